@@ -1,25 +1,25 @@
-"""Hair among hair: a grid of density and velocity around all guides of a groom.
+"""Forces between hair and hair: a grid of density and velocity around all guides of a groom.
 
     FELT_PER_SECOND times a second, before a substep:
-        deposit    each CV into the cell where it is: what strands it stands for, and their motion
-        look up    at each CV, of all others, smoothed: density, its gradient, mean motion
-        feel       pressure    out of where hair is denser than it was at rest
-                   cohesion    back to the others, where it is less dense than it was at rest
+        deposit    each CV into its cell: the mass of the strands it stands for, and their motion
+        look up    at each CV, from all others, smoothed: density, its gradient, mean motion
+        feel       pressure    out of regions where hair is denser than at rest
+                   cohesion    towards the others where it is less dense than at rest
                    friction    towards the mean motion
 
 Volumetric forces after Petrovic, Henne and Anderson 2005, "Volumetric Methods for Simulation and
 Rendering of Hair". Differences: density is compared with that of the same CV at rest, so that no
-style is inflated; and the grid goes with the groom and turns with it, so that hair at rest stays in
-its cells however the head moves.
+style is inflated; and the grid moves and turns with the groom, so that hair at rest stays in its
+cells however the head moves.
 
-A cell sums whole numbers, so its sums depend on no order. The grid wraps around: hair may be
-anywhere, and places that are a whole grid apart share their cells. It is as large as the groom at
-rest, so at rest none do.
+Cells sum whole numbers, so sums do not depend on the order. The grid wraps around: hair may be
+anywhere, and places that are a whole grid apart share a cell. The grid is as large as the groom at
+rest, so at rest no cells are shared.
 
-Other grooms leave their CVs in this grid too, see `neighbours`, as far as they are in the cells
-around this one's own. It is as large as the groom is then, so that none of theirs counts elsewhere.
+CVs of other grooms, see `neighbours`, are deposited too if they are in the cells around this
+groom. Then the grid is as large as the groom is at that moment, so that they count nowhere else.
 
-`reference/among.py` holds the same, one CV after the other; gpu_shaders/among_*.glsl are its twins.
+`reference/among.py` is a scalar implementation; gpu_shaders/among_*.glsl are the twins.
 """
 
 from __future__ import annotations
@@ -34,46 +34,47 @@ import numpy as np
 from ..arrays import Floats, Ints
 from .settings import DynamicsSettings
 
-#: How often hair feels other hair, nearly: a whole number of substeps apart [1/s].
+#: Approximate rate at which hair feels other hair, a whole number of substeps apart [1/s].
 FELT_PER_SECOND = 60.0
-#: The whole numbers of a cell: what a CV of a mean guide weighs, at most; a cell of motion in a
-#: substep, and how many cells count.
+#: Units of a cell's whole numbers: the mass of a mean guide's CV, and the largest mass; a motion by
+#: one cell per substep, and the largest motion in cells.
 MASS, HEAVIEST, MOTION, FASTEST = 16, 127, 1024, 4
-#: A cell is as wide as it takes for a CV to have this many others in its own at rest, and for the
-#: grid to have at most this many cells for each CV, between these fractions of the hair's length.
-#: The grid has at most SIDE cells to a side.
+#: The width of cells lies between FINEST and COARSEST, in fractions of the hair's length; within
+#: this range it is large enough for the median CV's cell to contain CROWD CVs at rest, and for the
+#: grid to have at most ROOM cells per CV. The grid has at most SIDE cells along each axis.
 CROWD, ROOM, FINEST, COARSEST, SIDE = 16, 2, 1.0 / 25.0, 1.0 / 8.0, 64
-#: Where a grid begins, in cells: nothing that is symmetric lies on the border of cells.
+#: Offset of the grid, in cells, so that symmetric hair does not lie on the borders of cells.
 BEGIN = np.array([0.37, 0.41, 0.43])
-#: Densities that differ by less than this part count as equal: CVs go from cell to cell one by one.
+#: Relative differences of density below this are ignored: CVs move between cells one by one.
 SLACK = 0.04
-#: Where the median density at rest is more than a CV's own, it is crowded from this part of it on.
+#: Lower limit of `HairGrid.full`, as a fraction of the median density at rest.
 THIN = 0.25
-#: At full volume: how far pressure and cohesion move a CV until hair feels again, where the
-#: density is twice what it was or nothing, in squared cells times the gradient of its logarithm;
-#: how far at most [cells]; and the rate at which friction takes differences of speed [1/s].
+#: At full volume: PUSH and PULL, displacement by pressure where the density has doubled and by
+#: cohesion where it has vanished, until hair feels again, in squared cells times the gradient of
+#: the density's logarithm; its maximum [cells]; the rate of friction [1/s].
 PUSH, PULL, FARTHEST, RUBBING = 1.4, 0.1, 0.4, 12.0
-#: CVs count where they will be after this part of the time until hair feels again: locks meet
-#: before they have gone through each other.
+#: CVs are deposited where they will be after this fraction of the time until hair feels again, so
+#: that locks meet before they have passed through each other.
 AHEAD = 0.75
-#: How many times more friction there is where the density is twice what it was: locks that meet
-#: stop.
+#: Factor of additional friction where the density has doubled: locks that meet stop.
 PRESSED = 15.0
-#: Cells beyond the groom's own in which other hair acts on it; and by how many cells a grid grows.
+#: Number of cells around the groom in which other hair acts on it; multiple of which a grid has
+#: cells along each axis.
 REACHED, GROWN = 2, 4
-#: What divides nothing [cells' worth of hair].
+#: Lower limit of divisors [density].
 TINY = 1.0e-6
 
 
 @dataclass(frozen=True, eq=False)
 class HairGrid:
-    """Where the hair of a groom was at rest.
+    """The grid of a groom, and its hair's density at rest.
 
-    cell: how wide [m]. counts: (3,) of cells. middle: (3,) float64 world [m], of the roots.
-    mass: (guide_count,) whole float32, MASS for a guide that stands for as many strands as most.
+    cell: width of a cell [m]. counts: (3,) of cells. middle: (3,) float64 world [m], of the roots.
+    mass: (guide_count,) whole float32, MASS for a guide that stands for the mean number of strands.
     unit: metres of hair that a CV of mass 1 stands for.
-    density: (cv_count, guide_count) float32 of the others at each CV.
-    full: the same, the density above which a CV is crowded; others are compared with it.
+    density: (cv_count, guide_count) float32, of the other CVs at each CV at rest.
+    full: (cv_count, guide_count) float32, the density above which pressure acts: `density`, but no
+        less than THIN of its median.
     """
 
     cell: float
@@ -92,7 +93,7 @@ class HairGrid:
         position: (3, cv_count, guide_count) world [m].
         size: the hair's length [m].
         strands: (guide_count,) how many each guide stands for; None: equally many.
-        others: hair of others there; None: there is none.
+        others: hair of other grooms at rest; None: there is none.
         """
         middle = position[:, 0].mean(axis=1, dtype=np.float64)
         mass = _masses(strands, position.shape[2])
@@ -109,7 +110,7 @@ class HairGrid:
         return replace(bare, density=density, full=full)
 
     def place(self, turn: Floats, middle: Floats) -> Place:
-        """Where the grid stands as the groom has turned, and its roots' middle has gone."""
+        """The grid's place once the groom has turned, with the middle of its roots at `middle`."""
         return Place(
             np.asarray(middle, np.float32),
             (np.asarray(turn, np.float64).T / self.cell).astype(np.float32),
@@ -119,10 +120,10 @@ class HairGrid:
 
 @dataclass(frozen=True)
 class Place:
-    """Where a grid stands.
+    """Where a grid stands in a frame.
 
     middle: (3,) float32 world [m]. into: (3, 3) float32, from the world to cells.
-    counts: (3,) of cells. low: the lowest one in which other hair counts.
+    counts: (3,) of cells. low: (3,) the lowest cell in which other hair counts.
     """
 
     middle: Floats
@@ -131,8 +132,8 @@ class Place:
     low: tuple[int, int, int] = (0, 0, 0)
 
     def around(self, points: Floats) -> Place:
-        """The same with cells enough for all that acts on a groom at these points (3, n) world
-        [m]."""
+        """The same with enough cells for a groom at these points (3, n) world [m], and all hair
+        that acts on it."""
         cells = self.cells(points)
         low = np.floor(cells.min(axis=1)).astype(int) - REACHED
         high = np.floor(cells.max(axis=1)).astype(int) + REACHED + 1
@@ -142,21 +143,21 @@ class Place:
         return replace(self, counts=(x, y, z), low=(first, second, third))
 
     def cells(self, points: Floats) -> Floats:
-        """Points (3, ...) world [m] in cells."""
+        """Points (3, ...) world [m] in units of cells."""
         return _turned(self.into, points - _beside(self.middle, points)) + _beside(
             BEGIN.astype(np.float32), points
         )
 
     def out(self, shifts: Floats, scale: float) -> Floats:
-        """Shifts (3, ...) in cells, in the world [m], times the scale over the square of a cell."""
+        """Shifts (3, ...) in cells as shifts in the world [m], with `Strength.scale` applied."""
         return _turned(self.into.T * np.float32(scale), shifts)
 
 
 @dataclass(frozen=True)
 class Strength:
-    """What the setting makes of the numbers above.
+    """The strength of forces between hair, by the settings and the constants above.
 
-    substeps: until hair feels again. push, pull: see PUSH. friction: rate times that time.
+    substeps: until hair feels again. push, pull: see PUSH. friction: its rate times that time.
     """
 
     substeps: int
@@ -166,16 +167,17 @@ class Strength:
 
     @property
     def ahead(self) -> float:
-        """How many substeps of its motion ahead a CV counts."""
+        """How many substeps ahead of its place a CV is deposited."""
         return AHEAD * self.substeps
 
     def scale(self, cell: float) -> float:
-        """From a shift in cells until hair feels again to what a substep adds, see `Place.out`."""
+        """The factor of `Place.out` from a shift in cells until hair feels again to the
+        displacement that each substep adds."""
         return cell * cell / self.substeps**2
 
     @classmethod
     def of(cls, settings: DynamicsSettings, dt: float) -> Strength | None:
-        """None where hair does not feel other hair."""
+        """The strength by the settings; None if hair does not feel other hair."""
         if not settings.volume:
             return None
         substeps = max(round(1.0 / (FELT_PER_SECOND * dt)), 1)
@@ -188,10 +190,9 @@ class Among:
     """How hair feels other hair in a frame.
 
     turn: (3, 3) of the groom since rest.
-    first: its first substep, counted since the start.
-    volume: (guide_count,) float32, by which the setting is multiplied where it is painted; None: it
-        is not.
-    others: other hair that is near; None: there is none.
+    first: the frame's first substep, counted since the start.
+    volume: (guide_count,) float32, painted factor of the setting; None: not painted.
+    others: nearby hair of other grooms; None: there is none.
     """
 
     grid: HairGrid
@@ -203,16 +204,16 @@ class Among:
     others: Others | None = None
 
     def is_due(self, number: int) -> bool:
-        """Whether hair feels before this substep of the frame."""
+        """Whether hair feels other hair before this substep of the frame."""
         return (self.first + number) % self.strength.substeps == 0
 
     def pieces(self, count: int) -> list[range]:
-        """The frame's substeps, cut where hair feels."""
+        """The frame's substeps in ranges, each of which begins where hair feels other hair."""
         cuts = [0, *(number for number in range(1, count) if self.is_due(number)), count]
         return [range(*ends) for ends in pairwise(cuts)]
 
     def beside(self, other: Neighbours | None) -> Among:
-        """The same where other hair is near."""
+        """The same with the hair of other grooms."""
         if other is None:
             return self
         place = other.grid.place(self.turn, self.place.middle).around(other.own)
@@ -227,10 +228,10 @@ class Among:
 
 @dataclass(frozen=True, eq=False)
 class Others:
-    """CVs of other hair.
+    """CVs of other grooms.
 
-    here: (3, n) float32 world [m], where they count. step: how they move in a substep.
-    mass: (n,) whole float32, see `HairGrid`.
+    here: (3, n) float32 world [m], where they are deposited. step: (3, n) [m], their motion in a
+        substep. mass: (n,) whole float32, see `HairGrid`.
     """
 
     here: Floats
@@ -239,12 +240,12 @@ class Others:
 
     @classmethod
     def of(cls, parts: Sequence[Others]) -> Others:
-        """All of them as one; there is at least one."""
+        """All parts, of which there is at least one, joined."""
         rows = ((part.here, part.step, part.mass) for part in parts)
         return cls(*(np.concatenate(each, axis=-1) for each in zip(*rows, strict=True)))
 
     def near(self, points: Floats, distance: float) -> Others:
-        """Those that are at most this far [m] from the box around points (3, n)."""
+        """The CVs that are within a distance [m] of the box around points (3, n)."""
         low, high = (_beside(end(axis=1), points) for end in (points.min, points.max))
         is_near = ((self.here >= low - distance) & (self.here <= high + distance)).all(axis=0)
         if is_near.all():
@@ -254,16 +255,17 @@ class Others:
         return Others(here, step, self.mass[chosen])
 
     def among(self, points: Floats) -> Floats:
-        """Points (3, n) and those that are in the box around them."""
+        """Points (3, n), and the CVs that are in the box around them, (3, m)."""
         return np.concatenate([points, self.near(points, 0.0).here], axis=1)
 
 
 @dataclass(frozen=True, eq=False)
 class Neighbours:
-    """What a groom feels of others at a moment.
+    """What a groom feels of other grooms at a moment.
 
-    grid: its own, in which they are at rest. others: as far ahead as its own CVs count.
-    own: (3, n) float32 world [m], where these count.
+    grid: its own, with the others included at rest.
+    others: their CVs, as far ahead as its own CVs are.
+    own: (3, n) float32 world [m], where its own CVs are deposited.
     """
 
     grid: HairGrid
@@ -280,13 +282,17 @@ def feel(
     volume: Floats | None = None,
     others: Others | None = None,
 ) -> tuple[Floats, Floats]:
-    """What friction takes from the motion of each CV at once, and what pressure and cohesion add in
-    each substep until hair feels again; both (3, cv_count, guide_count) [m].
+    """The effect of other hair on each CV, (3, cv_count, guide_count) [m] each.
 
-    Pressure that bears weight acts evenly: at once, it would throw the hair up and let it fall.
+    Pressure is spread over substeps because it bears weight: all at once, it would throw hair up
+    and let it fall again.
 
     Args:
-        others: as far ahead as these CVs count.
+        others: as far ahead as these CVs are deposited, see `Strength.ahead`.
+
+    Returns:
+        The motion per substep that friction takes away now, and the displacement by pressure and
+        cohesion in each substep until hair feels again.
     """
     motion = position - previous
     felt = Felt.of(grid, place, position + motion * np.float32(strength.ahead), motion, others)
@@ -309,9 +315,10 @@ def feel(
 
 @dataclass(frozen=True)
 class Felt:
-    """Of the other CVs at each, (..., cv_count, guide_count) float32.
+    """The grid's fields at each CV, of all other CVs, (..., cv_count, guide_count) float32.
 
-    density: [MASS a cell]. gradient: (3, ...) [the same a cell]. motion: (3, ...) world [m].
+    density: [mass per cell]. gradient: (3, ...) [density per cell]. motion: (3, ...) mean motion
+        in a substep, world [m].
     """
 
     density: Floats
@@ -347,7 +354,7 @@ class Felt:
 
 
 def others_in(place: Place, others: Others, cell: float) -> Floats:
-    """What other hair leaves in the cells, see `_sums`: of what is in those around the groom."""
+    """The sums of other hair, see `_sums`, from its CVs in the cells around the groom."""
     part = place.cells(others.here)
     nearest = np.floor(part + np.float32(0.5))
     low, counts = (np.array(each, np.float32)[:, None] for each in (place.low, place.counts))
@@ -359,10 +366,11 @@ def others_in(place: Place, others: Others, cell: float) -> Floats:
 
 
 def own_part(part: Floats) -> tuple[Floats, Floats]:
-    """What a CV finds of itself, (n,), and of itself in the gradient, (3, n), for a mass of 1.
+    """A CV's contribution to the density, (n,), and to the gradient, (3, n), at its own place, for
+    a mass of 1.
 
-    Its own cell is the nearer one of the two along each axis. Smoothing leaves a half of it there
-    and a quarter in each neighbour, and no slope there.
+    Along each axis, its cell is the nearer one of two. Smoothing leaves a half of the mass in it
+    and a quarter in each neighbour, without slope in the cell itself.
 
     Args:
         part: see `_between`.
@@ -375,20 +383,21 @@ def own_part(part: Floats) -> tuple[Floats, Floats]:
 
 
 def whole_motion(motion: Floats, cell: float) -> Floats:
-    """Ways [m] in whole parts of a cell, float32."""
+    """Motions [m] as whole numbers of cell / MOTION, clamped to FASTEST cells, float32."""
     limit = np.float32(FASTEST * MOTION)
     return np.rint(np.clip(motion * np.float32(MOTION / cell), -limit, limit))
 
 
 def _wrapped(corner: Floats, counts: tuple[int, int, int]) -> Ints:
-    """Which cell of a grid that wraps around it is, along each axis (3, n), for whole numbers."""
+    """Cell numbers in a grid that wraps around, along each axis (3, n), from whole numbers."""
     return corner.astype(np.int32) % np.array(counts, np.int32)[:, None]
 
 
 def _sums(
     low: Ints, part: Floats, lanes: tuple[Floats, ...], counts: tuple[int, int, int]
 ) -> Floats:
-    """What all CVs leave in the cells, (4, *counts) float32 of whole numbers."""
+    """The sums of all CVs in the cells, (4, *counts) float32, whole numbers: mass, and mass times
+    motion along each axis."""
     x, y, z = low + (part >= np.float32(0.5))
     after = tuple(count + 1 for count in counts)
     index = (x * after[1] + y) * after[2] + z
@@ -397,7 +406,7 @@ def _sums(
 
 
 def _folded(padded: Floats) -> Floats:
-    """One cell more along each axis, which is the first one again, added to that."""
+    """Sums without the extra last cell along each axis, which is added to the first one."""
     for axis in (1, 2, 3):
         cells = np.moveaxis(padded, axis, 0)
         cells[0] += cells[-1]
@@ -406,9 +415,10 @@ def _folded(padded: Floats) -> Floats:
 
 
 def _fields(sums: Floats) -> Floats:
-    """Of each cell from the 27 around: density, motion and the gradient of density, (x, y, z, 7).
+    """Density, motion and the gradient of density in each cell, smoothed over the 27 cells around
+    it, (x, y, z, 7).
 
-    Each axis ends with its first cell once more.
+    Each axis ends with its first cell repeated.
     """
     x, y, z = 1, 2, 3
     over_x = _smooth(sums, x)
@@ -423,7 +433,7 @@ def _fields(sums: Floats) -> Floats:
 
 
 def _smooth(sums: Floats, axis: int) -> Floats:
-    """A quarter, a half and a quarter of three cells."""
+    """Sums smoothed along an axis by the weights 1/4, 1/2 and 1/4."""
     before, here, after = _three(sums, axis)
     smooth: Floats = before + after
     smooth *= np.float32(0.5)
@@ -433,7 +443,7 @@ def _smooth(sums: Floats, axis: int) -> Floats:
 
 
 def _steep(sums: Floats, axis: int) -> Floats:
-    """Half of what the next cell has more than the one before."""
+    """The central difference along an axis, per cell."""
     before, _, after = _three(sums, axis)
     steep: Floats = after - before
     steep *= np.float32(0.5)
@@ -441,7 +451,7 @@ def _steep(sums: Floats, axis: int) -> Floats:
 
 
 def _three(sums: Floats, axis: int) -> tuple[Floats, Floats, Floats]:
-    """Of each cell along an axis, and of the first once more: that before, itself, the next."""
+    """The previous, the same and the next cell of each along an axis, with the first repeated."""
     count = sums.shape[axis]
     around = sums.take(np.arange(-1, count + 2), axis=axis, mode="wrap")
     before, here, after = (
@@ -451,11 +461,11 @@ def _three(sums: Floats, axis: int) -> tuple[Floats, Floats, Floats]:
 
 
 def _between(fields: Floats, low: Ints, part: Floats) -> Floats:
-    """The fields (n, 7) between the middles of cells.
+    """The fields interpolated between the middles of cells, (n, 7).
 
     Args:
         low: (3, n) the lowest of the eight cells whose middles are around a point.
-        part: (3, n) how far the point is from that middle to the next.
+        part: (3, n) the point's place between that middle and the next, from 0 to 1.
     """
     _, count_y, count_z, _ = fields.shape
     rows = fields.reshape(-1, fields.shape[-1])
@@ -491,7 +501,7 @@ def _masses(strands: Floats | None, guide_count: int) -> Floats:
 
 
 def _cell_of(points: Floats, extent: Floats, size: float) -> float:
-    """How wide the cells are, for points (3, n) [m]."""
+    """The width of cells for points (3, n) [m], see CROWD."""
     finest, coarsest = FINEST * size, COARSEST * size
     cell = max(min(max(finest, float(extent.max()) / (SIDE - 2)), coarsest), TINY)
     while cell < coarsest and (
@@ -503,7 +513,7 @@ def _cell_of(points: Floats, extent: Floats, size: float) -> float:
 
 
 def _crowd_of(points: Floats, cell: float) -> float:
-    """How many points are in the same cell as a point, the median."""
+    """The median number of points that share a point's cell, including itself."""
     corner = np.floor((points - points.min(axis=1)[:, None]) / cell).astype(np.int64)
     key = (corner[0] * (1 << 20) + corner[1]) * (1 << 20) + corner[2]
     _, own, number = np.unique(key, return_inverse=True, return_counts=True)
@@ -515,6 +525,6 @@ def _beside(vector: Floats, points: Floats) -> Floats:
 
 
 def _turned(matrix: Floats, points: Floats) -> Floats:
-    """matrix @ points, in the order of sums that the GPU takes."""
+    """matrix @ points, summed in the same order as on the GPU."""
     rows = [row[0] * points[0] + row[1] * points[1] + row[2] * points[2] for row in matrix]
     return np.stack(rows)

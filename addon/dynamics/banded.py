@@ -1,9 +1,9 @@
-"""Direct solves of small banded systems, one a guide, in step with all guides.
+"""Direct solvers for small banded systems, one per guide, for all guides at once.
 
-Rows are CVs or segments, so a sweep down the band is a Python loop of whole-row numpy calls.
-Only +, -, *, / are used, which IEEE 754 rounds alike everywhere: no BLAS. For some hundred guides
-the calls cost more than the numbers, so arrays are taken apart into rows once, and functions that
-are given where to write stand for operators, which take longer.
+Rows are CVs or segments, so a sweep down the band is a Python loop of numpy calls on whole rows.
+Only +, -, *, / are used, which IEEE 754 rounds alike everywhere: no BLAS. For a few hundred guides
+the overhead of calls dominates, so arrays are split into rows once, and ufuncs with an output
+argument are used instead of operators, which are slower.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from ..arrays import Floats
 
 
 def solve_tridiagonal(diagonal: Floats, beside: Floats, right: Floats) -> None:
-    """Solve symmetric tridiagonal systems in place: `right` becomes the answer.
+    """Solve symmetric tridiagonal systems in place: `right` becomes the solution.
 
     Thomas's algorithm without pivoting, as the systems are positive definite.
 
@@ -43,15 +43,15 @@ def solve_tridiagonal(diagonal: Floats, beside: Floats, right: Floats) -> None:
 
 
 class SharedBand:
-    """Symmetric positive definite matrices with two diagonals beside the main one, factored as
-    L D L^T, to be solved for many right sides: one for all guides, or one for each.
+    """Symmetric positive definite pentadiagonal matrices, factored as L D L^T for many right sides:
+    one for all guides, or one for each.
 
     Args:
-        main, beside, beyond: (n, 1) or (n, guide_count) float64, the diagonals; row i of the others
-            couples rows i and i + 1, and i and i + 2. What reaches beyond the matrix is not read.
+        main, beside, beyond: (n, 1) or (n, guide_count) float64, the diagonals; entry i of the
+            others couples rows i and i + 1, and i and i + 2. Entries beyond the matrix are not
+            read.
 
-    near, far: float32 of the same shape, L beside the diagonal: row i takes near[i] of row i - 1,
-    far[i] of i - 2. inverse_pivot: 1 / D.
+    near, far: float32 of the same shape, L[i, i - 1] and L[i, i - 2]. inverse_pivot: 1 / D.
     """
 
     def __init__(self, main: Floats, beside: Floats, beyond: Floats) -> None:
@@ -69,13 +69,13 @@ class SharedBand:
 
     def _take(self, near: Floats, far: Floats, inverse_pivot: Floats) -> None:
         self.near, self.far, self.inverse_pivot = near, far, inverse_pivot
-        # arrays without axes: numpy takes these in half the time that it needs for numbers
+        # arrays without axes, which numpy handles in half the time of plain numbers
         self._near, self._far = (
             [np.array(row[0]) if len(row) == 1 else row for row in rows] for rows in (near, far)
         )
 
     def part(self, guides: slice) -> SharedBand:
-        """The matrices of these guides, where each has its own."""
+        """The matrices of these guides, if each guide has its own."""
         some = SharedBand.__new__(SharedBand)
         some._take(*(each[:, guides] for each in (self.near, self.far, self.inverse_pivot)))
         return some
@@ -84,7 +84,7 @@ class SharedBand:
         """Replace `right` (3, n, guide_count) float32 by the solution."""
         if not right.shape[1]:
             return
-        band = np.ascontiguousarray(right.transpose(1, 0, 2))  # x, y and z of a row in one go
+        band = np.ascontiguousarray(right.transpose(1, 0, 2))  # x, y and z of a row at once
         rows, scratch = list(band), np.empty_like(band[0])
         for i, row in enumerate(rows[1:], 1):
             subtract(row, multiply(rows[i - 1], self._near[i], scratch), row)

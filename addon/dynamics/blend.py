@@ -1,8 +1,7 @@
-"""Guides between their style and their simulation, for what is shown: the simulation goes on as if
-all of it were seen.
+"""Blending the visible guides between their style and their simulation.
 
-Blending places would shorten a guide that has swung far. So each segment has a direction between
-both, and a length between both, and the segments are put together from the root on.
+The simulation itself is not affected. Blending positions would shorten a guide that has swung far,
+so directions and lengths of segments are blended, and the segments joined from the root on.
 """
 
 from __future__ import annotations
@@ -12,22 +11,22 @@ import numpy as np
 from ..arrays import Floats
 from .constraints import TINY
 
-#: Sums of two unit vectors that are shorter than this have no direction.
+#: A blend of two unit vectors shorter than this has no direction.
 OPPOSITE = np.float32(1.0e-4)
 
 
 def seen(simulated: Floats, style: Floats, fraction: Floats | None) -> Floats:
-    """What is seen of simulated guides, see `blended`, float32; None: all of all."""
+    """The visible guides, float32: `blended`, or the simulated ones if `fraction` is None."""
     if fraction is None:
         return simulated
     return blended(simulated, style.astype(np.float32), fraction)
 
 
 def blended(simulated: Floats, style: Floats, fraction: Floats) -> Floats:
-    """Guides (guide_count, cv_count, 3) [m], the root that of the style.
+    """Blended guides (guide_count, cv_count, 3) [m], with the roots of the style.
 
     Args:
-        fraction: (guide_count,), 0 is the style and 1 the simulation, each to the bit.
+        fraction: (guide_count,), 0 gives the style and 1 the simulation, both exactly.
     """
     part = fraction.astype(np.float32)[:, None, None]
     segments = blended_segment(np.diff(simulated, axis=1), np.diff(style, axis=1), part)
@@ -38,8 +37,8 @@ def blended(simulated: Floats, style: Floats, fraction: Floats) -> Floats:
 
 
 def blended_segment(simulated: Floats, style: Floats, fraction: Floats) -> Floats:
-    """Vectors (..., 3) [m] between two others; where these point against each other, the
-    simulated one's direction."""
+    """Vectors (..., 3) [m] blended by direction and length; if their directions cancel out, the
+    direction of `simulated` is used."""
     long, rest = (np.linalg.norm(each, axis=-1, keepdims=True) for each in (simulated, style))
     toward, ahead = simulated / np.maximum(long, TINY), style / np.maximum(rest, TINY)
     direction = ahead + (toward - ahead) * fraction

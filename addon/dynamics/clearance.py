@@ -1,7 +1,7 @@
-"""How far guides stay from colliders at most: as far as they were where the artist combed them.
+"""The upper limit of the distance that guides keep from colliders: that at which they were combed.
 
-The collision radius of a CV goes by the length of all hair. Brows, and hair that lies on the head,
-are nearer than that; without this, a motion would begin by lifting them off.
+The collision radius of a CV depends on the length of all hair. Brows, and hair that lies close to
+the head, are nearer than that; without this limit, a motion would begin by lifting them off.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from .settings import DynamicsSettings
 class GuideClearance:
     """Distances from colliders when a motion began.
 
-    reach: [m], none is longer.
+    reach: [m], upper limit of the distances.
     distances: (guide_count, cv_count, 1 + len(BETWEEN)) float32 [m], of each CV, and of the points
-        of the segment that ends there; 0 for what was inside, which is led out to the surface.
+        of the segment that ends there; 0 for points inside, which are moved out to the surface.
     """
 
     reach: float
@@ -37,18 +37,18 @@ class GuideClearance:
 
 
 def farthest_kept(settings: DynamicsSettings, size: float) -> float:
-    """[m] that any CV keeps from colliders, by hair of this size."""
+    """The largest distance [m] that a CV keeps from colliders, for hair of this size [m]."""
     return size * max(settings.radius_root, settings.radius_tip)
 
 
 def guide_clearance(
     grid: Floats, colliders: Sequence[PosedCollider], reach: float
 ) -> GuideClearance:
-    """That of a motion which begins now.
+    """The clearance of a motion that begins now.
 
     Args:
         grid: (guide_count, cv_count, 3) world [m], at rest.
-        colliders: taken where they stand at their frame's end.
+        colliders: used in their poses at the frame's end.
         reach: [m], see `farthest_kept`.
     """
     before = grid[:, np.maximum(np.arange(grid.shape[1]) - 1, 0)]

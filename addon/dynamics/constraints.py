@@ -4,15 +4,15 @@ For each segment j between CV j and CV j + 1, s_j = x_{j+1} - x_j, the constrain
 One Newton step solves  (J W J^T) lambda = |s_j| - l_j  and moves x by  -W J^T lambda  (Goldenthal
 et al. 2007, "Efficient Simulation of Inextensible Cloth", fast projection). On a chain the matrix
 is tridiagonal, so a step is exact up to the curvature of the constraint and costs as much as two
-relaxations. Each row and each unknown is multiplied by its |s_j|, which spares the unit vectors:
+relaxations. Each row and each unknown is scaled by its |s_j|, which avoids unit vectors:
 
     A_jj    =  s_j . (W_j + W_{j+1}) s_j          W_c = 0 for the pinned CVs,
     A_j,j+1 = -s_j . W_{j+1} s_{j+1}              else I - b n n^T
     right_j =  |s_j| (|s_j| - l_j)
 
 where n is the normal of the collider that CV c touches, or zero. So a CV in contact is 1 / (1 - b)
-times heavier across the surface and slides along it, and keeping the length does not push it in.
-A held CV has nearly W = 0.
+times heavier across the surface: it slides along it, and keeping lengths does not push it in. W of
+a held CV is nearly 0.
 """
 
 from __future__ import annotations
@@ -29,27 +29,27 @@ from .banded import solve_tridiagonal
 
 #: CVs of each guide that the head carries: the second gives the root's direction (TressFX).
 PINNED = ROOT_POINTS
-#: b above. At 1 a segment that stands straight on a collider could not change its length at all;
-#: at 0.98 hair with its root deep inside of a collider was seen to tremble, at 0.9 not.
+#: b above. At 1 a segment perpendicular to a collider could not change its length at all; at 0.98
+#: hair with its root deep inside a collider trembled, at 0.9 it does not.
 CONTACT_WEIGHT = np.float32(0.9)
-#: Mass that a held CV seems to have more than others, as a fraction: all but 1, as the lengths of
-#: a straight guide between two ends that cannot move have no solution. It is put back at once.
+#: 1 - W of a held CV. Not quite 1, as the lengths of a straight guide between two fixed ends have
+#: no solution; after the solve the CV is put back to its place.
 HELD = np.float32(0.99)
-#: How often guides with held CVs are shortened to and fro.
+#: Number of sweeps back and forth that shorten guides with held CVs.
 HELD_SWEEPS = 4
 #: Lengths below this count as zero [m].
 TINY = np.float32(1.0e-12)
 _TINY_SQUARED = TINY * TINY
-#: A length cannot be kept better, as float32 rounds world coordinates that are some times larger
-#: than the hair is long: in lengths of the hair.
+#: Accuracy of segment lengths, as a fraction of the hair's length: float32 rounds world coordinates
+#: that are several times larger than that.
 ROUNDING = 4.0e-6
 
 
 @dataclass(frozen=True)
 class Touched:
-    """Free CVs that touch a collider; few do, so that lists are quicker here than whole grids.
+    """Free CVs that touch a collider; they are few, so lists are faster here than whole grids.
 
-    index: (m,) rising, into (cv_count, guide_count) in C order.
+    index: (m,) ascending, into (cv_count, guide_count) in C order.
     normal: (3, m) unit, outwards, world.
     """
 
@@ -57,14 +57,18 @@ class Touched:
     normal: Floats
 
     def part(self, guides: Ints, guide_count: int) -> Touched:
-        """Those of some guides (n,), rising, of all; their index is among these guides alone."""
+        """The part for some guides (n,), ascending, reindexed to these."""
         index, kept = part_of(self.index, guides, guide_count)
         return Touched(index, self.normal[:, kept])
 
 
 def part_of(index: Ints, guides: Ints, guide_count: int) -> tuple[Ints, Ints]:
-    """Of indices (m,) into (cv_count, guide_count) in C order those of some guides (n,), rising: as
-    they are among these guides alone, and which these are."""
+    """Select indices of some guides (n,), ascending, from indices (m,) into (cv_count, guide_count)
+    in C order.
+
+    Returns:
+        The indices (k,) into (cv_count, n), and which of the m these are, (k,).
+    """
     cv, guide = np.divmod(index, guide_count)
     place = np.searchsorted(guides, guide)
     kept = np.flatnonzero(guides.take(place, mode="clip") == guide)
@@ -72,16 +76,16 @@ def part_of(index: Ints, guides: Ints, guide_count: int) -> tuple[Ints, Ints]:
 
 
 def pin(position: Floats, carried: Floats, length: Floats, held: Floats | None) -> None:
-    """Put the pinned CVs where the head carries them, and held ones where their ties do; they have
-    infinite mass.
+    """Put the pinned CVs where the head carries them, and held ones where their ties do, as if they
+    had infinite mass.
 
-    A held CV goes no farther from the one held before it than its length along the strand reaches.
-    Two that are neighbours keep their distance.
+    A held CV stays within reach of the previous held one, by the length of the strand between them.
+    Two that are neighbours keep exactly that length.
 
     Args:
         position, carried: (3, cv_count, guide_count) world [m].
         length: (cv_count - 1, guide_count) [m].
-        held: see `held.Held.rows`; None where no CV is held.
+        held: see `held.Held.rows`; None if no CV is held.
     """
     position[:, :PINNED] = carried[:, :PINNED]
     if held is None:
@@ -104,14 +108,14 @@ def pin(position: Floats, carried: Floats, length: Floats, held: Floats | None) 
 def keep_lengths(
     position: Floats, length: Floats, touched: Touched | None, held: Floats | None
 ) -> None:
-    """Bring all segments of `position` towards their length, in place.
+    """Bring all segments of `position` towards their lengths, in place.
 
-    One Newton step; exact but for the turn of the segments that it makes.
+    One Newton step, exact up to the rotation of segments that it causes.
 
     Args:
         position: (3, cv_count, guide_count) world [m], in C order.
         length: (cv_count - 1, guide_count) [m].
-        touched: None where nothing touches.
+        touched: None if nothing touches.
         held: see `pin`.
     """
     if position.shape[1] > PINNED:
@@ -123,15 +127,18 @@ def spring_step(position: Floats, target: Floats, compliance: Floats, held: Floa
 
     Args:
         position: (3, cv_count, guide_count) world [m], in C order.
-        target: (cv_count - PINNED, guide_count) [m], to which each segment would go without any.
+        target: (cv_count - PINNED, guide_count) [m], the length that each segment is drawn to.
         compliance: in the shape of `target`, over dt^2, for CVs of mass 1; 0 is rigid.
     """
     _newton_step(position, target, None, held, compliance)
 
 
 def relax_lengths(position: Floats, length: Floats, held: Floats | None, sweeps: int) -> None:
-    """Bring segments towards their length one after the other, from root to tip, again and again
-    (Jakobsen 2001): each gives half of its error to both of its ends, all of it to a free one."""
+    """Bring segments towards their lengths by `sweeps` relaxations from root to tip, in place.
+
+    Each segment moves both of its ends by half of its error, or a single free end by all of it
+    (Jakobsen 2001).
+    """
     last = position.shape[1] - 1
     for _ in range(sweeps):
         for cv in range(PINNED, last + 1):
@@ -150,8 +157,11 @@ def relax_lengths(position: Floats, length: Floats, held: Floats | None, sweeps:
 
 
 def hold_within_reach(position: Floats, length: Floats, held: Floats | None) -> None:
-    """No CV farther from the last pinned one than its length along the strand (Kim, Chentanez and
-    Mueller 2012, "Long Range Attachments"), neither in a straight line nor along the strand."""
+    """Bring each CV within reach of the last pinned one, in place.
+
+    Neither its straight distance nor that along the strand exceeds the strand's length there (Kim,
+    Chentanez and Mueller 2012, "Long Range Attachments").
+    """
     root = position[:, PINNED - 1 : PINNED]
     displacement = position[:, PINNED:] - root
     reach = np.cumsum(length[PINNED - 1 :], axis=0)
@@ -164,11 +174,11 @@ def hold_within_reach(position: Floats, length: Floats, held: Floats | None) -> 
 
 
 def shorten(position: Floats, length: Floats, held: Floats | None) -> None:
-    """No segment longer than it should be: from root to tip each CV comes near enough to the one
-    before it. That shortens zigzags, which long-range attachments let pass.
+    """Shorten segments that are too long, in place: from root to tip, each CV is pulled to the one
+    before it. That shortens zigzags, which long-range attachments alone allow.
 
-    Guides with held CVs are shortened to and fro, from these to the root first; where both cannot
-    be had, the length counts and not the held CV's place.
+    Guides with held CVs are shortened back and forth, first from these towards the root; if both
+    constraints conflict, lengths take precedence over the places of held CVs.
     """
     before = None if held is None else position.copy()
     is_swept = np.ones(position.shape[2], bool)
@@ -185,7 +195,7 @@ def shorten(position: Floats, length: Floats, held: Floats | None) -> None:
 
 
 def _brought_near(point: Floats, other: Floats, farthest: Floats) -> Floats:
-    """Points (3, n), no farther from the others than this (n,) [m]."""
+    """Points (3, n) pulled to no more than a distance (n,) [m] from others (3, n)."""
     offset = point - other
     offset *= np.minimum(
         farthest / np.maximum(np.sqrt(dot_rows(offset, offset)), TINY), np.float32(1.0)
@@ -195,8 +205,8 @@ def _brought_near(point: Floats, other: Floats, farthest: Floats) -> Floats:
 
 
 def _towards_root(held: Floats) -> Iterator[tuple[int, Bools]]:
-    """CVs from the last but one to the root, and which guides (guide_count,) are held somewhere
-    beyond them but not there."""
+    """CVs from the second last towards the root, each with the guides (guide_count,) that are held
+    somewhere beyond it but not there."""
     is_beyond = np.zeros(held.shape[1], bool)
     for cv in range(len(held) - 2, PINNED - 1, -1):
         is_beyond |= held[cv + 1] > 0.0
@@ -212,10 +222,11 @@ def finish_lengths(
     iterations: int,
     size: float,
 ) -> None:
-    """Go on, with the guides that need it, until no segment is off by more than `tolerance`.
+    """Repeat Newton steps, for the guides that need it, until no segment is off by more than
+    `tolerance`.
 
     Few guides do, and only when they are jerked around. One that is still off after `iterations`
-    Newton steps is laid out again.
+    steps is rebuilt from its directions, see `_laid_out`.
 
     Args:
         size: of the hair [m], see `state.Rest`.
@@ -238,10 +249,11 @@ def finish_lengths(
 
 
 def _laid_out(position: Floats, length: Floats, held: Floats | None) -> Floats:
-    """Guides with their segments' directions and exact lengths, from the root (follow the leader).
+    """Guides rebuilt from the root on with the directions of their segments and exact lengths
+    (follow the leader).
 
-    Those with held CVs are laid out from these to the root first, as FABRIK does (Aristidou and
-    Lasenby 2011); where both cannot be had, the length counts and not the held CV's place.
+    Guides with held CVs are first rebuilt from these towards the root, as in FABRIK (Aristidou and
+    Lasenby 2011); if both constraints conflict, lengths take precedence.
     """
     if held is not None:
         direction, _ = directions(position)
@@ -255,7 +267,7 @@ def _laid_out(position: Floats, length: Floats, held: Floats | None) -> Floats:
 
 
 def _off_length(position: Floats, length: Floats, tolerance: float, size: float) -> Ints:
-    """Guides of which a segment is off by more than this fraction of its length."""
+    """Guides with a segment that is off by more than this fraction of its length, and ROUNDING."""
     segment = position[:, PINNED:] - position[:, PINNED - 1 : -1]
     error = dot_rows(segment, segment)
     np.sqrt(error, out=error)
@@ -299,12 +311,16 @@ def _newton_step(
 def _solve_and_slide(
     position: Floats, segment: Floats, system: tuple[Floats, Floats, Floats], touched: Touched
 ) -> None:
-    """Solve with the weight of contacts, and take back what would push into them."""
+    """Solve with the weight of contacts, and undo the part of the motion that goes into them.
+
+    Args:
+        system: diagonal, off-diagonal and right side; the last becomes the solution.
+    """
     diagonal, beside, right = (part.reshape(-1) for part in system)
     rows, normal, guide_count = segment.reshape(3, -1), touched.normal, segment.shape[2]
     upper = touched.index - PINNED * guide_count  # the segment that ends at the CV
-    count = upper.searchsorted(beside.size)  # of all but tips, where no segment begins
-    inner, lower = upper[:count], upper[:count] + guide_count  # and the one that begins there
+    count = upper.searchsorted(beside.size)  # without tips, where no segment begins
+    inner, lower = upper[:count], upper[:count] + guide_count  # the segment that begins there
     along_upper = dot_rows(normal, chosen(rows, upper))
     along_lower = dot_rows(normal[:, :count], chosen(rows, lower))
     heavy_upper, heavy_lower = CONTACT_WEIGHT * along_upper, CONTACT_WEIGHT * along_lower
@@ -327,7 +343,7 @@ def segments(position: Floats) -> tuple[Floats, Floats]:
 
 
 def chain_matrix(segment: Floats, squared: Floats) -> tuple[Floats, Floats]:
-    """A of a guide without contacts: its diagonal (n, guide_count), and the one beside it.
+    """A of guides without contacts: its diagonal (n, guide_count) and off-diagonal.
 
     Args:
         segment, squared: see `segments`, from the last pinned CV to the tip.
@@ -339,7 +355,7 @@ def chain_matrix(segment: Floats, squared: Floats) -> tuple[Floats, Floats]:
 
 
 def less_next(rows: Floats) -> Floats:
-    """Each of (3, n, guide_count) less the next one, the last as it is: J^T, but for its sign."""
+    """Each of (3, n, guide_count) minus the next one, the last as it is: J^T."""
     result = np.empty_like(rows)
     np.subtract(rows[:, :-1], rows[:, 1:], out=result[:, :-1])
     result[:, -1:] = rows[:, -1:]
@@ -355,7 +371,7 @@ def directions(position: Floats) -> tuple[Floats, Floats]:
 
 
 def _length(vector: Floats) -> Floats:
-    """Length over the first axis, never zero; what is added is lost to rounding above 1e-8 m."""
+    """Length over the first axis, never zero; the term added is below rounding above 1e-8 m."""
     squared = dot_rows(vector, vector)
     squared += _TINY_SQUARED
     length: Floats = np.sqrt(squared, out=squared)
@@ -363,11 +379,11 @@ def _length(vector: Floats) -> Floats:
 
 
 def unit(vector: Floats) -> Floats:
-    """As `vectors.unit_rows`, in fewer steps, for each substep: see `_length`."""
+    """`vectors.unit_rows` in fewer operations, for use in each substep; see `_length`."""
     result: Floats = vector / _length(vector)
     return result
 
 
 def chosen(rows: Floats, index: Ints) -> Floats:
-    """The chosen columns (3, m) of rows (3, n), at their quickest where these are contiguous."""
+    """The chosen columns (3, m) of rows (3, n); fastest if these are contiguous."""
     return rows.take(index, axis=1, mode="clip")

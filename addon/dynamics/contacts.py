@@ -1,26 +1,24 @@
-"""Contacts: found once in a substep or a part of it, solved as planes in turn with lengths.
+"""Contacts: found once per substep or part of it, solved as planes in turn with lengths.
 
-A CV near a collider gets the plane of its nearest surface, moved out by the CV's own radius, which
-grows from root to tip (the "pearl" configuration of Nguyen and Donnelly 2005). What a plane asks
-for is limited: a CV goes no deeper than it was, as seen from the moving collider, and is led out by
-no more than `depenetration_speed`. So hair that starts inside comes out at a walk instead of
-exploding.
+A CV near a collider gets the plane of the nearest surface, moved out by the CV's own radius, which
+grows from root to tip (the "pearl" configuration of Nguyen and Donnelly 2005). The plane's demand
+is limited: a CV goes no deeper than it was, relative to the moving collider, and is moved out no
+faster than `depenetration_speed`. So hair that starts inside comes out slowly instead of exploding.
 
-Two things are looked at more closely where a collider's curves are tight for them, by the same
-measure: a straight way of length c, between two points outside of a ball of radius R, enters it by
-no more than c^2 / 8 R.
+Segments and paths need more care if a collider is sharply curved for their length: a straight line
+of length c between two points outside of a ball of radius R enters it by no more than c^2 / 8 R.
 
-    a segment   gets a plane too, at the deepest of some points between its CVs; what it asks for is
-                shared out to both of them
-    a CV's way  in a substep, as seen from the moving collider, is followed until it meets the
-                surface (sphere tracing, Hart 1996); the plane is the one there. So nothing passes
-                through what is thin, however fast either of them is
+    a segment    gets a plane too, at the deepest of some points between its CVs; its push is
+                 distributed to both of them
+    a CV's path  in a substep, relative to the moving collider, is followed until it meets the
+                 surface (sphere tracing, Hart 1996), and gets the plane there. So nothing passes
+                 through thin colliders, however fast either of them is
 
 Friction is Coulomb's, on positions (Macklin et al. 2014, "Unified Particle Physics", section 6.1):
 the slip against the collider's own motion is reduced by up to mu times the push.
 
-Limitations: one plane a CV, a segment and collider and substep; between colliders that touch each
-other the last one wins.
+Limitations: in a substep, each CV and each segment gets one plane per collider; between colliders
+that touch each other the last one wins.
 """
 
 from __future__ import annotations
@@ -37,44 +35,42 @@ from .colliders.posed import near_points, world_distance
 from .constraints import PINNED, TINY, Touched, chosen, part_of
 from .settings import DynamicsSettings
 
-#: How far a CV may be brought by the length solve after contacts were found, in sizes: these are
-#: the median length of hair, `state.Rest.size`, and `cloth.state.Fabric.size`.
+#: How far the length solve may move a CV after contacts were found, in sizes: `state.Rest.size`,
+#: the median length of hair, or `cloth.state.Fabric.size`.
 REACH = 0.008
-#: What is allowed to enter a collider unseen, in sizes: less than the radius that a CV keeps.
+#: Depth up to which lines may enter a collider undetected, in sizes: less than a CV's radius.
 UNSEEN = 0.003
-#: Where segments are looked at, as fractions from one CV to the next.
+#: The points of segments that are tested, as fractions from one CV to the next.
 BETWEEN = (0.25, 0.5, 0.75)
-#: Of the radius that CVs keep, what points of segments keep: hair that lies on a round surface goes
-#: by its CVs alone.
+#: The radius of these points as a fraction of the CVs', so that hair on a round surface rests on
+#: its CVs alone.
 BETWEEN_RADIUS = np.float32(0.5)
-#: Steps along a way at most; the shortest is this part of the way.
+#: Maximum number of steps along a path; the shortest step is the path's length over this number.
 TRACE_STEPS = 12
-#: How much of its distance may be missing, as a fraction of it, before contacts and lengths are
-#: solved in turn once more, and how often that is.
+#: The fraction of its distance that a point may lack before contacts and lengths are solved again;
+#: maximum number of such rounds.
 MAY_MISS, MORE_ROUNDS = np.float32(0.5), 10
-#: How many segments the root of a guide and a point that touches go in a substep, as seen from a
-#: collider, before the guide goes through it in parts; how many these are, and how many times as
-#: often contacts and lengths are solved in turn in each.
+#: A guide is advanced in parts of the substep if its root and a touching point both move farther
+#: than FAST segments, relative to a collider. Number of parts; factor of `passes` in each.
 FAST, PARTS, PART_PASSES = 0.5, 10, 2
-#: How often one CV is pushed by what a point near the other, which is pinned, asks for.
+#: Maximum factor of a push on a segment's free CV, if the other one, near the contact, is pinned.
 MAX_WEIGHT = np.float32(2.0)
-#: Closer than this to its plane a CV counts as touching, so that lengths do not push it in; in
-#: sizes.
+#: Distance from its plane below which a CV touches it, so that lengths do not push it in; in sizes.
 SKIN = 4.0e-4
 
 
 @dataclass(frozen=True)
 class Contacts:
-    """Planes of one collider, m of them.
+    """The contact planes of one collider, m of them.
 
     pose: of the collider.
-    index: (m,) into the points that contacts were looked for.
-    normal: (3, m) outwards, world. offset: (m,) [m], the point shall keep normal . x >= offset.
-    origin: (3, m) world [m], where the point would be had it stayed with the collider.
+    index: (m,) into the points that were tested.
+    normal: (3, m) outwards, world. offset: (m,) [m]; points must keep normal . x >= offset.
+    origin: (3, m) world [m], where the point would be now had it moved with the collider.
     is_out: (m,) whether the offset leads all the way out.
-    skin: [m], closer than this it touches.
-    push: (m,) [m], how far it was pushed so far in this substep.
-    slack: (m,) [m], how far it may be from its plane when the substep ends.
+    skin: [m], the distance below which a point touches.
+    push: (m,) [m], how far the point was pushed so far in this substep.
+    slack: (m,) [m], how far it may be below its plane when the substep ends.
     """
 
     pose: Pose
@@ -88,7 +84,7 @@ class Contacts:
     slack: Floats
 
     def push_out(self, position: Floats, friction: float) -> Bools:
-        """Bring points (3, n) back to their planes, in place; returns which ones touch, (m,)."""
+        """Move points (3, n) out to their planes, in place; returns which contacts touch, (m,)."""
         here = self._here(position)
         gap = dot_rows(self.normal, here)
         np.subtract(self.offset, gap, out=gap)
@@ -98,7 +94,7 @@ class Contacts:
         return (gap > -self.skin) & self.is_out
 
     def absorb(self, position: Floats, previous: Floats) -> None:
-        """Take away the speed that pushing out has made: contacts do not bounce.
+        """Remove the speed that pushing out has caused: contacts do not bounce.
 
         Changes `previous` (3, n), so that no pushed point moves away from the collider.
         """
@@ -109,20 +105,21 @@ class Contacts:
         self._add(previous, self.normal * away)
 
     def far(self, position: Floats, farthest: float) -> Bools:
-        """Which of them (m,) have gone farther [m] in the substep, as seen from the collider."""
+        """Which points (m,) have moved farther than this [m] in the substep, relative to the
+        collider."""
         path = self._here(position)
         path -= self.origin
         result: Bools = dot_rows(path, path) > np.float32(farthest * farthest)
         return result
 
     def missing(self, position: Floats) -> Bools:
-        """Which of them (m,) are farther below their planes than they may be."""
+        """Which points (m,) are farther below their planes than `slack` allows."""
         gap = self.offset - dot_rows(self.normal, self._here(position))
         result: Bools = gap > self.slack
         return result
 
     def part(self, guides: Ints, guide_count: int) -> Contacts:
-        """Those of some guides (n,), rising, of all; their index is among these guides alone."""
+        """The contacts of some guides (n,), ascending, reindexed to these."""
         index, kept = part_of(self.index, guides, guide_count)
         return replace(
             self,
@@ -136,19 +133,19 @@ class Contacts:
         )
 
     def note(self, part: Contacts, guides: Ints, guide_count: int) -> None:
-        """Take over how far those of `part` were pushed."""
+        """Copy back the push of a `part` for these guides."""
         _, kept = part_of(self.index, guides, guide_count)
         self.push[kept] = part.push
 
     def touched(self, is_touching: Bools) -> Touched | None:
         """The free CVs that touch."""
-        which = is_touching.nonzero()[0]  # sooner than by np.flatnonzero
+        which = is_touching.nonzero()[0]  # faster than np.flatnonzero
         if not which.size:
             return None
         return Touched(self.index.take(which), chosen(self.normal, which))
 
     def _pushed(self, here: Floats, push: Floats, friction: float) -> Floats:
-        """Where points (3, m) come to."""
+        """Where points (3, m) are moved to by a push (m,) [m] and friction."""
         there: Floats = here + self.normal * push
         if friction:
             slip = there - self.origin
@@ -173,10 +170,11 @@ class Contacts:
 
 @dataclass(frozen=True)
 class SegmentContacts(Contacts):
-    """The same of points on segments; `index` is of the CV where the segment ends.
+    """Contacts of points on segments; `index` is that of the CV where the segment ends.
 
-    stride: from a CV to the next of its guide. along: (m,) fraction of the segment.
-    weight_lower, weight_upper: (m,) of the point's way, what its two CVs go.
+    stride: difference of the indices of successive CVs of a guide.
+    along: (m,) fraction of the segment.
+    weight_lower, weight_upper: (m,) displacement of the segment's CVs, over that of the point.
     """
 
     stride: int
@@ -197,7 +195,8 @@ class SegmentContacts(Contacts):
         )
 
     def touched(self, is_touching: Bools) -> Touched | None:
-        """Both CVs of each segment that touches, of two of these the upper one's normal."""
+        """The free CVs of segments that touch; a CV between two of them gets the normal of the one
+        that begins there."""
         which = (is_touching & (self.push > 0.0)).nonzero()[0]
         if not which.size:
             return None
@@ -239,9 +238,9 @@ def find_contacts(
         position, previous: (3, n) float32 world [m], a substep apart.
         radius: (n,) float32 [m], the distance that each point keeps; -inf: it has no contacts.
         poses: of the colliders at the substep's end.
-        led_out: how far [m] a point that is inside may be led out in this substep.
+        led_out: how far [m] a point that is inside may be moved out in this substep.
         size: of the hair or cloth [m].
-        spacing: [m] of CVs along a guide; 0 of points that no segments join.
+        spacing: [m] of CVs along a guide; 0 for points without segments.
     """
     found = (
         _contacts_with(pose, position, previous, radius, led_out, size, spacing) for pose in poses
@@ -259,12 +258,13 @@ def find_between(
     size: float,
     guide_count: int,
 ) -> list[SegmentContacts]:
-    """Planes for the segments of guides near what is sharp for them.
+    """Planes for the segments of guides near colliders that are sharp for them.
 
     Args:
         position, previous, radius, poses, led_out, size: as in `find_contacts`, of all CVs in the
             order (cv_count, guide_count).
-        between: (len(BETWEEN), n) float32 [m], what points of the segment that ends at a CV keep.
+        between: (len(BETWEEN), n) float32 [m], the distance that points of the segment that ends at
+            a CV keep.
     """
     cv_count = position.shape[1] // guide_count
     spacing = spacing_of(size, cv_count)
@@ -277,7 +277,7 @@ def find_between(
 
 
 def spacing_of(size: float, cv_count: int) -> float:
-    """[m] from one CV to the next of hair of this size."""
+    """The distance [m] between successive CVs of hair of this size [m]."""
     return size / (cv_count - 1)
 
 
@@ -287,18 +287,18 @@ def is_sharp(pose: Pose, spacing: float, size: float) -> bool:
 
 
 def is_followed(travel: float, limit: float, sharp: bool) -> bool:
-    """Whether paths of points are followed: where segments collide, and where the collider itself
-    goes farther in the substep, `travel` [m], than a path that need not be (limit [m^2])."""
+    """Whether paths of points are followed: if segments collide, or if the collider's `travel` [m]
+    in the substep exceeds the length of paths that need not be followed (squared `limit` [m^2])."""
     return sharp or travel * travel > limit
 
 
 def short_squared(curve_radius: float, size: float) -> float:
-    """The squared length [m^2] of ways that need not be followed at curves of a radius [m]."""
+    """The squared length [m^2] of paths that need not be followed at a radius of curvature [m]."""
     return 8.0 * curve_radius * UNSEEN * size
 
 
 def cv_radius(settings: DynamicsSettings, cv_count: int, size: float) -> Floats:
-    """Collision radius [m] of the free CVs, (cv_count - 2,), growing evenly along the guide."""
+    """Collision radius [m] of the free CVs, (cv_count - 2,), linear along the guide."""
     along = np.linspace(0.0, 1.0, cv_count)[PINNED:]
     radius = settings.radius_root + (settings.radius_tip - settings.radius_root) * along
     return (size * radius).astype(np.float32)
@@ -308,7 +308,7 @@ def cv_radius(settings: DynamicsSettings, cv_count: int, size: float) -> Floats:
 def radius_of_all(
     settings: DynamicsSettings, cv_count: int, guide_count: int, size: float
 ) -> Floats:
-    """The same of all CVs of some guides, (cv_count * guide_count,); -inf for the pinned."""
+    """`cv_radius` of all CVs of guides, (cv_count * guide_count,); -inf for the pinned ones."""
     pinned = np.full(PINNED, -np.inf, np.float32)
     radius = np.repeat(np.concatenate([pinned, cv_radius(settings, cv_count, size)]), guide_count)
     radius.flags.writeable = False
@@ -318,8 +318,8 @@ def radius_of_all(
 def hurried_guides(
     contacts: list[Contacts], position: Floats, previous: Floats, size: float
 ) -> Ints:
-    """Guides, rising, that go through a substep in parts: those that meet with their segments what
-    goes far as seen from their roots, and are not dragged along yet.
+    """Guides, ascending, that are advanced in parts of the substep: they meet, with segments, a
+    collider that moves fast relative to their roots, and are not dragged along yet.
 
     Args:
         position, previous: (3, cv_count, n) world [m], a substep apart. size: of the hair [m].
@@ -337,8 +337,8 @@ def hurried_guides(
 
 
 def touched_by(contacts: list[Contacts], touching: list[Bools]) -> Touched | None:
-    """Free CVs that touch, each with the normal of the last collider that it touches, or else that
-    its segments touch; None where none does."""
+    """Free CVs that touch, each with the normal of the last collider that it touches itself, or
+    else that its segments touch; None if none does."""
     own: list[Touched] = []
     between: list[Touched] = []
     for one, which in zip(contacts, touching, strict=True):
@@ -349,7 +349,7 @@ def touched_by(contacts: list[Contacts], touching: list[Bools]) -> Touched | Non
 
 
 def last_of(found: list[Touched]) -> Touched | None:
-    """All of them; of those that name a CV again the last."""
+    """All of them joined; for CVs that occur several times, the last one."""
     if len(found) < 2:
         return found[0] if found else None
     index = np.concatenate([one.index for one in found])[::-1]
@@ -369,7 +369,7 @@ def _contacts_with(
 ) -> Contacts:
     sharp = is_sharp(pose, spacing, size)
     beyond: Floats | float = REACH * size
-    if sharp:  # what is beyond it now may have passed through
+    if sharp:  # points that are out now may have passed through
         beyond = _travel(pose, position, previous) + beyond
     index, local, reach = near_points(pose, position, radius, beyond)
     distance, normal = world_distance(pose, local)
@@ -448,7 +448,7 @@ def _between_with(
     wanted = between.take(upper, axis=1).ravel()
     offset = np.minimum(wanted, reached)
     offset += height
-    # of each segment the point that is deepest below its plane
+    # the point of each segment that is deepest below its plane
     missing = offset - dot_rows(normal, here)
     which = missing.reshape(len(BETWEEN), count).argmax(axis=0) * count + np.arange(count)
     which = which[missing.take(which) > -REACH * size]
@@ -481,7 +481,7 @@ def _mixed(lower: Floats, upper: Floats) -> Floats:
 
 
 def _travel(pose: Pose, position: Floats, previous: Floats) -> Floats:
-    """How far [m] points (3, n) have gone in the substep as seen from the collider, (n,)."""
+    """How far [m] points (3, n) have moved in the substep relative to the collider, (n,)."""
     origin = transform_points(pose.displacement, transform_points(pose.inverse, position))
     origin += previous
     origin -= position
@@ -492,24 +492,24 @@ def _travel(pose: Pose, position: Floats, previous: Floats) -> Floats:
 def _followed(
     pose: Pose, before: Floats, local: Floats, radius: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """Where the ways of points meet their radius (n,) [m], or end.
+    """Follow the paths of points until they come within their radius (n,) [m], or end.
 
     Args:
-        before: (3, n) world [m] where they were. local: (3, n) object space, where they are.
+        before: (3, n) world [m], where the points were. local: (3, n) object space, where they are.
 
     Returns:
-        normal (3, n) there; normal . x (n,) [m] of the surface there; and how far from the surface
-        they were, (n,) [m]: all in the world, as it is at the substep's end.
+        The normal (3, n) there; normal . x (n,) [m] of the surface there; and the distance of the
+        points from the surface before, (n,) [m]: all in world space at the substep's end.
     """
     begin = transform_points(pose.inverse_before, before)
     first, _ = world_distance(pose, begin)
-    scale = np.float32(pose.scale)  # a step that is too short harms nothing
+    scale = np.float32(pose.scale)  # the smallest scale: steps that are too short do no harm
     path = local - begin
     length = np.sqrt(dot_rows(path, path))
     length *= scale
     least = length * np.float32(1.0 / TRACE_STEPS)
     target = np.minimum(radius, first)
-    place = (first > 0.0).astype(np.float32)  # along the way; what starts inside met it there
+    place = (first > 0.0).astype(np.float32)  # fraction of the path; 0 for points starting inside
     going = ((first > 0.0) & (length > TINY)).nonzero()[0]
     gone, distance = np.zeros_like(length), first.copy()
     for _ in range(TRACE_STEPS):
@@ -523,7 +523,7 @@ def _followed(
         points = chosen(begin, going) + chosen(path, going) * (ahead / length.take(going))
         found = pose.collider.distance(points)[0] * scale
         met = found < target.take(going)
-        # between the last two steps, as if the distance fell evenly
+        # interpolated between the last two steps, as if the distance changed linearly
         back = np.minimum((room - (found - target.take(going))), np.inf)
         exact = ahead - step + step * room / np.maximum(back, TINY)
         hit = met.nonzero()[0]

@@ -1,4 +1,4 @@
-"""Figures of a motion: how far guides and strands stretch, and how deep in colliders they are."""
+"""Figures of a motion: stretch of guides and strands, and how deep they are in colliders."""
 
 from __future__ import annotations
 
@@ -21,22 +21,23 @@ from .state import DynamicsState
 
 type Colliders = tuple[PosedCollider, ...]
 
-#: What counts as stretched, a fraction, and as inside [m].
+#: Limits above which strands count as stretched, a fraction, and as inside a collider [m].
 STRETCHED, INSIDE = 0.01, 0.001
 
 
 @dataclass(frozen=True)
 class Figures:
-    """Of some frames, each guide and each strand by its worst one. Reports have the same names.
+    """Figures over several frames, with each guide and strand at its worst. Names as in reports.
 
-    Segments and strands shorter than a hundredth of the median one count as that long in stretches.
+    For stretch, segments and strands shorter than a hundredth of the median count as that long.
 
-    stretch_max_percent: of a guide's segment, but of no curl's, for these may stretch.
-    penetration_max_mm: of a guide's point, also where it was inside at rest.
-    strands_stretch_*: change of length of all strands as drawn; the worst, and the 99th percentile.
-    strands_stretched_percent: how many change by more than 1 %.
-    strands_penetration_*: how deep all strands as drawn are where they were outside at rest.
-    strands_inside_percent: how many are deeper than 1 mm.
+    stretch_max_percent: of a guide's segment, except in curls, which may stretch.
+    penetration_max_mm: of a guide's CV, also if it was inside at rest.
+    strands_stretch_*: change of length of strands as drawn; the worst, and the 99th percentile.
+    strands_stretched_percent: strands that change by more than 1 %.
+    strands_penetration_*: depth in colliders of strands as drawn, at points that were outside at
+        rest.
+    strands_inside_percent: strands that are deeper than 1 mm.
     """
 
     stretch_max_percent: float = 0.0
@@ -50,10 +51,10 @@ class Figures:
 
     @classmethod
     def of(cls, values: object) -> Self | None:
-        """As `as_dict` gives them, from a file; None where it has none.
+        """The figures from `as_dict` data of a file; None for None.
 
         Raises:
-            ValueError: they are something else.
+            ValueError: the data are something else.
         """
         if values is None:
             return None
@@ -71,8 +72,8 @@ class Figures:
 
     @property
     def table(self) -> tuple[tuple[str, str, str, str], ...]:
-        """For a panel: of all strands the worst, the 99th percentile, and how many are over 1 % or
-        1 mm; of guides the worst."""
+        """Rows for a panel: for all strands the worst, the 99th percentile, and how many exceed 1 %
+        or 1 mm; for guides the worst."""
         return (
             *_table("All Strands", tuple(asdict(self).values())[2:]),
             ("Guides", "Worst", "", ""),
@@ -83,7 +84,7 @@ class Figures:
 
 @dataclass(frozen=True)
 class CardFigures:
-    """The same of cards that ride: of their middle lines, and of their vertices."""
+    """The figures of riding cards: stretch of their spines, penetration of their vertices."""
 
     cards_stretch_max_percent: float = 0.0
     cards_stretch_p99_percent: float = 0.0
@@ -94,7 +95,7 @@ class CardFigures:
 
     @classmethod
     def of_frames(cls, change: Floats, depth: Floats) -> Self:
-        """Each card by its worst frame, see `length_changes` and `strand_depths`."""
+        """The figures from each card's worst `length_changes` and `strand_depths`, (n,) each."""
         return cls(*map(_rounded, _spread(change, depth)))
 
     def as_dict(self) -> dict[str, float]:
@@ -102,12 +103,12 @@ class CardFigures:
 
     @property
     def table(self) -> tuple[tuple[str, str, str, str], ...]:
-        """For a panel, as `Figures.table`."""
+        """Rows for a panel, see `Figures.table`."""
         return _table("Cards", tuple(asdict(self).values()))
 
 
 def blank_table(kind: type[Figures] | type[CardFigures]) -> tuple[tuple[str, ...], ...]:
-    """The table of what nobody has measured yet, as large as that of any figures of this kind."""
+    """The table of figures that are not measured yet, as large as that of measured ones."""
     rows = []
     for name, *values in kind().table:
         is_header = values[0] == "Worst"
@@ -116,7 +117,7 @@ def blank_table(kind: type[Figures] | type[CardFigures]) -> tuple[tuple[str, ...
 
 
 def _table(name: str, spread: tuple[float, ...]) -> tuple[tuple[str, str, str, str], ...]:
-    """The rows of a table for what `_spread` gives."""
+    """The rows of a table for the result of `_spread`."""
     stretch, depth = spread[:3], spread[3:]
     return (
         (name, "Worst", "99 %", "Over 1"),
@@ -126,8 +127,8 @@ def _table(name: str, spread: tuple[float, ...]) -> tuple[tuple[str, str, str, s
 
 
 def _spread(change: Floats, depth: Floats) -> tuple[float, ...]:
-    """The worst, the 99th percentile and how many are over the limit: of changes of length, a
-    fraction, and of depths [m], in percent and millimetres; 0 of nothing."""
+    """The worst, the 99th percentile, and the percentage above the limit: of changes of length, as
+    fractions, in percent, and of depths [m], in millimetres; all 0 without values."""
     if not len(change):
         return (0.0,) * 6
     return (
@@ -145,23 +146,23 @@ def _rounded(value: float) -> float:
 
 
 def _percent(value: float) -> str:
-    """Such as "0.03 %": two digits, but 0 only where it is nothing."""
+    """A text such as "0.03 %"; values above 0 are not rounded to 0."""
     return "0 %" if not value else f"{value:.1f} %" if value >= 1.0 else f"{max(value, 0.01):.2f} %"
 
 
 def _length(value: float) -> str:
-    """Such as "9.5 mm"."""
+    """A text such as "9.5 mm"."""
     return f"{value:,.1f} mm" if value < 1000.0 else f"{value / 1000.0:,.2f} m"
 
 
 class Measure:
-    """What is found frame after frame.
+    """Collects figures frame by frame.
 
     Args:
         rest: the guides at rest.
         points: (point_count, 3) [m, world], all strands at rest.
         offsets: (strand_count + 1,), strand s is points[offsets[s]:offsets[s + 1]].
-        colliders: as they stand then.
+        colliders: at rest.
     """
 
     def __init__(
@@ -173,17 +174,17 @@ class Measure:
         self._change, self._depth = (np.zeros(len(offsets) - 1) for _ in range(2))
 
     def take_style(self, rest: DynamicsState) -> None:
-        """Guides have these lengths from the next frame on."""
+        """Use the lengths of another style from the next frame on."""
         self._rest = rest
 
     def add(
         self, points: Floats, rest_lengths: Floats, guides: Floats, colliders: Colliders
     ) -> None:
-        """Take another frame into account.
+        """Add a frame.
 
         Args:
             points: all strands, (point_count, 3) [m, world].
-            rest_lengths: (strand_count,) [m], which they should have.
+            rest_lengths: (strand_count,) [m], the lengths that they should have.
             guides: (guide_count, cv_count, 3) [m, world].
         """
         position = np.ascontiguousarray(guides.transpose(2, 1, 0))
@@ -197,6 +198,6 @@ class Measure:
 
     @property
     def figures(self) -> Figures:
-        """Of all frames so far."""
+        """The figures of all frames so far."""
         found = 100.0 * self._stretch, 1000.0 * self._penetration
         return Figures(*map(_rounded, (*found, *_spread(self._change, self._depth))))

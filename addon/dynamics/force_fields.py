@@ -1,12 +1,12 @@
-"""The scene's force fields: what each does at the place where a CV is.
+"""The scene's force fields and their effect on CVs.
 
-The fields are Blender's, with the effect that they have on a particle of mass 1 (its manual,
-Physics > Forces): an acceleration, a rate at which they slow down what moves, and a spin around
-magnetic lines. What slows down is solved implicitly, so that it only ever slows down.
+The fields are Blender's, with their effect on a particle of mass 1 (its manual, Physics > Forces):
+an acceleration, a rate of slowing down, and a spin around magnetic field lines. Slowing down is
+solved implicitly, so that it cannot reverse a motion.
 
-Falloff is (1 + d - near)^-power beyond `near`, and nothing beyond `far`. Powers are products and
-square roots here, as numpy's own differs in its last bit from processor to processor. Turbulence
-is Perlin's noise (2002, "Improving Noise"), by the permutation that Blender has.
+Falloff is (1 + d - near)^-power beyond `near`, and 0 beyond `far`. Powers are computed by products
+and square roots, as numpy's own differ in their last bit between processors. Turbulence is Perlin's
+noise (2002, "Improving Noise") with Blender's permutation.
 """
 
 from __future__ import annotations
@@ -19,26 +19,27 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..strands.vectors import cross_rows, dot_rows
 
-#: Kinds that act on hair, and shapes of what they act from. The GPU knows them by these numbers.
+#: Kinds that act on hair, shapes of their sources, and falloffs; indices are used on the GPU.
 KINDS = ("force", "wind", "vortex", "magnet", "harmonic", "turbulence", "drag")
 SHAPES = ("point", "line", "plane", "points")
 FALLOFFS = ("sphere", "tube", "cone")
-#: Texels of a field on the GPU, see `ForceFields.table`; the permutation has four values in each.
+#: Texels of a field on the GPU, see `ForceFields.table`; width of that table, with four values of
+#: the permutation in each texel.
 FIELD_TEXELS, TABLE_WIDTH = 7, 64
-#: [of the hair's length] that fields move a CV at most in a substep.
+#: Maximum displacement of a CV by fields in a substep, as a fraction of the hair's length.
 FARTHEST = 0.1
-#: Beyond every distance. Float32 has no room for its square, nor needs it.
+#: Farther than any distance. Its square overflows in float32, but is not needed.
 ENDLESS = 3.0e38
 #: Vectors shorter than this have no direction.
 _TINY = np.float32(1.0e-12)
-#: [m/s^2] of each axis; what is more could overflow.
+#: Maximum acceleration along each axis [m/s^2], to avoid overflow.
 _STRONGEST = np.float32(1.0e9)
-#: Fractions of a power, halved this often.
+#: Number of binary digits of the fraction of a power.
 _HALVES = 16
 #: Octaves of turbulence.
 _OCTAVES = 3
 _NOWHERE = (0.0, 0.0, 0.0)
-#: The gradients of Perlin's noise, by the lowest four bits of a hash.
+#: The gradients of Perlin's noise, indexed by the lowest four bits of a hash.
 GRADIENTS = np.array(
     [
         *((x, y, 0) for y in (1, -1) for x in (1, -1)),
@@ -48,7 +49,7 @@ GRADIENTS = np.array(
     ],
     np.float32,
 )
-#: An angle over its sine as a polynomial of its cosine, within 1e-7, the highest power first; twin
+#: An angle over its sine as a polynomial of its cosine, error below 1e-7, highest power first; twin
 #: of lib_angle.glsl.
 _ANGLE = (
     0.01765366829931736,
@@ -65,7 +66,10 @@ _ANGLE = (
 
 @dataclass(frozen=True)
 class Falloff:
-    """power: of the distance. near, far: between them strength falls off."""
+    """How strength falls off with distance, see above.
+
+    power: of the distance. near, far: range in which it falls off; it is 0 beyond `far`.
+    """
 
     power: float = 0.0
     near: float = 0.0
@@ -77,16 +81,18 @@ class ForceField:
     """One field, world space [m].
 
     kind, shape, falloff: of KINDS, SHAPES, FALLOFFS.
-    place, normal: where it acts from and along what; of one that acts from many points, one of
-        these. center, axis: of its object; unit vectors.
-    damping: of harmonic fields and of drag, which is linear by it and quadratic by its strength.
-    size: of turbulence; of harmonic fields their rest length.
-    flow: how much of the speed it takes, by its falloff.
-    across: fraction of it that acts across strands only.
-    side: 1 or -1: only where that is the sign along `normal`; 0: on both sides.
-    distance: its falloff. radial: beside the axis, of tubes in metres, of cones in degrees.
+    center, axis: place and Z axis of its object, a unit vector.
+    place, normal: source of the field and its direction if they differ from these, as for one of
+        many points that it acts from.
+    damping: of harmonic fields; the linear part of drag, whose quadratic part is its strength.
+    size: of turbulence; for harmonic fields the rest length.
+    flow: rate at which it slows down motion [1/s], scaled by its falloff.
+    across: fraction of the field that acts across strands only.
+    side: 1 or -1: the side along `normal` that it acts on; 0: both sides.
+    distance: falloff by distance. radial: by the distance from the axis, in metres for tubes and in
+        degrees for cones.
     is_inverse_square: whether a force falls off with the square of the distance as well.
-    is_global: whether turbulence stays where it is while its object moves.
+    is_global: whether turbulence stays in place while its object moves.
     """
 
     kind: str
@@ -131,10 +137,10 @@ class ForceField:
 
 @dataclass(frozen=True, eq=False)
 class ForceFields:
-    """All that act in a frame.
+    """All fields that act in a frame.
 
-    permutation: (256,) of 0 to 255, of the noise; None where nothing is turbulent.
-    factor: of the falloff of each.
+    permutation: (256,) of 0 to 255, of the noise; None if no field is turbulent.
+    factor: common factor of their strengths, applied to the falloff.
     """
 
     fields: tuple[ForceField, ...] = ()
@@ -142,7 +148,7 @@ class ForceFields:
     factor: float = 1.0
 
     def by(self, factor: float) -> ForceFields | None:
-        """What is left of them; None where nothing acts."""
+        """The fields with this factor; None if nothing acts."""
         if not self.fields or factor <= 0.0:
             return None
         return replace(self, factor=factor)
@@ -159,21 +165,21 @@ class ForceFields:
 
     @cached_property
     def is_across(self) -> bool:
-        """Whether any acts differently across strands."""
+        """Whether any field acts partly across strands only."""
         return any(one.across > 0.0 for one in self.fields)
 
 
-#: Of a scene without any.
 NO_FIELDS = ForceFields()
 
 
 @dataclass(frozen=True)
 class Felt:
-    """What all fields together do at n points.
+    """The effect of all fields together at n points.
 
-    push: (3, n) [m/s^2]. slowing: (n,) [1/s], which takes that part of the speed. across_push,
-        across_slowing: of these, what acts across strands only. spin: (3, n) [1/s], around which
-        speed turns: the acceleration is speed x spin.
+    push: (3, n) [m/s^2], acceleration.
+    slowing: (n,) [1/s], rate at which the velocity decays.
+    across_push, across_slowing: the parts of these that act across strands only.
+    spin: (3, n) [1/s], turns the velocity: the acceleration is velocity x spin.
     """
 
     push: Floats
@@ -183,15 +189,17 @@ class Felt:
     spin: Floats
 
     def acceleration(self, velocity: Floats) -> Floats:
-        """(3, n) [m/s^2] of points at this velocity that are not on a strand."""
+        """The acceleration (3, n) [m/s^2] of points at this velocity that are not on a strand."""
         turned = cross_rows(velocity, self.spin)
         result: Floats = self.push - velocity * self.slowing + turned
         return result
 
 
 def felt(fields: ForceFields, points: Floats, velocity: Floats) -> Felt:
-    """Args:
-    points: (3, n) float32 world [m]. velocity: theirs [m/s].
+    """The effect of all fields at points.
+
+    Args:
+        points: (3, n) float32 world [m]. velocity: (3, n) float32 [m/s].
     """
     push, spin, across_push = (np.zeros_like(points) for _ in range(3))
     slowing, across_slowing = np.zeros_like(points[0]), np.zeros_like(points[0])
@@ -259,7 +267,11 @@ def _felt_of(
 
 
 def _away(one: ForceField, away: Floats, from_center: Floats, normal: Floats) -> Floats:
-    """From the nearest place of the field's shape, (3, n) [m]."""
+    """The vectors from the nearest point of the field's shape, (3, n) [m].
+
+    Args:
+        away: (3, n), from the field's place.
+    """
     if one.shape not in ("line", "plane"):
         return away
     along = normal * dot_rows(normal, from_center)
@@ -268,7 +280,7 @@ def _away(one: ForceField, away: Floats, from_center: Floats, normal: Floats) ->
 
 
 def _falloff(one: ForceField, distance: Floats, from_center: Floats, normal: Floats) -> Floats:
-    """The part of its strength that a field has, (n,)."""
+    """The fraction of its strength that a field has at each point, (n,)."""
     along = dot_rows(normal, from_center)
     if one.falloff == "sphere":
         part = _fallen(one.distance, distance)
@@ -291,7 +303,7 @@ def _fallen(falloff: Falloff, distance: Floats) -> Floats:
 
 
 def _power(base: Floats, power: float) -> Floats:
-    """base^power of numbers from 1 on, by products and roots."""
+    """base^power for base >= 1, by products and square roots."""
     result = np.ones_like(base)
     for _ in range(int(power)):
         result = result * base
@@ -306,7 +318,7 @@ def _power(base: Floats, power: float) -> Floats:
 
 
 def _degrees(sine: Floats, cosine: Floats) -> Floats:
-    """The angle of this sine and cosine, from 0 to 180."""
+    """The angle with this sine and cosine, from 0 to 180 degrees."""
     flat, angle = np.abs(cosine), np.zeros_like(cosine)
     for factor in _ANGLE:
         angle = angle * flat + np.float32(factor)
@@ -315,13 +327,13 @@ def _degrees(sine: Floats, cosine: Floats) -> Floats:
 
 
 def _direction(vectors: Floats) -> Floats:
-    """Unit vectors; nought where there is no direction."""
+    """Unit vectors; zero where there is no direction."""
     length = np.sqrt(dot_rows(vectors, vectors))
     return np.where(length > _TINY, vectors / np.maximum(length, _TINY), np.float32(0.0))
 
 
 def turbulence(permutation: Ints, points: Floats, size: float) -> Floats:
-    """Noise of three octaves along each axis, (3, n) of -1 to 1."""
+    """Three octaves of noise for each axis, (3, n), from -1 to 1."""
     scaled = points * np.float32(1.0 / size if size else 1.0)
     sums = []
     for axis in range(3):
@@ -335,7 +347,7 @@ def turbulence(permutation: Ints, points: Floats, size: float) -> Floats:
 
 
 def perlin(permutation: Ints, points: Floats) -> Floats:
-    """Perlin's noise of 2002 at points (3, n), (n,) of -1 to 1."""
+    """Perlin's noise of 2002 at points (3, n), (n,), from -1 to 1."""
     whole = np.floor(points)
     cell = np.mod(whole, np.float32(256.0)).astype(np.int32) & 255
     inside = points - whole
@@ -371,15 +383,15 @@ def blow(
     size: float,
     along: Floats | None = None,
 ) -> None:
-    """A substep's effect on the speed, which `previous` holds; in place.
+    """Apply a substep of the fields to the velocity, which `previous` holds, in place.
 
         v1 = (v + dt push) / (1 + dt slowing)
         v2 = (v1 + v1 x b + b (b . v1)) / (1 + b . b),   b = dt spin
 
     Args:
         position: (3, n) float32 world [m]; previous: a step of `dt` [s] earlier.
-        size: of the hair [m]: a CV is moved by FARTHEST of it at most.
-        along: (3, n), the direction of the strand at each CV; None: there are no strands.
+        size: of the hair [m]; a CV is moved by at most FARTHEST times this.
+        along: (3, n), the direction of the strand at each CV; None: no strands.
     """
     step = np.float32(dt)
     velocity = (position - previous) / step
@@ -405,13 +417,13 @@ def blow(
 
 
 def _left(slowing: Floats) -> Floats:
-    """The part of the speed that is left; a field may also drive on what moves."""
+    """The factor of the velocity; fields with negative slowing increase it."""
     return np.where(slowing > 0.0, 1.0 / (1.0 + np.abs(slowing)), 1.0 - slowing).astype(np.float32)
 
 
 def along_strands(position: Floats) -> Floats:
-    """Of the strands at their CVs, (3, cv_count, n), from rows of the same shape: from the CV
-    before to the CV after."""
+    """Unit directions of strands at their CVs, (3, cv_count, n), from rows of the same shape: from
+    the previous to the next CV."""
     before = np.concatenate([position[:, :1], position[:, :-1]], axis=1)
     after = np.concatenate([position[:, 1:], position[:, -1:]], axis=1)
     return _direction((after - before).reshape(3, -1)).reshape(position.shape)

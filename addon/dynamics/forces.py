@@ -1,4 +1,4 @@
-"""What moves hair before its constraints act: inertia, damping, gravity."""
+"""The forces that move hair before its constraints act: inertia, damping, drag, gravity."""
 
 from __future__ import annotations
 
@@ -16,14 +16,13 @@ from .settings import DynamicsSettings
 
 @dataclass(frozen=True)
 class Damped:
-    """What damping does in a substep; numbers, or of each guide (guide_count,).
+    """The effect of damping in a substep; numbers, or one for each guide (guide_count,).
 
-    Swing damping acts on the speed against the carried style, air damping on the speed in the
-    world; both together leave  v kept + v_style (1 - kept) style_damping / (sum of both), and the
-    same of the air.
+    Style damping acts on the speed relative to the carried style, air damping on the speed relative
+    to the air. With both, the speed becomes  v kept + v_style carried + v_air air.
 
-    kept: fraction of the speed that it leaves.
-    carried, air: fraction of the head's own speed, and of the air's, that it gives to the hair.
+    kept: remaining fraction of the speed.
+    carried, air: fractions of the style's and of the air's speed that are added.
     """
 
     kept: Any
@@ -35,7 +34,7 @@ class Damped:
         cls, settings: DynamicsSettings, dt: float, swing: Any = None, air: Any = None
     ) -> Damped:
         """Args:
-        swing, air: the rates of swing and air damping; None: those of the settings.
+        swing, air: the rates [1/s] of style and air damping; None: those of the settings.
         """
         swing = np.float64(settings.style_damping) if swing is None else swing
         air = settings.damping if air is None else air
@@ -45,13 +44,14 @@ class Damped:
 
 
 def brake(position: Floats, previous: Floats, drag: float, air_displacement: Floats | None) -> None:
-    """Drag by the square of the speed, implicitly: v_rel / (1 + drag |v_rel| dt), in place.
+    """Implicit quadratic drag: v_rel / (1 + drag |v_rel| dt), in place.
 
     Changes `previous`, which holds the speed.
 
     Args:
-        air_displacement: (3, guide_count), how far the air moves in a substep [m];
-            None when it stands still.
+        drag: [1/m].
+        air_displacement: (3, guide_count), how far the air moves in a substep [m]; None in still
+            air.
     """
     displacement = position - previous
     if air_displacement is not None:
@@ -66,10 +66,10 @@ def brake(position: Floats, previous: Floats, drag: float, air_displacement: Flo
 
 
 def predict(position: Floats, previous: Floats, impulse: Floats, kept: Any, out: Floats) -> None:
-    """Verlet step with time correction (Jakobsen 2001), all (3, cv_count, guide_count) [m].
+    """Verlet step (Jakobsen 2001), all (3, cv_count, guide_count) [m].
 
-    x' = x + (x - x_prev) kept + impulse, where `kept` holds damping and dt / dt_prev, and
-    `impulse` is a dt^2 and what the carried style adds.
+    x' = x + (x - x_prev) kept + impulse, where `impulse` is a dt^2 plus what the carried style and
+    the air add.
     """
     np.subtract(position, previous, out=out)
     out *= np.float32(kept)
@@ -83,12 +83,12 @@ def felt_gravity(
     """Acceleration [m/s^2] of each CV, (3, cv_count, guide_count), or (3, 1, 1) if all are alike.
 
     A groom is combed under gravity, so at rest its own stiffness already holds the part of the
-    weight that the lengths do not. That part is taken off, and it turns with the head: a groom at
-    rest stays as it is, and hangs otherwise as soon as the head is tilted. It is combed in air:
-    under water, where buoyancy carries the weight, the style lifts the hair, as hair does there.
+    weight that the lengths do not. That part is subtracted, turned with the head: so a groom at
+    rest stays as it is, and hangs differently as soon as the head is tilted. It was combed in air:
+    under water, where buoyancy carries the weight, the style lifts the hair, as real hair does.
 
     Args:
-        turn: (3, 3) how the groom has turned since, see `turn.best_rotation`.
+        turn: (3, 3) how the groom has turned since rest, see `turn.best_rotation`.
         carried: (3, cv_count, guide_count) world [m], the style.
     """
     pull = _pull(gravity, settings)
@@ -105,7 +105,7 @@ def felt_gravity(
 
 
 def combed_gravity(gravity: Floats, settings: DynamicsSettings, turn: Floats) -> Floats:
-    """The gravity (3,) [m/s^2] that the style carries, turned with it; arguments as above."""
+    """The gravity (3,) [m/s^2] that the style compensates, turned with it; see `felt_gravity`."""
     return _turned(_pull(gravity, settings), turn) * np.float32(settings.sag_compensation)
 
 
@@ -129,12 +129,12 @@ def weight_on_style(gravity: Floats, carried: Floats) -> Floats:
 
 
 def tension_on_style(gravity: Floats, carried: Floats) -> tuple[Floats, Floats]:
-    """Segments (3, n, guide_count) [m] beyond the pinned ones, and the tension in each by which
-    they hold gravity (3,), over the segment's length, (n, guide_count) [1/s^2].
+    """Segments (3, n, guide_count) [m] beyond the pinned ones, and the tension in each that holds
+    gravity (3,), over the segment's length, (n, guide_count) [1/s^2].
     """
     segment, squared = segments(carried[:, PINNED - 1 :])
     diagonal, beside = chain_matrix(segment, squared)
-    tension = np.zeros_like(diagonal)  # J g: only the segment at the pinned CV feels a difference
+    tension = np.zeros_like(diagonal)  # J g: differs from 0 only at the segment of the pinned CV
     tension[0] = dot_rows(segment[:, 0], gravity[:, None])
     solve_tridiagonal(diagonal, beside, tension)
     return segment, tension

@@ -1,4 +1,4 @@
-"""What acts on the guides in a frame, checked and made ready: once for all, and block by block."""
+"""Everything that acts on the guides in a frame, checked and prepared for all guides and blocks."""
 
 from __future__ import annotations
 
@@ -35,20 +35,20 @@ class Drive:
 
     target_before, target_now: (guide_count, cv_count, 3) world [m], the style carried by the head
         at the frame's begin and end.
-    colliders: with their way during the frame.
+    colliders: with their motion during the frame.
     gravity: (3,) world [m/s^2].
-    target_earlier: where that style was one frame earlier, so that its path is bent, see
-        `trajectory.curvature`; None: straight.
+    target_earlier: that style one frame earlier, which bends its path, see `trajectory.curvature`;
+        None: straight.
     force_fields: of the scene.
-    earlier_ratio: duration of that frame, over that of this one.
-    held: the CVs that go with these targets whatever the rest of the guide does; None: none.
-    clearance: how far guides stay from colliders at most; None: as far as their radius says.
-    simulated: (guide_count,), how much of what is shown of each guide is simulated, see
+    earlier_ratio: duration of the frame before, over that of this one.
+    held: the CVs that follow their targets whatever the rest of the guide does; None: none.
+    clearance: upper limit of the distance that guides keep from colliders; None: their radius.
+    simulated: (guide_count,), the simulated fraction of each guide's visible motion, see
         `blend.blended`; None: all of it.
-    painted: by what settings are multiplied at each guide; None: nothing is painted.
+    painted: factors of the settings at each guide; None: nothing is painted.
 
-    Hand the same array on from frame to frame, now to before to earlier: what is known of it then
-    need not be worked out again.
+    Pass the same arrays on from frame to frame, from now to before to earlier, so that cached
+    results for them are used again.
     """
 
     target_before: Floats
@@ -65,13 +65,13 @@ class Drive:
 
     @property
     def targets(self) -> tuple[Floats, ...]:
-        """Those that are there, the latest first."""
+        """The targets that are not None, the latest first."""
         known = (self.target_now, self.target_before, self.target_earlier)
         return tuple(target for target in known if target is not None)
 
     @cached_property
     def carrier(self) -> Carrier:
-        """How the roots go as a whole."""
+        """The motion of the roots as a whole."""
         earlier = self.target_earlier
         return Carrier.through(
             root_sample(self.target_before),
@@ -82,11 +82,11 @@ class Drive:
 
     @cached_property
     def style_carrier(self) -> Carrier | None:
-        """The same where it turns the style by so much that it goes on an arc."""
+        """`carrier` if it turns the style enough for its arc to matter; otherwise None."""
         return self.carrier if self.carrier.path.is_arc else None
 
     def target_at(self, moment: float) -> Floats:
-        """Where the style is at a moment of the frame, in the shape of the targets [m]."""
+        """The style at a moment of the frame, from 0 to 1, in the shape of the targets [m]."""
         before, now, earlier = (
             None if grid is None else grid.T
             for grid in (self.target_before, self.target_now, self.target_earlier)
@@ -97,11 +97,13 @@ class Drive:
 
 
 def check_drive(state: DynamicsState, drive: Drive, known: tuple[Floats, ...] = ()) -> None:
-    """Raises:
-    HairloomError: a drive that does not fit the state or is not finite.
+    """Check that a drive fits the state.
 
     Args:
-        known: arrays that were found right before.
+        known: target arrays that have been checked before.
+
+    Raises:
+        HairloomError: a drive that does not fit the state or is not finite.
     """
     for target in drive.targets:
         if any(target is one for one in known):
@@ -162,10 +164,10 @@ def check_drive(state: DynamicsState, drive: Drive, known: tuple[Floats, ...] = 
 def carried_after(
     state: DynamicsState, frame: Frame | None, drive: Drive, settings: DynamicsSettings, count: int
 ) -> LastStep | KnownStep:
-    """`DynamicsState.carried` after a frame of this number of substeps.
+    """`DynamicsState.carried` after a frame of `count` substeps.
 
     Args:
-        frame: None where there are none.
+        frame: None if there are no substeps.
     """
     if not inherits(settings):
         return (
@@ -179,12 +181,12 @@ def carried_after(
 
 
 def inherits(settings: DynamicsSettings) -> bool:
-    """Whether hair takes over some of the roots' motion without inertia."""
+    """Whether hair takes over a part of the roots' motion without inertia."""
     return settings.inherit_location > 0.0 or settings.inherit_rotation > 0.0
 
 
 def style_rows(state: DynamicsState, drive: Drive) -> tuple[StyleRows, ...]:
-    """The drive's targets in rows; those that the state knows from the frame before as they are."""
+    """The drive's targets as rows, taken from the state if the last frame has converted them."""
     known = {id(style.grid): style for style in state.styles}
     return tuple(
         known.get(id(target)) or StyleRows(target, as_rows(target)) for target in drive.targets
@@ -193,7 +195,7 @@ def style_rows(state: DynamicsState, drive: Drive) -> tuple[StyleRows, ...]:
 
 @dataclass(frozen=True)
 class Frame:
-    """What is the same for all guides during a frame."""
+    """The data of a frame that all guides share."""
 
     drive: Drive
     settings: DynamicsSettings
@@ -207,7 +209,7 @@ class Frame:
     air: Air | None
     force_fields: ForceFields | None  # None where none acts
     size: float  # of the hair [m], see `state.Rest`
-    among: Among | None  # None where hair does not feel other hair
+    among: Among | None  # None if hair does not feel other hair
     painted: PaintedFrame | None  # None where nothing is painted
     begun: LastStep | KnownStep  # see `DynamicsState.carried`
     speed_ratio: float  # of a substep to the one before the frame
@@ -253,11 +255,11 @@ class Frame:
         )
 
     def pieces(self, count: int) -> list[range]:
-        """The substeps that guides may go through one guide after the other."""
+        """Ranges of substeps in which guides are independent of each other."""
         return [range(count)] if self.among is None else self.among.pieces(count)
 
     def stop(self, rest: Rest, number: int, read: Callable[[], tuple[Floats, Floats]]) -> Stop:
-        """Before this substep hair is to feel hair; see `Stop`."""
+        """The stop before a substep in which hair feels hair, see `Stop`."""
         assert self.among is not None, "it feels"
         step = self.dt / self.duration
         ahead = self.among.strength.ahead * step
@@ -274,14 +276,15 @@ class Frame:
         return self.drive.carrier if self.inherits else self.drive.style_carrier
 
     def place(self, number: int) -> Rigid:
-        """Where the roots are as a whole after a substep, seen from the frame's begin; -1: before
-        the first one."""
+        """Where the roots as a whole are after a substep, relative to the frame's begin; -1: before
+        the first substep."""
         return (
             self.begun.places[1] if number < 0 else self.drive.carrier.path.at(self.span(number)[1])
         )
 
     def inherited(self, number: int) -> Carry:
-        """How hair goes with the roots in a substep without inertia; -1: in the one before."""
+        """The motion that hair takes over from the roots without inertia in a substep; -1: in the
+        last one of the frame before."""
         settings, ratio = self.settings, 1.0
         if number >= 0:
             now, before = self.place(number), self.place(number - 1)
@@ -298,7 +301,7 @@ class Frame:
         return begin, begin + self.dt / self.duration
 
     def air_displacement(self, roots: Floats, number: int) -> Floats | None:
-        """What the air at the roots (3, n) goes in a substep [m]; None when it stands still."""
+        """The displacement of the air at the roots (3, n) in a substep [m]; None in still air."""
         if self.air is None:
             return None
         return self.air.at(roots, self.time + number * self.dt) * np.float32(self.dt)
@@ -312,7 +315,9 @@ def _among(
     dt: float,
     volume: Floats | None,
 ) -> Among | None:
-    """The grid goes with the roots, halfway through the frame, and turns with the groom.
+    """The hair grid in a frame; None if hair does not feel other hair.
+
+    The grid is placed at the roots halfway through the frame, and turned with the groom.
 
     Args:
         volume: see `Among`.
@@ -328,17 +333,17 @@ def _among(
 
 @dataclass(frozen=True)
 class Block:
-    """Some guides made ready for a frame, rows (3, cv_count, n) world [m].
+    """Some guides prepared for a frame, rows (3, cv_count, n) world [m].
 
-    style: where the head carries the CVs.
-    impulse, impulse_curvature: what gravity and the moving style add to each CV in a
-        substep, and how that changes while the way of the style bends. Where the style goes on an
-        arc, gravity alone.
-    radius: (cv_count * n,) [m], the distance that each CV keeps from colliders; not to be written.
-    between: (len(BETWEEN), cv_count * n) [m], the same of points of the segment that ends there.
-    held: (cv_count, n), see `held.Held.rows`; None where none of these guides is held.
-    springs: of the guides that are curled; None where none of these gives.
-    matrix, damped: those of the frame, or each guide's own.
+    style: the path on which the head carries the CVs.
+    impulse, impulse_curvature: displacement of each CV by gravity and the moving style in a
+        substep, and its change as the path of the style bends. If the style moves on an arc,
+        gravity alone.
+    radius: (cv_count * n,) [m], the distance that each CV keeps from colliders; read-only.
+    between: (len(BETWEEN), cv_count * n) [m], the same for points of the segment that ends there.
+    held: (cv_count, n), see `held.Held.rows`; None if none of these guides is held.
+    springs: of the curled guides; None if none of these can stretch.
+    matrix, damped: those of the frame, or individual ones of each guide.
     """
 
     rest: Rest
@@ -411,10 +416,11 @@ class Block:
         )
 
     def impulse_at(self, span: tuple[float, float], begin: Floats | None, end: Floats) -> Floats:
-        """[m] that gravity and the moving style add to each CV in a substep; not to be written.
+        """The displacement [m] of each CV by gravity and the moving style in a substep; read-only.
 
         Args:
-            begin, end: the style at its ends; the former counts where this goes on an arc.
+            span: the substep's begin and end as fractions of the frame.
+            begin, end: the style at its begin and end; `begin` is None unless it moves on an arc.
         """
         if begin is not None:
             moved = end - begin

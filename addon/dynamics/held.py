@@ -1,7 +1,7 @@
-"""Which CVs are held by something else than the head: by hair ties, or by a surface.
+"""CVs that are held by something else than the head: by hair ties, or by a surface.
 
-A held CV goes where the style's target goes, as the pinned CVs at the root do, and colliders do not
-move it. Only its length along the strand counts for more: see `constraints.pin`.
+A held CV follows the style's target, like the pinned CVs at the root, and colliders do not move it.
+Only the length of the strand takes precedence: see `constraints.pin`.
 """
 
 from __future__ import annotations
@@ -17,21 +17,21 @@ from .constraints import PINNED
 
 @dataclass(frozen=True, eq=False)
 class Held:
-    """is_held: (guide_count, cv_count). What it says of pinned CVs counts for nothing."""
+    """is_held: (guide_count, cv_count); values of pinned CVs are ignored."""
 
     is_held: Bools
 
     @cached_property
     def rows(self) -> Floats:
-        """The same as (cv_count, guide_count) float32, 1 or 0; 0 for the pinned CVs."""
+        """`is_held` as (cv_count, guide_count) float32, 1 or 0; 0 for the pinned CVs."""
         rows = np.ascontiguousarray(self.is_held.T, np.float32)
         rows[:PINNED] = 0.0
         rows.flags.writeable = False
         return rows
 
     def spread(self, values: Floats) -> Floats:
-        """Values of pinned and held CVs, (guide_count, cv_count, 3), carried on to all others: in
-        between they change evenly, and stay as they are beyond the last one."""
+        """Values (guide_count, cv_count, 3) at pinned and held CVs, extended to all others: linear
+        in between, constant beyond the last one."""
         lower, upper, weight = self._between
         below, above = (np.take_along_axis(values, k[..., None], axis=1) for k in (lower, upper))
         result: Floats = below + weight[..., None] * (above - below)
@@ -39,7 +39,7 @@ class Held:
 
     @cached_property
     def _between(self) -> tuple[Ints, Ints, Floats]:
-        """For each CV the pinned or held ones before and behind it, and the latter's weight."""
+        """The pinned or held CVs before and after each CV, and the latter's weight."""
         known = self.is_held.copy()
         known[:, :PINNED] = True
         cv = np.arange(known.shape[1])

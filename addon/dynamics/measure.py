@@ -1,4 +1,4 @@
-"""What a simulation must hold: lengths, and hair outside of colliders; guides, and all hair."""
+"""Measures of a simulation's quality: lengths and penetration, of guides and of all strands."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from .colliders.signed_distance import signed_distance
 from .constraints import PINNED, TINY, directions
 from .state import DynamicsState
 
-#: What is shorter than this fraction of the median counts as that long: where hair is a thousandth
-#: of a millimetre long, rounding of float32 alone makes it many times as long.
+#: Minimum length that changes are related to, as a fraction of the median: hair of a thousandth of
+#: a millimetre gets many times longer by the rounding of float32 alone.
 SHORTEST = 0.01
 
 
 def max_stretch(state: DynamicsState) -> float:
     """Largest change of a simulated segment's length, as a fraction of its rest length.
 
-    Segments between pinned CVs belong to the style, those without length cannot stretch, and those
-    of curls may. See SHORTEST.
+    Segments between pinned CVs, without length, or of curls, which may stretch, do not count. See
+    SHORTEST.
     """
     rest = state.rest.length[PINNED - 1 :]
     if not rest.size:
@@ -47,8 +47,8 @@ def _depths(points: Floats, colliders: tuple[PosedCollider, ...]) -> Floats:
     for posed in colliders if points.size else ():
         inverse = np.linalg.inv(posed.matrix_now)
         distance, gradient = posed.collider.distance(transform_points(inverse, points))
-        # in the collider's space a step outwards is as long as the inverse makes it; the gradient
-        # gives the direction only, because a sampled one is short where two sides are as near
+        # the inverse scales a step outwards into the collider's space; the gradient is used for its
+        # direction only, because a sampled one is too short where two sides are equally near
         gradient /= np.maximum(np.sqrt(dot_rows(gradient, gradient)), TINY)
         steepness = inverse[:3, :3].T.astype(np.float32)
         outward = sum(steepness[:, axis, None] * gradient[axis] for axis in range(3))
@@ -58,10 +58,10 @@ def _depths(points: Floats, colliders: tuple[PosedCollider, ...]) -> Floats:
 
 
 def length_changes(points: Floats, offsets: Ints, rest_lengths: Floats) -> Floats:
-    """By which fraction of its length at rest each strand is longer or shorter, (strand_count,).
+    """The change of each strand's length, as a fraction of that at rest, (strand_count,).
 
     Args:
-        points: (point_count, 3) [m], strand after strand.
+        points: (point_count, 3) [m], strand by strand.
         offsets: (strand_count + 1,), strand s is points[offsets[s]:offsets[s + 1]].
         rest_lengths: (strand_count,) [m]; see SHORTEST.
     """
@@ -71,7 +71,7 @@ def length_changes(points: Floats, offsets: Ints, rest_lengths: Floats) -> Float
 
 
 def are_outside(points: Floats, colliders: tuple[PosedCollider, ...]) -> Bools:
-    """Which points (n, 3) world [m] are in no collider, as these stand at the frame's end."""
+    """Which points (n, 3) world [m] are outside of all colliders at the frame's end, (n,)."""
     distance, _ = signed_distance(points, colliders, 0.0)
     return np.asarray(distance >= 0.0)
 
@@ -79,10 +79,11 @@ def are_outside(points: Floats, colliders: tuple[PosedCollider, ...]) -> Bools:
 def strand_depths(
     points: Floats, offsets: Ints, colliders: tuple[PosedCollider, ...], were_outside: Bools
 ) -> Floats:
-    """How deep [m] each strand is in a collider with what was outside at rest, (strand_count,).
+    """How deep [m] the points of each strand that were outside at rest lie in a collider,
+    (strand_count,).
 
     Args:
-        points, offsets: as of `length_changes`.
+        points, offsets: see `length_changes`.
         were_outside: (point_count,), see `are_outside`.
     """
     distance, _ = signed_distance(points, colliders, 0.0)

@@ -1,4 +1,4 @@
-"""The parameters that hair and cloth share: the medium, its wind, and contacts."""
+"""The parameters that hair and cloth share: the medium, wind, and contacts."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import Any
 
 from ..params import Settings, integer, number
 
-#: keyframes may turn the wind round and round: sixteen turns [rad]
+#: keyframes may turn the wind by several turns: sixteen at most [rad]
 _MAX_TURNED = math.radians(16.0 * 360.0)
 
 
 def air_damping(*, is_painted: bool) -> Any:
-    """Declares it; hair may be painted, cloth may not."""
+    """Declare the air damping; it may be painted for hair, not for cloth."""
     return number(
         0.5,
         label="Air Damping",
@@ -29,7 +29,7 @@ def air_damping(*, is_painted: bool) -> Any:
 
 @dataclass(frozen=True, kw_only=True)
 class MotionSettings(Settings):
-    """Of all that moves by itself; a base of settings, not a section of its own."""
+    """The settings that hair and cloth share; a base class, not a section of its own."""
 
     buoyancy: float = number(
         0.0,

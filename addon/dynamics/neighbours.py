@@ -1,13 +1,14 @@
-"""Hair of several grooms goes through a frame together: each feels the CVs of the others in its
-own grid, see `among`.
+"""Several grooms are advanced through a frame together: each feels the CVs of the others in its own
+grid, see `among`.
 
-    at first sight     their style, where it is then in the grid that goes with the groom: the
-                       density that they have at rest
-    before it feels    where the others are at that moment, and how they move
+    when they first meet    density at rest: the others' style, placed in the groom's grid as it
+                            then is relative to the groom
+    before each feeling     the places and motions of the others at that moment
 
-Grooms that feel stop there, and none goes on before all have got as far. So no result depends on
-their order, and each has substeps of its own: after its last stop, hair is taken to go straight on.
-Hair that is not simulated, or does not feel, goes straight through the frame.
+Grooms stop whenever they feel other hair, and none goes on before all have reached that moment. So
+results do not depend on the order of grooms, and each groom has its own substeps: between its stops
+it is extrapolated linearly. Hair that is not simulated, or does not feel other hair, moves linearly
+through the frame.
 """
 
 from __future__ import annotations
@@ -32,22 +33,23 @@ from .among import (
 from .state import Rest, as_rows
 from .turn import rotation_from, sample
 
-#: Other guides count one in several, of which each counts for all, where a CV would have less mass.
+#: If the mean CV of another groom has less mass than this, only one in several of its guides is
+#: used, with the mass of all of them.
 LIGHTEST = MASS // 4
-#: Moments of a frame this near to each other are one.
+#: Moments of a frame that differ by less than this are the same.
 ONE_MOMENT = 1.0e-6
 
 
 @dataclass(frozen=True, eq=False)
 class Stop:
-    """A groom in a frame, before it feels other hair.
+    """A groom that has stopped in a frame to feel other hair.
 
-    moment: as a fraction of the frame. step, ahead: one substep, and how far ahead CVs count, as
-        others.
-    rest, style: what it returns to, and where that is at the frame's begin, (guide_count, cv_count,
-        3) world [m].
-    read: gives its CVs and where they were a substep before, each (3, cv_count, guide_count)
-        float32 world [m].
+    moment: as a fraction of the frame.
+    step, ahead: a substep, and how far ahead CVs are deposited, as fractions of the frame.
+    rest: of the groom.
+    style: (guide_count, cv_count, 3) world [m], its style at the frame's begin.
+    read: returns its CVs now and a substep earlier, each (3, cv_count, guide_count) float32 world
+        [m].
     """
 
     moment: float
@@ -58,12 +60,13 @@ class Stop:
     read: Callable[[], tuple[Floats, Floats]]
 
 
-#: A frame of a groom, that stops before it feels and takes what it feels of others; None: nothing.
+#: A frame of a groom: yields a stop whenever it feels other hair, and is sent the nearby hair of
+#: other grooms, or None if there is none.
 type Steps[Result] = Generator[Stop, Neighbours | None, Result]
 
 
 def alone[Result](steps: Steps[Result]) -> Result:
-    """What comes of a frame without others."""
+    """The result of a frame without other grooms."""
     try:
         next(steps)
         while True:
@@ -75,11 +78,11 @@ def alone[Result](steps: Steps[Result]) -> Result:
 
 @dataclass(frozen=True, eq=False)
 class Style:
-    """A groom's style, as other grooms see it at first.
+    """A groom's style, as other grooms need it when they first meet.
 
-    read: gives where it is at the frame's begin, (guide_count, cv_count, 3) world [m].
+    read: returns it at the frame's begin, (guide_count, cv_count, 3) world [m].
     hair: (guide_count,) metres of strands that each CV stands for.
-    source: what it was made from; another one is another style.
+    source: the object that it was made from, whose identity identifies the style.
     """
 
     read: Callable[[], Floats]
@@ -91,7 +94,7 @@ def hair_of(guides: Floats, strands: Floats) -> Floats:
     """Metres of strands that a CV of each guide stands for.
 
     Args:
-        guides: (guide_count, cv_count, 3) [m]. strands: (guide_count,) how many it stands for.
+        guides: (guide_count, cv_count, 3) [m]. strands: (guide_count,) how many each stands for.
     """
     lengths = np.linalg.norm(np.diff(guides, axis=1), axis=2).sum(axis=1)
     size = float(np.median(lengths)) if len(lengths) else 0.0
@@ -100,13 +103,13 @@ def hair_of(guides: Floats, strands: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class KnownHair:
-    """What a groom knows of others since its motion began.
+    """The other grooms that a groom has met since its motion began.
 
-    rest: of the groom, another one in each frame where its style is animated. at_rest: of each
-        other, by its number, what its style was made from and the CVs of this near the groom's,
-        where both are at rest; None: there are none.
-    grid: of the groom among those that are near now. among: their numbers, as far as they are near
-        at rest.
+    rest: of the groom; another object in each frame if its style is animated.
+    at_rest: by each other groom's number, the source of its style, and its CVs near the groom with
+        both at rest; None: there are none.
+    grid: of the groom, including the grooms that are near now.
+    among: numbers of those of them that are also near at rest.
     """
 
     rest: Rest | None = None
@@ -115,11 +118,11 @@ class KnownHair:
     among: frozenset[int] = frozenset()
 
     def meeting(self, rest: Rest, style: Floats, others: Mapping[int, Style]) -> KnownHair:
-        """The same with all of these others.
+        """The same after meeting other grooms.
 
         Args:
             rest, style: see `Stop`.
-            others: those that are near, by numbers that stay the same.
+            others: all that are near now, by numbers that are constant over frames.
         """
         known = dict(self.at_rest)
         fresh = [
@@ -145,11 +148,12 @@ class KnownHair:
 
 @dataclass(frozen=True, eq=False)
 class Straight:
-    """How a groom goes through a frame that does not stop in it.
+    """The motion of a groom that does not stop in a frame.
 
-    begin: its guides, (guide_count, cv_count, 3) world [m]. read_end: gives them, once it is there.
-    reach: how far hair gets from the middle of its roots [m]; what goes farther in a frame has been
-        put elsewhere.
+    begin: its guides, (guide_count, cv_count, 3) world [m].
+    read_end: returns them at the frame's end, once they are there.
+    reach: how far hair reaches from the middle of its roots [m]; a groom that moves farther in a
+        frame has been placed elsewhere, and counts as not moving.
     """
 
     begin: Floats
@@ -158,7 +162,7 @@ class Straight:
 
     @cached_property
     def ends(self) -> tuple[Floats, Floats]:
-        """Begin and end, of one shape."""
+        """The guides at begin and end, with the same shape."""
         end = self.read_end()
         if self.begin.shape != end.shape:
             return end, end
@@ -167,13 +171,16 @@ class Straight:
 
 
 class Mover:
-    """A groom in a frame.
+    """A groom that is advanced through a frame.
 
-    known: of others, in the end. error: why it did not come to the frame's end.
+    known: the other grooms that it has met, updated during the frame.
+    error: the exception that ended its frame early; None: none.
 
     Args:
-        number: stays the same from frame to frame.
-        steps: what it does, where that waits. near: the numbers of those that it feels.
+        number: constant over frames.
+        straight: its motion if it does not stop.
+        steps: its frame; None if it does not stop.
+        near: the numbers of the grooms that it feels.
     """
 
     def __init__(
@@ -193,11 +200,11 @@ class Mover:
 
     @property
     def stands_at(self) -> float:
-        """The moment at which it stands before it feels; infinite: it goes through."""
+        """The moment at which it has stopped; infinite if it has not."""
         return np.inf if self._steps is None or self._stop is None else self._stop.moment
 
     def go_on(self, felt: Neighbours | None) -> None:
-        """To the next stop or the frame's end."""
+        """Advance to the next stop or the frame's end."""
         if self._steps is None:
             return
         try:
@@ -205,11 +212,11 @@ class Mover:
             self._here, self._before = self._stop.read()
         except StopIteration:
             self._steps = None
-        except Exception as error:  # the others go on; whoever has sent it reports it
+        except Exception as error:  # the others go on; the caller reports it
             self._steps, self.error = None, error
 
     def feels(self, movers: Mapping[int, Mover]) -> Neighbours | None:
-        """What it feels of the others where it stands."""
+        """The nearby hair of the other grooms at its stop; None if there is none."""
         stop = self._stop
         assert stop is not None, "it stands somewhere"
         others = {number: movers[number] for number in sorted(self.near)}
@@ -228,11 +235,12 @@ class Mover:
         return Neighbours(grid, seen, own)
 
     def _seen(self, moment: float, step: float, unit: float) -> Others:
-        """CVs at a moment of the frame.
+        """This groom's CVs at a moment of the frame, as another groom feels them.
 
         Args:
-            step: a substep of the groom that sees them, as another fraction of it.
-            unit: see `HairGrid`.
+            moment: as a fraction of the frame.
+            step: a substep of the other groom, as a fraction of the frame.
+            unit: of the other groom, see `HairGrid`.
         """
         cv_count = self._straight.begin.shape[1]
         chosen, mass = _masses(self._style.hair, unit, cv_count)
@@ -250,7 +258,7 @@ class Mover:
 
 
 def go_together(movers: Sequence[Mover]) -> None:
-    """Through the frame."""
+    """Advance all grooms through the frame."""
     by_number = {mover.number: mover for mover in movers}
     for mover in movers:
         mover.go_on(None)
@@ -262,8 +270,8 @@ def go_together(movers: Sequence[Mover]) -> None:
 
 
 def _at_rest(rest: Rest, style: Floats, other: Style) -> Others | None:
-    """The CVs of other hair near those of a groom, where both are in their style and the groom has
-    gone back to where its motion began; None: there are none."""
+    """The CVs of another groom's style near a groom at rest, moved together with the groom to where
+    its motion began; None: there are none."""
     grid, guides = rest.hair_grid, other.read()
     chosen, mass = _masses(other.hair, grid.unit, guides.shape[1])
     turn = rotation_from(rest.sample, sample(style))
@@ -276,7 +284,7 @@ def _at_rest(rest: Rest, style: Floats, other: Style) -> Others | None:
 
 
 def _masses(hair: Floats, unit: float, cv_count: int) -> tuple[slice, Floats]:
-    """Which guides of other hair count, and the masses of all their CVs, as `_rows` has them."""
+    """Which guides of another groom are used, and the masses of their CVs in `_rows` order."""
     mass = hair / unit if unit else np.zeros(len(hair))
     lightest = LIGHTEST / max(len(hair), 1)
     every = int(max(LIGHTEST / max(float(mass.mean()), lightest), 1.0)) if len(hair) else 1

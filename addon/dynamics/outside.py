@@ -1,13 +1,13 @@
 """Guides stay outside of colliders and keep their lengths: both are solved in turn.
 
-Lengths come last, and slide along what touches. Where they have drawn a guide into a collider, it
-is solved again, by itself.
+Lengths are solved last; CVs in contact slide along the surface. A guide that lengths have drawn
+into a collider is solved again on its own.
 
-A collider that goes far in a substep drags hair over itself, so that lengths bring CVs to where the
-planes that were found say nothing. A guide that meets one goes through the substep in parts. In
-each, guide and collider go a part of their way and contacts are found again; what these have taken
-of the guide's speed is missing in the next. Far is measured as seen from the guide's root: a head
-that shakes its own hair is not.
+A fast collider drags hair over itself, so that lengths move CVs to places where the planes of the
+contacts no longer represent its surface. A guide that meets one is advanced in parts of the
+substep. In each part, guide and collider move a part of their way and contacts are found again; the
+speed that contacts take from the guide is missing in the next part. Fast means relative to the
+guide's root: a head that shakes its own hair is not.
 """
 
 from __future__ import annotations
@@ -42,7 +42,10 @@ from .settings import DynamicsSettings
 
 @dataclass(frozen=True)
 class Chain:
-    """What keeps guides in one piece; length, held: see `frame.Block`. size: of the hair [m]."""
+    """The length constraints of guides.
+
+    length: see `state.Rest`. held: see `frame.Block`. size: of the hair [m].
+    """
 
     length: Floats
     held: Floats | None
@@ -64,11 +67,11 @@ class Chain:
 
 @dataclass(frozen=True)
 class Outside:
-    """What guides stay outside of in a substep.
+    """Colliders that guides stay outside of in a substep.
 
     radius, between: see `frame.Block`.
     poses: of the colliders.
-    led_out: how far [m] a point that is inside may be led out.
+    led_out: how far [m] a point that is inside may be moved out.
     passes: how often contacts and lengths are solved in turn.
     """
 
@@ -80,9 +83,9 @@ class Outside:
     passes: int
 
     def keep(self, position: Floats, previous: Floats) -> None:
-        """Change both (3, cv_count, n) world [m], in place.
+        """Solve contacts and lengths; changes both arrays (3, cv_count, n) world [m] in place.
 
-        Guides that touch nothing take part, so that none depends on what others do.
+        Guides that touch nothing take part too, so that no guide depends on the others.
         """
         contacts = self._find(position, previous)
         guides = hurried_guides(contacts, position, previous, self.chain.size)
@@ -93,7 +96,7 @@ class Outside:
             position[:, :, guides], previous[:, :, guides] = own._in_parts(*some)
 
     def _in_parts(self, position: Floats, previous: Floats) -> tuple[Floats, Floats]:
-        """The same, part by part; position and previous at the end."""
+        """Solve the substep in parts; position and previous position at its end."""
         here, path = previous, (position - previous) / np.float32(PARTS)
         went = np.zeros_like(path)
         for number in range(PARTS):
@@ -115,7 +118,7 @@ class Outside:
         return here, here - went
 
     def _put_back(self, position: Floats, end: Floats) -> None:
-        """The CVs that something carries, to where it has carried them, without rounding."""
+        """Put pinned and held CVs at their exact places at the substep's end."""
         position[:, :PINNED] = end[:, :PINNED]
         if self.chain.held is not None:
             np.copyto(position, end, where=self.chain.held > 0.0)
@@ -146,7 +149,7 @@ class Outside:
 
 
 def _solve_in_turn(position: Floats, chain: Chain, contacts: list[Contacts], passes: int) -> None:
-    """Contacts and lengths, and lengths at last."""
+    """Solve contacts and lengths alternately, then finish lengths."""
     touched, settings = None, chain.settings
     here = position.reshape(3, -1)
     for _ in range(passes):
@@ -160,7 +163,7 @@ def _solve_in_turn(position: Floats, chain: Chain, contacts: list[Contacts], pas
 
 
 def _solve_again(position: Floats, chain: Chain, contacts: list[Contacts]) -> None:
-    """Once more in turn, for guides that their lengths have drawn into a collider."""
+    """Repeat for guides that lengths have drawn into a collider."""
     guide_count = position.shape[2]
     guides = _missing(position, contacts)
     for _ in range(MORE_ROUNDS):
@@ -178,7 +181,7 @@ def _solve_again(position: Floats, chain: Chain, contacts: list[Contacts]) -> No
 
 
 def _missing(position: Floats, contacts: list[Contacts]) -> Ints:
-    """Guides, rising, of which a CV or segment is farther below its plane than it may be."""
+    """Guides, ascending, with a CV or segment that is farther below its plane than allowed."""
     here, guide_count = position.reshape(3, -1), position.shape[2]
     found = [one.index[one.missing(here)] % guide_count for one in contacts]
     return np.unique(np.concatenate(found)) if found else np.zeros(0, np.int64)

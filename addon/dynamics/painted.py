@@ -1,7 +1,7 @@
-"""Settings that are painted: each guide has its own numbers where all others share one.
+"""Painted settings: each guide has individual values instead of the groom's.
 
-What is painted multiplies a setting. Stiffness may differ along a guide as well; of all else a
-guide has one number, the mean along it. A frame in which nothing is painted knows nothing of this.
+Painted factors multiply a setting. Stiffness may also vary along a guide; other settings use the
+mean along it. A frame in which nothing is painted does without this module.
 """
 
 from __future__ import annotations
@@ -17,14 +17,17 @@ from .forces import Damped
 from .settings import DynamicsSettings
 from .style import StyleBand, painted_band
 
-#: By what is painted of these, less is seen of the motion.
+#: Factors of these only blend the visible motion; they do not affect the simulation.
 _SEEN = frozenset({"simulated", "only_selected"})
 
 
 @dataclass(frozen=True, eq=False)
 class PaintedGuides:
-    """factors: of each painted setting by its name, (cv_count, guide_count) or (1, guide_count)
-    where it is alike along each guide; not negative and finite."""
+    """Factors of painted settings.
+
+    factors: by the setting's name, (cv_count, guide_count), or (1, guide_count) if constant along
+        each guide; finite and not negative.
+    """
 
     factors: Mapping[str, Floats]
 
@@ -33,16 +36,16 @@ class PaintedGuides:
         return settings.painted(name, self.factors.get(name, np.ones((1, 1))))
 
     def of_guides(self, settings: DynamicsSettings, name: str) -> Floats:
-        """A setting of each guide, (guide_count,), or (1,) where it is not painted."""
+        """A setting of each guide, (guide_count,), or (1,) if it is not painted."""
         return self.along(settings, name).mean(axis=0)
 
     @property
     def is_of_motion(self) -> bool:
-        """Whether any is painted but what is seen of the motion."""
+        """Whether anything is painted that affects the simulation."""
         return bool(self.factors.keys() - _SEEN)
 
     def all_seen(self) -> PaintedGuides:
-        """The same where all of the motion is seen."""
+        """The same without the factors that blend the visible motion."""
         return PaintedGuides({of: each for of, each in self.factors.items() if of not in _SEEN})
 
     def fits(self, cv_count: int, guide_count: int) -> bool:
@@ -55,8 +58,8 @@ class PaintedGuides:
 def simulated_of(
     painted: PaintedGuides | None, settings: DynamicsSettings, guide_count: int
 ) -> Floats | None:
-    """How much of each guide is simulated, (guide_count,) float32, see `blend.blended`; None: all
-    of all."""
+    """The simulated fraction of each guide's visible motion, (guide_count,) float32, see
+    `blend.blended`; None: all of it for all guides."""
     factors = {} if painted is None else painted.factors
     by_selection = settings.only_selected and "only_selected" in factors
     if settings.simulated == 1.0 and not by_selection and "simulated" not in factors:
@@ -71,10 +74,10 @@ def simulated_of(
 
 @dataclass(frozen=True, eq=False)
 class PaintedFrame:
-    """What guides have of their own in a frame, all float32.
+    """Individual values of guides in a frame, all float32.
 
-    gravity, volume: (guide_count,) by which what all others have is multiplied.
-    damped: of each guide.
+    gravity, volume: (guide_count,), factors of the groom's.
+    damped: with values for each guide.
     matrix: see `style.StyleBand`.
     """
 
@@ -97,7 +100,7 @@ class PaintedFrame:
 def painted_frame(
     painted: PaintedGuides, settings: DynamicsSettings, cv_count: int, guide_count: int, dt: float
 ) -> PaintedFrame:
-    """Of all guides of a groom."""
+    """The individual values of all guides of a groom."""
 
     def rows(values: Floats | float) -> Floats:
         return np.broadcast_to(np.asarray(values, np.float32), guide_count)

@@ -1,14 +1,15 @@
-"""How something goes as a whole within a frame: on the arc of its turn, not on the chord.
+"""Rigid motion within a frame: along the arc of its rotation, not along the chord.
 
-A rigid motion has a twist (w, v): it turns about an axis and goes along it, and with a = |w|
+A rigid motion is a screw with twist (w, v), a rotation about an axis and a shift along it. With
+a = |w|
 
     R = exp([w]),   t = V(w) v,   V(w) = 1 + (1 - cos a) / a^2 [w] + (a - sin a) / a^3 [w]^2
 
 (Murray, Li and Sastry 1994, "A Mathematical Introduction to Robotic Manipulation", section 2.3).
-Twists follow the parabola of `trajectory` through those of the frame's end and of one frame
-earlier, both as seen from the frame's begin. So what turns evenly about any axis goes on its
-circle, and what does not turn goes as it does without. What is not rigid is a parabola in places as
-the moving thing sees them.
+Twists follow the parabola of `trajectory` through the twists at the frame's end and one frame
+earlier, both relative to the frame's begin. So a uniform rotation about any axis follows its
+circle, and motion without rotation is the same as without twists. Motion that is not rigid follows
+a parabola in the moving frame of reference.
 """
 
 from __future__ import annotations
@@ -23,16 +24,16 @@ from ..arrays import Floats, Ints
 from .trajectory import at, curvature
 from .turn import rotation_from
 
-#: [rad] in a frame from which on arcs matter: below, a chord is off by a hundred thousandth of the
-#: distance from the axis at most, and a parabola by less than floats tell.
+#: Rotation in a frame from which on arcs matter [rad]: below, a chord is off by at most a hundred
+#: thousandth of the distance from the axis, and a parabola by less than float32 resolves.
 ARC = math.radians(0.5)
-#: Squared angles [rad^2] below this take the first terms of the series.
+#: Below this squared angle [rad^2] the first terms of series are used.
 _SMALL = 1.0e-8
 
 
 @dataclass(frozen=True)
 class Rigid:
-    """x goes to rotation x + shift. rotation: (3, 3) float64. shift: (3,) [m]."""
+    """The motion from x to rotation x + shift. rotation: (3, 3) float64. shift: (3,) [m]."""
 
     rotation: Floats
     shift: Floats
@@ -42,15 +43,15 @@ class Rigid:
         return Rigid(self.rotation.T, -(self.rotation.T @ self.shift))
 
     def since(self, other: Rigid) -> Rigid:
-        """From the other place to this one: how it has turned, and how far its pivot has gone."""
+        """The rotation, and the shift of the pivot, from the other place to this one."""
         return Rigid(self.rotation @ other.rotation.T, self.shift - other.shift)
 
     def part(self, shifted: float, turned: float) -> Rigid:
-        """That fraction of its shift, and that of its turn."""
+        """The motion with these fractions of its shift and rotation."""
         return Rigid(rotation_of(turn_of(self.rotation) * turned), self.shift * shifted)
 
     def turned(self, turn: Floats) -> Rigid:
-        """The same motion as it is where everything has been turned by a rotation (3, 3)."""
+        """The same motion in a space that is turned by a rotation (3, 3)."""
         return Rigid(turn @ self.rotation @ turn.T, turn @ self.shift)
 
 
@@ -59,9 +60,9 @@ STILL = Rigid(np.eye(3), np.zeros(3))
 
 @dataclass(frozen=True)
 class RigidPath:
-    """Of something that is moved as a whole, about a pivot that its owner knows.
+    """A rigid path within a frame, about a pivot that the owner stores.
 
-    now, earlier: where it is at the frame's end, and was one frame earlier, as seen from its begin.
+    now, earlier: the motion from the frame's begin to its end, and to one frame earlier.
     ratio: duration of the frame before, over that of this one.
     """
 
@@ -71,19 +72,19 @@ class RigidPath:
 
     @cached_property
     def is_arc(self) -> bool:
-        """Whether it turns by so much that its arc matters."""
+        """Whether it turns by more than ARC."""
         known = self.now if self.earlier is None else self.earlier
         turns = (turn_of(each.rotation) for each in (self.now, known))
         return any(math.hypot(*turn) > ARC for turn in turns)
 
     def at(self, moment: float) -> Rigid:
-        """Where it is at a moment, 0 the frame's begin and 1 its end, as seen from the begin."""
+        """The motion from the frame's begin to a moment, 0 its begin and 1 its end."""
         twist, bent = self._twist
         return motion_of(at(np.zeros(6), twist, bent, moment))
 
     @cached_property
     def _twist(self) -> tuple[Floats, Floats | None]:
-        """(6,) float64 from the begin to the end, w [rad] and v [m], and how it is bent."""
+        """The twist from begin to end, (6,) float64: w [rad] and v [m]; and its curvature."""
         twist = twist_of(self.now)
         if self.earlier is None:
             return twist, None
@@ -91,16 +92,17 @@ class RigidPath:
 
 
 def rotation_of(turn: Floats) -> Floats:
-    """The rotation (3, 3) about an axis by its length [rad], (3,)."""
+    """The rotation matrix (3, 3) of a rotation vector (3,), about it by its length [rad]."""
     first, second, _ = _series(turn)
     square = float(turn @ turn)
     return _spin(turn, 1.0 - second * square, first, second)
 
 
 def turn_of(rotation: Floats) -> Floats:
-    """What `rotation_of` gives a rotation (3, 3) of, (3,) [rad], no longer than pi.
+    """The rotation vector (3,) [rad] of a rotation matrix (3, 3), no longer than pi.
 
-    By the largest of a quaternion's parts, which is exact at any angle (Shepperd 1978).
+    Computed from the largest component of the quaternion, which is accurate at any angle (Shepperd
+    1978).
     """
     m = np.asarray(rotation, np.float64)
     squares = np.array([1.0 + np.trace(m), *(1.0 + 2.0 * m[i, i] - np.trace(m) for i in range(3))])
@@ -135,7 +137,7 @@ def twist_of(motion: Rigid) -> Floats:
 
 
 def _mean_turn(turn: Floats) -> Floats:
-    """V(w), the mean of the rotations on the way."""
+    """V(w), the mean of the rotations along the path."""
     _, second, third = _series(turn)
     return _spin(turn, 1.0 - third * float(turn @ turn), second, third)
 
@@ -170,9 +172,9 @@ def _spin(turn: Floats, even: float, cross: float, outer: float) -> Floats:
 
 @dataclass(frozen=True)
 class Carrier:
-    """What carries places: its path, about a pivot (3,) float64 world [m], which goes with it.
+    """A moving frame that carries places.
 
-    Of the motions of its path the shift is that of the pivot.
+    pivot: (3,) float64 world [m], at the frame's begin. path: shifts are those of the pivot.
     """
 
     pivot: Floats
@@ -182,7 +184,7 @@ class Carrier:
     def through(
         cls, before: Floats, now: Floats, earlier: Floats | None = None, ratio: float = 1.0
     ) -> Carrier:
-        """By the same places (3, n) float64 [m] at the frame's begin, at its end and earlier."""
+        """The best fit to places (3, n) float64 [m] at the frame's begin, its end and earlier."""
         if not before.size:
             return cls(np.zeros(3), RigidPath(STILL))
         pivot = before.mean(axis=1)
@@ -190,12 +192,12 @@ class Carrier:
         return cls(pivot, RigidPath(_between(before, now), since, ratio))
 
     def carry(self, motion: Rigid, begun: Rigid = STILL) -> Carry:
-        """By a motion, from where it had gone before."""
+        """The motion of places by `motion`, after the pivot has been moved by `begun`."""
         origin = self.pivot + begun.shift
         return Carry(motion.rotation, origin, origin + motion.shift)
 
     def seen(self, motion: Rigid) -> Carry:
-        """Back to the frame's begin."""
+        """The motion of places back to the frame's begin."""
         there = self.pivot + motion.shift
         return Carry(motion.inverse.rotation, there, self.pivot)
 
@@ -208,9 +210,9 @@ def _between(before: Floats, now: Floats) -> Rigid:
 
 @dataclass(frozen=True, eq=False)
 class LastStep:
-    """Where something was as a whole at a substep's begin and end, found once anybody asks.
+    """Where something was as a whole at a substep's begin and end, computed on demand.
 
-    path: of its frame. span: begin and end of the substep as fractions of that.
+    path: of its frame. span: begin and end of the substep as fractions of the frame.
     """
 
     path: RigidPath
@@ -218,25 +220,27 @@ class LastStep:
 
     @cached_property
     def places(self) -> tuple[Rigid, Rigid]:
-        """At the begin and at the end, as seen from the frame's end."""
+        """The places at the substep's begin and end, relative to the frame's end."""
         begin, end = (self.path.at(moment).since(self.path.now) for moment in self.span)
         return begin, end
 
 
 @dataclass(frozen=True, eq=False)
 class KnownStep:
-    """The same where it is known."""
+    """`LastStep` with known places."""
 
     places: tuple[Rigid, Rigid]
 
 
-#: Of what has not moved.
 NOT_MOVED = KnownStep((STILL, STILL))
 
 
 @dataclass(frozen=True)
 class Carry:
-    """x goes to rotation (x - origin) + there. rotation: (3, 3). origin, there: (3,) world [m]."""
+    """The motion from x to rotation (x - origin) + there.
+
+    rotation: (3, 3). origin, there: (3,) world [m].
+    """
 
     rotation: Floats
     origin: Floats
@@ -244,12 +248,12 @@ class Carry:
 
     @property
     def texels(self) -> Floats:
-        """(4, 4): rows of the rotation, each with a coordinate of `there`; the origin."""
+        """(4, 4) for the GPU: rows of the rotation and `there`; last the origin."""
         rows = np.concatenate([self.rotation, self.there[:, None]], axis=1)
         return np.concatenate([rows, [[*self.origin, 0.0]]])
 
     def moved(self, rows: Floats) -> Floats:
-        """Places (3, ...) [m]; float32 stays float32. Not by BLAS, which would wake its threads."""
+        """Places (3, ...) [m] moved, in the same dtype; without BLAS, which would wake threads."""
         places = rows.reshape(3, -1)
         beside = places - self.origin.astype(rows.dtype)[:, None]
         result = np.einsum("ij,jn->in", self.rotation.astype(rows.dtype), beside)
@@ -259,10 +263,10 @@ class Carry:
 
 @dataclass(frozen=True)
 class CarriedPath:
-    """The way of places (3, ...) [m] within a frame.
+    """The path of places (3, ...) [m] within a frame.
 
-    before, displacement, curvature: as `trajectory.at` takes them, as seen from what carries them.
-    carrier: None: nothing turns them.
+    before, displacement, curvature: see `trajectory.at`, relative to the carrier.
+    carrier: the moving frame; None: the world.
     """
 
     before: Floats
@@ -288,10 +292,10 @@ class CarriedPath:
         return cls(before, now - before, bent, carrier)
 
     def at(self, moment: float, place: Rigid | None = None) -> Floats:
-        """Where they are at a moment, 0 the frame's begin and 1 its end.
+        """The places at a moment, 0 the frame's begin and 1 its end.
 
         Args:
-            place: of what carries them; None: as its path says.
+            place: of the carrier; None: according to its path.
         """
         seen = at(self.before, self.displacement, self.curvature, moment)
         if self.carrier is None:
@@ -299,12 +303,12 @@ class CarriedPath:
         return self.carrier.carry(place or self.carrier.path.at(moment)).moved(seen)
 
     def part(self, chosen: Ints | slice) -> CarriedPath:
-        """Of some of the places (3, n)."""
+        """The path of some of the places (3, n)."""
         bent = None if self.curvature is None else self.curvature[:, chosen]
         return CarriedPath(self.before[:, chosen], self.displacement[:, chosen], bent, self.carrier)
 
     def as_floats(self) -> CarriedPath:
-        """In float32."""
+        """The same in float32."""
         bent = None if self.curvature is None else self.curvature.astype(np.float32)
         before, displacement = (
             rows.astype(np.float32) for rows in (self.before, self.displacement)

@@ -1,4 +1,4 @@
-"""The clock of a simulation: how many fixed substeps are due, and what time is left over."""
+"""The clock of a simulation: how many fixed substeps are due, and how much time is left over."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 
 from ..errors import HairloomError
 
-#: A substep is due when all but this fraction of it has passed, so that 4 / 240 s is one 60th.
+#: A substep is due once all but this fraction of it has passed, so that 4 / 240 s makes one 60th.
 _DUE = 1.0e-6
 
 
@@ -16,8 +16,8 @@ def due_substeps(
     """The simulated duration [s], how many substeps are due, and the time left after them [s].
 
     Args:
-        time_left: [s] that passed before and was not yet simulated.
-        duration: [s] of this frame; no more than `longest_frame` of it is simulated.
+        time_left: [s] of earlier frames that is not yet simulated.
+        duration: [s] of this frame; at most `longest_frame` of it is simulated.
         dt: [s] of a substep.
 
     Raises:

@@ -13,8 +13,8 @@ from .motion_settings import MotionSettings, air_damping
 class DynamicsSettings(MotionSettings):
     """How guides move, keep their style and meet colliders.
 
-    Stiffness is given as the number of swings a second that a strand would make if this stiffness
-    alone brought it back: it does not depend on the substep, the CV count or the strand's length.
+    Stiffness is given in swings per second, the frequency of a strand that only this stiffness
+    restores. So it does not depend on the substep, the CV count or the strand's length.
     """
 
     section = "dynamics"

@@ -1,4 +1,4 @@
-"""What the artist sets about letting hair fall."""
+"""The parameters of settling: letting combed hair fall onto the body."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from ..params import Settings, number
 from .settings import DynamicsSettings
 
-#: Still air slows falling hair at least this much, so that it comes to rest and does not swing.
+#: Minimum air damping of falling hair [1/s], so that it comes to rest without swinging.
 _DAMPING = 3.0
 
 
@@ -38,8 +38,7 @@ class SettleSettings(Settings):
     )
 
     def falling(self, own: DynamicsSettings) -> DynamicsSettings:
-        """How this hair falls: by its whole weight, in still air, held by a part of its
-        stiffness."""
+        """The dynamics of falling hair: full weight, still air, a fraction of its stiffness."""
         held = dict.fromkeys(("style_root", "style_tip", "bend"), self.stiffness)
         return replace(
             own.multiplied(**held),

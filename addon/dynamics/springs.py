@@ -1,19 +1,19 @@
-"""Curls give: the centre line of a curled guide is a chain of springs along itself.
+"""Stretching curls: the centre line of a curled guide is a chain of springs along itself.
 
-Each segment j of it may be drawn out or pushed together by an extension e = |s_j| - l_j, against
-a tension, for CVs of mass 1, of
+Each segment j may be drawn out or compressed by an extension e = |s_j| - l_j, against a tension,
+for CVs of mass 1, of
 
-    T(e) = kappa e / (1 - (e / E)^2) + T_0     E the most that it gives, T_0 that at rest
+    T(e) = kappa e / (1 - (e / E)^2) + T_0     E the maximum extension, T_0 the tension at rest
 
-which is an ideal spring at first and stiffens as the curl is drawn straight. kappa is such that a
-guide curled along its whole length bobs at the frequency of the settings, so that motion depends
-neither on the substep, nor on the CV count, nor on the size. T_0 is the tension of the weight that
-the style carries: a groom at rest is as long as it was combed.
+which is an ideal spring at first and stiffens as the curl is drawn straight. kappa is chosen such
+that a guide curled along its whole length bobs at the frequency of the settings, so that motion
+does not depend on the substep, the CV count or the size. T_0 is the tension of the weight that the
+style carries: a groom at rest is as long as it was combed.
 
-A step is backward Euler, linearised at the extension before it: the Newton step of `constraints`,
-with a compliance on the diagonal (XPBD, Macklin, Mueller and Chentanez 2016). The lengths that it
-leaves are those that the rest of the substep keeps. So what does not give stays as stiff as it was,
-and style, contacts and reach need to know of no springs.
+A step is backward Euler, linearised at the extension before it: the Newton step of `constraints`
+with a compliance on the diagonal (XPBD, Macklin, Mueller and Chentanez 2016). The rest of the
+substep keeps the resulting lengths. So segments without curls stay rigid, and style, contacts and
+reach need not handle springs.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ from .constraints import PINNED, TINY, segments, spring_step
 from .forces import tension_on_style
 from .settings import DynamicsSettings
 
-#: Of what a curl could be drawn out until it is straight, it gives this at Curl Stretch 1.
+#: E at Curl Stretch 1, as a fraction of the extension at which the curl is straight.
 GIVEN = 0.8
-#: A spring is linearised no nearer to its end than this.
+#: A spring is linearised at |e| / E up to this.
 STEEPEST = np.float32(0.9)
 
 
@@ -46,21 +46,21 @@ def stiffness(settings: DynamicsSettings, cv_count: int) -> float:
 
 
 def give(settings: DynamicsSettings) -> float:
-    """Fraction of a curl's room that it gives."""
+    """E as a fraction of a curl's room."""
     return GIVEN * settings.curl_stretch
 
 
 @dataclass(frozen=True)
 class Springs:
-    """The curled guides of a block in a frame; rows (cv_count - 2, n), a segment beyond the pinned
-    ones each.
+    """The curled guides of a block in a frame; rows (cv_count - 2, n), one for each segment beyond
+    the pinned ones.
 
-    guides: (n,) which of the block they are, rising.
+    guides: (n,) their indices in the block, ascending.
     length: [m] at rest.
-    most: E [m], 0 where a segment does not give.
+    most: E [m], 0 where a segment cannot stretch.
     load: T_0 / kappa [m].
     softness: 1 / (kappa dt^2).
-    held: see `held.Held.rows`, of these guides; None where none is held.
+    held: see `held.Held.rows`, of these guides; None if no guide of the block is held.
     """
 
     guides: Ints
@@ -81,13 +81,13 @@ class Springs:
         settings: DynamicsSettings,
         dt: float,
     ) -> Springs | None:
-        """Those of a block; None where no guide gives.
+        """The springs of a block; None if no guide can stretch.
 
         Args:
             room, length: (cv_count - 1, guide_count), see `state.Rest`.
             style: (3, cv_count, guide_count) world [m].
             combed: (3,) [m/s^2], the gravity that the style carries.
-            held: (cv_count, guide_count), see `held.Held.rows`; None where no CV is held.
+            held: (cv_count, guide_count), see `held.Held.rows`; None if no CV is held.
         """
         if room is None or not settings.curl_stretch or style.shape[1] <= PINNED:
             return None
@@ -103,12 +103,14 @@ class Springs:
         return cls(guides, at_rest, most, load, 1.0 / (kappa * dt * dt), own)
 
     def step(self, position: Floats, previous: Floats, length: Floats) -> Floats:
-        """Move curled guides by what their springs pull in a substep; the lengths (cv_count - 1,
-        guide_count) [m] of all segments from then on.
+        """Move curled guides by the pull of their springs in a substep, in place.
 
         Args:
             position, previous: (3, cv_count, guide_count) world [m], now and a substep earlier.
-            length: of all segments at rest.
+            length: (cv_count - 1, guide_count) [m], of all segments at rest.
+
+        Returns:
+            The lengths of all segments for the rest of the substep, in the shape of `length`.
         """
         some = position.take(self.guides, axis=2)
         _, squared = segments(previous[:, PINNED - 1 :].take(self.guides, axis=2))
@@ -129,6 +131,6 @@ class Springs:
 
 
 def limits(length: Floats, most: Floats) -> tuple[Floats, Floats]:
-    """How long and how short segments may get [m]: by the same factor."""
+    """The longest and shortest lengths of segments [m], by the same factor."""
     longest = length + most
     return longest, length * (length / np.maximum(longest, TINY))

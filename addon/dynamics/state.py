@@ -1,8 +1,8 @@
-"""What the simulation remembers of its guides from one frame to the next.
+"""The state of the simulated guides, kept from one frame to the next.
 
-Everything is a structure of arrays, (3, cv_count, guide_count) float32 in world space: one numpy
-call works on one CV, or all CVs, of every guide at once, over contiguous memory. That is 8 to 16
-times faster than an array of points.
+Everything is a structure of arrays, (3, cv_count, guide_count) float32 in world space: a numpy call
+processes one CV, or all CVs, of every guide at once, in contiguous memory. That is 8 to 16 times
+faster than an array of points.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from .turn import rest_sample
 
 @dataclass(frozen=True)
 class Rest:
-    """The style, as it was when the simulation started; constant.
+    """The style as it was when the simulation started; constant.
 
     position: (3, cv_count, guide_count) float32 world [m].
     length: (cv_count - 1, guide_count) float32 [m] of each segment.
-    shape: what is kept of it wherever the guides swing.
-    size: the median length of all guides [m], in which distances are given in the settings.
-    room: (cv_count - 1, guide_count) float32, by which fraction of its length each segment could be
-        drawn out until its curls are straight; None where no guide is curled.
+    shape: the local shape that is kept however the guides swing.
+    size: the median length of all guides [m], the unit of distances in the settings.
+    room: (cv_count - 1, guide_count) float32, the fraction of its length by which each segment can
+        be drawn out until its curls are straight; None if no guide is curled.
     strands: (guide_count,) how many strands each guide stands for; None: equally many.
     """
 
@@ -43,7 +43,7 @@ class Rest:
 
     @cached_property
     def hair_grid(self) -> HairGrid:
-        """For hair that feels other hair."""
+        """The hair grid at rest, without other grooms."""
         return HairGrid.at_rest(self.position, self.size, self.strands)
 
     @cached_property
@@ -54,7 +54,7 @@ class Rest:
     def part(self, guides: slice) -> Rest:
         """The rest of these guides, as views."""
         if guides == slice(0, self.position.shape[2]):
-            return self  # and what is known of them
+            return self  # with its cached properties
         return Rest(
             self.position[:, :, guides],
             self.length[:, guides],
@@ -67,7 +67,7 @@ class Rest:
 
 @dataclass(frozen=True, eq=False)
 class StyleRows:
-    """A style as it was given, (guide_count, cv_count, 3), and as rows (3, cv_count, guide_count)
+    """A style as passed in, (guide_count, cv_count, 3), and as rows (3, cv_count, guide_count)
     float32, world [m]."""
 
     grid: Floats
@@ -80,13 +80,13 @@ class DynamicsState:
 
     position, previous: (3, cv_count, guide_count) float32 world [m], one substep apart.
     rest: the style and the lengths to keep.
-    substep: length [s] of the last substep; 0 when there was none.
-    time_left: time [s] that has passed but is shorter than a substep, so not yet simulated.
+    substep: length [s] of the last substep; 0 if there was none.
+    time_left: time [s] that has passed but is not yet simulated, shorter than a substep.
     time: [s] simulated since the start; gusts depend on it.
-    styles: what the last frame went by, so that the next need not turn and check it again.
-    push: (3, cv_count, guide_count) [m], what other hair adds to each CV in a substep until it is
-        felt again; None where it is to be felt at once.
-    carried: where the roots were as a whole in the last substep.
+    styles: the last frame's styles, which the next frame need not convert and check again.
+    push: (3, cv_count, guide_count) [m], the displacement of each CV by other hair in each substep,
+        until it is computed again; None: compute it in the next substep.
+    carried: where the roots as a whole were in the last substep.
     """
 
     position: Floats
@@ -124,8 +124,7 @@ def start(
 
     Args:
         guide_grid: (guide_count, cv_count, 3) world [m], cv_count at least 2.
-        room: (guide_count, cv_count - 1), see `strands.center_lines.curl_room`; None: none is
-            curled.
+        room: (guide_count, cv_count - 1), see `strands.center_lines.curl_room`; None: no curls.
         strands: (guide_count,) how many strands each guide stands for; None: equally many.
 
     Raises:
@@ -161,12 +160,12 @@ def rows_of(grid: Floats, place: str) -> Floats:
 
 
 def as_rows(grid: Floats) -> Floats:
-    """The same without a check."""
+    """`rows_of` without checks."""
     return np.ascontiguousarray(grid.transpose(2, 1, 0), np.float32)
 
 
 def checked_grid(grid: Floats, place: str) -> Floats:
-    """The grid itself.
+    """The grid itself, checked.
 
     Raises:
         HairloomError: another shape, or a value that is not finite.

@@ -1,27 +1,27 @@
 """One frame of motion, in fixed substeps.
 
     repeat substep_rate times a second:
-        among        now and then: hair feels other hair
-        brake        drag by the square of the speed through the air
+        among        at some substeps: forces between hair and other hair
+        brake        quadratic drag
         blow         the scene's force fields push, slow down and turn
         predict      Verlet: inertia, damping, gravity, wind
-        pin          the head carries the first two CVs, ties carry what they hold
-        springs      curls give along themselves; the lengths that they leave are kept from there on
+        pin          the head carries the first two CVs, ties carry the CVs they hold
+        springs      curls stretch; the rest of the substep keeps the resulting lengths
         style        global and local shape, one direct solve
         lengths      one direct solve, or relaxation
-        contacts     found, then in turn:  push out  |  keep lengths; again in parts at what is fast
-        absorb       what was pushed out does not bounce
+        contacts     find them, then alternate:  push out  |  keep lengths; again in parts if fast
+        absorb       remove the speed gained by pushing out: contacts do not bounce
 
 References: Jakobsen 2001, "Advanced Character Physics"; Nguyen and Donnelly 2005, "Hair Animation
-and Rendering in the Nalu Demo", GPU Gems 2, chapter 23; Han and Harada 2012. `reference/` holds
-the same, one CV after the other.
+and Rendering in the Nalu Demo", GPU Gems 2, chapter 23; Han and Harada 2012. `reference/` has a
+scalar implementation, one CV at a time.
 
-Between two moments at which hair feels hair (`among`), and where it does not for the whole frame,
-guides are on their own. So they are advanced in blocks that fit into the cache; a guide's motion is
-the same to the last bit in any block.
+Guides are independent of each other between two moments at which hair feels hair (`among`), or for
+the whole frame if it does not. So they are advanced in blocks that fit into the cache; a guide's
+motion is the same to the last bit in any block.
 
-Time that is shorter than a substep waits in the state for the next frame, so the result does not
-depend on the frame rate; `grid_at_frame_end` bridges it for drawing.
+Time shorter than a substep is left in the state for the next frame, so the result does not depend
+on the frame rate; `grid_at_frame_end` bridges it for drawing.
 """
 
 from __future__ import annotations
@@ -49,15 +49,15 @@ from .style import restore_style
 
 __all__ = ["Drive", "advance", "displacement_beside_root", "grid_at_frame_end", "steps"]
 
-#: Guides that are advanced together, at most. Fewer, and numpy's calls cost more than the numbers;
-#: more, and the arrays of a substep leave the cache.
+#: Maximum number of guides advanced together. With fewer, the overhead of numpy's calls dominates;
+#: with more, the arrays of a substep do not fit into the cache.
 BLOCK = 12_000
 
 
 def advance(
     state: DynamicsState, drive: Drive, settings: DynamicsSettings, duration: float
 ) -> DynamicsState:
-    """The state after a frame of `duration` seconds; the state given stays as it is.
+    """The state after a frame of `duration` seconds; `state` itself does not change.
 
     Raises:
         HairloomError: a drive that does not fit the state or is not finite, or a bad duration.
@@ -68,7 +68,7 @@ def advance(
 def steps(
     state: DynamicsState, drive: Drive, settings: DynamicsSettings, duration: float
 ) -> Steps[DynamicsState]:
-    """As `advance`, with other hair."""
+    """`advance` as a generator that stops to feel other hair, see `neighbours.Steps`."""
     dt = 1.0 / settings.substep_rate
     longest = settings.longest_frame
     duration, count, left = due_substeps(state.time_left, duration, longest, dt)
@@ -107,7 +107,7 @@ def _copies(position: Floats, previous: Floats) -> tuple[Floats, Floats]:
 
 
 def _previous(state: DynamicsState, dt: float) -> Floats:
-    """Where the CVs were a substep of `dt` [s] earlier."""
+    """Where the CVs were one substep of `dt` [s] earlier, rescaled if the substep has changed."""
     if not state.substep or state.substep == dt:
         return state.previous.copy()
     motion = state.position - state.previous
@@ -132,7 +132,7 @@ def _advance_block(
     poses: list[list[Pose]],
     numbers: range,
 ) -> tuple[Floats, Floats]:
-    """Position and previous position after these substeps; takes the arrays."""
+    """Position and previous position after these substeps; overwrites the arrays passed."""
     settings, rest, damped = frame.settings, block.rest, block.damped
     spare = np.empty_like(position)
     chain = Chain(rest.length, block.held, rest.size, settings)
@@ -177,7 +177,7 @@ def _advance_block(
 
 
 def _blow(position: Floats, previous: Floats, frame: Frame) -> None:
-    """The force fields at each free CV; changes `previous`, which holds the speed."""
+    """Apply the force fields to each free CV; changes `previous`, which holds the speed."""
     fields = frame.force_fields
     assert fields is not None, "it is asked where there are any"
     here, before = (np.ascontiguousarray(rows[:, PINNED:]) for rows in (position, previous))
@@ -190,11 +190,10 @@ def _blow(position: Floats, previous: Floats, frame: Frame) -> None:
 def grid_at_frame_end(
     state: DynamicsState, drive: Drive, settings: DynamicsSettings, duration: float
 ) -> Floats:
-    """CVs at the frame's very end, (guide_count, cv_count, 3) world [m], for drawing.
+    """CVs at the very end of the frame, (guide_count, cv_count, 3) world [m], for drawing.
 
-    Bridges the time that is left over: each guide is moved as a whole to where its root is now,
-    and what is held to where it is held. What is not to be seen of the simulation goes with the
-    style.
+    Bridges the time left over: each guide is moved as a whole to where its root is now, and held
+    CVs to where they are held. Then the result is blended with the style, see `Drive.simulated`.
 
     Args:
         duration: of the frame [s].
@@ -212,8 +211,8 @@ def grid_at_frame_end(
 
 
 def turned_beside_root(state: DynamicsState, settings: DynamicsSettings) -> Floats | None:
-    """How hair turns about its roots (3, 3) in the time left over, where it inherits their
-    rotation; None: not."""
+    """The rotation (3, 3) of hair about its roots in the time left over, if it inherits theirs;
+    None if it does not turn."""
     if not settings.inherit_rotation or not state.time_left:
         return None
     left = state.carried.places[1].inverse
@@ -221,8 +220,8 @@ def turned_beside_root(state: DynamicsState, settings: DynamicsSettings) -> Floa
 
 
 def displacement_beside_root(time_left: float, drive: Drive, duration: float) -> Floats | None:
-    """How much more than its root each CV of held guides moves in the time left over, in the shape
-    of the targets [m]; None where nothing is held, or no time is left."""
+    """The displacement of each CV of held guides relative to its root in the time left over, in the
+    shape of the targets [m]; None if nothing is held or no time is left."""
     if drive.held is None or not time_left or not duration:
         return None
     displacement: Floats = drive.target_now - drive.target_at(1.0 - min(time_left / duration, 1.0))

@@ -1,9 +1,9 @@
-"""The style comes back: global and local shape of a guide in one direct solve.
+"""Restoring the style: global and local shape of a guide in one direct solve.
 
 Global shape pulls each CV to its place in the style that the head carries; local shape keeps the
 curvature between segments, so that waves and curls keep their form wherever the strand swings
 (both: Han and Harada 2012, "Real-time Hair Simulation with Efficient Hair Style Preservation").
-There both are relaxed CV after CV. Here they are the energies of one quadratic problem,
+There both are relaxed CV by CV. Here they are the energies of one quadratic problem,
 
     minimise  1/2 |x - x_free|^2 + 1/2 sum g_c |x_c - style_c|^2 + 1/2 sum s_i |b_i(x) - k_i|^2
 
@@ -12,20 +12,21 @@ There both are relaxed CV after CV. Here they are the energies of one quadratic 
                                                           the frame of segment i-1
     g = (omega_global dt)^2,  s = (omega_bend dt)^2       backward Euler of springs
 
-whose matrix I + diag(g) + B^T diag(s) B is banded, constant, and the same for all guides on which
-nothing is painted: one solve with scalar factors brings the stiffest style back without
-iterations, stable for any dt.
+whose matrix I + diag(g) + B^T diag(s) B is banded, constant, and the same for all guides unless
+stiffness is painted: one solve with scalar factors restores even the stiffest style without
+iterations, and is stable for any dt.
 
 Frames: on each segment a tangent t and a normal u, carried from segment to segment by the smallest
 rotation (Bishop 1975). With unit tangents that rotation is  u' = u - (u.t') / (1 + t.t') (t + t').
 
-k is taken from the frames before the solve, so it follows the segment before it and does not push
-back on it. Sharp kinks feed on that and tremble for ever. So from GENTLE to SHARP k turns from the
-one that the strand carries to the one that the head carries, which follows nothing in the strand.
+k is taken from the frames before the solve, so it follows the segment before it without acting back
+on it. That would make sharp kinks tremble forever. So between GENTLE and SHARP, k is blended from
+the one that turns with the strand to the one that the head carries, which does not depend on the
+strand's motion.
 
 Limitations: very stiff curls follow their root with a delay of some substeps; sharply kinked hair
-swings less, because its kinks want to keep their direction; a strand that folds back on itself by
-180 degrees loses its twist.
+swings less, because its kinks keep their direction relative to the head; a strand that folds back
+on itself by 180 degrees loses its twist.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ from .settings import DynamicsSettings
 _CANTILEVER = 3.5160
 
 
-#: Curvature over segment length, 2 sin(angle / 2): a gentle bend, and a sharp kink.
+#: Curvature over segment length, 2 sin(angle / 2), of a gentle bend and of a sharp kink.
 GENTLE, SHARP = 0.3, 0.8
 
 
@@ -56,8 +57,8 @@ class LocalShape:
 
     curvature: (3, cv_count - 2, guide_count) [m], each segment minus the one before it, in the
         frame of the one before it.
-    hold: (cv_count - 2, guide_count), the part that turns with the strand, 0 at sharp kinks.
-    twist_cv: (guide_count,) the CV that tells how a guide is turned about its root segment.
+    hold: (cv_count - 2, guide_count), the fraction that turns with the strand, 0 at sharp kinks.
+    twist_cv: (guide_count,) the CV that defines how a guide is twisted about its root segment.
     """
 
     curvature: Floats
@@ -70,27 +71,27 @@ class LocalShape:
 
     @cached_property
     def twist_place(self) -> Ints:
-        """Of the twist CVs in rows of all CVs, (guide_count,)."""
+        """The indices of the twist CVs in (cv_count * guide_count), (guide_count,)."""
         return self.twist_cv * len(self.twist_cv) + np.arange(len(self.twist_cv))
 
     @cached_property
     def turning(self) -> Floats:
-        """The fraction of the curvature that turns with the strand."""
+        """The part of the curvature that turns with the strand, in the shape of `curvature`."""
         return self.curvature * self.hold
 
     @cached_property
     def staying(self) -> Floats | None:
-        """1 - hold; None where no guide has sharp kinks."""
+        """1 - hold; None if no guide has sharp kinks."""
         staying = np.float32(1.0) - self.hold
         return staying if staying.any() else None
 
 
 @dataclass(frozen=True)
 class StyleBand:
-    """band: the factored matrix.
+    """The system of the style solve.
 
-    pull: (cv_count - 2, 1), g of each free CV. bend: (cv_count - 2, 1), s of each inner CV. Where
-    stiffness is painted all are (cv_count - 2, guide_count).
+    pull: (cv_count - 2, 1), g of each free CV. bend: (cv_count - 2, 1), s of each inner CV.
+    band: the factored matrix. If stiffness is painted, all are (cv_count - 2, guide_count).
     """
 
     pull: Floats
@@ -102,7 +103,7 @@ class StyleBand:
         return bool(self.bend.any())
 
     def part(self, guides: slice) -> StyleBand:
-        """Of these guides; itself where all share one."""
+        """The system of these guides; itself if all guides share one."""
         if self.pull.shape[1] == 1:
             return self
         return StyleBand(self.pull[:, guides], self.bend[:, guides], self.band.part(guides))
@@ -110,7 +111,7 @@ class StyleBand:
 
 @lru_cache(maxsize=8)
 def style_band(settings: DynamicsSettings, cv_count: int, dt: float) -> StyleBand:
-    """The matrix of the style solve for all free CVs of any guide."""
+    """The system for all free CVs of any guide, without painted stiffness."""
     root, tip, bend = (
         np.array([[value]]) for value in (settings.style_root, settings.style_tip, settings.bend)
     )
@@ -120,7 +121,7 @@ def style_band(settings: DynamicsSettings, cv_count: int, dt: float) -> StyleBan
 def painted_band(
     settings: DynamicsSettings, root: Floats, tip: Floats, bend: Floats, cv_count: int, dt: float
 ) -> StyleBand:
-    """That of guides of which each has its own stiffness.
+    """The system of guides with individual stiffness.
 
     Args:
         root, tip, bend: as in the settings, (cv_count or 1, guide_count or 1).
@@ -150,7 +151,7 @@ def painted_band(
 def restore_style(position: Floats, style: Floats, shape: LocalShape, matrix: StyleBand) -> None:
     """Move the free CVs of `position` (3, cv_count, guide_count) to the minimum, in place.
 
-    Solved for the correction, so that rounding of world coordinates is not multiplied by s.
+    Solved for the correction, so that s does not amplify the rounding of world coordinates.
     """
     right = style[:, PINNED:] - position[:, PINNED:]
     right *= matrix.pull
@@ -163,7 +164,7 @@ def restore_style(position: Floats, style: Floats, shape: LocalShape, matrix: St
 
 
 def local_shape(position: Floats) -> LocalShape:
-    """What of the shape of guides (3, cv_count, guide_count) is to be kept wherever they swing."""
+    """The local shape of guides (3, cv_count, guide_count) at rest."""
     twist_cv = twist_reference(position)
     curvature = rest_curvature(position, twist_cv)
     segment = np.diff(position, axis=1)
@@ -175,7 +176,7 @@ def local_shape(position: Floats) -> LocalShape:
 
 
 def twist_reference(position: Floats) -> Ints:
-    """The CV that lies farthest beside the line of the root segment, (guide_count,)."""
+    """The CV that is farthest from the line of the root segment, (guide_count,)."""
     beside = _across(position - position[:, :1], unit(position[:, 1] - position[:, 0])[:, None])
     squared: Floats = (beside * beside).sum(axis=0)
     return squared.argmax(axis=0)
@@ -194,11 +195,11 @@ def rest_curvature(position: Floats, twist_cv: Ints) -> Floats:
 def frames(segment: Floats, twist: Floats) -> tuple[Floats, Floats]:
     """Tangent and normal (3, n, guide_count) of each segment of the same shape [m].
 
-    The first normal points to the twist CV of the style, the others follow without twist. It is
-    zero on a straight guide, which has no curvature to turn.
+    The first normal points to the twist CV of the style, the others follow without twist. Normals
+    of a straight guide, which has no curvature to turn, are zero.
 
     Args:
-        twist: (3, guide_count), the way from the style's root to its twist CV [m].
+        twist: (3, guide_count), the vector from the style's root to its twist CV [m].
     """
     tangent = unit(segment)
     first = unit(_across(twist, tangent[:, 0]))

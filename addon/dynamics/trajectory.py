@@ -2,18 +2,18 @@
 
     at(s) = before + (now - before) s + curvature s (s - 1),      s from 0 to 1 in the frame
 
-is the parabola through where a thing was a frame earlier, at the frame's begin and at its end. Its
-speed is right to second order in the frame's duration, so that hair does not feel the frame rate;
-a straight line gives it a jerk at each frame. Roots and colliders use the same formula, so that
-they stay together.
+is the parabola through the values one frame earlier, at the frame's begin and at its end. Its speed
+is accurate to second order in the frame's duration, so that the motion of hair does not depend on
+the frame rate; with straight lines hair would be jerked at each frame. Roots and colliders use the
+same formula, so that they stay together.
 """
 
 from __future__ import annotations
 
 from ..arrays import Floats
 
-#: A pause or a hiccup between two frames says little about the speed: the ratio of the durations
-#: of the frame before and this one is held within these.
+#: Limits of the ratio of the durations of the frame before and this one: after a pause or hiccup it
+#: says little about the speed.
 _RATIO = (0.25, 4.0)
 
 
@@ -38,7 +38,7 @@ def clamped_ratio(ratio: float) -> float:
 
 
 def at(before: Floats, displacement: Floats, curvature: Floats | None, moment: float) -> Floats:
-    """Where a thing is at a moment of the frame, 0 its begin and 1 its end."""
+    """The value at a moment of the frame, 0 its begin and 1 its end."""
     number = before.dtype.type
     if curvature is None:
         return before + displacement * number(moment)

@@ -1,6 +1,6 @@
-"""How a whole groom has turned since rest: one rotation, from some places of some of its guides.
+"""How a whole groom has turned since rest: one rotation, from some CVs of some of its guides.
 
-Limitation: fur on several limbs feels their mean rotation.
+Limitation: fur on several limbs gets their mean rotation.
 """
 
 from __future__ import annotations
@@ -10,12 +10,12 @@ import numpy as np
 from ..arrays import Floats
 from .constraints import PINNED
 
-#: Guides at most that the rotation is taken from.
+#: Maximum number of guides that the rotation is computed from.
 SAMPLED_GUIDES = 256
 
 
 def best_rotation(rest: Floats, carried: Floats) -> Floats:
-    """The one rotation (3, 3) float64 that turns the whole groom from rest to where it is carried.
+    """The rotation (3, 3) float64 that best fits the whole groom from rest to where it is carried.
 
     Args:
         rest, carried: rows (3, cv_count, guide_count) [m].
@@ -33,15 +33,17 @@ def sample(grid: Floats) -> Floats:
 
 
 def root_sample(grid: Floats) -> Floats:
-    """The pinned CVs of evenly chosen guides in the shape of `sample`: what goes with the head. All
-    CVs where there are fewer than three guides, since two roots do not tell how they turn."""
+    """The pinned CVs of evenly chosen guides, which move with the head, in the shape of `sample`.
+
+    All CVs if there are fewer than three guides, since two roots do not determine a rotation.
+    """
     step = max(-(-len(grid) // SAMPLED_GUIDES), 1)
     places = np.asarray(grid)[::step, : PINNED if len(grid) > PINNED else None]
     return np.ascontiguousarray(places.transpose(2, 1, 0), np.float64).reshape(3, -1)
 
 
 def rest_sample(grid: Floats) -> Floats:
-    """`sample` about its own middle."""
+    """`sample` relative to its own mean."""
     places = sample(grid)
     return places - places.mean(axis=1, keepdims=True) if places.size else places
 
@@ -49,8 +51,8 @@ def rest_sample(grid: Floats) -> Floats:
 def rotation_from(rest: Floats, now: Floats) -> Floats:
     """The rotation (3, 3) float64 from `rest_sample` to `sample`.
 
-    Kabsch 1976. A small fraction of the identity picks the smallest rotation where the groom leaves
-    one free, as a single straight guide does.
+    Kabsch 1976. A small multiple of the identity selects the smallest rotation if the groom does
+    not determine one, like a single straight guide.
     """
     spread = np.einsum("in,jn->ij", now, rest)  # no BLAS: it would wake its threads for this
     spread.flat[::4] += 1.0e-6 * np.einsum("in,in->", rest, rest) + 1.0e-12

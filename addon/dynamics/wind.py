@@ -2,10 +2,10 @@
 
     air(x, t) = v + |v| gusts sqrt(2 / n) sum_i a_i sin(k_i . (x - v t) + phase_i),   a_i . k_i = 0
 
-is a sum of n random Fourier modes (Kraichnan 1970, "Diffusion by a Random Velocity Field"): free of
-divergence as air is, with standard deviation |v| gusts. That the eddies are carried along unchanged
-is Taylor's frozen turbulence (1938). It depends on place and time only, so that it is the same for
-any frame rate, and in any order of evaluation.
+is a sum of n random Fourier modes (Kraichnan 1970, "Diffusion by a Random Velocity Field"):
+divergence-free like air, with standard deviation |v| gusts. Eddies that drift along unchanged are
+Taylor's frozen turbulence (1938). The air depends on place and time only, so that it is the same
+for any frame rate and order of evaluation.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from .motion_settings import MotionSettings
 
 #: Modes in the sum.
 MODES = 8
-#: Of x^10 to x^0 in sin(x) / x.
+#: Coefficients of x^10 to x^0 in the series of sin(x) / x.
 _SINE = [np.float32((-1) ** k / factorial(2 * k + 1)) for k in range(5, -1, -1)]
 
 
@@ -54,7 +54,7 @@ class Air:
 
 
 def air_of(settings: MotionSettings) -> Air | None:
-    """The air of these settings; None when it stands still."""
+    """The air of these settings; None if it stands still."""
     rise, turn = settings.wind_elevation, settings.wind_direction
     own = np.array([np.cos(rise) * np.cos(turn), np.cos(rise) * np.sin(turn), np.sin(rise)])
     velocity = own * settings.wind_speed
@@ -76,7 +76,8 @@ def air_of(settings: MotionSettings) -> Air | None:
 
 @lru_cache(maxsize=8)
 def _modes(size: float, seed: int) -> tuple[Floats, Floats, Floats]:
-    """Wave vectors, unit vectors across them, phases; wave lengths within an octave of `size`."""
+    """Wave vectors, unit vectors across them, and phases; wavelengths within half an octave of
+    `size`."""
     random = np.random.default_rng(seed)
     direction = unit(random.normal(size=(MODES, 3)))
     length = size * 2.0 ** random.uniform(-0.5, 0.5, (MODES, 1))
@@ -87,7 +88,7 @@ def _modes(size: float, seed: int) -> tuple[Floats, Floats, Floats]:
 def sine(angle: Floats) -> Floats:
     """Sine of angles float32 [rad] by its Taylor polynomial on a quarter turn, error below 1e-6.
 
-    Of sums and products only, as numpy's own differs in its last bit from processor to processor.
+    Uses only sums and products, as numpy's sine differs in its last bit between processors.
     """
     turn = angle * np.float32(0.5 / np.pi) - np.float32(0.25)
     turn -= np.rint(turn)
