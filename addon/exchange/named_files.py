@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -33,7 +34,7 @@ def named_files(path: Path) -> list[Path]:
         found = _of_usd(path)
     else:
         found = []
-    return list(dict.fromkeys(each for each in found if each.is_file()))
+    return list(dict.fromkeys(each for each in found if os.path.isfile(each)))
 
 
 def _of_gltf(path: Path) -> list[Path]:
@@ -51,14 +52,8 @@ def _of_lines(path: Path, line: re.Pattern[bytes]) -> Iterator[Path]:
     for found in line.finditer(path.read_bytes()):
         words = found[1].decode("utf-8", "replace").split()
         ends = (" ".join(words[first:]) for first in range(len(words)))
-        yield from (path.parent / name for name in (*ends, *words) if _is_there(path.parent / name))
-
-
-def _is_there(path: Path) -> bool:
-    try:
-        return path.is_file()
-    except (OSError, ValueError):  # what no file can be called
-        return False
+        files = (path.parent / name for name in (*ends, *words))
+        yield from filter(os.path.isfile, files)
 
 
 def _of_usd(path: Path) -> list[Path]:

@@ -103,3 +103,33 @@ def test_the_guide_names_every_verb_and_no_option_that_is_not_there() -> None:
     known = {n for verb in VERBS for action in options_of(verb.name) for n in action.option_strings}
     blenders_own = {"--command", "--help"}
     assert set(re.findall(r"(?<![\w-])--[a-z][a-z-]*", text)) <= known | blenders_own
+
+
+@pytest.mark.parametrize(
+    ("option", "suffix"),
+    [
+        ("--scene", ".blend"),
+        ("--groom", ".tfx"),
+        ("--groom", ".abc"),
+        ("--head", ".obj"),
+        ("--preset", ".json"),
+        ("--stage", ".json"),
+        ("--bake", ""),
+    ],
+)
+def test_a_name_that_no_file_can_have_is_named(
+    option: str, suffix: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """pathlib raises where it is asked for a file with a name of over 255 bytes."""
+    name, picture = "a" * 300 + suffix, tmp_path / "still.png"
+    assert run(["render", option, name, "--output", str(picture)]) == 1
+    (said,) = [line for line in capfd.readouterr().err.splitlines() if "hairloom:" in line]
+    assert name in said
+    assert not picture.exists()
+
+
+def test_a_look_is_no_stage(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    picture = tmp_path / "still.png"
+    assert run(["render", "--stage", "looks/blond", "--output", str(picture)]) == 1
+    assert "--stage looks/blond: this preset has no settings of the stage" in capfd.readouterr().err
+    assert not picture.exists()

@@ -346,9 +346,19 @@ def _presets(options: argparse.Namespace) -> list[Preset[Any]]:
         getattr(options, "stage", None),
     )
     if stage is not None:
-        name = f"stage/{stage}" if stage in _stages() else stage
-        presets.append(named_preset(name, ["stage"]))
+        presets.append(_stage_preset(stage))
     return presets
+
+
+def _stage_preset(stage: str) -> Preset[Any]:
+    preset = named_preset(f"stage/{stage}" if stage in _stages() else stage, ["stage"])
+    if "stage" not in (settings.section for settings in preset.all):
+        raise HairloomError(
+            "this preset has no settings of the stage",
+            place=f"--stage {stage}",
+            remedy=f"Use {', '.join(_stages())} or give it as --preset",
+        )
+    return preset
 
 
 def chosen_settings(options: argparse.Namespace) -> SettingsMap:

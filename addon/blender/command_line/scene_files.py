@@ -36,7 +36,7 @@ def open_scene(path: Path) -> None:
     Raises:
         HairloomError: there is none, or Blender cannot read it.
     """
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise HairloomError("there is no such file", place=str(path), remedy="Check the path")
     try:
         bpy.ops.wm.open_mainfile(filepath=str(path.resolve()))

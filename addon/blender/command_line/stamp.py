@@ -116,21 +116,21 @@ class Stamp:
 
     def _digest_as_read(self, path: Path) -> str:
         """The digest of an input; "" if it has changed since the job began: it will run again."""
-        files = path.rglob("*") if path.is_dir() else (path,) if path.exists() else ()
+        files = path.rglob("*") if os.path.isdir(path) else (path,) if os.path.exists(path) else ()
         is_newer = any(file.stat().st_mtime_ns > self._begun for file in files)
         return "" if is_newer else file_digest(path)
 
 
 def file_digest(path: Path) -> str:
     """The digest of a file, or of all files in a folder with their names; "" for neither."""
-    if path.is_dir():
+    if os.path.isdir(path):
         lines = [
             f"{file.relative_to(path).as_posix()} {file_digest(file)}\n"
             for file in sorted(path.rglob("*"))
             if file.is_file()
         ]
         return digest("".join(lines).encode())
-    if not path.is_file():
+    if not os.path.isfile(path):
         return ""
     with open(path, "rb") as file:
         return hashlib.file_digest(file, lambda: hashlib.blake2b(digest_size=16)).hexdigest()

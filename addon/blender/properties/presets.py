@@ -7,6 +7,7 @@ presets, checked and never executed; other files in the folder are only reported
 from __future__ import annotations
 
 import json
+import os
 import re
 from collections.abc import Container, Iterable
 from dataclasses import dataclass
@@ -214,9 +215,9 @@ def named_preset(name: str, sections: Iterable[str] = tuple(ALL_SETTINGS)) -> Pr
         HairloomError: there is no such preset, or it is damaged.
     """
     below = PRESET_FOLDER / f"{name}.json"
-    is_shipped = below.is_file() and below.resolve().is_relative_to(PRESET_FOLDER)
+    is_shipped = os.path.isfile(below) and below.resolve().is_relative_to(PRESET_FOLDER)
     path = (below if is_shipped else None) or _own_path(name) or Path(name)
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise _no_preset(
             name, [one.name for each in sections for one in shipped(each) + own(each)[0]]
         )

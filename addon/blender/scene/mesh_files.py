@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -109,7 +110,7 @@ def _imported(path: Path) -> list[bpy.types.Object]:
             place=str(path),
             remedy="Use one of " + ", ".join(_IMPORTERS),
         )
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise HairloomError("there is no such file", place=str(path), remedy="Check the path")
     before = {obj.session_uid for obj in bpy.data.objects}
     with taken_back() as added:

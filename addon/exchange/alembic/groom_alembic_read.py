@@ -76,7 +76,7 @@ def read_groom_alembic(
 
 def _check(path: Path) -> None:
     """What can be said of a file without the library."""
-    if path.is_dir():
+    if os.path.isdir(path):
         raise _error(path, "this is a folder, not a file", "Choose an .abc file")
     try:
         size = os.stat(path).st_size

@@ -29,7 +29,7 @@ class BinaryFile:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        if path.is_dir():
+        if os.path.isdir(path):
             raise self.error("this is a folder, not a file", "Choose a file")
         try:
             self.size = os.stat(path).st_size

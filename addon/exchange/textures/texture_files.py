@@ -80,9 +80,9 @@ def read_texture(path: Path, *, is_color: bool) -> Floats:
             of a size that can be used.
     """
     library = _openimageio(path)
-    if path.is_dir():
+    if os.path.isdir(path):
         raise _unreadable(path, "this is a folder, not a file", "Choose a picture")
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise _unreadable(path, "there is no such file", "Check the path")
     if not path.stat().st_size:
         raise _unreadable(path, "the file is empty", "Save the picture again")
