@@ -8,8 +8,8 @@ While Blender plays, no frame waits for what is being made:
 
 The hair begins, from rest, at the first frame for which everything is made. The next loop of
 playback begins at the first frame and then equals a bake. To catch up earlier, the bodies of all
-missed frames would be needed. Single frame steps, scripts, bakes and renders (viewport renders
-too) wait, so that what they show is exact.
+missed frames would be needed. Steps of a single frame, scripts, bakes and renders (also those of
+the viewport) wait, so that what they show is exact.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class Preview:
     """One previewed groom or fin.
 
     frame: the scene frame up to which the timeline has moved it; None: the timeline does not.
-    bake: None: it has none. rig_hash: what it should be for the bake to be up to date; "": not
+    bake: None: it has none. rig_hash: the present one, to compare with that of the bake; "": not
         computed yet.
     problem, bake_problem: why it is not simulated, or its bake not shown.
     cards_are_stale: whether its cards need to be shaded again once edits have settled.

@@ -411,7 +411,7 @@ def publish(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
     # an overlay that has failed shows nothing
     is_replaced = (hair.mode == "OBJECT" or is_combed(hair)) and not overlay.failure()
     hides = is_replaced and hair.hairloom.hide_original and session.is_made
-    # without a head our shadow has nothing to fall on, and casters exist only where it is cast
+    # without a head our shadow has nothing to fall on; there are casters only if shadows are on
     has_own_shadow = session.settings[VolumeSettings].on_body and bool(session.snapshot.casters)
     show_originals(hair, depsgraph, show=not hides, has_own_shadow=has_own_shadow)
 

@@ -244,7 +244,8 @@ def clear() -> None:
 
 
 def changes(depsgraph: bpy.types.Depsgraph) -> tuple[set[int], set[int], bool]:
-    """Session numbers of what moved or was edited, of what was edited; and if lights changed."""
+    """Session numbers of what moved or changed shape, and of what changed shape or is an image; and
+    whether lights changed."""
     moved, edited, light_changed = set(), set(), False
     for update in depsgraph.updates:
         changed = update.id.original  # the evaluated copy has no session number

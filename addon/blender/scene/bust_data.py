@@ -30,8 +30,8 @@ class Bust:
     corner_vertex, corner_uv: (corner_count,) indices.
     weights: by name, (vertex_count,) from 0 to 1: HAIR_GROUPS; lips; cavity, the fraction of
         ambient light that folds leave.
-    makehuman: (vertex_count,) index in MakeHuman's base mesh; -1 for eyes and for the faces that
-        close the cut.
+    makehuman: (vertex_count,) index in MakeHuman's base mesh; -1 for vertices of the eyes and of
+        the cap that closes the cut.
     """
 
     positions: Floats

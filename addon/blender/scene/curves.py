@@ -277,7 +277,7 @@ def curve_points(curves: bpy.types.Curves) -> Floats:
 
 
 def _colors(curves: bpy.types.Curves) -> Floats | None:
-    """(point_count, 3) scene-linear, whether painted per point or per curve; None without any."""
+    """Scene-linear colours (point_count, 3), painted per point or per curve; None without any."""
     colors = read_attribute(curves, COLOR_ATTRIBUTE, "POINT", 4)
     if colors is None:
         of_curves = read_attribute(curves, COLOR_ATTRIBUTE, "CURVE", 4)
@@ -288,7 +288,7 @@ def _colors(curves: bpy.types.Curves) -> Floats | None:
 
 
 def _seeds(curves: bpy.types.Curves) -> Ints | None:
-    """(curve_count,), 0 for curves that Blender has added since; None without any."""
+    """Seeds (curve_count,), 0 for curves that Blender has added since; None without any."""
     seeds = read_attribute(curves, SEED_ATTRIBUTE, "CURVE")
     return seeds if seeds is not None and seeds.dtype.kind == "i" else None
 

@@ -70,8 +70,8 @@ def _fill(tree: bpy.types.NodeTree) -> None:
 
 
 def _whole(tree: bpy.types.NodeTree, mode: str) -> bpy.types.Node:
-    """A node that rounds to an integer: a float just above -1 becomes the text "-0", which names
-    no attribute."""
+    """A node that rounds to an integer: as floats, frames between -1 and 0 would be rounded up to
+    -0, and "-0" names no attribute."""
     node = tree.nodes.new("FunctionNodeFloatToInt")
     node.rounding_mode = mode
     return node

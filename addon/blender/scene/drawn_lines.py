@@ -15,7 +15,7 @@ from .surfaces import read_surface
 
 #: types of objects that can be a line
 LINE_TYPES = ("CURVE", "MESH")
-#: Greatest distance of a line on the surface, as a fraction of the surface's diagonal.
+#: Greatest median distance of a line on the surface, as a fraction of the surface's diagonal.
 _ON = 0.1
 #: A new line: its points, and where it starts and ends, as fractions of the head's depth from the
 #: front.

@@ -2,7 +2,8 @@
 
 A plain colour, or an Environment Texture turned by a Mapping, is read directly. All other nodes,
 such as a Sky Texture, are rendered by another Blender as a small panorama, once for each state of
-the nodes. In the window this runs in the background, and until then the world has its plain colour.
+the nodes. In a window this runs in the background; until then the world has its last rendering, or
+without one its plain colour.
 """
 
 from __future__ import annotations
@@ -57,7 +58,8 @@ def read_environment(scene: bpy.types.Scene, *, blocking: bool = True) -> Enviro
     """The world's light; the same object while nothing of it changes.
 
     Args:
-        blocking: False: render nodes in the background; until then a plain colour is returned.
+        blocking: False: render nodes in the background; until then the last rendering is returned,
+            or without one a plain colour.
     """
     return _read(scene.world, blocking=blocking).environment
 

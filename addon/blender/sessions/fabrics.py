@@ -1,7 +1,7 @@
-"""The fabric of a fin, made when it begins to play.
+"""Makes the fabric of a fin when it begins to play.
 
-That takes a second for 10,000 vertices, too long for a window to freeze. So Play and playback have
-it made in the background, and it is cached, as each loop of playback begins with the same mesh.
+That takes a second for 10,000 vertices, too long for a window to freeze. So Play and playback make
+it in the background, and it is cached, as each loop of playback begins with the same mesh.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Finds how far hair stays from its colliders, when it begins to play.
 
 That takes some hundredths of a second, with many children a tenth: longer than a frame. So Play has
-it found in the background, and it is cached, as each loop of playback begins at the same place.
+it found in the background, and the result is cached, as each loop of playback begins alike.
 """
 
 from __future__ import annotations

@@ -69,8 +69,8 @@ class Solver(Protocol):
         settings: DynamicsSettings,
         painted: PaintedGuides | None = None,
     ) -> None:
-        """Find how far hair stays from colliders, see `motion_flow.with_clearance`; otherwise
-        `steps` does so."""
+        """Find how far hair stays from colliders, see `motion_flow.with_clearance`. Without this
+        call, `steps` does so."""
 
     def steps(self, frame: FrameInput) -> Steps[None]:
         """One frame of motion, as `motion_flow.steps`."""

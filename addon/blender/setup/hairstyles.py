@@ -130,8 +130,8 @@ def add_head(collection: bpy.types.Collection, skin: str) -> Parts[bpy.types.Obj
 class _Growth:
     """A hairstyle on a mesh, before anything of it is in the scene.
 
-    size: of the hair, relative to that for which it was made.
-    factor: the same for its motion, but 1 for heads of about human size.
+    size: of the hair, relative to its size in the hairstyle.
+    factor: the size for its motion, which is 1 for heads of about human size.
     groups: weights of vertices, by name of a vertex group that the mesh lacks.
     landmarks: positions, guessed or placed, by name.
     solid: of a head other than the built-in one; modifiers must not bring hair into it.
