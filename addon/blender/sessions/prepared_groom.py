@@ -166,7 +166,7 @@ def prepared(
     """
     report("ambient occlusion")
     with ThreadPoolExecutor(1) as beside:
-        # cached here, or the window's first frame would wait for it; both run at once under numpy
+        # cached properties that the window's first frame needs; numpy lets both threads run at once
         moving = beside.submit(lambda: (rig.riders, rig.root_holds, rig.strands.uneven_along))
         groom = _drawn(rig, ambient, known, with_occluders, is_quick, report)
         moving.result()

@@ -123,7 +123,7 @@ class Session:
 
     @property
     def name(self) -> str:
-        """The name of its object when it was read."""
+        """The name of its object when that was last found."""
         return self._source.name
 
     @property
