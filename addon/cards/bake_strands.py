@@ -116,8 +116,8 @@ def flat_strands(
 
 
 def _half_width(across: Floats, along: Floats, thick: Floats, shape: Floats) -> Floats:
-    """From a ribbon's middle to its edge, perpendicular to the strand on the card, (n, stations,
-    2).
+    """From a ribbon's middle to its edge, perpendicular to the strand on the card,
+    (n, stations, 2).
 
     Args:
         across, along: place in the tile. thick: radius in widths of the card.

@@ -1,14 +1,15 @@
-"""What an artist has changed of cards since they were made.
+"""The artist's changes of cards since they were made.
 
-What was made is on record: where each card lay, which tile it showed, and a print of its vertices.
-Each face knows the number of its card. So cards fall into four kinds:
+A record holds what was made: where each card lay, which tile it showed, and a print of its
+vertices. Each face stores the number of its card. So there are four kinds of cards:
 
     unedited   the print of its piece is that on record: it is made again
     edited     it has a number, and its print is another one: it is kept
     deleted    it is on record, and no piece has its number: its place stays free
     own        a piece without a number, or a copy of another one: it is kept
 
-A piece is what hangs together and has one number. The record is in the space of the hair object.
+A piece is a connected part of the mesh with one number. The record is in the space of the hair
+object.
 """
 
 from __future__ import annotations
@@ -25,29 +26,30 @@ from .atlas_grid import AtlasGrid
 from .sort import connected_components
 from .strip import Strips
 
-#: Where along a card it is known by its middle; its edge halfway is known too, by which crossed
+#: Places along a card whose middles the record stores, beside the edge halfway, by which crossed
 #: cards differ.
 STATIONS = (0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0)
-#: The print of a card that is not in the mesh as it was made, which no piece has; and of one that
-#: is, before it is in the mesh.
+#: The print of a card that is not in the mesh as it was made, which no piece has; and of a new
+#: card, until it is in the mesh.
 NO_PRINT, UNPRINTED = 0, -1
-#: How far from a card on record one is looked for that belongs to it, in usual gaps between cards.
+#: Maximum distance of a card from the card on record that it belongs to, in usual gaps between
+#: cards.
 REACH = 2.0
 #: The gap of a card alone, as a fraction of its length.
 _LONELY = 0.25
-#: Numbers that spread bits (Steele, Lea and Flood 2014, "Fast splittable pseudorandom number
-#: generators", the variant of Stafford).
+#: Constants of a hash that mixes bits (Steele, Lea and Flood 2014, "Fast splittable pseudorandom
+#: number generators", the variant of Stafford).
 _MIX = (0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB)
 
 
 @dataclass(frozen=True, eq=False)
 class MadeCards:
-    """The record of the cards that were made, in one space (said by whoever made it).
+    """The record of the cards that were made, in one space, which its creator knows.
 
     places: (card_count, 5, 3) float32 [m] of each: its middle at `STATIONS`, and its edge halfway.
-    tile: (card_count,) int32 that each showed. grid: of the atlas.
+    tile: (card_count,) int32 tile of each. grid: of the atlas.
     marks: (card_count,) int32 prints, see `prints`, or NO_PRINT, or UNPRINTED.
-    stands: (card_count,) int32 the card that stands for each: itself, an edited one, or the one
+    stands: (card_count,) int32 the card that represents each: itself, an edited one, or the one
         that it was joined with.
     triangle: (card_count,) int32 of the head under the root; corners: (card_count, 3, 3) of it [m].
     triangle_count: of the head; 0 without one.
@@ -67,13 +69,13 @@ class MadeCards:
 
     @property
     def usual_width(self) -> float:
-        """Of a card halfway [m]."""
+        """Median width of cards halfway [m]."""
         half = self.places[:, 4] - (self.places[:, 1] + self.places[:, 2]) / 2.0
         return 2.0 * float(np.median(np.linalg.norm(half, axis=1))) if len(self) else 0.0
 
     @classmethod
     def of(cls, strips: Strips, tile: Ints, grid: AtlasGrid, head: Surface | None) -> MadeCards:
-        """Cards as they are made, before they are in a mesh."""
+        """The record of new cards, before they are in a mesh."""
         places, count = places_of(strips), len(strips)
         triangle: Ints = np.zeros(count, np.int32)
         corners = np.zeros((count, 3, 3), np.float32)
@@ -93,10 +95,10 @@ class MadeCards:
         )
 
     def joined(self, owner: Ints) -> MadeCards:
-        """Where some cards were joined with others in the mesh.
+        """The record after some cards were joined with others in the mesh.
 
         Args:
-            owner: (card_count or more,) the card in the mesh that stands for each.
+            owner: (card_count or more,) the card in the mesh that represents each.
         """
         is_gone = owner[: len(self)] != np.arange(len(self))
         marks = np.where(is_gone, NO_PRINT, self.marks).astype(np.int32)
@@ -114,8 +116,8 @@ class MadeCards:
 @dataclass(frozen=True)
 class EditCounts:
     """edited, deleted, own: cards that are kept as the artist left them.
-    lost: those for which no new card was found: edited ones stay beside the others, deleted ones
-        have nothing left to delete.
+    lost_edits, lost_deletions: those for which no new card was found: edited cards stay beside the
+        others, deleted ones have nothing left to delete.
     """
 
     edited: int = 0
@@ -144,15 +146,15 @@ class EditCounts:
 
 @dataclass(frozen=True, eq=False)
 class CardEdits:
-    """What is kept when cards are made again, in the space of the record.
+    """The changes that are kept when cards are made again, in the space of the record.
 
     record: of what was made.
     surface: the pieces that are kept, with UVs; no vertex is in two of them.
     piece: (triangle_count,) int32 which of them each triangle belongs to, from 0 without gaps.
-    number: (piece_count,) int32 the card that each stands for; -1 for the artist's own.
+    number: (piece_count,) int32 the card that each is; -1 for the artist's own.
     is_there: (card_count,) which cards on record have a piece, edited or not.
     matrix: (4, 4) to world space.
-    notes: what is doubtful, for the artist.
+    notes: doubts, for the artist.
     """
 
     record: MadeCards
@@ -173,7 +175,7 @@ class CardEdits:
 
     @property
     def is_deleted(self) -> Bools:
-        """(card_count,) cards on record that have no piece, and for which no other card stands."""
+        """(card_count,) cards on record that have no piece and that no other card represents."""
         stands_alone = self.record.stands == np.arange(len(self.record))
         deleted: Bools = stands_alone & ~self.is_there
         return deleted
@@ -205,12 +207,12 @@ class CardEdits:
 
 
 def edits_of(surface: Surface, made: Ints | None, record: MadeCards, matrix: Floats) -> CardEdits:
-    """Tell what the artist has changed of these cards.
+    """Find what the artist has changed of these cards.
 
     Args:
         surface: all triangles, with UVs, in the space of the record.
-        made: (triangle_count,) the number of each triangle's card, -1 for those that we have not
-            made; None where the mesh no longer has the numbers.
+        made: (triangle_count,) the number of each triangle's card, -1 for the artist's own; None if
+            the mesh no longer has the numbers.
         matrix: (4, 4) from that space to the world.
     """
     corner, piece = _pieces(surface.triangles, made)
@@ -246,7 +248,7 @@ def edits_of(surface: Surface, made: Ints | None, record: MadeCards, matrix: Flo
 
 
 def prints(surface: Surface, piece: Ints) -> Ints:
-    """A number for each piece that is another one once a vertex or a UV of it is, (piece_count,).
+    """A hash of each piece's vertices and UVs, (piece_count,).
 
     It does not depend on the order of vertices and faces, nor on how faces are cut into triangles.
     """
@@ -278,7 +280,7 @@ def places_of(strips: Strips) -> Floats:
 
 
 def usual_gap(places: Floats) -> float:
-    """How far a card usually is from the next one, as `gaps` measures it [m]."""
+    """Median distance of a card from the nearest one, as `gaps` measures it [m]."""
     count = len(places)
     if count < 2:
         line = np.linalg.norm(np.diff(places[:, :4], axis=1), axis=2).sum(axis=1)
@@ -290,8 +292,8 @@ def usual_gap(places: Floats) -> float:
 
 
 def gaps(some: Floats, others: Floats) -> Floats:
-    """How far cards are apart, (n, m) [m]: root mean square over their places; roots count twice,
-    as where cards are found."""
+    """Distances between cards, (n, m) [m]: root mean square over their places; roots count twice,
+    as in `cluster_strands`."""
     weight = np.sqrt([2.0, 1.0, 1.0, 1.0, 1.0])[:, None] / np.sqrt(6.0)
     one, two = ((each.astype(np.float64) * weight).reshape(-1, 15) for each in (some, others))
     squared = (one**2).sum(axis=1)[:, None] + (two**2).sum(axis=1) - 2.0 * one @ two.T
@@ -300,7 +302,7 @@ def gaps(some: Floats, others: Floats) -> Floats:
 
 
 def _mixed(key: Ints) -> Ints:
-    """64 bits, each of which depends on all."""
+    """A hash of 64 bits, each of which depends on all."""
     key = (key ^ (key >> np.uint64(30))) * np.uint64(_MIX[1])
     key = (key ^ (key >> np.uint64(27))) * np.uint64(_MIX[2])
     mixed: Ints = key ^ (key >> np.uint64(31))
@@ -308,9 +310,9 @@ def _mixed(key: Ints) -> Ints:
 
 
 def _pieces(triangles: Ints, made: Ints | None) -> tuple[Ints, Ints]:
-    """(corners that tell vertices of two cards apart, (n, 3); the piece of each triangle, (n,)).
+    """(corners by vertex and card, (n, 3); the piece of each triangle, (n,)).
 
-    Vertices that an artist has welded hold no cards together that were made apart.
+    Vertices that an artist has welded do not connect cards that were made separately.
     """
     if made is None:
         return triangles, connected_components(triangles)
@@ -328,7 +330,7 @@ def _middles(surface: Surface, piece: Ints, count: int) -> Floats:
 
 
 def _away(middle: Floats, record: MadeCards, number: Ints) -> Floats:
-    """How far each piece is from where its card was made [m]."""
+    """Distance of each piece from where its card was made [m]."""
     away: Floats = np.linalg.norm(middle - record.places[number, :4].mean(axis=1), axis=-1)
     return away
 
@@ -357,10 +359,10 @@ def _recognised(marks: Ints, middle: Floats, record: MadeCards) -> Ints:
 def _one_of_each(
     number: Ints, marks: Ints, middle: Floats, record: MadeCards
 ) -> tuple[Ints, Bools]:
-    """Numbers of which each is there once, and which pieces are as they were made.
+    """Numbers without duplicates, and which pieces are as they were made.
 
-    Of several pieces of one number the one that is unedited is the card, else the one that is
-    nearest to where it was made. The others are copies.
+    Of several pieces with one number, the unedited one is the card, else the one nearest to where
+    it was made. The others are copies and get -1.
     """
     has = np.flatnonzero(number >= 0)
     is_made = np.zeros(len(number), bool)
@@ -376,7 +378,7 @@ def _one_of_each(
 
 
 def _with_own_vertices(surface: Surface, corner: Ints, chosen: Bools) -> Surface:
-    """The chosen triangles, whose pieces share no vertices.
+    """The chosen triangles, with vertices that no two pieces share.
 
     Args:
         corner: (triangle_count, 3) see `_pieces`.

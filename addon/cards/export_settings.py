@@ -18,7 +18,7 @@ OF_MOTION: dict[str, tuple[str, ...]] = {
 
 @dataclass(frozen=True, kw_only=True)
 class CardExportSettings(Settings):
-    """What an artist chooses beside the file and its format."""
+    """What an artist chooses beyond the file and its format."""
 
     section: ClassVar[str] = "cards_export"
     title: ClassVar[str] = "Card Files"
@@ -127,7 +127,7 @@ class CardExportSettings(Settings):
         label="Depth",
         description="Precision of the motion textures",
     )
-    # 127 chains of two joints each, and the root, are as many as a byte can number
+    # 127 chains of two joints each and the root are as many joints as a byte can number
     chains: int = integer(
         127,
         label="Chains",

@@ -1,8 +1,8 @@
-"""One strip for each cluster of strands: where it runs, how it lies and how wide it is.
+"""One strip for each cluster of strands: its path, orientation and width.
 
 A strip runs along the mean of its strands. It turns about that line, as a whole and without
 twist, so that the strands spread along its width and it still faces away from the head. Each row is
-as wide as its strands lie, and the last one reaches to where most of them end.
+as wide as its strands are spread, and the last one reaches to where most of them end.
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ from .clusters import cluster_strands
 from .settings import CardSettings
 from .strip import CardFrames, Strips
 
-#: Half a card's width in standard deviations of its strands: sqrt(3) holds evenly spread strands.
+#: Half a card's width in standard deviations of its strands: sqrt(3) covers evenly spread strands.
 _COVERING = 1.8
-#: How much facing away from the head counts beside lying along the strands' spread.
+#: Weight of facing away from the head, relative to lying along the strands' spread.
 _FACING_WEIGHT = 0.35
 _TURNS = 72
-#: Least width of a row, as a fraction of the median; a single strand's card has it throughout.
+#: Minimum width of a row, as a fraction of the median; a single strand's card has it throughout.
 _MIN_WIDTH = 0.25
 #: How far a card reaches beyond the mean tip, in standard deviations of where its strands end.
 _TIP_REACH = 1.3
-#: And before the mean root: sqrt(3) holds evenly spread roots, so that no parting is bald.
+#: And before the mean root: sqrt(3) covers evenly spread roots, so that no parting is bald.
 _ROOT_REACH = 1.7
-#: Hair that leans out of the upright by more than this sine reaches back in full.
+#: Cards of hair that leans away from the upright by more than this sine reach back in full.
 _LEANING = 1.0 / 3.0
 
 
@@ -49,7 +49,7 @@ def cluster_of_strands(
 
 
 def with_fly_aways(grid: Floats, cluster: Ints, count: int) -> Ints:
-    """The clusters, and after them `count` strands alone, those farthest from their cluster.
+    """The clusters, then the `count` strands farthest from their cluster, each alone.
 
     The last strand of a cluster stays in it.
     """
@@ -68,8 +68,8 @@ def with_fly_aways(grid: Floats, cluster: Ints, count: int) -> Ints:
 def fit_strips(
     grid: Floats, radius: Floats, cluster: Ints, root_normal: Floats, settings: CardSettings
 ) -> Strips:
-    """Strips in the order of the clusters, with as many rows as there are CVs; where they are to be
-    crossed, the second ones of all clusters follow.
+    """Strips in the order of the clusters, with as many rows as there are CVs; with crossed pairs,
+    the second strips of all clusters follow.
 
     Args:
         grid: (strand_count, cv_count, 3) [m], root first.
@@ -104,7 +104,7 @@ def fit_strips(
 
 
 def _beyond_tip(away: Floats, tangent: Floats, mean: _Mean, cluster: Ints) -> Floats:
-    """How much farther than to the mean tip a card goes to hold its longer strands, (n, 1) [m].
+    """Distance that a card reaches beyond the mean tip to cover its longer strands, (n, 1) [m].
 
     Args:
         away: (strand_count, 3) from the mean tip to each strand's.
@@ -116,10 +116,10 @@ def _beyond_tip(away: Floats, tangent: Floats, mean: _Mean, cluster: Ints) -> Fl
 def _before_root(
     away: Floats, tangent: Floats, outwards: Floats, mean: _Mean, cluster: Ints
 ) -> Floats:
-    """From where a card begins to the mean root, so that it holds its rearmost roots, (n, 3) [m].
+    """From where a card begins to the mean root, so that it covers its rearmost roots, (n, 3) [m].
 
-    It runs back along the head, as far as its roots are spread, however steeply hair leaves it.
-    Hair that stands upright has no rearmost roots.
+    The card reaches back along the head, as far as its roots are spread, however steeply hair
+    leaves the head. Hair that stands upright has no rearmost roots.
 
     Args:
         away: (strand_count, 3) from the mean root to each strand's.
@@ -136,7 +136,7 @@ def _before_root(
 
 
 def _stacked(strips: Sequence[tuple[CardFrames, Floats]]) -> Strips:
-    """All of them, no row of which is much narrower than most are."""
+    """All strips in one, with rows no narrower than _MIN_WIDTH of the median."""
     width = np.concatenate([each for _, each in strips])
     width = np.maximum(width, _MIN_WIDTH * np.median(width))
     names = ("center", "tangent", "normal", "side")
@@ -163,8 +163,9 @@ class _Mean:
 def _best_turn(spread: Floats, normal: Floats, side: Floats, outwards: Floats) -> Floats:
     """The turn of each strip [rad] that lays it along the spread and lets it face outwards.
 
-    Of the whole turn in steps, the one with the most of: the fraction of the strands' variance that
-    lies along the width, and _FACING_WEIGHT times the mean cosine between normal and outwards.
+    Of steps of the whole turn, the one with the largest sum of the fraction of the strands'
+    variance that lies along the width, and _FACING_WEIGHT times the mean cosine between normal and
+    outwards.
     """
     turns = np.linspace(-np.pi, np.pi, _TURNS, endpoint=False)
     cosine, sine = np.cos(turns)[:, None, None], np.sin(turns)[:, None, None]
@@ -179,13 +180,14 @@ def _best_turn(spread: Floats, normal: Floats, side: Floats, outwards: Floats) -
 
 
 def _along(spread: Floats, cosine: Floats, sine: Floats) -> Floats:
-    """Variance along side cos - normal sin, of (..., 3) variances ahead, aside and of both."""
+    """Variance along side cos - normal sin, from (..., 3): variances ahead and aside, and
+    covariance."""
     ahead, aside, both = np.moveaxis(spread, -1, 0)
     variance: Floats = aside * cosine**2 + ahead * sine**2 - 2.0 * both * sine * cosine
     return variance
 
 
 def _smoothed(rows: Floats) -> Floats:
-    """Each row's value mixed with its neighbours', (card_count, row_count)."""
+    """Each row's value blended with its neighbours', (card_count, row_count)."""
     wide = np.pad(rows, ((0, 0), (1, 1)), mode="edge")
     return (wide[:, :-2] + 2.0 * wide[:, 1:-1] + wide[:, 2:]) / 4.0

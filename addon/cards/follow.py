@@ -1,12 +1,12 @@
 """Cards that ride on guides: bound at rest, carried as whole strips.
 
 A card has a spine: the middles of its rows, which are its vertices at one place along it. It rides
-as strands do, so it keeps its length, unless the curls that the card shows are drawn out. Each row
+as strands do, so it keeps its length, unless the curls that the card shows are stretched. Each row
 turns with the spine there, by the least rotations from root to tip (Bishop 1975). So strips bend
-and do not shear, a row stays as wide as it was, and nothing twists but what the root turns. What
-would stand in a collider is led out, see `contacts`.
+without shear, rows keep their width, and only the turn of the root twists a card. Cards are led out
+of colliders, see `contacts`.
 
-Vectors lie as planes here, (3, ...): that is several times as fast.
+Vectors are stored as planes here, (3, ...), which is several times as fast.
 
 Limitation: guides that wind around each other do not twist the card between them.
 """
@@ -27,29 +27,29 @@ from .card_mesh import CardMesh
 from .contacts import CardClearance, CardContacts
 from .sort import card_of_vertex
 
-#: How far along a card its first row may reach.
+#: Vertices this close to the first one along a card are in its first row.
 _ROOT_ROW = 1.0e-4
-#: A direction that is the mean of two shorter than this [m, or of unit ones] is none.
+#: Vectors shorter than this have no direction [m, or of unit vectors].
 _SHORTEST = 1.0e-12
-#: Roots that have turned by less than this have not.
+#: Roots that have turned by less than this count as unturned.
 _UNTURNED = 1.0e-5
 
 
 @dataclass(frozen=True, eq=False)
 class CardBinding:
-    """What of cards and guides at rest is needed to place the cards later.
+    """Data of cards and guides at rest with which the cards are placed later.
 
     mesh: at rest.
     guide, weight: (n, k) for each of n cards: indices of its guides, and weights of sum 1.
     guides: (guide_count, cv_count, 3) [m] at rest.
-    root: (3, n) from the mixture of the guides' roots to the card's root [m].
-    middle: (2, row_count) the vertices between which the middle of each row is.
+    root: (3, n) from the weighted mean of the guides' roots to the card's root [m].
+    middle: (2, row_count) the vertices between which the middle of each row lies.
     spine: (row_count, 3) float32 [m] at rest, that of card c is spine[offsets[c]:offsets[c + 1]].
     riders: all spines on the guides.
     headings: (3, longest, n) unit directions of spines at their rows, the last one repeated.
-    place: (row_count,) where the row lies in these, as if they were flat.
-    row: (vertex_count,) which row each vertex lies in. arms: (3, vertex_count) from there [m].
-    met: where the last motion began in which it was led out of colliders, and its clearance.
+    place: (row_count,) index of the row in the flattened headings.
+    row: (vertex_count,) the row of each vertex. arms: (3, vertex_count) from the row's middle [m].
+    met: cache of one entry: where the last motion with colliders began, and its clearance.
     """
 
     mesh: CardMesh
@@ -74,13 +74,13 @@ class CardBinding:
         return cards
 
     def lines(self, positions: Floats) -> Floats:
-        """The middles of all rows (row_count, 3) of vertices that are now here."""
+        """The middles of all rows (row_count, 3) with vertices at these positions."""
         middles: Floats = positions[self.middle].mean(axis=0)
         return middles
 
 
 def card_lines(mesh: CardMesh) -> tuple[Ints, Floats]:
-    """The card numbers that have triangles, (n,), and the middles of these cards at the root, a
+    """The numbers of cards that have triangles, (n,), and the middles of these cards at the root, a
     third, two thirds and the tip, (n, 4, 3) [m].
     """
     owner, used = card_of_vertex(mesh), np.unique(mesh.card)
@@ -104,7 +104,7 @@ def card_lines(mesh: CardMesh) -> tuple[Ints, Floats]:
 def bind_cards(
     mesh: CardMesh, guides: Floats, guide: Ints, weight: Floats, room: Floats | None = None
 ) -> CardBinding:
-    """Tie cards to the guides that they ride on.
+    """Bind cards to the guides that they ride on.
 
     Args:
         mesh: at rest, world space.
@@ -149,12 +149,13 @@ def bind_cards(
 def follow_guides(
     binding: CardBinding, guides: Floats, turn: Floats, contacts: CardContacts | None = None
 ) -> CardMesh:
-    """The cards where their guides are now; what does not move is the same arrays.
+    """The cards at the guides' current positions; arrays that do not change are those of
+    `binding.mesh`.
 
     Args:
         guides: (guide_count, cv_count, 3) [m] now.
-        turn: (guide_count, 3, 3), how the body has turned each guide's root since rest.
-        contacts: what they are led out of; None: nothing.
+        turn: (guide_count, 3, 3), rotation of each guide's root with the body since rest.
+        contacts: the colliders that cards are led out of; None: none.
     """
     turns = np.asarray(turn, np.float32)
     if not len(binding.guide) or _is_at_rest(binding, guides, turns):
@@ -165,7 +166,7 @@ def follow_guides(
     if contacts is not None:
         contacts.lead_spines(spine, carried, binding.offsets)
     frames = _frames(binding, spine, first)
-    # of the root, which has turned
+    # the scale of the root's turn
     size = np.cbrt(np.abs(np.linalg.det(first)))[binding.row_card]
     of_vertices = np.take(frames, binding.row, axis=2, mode="clip")
     positions = _placed(of_vertices, binding.arms)
@@ -183,7 +184,7 @@ def follow_guides(
 
 
 def carried_cards(binding: CardBinding, guides: Floats, turn: Floats) -> tuple[Floats, Floats]:
-    """Spines (row_count, 3) and vertices (vertex_count, 3) where roots alone carry them [m];
+    """Spines (row_count, 3) and vertices (vertex_count, 3) as carried by their roots alone [m];
     arguments as of `follow_guides`."""
     first = np.asarray(turn, np.float32)[binding.guide[:, 0]]
     spine = _carried_spine(binding, guides, first)
@@ -191,7 +192,7 @@ def carried_cards(binding: CardBinding, guides: Floats, turn: Floats) -> tuple[F
 
 
 def moved_mesh(mesh: CardMesh, matrix: Floats) -> CardMesh:
-    """Cards moved by an affine (4, 4) matrix; the same object for no motion."""
+    """Cards moved by an affine (4, 4) matrix; the same object for the identity."""
     if np.array_equal(matrix, np.eye(4)):
         return mesh
     turn = np.asarray(matrix, np.float64)[:3, :3]
@@ -217,8 +218,8 @@ class _Weights:
 
 
 def _with_ends(rows: Ints, row: Ints) -> tuple[Ints, Ints]:
-    """The rows (row_count, 2) and which of them each vertex lies in, with a second one, where the
-    first is, for cards that have one alone: a spine is a strand, of two points or more."""
+    """The rows (row_count, 2) and the row of each vertex, with the row of single-row cards doubled:
+    a spine is a strand, of two points or more."""
     single = np.flatnonzero(np.bincount(rows[:, 0]) == 1)
     at = np.searchsorted(rows[:, 0], single)
     shift = np.searchsorted(at, np.arange(len(rows)))
@@ -226,11 +227,11 @@ def _with_ends(rows: Ints, row: Ints) -> tuple[Ints, Ints]:
 
 
 def _middles(across: Floats, row: Ints, count: int) -> Ints:
-    """Of each row its middle vertex across the card, twice, or those beside its middle; (2, n).
-    A row without vertices has those of the one before.
+    """Each row's middle vertex across the card, twice, or the two beside its middle, (2, n). A row
+    without vertices has those of the row before.
 
     Args:
-        across: (m,) where vertices are across their cards. row: (m,) theirs.
+        across: (m,) place of each vertex across its card. row: (m,) its row.
     """
     order, sizes = np.lexsort((across, row)), np.bincount(row, minlength=count)
     begins = piece_starts(sizes)
@@ -239,7 +240,7 @@ def _middles(across: Floats, row: Ints, count: int) -> Ints:
 
 
 def _padded(offsets: Ints, longest: int) -> Ints:
-    """(longest, n) the rows of each card, the last one repeated."""
+    """The rows of each card, the last one repeated, (longest, n)."""
     rows: Ints = np.minimum(offsets[:-1] + np.arange(longest)[:, None], offsets[1:] - 1)
     return rows
 
@@ -253,10 +254,10 @@ def _riders(
 
 
 def _carried_spine(binding: CardBinding, guides: Floats, first: Floats) -> Floats:
-    """Spines where roots carry them, (row_count, 3) float32.
+    """Spines as carried by their roots, (row_count, 3) float32.
 
     Args:
-        first: (n, 3, 3), how the root of each card has turned.
+        first: (n, 3, 3) rotation of each card's root.
     """
     weights = _Weights(binding.guide, binding.weight)
     root = _mixed(guides[:, :1], weights)[:, 0].T + np.einsum("nij,jn->ni", first, binding.root)
@@ -269,20 +270,20 @@ def _carried_spine(binding: CardBinding, guides: Floats, first: Floats) -> Float
 
 
 def _carried_arms(binding: CardBinding, first: Floats) -> Floats:
-    """Vertices from their rows' middles where roots carry them, (vertex_count, 3)."""
+    """Vectors from rows' middles to vertices as roots turn them, (vertex_count, 3)."""
     owner = binding.row_card[binding.row]
     return _placed(np.ascontiguousarray(first.transpose(1, 2, 0))[:, :, owner], binding.arms)
 
 
 def _ridden(binding: CardBinding, carried: Floats, guides: Floats, turns: Floats) -> Floats:
-    """The spines now, (row_count, 3)."""
+    """The spines as they ride, (row_count, 3)."""
     rest = binding.guides
     by_root = guides[:, :1] + np.einsum("gij,gcj->gci", turns, rest - rest[:, :1])
     return ride(carried, binding.riders, by_root, guides)
 
 
 def _frames(binding: CardBinding, spine: Floats, first: Floats) -> Floats:
-    """How each row has turned since rest, (3, 3, row_count): with its root first, then with its
+    """Rotation of each row since rest, (3, 3, row_count): first that of its root, then that of its
     spine, (row_count, 3)."""
     planes = np.ascontiguousarray(first.transpose(1, 2, 0))
     before = np.stack([_row_times(row, binding.headings) for row in planes])
@@ -312,7 +313,7 @@ def _placed(frame: Floats, local: Floats) -> Floats:
 
 
 def _row_times(row: Floats, vectors: Floats) -> Floats:
-    """One row of matrices by vectors, (3, n) and (3, ..., n): (..., n). Quicker than einsum."""
+    """One row of matrices (3, n) times vectors (3, ..., n): (..., n). Faster than einsum."""
     value: Floats = row[0] * vectors[0]
     value += row[1] * vectors[1]
     value += row[2] * vectors[2]
@@ -320,7 +321,7 @@ def _row_times(row: Floats, vectors: Floats) -> Floats:
 
 
 def _mixed(guides: Floats, weights: _Weights) -> Floats:
-    """Guides mixed, (3, cv_count, n) float32."""
+    """Weighted means of guides, (3, cv_count, n) float32."""
     grid = np.ascontiguousarray(np.asarray(guides, np.float32).transpose(2, 1, 0))
     mixed = np.zeros((*grid.shape[:2], len(weights.guide)), np.float32)
     for column in range(weights.guide.shape[1]):
@@ -329,8 +330,8 @@ def _mixed(guides: Floats, weights: _Weights) -> Floats:
 
 
 def _headings(spine: Floats, offsets: Ints) -> Floats:
-    """Unit directions from root to tip at the rows, (3, row_count): those of strands.frames; 0
-    where there is none."""
+    """Unit directions from root to tip at the rows, (3, row_count), as in strands.frames; 0 where
+    there is none."""
     step = np.zeros((3, len(spine) + 1), np.float32)
     step[:, 1:-1] = np.diff(spine, axis=0).T
     step[:, offsets] = 0.0  # from one card to the next
@@ -343,7 +344,7 @@ def _headings(spine: Floats, offsets: Ints) -> Floats:
 
 
 def _is_at_rest(binding: CardBinding, guides: Floats, turns: Floats) -> bool:
-    """Whether guides are as at rest, to the bit."""
+    """Whether guides are exactly at rest, and roots have hardly turned."""
     if not np.array_equal(guides, binding.guides):
         return False
     return bool(np.abs(turns - np.eye(3, dtype=np.float32)).max(initial=0.0) < _UNTURNED)

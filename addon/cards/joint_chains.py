@@ -1,8 +1,8 @@
-"""Cards that move alike share a chain of joints: which ones, and with which other chain; where its
-joints are at rest.
+"""Chains of joints that cards share if they move alike: each card's chain, a second one, and the
+joints at rest.
 
-Alike is meant of how far places along the cards go from rest, frame by frame, and a little of where
-they lie: k-means (Lloyd 1982) from the cards that are farthest from each other.
+Similarity is that of the displacements of places along the cards, frame by frame, and a little of
+their positions: k-means (Lloyd 1982) from the cards that are farthest from each other.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from ..arrays import Floats, Ints
 from ..strands.vectors import unit_or
 from .joint_solve import Skin
 
-#: How much cards that lie apart are separated, beside how they move.
+#: Weight of cards' positions relative to their motion.
 _PLACE = 0.75
 _ROUNDS = 20
 _SMALLEST = 1.0e-12
@@ -23,7 +23,7 @@ _SMALLEST = 1.0e-12
 
 @dataclass(frozen=True, eq=False)
 class Chains:
-    """The chain that each card rides on, and another one that it may share; (n,) each."""
+    """The chain of each card, and another one that may move it too; (n,) each."""
 
     own: Ints
     other: Ints
@@ -34,7 +34,7 @@ def card_chains(places: Floats, moved: Floats, most: int) -> Chains:
     """Put cards into `most` chains or fewer.
 
     Args:
-        places: (n, row_count, 3) of each card at rest [m].
+        places: (n, row_count, 3) along each card at rest [m].
         moved: (n, row_count, frame_count, 3) the same in motion.
     """
     motions = (moved - places[:, :, None]).reshape(len(places), -1)
@@ -64,7 +64,8 @@ def _k_means(vectors: Floats, count: int) -> tuple[Ints, Floats]:
 
 
 def _far_apart(vectors: Floats, count: int) -> Floats:
-    """Each time the vector that is farthest from all chosen ones, beginning at the mean."""
+    """Vectors chosen one by one, each the farthest from all chosen ones, beginning near the
+    mean."""
     first = int(_squares(vectors, vectors.mean(axis=0)[None])[:, 0].argmin())
     chosen, distance = [first], np.full(len(vectors), np.inf)
     while len(chosen) < count:
@@ -74,7 +75,8 @@ def _far_apart(vectors: Floats, count: int) -> Floats:
 
 
 def _partners(vectors: Floats, own: Ints, centres: Floats) -> Ints:
-    """With which other centre, mixed with its own, each vector is best reached; its own alone."""
+    """The other centre whose mixture with a vector's own centre comes nearest to it; its own if
+    there is only one."""
     count = len(centres)
     if count < 2:
         return own
@@ -100,7 +102,8 @@ def _squares(vectors: Floats, centres: Floats) -> Floats:
 
 
 def rest_joints(lines: Floats, chains: Chains, joints: int) -> Floats:
-    """Along the middle of a chain's cards, with y towards the tip, (chains, joints, 4, 4).
+    """Joints at rest along the middle of a chain's cards, with y towards the tip,
+    (chains, joints, 4, 4).
 
     Args:
         lines: (n, row_count, 3) places along each card, root to tip [m].
@@ -128,7 +131,7 @@ def middle_lines(lines: Floats, chains: Chains, joints: int) -> Floats:
 
 
 def turned_to(direction: Floats) -> Floats:
-    """The least turns (..., 3, 3) that take y to these directions; Rodrigues' formula."""
+    """The smallest rotations (..., 3, 3) that take y to these directions; Rodrigues' formula."""
     y = np.array([0.0, 1.0, 0.0])
     unit = unit_or(direction, y, 1.0e-9)
     axis, cosine = np.cross(y, unit), unit[..., 1]
@@ -140,7 +143,7 @@ def turned_to(direction: Floats) -> Floats:
 
 
 def cross_matrices(axis: Floats) -> Floats:
-    """(..., 3, 3), what takes the cross product of vectors (..., 3) with others."""
+    """Matrices (..., 3, 3) of the cross product with vectors (..., 3)."""
     cross = np.zeros((*axis.shape, 3))
     cross[..., 0, 1], cross[..., 1, 0] = -axis[..., 2], axis[..., 2]
     cross[..., 0, 2], cross[..., 2, 0] = axis[..., 1], -axis[..., 1]
@@ -149,7 +152,8 @@ def cross_matrices(axis: Floats) -> Floats:
 
 
 def reach_of(points: Floats, skin: Skin, rest: Floats) -> Floats:
-    """Root mean square distance of what each joint moves from it, (chains, joints) [m]."""
+    """Root mean square distance from each joint of the points that it moves, (chains, joints)
+    [m]."""
     places = rest.reshape(-1, 4, 4)[:, :3, 3]
     square = np.square(points[:, None] - places[skin.joint]).sum(axis=-1)
     whole = np.bincount(skin.joint.ravel(), skin.weight.ravel(), len(places))

@@ -1,7 +1,8 @@
-"""Keys of joints: turns as quaternions and ways beside their parents, and only keys that count.
+"""Keys of joints: rotations as quaternions and translations relative to parents, without
+superfluous keys.
 
-A chain's joints share their keys. Between two of them engines turn evenly (slerp, Shoemake 1985)
-and move straight; a key is left out where that comes near enough.
+A chain's joints share their keys. Between two keys engines interpolate rotations by slerp
+(Shoemake 1985) and translations linearly; a key is left out where that comes near enough.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from .joints import JointRig
 
-#: Quaternions nearer to each other than this (their dot product) are mixed straight.
+#: Quaternions nearer to each other than this (their dot product) are interpolated linearly.
 _NEAR = 1.0 - 1.0e-9
 
 
@@ -24,7 +25,7 @@ class ChainKeys:
 
     frame: (key_count,) counted from 0.
     rotation: (joints, key_count, 4) unit quaternions x, y, z, w; translation: (joints, key_count,
-        3) [m]; of each joint in the space of the one before, of the first in that of the rig.
+        3) [m]; each joint in the space of the one before, the first in that of the rig.
     """
 
     frame: Ints
@@ -36,7 +37,7 @@ def chain_keys(rig: JointRig, near: float) -> Generator[float, None, tuple[Chain
     """The keys of all chains; yields the fraction of them that is done.
 
     Args:
-        near: how far a joint, and what it moves, may be from its path between two keys [m].
+        near: maximum distance of a joint, and of what it moves, from its path between two keys [m].
     """
     keys = []
     for chain in range(rig.chains):
@@ -50,7 +51,7 @@ def keys_of(turn: Floats, place: Floats, reach: Floats, near: float) -> ChainKey
 
     Args:
         turn, place: (joints, frame_count, 3, 3) and (joints, frame_count, 3) [m].
-        reach: (joints,) [m]: how far from a joint its turns matter.
+        reach: (joints,) [m]: distance from a joint at which its rotation matters.
     """
     frame_count = turn.shape[1]
     rotation, translation = _beside_parents(turn, place)
@@ -91,8 +92,8 @@ def between_keys(keys: ChainKeys, frame_count: int) -> tuple[Floats, Floats]:
 
 
 def quaternions(turn: Floats) -> Floats:
-    """Turns (..., 3, 3) as unit quaternions x, y, z, w (..., 4), by the largest of the four
-    (Shepperd 1978).
+    """Rotations (..., 3, 3) as unit quaternions x, y, z, w (..., 4), by the largest of the four
+    components (Shepperd 1978).
     """
     trace = np.trace(turn, axis1=-2, axis2=-1)
     diagonal = np.diagonal(turn, axis1=-2, axis2=-1)
@@ -122,7 +123,8 @@ def matrices(quaternion: Floats) -> Floats:
 
 
 def slerp(one: Floats, other: Floats, fraction: Floats) -> Floats:
-    """Evenly from one unit quaternion to the other, the shorter way round, (..., 4)."""
+    """Spherical interpolation from one unit quaternion to another, the shorter way round,
+    (..., 4)."""
     cosine = (one * other).sum(axis=-1, keepdims=True)
     other = np.where(cosine < 0.0, -other, other)
     cosine = np.minimum(np.abs(cosine), 1.0)
@@ -137,13 +139,14 @@ def slerp(one: Floats, other: Floats, fraction: Floats) -> Floats:
 
 
 def beside_parent(parent: Floats, own: Floats) -> Floats:
-    """Rigid matrices (..., 4, 4) in the space of others."""
+    """Rigid matrices (..., 4, 4) relative to those of parents."""
     result: Floats = np.linalg.inv(parent) @ own
     return result
 
 
 def _beside_parents(turn: Floats, place: Floats) -> tuple[Floats, Floats]:
-    """Quaternions that go the shorter way from frame to frame, and ways, in parents' spaces."""
+    """Quaternions that go the shorter way from frame to frame, and translations, in parents'
+    spaces."""
     turned, moved = turn.copy(), place.copy()
     back = turn[:-1].swapaxes(-1, -2)
     turned[1:] = back @ turn[1:]
@@ -156,7 +159,7 @@ def _beside_parents(turn: Floats, place: Floats) -> tuple[Floats, Floats]:
 
 
 def _shortest(keys: ChainKeys) -> ChainKeys:
-    """One key for what stays where it is."""
+    """A single key for joints that do not move."""
     if len(keys.frame) == 2 and all(
         np.array_equal(each[:, 0], each[:, 1]) for each in (keys.rotation, keys.translation)
     ):

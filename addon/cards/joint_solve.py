@@ -1,7 +1,7 @@
 """Rigid joints and their weights from moving points: the two halves of skinning decomposition.
 
-Le and Deng, "Smooth Skinning Decomposition with Rigid Bones", 2012: with the weights fixed each
-joint has its best rigid motion in closed form, with the motion fixed each point its best weights.
+Le and Deng, "Smooth Skinning Decomposition with Rigid Bones", 2012: with fixed weights, each
+joint's best rigid motion has a closed form; with fixed motion, each point's best weights are found.
 """
 
 from __future__ import annotations
@@ -14,27 +14,27 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 
-#: How many joints move one vertex, as engines have it.
+#: Number of joints that move one vertex, as usual in engines.
 INFLUENCES = 4
-#: How much a fit keeps to the turn before it, as a fraction of what the points say: points in a
-#: line say nothing of the turn about it.
+#: Weight of the previous rotation in a fit, as a fraction of that of the points: points in a line
+#: do not determine the rotation about it.
 _KEEP = 1.0e-4
 #: The same for weights.
 _KEEP_WEIGHTS = 1.0e-4
-#: Lengths [m] and weights below this are none.
+#: Lengths [m] and weights below this count as 0.
 _SMALLEST = 1.0e-9
 
 
 @dataclass(frozen=True, eq=False)
 class Skin:
-    """joint, weight: (n, INFLUENCES) for each point; weights are not negative, of sum 1."""
+    """joint, weight: (n, INFLUENCES) of each point; weights are not negative and add up to 1."""
 
     joint: Ints
     weight: Floats
 
     @classmethod
     def joined(cls, parts: Sequence[Skin]) -> Skin:
-        """All of them, one after the other, with the heaviest joint of each point first."""
+        """All parts, one after the other, with the heaviest joint of each point first."""
         joint = np.concatenate([each.joint for each in parts])
         weight = np.concatenate([each.weight for each in parts])
         order = np.argsort(-weight, axis=1, kind="stable")
@@ -46,11 +46,11 @@ def rigid_fits(
 ) -> tuple[Floats, Floats]:
     """The rigid motion that brings weighted points nearest to targets, in each frame.
 
-    Kabsch 1976. Where points say nothing of a turn it is the one before.
+    Kabsch 1976. Where points do not determine the rotation, the previous one is kept.
 
     Args:
         points: (n, 3). targets: (n, frame_count, 3). weight: (n,).
-        before: (frame_count, 3, 3) turns.
+        before: (frame_count, 3, 3) previous rotations.
 
     Returns:
         Turns (frame_count, 3, 3) and shifts (frame_count, 3): target = turn point + shift.
@@ -89,7 +89,7 @@ def skinned(points: Floats, skin: Skin, turn: Floats, shift: Floats) -> Floats:
 
 
 def first_joints(points: Floats, targets: Floats, skin: Skin, count: int) -> tuple[Floats, Floats]:
-    """`turn` and `shift` of each joint as if it alone moved what it has a weight in."""
+    """`turn` and `shift` of each joint, as if it alone moved all points that it has a weight in."""
     still = np.tile(np.eye(3), (targets.shape[1], 1, 1))
     turn, shift = np.tile(still, (count, 1, 1, 1)), np.zeros((count, *targets.shape[1:]))
     for joint in range(count):
@@ -103,7 +103,8 @@ def first_joints(points: Floats, targets: Floats, skin: Skin, count: int) -> tup
 def move_joints(
     points: Floats, targets: Floats, skin: Skin, turn: Floats, shift: Floats, rounds: int
 ) -> None:
-    """Better `turn` and `shift`, in place: joint by joint against what the others leave (eq. 8).
+    """Improve `turn` and `shift` in place, joint by joint, against the residual of the others
+    (eq. 8).
 
     Args:
         targets: (n, frame_count, 3).
@@ -129,12 +130,12 @@ def move_joints(
 def best_weights(points: Floats, targets: Floats, first: Skin, turn: Floats, shift: Floats) -> Skin:
     """The weights of the same joints that bring points nearest to targets (eq. 5).
 
-    Every set of joints that may remain is tried, so that the best weights that are not negative
-    are found, and not those where a search ends.
+    Every subset of the joints is tried, which finds the best weights that are not negative, not
+    just a local optimum.
 
     Args:
         targets: (n, frame_count, 3).
-        first: what weights keep to where the motion says nothing of them.
+        first: the weights to keep where the motion does not determine them.
     """
     shown = np.stack(
         [
@@ -143,7 +144,7 @@ def best_weights(points: Floats, targets: Floats, first: Skin, turn: Floats, shi
         ],
         axis=1,
     ).reshape(len(points), INFLUENCES, -1)
-    gram = shown @ shown.transpose(0, 2, 1)  # of the misses: weights of sum 1 mix these, too
+    gram = shown @ shown.transpose(0, 2, 1)  # of the residuals: weights of sum 1 blend these too
     scale = np.trace(gram, axis1=1, axis2=2) * _KEEP_WEIGHTS + _SMALLEST**2
     gram = gram + scale[:, None, None] * np.eye(INFLUENCES)
     pull = scale[:, None] * first.weight
@@ -172,7 +173,7 @@ def _of_joints(points: Floats, joint: Ints, turn: Floats, shift: Floats) -> Floa
 
 
 def _of_sum_one(gram: Floats, pull: Floats) -> Floats:
-    """w with the least w G w / 2 - p w among those of sum 1, (n, k), with Lagrange's multiplier."""
+    """w that minimises w G w / 2 - p w under sum 1, (n, k), by a Lagrange multiplier."""
     count, size = pull.shape
     both = np.stack([np.ones((count, size)), pull], axis=2)
     ones, free = np.moveaxis(np.linalg.solve(gram, both), 2, 0)

@@ -1,8 +1,8 @@
-"""Chains of joints that move cards as their guides do: for engines that know skinned meshes.
+"""Chains of joints that move cards as their guides do, for engines with skinned meshes.
 
 Cards that move alike share a chain (`joint_chains`), a vertex is weighted to two neighbouring
-joints of its own chain and two of another one, and joints and weights are fitted to the
-motion in turns (`joint_solve`).
+joints of its own chain and two of another one, and joints and weights are fitted to the motion
+alternately (`joint_solve`).
 """
 
 from __future__ import annotations
@@ -23,26 +23,26 @@ from .sort import card_of_vertex
 
 #: Numbers of joints that are tried, the fewest first.
 _COUNTS = (2, 3, 4, 6, 8, 12, 16)
-#: Joints go on being added while each step takes at least this fraction of the error away.
+#: Joints are added while each step reduces the error by at least this fraction.
 _WORTH = 0.03
-#: Fraction of the error that the joints may take; the rest is for the keys that are left out.
+#: Fraction of the allowed error for the joints; the rest is for the keys that are left out.
 FIT_FRACTION = 0.9
-#: Frames from which weights are learnt, and vertices from which joints are.
+#: Numbers of frames that weights, and of vertices that joints are learnt from.
 _LEARNT_FRAMES = 24
 _LEARNT_VERTICES = 12_000
 _TURNS = 3
-#: Frames that are solved, and vertices that are placed, at once.
+#: Frames solved at once, and vertices placed at once.
 _FRAMES_AT_ONCE = 64
 VERTICES_AT_ONCE = 4096
 
 
 @dataclass(frozen=True, eq=False)
 class CardTracks:
-    """Cards in motion, in the space that they have at rest, which the head carries.
+    """Cards in motion, in their space at rest, which moves with the head.
 
     levels: at rest [m], the finest first.
     moved: (vertex_count, frame_count, 3) float32 [m] of each level.
-    carrier: (frame_count, 4, 4) rigid, from that space to the world.
+    carrier: (frame_count, 4, 4) rigid motion, from that space to the world.
     hair_length: median length of the guides [m], of which errors are fractions.
     root: (3,) middle of the roots at rest [m].
     first: number of the first frame. frame_rate: [1/s].
@@ -77,8 +77,8 @@ class JointRig:
 
     chains, joints: how many chains, and joints in each.
     rest: (chains, joints, 4, 4) rigid [m]; the y axis is along the chain.
-    turn, place: (chains, joints, frame_count, 3, 3) and (..., 3) [m], of the joints themselves.
-    reach: (chains, joints) how far what it moves lies from it [m].
+    turn, place: (chains, joints, frame_count, 3, 3) and (..., 3) [m], the joints' own.
+    reach: (chains, joints) distance of what a joint moves from it [m].
     skins: of each level; a joint's number is chain * joints + number in the chain.
     """
 
@@ -93,8 +93,8 @@ class JointRig:
 
 @dataclass(frozen=True)
 class FitError:
-    """Distances of vertices as they are played from simulated ones [m], over all levels and frames:
-    root mean square, 99 % of them are below, and the worst.
+    """Distances of played vertices from simulated ones [m], over all levels and frames: root mean
+    square, 99th percentile, and maximum.
     """
 
     mean_square_root: float
@@ -103,7 +103,7 @@ class FitError:
 
     @classmethod
     def of(cls, distances: Sequence[Floats]) -> Self:
-        """Of distances (n,) [m], part after part."""
+        """The error of distances (n,) [m], given in parts."""
         every = np.concatenate(distances)
         rms = float(np.sqrt(np.mean(np.square(every, dtype=np.float64))))
         return cls(rms, float(np.quantile(every, 0.99)), float(every.max(initial=0.0)))
@@ -112,7 +112,7 @@ class FitError:
     def played(
         cls, tracks: CardTracks, skins: Sequence[Skin], moves: tuple[Floats, Floats]
     ) -> Self:
-        """Of all levels.
+        """The error of all levels.
 
         Args:
             moves: of the joints, see `joint_moves`.
@@ -131,7 +131,7 @@ class FitError:
 def joint_steps(
     tracks: CardTracks, settings: CardExportSettings
 ) -> Generator[float, None, JointRig]:
-    """The fewest joints that stay under the error; where none do, the nearest ones.
+    """The fewest joints that stay under the error; if none do, those with the smallest error.
 
     Yields the fraction that is done.
     """
@@ -153,17 +153,17 @@ def joint_steps(
 
 
 def keyed_error(tracks: CardTracks, rig: JointRig, turn: Floats, place: Floats) -> FitError:
-    """How far the cards are from the simulation when the joints are there.
+    """The error of the cards with the joints at these places.
 
     Args:
-        turn, place: as those of the rig, which they may differ from by left out keys.
+        turn, place: as in the rig, but possibly with keys left out.
     """
     return FitError.played(tracks, rig.skins, joint_moves(rig.rest, turn, place))
 
 
 def joint_moves(rest: Floats, turn: Floats, place: Floats) -> tuple[Floats, Floats]:
-    """What joints do to points at rest: turns (n, frame_count, 3, 3) and shifts (n, frame_count,
-    3) such that a point goes to turn point + shift.
+    """Transforms of points at rest by joints: turns (n, frame_count, 3, 3) and shifts
+    (n, frame_count, 3); a point moves to turn point + shift.
     """
     shape = turn.shape[2:]
     moves = (turn @ rest[:, :, None, :3, :3].swapaxes(-1, -2)).reshape(-1, *shape)
@@ -175,7 +175,7 @@ def joint_moves(rest: Floats, turn: Floats, place: Floats) -> tuple[Floats, Floa
 
 @dataclass(frozen=True, eq=False)
 class _Learnt:
-    """What joints are learnt from: some vertices of the finest level in some frames."""
+    """The data that joints are learnt from: some vertices of the finest level in some frames."""
 
     lines: Floats
     chains: Chains
@@ -207,7 +207,8 @@ class _Learnt:
         )
 
     def first_skin(self, card: Ints, along: Floats, joints: int) -> Skin:
-        """Each vertex between two joints of its own chain, with none of the other chain's."""
+        """Each vertex between two joints of its own chain, with weights of 0 for the other
+        chain's."""
         at = np.clip(along.astype(np.float64), 0.0, 1.0) * (joints - 1)
         before = np.minimum(at.astype(np.int64), joints - 2)
         own = self.chains.own[card] * joints + before
@@ -233,7 +234,7 @@ class _Learnt:
 def _on_all(
     tracks: CardTracks, learnt: _Learnt, joints: int, skin: Skin, turn: Floats, shift: Floats
 ) -> Generator[float, None, JointRig]:
-    """The learnt joints in all frames, and with all vertices."""
+    """The learnt joints in all frames and for all vertices."""
     chains, frame_count = learnt.chains.count, tracks.frame_count
     turns = np.empty((chains * joints, frame_count, 3, 3))
     shifts = np.empty((chains * joints, frame_count, 3))
@@ -285,7 +286,7 @@ def _skin_of(
 
 
 def _card_places(mesh: CardMesh, finest: CardMesh) -> Ints:
-    """Of each vertex, the place of its card among those of the finest level."""
+    """For each vertex, the index of its card among those of the finest level."""
     return np.searchsorted(np.unique(finest.card), card_of_vertex(mesh))
 
 

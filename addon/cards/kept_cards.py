@@ -1,11 +1,11 @@
 """Cards that an artist has edited, deleted or added, among cards that are made again.
 
-The rule: a new card belongs to the card on record that it lies nearest to. Where that one was
-edited, the edited one stands for the new card; where it was deleted, the place stays free. So edits
-hold as well where there are more cards now, fewer, or others. Nothing that the artist has made is
-left out: an edited card for which no new one is found stays beside the others.
+The rule: a new card belongs to the nearest card on record. If that one was edited, the edited card
+replaces the new one; if it was deleted, the place stays free. So edits hold too when there are more
+cards now, fewer, or others. Nothing that the artist has made is left out: an edited card for which
+no new one is found stays beside the others.
 
-Kept cards go with the skin under their roots, as far as that has moved since.
+Kept cards move with the skin under their roots, if that has moved since.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ from .settings import CardSettings
 from .sort import reordered
 from .strip import CardFrames, Strips, UncutCards
 
-#: Less than this fraction of a card's length is not moved: the skin is where it was.
+#: Motion of the skin below this fraction of a card's length is ignored.
 _STILL = 1.0e-3
-#: A card begins away from the head that begins farther from it than this part of its length.
+#: Cards that begin farther from the head than this part of their length are reported.
 _FAR = 0.25
 #: A vector shorter than this has no direction.
 _SHORTEST = 1.0e-12
@@ -42,11 +42,11 @@ _CHUNK = 512
 class KeptCards:
     """New cards with the kept ones among them.
 
-    cards: all, the artist's own ones last; those of which nothing is made are absent.
+    cards: all, the artist's own ones last; replaced and deleted ones are marked absent.
     mesh: of the kept cards alone, world space, as the artist left them.
-    model: (card_count,) the new card whose strands each card stands for.
-    record: of the new cards, and which card stands for each.
-    notes: what the artist should know.
+    model: (card_count,) the new card whose strands each card represents.
+    record: of the new cards, with the card that represents each.
+    notes: for the artist.
     """
 
     cards: UncutCards
@@ -58,7 +58,7 @@ class KeptCards:
 
     @property
     def numbers(self) -> Ints:
-        """Of the kept cards."""
+        """The numbers of the kept cards."""
         return np.unique(self.mesh.card)
 
     def put_into(self, mesh: CardMesh) -> CardMesh:
@@ -78,12 +78,12 @@ class KeptCards:
 def kept_cards(
     edits: CardEdits, cards: UncutCards, settings: CardSettings, head: Surface | None, baked: bool
 ) -> KeptCards:
-    """Find the places of an artist's cards among new ones.
+    """Place an artist's cards among new ones.
 
     Args:
-        cards: new ones, world space, as they would be without edits.
-        baked: whether the tiles show the groom's own strands, so that others may show now what one
-            has shown.
+        cards: new cards without edits, world space.
+        baked: whether the tiles show the groom's own strands, so that their contents may have
+            changed.
     """
     record = MadeCards.of(cards.strips, cards.tile, cards.atlas, head)
     before = edits.record.moved(edits.matrix)
@@ -94,7 +94,7 @@ def kept_cards(
     has = np.flatnonzero(ancestor >= 0)
     stands, is_free = np.full(len(record), -1, np.int32), np.zeros(len(record), bool)
     stands[has] = before.stands[ancestor[has]]
-    # where the card that stands for a place is gone, the place is free
+    # a place is free if the card that represented it is gone
     is_free[has] = ~edits.is_there[stands[has]]
     number = np.full(len(edits.number), -1, np.int32)
     stand_for = np.arange(len(record), dtype=np.int32)
@@ -119,8 +119,8 @@ def kept_cards(
 
 @dataclass(frozen=True)
 class _Placed:
-    """positions: of the vertices of the edits, world space. number: (piece_count,) of each among
-    the cards now. is_free: (new card count,). tile: (piece_count,)."""
+    """The kept pieces. positions: of their vertices, world space. number: (piece_count,) of each
+    among the current cards. is_free: (new card count,). tile: (piece_count,)."""
 
     positions: Floats
     number: Ints
@@ -221,11 +221,11 @@ def _notes(
 
 
 def _skin_moves(before: MadeCards, head: Surface | None) -> Floats:
-    """How the skin under each card on record has moved since, (n, 4, 4), world space; nothing
-    where it has hardly moved, or is another one.
+    """Motion of the skin under each card on record, (n, 4, 4), world space; the identity where it
+    has hardly moved, or if it is another skin.
 
     Args:
-        before: the record where its object is now.
+        before: the record, in world space at its object's current place.
     """
     moves = np.tile(np.eye(4), (len(before), 1, 1))
     if head is None or len(head.triangles) != before.triangle_count:
@@ -239,13 +239,13 @@ def _skin_moves(before: MadeCards, head: Surface | None) -> Floats:
 
 
 def _moved_each(points: Floats, moves: Floats) -> Floats:
-    """Points (n, m, 3), those of each by its own (4, 4) matrix."""
+    """Points (n, m, 3) moved by matrices (n, 4, 4)."""
     return np.einsum("nij,nmj->nmi", moves[:, :3, :3], points) + moves[:, None, :3, 3]
 
 
 def _carried(edits: CardEdits, before: MadeCards, moves: Floats) -> Floats:
     """The vertices of the kept pieces, (n, 3) float32 [m, world], carried by the skin under the
-    roots of their cards; the artist's own by that of the nearest card."""
+    roots of their cards; own cards by the skin under the nearest card."""
     places = moved(edits.surface.positions, edits.matrix)
     count = len(edits.number)
     if not count:
@@ -264,7 +264,7 @@ def _carried(edits: CardEdits, before: MadeCards, moves: Floats) -> Floats:
 
 
 def _frames(corners: Floats) -> Floats:
-    """(n, 4, 4) from a frame on each triangle, as large as it is, to the space of its corners."""
+    """(n, 4, 4) from a frame on each triangle, scaled by its size, to the space of its corners."""
     a, b, c = np.moveaxis(corners.astype(np.float64), 1, 0)
     normal = np.cross(b - a, c - a)
     size = np.sqrt(np.maximum(np.linalg.norm(normal, axis=1), 1.0e-18))
@@ -279,10 +279,10 @@ def _frames(corners: Floats) -> Floats:
 def _tiles_now(
     edits: CardEdits, record: MadeCards, ancestor: Ints, number: Ints, baked: bool
 ) -> Ints:
-    """The tile of each piece in the atlas now, (piece_count,).
+    """The tile of each piece in the current atlas, (piece_count,).
 
-    A card whose tile the artist has left has that of the card in whose place it is. One that he has
-    chosen is followed: it is the tile of most new cards that belong to those which had it.
+    A card whose tile the artist has not changed gets that of the card that it replaces. For a
+    changed tile, it is the tile of most new cards whose cards on record had that tile.
     """
     old = edits.record
     then = tiles_of(edits, old.grid)
@@ -301,7 +301,7 @@ def _tiles_now(
 
 
 def tiles_of(edits: CardEdits, grid: AtlasGrid) -> Ints:
-    """The tile on which the middle of each piece's UVs lies, (piece_count,)."""
+    """The tile that holds the middle of each piece's UVs, (piece_count,)."""
     assert edits.surface.corner_uv is not None
     flat = edits.surface.corner_uv.reshape(-1, 2)
     return grid.tile_at(means_by(np.repeat(edits.piece, 3), flat, len(edits.number)))
@@ -354,7 +354,7 @@ def _adopted(
 
 
 def _facing_as_before(mesh: CardMesh, triangles: Ints) -> CardMesh:
-    """With all faces as the artist has turned them, and normals to that side."""
+    """With all faces oriented as the artist has left them, and normals on that side."""
     a, b, c = np.moveaxis(mesh.positions[triangles].astype(np.float64), 1, 0)
     outward, total = np.cross(b - a, c - a), np.zeros((len(mesh.positions), 3))
     for corner in range(3):
@@ -363,7 +363,7 @@ def _facing_as_before(mesh: CardMesh, triangles: Ints) -> CardMesh:
 
 
 def _on_tiles(edits: CardEdits, grid: AtlasGrid, tile: Ints) -> Floats:
-    """UVs at the same places within their tiles of the atlas now, (triangle_count, 3, 2)."""
+    """UVs at the same places within their tiles of the current atlas, (triangle_count, 3, 2)."""
     uv, old = edits.surface.corner_uv, edits.record.grid
     assert uv is not None
     then = tiles_of(edits, old)
@@ -376,14 +376,14 @@ def _on_tiles(edits: CardEdits, grid: AtlasGrid, tile: Ints) -> Floats:
 
 
 def _rectangles(grid: AtlasGrid, tile: Ints) -> tuple[Floats, Floats]:
-    """Where tiles begin, and how large they are, each (n, 2)."""
+    """Origins and sizes of tiles in the texture, each (n, 2)."""
     low = grid.uv(tile, np.zeros(1), np.zeros(1)).astype(np.float64)
     high = grid.uv(tile, np.ones(1), np.ones(1)).astype(np.float64)
     return low, high - low
 
 
 def _across(uv: Floats, grid: AtlasGrid, tile: Ints) -> Floats:
-    """Where across their tiles vertices are, (vertex_count,) from 0 to 1."""
+    """Places of vertices across their tiles, (vertex_count,) from 0 to 1."""
     start, size = _rectangles(grid, tile)
     across: Floats = np.clip((uv[:, 0] - start[:, 0]) / size[:, 0], 0.0, 1.0)
     return across
@@ -392,7 +392,7 @@ def _across(uv: Floats, grid: AtlasGrid, tile: Ints) -> Floats:
 def _with_normals_of_volume(
     mesh: CardMesh, center: Floats, across: Floats, settings: CardSettings
 ) -> CardMesh:
-    """With the normals that cards which are made have, see strip.py."""
+    """With normals like those of made cards, see strip.py."""
     volume = volume_normals(mesh.positions, mesh.tangent, center)
     lean = settings.roundness * (2.0 * across - 1.0)
     volume = unit(volume + np.cross(mesh.tangent, volume) * lean[:, None])
@@ -403,7 +403,7 @@ def _with_normals_of_volume(
 def _strips(
     mesh: CardMesh, owner: Ints, across: Floats, shape: tuple[int, int], settings: CardSettings
 ) -> Strips:
-    """The strip that each piece is, for coarser levels: its edges cut at even steps of the way.
+    """Each piece as a strip, for coarser levels: its edges cut at even steps along it.
 
     Args:
         owner: (vertex_count,) the piece of each vertex.
@@ -421,7 +421,7 @@ def _strips(
     side = between - tangent * np.einsum("cri,cri->cr", between, tangent)[..., None]
     side = unit_or(side, unit_or(np.cross(tangent, facing), (1.0, 0.0, 0.0), _SHORTEST), _SHORTEST)
     normal = np.cross(side, tangent)
-    # a card that was turned over has its left edge on the right
+    # a flipped card has its left edge on the right
     is_inward = np.einsum("cri,cri->c", normal, facing) < 0.0
     side[is_inward] *= -1.0
     normal[is_inward] *= -1.0
@@ -434,7 +434,7 @@ def _strips(
 def _edges(
     mesh: CardMesh, owner: Ints, across: Floats, count: int, row_count: int
 ) -> tuple[Floats, Floats]:
-    """The outermost places of each piece at each row, two of (piece_count, row_count, 3) [m]."""
+    """The left and right ends of each piece at each row, two of (piece_count, row_count, 3) [m]."""
     corners = mesh.triangles[:, [(0, 1), (1, 2), (2, 0)]].reshape(-1, 2)
     one, two = np.unique(np.sort(corners, axis=1), axis=0).T
     piece, low, high = owner[one], mesh.along[one], mesh.along[two]
@@ -458,7 +458,7 @@ def _edges(
 
 
 def _filled(rows: Floats) -> Floats:
-    """Rows where no edge was found have the place of the nearest row that has one."""
+    """Rows where no edge was found, filled with the place of the nearest row that has one."""
     number = np.arange(rows.shape[1])
     for piece in np.flatnonzero(np.isnan(rows[..., 0]).any(axis=1)):
         there = np.flatnonzero(~np.isnan(rows[piece, :, 0]))
@@ -468,7 +468,7 @@ def _filled(rows: Floats) -> Floats:
 
 
 def _with(strips: Strips, numbers: Ints, changed: Strips, total: int) -> Strips:
-    """All strips, with others in the chosen places, which may be behind them."""
+    """All strips, with `changed` ones at these numbers, which may extend the list."""
     names = ("center", "tangent", "normal", "side")
     parts = []
     for name in names:

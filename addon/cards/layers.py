@@ -1,8 +1,8 @@
 """Layers: how deep in the hair a card lies, from the scalp to the surface.
 
-Artists build hair in layers: an opaque one next to the head, those that break it up, and loose
-strands last. Where a card lies is seen along its own normal, by the other cards below and above it.
-So hair that hangs far from the head has layers too, and thin hair has only the lowest.
+Artists build hair in layers: an opaque one next to the head, others that break it up, and loose
+strands last. A card's layer follows from the number of other cards below and above it along its own
+normal. So hair that hangs far from the head has layers too, and thin hair has only the lowest.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from .strip import Strips
 
 #: Places along a card at which its neighbours are counted.
 _STATIONS = 5
-#: Places of other cards that are looked at, at most.
+#: Maximum number of places of other cards.
 _MAX_OTHERS = 4096
-#: How many of them a look goes through where cards lie in one sheet.
+#: Number of such places within reach of a probe where cards lie in one sheet.
 _SEEN = 6.0
-#: Cosine between the normals of two cards that belong to the same side of the head.
+#: Minimum cosine between the normals of cards on the same side of the head.
 _ALIKE = 0.3
-#: What is nearer than this to a card's own plane, in terms of how wide a look is, is neither below
-#: nor above it.
+#: Places nearer than this to a card's own plane, in terms of the reach, are neither below nor above
+#: it.
 _LEVEL = 1.0e-3
 _CHUNK = 1024
 
@@ -29,7 +29,7 @@ _CHUNK = 1024
 def card_layers(strips: Strips, count: int) -> Ints:
     """The layer of each card, (card_count,) int32 from 0, next to the head, to `count` - 1.
 
-    Each has as many cards as the others, but all cards with none below them are in the lowest.
+    All layers have about equally many cards, but all cards with none below them are in the lowest.
     """
     depth = card_depths(strips)
     deeper = np.searchsorted(np.sort(depth), depth, side="left")
@@ -64,7 +64,7 @@ def _counted(
 
     Args:
         probes, others: places, unit normals, cards.
-        reach: squared distance from the line of sight within which another counts [m^2].
+        reach: squared distance from the probe's normal line within which others count [m^2].
     """
     (place, normal, card), (other_place, other_normal, other_card) = probes, others
     height = normal @ other_place.T - np.einsum("pi,pi->p", normal, place)[:, None]
@@ -84,6 +84,6 @@ def _counted(
 
 
 def _area(strips: Strips) -> float:
-    """Of all strips together [m^2]."""
+    """Area of all strips together [m^2]."""
     pieces = np.linalg.norm(np.diff(strips.frames.center, axis=1), axis=2)
     return float((pieces * (strips.width[:, 1:] + strips.width[:, :-1]) / 2.0).sum())

@@ -2,8 +2,8 @@
 
 Each level has about half the triangles of the one before: first by fewer rows, as far as the
 allowed error permits, which doubles from level to level up to a fraction of a card's width; then by
-fewer columns; then by fewer cards, where two that lie together become one that covers both. All
-levels show the same tiles of the same atlas, and a card keeps its number.
+fewer columns; then by fewer cards, where one card replaces two that lie together. All levels show
+the same tiles of the same atlas, and a card keeps its number.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from .segments import edges_of, fewest_segments, interpolated, segment_errors, w
 from .settings import CardSettings
 from .strip import Strips, UncutCards, strip_mesh
 
-#: Fraction of the triangles that a level keeps of the one before, at most, to be worth having.
+#: Maximum fraction of triangles that a useful level keeps of the one before.
 _MAX_KEPT = 0.6
-#: Where no error is allowed, levels start from this fraction of the cards' usual width. From the
-#: second one on rows stay: straighter cards would run through the head.
+#: Error of rows with which levels start if none is given, and its maximum while cards can be
+#: joined, as fractions of the cards' median width: straighter cards would run through the head.
 _MIN_ERROR, _MAX_ERROR = 0.05, 0.4
 _BISECTIONS = 24
-#: Fraction of the places on the edges of all cards, in percent, that a level's error holds for.
+#: Percentage of the places on the edges of all cards that a level's error holds for.
 _HELD = 90.0
 
 
@@ -33,8 +33,9 @@ _HELD = 90.0
 class CardLevel:
     """One level of detail.
 
-    error: nine tenths of the places on the edges of all cards are so near to this level's [m].
-    owner: (card_count,) the card in it that stands for each; empty for shells.
+    error: nine tenths of the places on the edges of all cards are within this distance of the
+        level's strips [m].
+    owner: (card_count,) the card of this level that represents each; empty for shells.
     """
 
     mesh: CardMesh
@@ -44,14 +45,13 @@ class CardLevel:
 
 @dataclass(frozen=True)
 class _Cut:
-    """How the cards of one level are cut; what is known of each card number is (card_count, ...).
+    """How the cards of one level are cut; arrays of cards are (card_count, ...).
 
     strips: at full resolution; those of numbers that are gone are not used.
-    owner: the number that stands for each card of the finest level.
+    owner: the number of the card that represents each card of the finest level.
     segments: 0 for numbers that are gone.
     errors: of the strips by number of segments, see `segment_errors`.
-    error: that rows are allowed [m]; most_error: that they are ever allowed, as long as there are
-        cards to be joined.
+    error: allowed for rows [m]; max_error: its maximum, as long as there are cards to be joined.
     """
 
     strips: Strips
@@ -71,12 +71,12 @@ class _Cut:
 def card_levels(
     cards: UncutCards, settings: CardSettings, error: float | None, kept: Ints | None = None
 ) -> tuple[CardLevel, ...]:
-    """The levels, finest first: as many as the settings ask for, or fewer where so few triangles
-    are left that they cannot be halved.
+    """The levels, finest first: as many as the settings say, or fewer if the triangles can no
+    longer be halved.
 
     Args:
-        error: that the rows of the finest level are allowed [m]; None keeps as many as there are.
-        kept: cards that the finest level joins with no others.
+        error: allowed for rows of the finest level [m]; None keeps all rows.
+        kept: cards that the finest level must not join with others.
     """
     cuts = [_within(_finest(cards, settings, error), cards.group, settings, kept)]
     while cuts[-1].triangle_count and len(cuts) < settings.levels:
@@ -108,7 +108,8 @@ def _finest(cards: UncutCards, settings: CardSettings, error: float | None) -> _
 
 
 def _within(cut: _Cut, group: Ints, settings: CardSettings, kept: Ints | None) -> _Cut:
-    """No more triangles than the settings allow, as far as cards can be joined."""
+    """The cut with at most as many triangles as the settings allow, as far as cards can be
+    joined."""
     budget = settings.max_triangles
     while budget and cut.triangle_count > budget:
         target = max(float(budget), cut.triangle_count / 2.0)
@@ -120,7 +121,8 @@ def _within(cut: _Cut, group: Ints, settings: CardSettings, kept: Ints | None) -
 
 
 def _coarser(cut: _Cut, group: Ints, most: int, half: float, kept: Ints | None = None) -> _Cut:
-    """No more than these triangles, half of what there are or more, or as near as may be."""
+    """A cut with at most `half` triangles, which is half of the current number or more, or as few
+    as possible."""
     allowed = min(2.0 * cut.error, cut.max_error)
     if _fewer_rows(cut, allowed, most).triangle_count > half and cut.columns > 1:
         cut = replace(cut, columns=(cut.columns + 1) // 2)
@@ -129,13 +131,13 @@ def _coarser(cut: _Cut, group: Ints, most: int, half: float, kept: Ints | None =
         cut = _fewer_cards(cut, least.segments, half, group, most, kept)
         least = _fewer_rows(cut, allowed, most)
     halved = _halved(cut, half, allowed, most)
-    if halved.triangle_count > half:  # no other way is left
+    if halved.triangle_count > half:  # nothing else is left to reduce
         halved = _halved(cut, half, float(cut.errors.max(initial=0.0)), most)
     return replace(halved, error=allowed)
 
 
 def _halved(cut: _Cut, half: float, allowed: float, most: int) -> _Cut:
-    """Rows by the least error that leaves no more triangles than `half`, or by the allowed one."""
+    """Rows by the smallest error that leaves at most `half` triangles, or by the allowed one."""
     low, high = 0.0, allowed
     for _ in range(_BISECTIONS):
         middle = (low + high) / 2.0
@@ -147,7 +149,7 @@ def _halved(cut: _Cut, half: float, allowed: float, most: int) -> _Cut:
 
 
 def _fewer_rows(cut: _Cut, error: float, most: int) -> _Cut:
-    """No card gets more rows than it has."""
+    """Fewer rows within the error; no card gets more rows than it has."""
     enough = fewest_segments(cut.errors, error, most)
     return replace(cut, segments=np.minimum(cut.segments, enough))
 
@@ -155,9 +157,9 @@ def _fewer_rows(cut: _Cut, error: float, most: int) -> _Cut:
 def _fewer_cards(
     cut: _Cut, segments: Ints, half: float, group: Ints, most: int, kept: Ints | None
 ) -> _Cut:
-    """Cards are joined until no more triangles than `half` are left, if cards have these segments.
+    """Cards joined until at most `half` triangles are left, if cards have these segments.
 
-    Where one round of pairs does not do, there is another.
+    If one round of pairs is not enough, another follows.
     """
     while True:
         there = np.flatnonzero(cut.segments)
@@ -189,7 +191,7 @@ def _mesh(cut: _Cut, cards: UncutCards, settings: CardSettings) -> CardMesh:
 
 
 def _parts(cut: _Cut) -> list[tuple[Ints, Strips]]:
-    """Strips with the same number of segments together, with the numbers of their cards."""
+    """Strips grouped by their number of segments, with the numbers of their cards."""
     by_count = {int(n): np.flatnonzero(cut.segments == n) for n in np.unique(cut.segments) if n}
     parts: list[tuple[Ints, Strips]] = [
         (cards, with_segments(cut.strips, cards, n)) for n, cards in by_count.items()
@@ -199,8 +201,8 @@ def _parts(cut: _Cut) -> list[tuple[Ints, Strips]]:
 
 
 def _silhouette_error(cut: _Cut, finest: Strips) -> float:
-    """How far the edges of all cards at full resolution are from this level's strips, across them
-    [m]: of those nine tenths that are nearest the farthest."""
+    """Distance of the edges of all cards at full resolution from this level's strips, perpendicular
+    to these [m]: the 90th percentile."""
     along = np.linspace(0.0, 1.0, finest.width.shape[1])
     center, side, tangent = (np.zeros_like(finest.frames.center) for _ in range(3))
     half = np.zeros_like(finest.width)

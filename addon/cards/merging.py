@@ -19,14 +19,15 @@ _CHUNK = 1024
 
 
 def pairs_to_join(strips: Strips, strand_count: Ints, group: Ints, numbers: Ints) -> Ints:
-    """Pairs of cards, (pair_count, 2), those that lose least first; no card is in two of them.
+    """Pairs of cards, (pair_count, 2), those with the smallest loss first; no card is in two of
+    them.
 
-    What is lost is how much the strands' squared distance from the middle of their card grows (Ward
+    The loss is the growth of the strands' squared distances from the middle of their card (Ward
     1963): single strands join the cards beside them first. The first of a pair is the one that
-    stands for more strands. No pair has cards of two groups.
+    represents more strands. No pair has cards of two groups.
 
     Args:
-        numbers: the cards that there are; of the others nothing is used.
+        numbers: the cards that exist; others are ignored.
     """
     first, second, loss = _neighbours(strips, strand_count, group, numbers)
     is_free = np.ones(len(strips), bool)
@@ -40,12 +41,12 @@ def pairs_to_join(strips: Strips, strand_count: Ints, group: Ints, numbers: Ints
 
 
 def with_joined(strips: Strips, strand_count: Ints, pairs: Ints) -> tuple[Strips, Ints]:
-    """All strips, where the first of each pair covers both, and how many strands they stand for.
+    """All strips, where the first of each pair covers both, and how many strands they represent.
 
-    It runs along the mean of both and lies as the first did. Strands spread evenly over both would
-    make it just so wide that it covers them, and no hair would shine through only if it had the
-    area of both: it is the geometric mean of these two widths. So two that lie side by side become
-    one of their widths together, and two that lie on each other one 1.4 times as wide.
+    The joined card runs along the mean of both, with the orientation of the first. Its width is the
+    geometric mean of two: the one that covers strands spread evenly over both, and the sum of both
+    widths, without which more skin would show through. So two cards side by side become one as wide
+    as both together, and two on top of each other one 1.4 times as wide.
     """
     kept, joined = pairs.T
     frames, width = strips.frames, strips.width
@@ -75,7 +76,7 @@ def with_joined(strips: Strips, strand_count: Ints, pairs: Ints) -> tuple[Strips
 def _neighbours(
     strips: Strips, strand_count: Ints, group: Ints, numbers: Ints
 ) -> tuple[Ints, Ints, Floats]:
-    """Cards, neighbours of the same group, and what is lost by joining them, each (n,)."""
+    """Cards, neighbours of the same group, and the loss by joining them, each (n,)."""
     rows = np.linspace(0, strips.width.shape[1] - 1, _STATIONS).round().astype(int)
     place = strips.frames.center[:, rows]
     place = (place - place.reshape(-1, 3).mean(axis=0)).reshape(len(strips), -1)
@@ -108,7 +109,8 @@ def _squared_distances(some: Floats, all_of_them: Floats) -> Floats:
 
 
 def _squared_width(strips: Strips, chosen: Ints, center: Floats, side: Floats) -> Floats:
-    """What the chosen strips add to the squared width of the one that covers them, (n, rows).
+    """Contributions of the chosen strips to the squared width of the strip that covers them,
+    (n, rows).
 
     Strands that are spread evenly over a width w have the variance w^2 / 12.
     """

@@ -1,21 +1,21 @@
 """Ambient occlusion of card vertices by rays against cards, with their alpha, and bodies.
 
-For cards of which no strands are known, and for what other grooms shade; cards that are made from
-strands have the occlusion of these, see `build.CardGroom`.
+For cards without known strands, and for occlusion by other grooms; cards that are made from strands
+have the strands' occlusion, see `build.CardGroom`.
 
-Stored is the light that a vertex gets from a uniform sky, as a fraction of what a surface of its
-normal gets in the open:  A = sum_i |n . d_i| T_i / sum_i |n . d_i|,  over directions d_i that
-are spread evenly over the half sphere about the normal n, which faces away from the head. So a
-card that lies open on the head has 1. T is the transmittance of the ray: a body lets nothing
-through, each card (1 - alpha)^extinction at the place that is met (Scheuermann 2004, section 5;
-Zhukov, Iones and Kronin 1998, ambient light under a uniform sky). With an extinction of 1 a card is
-what it looks like; strands shade with more, see shading/ambient.py.
+The result is the light that a vertex receives from a uniform sky, as a fraction of what a surface
+with its normal receives in the open:  A = sum_i |n . d_i| T_i / sum_i |n . d_i|,  over directions
+d_i spread evenly over the half sphere about the normal n, which faces away from the head. So a card
+that lies open on the head has 1. T is the transmittance of the ray: 0 through a body,
+(1 - alpha)^extinction through each card at the place that is met (Scheuermann 2004, section 5;
+Zhukov, Iones and Kronin 1998, ambient light under a uniform sky). With an extinction of 1 a card
+blocks as much light as it appears to; strands block more, see shading/ambient.py.
 
-All vertices share one set of axes. Along each axis every vertex has one ray, to that side to which
-its normal leans, and all rays are found together (see parallel_rays.py).
+All vertices share one set of axes. Along each axis every vertex has one ray, to the side to which
+its normal leans, and all rays are traced together (see parallel_rays.py).
 
-Limitations: alpha is taken from the nearest pixel. A body only holds back rays that enter it, so
-that roots which lie a little below the skin are not dark; its triangles must face outwards.
+Limitations: alpha is that of the nearest pixel. A body only blocks rays that enter it, so that
+roots a little below the skin are not dark; its triangles must face outwards.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ from .parallel_rays import crossings, point_grid
 from .sort import card_of_vertex
 from .steps import result_of
 
-#: What is nearer than this is met by nobody: cards that cross at a vertex. In extents of the cards.
+#: Minimum distance of what a ray meets, for cards that cross at a vertex. In extents of the cards.
 _NEAREST = 2.0e-4
-#: Optical depth of what is opaque: exp of its negative is 0 in float32.
+#: Optical depth of opaque texels: exp of its negative is 0 in float32.
 _OPAQUE = 100.0
 #: Directions at work at the same time; numpy lets other threads run most of the time.
 _THREADS = min(4, os.cpu_count() or 1)
@@ -47,15 +47,15 @@ _DIRECTIONS_PER_STEP = 8
 
 @dataclass(frozen=True)
 class CardOccluder:
-    """Cards that shade. alpha: (height, width) in [0, 1], row 0 the lowest; None is opaque."""
+    """Cards that occlude. alpha: (height, width) in [0, 1], row 0 the lowest; None: opaque."""
 
     mesh: CardMesh
     alpha: Floats | None = None
 
     @classmethod
     def of_surface(cls, surface: Surface, alpha: Floats | None) -> CardOccluder:
-        """A mesh that occluders and is not shaded: nothing is known of its cards. It is opaque
-        without UVs."""
+        """A mesh that occludes but is not shaded, so its cards' attributes are left empty. It is
+        opaque without UVs."""
         corners = surface.triangles.ravel()
         count = len(corners)
         uv = surface.corner_uv
@@ -82,8 +82,8 @@ def vertex_occlusion(
     """How open each vertex of `mesh` is, (vertex_count,) float32: 1 open, 0 enclosed.
 
     Args:
-        mesh: what is shaded; its own cards shade it when it is among the occluders.
-        occluders: cards of this groom, and of others by choice, all in one space.
+        mesh: the cards that are shaded; they occlude themselves if `mesh` is among the occluders.
+        occluders: cards of this groom, and optionally of others, all in one space.
         bodies: heads and whatever else lets no light through, in the same space.
     """
     return result_of(occlusion_steps(mesh, occluders, bodies, settings))
@@ -95,7 +95,7 @@ def occlusion_steps(
     bodies: Sequence[Surface],
     settings: CardOcclusionSettings,
 ) -> Generator[float, None, Floats]:
-    """As vertex_occlusion, some directions a step; each yields the fraction that is done."""
+    """As vertex_occlusion, some directions per step; yields the fraction that is done."""
     count = len(mesh.positions)
     if not count:
         return np.ones(0, np.float32)
@@ -116,7 +116,7 @@ def occlusion_steps(
 
 
 def extent_of(*meshes: CardMesh) -> float:
-    """The diagonal of cards' bounds [m], in which distances are given in the settings."""
+    """The diagonal of cards' bounds [m], the unit of distances in the settings."""
     positions = np.concatenate([mesh.positions for mesh in meshes])
     return float(np.linalg.norm(np.ptp(positions, axis=0)))
 
@@ -137,7 +137,7 @@ class _Triangles:
     """Triangles that parallel rays may meet.
 
     corners: (3, 3, triangle_count) float32 [m], corner by corner, coordinates first.
-    height: of a typical one [m].
+    height: of a typical triangle [m].
     """
 
     def __init__(self, positions: Floats, triangles: Ints, middle: Floats) -> None:
@@ -151,10 +151,10 @@ class _Triangles:
 class _Layer:
     """The cards of one occluder.
 
-    texel: (triangle_count, 6) float32 where the texture is at each triangle's first corner, and
-        how far from there it is at the others, in pixels, x and y.
+    texel: (triangle_count, 6) float32 place in the texture of each triangle's first corner, and
+        offsets of the others from it, x and y in pixels.
     depth: (height, width) float32, optical depth.
-    card: (triangle_count,); -1 where the shaded vertices are of no card of this occluder.
+    card: (triangle_count,); -1 if the shaded vertices belong to another mesh.
     """
 
     def __init__(self, occluder: CardOccluder, middle: Floats, is_own: bool) -> None:
@@ -181,7 +181,8 @@ class _Layer:
 
 @dataclass(frozen=True)
 class _Distances:
-    """From where to where along a ray cards and bodies occlude, and own cards from `own` on [m]."""
+    """Range along a ray in which cards and bodies occlude, and from where on a vertex's own card
+    does [m]."""
 
     nearest: float
     reach: float
@@ -191,14 +192,14 @@ class _Distances:
     def of(cls, settings: CardOcclusionSettings, extent: float, whole: float) -> Self:
         """Args:
         extent: of the cards that are shaded [m].
-            whole: of these and all that shade them.
+            whole: of these and all occluders.
         """
         own = settings.self_occlusion_distance * extent
         return cls(_NEAREST * extent, settings.reach * whole, own)
 
 
 class _Scene:
-    """What is shaded and what occluders, made ready for one axis after the other."""
+    """The shaded vertices and the occluders, prepared for one axis after the other."""
 
     def __init__(
         self,
@@ -286,7 +287,7 @@ class _Rays:
         return total
 
     def _met(self, corners: Floats, height: float, distances: _Distances) -> Iterator[_Met]:
-        """All that rays meet ahead of them within the reach, in portions."""
+        """All triangles that rays meet ahead within the reach, in portions."""
         if not len(self.vertex):
             return
         first, second, third = corners[:, 2]
@@ -306,7 +307,8 @@ class _Rays:
 
 
 def _frame(axis: Floats) -> Floats:
-    """Rows: two directions across the axis, and the axis, right-handed, (3, 3) float32."""
+    """Rows: two directions perpendicular to the axis, and the axis, right-handed, (3, 3)
+    float32."""
     aside = np.eye(3)[int(np.argmin(np.abs(axis)))]
     across = np.cross(aside, axis)
     across /= np.linalg.norm(across)

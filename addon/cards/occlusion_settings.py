@@ -9,7 +9,7 @@ from ..params import Settings, integer, number, toggle
 
 @dataclass(frozen=True, kw_only=True)
 class CardOcclusionSettings(Settings):
-    """How hair and the body shade the vertices of cards from the light of all sides."""
+    """How hair and the body occlude light from all sides at the vertices of cards."""
 
     section = "card_occlusion"
     title = "Card Occlusion"

@@ -1,13 +1,13 @@
 """Cards begin on the skin, and those of few rows do not run through it.
 
-A card runs along the mean of its strands. Their roots lie around it on a skin that curves away on
-all sides, so that their mean lies under it, and a card that rises as slowly as combed hair does
-would come out of it a finger's breadth later: a parting would be bare. What of a card's first
-piece lies under the skin is put onto it.
+A card runs along the mean of its strands. Their roots lie on a skin that curves away on all sides,
+so their mean lies under the skin, and a card that rises as slowly as combed hair would come out a
+finger's breadth later: a parting would be bare. So vertices near a card's root that lie under the
+skin are put onto it.
 
-A coarser card is straight between its rows, while the skin bulges out between them: it would sink
-in there, and a parting would grow bald from level to level. Both rows are raised by as much as
-what lies between them is under the skin.
+A coarser card is straight between its rows, while the skin bulges out between them: the card would
+sink in there, and a parting would grow bald from level to level. So both rows are raised by the
+depth of the places between them under the skin.
 """
 
 from __future__ import annotations
@@ -21,13 +21,14 @@ from ..strands import Surface
 from ..strands.closest_point import search_of
 from .card_mesh import CardMesh
 
-#: How far along a card its vertices are put onto the skin.
+#: Up to this place along a card its vertices are put onto the skin.
 _FIRST = 0.2
-#: How high above the skin they are put, as a fraction of the usual width of a card there.
+#: Height above the skin at which they are put, as a fraction of the median width of cards at the
+#: root.
 _CLEARANCE = 0.02
-#: What lies deeper than cards are usually wide is no beginning of a card.
+#: Vertices deeper than this under the skin, in the same unit, are left where they are.
 _DEEPEST = 1.0
-#: Places on an edge that are looked at.
+#: Places on an edge that are tested.
 _BETWEEN = (0.25, 0.5, 0.75)
 
 
@@ -36,7 +37,7 @@ def on_skin(mesh: CardMesh, head: Surface | None, width: float) -> CardMesh:
 
     Args:
         head: in the space of the cards; None leaves them as they are.
-        width: that cards usually have [m].
+        width: median width of cards at the root [m].
     """
     near = np.flatnonzero(mesh.along < _FIRST)
     if head is None or not len(near) or not len(head.triangles):
@@ -75,7 +76,8 @@ def above_skin(mesh: CardMesh, head: Surface | None, width: float) -> CardMesh:
 
 
 def _under(head: Surface, places: Floats, width: float) -> tuple[Floats, Floats, Bools]:
-    """The skin next to places, its normals there, and which places are under it or hardly above."""
+    """The closest points on the skin, its normals there, and which places are under it or hardly
+    above."""
     places = places.astype(np.float64)
     found = search_of(head).closest(places, reach=_DEEPEST * width)
     normal = head.vertex_normals()[head.triangles[found.triangle]]

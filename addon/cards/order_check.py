@@ -1,13 +1,14 @@
-"""How often cards are drawn in a wrong order: the four passes of Scheuermann 2004, by hand.
+"""How often cards are drawn in a wrong order, by a simulation of the four passes of Scheuermann
+2004.
 
-A pixel is wrong where the four passes, drawing the triangles in the order at hand, give it another
-colour than all its fragments from the farthest to the nearest, with a random colour for each
-card: by more than 1/255 in any channel. So every wrong pair counts that could be seen at all, and
-none that lies behind opaque hair, behind the head, or where one of the two is clear. The fraction
-is of the pixels that hair covers.
+A pixel is wrong if the four passes, drawing the triangles in the given order with a random colour
+for each card, give it another colour than blending all its fragments from the farthest to the
+nearest: by more than 1/255 in any channel. So every visible wrong pair counts, and none behind
+opaque hair, behind the head, or with a transparent fragment. The fraction is of the pixels that
+hair covers.
 
-The passes: opaque pixels with a depth test; then, of what is not hidden by them or by the head,
-back faces, and last front faces, which write their depth, so that farther ones that come too late
+The passes: opaque pixels with a depth test; then, of fragments that neither these nor the head
+hide, back faces, and last front faces, which write their depth, so that farther ones drawn later
 are lost.
 """
 
@@ -32,18 +33,18 @@ from .order_views import (
     view_directions,
 )
 
-#: Two colours that differ by more can be distinguished in 8 bits.
+#: Colours that differ by more can be distinguished in 8 bits.
 VISIBLE = 1.0 / 255.0
-#: Without a texture, cards cover this much everywhere.
+#: Alpha of cards without a texture.
 _PLAIN_ALPHA = 0.5
-#: Of the eye from the middle of the hair, in radii of the hair.
+#: Distance of the eye from the middle of the hair, in radii of the hair.
 _DISTANCE = 5.0
 
 
 @dataclass(frozen=True)
 class SeenCards:
-    """What a view sees of the cards: in each pixel fragments one after the other, the farthest
-    first, none hidden by opaque ones or the head. alpha: (fragment_count,), 1 for opaque ones.
+    """Visible fragments of the cards in a view, pixel by pixel, the farthest first, without those
+    that opaque ones or the head hide. alpha: (fragment_count,), 1 for opaque ones.
     """
 
     met: Fragments
@@ -64,8 +65,8 @@ def wrong_fraction(
 
     Args:
         front, back: (triangle_count,) triangles in the order in which front and back faces are
-            drawn. Without front the order of the mesh, without back the same for both.
-        alpha: (height, width) of the cards' texture; None takes half covered cards.
+            drawn. Without front: the order of the mesh; without back: the same for both.
+        alpha: (height, width) of the cards' texture; None: 0.5 everywhere.
         size: of the views, pixels across; the eye is 5 radii of the hair away.
     """
     front = np.arange(len(mesh.triangles)) if front is None else front
@@ -79,7 +80,7 @@ def wrong_fraction(
 
 
 def views_of(mesh: CardMesh, count: int, size: int) -> list[BallView]:
-    """Views around the head, other ones than those that the order is learnt from."""
+    """Views around the head, different from those that the order is learnt from."""
     middle, radius = sphere_of(mesh)
     turned = view_directions(count, turn=0.5)
     return [BallView(middle, radius, each, size, _DISTANCE * radius) for each in turned]
@@ -88,7 +89,7 @@ def views_of(mesh: CardMesh, count: int, size: int) -> list[BallView]:
 def seen_cards(
     mesh: CardMesh, head: Surface | None, view: BallView, alpha: Floats | None = None
 ) -> SeenCards:
-    """What this view sees; the texture's nearest texel counts."""
+    """The visible fragments of a view; alpha is that of the nearest texel."""
     met = fragments(view, mesh.positions, mesh.triangles)
     met = met[met.near > nearest(view, head)[met.pixel]]
     if alpha is None:
@@ -98,7 +99,7 @@ def seen_cards(
     hidden = np.full(view.size * view.size, -np.inf, np.float32)
     is_opaque = covers >= OPAQUE_ALPHA
     np.maximum.at(hidden, met.pixel[is_opaque], met.near[is_opaque])
-    # of opaque ones at one depth the first is drawn
+    # of opaque fragments at one depth the first is drawn
     is_seen = (covers >= MIN_ALPHA) & (met.near >= hidden[met.pixel])
     met, covers = met[is_seen], np.where(is_opaque, 1.0, covers)[is_seen]
     order = np.lexsort((met.near, met.pixel))
@@ -125,11 +126,11 @@ def _places(order: Ints) -> Ints:
 
 
 def _blended(seen: SeenCards, color: Floats, order: Ints, is_written: Bools) -> Floats:
-    """The colour of each pixel, (covered_count, 3), fragment over fragment in this order.
+    """The colour of each pixel, (covered_count, 3), fragments blended in this order.
 
     Args:
-        order: (fragment_count,), those of a pixel one after the other.
-        is_written: (fragment_count,) whose depth hides farther ones that come later.
+        order: (fragment_count,), pixel by pixel.
+        is_written: (fragment_count,) whether a fragment's depth hides farther ones that come later.
     """
     pixel = seen.met.pixel[order]
     starts = np.flatnonzero(np.diff(pixel, prepend=-1))

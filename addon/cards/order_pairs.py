@@ -27,8 +27,8 @@ from .order_views import (
     view_directions,
 )
 
-#: What cards without a texture are taken to cover. More would see too few of the layers, less those
-#: that hardly show.
+#: Alpha of cards without a texture. More would show too few layers, less would show layers that
+#: hardly count.
 OPACITY = 0.4
 #: A pair that changes its pixel's colour by less than this fraction is left out.
 MIN_WEIGHT = 0.004
@@ -62,10 +62,10 @@ _NAMES = ("behind", "before", "weight", "facing")
 def pairs_by_view(
     mesh: CardMesh, head: Surface | None, view_count: int, size: int, alpha: Floats | None = None
 ) -> Iterator[Pairs]:
-    """What each of many parallel views around the head sees, `size` pixels across.
+    """The pairs in each of many parallel views around the head, `size` pixels across.
 
     Args:
-        alpha: (height, width) of the cards' texture; None takes cards that cover evenly.
+        alpha: (height, width) of the cards' texture; None: OPACITY everywhere.
     """
     if alpha is not None:
         _, radius = sphere_of(mesh)
@@ -75,7 +75,7 @@ def pairs_by_view(
         both_directions = _both_directions(mesh, head, direction, size, alpha)
         return all_pairs([pairs_of(met, covers) for met, covers in both_directions])
 
-    # few at a time: who ends the work, or Blender, waits for those that have begun
+    # few at a time: ending the work, or Blender, waits for the views that have begun
     with ThreadPoolExecutor(_THREADS) as threads:
         begun: deque[Future[Pairs]] = deque()
         for direction in view_directions(view_count):
@@ -87,15 +87,15 @@ def pairs_by_view(
 
 
 def all_pairs(found: Sequence[Pairs]) -> Pairs:
-    """Those of some views together, one at least."""
+    """The pairs of some views in one, of at least one."""
     return Pairs(*(np.concatenate([getattr(one, name) for one in found]) for name in _NAMES))
 
 
 def _both_directions(
     mesh: CardMesh, head: Surface | None, direction: Floats, size: int, alpha: Floats | None
 ) -> Iterator[tuple[Fragments, Floats]]:
-    """What is seen from there and, unless that is from too far below, from the opposite side; and
-    how much it covers.
+    """The fragments seen from this direction and, unless too far below, from the opposite one; and
+    their alpha.
 
     Parallel views from opposite sides have the same fragments in opposite order.
     """
@@ -127,13 +127,13 @@ def _both_directions(
 
 
 def pairs_of(met: Fragments, covers: Floats) -> Pairs:
-    """All pairs of fragments that share a pixel, as far in as it matters.
+    """All pairs of fragments that share a pixel, down to MIN_WEIGHT.
 
-    Exchanging two changes the colour by the difference of theirs times what both cover and what all
-    others that lie before the farther one let through.
+    Exchanging two fragments changes the pixel by the difference of their colours times both alphas
+    and the transmittance of all other fragments before the farther one.
 
     Args:
-        met: those of a pixel one after the other, the farthest first.
+        met: pixel by pixel, the farthest first.
         covers: (fragment_count,) below 1.
     """
     count = len(met.pixel)
@@ -141,7 +141,7 @@ def pairs_of(met: Fragments, covers: Floats) -> Pairs:
     is_last[:-1] = met.pixel[1:] != met.pixel[:-1]
     ends = np.flatnonzero(is_last)
     in_front = np.repeat(ends, np.diff(ends, prepend=-1)) - np.arange(count)
-    # the logarithm of what all before a fragment let through
+    # logarithm of the transmittance of all fragments before each
     through = np.log1p(-covers.astype(np.float64)).cumsum()
     through = np.repeat(through[ends], np.diff(ends, prepend=-1)) - through
     found = [(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0))]

@@ -1,9 +1,9 @@
-"""The order that breaks the least of many preferences "this before that": linear ordering by
-insertion.
+"""The order that violates the least weight of many preferences "this before that": linear ordering
+by insertion.
 
-Each preference has a weight, and they may contradict each other. The problem is NP-hard; moving one
-thing after the other to where it breaks the least, until nothing moves, comes near the optimum in
-practice (Marti and Reinelt, "The Linear Ordering Problem", 2011, section 2: insertion
+Each preference has a weight, and preferences may contradict each other. The problem is NP-hard;
+moving one thing after the other to where it violates the least, until nothing moves, comes near the
+optimum in practice (Marti and Reinelt, "The Linear Ordering Problem", 2011, section 2: insertion
 neighbourhood).
 """
 
@@ -18,7 +18,7 @@ from ..arrays import Floats, Ints
 
 @dataclass(frozen=True)
 class Preferences:
-    """What is left of preferences when those that contradict each other cancel out.
+    """Net preferences, after contradictory ones have cancelled out.
 
     lower, higher: (pair_count,) two of `count` things, each pair once.
     weight: (pair_count,) above 0 where the lower number should come first, else below 0.
@@ -30,12 +30,13 @@ class Preferences:
     weight: Ints
 
     def broken(self, rank: Ints) -> int:
-        """Weight of the preferences that an order breaks. rank: (count,) of each thing."""
+        """Weight of the preferences that an order violates. rank: (count,) of each thing."""
         is_lower_first = rank[self.lower] < rank[self.higher]
         return int(np.abs(self.weight[is_lower_first != (self.weight > 0)]).sum())
 
     def of_whole(self, whole: Ints, count: int) -> Preferences:
-        """The same preferences for the `count` things that these are parts of, (self.count,)."""
+        """The same preferences for `count` larger things; `whole`, (self.count,), maps each thing
+        to its own."""
         is_lower_first = self.weight > 0
         before = np.where(is_lower_first, self.lower, self.higher)
         after = np.where(is_lower_first, self.higher, self.lower)
@@ -43,10 +44,10 @@ class Preferences:
 
 
 def net_preferences(count: int, before: Ints, after: Ints, weight: Ints) -> Preferences:
-    """`before` should come before `after`, each (pair_count,) of `count` things.
+    """Net preferences that `before` comes before `after`, each (pair_count,) of `count` things.
 
     Args:
-        weight: (pair_count,), not negative. A thing and itself have no order.
+        weight: (pair_count,), not negative. Pairs of a thing with itself are ignored.
     """
     is_pair = before != after
     before, after, weight = before[is_pair], after[is_pair], weight[is_pair]
@@ -61,14 +62,14 @@ def net_preferences(count: int, before: Ints, after: Ints, weight: Ints) -> Pref
 
 
 def min_broken(preferences: Preferences, start: Ints, max_moves: int = 20) -> Ints:
-    """The rank of each thing, (count,), in an order from which no single move is better.
+    """The rank of each thing, (count,), in an order that no single move improves.
 
-    A thing is looked at again when one that it is compared with has moved. Things without
-    preferences stay beside their neighbours in `start`.
+    A thing is tested again when one that it is compared with has moved. Things without preferences
+    stay beside their neighbours in `start`.
 
     Args:
         start: (count,) the things in the order that is improved.
-        max_moves: how often a thing is looked at, on average.
+        max_moves: maximum number of tests of a thing, on average.
     """
     place = np.empty(preferences.count)
     place[start] = np.arange(preferences.count)
@@ -90,7 +91,7 @@ def min_broken(preferences: Preferences, start: Ints, max_moves: int = 20) -> In
 
 
 def _better_place(own: float, places: Floats, weights: Ints) -> float | None:
-    """Between which of the others a thing breaks the least; None where it cannot be bettered.
+    """The place between others at which a thing violates the least; None if its own is as good.
 
     Args:
         weights: above 0 where the thing should come before the other.
@@ -108,7 +109,7 @@ def _better_place(own: float, places: Floats, weights: Ints) -> float | None:
 
 
 def _by_thing(preferences: Preferences) -> tuple[list[int], Ints, Ints]:
-    """Where the preferences of each thing begin, to which others, and their weights."""
+    """Preferences by thing: where each one's begin, the other things, and the weights."""
     one = np.concatenate([preferences.lower, preferences.higher])
     other = np.concatenate([preferences.higher, preferences.lower])
     weight = np.concatenate([preferences.weight, -preferences.weight])

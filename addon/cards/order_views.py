@@ -1,4 +1,4 @@
-"""What lies behind what in each pixel of a view, and how much of it cards cover by their texture.
+"""Fragments of cards by depth in each pixel of a view, and their alpha by the texture.
 
 Cards are triangles, sampled at pixel centres.
 """
@@ -13,23 +13,23 @@ from ..arrays import Bools, Floats, Ints, number_in_piece
 from ..strands import Surface
 from .card_mesh import CardMesh
 
-#: How far the elevations of views around a head reach [degrees]; few look at hair from below.
+#: Range of elevations of views around a head [degrees]; few look at hair from below.
 LOWEST, HIGHEST = -20.0, 65.0
-#: Points nearer to the eye than the rest of its distance from the middle count as behind it.
+#: Points beyond this fraction of the way from the middle to the eye count as behind it.
 _BEFORE_EYE = 0.99
-#: From this alpha on a pixel is opaque, and below the other it is clear: as in the passes.
+#: Alpha from which on a pixel is opaque, and below which it is transparent, as in the passes.
 OPAQUE_ALPHA, MIN_ALPHA = 0.99, 0.004
 _GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
 
 
 @dataclass(frozen=True)
 class BallView:
-    """A square picture that holds a sphere.
+    """A square picture that contains a sphere.
 
     middle: (3,) and radius: of the sphere [m].
     direction: (3,) unit vector from its middle towards the eye.
     size: pixels across.
-    distance: of the eye from the middle [m], more than the radius; infinite looks in parallel.
+    distance: of the eye from the middle [m], more than the radius; infinite: a parallel view.
     """
 
     middle: Floats
@@ -41,8 +41,8 @@ class BallView:
     def project(self, points: Floats) -> Floats:
         """(4, n) float32 of points (n, 3) [m]: x and y in pixels, nearness, scale.
 
-        Nearness grows towards the eye and is linear in the picture. So is the scale, by which a
-        point looks larger than one in the middle of the sphere; 0 behind the eye.
+        Nearness grows towards the eye and is linear in the picture. So is the scale, the size of a
+        point relative to one in the middle of the sphere; 0 behind the eye.
         """
         right = np.cross([0.0, 1.0e-3, 1.0], self.direction)
         right /= np.linalg.norm(right)
@@ -81,7 +81,7 @@ class Fragments:
 
 
 def view_directions(count: int, turn: float = 0.0) -> Floats:
-    """Unit vectors all around, evenly spread over the elevations of views of a head, (count, 3)."""
+    """Unit vectors all around, evenly spread over the range of elevations, (count, 3)."""
     number = np.arange(count) + 0.5
     low, high = np.sin(np.radians([LOWEST, HIGHEST]))
     up = low + (high - low) * ((number * _GOLDEN + turn) % 1.0)
@@ -90,7 +90,7 @@ def view_directions(count: int, turn: float = 0.0) -> Floats:
 
 
 def sphere_of(mesh: CardMesh) -> tuple[Floats, float]:
-    """Middle (3,) and radius [m] of a sphere that holds the cards."""
+    """Middle (3,) and radius [m] of a sphere that contains the cards."""
     low, high = (corner.astype(np.float64) for corner in mesh.bounds())
     return (low + high) / 2.0, max(float(np.linalg.norm(high - low)) / 2.0, 1e-9)
 
@@ -126,7 +126,7 @@ def fragments(view: BallView, positions: Floats, triangles: Ints) -> Fragments:
 
 
 def _candidates(corners: Floats, size: int) -> tuple[Ints, Ints, Ints]:
-    """Columns and rows of the pixels in the boxes around triangles, and whose they are, (n,)."""
+    """Columns and rows of the pixels in the triangles' boxes, and the triangle of each, (n,)."""
     low = np.clip(np.ceil(corners[:2].min(axis=1) - 0.5), 0, size).astype(np.int32)
     high = np.clip(np.floor(corners[:2].max(axis=1) - 0.5), -1, size - 1).astype(np.int32)
     width, height = np.maximum(high - low + 1, 0)
@@ -147,12 +147,13 @@ def nearest(view: BallView, surface: Surface | None) -> Floats:
 
 
 def far_to_near(met: Fragments) -> Fragments:
-    """Sorted by pixel, and in a pixel the farthest first; equally near ones keep their order."""
+    """Fragments sorted by pixel, and in a pixel the farthest first; equally near ones keep their
+    order."""
     return met[np.lexsort((met.near, met.pixel))]
 
 
 def alpha_at(mesh: CardMesh, met: Fragments, alpha: Floats) -> Floats:
-    """The nearest texel of each fragment, (fragment_count,); alpha: (height, width)."""
+    """Alpha of the nearest texel of each fragment, (fragment_count,); alpha: (height, width)."""
     first = 1.0 - met.second - met.third
     fractions = np.stack([first, met.second, met.third], axis=1)
     uv = np.einsum("nc,nci->ni", fractions, mesh.uv[mesh.triangles[met.triangle]])
@@ -163,10 +164,10 @@ def alpha_at(mesh: CardMesh, met: Fragments, alpha: Floats) -> Floats:
 
 
 def seen_from_afar(alpha: Floats, mesh: CardMesh, pixel: float) -> Floats:
-    """The alpha in texels that are about as large on the cards as a pixel of this many metres.
+    """The alpha with texels about as large on the cards as a pixel of this many metres.
 
-    Halved as often as the finest step above it, as mip maps are; their mean is what counts, since
-    thin strands of one texel each would be hit or missed at random.
+    It is halved like mip maps, to the last level whose texels are not larger than the pixel,
+    because samples would hit or miss thin strands of one texel at random.
     """
     texels = texels_per_metre(alpha, mesh) * pixel
     while texels >= 2.0 and min(alpha.shape) > 1:
@@ -177,14 +178,14 @@ def seen_from_afar(alpha: Floats, mesh: CardMesh, pixel: float) -> Floats:
 
 
 def texels_per_metre(alpha: Floats, mesh: CardMesh) -> float:
-    """On average over all cards."""
+    """Texels of the texture per metre, on average over all cards."""
     on_cards = _twice_area(mesh.positions[mesh.triangles])
     on_texture = _twice_area(mesh.uv[mesh.triangles]) * alpha.size
     return float(np.sqrt(on_texture / max(on_cards, 1e-30)))
 
 
 def _twice_area(corners: Floats) -> float:
-    """Of all triangles, (triangle_count, 3, 2 or 3)."""
+    """Doubled area of all triangles, (triangle_count, 3, 2 or 3)."""
     one, other = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     dot = np.einsum("ti,ti->t", one, other)
     squares = np.einsum("ti,ti->t", one, one) * np.einsum("ti,ti->t", other, other)

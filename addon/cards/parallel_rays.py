@@ -1,12 +1,13 @@
-"""Which triangles cover which points of a plane: parallel rays against triangles, all at once.
+"""Which triangles cover which points of a plane: intersection of parallel rays with triangles, all
+at once.
 
 Rays of one direction, seen along it, are points, and a ray meets a triangle where the triangle
-covers its point. The points lie in a grid of cells, row by row, so that those between two columns
-of one row follow each other. A triangle is cut into the rows that it crosses, as a rasteriser cuts
-it into scan lines, and in each of them takes the points between its own left and right end there.
+covers its point. The points are sorted into a grid of cells, row by row, so that those between two
+columns of one row are consecutive. A triangle is cut into the rows that it crosses, as a rasteriser
+cuts it into scan lines, and in each row tests the points between its left and right end there.
 
-Coordinates come first in all arrays, and what belongs to one pair is read at once: most of the
-time goes into reading from memory.
+Coordinates come first in all arrays, and the data of a pair are read together: most of the time
+goes into reading from memory.
 """
 
 from __future__ import annotations
@@ -18,13 +19,13 @@ import numpy as np
 
 from ..arrays import Floats, Ints, piece_starts
 
-#: Cells at most: so their numbers fit 16 bits, which numpy sorts fastest; and rows of them.
+#: Maximum number of cells, whose numbers thus fit 16 bits, which numpy sorts fastest; and of rows.
 _MAX_CELLS, _MAX_ROWS = 1 << 16, 250
 #: Rows that a triangle of typical height crosses.
 _ROWS_PER_TRIANGLE = 3.0
 #: Pairs of points and triangles tested at once: they stay in the processor's cache.
 _CHUNK = 1 << 15
-#: A rise of less than this is level, in rows.
+#: Edges that rise by less than this count as level, in rows.
 _LEVEL = 1.0e-6
 
 
@@ -32,9 +33,9 @@ _LEVEL = 1.0e-6
 class PointGrid:
     """Points of a plane sorted by their cells.
 
-    order: (n,) where each of the sorted points was before.
+    order: (n,) index of each sorted point before sorting.
     places: (n, 2) float32, the sorted points.
-    starts: (row_count * column_count + 1,) the first sorted point of each cell.
+    starts: (row_count * column_count + 1,) index of the first sorted point of each cell.
     low, cell: (2,) float32, the lowest corner, and width and height of a cell.
     """
 
@@ -49,7 +50,7 @@ class PointGrid:
 
 @dataclass(frozen=True)
 class Crossings:
-    """Points and the triangles that hold them, in pairs.
+    """Pairs of a point and a triangle that contains it.
 
     point, triangle: (m,) indices into the places before sorting, and into the triangles.
     second, third: (m,) float32, barycentric coordinates of the triangle's second and third corner.
@@ -66,7 +67,7 @@ def point_grid(places: Floats, triangle_height: float) -> PointGrid:
 
     Args:
         places: (2, n) float32, at least one.
-        triangle_height: how high a typical triangle is, in the unit of the places.
+        triangle_height: of a typical triangle, in the unit of the places.
     """
     low = places.min(axis=1)
     width, height = np.maximum(places.max(axis=1) - low, 1e-9)
@@ -84,7 +85,7 @@ def point_grid(places: Floats, triangle_height: float) -> PointGrid:
 
 
 def crossings(grid: PointGrid, corners: Floats) -> Iterator[Crossings]:
-    """All points that lie in triangles, in portions; triangles without area hold none.
+    """All points that lie in triangles, in portions; triangles without area contain none.
 
     Args:
         corners: (3, 2, triangle_count) float32, corner by corner.
@@ -102,7 +103,8 @@ def crossings(grid: PointGrid, corners: Floats) -> Iterator[Crossings]:
 
 
 def _spans(grid: PointGrid, corners: Floats) -> tuple[Ints, Ints, Ints]:
-    """(triangle, first sorted point, how many) for each row of cells that a triangle crosses."""
+    """(triangle, first sorted point, number of points) for each row of cells that a triangle
+    crosses."""
     x, y = np.moveaxis((corners - grid.low[:, None]) / grid.cell[:, None], 1, 0)
     lowest, highest = _least(y), _greatest(y)
     first = np.clip(lowest, 0, grid.row_count).astype(np.int64)
@@ -132,7 +134,7 @@ def _greatest(corners: Floats) -> Floats:
 def _ends_in_row(x: Floats, y: Floats, triangle: Ints, row: Floats) -> tuple[Floats, Floats]:
     """Left and right end of the part of each triangle that lies between y = row and row + 1.
 
-    x, y: (3, triangle_count) in cells. Each edge gives the ends of its own part in there.
+    x, y: (3, triangle_count) in cells. Each edge contributes the ends of its part in the row.
     """
     left = np.full(len(row), np.inf, np.float32)
     right = np.full(len(row), -np.inf, np.float32)

@@ -1,4 +1,4 @@
-"""Into how many segments a strip is cut: as few as the allowed error asks for."""
+"""The number of segments of a strip: as few as the allowed error permits."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ def tried_segments(most: int) -> Ints:
 
 
 def segment_errors(strips: Strips, most: int) -> Floats:
-    """How far the edges stray with each of `tried_segments`, (card_count, tried) float32 [m].
+    """Deviation of the edges with each of `tried_segments`, (card_count, tried) float32 [m].
 
-    That is the largest distance of a CV's row from the cut strip at the same place along it; that
-    a place slides along the strip does not count. With `most` segments it is 0: there is no finer
-    way. Never more than with fewer segments.
+    This is the largest distance of a CV's row from the cut strip at the same place along it,
+    without the part along the strip. With `most` segments it is 0, as nothing finer is tried. It is
+    never larger than with fewer segments.
     """
     edges, tried = edges_of(strips), tried_segments(most)
     tangent = strips.frames.tangent[:, :, None]
@@ -40,7 +40,7 @@ def fewest_segments(errors: Floats, error: float, most: int) -> Ints:
     """The fewest segments with which each strip stays within `error` [m], (card_count,) int32.
 
     Args:
-        errors: what `segment_errors` found with the same `most`.
+        errors: from `segment_errors` with the same `most`.
     """
     fits = errors <= error
     fits[:, -1] = True

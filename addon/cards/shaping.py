@@ -1,7 +1,7 @@
-"""Cards under an artist's hands: wider, twisted, on another tile; and a card along a drawn line.
+"""Edits of cards: widening, twisting, another tile; and a card along a drawn line.
 
-A row is what of a card lies at one place of the way from root to tip. Its middle is halfway between
-its outermost vertices; there it is widened and twisted.
+A row is the vertices of a card at one place from root to tip. Its middle is halfway between its
+outermost vertices; it is widened and twisted about that.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from .strip import Strips, UncutCards, card_frames, strip_mesh, taper
 
 #: Places along a card that are nearer to each other than this part of it are one row.
 _SAME_ROW = 1.0e-3
-#: A line that begins farther from the skin than this part of its length stays where it is drawn.
+#: A line that begins farther from the skin than this part of its length is not moved.
 _NEAR_SKIN = 0.25
 _SHORTEST = 1.0e-12
 
@@ -49,7 +49,7 @@ class CardVertices:
         return along
 
     def widened(self, root: float, tip: float) -> Floats:
-        """Positions with rows that are wider by these factors, evenly from root to tip."""
+        """Positions with rows widened by factors that change linearly from root to tip."""
         along = self.along
         middle, _ = self._middles(along)
         factor = root + (tip - root) * along
@@ -57,7 +57,8 @@ class CardVertices:
         return wider
 
     def twisted(self, angle: float) -> Floats:
-        """Positions with rows turned about the card: not at the root, by `angle` [rad] at the tip.
+        """Positions with rows turned about the card's axis: by 0 at the root to `angle` [rad] at
+        the tip.
 
         Rodrigues' formula.
         """
@@ -89,7 +90,7 @@ class CardVertices:
 
 
 def tile_shift(grid: AtlasGrid, tile: Ints, wanted: Ints) -> Floats:
-    """By how much UVs go from tiles to others, (n, 2)."""
+    """Offset of UVs from tiles to wanted ones, (n, 2)."""
     nothing = np.zeros(1)
     return grid.uv(wanted, nothing, nothing) - grid.uv(tile, nothing, nothing)
 
@@ -118,10 +119,10 @@ def card_along(
 
 
 def from_root(line: Floats, head: Surface | None) -> tuple[Floats, Floats]:
-    """A line from its root on, and the normal of the skin there.
+    """A line that starts at its root, and the normal of the skin there.
 
-    The end that is nearer to the skin is the root. Where it is near enough it is moved onto the
-    skin, and the line with it, ever less towards the tip.
+    The end nearer to the skin is the root. If it is near enough, it is moved onto the skin, and the
+    line with it, ever less towards the tip. Without a skin the higher end is the root.
 
     Args:
         line: (point_count, 3) [m], in the space of the head.

@@ -1,4 +1,4 @@
-"""What short hair is like from place to place: what its shells are shaped by."""
+"""Short hair from place to place: its shape, occlusion and colour, from which shells are made."""
 
 from __future__ import annotations
 
@@ -10,16 +10,17 @@ from ..arrays import Floats
 from ..strands import StrandSet
 from ..strands.nearest import nearest_points
 
-#: Beyond all colours, where a strand has none of its own.
+#: Value beyond all colours, for strands without one of their own.
 _NO_COLOR = 4.0
-#: Strands that the shape of hair is learnt from; neighbours by which it is known how long hair is
-#: at a place, and what it is like there. Nine tenths of them are no longer than the shells.
+#: Maximum number of strands that the hair is learnt from; numbers of neighbours that give the
+#: length of hair at a place, and its other properties; quantile of the neighbours' lengths that
+#: shells reach.
 _MAX_LEARNT, _NEIGHBOURS, _LIKE, _LONGEST = 20_000, 24, 12, 0.97
 
 
 def between(values: Floats, along: Floats) -> Floats:
-    """Values (n, cv_count, c) of CVs at parts (n, m) of their way, (n, m, c); beyond 1 they go
-    on as they end."""
+    """Values (n, cv_count, c) of CVs interpolated at parts (n, m) of the strands, (n, m, c);
+    extrapolated beyond 1."""
     place = along * (values.shape[1] - 1)
     low = np.clip(place.astype(np.int64), 0, values.shape[1] - 2)
     rows = np.arange(len(values))[:, None]
@@ -30,12 +31,11 @@ def between(values: Floats, along: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class ShortHair:
-    """Strands by the length that hair has around each: from the skin to the outermost layer.
+    """Strands over the length of the hair around each: from the skin to the outermost layer.
 
     roots: (n, 3) [m]. shift: (n, 2 layers + 1, 3) [m] from there, at the borders and middles of the
-    slabs. occlusion: (n, layers) in their middles, not a
-    number beyond the tip. reach: (n,) how long hair is there [m].
-    hue: (n, 3) the colour as an eye tells it apart; beyond all colours where it is the look's.
+    slabs. occlusion: (n, layers) in their middles, NaN beyond the tip. reach: (n,) length of the
+    hair there [m]. hue: (n, 3) the perceived colour; sqrt(_NO_COLOR) where it is the look's.
     """
 
     roots: Floats
@@ -54,7 +54,7 @@ class ShortHair:
         near = nearest_points(grid[:, 0], grid[:, 0], _NEIGHBOURS)[0]
         reach = np.quantile(length[near], _LONGEST, axis=1)
         station = np.linspace(0.0, 1.0, 2 * layers + 1)
-        # what is shorter goes on as it ends
+        # shorter strands are extrapolated
         along = np.minimum((reach / length)[:, None] * station, 2.0)
         shift = between(grid, along) - grid[:, :1]
         light: Floats = np.ones((len(chosen), layers))
@@ -68,13 +68,13 @@ class ShortHair:
         return cls(grid[:, 0], shift, light, reach, np.sqrt(np.maximum(hue, 0.0)))
 
     def around(self, places: Floats) -> ShortHair:
-        """What hair is like around places (m, 3)."""
+        """The mean hair around places (m, 3)."""
         near = nearest_points(places, self.roots, _LIKE)[0]
         shift, reach, hue = (part[near].mean(axis=1) for part in (self.shift, self.reach, self.hue))
         there = self.occlusion[near]
         reaches = np.isfinite(there)
         total = np.where(reaches, there, 0.0).sum(axis=1)
         light = total / np.maximum(reaches.sum(axis=1), 1)
-        # where none reaches, it is as open as hair is outermost
+        # where no neighbour reaches, as open as the most open one
         light = np.where(reaches.any(axis=1), light, np.nanmax(there, axis=(1, 2))[:, None])
         return ShortHair(places, shift, light, reach, hue)

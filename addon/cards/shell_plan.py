@@ -1,19 +1,18 @@
-"""What the atlas of shells shows: patterns, each with a tile for every layer.
+"""The plan of the atlas of shells: patterns, each with a tile for every layer.
 
-A texture of its own for all skin would need more than 4,096 texels a side on any head: strands are
-a tenth of a millimetre wide, and there is a layer for each slab. So a few patches of skin stand
-for all: k-medoids over how long, how upright, and of which colour hair is there. A tile shows the
-strands that grow on and around such a patch, each layer their pieces within its slab, as they are
-seen from straight above. A strand's pieces follow one another from layer to layer, so that from
-above the layers show the strands themselves. At the hairline patches show fewer strands of a
-pattern.
+A unique texture for all skin would need more than 4,096 texels a side on any head: strands are a
+tenth of a millimetre wide, and there is a layer for each slab. So a few patches of skin represent
+all: k-medoids over the length, uprightness and colour of the hair there. A pattern's tiles show the
+strands that grow on and around such a patch, each layer's tile their pieces within its slab, seen
+from straight above. A strand's pieces continue from layer to layer, so that from above the layers
+show the strands themselves. At the hairline patches show patterns with fewer strands.
 
-Of sparse hair few strands grow on a patch, some more or fewer by chance. So a pattern gets as many
-as grow on the same area of all patches that show it, and its strands the width by which they
+In sparse hair few strands grow on a patch, and their number varies by chance. So a pattern gets as
+many strands as grow on the same area of all patches that show it, with the width at which they
 cover as much there.
 
-A piece that stands upright is a dot from above and a line from the side. A layer shows it by a
-length between the two.
+An upright piece is a dot from above and a line from the side. A layer shows it with a length
+between the two.
 """
 
 from __future__ import annotations
@@ -33,38 +32,41 @@ from .bake_strands import FlatStrands, strand_ids
 from .shell_hair import ShortHair, between
 from .shell_skin import ShellSkin
 
-#: Patterns of whole hair; with less than these fractions of the usual strands a patch shows a
-#: thinner one, with as many as grow on such patches.
+#: Number of patterns of full hair; fractions of the usual density of strands below which a patch
+#: shows one of the thinner patterns, which are as dense as such patches.
 _PATTERNS, _BORDERS = 4, (0.8, 0.45)
-#: Fewer strands than expected are none by chance from this many standard deviations on.
+#: A patch counts as thin if it lacks more strands than this many standard deviations of the
+#: expected number.
 _BY_CHANCE = 2.0
-#: How far around a patch strands are taken, as a fraction of its tile; strands of a tile at most.
+#: Margin around a patch from which strands are taken, as a fraction of its tile; maximum strands of
+#: a tile.
 _AROUND, _MAX_STRANDS = 0.15, 2500
-#: Cells of a tile along each side in which one counts how much of it patches show; and points of a
-#: triangle, along each side.
+#: Cells along each side of a tile for counting how much of it patches show; and sample points along
+#: each side of a triangle.
 _SEEN_CELLS, _SEEN_POINTS = 8, 4
-#: Cells of a tile along each side, at most, of which empty ones are filled from others; and the
-#: strands that a cell should hold, so that chance leaves none empty.
+#: Maximum number of cells along each side of a tile, of which empty ones are filled from others;
+#: and strands that a cell should hold, so that none is empty by chance.
 _MAX_CELLS, _PER_CELL = 5, 16.0
-#: A texel is this fraction of a strand's width.
+#: Texels across a strand's width.
 _STRAND_TEXELS = 1.5
-#: How much wider strands are than drawn, of what cards have.
+#: Factor on the strand width of cards.
 _WIDER = 0.9
-#: Hair lies where the sine of its angle to the skin is smaller.
+#: Hair lies flat where the sine of its angle to the skin is below this.
 _FLAT = 0.6
-#: A difference of colour that counts like hair twice as long: of square roots of linear colours.
+#: Difference of perceived colour that counts as much as hair twice as long: of square roots of
+#: linear colours.
 _HUE = 0.15
 _TINY = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
 class Patches:
-    """Pieces of skin. Each array has a row a patch.
+    """Pieces of skin. Each array has one row per patch.
 
     center: (n, 3) [m]. axes: (n, 3, 3) unit vectors: across hair, along it within the skin, and
-    the normal; right-handed. extent: how far it goes from its center [m]. area: [m^2].
-    features: (n, k) of the hair, by which patches are alike. surface: all of them, and of_triangle
-    the patch of each of its triangles.
+    the normal; right-handed. extent: its reach from the center [m]. area: [m^2].
+    features: (n, k) of the hair, which measure similarity. surface: all patches, and of_triangle
+        the patch of each of its triangles.
     """
 
     center: Floats
@@ -79,7 +81,8 @@ class Patches:
     def of(
         cls, skin: ShellSkin, of_triangle: Ints, hair: ShortHair, vertex: Ints, patch: Ints
     ) -> tuple[Patches, Floats]:
-        """The patches, and the places of their vertices in their planes, (len(vertex), 2) [m]."""
+        """The patches, and the places of their vertices in the patches' planes, (len(vertex), 2)
+        [m]."""
         count = int(of_triangle.max()) + 1
 
         def mean(values: Floats) -> Floats:
@@ -118,19 +121,21 @@ class Patches:
 
 @dataclass(frozen=True, eq=False)
 class ShellPlan:
-    """All that the bake needs beside the strands' points and radii.
+    """What the bake needs beside the strands' points and radii.
 
     grid: how the atlas is divided; a pattern's layers are tiles one after another. size: of the
     atlas [pixels]. half: half of the side of the square that a tile shows [m].
-    features: (pattern_count, k) of whole patterns, see `Patches`; thinned: the pattern of which two
-    more show fewer strands, or None.
-    center: (pattern_count, 3), axes: (pattern_count, 3, 3), reach: (pattern_count,) [m] how long
-    hair is there.
-    strands, pattern: (n,) which strands each pattern shows. shift: (n, 2) how far aside [m].
+    features: (pattern_count, k) of whole patterns, see `Patches`; thinned: the pattern that the
+        thinner patterns derive from, or None.
+    center: (pattern_count, 3), axes: (pattern_count, 3, 3), reach: (pattern_count,) [m] length of
+        the hair there.
+    strands, pattern: (n,) strands and the patterns that show them. shift: (n, 2) within the tile
+        [m].
     thickness: (pattern_count,) factor of the radii.
-    density: of roots on most patches [1/m^2]. roots: by which it is known of others, (m, 3) [m].
+    density: median density of roots on patches [1/m^2]. roots: (m, 3) [m], which give the density
+        on other patches.
     is_flat: whether hair lies rather than stands.
-    notes: what the artist should know.
+    notes: for the artist.
     """
 
     grid: AtlasGrid
@@ -165,7 +170,7 @@ def _pattern_of(patches: Patches, features: Floats, step: Ints) -> Ints:
 
 
 def _thin_steps(patches: Patches, patch_of_root: Ints, density: float) -> Ints:
-    """How many of _BORDERS each patch is below, (patch_count,)."""
+    """Number of _BORDERS that each patch's density is below, (patch_count,)."""
     count = np.bincount(patch_of_root, minlength=len(patches.area))
     expected = density * patches.area
     is_thin = count < expected - _BY_CHANCE * expected**0.5
@@ -252,9 +257,9 @@ def _usual_density(patches: Patches, patch_of_root: Ints) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Grown:
-    """What grows on all patches that show a pattern, (pattern_count,) each.
+    """Hair on all patches that show a pattern, (pattern_count,) each.
 
-    density: of roots [1/m^2]. cover: area of strands, were they flat, over that of skin.
+    density: of roots [1/m^2]. cover: area of strands, laid flat, over that of skin.
     """
 
     density: Floats
@@ -267,8 +272,8 @@ class _Grown:
         skin = np.bincount(shows, patches.area, count)
         pattern = shows[patch_of_root]
         roots, area = np.bincount(pattern, minlength=count), np.bincount(pattern, covers, count)
-        # a pattern that no patch of this level shows, or without a root, is as thin as patches are
-        # that just need one
+        # a pattern that no patch of this level shows, or without a root, gets the density of the
+        # last border
         thin = len(covers) / patches.area.sum() * _BORDERS[-1]
         has_any = (skin > 0.0) & (roots > 0)
         skin = np.where(has_any, skin, 1.0)
@@ -297,7 +302,7 @@ def _shown(
     root_normal: Floats,
     random: np.random.Generator,
 ) -> _Shown:
-    """Strands around a patch, as many as the density asks for; usual: of hair that is whole."""
+    """Strands around a patch, as many as the density gives; usual: density of full hair."""
     axes, away = patches.axes[patch], roots - patches.center[patch]
     place, reach = away @ axes[:2].T, (1.0 + _AROUND) * half
     is_near = (np.abs(place) <= reach).all(axis=1)
@@ -340,7 +345,7 @@ def _seen_cover(
 
 
 def _in_cells(place: Floats, values: Floats) -> Floats:
-    """The sum of values in each cell of a tile; places from -1 to 1 along both sides."""
+    """Sums of values in the cells of a tile; places from -1 to 1 along both sides."""
     cell = np.floor((place + 1.0) * (0.5 * _SEEN_CELLS)).astype(int)
     is_inside = ((cell >= 0) & (cell < _SEEN_CELLS)).all(axis=1)
     number = cell[is_inside] @ [_SEEN_CELLS, 1]
@@ -354,7 +359,8 @@ def _filled(
     expected: float,
     random: np.random.Generator,
 ) -> tuple[Ints, Floats]:
-    """With copies in cells of the tile that have no hair, as at a rim: others show it as well."""
+    """The strands, with copies in cells of the tile without hair, as at a rim, since patches
+    elsewhere show the tile too."""
     reach = (1.0 + _AROUND) * half
     cells = int(np.clip((expected / _PER_CELL) ** 0.5, 1.0, _MAX_CELLS))
     cell = np.clip(((place / reach + 1.0) * 0.5 * cells).astype(int), 0, cells - 1)
@@ -376,7 +382,7 @@ def _filled(
 
 
 def _fitted(settings: AtlasSettings, tile_count: int, texels: float) -> AtlasSettings:
-    """With square tiles, as many as are needed."""
+    """The settings with square tiles, as many as are needed."""
     columns = 1 << round(np.log2(tile_count) / 2.0)
     square = replace(settings, columns=columns, rows=-(-tile_count // columns))
     return square.fitted(tile_count, texels, texels)
@@ -401,7 +407,7 @@ def shell_strands(
     """The pieces of the strands of the plan in its tiles, tile after tile.
 
     Args:
-        upright_shown: how much of an upright piece's length shows, squared.
+        upright_shown: squared fraction of an upright piece's length that shows.
         grid, radius, base: as of `bake_strands.flat_strands`.
     """
     layers, pattern = plan.layers, plan.pattern
@@ -457,7 +463,7 @@ def shell_strands(
 
 
 def _mean_shifts(plan: ShellPlan, points: Floats, slab: Floats) -> Floats:
-    """How far the middle of each slab is from the roots, (pattern_count, layers, 3) [m]."""
+    """Mean vectors from roots to the middle of each slab, (pattern_count, layers, 3) [m]."""
     middle = (slab[:, :-1] + slab[:, 1:]) / 2.0
     shift = between(points, np.minimum(middle, 2.0)) - points[:, :1]
     means = [shift[plan.pattern == pattern].mean(axis=0) for pattern in range(len(plan.reach))]
@@ -465,7 +471,8 @@ def _mean_shifts(plan: ShellPlan, points: Floats, slab: Floats) -> Floats:
 
 
 def _directions(step: Floats, mean: Floats, own: Ints, layer: Ints, axes: Floats) -> Floats:
-    """Directions of the pieces where the mean one is up the picture, (n, 3) unit vectors."""
+    """Directions of the pieces in frames where the mean direction is up the picture, (n, 3) unit
+    vectors."""
     course = np.gradient(np.pad(mean, ((0, 0), (1, 0), (0, 0))), axis=1)[:, 1:]
     along = unit(np.einsum("ni,nai->na", course[own, layer], axes))
     right = unit_or(np.cross(along, (0.0, 0.0, 1.0)), (1.0, 0.0, 0.0))
@@ -474,7 +481,7 @@ def _directions(step: Floats, mean: Floats, own: Ints, layer: Ints, axes: Floats
 
 
 def _beneath(area: Floats, side: float, layers: int) -> Floats:
-    """What the layers above let through from the front, of each tile: exp(-tau)."""
+    """Light from the front that the layers above each tile let through: exp(-tau)."""
     tau = (area / side).reshape(-1, layers)
     above = tau[:, ::-1].cumsum(axis=1)[:, ::-1] - tau
     open_: Floats = np.exp(-above).ravel()

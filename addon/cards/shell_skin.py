@@ -3,7 +3,7 @@
 The skin is cut finely; its vertices are gathered into cells of about one size (centroidal Voronoi
 cells; Lloyd 1982), and cells that meet become a triangle (Valette and Chassery 2004, "Approximated
 centroidal Voronoi diagrams for uniform polygonal mesh coarsening"). So the triangles are even,
-whatever the skin's own are like, and there are as many of them as are wanted.
+whatever the skin's own triangles, and as many as wanted.
 """
 
 from __future__ import annotations
@@ -21,20 +21,22 @@ from ..strands.triangles import area_vectors, areas_of, quartered
 from ..strands.vectors import unit
 from ..strands.weld import same_places
 
-#: How far from a root there is hair, in distances between roots.
+#: Distance from a root up to which skin has hair, in distances between roots.
 _REACH = 2.5
-#: How many times finer than the triangles that are made the skin is cut, and pieces at most.
+#: Factor by which the skin is cut finer than the coarse triangles, and maximum number of pieces.
 _FINER, _MAX_PIECES = 4.0, 400_000
-#: How far cells are kept apart along the normal, as a fraction of an edge: both sides of a sheet.
+#: Offset along the normal that separates cells on both sides of a sheet, as a fraction of an edge.
 _SIDES_APART = 0.4
 _ROUNDS, _ATTEMPTS = 10, 5
-#: Places of the skin at which it is looked for bulges, about.
+#: Approximate number of places of the skin that are tested for bulges.
 _MAX_BULGES = 20_000
-#: How far a vertex is raised at most, in what the coarse skin is off the skin.
+#: Maximum height by which a vertex is raised, in errors of the coarse skin.
 _MAX_RAISED = 2.5
-#: A triangle that faces farther away from its patch than this cosine is one of its own.
+#: If a triangle's normal and its patch's have a cosine below this, the patch's triangles become
+#: patches of their own.
 _APART = 0.6
-#: A triangle of less than this fraction of the usual area has no direction, and shows nothing.
+#: Triangles below this fraction of the median area are dropped: they have no direction and show
+#: nothing.
 _SLIVER = 0.02
 
 
@@ -44,8 +46,8 @@ class ShellSkin:
 
     positions, normals: (vertex_count, 3) [m], on the skin, and unit normals of the triangles there.
     triangles: (triangle_count, 3), counter-clockwise seen from outside.
-    error: nine tenths of the skin under hair are nearer to it than this [m].
-    raised: the positions moved out, so that no skin bulges out of the triangles.
+    error: nine tenths of the skin under hair are nearer to this one than this [m].
+    raised: the positions moved outwards, so that no skin bulges out of the triangles.
     """
 
     positions: Floats
@@ -56,31 +58,33 @@ class ShellSkin:
 
     @property
     def middles(self) -> Floats:
-        """Of the triangles, (triangle_count, 3) [m]."""
+        """Middles of the triangles, (triangle_count, 3) [m]."""
         middles: Floats = self.positions[self.triangles].mean(axis=1)
         return middles
 
     @property
     def facings(self) -> Floats:
-        """Of the triangles, mean normals, (triangle_count, 3)."""
+        """Mean normals of the triangles, (triangle_count, 3)."""
         return unit(self.normals[self.triangles].mean(axis=1))
 
     @property
     def area_vectors(self) -> Floats:
-        """Across the triangles, as long as their areas, (triangle_count, 3) [m^2]."""
+        """Vectors perpendicular to the triangles, as long as their areas, (triangle_count, 3)
+        [m^2]."""
         return area_vectors(self.positions[self.triangles])
 
     @property
     def areas(self) -> Floats:
-        """Of the triangles, (triangle_count,) [m^2]."""
+        """Areas of the triangles, (triangle_count,) [m^2]."""
         return np.linalg.norm(self.area_vectors, axis=1)
 
     def patches(self, count: int, layers: Floats) -> Ints:
-        """A patch of about one size for each triangle, (triangle_count,), from 0 without gaps; more
-        than `count` where triangles that lie together face apart.
+        """The patch of each triangle, (triangle_count,), from 0 without gaps, all of about one
+        size; more than `count` where triangles that lie together face apart.
 
         Args:
-            layers: (layer_count, vertex_count, 3) [m], where the vertices are in layers of shells.
+            layers: (layer_count, vertex_count, 3) [m], positions of the vertices in the layers of
+                shells.
         """
         label = gathered(self.middles, self.facings, self.areas, count)
         is_lonely = np.zeros(len(label), bool)
@@ -105,10 +109,10 @@ class FineSkin:
 
 
 def fine_skin(head: Surface, roots: Floats, spacing: float, triangle_count: int) -> FineSkin:
-    """The skin near roots, finely enough for this many coarse triangles.
+    """The skin near roots, cut finely enough for this many coarse triangles.
 
     Args:
-        roots: (strand_count, 3) [m]. spacing: of them, on the mean [m].
+        roots: (strand_count, 3) [m]. spacing: their mean distance [m].
     """
     reach = _REACH * spacing
     middle = head.corners.mean(axis=1)
@@ -136,7 +140,8 @@ def fine_skin(head: Surface, roots: Floats, spacing: float, triangle_count: int)
 
 
 def coarse_skin(fine: FineSkin, head: Surface, triangle_count: int) -> ShellSkin | None:
-    """No more triangles than this, and nearly as many; None where the hair is too small for any."""
+    """The skin in at most, and nearly, this many triangles; None if the hair is too small for
+    any."""
     cells, best = max(triangle_count // 2, 3), None
     for _ in range(_ATTEMPTS):
         found = _of_cells(fine, head, min(cells, len(fine.positions)))
@@ -151,7 +156,7 @@ def coarse_skin(fine: FineSkin, head: Surface, triangle_count: int) -> ShellSkin
 
 
 def gathered(places: Floats, normals: Floats, area: Floats, count: int) -> Ints:
-    """A cell of about one size for each place, (n,), of at most `count`.
+    """The cell of each place, (n,), of at most `count` cells of about one size.
 
     Args:
         places, normals: (n, 3); places of opposite normals are kept apart. area: (n,) weights.
@@ -171,7 +176,7 @@ def gathered(places: Floats, normals: Floats, area: Floats, count: int) -> Ints:
 
 def _of_cells(fine: FineSkin, head: Surface, count: int) -> ShellSkin:
     label = gathered(fine.positions, fine.normals, fine.area, count)
-    # a cell at the border stands on it, or hair would recede by half a cell
+    # a cell at the border lies on the border, or hair would recede by half a cell
     weight = np.where(_is_border(fine), 1.0, 1e-6) * fine.area
     has_border = np.bincount(label, _is_border(fine)) > 0
     weight = np.where(has_border[label], weight, fine.area)
@@ -194,7 +199,7 @@ def _of_cells(fine: FineSkin, head: Surface, count: int) -> ShellSkin:
     used, compact = np.unique(triangles, return_inverse=True)
     triangles = np.asarray(compact).reshape(-1, 3)
     positions = on_skin.point[used]
-    # its own normals: those of the skin at a point may be of a fold that the triangles lack
+    # normals of the coarse triangles: the skin's own may be those of a fold that is lost here
     across = np.zeros_like(positions)
     np.add.at(across, triangles, area_vectors(positions[triangles])[:, None])
     error = _error(fine, positions, triangles)
@@ -202,13 +207,14 @@ def _of_cells(fine: FineSkin, head: Surface, count: int) -> ShellSkin:
 
 
 def _raised(skin: ShellSkin, fine: FineSkin) -> ShellSkin:
-    """With vertices raised so far that hardly any skin under hair bulges out of the triangles: each
-    bulge moves the corners of the triangle below by as little as it takes together."""
+    """The skin with vertices raised so far that hardly any skin under hair bulges out of the
+    triangles: each bulge moves the corners of the triangle below it by the smallest sufficient
+    heights."""
     places = np.arange(0, len(fine.positions), max(len(fine.positions) // _MAX_BULGES, 1))
     on = search_of(Surface(skin.positions, skin.triangles)).closest(fine.positions[places])
     out = skin.facings[on.triangle]
     height = np.einsum("ni,ni->n", fine.positions[places] - on.point, out)
-    # what is beyond the border is not below a triangle
+    # places beyond the border have no triangle below
     is_over = (height > 0.5 * on.distance) & (on.distance > 0.0)
     corner, weight = skin.triangles[on.triangle], on.barycentric
     need = height[:, None] * weight / np.sum(weight**2, axis=1, keepdims=True)
@@ -236,5 +242,5 @@ def _error(fine: FineSkin, positions: Floats, triangles: Ints) -> float:
 
 
 def _edge(area: float, triangle_count: int) -> float:
-    """Of even triangles of this area together [m]."""
+    """Edge of this many even triangles with this area together [m]."""
     return float((4.0 / 3.0**0.5 * max(area, 1e-30) / max(triangle_count, 1)) ** 0.5)

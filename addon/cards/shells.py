@@ -1,14 +1,14 @@
-"""Shells: layers of the skin, one above the other, each of which shows where strands cross it.
+"""Shells: layers of the skin, one above the other, each of which shows the strands that cross it.
 
-Short hair is seen as a surface, of which cards make scales and tufts. Shells (Lengyel, Praun,
-Finkelstein and Hoppe 2001, "Real-time fur over arbitrary surfaces") are the skin's triangles again
-and again, further and further out: along the strands as they are combed, not along the normal. A
-layer stands for a slab of the hair; its texture, see shell_plan.py, holds the pieces of the
-groom's own strands in the slab.
+Short hair looks like a surface, but as cards it shows scales and tufts. Shells (Lengyel, Praun,
+Finkelstein and Hoppe 2001, "Real-time fur over arbitrary surfaces") are copies of the skin's
+triangles, further and further out: along the strands as they are combed, not along the normal. A
+layer represents a slab of the hair; its texture, see shell_plan.py, shows the pieces of the groom's
+own strands in the slab.
 
-The layers are drawn from the inside to the outside, which is back to front from wherever the skin
-faces the eye, so that blending needs no sorting (Scheuermann 2004). Every piece of skin with all
-its layers counts as a card: it rides on guides, and has a group and tiles.
+The layers are drawn from the inside to the outside, which is back to front wherever the skin faces
+the eye, so that blending needs no sorting (Scheuermann 2004). Every piece of skin with all its
+layers counts as a card: it rides on guides, and has a group and tiles.
 """
 
 from __future__ import annotations
@@ -35,22 +35,22 @@ from .shell_skin import FineSkin, ShellSkin, coarse_skin, fine_skin
 from .strip import mean_spacing
 
 #: Hair is short if it is shorter than this fraction of the side of the square that its roots fill;
-#: longer than the second fraction, no shell shows it.
+#: shells cannot show hair longer than the second fraction.
 SHORT, _TOO_LONG = 0.12, 0.4
-#: Fewer strands are no fur.
+#: Minimum number of strands for shells.
 _FEWEST = 100
-#: Triangles of the finest level where no number is set.
+#: Triangles of the finest level if no number is set.
 _TRIANGLES = 12_000
-#: Triangles of a patch, about, and the strands on it, at least: fewer are no pattern.
+#: Approximate number of triangles of a patch, and minimum strands on it: fewer make no pattern.
 _PATCH, _PATCH_STRANDS = 2, 8
-#: The cosine by which a normal of the hair's volume must look out of the layer.
+#: Minimum cosine between a normal of the hair's volume and that of the layer.
 _FRONT = 0.3
 
 
 @dataclass(frozen=True, eq=False)
 class Shells:
-    """levels: finest first, triangles from the inside to the outside, with occlusion. backs: of
-    each the triangles for back faces, from the outside to the inside. plan: of the atlas."""
+    """levels: finest first, triangles from the inside to the outside, with occlusion. backs: for
+    each level the triangles for back faces, from the outside to the inside. plan: of the atlas."""
 
     levels: tuple[CardLevel, ...]
     backs: tuple[Ints, ...]
@@ -63,7 +63,8 @@ def are_wanted(
     """Whether shells are made of this hair.
 
     Raises:
-        HairloomError: they are asked for, and this hair can have none, or its cards were edited.
+        HairloomError: the settings want shells, but this hair can have none, or its cards were
+            edited.
     """
     if settings.kind == "cards":
         return False
@@ -85,7 +86,7 @@ def are_wanted(
 
 
 def _problem(strands: StrandSet, head: Surface | None) -> str | None:
-    """Why there can be no shells of this hair; None where there can."""
+    """Why this hair can have no shells; None if it can."""
     if head is None or not len(head.triangles):
         return "shells are layers of the skin, and this hair has no surface"
     if is_face_hair(strands.group).any():
@@ -107,12 +108,13 @@ def _usual_length(strands: StrandSet) -> float:
 
 
 def _side(strands: StrandSet) -> float:
-    """Of the square that the roots fill [m]."""
+    """Side of the square that the roots fill [m]."""
     return _spacing(strands) * strands.strand_count**0.5
 
 
 def _spacing(strands: StrandSet) -> float:
-    """Of roots in a square grid [m]: the nearest of points at random is half as far."""
+    """Spacing of as many roots in a square grid [m]: the nearest of random points is half as
+    far."""
     return 2.0 * mean_spacing(strands.roots)
 
 
@@ -177,9 +179,9 @@ def _outside_in(mesh: CardMesh, layers: int) -> Ints:
 
 @dataclass(frozen=True, eq=False)
 class _Layered:
-    """A level's skin in patches, and what hair is like at its vertices.
+    """A level's skin in patches, and the hair at its vertices.
 
-    vertex, patch: (n,) of each vertex of a layer, in which a patch shares none with others.
+    vertex, patch: (n,) of each vertex of a layer, in which patches share no vertices.
     triangles: (m, 3) of these. place: (n, 2) in the plane of its patch [m].
     """
 

@@ -1,7 +1,7 @@
 """Cards of short hair, such as fur: more of them, and simpler ones.
 
-A card that is wide beside the length of its hair shows as a scale. So there are more cards, each
-narrower, of a few triangles, as short hair bends little: no more triangles in all.
+A card that is wide relative to the length of its hair looks like a scale. So there are more cards,
+each narrower and of few triangles, since short hair bends little: the total does not grow.
 """
 
 from __future__ import annotations
@@ -17,23 +17,23 @@ from .strip import mean_spacing
 
 #: Hair is short if it is shorter than this fraction of the side of the square that its roots fill.
 _SHORT = 0.12
-#: How wide the square of a card's roots should be at most, as a fraction of the hair's length.
+#: Maximum side of the square of a card's roots, as a fraction of the hair's length.
 _NARROW = 0.25
-#: How many times as many cards there may be, and the segments and columns of each: 8 triangles.
+#: Maximum factor on the number of cards, and segments and columns of each: 8 triangles.
 _MORE, _SEGMENTS, _COLUMNS = 3.0, 4, 1
-#: How much narrower strands are in the atlas: cards that lie on a body are mostly seen from the
-#: front, where a strand is as wide as it is.
+#: Factor on the strands' width in the atlas: cards that lie on a body are mostly seen from the
+#: front, where strands need no widening.
 _FACE_ON = 0.7
 
 
 def fitted_to_length(
     settings: CardSettings, atlas: AtlasSettings, strands: StrandSet
 ) -> tuple[CardSettings, AtlasSettings, tuple[str, ...]]:
-    """The settings that the cards of such hair are made by, and what the artist should know."""
+    """The settings for the cards of such hair, and notes for the artist."""
     wanted, length = settings.card_count, float(np.median(strands.lengths()))
     if settings.source != "clusters" or strands.strand_count <= wanted:
         return settings, atlas, ()
-    # the nearest of points at random is half as far as they are apart in a square grid
+    # the nearest of random points is half as far as the spacing of a square grid
     side = 2.0 * mean_spacing(strands.roots) * strands.strand_count**0.5
     if length > _SHORT * side:
         return settings, atlas, ()

@@ -1,18 +1,17 @@
 """The order in which cards are drawn: from the inside to the outside of the hair.
 
-For a head with hair that is nearly back to front from every side, so that blending needs no
-sorting at run time (Scheuermann 2004, "Rendering with approximate depth sorting"). He sorts by the
-distance from the head. Here that is where a search begins, which looks at the hair from many sides
-and moves what was drawn in the wrong order; order_pairs.py and order_search.py say how.
+On a head this is nearly back to front from every side, so that blending needs no sorting at run
+time (Scheuermann 2004, "Rendering with approximate depth sorting"). Scheuermann sorts by the
+distance from the head. Here that order is the start of a search, which views the hair from many
+sides and moves cards that are drawn in the wrong order, see order_pairs.py and order_search.py.
 
 Front faces and back faces are drawn in separate passes, so each has its own order: front
 faces from the inside to the outside, back faces, which are on the far side of the hair, the other
 way round.
 
-Limitations: one order cannot suit views that contradict each other; `wrong_fraction` says
-how often.
-Hair that swings far from its rest shape has to be sorted at run time, see `order_from`, or be a
-mesh of its own, such as a ponytail, see `card_orders`.
+Limitations: one order cannot suit views that contradict each other; `wrong_fraction` measures how
+often. Hair that swings far from its rest shape has to be sorted at run time, see `order_from`, or
+be a mesh of its own, such as a ponytail, see `card_orders`.
 """
 
 from __future__ import annotations
@@ -31,30 +30,31 @@ from .order_pairs import Pairs, all_pairs, pairs_by_view
 from .order_search import Preferences, min_broken, net_preferences
 from .steps import result_of
 
-#: Vertices of a card whose distance from the head is measured; more hardly change the order.
+#: Number of a card's vertices whose distance from the head is measured; more hardly change the
+#: order.
 SAMPLE_COUNT = 7
-#: Directions from which pairs are collected, and pixels across.
+#: Number of views from which pairs are collected, and pixels across.
 VIEW_COUNT, VIEW_SIZE = 48, 96
-#: The search takes at most this many pieces; where there are more triangles, a piece has several.
+#: Maximum number of pieces in the search; with more triangles, a piece has several.
 MAX_PIECES = 30_000
-#: With more triangles than this the distance decides alone.
+#: Maximum number of triangles for the search; with more, only the distance counts.
 MAX_TRIANGLES = 250_000
-#: Views looked at in a step, and how much of the time they take.
+#: Views per step, and the fraction of the time that all views take.
 _VIEWS_PER_STEP, _FRACTION_OF_VIEWS = 8, 0.6
 
-#: A group dangles where its middle card is this many times as far from the head as nearly all cards
-#: of the groups that lie nearer and do not dangle.
+#: A group dangles if its median card is this many times as far from the head as nearly all cards of
+#: the nearer groups that do not dangle.
 _FARTHER = 1.25
-#: Nearly all, in percent.
+#: Percentage that counts as nearly all.
 _NEARLY_ALL = 90.0
 
-#: What is sorted: pieces of cards or whole cards, by what is seen; whole cards by distance alone.
+#: What is sorted: pieces of cards or whole cards, by views; or whole cards, by distance alone.
 type SortBy = Literal["pieces", "cards", "distance"]
 
 
 @dataclass(frozen=True)
 class CardOrders:
-    """All triangles of a mesh in the order in which they are to be drawn, (triangle_count,) each.
+    """All triangles of a mesh in the order in which they are drawn, (triangle_count,) each.
 
     front: for front faces, and where both are drawn at once. back: for back faces.
     """
@@ -64,7 +64,7 @@ class CardOrders:
 
 
 def in_order(mesh: CardMesh, order: Ints) -> CardMesh:
-    """The same cards with their triangles in an order, (triangle_count,)."""
+    """The same cards with their triangles in this order, (triangle_count,)."""
     return replace(mesh, triangles=mesh.triangles[order], card=mesh.card[order])
 
 
@@ -76,20 +76,20 @@ def card_orders(
     view_count: int = VIEW_COUNT,
     alpha: Floats | None = None,
 ) -> CardOrders:
-    """The best orders that hold for all views around the head; the same for the same cards,
-    whatever order they come in.
+    """The best orders for all views around the head; the same for the same cards, whatever their
+    order.
 
     Args:
-        head: in the space of the mesh; without one the middle of the hair stands for it.
+        head: in the space of the mesh; without one distances are from the middle of the hair.
         by: "cards" and "distance" keep the triangles of a card together, from root to tip;
-            "pieces" sorts those of cards that cross each other apart, which halves what is wrong.
-            Cards that are nowhere seen together keep their order by distance, and those at equal
-            distance go by where their roots are.
-        apart: groups that are drawn on their own after all others, so that they can be left out or
-            moved; None finds those that dangle.
-        view_count: directions to look from. A third is enough for coarser levels of detail.
-        alpha: (height, width) of the texture, which says what of a card can be seen at all, and
-            how much behind it; None takes cards that cover evenly.
+            "pieces" sorts pieces of cards that cross each other separately, which halves the
+            errors. Cards that are nowhere seen together keep their order by distance, and those at
+            equal distance the order of their roots' places.
+        apart: groups that are drawn separately after all others, so that they can be left out or
+            moved; None: those that dangle.
+        view_count: number of views. A third is enough for coarser levels of detail.
+        alpha: (height, width) of the texture, which determines what is visible of a card and behind
+            it; None: cards that cover evenly.
     """
     return result_of(order_steps(mesh, head, by, apart, view_count, alpha))
 
@@ -102,7 +102,7 @@ def order_steps(
     view_count: int = VIEW_COUNT,
     alpha: Floats | None = None,
 ) -> Generator[float, None, CardOrders]:
-    """As card_orders, some views a step; each gives the fraction that is done."""
+    """As card_orders, some views per step; yields the fraction that is done."""
     numbered = canonical(mesh)
     orders = yield from _canonical_orders(numbered.mesh, head, by, apart, view_count, alpha)
     return CardOrders(numbered.triangle[orders.front], numbered.triangle[orders.back])
@@ -116,7 +116,7 @@ def _canonical_orders(
     view_count: int,
     alpha: Floats | None,
 ) -> Generator[float, None, CardOrders]:
-    """As order_steps, of a mesh that is numbered by `canonical`."""
+    """As order_steps, for a mesh that is numbered by `canonical`."""
     distance = card_distances(mesh, head)
     section = _section_of_cards(mesh, distance, apart)
     inside_out = np.lexsort((distance, section))
@@ -136,13 +136,14 @@ def _canonical_orders(
     front = _learnt(mesh, pairs[pairs.facing == 1], inside_out, piece)
     yield (1.0 + _FRACTION_OF_VIEWS) / 2.0
     back = _learnt(mesh, pairs[pairs.facing == 0], outside_in, piece)
-    # what was moved to an end of its own section may have passed others
+    # triangles moved to an end of their own section may have passed other sections
     front, back = (order[np.argsort(own[order], kind="stable")] for order in (front, back))
     return CardOrders(front, back)
 
 
 def _learnt(mesh: CardMesh, pairs: Pairs, cards: Ints, piece: Ints | None) -> Ints:
-    """All triangles in the order that breaks the least of the pairs, starting from whole cards."""
+    """All triangles in the order that violates the least of the pairs, starting from whole
+    cards."""
     preferences = net_preferences(len(mesh.triangles), pairs.behind, pairs.before, pairs.weight)
     triangles = _improved(preferences, mesh.card, cards)
     if piece is None:
@@ -152,7 +153,8 @@ def _learnt(mesh: CardMesh, pairs: Pairs, cards: Ints, piece: Ints | None) -> In
 
 
 def _improved(preferences: Preferences, thing: Ints, start: Ints) -> Ints:
-    """All triangles in an order of what they belong to, (triangle_count,), better than `start`."""
+    """All triangles in an order of the things that they belong to, (triangle_count,), better than
+    `start`."""
     rank = min_broken(preferences.of_whole(thing, len(start)), start)
     return np.argsort(rank[thing], kind="stable")
 
@@ -165,7 +167,7 @@ def _triangles_of(mesh: CardMesh, cards: Ints) -> Ints:
 
 
 def _section_of_cards(mesh: CardMesh, distance: Floats, apart: Collection[int] | None) -> Ints:
-    """Of each card number that has a distance, see `sections`."""
+    """The section of each card number that has a distance, see `sections`."""
     group = mesh.group[: len(distance)]
     if apart is None:
         used = np.unique(mesh.card)
@@ -190,8 +192,8 @@ def dangling_groups(group: Ints, distance: Floats) -> list[int]:
 
 
 def sections(group: Ints, apart: Collection[int]) -> Ints:
-    """What is drawn on its own, (len(group),): 0 for all groups but those of `apart`, which follow
-    as 1, 2 ...
+    """Sections that are drawn separately, (len(group),): 0 for all groups but those of `apart`,
+    which follow as 1, 2 ...
     """
     section = np.zeros(len(group), np.int64)
     for number, name in enumerate(apart, 1):
@@ -202,7 +204,7 @@ def sections(group: Ints, apart: Collection[int]) -> Ints:
 @dataclass(frozen=True)
 class Canonical:
     """mesh: the same cards; the triangles of a card follow each other from root to tip.
-    triangle: (triangle_count,) which triangle of the source each of its triangles is.
+    triangle: (triangle_count,) the source's triangle of each of its triangles.
     """
 
     mesh: CardMesh
@@ -210,12 +212,12 @@ class Canonical:
 
 
 def canonical(mesh: CardMesh) -> Canonical:
-    """The mesh numbered by the way from the root, then by place, then by UV.
+    """The mesh numbered by the position from root to tip, then by place, then by UV.
 
-    A search that starts from the order at hand ends in another one each time. So cards are numbered
-    by where they are before they are sorted, and sorting a mesh that is sorted changes nothing.
+    The result of the search depends on the order in which it starts. So cards are first numbered by
+    where they are; sorting a mesh that is sorted changes nothing.
 
-    What is alike in all of these keeps the order of its vertices.
+    Vertices that are equal in all of these keep their order.
     """
     vertices, rank = _by_place(mesh)
     number = np.empty(len(vertices), np.int32)
@@ -239,8 +241,8 @@ def canonical(mesh: CardMesh) -> Canonical:
 
 
 def _by_place(mesh: CardMesh) -> tuple[Ints, Ints]:
-    """Vertices from root to tip, and the rank of each of these, which those that are alike share;
-    (vertex_count,) each."""
+    """Vertices from root to tip, and the rank of each, shared by equal ones; (vertex_count,)
+    each."""
     keys = np.column_stack([mesh.along, mesh.positions, mesh.uv])
     vertices = np.lexsort(keys.T[::-1])
     keys = keys[vertices]
@@ -262,7 +264,7 @@ def order_from(mesh: CardMesh, eye: Floats) -> Ints:
     rest the orders of `card_orders` are better; where hair has swung far, this one is.
 
     Args:
-        eye: (4,) homogeneous, world space; (x, y, z, 0) looks in parallel from this direction.
+        eye: (4,) homogeneous, world space; (x, y, z, 0) is a parallel view from this direction.
     """
     first, second, third = mesh.positions[mesh.triangles.T]
     place, weight = np.asarray(eye[:3], np.float32), float(eye[3])
@@ -275,7 +277,7 @@ def order_from(mesh: CardMesh, eye: Floats) -> Ints:
 
 
 def _steps(values: Floats) -> Ints:
-    """Values in 65,536 equal steps, whose sorting takes a tenth of the time."""
+    """Values in 65,536 equal steps, which sort in a tenth of the time."""
     if not len(values):
         return np.zeros(0, np.uint16)
     low, high = float(values.min()), float(values.max())
@@ -283,9 +285,10 @@ def _steps(values: Floats) -> Ints:
 
 
 def pieces(mesh: CardMesh) -> Ints:
-    """What of a card is sorted apart from the rest of it, (triangle_count,) from 0 without gaps.
+    """The separately sorted piece of each triangle, (triangle_count,) from 0 without gaps.
 
-    A triangle each, or enough consecutive triangles of a card that there are not too many pieces.
+    A piece is one triangle, or as many consecutive triangles of a card as keep the number of pieces
+    below MAX_PIECES.
     """
     count = len(mesh.triangles)
     together = -(-count // MAX_PIECES) if count else 1
@@ -298,7 +301,7 @@ def pieces(mesh: CardMesh) -> Ints:
 
 
 def reordered(mesh: CardMesh, key: Floats | Ints) -> CardMesh:
-    """The same cards by ascending key, one a card number; equal keys keep their order."""
+    """The same cards by ascending key, one key per card number; equal keys keep their order."""
     triangles = np.argsort(key[mesh.card], kind="stable")
     owner = card_of_vertex(mesh)
     vertices = np.argsort(key[owner], kind="stable")
@@ -346,8 +349,8 @@ def connected_components(triangles: Ints) -> Ints:
     """Which connected piece each triangle belongs to, (triangle_count,) int32.
 
     Pieces are numbered by their lowest vertex. Hooking and pointer jumping (Shiloach and Vishkin
-    1982): across each edge the higher root is hung below the lower one, then all vertices are led
-    to their roots and the edges that became loops are forgotten; few rounds, each over all edges.
+    1982): across each edge the higher root is linked to the lower one, then all vertices are linked
+    to their roots, and edges that became loops are dropped; few rounds, each over all edges.
 
     Args:
         triangles: (triangle_count, 3) vertex indices.
@@ -370,7 +373,7 @@ def connected_components(triangles: Ints) -> Ints:
 
 
 def _lead_to_roots(root: Ints) -> None:
-    """Pointer jumping in place: afterwards each vertex names a vertex that names itself."""
+    """Pointer jumping in place: afterwards each vertex points to a vertex that points to itself."""
     while True:
         further = root[root]
         if (further == root).all():

@@ -1,13 +1,13 @@
 """Chains of joints that springs turn, as engines with VRMC_springBone move them.
 
 The algorithm is that of the specification (VRM Consortium, VRMC_springBone 1.0, "SpringBone
-Algorithm"): a bone's tail goes on by inertia (Verlet 1967), is drawn towards its way at rest and by
-gravity, is put back to the bone's length, and out of colliders; the bone then turns by the least
-turn that points it at its tail. Bones do not stretch, and a chain's first joint rides on the head.
+Algorithm"): a bone's tail moves on by inertia (Verlet 1967), is pulled towards its direction at
+rest and by gravity, and is corrected to the bone's length and out of colliders; the bone then takes
+the smallest rotation that points it at its tail. Bones do not stretch, and a chain's first joint
+moves with the head.
 
-Limitation, of the specification itself: stiffness and gravity are of one step, and inertia keeps a
-fraction of the way of one step, so the motion depends on the rate of steps. Values are fitted for
-`STEP_RATE`.
+Limitation, of the specification itself: stiffness, gravity and the fraction that inertia keeps are
+those of one step, so the motion depends on the rate of steps. Values are fitted for `STEP_RATE`.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ from .joint_keys import matrices, quaternions, slerp
 #: Steps [1/s] that the values are for: engines step once a frame.
 STEP_RATE = 60.0
 DOWN = np.array([0.0, 0.0, -1.0])
-#: Added to 1 + cos between two directions, which is 0 where the second is the first reversed.
+#: Minimum of 1 + cos between two directions, which is 0 for opposite ones.
 _REVERSED = 1.0e-9
-#: Lengths [m] below this are none.
+#: Lengths [m] below this count as 0.
 _SHORTEST = 1.0e-9
 
 
 @dataclass(frozen=True, eq=False)
 class Balls:
-    """Balls and capsules that ride with the head, in the space of the chains at rest.
+    """Balls and capsules that move with the head, in the space of the chains at rest.
 
-    center, tail: (n, 3) [m] the ends of a capsule's axis; of a ball the same. radius: (n,) [m].
+    center, tail: (n, 3) [m] the ends of a capsule's axis; equal for a ball. radius: (n,) [m].
     """
 
     center: Floats
@@ -42,12 +42,12 @@ class Balls:
 
     @classmethod
     def of(cls, center: Floats, radius: Floats) -> Balls:
-        """Balls."""
+        """Balls without axes."""
         center = np.asarray(center, np.float64).reshape(-1, 3)
         return cls(center, center, np.asarray(radius, np.float64).reshape(-1))
 
     def nearest(self, points: Floats) -> tuple[Floats, Floats]:
-        """Of points (..., 3), the place on each axis that is nearest, (..., n, 3), and the distance
+        """The place on each axis nearest to points (..., 3), (..., n, 3), and the points' distance
         from the ball around it (..., n) [m].
         """
         axis = self.tail - self.center
@@ -61,10 +61,11 @@ class Balls:
 
 @dataclass(frozen=True, eq=False)
 class SpringValues:
-    """What moves each bone, (chains, bones) each, in the words and units of VRMC_springBone.
+    """Spring parameters of each bone, (chains, bones) each, with the names and units of
+    VRMC_springBone.
 
-    stiffness, gravity: [m/s] that a tail is drawn in a second. drag: 0 to 1, the fraction of a
-    tail's way in a step that the next one loses. hit_radius: [m].
+    stiffness, gravity: speed at which a tail is pulled [m/s]. drag: 0 to 1, the fraction of a
+        tail's motion in a step that the next step loses. hit_radius: [m].
     """
 
     stiffness: Floats
@@ -75,10 +76,10 @@ class SpringValues:
 
 @dataclass(frozen=True, eq=False)
 class SpringChains:
-    """Chains at rest, and what they keep out of.
+    """Chains at rest, and the balls that they keep out of.
 
     rest: (chains, joints, 4, 4) rigid [m]; y points to the next joint, the last one ends the chain.
-    balls: of all chains. hits: (chains, n) which of them a chain keeps out of.
+    balls: for all chains. hits: (chains, n) which balls a chain keeps out of.
     """
 
     rest: Floats
@@ -87,19 +88,19 @@ class SpringChains:
 
     @property
     def lengths(self) -> Floats:
-        """Of the bones, (chains, joints - 1) [m]."""
+        """Lengths of the bones, (chains, joints - 1) [m]."""
         lengths: Floats = np.linalg.norm(np.diff(self.rest[..., :3, 3], axis=1), axis=-1)
         return lengths
 
     def take(self, chains: Ints) -> SpringChains:
-        """Some of them, also several times."""
+        """Some of the chains, possibly several times."""
         return SpringChains(self.rest[chains], self.balls, self.hits[chains])
 
 
 def stepped(carrier: Floats, frame_rate: float, step_rate: float = STEP_RATE) -> Floats:
-    """Rigid motion (frame_count, 4, 4) at each step instead of at each frame, (step_count, 4, 4).
+    """A rigid motion by frames, (frame_count, 4, 4), resampled to steps, (step_count, 4, 4).
 
-    Between frames it turns evenly and moves straight.
+    Between frames rotations are interpolated by slerp and translations linearly.
     """
     last = len(carrier) - 1
     at = np.arange(round(last * step_rate / frame_rate) + 1) * frame_rate / step_rate
@@ -114,7 +115,7 @@ def stepped(carrier: Floats, frame_rate: float, step_rate: float = STEP_RATE) ->
 
 
 def at_frames(values: Floats, frame_count: int, frame_rate: float) -> Floats:
-    """Values of steps (step_count, ...) at the frames, mixed straight between two steps."""
+    """Values of steps (step_count, ...) at the frames, interpolated linearly."""
     at = np.minimum(np.arange(frame_count) * STEP_RATE / frame_rate, len(values) - 1)
     before = np.minimum(at.astype(np.int64), max(len(values) - 2, 0))
     fraction = (at - before).reshape(-1, *[1] * (values.ndim - 1))
@@ -124,10 +125,10 @@ def at_frames(values: Floats, frame_count: int, frame_rate: float) -> Floats:
 
 
 def sprung(chains: SpringChains, values: SpringValues, carrier: Floats) -> Floats:
-    """Where springs have the joints in each step, in the space of the head.
+    """Places of the joints in each step as springs move them, in the space of the head.
 
     Args:
-        carrier: (step_count, 4, 4) rigid, the head's; one step is 1 / `STEP_RATE`.
+        carrier: (step_count, 4, 4) rigid motion of the head; one step is 1 / `STEP_RATE`.
 
     Returns:
         Places (step_count, chains, joints, 3) [m]; the chains begin at rest.
@@ -160,7 +161,8 @@ def sprung(chains: SpringChains, values: SpringValues, carrier: Floats) -> Float
 
 
 def turns_to(rest: Floats, places: Floats) -> Floats:
-    """How joints turn that point at these places, each by the least turn from the one before.
+    """Rotations of joints that point at these places, each by the smallest rotation after its
+    parent's.
 
     Args:
         rest: (chains, joints, 4, 4). places: (frame_count, chains, joints, 3).
@@ -181,7 +183,7 @@ def turns_to(rest: Floats, places: Floats) -> Floats:
 
 def chained(rest: Floats, targets: Floats) -> Floats:
     """The places nearest to targets (..., chains, joints, 3), joint by joint, that bones of the
-    same lengths reach.
+    rest lengths reach.
     """
     lengths = np.linalg.norm(np.diff(rest[..., :3, 3], axis=1), axis=-1)
     places = [np.broadcast_to(rest[:, 0, :3, 3], targets.shape[:-2] + (3,))]
@@ -191,7 +193,7 @@ def chained(rest: Floats, targets: Floats) -> Floats:
 
 
 def turned_by(one: Floats, other: Floats) -> Floats:
-    """The least turns (..., 3, 3) that take unit vectors to others; Rodrigues' formula."""
+    """The smallest rotations (..., 3, 3) that take unit vectors to others; Rodrigues' formula."""
     axis, cosine = np.cross(one, other), (one * other).sum(axis=-1)
     cross = cross_matrices(axis)
     fraction = 1.0 / np.maximum(1.0 + cosine, _REVERSED)
@@ -202,7 +204,7 @@ def turned_by(one: Floats, other: Floats) -> Floats:
 def _push_out(
     tail: Floats, place: Floats, length: Floats, chains: SpringChains, reach: Floats, head: Floats
 ) -> None:
-    """Tails (chains, 3) out of what they hit, ball after ball, in place."""
+    """Push tails (chains, 3) out of the balls that they hit, one after the other, in place."""
     balls = chains.balls
     if not len(balls.radius):
         return
@@ -223,7 +225,7 @@ def _push_out(
 
 
 def _beside_parents(rest: Floats) -> Floats:
-    """How joints at rest are turned beside the one before, (chains, joints, 3, 3)."""
+    """Rotations of joints at rest relative to the joint before, (chains, joints, 3, 3)."""
     turn = rest[..., :3, :3]
     beside: Floats = turn.copy()
     beside[:, 1:] = turn[:, :-1].swapaxes(-1, -2) @ turn[:, 1:]
@@ -231,7 +233,7 @@ def _beside_parents(rest: Floats) -> Floats:
 
 
 def _held(tail: Floats, place: Floats, length: Floats) -> Floats:
-    """On the way from the place, at this length (..., 1) from it."""
+    """Tails moved along their direction from the place to this length (..., 1) from it."""
     return place + _unit(tail - place) * length
 
 

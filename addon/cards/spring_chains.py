@@ -1,8 +1,8 @@
-"""A skeleton that springs move: few chains, whose first joints ride on the head.
+"""A skeleton that springs move: few chains, whose first joints move with the head.
 
-Cards that move alike share a chain, as those of baked joints do (`joint_chains`), but bones turn
-only: a vertex is weighted to two neighbouring bones of its own chain, one of another one, and the
-head. There are as many as bring something.
+Cards that move alike share a chain, as with baked joints (`joint_chains`), but bones only rotate: a
+vertex is weighted to two neighbouring bones of its own chain, one of another chain, and the head.
+There are as many joints as improve the result.
 """
 
 from __future__ import annotations
@@ -31,28 +31,29 @@ from .spring_bones import (
 )
 from .spring_fit import spring_fit
 
-#: Joints in a chain that are tried, and chains, the fewest first.
+#: Numbers of joints in a chain and of chains that are tried, ascending.
 _JOINTS = (2, 3, 4, 5, 7)
 _CHAINS = (1, 2, 4, 8, 12, 16, 24, 32, 48, 64, 96, 128)
-#: By this fraction an error may be larger than the least where fewer joints do; and by how much,
-#: of the hair's length, errors differ unseen.
+#: Fraction by which an error may exceed the smallest one to save joints; and the difference of
+#: errors that is not visible, as a fraction of the hair's length.
 _WORTH, _UNSEEN = 0.03, 1.0e-4
 #: Vertices that skins are learnt from.
 _LEARNT_VERTICES = 4000
-#: The most that a bone keeps away from what it hits, a fraction of its length.
+#: Maximum hit radius of a bone, as a fraction of its length.
 _HIT_FRACTION = 0.1
-#: How far into a ball a bone's tail may lie at rest and still keep out of it, of its length.
+#: Depth in a ball up to which a bone's tail may lie at rest and still collide with it, as a
+#: fraction of the bone's length.
 _NEAR = 1.0e-3
 
 
 @dataclass(frozen=True, eq=False)
 class SpringRig:
-    """Chains, what moves them, and what they move, in the space of `CardTracks`.
+    """Chains, their spring parameters and their skins, in the space of `CardTracks`.
 
     skins: of each level; a joint's number is chain * joints + number in the chain, and the root,
-        which rides on the head, comes after them.
+        which moves with the head, comes after them.
     joint_error: root mean square distance of each chain's joints from the simulation [m].
-    error: of all vertices, driven by springs, from the simulation.
+    error: of all vertices moved by springs, against the simulation.
     """
 
     chains: SpringChains
@@ -74,7 +75,7 @@ class _Choice:
 
 @dataclass(frozen=True)
 class Tried[Choice]:
-    """How many joints something has, and how far it is from the simulation [m]."""
+    """A choice, its number of joints, and its error against the simulation [m]."""
 
     joints: int
     error: float
@@ -85,8 +86,8 @@ def spring_steps(tracks: CardTracks, most: int, balls: Balls) -> Generator[float
     """The fewest joints that move the cards nearly as well as `most` would.
 
     Args:
-        most: joints, with the root that carries all chains.
-        balls: what chains keep out of.
+        most: maximum number of joints, including the root that carries all chains.
+        balls: which chains keep out of.
 
     Yields the fraction that is done.
     """
@@ -112,8 +113,8 @@ def spring_steps(tracks: CardTracks, most: int, balls: Balls) -> Generator[float
 
 
 def fewest_joints[Choice](tried: Sequence[Tried[Choice]], unseen: float) -> Choice:
-    """Of all that were tried the one with the fewest joints that is nearly as near as the nearest,
-    wherever between them more brought nothing.
+    """Of all choices the one with the fewest joints whose error is nearly the smallest, even if
+    more joints did not help at some steps in between.
 
     Args:
         unseen: errors that differ by less count as equal [m].
@@ -126,7 +127,7 @@ def fewest_joints[Choice](tried: Sequence[Tried[Choice]], unseen: float) -> Choi
 def spring_error(
     tracks: CardTracks, rest: Floats, places: Floats, skins: tuple[Skin, ...]
 ) -> FitError:
-    """How far the cards are from the simulation with joints in these places.
+    """The error of the cards against the simulation with joints in these places.
 
     Args:
         places: (frame_count, chains, joints, 3) [m].
@@ -135,7 +136,7 @@ def spring_error(
 
 
 def _moves(rest: Floats, places: Floats) -> tuple[Floats, Floats]:
-    """Of all joints, and of the root, which stays."""
+    """Transforms of all joints, and of the root, which stays."""
     turns = turns_to(rest, places).transpose(1, 2, 0, 3, 4)
     turn, shift = joint_moves(rest, turns, places.transpose(1, 2, 0, 3))
     still: Floats = np.tile(np.eye(3), (1, len(places), 1, 1))
@@ -144,7 +145,7 @@ def _moves(rest: Floats, places: Floats) -> tuple[Floats, Floats]:
 
 @dataclass(frozen=True, eq=False)
 class _Learnt:
-    """The lines of cards in all frames, and some vertices of the finest level in some."""
+    """The lines of cards in all frames, and some vertices of the finest level in some frames."""
 
     tracks: CardTracks
     lines: Floats
@@ -179,7 +180,8 @@ class _Learnt:
         return _Choice(groups, rest, moved, joints)
 
     def error(self, choice: _Choice) -> float:
-        """Of the learnt vertices if joints are where they are simulated, root mean square [m]."""
+        """Root mean square error of the learnt vertices with joints at their simulated places
+        [m]."""
         mesh, moved = self.levels[0]
         points = mesh.positions[self.picked].astype(np.float64)
         targets = moved[self.picked][:, self.frames].astype(np.float64)
@@ -200,7 +202,7 @@ class _Learnt:
         return Skin.joined(parts)
 
     def _first(self, mesh: CardMesh, vertices: Ints, choice: _Choice) -> Skin:
-        """Each vertex on its bone and a little on the nearer neighbour."""
+        """Each vertex weighted to its bone and a little to the nearer neighbour."""
         used = np.unique(self.tracks.levels[0].card)
         card = np.searchsorted(used, card_of_vertex(mesh)[vertices])
         bones = choice.joints - 1
@@ -220,8 +222,8 @@ class _Learnt:
 
 
 def _colliding(rest: Floats, balls: Balls) -> tuple[SpringChains, Floats]:
-    """Which balls each chain keeps out of, those that it is outside of at rest, and how far each
-    bone keeps away, (chains, bones) [m]: no more than it does at rest.
+    """The chains with the balls that each keeps out of, those that it is outside of at rest, and
+    the hit radius of each bone, (chains, bones) [m]: at most its distance at rest.
     """
     tails = rest[:, 1:, :3, 3]
     lengths = np.linalg.norm(np.diff(rest[..., :3, 3], axis=1), axis=-1)

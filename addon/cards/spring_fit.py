@@ -1,8 +1,8 @@
 """Stiffness, drag and gravity of each chain, so that springs move it as it was simulated.
 
-Differential evolution (Storn and Price 1997), of all chains at once and each by itself: the worth
-of a chain's values is how far its joints are from the simulation's, and no chain moves another one.
-Nothing is random: the same motion gives the same values.
+Differential evolution (Storn and Price 1997), for all chains at once but each independently: the
+cost of a chain's values is the distance of its joints from the simulation's, and no chain moves
+another one. The random seed is fixed: the same motion gives the same values.
 """
 
 from __future__ import annotations
@@ -15,23 +15,24 @@ import numpy as np
 from ..arrays import Floats
 from .spring_bones import STEP_RATE, SpringChains, SpringValues, at_frames, sprung, stepped
 
-#: Sets of values that are tried at a time, and how often.
+#: Sets of values in the population, and number of rounds.
 _POPULATION, _ROUNDS = 20, 30
-#: Steps of motion that are learnt from: those at its beginning.
+#: Steps at the beginning of the motion that values are learnt from.
 _LEARNT_STEPS = 360
-#: Weight of the difference of two sets, and how often a value is taken from the new set.
+#: Weight of the difference of two sets, and probability that a value is taken from the new set.
 _AMPLIFIED, _CROSSED = 0.7, 0.8
-#: What is searched, lowest and highest: the fraction of its way back that a bone goes in a step, as
-#: a power of 10, at the root and at the tip; drag at the root and at the tip; the fraction of its
-#: length that gravity draws it in a step, as a root, for small ones matter most. With some drag all
-#: swinging ends.
+#: Minimum and maximum of the searched values: log10 of the stiffness per step, as a fraction of the
+#: bone's length, at the root and at the tip; drag at the root and at the tip; square root of the
+#: gravity per step, as a fraction of the bone's length, since small values matter most. The minimum
+#: of drag makes all swinging end.
 _LOW = np.array([-2.5, -2.5, 0.01, 0.01, 0.0])
 _HIGH = np.array([0.5, 0.5, 1.0, 1.0, 0.4])
 
 
 @dataclass(frozen=True, eq=False)
 class SpringFit:
-    """values, and the root mean square distance of each chain's joints from the simulation [m]."""
+    """The values, and the root mean square distance of each chain's joints from the simulation
+    [m]."""
 
     values: SpringValues
     error: Floats
@@ -82,7 +83,7 @@ def spring_fit(
 
 
 def _values(chains: SpringChains, sets: Floats, hit_radius: Floats) -> SpringValues:
-    """Of sets (chains, 5), in the words of `_LOW`."""
+    """The values of sets (chains, 5), which are as in `_LOW`."""
     lengths = chains.lengths
     along = np.linspace(0.0, 1.0, lengths.shape[1])
     back = sets[:, 0, None] * (1.0 - along) + sets[:, 1, None] * along

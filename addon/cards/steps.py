@@ -1,4 +1,4 @@
-"""Work that goes on step by step, so that it can be shown and cancelled."""
+"""Work in steps, so that its progress can be shown and it can be cancelled."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 
 def result_of[Result](steps: Generator[Any, None, Result]) -> Result:
-    """All steps at once: what they return."""
+    """Run all steps at once, and return their result."""
     while True:
         try:
             next(steps)
@@ -19,7 +19,7 @@ def result_of[Result](steps: Generator[Any, None, Result]) -> Result:
 def map_progress[Step, Progress, Result](
     steps: Generator[Step, None, Result], tell: Callable[[Step], Progress]
 ) -> Generator[Progress, None, Result]:
-    """The same work, each step reported in another form."""
+    """The same work, with each step's progress converted by `tell`."""
     try:
         while True:
             yield tell(next(steps))

@@ -2,7 +2,7 @@
 
 side ->            u runs along `side`, v along the guide, so that side x tangent = normal and
 3---4---5  tip     the strip is seen counter-clockwise from outside. Each quad is cut into two
-| / | / |          triangles here, root first: nobody may triangulate later, because that
+| / | / |          triangles here, root first, not later in files or engines, because that
 0---1---2  root    would lose the order in which the cards must be drawn.
 """
 
@@ -24,13 +24,13 @@ from .sort import reordered
 
 #: Roots whose distance to their neighbours is measured.
 _SPACING_SAMPLES = 512
-#: For a single guide, which has no neighbour, in terms of its length.
+#: Spacing of a single guide, which has no neighbour, as a fraction of its length.
 _LONELY_SPACING = 0.04
 
 
 @dataclass(frozen=True)
 class CardFrames:
-    """Where each row of each card is and how it lies.
+    """Position and orientation of each row of each card.
 
     center, tangent, normal, side: (card_count, row_count, 3) float32, right-handed in the order
     side, tangent, normal; center in [m], the others unit vectors.
@@ -44,7 +44,7 @@ class CardFrames:
 
 @dataclass(frozen=True)
 class Strips:
-    """Strips that all have as many rows. width: (card_count, row_count) [m]."""
+    """Strips with the same number of rows. width: (card_count, row_count) [m]."""
 
     frames: CardFrames
     width: Floats
@@ -53,7 +53,7 @@ class Strips:
         return len(self.width)
 
     def of(self, cards: Ints) -> Strips:
-        """Those of the chosen cards."""
+        """The strips of the chosen cards."""
         frames = self.frames
         parts = (frames.center, frames.tangent, frames.normal, frames.side)
         return Strips(CardFrames(*(part[cards] for part in parts)), self.width[cards])
@@ -63,12 +63,12 @@ class Strips:
 class UncutCards:
     """All cards of a groom before they are cut into triangles; a card's number is its place here.
 
-    strand_count, group, layer, tile: (card_count,) int32 of each card: the strands that it stands
-        for, its group of hair, its layer, 0 next to the head, and its tile of the atlas.
+    strand_count, group, layer, tile: (card_count,) int32 of each card: the number of strands that
+        it represents, its group of hair, its layer, 0 next to the head, and its tile of the atlas.
     atlas: how the texture is divided into tiles.
-    center: (3,) [m], what normals look away from, as those of strands do; None gives each card the
+    center: (3,) [m], from which normals point away, as those of strands do; None: each card has the
         normals of its own surface.
-    absent: (card_count,) cards of which nothing is made, or None: all are made.
+    absent: (card_count,) cards that are not made; None: all are made.
     """
 
     strips: Strips
@@ -110,9 +110,9 @@ def strip_mesh(
     """Strips as triangles, card after card; occlusion is 1 until it is computed.
 
     Args:
-        parts: strips with the numbers of their cards, each number once at most.
-        cards: all cards there are; of their strips nothing is used.
-        column_count: pieces of a card across.
+        parts: strips with the numbers of their cards, each number at most once.
+        cards: all cards; their own strips are not used.
+        column_count: number of columns across a card.
     """
     meshes = [
         _part_mesh(strips, numbers, cards, column_count, settings) for numbers, strips in parts
@@ -143,7 +143,7 @@ def _part_mesh(
     normals = _normals(frames, across, settings)
     if cards.center is not None:
         volume = _normals_of_volume(positions, frames.tangent, cards.center, across, settings)
-        # engines turn normals by which side of a card they draw, so they stay on its front
+        # engines flip normals for back faces, so normals must be on the card's front
         is_front = np.einsum("crai,crai->cra", volume, normals) > 0.0
         normals = np.where(is_front[..., None], volume, normals)
     return CardMesh(
@@ -174,10 +174,10 @@ def card_frames(guides: Floats, root_normal: Floats, segment_count: int) -> Card
 
 
 def _facing_turn(normal: Floats, side: Floats, root_normal: Floats) -> Floats:
-    """The turn of each whole card about its guide that brings it to face the root's normal best.
+    """The turn of each whole card about its guide with which it best faces the root's normal.
 
-    At the root alone that would be arbitrary: hair often starts along the normal. The sum
-    over the rows of cos(turn) normal.r + sin(turn) side.r is largest for this angle [rad].
+    The root alone would give an arbitrary turn, since hair often starts along the normal r. This
+    angle [rad] maximises the sum over the rows of cos(turn) normal.r + sin(turn) side.r.
     """
     ahead = np.einsum("gri,gi->g", normal, root_normal)
     aside = np.einsum("gri,gi->g", side, root_normal)
@@ -185,8 +185,8 @@ def _facing_turn(normal: Floats, side: Floats, root_normal: Floats) -> Floats:
 
 
 def mean_spacing(roots: Floats) -> float:
-    """Mean distance from a root to its nearest neighbour [m], coinciding roots left out; 0
-    where there is none.
+    """Mean distance from a root to its nearest neighbour [m], without coinciding roots; 0 if there
+    is none.
 
     Estimated from at most `_SPACING_SAMPLES` roots, each measured against all.
     """
@@ -222,8 +222,8 @@ def strip_triangles(row_count: int, column_count: int) -> Ints:
 
 
 def _positions(frames: CardFrames, width: Floats, across: Floats, settings: CardSettings) -> Floats:
-    """The guide runs through the middle; the edges fall back by a parabola of height `bend`. A card
-    of one column is flat, and lies where the parabola does on average."""
+    """Positions of vertices: the guide runs through the middle, and the edges fall back by a
+    parabola of height `bend`. A card of one column is flat, at the parabola's mean height."""
     aside = (across - 0.5) * width[..., None]
     parabola = (2.0 * across - 1.0) ** 2 if len(across) > 2 else np.full_like(across, 1.0 / 3.0)
     behind = -settings.bend * width[..., None] * parabola
@@ -235,7 +235,7 @@ def _positions(frames: CardFrames, width: Floats, across: Floats, settings: Card
 
 
 def _normals(frames: CardFrames, across: Floats, settings: CardSettings) -> Floats:
-    """Perpendicular to the bent card, and leaning further outwards by `roundness`."""
+    """Normals perpendicular to the bent card, leaning further outwards by `roundness`."""
     edge = 2.0 * across - 1.0
     lean = (4.0 * settings.bend + settings.roundness) * edge  # the parabola's slope is 4 bend edge
     normals = frames.normal[:, :, None] + frames.side[:, :, None] * lean[:, None]
@@ -245,7 +245,7 @@ def _normals(frames: CardFrames, across: Floats, settings: CardSettings) -> Floa
 def _normals_of_volume(
     positions: Floats, tangent: Floats, center: Floats, across: Floats, settings: CardSettings
 ) -> Floats:
-    """Those of strands at the same places, leaning further outwards by `roundness`."""
+    """Normals of strands at the same places, leaning further outwards by `roundness`."""
     along = np.broadcast_to(tangent[:, :, None], positions.shape)
     normal = volume_normals(positions, along, center)
     lean = settings.roundness * (2.0 * across - 1.0)

@@ -1,12 +1,11 @@
-"""What card vertices take over from the strands that their cards stand for.
+"""Occlusion and light that card vertices take over from the strands of their cards.
 
-A card lies in the middle of its strands, so what a place of it would see of the sky is not what
-they see. Each vertex has the mean of its card's strands at the same part of their way, of which
-near ones count most: as hat functions between the columns of vertices, so that what the card
-shows across is on the mean what the strands have.
+A card lies in the middle of its strands, so it would see another part of the sky than they do. Each
+vertex gets the mean over its card's strands at the same part of their length, weighted by hat
+functions between the columns of vertices, so that the mean across the card is that of the strands.
 
-Of light the mean is over strands as they are seen: one that is hidden among others sends little of
-its light to an eye. The fraction of the sky that it sees says how often it is seen.
+The mean of light is weighted by the strands' visibility: one that is hidden among others sends
+little light to an eye. The fraction of the sky that a strand sees approximates its visibility.
 """
 
 from __future__ import annotations
@@ -20,26 +19,27 @@ from ..strands.vectors import unit_or
 from .card_mesh import CardMesh
 from .sort import card_of_vertex
 
-#: Pairs of vertices and strands at work at the same time.
+#: Pairs of vertices and strands in one batch.
 _PAIRS = 1 << 18
-#: Columns that lie closer count as this far apart [m].
+#: Minimum distance of columns [m].
 _MIN_WIDTH = 1.0e-12
-#: As often every strand is seen at least.
+#: Minimum visibility of a strand.
 _MIN_SEEN = 1.0e-6
-#: Hair is short unless it is this many times as long as its card is deep.
+#: Hair is short if it is shorter than this many times the depth of its card.
 _SLENDER = 8.0
-#: Of what is spread evenly, its extent over the root of its variance.
+#: Extent of an even distribution over its standard deviation.
 _EXTENT = np.sqrt(12.0)
 
 
 @dataclass(frozen=True, eq=False)
 class TakenOver:
-    """Of each vertex of a mesh.
+    """Values of each vertex of a mesh.
 
-    occlusion: (vertex_count,) float32, how open it is: 1 open, 0 shut in.
-    light: (vertex_count, k) float32, the mean of seen strands; None where that of strands is.
-    depth: (vertex_count,) float32 [m], how deep its strands lie along the normal: the extent of
-        even ones with the same variance. 0 where hair is so short that one sees its tips, which
+    occlusion: (vertex_count,) float32: 1 open, 0 occluded.
+    light: (vertex_count, k) float32, the mean of visible strands; None if that of the strands is
+        None.
+    depth: (vertex_count,) float32 [m], extent of its strands along the normal: that of evenly
+        spread ones with the same variance. 0 where hair is so short that its tips are seen, which
         lie side by side.
     """
 
@@ -51,15 +51,15 @@ class TakenOver:
 def taken_over(
     mesh: CardMesh, grid: Floats, occlusion: Floats, light: Floats | None, card: Ints
 ) -> TakenOver:
-    """What a mesh takes over.
+    """The values that a mesh takes over.
 
     Args:
         grid: (strand_count, cv_count, 3) [m], root first.
         occlusion: (strand_count, cv_count) of the strands.
         light: (strand_count, cv_count, k) of the strands; the first value is the fraction of the
-            sky that is seen. None: nothing is known of it.
+            sky that is seen. None: unknown.
         card: (strand_count,) the card of each strand, from 0 without gaps; -1 without one. Cards of
-            higher numbers stand for the same strands again, in the same order.
+            higher numbers represent the same strands again, in the same order.
     """
     length = np.linalg.norm(np.diff(grid, axis=1), axis=2).sum(axis=1)
     order = np.argsort(card, kind="stable")[np.count_nonzero(card < 0) :]
@@ -70,7 +70,7 @@ def taken_over(
     plane = unit_or(np.cross(side, mesh.tangent), mesh.normal)
     occluded, depth = np.ones(len(own), np.float32), np.zeros(len(own), np.float32)
     lit = None if light is None else np.zeros((len(own), light.shape[2]), np.float32)
-    # vertices of cards with as many strands together, so that little is left empty
+    # vertices of cards with similar numbers of strands together, so that little is left empty
     vertices = np.argsort(count[own], kind="stable")
     first = 0
     while first < len(vertices):
@@ -84,7 +84,7 @@ def taken_over(
         away = _at(grid, strand, along) - mesh.positions[chosen, None]
         aside = np.abs(np.einsum("vsi,vi->vs", away, side[chosen]))
         weight = np.maximum(1.0 - aside / reach[chosen, None], 0.0) * is_there
-        # where none is near, all count alike
+        # where no strand is near, all count equally
         weight = np.where(weight.sum(axis=1, keepdims=True) > 0.0, weight, is_there)
         occluded[chosen] = _mean(_at(occlusion[..., None], strand, along), weight)[:, 0]
         height = np.einsum("vsi,vi->vs", away, plane[chosen])[..., None]
@@ -100,13 +100,15 @@ def taken_over(
 
 
 def _mean(values: Floats, weight: Floats) -> Floats:
-    """Over strands, (vertices, k): values (vertices, strands, k), weights (vertices, strands)."""
+    """Weighted means over strands, (vertices, k), of (vertices, strands, k); weights
+    (vertices, strands)."""
     mean: Floats = np.einsum("vsk,vs->vk", values, weight) / weight.sum(axis=1, keepdims=True)
     return mean
 
 
 def _at(values: Floats, strand: Ints, along: Floats) -> Floats:
-    """Values of CVs between them, (n, m, channels): strands (n, m) at (n,) parts of their way."""
+    """Values interpolated between CVs, (n, m, channels), of strands (n, m) at parts (n,) of their
+    length."""
     place = along * (values.shape[1] - 1)
     low = np.minimum(place.astype(np.int64), values.shape[1] - 2)
     fraction = (place - low)[:, None, None]
@@ -115,8 +117,8 @@ def _at(values: Floats, strand: Ints, along: Floats) -> Floats:
 
 
 def _rows(mesh: CardMesh) -> tuple[Floats, Floats]:
-    """Across each vertex' row, (vertex_count, 3) unit vectors, and how far apart its vertices are
-    on the mean, (vertex_count,) [m]."""
+    """Unit vectors across each vertex' row, (vertex_count, 3), and the mean distance of the row's
+    vertices, (vertex_count,) [m]."""
     card = card_of_vertex(mesh)
     order = np.lexsort((mesh.uv[:, 0], mesh.along, card))
     is_other = (np.diff(card[order]) != 0) | (np.diff(mesh.along[order]) != 0.0)

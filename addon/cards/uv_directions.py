@@ -1,8 +1,8 @@
-"""Which way hair runs in the UVs of cards that somebody else has made: the axis, and the root end.
+"""The direction of hair in the UVs of an artist's own cards: the axis, and the root end.
 
-Of each island of UVs it is known how long its triangles are along u and along v, which of its two
-ends is nearer to the head, and which is higher. What one island leaves open, all others decide:
-hair textures are painted with all roots on one side.
+The evidence for each island of UVs is how long its triangles are along u and along v, which of its
+two ends is nearer to the head, and which is higher. Where one island is undecided, all others
+decide: hair textures are painted with all roots on one side.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints
 from ..strands.triangles import areas_of
 
-#: The way from root to tip in all UVs: found out, or known.
+#: The direction from root to tip in all UVs: "auto" finds it, the others are known.
 type UvDirection = Literal["auto", "up", "down", "right", "left"]
 #: (axis, whether the root is where the coordinate is largest)
 _KNOWN: dict[str, tuple[int, bool]] = {
@@ -25,26 +25,26 @@ _KNOWN: dict[str, tuple[int, bool]] = {
     "left": (0, True),
 }
 
-#: An island that is this many times as long along one axis decides for itself.
+#: An island that is this many times longer along one axis decides for itself.
 _CLEAR_LENGTH = 2.0
 #: So does one whose ends differ by this, as a fraction of its length.
 _CLEAR_END = 0.3
-#: A difference of ends below this says nothing.
+#: Differences of ends below this are no evidence.
 _NO_END = 0.05
-#: How much being higher counts beside being nearer to the head.
+#: Weight of being higher, relative to being nearer to the head.
 _HEIGHT_WEIGHT = 0.2
-#: Fraction of the way between the ends of an island that counts as one of its ends.
+#: Fraction of an island's length that counts as one of its ends.
 _END_FRACTION = 0.25
 
 
 @dataclass(frozen=True)
 class UvAxes:
-    """The way of each island.
+    """The direction of each island.
 
     axis: (island_count,) 0 where hair runs along u, 1 along v.
     is_down: (island_count,) whether the root is where that coordinate is largest.
-    is_against: (island_count,) whether it runs another way than the others.
-    is_unsaid: (island_count,) whether nothing says which end is the root, not even the others.
+    is_against: (island_count,) whether it runs in another direction than the others.
+    is_unsaid: (island_count,) whether the root end is unknown even from the others.
     """
 
     axis: Ints
@@ -56,7 +56,7 @@ class UvAxes:
 def uv_axes(
     corners: Floats, uv: Floats, distance: Floats, island: Ints, direction: UvDirection = "auto"
 ) -> UvAxes:
-    """Where roots and tips are.
+    """Find the direction of each island.
 
     Args:
         corners: (triangle_count, 3, 3) [m].
@@ -93,7 +93,8 @@ def uv_axes(
 
 
 def coordinate_gradients(corners: Floats, uv: Floats) -> Floats:
-    """How a place moves with u and with v, (triangle_count, 2, 3) [m]; 0 where UVs have no area."""
+    """Derivatives of the position by u and by v, (triangle_count, 2, 3) [m]; 0 where UVs have no
+    area."""
     one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     first, second = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
     area = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
@@ -114,7 +115,7 @@ def island_bounds(values: Floats, island: Ints) -> tuple[Floats, Floats]:
 
 
 def _lengths(corners: Floats, uv: Floats, island: Ints) -> Floats:
-    """How long each island is along u and along v, (island_count, 2) [m]."""
+    """Lengths of each island along u and along v, (island_count, 2) [m]."""
     speed = np.linalg.norm(coordinate_gradients(corners, uv), axis=2)
     weight = areas_of(corners) * (speed > 0.0).all(axis=1)
     total = np.maximum(_sums(island, weight), 1e-30)
@@ -127,7 +128,8 @@ def _lengths(corners: Floats, uv: Floats, island: Ints) -> Floats:
 def _end_evidence(
     corners: Floats, uv: Floats, distance: Floats, island: Ints, axis: Ints
 ) -> Floats:
-    """How much nearer to the head, and higher, large coordinates are, (island_count,) [m]."""
+    """How much nearer to the head, and higher, the end of large coordinates is, (island_count,)
+    [m]."""
     own = axis[island]
     coordinate = np.take_along_axis(uv, own[:, None, None], axis=2)[:, :, 0]
     low, high = island_bounds(coordinate, island)

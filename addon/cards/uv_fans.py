@@ -1,7 +1,7 @@
-"""Vertices of cards as files hold them.
+"""Vertices of cards as in exported files.
 
-Where a card's UVs are mirrored or folded, its frame turns over, and exporters that write tangents
-make two vertices of one. They are two in the mesh too, so that its indices are those of the file.
+Where a card's UVs are mirrored or folded, its tangent frame flips, and exporters that write
+tangents split vertices. They are split in the mesh too, so that its indices are those of the file.
 """
 
 from __future__ import annotations
@@ -17,18 +17,19 @@ from .sort import connected_components
 
 
 def with_fans_apart(mesh: CardMesh, back: Ints) -> tuple[CardMesh, Ints]:
-    """The same mesh, whose triangles share a vertex only if they hang together around it by edges
-    and their UVs turn the same way, as MikkTSpace groups them (Mikkelsen 2008, "Simulation of
-    Wrinkled Surfaces Revisited"). Vertices without a triangle are left out.
+    """The same mesh, whose triangles share a vertex only if they are connected around it by edges
+    and their UVs have the same orientation, as MikkTSpace groups them (Mikkelsen 2008, "Simulation
+    of Wrinkled Surfaces Revisited"). Vertices without a triangle are left out.
 
     Args:
-        back: (triangle_count, 3) its triangles in another order, which are given back likewise.
+        back: (triangle_count, 3) its triangles in another order, which are returned with the new
+            vertices.
     """
     triangles = mesh.triangles
     uv = mesh.uv[triangles].astype(np.float64)
     one, two = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
     is_turned = one[:, 0] * two[:, 1] > one[:, 1] * two[:, 0]
-    # each corner has two edges; corners at one vertex that have one in common are of one fan
+    # each corner has two edges; corners at one vertex with a common edge belong to one fan
     own = triangles.astype(np.int64)
     edges = [_edges(own, np.roll(own, step, axis=1), is_turned) for step in (1, 2)]
     _, number = np.unique(np.stack(edges, axis=2), return_inverse=True)
@@ -43,7 +44,8 @@ def with_fans_apart(mesh: CardMesh, back: Ints) -> tuple[CardMesh, Ints]:
 
 
 def _edges(vertex: Ints, other: Ints, is_turned: Bools) -> Ints:
-    """(triangle_count, 3) a number for each edge, seen from a vertex, and how the UVs turn."""
+    """A number for each edge as seen from a vertex, with the orientation of the UVs,
+    (triangle_count, 3)."""
     low, high = np.minimum(vertex, other), np.maximum(vertex, other)
     pair = low * (int(high.max(initial=0)) + 1) + high
     number: Ints = (pair * 2 + (vertex == high)) * 2 + is_turned[:, None]

@@ -1,7 +1,7 @@
 """Vertices in motion as a texture: a texel for each vertex and frame.
 
-Frame 0 has the upper rows, frame 1 those below it, and so on; within a frame vertices go along the
-rows, the first one at the left of the uppermost row. Vertices of all levels follow each other.
+Frame 0 has the upper rows, frame 1 those below, and so on; within a frame vertices run along the
+rows, the first one at the left of the top row. Vertices of all levels follow each other.
 """
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ import numpy as np
 from ..arrays import Floats
 from ..errors import HairloomError
 
-#: Widths that are tried [texels]: the first that holds everything in a height that is no larger.
+#: Widths that are tried [texels]; the first is chosen whose height is no larger.
 _WIDTHS = (1024, 2048, 4096, 8192)
 
 
 @dataclass(frozen=True)
 class MotionLayout:
-    """Where things are in the texture.
+    """The layout of the texture.
 
-    width: [texels]. rows: for each frame.
+    width: [texels]. rows: per frame.
     """
 
     vertex_count: int
@@ -35,7 +35,7 @@ class MotionLayout:
 
     @property
     def frame_step(self) -> float:
-        """How far the next frame is, as a fraction of the height, downwards."""
+        """Offset to the next frame, downwards, as a fraction of the height."""
         return self.rows / self.height
 
 
@@ -43,7 +43,7 @@ def motion_layout(vertex_count: int, frame_count: int, place: str) -> MotionLayo
     """A layout that wastes little.
 
     Raises:
-        HairloomError: it does not fit into a texture that engines can hold.
+        HairloomError: the motion does not fit into a texture that engines can hold.
     """
     for most in _WIDTHS:
         rows = -(-vertex_count // most)
@@ -67,7 +67,7 @@ def vertex_texels(layout: MotionLayout) -> Floats:
 
 
 def rounding(values: Floats, depth: str) -> Floats:
-    """What storing values of any shape adds to them.
+    """Rounding errors of stored values, of any shape.
 
     Args:
         depth: "half" or "float".

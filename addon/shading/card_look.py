@@ -85,8 +85,8 @@ def card_base(along: Floats, shading: ShadingSettings) -> Floats:
 
 
 def plain_albedo(color: Floats) -> Floats:
-    """The albedo with which a plain surface reflects as much light as hair of this colour, (...,
-    3).
+    """The albedo with which a plain surface reflects as much light as hair of this colour,
+    (..., 3).
 
     A plain surface has no shadows between strands: in the hair's colour it would be too bright,
     most of all for bright hair. Fitted to brown and blond hair on a head under three suns, see

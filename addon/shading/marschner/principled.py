@@ -193,9 +193,9 @@ def _inverse(function: Callable[[float], float], value: float) -> float:
 def azimuthal_width(roughness: float) -> float:
     """Standard deviation around the fibre for Blender's radial roughness in [0, 1], [rad].
 
-    Of the Gaussian nearest to Chiang's logistic with the scale s = sqrt(pi / 8) (0.265 b + 1.194
-    b^2 + 5.372 b^22): 1.702 s (Camilli 1994). (Chiang trims the logistic to the circle, which
-    matters only beyond 0.7.)
+    Of the Gaussian nearest to Chiang's logistic, 1.702 s (Camilli 1994), with the logistic's scale
+    s = sqrt(pi / 8) (0.265 b + 1.194 b^2 + 5.372 b^22). (Chiang trims the logistic to the circle,
+    which matters only beyond 0.7.)
     """
     scale = np.sqrt(np.pi / 8.0) * (
         0.265 * roughness + 1.194 * roughness**2 + 5.372 * roughness**22

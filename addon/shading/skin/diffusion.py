@@ -88,8 +88,8 @@ def soft_shadow(
 
 
 def corner_shifts(values: Floats, layout: SkinLayout) -> Floats:
-    """Mean of all sides that meet at each seam's ends, minus the mean of its own two, (seam_count,
-    2, channels); 0 unless three or more sides meet.
+    """Mean of all sides that meet at each seam's ends, minus the mean of its own two,
+    (seam_count, 2, channels); 0 unless three or more sides meet.
     """
     places, islands = layout.copies[:, :2], layout.copies[:, 2].astype(int)
     found, known = looked_up(values, layout.island, places, islands)

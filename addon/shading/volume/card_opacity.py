@@ -102,9 +102,10 @@ def own_strands(seen: Floats, own: Floats, near: Floats, front: Floats) -> tuple
     each.
 
     Eye and light look along different rays, so what is clear for the eye is as full as the rest for
-    the light. The visible strand lies at a depth s with the density p(s) = seen exp(-seen s) / (1 -
-    exp(-seen)). The light that reaches it is the integral of p(s) exp(-own max(s - near, 0)) from
-    the front, and of p(s) exp(-own max(1 - s - near, 0)) from behind.
+    the light. The visible strand lies at a depth s with the density
+    p(s) = seen exp(-seen s) / (1 - exp(-seen)). The light that reaches it is the integral of
+    p(s) exp(-own max(s - near, 0)) from the front, and of p(s) exp(-own max(1 - s - near, 0)) from
+    behind.
 
     Args:
         seen, own: number of the card's strands on a ray of the eye, and of the light, tau.
@@ -126,8 +127,8 @@ def own_strands(seen: Floats, own: Floats, near: Floats, front: Floats) -> tuple
 def own_tips(own: Floats, tau: Floats, front: Floats) -> tuple[Floats, Floats]:
     """The same for short hair, of which a tip is visible, with the others beside it.
 
-    Among strands that lie at random, tau on average and at least one, a strand has tau / (1 -
-    exp(-tau)) - 1 others beside it.
+    Among strands that lie at random, tau on average and at least one, a strand has
+    tau / (1 - exp(-tau)) - 1 others beside it.
 
     Args:
         own: tau of the card for the light. tau: of the card.

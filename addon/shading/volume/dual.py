@@ -145,8 +145,8 @@ def returned(a_forward: Floats, a_backward: Floats, count: Floats | float = np.i
     """The fraction of light that `count` strands, one behind the other, return.
 
     Endlessly deep hair returns R, with one more layer on top too: R = a_b + a_f^2 R / (1 - a_b R),
-    for any number of turns between the two. From one layer to the next the light keeps g = a_f / (1
-    - a_b R), so that a stack of n returns R (1 - g^2n) / (1 - R^2 g^2n) (Stokes 1862).
+    for any number of turns between the two. From one layer to the next the light keeps
+    g = a_f / (1 - a_b R), so that a stack of n returns R (1 - g^2n) / (1 - R^2 g^2n) (Stokes 1862).
     """
     a_forward = np.clip(a_forward, 0.0, np.maximum(_MAX_KEPT - a_backward, 0.0))
     middle = 1.0 + a_backward**2 - a_forward**2
