@@ -1,7 +1,7 @@
-"""From control points of curves in files to points on them, which is what strands are made of.
+"""Points on curves, which strands consist of, from the control points of curves in files.
 
-After the documentation of UsdGeomBasisCurves: how many segments a curve has, and which values each
-interpolation has for it. Hair runs through its points, as linear and pinned Catmull-Rom curves do.
+After the documentation of UsdGeomBasisCurves: the number of a curve's segments, and of its values
+for each interpolation. Hair runs through its points, as linear and pinned Catmull-Rom curves do.
 B-splines become the points between their segments, Bezier curves points at thirds of a segment.
 """
 
@@ -21,7 +21,7 @@ _AT_THIRDS = np.array([[27, 0, 0, 0], [8, 12, 6, 1], [1, 6, 12, 8]], np.float32)
 class Mix:
     """Values as weighted sums of others.
 
-    index: (count, terms), which ones.
+    index: (count, terms), which values.
     weight: (count, terms) float32.
     """
 
@@ -39,14 +39,14 @@ class Mix:
 
 @dataclass(frozen=True)
 class OnCurves:
-    """Points on curves, from what a file holds for them.
+    """Points on curves, and how their values follow from those in a file.
 
     offsets: (curve_count + 1,), curve c has the points offsets[c]:offsets[c + 1].
-    vertex: from values for each control point; None: they are those of the points.
-    varying: from values for each end of a segment; None: they are those of the points.
+    vertex: from values at control points; None: these are the points.
+    varying: from values at ends of segments; None: these are the points.
     varying_count: how many values of the latter kind there must be.
-    is_unfit: (curve_count,) without points, because their number does not fit the basis; None: all
-        do.
+    is_unfit: (curve_count,) curves left without points, because their number of control points does
+        not fit the basis; None: no curve.
     """
 
     offsets: Ints
@@ -57,7 +57,7 @@ class OnCurves:
 
 
 def points_on_curves(basis: str, is_pinned: bool, counts: Ints) -> OnCurves:
-    """How to get at points on open curves.
+    """The points on open curves.
 
     Args:
         basis: "linear", "catmullRom", "bspline" or "bezier".
@@ -93,10 +93,10 @@ def points_on_curves(basis: str, is_pinned: bool, counts: Ints) -> OnCurves:
 
 
 def usable_basis(basis: str, counts: Ints) -> tuple[str, tuple[str, ...]]:
-    """The basis that curves are read with, and what is to be said of it.
+    """The basis to read curves with, and notes on it.
 
-    Where most Bezier curves have a number of points that such curves cannot have, somebody has
-    written points on the curves, as Blender does of hair.
+    Where most Bezier curves have a number of points that such curves cannot have, the file holds
+    points on the curves, as Blender writes them for hair.
     """
     if basis != "bezier" or 2 * int(_are_bezier(counts).sum()) > len(counts):
         return basis, ()
@@ -116,7 +116,7 @@ def _are_bezier(counts: Ints) -> Bools:
 
 
 def _of_bezier(counts: Ints, offsets: Ints, curve: Ints, place: Ints) -> OnCurves:
-    """As many points as control points: every third control point is one, two lie between."""
+    """As many points as control points: every third of these, and two points between them."""
     is_sound = _are_bezier(counts)
     ends = (counts + 2) // 3  # one more than segments
     end_offsets = np.concatenate([[0], np.cumsum(ends)])

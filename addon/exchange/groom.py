@@ -1,7 +1,8 @@
-"""`Groom`, what every strand format is written from and read into: strands, and what engines ask.
+"""`Groom`, which all strand formats are written from and read into: strands with the attributes
+that engines read.
 
-Positions are in Blender's space: right-handed, Z up, metres. Units and axes of a file are the
-business of its writer and its reader.
+Positions are in Blender's space: right-handed, Z up, metres. Writers and readers convert to and
+from the units and axes of files.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from .tfxbone import BoneWeights
 
 @dataclass(frozen=True)
 class Groom:
-    """Strands with all that a file can say of them, checked when made; what is None is not known.
+    """Strands with all attributes that a file can hold, checked when made; None: not known.
 
     strands: points, radii [m], colours, groups, root UVs; guides are among them, marked by
         `is_guide`.
@@ -32,7 +33,7 @@ class Groom:
     closest_guides: (strand_count, 3) int32, the strand_id of guides, nearest first.
     guide_weights: (strand_count, 3) float32, their sum is 1.
     group_names: group -> name, for some of the groups.
-    bones: that carry the strands; they go into a .tfxbone file beside .tfx.
+    bones: those that carry the strands; they go into a .tfxbone file beside .tfx.
     dropped: by a reader: reason -> number of strands left out.
     source: by a reader: the file.
     motion: by a reader: where the points are at other times.
@@ -80,7 +81,7 @@ class Groom:
 
     @property
     def color(self) -> Floats | None:
-        """The strands', (point_count, 3) scene-linear."""
+        """The colours of the strands, (point_count, 3) scene-linear."""
         return self.strands.color
 
     def take(self, strands: Ints) -> Groom:
@@ -112,7 +113,7 @@ class Groom:
         return self.is_guide
 
 
-#: No motion of a file has more frames: nearly seven minutes at 24 frames a second.
+#: Maximum frames of a motion that is read: nearly seven minutes at 24 frames a second.
 MAX_FRAMES = 10_000
 
 
@@ -127,8 +128,8 @@ class ReadMotion:
     positions: Floats
 
     def at_frames(self, rate: float) -> tuple[int, Floats]:
-        """The first whole frame, and the points at this and those that follow, MAX_FRAMES at most,
-        (frames, point_count, 3); in between two times they go straight.
+        """The first whole frame, and the points from it on, (frames, point_count, 3), for at most
+        MAX_FRAMES frames; interpolated linearly between the file's times.
 
         Args:
             rate: frames in a second; frame f is at f / rate seconds.
@@ -140,7 +141,7 @@ class ReadMotion:
         return first, np.asarray(near + (far - near) * part[:, None, None], np.float32)
 
     def cut_note(self, rate: float) -> str:
-        """What is said of frames that `at_frames` leaves out; empty without any."""
+        """A note on frames that `at_frames` leaves out; empty without any."""
         _, count = self._range(rate)
         if count <= MAX_FRAMES:
             return ""
@@ -153,8 +154,8 @@ class ReadMotion:
 
 
 def between(times: Floats, wanted: Floats) -> tuple[Ints, Floats]:
-    """Of wanted times (n,), which of two or more ascending ones comes before each, and how far it
-    is to the next, in 0 to 1."""
+    """Which of two or more ascending times comes before each wanted time, (n,), and how far that is
+    to the next, 0 to 1."""
     left = np.clip(np.searchsorted(times, wanted, side="right") - 1, 0, len(times) - 2)
     part = (wanted - times[left]) / (times[left + 1] - times[left])
     return left, np.clip(part, 0.0, 1.0).astype(np.float32)
@@ -165,7 +166,7 @@ class GroomMotion:
     """The groom's points at each frame, for formats that hold motion.
 
     positions: for each frame (point_count, 3) float32 [m], in the order of the groom's points and
-        in its space; read once, so that a generator serves and not all frames need be in memory.
+        in its space; iterated once, so it can be a generator that keeps one frame in memory.
     rate: frames in a second.
     first_frame: the number of the first one; frame f is at f / rate seconds.
     """
@@ -185,9 +186,9 @@ def points_of(strands: StrandSet, chosen: Ints) -> Ints:
 
 
 def with_guide_copies(groom: Groom, guides: Ints, guide: Ints, weight: Floats) -> Groom:
-    """The groom, and behind its strands a marked copy of each guide.
+    """The groom with a marked copy of each guide after its strands.
 
-    Unreal does not draw what is marked as a guide, so a strand that is a guide is there twice.
+    Unreal does not draw strands that are marked as guides, so these are in the groom twice.
 
     Args:
         guides: (guide_count,) indices of the strands that are guides.

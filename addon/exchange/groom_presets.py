@@ -1,4 +1,4 @@
-"""What engines want of a groom Alembic, and what they will see of one before it is written."""
+"""What engines require of a groom Alembic, and a check of what they will see of one."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .groom import Groom
 
 #: Thinner than any hair of any creature [m]. A width of 0 makes Unity drop all widths.
 MIN_WIDTH = 1.0e-9
-#: Wider than any hair, in terms of its length: a mistake in units.
+#: Widths over this fraction of the hair's length are a mistake in units.
 WIDEST = 0.1
 
 
@@ -21,14 +21,14 @@ WIDEST = 0.1
 class GroomPreset:
     """How a file of strands is laid out for one engine.
 
-    title, about: what the artist reads.
+    title, about: texts for the artist.
     space: the file's unit and axes.
     max_points: longer curves are resampled to this count; the engine would cut or refuse them.
-    min_points: of a curve that the engine takes.
-    max_strands: of a group that the engine takes.
+    min_points: of a curve that the engine accepts.
+    max_strands: of a group that the engine accepts.
     parts: "strands" without guides, "guides" alone, or "both".
     is_split: one curves object for each group instead of one for all.
-    has_curve_uv: root UVs are written as the curves' own, one for each point, too.
+    has_curve_uv: root UVs are also written as the curves' own UVs, one for each point.
     basis: "linear", or "cubic" for Catmull-Rom, which goes through the points as well.
     """
 
@@ -45,8 +45,8 @@ class GroomPreset:
     basis: str = "linear"
 
 
-#: Unreal adds nothing to a groom's axes on import: it is left-handed with Z up, and meshes from
-#: Blender arrive there with y mirrored. It keeps 8 bits for a point's number, 22 for a curve's.
+#: Unreal does not convert a groom's axes on import: it is left-handed with Z up, and meshes from
+#: Blender arrive there with y mirrored. It stores a point's number in 8 bits, a curve's in 22.
 UNREAL = GroomPreset(
     "unreal",
     "Unreal",
@@ -56,8 +56,8 @@ UNREAL = GroomPreset(
     max_strands=(1 << 22) - 1,
 )
 #: Unity's Alembic importer takes files as right-handed with Y up and scales them by 0.01, unless
-#: set otherwise: so centimetres. Its hair wants all strands, a curves object for a strand group,
-#: and reads root UVs from the curves.
+#: set otherwise: so centimetres. Its hair package needs all strands, in a curves object for each
+#: group, and reads root UVs from the curves.
 UNITY = GroomPreset(
     "unity",
     "Unity",
@@ -98,16 +98,16 @@ def chosen_strands(groom: Groom, parts: str) -> Ints:
 
 
 def preflight(groom: Groom, preset: GroomPreset) -> dict[str, Any]:
-    """What the engine will see of a groom that is written so, in the units and axes of the file.
+    """What the engine will see of a groom written with this preset, in the file's units and axes.
 
     Returns:
-        strands, guides, points: counts; groups: group -> strands of it, or guides where there is
-            nothing else.
+        strands, guides, points: counts; groups: group -> number of its strands, or of its guides
+            where there are only guides.
         points_per_curve, width: least and most; length: shortest and longest.
         lowest, highest: corners of the bounds.
         resampled: strands with more points than the engine takes.
-        warnings: sentences for the artist; the groom can be written in spite of them, but for
-            having no strands.
+        warnings: sentences for the artist; only a lack of strands keeps the groom from being
+            written.
     """
     written = chosen_parts(groom, preset.parts)
     strands = written.strands

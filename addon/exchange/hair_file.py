@@ -1,11 +1,11 @@
 """Cem Yuksel's .hair files (cyHairFile), which many renderers and papers read: little-endian.
 
-128 bytes of header, then the arrays whose bits are set, each of all strands, root first: segments
+A header of 128 bytes, then the arrays whose bits are set, each of all strands, root first: segments
 (u16 a strand), points, thickness, transparency, colour, and UVs of points, which LuxCore added
-(bit 32; the specification keeps it for later). What has no array is the same for all strands and
-stands in the header. Thickness is the diameter, as LuxCore reads it.
+(bit 32; the specification keeps it for later). A value without an array is the same for all strands
+and is in the header. Thickness is the diameter, as LuxCore reads it.
 
-Units and axes are not said: Yuksel's own models have Z up. Groups are not stored.
+Units and axes are not stored: Yuksel's own models have Z up. Groups are not stored either.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ _ARRAYS = {
     _COLOR: ("colours", 3),
     _UV: ("UVs", 2),
 }
-#: Segments of a strand that fit into 16 bits.
+#: Maximum segments of a strand, which fit into 16 bits.
 MAX_SEGMENTS = 0xFFFF
 _WHITE = (1.0, 1.0, 1.0)
 
@@ -68,7 +68,7 @@ HEADER = np.dtype(
 class ReadHairFile(ReadGroom):
     """A .hair file.
 
-    info: what its maker wrote into it.
+    info: a text by the program that wrote it.
     transparency: (point_count,) float32 from 0, opaque, to 1.
     """
 
@@ -135,7 +135,7 @@ def write_hair_file(
     parts: Literal["strands", "guides", "both"] = "strands",
     uv: bool = False,
 ) -> tuple[str, ...]:
-    """Write a groom with thickness, and colours if known; what is one for all goes in the header.
+    """Write a groom with thickness, and colours if known; values common to all go into the header.
 
     Args:
         hair: Z up, metres; of any point counts.
@@ -145,7 +145,7 @@ def write_hair_file(
         uv: write root UVs as LuxCore's UVs of points; other readers may refuse such a file.
 
     Returns:
-        What the file cannot say of this groom.
+        Notes on what the file cannot store of this groom.
 
     Raises:
         HairloomError: no strands, a strand of more than 65,535 segments, or nothing can be written
@@ -189,7 +189,7 @@ def _one_or_each(
 ) -> None:
     """One value in the header where all are the same, else an array.
 
-    White is what a file without colours says, so that white hair has an array too.
+    White in the header means that there are no colours, so white hair gets an array, too.
     """
     is_one = bool((values == values[:1]).all())
     if is_one and not (bit == _COLOR and (values[0] == 1.0).all()):
@@ -207,7 +207,7 @@ def _color(file: _HairFile, point_count: int) -> Floats | None:
 
 
 class _HairFile(BinaryFile):
-    """A .hair file whose header was read and found sound, and whose arrays are all there."""
+    """A .hair file with a valid header and complete arrays."""
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)

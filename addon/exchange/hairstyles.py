@@ -1,6 +1,6 @@
 """A hairstyle as data: guides on the built-in head, Blender's own node modifiers, settings.
 
-NAME.json says what the style is, NAME.npz beside it holds the guides:
+NAME.json describes the style, NAME.npz beside it holds the guides:
 
 {"hairloom_style": 1, "title": "Bob", "source": "Hairloom", "order": 50,
  "masks": {"children": "scalp"},
@@ -33,15 +33,15 @@ from ..strands.rooted_shapes import RootedShapes
 from .files.atomic import write_bytes_atomic, write_text_atomic
 
 STYLE_VERSION = 1
-#: no style has nearly as many bytes: of its text, and of its guides once they are unpacked
+#: maximum bytes of a style's text and of its unpacked guides, far above those of any style
 _LONGEST_TEXT, _MAX_BYTES = 1 << 16, 1 << 26
-#: shapes are kept in steps of this [m]: finer than any hair is wide, and 65 cm fit into 16 bits
+#: shapes are stored in steps of this [m]: finer than any hair is wide, and 65 cm fit into 16 bits
 _STEP = 2.0e-5
-#: the section of settings that says how fur grows, which has no guides
+#: the section of settings by which fur grows, which has no guides
 GROWN = "grow"
-#: what a mask may say: where children grow
+#: what masks may be for: where children grow
 MASKS = ("children",)
-#: what numpy and zipfile raise at damaged files, some of it of encryption that is none
+#: what numpy and zipfile raise for damaged files, which may seem to be encrypted
 _UNREADABLE = (
     OSError,
     ValueError,
@@ -66,7 +66,7 @@ type InputValue = bool | int | float | str
 @dataclass(frozen=True)
 class NodeModifier:
     """nodes: name of one of Blender's node groups for hair.
-    inputs: by the name that the artist sees; what is not named keeps its default.
+    inputs: by the name that the artist sees; inputs that are not named keep their defaults.
     """
 
     nodes: str
@@ -77,9 +77,9 @@ class NodeModifier:
 class Hairstyle:
     """guides: None: it grows on any mesh, by the section `grow` of its settings.
     order: its place among others, the lowest first.
-    masks: vertex groups of the head, by what they say, see MASKS.
-    presets: names of presets, the later over the earlier.
-    settings: section -> values, over those.
+    masks: one of MASKS -> vertex group of the head.
+    presets: names of presets; later ones override earlier ones.
+    settings: section -> values, which override the presets.
     name: by which it is found again; a file's is its path. Not written.
     """
 
@@ -101,7 +101,8 @@ def read_hairstyle(path: Path, kinds: Mapping[str, type[Settings]]) -> Hairstyle
         kinds: the sections whose settings it may hold.
 
     Raises:
-        HairloomError: a file is missing, damaged or of a newer version, or names what is not there.
+        HairloomError: a file is missing, damaged or of a newer version, or has unknown sections or
+            masks.
     """
     data, place = _text(path), str(path)
     version = data.get("hairloom_style")
@@ -182,10 +183,11 @@ def _packed(guides: RootedShapes, place: str) -> bytes:
 
 
 def _packed_steps(steps: Ints) -> Ints:
-    """Bytes (2, 3, point_count) of what leads from each of point_count points to the next, int16.
+    """Points (point_count, 3) int16 as bytes (2, 3, point_count): low bytes, then high ones, by
+    axes.
 
-    Low bytes first, then high ones, by axes. Second differences, which wrap around and have their
-    sign in the lowest bit, pack a tenth better than first ones, bytes that are alike side by side.
+    They are stored as second differences, which wrap around and have their sign in the lowest bit.
+    Side by side, similar bytes of these compress a tenth better than those of first differences.
     """
     change = steps.copy()
     for _ in range(2):

@@ -1,4 +1,4 @@
-"""Several grooms as one, each with groups of its own: what engines import as one asset."""
+"""Several grooms as one, each with groups of its own, which engines import as one asset."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from .tfxbone import BoneWeights
 
 
 def joined_grooms(grooms: Sequence[Groom], name: str) -> tuple[Groom, tuple[str, ...]]:
-    """All strands one after the other, their groups numbered again, and named after their groom.
+    """All strands as one groom, with groups renumbered and named after their groom.
 
     Returns:
-        the groom, and what is lost because not all of them have it.
+        The groom, and notes on attributes that are lost because not all grooms have them.
     """
     if len(grooms) == 1:
         return grooms[0], ()
@@ -60,7 +60,7 @@ def _lost(
 
 
 def joined_bones(bones: Sequence[BoneWeights]) -> BoneWeights:
-    """Of all strands one after the other; bones of the same name are one."""
+    """The bones of all strands, one groom after the other; bones of the same name become one."""
     names = tuple(dict.fromkeys(name for each in bones for name in each.names))
     places = {name: place for place, name in enumerate(names)}
     carried = [np.array([places[name] for name in each.names])[each.bone] for each in bones]
@@ -83,7 +83,7 @@ def _groups(grooms: Sequence[Groom]) -> tuple[Any, dict[int, str]]:
 
 
 def _numbered(grooms: Sequence[Groom]) -> dict[str, Any]:
-    """New IDs of all strands, and the same guides by them; nothing where no groom has IDs."""
+    """New IDs of all strands, and closest guides by these; empty where no groom has IDs."""
     if all(groom.strand_id is None for groom in grooms):
         return {}
     ids, closest, taken = [], [], 0
@@ -106,7 +106,7 @@ def _numbered(grooms: Sequence[Groom]) -> dict[str, Any]:
 
 
 def _guides(grooms: Sequence[Groom]) -> Any:
-    """Marks of guides where some grooms have them; None where none has."""
+    """Which strands are guides, where some grooms mark them; None where none does."""
     if all(groom.is_guide is None for groom in grooms):
         return None
     return np.concatenate(

@@ -1,4 +1,4 @@
-"""The files that a file of a mesh or groom names: whoever reads the one depends on the others."""
+"""The files that a file of a mesh or groom refers to, which its content depends on."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ _MATERIALS, _PICTURE = (
 
 
 def named_files(path: Path) -> list[Path]:
-    """Those that are there, of a file that could be read: buffers and pictures of a .gltf,
-    materials of an .obj and their pictures, and layers and pictures of USD."""
+    """The existing files that a readable file refers to: buffers and pictures of a .gltf, materials
+    of an .obj and their pictures, and layers and pictures of USD."""
     suffix = path.suffix.lower()
     if suffix == ".gltf":
         found = _of_gltf(path)
@@ -42,13 +42,14 @@ def _of_gltf(path: Path) -> list[Path]:
         content: Any = json.loads(path.read_bytes())
         entries = [*content.get("buffers", ()), *content.get("images", ())]
         uris = [each["uri"] for each in entries if "uri" in each]
-    except (ValueError, AttributeError, TypeError):  # a reader of it has said what is wrong
+    except (ValueError, AttributeError, TypeError):  # whoever read it has reported what is wrong
         return []
     return [path.parent / unquote(uri) for uri in uris if not uri.startswith("data:")]
 
 
 def _of_lines(path: Path, line: re.Pattern[bytes]) -> Iterator[Path]:
-    """Names may have spaces, and follow options or other names: all that could be one."""
+    """All existing files that lines may name: names may have spaces, and follow options or other
+    names."""
     for found in line.finditer(path.read_bytes()):
         words = found[1].decode("utf-8", "replace").split()
         ends = (" ".join(words[first:]) for first in range(len(words)))
@@ -59,7 +60,7 @@ def _of_lines(path: Path, line: re.Pattern[bytes]) -> Iterator[Path]:
 def _of_usd(path: Path) -> list[Path]:
     try:
         usd_library(path)
-    except HairloomError:  # then nobody has read it
+    except HairloomError:  # then it cannot have been read
         return []
     from pxr import Tf, UsdUtils
 

@@ -1,4 +1,4 @@
-"""What a reader of a groom's file gives back, and the checks that readers share."""
+"""The result of reading a groom's file, and the checks that readers share."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from .groom import Groom
 
 @dataclass(frozen=True)
 class ReadGroom:
-    """What a file held that can be used.
+    """The usable content of a file.
 
     groom: Z up, metres.
-    version: as the file says, such as "1.5"; "" where it says none.
+    version: as the file names it, such as "1.5"; "" where it names none.
     axes: how the file's axes were read, in metres.
-    notes: what the file also holds, and the groom does not.
+    notes: what of the file is not in the groom.
     """
 
     groom: Groom
@@ -67,7 +67,7 @@ def usable(
 
 
 def finite(values: Floats, least: float = -np.inf) -> Floats:
-    """0 where a value is not finite or less than `least`."""
+    """Values, with 0 instead of those that are not finite or less than `least`."""
     is_sound = np.isfinite(values) & (values >= least)
     return values if is_sound.all() else np.where(is_sound, values, np.float32(0.0))
 
@@ -82,7 +82,7 @@ def kept_points(values: Floats, offsets: Ints, cleaned: Cleaned) -> Floats:
 
 
 def known_apart(identities: dict[str, Any], notes: list[str]) -> dict[str, Any]:
-    """IDs, and what names strands by them; nothing where two strands have the same. Notes grow."""
+    """IDs, and attributes that refer to them; empty if strands share an ID. Adds to `notes`."""
     numbers = identities.get("strand_id")
     if numbers is None or len(np.unique(numbers)) == len(numbers):
         return identities

@@ -9,21 +9,21 @@ import numpy as np
 from ..arrays import Floats
 from .groom import ReadMotion, between
 
-#: Times nearer than this [s] are one.
+#: Times nearer to each other than this [s] are one.
 _SAME_TIME = 1.0e-5
-#: Times from here on [s] are beyond the last frame that Blender has, at any rate.
+#: Times beyond this [s] are after Blender's last frame, at any frame rate.
 _LATEST = 2.0e6
 
 
 def motion_of(
     parts: Sequence[tuple[Floats | None, Floats]],
 ) -> tuple[Floats, Floats] | None:
-    """Times and points of all parts, (n,) and (n, point_count, 3); None where none moves: programs
-    write still hair at each frame, too.
+    """Times and points of all parts, (n,) and (n, point_count, 3); None where none moves, since
+    programs also write still hair at each frame.
 
     Args:
-        parts: times of each, (k,), and its points at these, (k, own_count, 3); None: it is still,
-            k = 1.
+        parts: of each its times, (k,), or None if it is still and k is 1; and its points at these,
+            (k, own_count, 3).
     """
     known = [times for times, _ in parts if times is not None and len(times) > 1]
     if not known or not all(np.isfinite(times).all() for times in known):
@@ -36,7 +36,7 @@ def motion_of(
 
 
 def _at(times: Floats, own: Floats | None, positions: Floats) -> Floats:
-    """A part at the times of all."""
+    """The points of a part at the times of all parts."""
     if own is None or len(own) < 2:
         return np.repeat(positions[:1], len(times), axis=0)
     if len(own) == len(times) and np.allclose(own, times, rtol=0.0, atol=_SAME_TIME):
@@ -48,8 +48,8 @@ def _at(times: Floats, own: Floats | None, positions: Floats) -> Floats:
 
 
 def sound_motion(times: Floats, positions: Floats) -> tuple[ReadMotion | None, str]:
-    """The motion up to the first time at which a point is not finite or that no scene has, and what
-    is said of that."""
+    """The motion before the first time that no scene has or at which a point is not finite, and a
+    note on that."""
     is_finite, is_near = np.isfinite(positions).all(axis=(1, 2)), np.abs(times) < _LATEST
     is_sound = is_finite & is_near
     count = len(times) if is_sound.all() else int(is_sound.argmin())

@@ -1,4 +1,4 @@
-"""What a program will see of strands before they are written: numbers, and the same in words."""
+"""What a program will see of strands, found before they are written: as numbers and in words."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from .strand_formats import StrandFormat
 
 #: units in a metre -> name
 _UNITS = {1.0: "m", 10.0: "dm", 100.0: "cm", 1000.0: "mm"}
-#: Groups that are named one by one.
+#: Maximum number of groups that are named one by one.
 _MAX_NAMED = 8
 
 
 def check_strands(
     groom: Groom, kind: StrandFormat, settings: StrandExportSettings
 ) -> dict[str, Any]:
-    """What `groom_presets.preflight` says, for any format, in the file's unit and axes.
+    """`groom_presets.preflight` for any format, in the file's unit and axes.
 
     Returns:
-        its facts, and: format; unit, such as "cm"; up; is_mirrored; group_names of those groups
+        Its facts, and: format; unit, such as "cm"; up; is_mirrored; group_names of those groups
         that have one.
 
     Raises:
-        HairloomError: an engine or option that cannot be.
+        HairloomError: an engine or option that the format does not have.
     """
     preset = layout_of(kind, settings)
     space = preset.space

@@ -1,4 +1,4 @@
-"""How strands are written to files: what an artist chooses, and the layout that follows."""
+"""Settings of strand files, and the file's layout that follows from them."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from .groom_presets import GroomPreset
 from .strand_formats import STRAND_FORMATS, StrandFormat
 from .tressfx_layout import VERTEX_COUNTS
 
-#: as the format has it, or the engine wants it
+#: the default of the format or the engine
 USUAL = "usual"
 
 
 def _engines() -> tuple[tuple[str, str, str], ...]:
-    """Those of all formats, with what each format says of them."""
+    """The engines of all formats, with each format's description of them."""
     titles: dict[str, str] = {}
     about: dict[str, list[str]] = {}
     for each in STRAND_FORMATS:
@@ -29,7 +29,7 @@ def _engines() -> tuple[tuple[str, str, str], ...]:
 
 @dataclass(frozen=True, kw_only=True)
 class StrandExportSettings(Settings):
-    """What is chosen beside the file and its format; a format goes by some of it alone."""
+    """Options of a strand file beside its path and format; each format has some of them."""
 
     section: ClassVar[str] = "strands_export"
     title: ClassVar[str] = "Strand Files"
@@ -151,10 +151,10 @@ class StrandExportSettings(Settings):
 
 
 def layout_of(kind: StrandFormat, settings: StrandExportSettings) -> GroomPreset:
-    """The engine's layout of the file, with all that was chosen in its place.
+    """The engine's layout of the file, with the artist's choices applied to it.
 
     Raises:
-        HairloomError: an engine that the format does not know, or a choice that it cannot follow.
+        HairloomError: an engine or option that the format does not have.
     """
     _check_options(kind, settings)
     layout = _engine_layout(kind, settings.engine)
@@ -181,7 +181,7 @@ def metres_per_unit(kind: StrandFormat, settings: StrandExportSettings) -> float
 
 
 def _engine_layout(kind: StrandFormat, engine: str) -> GroomPreset:
-    """The layout for the engine that is asked for, or the format's usual one."""
+    """The layout for this engine, or the format's usual one."""
     if engine == USUAL:
         return kind.layouts[0]
     for layout in kind.layouts:

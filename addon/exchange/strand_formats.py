@@ -18,12 +18,12 @@ _ENDLESS = (1 << 31) - 1
 class StrandFormat:
     """One of the formats.
 
-    name: as the command line has it.
+    name: on the command line.
     entry: in the File menu. about: the tooltip there.
     suffixes: of such files, in lower case, the usual one first.
-    layouts: those of the engines that it knows, the usual one first; without the option
-        `engine` there is one alone.
-    options: the parameters of `StrandExportSettings` that such a file goes by.
+    layouts: for the engines that it supports, the usual one first; only one without the option
+        `engine`.
+    options: the parameters of `StrandExportSettings` that apply to such a file.
     has_motion: whether a file can hold positions over time.
     """
 
@@ -143,7 +143,7 @@ def format_of(path: Path, name: str | None = None) -> tuple[Path, StrandFormat]:
     """The format of a file to write, and its path, which gets the usual suffix where it has none.
 
     Args:
-        name: of the format; None goes by the suffix.
+        name: of the format; None: the suffix decides.
 
     Raises:
         HairloomError: the suffix is of no format, or of another one.

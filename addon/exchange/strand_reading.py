@@ -1,4 +1,4 @@
-"""One way in for all files of strands, whichever format their suffix names."""
+"""Reading strands from a file of any format, by its suffix."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .strand_formats import ALEMBIC, HAIR, TRESSFX, USD, strand_format
 from .tressfx import read_tfx
 from .usd.groom_usd_read import read_usd
 
-#: what of a file that holds strands and guides is wanted
+#: which part of a file with strands and guides is read
 PARTS = ("strands", "guides", "both")
 
 
@@ -33,20 +33,20 @@ def read_strands(
 
     Args:
         path: .abc, .usdc, .usd, .usda, .tfx or .hair.
-        up: the file's up axis, "Y" or "Z". None: as a USD file and our Alembic files say; of others
-            Z in a .hair file, else Y.
-        scale: what lengths are multiplied by, beside what the file says of its unit; a .tfx or
-            .hair file says nothing and is taken to be in metres.
-        parts: one of PARTS. A file that holds guides alone gives those for "strands", too.
+        up: the file's up axis, "Y" or "Z". None: as USD files and our own Alembic files name it;
+            else Z in a .hair file, and Y in others.
+        scale: factor on lengths, beside the file's own unit; a .tfx or .hair file has none and is
+            taken to be in metres.
+        parts: one of PARTS. Of a file with guides alone, "strands" gives these.
         python: the command that starts another Python, see `subprocess_reader.run_reader`.
 
     Returns:
-        What the file's reader gives, with notes on what was left out. Closest guides are kept
-        where strands and guides are.
+        The result of the format's reader, with notes on what was left out. Closest guides are only
+        kept if both strands and guides are.
 
     Raises:
-        HairloomError: another suffix, no guides where they are wanted, or whatever keeps the file
-            from being read.
+        HairloomError: another suffix, no guides where they are wanted, or a file that cannot be
+            read.
     """
     if parts not in PARTS:
         raise HairloomError(
@@ -74,7 +74,7 @@ _READERS: dict[str, Reader] = {
 
 
 def _parts(groom: Groom, parts: str, path: Path) -> tuple[Groom, tuple[str, ...]]:
-    """What is wanted of a groom, and what there is to say of the rest."""
+    """The wanted part of a groom, and notes on the rest."""
     is_guide = groom.is_guide
     guides = 0 if is_guide is None else int(is_guide.sum())
     others = groom.strands.strand_count - guides
@@ -98,5 +98,5 @@ def _parts(groom: Groom, parts: str, path: Path) -> tuple[Groom, tuple[str, ...]
 
 
 def _untied(groom: Groom) -> Groom:
-    """Without the closest guides, which are no longer there."""
+    """The groom without closest guides, which are no longer in it."""
     return replace(groom, closest_guides=None, guide_weights=None)

@@ -1,4 +1,4 @@
-"""Strands to a file of any of the formats, by its suffix."""
+"""Writing strands to a file of any format, by its suffix."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class WrittenStrands:
     """What was written.
 
     files: all of them, that of the given path first where there is one.
-    notes: what the files cannot say of the groom.
+    notes: what the files cannot store of the groom.
     """
 
     files: tuple[Path, ...]
@@ -50,7 +50,7 @@ def write_strands(
         motion: of the groom's points; for Alembic and USD.
 
     Raises:
-        HairloomError: a suffix, engine or option that cannot be, motion for a format without,
+        HairloomError: a suffix, engine or option that does not exist, motion for a format without,
             nothing to write, a library that is missing, or nothing can be written there.
     """
     kind, settings = strand_format(path), settings or StrandExportSettings()
@@ -125,7 +125,7 @@ def _write_tressfx(
 
 
 def _bones_set_aside(written: Collection[Path]) -> tuple[str, ...]:
-    """Bones of an earlier export would be read with strands that they do not fit; a note for each.
+    """Rename bones of an earlier export, which do not fit the new strands; a note for each.
 
     Raises:
         HairloomError: they cannot be moved.
@@ -189,8 +189,8 @@ def _write_files(
 
 
 def _of_earlier(files: Collection[Path]) -> set[str]:
-    """Names of the files that an earlier export of this has left; none where one of them is not
-    there, so that the others are somebody else's."""
+    """The names of files that an earlier export of this has left; none if one of them is missing,
+    since the others are then of something else."""
     if not all(file.is_file() for file in files):
         return set()
     return {name for file in files for name in (file.name, file.with_suffix(".tfxbone").name)}
@@ -214,7 +214,7 @@ def _group_files(path: Path, groom: Groom) -> dict[Path, Ints]:
 
 
 def _part(groom: Groom, chosen: Ints, parts: str) -> Groom:
-    """The chosen strands; closest guides go where they are not all in the file."""
+    """The chosen strands, without closest guides where these are not in the file."""
     if len(chosen) < groom.strands.strand_count:
         groom = groom.take(chosen)
     if parts != "both" and groom.closest_guides is not None:

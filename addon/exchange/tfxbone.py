@@ -1,9 +1,9 @@
 """TressFX .tfxbone: the bones that carry a .tfx groom, four weights a strand; little-endian.
 
-i32 bone count; of each bone {i32 index, i32 length with the NUL, chars}; i32 strand count; of each
-strand {i32 index, 4 x (i32 bone, f32 weight)}. This is what TressFX's loader reads; the header
-struct in its TressFXFileFormat.h is not. The loader goes by the order of the strands, not by their
-index, takes bone -1 for none, and gives strands beyond the last one the weights of the last one.
+i32 bone count; for each bone {i32 index, i32 length with the NUL, chars}; i32 strand count; for
+each strand {i32 index, 4 x (i32 bone, f32 weight)}. This is what TressFX's loader reads; the header
+struct in its TressFXFileFormat.h is not. The loader uses the order of strands, not their index,
+reads bone -1 as none, and gives strands beyond the last one the weights of the last one.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from .files.binary_file import write_blocks
 
 #: Bones of one strand.
 INFLUENCES = 4
-#: A sum of weights so near to 1 is 1.
+#: A sum of weights this near to 1 counts as 1.
 _ROUNDING = 1.0e-6
 
 _STRAND = np.dtype(
@@ -36,10 +36,10 @@ class BoneWeights:
     names: of the bones.
     bone: (strand_count, 4) int32, indices into `names`, 0 where the weight is 0.
     weight: (strand_count, 4) float32, not negative, their sum is 1.
-    loose_count: strands that no bone carried, and that go with the first one.
+    loose_count: how many strands no bone carried; they follow the first one.
 
     Raises:
-        HairloomError: shapes that do not fit, an index that is no bone's, no sum of 1.
+        HairloomError: shapes that do not fit, an index of no bone, a sum that is not 1.
     """
 
     names: tuple[str, ...]
@@ -62,7 +62,7 @@ class BoneWeights:
         return len(self.bone)
 
     def take(self, strands: Ints) -> BoneWeights:
-        """Those of the strands with these indices, in this order."""
+        """The bones of the strands with these indices, in this order."""
         return BoneWeights(self.names, self.bone[strands], self.weight[strands])
 
 

@@ -1,15 +1,15 @@
 """TressFX .tfx grooms, versions 3 and 4: little-endian, strand after strand, root first.
 
 Layout after AMD's TressFXFileFormat.h (versions 3.1 and 4.x). Version 3 stores positions as
-float3, version 4 as float4 whose w is the inverse mass, 0 where a vertex is held. All strands of a
-file are what TressFX calls guides: it grows follow hairs around them when it loads them, in version
-3 as many as the file says, in version 4 as many as the game says. `tfxbone` is the skinning.
+float3, version 4 as float4 whose w is the inverse mass, 0 where a vertex is held. TressFX calls all
+strands of a file guides: it grows follow hairs around them when it loads them, in version 3 as many
+as the file says, in version 4 as many as the game says. `tfxbone` is the skinning.
 
 Root UVs count v from the top of the picture, as AMD's shaders and its exporter for Maya do.
 
-Limitations: a file has one radius a strand, so a taper is not kept; groups are not stored, for
-which TressFX takes a file each (`group_files`). No loader of AMD reads the thickness, whose header
-names no unit; here it is the radius, as what their shaders multiply it with is one.
+Limitations: a file has one radius a strand, so a taper is not kept; groups are not stored, so each
+needs a file of its own (see `strand_writing`). AMD's loaders do not read the thickness, and its
+header names no unit; here it is the radius, since AMD's shaders multiply it with a radius.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ def read_tfx(path: Path, up: str = "Y", scale: float = 1.0) -> ReadTressfx:
     count, positions = file.vertex_count, file.positions()
     thickness, strand_uv = file.of_strands("thickness", 1), file.of_strands("strand_uv", 2)
     color, vertex_uv = file.of_vertices("color", 4), file.of_vertices("vertex_uv", 2)
-    # What overflows becomes infinite, and what is not finite is dropped and counted.
+    # overflow gives infinity, and strands that are not finite are dropped and counted
     with np.errstate(over="ignore", invalid="ignore"):
         points = to_z_up(positions[:, :3], up) * np.float32(scale)
         radius = None if thickness is None else thickness[:, 0] * np.float32(scale)
@@ -128,7 +128,7 @@ def write_tfx(
             the root to 1 at the tip.
 
     Returns:
-        What the file cannot say of this groom.
+        Notes on what the file cannot store of this groom.
 
     Raises:
         HairloomError: no strands, a vertex count TressFX refuses, a file beyond 4 GiB, or nothing
@@ -171,7 +171,7 @@ def _write(path: Path, blocks: dict[str, Floats]) -> None:
     end = HEADER_4.itemsize
     filed: list[NDArray[Any] | bytes] = []
     for name, block in blocks.items():
-        gap = -end % 8  # the format asks for it
+        gap = -end % 8  # as the format requires
         if end + gap > np.iinfo(np.uint32).max:
             raise HairloomError(
                 "TressFX files end at 4 GiB, and this groom is larger",
@@ -185,8 +185,8 @@ def _write(path: Path, blocks: dict[str, Floats]) -> None:
 
 
 def _from_top(uv: Floats) -> Floats:
-    """UVs (n, 2) whose v goes the other way up: Blender counts it from the bottom of a picture, and
-    TressFX, which looks colours of roots up with it, from the top as Direct3D does."""
+    """UVs (n, 2) with v flipped: Blender counts it from the bottom of a picture, and TressFX, which
+    looks up colours of roots with it, from the top as Direct3D does."""
     return np.stack([uv[:, 0], 1.0 - uv[:, 1]], axis=1)
 
 

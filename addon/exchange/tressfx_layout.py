@@ -47,7 +47,7 @@ _LAYOUTS = {3: (HEADER_3, 3), 4: (HEADER_4, 4)}
 
 
 class TressfxFile(BinaryFile):
-    """A .tfx file whose header was read and found sound.
+    """A .tfx file with a valid header.
 
     Raises:
         HairloomError: the file cannot be read, or is no TressFX 3 or 4 file.
@@ -63,7 +63,7 @@ class TressfxFile(BinaryFile):
 
     @property
     def follow_count(self) -> int:
-        """Follow hairs of each strand; only version 3 says so."""
+        """The number of follow hairs of each strand; only version 3 stores it."""
         return int(self._header["follow_count"]) if self.position_width == 3 else 0
 
     def held(self, strand_count: int) -> Bools:
@@ -88,7 +88,7 @@ class TressfxFile(BinaryFile):
         return self._optional(name, self.strand_count, width)
 
     def _version(self) -> float:
-        """The version at byte 0, when it is one that we read."""
+        """The version at byte 0, if it is one that can be read."""
         version = float(self.array("version", 0, "<f4", 1)[0])
         if 3.0 <= version < 5.0:
             return version

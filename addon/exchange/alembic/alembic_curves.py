@@ -4,11 +4,18 @@
 
 Alembic's library may crash, or ask for all memory, on a damaged file. So this module imports no
 other of ours: it can be run by its path in a process that may die. The result has, for each curves
-object N in the file's order, "N/name", "N/matrix" (4, 4) that takes row vectors to the world,
-"N/points", "N/counts", "N/basis", "N/is_closed", "N/widths" where there are some, and "N/groom_*"
-as the file has them; of curves that move "N/times" [s] and "N/motion" (times, points, 3) in the
-world, as long as they have the same counts, and else "N/ended", the time from which on they have
-others; and what the file says of itself: "application", and "groom_*" of the top object.
+object N in the file's order,
+
+    N/name
+    N/matrix                      (4, 4), takes row vectors to the world
+    N/points, N/counts, N/basis, N/is_closed
+    N/widths                      where there are some
+    N/groom_*                     as the file has them
+    N/times                       [s], only of curves that move, as are the next two
+    N/motion                      (times, points, 3) in the world, while counts are the same
+    N/ended                       the time from which on they are others, if there is such a time
+
+and of the whole file "application", and "groom_*" of the top object.
 """
 
 from __future__ import annotations
@@ -23,11 +30,11 @@ from numpy.typing import NDArray
 
 type Arrays = dict[str, NDArray[Any]]
 
-#: What the process may take beside ten times the file's size [bytes].
+#: Memory that the process may take beside ten times the file's size [bytes].
 MEMORY = 4 << 30
-#: Objects below each other; a damaged file may have them in a circle.
+#: Maximum depth of objects, which form a cycle in some damaged files.
 DEEPEST = 64
-#: Samples of motion: nearly seven minutes at 24 frames a second.
+#: Maximum samples of motion: nearly seven minutes at 24 frames a second.
 MAX_TIMES = 10_000
 #: Exit codes, as `run_reader` expects them: after an error that is reported on stderr; where the
 #: results cannot be written.
@@ -56,7 +63,7 @@ def read_curves(path: str) -> Arrays:
 
 def _walk(thing: Any, above: tuple[Any, ...], found: Arrays, depth: int) -> None:
     """Args:
-    above: the schemas of what places it in the world, the outermost first.
+    above: the schemas of the transforms above it, the outermost first.
     """
     from alembic3d import Abc, AbcGeom
 
@@ -95,10 +102,10 @@ def _matrix(above: tuple[Any, ...], time: float | None = None) -> NDArray[np.flo
 
 
 def _around(moving: Any, time: float | None) -> tuple[list[tuple[Any, ...]], float]:
-    """How to ask for the samples before and after a time, and how far it is from one to the other;
-    for one sample where it is that, or lies beyond all.
+    """Selectors of the samples before and after a time, and how far it is between them, 0 to 1;
+    one selector where the time is that of a sample, or beyond all.
 
-    The library itself gives the nearest one.
+    The library itself only gives the nearest sample.
     """
     from alembic3d import Abc
 
@@ -112,7 +119,7 @@ def _around(moving: Any, time: float | None) -> tuple[list[tuple[Any, ...]], flo
 
 
 def _mixed(around: list[NDArray[Any]], part: float) -> NDArray[Any]:
-    """Between two samples values go straight."""
+    """Values interpolated linearly between two samples."""
     return around[0] if len(around) == 1 else around[0] + (around[1] - around[0]) * part
 
 
@@ -147,7 +154,7 @@ def _read_motion(schema: Any, above: tuple[Any, ...], prefix: str, found: Arrays
 
 
 def _times(moving: Any) -> NDArray[np.float64]:
-    """Of the samples of a property [s]."""
+    """The times of a property's samples [s]."""
     sampling = moving.getTimeSampling()
     count = moving.getNumSamples()
     return np.array([sampling.getSampleTime(number) for number in range(count)], np.float64)
@@ -171,7 +178,7 @@ def _read_geometry(schema: Any, prefix: str, found: Arrays) -> None:
 
 
 def _read_user(schema: Any, found: Arrays) -> None:
-    """The file's own version and tool; the first object that has some is believed."""
+    """The file's own version and tool, from the first object that has some."""
     for header in schema.propertyheaders:
         if header.getName() == ".userProperties" and "groom_version_major" not in found:
             _read_attributes(schema, header, "", found)
@@ -211,8 +218,11 @@ def _values(parent: Any, header: Any, *when: Any) -> NDArray[Any]:
 
 
 def _limit_memory(path: str) -> None:
-    """A file whose counts lie must not take all memory; only where the system sees to it: Windows
-    has no such limit, macOS refuses it. Blender itself, where it is this process, has much."""
+    """Limit the memory of this process, so that a file with wrong counts cannot take all of it.
+
+    Windows has no such limit, macOS refuses it. On Linux the memory that the process has already is
+    added, which is much where it is Blender itself.
+    """
     try:
         import resource
     except ImportError:
@@ -243,4 +253,4 @@ def _main(path: str, result: str) -> int:
 if __name__ == "__main__":
     code = _main(*sys.argv[-2:])
     sys.stderr.flush()
-    os._exit(code)  # at once: the library's own end may fail on what it has read
+    os._exit(code)  # at once: the library's own shutdown may fail on what it has read

@@ -1,4 +1,4 @@
-"""PyAlembic, as the package `alembic3d` brings it, and its arrays to and from numpy's."""
+"""PyAlembic from the package `alembic3d`, and its arrays from numpy's."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _PARAMETER = {
 
 
 def alembic_library(place: str) -> Any:
-    """Its modules as `abc`, `geom`, `core` and `imath`.
+    """The modules of PyAlembic as `abc`, `geom`, `core` and `imath`.
 
     Raises:
         HairloomError: it cannot be loaded in this Python.
@@ -47,7 +47,7 @@ def alembic_library(place: str) -> Any:
 
 
 def array_of(library: Any, values: Floats | Ints) -> Any:
-    """A copy of (n,) or (n, width) float32 or int32 as Imath has it."""
+    """A copy of (n,) or (n, width) float32 or int32 as an array of Imath."""
     return getattr(library.imath, _FROM_BUFFER[_kind(values)])(np.ascontiguousarray(values))
 
 

@@ -31,7 +31,7 @@ class Joined:
     root_uv: (curve_count, 2), or None.
     color: (point_count, 3), or None.
     is_guide: of each curve, or None.
-    identities: strand_id, closest_guides and guide_weights of each curve, as far as they are there.
+    identities: strand_id, closest_guides and guide_weights of each curve, as far as present.
     group_names: group -> name.
     motion: times [s] and the points at these, (n, point_count, 3), or None.
     unfit: see `unfit_curves`.
@@ -54,9 +54,9 @@ class Joined:
 
 @dataclass
 class _Object:
-    """One curves object, and what of it could not be used.
+    """One curves object, with notes on what could not be used.
 
-    points: on the curves. counts: of each curve. control_count: points that the file has.
+    points: on the curves. counts: of each curve. control_count: of control points in the file.
     """
 
     name: str
@@ -68,14 +68,14 @@ class _Object:
     notes: list[str] = field(default_factory=list)
 
     def of_curves(self, name: str, width: int = 1) -> _Values | None:
-        """An attribute's value for each curve, from as many, or from one for all."""
+        """An attribute's value for each curve, from values of curves or one for all."""
         values = self._values(name, width, (len(self.counts), 1))
         if values is None or len(values) == len(self.counts):
             return values
         return np.repeat(values, len(self.counts), axis=0)
 
     def of_points(self, name: str, width: int = 1) -> _Values | None:
-        """An attribute's value for each point, from as many, or from one a curve or for all."""
+        """An attribute's value for each point, from values of points, of curves, or one for all."""
         curves, ends = len(self.counts), self.on_curves.varying_count
         values = self._values(name, width, (self.control_count, ends, curves, 1))
         if values is None:
@@ -136,7 +136,7 @@ def joined(found: Arrays, path: Path) -> Joined:
         group_names=names,
         motion=motion_of([_moving(each) for each in objects]),
         unfit=_unfit(objects),
-        notes=(*_notes(objects), *left_out),  # after all others, which add to them
+        notes=(*_notes(objects), *left_out),  # after all others, which add notes to the objects
     )
 
 
@@ -161,7 +161,8 @@ def _unfit(objects: list[_Object]) -> dict[str, Bools]:
 
 
 def _numbers(found: Arrays) -> tuple[list[int], list[str]]:
-    """Of objects that have points and counts; and the names of those whose curves are closed."""
+    """The numbers of objects that have points and counts and are not closed; the names of closed
+    ones."""
     every = [n for n in range(len(found)) if f"{n}/name" in found]
     full = [n for n in every if f"{n}/points" in found and f"{n}/counts" in found]
     closed = [n for n in full if found.get(f"{n}/is_closed")]
@@ -207,7 +208,7 @@ def _placed(points: Floats, matrix: Floats) -> Floats:
 
 
 def _widths(each: _Object) -> _Values | None:
-    """Of a strand at each point, as engines take them: the attribute before the curves' own."""
+    """The width at each point: as in engines, the attribute overrides the curves' own widths."""
     widths = each.of_points("groom_width")
     return each.of_points("widths") if widths is None else widths
 
@@ -232,7 +233,7 @@ def _groups(objects: list[_Object]) -> tuple[Ints, dict[int, str]]:
 
 
 def _identities(objects: list[_Object]) -> Arrays:
-    """IDs, and what names strands by them: closest guides, with weights."""
+    """IDs, and closest guides, which refer to them, with weights."""
     ids = [_whole(each.of_curves("groom_id")) for each in objects]
     sizes = [len(each.counts) for each in objects]
     known = None if any(each is None for each in ids) else _side_by_side(ids, sizes, 0)

@@ -29,9 +29,9 @@ from .alembic_library import alembic_library, array_of, sample_of, scope_of, wri
 
 VERSION = (1, 5)
 TOOL = "Hairloom"
-#: A frame rate that nobody has; files and times would be broken by it.
+#: Maximum frame rate, far above any in use: higher ones break files and times.
 _MAX_RATE = 1.0e4
-#: No fewer bytes than a point, and a strand, have with all attributes; and all headers together.
+#: At least the bytes of a point and of a strand with all attributes, and of all headers together.
 _POINT_BYTES, _STRAND_BYTES, _HEADER_BYTES = 40, 64, 1 << 18
 
 
@@ -40,10 +40,10 @@ def write_groom_alembic(
 ) -> None:
     """Write a groom, still or moving; the file is there complete or not at all.
 
-    Strands without an ID get their number as one. Widths are at least LEAST_WIDTH.
+    Strands without an ID get their number as one. Widths are at least MIN_WIDTH.
 
     Args:
-        preset: the engine's units, axes, and what it takes; `replace` it for other wishes.
+        preset: the engine's units, axes and limits; `replace` changes some of them.
         motion: positions over time; widths and attributes stay the groom's.
 
     Raises:
@@ -61,7 +61,7 @@ def write_groom_alembic(
         try:
             _write(library, temporary, groom, parts, preset, motion)
         except BaseException as error:
-            # Its frames would hold the archive open, and Windows deletes no open file
+            # the traceback's frames would keep the archive open, and Windows deletes no open file
             traceback.clear_frames(error.__traceback__)
             if not isinstance(error, RuntimeError):
                 raise
@@ -72,20 +72,20 @@ def write_groom_alembic(
 
 
 def is_finished(path: Path) -> bool:
-    """Whether whoever wrote an Alembic file came to its end: its sixth byte says so."""
+    """Whether an Alembic file was written to its end, as its sixth byte tells."""
     with path.open("rb") as file:
         return file.read(6) == b"Ogawa\xff"
 
 
 @dataclass(frozen=True)
 class _Part:
-    """One curves object: its name, and which strands it has; None are all, in their order."""
+    """One curves object: its name, and which strands it has; None: all, in their order."""
 
     name: str
     chosen: Ints | None
 
     def taken(self, groom: Groom, preset: GroomPreset) -> _Taken:
-        """Its own copy of the groom, as large as the object: for as long as it is written."""
+        """A copy of the object's strands, to be kept only while it is written."""
         own = groom if self.chosen is None else groom.take(self.chosen)
         return _Taken(own, point_cap(own.strands, preset.max_points))
 
@@ -136,7 +136,7 @@ def _parts(groom: Groom, preset: GroomPreset) -> list[_Part]:
 
 
 def _chosen(groom: Groom, preset: GroomPreset) -> Iterator[tuple[str, Ints | None]]:
-    """Name and strands of each curves object; None are all of them, in their order."""
+    """Name and strands of each curves object; None: all of them, in their order."""
     count = groom.strands.strand_count
     wanted = chosen_strands(groom, preset.parts)
     if not preset.is_split:
@@ -159,9 +159,9 @@ def _write(
     preset: GroomPreset,
     motion: GroomMotion | None,
 ) -> None:
-    """The file is closed, and so finished, when the last of the local objects goes.
+    """Write the file, which is closed, and so finished, when the last local object is released.
 
-    Alembic's library ends the process where the disk is full, so that is looked at before.
+    Alembic's library ends the process where the disk is full, so free space is checked before.
     """
     counts = [part.point_counts(groom.strands, preset.max_points) for part in parts]
     points, strands = sum(int(each.sum()) for each in counts), sum(map(len, counts))
@@ -226,8 +226,8 @@ def _write_version(library: Any, properties: Any, groom: Groom, preset: GroomPre
 
 
 def _sample(library: Any, preset: GroomPreset, points: Floats) -> Any:
-    """Points, and the kind of curve, which each sample repeats. What is not given must stay unset:
-    Unreal takes empty knots for broken ones."""
+    """Points, and the kind of curve, which each sample repeats. All else must stay unset: Unreal
+    takes empty knots for broken ones."""
     geom, is_cubic = library.geom, preset.basis == "cubic"
     sample = geom.OCurvesSchemaSample()
     sample.setPositions(array_of(library, points))
@@ -238,7 +238,7 @@ def _sample(library: Any, preset: GroomPreset, points: Floats) -> Any:
 
 
 def _first_sample(library: Any, part: _Taken, preset: GroomPreset, points: Floats) -> Any:
-    """What the later ones repeat, too: counts, widths and UVs."""
+    """A sample with counts, widths and UVs, which later ones repeat."""
     sample = _sample(library, preset, points)
     sample.setCurvesNumVertices(array_of(library, part.point_counts.astype(np.int32)))
     sample.setWidths(sample_of(library, _widths(part, preset), "Vertex"))
@@ -271,14 +271,14 @@ def _write_attributes(library: Any, parent: Any, part: _Taken, preset: GroomPres
 
 
 def _write_group_names(library: Any, parent: Any, groom: Groom) -> None:
-    """Each name once, and for each strand which one."""
+    """Write each name once, and its index for each strand."""
     if not groom.group_names:
         return
     groups, which = np.unique(groom.strands.group, return_inverse=True)
     names = library.imath.StringArray(len(groups))
     for place, group in enumerate(groups.tolist()):
         names[place] = groom.group_names.get(group, f"{groom.name}_{group}")
-    # Unsigned ones are not made from a buffer, but from doubles
+    # unsigned arrays cannot be made from a buffer, but from doubles
     numbers = library.imath.DoubleArrayFromBuffer(which.astype(np.float64))
     indices = library.imath.UnsignedIntArray(numbers)
     scope = scope_of(library, "Uniform")
@@ -294,7 +294,7 @@ def _widths(part: _Taken, preset: GroomPreset) -> Floats:
 
 @dataclass(frozen=True)
 class PointCap:
-    """Where the new points lie between the old ones, the same for all values and all frames.
+    """Where new points lie between old ones, the same for all values and all frames.
 
     left, right: (new_count,) indices of old points.
     weight: (new_count,) float32, of the right one.
@@ -313,7 +313,7 @@ class PointCap:
 
 
 def point_cap(strands: StrandSet, most: int) -> PointCap | None:
-    """Equally spaced points, `most` of them, for each longer strand; None where none is longer."""
+    """`most` equally spaced points for each strand with more; None where none has more."""
     counts = strands.point_counts
     long = np.flatnonzero(counts > most)
     if not len(long):

@@ -28,7 +28,7 @@ from .alembic_library import alembic_library
 from .alembic_objects import Joined, joined
 from .groom_alembic import is_finished
 
-#: Hair wider than this in the file's units is in centimetres, not in metres.
+#: Hair that extends over more than this in the file's units is in centimetres, not in metres.
 WIDEST_IN_METRES = 5.0
 
 
@@ -44,11 +44,11 @@ def read_groom_alembic(
     """Read all curves of a file, at their first frame, and their motion.
 
     Args:
-        space: the file's unit and axes. None: what our own files say of themselves; of others, Y
-            up, in metres where Blender wrote them or they are smaller than WIDEST_IN_METRES, else
-            in centimetres.
-        up: "Y" or "Z" in place of what that says.
-        factor: what lengths are multiplied by beside that.
+        space: the file's unit and axes. None: as our own files record them; else Y up, in metres
+            where Blender wrote the file or the hair is smaller than WIDEST_IN_METRES, and in
+            centimetres otherwise.
+        up: "Y" or "Z", instead of that of `space`.
+        factor: further factor on lengths.
         with_guides: whether strands that are marked as guides are kept.
         python: the command that starts another Python, see `run_reader`.
 
@@ -75,7 +75,7 @@ def read_groom_alembic(
 
 
 def _check(path: Path) -> None:
-    """What can be said of a file without the library."""
+    """Refuse a file as far as that is possible without the library."""
     if os.path.isdir(path):
         raise _error(path, "this is a folder, not a file", "Choose an .abc file")
     try:
@@ -107,7 +107,7 @@ def _read_in_subprocess(path: Path, python: Sequence[str] | None) -> Arrays:
 
 
 def _recorded_space(found: Arrays) -> FileSpace | None:
-    """What our own files say of themselves, or what Blender's always are."""
+    """The space that our own files record, or that all of Blender's have; None of other files."""
     if "blender" in str(found.get("application", "")).lower():
         return FileSpace("Y", 1.0)
     text = str(found.get("groom_properties", ""))
@@ -127,8 +127,8 @@ def _guessed_space(curves: Joined) -> FileSpace:
 
 
 def _groom(curves: Joined, space: FileSpace, path: Path, notes: list[str]) -> Groom:
-    """Notes grow."""
-    # What overflows becomes infinite, and what is not finite is dropped and counted.
+    """The usable strands of all curves as a groom; adds to `notes`."""
+    # overflow gives infinity, and strands that are not finite are dropped and counted
     with np.errstate(over="ignore", invalid="ignore"):
         points = space.from_file(curves.points)
         radius = None
@@ -170,7 +170,7 @@ def _groom(curves: Joined, space: FileSpace, path: Path, notes: list[str]) -> Gr
 
 
 def _version(found: Arrays) -> str:
-    """Of the conventions for grooms; "" where the file says none."""
+    """The version of the conventions for grooms; "" where the file names none."""
     values = [found.get(f"groom_version_{which}") for which in ("major", "minor")]
     numbers = [int(v.flat[0]) for v in values if v is not None and v.size and v.dtype.kind in "iu"]
     return ".".join(map(str, numbers)) if len(numbers) == 2 and min(numbers) >= 0 else ""

@@ -26,13 +26,13 @@ _TILE = "place in the texture, v from the bottom: it rises from root to tip of a
 class CardFormat:
     """One of the formats.
 
-    name: as the command line has it.
+    name: on the command line.
     entry, about: in the list of formats of the dialog.
     suffixes: of such files, the usual one first.
     up: "Y" or "Z"; axes are right-handed.
-    unit: of lengths in the file, and how many of them are a metre.
-    attributes: what the file calls each attribute of a vertex -> what it is.
-    extra: those that are there where custom attributes are asked for.
+    unit: of lengths in the file. units_per_metre: how many of them are a metre.
+    attributes: the file's name of each attribute of a vertex -> its meaning.
+    extra: attributes that are added where custom ones are requested.
     """
 
     name: str
@@ -47,7 +47,7 @@ class CardFormat:
     extra: Mapping[str, str]
 
     def placed(self, points: Floats) -> Floats:
-        """World space, Z up [m], as the file has it, (..., 3)."""
+        """Points or vectors of world space, Z up [m], in the file's axes and unit, (..., 3)."""
         return from_z_up(points, self.up) * self.units_per_metre
 
     @property
@@ -143,7 +143,7 @@ def format_of(path: Path, name: str | None = None) -> tuple[Path, CardFormat]:
     """The format of a file to write, and its path, which gets the usual suffix where it has none.
 
     Args:
-        name: of the format; None goes by the suffix.
+        name: of the format; None: the suffix decides.
 
     Raises:
         HairloomError: another suffix, or one that is not of the format.

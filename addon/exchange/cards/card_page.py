@@ -1,7 +1,7 @@
-"""One HTML file that shows an asset anywhere: its files, and a viewer, lie in the page itself.
+"""One HTML file that shows an asset anywhere, with the asset's files and a viewer embedded in it.
 
-It asks for nothing else: its own content security policy forbids that, and any script but the one
-that it names by its digest.
+It loads nothing else: its own content security policy forbids that, and any script but the one
+whose digest is in the policy.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class CardPage:
         sidecar beside the GLB has; those of a head are named "head.*".
     levels: triangles and cards of each, the finest first.
     head: the materials of its triangles, one after the other; empty without one.
-    corners: two opposite ones of what the first view shows, in the axes of the GLB.
+    corners: two opposite ones of the box that the first view shows, in the axes of the GLB.
     maps: title, file and meaning of each texture. sizes: rows of a table of two columns.
     """
 
@@ -78,7 +78,7 @@ def _part(name: str) -> str:
 
 
 def _policy(script: str, style: str) -> str:
-    """Blobs and data are what lies in the page."""
+    """The content security policy; "blob:" and "data:" are what is embedded in the page."""
     return (
         f"default-src 'none'; script-src '{_digest(script)}'; style-src '{_digest(style)}'; "
         "img-src blob: data:; connect-src blob:; base-uri 'none'; form-action 'none'"

@@ -14,7 +14,7 @@ def group_ranges(mesh: CardMesh, *, by_layer: bool) -> dict[str, list[int]]:
     """Runs of triangles of one group, or of one group and layer, in the order in which they are
     drawn.
 
-    Columns of a table: group and layer, the first index and how many there are.
+    Columns of a table: group, layer, first index, and number of indices.
     """
     names = ("group", "layer") if by_layer else ("group",)
     keys = np.stack([getattr(mesh, name)[mesh.card] for name in names], axis=1)
@@ -24,8 +24,8 @@ def group_ranges(mesh: CardMesh, *, by_layer: bool) -> dict[str, list[int]]:
 
 
 def card_ranges(mesh: CardMesh) -> dict[str, list[int]] | None:
-    """The triangles of each card, in the order in which they are drawn, as a table as above; None
-    where pieces of cards are sorted apart, so that a card is in many places.
+    """The triangles of each card, in the order in which they are drawn, as a table like that of
+    `group_ranges`; None where pieces of a card are sorted separately, and so lie in many places.
     """
     runs = _runs(mesh.card[:, None])
     if len(runs) > mesh.card_count:
@@ -38,7 +38,7 @@ def _indices(runs: list[tuple[int, int]]) -> dict[str, list[int]]:
 
 
 def _runs(keys: Ints) -> list[tuple[int, int]]:
-    """(first triangle, count of indices) of each run of equal rows, of which there are some."""
+    """(first triangle, count of indices) of each run of equal rows; there is at least one row."""
     starts = np.flatnonzero(np.any(np.diff(keys, axis=0), axis=1)) + 1
     bounds = [0, *starts.tolist(), len(keys)]
     return [(one, 3 * (two - one)) for one, two in pairwise(bounds)]

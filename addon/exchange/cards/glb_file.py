@@ -1,4 +1,4 @@
-"""A GLB taken apart, to put something into it that its writer did not, and together again.
+"""A GLB taken apart, so that data can be added to it, and put together again.
 
 Khronos, "glTF 2.0 Specification", section 4.4: a header, a chunk of JSON, and one of bytes.
 """
@@ -25,7 +25,7 @@ _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
 @dataclass(eq=False)
 class GlbFile:
-    """What a GLB holds. content: its JSON; binary: its bytes, which accessors point into."""
+    """The parts of a GLB. content: its JSON; binary: its bytes, which accessors point into."""
 
     content: dict[str, Any]
     binary: bytearray
@@ -69,7 +69,7 @@ class GlbFile:
         )
 
     def values(self, number: int) -> Floats | Ints:
-        """What an accessor holds, (count, width); of one that lies densely, as Blender's do."""
+        """The values of an accessor, (count, width), which must lie densely, as Blender's do."""
         accessor = self.content["accessors"][number]
         view = self.content["bufferViews"][accessor["bufferView"]]
         width = _WIDTHS[accessor["type"]]
@@ -95,7 +95,7 @@ class GlbFile:
             "count": len(values),
             "type": kind,
         }
-        if kind == "SCALAR":  # times of animations must have them
+        if kind == "SCALAR":  # which times of animations must have
             accessor |= {"min": [float(values.min())], "max": [float(values.max())]}
         return self.append("accessors", accessor)
 
@@ -113,7 +113,7 @@ class GlbFile:
         return len(entries) - 1
 
     def node(self, name: str) -> int:
-        """The number of the mesh's node of this name, which a bone may have too."""
+        """The number of the mesh's node of this name; a bone may have the same name."""
         (number,) = (
             number
             for number, node in enumerate(self.content["nodes"])

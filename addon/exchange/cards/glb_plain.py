@@ -1,7 +1,7 @@
-"""What makes a GLB of cards right in a viewer that knows nothing of Hairloom.
+"""Changes to a GLB of cards that make it look right in viewers without support for Hairloom.
 
-One level of detail is in its scene: the others are named by MSFT_lod, and viewers without it never
-meet them. The material has all maps that glTF knows: see `with_material`.
+Only one level of detail is in its scene: MSFT_lod refers to the others, which viewers without it
+ignore. The material has all maps that glTF defines, see `with_material`.
 
 Khronos, "glTF 2.0 Specification", sections 3.9 and 5.19; vendor extension MSFT_lod; extension
 KHR_materials_anisotropy.
@@ -17,19 +17,19 @@ from .glb_file import GlbFile
 
 LOD, _ANISOTROPY = "MSFT_lod", "KHR_materials_anisotropy"
 _SPECULAR = "KHR_materials_specular"
-#: Of the light that a smooth surface reflects, what hair does: measured with bench engines.
+#: Fraction of a smooth surface's reflected light that hair reflects: measured with `bench engines`.
 SPECULAR = 0.9
-#: Height of a screen [pixels] on which the next level is off by one of them where it takes over.
+#: Height of a screen [pixels] on which the next level is off by one pixel where it takes over.
 SCREEN_HEIGHT = 1080.0
-#: Where a level's error is not known: it takes over at this fraction of the height of the last.
+#: A level of unknown error takes over at this fraction of the height of the last.
 _STEP = 0.5
 _CLAMPED, _LINEAR, _MIP_MAPPED = 33071, 9729, 9987
-#: the second UV map's first component is ambient occlusion, which a ramp of grey gives back
+#: the second UV map's first component is ambient occlusion, which a ramp of grey maps to itself
 _OCCLUSION_UV = 1
 
 
 def with_levels(file: GlbFile, nodes: Sequence[str], coverage: Sequence[float]) -> None:
-    """Leave the finest level in the scene, and name the others by it.
+    """Leave only the finest level in the scene, with references to the others.
 
     Args:
         nodes: of the levels, the finest first.
@@ -49,8 +49,8 @@ def with_levels(file: GlbFile, nodes: Sequence[str], coverage: Sequence[float]) 
 
 
 def screen_coverage(levels: Sequence[CardMesh], errors: Sequence[float]) -> list[float]:
-    """Of each level the least fraction of the screen that the hair takes up while it is shown; 0 of
-    the last. A level gives way to the next where that one is off by a pixel of SCREEN_HEIGHT.
+    """The smallest fraction of the screen that the hair takes up while each level is shown; 0 for
+    the last. A level is replaced by the next where that one is off by a pixel of SCREEN_HEIGHT.
 
     Args:
         errors: of each level [m], as CardBuild has them; empty where they are not known.

@@ -1,6 +1,6 @@
-"""Joints, weights and keys into a GLB of cards that Blender's exporter wrote.
+"""Joints, weights and keys, added to a GLB of cards that Blender's exporter wrote.
 
-Blender's own way needs an armature with actions in the scene; all of it is there already as arrays.
+Blender's exporter would need an armature with actions in the scene; here all are arrays already.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ _OF_VERTICES = 34962  # ARRAY_BUFFER
 _AXES = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 #: How far a vertex of the file may be from ours, a fraction of the hair's size.
 _SAME = 1.0e-5
-#: Weights below this are none.
+#: Weights below this count as 0.
 _MIN_WEIGHT = 1.0e-5
 
 
 @dataclass(frozen=True, eq=False)
 class Skeleton:
-    """What goes into the file beside the meshes, in metres and Z up.
+    """The joints and keys that go into the file beside the meshes, in metres and Z up.
 
     keys: of each chain. root: (3,) where the root joint is at rest.
-    root_keys: of the root joint, of one chain with one joint; None leaves it at rest.
+    root_keys: of the root joint, as one chain with one joint; None leaves it at rest.
     frame_rate: [1/s], of the keys' frames.
     """
 
@@ -128,7 +128,7 @@ def add_head_bone(file: GlbFile, root: int, name: str, matrix: Floats) -> None:
 
 
 def vertices_of(file: GlbFile, primitive: dict[str, Any], mesh: CardMesh, place: str) -> Ints:
-    """Which vertex of the mesh each vertex of the file is; known by the order of corners.
+    """The mesh's vertex for each vertex of the file, found by the order of corners.
 
     Raises:
         HairloomError: the file's corners are others.
@@ -158,7 +158,7 @@ def _add_weights(
     owner = vertices_of(file, primitive, mesh, place)
     weight = np.where(skin.weight < _MIN_WEIGHT, 0.0, skin.weight)
     weight = (weight / weight.sum(axis=1, keepdims=True)).astype(np.float32)
-    # the root is joint 0, and what has no weight names no joint
+    # the root is joint 0, which entries without weight name, too
     joint = np.where(weight > 0.0, (skin.joint + 1) % joint_count, 0)
     is_small = joint.max(initial=0) < 256
     numbers: Ints = joint[owner].astype(np.uint8) if is_small else joint[owner].astype(np.uint16)
@@ -168,7 +168,7 @@ def _add_weights(
 
 
 def _add_joints(file: GlbFile, rest: Floats, root: Floats) -> list[int]:
-    """Nodes of all joints, the root first; numbers."""
+    """Add nodes of all joints; their numbers, the root first."""
     first = {"name": ROOT_JOINT, "translation": _vector(root), "children": []}
     numbers = [file.append("nodes", first)]
     names = iter(joint_names(*rest.shape[:2]))
@@ -208,8 +208,8 @@ def _add_skin(file: GlbFile, chains: Floats, root: Floats, joints: list[int]) ->
 
 
 def _add_to_scene(file: GlbFile, meshes: list[int], root: int) -> None:
-    """Meshes and the root joint below one node, as Blender's own exporter has them: readers look
-    for what they have in common.
+    """Put meshes and root joint below one node, as Blender's own exporter does: readers look for
+    their common parent.
     """
     (scene,) = file.content["scenes"]
     if scene["nodes"] == meshes:
@@ -256,7 +256,7 @@ def _vector(vector: Floats) -> list[float]:
 
 
 def _rotations(quaternion: Floats) -> Floats:
-    """Of Z-up space as the file has them."""
+    """Quaternions of Z-up space in the file's axes."""
     vector = GLB.placed(quaternion[..., :3])
     turned: Floats = np.concatenate([vector, quaternion[..., 3:]], axis=-1)
     return turned

@@ -1,5 +1,5 @@
-"""Joints, weights and springs into a GLB of cards: VRMC_springBone, which UniVRM, three-vrm, Godot
-VRM and others move.
+"""Joints, weights and springs, added to a GLB of cards: VRMC_springBone, which UniVRM, three-vrm,
+Godot VRM and others simulate.
 
 VRM Consortium, "VRMC_springBone 1.0". Its numbers are those of `SpringValues`.
 """
@@ -35,10 +35,10 @@ class HeadBone:
 
 @dataclass(frozen=True, eq=False)
 class SpringSkeleton:
-    """What goes into the file beside the meshes, in metres and Z up.
+    """The joints and springs that go into the file beside the meshes, in metres and Z up.
 
     root: (3,) where the root joint, which rides on the head, is at rest.
-    bone: what carries the root joint; None where the character has no bones.
+    bone: the one that carries the root joint; None where the character has no bones.
     """
 
     rig: SpringRig
@@ -72,8 +72,8 @@ def with_springs(
 
 
 def spring_list(rig: SpringRig) -> list[dict[str, Any]]:
-    """Of each chain its joints by name, what moves them, and the colliders that it keeps out of.
-    The last joint ends the chain, so it has no numbers.
+    """For each chain its joints by name, the values of their springs, and the colliders that it
+    stays out of. The last joint ends the chain, so it has no values.
     """
     chains, values = rig.chains, rig.values
     count, size = chains.rest.shape[:2]
@@ -121,7 +121,7 @@ def _extension(skeleton: SpringSkeleton, joints: list[int]) -> dict[str, Any]:
     extension: dict[str, Any] = {"specVersion": _VERSION, "springs": springs}
     if shapes:
         extension["colliders"] = [{"node": root, "shape": shape} for shape in shapes]
-        # a group of each, for a chain names groups
+        # a group for each collider, since a chain refers to groups
         extension["colliderGroups"] = [
             {"name": f"head_{number}", "colliders": [number]} for number in range(len(shapes))
         ]

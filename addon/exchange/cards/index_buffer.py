@@ -1,8 +1,8 @@
 """NAME.indices.bin: the sorted indices alone, for engines that keep their own vertices.
 
-Raw little-endian unsigned integers, three a triangle, all levels one after the other and then,
-where there is one, the order for back faces of all levels. The sidecar says where each begins. They
-count the vertices of each level from 0, in the order in which the file beside them lists them.
+Raw little-endian unsigned integers, three a triangle: all levels one after the other, then all
+levels in the order for back faces, if there is one. The sidecar stores where each begins. Indices
+count the vertices of each level from 0, in the order of the file beside this one.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from ...arrays import Ints
 from ...cards.card_mesh import CardMesh
 
-#: Vertices that uint16 can tell apart: its largest value is the end of a strip to some engines.
+#: Maximum vertices for uint16: its largest value means the end of a strip to some engines.
 _MAX_SHORT = 0xFFFF
 
 
@@ -33,7 +33,8 @@ class IndexBuffer:
     back_first: tuple[int, ...]
 
     def backs_alone(self) -> IndexBuffer:
-        """Without the first orders, which the mesh has: `first` names the second ones, too."""
+        """The buffer without the first orders, which the mesh has: `first` is that of the second
+        ones, too."""
         begin = self.back_first[0]
         size = 2 if self.type == "uint16" else 4
         back = tuple(each - begin for each in self.back_first)

@@ -15,12 +15,12 @@ from .glb_file import GlbFile
 from .glb_plain import LOD
 from .glb_springs import SPRINGS
 
-#: Steps of a rounded number: of the largest extent for positions, else of 1. None can be seen: they
-#: are a fifth of a degree, and a sixteenth of a texel of 1,024.
+#: Steps to which values are rounded, for positions as a fraction of the largest extent. They cannot
+#: be seen: a fifth of a degree, and with UVs a sixteenth of one of 1,024 texels.
 _STEPS = {"POSITION": 2.0**-14, "NORMAL": 2.0**-8, "TANGENT": 2.0**-8}
 _UV_STEP = 2.0**-14
-#: Steps of what is stored in 8 bits. Fewer compress better: those of single strands are lost among
-#: many. 128, which is no direction, is one of them, and so is 255.
+#: Steps of values that are stored in 8 bits. Fewer steps compress better, and differences of single
+#: strands are lost among many. 128, which means no direction, is one of the steps, as is 255.
 _STORED = {"base": 4, "alpha": 4, "tangent": 4, "normal": 8, "shift": 4, "noise": 16}
 
 
@@ -52,7 +52,7 @@ def small_glb(data: bytes, place: str) -> bytes:
 
 
 def rounded(name: str, values: Floats) -> Floats:
-    """Values of vertices (n, ...) of this attribute of a GLB, which compress better so."""
+    """Values of vertices (n, ...) of this attribute of a GLB, rounded to compress better."""
     step = _STEPS.get(name, _UV_STEP)
     if name == "POSITION":
         extent = float(np.ptp(values, axis=0).max())
@@ -61,7 +61,7 @@ def rounded(name: str, values: Floats) -> Floats:
 
 
 def _with_values(file: GlbFile, values: Mapping[int, Floats]) -> GlbFile:
-    """Only the bytes that accessors point to, some of them with other values."""
+    """The file with only the bytes that accessors point to, and other values for some of these."""
     old_binary, old_views = bytes(file.binary), file.content["bufferViews"]
     file.binary, file.content["bufferViews"] = bytearray(), []
     moved: dict[int, int] = {}
@@ -82,16 +82,16 @@ def _with_values(file: GlbFile, values: Mapping[int, Floats]) -> GlbFile:
 
 
 def small_maps(maps: Mapping[str, Floats], grid: AtlasGrid, size: int) -> dict[str, Floats]:
-    """Maps of at most `size` texels a side, in as few values as they need.
+    """Maps of at most `size` texels a side, in as few different values as they need.
 
-    Those of one size with alpha get its mean where there is no hair.
+    Where there is no hair, maps of alpha's size get their own mean over the hair.
     """
     alpha = maps["alpha"]
     together = {name: each for name, each in maps.items() if each.shape[:2] == alpha.shape}
     small = _with_size(together, grid, size)
     hair = small["alpha"] > 0.0
     for name, values in small.items():
-        # normals change most across the edge of a strand, where filters look beyond it
+        # normals change most across the edge of a strand, where filters sample beyond it
         kept = _grown(hair) if name == "normal" else hair
         if name != "alpha" and kept.any():
             small[name] = np.where(
@@ -110,14 +110,14 @@ def _with_size(maps: Mapping[str, Floats], grid: AtlasGrid, size: int) -> dict[s
 
 
 def _grown(mask: Bools) -> Bools:
-    """With the four neighbours of each texel."""
+    """A mask extended by the four neighbours of each texel."""
     wide = np.pad(mask, 1)
     grown: Bools = mask | wide[2:, 1:-1] | wide[:-2, 1:-1] | wide[1:-1, 2:] | wide[1:-1, :-2]
     return grown
 
 
 def _in_steps(name: str, values: Floats) -> Floats:
-    """Colours in steps of what is stored, which is by the sRGB curve."""
+    """Values rounded to steps of what is stored, which for colours is sRGB."""
     step = _STORED[name] / 255.0
     stored = np.clip(values, 0.0, 1.0)
     if name == "base":

@@ -1,4 +1,4 @@
-"""NAME.hairloom.json beside a mesh: what its file cannot say about how its hair is to be drawn.
+"""NAME.hairloom.json beside a mesh: what its file cannot store about how to draw its hair.
 
 For the engine programmer who writes the hair material. Plain data, by docs/sidecar.schema.json; all
 lengths and vectors in the file's own units and axes.
@@ -38,7 +38,7 @@ MIN_ALPHA = 0.004
 class DrawPass:
     """One of the passes in which cards are drawn; tests and culling in the words of the GPU.
 
-    pixels: which of them; "all" needs no test of alpha.
+    pixels: which of them it draws, by a test of alpha; "all": without a test.
     """
 
     name: str
@@ -54,7 +54,7 @@ class DrawPass:
 
     @property
     def alpha_range(self) -> tuple[float, float] | None:
-        """Alpha of what it draws, from the first to below the second; None without a test."""
+        """Alpha of the pixels drawn, from the first to below the second; None without a test."""
         if self.pixels == "all":
             return None
         least = {_OPAQUE: OPAQUE_ALPHA, _REST: 0.0}.get(self.pixels, MIN_ALPHA)
@@ -68,9 +68,9 @@ class DrawPass:
 _OPAQUE = "alpha >= opaque_alpha"
 _REST = "alpha < opaque_alpha"
 _VISIBLE = "alpha >= min_alpha"
-#: Scheuermann 2004, where the first pass alone tests alpha, so that the others keep early depth
-#: tests. The last one, which writes depth, tests it here too: else a card's clear pixels hide what
-#: is drawn after it, which doubles the difference to hair that is sorted for each view.
+#: Scheuermann 2004, where only the first pass tests alpha, so that the others keep early depth
+#: tests. Here the last one, which writes depth, tests alpha, too: otherwise a card's clear pixels
+#: hide what is drawn after it, which doubles the difference to hair that is sorted for each view.
 FOUR_PASSES = (
     DrawPass("prime depth", _OPAQUE, False, True, "less", "none"),
     DrawPass("opaque", "all", True, False, "equal", "none"),
@@ -90,11 +90,11 @@ class CardFile:
     """A file of cards that was written.
 
     levels: as they were written, world space, Z up [m], the finest first; nodes: their names there.
-    errors: of each level [m], how far it is from the strands' own way; empty: not known.
+    errors: of each level [m], how far it is from the strands' own paths; empty: not known.
     portable: without custom attributes.
     textures: role -> {"file", "channels"} of those that lie beside it; texture_files: file -> what
         its channels hold. highlights: which of them breaks up the highlights, "shift" or "tangent".
-    base_gain: what the base texture is to be multiplied by.
+    base_gain: factor on the base texture.
     view_compensated_alpha: mean_facing and min_facing where alpha is that of baked strands,
         else empty.
     material: model, values, units, fibre and tables, see blender/cards/files.py.
@@ -123,7 +123,7 @@ class CardFile:
 
 
 def sidecar_text(cards: CardFile) -> str:
-    """The whole sidecar; numbers of a list stand in one line."""
+    """The whole sidecar, with each list of numbers in one line."""
     text = json.dumps(description(cards), indent=2, ensure_ascii=False)
     texts_or_lists = re.compile(r'"(?:[^"\\]|\\.)*"|\[\s+(-?[\d.][^\[\]{}"]*?)\s+\]')
     return texts_or_lists.sub(_in_one_line, text) + "\n"
@@ -137,7 +137,7 @@ def _in_one_line(found: re.Match[str]) -> str:
 def files_of_earlier(path: Path) -> set[str]:
     """The names of the files that an earlier export of this mesh has written beside it.
 
-    path: of the mesh. Without a sidecar of ours there is none.
+    path: of the mesh. Without a sidecar of ours the set is empty.
     """
     owner, texts = _read(path)
     if owner != path.name:
@@ -147,7 +147,7 @@ def files_of_earlier(path: Path) -> set[str]:
 
 
 def other_owner(path: Path) -> str:
-    """The name of another mesh that lies beside this one and has the sidecar that this one would
+    """The name of another mesh beside this one whose sidecar has the name that this one's would
     have; "" where there is none.
 
     path: of the mesh.
@@ -157,8 +157,7 @@ def other_owner(path: Path) -> str:
 
 
 def _read(path: Path) -> tuple[str, set[str]]:
-    """Which mesh the sidecar of this name is of, and all texts in it; nothing where it is none of
-    ours."""
+    """The mesh of the sidecar of this name, and all texts in it; empty where it is not ours."""
     try:
         content = json.loads(path.with_name(path.stem + SUFFIX).read_text(encoding="utf-8"))
         owner = str(content["file"]) if "hairloom_sidecar" in content else ""
@@ -262,7 +261,7 @@ def _back_order(cards: CardFile) -> dict[str, str]:
 
 
 def _textures(cards: CardFile) -> dict[str, Any]:
-    """Role -> file, channels and how they are read."""
+    """Role -> file, channels and how to read them."""
     if not cards.textures:
         return {}
     roles = {}

@@ -1,4 +1,4 @@
-"""What the sidecar says of cards in motion, as plain data in the file's own units and axes."""
+"""The sidecar's description of cards in motion, as plain data in the file's own units and axes."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ _HOW_TO_SPRING = (
 
 
 def spring_motion(tracks: CardTracks, skeleton: SpringSkeleton, error: FitError) -> dict[str, Any]:
-    """Of a GLB with springs."""
+    """The motion of a GLB with springs."""
     rig = skeleton.rig
     chains, joints = rig.chains.rest.shape[:2]
     return {
@@ -74,7 +74,7 @@ def spring_motion(tracks: CardTracks, skeleton: SpringSkeleton, error: FitError)
 def joint_motion(
     tracks: CardTracks, skeleton: Skeleton, error: FitError, space: str
 ) -> dict[str, Any]:
-    """Of a GLB with joints."""
+    """The motion of a GLB with joints."""
     rig, scale = skeleton.rig, GLB.units_per_metre
     return {
         "kind": "joints",
@@ -102,7 +102,7 @@ def texture_motion(
     error: FitError,
     space: str,
 ) -> dict[str, Any]:
-    """Of a vertex animation texture.
+    """The motion in a vertex animation texture.
 
     Args:
         files: position, normal and tangent -> file.
@@ -132,7 +132,7 @@ def texture_motion(
 
 
 def _error(error: FitError, tracks: CardTracks, scale: float) -> dict[str, float]:
-    """In a file of this many units in a metre."""
+    """The errors in a file with `scale` units in a metre."""
     return {
         "root_mean_square": error.mean_square_root * scale,
         "percentile_99": error.most * scale,

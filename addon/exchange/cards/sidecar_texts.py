@@ -1,4 +1,4 @@
-"""What the sidecar says in words: how cards are to be read and drawn."""
+"""The texts of the sidecar: how to read and draw cards."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ VIEW_COMPENSATED_ALPHA = (
     "min_facing)); f is |dot(n, e)| of the normal n of its plane and the way e to the eye made "
     "perpendicular to the tangent, a unit vector"
 )
-#: role of a texture -> its color space in files of integers, and what it says
+#: role of a texture -> its color space in files of integers, and its meaning
 ROLES = {
     "color": (
         "sRGB",

@@ -1,6 +1,6 @@
-"""Reading numpy's .npz files as numpy writes them uncompressed, whatever they hold.
+"""Reading uncompressed .npz files, damaged ones included, which numpy's own reader does not check.
 
-numpy's own reader believes the shapes that a file names, and lets errors of zip files through.
+numpy's reader trusts the shapes that a file names, and lets errors of zip files through.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-#: what a file, its list of arrays or the description of one may raise when it is damaged
+#: what reading a damaged file, list of arrays or header of an array may raise
 _DAMAGE = (
     zipfile.BadZipFile,
     zlib.error,

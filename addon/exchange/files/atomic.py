@@ -30,7 +30,7 @@ _REMEDIES = {
     os.strerror(errno.EFBIG): "Choose a folder on a disk that takes files of this size",
     os.strerror(errno.ENAMETOOLONG): "Choose a shorter name",
     os.strerror(errno.EROFS): _RIGHTS,
-    # on Windows the same is said of a file that is open
+    # Windows gives the same reason for a file that is open
     _NO_RIGHTS: _RIGHTS if os.name == "posix" else f"{_RIGHTS}, and close what uses the file",
     os.strerror(errno.EPERM): _RIGHTS,
 }
@@ -44,20 +44,20 @@ _FULL = 1 << 16
 
 @contextmanager
 def atomic_write(path: Path, *, keeps: bool = True) -> Iterator[Path]:
-    """A path beside `path` to write to; it takes the place of `path` when the block ends well.
+    """A path beside `path` to write to; it replaces `path` when the block succeeds.
 
     The temporary path has the same suffix, so that exporters accept it. Missing folders are made.
     When the block fails or is interrupted, what was at `path` before stays as it was. What a killed
     process left in the folder is removed.
 
     Args:
-        keeps: keep a file that is whole but cannot take its place, since another program holds the
-            old one, beside it; it may have taken minutes to write.
+        keeps: if another program holds the old file, keep the complete new one beside it, since it
+            may have taken minutes to write.
 
     Raises:
         HairloomError: nothing can be written there, or the block wrote no file.
     """
-    target = Path(os.path.realpath(path))  # through a link, as plain writing would go
+    target = Path(os.path.realpath(path))  # through a link, as plain writing goes
     temporary = temporary_beside(target)
     try:
         _check_writable(target)
@@ -113,7 +113,7 @@ def _check_writable(target: Path) -> None:
         raise PermissionError(errno.EACCES, why)
     target.parent.mkdir(parents=True, exist_ok=True)
     remove_stale_files(target.parent)
-    # under another name: nobody else shall know the right one before it is taken
+    # under another name, so that nobody else can see the right one before it is used
     trial = temporary_beside(target)
     trial.touch(exist_ok=False)
     trial.unlink()
@@ -212,8 +212,8 @@ def remedy_for(why: str) -> str:
 
 
 def as_system_says(path: Path, why: str) -> str:
-    """Why a library could not write beside this path: that the disk is full, where it is, which
-    few of them say; else what the library says."""
+    """Why a library could not write beside this path: a full disk, which few libraries report, or
+    else what the library says."""
     free = shutil.disk_usage(path.parent).free if path.parent.is_dir() else _FULL
     return DISK_FULL if free < _FULL else why
 
@@ -221,9 +221,9 @@ def as_system_says(path: Path, why: str) -> str:
 def check_free_space(path: Path, size: int) -> None:
     """Make sure that `size` more bytes fit into the folder of `path` now.
 
-    Asked before a library writes that does not survive a full disk.
+    For use before a library writes that does not survive a full disk.
 
-    Where the system can set space aside it is asked to, since quotas and limits do not show in the
+    Where the system can reserve space this is tried, since quotas and limits do not show in the
     free space of a disk.
 
     Raises:

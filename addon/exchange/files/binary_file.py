@@ -1,7 +1,7 @@
-"""Reading binary files that may lie: every read is first checked against the file's size.
+"""Reading binary files that may be wrong: every read is first checked against the file's size.
 
 Nothing is allocated before the file is known to hold it, so that a file of a few bytes that claims
-2^31 points costs nothing. And writing them: blocks one after the other, put in place when complete.
+2^31 points costs nothing. And writing them: block after block, put in place when complete.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class BinaryFile:
             raise self._too_large() from error
 
     def check(self, name: str, offset: int, byte_count: int) -> None:
-        """That the file holds these bytes.
+        """Make sure that the file holds these bytes.
 
         Raises:
             HairloomError: they reach past its end.

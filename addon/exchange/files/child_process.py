@@ -1,9 +1,9 @@
 """Starting another process: the only place where that is done.
 
 A child runs no code that somebody has put into the current folder or the environment. It works in
-a folder that comes with Python, Python's variables are not handed on, and the modules that it finds
-are those of this process. It gets no input, shows no window and has an end, before which it can be
-ended by who no longer waits for it.
+a folder that comes with Python, Python's variables are not passed on, and the modules that it finds
+are those of this process. It gets no input, shows no window, and is killed after a time limit, or
+earlier by a caller that no longer waits for it.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from contextlib import AbstractContextManager, nullcontext
 from contextvars import ContextVar
 from pathlib import Path
 
-#: for a process on Windows, which else would show one
+#: for Windows, where a process would show a window otherwise
 _NO_WINDOW = getattr(subprocess, "CREATE_NO_WINDOW", 0)
 
-#: What surrounds a child's run, given what ends the child; who may give up the work sets it, and it
-#: may raise instead.
+#: Makes the context of a child's run, from the function that kills the child. Callers that may
+#: cancel the work set it; it may raise instead.
 ending: ContextVar[Callable[[Callable[[], None]], AbstractContextManager[object]]] = ContextVar(
     "ending", default=nullcontext
 )
@@ -63,7 +63,7 @@ def python_program(program: str) -> tuple[str, ...]:
 
 
 def same_packages() -> dict[str, str]:
-    """What a Python's environment must hold so that it finds all packages that this one does.
+    """The environment variables by which another Python finds all packages that this one does.
 
     Relative folders are left out: for the child they would be others, such as a stranger's.
     """
@@ -71,6 +71,6 @@ def same_packages() -> dict[str, str]:
 
 
 def _environment() -> dict[str, str]:
-    """This process's, but for what Python takes from it."""
+    """This process's environment without the variables of Python, but with `same_packages`."""
     others = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
     return others | same_packages()

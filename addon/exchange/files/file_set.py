@@ -19,12 +19,12 @@ from .stale_temp_files import COMPLETE, remove_stale_files, temporary_beside
 
 @contextmanager
 def written_together(path: Path) -> Iterator[Path]:
-    """A new, hidden folder beside `path`; its files move beside `path` when the block ends well.
+    """A new, hidden folder beside `path`; its files move beside `path` when the block succeeds.
 
-    They keep their names, so that they may name each other. Missing folders are made. When the
-    block fails or is interrupted, or when one of the files cannot be put into its place, all that
-    was there before stays as it was, and folders that were made go again. What a killed process
-    left in the folder is removed.
+    They keep their names, so that they can refer to each other. Missing folders are made. When the
+    block fails or is interrupted, or when one of the files cannot be put into its place, all files
+    stay as they were before, and folders that were made are removed. What a killed process left in
+    the folder is removed.
 
     Raises:
         HairloomError: nothing can be written there, or the block wrote no file of `path`'s name.
@@ -41,7 +41,7 @@ def written_together(path: Path) -> Iterator[Path]:
         _remove_empty(missing)
         raise unwritable(path, error.strerror or str(error)) from error
     try:
-        (staging / path.name).touch(exist_ok=False)  # fails now for a name that cannot be
+        (staging / path.name).touch(exist_ok=False)  # fails early for an impossible name
         (staging / path.name).unlink()
         if why := why_not_replaced(path):
             raise unwritable(path, why)
@@ -65,24 +65,24 @@ def written_together(path: Path) -> Iterator[Path]:
 
 
 def _remove_empty(folders: Sequence[Path]) -> None:
-    """The innermost first; one that holds something, as after a good end, stays."""
+    """Remove empty folders, the innermost first; after success they hold files, and stay."""
     for folder in folders:
         with suppress(OSError):
             folder.rmdir()
 
 
 def kept_aside(staging: Path, path: Path, own: Container[str] = ()) -> tuple[str, ...]:
-    """Keep files that a set is about to replace and that were not made with it.
+    """Keep files that a set is about to replace, but that are not of an earlier set of this path.
 
-    Only for `path` itself has the artist been asked whether it may be replaced. The others become
-    "NAME old", once; what was kept there before stays.
+    The artist has only agreed to replace `path` itself. Each other file is copied to "NAME old",
+    unless that exists already.
 
     Args:
         staging: the folder of `written_together`, with all files in it.
         own: names of files that an earlier set of this path was made of.
 
     Returns:
-        a sentence for each.
+        A sentence for each.
     """
     notes = []
     for file in sorted(each for each in staging.iterdir() if each.is_file()):
@@ -134,7 +134,7 @@ def _check_and_flush(file: Path, target: Path) -> None:
 
 
 def _keep(target: Path, backup: Path) -> None:
-    """A second name for the old file, or a copy where file systems have no such names."""
+    """Keep the old file under a second name, or as a copy where the file system has no links."""
     if not target.exists():
         return
     try:
@@ -148,7 +148,7 @@ def _restore(file: Path, target: Path, backup: Path) -> None:
     if not file.exists():
         move(target, file)
     if backup.exists() and not (target.exists() and os.path.samefile(backup, target)):
-        move(backup, target)  # unless it was never replaced: who holds it has been waited for
+        move(backup, target)  # unless it was never replaced: moving would wait for its holder again
 
 
 def _kept(staging: Path, path: Path, error: PermissionError) -> HairloomError:

@@ -1,4 +1,4 @@
-"""Unit and axes of a file, and the way between them and Blender's: metres, Z up, right-handed."""
+"""Unit and axes of a file, and conversion from and to Blender's: metres, Z up, right-handed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Putting files in their places, by the rules of every system."""
+"""Moving files to their places, by the rules of every system."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from contextlib import AbstractContextManager, nullcontext, suppress
 from contextvars import ContextVar
 from pathlib import Path
 
-#: What surrounds the moment in which new files take the places of old ones; who may give up the
-#: work sets it, and it may raise instead, which leaves all as it was.
+#: Makes the context in which new files replace old ones. Callers that may cancel the work set it;
+#: it may raise instead, which leaves all files as they were.
 committing: ContextVar[Callable[[], AbstractContextManager[object]]] = ContextVar(
     "committing", default=nullcontext
 )
@@ -73,6 +73,6 @@ def flush_names(folder: Path) -> None:
 
 
 def free_name(path: Path) -> Path:
-    """This path, or one beside it that nothing has."""
+    """This path, or a numbered one beside it, which does not exist yet."""
     names = (path, *(path.with_name(f"{path.stem} {n}{path.suffix}") for n in range(2, 10_000)))
     return next(each for each in names if not os.path.lexists(each))

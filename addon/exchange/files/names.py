@@ -1,4 +1,4 @@
-"""Names that every program and file system takes."""
+"""Names that every program and file system accepts."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ from ...errors import HairloomError
 #: Names that Windows keeps for devices, with any suffix.
 _DEVICES = re.compile(r"(con|prn|aux|nul|com[0-9¹²³]|lpt[0-9¹²³])(\..*)?", re.IGNORECASE)
 _UNSAFE = re.compile(r"[^\w\-. ]+")
-#: Letters of a path: Windows takes longer ones only where it and the program are set up for them.
+#: Maximum characters of a path: Windows accepts more only where it and the program are set up for
+#: it.
 MAX_PATH = 259 if os.name == "nt" else 4095
-#: Letters of a folder's name, at most 200 bytes; Windows has 260 for a whole path.
+#: Maximum characters of a folder's name, in at most 200 bytes; Windows has 260 for a whole path.
 _MAX_LETTERS = 50
 
 
@@ -38,7 +39,7 @@ def check_name(path: Path) -> None:
 
 
 def length_remark(path: Path, why: str) -> str:
-    """What else there is to say where the system calls a path unknown that is too long for it."""
+    """A remark for where the system reports a path as missing that is too long for it; else ""."""
     length = len(os.path.abspath(path))
     if why != os.strerror(errno.ENOENT) or length <= MAX_PATH:
         return ""
@@ -59,10 +60,10 @@ def plain_name(name: str, fallback: str = "hair") -> str:
 
 
 def folder_name(name: str, taken: Container[str] = (), fallback: str = "hair") -> str:
-    """A name for a folder that every system takes, and that leads nowhere else.
+    """A name for a folder that every system accepts, and that leads nowhere else.
 
     Args:
-        taken: names that others have, in the form of `as_compared`.
+        taken: names that are in use, in the form of `as_compared`.
     """
     composed = unicodedata.normalize("NFC", name)
     plain = _UNSAFE.sub("_", composed).strip(". ") or fallback
@@ -78,7 +79,7 @@ def no_device(name: str) -> str:
 
 
 def distinct_names(names: Iterable[str]) -> list[str]:
-    """These names, with a number behind those that are one with an earlier one on some system."""
+    """These names, with a number added to those that equal an earlier one on some system."""
     found: list[str] = []
     taken: set[str] = set()
     for name in names:
@@ -93,8 +94,8 @@ def _free(name: str, taken: Container[str]) -> str:
 
 
 def alike_beside(path: Path) -> str:
-    """The name of another file in the folder that is one with this on systems which ignore case;
-    "" where there is none."""
+    """The name of another file in the folder that equals this one on systems that ignore case; ""
+    where there is none."""
     wanted = as_compared(path.name)
     there = sorted(path.parent.iterdir()) if path.parent.is_dir() else []
     alike = (each for each in there if each.name != path.name and as_compared(each.name) == wanted)
@@ -107,5 +108,6 @@ def _is_one(path: Path, other: Path) -> bool:
 
 
 def as_compared(name: str) -> str:
-    """The same for names that are one to any system: Windows and macOS ignore case."""
+    """A form that is the same for names that any system takes as one, as Windows and macOS ignore
+    case."""
     return unicodedata.normalize("NFC", name).casefold()

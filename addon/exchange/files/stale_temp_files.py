@@ -1,8 +1,8 @@
-"""Names for what is written beside a file, and what a killed writer leaves of it.
+"""Names of temporary files beside a file, and removal of those that killed writers have left.
 
-A name says which process writes it and where that runs: .groom.hl-3f0c9a1e-4711-5b21c7d0.abc. The
-next who writes into the folder removes those whose processes are gone. Files that belong together
-and were complete when their writer was killed are put in place first (see `file_set`).
+A name tells which process writes the file, and where it runs: .groom.hl-3f0c9a1e-4711-5b21c7d0.abc.
+The next process that writes into the folder removes those whose writers are gone. Files that belong
+together and were complete when their writer was killed are put in place first (see `file_set`).
 """
 
 from __future__ import annotations
@@ -20,39 +20,39 @@ from pathlib import Path
 
 from .moving import move
 
-#: What such a name holds.
+#: The part of such a name that identifies its writer.
 MARK = r"hl-(?P<place>[0-9a-f]{8})-(?P<process>\d{1,10})-[0-9a-f]{8}"
 _OURS = re.compile(rf"\..*\.{MARK}(\.[^.]*)?")
-#: In a folder of files that belong together: all of them are there.
+#: Marks a folder of files that belong together as complete.
 COMPLETE = ".complete"
-#: Seconds without a change after which a file has no writer, where none can be asked for.
+#: Seconds without a change after which a writer whose process cannot be checked counts as gone.
 _ABANDONED = 86_400.0
 
 
 def temporary_beside(path: Path, suffix: str | None = None) -> Path:
-    """A hidden name in the same folder that nobody else takes, with this or the same suffix."""
+    """A unique hidden name in the same folder, with this suffix or that of `path`."""
     # no longer than other names, which have 255 bytes at most
     return path.with_name(f".{path.stem[:20]}.{mark()}{path.suffix if suffix is None else suffix}")
 
 
 def mark() -> str:
-    """A part of a name that tells which process writes there; nobody else takes it."""
+    """A unique part of a name that tells which process writes there, see MARK."""
     return f"hl-{_here()}-{os.getpid()}-{secrets.token_hex(4)}"
 
 
 def is_temporary(name: str) -> bool:
-    """Whether it is such a name."""
+    """Whether this is the name of a temporary file."""
     return _OURS.fullmatch(name) is not None
 
 
 def is_stale(path: str | Path, name: re.Match[str]) -> bool:
     """Whether the writer of this file or folder is gone.
 
-    Those of this machine since it was started can be asked for. Others, such as one that a power
-    cut has ended, are taken for gone after a day without a change.
+    Processes of this machine since its start can be checked. Others, such as one that a power cut
+    has ended, count as gone after a day without a change.
 
     Args:
-        name: of it, matched by a pattern with the groups of `mark`.
+        name: of the file or folder, matched by a pattern with the groups of MARK.
     """
     if name["place"] != _here() or os.name != "posix":
         return _is_abandoned(path)
@@ -60,9 +60,9 @@ def is_stale(path: str | Path, name: re.Match[str]) -> bool:
 
 
 def remove_stale_files(folder: Path) -> None:
-    """Remove files and folders with such names whose writers were killed.
+    """Remove temporary files and folders whose writers were killed.
 
-    A process that has the number of a dead one keeps what that left, for that time.
+    They stay while another process has the number of their dead writer.
 
     Raises:
         OSError: the folder cannot be read, or a complete set of files not be put in place.
@@ -83,7 +83,7 @@ def remove_stale_files(folder: Path) -> None:
 
 
 def put_in_place(staging: Path, folder: Path) -> None:
-    """Move the files of a complete set that are still to be moved, but over no newer ones."""
+    """Move the remaining files of a complete set to their places, but not over newer ones."""
     complete = (staging / COMPLETE).stat().st_mtime_ns
     for file in sorted(staging.iterdir()):
         target = Path(os.path.realpath(folder / file.name))  # through a link
@@ -101,7 +101,7 @@ def _is_abandoned(path: str | Path) -> bool:
 
 
 def _is_writing(process: int) -> bool:
-    """Not for Windows, where asking for a process by signal 0 would end it."""
+    """Whether the process runs. Not for Windows, where signal 0 would end it."""
     try:
         os.kill(process, 0)
     except ProcessLookupError:
@@ -113,7 +113,8 @@ def _is_writing(process: int) -> bool:
 
 @cache
 def _here() -> str:
-    """Where this process has its number: folders may be shared by machines and containers."""
+    """A name for where process numbers are those of this process: machines and containers may share
+    folders."""
     numbers, machine = "", ""
     with contextlib.suppress(OSError):  # only Linux has several
         numbers = os.readlink("/proc/self/ns/pid")

@@ -1,7 +1,6 @@
-"""Letting another process read a file, so that a library that fails on it does not take Blender
-along.
+"""Reading a file in another process, so that a library that crashes on it does not end Blender.
 
-What runs there is a script that imports none of our modules. It ends with REPORTED after an error
+That process runs a script that imports none of our modules. It ends with REPORTED after an error
 that it has written to stderr.
 """
 
@@ -17,11 +16,11 @@ from ...errors import HairloomError
 from .child_process import python_program, run_child
 from .names import check_name
 
-#: exit code of a script that says why on stderr, and of one that cannot write its results
+#: exit codes of a script: after an error that is on stderr; where its results cannot be written
 REPORTED, NO_ROOM = 3, 4
-#: How Linux and macOS end a process that goes on for too long, or takes too much.
+#: Exit codes where Linux or macOS has ended a process, and why: it took too much time, or memory.
 _ENDED = {-24: "since it took too long for a file of this size", -9: "as where memory runs out"}
-#: Seconds for any file, and bytes that a slow disk gives in another one.
+#: Seconds for any file, and bytes that a slow disk reads in each further second.
 _PATIENCE, _BYTES_A_SECOND = 60.0, 4.0e6
 
 
@@ -37,8 +36,8 @@ def run_reader(
     """Run a script on a file, as SCRIPT -- FILE RESULTS, and wait until it has ended well.
 
     Args:
-        library: whose failure it would be, as it is named in messages.
-        python: how to start a Python: a command to which a script and its arguments are added.
+        library: the name of the library that reads it, for messages.
+        python: the command that starts a Python, to which the script and its arguments are added.
             None: this one, where it is a program of its own.
         settings: further environment variables.
 
@@ -78,7 +77,7 @@ def run_reader(
 
 
 def this_python(path: Path) -> tuple[str, ...]:
-    """The command that starts a Python like this one; `path` is what it shall read.
+    """The command that starts a Python like this one; `path` is the file to read, for messages.
 
     Raises:
         HairloomError: this Python is a part of another program.

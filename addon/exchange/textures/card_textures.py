@@ -1,4 +1,4 @@
-"""The maps of hair cards as texture files, packed and in the format that an engine wants."""
+"""The maps of hair cards as texture files, packed and in the format that an engine needs."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class WrittenTexture:
 
     @property
     def color_space(self) -> str:
-        """How programs are to read it: colours of half floats are not by the sRGB curve."""
+        """How programs are to read it: half floats are always linear."""
         return "linear" if self.path.suffix == FORMATS["exr"] else self.layout.color_space
 
 
@@ -100,7 +100,7 @@ def _write_dds(
     *,
     is_compressed: bool,
 ) -> None:
-    needed = layout.sources | {"alpha"}  # which weighs all others
+    needed = layout.sources | {"alpha"}  # the weight of all others
     own = {name: values for name, values in maps.items() if name in needed}
     levels = mip_levels(own, grid=grid, threshold=threshold)
     write_dds(

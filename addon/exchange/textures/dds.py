@@ -1,9 +1,9 @@
 """DDS files: textures as GPUs hold them, with all mip maps, compressed in blocks of 4 x 4 texels.
 
 BC7 holds colours with or without alpha, and any three or four values, in 8 bits a texel; BC5 two
-values in 8 bits, BC4 one in 4 bits. etcpak compresses to BC7; the extension's zip brings it along.
-Header by Microsoft's "Programming Guide for DDS",
-always with its DX10 part, which alone can say sRGB and BC7.
+values in 8 bits, BC4 one in 4 bits. etcpak, which comes with the extension's zip, compresses to
+BC7. The header follows Microsoft's "Programming Guide for DDS", always with its DX10 part, which is
+needed for sRGB and BC7.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def write_dds(
         levels: (height, width, 1 to 4) in [0, 1] each, row 0 at the bottom, the full size first;
             each as `mip_maps.level_sizes` has it.
         is_color: red, green and blue are linear, and stored as sRGB.
-        is_normal_map: of three channels red and green alone are kept when compressed.
+        is_normal_map: only red and green of the three channels are kept when compressed.
         has_coverage: the fourth channel is straight alpha, not a value of its own.
 
     Raises:
@@ -84,7 +84,7 @@ def _bytes_of(level: Floats, *, is_color: bool) -> npt.NDArray[np.uint8]:
 
 
 def _in_four_channels(texels: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
-    """Green and blue that are missing as 0, alpha as 255."""
+    """Texels with 0 for missing green and blue, and 255 for missing alpha."""
     full = np.zeros((*texels.shape[:2], 4), np.uint8)
     full[..., 3] = 255
     full[..., : texels.shape[2]] = texels
@@ -92,7 +92,7 @@ def _in_four_channels(texels: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
 
 
 def _compressed(texels: npt.NDArray[np.uint8], path: Path) -> bytes:
-    """Blocks that stick out at the edges repeat the last row and column."""
+    """The compressed blocks; those beyond the edges repeat the last row and column."""
     height, width, channels = texels.shape
     full = np.pad(texels, ((0, -height % 4), (0, -width % 4), (0, 0)), mode="edge")
     if channels <= 2:

@@ -1,8 +1,8 @@
-"""Mip maps of card textures, down to a single texel, that keep what a texture is for.
+"""Mip maps of card textures, down to a single texel, that keep what each texture is for.
 
-Averaged as they stand, textures of hair go wrong at a distance: alpha falls below the threshold of
-the alpha test and the hair grows thin, colours take in what lies beside the strands, directions
-grow shorter, and tiles of an atlas run into each other. Here
+With plain averages, textures of hair go wrong at a distance: alpha falls below the threshold of the
+alpha test and the hair grows thin, colours mix with those beside the strands, directions grow
+shorter, and tiles of an atlas run into each other. Here
 
     alpha       keeps its coverage: in each tile as many texels pass the alpha test as at full size
                 (Castano 2010, "Computing alpha mipmaps")
@@ -26,13 +26,13 @@ from ...strands.vectors import unit_or
 
 #: Maps that hold directions as 0.5 d + 0.5.
 DIRECTIONS = ("normal", "tangent")
-#: Maps of names rather than amounts.
+#: Maps of labels, which cannot be averaged.
 LABELS = ("strand_id",)
-#: Fewer texels than these say nothing about a tile's coverage: the whole texture's is kept then.
+#: Minimum texels of a tile whose own coverage is kept; with fewer, the whole texture's is.
 _MIN_TILE_TEXELS = 16
-#: What texels without hair weigh, so that where there is none at all the mean is that of all.
+#: Weight of texels without hair, so that the mean is that of all texels where none has hair.
 _MIN_WEIGHT = 1e-12
-#: Below it there is no direction [1].
+#: Length below which a mean vector has no direction.
 _NOTHING = 1e-6
 
 
@@ -49,7 +49,7 @@ def mip_levels(
 
     Args:
         maps: name -> (height, width) or (height, width, channels) in [0, 1], all of one size;
-            "alpha", where it is there, says where there is hair. See DIRECTIONS and LABELS.
+            "alpha", if present, is where there is hair. See DIRECTIONS and LABELS.
         grid: the tiles that must not run into each other.
         threshold: of the alpha test, in (0, 1); None averages alpha as it stands, for blending.
 
@@ -87,7 +87,7 @@ class _Taps:
 
     @classmethod
     def between(cls, old: int, new: int, tiles: int) -> _Taps:
-        """By the lengths in which texels lie over each other, within the tile of the new one."""
+        """Fractions by how far texels overlap, within the tile of the new one."""
         ratio = old / new
         first = np.floor(np.arange(new) * ratio + 1e-9).astype(np.intp)
         index = first[:, None] + np.arange(int(np.ceil(ratio)) + (old % new > 0))
@@ -102,7 +102,7 @@ class _Taps:
         return cls(index, fraction.astype(np.float32))
 
     def mean(self, values: Floats) -> Floats:
-        """Along axis 0, (new, ...)."""
+        """Means along axis 0, (new, ...)."""
         if np.array_equal(self.index.ravel(), np.arange(len(values))) and self.is_even:
             pairs = values.reshape(len(self.index), -1, *values.shape[1:])
             total = sum(pairs[:, each] for each in range(1, pairs.shape[1])) + pairs[:, 0]
@@ -128,7 +128,7 @@ class _Taps:
 
 @dataclass(frozen=True)
 class _Halving:
-    """From one level to the next."""
+    """The step from one level to the next."""
 
     rows: _Taps
     columns: _Taps
@@ -154,7 +154,7 @@ def _tile_of(texels: int, tiles: int) -> Ints:
 
 
 def _as_averaged(name: str, values: Floats, weight: Floats) -> Floats:
-    """What can be summed up level by level: the value by its weight, which is never nothing."""
+    """Values times their weight, which is never 0, so that they can be summed level by level."""
     if name == "alpha" or name in LABELS:
         return values
     plain = 2.0 * values - 1.0 if name in DIRECTIONS else values
@@ -166,7 +166,7 @@ def _as_averaged(name: str, values: Floats, weight: Floats) -> Floats:
 
 
 def _as_shown(name: str, values: Floats, weight: Floats) -> Floats:
-    """What a texture holds of such a sum: where there is no hair, the mean of all."""
+    """The values of a texture, from such sums: where there is no hair, the mean of all texels."""
     if name == "alpha" or name in LABELS:
         return values
     by_weight = weight if values.ndim == 2 else weight[..., None]
@@ -212,8 +212,8 @@ def _with_coverage(alpha: Floats, coverage: Floats, grid: AtlasGrid, threshold: 
 def _passing(alpha: Floats, fraction: float, threshold: float) -> Floats:
     """Alpha, scaled so that this fraction of it passes the test, and one texel at least if any did.
 
-    Castano scales all alphas by one factor; here this goes for those below the threshold, and
-    those above it are scaled by their distance to 1, so that opaque hair stays opaque.
+    Castano scales all alphas by one factor. Here those that fail the test are scaled so; of those
+    that pass, the distance to 1 is scaled, so that opaque hair stays opaque.
     """
     if fraction == 0.0:
         return np.minimum(alpha, np.nextafter(np.float32(threshold), np.float32(0.0)))

@@ -1,4 +1,4 @@
-"""Between scene-linear values and those that picture files of integers store: IEC 61966-2-1."""
+"""Conversion between scene-linear values and those in picture files of integers: IEC 61966-2-1."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from ...arrays import Floats
 
 
 def srgb_encoded(linear: Floats) -> Floats:
-    """Values in [0, 1] by the sRGB curve."""
+    """Values in [0, 1], encoded by the sRGB curve."""
     curved = 1.055 * np.power(np.maximum(linear, 0.0031308), 1.0 / 2.4) - 0.055
     return np.where(linear <= 0.0031308, 12.92 * linear, curved)
 

@@ -1,12 +1,12 @@
-"""Pictures to and from files through OpenImageIO, without Blender.
+"""Reading and writing pictures through OpenImageIO, without Blender.
 
-Colours are scene-linear here, and by the sRGB curve in files of integers; everything else (alpha,
-shifts, directions) is stored as it is. Alpha is straight: OpenImageIO would multiply colours with
-it, which loses them where it is 0. Only EXR files hold them multiplied, as all programs take them,
-but for packed textures, whose channels are values of their own.
+Colours are scene-linear here, and sRGB in files of integers; everything else (alpha, shifts,
+directions) is stored as it is. Alpha is straight: OpenImageIO would premultiply colours, which
+loses them where alpha is 0. Only EXR files are premultiplied, as all programs expect, except for
+packed textures, whose channels are independent values.
 
-OpenImageIO comes with official builds of Blender and lies on PyPI as `openimageio`. Where it is
-missing, blender/base/images.py has Blender's own readers and writers in its place.
+OpenImageIO comes with official builds of Blender and is on PyPI as `openimageio`. Where it is
+missing, blender/base/images.py uses Blender's own readers and writers instead.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from .srgb import srgb_decoded, srgb_encoded
 
 #: The largest side of a texture on every GPU that Blender supports [pixels].
 LARGEST_SIDE = 16384
-#: More than anybody paints [pixels]; as four float channels they take 1 GiB.
+#: Maximum size, more than anybody paints [pixels]; as four float channels it takes 1 GiB.
 MAX_PIXELS = 1 << 26
 #: suffix -> the depths that such a file can have, the first being the usual one
 DEPTHS = {
@@ -36,9 +36,9 @@ DEPTHS = {
 
 #: The chunk IEND with its checksum.
 _END_OF_PNG = b"\0\0\0\0IEND\xaeB`\x82"
-#: In EXR and TIFF files, which otherwise have the time: the same pixels are the same bytes.
+#: Date of EXR and TIFF files, always the same, so that the same pixels give the same bytes.
 _NO_DATE = "1970:01:01 00:00:00"
-#: In EXR files, whose alpha is multiplied otherwise: this one's is not.
+#: Attribute of EXR files whose colours are not premultiplied, as they would be otherwise.
 _STRAIGHT = "hairloom_straight_alpha"
 
 
@@ -76,8 +76,7 @@ def read_texture(path: Path, *, is_color: bool) -> Floats:
         straight alpha; integers as [0, 1]. What a file holds beyond four channels is left out.
 
     Raises:
-        HairloomError: no OpenImageIO, no such file, or none that can be read, whole, as a picture
-            of a size that can be used.
+        HairloomError: no OpenImageIO, no such file, or no complete picture of a usable size.
     """
     library = _openimageio(path)
     if os.path.isdir(path):
@@ -113,7 +112,7 @@ def write_texture(
             integers hold [0, 1].
         is_color: integers are coded by the sRGB curve.
         depth: one of DEPTHS for this suffix; None is the usual one.
-        is_packed: engines unpack its channels, so that nothing is multiplied in EXR files either.
+        is_packed: engines unpack its channels, so that even EXR files are not premultiplied.
         compression: "none" for a file that simple readers can read; None is the usual one.
 
     Raises:
@@ -147,7 +146,8 @@ def write_texture(
 
 
 def has_its_end(path: Path) -> bool:
-    """Whether a PNG has its closing chunk: those who write them are silent about a full disk."""
+    """Whether a PNG has its closing chunk, since writers of PNG files do not report a full disk;
+    True of other files."""
     if path.suffix.lower() != ".png":
         return True
     with path.open("rb") as file:
@@ -169,7 +169,7 @@ def _openimageio(path: Path) -> Any:
 
 
 def _pixels(path: Path, source: Any, library: Any, *, is_color: bool) -> Floats:
-    """What an open file holds, once its header is known to make sense."""
+    """The pixels of an open file, after a check of its header."""
     spec = source.spec()
     width, height, channels = spec.width, spec.height, min(spec.nchannels, 4)
     if spec.deep or spec.depth > 1 or min(width, height, channels) < 1:
@@ -205,7 +205,7 @@ def _with_colors(image: Floats, colors: Floats) -> Floats:
 
 
 def _space(*, is_color: bool, depth: str) -> str:
-    """OpenImageIO's name of what the values mean."""
+    """OpenImageIO's name of the values' colour space."""
     if not is_color:
         return "raw"
     return "sRGB" if depth.startswith("uint") else "lin_rec709"
@@ -241,7 +241,7 @@ def _unreadable(path: Path, problem: str, remedy: str) -> HairloomError:
 
 
 def _reason(source: Any) -> str:
-    """The first line of what OpenImageIO, or one of its readers or writers, has to say."""
+    """The first line of the error message of OpenImageIO, or of one of its readers or writers."""
     try:
         text = source.geterror()
     except UnicodeDecodeError:  # it quotes what it found in the file

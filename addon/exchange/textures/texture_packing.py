@@ -1,13 +1,13 @@
 """How the maps of hair cards are put into the channels of an engine's textures.
 
-A preset is data: which files there are, and what each of their channels holds. What differs between
-engines is in it too: whether green runs up or down in directions, whether colours are sRGB, and
-what stands for how rough hair is. It never turns maps round: in all files the root of the hair is
-at the bottom, the tip at the top, and the top row comes first.
+A preset is data: which files there are, and what each of their channels holds. It includes what
+differs between engines: whether green runs up or down in directions, whether colours are sRGB, and
+which map roughness is in. It never flips maps: in all files the root of the hair is at the bottom,
+the tip at the top, and the top row comes first.
 
 Directions are in the frame of the card, 0.5 d + 0.5: x across it, along u; y up, from root to tip;
-z away from the head. Unreal's tangent space has y down the picture, so that green is turned round
-there, for the tangent as for a normal map. Anisotropy in glTF and Godot is the direction in which
+z away from the head. Unreal's tangent space has y down the picture, so green is inverted there, in
+the tangent as in a normal map. Anisotropy in glTF and Godot is the direction in which
 highlights are stretched, which on hair is across the strands: a quarter turn from the tangent.
 
 Sources: Unreal's names and channels are those of its card layouts "Card Default" and "Card Compact"
@@ -25,7 +25,7 @@ import numpy as np
 from ...arrays import Floats
 from ...errors import HairloomError
 
-#: What a map says, in a few words; and what stands in its place where it is missing.
+#: The meaning of each map, in a few words; and the value that replaces a missing one.
 MEANINGS = {
     "alpha": ("coverage", 1.0),
     "color": ("colour as a plain material shows it", 1.0),
@@ -55,7 +55,7 @@ class Channel:
 
     source: the name of a map, or "" for a constant.
     component: which of a map's three.
-    is_inverted: 1 minus the value, which turns the component of a direction round.
+    is_inverted: 1 minus the value, which reverses the component of a direction.
     constant: what a channel without a source holds.
     """
 
@@ -79,7 +79,7 @@ class Channel:
         return f"{self.source}: {value} of the {about}"
 
     def of(self, maps: Mapping[str, Floats]) -> Floats | float:
-        """Its values, (height, width) or one for all."""
+        """The channel's values, (height, width) or one for all."""
         if not self.source:
             return self.constant
         if self.source not in maps:
@@ -91,7 +91,7 @@ class Channel:
 
     @property
     def _missing(self) -> float:
-        """Directions that are missing: the card's normal, or straight up."""
+        """The value of a missing map; for directions those of the card's normal, or straight up."""
         up = {"normal": 2, "tangent": 1}.get(self.source)
         return 1.0 if up == self.component else MEANINGS[self.source][1]
 
@@ -119,7 +119,7 @@ class TextureLayout:
 
     @property
     def has_coverage(self) -> bool:
-        """Whether the fourth channel says where there is hair."""
+        """Whether the fourth channel is the coverage of hair."""
         return len(self.channels) == 4 and self.channels[3].source == "alpha"
 
     @property
@@ -251,7 +251,7 @@ PRESETS: dict[str, tuple[TextureLayout, ...]] = {
 
 
 def layouts(preset: str, maps: Mapping[str, Floats]) -> list[TextureLayout]:
-    """The files of a preset, less those of which no map is there.
+    """The files of a preset, without those of which all maps are missing.
 
     Raises:
         HairloomError: no such preset, no map at all, another map than those of MEANINGS, or maps
@@ -272,8 +272,7 @@ def packed(maps: Mapping[str, Floats], preset: str) -> list[PackedTexture]:
 
     Args:
         maps: name -> (height, width), or (height, width, 3) for base, normal and tangent, in
-            [0, 1], of one size. A missing one is taken as nothing out of the ordinary, see
-            MEANINGS.
+            [0, 1], of one size. A missing one is replaced by a neutral value, see MEANINGS.
 
     Raises:
         HairloomError: as `layouts` does.

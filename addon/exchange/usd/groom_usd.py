@@ -4,11 +4,11 @@
     /name/strands    BasisCurves: cubic, catmullRom, pinned, so that curves pass through all points
                      and end at the first and the last; or one such prim for each group, by its name
 
-Widths are twice the radii. What a groom says beyond that are primvars with the names of Epic's
-"Using Alembic for Grooms". Unreal Engine takes primvars of the plain types (float3, not color3f)
-and for each strand or point alone, takes the version from user properties of the topmost prim, and
-wants GroomAPI applied to it. Root UVs go in once more as `st`, and colours as `displayColor`, for
-all others.
+Widths are twice the radii. All further attributes are primvars with the names of Epic's "Using
+Alembic for Grooms". Unreal Engine only reads primvars of the plain types (float3, not color3f) with
+a value for each strand or point, reads the version from user properties of the topmost prim, and
+needs GroomAPI applied to it. For all others, root UVs are repeated as `st`, and colours as
+`displayColor`.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from .usd_reader import summary
 #: The version of Epic's conventions that the names of primvars are from.
 GROOM_VERSION = (1, 5)
 
-#: Frames that wait in memory before they go to the file [bytes].
+#: Size of the frames that are kept in memory before they are saved [bytes].
 _WAITING = 1 << 28
 
 
@@ -60,7 +60,7 @@ def write_usd(
     is_linear: bool = False,
     motion: GroomMotion | None = None,
 ) -> None:
-    """Write a groom with all that it says; the file is there complete or not at all.
+    """Write a groom with all its attributes; the file is there complete or not at all.
 
     Args:
         path: .usdc (binary), .usda (text), or .usd, which is binary.
@@ -68,7 +68,7 @@ def write_usd(
         scale: metres in one unit of the file.
         by_group: a prim for each group in place of one for all.
         is_linear: straight between points, in place of cubic.
-        motion: time samples, one a frame; the groom itself stays the value for no time.
+        motion: time samples, one a frame; the groom itself stays the default value.
 
     Raises:
         HairloomError: no strands, no OpenUSD, another suffix, frames that do not fit the groom, or
@@ -134,7 +134,7 @@ def _root(usd: ModuleType, stage: Any, groom: Groom, space: UsdSpace) -> Any:
 
 @dataclass(frozen=True)
 class _Part:
-    """Strands that share a prim: their indices in the whole groom, their points', themselves."""
+    """Strands that share a prim: the indices of their points in the whole groom, and themselves."""
 
     points: Ints | slice
     groom: Groom
@@ -158,7 +158,7 @@ def _parts(groom: Groom, by_group: bool) -> Iterator[tuple[str, _Part]]:
 def _written_part(
     usd: ModuleType, root: Any, name: str, part: _Part, space: UsdSpace, is_linear: bool
 ) -> tuple[Any, _Part]:
-    """A prim of curves as the groom is at rest, and whose it is."""
+    """A prim of curves with the groom at rest, and the part that is in it."""
     tokens, strands = usd.UsdGeom.Tokens, part.groom.strands
     path = root.GetPath().AppendChild(name)
     curves = usd.UsdGeom.BasisCurves.Define(root.GetStage(), path)
@@ -225,7 +225,7 @@ def _group_names(groom: Groom) -> list[str]:
 def _set_points(
     usd: ModuleType, curves: Any, points: Floats, width: float, space: UsdSpace, *time: float
 ) -> None:
-    """Points [m] and the box around them, at a time, or at none."""
+    """Set points [m] and the box around them, at a time or as default values."""
     placed = np.ascontiguousarray(from_z_up(points, space.up), np.float32)
     if space.scale != 1.0:
         placed = placed / np.float32(space.scale)
@@ -258,7 +258,7 @@ def _write_motion(
             time = float(motion.first_frame + count)
             _set_points(usd, curves, points[part.points], width, space, time)
         count, waiting = count + 1, waiting + points.nbytes
-        if is_binary and waiting > _WAITING:  # a binary file grows at its end; a text is one piece
+        if is_binary and waiting > _WAITING:  # a binary file only grows; a text is one piece
             stage.GetRootLayer().Save()
             waiting = 0
     stage.SetTimeCodesPerSecond(motion.rate)

@@ -1,9 +1,8 @@
-"""Reading grooms from the BasisCurves of USD files: whichever prims, bases and primvars they use.
+"""Reading grooms from the BasisCurves of USD files, whichever prims, bases and primvars they use.
 
-Units, axes and the places of prims come from the file. Strands are read at rest: values without a
-time, or those of the first one; and, where they move, at all times. Instances of prims are read as
-often as they stand in the file; point instancers are not, and of other geometry only its number is
-reported.
+Units, axes and the places of prims come from the file. Strands are read at rest, from default
+values or those of the first time, and at all times where they move. A prim with instances is read
+once for each; point instancers are not read, and of other geometry only the number is reported.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ from .usd_curves import Curves, UnusableCurvesError, curves_of
 from .usd_library import usd_arrays
 from .usd_reader import Arrays, unpacked
 
-#: prims of which each is named in notes
+#: maximum number of prims that notes name one by one
 _FEW = 3
 
 
@@ -43,14 +42,14 @@ def read_usd(
 
     Args:
         path: .usd, .usdc or .usda.
-        up: "Y" or "Z" in place of what the file says.
-        scale: metres in one unit, in place of what the file says.
-        factor: what lengths are multiplied by beside that.
+        up: "Y" or "Z", instead of the file's own.
+        scale: metres in one unit, instead of the file's own.
+        factor: further factor on lengths.
         python: the command that starts another Python, see `run_reader`.
 
     Returns:
         The groom: groups as the file has them, or one for each prim; the version of Epic's
-        conventions that it names, else 0; notes on all that was changed or left out.
+        conventions that it names, else ""; notes on all that was changed or left out.
 
     Raises:
         HairloomError: no OpenUSD, a file that cannot be read, or one without a usable strand.
@@ -65,7 +64,7 @@ def read_usd(
 
 
 class _Reading:
-    """What a file holds, and what there is to say of it."""
+    """The content of a file, and notes on it."""
 
     def __init__(
         self, arrays: Arrays, path: Path, up: str | None, scale: float | None, factor: float
@@ -117,12 +116,12 @@ class _Reading:
         )
 
     def version(self) -> str:
-        """Of the conventions for grooms, as the topmost prim says; "" where it does not."""
+        """The version of the conventions for grooms that the topmost prim names; "" if none."""
         major, minor = self._arrays["version"].tolist()
         return f"{major}.{minor}" if min(major, minor) >= 0 else ""
 
     def name(self) -> str:
-        """The topmost prim's, unless that is Blender's "root"."""
+        """The topmost prim's name, or the file's where that is Blender's "root"."""
         name, label = map(str, self._arrays["prim_names"])
         return self._path.stem if name in ("", "root") else label or name
 
@@ -131,9 +130,9 @@ class _Reading:
 
 
 def _of_prims(notes: dict[str, list[str]], one: str = "", many: str = "") -> list[str]:
-    """Sentences on prims, given the paths that each is on; of many prims one for all.
+    """Sentences from notes and the paths of the prims that they are on; one for many prims.
 
-    one, many: what a sentence begins with, after the path or the paths.
+    one, many: text between the path or paths and the note.
     """
     found = []
     for note, paths in notes.items():
@@ -145,7 +144,7 @@ def _of_prims(notes: dict[str, list[str]], one: str = "", many: str = "") -> lis
 
 
 def _joined(pieces: list[Curves], path: Path, name: str, notes: list[str]) -> Groom:
-    """All pieces as one groom of usable strands; notes grow."""
+    """All pieces as one groom of usable strands; adds to `notes`."""
     counts = np.concatenate([np.diff(piece.offsets) for piece in pieces])
     offsets = np.concatenate([[0], np.cumsum(counts)])
     groups, group_names = _groups(pieces)
@@ -200,7 +199,7 @@ def _together(arrays: list[NDArray[Any]]) -> NDArray[Any]:
 
 
 def _of_all(what: str, arrays: list[NDArray[Any] | None], notes: list[str]) -> NDArray[Any] | None:
-    """All arrays as one, or None where a prim has none; reported if another one has."""
+    """All arrays as one; None if a prim has none, with a note if another one has."""
     known = [array for array in arrays if array is not None]
     if len(known) == len(arrays):
         return _together(known)
@@ -210,14 +209,14 @@ def _of_all(what: str, arrays: list[NDArray[Any] | None], notes: list[str]) -> N
 
 
 def _radius(piece: Curves) -> Floats:
-    """NaN, which `clean` replaces, where it is not known."""
+    """A piece's radii; NaN, which `clean` replaces, where they are not known."""
     if piece.radius is not None:
         return piece.radius
     return np.full(len(piece.points), np.nan, np.float32)
 
 
 def _colors(pieces: list[Curves]) -> Floats | None:
-    """NaN, which is none, where a prim has none."""
+    """The colours of all pieces; NaN, which means no colour, where a prim has none."""
     if all(piece.color is None for piece in pieces):
         return None
     none = np.float32(np.nan)
@@ -248,7 +247,7 @@ def _groups(pieces: list[Curves]) -> tuple[Ints, dict[int, str]]:
 
 
 def _guides(pieces: list[Curves], kept: Ints) -> Bools | None:
-    """Strands are none where a prim does not say."""
+    """Which strands are guides; none of those of a prim that does not say."""
     if all(piece.is_guide is None for piece in pieces):
         return None
     flags = [

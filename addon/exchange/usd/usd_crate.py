@@ -1,8 +1,8 @@
 """Binary USD files (crates), checked before the library opens them.
 
-OpenUSD believes the counts at the beginnings of a crate's sections: a damaged file of 3 kB made it
-fill 5 GB for 40 s. Here they are held against what that many bytes can hold: LZ4 makes bytes at
-most 255 times smaller, and of integers, by USD's own coding, no fewer than two bits each are left.
+OpenUSD trusts the counts at the beginnings of a crate's sections: a damaged file of 3 kB made it
+fill 5 GB for 40 s. Here they are compared with what that many bytes can hold: LZ4 makes bytes at
+most 255 times smaller, and USD's own coding leaves at least two bits of each integer.
 """
 
 from __future__ import annotations

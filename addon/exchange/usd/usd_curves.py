@@ -21,13 +21,13 @@ _ROOT_UVS = ("groom_root_uv", "surface_uv_coordinate", "st", "uv", "map1")
 
 @dataclass(frozen=True)
 class Curves:
-    """What a prim holds; what is None is not known. Arrays are as in `Groom`.
+    """The content of a prim; None: not known. Arrays are as in `Groom`.
 
     offsets: (curve_count + 1,).
     unfit: see `unfit_curves`.
     notes: what had to be changed or left out.
-    times, positions: when it moves (n,) [s], and the points then (n, point_count, 3); None and the
-        points (1, point_count, 3) where it does not.
+    times, positions: of a prim that moves its times (n,) [s], and the points at these,
+        (n, point_count, 3); of a still one None and (1, point_count, 3).
     """
 
     name: str
@@ -57,7 +57,7 @@ class UnusableCurvesError(Exception):
 
 
 def curves_of(prim: Arrays, space: Floats) -> Curves:
-    """What a prim holds, as strands.
+    """The content of a prim as strands.
 
     Args:
         prim: the arrays of a prim, by the names of `usd_reader`.
@@ -131,7 +131,7 @@ def _motion(prim: Arrays, values: _Values, space: Floats) -> tuple[Floats | None
 def _radius(
     values: _Values, interpolation: str, scale: float
 ) -> tuple[Floats | None, tuple[str, ...]]:
-    """Half the widths [m], and what to say of those that cannot be hair's."""
+    """Half the widths [m], and notes on those that cannot be hair's."""
     widths = _array(values.prim.get("widths"), np.float32)
     if widths is None or not len(widths):
         return None, ("it has no widths",)
@@ -166,7 +166,7 @@ class _Values:
         return None if values is None else self.on_points(values, interpolation, name)
 
     def on_points(self, values: Floats, interpolation: str, name: str) -> Floats | None:
-        """Values brought to each point, or None, and a note, where there are not enough."""
+        """Values at each point; None, with a note, if their number does not fit."""
         on_curves = self.on_curves
         expected = self._expected(interpolation)
         if len(values) == 1 or interpolation == "constant":
@@ -197,7 +197,7 @@ class _Values:
         return None if rows is None else [names[row] for row in rows.tolist()]
 
     def _rows(self, name: str, length: int, interpolation: str) -> Ints | None:
-        """For each strand, which of the values is its own."""
+        """The index of the value of each strand."""
         if length == 1 or interpolation == "constant":
             return np.zeros(len(self._counts), np.int64)
         expected = self._expected(interpolation)

@@ -1,4 +1,4 @@
-"""Levels of detail in a USD file of cards: of all that lie in one place, one is there."""
+"""Levels of detail in a USD file of cards, which lie in one place: variants, one of them shown."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ VARIANT_SET, _VARIANT = "LOD", "LOD{}"
 
 
 def with_level_variants(path: Path, nodes: Sequence[str]) -> None:
-    """Make the levels variants of what holds them; the finest is chosen.
+    """Make the levels variants of their parent prim, with the finest selected.
 
     Args:
         nodes: the levels' names, the finest first, which are siblings.

@@ -1,7 +1,7 @@
-"""OpenUSD's Python modules, which official builds of Blender bring along, and what they read.
+"""OpenUSD's Python modules, which come with official builds of Blender, and what they read.
 
-The bpy module from PyPI has them in a folder that Python does not search: there usd-core takes
-their place, in one process with Blender's own. Some Linux distributions build Blender without.
+The bpy module from PyPI has them in a folder that Python does not search: usd-core is used there,
+in one process with Blender's own. Some Linux distributions build Blender without them.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def usd_library(place: Path) -> ModuleType:
 
 
 def usd_arrays(path: Path, python: Sequence[str] | None = None) -> Arrays:
-    """What another process finds in a file, see `usd_reader`: this one never opens it.
+    """The arrays that another process reads from a file, see `usd_reader`; this one never opens it.
 
     python: the command that starts another Python, see `run_reader`.
 
@@ -73,7 +73,7 @@ def usd_arrays(path: Path, python: Sequence[str] | None = None) -> Arrays:
         )
     with tempfile.TemporaryDirectory(prefix="hairloom-") as folder:
         result = Path(folder) / "curves.npz"
-        # One thread: each further one reserves memory of its own, which would count.
+        # one thread: each further one reserves memory, which counts towards the limit
         one_thread = {"PXR_WORK_THREAD_LIMIT": "1"}
         script = Path(usd_reader.__file__)
         run_reader(script, path, [result], library="USD", python=python, settings=one_thread)

@@ -6,14 +6,21 @@ A damaged file makes OpenUSD crash, and a text of a few kilobytes can describe m
 machine holds. So only this process opens files, and it has limits of time, memory and prims. It
 imports no other module of ours. It ends with REPORTED, and a line on stderr, after an error.
 
-The result has, for each BasisCurves in the file's order, "name", "path", "matrix" (4, 4) that takes
-row vectors to the stage, "points", "counts", "widths", "traits" (wrap, type, basis, interpolation
-of widths), of those that move "times" [s], "motion" (times, points, 3) and "matrices" (times, 4,
-4), as long as they have as many points, and else "ended", the time from which on they have others;
-and, for each primvar of PRIMVARS that it has, "primvar/NAME" without indices and
-"interpolation/NAME", all of them `packed`. And it has of the stage "up", "unit", "has_unit",
-"prim_names" (name and label of the topmost one), "version" (major and minor; -1 where it names
-none), "others" (types of other geometry) and "other_counts".
+The result has, for each BasisCurves in the file's order, all of it `packed`:
+
+    name, path
+    matrix            (4, 4), takes row vectors to the stage
+    points, counts, widths
+    traits            wrap, type, basis, interpolation of widths
+    times             [s], only of curves that move, as are the next three
+    motion, matrices  (times, points, 3) and (times, 4, 4), while the number of points is the same
+    ended             the time from which on it is another one, if there is such a time
+    primvar/NAME      without indices, for each primvar of PRIMVARS that there is
+    interpolation/NAME
+
+And it has of the stage "up", "unit", "has_unit", "prim_names" (name and label of the topmost one),
+"version" (major and minor; -1 where it names none), "others" (types of other geometry) and
+"other_counts".
 """
 
 from __future__ import annotations
@@ -57,16 +64,16 @@ MAX_POINTS = 1 << 28
 MAX_PRIMS = 1_000_000
 #: Memory that a file may take beside its own size [bytes], and as a multiple of it.
 _BESIDE, _MAX_TIMES = 640 << 20, 30
-#: Time of the processor for any file, with the start [s], and bytes that take a second more.
+#: Processor time for any file, including the start [s], and bytes that take a second more.
 _SECONDS, _BYTES_A_SECOND = 6, 1_000_000
 
 
 class _TooMuchError(Exception):
-    """The file describes more than can be meant."""
+    """The file describes more than is plausible."""
 
 
 def read_curves(path: str) -> Arrays:
-    """All curves of a file, at no time or the first one that there is."""
+    """All curves of a file, with default values or those of the first time."""
     from pxr import Usd, UsdGeom
 
     stage = Usd.Stage.Open(path)
@@ -98,8 +105,8 @@ def read_curves(path: str) -> Arrays:
 
 
 def packed(prims: list[Arrays]) -> Arrays:
-    """The arrays of many prims as a few, since an array in a file takes longer than a prim: those
-    of one name, type and shape follow each other, texts are one document. Empties the prims.
+    """The arrays of many prims as a few, since each array in a file takes longer than a prim:
+    arrays of one name, type and shape are joined, texts become one document. Empties the prims.
 
     "texts": JSON as bytes, for each prim {name: text or texts}. "layouts": JSON as bytes, the name
     and the dimensions of each K; "K/values": the rows of all prims that have it, "K/prims": which
@@ -183,12 +190,12 @@ def _of_curves(prim: Any) -> Arrays:
 
 
 def _times(prim: Any) -> list[float]:
-    """At which its points, or the places of what it is in, are given; none where nothing moves."""
+    """The times at which a prim's points or the transforms above it are given; none if still."""
     from pxr import UsdGeom
 
     times = set(UsdGeom.BasisCurves(prim).GetPointsAttr().GetTimeSamples())
     above = prim
-    while above:  # scopes and prims without a type lie between what moves, too
+    while above:  # scopes and prims without a type may lie between
         if above.IsA(UsdGeom.Xformable):
             times |= set(UsdGeom.Xformable(above).GetTimeSamples())
         above = above.GetParent()
@@ -219,7 +226,7 @@ def _motion(prim: Any, curves: Arrays) -> Arrays:
 
 
 def _value(attribute: Any) -> Any:
-    """At no time; where an attribute has time samples alone, the first of them."""
+    """An attribute's default value, or its first time sample where it has only these."""
     from pxr import Usd
 
     value = attribute.Get()
@@ -227,7 +234,7 @@ def _value(attribute: Any) -> Any:
 
 
 def _flattened(primvar: Any) -> Any:
-    """Without its indices."""
+    """A primvar's values without its indices."""
     from pxr import Usd
 
     value = primvar.ComputeFlattened(Usd.TimeCode.Default())
@@ -261,11 +268,11 @@ def summary(error: BaseException) -> str:
 
 
 def _limit(*paths: str) -> None:
-    """Of memory and time for this process, by the size of these files; only Linux says how much
-    memory it has.
+    """Limit memory and time of this process by the size of these files; only on Linux, which tells
+    how much memory it has.
 
-    Memory is what it may write to. Of the addresses that it has, libraries and stacks of threads
-    take a gigabyte and use little of it.
+    Only memory that it may write to is limited. Of its address space, libraries and stacks of
+    threads take a gigabyte and use little of it.
     """
     if not sys.platform.startswith("linux"):
         return
@@ -301,4 +308,4 @@ def _main(path: str, result: str) -> int:
 if __name__ == "__main__":
     code = _main(*sys.argv[-2:])
     sys.stderr.flush()
-    os._exit(code)  # at once: the library's own end may fail on what it has read
+    os._exit(code)  # at once: the library's own shutdown may fail on what it has read

@@ -1,4 +1,4 @@
-// Takes the place of three.js's loader of EXR files in a page, whose tables are plain half floats.
+// Replaces three.js's loader of EXR files in a page, whose tables are plain half floats.
 import { DataTexture, HalfFloatType, RGBAFormat } from 'three';
 
 export class EXRLoader {

@@ -1,4 +1,4 @@
-// What a web page of an export runs: it shows the asset that lies in the page itself.
+// The script of an export's web page: it shows the asset that is embedded in the page.
 // tools/make_viewer.py bundles it with three.js into viewer.min.js.
 import * as THREE from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
@@ -6,7 +6,7 @@ import { loadHairloomCards } from '../../../../docs/engines/three/hairloom_cards
 
 const FIELD_OF_VIEW = 30;
 const CALM = matchMedia('(prefers-reduced-motion: reduce)').matches;
-// Suns: the way to each in degrees around and above the hair, as the first view sees it.
+// The direction to each sun in degrees around and above the hair, relative to the first view.
 const SUNS = [
   { around: 38, above: 36 },
   { around: -62, above: 12 },
@@ -119,7 +119,7 @@ async function show() {
   globalThis.hairloom = { scene, hair, camera, controls, renderer, redraw };
 }
 
-// File name -> address of what lies in the page as base64, some of it compressed.
+// File name -> address of its content, which is in the page as base64, in part compressed.
 async function unpacked(files) {
   const entries = Object.entries(files).map(async ([name, { type, data, gzip }]) => {
     let blob = new Blob([Uint8Array.from(atob(data), (sign) => sign.charCodeAt(0))], { type });
@@ -162,7 +162,7 @@ async function pictureOf(address) {
 }
 
 function materialOf({ color, emission, roughness, specular, alpha, transparency }, picture) {
-  const boundary = Math.sqrt(Math.min(specular, 0.16)); // that reflects this much: its index of refraction
+  const boundary = Math.sqrt(Math.min(specular, 0.16)); // a boundary that reflects this amplitude has the index of refraction below
   return new THREE.MeshPhysicalMaterial({
     color: picture ? '#ffffff' : new THREE.Color(...color),
     map: picture ?? null,
@@ -305,7 +305,7 @@ function surroundingsOf(scene, { center, radius }, redraw) {
   return turn;
 }
 
-// Of the hair on the head. Shadows among strands are in the shading of the cards.
+// Shadows of the hair on the head. Those among strands are in the shading of the cards.
 function castShadows(hair, head) {
   hair.levels.forEach(({ object }) => {
     const [caster] = object.children;
@@ -364,7 +364,7 @@ function plainMesh(group, passes) {
   const material = last.material.clone();
   Object.assign(material, { uniforms: last.material.uniforms, side: THREE.DoubleSide });
   const mesh = meshLike(last, unordered(last.geometry), material);
-  mesh.onBeforeRender = last.onBeforeRender; // with its share of the pixels
+  mesh.onBeforeRender = last.onBeforeRender; // which sets the level's part of the pixels
   mesh.castShadow = passes[0].castShadow;
   mesh.customDepthMaterial = passes[0].customDepthMaterial;
   group.add(mesh);
