@@ -49,9 +49,9 @@ BEGIN = np.array([0.37, 0.41, 0.43])
 SLACK = 0.04
 #: Lower limit of `HairGrid.full`, as a fraction of the median density at rest.
 THIN = 0.25
-#: At full volume: PUSH and PULL, displacement by pressure where the density has doubled and by
-#: cohesion where it has vanished, until hair feels again, in squared cells times the gradient of
-#: the density's logarithm; its maximum [cells]; the rate of friction [1/s].
+#: At full volume, until hair feels again: displacement by pressure where the density has doubled
+#: (PUSH), and by cohesion where it has vanished (PULL), in squared cells times the gradient of the
+#: density's logarithm; its maximum [cells]; the rate of friction [1/s].
 PUSH, PULL, FARTHEST, RUBBING = 1.4, 0.1, 0.4, 12.0
 #: CVs are deposited where they will be after this fraction of the time until hair feels again, so
 #: that locks meet before they have passed through each other.

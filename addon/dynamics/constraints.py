@@ -174,8 +174,9 @@ def hold_within_reach(position: Floats, length: Floats, held: Floats | None) -> 
 
 
 def shorten(position: Floats, length: Floats, held: Floats | None) -> None:
-    """Shorten segments that are too long, in place: from root to tip, each CV is pulled to the one
-    before it. That shortens zigzags, which long-range attachments alone allow.
+    """Shorten segments that are too long, in place, from root to tip.
+
+    That shortens zigzags, which long-range attachments alone allow.
 
     Guides with held CVs are shortened back and forth, first from these towards the root; if both
     constraints conflict, lengths take precedence over the places of held CVs.

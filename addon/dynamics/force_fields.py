@@ -89,8 +89,8 @@ class ForceField:
     flow: rate at which it slows down motion [1/s], scaled by its falloff.
     across: fraction of the field that acts across strands only.
     side: 1 or -1: the side along `normal` that it acts on; 0: both sides.
-    distance: falloff by distance. radial: by the distance from the axis, in metres for tubes and in
-        degrees for cones.
+    distance: falloff by distance, along the axis for tubes and cones. radial: across the axis, in
+        metres for tubes and in degrees for cones.
     is_inverse_square: whether a force falls off with the square of the distance as well.
     is_global: whether turbulence stays in place while its object moves.
     """

@@ -108,8 +108,8 @@ class KnownHair:
     rest: of the groom; another object in each frame if its style is animated.
     at_rest: by each other groom's number, the source of its style, and its CVs near the groom with
         both at rest; None: there are none.
-    grid: of the groom, including the grooms that are near now.
-    among: numbers of those of them that are also near at rest.
+    grid: of the groom, with the grooms that are near now included at rest.
+    among: numbers of the grooms that are near both now and at rest.
     """
 
     rest: Rest | None = None

@@ -7,7 +7,7 @@ A fast collider drags hair over itself, so that lengths move CVs to places where
 contacts no longer represent its surface. A guide that meets one is advanced in parts of the
 substep. In each part, guide and collider move a part of their way and contacts are found again; the
 speed that contacts take from the guide is missing in the next part. Fast means relative to the
-guide's root: a head that shakes its own hair is not.
+guide's root: a head that shakes its own hair does not count.
 """
 
 from __future__ import annotations
@@ -44,7 +44,8 @@ from .settings import DynamicsSettings
 class Chain:
     """The length constraints of guides.
 
-    length: see `state.Rest`. held: see `frame.Block`. size: of the hair [m].
+    length: (cv_count - 1, n) [m], to keep in this substep. held: see `frame.Block`.
+    size: of the hair [m].
     """
 
     length: Floats

@@ -63,7 +63,7 @@ class Shades:
 
 
 def shades_of(spheres: Floats, view: PictureView, half_width: float, radius: float) -> Shades:
-    """The regions that occluder spheres hide in one view; spheres of no use are left out.
+    """The regions that occluder spheres hide in one view, without spheres that hide nothing.
 
     Args:
         spheres: (k, 4) xyz centre and w radius [m, world].
@@ -160,7 +160,7 @@ def moved_spheres(spheres: Floats, matrix: Floats) -> Floats:
 
 
 def _box(surface: Surface, roots: Floats | None) -> tuple[Floats, Floats]:
-    """The box to search for balls, two corners: that of the roots, grown by half its size."""
+    """The box to search for balls, two corners: the roots, and half their extent around them."""
     low, high = surface.bounds()
     if roots is None or not len(roots):
         return low, high

@@ -41,8 +41,8 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints
 from .settings import DetailSettings
 
-#: The side planes are moved out by this factor of w, for the width of strands (0.1: by 5 % of the
-#: picture).
+#: The side planes are moved out by this fraction of w, for the width of strands (0.1: by 5 % of the
+#: picture's size).
 MARGIN = 0.1
 #: A control point nearer to the plane of the eye than this counts as lying in it [m].
 NEAREST = 1.0e-6

@@ -158,7 +158,7 @@ class Leans:
         return cls(strands, values)._where(_size(values) > UPRIGHT, counts)
 
     def after(self, duration: float, offsets: Ints) -> Leans:
-        """What is left of them after some time [s]."""
+        """The leans that are left after some time [s]."""
         size, turned = _size(self.values), np.float32(TURNING_BACK * duration)
         left = self._where(size > turned, np.diff(offsets)[self.strands])
         size = np.maximum(_size(left.values), np.float32(_TINY))

@@ -16,7 +16,7 @@ of its area: layer counts are roughly exponentially distributed over the groom, 
 1 / (L + 1) uncovered. c(s, f) = c(1, 1) is a quadratic equation for f. For a sparse groom of thin
 strands f is 1 / s.
 
-Measured error, with down to an eighth of the strands, of grooms 150 to 30 pixels high: the covered
+Measured error, with down to an eighth of the strands, of grooms of 150 to 30 pixels: the covered
 area stays within 2.2 % of that of all strands for 11,400 and 2,000 strands combed by hand; for
 grown and curled ones it is off by 3 % in most views and by 5.6 % at worst, 30 pixels high; for 500
 strands by 6.6 %. A factor of 1 / s would be off by up to 40 %.

@@ -38,8 +38,8 @@ class Knots(IntEnum):
 #: How far a smooth curve strays from a polygon at a corner, over the length of a piece times the
 #: difference of the unit directions there.
 _ROUNDING = 2.0 / 27.0
-#: A polygon may be rounded by this fraction of its length, which leaves hair curves as they are
-#: after Blender's Resample Curve, which makes polygons of all curves.
+#: A polygon may be rounded by this fraction of its length. So hair keeps its points after Blender's
+#: Resample Curve, which makes polygons of all curves.
 _ROUNDED = 2.0e-3
 #: Maximum number of pieces that a segment of a polygon is cut into.
 _MAX_PIECES = 64

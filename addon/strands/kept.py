@@ -48,7 +48,8 @@ class Kept:
 
         Args:
             fixed: everything else that the result depends on, compared with the last call's.
-            rows: input arrays (n, ...); row i of the result may depend on row i of these only.
+            rows: input arrays (n, ...); beside `fixed`, row i of the result depends only on row i
+                of these.
             make: returns arrays (k, ...) for row indices (k,); called from several threads. Its
                 result must not be changed afterwards.
         """

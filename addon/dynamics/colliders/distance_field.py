@@ -5,8 +5,8 @@ serves to move out points that start inside, interpolated from fewer nodes, whic
 of the time.
 Sign: generalised winding number, which is robust to holes, doubled faces and slivers; an opening,
 as at a neck, is closed where the number is one half. It is evaluated at nodes nearer to the surface
-than one cell, and at one in STRIDE^3 others, whose neighbours are on the same side; remaining nodes
-take the sign of their predecessor along the rows.
+than one cell, and at one of each STRIDE^3 others, whose neighbours are on the same side; remaining
+nodes take the sign of their predecessor along the rows.
 
 No part of the surface lies outside of the interpolated one by more than a twentieth of a cell, see
 `covering`: hair that stays out of the field stays out of the mesh.

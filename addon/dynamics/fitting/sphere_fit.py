@@ -182,8 +182,8 @@ def _tangent_radius(displacement: Floats, inward: Floats, widest: Floats) -> Flo
 
 
 def _distinct(centers: Floats, radii: Floats, alike: float) -> tuple[Floats, Floats]:
-    """Balls sorted by size, largest first, without those that stick out of an earlier one by no
-    more than `alike` [m] anywhere."""
+    """Balls sorted by size, largest first, without those whose surface differs from an earlier
+    one's by no more than `alike` [m] everywhere."""
     order = np.argsort(-radii, kind="stable")
     centers, radii = centers[order], radii[order]
     kept = np.ones(len(radii), bool)
