@@ -38,8 +38,8 @@ class AdoptedCards:
     """mesh: its triangles are those of the source, in their order; occlusion is 1.
     vertex: (vertex_count,) which vertex of the source each vertex is.
     corner: (triangle_count, 3) the vertex at each corner of the source's triangles, some of which
-        are turned over in the mesh.
-    notes: what is doubtful, a sentence each, for the artist.
+        are flipped in the mesh.
+    notes: doubts for the artist, a sentence each.
     """
 
     mesh: CardMesh
@@ -61,7 +61,8 @@ def adopt_cards(
     Args:
         source: with UVs, in the space of the head.
         head: the surface that hair grows on; without one the higher ends of cards are their roots.
-        group: (vertex_count,) of the source's vertices; a card belongs to that of most of them.
+        group: (vertex_count,) of the source's vertices; a card belongs to the group of most of its
+            corners.
         direction: in which the UVs of all cards run from root to tip; "auto" finds it.
         place: names the mesh in messages.
 

@@ -85,8 +85,8 @@ def plan_atlas(
     """Choose what the tiles show.
 
     Args:
-        strips: one a cluster, with as many rows as there are CVs; those of fit_strips, without the
-            crossed ones.
+        strips: one per cluster, with as many rows as there are CVs; from fit_strips, without the
+            second strips of crossed pairs.
         grid: (strand_count, cv_count, 3) [m], root first.
         radius: (strand_count, cv_count) [m], as strands are drawn.
         cluster: (strand_count,) the card of each strand, from 0 without gaps.

@@ -11,7 +11,7 @@ from ..arrays import Floats, Ints
 
 @dataclass(frozen=True)
 class AtlasGrid:
-    """Tiles are counted along rows from the lowest left one.
+    """Tiles are counted along rows from the lower left one.
 
     padding: fraction of a tile's width, and of its height, that is left free on each of its sides.
     """

@@ -44,7 +44,7 @@ _MIX = (0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB)
 
 @dataclass(frozen=True, eq=False)
 class MadeCards:
-    """The record of the cards that were made, in one space, which its creator knows.
+    """The record of the cards that were made, in a space that depends on its creator.
 
     places: (card_count, 5, 3) float32 [m] of each: its middle at `STATIONS`, and its edge halfway.
     tile: (card_count,) int32 tile of each. grid: of the atlas.

@@ -73,7 +73,7 @@ class CardTracks:
 
 @dataclass(frozen=True, eq=False)
 class JointRig:
-    """Joints and what they move, in the space of `CardTracks`; chain after chain.
+    """Joints and the skins that they move, in the space of `CardTracks`; chain after chain.
 
     chains, joints: how many chains, and joints in each.
     rest: (chains, joints, 4, 4) rigid [m]; the y axis is along the chain.

@@ -121,8 +121,8 @@ def _within(cut: _Cut, group: Ints, settings: CardSettings, kept: Ints | None) -
 
 
 def _coarser(cut: _Cut, group: Ints, most: int, half: float, kept: Ints | None = None) -> _Cut:
-    """A cut with at most `half` triangles, which is half of the current number or more, or as few
-    as possible."""
+    """A cut with at most `half` triangles, half of the current number or more, or with as few as
+    possible."""
     allowed = min(2.0 * cut.error, cut.max_error)
     if _fewer_rows(cut, allowed, most).triangle_count > half and cut.columns > 1:
         cut = replace(cut, columns=(cut.columns + 1) // 2)

@@ -1,4 +1,4 @@
-"""Cards begin on the skin, and those of few rows do not run through it.
+"""Cards moved out of the skin: at their roots, and between the rows of coarse levels.
 
 A card runs along the mean of its strands. Their roots lie on a skin that curves away on all sides,
 so their mean lies under the skin, and a card that rises as slowly as combed hair would come out a

@@ -15,9 +15,9 @@ from .marschner.pigment import COLOR_FACTOR
 from .settings import ShadingSettings
 from .volume.card_opacity import MEAN_TURN, MIN_FACING, turned_facing
 
-#: Density of a card that faces the eye, relative to its mean over all turns about its strands: 2 /
-#: pi, the mean of |cos|, and a quarter more, because cards that are nearly transparent still write
-#: depth and hide what lies behind them (measured, Sintel).
+#: Density of a card that faces the eye, relative to its mean over all turns about its strands:
+#: 2 / pi, the mean of |cos|, and a quarter more, because cards that are nearly transparent still
+#: write depth and hide what lies behind them (measured, Sintel).
 MEAN_FACING = 1.25 * MEAN_TURN
 #: Both constants, by their names in sidecars.
 VIEW_COMPENSATED_ALPHA = {"mean_facing": MEAN_FACING, "min_facing": MIN_FACING}

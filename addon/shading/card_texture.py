@@ -5,7 +5,7 @@
     | 0 +---+        one before it
     |   | 2 |
     +---+---+        each with a border of one texel, so that linear filtering never meets a
-                     neighbour: the border repeats the picture, or goes on with its edge
+                     neighbour: the border repeats the picture, or extends its edge
 
 A pixel's level follows from the step in the texture to the next pixel (Williams 1983, "Pyramidal
 parametrics"); the two nearest levels are blended. Alpha is averaged unweighted, because it is
@@ -92,7 +92,7 @@ def within_tile(place: Floats, texels: Ints, tiles: tuple[int, int]) -> Floats:
 def card_texel(
     packed: Floats, place: Floats, level: Floats, tiles: tuple[int, int] | None = None
 ) -> Floats:
-    """What a packed texture (rows, columns, channels) holds at places (n, 2), (n, channels).
+    """Values of a packed texture (rows, columns, channels) at places (n, 2), (n, channels).
 
     Args:
         level: (n,) see `wanted_level`. tiles: columns and rows; None: the picture repeats.

@@ -136,7 +136,7 @@ def _averaged(picture: Floats, most: int, weights: Floats) -> Floats:
 
 
 def _lit(pixels: Floats) -> Floats:
-    """Pixels as Cycles takes them: black where a channel is not finite."""
+    """Pixels as Cycles reads them: black where a channel is not finite."""
     is_finite = np.isfinite(pixels).all(axis=-1, keepdims=True)
     return np.where(is_finite, np.maximum(pixels, 0.0), 0.0).astype(np.float64)
 

@@ -143,7 +143,7 @@ class _SkinCells:
     normal: (3, *shape), the mean of the skin in each cell. is_skin: which cells hold any.
     is_inside: which cells lie directly below it.
     facing: (26, skin_count), light that each cell of skin reflects, by the light's direction.
-    clear: (skin_count,), the sum of what the body does not block of that.
+    clear: (skin_count,), the same over all directions, without the light that the body blocks.
     """
 
     normal: Floats

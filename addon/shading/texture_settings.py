@@ -9,7 +9,7 @@ from ..params import Settings, choice, integer, number, when
 
 @dataclass(frozen=True, kw_only=True)
 class TextureSettings(Settings):
-    """What the strips of hair on a card texture look like."""
+    """Appearance of the strips of hair on a card texture."""
 
     section = "card_texture"
     title = "Card Texture"

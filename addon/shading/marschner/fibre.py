@@ -105,13 +105,14 @@ class Fibre:
 
     @property
     def widths(self) -> tuple[float, float, float]:
-        """Of R, TT, TRT: standard deviations of theta_h, at least MIN_WIDTH."""
+        """Standard deviations of theta_h of R, TT and TRT, at least MIN_WIDTH."""
         least = float(MIN_WIDTH)
         return (max(self.width_r, least), max(self.width_tt, least), max(self.width_trt, least))
 
     @property
     def highlight_shifts(self) -> tuple[float, float, float]:
-        """Of R, TT, TRT: how far towards the tip a highlight lies; its lobe peaks at minus this.
+        """Shifts of the highlights of R, TT and TRT towards the tip; a lobe peaks at minus its
+        shift.
 
         In theta_h, so half of the change of theta_r: +1, -1/2 and -2 tilts, and the offsets.
         """
@@ -124,17 +125,17 @@ class Fibre:
 
     @property
     def strengths(self) -> tuple[float, float, float, float]:
-        """Of R, TT, TRT and the rest."""
+        """Factors of R, TT, TRT and the rest."""
         return (self.strength_r, self.strength_tt, self.strength_trt, self.strength_higher)
 
     @property
     def lobe_widths(self) -> tuple[float, float, float, float]:
-        """Of R, TT, TRT and the rest, which is spread as TRT is."""
+        """Widths of R, TT, TRT and the rest, which is spread as TRT is."""
         return (*self.widths, self.widths[2])
 
     @property
     def lobe_shifts(self) -> tuple[float, float, float, float]:
-        """Of R, TT, TRT and the rest, see highlight_shifts."""
+        """Shifts of R, TT, TRT and the rest, see highlight_shifts."""
         return (*self.highlight_shifts, self.highlight_shifts[2])
 
 

@@ -89,7 +89,8 @@ def longitudinal_lobes(fibre: Fibre) -> tuple[LongitudinalLobe, ...]:
 
 
 def _balance(lobes: list[LongitudinalLobe], index: float) -> Floats:
-    """Factor of all lobes at even steps of theta, from what a clear fibre would send out.
+    """Factor of all lobes at even steps of theta, from the energy that a clear fibre would send
+    out.
 
     The last line only lowers it. Without a tilt every theta then sends out all light, to 1e-3.
     """

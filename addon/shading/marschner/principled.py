@@ -88,8 +88,8 @@ def settings_from(
 
 
 def hair_from(settings: ShadingSettings) -> tuple[PrincipledHair, tuple[str, ...]]:
-    """The node that looks like a strand of this look at its root, the inverse of `settings_from`,
-    and notes on what the node has no input for.
+    """The node that matches this look at the roots, the inverse of `settings_from`, and notes on
+    settings that the node has no input for.
 
     Noise, sparkle and variation along or between strands are not part of the node, except the
     variation of melanin.

@@ -24,7 +24,7 @@ from .gutter import clamped, gutter_at
 from .near_borders import nearest_borders
 from .seams import Borders, copies_of, find_borders
 
-#: [texels] how far an island goes on beyond its borders
+#: [texels] how far an island continues beyond its borders
 GUTTER = 32
 #: [texels] how far from a seam its two sides begin to be blended
 CLOSING = 8.0

@@ -125,7 +125,7 @@ def own_strands(seen: Floats, own: Floats, near: Floats, front: Floats) -> tuple
 
 
 def own_tips(own: Floats, tau: Floats, front: Floats) -> tuple[Floats, Floats]:
-    """The same for short hair, of which a tip is visible, with the others beside it.
+    """As `own_strands`, for short hair, whose visible tip has the others beside it.
 
     Among strands that lie at random, tau on average and at least one, a strand has
     tau / (1 - exp(-tau)) - 1 others beside it.

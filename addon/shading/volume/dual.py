@@ -7,7 +7,7 @@ back and forth.
 
 Differences:
     The number of strands between is not a whole number but a mean, tau of the opacity maps. For
-        strands that lie at random it is distributed after Poisson, so the mean of a_f^n is
+        strands that lie at random it has a Poisson distribution, so the mean of a_f^n is
         exp(-tau (1 - a_f)), of which exp(-tau) has met none: no threshold, and no jump.
     Light that returns from the hair behind is summed over all orders, not only three, and for the
         actual number of strands: deep white hair returns all light, a thin layer less.
@@ -266,9 +266,9 @@ def off_the_skin(
     irradiance, it is radiance.
 
     The skin is a Lambertian plane, with the hair above it. Light reaches it through tau + beyond
-    strands, which are 1 / facing times as many along the slanted ray as straight up; is reflected
-    evenly; and goes to and fro between skin and hair. Of light from behind, a strand sends a_f to
-    an eye on the light's side, and a_b to an eye on the other side.
+    strands, 1 / facing times as many along the slanted ray as straight up. The skin reflects it
+    evenly, and it bounces between skin and hair. Of light from behind, a strand sends a_f to an eye
+    on the light's side, and a_b to an eye on the other side.
 
     Args:
         forward, backward: fractions at this theta_d by colour and lobe, (..., 3, 4).
@@ -299,9 +299,9 @@ def off_far_skin(
     """Light off skin farther away that a strand sends to the eye, (..., 3): times irradiance, it is
     radiance.
 
-    As `off_the_skin`, from the part of half of all directions that is skin. On the way strands send
-    light to and fro, so that each attenuates it by sqrt((1 - a_f)^2 - a_b^2) (Kubelka and Munk
-    1931).
+    As `off_the_skin`, from the part of half of all directions that is skin. On the way strands
+    scatter light back and forth, so that each attenuates it by sqrt((1 - a_f)^2 - a_b^2) (Kubelka
+    and Munk 1931).
 
     Args:
         outward: cosine between the eye and the normal of the hair's volume, (...).

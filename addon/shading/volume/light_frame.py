@@ -81,7 +81,7 @@ class LightFrame:
         """The fraction of the map that a short piece of a strand of the width 1 m covers, (...).
 
         Args:
-            points: (..., 3) its middle [m]. along: (..., 3) from its one end to the other [m].
+            points: (..., 3) its middle [m]. along: (..., 3) from one end to the other [m].
         """
         projected, breadth = self._seen(points, along)
         return np.linalg.norm(projected, axis=-1) * breadth
@@ -89,8 +89,8 @@ class LightFrame:
     def strand_breadth(self, points: Floats, along: Floats) -> Floats:
         """Width in the map of a strand that is 1 m wide, as a fraction of the map's side, (...).
 
-        The width is across the light's ray, to which a wide map lies aslant at its rim: strands
-        appear wider there, the more so the less they run towards the middle.
+        The width is perpendicular to the light's ray, but the rim of a wide map is oblique to it:
+        strands appear wider there, the more so the less they run towards the middle.
 
         Args:
             points: (..., 3) [m], ahead of the light. along: (..., 3) its tangent.

@@ -67,7 +67,7 @@ class MapSize:
 
 
 def asked_size(settings: VolumeSettings, map_count: int) -> MapSize:
-    """What the settings ask for."""
+    """The size that the settings ask for."""
     layers = len(layer_ends(settings))
     slots = min(-(-layers // 4), MAX_SLOTS)
     side = -(-settings.resolution // START_TEXELS) * START_TEXELS
@@ -78,7 +78,7 @@ def asked_size(settings: VolumeSettings, map_count: int) -> MapSize:
 def fitted_size(
     settings: VolumeSettings, map_count: int, room: int, largest_side: int = _LARGEST_SIDE
 ) -> MapSize:
-    """What is drawn: fewer texels a side where the asked size does not fit.
+    """The size that is drawn: fewer texels per side if the size that is asked for does not fit.
 
     Args:
         map_count: lights that throw shadows.

@@ -22,7 +22,7 @@ from ...strands import Surface
 from ..lights import LIGHT_CAPACITY, Light
 from .light_frame import Ball, LightFrame, frame_at, frame_of_sun, shines_along, stepped_ball
 
-#: frames of all lights together, at most: each light amidst meshes sees them in the sides of a cube
+#: maximum number of frames of all lights: each light amidst meshes sees them in the sides of a cube
 MESH_FRAME_CAPACITY = 6 * LIGHT_CAPACITY
 #: maximum half angle of one frame [rad]; wider views take the sides of a cube
 _WIDEST = float(np.radians(55.0))

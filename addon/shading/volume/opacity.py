@@ -9,13 +9,13 @@ Layers are placed by one of two methods, given by where they end:
             2005 draw 16 of them in one pass);
     deep    from the first hair that light meets in each texel on, each layer thicker than the one
             before (Yuksel and Keyser 2008): they follow the hair, so that it shows no bands. In the
-            paper they are equally thick everywhere; ours divide the range up to the last hair, so
-            that few layers suffice for a thin fringe and a whole head alike.
+            paper a layer is equally thick in all texels; ours divide the range up to the last hair,
+            so that few layers suffice for a thin fringe and a whole head alike.
 Slices are deep layers that start at 0 and end at 1 everywhere, so that one shader draws both.
 
 First and last hair are stored for blocks of texels, as a plane each: with one depth per block, hair
 that light grazes would be lit on one side of a block and dark on the other. Hair that a mesh hides
-from the light is in no layer, so that the hair before a head has all of them.
+from the light is in no layer, so that all layers serve the hair in front of a head.
 
 All depths are those of light_frame.py, 0 to 1 through the ball. Between the ends of two layers
 tau is taken as linear. Reference of gpu_shaders/lib_opacity.glsl.
@@ -100,7 +100,7 @@ class LayerSpans:
 
     @classmethod
     def between(cls, first: Floats, last: Floats, block: int) -> LayerSpans:
-        """From the first hair to the last one.
+        """Spans from the first hair to the last.
 
         Args:
             first, last: (side, side) depth of these in each block; without hair, first lies behind
@@ -289,7 +289,7 @@ class Coverage:
         return LayerSpans.between(first.reshape(side, side), last.reshape(side, side), block)
 
     def layers(self, ends: Floats, spans: LayerSpans) -> Floats:
-        """What a map holds, (resolution^2, layer_count)."""
+        """The sums that a map holds, (resolution^2, layer_count)."""
         row, column = np.divmod(self.texel, self.resolution)
         behind = np.minimum(spans.fraction(row, column, self.place, self.depth), 1.0)
         # a piece is added to the first layer that it counts in; cumsum adds it to the others

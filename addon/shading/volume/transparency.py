@@ -21,7 +21,7 @@ import numpy as np
 
 from ...arrays import Floats
 
-#: Layers of a pixel that are shaded, at most.
+#: Maximum number of layers of a pixel that are shaded.
 LAYERS = 8
 #: The same while a view turns with its lights.
 TURNING_LAYERS = 3
