@@ -27,7 +27,7 @@ def are_same(one: Floats | Ints | None, other: Floats | Ints | None) -> bool:
 
 def same_content(one: Any, other: Any) -> bool:
     """Whether two values are the same, bit for bit: arrays, or data classes, tuples and mappings
-    that hold them. Of data classes only fields are compared, no cached properties."""
+    that hold them. Of data classes only fields are compared, not cached properties."""
     if one is other:
         return True
     if type(one) is not type(other):

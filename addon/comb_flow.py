@@ -76,7 +76,7 @@ def put_children(points: Floats, offsets: Ints, grown: Grown, chosen: Ints, own:
     """Write the shapes of some of a rig's children into `points`, with their old point counts.
 
     Args:
-        chosen: (n,) indices among the rig's children, in the order of `grown.kept`.
+        chosen: (n,) indices among the rig's children, for which `grown.kept` ascends.
         own: the number of strands before the children.
     """
     children = _strands(grown.growth.shapes(grown.shapes.grid, grown.kept[chosen]))

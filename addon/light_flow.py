@@ -65,7 +65,7 @@ class HairLight:
 
     occlusion: (point_count,), 1 where nothing shades.
     openness: (point_count, 4), see `ambient.openness_field`: the mean, and a vector in the strand's
-        axes. The vector turns with the strand, so in motion it is as good as occlusion.
+        axes. The vector turns with the strand, so in motion it stays as accurate as occlusion.
     skin_seen: (point_count, 8), see `skin_seen_by`; None without a head.
     fields: the ones that light was looked up in; None without strands.
     is_quick: whether these fields are coarse, or those of earlier hair.
@@ -268,7 +268,7 @@ def _between(values: Floats, before: Ints, part: Floats) -> Floats:
 
 
 def _few_axes(strands: StrandSet, chosen: Ints, among: StrandSet) -> Axes:
-    """`strand_axes` at the chosen points, (k,); `among` is all hair, which has the volume."""
+    """`strand_axes` at the chosen points, (k,), with normals in the volume of the hair `among`."""
     tangent = tangents_at(strands.points, strands.offsets, chosen)
     away = np.ascontiguousarray(strands.points[chosen].T) - _middle(among)
     normal = volume_normal_rows(away, tangent)

@@ -337,9 +337,9 @@ def with_clearance(
     """The motion with clearances from colliders, which are computed in the first frame with any.
 
     Guides stay as far away as their radius says, and strands as far as guides do at their roots,
-    but neither farther than they were at that frame's begin: guides in their style, strands where
-    their roots carried them. Where nothing is simulated, strands get no clearance and follow their
-    style.
+    but neither farther than they were at the start of that frame: guides in their style, strands
+    where their roots carried them. Where nothing is simulated, strands get no clearance and follow
+    their style.
     """
     simulated, size = simulated_of(painted, settings, len(rig.guides)), motion.dynamics.rest.size
     kept, reach = settings.radius_root * size, farthest_kept(settings, size)

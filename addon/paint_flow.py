@@ -36,7 +36,7 @@ _FAINTEST = 1.0e-6
 
 
 def painted(rig: Rig, density: Floats | None, masks: Masks = NO_MASKS) -> Rig:
-    """The rig with children by a new density and in the shapes of new masks.
+    """The rig with its children as a new density and new masks make them.
 
     Args:
         rig: with children that have grown.
@@ -114,7 +114,7 @@ def _coated(painted: Floats, look: ShadingSettings) -> Floats:
 
 
 def _grown(roots: ChildRoots, head: Surface, grown: Grown) -> tuple[Ints, Grown]:
-    """The index of each root's child in the growth, (n,), and the growth with these added to it."""
+    """The index of each root's child in the growth, (n,), and the growth with new ones added."""
     growth = grown.growth
     number = same_rows(roots.point, growth.root)
     new = np.flatnonzero(number < 0)

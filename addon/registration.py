@@ -1,6 +1,6 @@
 """Registers all of Hairloom with Blender when it is enabled, and unregisters it when disabled.
 
-Nothing here touches the GPU; the first draw is the first to do so.
+Nothing here touches the GPU: that starts with the first draw.
 """
 
 from __future__ import annotations

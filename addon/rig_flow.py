@@ -54,7 +54,7 @@ MANY_INSIDE = 0.01
 
 @dataclass(frozen=True, eq=False)
 class Begun:
-    """The begin of a motion, from which clearances between hair and colliders are computed.
+    """The start of a motion, from which clearances between hair and colliders are computed.
 
     pose: of the body. colliders: as they stood. kept: how far hair stays from them at most [m].
     """
@@ -98,7 +98,7 @@ class Pose:
 
     head_positions: (vertex_count, 3) [m], world space, or None for hair without a head.
     matrix: (4, 4), moves rest world space to now; carries hair without a head, and colliders.
-    anchors: of hair that is held, see `groom.holds.anchors_of`; None: none is.
+    anchors: of held hair, see `groom.holds.anchors_of`; None: no hair is held.
     solids: what cards are led out of; None: nothing, or not known.
     """
 
@@ -445,7 +445,7 @@ def _weights(
     guide_kind: Ints | None = None,
     partings: Partings | None = None,
 ) -> GuideWeights:
-    """Guide weights; held strands follow guides that are held by the same kind of holder."""
+    """Guide weights; held strands follow guides of the same kind, see `Holds.kinds`."""
     group, guide_group = strands.group, guides.group
     if kind is not None and guide_kind is not None:
         both = grouped(np.append(group, guide_group), np.append(kind, guide_kind))
@@ -596,9 +596,9 @@ def strand_ranks(rig: Rig) -> Floats:
     """The rank of each strand in an even order, (strand_count,), 0 to 1: the strands below any rank
     are the same hair, only sparser.
 
-    The artist's own strands and the children are ranked apart, so that each keep their fraction.
-    Children grow in such an order, which gives their ranks: one child more hardly changes those of
-    the others.
+    The artist's own strands and the children are ranked separately, so that both keep their
+    fractions. Children grow in such an order, which gives their ranks: one more child hardly
+    changes those of the others.
     """
     count = rig.strands.strand_count
     own = count - rig.child_count

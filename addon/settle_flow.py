@@ -35,7 +35,7 @@ _MIN_CVS, _MAX_CVS = 8, 64
 
 
 def guides_that_fall(strands: StrandSet, own: GuideSettings) -> GuideSettings:
-    """Settings by which all curves are simulated, with the median of their point counts."""
+    """Settings that simulate all curves, with the median of their point counts."""
     typical = int(np.median(strands.point_counts)) if strands.strand_count else own.cv_count
     cv_count = min(max(typical, own.cv_count, _MIN_CVS), _MAX_CVS)
     guide_count = min(max(strands.strand_count, 1), _MAX_GUIDES)

@@ -4,8 +4,8 @@ style of each frame.
 A rig is at rest, so the curves of a frame are brought back to rest. Children, guides and weights,
 roots on the head and occlusion stay those of the rig, and all that moves a rig works as usual. The
 curves may have been moved by their object alone, or may already follow their surface, as Blender's
-own hair nodes make them. Both motions are undone in turn; the one that brings roots nearer to those
-of the rig counts.
+own hair nodes make them. Each of the two is undone, and the result with roots nearer to those of
+the rig is taken.
 """
 
 from __future__ import annotations

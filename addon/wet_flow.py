@@ -4,8 +4,8 @@ The artist's own settings stay as they are; the changed ones are drawn, grown an
 
 Water is weight: soaked hair holds about its own mass of water (Robbins 2012, "Chemical and Physical
 Behavior of Human Hair", chapter 9, has a third within the fibre; the rest is the film). A stiffness
-given as a frequency is divided by the square root of the mass; damping, wind and the compensation
-of sag are divided by the mass itself. Water also draws strands together in clumps.
+given as a frequency is divided by the square root of the mass; damping, drag, force fields and sag
+compensation are divided by the mass itself. Water also draws strands together in clumps.
 """
 
 from __future__ import annotations

@@ -42,8 +42,8 @@ class OnCurves:
     """Points on curves, and how their values follow from those in a file.
 
     offsets: (curve_count + 1,), curve c has the points offsets[c]:offsets[c + 1].
-    vertex: from values at control points; None: these are the points.
-    varying: from values at ends of segments; None: these are the points.
+    vertex: values of points from those at control points; None: they are the same.
+    varying: values of points from those at ends of segments; None: they are the same.
     varying_count: how many values of the latter kind there must be.
     is_unfit: (curve_count,) curves left without points, because their number of control points does
         not fit the basis; None: no curve.

@@ -17,7 +17,7 @@ _PARTS = either(_HAS_CLUMPS, when("children.method", "multi", "auto"))
 
 @dataclass(frozen=True, kw_only=True)
 class ChildrenSettings(Settings):
-    """Strands between the artist's own, which all become guides or are chosen from."""
+    """Strands between the artist's own, of which all or some are guides."""
 
     section = "children"
     title = "Children"

@@ -136,7 +136,7 @@ class SampleCells:
         return np.asarray(dot_rows(gap, gap) < limit * limit)
 
     def _list(self, place: Floats, octave: int) -> tuple[Ints, Ints]:
-        """Begin and end of the entries of the cell in which each place (3, n) lies."""
+        """Start and end of the entries of the cell in which each place (3, n) lies."""
         size = self._size(octave)
         cell = [np.floor(axis / size).astype(np.int64) for axis in place]
         bucket = self._bucket(cell, octave)

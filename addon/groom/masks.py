@@ -102,7 +102,7 @@ class Mask:
         raise NotImplementedError
 
     def of(self, strands: Ints) -> Mask:
-        """The mask for some of the artist's strands, by their index among these."""
+        """The mask of some of the artist's strands, renumbered among these."""
         return self
 
     @property

@@ -41,7 +41,7 @@ class SurfaceColor(PaintedColor):
 
     def at(self, triangle: Ints, barycentric: Floats) -> Floats:
         a, b, c = self.corners[triangle].astype(np.float64).transpose(1, 0, 2)
-        # so that it is exactly the same where it is painted evenly
+        # by differences, so that it is exactly even where it is painted evenly
         found: Floats = a + barycentric[:, 1:2] * (b - a) + barycentric[:, 2:3] * (c - a)
         return found
 

@@ -158,7 +158,7 @@ def _add_weights(
     owner = vertices_of(file, primitive, mesh, place)
     weight = np.where(skin.weight < _MIN_WEIGHT, 0.0, skin.weight)
     weight = (weight / weight.sum(axis=1, keepdims=True)).astype(np.float32)
-    # the root is joint 0, which entries without weight name, too
+    # the root is joint 0; entries without weight refer to it, too
     joint = np.where(weight > 0.0, (skin.joint + 1) % joint_count, 0)
     is_small = joint.max(initial=0) < 256
     numbers: Ints = joint[owner].astype(np.uint8) if is_small else joint[owner].astype(np.uint16)

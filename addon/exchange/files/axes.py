@@ -1,4 +1,4 @@
-"""Between the axes of files, right-handed with Y or Z up, and Blender's, right-handed with Z up."""
+"""Conversion between a file's axes, right-handed with Y or Z up, and Blender's, with Z up."""
 
 from __future__ import annotations
 

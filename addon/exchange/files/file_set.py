@@ -152,7 +152,7 @@ def _restore(file: Path, target: Path, backup: Path) -> None:
 
 
 def _kept(staging: Path, path: Path, error: PermissionError) -> HairloomError:
-    """Files that took minutes to write stay where they can be found."""
+    """Keep new files, which may have taken minutes to write, where they can be found; the error."""
     for left in (staging / "old").iterdir():
         left.unlink()
     (staging / "old").rmdir()

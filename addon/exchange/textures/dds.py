@@ -92,7 +92,7 @@ def _in_four_channels(texels: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
 
 
 def _compressed(texels: npt.NDArray[np.uint8], path: Path) -> bytes:
-    """The compressed blocks; those beyond the edges repeat the last row and column."""
+    """The compressed blocks; those that reach beyond the edges repeat the last row and column."""
     height, width, channels = texels.shape
     full = np.pad(texels, ((0, -height % 4), (0, -width % 4), (0, 0)), mode="edge")
     if channels <= 2:

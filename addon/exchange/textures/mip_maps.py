@@ -212,8 +212,8 @@ def _with_coverage(alpha: Floats, coverage: Floats, grid: AtlasGrid, threshold: 
 def _passing(alpha: Floats, fraction: float, threshold: float) -> Floats:
     """Alpha, scaled so that this fraction of it passes the test, and one texel at least if any did.
 
-    Castano scales all alphas by one factor. Here those that fail the test are scaled so; of those
-    that pass, the distance to 1 is scaled, so that opaque hair stays opaque.
+    Castano scales all alphas by one factor. Here those that are to fail the test are scaled so; of
+    those that are to pass, the distance to 1 is scaled, so that opaque hair stays opaque.
     """
     if fraction == 0.0:
         return np.minimum(alpha, np.nextafter(np.float32(threshold), np.float32(0.0)))

@@ -134,7 +134,7 @@ def _root(usd: ModuleType, stage: Any, groom: Groom, space: UsdSpace) -> Any:
 
 @dataclass(frozen=True)
 class _Part:
-    """Strands that share a prim: the indices of their points in the whole groom, and themselves."""
+    """Strands that share a prim, and the indices of their points in the whole groom."""
 
     points: Ints | slice
     groom: Groom
