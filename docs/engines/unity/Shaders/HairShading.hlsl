@@ -11,7 +11,7 @@ float2 hair_size(Texture2D table)
   return float2(width, height);
 }
 
-// How hair cards respond to light, as in Hairloom: both models, for the shaders of an engine.
+// Shading of hair cards as in Hairloom, with both models, for the shaders of an engine.
 //
 // Written in the common subset of GLSL ES 3.00 and Godot's shading language, so one file serves both.
 // All vectors are in one space, which may be any; T runs from root to tip. Declares no resources.
@@ -70,18 +70,17 @@ float3 hair_unit(float3 direction, float3 fallback)
   return size > 1.0e-6 ? direction / size : fallback;
 }
 
-// Levels of detail that are drawn together while one takes over from the other share the pixels: each
-// has those whose threshold lies in its part of 0 to 1, so that no pixel is left out or drawn by two.
-// The thresholds are interleaved gradient noise: Jimenez 2014, "Next Generation Post Processing in
-// Call of Duty: Advanced Warfare".
+// Cross-fade between levels of detail: each level draws the pixels whose threshold lies in its part of
+// 0 to 1, so that exactly one level draws each pixel. The thresholds are interleaved gradient noise:
+// Jimenez 2014, "Next Generation Post Processing in Call of Duty: Advanced Warfare".
 bool hair_level_has(float2 pixel, float2 part)
 {
   float threshold = frac(52.9829189 * frac(dot(pixel, float2(0.06711056, 0.00583715))));
   return threshold >= part.x && threshold < part.y;
 }
 
-// A texel of the tangent map as Hairloom's own packing has it: other packings have its components in other
-// channels, or as 1 minus the value. Each component is made of red, green, blue and 1.
+// Converts a texel of the tangent map to Hairloom's own packing; other packings store its components in
+// other channels or inverted. x, y, z: the weights of red, green, blue and 1 in each component.
 float3 hair_texel(float3 texel, float4 x, float4 y, float4 z)
 {
   float4 lanes = float4(texel, 1.0);
@@ -144,8 +143,8 @@ float3 hair_kajiya_kay(HairMaterial hair, HairPlace place, float3 to_light)
   return diffuse + diffuse * (primary + secondary);
 }
 
-// Coverage of a card that is seen at a slant, if alpha is the coverage averaged over all rotations about
-// its strands: these move closer together and cover no less. across: normal of its plane, of any length;
+// Coverage of a card seen at a slant, where strands appear closer together and so cover more. alpha: its
+// coverage averaged over all rotations about its strands; across: normal of its plane, of any length;
 // tangent: of the card; facing: mean and least of textures.view_compensated_alpha in the sidecar.
 float hair_view_compensated_alpha(float alpha, float3 across, float3 tangent, float3 to_eye, float2 facing)
 {
@@ -155,8 +154,8 @@ float hair_view_compensated_alpha(float alpha, float3 across, float3 tangent, fl
   return 1.0 - pow(1.0 - alpha, facing.x / max(faces, facing.y));
 }
 
-// Mean absorption of the strands at a point, some of which are grey; the base texture gives their
-// difference from the mean of the card.
+// Mean absorption of the strands at a point, some of them grey; base, from the base texture, is their
+// colour over the mean colour of the card.
 float3 hair_absorption(HairMaterial hair, float along, float3 base)
 {
   float3 mixed = lerp(hair.fibre_root.xyz, hair.fibre_tip.xyz, hair_tip_fraction(hair, along));
@@ -167,7 +166,7 @@ float3 hair_absorption(HairMaterial hair, float along, float3 base)
   return root * root;
 }
 
-// The colour of a mass of such hair.
+// Colour of a mass of this hair.
 float3 hair_color(HairMaterial hair, float along, float3 base)
 {
   if (hair.model == 1) {
