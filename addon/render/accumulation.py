@@ -1,4 +1,4 @@
-"""A picture as the mean of many, added up on the GPU in float32."""
+"""Accumulation of pictures: the mean of many, summed on the GPU in float32."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ _SHOWING = ShaderRecipe(
 
 
 class Accumulation:
-    """Samples of one picture, all of one size; making one touches no GPU.
+    """The sum of the samples of one picture, all of one size. Creating one does not touch the GPU.
 
-    count: samples so far. total: their sum, RGBA32F, once there is a size.
+    count: samples so far. total: their sum, an RGBA32F texture, once the size is known.
     """
 
     def __init__(self) -> None:
@@ -110,17 +110,17 @@ class Target:
         return self
 
     def clear(self, color: tuple[float, float, float, float]) -> None:
-        """Fill it with one colour, as far away as can be."""
+        """Fill it with one colour, and the depth buffer with 1."""
         with drawing_into(self._framebuffer):
             self._framebuffer.clear(color=color, depth=1.0)
 
     def clear_color(self, color: tuple[float, float, float, float]) -> None:
-        """Fill its colours alone."""
+        """Fill its colours only."""
         with drawing_into(self._framebuffer):
             self._framebuffer.clear(color=color)
 
     def drawing(self) -> Any:
-        """A context in which draws go into it."""
+        """A context manager in which draws go into it."""
         return drawing_into(self._framebuffer)
 
     def depths(self) -> Floats:

@@ -1,16 +1,16 @@
-"""Hair among hair on the GPU: `dynamics.among.feel`, of guides that lie in textures.
+"""Hair among hair on the GPU: `dynamics.among.feel` for guides that are in textures.
 
-    hair_at_rest   RGBA32F in the layout of strand_layout.strand_rows: of each CV x its density at
-                   rest, y that above which it is crowded, z its mass, w by which volume is
-                   multiplied where it is painted
-    cell_sums      RGBA32F: of each cell x mass, yzw motion times mass, whole numbers
-    densities      RGBA32F: the same smoothed
-    gradients      RGBA32F: xyz how the smoothed mass grows along each axis
+    hair_at_rest   RGBA32F in the layout of strand_layout.strand_rows: for each CV x its density at
+                   rest, y the density above which it is crowded, z its mass, w the painted factor
+                   on the volume
+    cell_sums      RGBA32F: for each cell x mass, yzw motion times mass, whole numbers
+    densities      RGBA32F: the same, smoothed
+    gradients      RGBA32F: xyz gradient of the smoothed mass
 
-    other_places, other_steps   RGBA32F, a texel a CV of other hair: where it counts and its mass,
-                   and how it moves in a substep
+    other_places, other_steps   RGBA32F, a texel for each CV of other hair: its place and mass, and
+                   its motion in a substep
 
-CVs are drawn as points that blending adds up, which needs no atomics. Sums are exact as long as
+CVs are drawn as points and summed by blending, which needs no atomics. Sums are exact as long as
 they fit into the 24 bits of a float.
 """
 
@@ -35,7 +35,7 @@ _FEWEST = 1024
 
 @lru_cache(maxsize=32)
 def deposit_recipe(cv_count: int) -> ShaderRecipe:
-    """What the CVs leave in the cells."""
+    """The program that deposits CVs into the cells."""
     names = ("positions", "previous_positions", "hair_at_rest")
     return ShaderRecipe(
         name="among_deposit",
@@ -73,7 +73,7 @@ FIELDS_RECIPE = ShaderRecipe(
 
 @lru_cache(maxsize=32)
 def feel_recipe(cv_count: int, pairs: str) -> ShaderRecipe:
-    """Friction at once, and what pushes the guides until it is felt again.
+    """The program that applies friction, and computes what pushes the guides until the next run.
 
     Args:
         pairs: see capabilities.pair_format.
@@ -95,7 +95,7 @@ def feel_recipe(cv_count: int, pairs: str) -> ShaderRecipe:
 
 
 class AmongPass:
-    """Keeps the grid of one groom's guides; making one touches no GPU."""
+    """The grid of one groom's guides on the GPU. Creating one does not touch the GPU."""
 
     def __init__(self) -> None:
         self._block, self._points = UniformBlock(), Ribbons()
@@ -106,11 +106,11 @@ class AmongPass:
         self._target: Any = None
 
     def feel(self, among: Among, guides: dict[str, Any], speed_ratio: float, pairs: str) -> None:
-        """Change the motion of guides, and what pushes them.
+        """Update the motion of guides, and what pushes them.
 
         Args:
             guides: the textures positions, previous_positions and pushes of dynamics_pass.
-            speed_ratio: of the substep that comes to the one before it.
+            speed_ratio: length of the coming substep over that of the one before it.
             pairs: the format of previous_positions.
         """
         if among.grid is not self._grid or among.volume is not self._volume:
@@ -155,7 +155,7 @@ class AmongPass:
 
 
 def _room_for(count: int) -> int:
-    """As many texels as are drawn for CVs of other hair, so that few numbers occur."""
+    """How many points are drawn for CVs of other hair: rounded up, so that few batches are made."""
     return max(1 << max(count - 1, 0).bit_length(), _FEWEST)
 
 

@@ -1,16 +1,16 @@
-"""Bakes an atlas: strands that were laid flat drawn into it from straight above, on the GPU.
+"""Bakes an atlas on the GPU: flattened strands, drawn from straight above.
 
-Block after block of the atlas: all samples of it in one draw, three targets and a depth, then a
-compute shader that makes texels of them. Reference: cards/bake.py. The textures' texels:
+Block by block: one draw of all samples of the block into three targets and a depth buffer, then a
+compute shader that filters them to texels. Reference: cards/bake.py. The textures' texels:
 
-    cv_places  RGBA32F: xy place, zw half width             of each CV
-    cv_ways    RGBA32F: xyz tangent, w depth
-    cv_looks   RGBA32F: xyz base, w occlusion
-    cv_rest    RGBA32F: x fraction of samples that count, y strand_id, z along
+    cv_places    RGBA32F: xy place, zw half width            for each CV
+    cv_tangents  RGBA32F: xyz tangent, w depth
+    cv_looks     RGBA32F: xyz base, w occlusion
+    cv_rest      RGBA32F: x fraction of samples that count, y strand_id, z along
 
-    sample_place  RGBA16F: x along, y strand_id, z depth, w occlusion
-    sample_way    RGBA16F: xyz tangent, w place across the strand
-    sample_base   RGBA16F: xyz base, w 1 where there is hair
+    sample_place    RGBA16F: x along, y strand_id, z depth, w occlusion
+    sample_tangent  RGBA16F: xyz tangent, w place across the strand
+    sample_base     RGBA16F: xyz base, w 1 where there is hair
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from .shader_program import ShaderProgram, ShaderRecipe, program
 from .strand_layout import strand_rows
 from .textures import drawing_into, drawing_state, texture_from, texture_to_array
 
-#: Texels that a compute group works on, along each side.
+#: Texels along each side of a compute group.
 _GROUP = 8
 _SAMPLES_OF = ("sample_place", "sample_tangent", "sample_base")
 _TEXELS_OF = ("texel_place", "texel_base", "texel_tangent", "texel_normal")
@@ -39,7 +39,7 @@ _CVS = ("cv_places", "cv_tangents", "cv_looks", "cv_rest")
 
 
 def atlas_recipe(*, is_sparse: bool) -> ShaderRecipe:
-    """The program that draws strands; `is_sparse` where some are thinner than a sample."""
+    """The program that draws strands; `is_sparse`: some are thinner than a sample."""
     return ShaderRecipe(
         name=f"atlas{'_sparse' * is_sparse}",
         vertex="atlas.vert.glsl",
@@ -79,7 +79,7 @@ def baked_maps(flat: FlatStrands, size: int) -> AtlasMaps:
 
 
 def baking(flat: FlatStrands, size: int) -> Generator[None, None, AtlasMaps]:
-    """Bake the maps of an atlas, a block a step; zeros where no strand is, as sampled_maps.
+    """Bake the maps of an atlas, one block per step; zero where no strand is, as in sampled_maps.
 
     Args:
         size: of the atlas [pixels].
@@ -109,10 +109,10 @@ def baking(flat: FlatStrands, size: int) -> Generator[None, None, AtlasMaps]:
 
 @dataclass(frozen=True)
 class _Bake:
-    """What blocks are drawn from.
+    """The inputs for drawing blocks.
 
-    half: of the strands as they are drawn.
-    textures: of the stations. is_sparse: some strands are thinner than a sample.
+    half: half widths of the strands as drawn.
+    textures: of the CVs. is_sparse: some strands are thinner than a sample.
     """
 
     flat: FlatStrands
@@ -139,7 +139,7 @@ class _Bake:
 
 
 def _blocks(bake: _Bake) -> Iterator[tuple[Block, Floats]]:
-    """Each block that has hair, and its texels (4, height, width, 4)."""
+    """The blocks that have hair, each with its texels (4, height, width, 4)."""
     blocks = blocks_of(bake.size)
     width, height = blocks[0].width, blocks[0].height
     shape = blocks[0].samples_across, height * SAMPLES
@@ -185,5 +185,5 @@ def _texture(width: int, height: int, texture_format: str) -> Any:
 
 
 def _ribbon(cv_count: int) -> Any:
-    """A strip of vertices without attributes: two a CV."""
+    """A strip of vertices without attributes: two per CV."""
     return gpu_objects.bare_batch("TRI_STRIP", 2 * cv_count)

@@ -1,15 +1,15 @@
-"""Hair's shadow on the meshes under it where Blender draws them, as in its viewport.
+"""Hair's shadow on meshes that Blender draws, as in its viewport.
 
-The meshes that throw shadows on the hair (Snapshot.casters) are drawn once more, as black that
-covers the picture by as much as hair takes of its light: of each light by its map, over all light
-that reaches the place. Where another mesh is nearer nothing is drawn.
+The meshes that cast shadows on the hair (Snapshot.casters) are drawn again, in black. Alpha is the
+fraction of their brightness that hair takes, from the opacity map of each light. The draw is
+depth-tested, so hidden meshes get no shadow.
 
-As a sample it stores, in place of drawing, how much of the light on the screen hair takes, and how
-much there is, so that both can be added up, see soft_picture.py.
+For a sample, this fraction is not drawn: the brightness that hair takes and the brightness without
+hair are stored instead, so that both can be summed, see soft_picture.py.
 
-Limitations: it darkens the finished picture, for which matt skin stands, so that a highlight is
-darkened as its colour is, and white cloth by a view transform too much. Two sheets of a mesh closer
-together than 0.05 % of their distance to the eye are darkened twice.
+Limitations: the finished picture is darkened, as if its meshes were matt skin. So highlights darken
+as much as the colour, and a view transform makes the shadow on white cloth too dark. Two sheets of
+a mesh closer together than 0.05 % of their distance to the eye are darkened twice.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ _SAMPLED_RECIPE = replace(
 
 
 class BodyShadow:
-    """Keeps the meshes of the last draw on the GPU; making one touches no GPU."""
+    """The meshes of the last draw on the GPU. Creating one does not touch the GPU."""
 
     def __init__(self) -> None:
         self.release()
@@ -66,12 +66,12 @@ class BodyShadow:
         display: Display | None = None,
         sample: Any = None,
     ) -> None:
-        """Darken what is in the bound framebuffer, a viewport's, depth-tested against it.
+        """Darken the picture in the bound framebuffer, that of a viewport, depth-tested against it.
 
         Args:
             maps: of the snapshot's hair. Others as in StrandPass.draw.
-            sample: an RGBA32F texture as large as the viewport reaches, 0 where no shadow of other
-                hair is yet; it gets the shadow, and the framebuffer nothing.
+            sample: an RGBA32F texture that covers the viewport, 0 where other hair has stored no
+                shadow yet. The shadow is stored into it, and nothing is drawn.
 
         Raises:
             ShaderError: the shader does not compile here.
@@ -93,7 +93,7 @@ class BodyShadow:
             finish_stores()
 
     def release(self) -> None:
-        """Let go of all that lies on the GPU; the next draw uploads again."""
+        """Release everything on the GPU; the next draw uploads again."""
         self._blocks = UniformBlocks()
         self._batches: list[tuple[Surface, Any]] = []
 

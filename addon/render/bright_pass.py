@@ -1,4 +1,4 @@
-"""Shafts of light from what is bright; the reference is shading/bright_shafts.py."""
+"""Shafts of light from bright parts of the picture; the reference is shading/bright_shafts.py."""
 
 from __future__ import annotations
 
@@ -60,11 +60,11 @@ _ADD = ShaderRecipe(
 
 
 class BrightThings:
-    """What is bright in a picture as it is now, to be added as shafts later.
+    """The bright parts of a picture at construction, to be added as shafts later.
 
     Args:
         seen: RGBA32F texture, scene-linear and premultiplied.
-        behind: what lies under it, an RGBA32F texture of its size or of one texel.
+        behind: its background, an RGBA32F texture of its size or of one texel.
     """
 
     def __init__(self, seen: Any, behind: Any, camera: Camera, settings: ShaftSettings) -> None:
@@ -77,8 +77,8 @@ class BrightThings:
             self._take(seen, behind)
 
     def add_to(self, picture: Any) -> None:
-        """Add the shafts to an RGBA32F texture of the same size; without any it stays as it is to
-        the bit.
+        """Add the shafts to an RGBA32F texture of the same size; without any it stays
+        bit-identical.
         """
         for region in self.found.regions:
             self._add_region(picture, region)
@@ -132,5 +132,5 @@ class BrightThings:
 
 
 def plain(color: tuple[float, float, float, float]) -> Any:
-    """One premultiplied colour that lies behind all of a picture."""
+    """A texture of one texel: a premultiplied background colour."""
     return texture_from(np.array([[color]], np.float32), "RGBA32F")

@@ -19,8 +19,7 @@ class Camera:
 
     view: (4, 4) world to view space, a rigid motion.
     projection: (4, 4) view to clip space, perspective or orthographic.
-    sample: which of a picture's samples it takes, from 0; what hashed alpha leaves out is another
-        part in each.
+    sample: index of the picture's sample, from 0; hashed alpha discards other fragments in each.
     Both multiply columns: clip = projection @ view @ (x, y, z, 1).
     """
 
@@ -33,7 +32,7 @@ class Camera:
         """The eye in homogeneous world coordinates, (4,).
 
         xyz is its position and w 1 for a perspective; xyz is the unit direction towards it and w 0
-        for an orthographic projection. So `eye.xyz - eye.w * point` looks from a point to the eye.
+        for an orthographic projection. So `eye.xyz - eye.w * point` points from a point to the eye.
         """
         is_perspective = self.projection[3, 3] == 0.0
         seen = np.array([0.0, 0.0, 0.0, 1.0] if is_perspective else [0.0, 0.0, 1.0, 0.0])
@@ -98,7 +97,7 @@ def frame_camera(
     *,
     margin: float = 1.08,
 ) -> Camera:
-    """The perspective camera that just holds a bounding box, all eight corners.
+    """The perspective camera whose picture just contains a bounding box, all eight corners.
 
     Args:
         bounds: lowest and highest corner, each (3,) [m], world space.
@@ -131,7 +130,7 @@ def frame_points(
     *,
     margin: float = 1.08,
 ) -> Camera:
-    """The perspective camera that just holds points, in the middle of the picture.
+    """The perspective camera whose picture just contains points, centred.
 
     Args:
         points: (n, 3) [m], world space, at least one. Others as in `frame_camera`.

@@ -1,4 +1,4 @@
-"""The same camera through another window: a part of the picture, or one moved by less than a pixel.
+"""Cameras for another window: a part of the picture, or one shifted by a fraction of a pixel.
 
 Pure numpy: importable without gpu.
 """
@@ -17,7 +17,7 @@ type Window = tuple[float, float, float, float]
 
 
 def cropped(camera: Camera, window: Window) -> Camera:
-    """The camera that shows this part of the picture alone, as large as its target.
+    """The camera that shows only this part of the picture, filling the target.
 
     Raises:
         ValueError: a window without a size.
@@ -33,11 +33,11 @@ def cropped(camera: Camera, window: Window) -> Camera:
 
 
 def jittered(camera: Camera, offset: Floats, width: int, height: int, sample: int = 0) -> Camera:
-    """The camera whose pixels look where `offset` (2,) [pixels] from their middles is.
+    """The camera whose pixels are sampled at an offset (2,) [pixels] from their centres.
 
     Args:
         width, height: of the target [pixels].
-        sample: number of the sample that is taken there.
+        sample: index of the sample.
     """
     projection = np.array(camera.projection, np.float64)
     for axis, side in enumerate((width, height)):
@@ -46,7 +46,7 @@ def jittered(camera: Camera, offset: Floats, width: int, height: int, sample: in
 
 
 def view_depth(camera: Camera, depth: Floats) -> Floats:
-    """Distance along the view [m] of what a depth buffer holds, in [0, 1]."""
+    """Distance along the view [m] of depth buffer values in [0, 1]."""
     clip = 2.0 * np.asarray(depth, np.float64) - 1.0
     scale, offset = camera.projection[2, 2], camera.projection[2, 3]
     if camera.projection[3, 3] == 0.0:

@@ -1,14 +1,14 @@
-"""What the GPU here can do, found once a start by trying it out, and what is drawn without it.
+"""Capabilities of the GPU, probed once per start, and the fallbacks for missing ones.
 
-Drivers may accept a program and do nothing, so what it wrote is read back. Each pass asks here
-before it makes a program that not every backend has:
+Drivers may accept a program and do nothing, so the results of probes are read back. Passes query
+this module before they make a program that not every backend supports:
 
-    image_atomics   strands as lists of each pixel (strand_layers.py), else hashed
-                    (hashed_strands.py); where deep layers start, else by depth tests
+    image_atomics   strands as lists per pixel (strand_layers.py), else hashed
+                    (hashed_strands.py); starts of deep layers, else by depth tests
                     (opacity_pass.py)
 
-The preferences, and HAIRLOOM_IMAGE_ATOMICS=never in the environment, have it drawn without them,
-to find out whether they are what is wrong. See docs/dev/gpu.md.
+The preferences, and HAIRLOOM_IMAGE_ATOMICS=never in the environment, turn them off, to find out
+whether they are the cause of a problem. See docs/dev/gpu.md.
 """
 
 from __future__ import annotations
@@ -26,19 +26,19 @@ from . import gpu_objects
 from .shader_program import ShaderRecipe, program
 from .textures import drawing_into, drawing_state, texture_to_array
 
-#: how image atomics may be chosen
+#: choices for image atomics
 ATOMICS_CHOICES = ("automatic", "never")
-#: in the environment; stronger than what is chosen in Blender
+#: environment variable; overrides the choice in Blender
 ATOMICS_VARIABLE = "HAIRLOOM_IMAGE_ATOMICS"
-#: of all textures that passes make
+#: formats of all textures that passes make
 FORMATS = (
     *("R16F", "R32F", "RG32F", "RGBA16F", "RGBA32F"),
     *("R32UI", "RGBA32UI", "DEPTH_COMPONENT32F"),
 )
-#: why they are not even tried: a program with early_fragment_tests does not compile on Metal, and a
-#: script's textures lack the flag that its atomics need
+#: why they are not even probed: a program with early_fragment_tests does not compile on Metal, and
+#: textures made by scripts lack the flag that atomics need there
 _METAL = "Blender gives scripts no textures for them on Metal"
-#: samples of a pixel that make a still of hashed strands, where they are drawn in place of layers
+#: samples per pixel of a still whose strands are hashed as a fallback for layers
 CALM_SAMPLES = 16
 _SIDE = 16
 _DISPATCH_RECIPE = ShaderRecipe(
@@ -55,14 +55,14 @@ _ATOMICS_RECIPE = ShaderRecipe(
 
 @dataclass(frozen=True, kw_only=True)
 class Capabilities:
-    """What was found.
+    """The results of the probes.
 
     backend: as Blender names it. image_atomics: whether they are used.
-    atomics_problem: why they are not; else empty.
-    missing_formats: of FORMATS. texture_size: of a side [texels]. texture_layers: of an array.
-    group_size, group_count: of compute shaders, in x, y and z.
-    dispatch_ms: how long a small one takes until it is read back; None where it fails.
-    probe_ms: how long it took to find all this out.
+    atomics_problem: why they are not used; else empty.
+    missing_formats: of FORMATS. texture_size: largest side [texels]. texture_layers: of an array.
+    group_size, group_count: limits of compute shaders in x, y and z.
+    dispatch_ms: duration of a small dispatch until it is read back; None where it fails.
+    probe_ms: duration of all probes.
     """
 
     backend: str
@@ -81,39 +81,39 @@ _chosen = "automatic"
 
 
 def choose_image_atomics(choice: str) -> None:
-    """From the next draw on; one of ATOMICS_CHOICES."""
+    """Choose one of ATOMICS_CHOICES, from the next draw on."""
     global _chosen
     assert choice in ATOMICS_CHOICES, choice
     _chosen = choice
 
 
 def capabilities() -> Capabilities:
-    """What the GPU here can do; the first call in a context that can draw finds out."""
+    """Capabilities of the GPU, probed by the first call, which needs a context that can draw."""
     return _probed(_forbidden())
 
 
 def pair_format() -> str:
-    """Of two numbers a texel, which one program both reads and writes: Metal has only one and four
-    of them (Apple's feature set tables, "Texture Buffer Pixel Formats")."""
+    """The texture format for two numbers per texel that one program both reads and writes. For
+    that, Metal supports only one or four channels (Apple's feature set tables, "Texture Buffer
+    Pixel Formats")."""
     return "RGBA32F" if gpu.platform.backend_type_get() == "METAL" else "RG32F"
 
 
 def reads_back() -> bool:
-    """Whether an invocation may read texels again that it has written. On Metal it would need a
-    fence (Metal Shading Language Specification, "Texture Functions"), which scripts cannot ask
-    for."""
+    """Whether an invocation can read texels that it has written. On Metal that needs a fence (Metal
+    Shading Language Specification, "Texture Functions"), which scripts cannot have."""
     return bool(gpu.platform.backend_type_get() != "METAL")
 
 
 def fails_in_idle_branches() -> bool:
-    """Whether a program may crash in a branch that no pixel of a block takes: Mesa's Vulkan on the
-    processor does where hashed strands are shaded."""
+    """Whether a program may crash in a branch that no pixel of a block takes, as Mesa's software
+    Vulkan does in the shading of hashed strands."""
     is_vulkan = gpu.platform.backend_type_get() == "VULKAN"
     return is_vulkan and "llvmpipe" in gpu.platform.renderer_get()
 
 
 def _forbidden() -> str | None:
-    """Who does not want image atomics."""
+    """Why the user has turned image atomics off; None where they are on."""
     if os.environ.get(ATOMICS_VARIABLE, "").lower() == "never":
         return f"turned off by {ATOMICS_VARIABLE}"
     return "turned off in the preferences" if _chosen == "never" else None
@@ -123,7 +123,7 @@ def _forbidden() -> str | None:
 def _probed(forbidden: str | None) -> Capabilities:
     begin = time.perf_counter()
     backend = str(gpu.platform.backend_type_get())
-    # a program that a driver refuses is never made where nobody wants it
+    # where atomics are off, their program is never made, in case a driver refuses it
     problem = forbidden or (_METAL if backend == "METAL" else _atomics_problem())
     dispatch_ms = _dispatch_ms()
     missing = tuple(each for each in FORMATS if not _is_format_there(each))
@@ -147,21 +147,21 @@ def _probed(forbidden: str | None) -> Capabilities:
 
 
 def _atomics_problem() -> str:
-    """What is wrong with those of a small draw, compared with what must come out."""
+    """What is wrong with image atomics, by the results of a small draw; empty if nothing."""
     try:
         found = _counted_by_atomics()
     except Exception as error:  # a driver may fail at any point, each with an error of its own
         return f"{type(error).__name__}: {error}"
     count = _SIDE * _SIDE
-    # the last exchange leaves one of the numbers, and the others come back
+    # the last exchange leaves one of the numbers, the others are returned
     expected = [count, 0, count - 1, count * (count + 1) // 2]
     read = [*found[:3], found[3] + found[4]]
     return "" if read == expected else f"they give {read}, not {expected}"
 
 
 def _counted_by_atomics() -> list[int]:
-    """What fragments have left: how many they are, the least and the largest of their numbers, the
-    sum of what exchanges gave back, and what the last one left.
+    """Results of atomics over all fragments: their count, the minimum and maximum of their numbers,
+    the number that the last exchange left, and the sum of those that exchanges returned.
     """
     probed = gpu_objects.texture((5, 1), format="R32UI")
     probed.clear(format="UINT", value=(0,))
@@ -177,7 +177,7 @@ def _counted_by_atomics() -> list[int]:
 
 
 def _dispatch_ms() -> float | None:
-    """How long a small dispatch takes; None where it does not do what it should."""
+    """How long a small dispatch takes [ms]; None where its result is wrong."""
     try:
         times = [_timed_dispatch() for _ in range(2)]  # the first one may still compile
     except Exception as error:  # as above; the self-test fails, and this is why

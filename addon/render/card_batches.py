@@ -1,4 +1,4 @@
-"""Hair cards on the GPU: vertices of the moment, and triangles in the orders they are drawn in."""
+"""Hair cards on the GPU: current vertices, and triangles in the orders in which they are drawn."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from ..shading.environment import openness_by_occlusion
 from . import gpu_objects
 from .card_snapshot import CardSnapshot
 
-#: vertex attribute -> its length: of a CardMesh, and the last four of a CardSnapshot
+#: vertex attribute -> its length; the last four are of a CardSnapshot, the others of a CardMesh
 ATTRIBUTES = {
     **{"position": 3, "normal": 3, "tangent": 3, "uv": 2, "occlusion": 1, "along": 1},
     **{"openness": 4, "received": 4, "beneath": 4, "depth": 1},
 }
-#: by CardMesh.axes: skin right beneath, as on a plane
+#: in CardMesh.axes: skin right beneath, as on a plane
 _PLANE = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0], np.float32)
-#: by the same axes, to where hair looks
+#: in the same axes: the outward direction of the hair
 _AWAY = np.array([0.0, 1.0, 0.0], np.float32)
 
 
 @dataclass(eq=False)
 class _Order:
-    """One order of triangles, and what draws it with the vertices of the moment."""
+    """One order of triangles, and the batch that draws it with the current vertices."""
 
     triangles: Ints
     indices: Any
@@ -35,28 +35,28 @@ class _Order:
 
 
 class CardBatches:
-    """Keeps one groom's cards; making one touches no GPU.
+    """The cards of one groom on the GPU. Creating one does not touch the GPU.
 
-    Vertices go up with every new mesh, triangles only where they are others than before.
+    Vertices are uploaded with every new mesh, triangles only when they change.
     """
 
     def __init__(self) -> None:
         self.release()
 
     def release(self) -> None:
-        """Let go of all that lies on the GPU."""
+        """Release everything on the GPU."""
         self._mesh: CardMesh | None = None
         self._vertices: Any = None
         self._orders: dict[str, _Order] = {}
         self._eye: Floats | None = None
 
     def static(self, cards: CardSnapshot) -> Any:
-        """All triangles in the order of the mesh."""
+        """The batch of all triangles in the order of the mesh."""
         self._upload(cards)
         return self._batch("static", cards.mesh.triangles)
 
     def of(self, cards: CardSnapshot, eye: Floats) -> dict[str, Any]:
-        """What draws front faces and what draws back faces, by "front" and "back".
+        """The batches of front faces and of back faces, by "front" and "back".
 
         Args:
             eye: (4,) homogeneous, see Camera.eye.
@@ -70,7 +70,7 @@ class CardBatches:
         return {"front": front, "back": self._batch("back", cards.back_triangles)}
 
     def _sorted(self, cards: CardSnapshot, eye: Floats) -> Any:
-        """For this eye; nothing goes up where the order is that of the draw before."""
+        """The batch sorted for this eye; nothing is uploaded if the order has not changed."""
         mesh = cards.mesh
         is_same = self._mesh is mesh and self._eye is not None and (self._eye == eye).all()
         self._upload(cards)

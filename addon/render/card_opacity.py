@@ -1,8 +1,8 @@
 """Draws hair cards into opacity maps, see opacity_maps.py.
 
-A card's triangles add what its alpha stands for (shading/volume/card_opacity.py) to all layers that
-end behind them. Deep layers lie between the first and the last card that are not clear: two depth
-buffers as large as the map find them.
+A card's triangles add the optical depth of its alpha (shading/volume/card_opacity.py) to all layers
+that end behind them. Deep layers lie between the first and the last card that are not clear, which
+are found by two depth buffers of the map's size.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ class _Cards:
         self.batch.draw(shader.shader)
 
     def draw_starts(self, maps: OpacityMaps, number: int, place: ShaderFeature) -> None:
-        """Depths of the first and the last card."""
+        """Draw the depths of the first and the last card into `maps.starts`."""
 
         def draw() -> None:
             features, numbers = [place, maps.mesh_feature, self.feature], {"min_alpha": MIN_ALPHA}
@@ -102,23 +102,23 @@ class _Cards:
 
 
 class CardOpacity:
-    """Keeps the maps of one set of cards from draw to draw; making one touches no GPU."""
+    """The opacity maps of one set of cards. Creating one does not touch the GPU."""
 
     def __init__(self) -> None:
         self.release()
 
     def release(self) -> None:
-        """Let go of all that lies on the GPU; the next draw makes it again."""
+        """Release everything on the GPU; the next draw makes it again."""
         self._drawing, self._blocks = OpacityDrawing(), UniformBlocks()
         self._drawn: tuple[Any, Any] = (None, None)
         self._serial = 0
         self._extent: tuple[CardMesh | None, Ball] = (None, Ball(np.zeros(3), 1.0))
 
     def of(self, cards: CardSnapshot, batch: Any, alpha: Any, snapshot: Snapshot) -> OpacityMaps:
-        """The maps of these cards, in the light of a snapshot.
+        """The maps of these cards in the lights of a snapshot, drawn only when something changed.
 
         Args:
-            batch: the mesh on the GPU. alpha: its texture; another object whenever it is another.
+            batch: the mesh on the GPU. alpha: its alpha texture. Pass a new object for each change.
         """
         if self._drawn[0] is not batch or self._drawn[1] is not alpha:
             self._drawn, self._serial = (batch, alpha), self._serial + 1

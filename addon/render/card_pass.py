@@ -1,22 +1,22 @@
-"""Draws hair cards into whatever target is bound, by the four passes of Scheuermann 2004.
+"""Draws hair cards into the bound framebuffer, by the four passes of Scheuermann 2004.
 
-    prime depth              opaque pixels alone, no colours
-    opaque                   shades them, where the depth is equal
-    transparent back faces   over what is there, without depth
-    transparent front faces  over that, with depth, so that nothing farther comes over them later;
-                             clear pixels, which would hide it as well, are left out by choice
+    prime depth              opaque pixels only, no colours
+    opaque                   shades these, with the depth test EQUAL
+    transparent back faces   blended over the picture, without writing depth
+    transparent front faces  blended over that, writing depth, so that nothing farther is drawn over
+                             them later; optionally without clear pixels, which would hide it too
 
-The first alone tests alpha, so that in the others hidden pixels are left out before they are
-shaded. The author's simpler scheme has three passes, each with a test. Either draws triangles as
-they stand, or sorted by card for the eye; exchange/cards/sidecar.py lists the states, for engines
-too. Opaque meshes have to be drawn before.
+Only the first pass tests alpha, so that in the others the early depth test discards hidden pixels
+before they are shaded. The author's simpler scheme has three passes, each with an alpha test. Both
+draw triangles in the order of the mesh, or sorted by card for the eye. exchange/cards/sidecar.py
+lists the states, also for engines. Opaque meshes must be drawn first.
 
-Textures have their mip maps in them, see card_textures.py. Seen at a slant, cards of a baked atlas
-cover as much as their strands do, see shading/card_look.py.
+Textures contain their mip maps, see card_textures.py. Seen at a slant, cards of a baked atlas keep
+the coverage of their strands, see shading/card_look.py.
 
-Limitations: what cards.sort says of the order. Front faces that are nearly clear write depth, as
-the paper has it, and hide what is behind them but drawn later: an eighth of what thin hair covers.
-Baked cards are made so much denser (card_look.MEAN_FACING).
+Limitations: those of the order, see cards.sort. Nearly clear front faces write depth, as in the
+paper, and hide farther hair that is drawn later: an eighth of what thin hair covers. Baked cards
+are made denser by as much (card_look.MEAN_FACING).
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ _PRIME_RECIPE = ShaderRecipe(
     outputs=(("VEC4", "color"),),
     defines=(("PRIME", 1),),
 )
-#: shades; what is optional are features
+#: shading; features add the optional parts
 _SHADED_RECIPE = ShaderRecipe(
     name="card",
     vertex="card.vert.glsl",
@@ -97,14 +97,14 @@ _SHADED_RECIPE = ShaderRecipe(
         *(("MARSCHNER", 0), ("SHADOWS", 0), ("SCATTERING", 0)),
     ),
 )
-#: from this alpha on a card is what stands in a pixel, for depth and object masks
+#: alpha from which a card counts as present in a pixel, for depth and object masks
 _PRESENT_ALPHA = 0.5
 
 
 class CardPass:
-    """Keeps the cards of the last snapshot on the GPU; making one touches no GPU.
+    """The cards of the last snapshot on the GPU. Creating one does not touch the GPU.
 
-    notes: what the artist should know of their last maps, each with its remedy.
+    notes: notes to the artist on their last maps, each with its remedy.
     """
 
     def __init__(self) -> None:
@@ -115,7 +115,7 @@ class CardPass:
         released_with_shaders(self)
 
     def opacity(self, snapshot: Snapshot) -> OpacityMaps | None:
-        """How much hair lies between each light and every place, as StrandPass.opacity of strands.
+        """The opacity maps of the cards, as StrandPass.opacity for strands; None without shadows.
 
         Raises:
             ShaderError: as `draw`.
@@ -144,7 +144,7 @@ class CardPass:
 
         Args:
             width, height: of the target [pixels].
-            opacity: of the hair that shades them, such as their own, see `opacity`.
+            opacity: maps of the hair that shades them, such as their own, see `opacity`.
             output, display: as in StrandPass.draw.
 
         Raises:
@@ -180,7 +180,7 @@ class CardPass:
         *,
         min_alpha: float = _PRESENT_ALPHA,
     ) -> None:
-        """The depth of the cards alone, wherever they cover at least so much.
+        """Draw only the depth of the cards, where their alpha is at least `min_alpha`.
 
         Raises:
             ShaderError: as `draw`.
@@ -194,7 +194,7 @@ class CardPass:
             self._draw_depth(view, self._batches.static(cards), min_alpha, sharpness=0.0)
 
     def release(self) -> None:
-        """Let go of all that lies on the GPU; the next draw uploads again."""
+        """Release everything on the GPU; the next draw uploads again."""
         self._blocks = UniformBlocks()
         self._opacity.release()
         self._batches.release()
@@ -207,7 +207,7 @@ class CardPass:
     def _shading(
         self, snapshot: Snapshot, cards: CardSnapshot, maps: OpacityMaps | None
     ) -> Iterator[ShaderFeature]:
-        """What all programs that shade these cards have."""
+        """The features of all programs that shade these cards."""
         yield lights_feature(snapshot)
         yield self._maps_feature(cards)
         yield ShaderFeature(
@@ -231,7 +231,7 @@ class CardPass:
             yield scattering_feature(snapshot)
 
     def _maps_feature(self, cards: CardSnapshot) -> ShaderFeature:
-        """What a program has that reads the pictures of these cards."""
+        """The feature of programs that read the textures of these cards."""
         has_normal, has_tangent = cards.textures.normal is not None, cards.has_tangent_map
         names = ["base", "alpha", "noise", "tangent" if has_tangent else "shift"]
         names += ["normal"] * has_normal
@@ -245,7 +245,7 @@ class CardPass:
     def _draw_shaded(
         self, each: DrawPass, features: Sequence[ShaderFeature], batch: Any, encoding: int
     ) -> None:
-        """A pass that tests alpha may have to shade pixels that are hidden."""
+        """Draw one shaded pass. One that tests alpha may shade hidden pixels too."""
         if each.alpha_range is not None:
             numbers = {"alpha_range": ("VEC2", each.alpha_range)}
             clipped = ShaderFeature(name="clipped", numbers=numbers, defines={"CLIPPED": 1})
@@ -256,11 +256,11 @@ class CardPass:
     def _draw_depth(
         self, view: ShaderFeature, batch: Any, min_alpha: float, *, sharpness: float
     ) -> None:
-        """Pixels of that alpha alone, by a shader that asks for nothing else.
+        """Draw the depth of pixels with at least this alpha, by a shader that reads nothing else.
 
         Args:
-            sharpness: 1 chooses mip maps as shading does; 0 asks the picture itself, of which small
-                pixels meet as many that are opaque as large ones.
+            sharpness: 1 chooses mip maps as shading does; 0 reads level 0, so that the fraction of
+                opaque pixels does not depend on their size.
         """
         shader = bound(
             _PRIME_RECIPE,
@@ -277,7 +277,7 @@ class CardPass:
 
 
 def passes_of(drawing: CardDrawingSettings) -> tuple[DrawPass, ...]:
-    """The passes of a scheme, as `draw` goes through them."""
+    """The passes of a scheme, in the order of drawing."""
     if drawing.passes == "three":
         return THREE_PASSES
     if drawing.skip_clear:
@@ -292,7 +292,7 @@ def _drawn(snapshot: Snapshot) -> CardSnapshot | None:
 
 @contextmanager
 def _state_of(each: DrawPass) -> Iterator[None]:
-    """The state of a pass, and afterwards what was there before."""
+    """Set the GPU state of a pass, and restore it afterwards."""
     blend = "ALPHA_PREMULT" if each.is_blended else "NONE"
     depth_test = each.depth_test.upper()
     with drawing_state(depth_test=depth_test, depth_write=each.depth_write, blend=blend):

@@ -1,4 +1,4 @@
-"""The textures of hair cards on the GPU, each with its mip maps in it: shading/card_texture.py."""
+"""Textures of hair cards on the GPU, with their mip maps packed: see shading/card_texture.py."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from .card_snapshot import CardSnapshot
 from .shader_program import released_with_shaders
 from .textures import texture_from
 
-#: textures that repeat in u and v; the others end at their edges
+#: textures that repeat in u and v; the others are clamped
 _REPEATED = ("shift", "noise")
 
 
 class CardTextures:
-    """Keeps the textures of the last cards; making one touches no GPU."""
+    """The textures of the last cards. Creating one does not touch the GPU."""
 
     def __init__(self) -> None:
         self._pictures: HairTextures | None = None
@@ -32,7 +32,7 @@ class CardTextures:
 
     @property
     def tiles(self) -> tuple[float, float]:
-        """Columns and rows, as shaders take them."""
+        """Columns and rows of the atlas, as shaders take them."""
         return tiles_of(self._grid)
 
     def of(self, name: str) -> Any:
@@ -40,7 +40,7 @@ class CardTextures:
         return self._textures[name]
 
     def upload(self, cards: CardSnapshot) -> None:
-        """Hold the textures of these cards; nothing goes up that is there."""
+        """Upload the textures of these cards, unless they are there already."""
         pictures, grid = cards.textures, cards.mesh.atlas
         if self._pictures is not pictures or self._grid != grid:
             for _ in self.uploading(pictures, grid, packed_textures(pictures, grid)):
@@ -49,7 +49,7 @@ class CardTextures:
     def uploading(
         self, pictures: HairTextures, grid: AtlasGrid, packed: Iterable[tuple[str, Floats]]
     ) -> Generator[None]:
-        """The same in steps, a texture each; packed: see `packed_textures`."""
+        """Upload one texture per step; packed: see `packed_textures`."""
         self.release()
         textures: dict[str, Any] = {}
         for name, texels in packed:
@@ -60,26 +60,26 @@ class CardTextures:
         self._pictures, self._grid, self._textures = pictures, grid, textures
 
     def release(self) -> None:
-        """Let go of them; the next draw uploads again."""
+        """Release the textures; the next draw uploads them again."""
         self._pictures, self._textures = None, {}
 
 
 def packed_textures(pictures: HairTextures, grid: AtlasGrid) -> Iterator[tuple[str, Floats]]:
-    """Name and texels of each texture, see shading/card_texture.py; any thread may ask for them."""
+    """Name and texels of each texture, see shading/card_texture.py. Thread-safe."""
     for name, levels in _levels(pictures, grid):
         yield name, packed_levels(levels, is_repeated=name in _REPEATED)
 
 
 def tiles_of(grid: AtlasGrid) -> tuple[float, float]:
-    """Columns and rows, as shaders take them."""
+    """Columns and rows of an atlas, as shaders take them."""
     return float(grid.columns), float(grid.rows)
 
 
 def _levels(pictures: HairTextures, grid: AtlasGrid) -> Iterator[tuple[str, list[Floats]]]:
-    """The levels of each texture, by how much hair there is.
+    """The mip levels of each texture, weighted by alpha.
 
-    Of mip_levels alone what is wanted: its maps are in [0, 1], while the base of an atlas may be
-    brighter, and what repeats knows no tiles.
+    Adapts to mip_levels: its maps are in [0, 1], while the base of an atlas may be brighter; and
+    textures that repeat have no tiles.
     """
     for name, picture in vars(pictures).items():
         if not isinstance(picture, np.ndarray):
@@ -95,7 +95,7 @@ def _levels(pictures: HairTextures, grid: AtlasGrid) -> Iterator[tuple[str, list
 
 
 def _texels(picture: Floats, most: float) -> Floats:
-    """As a texture holds them, (height, width, 1 or 4)."""
+    """A level in the layout of its texture, (height, width, 1 or 4)."""
     if picture.ndim == 2:
         return picture[..., None] * np.float32(most)
     opaque = np.ones((*picture.shape[:2], 1), np.float32)

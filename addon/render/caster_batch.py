@@ -1,4 +1,4 @@
-"""Meshes on the GPU where only their places count, and the holes of their alpha."""
+"""Meshes on the GPU for passes that only need positions, and alpha for holes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .snapshot import Caster, MeshSnapshot, surface_of
 
 
 def alpha_picture(caster: Caster) -> Floats | None:
-    """The picture whose alpha makes holes; None where none does."""
+    """The picture whose alpha makes holes in a mesh; None if there is none."""
     if not isinstance(caster, MeshSnapshot) or caster.transparency == "opaque":
         return None
     pictures = pictures_of(caster)
@@ -19,11 +19,11 @@ def alpha_picture(caster: Caster) -> Floats | None:
 
 
 def caster_batch(caster: Caster, carried: Floats | None = None) -> Any:
-    """The triangles: position; with such a picture UVs as well, for which each corner is a vertex
-    of its own.
+    """A batch of the triangles with positions; with an alpha picture also UVs, with a vertex for
+    each corner.
 
     Args:
-        carried: (vertex_count, 3), an attribute of this name; None for none.
+        carried: (vertex_count, 3), an additional attribute of this name; None for none.
     """
     surface = surface_of(caster)
     values, has_corners = {"position": surface.positions}, alpha_picture(caster) is not None

@@ -1,10 +1,10 @@
-"""Colliders on the GPU: their solids, uploaded once, and how they are posed in each substep.
+"""Colliders on the GPU: their solids, uploaded once, and their pose in each substep.
 
-rounds RGBA32F: two texels a round solid: xyz start [m], w radius; xyz axis to the end, w one
-                over its squared length, 0 for a ball. A set of balls is several of them.
-fields RGBA32F: a texel a node of a distance field [m]: its value and those of its neighbours
-                along z, along y, and along both. x runs fastest, then y, so that the two texels
-                that a look-up reads lie side by side; a field begins a row.
+rounds RGBA32F: two texels for each round solid: xyz start [m], w radius; xyz axis to the end, w one
+                over its squared length, 0 for a ball. A set of balls is several solids.
+fields RGBA32F: one texel for each node of a distance field [m]: its value and those of its
+                neighbours along z, along y, and along both. x varies fastest, then y, so that the
+                two texels that a look-up reads are adjacent; each field begins a row.
 """
 
 from __future__ import annotations
@@ -30,16 +30,16 @@ from ..errors import HairloomError
 from .shader_source import COLLIDER_TEXELS, FIELD_ROW, ROUNDS_ACROSS, STRAND_ROWS
 from .textures import texture_from
 
-#: The squared length of paths that need not be followed where none need be.
+#: Squared length up to which paths need not be followed, where none need to be.
 NOT_FOLLOWED = 1.0e30
 
 
 @dataclass(frozen=True)
 class SolidKinds:
-    """Which colliders a program with lib_signed_distance.glsl is for.
+    """The kinds of colliders that a program with lib_signed_distance.glsl supports.
 
-    rounds, fields: whether any is a round solid, and a field. several: whether there may be more
-    than one.
+    rounds, fields: whether there are round solids, and fields. several: whether there may be more
+    than one collider.
     """
 
     rounds: bool
@@ -62,12 +62,12 @@ class SolidKinds:
 
 @dataclass(frozen=True)
 class ColliderTextures:
-    """The solids of some colliders.
+    """The solids of some colliders in textures.
 
-    colliders: those that lie in the textures, in their order.
-    own: (collider_count, 2, 4) what the table of moments says of each. Of a field: nodes along x,
-        y and z, and the row where it begins; low and cell. Of others: first round solid, and how
-        many; 0; -1.
+    colliders: those in the textures, in order.
+    own: (collider_count, 2, 4) two texels of each in the table of moments. For a field: nodes along
+        x, y and z, and its first row; low and cell. For others: first round solid, number of
+        solids, 0, -1; zeros.
     bounds: center and radius [m] of a sphere around each.
     rounds, fields: see above; None where there are none.
     """
@@ -103,17 +103,17 @@ class ColliderTextures:
         return cls(colliders, own, bounds, *textures)
 
     def are_of(self, posed: tuple[PosedCollider, ...]) -> bool:
-        """Whether these are the colliders that lie in the textures."""
+        """Whether these are the colliders in the textures."""
         return len(posed) == len(self.colliders) and all(
             one.collider is other for one, other in zip(posed, self.colliders, strict=True)
         )
 
     @cached_property
     def rounds_of_distance(self) -> int:
-        """Rounds of loops that one look at all colliders takes."""
+        """Loop iterations for the distance of one point to all colliders."""
         is_round = self.own[:, 0, 3] < 0.0
         if len(self.own) == 1 and not is_round.any():
-            return 0  # a grid alone is looked up without a loop
+            return 0  # a single field is looked up without a loop
         return len(self.own) + int(self.own[is_round, 0, 1].sum())
 
     @property
@@ -123,8 +123,8 @@ class ColliderTextures:
     def solids(self, posed: tuple[PosedCollider, ...]) -> Any:
         """The texture `solids` of lib_signed_distance.glsl: all colliders at the frame's end.
 
-        It is RGBA32F, COLLIDER_TEXELS texels a collider in one row, as `moments` has them, but for
-        those that say how they move.
+        RGBA32F, with COLLIDER_TEXELS texels for each collider in one row, as in `moments`; those
+        for the motion are 0.
         """
         table = np.zeros((1, len(posed), COLLIDER_TEXELS, 4), np.float32)
         for place, one in enumerate(posed):
@@ -141,16 +141,15 @@ class ColliderTextures:
     ) -> Floats:
         """Rows of the table of moments, (substep_count, collider_count * COLLIDER_TEXELS, 4).
 
-        A collider's texels: three rows of its inverse matrix at the substep's end; three of how
-        much the substep changes its matrix; those of `own`; a sphere around it, on its way in the
-        substep, that holds all points within reach; three rows of its inverse matrix at the
-        substep's begin; x the squared length of ways that need not be followed (see
-        `contacts.short_squared`), y 1 where segments collide, z its smallest scale,
-        w its swelling.
+        A collider's texels: three rows of its inverse matrix at the substep's end; three rows of
+        the change of its matrix in the substep; those of `own`; a sphere around all points that it
+        may reach in the substep; three rows of its inverse matrix at the substep's begin; x the
+        squared length up to which paths need not be followed (see `contacts.short_squared`), y 1
+        where segments collide, z its smallest scale, w its swelling.
 
         Args:
             spans: (substep_count, 2) begin and end of each substep as fractions of the frame.
-            reach: [m] from a collider in which contacts may be.
+            reach: largest distance of a contact from a collider [m].
             size: [m] of the hair. cv_count: of a guide.
         """
         table = np.zeros((len(spans), len(posed), COLLIDER_TEXELS, 4), np.float32)
@@ -176,8 +175,8 @@ class ColliderTextures:
         return table.reshape(len(spans), -1, 4)
 
     def _stand(self, table: Floats, place: int, now: Floats) -> None:
-        """Write into rows of a table of moments where a collider stands, (n, 4, 4) object to world,
-        and what it is."""
+        """Write the pose of a collider, (n, 4, 4) object to world, its shape and its bounding
+        sphere into rows of a table of moments."""
         table[:, place, 0:3] = np.linalg.inv(now)[:, :3]
         table[:, place, 6:8] = self.own[place]
         turned, (center, radius) = now[:, :3, :3], self.bounds[place]
@@ -187,13 +186,13 @@ class ColliderTextures:
 
 
 class UploadedColliders:
-    """The textures of the colliders that were asked for last; passes of one groom share them."""
+    """The textures of the last requested colliders; the passes of one groom share them."""
 
     def __init__(self) -> None:
         self._textures: ColliderTextures | None = None
 
     def of(self, posed: tuple[PosedCollider, ...]) -> ColliderTextures:
-        """Those of these colliders, uploaded if they are others than before.
+        """The textures of these colliders, uploaded if they are not the last ones.
 
         Raises:
             HairloomError: more of them than a texture holds.
@@ -203,12 +202,12 @@ class UploadedColliders:
         return self._textures
 
     def release(self) -> None:
-        """Let go of all that lies on the GPU."""
+        """Release everything on the GPU."""
         self._textures = None
 
 
 def round_texels(collider: Collider) -> Floats:
-    """Two texels for each round solid, (n, 2, 4)."""
+    """Two texels for each round solid of a collider, (n, 2, 4)."""
     if isinstance(collider, SphereSetCollider):
         solids = np.zeros((len(collider.radii), 2, 4), np.float32)
         solids[:, 0, :3], solids[:, 0, 3] = collider.centers, collider.radii

@@ -1,9 +1,9 @@
-"""Cryptomatte: which objects cover a pixel, and how much each.
+"""Cryptomatte: which objects cover a pixel, and how much each covers.
 
 After Friedman and Jones 2015, "Fully automatic ID mattes with support for motion blur and
 transparency", and the specification of Cryptomatte 1.2.0 (Psyop). An object's ID is the hash of its
-name, as a float; pictures hold IDs and coverages in pairs, two to a picture, those that cover most
-first.
+name, as a float. Pictures hold pairs of ID and coverage, two to a picture, sorted by coverage,
+largest first.
 
 Pure numpy: importable without gpu.
 """
@@ -17,7 +17,7 @@ import numpy as np
 
 from ..arrays import Floats
 
-#: pairs of ID and coverage in a picture of four channels
+#: pairs of ID and coverage in a four-channel picture
 PAIRS = 2
 _WORD = 0xFFFFFFFF
 
@@ -39,9 +39,9 @@ def murmur3(key: bytes, seed: int = 0) -> int:
 
 
 def matte_bits(name: str) -> int:
-    """The bits of an ID: the hash of the name, without exponents that make it no plain number."""
+    """The bits of an ID: the hash of the name, changed where it is not a normal float."""
     found = murmur3(name.encode())
-    # a float of exponent 0 may be flushed to 0, and one of 255 is infinite or no number
+    # a float with exponent 0 may be flushed to 0, and one with 255 is infinite or NaN
     return found ^ 1 << 23 if found >> 23 & 255 in (0, 255) else found
 
 
@@ -51,10 +51,10 @@ def matte_id(name: str) -> np.float32:
 
 
 def metadata(layer: str, names: Iterable[str]) -> dict[str, str]:
-    """What a file says of a Cryptomatte.
+    """The metadata of a Cryptomatte in a file.
 
     Args:
-        layer: what its pictures' names begin with. names: of all objects.
+        layer: prefix of its pictures' names. names: of all objects.
     """
     # seven digits, as in the specification
     place = f"cryptomatte/{murmur3(layer.encode()) >> 4:07x}"
@@ -68,11 +68,11 @@ def metadata(layer: str, names: Iterable[str]) -> dict[str, str]:
 
 
 class Coverages:
-    """How much each object covers of each pixel, as the sum over samples.
+    """The coverage of each pixel by each object, as a sum over samples.
 
     Args:
         height, width: [pixels].
-        levels: how many objects of a pixel have room; what else covers it is left out.
+        levels: number of objects stored per pixel; further ones are dropped.
     """
 
     def __init__(self, height: int, width: int, levels: int) -> None:
@@ -81,12 +81,12 @@ class Coverages:
         self._sums = np.zeros((levels, height * width), np.float32)
 
     def add(self, name: str, coverage: Floats) -> None:
-        """Add what an object covers in a sample, (height, width)."""
+        """Add the coverage by an object in one sample, (height, width)."""
         flat, own = coverage.ravel(), matte_id(name)
         pixels = np.flatnonzero(flat > 0.0)
         is_left = np.ones(len(pixels), bool)
         for ids, sums in zip(self._ids, self._sums, strict=True):
-            # levels fill from the first on, so that an object has one at most
+            # levels fill up in order, so that an object has at most one per pixel
             is_here = is_left & ((ids[pixels] == own) | (sums[pixels] == 0.0))
             here = pixels[is_here]
             ids[here] = own
@@ -94,10 +94,10 @@ class Coverages:
             is_left &= ~is_here
 
     def pictures(self, samples: int) -> list[Floats]:
-        """IDs and coverages, (height, width, 4) each, those that cover most first.
+        """Pictures of IDs and coverages, (height, width, 4) each, largest coverage first.
 
         Args:
-            samples: how many were added.
+            samples: number of samples that were added.
         """
         order = np.argsort(-self._sums, axis=0, kind="stable")
         ids = np.take_along_axis(self._ids, order, axis=0)

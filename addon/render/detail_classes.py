@@ -1,8 +1,8 @@
-"""Strands put into classes of about as many pieces, each of which is one instanced draw.
+"""Classes of strands with similar numbers of pieces, each drawn by one instanced draw.
 
-The gpu module has no indirect draw, and all instances of a draw have equally many vertices. So the
-strands of a class all get the vertices of its capacity, and those that need fewer let the rest
-fall onto their tip.
+The gpu module has no indirect draw, and all instances of a draw have the same number of vertices.
+So all strands of a class get as many vertices as its capacity needs; those that need fewer collapse
+the rest onto their tip.
 
 Pure numpy: importable without gpu.
 """
@@ -16,12 +16,13 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 
-#: A capacity is at most 1 / step above the one before; the finest step that needs few draws.
+#: A capacity is at most 1 / step larger than the one before. Steps are tried from the finest on
+#: until few enough draws are needed.
 _STEPS = (16, 8, 4, 2, 1)
-#: Strands are drawn from near to far in this many steps if that leaves any capacities, and in more
-#: if there are draws left.
+#: Number of depth slabs in which strands are drawn, from near to far; up to the second number if
+#: there are draws left.
 _SLABS, _MAX_SLABS = 4, 16
-#: draws of a groom's strands, and of those that throw the shadow of one light
+#: Most draws of a groom's strands, and of those that cast the shadow of one light.
 MAX_CLASSES, MAX_MAP_CLASSES = 16, 5
 
 
@@ -29,9 +30,9 @@ MAX_CLASSES, MAX_MAP_CLASSES = 16, 5
 class DetailClass:
     """One instanced draw.
 
-    capacity: pieces that each of its instances has vertices for.
-    first: place of its first strand in the order.
-    count: how many strands it has.
+    capacity: pieces for which each of its instances has vertices.
+    first: index of its first strand in the order.
+    count: number of strands.
     """
 
     capacity: int
@@ -40,23 +41,23 @@ class DetailClass:
 
     @property
     def vertex_count(self) -> int:
-        """Of all its instances: two a station, and one station more than pieces."""
+        """Vertices of all its instances: two per station, with one station more than pieces."""
         return 2 * (self.capacity + 1) * self.count
 
 
 def detail_classes(
     totals: Ints, depths: Floats | None = None, held: Ints | None = None
 ) -> tuple[Ints, tuple[DetailClass, ...]]:
-    """The strands that are drawn, in order of their classes, and these classes.
+    """The indices of the strands that are drawn, ordered by class, and the classes.
 
-    With depths near strands come first: what they hide is then not shaded. The depths are cut into
-    slabs, and each slab has its own classes. Within a class strands keep their order, so that two
-    pictures of one view are the same, and strands that are not drawn change no other's place.
+    With depths, near strands come first, so that what they hide is not shaded. The depths are
+    divided into slabs, each with its own classes. Within a class strands keep their order, so that
+    two pictures of one view are the same, and omitting strands does not reorder the others.
 
     Args:
         totals: (strand_count,) pieces of each strand, 0 for those that are not drawn.
-        depths: (strand_count,) how far each strand is, in any unit; None: the order is no matter.
-        held: capacities that hold all totals, growing from 0; None: as few as MAX_CLASSES need.
+        depths: (strand_count,) depth of each strand, in any unit; None: the order does not matter.
+        held: capacities up to the largest total, rising from 0; None: chosen for MAX_CLASSES.
     """
     if not len(totals):
         return np.zeros(0, np.intp), ()
@@ -77,7 +78,8 @@ def detail_classes(
 
 
 def _series(totals: Ints, most: int) -> tuple[Ints, int]:
-    """The finest capacities of which these strands use this many or fewer, and how many."""
+    """The finest series of capacities of which these strands use at most `most`, and how many they
+    use."""
     present = np.flatnonzero(np.bincount(totals)[1:]) + 1
     for step in _STEPS:
         series = capacities(int(totals.max()), step)
@@ -88,16 +90,16 @@ def _series(totals: Ints, most: int) -> tuple[Ints, int]:
 
 
 def spread_capacities(totals: Ints) -> Ints:
-    """0, and MAX_MAP_CLASSES capacities or fewer, each for about as many strands.
+    """0, and at most MAX_MAP_CLASSES capacities, each for about the same number of strands.
 
-    Few draws then waste little; of strands whose pieces change it would mix up their order.
+    So few draws waste little. Not for strands whose pieces change, whose order would change too.
     """
     places = np.linspace(0.0, 1.0, MAX_MAP_CLASSES + 1)
     return np.unique([0, *np.quantile(totals, places[1:], method="higher")])
 
 
 def _slabs(depths: Floats, count: int) -> Ints:
-    """Which of this many equal parts of all depths each lies in, 0 the nearest."""
+    """The index of the depth slab of each strand, of `count` equal ones, 0 the nearest."""
     depths = np.nan_to_num(depths, nan=0.0, posinf=0.0, neginf=0.0)
     span = max(float(np.ptp(depths)), 1.0e-30)
     fraction = (depths - depths.min()) / span
@@ -106,7 +108,7 @@ def _slabs(depths: Floats, count: int) -> Ints:
 
 @lru_cache(maxsize=64)
 def capacities(most: int, step: int) -> Ints:
-    """0, and all capacities up to the first that holds `most` pieces, growing."""
+    """0, and all capacities up to the first of at least `most` pieces, rising."""
     series = [0]
     while series[-1] < most:
         series.append(series[-1] + max(series[-1] // step, 1))

@@ -1,17 +1,19 @@
-"""How finely each strand is drawn in one view, and which are: computed on the GPU.
+"""Detail of strands in one view, computed on the GPU: which are drawn, and in how many pieces.
 
-Two steps, with a texel a strand as strand_layout.strand_rows has them, but for the factors:
+Two steps. Except for the factors, textures have a texel per strand in the layout of
+strand_layout.strand_rows:
 
-    cv_points ----> detail ----> factors, totals             one invocation a strand
-    totals -------> numpy -----> order, classes              read back, 8 bytes a strand
+    cv_points ----> detail ----> factors, totals             one invocation per strand
+    totals -------> numpy -----> order, classes              read back, 8 bytes per strand
 
-    factors RGBA32F: the pieces of sixteen segments as bytes, see lib_detail_packing.glsl; those of
-                     a strand begin where its span says
-    totals  RG32F:   x pieces of the whole strand, 0 where it is not drawn; y its mean depth
-    order   RGBA32F: x a strand that is drawn, y its pieces, z factor of its width; those of a class
-                     lie side by side
+    factors RGBA32F: the pieces of sixteen segments as bytes, see lib_detail_packing.glsl; the span
+                     of a strand has the index of its first texel
+    totals  RG32F:   x pieces of the strand, 0 where it is not drawn; y its mean depth
+    order   RGBA32F: x a strand that is drawn, y its pieces, z factor on its width; consecutive for
+                     each class
 
-What moves in a view that was at rest before does not wait for the totals, see detail_slots.py.
+Hair that moves, in a view that was at rest before, does not wait for the totals, see
+detail_slots.py.
 """
 
 from __future__ import annotations
@@ -40,16 +42,16 @@ from .snapshot import Snapshot
 from .strand_layout import StrandLayout, from_strand_rows, strand_rows, strand_rows_size
 from .textures import UniformBlock, texture_from, texture_to_array
 
-#: How far a strand that covers pixels in part is drawn beyond its edge [pixels].
+#: How far strands are drawn beyond their edge, to reach partly covered pixels [pixels].
 EDGE = 0.75
 _BLOCKS = (("DetailView", "seen"), ("DetailSettings", "detail"))
 
 
 def detail_recipe(mode: str, culling: str, *, counted: bool = False) -> ShaderRecipe:
-    """The program of one choice of each: a software driver computes all branches of a shader.
+    """The program for one mode and one culling; a software driver would compute all branches.
 
     Args:
-        counted: what strands ask for as well, see detail_slots.py.
+        counted: the program also computes the demand of strands, see detail_slots.py.
     """
     recipe = ShaderRecipe(
         name=f"detail_{mode}_{culling}",
@@ -79,13 +81,13 @@ def detail_recipe(mode: str, culling: str, *, counted: bool = False) -> ShaderRe
 
 @dataclass(frozen=True)
 class DetailOrder:
-    """What is drawn of a groom in one view.
+    """The strands of a groom that are drawn in one view.
 
-    factors, order: textures as above; None where all segments have equally many pieces.
-    classes: the draws that it needs.
-    strands, pieces: how many are drawn; of what moves, how many were at rest.
-    subdivisions: pieces of each segment, where all have equally many; else 0.
-    slots: texture in place of the order, for what moves; one class is all of them.
+    factors, order: textures as above; None where all segments have the same number of pieces.
+    classes: the draws.
+    strands, pieces: numbers of those drawn; for moving hair, those of the last view at rest.
+    subdivisions: pieces of each segment, where all have the same number; else 0.
+    slots: texture used instead of the order for moving hair; there is one class of all slots.
     """
 
     factors: Any
@@ -98,7 +100,7 @@ class DetailOrder:
 
 
 class DetailPass:
-    """The detail of one groom in the view that was asked for last. Making one touches no GPU."""
+    """The detail of one groom in its last view. Creating one does not touch the GPU."""
 
     def __init__(self) -> None:
         self._asked: tuple[Any, ...]
@@ -119,16 +121,16 @@ class DetailPass:
         counted: bool = False,
         room: Callable[[int], int] | None = None,
     ) -> DetailOrder:
-        """What is to be drawn; computed only where something is new since the last time.
+        """The strands to draw; computed only when something changed since the last call.
 
         Args:
             points: the textures cv_points and strand_spans of the snapshot, see strand_pass.py.
-            serial: grows whenever one of them is another one or is written.
+            serial: grows whenever one of them is replaced or written.
             size: width and height of the final picture [pixels].
-            by_depth: near strands come first; else their order is no matter.
-            counted: what strands ask for is counted, so that they may move next.
-            room: for what moves, see `may_move`: makes room for this many fragments, and says how
-                many have some. The GPU is not waited for.
+            by_depth: near strands come first; else the order does not matter.
+            counted: also sum the demand of strands, so that the next frames can move.
+            room: for moving hair, see `may_move`: a function that makes room for this many
+                fragments and returns how many fit. The GPU is not waited for.
 
         Raises:
             ShaderError: the shader does not compile here.
@@ -164,11 +166,11 @@ class DetailPass:
         return order
 
     def may_move(self, snapshot: Snapshot) -> bool:
-        """Whether enough was counted of these strands to draw them while they move."""
+        """Whether the counts that drawing in motion needs are there for these strands."""
         return self._known is not None and self._known.is_of(snapshot.layout, snapshot.detail)
 
     def release(self) -> None:
-        """Let go of all that lies on the GPU; the next order is computed again."""
+        """Release everything on the GPU; the next call computes the order again."""
         self._blocks = {name: UniformBlock() for _, name in _BLOCKS}
         self._asked, self._order, self._known = (), None, None
         self._factors: Any = None
@@ -192,7 +194,7 @@ class DetailPass:
         thinned: Thinning,
         slot_pieces: int,
     ) -> None:
-        """The textures of factors and totals, and what strands ask for where that is counted."""
+        """Compute the textures of factors and totals, and the demand if the recipe counts it."""
         count = snapshot.strand_count
         self._fit(snapshot.layout)
         textures = {name: points[name] for name in ("cv_points", "strand_spans")}
@@ -216,13 +218,13 @@ class DetailPass:
             self._slots.count(self._totals, textures["strand_widths"], count, slot_pieces)
 
     def _read_totals(self, count: int) -> Floats:
-        """Pieces and depth of each strand (strand_count, 2); waits for the GPU."""
+        """Pieces and depth of each strand, (strand_count, 2). Waits for the GPU."""
         return from_strand_rows(texture_to_array(self._totals), count, 1).reshape(count, 2)
 
     def _counted(
         self, snapshot: Snapshot, totals: Floats, widths: Floats, scale: float
     ) -> KnownDetail:
-        """What is known for the next frames."""
+        """The counts at rest, for the next frames."""
         pieces = _drawn_pieces(totals, widths)
         slot_pieces, slots = best_slot_pieces(pieces)
         fragments = self._slots.demanded()[2]
@@ -233,14 +235,14 @@ class DetailPass:
         )
 
     def _moving(self, known: KnownDetail, slot_count: int, capacity: int) -> DetailOrder:
-        """As many slots as may be needed, filled by the GPU."""
+        """The order of moving hair: this many slots, filled by the GPU."""
         slots = self._slots.filled(slot_count, capacity)
         drawn = DetailClass(known.slot_pieces, 0, slot_count)
         counts = known.strands, known.pieces
         return DetailOrder(self._factors, None, (drawn,), *counts, slots=slots)
 
     def _widths_texture(self, snapshot: Snapshot, thinned: Thinning) -> Any:
-        """Factor of each strand's width, a texel a strand."""
+        """A texture of factors on strands' widths, a texel per strand."""
         made_of = snapshot.rank, thinned, snapshot.strand_count
         kept = self._strand_widths
         if not kept or kept[0] is not made_of[0] or kept[1:3] != made_of[1:]:
@@ -249,7 +251,7 @@ class DetailPass:
         return self._strand_widths[-1]
 
     def _fit(self, layout: StrandLayout) -> None:
-        """Textures that the shader writes, those of the last time if they fit."""
+        """Make the textures that the shader writes, or keep the last ones if their sizes fit."""
         sizes = layout.factor_size, strand_rows_size(layout.strand_count, 1)
         kept = self._factors, self._totals
         if None in kept or tuple((each.width, each.height) for each in kept) != sizes:
@@ -259,12 +261,12 @@ class DetailPass:
 
 @dataclass(frozen=True, eq=False)
 class GroomExtent:
-    """How large a groom is, which hardly changes as it moves: found once for its ranks and its
-    widths. An instance that is scaled has other widths.
+    """The size of a groom, which hardly changes as it moves: computed once for its ranks and
+    widths. A scaled instance has other widths.
 
-    rank, widths: those of the groom that this is of.
-    low, high: (3,) corners of all strands around its center [m].
-    total_length: of all strands [m]. radius: the mean [m].
+    rank, widths: the arrays of the groom for which it was computed.
+    low, high: (3,) corners of the box of all strands, relative to the mean of the roots [m].
+    total_length: of all strands [m]. radius: mean [m].
     """
 
     rank: Floats
@@ -287,7 +289,7 @@ class GroomExtent:
         return self.rank is snapshot.rank and self.widths is snapshot.radius
 
     def thinning(self, snapshot: Snapshot, view: PictureView) -> Thinning:
-        """How the groom is thinned out where it is now."""
+        """The thinning of the groom at its current place."""
         settings, roots = snapshot.strand_settings, snapshot.root_center
         return thinning(
             (self.low + roots, self.high + roots),
@@ -300,7 +302,7 @@ class GroomExtent:
 
 
 def _even_order(snapshot: Snapshot) -> DetailOrder:
-    """All strands in the pieces of the fixed mode, which no pass has to find out."""
+    """The order of all strands in the fixed mode, which needs no pass on the GPU."""
     subdivisions = snapshot.detail.subdivisions
     pieces = (snapshot.layout.cv_count - 1) * subdivisions
     drawn = DetailClass(pieces, 0, snapshot.strand_count)
@@ -309,14 +311,14 @@ def _even_order(snapshot: Snapshot) -> DetailOrder:
 
 
 def _widths(snapshot: Snapshot, thinned: Thinning) -> Floats:
-    """Factor of each strand's width (strand_count,); 0 where it is not drawn."""
+    """Factor on each strand's width, (strand_count,); 0 where it is not drawn."""
     if snapshot.rank is None or thinned == Thinning():
         return np.ones(snapshot.strand_count, np.float32)
     return width_factor(snapshot.rank, thinned.fraction, thinned.widening)
 
 
 def _ordered(factors: Any, totals: Floats, widths: Floats, by_depth: bool) -> DetailOrder:
-    """The strands that have pieces and a width, in classes."""
+    """The order of the strands that have pieces and a width, in classes."""
     pieces = _drawn_pieces(totals, widths)
     drawn, classes = detail_classes(pieces, totals[:, 1] if by_depth else None)
     order = np.zeros((len(drawn), 1, 4), np.float32)
@@ -326,12 +328,12 @@ def _ordered(factors: Any, totals: Floats, widths: Floats, by_depth: bool) -> De
 
 
 def _drawn_pieces(totals: Floats, widths: Floats) -> Ints:
-    """Of each strand, 0 where it is not drawn."""
+    """Pieces of each strand, (strand_count,); 0 where it is not drawn."""
     return np.where(widths > 0.0, totals[:, 0], 0.0).astype(np.int32)
 
 
 def _shades(snapshot: Snapshot, view: PictureView, widening: float) -> Floats:
-    """What the occluder spheres hide from view, (k, 12) as in lib_culling.glsl."""
+    """The regions that the occluder spheres hide, (k, 12) as in lib_culling.glsl."""
     if snapshot.detail.culling != "hidden" or snapshot.occluder_spheres is None:
         return np.zeros((0, 12), np.float32)
     settings = snapshot.strand_settings
@@ -356,8 +358,8 @@ def _view_values(view: PictureView, camera: Camera, snapshot: Snapshot, shades: 
 
 
 def _focal_length(view: PictureView) -> float:
-    """Pixels of a metre at a depth of 1, as clip space's w has it; of pixels that are not square
-    the geometric mean."""
+    """Pixels per metre at depth 1, measured as clip w; the geometric mean for pixels that are not
+    square."""
     across, upward = np.diag(view.projection)[:2] * view.half_size
     return float(np.sqrt(across * upward))
 

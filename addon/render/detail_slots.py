@@ -1,20 +1,20 @@
-"""Strands in slots of equally many pieces, which the GPU itself fills: what moves is drawn so.
+"""Slots with the same number of pieces, which the GPU assigns to moving strands.
 
-The gpu module has no indirect draw, and to read back how many strands are drawn in how many pieces
-waits for the GPU. So what moves is one draw of as many slots as the last count of its view
-suggests:
+The gpu module has no indirect draw, and reading back how many strands are drawn in how many pieces
+would wait for the GPU. So moving hair is drawn as one draw whose number of slots is estimated from
+the last count of its view:
 
-    detail ----> factors, totals, asked      one invocation a strand, as the others
-    asked -----> demand                      all added up
-    demand ----> slots                       in which of them each strand is
+    detail ----> factors, totals, asked      one invocation per strand, as in the next two steps
+    asked -----> demand                      sums
+    demand ----> slots                       the slots of each strand
 
-    asked  RGBA32F:       what a strand asks for, see detail.comp.glsl
-    demand R32UI 6 x 1:   what all do, see lib_detail_slots.glsl
-    slots  RGBA32UI:      likewise; what is not in use has no pieces
+    asked  RGBA32F:       the demand of each strand, see detail.comp.glsl
+    demand R32UI 6 x 1:   the sums, see lib_detail_slots.glsl
+    slots  RGBA32UI:      see lib_detail_slots.glsl; unused slots have no pieces
 
-Where more slots are wanted than there are, strands are drawn in fewer pieces, each of them from its
-root to its tip. Where more fragments are to be expected than the lists of pixels have room for, a
-part of the strands is drawn, and these are wider. So nothing vanishes that was not counted.
+If strands want more slots than there are, they are drawn in fewer pieces, still from root to tip.
+If more fragments are expected than fit into the lists of pixels, only a part of the strands is
+drawn, and wider. So a wrong estimate makes no hair vanish.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from .strand_layout import strand_rows_size
 
 #: numbers of `demand`
 DEMANDS = 6
-#: how many times more slots are made than are needed: a view that comes nearer soon needs more
+#: factor on the slots that are needed now, since a view that comes nearer soon needs more
 _SPARE = 1.5
 
 _TEXTURES = (("FLOAT_2D", "totals"), ("FLOAT_2D", "strand_widths"), ("FLOAT_2D", "asked"))
@@ -53,13 +53,13 @@ _SLOTS_RECIPE = replace(
 
 
 class DetailSlots:
-    """The slots of one groom in one view. Making one touches no GPU."""
+    """The slots of one groom in one view. Creating one does not touch the GPU."""
 
     def __init__(self) -> None:
         self.release()
 
     def release(self) -> None:
-        """Let go of all that lies on the GPU."""
+        """Release everything on the GPU."""
         self._asked: Any = None
         self._demand: Any = None
         self._slots: Any = None
@@ -67,18 +67,18 @@ class DetailSlots:
         self._integers: dict[str, int] = {}
 
     def asked(self, strand_count: int) -> Any:
-        """The texture into which the pass of detail writes what strands ask for."""
+        """The texture into which the detail pass writes the demand of strands."""
         size = strand_rows_size(strand_count, 1)
         if self._asked is None or (self._asked.width, self._asked.height) != size:
             self._asked = gpu_objects.texture(size, format="RGBA32F")
         return self._asked
 
     def count(self, totals: Any, strand_widths: Any, strand_count: int, slot_pieces: int) -> None:
-        """Add it up on the GPU.
+        """Sum the demand on the GPU.
 
         Args:
-            totals: see detail_pass.py. strand_widths: factor of each strand's width.
-            slot_pieces: pieces that a slot has.
+            totals: see detail_pass.py. strand_widths: factor on each strand's width.
+            slot_pieces: pieces of a slot.
         """
         if self._demand is None:
             self._demand = gpu_objects.texture((DEMANDS, 1), format="R32UI")
@@ -88,15 +88,15 @@ class DetailSlots:
         self._dispatch(_DEMAND_RECIPE, {"demand": self._demand}, self._integers)
 
     def demanded(self) -> list[int]:
-        """What was added up; waits for the GPU."""
+        """The sums. Waits for the GPU."""
         return [int(each) for each in np.asarray(self._demand.read()).ravel()]
 
     def filled(self, slot_count: int, capacity: int) -> Any:
-        """The texture of slots once all strands that were counted are in it.
+        """The texture of slots, filled with all counted strands.
 
         Args:
-            slot_count: how many may be in use.
-            capacity: fragments that have room.
+            slot_count: most slots that may be used.
+            capacity: number of fragments that fit.
         """
         if self._slots is None or self._slots.width * self._slots.height < slot_count:
             size = strand_rows_size(int(slot_count * _SPARE), 1)

@@ -1,13 +1,13 @@
-"""What colours become on the screen, as a table: Blender's view transform for our shaders.
+"""Blender's view transform as a look-up table for our shaders.
 
-The table is a cube over a shaper: log2(radiance / DARKEST + 1), scaled so that 1 lies on a texel,
-where the transform "Standard" has its kink; the last texel is 24 times white. Exposure is a factor
-before the table and gamma a power behind it, so that neither makes another table.
+The table is a cube with a shaper: log2(radiance / DARKEST + 1), scaled so that radiance 1, where
+the transform "Standard" has its kink, lies on a texel; the last texel is 24 times white. Exposure
+is a factor before the table and gamma a power after it, so neither needs another table.
 
-Measured against Blender's own pictures of 6,000 colours as lit hair has them, in 1/255: AgX is off
-by 0.08 in the mean and by 1.7 at worst, Standard by 0.1. Any colours at all, where AgX clips
-channels: 3.4 at worst, with its strongest looks 6. With 48 texels it was half as much again. False
-Color, which has steps, is blurred by a texel.
+Errors against Blender's own pictures of 6,000 colours of lit hair, in 1/255: AgX 0.08 on average
+and 1.7 at most, Standard 0.1. For arbitrary colours, where AgX clips channels, 3.4 at most, and 6
+with its strongest looks. With 48 texels errors were half as large again. False Color, which has
+steps, is blurred by a texel.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ from .shader_program import released_with_shaders
 from .textures import volume_from
 
 SIZE = 64
-#: the texel that is the radiance 1
+#: the texel of radiance 1
 _KNEE = 40
-#: below this radiance texels lie evenly, above it evenly in stops
+#: texels are spaced linearly in radiance below this, and in stops above it
 DARKEST = 2.0**-8
 _STOPS = float(np.log2(1.0 / DARKEST + 1.0)) * (SIZE - 1) / _KNEE
 
 
 def shaped(radiance: Floats) -> Floats:
-    """Where radiances lie along an axis of the table, in [0, 1].
+    """Places of radiances along an axis of the table, in [0, 1].
 
     Twin of `display_shaped` in gpu_shaders/lib_output.glsl.
     """
@@ -39,14 +39,14 @@ def shaped(radiance: Floats) -> Floats:
 
 
 def table_radiances() -> Floats:
-    """What a view transform is asked for, (SIZE, SIZE, SIZE, 3): blue, green, red axis."""
+    """The radiances at the texels, (SIZE, SIZE, SIZE, 3); axes: blue, green, red."""
     axis = DARKEST * (np.exp2(np.linspace(0.0, _STOPS, SIZE)) - 1.0)
     blue, green, red = np.meshgrid(axis, axis, axis, indexing="ij")
     return np.stack([red, green, blue], axis=-1).astype(np.float32)
 
 
 class DisplayTable:
-    """The code values of `table_radiances`, (SIZE, SIZE, SIZE, 3) in [0, 1]; keeps its texture."""
+    """The code values of `table_radiances`, (SIZE, SIZE, SIZE, 3) in [0, 1], with their texture."""
 
     def __init__(self, codes: Floats) -> None:
         if codes.shape != (SIZE, SIZE, SIZE, 3):
@@ -70,10 +70,10 @@ class DisplayTable:
 
 @dataclass(frozen=True, eq=False)
 class Display:
-    """How a view shows colours.
+    """The view transform of a view.
 
-    gain: factor of the radiance, 2 to the power of the exposure.
-    gamma: the code values are taken to the power of 1 / gamma.
+    gain: factor on the radiance, 2 to the power of the exposure.
+    gamma: code values are raised to 1 / gamma.
     """
 
     table: DisplayTable
@@ -82,12 +82,12 @@ class Display:
 
     @property
     def shaper(self) -> tuple[float, float, float, float]:
-        """For the shader: gain / DARKEST, 1 / stops, texels, 1 / gamma."""
+        """`display_shaper` of the shader: gain / DARKEST, 1 / stops, texels, 1 / gamma."""
         return self.gain / DARKEST, 1.0 / _STOPS, float(SIZE), 1.0 / self.gamma
 
     @property
     def feature(self) -> ShaderFeature:
-        """What a program that shows colours as a view does has."""
+        """The feature of programs that apply the view transform."""
         return ShaderFeature(
             name="display",
             textures={"display_table": ("FLOAT_3D", self.table.texture)},
@@ -98,8 +98,8 @@ class Display:
     def shown(self, radiance: Floats) -> Floats:
         """Code values of radiances (..., 3), in [0, 1].
 
-        Twin of `display_code` in gpu_shaders/lib_output.glsl, but for the eighth bit to which a
-        GPU may round the weights of its filter.
+        Twin of `display_code` in gpu_shaders/lib_output.glsl, except that a GPU may round filter
+        weights to eight bits.
         """
         place = shaped(self.gain * np.asarray(radiance, np.float64)) * (SIZE - 1)
         before = np.minimum(place.astype(int), SIZE - 2)

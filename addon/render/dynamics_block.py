@@ -1,11 +1,11 @@
-"""The numbers of a frame of dynamics as its shader reads them: a uniform block (struct_dynamics)
-and a table of moments, one row a substep.
+"""The inputs of a frame of dynamics for its shader: a uniform block (struct_dynamics) and a table
+of moments, one row per substep.
 
 A row of the table, texels of RGBA32F:
     0     x the substep's end s as a fraction of the frame, y s (s - 1); z and w fractions of the
-          style's displacement and curvature that swing damping gives to each CV. y and w are over
-          r (r + 1) with the ratio r of `trajectory.curvature`, or 0 where the style moves straight.
-          Where it goes on an arc, z and w are 0
+          style's displacement and curvature that swing damping gives to each CV. y and w are
+          divided by r (r + 1) with the ratio r of `trajectory.curvature`, or 0 where the style
+          moves straight; z and w are 0 where it moves along an arc
     1, 2  phases of the gusts' modes [rad]
     then  COLLIDER_TEXELS for each collider, see collider_textures.py
 """
@@ -30,17 +30,17 @@ from ..dynamics.trajectory import clamped_ratio
 from ..dynamics.wind import MODES
 from .shader_source import MOMENT_TEXELS
 
-#: Numbers before the vectors, and vectors before those of the CVs, of the uniform block.
+#: The uniform block: numbers before the vectors, and vectors before those of the CVs.
 _NUMBERS, _VECTORS = 16, 4 + 2 * MODES
 
 
 def spans_of(frame: Frame, first: int, count: int) -> Floats:
-    """Begin and end of some substeps as fractions of the frame, (count, 2) float64."""
+    """Begin and end of each substep as fractions of the frame, (count, 2) float64."""
     return np.array([frame.span(number) for number in range(first, first + count)]).reshape(-1, 2)
 
 
 def moments_of(frame: Frame, first: int, spans: Floats) -> Floats:
-    """The table's texels but those of colliders, (substep_count, MOMENT_TEXELS, 4) float32."""
+    """The table without colliders' texels, (substep_count, MOMENT_TEXELS, 4) float32."""
     table = np.zeros((len(spans), MOMENT_TEXELS, 4), np.float32)
     begin, end = spans.T
     table[:, 0, 0] = end
@@ -92,7 +92,7 @@ def block_of(
 
     Args:
         substep_count: of this dispatch.
-        speed_ratio: of its first substep to the one before it.
+        speed_ratio: length of its first substep over that of the one before it.
     """
     settings, dt = frame.settings, frame.dt
     values = np.zeros(_NUMBERS + 4 * _VECTORS + 8 * cv_count, np.float32)

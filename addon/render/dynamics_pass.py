@@ -1,39 +1,41 @@
-"""Dynamics on the GPU: `dynamics.step.advance` as a compute shader, one invocation a guide.
+"""Dynamics on the GPU: `dynamics.step.advance` as a compute shader, one invocation per guide.
 
 The guides stay on the GPU from frame to frame, in textures in the layout of
 strand_layout.strand_rows:
 
     positions      RGBA32F: xyz world [m], w the z of a substep earlier
-    previous_positions   RG32F, on Metal RGBA32F: x and y of a substep earlier; software drivers
-                   take time for each number that is written
-    pushes         RGBA32F: xyz [m] what other hair adds in a substep, see state.DynamicsState
-    bridged        RGBA32F: xyz world [m], at the frame's very end (step.grid_at_frame_end)
+    previous_positions   RG32F, on Metal RGBA32F: x and y of a substep earlier; with software
+                   drivers each number that is written costs time
+    pushes         RGBA32F: xyz [m] displacement by other hair in a substep, see state.DynamicsState
+    bridged        RGBA32F: xyz world [m], at the exact end of the frame (step.grid_at_frame_end)
     styles_earlier, styles_before, styles_now   RGBA32F: xyz world [m], see frame.Drive
-    rest_shapes    RGBA32F: of CV i xyz curvature [m] and w hold (style.LocalShape); of CV 0 x its
+    rest_shapes    RGBA32F: for CV i xyz curvature [m] and w hold (style.LocalShape); for CV 0 x its
                    twist CV
     rest_lengths   R32F: [m] to the next CV
     curl_rooms     R32F: of the segment to the next CV, see Rest.room; only where curls give
     held_cvs       R32F: 1 where a CV is held (held.Held), else 0
     force_fields   RGBA32F: see force_fields.ForceFields.table; only where any act
-    clearances     RGBA32F: of each CV, see clearance.GuideClearance; only where there are colliders
-    beside_root    RGBA32F: xyz [m], see step.displacement_beside_root; both only where CVs are held
-    painted_bands  RGBA32F: of each CV near and far factor, inverse pivot and pull (style.StyleBand)
-    painted_numbers   RGBA32F: of a guide's first CV x the speed that damping leaves, y the fraction
-                   of the air's, z and w by which those of the style and gravity are multiplied;
-                   of all others x bend; both only where something is painted
-    carriers       RGBA32F: four texels a place or motion, see rigid_path.Carry.texels. Row n: where
-                   the roots are as a whole at the end of substep n; what hair inherits in it. One
-                   more row: the same at the begin of the first and in the one before, where w of
-                   the origins are that moment s and s (s - 1) as in the table of moments; back from
-                   the frame's end, with w the fraction of its motion that a style gives which goes
-                   on an arc; back from one frame earlier; halfway, with w as s (s - 1)
-    fractions      R32F: of a guide's first CV how much of it is simulated, see blend.blended; only
-                   where not all is
+    clearances     RGBA32F: for each CV, see clearance.GuideClearance; only with colliders
+    beside_root    RGBA32F: xyz [m], see step.displacement_beside_root; this and held_cvs only where
+                   CVs are held
+    painted_bands  RGBA32F: for each CV near and far factor, inverse pivot, pull (style.StyleBand)
+    painted_numbers   RGBA32F: for a guide's first CV x fraction of the speed that damping leaves, y
+                   fraction of the air's speed, z and w factors on the style's motion and gravity;
+                   for all others x bend; this and painted_bands only where something is painted
+    carriers       RGBA32F: four texels for each rigid motion, see rigid_path.Carry.texels. Row n:
+                   the motion of all roots to the end of substep n; the motion that hair inherits in
+                   it. In the last row: the same to the begin of the first substep, with s of that
+                   moment in w of the origin; the same in the substep before, with s (s - 1) in w as
+                   in the table of moments; back from the frame's end, with w the fraction of its
+                   motion that a style on an arc gives; back from one frame earlier; to the middle
+                   of the frame, with w as s (s - 1)
+    fractions      R32F: for a guide's first CV the simulated fraction, see blend.blended; only
+                   where some guides are not fully simulated
 
-Limitations: a CV keeps two contacts at once, the most pressing ones, where numpy keeps one for each
-collider. A set of balls has each of its balls asked, numpy only near ones. Two forms that round
-differently drift apart where limp hair enlarges what rounding starts. Beyond 34 CVs Mesa's software
-driver is seven times slower for each CV, as it unrolls no loop that long.
+Limitations: a CV keeps the two most pressing contacts, where numpy keeps one for each collider. All
+balls of a set are tested, in numpy only near ones. GPU and CPU round differently, and in limp hair
+such differences grow until results drift apart. Beyond 34 CVs Mesa's software driver is seven times
+slower for each CV, since it does not unroll loops of that length.
 """
 
 from __future__ import annotations
@@ -64,18 +66,18 @@ from .shader_program import ShaderRecipe, program, released_with_shaders
 from .strand_layout import from_strand_rows, strand_rows
 from .textures import UniformBlock, texture_from, texture_to_array
 
-#: Substeps of one dispatch at most: operating systems reset a GPU that does not answer for seconds.
+#: Most substeps per dispatch: operating systems reset a GPU that does not respond for seconds.
 SUBSTEPS_AT_ONCE = 64
-#: Contacts that a CV may have at once.
+#: Most contacts of a CV at once.
 CONTACT_SLOTS = 2
 GROUP_SIZE = 32
-#: What a bridge's shader calls the rows of the turn about roots.
+#: Names in the bridge's shader of the rows of the rotation about roots.
 TURN_ROWS = ("turn_x", "turn_y", "turn_z")
 
 
 @lru_cache(maxsize=4)
 def bridge_recipe(*, held: bool, blended: bool, turned: bool = False) -> ShaderRecipe:
-    """The program of a frame's very end."""
+    """The program that moves guides from the last substep to the exact end of the frame."""
     names = ["positions", "styles_now", *["beside_root"] * held, *["fractions"] * blended]
     return ShaderRecipe(
         name="dynamics_bridge",
@@ -113,7 +115,7 @@ def dynamics_recipe(
     inherits: bool = False,
     pairs: str = "RG32F",
 ) -> ShaderRecipe:
-    """The program for guides of this many CVs, without what the scene does not need.
+    """The program for guides with this many CVs, with only the parts that the scene needs.
 
     Args:
         pairs: see capabilities.pair_format.
@@ -158,36 +160,36 @@ def dynamics_recipe(
 
 
 class DynamicsPass:
-    """Guides in motion on the GPU. Making one touches no GPU; the first frame does.
+    """Simulated guides on the GPU. Creating one does not touch the GPU; the first frame does.
 
     Args:
-        state: where the motion begins, or goes on.
-        colliders: where they are uploaded to; None: to a place of its own.
+        state: from which the motion starts or continues.
+        colliders: uploads shared with other passes; None: its own.
     """
 
     def __init__(self, state: DynamicsState, colliders: UploadedColliders | None = None) -> None:
-        self._state = state  # positions as they were given or read last, the clock as it is now
+        self._state = state  # positions as last given or read back; the current clock
         self._colliders = colliders or UploadedColliders()
         self.release()
         released_with_shaders(self)
 
     @property
     def guides(self) -> Any:
-        """Texture RGBA32F in the layout of strand_layout.strand_rows, xyz the CVs [m, world] at the
-        end of the last frame, w anything; None before the first frame."""
+        """Texture RGBA32F in the layout of strand_layout.strand_rows: xyz the CVs [m, world] at the
+        end of the last frame, w undefined; None before the first frame."""
         return self._textures.get("bridged" if self._is_bridged else "positions")
 
     def advance(self, drive: Drive, settings: DynamicsSettings, duration: float) -> None:
         """Move the guides by a frame of `duration` seconds, as step.advance does.
 
         Raises:
-            HairloomError: as step.advance; or a collider that the GPU cannot have.
+            HairloomError: as step.advance; or a collider that the GPU does not support.
             ShaderError: the shader does not compile here.
         """
         alone(self.steps(drive, settings, duration))
 
     def steps(self, drive: Drive, settings: DynamicsSettings, duration: float) -> Steps[None]:
-        """As `advance`, with other hair."""
+        """As `advance`, in steps between which other grooms' hair is exchanged."""
         state, dt, longest = self._state, 1.0 / settings.substep_rate, settings.longest_frame
         duration, count, left = due_substeps(state.time_left, duration, longest, dt)
         check_drive(state, drive, tuple(style for style, _ in self._styles))
@@ -212,13 +214,13 @@ class DynamicsPass:
         )
 
     def take_rest(self, rest: Rest) -> None:
-        """Guides have other shapes and lengths from the next frame on."""
+        """Use other rest shapes and lengths from the next frame on."""
         self._state = replace(self._state, rest=rest)
         if "positions" in self._textures:
             self._upload_rest(rest)
 
     def read(self) -> DynamicsState:
-        """The state as it is now, read back; step.advance and another pass can go on from it."""
+        """The current state, read back; step.advance or another pass can continue from it."""
         if "positions" in self._textures:
             position, previous = self._read_moving(1.0)
             push = as_rows(self._grid("pushes")[..., :3]) if self._is_pushed else None
@@ -226,10 +228,10 @@ class DynamicsPass:
         return self._state
 
     def _read_moving(self, speed_ratio: float) -> tuple[Floats, Floats]:
-        """Where the CVs are and were in the substep before, in the shape of the state's.
+        """Positions of the CVs now and a substep earlier, in the shape of the state's.
 
         Args:
-            speed_ratio: of a substep to the one before it.
+            speed_ratio: length of the coming substep over that of the one before it.
         """
         here, beside = (self._grid(name) for name in ("positions", "previous_positions"))
         position = as_rows(here[..., :3])
@@ -239,12 +241,12 @@ class DynamicsPass:
         return position, previous
 
     def release(self) -> None:
-        """Let go of all that lies on the GPU; goes on from the state that was read last."""
+        """Release everything on the GPU; the next frame continues from the last state read."""
         self._textures: dict[str, Any] = {}
         self._is_bridged = self._is_pushed = False
         self._block, self._among = UniformBlock(), AmongPass()
         self._colliders.release()
-        self._styles: list[tuple[Floats, Any]] = []  # those of the last frame, and their textures
+        self._styles: list[tuple[Floats, Any]] = []  # of the last frame, with their textures
         self._held: Held | None = None
         self._clearance: GuideClearance | None = None
         self._painted: PaintedFrame | None = None
@@ -263,7 +265,7 @@ class DynamicsPass:
         self._styles = [(style, self._style_texture(style)) for style in drive.targets]
         now, before, *earlier = (texture for _, texture in self._styles)
         textures |= {"styles_now": now, "styles_before": before}
-        textures["styles_earlier"] = earlier[0] if earlier else before  # which then counts nothing
+        textures["styles_earlier"] = earlier[0] if earlier else before  # then has no effect
         self._colliders.of(drive.colliders)
         if drive.held is not None and drive.held is not self._held:
             held = drive.held.rows.T[..., None]
@@ -296,7 +298,7 @@ class DynamicsPass:
         return next(known, None) or points_texture(style)
 
     def _steps(self, frame: Frame, count: int, speed_ratio: float) -> Steps[None]:
-        """All substeps of a frame; the first is `speed_ratio` as long as the one before it."""
+        """All substeps of a frame; the first is `speed_ratio` times as long as the one before."""
         self._is_pushed &= frame.among is not None
         if frame.painted is not self._painted:
             self._upload_painted(frame)
@@ -389,7 +391,7 @@ def points_texture(grid: Floats, lane: Floats | float = 0.0) -> Any:
     """Points (guide_count, cv_count, 3) as a texture in the layout of strand_rows.
 
     Args:
-        lane: (guide_count, cv_count) what goes with them in w.
+        lane: (guide_count, cv_count) values for w.
     """
     points = np.empty((*grid.shape[:2], 4), np.float32)
     for axis in range(3):  # one by one is three times faster than all three
@@ -415,7 +417,7 @@ def rest_shapes(rest: Rest) -> Floats:
 
 
 def of_segments(values: Floats) -> Floats:
-    """Values of segments (cv_count - 1, guide_count), each at its first CV,
+    """Values of segments (cv_count - 1, guide_count), each stored at its first CV,
     (guide_count, cv_count, 1)."""
     at_cvs = np.zeros((values.shape[1], values.shape[0] + 1, 1), np.float32)
     at_cvs[:, :-1, 0] = values.T

@@ -1,4 +1,4 @@
-"""Programs of a recipe and a list of features, so that what is declared is what is bound."""
+"""Programs of a recipe with features: what features declare is also what is bound."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from .textures import UniformBlock
 
 
 class UniformBlocks:
-    """Uniform buffers by name, each of which follows its values; made on first use."""
+    """Uniform buffers by name, each updated to its current values; made on first use."""
 
     def __init__(self) -> None:
         self._blocks: dict[str, UniformBlock] = {}
 
     def holding(self, name: str, values: Floats) -> Any:
-        """The buffer of this name with these std140 values in it."""
+        """The buffer of this name, with these std140 values."""
         return self._blocks.setdefault(name, UniformBlock()).holding(values)
 
 
 def recipe_with(recipe: ShaderRecipe, features: Iterable[ShaderFeature]) -> ShaderRecipe:
-    """The recipe with all that these features declare."""
+    """The recipe with all declarations of these features."""
     features = tuple(features)
     blocks = [(kind, name) for each in features for name, (kind, _) in each.blocks.items()]
     textures = [(kind, name) for each in features for name, (kind, _) in each.textures.items()]
@@ -56,14 +56,14 @@ def bound(
     integers: Mapping[str, int] | None = None,
     numbers: Mapping[str, Any] | None = None,
 ) -> ShaderProgram:
-    """The program of a recipe with these features, ready to draw.
+    """The program of a recipe with these features, bound and ready to draw.
 
     Args:
         blocks: buffers of the features' blocks.
-        images, textures, integers, numbers: what the recipe declares by itself.
+        images, textures, integers, numbers: values for the recipe's own declarations.
 
     Raises:
-        ShaderError: it does not compile here, or something is not both declared and given.
+        ShaderError: it does not compile here, or a declaration and a value do not match.
     """
     features = tuple(features)
     shader = program(recipe_with(recipe, features))

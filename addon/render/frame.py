@@ -1,7 +1,7 @@
-"""The recipe of one picture: meshes, strands, cards, and the samples averaged to pixels.
+"""Rendering of one picture: meshes, strands and cards, with samples averaged to pixels.
 
-A still is the mean of several, each lit by another point of every light that has a size, so that
-shadows have penumbras, and what one shadow map cannot resolve differs from picture to picture.
+A still is the mean of several pictures, each lit by another point of every light that has a size.
+So shadows have penumbras, and errors of single shadow maps average out.
 """
 
 from __future__ import annotations
@@ -68,11 +68,10 @@ def render_image(
         width, height: [pixels].
         samples: samples across a pixel: 3 draws 3 x 3 and averages them.
         background: premultiplied rgba.
-        passes, card_pass: those of an earlier call, so that what did not change is not uploaded
-            again.
+        passes, card_pass: those of an earlier call, so that only changes are uploaded.
 
     Raises:
-        ValueError: a size that no GPU can draw.
+        ValueError: a size that is not supported by every GPU.
         ShaderError: a shader does not compile here.
     """
     largest = max(width, height) * samples
@@ -91,7 +90,7 @@ def render_image(
             snapshot.all_casters, kept_lights(snapshot.lights), MeshShadowSettings()
         )
     with drawing_into(target):
-        # shafts ask alpha what stands before a light
+        # shafts use alpha to find what stands before a light
         target.clear(color=_NOTHING if snapshot.shafts.use_shafts else background, depth=1.0)
         mesh_pass.draw(snapshot, camera, *size, opacity=opacity, shadows=shadows)
         strand_pass.draw(snapshot, camera, *size, samples=samples)
@@ -115,11 +114,11 @@ def render_still(
     passes: tuple[MeshPass, StrandPass],
     card_pass: CardPass,
 ) -> Floats:
-    """As `render_image`, with soft shadows: each sample of a pixel is a picture of its own, in the
-    light of one point of each light.
+    """As `render_image`, with soft shadows: each sample of a pixel is a separate picture, lit by
+    one point of each light.
 
     Args:
-        center: (3,) [m], what the disks of lamps face.
+        center: (3,) [m], the point that the disks of lamps face.
 
     Raises:
         ValueError, ShaderError: as `render_image`.
@@ -141,7 +140,7 @@ def render_still(
 
 
 def _averaged(color: Any, samples: int) -> Any:
-    """A texture with `samples` x `samples` texels for each pixel, made one texel a pixel."""
+    """A texture with `samples` x `samples` texels per pixel, averaged to one texel per pixel."""
     width, height = color.width // samples, color.height // samples
     picture = gpu_objects.texture((width, height), format="RGBA32F")
     shader = program(_BOX_RECIPE)

@@ -1,13 +1,13 @@
-"""From which side hair is best seen, found from where it grows.
+"""The side from which hair is best seen, found from where it grows.
 
-A candidate direction of view is as good as much hair is seen from there, and as much of the face:
-what of the body is bare amidst the hair. Their product is largest between the front and the side of
-a head, in front of a patch of fur, and beside a beast with its head towards the eye. It is never
-large from the edge of a sheet, nor from behind a face.
+A candidate direction of view is rated by the product of how much hair and how much of the face is
+visible from there. The face is the bare part of the body amidst the hair. The product is largest
+between the front and the side of a head, in front of a patch of fur, and beside an animal with its
+head towards the eye. It is small from the edge of a sheet, and from behind a face.
 
-Where no face is seen, as of a beast in fur all over, the coat tells: it lies from the nose to the
-tail. Seen from behind it also shows the ends of its strands. These send little light to the eye,
-whatever lights there are in front, since light leaves a strand in a cone around it.
+If no face is visible, as on an animal with fur all over, the lie of the coat decides: it runs from
+the nose to the tail. From behind one would also see the ends of its strands, which look dark under
+lights in front, since light leaves a strand in a cone around it.
 
 Pure numpy: importable without gpu.
 """
@@ -24,42 +24,41 @@ from ..strands.nearest import nearest_points
 from ..strands.resample import resample
 from ..strands.triangles import areas_of
 
-#: directions around the hair that are tried
+#: number of directions around the hair that are tried
 _AROUND = 16
-#: how far above the hair the eye may be, as z of a direction of unit length across; and how good
-#: it is to look from there
+#: heights of the eye, as z of a direction whose horizontal part has unit length, and their ratings
 _HEIGHTS = ((0.16, 1.0), (0.4, 0.92), (0.7, 0.8), (1.7, 0.6))
-#: one looks at a head from no higher than this many of these, if this much of its face is seen from
-#: its own height
+#: only this many of the lowest heights are tried for a head, if at least this fraction of the whole
+#: face is visible from its own height
 _LOW_HEIGHTS, _LEVEL_FACE = 2, 0.5
-#: a three-quarter view is turned by this from the front [rad], and one nearly from the side, which
-#: is so much less good, by this: a crest and a braid are seen from there
+#: angles from the front [rad], with ratings: a three-quarter view, and one nearly from the side,
+#: which shows a crest or a braid
 _THREE_QUARTER, _ASIDE = float(np.radians(29.0)), float(np.radians(67.0))
 _TURNS = ((_THREE_QUARTER, 1.0), (_ASIDE, 0.74))
-#: what counts where no face is seen, as a fraction of the whole face
+#: added to the visible fraction of the face, so that views without a face count too
 _WITHOUT_FACE = 0.35
-#: a face is seen at least as large as this, as a fraction of the hair
+#: smallest visible area of a face, as a fraction of that of the hair
 _MIN_FACE = 0.02
-#: there is a front where the directions' goodness leans to one side by this fraction
+#: there is a front if the ratings of the directions lean to one side by this fraction
 _MIN_LEAN = 0.06
-#: and where the directions from which a face is seen do by this
+#: and if the directions from which the face is visible lean by this
 _MIN_FACE_LEAN = 0.2
-#: a coat lies to one side where its strands lead there by this fraction of their lengths; and it is
-#: seen against its lie if that shows this fraction of the hair that the other way round does
+#: smallest length of `_Seen.lie` for a coat to have a lie; and the smallest visible area against
+#: the lie, as a fraction of that from the opposite side
 _MIN_LIE, _MIN_AGAINST = 0.2, 0.5
-#: how much better the front in Blender's sense, towards -Y, is than the back, and one three-quarter
-#: view than the other, where all else is equal
+#: preference for Blender's front, towards -Y, over the back, and for one three-quarter view over
+#: the other, where all else is equal
 _PREFERENCE = 0.04
-#: bare is what is farther from all roots than these neighbours are apart, times this; and than
-#: this fraction of the roots' extent
+#: a place is bare if it is farther from all roots than this many spacings of the roots, and than
+#: this fraction of their extent
 _BARE_SPACINGS, _BARE_FRACTION = 4.0, 0.12
-#: a face lies within the roots' extent, times this
+#: a face lies within the roots' extent times this
 _FACE_REACH = 1.35
-#: and higher than this fraction of the roots
+#: and above this quantile of the roots' heights
 _LOWEST = 0.03
-#: points that stand for hair, roots and body, and cells across what is seen
+#: numbers of points that represent hair, roots and body, and of cells across the hair
 _HAIR, _ROOTS, _BODY, _CELLS = 20_000, 3_000, 16_000, 56
-#: and of each strand whose points are where its shape needs them
+#: points of each resampled strand, where points are not evenly spaced
 _CVS = 16
 
 
@@ -67,21 +66,21 @@ _CVS = 16
 class GoodSide:
     """Directions from the hair towards an eye, (3,) each.
 
-    front: level, of unit length. three_quarter: where it is best seen.
+    front: horizontal, of unit length. three_quarter: the best direction of view.
     """
 
     front: Floats
     three_quarter: Floats
 
     def turned(self, degrees: float, height: float) -> Floats:
-        """The front turned to the side on which the three-quarter view is; height: its z."""
+        """The front, turned towards the three-quarter view; height: z of the result."""
         left = self.front[0] * self.three_quarter[1] - self.front[1] * self.three_quarter[0]
         turned = _turned(self.front, np.copysign(np.radians(degrees), left))
         return np.array([turned[0], turned[1], height])
 
 
 def good_side(strands: StrandSet, body: Surface | None) -> GoodSide:
-    """Of hair at rest on its body, world space."""
+    """The best directions for hair at rest on its body, world space."""
     seen = _Seen.of(strands, body)
     angles = 2.0 * np.pi * np.arange(_AROUND) / _AROUND
     level = np.stack([np.sin(angles), -np.cos(angles), np.zeros(_AROUND)], axis=1)
@@ -90,9 +89,9 @@ def good_side(strands: StrandSet, body: Surface | None) -> GoodSide:
     is_face = whole[1] > _MIN_FACE * whole[0]
     good = _goodness(areas, whole) * (1.0 - 0.5 * _PREFERENCE * level[:, 1])
     front = None if is_face else seen.against_lie()
-    # beside a coat one looks at ends again
+    # from nearly beside a coat the ends of its strands are visible again
     turns = ((_THREE_QUARTER, 1.0),) if front is not None else _TURNS
-    # short hair is seen as well from behind, but a face only from its front
+    # short hair is visible from behind too, but a face only from the front
     if front is None:
         front = _leaning(good, level, _MIN_LEAN)
     face = _leaning(areas[:, 1], level, _MIN_FACE_LEAN) if is_face else None
@@ -117,14 +116,14 @@ def good_side(strands: StrandSet, body: Surface | None) -> GoodSide:
 
 
 def _leaning(good: Floats, level: Floats, least: float) -> Floats | None:
-    """The unit direction to which the directions' goodness leans; None where by too little."""
+    """The unit direction to which the ratings `good` of directions lean; None if by too little."""
     lean: Floats = (good[:, None] * level).sum(axis=0)
     length = np.linalg.norm(lean)
     return lean / length if length > least * good.sum() else None
 
 
 def _goodness(areas: Floats, whole: Floats) -> Floats:
-    """Of areas (n, 2) of hair and face, where the largest of them are `whole`."""
+    """Ratings (n,) of visible areas (n, 2) of hair and face, of which `whole` are the largest."""
     hair, face = areas[:, 0] / max(whole[0], 1.0), areas[:, 1] / max(whole[1], 1.0)
     return hair * (_WITHOUT_FACE + face) if whole[1] > _MIN_FACE * whole[0] else hair
 
@@ -141,10 +140,10 @@ def _turned(direction: Floats, angle: float) -> Floats:
 
 @dataclass(frozen=True)
 class _Seen:
-    """Points that stand for hair and body, as a picture of few cells sees them.
+    """Points that represent hair and body, for pictures of few cells.
 
-    points: (n, 3) [m] from the middle. kind: (n,) 0 body, 1 hair, 2 face. cell: its side [m].
-    lie: (3,) mean chord from root to tip, level, as a fraction of the strands' lengths.
+    points: (n, 3) [m] from the middle. kind: (n,) 0 body, 1 hair, 2 face. cell: side of a cell [m].
+    lie: (3,) horizontal sum of the chords from root to tip, over the sum of their lengths.
     """
 
     points: Floats
@@ -154,7 +153,7 @@ class _Seen:
 
     @classmethod
     def of(cls, strands: StrandSet, body: Surface | None) -> _Seen:
-        # without roots, which are seen from both sides of a sheet
+        # without roots, which are visible from both sides of a sheet
         grid = _evenly_spaced(strands).grid
         hair: Floats = _some(grid[:, 1:].reshape(-1, 3), _HAIR).astype(np.float64)
         middle = 0.5 * (hair.min(axis=0) + hair.max(axis=0))
@@ -169,8 +168,8 @@ class _Seen:
         return cls(np.concatenate(points) - middle, np.concatenate(kind), cell, _lie(grid))
 
     def against_lie(self) -> Floats | None:
-        """The level unit direction from which hair lies away; None where it lies to no side, or is
-        seen from the other side alone, as in front of a wall."""
+        """The horizontal unit direction towards an eye that looks along the lie of the hair; None
+        if it has no lie, or is visible mainly from the other side, as in front of a wall."""
         length = float(np.linalg.norm(self.lie))
         if length < _MIN_LIE:
             return None
@@ -179,7 +178,7 @@ class _Seen:
         return front if against > _MIN_AGAINST * along else None
 
     def areas(self, direction: Floats) -> tuple[int, int]:
-        """In how many cells hair is seen, and in how many the face."""
+        """The number of cells that show hair, and of those that show the face."""
         towards = direction / np.linalg.norm(direction)
         right = np.cross([0.0, 0.0, 1.0], towards)
         right /= np.linalg.norm(right)
@@ -192,7 +191,7 @@ class _Seen:
 
 
 def _evenly_spaced(strands: StrandSet) -> StrandSet:
-    """The same hair in points that say how long it is; few strands will do."""
+    """The hair with evenly spaced points; a sample of strands where it is resampled."""
     if strands.is_uniform:
         return strands
     few = strands.take(_some(np.arange(strands.strand_count), -(-_HAIR // _CVS)))
@@ -200,19 +199,19 @@ def _evenly_spaced(strands: StrandSet) -> StrandSet:
 
 
 def _lie(grid: Floats) -> Floats:
-    """Of strands (n, cv_count, 3): see `_Seen.lie`."""
+    """`_Seen.lie` of strands (n, cv_count, 3)."""
     chord = grid[:, -1].astype(np.float64) - grid[:, 0]
     whole = float(np.linalg.norm(chord, axis=1).sum())
     return chord.sum(axis=0) * (1.0, 1.0, 0.0) / max(whole, 1e-30)
 
 
 def _some[Array: (Floats, Ints)](points: Array, count: int) -> Array:
-    """Evenly many of the points, or all."""
+    """An even subset of at most `count` points."""
     return points[:: -(-len(points) // count)]
 
 
 def _places_on(body: Surface, middle: Floats, reach: float) -> Floats:
-    """Points (n, 3) spread over what of the body is within reach of the hair's middle."""
+    """Points (n, 3) spread over the part of the body within reach of the hair's middle."""
     corners = body.corners.astype(np.float64)
     near = np.linalg.norm(corners - middle, axis=2).min(axis=1) < reach
     corners = corners[near] if near.any() else corners
@@ -225,14 +224,14 @@ def _places_on(body: Surface, middle: Floats, reach: float) -> Floats:
 
 
 def _is_face(places: Floats, roots: Floats) -> Bools:
-    """Which of the places are bare, with the hair around them."""
+    """Which of the places are bare skin amidst the hair."""
     roots = _some(roots, _ROOTS)
     middle = roots.mean(axis=0)
     extent = float(np.linalg.norm(roots - middle, axis=1).max())
     spacing = float(np.median(nearest_points(roots, roots, 2)[1][:, -1]))
     reach = max(_BARE_SPACINGS * spacing, _BARE_FRACTION * extent)
     is_near = np.linalg.norm(places - middle, axis=1) < _FACE_REACH * extent
-    # a neck is seen from all sides and says nothing
+    # a neck is visible from all sides, so it does not help
     is_near &= places[:, 2] > np.quantile(roots[:, 2], _LOWEST)
     found = np.zeros(len(places), bool)
     found[is_near] = nearest_points(places[is_near], roots, 1)[1][:, 0] > reach

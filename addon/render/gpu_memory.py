@@ -1,19 +1,19 @@
-"""How many bytes of the GPU's memory Hairloom takes, and what gives way where they are too few.
+"""The budget of GPU memory, and what is reduced when it is exceeded.
 
-Blender does not tell scripts how much memory a GPU has. So there is a budget of a gibibyte, unless
-the preferences or HAIRLOOM_GPU_MEMORY [MB] in the environment say otherwise. Who makes something
-large asks here first. In this order they give way:
+Blender does not report to scripts how much memory a GPU has. So the budget is a gibibyte, unless
+the preferences or HAIRLOOM_GPU_MEMORY [MB] in the environment set another one. Code that allocates
+much queries this module first. These are reduced, in this order:
 
-    lists of strands    a quarter of the budget, less where other things need it: strands are drawn
-                        in more parts, which takes longer and looks the same (strand_layers.py)
-    soft shadows        none in a view at rest for which the budget has no room (soft_picture.py)
-    kept pictures       none while more than the budget is taken: a view at rest is drawn again
+    lists of strands    a quarter of the budget, less if other data needs it: strands are drawn in
+                        more parts, which takes longer and looks the same (strand_layers.py)
+    soft shadows        omitted in a view at rest if they exceed the budget (soft_picture.py)
+    kept pictures       omitted while the budget is exceeded: a view at rest is drawn again
                         (kept_picture.py)
-    shadow maps         half the budget for all grooms of a picture alike, a quarter for meshes:
-                        fewer texels (map_size.py), of which a note tells
+    shadow maps         half the budget, shared by all grooms of a picture, and a quarter for
+                        meshes: fewer texels (map_size.py), with a note to the artist
 
-What remains is the hair itself and the picture, for which there is no substitute: the panel says
-by how much they are beyond the budget.
+The hair itself and the picture cannot be reduced: the panel shows by how much they exceed the
+budget.
 """
 
 from __future__ import annotations
@@ -26,12 +26,11 @@ from contextvars import ContextVar
 from . import gpu_objects
 
 MEGABYTE = 1 << 20
-#: [MB] where nobody says otherwise
+#: default budget [MB]
 DEFAULT = 1024
-#: in the environment [MB]; stronger than what is chosen in Blender
+#: environment variable [MB]; overrides the choice in Blender
 MEMORY_VARIABLE = "HAIRLOOM_GPU_MEMORY"
-#: fractions of the budget: lists of strands at most, and at least; shadow maps of hair, and of
-#: meshes
+#: fractions of the budget: most and least for lists of strands; shadow maps of hair, and of meshes
 _LISTS, _MIN_LISTS, _MAPS, _MESH_MAPS = 1 / 4, 1 / 32, 1 / 2, 1 / 4
 
 _chosen = DEFAULT
@@ -39,13 +38,13 @@ _GROOMS: ContextVar[int] = ContextVar("grooms of the picture that is drawn", def
 
 
 def choose_budget(megabytes: int) -> None:
-    """From the next draw on."""
+    """Set the budget [MB], from the next draw on."""
     global _chosen
     _chosen = megabytes
 
 
 def budget() -> int:
-    """How many bytes may be taken."""
+    """The budget in bytes."""
     try:
         asked = int(os.environ.get(MEMORY_VARIABLE, ""))
     except ValueError:
@@ -55,7 +54,7 @@ def budget() -> int:
 
 @contextmanager
 def shared_by(groom_count: int) -> Iterator[None]:
-    """While a picture of this many grooms is drawn."""
+    """A context in which a picture of this many grooms is drawn."""
     token = _GROOMS.set(max(groom_count, 1))
     try:
         yield
@@ -64,24 +63,24 @@ def shared_by(groom_count: int) -> Iterator[None]:
 
 
 def maps_room() -> int:
-    """Bytes of the shadow maps of one groom. The same in every picture of as many grooms, whatever
-    else is there: what they show depends on it."""
+    """Bytes for the shadow maps of one groom. Depends only on the number of grooms in the picture,
+    not on other allocations, since it affects the picture."""
     return int(_MAPS * budget()) // _GROOMS.get()
 
 
 def mesh_maps_room() -> int:
-    """Bytes of the shadow maps of all meshes."""
+    """Bytes for the shadow maps of all meshes."""
     return int(_MESH_MAPS * budget())
 
 
 def lists_room(held: int) -> int:
-    """Bytes of the lists of strands, which hold this many now."""
+    """Bytes for the lists of strands, which take `held` bytes now."""
     gpu_objects.free_unused()
     left = budget() - (gpu_objects.bytes_in_use() - held)
     return int(min(_LISTS * budget(), max(left, _MIN_LISTS * budget())))
 
 
 def is_short(more: int = 0) -> bool:
-    """Whether more is taken than may be, with this many bytes more; in a thread that draws."""
+    """Whether the budget would be exceeded with this many more bytes. In a thread that draws."""
     gpu_objects.free_unused()
     return gpu_objects.bytes_in_use() + more > budget()

@@ -1,10 +1,10 @@
-"""Makes textures, buffers and framebuffers, each of which is freed by the thread that made it, and
-counts the bytes of all that are there.
+"""Creation of textures, buffers and framebuffers, with each freed in the thread that made it, and
+bytes in use counted.
 
-Blender on Vulkan destroys at once what a thread without a GPU context frees, even where commands
-that it has not run yet still use it, and then crashes. Python frees in any thread: a job drops the
-last reference, or the collector of reference cycles happens to run there. So each object is also
-referenced from here, until its own thread makes another one and finds it in no other use.
+On Vulkan, Blender immediately destroys an object that is freed in a thread without a GPU context,
+even if pending commands use it, and then crashes. Python may free objects in any thread: a job may
+drop the last reference, or the garbage collector may run there. So this module also references each
+object, until the object's own thread makes another one and finds it otherwise unused.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 
-#: bytes a texel; gpu.types.GPUTexture's own format comes first
+#: bytes per texel; the default format of gpu.types.GPUTexture comes first
 _TEXEL_BYTES = {
     "RGBA8": 4,
     "R8": 1,
@@ -39,9 +39,10 @@ _TEXEL_BYTES = {
 
 @dataclass
 class _Owned:
-    """What a thread has made, and how many bytes each takes.
+    """The objects that a thread has made, with their sizes [bytes].
 
-    lock: a render thread that ends gives what it has made to the main thread, which works on.
+    lock: a render thread that ends hands its objects over to the main thread, which may be using
+        its own.
     """
 
     objects: list[Any] = field(default_factory=list)
@@ -56,7 +57,7 @@ class _Owned:
     def free_unused(self) -> None:
         with self.lock:
             before = -1
-            while len(self.objects) != before:  # a batch goes before its vertices
+            while len(self.objects) != before:  # a batch must be freed before its vertices
                 before, counts = len(self.objects), _counts(self.objects)
                 used = [count > _UNUSED for count in counts]
                 for values in (self.objects, self.sizes):
@@ -74,13 +75,13 @@ def _counts(objects: list[Any]) -> list[int]:
     return [sys.getrefcount(each) for each in objects]
 
 
-#: of an object that only its list references, as this Python counts them
+#: reference count, in this Python, of an object that only its list references
 _UNUSED = _counts([object()])[0]
 
 
 @dataclass
 class _Kept:
-    """All that is there, by thread, and the most bytes that there were at once."""
+    """All objects, by thread, and the peak number of bytes."""
 
     owned: dict[int, _Owned] = field(default_factory=dict)
     peak: int = 0
@@ -94,21 +95,21 @@ _KEPT = _Kept()
 
 
 def free_unused() -> None:
-    """Free what this thread has made and nothing uses any more; in a thread that draws."""
+    """Free this thread's unused objects. In a thread that draws."""
     owned = _KEPT.owned.get(threading.get_ident())
     if owned is not None:
         owned.free_unused()
 
 
 def hand_over() -> None:
-    """At the end of a render: what is unused is freed, what is still in use belongs to the main
-    thread."""
+    """At the end of a render: free this thread's unused objects, and hand the others over to the
+    main thread."""
     main = threading.main_thread().ident
     assert main is not None
     if threading.get_ident() == main:
         free_unused()
         return
-    # reading waits for all that this thread's context has still to do
+    # reading waits until this thread's context has run all its commands
     texture((1, 1), format="R32F").read()
     free_unused()
     mine = _KEPT.owned.pop(threading.get_ident(), _Owned())
@@ -116,17 +117,17 @@ def hand_over() -> None:
 
 
 def forget() -> None:
-    """At exit: free what nothing uses, and keep nothing else alive."""
+    """At exit: drop all references held here, which frees unused objects."""
     _KEPT.owned.clear()
 
 
 def bytes_in_use() -> int:
-    """Of all textures and buffers that have not been freed; a driver may round them up."""
+    """Bytes of all textures and buffers that have not been freed; drivers may round them up."""
     return _KEPT.size
 
 
 def peak_bytes() -> int:
-    """The most that there were at once since Blender started."""
+    """The most bytes in use at once since Blender started."""
     return _KEPT.peak
 
 
@@ -139,12 +140,12 @@ def texture(size: tuple[int, ...], *, format: str, layers: int = 0, data: Any = 
 
 
 def framebuffer(**slots: Any) -> Any:
-    """As gpu.types.GPUFrameBuffer; it has no memory of its own."""
+    """As gpu.types.GPUFrameBuffer; it takes no memory of its own."""
     return _made("GPUFrameBuffer", 0, **slots)
 
 
 def vertex_buffer(values: Mapping[str, Floats]) -> Any:
-    """Attributes of vertices by name, (vertex_count, length) each."""
+    """A buffer of vertex attributes by name, (vertex_count, length) each."""
     layout = gpu.types.GPUVertFormat()
     # attr_fill checks neither dtype nor order
     arrays = {name: np.ascontiguousarray(array, np.float32) for name, array in values.items()}
@@ -158,7 +159,7 @@ def vertex_buffer(values: Mapping[str, Floats]) -> Any:
 
 
 def index_buffer(triangles: Ints) -> Any:
-    """Of triangles, (triangle_count, 3)."""
+    """An index buffer of triangles, (triangle_count, 3)."""
     corners = np.ascontiguousarray(triangles, np.int32)
     return _made("GPUIndexBuf", corners.nbytes, type="TRIS", seq=corners)
 
@@ -169,20 +170,20 @@ def uniform_buffer(values: Any) -> Any:
 
 
 def batch(kind: str, vertices: Any, indices: Any = None) -> Any:
-    """As gpu.types.GPUBatch; it has no memory of its own."""
+    """As gpu.types.GPUBatch; it takes no memory of its own."""
     options = {} if indices is None else {"elem": indices}
     return _made("GPUBatch", 0, type=kind, buf=vertices, **options)
 
 
 def bare_batch(kind: str, count: int) -> Any:
-    """Vertices with nothing in them, which their shader puts somewhere by their numbers."""
+    """A batch of vertices without data, which the shader places by gl_VertexID."""
     layout = gpu.types.GPUVertFormat()
     layout.attr_add(id="unused", comp_type="F32", len=1, fetch_mode="FLOAT")
     return batch(kind, _made("GPUVertBuf", 4 * count, layout, count))
 
 
 def triangle() -> Any:
-    """By which whole_target.vert.glsl covers a target."""
+    """The batch with which whole_target.vert.glsl covers a target."""
     return bare_batch("TRIS", 3)
 
 

@@ -1,4 +1,4 @@
-"""One groom on the GPU: its strands and cards, their shadow, and that of others on them."""
+"""One groom on the GPU: its strands and cards, and the shadows on them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .strand_pass import StrandPass
 
 
 class GroomPass:
-    """Making one touches no GPU."""
+    """The passes of one groom. Creating one does not touch the GPU."""
 
     def __init__(self) -> None:
         self.strands, self.cards = StrandPass(), CardPass()
@@ -20,8 +20,8 @@ class GroomPass:
     def maps(
         self, snapshot: Snapshot, *, view: Hashable = None, is_turning: bool = False
     ) -> OpacityMaps | None:
-        """How much of this hair lies between each light and every place: of its strands, and of its
-        cards where it has none. None where it throws no shadow.
+        """The opacity maps of the groom's strands, or of its cards where it has no strands. None if
+        it casts no shadow.
 
         Args:
             view, is_turning: as in StrandPass.opacity.
@@ -32,10 +32,10 @@ class GroomPass:
     def others(
         self, key: Hashable, snapshot: Snapshot, maps: Mapping[Hashable, OpacityMaps | None]
     ) -> list[OpacityMaps]:
-        """The maps of all other grooms whose shadow may fall on these strands.
+        """The maps of all other grooms that may cast shadows on these strands.
 
         Args:
-            key: of this groom among the maps, which are of the same lights in the same order.
+            key: of this groom in `maps`; all maps are of the same lights in the same order.
         """
         others = [each for other, each in maps.items() if other != key and each is not None]
         if not others or not snapshot.strand_count:
@@ -45,5 +45,5 @@ class GroomPass:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What the artist should know of the last draw, each with its remedy."""
+        """Notes to the artist on the last draw, each with its remedy."""
         return (*self.strands.statistics.notes, *self.cards.notes)

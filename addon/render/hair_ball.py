@@ -8,13 +8,14 @@ from .snapshot import Snapshot
 
 
 class HairBall:
-    """Keeps what it has found for one array of points, since that takes time."""
+    """Computes the sphere, and caches the result for one array of points."""
 
     def __init__(self) -> None:
         self._extent: tuple[Floats | None, Ball | float] = (None, 0.0)
 
     def of(self, snapshot: Snapshot) -> Ball:
-        """Around all strands; of those on the GPU around all places that they can get to."""
+        """The sphere around all strands; for strands on the GPU, around all places that they can
+        reach."""
         device = snapshot.device_points
         kept, found = self._extent
         if kept is not snapshot.points or isinstance(found, float) != (device is not None):

@@ -1,4 +1,4 @@
-"""What hair throws on meshes beside that of the groom whose maps they are drawn with."""
+"""Shadows on meshes from grooms other than the one with whose maps they are drawn."""
 
 from __future__ import annotations
 
@@ -18,9 +18,10 @@ _NOWHERE = (0.0, 0.0, 0.0, -1.0)
 
 
 class HairOnMeshes:
-    """Asks the maps of all grooms at the nearest mesh of each pixel; making one touches no GPU.
+    """Looks up the maps of all grooms at the nearest mesh of each pixel.
 
-    Meshes that are blended are left out: others are seen through them.
+    Creating one does not touch the GPU. Blended meshes are skipped, since others are visible
+    through them.
     """
 
     def __init__(self) -> None:
@@ -40,10 +41,10 @@ class HairOnMeshes:
         camera: Camera,
         size: tuple[int, int],
     ) -> Any:
-        """What MeshPass.draw takes as `between`; None where there is but one groom.
+        """The argument `between` of MeshPass.draw; None if there is only one groom.
 
         Args:
-            groups: meshes by the index of the maps that they are drawn with, in that order.
+            groups: meshes by the index, in `maps`, of the maps with which they are drawn.
         """
         if len(maps) < 2:
             return None
@@ -54,7 +55,7 @@ class HairOnMeshes:
 
 
 def _placed(groups: Mapping[int, Sequence[MeshSnapshot]], sample: int) -> list[Placed]:
-    """With the same holes as they are drawn with."""
+    """The meshes that are not blended, with the same holes as when they are drawn."""
     found = []
     for index, meshes in groups.items():
         solid = [each for each in meshes if len(each.surface.triangles)]

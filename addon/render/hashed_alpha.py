@@ -1,14 +1,14 @@
-"""By what chance hashed meshes and strands are left out in each of the samples of a picture.
+"""Hashed alpha: thresholds by which meshes and strands are discarded in the samples of a picture.
 
-A pixel's pattern is shifted from sample to sample along a sequence that fills [0, 1) evenly (Halton
-1960), so that the mean of the samples is as dense as alpha says. Meshes that lie before each other,
-and the two sides of one, have sequences of their own: else they would be left out together, and
-more would be seen behind them than is let through.
+For meshes, a pixel's threshold is shifted from sample to sample along a sequence that fills [0, 1)
+evenly (Halton 1960), so that the mean of the samples has the density of alpha. Meshes that overlap,
+and the two sides of a mesh, have different sequences: otherwise they would be discarded together,
+and too much would be visible behind them.
 
-Strands are too many for that. All have one sequence, the bits of the samples' numbers in reverse,
-which each shuffles and scrambles in each pixel (Owen 1995, by the hash of Laine and Karras 2011, as
-Burley gives it in 2020, "Practical Hash-based Owen Scrambling"). So a strand alone is as dense as
-alpha says within a sample's weight, and strands before each other are left out independently.
+Strands are too many for that. They share one sequence, the bit-reversed sample indices, which is
+shuffled and scrambled for each strand and pixel (Owen 1995, by the hash of Laine and Karras 2011 as
+in Burley 2020, "Practical Hash-based Owen Scrambling"). So the density of a single strand is that
+of alpha within one sample's weight, and overlapping strands are discarded independently.
 
 Pure numpy: importable without gpu.
 """
@@ -20,18 +20,18 @@ import numpy as np
 from ..arrays import Floats, Ints
 from .halton import radical_inverse
 
-#: of the hash: even numbers, so that lower bits alone decide about a bit
+#: factors of the hash: even numbers, so that a bit only depends on lower bits
 _MIXING = (0x6C50B47C, 0xB82F1E52, 0xC7AFE638, 0x8D22F6E6)
-#: of the sequences, which are independent of each other since these are primes
+#: bases of the sequences: primes, so that the sequences are independent
 _BASES = (2, 3, 5, 7, 11, 13, 17, 19)
 
 
 def shifts(number: int, sample: int) -> tuple[float, float]:
-    """Of a mesh's front and back, in [0, 1); 0 at the first sample.
+    """The shifts of a mesh's front and back, in [0, 1); 0 at the first sample.
 
     Args:
-        number: of the mesh; four have sequences of their own.
-        sample: number of the sample, from 0.
+        number: of the mesh; numbers that differ by four share sequences.
+        sample: index of the sample, from 0.
     """
     first = 2 * number % len(_BASES)
     front, back = (radical_inverse(np.array([sample]), _BASES[first + k]) for k in (0, 1))
@@ -39,8 +39,8 @@ def shifts(number: int, sample: int) -> tuple[float, float]:
 
 
 def scrambled(place: Ints, seed: Ints, other_seed: Ints) -> Floats:
-    """Of a sequence that fills [0, 1) evenly, the numbers at these places. Each pair of seeds has
-    an order of its own. 24 bits, exact in float32.
+    """Elements `place` of a sequence that fills [0, 1) evenly. Each pair of seeds has its own order
+    of the sequence. 24 bits, exact in float32.
     """
     shuffled = _reversed_bits(_mixed_upwards(_reversed_bits(np.asarray(place, np.uint32)), seed))
     digits = _reversed_bits(_mixed_upwards(shuffled, other_seed))
@@ -48,7 +48,7 @@ def scrambled(place: Ints, seed: Ints, other_seed: Ints) -> Floats:
 
 
 def _mixed_upwards(value: Ints, seed: Ints) -> Ints:
-    """Each bit flipped or not by those below it."""
+    """Flips each bit, or not, depending on the bits below it."""
     with np.errstate(over="ignore"):  # uint32 wraps, as in GLSL
         value = value + np.asarray(seed, np.uint32)
         for factor in _MIXING:

@@ -1,14 +1,14 @@
-"""Strands by hashed alpha: of each pixel the nearest strand that chance lets stay, shaded last.
+"""Strands with hashed alpha: the nearest fragment that is not discarded in each pixel, shaded last.
 
-Chance has two turns a draw, each with textures of its own:
+Each draw takes two such samples, called turns, with their own textures:
 
     hair   RGBA32F:  x the strand, y the place along it, z the depth; w 0 without hair
     light  RGBA32F:  the colour, and the depth
 
-That is 68 bytes a pixel with a depth buffer, whatever the strands, and neither lists nor atomics:
-it is what drivers without them draw in place of layers. A sample is noisy. The mean of samples
-comes to layers, since each leaves out another part (hashed_alpha.py). All grooms and all views
-share the textures.
+With a depth buffer that is 68 bytes per pixel for any number of strands. It needs neither lists nor
+atomics, so it is the fallback for layers on drivers without these. One sample is noisy; the mean of
+samples converges to layers, since each discards other fragments (hashed_alpha.py). All grooms and
+all views share the textures.
 """
 
 from __future__ import annotations
@@ -36,14 +36,14 @@ _SHOWN_RECIPE = ShaderRecipe(
 
 
 class HashedStrands:
-    """What a draw of hashed strands needs on the GPU; making one touches no GPU."""
+    """The textures for drawing hashed strands. Creating one does not touch the GPU."""
 
     def __init__(self) -> None:
         self.release()
         released_with_shaders(self)
 
     def release(self) -> None:
-        """Let go of all that lies on the GPU; the next draw makes it again."""
+        """Release everything on the GPU; the next draw makes it again."""
         self._size = 0, 0
         self._hair: tuple[Any, ...] = ()
         self._light: tuple[Any, ...] = ()
@@ -51,7 +51,7 @@ class HashedStrands:
         self._triangle: Any = None
 
     def draw(self, drawing: StrandDrawing) -> None:
-        """Find who is seen, shade it, and put it over what is in the bound framebuffer.
+        """Find the visible fragments, shade them, and blend them over the bound framebuffer.
 
         Depth is written where both turns have found hair.
 
@@ -60,7 +60,7 @@ class HashedStrands:
         """
         left, bottom, width, height = gpu.state.viewport_get()
         self._fit((width, height))
-        # renders draw in a context of their own, which shares textures and no framebuffers
+        # renders draw in their own context, which shares textures but not framebuffers
         for turn, hair in enumerate(self._hair):
             target = gpu_objects.framebuffer(depth_slot=self._depth, color_slots=(hair,))
             with drawing_into(target), drawing_state():
@@ -86,7 +86,8 @@ class HashedStrands:
         self._triangle.draw(shader.shader)
 
     def _fit(self, size: tuple[int, int]) -> None:
-        """Targets for this many pixels; the old ones, where they are not far too large."""
+        """Make textures for this many pixels, or keep the old ones if they are not far too
+        large."""
         kept = self._size
         is_held = kept[0] >= size[0] and kept[1] >= size[1]
         if is_held and kept[0] * kept[1] <= 4 * max(size[0] * size[1], 1):
@@ -99,5 +100,5 @@ class HashedStrands:
             self._triangle = gpu_objects.triangle()
 
 
-#: of all grooms and views
+#: shared by all grooms and views
 HASHED_STRANDS = HashedStrands()

@@ -1,9 +1,9 @@
-"""Strands brought to where ties and surfaces hold them, on the GPU: `refine.hold.hold` behind
-RidePass, over textures in the layouts of `strand_layout`.
+"""Moves strands to where ties and surfaces hold them, on the GPU: `refine.hold.hold` after
+RidePass, on textures in the layouts of `strand_layout`.
 
     rest_points   RGBA32F: xyz position at rest [m, world]
-    strand_spans  RGBA32F: where the points of each strand lie, see strand_layout.StrandLayout
-    held_strands  RGBA32F: x a strand that is held, y its first hold, z how many it has
+    strand_spans  RGBA32F: the points of each strand, see strand_layout.StrandLayout
+    held_strands  RGBA32F: x a strand that is held, y its first hold, z number of its holds
     holds         RG32F: x place in CVs, y anchor
     anchors       RGBA32F: three texels each, rows of the matrix from world at rest to world now
     cv_points     RGBA32F: xyz position now [m, world], changed in place
@@ -38,7 +38,7 @@ HOLD_RECIPE = ShaderRecipe(
 
 
 class HoldPass:
-    """The holds of one groom on the GPU. Making one touches no GPU; `hold` does.
+    """The holds of one groom on the GPU. Creating one does not touch the GPU; `hold` does.
 
     Args:
         holds: of all strands.
@@ -50,12 +50,12 @@ class HoldPass:
         self.release()
 
     def release(self) -> None:
-        """Let go of all that lies on the GPU."""
+        """Release everything on the GPU."""
         self._known: Holds | None = None
         self._textures: dict[str, Any] = {}
 
     def hold(self, cv_points: Any, rest_points: Any, anchors: Floats | None) -> None:
-        """Bring the strands in a texture to where they are held.
+        """Move the strands in a texture to where they are held.
 
         Args:
             anchors: see `groom.holds.anchors_of`; None: nothing is held.

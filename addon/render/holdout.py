@@ -1,4 +1,4 @@
-"""Hair that is a hole in the picture, as strong as it covers what is behind it."""
+"""Hair as a hole in the picture, weighted by its coverage."""
 
 from __future__ import annotations
 
@@ -20,7 +20,10 @@ _NOTHING = (0.0, 0.0, 0.0, 0.0)
 
 
 class Holdout:
-    """Draws beside a target and cuts that out of it; making one touches no GPU."""
+    """Draws into a separate texture and cuts the result out of a target.
+
+    Creating one does not touch the GPU.
+    """
 
     def __init__(self) -> None:
         self.release()
@@ -33,8 +36,8 @@ class Holdout:
         self._framebuffer: Any = None
 
     def cut(self, target: Target, draw: Callable[[], None]) -> None:
-        """Take what `draw` draws, hidden by all that is in the target and hiding what comes after
-        it, out of the target's colours and alpha.
+        """Cut what `draw` draws out of the target's colour and alpha. It is depth-tested against
+        the target, and writes its depth.
         """
         if self._depth is not target.depth:
             size = target.color.width, target.color.height

@@ -1,4 +1,4 @@
-"""The order of what fragments store into images, and of what reads it."""
+"""Synchronization of image stores in fragment shaders with later reads."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ _RECIPE = ShaderRecipe(
 
 
 def finish_stores() -> None:
-    """What has been drawn so far has stored all that comes after it reads."""
+    """Make the image stores of all draws so far visible to all later reads."""
     done = program(_RECIPE)
     done.bind()
     done.dispatch(1)

@@ -1,9 +1,8 @@
-"""How much hair of other grooms lies between the lights and places, which have maps of their own.
+"""Shadows between grooms: the optical depth of other grooms' hair between the lights and places.
 
-A groom's maps hold its own strands. What shades a strand or a mesh is more: at each CV of its own
-hair, and at each pixel of meshes, what all other grooms have in the way of the first lights is
-added up in a texture, a channel a light. CVs are close enough to each other for a shadow that comes
-from elsewhere.
+A groom's maps only hold its own strands. So the optical depth of all other grooms for the first
+lights is summed in a texture, a channel per light, at each CV of the groom's hair or at each pixel
+of meshes. For a shadow from other hair, CVs are dense enough.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from .opacity_maps import OpacityMaps
 from .shader_program import ShaderRecipe
 from .shader_source import OTHER_TAU_LIGHTS
 
-#: of a place that has no groom of its own
+#: number of a groom that no place has
 NOBODY = -5
 
 
@@ -37,17 +36,17 @@ _RECIPE = ShaderRecipe(
 
 
 class InterGroomShadow:
-    """Keeps what it has found for one texture of places; making one touches no GPU."""
+    """The result for one texture of places. Creating one does not touch the GPU."""
 
     def __init__(self) -> None:
         self.release()
 
     def release(self) -> None:
-        """Let go of all that lies on the GPU; the next call makes it again."""
+        """Release everything on the GPU; the next call makes it again."""
         self._blocks: list[UniformBlocks] = []
         self._found: Any = None
         self._made_of: tuple[Any, ...] = ()
-        self._kept: Sequence[tuple[int, OpacityMaps]] = ()  # so that their ids are of nothing else
+        self._kept: Sequence[tuple[int, OpacityMaps]] = ()  # so that their ids are not reused
 
     def at(
         self,
@@ -56,13 +55,13 @@ class InterGroomShadow:
         grooms: Sequence[tuple[int, OpacityMaps]],
         light_count: int,
     ) -> Any:
-        """A texture as large as that of the places, RGBA32F: the optical depth of each light.
+        """An RGBA32F texture of the size of `places`: the optical depth for each light.
 
         Args:
-            places: RGBA32F, xyz [m, world]; w the number of the groom whose hair does not count;
-                negative where there is nothing.
-            serial: another number whenever the places are others; None: they always are.
-            grooms: number and maps of each groom that may be in the way.
+            places: RGBA32F, xyz [m, world]; w the number of the groom whose hair is skipped;
+                negative where there is no place.
+            serial: changes whenever the places change; None: they always do.
+            grooms: number and maps of each groom that may cast a shadow.
         """
         made_of = (serial, light_count, *((number, id(maps)) for number, maps in grooms))
         size = places.width, places.height
@@ -90,7 +89,8 @@ class InterGroomShadow:
 
 
 def may_shade(maps: OpacityMaps, ball: Ball) -> bool:
-    """Whether hair with these maps may throw a shadow on anything in a ball; all light counts.
+    """Whether hair with these maps may cast a shadow on anything in a ball, for any of the first
+    lights.
 
     Pure numpy.
     """
@@ -102,7 +102,7 @@ def may_shade(maps: OpacityMaps, ball: Ball) -> bool:
 
 
 def _reaches(x: Floats, y: Floats, w: Floats, depth: Floats, ball: Ball) -> bool:
-    """Whether the ball, or what lies nearer to the light, is in a map."""
+    """Whether any of the ball is in a map, at or behind the depth at which the map begins."""
     center = np.append(ball.center, 1.0)
     if depth @ center + ball.radius * np.linalg.norm(depth[:3]) < 0.0:
         return False

@@ -1,11 +1,11 @@
-"""The picture of one view's strands, kept so that a view in which nothing changed shows it again.
+"""The picture of one view's strands, kept to be shown again while nothing changes.
 
-    color RGBA16F: premultiplied, as it goes into the view; for sums RGBA32F, see soft_picture.py
-    depth DEPTH32F: of the nearest hair that hides more than half of what lies behind it; 1 is none
+    color RGBA16F: premultiplied, encoded for the view; for sums RGBA32F, see soft_picture.py
+    depth DEPTH32F: of the nearest hair that hides more than half of what lies behind it; 1 for none
 
-That is 12 bytes a pixel. Strands are drawn into the view, depth-tested against what is in it, and
-what they add is shown into this picture as well: so it holds for as long as what is in the view has
-the same depths. Whoever keeps it says by marks what it was drawn of.
+That is 12 bytes per pixel. Strands are drawn into the view, depth-tested against it, and their
+contribution is drawn into this picture as well. So the picture is valid as long as the depths of
+the rest of the view stay the same. Its owner sets marks for the data from which it was drawn.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ _SHOWN_RECIPE = ShaderRecipe(
 
 
 class KeptPicture:
-    """Making one touches no GPU.
+    """A picture of strands with depth. Creating one does not touch the GPU.
 
-    marks: what it is of, see `is_of`; empty: nothing that may be shown again.
-    color, depth: the textures above, once it is begun.
+    marks: the data from which it was drawn, see `is_of`; empty: it must not be shown again.
+    color, depth: the textures above, after `begin`.
 
     Args:
-        color_format: of its colours.
+        color_format: of `color`.
     """
 
     def __init__(self, color_format: str = "RGBA16F") -> None:
@@ -47,7 +47,7 @@ class KeptPicture:
         released_with_shaders(self)
 
     def release(self) -> None:
-        """Let go of all that lies on the GPU; the picture is gone."""
+        """Release everything on the GPU; the picture is lost."""
         self.marks: tuple[Any, ...] = ()
         self.color: Any = None
         self.depth: Any = None
@@ -55,15 +55,15 @@ class KeptPicture:
         self._triangle: Any = None
 
     def forget(self) -> None:
-        """It is not to be shown again; its textures stay."""
+        """Clear the marks, so that it is not shown again; its textures stay."""
         self.marks = ()
 
     def is_of(self, marks: tuple[Any, ...]) -> bool:
-        """Whether it was drawn of the same objects and of equal numbers."""
+        """Whether it was drawn from the same objects and equal numbers."""
         return are_same_marks(self.marks, marks)
 
     def begin(self) -> None:
-        """An empty picture, as large as the viewport reaches."""
+        """Clear the picture, resized to cover the viewport."""
         left, bottom, width, height = gpu.state.viewport_get()
         size = left + width, bottom + height
         self.forget()
@@ -76,16 +76,16 @@ class KeptPicture:
 
     @contextmanager
     def drawing(self) -> Iterator[None]:
-        """Draw into it, where the bound framebuffer's viewport is."""
+        """A context in which draws go into it, at the viewport of the bound framebuffer."""
         viewport = gpu.state.viewport_get()
-        # renders draw in a context of their own, which shares textures and no framebuffers
+        # renders draw in their own context, which shares textures but not framebuffers
         self._target = gpu_objects.framebuffer(depth_slot=self.depth, color_slots=(self.color,))
         with drawing_into(self._target):
             gpu.state.viewport_set(*viewport)
             yield
 
     def show(self) -> None:
-        """Put it over what is in the bound framebuffer, as the strands were."""
+        """Draw it over the bound framebuffer, as the strands were drawn."""
         with drawing_state(depth_test="NONE", depth_write=False, blend="ALPHA_PREMULT"):
             self._draw(writes_depth=False)
         with drawing_state(depth_test="ALWAYS"):
@@ -102,7 +102,7 @@ class KeptPicture:
 
 
 def are_same_marks(marks: tuple[Any, ...], others: tuple[Any, ...]) -> bool:
-    """Whether both are of the same objects and of equal numbers; no marks are of nothing."""
+    """Whether both hold the same objects and equal numbers; False if there are no marks."""
     return (
         bool(marks)
         and len(marks) == len(others)

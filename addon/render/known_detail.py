@@ -1,4 +1,4 @@
-"""What was counted of strands at rest, from which the next frames guess how much they need.
+"""Counts of strands at rest, from which the next frames estimate how much they need.
 
 Pure numpy: importable without gpu.
 """
@@ -13,19 +13,19 @@ from ..arrays import Ints
 from ..refine.settings import DetailSettings
 from .strand_layout import StrandLayout
 
-#: pieces that a slot may have, and what a slot costs beside its stations, in stations
+#: possible numbers of pieces of a slot, and the overhead of a slot in stations
 _PIECES, _SLOT_COST = range(2, 65), 1
-#: more than was counted last: of slots, which are all drawn, and of fragments, which take memory
+#: margins on the last counts: of slots, which are all drawn, and of fragments, which take memory
 _SPARE_SLOTS, _SPARE_FRAGMENTS = 1.03, 1.25
 
 
 @dataclass(frozen=True, eq=False)
 class KnownDetail:
-    """What was counted of a groom in a view when it was last at rest.
+    """The counts of a groom in a view when it was last at rest.
 
-    layout, settings: of its strands. scale: pixels of a metre at its middle.
-    slot_pieces: pieces a slot. slots: how many strands fill. fragments: how many they may have.
-    strands, pieces: how many are drawn.
+    layout, settings: of its strands. scale: pixels per metre at its middle.
+    slot_pieces: pieces of a slot. slots: number that strands fill. fragments: upper bound.
+    strands, pieces: numbers drawn.
     """
 
     layout: StrandLayout
@@ -38,22 +38,23 @@ class KnownDetail:
     pieces: int
 
     def is_of(self, layout: StrandLayout, settings: DetailSettings) -> bool:
-        """Whether it says something about these strands."""
+        """Whether these counts are for such strands."""
         return self.layout.is_as(layout) and self.settings == settings
 
     def slots_at(self, scale: float) -> int:
-        """Room for them where a metre is as many pixels: all strands have a slot at least."""
+        """Slots needed at this scale [pixels per metre], at least one for each strand."""
         nearer = max(scale / self.scale, 1.0)
-        grown = 1.0 if self.settings.mode == "fixed" else nearer**0.5  # as Wang's bound does
+        grown = 1.0 if self.settings.mode == "fixed" else nearer**0.5  # as in Wang's bound
         return max(int(self.slots * grown * _SPARE_SLOTS), self.layout.strand_count)
 
     def fragments_at(self, scale: float) -> int:
-        """How many of them there may be where a metre is as many pixels."""
+        """Fragments needed at this scale [pixels per metre]."""
         return int(self.fragments * max(scale / self.scale, 1.0) * _SPARE_FRAGMENTS)
 
 
 def best_slot_pieces(pieces: Ints) -> tuple[int, int]:
-    """Of how many pieces slots are best, so that few stations are drawn, and how many these are.
+    """The number of pieces per slot with which the fewest stations are drawn, and the number of
+    slots.
 
     Args:
         pieces: of each strand, (strand_count,).

@@ -1,15 +1,16 @@
-"""Strands that ride, led out of colliders on the GPU: `refine.lead_out` behind RidePass, over
-textures in the layouts of `strand_layout`.
+"""Leads riding strands out of colliders on the GPU: `refine.lead_out` after RidePass, on textures
+in the layouts of `strand_layout`.
 
-    strand_spans  RGBA32F: where the points of each strand lie, see strand_layout.StrandLayout
+    strand_spans  RGBA32F: the points of each strand, see strand_layout.StrandLayout; w the last
+                  point that moves rigidly with the root
     solids, rounds, fields: the colliders, see collider_textures.py
-    rest_points, root_motions: where roots carry points, see ride_pass.py
-    clearances    R32F: how far from colliders each point stays where its root carries it [m]
-    states        RGBA32F: of each strand x whether it is led out, see lead_out.comp.glsl
-    near_strands, near_counts RGBA32F: which strands are too near, see lead_out.comp.glsl
-    leans         RGBA32F: xyz how the segment that ends at a point was bent, see lead_out.Leans
-    led_points    RGBA32F: xyz where points are led to [m, world]
-    led_texels    RG32F: the texels of points that were led earlier
+    rest_points, root_motions: the motion of points with their roots, see ride_pass.py
+    clearances    R32F: distance that each point keeps where its root carries it [m]
+    states        RGBA32F: state of each strand, x whether it is led out, see lead_out.comp.glsl
+    near_strands, near_counts RGBA32F: strands that are too near, see lead_out.comp.glsl
+    leans         RGBA32F: xyz bend of the segment that ends at a point, see lead_out.Leans
+    led_points    RGBA32F: xyz position of points that are led out [m, world]
+    led_texels    RG32F: texels of points that were led out earlier
     cv_points     RGBA32F: xyz position now [m, world], changed in place
 """
 
@@ -42,11 +43,11 @@ from .strand_layout import StrandLayout, from_strand_rows, strand_rows, strand_r
 from .textures import texture_from, texture_to_array
 
 _GROUP = (64, 1)
-#: what infinity is on the GPU [m]
+#: replaces infinity on the GPU [m]
 _ENDLESS = np.float32(1.0e30)
-#: no segment leans by more
+#: larger than any bend of a segment
 _UPRIGHT_AGAIN = 4.0
-#: Software drivers end a shader after about this many rounds of all its loops.
+#: Most iterations of all loops of a shader; software drivers end one after a few more.
 _ROUNDS = 60_000
 #: step -> its images
 _STEPS = {
@@ -83,7 +84,7 @@ _INTEGERS = {
     "LED": (*_OF_POINTS, "lane_count", "first_attempt", "attempt_end"),
     "PUT": ("mover_count", "lane_count"),
 }
-#: strands of an invocation, at most
+#: step -> most strands per invocation
 _INVOCATION = {"COUNTED": LEAD_BLOCK, "LISTED": LEAD_BLOCK, "BENT": 8, "LED": 8, "PUT": 8}
 #: step -> its numbers
 _NUMBERS = {
@@ -93,7 +94,7 @@ _NUMBERS = {
     "LED": ("kept",),
     "PUT": ("kept",),
 }
-#: steps that ask colliders
+#: steps that read colliders
 _ASKING = ("NEAR", "LED")
 PUT_RECIPE = ShaderRecipe(
     name="put_points",
@@ -107,11 +108,11 @@ PUT_RECIPE = ShaderRecipe(
 
 @cache
 def lead_out_recipe(steps: tuple[str, ...], solids: SolidKinds | None) -> ShaderRecipe:
-    """The program of one step, or of several that follow each other for each strand.
+    """The program of one step, or of several that are done one after the other for each strand.
 
     Args:
         steps: keys of _STEPS, see lead_out.comp.glsl.
-        solids: the colliders that it asks; None: none.
+        solids: kinds of the colliders that it reads; None: it reads none.
     """
     defines = tuple((f"IS_{step}", 1) for step in steps)
     names, integers = _of_all(_TEXTURES, steps), ("strand_count", *_of_all(_INTEGERS, steps))
@@ -132,16 +133,16 @@ def lead_out_recipe(steps: tuple[str, ...], solids: SolidKinds | None) -> Shader
 
 
 def _of_all(needs: Mapping[str, tuple[Any, ...]], steps: tuple[str, ...]) -> tuple[Any, ...]:
-    """What any of some steps needs, each once."""
+    """The union of what some steps need, without duplicates."""
     return tuple(dict.fromkeys(need for step in steps for need in needs.get(step, ())))
 
 
 class LeadOutPass:
-    """The contacts of one groom's strands on the GPU. Making one touches no GPU.
+    """Leads the strands of one groom out of colliders. Creating one does not touch the GPU.
 
     Args:
         layout: of cv_points.
-        colliders: where they are uploaded to.
+        colliders: uploads shared with other passes.
     """
 
     def __init__(self, layout: StrandLayout, colliders: UploadedColliders) -> None:
@@ -151,7 +152,7 @@ class LeadOutPass:
         self.release()
 
     def take(self, clearance: Clearance | None) -> None:
-        """Go on with the clearance of a motion; None: it has none yet."""
+        """Use the clearance of a motion from now on; None: it has none yet."""
         if clearance is not self._clearance:
             self.release()
             self._clearance = clearance
@@ -159,15 +160,15 @@ class LeadOutPass:
     def begin(
         self, posed: tuple[PosedCollider, ...], point_rounds: int, since: float = np.inf
     ) -> Seen | None:
-        """What a frame needs where strands are to be led out of these; None where they are not.
+        """The inputs of a frame in which strands are led out of these; None if they are not.
 
         Args:
-            point_rounds: how many rounds of its loops the pass that moves strands takes for a point
-                of one, see `Seen.at_once`.
-            since: time since the frame from which it goes on [s]; infinite: from none.
+            point_rounds: loop iterations per point in the pass that moves strands, see
+                `Seen.at_once`.
+            since: time since the frame that this one continues [s]; infinite if it continues none.
 
         Raises:
-            HairloomError: a collider that the GPU cannot have.
+            HairloomError: a collider that the GPU does not support.
         """
         if self._clearance is None or not posed or not self._layout.strand_count:
             self._textures.pop("states", None)
@@ -196,9 +197,10 @@ class LeadOutPass:
         """Lead strands out, see `refine.lead_out.lead_out`.
 
         Args:
-            seen: of this frame; if `at_once`, the pass before has found who is too near.
+            seen: of this frame; if `at_once`, the pass before has found the strands that are too
+                near.
             carrying: the textures rest_points and root_motions.
-            mover_count: how many root motions there are.
+            mover_count: number of root motions.
 
         Raises:
             ShaderError: the shader does not compile here.
@@ -209,7 +211,7 @@ class LeadOutPass:
         for step in (() if seen.at_once else ("HELD", "NEAR")) + ("COUNTED", "LISTED"):
             self._run((step,), textures, integers, numbers)
         is_short = self._points_at_once() >= ATTEMPTS * self._layout.longest
-        if is_short and reads_back():  # a dispatch costs as much as leading some strands
+        if is_short and reads_back():  # each further dispatch costs as much as leading some strands
             every = {**integers, "first_attempt": 0, "attempt_end": ATTEMPTS}
             self._run(("BENT", "LED", "PUT"), textures, every, numbers)
             return
@@ -221,7 +223,7 @@ class LeadOutPass:
         self._run(("PUT",), textures, integers, numbers)
 
     def put(self, cv_points: Any, led: LedOut) -> None:
-        """Put strands where they were led to earlier, see `LedOut.put`.
+        """Set strands to the points to which they were led earlier, see `LedOut.put`.
 
         Raises:
             ShaderError: the shader does not compile here.
@@ -245,7 +247,7 @@ class LeadOutPass:
         shader.dispatch(count)
 
     def led(self) -> Ints:
-        """The strands that `lead` has led out last, (n,), read back."""
+        """The strands that the last `lead` has led out, (n,), read back."""
         states = self._textures.get("states")
         if states is None:
             return np.zeros(0, np.int32)
@@ -253,11 +255,11 @@ class LeadOutPass:
         return np.flatnonzero(flags[:, 0, 0]).astype(np.int32)
 
     def release(self) -> None:
-        """Let go of all that lies on the GPU; the next frame uploads it again."""
+        """Release everything on the GPU; the next frame uploads it again."""
         self._textures: dict[str, Any] = {}
 
     def _upload(self, clearance: Clearance) -> None:
-        """What is constant, and the textures that the shaders write."""
+        """Upload constant data, and make the textures that the shaders write."""
         layout, textures = self._layout, self._textures
         if "clearances" not in textures:
             values = np.maximum(clearance.points, -_ENDLESS)[:, None]
@@ -281,7 +283,7 @@ class LeadOutPass:
         integers: dict[str, int],
         numbers: dict[str, float],
     ) -> None:
-        """Some steps over all points of all strands, as many at once as drivers bear."""
+        """Run some steps for all points of all strands, in as few dispatches as drivers allow."""
         assert self._solids is not None
         is_asking = any(step in _ASKING for step in steps)
         recipe = lead_out_recipe(steps, self._solids.kinds if is_asking else None)
@@ -301,8 +303,7 @@ class LeadOutPass:
             shader.dispatch(invocations)
 
     def _points_at_once(self) -> int:
-        """How many points of a strand one dispatch may lead, with what bends it before and puts it
-        after that."""
+        """How many points of a strand one dispatch can lead, including the steps BENT and PUT."""
         assert self._solids is not None
         a_point = 4 + (SWEEPS + TRIES + HALVINGS + 4) * (1 + self._solids.rounds_of_distance)
         return max(_ROUNDS // (a_point * _INVOCATION["LED"]), 1)
@@ -310,12 +311,12 @@ class LeadOutPass:
 
 @dataclass(frozen=True)
 class Seen:
-    """What strands are led out of in one frame.
+    """The inputs for leading strands out of colliders in one frame.
 
     textures: strand_spans, clearances and the colliders. states: an image. kinds, integers: of the
-    colliders. kept: [m]. turned_back: by how much segments have turned back since the frame before
-    [radians]. at_once: whether the pass that moves strands can do the steps HELD and
-    NEAR.
+    colliders. kept: largest distance that points keep [m]. turned_back: angle by which segments
+    turn back since the frame before [rad]. at_once: whether the pass that moves strands can do the
+    steps HELD and NEAR.
     """
 
     textures: dict[str, Any]

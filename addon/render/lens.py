@@ -1,6 +1,6 @@
-"""Depth of field: a picture's samples look through different places of the lens.
+"""Depth of field: the samples of a picture look through different points of the lens.
 
-All of them see what lies in the plane of focus at the same place of the picture.
+All of them see points in the plane of focus at the same place of the picture.
 
 Pure numpy: importable without gpu.
 """
@@ -20,10 +20,10 @@ _FEWEST_BLADES = 3
 
 @dataclass(frozen=True)
 class Lens:
-    """radius: of the aperture [m]; focus: distance along the view that is sharp [m].
+    """A lens. radius: of the aperture [m]; focus: distance along the view that is sharp [m].
 
-    blades: corners of the aperture, below three a circle, which the corners lie on.
-    rotation: of the corners [rad]. ratio: how many times higher than wide the aperture is.
+    blades: number of corners of the aperture, which lie on a circle; below three, it is the circle.
+    rotation: of the corners [rad]. ratio: height of the aperture over its width.
     """
 
     radius: float
@@ -33,7 +33,8 @@ class Lens:
     ratio: float = 1.0
 
     def places(self, count: int) -> Floats:
-        """Where `count` samples look through, (count, 2) [m] right and up of its middle.
+        """Points of the lens for `count` samples, (count, 2) [m] to the right and up from its
+        middle.
 
         Evenly over the aperture. The first is the middle; more samples begin with those of fewer.
         """
@@ -47,7 +48,7 @@ class Lens:
         return np.asarray(self.radius * unit * [1.0 / self.ratio, 1.0])
 
     def _in_corners(self, turn: Floats, out: Floats) -> Floats:
-        """Of a disk cut into one triangle for each side, (n, 2)."""
+        """Points of a regular polygon, one triangle for each side, (n, 2)."""
         corner, along = np.divmod(turn * self.blades, 1.0)
         step = 2.0 * np.pi / self.blades
         ends = self.rotation + step * np.stack([corner, corner + 1.0])
@@ -57,7 +58,7 @@ class Lens:
 
 
 def through(camera: Camera, lens: Lens, place: Floats) -> Camera:
-    """The camera that looks through this place (2,) [m] of a lens around its eye."""
+    """The camera that looks through this point (2,) [m] of a lens centred at its eye."""
     right, up = float(place[0]), float(place[1])
     moved, sheared = np.eye(4), np.eye(4)
     moved[:2, 3] = -right, -up

@@ -1,7 +1,7 @@
-"""Soft shadows: each sample of a picture sees another point of every light that has a size.
+"""Soft shadows: each sample of a picture is lit by another point of every light that has a size.
 
-The mean over samples has the light's penumbra, on hair and on meshes, and its highlight is as broad
-as the light is. The first sample has the middle of all lights.
+The mean over samples has the light's penumbra, on hair and on meshes, and highlights as broad as
+the light. The first sample uses the middle of all lights.
 
 Pure numpy: importable without gpu.
 """
@@ -18,16 +18,16 @@ from ..shading.area_lights import Panel
 from ..shading.lights import Light
 from ..strands.vectors import both_across, triple
 
-#: steps of a sequence that fills a square evenly, and no other sequence of a picture has
+#: steps of a sequence that fills a square evenly, used by no other sequence of a picture
 _STEPS = np.sqrt([2.0, 3.0]) - 1.0
 
 
 def lights_at(lights: Sequence[Light], sample: int, center: Floats) -> tuple[Light, ...]:
-    """One point of each light in place of all of it; the same ones for equal samples.
+    """One point of each light instead of the light; the same points for equal samples.
 
     Args:
-        sample: its number, from 0.
-        center: (3,) [m] what a lamp's disk faces.
+        sample: its index, from 0.
+        center: (3,) [m] the point that a lamp's disk faces.
     """
     place = (0.5 + sample * _STEPS) % 1.0
     return tuple(_at(light, place, np.asarray(center, np.float64)) for light in lights)
@@ -42,7 +42,7 @@ def _at(light: Light, place: Floats, center: Floats) -> Light:
 
 
 def _of_sun(light: Light, aside: Floats) -> Light:
-    """Of the disk that fills its angle, as in Cycles."""
+    """A point of the disk that fills a sun's angle, as in Cycles."""
     right, up = both_across(np.array(light.vector))
     x, y = np.tan(0.5 * min(light.angle, 0.99 * np.pi)) * aside
     towards = np.array(light.vector) + x * right + y * up
@@ -50,11 +50,11 @@ def _of_sun(light: Light, aside: Floats) -> Light:
 
 
 def _of_lamp(light: Light, aside: Floats, center: Floats) -> Light:
-    """Of the disk that faces the hair, as a point; at the middle of the hair as much arrives as of
-    the whole lamp. Of a disk without a cone that is so all along its axis."""
+    """A point of the disk that faces the hair, with a power that gives the same irradiance at the
+    hair's middle as the whole lamp, for a disk without a cone all along its axis."""
     away = center - np.array(light.vector)
     distance = float(np.linalg.norm(away))
-    if distance <= light.radius:  # hair inside a lamp sees no side of it
+    if distance <= light.radius:  # the middle of the hair is inside the lamp
         return light
     right, up = both_across(away / distance)
     x, y = light.radius * aside
@@ -63,14 +63,14 @@ def _of_lamp(light: Light, aside: Floats, center: Floats) -> Light:
     if light.cone is None and not light.is_ball:
         left = np.sqrt(max(light.radius**2 - farther, 0.0))
         return replace(light, vector=at, radius=float(left))
-    # with a radius, a cone would blur its rim by it once more
+    # no radius, since that would blur the rim of a cone once more
     factor = (distance**2 + farther) / (distance**2 + light.softening[0])
     power = triple(factor * np.array(light.power))
     return replace(light, vector=at, power=power, radius=0.0)
 
 
 def _of_panel(light: Light, panel: Panel, place: Floats) -> Light:
-    """A panel that is as good as a point, and shines as the whole one does."""
+    """A panel of zero size that has the power of the whole one."""
     aside = disk_place(place) if panel.is_round else 2.0 * place - 1.0
     x, y = np.array([panel.half_width, panel.half_height]) * aside
     at = np.array(light.vector) + x * np.array(panel.right) + y * np.array(panel.up)
@@ -79,8 +79,8 @@ def _of_panel(light: Light, panel: Panel, place: Floats) -> Light:
 
 
 def disk_place(place: Floats) -> Floats:
-    """A place of the unit square, (2,), on the unit disk: equal areas stay equal, and the middle is
-    the middle (Shirley and Chiu 1997, "A low distortion map between disk and square").
+    """A place (2,) of the unit square mapped to the unit disk, which preserves area and the middle
+    (Shirley and Chiu 1997, "A low distortion map between disk and square").
     """
     x, y = 2.0 * np.asarray(place) - 1.0
     if x == 0.0 and y == 0.0:

@@ -1,7 +1,6 @@
-"""Marschner's look-up tables on the GPU, those of the last few shapes of fibre.
+"""Marschner's look-up tables on the GPU, for the last few fibre shapes.
 
-Hair's colour is in no table, so sliders of colour change nothing here; grooms of one kind of hair
-share their textures.
+The tables do not depend on the hair's colour, and grooms with the same fibre share their textures.
 """
 
 from __future__ import annotations
@@ -41,7 +40,7 @@ class _Tables:
 
 
 class MarschnerTextures:
-    """Makes textures for a shape of fibre when it is first asked, and keeps the last CAPACITY."""
+    """Textures for fibre shapes, made on first use; keeps the last CAPACITY shapes."""
 
     def __init__(self) -> None:
         self._kept: OrderedDict[Any, _Tables] = OrderedDict()
@@ -58,7 +57,7 @@ class MarschnerTextures:
         return {name: kept[name] for _, name in FRACTIONS_TEXTURES}
 
     def forward(self, shading: ShadingSettings, size: int) -> Floats:
-        """The fraction of light that a strand sends on, by colour, (3,)."""
+        """The fraction of light that a strand scatters forward, by colour, (3,)."""
         return mean_forward(self._of(shading, size).fractions.forward, shading)
 
     def _of(self, shading: ShadingSettings, size: int) -> _Tables:
@@ -74,16 +73,16 @@ class MarschnerTextures:
         return self._kept[key]
 
     def release(self) -> None:
-        """Let go of all textures; the next call makes them again."""
+        """Release all textures; the next call makes them again."""
         self._kept.clear()
 
 
-#: what all passes share
+#: shared by all passes
 MARSCHNER = MarschnerTextures()
 
 
 def marschner_feature(snapshot: Snapshot) -> ShaderFeature:
-    """What a program that shades by Marschner's model has."""
+    """The feature of programs that shade by Marschner's model."""
     shading = snapshot.shading
     textures = MARSCHNER.of(shading, snapshot.table_size)
     return ShaderFeature(
@@ -95,7 +94,7 @@ def marschner_feature(snapshot: Snapshot) -> ShaderFeature:
 
 
 def scattering_feature(snapshot: Snapshot) -> ShaderFeature:
-    """What a program needs to add light scattered from strand to strand, in Marschner's model."""
+    """The feature of programs that add light scattered between strands, in Marschner's model."""
     textures = MARSCHNER.fractions(snapshot.shading, snapshot.table_size)
     return ShaderFeature(
         name="scattering",
@@ -109,13 +108,13 @@ def scattering_feature(snapshot: Snapshot) -> ShaderFeature:
 
 
 def under_hair_feature(snapshot: Snapshot, maps: OpacityMaps) -> ShaderFeature:
-    """What a program has that lights what lies under hair, through its maps."""
+    """The feature of programs that shade surfaces under hair, with its maps."""
     feature = maps.feature
     return replace(feature, numbers={"hair_forward": ("VEC3", hair_forward(snapshot))})
 
 
 def hair_forward(snapshot: Snapshot) -> tuple[float, float, float]:
-    """The fraction of light that the hair sends on to what lies under it, by colour; 0 without
+    """The fraction of light that hair scatters forward to surfaces under it, by colour; 0 without
     light from strand to strand.
     """
     shading = mean_look(snapshot.color, snapshot.shading)

@@ -1,4 +1,4 @@
-"""Meshes on the GPU."""
+"""Batches of meshes on the GPU."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from .snapshot import MeshSnapshot
 
 
 def mesh_batch(mesh: MeshSnapshot, skin: SkinLayout | None = None) -> Any:
-    """The triangles of a mesh: position, normal, occlusion; with pictures its UVs, for which each
-    corner is a vertex of its own.
+    """A batch of the triangles of a mesh: position, normal, occlusion; with pictures also UVs, with
+    a vertex for each corner.
 
     Args:
-        skin: the layout of the head that it is a part of, in which each corner has a place.
+        skin: the layout of the head that it is a part of, which gives each corner a place.
     """
     surface = mesh.surface
     count = len(surface.positions)
@@ -40,10 +40,10 @@ def mesh_batch(mesh: MeshSnapshot, skin: SkinLayout | None = None) -> Any:
 
 
 def triangle_batch(values: dict[str, Floats], triangles: Ints | None) -> Any:
-    """Vertex attributes by name, (vertex_count, length) each, and the triangles between them.
+    """A batch of triangles with vertex attributes by name, (vertex_count, length) each.
 
     Args:
-        triangles: (triangle_count, 3); None where three vertices each are a triangle.
+        triangles: (triangle_count, 3); None: every three vertices are a triangle.
     """
     vertices = gpu_objects.vertex_buffer(values)
     indices = None if triangles is None else gpu_objects.index_buffer(triangles)
@@ -51,7 +51,7 @@ def triangle_batch(values: dict[str, Floats], triangles: Ints | None) -> Any:
 
 
 def _skin_places(mesh: MeshSnapshot, skin: SkinLayout) -> Floats:
-    """Place and island of each corner, (3 triangle_count, 3)."""
+    """UV place and island of each corner, (3 triangle_count, 3)."""
     assert mesh.skin is not None
     chosen = slice(None) if mesh.skin.triangle is None else mesh.skin.triangle
     place = skin.place[chosen].reshape(-1, 2)

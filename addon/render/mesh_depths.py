@@ -1,4 +1,4 @@
-"""Draws the depth of the first mesh that a light meets into a map, with the holes of its alpha."""
+"""Draws shadow maps: the depth of the first mesh that a light meets, with holes by its alpha."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from .textures import drawing_into, drawing_state
 
 #: rows of a map, by their names in the shader: x, y, w and depth of (world position, 1)
 _ROWS = ("map_x", "map_y", "map_w", "map_depth")
-#: the golden ratio: meshes behind one another have their holes at different texels
+#: the golden ratio, by which patterns of meshes differ, so that their holes do not coincide
 _NEXT_PATTERN = 0.6180339887
 
 
 def depth_recipe(*, has_alpha: bool, has_pictures: bool) -> ShaderRecipe:
-    """The program of meshes that have holes, or have not."""
+    """The program of meshes with or without holes."""
     return ShaderRecipe(
         name=f"mesh_depth{'_alpha' * has_alpha}{'_pictures' * has_pictures}",
         vertex="mesh_depth.vert.glsl",
@@ -46,14 +46,14 @@ def depth_recipe(*, has_alpha: bool, has_pictures: bool) -> ShaderRecipe:
 
 
 class MeshDepths:
-    """Keeps meshes that throw shadows on the GPU from draw to draw; making one touches no GPU."""
+    """Meshes that cast shadows, on the GPU. Creating one does not touch the GPU."""
 
     def __init__(self) -> None:
         self._batches: list[tuple[Caster, Any]] = []
         self._pictures = PictureTextures()
 
     def hold(self, casters: Sequence[Caster]) -> None:
-        """Have these on the GPU, and no others; what is the same object is not uploaded again."""
+        """Upload these meshes and release all others; objects that are there are kept."""
         kept = {id(caster): batch for caster, batch in self._batches}
         self._batches = [
             (caster, kept[id(caster)] if id(caster) in kept else caster_batch(caster))
@@ -66,7 +66,7 @@ class MeshDepths:
         """Draw one map.
 
         Args:
-            depths: texture array; what lies in the layer is lost.
+            depths: texture array; the layer is overwritten.
             rows: (4, 4) x, y, w and depth of a place (x, y, z, 1) in the map.
         """
         target = gpu_objects.framebuffer(depth_slot={"texture": depths, "layer": layer})
@@ -79,7 +79,7 @@ class MeshDepths:
                     batch.draw(shader)
 
     def _bound(self, caster: Caster, number: int, of_map: dict[str, Any]) -> Any:
-        """The shader of a mesh, ready to draw."""
+        """The shader of a mesh, bound and ready to draw."""
         numbers, picture, has_alpha = dict(of_map), alpha_picture(caster), False
         textures = {} if picture is None else {"mesh_color_map": self._pictures.color(picture)}
         if isinstance(caster, MeshSnapshot) and caster.transparency != "opaque":
@@ -92,7 +92,7 @@ class MeshDepths:
 
 
 def _is_seen(surface: Surface, rows: Floats) -> bool:
-    """Whether any of its box may lie in the map."""
+    """Whether the surface's box may intersect the map."""
     low, high = surface.bounds()
     ends = np.array([low, high], np.float64)
     x, y, z = np.indices((2, 2, 2)).reshape(3, 8)

@@ -1,4 +1,4 @@
-"""Draws lit meshes, such as the head under the hair, into whatever target is bound."""
+"""Draws lit meshes, such as the head under the hair, into the bound framebuffer."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ _RECIPE = ShaderRecipe(
     defines=(("SHADOWS", 0),),
 )
 
-#: what hair leaves of the light on meshes, in place of them
+#: the fraction of light on meshes that hair lets through, instead of the meshes
 _SHADOW_RECIPE = replace(
     _RECIPE, name="mesh_hair_shadow", fragment="mesh_hair_shadow.frag.glsl", integers=()
 )
@@ -54,7 +54,7 @@ type _Batch = tuple[MeshSnapshot, SkinLayout | None, Any]
 
 
 class MeshPass:
-    """Keeps the meshes of the last snapshot on the GPU; making one touches no GPU."""
+    """The meshes of the last snapshot on the GPU. Creating one does not touch the GPU."""
 
     def __init__(self) -> None:
         self.mesh_shadows = MeshShadowPass()
@@ -77,12 +77,12 @@ class MeshPass:
 
         Args:
             opacity: the hair's maps, see StrandPass.opacity.
-            shadows: of all meshes; without, they shade each other only where the hair's maps are.
-            between: what other hair is in the way, at each pixel of the target, see
-                InterGroomShadow;
-                counts where there are maps. Others as in StrandPass.draw.
+            shadows: of all meshes; without them, meshes shade each other only within the hair's
+                maps.
+            between: optical depth of other hair at each pixel of the target, see InterGroomShadow;
+                only used with `opacity`. Others as in StrandPass.draw.
         """
-        # nothing is seen of a hole in the picture, nor a shadow on it
+        # a hole in the picture shows neither the mesh nor a shadow on it
         seen = [mesh for mesh in snapshot.meshes if not mesh.is_holdout]
         skins = self._skins(seen, snapshot, opacity, shadows)
         self._upload(snapshot.meshes, skins)
@@ -106,8 +106,8 @@ class MeshPass:
         shadows: MeshShadows | None = None,
         between: Any = None,
     ) -> None:
-        """Draw the fraction of their light that hair leaves to all meshes of the snapshot, by
-        colour, into the bound framebuffer, depth-tested.
+        """Draw the shadow of hair on all meshes of the snapshot into the bound framebuffer,
+        depth-tested: the fraction of light that hair lets through, by colour.
 
         Args:
             all as of `draw`.
@@ -123,7 +123,7 @@ class MeshPass:
         self._pictures.forget_but(snapshot.meshes)
 
     def release(self) -> None:
-        """Let go of all that lies on the GPU; the next draw uploads again."""
+        """Release everything on the GPU; the next draw uploads again."""
         self._blocks = UniformBlocks()
         self._batches: list[_Batch] = []
         self.skin = SkinPass()
@@ -139,7 +139,7 @@ class MeshPass:
         *,
         of_hair_alone: bool = False,
     ) -> dict[int, SkinShadow]:
-        """The soft shadows on those that are skin, see SkinPass.shadows."""
+        """The soft shadows on meshes that are skin, see SkinPass.shadows."""
         return self.skin.shadows(
             meshes,
             opacity,
@@ -153,7 +153,7 @@ class MeshPass:
     def _mesh_features(
         self, mesh: MeshSnapshot, skin: SkinShadow | None
     ) -> Iterator[ShaderFeature]:
-        """What the program of one mesh has: its surface, its soft shadow, its pictures."""
+        """The features of one mesh: its surface, its soft shadow, its pictures."""
         yield ShaderFeature(
             numbers={
                 "mesh_specular": ("FLOAT", mesh.specular),
@@ -180,7 +180,7 @@ class MeshPass:
     def _cover_features(
         self, mesh: MeshSnapshot, skin: SkinShadow | None
     ) -> Iterator[ShaderFeature]:
-        """What the program of one mesh has that shows not its surface: how much of it is there."""
+        """The features of one mesh in programs that need its coverage but not its surface."""
         if skin is not None:
             yield skin.feature
         if mesh.transparency != "opaque":
@@ -209,7 +209,7 @@ def _shared(
     opacity: OpacityMaps | None,
     shadows: MeshShadows | None,
 ) -> list[ShaderFeature]:
-    """What the programs of all meshes have: view, light, and what is in its way."""
+    """The features of all meshes: view, lights, and shadows."""
     found = [view_feature(camera, *size), lights_feature(snapshot)]
     if opacity is not None:
         found.append(under_hair_feature(snapshot, opacity))
@@ -221,8 +221,8 @@ def _shared(
 def _moment_features(
     mesh: MeshSnapshot, number: int, sample: int, between: Any
 ) -> Iterable[ShaderFeature]:
-    """What the program of one mesh has in this sample alone."""
-    # a pixel stands for what lies behind all that is blended
+    """The features of one mesh that depend on the sample."""
+    # `between` holds the nearest mesh that is not blended
     if between is not None and mesh.transparency != "blended":
         yield _inter_groom_feature(between)
     if mesh.transparency == "hashed":
@@ -244,7 +244,7 @@ def _alpha_feature(mesh: MeshSnapshot) -> ShaderFeature:
 
 
 def _inter_groom_feature(between: Any) -> ShaderFeature:
-    """What a program has that knows of more hair in the way than the maps hold, by pixel."""
+    """The feature of programs that read the optical depth of other hair per pixel."""
     return ShaderFeature(
         name="others",
         textures={"inter_groom_shadow": ("FLOAT_2D", between)},
@@ -253,12 +253,12 @@ def _inter_groom_feature(between: Any) -> ShaderFeature:
 
 
 def _hashed_feature(number: int, sample: int) -> ShaderFeature:
-    """How far the pattern by which a hashed mesh is left out is shifted; see hashed_alpha.py."""
+    """The feature with the shift of a hashed mesh's pattern, see hashed_alpha.py."""
     return ShaderFeature(numbers={"mesh_chance": ("VEC2", shifts(number, sample))})
 
 
 def _far_to_near(batches: list[_Batch], camera: Camera) -> list[_Batch]:
-    """What covers what is behind it first, then what is blended, the farthest first."""
+    """First the batches that are not blended, then the blended ones, the farthest first."""
     return sorted(
         batches,
         key=lambda each: (
@@ -269,6 +269,6 @@ def _far_to_near(batches: list[_Batch], camera: Camera) -> list[_Batch]:
 
 
 def _distance(mesh: MeshSnapshot, camera: Camera) -> float:
-    """Of the middle of a mesh along the view [m]."""
+    """Distance of the middle of a mesh along the view [m]."""
     low, high = mesh.surface.bounds()
     return -float(camera.view[2, :3] @ (0.5 * (low + high)) + camera.view[2, 3])

@@ -1,4 +1,4 @@
-"""The pictures of meshes' materials on the GPU."""
+"""Textures of meshes' materials on the GPU."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from .shader_feature import ShaderFeature
 from .snapshot import Color, MeshPictures, MeshSnapshot
 from .textures import texture_from
 
-#: straight up in tangent space
+#: a normal map of one texel, straight up
 _LEVEL = np.array([[[0.5, 0.5, 1.0, 1.0]]], np.float32)
 
 
 def pictures_of(mesh: MeshSnapshot) -> MeshPictures | None:
-    """Those of a mesh that has UVs to lay them over."""
+    """The pictures of a mesh; None if it has none, or no UVs."""
     pictures = mesh.pictures
     if pictures is None or mesh.surface.corner_uv is None:
         return None
@@ -25,14 +25,14 @@ def pictures_of(mesh: MeshSnapshot) -> MeshPictures | None:
 
 
 class PictureTextures:
-    """Uploads a picture once, as long as it is the same array."""
+    """Textures of pictures, each uploaded once as long as it is the same array."""
 
     def __init__(self) -> None:
         self._kept: dict[int, tuple[Floats, Any]] = {}
         self._colors: dict[Color, Any] = {}
 
     def feature(self, mesh: MeshSnapshot, pictures: MeshPictures) -> ShaderFeature:
-        """What a program has that lays them over a mesh's UVs; of what has no picture one texel."""
+        """The feature of programs that use a mesh's pictures; missing ones become one texel."""
         color, normal = pictures.color, pictures.normal
         texels = {
             "mesh_color_map": self._plain(mesh.color) if color is None else self._texture(color),
@@ -48,7 +48,7 @@ class PictureTextures:
         )
 
     def alpha_feature(self, picture: Floats) -> ShaderFeature:
-        """What a program has that lays the alpha of this picture alone over a mesh's UVs."""
+        """The feature of programs that only use the alpha of a mesh's picture."""
         return ShaderFeature(
             name="alpha",
             textures={"mesh_color_map": ("FLOAT_2D", self._texture(picture))},
@@ -58,11 +58,11 @@ class PictureTextures:
         )
 
     def color(self, picture: Floats) -> Any:
-        """A picture of colours by itself, (height, width, 4)."""
+        """The texture of a colour picture (height, width, 4)."""
         return self._texture(picture)
 
     def forget_but(self, meshes: Sequence[MeshSnapshot]) -> None:
-        """Let go of what none of these meshes has."""
+        """Release the textures that none of these meshes uses."""
         used = {id(_LEVEL)}
         for mesh in meshes:
             if mesh.pictures is not None:

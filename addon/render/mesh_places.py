@@ -1,4 +1,4 @@
-"""Draws where meshes are and which is nearest, for masks and for what is found at their places."""
+"""Draws positions and numbers of the nearest meshes, for masks and for look-ups at these places."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .snapshot import MeshSnapshot
 from .textures import UniformBlock, drawing_state
 from .view_block import view_values
 
-#: the pattern of a mesh that is cut where it covers less than half, see mesh_place.frag.glsl
+#: pattern of a mesh that is discarded where alpha is at most a half, see mesh_place.frag.glsl
 CUT = (-1.0, -1.0)
 
 
@@ -23,8 +23,8 @@ CUT = (-1.0, -1.0)
 class Placed:
     """A mesh to draw.
 
-    number: what is written. chance: of its holes, see hashed_alpha.shifts.
-    carried: (vertex_count, 3), written in place of where the mesh is; None: that is.
+    number: written for its pixels. chance: shifts of its pattern, see hashed_alpha.shifts.
+    carried: (vertex_count, 3), written instead of the positions; None: positions.
     """
 
     mesh: MeshSnapshot
@@ -34,7 +34,7 @@ class Placed:
 
 
 def place_recipe(*, has_alpha: bool, has_pictures: bool, is_carrying: bool) -> ShaderRecipe:
-    """The program of meshes that have holes, or have not."""
+    """The program of meshes with or without holes."""
     parts = "_alpha" * has_alpha, "_pictures" * has_pictures, "_carrying" * is_carrying
     return ShaderRecipe(
         name=f"mesh_place{''.join(parts)}",
@@ -66,20 +66,20 @@ def place_recipe(*, has_alpha: bool, has_pictures: bool, is_carrying: bool) -> S
 
 
 class MeshPlaces:
-    """Keeps meshes on the GPU from draw to draw; making one touches no GPU."""
+    """The meshes of the last draw on the GPU. Creating one does not touch the GPU."""
 
     def __init__(self) -> None:
         self.release()
         released_with_shaders(self)
 
     def release(self) -> None:
-        """Let go of all that lies on the GPU; the next draw uploads again."""
+        """Release everything on the GPU; the next draw uploads again."""
         self._view = UniformBlock()
         self._batches: list[tuple[Placed, Any]] = []
         self._pictures = PictureTextures()
 
     def draw(self, meshes: Sequence[Placed], camera: Camera, width: int, height: int) -> None:
-        """Draw place [m, world] and number of each mesh into the bound framebuffer."""
+        """Draw position [m, world] and number of each mesh into the bound framebuffer."""
         kept = {_key(each): batch for each, batch in self._batches}
         self._batches = [
             (each, kept.get(_key(each)) or caster_batch(each.mesh, each.carried))
@@ -94,7 +94,7 @@ class MeshPlaces:
         self._pictures.forget_but([each.mesh for each in meshes])
 
     def _bound(self, each: Placed, view: Any) -> Any:
-        """The shader of a mesh, ready to draw."""
+        """The shader of a mesh, bound and ready to draw."""
         mesh, picture = each.mesh, alpha_picture(each.mesh)
         has_alpha, has_pictures = mesh.transparency != "opaque", picture is not None
         textures: dict[str, Any] = {}
@@ -114,5 +114,5 @@ class MeshPlaces:
 
 
 def _key(each: Placed) -> tuple[int, int]:
-    """What its batch is made of; both live as long as that is kept."""
+    """The identities of the inputs of its batch, which are kept alive as long as the batch."""
     return id(each.mesh), id(each.carried)

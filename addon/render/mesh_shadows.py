@@ -1,6 +1,6 @@
-"""Shadows of meshes on meshes, wherever they are: a map of depths or more for each light.
+"""Shadows of meshes on meshes: one or more shadow maps for each light.
 
-Maps are drawn only when a mesh or a light is another one than before.
+Maps are drawn only when a mesh or a light changes.
 """
 
 from __future__ import annotations
@@ -31,20 +31,20 @@ from .shader_program import released_with_shaders
 from .snapshot import Caster, surface_of
 
 _TEXEL_BYTES = 4
-#: of hashed_alpha.shifts, by which the texels that are asked move from sample to sample
+#: number, for hashed_alpha.shifts, of the sequence that shifts look-ups from sample to sample
 _SEQUENCE = 1
 
 
 @dataclass(frozen=True, eq=False)
 class MeshShadows:
-    """What shading reads: the block `MeshShadows` without a shift, and the maps."""
+    """The inputs of shading: the block `MeshShadows` without a shift, and the maps."""
 
     values: Floats
     depths: Any
 
     def feature(self, sample: int) -> ShaderFeature:
-        """What a program that reads them has, in a sample of a picture: each looks up other places
-        of the maps, so that the mean of them has smooth edges.
+        """The feature of programs that read the maps in one sample of a picture. Look-ups are
+        shifted from sample to sample, so that the mean has smooth edges.
         """
         values = self.values.copy()
         values[-4:-2] = 2.0 * (np.add(shifts(_SEQUENCE, sample), 0.5) % 1.0) - 1.0
@@ -57,14 +57,14 @@ class MeshShadows:
 
 
 class MeshShadowPass:
-    """Keeps the maps of a scene from draw to draw; making one touches no GPU."""
+    """The mesh shadow maps of a scene. Creating one does not touch the GPU."""
 
     def __init__(self) -> None:
         self.release()
         released_with_shaders(self)
 
     def release(self) -> None:
-        """Let go of all that lies on the GPU; the next draw makes it again."""
+        """Release everything on the GPU; the next draw makes it again."""
         self._casters = MeshDepths()
         self._extents: list[tuple[Caster, Extent]] = []
         self._drawn: tuple[Any, ...] = ()
@@ -74,11 +74,11 @@ class MeshShadowPass:
     def maps(
         self, casters: Sequence[Caster], lights: Sequence[Light], settings: MeshShadowSettings
     ) -> MeshShadows | None:
-        """The maps of a moment; None where no mesh can shade another one.
+        """The maps of a moment; None if no mesh can shade another one.
 
         Args:
-            casters: in world space; another object whenever one is another.
-            lights: in the order in which the shader knows them.
+            casters: in world space; pass a new object for each change.
+            lights: in the order of the shader's lights.
         """
         if not settings.mesh_shadows:
             self.release()
@@ -86,7 +86,7 @@ class MeshShadowPass:
         frames = self._frames(casters, lights)
         if not any(frames):
             return None
-        layers = max(sum(map(len, frames)), 2)  # one texture alone would not be an array
+        layers = max(sum(map(len, frames)), 2)  # an array needs at least two layers
         most = gpu.capabilities.max_texture_size_get()
         side = mesh_map_side(settings.mesh_resolution, layers, most, gpu_memory.mesh_maps_room())
         values = pack_mesh_shadows(frames, side)
@@ -103,7 +103,7 @@ class MeshShadowPass:
     def _frames(
         self, casters: Sequence[Caster], lights: Sequence[Light]
     ) -> list[tuple[LightFrame, ...]]:
-        """Of each light."""
+        """The frames of each light's maps."""
         kept = {id(caster): extent for caster, extent in self._extents}
         self._extents = [
             (each, kept[id(each)] if id(each) in kept else extent_of(surface_of(each)))
@@ -114,7 +114,7 @@ class MeshShadowPass:
         return [] if ball is None else [mesh_frames(each, ball) for each in lights[:LIGHT_CAPACITY]]
 
     def _texture(self, side: int, layers: int) -> Any:
-        """That of the draw before, where it is as large."""
+        """The texture of the draw before if it has this size, else a new one."""
         if self._maps is not None and self._shape == (side, layers):
             return self._maps.depths
         self._shape = side, layers
@@ -122,7 +122,8 @@ class MeshShadowPass:
 
 
 def mesh_map_side(asked: int, layers: int, most: int, room: int) -> int:
-    """Texels along a side of each of these maps, as many as memory [bytes] and GPU allow."""
+    """Texels along a side of each map: as asked, if memory (`room`, bytes) and the GPU (`most`)
+    allow."""
     return max(min(asked, most, int(np.sqrt(room / (_TEXEL_BYTES * layers)))), 1)
 
 

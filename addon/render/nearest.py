@@ -1,5 +1,5 @@
-"""What lies nearest in the middle of each pixel, and what a compositor asks of it: which object and
-strand it is, where it was and will be, and how it faces.
+"""The nearest surface at the centre of each pixel, and passes for compositors from it: object,
+strand, motion and normal.
 
 Pure numpy: importable without gpu.
 """
@@ -19,19 +19,19 @@ from .camera_window import view_depth
 from .scene_snapshot import SceneSnapshot
 from .snapshot import Snapshot
 
-#: distance [m] where nothing is, as Blender's engines have it; and from which what lies behind all
-#: seems to move by the turning of the camera alone
+#: distance [m] of pixels without a surface, as in Blender's engines; and distance of the
+#: background, so far away that only rotations of the camera move it
 FAR_AWAY, _BACKGROUND = 1.0e10, 1.0e9
 
 
 @dataclass(frozen=True, eq=False)
 class Nearest:
-    """Each (height, width), row 0 at the bottom.
+    """The nearest surface of each pixel. All arrays are (height, width), row 0 at the bottom.
 
-    depth: of the depth buffer, in [0, 1]; 1 where nothing is.
-    mesh, groom: indices into those of the scene; -1 where it is none. One at most is not -1.
-    strand, place: of a groom's strands, -1 where it is none, and where along its points: 0 at the
-        first one, 1 at the last one, and as much from each to the next.
+    depth: of the depth buffer, in [0, 1]; 1 where there is no surface.
+    mesh, groom: indices into those of the scene, -1 for none. At most one of them is not -1.
+    strand, place: index of the groom's strand, -1 for none; and the place along its points, 0 at
+        the first and 1 at the last, with equal steps from point to point.
     """
 
     depth: Floats
@@ -41,19 +41,19 @@ class Nearest:
     place: Floats
 
     def of_hair(self) -> Nearest:
-        """The same where hair is nearest, and nothing elsewhere."""
+        """The same where hair is nearest, and no surface elsewhere."""
         is_hair = self.groom >= 0
         return replace(
             self, depth=np.where(is_hair, self.depth, 1.0), mesh=np.full_like(self.mesh, -1)
         )
 
     def distances(self, camera: Camera) -> Floats:
-        """How far away it is, along the view [m]."""
+        """Distances along the view [m]."""
         far = view_depth(camera, self.depth)
         return np.where(self.depth < 1.0, far, FAR_AWAY).astype(np.float32)
 
     def object_numbers(self, scene: SceneSnapshot) -> Floats:
-        """The number of its object, 0 where nothing is."""
+        """Object numbers, 0 where there is no surface."""
         found = np.zeros(self.depth.shape, np.float32)
         for indices, drawn in ((self.mesh, scene.meshes), (self.groom, scene.grooms)):
             numbers = np.array([0, *(each.number for each in drawn)], np.float32)
@@ -61,18 +61,18 @@ class Nearest:
         return found
 
     def strand_numbers(self) -> Floats:
-        """The number of its strand in the groom, counted from 1; 0 where it is none."""
+        """Numbers of strands in their groom, counted from 1; 0 where there is no strand."""
         return (self.strand + 1).astype(np.float32)
 
     def on_strands(
         self, grooms: Sequence[Snapshot], meshes: Floats, *, slope: bool = False
     ) -> Floats:
-        """Where strands are that are nearest, (height, width, 3) [m, world].
+        """Positions of the nearest strands, (height, width, 3) [m, world].
 
         Args:
             grooms: those of the scene, now or at another time.
-            meshes: (height, width, 3), what is given back elsewhere.
-            slope: give the derivative along them instead.
+            meshes: (height, width, 3), returned where no strand is nearest.
+            slope: return the derivative along the strands instead.
         """
         found = np.array(meshes, np.float64)
         for index, groom in enumerate(grooms):
@@ -83,12 +83,12 @@ class Nearest:
         return found
 
     def normals(self, scene: SceneSnapshot, camera: Camera, meshes: Floats) -> Floats:
-        """Unit normals towards the eye, (height, width, 3), world space; 0 where nothing is.
+        """Unit normals towards the eye, (height, width, 3), world space; 0 without a surface.
 
-        Of a strand, the direction towards the eye that is across it.
+        The normal of a strand is the direction across it that is nearest to that towards the eye.
 
         Args:
-            meshes: (height, width, 3), of those that are nearest, of any length.
+            meshes: (height, width, 3), normals of the nearest meshes, of any length.
         """
         height, width = self.depth.shape
         to_eye = camera.eye[:3] - camera.eye[3] * unprojected(camera, self.depth)
@@ -103,9 +103,9 @@ class Nearest:
 
 @dataclass(frozen=True, eq=False)
 class Moment:
-    """Where all that a scene has now is at some time.
+    """The objects of the current scene at another time.
 
-    meshes: (vertex_count, 3) of each [m, world]. grooms: as they are then.
+    meshes: (vertex_count, 3) of each mesh at that time [m, world]. grooms: at that time.
     """
 
     camera: Camera
@@ -114,7 +114,7 @@ class Moment:
 
     @classmethod
     def of(cls, scene: SceneSnapshot, then: SceneSnapshot, camera: Camera) -> Moment:
-        """What is not there then, or has other points, is where it is now."""
+        """Objects that do not exist then, or have other points, stay where they are now."""
         meshes = {mesh.key: mesh.surface.positions for mesh in then.meshes}
         grooms = {groom.key: groom.snapshot for groom in then.grooms}
         return cls(
@@ -125,15 +125,15 @@ class Moment:
 
 
 def background(camera: Camera, depth: Floats) -> Floats:
-    """Places far behind all that is seen, for what nothing is in front of; (height, width, 3)."""
+    """Places far behind all surfaces, for pixels without one, (height, width, 3)."""
     behind = unprojected(camera, np.ones_like(depth))
     away = behind - camera.eye[:3]
     return behind if camera.eye[3] == 0.0 else camera.eye[:3] + _BACKGROUND * unit(away)
 
 
 def motion(before: Floats, now: Floats, after: Floats) -> Floats:
-    """Blender's Vector: how far each pixel's content has moved since the frame before, and moves
-    until the next one, both backwards; (height, width, 4) [pixels].
+    """Blender's Vector pass: the displacement of each pixel's content from now to the previous
+    frame, and from the next frame to now, (height, width, 4) [pixels].
 
     Args:
         before, now, after: places in the picture at these times, (height, width, 2) [pixels].
@@ -155,7 +155,7 @@ def projected(camera: Camera, points: Floats, size: tuple[int, int]) -> Floats:
 
 
 def unprojected(camera: Camera, depth: Floats) -> Floats:
-    """What a depth buffer sees, (height, width, 3) [m, world]."""
+    """Positions of the values of a depth buffer, (height, width, 3) [m, world]."""
     height, width = depth.shape
     x, y = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
     clip = np.stack([2.0 * x - 1.0, 2.0 * y - 1.0, 2.0 * depth - 1.0, np.ones_like(x)], axis=2)
@@ -165,8 +165,8 @@ def unprojected(camera: Camera, depth: Floats) -> Floats:
 
 
 def _around(groom: Snapshot, strand: Ints, place: Floats) -> tuple[list[Floats], Floats]:
-    """The four points around places on strands, (n, 3) each, and where between the middle two,
-    (n, 1); beyond its ends a strand goes on straight."""
+    """The four points around places on strands, (n, 3) each, and the fraction between the middle
+    two, (n, 1); strands are extended straight beyond their ends."""
     first = groom.layout.offsets[strand].astype(np.int64)
     last = groom.layout.counts[strand].astype(np.int64) - 1
     along = place.astype(np.float64) * last

@@ -1,20 +1,19 @@
 """The lights' opacity maps: how much hair lies between each light and every place.
 
-    starts  R32UI: depths of the first and the last hair, where layers are deep
-    spans   RGBA32F: where layers start and how thick they are, with how both go on from block to
-            block
-    meshes  depth array: of the first mesh
-    slots   RGBA32F arrays, as many as a framebuffer is given at once, at most six: four layers a
-            texel
+    starts  R32UI: depths of the first and the last hair, for deep layers
+    spans   RGBA32F: start and thickness of the layers in each block of texels, with their slopes
+    meshes  depth array: depth of the first mesh
+    slots   RGBA32F arrays, as many as are attached to a framebuffer at once, at most six: four
+            layers per texel
 
-Each light that throws shadows has a map: in `starts` and `spans` one square above the other, the
-last hair's, or thickness, to the right of the first one's; in the slots as many layers of an array
-as it takes passes to draw all its texels, texel t in slot t % slots.
+Each light that casts shadows has a map. In `starts` and `spans` maps are squares, stacked
+vertically, with the last hair or the thickness to the right of the first hair or the start. In the
+slots, a map has as many array layers as it takes passes to draw all its texels, with texel t in
+slot t % slots.
 
-Drawn are first the depths of meshes; then where deep layers start and end, but for hair that meshes
-hide; then the sums of the layers by additive blending. What has not changed since the last draw is
-not drawn again, so that a moving camera costs nothing. Lights that are attached to a view which
-moves lag a little behind it.
+Drawn are, in this order, the depths of meshes; start and end of deep layers, without hair that
+meshes hide; and the sums of the layers, by additive blending. Only changes are drawn again, so that
+a moving camera costs nothing. Shadows of lights that are attached to a moving view lag a little.
 """
 
 from __future__ import annotations
@@ -42,7 +41,7 @@ from .snapshot import Caster
 from .textures import drawing_into, drawing_state
 
 _NOTHING = (0.0, 0.0, 0.0, 0.0)
-#: while a view turns, shadows lag behind its lights by about this angle, and never by more [rad]
+#: while a view turns: typical and largest angle by which shadows lag behind its lights [rad]
 _LAG, _MAX_LAG = float(np.radians(8.0)), float(np.radians(20.0))
 _SPANS_RECIPE = ShaderRecipe(
     name="opacity_spans",
@@ -62,9 +61,9 @@ _NO_STARTS_RECIPE = ShaderRecipe(
 
 @dataclass(frozen=True, eq=False)
 class OpacityMaps:
-    """What shading reads: the block `Opacity`, and the textures.
+    """The inputs of shading: the block `Opacity`, and the textures.
 
-    note: what the artist is to know of them, or nothing.
+    note: a note on them to the artist, or empty.
     """
 
     values: Floats
@@ -77,17 +76,17 @@ class OpacityMaps:
 
     @property
     def passes(self) -> int:
-        """How many layers of each slot a map has: one a pass that draws it."""
+        """Array layers of a map in each slot: one for each pass that draws it."""
         return self.size.passes
 
     @property
     def mesh_feature(self) -> ShaderFeature:
-        """What a program has that leaves out hair behind meshes, whose depths are drawn by then."""
+        """The feature of programs that skip hair behind meshes, whose depths are drawn first."""
         return ShaderFeature(textures={"opacity_meshes": ("DEPTH_2D_ARRAY", self.meshes)})
 
     @property
     def feature(self) -> ShaderFeature:
-        """What a program that reads them has."""
+        """The feature of programs that read the maps."""
         arrays = {f"opacity_{slot}": array for slot, array in enumerate(self.slots)}
         named = {name: ("FLOAT_2D_ARRAY", array) for name, array in arrays.items()}
         named["opacity_meshes"] = ("DEPTH_2D_ARRAY", self.meshes)
@@ -108,13 +107,13 @@ class OpacityMaps:
 
     @property
     def span_feature(self) -> ShaderFeature:
-        """What a program has that knows where deep layers start and end."""
+        """The feature of programs that read start and end of deep layers."""
         return ShaderFeature(
             name="deep", textures={"opacity_spans": ("FLOAT_2D", self.spans)}, defines={"DEEP": 1}
         )
 
     def find_spans(self, number: int) -> None:
-        """Of the first and the last hair that the light of this map meets."""
+        """Compute the spans of one map from its first and last depths."""
         side = self.size.side // START_TEXELS
         shader = program(_SPANS_RECIPE)
         shader.bind(
@@ -125,7 +124,7 @@ class OpacityMaps:
         shader.dispatch(side, side)
 
     def forget_starts(self, number: int) -> None:
-        """As if the light of this map had met no hair."""
+        """Clear the first and last depths of one map to those without hair."""
         side = self.size.side // START_TEXELS
         shader = program(_NO_STARTS_RECIPE)
         shader.bind(images={"starts": self.starts}, integers={"map_index": number, "side": side})
@@ -133,9 +132,9 @@ class OpacityMaps:
 
 
 def new_maps(values: Floats, size: MapSize) -> OpacityMaps:
-    """Textures of this size; what they hold is to be drawn."""
+    """Maps of this size, whose textures have yet to be drawn."""
     square, mesh_square = (size.side, size.side), (size.mesh_side, size.mesh_side)
-    # one texture alone would not be an array
+    # an array needs at least two layers
     count = max(size.map_count * size.passes, 2)
     slots = range(size.slots)
     arrays = tuple(gpu_objects.texture(square, layers=count, format="RGBA32F") for _ in slots)
@@ -154,13 +153,13 @@ class HairInMaps(Protocol):
 
     @property
     def state(self) -> Hashable:
-        """Another value whenever its maps are others."""
+        """A value that changes whenever the hair's maps change."""
 
     def draw_starts(self, maps: OpacityMaps, number: int, place: ShaderFeature) -> None:
-        """Write into `maps.starts` where the layers of one map start and end.
+        """Write the depths at which the layers of one map start and end into `maps.starts`.
 
         Args:
-            number: of the map. place: the block of the maps, and which light it is.
+            number: of the map. place: the block of the maps, and the light's index.
         """
 
     def draw_layers(self, features: Sequence[ShaderFeature]) -> None:
@@ -168,9 +167,9 @@ class HairInMaps(Protocol):
 
 
 class OpacityDrawing:
-    """Keeps the maps of one groom from draw to draw; making one touches no GPU.
+    """The maps of one groom, kept from draw to draw. Creating one does not touch the GPU.
 
-    is_behind: some maps are those of where their lights were before, see `maps`.
+    is_behind: some maps are of earlier positions of their lights, see `maps`.
     """
 
     def __init__(self) -> None:
@@ -196,11 +195,11 @@ class OpacityDrawing:
 
         Args:
             ball: around all hair.
-            lights: in the order in which the shader knows them.
-            casters: meshes, world space; another object whenever one is another.
-            spacing: of strands whose hairs fill the space between them [m]; 0: none do.
-            is_turning: the lights are attached to a view that moves. Then no more than one map a
-                frame is drawn again, as long as all of them lag little.
+            lights: in the order of the shader's lights.
+            casters: meshes, world space; pass a new object for each change.
+            spacing: distance of strands that represent the hairs between them [m]; 0: none do.
+            is_turning: the lights are attached to a view that moves. Then at most one map per frame
+                is drawn again, as long as all of them lag little.
         """
         frames = dict(enumerate(shadow_frames(lights, ball, settings)))
         wanted = {light: frame for light, frame in frames.items() if frame is not None}
@@ -229,7 +228,7 @@ class OpacityDrawing:
             self._maps = maps = replace(self._maps_of(values, size), note=note)
             self._casters.hold(casters)
             places = [(number, light) for number, light in enumerate(wanted) if light in due]
-            # all meshes first: else Mesa on the CPU reads depths of a map that it still draws
+            # all meshes first: else Mesa on the CPU reads depths of a map that is still being drawn
             for number, light in places:
                 self._draw_casters(maps, number, light, casters)
             for number, light in places:
@@ -239,7 +238,7 @@ class OpacityDrawing:
         return self._maps
 
     def _maps_of(self, values: Floats, size: MapSize) -> OpacityMaps:
-        """The textures of the draw before where they have this size, with other values."""
+        """Maps with these values, and the textures of the draw before if they have this size."""
         if self._maps is not None and self._maps.size == size:
             return replace(self._maps, values=values)
         self._meshes_drawn = {}
@@ -248,7 +247,7 @@ class OpacityDrawing:
     def _draw_casters(
         self, maps: OpacityMaps, number: int, light: int, casters: tuple[Caster, ...]
     ) -> None:
-        """The depths of meshes, if a light sees others than before, or from elsewhere."""
+        """Draw the depths of meshes, if the meshes or the light's view have changed."""
         rows = maps.values[: 4 * 4 * LIGHT_CAPACITY].reshape(4, LIGHT_CAPACITY, 4)[:, light]
         seen = tuple(map(id, casters)), rows.tobytes()
         if self._meshes_drawn.get(number) != seen:
@@ -262,7 +261,7 @@ def due_maps(
     """The lights whose maps are to be drawn, or drawn again.
 
     Args:
-        drawn, wanted: frames by light; either none is drawn yet, or all are.
+        drawn, wanted: frames by light; either none or all are drawn.
         is_turning: as for `OpacityDrawing.maps`.
     """
     if not drawn:
@@ -278,14 +277,14 @@ def due_maps(
 
 
 def _turn(one: LightFrame, other: LightFrame) -> float:
-    """The angle between the directions in which two frames look [rad]."""
+    """The angle between the directions of two frames [rad]."""
     along = one.to_depth[:3], other.to_depth[:3]
     lengths = np.linalg.norm(along[0]) * np.linalg.norm(along[1])
     return float(np.arccos(np.clip(along[0] @ along[1] / lengths, -1.0, 1.0)))
 
 
 def _draw_map(maps: OpacityMaps, number: int, light: int, hair: HairInMaps) -> None:
-    """The map of one light: where its layers start, then what they hold."""
+    """Draw the map of one light: the starts of its layers, then their sums."""
     place = ShaderFeature(
         blocks={"opacity": ("Opacity", maps.values)}, integers={"light_index": light}
     )

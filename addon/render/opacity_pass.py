@@ -1,7 +1,7 @@
-"""Draws strands into opacity maps, see opacity_maps.py: ribbons of one piece a segment.
+"""Draws strands into opacity maps, see opacity_maps.py: ribbons with one piece per segment.
 
-Strands of about as many points are one draw, see detail_classes.py. So programs take the spans of
-the strands that are drawn, in the order of these classes.
+Strands with similar point counts are one draw, see detail_classes.py. So programs read spans only
+of the strands that are drawn, in the order of these classes.
 """
 
 from __future__ import annotations
@@ -60,17 +60,17 @@ _STARTS_RECIPE = ShaderRecipe(
     images=(("R32UI", "starts", "READ_WRITE"),),
     integers=("drawn_count", "map_index", "first_instance"),
 )
-#: of a segment, where depth tests find the first and the last hair
+#: fewest sample points of a segment, where depth tests find the first and the last hair
 _FEWEST_POINTS = 8
 
 
 @dataclass(frozen=True, eq=False)
 class _Casting:
-    """Strands that throw the shadow of all: those of the lowest ranks, which stay the same ones
-    when a strand comes or goes; every nth would be others from there on.
+    """The strands that cast the shadow of all strands: those of the lowest ranks. If a strand is
+    added or removed, the others stay the same; choosing every nth strand would change them.
 
-    layout: of all strands. rank: see Snapshot. count: how many of them.
-    spans: their texture strand_spans, in the order in which they are drawn. classes: the draws.
+    layout: of all strands. rank: see Snapshot. count: number of chosen strands.
+    spans: their texture strand_spans, in drawing order. classes: the draws.
     """
 
     layout: StrandLayout
@@ -100,7 +100,7 @@ class _Casting:
 
 @dataclass(frozen=True, eq=False)
 class _Strands:
-    """Strands on the GPU. curves: where they are. casting: those that are drawn."""
+    """Strands on the GPU. curves: their points. casting: the strands that are drawn."""
 
     state: Hashable
     curves: ShaderFeature
@@ -117,8 +117,8 @@ class _Strands:
             draw_starts(maps, number, side, lambda: self._draw_points(maps, side, place))
 
     def _draw_points(self, maps: OpacityMaps, side: int, place: ShaderFeature) -> None:
-        """What may be the first or the last hair of a texel: two points a texel, along strands as
-        long as the map is broad.
+        """Draw sample points for the first and the last depth, enough that a strand as long as the
+        map is wide has two in each texel.
         """
         integers = {"first_instance": 0, "points_across": 0}
         shader = bound(
@@ -164,7 +164,7 @@ class _Strands:
 
 
 class OpacityPass:
-    """Keeps the maps of one groom's strands from draw to draw; making one touches no GPU."""
+    """The opacity maps of one groom's strands. Creating one does not touch the GPU."""
 
     def __init__(self) -> None:
         self.release()
@@ -177,7 +177,7 @@ class OpacityPass:
 
     @property
     def is_behind(self) -> bool:
-        """Whether maps are those of where lights were before, see OpacityDrawing.maps."""
+        """Whether some maps are of earlier positions of their lights, see OpacityDrawing.maps."""
         return self._drawing.is_behind
 
     def maps(
@@ -199,10 +199,10 @@ class OpacityPass:
         """The maps of a frame.
 
         Args:
-            points: texture of CVs, xyz [m, world] and radius, in this layout.
-            serial: another number whenever the points are others.
+            points: texture of CVs, xyz [m, world] and w radius, in this layout.
+            serial: changes whenever the points change.
             rank: see Snapshot.
-            looks: texture cv_looks where points are unevenly spaced, see strand_pass.py.
+            looks: texture cv_looks, if points are unevenly spaced, see strand_pass.py.
             ball, lights, casters, spacing, is_turning: as in OpacityDrawing.maps.
         """
         count = max(round(layout.strand_count * settings.strand_fraction), 1)

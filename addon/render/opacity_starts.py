@@ -1,7 +1,7 @@
-"""Where the deep layers of an opacity map start and end, by depth tests: no atomics of images.
+"""Start and end of the deep layers of an opacity map by depth tests, without image atomics.
 
-The depth of the first and of the last hair in two depth buffers, then the outermost of as many of
-their texels as fall onto one of `starts`.
+The depths of the first and of the last hair are drawn into two depth buffers, which are then
+reduced to the resolution of `starts`.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ _STARTS_RECIPE = ShaderRecipe(
 
 
 def draw_starts(maps: OpacityMaps, number: int, side: int, draw: Callable[[], None]) -> None:
-    """Write into `maps.starts` where the layers of one map start and end.
+    """Write the depths at which the layers of one map start and end into `maps.starts`.
 
     Args:
         side: of the depth buffers [texels]; a multiple of that of `starts`.
-        draw: all hair into the bound depth buffer.
+        draw: draws all hair into the bound depth buffer.
     """
     depths = {
         "first_depths": _depths(side, "LESS_EQUAL", 1.0, draw),
@@ -40,7 +40,8 @@ def draw_starts(maps: OpacityMaps, number: int, side: int, draw: Callable[[], No
 
 
 def _depths(side: int, depth_test: str, none: float, draw: Callable[[], None]) -> Any:
-    """A texture with the depth of the one hair in each texel that wins; `none` without any."""
+    """A texture with the depth of the hair that wins the depth test in each texel; `none` where
+    there is no hair."""
     depths = gpu_objects.texture((side, side), format="DEPTH_COMPONENT32F")
     target = gpu_objects.framebuffer(depth_slot=depths)
     with drawing_into(target), drawing_state(depth_test=depth_test):

@@ -1,4 +1,4 @@
-"""The layers of opacity maps side by side in one picture, to see what they hold."""
+"""The layers of opacity maps as tiles of one picture, for inspection."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ _RECIPE = ShaderRecipe(
 
 
 def opacity_tiles(maps: OpacityMaps, layer_count: int) -> Floats:
-    """How much light is left behind each layer, (height, width, 4) scene-linear.
+    """The transmittance behind each layer, (height, width, 4) scene-linear.
 
-    Row 0 is at the bottom. Layers of a map lie in rows from the top left on, 16 of them 4 x 4; of
-    deep ones the first tile is the depth at which they start, bright near the light. The maps of
-    several lights lie below one another, in the order of the lights.
+    Row 0 is at the bottom. The layers of a map are in rows from the top left on, 16 layers as
+    4 x 4. For deep layers the first tile is the depth at which they start, bright near the light.
+    The maps of several lights are below one another, in the order of the lights.
 
     Args:
-        layer_count: of the layers that a map has, see shading.volume.opacity.layer_ends.
+        layer_count: number of layers of a map, see shading.volume.opacity.layer_ends.
 
     Raises:
         HairloomError: no light has a map.

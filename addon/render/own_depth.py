@@ -1,4 +1,4 @@
-"""Depths of meshes in a viewport in which Blender leaves none."""
+"""Depths of meshes in a viewport whose depth buffer Blender leaves empty."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from .view_block import view_values
 
 
 class OwnDepth:
-    """Keeps the meshes of the last draw on the GPU; making one touches no GPU."""
+    """The meshes of the last draw on the GPU. Creating one does not touch the GPU."""
 
     def __init__(self) -> None:
         self.release()
         released_with_shaders(self)
 
     def release(self) -> None:
-        """Let go of all that lies on the GPU; the next draw uploads again."""
+        """Release everything on the GPU; the next draw uploads again."""
         self._view = UniformBlock()
         self._batches: list[tuple[Surface, Any]] = []
 

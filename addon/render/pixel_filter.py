@@ -1,6 +1,6 @@
-"""Where the samples of a pixel lie: one sequence, spread as a pixel filter weighs.
+"""Positions of a pixel's samples: a low-discrepancy sequence, distributed by the pixel filter.
 
-Samples that lie as densely as the filter weighs count equally: their mean is the filtered picture
+Samples whose density is that of the filter have equal weights: their mean is the filtered picture
 (Ernst, Stamminger and Greiner 2006, "Filter importance sampling").
 
 Pure numpy: importable without gpu.
@@ -12,18 +12,18 @@ import numpy as np
 
 from ..arrays import Floats
 
-#: of the generalised golden ratio in two dimensions, the real root of x^3 = x + 1
+#: the generalised golden ratio in two dimensions, the real root of x^3 = x + 1
 #: (Roberts 2018, "The unreasonable effectiveness of quasirandom sequences")
 _PLASTIC = 1.32471795724474602596
-#: of the window of Blackman and Harris (Harris 1978), which Blender's engines filter by
+#: coefficients of the Blackman-Harris window (Harris 1978), the filter of Blender's engines
 _HARRIS = (0.35875, -0.48829, 0.14128, -0.01168)
 _TABLE = 4096
 
 
 def jitters(count: int, filter_size: float) -> Floats:
-    """Places of `count` samples of a pixel, (count, 2) [pixels] from its middle.
+    """Positions of `count` samples of a pixel, (count, 2) [pixels] from its centre.
 
-    The first one is the middle itself. More samples begin with those of fewer.
+    The first one is the centre. More samples begin with those of fewer.
 
     Args:
         filter_size: width of the filter [pixels], Blender's default is 1.5.
@@ -33,7 +33,7 @@ def jitters(count: int, filter_size: float) -> Floats:
 
 
 def _fraction_to_place(fraction: Floats) -> Floats:
-    """Where this fraction of the filter's weight lies to the left, in -0.5 to 0.5."""
+    """The place in -0.5..0.5 to the left of which this fraction of the filter's weight lies."""
     edges = np.linspace(0.0, 1.0, _TABLE + 1)
     middles = (edges[:-1] + edges[1:]) / 2.0
     weights = sum(a * np.cos(2.0 * np.pi * k * middles) for k, a in enumerate(_HARRIS))

@@ -1,7 +1,8 @@
-"""Parts of a picture that are drawn one after the other, because all of it at once has no room.
+"""Parts of a picture that are drawn one after the other, if all of it does not fit into memory.
 
-A part is a run of pixels, row by row; where one pixel alone is too much, a range of depths in it.
-Depths are cut where hair is, which may be a thousandth of all: each part is a draw of all strands.
+A part is a run of pixels, row by row; if a single pixel is too much, a range of depths in it.
+Depths are divided within the range of the hair, which may be a thousandth of all depths, since each
+part costs a draw of all strands.
 Pure numpy: importable without gpu.
 """
 
@@ -15,19 +16,19 @@ from ..arrays import Ints
 from ..shading.volume.light_frame import Ball
 from .camera import Camera
 
-#: the float bits of all depths, from 0 to 1, are below it; as floats above 0 do, they grow
+#: end of the range of float bits of depths from 0 to 1; bits of floats from 0 on rise with them
 DEPTH_END = 0x3F800001
 ALL_DEPTHS = range(DEPTH_END)
-#: of the distance of the farthest hair, how near the nearest is expected
+#: smallest expected distance of hair, as a fraction of the largest
 _NEAREST = 1.0 / 16.0
 
 
 @dataclass(frozen=True)
 class PixelPart:
-    """Pixels from `first` on, up to and without `end`, counted row by row from the bottom left, and
-    depths from `near` on, up to and without `far`, as float bits.
+    """Pixels from `first` up to but without `end`, counted row by row from the bottom left, and
+    depths from `near` up to but without `far`, as float bits.
 
-    expected: depths that hair may have; others are in a part all the same.
+    expected: range of the hair's depths, used to divide parts; other depths are in parts too.
     """
 
     first: int
@@ -38,7 +39,7 @@ class PixelPart:
 
     @property
     def halves(self) -> tuple[PixelPart, ...]:
-        """Two parts that are this one, the farther first; none where it cannot be cut."""
+        """This part divided in two, the farther first; empty if it cannot be divided."""
         pixel = (self.first + self.end) // 2
         if self.end - self.first > 1:
             return replace(self, end=pixel), replace(self, first=pixel)
@@ -46,7 +47,7 @@ class PixelPart:
 
     @property
     def slabs(self) -> tuple[PixelPart, ...]:
-        """The farther half of its depths and the nearer one; none where it has but one depth."""
+        """The farther and the nearer half of its depths; empty if it has only one depth."""
         if self.far - self.near < 2:
             return ()
         low, high = max(self.near, self.expected.start), min(self.far, self.expected.stop)
@@ -56,22 +57,22 @@ class PixelPart:
         return replace(self, near=depth), replace(self, far=depth)
 
     def rows(self, across: int) -> range:
-        """The rows that it touches, where a row has `across` pixels."""
+        """The rows that it touches, for rows of `across` pixels."""
         return range(self.first // across, (self.end - 1) // across + 1)
 
 
 def pixel_parts(
     counts: Ints, capacity: int, longest: int | None = None, expected: range = ALL_DEPTHS
 ) -> list[PixelPart]:
-    """As few parts as hold all pixels that have something, each with no more than has room.
+    """The fewest parts that cover all pixels with fragments, each with no more than fit.
 
-    A pixel that has more by itself is a part of its own. A part with a pixel that has more than
-    `longest` is two, by depth, the farther one first.
+    A pixel with more fragments than that is a part by itself. A part that has a pixel with more
+    than `longest` is divided in two by depth, the farther first.
 
     Args:
-        counts: (pixel_count,) how much there is in each.
-        capacity: how much has room, at least 1.
-        longest: how much of a pixel can be drawn at once; None: as much as there is.
+        counts: (pixel_count,) fragments of each pixel.
+        capacity: number of fragments that fit, at least 1.
+        longest: most fragments of a pixel that can be drawn at once; None: any number.
         expected: see PixelPart.
     """
     passed = np.cumsum(counts, dtype=np.int64)
@@ -88,7 +89,7 @@ def pixel_parts(
 
 
 def expected_depths(ball: Ball, camera: Camera) -> range:
-    """The float bits of depths that a ball has in a picture, where it does not reach the eye."""
+    """The float bits of a ball's depths in a picture, limited to distances of at least _NEAREST."""
     away = -float(camera.view[2, :3] @ ball.center + camera.view[2, 3])
     farthest = away + ball.radius
     seen = -np.array([max(away - ball.radius, _NEAREST * farthest), farthest])

@@ -1,4 +1,4 @@
-"""Vertices without attributes, from which shaders make ribbons; one strip for all instances."""
+"""Vertices without attributes for ribbons, which shaders place; one strip for all instances."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from . import gpu_objects
 
 
 class Ribbons:
-    """Strips by how many pieces they have room for, and points, made on first use."""
+    """Strips by their number of pieces, and points, made on first use."""
 
     def __init__(self) -> None:
         self._batches: dict[tuple[str, int], Any] = {}
 
     def of(self, capacity: int) -> Any:
-        """A strip of two vertices a station, and one station more than pieces."""
+        """A strip with two vertices per station, and one station more than pieces."""
         return self._batch("TRI_STRIP", 2 * (capacity + 1))
 
     def points(self, count: int) -> Any:
-        """As many vertices, a point each."""
+        """A batch of this many points."""
         return self._batch("POINTS", count)
 
     def _batch(self, kind: str, count: int) -> Any:

@@ -1,31 +1,31 @@
-"""Strands that ride on guides, computed on the GPU: what StrandPass draws without an upload.
+"""Strands that ride on guides, computed on the GPU, where StrandPass draws them without an upload.
 
-The same as motion_flow.strands_and_led, in dispatches over textures in the layout of
+Equivalent to motion_flow.strands_and_led, as dispatches on textures in the layout of
 strand_layout.strand_rows:
 
-    vertices ------> ride_roots ------> root_motions                    one invocation a strand
-    guides_now ----> ride_guides -----> guide_turns                     one a guide
-                     ride ------------> cv_points                       one a strand
-                     lead_out, hold, changed in place
+    vertices ------> ride_roots ------> root_motions                    one invocation per strand
+    guides_now ----> ride_guides -----> guide_turns                     one per guide
+                     ride ------------> cv_points                       one per strand
+                     lead_out, hold: change cv_points in place
 
-New with every frame are the head's vertices that hold a root, or a matrix, and the guides.
+Uploaded with every frame are the guides, and the head's vertices that hold a root, or a matrix.
 
     root_holds    RGBA32F: first texel xyz the triangle's vertices, second xy weights of b and c
     rest_frames   RGBA32F: xyz of four texels origin, tangent, bitangent, normal at rest
     rest_points   RGBA32F: xyz position at rest [m, world], w radius [m]
-    guide_points  RGBA32F: xyz CVs of the guides at rest [m, world], w whether the segment from
-                           there on may be drawn out
-    guide_strands R32F:    the strand that each guide is
+    guide_points  RGBA32F: xyz CVs of the guides at rest [m, world], w whether the segment that
+                           begins there may stretch
+    guide_strands R32F:    the strand of each guide
     guide_turns   RGBA32F: the rotation of each segment of the guides since rest, a quaternion, and
-                           last xyz how far the guide has left its root [m]
-    rest_turns    RGBA32F: the same of guides at rest
-    guide_axes    RGBA32F: of each segment of the guides, where curls may be drawn out: xyz where
-                           it points as its root carries it, w by which fraction it is longer
-    guide_weights RGBA32F: xyz of three texels the guides, their weights, their segments a metre
-    strand_spans  RGBA32F: where the points of each strand lie, see strand_layout.StrandLayout
+                           last xyz the guide's displacement from its root [m]
+    rest_turns    RGBA32F: the same for guides at rest
+    guide_axes    RGBA32F: for each segment of the guides, where curls may stretch: xyz direction as
+                           carried by the root, w extension as a fraction
+    guide_weights RGBA32F: xyz of three texels the guides, their weights, their segments per metre
+    strand_spans  RGBA32F: the points of each strand, see strand_layout.StrandLayout
     cv_points     RGBA32F: xyz position now [m, world], w radius [m]
 
-Whole numbers lie in them as floats, exact below 2^24.
+Whole numbers are stored as floats, exact below 2^24.
 """
 
 from __future__ import annotations
@@ -81,9 +81,9 @@ def _guides_recipe(*, curls: bool) -> ShaderRecipe:
 
 @cache
 def _ride_recipe(*, curls: bool, solids: SolidKinds | None = None) -> ShaderRecipe:
-    """The pass that moves strands, which may find who is too near to colliders."""
+    """The program that moves strands; with `solids` it also finds those too near to colliders."""
     names = ["root_motions", "guide_weights", "strand_spans"]
-    # software drivers find a level of detail for each texel of a texture, but not of an image
+    # images, since software drivers compute a level of detail for each fetch from a texture
     images: tuple[tuple[str, ...], ...] = (
         ("RGBA32F", "cv_points"),
         ("RGBA32F", "rest_points", "READ"),
@@ -110,16 +110,17 @@ def _ride_recipe(*, curls: bool, solids: SolidKinds | None = None) -> ShaderReci
 
 
 GUIDES_RECIPE, CURLED_GUIDES_RECIPE = _guides_recipe(curls=False), _guides_recipe(curls=True)
-#: Rounds of loops that ride.comp.glsl takes for a point, but for colliders.
+#: Loop iterations of ride.comp.glsl per point, without those for colliders.
 _POINT_ROUNDS = 8
 
 
 @dataclass(frozen=True, eq=False)
 class RideTexels:
-    """What is uploaded of all strands, as it lies in its textures. A thread may make it, for which
-    the window's frame would wait.
+    """The data of all strands in the layout of its textures. It can be made in a thread, so that
+    the window does not wait for it.
 
-    rest_points, guide_weights, strand_spans, root_holds: as above; no root_holds without a head.
+    rest_points, guide_weights, strand_spans, root_holds: as above; root_holds is None without a
+    head.
     """
 
     layout: StrandLayout
@@ -152,19 +153,20 @@ def _weight_texels(riders: Riders) -> Floats:
 
 
 class RidePass:
-    """The strands of one groom on the GPU. Making one touches no GPU; `carry` and `ride` do.
+    """The strands of one groom on the GPU. Creating one does not touch the GPU; `carry` and `ride`
+    do.
 
     Args:
-        strands: world space at rest; bound when there is a head.
+        strands: world space at rest; bound if there is a head.
         root_holds: how a head holds them; None for hair that one matrix carries.
         guides: (guide_count,) indices of the strands that are simulated.
-        guide_grid: (guide_count, cv_count, 3) [m], the lines that are simulated, at rest.
-        riders: how the strands ride on them.
+        guide_grid: (guide_count, cv_count, 3) [m], the simulated lines at rest.
+        riders: how the strands ride on the guides.
         holds: where strands are held by ties or by a surface; None: nowhere.
-        colliders: where these are uploaded to; None: to a place of its own.
-        texels: of these strands, if they are made already.
+        colliders: uploads shared with other passes; None: its own.
+        texels: of these strands, if already made.
 
-    leading: what leads strands out of colliders.
+    leading: the pass that leads strands out of colliders.
     """
 
     def __init__(
@@ -192,7 +194,7 @@ class RidePass:
         released_with_shaders(self.points)  # a snapshot may outlive this pass
 
     def take_style(self, strands: StrandSet, guide_grid: Floats, riders: Riders) -> None:
-        """The same strands and guides have other shapes at rest from the next frame on."""
+        """Use other rest shapes of the same strands and guides from the next frame on."""
         self._strands, self._guide_grid, self._riders = strands, guide_grid, riders
         self._root_mean = strands.roots.mean(axis=0, dtype=np.float64)
         self._texels = None
@@ -203,13 +205,12 @@ class RidePass:
     def carry(
         self, head_positions: Floats | None, matrix: Floats, anchors: Floats | None = None
     ) -> None:
-        """Show every strand in its rest shape, carried rigidly by its own root, and where it is
-        held.
+        """Set every strand to its rest shape, carried rigidly by its root, and to its holds.
 
         Args:
             head_positions: (vertex_count, 3) [m], world space; None for hair without a head.
-            matrix: (4, 4), moves rest world space to now; carries hair without a head.
-            anchors: what holds strands, see `groom.holds.anchors_of`; None: nothing does.
+            matrix: (4, 4) from world space at rest to now; carries hair without a head.
+            anchors: of the holds, see `groom.holds.anchors_of`; None: nothing is held.
 
         Raises:
             ShaderError: a shader does not compile here.
@@ -227,18 +228,18 @@ class RidePass:
         led: LedOut = NOT_LED,
         since: float = np.inf,
     ) -> None:
-        """Show every strand carried by its root and moved with its guides.
+        """Set every strand to where its root carries it and its guides move it.
 
         Args:
             head_positions, matrix, anchors: as in `carry`.
             guides_now: (guide_count, cv_count, 3) [m], world space, or a texture RGBA32F that
                 holds them in the layout of strand_layout.strand_rows.
-            colliders: what strands are led out of, once `leading` knows their clearance.
+            colliders: out of which strands are led, once `leading` has their clearance.
             led: strands that were led out of colliders earlier.
-            since: time since the frame that was shown last [s], if this one goes on from there.
+            since: time since the last frame [s], if this one continues it; else infinite.
 
         Raises:
-            HairloomError: a collider that the GPU cannot have.
+            HairloomError: a collider that the GPU does not support.
             ShaderError: a shader does not compile here.
             ValueError: guides of another shape.
         """
@@ -252,20 +253,20 @@ class RidePass:
         self._run_ride("guide_turns", anchors, colliders, led, since)
 
     def read(self) -> Floats:
-        """The strands as they are shown, (point_count, 3) float32 [m], world space."""
+        """The current points of the strands, (point_count, 3) float32 [m], world space."""
         assert self.points.texture is not None, "nothing is shown yet"
         pixels = texture_to_array(self.points.texture)
         return np.ascontiguousarray(self.points.layout.values(pixels)[:, :3])
 
     def read_led(self) -> LedOut:
-        """Those that were led out of colliders."""
+        """The strands that were led out of colliders, read back."""
         led = self.leading.led()
         if not len(led):
             return NOT_LED
         return LedOut.of(led, self.read(), self._strands.offsets)
 
     def release(self) -> None:
-        """Let go of all that lies on the GPU; the next frame uploads it again."""
+        """Release everything on the GPU; the next frame uploads it again."""
         self._textures: dict[str, Any] = {}
         self.points.release()
         self.leading.release()
@@ -274,16 +275,16 @@ class RidePass:
 
     @property
     def _segment_count(self) -> int:
-        """Of each guide."""
+        """Segments of each guide."""
         return int(self._guide_grid.shape[1]) - 1
 
     @property
     def _mover_count(self) -> int:
-        """How many root motions there are: one for each strand, or one for all."""
+        """Number of root motions: one for each strand, or one for all."""
         return 1 if self._root_holds is None else self._strands.strand_count
 
     def _take_pose(self, head_positions: Floats | None, matrix: Floats) -> None:
-        """Write root_motions, and the middle of all roots."""
+        """Compute root_motions, and the middle of all roots."""
         if not self._textures:
             self._upload()
         if self._root_holds is None or head_positions is None:
@@ -295,7 +296,7 @@ class RidePass:
         self._run_roots(head_positions)
 
     def _upload(self) -> None:
-        """Everything that is constant, and the textures that the shaders write."""
+        """Upload constant data, and make the textures that the shaders write."""
         strands, textures = self._strands, self._textures
         count, texels = strands.strand_count, self._texels
         if texels is None:
@@ -320,7 +321,7 @@ class RidePass:
             textures |= {"frames": textures["rest_frames"], "rest_frames": rest_frames}
 
     def _upload_style(self, rest_points: Floats, guide_weights: Floats) -> None:
-        """What depends on the shapes at rest.
+        """Upload what depends on the shapes at rest.
 
         Args:
             rest_points, guide_weights: texels of all strands.
@@ -406,14 +407,14 @@ class RidePass:
 
 
 def _padded(values: Floats) -> Floats:
-    """Three channels (n, m, 3) as four, the last 0, float32: textures have no three."""
+    """Three channels (n, m, 3) padded to four with 0, float32: no texture has three channels."""
     padded = np.zeros((*values.shape[:2], 4), np.float32)
     padded[..., :3] = values
     return padded
 
 
 def _empty(strand_count: int, column_count: int) -> Any:
-    """A texture RGBA32F of the size that strand_rows gives, zero everywhere."""
+    """An RGBA32F texture in the layout of strand_rows, cleared to 0."""
     return _cleared(strand_rows_size(strand_count, column_count))
 
 
@@ -430,8 +431,8 @@ def _named(textures: dict[str, Any], *names: str) -> dict[str, Any]:
 def matrix_motion(matrix: Floats) -> Floats:
     """An affine (4, 4) motion of the world as the one root motion of all strands, (1, 4, 4).
 
-    As ride_roots.comp.glsl writes it: xyz a column of the turn and w a coordinate of the shift,
-    three times, then xyz the rest origin.
+    In the layout of ride_roots.comp.glsl: three texels with a column of the turn in xyz and a
+    coordinate of the shift in w, then xyz the rest origin.
     """
     motion = np.zeros((1, 4, 4))
     motion[0, :3, :3] = (matrix[:3, :3] - np.eye(3)).T

@@ -1,4 +1,4 @@
-"""Draws a whole scene: meshes first, then the strands of all grooms, each in its own light."""
+"""Draws a whole scene: meshes first, then the strands of all grooms, then their cards."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from .textures import texture_to_array
 
 type Rgba = tuple[float, float, float, float]
 
-#: A render in the window draws in a separate thread, and passes share textures.
+#: For renders in the window, which draw in a separate thread, since passes share textures.
 ONE_AT_A_TIME = threading.Lock()
 _NOTHING: Rgba = (0.0, 0.0, 0.0, 0.0)
 _ALL: Rgba = (1.0, 1.0, 1.0, 1.0)
@@ -42,12 +42,12 @@ _NOWHERE: Rgba = (0.0, 0.0, 0.0, -1.0)
 
 @dataclass(frozen=True, eq=False)
 class ShaftsApart:
-    """Shafts of light beside a picture whose meshes are holes.
+    """Shafts of light in a texture of their own, for a picture in which meshes are holes.
 
-    light: RGBA32F texture of the picture's size that gets them.
-    behind: the picture that is seen through the holes, see BrightThings; None: nothing is.
-    shows_world: the world is in that picture, so that its bright places are bright things and no
-        lights as well.
+    light: RGBA32F texture of the picture's size into which they are drawn.
+    behind: the picture that is visible through the holes, see BrightThings; None: the sky alone.
+    shows_world: the world is in that picture, so that its bright places make shafts as bright parts
+        and not also as lights.
     """
 
     light: Any
@@ -56,13 +56,13 @@ class ShaftsApart:
 
 
 def shafts_of(scene: SceneSnapshot) -> ShaftSettings | None:
-    """By what settings a scene has shafts of light: those of the first groom that has them."""
+    """The settings of a scene's shafts of light: those of the first groom that has shafts."""
     grooms = (groom.snapshot.shafts for groom in scene.grooms)
     return next((each for each in grooms if each.use_shafts), None)
 
 
 class ScenePass:
-    """Keeps a scene on the GPU from draw to draw; making one touches no GPU."""
+    """A scene on the GPU, kept from draw to draw. Creating one does not touch the GPU."""
 
     def __init__(self) -> None:
         self._grooms: dict[Hashable, GroomPass] = {}
@@ -84,8 +84,8 @@ class ScenePass:
 
         Args:
             size: width and height [pixels].
-            sky: what is seen where nothing is.
-            apart: where shafts of light go if not into the picture.
+            sky: background colour.
+            apart: the separate texture for shafts of light; None: they are drawn into the picture.
 
         Raises:
             ShaderError: a shader does not compile here, or points on the GPU were released.
@@ -107,7 +107,7 @@ class ScenePass:
         shafts = shafts_of(scene)
         holes = {groom.key for groom in scene.grooms if groom.is_holdout}
         seen = lit.keys() - holes
-        # shafts ask alpha what stands before a light
+        # shafts use alpha to find what stands before a light
         goes_under = shafts is not None and apart is None
         target.sized(*size).clear(_NOTHING if goes_under else sky)
         with target.drawing():
@@ -130,9 +130,10 @@ class ScenePass:
     def draw_hair_shadow(
         self, scene: SceneSnapshot, camera: Camera, target: Target, size: tuple[int, int]
     ) -> None:
-        """Draw the fraction of their light that hair leaves to meshes, by colour; 1 elsewhere.
+        """Draw the shadow of hair on meshes: the fraction of light, by colour, that hair lets
+        through; 1 elsewhere.
 
-        Others, and errors, as of `draw`.
+        Arguments and errors as of `draw`.
         """
         with ONE_AT_A_TIME, gpu_memory.shared_by(len(scene.grooms)):
             maps = self._maps(scene)
@@ -141,21 +142,21 @@ class ScenePass:
                 self._draw_meshes(scene, camera, size, maps, is_hair_shadow=True)
 
     def _maps(self, scene: SceneSnapshot) -> dict[Hashable, OpacityMaps | None]:
-        """What is in the way of light in each groom; grooms that are no longer there are let go."""
+        """The opacity maps of each groom. Also releases grooms that are no longer in the scene."""
         self._forget_but(scene)
         lit = {groom.key: scene.lit(groom) for groom in scene.grooms}
         return {key: self._groom(key).maps(groom) for key, groom in lit.items()}
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What the artist should know of the last draw, each with its remedy."""
+        """Notes to the artist on the last draw, each with its remedy."""
         return tuple(dict.fromkeys(chain(*(each.notes for each in self._grooms.values()))))
 
     def nearest(
         self, scene: SceneSnapshot, camera: Camera, target: Target, size: tuple[int, int]
     ) -> Nearest:
-        """What lies in the middle of each pixel. A strand hides what is behind it, whatever its
-        transparency, and is no thinner than *Min Width*; cards and meshes do where they cover at
+        """The nearest surface at the centre of each pixel. Strands are opaque, whatever their
+        transparency, and no thinner than *Min Width*; cards and meshes count where they cover at
         least a half.
         """
         with ONE_AT_A_TIME, gpu_memory.shared_by(len(scene.grooms)):
@@ -188,7 +189,8 @@ class ScenePass:
         target: Target,
         size: tuple[int, int],
     ) -> Floats:
-        """Values of vertices where a mesh is nearest, (height, width, 3); 0 elsewhere.
+        """Interpolated vertex values of the nearest mesh at each pixel, (height, width, 3); 0
+        elsewhere.
 
         Args:
             values: (vertex_count, 3) of each mesh.
@@ -204,7 +206,7 @@ class ScenePass:
     def tangents(
         self, scene: SceneSnapshot, camera: Camera, target: Target, size: tuple[int, int]
     ) -> Floats:
-        """Sums of the unit tangents of all strands that are seen, each as strong as it covers the
+        """Sums of the unit tangents of all visible strands, weighted by their coverage of the
         pixel, (height, width, 3), world space, root to tip. Cards have none.
         """
         with ONE_AT_A_TIME, gpu_memory.shared_by(len(scene.grooms)):
@@ -221,10 +223,10 @@ class ScenePass:
     def coverages(
         self, scene: SceneSnapshot, camera: Camera, target: Target, size: tuple[int, int]
     ) -> tuple[dict[str, Floats], Floats]:
-        """How much of each pixel each object covers, by name, and all hair, as `draw` has them;
-        (height, width) each. Meshes that are blended, and holdouts, cover nothing.
+        """The coverage of each pixel by each object, by name, and by all hair, in the picture of
+        `draw`, (height, width) each. Blended meshes and holdouts cover nothing.
         """
-        # as `draw` has them: strands before cards, holes last
+        # in the order of `draw`: strands before cards, holes last
         grooms = sorted(
             scene.grooms, key=lambda each: (each.is_holdout, each.snapshot.cards is not None)
         )
@@ -262,7 +264,7 @@ class ScenePass:
         size: tuple[int, int],
         maps: dict[Hashable, OpacityMaps | None],
     ) -> None:
-        """These grooms alone, in the order of the scene."""
+        """Draw only these grooms, in the order of the scene."""
         grooms = [(key, groom) for key, groom in lit.items() if key in keys]
         for key, groom in grooms:
             own = self._groom(key)
@@ -282,8 +284,8 @@ class ScenePass:
         *,
         is_hair_shadow: bool = False,
     ) -> None:
-        """Each mesh with the maps of the groom that is nearest, and what the others have in the way
-        of light.
+        """Draw each mesh with the maps of the nearest groom, and the optical depth of the other
+        grooms.
         """
         shading = [groom for groom in scene.grooms if maps[groom.key] is not None]
         centers = np.array([scene.lit(groom).center for groom in shading]).reshape(-1, 3)
@@ -313,7 +315,7 @@ class ScenePass:
             )
 
     def _forget_but(self, scene: SceneSnapshot) -> None:
-        """Let go of grooms that are no longer there."""
+        """Release grooms that are no longer in the scene."""
         keys = {groom.key for groom in scene.grooms}
         for passes in (self._grooms, self._mesh_passes):
             for key in set(passes) - keys - {None}:
@@ -321,14 +323,14 @@ class ScenePass:
 
 
 def _opaque(snapshot: Snapshot) -> Snapshot:
-    """The same hair, whose strands hide all that is behind them."""
+    """The same hair with opaque strands."""
     opaque = replace(snapshot.strand_settings, transparency="none")
     return replace(snapshot, strand_settings=opaque)
 
 
 def _places(scene: SceneSnapshot, sample: int) -> list[Placed]:
-    """Meshes by their index, with as many holes as they are drawn with; others are seen through
-    those that are blended."""
+    """The meshes that are not blended, by index, with the same holes as when they are drawn. Others
+    are visible through blended ones, which are skipped."""
     return [
         Placed(mesh, float(index), shifts(index, sample))
         for index, mesh in enumerate(scene.meshes)

@@ -1,4 +1,4 @@
-"""A whole scene as it is drawn: meshes, grooms and light, as plain arrays.
+"""A whole scene for drawing: meshes, grooms and lights, as plain arrays.
 
 Pure numpy: importable without gpu.
 """
@@ -22,9 +22,9 @@ class DrawnGroom:
     """One groom of a scene.
 
     key: equal from moment to moment.
-    snapshot: its own meshes, lights and ambient count for nothing, the scene's stand for them.
-    name, number: of its object; what Cryptomattes and the object mask hold where it is seen.
-    is_holdout: it hides what is behind it and is a hole in the picture itself.
+    snapshot: its meshes, lights and ambient are ignored; those of the scene are used.
+    name, number: of its object, for Cryptomattes and the object mask.
+    is_holdout: it hides what is behind it and is itself a hole in the picture.
     """
 
     key: Hashable
@@ -38,8 +38,8 @@ class DrawnGroom:
 class SceneSnapshot:
     """One moment of a scene.
 
-    casters: meshes that throw shadows, seen or not, world space.
-    mesh_shadows: of meshes on meshes.
+    casters: meshes that cast shadows, visible or not, world space.
+    mesh_shadows: settings of shadows of meshes on meshes.
     ambient, harmonics: the world's, see Snapshot.
     """
 
@@ -53,8 +53,8 @@ class SceneSnapshot:
     _lit: dict[Hashable, Snapshot] = field(default_factory=dict, init=False, repr=False)
 
     def lit(self, groom: DrawnGroom) -> Snapshot:
-        """The groom in the scene's light, on the mesh that is nearest, among all that throw
-        shadows; the same object as long as the scene is the same.
+        """The groom in the scene's light, on its nearest mesh, with all meshes that cast shadows;
+        the same object for each call.
         """
         if groom.key not in self._lit:
             near = _nearest(self.casters, groom.snapshot.center)
@@ -77,7 +77,7 @@ class SceneSnapshot:
         return self if lights == self.lights else replace(self, lights=lights)
 
     def unlit_by_hair(self) -> Snapshot:
-        """Nothing but light, for meshes that no hair shades."""
+        """A snapshot with only the lights, for meshes that no hair shades."""
         none = np.zeros((0, 3), np.float32)
         return Snapshot(
             none,
@@ -89,13 +89,13 @@ class SceneSnapshot:
 
 
 def shaded_by(meshes: tuple[MeshSnapshot, ...], centers: Floats) -> list[int]:
-    """For each mesh the groom whose shadow falls on it: the one that is nearest.
+    """For each mesh the groom whose shadow falls on it: the nearest one.
 
     Args:
-        centers: (groom_count, 3) [m], the middles of the grooms that throw shadows.
+        centers: (groom_count, 3) [m], the middles of the grooms that cast shadows.
 
     Returns:
-        Indices into `centers`; all -1 without any.
+        Indices into `centers`; all -1 if there are none.
     """
     if not len(centers):
         return [-1] * len(meshes)
@@ -103,8 +103,9 @@ def shaded_by(meshes: tuple[MeshSnapshot, ...], centers: Floats) -> list[int]:
 
 
 def _nearest(meshes: tuple[MeshSnapshot, ...], center: Floats) -> MeshSnapshot | None:
-    """The mesh that hair around this place grows from, as far as that is known: of those whose
-    box holds the place, skin before a cap that is worn on it, then the smallest.
+    """The mesh from which hair around this place probably grows: the one with the nearest box; of
+    several, such as those whose boxes contain the place, skin before a cap worn on it, then the
+    smallest.
     """
 
     def rank(mesh: MeshSnapshot) -> tuple[float, bool, float]:

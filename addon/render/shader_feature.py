@@ -1,7 +1,7 @@
-"""What programs have for one purpose, such as Marschner's model or opacity maps: said once.
+"""Features: the declarations and values of programs for one purpose, such as opacity maps.
 
-A feature holds each declaration together with the value that a draw gives it; `feature_programs`
-makes programs of them. Nothing here needs a GPU.
+A feature holds each declaration together with its value for a draw, so that both are in one place;
+`feature_programs` composes programs from features. Nothing here needs a GPU.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from ..arrays import Floats
 class ShaderFeature:
     """Part of a program.
 
-    name: what it adds to the program's name; nothing where all programs of a recipe have it.
+    name: appended to the program's name; empty for features of all programs of a recipe.
     blocks: (struct, std140 values) by name. textures: (sampler type, texture) by name.
     integers: by name. numbers: (type, value) by name.
     inputs, varyings, outputs: as in ShaderRecipe.
-    defines: value by name; one that the recipe has as well takes its place.
+    defines: values by name, which override those of the recipe.
     """
 
     name: str = ""

@@ -1,8 +1,8 @@
-"""From a recipe to a compiled shader, kept for ever, and its resources bound completely.
+"""Compiled shaders from recipes, cached until exit, with checks that all resources are bound.
 
-Shaders are never dropped while Blender runs: one that is collected while bound is used after it
-is freed. `release()` is for the end: a GPU object that outlives Blender's
-GPU, as those do that are alive when a script calls sys.exit(), crashes it.
+Shaders are never dropped while Blender runs: one that is collected while bound is used after it is
+freed. `release()` is for exit: a GPU object that outlives Blender's GPU context, such as one alive
+when a script calls sys.exit(), crashes Blender.
 """
 
 from __future__ import annotations
@@ -25,28 +25,28 @@ from ..params.glsl import struct_source
 from . import gpu_objects
 from .shader_source import SHADER_FOLDER, ShaderError, ShaderText, compose
 
-#: what a compute shader may do with an image, and Blender's words for it
+#: accesses of a compute shader to an image, with Blender's qualifiers
 ACCESSES = {"WRITE": {"WRITE"}, "READ": {"READ"}, "READ_WRITE": {"READ", "WRITE"}}
-#: Blender's word for the kind of an image, where it holds no floats
+#: Blender's image types of formats that are not floats
 _IMAGE_KINDS = {"R32UI": "UINT_2D", "RGBA32UI": "UINT_2D"}
 
 
 @dataclass(frozen=True)
 class ShaderRecipe:
-    """All that a shader is made of. Slots are given in the order of declaration.
+    """All inputs of a shader program. Slots are assigned in the order of declaration.
 
     vertex, fragment, compute: file names in `folders`.
     structs: files with the structs that blocks use; they come before everything else.
     settings: parameter sets whose structs, named after the classes, blocks use as well.
     blocks: (struct, name) of each uniform block.
     textures: (sampler type, name).
-    images: (format, name) of what shaders write; (format, name, access) with an access of
-        ACCESSES for those that they read as well.
+    images: (format, name) of images that shaders write; (format, name, access) with one of ACCESSES
+        for those that they read.
     integers: names of INT push constants (UINT ones stay 0 on OpenGL); numbers: (type, name).
     inputs: (type, name) of vertex attributes; varyings: (interpolation, type, name).
     outputs: (type, name) of fragment outputs.
     group_size: compute local size in x, or in x and y.
-    defines: (name, value) of preprocessor names: one file, several programs.
+    defines: (name, value) for the preprocessor, so that one file makes several programs.
     """
 
     name: str
@@ -80,7 +80,7 @@ class ShaderRecipe:
 
 
 class ShaderProgram:
-    """A compiled shader that refuses to run with a resource missing."""
+    """A compiled shader that checks that all resources are bound."""
 
     def __init__(self, recipe: ShaderRecipe) -> None:
         self.recipe = recipe
@@ -97,11 +97,11 @@ class ShaderProgram:
     ) -> None:
         """Bind the shader and each declared resource; call before every draw or dispatch.
 
-        Blender's binding slots are global, and an unbound resource crashes Vulkan. The caller
-        keeps the resources alive until it has drawn: what is freed is unbound.
+        Blender's binding slots are global, and an unbound resource crashes Vulkan. The caller must
+        keep the resources alive until it has drawn: freeing one unbinds it.
 
         Raises:
-            ShaderError: a declared resource is not given, or one is given that is not declared.
+            ShaderError: a declared resource is missing, or one is given that is not declared.
         """
         recipe = self.recipe
         self._require("block", [name for _, name in recipe.blocks], blocks)
@@ -122,12 +122,12 @@ class ShaderProgram:
             self.shader.uniform_float(name, number)
 
     def run(self, width: int, height: int = 1) -> None:
-        """Run what is bound, a compute shader, for this many invocations, up to whole groups."""
+        """Run the bound compute shader for this many invocations, rounded up to whole groups."""
         across, down = (*self.recipe.group_size, 1)[:2]
         gpu.compute.dispatch(self.shader, -(-width // across), -(-height // down), 1)
 
     def dispatch(self, width: int, height: int = 1) -> None:
-        """As `run`, and bind nothing after it."""
+        """As `run`, and unbind the shader after it."""
         self.run(width, height)
         gpu.shader.unbind()
 
@@ -139,7 +139,7 @@ class ShaderProgram:
 
 
 class Releasable(Protocol):
-    """Something that keeps GPU objects, and can let go of them and make them again."""
+    """An owner of GPU objects that can release them and make them again."""
 
     def release(self) -> None: ...
 
@@ -149,10 +149,10 @@ _KEEPERS: weakref.WeakSet[Releasable] = weakref.WeakSet()
 
 
 def program(recipe: ShaderRecipe) -> ShaderProgram:
-    """The compiled shader of a recipe; compiled on the first call, in a context that can draw.
+    """The compiled shader of a recipe, compiled on the first call, in a context that can draw.
 
     Raises:
-        ShaderError: it does not compose or compile; the message has file, line and log.
+        ShaderError: it does not compose or compile; the message contains file, line and log.
     """
     if recipe not in _PROGRAMS:
         _PROGRAMS[recipe] = ShaderProgram(recipe)
@@ -160,13 +160,13 @@ def program(recipe: ShaderRecipe) -> ShaderProgram:
 
 
 def released_with_shaders(keeper: Releasable) -> None:
-    """Have `release()` release this one too, as long as it lives."""
+    """Have `release()` also release this one, as long as it exists."""
     _KEEPERS.add(keeper)
 
 
 @atexit.register
 def release() -> None:
-    """At exit: let go of all shaders and of what passes keep."""
+    """At exit: release all shaders and the GPU objects of all passes."""
     for keeper in list(_KEEPERS):
         keeper.release()
     if _PROGRAMS:
@@ -215,14 +215,14 @@ def _create_info(recipe: ShaderRecipe, texts: Mapping[str, ShaderText]) -> Any:
 
 
 def struct_sources(recipe: ShaderRecipe) -> str:
-    """The structs of its blocks, which come before everything else."""
+    """The source of the structs for its blocks, which comes before everything else."""
     structs = [compose(file, recipe.folders).source for file in recipe.structs]
     structs += [struct_source(settings, settings.__name__) for settings in recipe.settings]
     return "\n".join(structs)
 
 
 def uses_image_atomics(texts: Mapping[str, ShaderText]) -> bool:
-    """Whether a program needs what not every backend has, see capabilities.py."""
+    """Whether a program uses image atomics, which not every backend has, see capabilities.py."""
     return any("imageAtomic" in text.source for text in texts.values())
 
 
@@ -243,7 +243,8 @@ def _declare_drawing(info: Any, recipe: ShaderRecipe, texts: Mapping[str, Shader
 
 
 def _mapped(log: str, texts: Mapping[str, ShaderText]) -> str:
-    """The log in the places of our files; a line says first which stage it is about."""
+    """The log with places in our files. A line that names a stage sets it for itself and the lines
+    after it."""
     stage, lines = next(iter(texts)), []
     for line in log.splitlines():
         for candidate in texts:
@@ -254,7 +255,7 @@ def _mapped(log: str, texts: Mapping[str, ShaderText]) -> str:
 
 
 class _Log:
-    """What was written to standard output while it was caught."""
+    """The text captured from standard output."""
 
     def __init__(self) -> None:
         self.file = tempfile.TemporaryFile()  # noqa: SIM115 - closed by text()
@@ -267,13 +268,13 @@ class _Log:
 
 @contextlib.contextmanager
 def _standard_output() -> Iterator[_Log]:
-    """Catch what Blender's C side prints, which is where the compiler's log goes."""
+    """Capture the output of Blender's C code, where the compiler's log is printed."""
     log = _Log()
     try:
         if sys.stdout is not None:
             sys.stdout.flush()
         kept = os.dup(1)
-    except OSError:  # a Blender without a console has no standard output to catch
+    except OSError:  # a Blender without a console has no standard output
         yield log
         return
     os.dup2(log.file.fileno(), 1)

@@ -1,9 +1,9 @@
-"""Shaders as text: includes and names resolved, every line traceable to its file.
+"""Shader sources: includes and constants resolved, with every line traceable to its file.
 
-Two things are understood beyond GLSL, each on its own terms:
-    #include "lib_x.glsl"   pulls in a file of gpu_shaders/, once a shader
-    {{name}}                a constant that Python declares once, see CONSTANTS
-An unknown include or name is an error here, with file and line, before any driver sees it.
+Two extensions to GLSL:
+    #include "lib_x.glsl"   inserts a file of gpu_shaders/, once per shader
+    {{name}}                a constant that is declared in Python, see CONSTANTS
+An unknown file or name raises an error with file and line, before any driver compiles it.
 Importable and testable without gpu.
 """
 
@@ -73,43 +73,43 @@ from .pixel_parts import DEPTH_END
 
 SHADER_FOLDER = Path(__file__).resolve().parents[2] / "gpu_shaders"
 
-#: A texture side may be 16384 texels on every GPU that Blender supports.
+#: Largest texture side that every GPU supported by Blender has [texels].
 STRAND_ROWS = 16384
-#: Texels of the dynamics' table of moments: of the substep itself, and of each collider.
+#: Texels of the dynamics' table of moments: for the substep itself, and for each collider.
 MOMENT_TEXELS, COLLIDER_TEXELS = 1 + -(-MODES // 4), 13
-#: Strands that are counted at once, of which some are led out of colliders.
+#: Strands per block in which those to be led out of colliders are counted.
 LEAD_BLOCK = 128
 #: Round solids, and nodes of distance fields, in one row of their textures.
 ROUNDS_ACROSS, FIELD_ROW = 512, 4096
-#: Regions behind the head that culling looks into, at most; a strand's are bits of one number.
+#: Most regions behind the head for culling; a strand's regions are bits of one integer.
 SHADE_CAPACITY = 16
-#: Texels of four layers that an opacity map may have: three passes of six slots, for 64 slices.
+#: Most texels, of four layers each, of an opacity map: three passes of six slots, for 64 slices.
 LAYER_TEXEL_CAPACITY = 18
-#: How depth is kept where an opacity map's deep layers start and end.
+#: Scale of depths as integers in `starts` of opacity maps.
 START_SCALE = float(1 << 24)
-#: Strands' fragments in one row of the texture that holds the lists of all pixels.
+#: Fragments of strands per row of the texture with the lists of all pixels.
 LAYER_ROW = 4096
-#: [pixels] half the width up to which a strand is made wider for others that are not drawn
+#: half width to which a strand may be widened to replace others that are not drawn [pixels]
 THIN_STRAND = 1.5
-#: binary digits of how many layers a pixel may have
+#: binary digits of the largest number of layers of a pixel
 LIST_DIGITS = 26
 #: Triangles, seams and copies of seams' ends in one row of the textures of skin.
 SKIN_TRIANGLES_ACROSS, SKIN_SEAMS_ACROSS, SKIN_COPIES_ACROSS = 1024, 1024, 4096
-#: Pixels between the layers of a map that are shown side by side.
+#: Pixels between the tiles that show the layers of a map.
 TILE_GAP = 2
-#: masks hold what covers more of a pixel than this, as Cycles has it
+#: masks hold objects that cover more of a pixel than this, as in Cycles
 COVERS = 0.5
-#: added to light on the screen that something is divided by
+#: added to brightness on the screen before dividing by it
 NO_LIGHT = 1.0e-4
-#: the strongest lights, for which one groom shades others: a channel of a texture each
+#: number of lights, the strongest, for which grooms shade each other: a texture channel each
 OTHER_TAU_LIGHTS = 4
-#: how a pass writes its colour; see encoded() in lib_output.glsl
+#: encodings of a pass's colour; see output_encoded() in lib_output.glsl
 OUTPUTS = ("scene_linear", "viewport")
-#: what strands may be coloured by in place of their shading, see lib_debug_color.glsl
+#: colours of strands instead of their shading, see lib_debug_color.glsl
 DEBUG_VIEWS = ("none", "detail", "guide", "group", "occlusion", "stretch", "depth")
-#: a change of length that is shown in full colour, as a fraction; and a depth, of the hair's radius
+#: a relative change of length, and a depth as a fraction of the hair's radius, shown in full colour
 SHOWN_STRETCH, SHOWN_DEPTH = 0.01, 0.02
-#: the choices of DetailSettings, by the numbers under which shaders know them
+#: the choices of DetailSettings; shaders use their indices
 DETAIL_CHOICES = {
     parameter.name: tuple(name for name, _, _ in parameter.choices)
     for parameter in DetailSettings.parameters()
@@ -237,11 +237,11 @@ _COMPILER_LINE = re.compile(r"python_shader\.glsl:(\d+)")
 
 
 class ShaderError(RuntimeError):
-    """A shader that cannot be composed, compiled or bound; it says where, and the log."""
+    """A shader that cannot be composed, compiled or bound; the message has place and log."""
 
 
 def output_index(output: str) -> int:
-    """The number by which shaders know an output.
+    """The index of an output in shaders.
 
     Raises:
         ValueError: there is no such output.
@@ -269,18 +269,18 @@ class ShaderText:
         return f"{file}:{number}"
 
     def mapped(self, log: str) -> str:
-        """A compiler log with its line numbers turned into places in our files."""
+        """A compiler log with line numbers replaced by places in our files."""
         return _COMPILER_LINE.sub(lambda found: self.place(int(found.group(1))), log)
 
 
 def compose(name: str, folders: Sequence[Path] = (SHADER_FOLDER,)) -> ShaderText:
-    """The file of this name with all that it includes, each file once, in order of need.
+    """The file of this name with all included files, each once, before the first that needs it.
 
     Args:
-        folders: searched in turn; tests put their own before SHADER_FOLDER.
+        folders: searched in order; tests put their own before SHADER_FOLDER.
 
     Raises:
-        ShaderError: an unknown file or name, with the file and line that asks for it.
+        ShaderError: an unknown file or name, with the file and line that refers to it.
     """
     lines: list[str] = []
     origins: list[tuple[str, int]] = []
@@ -296,7 +296,7 @@ def _append(
     lines: list[str],
     origins: list[tuple[str, int]],
 ) -> None:
-    """Add one file to the end of `lines`, what it includes before the line that includes it."""
+    """Append one file to `lines`, with each included file inserted in place of its include."""
     if name in done:
         return
     done.add(name)
@@ -309,7 +309,7 @@ def _append(
 
 
 def _read(name: str, asked_by: str, folders: tuple[Path, ...]) -> tuple[tuple[str, str], ...]:
-    """The lines of a file, each with the file that it includes; "" for none."""
+    """The lines of a file, each with the name of the file that it includes, "" for none."""
     for folder in folders:
         file = folder / name
         if file.is_file():
@@ -319,7 +319,7 @@ def _read(name: str, asked_by: str, folders: tuple[Path, ...]) -> tuple[tuple[st
 
 @cache
 def _lines(file: Path, _written: int) -> tuple[tuple[str, str], ...]:
-    """As `_read`; many programs include the same files."""
+    """As `_read`, cached, since many programs include the same files."""
     lines = []
     for number, line in enumerate(file.read_text(encoding="utf-8").splitlines(), start=1):
         include = _INCLUDE.match(line)

@@ -7,7 +7,7 @@ import numpy as np
 from ..arrays import Floats
 from ..shading.shafts import REACH, LightOnScreen, PolarGrid
 
-#: what recipes that read it have
+#: structs and blocks of recipes that read it
 STRUCTS, BLOCKS = ("struct_shafts.glsl",), (("Shafts", "shafts"),)
 
 

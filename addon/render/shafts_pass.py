@@ -1,4 +1,4 @@
-"""Shafts of light into a finished picture; the reference is shading/shafts.py."""
+"""Draws shafts of light into a finished picture; the reference is shading/shafts.py."""
 
 from __future__ import annotations
 
@@ -58,11 +58,11 @@ def finish_with_shafts(
     settings: ShaftSettings,
     background: tuple[float, float, float, float],
 ) -> None:
-    """Add all shafts to a picture that was drawn over nothing, and put a colour under it.
+    """Add all shafts to a picture without a background, and composite it over a colour.
 
     Args: as of `add_shafts` and `put_under`.
     """
-    # shafts from lights throw none themselves
+    # before `add_shafts`, since shafts from lights must not count as bright parts
     behind = plain(background) if wants_bright(settings) else None
     bright = BrightThings(picture, behind, camera, settings)
     add_shafts(picture, drawn, depth, camera, lights, settings)
@@ -79,12 +79,12 @@ def shafts_apart(
     lights: Sequence[Light],
     settings: ShaftSettings,
 ) -> None:
-    """Add all shafts to a texture beside the picture.
+    """Add all shafts to a texture of their own.
 
     Args:
         into: RGBA32F, black at first.
-        drawn, depth: hair over holes where meshes are, and the depth of both.
-        behind: what lies under the hair, the picture of another engine, as of `BrightThings`.
+        drawn, depth: hair with holes for meshes, and the depth of both.
+        behind: the background of the hair, which is another engine's picture, as of `BrightThings`.
             Others as of `add_shafts`.
     """
     bright = BrightThings(drawn, behind, camera, settings)
@@ -104,14 +104,14 @@ def add_shafts(
 ) -> None:
     """Add the haze of the lights in view, and the shafts in it, to a picture on the GPU.
 
-    Where no light is in view, or shafts are off, the picture stays as it is to the bit.
+    If no light is in view, or shafts are off, the picture stays bit-identical.
 
     Args:
-        picture: RGBA32F texture, scene-linear and premultiplied; it is changed. It was drawn over
-            nothing, since alpha says what stands before a light; see `put_under`.
-        drawn, depth: the colour and depth that it was averaged from, with a whole number of texels
+        picture: RGBA32F texture, scene-linear and premultiplied, changed in place. It must not have
+            a background, since its alpha determines what stands before a light; see `put_under`.
+        drawn, depth: the colour and depth from which it was averaged, with a whole number of texels
             along each side of a pixel; `drawn` may be the picture itself.
-        is_apart: meshes are holes in `drawn` and known by their depth alone.
+        is_apart: meshes are holes in `drawn`, so that only their depth shows them.
     """
     width, height = picture.width, picture.height
     seen = lights_on_screen(lights, camera.view, camera.projection, width, height, settings)
@@ -120,7 +120,7 @@ def add_shafts(
 
 
 def put_under(picture: Any, background: tuple[float, float, float, float]) -> None:
-    """Put a premultiplied colour under a picture that was drawn over nothing."""
+    """Composite a picture without a background over a premultiplied colour."""
     shader = program(_UNDER)
     shader.bind(images={"picture": picture}, numbers={"background": background})
     shader.dispatch(picture.width, picture.height)

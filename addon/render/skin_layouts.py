@@ -1,4 +1,4 @@
-"""Layouts of heads, kept from render to render: making one takes longer than drawing it.
+"""A cache of heads' layouts from render to render: making one takes longer than drawing it.
 
 Pure numpy: importable without gpu.
 """
@@ -13,10 +13,10 @@ from ..arrays import Floats, Ints
 from ..shading.skin.layout import SkinLayout, skin_layout
 from ..strands import Surface
 
-#: heads that are kept
+#: number of heads that are kept
 _CAPACITY = 8
-#: A layout serves a head whose edges are this much longer or shorter at most: so much wider or
-#: narrower is the blur there.
+#: Largest relative change of a head's edges with which a layout is reused; the width of the blur is
+#: wrong by as much there.
 _STRETCH = 0.05
 
 
@@ -42,7 +42,7 @@ _kept: list[_Kept] = []
 
 
 def layout_of(surface: Surface, resolution: int) -> SkinLayout:
-    """`skin_layout`, or one of before that serves this surface as well."""
+    """`skin_layout`, or an earlier result that also fits this surface."""
     edges = np.linalg.norm(surface.corners - np.roll(surface.corners, 1, axis=1), axis=2)
     for kept in _kept:
         if kept.serves(surface, edges, resolution):
@@ -55,5 +55,5 @@ def layout_of(surface: Surface, resolution: int) -> SkinLayout:
 
 
 def forget() -> None:
-    """Keep none."""
+    """Clear the cache."""
     _kept.clear()

@@ -1,13 +1,13 @@
-"""Draws soft shadows on heads: how much light reaches the skin, in UV space, spread along it.
+"""Draws soft shadows on heads: the light that reaches the skin, in UV space, blurred along it.
 
-    texels     what each texel of a head's UV map shows: triangle, two weights, island
-    stretches  its width and height [m], and the nearest seam
-    shadow     the fraction of each light that reaches the skin, a channel a light, at first as it
-               is; spread along rows and then along columns
-    shifts     what closes seams where three or more meet
+    texels     for each texel of a head's UV map its triangle, two weights, island
+    stretches  width and height of each texel [m], and the nearest seam
+    shadow     the fraction of each light that reaches the skin, a channel per light; first sharp,
+               then blurred along rows and along columns
+    shifts     corrections that close seams where three or more sides meet
 
-The layout (addon/shading/skin/layout.py) is made when a head's triangles or UVs are others; the
-shadow when anything has moved.
+The layout (addon/shading/skin/layout.py) is made when a head's triangles or UVs change; the shadow
+when anything has moved.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from .skin_layouts import layout_of
 from .snapshot import Color, MeshSnapshot
 from .textures import texture_from, texture_to_array
 
-#: what a program that looks the shadow up needs
+#: textures of programs that look up the shadow
 SKIN_TEXTURES = tuple(
     ("FLOAT_2D", f"skin_{name}") for name in ("shadow", "texels", "stretches", "seams", "shifts")
 )
@@ -69,7 +69,7 @@ _CORNER_RECIPE = ShaderRecipe(
 
 @dataclass(eq=False)
 class SkinShadow:
-    """The shadow on one head.
+    """The soft shadow on one head.
 
     textures: by their names in the shader, see SKIN_TEXTURES.
     """
@@ -79,7 +79,7 @@ class SkinShadow:
 
     @property
     def feature(self) -> ShaderFeature:
-        """What a program that looks the shadow up has."""
+        """The feature of programs that look up the shadow."""
         return ShaderFeature(
             name="skin",
             textures={name: (kind, self.textures[name]) for kind, name in SKIN_TEXTURES},
@@ -89,15 +89,15 @@ class SkinShadow:
         )
 
     def picture(self) -> Floats:
-        """The map as a picture, (rows, columns, channels), row 0 at v = 0: the fraction of each
-        light that reaches the skin, 1 where there is none.
+        """The map as an array (rows, columns, channels), row 0 at v = 0: the fraction of each light
+        that reaches the skin, 1 where there is no skin.
         """
         return texture_to_array(self.textures["skin_shadow"])
 
 
 @dataclass(frozen=True, eq=False)
 class _Drawn:
-    """What a shadow depends on."""
+    """The inputs of a shadow."""
 
     positions: Floats
     opacity: OpacityMaps
@@ -122,8 +122,8 @@ class _Drawn:
 class _Head:
     """A head on the GPU.
 
-    size: [m] the square root of its area when its layout was made.
-    drawn: of what its shadow was drawn.
+    size: square root of its area when its layout was made [m].
+    drawn: inputs from which its shadow was drawn.
     """
 
     triangles: Ints
@@ -144,13 +144,13 @@ class _Head:
 
 
 class SkinPass:
-    """Keeps layouts and shadows of the heads that were drawn last; making one touches no GPU."""
+    """Layouts and shadows of the heads drawn last. Creating one does not touch the GPU."""
 
     def __init__(self) -> None:
         self.release()
 
     def release(self) -> None:
-        """Let go of all that lies on the GPU; the next draw makes it again."""
+        """Release everything on the GPU; the next draw makes it again."""
         self._heads: list[_Head] = []
         self._blocks = UniformBlocks()
 
@@ -165,14 +165,14 @@ class SkinPass:
         *,
         of_hair_alone: bool = False,
     ) -> dict[int, SkinShadow]:
-        """The soft shadow on each mesh that is skin, by the mesh's id(); none on those whose UVs
-        are of no use, and none at all without opacity maps or softness.
+        """The soft shadow on each mesh that is skin, by the mesh's id(). Meshes with unusable UVs
+        have none; without opacity maps or softness there are none.
 
         Args:
-            light_count: lights that the maps know of.
-            forward: the fraction of light that hair sends on, by colour; the shadow is that of
-                their mean.
-            shadows: of all meshes, beyond the maps.
+            light_count: number of lights in the maps.
+            forward: the fraction of light that hair scatters forward, by colour; the shadow uses
+                its mean.
+            shadows: of all meshes, beyond the opacity maps.
             of_hair_alone: without the shadows of meshes.
         """
         if opacity is None or not settings.soft_shadow or not settings.softness:
@@ -226,7 +226,7 @@ class SkinPass:
         return head.shadow
 
     def _reaching(self, head: _Head, surface: Surface, wanted: _Drawn) -> Any:
-        """How much of each light reaches the skin, as it is."""
+        """The fraction of each light that reaches the skin, before the blur."""
         corners = texture_from(
             _in_rows(surface.corners.reshape(-1, 3), 3 * SKIN_TRIANGLES_ACROSS), "RGBA32F"
         )
@@ -248,12 +248,12 @@ class SkinPass:
 
 
 def head_size(surface: Surface) -> float:
-    """What the softness of its shadow is a fraction of: the square root of its area [m]."""
+    """The size of a head, of which softness is a fraction: the square root of its area [m]."""
     return float(np.sqrt(areas_of(surface.corners.astype(np.float64)).sum()))
 
 
 def layout_textures(layout: SkinLayout) -> dict[str, Any]:
-    """A layout on the GPU, as lib_skin.glsl and skin_*.comp.glsl read it, by name."""
+    """The textures of a layout for lib_skin.glsl and skin_*.comp.glsl, by name."""
     texels = np.dstack([layout.triangle, layout.weights, layout.island])
     stretches = np.dstack([layout.stretch, layout.seam, np.zeros_like(layout.seam)])
     count = len(layout.seams)
@@ -272,7 +272,7 @@ def layout_textures(layout: SkinLayout) -> dict[str, Any]:
 
 
 def spread(shadow: Any, textures: dict[str, Any], softness: float, axis: int) -> Any:
-    """The texture spread by `softness` metres along rows (axis 0) or columns (axis 1)."""
+    """The texture blurred by `softness` metres along rows (axis 0) or columns (axis 1)."""
     found, shader = _like(shadow), program(_BLUR_RECIPE)
     names = ("skin_texels", "skin_stretches")
     shader.bind(
@@ -286,7 +286,7 @@ def spread(shadow: Any, textures: dict[str, Any], softness: float, axis: int) ->
 
 
 def closing_shifts(shadow: Any, textures: dict[str, Any]) -> Any:
-    """A texture with two texels a seam, see skin_corner.comp.glsl."""
+    """A texture with two texels per seam, see skin_corner.comp.glsl."""
     seams = textures["skin_seams"]
     found = gpu_objects.texture((seams.width // 2, seams.height), format="RGBA32F")
     shader = program(_CORNER_RECIPE)
@@ -300,7 +300,7 @@ def closing_shifts(shadow: Any, textures: dict[str, Any]) -> Any:
 
 
 def _in_rows(values: Floats, across: int) -> Floats:
-    """Values (n, channels) as texels, `across` a row, (rows, across, 4)."""
+    """Values (n, channels) as texels, `across` per row, (rows, across, 4)."""
     rows = max(-(-len(values) // across), 1)
     texels = np.zeros((rows * across, 4), np.float32)
     texels[: len(values), : values.shape[1]] = values

@@ -1,4 +1,4 @@
-"""What is drawn, as plain arrays: no live data of Blender ever reaches a pass.
+"""The data that is drawn, as plain arrays: passes never access live Blender data.
 
 Pure numpy: importable without gpu.
 """
@@ -29,9 +29,9 @@ from .strand_layout import NO_STRANDS, StrandLayout
 
 type Color = tuple[float, float, float]
 
-#: how meshes that do not cover all are drawn
+#: ways of drawing partly transparent meshes
 TRANSPARENCIES = ("opaque", "hashed", "blended")
-#: what a snapshot has of each point, and its channels
+#: fields of a snapshot with a value for each point, and their channels
 _OF_POINTS = {
     "points": (3,),
     "rest": (3,),
@@ -51,9 +51,10 @@ SKIN_SPECULAR, SKIN_ROUGHNESS = 0.028, 0.45
 class Skin:
     """The head that a mesh is, or is a part of, for the soft shadow on it (render/skin_pass.py).
 
-    surface: the whole head, world space; hand its triangles and UVs on as the same objects while
-        they are the same.
-    triangle: (triangle_count,) of the mesh: which of the head's they are; None is all of them.
+    surface: the whole head, world space; pass the same objects for triangles and UVs while they do
+        not change.
+    triangle: (triangle_count,) for each triangle of the mesh its index in the head; None: the mesh
+        is the head.
     """
 
     surface: Surface
@@ -62,12 +63,12 @@ class Skin:
 
 @dataclass(frozen=True, eq=False)
 class MeshPictures:
-    """Pictures of a material, laid over the UVs of the mesh's surface, again and again beyond them.
+    """Pictures of a material over the UVs of the mesh's surface, repeated beyond 0..1.
 
-    Hand the same array on where nothing changed. Row 0 is at v = 0.
+    Pass the same array while nothing changes. Row 0 is at v = 0.
 
     color: (height, width, 4) scene-linear, straight alpha, instead of the mesh's own colour.
-    normal: (height, width, 4) normals in tangent space, 0 to 1; bump: how strong they are.
+    normal: (height, width, 4) normals in tangent space, 0 to 1; bump: their strength.
     """
 
     color: Floats | None = None
@@ -81,18 +82,18 @@ class MeshSnapshot:
 
     vertex_normals: (vertex_count, 3) unit vectors.
     color: scene-linear albedo.
-    occlusion: (vertex_count,) light that arrives, 0 to 1; None is 1 everywhere.
-    specular: the fraction of the light that the boundary reflects where it falls straight in.
-    roughness: of the boundary, as Principled has it.
+    occlusion: (vertex_count,) fraction of ambient light that arrives, 0 to 1; None: 1 everywhere.
+    specular: reflectance of the boundary at normal incidence.
+    roughness: of the boundary, as in Principled.
     key: of the mesh, equal from moment to moment. name: of its object, in Cryptomattes.
-    number: what object masks hold where it is seen.
-    is_holdout: it hides what is behind it and is a hole in the picture itself.
-    skin: the head that it is a part of; None is no skin, on which shadows have hard edges.
-    pictures: of its material; None, and on a surface without UVs, its colour alone.
-    alpha: how much it covers, times the alpha of its picture.
-    emission: scene-linear light that it gives off to the eye alone.
-    transparency: one of TRANSPARENCIES: "opaque" whatever alpha says; "hashed" has as many holes as
-        alpha asks for, finer than pixels; "blended" is drawn last, the farthest first.
+    number: of its object, in object masks.
+    is_holdout: it hides what is behind it and is itself a hole in the picture.
+    skin: the head that it is a part of; None: it is not skin, and shadows on it have hard edges.
+    pictures: of its material; None, or on a surface without UVs: its colour alone.
+    alpha: its coverage, times the alpha of its picture.
+    emission: scene-linear radiance that it emits towards the eye; it lights nothing.
+    transparency: one of TRANSPARENCIES: "opaque" ignores alpha; "hashed" has holes, finer than
+        pixels, as many as alpha requires; "blended" is drawn last, the farthest first.
     """
 
     surface: Surface
@@ -131,7 +132,7 @@ class MeshSnapshot:
         return cls(surface, surface.vertex_normals(), color, occlusion, skin=skin)
 
 
-#: what throws shadows: a mesh with its alpha, or one that covers all
+#: a mesh that casts shadows, with alpha or opaque
 type Caster = Surface | MeshSnapshot
 
 
@@ -143,14 +144,14 @@ def surface_of(caster: Caster) -> Surface:
 class DevicePoints:
     """CVs that are computed on the GPU and stay there.
 
-    Whoever computes them writes the next moment into the same texture, so a picture shows them as
-    they are when it is drawn, and lets go of it when the GPU goes.
+    Their owner writes each next moment into the same texture, so a draw shows their current state;
+    and releases it at the end of the GPU.
 
-    layout: where they lie in the texture.
+    layout: of the texture.
     texture: RGBA32F, xyz position [m, world] and w radius [m]; None before the first moment and
         after the release.
     center: (3,) [m], the middle of all roots.
-    serial: grows whenever the texture is written, so that others know what is out of date.
+    serial: grows whenever the texture is written, so that readers can tell what is out of date.
     """
 
     layout: StrandLayout
@@ -167,48 +168,51 @@ class DevicePoints:
 class Snapshot:
     """One moment of hair, the meshes around it, and the light.
 
-    Strands have as many points as each needs. What belongs to points is taken as a grid as well,
-    (strand_count, cv_count, ...), of strands that have equally many; it is held point by point.
+    Each strand has as many points as it needs. Values of points may also be given as a grid,
+    (strand_count, cv_count, ...), for strands of one point count; they are stored point by point.
 
     points: (point_count, 3) float32 [m], world space, strand after strand, root first.
     radius: (point_count,) float32 [m].
-    layout: which points each strand has; of a grid it follows. Hand the same one on.
-    along: (point_count,) the fraction of its strand's length at which each point lies at rest, 0 at
-        the root and 1 at the tip; None where points are evenly spaced.
-    extinction, spacing: factor on the light that a strand blocks, and how far apart [m] the strands
-        are whose hairs fill the space between them, see `groom.widths.Widths`.
-    occlusion: (point_count,) ambient light that arrives, 0 to 1; None is 1 everywhere.
+    layout: the points of each strand; set from the shape of a grid. Pass the same one on.
+    along: (point_count,) arc length of each point at rest as a fraction of its strand's length, 0
+        at the root and 1 at the tip; None: points are evenly spaced.
+    extinction, spacing: factor on the light that a strand blocks, and distance [m] of strands that
+        represent the hairs between them, see `groom.widths.Widths`.
+    occlusion: (point_count,) fraction of ambient light that arrives, 0 to 1; None: 1 everywhere.
     openness: (point_count, 4), how much of the world's light comes straight to each point, by
-        direction, see ambient.openness_field; None is what occlusion and the hair's volume say.
-    skin_seen: (point_count, 8), the skin that each point sees, see light_flow.skin_seen_by;
-        None is skin right beneath, as under hair on a plane.
-    color: (point_count, 3) scene-linear, the strands' own; None is the look's, and so is NaN, all
-        along a strand. Counts where the look wants it, see drawn_strands.drawn_color.
-    seed: (strand_count,) whole numbers below 2^24, which the noise of a strand depends on; None is
-        each strand's index.
-    ambient, harmonics: the world's mean radiance [W/(m^2 sr)], and how it differs by direction,
-        (8, 3), see shading/environment.py; None is not at all.
-    volume_center: (3,) [m], what strands look away from; None is the middle of all roots.
-    device_points: the same strands where the GPU has moved them; they are drawn in place of
-        `points` and `radius`, which then only say how large the hair is.
-    guide, group: (strand_count,) whole numbers, what debug_view shows; None is 0 everywhere.
-    rank: (strand_count,) in 0..1, below 1: when a groom gets small, strands of high rank go first
-        (refine/thinning.py); None draws all of them always.
+        direction, see ambient.openness_field; None: derived from occlusion and the hair's volume.
+    skin_seen: (point_count, 8), the skin that each point sees, see light_flow.skin_seen_by; None:
+        skin right beneath, as under hair on a plane.
+    color: (point_count, 3) scene-linear, the strands' own colours; NaN all along a strand, or None
+        for all, means the look's colour. Used if the look requires it, see
+        drawn_strands.drawn_color.
+    seed: (strand_count,) whole numbers below 2^24 for the noise of each strand; None: each strand's
+        index.
+    ambient, harmonics: the world's mean radiance [W/(m^2 sr)], and its dependence on direction,
+        (8, 3), see shading/environment.py; None: it has none.
+    volume_center: (3,) [m], centre from which normals of the hair's volume point away; None: the
+        middle of all roots.
+    device_points: the same strands moved on the GPU; they are drawn instead of `points` and
+        `radius`, which then only give the size of the hair.
+    guide, group: (strand_count,) whole numbers for debug_view; None: 0 everywhere.
+    rank: (strand_count,) in 0..1, below 1: as a groom gets small, strands of high rank are omitted
+        first (refine/thinning.py); None: all are always drawn.
     occluder_spheres: (k, 4) xyz center and w radius [m, world] of spheres inside the head that hide
-        the strands behind them (refine/culling.py). The first 16 count; None hides nothing.
+        the strands behind them (refine/culling.py). Only the first 16 are used; None: no culling.
     debug_view: one of DEBUG_VIEWS.
-    rest: (point_count, 3) [m], the strands in their style, whose lengths "stretch" compares; None:
-        these are at rest.
-    solids: colliders as they stand, from which "depth" measures; none: it is not known.
-    casters: meshes that are not drawn here but throw shadows on the hair, world space.
-    table_size: texels across Marschner's look-up tables; PREVIEW_SIZE while their shape changes.
+    rest: (point_count, 3) [m], the strands in their style, with whose lengths "stretch" compares;
+        None: the strands are at rest.
+    solids: colliders in their current pose, for "depth"; empty: depths are unknown.
+    casters: meshes that are not drawn here but cast shadows on the hair, world space.
+    table_size: texels across Marschner's look-up tables; PREVIEW_SIZE while the fibre's shape
+        changes.
     cards: hair cards, drawn after meshes and strands (render/card_pass.py).
 
-    A pass uploads an array again only when it is another object than before: hand the same array
-    on where nothing changed, and a new array (not the old one rewritten) where something did.
+    A pass uploads an array again only when it is a new object: pass the same array while nothing
+    changes, and a new array, not the old one overwritten, when something does.
 
     Raises:
-        ValueError: shapes that do not fit.
+        ValueError: shapes that do not match.
     """
 
     points: Floats
@@ -290,7 +294,7 @@ class Snapshot:
 
     @property
     def all_casters(self) -> tuple[Caster, ...]:
-        """Meshes that throw shadows on the hair, drawn here or not."""
+        """Meshes that cast shadows on the hair, drawn here or not."""
         return (*self.meshes, *self.casters)
 
     @property
@@ -299,20 +303,20 @@ class Snapshot:
 
     @property
     def has_world(self) -> bool:
-        """Whether light comes from all around."""
+        """Whether there is light from the world."""
         return any(self.ambient)
 
     @property
     def center(self) -> Floats:
-        """What strands look away from, (3,) [m]."""
+        """The centre from which normals of the hair's volume point away, (3,) [m]."""
         if self.volume_center is not None:
             return np.asarray(self.volume_center, np.float32)
         return self.root_center
 
     @property
     def skin_color(self) -> Color:
-        """What light through the hair comes back off: the mean colour of the meshes; of meshes that
-        only throw shadows no colour is known, so they are skin; black without any.
+        """The albedo that reflects light behind the hair: the mean colour of the meshes; SKIN if
+        there are only casters, whose colour is unknown; black without any.
         """
         if not self.meshes:
             return SKIN if self.casters else (0.0, 0.0, 0.0)
@@ -334,7 +338,7 @@ class Snapshot:
         return self.points[self.layout.offsets[:-1]]
 
 
-#: field of a snapshot -> the settings that it holds
+#: field of a snapshot -> the class of its settings
 SECTIONS: dict[str, type[Settings]] = {
     each.name: each.default_factory
     for each in fields(Snapshot)

@@ -1,14 +1,14 @@
 """Soft shadows of a view at rest: hair, and its shadow on meshes, as the mean of many samples.
 
-Each sample is lit by one point of each light, see light_samples.py. Hair is added up scene-linear
-and becomes what a view shows as the mean, so that a penumbra is as bright as in a still. Of the
-shadow on meshes what hair takes of the light is added up, and all light beside it, as both are on
-the screen: a sample in which a light shines more counts more.
+Each sample is lit by one point of each light, see light_samples.py. Hair is summed scene-linear,
+and only the mean is encoded for the view, so that a penumbra is as bright as in a still. For the
+shadow on meshes two brightnesses on the screen are summed: that which hair takes, and that without
+hair. So samples in which a light shines brighter count more.
 
     hair_sum, shadow_sum RGBA32F: of all samples
-    sample RGBA32F with a depth DEPTH32F: the one that is drawn
+    sample RGBA32F with a depth DEPTH32F: the current sample
 
-That is 52 bytes a pixel, for as long as samples are added up. A KeptPicture takes the result.
+That is 52 bytes per pixel while samples are being summed. The result is drawn into a KeptPicture.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ _RECIPE = ShaderRecipe(
 
 
 class SoftPicture:
-    """Making one touches no GPU."""
+    """The sums of samples of one view. Creating one does not touch the GPU."""
 
     def __init__(self) -> None:
         self._hair, self._shadow = Accumulation(), Accumulation()
@@ -52,19 +52,19 @@ class SoftPicture:
         return self._hair.count
 
     def missing_bytes(self) -> int:
-        """What the next sample of the bound viewport makes on the GPU."""
+        """Bytes that the next sample of the bound viewport allocates on the GPU."""
         left, bottom, width, height = gpu.state.viewport_get()
         return 0 if self.count else _PIXEL_BYTES * (left + width) * (bottom + height)
 
     def add(
         self, draw_shadows: Callable[[Any], None], draw_hair: Callable[[KeptPicture], None]
     ) -> None:
-        """Add a sample of what is in the bound viewport; the first one after a release, or in a
-        viewport of another size, begins a new sum.
+        """Add a sample for the bound viewport; the first one after a release, or in a viewport of
+        another size, begins a new sum.
 
         Args:
-            draw_shadows: has BodyShadow store into this texture.
-            draw_hair: has StrandPass draw into this picture, as a sample.
+            draw_shadows: lets BodyShadow store a sample into this texture.
+            draw_hair: lets StrandPass draw a sample into this picture.
         """
         self._sample.begin()
         size = self._sample.color.width, self._sample.color.height
@@ -78,7 +78,7 @@ class SoftPicture:
         self._hair.add(self._sample.color)
 
     def show_in(self, picture: KeptPicture, display: Display | None) -> None:
-        """Have the kept picture of this viewport hold the mean of the samples so far.
+        """Draw the mean of the samples so far into the kept picture of this viewport.
 
         Args:
             display: as in StrandPass.draw.
@@ -100,7 +100,7 @@ class SoftPicture:
             self._triangle.draw(shader.shader)
 
     def release(self) -> None:
-        """Let go of all that lies on the GPU, and of the samples."""
+        """Release everything on the GPU, with all samples."""
         for each in (self._hair, self._shadow, self._sample):
             each.release()
         self._triangle = None

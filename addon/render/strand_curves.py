@@ -1,4 +1,4 @@
-"""Where the curves of strands are on the GPU, as all programs that draw them take it."""
+"""The inputs, on the GPU, of all programs that draw the curves of strands."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from .textures import texture_from
 
 
 def curves_feature(cv_points: Any, strand_spans: Any, cv_looks: Any = None) -> ShaderFeature:
-    """What all programs that draw curves have.
+    """The feature of all programs that draw curves.
 
     Args:
-        cv_points, strand_spans, cv_looks: textures, see strand_pass.py. The last one only where
-            points are unevenly spaced, so that they say themselves how far along they are.
+        cv_points, strand_spans, cv_looks: textures, see strand_pass.py. cv_looks only if points are
+            unevenly spaced, since it stores their positions along the strand.
     """
     textures = {"cv_points": ("FLOAT_2D", cv_points), "strand_spans": ("FLOAT_2D", strand_spans)}
     if cv_looks is None:

@@ -1,4 +1,4 @@
-"""One draw of strands by its programs: shaded as they are drawn, or later, as layers or hashed."""
+"""One draw of strands: programs and bindings for opaque strands, layers and hashed strands."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from .pixel_parts import PixelPart
 from .shader_feature import ShaderFeature
 from .shader_program import ShaderProgram, ShaderRecipe
 
-#: what covers pixels in part, see ribbon_coverage in lib_coverage.glsl
+#: for the coverage of pixels, see ribbon_coverage in lib_coverage.glsl
 _RIBBON = ("smooth", "VEC4", "ribbon")
-#: what it takes to find a fragment's looks later
+#: for shading a fragment later
 _PLACED = (("smooth", "FLOAT", "strand_place"), ("flat", "INT", "strand_index"), _RIBBON)
 _STRUCTS = ("struct_view.glsl", "struct_lights.glsl", "struct_fibre.glsl", "struct_opacity.glsl")
 _SETTINGS = (StrandSettings, ShadingSettings)
-#: of shading, for programs without the features that turn these on
+#: default defines of shading, which features override
 _PLAIN = (("MARSCHNER", 0), ("SHADOWS", 0), ("SCATTERING", 0))
-#: of strand.vert.glsl, likewise
+#: default defines of strand.vert.glsl
 _WHOLE = (("ADAPTIVE", 0), ("IN_SLOTS", 0), ("DEBUG", 0), ("UNEVEN", 0))
 _VARYINGS = (
     ("smooth", "VEC3", "strand_point"),
@@ -43,7 +43,7 @@ _OPAQUE_RECIPE = ShaderRecipe(
     outputs=(("VEC4", "color"),),
     defines=(*_PLAIN, *_WHOLE, ("COVERED", 0), ("GATHERED", 0)),
 )
-#: who is nearest
+#: finds the nearest strand
 _PLACE_RECIPE = ShaderRecipe(
     name="strand_place",
     vertex="strand.vert.glsl",
@@ -55,7 +55,7 @@ _PLACE_RECIPE = ShaderRecipe(
     outputs=(("VEC4", "color"),),
     defines=(*_WHOLE, ("COVERED", 0), ("GATHERED", 1)),
 )
-#: the nearest fragment that chance lets stay
+#: finds the nearest fragment that is not discarded
 _HASHED_RECIPE = ShaderRecipe(
     name="strand_hashed",
     vertex="strand.vert.glsl",
@@ -67,7 +67,7 @@ _HASHED_RECIPE = ShaderRecipe(
     outputs=(("VEC4", "hair"),),
     defines=(*_WHOLE, ("COVERED", 1), ("GATHERED", 1)),
 )
-#: shades what two turns have found
+#: shades the fragments that two turns have found
 _HASHED_SHADE_RECIPE = ShaderRecipe(
     name="strand_hashed_shade",
     vertex="whole_target.vert.glsl",
@@ -79,7 +79,7 @@ _HASHED_SHADE_RECIPE = ShaderRecipe(
     outputs=(("VEC4", "first_light"), ("VEC4", "second_light")),
     defines=(*_PLAIN, ("UNEVEN", 0)),
 )
-#: puts each fragment into the list of its pixel
+#: adds each fragment to the list of its pixel
 _GATHER_RECIPE = ShaderRecipe(
     name="strand_gather",
     vertex="strand.vert.glsl",
@@ -105,7 +105,7 @@ _COUNT_RECIPE = replace(
     integers=(),
     defines=(*_WHOLE, ("COVERED", 1), ("GATHERED", 1), ("COUNTED", 1), ("PARTS", 0)),
 )
-#: shades those of all lists that are seen
+#: shades the visible nodes of all lists
 _SHADE_RECIPE = ShaderRecipe(
     name="strand_layers_shade",
     compute="strand_layers_shade.comp.glsl",
@@ -119,7 +119,7 @@ _SHADE_RECIPE = ShaderRecipe(
     group_size=(64, 1),
     defines=(*_PLAIN, ("UNEVEN", 0)),
 )
-#: adds up each pixel's list
+#: sums each pixel's list
 _SHOWN_RECIPE = ShaderRecipe(
     name="strand_layers_shown",
     vertex="whole_target.vert.glsl",
@@ -136,13 +136,13 @@ _SHOWN_RECIPE = ShaderRecipe(
 
 @dataclass(frozen=True, eq=False)
 class StrandDrawing:
-    """All that one draw binds.
+    """All bindings of one draw.
 
-    order: which strands, in how many pieces.
-    ribbon: the vertices of a strand that has room for this many pieces.
-    points: where strands and eye are. shading: what all programs that shade have.
-    shown: what those that write colours have beside that.
-    expected_depths: see PixelPart; found only where they are asked for.
+    order: the strands to draw, with their numbers of pieces.
+    ribbon: makes the batch of a strand with this many pieces.
+    points: features of strands and eye. shading: features of all programs that shade.
+    shown: additional features of programs that write colours.
+    expected_depths: see PixelPart; called only if needed.
     """
 
     order: DetailOrder
@@ -156,24 +156,25 @@ class StrandDrawing:
     expected_depths: Callable[[], range]
 
     def draw(self) -> None:
-        """All strands, opaque, each pixel shaded as it is drawn."""
+        """Draw all strands, opaque, each pixel shaded as it is drawn."""
         integers = {"output_encoding": self.output_encoding, "samples_across": self.samples_across}
         features = [*self.points, self._detail, *self.shading, *self.shown]
         self._draw(bound(_OPAQUE_RECIPE, features, self.blocks, integers=integers))
 
     def place(self) -> None:
-        """Who is nearest, as wide as opaque strands are, and where along its points."""
+        """Draw the number of the nearest strand and the place along its points, with the width of
+        opaque strands."""
         integers = {"samples_across": self.samples_across}
         features = [*self.points, self._detail]
         self._draw(bound(_PLACE_RECIPE, features, self.blocks, integers=integers))
 
     def hash(self, turn: int) -> None:
-        """Who is seen where, of all strands, in one of two turns, see hashed_strands.py."""
+        """Draw the visible fragments of one of two turns, see hashed_strands.py."""
         features = [*self.points, self._detail]
         self._draw(bound(_HASHED_RECIPE, features, self.blocks, integers={"turn": turn}))
 
     def shade_hashed(self, found: Sequence[Any]) -> ShaderProgram:
-        """Bind what shades those that two turns have found."""
+        """Bind the program that shades the fragments of two turns."""
         driver = ShaderFeature(defines={"SHADES_ALL": int(fails_in_idle_branches())})
         return bound(
             _HASHED_SHADE_RECIPE,
@@ -186,21 +187,21 @@ class StrandDrawing:
     def gather(
         self, images: Mapping[str, Any], capacity: int, part: PixelPart | None = None
     ) -> None:
-        """All strands, or what of them is in a part, into lists of pixels, see strand_layers.py."""
+        """Add all fragments, or those in a part, to the lists of pixels, see strand_layers.py."""
         features = [*self.points, self._detail, *(() if part is None else (_part_feature(part),))]
         integers = {"capacity": capacity}
         self._draw(self._bound(_GATHER_RECIPE, features, images, integers))
 
     def count(self, images: Mapping[str, Any]) -> None:
-        """How many fragments the list of each pixel would have, into its head."""
+        """Count the fragments of each pixel in the head of its list."""
         self._draw(self._bound(_COUNT_RECIPE, [*self.points, self._detail], images, {}))
 
     def shade(self, images: Mapping[str, Any]) -> ShaderProgram:
-        """Bind the program that shades the nodes that are seen."""
+        """Bind the program that shades the visible nodes."""
         return self._bound(_SHADE_RECIPE, [*self.points, *self.shading], images, {})
 
     def show(self, images: Mapping[str, Any], *, writes_depth: bool) -> ShaderProgram:
-        """Bind what adds up these lists."""
+        """Bind the program that sums the lists."""
         integers = {
             "output_encoding": self.output_encoding,
             "writes_depth": int(writes_depth),
@@ -209,7 +210,7 @@ class StrandDrawing:
 
     @property
     def _detail(self) -> ShaderFeature:
-        """How many pieces a program draws: equally many of every segment, or of each its own."""
+        """The feature for the numbers of pieces: one number for all segments, or one for each."""
         order = self.order
         if order.factors is None:
             return ShaderFeature(name="fixed", integers={"subdivisions": order.subdivisions})
@@ -250,7 +251,7 @@ class StrandDrawing:
 
 
 def _part_feature(part: PixelPart) -> ShaderFeature:
-    """What a program has that gathers only what is in a part."""
+    """The feature of programs that gather only the fragments in a part."""
     ends = {"first": part.first, "end": part.end, "near": part.near, "far": part.far}
     return ShaderFeature(
         name="part",

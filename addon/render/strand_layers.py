@@ -1,27 +1,28 @@
-"""Strands as layers: the lists of all pixels, of which some stand for all, shaded and added up.
+"""Strands as layers: lists of fragments per pixel, of which a selection is shaded and summed.
 
-    count   R32UI 4 x 1:   how many fragments there are, how many pixels that have some, how many
-                           fragments are seen, and how many the longest list has
-    heads   R32UI:         of each pixel the first one of its list, counted from 1; 0 is none
-    pixels  R32UI:         those that have fragments, side by side: x, and y in the upper half
+    count   R32UI 4 x 1:   numbers of fragments, of pixels with fragments and of visible fragments,
+                           and the length of the longest list
+    heads   R32UI:         for each pixel the first node of its list, counted from 1; 0 for none
+    pixels  R32UI:         the pixels with fragments, consecutively: x, and y in the upper half
     nodes   RGBA32UI:      the fragments, see lib_layer_packing.glsl; later their colours
-    seen    R32UI:         the numbers of those that are seen, side by side, whatever their pixels:
-                           no invocation that shades is idle because its pixel has fewer of them
-    fronts  RG32F:         of each pixel the depth from which on it hides, and its alpha
+    seen    R32UI:         the numbers of the visible nodes, consecutively for all pixels, so that
+                           no shading invocation is idle because its pixel has fewer of them
+    fronts  RG32F:         for each pixel the depth from which on it hides, and its alpha
 
-That is 16 bytes a pixel, and 20 more for each fragment of a strand that no mesh hides. All grooms
-and all views share them, since nothing is kept from one draw to the next.
+That is 16 bytes per pixel, plus 20 for each fragment of a strand that no mesh hides. All grooms and
+all views share these textures, since nothing is kept from one draw to the next.
 
-Fragments that have no room all at once are drawn in parts, see pixel_parts.py: first each pixel
-counts its own, then parts that have room are gathered, ordered, shaded and shown one by one. So
-memory decides how often strands are drawn, and never what is seen. A part of one pixel that has no
-room is drawn by depth, the farthest first, each over what is there: exact but for the colours of
-Blender's viewport, which are added up as they are encoded. So is a part with a list too long for a
-software driver, whose shaders end after 65,535 rounds of all their loops.
+If not all fragments fit, they are drawn in parts, see pixel_parts.py: the fragments of each pixel
+are counted, then parts that fit are gathered, ordered, shaded and shown one after the other. So
+memory affects how often strands are drawn, but not the picture. A single pixel that does not fit is
+divided by depth, and its parts are blended, the farthest first. That is exact, except in Blender's
+viewport, where encoded colours are blended. A part with a list that is too long for a software
+driver, whose shaders end after 65,535 iterations of all their loops, is divided in the same way.
 
-What moves is not waited for: nothing is read back, and as many invocations order and shade as the
-view's size suggests, as often as the counts on the GPU say. Room is made beforehand for what was
-counted of the view before, and detail_slots.py has no more fragments drawn than have room.
+While the view moves, the GPU is not waited for: nothing is read back, the number of invocations
+that order and shade follows from the view's size, and they loop up to the counts on the GPU. Room
+is made beforehand from the counts of the view before, and detail_slots.py limits the fragments to
+those that fit.
 """
 
 from __future__ import annotations
@@ -44,21 +45,21 @@ from .shader_source import LAYER_ROW, ShaderError
 from .strand_drawing import StrandDrawing
 from .textures import drawing_rows, drawing_state
 
-#: rows of nodes at first, 20 MiB
+#: initial rows of nodes, 20 MiB
 FIRST_ROWS = 256
-#: of a node and its number among those that are seen
+#: bytes of a node and of its number in `seen`
 FRAGMENT_BYTES = 20
-#: lists are made smaller where they take this much more than there is room for now
+#: lists are made smaller if they exceed the available memory by this factor
 _TOO_LARGE = 1.25
-#: a count that turned out too small is made this much larger than what was found
+#: margin on a count when lists turned out too small
 _SPARE = 1.25
-#: pixels of which the fragments of what moves are shaded by one invocation, one after the other
+#: pixels per shading invocation while hair moves
 _SHADED_IN_TURN = 16
-#: nodes that a round of a loop takes in software, so that all rounds do for more of them
+#: nodes per loop iteration with software drivers, whose iterations are limited
 _NODES_A_ROUND = 8
-#: fragments of a pixel that a software driver can order: each takes some five rounds of loops
+#: most fragments of a pixel that a software driver can order: each takes about five iterations
 LONGEST_IN_SOFTWARE = 12288
-#: more than any list has
+#: larger than the length of any list
 _ANY_LENGTH = (1 << 31) - 1
 
 _ORDER_RECIPE = ShaderRecipe(
@@ -86,9 +87,9 @@ _TURNING_ORDER_RECIPE = replace(
 
 @dataclass(frozen=True)
 class LayersDrawn:
-    """In how many parts layers were drawn, and how many fragments had no room in any.
+    """In how many parts layers were drawn, and how many fragments did not fit into any.
 
-    fragments: of strands that nothing hides, how many; 0 where they were not waited for.
+    fragments: number of fragments that nothing hides; 0 if the GPU was not waited for.
     """
 
     parts: int = 0
@@ -97,10 +98,10 @@ class LayersDrawn:
 
 
 class StrandLayers:
-    """What a draw of layers needs on the GPU; making one touches no GPU.
+    """The textures for drawing layers. Creating one does not touch the GPU.
 
     Args:
-        max_rows: of nodes, LAYER_ROW fragments each; None: as many as memory has room for.
+        max_rows: most rows of nodes, LAYER_ROW fragments each; None: as many as fit into memory.
     """
 
     def __init__(self, max_rows: int | None = None) -> None:
@@ -109,11 +110,11 @@ class StrandLayers:
         released_with_shaders(self)
 
     def release(self) -> None:
-        """Let go of all that lies on the GPU; the next draw makes it again."""
+        """Release everything on the GPU; the next draw makes it again."""
         self._max_rows = 0
-        #: where a driver has refused more
+        #: most rows after a driver has refused more
         self._refused_rows: int | None = None
-        self._found = self._pixel_count = self._too_long = 0  # of what was gathered last
+        self._found = self._pixel_count = self._too_long = 0  # of the last gathering
         self._size = 0, 0
         self._count: Any = None
         self._heads: Any = None
@@ -136,15 +137,15 @@ class StrandLayers:
         picture: KeptPicture | None = None,
         is_sample: bool = False,
     ) -> LayersDrawn:
-        """Gather, order, shade, and put the result over what is in the bound framebuffer.
+        """Gather, order and shade fragments, and blend the result over the bound framebuffer.
 
         Args:
-            is_own_target: nobody else has set a scissor for that framebuffer.
-            in_parts: whether it is likely to have no room at once, so that this is not even tried.
+            is_own_target: no other code has set a scissor for that framebuffer.
+            in_parts: fragments probably do not fit at once, so that this is not even tried.
             is_moving: the GPU is not waited for, see `room_for`.
-            is_turning: so does the whole view, so that fewer layers do.
-            picture: takes the result as well.
-            is_sample: it takes the colours alone; the framebuffer gets the depths.
+            is_turning: the whole view moves, so that fewer layers suffice.
+            picture: also gets the result.
+            is_sample: only the picture gets colours; the framebuffer gets depths.
 
         Raises:
             ShaderError: a shader does not compile here, or there is no memory at all.
@@ -178,7 +179,7 @@ class StrandLayers:
         return LayersDrawn(drawn, missing, fragments)
 
     def room_for(self, count: int) -> int:
-        """Make room for this many fragments in the bound viewport, and say how many have some.
+        """Make room for this many fragments in the bound viewport, and return how many fit.
 
         Raises:
             ShaderError: there is no memory at all.
@@ -189,7 +190,7 @@ class StrandLayers:
         return self._capacity
 
     def _is_gathered(self, drawing: StrandDrawing) -> bool:
-        """Gather all fragments at once, where they have room or can be given it."""
+        """Gather all fragments at once, making room if needed; False if they cannot fit."""
         while (found := self._gather(drawing)) > self._capacity:
             if found > self._max_rows * LAYER_ROW or not self._make_room(int(found * _SPARE)):
                 return False
@@ -198,21 +199,21 @@ class StrandLayers:
     def _gather(
         self, drawing: StrandDrawing, part: PixelPart | None = None, rows: range | None = None
     ) -> int:
-        """Gather all fragments, or those of a part; how many there are, with room or without."""
+        """Gather all fragments, or those of a part; returns their number, also if too many."""
         self._store(lambda: drawing.gather(self._images, self._capacity, part), rows)
         self._found, self._pixel_count, *_ = self._counts()
         return self._found
 
     def _counted(self, drawing: StrandDrawing) -> Ints:
-        """How many fragments each pixel has, row by row."""
+        """The number of fragments of each pixel, row by row."""
         self._store(lambda: drawing.count(self._images))
         return np.asarray(self._heads.read()).ravel()
 
     def _store(self, draw: Callable[[], None], rows: range | None = None) -> None:
-        """Have a draw write images, which begin at 0, so that they can be read after it."""
+        """Clear the counters, run a draw that writes images, and make its writes visible."""
         for counter in (self._count, self._heads):
             counter.clear(format="UINT", value=(0,))
-        # adds nothing to the colours; with the colour mask off, drivers skip such a draw
+        # the draw adds black; with the colour mask off, drivers would skip it
         with (
             drawing_state(depth_write=False, blend="ADDITIVE_PREMULT"),
             drawing_rows(rows),
@@ -221,7 +222,7 @@ class StrandLayers:
         finish_stores()
 
     def _is_finished(self, drawing: StrandDrawing, *, even_if_too_long: bool = False) -> bool:
-        """Order, shade and show what is gathered; not where a list is too long for that."""
+        """Order, shade and show the gathered fragments; False if a list is too long for that."""
         self._too_long = 0
         pixel_count = self._pixel_count
         if not pixel_count:
@@ -237,7 +238,7 @@ class StrandLayers:
     def _order(
         self, count: int, recipe: ShaderRecipe = _ORDER_RECIPE, *, longest: int | None = None
     ) -> None:
-        """Order all lists that there are, but those that are too long, by as many invocations."""
+        """Order all lists, except those that are too long, with this many invocations."""
         if is_software():
             defines = dict(recipe.defines) | {"NODES_A_ROUND": _NODES_A_ROUND}
             recipe = replace(recipe, defines=tuple(defines.items()))
@@ -249,7 +250,7 @@ class StrandLayers:
         _dispatch(order, count)
 
     def _shade(self, drawing: StrandDrawing, count: int) -> None:
-        """Shade all that is seen, by as many invocations, and show it."""
+        """Shade all visible nodes with this many invocations, and show them."""
         _dispatch(drawing.shade(self._images), count)
         self._show(drawing, writes_color=not self._is_sample)
         if self._picture is not None:
@@ -257,7 +258,7 @@ class StrandLayers:
                 self._show(drawing)
 
     def _show(self, drawing: StrandDrawing, *, writes_color: bool = True) -> None:
-        """Colours and depths of all lists, into the bound framebuffer."""
+        """Draw colours and depths of all lists into the bound framebuffer."""
         images = self._images
         if writes_color:
             with drawing_state(depth_test="NONE", depth_write=False, blend="ALPHA_PREMULT"):
@@ -267,8 +268,8 @@ class StrandLayers:
             self._triangle.draw(drawing.show(images, writes_depth=True).shader)
 
     def _counts(self) -> tuple[int, int, int, int]:
-        """How many fragments there are, pixels that have some, fragments that are seen, and the
-        fragments of the longest list."""
+        """The numbers of fragments, of pixels with fragments and of visible fragments, and the
+        length of the longest list."""
         found, pixels, seen, longest = np.asarray(self._count.read()).ravel().tolist()
         return int(found), int(pixels), int(seen), int(longest)
 
@@ -285,11 +286,11 @@ class StrandLayers:
 
     @property
     def _capacity(self) -> int:
-        """How many fragments have room."""
+        """The number of fragments that fit."""
         return int(self._nodes.height) * LAYER_ROW
 
     def _make_room(self, count: int) -> bool:
-        """Room for this many fragments, as far as it goes; whether it is more than before."""
+        """Make room for this many fragments, within the limit; whether room has grown."""
         before = self._capacity
         rows = min(-(-count // LAYER_ROW), self._max_rows)
         if rows * LAYER_ROW > before:
@@ -297,7 +298,7 @@ class StrandLayers:
         return self._capacity > before
 
     def _limit(self) -> None:
-        """How many rows there may be now; what is beyond is let go of."""
+        """Update the limit of rows, and shrink the lists if they are far beyond it."""
         held = 0 if self._nodes is None else self._capacity * FRAGMENT_BYTES
         rows = gpu_memory.lists_room(held) // (FRAGMENT_BYTES * LAYER_ROW)
         limits = (max(rows, 1), self._wanted_rows, self._refused_rows)
@@ -306,7 +307,7 @@ class StrandLayers:
             self._make_nodes(self._max_rows)
 
     def _make_nodes(self, rows: int) -> None:
-        """This many rows, or as many as there is memory for."""
+        """Make this many rows, or as many as fit into memory."""
         self._nodes = self._seen = None
         while self._nodes is None:
             try:
@@ -319,8 +320,8 @@ class StrandLayers:
                 self._refused_rows = self._max_rows = rows = rows // 2
 
     def _fit(self, size: tuple[int, int]) -> None:
-        """Buffers for this many pixels; the old ones, where they are not far too large. Views of
-        several shapes that take turns have the same ones.
+        """Make textures for this many pixels, or keep the old ones if they are not far too large.
+        They grow to cover all views, so that views drawn alternately share them.
         """
         self._limit()
         kept, wanted = self._size, size
@@ -342,25 +343,25 @@ class StrandLayers:
 
 
 def is_software() -> bool:
-    """Whether a processor draws in place of a GPU."""
+    """Whether a software driver draws instead of a GPU."""
     return str(gpu.platform.device_type_get()) == "SOFTWARE"
 
 
 def _longest() -> int | None:
-    """How many fragments of a pixel can be ordered; None: all."""
+    """The most fragments of a pixel that can be ordered; None: any number."""
     return LONGEST_IN_SOFTWARE if is_software() else None
 
 
 def _dispatch(shader: ShaderProgram, count: int) -> None:
-    """This many invocations, in rows."""
+    """Dispatch this many invocations, in rows."""
     shader.dispatch(min(count, LAYER_ROW), -(-count // LAYER_ROW))
 
 
 def _viewport_end() -> tuple[int, int]:
-    """How far the viewport of the bound framebuffer reaches, across and up [pixels]."""
+    """The right and the upper end of the bound framebuffer's viewport [pixels]."""
     left, bottom, width, height = gpu.state.viewport_get()
     return left + width, bottom + height
 
 
-#: of all grooms and views
+#: shared by all grooms and views
 LAYERS_OF_PIXELS = StrandLayers()

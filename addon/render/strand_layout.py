@@ -1,7 +1,7 @@
-"""Where the data of strands lies in a texture: all texels of a strand side by side in one row.
+"""The layout of strand data in textures: all texels of a strand side by side in one row.
 
-`strand_rows` is for equally many texels a strand, `StrandLayout` for as many points as each strand
-has. Twin of gpu_shaders/lib_strand_texel.glsl. Pure numpy: importable without gpu.
+`strand_rows` is for the same number of texels per strand, `StrandLayout` for point counts that
+differ. Twin of gpu_shaders/lib_strand_texel.glsl. Pure numpy: importable without gpu.
 """
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ import numpy as np
 from ..arrays import Floats, Ints
 from .shader_source import STRAND_ROWS
 
-#: Segments whose detail factors lie in one texel, see lib_detail_packing.glsl.
+#: Segments whose detail factors are in one texel, see lib_detail_packing.glsl.
 FACTORS_IN_TEXEL = 16
 
 
 def strand_rows(values: Floats) -> Floats:
-    """Per-CV values (strand_count, cv_count, channels) as texture rows, one a strand.
+    """Per-CV values (strand_count, cv_count, channels) as texture rows, one per strand.
 
-    Strand s lies in row s % 16384, from column (s // 16384) * cv_count on: beyond 16384 strands,
-    the largest texture side, further column blocks follow. Unused texels are 0. Of one value a
-    strand, rows hold 16384 strands each: GPUs and processors fetch what lies side by side at once.
+    Strand s is in row s % 16384, from column (s // 16384) * cv_count on: beyond 16384 strands, the
+    largest texture side, further column blocks follow. Unused texels are 0. If there is one value
+    per strand, rows hold 16384 strands each, since adjacent texels are fetched together.
 
     Raises:
         ValueError: more strands than blocks of columns can hold.
@@ -59,7 +59,7 @@ def strand_rows_size(strand_count: int, cv_count: int) -> tuple[int, int]:
 
 
 def from_strand_rows(pixels: Floats, strand_count: int, cv_count: int) -> Floats:
-    """What `strand_rows` has laid out, again as (strand_count, cv_count, channels)."""
+    """The inverse of `strand_rows`, (strand_count, cv_count, channels)."""
     height, width, channels = pixels.shape
     if cv_count == 1:
         return pixels.reshape(-1, 1, channels)[:strand_count]
@@ -69,11 +69,11 @@ def from_strand_rows(pixels: Floats, strand_count: int, cv_count: int) -> Floats
 
 @dataclass(frozen=True, eq=False)
 class StrandLayout:
-    """The points of strands in a texture, one texel a point.
+    """The layout of strands' points in a texture, one texel per point.
 
-    Strands of one point count lie as `strand_rows` has them, which costs nothing. Others fill rows
-    of 16384 texels, one after the other; a strand that does not fit the rest of a row begins the
-    next one.
+    Strands of one point count have the layout of `strand_rows`, which needs no copy. Others fill
+    rows of 16384 texels, one after the other; a strand that does not fit into the rest of a row
+    begins the next one.
 
     offsets: (strand_count + 1,), strand s has the points offsets[s] to offsets[s + 1] - 1.
 
@@ -92,7 +92,7 @@ class StrandLayout:
 
     @classmethod
     def uniform(cls, strand_count: int, cv_count: int) -> StrandLayout:
-        """Of strands that have equally many points."""
+        """The layout of strands with the same number of points."""
         return cls(np.arange(strand_count + 1, dtype=np.int32) * np.int32(cv_count))
 
     def is_as(self, other: StrandLayout) -> bool:
@@ -114,12 +114,12 @@ class StrandLayout:
 
     @cached_property
     def longest(self) -> int:
-        """Points of the strand that has the most, 0 where there is none."""
+        """The largest point count of a strand, 0 if there are no strands."""
         return int(self.counts.max(initial=0))
 
     @cached_property
     def cv_count(self) -> int:
-        """How many points each strand has; 0 where they differ."""
+        """The point count of all strands; 0 if they differ."""
         if not self.strand_count:
             return 2
         first = int(self.counts[0])
@@ -136,10 +136,10 @@ class StrandLayout:
 
     @cached_property
     def spans(self) -> Floats:
-        """Of each strand the texel of its first point, how many points it has, and the first texel
-        of its detail factors, counted through, (strand_count, 4) float32; exact below 2^24.
+        """For each strand the texel of its first point, its number of points, and the index of the
+        first texel of its detail factors, (strand_count, 4) float32; exact below 2^24.
 
-        As the texture strand_spans holds them, in the layout of `strand_rows`.
+        The values of the texture strand_spans, which has the layout of `strand_rows`.
         """
         spans = np.zeros((self.strand_count, 4), np.float32)
         strands = np.arange(self.strand_count)
@@ -156,13 +156,13 @@ class StrandLayout:
 
     @property
     def factor_size(self) -> tuple[int, int]:
-        """Width and height of the texture that holds all detail factors, texel by texel."""
+        """Width and height of the texture of all detail factors."""
         texels = max(int(self._factors[-1]), 1)
         return min(texels, STRAND_ROWS), -(-texels // STRAND_ROWS)
 
     def pixels(self, values: Floats) -> Floats:
-        """Values (point_count, channels) as a texture's (height, width, channels), float32;
-        texels of no point are 0.
+        """Values (point_count, channels) in the layout of the texture, (height, width, channels)
+        float32; unused texels are 0.
         """
         channels = values.shape[1]
         if self.cv_count:
@@ -174,7 +174,7 @@ class StrandLayout:
         return pixels
 
     def values(self, pixels: Floats) -> Floats:
-        """What `pixels` has laid out, again as (point_count, channels)."""
+        """The inverse of `pixels`, (point_count, channels)."""
         channels = pixels.shape[2]
         if self.cv_count:
             return from_strand_rows(pixels, self.strand_count, self.cv_count).reshape(-1, channels)
@@ -183,7 +183,7 @@ class StrandLayout:
 
     @cached_property
     def _rows(self) -> Ints:
-        """The first strand of each row, and last how many there are; for strands that differ."""
+        """The first strand of each row, and the strand count; for point counts that differ."""
         rows = [0]
         while rows[-1] < self.strand_count:
             room = self.offsets[rows[-1]] + STRAND_ROWS
@@ -195,13 +195,13 @@ class StrandLayout:
 
     @property
     def _row_points(self) -> list[tuple[int, int]]:
-        """The points of each row, from and up to."""
+        """Begin and end of the points in each row."""
         ends = self.offsets[self._rows].tolist()
         return list(pairwise(ends))
 
     @cached_property
     def _factors(self) -> Ints:
-        """The first texel of each strand's detail factors, and how many there are in all."""
+        """The first texel of each strand's detail factors, and the number of all texels."""
         texels = (self.counts - 2) // FACTORS_IN_TEXEL + 1
         return np.concatenate([[0], np.cumsum(texels, dtype=np.int64)])
 

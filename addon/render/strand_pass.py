@@ -1,19 +1,19 @@
-"""Draws strands as ribbons that face the eye, shaded per pixel, into whatever target is bound.
+"""Draws strands as ribbons that face the eye, shaded per pixel, into the bound framebuffer.
 
-Packed textures, a texel a point, where strand_layout.StrandLayout says:
-    cv_points RGBA32F: xyz position [m, world], w radius [m]     new with every new pose, unless
-                                                                 it lies on the GPU already
+Textures with a texel per point, in the layout of strand_layout.StrandLayout:
+    cv_points RGBA32F: xyz position [m, world], w radius [m]     uploaded with every new pose,
+                                                                 unless it is on the GPU already
     cv_looks  RG32F:   x ambient occlusion, y fraction of the    constant
                        strand's length, where UNEVEN
-    cv_colors RGBA16F: xyz own colour, w 0 where there is none   constant; of coloured hair alone
-And a texel a strand, as strand_layout.strand_rows has them:
-    strand_spans  RGBA32F: where its points lie, see lib_strand_texel.glsl
-    strand_seeds  R32F:    what its noise depends on
-    debug_numbers R32F:    the guide or the group that a debug view shows
-    rest_lengths R32F:     how long the segment that begins at a point is at rest [m]
-    solids, rounds, fields: colliders, see collider_textures.py
+    cv_colors RGBA16F: xyz own colour, w 0 where there is none   constant; only of coloured hair
+    rest_lengths R32F: length at rest of the segment that begins at the point [m]
+And with a texel per strand, in the layout of strand_layout.strand_rows:
+    strand_spans  RGBA32F: its points, see lib_strand_texel.glsl
+    strand_seeds  R32F:    the seed of its noise
+    debug_numbers R32F:    the guide or the group for a debug view
+And solids, rounds, fields: colliders, see collider_textures.py
 
-How many pieces each segment has comes from detail_pass.py, unless all have equally many.
+The number of pieces of each segment comes from detail_pass.py, unless all have the same number.
 """
 
 from __future__ import annotations
@@ -58,28 +58,28 @@ from .strand_layout import StrandLayout, strand_rows
 from .textures import drawing_state, texture_from
 from .view_block import lights_feature, view_feature
 
-#: half floats end soon after
+#: little below the largest half float
 _BRIGHTEST = 6.0e4
-#: hair of no size has depths too [m]
+#: smallest depth shown in full colour, for hair without size [m]
 _THIN = 1.0e-9
-#: what a draw may write: light; in its place unit tangents from root to tip, in world space; or, of
-#: opaque strands alone, the number of the nearest one and where along its points
+#: what a draw writes: radiance; unit tangents from root to tip, in world space; or, for opaque
+#: strands only, the number of the nearest strand and the place along its points
 CONTENTS = ("light", "tangents", "places")
-#: debug views that show a number of each strand
+#: debug views that show a number for each strand
 NUMBERED_VIEWS = ("guide", "group")
 
 
 @dataclass(frozen=True, eq=False)
 class InView:
-    """How a view that is drawn again and again is drawn now.
+    """The state of a view that is drawn repeatedly.
 
-    name: which one it is; what depends on a view is kept for each name.
+    name: identifies the view; data that depends on a view is kept by name.
     is_turning: the lights are attached to the view, which moves, see OpacityDrawing.maps.
-    is_moving: what is seen differs from what the view showed before, and soon from this: what the
-        GPU would have to be waited for is taken from before, see StrandPass.is_behind.
-    picture: takes what is drawn, so that it can be shown again.
-    is_sample: it takes this alone, scene-linear, as one of many that are added up; the bound
-        framebuffer gets the depths.
+    is_moving: the content changes from draw to draw. Results for which the GPU would have to be
+        waited for are taken from earlier draws, see StrandPass.is_behind.
+    picture: also gets what is drawn, so that it can be shown again.
+    is_sample: only the picture gets colours, scene-linear, as one of many samples to be summed; the
+        bound framebuffer gets depths.
     """
 
     name: Hashable = None
@@ -89,15 +89,15 @@ class InView:
     is_sample: bool = False
 
 
-#: Of whoever draws into one picture.
+#: For draws into a single picture.
 NO_VIEW = InView()
 
 
 @dataclass(frozen=True)
 class Statistics:
-    """What a draw has drawn: strands, their straight pieces, and the vertices of all instances.
+    """Numbers of a draw: strands, their straight pieces, and the vertices of all instances.
 
-    layers: how those that are drawn as layers had room. maps_note: of OpacityMaps.
+    layers: results of drawing as layers. maps_note: note of OpacityMaps.
     """
 
     strands: int = 0
@@ -108,7 +108,7 @@ class Statistics:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What the artist should know of the draw, each with its remedy."""
+        """Notes to the artist on the draw, each with its remedy."""
         found = [self.maps_note] if self.maps_note else []
         if self.layers.missing:
             found.append(
@@ -121,9 +121,9 @@ class Statistics:
 
 @dataclass(eq=False)
 class _Lit:
-    """What draws the maps of one light. light: None before the first.
+    """The shadows for one set of lights. light: these lights; None before the first draw.
 
-    between: what other grooms have in the way of it.
+    between: the optical depth of other grooms for them.
     """
 
     light: tuple[Light, ...] | None = None
@@ -133,10 +133,11 @@ class _Lit:
 
 @dataclass(eq=False)
 class _View:
-    """What is kept for one view.
+    """The data kept for one view.
 
-    lit: by its lights; other views may have the same. asked: the lights of its last draw.
-    parts: in how many its strands were drawn last at rest. is_moving: they were not at rest last.
+    lit: shadows for its lights, possibly shared with other views. asked: lights of its last draw.
+    parts: number of parts in which its strands were last drawn at rest. is_moving: the last draw
+        was not at rest.
     """
 
     detail: DetailPass = field(default_factory=DetailPass)
@@ -147,13 +148,13 @@ class _View:
 
 
 class StrandPass:
-    """Keeps one groom's strands on the GPU from draw to draw.
+    """The strands of one groom on the GPU, kept from draw to draw.
 
-    Making one touches no GPU; the first draw does. Arrays of a snapshot are uploaded only when
-    they are other objects than in the draw before.
+    Creating one does not touch the GPU; the first draw does. Arrays of a snapshot are uploaded only
+    if they are other objects than in the draw before.
 
-    Views are known by any name; what depends on them is kept for each. Whoever draws into one
-    picture needs none.
+    Views are identified by names; data that depends on a view is kept for each. Draws into a single
+    picture need no name.
 
     statistics: of the last draw.
     """
@@ -186,11 +187,11 @@ class StrandPass:
             content: one of CONTENTS.
             output: "scene_linear" for a picture of ours; "viewport" for a POST_VIEW handler in
                 Blender's viewport.
-            display: for "viewport", the view transform; None is the plain "Standard".
-            samples: pixels of the target across one pixel of the final picture; the least width
-                and the settings of detail count in the latter.
-            others: maps of other hair that may be in the way of light. Counts where this hair has
-                maps itself, see `opacity`.
+            display: for "viewport", the view transform; None: the plain "Standard".
+            samples: pixels of the target across one pixel of the final picture; the minimum width
+                and the settings of detail are in pixels of the latter.
+            others: maps of other hair that may cast shadows. Only used if this hair has maps too,
+                see `opacity`.
 
         Raises:
             ShaderError: the shader does not compile here, or points on the GPU were released.
@@ -224,7 +225,7 @@ class StrandPass:
         if content == "light" and not is_debug:
             maps = self.opacity(snapshot, view=view.name, is_turning=view.is_turning)
         if content == "light" and not others:
-            own.lit.between.release()  # else maps of grooms that are gone stay
+            own.lit.between.release()  # else it keeps maps of grooms that are gone
         drawing = StrandDrawing(
             order=order,
             ribbon=self._ribbons.of,
@@ -275,13 +276,13 @@ class StrandPass:
     def opacity(
         self, snapshot: Snapshot, *, view: Hashable = None, is_turning: bool = False
     ) -> OpacityMaps | None:
-        """How much hair lies between each light and every place; None where it throws no shadow.
+        """The opacity maps of the hair; None if it casts no shadow.
 
-        Drawn into separate textures, and only when something has changed. Views in the same light
-        have the same ones.
+        Drawn into separate textures, only when something has changed. Views with the same lights
+        share them.
 
         Args:
-            view: the name of one; is_turning: see InView.
+            view: name of the view; is_turning: see InView.
 
         Raises:
             ShaderError: as `draw`.
@@ -305,36 +306,37 @@ class StrandPass:
         )
 
     def _lit_by(self, snapshot: Snapshot, view: Hashable) -> OpacityPass:
-        """What draws the maps of this light: that of a view which is lit by it, or of this one."""
+        """The pass for the maps of these lights: that of any view with these lights, or the
+        view's own."""
         light, own = snapshot.lights, self._views.setdefault(view, _View())
         lit = next((each.lit for each in self._views.values() if each.lit.light == light), own.lit)
         if lit.light not in (light, None) and own.asked == light:
-            lit = _Lit()  # another view, which was lit alike, has turned
+            lit = _Lit()  # another view, which shared these lights, has turned
         lit.light = own.asked = light
         own.lit = lit
         return lit.opacity
 
     def is_behind(self, view: Hashable) -> bool:
-        """Whether a view has to be drawn again once it rests: its shadows lag behind its lights, or
-        it was drawn without waiting for the GPU.
+        """Whether a view must be drawn again once it is at rest, because its shadows lag behind its
+        lights, or because it was drawn without waiting for the GPU.
         """
         own = self._views.get(view)
         return own is not None and (own.is_moving or own.lit.opacity.is_behind)
 
     def forget_views(self, shown: Set[Hashable]) -> None:
-        """Let go of what was kept for views other than these."""
+        """Release the data of all views except these."""
         self._views = {view: own for view, own in self._views.items() if view in shown}
 
     def forget_view(self, view: Hashable) -> None:
-        """Let go of what was kept for this view."""
+        """Release the data of this view."""
         self._views.pop(view, None)
 
     def ball(self, snapshot: Snapshot) -> Ball:
-        """A sphere that holds all its strands."""
+        """A sphere around all its strands."""
         return self._ball.of(snapshot)
 
     def release(self) -> None:
-        """Let go of all that lies on the GPU; the next draw uploads again."""
+        """Release everything on the GPU; the next draw uploads again."""
         self._blocks = UniformBlocks()
         self._views = {}
         self._ball = HairBall()
@@ -344,24 +346,24 @@ class StrandPass:
         self._ribbons = Ribbons()
 
     def _strands_feature(self, snapshot: Snapshot) -> ShaderFeature:
-        """What all programs that know how wide strands are have."""
+        """The feature of programs that need the width of strands."""
         values = struct_values(snapshot.strand_settings.as_drawn)
         return ShaderFeature(blocks={"strands": ("StrandSettings", values)})
 
     def _curves(self, snapshot: Snapshot) -> ShaderFeature:
-        """What all programs that know where strands are have."""
+        """The feature of programs that need the points of strands."""
         textures = self._textures
         looks = None if snapshot.along is None else textures["cv_looks"]
         return curves_feature(textures["cv_points"], textures["strand_spans"], looks)
 
     def _tangents(self, snapshot: Snapshot) -> ShaderFeature:
-        """What all programs that write tangents have in place of what shades."""
+        """The feature of programs that write tangents, instead of those for shading."""
         return ShaderFeature(
             name="tangents", textures=self._looks(snapshot), defines={"TANGENTS": 1}
         )
 
     def _looks(self, snapshot: Snapshot) -> dict[str, tuple[str, Any]]:
-        """Textures of strands' looks; of unevenly spaced points, all programs have the other."""
+        """Textures for shading; cv_looks only for evenly spaced points, else it is in `_curves`."""
         names = ("strand_seeds", *(("cv_looks",) if snapshot.along is None else ()))
         return {name: ("FLOAT_2D", self._textures[name]) for name in names}
 
@@ -372,9 +374,9 @@ class StrandPass:
         between: InterGroomShadow,
         others: Sequence[OpacityMaps],
     ) -> Iterator[ShaderFeature]:
-        """What all programs that shade these strands have.
+        """The features of all programs that shade these strands.
 
-        A debug view has no model: it is the same with either.
+        Debug views do not depend on the shading model.
         """
         yield ShaderFeature(
             textures=self._looks(snapshot),
@@ -404,7 +406,7 @@ class StrandPass:
     def _inter_groom_feature(
         self, between: InterGroomShadow, others: Sequence[OpacityMaps], light_count: int
     ) -> ShaderFeature:
-        """What a program has that knows of more hair in the way than its maps hold, by CV."""
+        """The feature of programs that read the optical depth of other hair per CV."""
         points, grooms = self._textures["cv_points"], [(NOBODY, other) for other in others]
         found = between.at(points, self._points_serial, grooms, light_count)
         return ShaderFeature(
@@ -415,7 +417,7 @@ class StrandPass:
         )
 
     def _color_feature(self) -> ShaderFeature:
-        """What a program has that shades strands in their own colours."""
+        """The feature of programs that shade strands in their own colours."""
         return ShaderFeature(
             name="colored",
             textures={"cv_colors": ("FLOAT_2D", self._textures["cv_colors"])},
@@ -424,7 +426,7 @@ class StrandPass:
         )
 
     def _openness_feature(self) -> ShaderFeature:
-        """What a program has that knows from where the world's light comes to strands."""
+        """The feature of programs that read the openness of strands to the world's light."""
         return ShaderFeature(
             name="open",
             textures={"cv_openness": ("FLOAT_2D", self._textures["cv_openness"])},
@@ -433,7 +435,7 @@ class StrandPass:
         )
 
     def _skin_feature(self) -> ShaderFeature:
-        """What a program has that knows what skin strands see."""
+        """The feature of programs that read the skin that strands see."""
         names = "received", "beneath"
         return ShaderFeature(
             name="skin",
@@ -443,7 +445,7 @@ class StrandPass:
         )
 
     def _debug_feature(self, snapshot: Snapshot) -> ShaderFeature:
-        """What a program has that shows a debug view."""
+        """The feature of programs that show a debug view."""
         names: tuple[str, ...] = ()
         integers: dict[str, int] = {}
         numbers: dict[str, tuple[str, float]] = {}
@@ -489,7 +491,7 @@ class StrandPass:
             sources = (snapshot.color, snapshot.group, layout, chosen)
             self._take("cv_colors", sources, partial(_colors_texture, snapshot))
         openness = snapshot.openness
-        # Kajiya-Kay's model takes the world by ambient occlusion alone
+        # Kajiya-Kay's model shadows the world's light by ambient occlusion alone
         if not snapshot.has_world or look.model != "marschner" or openness is None:
             self._drop("cv_openness")
         else:
@@ -513,7 +515,7 @@ class StrandPass:
             self._take("solids", (snapshot.solids,), lambda: solids.solids(snapshot.solids))
 
     def _upload_skin(self, snapshot: Snapshot) -> None:
-        """Only light from strand to strand asks for it."""
+        """Upload the skin that strands see, which only light from strand to strand needs."""
         seen, layout = snapshot.skin_seen, snapshot.layout
         is_wanted = snapshot.shading.model == "marschner" and snapshot.volume.scattering
         for name, part in (("cv_received", slice(4)), ("cv_beneath", slice(4, 8))):
@@ -524,7 +526,7 @@ class StrandPass:
                 self._take(name, (seen, layout), make)
 
     def _take(self, name: str, sources: tuple[Any, ...], make: Callable[[], Any]) -> bool:
-        """Make a texture again if a source is another object than before; tuples count by value."""
+        """Make a texture again if a source is a new object; tuples are compared by value."""
         before = self._uploaded.get(name, ())
         if len(before) == len(sources) and all(
             old is new or (isinstance(old, tuple) and old == new)
@@ -536,26 +538,26 @@ class StrandPass:
         return True
 
     def _drop(self, name: str) -> None:
-        """Let go of a texture that is not wanted any more."""
+        """Release a texture that is no longer needed."""
         self._textures.pop(name, None)
         self._uploaded.pop(name, None)
 
 
 def drawn_transparency(settings: StrandSettings) -> str:
-    """How strands are drawn here: layers are hashed where images have no atomics."""
+    """The method by which strands are drawn: without image atomics, hashed instead of layers."""
     wanted = settings.transparency
     return "hashed" if wanted == "layers" and not capabilities().image_atomics else wanted
 
 
 def calm_samples(settings: StrandSettings) -> int:
-    """How many samples of a pixel make a still whose strands are calm that are hashed because their
-    lists cannot be made; else 1.
+    """Samples per pixel that make a still free of noise where strands are hashed as a fallback for
+    layers; else 1.
     """
     return CALM_SAMPLES if drawn_transparency(settings) != settings.transparency else 1
 
 
 def _half_texture(layout: StrandLayout, values: Floats) -> Any:
-    """Of four numbers a point, (point_count, 4), to half precision."""
+    """A half-float texture of four numbers per point, (point_count, 4)."""
     return texture_from(layout.pixels(values), "RGBA16F")
 
 
@@ -572,8 +574,8 @@ def _has_own_colors(snapshot: Snapshot) -> bool:
 
 
 def _colors_texture(snapshot: Snapshot) -> Any:
-    """See the head of this file; w is 1 where strands have colours, and 2 where
-    tips have none of the look either."""
+    """The texture cv_colors; w is 1 where strands have colours, and 2 where tips do not get the
+    look's tint either."""
     look, group = snapshot.shading, snapshot.group
     every_cv = None if group is None else np.repeat(group, snapshot.layout.counts)
     color = own_colors(snapshot.color, every_cv, look)
@@ -587,7 +589,7 @@ def _colors_texture(snapshot: Snapshot) -> Any:
 
 
 def _numbers_texture(snapshot: Snapshot) -> Any:
-    """The number of each strand that the debug view shows, exact below 2^24; 0 without any."""
+    """The texture debug_numbers: exact below 2^24; 0 if the snapshot has no numbers."""
     numbers = getattr(snapshot, snapshot.debug_view)
     shown = np.zeros((snapshot.strand_count, 1, 1), np.float32)
     if numbers is not None:
@@ -596,7 +598,7 @@ def _numbers_texture(snapshot: Snapshot) -> Any:
 
 
 def _lengths_texture(snapshot: Snapshot) -> Any:
-    """0 of what has no segment behind it, and everywhere where strands are at rest."""
+    """The texture rest_lengths; 0 everywhere if strands are at rest. Values at tips are unused."""
     length = np.zeros((snapshot.layout.point_count, 1), np.float32)
     if snapshot.rest is not None:
         length[:-1, 0] = np.linalg.norm(np.diff(snapshot.rest, axis=0), axis=1)
@@ -612,7 +614,7 @@ def _looks_texture(snapshot: Snapshot) -> Any:
 
 
 def _seeds_texture(snapshot: Snapshot) -> Any:
-    """What the noise of each strand depends on, exact below 2^24."""
+    """The texture strand_seeds, exact below 2^24."""
     seed = np.arange(snapshot.strand_count) if snapshot.seed is None else snapshot.seed
     seeds = np.asarray(seed % SEED_LIMIT, np.float32)
     return texture_from(strand_rows(seeds[:, None, None]), "R32F")

@@ -1,4 +1,4 @@
-"""Arrays onto the GPU and back, and the state that drawing borrows."""
+"""Transfer of arrays to the GPU and back, and contexts that set and restore the drawing state."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ _CHANNELS = {"R16F": 1, "R32F": 1, "RG32F": 2, "RGBA32F": 4, "RGBA16F": 4}
 
 
 def texture_from(pixels: Floats, texture_format: str) -> Any:
-    """A 2D texture from (height, width, channels); float32, filtered linearly."""
+    """A 2D texture from a float32 array (height, width, channels), filtered linearly."""
     height, width, channels = pixels.shape
     assert channels == _CHANNELS[texture_format], (pixels.shape, texture_format)
-    # The Buffer reads the array's memory as it lies: dtype and order must be right.
+    # Buffer reads the array's memory directly: dtype and order must be right.
     pixels = np.ascontiguousarray(pixels, np.float32)
     data = gpu.types.Buffer("FLOAT", pixels.shape, pixels)
     return gpu_objects.texture((width, height), format=texture_format, data=data)
 
 
 def volume_from(texels: Floats) -> Any:
-    """An RGBA32F 3D texture from (depth, height, width, 4); float32, filtered linearly."""
+    """An RGBA32F 3D texture from a float32 array (depth, height, width, 4), filtered linearly."""
     depth, height, width, channels = texels.shape
     assert channels == 4, texels.shape
     texels = np.ascontiguousarray(texels, np.float32)
@@ -36,19 +36,19 @@ def volume_from(texels: Floats) -> Any:
 
 def texture_to_array(texture: Any) -> Floats:
     """A float texture as (height, width, channels) float32, row 0 at the bottom."""
-    pixels = np.asarray(texture.read(), np.float32)  # the memory that was read, without a copy
+    pixels = np.asarray(texture.read(), np.float32)  # a view of the memory read, without a copy
     return pixels.reshape(texture.height, texture.width, -1)
 
 
 class UniformBlock:
-    """A uniform buffer that follows its values; made on first use."""
+    """A uniform buffer that is updated when its values change; made on first use."""
 
     def __init__(self) -> None:
         self._values: Floats | None = None
         self._buffer: Any = None
 
     def holding(self, values: Floats) -> Any:
-        """The buffer with these std140 bytes in it, (n,) float32, n a multiple of 4."""
+        """The buffer with these std140 values, (n,) float32, n a multiple of 4."""
         values = np.ascontiguousarray(values, np.float32)
         assert values.size % 4 == 0, values.size
         if self._values is None or self._values.size != values.size:
@@ -68,10 +68,10 @@ class UniformBlock:
 def drawing_state(
     *, depth_test: str = "LESS_EQUAL", depth_write: bool = True, blend: str = "NONE"
 ) -> Iterator[None]:
-    """Set all state that a draw depends on, and put it back however the draw ends.
+    """Set all state that a draw depends on, and restore it, also after exceptions.
 
-    Culling, facing and colour mask cannot be asked for; they return to Blender's own defaults.
-    The viewport and scissor are those of the framebuffer and stay as they are.
+    Culling, facing and colour mask cannot be queried; they are reset to Blender's defaults. The
+    viewport and scissor are those of the framebuffer and are not changed.
     """
     state = gpu.state
     before = state.depth_test_get(), state.depth_mask_get(), state.blend_get()
@@ -91,19 +91,19 @@ def drawing_state(
 
 @contextmanager
 def drawing_into(framebuffer: Any) -> Iterator[None]:
-    """Draw into a framebuffer of our own; the one that was bound comes back as it was."""
+    """Draw into a framebuffer of our own; the previous one is restored with its state."""
     scissor, viewport = gpu.state.scissor_get(), gpu.state.viewport_get()
     with framebuffer.bind():
         yield
-    # Vulkan opens both of a framebuffer that is bound again
+    # when a framebuffer is bound again, Vulkan resets both to all of it
     gpu.state.viewport_set(*viewport)
     gpu.state.scissor_set(*scissor)
 
 
 @contextmanager
 def drawing_rows(rows: range | None) -> Iterator[None]:
-    """Draw into these rows only, of a framebuffer of our own: whether others test against a scissor
-    cannot be asked for. None is all.
+    """Draw only into these rows; None: all. Only for a framebuffer of our own, since it cannot be
+    queried whether another one uses a scissor test.
     """
     if rows is None:
         yield

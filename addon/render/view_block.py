@@ -1,4 +1,4 @@
-"""What drawing shaders share: the blocks `View` and `Lights`."""
+"""The blocks `View` and `Lights` of drawing shaders."""
 
 from __future__ import annotations
 
@@ -12,12 +12,13 @@ from .snapshot import Snapshot
 
 
 def view_feature(camera: Camera, width: int, height: int) -> ShaderFeature:
-    """The block `View` for a target of this size [pixels]."""
+    """The feature with the block `View` for a target of this size [pixels]."""
     return ShaderFeature(blocks={"view": ("View", view_values(camera, width, height))})
 
 
 def lights_feature(snapshot: Snapshot) -> ShaderFeature:
-    """The block `Lights`, and which of them a program has to know: WORLD, light from all around."""
+    """The feature with the block `Lights`, and the defines for the kinds of lights that a program
+    supports; WORLD: light from all around."""
     kinds, has_world = kinds_needed(kept_lights(snapshot.lights)), snapshot.has_world
     block = pack_lights(snapshot.lights, snapshot.ambient, snapshot.harmonics)
     return ShaderFeature(
@@ -28,7 +29,7 @@ def lights_feature(snapshot: Snapshot) -> ShaderFeature:
 
 
 def view_values(camera: Camera, width: int, height: int) -> Floats:
-    """`View` of struct_view.glsl in std140, (40,) float32; GLSL's matrices are stored by columns.
+    """`View` of struct_view.glsl in std140, (40,) float32; GLSL stores matrices by columns.
 
     Args:
         width, height: of the target [pixels].
