@@ -3,7 +3,7 @@
 Curves that moved, and children that are mixed from them, are shaped again. Each keeps its root,
 guides and weights, clump, random numbers and point count. So nothing else changes, and results for
 the whole groom, such as ambient occlusion, stay in use. Left to `rig_flow.prepare`, which has to
-follow: point counts by need, children led out of the head, guides of children, and widths.
+follow: the points that shapes need, children led out of the head, guides of children, and widths.
 """
 
 from __future__ import annotations

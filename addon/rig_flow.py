@@ -253,7 +253,7 @@ class Rig:
 
     @cached_property
     def rest_lengths(self) -> Floats:
-        """Of all strands, (strand_count,) [m]."""
+        """The lengths of all strands, (strand_count,) [m]."""
         return self.strands.lengths()
 
     @property

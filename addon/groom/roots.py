@@ -162,7 +162,7 @@ def root_motions(rest: RootFrames, now: RootFrames) -> RootMotions:
     for row in range(3):
         for column in range(3):
             turn[row, column] = dot_rows(change[row], was[column])
-    # the origin is rounded to float32 below: turning what it loses must not be lost, too
+    # the origin is rounded to float32 below; the shift compensates for that
     rounding = origin - origin.astype(np.float32)
     shift = now.origin.T - origin
     for column in range(3):
@@ -198,7 +198,7 @@ def _check_scale(
     roots_size = float(np.linalg.norm(np.ptp(roots, axis=0)))
     away = float(np.median(distance))
     is_far = away > IMPLAUSIBLE_DISTANCE * surface_size
-    # the hair of a head in metres may lie between the legs of a body in decimetres, which are near
+    # hair of a head in metres may lie near a body in decimetres all the same: between its legs
     is_apart = away > IMPLAUSIBLE_DISTANCE * roots_size and len(roots) >= _FEW
     is_apart &= roots_size > _PATCH * surface_size
     if is_far:

@@ -61,9 +61,9 @@ def find_holds(strands: StrandSet, holders: Holders, tip_distance: float = 0.0) 
     """Where strands of any point counts are held; None where nothing may hold them.
 
     A tie holds a strand at one place: a ring where the strand first passes through it, a ball where
-    the strand is nearest to its middle. As the root decides about the first two points, no place is
-    before the third; strands of two points are never held. Of two places that share a point the one
-    nearer to the root counts.
+    the strand is nearest to its middle. The root determines the first two points, so no place is
+    before the third, and strands of two points are never held. Of two places that share a point,
+    the one nearer to the root counts.
 
     Args:
         tip_distance: tips nearer to their surface than this are held [m].

@@ -5,7 +5,7 @@ counts like a distance on the scalp, so that the two sides of a parting do not m
 The weights are those of Franke and Little (in Barnhill 1977; Franke 1982, Scattered data
 interpolation): w = (R - d) / (R d) = 1/d - 1/R with R the distance of the fourth nearest guide,
 so that a guide fades out before another one takes its place. Their exponent is 1 here, where
-scattered data take 2, because strands shall blend rather than flock around the nearest guide.
+scattered data take 2, because strands should blend rather than flock around the nearest guide.
 
 A child has no direction of its own yet: it is on the side of its nearest guide, and guides that
 diverge from that one, or from each other, are left out (`child_weights`).

@@ -274,8 +274,8 @@ class _Hair:
 
 
 def _found(strands: StrandSet, parts: float, number: Ints, kept: Kept) -> _Found:
-    """Found widths of hair, and on their own those of brows and lashes, which are short and grow
-    close together however much hair is on the head.
+    """Found widths of hair. Those of brows and lashes are found separately, since they are short
+    and grow close together however much hair is on the head.
 
     Args:
         parts: how many strands are drawn for each of these but brows and lashes.
@@ -300,8 +300,8 @@ def _found_of(hair: _Hair, parts: float = 1.0) -> _Found:
     """Widths that give the cover of a head, and in short or spread hair a few layers of it.
 
     Args:
-        parts: how many strands are drawn for each of these, evenly spread between them. Where they
-            are to lie in layers, the spacing that bounds their width is that of these.
+        parts: how many strands are drawn for each of these, evenly spread between them. The width
+            that layers need is limited by the spacing of these, not of all that are drawn.
     """
     if hair.middle <= 0.0:
         return _Found(hair.length * _ALONE, 0.0, 1.0, 1.0)
@@ -413,7 +413,7 @@ def _why_not(strands: StrandSet, own: float, found: _Found) -> str:
 
 
 def _length(meters: float) -> str:
-    """In the unit that gives a number one can read."""
+    """A length in the unit that makes its number readable."""
     for factor, unit in ((1.0, "m"), (1e2, "cm"), (1e3, "mm")):
         if meters * factor >= 1.0:
             return f"{meters * factor:.3g} {unit}"

@@ -1,6 +1,6 @@
 """Grooms as Alembic files for engines, after Epic's "Alembic for Grooms Specification" 1.5.
 
-One IXform carries the version and what wrote the file; below it lie ICurves with the attributes
+One IXform has the version and the name of this program; below it lie ICurves with the attributes
 groom_guide, groom_group_id, groom_group_name, groom_id, groom_root_uv, groom_width, groom_color,
 groom_closest_guides and groom_guide_weights. Vectors have the interpretation "vector": Unreal's
 importer refuses others. Widths are the curves' own as well, where Unity and Blender look for them;

@@ -1,6 +1,6 @@
-"""Reading uncompressed .npz files, damaged ones included, which numpy's own reader does not check.
+"""Reading uncompressed .npz files that may be damaged.
 
-numpy's reader trusts the shapes that a file names, and lets errors of zip files through.
+numpy's own reader trusts the shapes that a file names, and lets errors of zip files through.
 """
 
 from __future__ import annotations

@@ -151,7 +151,7 @@ def check_place(path: Path) -> None:
 
 
 def check_folder_place(folder: Path) -> None:
-    """The same for a folder that files are to be written into; it need not be there yet.
+    """Refuse a folder that files cannot be written into; it need not be there yet.
 
     Raises:
         HairloomError: a file has this name, or no file can be made there.

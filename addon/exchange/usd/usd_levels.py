@@ -1,4 +1,4 @@
-"""Levels of detail in a USD file of cards, which lie in one place: variants, one of them shown."""
+"""Levels of detail in a USD file of cards as variants: all lie in one place, and one is shown."""
 
 from __future__ import annotations
 

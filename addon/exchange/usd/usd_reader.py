@@ -58,9 +58,9 @@ PRIMVARS = (
     "map1",
 )
 _PARTS = ("major", "minor")
-#: More than any groom; their positions alone take 3 GiB.
+#: Maximum points, more than any groom has; their positions alone take 3 GiB.
 MAX_POINTS = 1 << 28
-#: More than any scene that is sent for its hair, counted with all instances.
+#: Maximum prims with all instances, more than any scene has that is sent for its hair.
 MAX_PRIMS = 1_000_000
 #: Memory that a file may take beside its own size [bytes], and as a multiple of it.
 _BESIDE, _MAX_TIMES = 640 << 20, 30
