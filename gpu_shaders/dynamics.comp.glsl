@@ -37,7 +37,7 @@ vec3 twist_curvature;
 #ifdef HAS_SPRINGS
 bool is_curled = false;
 #endif
-float own_kept;           // of the block, or painted for this guide; so the next three
+float own_kept;           // of the block, or painted for this guide; so is own_air
 float own_air;
 float own_carried = 1.0;  // factor on the motion that the moving style gives
 float own_gravity = 1.0;

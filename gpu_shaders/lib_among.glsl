@@ -38,7 +38,7 @@ vec4 among_lanes(Among among, vec3 motion, float mass)
   return vec4(mass, roundEven(whole) * mass);
 }
 
-// Cells of a grid that wraps around, along one axis.
+// Cells wrapped into a periodic grid.
 ivec3 among_wrapped(ivec3 cell, ivec3 counts)
 {
   return cell - counts * ivec3(floor((vec3(cell) + 0.5) / vec3(counts)));

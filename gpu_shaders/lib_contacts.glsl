@@ -24,7 +24,7 @@ float pushed[CONTACT_SLOTS][FREE_SIZE];  // [m] in this substep
 vec4 between_plane[CONTACT_SLOTS][FREE_SIZE];
 vec4 between_origin[CONTACT_SLOTS][FREE_SIZE];
 float between_pushed[CONTACT_SLOTS][FREE_SIZE];
-float between_along[CONTACT_SLOTS][FREE_SIZE];  // its fraction of the segment
+float between_along[CONTACT_SLOTS][FREE_SIZE];  // place of the point on the segment, 0 to 1
 vec3 between_normal[FREE_SIZE];  // at each free CV with a touching segment, else zero
 // Begin, end and length of a part of the substep, as fractions of the substep; and whether the contacts
 // found last require the substep to be done in parts.
@@ -481,7 +481,7 @@ void find_contacts(int substep)
     }
   }
 #if CONTACT_SLOTS == 1
-  find_with(posed_at(substep, 0));  // there is but one collider
+  find_with(posed_at(substep, 0));  // there is only one collider
 #else
   float squared = 0.0;
   for (int i = 0; i < FREE; i++) {

@@ -14,7 +14,7 @@ struct Control {
   vec4 b0, b1, b2, b3;
 };
 
-// Of the segment from p1 to p2; in clip space as well as in the world.
+// Control points of the segment from p1 to p2, in clip space or in the world.
 Control segment_control(vec4 p0, vec4 p1, vec4 p2, vec4 p3)
 {
   const float sixth = 1.0 / 6.0;

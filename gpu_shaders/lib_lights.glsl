@@ -18,7 +18,7 @@ const float FAR_PANEL = 2.5e-3, MIN_HEIGHT = 1.0e-9;
 const vec3 PANEL_NODES = vec3(0.23861918608319692, 0.6612093864662645, 0.932469514203152);
 const vec3 PANEL_WEIGHTS = vec3(0.46791393457269104, 0.3607615730481386, 0.17132449237917036);
 
-// Shade of an area light's spread, in a direction whose angle from its axis has this tangent.
+// Factor of an area light's spread on its radiance, at an angle from its axis with this tangent.
 float panel_shade(Lights lights, int index, float tangent)
 {
   return max(lights.along[index].w - tangent, 0.0) * lights.power[index].w;

@@ -49,7 +49,7 @@ RootFrame root_frame(vec3 a, vec3 b, vec3 c, vec2 weight)
   return frame;
 }
 
-// Stored as a change, so that a root that did not move leaves its strand bit for bit as it is.
+// Stored as a change, so that a root that did not move leaves its strand bit-identical.
 RootMotion root_motion(RootFrame rest, RootFrame now)
 {
   RootMotion motion;

@@ -1,4 +1,4 @@
-// Transforms to polar coordinates and blurs along the radius, from the light outwards; one invocation per ray.
+// Transforms to polar coordinates and blurs along the radius, from the light outwards; an invocation per ray.
 // Twin of to_polar and radial_blur in addon/shading/shafts.py.
 #include "lib_shafts.glsl"
 

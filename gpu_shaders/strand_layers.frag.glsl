@@ -1,5 +1,6 @@
 // Strands as layers, first step: adds each fragment that no mesh hides to the list of its pixel. The first
-// fragment of a pixel also adds the pixel to the list of pixels with hair. Visible fragments are shaded later.
+// fragment of a pixel also adds the pixel to the list of pixels with hair. Visible fragments are shaded
+// later.
 //
 // COUNTED: instead, the heads of the lists count fragments. PARTS: only fragments of a run of pixels, row by
 // row, and in a range of depths, see addon/render/pixel_parts.py.

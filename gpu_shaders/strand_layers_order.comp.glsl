@@ -136,7 +136,7 @@ void keep_layer(uint number, uvec4 node, float fraction)
   kept_count++;
 }
 
-// x transmittance of all layers, y depth at which the transmittance has fallen to a half, 2 where it does not.
+// x transmittance of all layers, y depth at which it has fallen to a half, 2 where it does not.
 vec2 hidden_by(uint sorted)
 {
   float through = 1.0, front = 2.0;

@@ -1,4 +1,4 @@
-// The lights' opacity maps. Filled by addon/render/opacity_pass.py.
+// The lights' opacity maps. Filled by addon/render/opacity_maps.py.
 struct Opacity {
   vec4 map_x[{{light_capacity}}];      // rows that take (world position, 1) to x, y, depth and w of
   vec4 map_y[{{light_capacity}}];      // each light's map, see light_frame.py

@@ -1,4 +1,4 @@
-// A light on the screen and the grid of rays around it; filled by addon/render/shafts_pass.py.
+// A light on the screen and the grid of rays around it. Filled by addon/render/shafts_block.py.
 
 struct Shafts {
   vec4 radiance;        // rgb of the haze at the light, w window depth of the light

@@ -142,10 +142,10 @@ class ColliderTextures:
         """Rows of the table of moments, (substep_count, collider_count * COLLIDER_TEXELS, 4).
 
         A collider's texels: three rows of its inverse matrix at the substep's end; three rows of
-        the change of its matrix in the substep; those of `own`; a sphere around all points that it
-        may reach in the substep; three rows of its inverse matrix at the substep's begin; x the
-        squared length up to which paths need not be followed (see `contacts.short_squared`), y 1
-        where segments collide, z its smallest scale, w its swelling.
+        the change of its matrix in the substep; those of `own`; a sphere around all points within
+        `reach` of it during the substep; three rows of its inverse matrix at the substep's begin; x
+        the squared length up to which paths need not be followed (see `contacts.short_squared`), y
+        1 where segments collide, z its smallest scale, w its swelling.
 
         Args:
             spans: (substep_count, 2) begin and end of each substep as fractions of the frame.
@@ -180,7 +180,7 @@ class ColliderTextures:
         table[:, place, 0:3] = np.linalg.inv(now)[:, :3]
         table[:, place, 6:8] = self.own[place]
         turned, (center, radius) = now[:, :3, :3], self.bounds[place]
-        stretch = np.sqrt(np.einsum("nij,nij->n", turned, turned))  # no less than the largest
+        stretch = np.sqrt(np.einsum("nij,nij->n", turned, turned))  # an upper bound of the scale
         table[:, place, 8, :3] = turned @ center + now[:, :3, 3]
         table[:, place, 8, 3] = radius * stretch
 

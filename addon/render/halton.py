@@ -12,7 +12,7 @@ from ..arrays import Floats, Ints
 
 
 def radical_inverse(number: Ints, base: int) -> Floats:
-    """The digits of whole numbers (n,) behind the point, in reverse, (n,)."""
+    """The radical inverses of whole numbers (n,): their digits mirrored at the point, (n,)."""
     found, left, place = np.zeros(len(number)), number.astype(np.int64), 1.0 / base
     while left.any():
         left, digit = np.divmod(left, base)

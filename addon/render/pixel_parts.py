@@ -39,7 +39,7 @@ class PixelPart:
 
     @property
     def halves(self) -> tuple[PixelPart, ...]:
-        """This part divided in two, the farther first; empty if it cannot be divided."""
+        """This part divided in two, by pixels or else by `slabs`; empty if it cannot be divided."""
         pixel = (self.first + self.end) // 2
         if self.end - self.first > 1:
             return replace(self, end=pixel), replace(self, first=pixel)
