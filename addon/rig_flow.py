@@ -359,7 +359,7 @@ def _loose(away: float) -> tuple[str, ...]:
     if not away:
         return ()
     return (
-        f"its roots lie {1e3 * away:.3g} mm from the surface (median), so they move beside it. "
+        f"its roots lie {1e3 * away:.3g} mm from the surface (median), so they float beside it. "
         "Check unit, up axis and place of both, or press Snap to Surface.",
     )
 
@@ -395,8 +395,9 @@ def _lost_length(strands: StrandSet, own: StrandSet) -> tuple[str, ...]:
     if not len(lost):
         return ()
     note = (
-        f"{len(lost):,} strands need more than {MAX_POINTS} points. They have that many, and lose"
-        f" up to {100.0 * float(lost.max()):.1f} % of their length. Use fewer turns."
+        f"{len(lost):,} strands need more than {MAX_POINTS} points. They are limited to that "
+        f"number, and lose up to {100.0 * float(lost.max()):.1f} % of their length. Use fewer "
+        "turns."
     )
     return (note,)
 
@@ -421,19 +422,19 @@ def _automatic(
     count, line = hair.strand_count, ""
     if are_few(hair):
         line = (
-            f"Children: none, since {count:,} curves may be guides or a part of the hair. Set"
-            " Method to Between Guides to fill the space between them"
+            f"Children: none, since {count:,} curves may be guides or a part of the hair. Set "
+            "Method to Between Guides to fill the space between them"
         )
     if parts > 1.0 and rig.head is None:
-        parts, line = 1.0, "Children: none, since the hair has no surface on which they could grow"
+        parts, line = 1.0, "Children: none, since the hair has no surface to grow them on"
     own, found = with_widths(rig.strands, widths, parts, kept=growing.kept)
     rig = replace(rig, strands=own, widths=found)
     if parts > 1.0:
         with_children = _with_children(rig, settings, growing, place)
         rig = replace(with_children, widths=found)
         line = (
-            f"Children: {rig.child_count:,} added, since {count:,} curves are too few for a body of"
-            " hair. Set Method to None to see the curves alone"
+            f"Children: {rig.child_count:,} added, since {count:,} curves are too few for full "
+            "hair. Set Method to None to see only the curves"
         )
     return replace(rig, children_line=line)
 
@@ -552,8 +553,8 @@ def _outside(
     notes = made.notes
     if lost > MANY_INSIDE * len(is_out):
         notes += (
-            f"{lost:,} of {len(is_out):,} children would lie in the surface, so they are left out."
-            " Comb the curves around them farther out.",
+            f"{lost:,} of {len(is_out):,} children would lie in the surface, so they are left "
+            "out. Comb the curves around them farther out.",
         )
     weights = GuideWeights(made.weights.guide[chosen], made.weights.weight[chosen])
     return Children(led.take(chosen), weights, notes, made.growth), chosen
@@ -571,8 +572,9 @@ def _parent_shapes(parents: StrandSet, child_count: int) -> tuple[StrandSet, tup
     shapes = resample(parents, count)
     kept = shapes.lengths().sum(dtype=np.float64) / parents.lengths().sum(dtype=np.float64)
     note = (
-        f"{child_count:,} children of {needed} points do not fit into memory, so they have {count},"
-        f" and {100.0 * (1.0 - kept):.1f} % of the length of curls is lost. Use fewer children."
+        f"{child_count:,} children with {needed} points do not fit into memory, so they have "
+        f"{count} points, and {100.0 * (1.0 - kept):.1f} % of the length of curls is lost. Use "
+        "fewer children."
     )
     return shapes, (note,)
 

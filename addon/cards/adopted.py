@@ -238,26 +238,29 @@ def _direction_notes(axes: UvAxes, island: Ints, card: Ints, head: Surface | Non
         len(np.unique(card[flags[island]])) for flags in (axes.is_against, axes.is_unsaid)
     )
     if against:
-        yield f"The UVs of {against} of {_cards(count)} run another way than those of the others"
+        yield (
+            f"The UVs of {against} of {_cards(count)} run in another direction than those of the "
+            "others"
+        )
     if unsaid:
         yield (
-            f"The UVs of {unsaid} of {_cards(count)} leave open which end is the root. "
-            "Choose it under Root to Tip"
+            f"The UVs of {unsaid} of {_cards(count)} do not tell which end is the root. Choose it "
+            "under Root to Tip"
         )
 
 
 def _shape_notes(source: Surface, card: Ints, is_mixed: Bools) -> Iterator[str]:
     count = int(card.max()) + 1
     if count == 1:
-        yield "All faces hang together, so there is nothing to sort: cards must be separate pieces"
+        yield "All faces are connected, so there is nothing to sort: cards must be separate pieces"
     if is_mixed.any():
-        yield f"The faces of {_cards(int(is_mixed.sum()))} do not all look to the same side"
+        yield f"The faces of {_cards(int(is_mixed.sum()))} do not all point to the same side"
     a, b, c = np.moveaxis(source.corners.astype(np.float64), 1, 0)
     area = 2.0 * areas_of(source.corners.astype(np.float64))
     longest = np.max([((x - y) ** 2).sum(axis=1) for x, y in ((a, b), (b, c), (c, a))], axis=0)
     is_flat = np.bincount(card, area > _FLAT * longest, minlength=count) == 0
     if is_flat.any():
-        yield f"No face of {_cards(int(is_flat.sum()))} has an area"
+        yield f"No face of {_cards(int(is_flat.sum()))} has any area"
     shared = _crowded(source.triangles, card)
     if shared:
         yield f"In {_cards(shared)} more than two faces share an edge"

@@ -133,7 +133,7 @@ def check_width(radius: Floats) -> None:
     """
     if not (radius > 0.0).any():
         raise HairloomError(
-            "no strand has a width, so that the atlas would be empty",
+            "no strand has a width, so the atlas would be empty",
             place="strands",
             remedy="Give the strands a radius, or raise Fullness",
         )
@@ -321,7 +321,7 @@ def _cap_note(crowding: Floats) -> tuple[str, ...]:
     if not full:
         return ()
     return (
-        f"{full} tiles cannot hold all their strands; they show some of them, up to "
+        f"{full} tiles cannot hold all their strands; they show only some of them, up to "
         f"{crowding.max():.1f} times as wide",
     )
 
@@ -342,7 +342,7 @@ def _size_notes(
         fitting = next((f"an atlas of {size}" for size in SIZES if size >= larger), "fewer columns")
         notes.append(
             f"strands are {fraction:.2g} pixels of the atlas wide and show as fainter lines; "
-            f"{fitting} would show them as they are"
+            f"{fitting} would show them correctly"
         )
     short = int((length < high).sum())
     if short:

@@ -147,7 +147,7 @@ class AtlasSettings(Settings):
         needed = max(count * (least + 2 * self.padding) for count, least in parts)
         return HairloomError(
             f"{self.columns} x {self.rows} tiles of {across:g} x {along:g} pixels with "
-            f"{self.padding} pixels of padding do not fit in {self.side} pixels; that takes "
+            f"{self.padding} pixels of padding do not fit in {self.side} pixels; they need "
             f"{needed}, which is {needed - self.side} more",
             place="atlas",
             remedy="Use a larger atlas, fewer columns and rows, or less padding",

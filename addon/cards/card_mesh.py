@@ -70,7 +70,7 @@ class CardMesh:
                 raise _broken(f"{name} holds a value that is not finite")
             object.__setattr__(self, name, value)
         if triangle_count and not 0 <= self.triangles.min() <= self.triangles.max() < vertex_count:
-            raise _broken("a triangle names a vertex that does not exist")
+            raise _broken("a triangle refers to a vertex that does not exist")
         self._check_cards()
 
     def _check_cards(self) -> None:

@@ -223,7 +223,9 @@ def edits_of(surface: Surface, made: Ints | None, record: MadeCards, matrix: Flo
     if made is None:
         number = _recognised(marks, middle, record)
         if count:
-            notes = ("the numbers of its cards are gone: they were recognised by their place",)
+            notes = (
+                "the numbers of its cards are missing, so cards were recognised by their places",
+            )
     else:
         number = np.full(count, -1, np.int32)
         number[piece] = made

@@ -203,12 +203,11 @@ def _notes(
     notes = list(edits.notes)
     if counts.lost_edits:
         notes.append(
-            f"no new card was found for {counts.lost_edits:,} edited ones, which stay beside the "
-            "others as your own"
+            f"no new card matches {counts.lost_edits:,} edited ones, which stay as your own cards"
         )
     if counts.lost_deletions:
         notes.append(
-            f"no new card was found for {counts.lost_deletions:,} deleted ones, which are forgotten"
+            f"no new card matches {counts.lost_deletions:,} deleted ones, which are forgotten"
         )
     if head is not None and len(head.triangles) and piece_count:
         center = strips.frames.center
@@ -216,7 +215,7 @@ def _notes(
         away = closest_point(center[:, 0].astype(np.float64), head).distance
         far = int(np.count_nonzero(away > _FAR * length))
         if far:
-            notes.append(f"{far:,} of the cards that were kept begin away from the head")
+            notes.append(f"{far:,} of the kept cards begin away from the head")
     return tuple(notes)
 
 

@@ -393,7 +393,7 @@ def _notes(texels: float) -> tuple[str, ...]:
         return ()
     return (
         f"strands are {texels:.2g} pixels of the atlas wide and show as fainter lines; a larger "
-        "atlas, fewer Shell Layers or a higher Max Triangles would show them as they are",
+        "atlas, fewer Shell Layers or a higher Max Triangles would show them correctly",
     )
 
 

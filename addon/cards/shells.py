@@ -71,7 +71,7 @@ def are_wanted(
     problem = _problem(strands, head)
     if has_edits and settings.kind == "shells":
         raise HairloomError(
-            "its cards were edited, and shells would take their place",
+            "its cards were edited, and shells would replace them",
             place="shells",
             remedy="Set Kind to Cards or to Automatic, or press Discard Edits",
         )
@@ -93,7 +93,7 @@ def _problem(strands: StrandSet, head: Surface | None) -> str | None:
         return "brows and lashes cannot be shells, which show hair as layers over skin"
     if strands.strand_count < _FEWEST:
         count = "1 strand" if strands.strand_count == 1 else f"{strands.strand_count} strands"
-        return f"{count} cannot fill shells, which take {_FEWEST} or more"
+        return f"{count} cannot fill shells, which need {_FEWEST} or more"
     length, side = _usual_length(strands), _side(strands)
     if length > _TOO_LONG * side:
         return (

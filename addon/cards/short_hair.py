@@ -46,7 +46,7 @@ def fitted_to_length(
         column_count=min(settings.column_count, _COLUMNS),
     )
     note = (
-        f"the hair is short beside {wanted:,} cards, so there are {fitted.card_count:,} of "
+        f"the hair is too short for {wanted:,} cards, so there are {fitted.card_count:,} of "
         f"{2 * fitted.segment_count * fitted.column_count} triangles or fewer"
     )
     return fitted, replace(atlas, strand_width=_FACE_ON * atlas.strand_width), (note,)

@@ -53,7 +53,7 @@ def motion_layout(vertex_count: int, frame_count: int, place: str) -> MotionLayo
         f"{vertex_count:,} vertices in {frame_count:,} frames do not fit into a texture of "
         f"{_WIDTHS[-1]} x {_WIDTHS[-1]} texels",
         place=place,
-        remedy="Write fewer frames, levels of detail or cards, or joints",
+        remedy="Write fewer frames, levels of detail or cards, or choose joints",
     )
 
 

@@ -60,9 +60,9 @@ class Figures:
             return None
         names = {field.name for field in fields(cls)}
         if not isinstance(values, dict) or set(values) != names:
-            raise ValueError("its figures are others")
+            raise ValueError("its figures have other names")
         if not all(isinstance(value, int | float) for value in values.values()):
-            raise ValueError("its figures are no numbers")
+            raise ValueError("its figures are not numbers")
         if not all(math.isfinite(value) for value in values.values()):
             raise ValueError("its figures are not finite")
         return cls(**values)

@@ -111,15 +111,15 @@ def check_drive(state: DynamicsState, drive: Drive, known: tuple[Floats, ...] = 
         guide_count, cv_count = checked_grid(target, "style").shape[:2]
         if (guide_count, cv_count) != (state.guide_count, state.cv_count):
             raise HairloomError(
-                f"the style has {guide_count} guides of {cv_count} CVs, "
-                f"the simulation {state.guide_count} of {state.cv_count}",
+                f"the style has {guide_count} guides of {cv_count} CVs, but the simulation has "
+                f"{state.guide_count} of {state.cv_count}",
                 place="dynamics",
                 remedy="Start the simulation again",
             )
     if drive.held is not None and drive.held.is_held.shape != (state.guide_count, state.cv_count):
         raise HairloomError(
-            f"ties hold {drive.held.is_held.shape} guides and CVs, "
-            f"the simulation has {(state.guide_count, state.cv_count)}",
+            f"ties hold {drive.held.is_held.shape} guides and CVs, but the simulation has "
+            f"{(state.guide_count, state.cv_count)}",
             place="dynamics",
             remedy="Start the simulation again",
         )
@@ -129,21 +129,21 @@ def check_drive(state: DynamicsState, drive: Drive, known: tuple[Floats, ...] = 
         state.cv_count,
     ):
         raise HairloomError(
-            f"distances from colliders are known of {clearance.distances.shape[:2]} guides and "
-            f"CVs, the simulation has {(state.guide_count, state.cv_count)}",
+            f"there are distances from colliders for {clearance.distances.shape[:2]} guides and "
+            f"CVs, but the simulation has {(state.guide_count, state.cv_count)}",
             place="dynamics",
             remedy="Start the simulation again",
         )
     if drive.simulated is not None and drive.simulated.shape != (state.guide_count,):
         raise HairloomError(
-            f"it is known of {drive.simulated.shape} guides how much is simulated, the simulation "
-            f"has {state.guide_count}",
+            f"there are values of Simulated for {drive.simulated.shape} guides, but the "
+            f"simulation has {state.guide_count}",
             place="dynamics",
             remedy="Start the simulation again",
         )
     if drive.painted is not None and not drive.painted.fits(state.cv_count, state.guide_count):
         raise HairloomError(
-            f"what is painted is not {state.guide_count} finite numbers, one for each guide",
+            f"painted values must be {state.guide_count} finite numbers, one for each guide",
             place="dynamics",
             remedy="Start the simulation again",
         )

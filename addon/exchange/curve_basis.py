@@ -100,7 +100,9 @@ def usable_basis(basis: str, counts: Ints) -> tuple[str, tuple[str, ...]]:
     """
     if basis != "bezier" or 2 * int(_are_bezier(counts).sum()) > len(counts):
         return basis, ()
-    return "linear", ("it says bezier, but its numbers of points are of curves through them",)
+    return "linear", (
+        "its basis is bezier, but its numbers of points are those of curves through them",
+    )
 
 
 def unfit_curves(on_curves: OnCurves, basis: str) -> dict[str, Bools]:

@@ -75,9 +75,9 @@ class Groom:
         if self.motion is not None and self.motion.positions.shape[1] != len(self.strands.points):
             raise _broken(f"a motion of {self.motion.positions.shape[1]} points")
         if (self.closest_guides is None) != (self.guide_weights is None):
-            raise _broken("closest_guides and guide_weights come together or not at all")
+            raise _broken("closest_guides and guide_weights must be given together")
         if self.closest_guides is not None and self.strand_id is None:
-            raise _broken("closest_guides name strands by strand_id, which is missing")
+            raise _broken("closest_guides refer to strands by strand_id, which is missing")
 
     @property
     def color(self) -> Floats | None:

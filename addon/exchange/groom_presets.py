@@ -140,7 +140,7 @@ def _warnings(groom: Groom, written: Groom, preset: GroomPreset) -> list[str]:
     strands = written.strands
     if not strands.strand_count:
         what = "guides" if preset.parts == "guides" else "strands"
-        return [f"The engine will see no {what}"]
+        return [f"The engine will receive no {what}"]
     warnings = []
     zero = int((strands.radius <= 0.0).sum())
     if zero:
@@ -151,7 +151,7 @@ def _warnings(groom: Groom, written: Groom, preset: GroomPreset) -> list[str]:
     if len(np.unique(strands.group)) == 1:
         warnings.append("All strands are in one group: they can have only one material")
     if strands.root_uv is None:
-        warnings.append("There are no root UVs: the engine makes some up, or has none")
+        warnings.append("There are no root UVs: the engine generates some, or has none")
     long = int((strands.point_counts > preset.max_points).sum())
     if long:
         warnings.append(f"{long} strands are resampled to {preset.max_points} points")

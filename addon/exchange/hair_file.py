@@ -174,7 +174,7 @@ def write_hair_file(
     if _SEGMENTS in arrays and segments.max() > MAX_SEGMENTS:
         raise HairloomError(
             f"a strand has {segments.max():,} segments, and .hair files hold up to "
-            f"{MAX_SEGMENTS:,} of each",
+            f"{MAX_SEGMENTS:,} per strand",
             place=str(path),
             remedy="Resample the hair to fewer points",
         )
@@ -213,7 +213,7 @@ class _HairFile(BinaryFile):
         super().__init__(path)
         if self.array("signature", 0, "S4", 1)[0] != b"HAIR":
             raise self.error(
-                "this is no .hair file: it does not begin with HAIR", "Choose a .hair file"
+                "this is not a .hair file: it does not begin with HAIR", "Choose a .hair file"
             )
         self._header = self.array("header", 0, HEADER, 1)[0]
         self._strand_count = int(self._header["strand_count"])
@@ -223,7 +223,7 @@ class _HairFile(BinaryFile):
             raise self.error("it holds no strands", "Export the groom again")
         if self._bits > sum(_ARRAYS):
             raise self.error(
-                f"it holds arrays that are not known here (bits {self._bits:#x}, byte 12)",
+                f"it holds unknown arrays (bits {self._bits:#x}, byte 12)",
                 "The file is damaged, or newer than this reader",
             )
         self._check_arrays()
@@ -249,7 +249,7 @@ class _HairFile(BinaryFile):
             total = int(segments.sum(dtype=np.int64)) + self._strand_count
         if total != self._point_count:
             raise self.error(
-                f"its strands have {total:,} points together, and it says that there are "
+                f"its strands have {total:,} points together, but its header states "
                 f"{self._point_count:,} (byte 8)",
                 "The file is damaged: copy or export it again",
             )
@@ -293,7 +293,7 @@ def _writing_notes(name: str, groom: Groom, has_uv: bool) -> tuple[str, ...]:
     if (strands.group != strands.group[0]).any():
         notes.append(f"{name}: .hair holds no groups. Write a file for each group to keep them.")
     if strands.root_uv is not None and not has_uv:
-        notes.append(f"{name}: .hair holds no root UVs, unless as LuxCore writes them.")
+        notes.append(f"{name}: .hair holds no root UVs, except in the manner of LuxCore.")
     if groom.strand_id is not None or groom.closest_guides is not None:
         notes.append(f"{name}: .hair holds no strand IDs and no closest guides.")
     return tuple(notes)

@@ -115,16 +115,16 @@ def read_hairstyle(path: Path, kinds: Mapping[str, type[Settings]]) -> Hairstyle
     settings = _dictionary(data, "settings", place)
     for section, values in settings.items():
         if section not in kinds or not isinstance(values, Mapping):
-            raise _damaged(f"it sets '{section}', which is no section of settings", place)
+            raise _damaged(f"it sets '{section}', which is not a section of settings", place)
         kinds[section].from_dict(values, place)
     masks = _dictionary(data, "masks", place)
     if not set(masks) <= set(MASKS) or not all(isinstance(name, str) for name in masks.values()):
         raise _damaged(f"it has masks other than {', '.join(MASKS)}", place)
     presets, order = data.get("presets", []), data.get("order", 0)
     if not isinstance(presets, list) or not all(isinstance(name, str) for name in presets):
-        raise _damaged("its presets are no list of names", place)
+        raise _damaged("its presets are not a list of names", place)
     if not isinstance(order, int):
-        raise _damaged("its order is no whole number", place)
+        raise _damaged("its order is not a whole number", place)
     return Hairstyle(
         title=str(data.get("title") or path.stem),
         guides=None if GROWN in settings else _guides(path.with_suffix(".npz")),
@@ -221,7 +221,7 @@ def _text(path: Path) -> dict[str, Any]:
 def _dictionary(data: Mapping[str, Any], name: str, place: str) -> dict[str, Any]:
     values = data.get(name, {})
     if not isinstance(values, dict):
-        raise _damaged(f"its {name} are no table", place)
+        raise _damaged(f"its {name} are not a table", place)
     return values
 
 
@@ -245,14 +245,14 @@ def _guides(path: Path) -> RootedShapes:
     try:
         with zipfile.ZipFile(path) as archive:
             if sum(info.file_size for info in archive.infolist()) > _MAX_BYTES:
-                raise ValueError("its guides are too many")
+                raise ValueError("it has too many guides")
         with np.load(path, allow_pickle=False) as file:
             arrays = {name: file[name] for name in _ARRAYS}
     except _UNREADABLE as error:
         raise _damaged(f"the guides of this style cannot be read ({error})", place) from error
     for name, (kind, dimensions) in _ARRAYS.items():
         if arrays[name].dtype != kind or arrays[name].ndim != dimensions:
-            raise _damaged(f"the array '{name}' is of another kind", place)
+            raise _damaged(f"the array '{name}' has the wrong type", place)
     counts, count = arrays["counts"], len(arrays["counts"])
     fits = (
         count > 0
@@ -263,7 +263,7 @@ def _guides(path: Path) -> RootedShapes:
         and bool(np.isfinite(arrays["root_uv"]).all())
     )
     if not fits:
-        raise _damaged("the guides of this style do not fit each other", place)
+        raise _damaged("the arrays of this style's guides do not match each other", place)
     places = _unpacked_steps(arrays["differences"])
     return RootedShapes(
         arrays["root_uv"],
@@ -274,4 +274,6 @@ def _guides(path: Path) -> RootedShapes:
 
 
 def _damaged(problem: str, place: str) -> HairloomError:
-    return HairloomError(problem, place=place, remedy="Install Hairloom again, or make it again")
+    return HairloomError(
+        problem, place=place, remedy="Install Hairloom again, or make the style again"
+    )

@@ -54,7 +54,7 @@ def _lost(
     if not 0 < len(without) < len(grooms):
         return ()
     return (
-        f"{', '.join(without)}: no {what}, so the file has none at all. Give this hair {remedy}, "
+        f"{', '.join(without)}: no {what}, so the whole file has none. Give this hair {remedy}, "
         "or write it to a separate file.",
     )
 

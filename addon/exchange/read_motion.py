@@ -55,10 +55,14 @@ def sound_motion(times: Floats, positions: Floats) -> tuple[ReadMotion | None, s
     count = len(times) if is_sound.all() else int(is_sound.argmin())
     note = ""
     if count < len(times):
-        reason = "points that are no numbers" if is_near[count] else "a time that no scene has"
+        reason = (
+            "points that are not numbers"
+            if is_near[count]
+            else "a time outside the range of a scene"
+        )
         note = ended_at(float(times[count]), reason)
     return (ReadMotion(times[:count], positions[:count]) if count > 1 else None), note
 
 
 def ended_at(seconds: float, reason: str) -> str:
-    return f"at {seconds:g} s it has {reason}, so its motion ends before"
+    return f"at {seconds:g} s it has {reason}, so its motion ends before that"

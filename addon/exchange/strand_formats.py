@@ -48,7 +48,7 @@ ALEMBIC = StrandFormat(
     "alembic",
     "Groom Alembic",
     "Hair groom (.abc)",
-    "Write hair as an Alembic groom, with all that engines ask of one",
+    "Write hair as an Alembic groom, with all that engines need",
     (".abc",),
     tuple(PRESETS.values()),
     ("engine", "basis", "parts", "by_group", "use_bake"),
@@ -58,7 +58,7 @@ USD = StrandFormat(
     "usd",
     "USD",
     "Hair strands (.usdc/.usd/.usda)",
-    "Write hair as USD curves, with all that engines ask of a groom as primvars",
+    "Write hair as USD curves, with all that engines need as primvars",
     (".usdc", ".usd", ".usda"),
     (
         _usd("blender", "Blender", "Z", 1.0),
@@ -103,7 +103,7 @@ HAIR = StrandFormat(
     "hair",
     "Cem Yuksel's .hair",
     "Cem Yuksel's hair (.hair)",
-    "Write hair in Cem Yuksel's format, which renderers and papers read",
+    "Write hair in Cem Yuksel's format, which renderers and papers use",
     (".hair",),
     (
         GroomPreset(
@@ -133,7 +133,9 @@ def strand_format(path: Path) -> StrandFormat:
         if suffix in each.suffixes:
             return each
     raise HairloomError(
-        f"'{path.suffix}' is no suffix of files of strands" if path.suffix else "it has no suffix",
+        f"'{path.suffix}' is not the suffix of a strand file"
+        if path.suffix
+        else "it has no suffix",
         place=str(path),
         remedy="Choose one of " + ", ".join(SUFFIXES),
     )

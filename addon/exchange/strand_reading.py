@@ -50,7 +50,7 @@ def read_strands(
     """
     if parts not in PARTS:
         raise HairloomError(
-            f"'{parts}' is no part", place="parts", remedy="Use " + ", ".join(PARTS)
+            f"'{parts}' is not a part", place="parts", remedy="Use " + ", ".join(PARTS)
         )
     if not (np.isfinite(scale) and scale > 0.0):
         raise HairloomError(
@@ -92,7 +92,7 @@ def _parts(groom: Groom, parts: str, path: Path) -> tuple[Groom, tuple[str, ...]
     if not guides:
         return _untied(groom), ()
     if not others:
-        return _untied(groom), (f"{path.name}: it holds nothing but guides: {guides:,} of them.",)
+        return _untied(groom), (f"{path.name}: it holds only guides: {guides:,} of them.",)
     note = f"{path.name}: {guides:,} guides were left out."
     return _untied(replace(groom.without_guides(), is_guide=None)), (note,)
 

@@ -56,7 +56,7 @@ def write_strands(
     kind, settings = strand_format(path), settings or StrandExportSettings()
     if motion is not None and not kind.has_motion:
         raise HairloomError(
-            f"{kind.title} holds no motion",
+            f"{kind.title} cannot store motion",
             place=str(path),
             remedy="Write one frame, or choose Alembic (.abc) or USD (.usdc)",
         )
@@ -139,7 +139,7 @@ def _bones_set_aside(written: Collection[Path]) -> tuple[str, ...]:
             move(bones, kept)
         except OSError as error:
             raise unwritable(bones, error.strerror or str(error)) from error
-        notes.append(f"{bones.name} is of other strands, and is kept as {kept.name}.")
+        notes.append(f"{bones.name} belongs to other strands, and is kept as {kept.name}.")
     return tuple(notes)
 
 

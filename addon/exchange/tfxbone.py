@@ -53,7 +53,7 @@ class BoneWeights:
         if self.bone.shape != (len(self.bone), INFLUENCES) or self.weight.shape != self.bone.shape:
             raise _broken(f"bones of shape {self.bone.shape}, weights of {self.weight.shape}")
         if ((self.bone < 0) | (self.bone >= max(len(self.names), 1))).any():
-            raise _broken(f"a bone beyond the {len(self.names)} that there are")
+            raise _broken(f"a bone index beyond the {len(self.names)} bones")
         if not (np.abs(self.weight.sum(axis=1, dtype=np.float64) - 1.0) < 1.0e-3).all():
             raise _broken("weights whose sum is not 1")
 

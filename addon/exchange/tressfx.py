@@ -174,9 +174,9 @@ def _write(path: Path, blocks: dict[str, Floats]) -> None:
         gap = -end % 8  # as the format requires
         if end + gap > np.iinfo(np.uint32).max:
             raise HairloomError(
-                "TressFX files end at 4 GiB, and this groom is larger",
+                "TressFX files are limited to 4 GiB, and this groom is larger",
                 place=str(path),
-                remedy="Write fewer strands, or fewer vertices a strand",
+                remedy="Write fewer strands, or fewer vertices per strand",
             )
         header[name] = end + gap
         filed += [bytes(gap), np.ascontiguousarray(block, "<f4")]
@@ -196,7 +196,7 @@ def _vertex_count(wanted: int | None, strands: StrandSet, path: Path) -> int:
         return next((count for count in VERTEX_COUNTS if count >= longest), VERTEX_COUNTS[-1])
     if wanted not in VERTEX_COUNTS:
         raise HairloomError(
-            f"TressFX does not take {wanted} vertices a strand",
+            f"TressFX does not support {wanted} vertices per strand",
             place=str(path),
             remedy="Use 4, 8, 16, 32 or 64",
         )
@@ -219,7 +219,7 @@ def _reading_notes(name: str, file: TressfxFile, color: Floats | None) -> tuple[
     if file.follow_count:
         notes.append(
             f"{name}: TressFX grows {file.follow_count} follow hairs around each strand of this "
-            "file; they are not in it. Children from guides do the same here."
+            "file, which does not contain them. Use children from guides instead."
         )
     if color is not None and not (color[:, 3] == 1.0).all():
         notes.append(f"{name}: the alpha of its colours is not kept.")
@@ -237,7 +237,7 @@ def _writing_notes(name: str, groom: Groom, uniform: StrandSet, added: int) -> t
     radius = uniform.radius.reshape(-1, count)
     if (radius != radius[:, :1]).any():
         notes.append(
-            f"{name}: .tfx holds one thickness a strand, that of the root; tapers are lost."
+            f"{name}: .tfx holds one thickness per strand, that of the root; tapers are lost."
         )
     if groom.strand_id is not None or groom.closest_guides is not None:
         notes.append(f"{name}: .tfx holds no strand IDs and no closest guides.")

@@ -93,7 +93,7 @@ class TressfxFile(BinaryFile):
         if 3.0 <= version < 5.0:
             return version
         raise self.error(
-            f"this is no TressFX 3 or 4 file: its version, at byte 0, reads as {version:.6g}",
+            f"this is not a TressFX 3 or 4 file: its version, at byte 0, reads as {version:.6g}",
             "Choose a .tfx file, or export it again as version 4",
         )
 

@@ -301,12 +301,12 @@ def _notes(wanted: int, found: int, is_bare: bool, is_tuft: bool) -> tuple[str, 
         )
     if found < wanted:
         notes.append(
-            f"Only {found:,} of {wanted:,} children found room near guides."
-            " Draw guides wherever hair is to grow."
+            f"Only {found:,} of {wanted:,} children have room near guides. Draw guides wherever "
+            "hair is to grow."
         )
     if is_bare:
         notes.append(
-            "Part of the painted area is too far from all guides and stays bare."
-            " Draw guides there, or paint less."
+            "Part of the painted area is too far from all guides and stays bare. Draw guides "
+            "there, or paint less."
         )
     return tuple(notes)

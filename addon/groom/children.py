@@ -354,7 +354,7 @@ def _notes(
         )
     if needed > cv_count:
         notes += (
-            f"Curls need {needed:,} points a child and have {cv_count:,}, so they are coarse or "
-            "longer than Curl Length. Use a longer one, or fewer children.",
+            f"Curls need {needed:,} points per child and have {cv_count:,}, so they are coarse or "
+            "longer than Curl Length. Raise Curl Length, or use fewer children.",
         )
     return notes

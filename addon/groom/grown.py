@@ -50,7 +50,7 @@ def checked_weights(weights: Floats | None, surface: Surface, name: str) -> Floa
         raise HairloomError(
             f"the {name} is 0 on every vertex, so there is no area on which hair may grow",
             place=name,
-            remedy="Paint weight where hair shall grow, or choose another group",
+            remedy="Paint weights where hair is to grow, or choose another group",
         )
     return np.maximum(values, 0.0)
 

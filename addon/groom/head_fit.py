@@ -160,7 +160,7 @@ def fit_head(
     if landmarks is None:
         landmarks, is_sure = guess_landmarks(model, target)
         if not is_sure:
-            raise HairloomError("nothing like a head was found on it", place=place, remedy=_REMEDY)
+            raise HairloomError("no shape of a head was found on it", place=place, remedy=_REMEDY)
     names = [name for name in LANDMARKS if name in landmarks]
     own = _own_landmarks(model)
     source = np.array([own[name] for name in names])
@@ -371,22 +371,22 @@ def _landmark_similarity(names: list[str], source: Floats, wanted: Floats, place
                 f"the landmarks {_title(names[one])} and {_title(names[other])} lie on top of "
                 "each other",
                 place=place,
-                remedy="Drag them apart, or delete both to have them guessed",
+                remedy="Drag them apart, or delete both to have them guessed again",
             )
     if matrix is None or mean_scale(matrix) < 1e-9:
         raise HairloomError(
             "it has too few landmarks",
             place=place,
-            remedy="Delete them all to have them guessed",
+            remedy="Delete them all to have them guessed again",
         )
     gap = np.linalg.norm(_moved(wanted, np.linalg.inv(matrix)) - source, axis=1)
     worst = int(gap.argmax())
     if gap[worst] > _MISTAKEN:
         raise HairloomError(
-            f"the landmarks do not lie as on a head; {_title(names[worst])} is "
+            f"the landmarks do not match a head; {_title(names[worst])} is "
             f"{1000.0 * gap[worst] * mean_scale(matrix):.0f} mm from where it should be",
             place=place,
-            remedy="Drag it to its place, or delete all landmarks to have them guessed",
+            remedy="Drag it to its place, or delete all landmarks to have them guessed again",
         )
     return matrix
 

@@ -209,15 +209,14 @@ def _check_scale(
         return
     if factor is None:
         raise HairloomError(
-            f"its roots lie {away:.3g} m from the head (median); they span"
-            f" {roots_size:.3g} m, the head spans {surface_size:.3g} m, and no usual unit makes"
-            " them meet",
+            f"its roots lie {away:.3g} m from the head (median); they span {roots_size:.3g} m, "
+            f"the head spans {surface_size:.3g} m, and no common unit makes them meet",
             place=place,
             remedy="Move the groom onto the head, choose its up axis, or choose another head",
         )
     raise HairloomError(
-        f"this groom is of another scale than the head: its roots span {roots_size:.3g} m,"
-        f" the head spans {surface_size:.3g} m",
+        f"this groom has a different scale from the head: its roots span {roots_size:.3g} m, the "
+        f"head spans {surface_size:.3g} m",
         place=place,
         remedy=f"Scale the groom by {factor:.4g} (pass --groom-scale {factor:.4g}), or the head by "
         f"{1.0 / factor:.4g} (pass --head-scale {1.0 / factor:.4g})",

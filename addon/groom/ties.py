@@ -107,8 +107,8 @@ def idle(holds: Holds, holders: Holders) -> tuple[str, ...]:
     surface = holders.tip_surface
     if surface is not None and holds.tie_count not in busy:
         notes.append(
-            f"No tip is near {surface.name}, or near the part of it that holds tips, so it holds "
-            "none. Raise Tip Distance, or move it and press Preview again."
+            f"No tip is near {surface.name}, or near its part that holds tips, so it holds none. "
+            "Raise Tip Distance, or move it and press Preview again."
         )
     return tuple(notes)
 

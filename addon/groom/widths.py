@@ -403,7 +403,7 @@ def _is_row(roots: Floats) -> bool:
 def _why_not(strands: StrandSet, own: float, found: _Found) -> str:
     """Why the groom's own widths cannot be hair; empty where they can."""
     if not strands.has_widths:
-        return "it brings none"
+        return "it has none"
     wanted = float(np.median(found.width))
     if own < _TOO_THIN * wanted:
         return f"its own, {_length(own)}, would leave it bald"

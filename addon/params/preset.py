@@ -56,7 +56,7 @@ def read_any_preset(path: Path, kinds: Mapping[str, type[Settings]]) -> Preset[A
     kind = kinds.get(section) if isinstance(section, str) else None
     if kind is None:
         raise HairloomError(
-            f"this is a preset of no known kind ('{section}')",
+            f"this preset has an unknown kind ('{section}')",
             place=str(path),
             remedy="Choose a preset of " + ", ".join(kinds),
         )
@@ -69,7 +69,7 @@ def _also(data: Any, kinds: Mapping[str, type[Settings]], place: str) -> tuple[S
     unknown = [data] if not isinstance(data, Mapping) else sorted(set(data) - set(kinds))
     if unknown or not all(isinstance(values, Mapping) for values in data.values()):
         raise HairloomError(
-            "what this preset also sets is of no known kind",
+            "this preset also sets an unknown kind of settings",
             place=place,
             remedy="Choose a preset saved by Hairloom",
         )

@@ -42,7 +42,7 @@ def opacity_tiles(maps: OpacityMaps, layer_count: int) -> Floats:
     map_count = int((numbers >= 0.0).sum())
     if not map_count:
         raise HairloomError(
-            "no light throws a shadow of hair here",
+            "no light casts a shadow of the hair here",
             place="Show Opacity Map",
             remedy="Add a light outside of the hair, and raise Max Lights in Shadows if it is 0",
         )

@@ -112,8 +112,8 @@ class Statistics:
         found = [self.maps_note] if self.maps_note else []
         if self.layers.missing:
             found.append(
-                f"Strands: {self.layers.missing:,} fragments of hair are missing, because too many "
-                "lie in one point of the picture. Remove strands that lie in one another, or set "
+                f"Strands: {self.layers.missing:,} fragments of hair are missing, because too "
+                "many lie in one point of the picture. Remove overlapping strands, or set "
                 "Transparency to Hashed."
             )
         return tuple(found)

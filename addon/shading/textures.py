@@ -148,7 +148,7 @@ def picture_as(name: str, picture: Floats, *, place: str) -> Floats:
             f"it cannot be the {name} texture, because it holds "
             + ("values that are not finite" if picture.size else "no pixels"),
             place=place,
-            remedy="Choose another picture, or save it again from where it was made",
+            remedy="Choose another picture, or save it again in the program that made it",
         )
     picture = np.clip(picture, 0.0, 1.0).astype(np.float32)
     color = np.repeat(picture[..., :1], 3, axis=-1) if picture.shape[-1] < 3 else picture[..., :3]

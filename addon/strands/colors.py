@@ -50,6 +50,6 @@ def color_notes(place: str, strands: StrandSet) -> tuple[str, ...]:
     if not count:
         return ()
     return (
-        f"{place}: {count:,} of {strands.strand_count:,} strands have no colour that can be used, "
-        "so they have the look's. Give their attribute color finite values of zero or more.",
+        f"{place}: {count:,} of {strands.strand_count:,} strands have no usable colour, so they "
+        "use the look's. Give their attribute color finite values of zero or more.",
     )

@@ -85,7 +85,7 @@ class StrandSet:
             if value is not None and value.shape != shape:
                 raise _broken(f"{name} has shape {value.shape} instead of {shape}")
         if (self.root_triangle is None) != (self.root_barycentric is None):
-            raise _broken("root_triangle and root_barycentric come together or not at all")
+            raise _broken("root_triangle and root_barycentric must be given together")
 
     @property
     def strand_count(self) -> int:

@@ -48,7 +48,7 @@ class Surface:
         if self.corner_uv is not None and self.corner_uv.shape != (count, 3, 2):
             raise _broken(f"corner_uv has shape {self.corner_uv.shape}, not {(count, 3, 2)}")
         if count and not 0 <= self.triangles.min() <= self.triangles.max() < len(self.positions):
-            raise _broken("a triangle names a vertex that does not exist")
+            raise _broken("a triangle refers to a vertex that does not exist")
         if not np.isfinite(self.positions).all():
             raise _broken("a vertex is not finite")
 

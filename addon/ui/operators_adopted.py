@@ -149,7 +149,7 @@ def _named_head(name: str, cards: bpy.types.Object) -> bpy.types.Object | None:
     head = bpy.data.objects.get(name)
     if head is None or head.type != "MESH" or head == cards:
         raise HairloomError(
-            "it is not a mesh that hair could grow from" if head else "there is no such object",
+            "it is not a mesh that hair can grow from" if head else "there is no such object",
             place=f"Head '{name}'",
             remedy="Choose the mesh of the head, or none",
         )

@@ -45,7 +45,11 @@ class HAIRLOOM_OT_bake(LongWork, bpy.types.Operator):
         yield from counted(bake.steps(), bake.frame_count, "frames")
         locked = show_in_renders(bake.objects(), context.evaluated_depsgraph_get())
         names = ", ".join(obj.name for obj in bake.objects())
-        also = "; Render > Lock Interface is on, which renders of baked hair need" if locked else ""
+        also = (
+            "; Render > Lock Interface was turned on, as renders of baked hair need it"
+            if locked
+            else ""
+        )
         count = "1 frame" if bake.frame_count == 1 else f"{bake.frame_count:,} frames"
         if bake.unfelt:
             report(self, "WARNING", " ".join(bake.unfelt))

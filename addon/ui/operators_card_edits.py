@@ -27,9 +27,7 @@ _STEPS = {"next": 1, "previous": -1}
 def _in_edit_mode(operator: Any, context: bpy.types.Context) -> bool:
     if edited_cards(context):
         return True
-    operator.poll_message_set(
-        "Select cards in Edit Mode of what Make Cards has made, the finest level"
-    )
+    operator.poll_message_set("Select cards in Edit Mode, in the finest level made by Make Cards")
     return False
 
 
@@ -187,7 +185,9 @@ class HAIRLOOM_OT_add_card_along_curve(bpy.types.Operator):
             cls.poll_message_set("There are no cards yet: press Make Cards first")
             return False
         if not _curves(context):
-            cls.poll_message_set("Select a curve beside the hair, such as one of the Draw tool")
+            cls.poll_message_set(
+                "Select a curve together with the hair, such as one made with the Draw tool"
+            )
             return False
         return True
 

@@ -68,7 +68,7 @@ class HAIRLOOM_OT_discard_card_edits(LongWork, bpy.types.Operator):
             lost = "All edits"
         else:
             if edits is None:
-                report(self, "INFO", f"{hair.name}: nobody has edited its cards")
+                report(self, "INFO", f"{hair.name}: its cards have no edits")
                 return {"CANCELLED"}
             lost = edits.counts.listed
         return context.window_manager.invoke_confirm(

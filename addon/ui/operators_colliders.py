@@ -58,8 +58,8 @@ class HAIRLOOM_OT_fit_spheres(LongWork, bpy.types.Operator):
             report(
                 self,
                 "WARNING",
-                f"{fitted.unskinned} of {count} spheres follow {mesh.name} as an object but not "
-                "its shape: apply the modifiers that copy vertices, and fit again",
+                f"{fitted.unskinned} of {count} spheres follow the object {mesh.name} but not its "
+                "shape: apply the modifiers that copy vertices, and fit again",
             )
         report(
             self,

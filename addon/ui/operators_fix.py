@@ -38,7 +38,7 @@ class HAIRLOOM_OT_set_surface(bpy.types.Operator):
         visible = [obj for obj in objects_in(context.view_layer) if obj.visible_get()]
         mesh = surface_for(hair, selected or visible, depsgraph)
         set_surface(hair, mesh)
-        report(self, "INFO", f"{hair.name} grows from {mesh.name} now")
+        report(self, "INFO", f"{hair.name} now grows from {mesh.name}")
         return {"FINISHED"}
 
 

@@ -104,7 +104,7 @@ class HAIRLOOM_OT_take_flow_back(TakesBack, bpy.types.Operator):
     bl_label = "Take Flow Back"
     bl_options = {"REGISTER", "UNDO"}
     shape = BEFORE_FLOW
-    idle = "The selected hair does not follow strokes: press Comb Along Flow"
+    idle = "The selected hair was not combed along strokes: press Comb Along Flow"
     before = "followed strokes"
 
 

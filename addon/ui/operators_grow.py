@@ -89,7 +89,7 @@ def _state(curves: bpy.types.Curves, lost: tuple[str, ...]) -> str:
     if not lost:
         return "Follows these settings"
     if not has_grown(curves):
-        return "Has not grown from these"
+        return "Not grown from these"
     return "Older than these settings" if is_behind(curves) else "Changed since it grew"
 
 

@@ -158,7 +158,9 @@ class HAIRLOOM_OT_place_landmarks(LongWork, bpy.types.Operator):
             report(self, "INFO", f"{head.name}: {_placed(len(made))}")
         else:
             report(
-                self, "WARNING", f"{head.name}: it is unlike a head: drag all landmarks yourself"
+                self,
+                "WARNING",
+                f"{head.name}: it does not look like a head: drag all landmarks yourself",
             )
 
 

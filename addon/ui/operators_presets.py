@@ -88,7 +88,7 @@ class HAIRLOOM_OT_add_preset(bpy.types.Operator, ImportHelper):
         _apply(preset.all, context)
         title = free_title(preset.title or path.stem, preset.settings.section)
         save_own(title, *preset.all)
-        report(self, "INFO", f"'{title}' is applied, and one of your own presets now")
+        report(self, "INFO", f"'{title}' was applied, and is now one of your own presets")
         return {"FINISHED"}
 
 

@@ -71,7 +71,7 @@ class HAIRLOOM_OT_cancel_build(bpy.types.Operator):
             return False
         if any(map(_is_being_made, chosen_hair(context))):
             return True
-        cls.poll_message_set("Nothing is being made of the selected hair")
+        cls.poll_message_set("Nothing is being made for the selected hair")
         return False
 
     @reporting

@@ -17,7 +17,7 @@ _ICONS = {"INFO": "INFO", "WARNING": "ERROR", "ERROR": "CANCEL"}
 def _has_reports(cls: type[Any]) -> bool:
     if past_reports:
         return True
-    cls.poll_message_set("Nothing has been reported since Blender was started")
+    cls.poll_message_set("There are no reports since Blender was started")
     return False
 
 
@@ -41,7 +41,7 @@ class HAIRLOOM_OT_show_reports(bpy.types.Operator):
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         row = layout.row()
-        row.label(text="Reports, the last one first")
+        row.label(text="Reports, latest first")
         row.operator("hairloom.copy_reports", text="Copy", icon="COPYDOWN")
         for each in reversed(past_reports):
             column = layout.box().column(align=True)
@@ -63,7 +63,7 @@ class HAIRLOOM_OT_copy_reports(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         lines = (f"{one.time} {one.source}, {one.kind}: {one.text}" for one in past_reports)
         context.window_manager.clipboard = "\n".join(lines)
-        report(self, "INFO", "The reports are copied")
+        report(self, "INFO", "The reports were copied")
         return {"FINISHED"}
 
 

@@ -44,7 +44,7 @@ class HAIRLOOM_OT_copy_report(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         context.window_manager.clipboard = self_test.report_text()
-        report(self, "INFO", "The report is copied")
+        report(self, "INFO", "The report was copied")
         return {"FINISHED"}
 
 

@@ -28,7 +28,9 @@ class HAIRLOOM_OT_show_slices(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         picture = slices_of_view(_previewed(context).snapshot, context)
         _show(context, shown_image(slices.IMAGE, picture))
-        report(self, "INFO", "White: all light is left. Layers from the light on, from top left")
+        report(
+            self, "INFO", "White: no light is blocked. Layers away from the light, from top left"
+        )
         return {"FINISHED"}
 
 

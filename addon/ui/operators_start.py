@@ -185,7 +185,7 @@ class HAIRLOOM_OT_convert_particles(LongWork, bpy.types.Operator):
             _, done = at_once(take_over(hair, depsgraph, chosen_presets(chosen)))
             for one in done:
                 report(self, "INFO", f"{hair.name}: {one}")
-        result = f"{mesh.name}: its particle hair is hidden, curves took its place"
+        result = f"{mesh.name}: its particle hair was hidden and replaced by curves"
         tell(self, Outcome(result, dropped))
         yield from beginning(self, context, made, plays=chosen.plays)
 

@@ -36,7 +36,10 @@ class TakesBack:
     def execute(self: Any, context: bpy.types.Context) -> set[str]:
         for hair in filter(self.shape.is_there, chosen_hair(context)):
             if self.shape.back(hair):
-                text = "what other tools and brushes have made of its shape since then is gone too"
+                text = (
+                    "changes that other tools and brushes have made to its shape since then are "
+                    "lost, too"
+                )
                 report(self, "WARNING", f"{hair.name}: {text}. Undo brings it back")
             report(self, "INFO", f"{hair.name} is as it was before it {self.before}")
         return {"FINISHED"}

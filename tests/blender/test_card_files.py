@@ -352,7 +352,7 @@ def test_files_of_an_artist_are_kept_and_own_ones_replaced(tmp_path: Path, capfd
     (tmp_path / "hair_base.png").write_bytes(b"painted")
     assert cards(tmp_path / "hair.glb", "--levels", "1") == 0
     assert (tmp_path / "hair_base old.png").read_bytes() == b"painted"
-    assert "hair_base.png was there already" in capfd.readouterr().out
+    assert "hair_base.png already existed" in capfd.readouterr().out
     names = {path.name for path in tmp_path.iterdir()}
     assert cards(tmp_path / "hair.glb", "--set", "grow.length=0.2", "--levels", "1") == 0
     assert {path.name for path in tmp_path.iterdir()} == names, "its own are no artist's"

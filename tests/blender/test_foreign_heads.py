@@ -397,7 +397,7 @@ def test_half_a_head_is_refused() -> None:
     head = scan()
     keep = [list(p.vertices) for p in head.data.polygons if p.center.x > PLACE[0]]
     half = mesh_object("Half", np.array([v.co[:] for v in head.data.vertices]), keep)
-    refused(half, "no faces where|nothing like a head")
+    refused(half, "no faces where|no shape of a head")
 
 
 @pytest.mark.slow

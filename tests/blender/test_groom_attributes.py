@@ -131,7 +131,7 @@ def test_a_strand_with_a_colour_that_cannot_be_used_has_none(faulty):
     np.testing.assert_array_equal(read[:2], groom.color[:2])
     np.testing.assert_array_equal(read[7:], groom.color[7:])
     warnings = read_source(hair, bpy.context.evaluated_depsgraph_get()).warnings
-    assert sum("1 of 4 strands have no colour" in warning for warning in warnings) == 1
+    assert sum("1 of 4 strands have no usable colour" in warning for warning in warnings) == 1
 
 
 def test_ids_that_are_not_unique_are_none():

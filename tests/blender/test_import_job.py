@@ -181,7 +181,7 @@ def test_one_bad_file_keeps_the_scene_from_being_written(
     arguments = ["import", *files, "--output", str(output), "--report", str(report)]
     assert command_line.run(arguments) == 1
     message = capfd.readouterr().err
-    assert "bad.abc: this is no Alembic file" in message and "Traceback" not in message
+    assert "bad.abc: this is not an Alembic file" in message and "Traceback" not in message
     assert not output.exists() and json.loads(report.read_text())["status"] == "failed"
 
 

@@ -73,7 +73,7 @@ def test_a_mesh_that_is_not_closed_collides_and_is_told(scene):
     near = [min(opposite, key=lambda v: math.dist(corners[v], corners[at])) for at in quad]
     faults = {
         "4 edges with only one face": faces[1:],
-        "at 4 edges faces look to different sides": [quad[::-1], *faces[1:]],
+        "at 4 edges the faces point to opposite sides": [quad[::-1], *faces[1:]],
         "edges with more than two faces": [*faces, (quad[0], quad[2], near[2], near[0])],
     }
     for words, wrong in faults.items():

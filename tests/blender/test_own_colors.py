@@ -138,7 +138,7 @@ def test_strands_without_a_colour_are_exported_in_the_looks(
     out = still_hair(hair, evaluated(), ExportRequest(guides=False, color=False))
     expected = two_colored((0.25, 0.5, 0.75)).color
     np.testing.assert_allclose(out.groom.color, expected, atol=1e-6)
-    assert sum("have no colour that can be used" in note for note in out.notes) == 1
+    assert sum("have no usable colour" in note for note in out.notes) == 1
 
 
 def test_children_are_exported_in_the_colours_of_their_guides(

@@ -252,7 +252,7 @@ def vertices_of(name: str) -> list[tuple[int, ...]]:
     ("arguments", "message"),
     [
         (["run", "fin_add"], "--output"),
-        (["run", "fin_add", "--save", "--output", "x.blend"], "twice"),
+        (["run", "fin_add", "--save", "--output", "x.blend"], "both --output"),
         (["run", "fin_add", "--output", "x.png"], ".blend"),
         (["run", "fin_add", "--object", "Nobody", "--output", "x.blend"], "Nobody"),
         (["run", "--object", "Hair", "--set", "shading.no=1", "--output", "x.blend"], "'no'"),

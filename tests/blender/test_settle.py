@@ -222,7 +222,7 @@ def test_what_is_taken_back_takes_later_tools_along(order, new_hair, sphere):
     assert (curve_points(hair.data) == shapes[0]).all()
     assert not COMBED.is_there(hair) and not BEFORE_TRIM.is_there(hair)
     assert hair.hairloom.dynamics.sag_compensation == 0.5
-    assert len([each for each in past_reports if "is gone too" in each.text]) == 1
+    assert len([each for each in past_reports if "are lost, too" in each.text]) == 1
     hair.select_set(False)
     twin.select_set(True)
     bpy.context.view_layer.objects.active = twin
@@ -230,7 +230,7 @@ def test_what_is_taken_back_takes_later_tools_along(order, new_hair, sphere):
     assert (curve_points(twin.data) == shapes[1]).all()
     assert COMBED.is_there(twin) is (second == "take_trim_back")
     assert twin.hairloom.dynamics.sag_compensation == (0.5 if second == "back_to_combed" else 1.0)
-    assert len([each for each in past_reports if "is gone too" in each.text]) == 1
+    assert len([each for each in past_reports if "are lost, too" in each.text]) == 1
 
 
 def test_linked_duplicates_share_settled_curves_and_carry_their_weight_alike(new_hair, sphere):

@@ -148,7 +148,7 @@ def test_a_lamp_amidst_the_hair_is_told_where_a_view_goes_by_it(new_hair: Any, s
     assert not any("Candle" in warning for warning in session.warnings)
     view_shadings()[0].type = "RENDERED"
     (warning,) = (each for each in session.warnings if each.startswith("Candle: "))
-    assert "amidst the hair" in warning
+    assert "inside the hair" in warning
     lamp.location.x += 5.0
     bpy.context.view_layer.update()
     session.light(bpy.context.evaluated_depsgraph_get())

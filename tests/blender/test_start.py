@@ -282,7 +282,7 @@ def test_particle_hair_that_is_dropped_is_reported(sphere):
         bpy.ops.hairloom.convert_particles()
     count = len(bpy.context.object.data.curves)
     assert 20 < count < 80
-    assert f"curves took its place; dropped {100 - count} (" in reports.warnings[-1]
+    assert f"replaced by curves; dropped {100 - count} (" in reports.warnings[-1]
 
 
 @pytest.mark.slow

@@ -265,5 +265,5 @@ def test_motion_into_a_format_without_is_refused(new_hair: Any, tmp_path: Path) 
         StrandExportSettings(),
         frames=range(1, 3),
     )
-    with pytest.raises(HairloomError, match=r"TressFX holds no motion.*Alembic"):
+    with pytest.raises(HairloomError, match=r"TressFX cannot store motion.*Alembic"):
         plan.write(tmp_path / "a.tfx")

@@ -100,5 +100,5 @@ def test_large_maps_are_shown_smaller_and_many_slices_in_more_rows() -> None:
 
 
 def test_without_a_map_there_is_nothing_to_show() -> None:
-    with pytest.raises(HairloomError, match="no light throws"):
+    with pytest.raises(HairloomError, match="no light casts"):
         tiles_of(VolumeSettings(shadows="deep", resolution=32), LAMP)

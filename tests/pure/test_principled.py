@@ -194,10 +194,10 @@ def test_what_the_node_cannot_do_is_said() -> None:
     assert any("one Roughness" in note for note in hair_from(uneven)[1])
     assert any("offsets" in note for note in hair_from(ShadingSettings(offset_trt=0.1))[1])
     strong, notes = hair_from(ShadingSettings(strength_trt=1.5))
-    assert strong.model == "CHIANG" and any("Second Strength became 1" in note for note in notes)
+    assert strong.model == "CHIANG" and any("Strength were set to 1" in note for note in notes)
     weak, notes = hair_from(ShadingSettings(strength_r=1.5, strength_tt=0.4))
     assert weak.model == "HUANG" and (weak.reflection, weak.transmission) == (1.0, 0.4)
-    assert any("taken down to 1" in note for note in notes)
+    assert any("lowered to 1" in note for note in notes)
     assert hair_from(ShadingSettings())[1] == ()
 
 

@@ -223,7 +223,7 @@ def _colors(position: Floats, pairs: Ints) -> tuple[Color, ...]:
 def _indices(rows: Ints, width: int, count: int) -> Ints:
     rows = np.asarray(rows, np.int64).reshape(-1, width)
     if rows.size and not 0 <= rows.min() <= rows.max() < count:
-        raise _broken("a face or an edge names a vertex that does not exist")
+        raise _broken("a face or an edge refers to a vertex that does not exist")
     return rows
 
 

@@ -244,7 +244,8 @@ def _prepare(state: ClothState, drive: Drive, settings: FinSettings, dt: float) 
     gravity = np.asarray(drive.gravity, np.float32)
     if before.shape != state.position.shape or now.shape != state.position.shape:
         raise HairloomError(
-            f"the mesh has {now.shape[1]:,} vertices, the simulation {state.vertex_count:,}",
+            f"the mesh has {now.shape[1]:,} vertices, but the simulation has "
+            f"{state.vertex_count:,}",
             place="fin",
             remedy="Start the simulation again",
         )

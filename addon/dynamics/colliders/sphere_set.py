@@ -38,7 +38,7 @@ class SphereSetCollider:
         if not count or self.centers.shape != (count, 3):
             raise _broken(
                 f"centers of shape {self.centers.shape} and radii of shape {self.radii.shape} are "
-                "no set of balls",
+                "not a set of balls",
                 "Give centers (n, 3) and radii (n,), one ball or more",
             )
         if not is_solid(self.radii, self.centers):

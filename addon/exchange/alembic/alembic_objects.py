@@ -141,7 +141,7 @@ def joined(found: Arrays, path: Path) -> Joined:
 
 
 def _notes(objects: list[_Object]) -> tuple[str, ...]:
-    together = f"its {len(objects):,} curves objects became one groom"
+    together = f"its {len(objects):,} curves objects were joined into one groom"
     notes = tuple(note for each in objects for note in each.notes)
     return (together, *notes) if len(objects) > 1 else notes
 
@@ -174,17 +174,17 @@ def _object(found: Arrays, number: int, path: Path) -> _Object:
     own = {n.removeprefix(prefix): v for n, v in found.items() if n.startswith(prefix)}
     name, points, counts = str(own["name"]), own["points"], own["counts"]
     if points.ndim != 2 or points.shape[1] != 3 or points.dtype.kind != "f" or counts.ndim != 1:
-        raise _lying(path, name, "its points are no positions")
+        raise _lying(path, name, "its points are not positions")
     counts = counts.astype(np.int64)
     if len(counts) and (counts.min() < 0 or counts.sum() != len(points)):
-        raise _lying(path, name, f"its curves want {counts.sum()} points and it has {len(points)}")
+        raise _lying(path, name, f"its curves need {counts.sum()} points, but it has {len(points)}")
     basis, said = usable_basis(str(own.get("basis", "linear")), counts)
-    ended = [ended_at(float(own["ended"]), "other counts of points")] if "ended" in own else []
+    ended = [ended_at(float(own["ended"]), "different counts of points")] if "ended" in own else []
     notes = [f"{name}: {note}" for note in (*ended, *said)]
     on_curves = points_on_curves(basis, True, counts)
     placed = _placed(points, own["matrix"])
     if on_curves.vertex is not None:
-        notes.append(f"{name}: its {basis} curves became points on the curves")
+        notes.append(f"{name}: its {basis} curves were converted to points on the curves")
         placed = on_curves.vertex.of(placed)
     return _Object(name, placed, np.diff(on_curves.offsets), own, len(points), on_curves, notes)
 

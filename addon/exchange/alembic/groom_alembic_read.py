@@ -63,13 +63,15 @@ def read_groom_alembic(
     if space is None:
         space = _guessed_space(curves)
         unit = "metres" if space.per_metre == 1.0 else "centimetres"
-        notes.append(f"it names no unit and no axes: read in {unit}, {up or space.up} up")
+        notes.append(
+            f"it stores no unit and no axes, so it was read in {unit}, {up or space.up} up"
+        )
     space = replace(space, up=up or space.up, per_metre=space.per_metre / factor)
     groom = _groom(curves, space, path, notes)
     if not with_guides:
         groom = groom.without_guides()
     if not groom.strands.strand_count:
-        raise _error(path, "it holds nothing but guides", "Read it with its guides")
+        raise _error(path, "it holds only guides", "Read it with its guides")
     notes = [f"{path.name}: {note}." for note in notes]
     return ReadGroom(groom, _version(found), replace(space, per_metre=1.0), tuple(notes))
 
@@ -88,11 +90,11 @@ def _check(path: Path) -> None:
     if not size:
         raise _error(path, "the file is empty", "Export the groom again")
     if start == b"\x89HDF\r\n\x1a\n":
-        raise _error(path, "this is an Alembic of the old kind, HDF5", "Export it again as Ogawa")
+        raise _error(path, "this is an old Alembic file, in HDF5", "Export it again as Ogawa")
     if not start.startswith(b"Ogawa"):
-        raise _error(path, "this is no Alembic file", "Choose an .abc file")
+        raise _error(path, "this is not an Alembic file", "Choose an .abc file")
     if not is_finished(path):
-        raise _error(path, "it was never finished", "Export the groom again")
+        raise _error(path, "it was not written to its end", "Export the groom again")
 
 
 def _read_in_subprocess(path: Path, python: Sequence[str] | None) -> Arrays:

@@ -10,16 +10,16 @@ from ...arrays import Floats
 from ...errors import HairloomError
 from ..files.axes import from_z_up
 
-_OCCLUSION = "ambient occlusion of the vertex, 0 shut in to 1 open"
+_OCCLUSION = "ambient occlusion of the vertex, from 0 enclosed to 1 open"
 _OPENNESS = (
-    f"first component: {_OCCLUSION}; multiply the shaded colour with it. Second component: how far "
-    "along the strands the vertex lies, 0 at the root to 1 at the tip"
+    f"first component: {_OCCLUSION}; multiply the shaded colour by it. Second component: position "
+    "of the vertex along the strands, from 0 at the root to 1 at the tip"
 )
 _REST = "rest pose"
 _NORMAL = "of the card, away from the head, rounded across the card"
 _TANGENT = "xyz across the strands, along u; strands run from root to tip along "
-_TILE_TOP = "place in the texture, v from the top: it falls from root to tip of a tile"
-_TILE = "place in the texture, v from the bottom: it rises from root to tip of a tile"
+_TILE_TOP = "texture coordinates, v from the top: v decreases from root to tip of a tile"
+_TILE = "texture coordinates, v from the bottom: v increases from root to tip of a tile"
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ FBX = CardFormat(
         "LayerElementBinormal 0": "along the strands, from root to tip",
         "LayerElementUV 0": _TILE,
         "LayerElementUV 1": _OPENNESS
-        + ". An importer that turns v of textures around turns the second component around too",
+        + ". An importer that flips v of textures also flips the second component",
     },
     {},
 )
@@ -128,8 +128,8 @@ OBJ = CardFormat(
     "metre",
     1.0,
     {
-        "v": f"{_REST}, with a colour behind it. Red: {_OCCLUSION}. Green: how far along the "
-        "strands the vertex lies, 0 at the root to 1 at the tip",
+        "v": f"{_REST}, followed by a colour. Red: {_OCCLUSION}. Green: position of the vertex "
+        "along the strands, from 0 at the root to 1 at the tip",
         "vn": _NORMAL,
         "vt": f"{_TILE}. Tangents are along u",
     },
@@ -157,7 +157,7 @@ def format_of(path: Path, name: str | None = None) -> tuple[Path, CardFormat]:
         return path.with_name(path.name + named.suffixes[0]), named
     suffixes = named.suffixes if named else SUFFIXES
     raise HairloomError(
-        f"cards are not written as '{path.suffix}'" + (f" in the format {name}" if name else ""),
+        f"cards cannot be written as '{path.suffix}'" + (f" in the format {name}" if name else ""),
         place=str(path),
         remedy=f"Use {', '.join(suffixes)}",
     )

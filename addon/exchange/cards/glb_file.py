@@ -47,7 +47,7 @@ class GlbFile:
                 raise ValueError("its bytes are cut off")
         except (struct.error, ValueError) as error:
             raise HairloomError(
-                f"this is no whole GLB ({error})", place=place, remedy="Write it again"
+                f"this is not a complete GLB ({error})", place=place, remedy="Write it again"
             ) from error
         return cls(content, binary)
 

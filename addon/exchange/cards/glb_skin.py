@@ -145,9 +145,9 @@ def vertices_of(file: GlbFile, primitive: dict[str, Any], mesh: CardMesh, place:
         if np.array_equal(owner[corners], ours) and owner.min() >= 0 and miss <= near:
             return owner
     raise HairloomError(
-        "Blender's exporter wrote other vertices than those that were to be skinned",
+        "Blender's exporter wrote other vertices than those to be skinned",
         place=place,
-        remedy="Write a motion texture instead, and tell us the version of Blender",
+        remedy="Write a motion texture instead, and report your version of Blender to us",
     )
 
 

@@ -18,32 +18,32 @@ from .glb_springs import SPRINGS, SpringSkeleton, collider_list, spring_list
 #: format -> where the texel of each vertex is
 TEXEL_ATTRIBUTES = {"glb": "TEXCOORD_2", "fbx": "LayerElementUV 2", "usd": "primvars:st2"}
 TEXTURE_MEANINGS = {
-    "position": "from the place of the vertex in the file to where it is in the frame",
+    "position": "from the position of the vertex in the file to its position in the frame",
     "normal": "of the card in the frame, unit length",
     "tangent": "along the strands in the frame, from root to tip, unit length",
 }
 _SPACES = {
-    "head": "the hair rides with the head already: carry the object, or its root joint, with the "
-    "head, from where the head is at rest in the file",
-    "world": "the motion of the head is in it: leave the object where it is",
+    "head": "without the motion of the head: attach the object, or its root joint, to the head, "
+    "in the head's rest position in the file",
+    "world": "with the motion of the head: do not move the object",
 }
 _HOW_TO_READ = (
     "values = texture at texel + (0, frame * frame_step), nearest texel, no mip maps, no sRGB, no "
-    "compression; signed floats in the units and axes of the file. Mix the values of two frames "
-    "between them, and make directions unit length again"
+    "compression; signed floats in the units and axes of the file. Between two frames, "
+    "interpolate their values and normalize directions"
 )
 _HOW_TO_PLAY = (
-    "linear blend skinning; rotations between keys by slerp, translations straight. Keys that this "
-    "reproduces are left out"
+    "linear blend skinning; slerp rotations and interpolate translations linearly between keys. "
+    "Keys that this reproduces are left out"
 )
 
 _HOW_TO_SPRING = (
-    "attach root_joint to the head. Step each chain step_rate times a second, from root to tip. A"
-    " bone's tail is the next joint: tail += (tail - tail before) * (1 - drag) + (way of the bone"
-    " at rest, turned with its parent, of unit length) * stiffness / step_rate + "
-    "gravity_direction * gravity / step_rate; put it back to the bone's length; for each collider"
-    " of the chain that is nearer than radius + hit_radius, push it out and put it back to the "
-    "bone's length again; turn the bone by the least turn that points it at its tail"
+    "attach root_joint to the head. Step each chain step_rate times per second, from root to tip. "
+    "A bone's tail is the next joint: tail += (tail - previous tail) * (1 - drag) + (unit "
+    "direction of the bone at rest, rotated with its parent) * stiffness / step_rate + "
+    "gravity_direction * gravity / step_rate; restore the bone's length; for each collider of the "
+    "chain that is nearer than radius + hit_radius, push the tail out and restore the bone's "
+    "length again; rotate the bone by the smallest rotation that points it at its tail"
 )
 
 

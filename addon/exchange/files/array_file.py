@@ -47,7 +47,7 @@ def read_arrays(path: Path) -> dict[str, NDArray[Any]]:
         with zipfile.ZipFile(path) as archive:
             members = archive.infolist()
             if sum(member.file_size for member in members) > path.stat().st_size:
-                raise ValueError("it claims to be larger than it is")
+                raise ValueError("its stated size exceeds its actual size")
             return {
                 member.filename.removesuffix(".npy"): _array(archive.read(member))
                 for member in members
@@ -60,6 +60,6 @@ def _array(content: bytes) -> NDArray[Any]:
     stream = io.BytesIO(content)
     shape, is_fortran, dtype = _HEADERS[np.lib.format.read_magic(stream)](stream)
     if dtype.hasobject or min(shape, default=0) < 0:
-        raise ValueError("it holds Python objects, or less than nothing")
+        raise ValueError("it holds Python objects, or a negative size")
     values = np.frombuffer(content, dtype, math.prod(shape), offset=stream.tell())
     return values.reshape(shape, order="F" if is_fortran else "C").copy(order="K")

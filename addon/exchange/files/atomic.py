@@ -138,9 +138,9 @@ def check_place(path: Path) -> None:
     check_name(path)
     if not path.name:
         raise HairloomError(
-            "this names a folder, and no file in it",
+            "this names a folder, not a file",
             place=str(path),
-            remedy="Give the name of a file; if it comes from a variable, that may be empty",
+            remedy="Give a file name; if it comes from a variable, that may be empty",
         )
     try:
         why = why_not_replaced(path) or _why_no_file(path)
@@ -189,7 +189,7 @@ def _why_no_file(path: Path) -> str:
     """Why no file can be made here, nor the folders that it needs; empty where one can."""
     folder = next(each for each in path.absolute().parents if each.exists())
     if not folder.is_dir():
-        return f"{folder.name} is no folder"
+        return f"{folder.name} is not a folder"
     return "" if os.access(folder, os.W_OK | os.X_OK) else _NO_RIGHTS
 
 

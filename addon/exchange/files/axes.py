@@ -32,5 +32,5 @@ def from_z_up(points: Floats, up: str) -> Floats:
 
 def _is_y_up(up: str) -> bool:
     if up not in ("Y", "Z"):
-        raise HairloomError(f"'{up}' is no up axis", place="up axis", remedy="Use Y or Z")
+        raise HairloomError(f"'{up}' is not an up axis", place="up axis", remedy="Use Y or Z")
     return up == "Y"

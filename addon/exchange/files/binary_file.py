@@ -53,8 +53,8 @@ class BinaryFile:
             raise self._too_large() from error
         if len(items) < count:
             raise self.error(
-                f"the {name} is cut short, since the file changes while it is read",
-                "Wait until it is written",
+                f"the {name} is cut short, because the file changed while it was read",
+                "Wait until the file is written",
             )
         return items
 

@@ -91,7 +91,7 @@ def kept_aside(staging: Path, path: Path, own: Container[str] = ()) -> tuple[str
         is_foreign = file.name != path.name and file.name not in own and there.is_file()
         if is_foreign and not kept.exists() and not filecmp.cmp(file, there, shallow=False):
             shutil.copy2(there, kept)
-            notes.append(f"{file.name} was there already, and is kept as {kept.name}.")
+            notes.append(f"{file.name} already existed, and is kept as {kept.name}.")
     return tuple(notes)
 
 

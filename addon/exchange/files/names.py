@@ -32,7 +32,7 @@ def check_name(path: Path) -> None:
         str(path).encode("utf-8")
     except UnicodeEncodeError as error:
         raise HairloomError(
-            "this name is not UTF-8, so that few programs can open it",
+            "this name is not UTF-8, so few programs can open it",
             place=ascii(str(path)),
             remedy="Rename the file or the folder",
         ) from error
@@ -43,7 +43,7 @@ def length_remark(path: Path, why: str) -> str:
     length = len(os.path.abspath(path))
     if why != os.strerror(errno.ENOENT) or length <= MAX_PATH:
         return ""
-    return f"; while it is written it has a path of {length} letters, and {MAX_PATH} work here"
+    return f"; while it is written its path has {length} letters, and {MAX_PATH} work here"
 
 
 def plain_name(name: str, fallback: str = "hair") -> str:

@@ -19,7 +19,7 @@ from .names import check_name
 #: exit codes of a script: after an error that is on stderr; where its results cannot be written
 REPORTED, NO_ROOM = 3, 4
 #: Exit codes where Linux or macOS has ended a process, and why: it took too much time, or memory.
-_ENDED = {-24: "since it took too long for a file of this size", -9: "as where memory runs out"}
+_ENDED = {-24: "since it took too long for a file of this size", -9: "as when memory runs out"}
 #: Seconds for any file, and bytes that a slow disk reads in each further second.
 _PATIENCE, _BYTES_A_SECOND = 60.0, 4.0e6
 
@@ -68,7 +68,7 @@ def run_reader(
         )
     if done.returncode == NO_ROOM:
         raise HairloomError(
-            "what is read cannot be put down in the folder for temporary files",
+            "the data cannot be written to the folder for temporary files",
             place=str(path),
             remedy=f"Free some space in {tempfile.gettempdir()}",
         )

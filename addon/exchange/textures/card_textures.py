@@ -60,7 +60,7 @@ def write_card_textures(
     """
     if file_format not in FORMATS:
         raise HairloomError(
-            f"textures are not written as '{file_format}'",
+            f"textures cannot be written as '{file_format}'",
             place="Texture format",
             remedy=f"Choose one of {', '.join(FORMATS)}",
         )

@@ -147,7 +147,7 @@ def _compressor(path: Path) -> Any:
         raise HairloomError(
             f"etcpak, which compresses DDS textures, cannot be loaded ({error})",
             place=str(path),
-            remedy="Install Hairloom from its zip, which brings it along for Windows, macOS and "
-            "Linux on the usual processors, or choose PNG, EXR or uncompressed DDS",
+            remedy="Install Hairloom from its zip, which includes it for Windows, macOS and Linux "
+            "on the usual processors, or choose PNG, EXR or uncompressed DDS",
         ) from error
     return etcpak

@@ -173,7 +173,7 @@ def _pixels(path: Path, source: Any, library: Any, *, is_color: bool) -> Floats:
     spec = source.spec()
     width, height, channels = spec.width, spec.height, min(spec.nchannels, 4)
     if spec.deep or spec.depth > 1 or min(width, height, channels) < 1:
-        raise _unreadable(path, "this is no flat picture", "Save it as a plain picture")
+        raise _unreadable(path, "this is not a flat picture", "Save it as a plain picture")
     check_size(width, height, str(path))
     image = source.read_image(0, 0, 0, channels, library.FLOAT)
     # What could not be read would come as zeros, or not at all
@@ -215,14 +215,14 @@ def _depth(path: Path, depth: str | None) -> str:
     depths = DEPTHS.get(path.suffix.lower())
     if depths is None:
         raise HairloomError(
-            f"pictures are not written as '{path.suffix}'",
+            f"pictures cannot be written as '{path.suffix}'",
             place=str(path),
             remedy=f"Use {', '.join(DEPTHS)}",
         )
     if depth is None or depth in depths:
         return depth or depths[0]
     raise HairloomError(
-        f"{path.suffix} files do not hold {depth}",
+        f"{path.suffix} files cannot store {depth}",
         place=str(path),
         remedy=f"Use {' or '.join(depths)}",
     )
@@ -232,7 +232,7 @@ def _broken(path: Path, source: Any) -> HairloomError:
     return _unreadable(
         path,
         f"this file cannot be read as a picture ({_reason(source)})",
-        "It is damaged or no picture: save it again, as PNG, TIFF or EXR",
+        "It is damaged or not a picture: save it again, as PNG, TIFF or EXR",
     )
 
 
@@ -245,6 +245,6 @@ def _reason(source: Any) -> str:
     try:
         text = source.geterror()
     except UnicodeDecodeError:  # it quotes what it found in the file
-        text = "it holds names that are no text"
+        text = "it holds names that are not text"
     lines = [line.strip().rstrip(".") for line in text.splitlines() if line.strip()]
     return lines[0] if lines else "no reason given"

@@ -28,10 +28,10 @@ from ...errors import HairloomError
 #: The meaning of each map, in a few words; and the value that replaces a missing one.
 MEANINGS = {
     "alpha": ("coverage", 1.0),
-    "color": ("colour as a plain material shows it", 1.0),
+    "color": ("colour for a plain material", 1.0),
     "base": ("colour as a factor of the hair's", 1.0),
     "normal": ("normal", 0.5),
-    "tangent": ("way of the strand from root to tip", 0.5),
+    "tangent": ("direction of the strand from root to tip", 0.5),
     "depth": ("depth, larger further from the head, 0.5 in the card's plane", 0.5),
     "along": ("root 0 to tip 1", 0.0),
     "strand_id": ("random number of the strand", 0.0),

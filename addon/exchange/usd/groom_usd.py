@@ -77,7 +77,7 @@ def write_usd(
     usd = usd_library(path)
     if path.suffix.lower() not in SUFFIXES:
         raise HairloomError(
-            f"'{path.suffix}' is no suffix of USD files",
+            f"'{path.suffix}' is not a suffix of USD files",
             place=str(path),
             remedy="Use .usdc, .usda or .usd",
         )
@@ -105,7 +105,7 @@ def _checked(up: str, scale: float, path: Path) -> UsdSpace:
     from_z_up(np.zeros(3), up)  # refuses another axis
     if not (np.isfinite(scale) and scale > 0.0):
         raise HairloomError(
-            f"a unit of {scale} m makes no sense",
+            f"a unit of {scale} m is not valid",
             place=str(path),
             remedy="Use a number above 0, such as 0.01 for centimetres",
         )

@@ -75,9 +75,9 @@ class _Reading:
         self._left_out = ""
         unit = float(arrays["unit"]) if scale is None else scale
         if scale is None and not arrays["has_unit"]:
-            self.notes.append("it names no unit, so that lengths were taken as centimetres")
+            self.notes.append("it stores no unit, so lengths were read as centimetres")
         if not (np.isfinite(unit) and unit > 0.0):
-            self.notes.append(f"its unit of {unit} m makes no sense and was taken as a metre")
+            self.notes.append(f"its unit of {unit} m is not valid and was read as a metre")
             unit = 1.0
         self.axes = FileSpace(up or str(arrays["up"]))
         self._to_blender = np.eye(4)
@@ -101,7 +101,7 @@ class _Reading:
         others = zip(self._arrays["others"], self._arrays["other_counts"], strict=True)
         counts = ", ".join(f"{count:,} {kind}" for kind, count in others)
         if counts:
-            self._left_out = f"prims that are no BasisCurves were left out ({counts})"
+            self._left_out = f"prims other than BasisCurves were left out ({counts})"
             self.notes.append(self._left_out)
 
     def nothing_found(self) -> HairloomError:
@@ -166,7 +166,7 @@ def _joined(pieces: list[Curves], path: Path, name: str, notes: list[str]) -> Gr
             remedy="Export the groom again",
         )
     if len(pieces) > 1:
-        notes.append(f"its {len(pieces):,} prims of curves became one groom")
+        notes.append(f"its {len(pieces):,} prims of curves were joined into one groom")
     found, motion = motion_of([(piece.times, piece.positions) for piece in pieces]), None
     if found is not None:
         times, positions = found
@@ -271,6 +271,6 @@ def _identities(pieces: list[Curves], kept: Ints, notes: list[str]) -> dict[str,
         return known
     weights = weights[kept]
     if not np.isfinite(weights).all():
-        notes.append("closest guides were left out, because weights of them are no numbers")
+        notes.append("closest guides were left out, because some of their weights are not numbers")
         return known
     return known | {"closest_guides": closest[kept], "guide_weights": weights}

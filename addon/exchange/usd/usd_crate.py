@@ -83,7 +83,7 @@ def _is_sound(section: bytes, counts: int, blocks: int) -> bool:
 
 def _damaged(path: Path, what: str, byte: int) -> HairloomError:
     return HairloomError(
-        f"{what}, at byte {byte:,}, cannot be right",
+        f"{what}, at byte {byte:,}, is not valid",
         place=str(path),
         remedy="The file is cut short or damaged: copy or export it again",
     )

@@ -73,7 +73,7 @@ def curves_of(prim: Arrays, space: Floats) -> Curves:
         raise UnusableCurvesError("it has no curves")
     if counts.min() < 0 or int(counts.sum()) != len(points):
         raise UnusableCurvesError(
-            f"its {len(counts):,} counts of points add up to {int(counts.sum()):,}, and it has "
+            f"its {len(counts):,} counts of points add up to {int(counts.sum()):,}, but it has "
             f"{len(points):,} points"
         )
     wrap, kind, basis, widths_interpolation = map(str, prim["traits"])
@@ -86,7 +86,7 @@ def curves_of(prim: Arrays, space: Floats) -> Curves:
     radius, notes = _radius(values, widths_interpolation, mean_scale(matrix))
     notes += said
     if values.on_curves.vertex is not None:
-        notes += (f"its {basis} curves became points on the curves",)
+        notes += (f"its {basis} curves were converted to points on the curves",)
     if "ended" in prim:
         notes += (ended_at(float(prim["ended"]), "another number of points"),)
     color = values.of_points("groom_color", 3)
@@ -141,7 +141,7 @@ def _radius(
     with np.errstate(over="ignore", invalid="ignore"):
         radius = radius * np.float32(0.5 * scale)
     wrong = int((~are_widths(radius, values.on_curves.offsets)).sum())
-    notes = (f"{wrong:,} widths are none of hair and were replaced",) if wrong else ()
+    notes = (f"{wrong:,} widths are not plausible for hair and were replaced",) if wrong else ()
     return radius, notes
 
 
@@ -234,7 +234,7 @@ class _Values:
 
     def _unfit(self, name: str, count: int, expected: int, interpolation: str) -> None:
         self.notes.append(
-            f"its {name} were left out: {count:,} values where '{interpolation}' wants {expected:,}"
+            f"its {name} were left out: {count:,} values where '{interpolation}' needs {expected:,}"
         )
 
 

@@ -51,7 +51,7 @@ def usd_arrays(path: Path, python: Sequence[str] | None = None) -> Arrays:
     """
     usd_library(path)  # for its message, should it be missing
     if path.suffix.lower() not in SUFFIXES:
-        raise _unusable(path, f"'{path.suffix}' is no suffix of USD files", "Choose a .usd file")
+        raise _unusable(path, f"'{path.suffix}' is not a suffix of USD files", "Choose a .usd file")
     try:
         with path.open("rb") as file:
             beginning = file.read(8)
@@ -68,7 +68,7 @@ def usd_arrays(path: Path, python: Sequence[str] | None = None) -> Arrays:
     elif not beginning.startswith(b"#usda"):
         raise _unusable(
             path,
-            "this is no USD file: it begins neither as a binary one nor as a text",
+            "this is not a USD file: it begins neither as a binary nor as a text file",
             "Choose a .usd, .usdc or .usda file, or export the groom again",
         )
     with tempfile.TemporaryDirectory(prefix="hairloom-") as folder:

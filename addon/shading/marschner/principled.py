@@ -116,9 +116,9 @@ def _node_of_fibre(settings: ShadingSettings, notes: list[str]) -> dict[str, Any
     """The inputs for the shape of the highlights; one roughness replaces three widths."""
     inner = 0.5 * (2.0 * settings.width_tt + 0.5 * settings.width_trt)
     if max(2.0 * settings.width_tt, 0.5 * settings.width_trt) > _UNEVEN * inner:
-        notes.append("Rim Width and Second Width became one Roughness")
+        notes.append("Rim Width and Second Width were combined into one Roughness")
     if settings.offset_r or settings.offset_tt or settings.offset_trt:
-        notes.append("the offsets of single highlights are left out: the node has one Offset")
+        notes.append("offsets of single highlights are left out: the node has only one Offset")
     roughness = _roughness_of(inner)
     outer = _roughness_of(settings.width_r)
     # glints have at least the azimuthal blur of all else
@@ -137,12 +137,12 @@ def _node_of_fibre(settings: ShadingSettings, notes: list[str]) -> dict[str, Any
     }
     if settings.eccentricity == 1.0 and min(strengths.values()) > _WEAK:
         if settings.strength_tt != 1.0 or settings.strength_trt != 1.0:
-            notes.append("Rim Strength and Second Strength became 1: the node has none")
+            notes.append("Rim Strength and Second Strength were set to 1: the node has none")
         values["ior"] = _stronger(settings.index_of_refraction, settings.strength_r)
         return values
-    notes.append("the node's model is Huang's, which knows strengths: one Roughness is for all")
+    notes.append("the node uses Huang's model, which has strengths but a single Roughness")
     if max(strengths.values()) > 1.0 or settings.eccentricity > 1.0:
-        notes.append("strengths and Eccentricity above 1 were taken down to 1")
+        notes.append("strengths and Eccentricity above 1 were lowered to 1")
     within = {name: _between(value, 0.0, 1.0) for name, value in strengths.items()}
     return values | within | {"model": "HUANG", "aspect_ratio": min(settings.eccentricity, 1.0)}
 
@@ -162,7 +162,7 @@ def _stronger(index: float, strength: float) -> float:
 def _node_of_highlights(settings: ShadingSettings, notes: list[str]) -> dict[str, Any]:
     """The same for Kajiya-Kay's two highlights: cos^n of an angle is nearly a Gaussian of 1 /
     sqrt(n)."""
-    notes.append("Kajiya-Kay is no model of a fibre: only colour, width and shift were taken over")
+    notes.append("Kajiya-Kay is not a fibre model: only colour, width and shift were copied")
     first, second = (
         float(1.0 / np.sqrt(exponent))
         for exponent in (settings.primary_exponent, settings.secondary_exponent)
@@ -217,7 +217,7 @@ def _pigment(hair: PrincipledHair, notes: list[str]) -> dict[str, Any]:
         if hair.tint != WHITE:
             absorption = absorption + color_absorption(np.array(hair.tint), radial)
             pigment = "absorption"
-            notes.append("Tint and Melanin became one Absorption")
+            notes.append("Tint and Melanin were combined into Absorption")
     elif hair.parametrization == "ABSORPTION":
         absorption = np.maximum(hair.absorption_coefficient, 0.0)
         pigment, values = "absorption", {}
@@ -257,7 +257,7 @@ def _shape(hair: PrincipledHair, notes: list[str]) -> dict[str, Any]:
         "strength_higher": 1.0,
     }
     if hair.model == "HUANG":
-        notes.append("Huang's model is drawn as Chiang's: its Roughness counts in both directions")
+        notes.append("Huang's model is drawn as Chiang's: its Roughness is used in both directions")
         values |= {
             "eccentricity": hair.aspect_ratio,
             "strength_r": hair.reflection,
@@ -280,7 +280,7 @@ def _in_range(values: dict[str, Any], notes: list[str]) -> dict[str, Any]:
         else:
             within = _between(value, low, high)
         if within != value:
-            notes.append(f"{parameter.label} was taken into its range, {low:g} to {high:g}")
+            notes.append(f"{parameter.label} was clamped to its range, {low:g} to {high:g}")
         kept[parameter.name] = within
     return kept
 

@@ -47,7 +47,7 @@ def shadow_warnings(
     left_out = 1.0 - float(strengths[asked].sum()) / max(float(strengths.sum()), 1e-30)
     if settings.max_lights and len(lights) > len(asked) and left_out > _MUCH_LIGHT:
         found.append(
-            f"Shadows: only the {settings.max_lights} strongest of {len(lights)} lights throw "
+            f"Shadows: only the {settings.max_lights} strongest of {len(lights)} lights cast "
             f"shadows of hair; {left_out:.0%} of the light comes from the others. Raise Max "
             "Lights, or hide those that add least."
         )
@@ -57,23 +57,22 @@ def shadow_warnings(
 def _setting_warnings(ball: Ball, settings: VolumeSettings) -> Iterator[str]:
     if settings.extinction == 0.0:
         yield (
-            "Shadows: with an Extinction of 0 hair throws none. Set it to 1, which is what the "
-            "strands' width asks for, or Shadows to None."
+            "Shadows: with an Extinction of 0 hair casts none. Set it to 1, which matches the "
+            "strands' width, or set Shadows to None."
         )
     if settings.extinction >= _HARD_EXTINCTION:
         yield (
-            "Shadows: with so high an Extinction a single strand takes all light. Set it to 1, "
-            "which is what the strands' width asks for."
+            "Shadows: with this high an Extinction a single strand blocks all light. Set it to 1, "
+            "which matches the strands' width."
         )
     if settings.max_lights == 0:
         yield (
-            "Shadows: no light throws any as long as Max Lights is 0. Raise it, or set Shadows to "
-            "None."
+            "Shadows: no light casts any while Max Lights is 0. Raise it, or set Shadows to None."
         )
     if ball.radius < 2.0 * MIN_RADIUS:
         yield (
-            "Shadows: the hair has no extent, so it throws none that could be seen. Give its "
-            "strands a length."
+            "Shadows: the hair has no extent, so it casts no visible shadow. Give its strands a "
+            "length."
         )
 
 
@@ -82,17 +81,17 @@ def _light_warnings(light: Light, ball: Ball) -> Iterator[str]:
     name = light.name or f"A {light.kind} light"
     if _misses(light, ball):
         yield (
-            f"{name}: it shines past the hair, so it neither lights it nor throws its shadow. Turn "
+            f"{name}: it shines past the hair, so it neither lights it nor casts its shadow. Turn "
             "it to the hair, or hide it."
         )
     elif is_within(light, ball) and _is_wide(light):
         clear = f"Move it farther than {1.05 * ball.radius:.2g} m from the middle of the hair"
         if light_frame(light, ball) is None:
-            yield f"{name}: it stands amidst the hair, which throws no shadow of it. {clear}."
+            yield f"{name}: it stands inside the hair, which casts no shadow of its light. {clear}."
         else:
             yield (
-                f"{name}: it stands as near as hair reaches, and hair beside and behind it gets no "
-                f"shadow. {clear}, or take a spot."
+                f"{name}: it stands within reach of the hair, so hair beside and behind it gets "
+                f"no shadow. {clear}, or use a spot light."
             )
 
 

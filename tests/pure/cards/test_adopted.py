@@ -87,7 +87,7 @@ def test_cards_that_run_another_way_are_counted_and_of_how_many() -> None:
     uv = mesh.uv.copy()
     uv[turned] = LAID["down"](uv[turned])
     adopted = adopt_cards(as_source(mesh, uv), ball(), place="test")
-    said = "The UVs of 4 of 24 cards run another way than those of the others"
+    said = "The UVs of 4 of 24 cards run in another direction than those of the others"
     assert adopted.notes == (said,)
 
 
@@ -96,7 +96,7 @@ def test_cards_whose_root_nothing_tells_are_said_to_be_such() -> None:
     mesh = hanging()
     flat = Surface(mesh.positions * [1.0, 1.0, 0.0], mesh.triangles, mesh.uv[mesh.triangles])
     notes = adopt_cards(flat, None, place="test").notes
-    assert any("The UVs of 24 of 24 cards leave open which end is the root" in n for n in notes)
+    assert any("The UVs of 24 of 24 cards do not tell which end is the root" in n for n in notes)
     assert not any("another way" in note for note in notes)
 
 
@@ -139,7 +139,7 @@ def test_cards_that_face_the_head_are_turned_and_those_at_odds_are_noted() -> No
     at_odds = mesh.triangles.copy()
     at_odds[3] = at_odds[3, ::-1]
     adopted = adopt_cards(replaced(mesh, at_odds), ball(), place="test")
-    assert adopted.notes == ("The faces of 1 card do not all look to the same side",)
+    assert adopted.notes == ("The faces of 1 card do not all point to the same side",)
     np.testing.assert_array_equal(
         np.sort(adopted.mesh.triangles, axis=1), np.sort(adopted.corner, axis=1)
     )
@@ -193,10 +193,10 @@ def test_doubtful_shapes_are_noted() -> None:
     positions, triangles, uv = mesh.positions, mesh.triangles, mesh.uv
     assert notes_of(positions, triangles, uv) == ""
     one = hanging(1)
-    assert "hang together" in notes_of(one.positions, one.triangles, one.uv)
+    assert "are connected" in notes_of(one.positions, one.triangles, one.uv)
     flat = positions.copy()
     flat[np.unique(triangles[mesh.card == 1])] = (0.0, 0.0, 0.2)
-    assert "No face of 1 card has an area" in notes_of(flat, triangles, uv)
+    assert "No face of 1 card has any area" in notes_of(flat, triangles, uv)
     nowhere = uv.copy()
     nowhere[:] = 0.5
     notes_of(positions, triangles, nowhere)
@@ -257,9 +257,7 @@ def test_a_ponytail_of_an_artist(shared_data: Path, body: Surface) -> None:
     adopted = adopt_cards(source, body, place="ponytail01")
     mesh = adopted.mesh
     assert mesh.card_count == 48
-    assert (
-        len(adopted.notes) == 1 and "The UVs of 6 of 48 cards run another way" in adopted.notes[0]
-    )
+    assert len(adopted.notes) == 1 and "UVs of 6 of 48 cards run in another" in adopted.notes[0]
     sizes = np.bincount(mesh.card)
     tail, locks = int(sizes.argmax()), np.flatnonzero(sizes <= 36)
     for card in (tail, *locks):

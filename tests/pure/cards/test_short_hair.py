@@ -51,7 +51,7 @@ def test_fur_gets_more_cards_of_eight_triangles_at_most() -> None:
     assert mesh.card_count == 300
     assert np.bincount(mesh.card).max() == 8
     assert build.notes[0] == (
-        "the hair is short beside 100 cards, so there are 300 of 8 triangles or fewer"
+        "the hair is too short for 100 cards, so there are 300 of 8 triangles or fewer"
     )
 
 

@@ -58,5 +58,5 @@ def test_nodes_of_meshes_are_known_by_name() -> None:
     [b"", EMPTY[:30], EMPTY[:-1], b"glTX" + EMPTY[4:], EMPTY.replace(b'"asset"', b'"asset}')],
 )
 def test_damage_is_told(data: bytes) -> None:
-    with pytest.raises(HairloomError, match="no whole GLB"):
+    with pytest.raises(HairloomError, match="not a complete GLB"):
         GlbFile.of(data, "x")

@@ -414,7 +414,7 @@ def test_bezier_curves_become_points_on_them(tmp_path: Path) -> None:
     thirds = [(0, 0), (7 / 9, 2), (20 / 9, 2), (3, 0)]
     np.testing.assert_allclose(read.strands.points, [(x, 0, y) for x, y in thirds], atol=1e-5)
     np.testing.assert_allclose(read.strands.radius, [0.03, 0.025, 0.02, 0.015], rtol=1e-5)
-    assert "a.abc: hair: its bezier curves became points on the curves." in read.notes
+    assert "a.abc: hair: its bezier curves were converted to points on the curves." in read.notes
 
 
 def test_files_of_other_programs_are_read(tmp_path: Path) -> None:
@@ -465,7 +465,7 @@ def test_counts_that_lie_are_told(tmp_path: Path) -> None:
     assert content.count(counts.tobytes()) == 1
     for lie in ([4, 2, 7, 5, 3, 7], [4, 2, 7, 5, 3, 1 << 30], [4, 2, 7, 5, -3, 6]):
         path.write_bytes(content.replace(counts.tobytes(), np.array(lie, "<i4").tobytes()))
-        with pytest.raises(HairloomError, match=r"its curves want .* points and it has 27"):
+        with pytest.raises(HairloomError, match=r"its curves need .* points, but it has 27"):
             read_groom_alembic(path)
 
 
@@ -500,9 +500,9 @@ def test_an_archive_without_curves_is_told(tmp_path: Path) -> None:
     ("content", "message"),
     [
         (b"", "the file is empty"),
-        (b"solid cube", "this is no Alembic file"),
+        (b"solid cube", "this is not an Alembic file"),
         (b"\x89HDF\r\n\x1a\n" + bytes(100), "HDF5"),
-        (b"Ogawa\0" + bytes(100), "never finished"),
+        (b"Ogawa\0" + bytes(100), "not written to its end"),
     ],
 )
 def test_other_files_are_told(tmp_path: Path, content: bytes, message: str) -> None:
@@ -639,10 +639,10 @@ def test_preflight_warns(change: Any, preset: Any, warning: str) -> None:
 
 def test_preflight_of_nothing_says_so() -> None:
     none = groom().take(np.array([], int))
-    assert preflight(none, UNREAL)["warnings"] == ["The engine will see no strands"]
+    assert preflight(none, UNREAL)["warnings"] == ["The engine will receive no strands"]
     no_guides = replace(groom(), is_guide=np.zeros(6, bool))
     guides = replace(UNREAL, parts="guides")
-    assert preflight(no_guides, guides)["warnings"] == ["The engine will see no guides"]
+    assert preflight(no_guides, guides)["warnings"] == ["The engine will receive no guides"]
 
 
 @pytest.mark.parametrize(

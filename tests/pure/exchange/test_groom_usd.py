@@ -321,7 +321,7 @@ def test_curves_of_every_basis_become_points_on_them(tmp_path: Path, basis: str,
     assert np.allclose(read.strands.points, np.vstack(expected), atol=1e-6)
     widths = np.concatenate([np.linspace(1e-4, 3e-4, len(each)) for each in expected])
     assert np.allclose(2 * read.strands.radius, widths, rtol=1e-5)
-    became = [note for note in read.notes if "became points" in note]
+    became = [note for note in read.notes if "were converted to points" in note]
     assert bool(became) == ((basis, wrap) != ("catmullRom", "pinned"))
 
 
@@ -422,7 +422,7 @@ def test_other_prims_are_left_out_and_told(tmp_path: Path) -> None:
     assert dict(read.groom.group_names) == {0: "good", 1: "broken"}
     notes = "\n".join(read.notes)
     for told in (
-        "/short was left out: its 1 counts of points add up to 3, and it has 2 points",
+        "/short was left out: its 1 counts of points add up to 3, but it has 2 points",
         "/closed was left out: its curves are closed",
         "/empty was left out: it has no curves",
         "1 HermiteCurves, 1 Mesh, 1 NurbsCurves, 1 PointInstancer",
@@ -445,7 +445,7 @@ def test_primvars_that_do_not_fit_are_left_out(tmp_path: Path) -> None:
     assert groom.color is groom.strand_id is groom.strands.root_uv is None
     assert groom.strands.group.tolist() == [0, 0]
     assert np.allclose(groom.strands.radius, [5e-5] * 5)
-    assert "its groom_color were left out: 3 values where 'vertex' wants 5" in notes
+    assert "its groom_color were left out: 3 values where 'vertex' needs 5" in notes
     assert "3 widths" in notes and "IDs were left out" in notes
 
 
@@ -473,8 +473,8 @@ def test_a_file_without_usable_curves_is_an_error(tmp_path: Path) -> None:
     (tmp_path / "text.usda").write_text("#usda 1.0\ndef BasisCurves {{{")
     (tmp_path / "folder.usd").mkdir()
     assert "is empty" in complaint("empty.usd")
-    assert "no USD file" in complaint("other.usd")
-    assert "no suffix" in complaint("hair.abc")
+    assert "not a USD file" in complaint("other.usd")
+    assert "not a suffix" in complaint("hair.abc")
     assert "cannot read it" in complaint("text.usda")
     assert "cannot be read" in complaint("folder.usd") and "cannot be read" in complaint("no.usd")
 
@@ -485,11 +485,11 @@ def test_what_cannot_be_written_is_an_error(tmp_path: Path) -> None:
     (tmp_path / "taken.usdc").mkdir()
     short = GroomMotion([groom.strands.points[1:]], 24.0)
     for name, wanted, options, told in (
-        ("a.abc", groom, {}, "no suffix"),
-        ("a.usdz", groom, {}, "no suffix"),
+        ("a.abc", groom, {}, "not a suffix"),
+        ("a.usdz", groom, {}, "not a suffix"),
         ("a.usdc", none, {}, "no strands"),
-        ("a.usdc", groom, {"up": "X"}, "no up axis"),
-        ("a.usdc", groom, {"scale": 0.0}, "makes no sense"),
+        ("a.usdc", groom, {"up": "X"}, "not an up axis"),
+        ("a.usdc", groom, {"scale": 0.0}, "is not valid"),
         ("a.usdc", groom, {"motion": short}, "frame 1 has points that do not fit"),
         ("taken.usdc", groom, {}, "cannot be written"),
     ):

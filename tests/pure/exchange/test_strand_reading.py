@@ -116,7 +116,7 @@ def test_a_file_of_guides_alone_gives_those(tmp_path: Path) -> None:
     write(tmp_path / "hair.abc", groom(guides=(0, 1, 2, 3, 4)))
     read = read_strands(tmp_path / "hair.abc")
     assert read.strands.strand_count == 5 and read.groom.is_guide.all()
-    assert any("nothing but guides" in note for note in read.notes)
+    assert any("only guides" in note for note in read.notes)
 
 
 def test_several_grooms_in_a_file_become_one_and_that_is_told(tmp_path: Path) -> None:
@@ -130,13 +130,13 @@ def test_several_grooms_in_a_file_become_one_and_that_is_told(tmp_path: Path) ->
     stage.Save()
     read = read_strands(tmp_path / "two.usda")
     assert dict(read.groom.group_names) == {0: "front", 1: "back"}
-    assert "two.usda: its 2 prims of curves became one groom." in read.notes
+    assert "two.usda: its 2 prims of curves were joined into one groom." in read.notes
     write_groom_alembic(
         tmp_path / "two.abc", groom_of_groups(), replace(BLENDER, is_split=True, parts="both")
     )
     read = read_strands(tmp_path / "two.abc")
     assert read.strands.group.tolist() == [0, 0, 1, 1, 1]
-    assert "two.abc: its 2 curves objects became one groom." in read.notes
+    assert "two.abc: its 2 curves objects were joined into one groom." in read.notes
 
 
 @pytest.mark.parametrize("parts", ["both", "guides"])
@@ -241,7 +241,7 @@ def test_bezier_curves_that_are_points_are_read_as_such(tmp_path: Path) -> None:
     stage_of_curves(tmp_path / "hair.usda", [4, 5, 6], "bezier").Save()
     read = read_strands(tmp_path / "hair.usda")
     assert read.strands.point_counts.tolist() == [4, 5, 6] and not read.dropped
-    assert any("it says bezier, but" in note for note in read.notes)
+    assert any("its basis is bezier, but" in note for note in read.notes)
 
 
 def groom_of_groups() -> Groom:
@@ -253,11 +253,11 @@ def groom_of_groups() -> Groom:
     ("name", "content", "problem"),
     [
         ("hair", b"x", "it has no suffix"),
-        ("hair.obj", b"x", "'.obj' is no suffix of files of strands"),
-        ("hair.abc", b"HAIR" + bytes(200), "this is no Alembic file"),
-        ("hair.tfx", b"#usda 1.0\n" + bytes(200), "no TressFX 3 or 4 file"),
+        ("hair.obj", b"x", "'.obj' is not the suffix of a strand file"),
+        ("hair.abc", b"HAIR" + bytes(200), "this is not an Alembic file"),
+        ("hair.tfx", b"#usda 1.0\n" + bytes(200), "not a TressFX 3 or 4 file"),
         ("hair.usdc", b"Ogawa\xff" + bytes(200), "USD"),
-        ("hair.hair", b"PXR-USDC" + bytes(200), "no .hair file"),
+        ("hair.hair", b"PXR-USDC" + bytes(200), "not a .hair file"),
         ("hair.usd", b"", "empty"),
         ("hair.abc", b"", "empty"),
     ],
@@ -303,5 +303,5 @@ def test_times_that_no_scene_has_end_the_motion() -> None:
     positions = np.zeros((3, 2, 3), np.float32)
     motion, note = sound_motion(np.array([0.0, 1.0, 1e300]), positions)
     assert motion is not None and motion.times.tolist() == [0.0, 1.0]
-    assert "at 1e+300 s it has a time that no scene has" in note
+    assert "at 1e+300 s it has a time outside the range of a scene" in note
     assert sound_motion(np.array([1e300, 1.5e300, 2e300]), positions)[0] is None

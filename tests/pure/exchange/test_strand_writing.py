@@ -88,7 +88,7 @@ def test_the_suffix_says_the_format(suffix: str, tmp_path: Path) -> None:
 
 def test_a_suffix_or_engine_that_is_not_known_is_named(tmp_path: Path) -> None:
     for name, output, message in (
-        ("hair.obj", StrandExportSettings(), r"'\.obj' is no suffix.*\.abc"),
+        ("hair.obj", StrandExportSettings(), r"'\.obj' is not the suffix.*\.abc"),
         (
             "hair.abc",
             StrandExportSettings(engine="maya"),
@@ -104,7 +104,7 @@ def test_a_suffix_or_engine_that_is_not_known_is_named(tmp_path: Path) -> None:
         with pytest.raises(HairloomError, match="'scale'"):
             StrandExportSettings(scale=scale)
     motion = GroomMotion([groom().strands.points], 24.0)
-    with pytest.raises(HairloomError, match=r"\.hair holds no motion"):
+    with pytest.raises(HairloomError, match=r"\.hair cannot store motion"):
         write_strands(tmp_path / "hair.hair", groom(), motion=motion)
     assert list(tmp_path.iterdir()) == []
 
@@ -182,7 +182,7 @@ def test_bones_of_an_earlier_export_do_not_stay_with_other_strands(tmp_path: Pat
     written = write_strands(tmp_path / "hair.tfx", groom())
     assert {file.name for file in tmp_path.iterdir()} == {"hair.tfx", "hair old.tfxbone"}
     assert (tmp_path / "hair old.tfxbone").read_bytes() == before
-    assert written.notes[-1].endswith("of other strands, and is kept as hair old.tfxbone.")
+    assert written.notes[-1].endswith("to other strands, and is kept as hair old.tfxbone.")
 
 
 def test_an_export_again_replaces_its_own_files_and_keeps_those_of_others(tmp_path: Path) -> None:
@@ -196,9 +196,7 @@ def test_an_export_again_replaces_its_own_files_and_keeps_those_of_others(tmp_pa
         said = write_strands(tmp_path / "hair.tfx", hair, split).notes
         said += write_strands(tmp_path / "one.tfx", hair).notes
         kept = [note for note in said if "is kept as" in note]
-        assert (
-            kept == ["hair_crown.tfx was there already, and is kept as hair_crown old.tfx."][turn:]
-        )
+        assert kept == ["hair_crown.tfx already existed, and is kept as hair_crown old.tfx."][turn:]
     assert [file.name for file in tmp_path.iterdir() if "old" in file.name] == [
         "hair_crown old.tfx"
     ]

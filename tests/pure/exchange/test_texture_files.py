@@ -155,8 +155,8 @@ def test_what_cannot_be_written_is_named_and_leaves_nothing(tmp_path: Path) -> N
     image = random_picture(3)
     (tmp_path / "file").write_text("a file")
     for path, depth, problem in (
-        (tmp_path / "a.jpg", None, "not written as '.jpg'"),
-        (tmp_path / "a.png", "float", "do not hold float"),
+        (tmp_path / "a.jpg", None, "cannot be written as '.jpg'"),
+        (tmp_path / "a.png", "float", "cannot store float"),
         (tmp_path / "file" / "a.png", None, "cannot be written"),
     ):
         with pytest.raises(HairloomError, match=problem):

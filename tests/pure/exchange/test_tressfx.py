@@ -381,7 +381,7 @@ BAD_FILES = {
     "version 5": (patched(0, f32(5.0)), "byte 0, reads as 5"),
     "version NaN": (patched(0, f32(float("nan"))), "byte 0, reads as nan"),
     "version 3 in a version 4 file": (patched(0, f32(3.0)), "positions would start at byte"),
-    "text": (b"# Wavefront OBJ\nv 0 0 0\n" * 20, "no TressFX 3 or 4 file"),
+    "text": (b"# Wavefront OBJ\nv 0 0 0\n" * 20, "not a TressFX 3 or 4 file"),
     "no strands": (patched(4, u32(0)), "no strands (byte 4)"),
     "no vertices": (patched(8, u32(0)), "no vertices a strand (byte 8)"),
     "one vertex": (patched(8, u32(1)), "fewer than two points"),
@@ -423,5 +423,5 @@ def test_a_file_that_shrinks_while_it_is_read_is_a_message(tmp_path: Path) -> No
     path.write_bytes(bytes(1000))
     file = BinaryFile(path)
     path.write_bytes(bytes(500))
-    with pytest.raises(HairloomError, match="changes while it is read"):
+    with pytest.raises(HairloomError, match="changed while it was read"):
         file.array("points", 0, "<f4", 200)

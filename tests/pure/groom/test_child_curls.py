@@ -92,7 +92,7 @@ def test_curls_that_have_no_room_say_so_and_are_finite(monkeypatch: pytest.Monke
     wanted = settings(curl=0.02, curl_length=0.005, strand_count=100)
     made = make_children(standing(), SURFACE, wanted, place="test")
     assert made.strands.grid.shape[1] == 512
-    assert any("Curls need 4,801 points a child and have 512" in each for each in made.notes)
+    assert any("Curls need 4,801 points per child and have 512" in each for each in made.notes)
     monkeypatch.setattr(children, "CHILD_POINTS", 10_000)
     many = settings(curl=0.02, curl_length=0.1, strand_count=10_000 // 50)
     count = make_children(standing(), SURFACE, many, place="test").growth.cv_count

@@ -155,7 +155,7 @@ def test_hair_of_a_head_between_the_legs_of_a_larger_body_is_of_another_scale(
     small = whole.transformed(np.diag([0.1, 0.1, 0.1, 1.0]))
     away = np.median(closest_point(small.roots, body).distance)
     assert away < 0.15 * np.linalg.norm(np.ptp(body.positions, axis=0))
-    with pytest.raises(HairloomError, match="another scale") as caught:
+    with pytest.raises(HairloomError, match="different scale") as caught:
         bind_roots(small, body, place="hair.tfx")
     assert "(pass --head-scale 0.1)" in caught.value.remedy
 
@@ -175,7 +175,7 @@ def test_a_groom_in_another_place_is_not_called_another_scale(egg: Surface) -> N
     matrix = np.eye(4)
     matrix[:3, 3] = (3.0, 0.0, 0.0)
     strands = hair_on(egg, 200).transformed(matrix)
-    with pytest.raises(HairloomError, match="no usual unit makes them meet"):
+    with pytest.raises(HairloomError, match="no common unit makes them meet"):
         bind_roots(strands, egg, place="hair.tfx")
 
 

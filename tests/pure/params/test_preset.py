@@ -45,7 +45,11 @@ def test_a_preset_comes_back_as_saved(tmp_path: Path) -> None:
         ({"values": {"length": "long"}}, "'length' is 'long'", "Use a value"),
         ({"values": {"lenght": 0.1}}, "unknown grow parameter 'lenght'", "Did you mean length"),
         ({"values": [1, 2]}, "not a Hairloom preset", "Choose a preset"),
-        ({"section": "guides"}, "a preset of no known kind ('guides')", "Choose a preset of grow"),
+        (
+            {"section": "guides"},
+            "an unknown kind ('guides')",
+            "Choose a preset of grow",
+        ),
         ({"hairloom": PRESET_VERSION + 1}, f"{PRESET_VERSION + 1}", ""),
         ({"hairloom": "one"}, "'one'", ""),
         ({"hairloom": None}, "None", ""),

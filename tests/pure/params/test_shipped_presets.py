@@ -61,7 +61,7 @@ def test_titles_within_a_section_differ() -> None:
 def test_a_preset_of_no_known_kind_is_refused(tmp_path: Path, text: str) -> None:
     path = tmp_path / "odd.json"
     path.write_text(text)
-    with pytest.raises(HairloomError, match="no known kind") as caught:
+    with pytest.raises(HairloomError, match="unknown kind") as caught:
         read_any_preset(path, ALL_SETTINGS)
     assert caught.value.place == str(path)
 
@@ -82,7 +82,7 @@ def test_what_a_preset_brings_along_is_checked(tmp_path: Path, also: object) -> 
     path = tmp_path / "odd.json"
     data = {"hairloom": 1, "section": "shading", "title": "x", "values": {}, "also": also}
     path.write_text(json.dumps(data))
-    with pytest.raises(HairloomError, match="no known kind"):
+    with pytest.raises(HairloomError, match="unknown kind"):
         read_any_preset(path, ALL_SETTINGS)
 
 

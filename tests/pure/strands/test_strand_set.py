@@ -35,7 +35,7 @@ def ragged(**changes: Any) -> StrandSet:
         ({"radius": np.zeros(3)}, "radius has shape"),
         ({"group": np.zeros(6)}, "group has shape"),
         ({"root_uv": np.zeros((5, 3))}, "root_uv has shape"),
-        ({"root_barycentric": None}, "come together"),
+        ({"root_barycentric": None}, "given together"),
         ({"offsets": np.array([1, 3])}, "must be a list that starts with 0"),
         ({"offsets": np.array([0, 2, 7, 10, 20, 21])}, "fewer than two points"),
         ({"points": np.full((21, 3), np.nan)}, "not finite"),

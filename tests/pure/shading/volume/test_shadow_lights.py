@@ -48,13 +48,13 @@ def test_lights_that_throw_all_their_shadow_are_not_told_of() -> None:
 
 def test_a_light_amidst_the_hair_is_told_by_its_name() -> None:
     (warning,) = told(SUN, point(0.1, 0.02, 1.5))
-    assert warning.startswith("Lamp: it stands amidst the hair") and "0.21 m" in warning
+    assert warning.startswith("Lamp: it stands inside the hair") and "0.21 m" in warning
     assert shadow_frames([SUN, point(0.1, 0.02, 1.5)], BALL, DEEP)[1] is None
 
 
 def test_of_a_light_as_near_as_hair_reaches_a_part_has_no_shadow() -> None:
     (warning,) = told(point(0.1, 0.12, 1.5))
-    assert warning.startswith("Lamp: it stands as near as hair reaches")
+    assert warning.startswith("Lamp: it stands within reach of the hair")
     assert shadow_frames([point(0.1, 0.12, 1.5)], BALL, DEEP)[0] is not None
     assert told(spot(0.1, 0.12, 1.5, size=3.1))[0].startswith("Spot: ")
 
@@ -91,8 +91,8 @@ def test_lights_beyond_those_that_throw_shadows_are_told_where_they_are_much() -
 @pytest.mark.parametrize(
     ("name", "value", "word"),
     [
-        ("extinction", 0.0, "throws none"),
-        ("extinction", 1000.0, "so high"),
+        ("extinction", 0.0, "casts none"),
+        ("extinction", 1000.0, "this high"),
         ("max_lights", 0, "is 0"),
     ],
 )
