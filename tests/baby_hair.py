@@ -18,7 +18,7 @@ def wig() -> rig_flow.Rig:
 
 
 def short_strands(rig: rig_flow.Rig) -> Bools:
-    """(strand_count,) those that no setting but Baby Hair has cut."""
+    """(strand_count,) whether a strand is baby hair: no other setting shortens strands here."""
     length = rig.strands.lengths()
     is_short: Bools = length < 0.5 * np.median(length)
     assert 20 < is_short.sum() < 400

@@ -11,7 +11,7 @@ load_package()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Of cases that are alike a commit runs the first and the last."""
+    """Of the cases of a test marked `alike`, a commit runs only the first and the last."""
     families: dict[str, list[pytest.Item]] = {}
     for item in items:
         if item.get_closest_marker("alike") and not item.get_closest_marker("slow"):

@@ -1,4 +1,5 @@
-"""Exports as they come out of other hands: each function changes a folder with `cards.glb`."""
+"""Exports as other programs and users leave them: each function changes a folder with
+`cards.glb`."""
 
 from __future__ import annotations
 
@@ -37,7 +38,7 @@ def garbage(folder: Path) -> None:
 
 
 def renamed(folder: Path) -> None:
-    """Mesh and sidecar; the sidecar still names cards.glb."""
+    """Mesh and sidecar renamed; the sidecar still refers to cards.glb."""
     for end in (".glb", ".hairloom.json"):
         (folder / f"cards{end}").rename(folder / f"{NAME}{end}")
 
@@ -82,7 +83,7 @@ def _changed(folder: Path, change: Callable[[GlbFile], None]) -> None:
 
 
 def reordered(folder: Path) -> None:
-    """As an optimiser of vertex caches does: the same triangles in another order."""
+    """The same triangles in another order, as after vertex cache optimisation."""
 
     def change(file: GlbFile) -> None:
         accessor = file.content["accessors"][_finest(file)["indices"]]
@@ -143,8 +144,8 @@ def quantised(folder: Path) -> None:
 
 
 def with_mirrored_cards(folder: Path) -> None:
-    """No damage: the frames of cards that an artist has mirrored, on one side of the hair. Their
-    strands run where they ran.
+    """No damage: the tangent frames of cards that an artist has mirrored, on one side of the hair.
+    The direction of their strands does not change.
     """
 
     def change(file: GlbFile) -> None:
@@ -159,8 +160,7 @@ def with_mirrored_cards(folder: Path) -> None:
 
 
 def with_turned_tangents(folder: Path) -> None:
-    """No damage: their components as packings for some engines have them, x in green as 1 minus the
-    value, y in red."""
+    """No damage: tangents packed as for some engines, with 1 - x in green and y in red."""
     file = folder / sidecar_of(folder)["textures"]["tangent"]["file"]
     pixels = read_texture(file, is_color=False)[::-1, :, :3]
     turned = np.stack([pixels[..., 1], 1.0 - pixels[..., 0], pixels[..., 2]], axis=-1)
@@ -172,7 +172,7 @@ def with_turned_tangents(folder: Path) -> None:
     change_sidecar(folder, change)
 
 
-#: what was done -> what one sentence says of it; an empty one: nothing
+#: damage -> words of the one message about it; "": no message
 DAMAGES: dict[Callable[[Path], None], str] = {
     without_sidecar: "is missing",
     garbage: "is no sidecar",
@@ -183,7 +183,7 @@ DAMAGES: dict[Callable[[Path], None], str] = {
     without_index_buffer: "is missing",
     reordered: "another program has changed",
     without_unused: "another program has changed",
-    quantised: "",  # rounded to 65,536 steps: nothing that one sees
+    quantised: "",  # 65,536 steps: not visible
 }
 
 

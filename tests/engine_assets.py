@@ -1,4 +1,4 @@
-"""An asset as engines read it, beside our own picture of it, and what compares both."""
+"""An asset for engines with Hairloom's picture of it, and the comparison of an engine's picture."""
 
 from __future__ import annotations
 
@@ -27,27 +27,28 @@ from hairloom.addon.shading.texture_settings import TextureSettings
 from hairloom.addon.shading.volume.settings import VolumeSettings
 from hairloom.addon.strands import StrandSet
 
-#: the engines run where nothing but the repository is seen
+#: in the repository: the engines run in a sandbox that sees nothing else
 OUTPUT = REPOSITORY / "out" / "engines"
 
 SIZE, FIELD_OF_VIEW = 480, 30.0
 EYE, TARGET = (0.25, -0.45, 0.1), (0.0, 0.0, -0.01)
 TO_SUN = tuple(np.array([0.5, -0.7, 0.5]) / np.linalg.norm([0.5, -0.7, 0.5]))
 IRRADIANCE = 4.0
-#: Radiance from all sides. Hairloom has Marschner's lobes of it too, engines the colour of hair
-#: alone: nothing to be compared.
+#: Ambient radiance. None for Marschner, since the two differ by design: Hairloom lights all lobes
+#: with it, engines only the hair's colour.
 AMBIENT = {"kajiya_kay": 0.3, "marschner": 0.0}
 NEAR, FAR = 0.05, 5.0
 
 MOST_MEAN = 1.0 / 255.0
-#: Share of pixels that differ by more than 8 / 255, at most: mip maps are not made alike, and sharp
-#: highlights show it. Baked cards that did not grow denser at a slant would be at 0.022.
+#: Largest fraction of pixels that may differ by more than 8 / 255: engines make mip maps in another
+#: way, which sharp highlights show. Without denser alpha at grazing angles, baked cards would reach
+#: 0.022.
 MOST_DIFFERENT = {"kajiya_kay": 0.03, "marschner": 0.005, "baked": 0.015}
 
 
 @dataclass(frozen=True)
 class Asset:
-    """A folder with all that an engine reads, and the same picture by Hairloom, row 0 on top."""
+    """A folder with all files that an engine reads, and Hairloom's picture of it, row 0 on top."""
 
     folder: Path
     picture: np.ndarray
@@ -145,7 +146,7 @@ def by_hairloom(written: WrittenCards, look: ShadingSettings) -> np.ndarray:
 
 
 def check(asset: Asset, drawn: Path) -> None:
-    """The engine's picture is ours, as a screen shows both."""
+    """The engine's picture equals ours within limits, both in display values."""
     theirs = read_texture(drawn, is_color=False)[..., :3]
     ours = read_encoded(asset.picture)
     difference = np.abs(theirs - ours)
@@ -155,6 +156,6 @@ def check(asset: Asset, drawn: Path) -> None:
 
 
 def read_encoded(linear: np.ndarray) -> np.ndarray:
-    """Scene-linear in front of black, (height, width, 3), by the sRGB curve."""
+    """A scene-linear picture before black, encoded with the sRGB curve, (height, width, 3)."""
     color = np.clip(linear[..., :3], 0.0, 1.0)
     return np.where(color <= 0.0031308, 12.92 * color, 1.055 * color ** (1 / 2.4) - 0.055)

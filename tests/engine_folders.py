@@ -1,18 +1,18 @@
-"""What the folders of docs/engines need to be complete wherever they are copied to."""
+"""Whether the folders of docs/engines are complete, so that each can be copied alone."""
 
 from __future__ import annotations
 
 import re
 from pathlib import Path
 
-#: what names another file of the folder: scripts and shaders of Godot, plugin.cfg, JavaScript
+#: references to other files of a folder, in Godot's scripts and shaders, plugin.cfg and JavaScript
 _NAMES = re.compile(
     r"""(?:preload\(|#include |^script=|from )["']([^"'\n]+\.\w+)["']""", re.MULTILINE
 )
 
 
 def missing_files(folder: Path) -> set[str]:
-    """Files that those of a folder name, and that are not in it; not three.js and Unity's own."""
+    """Files that a folder's files refer to but that it lacks, apart from three.js's and Unity's."""
     named = {
         name
         for file in folder.rglob("*")

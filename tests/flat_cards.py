@@ -22,7 +22,7 @@ def card(
 ) -> dict[str, np.ndarray]:
     """A rectangle from low to high (x, z) whose normals face -y, its root at the top.
 
-    A card whose low x is the greater one shows its back to an eye that looks along +y.
+    If low x is greater than high x, an eye that looks along +y sees the card's back.
     """
     (x0, z0), (x1, z1) = low, high
     lean = np.array([0.0, -np.cos(tilt), np.sin(tilt)])
@@ -65,8 +65,11 @@ def constant(
 
 
 def snapshot_of(mesh: CardMesh, textures: HairTextures, *, cards: Any = None, **more: Any) -> Any:
-    """Nothing but cards, without shadows if nothing is said of them; `cards`: how they are drawn,
-    as CardSnapshot has it."""
+    """A snapshot of cards alone, without shadows by default.
+
+    Args:
+        cards: how cards are drawn, fields of CardSnapshot.
+    """
     from hairloom.addon.render.card_snapshot import CardSnapshot
     from hairloom.addon.render.snapshot import Snapshot
 

@@ -11,7 +11,7 @@ from hairloom.addon.groom.children_settings import ChildrenSettings
 from hairloom.addon.groom.roots import bind_roots
 from hairloom.addon.strands import StrandSet, Surface
 
-#: mixed, and nothing else
+#: children that are mixed from several guides, without any other effect
 PLAIN: dict[str, Any] = {
     "method": "multi",
     "length_variation": 0.0,
@@ -39,7 +39,8 @@ def sheet(cells: int = 10, size: float = 1.0) -> Surface:
 def guides_at(
     surface: Surface, root: Any, way: Any, group: Ints | None = None, cv_count: int = 9
 ) -> StrandSet:
-    """Straight guides from these roots along these ways, (guide_count, 3) each, bound."""
+    """Straight guides, bound to the surface; `root` and `way` (from root to tip): (guide_count,
+    3)."""
     root, way = np.asarray(root, np.float64), np.asarray(way, np.float64)
     grid = root[:, None] + np.linspace(0.0, 1.0, cv_count)[:, None] * way[:, None]
     strands = StrandSet(

@@ -1,4 +1,4 @@
-"""A disk that is full, as far as this process goes."""
+"""A full disk, simulated for this process alone."""
 
 from __future__ import annotations
 

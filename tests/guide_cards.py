@@ -1,4 +1,4 @@
-"""Cards along a few guides, for tests that want any cards."""
+"""Cards along a few guides, for tests in which any cards do."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Shading in HLSL that glslang and SPIRV-Cross have turned into GLSL, on the GPU."""
+"""HLSL shading on the GPU, translated into GLSL by glslang and SPIRV-Cross."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from hairloom.addon.shading.marschner.tables import marschner_tables
 
 
 def probed_hlsl(hlsl: Path, text: str, sandbox: str, folder: Path) -> np.ndarray:
-    """What a fragment program in HLSL gives, see `probed`.
+    """The result of a fragment program in HLSL, see `probed`.
 
     Args:
-        hlsl: the file that is written, where programs of the sandbox find it.
-        folder: for what comes of it.
+        hlsl: the file to write `text` to, where the sandbox's programs can read it.
+        folder: for the translated program.
     """
     hlsl.write_text(text, encoding="utf-8")
     program = hlsl.with_suffix(".spv")
@@ -30,7 +30,7 @@ def probed_hlsl(hlsl: Path, text: str, sandbox: str, folder: Path) -> np.ndarray
 
 
 def _as_function(text: str) -> str:
-    """A fragment program of SPIRV-Cross with plain variables, and the textures of ours."""
+    """A fragment program of SPIRV-Cross as a function: plain variables, and our textures."""
     text = re.sub(r"#version.*", "", text)
     text = re.sub(r"layout\(location = \d+\) in vec2 (\w+);", r"vec2 \1;\n#define at \1", text)
     result = r"vec4 \1;\n#define result_of_probe \1"

@@ -1,4 +1,5 @@
-"""What many tests make of the same things is made once in a process, and looked up afterwards."""
+"""A cache for costly functions that many tests call with the same arguments: each result is
+computed once per process."""
 
 from __future__ import annotations
 
@@ -16,20 +17,20 @@ import pytest
 
 from hairloom.addon.params import SettingsMap
 
-#: results of each function that are kept
+#: results that are kept per function
 CAPACITY = 40
 _PLAIN = (str, bytes, bool, int, float, type(None), Enum, np.generic, SettingsMap)
 
 
 class Unknown(Exception):
-    """A value of which nobody can say what is in it."""
+    """A value whose content cannot be hashed."""
 
 
 def digest(*values: Any) -> bytes:
-    """The same for values of the same content.
+    """A digest that is equal for values of equal content.
 
     Raises:
-        Unknown: there is one that is neither plain, an array nor made of such.
+        Unknown: a value is neither plain, nor an array, nor composed of these.
     """
     found = hashlib.blake2b(digest_size=16)
     for value in values:
@@ -63,10 +64,10 @@ def once(
     name: str,
     also: Callable[[], Any] = lambda: None,
 ) -> None:
-    """Let a function of a module make what it makes of the same arguments once.
+    """Cache a module's function by the content of its arguments.
 
     Args:
-        also: what else it depends on.
+        also: everything else that its result depends on.
     """
     make = getattr(module, name)
     made: OrderedDict[bytes, Any] = OrderedDict()

@@ -18,8 +18,8 @@ def mip_chain(
 
     Args:
         image: (height, width) or (height, width, channels) in [0, 1].
-        alpha: (height, width), how much each texel counts.
-        is_direction: it holds unit vectors as 0.5 d + 0.5.
+        alpha: (height, width), the weight of each texel.
+        is_direction: the image holds unit vectors d as 0.5 d + 0.5.
     """
     name = DIRECTIONS[0] if is_direction else "base"
     maps = {name: image} | ({} if alpha is None else {"alpha": alpha})
@@ -29,6 +29,6 @@ def mip_chain(
 def alpha_chain(
     alpha: Floats, *, threshold: float = 0.5, grid: AtlasGrid | None = None
 ) -> list[Floats]:
-    """All levels of an alpha (height, width) with its coverage kept, itself first."""
+    """All levels of an alpha (height, width), itself first; each keeps its coverage."""
     levels = mip_levels({"alpha": alpha}, grid=grid, threshold=threshold)
     return [level["alpha"] for level in levels]

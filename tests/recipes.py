@@ -9,14 +9,14 @@ from pathlib import Path
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 PAGE = REPOSITORY / "docs" / "dev" / "extending.md"
-#: what of the repository a recipe may change
+#: parts of the repository that a recipe may change
 _PARTS = ("__init__.py", "blender_manifest.toml", "addon", "gpu_shaders", "presets", "translations")
 _LOADER = "tools/extension_loader.py"
 
 
 @dataclass(frozen=True)
 class Block:
-    """A block of code that names a file: a file to add, or a change of one."""
+    """A block of code with a file's name: a new file (`python`), or a change of one (`diff`)."""
 
     recipe: str
     kind: str
@@ -24,10 +24,10 @@ class Block:
     text: str
 
     def apply(self, tree: Path) -> None:
-        """Write the file into a copy of the repository, or change it there.
+        """Add or change the file in a copy of the repository.
 
-        A change has the lines as they are now, with a space before, in a row: lines with + come
-        in, lines with - go.
+        A change is one run of lines: context begins with a space, added lines with +, removed
+        lines with -.
         """
         file = tree / self.path
         if self.kind == "python":
@@ -57,7 +57,7 @@ def blocks(page: Path = PAGE) -> list[Block]:
 
 
 def listed_files(recipe: str) -> set[str]:
-    """The sources that a recipe names, beside its blocks."""
+    """The sources that a recipe names outside its blocks of code."""
     text = re.sub(r"^```.*?^```$", "", recipes()[recipe], flags=re.M | re.S)
     return set(re.findall(r"`((?:addon|gpu_shaders)/[\w./]+\.(?:py|glsl))`", text))
 

@@ -1,9 +1,9 @@
-"""A plugin of pytest that writes down all programs that tests compile, for test_cross_compile.py:
+"""A pytest plugin that records all programs that tests compile, for test_cross_compile.py:
 
 pytest -p record_programs TESTS, with the folder in HAIRLOOM_PROGRAMS
 
-A program becomes a file for each stage, in Vulkan's GLSL, and a line of JSON: its name, the file
-that each stage begins with, and what it needs.
+For each program it writes a file per stage, in Vulkan's GLSL, and a line of JSON: the program's
+name, the file that each stage begins with, and the features that it needs.
 """
 
 from __future__ import annotations

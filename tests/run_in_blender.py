@@ -1,4 +1,4 @@
-"""Runs the tests inside a Blender, in the background:
+"""Runs the tests inside Blender, in the background:
 
 blender -b --factory-startup --python-exit-code 1 --python tests/run_in_blender.py [-- PYTEST ARGS]
 
@@ -30,7 +30,7 @@ def main() -> int:
         f"GPU: {gpu.platform.backend_type_get()}, {gpu.platform.renderer_get()}, "
         f"{gpu.platform.version_get()}"
     )
-    # pytest reads its settings, and the folders in them, relative to where it is started.
+    # pytest's settings, and the folders in them, are relative to the working directory.
     os.chdir(REPOSITORY)
     extra = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []
     chosen = any(Path(argument.split("::")[0]).exists() for argument in extra)

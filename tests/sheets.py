@@ -1,4 +1,4 @@
-"""Square sheets before a view: cards whose right order is plain."""
+"""Square sheets before a view: cards whose right order is obvious."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ VIEW = BallView(np.array([0.01, 0.0, 0.004]), 1.0, np.array([0.0, -1.0, 0.0]), 3
 
 
 def sheets(depths: tuple[float, ...], turned: tuple[bool, ...] = ()) -> CardMesh:
-    """Square sheets of half the picture's width; the larger depth is nearer to the eye of VIEW."""
+    """Square sheets of half the picture's width; a larger depth is nearer to VIEW's eye."""
     square = np.array([[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]]) * 0.5
     points = np.concatenate([square - [0.0, depth, 0.0] for depth in depths])
     faces = np.array([[0, 1, 2], [0, 2, 3]])

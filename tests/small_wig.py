@@ -31,7 +31,7 @@ def curves(count: int = 60) -> StrandSet:
 
 
 def turned(strands: StrandSet, number: np.ndarray, angle: float) -> StrandSet:
-    """The same with some strands turned around their roots, about Z."""
+    """Strands of which those in `number` are turned about Z, around their roots."""
     points = strands.points.copy()
     turn = np.array(
         [[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]]

@@ -1,4 +1,4 @@
-"""Closed surfaces whose shadow is known."""
+"""Spheres, closed surfaces whose shadows are known."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def ball(radius: float) -> Surface:
 
 
 def globe(rings: int, radius: float = 0.1) -> Surface:
-    """A sphere of this many circles of latitude."""
+    """A sphere with this many circles of latitude."""
     polar, around = np.meshgrid(np.linspace(0, np.pi, rings), np.linspace(0, 2 * np.pi, 2 * rings))
     points = np.stack(
         [np.sin(polar) * np.cos(around), np.sin(polar) * np.sin(around), np.cos(polar)], axis=-1

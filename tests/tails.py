@@ -1,15 +1,15 @@
-"""Hair that is close to hair: ponytails and locks."""
+"""Hair that touches other hair: ponytails and locks."""
 
 import numpy as np
 
 from hairloom.addon.dynamics.state import start
 
-#: A style that bears next to nothing, and none of the weight.
+#: A weak style that carries none of the weight.
 SOFT = {"style_root": 0.5, "style_tip": 0.1, "bend": 0.3, "sag_compensation": 0.0}
 
 
 def tail(count, cv_count=12, narrow=0.012, wide=0.04, length=0.3, seed=1):
-    """A ponytail below its tie: out to `wide`, then straight down."""
+    """A ponytail below its tie: its radius grows from `narrow` to `wide`, then stays."""
     random = np.random.default_rng(seed)
     angle, away = random.uniform(0.0, 2.0 * np.pi, count), random.random(count) ** 0.5
     along = np.linspace(0.0, 1.0, cv_count)
@@ -22,7 +22,7 @@ def tail(count, cv_count=12, narrow=0.012, wide=0.04, length=0.3, seed=1):
 
 
 def locks(count, cv_count=12, seed=2):
-    """Two locks of hair that hang side by side, 3 cm apart, and on which side each strand is."""
+    """Two locks of hair that hang side by side, 3 cm apart, and each strand's side, -1 or 1."""
     lock = tail(2 * count, cv_count, 0.012, 0.012, 0.25, seed)
     side = np.repeat([-1.0, 1.0], count)
     lock[..., 0] += (0.015 * side)[:, None].astype(np.float32)
@@ -43,8 +43,8 @@ def turned(angle, axis=(0.3, -0.5, 0.8)):
 
 
 def squeezed(count=30, cv_count=8):
-    """A tail that has been moved, turned, squeezed and set in motion: rest, position, previous,
-    turn, middle."""
+    """A tail that has been moved, turned, squeezed and set in motion: its rest, position,
+    previous position, turn (3, 3), and mean root."""
     random = np.random.default_rng(5)
     rest = tail(count, cv_count)
     turn, move = turned(0.7), np.array([0.4, -2.0, 1.5])

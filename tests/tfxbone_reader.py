@@ -11,7 +11,7 @@ from hairloom.addon.exchange.tfxbone import INFLUENCES, BoneWeights
 
 
 def read_tfxbone(path: Path) -> BoneWeights:
-    """The bones of a whole file; bone -1 is none."""
+    """The bone weights of a file; bone -1 means none."""
     content = path.read_bytes()
     (bone_count,), at = struct.unpack_from("<i", content), 4
     names: dict[int, str] = {}

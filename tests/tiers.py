@@ -14,7 +14,7 @@ def few_in_commits(cases: Iterable[Any], count: int = 1) -> list[Any]:
 
 
 def few_by_name(cases: Mapping[str, Any], *slow: str) -> list[Any]:
-    """Named cases for `parametrize`, of which those named are slow."""
+    """Named cases for `parametrize`; those in `slow` are marked slow."""
     assert set(slow) <= set(cases)
     marks = {name: [pytest.mark.slow] if name in slow else [] for name in cases}
     return [pytest.param(case, marks=marks[name], id=name) for name, case in cases.items()]

@@ -1,6 +1,6 @@
-"""Windows' rules for files, on any system: long paths, names without case, files that are open.
+"""Windows' rules for files, on any system: path length, names without case, open files.
 
-Only the calls that Hairloom's writers make go by them; what a test looks at afterwards does not.
+Only the calls that Hairloom's writers make obey them; what a test checks afterwards does not.
 """
 
 from __future__ import annotations
@@ -25,13 +25,17 @@ _ONE = (
     *("access", "utime", "listxattr", "getxattr", "setxattr"),
 )
 _TWO = ("replace", "rename", "link")
-#: these need the file for themselves
+#: these fail if another program has the file open
 _ALONE = ("rmdir", "unlink", "replace", "rename")
 
 
 @contextmanager
 def windows_rules(held: Collection[Path] = ()) -> Iterator[None]:
-    """held: files that another program has open."""
+    """Apply the rules within this context.
+
+    Args:
+        held: files that another program has open.
+    """
 
     def checked(real: Callable[..., Any], count: int) -> Callable[..., Any]:
         def call(*arguments: Any, **options: Any) -> Any:
@@ -61,7 +65,11 @@ _real_listdir = os.listdir
 
 
 def _as_there(path: Any) -> Any:
-    """A path that is not too long, by the name that a file of it has, whatever its case."""
+    """The path of an existing file whose name differs only in case, or the path itself.
+
+    Raises:
+        FileNotFoundError: the path is too long.
+    """
     if not isinstance(path, (str, os.PathLike)):
         return path
     text = os.fspath(path)

@@ -1,4 +1,4 @@
-"""When what holds arrays is the same to the last bit."""
+"""When two objects that hold arrays count as equal to the last bit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Hair under a brush is what a full rebuild of the combed curves makes, without that."""
+"""The quick update of hair under a comb brush equals a full rebuild from the combed curves."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ def rig_of(strands: StrandSet, settings: ChildrenSettings) -> rig_flow.Rig:
 @pytest.mark.parametrize("method", ["none", "multi", "single"])
 @pytest.mark.parametrize("clump", [0.0, 0.8])
 def test_it_is_what_a_rebuild_makes(method: str, clump: float) -> None:
-    """A small turn, so that no guide is another one's; more children than one level of clumps."""
+    """Against a full rebuild. The turn is small, so that each strand keeps its guides; the children
+    are so many that clumps have several levels."""
     settings = ChildrenSettings(method=method, strand_count=5000, clump=clump, frizz=0.02)
     before, after = curves(), turned(curves(), COMBED, 0.05)
     rig, whole = rig_of(before, settings), rig_of(after, settings)
@@ -53,7 +54,7 @@ def test_one_stroke_after_another_and_back_leaves_nothing() -> None:
 
 
 def test_curves_of_other_point_counts_keep_those_of_the_rig() -> None:
-    """Curls keep their points; a curve that a brush has straightened has as many as before."""
+    """A curl that a brush has straightened keeps the number of points that it had in the rig."""
     strands = curves()
     angle = np.linspace(0.0, 30.0, 200)
     coil = np.stack([0.01 * np.cos(angle) - 0.01, 0.01 * np.sin(angle), 0.003 * angle], axis=1)

@@ -17,11 +17,11 @@ PAGES = [
     *sorted((REPOSITORY / "docs").rglob("*.md")),
     REPOSITORY / "gpu_shaders" / "README.md",
 ]
-#: pages for programmers, and the shaders that are handed to them; all others are for artists
+#: pages for programmers, and the shaders that engines reuse; all others are for artists
 FOR_PROGRAMMERS = ("CONTRIBUTING.md", "docs/dev/", "docs/engines/", "gpu_shaders/")
-#: folders that are not in the repository but made in it
+#: folders that tools create; not in the repository
 MADE = ("out/", "out/window/", "dist/")
-#: of a picture of the user guide, so that a page of them loads at once
+#: limit for a picture of the user guide, so that its pages load fast
 MOST_BYTES = 150_000
 
 
@@ -31,12 +31,12 @@ def test_the_parameter_tables_are_current() -> None:
 
 
 def texts_of(page: Path) -> str:
-    """A page without its code blocks, whose brackets are no links."""
+    """A page without its code blocks, in which brackets are not links."""
     return re.sub(r"^```.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.M | re.S)
 
 
 def anchors(page: Path) -> set[str]:
-    """What links may lead to in a page, as hosts of git name its headings."""
+    """The anchors of a page's headings, as Git hosts build them."""
     found: list[str] = []
     for heading in re.findall(r"^#+ (.+)$", texts_of(page), flags=re.M):
         kept = re.sub(r"[^\w\- ]", "", heading.strip().lower())
@@ -71,7 +71,7 @@ def test_every_page_is_reached_from_the_readme() -> None:
 
 
 def test_the_list_of_the_readme_has_every_page() -> None:
-    """But the tutorials, which have a list of their own."""
+    """Except for tutorials, which have their own list."""
     pages = texts_of(REPOSITORY / "README.md").partition("\n## Pages\n")[2]
     listed = set(re.findall(r"\]\((docs/[^)]+\.md)\)", pages))
     docs = [page.relative_to(REPOSITORY) for page in (REPOSITORY / "docs").rglob("*.md")]
@@ -81,7 +81,8 @@ def test_the_list_of_the_readme_has_every_page() -> None:
 
 
 def test_the_table_of_the_report_has_every_key_that_verbs_write() -> None:
-    """Those that stand in their code; of figures it says itself which there are."""
+    """All keys that appear literally in the verbs' code. Keys of figures do not; the page explains
+    them."""
     verbs = REPOSITORY / "addon" / "blender" / "command_line"
     written = set()
     for file in verbs.glob("*.py"):
@@ -110,7 +111,7 @@ def test_every_picture_is_shown_and_small() -> None:
 
 
 def test_the_architecture_page_names_every_room() -> None:
-    """Those of addon/, and the folders within its two largest."""
+    """The rooms of addon/, and the folders within its two largest rooms."""
     text = (REPOSITORY / "docs" / "dev" / "architecture.md").read_text(encoding="utf-8")
     addon = REPOSITORY / "addon"
     rooms = [f"{path.name}/" for path in addon.iterdir() if (path / "__init__.py").exists()]
@@ -132,7 +133,7 @@ def test_the_architecture_page_names_every_phase_of_a_preview() -> None:
 
 
 def files_named_in(text: str) -> list[str]:
-    """What in a page's `code` is a file of source."""
+    """The source files that a text names in backticks."""
     return re.findall(r"`((?:[\w.*/-]+/)?[\w.*-]+\.(?:py|glsl|toml))`", text)
 
 
@@ -141,7 +142,8 @@ def folders_named_in(text: str) -> list[str]:
 
 
 def is_there(name: str, page: Path) -> bool:
-    """By its path from the top or from addon/, or from the page's folder; a * is any text."""
+    """Whether a file or folder exists, relative to the repository, addon/ or the page's folder; a *
+    matches any text."""
     if Path(name).name.removeprefix("session_").startswith(("x.", "lib_x.", "struct_x.")):
         return True  # any file of that kind
     tops = (REPOSITORY, REPOSITORY / "addon", page.parent)
@@ -191,7 +193,7 @@ def test_decisions_have_a_number_a_day_a_status_and_a_topic() -> None:
     status = r"\n\n\d{4}-\d\d-\d\d · (accepted|superseded by ((?:\d+(?: and )?)+)) · (\w+)\n\n\*\*"
 
     numbers = [int(entry.partition(".")[0]) for entry in entries]
-    # work that goes on side by side takes numbers ahead of each other
+    # work in parallel may reserve numbers, so that some can be missing
     assert numbers == sorted(set(numbers))
     for number, entry in zip(numbers, entries, strict=True):
         title = entry.partition("\n")[0]

@@ -1,4 +1,4 @@
-"""Folders of docs/engines are complete: each is copied into a project alone."""
+"""The folders of docs/engines are complete, since each is copied into a project alone."""
 
 import json
 import re
@@ -50,7 +50,8 @@ def test_the_npm_package_has_all_of_its_files() -> None:
 
 
 def test_every_file_of_the_unity_package_has_a_name_of_its_own() -> None:
-    """Without these Unity gives each file another name in each project, and references break."""
+    """A unique GUID. Without .meta files Unity gives a file another GUID in each project, which
+    breaks references."""
     folder = ENGINES / "unity"
     files = {each for each in folder.rglob("*") if each.suffix != ".meta"}
     metas = {each: each.with_name(f"{each.name}.meta") for each in files}

@@ -1,4 +1,4 @@
-"""docs/figures.md shows what was measured, and the other pages quote it."""
+"""docs/figures.md shows the measured figures, and the other pages quote them."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def test_what_was_measured_is_what_would_be_measured_today() -> None:
 
 
 def test_each_benchmark_has_a_limit() -> None:
-    """One without could find anything, and `make bench` would pass."""
+    """Without a limit, `make bench` would pass whatever a benchmark measures."""
     found = figures.known()["benches"]
     assert [name for name, each in found.items() if each["ended"] and not each["limits"]] == []
 
@@ -100,7 +100,7 @@ def test_what_is_missed_is_said_first_and_in_its_row() -> None:
 def test_each_section_has_its_own_date_and_setup(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    """Those of the others stay where one is measured again, on another machine."""
+    """Measuring one benchmark again, on another machine, leaves date and setup of the others."""
     plain = {"arguments": "", "left_out": "", "other_work": 0.0, "seconds": 1.0, "ended": True}
     plain |= {"reference": "a ring", "limits": {}, "missed": [], "figures": {}}
     kept = {"benches": {"ties": plain | SETUP, "house": plain | SETUP}}
@@ -140,7 +140,7 @@ def test_arguments_are_words_that_benchmarks_know() -> None:
 
 
 def typed(text: str, names: list[str]) -> list[str]:
-    """Numbers that a page has typed beside the name of a figure, in a sentence or a row."""
+    """Numbers that are typed beside the name of a figure, in a sentence or a table row."""
     name = rf"(?<![\w.])`?(?:{'|'.join(map(re.escape, names))})`?"
     in_sentences = re.findall(rf"{name}(?:(?: is|:)?\s+\d[\d.,]*|,\s+\d[\d.]*,)", text)
     in_rows = re.findall(rf"^\| *{name}[^|]*\| *\d[^|]*\|", text, re.M)
@@ -148,11 +148,11 @@ def typed(text: str, names: list[str]) -> list[str]:
 
 
 def test_a_number_beside_the_name_of_a_figure_is_a_quote() -> None:
-    """One that somebody has typed stays as it was when the next one is found."""
+    """A typed number would stay when the figure is measured again."""
     found = figures.known()["benches"].values()
     names = [name for each in found for name in each.get("figures", {}) if "_" in name]
     for path in sorted((figures.REPOSITORY / "docs").rglob("*.md")):
-        if path != figures.PAGE and path.name != "decisions.md":  # what was found when it was made
+        if path != figures.PAGE and path.name != "decisions.md":  # dated: keeps its numbers
             assert typed(path.read_text(encoding="utf-8"), names) == [], path.name
 
 

@@ -14,14 +14,15 @@ ADDON = Path(__file__).parents[2] / "addon"
 
 
 def is_defined(step: Step, addon: Path) -> bool:
-    """Whether the file has the function or class, by itself or in a class."""
+    """Whether the step's file defines its function or class, at any level."""
     tree = ast.parse((addon / step.file).read_text(encoding="utf-8"))
     kinds = (ast.FunctionDef, ast.ClassDef)
     return any(isinstance(node, kinds) and node.name == step.name for node in ast.walk(tree))
 
 
 def modules_imported(file: str, addon: Path) -> set[str]:
-    """Files of addon/ that a file imports, whole or names of them, also through a package."""
+    """Files of addon/ that a file imports, as modules or names from them, also through a
+    package."""
     path = addon / file
     found: set[Path] = set()
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
@@ -37,7 +38,7 @@ def modules_imported(file: str, addon: Path) -> set[str]:
 
 
 def fault(caller: Step, called: Step, addon: Path) -> str:
-    """What is wrong with an arrow, or nothing."""
+    """The problem of an arrow, or ""."""
     arrow = f"{caller.file} {caller.name} -> {called.file} {called.name}"
     if FLOORS.index(called.floor) < FLOORS.index(caller.floor):
         return f"{arrow}: points up"

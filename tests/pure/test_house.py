@@ -1,8 +1,8 @@
-"""The rules of the house: which room may import which, that imports never run in a circle, that
-nothing stands there for tests alone.
+"""The rules of the code base: which room may import which, no circular imports, and no code that
+only tests use.
 
-The rooms within `blender/` stand in an order, and each imports only from those before it. The table
-is in tools/house_rules.py.
+The rooms within `blender/` have an order, and each imports only from those before it. The table is
+in tools/house_rules.py.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ def test_forbidden_imports_and_circles_are_seen(tmp_path: Path) -> None:
 
 
 def test_processes_are_started_in_one_place() -> None:
-    """Where their folder, environment, input and end are thought of."""
+    """That place sets their folder, environment and input, and ends them."""
     starters = {path.name for path in ADDON.rglob("*.py") if _starts_processes(path.read_text())}
     assert starters == {"child_process.py"}
 
@@ -104,7 +104,7 @@ def test_starting_a_process_is_seen(code: str, starts: bool) -> None:
 
 def _starts_processes(code: str) -> bool:
     if not re.search(rf"\b({'|'.join(_STARTERS)}|ProcessPoolExecutor|os)\b", code):
-        return False  # nor is it parsed, as nearly all modules
+        return False  # most modules: parsing them all would take long
     for node in ast.walk(ast.parse(code)):
         if isinstance(node, ast.Import):
             if any(each.name.split(".")[0] in _STARTERS for each in node.names):
@@ -126,7 +126,8 @@ _STARTERS = {"subprocess", "multiprocessing", "pty"}
 
 
 def test_nothing_is_there_for_tests_alone() -> None:
-    """What only tests call is a helper of theirs. A shader's twin is what it is tested against."""
+    """A function that only tests call belongs into the tests, unless it is the twin that a shader
+    is tested against."""
     assert unused_names() == [], "delete them, or name them in WANTED with the reason"
 
 
@@ -158,7 +159,7 @@ def test_docstrings_name_arguments_that_there_are(tmp_path: Path) -> None:
 
 
 def test_importing_the_pure_rooms_needs_no_blender() -> None:
-    """Holds at run time too: a fresh interpreter without bpy imports every pure module."""
+    """At run time too: a fresh interpreter without bpy imports every pure module."""
     modules = [
         module_name(file).removesuffix(".__init__")
         for room in sorted(PURE)

@@ -1,4 +1,4 @@
-"""Quick light: near to the light that is found after it, and equal to it where both look."""
+"""Quick light approximates the final light, and equals it at the points where it is sampled."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ COARSE = AmbientSettings(cell_count=16)
 
 @pytest.fixture(scope="module")
 def rig() -> Rig:
-    """Hair of the upper half of a ball, which hangs in waves, so that strands keep their points."""
+    """Hair on the upper half of a ball, wavy so that strands keep their points."""
     random = np.random.default_rng(2)
     out = random.normal(size=(COUNT, 3))
     out[:, 2] = np.abs(out[:, 2])
@@ -49,7 +49,8 @@ def with_strands(rig: Rig, points: Floats) -> Rig:
 
 
 def test_quick_light_is_the_fields_at_some_points_and_straight_between(rig: Rig) -> None:
-    """All roots a little elsewhere: so no strand is known, and all are looked up."""
+    """At the sampled points against the fields. All roots are moved a little, so that no strand is
+    found in the light of before."""
     light = rest_light(rig, SETTINGS)
     fields = light.fields
     assert fields is not None
@@ -85,7 +86,8 @@ def test_strands_that_were_there_keep_their_light_wherever_they_are_in_the_order
 
 
 def test_the_first_hair_has_light_like_its_own(rig: Rig) -> None:
-    """Neither black nor white for a moment: on average as light, and dark where that is dark."""
+    """Its mean is close to that of the final light, with which it correlates, so that hair does not
+    flash black or white at first."""
     light, quick = rest_light(rig, SETTINGS), quick_light(rig, SETTINGS, None)
     assert quick.occlusion.mean() == pytest.approx(light.occlusion.mean(), abs=0.05)
     assert np.corrcoef(quick.occlusion, light.occlusion)[0, 1] > 0.9

@@ -1,4 +1,4 @@
-"""How many runs under load have passed in a row."""
+"""The number of runs under load that have passed in a row."""
 
 import pytest
 from load_runs import Run, passed_in_a_row

@@ -1,4 +1,4 @@
-"""What tests share has to be what they would have made themselves."""
+"""Cached results equal those that a test would have computed itself."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def test_what_nobody_can_look_into_is_unknown(value: Any) -> None:
 
 @pytest.fixture
 def module(monkeypatch: pytest.MonkeyPatch) -> Any:
-    """One with a function that counts its calls, and what it depends on besides."""
+    """A module with a function that records its calls, and with `cells`, on which it depends."""
     module = ModuleType("one")
     module.calls, module.cells = [], 1
 

@@ -1,4 +1,4 @@
-"""Pictures that move: small enough to load, smooth, and without a jump where they begin again."""
+"""Animated pictures are small enough to load, smooth, and loop without a jump."""
 
 from __future__ import annotations
 

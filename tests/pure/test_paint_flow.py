@@ -1,4 +1,4 @@
-"""Children under a brush on their density stand where a full rebuild has them, without that."""
+"""The quick update of children while their density is painted equals a full rebuild."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def rig_of(density: Floats | None, settings: ChildrenSettings, **others: object)
 
 
 def shapes(rig: rig_flow.Rig) -> dict[bytes, Floats]:
-    """Of the children, by their roots."""
+    """The points of each child by the bytes of its root."""
     own = rig.own_count
     assert own is not None
     grid = rig.strands.grid[own:]
@@ -81,7 +81,7 @@ def test_those_that_come_hold_to_where_they_grow() -> None:
 
 def test_those_that_come_are_drawn_into_the_clumps_around_them() -> None:
     def gap(clump: float) -> float:
-        """How far the tips of those that come are from the nearest tip of those that stay [m]."""
+        """Median distance of new tips from the nearest tip of a strand that stays [m]."""
         rig = rig_of(EVEN, ChildrenSettings(method="multi", strand_count=5000, clump=clump))
         before, now = shapes(rig), shapes(painted(rig, dab(3.0)))
         new = np.array([strand[-1] for root, strand in now.items() if root not in before])
@@ -113,7 +113,7 @@ def test_what_was_painted_is_combed_as_all_hair_is() -> None:
 
 
 def test_where_fewer_are_wanted_nothing_grows_beside_them() -> None:
-    """Too far from guides for all of them, so that they are fewer."""
+    """A painted corner that is too far from guides for all children has fewer, but none outside."""
     settings = ChildrenSettings(method="multi", strand_count=3000, clump=0.0)
     corner = np.where(HEAD.positions[:, :2].sum(axis=1) > 0.17, 1.0, 0.0)
     now = shapes(painted(rig_of(EVEN, settings), corner))

@@ -1,6 +1,6 @@
-"""What each event makes of a preview: the table that Play, the timeline and bakes go by.
+"""The table of a preview's phases and events, which Play, the timeline and bakes follow.
 
-The module is read from its file: the rooms around it need Blender.
+The module is loaded from its file, since the rooms around it need Blender.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ Action, Event, Phase, next_phase = phases.Action, phases.Event, phases.Phase, ph
 
 
 def after(phase: object, *events: object) -> tuple[object, list[str]]:
-    """Where events lead from a phase, and what is done on the way."""
+    """The phase after these events, and the actions on the way."""
     done = []
     for event in events:
         phase, action = next_phase(phase, event)

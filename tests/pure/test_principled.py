@@ -1,4 +1,4 @@
-"""From the numbers of a Principled Hair node to our settings."""
+"""Conversion from the inputs of a Principled Hair node to our settings, and back."""
 
 from __future__ import annotations
 
@@ -91,7 +91,8 @@ def test_the_width_around_is_that_of_the_gaussian_nearest_to_chiangs_logistic() 
 
 
 def test_the_offset_is_the_tilt() -> None:
-    """Measured against Cycles: a positive one moves the first highlight to the tip in both."""
+    """The sign was measured against Cycles: in both, a positive offset moves the first highlight
+    towards the tip."""
     before = ShadingSettings(offset_r=0.1, offset_trt=-0.1)
     settings, _ = settings_from(PrincipledHair(offset=0.07), before)
     assert settings.cuticle_tilt == pytest.approx(0.07)
@@ -202,7 +203,8 @@ def test_what_the_node_cannot_do_is_said() -> None:
 
 
 def test_a_stronger_first_highlight_is_a_higher_index_of_refraction() -> None:
-    """Fresnel at right angles; Cycles knows no other strength of Chiang's first highlight."""
+    """Against Fresnel's formula at normal incidence. In Cycles nothing else sets the strength of
+    Chiang's first highlight."""
 
     def reflectance(index: float) -> float:
         return ((index - 1.0) / (index + 1.0)) ** 2
@@ -215,5 +217,5 @@ def test_a_stronger_first_highlight_is_a_higher_index_of_refraction() -> None:
 
 @pytest.mark.parametrize("path", sorted(LOOKS.glob("*.json")), ids=lambda path: path.stem)
 def test_no_look_that_ships_needs_huangs_model(path: Path) -> None:
-    """In Cycles it is darker than our pictures by a third; Chiang's is as bright."""
+    """Huang's hair in Cycles is a third darker than our pictures; Chiang's is as bright."""
     assert hair_from(read_any_preset(path, ALL_SETTINGS).settings)[0].model == "CHIANG"

@@ -1,4 +1,5 @@
-"""What tools and benchmarks import is there: many run once in a release, and nobody types them."""
+"""Everything that tools and benchmarks import exists: many run only once per release, and no type
+checker reads them."""
 
 from __future__ import annotations
 
@@ -28,7 +29,7 @@ def file_of(module: str) -> Path | None:
 
 @cache
 def names_in(path: Path) -> set[str]:
-    """What can be imported from a file or a folder."""
+    """The names that can be imported from a file or a folder."""
     if path.is_dir():
         inside = {each.stem for each in path.iterdir()}
         start = path / "__init__.py"
@@ -46,7 +47,7 @@ def names_in(path: Path) -> set[str]:
 
 
 def missing(text: str) -> list[str]:
-    """What a program imports from files of ours that do not have it."""
+    """Names that a program imports from files of ours that do not define them."""
     found = []
     for node in ast.walk(ast.parse(text)):
         if not isinstance(node, ast.ImportFrom) or node.module is None:

@@ -1,4 +1,4 @@
-"""What pages and the changelog promise about safety is held by a test, sentence by sentence."""
+"""A test holds each sentence in which pages or the changelog promise something about safety."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ PAGES = (
     REPOSITORY / "docs" / "farm" / "README.md",
     *sorted(each for each in (REPOSITORY / "docs").glob("*.md") if each.name != "glossary.md"),
 )
-#: What a sentence has that promises something about files, Esc, kills or crashes.
+#: Words of sentences that promise something about files, Esc, kills or crashes.
 SAFETY = re.compile(
     r"Esc cancels|Esc ends the reading|half-written|whole or not|was killed|crash|file was in use"
     r"|that is in use|one before as it was|stays as it was|partial (files|result)|own process"
@@ -28,7 +28,7 @@ CANCELLED_TURN = "blender/test_turntable.py::test_what_is_cancelled_leaves_nothi
 CANCELLED_CARDS = (
     "blender/test_card_object.py::test_cards_that_are_cancelled_leave_the_scene_as_it_was"
 )
-#: a part of a sentence -> what holds it
+#: a part of a sentence -> the test that holds it
 PROMISES = {
     "Alembic or USD file that crashes": CRASHES,
     "Esc ends the reading": "blender/test_strand_import_steps.py"
@@ -93,7 +93,7 @@ def text_of(page: Path) -> str:
 
 
 def unheld(text: str) -> list[str]:
-    """Sentences of this text that promise something which nobody holds."""
+    """Sentences of this text that promise something about safety that no test holds."""
     sentences = re.split(r"(?<=[.!?|]) ", text)
     return [
         sentence
@@ -123,8 +123,8 @@ def test_a_promise_that_nobody_holds_is_seen() -> None:
 
 
 def test_one_module_opens_usd_files() -> None:
-    """The program that another process runs; what is written here is made in memory, but for cards,
-    which Blender's exporter has just written."""
+    """Only the reader that runs in another process opens foreign files. Writers make USD in memory,
+    except for cards, which open the file that Blender's exporter has just written."""
     opens = re.compile(r"(Stage|Layer)\.(Open|FindOrOpen|OpenAsAnonymous)\w*\(")
     files = (REPOSITORY / "addon").rglob("*.py")
     found = sorted(each.name for each in files if opens.search(each.read_text(encoding="utf-8")))

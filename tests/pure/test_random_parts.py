@@ -1,4 +1,4 @@
-"""Random actions that are more than one Blender can do are split; none is lost or done twice."""
+"""Random actions that are too many for one Blender are split; none is lost or done twice."""
 
 from __future__ import annotations
 

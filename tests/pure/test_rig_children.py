@@ -1,4 +1,4 @@
-"""`rig_flow.prepare` with children: what is a guide, what is a child, and what is said."""
+"""`rig_flow.prepare` with children: which strands are guides, which children, and its notes."""
 
 from dataclasses import replace
 
@@ -40,7 +40,7 @@ def test_an_artist_reads_which_curves_are_simulated() -> None:
 
 @pytest.mark.parametrize("method", ["multi", "single"])
 def test_no_strand_of_the_artist_is_lost(method: str) -> None:
-    """All that were there are still there, where they were, and children come on top."""
+    """The artist's strands come first, in their places and with their guides; children follow."""
     plain = rig_of(None, sheet())
     rig = rig_of(ChildrenSettings(method=method, strand_count=200), sheet())
     assert (rig.strands.strand_count, rig.own_count, rig.child_count) == (260, 60, 200)
@@ -97,7 +97,7 @@ def test_without_a_head_there_are_no_children() -> None:
 
 
 def test_low_ranks_are_an_even_sparser_groom() -> None:
-    """A quarter of the strands reaches every quarter of the sheet in about its share."""
+    """Each quarter of the sheet has about a quarter of the strands of low rank."""
     for children in (None, ChildrenSettings(method="multi", strand_count=700)):
         rig = rig_flow.prepare(
             curves(300 if children else 1000), sheet(), GUIDES, place="a wig", children=children
@@ -112,7 +112,8 @@ def test_low_ranks_are_an_even_sparser_groom() -> None:
 
 
 def test_children_keep_their_noise_when_others_come_or_go() -> None:
-    """The seeds of the same roots are the same, wherever they stand among all; own ones count."""
+    """A child's seed depends on its root alone, not on its place among the others; the artist's
+    strands are numbered."""
     many, few = (ChildrenSettings(method="multi", strand_count=count) for count in (700, 300))
     rig, other = rig_of(many, sheet()), rig_of(few, sheet())
     own, seeds = rig.own_count, rig_flow.strand_seeds(rig)
@@ -127,7 +128,7 @@ def test_children_keep_their_noise_when_others_come_or_go() -> None:
 
 
 def test_baby_hair_is_fine_where_widths_are_found() -> None:
-    """Found widths know how far strands are apart, not that some of them are baby hair."""
+    """Found widths depend on the distance between strands; baby hair is thinner all the same."""
     settings = ChildrenSettings(method="multi", strand_count=2000, length_variation=0.0)
 
     def widths(baby_hair: float) -> tuple[np.ndarray, np.ndarray]:

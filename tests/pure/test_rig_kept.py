@@ -1,5 +1,5 @@
-"""A groom that is made again while it is combed and painted is what is made of it from nothing, bit
-for bit."""
+"""A rig that is updated while its groom is combed and painted equals one that is built from
+scratch, bit for bit."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ HEAD = sheet()
 
 
 def block() -> DistanceField:
-    """A box below the sheet and a bump on it, through which some children go."""
+    """A box below the sheet with a bump that some children pass through."""
     low, cell = np.array([-0.15, -0.15, -0.1]), 0.01
     axes = [start + cell * np.arange(count) for start, count in zip(low, (31, 31, 31), strict=True)]
     x, y, z = np.meshgrid(*axes, indexing="ij")
@@ -33,7 +33,7 @@ def block() -> DistanceField:
 
 
 def same(one: Any, other: Any, where: str = "rig") -> None:
-    """That all arrays and numbers are, down to the last bit."""
+    """Assert that all arrays and numbers are equal, bit for bit."""
     if isinstance(one, np.ndarray):
         assert one.dtype == other.dtype, where
         np.testing.assert_array_equal(one, other, where)
@@ -56,7 +56,7 @@ def combed(strands: StrandSet, stroke: int) -> StrandSet:
 
 
 def painted(stroke: int) -> np.ndarray:
-    """More and less hair in some places."""
+    """A density with less hair around the place of this stroke."""
     x, y, _ = HEAD.positions.T
     away = np.hypot(x - 0.03 * stroke, y - 0.02)
     return np.where(away < 0.04, 0.3, 1.0).astype(np.float32)

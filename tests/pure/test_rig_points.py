@@ -1,4 +1,5 @@
-"""`rig_flow.prepare`: strands of any points, and what is said of those that need too many."""
+"""`rig_flow.prepare`: strands with any number of points, and the note on those that need too
+many."""
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from hairloom.addon.strands import StrandSet
 
 
 def notes_of(turns: float) -> tuple[str, ...]:
-    """Of three coils of 4,000 points, 25 cm long and 8 mm around."""
+    """The notes on three coils of 4,000 points, 25 cm long, with a radius of 8 mm."""
     along = np.linspace(0.0, 1.0, 4000)
     angle = 2.0 * np.pi * turns * along
     coil = np.stack([0.008 * np.cos(angle), 0.008 * np.sin(angle), -0.25 * along], axis=1)
@@ -23,13 +24,14 @@ def test_too_many_turns_are_counted_with_what_they_lose() -> None:
     assert notes_of(20.0) == ()
     (note,) = notes_of(100.0)
     assert note.startswith("3 strands need more than 512 points")
-    # an even polygon of five segments a turn is by 6.5 % shorter than the circle
+    # a regular polygon of five segments per turn is 6.5 % shorter than the circle
     lost = float(note.split("up to ")[1].split(" %")[0])
     assert abs(lost - 100.0 * (1.0 - np.sinc(100.0 / 511.0))) < 0.2
 
 
 def straight(count: int, lengthening: float) -> StrandSet:
-    """Eight strands down, 25 cm long, whose segments get longer to the tip by this factor each."""
+    """Eight strands that hang down, 25 cm long, each segment longer than the one before by this
+    factor."""
     steps = lengthening ** np.arange(count - 1)
     place = np.concatenate([[0.0], np.cumsum(steps) / steps.sum()])
     roots = np.arange(8)[:, None, None] * np.array([0.05, 0.0, 0.0])
@@ -38,7 +40,7 @@ def straight(count: int, lengthening: float) -> StrandSet:
 
 
 def bent(guides: np.ndarray) -> np.ndarray:
-    """Even guides that bend ever more towards the tip, in the plane of x and z."""
+    """Guides bent in the plane of x and z, more and more towards the tip; lengths stay."""
     step = np.linalg.norm(np.diff(guides, axis=1), axis=2, keepdims=True)
     angle = 1.5 * ((np.arange(step.shape[1]) + 0.5) / step.shape[1])[:, None] ** 2
     away = np.concatenate([np.sin(angle), 0.0 * angle, -np.cos(angle)], axis=1)
@@ -52,7 +54,8 @@ def bent(guides: np.ndarray) -> np.ndarray:
 def test_strands_go_with_their_guides_whatever_their_spacing(
     count: int, lengthening: float
 ) -> None:
-    """Also where they have as many points as guides have: each tip is on its own guide's."""
+    """The tip of each guide's own strand stays at the guide's tip, also where strands have as many
+    points as guides have CVs."""
     settings = GuideSettings(guide_count=8, cv_count=16)
     rig = rig_flow.prepare(straight(count, lengthening), None, settings, place="wig")
     step = np.linalg.norm(np.diff(rig.guide_grid, axis=1), axis=2)
@@ -66,7 +69,8 @@ def test_strands_go_with_their_guides_whatever_their_spacing(
 
 @pytest.mark.parametrize("count", [16, 17])
 def test_guides_are_held_where_their_strands_are(count: int) -> None:
-    """A ring 10 cm below the roots, around strands whose points lie close there."""
+    """A ring 10 cm below the roots holds guides at 10 cm of their length, although the points of
+    their strands are unevenly spaced."""
     shape = np.diag([0.3, 0.3, 0.3, 1.0])
     shape[:3, 3] = [0.175, 0.0, -0.1]
     rig = rig_flow.prepare(

@@ -1,4 +1,4 @@
-"""A ponytail on a moving head: what is held stays where it is held, and keeps its length."""
+"""A ponytail on a moving head: held places stay in their tie, and strands keep their lengths."""
 
 from dataclasses import replace
 
@@ -22,7 +22,7 @@ CV_COUNT = 24
 
 
 def ponytail(count: int = 200, seed: int = 4) -> StrandSet:
-    """From a patch through a ring of 1 cm behind it, then down: 30 cm, with some strands beside."""
+    """Strands from a patch through a ring of 1 cm behind it and 30 cm down; one of 20 passes by."""
     random = np.random.default_rng(seed)
     roots = random.uniform([-0.06, -0.06, 0.0], [0.06, 0.06, 0.0], (count, 3))
     across = random.normal(0.0, 0.003, (count, 1, 3)) * [1.0, 0.0, 1.0]
@@ -43,7 +43,7 @@ def ponytail(count: int = 200, seed: int = 4) -> StrandSet:
 
 
 def tie() -> Tie:
-    """Its axis along y."""
+    """The ring, its axis along y."""
     shape = np.eye(4)
     shape[:3, :3] = 0.012 * np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]]).T
     shape[:3, 3] = RING
@@ -67,7 +67,7 @@ def shaking(time: float, turn: float = 25.0) -> np.ndarray:
 
 
 def pose_at(rig: Rig, matrix: np.ndarray, own: np.ndarray | None = None) -> Pose:
-    """Everything goes with the head; `own` moves the tie besides."""
+    """The pose in which head and ties move by `matrix`, the ties also by `own`."""
     assert rig.holds is not None
     tie_matrix = matrix if own is None else matrix @ own
     ties = np.broadcast_to(tie_matrix, (rig.holds.tie_count, 4, 4))
@@ -77,7 +77,7 @@ def pose_at(rig: Rig, matrix: np.ndarray, own: np.ndarray | None = None) -> Pose
 
 
 def escape(rig: Rig, pose: Pose, strands: np.ndarray) -> np.ndarray:
-    """How far each held strand is from where it is held [m]."""
+    """Distance of each hold's place on its strand from where its anchor has it [m]."""
     holds = rig.holds.where(pose.anchors)
     first = holds.place.astype(int)
     part = (holds.place - first)[:, None]
@@ -118,7 +118,7 @@ TIPS = TipSurface(
     "holders", [Holders((tie(),)), Holders((tie(),), TIPS)], ids=["ponytail", "bun"]
 )
 def test_all_strands_stay_in_a_ring_that_turns_with_the_head(holders: Holders) -> None:
-    """At 24 frames a second, within 0.1 mm; drawn strands keep the lengths that guides do."""
+    """At 24 frames a second, within 0.1 mm; drawn strands keep their lengths to 0.2 %."""
     rig = rig_of(holders)
     assert rig.holds is not None and rig.notes == ()
     is_tip = rig.holds.anchor >= rig.holds.tie_count
@@ -138,7 +138,7 @@ def test_all_strands_stay_in_a_ring_that_turns_with_the_head(holders: Holders) -
 
 
 def test_hair_beyond_a_tie_follows_the_tie_and_not_the_head() -> None:
-    """A ring that goes up by 2 cm while the head is still takes the tail along."""
+    """A ring that rises by 2 cm while the head is still lifts the tail by as much."""
     rig = rig_of(Holders((tie(),)))
     lifted = np.eye(4)
     lifted[2, 3] = 0.02
@@ -212,7 +212,7 @@ def test_a_tie_without_hair_is_said_and_does_no_harm() -> None:
 
 
 def test_the_end_of_a_braid_stays_together() -> None:
-    """Three bundles around each other, held by a ball at their ends, which swings by itself."""
+    """Three bundles twisted around each other, held at their ends by a ball that swings freely."""
     random = np.random.default_rng(3)
     along = np.linspace(0.0, 1.0, 60)
     turn = 12.0 * along + (2.0 * np.pi / 3.0) * (np.arange(90) % 3)[:, None]
@@ -244,7 +244,8 @@ def test_the_end_of_a_braid_stays_together() -> None:
 
 
 def test_strange_strands_in_a_tie_do_no_harm() -> None:
-    """Of two points, with two points at one place, without length at the tip, and a single dot."""
+    """A strand of two points, one with two coincident points, one with no length at its tip, and
+    one whose points all coincide."""
     whole = ponytail(6).points.reshape(6, -1, 3)
     ends = np.stack([whole[0, 0], RING + [0.0, 0.02, 0.0]])
     doubled = np.concatenate([whole[1, :30], whole[1, 29:30], whole[1, 30:]])
@@ -272,7 +273,8 @@ def test_strange_strands_in_a_tie_do_no_harm() -> None:
 
 
 def test_brows_go_with_the_face() -> None:
-    """Short strands beside others, one guide each: they are where their roots carry them."""
+    """Short strands of the group BROWS beside long ones, one guide each: only their roots carry
+    them."""
     along = np.linspace(0.0, 1.0, 8)[:, None]
     roots = np.linspace([-0.05, 0.0, 0.0], [0.05, 0.0, 0.0], 6)
     length = np.where(np.arange(6) < 2, 0.01, 0.2)

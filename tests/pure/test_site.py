@@ -1,4 +1,4 @@
-"""The documentation as a site: links that lead somewhere, a menu, and nothing from elsewhere."""
+"""The documentation as a site: valid links, a menu, and no files from other hosts."""
 
 from __future__ import annotations
 

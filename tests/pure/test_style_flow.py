@@ -1,4 +1,4 @@
-"""An animated style is what the curves of its frame would make, wherever the body is."""
+"""An animated style equals the style that a rebuild from its frame's curves gives, in any pose."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def rig_of(strands: StrandSet, children: ChildrenSettings | None = CHILDREN) -> 
 
 
 def bowed(strands: StrandSet, far: float, longer: float = 1.0) -> StrandSet:
-    """Bent to the side by the square of the way along, and longer."""
+    """Strands scaled by `longer` and bent along y: by `far` [m] at the tip, and quadratically."""
     grid = strands.grid.copy()
     along = np.linspace(0.0, 1.0, grid.shape[1])[:, None]
     grid = grid[:, :1] + (grid - grid[:, :1]) * longer + along**2 * np.array([0.0, far, 0.0])
@@ -50,8 +50,8 @@ def pose_of(rig: Rig, matrix: np.ndarray) -> Pose:
 
 @pytest.mark.parametrize("moved_by", ["object", "surface"])
 def test_it_is_what_a_rebuild_makes(moved_by: str) -> None:
-    """Whether the hair's object stands still while nodes carry the curves with their surface, or
-    goes with it."""
+    """Against a full rebuild: the hair's object moves with the surface, or stands still while nodes
+    carry the curves with the surface."""
     rig, now = rig_of(curves()), bowed(curves(), 0.04, 1.3)
     matrix = turned()
     back = np.linalg.inv(matrix) if moved_by == "object" else np.eye(4)

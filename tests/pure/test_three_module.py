@@ -1,4 +1,4 @@
-"""The module for three.js of docs/engines, in node: what needs no browser."""
+"""The three.js module of docs/engines, in Node.js: everything that needs no browser."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ ADDRESSES = {
 
 @pytest.fixture(scope="module")
 def found(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    """What three_module.mjs prints."""
+    """The output of three_module.mjs."""
     if not (MODULES / "three").is_dir():
         pytest.skip("three.js is missing: `make setup` installs it")
     folder = tmp_path_factory.mktemp("module")
@@ -41,7 +41,7 @@ def found(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
 def test_a_level_has_the_pixels_of_the_camera_that_draws_it(
     found: dict[str, Any], camera: str
 ) -> None:
-    """Though a mirror has drawn the scene from elsewhere; an eye has those of its headset."""
+    """Also after a mirror has drawn the scene from elsewhere; an eye uses its headset's pixels."""
     assert found["parts"][camera] == [0, 1]
 
 

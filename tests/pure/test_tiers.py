@@ -1,4 +1,5 @@
-"""What a commit leaves to `make test-all`: a test that it runs fails for the same kind of fault."""
+"""For each slow test that a commit leaves to `make test-all`, it runs another that fails for the
+same kind of fault."""
 
 from __future__ import annotations
 
@@ -34,7 +35,7 @@ def marked_in(file: Path) -> dict[str, dict[str, ast.expr]]:
 
 
 def left_out(folder: Path) -> Iterator[tuple[Path, str, Path, str]]:
-    """Tests that name another which a commit runs instead: file and name of both."""
+    """Slow tests that name another test for commits: file and name of both."""
     for file in sorted(folder.rglob("test_*.py")):
         for name, marks in marked_in(file).items():
             slow = marks.get("slow")

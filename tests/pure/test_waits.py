@@ -1,4 +1,4 @@
-"""Every loop that waits has an end, and somebody has said which."""
+"""Every loop that waits has an end, which tools/waits.py states."""
 
 from __future__ import annotations
 

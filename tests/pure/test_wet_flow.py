@@ -1,4 +1,4 @@
-"""What water does to children and motion, against the motion of a mass on a spring."""
+"""The effect of water on children and on motion, against a mass on a spring."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ def test_the_settings_of_looks_children_and_motion_act_together() -> None:
 
 
 def test_a_heavier_mass_swings_slower_and_loses_less() -> None:
-    """x'' = -(k x + c x') / m: its frequency and its rate of decay, for a mass that has grown."""
+    """Frequency and rate of decay of m x'' = -(k x + c x') for the larger mass."""
     stiffness, loss, mass = 30.0, 0.4, 1.0 + WATER
     dry, wet = (np.roots([m, loss, stiffness])[0] for m in (1.0, mass))
     settings = DynamicsSettings()
     after = heavier(settings, 1.0)
-    # without the shift that damping makes, of less than a thousandth
+    # abs() of the root is the undamped frequency
     assert after.style_tip / settings.style_tip == pytest.approx(abs(wet / dry), rel=1e-6)
     assert after.damping / settings.damping == pytest.approx(wet.real / dry.real, rel=1e-6)
     assert after.sag_compensation == pytest.approx(1.0 / mass)
@@ -47,7 +47,7 @@ def test_a_heavier_mass_swings_slower_and_loses_less() -> None:
 
 def test_children_of_wet_hair_lie_closer_in_their_clumps() -> None:
     def gap(settings: ChildrenSettings) -> float:
-        """How far the tip of a child is from the nearest other tip, in the mean [m]."""
+        """Mean distance of a child's tip from the nearest other tip [m]."""
         rig = rig_flow.prepare(curves(), sheet(), GUIDES, place="a wig", children=settings)
         tips = rig.strands.grid[60:, -1]
         away = np.linalg.norm(tips[:, None] - tips[None], axis=2)

@@ -1,4 +1,4 @@
-"""What holds for window sessions and needs no window to be seen."""
+"""Rules for window sessions that can be checked without a window."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ def test_the_modules_that_sessions_look_at_are_there() -> None:
     assert set(re.findall(r'of_hairloom\("([^"]*)"\)', texts)) == set(table)
 
 
-#: Functions that wait for ticks on purpose: they show that nothing happens meanwhile.
+#: Functions that wait for ticks on purpose, to show that nothing happens meanwhile.
 STILL = {"session_soft_shadows.py": {"nothing_more_is_drawn"}}
 
 
 def waits_for_ticks(tree: ast.AST) -> list[int]:
-    """The lines where a session waits for a number of ticks: in one yield, or in a loop of them."""
+    """The lines where a session waits for several ticks, in one yield or in a loop."""
     return [
         node.lineno
         for node in ast.walk(tree)
@@ -48,7 +48,7 @@ def _yielded(statement: ast.stmt) -> ast.Yield | None:
 
 
 def _constant(given: ast.Yield | None) -> float | None:
-    """The ticks that a yield names; 1 where it names none."""
+    """The number of ticks of a yield, 1 for a bare one; None if it is no constant."""
     if given is None:
         return None
     if given.value is None:
@@ -65,7 +65,7 @@ def without_still_ones(tree: ast.Module, name: str) -> ast.Module:
 
 
 def test_no_session_waits_for_ticks() -> None:
-    """The driver refuses those of one yield as well; here it is seen before."""
+    """The driver also refuses a yield of several ticks, but only at run time."""
     waits = [
         f"{file.name}:{line}"
         for file in WINDOW.glob("*.py")

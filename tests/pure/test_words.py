@@ -1,4 +1,4 @@
-"""The words that the glossary retires are used nowhere."""
+"""No text or name uses a word that the glossary retires."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def test_no_retired_word_is_used() -> None:
 
 
 def test_each_kind_of_use_is_seen(tmp_path: Path) -> None:
-    """The first test can fail, and does not where a word only looks like a retired one."""
+    """Retired words are found in each kind of text, and similar words are not."""
     files = {
         "docs/glossary.md": GLOSSARY,
         "docs/page.md": "# Page\n\nIt hangs\non this. `anew`\n\n```\nanew\n```\nOr leave out.\n",
