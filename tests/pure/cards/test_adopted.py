@@ -1,4 +1,4 @@
-"""Cards of others against our own cards, whose way is known, and against MakeHuman's hair."""
+"""Adopted cards, tested with our own cards, whose direction is known, and MakeHuman's hair."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def ball() -> Surface:
 
 
 def hanging(count: int = 24, stands: bool = False) -> CardMesh:
-    """Our own cards: they hang down the sides of a ball, or stand on it like a hedgehog's."""
+    """Our own cards: they hang down the sides of a ball, or stand on it like spines."""
     random = np.random.default_rng(2)
     out = random.normal(size=(count, 3)) * [1.0, 1.0, 0.5]
     out /= np.linalg.norm(out, axis=1, keepdims=True)
@@ -47,12 +47,12 @@ def as_source(mesh: CardMesh, uv: np.ndarray | None = None) -> Surface:
 
 
 def source_corners(adopted: AdoptedCards) -> tuple[np.ndarray, np.ndarray]:
-    """Places and UVs at the corners of the source's triangles, as they were understood."""
+    """Positions and UVs that adoption gave to the corners of the source's triangles."""
     mesh = adopted.mesh
     return mesh.positions[adopted.corner], mesh.uv[adopted.corner]
 
 
-#: how the hair lies on the texture: what becomes of (u, v) when roots are below
+#: direction of hair on the texture -> conversion of our UVs into it; "up": roots are below
 LAID = {
     "up": lambda uv: uv,
     "down": lambda uv: np.stack([uv[:, 0], 1.0 - uv[:, 1]], 1),
@@ -92,7 +92,7 @@ def test_cards_that_run_another_way_are_counted_and_of_how_many() -> None:
 
 
 def test_cards_whose_root_nothing_tells_are_said_to_be_such() -> None:
-    """They lie flat, without a head."""
+    """The cards lie flat, and there is no head."""
     mesh = hanging()
     flat = Surface(mesh.positions * [1.0, 1.0, 0.0], mesh.triangles, mesh.uv[mesh.triangles])
     notes = adopt_cards(flat, None, place="test").notes
@@ -108,7 +108,7 @@ def test_without_a_head_the_higher_end_is_the_root() -> None:
 
 
 def test_a_card_that_leads_back_to_the_head_is_told_by_the_others() -> None:
-    """A loop whose tip is as near to the head as its root, and as high."""
+    """A loop whose tip is as near to the head and as high as its root: the other cards decide."""
     mesh = hanging(10)
     turn = np.linspace(0.0, np.pi, 9)
     loop = np.stack([0.12 + 0.05 * np.sin(turn), 0.05 * np.cos(turn), 0.0 * turn], axis=1)[None]
@@ -210,7 +210,7 @@ def test_doubtful_shapes_are_noted() -> None:
 
 
 def read_obj(path: Path, group: str = "") -> Surface:
-    """An OBJ file of MakeHuman in metres, Z up; of one group of its faces, or of all."""
+    """An OBJ file of MakeHuman in metres, Z up; all its faces, or those of one group."""
     places, coordinates, corners, uvs, here = [], [], [], [], ""
     for line in path.read_text().splitlines():
         kind, *words = line.split() or [""]
@@ -263,7 +263,7 @@ def test_a_ponytail_of_an_artist(shared_data: Path, body: Surface) -> None:
     for card in (tail, *locks):
         own = np.unique(mesh.triangles[mesh.card == card])
         assert np.corrcoef(mesh.positions[own, 2], mesh.along[own])[0, 1] < -0.9
-    # the tail is a closed lock, which looks outwards all around
+    # the tail is a closed lock, whose normals point outwards all around
     a, b, c = np.moveaxis(mesh.positions[mesh.triangles[mesh.card == tail]].astype(float), 1, 0)
     middle = a.mean(axis=0)
     assert np.einsum("ij,ij->", np.cross(b - a, c - a), a - middle) > 0.0

@@ -1,4 +1,4 @@
-"""Which strands the tiles of an atlas show, and how an atlas is divided."""
+"""The strands that an atlas's tiles show, and the division of an atlas."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def test_few_cards_have_a_tile_each() -> None:
 
 
 def many(seed: int = 0) -> AtlasPlan:
-    """60 cards of three kinds that are plain to see: narrow, wide, and long with few strands."""
+    """60 cards of three clearly different kinds: narrow, wide, and long with few strands."""
     random = np.random.default_rng(4)
     kind = random.integers(3, size=60)
     wobble = random.uniform(0.95, 1.05, size=60)
@@ -68,7 +68,8 @@ def test_cards_that_look_alike_share_a_tile() -> None:
 
 
 def test_cards_of_different_colours_share_no_tile() -> None:
-    """Shapes differ as well, but less to the eye; strands without a colour are of a kind too."""
+    """Colours count more than shapes, which differ too; strands without a colour are a kind of
+    their own."""
     random, kind = np.random.default_rng(5), np.arange(48) % 4
     width = 0.02 * random.uniform(0.7, 1.4, 48)
     parts = tufts(width, np.full(48, 0.2), np.full(48, 8), 1e-4)
@@ -88,7 +89,8 @@ def test_the_same_seed_gives_the_same_plan() -> None:
 
 
 def test_brows_have_tiles_enough_and_strands_as_wide_as_they_are() -> None:
-    """Six of 16, where their share would be one; others are wider, since cards are seen aslant."""
+    """Brows get six of 16 tiles, where their proportion is one. Strands of all other hair are drawn
+    wider, since cards are mostly seen at an angle."""
     parts = tufts(np.full(200, 0.02), np.full(200, 0.2), np.full(200, 6), 1e-4)
     is_brow = np.arange(200) < 12
     settings = AtlasSettings(size="512", columns=16, rows=1)
@@ -100,7 +102,7 @@ def test_brows_have_tiles_enough_and_strands_as_wide_as_they_are() -> None:
 
 
 def test_cards_of_both_sides_of_a_parting_share_no_tile() -> None:
-    """Alike but for on which side of the card roots lie ahead."""
+    """The cards differ only in the side on which roots lie farther ahead."""
     parts = tufts(np.full(40, 0.02), np.full(40, 0.2), np.full(40, 6), 1e-4)
     side, cluster = np.where(np.arange(40) % 2 == 0, 1.0, -1.0), parts[3]
     frames = parts[0].frames
@@ -126,7 +128,8 @@ def test_groups_and_single_strands_share_no_tile() -> None:
 
 
 def test_single_strands_share_no_tile_with_tufts_that_are_as_wide() -> None:
-    """Half of both kinds are ten times as wide as the other half, which is a larger difference."""
+    """Width varies by a factor of ten within both kinds, a larger difference than the number of
+    strands."""
     count = np.repeat([2, 1], 10)
     parts = tufts(np.resize([0.005, 0.05], 20), np.full(20, 0.2), count, 1e-4)
     settings = AtlasSettings(size="512", columns=2, rows=1)
@@ -142,13 +145,13 @@ def test_more_groups_than_tiles_share_them() -> None:
 
 
 def test_a_thin_card_is_narrowed_to_cover_as_much_as_its_own_strands() -> None:
-    """Two cards share a tile of 10 strands; the other one has but 8 of them."""
+    """Two cards with 10 and 8 strands share a tile, which shows the strands of one of them."""
     parts = tufts(np.full(2, 0.1), np.full(2, 0.2), np.array([10, 8]), 1e-4)
     for seed in range(8):
         settings = AtlasSettings(size="512", columns=1, rows=1, seed=seed)
         plan = plan_atlas(*parts, np.zeros(18, int), settings)
         expected = (1.0, 0.8) if len(plan.strands) == 10 else (1.25, 1.0)
-        # covering by chance: a strand hides 0.2 % of the width, so hardly one another
+        # strands are 0.2 % of the width, so that they hardly overlap
         np.testing.assert_allclose(plan.width_factor, expected, rtol=0.01)
 
 
@@ -162,7 +165,8 @@ def test_a_full_tile_keeps_its_thickness() -> None:
 
 
 def test_notes_say_what_is_smaller_than_a_pixel() -> None:
-    """0.1 m on 504 pixels; strands of 0.05 mm are a quarter of one, and would be one in 2048."""
+    """0.1 m on 504 pixels: strands of 0.05 mm are a quarter of a pixel, and one pixel in an atlas
+    of 2048."""
     parts = tufts(np.array([0.1]), np.array([0.2]), np.array([30]), 2.5e-5)
     settings = AtlasSettings(size="512", columns=1, rows=1)
     (note,) = plan_atlas(*parts, np.zeros(30, int), settings).notes
@@ -191,7 +195,7 @@ def test_an_atlas_that_is_too_small_says_by_how_much() -> None:
 def test_an_automatic_atlas_is_as_large_as_its_strands_need(
     count: int, radius: float, size: int
 ) -> None:
-    """Strands are one and a half texels wide at least; half the size would leave them thinner."""
+    """The smallest size in which strands are at least one and a half texels wide."""
     parts = tufts(np.full(count, 0.02), np.full(count, 0.1), np.full(count, 5), radius)
     settings = AtlasSettings(strand_width=1.0)
     plan = plan_atlas(*parts, np.zeros(len(parts[1]), int), settings)
@@ -208,7 +212,7 @@ def test_an_automatic_atlas_is_as_large_as_its_strands_need(
 
 
 def test_an_automatic_atlas_has_an_end() -> None:
-    """Where that is too small for its strands, it says so."""
+    """At the maximum size a note reports strands that are too thin."""
     parts = tufts(np.full(64, 0.02), np.full(64, 0.2), np.full(64, 5), 1e-6)
     plan = plan_atlas(*parts, np.zeros(len(parts[1]), int), AtlasSettings())
     assert plan.size == 2048

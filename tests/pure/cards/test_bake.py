@@ -1,4 +1,4 @@
-"""Strands laid flat and baked, against what is known of them."""
+"""Strands that are laid flat and baked, against their known geometry."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def lines(
 def baked(
     plan: AtlasPlan, grid: np.ndarray, width: float, size: int, base: np.ndarray | None = None
 ) -> tuple[FlatStrands, AtlasMaps]:
-    """Strands of this width as a share of the card's."""
+    """Bake strands; `width` is a strand's width as a fraction of the card's."""
     radius = np.full(grid.shape[:2], 0.5 * width * WIDTH, np.float32)
     flat = flat_strands(plan, grid, radius, base)
     return flat, sampled_maps(flat, size)
@@ -65,7 +65,8 @@ def baked(
 
 @pytest.mark.parametrize("width", [0.05, 0.03, 0.0051, 0.0007])
 def test_parallel_strands_cover_what_they_are_wide(width: float) -> None:
-    """Of 64 pixels 0.05 are three and 0.0007 a twentieth, which no sample may hit."""
+    """Alpha is the sum of all widths. In 64 pixels, 0.05 is three pixels and 0.0007 a twentieth of
+    one, which samples can miss."""
     across = np.linspace(-0.34, 0.33, 8)
     _, maps = baked(plan_of([8]), lines(across, rows=ROWS), width, 64)
     assert maps.alpha.mean() == pytest.approx(8 * width, rel=0.05)
@@ -79,7 +80,7 @@ def test_overlapping_strands_are_fully_opaque() -> None:
 
 
 def test_slanting_strands_cover_their_projected_area() -> None:
-    """Ribbons lie across their way: one by 30 degrees is longer, and as wide."""
+    """A slanting ribbon keeps its width across its direction and is longer than an upright one."""
     across = np.array([-0.33, -0.1, 0.1])
     slope = np.tan(np.radians(12.0))
     _, maps = baked(plan_of([3]), lines(across, end=across + slope), 0.03, 96)
@@ -88,7 +89,7 @@ def test_slanting_strands_cover_their_projected_area() -> None:
 
 
 def test_a_diagonal_strand_knows_its_way() -> None:
-    """Straight up and aside by 30 degrees, and out of the card by 20: known as a unit vector."""
+    """A strand 30 degrees aside and 20 out of the card has this direction as its unit tangent."""
     grid = lines(np.array([-0.3]), end=np.array([-0.3 + np.tan(np.radians(30.0))]))
     grid[0, :, 1] = -np.linspace(0.0, LENGTH * np.tan(np.radians(20.0)), ROWS)
     flat, maps = baked(plan_of([1]), grid, 0.05, 64)
@@ -104,7 +105,7 @@ def test_a_diagonal_strand_knows_its_way() -> None:
 
 
 def test_a_strand_is_round() -> None:
-    """Across a strand the normal's x goes evenly from -1 to 1, and z is what is left of 1."""
+    """Across a strand the normal's x goes linearly from -1 to 1, with z = sqrt(1 - x^2)."""
     _, maps = baked(plan_of([1]), lines(np.array([0.0])), 0.5, 64)
     x, y, z = np.moveaxis(2.0 * maps.normal[32, 17:47] - 1.0, -1, 0)
     place = (np.arange(17, 47) + 0.5 - 32.0) / 16.0
@@ -114,8 +115,8 @@ def test_a_strand_is_round() -> None:
 
 
 def test_a_curl_goes_evenly_from_root_to_tip() -> None:
-    """A helix about the strip: at height z of the card it is z of its own way, and it lies where
-    the helix does."""
+    """A helix along the strip: at height z of the card `along` is z, and place and depth are the
+    helix's."""
     rows = 64
     turn = np.linspace(0.0, 4.0 * np.pi, rows)
     grid = lines(np.array([0.0]), rows=rows)
@@ -141,7 +142,8 @@ def test_the_outermost_strand_shows() -> None:
 
 
 def test_what_lies_behind_gets_less_light() -> None:
-    """exp(-tau): nothing is before the front one; of a quarter of the card's width it hides 0.4."""
+    """exp(-tau) behind a strand of 0.1 of the card's width, which counts over a quarter of that
+    width: tau is 0.4. Nothing lies before the front strand."""
     grid = np.concatenate([lines(np.array([0.05]), depth=0.004), lines(np.array([0.0]))])
     flat, _ = baked(plan_of([2]), grid, 0.1, 32)
     np.testing.assert_allclose(flat.occlusion[0], 1.0)
@@ -160,7 +162,7 @@ def test_colours_are_kept_below_one_and_the_gain_gives_them_back() -> None:
 
 
 def test_strands_beyond_the_strip_are_squeezed_into_it() -> None:
-    """Nothing is cut off: neither aside, nor before the root, nor behind the tip."""
+    """Nothing is cut off: not at the sides, nor before the root, nor beyond the tip."""
     across = np.array([-0.9, -0.2, 0.0, 0.2, 0.9])
     grid = lines(across)
     grid[2, :, 2] = np.linspace(-0.3 * LENGTH, 1.4 * LENGTH, ROWS)
@@ -173,7 +175,8 @@ def test_strands_beyond_the_strip_are_squeezed_into_it() -> None:
 
 
 def test_strands_that_begin_a_little_late_begin_sooner_and_end_where_they_do() -> None:
-    """By seven tenths of what they are late, up to 6 % of the card: brows start anywhere."""
+    """Seven tenths of their delay are removed, at most 4.2 % of the card: roots of brows lie
+    anywhere."""
     grid, late = lines(np.zeros(3)), np.array([0.0, 0.05, 0.5])
     for strand, start in enumerate(late):
         grid[strand, :, 2] = np.linspace(start, 1.0, ROWS) * LENGTH
@@ -193,7 +196,7 @@ def test_strips_without_size_do_no_harm() -> None:
 
 
 def red_and_green(grid: AtlasGrid, size: int) -> AtlasMaps:
-    """A tile of red strands beside one of green ones, and so on in rows."""
+    """Tiles of red and of green strands, alternating as on a chessboard."""
     count = grid.tile_count
     plan = plan_of([3] * count, grid)
     strands = np.concatenate([lines(np.array([-0.5, 0.1, 0.5]))] * count)
@@ -205,7 +208,7 @@ def red_and_green(grid: AtlasGrid, size: int) -> AtlasMaps:
 
 @pytest.mark.parametrize(("columns", "rows"), [(4, 2), (5, 3)])
 def test_no_tile_reaches_into_another(columns: int, rows: int) -> None:
-    """Each texel, the padding's too, is of its tile's colour; no hair is in the padding."""
+    """Each texel has its tile's colour, also in the padding, which contains no hair."""
     size, share = 128, 4 / 128
     grid = AtlasGrid(columns, rows, (share * columns, share * rows))
     maps = red_and_green(grid, size)
@@ -223,7 +226,7 @@ def test_no_tile_reaches_into_another(columns: int, rows: int) -> None:
 
 
 def test_no_tile_reaches_into_another_in_mip_maps() -> None:
-    """Down to where a tile is 4 texels wide; the colours are those of the tile alone."""
+    """Down to the level at which a tile is 4 texels wide, each has its tile's colour alone."""
     grid = AtlasGrid(4, 4, (1 / 8, 1 / 8))
     base = red_and_green(grid, 128).base
     while len(base) > 16:
@@ -240,7 +243,7 @@ def test_tiles_without_hair_are_plain() -> None:
 
 
 def test_values_go_over_from_hair_to_hair() -> None:
-    """Between two strands depth is between theirs; a strand's number is one of theirs."""
+    """Between two strands, depth is interpolated, while the strand's number is one of the two."""
     grid = np.concatenate([lines(np.array([-0.3]), depth=0.008), lines(np.array([0.3]))])
     flat, maps = baked(plan_of([2]), grid, 0.1, 64)
     whole = dilated(maps, AtlasGrid())

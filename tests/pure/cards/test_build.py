@@ -1,4 +1,4 @@
-"""From a groom to all its levels: what holds in each, and what bad input gives."""
+"""From a groom to all levels of its cards: properties of each level, and bad input."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from hairloom.addon.strands.face import BROWS
 
 MADE, BAKED = AtlasSettings(source="made"), AtlasSettings(columns=8, rows=2)
 FEW_RAYS = CardOcclusionSettings(rays=16)
-#: as if the few strands here stood for many
+#: makes the few strands here as dense as a full groom
 DENSE = AmbientSettings(extinction=100.0)
 
 
@@ -108,7 +108,7 @@ def test_levels_share_one_atlas_and_all_that_is_known_of_cards(way: str, source:
     few_in_commits([pytest.param("clusters", "baked"), pytest.param("guides", "made")]),
 )
 def test_cards_are_the_same_at_any_scale(method: str, source: str, factor: float) -> None:
-    """Their number, shape, tiles, light and order."""
+    """Their number, shape, tiles, light and order do not depend on the unit of length."""
 
     def at(scale: float) -> CardBuild:
         strands = falling(300)
@@ -148,7 +148,8 @@ def test_guides_keep_their_groups() -> None:
 
 
 def test_guides_show_the_strands_that_lie_along_them() -> None:
-    """Where no others are, tufts that are made by chance."""
+    """Each tile shows the strands of its guides. Where there are only guides, tufts are made
+    instead."""
     groom, settings = _groom(falling(1500)), CardSettings(source="guides")
     grid, guides = groom.strands.grid, groom.guides
     assert len(guides) < len(grid)
@@ -301,7 +302,7 @@ def test_the_order_is_the_one_that_was_chosen_and_its_faults_are_told(by: str) -
 
 
 def test_cards_that_are_clear_stay_in_the_order_of_their_distance() -> None:
-    """The search has nothing to better there."""
+    """There the search for an order has nothing to improve."""
     clear = np.zeros((4, 4), np.float32)
     seen, unseen, by_distance = (
         built(falling(900), levels=1, order_by=by, alpha=alpha).finest.card.tolist()

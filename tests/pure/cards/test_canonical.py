@@ -1,4 +1,4 @@
-"""One numbering, whatever order the cards, vertices and triangles of a mesh come in."""
+"""A canonical numbering, whatever the order of a mesh's cards, vertices and triangles."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ STRIP = np.array([[0, 1, 3], [0, 3, 2], [2, 3, 5], [2, 5, 4]], np.int32)
 
 
 def strips(places: np.ndarray) -> CardMesh:
-    """A card at each place (n, 3) [m], 2 cm wide; no two have the same numbers of anything."""
+    """A card at each place (n, 3) [m], 2 cm wide; all their values differ."""
     count, random = len(places), np.random.default_rng(3)
     across, along = np.tile([0.0, 1.0], 3), np.repeat([0.0, 0.5, 1.0], 2)
     shape = np.column_stack([0.02 * across, np.zeros(6), along])
@@ -42,7 +42,7 @@ def scattered(count: int = 30) -> CardMesh:
 
 
 def shuffled(mesh: CardMesh, seed: int) -> CardMesh:
-    """The same cards under other numbers, which leave gaps; triangles begin at other corners."""
+    """The same cards renumbered, with gaps; triangles begin at other corners."""
     random = np.random.default_rng(seed)
     vertices = random.permutation(len(mesh.positions))
     triangles = np.argsort(vertices)[mesh.triangles]
@@ -107,7 +107,7 @@ def test_cards_have_no_gaps_and_their_triangles_go_from_root_to_tip() -> None:
 
 
 def test_the_way_from_the_root_counts_before_the_place() -> None:
-    """Of two cards that lie alike, the root of one is where the other has its tip."""
+    """Two cards in one place: the root of one is at the tip of the other."""
     mesh = strips(np.zeros((2, 3)))
     along = mesh.along.copy()
     along[6:] = 1.0 - along[6:]
@@ -127,7 +127,7 @@ def test_cards_in_one_place_are_told_apart_by_their_uv(seed: int) -> None:
 
 
 def test_cards_that_are_alike_in_all_keep_their_order() -> None:
-    """Whatever the order of their triangles: that of their vertices counts."""
+    """The order of their vertices counts, whatever the order of their triangles."""
     mesh = strips(np.zeros((4, 3)))
     order = np.random.default_rng(8).permutation(len(mesh.triangles))
     mixed = replace(mesh, triangles=mesh.triangles[order], card=mesh.card[order])
@@ -166,8 +166,8 @@ def test_triangles_of_one_card_go_by_the_places_of_their_corners() -> None:
 
 
 def test_vertices_in_one_place_count_alike() -> None:
-    """A card with two vertices in one place, as engines split them, counts as one without; also
-    where the triangle that comes later has the first of them."""
+    """Vertices that engines have split do not change a card's order, also where the later triangle
+    has the first of two coincident vertices."""
     whole = strips(np.zeros((1, 3)))
     split = replace(
         whole,

@@ -1,4 +1,4 @@
-"""Cards of strands that have as many points as each needs."""
+"""Cards of strands that have different numbers of points."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ SETTINGS = SettingsMap(
 
 
 def waving(count: int = 200, cv_count: int = 64) -> StrandSet:
-    """A curtain, straight on the left and waved on the right."""
+    """A curtain of strands, straight on the left and more and more wavy to the right."""
     random = np.random.default_rng(2)
     along = np.linspace(0.0, 1.0, cv_count)
     side = np.sort(random.random(count))[:, None]

@@ -1,4 +1,4 @@
-"""Clusters of strands against bundles that are known, and against moving single strands."""
+"""Clusters of strands against known bundles, and against moves of single strands."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hairloom.addon.strands.face import BROWS, LASHES
 
 
 def bundles(count: int, strands: int, spread: float = 0.002) -> tuple[np.ndarray, np.ndarray]:
-    """Straight strands in bundles that lie 5 cm from each other: (n, 8, 3), and whose they are."""
+    """Straight strands (n, 8, 3) in bundles 5 cm apart, and the bundle of each."""
     random = np.random.default_rng(5)
     owner = random.permutation(np.repeat(np.arange(count), strands))
     roots = np.stack([owner % 4, owner // 4, np.zeros(len(owner))], axis=1) * 0.05
@@ -24,7 +24,7 @@ def bundles(count: int, strands: int, spread: float = 0.002) -> tuple[np.ndarray
 
 
 def spread_within(grid: np.ndarray, label: np.ndarray) -> float:
-    """What k-means makes small, over all CVs."""
+    """The objective of k-means: squared distances from the cluster's mean, over all CVs."""
     means = np.stack([grid[label == each].mean(axis=0) for each in range(label.max() + 1)])
     return float(((grid - means[label]) ** 2).sum())
 
@@ -80,8 +80,8 @@ def test_no_cluster_holds_two_groups_and_each_group_has_its_share() -> None:
 
 
 def test_no_single_strand_could_move_to_a_much_better_cluster() -> None:
-    """A solution of k-means: hardly any strand is nearer to another mean; ours is not far off the
-    best of many starts."""
+    """A local optimum of k-means: hardly any strand is nearer to another mean, and no start gives
+    a much better one."""
     grid = np.random.default_rng(3).normal(size=(400, 6, 3)).astype(np.float32)
     group = np.zeros(400, np.int32)
     found = [spread_within(grid, cluster_strands(grid, group, 20, seed)) for seed in range(8)]
@@ -124,7 +124,7 @@ def test_cards_are_shared_out_by_size() -> None:
 
 
 def test_cards_of_brows_and_lashes_hold_few_strands() -> None:
-    """Of few cards in all they would get one or two, which are blocks."""
+    """In proportion to all cards they would get one or two, which look like blocks."""
     grid, _ = bundles(12, 60)
     group = np.repeat([0, BROWS, LASHES], [600, 80, 40]).astype(np.int32)
     label = cluster_strands(grid, group, 20)
@@ -135,7 +135,7 @@ def test_cards_of_brows_and_lashes_hold_few_strands() -> None:
 
 
 def parted(count: int = 4000, lift: float = 0.2) -> tuple[np.ndarray, np.ndarray]:
-    """Hair on a square of 10 cm, combed away from its middle line: (n, 8, 3), and normals."""
+    """Strands (n, 8, 3) on a square of 10 cm, combed away from its middle line, and normals."""
     roots = np.random.default_rng(6).uniform(-0.05, 0.05, (count, 3)) * [1.0, 1.0, 0.0]
     way = np.stack([np.sign(roots[:, 0]), 0.0 * roots[:, 0], np.full(count, lift)], axis=1)
     grid = roots[:, None] + np.linspace(0.0, 0.1, 8)[:, None] * way[:, None]

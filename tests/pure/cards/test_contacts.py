@@ -43,7 +43,7 @@ def fallen(guides: np.ndarray, by: float) -> np.ndarray:
 
 
 def bound(mesh: CardMesh, guides: np.ndarray) -> tuple[CardBinding, np.ndarray, CardContacts]:
-    """The cards, each on its own guide, how roots have turned, and what cards are led out of."""
+    """The cards bound to their guides, the turns of roots (none), and their contacts with BALL."""
     count = len(guides)
     own, turns = np.arange(count)[:, None], np.tile(np.eye(3), (count, 1, 1))
     cards = bind_cards(mesh, guides, own, np.ones((count, 1), np.float32))
@@ -53,7 +53,7 @@ def bound(mesh: CardMesh, guides: np.ndarray) -> tuple[CardBinding, np.ndarray, 
 
 
 def depths(points: np.ndarray) -> np.ndarray:
-    """In the ball, by its formula."""
+    """Depth in the ball, by formula [m]."""
     return RADIUS - np.linalg.norm(points.astype(np.float64), axis=1)
 
 
@@ -85,7 +85,8 @@ def test_lengths_and_widths_are_kept(by: float) -> None:
 
 
 def test_rows_bend_by_a_right_angle_at_most() -> None:
-    """As one does that came down on its edge: half of it lies on the ball, half stands up."""
+    """The extreme is a row that falls on the ball edge first: half of it lies down, half stands
+    up."""
     mesh, guides = cards_on_a_ball()
     cards, turns, contacts = bound(mesh, guides)
     led = follow_guides(cards, fallen(guides, 1.9), turns, contacts)
@@ -109,7 +110,7 @@ def test_normals_and_tangents_turn_with_what_is_led() -> None:
     order = np.lexsort((mesh.uv[:, 0], cards.row))
     rows = led.positions[order].reshape(-1, CardSettings().column_count + 1, 3)
     at_rest = mesh.positions[order].reshape(rows.shape)
-    # the angle between a normal and the way across the card is that at rest
+    # the angle between a normal and the direction across the card stays as at rest
     for half, one, other in ((0, 0, 1), (2, 1, 2)):
         found = []
         for points, normal in ((rows, led.normal), (at_rest, mesh.normal)):
@@ -140,7 +141,7 @@ def test_what_is_far_from_colliders_is_where_it_rides() -> None:
 
 
 def test_a_vertex_is_led_as_often_as_it_is_asked_to() -> None:
-    """No frame depends on the one before: frames of a bake come in any order."""
+    """Frames give the same in any order, as a bake needs: none depends on the one before."""
     mesh, guides = cards_on_a_ball()
     cards, turns, contacts = bound(mesh, guides)
     frames = [fallen(guides, by) for by in (0.4, 1.9, -2.0)]
@@ -153,7 +154,7 @@ def test_a_vertex_is_led_as_often_as_it_is_asked_to() -> None:
 
 
 def test_a_card_of_one_row_goes_with_its_root() -> None:
-    """As a mesh that knows of no way along itself: nothing is led, and nothing breaks."""
+    """A mesh whose `along` is all 0 has one row per card: nothing is led out, and all is finite."""
     mesh, guides = cards_on_a_ball(3)
     flat = CardMesh(**{**vars(mesh), "along": np.zeros_like(mesh.along)})
     cards, turns, contacts = bound(flat, guides)

@@ -1,4 +1,4 @@
-"""Strips against bundles of strands whose best strip one knows."""
+"""Strips fitted to bundles of strands whose best strip is known."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def test_edges_stay_within_the_error_and_one_segment_less_would_not_do() -> None
     strips = fitted(grid.astype(np.float32), (0.0, 0.0, 1.0))
     counts = [segments_within(strips, error, 32)[0] for error in (0.01, 0.002, 0.0005)]
     assert counts == sorted(counts) and len(set(counts)) == 3
-    # a chord of an arc of the angle a is off by r (1 - cos a/2)
+    # the sagitta of a chord over the angle a is r (1 - cos a/2)
     for error, count in zip((0.01, 0.002, 0.0005), counts, strict=True):
         sagitta = 0.1 * (1.0 - np.cos(np.pi / count / 2.0))
         assert sagitta < 1.1 * error
@@ -98,7 +98,8 @@ def test_strands_that_stick_out_leave_their_cluster() -> None:
 
 
 def test_a_card_reaches_to_where_most_of_its_strands_end() -> None:
-    """Strands of a length that varies by 3 cm: with 1.3 deviations nine of ten end on it."""
+    """Strands whose lengths have a standard deviation of 3 cm: the card is 1.3 deviations longer
+    than their mean, so that nine of ten end on it."""
     random = np.random.default_rng(2)
     grid = flat_bundle((1.0, 0.0, 0.0), 400)
     grid *= 1.0 + random.normal(scale=0.1, size=(400, 1, 1)).astype(np.float32) * [0.0, 0.0, 1.0]
@@ -109,7 +110,8 @@ def test_a_card_reaches_to_where_most_of_its_strands_end() -> None:
 
 
 def test_a_card_reaches_back_to_its_rearmost_roots_along_the_head() -> None:
-    """Roots spread along it, and hair that rises at 45 or at 63 degrees; upright hair stays."""
+    """Roots spread along the head, with hair that rises at 45 or 63 degrees. The card of upright
+    hair is not lengthened."""
     spread = 0.02 / 3.0**0.5
     for lean, begins in ((1.0, -1.7 * spread), (0.5, -0.85 * spread), (0.0, 0.0)):
         grid = flat_bundle((0.2, 0.0, 0.0), 400)
@@ -121,7 +123,7 @@ def test_a_card_reaches_back_to_its_rearmost_roots_along_the_head() -> None:
 
 
 def test_nineteen_of_twenty_places_of_a_groom_lie_on_their_card() -> None:
-    """Wavy strands that hang from a head: across, each lies within the width of its card."""
+    """The points of wavy strands that hang from a head lie within the width of their card."""
     random = np.random.default_rng(4)
     normal = random.normal(size=(3000, 3))
     normal[:, 2] = np.abs(normal[:, 2])
@@ -137,7 +139,7 @@ def test_nineteen_of_twenty_places_of_a_groom_lie_on_their_card() -> None:
     away = grid - strips.frames.center[cluster]
     aside = np.abs(np.einsum("sri,sri->sr", away, strips.frames.side[cluster]))
     assert (aside <= strips.width[cluster] / 2.0).mean() > 0.93
-    # and their card lies along them: off it they are less than half as far as across it
+    # half of all points are nearer to the card's plane than half a card's width
     ahead = np.abs(np.einsum("sri,sri->sr", away, strips.frames.normal[cluster]))
     assert np.median(ahead) < 0.5 * np.median(strips.width)
     facing = np.einsum("cri,ci->cr", strips.frames.normal, _mean_normals(normal, cluster))

@@ -1,4 +1,4 @@
-"""Cards that ride on guides: whole strips, wherever the guides go."""
+"""Cards that ride on guides stay connected strips, wherever the guides go."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ LENGTH, CVS = 0.3, 25
 
 
 def straight(count: int = 1) -> np.ndarray:
-    """Guides along x from (0, i / 100, 0)."""
+    """Guides along x; guide i begins at (0, i / 100, 0)."""
     guides = np.zeros((count, CVS, 3), np.float32)
     guides[..., 0] = np.linspace(0.0, LENGTH, CVS)
     guides[..., 1] = 0.01 * np.arange(count)[:, None]
@@ -83,7 +83,7 @@ def turn_about(axis: str, angle: float) -> np.ndarray:
 def test_guides_at_rest_move_nothing() -> None:
     mesh, guides, binding = hair()
     assert follow_guides(binding, guides, np.tile(np.eye(3), (30, 1, 1))) is mesh
-    # as where they have moved by nothing that counts
+    # a shift too small to matter goes through the formulas
     now = follow_guides(binding, guides + np.float32(1e-8), np.tile(np.eye(3), (30, 1, 1)))
     np.testing.assert_allclose(now.positions, mesh.positions, atol=2e-7)
     np.testing.assert_allclose(now.normal, mesh.normal, atol=1e-5)
@@ -112,7 +112,7 @@ def test_a_mirrored_and_scaled_body_takes_its_cards_along() -> None:
 
 @pytest.mark.parametrize("bend", [0.5 * np.pi, np.pi, 1.5 * np.pi])
 def test_a_bent_guide_bends_its_card_and_shears_nothing(bend: float) -> None:
-    """Guides laid on a circle about y: the card becomes a piece of a cylinder, known exactly."""
+    """Against the cylinder that a card becomes when its guide is laid on a circle about y."""
     mesh, binding = flat_card(), bound(flat_card(), straight())
     radius = LENGTH / bend
     angle = np.linspace(0.0, bend, CVS)
@@ -122,7 +122,7 @@ def test_a_bent_guide_bends_its_card_and_shears_nothing(bend: float) -> None:
     across = pairs[:, 1] - pairs[:, 0]
     np.testing.assert_allclose(across, np.tile([0.0, 0.02, 0.0], (len(across), 1)), atol=1e-6)
     at = mesh.along * bend
-    # ends of the arc are chords there: half a step off in direction
+    # at the ends, directions are those of chords, half a step off
     inside = (mesh.along > 0.0) & (mesh.along < 1.0)
     expected = np.stack([-np.sin(at), np.zeros_like(at), np.cos(at)], axis=1)
     np.testing.assert_allclose(now.normal[inside], expected[inside], atol=1e-3)
@@ -131,7 +131,7 @@ def test_a_bent_guide_bends_its_card_and_shears_nothing(bend: float) -> None:
 
 
 def test_a_turned_root_twists_the_whole_card_alike() -> None:
-    """The guide stays where it is while its root turns about it."""
+    """The guide stays in place while its root turns about it."""
     mesh, binding = flat_card(), bound(flat_card(), straight())
     turn = turn_about("x", 1.1)
     now = follow_guides(binding, straight(), turn[None])
@@ -139,7 +139,7 @@ def test_a_turned_root_twists_the_whole_card_alike() -> None:
 
 
 def test_a_helix_does_not_wring_its_card() -> None:
-    """From row to row a card turns by no more than its bone does: nothing winds about it."""
+    """From row to row a card turns no more than its bone: nothing twists about it."""
     binding = bound(flat_card(), straight())
     t = np.linspace(0.0, 1.0, CVS)
     helix = np.stack([0.2 * t, 0.03 * np.cos(12 * t) - 0.03, 0.03 * np.sin(12 * t)], axis=1)
@@ -182,7 +182,7 @@ def test_guides_count_by_their_weights() -> None:
 
 
 def test_cards_of_a_rig_ride_as_its_strands_do() -> None:
-    """Groups apart: the cards of one stay while the guides of the other move."""
+    """Groups are independent: the cards of one stay while the guides of the other move."""
     random = np.random.default_rng(0)
     roots = np.concatenate([random.normal(0.0, 0.02, (60, 3)) + [x, 0.0, 0.0] for x in (0.0, 0.1)])
     grid = roots[:, None] + np.linspace(0.0, 0.2, 12)[None, :, None] * np.array([0.0, 0.0, -1.0])
@@ -241,7 +241,7 @@ def test_a_card_of_curls_gets_longer_with_its_guide_and_stays_as_wide() -> None:
 
 
 def test_vertices_without_triangles_change_no_card() -> None:
-    """They are of no card, whatever is said of their places along it and across it."""
+    """They belong to no card, whatever their values of `along` and UV."""
     mesh = flat_card()
     more = {
         name: np.concatenate([getattr(mesh, name), getattr(mesh, name)[20:25] + np.float32(0.2)])

@@ -35,7 +35,7 @@ FRAMES = 30
 
 
 def turn_about(axis: int, angle: np.ndarray) -> np.ndarray:
-    """(..., 3, 3) by angles (...)."""
+    """Rotations (..., 3, 3) about an axis by angles (...)."""
     one, two = (axis + 1) % 3, (axis + 2) % 3
     turn = np.zeros((*np.shape(angle), 3, 3))
     turn[..., axis, axis] = 1.0
@@ -56,14 +56,14 @@ def test_a_rigid_motion_is_found() -> None:
     targets = np.einsum("fab,nb->nfa", turn, points) + way
     still = np.tile(np.eye(3), (5, 1, 1))
     found = rigid_fits(points, targets, random.uniform(0.1, 1.0, 9), still)
-    np.testing.assert_allclose(found[0], turn, atol=2e-3)  # it keeps a little to what was before
+    np.testing.assert_allclose(found[0], turn, atol=2e-3)  # a weak pull towards the earlier turn
     again = rigid_fits(points, targets, np.ones(9), found[0])
     np.testing.assert_allclose(again[0], turn, atol=1e-6)
     np.testing.assert_allclose(again[1], way, atol=1e-6)
 
 
 def test_points_in_a_line_do_not_spin() -> None:
-    """What they say nothing of stays as it was, and no turn is a mirror."""
+    """The turn about the line, which the points leave open, stays as before; no turn mirrors."""
     points = np.linspace(0.0, 1.0, 5)[:, None] * [1.0, 0.0, 0.0]
     before = turn_about(0, np.array([0.4]))
     turn, _ = rigid_fits(points, points[:, None], np.ones(5), before)
@@ -89,7 +89,7 @@ def test_skinning_is_the_sum_of_its_joints() -> None:
 
 
 def test_weights_are_the_best_on_a_fine_grid() -> None:
-    """No mixture of a grid over all that there are comes nearer."""
+    """Brute force: no mixture of weights on a fine grid has a smaller error."""
     turn, way = joints_at_random(4, 6, 4)
     random = np.random.default_rng(5)
     points, targets = random.normal(size=(20, 3)), random.normal(size=(20, 6, 3))
@@ -111,7 +111,7 @@ def test_weights_are_the_best_on_a_fine_grid() -> None:
 
 
 def test_cards_that_move_alike_share_a_chain() -> None:
-    """Three kinds of motion, not where cards lie, make three chains."""
+    """Three kinds of motion give three chains, wherever the cards lie."""
     random = np.random.default_rng(6)
     kind = random.integers(0, 3, 60)
     places = random.uniform(-0.1, 0.1, (60, 4, 3))
@@ -141,7 +141,7 @@ def tracks_of(mesh: CardMesh, moved: np.ndarray) -> CardTracks:
 
 
 def bent(mesh: CardMesh, curl: float) -> np.ndarray:
-    """Each card bent to an arc by an angle that swings, (vertex_count, FRAMES, 3)."""
+    """Each card bent to an arc whose angle oscillates, (vertex_count, FRAMES, 3)."""
     length = -mesh.positions[:, 2, None].astype(np.float64)
     angle = curl * np.sin(np.linspace(0.0, 2.0 * np.pi, FRAMES)) / 0.1 * length
     radius = length / np.where(np.abs(angle) > 1e-6, angle, 1.0)
@@ -256,7 +256,7 @@ def test_an_even_motion_needs_two_keys_and_a_still_one_needs_one() -> None:
 
 @pytest.mark.parametrize("near", [3e-3, 1e-3, 0.0])
 def test_left_out_keys_stay_near(near: float) -> None:
-    """Along a whole chain, whose joints hang on each other."""
+    """Between the remaining keys the error stays below `near`, along a whole chain of joints."""
     time = np.linspace(0.0, 6.0, 60)
     turn = np.stack([turn_about(0, np.sin(time + 0.3 * joint)) for joint in range(4)])
     place = 0.02 * np.cumsum(turn[..., 1], axis=0)
@@ -268,7 +268,7 @@ def test_left_out_keys_stay_near(near: float) -> None:
     assert miss.max() <= near + 1e-12
     assert (len(keys.frame) == 60) == (near == 0.0)
     steps = (keys.rotation[:, 1:] * keys.rotation[:, :-1]).sum(axis=-1)
-    assert steps.min() > 0.0  # engines that mix without a look at signs do not spin
+    assert steps.min() > 0.0  # engines that ignore the signs of quaternions do not spin
 
 
 def test_all_chains_have_keys() -> None:

@@ -1,4 +1,4 @@
-"""Layers against shells of cards whose depth one knows."""
+"""Layers of cards that lie on concentric spheres of known radius."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_shells_are_layers_from_the_inside_to_the_outside() -> None:
 
 
 def test_hair_that_hangs_far_from_the_head_has_layers_too() -> None:
-    """A curtain of three sheets: the distance from the head says nothing of their depth."""
+    """A curtain of three sheets, whose distance from the head does not tell their depth."""
     random = np.random.default_rng(1)
     depth = np.repeat([0.0, 0.01, 0.02], 100)
     center = np.zeros((300, 9, 3), np.float32)
@@ -78,7 +78,8 @@ def test_one_card_and_one_layer() -> None:
 
 
 def test_a_part_of_many_cards_says_the_same_as_all() -> None:
-    """More places than are looked at: the layers are those of the shells all the same."""
+    """Of this many cards only a sample is evaluated; the layers are those of the shells all the
+    same."""
     parts = [shell(0.10 + 0.01 * k, 700, k) for k in range(2)]
     center, outwards = (np.concatenate(part) for part in zip(*parts, strict=True))
     layer = card_layers(strips_of(center, outwards), 2)

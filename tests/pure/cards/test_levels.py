@@ -1,4 +1,5 @@
-"""Levels of detail against what they promise: half the triangles, the same place, one atlas."""
+"""Levels of detail: each has half the triangles of the one before, covers the same area, and uses
+the same atlas."""
 
 from __future__ import annotations
 
@@ -46,7 +47,7 @@ def area(mesh: CardMesh) -> float:
 
 
 def seen(mesh: CardMesh, toward: int, pixels: int = 64) -> np.ndarray:
-    """Which pixels of a picture along an axis the mesh covers, by points all over it."""
+    """The pixels that the mesh covers in a view along an axis, by random points on it."""
     random = np.random.default_rng(0)
     corners = mesh.positions[mesh.triangles]
     share = random.dirichlet([1.0, 1.0, 1.0], size=(len(corners), 100))
@@ -86,7 +87,8 @@ def test_rows_go_first_then_columns_then_cards() -> None:
 
 
 def test_the_error_that_is_stated_holds_for_the_edges() -> None:
-    """Nine tenths of the finest edges are so near to the level's surface, measured in space."""
+    """Nine tenths of the finest edges lie within the stated error of the level's surface, by their
+    distance in space."""
     cards = fall(120)
     settings = CardSettings(levels=4, bend=0.0, error=0.0)
     levels = card_levels(cards, settings, 0.0)

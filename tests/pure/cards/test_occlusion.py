@@ -1,4 +1,4 @@
-"""Ambient occlusion against brute force, against what one knows, and within its time."""
+"""Ambient occlusion against brute force, known values and formulas, and within its time."""
 
 from __future__ import annotations
 
@@ -56,15 +56,15 @@ def stacked(heights: list[float], size: float = 1.0) -> CardMesh:
 
 
 def plain(**changed: float) -> CardOcclusionSettings:
-    """Cards let through what their alpha says."""
+    """Settings with which cards let through exactly 1 - alpha."""
     return CardOcclusionSettings(**{"reach": 100.0, "extinction": 1.0, **changed})  # type: ignore[arg-type]
 
 
 def brute_force(
     mesh: CardMesh, alpha: np.ndarray, head: Surface, chosen: np.ndarray, rays: int, own: float
 ) -> np.ndarray:
-    """Random rays (by the cosine about the normal), one vertex after the other, against every
-    triangle (Moeller and Trumbore 1997)."""
+    """Occlusion by cosine-distributed random rays against every triangle, vertex by vertex (Moeller
+    and Trumbore 1997)."""
     random = np.random.default_rng(0)
     corners = np.concatenate([mesh.positions[mesh.triangles], head.corners]).astype(np.float64)
     a, one, two = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
@@ -144,11 +144,11 @@ def test_deep_inside_it_is_dark_and_outside_light() -> None:
 
 @pytest.mark.slow
 def test_below_a_wide_square_only_the_light_past_its_edge_arrives() -> None:
-    """Form factor of a square from below its middle: Lambert's formula for four equal edges."""
+    """Against the form factor of a square above its middle: Lambert's formula, four equal edges."""
     mesh = stacked([0.0, 1.0])
     middle = stacked([0.0], size=1e-3)
     found = vertex_occlusion(middle, [CardOccluder(mesh)], [], plain(rays=4096))
-    # the first square lies in the plane of the vertices themselves
+    # the first square lies in the plane of the vertices and blocks nothing
     slant = 1.0 / np.sqrt(2.0)
     blocked = 4.0 / (np.pi) * slant * np.arctan(slant)
     np.testing.assert_allclose(found, 1.0 - blocked, atol=0.005)

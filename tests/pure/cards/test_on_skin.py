@@ -1,4 +1,4 @@
-"""Cards on a ball: where they begin."""
+"""Where cards on a ball begin."""
 
 from __future__ import annotations
 
@@ -60,13 +60,13 @@ def test_what_lies_on_the_skin_or_far_within_stays() -> None:
 
 
 def test_a_card_of_few_rows_does_not_run_through_the_skin() -> None:
-    """One row at each end of a chord over the ball: what lies between is raised as well."""
+    """A card with one row at each end of a chord through the ball is raised in between as well."""
     head = Surface(*ball_mesh(96))
     mesh = card(1.0, 0.8, row_count=2, column_count=1)
     found = above_skin(mesh, head, WIDTH)
     assert lowest_inside(mesh) < -0.04
     assert lowest_inside(found) > -0.01
-    # no farther than it was too low
+    # raised no farther than it lay too low
     assert np.linalg.norm(found.positions - mesh.positions, axis=1).max() < 0.07
 
 
@@ -79,7 +79,7 @@ def test_what_lies_above_the_skin_or_far_within_is_not_raised() -> None:
 
 
 def lowest_inside(mesh) -> float:
-    """How high the triangles' edges and middles are, at least."""
+    """The lowest height of the triangles above the ball, sampled on edges and inside."""
     weights = np.array([[x, y, 4 - x - y] for x in range(5) for y in range(5 - x)]) / 4.0
     places = np.einsum("pk,tki->tpi", weights, mesh.positions[mesh.triangles])
     return float(np.linalg.norm(places, axis=-1).min()) - 1.0

@@ -1,4 +1,4 @@
-"""What the texture says of the order, where the answer is plain."""
+"""The effect of the texture's alpha on the order, in cases with an obvious answer."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def test_alpha_is_that_of_the_texel_under_the_pixel() -> None:
     mesh = sheets((0.0,))
     random = np.random.default_rng(0).random((16, 16))
     met = fragments(VIEW, mesh.positions, mesh.triangles)
-    # the sheet has half the picture, from (7.84, 7.936) on
+    # the sheet covers half the picture, from column 7.84 and row 7.936
     row, column = (
         at - offset for at, offset in zip(divmod(met.pixel, 32), (7.936, 7.84), strict=True)
     )

@@ -1,4 +1,4 @@
-"""Wrong pixels of pictures whose right answer is known."""
+"""Wrong pixels in pictures whose right answer is known."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from hairloom.addon.strands import Surface
 def share(
     mesh: CardMesh, cards: tuple[int, ...], alpha: float = 0.5, head: Surface | None = None
 ) -> float | None:
-    """Share of wrong pixels where whole cards are drawn in this order; None where none is seen."""
+    """The fraction of wrong pixels if cards are drawn in this order; None if none is seen."""
     order = np.concatenate([np.flatnonzero(mesh.card == card) for card in cards])
     picture = np.full((4, 4), alpha)
     is_wrong = wrong_pixels(mesh, seen_cards(mesh, head, VIEW, picture), order, order)
@@ -56,8 +56,9 @@ def test_what_cannot_be_seen_cannot_be_wrong() -> None:
 
 
 def test_depth_that_front_faces_write_loses_what_comes_too_late() -> None:
-    """Two halves of one card have one colour, so that blending them in any order is right; but the
-    farther one is lost after the nearer one, unless both are back faces or it is opaque.
+    """Two halves of one card have one colour, so any order of blending is right; but the depth test
+    rejects the farther half after the nearer one, unless both are back faces or the farther one is
+    opaque.
     """
     near_first = np.array([2, 3, 0, 1])
     picture = np.array([[1.0, 0.5]])  # along u
@@ -75,7 +76,7 @@ def test_depth_that_front_faces_write_loses_what_comes_too_late() -> None:
 
 
 def test_alpha_is_read_where_the_texture_says() -> None:
-    """Left half clear, right half opaque, and half covered above; seen from the front."""
+    """A texture whose left half is clear, its right half opaque below and 0.5 above."""
     picture = np.array([[0.0, 1.0], [0.0, 0.5]])
     mesh = sheets((0.1,))
     for distance in (np.inf, 3.0):

@@ -1,4 +1,4 @@
-"""The search for an order against all orders there are."""
+"""The search for an order against all possible orders."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def as_preferences(table: np.ndarray) -> Preferences:
 
 
 def broken(table: np.ndarray, order: tuple[int, ...] | np.ndarray) -> int:
-    """What an order breaks of what is left when contradictions are set off, by a double loop."""
+    """The net preferences that an order breaks, by a double loop; contradictory ones cancel out."""
     left = np.maximum(table - table.T, 0)
     return sum(int(left[b, a]) for i, a in enumerate(order) for b in order[i + 1 :])
 
@@ -64,7 +64,8 @@ def test_preferences_of_parts_are_those_of_the_whole() -> None:
 
 @pytest.mark.parametrize("count", [2, 5, 7])
 def test_what_is_found_is_nearly_the_best_of_all_orders(count: int) -> None:
-    """A search by single moves may stop a little above the best, and then no single move helps."""
+    """Against all orders. A search by single moves may stop a little above the optimum, where no
+    single move helps."""
     random = np.random.default_rng(count)
     trials, best_of_all, found_of_all = (40 if count < 7 else 8), 0, 0
     for _ in range(trials):

@@ -1,4 +1,4 @@
-"""Fragments against rays, and pairs against plain loops."""
+"""Fragments against rays through each pixel, and pairs against plain loops."""
 
 from __future__ import annotations
 
@@ -51,8 +51,8 @@ def as_cards(points: np.ndarray, triangles: np.ndarray) -> CardMesh:
 def hits(
     view: BallView, corners: np.ndarray
 ) -> dict[tuple[int, int], tuple[float, bool, np.ndarray]]:
-    """(pixel, triangle) -> how far towards the eye, whether from the front, barycentric: a ray
-    through each pixel's middle, met with each triangle's plane.
+    """(pixel, triangle) -> depth towards the eye, whether it is a front face, and barycentric
+    coordinates, from a ray through each pixel's centre and each triangle's plane.
     """
     right = np.cross([0.0, 1.0e-3, 1.0], view.direction)
     right /= np.linalg.norm(right)
@@ -64,7 +64,7 @@ def hits(
         x, y = ((np.array([column, row]) + 0.5) / view.size * 2.0 - 1.0) * view.radius
         if np.isinf(view.distance):
             start, way = view.middle + x * right + y * up, -view.direction
-        else:  # the sphere's outline touches the picture's edge
+        else:  # the sphere touches the picture's border
             x, y = (each / np.sqrt(1.0 - (view.radius / view.distance) ** 2) for each in (x, y))
             start, way = eye, view.middle + x * right + y * up - eye
         for number, (a, b, c) in enumerate(corners):
@@ -93,7 +93,7 @@ def test_fragments_are_where_rays_meet_triangles(distance: float) -> None:
         shares[0] = 1.0 - shares.sum()
         key = int(met.pixel[index]), int(met.triangle[index])
         found[key] = met.near[index], met.is_front[index], shares
-    assert len(set(truth) ^ set(found)) <= 2  # at an edge, by rounding
+    assert len(set(truth) ^ set(found)) <= 2  # rounding at edges
     for key in set(truth) & set(found):
         assert found[key][1] == truth[key][1]
         np.testing.assert_allclose(found[key][2], truth[key][2], atol=2e-4)
@@ -156,7 +156,7 @@ def test_pairs_are_those_of_a_double_loop() -> None:
 
 
 def test_a_view_from_behind_is_the_view_from_the_front_turned_over() -> None:
-    """Both are made from the same fragments; here each is drawn by itself."""
+    """Against two separate renderings. Normally both views are made from the same fragments."""
     points, triangles = loose_triangles(20, seed=2)
     points *= 0.5
     ball = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [-1, 0, 0], [0, -1, 0], [0, 0, -1]]) * 0.2

@@ -1,4 +1,4 @@
-"""Shells of fur on a ball and on a square of skin, whose density, length and lean one knows."""
+"""Shells of fur on a ball and on a square of skin, whose density, length and lean are known."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def strands_of(root: np.ndarray, direction: np.ndarray, length: np.ndarray) -> S
 def fur_on_square(
     count: int = 4000, lean: float = 0.6, spread: float = 0.0, seed: int = 3
 ) -> StrandSet:
-    """Combed along x, `lean` of its length."""
+    """Fur combed along x, by `lean` of its length."""
     random = np.random.default_rng(seed)
     root = np.concatenate([random.uniform(0.0, SIDE, (count, 2)), np.zeros((count, 1))], axis=1)
     direction = np.tile([lean, 0.0, np.sqrt(1.0 - lean**2)], (count, 1))
@@ -115,7 +115,7 @@ def areas(mesh: CardMesh) -> np.ndarray:
 
 
 def test_layers_follow_the_combed_hair_from_the_inside_to_the_outside() -> None:
-    """Each is as large as the skin, and lies where the strands cross its height."""
+    """Each layer is as large as the skin, and lies where the strands cross its height."""
     made = fur_on_the_square()
     mesh, layers = made.levels[0].mesh, SHELLS.shell_layers
     along = mesh.along[mesh.triangles].mean(axis=1)
@@ -135,8 +135,8 @@ def test_layers_follow_the_combed_hair_from_the_inside_to_the_outside() -> None:
 @pytest.mark.slow(instead="test_sparse_hair_covers_as_much_however_few_strands_a_pattern_has")
 @pytest.mark.parametrize("spread", [0.5, 0.0])
 def test_from_above_layers_cover_what_strands_cover(spread: float) -> None:
-    """Of strands at random, each of which covers its area, exp(-tau) is left open (Poisson), on the
-    mean of all patterns."""
+    """Against the Poisson distribution: random strands leave exp(-tau) uncovered, on the mean of
+    all patterns."""
     strands = fur_on_square(10_000, spread=spread)
     plan = built(strands, square()).plan
     radius = strands.radius.reshape(strands.strand_count, -1)
@@ -158,7 +158,8 @@ def test_from_above_layers_cover_what_strands_cover(spread: float) -> None:
 def test_sparse_hair_covers_as_much_however_few_strands_a_pattern_has(
     count: int, seed: int
 ) -> None:
-    """Every point of skin by what the textures have there, and not by what is planned."""
+    """The coverage that the textures have at random points of the skin, not the planned coverage,
+    against the Poisson distribution."""
     strands = replace(fur_on_square(count, spread=0.5, seed=seed), radius=np.full(count * 8, 4e-4))
     made = built(strands, square())
     plan, mesh = made.plan, made.levels[0].mesh

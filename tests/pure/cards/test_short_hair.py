@@ -1,4 +1,4 @@
-"""Cards of fur on a square of skin, whose width and spacing one knows."""
+"""Cards of fur on a square of skin, whose right width and spacing are known."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ ATLAS = AtlasSettings()
 
 
 def fur(length: float) -> StrandSet:
-    """Strands at random on a square, which rise and bend over."""
+    """Strands at random places of a square, which rise and bend over."""
     random = np.random.default_rng(2)
     root = np.concatenate([random.uniform(0.0, SIDE, (COUNT, 2)), np.zeros((COUNT, 1))], axis=1)
     along = np.linspace(0.0, 1.0, 12)[:, None]
@@ -61,7 +61,7 @@ def test_longer_hair_has_the_cards_that_are_asked_for(length: float) -> None:
 
 
 def test_there_are_no_more_cards_than_it_takes() -> None:
-    """Roots of a card fill a square of a quarter of the hair's length."""
+    """The roots of a card fill a square with a side of a quarter of the hair's length."""
     strands = fur(0.03)
     fitted, _, _ = fitted_to_length(replace(FUR, card_count=1000), ATLAS, strands)
     square = 0.25 * float(np.median(strands.lengths()))
@@ -76,7 +76,7 @@ def test_no_card_is_without_strands_and_guides_are_left_as_they_are() -> None:
 
 
 def test_strands_on_cards_that_lie_flat_are_about_as_wide_as_they_are() -> None:
-    """Without the mean over all turns of a card, pi / 2."""
+    """Without the factor pi / 2 that otherwise averages over all orientations of a card."""
     _, atlas, _ = fitted_to_length(FUR, ATLAS, fur(0.01))
     assert atlas.strand_width == pytest.approx(0.7 * np.pi / 2.0, rel=1e-3)
 

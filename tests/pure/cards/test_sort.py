@@ -32,7 +32,7 @@ from hairloom.addon.strands import Surface
 
 
 def flood_fill(triangles: np.ndarray) -> list[int]:
-    """The plain way: walk from triangle to triangle over shared vertices."""
+    """The component of each triangle, by walking over shared vertices."""
     at_vertex: dict[int, list[int]] = {}
     for index, triangle in enumerate(triangles.tolist()):
         for vertex in triangle:
@@ -57,7 +57,7 @@ def test_components_agree_with_a_flood_fill(seed: int) -> None:
 
 
 def test_components_of_a_long_shuffled_strip() -> None:
-    """One piece whose vertices are numbered at random: the worst case for label propagation."""
+    """One component with randomly numbered vertices: the worst case for label propagation."""
     random = np.random.default_rng(0)
     strip = np.arange(5000)[:, None] + np.arange(3)
     shuffled = random.permutation(5002)[strip][random.permutation(5000)]
@@ -66,7 +66,7 @@ def test_components_of_a_long_shuffled_strip() -> None:
 
 
 def shells(count: int = 60) -> tuple[CardMesh, np.ndarray]:
-    """Cards that hang around a sphere, pairs face to face at one distance, in random order."""
+    """Cards that hang around a sphere in random order, in opposite pairs at the same distance."""
     random = np.random.default_rng(3)
     distance = np.repeat(random.permutation(np.linspace(0.11, 0.2, count // 2)), 2)
     angle = np.repeat(random.uniform(0.0, np.pi, count // 2), 2) + np.tile([0, np.pi], count // 2)
@@ -104,7 +104,7 @@ def test_triangles_of_a_card_stay_together_from_root_to_tip(by: SortBy) -> None:
 
 
 def shuffled(mesh: CardMesh, seed: int) -> CardMesh:
-    """The same cards: vertices, triangles, their corners and the numbers of cards by chance."""
+    """The same cards with vertices, triangles, corners and card numbers permuted at random."""
     random = np.random.default_rng(seed)
     vertices = random.permutation(len(mesh.positions))
     cards = random.permutation(len(mesh.group))
@@ -119,7 +119,7 @@ def shuffled(mesh: CardMesh, seed: int) -> CardMesh:
 
 
 def as_drawn(mesh: CardMesh, order: np.ndarray) -> np.ndarray:
-    """Where the corners of triangles are, the lowest of each first, (triangle_count, 9)."""
+    """The corners of each triangle, the smallest position first, (triangle_count, 9)."""
     corners = mesh.positions[mesh.triangles[order]]
     first = np.lexsort(corners.transpose(2, 0, 1)[::-1], axis=1)[:, :1]
     turned = (first + np.arange(3)) % 3
@@ -210,10 +210,10 @@ def nested_cubes(sizes: tuple[float, ...]) -> CardMesh:
 
 @pytest.mark.parametrize("by", few_in_commits(["cards", "pieces", "distance"]))
 def test_nested_cubes_are_exactly_right_from_everywhere(by: SortBy) -> None:
-    """Their order is known: front faces from the inside, back faces from the outside."""
+    """Against the known order: front faces from the inside out, back faces from the outside in."""
     mesh = nested_cubes((1.0, 1.3, 1.6, 1.9))
     orders = card_orders(mesh, None, by)
-    if by != "pieces":  # of which some are never seen together
+    if by != "pieces":  # some pieces are never seen together
         cube = mesh.card // 6
         np.testing.assert_array_equal(cube[orders.front], np.sort(cube)[::-1])
         np.testing.assert_array_equal(cube[orders.back], np.sort(cube))
@@ -243,7 +243,7 @@ def test_what_is_learnt_is_better_than_the_distance() -> None:
 
 
 def test_cards_side_by_side_go_by_their_place() -> None:
-    """No view sees one before the other, so that the distance decides, and then where it is."""
+    """No view sees one before another, so the distance decides, and then the position."""
     along = np.linspace(0.0, 0.1, 4)[:, None] * [0.0, 0.0, 1.0]
     places = np.array([[0.03, 0.0, 0.0], [0.0, 0.0, 0.0], [-0.03, 0.0, 0.0]])
     guides = (places[:, None] + along).astype(np.float32)
@@ -392,7 +392,7 @@ def test_five_thousand_cards_are_sorted() -> None:
 
 
 def test_the_order_of_few_cards_is_the_best_of_all_orders() -> None:
-    """Of all that six crossing cards could be drawn in, judged by the pairs that are seen."""
+    """Brute force over all orders of six crossing cards, judged by the pairs that are seen."""
     mesh = crossing_cards(6)
     orders = card_orders(mesh, None, "cards", view_count=24)
     pairs = all_pairs(list(pairs_by_view(mesh, None, 24, VIEW_SIZE)))

@@ -1,4 +1,4 @@
-"""Springs: the steps of the specification bone by bone, and values that are found again."""
+"""Spring bones: all steps of the specification, bone by bone, and the search for known values."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ NO_BALLS = Balls.of(np.empty((0, 3)), np.empty(0))
 
 
 def shaken(steps: int = STEPS) -> np.ndarray:
-    """A head that turns about Z and goes to and fro, (steps, 4, 4)."""
+    """A head that turns about Z and moves to and fro, (steps, 4, 4)."""
     angle = 0.5 * np.sin(np.arange(steps) * 0.2)
     head = np.tile(np.eye(4), (steps, 1, 1))
     head[:, 0, 0] = head[:, 1, 1] = np.cos(angle)
@@ -42,7 +42,7 @@ def shaken(steps: int = STEPS) -> np.ndarray:
 
 
 def made_chains(count: int = 3, joints: int = 4, balls: Balls = NO_BALLS) -> SpringChains:
-    """Hanging outwards, every one a little bent."""
+    """Chains that hang outwards, each a little bent."""
     random = np.random.default_rng(4)
     ways = random.normal(size=(count, joints, 3)) * 0.3 + [0.5, 0.0, -1.0]
     ways *= 0.04 / np.linalg.norm(ways, axis=-1, keepdims=True)
@@ -69,7 +69,8 @@ def made_values(chains: SpringChains) -> SpringValues:
 
 
 def least_turn(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """By axis and angle, as scalars: Rodrigues' formula in another form."""
+    """The smallest rotation from `one` to `other`, by axis and angle: another form of Rodrigues'
+    formula."""
     axis = np.cross(one, other)
     sine, cosine = np.linalg.norm(axis), one @ other
     if sine < 1e-12:
@@ -80,7 +81,7 @@ def least_turn(one: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 
 def by_the_book(chain: SpringChains, values: SpringValues, head: np.ndarray) -> np.ndarray:
-    """The pseudocode of the specification for one chain, bone by bone, in the world."""
+    """The specification's pseudocode for one chain, bone by bone, in world space."""
     rest = chain.rest[0]
     first = head[0] @ rest
     current, before = list(first[1:, :3, 3]), list(first[1:, :3, 3])
@@ -163,7 +164,8 @@ def test_frames_and_steps_are_the_same_times() -> None:
 
 
 def test_values_that_are_known_are_found_again() -> None:
-    """Not the values themselves, which can do for each other, but the motion that they make."""
+    """The motion is the same. The values themselves are not compared, since others give the same
+    motion."""
     chains, head = made_chains(count=2, joints=3), shaken()
     shape = chains.lengths.shape
     known = SpringValues(
@@ -177,7 +179,7 @@ def test_values_that_are_known_are_found_again() -> None:
 
 
 def moving_cards(swing: float) -> CardTracks:
-    """Cards beside each other; all swing as one, by this angle."""
+    """Cards side by side that swing together by this angle."""
     places = np.linspace(0.0, 0.2, 12)
     guides = np.zeros((12, 9, 3))
     guides[..., 0] = places[:, None]
@@ -198,7 +200,7 @@ def moving_cards(swing: float) -> CardTracks:
 @pytest.mark.parametrize(
     ("errors", "best"),
     [
-        ({3: 6.0, 5: 5.9, 9: 6.1, 119: 1.6}, 119),  # a step that brings nothing ends no search
+        ({3: 6.0, 5: 5.9, 9: 6.1, 119: 1.6}, 119),  # a step without gain does not end the search
         ({3: 6.0, 9: 1.61, 119: 1.6}, 9),
         ({3: 1e-9, 9: 0.0}, 3),
         ({3: 2.0, 9: 1.0, 119: 3.0}, 9),
@@ -217,7 +219,7 @@ def test_what_swings_as_one_needs_one_chain() -> None:
 def test_nothing_is_tried_that_has_more_joints_than_the_maximum(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The root that carries all chains is one of them."""
+    """The root joint that carries all chains counts as well."""
 
     def most(tried: list[Tried[Any]], unseen: float) -> Any:
         return max(tried, key=lambda each: each.joints).choice

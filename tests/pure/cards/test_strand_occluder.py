@@ -1,4 +1,4 @@
-"""Strands that shade others' cards: quick cards take as much light as the strands do."""
+"""Strands that shade other hair's cards: quick cards for them block as much light as they do."""
 
 from __future__ import annotations
 
@@ -28,7 +28,8 @@ def curtain(count: int, radius: float = 2.0e-4) -> Rig:
 
 
 def taken(occluder: CardOccluder) -> float:
-    """What cards take of light from everywhere [m^2]: half of their area times tau (Cauchy)."""
+    """The area that cards block of light from all directions [m^2]: half of their area times tau
+    (Cauchy's formula)."""
     mesh = occluder.mesh
     assert occluder.alpha is not None
     a, b, c = (mesh.positions[mesh.triangles[:, corner]] for corner in range(3))

@@ -1,4 +1,4 @@
-"""Cards against what their guides and the documented conventions say."""
+"""Cards against their guides and the documented conventions."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def test_cards_face_away_from_the_head_where_they_hang() -> None:
 
 
 def test_no_turn_of_a_whole_card_lets_it_face_the_roots_normal_more() -> None:
-    """Where hair leaves the head along the normal, that is decided by the rest of it."""
+    """Where hair leaves the head along the normal, the rest of the card decides."""
     random = np.random.default_rng(4)
     normal = random.normal(size=(30, 3))
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
@@ -87,7 +87,7 @@ def test_no_turn_of_a_whole_card_lets_it_face_the_roots_normal_more() -> None:
 
 
 def test_frames_do_not_twist() -> None:
-    """Along a helix a parallel frame turns no more between rows than the tangent itself does."""
+    """Along a helix, a parallel frame turns no more between rows than the tangent does."""
     turn = np.linspace(0.0, 6.0 * np.pi, 64)
     helix = np.stack([0.05 * np.cos(turn), 0.05 * np.sin(turn), -0.02 * turn], axis=-1)
     settings = CardSettings(segment_count=63, roundness=0.0, bend=0.0)
@@ -116,7 +116,7 @@ def test_the_guide_runs_through_the_middle_and_the_edges_fall_back() -> None:
 
 
 def test_roundness_leans_normals_of_the_volume_outwards_at_the_edges() -> None:
-    """By the angle whose tangent it is, towards the side on which the edge lies."""
+    """By atan(roundness), towards the side of the edge."""
     guides, normals = hanging_guides()
 
     def of_volume(roundness: float) -> CardMesh:
@@ -136,7 +136,7 @@ def test_roundness_leans_normals_of_the_volume_outwards_at_the_edges() -> None:
         turn = np.arccos(np.clip((one[:, :, edge] * other[:, :, edge]).sum(axis=-1), -1.0, 1.0))
         is_front = (one[:, :, edge] * one[:, :, 1]).sum(axis=-1) > 0.9
         is_usual = np.isclose(turn, np.arctan(0.5), atol=1e-4)
-        assert is_usual[is_front].mean() > 0.95  # but for those that keep the card's own
+        assert is_usual[is_front].mean() > 0.95  # the others keep the card's own normal
         leaning = ((other - one)[:, :, edge] * across).sum(axis=-1) * sign
         assert leaning[is_usual].min() > 0.0
 

@@ -67,7 +67,7 @@ def upright(x: float, y: float = 0.0) -> np.ndarray:
 
 @pytest.mark.parametrize("turn", [0.0, 0.9])
 def test_each_edge_has_the_occlusion_of_the_strand_that_runs_along_it(turn: float) -> None:
-    """Whatever the depth of the strands, and whichever way the normals of the vertices look."""
+    """For strands at any depth and for any vertex normals."""
     grid = np.stack([upright(-0.01, 0.03), upright(0.01, -0.05), upright(0.0)])
     occlusion = np.array([np.linspace(0.1, 0.3, 5), np.linspace(0.5, 0.9, 5), np.full(5, 7.0)])
     normal = np.tile([np.sin(turn), -np.cos(turn), 0.0], (6, 1))
@@ -90,7 +90,8 @@ def test_a_card_whose_strands_are_all_elsewhere_has_their_mean() -> None:
 
 
 def test_light_is_that_of_strands_as_they_are_seen() -> None:
-    """One that sees three times as much of the sky is seen three times as often."""
+    """The mean is weighted by openness: a strand that sees three times as much of the sky is seen
+    three times as often."""
     grid = np.stack([upright(-0.5), upright(0.7)])
     light = np.repeat([[[0.2, 1.0, -4.0]], [[0.6, 5.0, 4.0]]], 5, 1)
     found = of_two(grid, light).light
@@ -100,7 +101,7 @@ def test_light_is_that_of_strands_as_they_are_seen() -> None:
 
 
 def test_depth_is_that_of_even_strands() -> None:
-    """Thrown evenly through 0.04 m, the normal is -y."""
+    """Strands uniformly distributed over 0.04 m along the normal -y have this depth."""
     heights = np.random.default_rng(3).uniform(-0.03, 0.01, 4000)
     grid = np.stack([upright(0.0, y) for y in heights])
     card = np.zeros(len(grid), int)
@@ -116,7 +117,7 @@ def test_depth_is_that_of_even_strands() -> None:
 
 @pytest.mark.parametrize("settings", few_in_commits([CLUSTERS, replace(CLUSTERS, crossed=True)]))
 def test_each_card_is_as_open_as_its_own_strands(settings: CardSettings) -> None:
-    """Against a loop over cards; the vertices of a card lie evenly along it."""
+    """Against a loop over cards."""
     rig = rig_of(900)
     dense = AmbientSettings(extinction=100.0)
     shade = light_flow.rest_light(rig, dense).occlusion
@@ -174,7 +175,7 @@ def test_normals_are_those_of_strands_across_the_tangents_and_on_the_front(way: 
     for mesh in build.levels:
         expected = strand_normal(mesh.positions, mesh.tangent, center)
         is_same = np.abs(mesh.normal - expected).max(axis=1) < 1e-5
-        assert is_same.mean() > 0.8  # roots are upright, where any normal would do
+        assert is_same.mean() > 0.8  # at upright roots any normal will do
         lean = np.einsum("vi,vi->v", mesh.normal, mesh.tangent)
         np.testing.assert_allclose(lean, 0.0, atol=1e-5)
         a, b, c = np.moveaxis(mesh.positions[mesh.triangles], 1, 0)

@@ -1,4 +1,4 @@
-"""Motion textures: every vertex and frame has the texel that the layout says."""
+"""Motion textures: every vertex and frame has its texel as the layout defines it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from hairloom.addon.errors import HairloomError
 
 @pytest.mark.parametrize(("vertices", "frames"), [(1, 2), (700, 5), (1025, 40), (5000, 900)])
 def test_a_shader_finds_what_was_put_in(vertices: int, frames: int) -> None:
-    """By the texel and the step to the next frame alone, in a picture counted from the top."""
+    """From a vertex's texel and the step to the next frame alone, rows counted from the top."""
     values = np.random.default_rng(vertices).normal(size=(vertices, frames, 3)).astype(np.float32)
     layout = motion_layout(vertices, frames, "x")
     texture = motion_texture(values, layout)
@@ -30,7 +30,7 @@ def test_a_shader_finds_what_was_put_in(vertices: int, frames: int) -> None:
 
 
 def test_texels_are_exact_enough_as_float32() -> None:
-    """The middle of a texel stays in its middle half in the files' coordinates."""
+    """As float32, the coordinate of a texel's centre stays within the texel's middle half."""
     layout = motion_layout(60_000, 1000, "x")
     v = vertex_texels(layout).astype(np.float32).astype(np.float64)[:, 1] * layout.height
     assert np.abs(v % 1.0 - 0.5).max() < 0.01

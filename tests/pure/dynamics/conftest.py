@@ -19,7 +19,7 @@ from hairloom.addon.dynamics.step import Drive, advance
 from hairloom.addon.strands import Surface
 
 EARTH = np.array([0.0, 0.0, -9.81])
-#: Nothing but inertia, gravity and lengths.
+#: Only inertia, gravity and lengths.
 LIMP = {
     "style_root": 0.0,
     "style_tip": 0.0,
@@ -59,7 +59,7 @@ def straight(
 
 
 def curly(guide_count: int, cv_count: int, length: float = 0.2, seed: int = 3) -> np.ndarray:
-    """Guides from a dome outwards, each with its own waves, with uneven segments."""
+    """Guides that grow outwards from a dome, each with its own waves, in uneven segments."""
     rng = np.random.default_rng(seed)
     out = rng.normal([0.0, 0.0, 1.5], 1.0, (guide_count, 3))
     out /= np.linalg.norm(out, axis=1, keepdims=True)
@@ -71,14 +71,14 @@ def curly(guide_count: int, cv_count: int, length: float = 0.2, seed: int = 3) -
 
 
 def tips(is_held: Any, cv_count: int) -> np.ndarray:
-    """The tips of these guides (guide_count,), as `Scene.held`."""
+    """A mask of the tips of guides, for `Scene.held`; is_held: (guide_count,)."""
     held = np.zeros((len(is_held), cv_count), bool)
     held[:, -1] = is_held
     return held
 
 
 def tied(is_held: Any, cv_count: int, *first: int) -> np.ndarray:
-    """These guides, tied between each of these CVs and the next one, as `Scene.held`."""
+    """A mask of guides tied between each CV in `first` and the next one, for `Scene.held`."""
     held = np.zeros((len(is_held), cv_count), bool)
     for cv in first:
         held[is_held, cv : cv + 2] = True
@@ -86,7 +86,7 @@ def tied(is_held: Any, cv_count: int, *first: int) -> np.ndarray:
 
 
 def icosphere(radius: float, subdivisions: int = 4) -> Surface:
-    """A ball of equal triangles, outwards."""
+    """A ball of equal triangles that face outwards."""
     golden = (1.0 + 5.0**0.5) / 2.0
     corners = np.array(
         [
@@ -116,7 +116,7 @@ def icosphere(radius: float, subdivisions: int = 4) -> Surface:
 
 
 def box(size: tuple[float, float, float]) -> Surface:
-    """A box around the origin, outwards."""
+    """A box around the origin whose triangles face outwards."""
     corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) / 2.0
     quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     triangles = [t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))]
@@ -124,7 +124,8 @@ def box(size: tuple[float, float, float]) -> Surface:
 
 
 def random_settings(random: np.random.Generator, **fixed: Any) -> DynamicsSettings:
-    """Hard ranges at random, half of the values at an end of theirs; `fixed` ones as given."""
+    """Random values from the hard ranges, half of them at an end of the range; `fixed` ones as
+    given."""
     values: dict[str, Any] = {}
     for parameter in DynamicsSettings.parameters():
         if parameter.kind == "toggle":
@@ -152,13 +153,13 @@ def random_settings(random: np.random.Generator, **fixed: Any) -> DynamicsSettin
 
 @dataclass
 class Scene:
-    """Guides on a head that moves by matrices, with colliders that go with it or stand still.
+    """Guides on a head that moves by matrices, with colliders that move with it or stand still.
 
-    held: (guide_count, cv_count) the CVs that go with the head too, or None.
-    room: (guide_count, cv_count - 1) how much curls have to give, or None.
-    painted: by what settings are multiplied at each guide, or None.
-    is_combed: whether guides stay no farther from colliders than they are at first.
-    bowed: whether the ways within a frame are smooth, as `motion_flow` makes them.
+    held: (guide_count, cv_count) mask of CVs that move with the head too, or None.
+    room: (guide_count, cv_count - 1) how far segments of curls can stretch, or None.
+    painted: factors of settings at each guide, or None.
+    is_combed: whether colliders push guides no farther away than they are at rest.
+    bowed: whether trajectories within a frame are smooth, as `motion_flow` makes them.
     """
 
     grid: np.ndarray
@@ -219,7 +220,7 @@ class Scene:
 
 
 class Kit:
-    """Everything above by name, as test files cannot import each other."""
+    """Everything above by name, since test files cannot import each other."""
 
     EARTH = EARTH
     LIMP = LIMP

@@ -1,4 +1,4 @@
-"""Hair that feels other hair: against a form without a grid, and what it is for."""
+"""Forces between hairs of a groom: against a form without a grid, and their intended effects."""
 
 from dataclasses import replace
 
@@ -89,7 +89,8 @@ def test_at_rest_it_does_nothing_wherever_the_head_is(angle):
 
 
 def test_hair_at_rest_stays_at_rest():
-    """With weight borne by the style, as by default: it comes to the same rest, at no speed."""
+    """With weight carried by the style, as by default, hair comes to the same rest as without
+    volume."""
     grid = tail(200)
     alone, among_others = (
         played(grid, DynamicsSettings(volume=volume), 4.0) for volume in (0.0, 1.0)
@@ -113,7 +114,7 @@ def test_a_ponytail_keeps_its_volume():
 def test_it_comes_to_rest_under_its_weight():
     settings = DynamicsSettings(volume=1.0, **SOFT)
     state = played(tail(300), settings, 4.0)
-    assert state.push.any()  # which bears it
+    assert state.push.any()  # the push carries hair
     speed = np.linalg.norm(state.position - state.previous, axis=0) / DT
     assert np.quantile(speed, 0.99) < 0.01
     assert speed.max() < 0.05
@@ -139,7 +140,7 @@ def test_locks_do_not_swing_through_each_other():
 
 
 def test_neighbours_move_together():
-    """One strand that moves among many that stand is braked; its lengths and theirs are kept."""
+    """A strand that moves among still ones is slowed down and drags them along."""
     grid = tail(200)
     rest = start(grid).rest
     previous = rest.position.copy()

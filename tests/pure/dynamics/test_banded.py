@@ -46,7 +46,7 @@ def test_each_guide_may_have_a_matrix_of_its_own(count):
 
 
 def diagonals(matrix):
-    """The main one, that beside it and that beyond, (n, 1) each."""
+    """The main diagonal and the two below it, (n, 1) each."""
     return (
         np.append(np.diagonal(matrix, -away), np.zeros(min(away, len(matrix))))[:, None]
         for away in range(3)

@@ -1,4 +1,4 @@
-"""The field of a mesh that has changed its shape, against the mesh itself."""
+"""The distance field of a mesh that has changed its shape, against the mesh itself."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ SETTINGS = DynamicsSettings(collider_resolution=24)
 
 
 def rod(kit):
-    """A ball drawn out to a rod of 40 cm along x."""
+    """A ball stretched to a rod of 40 cm along x."""
     ball = kit.icosphere(0.06, 3)
     positions = ball.positions.copy()
     positions[:, 0] += (
@@ -24,7 +24,7 @@ def rod(kit):
 
 
 def bent(positions):
-    """The half beyond x = 0 goes up in an arc: out of the box that the rod at rest lies in."""
+    """The half at positive x bent up in an arc, out of the bounding box of the rod at rest."""
     angle = 4.0 * np.maximum(positions[:, 0], 0.0)
     x, z = positions[:, 0], positions[:, 2]
     over = np.maximum(x, 0.0) > 0.0
@@ -36,8 +36,8 @@ def bent(positions):
 
 @pytest.mark.parametrize("is_turned", [False, True])
 def test_an_arm_that_bends(kit, is_turned):
-    """Near its surface as exact as a field that is made for it, on the right side everywhere; also
-    where all faces look inwards."""
+    """Near the surface as exact as a new field of the bent mesh, and everywhere of the right sign;
+    also if all faces look inwards."""
     surface = rod(kit)
     if is_turned:
         surface = Surface(surface.positions, surface.triangles[:, ::-1])

@@ -1,4 +1,4 @@
-"""Fins: a mesh that moves as cloth keeps its edges, its pins and its energy."""
+"""Fins, meshes that move as cloth: edge lengths, pins and energy."""
 
 from itertools import pairwise
 from pathlib import Path
@@ -27,14 +27,15 @@ BARE = {"damping": 0.0, "bend": 0.0}
 
 
 def max_cloth_stretch(state):
-    """Largest growth of an edge, as a fraction of its rest length; those of no length cannot."""
+    """Largest growth of an edge, as a fraction of its rest length, except for edges of no
+    length."""
     rest = state.fabric.length
     growth = (distances(state.position, state.fabric.pairs) - rest)[rest > 1e-9]
     return float((growth / rest[rest > 1e-9]).max(initial=0.0))
 
 
 def sheet(rows, columns, size):
-    """Hangs from its first row in the plane y = 0; `size` [m] is the spacing times 39."""
+    """A sheet below its first row in the plane y = 0; its spacing is `size` / 39 [m]."""
     down, along = np.meshgrid(np.arange(rows), np.arange(columns), indexing="ij")
     points = np.stack([along.ravel(), np.zeros(down.size), -down.ravel()], axis=1) * size / 39.0
     quads = np.arange(rows * columns).reshape(rows, columns)
@@ -56,7 +57,8 @@ def still(points, time):
 
 
 def shaken(points, time):
-    """5 cm to and fro along a slanted line, once a second, begun and ended within three seconds."""
+    """Points shaken by 5 cm along a slanted line, once a second, fading in and out within three
+    seconds."""
     strength = np.sin(np.pi * min(max(time, 0.0), 3.0) / 3.0) ** 2
     push = 0.05 * strength * np.sin(2.0 * np.pi * time) * np.array([1.0, 2.0, 1.0])
     return points + push
@@ -95,7 +97,7 @@ def test_each_edge_comes_once_and_no_color_holds_a_vertex_twice():
 
 
 def test_folds_lie_across_inner_edges():
-    """Of two triangles, the outer vertices; of three at one edge, each with the next."""
+    """Two triangles: their outer vertices. Three at one edge: each one's with the next one's."""
     assert opposite_pairs(np.array([[0, 1, 2], [1, 0, 3]])).tolist() == [[2, 3]]
     assert opposite_pairs(np.array([[0, 1, 2], [1, 0, 3], [0, 1, 4]])).tolist() == [[2, 3], [3, 4]]
     # a tetrahedron's opposite vertices are edges already
@@ -162,7 +164,7 @@ def test_weights_between_pull_the_more_the_higher_they_are():
 
 
 def test_a_strip_held_at_both_ends_hangs_as_a_catenary():
-    """To 2 % of its sag."""
+    """Against the analytic catenary, to 2 % of the sag."""
     points, triangles = sheet(2, 61, 0.65)
     points = points[:, [0, 2, 1]]  # lies flat
     length = points[60, 0]
@@ -189,7 +191,7 @@ def test_a_strip_held_at_both_ends_hangs_as_a_catenary():
 
 @pytest.mark.slow
 def test_stretch_is_as_promised_for_any_mesh_and_step():
-    """A string of one metre gains the share that the parameter says, at its upper end."""
+    """The topmost edge of a hanging string of one metre stretches by the parameter's fraction."""
     for count, steps in ((11, 10), (41, 20), (41, 40)):
         points = np.zeros((count, 3), np.float32)
         points[:, 2] = -np.linspace(0.0, 1.0, count)
@@ -205,14 +207,14 @@ def test_stretch_is_as_promised_for_any_mesh_and_step():
 
 
 def energy(state):
-    """[J/kg], in the middle of the last small step, in which the speed is known."""
+    """Mean energy [J/kg] in the middle of the last small step, where the speed is known."""
     speed = (state.position - state.previous) / state.small_step
     height = (state.position[2] + state.previous[2]) / 2.0
     return float((0.5 * (speed**2).sum(axis=0) + 9.81 * height).mean())
 
 
 def test_energy_never_grows_without_input():
-    """But for the little that edges store while they are stretched: 0.5 % of what it moves by."""
+    """Up to 0.5 % of its range is allowed, for the energy stored in stretched edges."""
     points, triangles = sheet(12, 12, 1.0)
     corners = np.zeros(144)
     corners[[0, 11]] = 1.0
@@ -233,7 +235,7 @@ def test_two_runs_are_alike_to_the_last_bit():
 
 @pytest.mark.slow
 def test_the_frame_rate_does_not_matter():
-    """Within 2 % of the cloth's length; at the same moment, after a second of shaking."""
+    """After a second of shaking, positions agree within 2 % of the cloth's length."""
     ends = {}
     for fps in (24.0, 30.0, 60.0, 120.0):
         states = play(hanging(12, 12, 1.0), 1.0, FinSettings(), shaken, fps)
@@ -283,7 +285,7 @@ def test_wind_carries_free_cloth_along():
     ],
 )
 def test_the_slow_form_agrees(values, tolerance):
-    """To what rounding in float32 grows to over eight frames."""
+    """Within the rounding errors of float32 over eight frames."""
     points, triangles = sheet(6, 6, 2.0)
     pin = np.zeros(36)
     pin[:6], pin[6:12] = 1.0, np.linspace(0.0, 0.9, 6)
@@ -342,7 +344,8 @@ def test_cloth_without_pins_falls():
 
 
 def test_odd_meshes_survive():
-    """Doubles, edges of no length, loose vertices, a face on itself, three faces at an edge."""
+    """Coincident vertices, edges of no length, loose vertices, a degenerate face, and three faces
+    at an edge."""
     points = np.array(
         [[0, 0, 0], [0, 0, 0], [0.1, 0, 0], [0, 0, -0.1], [0.1, 0, -0.1], [9, 9, 9], [0, 0.1, 0]],
         np.float32,
@@ -416,7 +419,7 @@ def test_time_left_over_is_bridged_for_drawing():
     assert drawn[:4] == pytest.approx(moved[:4], abs=1e-7)
     way = drawn - state.position.T
     assert way[4:] == pytest.approx(np.tile(way[0], (12, 1)), abs=1e-6)
-    # without pins they go on as they flew
+    # without pins they keep their velocity
     loose = start_cloth(points, state.fabric.triangles, np.zeros(16))
     loose = advance_cloth(loose, drive, FinSettings(**BARE), 1.5 / 240.0)
     fallen = (cloth_at_frame_end(loose, drive) - loose.position.T)[:, 2]
@@ -442,7 +445,7 @@ def test_the_ends_of_each_range_can_be_simulated(name, end):
 
 
 def test_far_from_the_origin_it_moves_the_same():
-    """A kilometre away, to a tenth of a millimetre: what float32 could not tell apart there."""
+    """A kilometre away, to 0.1 mm."""
     points, triangles = sheet(8, 8, 1.0)
     pin = (np.arange(64) < 8).astype(float)
     away = np.array([1000.0, -500.0, 20.0])

@@ -1,4 +1,4 @@
-"""Balls, capsules and sets of balls against their formulas, posed and run into by hair."""
+"""Balls, capsules and sets of balls against their formulas, posed, and in contact with hair."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ ROD = CapsuleCollider(np.array([-0.03, 0.0, 0.01]), np.array([0.05, 0.02, -0.02]
 
 
 def balls(count=60, seed=5):
-    """Balls of very different sizes, some within others."""
+    """Balls of very different sizes, some inside others."""
     random = np.random.default_rng(seed)
     centers = random.uniform(-0.12, 0.12, (count, 3))
     return SphereSetCollider(centers, random.uniform(0.004, 0.06, count))
@@ -34,7 +34,7 @@ def scattered(count=5000, reach=0.3, seed=1):
 
 
 def rod_distance(rod, points):
-    """By trying many places on the axis."""
+    """Distance to a capsule, by brute force over many points of its axis."""
     share = np.linspace(0.0, 1.0, 4001)[:, None]
     axis = rod.start + share * (rod.end - rod.start)
     gap = np.linalg.norm(points.T[:, None].astype(np.float64) - axis, axis=2)
@@ -42,7 +42,7 @@ def rod_distance(rod, points):
 
 
 def set_distance(balls, points):
-    """From every ball to every point."""
+    """Distance to a set of balls, by brute force over all balls."""
     gap = np.linalg.norm(points.T[:, None].astype(np.float64) - balls.centers, axis=2)
     return (gap - balls.radii).min(axis=1)
 
@@ -60,7 +60,7 @@ def test_a_capsule_without_length_is_a_ball():
 
 @pytest.mark.parametrize("count", [1, 2, 60, 400])
 def test_set_is_the_nearest_of_all_balls(count):
-    """Also for points far outside of the set, and deep inside of many balls at once."""
+    """Against brute force, also far outside the set and deep inside many balls at once."""
     collider = balls(count, seed=count)
     for points in (scattered(), scattered(500, 5.0)):
         distance, _ = collider.distance(points)
@@ -141,7 +141,7 @@ def test_bad_shapes_are_named(make, message):
 
 
 def test_a_scaled_and_turned_ball_is_as_deep_as_geometry_says(kit):
-    """A ball of 5 cm, doubled, turned and moved: a CV 3 cm below its skin is 3 cm deep."""
+    """A ball of 5 cm, scaled by 2, turned and moved: a CV 3 cm below its surface is 3 cm deep."""
     matrix = kit.translation(0.3, 0.2, 0.1) @ kit.rotation(1, 0.8) @ np.diag([2.0, 2.0, 2.0, 1.0])
     middle = matrix[:3, :3] @ BALL.center + matrix[:3, 3]
     grid = np.repeat(middle[None, None], 4, axis=1) + np.array([0.0, 0.0, 0.07])
@@ -150,7 +150,7 @@ def test_a_scaled_and_turned_ball_is_as_deep_as_geometry_says(kit):
 
 
 def test_a_stretched_and_mirrored_ball_is_measured_along_its_own_axes():
-    """Twice as long along x, and mirrored: on its axes the depth is exact."""
+    """Scaled by -2 along x: on its axes the depth is exact."""
     matrix = np.diag([-2.0, 1.0, 1.0, 1.0])
     posed = PosedCollider(SphereCollider(np.zeros(3), 0.1), matrix, matrix)
     for place, depth in (((0.17, 0.0, 0.0), 0.03), ((0.0, 0.09, 0.0), 0.01)):
@@ -185,7 +185,7 @@ def test_hair_on_a_shaking_head_stays_out_of_it(kit, shake, kinds, kind):
 
 @pytest.mark.parametrize("kind", ["ball", "rod", "set", "mesh"])
 def test_a_turned_and_scaled_collider_sweeps_through_hair(kit, kinds, kind):
-    """Half its size, turning, at 1 m/s against hanging hair: the hair is swept along."""
+    """Scaled by 0.5 and turning, at 1 m/s into hanging hair, which is swept along."""
     collider, allowed = kinds[kind]
     curtain = kit.straight(40, 16, 0.3)
     state, settings = start(curtain), DynamicsSettings(style_root=0.5, style_tip=0.2)

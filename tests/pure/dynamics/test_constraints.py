@@ -1,4 +1,4 @@
-"""Lengths: kept exactly, without a push from nowhere, and along what is touched."""
+"""Lengths are kept, without external momentum, and CVs in contact slide along the surface."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ from hairloom.addon.dynamics.constraints import (
 
 @pytest.fixture
 def disturbed(kit):
-    """Guides as rows, pushed about by up to 3 mm, and the lengths they had."""
+    """Guides as rows, disturbed by up to 3 mm, and the lengths that they had before."""
     rows = np.ascontiguousarray(kit.curly(40, 16).transpose(2, 1, 0))
     length = np.linalg.norm(np.diff(rows, axis=1), axis=0)
     noise = np.random.default_rng(1).uniform(-0.003, 0.003, rows.shape).astype(np.float32)
@@ -57,7 +57,7 @@ def test_pinned_cvs_stay(disturbed):
 
 
 def test_momentum_comes_only_through_the_root(disturbed):
-    """Inner forces cancel: what is left of all corrections pulls along the first free segment."""
+    """Internal forces cancel: the sum of all corrections points along the first free segment."""
     position, length = disturbed
     before = position.copy()
     direction, _ = directions(position)
@@ -69,7 +69,7 @@ def test_momentum_comes_only_through_the_root(disturbed):
 
 
 def test_contact_slides(disturbed):
-    """With a normal, a CV moves along the surface ten times more easily than across it."""
+    """A CV in contact moves ten times more easily along the surface than along its normal."""
     position, length = disturbed
     cv, guides = 5 + PINNED, np.arange(40)
     touched = Touched(cv * 40 + guides, np.float32([[0.0], [0.0], [1.0]]) + 0.0 * guides)
@@ -83,7 +83,8 @@ def test_contact_slides(disturbed):
 
 
 def touching(position, seed=5):
-    """A third of the free CVs, tips among them, with random normals; and these as a grid."""
+    """A third of the free CVs, tips among them, in contact with random normals, as Touched and as a
+    grid."""
     random = np.random.default_rng(seed)
     normal = random.normal(size=position.shape).astype(np.float32)
     normal /= np.linalg.norm(normal, axis=0)
@@ -94,7 +95,7 @@ def touching(position, seed=5):
 
 
 def test_a_step_with_contacts_is_newtons(disturbed):
-    """x - W J^T (J W J^T)^-1 C with the dense matrices of each guide."""
+    """Against x - W J^T (J W J^T)^-1 C with each guide's dense matrices."""
     position, length = disturbed
     touched, normal = touching(position)
     before = position.astype(np.float64)
@@ -137,7 +138,7 @@ def test_finish_reaches_the_tolerance_only_where_needed(disturbed):
 
 
 def test_finish_never_gives_up_on_lengths(disturbed):
-    """One Newton step cannot fix this; laying the guide out again does."""
+    """Where one Newton step is not enough, guides are laid out again, so that lengths hold."""
     position, length = disturbed
     position[:, PINNED:] *= np.random.default_rng(2).uniform(-30, 30, position[:, PINNED:].shape)
     finish_lengths(position, length, None, None, 0.002, 1, 0.2)
@@ -174,7 +175,7 @@ def test_long_range_attachment_bounds_the_way_from_the_root(disturbed):
 
 @pytest.mark.parametrize("held", [False, True])
 def test_long_range_attachment_leaves_no_zigzag(disturbed, held):
-    """A strand that goes to and fro near its root is within reach, and yet too long."""
+    """A zigzag near the root is within reach of the attachment, and yet too long."""
     position, length = disturbed
     to_and_fro = (np.arange(position.shape[1]) % 2 * 0.05).astype(np.float32)
     position[0, PINNED:] = position[0, PINNED - 1] + to_and_fro[PINNED:, None]
@@ -217,7 +218,8 @@ def test_newton_keeps_a_held_tip_and_all_lengths(disturbed):
 
 
 def test_finish_lays_guides_with_held_tips_out_towards_them(disturbed):
-    """Where Newton gives up lengths still hold, and the tip ends nearer to its place than free."""
+    """Where Newton's steps fail, lengths still hold, and a held tip ends nearer to its place than a
+    free one."""
     position, length = disturbed
     tip = position[:, -1].copy()
     noise = np.random.default_rng(2).normal(0.0, 0.02, position[:, 3:].shape).astype(np.float32)

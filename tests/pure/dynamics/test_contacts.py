@@ -1,4 +1,4 @@
-"""Hair and colliders: outside stays outside, inside is led out, friction drags along."""
+"""Hair and colliders: outside stays outside, inside is led out, friction drags hair along."""
 
 import numpy as np
 import pytest
@@ -60,9 +60,9 @@ def test_pearls_grow_towards_the_tip(kit):
 
 @pytest.mark.parametrize("thin", [False, True])
 def test_hair_at_rest_stays_where_it_was_combed(kit, thin):
-    """Short hair that lies nearer to a ball, and to the edge of a box, than its radius is."""
+    """Short hair that lies nearer to a ball, and to a box's edge, than the collision radius."""
     settings = DynamicsSettings(radius_root=0.05, radius_tip=0.2, collider_resolution=24)
-    if thin:  # its segments pass the edge, whose CVs are farther away
+    if thin:  # segments pass near the edge, while their CVs are farther away
         edge = DistanceField.from_surface(kit.box((0.4, 0.03, 0.03)), settings)
         grid = kit.straight(12, 6, 0.05, (0.0, 0.7, -0.7)) + np.float32([-0.05, 0.003, 0.035])
         near = edge
@@ -94,7 +94,7 @@ def test_a_mesh_holds_hair_out(kit):
 
 
 def test_a_moving_ball_sweeps_hair_along(kit):
-    """A ball comes through hanging hair at 1 m/s: never through it."""
+    """A ball that moves into hanging hair at 1 m/s sweeps it along."""
     settings = DynamicsSettings(**kit.LIMP | {"damping": 1.0})
     ball = SphereCollider((0, 0, 0), 0.06)
     grid = kit.straight(12, 16, 0.25)
@@ -111,7 +111,7 @@ def test_a_moving_ball_sweeps_hair_along(kit):
 
 @pytest.mark.parametrize("kind", ["finger", "plate"])
 def test_nothing_thin_passes_between_two_points(kit, kind):
-    """It goes through hanging hair at 2 m/s, a width of its own in each substep.
+    """A thin collider at 2 m/s, which moves by about its thickness in each substep.
 
     A sharp edge over which hair is drawn enters a segment by up to 2 mm.
     """
@@ -139,8 +139,8 @@ def test_nothing_thin_passes_between_two_points(kit, kind):
 
 
 def swept(kit, kind, speed, grid):
-    """How a plate of 1 cm or a finger of 16 mm goes 0.28 m through hanging hair: where it is and
-    the state after each substep, first of all at the begin."""
+    """A plate of 1 cm or a finger of 16 mm moves 0.28 m into hanging hair: its matrix and the state
+    at the beginning and after each substep."""
     settings = DynamicsSettings()
     thin = CapsuleCollider((-0.1, 0.0, 0.0), (0.1, 0.0, 0.0), 0.008)
     if kind == "plate":
@@ -156,10 +156,10 @@ def swept(kit, kind, speed, grid):
 @pytest.mark.parametrize("speed", [4.0, 5.6])
 @pytest.mark.parametrize("kind", ["finger", "plate"])
 def test_nothing_thin_passes_however_fast(kit, kind, speed):
-    """It goes farther than it is thick in a substep; hair is drawn over it.
+    """The collider moves farther than its thickness in a substep.
 
-    A point that went through has gone around its middle, by its own way and along its guide, once
-    more than it has turned about it.
+    The angle of each point about the collider's axis is unwrapped along its guide; a point that
+    passed through would make it jump by a full turn from one substep to the next.
     """
     grid = kit.straight(5, 16, 0.25) - np.float32([0.02, 0.0, 0.0])
     seen = []
@@ -183,7 +183,7 @@ def test_what_meets_something_fast_goes_as_if_it_was_alone(kit):
 
 @pytest.mark.parametrize("turn", [(-1.0, -1.0, 1.0), (-1.0, 1.0, 1.0)])
 def test_what_turns_round_in_one_substep_is_nowhere_flat(turn):
-    """By 180 degrees, or into its mirror image: halfway there is no inverse."""
+    """By 180 degrees, or into its mirror image: a linear blend would be singular halfway."""
     after = np.diag([*turn, 1.0])
     collider = CapsuleCollider((-0.1, 0.0, 0.0), (0.1, 0.0, 0.0), 0.008)
     (pose,) = PosedCollider(collider, np.eye(4), after).poses([(0.0, 1.0)])
@@ -201,7 +201,7 @@ def between(grid):
 
 
 def test_hair_that_starts_inside_is_led_out(kit):
-    """It comes out within a second and never gets faster than a fall."""
+    """It comes out within a second, no faster than it would fall."""
     settings = DynamicsSettings()
     grid = lying(kit, length=0.2)
     scene = kit.Scene(grid, settings, standing=(SphereCollider((0.0, 0.08, 0.2), 0.05),))
@@ -216,7 +216,7 @@ def test_hair_that_starts_inside_is_led_out(kit):
 
 
 def test_push_speed_is_the_limit(kit):
-    """A single free CV deep inside walks out along the normal at this speed, and stays calm."""
+    """A single free CV deep inside moves out along the normal at this speed, without jitter."""
     settings = DynamicsSettings(
         **kit.LIMP | BARE | {"depenetration_speed": 0.01, "friction": 0.0, "length_tolerance": 0.02}
     )
@@ -258,7 +258,7 @@ def test_friction_drags_hair_along(kit):
 
 @pytest.mark.parametrize("mirror", [1.0, -1.0])
 def test_a_scaled_ball_is_an_ellipsoid(kit, mirror):
-    """Uneven scale and mirroring: distances are the world's, and hair stays outside."""
+    """With uneven scale and mirroring, distances are those of the world, and hair stays outside."""
     matrix = np.diag([0.6 * mirror, 1.4, 1.0, 1.0])
     settings = DynamicsSettings(**kit.LIMP | BARE | {"damping": 2.0})
     grid = lying(kit)
@@ -273,7 +273,7 @@ def test_a_scaled_ball_is_an_ellipsoid(kit, mirror):
 
 @pytest.mark.parametrize("bowed", [False, True])
 def test_a_scaled_collider_that_moves_keeps_hair_out(kit, bowed):
-    """An ellipsoid that tumbles through hanging hair, on straight and on smooth ways."""
+    """An ellipsoid that tumbles through hanging hair, on straight and on smooth trajectories."""
     scale = np.diag([0.5, 1.5, -1.0, 1.0])
 
     def matrix(time):
@@ -316,7 +316,7 @@ def test_two_balls_that_touch_each_other(kit):
     ids=["capsule", "sphere set"],
 )
 def test_any_solid_leads_out_what_starts_inside(kit, collider):
-    """Over frames, no faster than a fall; what is out stays out."""
+    """Over several frames, no faster than it would fall; hair that is out stays out."""
     settings = DynamicsSettings()
     scene = kit.Scene(lying(kit, length=0.2), settings, standing=(collider,))
     states = scene.play(2.0)

@@ -1,4 +1,4 @@
-"""Signed distances against what balls and boxes have by formula."""
+"""Signed distances against the formulas of balls and boxes."""
 
 import numpy as np
 import pytest
@@ -40,7 +40,7 @@ def brick(kit):
 
 
 def test_ball(ball):
-    """Near the surface within a tenth of a cell of the formula, the mesh's own facets included."""
+    """Near the surface within a tenth of a cell of the formula, including the error of facets."""
     points = scattered(0.13)
     exact = np.linalg.norm(points, axis=0) - 0.1
     distance, gradient = ball.distance(points)
@@ -52,7 +52,7 @@ def test_ball(ball):
 
 
 def test_box_within_half_a_diagonal(brick):
-    """Exact beside the faces, cut off by a part of a cell at edges and corners; coarser far off."""
+    """Exact at faces, rounded by part of a cell at edges and corners, coarser far away."""
     points = scattered(0.11, 20000)
     exact = box_distance(points, (0.2, 0.12, 0.08))
     distance, _ = brick.distance(points)
@@ -93,7 +93,7 @@ def test_near_nodes_are_exact_and_all_signs_right(kit):
 
 
 def test_no_part_of_the_surface_lies_outside(kit):
-    """Of a box with sharp edges, and of a sheet of a third of a cell, each askew."""
+    """For a box with sharp edges, and a sheet of a third of a cell, both askew to the grid."""
     turn = kit.rotation(0, 0.3) @ kit.rotation(1, 0.2)
     for size in ((0.2, 0.14, 0.1), (0.2, 0.2, 0.003)):
         straight = kit.box(size)
@@ -124,7 +124,7 @@ def test_near_misses_none_of_what_is_looked_up_and_keeps_few_others(ball):
         chosen = ball.near(points, reach)
         assert np.isin(np.flatnonzero(distance < np.sqrt(3.0) * reach), chosen).all()
         chosen = chosen[np.abs(points[:, chosen]).max(axis=0) < 0.1]
-        # half a cell is no longer than this from corner to corner
+        # 0.87 is half the diagonal of a cell
         assert (distance[chosen] < np.sqrt(3.0) * reach + 0.87 * ball.cell).all()
 
 
@@ -142,7 +142,7 @@ def test_a_hole_does_not_turn_the_inside_out(kit):
     whole = kit.icosphere(0.1, 2)
     holed = Surface(whole.positions, whole.triangles[6:])
     field = field_of(holed)
-    # no longer than the way to where the hole is closed
+    # no farther than the closed hole
     assert -0.1 < field.distance(np.zeros((3, 1), np.float32))[0][0] < -0.05
     assert field.distance(np.full((3, 1), 0.09, np.float32))[0][0] > 0.04
 
@@ -172,7 +172,8 @@ def test_a_mesh_without_volume_is_named(positions, triangles, message):
 
 
 def test_a_wide_opening_lets_nothing_of_the_inside_count_as_outside(kit):
-    """A ball cut off below, where rows of the grid enter it: by the exact winding number."""
+    """Against the exact winding number, for a ball that is cut off below, so that rows of the grid
+    enter it."""
     ball = kit.icosphere(0.1)
     kept = ball.positions[ball.triangles][:, :, 2].min(axis=1) > -0.06
     bowl = Surface(ball.positions, ball.triangles[kept])
@@ -187,7 +188,7 @@ def test_a_wide_opening_lets_nothing_of_the_inside_count_as_outside(kit):
 
 
 def test_an_opening_is_a_surface_too(kit):
-    """A box without its lid: what is beyond the lid's place finds it as near as it is."""
+    """In and above a box without its lid, no distance exceeds that to the closed opening."""
     box = kit.box((0.2, 0.2, 0.2))
     upper = (box.corners[:, :, 2] > 0.0).all(axis=1)
     field = DistanceField.from_surface(

@@ -1,4 +1,4 @@
-"""A few of the seeded runs of bench/endurance.py: nothing breaks, and hair keeps its length."""
+"""Some of the seeded runs of bench/endurance.py: all values stay finite, and lengths are kept."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def test_a_shaken_head_leaves_the_hair_its_length() -> None:
 
 
 def test_the_runs_are_what_they_say() -> None:
-    """Otherwise the tests above would show little."""
+    """The random runs cover the whole range, without which the tests above would show little."""
     runs = [random_run(seed) for seed in range(60)]
     settings = [run.settings for run in runs]
     assert {run.grid.shape[1] for run in runs} == {2, 3, 4, 8, 16, 24}

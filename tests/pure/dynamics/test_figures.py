@@ -1,4 +1,4 @@
-"""Figures of a motion, where one knows what they are: strands that were stretched by hand."""
+"""Figures of a motion against known values: strands that are stretched by hand."""
 
 import numpy as np
 import pytest
@@ -47,7 +47,7 @@ def test_each_strand_counts_by_its_worst_frame():
     found = measure.figures
     assert found.strands_stretch_max_percent == pytest.approx(50.0, abs=1e-3)
     assert found.strands_stretched_percent == pytest.approx(100.0 * 4 / COUNT)
-    # of 200 strands the 99th percentile lies between the second and the third worst: 20 and 2 %
+    # of 200 strands, the 99th percentile lies between the second and third worst: 20 and 2 %
     assert found.strands_stretch_p99_percent == pytest.approx(2.0 + 0.01 * 18.0, abs=1e-3)
     assert found.stretch_max_percent == 0.0, "none of them is a guide"
     now[2, -1, 2] += 0.1 * 0.2 / (POINTS - 1)
@@ -56,8 +56,8 @@ def test_each_strand_counts_by_its_worst_frame():
 
 
 def test_what_is_too_short_to_be_measured_does_not_decide():
-    """A strand and guide of 2 micrometres, in segments of 0.0003 mm, where the next float is 0.0001
-    mm off: 6 micrometres more are 300 % of it, and 0.3 % of what counts."""
+    """A strand, also a guide, of 2 micrometres, where float32 has steps of 0.1 micrometres: 6
+    micrometres more are 300 % of it, but 0.3 % of the length that counts."""
     grid = upright() + np.float32(1.0)
     grid[0] = 1.0
     grid[0, :, 2] += np.linspace(0.0, 2.0e-6, POINTS)
@@ -112,7 +112,7 @@ def test_the_table_says_nothing_is_nothing_and_little_is_not():
 
 
 def test_nothing_is_deeper_in_a_thin_mesh_than_that_is_thick(kit):
-    """In its middle, where both sides are as near, sampled distances do not change."""
+    """In its middle, at the same distance from both sides, sampled distances are constant."""
     ball = kit.icosphere(0.1, 4)
     disc = Surface(ball.positions * [0.05, 1.0, 1.0], ball.triangles)
     field = DistanceField.from_surface(disc, DynamicsSettings())
@@ -127,7 +127,7 @@ def test_nothing_is_deeper_in_a_thin_mesh_than_that_is_thick(kit):
 
 @pytest.mark.parametrize("kind", [Figures, CardFigures])
 def test_what_was_not_measured_takes_as_much_room(kind: type[Figures] | type[CardFigures]) -> None:
-    """A panel keeps its height when it is measured."""
+    """A panel keeps its height when a measurement begins."""
     blank, table = blank_table(kind), kind().table
     assert [len(row) for row in blank] == [len(row) for row in table]
     assert [row[0] for row in blank] == [row[0] for row in table]

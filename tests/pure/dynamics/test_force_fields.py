@@ -1,6 +1,6 @@
-"""Force fields: three forms that agree, formulas of textbooks, and hair that stays whole.
+"""Force fields: three implementations that agree, textbook formulas, and hair that stays finite.
 
-That they are Blender's, field for field, is in tests/blender/test_force_fields.py.
+tests/blender/test_force_fields.py compares each field with Blender's.
 """
 
 from dataclasses import replace
@@ -36,7 +36,7 @@ DT = 1.0 / 180.0
 
 
 def variants():
-    """Every kind in every shape, with all other values at random."""
+    """Fields of every kind in every shape, with random other values."""
     random = np.random.default_rng(7)
     for kind in KINDS:
         for shape in SHAPES:
@@ -65,7 +65,8 @@ def variants():
 
 
 def smooth(kind=None):
-    """Of each kind one, or only of this one, without edges, at which rounding decides."""
+    """One field of each kind, or of `kind` alone, without discontinuities, where rounding would
+    decide."""
     return tuple(
         replace(one, strength=one.strength * 3.0, side=0, distance=Falloff(1.37), flow=0.5)
         for one in variants()
@@ -113,7 +114,7 @@ def test_the_slow_form_agrees_on_strands(kit):
 
 @pytest.mark.parametrize("kind", few_in_commits([None, *KINDS], 2))
 def test_the_slow_step_agrees(kit, shake, kind):
-    """All at once, and each by itself, as strong as is seen."""
+    """All fields at once and each alone, strong enough to have a visible effect."""
     fields = smooth(kind)
     scene = kit.Scene(
         kit.curly(4, 10),
@@ -143,7 +144,7 @@ def test_the_slow_cloth_agrees():
 
 
 def test_no_field_changes_nothing(kit, shake):
-    """To the bit: fields that are not there, or turned off."""
+    """Bit for bit: without fields, and with fields that are turned off."""
     fields = ForceFields(tuple(variants()), PERMUTATION)
     plain = kit.Scene(kit.curly(6, 10), DynamicsSettings(), shake)
     off = kit.Scene(
@@ -158,7 +159,7 @@ def test_no_field_changes_nothing(kit, shake):
 
 
 def test_free_hair_in_even_wind_goes_as_fast_as_it_blows(kit):
-    """v' = s - f v: with no other force its speed nears strength over flow."""
+    """v' = s - f v: without other forces, the speed approaches strength over flow."""
     grid = kit.straight(1, 8)
     previous = np.ascontiguousarray(grid.transpose(2, 1, 0)).reshape(3, -1)
     wind = ForceFields((ForceField("wind", axis=(1.0, 0.0, 0.0), strength=3.0, flow=2.0),))
@@ -172,7 +173,7 @@ def test_free_hair_in_even_wind_goes_as_fast_as_it_blows(kit):
 
 
 def test_a_magnet_turns_speed_and_adds_none():
-    """It may take some, as what slows down is solved implicitly."""
+    """It may remove some, since damping terms are solved implicitly."""
     position, previous = np.zeros((3, 1), np.float32), np.zeros((3, 1), np.float32)
     previous[0] = -0.01
     magnet = ForceFields((ForceField("magnet", shape="plane", strength=5.0),))
@@ -192,7 +193,7 @@ def test_a_magnet_turns_speed_and_adds_none():
 @pytest.mark.parametrize("strength", [1e6, -1e6])
 @pytest.mark.parametrize("kind", KINDS)
 def test_hair_stays_whole_in_any_field(kit, kind, strength):
-    """The strongest that the scene passes on, in the middle of the hair, without falloff."""
+    """Fields of the greatest strength that the scene passes on, amid the hair, without falloff."""
     fields = tuple(
         ForceField(
             kind,

@@ -1,4 +1,4 @@
-"""Held CVs: which they are, and what is carried on from one to the next."""
+"""Held CVs: their indices, and values that are spread from one to the next."""
 
 import numpy as np
 
@@ -40,7 +40,7 @@ def test_neighbours_keep_their_distance_wherever_their_tie_goes(kit):
 
 
 def test_a_ponytail_through_a_ring_that_turns_with_the_head_stays_in_it(kit, shake):
-    """Within a tenth of a millimetre, with all lengths, also between two substeps."""
+    """Within 0.1 mm, with all lengths kept, also at frames between two substeps."""
     from hairloom.addon.dynamics.measure import max_stretch
     from hairloom.addon.dynamics.step import advance, grid_at_frame_end
 
@@ -48,7 +48,7 @@ def test_a_ponytail_through_a_ring_that_turns_with_the_head_stays_in_it(kit, sha
     held = kit.tied([True] * 12, 16, 6)
     scene = kit.Scene(grid, DynamicsSettings(), shake, held=held, bowed=True)
     state = scene.start()
-    for frame in range(48):  # at 24 frames a second half a substep is left at every other
+    for frame in range(48):  # at 24 frames a second, every other one ends in mid-substep
         drive = scene.drive(frame / 24.0, (frame + 1) / 24.0)
         state = advance(state, drive, scene.settings, 1.0 / 24.0)
         shown = grid_at_frame_end(state, drive, DynamicsSettings(), 1.0 / 24.0)

@@ -1,4 +1,4 @@
-"""How much of the head's motion hair takes over without inertia."""
+"""The fraction of the head's motion that hair inherits without inertia."""
 
 from dataclasses import replace
 
@@ -16,13 +16,13 @@ SOFT = {"style_root": 0.5, "style_tip": 0.0, "bend": 0.5, "length_tolerance": 0.
 
 
 def tumbling(kit, time):
-    """Fast and uneven, about changing axes."""
+    """A fast, uneven motion about changing axes."""
     turn = kit.rotation(0, 3.0 * np.sin(4.0 * time)) @ kit.rotation(2, 9.0 * time**2)
     return kit.translation(2.0 * time**2, 0.3 * np.sin(9.0 * time), 0.0) @ turn
 
 
 def played(kit, settings, motion, form=advance, seconds=0.5, fps=24.0, gravity=(0.0, 0.0, 0.0)):
-    """States, and guides as they are shown, at each frame."""
+    """The states and the shown guides of all frames."""
     grid = kit.curly(30, 8)
     state, shown = start(kit.moved(motion(0.0), grid)), []
     for frame in range(round(seconds * fps)):
@@ -37,7 +37,7 @@ def played(kit, settings, motion, form=advance, seconds=0.5, fps=24.0, gravity=(
 @pytest.mark.parametrize("fps", [24.0, 60.0, 400.0])
 @pytest.mark.parametrize("stiff", [SOFT, {"style_root": 0.0, "style_tip": 0.0, "bend": 0.0}])
 def test_all_of_it_is_as_at_rest(kit, stiff, fps):
-    """Without weight, hair on a tumbling head stays in its style in every frame."""
+    """Without gravity, hair that inherits all motion of a tumbling head stays in its style."""
     settings = DynamicsSettings(**WHOLE | stiff)
     _, shown = played(kit, settings, lambda time: tumbling(kit, time), fps=fps)
     for frame, guides in enumerate(shown, 1):
@@ -46,7 +46,8 @@ def test_all_of_it_is_as_at_rest(kit, stiff, fps):
 
 
 def test_swinging_goes_on_as_if_the_head_stood_still(kit):
-    """Thrown hair swings on a tumbling head as it does on one at rest, seen from there."""
+    """Relative to the head, hair that is given a push swings on a tumbling head as on a still
+    one."""
     settings = DynamicsSettings(**WHOLE | SOFT | {"sag_compensation": 0.0})
     fps, dt, grid, ends = 60.0, 1.0 / 180.0, kit.curly(30, 8), []
     for motion in (lambda time: np.eye(4), lambda time: tumbling(kit, time)):
@@ -64,7 +65,8 @@ def test_swinging_goes_on_as_if_the_head_stood_still(kit):
 
 
 def test_parts_lie_in_between(kit):
-    """Lag behind the head is less with more of it, and movement and rotation count alone."""
+    """More inherited motion means less lag behind the head; location and rotation are
+    independent."""
 
     def lag(**values):
         settings = DynamicsSettings(**SOFT | values)
@@ -79,8 +81,8 @@ def test_parts_lie_in_between(kit):
 
 
 def test_it_fades_in_without_a_jerk(kit):
-    """On a head that goes evenly, where no air slows hair down, nobody can tell how much of its
-    motion is inherited; so setting it in mid-motion changes nothing."""
+    """On a head at constant speed and without air damping, the inherited fraction has no effect, so
+    changing it in mid-motion changes nothing."""
     grid, fps, way = kit.curly(30, 8), 60.0, np.float32([0.05, 0.0, 0.0])
     plain = DynamicsSettings(damping=0.0, sag_compensation=0.0)
     states = [start(grid), start(grid)]
@@ -100,7 +102,7 @@ def test_it_fades_in_without_a_jerk(kit):
     "values", few_in_commits([WHOLE, {"inherit_location": 0.4}, {"inherit_rotation": 0.7}])
 )
 def test_equals_the_reference(kit, values):
-    """With wind, drag and weight, in frames that substeps do not fit into."""
+    """With wind, drag and gravity, in frames of no whole number of substeps."""
     settings = DynamicsSettings(
         **SOFT | values | {"drag": 2.0, "wind_speed": 3.0, "damping": 1.0, "sag_compensation": 0.5}
     )

@@ -1,4 +1,4 @@
-"""Grooms that feel each other: against a form without a grid, against one groom, at rest."""
+"""Grooms that interact: against a form without a grid, against one groom, and at rest."""
 
 from dataclasses import replace
 
@@ -20,7 +20,7 @@ FULL = DynamicsSettings(volume=1.0, **SOFT)
 
 
 def swayed(grooms, frames, near=None, sway=0.05):
-    """Through frames in which the head sways at 1 Hz; gives their CVs in each."""
+    """The CVs of all grooms in each frame while the head sways at 1 Hz."""
     rests, found = [groom.grid for groom in grooms], []
     for number in range(1, frames + 1):
         way = np.float32([sway * np.sin(2.0 * np.pi * number * FRAME), 0.0, 0.0])
@@ -30,7 +30,8 @@ def swayed(grooms, frames, near=None, sway=0.05):
 
 
 def test_as_without_a_grid():
-    """Others that are heavier and lighter, some of them far away, and in motion."""
+    """Against the form without a grid, with other hair that moves, of various mass, some far
+    away."""
     rest, position, previous, turn, middle = squeezed()
     random, settings = np.random.default_rng(3), DynamicsSettings(volume=1.0)
     at_rest = np.concatenate([tail(12, 8, seed=4).reshape(-1, 3) + [0.01, 0.0, 0.0]] * 2)
@@ -67,8 +68,9 @@ def replace_others(hair):
 
 
 def test_two_halves_of_a_groom_move_as_it_does():
-    """Halves that know each other are a tenth as far from the whole as those that do not, and a
-    fortieth as far as hair that feels none. They differ at all as cells of each begin elsewhere."""
+    """Halves that interact deviate from the whole groom by a tenth of what separate halves do, and
+    by a fortieth of what hair without volume does. They deviate at all because their grids have
+    other origins."""
     grid = tail(600)
     whole, halves = swayed([Groom(grid, FULL)], 24), [grid[::2], grid[1::2]]
     cases = {
@@ -112,7 +114,7 @@ def test_locks_of_two_grooms_do_not_swing_through_each_other():
 
 @pytest.mark.parametrize("angle", [0.0, 0.4, 2.0])
 def test_at_rest_nothing_acts_wherever_the_head_is(angle):
-    """Two grooms that are combed into each other."""
+    """No push between two grooms that are combed into each other."""
     one, other = tail(300), tail(200, seed=2) * np.float32(1.03)
     rest, turn, move = start(one).rest, turned(angle), np.array([3.0, -1.0, 0.5])
     style = Style(lambda: other, hair_of(other, np.ones(200)), other)
@@ -172,7 +174,7 @@ def test_neighbours_that_is_far_away_changes_no_bit():
 
 
 def test_hair_that_goes_straight_is_felt():
-    """A lock that nobody simulates is moved into one that hangs there."""
+    """A lock without simulation that is moved into a hanging one pushes it."""
     grid, side = locks(100)
     still, moved = grid[side > 0.0], grid[side < 0.0]
     for settings in (FULL, replace(FULL, volume=0.0)):
@@ -188,7 +190,7 @@ def test_hair_that_goes_straight_is_felt():
 
 @pytest.mark.parametrize("rate", [100.0, 240.0])
 def test_grooms_of_other_substeps(rate):
-    """Each stops when it feels; the ends are about those of equal ones."""
+    """Grooms with different substep rates end within 2 mm of grooms with equal ones."""
     grids = [tail(300)[::2], tail(300)[1::2]]
     even = [Groom(grid, FULL) for grid in grids]
     uneven = [Groom(grids[0], FULL), Groom(grids[1], replace(FULL, substep_rate=rate))]
@@ -198,7 +200,7 @@ def test_grooms_of_other_substeps(rate):
 
 @pytest.mark.parametrize("size", [0.001, 1000.0])
 def test_grooms_of_any_size(size):
-    """Gravity apart, hair of another size moves as much larger or smaller."""
+    """With gravity scaled alike, scaled hair makes the scaled motion."""
     ends = []
     for scale in (1.0, size):
         grids = [(tail(120, seed=seed) * scale).astype(np.float32) for seed in (1, 2)]
@@ -208,8 +210,8 @@ def test_grooms_of_any_size(size):
 
 
 def test_neighbours_counts_for_the_strands_it_stands_for():
-    """Hair of half as many guides that stand for twice as many strands is as dense, also where it
-    is so fine that one guide of several is looked at."""
+    """Half as many guides that each represent twice as many strands give the same density, also
+    where hair has so many guides that only some are used."""
     one, other = tail(200), tail(400, seed=2)
     rest = start(one, strands=np.full(200, 10.0)).rest
     found = []
@@ -223,7 +225,7 @@ def test_neighbours_counts_for_the_strands_it_stands_for():
 
 
 def test_an_animated_style_does_not_forget_how_others_were_combed():
-    """Its grid is that of the new style, with the others as they were first met."""
+    """The grid has the new style, and other hair as it was when they first met."""
     one, other = tail(200), tail(200, seed=2)
     places = iter([other, other + np.float32([0.01, 0.0, 0.0])])
     style = Style(lambda: next(places), hair_of(other, np.ones(200)), other)
@@ -237,7 +239,7 @@ def test_an_animated_style_does_not_forget_how_others_were_combed():
 
 
 def test_what_is_known_of_others_is_kept():
-    """While nobody comes, goes or is edited, the grid is the same one."""
+    """The grid is kept as long as no groom is edited."""
     grooms = [Groom(tail(60), FULL), Groom(tail(60, seed=2), FULL)]
     swayed(grooms, 2)
     grid = grooms[0].known.grid

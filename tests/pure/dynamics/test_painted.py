@@ -1,5 +1,5 @@
-"""Settings that are painted: numpy's form against the slow one, and against guides that have the
-painted number as their setting."""
+"""Painted settings: the fast step against the slow one, and against guides whose setting has the
+painted value."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.step import BLOCK, advance
 from hairloom.addon.errors import HairloomError
 
-#: [m] of float32 against float64 in 0.2 s, see test_reference
+#: tolerance [m] of float32 against float64 after 0.2 s, see test_reference
 CLOSE = 2e-4
 NAMES = ("gravity", "damping", "style_root", "style_tip", "style_damping", "bend", "volume")
 VALUES = {
@@ -35,7 +35,7 @@ def scene_of(kit, shake, painted, count=8, **values):
 
 
 def test_as_the_slow_form_where_all_is_painted(kit, shake):
-    """Stiffness also along the guides."""
+    """Stiffness also varies along the guides."""
     random = np.random.default_rng(6)
     painted = PaintedGuides(
         {
@@ -54,7 +54,7 @@ def test_as_the_slow_form_where_all_is_painted(kit, shake):
 
 @pytest.mark.parametrize("name", [name for name in NAMES if name != "volume"])
 def test_each_guide_goes_as_if_its_number_were_the_setting(kit, shake, name):
-    """Guides that do not feel each other, half of them painted."""
+    """Guides without volume, so that they do not feel each other, half of them painted."""
     factor = np.where(np.arange(8) < 4, 0.25, 1.0)[None]
     scene = scene_of(kit, shake, PaintedGuides({name: factor}), volume=0.0)
     plain = kit.Scene(**scene.__dict__ | {"painted": None})
@@ -67,7 +67,7 @@ def test_each_guide_goes_as_if_its_number_were_the_setting(kit, shake, name):
 
 
 def test_hair_painted_without_volume_feels_no_other(kit, shake):
-    """Where volume is painted 0 for all, hair goes as it goes alone."""
+    """With volume painted 0 everywhere, hair moves as with the setting 0."""
     nothing = PaintedGuides({"volume": np.zeros((1, 8))})
     found = scene_of(kit, shake, nothing).play(0.2, 50.0)[-1].position
     alone = scene_of(kit, shake, None, volume=0.0).play(0.2, 50.0)[-1].position
@@ -77,7 +77,7 @@ def test_hair_painted_without_volume_feels_no_other(kit, shake):
 
 
 def test_blocks_have_their_own_columns(kit):
-    """More guides than are advanced together, each painted otherwise, go as each does alone."""
+    """More guides than one block holds, each with another value, move as each does alone."""
     count = BLOCK + 30
     grid = np.repeat(kit.curly(1, 6), count, axis=0)
     factor = np.linspace(0.0, 2.0, count)[None]

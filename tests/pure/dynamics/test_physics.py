@@ -1,4 +1,4 @@
-"""Motion against what physics says: periods, energy, drag, wind, hanging shapes."""
+"""Motion against analytic physics: periods, energy, drag, wind, hanging shapes."""
 
 import numpy as np
 import pytest
@@ -76,7 +76,7 @@ def test_hanging_chain_swings_in_its_period(kit):
 
 
 def test_bend_stiffness_is_swings_a_second(kit):
-    """A straight strand without gravity swings as a cantilever of the frequency that was set."""
+    """Without gravity, a straight strand swings as a cantilever of the set frequency."""
     settings = DynamicsSettings(**kit.LIMP | {"bend": 2.0, "substep_rate": 1000})
     scene = kit.Scene(kit.straight(1, 24), settings, gravity=np.zeros(3))
     state = scene.start()
@@ -106,7 +106,7 @@ def test_style_stiffness_is_swings_a_second(kit):
 
 
 def test_air_damping_is_per_second(kit):
-    """The speed falls as exp(-damping t), whatever the substep."""
+    """The speed decays as exp(-damping t), whatever the substep."""
     for rate in (60.0, 240.0, 1000.0):
         settings = DynamicsSettings(**kit.LIMP | {"damping": 3.0, "substep_rate": rate})
         scene = kit.Scene(kit.straight(1, 3, 2e3), settings, gravity=np.zeros(3))
@@ -123,11 +123,11 @@ def test_air_damping_is_per_second(kit):
 
 
 def energies(states, settings, style, gravity=9.81):
-    """Of all CVs together with mass 1, for each state: kinetic, potential and elastic.
+    """Kinetic, potential and elastic energy of all CVs together, of mass 1, for each state.
 
-    Speeds are those that the substep ended with, as backward Euler sees them: its energy falls for
-    any convex potential. A straight strand's bend energy is that of its second differences; a
-    curl's is none, as its rest curvature turns with the strand.
+    Speeds are those at the end of the substep, as in backward Euler, whose energy decreases for any
+    convex potential. The bend energy of a straight strand is that of its second differences. A curl
+    has no bend energy, since its rest curvature turns with the strand.
     """
     dt = 1.0 / settings.substep_rate
     band = style_band(settings, style.shape[1], dt)
@@ -149,7 +149,8 @@ def energies(states, settings, style, gravity=9.81):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_energy_of_limp_hair_never_grows(kit, seed):
-    """Released from any shape, undamped: kinetic and potential energy together only fall."""
+    """Released from any shape, without damping: the sum of kinetic and potential energy never
+    grows."""
     settings = DynamicsSettings(**kit.LIMP)
     grid = kit.curly(6, 16, seed=seed)
     grid[:3] = kit.straight(3, 16, 0.2, (1.0, 0.0, 0.0))
@@ -166,7 +167,7 @@ def test_energy_of_limp_hair_never_grows(kit, seed):
     ids=["place", "bend", "both"],
 )
 def test_energy_of_styled_hair_never_grows(kit, stiffness):
-    """Straight hair bent aside and let go: elastic energy is counted too, and the sum falls."""
+    """Straight hair, bent aside and released: the sum including elastic energy never grows."""
     settings = DynamicsSettings(**kit.LIMP | stiffness)
     scene = kit.Scene(kit.straight(6, 16), settings)
     state = scene.start()
@@ -186,7 +187,8 @@ def test_energy_of_styled_hair_never_grows(kit, stiffness):
 
 
 def along_wind(kit, settings, seconds, fps=60.0, gravity=0.0, direction=(0.0, 0.0, -1.0)):
-    """Speeds (frames, 3) and times of one free CV on an arm so long that it hardly turns."""
+    """Speeds (frames, 3) and times of one free CV on an arm that is so long that it hardly
+    turns."""
     grid = kit.straight(1, 3, 2e3, direction)
     scene = kit.Scene(grid, settings, gravity=np.array([0.0, 0.0, -gravity]))
     states = scene.play(seconds, fps)[1:]
@@ -195,7 +197,7 @@ def along_wind(kit, settings, seconds, fps=60.0, gravity=0.0, direction=(0.0, 0.
 
 
 def test_damped_hair_takes_on_the_speed_of_the_wind(kit):
-    """v = w (1 - exp(-c t))"""
+    """Against v = w (1 - exp(-c t))."""
     values = {"damping": 3.0, "wind_speed": 5.0, "wind_direction": np.pi / 2, "gusts": 0.0}
     speed, time = along_wind(kit, DynamicsSettings(**kit.LIMP | values), 1.0)
     np.testing.assert_allclose(speed[:, 1], 5.0 * (1.0 - np.exp(-3.0 * time)), rtol=0.01, atol=0.01)
@@ -203,7 +205,7 @@ def test_damped_hair_takes_on_the_speed_of_the_wind(kit):
 
 
 def test_drag_closes_up_to_the_wind(kit):
-    """w - v = w / (1 + k w t)"""
+    """Against w - v = w / (1 + k w t)."""
     values = {"drag": 0.5, "wind_speed": 6.0, "gusts": 0.0}
     speed, time = along_wind(kit, DynamicsSettings(**kit.LIMP | values), 2.0)
     expected = 6.0 - 6.0 / (1.0 + 0.5 * 6.0 * time)
@@ -211,7 +213,7 @@ def test_drag_closes_up_to_the_wind(kit):
 
 
 def test_drag_and_weight_settle_at_the_terminal_speed(kit):
-    """v = sqrt(g / k) tanh(t sqrt(g k))"""
+    """Against v = sqrt(g / k) tanh(t sqrt(g k))."""
     settings = DynamicsSettings(**kit.LIMP | {"drag": 2.0, "substep_rate": 240.0})
     speed, time = along_wind(kit, settings, 1.0, gravity=9.81, direction=(1.0, 0.0, 0.0))
     terminal = np.sqrt(9.81 / 2.0)
@@ -236,7 +238,8 @@ def test_floating_hair_feels_no_weight(kit):
 
 
 def test_under_water_the_style_lifts_the_hair(kit):
-    """Combed in air it holds its weight; where that is carried, it rises above its style."""
+    """The style carries hair's weight in air; where water carries it, hair rises above its
+    style."""
     grid = kit.straight(5, 16, 0.2, (0.8, 0.0, -0.6))
     states = kit.Scene(grid, DynamicsSettings(buoyancy=1.0, drag=4.0)).play(3.0)
     assert (states[-1].grid[:, -1, 2] > grid[:, -1, 2] + 0.01).all()
@@ -246,7 +249,8 @@ def test_under_water_the_style_lifts_the_hair(kit):
 
 
 def catenary(start_point, end_point, length, share):
-    """Points (n, 2) at these shares of a chain's length between two points in the plane x, z."""
+    """Points (n, 2) at these fractions of the length of a chain between two points in the plane x,
+    z."""
     (x0, z0), (x1, z1) = start_point, end_point
     span, rise = x1 - x0, z1 - z0
     low, high = 1e-3, 1e3  # a: sqrt(L^2 - rise^2) = 2 a sinh(span / 2 a), falling in a
@@ -265,7 +269,7 @@ def catenary(start_point, end_point, length, share):
 @pytest.mark.parametrize("rise", [0.0, 0.06])
 @pytest.mark.parametrize("by", ["tip", "tie"])
 def test_a_strand_held_at_both_ends_hangs_as_a_catenary(kit, solver, rise, by):
-    """A tie holds two CVs in a row, beyond which a tail hangs."""
+    """Against the analytic catenary. A tie holds two successive CVs, beyond which a tail hangs."""
     cv_count, length, span = 32, 0.3, 0.18
     segment = length / (cv_count - 1)
     # any shape of that length between the ends: here an arch of two straight halves, upwards
@@ -303,7 +307,7 @@ def test_a_strand_held_at_both_ends_hangs_as_a_catenary(kit, solver, rise, by):
 
 
 def oscillation(time):
-    """0.3 m to and fro along x, once a second, smoothly begun."""
+    """A motion by 0.3 m along x, once a second, with a smooth beginning."""
     begun = np.sin(np.pi * min(max(time, 0.0), 0.5)) ** 2
     matrix = np.eye(4)
     matrix[0, 3] = 0.15 * begun * np.sin(2.0 * np.pi * time)
@@ -321,9 +325,9 @@ def tips_after_two_seconds(kit, fps, values, bowed):
 )
 @pytest.mark.parametrize("rates", few_in_commits([(24.0, 120.0), (24.0, 30.0, 60.0, 120.0)]))
 def test_the_frame_rate_does_not_matter(kit, values, rates):
-    """Under 2 % of the hair's length (0.2 m) at the tips, any two rates.
+    """For any two rates, tips differ by less than 2 % of the hair's length (0.2 m).
 
-    It is 0.1 %, and twice as much on straight ways.
+    The measured difference is 0.1 %, and twice as much on straight trajectories.
     """
 
     def spread(bowed):

@@ -1,4 +1,4 @@
-"""The fast step against the slow one: two solvers that share next to nothing must agree."""
+"""The fast step against the slow one: two solvers that share almost no code must agree."""
 
 from dataclasses import replace
 
@@ -20,10 +20,10 @@ from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import start
 from hairloom.addon.dynamics.step import Drive, advance
 
-#: [m] in 0.4 s of float32 against float64: limp strands enlarge what rounding starts about
-#: seventyfold (the slow form does it too, started one rounding apart), contacts more.
+#: tolerances [m] of float32 against float64 after 0.4 s: limp strands amplify rounding errors about
+#: seventyfold (so does the slow form, if started one rounding error apart), contacts more.
 FREE, TOUCHING = 2e-4, 1e-3
-#: Else one form takes a last Newton step that the other finds needless by a hair.
+#: Otherwise one form could take a last Newton step that the other just avoids.
 TIGHT = {"length_tolerance": 0.0001}
 
 
@@ -53,7 +53,7 @@ def test_without_colliders(kit, shake, values):
         assert one.time_left == pytest.approx(other.time_left, abs=1e-9)
 
 
-#: Each feature alone and what it acts together with.
+#: Each feature alone, and combined with others that it interacts with.
 FEATURES = {
     "curves": {"style_along": (1.0, 0.1, 0.9, 0.9, 0.2), "bend_along": (1.0, 1.0, 0.5, 0.0, 0.3)},
     "drag": {"drag": 8.0},
@@ -95,7 +95,7 @@ def test_held_cvs(kit, shake, solver):
 
 
 def test_another_style_in_mid_play(kit, shake):
-    """Longer and of another shape, as if nodes had moved the curves of the style."""
+    """A change to longer guides of another shape, as if nodes had moved the style's curves."""
     first = kit.curly(6, 10)
     second = first * np.linspace(1.0, 1.3, 10)[:, None] + [0.0, 0.01, 0.0]
     settings, found = DynamicsSettings(**TIGHT), []
@@ -116,7 +116,8 @@ def test_another_style_in_mid_play(kit, shake):
 @pytest.mark.parametrize("held", few_in_commits([True, False]))
 @pytest.mark.parametrize("solver", few_in_commits(["direct", "relaxation"]))
 def test_curls_that_give(kit, shake, solver, held):
-    """Some guides, some segments of these, with ties and a ball, the weight carried in part."""
+    """Some segments of some guides stretch, with ties and a ball; the style carries part of the
+    weight."""
     room = np.random.default_rng(4).uniform(-0.5, 1.5, (6, 9)).clip(0.0, None)
     room[::3] = 0.0
     values = {"length_solver": solver, "curl_stretch": 0.5, "sag_compensation": 0.6}
@@ -148,7 +149,7 @@ def test_held_cvs_that_tear(kit, iterations):
 
 
 def test_a_changed_substep(kit, shake):
-    """The speed is kept, and quadratic drag sees it as it is."""
+    """The speed is kept, also for quadratic drag."""
     one, other = (DynamicsSettings(**TIGHT | {"drag": 3.0, "substep_rate": r}) for r in (200, 100))
     scene = kit.Scene(kit.curly(4, 8), one, shake)
     state = scene.play(0.2, 50.0)[-1]
@@ -170,7 +171,7 @@ def test_with_a_ball_and_a_mesh(kit, shake, friction, is_combed):
     ball = SphereCollider(grid[3, 7] + [0.0, 0.0, 0.03], 0.05)
     scene = kit.Scene(grid, settings, shake, on_head=(mesh,), standing=(ball,), is_combed=is_combed)
     fast, slow = both(kit, scene)
-    if is_combed:  # it matters
+    if is_combed:  # makes a difference here
         uncombed = kit.Scene(**scene.__dict__ | {"is_combed": False}).play(0.4, 50.0)
         assert np.abs(fast[-1].position - uncombed[-1].position).max() > 5e-3
     assert deepest_penetration(fast[0], scene.colliders(0, 0)) > 0.0  # some start inside
@@ -212,8 +213,8 @@ def test_with_a_sphere_set_and_a_capsule(kit, shake, collider, bowed):
 @pytest.mark.parametrize("is_combed", [False, True])
 @pytest.mark.parametrize("speed", few_in_commits([6.5, 2.2]))
 def test_segments_at_what_is_thin_and_fast(kit, is_mesh, is_combed, speed):
-    """It goes twice its own thickness in a substep, or farther than a segment is long; all find the
-    same places on the segments."""
+    """A collider that moves by twice its thickness per substep, or by more than a segment's length:
+    both forms find the same places on the segments."""
     settings = DynamicsSettings(**kit.LIMP | TIGHT | {"damping": 1.0, "collider_resolution": 24})
     if is_combed:
         settings = replace(settings, radius_root=0.02, radius_tip=0.08)
@@ -231,7 +232,7 @@ def test_segments_at_what_is_thin_and_fast(kit, is_mesh, is_combed, speed):
     ]
     states = [start(grid) for _ in moving]
     still, clearance = kit.Scene(grid, settings), None
-    if is_combed:  # so near that it matters
+    if is_combed:  # near enough to make a difference
         aside = kit.translation(0.0, 0.04, 0.0)
         near = [PosedCollider(thin, aside @ motion(0.0), aside @ motion(0.0))]
         clearance = guide_clearance(grid, near, farthest_kept(settings, 0.25))

@@ -1,4 +1,4 @@
-"""Roots and colliders on a head that turns within a frame: on the arc, and by even speed."""
+"""Roots and colliders of a head that turns within a frame move on arcs at constant speed."""
 
 import math
 
@@ -23,7 +23,7 @@ PIVOT = np.array([0.02, -0.05, -0.15])
 
 
 def turned_about(kit, axis, angle):
-    """About an axis through the neck."""
+    """A rotation about an axis through the neck."""
     return kit.translation(*PIVOT) @ kit.rotation(axis, angle) @ kit.translation(*-PIVOT)
 
 
@@ -35,7 +35,8 @@ def on_arc(kit, axis, degrees, moment):
 @pytest.mark.parametrize("axis", [0, 2])
 @pytest.mark.parametrize("degrees", [10.0, 90.0, 170.0])
 def test_roots_stay_on_the_arc(kit, axis, degrees, earlier):
-    """An even turn about the neck: every place of the style is on its circle at every moment."""
+    """During an even turn about the neck, each point of the style is on its circle at any
+    moment."""
     grid = kit.curly(40, 6)
     targets = [kit.moved(on_arc(kit, axis, degrees, s), grid) for s in (-1.0, 0.0, 1.0)]
     drive = Drive(*targets[1:], (), kit.EARTH, targets[0] if earlier else None)
@@ -45,7 +46,8 @@ def test_roots_stay_on_the_arc(kit, axis, degrees, earlier):
 
 
 def test_the_simulation_pins_roots_on_the_arc(kit):
-    """90 degrees in a frame of four substeps, one after the other; a chord is 3 cm inside."""
+    """90 degrees in a frame of one substep, and of one and a half; a chord would be over 2 cm
+    off."""
     grid = kit.curly(40, 6)
     targets = [kit.moved(on_arc(kit, 2, 90.0, s), grid) for s in (0.0, 1.0)]
     state = start(grid)
@@ -62,7 +64,7 @@ def test_the_simulation_pins_roots_on_the_arc(kit):
 
 @pytest.mark.parametrize("earlier", [False, True])
 def test_colliders_stay_on_the_arc(kit, earlier):
-    """A matrix that is scaled and sheared as well keeps its shape on the way."""
+    """A matrix with scale and shear keeps its shape along the arc."""
     shape = np.diag([1.0, 2.0, 0.5, 1.0]) @ kit.translation(0.3, 0.0, 0.1)
     shape[0, 1] = 0.2
     before, now, since = (on_arc(kit, 1, 90.0, s) @ shape for s in (0.0, 1.0, -1.0))
@@ -86,7 +88,7 @@ def test_pinned_cloth_stays_on_the_arc(kit):
 
 
 def test_what_does_not_turn_goes_as_before(kit):
-    """To the last bit: arcs cost nothing and change nothing there."""
+    """Without a turn there are no arcs, and results are the same bit for bit."""
     grid = kit.curly(40, 6)
     shifted = [kit.moved(kit.translation(0.1 * k * k, 0.0, 0.02), grid) for k in range(3)]
     drive = Drive(*shifted[1:], (), kit.EARTH, shifted[0])
@@ -97,7 +99,7 @@ def test_what_does_not_turn_goes_as_before(kit):
 
 
 def test_an_uneven_turn_goes_through_all_three_places(kit):
-    """Slower and slower, about one axis: angles are the parabola through the three."""
+    """A turn about one axis that slows down: angles lie on the parabola through all three."""
     grid, angles = kit.curly(40, 6), (-0.9, 0.0, 0.5)
     targets = [kit.moved(turned_about(kit, 2, angle), grid) for angle in angles]
     drive = Drive(*targets[1:], (), kit.EARTH, targets[0])
@@ -120,7 +122,7 @@ def test_twists_come_back(angle):
 
 
 def test_every_axis_is_found():
-    """Each part of the quaternion is the largest once."""
+    """The axes make each component of the quaternion the largest once."""
     for axis in (*np.eye(3), *-np.eye(3), np.array([0.6, 0.0, 0.8])):
         for angle in (0.01, 2.0, 3.1):
             np.testing.assert_allclose(turn_of(rotation_of(axis * angle)), axis * angle, atol=1e-12)

@@ -1,4 +1,4 @@
-"""Motion knows no metre: hair and cloth a thousand times smaller and larger move the same."""
+"""Motion does not depend on scale: hair and cloth a thousand times smaller or larger move alike."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from hairloom.addon.dynamics.colliders.distance_field import DistanceField
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.step import Drive
 
-#: powers of two, so that numbers are rounded alike and small differences have nothing to grow from
+#: powers of two, so that rounding is the same and there are no differences that could grow
 FACTORS = (2.0**-10, 2.0**10)
 LENGTH = 0.2
-#: of the hair's length
+#: tolerance, as a fraction of the hair's length
 ROUNDED = 1e-4
 
 
 def larger(matrix: np.ndarray, factor: float) -> np.ndarray:
-    """The same way, of what is larger by a factor."""
+    """The same motion for objects that are larger by a factor."""
     scaled = matrix.copy()
     scaled[:3, 3] *= factor
     return scaled
@@ -31,7 +31,8 @@ def larger(matrix: np.ndarray, factor: float) -> np.ndarray:
 @pytest.mark.parametrize("collider", few_in_commits(["mesh", "ball"]))
 @pytest.mark.parametrize("solver", few_in_commits(["direct", "relaxation"]))
 def test_hair_moves_the_same_at_any_size(kit, shake, collider, solver):
-    """With gravity as much stronger: on a head that shakes, combed through a ball or a box."""
+    """With gravity scaled alike, on a shaking head; half of the hair starts inside a ball or
+    box."""
 
     def ends(factor: float) -> np.ndarray:
         grid = kit.curly(40, 12, LENGTH) * np.float32(factor)

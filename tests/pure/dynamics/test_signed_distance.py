@@ -33,7 +33,7 @@ def test_a_ball_is_where_the_frame_ends(kit):
 
 
 def test_the_nearest_of_all_kinds_counts(kit):
-    """Also for points that are inside of several, and within a reach only."""
+    """Also for points inside several colliders, and with a limited reach."""
     rod = CapsuleCollider((-0.1, 0.0, 0.0), (0.1, 0.0, 0.0), 0.05)
     balls = SphereSetCollider(((0.1, 0.02, 0.0), (0.2, 0.0, 0.1)), (0.07, 0.03))
     field = DistanceField.from_surface(kit.icosphere(0.08, 3), DynamicsSettings())

@@ -1,4 +1,5 @@
-"""A real groom on a real head: lengths, contact with the true mesh, and the style come through."""
+"""A real groom on a real head: its lengths, contact with the true mesh, and the return to its
+style."""
 
 from itertools import pairwise
 
@@ -58,4 +59,4 @@ def test_a_shaken_head(kit, shake, sintel):
     )
     assert np.median(swung) > 0.004
     assert np.median(away) < 0.001
-    assert away.max() < 0.008  # the few that the collision radius holds off the head
+    assert away.max() < 0.008  # a few that the collision radius keeps off the head

@@ -1,4 +1,4 @@
-"""Fitted spheres: they stay within what may stick out, cover the mesh, and bear bad meshes."""
+"""Fitted spheres: they stick out no farther than allowed, cover the mesh, and accept bad meshes."""
 
 from itertools import pairwise
 from pathlib import Path
@@ -47,7 +47,7 @@ def test_a_ball_needs_one_sphere(kit):
 
 
 def test_a_rod_is_covered_along_its_middle(kit):
-    """The medial axis of a long square rod, but for its ends and edges, is its middle line."""
+    """Except at ends and edges, the medial axis of a long square rod is its middle line."""
     fit = fitted(kit.box((0.4, 0.05, 0.05)), count=12)
     assert np.abs(fit.centers[:, 1:]).max() < 0.02
     assert np.ptp(fit.centers[:, 0]) > 0.3
@@ -55,7 +55,7 @@ def test_a_rod_is_covered_along_its_middle(kit):
 
 @pytest.mark.parametrize("overshoot", [0.0, 0.01, 0.03])
 def test_nothing_sticks_out_farther_than_allowed(kit, overshoot):
-    """Measured by formula, not by the fit's own error."""
+    """Measured by the formula of a box as well as by the fit's own error."""
     size = (0.2, 0.12, 0.08)
     fit = fitted(kit.box(size), 20, overshoot)
     beyond = np.abs(fit.centers) + fit.radii[:, None] - np.array(size) / 2.0
@@ -71,7 +71,7 @@ def test_more_spheres_leave_smaller_gaps(kit):
 
 @pytest.mark.slow
 def test_no_other_choice_of_the_same_size_does_better_by_chance(kit):
-    """Against many random choices of as many medial balls."""
+    """Against many random choices of the same number of medial balls."""
     surface = both(kit.box((0.2, 0.05, 0.05)), shifted(kit.icosphere(0.04, 2), 0.0, 0.0, 0.07))
     fit, boundary = fitted(surface, 10), boundary_of(surface, "mesh")
     samples, search = samples_of(boundary.mesh, 600), ClosestPointSearch(boundary.surface)
@@ -113,7 +113,8 @@ def test_scaled_tenfold_everything_is_ten_times_as_large(kit):
 
 
 def test_a_hole_lets_no_sphere_out(kit):
-    """A bust whose neck is cut off: without closing it a ball would bulge out of the neck."""
+    """A ball that is cut off below, as a bust is at the neck: spheres must not bulge out of the
+    hole."""
     ball = kit.icosphere(0.1, 3)
     above = ball.corners[:, :, 2].mean(axis=1) > -0.05
     fit = fitted(Surface(ball.positions, ball.triangles[above]), 10)
@@ -122,7 +123,7 @@ def test_a_hole_lets_no_sphere_out(kit):
 
 @pytest.mark.slow
 def test_parts_within_parts_do_no_harm(kit):
-    """An eye within a head, with its own surface."""
+    """An eye with its own surface within a head."""
     head, eye = kit.icosphere(0.1, 3), shifted(kit.icosphere(0.03, 2), 0.05, 0.0, 0.0)
     fit = fitted(both(head, eye), 1, 0.0)
     np.testing.assert_allclose(fit.radii, 0.1, atol=2e-3)
@@ -135,7 +136,7 @@ def test_flipped_faces_do_no_harm(kit):
 
 
 def test_the_error_is_what_geometry_says(kit):
-    """A ball of 10 cm for which one of 9 and one of 12 cm stand, beside each other."""
+    """Spheres of 9 and of 12 cm for a ball of 10 cm have errors of 1 cm inside and 2 cm outside."""
     boundary = boundary_of(kit.icosphere(0.1, 4), "ball")
     search = ClosestPointSearch(boundary.surface)
     origin = np.zeros((1, 3), np.float32)
@@ -172,7 +173,8 @@ def test_a_mesh_without_volume_is_named(positions, triangles, message):
 
 @pytest.mark.slow
 def test_the_head_of_sintel(shared_data: Path):
-    """60 spheres for a bust with open neck: about 1 mm off on average, ears and hems more."""
+    """60 spheres for a bust with an open neck: mean errors of less than 2 mm, more at ears and
+    hems."""
     surface = _read_obj(shared_data / "sintel" / "sintel.obj")
     fit = fitted(surface, 60)
     assert fit.error.gap_mean < 0.002 and fit.error.outside_mean < 0.002
@@ -194,7 +196,7 @@ def _read_obj(path: Path) -> Surface:
 
 
 def test_a_closed_mesh_has_no_holes(kit):
-    """Though each of its triangles has its own corners, as after splitting UV seams."""
+    """Also if each of its triangles has its own vertices, as after splitting UV seams."""
     for surface in (kit.icosphere(0.1, 2), kit.box((1.0, 1.0, 1.0))):
         closed, fans = close_holes(surface)
         assert closed is surface and not len(fans)
@@ -215,7 +217,7 @@ def test_two_holes_are_closed_each_by_its_own_fan(kit):
     assert len(fans) > 20
 
 
-# --- where points have gone
+# --- where points have moved
 
 
 def test_a_similarity_is_found_again(kit):

@@ -1,4 +1,4 @@
-"""Curls that give, against what physics says of springs, and against hair that does not."""
+"""Curls that stretch, against the physics of springs and against hair that does not stretch."""
 
 from dataclasses import replace
 
@@ -28,15 +28,15 @@ def hanging(kit, settings, cv_count, gravity, room=2.0, guide_count=1):
 
 
 def longer(states):
-    """By how much the first guide is longer than at the start [m]."""
+    """Growth of the first guide since the first state [m]."""
     return np.array([states[0].position[2, -1, 0] - state.position[2, -1, 0] for state in states])
 
 
 @pytest.mark.parametrize("cv_count", [3, 16])
 @pytest.mark.parametrize("frequency", few_in_commits([3.0, 1.0]))
 def test_a_curl_bobs_as_often_as_the_setting_says(kit, frequency, cv_count):
-    """Small motion: the frequency is that of the setting, whatever the number of CVs, and the
-    middle that of a chain of springs that bears its own weight: g n (n + 1) / (2 kappa)."""
+    """Small motion has the set frequency for any number of CVs, around the mean length of a chain
+    of springs under its own weight: g n (n + 1) / (2 kappa)."""
     gravity = -0.02 * frequency**2
     settings = settings_of(kit, curl_bounce=frequency, substep_rate=240.0)
     states = hanging(kit, settings, cv_count, gravity).play(4.0 / frequency, 60.0 * frequency)
@@ -52,7 +52,7 @@ def test_a_curl_bobs_as_often_as_the_setting_says(kit, frequency, cv_count):
 
 
 def test_weight_draws_a_curl_to_where_its_tension_balances(kit):
-    """kappa e / (1 - (e / E)^2) is the weight below, segment by segment, at rest."""
+    """At rest, the tension kappa e / (1 - (e / E)^2) of each segment equals the weight below it."""
     settings = settings_of(kit, curl_bounce=1.5, damping=8.0)
     state = hanging(kit, settings, 10, -9.81, room=0.5).play(4.0)[-1]
     rest = LENGTH / 9.0
@@ -87,7 +87,7 @@ def test_what_curls_give_counts_as_no_stretch(kit):
 
 
 def test_a_groom_at_rest_is_as_long_as_it_was_combed(kit):
-    """The weight that the style carries draws nothing out."""
+    """Weight that the style carries stretches nothing."""
     scene = hanging(kit, DynamicsSettings(), 12, -9.81)
     assert np.abs(longer(scene.play(1.0))).max() < 2e-5 * LENGTH
 
@@ -136,7 +136,7 @@ def test_substeps_hardly_matter(kit, shake, rate):
 
 @pytest.mark.parametrize("seed", few_in_commits(range(12), 3))
 def test_any_settings_stay_finite_and_within_what_is_given(kit, seed):
-    """Segments get no longer than what they give, and shorter by the same factor at most."""
+    """Segments stay within the stretch that they allow, in both directions by the same factor."""
     random = np.random.default_rng(seed)
     count, cv_count = 12, int(random.choice([2, 3, 5, 16]))
     settings = kit.random_settings(random, length_solver="direct", gravity=1.0)

@@ -1,4 +1,4 @@
-"""A frame of motion: the style, time, what must hold always, and bad input."""
+"""A frame of motion: the style, time, invariants, and bad input."""
 
 import numpy as np
 import pytest
@@ -33,7 +33,7 @@ def test_without_held_weight_it_sags(kit):
 
 
 def test_tilted_hair_falls(kit):
-    """Held weight turns with the head: bent forward, hair hangs below its style."""
+    """The weight that the style carries turns with the head: bent forward, hair hangs lower."""
     grid = kit.straight(5, 16, 0.2, (0.0, 0.6, 0.8))
 
     def tilt(time):
@@ -109,9 +109,9 @@ def test_best_rotation_of_one_straight_guide_is_the_smallest(kit):
 
 
 def farthest_reach(state):
-    """Largest length along a guide from its root to a CV, over what it should be.
+    """Largest ratio of the length along a guide, from its root to a CV, to its rest length.
 
-    At rest at most 1. The segment of the pinned CVs counts with the length that the head gives it.
+    At rest 1. The segment of the pinned CVs counts with the length that the head gives it.
     """
     length = state.rest.length.copy()
     length[: PINNED - 1] = directions(state.position[:, :PINNED])[1]
@@ -126,7 +126,7 @@ def end_at(kit, motion, fps, seconds=1.0):
 
 @pytest.mark.parametrize("fps", few_in_commits([24, 30, 144]))
 def test_even_motion_gives_the_same_at_any_frame_rate(kit, fps):
-    """A head at constant speed is drawn exactly by linear blending: only rounding may differ."""
+    """Linear interpolation is exact for a head at constant speed, so only rounding may differ."""
 
     def motion(time):
         return kit.translation(0.8 * time, 0.0, 0.3 * time)
@@ -144,7 +144,7 @@ def test_a_shake_gives_nearly_the_same_at_any_frame_rate(kit, shake, fps):
 
 
 def test_time_is_not_lost(kit):
-    """100 frames that are no whole number of substeps take as many substeps as their sum."""
+    """100 frames of no whole number of substeps take as many substeps as their total time."""
     settings = DynamicsSettings()
     scene = kit.Scene(kit.curly(3, 8), settings)
     state, count = scene.start(), 0
@@ -173,7 +173,8 @@ def test_no_time_changes_nothing(kit):
 
 
 def test_grid_at_frame_end_reaches_the_moved_roots(kit):
-    """At 25 frames a second 9.6 substeps fit: the left time is bridged without a stretch."""
+    """At 25 frames a second a frame is no whole number of substeps; the time left is bridged
+    without stretching hair."""
     settings = DynamicsSettings()
     scene = kit.Scene(kit.curly(5, 8), settings, lambda time: kit.translation(time, 0, 0))
     drive = scene.drive(0.0, 1 / 25)
@@ -185,7 +186,7 @@ def test_grid_at_frame_end_reaches_the_moved_roots(kit):
 
 
 def test_a_changed_substep_keeps_the_speed(kit):
-    """Time correction: the strand swings on when the rate is changed in flight."""
+    """Time correction of Verlet's method: a strand moves on at its speed when the rate changes."""
     fast, slow = (DynamicsSettings(**kit.LIMP | {"substep_rate": r}) for r in (480.0, 120.0))
     scene = kit.Scene(kit.straight(1, 3, 2e3), fast, gravity=np.zeros(3))
     state = scene.start()
@@ -196,7 +197,7 @@ def test_a_changed_substep_keeps_the_speed(kit):
     assert (state.position - state.previous)[0, 2, 0] * 120.0 == pytest.approx(1.0, rel=0.01)
 
 
-# --- what must hold always -----------------------------------------------------------------------
+# --- invariants ----------------------------------------------------------------------------------
 
 
 def test_the_same_twice(kit, shake):
@@ -210,7 +211,7 @@ WINDY = {"wind_speed": 5.0, "drag": 1.0, "sag_compensation": 0.0}
 
 
 def swept(kit, shake, guides, settings):
-    """Some of 30 guides on a shaken head, half of them held, and where they end."""
+    """The last state of some of 30 guides on a shaken head, with some tips held and some tied."""
     held = kit.tips(np.arange(30) % 2 == 0, 12)
     held |= kit.tied(np.arange(30) % 3 == 0, 12, 6)
     scene = kit.Scene(
@@ -226,7 +227,8 @@ def swept(kit, shake, guides, settings):
 
 @pytest.mark.parametrize("solver", few_in_commits(["direct", "relaxation"]))
 def test_a_guide_does_not_feel_the_others(kit, shake, solver):
-    """Alone and among others, to the last bit; but for how the groom turns."""
+    """Alone and among others, bit for bit; without carried weight, which turns with the groom's
+    mean rotation."""
     settings = DynamicsSettings(**WINDY | {"length_solver": solver})
     together = swept(kit, shake, np.arange(30), settings)
     for guide in (0, 7, 29):
@@ -237,7 +239,7 @@ def test_a_guide_does_not_feel_the_others(kit, shake, solver):
 
 @pytest.mark.parametrize("size", few_in_commits([7, 1, 30]))
 def test_blocks_change_nothing(kit, shake, size, monkeypatch):
-    """With held weight too, as the mean rotation is that of the whole groom."""
+    """Also with carried weight, which turns with the mean rotation of the whole groom."""
     whole = swept(kit, shake, np.arange(30), DynamicsSettings())
     monkeypatch.setattr(step, "BLOCK", size)
     parts = swept(kit, shake, np.arange(30), DynamicsSettings())
@@ -285,7 +287,8 @@ def test_guides_without_length_stay_finite(kit, shake):
 @pytest.mark.parametrize("held", [None, True])
 @pytest.mark.parametrize("seed", few_in_commits(range(12), 2))
 def test_any_settings_stay_finite_and_short(kit, seed, held):
-    """Hard ranges at random, with a violent head, colliders, force fields and held tips."""
+    """Random values from the hard ranges, with a violent head, colliders, force fields and held
+    tips."""
     random = np.random.default_rng(seed)
     fixed = {} if seed % 4 == 3 else {"length_solver": "direct"}
     settings = kit.random_settings(random, **fixed)
@@ -358,7 +361,7 @@ def test_a_bad_duration_is_named(kit, duration):
 
 
 def test_a_collider_that_turns_over_within_a_frame_does_no_harm(kit):
-    """Half a turn in one frame: on its straight way the ball is flat for a moment."""
+    """Half a turn in one frame: linear interpolation of its matrix would flatten the ball."""
     grid = kit.curly(20, 12)
     posed = PosedCollider(SphereCollider((0, 0, 0), 0.12), np.eye(4), kit.rotation(0, np.pi))
     settings = DynamicsSettings(substep_rate=120.0)
@@ -368,7 +371,7 @@ def test_a_collider_that_turns_over_within_a_frame_does_no_harm(kit):
 
 
 def test_a_tied_straight_strand_stays_calm(kit, shake):
-    """Lengths between two fixed ends in a line have no solution but for compliance."""
+    """Without compliance, length constraints between two fixed ends on a line have no solution."""
     scene = kit.Scene(
         kit.straight(4, 12, 0.2, (0.0, 0.6, 0.8)),
         DynamicsSettings(),

@@ -1,4 +1,4 @@
-"""Frames that do not twist, and a style that comes back."""
+"""Frames that do not twist, and hair that returns to its style."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ def frames_of(state):
 
 
 def test_frames_are_the_transported_normals(kit):
-    """Against the frames of the strands room, which use Rodrigues' formula."""
+    """Against the frames of `strands/`, which use Rodrigues' formula."""
     tangent, normal = frames_of(start(kit.curly(30, 16)))
     expected = transported_normals(tangent.transpose(2, 1, 0), normal[:, 0].T)
     np.testing.assert_allclose(normal.transpose(2, 1, 0), expected, atol=2e-5)
@@ -26,7 +26,7 @@ def test_frames_are_the_transported_normals(kit):
 
 
 def test_curvature_turns_with_the_root(kit):
-    """A guide moved rigidly has nothing to restore, whatever the turn."""
+    """A rigidly moved guide is at rest, whatever the turn."""
     grid = kit.curly(30, 16)
     turn = kit.rotation(0, 1.1) @ kit.rotation(2, 2.3)
     state = start(grid)
@@ -39,7 +39,7 @@ def test_curvature_turns_with_the_root(kit):
 
 
 def test_bend_alone_brings_curls_back_without_place(kit):
-    """Straightened hair curls up again by its bend stiffness, with no pull to its place."""
+    """Straightened hair curls up again by bend stiffness alone, without a pull to its place."""
     grid = kit.curly(10, 16)
     state = start(grid)
     straightened = grid[:, :1] + (grid[:, 1:2] - grid[:, :1]) * np.arange(16)[:, None]
@@ -59,7 +59,7 @@ def test_bend_alone_brings_curls_back_without_place(kit):
 
 
 def test_solve_is_the_minimum(kit):
-    """The place pull alone is a weighted mean of where a CV is and where it belongs."""
+    """Without bend stiffness, the result is a weighted mean of a CV's position and its style's."""
     state = start(kit.curly(5, 8))
     settings = DynamicsSettings(style_root=3.0, style_tip=1.0, bend=0.0)
     dt = 1 / 60
@@ -98,7 +98,8 @@ def zigzag(guide_count: int, angle: float) -> np.ndarray:
 @pytest.mark.alike
 @pytest.mark.parametrize("degrees", [10, 30, 60, 80])
 def test_shaken_hair_comes_to_rest_however_kinked(degrees: float) -> None:
-    """Kinks that turned with the strand fed on their own motion and never stopped."""
+    """A regression: kinks whose rest curvature turned with the strand drove themselves and never
+    came to rest."""
     grid = zigzag(60, np.radians(degrees))
     state, settings = start(grid), DynamicsSettings()
     gravity = np.array([0.0, 0.0, -9.81])

@@ -1,4 +1,4 @@
-"""The way within a frame: exact for parabolas, and true to a turning head."""
+"""Trajectories within a frame: exact for parabolas, and close to the arcs of a turning head."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,8 @@ from hairloom.addon.dynamics.trajectory import at, curvature
 
 @pytest.mark.parametrize("ratio", [0.25, 0.5, 1.0, 1.7, 4.0])
 def test_three_moments_give_their_parabola(ratio):
-    """The frame before lasted `ratio` of this one; all of the way between is exact."""
+    """The trajectory equals the parabola everywhere; the frame before lasted `ratio` of this
+    one."""
     place, speed, bend = np.random.default_rng(1).normal(size=(3, 5, 3))
 
     def parabola(share):
@@ -31,7 +32,7 @@ def test_an_even_way_is_straight():
 
 
 def test_a_hiccup_does_not_throw_the_way_about():
-    """A frame before of nearly no time would give any speed; the ratio is held."""
+    """A previous frame of almost no time would give a huge speed, so the ratio is limited."""
     before, now = np.zeros(3), np.array([0.01, 0.0, 0.0])
     bent = curvature(before - 0.02, before, now, 1e-6)
     assert np.abs(bent).max() < 0.1
@@ -39,7 +40,8 @@ def test_a_hiccup_does_not_throw_the_way_about():
 
 @pytest.mark.parametrize("degrees", [5.0, 20.0])
 def test_roots_stay_on_a_turning_head(kit, degrees):
-    """A point of the head at 0.1 m: farthest from its true circle within the frame."""
+    """The largest distance of a point at 0.1 m from its true circle, against the error terms of
+    linear and quadratic interpolation."""
     turn = np.radians(degrees)
     point = np.array([[0.1, 0.0, 0.0]], np.float64)
     earlier, before, now = (

@@ -1,4 +1,5 @@
-"""Gusts: as strong as they say, free of divergence, carried along, the same at any frame rate."""
+"""Gusts: of the set strength, free of divergence, carried by the wind, the same at any frame
+rate."""
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ def anywhere(count, size=20.0):
 
 
 def test_the_sine_is_a_sine():
-    """Far from zero float32 rounds the angle itself, by 6e-8 of it."""
+    """Far from zero, float32 rounds the angle itself, by a relative 6e-8."""
     angle = np.linspace(-40.0, 40.0, 100_001).astype(np.float32)
     away = np.abs(sine(angle) - np.sin(angle.astype(np.float64)))
     assert away[np.abs(angle) < 7.0].max() < 1e-6
@@ -36,7 +37,7 @@ def test_direction(turn, rise, expected):
 
 
 def test_gusts_are_as_strong_as_they_say():
-    """Mean and standard deviation over space."""
+    """Mean and standard deviation over space equal the settings."""
     air = air_of(GUSTY)
     speed = air.at(anywhere(200_000), 0.0).astype(np.float64)
     mean = speed.mean(axis=1)
@@ -59,7 +60,7 @@ def test_gusts_are_free_of_divergence(seed):
 
 
 def test_gusts_drift_with_the_wind():
-    """Taylor's frozen turbulence: what is here now is downwind a second later."""
+    """Taylor's frozen turbulence: a second later, the same gusts are found downwind."""
     air = air_of(GUSTY)
     points = anywhere(100, 1.0)
     later = air.at(points + air.velocity[:, None], 1.0)

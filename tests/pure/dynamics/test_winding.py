@@ -1,4 +1,4 @@
-"""Winding numbers against the exact sum over all triangles, and against what geometry says."""
+"""Winding numbers against the exact sum over all triangles, and against known solid angles."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from hairloom.addon.strands import Surface
 
 
 def globe(rows: int = 24, columns: int = 48, radius: float = 0.1) -> Surface:
-    """A closed sphere of longitudes and latitudes, seen from outside counter-clockwise."""
+    """A closed sphere of longitudes and latitudes, counter-clockwise from outside."""
     polar, around = np.linspace(0, np.pi, rows + 1), np.arange(columns) * 2 * np.pi / columns
     sphere = np.stack(
         [
@@ -47,7 +47,7 @@ def test_inside_is_one_and_outside_zero() -> None:
 
 
 def test_right_at_the_surface_it_is_as_the_exact_sum() -> None:
-    """Where points share cells with many others, and with triangles that are near to some."""
+    """Where points share cells with many others, for some of which triangles are near."""
     points = np.random.default_rng(2).normal(0.0, 1.0, (400, 3))
     points *= 0.1 / np.linalg.norm(points, axis=1, keepdims=True)
     points *= np.linspace(0.97, 1.03, 400)[:, None]
@@ -68,7 +68,7 @@ def test_a_mesh_turned_inside_out_gives_minus_one() -> None:
 
 @pytest.mark.parametrize("triangle_count", [1, 3, 5, 700])
 def test_as_the_exact_sum_for_any_soup(triangle_count: int) -> None:
-    """Counts that do not fill the tree's leaves: a triangle counted twice would show."""
+    """With counts that do not fill the tree's leaves, a triangle counted twice would show."""
     random = np.random.default_rng(triangle_count)
     corners = random.normal(0.0, 1.0, (triangle_count, 1, 3)) + random.normal(
         0.0, 0.2, (triangle_count, 3, 3)
