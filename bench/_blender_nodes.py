@@ -8,10 +8,10 @@ import bpy
 
 
 def shipped_node_group(name: str, assets: str) -> bpy.types.NodeTree:
-    """The one of this name, read where the open file has none.
+    """The node group of this name, loaded from `assets` if the open file has none.
 
     Args:
-        assets: the file, beneath Blender's own data.
+        assets: path of the .blend file in Blender's data folder.
     """
     known = bpy.data.node_groups.get(name)
     if known is not None:

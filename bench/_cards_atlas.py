@@ -1,5 +1,5 @@
-"""The atlas of Sintel's cards: how long its bake takes. See _cards_strands for what cards with it
-are beside strands."""
+"""How long the bake of the atlas of Sintel's cards takes. _cards_strands compares cards that use it
+with strands."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from hairloom.addon.params import SettingsMap
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
 
 ROUNDS = 3
-#: 11,400 strands stand for many more
+#: wide, because 11,400 strands represent many more
 STRANDS = StrandSettings(fullness=2.0)
 
 
 def atlas_figures() -> dict[str, float]:
-    """atlas_seconds of the bake, the least of some rounds; atlas_cpu_seconds of all processors."""
+    """atlas_seconds: of the bake, the minimum over ROUNDS; atlas_cpu_seconds: on all processors."""
     rig = sintel_rig()
     seconds: list[tuple[float, float]] = []
 

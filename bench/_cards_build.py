@@ -1,4 +1,4 @@
-"""How long Sintel's cards take: clusters, strips, levels of detail, occlusion and order."""
+"""How long building Sintel's cards takes: clusters, strips, levels of detail, occlusion, order."""
 
 from __future__ import annotations
 

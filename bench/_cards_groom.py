@@ -1,4 +1,4 @@
-"""Sintel's hair on her head, and how it is made into cards: what the card benches share."""
+"""Sintel's hair and head, and the settings of her cards, for all card benches."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from hairloom.addon.exchange.tressfx import read_tfx
 from hairloom.addon.groom.settings import GuideSettings
 from hairloom.addon.rig_flow import Rig
 
-#: 800 cards of clusters, an atlas of 2048 baked from the strands, 256 rays a vertex
+#: 800 cards of clusters, an atlas of 2048 baked from the strands, 256 rays per vertex
 SETTINGS = (CardSettings(source="clusters"), AtlasSettings(), CardOcclusionSettings())
 
 

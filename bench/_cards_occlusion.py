@@ -1,7 +1,7 @@
 """Ambient occlusion of Sintel's cards against brute force: random rays through Blender's BVH tree.
 
-The reference casts one ray after the other from a sample of vertices, by the cosine about the
-normal, and follows each from card to card until it meets the head or the open.
+The reference casts cosine-weighted rays about the normal from a sample of vertices, one at a time,
+and follows each from card to card until it hits the head or escapes.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ from hairloom.addon.strands import Surface
 VERTICES, ROUNDS = 20_000, 3
 #: vertices that are compared, and rays of the reference from each
 COMPARED, REFERENCE_RAYS = 150, 1600
-#: a ray goes on so far behind what it has met [m], and ends with less light than this
+#: distance behind a hit at which a ray goes on [m]; it ends with less light than DARK
 STEP, DARK = 1.0e-5, 1.0e-3
 CARDS = CardSettings(source="clusters", card_count=800, error=0.001)
 
 
 def occlusion_figures() -> dict[str, float]:
-    """ao_seconds for VERTICES vertices of 256 rays each, the least of some rounds, and of the same
-    rounds the processor's time; ao_error and ao_bias against brute force; the twentieth part of
-    vertices that lie deepest, and the most open ones."""
+    """ao_seconds: for VERTICES vertices of 256 rays each, the minimum over ROUNDS;
+    ao_processor_seconds: likewise, processor time; ao_error, ao_bias: mean absolute and mean
+    difference from brute force; ao_deep, ao_open: 5th and 99th percentile of openness."""
     mesh, alpha, head = sintel_cards()
     settings, occluders = CardOcclusionSettings(), [CardOccluder(mesh, alpha)]
     timings = []
@@ -76,7 +76,7 @@ def brute_force(
     chosen: np.ndarray,
     settings: CardOcclusionSettings,
 ) -> np.ndarray:
-    """How open the chosen vertices are, one ray after the other, (len(chosen),)."""
+    """The openness of the chosen vertices by brute force, (len(chosen),)."""
     count = len(mesh.positions)
     points = np.concatenate([mesh.positions, head.positions]).astype(np.float64)
     triangles = np.concatenate([mesh.triangles, head.triangles + count])
@@ -106,10 +106,10 @@ class _Scene:
     ) -> None:
         self._tree, self._mesh, self._alpha = tree, mesh, alpha
         self._corners, self._settings = corners, settings
-        self._extent = extent_of(mesh)  # which are all cards there are
+        self._extent = extent_of(mesh)  # the mesh holds all cards
 
     def light(self, start: np.ndarray, direction: np.ndarray, own: int) -> float:
-        """What comes through along one ray."""
+        """The fraction of light that arrives along one ray."""
         light, travelled = 1.0, 1.0e-4
         origin, way = Vector(start), Vector(direction)
         while light > DARK:

@@ -1,9 +1,9 @@
-"""How often cards of Sintel's hair are drawn in a wrong order, and what it takes to sort them.
+"""How often cards of Sintel's hair are drawn in a wrong order, and how long sorting takes.
 
-What a wrong pixel is, `cards.order_check` says: after the four passes its colour is off by more
-than 1/255, with a colour by chance for each card and the alpha of the procedural texture. The share
-is of the pixels that hair covers, over VIEW_COUNT views around the head; none of them is one that
-the order was learnt from. Times are those of the processor, which others may share.
+A pixel is wrong if its colour after the four passes is off by more than 1/255, with a random colour
+for each card and the texture's alpha (see `cards.order_check`). Figures are fractions of the pixels
+that hair covers, over VIEW_COUNT views around the head, from none of which the order was learnt.
+Times are processor times, as other programs may run.
 """
 
 from __future__ import annotations
@@ -40,26 +40,26 @@ from hairloom.addon.shading.textures import hair_textures
 from hairloom.addon.strands import Surface
 
 VIEW_COUNT, SIZE = 200, 128
-#: for the cards along guides
+#: views for the cards along guides
 FEWER_VIEWS = 40
 SORTED_TRIANGLES, ROUNDS = 100_000, 9
 
-#: The triangles for front faces and those for back faces in this view.
+#: The order of triangles in a view, for front faces and for back faces.
 type OrderOf = Callable[[BallView], tuple[np.ndarray, np.ndarray]]
 
 
 def order_figures() -> dict[str, float]:
-    """The figures by name; those with `baked` have the baked texture, the others the procedural.
+    """The figures by name; `baked` names the baked texture, the others the procedural.
 
     order_wrong_unsorted: cards in the order in which they were built.
-    order_wrong_sorted: the order of the mesh for front faces, and the one for back faces.
+    order_wrong_sorted: the mesh's order for front faces, and that for back faces.
     order_wrong_perview: whole cards by the distance of their middle from the eye, for each view.
-    order_wrong_perview_triangles: triangles by that of theirs, as `order_from` has them.
+    order_wrong_perview_triangles: triangles by their own distance, as `order_from` sorts them.
     order_wrong_distance: whole cards by their distance from the head, for all views.
-    order_wrong_cards: whole cards in the order that was learnt, with one for back faces.
-    order_wrong_one_buffer: the order of the mesh for both sides.
-    order_wrong_guides_sorted, order_wrong_guides_unsorted: of one card along each guide.
-    sort_ms: 100,000 triangles: pieces found and all moved by given distances, the median.
+    order_wrong_cards: whole cards in the learnt order, which has another for back faces.
+    order_wrong_one_buffer: the mesh's order for front faces, also for back faces.
+    order_wrong_guides_sorted, order_wrong_guides_unsorted: one card along each guide.
+    sort_ms: to find the pieces of 100,000 triangles and sort them by distance, the median.
     order_seconds: to learn the orders of 800 cards; order_from_ms: to sort them for an eye.
     """
     rig = sintel_rig()
@@ -106,7 +106,7 @@ def cards_and_alpha(rig: Rig, way: str, source: str) -> tuple[CardMesh, np.ndarr
 
 
 def as_built(mesh: CardMesh) -> CardMesh:
-    """The cards by number, and the triangles of each from root to tip."""
+    """Triangles sorted by card, those of a card from root to tip."""
     owner = np.lexsort((mesh.triangles.min(axis=1), mesh.card))
     return replace(mesh, triangles=mesh.triangles[owner], card=mesh.card[owner])
 
@@ -153,7 +153,7 @@ def wrong_shares(
     view_count: int,
     alpha: np.ndarray,
 ) -> dict[str, float]:
-    """The share of wrong pixels for each order, over the same views."""
+    """The fraction of wrong pixels for each order, over the same views."""
     wrong, covered = dict.fromkeys(orders, 0), 0
     for view in views_of(mesh, view_count, SIZE):
         seen = seen_cards(mesh, head, view, alpha)
@@ -175,7 +175,7 @@ def tiled_alpha(mesh: CardMesh) -> np.ndarray:
 
 
 def sort_milliseconds() -> float:
-    """Strips of 20 triangles, shuffled, with given distances."""
+    """To sort strips of 20 triangles by random distances."""
     random = np.random.default_rng(0)
     count = SORTED_TRIANGLES // 20
     strip = np.arange(20)[:, None] + np.arange(3)

@@ -1,9 +1,8 @@
 """Sintel's cards by four passes against fragments sorted in each pixel, and against three passes.
 
-The reference draws each card alone, in the same light and with the shadows of all, and puts what it
-covers over what is behind it, pixel by pixel, by depth. Cost is that of the passes alone: head,
-shadow maps and textures are there already. All ways take turns, so that a busy machine meets them
-alike.
+The reference draws each card alone, in the same light and with the shadows of all cards, and
+composites them per pixel by depth. Cost is that of the passes alone: head, shadow maps and textures
+are there already. All variants take turns, so that load on the machine affects them alike.
 """
 
 from __future__ import annotations
@@ -64,9 +63,9 @@ def passes_figures() -> dict[str, float]:
     """The figures by name.
 
     fourpass_error: mean difference of displayed colours (sRGB, 0 to 1) from the sorted reference
-        where cards cover anything, over all views; fourpass_error_<way>: of the other ways.
-    fourpass_speedup: time of the three passes over that of the four, the least of many rounds;
-        fourpass_speedup_as_in_the_paper: of the four without any test of alpha after the first.
+        where cards cover anything, over all views; fourpass_error_<way>: of the other variants.
+    fourpass_speedup: time of three passes over that of four, each the minimum over ROUNDS;
+        fourpass_speedup_as_in_the_paper: the same of four that test no alpha after the first.
     """
     stages = [stage(view) for view in VIEWS]
     errors = {name: [] for name in WAYS}
@@ -176,7 +175,7 @@ def shown(picture: np.ndarray) -> np.ndarray:
 
 
 def cost(stages: list[Stage]) -> dict[str, float]:
-    """The least time of the passes over the head [ms], by way; the mean of the views."""
+    """The minimum time of the passes over the head [ms], by variant; mean over the views."""
     color = gpu.types.GPUTexture((COST_SIZE, COST_SIZE), format="RGBA16F")
     depth = gpu.types.GPUTexture((COST_SIZE, COST_SIZE), format="DEPTH_COMPONENT32F")
     target = gpu.types.GPUFrameBuffer(depth_slot=depth, color_slots=(color,))

@@ -1,8 +1,8 @@
-"""Cards beside the strands that they stand for: the sheet out/cards_sheet.png.
+"""Cards beside the strands that they represent: the sheet out/cards_sheet.png.
 
-Sintel's hair from eight sides at one metre, by one sun and the world's light, in front of a head
-that hides what is behind it: strands above, cards below, of two looks and two widths of strands.
-With deep shadows each has those of its own hair; without, what comes of ambient occlusion.
+Sintel's hair from eight sides at one metre, lit by one sun and the world, with the head as a
+holdout: strands above, cards below, in two looks and two widths of strands. With deep shadows,
+strands shadow strands and cards shadow cards; without, only ambient occlusion darkens them.
 """
 
 from __future__ import annotations
@@ -40,18 +40,18 @@ from hairloom.addon.shading.volume.settings import VolumeSettings
 
 SHEET = REPOSITORY / "out" / "cards_sheet.png"
 VIEWS, DISTANCE, SIZE, SAMPLES = 8, 1.0, 256, 2
-#: some views are drawn larger as well, where strands are as wide as a good part of a pixel
+#: some views are also drawn larger, with strands that are a good part of a pixel wide
 LARGE, LARGE_VIEWS = 1024, (0, 3)
 SUN, STRENGTH, WORLD = (0.4, 0.6, -0.8), 4.0, (0.3, 0.3, 0.3)
 LOOKS, WIDTHS, SHADOWS = ("brown", "blond"), (1.0, 2.0), ("deep", "none")
 
 
 def strands_figures() -> dict[str, float]:
-    """Write the sheet; how far cards are from strands, relative, at worst of the eight views.
+    """Write the sheet; relative differences of cards from strands, the worst of the eight views.
 
     coverage_difference: of the sum of alpha, over both widths; coverage_difference_<size>: of the
-        larger pictures, with strands as wide as the file has them.
-    color_difference_<look>: of the mean colour of what is covered, at worst of the three channels
+        larger pictures, with strands as wide as in the file.
+    color_difference_<look>: of the mean colour where hair covers, the worst of the three channels
         and of both widths, with shadows; color_difference_<look>_unshadowed: without.
     """
     rig = sintel_rig()
@@ -87,7 +87,7 @@ def _made(rig: Rig, width: float) -> MappedCards:
 
 
 def _cards(rig: Rig, made: MappedCards, look: str, width: float) -> CardSnapshot:
-    """The cards in a look, which changes nothing but their maps."""
+    """The cards in a look, on which only their maps depend."""
     settings = _settings(look, width)
     maps = card_maps(CardInputs(rig, settings), made.build, drawn_maps)
     built = BuiltCards.of(rig, replace(made, maps=maps))
@@ -125,7 +125,7 @@ def _as_cards(hair: Snapshot, cards: CardSnapshot) -> Snapshot:
 def _drawn(
     rig: Rig, hair: Snapshot, shadows: str, views: tuple[int, ...] = (), size: int = SIZE
 ) -> list[np.ndarray]:
-    """These views, or all."""
+    """Pictures from these views, or from all."""
     shaded = replace(hair, volume=VolumeSettings(shadows=shadows))
     chosen = views or range(VIEWS)
     return [render_image(shaded, _camera(rig, view), size, size, SAMPLES) for view in chosen]
@@ -152,6 +152,6 @@ def _differences(strands: list[np.ndarray], cards: list[np.ndarray]) -> tuple[fl
 
 
 def _shown(picture: np.ndarray) -> np.ndarray:
-    """In front of grey."""
+    """The picture over grey."""
     backdrop = np.array([0.2, 0.2, 0.2, 1.0], np.float32)
     return picture + backdrop * (1.0 - picture[..., 3:])

@@ -1,9 +1,8 @@
 """A style of 20,000 children on the built-in head, combed as a brush does, and painted.
 
-What is measured is what the window does, without its drawing: from Blender's evaluation of the
-curves until the snapshot that the next redraw draws has all strands; and until these have their own
-light. In the window a pause and the look for what has arrived come before and after what is made in
-a thread; both are added.
+Times run, as in the window but without its drawing, from Blender's evaluation of the curves until
+the snapshot for the next redraw has all strands, and until these have their own light. In the
+window, a pause precedes the work of a thread, and its result is polled for; both delays are added.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ RADIUS, TURN = 0.03, 0.2
 
 
 def styled(style: str) -> Any:
-    """This hairstyle, previewed with as many children."""
+    """A groom of this hairstyle, previewed with STRANDS children."""
     bpy.ops.hairloom.add_hairstyle(style=style, plays=False)
     hair = bpy.context.object
     hair.data.hairloom.children.strand_count = STRANDS
@@ -38,7 +37,7 @@ def styled(style: str) -> Any:
 
 
 def combed(hair: Any) -> dict[str, float]:
-    """Medians [ms]: a stroke, all that follows from it, its own light, and its undo."""
+    """Medians [ms] for a stroke: its first update, all strands, their light, and its undo."""
     first, rest, undo, light = [], [], [], []
     session, count = previews.session_of(hair), len(hair.data.curves)
     assert session is not None
@@ -62,8 +61,8 @@ def combed(hair: Any) -> dict[str, float]:
 
 
 def painted(hair: Any) -> dict[str, float]:
-    """Medians [ms]: a dab of a brush on the weights by which children grow, until they do, and all
-    that follows from it."""
+    """Medians [ms] for a dab on the density of children: its first update, all strands, their
+    light."""
     head, first, rest, light = hair.parent, [], [], []
     group = head.vertex_groups[hair.hairloom.children_density]
     session = previews.session_of(hair)

@@ -1,4 +1,4 @@
-"""Whether a long animation in the background stays as quick and as small as it begins."""
+"""How time and memory grow over a long animation that is rendered in the background."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ _PAGE_KIB = 4.0
 
 def frame_figures() -> dict[str, float]:
     """memory_growth_percent: of the process from the 10th frame to the last.
-    frame_ms: median of the time of a frame. frame_growth_percent: of the last quarter's median
-    beside that of the first one after the 10th frame.
+    frame_ms: median time of a frame. frame_growth_percent: of the last quarter's median relative to
+    the first quarter's, both of the frames after the 10th.
     """
     scene = build_stage(WIDTH, HEIGHT, SAMPLES)
     head = bpy.data.objects["Head"]

@@ -1,4 +1,4 @@
-"""Whether a picture of few samples is that of many, and that of another process."""
+"""How far a picture of few samples is from one of many, and from that of another process."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ bpy.ops.render.render(write_still=True)
 
 
 def picture_figures() -> dict[str, float]:
-    """accumulation_flip: mean FLIP of 64 samples beside 1,024, accumulation_flip_1 of one.
-    background_difference: most that a pixel of another process differs by, in 1/255;
+    """accumulation_flip: mean FLIP of 64 samples against 1,024; accumulation_flip_1: of one sample.
+    background_difference: largest difference of the picture of another process, in 1/255;
     run_difference: of a second render in this one.
     """
     scene = build_stage(WIDTH, HEIGHT, FEW)
@@ -48,7 +48,7 @@ def flip(reference: np.ndarray, picture: np.ndarray) -> float:
 
 
 def difference(one: np.ndarray, other: np.ndarray) -> float:
-    """The most that any channel differs by, in 1/255."""
+    """The largest difference of a channel, in 1/255."""
     return float(255.0 * np.abs(one - other).max())
 
 

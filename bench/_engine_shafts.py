@@ -1,4 +1,4 @@
-"""Shafts of light: what is lost on the way to polar coordinates and back, on the GPU's own grid."""
+"""Shafts of light: the error of resampling to polar coordinates and back, on the GPU's grid."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ PLACES = ((240.0, 180.0), (100.5, 300.5), (0.0, 180.0), (-60.0, 420.0))
 
 
 def shafts_figures() -> dict[str, float]:
-    """Mean difference of a picture of soft edges that went there and back, the worst place's."""
+    """Mean error of a picture with soft edges that was resampled twice, for the worst place."""
     picture = _picture()
     differences = []
     for place in PLACES:

@@ -1,7 +1,7 @@
-"""The soft shadow on Sintel's head: how far apart the two sides of a seam are, and its cost.
+"""The soft shadow on Sintel's head: its difference across UV seams, and its cost.
 
-The sheet out/skin_sheet.png: the UV-space map as the light comes, and as it has spread along the
-skin; below them the forehead with the plain compare, and with the soft shadow.
+The sheet out/skin_sheet.png: the UV-space map before and after light has spread along the skin;
+below them the forehead with the plain comparison of depths, and with the soft shadow.
 """
 
 from __future__ import annotations
@@ -32,15 +32,15 @@ from hairloom.addon.shading.volume.settings import VolumeSettings
 
 SHEET = REPOSITORY / "out" / "skin_sheet.png"
 SIZE, ROUNDS, PLACES = 512, 5, 17
-#: no softness that could be seen
+#: too little softness to be seen
 HARD = 1e-6
 DEEP = VolumeSettings(shadows="deep", strand_fraction=1.0)
 
 
 def skin_figures() -> dict[str, float]:
-    """Of all lights and places along all seams the largest difference between the two sides, and
-    what 999 of 1000 are below, in 255ths of a light; seconds to lay the head out, milliseconds to
-    draw a shadow again.
+    """The largest difference between the two sides of a seam, over all lights and places along all
+    seams, and its 99.9th percentile, in 1/255 of a light; seconds for three pictures with the
+    layout of the head, milliseconds to draw a shadow again.
     """
     snapshot = sintel()
     hard = replace(snapshot, skin=replace(snapshot.skin, softness=HARD))
@@ -102,7 +102,7 @@ def drawn(snapshot: Snapshot) -> tuple[np.ndarray, tuple[SkinShadow, ...]]:
 
 
 def seam_differences(shadow: SkinShadow) -> np.ndarray:
-    """Between the two sides at places along all seams, (n,) in 255ths."""
+    """Differences between the two sides at places along all seams, (n,) in 1/255."""
     layout, values = shadow.layout, shadow.picture()
     share = np.linspace(0.0, 1.0, PLACES)[None, :, None]
     places = (layout.seams[:, :1] * (1.0 - share) + layout.seams[:, 1:] * share).reshape(-1, 4)
@@ -115,7 +115,7 @@ def seam_differences(shadow: SkinShadow) -> np.ndarray:
 
 
 def milliseconds(snapshot: Snapshot) -> dict[str, float]:
-    """The least of some rounds to draw the shadow again, by how soft it is."""
+    """The minimum time over ROUNDS to draw the shadow again, by softness."""
     passes, (mesh,) = (MeshPass(), StrandPass()), snapshot.meshes
     opacity = passes[1].opacity(snapshot)
     skin_pass = passes[0].skin
@@ -124,7 +124,7 @@ def milliseconds(snapshot: Snapshot) -> dict[str, float]:
     for name, metres in (("3mm", 0.003), ("10mm", 0.01)):
         softness, taken = metres / size, []
         for number in range(ROUNDS):
-            # a little more each time, so that it is drawn each time
+            # another softness each time, so that the shadow is drawn each time
             settings = replace(snapshot.skin, softness=softness * (1.0 + 1e-4 * number))
             begun = time.perf_counter()
             shadows = skin_pass.shadows((mesh,), opacity, settings, len(snapshot.lights))

@@ -42,7 +42,7 @@ def build_stage(width: int, height: int, samples: int) -> Any:
 
 
 def shown_picture(scene: Any, samples: int) -> np.ndarray:
-    """What F12 saves, (height, width, 3) in 0 to 1."""
+    """The picture that F12 saves, (height, width, 3) in 0 to 1."""
     scene.hairloom.picture.samples = samples
     with tempfile.TemporaryDirectory(prefix="hairloom") as folder:
         path = Path(folder) / "picture.png"
@@ -52,7 +52,7 @@ def shown_picture(scene: Any, samples: int) -> np.ndarray:
 
 
 def read_picture(path: Path) -> np.ndarray:
-    """(height, width, 3) in 0 to 1, as it is stored, the top row first."""
+    """The values that an image file stores, (height, width, 3) in 0 to 1, the top row first."""
     image = bpy.data.images.load(str(path), check_existing=False)
     image.colorspace_settings.is_data = True
     pixels = np.empty(len(image.pixels), np.float32)

@@ -1,13 +1,13 @@
-"""How much hair there is in the atlas of shipped cards, and how cards of fur look.
+"""How much hair the atlas of exported cards holds, and how cards of fur look.
 
-Grooms that nobody here made, and the fur that ships on Blender's monkey, with no setting changed:
-widths are found, children are added. Cards are made as *Make Cards* and the exporters make them.
+Third-party grooms, and the shipped fur on Blender's monkey, with default settings: widths are
+found, children are added. Cards are made as by *Make Cards* and the exporters.
 
-- opaque_percent: of the texels, those whose alpha is above 0.5.
-- strand_texels: how wide the median strand is drawn in the atlas, on the mean of its rows.
-- side_texels: width and height of the atlas; of twenty strands alone as well.
-- Of fur: triangles of the average card, and how far its cards are from the strands themselves, from
-  four sides: the sum of alpha, and the mean colour of what is covered, the worst channel.
+- opaque_percent: texels whose alpha is above 0.5.
+- strand_texels: width of the median strand in the atlas, the mean over its rows.
+- side_texels: width and height of the atlas; also for a groom of twenty strands.
+- Of fur: triangles of the average card, and differences of its cards from its strands, from four
+  sides: of the sum of alpha, and of the mean colour where hair covers, the worst channel.
 
 Writes out/bench_engines/cards_NAME.png, strands above and cards below, and the atlases' alpha.
 """
@@ -61,7 +61,7 @@ SUN, STRENGTH, WORLD = (0.4, 0.6, -0.8), 4.0, (0.3, 0.3, 0.3)
 
 
 def atlas_figures(names: list[str]) -> dict[str, Any]:
-    """Of these grooms, or of all; and the worst of each figure."""
+    """The figures of these grooms, or of the usual ones."""
     found: dict[str, Any] = {}
     chosen(names, GROOMS_OF_ATLAS)
     for name in names or [*HAIR, "mohawk", *STYLES, "few"]:
@@ -86,7 +86,7 @@ def _inputs(name: str) -> CardInputs:
 
 
 def _added(style: str) -> CardInputs:
-    """By the artist's own button."""
+    """A hairstyle that is added by the artist's button."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     if not hasattr(bpy.types.Scene, "hairloom"):
         hairloom.register()
@@ -137,7 +137,7 @@ def beside_strands(
     sides: Sequence[tuple[float, float, float]],
     path: Path,
 ) -> tuple[float, float]:
-    """How far cards are from their strands in coverage and colour, see `_differences`; writes a
+    """Differences of cards from their strands in coverage and colour, see `_differences`; writes a
     picture, strands above and cards below."""
     strands = _lit(inputs)
     drawn = replace(without_strands(strands), cards=cards.drawn(cards.rest, inputs.settings))

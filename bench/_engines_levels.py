@@ -1,18 +1,18 @@
-"""Where one level of detail gives way to the next, as three.js draws it by our module.
+"""The switch from one level of detail to the next, as three.js draws it with our module.
 
-Cards with the settings that they have, with their head and three suns, as large as they are on a
-screen of 1,080 lines at the distance at which the file says that a level takes over; two sides.
-FLIP is Andersson et al.'s (2020), its mean over the pixels in which hair is seen.
+Cards with default settings, with their head and three suns, as large as on a screen of 1,080 lines
+at the distance at which the file switches levels; two sides. FLIP (Andersson et al. 2020) is its
+mean over the pixels that show hair.
 
-- levels_pop_flip: how much a picture differs from the one before in the middle of the band in
-  which both levels are drawn, while the camera goes by a hundredth of its distance a picture; the
-  camera's own motion is left out, only levels change.
-- levels_at_once_flip: the same without cross-fade: how far one level is from the next.
+- levels_pop_flip: difference of successive pictures in the middle of the band in which both levels
+  are drawn, while the camera moves by a hundredth of its distance per picture; only the levels
+  change, the camera's own motion is left out.
+- levels_at_once_flip: difference of one level from the next, without cross-fade.
 - levels_moved_flip: what the camera's own motion by a hundredth changes, with one level.
-- levels_light_percent, levels_area_percent: how much lighter or darker the next level is, and how
-  much more or less of the picture it covers, at most.
+- levels_light_percent, levels_area_percent: largest relative difference of the next level in
+  brightness, and in the area that it covers.
 
-Writes out/bench_levels/NAME_N.png: level N, the next, both where they fade, and the change.
+Writes out/bench_levels/NAME_N.png: level N, the next, both as they fade, and the difference.
 """
 
 from __future__ import annotations
@@ -42,23 +42,23 @@ REPOSITORY = Path(__file__).parents[1]
 PAGE = REPOSITORY / "bench" / "engines" / "levels" / "index.html"
 THREE = REPOSITORY / "tools" / "node" / "node_modules" / "three"
 SANDBOX = str(REPOSITORY / "tools" / "window_blender")
-#: what the browser's machine sees of this one
+#: a folder that the browser's sandbox sees
 OUTPUT = REPOSITORY / "out" / "bench_levels"
 LINES, FIELD_OF_VIEW, SIDES = 1080, 50.0, 2
-#: of the hair's largest extent, how wide a picture is
+#: width of a picture, as a multiple of the hair's largest extent
 ROOM = 1.35
-#: of a distance, how far the camera goes from picture to picture
+#: fraction of its distance by which the camera moves from picture to picture
 STEP = 0.01
-#: in the middle of the band, which is a tenth of the distance wide
+#: of the distance: two places in the middle of the band, which is a tenth of it wide
 FACTORS = (1.0 - STEP / 2.0, 1.0 + STEP / 2.0)
 SUNS = (((0.5, 0.6, 0.7), 2.0), ((-0.8, 0.3, 0.3), 0.7), ((0.1, 0.5, -0.9), 1.4))
 AMBIENT = 1.0
-#: a pixel with hair in it differs so much from the one without
+#: least difference that hair makes in a pixel that shows it
 SEEN = 1.0 / 255.0
 
 
 def level_figures(names: list[str]) -> dict[str, Any]:
-    """Of these grooms, or of both: the worst of each figure."""
+    """The worst of each figure over these grooms, or over both."""
     shutil.rmtree(OUTPUT, ignore_errors=True)
     found: dict[str, Any] = {}
     for name in chosen(names, GROOMS_OF_LEVELS):
@@ -119,7 +119,7 @@ def _of(name: str, site: Path) -> dict[str, float]:
 
 
 def _drawn(site: Path) -> list[np.ndarray]:
-    """Where each level gives way: (sides, pictures, size, size, 3), linear, row 0 on top."""
+    """The pictures of each switch: (sides, pictures, size, size, 3), linear, row 0 on top."""
     shutil.copy2(PAGE, site)
     shutil.copytree(THREE, site / "three")
     shutil.copy2(REPOSITORY / "tools" / "draw_page.py", site)

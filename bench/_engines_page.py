@@ -1,5 +1,5 @@
-"""The web page of Sintel's cards: how large it is, and whether it opens in Chromium from its file,
-without a network and without a word on the console."""
+"""The web page of Sintel's cards: how large it is, and whether Chromium opens it from its file
+without a network and without console messages."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hairloom.addon.blender.command_line import command_line
 
 REPOSITORY = Path(__file__).parents[1]
 SANDBOX = str(REPOSITORY / "tools" / "window_blender")
-#: what the browser's machine sees of this one
+#: a folder that the browser's sandbox sees
 OUTPUT = REPOSITORY / "out" / "bench_page"
 STEPS = (
     {"media": {"prefers-reduced-motion": "reduce"}},
@@ -26,8 +26,8 @@ STEPS = (
 
 
 def page_figures() -> dict[str, Any]:
-    """page_bytes: of the whole file, by the options as they come. page_errors: words on the
-    console, requests for anything outside of the page, and a picture that never came."""
+    """page_bytes: of the whole file, with default options. page_errors: console messages, requests
+    for anything outside the page, and 1 if the page is not ready."""
     shutil.rmtree(OUTPUT, ignore_errors=True)
     folder = Path(os.environ.get("HAIRLOOM_DATA", REPOSITORY.parent / "shared" / "data")) / "sintel"
     strands, head = folder / "SintelHairOriginal-sintel_hair.16points.tfx", folder / "sintel.obj"

@@ -1,7 +1,7 @@
-"""The GLB as it comes, in a viewer that knows nothing of us, beside our own picture of the strands.
+"""The exported GLB in a viewer without our module, beside our own picture of the strands.
 
-The sample scene's hair with the settings that it has, and blond, on its head, which is black, under
-three suns; four sides. three.js draws the cards by its own loader and its own standard material.
+The sample scene's hair with its own settings, and blond, on a black head under three suns; four
+sides. three.js draws the cards with its own loader and standard material.
 """
 
 from __future__ import annotations
@@ -27,18 +27,18 @@ REPOSITORY = Path(__file__).parents[1]
 PAGE = REPOSITORY / "bench" / "engines" / "plain"
 THREE = REPOSITORY / "tools" / "node" / "node_modules" / "three"
 SANDBOX = str(REPOSITORY / "tools" / "window_blender")
-#: what the browser's machine sees of this one
+#: a folder that the browser's sandbox sees
 OUTPUT = REPOSITORY / "out" / "bench_engines"
 SIZE, SIDES, FIELD_OF_VIEW = 320, 4, 30.0
-#: the colours that the hair is drawn in; None as it comes
+#: the colours that the hair is drawn in; None: the sample scene's own
 COLORS = {"brown": None, "blond": (0.5, 0.255, 0.08)}
-#: the ways to the suns, Z up, and the irradiance of each
+#: direction to each sun, Z up, and its irradiance
 SUNS = (((0.5, -0.7, 0.6), 3.0), ((-0.8, -0.3, 0.3), 1.0), ((0.1, 0.9, 0.5), 2.0))
 
 
 def plain_figures() -> dict[str, Any]:
-    """plain_levels_visible: meshes of hair that the viewer shows. plain_color_percent: how far the
-    light of all sides together is from ours, the worst channel of the worst colour."""
+    """plain_levels_visible: meshes of hair that the viewer shows. plain_color_percent: difference
+    from our light, summed over all sides, the worst channel of the worst colour."""
     shutil.rmtree(OUTPUT, ignore_errors=True)
     scene, hair, views = _stage()
     found: dict[str, Any] = {"plain_levels_visible": 0, "plain_color_percent": 0.0}
@@ -96,7 +96,7 @@ def _stage() -> tuple[Any, Any, list[dict[str, Any]]]:
 
 
 def _drawn(scene: Any, view: dict[str, Any]) -> np.ndarray:
-    """Linear, in front of black, row 0 on top."""
+    """The engine's picture, linear, over black, row 0 on top."""
     camera = bpy.data.objects.new("Side", bpy.data.cameras.new("Side"))
     camera.data.angle = math.radians(FIELD_OF_VIEW)
     camera.data.clip_start, camera.data.clip_end = view["near"], view["far"]

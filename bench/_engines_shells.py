@@ -1,7 +1,7 @@
 """Shells of the short coat beside its strands, as `_engines_atlas` compares cards of fur.
 
-From eight sides, with the settings that the hairstyle has: shells_triangles of the finest level,
-and shells_coverage_percent and shells_color_percent, the worst side and channel.
+From eight sides, with the hairstyle's settings: shells_triangles of the finest level, and
+shells_coverage_percent and shells_color_percent, the worst side and channel.
 """
 
 from __future__ import annotations

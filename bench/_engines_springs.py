@@ -23,9 +23,9 @@ SECONDS = 2.0
 
 
 def spring_figures() -> dict[str, Any]:
-    """spring_error_percent: 99 % of all corners of triangles are nearer, of the hair's mean length.
-    spring_rigid_percent: the same of hair that is fixed to the head. spring_told_percent:
-    what the sidecar says of it."""
+    """spring_error_percent: 99th percentile of the errors of all corners of triangles, relative to
+    the hair's mean length. spring_rigid_percent: the same of hair that is fixed to the head.
+    spring_told_percent: the error that the sidecar reports."""
     rig = sintel_rig()
     motion = shaken(rig, SECONDS)
     cards, atlas, occlusion = SETTINGS

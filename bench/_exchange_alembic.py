@@ -1,7 +1,7 @@
 """Groom Alembic with all attributes: time to write and to read, size, and memory.
 
-Each act has a process of its own, so that the most memory that it took can be seen. The reader
-starts another process, whose start counts.
+Each action has its own process, so that its peak memory can be measured. The reader starts another
+process, whose start counts.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ GUIDES = 50
 
 
 def alembic_figures() -> dict[str, float]:
-    """Seconds, the least of some rounds, megabytes of the file, and of memory beside what was
-    there before; for reading, the groom itself is among them, and the other process is not."""
+    """Seconds, the minimum over ROUNDS; megabytes of the file, and of peak memory above what was
+    used before. For reading, memory includes the groom, and not the other process."""
     figures = {}
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "groom.abc"
@@ -77,7 +77,7 @@ def full_groom() -> Groom:
 
 
 def _act(act: str, preset: str, path: Path) -> dict[str, float]:
-    """One act some times over; the memory is that of the first time."""
+    """One action, ROUNDS times; memory is that of a first run, which is not timed."""
     groom = full_groom() if act == "write" else None
 
     def work() -> None:
@@ -96,7 +96,7 @@ def _act(act: str, preset: str, path: Path) -> dict[str, float]:
 
 
 def processor_seconds() -> float:
-    """Of this process and of those that it has waited for; other work does not count in it."""
+    """Processor time of this process and of the children that it has waited for."""
     who = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
     usage = [resource.getrusage(each) for each in who]
     return sum(each.ru_utime + each.ru_stime for each in usage)

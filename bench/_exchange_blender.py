@@ -1,6 +1,6 @@
-"""Blender's own Alembic and USD of the same strands, as the reference: positions and widths only.
+"""Blender's own Alembic and USD of as many strands, as the reference: positions and widths only.
 
-A process of its own, since Blender brings another USD library than the one that we use here.
+It has its own process, since Blender brings another USD library than the one used here.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ STRANDS, POINTS, ROUNDS = 100_000, 16, 3
 
 
 def blender_figures() -> dict[str, float]:
-    """Seconds to write and to read, the least of some rounds."""
+    """Seconds to write and to read, the minimum over ROUNDS."""
     done = subprocess.run([sys.executable, __file__], capture_output=True, text=True, check=True)
     return json.loads(done.stdout.splitlines()[-1])
 

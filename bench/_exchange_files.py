@@ -1,6 +1,6 @@
-"""How fast TressFX and .hair files are, and what damage and death do to files of all formats.
+"""Speed of TressFX and .hair files, and what damage and killed writers do to files of all formats.
 
-Fuzzing and killing run in children: one that crashes ends the benchmark with its last words.
+Fuzzing and killing run in child processes; if one crashes, the benchmark ends with its errors.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ KILLED_FORMATS = ("tfx", "tfxbone", "hair", "preset", "abc", "usdc", "glb")
 
 def file_timings() -> dict[str, float]:
     """<format>_write_seconds and <format>_read_seconds of STRANDS x POINTS with UVs and thickness,
-    medians of some rounds, and the processor's time of the same."""
+    medians over ROUNDS; and <format>_..._processor_seconds likewise."""
     groom = Groom(_strands())
     found: dict[str, float] = {}
     with tempfile.TemporaryDirectory() as folder:
@@ -53,12 +53,12 @@ def file_timings() -> dict[str, float]:
 
 
 def fuzz_figures(ours: int, libraries: int) -> dict[str, float]:
-    """How many damaged files were read, refused, or neither (failures); the slowest, and the most
-    memory as a multiple of the file, of those that we parse; and of those that libraries parse how
-    many ended all right.
+    """Numbers of damaged files that were read, refused, or neither (failures). Of the formats that
+    we parse also the slowest, and peak memory as a multiple of the file; of each format how many
+    were read.
 
     Args:
-        ours, libraries: how many of a format that we parse, and of one that a library parses.
+        ours, libraries: files of each format that we parse, and that a library parses.
     """
     counts = dict.fromkeys(OUR_FORMATS, ours) | dict.fromkeys(LIBRARIES_FORMATS, libraries)
     with ThreadPoolExecutor(2) as pool:
@@ -95,7 +95,7 @@ def kill_figures(trials: int) -> dict[str, float]:
 
 
 def _child(tool: str, kind: str, count: int) -> dict[str, Any]:
-    """The report of a tool of this repository in a process of its own."""
+    """The report of a tool of this repository, run in its own process."""
     in_package = str(REPOSITORY / "tools" / "in_package.py")
     command = [sys.executable, in_package, tool, kind, str(count)]
     one_thread = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}

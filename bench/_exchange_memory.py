@@ -1,4 +1,4 @@
-"""The most memory that some work takes beside what is there before."""
+"""The peak memory of some work above what was used before."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ _PROCESS = Path("/proc/self")
 
 
 def megabytes_beside(work: Callable[[], object]) -> float:
-    """Linux alone can forget the highest mark so far, which making the data would else have set."""
+    """Of Linux alone, which can reset the peak that making the data has set."""
     (_PROCESS / "clear_refs").write_text("5")
     before = _kilobytes("VmRSS")
     work()

@@ -38,7 +38,7 @@ RATE = 60.0
 
 
 def motion_figures(seconds: float) -> dict[str, float]:
-    """Errors in percent of the hair's mean length and in mm, what the skeleton has, and the time.
+    """Errors in percent of the hair's mean length and in mm, counts of the skeleton, and times.
 
     Args:
         seconds: of motion.
@@ -46,7 +46,7 @@ def motion_figures(seconds: float) -> dict[str, float]:
     rig = sintel_rig()
     motion = shaken(rig, seconds)
     cards, atlas, occlusion = SETTINGS
-    # light on cards says nothing about their motion
+    # few rays, as occlusion does not affect motion
     settings = SettingsMap(cards, atlas, replace(occlusion, rays=8))
     levels = result_of(card_build_steps(rig, settings)).levels
     begin = time.perf_counter()
@@ -83,7 +83,7 @@ def motion_figures(seconds: float) -> dict[str, float]:
 
 
 def shaken(rig: Rig, seconds: float) -> MadeMotion:
-    """Simulated by numpy through the shake; cards are led out of the head, as in a bake."""
+    """The shake, simulated by numpy; cards are led out of the head, as in a bake."""
     assert rig.head is not None
     settings = DynamicsSettings()
     collider = DistanceField.from_surface(rig.head, settings, place="Sintel")

@@ -1,4 +1,4 @@
-"""How exactly strands come back: random ones with all attributes, and real files where they lie."""
+"""How exactly files keep strands: random ones with all attributes, and real files if present."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ STRANDS, POINTS = 5_000, 16
 
 
 def round_trip_figures() -> dict[str, float]:
-    """roundtrip_max_error: the farthest that any point moved in any format, as a fraction of the
-    largest coordinate, of which float32 keeps 6e-8; <format>_roundtrip_error of each; and
-    roundtrip_real_files: how many real ones are among them."""
+    """roundtrip_max_error: largest error of a coordinate in any format, as a fraction of the
+    largest coordinate, of which float32 keeps 6e-8; <format>_roundtrip_error: of each format;
+    roundtrip_real_files: number of real files among the grooms."""
     real = [read_tfx(path).groom for name in REAL for path in sorted(DATA.glob(name))]
     errors = dict.fromkeys(_WAYS, 0.0)
     with tempfile.TemporaryDirectory() as folder:
@@ -48,7 +48,7 @@ def round_trip_figures() -> dict[str, float]:
 
 
 def _in_order(groom: Groom, way: str) -> Floats:
-    """The points as a file has them: Unity's has a curves object for each group."""
+    """The points in the file's order: Unity's Alembic has a curves object for each group."""
     group = groom.strands.group if way == "abc_unity" else np.zeros(groom.strands.strand_count)
     return groom.take(np.argsort(group, kind="stable")).strands.points
 

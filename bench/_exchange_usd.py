@@ -1,7 +1,7 @@
 """Writing and reading 100,000 strands of 16 points as USD, with all primvars that a groom can have.
 
-`usd_bare_seconds` is what usd-core takes for positions, counts and widths alone: the part of the
-time that no writer can do without. Memory is what is taken beside what was there before.
+`usd_bare_seconds` is usd-core's time for positions, counts and widths alone, which no writer can
+save. Memory is the peak above what was used before.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def usd_figures() -> dict[str, float]:
 
 
 def full_groom() -> Groom:
-    """Random strands with everything that a groom can say."""
+    """Random strands with every attribute that a groom can have."""
     random = np.random.default_rng(9)
     step = random.normal(0.0, 0.01, (STRANDS, POINTS, 3))
     strands = StrandSet(

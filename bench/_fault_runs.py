@@ -1,9 +1,9 @@
-"""Seeded faults while files are written: what is there afterwards is the old result or the new one.
+"""Seeded faults while files are written; afterwards the old result or the new one must be there.
 
-Faults come from the system where it can give them: a limit of file sizes stands for a full disk, a
-user without rights for a read-only folder, an exit amid the work for a killed process. The others
-are set off at the n-th rename, flush or link: the file vanishes, the rename fails or is refused by
-Windows' rules, another program writes the same files first. Nothing else is replaced.
+The system causes faults where it can: a limit of file sizes acts as a full disk, a user without
+rights as a read-only folder, an exit during the write as a killed process. The others are injected
+at the n-th rename, flush or link: the file vanishes, the rename fails or is refused by Windows'
+rules, another program writes the same files first. Nothing else is mocked.
 """
 
 from __future__ import annotations
@@ -42,9 +42,9 @@ from hairloom.addon.exchange.usd.groom_usd_read import read_usd
 STRANDS = 300
 GROOMS = [sample(STRANDS, seed) for seed in range(2)]
 NOBODY = 65534
-#: Files to be read are made once.
+#: Folder of the files that verbs read, which are made once.
 SOURCES = Path(tempfile.gettempdir()) / f"hairloom-fault-sources-{os.getpid()}"
-#: what the calls that faults happen at are
+#: the calls at which faults are injected
 CALLS = (("replace", os), ("fsync", os), ("link", os))
 FAULTS = ("full", "read-only", "killed", "vanishes", "fails", "another", "memory", "child")
 WINDOWS = ("held", "held for a moment", "no links")
@@ -54,12 +54,13 @@ type Contents = dict[str, bytes]
 
 
 class EndedError(BaseException):
-    """A process that is killed does not tidy up."""
+    """The writing process was killed, so that nothing was tidied up."""
 
 
 @dataclass(frozen=True)
 class Verb:
-    """write(path, version): of one of two results. source: of what it reads first, if anything."""
+    """write(path, version): one of two results. source: suffix of the file that it reads first, if
+    any."""
 
     write: Callable[[Path, int], object]
     suffix: str
@@ -129,8 +130,9 @@ def _source(suffix: str, version: int) -> Path:
 
 @dataclass
 class Found:
-    """runs; broken: where a fault came in time; losses: neither the old result nor the new one;
-    mixed: parts of both; untrue: messages that are not so, or no message of ours."""
+    """Numbers of runs. broken: the fault interrupted the write; losses: neither the old result nor
+    the new one; mixed: parts of both; untrue: a false message, or an error that is no
+    HairloomError."""
 
     runs: int = 0
     broken: int = 0
@@ -140,7 +142,7 @@ class Found:
 
 
 def fault_runs(count: int, seed: int) -> tuple[Found, list[str]]:
-    """Run this many; returns also what went wrong."""
+    """Run this many; also a line for each problem."""
     found, problems = Found(), list[str]()
     for verb in VERBS.values():
         for version in (0, 1):
@@ -164,10 +166,10 @@ def fault_runs(count: int, seed: int) -> tuple[Found, list[str]]:
 
 
 def _run(verb: Verb, fault: str, folder: Path, random: Any) -> tuple[str, bool]:
-    """What is wrong, "" for nothing; and whether the fault came in time."""
+    """The problem, "" if none; and whether the fault interrupted the write."""
     path = folder / f"hair{verb.suffix}"
     results = []
-    for version in (1, 0):  # the last one is what is there before
+    for version in (1, 0):  # the last one stays, as the old result
         verb.write(path, version)
         results.append(_contents(folder))
     new, old = results
@@ -189,10 +191,10 @@ def judged(
     *,
     is_second: bool,
 ) -> tuple[str, bool]:
-    """What is wrong, "" for nothing; and whether the fault came in time.
+    """The problem, "" if none; and whether the fault interrupted the write.
 
     Args:
-        places: of which a message must name one.
+        places: paths, of which a message must name one.
         there: what is in the folder after the run.
         error: what the run has raised.
         is_second: whether another writer may have come last, so that its result is shown.
@@ -219,7 +221,7 @@ def judged(
 def _is_untrue(
     error: HairloomError, is_new: bool, kept: Contents, places: tuple[Path, ...]
 ) -> bool:
-    """Whether a message says what is not so, or leaves out what to do."""
+    """Whether a message is false, or has no remedy."""
     text = str(error)
     named = re.search(r"beside it (?:as|in) (.+?)\.?$", error.remedy)
     if named is not None:
@@ -232,7 +234,7 @@ def _is_untrue(
 
 
 def _write_with(verb: Verb, path: Path, fault: str, random: Any) -> BaseException | None:
-    """Write the new result while that goes wrong; what was raised."""
+    """Write the new result under a fault; the exception that was raised, if any."""
     at = int(random.integers(1, 7))
     try:
         with FAULT_MAKERS[fault](at, path, verb, random):
@@ -271,7 +273,7 @@ def _read_only(_at: int, path: Path, _verb: Verb, _random: Any) -> Iterator[None
 
 @contextlib.contextmanager
 def at_call(at: int, act: Callable[..., object]) -> Iterator[None]:
-    """Have something happen before the n-th rename, flush or link of all."""
+    """Call `act` before the n-th rename, flush or link."""
     left = [at]
 
     def watched(real: Callable[..., Any]) -> Callable[..., Any]:
@@ -317,7 +319,8 @@ def _another(
 
 @contextlib.contextmanager
 def _killed(at: int, path: Path, verb: Verb, _random: Any) -> Iterator[None]:
-    """In a child, which ends at that call without any tidying; the parent then does nothing."""
+    """A child process writes and ends at that call without tidying up; the parent writes
+    nothing."""
     child = os.fork()
     if child == 0:
         try:
@@ -332,7 +335,7 @@ def _killed(at: int, path: Path, verb: Verb, _random: Any) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _memory(at: int, _path: Path, _verb: Verb, _random: Any) -> Iterator[None]:
-    """Where memory runs out in a reader."""
+    """A reader runs out of memory."""
     real, left = np.fromfile, [at]
 
     def fromfile(*arguments: Any, **options: Any) -> Any:
@@ -347,7 +350,7 @@ def _memory(at: int, _path: Path, _verb: Verb, _random: Any) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _child(_at: int, _path: Path, _verb: Verb, _random: Any) -> Iterator[None]:
-    """The process that reads is killed, as by a system that is short of memory."""
+    """The reading subprocess is killed, as by a system that is short of memory."""
     ended = subprocess.CompletedProcess([], -9, b"", b"")
     with mock.patch.object(subprocess_reader, "run_child", lambda *_, **__: ended):
         yield
@@ -412,7 +415,7 @@ FAULT_MAKERS: dict[str, Fault] = {
 
 
 def _contents(folder: Path) -> dict[str, bytes]:
-    """What is to be seen: files, and of a bake what it shows."""
+    """The visible files, and of a bake the arrays of its frames."""
     contents = {}
     for path in sorted(folder.iterdir()):
         if path.name.startswith("."):
@@ -431,7 +434,7 @@ def _contents(folder: Path) -> dict[str, bytes]:
 
 
 def _content(path: Path) -> bytes:
-    """Alembic files have a date, so their size stands for them."""
+    """A file's bytes; of Alembic files, which contain a date, the size."""
     return str(path.stat().st_size).encode() if path.suffix == ".abc" else path.read_bytes()
 
 

@@ -72,13 +72,15 @@ CASES = {
 
 
 def field_error(points: np.ndarray) -> dict[str, float]:
-    """The largest difference of accelerations in each case, over the largest one there is."""
+    """The largest error of acceleration in each case, over the largest acceleration."""
     return {name: error_of(kind, values, points) for name, (kind, values) in CASES.items()}
 
 
 def error_of(kind: str, values: dict[str, object], points: np.ndarray) -> float:
-    """Args:
-    points: (n, 3) world [m].
+    """The error of one case, see `field_error`.
+
+    Args:
+        points: (n, 3) world [m].
     """
     source = field_object(kind, values)
     particles = particles_at(points)
@@ -113,7 +115,7 @@ def field_object(kind: str, values: dict[str, object]) -> bpy.types.Object:
 
 
 def particles_at(points: np.ndarray) -> bpy.types.Object:
-    """A mesh of these points that lets go of a particle at each, in the first frame."""
+    """A mesh of these points, each of which emits a particle in the first frame."""
     mesh = bpy.data.meshes.new("Points")
     mesh.from_pydata(points.tolist(), [], [])
     obj = bpy.data.objects.new("Points", mesh)
@@ -133,7 +135,7 @@ def particles_at(points: np.ndarray) -> bpy.types.Object:
 
 
 def acceleration_of(obj: bpy.types.Object) -> np.ndarray:
-    """(n, 3) [m/s^2], of each particle in the first frame."""
+    """The acceleration of each particle in the first frame, (n, 3) [m/s^2]."""
     scene, velocity = bpy.context.scene, []
     for frame in (1, 2):
         scene.frame_set(frame)

@@ -1,4 +1,4 @@
-"""The two fast forms of the step behind one face, so that benchmarks treat them alike."""
+"""The two fast implementations of the step behind one interface, for benchmarks."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ class Form(Protocol):
     """A simulation in progress."""
 
     def advance(self, drive: Drive, settings: DynamicsSettings, duration: float) -> None:
-        """One frame, until the CPU holds the guides."""
+        """Simulate a frame, and wait until the guides are on the CPU."""
 
     def state(self) -> DynamicsState:
-        """What the frame has led to."""
+        """The state after the last frame."""
 
     def release(self) -> None:
-        """Give back what it holds on the GPU."""
+        """Free its GPU resources."""
 
 
 class NumpyForm:
@@ -39,7 +39,7 @@ class NumpyForm:
         return self._state
 
     def release(self) -> None:
-        """Nothing is held."""
+        """Nothing to free."""
 
 
 class ComputeForm:
@@ -64,7 +64,7 @@ def play(
     fps: float,
     watch: Callable[[DynamicsState, Drive], None] | None = None,
 ) -> list[float]:
-    """Milliseconds of each frame; `watch` sees each frame's end, outside of that time."""
+    """Milliseconds of each frame; `watch` is called after each, outside the timing."""
     times = []
     for drive in drives:
         begin = time.perf_counter()

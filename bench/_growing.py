@@ -1,7 +1,7 @@
 """Hair on the built-in head whose settings are edited while it is previewed.
 
-What is measured is what the window does, without its drawing: from the moment a setting is given
-until the snapshot that the next redraw draws is of the curves that it makes.
+Times run, as in the window but without its drawing, from the edit of a setting until the snapshot
+for the next redraw has the new curves.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.setup.hairstyles import add_head
 
 STRANDS = 4095
-#: what an artist drags; each is given some values in a row, as a slider gives them
+#: settings that an artist drags, each with successive values of the slider
 EDITS = {
     "length": (0.255, 0.26, 0.265, 0.27),
     "droop": (0.46, 0.47, 0.48, 0.49),

@@ -1,8 +1,8 @@
-"""Blender 5.2's own "Hair Dynamics" node group, the peer of the dynamics benchmark.
+"""Blender 5.2's own "Hair Dynamics" node group, which the dynamics are compared with.
 
 From the assets that Blender ships; mode "Physics (Experimental)", because its default mode,
-"Animation", simulates nothing; surface collision on, because it is the peer of a simulation with
-one; everything else as shipped: 10 substeps of 15 constraint steps a frame.
+"Animation", simulates nothing; surface collision on, because ours collides too; everything else as
+shipped: 10 substeps of 15 constraint steps a frame.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class HairDynamics:
         """Milliseconds of each frame after the warm-up, and the worst stretch of all frames.
 
         The time of a frame is that of `scene.frame_set`, which evaluates everything. Without the
-        modifier the same takes well under 0.1 ms, so nothing is taken off.
+        modifier the same takes well under 0.1 ms, so nothing is subtracted.
         """
         times, stretch = [], 0.0
         self._scene.frame_set(0)
@@ -47,7 +47,7 @@ class HairDynamics:
             begin = time.perf_counter()
             self._scene.frame_set(frame)
             times.append((time.perf_counter() - begin) * 1000.0)
-            # the first two CVs are pinned by both
+            # both simulations pin the first two CVs
             change = np.abs(_segments(self._points()) / self._length - 1.0)[:, 1:]
             stretch = max(stretch, float(change.max()))
         return times[warm_up:], stretch
@@ -63,7 +63,7 @@ class HairDynamics:
         bpy.data.objects.remove(self.hair)
 
     def _points(self) -> np.ndarray:
-        """As evaluated in this frame, (strand_count, cv_count, 3), object space."""
+        """The evaluated points of this frame, (strand_count, cv_count, 3), object space."""
         evaluated = self.hair.evaluated_get(bpy.context.evaluated_depsgraph_get())
         points = np.empty(self._shape, np.float32)
         evaluated.data.position_data.foreach_get("vector", points.ravel())

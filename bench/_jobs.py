@@ -1,7 +1,7 @@
-"""Long jobs as the window works through them: how long nothing is said, and no key is heard.
+"""For how long long jobs in the window neither report progress nor let keys be handled.
 
-What is measured is the longest time that a job keeps Blender's main thread between two looks at the
-keyboard: until the first word of progress, and from one to the next. Drawing is left out.
+Measured is the longest time for which a job keeps Blender's main thread: until its first report of
+progress, and from one report to the next. Drawing is left out.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ _LOOK = 0.01
 
 
 def silent() -> dict[str, float]:
-    """The longest silence of each job [s], and that of all."""
+    """The longest time without progress of each job [s], and of all."""
     found = {}
     for name, job in JOBS.items():
         longest: list[float] = []
-        # as in a window, where nobody waits for what a thread makes
+        # as in a window, where nothing blocks on a thread
         latest_job.is_blocking = lambda: False
         long_work._at_once = lambda steps, to=longest: to.append(_longest(steps))
         job()
@@ -38,7 +38,7 @@ def silent() -> dict[str, float]:
 
 
 def _longest(steps: Iterator[Any]) -> float:
-    """Of the steps of a job, in seconds."""
+    """The duration of a job's longest step [s]."""
     longest = 0.0
     while True:
         began = time.perf_counter()

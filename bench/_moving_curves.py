@@ -1,4 +1,4 @@
-"""Hair curves that geometry nodes move by themselves."""
+"""Hair curves that geometry nodes move."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from typing import Any
 import bpy
 import numpy as np
 
-#: how far tips go to the side, and how much longer strands get, in a frame [m]
+#: how far tips move sideways, and up, in a frame [m]
 SIDE, LONGER = 0.004, 0.002
 
 
 def move_by_nodes(hair: Any) -> Any:
-    """A modifier by which tips go to +X and up, ever farther with the frames; the curves at frame 1
-    stay as they are."""
+    """Add a modifier that moves tips to +X and up, farther in each frame; at frame 1 curves are
+    unchanged."""
     group = bpy.data.node_groups.new("Moving", "GeometryNodeTree")
     for name, way in (("Geometry", "INPUT"), ("Geometry", "OUTPUT")):
         group.interface.new_socket(name, in_out=way, socket_type="NodeSocketGeometry")
@@ -45,7 +45,8 @@ def move_by_nodes(hair: Any) -> Any:
 
 
 def apart(points: Any, offsets: Any, curves: Any) -> float:
-    """How far strands are from curves, as lines, either way [m]."""
+    """The largest distance of a strand's points from its curve, or of a curve's from its strand
+    [m]."""
     farthest = 0.0
     for number in range(len(offsets) - 1):
         strand = points[offsets[number] : offsets[number + 1]].astype(np.float64)
@@ -56,7 +57,7 @@ def apart(points: Any, offsets: Any, curves: Any) -> float:
 
 
 def _away(points: Any, line: Any) -> float:
-    """Of the point that is farthest from a line of straight pieces."""
+    """The distance of the point that is farthest from a polyline."""
     begin, way = line[:-1], np.diff(line, axis=0)
     beside = points[:, None] - begin
     part = (beside * way).sum(axis=2) / np.maximum((way * way).sum(axis=1), 1e-30)
@@ -65,7 +66,7 @@ def _away(points: Any, line: Any) -> float:
 
 
 def lose_curves(hair: Any, frame: int) -> None:
-    """A modifier that takes three curves away from this frame on."""
+    """Add a modifier that deletes three curves from this frame on."""
     group = bpy.data.node_groups.new("Losing", "GeometryNodeTree")
     for name, way in (("Geometry", "INPUT"), ("Geometry", "OUTPUT")):
         group.interface.new_socket(name, in_out=way, socket_type="NodeSocketGeometry")

@@ -1,8 +1,8 @@
-"""Hair in the light of three worlds made by code, path traced by Cycles with the same curves.
+"""Hair in the light of three procedural worlds, beside Cycles' path tracing of the same curves.
 
-The built-in groom on its head, with every setting as it ships; the world comes the way a user's
-does, out of the nodes of Cycles' own world. FLIP and light are of the pixels that hair covers; all
-colours under one world have one exposure, by which the brightest is bright.
+The built-in groom on its head, with default settings; the world is read from the nodes of Cycles'
+own world, as a user's is. FLIP and light are those of the pixels that hair covers; all colours
+under one world share an exposure, at which the brightest of them is bright.
 """
 
 from __future__ import annotations
@@ -30,18 +30,18 @@ from hairloom.addon.strands.arc_length import along
 
 SHEET = Path(__file__).resolve().parents[1] / "out" / "environment_sheet.png"
 SIZE, SAMPLES = 160, 3
-#: of Cycles' pictures, which are denoised: paths a pixel, bounces
+#: of Cycles' pictures, which are denoised: paths per pixel, bounces
 PATHS, BOUNCES = 64, 64
 #: pixels of a panorama
 ROWS, COLUMNS = 128, 256
 #: the brightest tenth of the brightest hair is this bright in a picture
 SHOWN = 0.5
-#: of a pixel of hair, what hair covers at least
+#: least coverage of a pixel that counts as hair
 _IS_HAIR = 0.5
 
 
 def _directions() -> np.ndarray:
-    """Of each pixel of a panorama, (ROWS, COLUMNS, 3), row 0 at the bottom."""
+    """The direction of each pixel of a panorama, (ROWS, COLUMNS, 3), row 0 at the bottom."""
     height = (np.arange(ROWS)[:, None] + 0.5) / ROWS * np.pi - 0.5 * np.pi
     turn = (0.5 - (np.arange(COLUMNS)[None, :] + 0.5) / COLUMNS) * 2.0 * np.pi
     flat = np.cos(height)
@@ -85,7 +85,7 @@ WORLDS: dict[str, Callable[[], np.ndarray]] = {
 
 
 def truths(rig: Rig, camera: Any) -> Iterator[tuple[str, str, Any, np.ndarray]]:
-    """World, colour, the world of Blender's and Cycles' picture."""
+    """The name of a world, that of a colour, Blender's world, and Cycles' picture."""
     room, strands = CyclesRoom(), rig.strands
     drawn = drawn_radius(strands.radius, StrandSettings(), along(strands.points, strands.offsets))
     room.strands(strands.points, drawn, counts=strands.point_counts)
@@ -108,7 +108,7 @@ def truths(rig: Rig, camera: Any) -> Iterator[tuple[str, str, Any, np.ndarray]]:
 
 def environment() -> dict[str, Any]:
     """environment_flip_hair: the largest mean FLIP of hair, of all worlds and colours.
-    environment_light_percent: by how much a channel's light on hair is off at most.
+    environment_light_percent: largest error of a channel's light on hair.
     """
     rig = rig_of(built_in(), "built-in")
     camera = _studio(rig)._camera(1.0)
@@ -142,7 +142,7 @@ def environment() -> dict[str, Any]:
 
 
 def _ours(rig: Rig, camera: Any, absorption: tuple[float, float, float], world: Any) -> np.ndarray:
-    """The groom by our own light of this world of Blender's."""
+    """Our picture of the groom in the light of Blender's world."""
     _, look = plain_look(absorption)
     studio = _studio(rig, GroomSettings().with_settings(look))
     light = read_environment(SimpleNamespace(world=world))

@@ -1,7 +1,7 @@
 """Soft shadows on a matt floor, of a ball and of a curtain of hair, beside Cycles.
 
-A sun of 10 degrees and an area light of a metre; rms over the floor, whose brightest place is 1.
-Whole pictures by the engine, as F12 renders them.
+A sun of 10 degrees and an area light of a metre; rms error over the floor, relative to its
+brightest place. Pictures are rendered by the engine, as with F12.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ ABOVE, SEEN = 6.0, 2.4
 
 
 def soft_shadows(rendered: Callable[[Any], tuple[dict[str, np.ndarray], float]]) -> dict[str, Any]:
-    """soft_shadow_rms: the larger one of both lights. soft_shadow_hard_rms: the same of our lights
-    without a size, for how much there is to win.
+    """soft_shadow_rms: the larger of both lights. soft_shadow_hard_rms: the same without softness,
+    our lights having no size, for comparison.
 
     Args:
         rendered: renders a scene; see picture.py.
@@ -132,7 +132,7 @@ def _curtain() -> Any:
 
 
 def _floor(scene: Any, engine: str, rendered: Callable[..., Any]) -> np.ndarray:
-    """Light on the floor, (SIZE, SIZE); not a number where something is before it."""
+    """Light on the floor, (SIZE, SIZE); NaN where something is in front of it."""
     scene.render.engine = "CYCLES" if engine == "CYCLES" else "HAIRLOOM"
     light = scene.objects[next(each.name for each in scene.objects if each.type == "LIGHT")].data
     kept = light.angle if light.type == "SUN" else light.size

@@ -16,9 +16,9 @@ from hairloom.addon.groom.ties import Holders, Tie
 from hairloom.addon.rig_flow import Pose, Rig
 from hairloom.addon.strands import StrandSet
 
-#: From the middle of the skull to the ring, a fraction beyond the skin, and the ring's radius [m].
+#: Direction from the skull's middle to the ring; its distance from the skin, and its radius [m].
 TOWARDS, BEYOND, RADIUS = np.array([0.0, 0.8, 0.6]), 0.025, 0.014
-#: [m] of hair behind the ring, and how far hair lies off the skin.
+#: Length of hair behind the ring, and distance of hair from the skin [m].
 TAIL, LIFT = 0.28, 0.006
 POINTS = 24
 
@@ -67,7 +67,7 @@ def ponytail(count: int, *, children: ChildrenSettings | None = None) -> Ponytai
 
 
 def _combed(grown: StrandSet, bust: BuiltInHead, middle: np.ndarray, axis: np.ndarray) -> StrandSet:
-    """From each root along the skin to the ring, through it and down."""
+    """The strands, from each root along the skin to the ring, through it and down."""
     random = np.random.default_rng(1)
     roots, count = grown.roots.astype(np.float64), grown.strand_count
     angle, away = random.uniform(0.0, 2.0 * np.pi, count), RADIUS * random.random(count) ** 0.5
@@ -108,8 +108,8 @@ def _combed(grown: StrandSet, bust: BuiltInHead, middle: np.ndarray, axis: np.nd
 
 
 def _skin(bust: BuiltInHead, direction: np.ndarray) -> np.ndarray:
-    """How far the skin is from the middle in unit directions (n, 3), (n,) [m]: the farthest of the
-    vertices about there."""
+    """Distance of the skin from the skull's middle in unit directions (n, 3), (n,) [m]: that of the
+    vertex that is nearest in direction."""
     vertices = bust.surface.positions.astype(np.float64)
     vertices = vertices[vertices[:, 2] > -0.05]
     away = np.linalg.norm(vertices, axis=1)

@@ -1,8 +1,8 @@
 """Seeded runs that try to break the dynamics: any settings, any guides, wild heads and colliders.
 
-Every value is drawn from its whole hard range, and often from one of its ends. Only what would
-take minutes a run is held back: the substep rate and the number of relaxations. No Blender here,
-so that the tests can use it too.
+Every value is drawn from its whole hard range, and often from one of its ends. Only the substep
+rate and the number of relaxations are limited, since a run would otherwise take minutes. Nothing
+here needs Blender, so that tests can use it.
 """
 
 from __future__ import annotations
@@ -39,24 +39,24 @@ from hairloom.addon.params import Parameter
 
 CV_COUNTS = (2, 3, 4, 8, 16, 24)
 FRAME_RATES = (12.0, 24.0, 30.0, 60.0, 120.0)
-#: Left out beside masks: what no step reads, and what is drawn by itself, so that the runs stay
-#: what they were.
+#: Settings that are not drawn, besides masks: those that no step reads, and those that are drawn
+#: separately, so that each seed keeps its run.
 _NOT_DRAWN = {"device", "collider_resolution", "curl_stretch", "curl_bounce"} | {
     "animated_style",
     "simulated",
 }
-#: Sweeps over a segment in a second of simulation; with more of them a run takes minutes.
+#: Most sweeps over segments in a second of simulation; with more, a run takes minutes.
 _SWEEPS = 60_000
-#: Shorter than this a strand has no length to be compared with [m].
+#: Shortest length at rest that lengths are compared with [m].
 _NO_LENGTH = 1.0e-4
 
 
 @dataclass(frozen=True)
 class Way:
-    """How a thing moves: swaying, turning, pulsing; a function of time, with one jump at most.
+    """The motion of an object over time: swaying, turning, pulsing, with one jump at most.
 
     sway, phase: (3,) [m], [rad]. rate: (3,) [1/s]. axis: (3,) unit. turn: [1/s]. scale: (3,).
-    pulse: share of the scale. jump_at: [s]. jump: (3,) [m].
+    pulse: fraction of the scale. jump_at: [s]. jump: (3,) [m].
     """
 
     place: np.ndarray
@@ -82,8 +82,8 @@ class Way:
 
 @dataclass(frozen=True)
 class RandomRun:
-    """Guides (guide_count, cv_count, 3) at rest on a head, how much their curls have to give, and
-    all that happens to them."""
+    """Guides (guide_count, cv_count, 3) at rest on a head, the room of their curls (see `start`),
+    and all that acts on them."""
 
     grid: np.ndarray
     settings: DynamicsSettings
@@ -97,11 +97,11 @@ class RandomRun:
     room: np.ndarray | None = None
 
     def begin(self) -> DynamicsState:
-        """The guides where the head is at first."""
+        """The guides in the head's first pose."""
         return start(_moved(self.head.matrix(0.0), self.grid), self.room)
 
     def drives(self, seconds: float) -> Iterator[Drive]:
-        """One a frame."""
+        """A drive for each frame."""
         times = np.arange(round(seconds * self.fps) + 1) / self.fps
         for number in range(1, len(times)):
             moments = times[max(number - 2, 0) : number + 1].tolist()
@@ -121,10 +121,9 @@ class RandomRun:
 
 @dataclass(frozen=True)
 class Reach:
-    """The farthest that a CV is from its root, as a share of its length along the strand, which is
-    that at rest, but for what curls give.
-
-    straight: in a straight line. along: along the strand as it is. is_finite: no NaN anywhere.
+    """The largest distance of a CV from its root, as a fraction of the rest length between them,
+    which includes what curls give. straight: in a straight line. along: along the strand.
+    is_finite: all numbers are finite.
     """
 
     straight: float
@@ -133,7 +132,7 @@ class Reach:
 
 
 def reach_of(state: DynamicsState, settings: DynamicsSettings | None = None) -> Reach:
-    """The worst of all CVs of a state; without settings nothing gives."""
+    """The worst of all CVs of a state; without settings, curls give nothing."""
     position = state.position.astype(np.float64)
     if not np.isfinite(position).all() or not np.isfinite(state.previous).all():
         return Reach(np.inf, np.inf, False)
@@ -149,7 +148,7 @@ def reach_of(state: DynamicsState, settings: DynamicsSettings | None = None) -> 
 
 
 def promises_length(settings: DynamicsSettings) -> bool:
-    """Whether these settings ask for hair that does not stretch: relaxation alone does not."""
+    """Whether these settings keep lengths; relaxation alone does not."""
     return settings.length_solver == "direct" or settings.long_range
 
 
@@ -165,7 +164,7 @@ def random_run(seed: int, guide_count: int = 12) -> RandomRun:
     if cv_count >= 4 and random.random() < 0.2:
         is_held = np.zeros((guide_count, cv_count), bool)
         is_held[:, -1] = random.random(guide_count) < 0.5
-        ties = np.random.default_rng(seed)  # of their own, so that the runs stay what they were
+        ties = np.random.default_rng(seed)  # a separate generator, so that each seed keeps its run
         first = ties.integers(0, cv_count - 1, guide_count)
         is_tied = ties.random(guide_count) < 0.3
         for step in (0, 1):
@@ -194,7 +193,7 @@ def random_run(seed: int, guide_count: int = 12) -> RandomRun:
 
 
 def _fields(random: np.random.Generator) -> ForceFields:
-    """None, or some of all kinds, of which a few are much too strong."""
+    """No fields, or some of any kind, a few of them much too strong."""
     fields = []
     for _ in range(random.choice([0, 0, 1, 4])):
         axis = random.normal(size=3)
@@ -220,7 +219,7 @@ def _fields(random: np.random.Generator) -> ForceFields:
 
 
 def shaken(guide_count: int) -> RandomRun:
-    """No random run, but default settings in gusts, on a ball that sways like a shaken head."""
+    """Not random: default settings in gusts, on a ball that sways like a shaken head."""
     random = np.random.default_rng(0)
     still = np.zeros(3)
     head = Way(
@@ -278,7 +277,8 @@ def _drawn(parameter: Parameter, random: np.random.Generator) -> Any:
 
 
 def _guides(random: np.random.Generator, count: int, cv_count: int) -> np.ndarray:
-    """Curly, straight, folded, without length, with a segment without length; 1 cm to 2 m."""
+    """Curly or straight, 1 cm to 2 m long; one folds back, one has no length, one none in its outer
+    half."""
     length = 0.01 * 200.0 ** random.random((count, 1, 1))
     grid = _curls(random, length, cv_count, float(random.choice([0.0, 0.2])))
     if cv_count > 3:
@@ -291,7 +291,7 @@ def _guides(random: np.random.Generator, count: int, cv_count: int) -> np.ndarra
 def _curls(
     random: np.random.Generator, length: np.ndarray, cv_count: int, wave: float
 ) -> np.ndarray:
-    """Guides outwards from a ball of 0.1 m, waved by a share of their length (count, 1, 1) [m]."""
+    """Guides outwards from a ball of 0.1 m, waved by a fraction of length (count, 1, 1) [m]."""
     outward = random.normal(size=(len(length), 1, 3))
     outward /= np.linalg.norm(outward, axis=2, keepdims=True)
     share = np.linspace(0.0, 1.0, cv_count)[:, None] ** random.choice([1.0, 1.5])
@@ -336,7 +336,7 @@ def _solid(random: np.random.Generator) -> Collider:
 
 @lru_cache(maxsize=2)
 def _mesh(which: int) -> DistanceField:
-    """What a mesh becomes: a box with sharp edges, or a ring with a hole, sampled coarsely."""
+    """The distance field of a box with sharp edges, or of a torus, sampled coarsely."""
     low, cell, nodes = -0.25, 0.02, 26
     axis = low + cell * np.arange(nodes)
     points = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1)

@@ -1,12 +1,11 @@
 """Strands carried on the CPU, beside Blender's node "Interpolate Hair Curves" and plain numpy.
 
 762 guides on a ball, combed, carry 4,095, 20,000 and 100,000 strands of 30 points. The node gets
-the same guides of 30 points, and three of them for a strand; a frame of it is an evaluation of the
-depsgraph after the guides were tagged. It finds roots and weights again in each, which cannot be
-turned off. Ours is `ride`, which a frame of the preview without compute shaders goes through: it
-has the weights since the groom was built, those of the roots that the node chose, and the strands'
-rest shapes. The forms of plain numpy only add up displacements, as strands that neither turn nor
-keep their lengths would take.
+the same guides of 30 points, and three of them per strand; a frame of it is an evaluation of the
+depsgraph after the guides are tagged, in which it always computes roots and weights again. Ours is
+`ride`, as in a frame of the preview without compute shaders: rest shapes, and weights for the roots
+that the node chose, are computed beforehand. The plain numpy variants only add up displacements, so
+that strands neither turn nor keep their lengths.
 """
 
 from __future__ import annotations
@@ -46,7 +45,7 @@ class InterpolatedHair:
         self._set(Input_10=3)  # Interpolation Guides
 
     def strands(self, count: int) -> StrandSet:
-        """With the density at which the node makes about this many."""
+        """The node's strands, at a density that makes about this many."""
         density = count / (4.0 * np.pi * RADIUS**2)
         for _ in range(4):
             self._set(Input_15=density)
@@ -71,7 +70,7 @@ class InterpolatedHair:
 
 
 def gathered(rest: np.ndarray, motion: np.ndarray, weights: GuideWeights) -> np.ndarray:
-    """Three takes and their sum."""
+    """Three gathers and their sum."""
     one, two, three = (motion[index] for index in weights.guide.T)
     w = weights.weight[:, :, None, None]
     return rest + one * w[:, 0] + two * w[:, 1] + three * w[:, 2]
@@ -97,10 +96,10 @@ PLAIN: tuple[Mix, ...] = (gathered, summed, summed_in_chunks)
 
 
 def node_figures() -> dict[str, float]:
-    """Milliseconds, the least of ROUNDS in which all take turns, and ratios (bench/refinement.py).
+    """Milliseconds, the minimum over ROUNDS in turns, and ratios (bench/refinement.py).
 
-    node_ratio_N: times faster than the node. numpy_ratio_N: the time as a factor of the fastest
-    plain form's. peak_memory_ratio: the most memory that was taken, over that of the result.
+    node_ratio_N: the node's time over ours. numpy_ratio_N: our time over that of the fastest plain
+    variant. peak_memory_ratio: peak memory over the size of the result.
     """
     bpy.ops.mesh.primitive_uv_sphere_add(radius=RADIUS, segments=48, ring_count=24)
     head = bpy.context.object
@@ -162,7 +161,8 @@ def _peak_ratio(work: Callable[[], np.ndarray]) -> float:
 
 
 def _weights(roots: np.ndarray, guides: StrandSet, count: int) -> GuideWeights:
-    """Those of `count` strands at these roots, some twice or none where there are not as many."""
+    """Weights of `count` strands at these roots, of which some repeat or drop out to make the
+    count."""
     roots = roots[np.linspace(0, len(roots) - 1, count).round().astype(int)]
     group = np.zeros(GUIDES, np.int32)
     return guide_weights(roots, np.zeros(count, np.int32), guides.grid[:, 0], group)

@@ -1,9 +1,9 @@
 """Refinement in the picture: vertices, errors and times of one groom, whole and close up.
 
-Sintel's 11,400 strands of 16 CVs where the shared data is, else as many grown on Blender's monkey.
-Undivided is one piece a segment; fixed 64, which would be 22 million vertices, is only counted.
-All contestants draw every strand that there is: nothing is culled or thinned out but where that
-is what is asked.
+Sintel's 11,400 strands of 16 CVs if the shared data is there, otherwise as many grown on Blender's
+monkey. Undivided is one piece per segment; fixed 64, which would be 22 million vertices, is only
+counted. All variants draw every strand: culling and thinning are off except where they are
+measured.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ SINTEL = Path("sintel") / "SintelHairOriginal-sintel_hair.16points.tfx"
 WIDTH, HEIGHT, STRANDS, ROUNDS = 960, 720, 11_400, 15
 BARE = DetailSettings(culling="none", lod_size=0.0)
 UNDIVIDED = replace(BARE, mode="fixed", subdivisions=1)
-#: corners of the exact curve between two of the drawn line
+#: pieces of the exact curve for each piece of the drawn line
 PROBES = 8
 #: strands whose corners are held in memory at once
 CHUNK = 500
@@ -102,7 +102,7 @@ def view_figures() -> dict[str, Any]:
 
 
 def vertices(shown: Groom) -> dict[str, float]:
-    """How many each way of drawing the whole head takes, and their ratios."""
+    """Vertices that each variant draws for the whole head, and their ratios."""
     strand_count, cv_count, _ = shown.strands.shape
     drawn = StrandPass()
     snapshot, camera = shown.snapshot(BARE), shown.camera()
@@ -120,9 +120,9 @@ def vertices(shown: Groom) -> dict[str, float]:
 
 
 def error_px(shown: Groom, camera: Camera) -> float:
-    """How far the exact curve is from the line that is drawn, at most [pixels].
+    """The largest distance of the exact curve from the drawn line [pixels].
 
-    Of all that is within the picture, each piece probed in seven places.
+    Each piece within the picture is probed at seven places.
     """
     factors = _factors(shown, camera)
     view = PictureView(camera.view, camera.projection, WIDTH, HEIGHT)
@@ -135,7 +135,7 @@ def error_px(shown: Groom, camera: Camera) -> float:
 def _error_of(strands: np.ndarray, factors: np.ndarray, view: PictureView) -> float:
     exact, _ = adaptive_points(strands.astype(np.float64), factors * PROBES)
     clip = np.concatenate([exact, np.ones((len(exact), 1))], axis=1) @ view.view_projection.T
-    # a strand's corners are its probes, every eighth from its root on
+    # the drawn line's corners are every eighth probe, from the root on
     starts = stations(factors)[:, -1] * PROBES + 1
     root = np.repeat(piece_starts(starts), starts)
     place = np.arange(len(clip)) - root
@@ -155,9 +155,9 @@ def _error_of(strands: np.ndarray, factors: np.ndarray, view: PictureView) -> fl
 
 
 def frame_times(shown: Groom) -> dict[str, float]:
-    """Milliseconds a frame while the camera turns, so that all detail is found again each frame.
+    """Milliseconds per frame while the camera turns, so that each frame computes all detail again.
 
-    Medians of rounds in which the contestants take turns, at the size of the picture and at half.
+    Medians over rounds in which the variants take turns, at full size and at half.
     """
     ways = {"undivided": UNDIVIDED, "adaptive": BARE}
     snapshots = {name: shown.snapshot(way) for name, way in ways.items()}
@@ -191,7 +191,8 @@ def frame_times(shown: Groom) -> dict[str, float]:
 
 
 def gpu_cpu_difference(shown: Groom) -> float:
-    """How far the GPU's stations are from the CPU's at most, as a share of the hair's length."""
+    """The largest distance of the GPU's stations from the CPU's, as a fraction of the strand's
+    length."""
     factors = _factors(shown, shown.close_up())
     most = int(stations(factors)[:, -1].max())
     shader = program(
@@ -231,9 +232,9 @@ def gpu_cpu_difference(shown: Groom) -> float:
 
 
 def coverage_eighth_difference(shown: Groom) -> float:
-    """How much an eighth of the strands covers less or more than all, as a share; the worst view.
+    """Relative difference in coverage of an eighth of the strands from all, in the worst view.
 
-    The groom is 135 and 68 pixels high; its strands have the ranks of an even order.
+    The groom is 135 and 68 pixels high; strands are ranked by `even_ranks`.
     """
     rank = even_ranks(shown.strands[:, 0])
     worst = 0.0
@@ -250,14 +251,14 @@ def coverage_eighth_difference(shown: Groom) -> float:
 
 
 def _factors(shown: Groom, camera: Camera) -> np.ndarray:
-    """As the GPU finds them."""
+    """Detail factors, as the GPU computes them."""
     snapshot = shown.snapshot(BARE)
     order = DetailPass().order(snapshot, point_textures(snapshot), 1, camera, (WIDTH, HEIGHT))
     return read_factors(order, *shown.strands.shape[:2])
 
 
 class Target:
-    """Something to draw into; a framebuffer does not keep its textures alive."""
+    """A framebuffer and its textures, which it does not keep alive itself."""
 
     def __init__(self, width: int, height: int) -> None:
         self._color = gpu.types.GPUTexture((width, height), format="RGBA16F")
@@ -267,7 +268,7 @@ class Target:
         )
 
     def timed(self, draw: Callable[[], None]) -> float:
-        """Milliseconds until the picture is there: until one pixel can be read back."""
+        """Milliseconds until the picture is drawn: until one pixel can be read back."""
         with self.framebuffer.bind():
             self.framebuffer.clear(color=(0.0, 0.0, 0.0, 0.0), depth=1.0)
             begin = time.perf_counter()

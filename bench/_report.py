@@ -1,4 +1,4 @@
-"""How benchmarks begin, and report what they found: a line a figure, then all of it as JSON."""
+"""How benchmarks start and report: a line for each figure, then all of them as JSON."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ import numpy as np
 
 from hairloom.addon.render.strand_layers import is_software
 
-#: that of a figure in the JSON
+#: decimal places of figures
 DIGITS = 6
 
 
 def start() -> None:
-    """Blender as a module can draw after this."""
+    """Let Blender as a module draw."""
     gpu.init()
 
 
 def measured(
     parts: Mapping[str, Callable[[], Mapping[str, Any]]], names: Sequence[str]
 ) -> dict[str, Any]:
-    """The figures of these parts of a benchmark, or of all where none is named."""
+    """The figures of these parts of a benchmark, or of all if none is named."""
     return {key: value for name in chosen(names, parts) for key, value in parts[name]().items()}
 
 
 def chosen(names: Sequence[str], parts: Iterable[str]) -> list[str]:
-    """These parts of a benchmark, or all where none is named; it ends where one is unknown."""
+    """These parts of a benchmark, or all if none is named; exits if one is unknown."""
     known = list(parts)
     unknown = [name for name in names if name not in known]
     if unknown:
@@ -48,12 +48,12 @@ def report(
     at_most: Mapping[str, float] | None = None,
     at_least: Mapping[str, float] | None = None,
 ) -> int:
-    """Print the figures and what is missed; the exit status: 1 if a figure misses its limit, or if
-    there is none.
+    """Print the figures and the missed limits; the exit status: 1 if a figure misses its limit, or
+    if there is no figure.
 
-    found: figures by name; None is one that has not been measured. reference: what ratios and
-    errors are against. at_most, at_least: limits by name, or by a pattern of names such as
-    `*_seconds`. One for which nothing was found asks nothing; NaN misses every limit.
+    found: figures by name; None: not measured. reference: what ratios and errors are relative to.
+    at_most, at_least: limits by name, or by a pattern of names such as `*_seconds`; one that
+    matches no figure is ignored. NaN misses every limit.
     """
     limits = _limits(found, at_most or {}, operator.le) | _limits(
         found, at_least or {}, operator.ge
@@ -83,7 +83,7 @@ class _Limit:
 def _limits(
     found: Mapping[str, Any], patterns: Mapping[str, float], holds: Callable[[float, float], bool]
 ) -> dict[str, _Limit]:
-    """Of all figures that have been measured and that a pattern names."""
+    """The limits of measured figures whose names match a pattern."""
     return {
         name: _Limit(holds, value)
         for pattern, value in patterns.items()
@@ -93,7 +93,7 @@ def _limits(
 
 
 def machine() -> dict[str, str | bool]:
-    """What computed and drew; `gpu` must be there."""
+    """The versions and the GPU behind the figures; call `start` first."""
     return {
         "backend": gpu.platform.backend_type_get(),
         "renderer": gpu.platform.renderer_get(),

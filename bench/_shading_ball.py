@@ -2,10 +2,10 @@
 
 Strands run along meridians from the top of a black ball to its bottom; one sun; no world; the same
 strands, camera and fibre in both. Columns, from the left:
-    1. Cycles, the sun's own light alone, without shadows: each strand as if it were on its own;
-    2. ours without what stands in for shadows and for light from strand to strand: what must match;
-    3. Cycles, path traced with all bounces and shadows: the truth;
-    4. ours with both stand-ins. Shadows and light from strand to strand are measured in
+    1. Cycles, direct sunlight without shadows: each strand as if it were alone;
+    2. ours without the approximations of shadows and of multiple scattering: must match 1;
+    3. Cycles, path traced with all bounces and shadows: the reference;
+    4. ours with both approximations. Computed shadows and multiple scattering are measured in
        _volume_balls.py.
 Rows: black from the front, blond from the front, blond against the light.
 """
@@ -32,11 +32,11 @@ from hairloom.addon.strands import Surface
 
 SHEET = Path(__file__).resolve().parents[1] / "out" / "shading_sheet.png"
 SIZE, SAMPLES = 240, 4
-#: a pixel: where each path ends at the first strand, and where it goes on; the latter are denoised
+#: paths per pixel: that end at the first strand, and that go on, whose picture is denoised
 PATHS_SINGLE, PATHS_FULL = 24, 64
-#: strands on the sheet, and so few that hardly one hides another
+#: strands on the sheet, and few enough that hardly one hides another; their radius
 STRANDS, FEW, RADIUS = 14_000, 2_000, 0.003
-#: shown from bottom to top [m]; the ball has a radius of 1
+#: height of the view [m]; the ball has a radius of 1
 HEIGHT = 2.3
 BLACK = (2.5, 3.5, 5.0)
 HAIR = Hair(0.2, float(np.radians(3.0)))
@@ -50,10 +50,10 @@ BLOCK = 12
 
 
 def ball_figures() -> dict[str, Any]:
-    """Write the sheet; how far single scattering is from Cycles', as shares of its mean.
+    """Write the sheet; differences of single scattering from Cycles', relative to its mean.
 
-    It is measured on few strands as well: where many lie behind one another near the outline, only
-    their outer sides are seen, and Cycles shades each side by itself, ours the whole width as one.
+    They are measured on few strands as well: where many overlap near the outline, only their outer
+    sides are seen, and Cycles shades across a strand's width, where ours has one shade.
     """
     dense, few = combed_strands(STRANDS), combed_strands(FEW)
     core = Surface(*ball_mesh())
@@ -96,7 +96,7 @@ def snapshot_of(
     towards: tuple[float, float, float],
     stand_ins: float,
 ) -> Snapshot:
-    """The ball as we draw it, with so much of what stands in for shadows and other strands."""
+    """The ball as we draw it; stand_ins: strength of approximate shadows and scattering, 0 to 1."""
     fibre = HAIR.fibre(absorption)
     shading = ShadingSettings(
         model="marschner",
@@ -128,20 +128,20 @@ def snapshot_of(
 
 
 def drawn(snapshot: Snapshot) -> np.ndarray:
-    """From +z, (SIZE, SIZE, 4)."""
+    """The picture from +z, (SIZE, SIZE, 4)."""
     view = look_at((0.0, 0.0, DISTANCE), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0))
     camera = Camera(view, orthographic(HEIGHT, 1.0, 1.0, 2.0 * DISTANCE))
     return render_image(snapshot, camera, SIZE, SIZE, SAMPLES)
 
 
 def blocks(picture: np.ndarray) -> np.ndarray:
-    """Means of blocks of pixels, (blocks, blocks, 3): what is left when strands are averaged."""
+    """Means of blocks of pixels, (blocks, blocks, 3): they average over strands."""
     count = SIZE // BLOCK
     return picture[..., :3].reshape(count, BLOCK, count, BLOCK, 3).mean(axis=(1, 3))
 
 
 def difference(ours: np.ndarray, theirs: np.ndarray) -> float:
-    """Mean of the differences of blocks over the mean."""
+    """Mean absolute difference of blocks, relative to the mean of theirs."""
     one, other = blocks(ours), blocks(theirs)
     return float(np.abs(one - other).mean() / other.mean())
 

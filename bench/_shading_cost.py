@@ -1,7 +1,7 @@
 """What shading costs: a frame under either model, and a slider that moves.
 
 Sintel's 11,400 strands under three lights (see _refinement_views). All rounds are interleaved, so
-that a busy machine meets all contestants alike.
+that load on the machine affects all variants alike.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from hairloom.addon.shading.marschner.tables import DEFAULT_SIZE, PREVIEW_SIZE
 from hairloom.addon.shading.settings import ShadingSettings
 
 ROUNDS = 15
-#: strands, and pixels along a side, where only the call counts
+#: strands, and pixels along a side, where only the draw call is timed
 FEW = 64
 MARSCHNER_LOOK = ShadingSettings(model="marschner")
 
@@ -33,9 +33,9 @@ def cost_figures() -> dict[str, float]:
     """The figures by name.
 
     frame_ratio_models: time of a frame with Marschner over that with Kajiya-Kay.
-    slider_colour_ms, slider_shape_ms: what a draw call computes longer when a colour has changed
-        since the draw before, and when the fibre's shape has, at the preview's size.
-    refine_ms: the same for a shape at the size at rest.
+    slider_colour_ms, slider_shape_ms: how much longer a draw call computes after a change of
+        colour, and of the fibre's shape, with tables of the preview's size.
+    refine_ms: the same for a shape, with tables of the size at rest.
     """
     shown = groom()
     camera = shown.camera()
@@ -49,7 +49,7 @@ def cost_figures() -> dict[str, float]:
 
 
 def frame_ratio(snapshot: Snapshot, camera: Camera) -> float:
-    """Median over median, each until a pixel can be read back."""
+    """The ratio of median times, each until a pixel can be read back."""
     target, drawn = Target(WIDTH, HEIGHT), StrandPass()
     looks = [replace(snapshot, shading=look) for look in (MARSCHNER_LOOK, ShadingSettings())]
     times: list[list[float]] = [[], []]
@@ -63,10 +63,10 @@ def frame_ratio(snapshot: Snapshot, camera: Camera) -> float:
 def delay_ms(
     snapshot: Snapshot, camera: Camera, changes: Iterator[ShadingSettings], size: int
 ) -> float:
-    """Median of what a draw call computes longer after a change than once more without one.
+    """The median time that a draw call takes longer after a change than without one.
 
-    By the clock of the calling thread, which other programs do not hold up, and with few strands:
-    the tables do not hang on how many there are.
+    Measured in the calling thread's processor time, which other programs do not affect, and with
+    few strands, as the tables do not depend on their number.
     """
     cvs = snapshot.layout.cv_count
     few = replace(
@@ -79,7 +79,7 @@ def delay_ms(
     MARSCHNER.release()
 
     def call_ms(shading: ShadingSettings) -> float:
-        """Until the call returns; what the GPU still has to do is waited for without a clock."""
+        """The draw call's own time; the wait for the GPU is not timed."""
         shown = replace(few, shading=shading, table_size=size)
         took = 0.0
 

@@ -1,14 +1,13 @@
 """Our fibre's lobes against those of Cycles' Principled Hair (Chiang's model).
 
-One straight strand, one sun, and a camera: for each pair of directions the mean radiance of the
-strand's width over the sun's irradiance, which is S cos theta_i. Cycles spreads light around the
-fibre by a logistic curve; ours is the Gaussian nearest to it. R is what black hair
-shows; TT and TRT are what a fibre of little pigment shows beyond R. The usual hair's TRT is so wide
-that it matters by which angle one takes Fresnel's terms, so it is measured on its own, also with
-these by Cycles' angle.
+One straight strand, one sun, and a camera: for each pair of directions the mean radiance over the
+strand's width, divided by the sun's irradiance, which is S cos theta_i. Azimuthally, Cycles uses a
+logistic distribution; ours is the Gaussian nearest to it. R is measured on black hair; TT and TRT
+are what a fibre of little pigment shows beyond R. The usual hair's TRT is so wide that the angle
+used in Fresnel's terms matters, so it is measured separately, also with Cycles' angle.
 
-Angles and widths are read off profiles, in degrees: where the peak is, and the full width at half
-of its height over 2.355. Along the strand they are those of theta_h.
+Angles and widths are read off profiles, in degrees: the position of the peak, and the full width at
+half maximum over 2.355. Longitudinally they are angles of theta_h.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ from hairloom.addon.shading.marschner.scattering import azimuthal_lobes
 
 BLACK = (100.0, 100.0, 100.0)
 BLOND = (0.06, 0.12, 0.3)
-#: of a picture that the strand nearly fills, [pixels]
+#: of a picture that the strand nearly fills [pixels]
 SIZE = 32
 GAUSSIAN_FWHM = 2.3548
 
@@ -41,7 +40,7 @@ class Hair:
     around: float = 0.3
 
     def fibre(self, absorption: tuple[float, float, float]) -> Fibre:
-        """The same hair, ours: as an artist gets it from the node."""
+        """Our fibre for the same hair, as an artist gets it from the node."""
         node = PrincipledHair(
             parametrization="ABSORPTION",
             absorption_coefficient=absorption,
@@ -54,7 +53,7 @@ class Hair:
 
 @dataclass(frozen=True)
 class Scan:
-    """A way through the directions: the three angles in step, and `place` along it [degrees]."""
+    """A path through the directions: the three angles at each `place` along it [degrees]."""
 
     lobe: str
     place: np.ndarray
@@ -71,7 +70,7 @@ class Scan:
 
     @classmethod
     def around(cls, lobe: str) -> Scan:
-        """phi from 60 degrees to as much on the other side, across the strand."""
+        """phi from 60 to 300 degrees, in the plane across the strand."""
         turn = np.arange(60.0, 301.0, 4.0)
         nought = np.zeros_like(turn)
         return cls(lobe, turn, nought, nought, np.radians(turn))
@@ -89,12 +88,13 @@ HAIRS = (
     Hair(0.15, float(np.radians(3.0))),
     Hair(0.2, float(np.radians(2.0)), around=0.5),
 )
-#: Principled Hair as it comes: its TRT is 17 degrees wide
+#: Principled Hair with its defaults: its TRT is 17 degrees wide
 USUAL = Hair(0.3, float(np.radians(2.0)))
 
 
 def lobe_figures() -> dict[str, Any]:
-    """The worst differences in degrees, per scan and in all; radiances as ours over Cycles'."""
+    """The worst differences in degrees, per scan and overall; and ratios of our radiance to
+    Cycles'."""
     room = CyclesRoom()
     room.strands(np.array([[[-2.0, 0.0, 0.0], [2.0, 0.0, 0.0]]]), 0.45)
     found: dict[str, Any] = {}
@@ -117,7 +117,7 @@ def lobe_figures() -> dict[str, Any]:
 
 
 def cycles_profile(room: CyclesRoom, scan: Scan, hair: Hair) -> np.ndarray:
-    """Green of a lobe along a scan, from what the whole strand shows."""
+    """A lobe's green radiance along a scan, extracted from that of the whole fibre."""
 
     def shown(absorption: tuple[float, float, float]) -> np.ndarray:
         room.hair(
@@ -134,11 +134,11 @@ def cycles_profile(room: CyclesRoom, scan: Scan, hair: Hair) -> np.ndarray:
 
 
 def our_profile(scan: Scan, hair: Hair, is_their_way: bool = False) -> np.ndarray:
-    """The same of ours.
+    """The same for our fibre.
 
     Args:
-        is_their_way: what happens around the fibre goes by theta_r, as Cycles has it, which is
-            not the same both ways round; Marschner's and ours goes by theta_d.
+        is_their_way: azimuthal scattering depends on theta_r, as in Cycles, which is not
+            reciprocal; in Marschner's model and ours it depends on theta_d.
     """
     theta_d = 0.5 * (scan.theta_r - scan.theta_i)
     cone = np.cos(scan.theta_r if is_their_way else theta_d)
@@ -158,7 +158,7 @@ def our_profile(scan: Scan, hair: Hair, is_their_way: bool = False) -> np.ndarra
 def strand_radiance(
     room: CyclesRoom, theta_i: float, theta_r: float, phi: float, seed: int = 0
 ) -> float:
-    """Mean of green over the strand's width, for a sun of 1 W/m^2."""
+    """Mean green radiance over the strand's width, for a sun of 1 W/m^2."""
     strand = np.array([np.cos(theta_r), 0.0, np.sin(theta_r)])
     to_eye = np.array([-np.sin(theta_r), 0.0, np.cos(theta_r)])  # across the strand
     aside = np.array([0.0, -1.0, 0.0])
@@ -170,7 +170,7 @@ def strand_radiance(
 
 
 def noise(room: CyclesRoom) -> float:
-    """How much one radiance differs from seed to seed, as a share: the deviation of eight."""
+    """Relative standard deviation of a radiance over eight seeds."""
     room.hair(BLOND, Roughness=0.15, Radial_Roughness=0.3, Offset=0.0)
     seen = [strand_radiance(room, 0.1, 0.0, 0.1, seed) for seed in range(8)]
     return float(np.std(seen) / np.mean(seen))
@@ -179,8 +179,8 @@ def noise(room: CyclesRoom) -> float:
 def peak_of(place: np.ndarray, profile: np.ndarray) -> tuple[float, float, float]:
     """Where a profile is highest, its width as that of a Gaussian, and its height.
 
-    The parabola through the logarithm of the three highest samples; straight lines between samples
-    at half of the height.
+    The peak is a parabola through the logarithms of the three highest samples; at half maximum,
+    samples are interpolated linearly.
     """
     top = int(np.clip(profile.argmax(), 1, len(profile) - 2))
     step = place[1] - place[0]

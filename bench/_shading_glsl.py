@@ -17,12 +17,12 @@ from hairloom.addon.shading.settings import ShadingSettings
 
 SHADERS = Path(__file__).resolve().parents[1] / "tests" / "gpu" / "shaders"
 SIDE = 256
-#: light below this share of the brightest counts as a difference from that share
+#: fraction of the largest value; smaller values are compared as if they were this large
 LEAST = 1.0e-5
 
 
 def glsl_relative_error() -> float:
-    """The largest difference over the value, of 65,536 times 3."""
+    """The largest relative error of 65,536 times 3 values."""
     shading = ShadingSettings()
     angles, absorptions = _random_ways()
     shader = program(
@@ -41,7 +41,7 @@ def glsl_relative_error() -> float:
         )
     )
     result = gpu.types.GPUTexture((SIDE, SIDE), format="RGBA32F")
-    # held here: binding keeps nothing alive
+    # referenced here, as binding keeps nothing alive
     textures = {
         "angles": texture_from(angles, "RGBA32F"),
         "absorptions": texture_from(absorptions, "RGBA32F"),
@@ -57,14 +57,15 @@ def glsl_relative_error() -> float:
     absorption, strengths = absorptions[..., :3].astype(np.float64), np.array(fibre.strengths)
     tables = marschner_tables(fibre, DEFAULT_SIZE)
     expected = look_up(tables, theta_i, theta_r, phi, absorption, strengths, level)
-    # as light uses it: where it grazes, S itself has no bounds
+    # as lighting uses it: at grazing angles, S itself is unbounded
     cosine = np.cos(theta_i)[..., None]
     apart, size = np.abs(found - expected) * cosine, np.abs(expected) * cosine
     return float((apart / np.maximum(size, LEAST * size.max())).max())
 
 
 def _random_ways() -> tuple[np.ndarray, np.ndarray]:
-    """theta_i, theta_r, phi, level; and absorptions; half of the ways near the first highlight."""
+    """Random theta_i, theta_r, phi, level, half of them near the first highlight; and
+    absorptions."""
     chance = np.random.default_rng(11)
     steepest = 0.49 * np.pi
     angles = np.zeros((SIDE, SIDE, 4), np.float32)

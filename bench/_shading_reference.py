@@ -1,8 +1,9 @@
-"""Marschner's reference and its tables: how right they are, and how long the tables take.
+"""Errors of Marschner's reference and of its tables, and how long the tables take.
 
 `lobe_error_*` are the largest differences of N_R, N_TT, N_TRT from ten million rays traced through
-a glass cylinder, over each lobe's peak, away from the pole of TRT. `lut_error` is that of S from
-the tables of the default size, over the peak of S, the worst of five hair colours and channels.
+a glass cylinder, relative to each lobe's peak, away from the pole of TRT. `lut_error` is that of S
+from the tables of the default size, relative to the peak of S, the worst of five hair colours and
+channels.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ MELANIN_AND_REDNESS = {
 
 
 def reference_figures() -> dict[str, float]:
-    """All numbers of this part, for the benchmark to print."""
+    """The figures of this part, for the benchmark to print."""
     error_r, error_tt, error_trt = ray_errors()
     energies = furnace_energies()
     return {
@@ -52,7 +53,7 @@ def reference_figures() -> dict[str, float]:
 
 
 def ray_errors() -> tuple[float, float, float]:
-    """Of R, TT, TRT, for light 20 degrees off the plane across brown hair."""
+    """Errors of R, TT, TRT, for light 20 degrees off brown hair's normal plane."""
     theta = np.radians(20.0)
     fibre = Fibre(absorption=(0.1, 0.4, 1.5), glint_width=0.0)
     rounds = [traced_lobes(RAYS_AT_ONCE, theta, fibre, seed=seed)[0] for seed in range(RAY_ROUNDS)]
@@ -60,14 +61,14 @@ def ray_errors() -> tuple[float, float, float]:
 
 
 def furnace_energies() -> Floats:
-    """What a clear fibre without tilt sends out of light from -85 to 85 degrees, (35,)."""
+    """Energy that a clear fibre without tilt scatters, for light from -85 to 85 degrees, (35,)."""
     fibre = Fibre(absorption=(0.0, 0.0, 0.0), cuticle_tilt=0.0)
     theta_i = np.radians(np.linspace(-85.0, 85.0, 35))
     return scattered_energy(fibre, theta_i)[:, 0]
 
 
 def color_errors() -> dict[str, float]:
-    """Of S from one set of tables, by hair colour."""
+    """Errors of S from one set of tables, by hair colour."""
     random = np.random.default_rng(5)
     theta_i, theta_r = np.radians(random.uniform(-60.0, 60.0, (2, 20_000)))
     phi = random.uniform(-np.pi, np.pi, 20_000)
@@ -85,7 +86,7 @@ def color_errors() -> dict[str, float]:
 
 
 def tables_ms(size: int) -> float:
-    """Median of making all tables of a fibre: the processor's time, not the clock's."""
+    """Median processor time to make all tables of a fibre."""
     times = []
     for _ in range(TABLE_ROUNDS):
         begin = time.process_time()

@@ -1,6 +1,6 @@
 """Cycles in a scene of its own: strands of Principled Hair (Chiang's model), one sun, one camera.
 
-The camera is at (0, 0, 1) times DISTANCE, looks down and sees no perspective; or it is one of ours.
+The camera is at (0, 0, 1) times DISTANCE, looks down and is orthographic; or it is one of ours.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ DISTANCE = 50.0
 
 
 class CyclesRoom:
-    """Give it strands and a sun, set the hair, and take pictures."""
+    """Cycles' pictures of strands: set strands, sun and hair first."""
 
     def __init__(self) -> None:
         self._scene = scene = bpy.data.scenes.new("Room")
@@ -61,8 +61,8 @@ class CyclesRoom:
         casts_shadow: bool = True,
         counts: np.ndarray | None = None,
     ) -> None:
-        """In place of those before: (strand_count, cv_count, 3), root first; radii or one. Strands
-        that have each their own count of points come as (point_count, 3).
+        """Replace the strands: (strand_count, cv_count, 3), root first, with a radius or radii.
+        Strands of different numbers of points, `counts`, are (point_count, 3).
         """
         curves = bpy.data.hair_curves.new("Strands")
         curves.add_curves(
@@ -85,7 +85,7 @@ class CyclesRoom:
         color: tuple[float, float, float] = (0.0, 0.0, 0.0),
         casts_shadow: bool = False,
     ) -> None:
-        """A smooth body that follows Lambert; it is black and casts no shadow."""
+        """A smooth Lambertian body; by default it is black and casts no shadow."""
         mesh = bpy.data.meshes.new("Body")
         mesh.from_pydata(positions.tolist(), [], triangles.tolist())
         mesh.shade_smooth()
@@ -98,7 +98,7 @@ class CyclesRoom:
         self._body.visible_shadow = casts_shadow
 
     def leave_out_body(self, is_left_out: bool) -> None:
-        """Whether it is a hole in the picture, so that alpha is what strands cover."""
+        """Whether the body is a holdout, so that alpha is the coverage of strands."""
         self._body.is_holdout = is_left_out
 
     def look(self, camera: Camera) -> None:
@@ -109,7 +109,7 @@ class CyclesRoom:
         lens.angle = 2.0 * float(np.arctan(1.0 / camera.projection[1, 1]))
 
     def paths(self, samples: int, bounces: int = 0, is_denoised: bool = False) -> None:
-        """How many a pixel, and how often each meets strands again; 0 is the sun's own light."""
+        """Paths per pixel, and bounces of each; 0 bounces: direct sunlight alone."""
         cycles = self._scene.cycles
         cycles.samples, cycles.use_denoising = samples, is_denoised
         cycles.max_bounces = cycles.diffuse_bounces = cycles.glossy_bounces = bounces
@@ -120,7 +120,7 @@ class CyclesRoom:
         self._strands.rotation_euler.y = -angle
 
     def sun(self, towards: np.ndarray, strength: float = 1.0) -> None:
-        """Towards the sun, and its strength [W/m^2]."""
+        """Set the direction to the sun, and its strength [W/m^2]."""
         self._sun.data.energy = strength
         self._sun.rotation_euler = Vector(towards).to_track_quat("Z", "Y").to_euler()
 
@@ -129,7 +129,8 @@ class CyclesRoom:
         return self._scene.world
 
     def world(self, radiance: np.ndarray) -> None:
-        """Light from all around, as an Environment Texture: (rows, columns, 3), row 0 below."""
+        """Light from all around, as an Environment Texture: (rows, columns, 3), row 0 at the
+        bottom."""
         tree, (rows, columns) = self._scene.world.node_tree, radiance.shape[:2]
         image = bpy.data.images.new("Panorama", columns, rows, float_buffer=True)
         image.colorspace_settings.name = "Linear Rec.709"
@@ -149,8 +150,8 @@ class CyclesRoom:
             self._node.inputs[name.replace("_", " ")].default_value = value
 
     def picture(self, size: int, height: float = 1.0, seed: int = 0) -> np.ndarray:
-        """(size, size, 4) scene-linear, premultiplied, of a square `height` [m] high; what a camera
-        of ours sees is as high as it is.
+        """(size, size, 4) scene-linear, premultiplied, of a square `height` [m] high, which a
+        camera of ours ignores.
         """
         render = self._scene.render
         render.resolution_x = render.resolution_y = size

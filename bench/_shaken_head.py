@@ -1,7 +1,7 @@
-"""The scene of the dynamics benchmarks: combed guides on a ball that swings to and fro.
+"""The scene of the dynamics benchmarks: combed guides on a ball that oscillates.
 
-A UV sphere of radius 0.1 m goes 0.3 m to either side, once a second. It does not ease in: in the
-first frame it has its full speed of 1.9 m/s, which is as hard as it gets.
+A UV sphere of radius 0.1 m goes 0.3 m to either side, once a second. It does not ease in: it has
+its full speed of 1.9 m/s in the first frame, the hardest case.
 """
 
 from __future__ import annotations
@@ -38,12 +38,12 @@ def surface_of(head: bpy.types.Object) -> Surface:
 def guides_on(surface: Surface, count: int, cv_count: int = 16) -> StrandSet:
     """Combed hair of the scalp, every strand of it a guide."""
     settings = GrowSettings(strand_count=count, cv_count=cv_count, length=LENGTH)
-    # of known widths: others are found and marked so, for which the extension must be registered
+    # marked as having widths: finding them would require the extension to be registered
     return replace(grow(surface, settings, scalp_density(surface)), has_widths=True)
 
 
 def sway(time: float) -> float:
-    """Where the head is at a time [s], along x [m]."""
+    """The head's x [m] at a time [s]."""
     return float(SWAY * np.sin(2.0 * np.pi * RATE * time))
 
 
@@ -55,11 +55,12 @@ class Shake:
     colliders: tuple[Collider, ...]
 
     def drives(self, fps: float, seconds: float) -> Iterator[Drive]:
-        """One a frame, with ways bent as `motion_flow.advance` bends them."""
+        """A drive for each frame, with trajectories bent as by `motion_flow.advance`."""
         places = [sway(frame / fps) for frame in range(round(seconds * fps) + 1)]
         earlier, before = None, self._carried(places[0])
         for frame in range(1, len(places)):
-            # as in motion_flow the style at one frame's end is the same array at the next's begin
+            # as in motion_flow, a frame begins with the array of the style at the end of the last
+            # frame
             now = self._carried(places[frame])
             yield self._drive((earlier, before, now), places[max(frame - 2, 0) : frame + 1])
             earlier, before = before, now
@@ -68,7 +69,7 @@ class Shake:
         return self.grid + np.array([x, 0.0, 0.0], np.float32)
 
     def _drive(self, targets: tuple[np.ndarray | None, ...], places: list[float]) -> Drive:
-        """Of the last two or three places of the head."""
+        """The drive between the last two places of the head; a third, earlier one bends it."""
         matrices = [_moved(x) for x in places]
         since = matrices[0] if len(places) == 3 else None
         colliders = tuple(
@@ -80,7 +81,7 @@ class Shake:
 
 
 def depth_in(surface: Surface) -> Callable[[np.ndarray], float]:
-    """Gives how deep [m] the deepest of points (n, 3) lies in this convex mesh; exact."""
+    """A function for the exact depth [m] of the deepest of points (n, 3) in this convex mesh."""
     normals = surface.triangle_normals().astype(np.float64)
     kept = np.linalg.norm(normals, axis=1) > 0.5
     normals, corner = normals[kept], surface.corners[kept, 0].astype(np.float64)

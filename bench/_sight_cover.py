@@ -1,9 +1,9 @@
 """Whether hair covers the body that it grows on, from six sides.
 
-The groom's outline is where its own curves, without children, would hide all if they were as wide
-as they are apart, less the margin by which these stand out further than the curves do. In it the
-share of pixels is counted through which less than a twentieth of the body is seen. The body is
-drawn as a hole, so that alpha is what hair covers of it.
+The groom's outline is where its own curves, without children, would be opaque if they were widened
+until neighbours touch, eroded by half the added width. Within it the fraction of pixels is counted
+through which less than a twentieth of the body is seen. The body is drawn as a holdout, so that
+alpha is the hair's coverage.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from hairloom.addon.shading.volume.settings import VolumeSettings
 
 SIDES = ((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0.01, 1), (0, 0.01, -1))
 SIZE, SAMPLES = 400, 3
-#: of the body, in a pixel
+#: visible fraction of the body in a pixel, above which the body shows
 SHOWS_THROUGH = 0.05
 
 
 def cover(pair, name: str, factor: float = 1.0) -> float:
-    """The share of pixels in the outline through which no body is seen."""
+    """The fraction of pixels in the outline through which no body is seen."""
     pair = scaled(pair, factor)
     rig, own = rig_of(pair, name), rig_of(pair, name, "none")
     plain, wide = _unlit(rig), _unlit(own)
@@ -47,7 +47,7 @@ def cover(pair, name: str, factor: float = 1.0) -> float:
 
 
 def coverage(rig: Rig, camera: Camera, size: int, samples: int) -> np.ndarray:
-    """What hair in front of the body covers of each pixel, (size, size)."""
+    """Coverage of each pixel by hair that the body does not hide, (size, size)."""
     return render_image(_unlit(rig), camera, size, size, samples)[..., 3]
 
 
@@ -58,24 +58,24 @@ def _unlit(rig: Rig) -> Snapshot:
 
 
 def _width(rig: Rig) -> float:
-    """Of the median strand at its root [m]."""
+    """The width of the median strand at its root [m]."""
     return 2.0 * float(np.median(rig.strands.radius[rig.strands.offsets[:-1]]))
 
 
 def _apart(rig: Rig) -> float:
-    """How many times as wide strands would be, if they touched."""
+    """The factor by which strands would have to be wider to touch."""
     return with_widths(rig.strands, "found")[1].spacing / _width(rig)
 
 
 def _pixels_per_metre(rig: Rig, camera: Camera) -> float:
-    """Of a picture, in the middle of the hair."""
+    """Scale of a picture at the depth of the hair's middle."""
     low, high = rig.strands.bounds()
     away = np.linalg.norm(camera.eye[:3] - (low + high) / 2.0)
     return float(0.5 * SIZE * camera.projection[1, 1] / away)
 
 
 def _eroded(mask: np.ndarray, margin: float) -> np.ndarray:
-    """Without what is nearer to its edge than this [pixels]."""
+    """The mask, eroded by `margin` [pixels]."""
     reach = int(margin)
     padded = np.pad(mask, reach)
     inside = np.ones_like(mask)
@@ -97,7 +97,7 @@ def _alpha(snapshot: Snapshot, camera: Camera) -> np.ndarray:
 
 
 def _body(rig: Rig, camera: Camera) -> np.ndarray:
-    """What of each pixel the body would fill; without one, all that hair is drawn before."""
+    """Coverage of each pixel by the body, without hair; 1 everywhere if there is no body."""
     if rig.head is None:
         return np.ones((SIZE, SIZE), np.float32)
     nothing = np.zeros((0, 2, 3), np.float32), np.zeros((0, 2), np.float32)

@@ -1,4 +1,4 @@
-"""The grooms of the sight bench, made ready as the product does with no setting changed."""
+"""The grooms of the sight bench, prepared as by the extension with default settings."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def sintel() -> Pair:
 
 
 def ponytail() -> Pair:
-    """Four files, one head of hair; it comes without a head, so on the hull of its roots."""
+    """Four files of one groom; it comes without a head, so its head is the hull of its roots."""
     names = ("front_top", "side", "back", "tail")
     parts = [read_tfx(_DATA / "tressfx_ponytail" / f"{name}.tfx").groom for name in names]
     strands = joined_grooms(parts, "ponytail")[0].strands

@@ -1,6 +1,6 @@
-"""Hair that layers leave out: grown strands drawn as layers, and hashed, which keeps no lists.
+"""Hair that layered transparency misses: grown strands drawn as layers, and hashed, without lists.
 
-White hair in white light around a black head, so that the red of a pixel is what hair covers of it.
+White hair in white light around a black head, so that a pixel's red is the coverage of hair.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ from hairloom.addon.shading.volume.settings import VolumeSettings
 CV_COUNT, SAMPLES = 16, 8
 VIEW, FIELD_OF_VIEW = (-0.55, -1.0, 0.18), np.radians(30.0)
 WHITE, BLACK = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
-#: A pixel has hair where this fraction of it is covered: by all samples, and by layers. Samples are
-#: left to chance, so that between the two there is room.
+#: A pixel has hair above COVERED, by the mean of all samples, and none below EMPTY, by layers. The
+#: gap between them allows for the noise of samples.
 COVERED, EMPTY = 0.5, 0.05
 
 
 def missing_percent(strand_count: int, width: int, height: int, width_factor: float = 1.0) -> float:
-    """How many of the pixels that hashed strands cover have none as layers [%].
+    """The percentage of pixels covered by hashed strands in which layers draw none.
 
     Args:
         width, height: of the picture [pixels].
-        width_factor: how much wider strands are than they grow.
+        width_factor: factor on the widths with which strands grow.
     """
     layers, hashed = coverages(strand_count, width, height, width_factor)
     is_covered = hashed > COVERED
@@ -43,7 +43,7 @@ def missing_percent(strand_count: int, width: int, height: int, width_factor: fl
 def coverages(
     strand_count: int, width: int, height: int, width_factor: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """What hair covers of each pixel (height, width): as layers, and in the mean of all samples."""
+    """Coverage of each pixel (height, width): as layers, and as the mean of all hashed samples."""
     shown, camera = grown_hair(strand_count, width / height, width_factor)
     passes = MeshPass(), StrandPass()
 
@@ -59,7 +59,7 @@ def coverages(
 
 
 def grown_hair(strand_count: int, aspect: float, width_factor: float) -> tuple[Snapshot, Camera]:
-    """A groom on the built-in head, and the camera that holds it."""
+    """A groom on the built-in head, and a camera that frames it."""
     head = built_in_head().surface
     settings = GrowSettings(strand_count=strand_count, cv_count=CV_COUNT)
     strands = grow(head, settings, scalp_density(head))

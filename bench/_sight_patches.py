@@ -1,8 +1,8 @@
-"""Patches of blond strands on black ground under one sun, beside Cycles: they stand, lean or lie.
+"""Patches of standing, leaning or lying blond strands on black ground under one sun, beside Cycles.
 
-Cycles takes the same picture with few bounces and with many, which tells after how many strands
-light reaches the eye. Means over the middle of a patch, so that nothing but the light of strands
-counts: no outline, no head, no hairstyle.
+Cycles renders the same picture with few and with many bounces, which shows how many strands light
+meets before it reaches the eye. Means are taken over the middle of a patch, so that only light
+among strands counts: no outline, no head, no hairstyle.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from hairloom.addon.shading.volume.settings import VolumeSettings
 from hairloom.addon.strands import Surface
 
 COLOR = "blond"
-#: how high strands fill the space over the ground, their radius [m], and how many metres of strand
-#: there are in a cubic metre; 20 strands cross a metre
+#: height of the layer of strands, their radius [m], and metres of strand per cubic metre; a path of
+#: a metre crosses 20 strands
 HEIGHT, RADIUS, DENSITY = 0.5, 0.002, 5000.0
-#: from the normal of the ground [rad]; how much strands differ from one another
+#: angles from the ground's normal [rad]; deviation of strands from them
 LEANS, DISORDER = {"standing": 0.0, "leaning": np.radians(60.0), "lying": 0.5 * np.pi}, 0.15
-#: from the normal towards +X, the way strands lean, and around it [degrees]
+#: angle from the normal towards +X, where strands lean, and around the normal [degrees]
 SUN = (40.0, 0.0)
 EYES = {"ahead": (60.0, 0.0), "against": (60.0, 180.0), "aside": (60.0, 90.0)}
 DISTANCE, SHOWN = 50.0, 0.5
@@ -38,8 +38,8 @@ BOUNCES = (0, 4, 16, 64)
 
 
 def patch_figures() -> dict[str, float]:
-    """For each patch and eye, in red and blue: our light over Cycles', and what share of Cycles'
-    light is there after so many bounces.
+    """For each patch and eye, in red and blue: the ratio of our light to Cycles', and the fraction
+    of Cycles' light that each number of bounces yields.
     """
     found = {}
     sun, room = _direction(*SUN), CyclesRoom()
@@ -79,7 +79,7 @@ def _views() -> Iterator[tuple[str, str, np.ndarray, Camera]]:
 
 
 def _patch(lean: float) -> np.ndarray:
-    """Strands over two metres each way, (n, 4, 3) float32, root first."""
+    """Strands over an area of two by two metres, (n, 4, 3) float32, root first."""
     chance = np.random.default_rng(3)
     if lean < 1.5:
         count, length = int(4.0 * DENSITY * np.cos(lean)), HEIGHT / np.cos(lean)
@@ -87,7 +87,7 @@ def _patch(lean: float) -> np.ndarray:
         root[:, 0] -= 0.5 * HEIGHT * np.tan(lean)
         spread = np.full(3, DISORDER)
     else:
-        # as long as the patch and a little more; they hardly leave their height
+        # a little longer than the patch, and nearly horizontal
         length = 2.6
         count = int(DENSITY * 2.0 * HEIGHT)
         root = chance.uniform(-1.0, 1.0, (count, 3))

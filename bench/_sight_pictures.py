@@ -1,21 +1,21 @@
-"""Pictures of the studio with every setting as it ships: of any scale, of any number of strands,
-and beside Cycles.
+"""Pictures of the studio with default settings: at any scale, with any number of strands, and
+beside Cycles.
 
-FLIP is Andersson et al.'s (2020) at its own 67 pixels a degree, over pixels of which hair covers
-most.
+FLIP (Andersson et al. 2020), at its default 67 pixels per degree, is averaged over pixels that hair
+mostly covers.
 
-The same groom by fewer strands is other strands, pixel by pixel, in any renderer. So `count_flip`
-is that of hair seen from where a pixel is as wide as the fewest strands are apart: pictures are
-reduced by a whole number, in linear light. Even so, two grooms of as many strands that share none
+With fewer strands, a groom's strands are at other pixels, in any renderer. So `count_flip` is
+measured at a distance at which a pixel is as wide as the spacing of the fewest strands: pictures
+are reduced by an integer factor, in linear light. Even so, two disjoint grooms of as many strands
 differ by `count_flip_floor`: no renderer could show fewer strands as more without that noise. So
-the limit is on `count_flip_excess`, what is above the floor; both are of the same run, and each
+the limit is on `count_flip_excess`, the part above the floor; both are of the same run, and each
 count has the floor of its own pair of grooms, since few strands make more noise. `count_flip_pixel`
-is that of the pictures themselves and has no limit. One camera and the same lights serve all: each
-groom by itself might be seen from its other side.
+is measured on the full pictures and has no limit. One camera and the same lights serve all, as a
+camera fitted to each groom might see it from another side.
 
-Beside Cycles all colours have one exposure, by which the brightest of them, blond, is bright in
-the picture: black hair is dark in any picture, and a user sees it so. `cycles_flip_shown_COLOR`,
-without a limit, is that of each colour brightened for itself, black by some twenty times.
+Beside Cycles all colours share the exposure at which blond, the brightest, is bright in the
+picture: black hair is dark in any picture, and users see it so. `cycles_flip_shown_COLOR`, without
+a limit, is measured with an exposure for each colour, which is some twenty times higher for black.
 """
 
 from __future__ import annotations
@@ -50,9 +50,9 @@ from hairloom.addon.shading.stage_settings import StageSettings
 from hairloom.addon.strands.arc_length import along
 
 SIZE, SAMPLES = 320, 3
-#: Cycles' pictures of one colour, each with a seed of its own and denoised; paths a pixel; bounces
+#: Cycles' pictures of a colour, each with its own seed and denoised; paths per pixel; bounces
 SEEDS, PATHS, BOUNCES = 3, 64, 64
-#: towards the sun, and its strength [W/m^2]
+#: direction to the sun, and its strength [W/m^2]
 SUN, STRENGTH = np.array([-0.2, -0.75, 0.6]), float(np.pi)
 #: absorption of the hair, per radius
 COLORS = {
@@ -61,19 +61,19 @@ COLORS = {
     "red": (0.2, 0.8, 2.3),
     "blond": (0.06, 0.12, 0.3),
 }
-#: the brightest tenth of the brightest hair is so bright in a picture
+#: the brightest tenth of the brightest hair is this bright in a picture
 SHOWN = 0.5
 COUNTS = (5_000, 20_000, 100_000)
 #: Cycles' room is black
 _UNLIT = ("ambient", "backdrop_center", "backdrop_edge")
-#: of a pixel of hair, what hair covers at least
+#: least coverage of a pixel that counts as hair
 _IS_HAIR = 0.5
-#: what a look has of its own beside what Principled Hair knows
+#: parameters of a look that Principled Hair does not have
 _UNKNOWN = ("color_variation", "shift_noise", "sparkle")
 
 
 def scale_flip(pair: Pair, name: str) -> float:
-    """The same groom and head a thousand times smaller and larger."""
+    """FLIP between a groom and the same, with its head, a thousand times smaller and larger."""
     one, hair = _picture(rig_of(pair, name))
     return max(
         _flip(one, _picture(rig_of(scaled(pair, factor), name))[0], hair) for factor in (1e-3, 1e3)
@@ -81,8 +81,8 @@ def scale_flip(pair: Pair, name: str) -> float:
 
 
 def count_figures() -> dict[str, float]:
-    """The built-in groom by all of its strands, and by even parts of them: as it ships, when
-    children fill up what is few, and without them.
+    """The built-in groom with all strands, and with evenly chosen fewer: with default children,
+    which fill gaps, and without.
     """
     shipped = _count_figures(ChildrenSettings().method)
     bare = {f"{name}_without_children": value for name, value in _count_figures("none").items()}
@@ -91,7 +91,7 @@ def count_figures() -> dict[str, float]:
 
 def _count_figures(children: str) -> dict[str, float]:
     head = built_in_head()
-    # without brows and lashes: an even part of those leaves bare skin, as no groom has
+    # without brows and lashes: thinned out, they leave bare skin, as in no real groom
     settings = GrowSettings(strand_count=COUNTS[-1])
     grown = grow(head.surface, settings, head.weights["scalp"])
     whole = rig_of((grown, head.surface), "built-in", "none")
@@ -170,7 +170,7 @@ def cycles_figures() -> dict[str, float]:
 
 
 def plain_look(absorption: tuple[float, float, float]) -> tuple[PrincipledHair, ShadingSettings]:
-    """Principled Hair as it comes, and a look without what it does not know."""
+    """Principled Hair with its defaults, and a look of only the parameters that it has."""
     node = PrincipledHair(parametrization="ABSORPTION", absorption_coefficient=absorption)
     plain = replace(ShadingSettings(), **dict.fromkeys(_UNKNOWN, 0.0))
     return node, settings_from(node, plain)[0]
@@ -182,7 +182,7 @@ def _picture(
     lights: tuple[Light, ...] | None = None,
     camera: Camera | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The studio's, (SIZE, SIZE, 4), and where hair is in it."""
+    """The studio's picture, (SIZE, SIZE, 4), and a mask of its hair."""
     studio = _studio(rig, settings)
     camera = camera or studio._camera(1.0)
     points = rig.strands.points
@@ -196,14 +196,14 @@ def _studio(rig: Rig, settings: GroomSettings | None = None) -> Studio:
 
 
 def _pixel_size(camera: Camera, rig: Rig) -> float:
-    """How wide a pixel of a picture is in the middle of the hair [m]."""
+    """The width of a pixel at the depth of the hair's middle [m]."""
     low, high = rig.strands.bounds()
     depth = -(camera.view @ np.append(0.5 * (low + high), 1.0))[2]
     return float(2.0 * depth * np.tan(0.5 * FIELD_OF_VIEW) / SIZE)
 
 
 def _reduced(picture: np.ndarray, size: int) -> np.ndarray:
-    """The mean of squares of so many pixels a side; what is left over at the border goes."""
+    """Means of squares of `size` pixels a side; a remainder at the border is dropped."""
     rows, columns = (side // size for side in picture.shape[:2])
     squares = picture[: rows * size, : columns * size].astype(np.float64)
     found: np.ndarray = squares.reshape(rows, size, columns, size, -1).mean(axis=(1, 3))

@@ -1,11 +1,10 @@
-"""What it costs that strands turn with their guides, keep their lengths and stay out of the head.
+"""The cost of strands that turn with their guides, keep their lengths and stay out of the head.
 
-A frame of all strands, in numpy and in compute, as a factor of what strands took that only added
-up the displacements of their guides: the code of the first round, kept here, with the frames of
-roots that both have in common. Frames of the demo's shake, both forms in turns. Times are the
-processor's, of all threads, so that what else runs on the machine counts little; of each frame the
-least of some rounds, and then the mean of all frames. In compute, the texture of the strands is
-read back once, behind all frames.
+A frame of all strands, in numpy and in compute, relative to strands that only add up the
+displacements of their guides: an earlier implementation, kept here, with the same frames of roots.
+Frames are those of the demo's shake, both variants in turns. Times are processor times of all
+threads, so that other load counts little: of each frame the minimum over ROUNDS, then the mean over
+frames. In compute, the texture of the strands is read back once, after all frames.
 """
 
 from __future__ import annotations
@@ -34,7 +33,7 @@ ROUNDS, EVERY, CHUNK = 40, 4, 512
 
 
 def cost_figures(rig: Rig, motions: Sequence[Motion]) -> dict[str, float]:
-    """Milliseconds a frame and ratios; all strands have as many points as guides have CVs."""
+    """Milliseconds per frame and ratios; strands must have as many points as guides have CVs."""
     chosen = motions[EVERY - 1 :: EVERY]
     shape = (rig.strands.strand_count, *rig.guide_grid.shape[1:])
     assert rig.strands.points.size == np.prod(shape)
@@ -58,7 +57,7 @@ def cost_figures(rig: Rig, motions: Sequence[Motion]) -> dict[str, float]:
 def _least(
     one: Callable[[Any], object], other: Callable[[Any], object], parts: Sequence[Sequence[Any]]
 ) -> tuple[float, float]:
-    """The processor's milliseconds for a frame of two forms, which do parts of it in turns."""
+    """Processor milliseconds per frame of two variants, which do each part in turns."""
     times = np.empty((ROUNDS, len(parts), 2))
     for of_round in times:
         for of_part, part in zip(of_round, parts, strict=True):
@@ -72,7 +71,7 @@ def _least(
 
 
 def _summed(rig: Rig, rest: RootFrames, motion: Motion) -> Floats:
-    """All strands (strand_count, cv_count, 3) with the displacements of their guides."""
+    """All strands (strand_count, cv_count, 3), moved by the displacements of their guides."""
     grid = rig.strands.points.reshape(rig.strands.strand_count, -1, 3)
     moved = _carried(rig, rest, motion.pose, slice(None), grid)
     by_roots = _carried(rig, rest, motion.pose, rig.guides, rig.guide_grid)
@@ -93,7 +92,7 @@ def _summed(rig: Rig, rest: RootFrames, motion: Motion) -> Floats:
 
 
 def _carried(rig: Rig, rest: RootFrames, pose: Pose, chosen: Ints | slice, grid: Floats) -> Floats:
-    """Each strand of a grid carried by its root."""
+    """The strands of a grid, each carried by its root."""
     strands, head = rig.strands, rig.head
     assert head is not None and pose.head_positions is not None
     assert strands.root_triangle is not None and strands.root_barycentric is not None
@@ -110,7 +109,7 @@ def _carried(rig: Rig, rest: RootFrames, pose: Pose, chosen: Ints | slice, grid:
 
 
 class _SummedPass(RidePass):
-    """RidePass, but that strands only add up displacements."""
+    """RidePass whose strands only add up displacements."""
 
     def _run_guides(self, guides_now: Any) -> None:
         count, cv_count = self._guide_grid.shape[:2]
@@ -161,7 +160,7 @@ class _SummedPass(RidePass):
 
 
 def _on_gpu(rig: Rig, rest: RootFrames, motions: Sequence[Motion]) -> tuple[float, float]:
-    """Milliseconds of a frame in compute, of today's form and of the first round's."""
+    """Milliseconds per frame in compute, of the current implementation and of the earlier one."""
     ours, peer = (
         form(rig.strands, rig.root_holds, rig.guides, rig.guide_grid, rig.riders, rig.holds)
         for form in (RidePass, _SummedPass)
@@ -171,7 +170,7 @@ def _on_gpu(rig: Rig, rest: RootFrames, motions: Sequence[Motion]) -> tuple[floa
     def shown(form: RidePass, frames: Sequence[Motion]) -> Floats:
         for motion in frames:
             pose, colliders = motion.pose, motion.colliders
-            guides, since = motion.guides, motion.duration  # as if each went on from the last one
+            guides, since = motion.guides, motion.duration  # as if frames were consecutive
             form.ride(pose.head_positions, pose.matrix, guides, None, colliders, since=since)
         return form.read()
 

@@ -1,4 +1,4 @@
-"""How far drawn hair is from its animated style where nothing is simulated, and what that costs."""
+"""How far drawn hair is from its animated style with simulation off, and what that costs."""
 
 from __future__ import annotations
 
@@ -13,14 +13,16 @@ from hairloom.addon.blender.scene.curves import read_curves, write_curves
 from hairloom.addon.strands import StrandSet
 
 FRAMES, CURVES, CHILDREN, POINTS = 24, 300, 4000, 16
-#: Children that are nothing but means of the curves around them, so that it is known how they move.
+#: Settings of children that are plain means of the curves around them, so that their motion is
+#: known.
 PLAIN = {"clump": 0.0, "frizz": 0.0, "length_variation": 0.0, "baby_hair": 0.0}
 
 
 def style_follow() -> dict[str, object]:
-    """Curves on a plane that turns: nodes move all of them to the side, and make them longer.
+    """Curves on a plane that turns; nodes move them sideways and lengthen them.
 
-    Blender says where the curves are. Children go as far as the curves around them do.
+    The curves are compared with Blender's evaluation. Children move as far as the curves around
+    them.
     """
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     hair, scene = _hair(), bpy.context.scene
@@ -77,7 +79,7 @@ def _hair() -> Any:
 
 
 def _error(session: Any, frame: int) -> float:
-    """Of all drawn strands in a frame [m]."""
+    """The largest error of drawn strands in a frame [m]."""
     bpy.context.scene.frame_set(frame)
     depsgraph = bpy.context.evaluated_depsgraph_get()
     shown, rest = session.strands, session.groom.rig.strands

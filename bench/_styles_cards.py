@@ -1,7 +1,7 @@
 """Cards of a hairstyle beside its strands, as *Make Cards* makes them with the style's settings.
 
-From eight sides, in the light of a sun and of a grey world, before the head, which hides what is
-behind it. Writes out/bench_styles/cards_NAME.png, strands above and cards below.
+From eight sides, in the light of a sun and of a grey world, with the head as a
+holdout. Writes out/bench_styles/cards_NAME.png, strands above and cards below.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ OUTPUT = REPOSITORY / "out" / "bench_styles"
 
 
 def card_figures(style: str) -> dict[str, float]:
-    """How far the cards of a style are from its strands: the sum of alpha, and the mean colour of
-    what is covered; the worst side, and channel [%]."""
+    """Differences of a style's cards from its strands, in the sum of alpha and in the mean colour
+    where hair covers; the worst side and channel [%]."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     bpy.ops.hairloom.add_hairstyle(style=style, plays=False)
     inputs, _, _ = read_inputs(bpy.context.object, bpy.context.evaluated_depsgraph_get())

@@ -1,4 +1,4 @@
-"""Suzanne, which comes with every Blender, as the head of benchmarks: figures stay comparable."""
+"""Suzanne, which every Blender has, as the head of benchmarks, so that figures stay comparable."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Contestants that are timed under the same conditions."""
+"""Timing of variants under the same conditions."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from collections.abc import Callable, Mapping
 
 
 def in_turns(plays: Mapping[str, Callable[[], float]], rounds: int) -> dict[str, list[float]]:
-    """The times of each contestant, one for each round.
+    """The times of each variant, one per round.
 
-    All take turns, so that a busy moment of the machine meets all of them, and the least of as many
-    times is compared.
+    All take turns, so that load on the machine affects all of them, and minima over as many times
+    are compared.
     """
     times: dict[str, list[float]] = {name: [] for name in plays}
     for _ in range(rounds):
@@ -20,7 +20,7 @@ def in_turns(plays: Mapping[str, Callable[[], float]], rounds: int) -> dict[str,
 
 
 def milliseconds(work: Callable[[], object]) -> float:
-    """By the clock on the wall."""
+    """Wall-clock time of `work`."""
     begin = time.perf_counter()
     work()
     return (time.perf_counter() - begin) * 1000.0

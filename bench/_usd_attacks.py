@@ -1,4 +1,4 @@
-"""Seeded USD texts that were written to do harm, and what reading them costs."""
+"""Seeded malicious USD texts, and what reading them costs."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ _CURVE = (
 
 
 def usd_attacks(count: int, seed: int) -> dict[str, float]:
-    """Read this many; crashes are ends without a message of ours.
+    """Read this many; crashes are failures without a HairloomError that has a remedy.
 
-    longest_seconds: by the clock, where other work counts too. longest_processor_seconds: of this
-    process and the one that reads, for the same file.
+    longest_seconds: wall-clock time, in which other load counts. longest_processor_seconds: of this
+    process and of the one that reads.
     """
     found = {"usda_attacks": count, "usda_crashes": 0}
     found |= {"longest_seconds": 0.0, "longest_processor_seconds": 0.0}
@@ -54,13 +54,13 @@ def usd_attacks(count: int, seed: int) -> dict[str, float]:
 
 
 def _processor_seconds() -> float:
-    """Of this process, and of all that it has started and that have ended."""
+    """Of this process, and of its children that have ended."""
     times = os.times()
     return times.user + times.system + times.children_user + times.children_system
 
 
 def _damaged(text: str, random: _Random) -> str:
-    """Every third one also has letters changed."""
+    """The text; in a third of all cases with random letters changed."""
     if random.integers(3):
         return text
     letters = list(text)

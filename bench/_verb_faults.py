@@ -1,9 +1,9 @@
 """Seeded faults while verbs run as users call them: `hairloom VERB ...`, in a Blender without a
 window.
 
-The faults are those of `_fault_runs`. A process that is killed, and another one that writes the
-same, are Blenders of their own here. Two more are the GPU's: there is no driver, or it has no
-memory left. A verb's message is the line that it prints; what ends it without one counts as untrue.
+The faults are those of `_fault_runs`, but a process that is killed, and another one that writes the
+same files, are separate Blenders. Two more faults are the GPU's: there is no driver, or its memory
+is full. A verb's message is the line that it prints; a failure without one counts as untrue.
 
     _verb_faults.py VERB PATH VERSION NUMBER    run a verb and end at its NUMBERth call
 """
@@ -57,13 +57,13 @@ from hairloom.addon.exchange.tressfx import write_tfx  # noqa: E402
 from hairloom.addon.exchange.usd.groom_usd import write_usd  # noqa: E402
 from hairloom.addon.strands import StrandSet  # noqa: E402
 
-#: What verbs read, made once, also for the processes that this one starts.
+#: Files that verbs read, made once, and shared with child processes.
 _HANDED_ON = "HAIRLOOM_FAULT_SOURCES"
 SOURCES = Path(
     os.environ.get(_HANDED_ON)
     or Path(tempfile.gettempdir()) / f"hairloom-verb-sources-{os.getpid()}"
 )
-#: of the two results
+#: strands of the two results
 COUNTS = (30, 40)
 _SMALL = (
     "--set=guides.guide_count=12",
@@ -79,9 +79,9 @@ DRAWING = (*WRITING, *GPU)
 
 @dataclass(frozen=True)
 class Verb:
-    """arguments: of one of two results, to be written to a path.
+    """arguments: the command line that writes one of two results to a path.
 
-    prepares: what lies there before it runs, where that is more than nothing.
+    prepares: creates files that must exist before it runs, if any.
     """
 
     arguments: Callable[[Path, int], list[str]]
@@ -91,14 +91,14 @@ class Verb:
 
     def write(self, path: Path, version: int) -> None:
         """Raises:
-        HairloomError: what the verb has said.
+        HairloomError: the verb's message.
         """
         self.prepares(path, version)
         run_verb(self.arguments(path, version))
 
 
 def run_verb(arguments: list[str]) -> None:
-    """Run it, and have its message be its error."""
+    """Run a verb; raise the error whose message it prints."""
     failures: list[HairloomError] = []
     output = io.StringIO()
 
@@ -121,8 +121,8 @@ def run_verb(arguments: list[str]) -> None:
 
 @contextlib.contextmanager
 def _quiet() -> Iterator[None]:
-    """What Blender prints goes nowhere: to a file it could hit the limit that stands for a full
-    disk, and that ends Blender."""
+    """Discard what Blender prints: written to a file, it could hit the size limit that acts as a
+    full disk, which ends Blender."""
     sys.stdout.flush()
     kept, nowhere = os.dup(1), os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, 1)
@@ -168,7 +168,7 @@ def _import(suffix: str) -> Verb:
 
 
 def _over_itself(path: Path, _version: int) -> None:
-    """The artist's scene, which the verb saves over."""
+    """Put the artist's scene at the path, for a verb that overwrites it."""
     if not path.exists():
         shutil.copy(_scene(0), path)
 
@@ -274,7 +274,7 @@ def make_sources() -> None:
 
 
 def verb_fault_runs(count: int, seed: int) -> tuple[Found, list[str]]:
-    """Run this many; returns also what went wrong."""
+    """Run this many; also a line for each problem."""
     hairloom.register()
     os.environ[_HANDED_ON] = str(SOURCES)
     found, problems = Found(), list[str]()
@@ -299,7 +299,7 @@ def verb_fault_runs(count: int, seed: int) -> tuple[Found, list[str]]:
 
 
 def _run(name: str, fault: str, random: Any) -> tuple[str, bool]:
-    """What is wrong, "" for nothing; and whether the fault came in time."""
+    """The problem, "" if none; and whether the fault interrupted the write."""
     verb, at = VERBS[name], int(random.integers(1, 7))
     old, new = _result(name, 0), _result(name, 1, fault == "no gpu")
     with tempfile.TemporaryDirectory() as text:
@@ -326,8 +326,8 @@ def _run(name: str, fault: str, random: Any) -> tuple[str, bool]:
 
 @functools.cache
 def _result(name: str, version: int, is_refused: bool = False) -> Path:
-    """A folder with what a verb makes where nothing goes wrong; without a GPU cards are made
-    otherwise, and what cannot be drawn is not there."""
+    """A folder with a verb's result without faults; without a GPU, cards are made differently, and
+    files that need drawing are missing."""
     verb, folder = VERBS[name], SOURCES / f"{name} {version} {is_refused}"
     folder.mkdir()
     path = folder / f"hair{verb.suffix}"
@@ -341,8 +341,8 @@ def _result(name: str, version: int, is_refused: bool = False) -> Path:
 
 
 def contents(folder: Path) -> Contents:
-    """What is to be seen. Bakes stand for what they show, scenes for what is in them, and files
-    that hold a date for their sizes."""
+    """The visible files: of bakes a digest of their arrays, of scenes a summary of their data, of
+    files that contain a date the size."""
     found: Contents = {}
     for path in sorted(folder.rglob("*")):
         name = str(path.relative_to(folder))
@@ -370,9 +370,9 @@ def _of_bake(folder: Path) -> bytes:
 
 
 def _of_scene(path: Path) -> bytes:
-    """What is in it; a file that is cut short cannot be opened."""
+    """A summary of a scene's data, or the error if a truncated file cannot be opened."""
     with bpy.data.temp_data() as data, tempfile.TemporaryDirectory() as folder:
-        copy = shutil.copy(path, folder)  # Blender loads nothing from the file that is open
+        copy = shutil.copy(path, folder)  # Blender cannot load from the file that is open
         try:
             with data.libraries.load(str(copy)) as (there, here):
                 here.objects = there.objects
@@ -390,7 +390,7 @@ def _look(curves: bpy.types.Curves) -> list[float]:
 
 @dataclass(frozen=True)
 class Running:
-    """A verb, for the faults that begin it again."""
+    """A verb, for the faults that run it a second time."""
 
     name: str
 
@@ -424,7 +424,7 @@ def _no_gpu(_at: int, _path: Path, _verb: Any, _random: Any) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _gpu_memory(at: int, _path: Path, _verb: Any, _random: Any) -> Iterator[None]:
-    """From the n-th texture or target on there is none."""
+    """From the n-th texture or target on, GPU memory is full."""
     left = [at]
 
     def refusing(real: Callable[..., Any]) -> Callable[..., Any]:

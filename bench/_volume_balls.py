@@ -1,7 +1,7 @@
-"""Balls of combed hair with shadows and light from strand to strand, beside Cycles' path traced.
+"""Balls of combed hair with shadows and multiple scattering, beside Cycles' path tracing.
 
 The sheet out/volume_sheet.png. Columns: Cycles with all bounces and shadows, denoised; ours with
-what stands in for both; ours with shadows alone; ours with shadows and light from strand to strand.
+approximations of both; ours with shadows alone; ours with shadows and multiple scattering.
 Rows: black, brown, blond, white, lit from the front; blond lit from a side.
 """
 
@@ -29,7 +29,7 @@ ROWS = {
     "white": ((0.01, 0.01, 0.01), FRONT),
     "blond_side": (BLOND, (-1.0, 0.3, 0.1)),
 }
-#: each column's share of the stand-ins, and its shadows
+#: each column's strength of the approximations, and its shadows
 COLUMNS = {
     "stand_ins": (1.0, VolumeSettings(shadows="none")),
     "single": (0.0, VolumeSettings(shadows="deep", strand_fraction=1.0, scattering=False)),
@@ -38,8 +38,8 @@ COLUMNS = {
 
 
 def ball_figures() -> dict[str, float]:
-    """Write the sheet; for each row and column the least and the most ratio of a channel's light to
-    Cycles', and the mean difference of blocks as a share of its mean.
+    """Write the sheet; for each row and column the smallest and largest ratio of a channel's light
+    to Cycles', and the mean difference of blocks relative to Cycles' mean.
     """
     strands, core = combed_strands(ball.STRANDS), Surface(*ball_mesh())
     room = CyclesRoom()

@@ -1,8 +1,8 @@
-"""What a whole frame with shadows costs, beside EEVEE's fastest, and deep layers beside slices.
+"""The cost of a whole frame with shadows, beside EEVEE's fastest, and of deep layers beside slices.
 
 4,095 strands of 30 points on a ball, under one sun that throws shadows, at 800 x 600. The hair
 moves in every frame, so that every frame uploads its points and draws its maps again. All take
-turns, so that a busy machine meets all of them alike.
+turns, so that load on the machine affects them alike.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from hairloom.addon.strands import Surface
 STRANDS, POINTS, RADIUS = 4_095, 30, 0.001
 WIDTH, HEIGHT, FIELD_OF_VIEW = 800, 600, np.radians(30.0)
 EYE, SUN, STRENGTH = (0.0, 0.0, 5.0), (-0.45, -0.5, -0.8), 3.0
-#: of ours and of EEVEE
+#: rounds of ours and of EEVEE
 ROUNDS, EEVEE_ROUNDS = 24, 4
 VOLUMES = {
     "none": VolumeSettings(shadows="none"),
@@ -44,13 +44,13 @@ VOLUMES = {
 def cost_figures() -> dict[str, float]:
     """The figures by name.
 
-    frame_ratio_eevee: EEVEE's time of a frame over ours with 16 slices; frame_ratio_eevee_cpu: that
-        of all processors together, which other work on the machine hardly changes.
-    deep_ratio_slices: our frame with four deep layers, which err less than 16 slices, over that
-        with slices; deep_ratio_slices_map: the maps alone; deep16_ratio_slices: with the 16 that
-        are the default.
-    eevee_ms, frame_ms_<shadows>, map_ms_<shadows>: medians. Strands are drawn as the settings have
-        them at first, with transparency.
+    frame_ratio_eevee: EEVEE's time of a frame over ours with 16 slices; frame_ratio_eevee_cpu: the
+    same of processor time, which other load hardly changes.
+    deep_ratio_slices: our frame with four deep layers, whose errors are below those of 16 slices,
+        over that with slices; deep_ratio_slices_map: of the maps alone; deep16_ratio_slices: with
+        16 deep layers, the default.
+    eevee_ms, frame_ms_<shadows>, map_ms_<shadows>: medians. Strands are drawn with default
+        settings, that is with transparency.
     """
     strands = moved()
     frames = {name: OurFrame(volume) for name, volume in VOLUMES.items()}
@@ -92,7 +92,7 @@ def cost_figures() -> dict[str, float]:
 
 
 def moved(turn: float = 0.0) -> np.ndarray:
-    """The hair as it sways, (strand_count, cv_count, 3) float32."""
+    """The swaying hair at a phase [rad], (strand_count, cv_count, 3) float32."""
     strands = _AT_REST.copy()
     strands[..., 0] += 0.05 * np.sin(turn) * np.linspace(0.0, 1.0, POINTS, dtype=np.float32) ** 2
     return strands
@@ -105,7 +105,7 @@ def milliseconds(work: Callable[[], None]) -> float:
 
 
 def _combed() -> np.ndarray:
-    """Exactly as many as are asked for: those that would cross the lower pole are left out."""
+    """Exactly STRANDS strands, without those that would cross the lower pole."""
     return combed_strands(2 * STRANDS, POINTS)[:STRANDS]
 
 
@@ -114,7 +114,7 @@ _BODY = Surface(*ball_mesh(rings=24))
 
 
 class OurFrame:
-    """The viewport's draw of a moment, or its maps alone, until the GPU is done."""
+    """The viewport's draw of a frame, or of its maps alone, until the GPU is done."""
 
     def __init__(self, volume: VolumeSettings) -> None:
         self._volume, self._meshes = volume, (MeshSnapshot.of(_BODY),)
@@ -155,7 +155,7 @@ class OurFrame:
         )
 
     def _finish(self) -> None:
-        """One pixel that can be read back is the end of all that was drawn before."""
+        """Wait until all is drawn, by reading back a pixel."""
         self._target.read_color(0, 0, 1, 1, 4, 0, "FLOAT")
 
 

@@ -1,7 +1,7 @@
-"""How far opacity maps are from counting the strands between light and place one by one.
+"""Errors of opacity maps, against counting the strands between light and point one by one.
 
-On a ball of combed hair, and on Sintel's head where the shared data is, with strands of several
-widths: the mean error of T at 10,000 random places of strands, over the mean of T.
+On a ball of combed hair, and on Sintel's head if the shared data is there, with strands of several
+widths: the mean error of T at 10,000 random points of strands, relative to the mean of T.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from hairloom.addon.shading.lights import Light
 STRANDS, RADIUS = 14_000, 0.003
 SUN = Light.sun((-0.45, -0.5, -0.8), (1.0, 1.0, 1.0), 1.0)
 HEAD_SUN = Light.sun((0.4, -0.8, -0.5), (1.0, 1.0, 1.0), 1.0)
-#: [m] of Sintel's strands
+#: radii of Sintel's strands [m]
 HEAD_RADII = {"thin": 4.0e-5, "middle": 1.0e-4, "thick": 2.0e-4}
 
 
 def shadow_figures() -> dict[str, float]:
-    """t_error_<way> on the ball, t_error_<groom>_<radius>_<way> on the head, by ways to lay layers:
-    none is light without shadow, slicesN, deepN.
+    """t_error_<way>: on the ball; t_error_<groom>_<width>_<way>: on the head. Ways to place layers
+    are slicesN and deepN; none is light without shadow.
     """
     ball = combed_strands(STRANDS).astype(np.float64)
     found = {f"t_error_{way}": error for way, error in errors(ball, RADIUS, SUN).items()}

@@ -1,12 +1,13 @@
-"""Sintel's hair on her head beside Cycles' path traced: the sheet out/volume_sintel.png.
+"""Sintel's hair on her head beside Cycles' path tracing: the sheet out/volume_sintel.png.
 
-The same strands, head, camera and sun in both, the head in the colour of skin, and shadows of all
-on all. Hair is Principled Hair as the node comes, and ours as an artist gets it from the node.
-Columns: Cycles with all bounces; ours with what stands in for shadows and scattering; ours with
-shadows alone; ours with shadows and light from strand to strand. Rows: black, brown, blond.
+The same strands, head, camera and sun in both; the head has the colour of skin, and everything
+casts shadows on everything. Hair is Principled Hair with its defaults, and ours as an artist gets
+it from the node. Columns: Cycles with all bounces; ours with approximations of shadows and
+scattering; ours with shadows alone; ours with shadows and multiple scattering. Rows: black, brown,
+blond.
 
-Cycles' pictures are denoised, each with a seed of its own, and averaged until little noise is left:
-what the denoiser leaves differs from seed to seed.
+Cycles' pictures are denoised, each with its own seed, and averaged until little noise is left,
+since the denoiser's errors differ from seed to seed.
 """
 
 from __future__ import annotations
@@ -37,15 +38,15 @@ from hairloom.addon.shading.volume.settings import VolumeSettings
 from hairloom.addon.strands import Surface
 
 SHEET = REPOSITORY / "out" / "volume_sintel.png"
-#: across a picture; ours has this many samples across each pixel, which all strands are wider than
+#: pixels across a picture, and our samples across a pixel, which are closer than strands are wide
 SIZE, SAMPLES = 256, 8
-#: paths a pixel in each of Cycles' pictures; how much noise is left to be, and in how many at most
+#: of Cycles' pictures: paths per pixel; bounces; noise to reach, and the most pictures
 PATHS, BOUNCES, NOISE, MOST_PICTURES = 64, 64, 0.01, 24
-#: [m]; 2.5 times the file's, since 11,400 strands stand for many more. No taper
+#: [m]; 2.5 times the file's, since 11,400 strands represent many more. No taper
 RADIUS = 1.0e-4
 SUN, STRENGTH = np.array([-0.2, -0.75, 0.6]), float(np.pi)
 VIEW_DIRECTION, FIELD_OF_VIEW, MARGIN = (-0.55, -1.0, 0.18), np.radians(30.0), 0.85
-#: the brightest tenth of the hair is so bright in a picture
+#: the brightest tenth of the hair is this bright in a picture
 SHOWN = 0.5
 BROWN = (0.63, 1.12, 2.4)
 COLORS = {"black": BLACK, "brown": BROWN, "blond": BLOND}
@@ -60,7 +61,7 @@ DUAL = VolumeSettings(
     scattering=True,
     density=0.7,
 )
-#: each column's share of the stand-ins, and its shadows
+#: each column's strength of the approximations, and its shadows
 COLUMNS = {
     "stand_ins": (1.0, VolumeSettings(shadows="none")),
     "single": (0.0, replace(DUAL, scattering=False)),
@@ -88,9 +89,10 @@ def sintel() -> Sitter:
 
 def sintel_figures() -> dict[str, float]:
     """Write the sheet; for each colour FLIP with scattering, with shadows alone and with the
-    stand-ins; ours over Cycles' light of the hair by channel, and what noise Cycles' has left.
+    approximations; the ratio of our light on hair to Cycles' by channel; the noise left in Cycles'
+    picture.
 
-    flip_*_hair: the mean over what hair covers, with scattering.
+    flip_*_hair: the mean weighted by the coverage of hair.
     """
     sitter = sintel()
     covered = coverage(sitter)
@@ -128,7 +130,7 @@ def cycles_room(sitter: Sitter) -> CyclesRoom:
 
 
 def coverage_difference(room: CyclesRoom, covered: np.ndarray) -> float:
-    """How far what hair covers is from Cycles', on average over the picture."""
+    """The mean difference of hair's coverage from Cycles', over the picture."""
     room.paths(PATHS)
     room.leave_out_body(True)
     theirs = room.picture(SIZE)[..., 3]
@@ -139,7 +141,7 @@ def coverage_difference(room: CyclesRoom, covered: np.ndarray) -> float:
 def path_traced(
     room: CyclesRoom, absorption: tuple[float, float, float]
 ) -> tuple[np.ndarray, float]:
-    """(SIZE, SIZE, 4), and its noise: the deviation of a pixel over the mean of head and hair."""
+    """Cycles' picture (SIZE, SIZE, 4), and the standard deviation of its pixels over their mean."""
     room.hair(
         absorption,
         Roughness=USUAL.roughness,
@@ -158,7 +160,7 @@ def path_traced(
 
 
 def hair_settings(absorption: tuple[float, float, float], stand_ins: float) -> ShadingSettings:
-    """Ours from the node, all strands alike, with so much of the stand-ins."""
+    """Settings from the node, for strands alike; stand_ins: strength of the approximations."""
     node = PrincipledHair(
         parametrization="ABSORPTION",
         absorption_coefficient=absorption,
@@ -182,7 +184,7 @@ def snapshot_of(
     stand_ins: float,
     volume: VolumeSettings,
 ) -> Snapshot:
-    """The hair on the head under the sun, and nothing else that shines."""
+    """The hair on the head, with the sun as the only light."""
     return Snapshot(
         sitter.strands,
         np.full(sitter.strands.shape[:2], RADIUS, np.float32),
@@ -197,7 +199,7 @@ def snapshot_of(
 
 
 def coverage(sitter: Sitter) -> np.ndarray:
-    """What strands cover of each pixel and the head does not hide, (SIZE, SIZE)."""
+    """Coverage of each pixel by strands that the head does not hide, (SIZE, SIZE)."""
     snapshot = snapshot_of(sitter, BLOND, 0.0, VolumeSettings(shadows="none"))
     white = ShadingSettings(base_color=(1.0, 1.0, 1.0), color_variation=0.0, ambient=1.0)
     head = replace(snapshot.meshes[0], color=(0.0, 0.0, 0.0))
@@ -210,8 +212,8 @@ def drawn(sitter: Sitter, snapshot: Snapshot) -> np.ndarray:
 
 
 def flip_map(reference: np.ndarray, picture: np.ndarray) -> np.ndarray:
-    """FLIP of two scene-linear pictures as sRGB shows them, (height, width), at its own 67 pixels a
-    degree (Andersson et al. 2020).
+    """FLIP (Andersson et al. 2020) of two scene-linear pictures, encoded as sRGB, at its default 67
+    pixels per degree, (height, width).
     """
     encoded = [
         np.ascontiguousarray(srgb_encoded(np.clip(each[..., :3], 0.0, 1.0)), np.float32)

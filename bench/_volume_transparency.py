@@ -1,7 +1,7 @@
-"""Layers of strands against all of them sorted, whatever their order, and what they cost.
+"""Layered transparency against sorting, for any order of strands, and what it costs.
 
 Crossing ribbons in perspective, of many colours, against `sorted_picture`; then the ball of
-_volume_cost, drawn opaque and with each way of transparency in turn.
+_volume_cost, drawn opaque and with each method of transparency in turn.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ SUN = Light.sun((-0.45, -0.5, -0.8), (1.0, 1.0, 1.0), 3.0)
 def transparency_figures() -> dict[str, float]:
     """The figures by name.
 
-    transparency_error: mean difference of colour to all layers sorted.
-    permutation_difference: the largest between any two orders of strands.
+    transparency_error: mean difference of colour from all layers, sorted.
+    permutation_difference: the largest difference between two orders of strands.
     transparency_cost_layers, transparency_cost_hashed: median time of a frame over that of opaque
         strands.
-    transparency_noise_<way>: mean difference of colour to 8 x 8 opaque samples in one sample.
+    transparency_noise_<way>: mean difference of colour, in one sample, from 8 x 8 opaque ones.
     """
     return {**ribbon_figures(), **cost_ratios(), **noise_figures()}
 
@@ -113,7 +113,7 @@ def sorted_picture(strands: np.ndarray, brightness: np.ndarray, camera: Camera) 
 
 
 def cost_ratios() -> dict[str, float]:
-    """All ways take turns, so that a busy machine meets them alike."""
+    """All methods take turns, so that load on the machine affects them alike."""
     camera, shown = _ball(WIDTH, HEIGHT)
     ways = {way: _with(shown, way) for way in ("none", "hashed", "layers")}
     target, color = _target(WIDTH, HEIGHT)

@@ -1,26 +1,26 @@
-"""Hair among hair, whether it keeps volume and locks, does nothing at rest, and what it costs; the
-scene's force fields; and hair that follows an animated style.
+"""Hair that feels other hair: volume, locks, rest and cost; the scene's force fields; and hair that
+follows an animated style.
 
-volume_kept          a ponytail in a style that bears nothing, 2 s below its tie: cells as wide as
-                     two strands are apart that it runs through, over those at rest; without: the
-                     same with Volume 0
-volume_kept_bent     the same over a shoulder, a capsule that comes under it in the first second
+volume_kept          a ponytail below its tie, in a style that bears nearly nothing, after 2 s:
+                     cells as wide as the spacing of strands that it runs through, over those at
+                     rest; without: the same with Volume 0
+volume_kept_bent     the same over a shoulder, a capsule that moves under it in the first second
 rest_motion_mm       how much farther from its style hair at rest is after 10 s than with Volume 0
-crossing_percent     of two locks side by side that swing against each other, 1 m/s at the tips: how
-                     many strands are on the other's side, in the worst frame
-crossing_across_percent   the same where each lock is a groom of its own
-halves_apart_mm      of a ponytail on a head that sways, cut into two grooms: how far its strands
-                     are from where they are in one, the mean over a second; without: where the two
-                     do not feel each other
-cost_ratio_two_*     a frame of a groom cut in two that feel each other over one of the whole
-cost_ratio_*         a frame at 24 a second with Volume over one without, on a head that sways, with
-                     its mesh as collider; each frame by the least of several rounds in turn
+crossing_percent     of two locks side by side that swing against each other, 1 m/s at the tips:
+                     strands on the other lock's side, in the worst frame
+crossing_across_percent   the same with each lock as a separate groom
+halves_apart_mm      of a ponytail on a head that sways: mean distance of its strands, over a
+                     second, when cut into two grooms, from where they are in one; without: the same
+                     if the two do not feel each other
+cost_ratio_two_*     time of a frame of two half grooms that feel each other over one of the whole
+cost_ratio_*         time of a frame at 24 a second with Volume over one without, on a head that
+                     sways, with its mesh as collider; each frame by the minimum over rounds in turn
 field_error          force fields of every kind, shape and falloff beside Blender's particles: the
-                     largest difference of accelerations at 200 places, over the largest one
-field_cost_ratio_*   a frame as above with four force fields over one without
-style_follow_mm      of curves and children that nodes move, on a surface that turns, and of which
-                     nothing is simulated: how far any drawn strand is from where the curves are
-style_frame_ms       a frame of it that is simulated; read_once: the same with a style that is still
+                     largest error of acceleration at 200 places, over the largest acceleration
+field_cost_ratio_*   time of a frame as above with four force fields over one without
+style_follow_mm      of curves and children that nodes move, on a surface that turns, without
+                     simulation: largest distance of a drawn strand from the curves
+style_frame_ms       time of such a frame, simulated; read_once: the same with a style that is still
 
 The exit status is 1 if a limit is missed.
 
@@ -58,14 +58,14 @@ from hairloom.addon.render.dynamics_pass import DynamicsPass
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
 FPS, GUIDES, CVS, SECONDS = 24.0, 762, 16, 2.0
-#: A style that bears next to nothing, and none of the weight.
+#: A style that bears nearly nothing, and no weight.
 SOFT = {"style_root": 0.5, "style_tip": 0.1, "bend": 0.3, "sag_compensation": 0.0}
-#: Volume in what is measured, but for cost, where it does not matter how much.
+#: Volume in all figures but cost, which hardly depends on it.
 VOLUME = 1.0
 #: [m/s] of each lock, at the tips.
 SWING = 1.0
 SIZES, ROUNDS = {"762": 762, "10k": 10_000}, {"762": 7, "10k": 3}
-#: Four kinds that scenes have, around the head.
+#: Four common kinds, around the head.
 FIELDS = (
     ForceField("wind", axis=(1.0, 0.0, 0.0), strength=5.0, shape="plane", flow=1.0, across=1.0),
     ForceField("force", center=(0.3, 0.3, 0.2), strength=-2.0, distance=Falloff(2.0)),
@@ -148,7 +148,7 @@ def shoulder(frame: int) -> tuple[PosedCollider, ...]:
 
 
 def cells_of(grid: np.ndarray, width: float) -> int:
-    """How many cells of this width strands run through."""
+    """The number of cells of this width that strands run through."""
     steps = np.linspace(0.0, 1.0, 5)[:-1, None, None, None]
     points = grid[:, :-1] * (1.0 - steps) + grid[:, 1:] * steps
     return len(np.unique(np.floor(points.reshape(-1, 3) / width).astype(int), axis=0))
@@ -167,8 +167,8 @@ def rest_motion() -> float:
 
 
 def in_blender() -> dict[str, object]:
-    """The largest error of force fields, and of which case it is, of Blender's particles; and how
-    hair follows its style."""
+    """The largest error of force fields beside Blender's particles, and its case; and how hair
+    follows its style."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     register()
     try:
@@ -183,7 +183,7 @@ def in_blender() -> dict[str, object]:
 
 
 def crossings() -> dict[str, object]:
-    """Two locks of one groom, and of two."""
+    """Crossings of two locks of one groom, and of two grooms."""
     grid, side = tail(240, 0.012, 0.012, 0.25), np.repeat([-1.0, 1.0], 120)
     grid[..., 0] += (0.015 * side)[:, None].astype(np.float32)
     apart = (slice(0, 120), slice(120, 240))
@@ -233,7 +233,7 @@ def halves() -> dict[str, object]:
 
 
 def costs(name: str, count: int) -> dict[str, object]:
-    """Milliseconds a frame, and their ratio, of all that can run here."""
+    """Milliseconds per frame, and ratios, of all implementations that can run here."""
     surface = surface_of(new_head())
     field = DistanceField.from_surface(surface, DynamicsSettings(), place="head")
     guides = guides_on(surface, count)
@@ -254,7 +254,7 @@ def costs(name: str, count: int) -> dict[str, object]:
                 times.setdefault((form, kind), []).append(took)
     found: dict[str, object] = {}
     for form in forms:
-        # the first frames compile, and find the grid
+        # the first frames compile, and size the grid
         without, with_it, with_fields = (
             float(np.min(times[form, kind], axis=0)[2:].mean()) for kind in kinds
         )
@@ -269,7 +269,8 @@ def costs(name: str, count: int) -> dict[str, object]:
 
 
 def cost_of_two(form: str, grid: np.ndarray, rounds: int) -> float:
-    """Without a collider, of which each groom has its own."""
+    """The time of two half grooms over that of the whole, without colliders, which each would
+    have."""
     settings, frames, times = DynamicsSettings(volume=0.5), 8, []
     for _ in range(rounds):
         for parts in ((slice(0, None),), (slice(0, None, 2), slice(1, None, 2))):
@@ -289,7 +290,8 @@ def cost_of_two(form: str, grid: np.ndarray, rounds: int) -> float:
 
 
 def draw(folder: Path) -> None:
-    """A ponytail on the built-in head in soft hair: its style, and 2 s later without and with."""
+    """Draw a ponytail of soft hair on the built-in head: its style, and 2 s later without and with
+    Volume."""
     from _ponytail import ponytail
 
     from hairloom.addon.blender.base import images

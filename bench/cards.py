@@ -1,7 +1,8 @@
 """Hair cards of Sintel: how long they take, order, occlusion, passes, and cards beside strands.
 
 See `_cards_build`, `_cards_atlas`, `_cards_order`, `_cards_occlusion`, `_cards_passes` and
-`_cards_strands` for what is compared with what. Limits are twice what was found when they were set.
+`_cards_strands` for what is compared with what. Limits are twice the values measured when they were
+set.
 
 make bench NAME=cards           some minutes; writes out/cards_sheet.png
 tools/bench.py cards build        some parts: build, atlas, order, occlusion, passes, strands
@@ -23,7 +24,7 @@ REFERENCE = (
     "rays one by one; cards sorted for each view and pixels sorted; the strands "
     "themselves; the three-pass scheme"
 )
-#: fractions of pixels that blend in the wrong order, with the orders that the files have
+#: fractions of pixels that blend in the wrong order, with the orders of the files
 AT_MOST = {
     "order_wrong_sorted": 0.038,
     "order_wrong_baked_sorted": 0.088,

@@ -1,12 +1,10 @@
 """How long the program of dynamics takes to compile, beside the programs that draw hair.
 
-Each scene is compiled in a process of its own, without the cache of Mesa's drivers. A time is the
-processor time of the first dispatch less that of the second, of all threads. What it is a ratio to
-is found in the same way in that process: the first picture of a ball of hair as the preview
-draws it at rest, with its shading, layers and deep maps, less the second picture.
-
-The limits are for a software driver; on a GPU only the seconds are told. Exit code 1: a limit is
-missed.
+Each scene is compiled in its own process, without the cache of Mesa's drivers. A time is the
+processor time, of all threads, of the first dispatch less that of the second. The reference is
+measured in the same way in that process: the first picture of a ball of hair as the preview draws
+it at rest, with its shading, layers and deep maps, less the second picture. Limits are for a
+software driver; on a GPU, seconds are only reported. Exit code 1: a limit is missed.
 
 make bench NAME=compile             a minute
 tools/bench.py compile head         some scenes (head, plate, fields)
@@ -56,9 +54,9 @@ from hairloom.addon.shading.lights import three_point_lights
 REFERENCE = "the programs of a picture of hair at rest, compiled in the same process"
 GUIDES, CVS, STRANDS, WIDTH, HEIGHT = 40, 16, 200, 64, 36
 GRAVITY, FRAME = np.array([0.0, 0.0, -9.81]), 1.0 / 60.0
-#: scene -> the most that its ratio may be, 1.5 times the middle of three runs beside other work
+#: scene -> upper limit of its ratio, 1.5 times the median of three runs under other load
 LIMITS = {"head": 2.0, "plate": 3.5, "fields": 1.6}
-#: what a process is asked for that measures one scene
+#: argument of a process that measures one scene
 _ONE = "--one"
 _ABOVE = {"center": (0.05, -0.1, 0.35), "axis": (0.48, 0.6, 0.64)}
 _FIELDS = (
@@ -113,7 +111,7 @@ def compiled(scene: Scene) -> tuple[float, float]:
 
 
 def first_of(work: Callable[[], None]) -> float:
-    """By how many seconds the first time takes longer than the second one."""
+    """The seconds by which the first run takes longer than the second."""
     taken = []
     for _ in range(2):
         began = time.process_time()
@@ -123,7 +121,7 @@ def first_of(work: Callable[[], None]) -> float:
 
 
 def _picture() -> Callable[[], None]:
-    """A ball of hair, drawn and read back."""
+    """A function that draws a ball of hair and reads it back."""
     rig = hair_ball(STRANDS)
     snapshot = snapshot_of(prepared(rig, AmbientSettings(), with_occluders=False))
     points = rig.strands.points
@@ -142,7 +140,7 @@ def _picture() -> Callable[[], None]:
 
 
 def _frames(scene: Scene) -> Callable[[], None]:
-    """Guides out of a ball that turns with its colliders, a frame each time."""
+    """A function that simulates a frame of guides on a ball that turns with its colliders."""
     out = np.random.default_rng(GUIDES).normal([0.0, 0.0, 1.5], 1.0, (GUIDES, 3))
     out /= np.linalg.norm(out, axis=1, keepdims=True)
     grid = (out[:, None] * np.linspace(0.1, 0.3, CVS)[:, None]).astype(np.float32)
@@ -161,7 +159,7 @@ def _frames(scene: Scene) -> Callable[[], None]:
 
 
 def head() -> Scene:
-    """A box as large as a head, as the field of a mesh."""
+    """A box as large as a head, as a distance field."""
     return Scene((_box_field((0.095, 0.095, 0.095), (0.0, 0.0, 0.0), 0.01),))
 
 

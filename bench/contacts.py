@@ -1,8 +1,8 @@
-"""How deep guides enter what they collide with, between their points too, and what passes through.
+"""How deep guides enter colliders, between their points too, and how many pass through.
 
-Depths are measured at the triangles of the collider as it is at that moment, not in what the
-simulation knows of it. Every guide is sampled densely along its segments; of a sample that lies
-inside at rest nothing is asked. Exit code 1: a limit is missed.
+Depths are measured at the triangles of the collider at that moment, not in its distance field,
+which the simulation uses. Every guide is sampled densely along its segments; samples that are
+inside at rest do not count. Exit code 1: a limit is missed.
 
 make bench NAME=contacts
 tools/bench.py contacts thin compute     some parts (thin, sintel, built_in), on the GPU
@@ -44,9 +44,9 @@ from hairloom.addon.strands.closest_point import closest_point
 
 REFERENCE = "the triangles of the colliders"
 FPS, SAMPLES = 60.0, 6
-#: of plates and fingers, guides that pass through; how deep they may be in a head [mm]
+#: guides that pass through thin solids; depth in a head [mm]
 AT_MOST = {"*_passed": 0, "*_demo_depth_worst_mm": 0.5, "*_fast_depth_worst_mm": 1.0}
-#: At which plates and fingers go [m/s].
+#: Speeds of thin solids [m/s].
 SPEEDS = (1.0, 2.0, 2.8, 4.0, 5.6)
 #: A head at 5 Hz and 5.6 m/s.
 FAST_RATE, FAST_SWAY = 5.0, 0.178
@@ -55,7 +55,8 @@ Motion = Callable[[float], np.ndarray]
 
 @dataclass
 class Depths:
-    """The worst of all frames, in mm of what was outside at rest, and percent of strands."""
+    """The worst of all frames: depths of samples outside at rest [mm], and percentages of
+    guides."""
 
     surface: Surface
     field: DistanceField
@@ -70,7 +71,7 @@ class Depths:
         return cls(surface, field, depth > 0.0)
 
     def note(self, grid: np.ndarray, matrix: np.ndarray) -> None:
-        """Guides (n, cv_count, 3) of one moment, with the collider moved by a matrix from rest."""
+        """Add a frame of guides (n, cv_count, 3); `matrix` moves the collider from rest."""
         local = moved(np.linalg.inv(matrix), dense(grid))
         depth = depth_in(local.reshape(-1, 3), self.surface, self.field).reshape(local.shape[:2])
         depth[self.inside_at_rest] = 0.0
@@ -93,10 +94,10 @@ def dense(grid: np.ndarray) -> np.ndarray:
 
 
 def depth_in(points: np.ndarray, surface: Surface, field: DistanceField) -> np.ndarray:
-    """How deep [m] points (n, 3) lie in a closed mesh, exact; 0 outside.
+    """The exact depth [m] of points (n, 3) in a closed mesh; 0 outside.
 
-    The field only says which points are looked at: what lies inside is no more than half a cell's
-    diagonal outside by it.
+    The field only preselects points: it places points inside the mesh at most half a cell's
+    diagonal outside.
     """
     rough, _ = field.distance(np.ascontiguousarray(points.T, np.float32))
     within = np.flatnonzero(rough < field.cell)
@@ -117,7 +118,7 @@ def demo_shake(centre: np.ndarray) -> Motion:
 
 
 def fast_shake(centre: np.ndarray) -> Motion:
-    """5 Hz: the demo's turn by a fifth, and a sway that reaches 5.6 m/s."""
+    """5 Hz: a turn by 10 degrees, and a sway that reaches 5.6 m/s."""
 
     def matrix(time: float) -> np.ndarray:
         ease = min(time / 0.25, 1.0)
@@ -136,7 +137,8 @@ def fast_shake(centre: np.ndarray) -> Motion:
 def shaken(
     rig: Rig, motion: Motion, seconds: float, make: Callable[..., Form], every: int = 1
 ) -> dict[str, float]:
-    """Every so many guides of a groom on its head, which moves rigidly and collides as its mesh."""
+    """Depths of every n-th guide of a groom in its head, which moves rigidly and collides as a
+    mesh."""
     assert rig.head is not None
     settings = DynamicsSettings()
     collider = DistanceField.from_surface(rig.head, settings)
@@ -204,7 +206,8 @@ def ear(settings: DynamicsSettings) -> Thin:
 def swung(
     thin: Thin, make: Callable[..., Form], settings: DynamicsSettings, speed: float = 5.6
 ) -> dict[str, float]:
-    """It goes through hanging hair, 1/180 s at a time, and we count the strands that it passes."""
+    """Move a solid through hanging hair, a substep at a time, and count strands that pass through
+    it."""
     count, cv_count = 60, 16
     along = np.linspace(0.0, -0.25, cv_count)
     grid = np.zeros((count, cv_count, 3), np.float32)
@@ -237,7 +240,7 @@ def place(y: float) -> np.ndarray:
 
 
 def crosses(begin: np.ndarray, end: np.ndarray, core: np.ndarray) -> np.ndarray:
-    """Whether each way (..., 3) goes through any triangle."""
+    """Whether the line from each begin to its end (..., 3) crosses any triangle."""
     way = end - begin
     found = np.zeros(begin.shape[:-1], bool)
     for a, b, c in core:

@@ -1,8 +1,8 @@
 """Reading hair curves from Blender, 100,000 of 16 points, against Blender's own slow accessor.
 
-The reference is `curves.points.foreach_get("position")` on the same evaluated curves: what an
-add-on does that follows the obvious path. It only copies positions; ours also takes offsets and
-radii, moves all into world space and checks every curve.
+The reference is `curves.points.foreach_get("position")` on the same evaluated curves, the obvious
+call for an add-on. It only copies positions; ours also reads offsets and radii, transforms all into
+world space and checks every curve.
 """
 
 import statistics

@@ -1,10 +1,10 @@
-"""The dynamics against Blender's own: milliseconds a frame, stretch, penetration, frame rates.
+"""The dynamics against Blender's own: milliseconds per frame, stretch, penetration, frame rates.
 
 762 guides of 16 CVs on a ball that swings 0.3 m to either side once a second, at 60 frames a
 second, the ball's mesh as collider, bend and style on as by default. The peer is Blender's "Hair
-Dynamics" on the same guides in the same process (see `_hair_dynamics`). Every time is the least of
-the medians of several rounds, in which all contestants take turns, so that a busy moment of the
-machine meets all of them.
+Dynamics" on the same guides in the same process (see `_hair_dynamics`). Every time is the minimum
+of the medians of several rounds, in which all variants take turns, so that load on the machine
+affects all of them.
 
 make bench NAME=dynamics            about four minutes
 make bench NAME="dynamics --peer-10k"   the peer with 10,000 guides too: three minutes more
@@ -39,9 +39,9 @@ AT_MOST = {"stretch_max_percent": 1.0, "penetration_sphere_mm": 0.001, "penetrat
 #: times faster than the peer
 AT_LEAST = {"ratio_numpy": 1.0, "ratio_compute": 1.0}
 GUIDES, FPS, WARM_UP, SWING = 762, 60.0, 10, 60
-#: A busy minute of the machine shall not meet all rounds.
+#: Enough that a busy minute of the machine does not affect all rounds.
 ROUNDS, SCALING_ROUNDS = 7, 3
-FRAMES = WARM_UP + SWING  # of a play, whose whole swing is measured
+FRAMES = WARM_UP + SWING  # of a play; one whole swing is measured
 SIZES = (1_000, 3_000, 10_000, 30_000, 50_000)
 FRAME_RATES = (24.0, 30.0, 60.0, 120.0)
 SETTINGS = DynamicsSettings()
@@ -83,9 +83,9 @@ def race(
     field: DistanceField,
     rounds: int,
 ) -> dict[str, float]:
-    """Milliseconds a frame of all contestants, and how far the medians of the rounds lie apart.
+    """Milliseconds per frame of all variants, in the best round and in the worst.
 
-    In each round each of them plays one swing.
+    In each round each variant plays one swing.
     """
     shake = Shake(guides.grid, (field,))
     balls = Shake(guides.grid, (SphereCollider((0.0, 0.0, 0.0), RADIUS),))
@@ -126,10 +126,10 @@ def timed(make: Callable[[DynamicsState], Form], shake: Shake, seconds: float) -
 def accuracy(
     forms: Forms, guides: StrandSet, surface: Surface, field: DistanceField
 ) -> dict[str, float]:
-    """The worst stretch and penetration of both forms in every frame of two seconds.
+    """The worst stretch and penetration of all implementations over two seconds.
 
-    In the ball as the sphere it is, and in the ball's mesh, of which the simulation knows only
-    the distance field: its depth is measured at the triangles themselves.
+    Colliders are the ball as a sphere, and its mesh, of which the simulation has only the distance
+    field; depth is measured at the triangles themselves.
     """
     depth = depth_in(surface)
     worst = {"stretch_max_percent": 0.0, "penetration_sphere_mm": 0.0, "penetration_mesh_mm": 0.0}
@@ -156,7 +156,8 @@ def accuracy(
 
 
 def scaling(forms: Forms, surface: Surface, field: DistanceField) -> dict[str, float]:
-    """Milliseconds a frame for more and more guides, and the exponent that fits them best."""
+    """Milliseconds per frame for growing numbers of guides, and the exponent that fits them
+    best."""
     most = guides_on(surface, SIZES[-1]).grid
     chosen = np.random.default_rng(1).permutation(SIZES[-1])
     shakes = {size: Shake(most[np.sort(chosen[:size])], (field,)) for size in SIZES}
@@ -179,8 +180,8 @@ def scaling(forms: Forms, surface: Surface, field: DistanceField) -> dict[str, f
 def frame_rates(
     make: Callable[[DynamicsState], Form], guides: StrandSet, field: DistanceField
 ) -> float:
-    """How far any tip is after two seconds from where another frame rate has it, in percent of
-    its hair's length; the worst tip of all guides and pairs of rates."""
+    """The largest distance of a guide's tip, after two seconds, between two frame rates, in percent
+    of the guide's length."""
     tips = []
     for fps in FRAME_RATES:
         form = make(start(guides.grid))

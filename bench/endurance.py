@@ -1,9 +1,9 @@
 """Whether the dynamics can be broken: 1,000 seeded runs of two seconds, and a shake of ten minutes.
 
-A run fails if anything is not finite, or if the way along the strand from its root to a CV is
-longer than 1.02 times what it is at rest, with what its curls give; that holds for every setting
-but relaxation without long-range attachment, which asks for hair that stretches. The scenes are
-those of `_random_runs`. The last line is one JSON object; the exit status is 1 if anything
+A run fails if anything is not finite, or if the length along a strand from its root to a CV exceeds
+1.02 times that at rest, including what curls give. Lengths do not count with relaxation without
+long-range attachment, which lets hair stretch. The scenes are those of
+`_random_runs`. The last line is one JSON object; the exit status is 1 if anything
 failed.
 
 make bench NAME="endurance --runs 1000 --first 0 --minutes 10 --compute"
@@ -32,7 +32,7 @@ AT_MOST = {"failures": 0, "reach_along_strand": LIMIT, "shake_failed": 0}
 
 @dataclass
 class Tally:
-    """What has been seen so far."""
+    """The results so far."""
 
     runs: int = 0
     worst_ratio: float = 0.0
@@ -69,7 +69,7 @@ def main() -> int:
 
 
 def note(tally: Tally, seed: int, run: RandomRun, *, compute: bool) -> None:
-    """Play a run and write down how it went."""
+    """Play a run and record its result."""
     problem = None
     ratio = 0.0
 
@@ -85,7 +85,7 @@ def note(tally: Tally, seed: int, run: RandomRun, *, compute: bool) -> None:
     form: Form = ComputeForm(begun) if compute else NumpyForm(begun)
     try:
         play(form, run.drives(SECONDS), run.settings, run.fps, watch)
-    except Exception:  # whatever it is, it is a failure of this seed, and the others go on
+    except Exception:  # any exception is a failure of this seed, and the others go on
         traceback.print_exc()
         problem = "raised"
     form.release()
@@ -98,8 +98,8 @@ def note(tally: Tally, seed: int, run: RandomRun, *, compute: bool) -> None:
 
 
 def shake(make: type[NumpyForm] | type[ComputeForm], minutes: float) -> dict[str, object]:
-    """A head that sways in gusts for minutes: the hair still has its length, and its fastest speed
-    has not grown from the first quarter of the time to the last."""
+    """Shake a head in gusts for minutes: hair must keep its length, and its top speed may grow by
+    less than half from the first quarter of the time to the last."""
     run = shaken(guide_count=60)
     worst, speeds = 0.0, []
 

@@ -1,7 +1,8 @@
-"""The render engine: clean stills, the same everywhere, and animations that do not grow.
+"""The render engine: noise and reproducibility of stills, and growth of time and memory in
+animations.
 
 See the modules `_engine_...` for what is compared with what. The reference of stills is the same
-scene at 1,024 samples. Limits are twice what was found when they were set.
+scene at 1,024 samples. Limits are twice the values measured when they were set.
 
 make bench NAME=engine          some minutes
 tools/bench.py engine picture        some parts: picture, skin, shafts, frames
@@ -18,7 +19,7 @@ from _engine_skin import skin_figures
 from _report import measured, report, start
 
 REFERENCE = "the same scene at 1,024 samples; another process; the tenth frame"
-#: coordinates that go wrong show a picture from elsewhere, and a difference near 1
+#: wrong coordinates show other parts of the picture, with a difference near 1
 AT_MOST = {"polar_difference": 0.006}
 PARTS = {
     "picture": picture_figures,

@@ -1,9 +1,8 @@
-"""Exported cards in programs that know nothing of Hairloom, what a user sees there, the page, the
-springs, the levels of detail, and the atlases that are exported.
+"""Exported cards in programs without Hairloom: plain viewers, the page, the springs, shells, the
+levels of detail, and the exported atlases.
 
 See `_engines_plain`, `_engines_page`, `_engines_springs`, `_engines_shells`, `_engines_levels` and
-`_engines_atlas`
-for what is compared with what.
+`_engines_atlas` for what is compared with what.
 
 Exit code 1: a limit is missed.
 
@@ -32,7 +31,7 @@ PARTS = {
     "springs": spring_figures,
     "shells": shell_figures,
 }
-#: figures -> the most, and the least, that they may be
+#: figure -> upper limit, and lower limit
 AT_MOST = {
     "*plain_levels_visible": 1,
     "*plain_color_percent": 10.0,

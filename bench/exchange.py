@@ -1,17 +1,14 @@
-"""Strands as files: how fast they are written and read, how exactly they come back, and what
-damaged files and killed writers do; and cards that move.
+"""Strands as files: how fast they are written and read, how exactly they are kept, and what damaged
+files and killed writers do; and cards that move.
 
 See `_exchange_alembic`, `_exchange_usd`, `_exchange_files`, `_exchange_round_trip`,
 `_exchange_motion` and `_exchange_blender` for what is measured, and against what.
 
-Sizes of USD files and of the memory that they take may be twice what was found when the limits were
-set.
-
-Beside each part stands what it takes, wall clock and processor: other work shows in the former
-alone.
+Limits on the size of USD files and on their memory are twice the values measured when they were
+set. Each part prints its wall-clock and processor time; other load affects the former alone.
 
 make bench NAME=exchange                      some minutes, with few damaged files and kills
-tools/bench.py exchange whole                 the numbers of the proof: an hour or more
+tools/bench.py exchange whole                 the full numbers of them: an hour or more
 tools/bench.py exchange whole kills "damaged files"    of these parts alone
 """
 
@@ -34,7 +31,7 @@ from _report import report, start
 #: kills of a format's writer; seconds of motion
 FEW, WHOLE = (1_000, 30, 5, 0.5), (10_000, 1_000, 100, 2.0)
 REFERENCE = "Blender's own Alembic and USD of the same strands, positions and widths only"
-#: what there may be none of, and sizes [MB]
+#: counts that must be 0, and limits of sizes [MB]
 AT_MOST: dict[str, float] = dict.fromkeys(
     ("fuzz_failures", "kill_failures", "kill_mixed", "kill_leftovers"), 0
 )
@@ -66,7 +63,7 @@ def main(chosen: list[str], *, is_whole: bool) -> int:
 
 
 def summary(found: dict[str, float]) -> dict[str, float]:
-    """The figures that have a limit, and what Blender takes for the same strands with less."""
+    """The main figures, and ratios to Blender's times for as many strands with fewer attributes."""
     reads = ("abc_unreal_read_seconds", "usd_read_seconds", "tfx_read_seconds")
     return {
         "alembic_seconds": found["abc_unreal_write_seconds"],

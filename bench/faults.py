@@ -1,4 +1,4 @@
-"""Nothing lost, nothing taken over: faults while files are written, and files that mean harm.
+"""Faults while files are written, and malicious files: nothing may be lost, no foreign code run.
 
 See `_fault_runs`, `_verb_faults` and `_usd_attacks` for what is done. Exit code 1: a limit is
 missed.
@@ -33,7 +33,7 @@ from hairloom.addon.exchange.usd.usd_library import usd_library
 
 REFERENCE = "the result before, or the new one; a limit of the system on what a file may take"
 SEED = 22
-#: figure -> the most, and the least, that it may be
+#: figure -> upper limit, and lower limit
 AT_MOST = {
     "fault_losses": 0,
     "fault_mixed": 0,
@@ -42,7 +42,7 @@ AT_MOST = {
     "verb_mixed": 0,
     "verb_untrue_messages": 0,
     "usda_crashes": 0,
-    "longest_seconds": 10.0,  # beside other work: nice -n -15
+    "longest_seconds": 10.0,  # under other load, run with nice -n -15
     "longest_processor_seconds": 10.0,
     "memory_mb": 1024.0,
     "planted_code_runs": 0,
@@ -80,9 +80,9 @@ def verbs(count: int = 255) -> dict[str, Any]:
 
 
 def planted() -> dict[str, int]:
-    """Modules in the current folder and the environment; every way to start a child."""
+    """Whether modules planted in the current folder or the environment run in any child process."""
     before, ran = os.getcwd(), 0
-    usd_library(Path())  # else this process, which is no Blender, would find the planted one
+    usd_library(Path())  # otherwise this process, which is no Blender, would find the planted one
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         for module in ("ctypes", "numpy", "pxr", "sitecustomize", "usercustomize", "json", "site"):
@@ -109,7 +109,7 @@ def planted() -> dict[str, int]:
 
 
 def autosave() -> dict[str, int]:
-    """In a Blender with a window that plays hair for two minutes."""
+    """Autosaves of a Blender with a window that plays hair for two minutes."""
     subprocess.run(["make", "test-ui", "SESSIONS=session_autosave"], cwd=REPOSITORY, check=False)
     logs = (REPOSITORY / "out" / "window").glob("autosave-*.log")
     texts = (log.read_text(encoding="utf-8", errors="replace") for log in logs)

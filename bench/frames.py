@@ -1,8 +1,8 @@
-"""What frames of the preview ask of the GPU, and what is not done twice.
+"""The work of the GPU in frames of the preview, and the work that is reused.
 
-Grown hair on Suzanne's head in a studio's light, as a view in Solid shows it, at 320 x 240. What is
-compared takes turns; a time is the least of some rounds, until the GPU has done it. A driver that
-is software is timed by what all threads compute, which other work on the machine does not change.
+Grown hair on Suzanne's head in a studio's light, as a view in Solid shows it, at 320 x 240.
+Variants take turns; a time is the minimum over ROUNDS, until the GPU is done. A software driver is
+timed by processor time, which other load does not change.
 
 make bench NAME=frames          two minutes; exits with an error beyond a limit
 """
@@ -38,9 +38,9 @@ from hairloom.addon.strands import StrandSet
 
 REFERENCE = "the same view drawn afresh, drawn as at rest, one view"
 STRANDS, WIDTH, HEIGHT, ROUNDS = 3000, 320, 240, 7
-#: [rad] by which a view turns from frame to frame
+#: turn of a view from frame to frame [rad]
 TURN = float(np.radians(1.5))
-#: figure -> most that it may be
+#: figure -> upper limit
 AT_MOST = {
     "readbacks_per_frame": 0,
     "playing_ratio": 1.2,
@@ -84,7 +84,7 @@ class Stage:
         return cls(strands, *_target(WIDTH, HEIGHT))
 
     def hair(self) -> Snapshot:
-        """Moved a little, so that all that depends on where it is is new."""
+        """The hair, moved a little, so that nothing that depends on its position is reused."""
         moved = self.strands.points + np.float32(1.0e-4 * next(self.numbers))
         return Snapshot(
             moved.reshape(self.strands.grid.shape), self.strands.radius.reshape(STRANDS, -1)
@@ -113,7 +113,7 @@ class Stage:
             draw()
 
     def took(self, draw: Callable[[], None]) -> float:
-        """[s] until the GPU has done it."""
+        """Seconds until the GPU is done."""
         clock = time.process_time if is_software() else time.perf_counter
         self.color.read()
         begin = clock()
@@ -122,7 +122,7 @@ class Stage:
         return clock() - begin
 
     def call_figures(self) -> dict[str, float]:
-        """Of a frame that plays, and of one whose view turns."""
+        """GPU calls of a frame that plays, and of one whose view turns."""
         own, hair, moving = StrandPass(), self.hair(), {"is_moving": True}
         self.draw(own, hair, 0.0)
         playing = gpu_calls(lambda: self.draw(own, self.hair(), 0.0, **moving))
@@ -134,7 +134,7 @@ class Stage:
         }
 
     def playing_figures(self) -> dict[str, float]:
-        """Hair that plays, beside the same drawn as if it were at rest."""
+        """Hair that plays, relative to the same drawn as if at rest."""
         exact, moving = StrandPass(), StrandPass()
         for own in (exact, moving):
             self.draw(own, self.hair(), 0.0)
@@ -145,7 +145,7 @@ class Stage:
         return {"playing_ratio": in_motion / in_rest}
 
     def still_figures(self) -> dict[str, float]:
-        """A view in which nothing has changed, beside the same drawn afresh as before."""
+        """An unchanged view shown from its kept picture, relative to drawing it again."""
         own, hair, kept = StrandPass(), self.hair(), KeptPicture()
 
         def keep() -> None:
@@ -166,7 +166,7 @@ class Stage:
         }
 
     def orbit_figures(self) -> dict[str, float]:
-        """A view that turns in Solid, beside one that is drawn in each frame as at rest."""
+        """A view that turns in Solid, relative to one drawn in each frame as at rest."""
         hair, all_maps, few_maps = self.hair(), StrandPass(), StrandPass()
         angles = np.arange(2 * ROUNDS + 2) * TURN
         for own in (all_maps, few_maps):
@@ -181,12 +181,12 @@ class Stage:
                         )
                     )
                 )
-        # some of the frames draw a map, and some none: the middle half of both
+        # some frames draw a map and some do not: average over the middle half
         middle = [float(np.mean(np.sort(each)[ROUNDS // 2 : -ROUNDS // 2])) for each in times]
         return {"orbit_solid_ms": 1000.0 * middle[1], "orbit_solid_ratio": middle[1] / middle[0]}
 
     def two_view_figures(self) -> dict[str, float]:
-        """Hair that plays in two views, beside the same in one."""
+        """Hair that plays in two views, relative to one."""
         alone, both = StrandPass(), StrandPass()
 
         def one() -> None:
@@ -201,8 +201,8 @@ class Stage:
         return {"two_views_ratio": in_two / in_one}
 
     def groom_figures(self) -> dict[str, float]:
-        """Two and four grooms that play in one place and shade each other, beside the same grooms
-        that each shade only themselves."""
+        """Two and four grooms that play in one place and shade each other, relative to the same
+        grooms shading only themselves."""
         found: dict[str, float] = {}
         for number in (2, 4):
             kinds = [[GroomPass() for _ in range(number)] for _ in range(2)]
@@ -232,7 +232,8 @@ class Stage:
             self.draw(own.strands, each, 0.0, others=others, is_moving=True)
 
     def least(self, *works: Callable[[], None]) -> list[float]:
-        """[s] of each, the least of all rounds but the first, in which they take turns."""
+        """Seconds of each: the minimum over rounds in which they take turns, without the first
+        round."""
         rounds = [[self.took(work) for work in works] for _ in range(ROUNDS + 1)]
         return np.min(rounds[1:], axis=0).tolist()
 

@@ -1,15 +1,13 @@
-"""How long the window stands still: the main thread's stops while hair is shown, played and set.
+"""How long the main thread blocks the window while hair is shown, played and edited.
 
-The sample scene at default settings, then with 100,000 children. For each thing that an artist
-does, the longest stop of the main thread, in wall time and in its own processor time: on a machine
-that does other work as well the latter is what counts. Drawing is left out. Play waits for its
-collider as in a window; the ticks of that time are `waiting`. Hair is made in a thread: its
-`arrives` is what the main thread does to show it, and the heartbeat, a millisecond of sleep, is as
-late as the thread holds it up; to be compared with the one without a thread, late by what else runs
-on the machine. Its second number leaves out the time in which it waited for a processor, where the
-system (Linux) tells that: what is left is the thread's.
-
-Programs are compiled before: `compile` times that.
+The sample scene with default settings, then with 100,000 children. For each action of an artist,
+the longest block of the main thread, in wall time and in its own processor time; under other load
+the latter counts. Drawing is left out. Play waits for its collider as in a window; the ticks of
+that time are `waiting`. Hair is made in a thread: `arrives` is the main thread's work to show it.
+The heartbeat is a sleep of a millisecond, which the thread delays; it is to be compared with the
+heartbeat without a thread, which only other load delays. Its second number excludes the wait for a
+processor, if the system (Linux) reports it: the rest is due to the thread. Programs are compiled
+before, which the bench `compile` times.
 
 make bench NAME=freeze
 """
@@ -38,11 +36,11 @@ from hairloom.addon.blender.sessions.session import Session
 from hairloom.addon.blender.setup.sample_scene import add_sample_scene
 
 REFERENCE = "a heartbeat without a thread, and what Blender itself takes"
-#: longest stop of the main thread [ms processor]: by default, while 100,000 children come, and
-#: while these are combed
+#: longest block of the main thread [ms of processor time]: with default settings, while 100,000
+#: children arrive, and while these are combed
 AT_MOST = {"default_ms": 40.0, "arrival_100k_ms": 100.0, "combing_100k_ms": 100.0}
 RATE, FRAMES, MOVES, BEATS = 24.0, 24, 8, 2000
-#: group of settings -> a slider of it and what it is dragged to
+#: section and name of a slider -> the value that it is dragged to
 SLIDERS = {
     "dynamics.damping": 0.3,
     "shading.sparkle": 0.5,
@@ -52,7 +50,7 @@ SLIDERS = {
 
 
 class Stops:
-    """The longest stop of each kind, (wall, processor) [ms]."""
+    """The longest block of each kind, (wall, processor) [ms]."""
 
     def __init__(self) -> None:
         self.longest: dict[str, tuple[float, float]] = {}
@@ -64,7 +62,8 @@ class Stops:
         return result
 
     def beat(self, kind: str, pause: float = 0.001) -> None:
-        """A sleep of this long [s]: how late it is, and without its wait for a processor."""
+        """Note how late a sleep of this long [s] ends, with and without its wait for a
+        processor."""
         begin, queued = time.perf_counter(), queued_time()
         time.sleep(pause)
         late = time.perf_counter() - begin - pause
@@ -76,7 +75,8 @@ class Stops:
         self.longest[kind] = max(known[0], now[0]), max(known[1], now[1])
 
     def figures(self) -> dict[str, float]:
-        """Of each kind, and what has a limit: the longest [ms processor] of the main thread."""
+        """The blocks of each kind, and the figures with limits: the longest [ms of processor
+        time]."""
         ours = {
             kind: cpu
             for kind, (_, cpu) in self.longest.items()
@@ -119,7 +119,7 @@ def main() -> int:
         previews.advance(depsgraph, 1.0 / RATE)
 
     def arrive(kind: str) -> None:
-        """Frames until the hair that is being made is shown, and one with it."""
+        """Play frames until hair in the making is shown, and one with it."""
         begin = time.perf_counter()
         while session.is_pending:
             due = time.perf_counter() + 1.0 / RATE
@@ -177,7 +177,7 @@ def main() -> int:
 
 
 def compile_programs(form: str) -> None:
-    """Have the sample scene play once, and forget it with all that was found on its head."""
+    """Play the sample scene once, and drop it with all that is cached of its head."""
     scene, hair = at_once(add_sample_scene(()))
     hair.hairloom.dynamics.device = form
     depsgraph = scene.view_layers[0].depsgraph
@@ -198,7 +198,8 @@ def _slug(kind: str) -> str:
 
 
 def queued_time() -> float:
-    """How long this thread has waited for a processor so far [s]; 0 where nobody tells."""
+    """How long this thread has waited for a processor so far [s]; 0 if the system does not report
+    it."""
     told = Path("/proc/thread-self/schedstat")
     return int(told.read_text().split()[1]) / 1e9 if told.exists() else 0.0
 

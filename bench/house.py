@@ -1,8 +1,10 @@
-"""Figures of the house: arrows, circles, what changes, dead code, words, how long checks take.
+"""The state of the code: imports between rooms, what a new setting touches, dead code, retired
+words, and how long checks take.
 
-They come from the tree itself, the minutes from out/timings.json, where `make test` and `.ci/run`
-leave them, and the runs under load from bench/load_runs.json; `--run` runs these three first,
-which takes hours. What has not been measured is null. Exit code 1: a limit is missed.
+Figures are computed from the tree itself; the minutes come from out/timings.json, where `make test`
+and `.ci/run` write them, and the runs under load from bench/load_runs.json; `--run` runs these
+three first, which takes hours. A figure that was not measured is null. Exit code 1: a limit is
+missed.
 
 make bench NAME=house
 """
@@ -23,7 +25,7 @@ from hairloom.addon.parameters import ALL_SETTINGS
 
 REFERENCE = "the tree, and the last runs of make test and of all that a commit has to pass"
 SECTIONS = {section: each.__name__ for section, each in ALL_SETTINGS.items()}
-#: figure -> the most that it may be
+#: figure -> upper limit
 AT_MOST = {
     "arrows_up": 0,
     "import_circles": 0,

@@ -1,13 +1,13 @@
-"""How much of the GPU's memory hair takes: 500,000 strands in a picture of 3840 x 2160 pixels.
+"""GPU memory of hair: 500,000 strands in a picture of 3840 x 2160 pixels.
 
-Grown hair on the built-in head with deep shadows of three lights, as a still draws it. All
-textures and buffers count, as large as they are asked for.
+Grown hair on the built-in head with deep shadows of three lights, as a still draws it. All textures
+and buffers count with the size requested.
 
-bytes_500k_4k     the most that there was at once, with the budget that is the default
-missing           fragments that had no room; parts: in how many the strands were drawn
-bytes_small       the same with 100,000 strands at 1280 x 720, and a budget of 128 MB
-small_difference  how far that picture is from one with the default budget, without shadow maps,
-                  which may be smaller
+bytes_500k_4k     peak memory, with the default budget
+missing           fragments without room; parts: the number of parts that strands were drawn in
+bytes_small       memory in use with 100,000 strands at 1280 x 720, and a budget of 128 MB
+small_difference  largest difference of that picture from one with the default budget; without
+                  shadow maps, which may be smaller
 
 make bench NAME=memory          a quarter of an hour without a GPU
 tools/bench.py memory small     one part: large or small
@@ -68,7 +68,7 @@ def main(names: list[str]) -> int:
 
 
 def drawn(strand_count: int, width: int, height: int, shadows: str) -> tuple[np.ndarray, Any]:
-    """The picture, and how its layers had room."""
+    """The picture, and the statistics of its layers."""
     shown, camera = grown_hair(strand_count, width / height, 1.0)
     lights, volume = three_point_lights(camera.view), VolumeSettings(shadows=shadows)
     passes = MeshPass(), StrandPass()

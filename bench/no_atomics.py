@@ -1,4 +1,4 @@
-"""Strands and deep opacity maps where images have no atomics, beside those with.
+"""Strands and deep opacity maps without image atomics, beside those with.
 
 Sintel's own hair on her head, with deep shadows and scattering, and the ball of
 _volume_transparency for the cost of a frame.
@@ -38,13 +38,13 @@ from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
 REFERENCE = "the same with image atomics"
 SHEET = REPOSITORY / "out" / "no_atomics.png"
 SIZE, SAMPLES, ROUNDS = 256, 16, 7
-#: [m], as in the file
+#: radius of strands [m], as in the file
 RADIUS = 4.0e-5
 LIGHTS = (
     Light.sun((-0.2, -0.75, 0.6), (1.0, 1.0, 1.0), 3.0),
     Light.sun((0.7, -0.2, 0.5), (1.0, 0.9, 0.8), 1.0),
 )
-#: figure -> most that it may be
+#: figure -> upper limit
 AT_MOST = {"no_atomics_flip": 0.02, "hashed_cost": 1.0, "deep_difference": 1.0}
 
 
@@ -62,7 +62,7 @@ def main() -> int:
 
 
 def shown(sitter: Sitter, transparency: str) -> Snapshot:
-    """Sintel with the volume of a new groom, as Marschner's model has her."""
+    """Sintel's hair in Marschner's model, with default volume settings."""
     return Snapshot(
         sitter.strands,
         np.full(sitter.strands.shape[:2], RADIUS, np.float32),
@@ -76,8 +76,8 @@ def shown(sitter: Sitter, transparency: str) -> Snapshot:
 
 
 def picture_figures(sitter: Sitter) -> dict[str, float]:
-    """no_atomics_flip: mean FLIP of 16 samples without atomics beside 16 with; layers_flip: of 16
-    other samples with. Those on _hair: over the pixels that hair covers.
+    """no_atomics_flip: mean FLIP of 16 samples without atomics against 16 with; layers_flip: of 16
+    other samples with. Names with _hair: over the pixels that hair covers.
     """
     layers = accumulated(sitter, 0)
     other = accumulated(sitter, SAMPLES)
@@ -105,13 +105,13 @@ def flip_map(one: Floats, other: Floats) -> Floats:
 
 
 def hair_mask(sitter: Sitter) -> Any:
-    """The pixels of which hair alone covers some."""
+    """A mask of the pixels that hair, without the head, covers in part."""
     bald = replace(shown(sitter, "layers"), meshes=())
     return render_image(bald, sitter.camera, SIZE, SIZE, 1)[..., 3] > 0.0
 
 
 def accumulated(sitter: Sitter, first: int) -> Floats:
-    """The mean of samples from this one on, as the render engine takes them."""
+    """The mean of SAMPLES samples, from this one on, as the render engine takes them."""
     passes, hair, total = (MeshPass(), StrandPass()), shown(sitter, "layers"), np.zeros(1)
     places = jitters(first + SAMPLES, 1.5)
     for number in range(first, first + SAMPLES):
@@ -121,7 +121,7 @@ def accumulated(sitter: Sitter, first: int) -> Floats:
 
 
 def map_figures(sitter: Sitter) -> dict[str, float]:
-    """deep_difference: the most that a channel of opaque strands in the maps' light differs by, in
+    """deep_difference: largest difference of a channel of opaque strands, lit through the maps, in
     1/255 of the brightest.
     """
     pictures = []
@@ -134,7 +134,7 @@ def map_figures(sitter: Sitter) -> dict[str, float]:
 
 
 def cost_figures() -> dict[str, float]:
-    """hashed_cost: the least time of a frame over that of layers; they take turns."""
+    """hashed_cost: minimum time of a frame over that with layers; they take turns."""
     width, height = 800, 600
     camera, ball = _ball(width, height)
     ways = {

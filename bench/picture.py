@@ -1,11 +1,9 @@
-"""Hair over the pictures of EEVEE and Cycles, and how a camera blurs it, beside Cycles.
+"""Hair over the pictures of EEVEE and Cycles, and its blur by the camera, beside Cycles.
 
-The sample scene as it comes, its hair laid over by *Hairloom Hair*. Where neither hair nor its
-shadow is, the picture has to be the engine's own; where our raster of a mesh and the engine's depth
-disagree, hair is cut off wrongly. Depth of field and motion blur are compared by what the same
-strands, with the same widths, cover of each pixel.
-
-What the parts environment and soft_shadows compare is said in their modules.
+The sample scene, its hair composited by *Hairloom Hair*. Where neither hair nor its shadow is, the
+picture must equal the engine's own; where our depth of a mesh and the engine's disagree, hair is
+cut off wrongly. Depth of field and motion blur are compared by the coverage of each pixel by the
+same strands, with the same widths. For the parts environment and soft_shadows see their modules.
 
 Exit code 1: a limit is missed.
 
@@ -38,14 +36,14 @@ from hairloom.addon.blender.setup.sample_scene import add_sample_scene
 
 REFERENCE = "the engine without hair; Cycles with the same curves"
 WIDTH, HEIGHT = 960, 720
-#: few, since all is done on the CPU here
+#: few, since everything runs on the CPU here
 ENGINE_SAMPLES, HAIR_SAMPLES, BLUR_SAMPLES = 8, 8, 64
 ENGINES = {"eevee": "BLENDER_EEVEE", "cycles": "CYCLES"}
-#: how far apart depths may be, as a fraction, and of what size the pictures of blur are [pixels]
+#: relative tolerance of depths, and size of the pictures of blur [pixels]
 DEPTH_TOLERANCE, BLUR_SIZE = 0.01, 320
 #: size of a picture that is not timed [percent]
 WARMING_UP = 10
-#: figure -> the most that it may be
+#: figure -> upper limit
 AT_MOST = {
     **{f"over_{engine}_depth_mismatch_percent": 0.1 for engine in ENGINES},
     **{f"over_{engine}_outside_difference": 0.0 for engine in ENGINES},
@@ -94,7 +92,7 @@ def rendered(scene: Any) -> tuple[Passes, float]:
 
 
 def _passes_in(path: Path) -> Passes:
-    """By name; what was composited stands for what was rendered."""
+    """Passes by name; the composited one replaces the rendered one."""
     found: Passes = {}
     file, number = oiio.ImageInput.open(str(path)), 0
     while file.seek_subimage(number, 0):
@@ -117,9 +115,9 @@ def without(hair: Any) -> Iterator[None]:
 
 
 def over(name: str) -> dict[str, Any]:
-    """outside_difference: the most that a pixel without hair and shadow differs by.
-    depth_mismatch_percent: of the pixels, where the mesh that hides hair is elsewhere.
-    seconds_ratio: of one frame to 1.5 times the engine's own and that of the hair alone.
+    """outside_difference: largest difference of a pixel without hair and shadow.
+    depth_mismatch_percent: pixels where our depth of meshes and the engine's disagree.
+    seconds_ratio: time of a frame over 1.5 times the engine's own plus that of hair alone.
     """
     scene, hair = scene_with_hair()
     scene.render.engine = ENGINES[name]
@@ -154,7 +152,7 @@ def over(name: str) -> dict[str, Any]:
 
 
 def blur() -> dict[str, Any]:
-    """Mean FLIP of what strands cover, over the pixels where either engine has hair."""
+    """Mean FLIP of the coverage of strands, over the pixels where either engine has hair."""
     scene, hair = scene_with_hair()
     scene.render.resolution_x = scene.render.resolution_y = BLUR_SIZE
     scene.render.film_transparent = True

@@ -1,15 +1,15 @@
 """One frame of the preview, 11,400 strands of 16 points at 960 x 720, stage by stage.
 
-The reference draws the same strands as plain lines with the gpu module's own shader, uploaded
-again each frame as a batch: what an add-on does that follows the module's examples. Ours draws
+The reference draws the same strands as plain lines with the gpu module's own shader, uploaded again
+each frame as a batch, as an add-on would after the module's examples. Ours draws
 ribbons with width and adaptive detail, lit by three lights and with two shifted highlights.
 
-The same frames once more with guides that stay on the GPU: `gpu_simulate_ms` and `gpu_ride_ms`
-end when the GPU has done it, `gpu_draw_ms` has nothing to pack and to upload. `cpu_frame_ms` and
-`gpu_frame_ms` are the three stages of either way together.
+The same frames again with guides that stay on the GPU: `gpu_simulate_ms` and `gpu_ride_ms` end when
+the GPU is done, `gpu_draw_ms` neither packs nor uploads. `cpu_frame_ms` and `gpu_frame_ms` are the
+sums of the three stages.
 
-`draw_ratio` is how fast ours draws beside the lines. Its limit is half of what a software driver
-found when it was set; times have none, since each machine has its own.
+`draw_ratio` is the time of the lines over ours. Its limit is half of its value on a software driver
+when it was set; times have no limits, since they depend on the machine.
 """
 
 import statistics
@@ -77,13 +77,13 @@ class Lines:
 
 
 def simulated(solver: ComputeSolver, pose: rig_flow.Pose) -> None:
-    """A frame of dynamics; the guides are read back, 0.05 ms, so that it is over."""
+    """Simulate a frame, and wait for its end by reading the guides back, 0.05 ms."""
     alone(solver.steps(motion_flow.FrameInput(pose, (), DynamicsSettings(), GRAVITY, 1.0 / 60.0)))
     solver.guides()
 
 
 def ridden(solver: ComputeSolver, snapshot: Snapshot) -> Snapshot:
-    """The snapshot with all strands on the GPU, done when they can be read back, 0.1 ms."""
+    """The snapshot with all strands on the GPU; reading them back, 0.1 ms, waits for the end."""
     shown = solver.shown(snapshot)
     assert shown.device_points is not None
     shown.device_points.texture.read()

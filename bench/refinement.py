@@ -1,4 +1,5 @@
-"""Refinement: strands carried on the CPU beside Blender's node, detail in the picture or fixed.
+"""Refinement: strands carried on the CPU beside Blender's node; adaptive and fixed detail in the
+picture.
 
 See `_refinement_node` and `_refinement_views` for what is compared with what.
 
@@ -15,7 +16,7 @@ from _refinement_views import view_figures
 from _report import measured, report, start
 
 REFERENCE = "Blender's Interpolate Hair Curves node; one piece a segment; the exact curve"
-#: figure -> the most, and the least, that it may be
+#: figure -> upper limit, and lower limit
 AT_MOST = {
     "error_px_max": 0.5,
     "vertices_undivided_ratio": 1.5,

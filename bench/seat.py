@@ -1,19 +1,19 @@
-"""The artist's seat: what leaves Hairloom for Blender's own tools is what was drawn.
+"""An artist's view: whether *Make Real* keeps the picture, and how long edits and jobs take.
 
-`make_real_flip` compares the sample scene, rendered by Hairloom with the settings that ship, with
-the same scene after *Make Real*: Blender's own curves, drawn again. FLIP is Andersson et al.'s
-(2020), over the pixels that hair changes. `make_real_seconds` is processor time.
-`real_light_percent` is how much more or less light, by channel, Cycles finds on these curves with
-their material than Hairloom did on the hair that they were, over all pixels of hair, for the worst
+`make_real_flip` compares the sample scene, rendered by Hairloom with default settings, with the
+same scene after *Make Real*: Blender's own curves, rendered again. FLIP (Andersson et al. 2020) is
+averaged over the pixels that hair changes. `make_real_seconds` is processor time.
+`real_light_percent` is the relative difference in light between these curves with their material in
+Cycles and the hair in Hairloom before, over all pixels of hair, for the worst channel and the worst
 of three colours.
 
-`comb_ms` is a stroke on long straight hair of 20,000 children until all strands have followed,
-`comb_all_ms` until the rest has come, `comb_light_ms` until that has its own light, `comb_undo_ms`
-the stroke taken back; see `_combing`.
-`grow_edit_ms` is a setting of growth given to 4,095 strands until these and their children follow;
-see `_growing`.
-`silent_seconds_max` is the longest that a job keeps the window from saying how far it is, and from
-hearing Esc; see `_jobs`.
+`comb_ms` is the time of a stroke on long straight hair of 20,000 children until the strands follow,
+`comb_all_ms` until all strands are there, `comb_light_ms` until they have their own light,
+`comb_undo_ms` that of the stroke's undo; see `_combing`.
+`grow_edit_ms` is the time of an edit of the growth of 4,095 strands until these and their children
+follow; see `_growing`.
+`silent_seconds_max` is the longest time for which a job keeps the window from showing progress and
+from handling Esc; see `_jobs`.
 
 make bench NAME=seat                some five minutes
 tools/bench.py seat comb            combing alone
@@ -53,11 +53,11 @@ AT_MOST = {
     "silent_seconds_max": 0.5,
 }
 SIZE = 480
-#: what else is compared, without a limit: a look with all that a colour for each strand has to hold
+#: also compared, without a limit: a look whose colours vary from strand to strand and along them
 TINTED = {"tip_tint": 0.5, "grey_fraction": 0.1}
-#: what hair changes where it is: as a picture shows it, and in light
+#: least change of a pixel that shows hair: as displayed, and in linear light
 _CHANGED, _SEEN = 0.01, 0.03
-#: of Make Real in Cycles: width and height of a picture, samples of ours, paths a pixel, bounces
+#: of Make Real in Cycles: width and height of a picture, our samples, paths per pixel, bounces
 CYCLES_SIZE, SAMPLES, PATHS, BOUNCES = 200, 4, 32, 64
 LOOKS = "black", "brown", "blond"
 
@@ -112,7 +112,7 @@ def _light_in_cycles(look: str) -> float:
 
 
 def _sample(look: str, size: int) -> tuple[bpy.types.Scene, bpy.types.Object]:
-    """The sample scene in this look, to be drawn so large."""
+    """The sample scene in this look, for pictures of this size."""
     scene, hair = at_once(add_sample_scene((f"looks/{look}",), "light"))
     scene.render.resolution_x = scene.render.resolution_y = size
     return scene, hair
@@ -125,7 +125,7 @@ def _made_real(scene: bpy.types.Scene, hair: bpy.types.Object) -> bpy.types.Obje
 
 
 def _picture(scene: bpy.types.Scene, kind: str = "PNG") -> np.ndarray:
-    """(SIZE, SIZE, 3): as an artist sees it, or linear light as OPEN_EXR."""
+    """The rendered picture, (size, size, 3): as displayed, or linear light as OPEN_EXR."""
     scene.render.image_settings.file_format = kind
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "picture"

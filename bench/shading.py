@@ -19,7 +19,7 @@ from _shading_glsl import glsl_relative_error
 from _shading_reference import reference_figures
 
 REFERENCE = "rays through a dielectric cylinder; Cycles' Principled Hair (Chiang); numpy in float64"
-#: figure -> the most, and the least, that it may be
+#: figure -> upper limit, and lower limit
 AT_MOST = {
     "lobe_error_*": 0.01,
     "furnace_worst": 1.01,

@@ -1,7 +1,7 @@
-"""First sight: what grooms that nobody here made look like with no setting changed.
+"""First sight: how third-party grooms look with default settings.
 
-What is compared with what: see `_sight_missing`, `_sight_cover`, `_sight_pictures` and
-`_sight_patches`.
+See `_sight_missing`, `_sight_cover`, `_sight_pictures` and `_sight_patches` for what is compared
+with what.
 
 make bench NAME=sight               some twenty minutes
 tools/bench.py sight cover          one part: missing, lost, cover, scale, count, cycles or
@@ -22,7 +22,7 @@ from _sight_patches import patch_figures
 from _sight_pictures import count_figures, cycles_figures, scale_flip
 
 REFERENCE = "hashed strands, which keep no lists; strands as wide as they are apart; Cycles"
-#: figure -> the most, and the least, that it may be
+#: figure -> upper limit, and lower limit
 AT_MOST = {
     "missing_percent": 0.0,
     "lost_curves": 0,
@@ -32,7 +32,7 @@ AT_MOST = {
     "cycles_flip_hair": 0.15,
 }
 AT_LEAST = dict.fromkeys((f"cover_{name}" for name in GROOMS), 0.9)
-#: strands, width and height of the picture, how much wider the strands are than they grow
+#: strands, width and height of the picture, factor on the widths with which strands grow
 CROWDED = (
     (100_000, 1920, 1440, 1.0),
     (200_000, 960, 720, 1.0),
@@ -46,7 +46,8 @@ def missing() -> dict[str, float]:
 
 
 def covers() -> dict[str, float]:
-    """Of each groom as it is, and a thousand times smaller and larger; the worst counts."""
+    """Figures of each groom: the worst of its own size, and of it a thousand times smaller and
+    larger."""
     return {
         f"cover_{name}": min(cover(read(), name, factor) for factor in (1.0, 1e-3, 1e3))
         for name, read in GROOMS.items()

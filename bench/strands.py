@@ -1,20 +1,20 @@
-"""What is promised of hair, of all strands as they are drawn: lengths, shapes, and the head.
+"""How well all drawn strands keep their lengths and shapes, and stay out of the head.
 
-Sintel, the TressFX ponytail, the built-in groom, and 8,000 coils of 20 turns, by default settings
-and without children, which would hide the curves that there are. Two seconds of the demo's shake
-at 24 frames a second, and of one of 5 Hz and 3.1 m/s at 60. Each strand counts by its worst frame.
-Depths are distances from the mesh's own triangles, of points inside of it that were outside at
-rest, as if the hair's median length were 25 cm: grooms come in any unit. So are jumps: by how much
-what leading out adds to where strands ride changes from one frame to the next. A jump is a flip if
-it is as far in one of 16 parts of the way between the two frames: the others go there steadily. It
-is a flip of leading out if where the strand rides does not jump as far in that part.
+Sintel, the TressFX ponytail, the built-in groom, and 8,000 coils of 20 turns, with default settings
+and without children, which would hide the curves. Two seconds of the demo's shake at 24 frames a
+second, and of a shake of 5 Hz and 3.1 m/s at 60. Each strand counts by its worst frame. Depths are
+distances from the mesh's triangles, of points inside the mesh that are outside at rest, scaled as
+if the hair's median length were 25 cm: grooms come in any unit. So are jumps: changes, from one
+frame to the next, in the displacement that leading out adds to where strands ride. A jump is a flip
+if it exceeds the same limit within one of 16 parts of the way between the two frames; otherwise the
+motion is steady. It is a flip of leading out if where the strand rides does not jump in that part.
 
-Cards of Sintel's hair that ride on the guides in the demo's shake: how deep vertices are that were
-outside at rest, and how many cards have any that is deeper than a millimetre; how much deeper the
-others are than at rest; by how much cards change their lengths, along their middles, and rows their
-widths; how far rows fold; and how many cards leading out has jump, as of strands.
+Cards of Sintel's hair that ride on the guides in the demo's shake: how deep vertices are that are
+outside at rest, and how many cards have any deeper than a millimetre; how much deeper the others
+are than at rest; by how much cards change their lengths, along their middles, and rows their
+widths; how far rows fold; and how many cards jump by leading out, as for strands.
 
-What it costs, of Sintel: see `_strands_cost`.
+For the cost, with Sintel's hair, see `_strands_cost`.
 
 Exit code 1: a limit is missed.
 
@@ -61,13 +61,13 @@ from hairloom.addon.strands.closest_point import ClosestPointSearch
 REFERENCE = "strands at rest, and the triangles of the head"
 SECONDS, FPS, FAST_FPS = 2.0, 24.0, 60.0
 MEDIAN_LENGTH = 0.25  # [m]
-JUMP = 0.025  # [m], what leading out adds to the path of a strand in a frame, that is seen
-#: frames from one to the next in which flips are looked for, and the parts of each
+JUMP = 0.025  # [m], visible change in a frame of what leading out adds
+#: flips are looked for once in this many frames, in this many parts of the way to the next
 FLIPS_EVERY, PARTS = 6, 16
 GRAVITY = np.array([0.0, 0.0, -9.81])
-#: of the coils [m]; points of each before it is made ready
+#: number, turns, radius and length [m] of coils; points of each before preparation
 COILS, TURNS, COIL_RADIUS, COIL_LENGTH, COIL_POINTS = 8000, 20, 0.004, 0.15, 400
-#: figure -> the most, and the least, that it may be
+#: figure -> upper limit, and lower limit
 AT_MOST = {
     "length_p99_percent": 0.2,
     "length_worst_percent": 1.0,
@@ -91,7 +91,7 @@ AT_LEAST = {"coil_length_kept": 0.995}
 
 
 def coils() -> Pair:
-    """Straight out of the built-in head's scalp."""
+    """Coils that stand straight out of the built-in head's scalp."""
     strands, head = GROOMS["built_in"]()
     assert head is not None
     surface = built_in_head().surface
@@ -152,7 +152,7 @@ def pose_of(rig: Rig, matrix: Floats) -> Pose:
 
 
 def shaken(rig: Rig, shake: Any, fps: float) -> dict[str, float]:
-    """Of all strands, each by its worst frame."""
+    """Figures of all strands, each by its worst frame."""
     assert rig.head is not None
     collider = field_of(rig.head, DynamicsSettings(), place="head")
     search = ClosestPointSearch(rig.head)
@@ -199,7 +199,7 @@ def shaken(rig: Rig, shake: Any, fps: float) -> dict[str, float]:
 
 
 def _farthest(displacement: Floats, offsets: Ints) -> Floats:
-    """Of each strand the farthest that any of its points goes (point_count, 3), (strand_count,)."""
+    """The largest displacement (point_count, 3) of a point of each strand, (strand_count,)."""
     return np.asarray(np.maximum.reduceat(np.linalg.norm(displacement, axis=1), offsets[:-1]))
 
 
@@ -211,14 +211,14 @@ def _farthest_in_parts(
     correction: Floats,
     jump: float,
 ) -> Floats:
-    """Of each strand by how much what leading out adds to it changes, at most, in one part of the
-    way between two frames, on which guides and head go straight; and the same of those parts in
-    which the strand does not jump where it rides, as seen from the head, (2, strand_count).
+    """The largest change of each strand's displacement by leading out, in one part of the way
+    between two frames, on which guides and head move straight; and the same over the parts in which
+    the strand does not jump where it rides, in the head's space, (2, strand_count).
 
     Args:
-        led: in the frame before.
-        correction: (point_count, 3), what it adds then.
-        jump: how far a jump is [m].
+        led: of the frame before.
+        correction: (point_count, 3), the displacement by leading out in the frame before.
+        jump: least size of a jump [m].
     """
     (before, now), offsets = moments, rig.strands.offsets
     farthest = np.zeros((2, rig.strands.strand_count))
@@ -247,7 +247,7 @@ def _farthest_in_parts(
 
 
 def _as_head(points: Floats, matrix: Floats) -> Floats:
-    """Points (n, 3) of the world as seen from the head."""
+    """World points (n, 3) in the head's space."""
     seen: Floats = (points - matrix[:3, 3]) @ matrix[:3, :3]
     return seen
 
@@ -255,8 +255,9 @@ def _as_head(points: Floats, matrix: Floats) -> Floats:
 def _inside(
     points: Floats, matrix: Floats, collider: Collider, head: Surface
 ) -> tuple[Ints, Floats]:
-    """Which points are in the mesh itself, and where these are at rest: of those in its field,
-    which holds all of it but a twentieth of a cell, those that it winds around."""
+    """Indices of the points inside the mesh, and their places with the head at rest. Candidates are
+    the points inside its distance field, which misses the mesh by a twentieth of a cell at most; of
+    these the mesh must wind around a point."""
     posed = (PosedCollider(collider, matrix, matrix),)
     index = np.flatnonzero(signed_distance(points, posed, 0.01)[0] < 0.0)
     local = ((points[index] - matrix[:3, 3]) @ matrix[:3, :3]).astype(np.float32)
@@ -265,12 +266,13 @@ def _inside(
 
 
 def still_and_turned(rig: Rig) -> dict[str, float]:
-    """Errors at rest [m], and of head and guides that turn as one, by the median length."""
+    """The error at rest [m], and that of a rigid turn of head and guides, over the median
+    length."""
     rest = motion_flow.strands_at(rig, rig.rest_pose, rig.guide_grid)
     matrix = shake_matrix(np.zeros(3), 0.3)
     matrix[:3, 3] = 0.3, -0.2, 0.1
     assert rig.head is not None
-    # in double precision, so that only what riding does is seen
+    # in double precision, so that only errors of riding show
     turned = rig.head.positions.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
     guides = rig.guide_grid.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
     now = motion_flow.strands_at(rig, Pose(turned, matrix), guides)
@@ -304,7 +306,7 @@ def coil_figures(rig: Rig, made_of: StrandSet) -> dict[str, float]:
 
 
 def card_figures(rig: Rig) -> dict[str, float]:
-    """Of cards in the shake, each vertex and each card by its worst frame."""
+    """Figures of cards in the shake, each vertex and each card by its worst frame."""
     assert rig.head is not None
     collider = field_of(rig.head, DynamicsSettings(), place="head")
     mesh = result_of(card_build_steps(rig, SettingsMap())).finest
@@ -380,7 +382,7 @@ def _timed(
 
 
 def _middle_lines(mesh: CardMesh, cards: CardBinding) -> Ints:
-    """Of each row the vertex in its middle: Sintel's cards have three in a row."""
+    """The middle vertex of each row; Sintel's cards have three in a row."""
     order = np.lexsort((mesh.uv[:, 0], cards.row))
     count = np.bincount(cards.row)
     assert (count % 2 == 1).all()
@@ -396,10 +398,10 @@ def _row_edges(mesh: CardMesh, cards: CardBinding) -> Ints:
 
 
 def _folds(points: Floats, edges: Ints, lines: Ints) -> Floats:
-    """By how much the halves of each row turn from each other [degrees], (row_count,).
+    """The angle by which the halves of each row fold [degrees], (row_count,).
 
     Args:
-        edges: see `_row_edges`; two a row. lines: see `_middle_lines`.
+        edges: see `_row_edges`; two per row. lines: see `_middle_lines`.
     """
     row = np.full(len(points), -1)
     row[lines] = np.arange(len(lines))

@@ -1,20 +1,20 @@
-"""What is promised of each hairstyle that ships, added by the artist's own button to a new head; of
-fur, to Blender's monkey.
+"""What each shipped hairstyle must fulfil, added by the artist's button to a new head, or fur to
+Blender's monkey.
 
-- seconds: from the click until all hair stands, in quick light as the window shows it first, and
-  seconds_until_lit: until it has its own light; the head and its distance field are there.
-- bald: how much of the scalp inside of the hairline shows through from six sides, where hair covers
-  less than a quarter of a square of 2 mm; what counts is the width of all strands before the skin.
-- inside: strands that are in the head's own triangles, by their winding number, by more than 1 mm.
-- length: how far the strands that are drawn are from the curves that Blender's nodes make.
-- fit_distance: how far roots are from other heads, as Blender's own search finds it, and how many
-  strands are in these: MakeHuman's base mesh shaped as another person, Sintel's, and one
-  like a scan of that person: few triangles with noise and holes, turned, in centimetres.
-- edit_ms: a stroke over curls, 20,000 of them by Blender's nodes and our children, until all
-  strands have followed; paint_ms: a dab on the density of 20,000 children, until they stand where
-  they are painted; paint_all_ms: all that follows from it; paint_light_ms: its own light; see
+- seconds: from the click until all hair is shown, in the quick light that the window shows first;
+  seconds_until_lit: until it has its own light. The head and its distance field exist before.
+- bald: how much of the scalp inside the hairline shows through from six sides: squares of 2 mm of
+  which hair covers less than a quarter, by the total area of strands in front of the skin.
+- inside: strands deeper than 1 mm in the head's mesh, by winding number.
+- length: difference in length of drawn strands from the curves that Blender's nodes make.
+- fit_distance: distance of roots from other heads, by Blender's own search; fit_inside: strands
+  inside these. They are MakeHuman's base mesh shaped as another person, Sintel's head, and one like
+  a scan of that person: few triangles with noise and holes, turned, in centimetres.
+- edit_ms: a stroke over curls, 20,000 of them by Blender's nodes and our children, until the
+  strands follow; paint_ms: a dab on the density of 20,000 children, until they follow;
+  paint_all_ms: until all strands are there; paint_light_ms: until they have their own light; see
   `_combing`.
-- cards_coverage, cards_color: cards beside the strands, see `_styles_cards`. Only when asked for: a
+- cards_coverage, cards_color: cards beside the strands, see `_styles_cards`. Only on request: a
   minute for each style.
 
 Exit code 1: a limit is missed.
@@ -61,7 +61,7 @@ from hairloom.addon.strands import StrandSet, Surface
 from hairloom.addon.strands.closest_point import ClosestPointSearch
 
 REFERENCE = "the curves that Blender evaluates, and the triangles of the built-in head"
-#: how many there are at least: heads of hair, and brows, lashes, beards and fur
+#: least numbers of hairstyles: heads of hair; and brows, lashes, beards and fur
 AT_LEAST = {"heads": 16, "extras": 7}
 AT_MOST = {
     "*_inside_percent": 0.0,
@@ -73,9 +73,9 @@ AT_MOST = {
     "*_cards_coverage_percent": 10.0,
     "*_cards_color_percent": 10.0,
 }
-#: the most skin that shows inside of the hairline [%]
+#: most skin that may show inside the hairline [%]
 BALD = 1.0
-#: styles whose name asks for skin that shows -> the most [%]; None: nothing is to be covered
+#: styles that are meant to show skin -> the most [%]; None: not checked
 BARE: dict[str, float | None] = {
     "buzz_cut": 3.0,
     "crop_fade": 12.0,
@@ -87,21 +87,21 @@ BARE: dict[str, float | None] = {
     "moustache": None,
 }
 SIDES = np.concatenate([np.eye(3), -np.eye(3)[:2], [[0.0, 0.7, 0.7]]])
-SQUARE, COVERED, STEP = 0.002, 0.25, 0.0006  # [m], of one, [m]
+SQUARE, COVERED, STEP = 0.002, 0.25, 0.0006  # [m], fraction of a square, [m]
 DEEP = 0.001  # [m]
 _CHUNK = 2_000_000
-#: styles that are put on other heads, and what is promised of them there
+#: styles that are added to other heads
 FITTED = ("long_straight", "curls", "full_beard")
 DATA = Path(os.environ.get("HAIRLOOM_DATA", Path(__file__).parents[2] / "shared" / "data"))
-#: of MakeHuman's base mesh: vertices of its skin, and the middle of its skull [m]
+#: of MakeHuman's base mesh: number of vertices of its skin, and the middle of its skull [m]
 SKIN, MAKEHUMANS_SKULL = 13380, np.array([0.0, -0.06, 0.735])
 
 
 def bald(strands: StrandSet, head: Surface, group: str) -> float:
-    """Of the squares in which skin of this group is nearest to the eye, how many show it [%].
+    """The percentage of squares with skin of this group in front that show it.
 
     Args:
-        group: of the built-in head; "": all of the surface.
+        group: vertex group of the built-in head; "": the whole surface.
     """
     weights = built_in_head().weights[group] if group else np.ones(len(head.positions))
     place, is_scalp = skin_samples(head, weights > 0.5)
@@ -162,7 +162,7 @@ def hair_samples(strands: StrandSet) -> tuple[Floats, Floats]:
 
 
 def inside_percent(strands: StrandSet, head: Surface, least: float = DEEP) -> float:
-    """Strands with a point in the mesh itself, deeper than this [m]."""
+    """The percentage of strands with a point in the mesh that is deeper than `least` [m]."""
     field = field_of(head, DynamicsSettings(), place="head")
     posed = (PosedCollider(field, np.eye(4), np.eye(4)),)
     index = np.flatnonzero(signed_distance(strands.points, posed, 10.0 * least)[0] < 0.0)
@@ -175,8 +175,8 @@ def inside_percent(strands: StrandSet, head: Surface, least: float = DEEP) -> fl
 
 
 def added(name: str) -> tuple[Rig, float, float, float]:
-    """The rig, the seconds until it stood and until it had its own light, and the worst error of
-    lengths [%]. Made beside, as in a window."""
+    """The rig, the seconds until it was shown and until it had its own light, and the worst error
+    of lengths [%]. It is made in a thread, as in a window."""
     scene_events.clear()
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     if grows_anywhere(named_hairstyle(name)):
@@ -190,7 +190,7 @@ def added(name: str) -> tuple[Rig, float, float, float]:
     begun = time.process_time(), time.perf_counter()
 
     def passed() -> float:
-        """Other work on this machine must not count; more than one core must not count twice."""
+        """The smaller of two times: other load must not count, nor several cores more than once."""
         return min(time.process_time() - begun[0], time.perf_counter() - begun[1])
 
     with patch.object(latest_job, "is_blocking", lambda: False):
@@ -210,7 +210,7 @@ def added(name: str) -> tuple[Rig, float, float, float]:
 
 
 def other_heads() -> Iterator[tuple[str, Any]]:
-    """Each in a new scene, selected; and its name."""
+    """The name and the object of each head, selected in a new scene."""
     for name, make in (("makehuman", _makehuman), ("sintel", _sintel), ("scan", _scan)):
         scene_events.clear()
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
@@ -269,8 +269,8 @@ def _scan() -> Any:
 
 
 def fit_figures() -> dict[str, float]:
-    """Of three styles on each of the other heads: the farthest root [mm on a head of 1 times the
-    built-in one's size], strands inside [%]; and the most seconds."""
+    """The worst of three styles on each of the other heads: distance of a root [mm, at the size of
+    the built-in head], strands inside [%], and seconds."""
     found: dict[str, float] = {}
     for style in FITTED:
         for name, head in other_heads():

@@ -1,7 +1,7 @@
 """Whether hair stays in a tie: a ponytail on the built-in head, shaken for two seconds.
 
-Of all strands as they are drawn: how far they leave their place in the ring (at most 1 mm), and how
-much longer or shorter they get; with a demo shake and one of 5 Hz, at 24 frames a second, so that
+Of all drawn strands: how far they leave their place in the ring (at most 1 mm), and how much they
+change their lengths; with the demo's shake and one of 5 Hz, at 24 frames a second, so that
 half a substep is left at every other frame. The last line is one JSON object; the exit status is 1
 if a limit is missed.
 
@@ -65,14 +65,14 @@ def main() -> int:
 
 
 def fast_shake(time: float) -> np.ndarray:
-    """0.1 m to either side, five times a second, smoothly begun."""
+    """0.1 m to either side, five times a second, with a smooth start."""
     matrix = np.eye(4)
     matrix[0, 3] = 0.1 * np.sin(np.pi * min(time, 0.5)) ** 2 * np.sin(10.0 * np.pi * time)
     return matrix
 
 
 def played(tail: Ponytail, shake, collider, *, compute: bool):
-    """What was seen of all strands, and some moments: (pose, strands)."""
+    """Figures of all strands, and some moments: (pose, strands)."""
     rig, settings = tail.rig, DynamicsSettings()
     solver = (ComputeSolver if compute else NumpySolver)(rig)
     offsets = rig.strands.offsets
@@ -112,7 +112,7 @@ def escape(tail: Ponytail, pose: rig_flow.Pose, strands: np.ndarray) -> np.ndarr
 
 
 def draw(tail: Ponytail, shown: list, path: Path) -> None:
-    """Twelve moments, from behind and aside."""
+    """Draw twelve moments, from behind at an angle."""
     from hairloom.addon.blender.base import images
     from hairloom.addon.blender.pictures.studio import FIELD_OF_VIEW, Studio
     from hairloom.addon.blender.properties.groom_settings import GroomSettings

@@ -2,8 +2,8 @@
 against sorting, the cost beside EEVEE.
 
 See `_volume_shadows`, `_volume_balls`, `_volume_sintel`, `_volume_transparency` and `_volume_cost`
-for what is compared with what. Limits are twice what was found when they were set; layers, whose
-order strands must not change, were the same to the last bit.
+for what is compared with what. Limits are twice the values measured when they were set; layers,
+which must not depend on the order of strands, were bit-identical.
 
 make bench NAME=volume          some minutes; writes out/volume_sheet.png and out/volume_sintel.png
 tools/bench.py volume cost        some parts: cost, shadows, transparency, balls, sintel

@@ -1,4 +1,4 @@
-"""Runs one benchmark, bench/NAME.py, with the package `hairloom` importable in it.
+"""Run one benchmark, bench/NAME.py, with the package `hairloom` importable.
 
 python tools/bench.py NAME [arguments of that benchmark]
 """
