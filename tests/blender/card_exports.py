@@ -1,4 +1,4 @@
-"""Exports of small cards, and what lies beside them."""
+"""Exports of small card meshes, and the files beside them."""
 
 from __future__ import annotations
 
@@ -46,7 +46,8 @@ def cards(output: Path, *more: str) -> int:
 
 
 def sidecar_of(path: Path) -> dict[str, Any]:
-    """The sidecar, which follows the schema and names files that are there."""
+    """The sidecar of an export, validated against the schema; all files that it names must
+    exist."""
     content = json.loads(path.with_suffix(".hairloom.json").read_text(encoding="utf-8"))
     jsonschema.Draft202012Validator(SCHEMA).validate(content)
     textures = content["textures"].values()

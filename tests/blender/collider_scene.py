@@ -1,4 +1,4 @@
-"""A scene of colliders, and what hair meets in it."""
+"""A scene of colliders, as obstacles of an object."""
 
 import bpy
 import numpy as np
@@ -12,7 +12,7 @@ COARSE = DynamicsSettings(collider_resolution=16)
 
 
 class Scene:
-    """An owner without a head, whose colliders are in a collection."""
+    """An owner without a head, with its colliders in a collection."""
 
     def __init__(self):
         self.colliders = bpy.data.collections.new("Colliders")
@@ -50,7 +50,8 @@ def depsgraph():
 
 
 def distance_now(posed, point):
-    """Of one place (3,) in the world at the frame's end, to first order."""
+    """The distance of a point (3,), world space, from a collider at the frame's end, to first
+    order."""
     inverse = np.linalg.inv(posed.matrix_now)
     local = transform_points(inverse, np.array(point, np.float32)[:, None])
     distance, gradient = posed.collider.distance(local)

@@ -1,4 +1,4 @@
-"""What the tests of Blender's side share: an empty scene, the extension, small grooms."""
+"""Fixtures of the Blender tests: an empty scene, the extension, small grooms."""
 
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -28,15 +28,16 @@ from hairloom.addon.strands import StrandSet  # noqa: E402
 
 @pytest.fixture(autouse=True, scope="session")
 def same_fields() -> Iterator[Any]:
-    """The distance field of a mesh is made once for all tests: it takes seconds, most tests have
-    the same head, and those in tests/pure show what a field is. It gives what makes one."""
+    """Build the distance field of each mesh once for all tests: a field takes seconds, most tests
+    use the same head, and tests/pure covers the fields themselves. Yields the original
+    `from_surface`."""
     made: dict[tuple[Any, ...], DistanceField] = {}
     make = DistanceField.from_surface
 
     def found(surface: Any, settings: Any, **place: str) -> DistanceField:
         corner = surface.positions[surface.triangles].astype(np.float64)
         volume = np.linalg.det(corner).sum() / 6.0
-        # Blender cuts even quads along this diagonal or that, from one mesh to the next
+        # Blender may triangulate equal quads along either diagonal
         shape = surface.positions.tobytes(), len(corner), round(volume, 9)
         key = (*shape, settings.collider_resolution)
         if key not in made:
@@ -50,8 +51,8 @@ def same_fields() -> Iterator[Any]:
 
 @pytest.fixture(autouse=True, scope="session")
 def made_before() -> Iterator[None]:
-    """What takes long and depends on its arguments alone is made once of the same ones: most tests
-    have the same hair on the same head, and those in tests/pure show what it is."""
+    """Cache slow functions that depend on their arguments alone: most tests use the same hair on
+    the same head, and tests/pure covers these functions."""
 
     def cells() -> tuple[int, int]:
         return density_grid._MAX_CELLS, skin_seen._CELLS
@@ -72,14 +73,14 @@ def made_before() -> Iterator[None]:
 
 @pytest.fixture(autouse=True)
 def empty_scene() -> None:
-    """A file with nothing in it, and nothing to undo."""
+    """An empty file with an empty undo stack."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
 
 
 @pytest.fixture(autouse=True)
 def numpy_unless_asked(request: pytest.FixtureRequest) -> Iterator[None]:
-    """Hair is simulated by numpy, but in tests that draw or ask for a GPU: software drivers take up
-    to a minute to compile the shader, and an earlier test may or may not have started the GPU."""
+    """Simulate hair with numpy, except in tests that draw or request a GPU: software drivers take
+    up to a minute to compile the shader, and whether an earlier test has started the GPU varies."""
     with pytest.MonkeyPatch.context() as patch:
         if not (request.node.get_closest_marker("draws") or "gpu_context" in request.fixturenames):
             patch.setattr(solvers, "compute_available", lambda: False)
@@ -88,9 +89,9 @@ def numpy_unless_asked(request: pytest.FixtureRequest) -> Iterator[None]:
 
 @pytest.fixture(autouse=True)
 def coarse_light(request: pytest.FixtureRequest) -> Iterator[None]:
-    """Where nothing is drawn, or its light is not looked at, light within hair is found in fewer
-    cells: it is most of the time that a few strands take to prepare. Those in tests/pure show what
-    it is."""
+    """Compute the light within hair on a coarse grid, except in tests that look at drawn light: it
+    takes most of the time that a few strands need to prepare. tests/pure covers the light
+    itself."""
     draws = request.node.get_closest_marker("draws")
     with pytest.MonkeyPatch.context() as patch:
         if draws is None or not draws.kwargs.get("light", True):
@@ -104,7 +105,8 @@ _is_enabled = False
 
 @pytest.fixture
 def extension(empty_scene: None) -> Iterator[None]:
-    """Hairloom registered, as when its extension is enabled: once, and for each test at rest."""
+    """Hairloom registered, as when its extension is enabled: once for all tests, reset after
+    each."""
     global _is_enabled
     if not _is_enabled:
         hairloom.register()
@@ -115,7 +117,7 @@ def extension(empty_scene: None) -> Iterator[None]:
 
 @pytest.fixture
 def no_extension(empty_scene: None) -> None:
-    """Hairloom not registered, for what registers it itself, and unregisters it at its end."""
+    """Hairloom not registered, for tests that register and unregister it themselves."""
     global _is_enabled
     if _is_enabled:
         hairloom.unregister()
@@ -133,13 +135,14 @@ def sphere() -> Any:
 
 @pytest.fixture
 def new_hair(extension: None) -> Callable[..., Any]:
-    """Makes a hair curves object from strands (a hedgehog), on a head or on none."""
+    """A function that makes a hair curves object from strands (by default a hedgehog), with or
+    without a head."""
     from hairloom.addon.blender.scene.curves import write_curves
 
     def make(head: Any = None, strands: StrandSet | None = None) -> Any:
         strands = hedgehog() if strands is None else strands
         hair = write_curves("Hair", strands, head, bpy.context.collection)
-        # so few strands are no hair
+        # automatic widths and children would turn so few strands into a full head of hair
         hair.data.hairloom.widths.method = "own"
         hair.data.hairloom.children.method = "none"
         for other in bpy.context.selected_objects:
@@ -162,7 +165,7 @@ def preview(new_hair: Any, sphere: Any, evaluated: Any) -> tuple[Any, Any, Any]:
 
 @pytest.fixture
 def evaluated() -> Callable[[], Any]:
-    """Gives the evaluated dependency graph as it is now."""
+    """A function that returns the current evaluated dependency graph."""
     return lambda: bpy.context.evaluated_depsgraph_get()
 
 
@@ -188,7 +191,8 @@ def stage(extension: None) -> Any:
 
 @pytest.fixture
 def flag(extension):
-    """A sheet of 11 x 11 vertices, 0.4 m wide, lying flat, made a fin, pinned at its edge at -x."""
+    """A flat sheet of 11 x 11 vertices, 0.4 m wide, made a fin that is pinned along its edge at
+    -x."""
     bpy.ops.mesh.primitive_grid_add(x_subdivisions=10, y_subdivisions=10, size=0.4)
     obj = bpy.context.object
     obj.name = "Flag"

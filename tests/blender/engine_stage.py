@@ -1,4 +1,4 @@
-"""What the tests of the render engine put into their scene, and what it renders."""
+"""The scene for tests of the render engine, and its renders."""
 
 from __future__ import annotations
 
@@ -25,7 +25,8 @@ def background(scene: Any) -> Any:
 
 
 def set_panorama(scene: Any, radiance: np.ndarray, kind: str = "EQUIRECTANGULAR") -> Any:
-    """An Environment Texture of these pixels, row 0 below; its node."""
+    """Light the world with an Environment Texture of these pixels, row 0 at the bottom; returns its
+    node."""
     rows, columns = radiance.shape[:2]
     image = bpy.data.images.new("Panorama", columns, rows, float_buffer=True)
     image.colorspace_settings.name = "Linear Rec.709"
@@ -51,7 +52,7 @@ def add_ball(radius: float = 0.15, color: tuple[float, float, float] = (1.0, 1.0
 
 
 def rendered(folder: Path) -> dict[str, np.ndarray]:
-    """Render, and read back all passes, see `passes_in`."""
+    """Render, and read back all passes with `passes_in`."""
     scene = bpy.context.scene
     settings = scene.render.image_settings
     if hasattr(settings, "media_type"):
@@ -65,7 +66,7 @@ def rendered(folder: Path) -> dict[str, np.ndarray]:
 
 
 def passes_in(path: Path) -> dict[str, np.ndarray]:
-    """Name -> (height, width, channels), row 0 at the bottom."""
+    """All passes of a file: name -> (height, width, channels), row 0 at the bottom."""
     import OpenImageIO
 
     found = {}
@@ -91,7 +92,7 @@ def coded(path: Path) -> np.ndarray:
 
 
 def view_shadings() -> list[Any]:
-    """The shading of all 3D views of the file."""
+    """The shading settings of all 3D views of the file."""
     windows = bpy.context.window_manager.windows
     areas = [area for window in windows for area in window.screen.areas]
     return [area.spaces.active.shading for area in areas if area.type == "VIEW_3D"]

@@ -1,4 +1,4 @@
-"""A fin as it moves, and as Blender shows it."""
+"""A fin in motion, as the session computes it and as Blender shows it."""
 
 import bpy
 import numpy as np
@@ -13,14 +13,14 @@ def update():
 
 
 def rest_of(obj):
-    """The mesh's own coordinates, object space."""
+    """The vertices of the original mesh, object space."""
     rest = np.empty((len(obj.data.vertices), 3), np.float32)
     obj.data.vertices.foreach_get("co", rest.ravel())
     return rest
 
 
 def shown(obj, evaluated):
-    """The evaluated mesh as Blender draws it, world space, first the original vertices."""
+    """The vertices of the evaluated mesh, world space; the original vertices come first."""
     there = obj.evaluated_get(evaluated())
     points = np.empty((len(there.data.vertices), 3), np.float32)
     there.data.vertices.foreach_get("co", points.ravel())

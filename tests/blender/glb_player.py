@@ -1,4 +1,4 @@
-"""A player of skinned GLB files, by the specification alone."""
+"""A player of skinned GLB files, written from the specification alone."""
 
 from __future__ import annotations
 
@@ -10,19 +10,20 @@ from glb_files import Glb
 
 
 class Player:
-    """Plays a skinned GLB by the specification, section 3.7.3 and appendix C, vertex by vertex."""
+    """Plays a skinned GLB vertex by vertex, by section 3.7.3 and appendix C of the
+    specification."""
 
     def __init__(self, path: Path) -> None:
         self.file = Glb(path)
         self.json = self.file.json
 
     def corners(self, seconds: float) -> list[np.ndarray]:
-        """The corners of all triangles of each skinned node, by name, in Blender's axes."""
+        """The corners of all triangles of each skinned node, sorted by node name, in Blender's
+        axes."""
         return [points[index] for points, index in self._placed(seconds)]
 
     def vertices(self, seconds: float) -> np.ndarray:
-        """All of the finest level, which a scene shows, also those of no triangle, in Blender's
-        axes."""
+        """All vertices of the finest level, used by a triangle or not, in Blender's axes."""
         return self._placed(seconds)[0][0]
 
     def _placed(self, seconds: float) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -57,7 +58,7 @@ class Player:
         def walk(number: int, parent: np.ndarray) -> None:
             node, matrix = local[number], np.eye(4)
             x, y, z, w = node.get("rotation", (0.0, 0.0, 0.0, 1.0))
-            # q p q* written out for the three axes
+            # q p q* for each of the three axes
             matrix[:3, 0] = [
                 w * w + x * x - y * y - z * z,
                 2 * (x * y + w * z),

@@ -9,7 +9,7 @@ from hairloom.addon.blender.sessions.session import Session
 
 
 def grid_of(session: Session) -> Floats:
-    """As they are shown."""
+    """The strands that a session shows."""
     return session.strands.reshape(session.rig.strands.strand_count, -1, 3)
 
 

@@ -1,11 +1,11 @@
-"""What ufbx, a reader that we did not write, finds in an FBX or OBJ file, as JSON.
+"""Dumps an FBX or OBJ file as JSON, read by ufbx, an independent reader.
 
-Run in a process of its own:
+Run in a separate process:
 
     python mesh_view.py FILE RESULT.json
 
-Of each mesh, in the order of its faces: the corners' positions in the file's space, normals, and
-those of each UV set, with tangents and bitangents, and of each colour set.
+For each mesh, in the order of its faces: the corners' positions in the file's space, normals, UV
+sets with tangents and bitangents, and colour sets.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import ufbx
 
 def main(path: str, output: str) -> None:
     scene = ufbx.load_file(path)
-    # asked for once and kept: the binding frees what is let go of too early
+    # fetched once and kept: the binding frees objects as soon as nothing refers to them
     nodes, materials = list(scene.nodes), list(scene.materials)
     settings, attributes = scene.settings, [node.attrib for node in nodes]
     transforms = [node.local_transform for node in nodes]

@@ -1,10 +1,10 @@
-"""Modifiers of geometry nodes, as an artist adds them."""
+"""Geometry nodes modifiers, added as an artist adds them."""
 
 import bpy
 
 
 def with_modifier(obj, *nodes):
-    """A geometry nodes modifier that sends the curves through these nodes."""
+    """Add a geometry nodes modifier that passes the curves through these nodes in turn."""
     tree = bpy.data.node_groups.new("Nodes", "GeometryNodeTree")
     for in_out in ("INPUT", "OUTPUT"):
         tree.interface.new_socket("Geometry", in_out=in_out, socket_type="NodeSocketGeometry")
@@ -20,7 +20,7 @@ def with_modifier(obj, *nodes):
 
 
 def mode_of(modifier):
-    """The input of Blender's Hair Dynamics that has their mode."""
+    """The input "Mode" of a modifier that uses Blender's Hair Dynamics."""
     sockets = modifier.node_group.interface.items_tree
     (mode,) = (each for each in sockets if each.item_type == "SOCKET" and each.name == "Mode")
     return getattr(modifier.properties.inputs, mode.identifier)

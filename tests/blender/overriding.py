@@ -1,4 +1,4 @@
-"""A scene whose objects come from another file, and are overridden with their data."""
+"""A scene of library overrides of objects and their data."""
 
 from pathlib import Path
 
@@ -6,8 +6,8 @@ import bpy
 
 
 def overridden(folder: Path) -> list[bpy.types.Object]:
-    """All that is in the scene, saved in a file of its own and brought back from there in one
-    collection, in the same order."""
+    """Save all objects of the scene in a library file, in one collection, and link them back as
+    overrides, in the same order."""
     file, collection = str(folder / "library.blend"), bpy.data.collections.new("Character")
     bpy.context.scene.collection.children.link(collection)
     names = [obj.name for obj in bpy.context.scene.objects]

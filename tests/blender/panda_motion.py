@@ -1,4 +1,4 @@
-"""Plays the animation of a GLB in Panda3D and says where its vertices are.
+"""Plays the animation of a GLB in Panda3D and stores the bounds of its vertices.
 
     python panda_motion.py FILE.glb BOUNDS.json RATE FRAME ...
 
@@ -20,7 +20,7 @@ from panda3d.core import GeomVertexReader, NodePath, Thread  # noqa: E402
 
 
 def places(actor: Actor) -> np.ndarray:
-    """All vertices where the joints have put them."""
+    """All vertices as the joints deform them."""
     found, now = [], Thread.get_current_thread()
     for path in actor.find_all_matches("**/+GeomNode"):
         for number in range(path.node().get_num_geoms()):

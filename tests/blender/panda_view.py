@@ -1,11 +1,11 @@
-"""Draws a GLB with Panda3D, an engine that we did not write, and saves what it drew.
+"""Draws a GLB with Panda3D, an independent engine, and saves the picture.
 
-Run in a process of its own, because two OpenGL contexts in one process get in each other's way:
+Run in a separate process, because two OpenGL contexts in one process interfere:
 
     python panda_view.py FILE.glb PICTURE.npy SIZE EXTENT
 
 The view is orthographic along +Y (Blender's axes), EXTENT wide and high around the origin. The
-picture is (SIZE, SIZE, 4) uint8, row 0 at the bottom, in front of clear black.
+picture is (SIZE, SIZE, 4) uint8, row 0 at the bottom, on a transparent black background.
 """
 
 import sys

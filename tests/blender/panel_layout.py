@@ -1,12 +1,12 @@
-"""What a panel draws, counted without a window: how many rows high it is, and its texts."""
+"""Layout of a panel without a window: its height in rows, and its texts."""
 
 from typing import Any
 
 
 class Layout:
-    """In place of Blender's UILayout: rows are 1 high, what stands side by side counts once.
+    """Replaces Blender's UILayout: a row is 1 high, and items side by side count once.
 
-    texts: of labels, buttons and fields, each with the fraction of the panel's width that it has.
+    texts: text and fraction of the panel's width of each label, button and field.
     """
 
     def __init__(self, texts: list[tuple[str, float]], width: float = 1.0, *, is_row: bool = False):

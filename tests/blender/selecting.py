@@ -1,4 +1,4 @@
-"""Objects chosen as by a click."""
+"""Select objects as a click does."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import bpy
 
 
 def select(obj: bpy.types.Object) -> None:
-    """This object alone, and active."""
+    """Select only this object and make it active."""
     for other in bpy.context.selected_objects:
         other.select_set(False)
     obj.select_set(True)

@@ -1,4 +1,4 @@
-"""A small 3D view without a window, into which the overlay draws."""
+"""A small 3D view without a window, which the overlay draws into."""
 
 from __future__ import annotations
 
@@ -19,9 +19,10 @@ NOTHING = (0.0, 0.0, 0.0, 0.0)
 
 
 class SmallView:
-    """A 3D view of SIZE pixels of this scene, as Blender hands it to who draws into it.
+    """A 3D view of SIZE pixels of the current scene, with the context that Blender passes to draw
+    handlers.
 
-    depth: that Blender leaves in it.
+    depth: the value that Blender leaves in the depth buffer.
     """
 
     def __init__(self, camera: Camera) -> None:
@@ -51,7 +52,7 @@ class SmallView:
         self.target, self.depth = Target(), 1.0
 
     def shows(self, **grooms: Snapshot | None) -> np.ndarray:
-        """What is drawn of these grooms, (SIZE, SIZE, 4); None is one that is hidden."""
+        """The picture of these grooms, (SIZE, SIZE, 4). None hides a groom."""
         numbers = {name: number for number, name in enumerate(sorted(grooms), start=1)}
         for uid in set(overlay._overlay.drawn) - set(numbers.values()):
             overlay.drop(uid)

@@ -1,5 +1,5 @@
-"""Strands for the tests of exports, and their files as Alembic's own lower level and usd-core read
-them."""
+"""Strands for tests of exports, and readers of their files by Alembic's low-level API and
+usd-core."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from alembic3d import Abc, AbcGeom
 
 
 def straight(place: tuple[float, float, float] = (1.0, 2.0, 3.0)) -> StrandSet:
-    """Two strands, a metre long, the first of which stands at a place."""
+    """Two straight vertical strands, 1 m long; the root of the first is at `place`."""
     points = np.array(place) + np.linspace([0, 0, 0], [0, 0, 1], 5)
     both = np.concatenate([points, points + (0.1, 0.0, 0.0)])
     return StrandSet(both, [0, 5, 10], np.full(10, 4e-5), [0, 0])
 
 
 def curves_of(path: Path) -> dict[str, dict[str, Any]]:
-    """Curves objects of an Alembic file by name: points of all samples, times, attributes."""
+    """The Curves objects of an Alembic file by name: points of all samples, times, attributes."""
     archive = Abc.IArchive(str(path))
     (above,) = list(archive.getTop().children)
     found = {}
@@ -52,14 +52,14 @@ def curves_of(path: Path) -> dict[str, dict[str, Any]]:
     return found
 
 
-#: for tests that write or read USD
+#: skips tests that read or write USD where usd-core is missing
 needs_usd = pytest.mark.skipif(
     importlib.util.find_spec("pxr") is None, reason="this Python has no OpenUSD"
 )
 
 
 def stage_of(path: Path) -> tuple[Any, Any]:
-    """The stage and its one prim of curves."""
+    """The stage, and its only BasisCurves prim."""
     usd = pytest.importorskip("pxr.Usd", reason="usd-core is missing: `make setup` installs it")
     from pxr import UsdGeom
 
@@ -69,12 +69,12 @@ def stage_of(path: Path) -> tuple[Any, Any]:
 
 
 def to_unreal(points: np.ndarray) -> np.ndarray:
-    """After Epic: centimetres, and y the other way."""
+    """Points in Unreal's coordinates by Epic: centimetres, with y negated."""
     return np.asarray(points) * [100.0, -100.0, 100.0]
 
 
 def push_up(hair: Any, amount: float, *, frame_driven: bool = False) -> Any:
-    """A geometry nodes modifier that moves all points up, in metres, or metres a frame."""
+    """Add a geometry nodes modifier that moves all points up, by metres or metres per frame."""
     tree = bpy.data.node_groups.new("Push", "GeometryNodeTree")
     tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
     tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")

@@ -1,4 +1,4 @@
-"""Hair on a head that is thrown about, and whether previewed hair swings."""
+"""Hair on a head that shakes, and a check that previewed hair swings."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ import numpy as np
 from grids import grid_of
 
 FRAME = 1.0 / 24.0  # [s]
-#: the push of a head in each of some frames [m]
+#: distance that the head moves in each of FRAMES frames [m]
 STEP, FRAMES = 0.03, 4
 
 
 def thrown(hair: Any, head: Any, last: int, bake: Path, peak: int = 4) -> tuple[Any, Any]:
-    """Hair and its head, which is keyed from frame 1 to `last`; quickly solved, on the CPU."""
+    """Key the head from frame 1 to `last` and set the hair up to be solved fast on the CPU."""
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = 1, last
     for frame, x in ((1, 0.0), (peak, 0.1), (last, -0.05)):
@@ -32,7 +32,7 @@ def thrown(hair: Any, head: Any, last: int, bake: Path, peak: int = 4) -> tuple[
 def play(
     evaluated: Callable[[], Any], frames: int, each: Callable[[int], None] = lambda frame: None
 ) -> None:
-    """Let hair play freely, whatever `each` does before a frame."""
+    """Let the preview play freely; `each` is called before each frame."""
     from hairloom.addon.blender.preview import previews
 
     for frame in range(frames):
@@ -42,7 +42,7 @@ def play(
 
 
 def swings(session: Any) -> bool:
-    """Whether hair that plays lags behind its head, pushed from rest, while its roots do not."""
+    """Whether the tips lag behind a head that moves from rest, while the roots follow it."""
     from hairloom.addon.blender.preview import previews
 
     previews.rest(bpy.context.evaluated_depsgraph_get(), keep_playing=True)

@@ -1,4 +1,4 @@
-"""An artist's own cards in Blender: their faces are put in order, and nothing else changes."""
+"""Adopted cards in Blender: sorting puts their faces in order and changes nothing else."""
 
 from __future__ import annotations
 
@@ -32,14 +32,15 @@ def new_mesh(name, positions, faces, corner_uv=None):
     return obj
 
 
-#: distances of the shells from the middle of the head [m], in the order of their faces
+#: distances of the shells from the middle of the head [m], in face order
 SHELLS = (0.14, 0.11, 0.17, 0.12)
 ROWS = 4
 
 
 @pytest.fixture
 def shells(sphere):
-    """Strips of quads that hang around the ball, far ones before near ones; u runs to the tip."""
+    """Vertical strips of quads around the ball, the shells in no order of distance; u runs to the
+    tip."""
     positions, faces, uv = [], [], []
     for shell in SHELLS:
         for turn in np.linspace(0.0, 2.0 * np.pi, 6, endpoint=False):
@@ -57,7 +58,7 @@ def shells(sphere):
 
 
 def polygons(mesh):
-    """Vertices and material of each face."""
+    """Vertices and material index of each face."""
     return [(tuple(face.vertices), face.material_index) for face in mesh.polygons]
 
 
@@ -109,7 +110,8 @@ def test_occlusion_is_an_attribute_and_a_map_that_keep_to_their_vertices(shells,
     np.testing.assert_allclose(layer(mesh, "Occlusion"), np.stack([openness, along], 1)[corner])
     assert mesh.uv_layers.active.name == "Hair"
     uv = read_cards(shells, evaluated(), SortOptions(head=sphere)).cards.mesh.uv
-    mesh.uv_layers.active = mesh.uv_layers["Occlusion"]  # which says nothing of pictures
+    # it must not be taken for the UVs of the texture
+    mesh.uv_layers.active = mesh.uv_layers["Occlusion"]
     again = read_cards(shells, evaluated(), SortOptions(head=sphere)).cards.mesh.uv
     np.testing.assert_array_equal(again, uv)
     once = layer(mesh, "Occlusion")
@@ -119,7 +121,7 @@ def test_occlusion_is_an_attribute_and_a_map_that_keep_to_their_vertices(shells,
 
 
 def decorated(obj):
-    """Gives a mesh one of everything that sorting might lose."""
+    """Give a mesh one of everything that sorting might lose."""
     mesh, random = obj.data, np.random.default_rng(0)
     for name in ("One", "Two"):
         mesh.materials.append(bpy.data.materials.new(name))
@@ -159,7 +161,7 @@ def decorated(obj):
 
 
 def everything(obj):
-    """All that a mesh has, by what it belongs to: faces and corners by their vertices."""
+    """All data of a mesh by element: faces and corners are identified by their vertices."""
     mesh = obj.data
     faces = [tuple(face.vertices) for face in mesh.polygons]
     corners = [(face, at) for face in faces for at in range(len(face))]
@@ -248,7 +250,7 @@ def test_a_vertex_group_is_drawn_after_all_others(shells, sphere, evaluated):
 
 
 def clear_material(obj):
-    """One whose picture is clear everywhere."""
+    """Give an object a material whose picture is transparent everywhere."""
     material = bpy.data.materials.new("Hair")
     obj.data.materials.append(material)
     image = bpy.data.images.new("Clear", 4, 4, alpha=True)
@@ -273,13 +275,14 @@ def test_alpha_comes_from_the_material(shells, sphere, evaluated):
 
 
 def test_the_order_goes_by_what_the_material_lets_see(shells, sphere, evaluated):
-    """Cards that are clear all over have none, and stay in the order of their distance."""
+    """Sorting by pieces uses the material's alpha: fully transparent cards hide nothing and keep
+    the order of distance."""
 
     def order(by):
         sort_mesh(shells, evaluated(), SortOptions(head=sphere, by=by, occlusion=None))
         return polygons(shells.data)
 
-    sphere.location.x = 0.4  # so that the distance from it is not the best order
+    sphere.location.x = 0.4  # so that the best order differs from the order of distance
     seen, by_distance = order("pieces"), order("distance")
     assert seen != by_distance
     clear_material(shells)

@@ -1,4 +1,4 @@
-"""Curves that nodes move are the style of each frame: exactly where nothing is simulated."""
+"""Curves that nodes move are the style of each frame; unsimulated hair follows them exactly."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ LAST = 8
 
 @pytest.fixture(params=few_in_commits(["compute", "numpy"]))
 def moving(request: Any, gpu_context: Any, new_hair: Any, sphere: Any, tmp_path: Any) -> Any:
-    """Hair on a head that turns, which nodes move, its style animated."""
+    """Hair that nodes move, on a head that turns, with an animated style."""
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = 1, LAST
     hair = new_hair(sphere)
@@ -55,7 +55,7 @@ def session_at_start(hair: Any, evaluated: Any) -> Any:
 
 
 def seen(hair: Any, evaluated: Any) -> StrandSet:
-    """As Blender itself shows the curves."""
+    """The curves as Blender itself evaluates them."""
     return read_curves(hair, evaluated()).strands
 
 
@@ -102,7 +102,7 @@ def test_what_is_painted_0_goes_with_the_style_and_the_rest_is_simulated(
         for number, guide in enumerate(session.solver.guides())
     ]
     lower, upper = np.array(away)[is_upper < -0.06], np.array(away)[is_upper > 0.02]
-    assert lower.max() < 2e-3 and upper.min() > 5e-3  # CVs lie on straight pieces between points
+    assert lower.max() < 2e-3 and upper.min() > 5e-3  # CVs lie on the chords between points
 
 
 def test_a_bake_has_the_style_of_each_frame(moving: Any, evaluated: Any) -> None:
@@ -147,7 +147,7 @@ def test_curves_that_are_lost_in_mid_play_leave_the_last_style_that_fits(
 def test_a_groom_that_moves_in_a_file_comes_with_all_its_frames(
     moving: Any, evaluated: Any, tmp_path: Path
 ) -> None:
-    """Where it was exported; and it is the style of each frame at once."""
+    """An imported animated file gives each frame's points and is the animated style at once."""
     pytest.importorskip("alembic3d", reason="it is missing: `make setup` installs it")
     shown = []
     for frame in range(1, LAST + 1):
@@ -185,7 +185,7 @@ def test_both_forms_agree_halfway(moving: Any, evaluated: Any) -> None:
 
 
 def test_the_verb_simulates_the_style_of_each_frame(moving: Any, tmp_path: Any) -> None:
-    """Frame by frame what a bake in the scene stores."""
+    """The verb and a bake in the scene store equal arrays in each frame."""
     moving.hairloom.dynamics.simulated = 0.3
     for _ in Bake.of([moving], bpy.context.scene).steps():
         pass

@@ -1,4 +1,4 @@
-"""What holds for all that the artist meets: texts, units, limits, greyed-out buttons."""
+"""Rules for everything that artists see: texts, units, limits, greyed-out buttons."""
 
 import re
 
@@ -9,7 +9,7 @@ from hairloom.addon import registration
 
 pytestmark = pytest.mark.usefixtures("extension")
 
-#: words of a title that are not written large
+#: words that stay in lower case in a title
 SMALL = {"a", "an", "and", "as", "at", "by", "for", "from", "in", "of", "on", "or", "per", "the"}
 SMALL |= {"to", "with", "x", "fps"}
 #: groups of properties, and operators
@@ -21,7 +21,7 @@ HOLDERS = [
 
 
 def own_properties(holder):
-    """What it declares itself, not what Blender gives to every class of its kind."""
+    """The properties that a class declares itself, without those that Blender adds."""
     bases = {prop.identifier for prop in holder.bl_rna.base.properties}
     blenders = {"check_existing", "directory", "filepath", "files", "filter_glob"}
     for prop in holder.bl_rna.properties:
@@ -30,7 +30,7 @@ def own_properties(holder):
 
 
 def wrong(check):
-    """Properties of ours of which something does not hold."""
+    """Our visible properties for which `check` is false."""
     return [
         f"{holder.__name__}.{prop.identifier}: {prop.name!r}, {prop.description!r}"
         for holder in HOLDERS
@@ -66,7 +66,7 @@ def test_numbers_have_soft_limits_within_hard_ones():
 
 
 def test_units_are_those_that_were_declared():
-    """A length is shown in the scene's units, an angle in degrees, a time in seconds."""
+    """Lengths have the scene's units, angles degrees, times seconds, as the parameters declare."""
     wanted = {"length": "LENGTH", "angle": "ROTATION", "time": "TIME_ABSOLUTE"}
     wanted |= {"speed": "VELOCITY", "acceleration": "ACCELERATION"}
     checked = 0
@@ -92,7 +92,7 @@ def test_every_panel_menu_and_operator_says_what_it_is(kind):
 
 
 def test_settings_open_closed_except_the_first():
-    """Fourteen open sections would fill the screen."""
+    """Subpanels start closed: fourteen open ones would fill the screen."""
     below = [p for p in registration.CLASSES if getattr(p, "bl_parent_id", "").startswith("HAIR")]
     assert below and all("DEFAULT_CLOSED" in panel.bl_options for panel in below)
 
@@ -124,7 +124,8 @@ SCENES = [nothing_there, a_mesh, hair_in_the_air, hair_on_a_mesh, a_mesh_in_edit
 
 @pytest.mark.parametrize("scene", SCENES, ids=lambda scene: scene.__name__)
 def test_a_button_that_is_greyed_out_says_why(new_hair, scene):
-    """Blender's own words for a poll without a reason are "context is incorrect"."""
+    """No operator falls back on Blender's text for a poll without a reason, "context is
+    incorrect"."""
     scene(new_hair)
     mute, greyed = [], 0
     for name in dir(bpy.ops.hairloom):

@@ -1,4 +1,4 @@
-"""Baby hair is no hair for cards, in a groom and in its bake."""
+"""Cards leave out baby hair, in a groom and in its bake."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def test_a_bake_knows_its_baby_hair() -> None:
 
 @pytest.mark.draws
 def test_the_atlas_shows_the_strands_that_its_plan_names() -> None:
-    """It is that of a groom in which no baby hair ever was."""
+    """The atlas equals that of the same groom without its baby hair."""
     rig, look, drawn = wig(), ShadingSettings(color_variation=0.0), StrandSettings()
     settings = CardSettings(source="clusters", card_count=12)
     groom = card_groom(rig)

@@ -1,4 +1,4 @@
-"""Baking: equal to what playback shows, whole or not at all, and shown again."""
+"""Bakes equal playback, are complete or not written at all, and are shown again."""
 
 import json
 import os
@@ -33,7 +33,7 @@ LAST = 8
 
 @pytest.fixture
 def swinging(new_hair, sphere, tmp_path):
-    """Hair on a head that is thrown about for some frames: (hair, head)."""
+    """Hair on a head that shakes for some frames: (hair, head)."""
     return thrown(new_hair(sphere), sphere, LAST, tmp_path / "bake")
 
 
@@ -47,7 +47,7 @@ def drawn(hair):
 
 
 def played(hair, first=1, last=LAST):
-    """The strands of each frame while the scene goes through them."""
+    """The drawn strands of each frame as the scene steps through the frames."""
     shown = []
     for frame in range(first, last + 1):
         bpy.context.scene.frame_set(frame)
@@ -57,7 +57,7 @@ def played(hair, first=1, last=LAST):
 
 def test_a_bake_equals_playback_bit_for_bit(swinging, evaluated):
     hair, _ = swinging
-    hair.hairloom.dynamics.radius_root = 0.5  # all that swings comes too near
+    hair.hairloom.dynamics.radius_root = 0.5  # wide enough that swinging strands touch the head
     previews.start(hair, evaluated())
     live_strands = played(hair)
     assert np.ptp(live_strands[:, :, -1] - live_strands[:, :, 0], axis=0).max() > 0.01
@@ -75,10 +75,11 @@ def test_a_bake_equals_playback_bit_for_bit(swinging, evaluated):
 
 @pytest.mark.usefixtures("gpu_context")
 def test_a_bake_on_the_gpu_equals_playback_on_the_gpu_bit_for_bit(swinging, evaluated):
-    """Guides and what is drawn of them; the copy for renders is ridden on the CPU."""
+    """Baked guides and drawn strands equal playback; strands ridden from the bake on the CPU, as
+    for renders, are within 2e-6 m."""
     hair, _ = swinging
     hair.hairloom.dynamics.device = "compute"
-    hair.hairloom.dynamics.radius_root = 0.5  # all that swings comes too near
+    hair.hairloom.dynamics.radius_root = 0.5  # wide enough that swinging strands touch the head
     session = previews.start(hair, evaluated())
     guides, strands = [], []
     for frame in range(1, LAST + 1):
@@ -117,7 +118,7 @@ def test_a_bake_is_the_same_with_and_without_a_preview(previewed, swinging, eval
 
 
 def test_a_preview_begun_elsewhere_shows_the_very_same_strands(swinging, evaluated):
-    """It takes the rig of the bake, wherever the head is by then."""
+    """A preview that starts after the head has moved uses the rig of the bake."""
     hair, _ = swinging
     bake(hair)
     cache = playback.cache_of(hair)
@@ -130,7 +131,8 @@ def test_a_preview_begun_elsewhere_shows_the_very_same_strands(swinging, evaluat
 
 
 def test_baked_hair_has_the_size_of_its_bake(swinging, evaluated):
-    """Also where that is baked again or deleted while it is previewed."""
+    """A new scale of the head shows once the hair is baked again or its bake is deleted, also
+    during a preview."""
     hair, head = swinging
     previews.start(hair, evaluated())
     bake(hair)
@@ -370,7 +372,7 @@ def test_what_a_killed_bake_leaves_goes_with_the_next(swinging, tmp_path, monkey
 
 
 def test_two_who_bake_into_one_folder_never_mix_their_frames(tmp_path):
-    """Each has frames of its own; the last one to finish is shown, whole."""
+    """Two writers interleave their frames; each time, the last to finish is shown completely."""
     folder = tmp_path / "bake"
     writers = [CacheWriter(folder), CacheWriter(folder)]
     for value, writer in enumerate(writers):
@@ -388,7 +390,7 @@ def test_two_who_bake_into_one_folder_never_mix_their_frames(tmp_path):
 
 
 def test_a_bake_that_cannot_take_its_place_is_kept(swinging, tmp_path, monkeypatch):
-    """By Windows' rules: what is open is not replaced."""
+    """Under Windows' rule that open files cannot be replaced, the new frames are kept and named."""
     hair, _ = swinging
     bake(hair)
     folder, shown = tmp_path / "bake", frames_in(tmp_path / "bake")
@@ -410,7 +412,7 @@ def test_a_bake_that_cannot_take_its_place_is_kept(swinging, tmp_path, monkeypat
 
 
 def test_a_render_and_the_window_read_a_bake_at_the_same_time(tmp_path):
-    """One lets go of a frame that the other one has just found."""
+    """One thread drops a frame from memory between another thread's check for it and its read."""
     writer = CacheWriter(tmp_path / "bake")
     writer.add_constants({"value": np.zeros(1)})
     frames = range(1, 9)
@@ -426,7 +428,7 @@ def test_a_render_and_the_window_read_a_bake_at_the_same_time(tmp_path):
             is_there = super().__contains__(frame)
             if is_there and not other.ident:
                 other.start()
-                other.join(0.2)  # it reads all, unless it has to wait for this one
+                other.join(0.2)  # it reads all frames, unless it waits for the lock of this thread
             return is_there
 
     cache.frame(1)
@@ -437,7 +439,8 @@ def test_a_render_and_the_window_read_a_bake_at_the_same_time(tmp_path):
 
 
 def test_frames_that_are_open_elsewhere_go_when_their_writer_is_gone(tmp_path):
-    """By Windows' rules: a player reads the bake before."""
+    """Under Windows' rules, frames that a player holds open outlive the next bake and go with the
+    one after it, once their writer has ended."""
     folder = tmp_path / "bake"
 
     def bake(value):
@@ -544,7 +547,8 @@ def test_an_unsaved_file_needs_a_folder_of_its_own(swinging, tmp_path):
 
 
 def test_every_file_has_bakes_of_its_own(swinging, tmp_path):
-    """A second version of a file shows the bake of the first until it is baked itself."""
+    """A second version of a file shows the first one's bake until it is baked itself, and leaves
+    the first one's frames alone."""
     hair, _ = swinging
     hair.hairloom.bake.folder = ""
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot_v1.blend"))
@@ -571,7 +575,7 @@ def test_a_folder_with_the_bake_of_another_file_is_refused(swinging, evaluated, 
         bake(hair)
     free(hair, evaluated())
     assert hair.hairloom.bake.folder == "" and frames_in(tmp_path / "bake") == shown
-    bake(hair, folder=tmp_path / "bake")  # who names it means it
+    bake(hair, folder=tmp_path / "bake")  # a folder that is given explicitly is taken
     assert Cache(tmp_path / "bake").facts.file == "shot_v2.blend"
 
 
@@ -685,7 +689,8 @@ def test_the_buttons_bake_and_delete(swinging, tmp_path):
 
 
 def test_a_bake_knows_how_far_its_strands_stretch_and_how_deep_they_are(swinging):
-    """Found again from its frames, and the sphere that the head is."""
+    """The stored figures equal those that are computed from the bake's frames and the head as a
+    sphere."""
     hair, head = swinging
     head.hairloom.collider_shape = "sphere"
     bake(hair)
@@ -697,7 +702,7 @@ def test_a_bake_knows_how_far_its_strands_stretch_and_how_deep_they_are(swinging
         depth.append(0.1 - np.linalg.norm(grid[:, 1:] - matrix[:3, 3], axis=2).min())
     found = cache.facts.figures
     assert found.strands_stretch_max_percent == pytest.approx(100.0 * max(change), abs=1e-3)
-    # the ball is around the mesh's box, a little larger than its faces
+    # the sphere encloses the mesh's bounding box and is a little larger than its faces
     assert found.strands_penetration_max_mm == pytest.approx(1000.0 * max(depth), abs=0.2)
 
 
@@ -710,7 +715,7 @@ def test_figures_that_are_none_make_a_bake_damaged(swinging):
         facts.write_text(json.dumps(content | {"figures": bad}))
         with pytest.raises(HairloomError, match="damaged"):
             Cache(facts.parent)
-    del content["figures"]  # by an earlier version
+    del content["figures"]  # as written by an earlier version
     facts.write_text(json.dumps(content))
     assert Cache(facts.parent).facts.figures is None
 
@@ -731,7 +736,7 @@ def test_led_strands_that_are_not_of_the_groom_are_refused(strands, count, swing
 
 
 def test_a_render_has_the_rig_of_the_newest_bake(swinging, evaluated):
-    """Strands at rest are the same, but other guides move them."""
+    """Strands at rest are unchanged, but other guides move them."""
     hair, _ = swinging
     bake(hair)
     engine_hair.read_groom(hair, evaluated())
@@ -757,7 +762,7 @@ def test_a_folder_that_is_asked_for_is_taken_though_another_object_names_it(swin
 
 
 def test_two_names_of_one_folder_are_one_folder(swinging, tmp_path):
-    """Of two bakes in one run neither takes the place of the other."""
+    """Two bakes of one run do not overwrite each other if two spellings name one folder."""
     hair, _ = swinging
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "wig.blend"))
     twin = hair.copy()

@@ -1,4 +1,4 @@
-"""The verb `bake`: scene in, bakes and report out, one line and exit code 1 for bad input."""
+"""The verb `bake`: bakes and a report from a scene; one line and exit code 1 for bad input."""
 
 import json
 import re
@@ -23,7 +23,7 @@ LAST = 5
 
 @pytest.fixture
 def file(new_hair, sphere, tmp_path):
-    """A saved file with hair on a head that moves; the open scene is another one."""
+    """A saved file with hair on a head that moves; the open scene is empty."""
     hair = new_hair(sphere)
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = 1, LAST
@@ -73,7 +73,7 @@ def test_frames_output_and_settings_are_chosen(file, tmp_path):
 
 
 def test_an_object_that_is_named_twice_is_taken_once(file, tmp_path):
-    """As in lists that a script has joined."""
+    """Duplicate names occur where a script joins lists."""
     report, twice = tmp_path / "report.json", ["--object", "Hair", "--object", "Hair"]
     bake = ["bake", "--scene", str(file), "--frames", "1", "2", *twice]
     bake += ["--output", str(tmp_path / "out"), "--report", str(report)]
@@ -89,7 +89,7 @@ def test_an_object_that_is_named_twice_is_taken_once(file, tmp_path):
 @pytest.mark.alike
 @pytest.mark.parametrize("verb", [["bake"], ["simulate", "--animated"], ["simulate"]])
 def test_only_selected_curves_move_by_themselves(file, tmp_path, verb):
-    """In a file that was saved with a selection; the others are exactly where their style is."""
+    """A file saved with a selection: unselected curves stay exactly at their style."""
     bpy.ops.wm.open_mainfile(filepath=str(file))
     curves = bpy.data.objects["Hair"].data
     is_chosen = np.arange(len(curves.curves)) % 3 == 0
@@ -139,7 +139,7 @@ def test_bad_input_is_one_line_and_exit_code_1(arguments, message, file, tmp_pat
 
 
 def test_hair_without_a_surface_is_baked_and_noted(file, tmp_path):
-    """The task of a farm is done, and its report says why the motion may be none that is meant."""
+    """A farm's task succeeds, and its report says why the motion may not be the intended one."""
     bpy.ops.wm.open_mainfile(filepath=str(file))
     bpy.data.objects["Hair"].data.surface = bpy.data.objects["Hair"].parent = None
     bpy.ops.wm.save_mainfile()
@@ -185,7 +185,8 @@ def test_the_bake_of_the_command_line_is_that_of_the_button(file, tmp_path):
 
 
 def test_a_baked_frame_is_drawn(file, tmp_path):
-    """The verb render; what has changed since the bake is told."""
+    """The verb `render` draws baked frames, and its report notes what has changed since the
+    bake."""
     assert command_line.run(["bake", "--scene", str(file), "--save"]) == 0
     picture, report = tmp_path / "hair.png", tmp_path / "report.json"
     arguments = ["render", "--scene", str(file), "--groom", "Hair", "--bake", "--width", "96"]
@@ -240,7 +241,7 @@ def test_what_is_not_baked_is_not_drawn(arguments, message, file, tmp_path, caps
 
 
 def _half_covered_head_that_swells(new_hair, sphere):
-    """A head with hair on one side alone, that a shape key deforms where it has none."""
+    """A head with hair on one side only, and a shape key that deforms the other side."""
     strands = hedgehog()
     hair = new_hair(sphere, strands.take(np.flatnonzero(strands.roots[:, 0] > 0.03)))
     hair.hairloom.dynamics.collider_resolution = 8
@@ -261,7 +262,7 @@ def _half_covered_head_that_swells(new_hair, sphere):
 
 @pytest.mark.slow(instead="test_a_baked_frame_is_drawn")
 def test_the_whole_of_a_deformed_head_is_drawn(new_hair, sphere, evaluated, tmp_path, monkeypatch):
-    """Its drawn vertices are those that Blender evaluates, roots on them or not."""
+    """The drawn vertices are those that Blender evaluates, with or without roots on them."""
     _half_covered_head_that_swells(new_hair, sphere)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "wig.blend"))
     assert command_line.run(["bake", "--save"]) == 0

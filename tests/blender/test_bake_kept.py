@@ -1,4 +1,4 @@
-"""What a bake adds to a scene: nothing of the artist's is lost when it or its copy goes."""
+"""A bake adds a copy of the hair to the scene; no hair is lost when the bake or the copy goes."""
 
 import bpy
 import pytest
@@ -54,7 +54,7 @@ def test_hair_that_was_hidden_stays_hidden_when_its_copy_goes(hair):
 
 
 def test_a_copy_shows_no_bake_of_other_strands(hair, new_hair, sphere, tmp_path, capsys):
-    """Another file has baked other hair of as many points into the folder."""
+    """Another file bakes other hair with the same number of points into the folder."""
     bake(hair)
     copy = hair.hairloom.bake.copy
     shown = [tuple(point.vector) for point in copy.data.position_data]
@@ -113,7 +113,7 @@ def test_names_that_are_one_on_some_system_get_two_folders():
 
 
 def test_versions_of_a_file_with_a_long_name_get_two_folders():
-    """Studios number at the end."""
+    """Studios put the version at the end of long names."""
     stems = [f"show_episode_12_sequence_0400_shot_0130_lighting_final_v{n:03}" for n in range(3)]
     folders = {folder_name(stem) for stem in stems}
     assert len(folders) == 3 and max(map(len, folders)) <= 50

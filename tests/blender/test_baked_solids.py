@@ -1,5 +1,4 @@
-"""Cards of hair that moves are led out of the same solids while it plays, from its bake, and as
-exported."""
+"""Moving cards are led out of the same solids in playback, from a bake and in exports."""
 
 from __future__ import annotations
 
@@ -51,7 +50,7 @@ def mesh(sphere, evaluated) -> Surface:
 
 
 def solids(mesh: Surface, bend: float) -> tuple[PosedCollider, ...]:
-    """One of each kind, and the mesh as it is at rest and bent."""
+    """One collider of each kind, and the mesh's field at rest and bent."""
     matrix = np.eye(4)
     matrix[:3, 3] = 0.05, 0.02, 0.3
     field = field_of(mesh, SETTINGS, place="x")
@@ -105,8 +104,8 @@ def test_between_two_frames_solids_go_straight(mesh):
 
 @pytest.fixture(params=few_in_commits(["sphere", "mesh"]))
 def swinging(request, new_hair, sphere, tmp_path):
-    """Hair that falls over the sphere, drawn as cards; the faces of its mesh are flat, so they are
-    up to 1.7 mm inside of it."""
+    """Hair that falls over the sphere, drawn as cards. Flat faces of the mesh lie up to 1.7 mm
+    inside the sphere."""
     hair, head = thrown(new_hair(sphere), sphere, LAST, tmp_path / "bake")
     head.hairloom.collider_shape = request.param
     hair.hairloom.dynamics.collider_resolution = 64

@@ -1,4 +1,4 @@
-"""What a benchmark prints, how it ends, and what it compares."""
+"""Benchmarks: their printed figures, exit status and comparisons."""
 
 from __future__ import annotations
 
@@ -75,7 +75,8 @@ def test_a_part_that_is_unknown_ends_a_benchmark() -> None:
     few_in_commits(sorted(name for name, short in figures.BENCHES.items() if short.arguments)),
 )
 def test_each_benchmark_refuses_a_part_that_it_has_not(name: str) -> None:
-    """And does not measure all or nothing instead."""
+    """A mistyped part ends the benchmark with an error; it does not measure everything or
+    nothing."""
     command = [sys.executable, str(figures.REPOSITORY / "tools" / "bench.py"), name, "mistyped"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300)
     assert done.returncode != 0, done.stdout

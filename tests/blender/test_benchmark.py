@@ -1,4 +1,4 @@
-"""What `self-test --benchmark` writes: figures of a machine, each of which has ended on the GPU."""
+"""`self-test --benchmark`: figures of a machine, each timed until the GPU has finished."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def test_without_the_option_nothing_is_measured(monkeypatch: Any) -> None:
 
 
 def test_a_time_ends_with_the_work_of_the_gpu() -> None:
-    """A dispatch of loops that take long is over when it is timed, not only asked for."""
+    """The time of a long dispatch includes its work on the GPU, not only its submission."""
     import time
 
     import gpu
@@ -66,7 +66,7 @@ def test_a_time_ends_with_the_work_of_the_gpu() -> None:
     def work() -> None:
         shader.bind()
         shader.image("found", target)
-        # long beside the wait for it, on a GPU too
+        # long compared with the wait for the result, on a GPU too
         shader.uniform_int("rounds", 400 if is_software() else 40_000)
         gpu.compute.dispatch(shader, 32, 32, 1)
         gpu.shader.unbind()
@@ -78,7 +78,7 @@ def test_a_time_ends_with_the_work_of_the_gpu() -> None:
         return 1000.0 * (time.perf_counter() - begin)
 
     taken = bench.time(work)
-    whole = min(with_its_end() for _ in range(3))  # what else the machine does makes it longer
+    whole = min(with_its_end() for _ in range(3))  # the minimum, because other load only adds time
     assert taken > 0.3 * whole > 0.3
 
 

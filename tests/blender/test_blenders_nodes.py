@@ -1,4 +1,4 @@
-"""Blender's own hair nodes on an artist's curves: what they make is what is drawn."""
+"""The curves that Blender's own hair nodes make are the curves that are drawn."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def length(line: np.ndarray) -> float:
 
 
 def farthest_from(points: np.ndarray, line: np.ndarray) -> float:
-    """How far the farthest of some points is from a line of segments."""
+    """The largest distance of these points from a polyline."""
     start, step = line[:-1], np.diff(line, axis=0)
     along = np.einsum("psi,si->ps", points[:, None] - start, step)
     along = np.clip(along / np.maximum((step * step).sum(axis=1), 1e-20), 0.0, 1.0)

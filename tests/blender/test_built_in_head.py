@@ -1,4 +1,4 @@
-"""The bust that ships: clean, of real size, with a hairline, brows, lashes and skin."""
+"""The built-in bust: a clean mesh of real size, with a hairline, brows, lashes and skin."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ def test_it_is_a_head_of_real_size_around_its_skull() -> None:
     assert np.abs(cranium.center).max() < 0.03 and 0.09 < cranium.half_depth < 0.12
     low, high = head.surface.bounds()
     assert high[2] - low[2] == pytest.approx(0.37, abs=0.03)
-    # as far to the left as to the right, and the nose ahead
+    # symmetric, with the nose in front
     assert low[0] == pytest.approx(-high[0], abs=1e-4)
     nose = head.surface.positions[head.surface.positions[:, 1].argmin()]
     assert abs(nose[0]) < 2e-3 and -0.06 < nose[2] < -0.02
 
 
 def test_its_mesh_is_clean() -> None:
-    """No face twice, no edge of more than two faces, no face without area, and UVs that do not
-    overlap."""
+    """No duplicate faces, no edge with more than two faces, no face without area, no overlapping
+    UVs."""
     bust = load_bust()
     mesh = bust_object("Bust", None).data
     assert not mesh.validate()
@@ -60,7 +60,7 @@ def test_weights_fall_off_smoothly_and_lie_where_hair_grows() -> None:
     assert (scalp[z > 0.1] > 0.99).all(), "on the crown"
     face = (y < -0.06) & (z < 0.05) & (np.abs(x) < 0.05)
     assert not scalp[face].any() and not scalp[z < -0.1].any()
-    # between the bare forehead and the full scalp lie at least a centimetre and a half
+    # the hairline is a gradient: bare forehead, partial weights, full scalp
     front = (np.abs(x) < 0.01) & (y < -0.02) & (z > 0.03)
     assert np.ptp(z[front & (scalp > 0.02) & (scalp < 0.98)]) > 0.005
     assert z[front & (scalp == 0.0)].max() < z[front & (scalp > 0.98)].min()
@@ -113,13 +113,13 @@ def test_brows_and_lashes_leave_the_skin_and_keep_their_places() -> None:
     assert brows.shape == (150, hair.cv_count, 3) and lashes.shape == (120, hair.cv_count, 3)
     length = np.linalg.norm(np.diff(brows, axis=1), axis=2).sum(axis=1)
     assert length.max() <= hair.brow_length + 1e-6 and length.min() > 0.4 * hair.brow_length
-    # brows grow outwards; lashes ahead, the upper ones up and the lower ones down at their ends
+    # brows grow outwards, lashes forwards, and the tips of the upper lashes up
     outward = (np.abs(brows[:, -1, 0]) - np.abs(brows[:, 0, 0])) > 0.0
     assert outward.mean() > 0.95
     assert (lashes[:, -1, 1] < lashes[:, 0, 1]).all()
     is_upper = lashes[:, 0, 2] > np.median(lashes[:, 0, 2]) + 0.002
     assert (lashes[is_upper, -1, 2] > lashes[is_upper, 0, 2]).mean() > 0.95
-    # tips are outside of the lids
+    # tips are outside the lids
     assert (lashes[:, -1, 1] < -0.07).all()
 
 

@@ -1,4 +1,4 @@
-"""Cards that an artist has edited survive being made again; Blender does the edits."""
+"""Cards that an artist has edited with Blender's own tools survive Make Cards."""
 
 import json
 import zlib
@@ -25,7 +25,7 @@ from hairloom.addon.cards.steps import result_of
 
 @pytest.fixture
 def hair(new_hair, sphere):
-    """A hedgehog of 60 strands on a sphere, to be twelve cards in two levels."""
+    """A hedgehog of 60 strands on a sphere, set up for twelve cards in two levels."""
     made = new_hair(sphere)
     cards, texture = made.data.hairloom.cards, made.data.hairloom.card_texture
     cards.source, cards.card_count, cards.levels, cards.fly_aways = "clusters", 12, 2, 0.0
@@ -46,14 +46,14 @@ def make(hair):
 
 
 def numbers(obj):
-    """The made card of each face, -1 for own ones."""
+    """The index of the made card of each face, -1 for the artist's own cards."""
     found = np.empty(len(obj.data.polygons), np.int32)
     obj.data.attributes[MADE_ATTRIBUTE].data.foreach_get("value", found)
     return found - 1
 
 
 def corners(obj, card, layer=None):
-    """Places, or UVs, of the corners of a card, sorted: the same however its faces are ordered."""
+    """Sorted positions or UVs of a card's corners, the same in any face order."""
     mesh = obj.data
     rows = [
         tuple(mesh.vertices[mesh.loops[loop].vertex_index].co)
@@ -67,7 +67,7 @@ def corners(obj, card, layer=None):
 
 
 def edit(obj, chosen, act):
-    """In Edit Mode, with the faces of these cards selected."""
+    """Run `act` in Edit Mode with the faces of these cards selected."""
     select(obj)
     bpy.ops.object.mode_set(mode="EDIT")
     bpy.ops.mesh.select_mode(type="FACE")
@@ -96,7 +96,7 @@ def edits(hair):
 def test_cards_that_nobody_has_touched_are_made_anew(hair):
     obj = make(hair)
     assert edits(hair) is None
-    edit(obj, (), lambda: None)  # in and out of Edit Mode
+    edit(obj, (), lambda: None)  # enters and leaves Edit Mode
     assert edits(hair) is None
     hair.data.hairloom.cards.card_count = 20
     assert set(numbers(make(hair))) == set(range(20)) and edits(hair) is None
@@ -107,7 +107,7 @@ def test_a_moved_card_stays_where_it_was_put(hair):
     before = {card: corners(obj, card) for card in range(12)}
     move(obj, 3)
     assert edits(hair).edited == 1 and edits(hair).deleted == 0 and edits(hair).own == 0
-    for _ in range(3):  # again and again
+    for _ in range(3):  # made again several times
         obj = make(hair)
         assert set(numbers(obj)) == set(range(12))
         np.testing.assert_allclose(corners(obj, 3), before[3] + [0.02, 0.0, 0.0], atol=1e-6)
@@ -165,7 +165,7 @@ def test_another_tile_is_kept(hair):
 @pytest.mark.alike
 @pytest.mark.parametrize("count", [6, 12, 24])
 def test_with_other_cards_nothing_vanishes(hair, count):
-    """Fewer, as many by another seed, and more."""
+    """Make Cards with fewer cards, as many from another seed, and more, keeps the moved card."""
     obj = make(hair)
     move(obj, 3)
     delete(obj, 5)
@@ -186,7 +186,7 @@ def test_cards_that_were_joined_to_save_triangles_are_not_deleted(hair, seed):
     first = areas(obj)
     assert len(first) == 6 and edits(hair) is None
     np.testing.assert_allclose(sorted(areas(make(hair))), sorted(first), rtol=1e-5)
-    # an edited one stands for those that it was joined with, as it was put
+    # an edited card also represents those that it was joined with, and stays where it was put
     card = max(numbers(obj))
     shape = corners(obj, card)
     move(obj, card)
@@ -194,7 +194,7 @@ def test_cards_that_were_joined_to_save_triangles_are_not_deleted(hair, seed):
     for _ in range(2):
         np.testing.assert_allclose(sorted(areas(make(hair))), sorted(first), rtol=1e-5)
         np.testing.assert_allclose(corners(obj, card), shape + [0.02, 0.0, 0.0], atol=1e-6)
-    # others come back where there is room for them
+    # the other cards come back once there is room for them
     cards.max_triangles = 0
     assert len(areas(make(hair))) == 11
     bpy.ops.hairloom.discard_card_edits()
@@ -202,14 +202,14 @@ def test_cards_that_were_joined_to_save_triangles_are_not_deleted(hair, seed):
 
 
 def areas(obj):
-    """Of each card [m^2]."""
+    """The area of each card [m^2]."""
     total = np.zeros(max(numbers(obj)) + 1)
     np.add.at(total, numbers(obj), [face.area for face in obj.data.polygons])
     return total[total > 0.0]
 
 
 def test_cards_with_shape_keys_are_not_made_again(hair):
-    """Blender keeps the places of keys by their number, which new vertices would get."""
+    """Shape keys store positions by vertex index, which new vertices would reuse."""
     obj = make(hair)
     obj.shape_key_add(name="Basis")
     obj.shape_key_add(name="Wind").data[0].co.z += 0.1
@@ -322,7 +322,7 @@ def test_a_card_away_from_the_head_is_kept_and_said(hair, capfd):
 
 
 def test_edited_cards_go_with_their_skin(hair, sphere):
-    """The head is bent within its object, as a pose does."""
+    """Moved vertices of the head's mesh, as a pose moves them, carry edited cards along."""
     obj = make(hair)
     move(obj, 3)
     before = corners(obj, 3)
@@ -338,7 +338,8 @@ def test_edited_cards_go_with_their_skin(hair, sphere):
 
 @pytest.mark.parametrize("scale", few_in_commits([(-1.0, 1.0, 1.0), (2.0, 2.0, 2.0)]))
 def test_edited_cards_go_with_the_object(hair, sphere, scale):
-    """Its mesh lies in the hair's space, whether that is moved, scaled or mirrored."""
+    """Remade cards keep edits where the head was moved, scaled or mirrored: the mesh is in the
+    hair's space."""
     sphere.location, sphere.scale = (1.0, 2.0, 3.0), scale
     bpy.context.view_layer.update()
     obj = make(hair)
@@ -359,7 +360,7 @@ def faces(obj, card):
 
 
 def test_coarser_levels_follow_the_edited_shape(hair):
-    """A card is moved and enlarged: the coarser one lies on it, and no other is where it was."""
+    """The coarser level follows a card that was moved and enlarged, and lacks a deleted card."""
     hair.data.hairloom.cards.column_count, hair.data.hairloom.cards.error = 1, 0.05
     obj = make(hair)
     coarse = of_card(card_objects(hair)[1], 3)
@@ -375,12 +376,13 @@ def test_coarser_levels_follow_the_edited_shape(hair):
     own, coarse = corners(obj, 3), of_card(card_objects(hair)[1], 3)
     assert not len(of_card(card_objects(hair)[1], 5))
     assert len(coarse) < len(own)
-    for reach in (np.min, np.max):  # the coarser one is raised where it would sink into the head
+    # 0.012 m, because the coarser card is raised where it would sink into the head
+    for reach in (np.min, np.max):
         np.testing.assert_allclose(reach(coarse, axis=0), reach(own, axis=0), atol=0.012)
 
 
 def of_card(obj, card):
-    """The places of the corners of a card in any level."""
+    """The positions of a card's corners, in a mesh of any level."""
     number = np.empty(len(obj.data.polygons), np.int32)
     obj.data.attributes["card"].data.foreach_get("value", number)
     pairs = zip(obj.data.polygons, number, strict=True)
@@ -415,7 +417,7 @@ def test_edits_are_in_the_file(hair, tmp_path):
 
 
 def test_what_is_drawn_has_the_edits(hair, evaluated):
-    """The preview follows once Edit Mode is left, without Make Cards."""
+    """The preview updates when Edit Mode ends, without Make Cards."""
     obj = make(hair)
     hair.data.hairloom.card_drawing.shown_as = "cards"
     session = previews.start(hair, evaluated())
@@ -460,7 +462,7 @@ def lowest(mesh, card):
 
 
 def test_edited_cards_ride_on_the_guides(hair, evaluated):
-    """A card that was moved aside goes with its guides as the others do."""
+    """A card that was moved follows its guides as the other cards do."""
     obj = make(hair)
     move(obj, 3, by=(0.0, 0.0, 0.02))
     built = BuiltCards.now(read_inputs(hair, evaluated())[0])
@@ -480,7 +482,7 @@ def test_edited_cards_ride_on_the_guides(hair, evaluated):
 
 
 def test_exported_cards_have_the_edits(hair, evaluated, tmp_path):
-    """Another importer reads the file: Blender's own."""
+    """Blender's glTF importer finds the moved card, and not the deleted one."""
     obj = make(hair)
     move(obj, 3, by=(0.0, 0.0, 1.0))
     delete(obj, 5)
@@ -498,7 +500,8 @@ def test_exported_cards_have_the_edits(hair, evaluated, tmp_path):
 
 
 def test_a_card_whose_uvs_are_folded_has_the_indices_of_its_file(hair, evaluated, tmp_path):
-    """And one whose corner is turned over, so that its triangles meet in a vertex alone."""
+    """The indices also match for a card with a flipped corner, whose triangles there share only a
+    vertex."""
     hair.data.hairloom.cards.column_count = 2
     obj = make(hair)
     uv = obj.data.uv_layers["UVMap"].uv
@@ -533,8 +536,8 @@ def test_a_card_whose_uvs_are_folded_has_the_indices_of_its_file(hair, evaluated
 
 @pytest.mark.parametrize("is_chosen", few_in_commits([False, True]))
 def test_in_another_atlas_a_card_lies_within_one_tile(hair, is_chosen):
-    """The atlas gets eight columns in place of four. A card that was only moved has the tile of the
-    card that it replaces."""
+    """The atlas changes from four columns to eight. A card that was only moved takes the tile of
+    the card that it replaces."""
     obj = make(hair)
     move(obj, *range(12))
     if is_chosen:
@@ -550,7 +553,7 @@ def test_in_another_atlas_a_card_lies_within_one_tile(hair, is_chosen):
 
 
 def tiles_of(obj):
-    """The tile of each card."""
+    """The tile of each of the twelve cards."""
     tile = np.empty(len(obj.data.polygons), np.int32)
     obj.data.attributes["tile"].data.foreach_get("value", tile)
     return {card: int(tile[numbers(obj) == card][0]) for card in range(12)}

@@ -1,4 +1,4 @@
-"""Hair cards as FBX, USD and OBJ, read back by readers that we did not write: ufbx and usd-core."""
+"""Hair cards as FBX, USD and OBJ, read back by independent readers: ufbx and usd-core."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ needs_ufbx = pytest.mark.skipif(
 
 
 def shuffled_cards(segments: int, seed: int) -> CardMesh:
-    """Cards around a circle whose triangles come in an order that no exporter would choose."""
+    """Cards around a circle, their triangles in an order that no exporter would choose."""
     random = np.random.default_rng(seed)
     angle = random.uniform(0.0, 2.0 * np.pi, 20)
     out = np.stack([np.cos(angle), np.sin(angle), np.zeros(20)], axis=-1)
@@ -84,7 +84,7 @@ def read_by_ufbx(path: Path, folder: Path) -> dict[str, Any]:
 
 
 def at_corners(values: np.ndarray, mesh: CardMesh) -> np.ndarray:
-    """Of each corner of each triangle, in order, (corners, width)."""
+    """The values at each corner of each triangle, in order, (corners, width)."""
     return values[mesh.triangles.ravel()]
 
 
@@ -111,7 +111,8 @@ def test_fbx_keeps_order_attributes_and_levels(levels: list[CardMesh], tmp_path:
 
 
 def mirrored(levels: list[CardMesh]) -> list[CardMesh]:
-    """As an artist mirrors cards: u runs the other way, strands and faces as before."""
+    """Levels as if an artist had mirrored the cards: u runs the other way, strands and faces are
+    unchanged."""
     return [replace(mesh, uv=np.abs([1.0, 0.0] - mesh.uv).astype(np.float32)) for mesh in levels]
 
 
@@ -119,7 +120,8 @@ def mirrored(levels: list[CardMesh]) -> list[CardMesh]:
 def test_glb_says_which_way_strands_run(
     levels: list[CardMesh], tmp_path: Path, is_mirrored: bool
 ) -> None:
-    """By the formula of the sidecar."""
+    """The sidecar's formula gives the strands' direction from the GLB's normals and tangents, also
+    for mirrored UVs."""
     assert "TANGENT.w * cross(NORMAL, TANGENT.xyz)" in GLB.attributes["TANGENT"]
     path = written(tmp_path, mirrored(levels) if is_mirrored else levels, GLB)
     file = GlbFile.of(path.read_bytes(), str(path))
@@ -163,7 +165,7 @@ def test_fbx_is_in_centimetres_with_y_up_and_no_object_is_scaled_or_turned(
     assert np.array(read["turns"]) == pytest.approx(np.tile([0, 0, 0, 1], (len(read["turns"]), 1)))
     textures = {"DiffuseColor": "hair_base.png", "TransparencyFactor": "hair_alpha.png"}
     assert read["textures"] == textures
-    # the format wants the whole path as well: that of the file, not of the temporary folder
+    # FBX also stores absolute paths: they must point to the final folder, not the temporary one
     assert str(tmp_path / "hair_base.png").encode() in path.read_bytes()
 
 
@@ -177,7 +179,7 @@ def test_obj_keeps_order_and_attributes(levels: list[CardMesh], tmp_path: Path) 
         np.testing.assert_allclose(got["position"], place, atol=1e-6)
         np.testing.assert_allclose(got["uv"][0], at_corners(mesh.uv, mesh), atol=1e-6)
         openness = at_corners(np.stack([mesh.occlusion, mesh.along], axis=1), mesh)
-        # four digits, and Blender's own table of the sRGB curve
+        # OBJ stores four digits, and Blender's table approximates the sRGB curve
         np.testing.assert_allclose(np.array(got["color"][0])[:, :2], openness, atol=3e-4)
         normal = at_corners(from_z_up(mesh.normal, "Y"), mesh)
         np.testing.assert_allclose(got["normal"], normal, atol=2e-4)
@@ -244,7 +246,8 @@ def test_a_disk_that_is_full_for_the_levels_of_usd_is_told(
 
 
 def test_the_users_blocks_keep_their_names(levels: list[CardMesh], tmp_path: Path) -> None:
-    """Objects of the names that we need are there already, and the file still has those names."""
+    """Blocks in the scene already have the names that the export needs: they keep them, and the
+    file has them too."""
     mesh = bpy.data.meshes.new(f"{NODE}_LOD0")
     obj = bpy.data.objects.new(f"{NODE}_LOD0", mesh)
     bpy.context.scene.collection.objects.link(obj)
@@ -282,7 +285,7 @@ def test_an_exporter_that_is_missing_is_told_and_nothing_is_written(
     file_format: CardFormat,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """As in a Blender that was built without it."""
+    """Such as in a Blender that was built without this exporter."""
     monkeypatch.setitem(
         exporters._OPERATORS, file_format.name, lambda: bpy.ops.wm.hairloom_no_such_export
     )

@@ -1,4 +1,4 @@
-"""Hair cards with all that lies beside them: from the command line, a button and a collection."""
+"""Hair cards and the files beside them: from the command line, a button and a collection."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ pytestmark = pytest.mark.usefixtures("extension")
 
 
 def oiio_pixels(path: Path) -> np.ndarray:
-    """All channels as they are stored, the lowest row first."""
+    """All channels as stored, row 0 at the bottom."""
     library = pytest.importorskip("OpenImageIO")
     source = library.ImageInput.open(str(path))
     spec = source.spec()
@@ -73,7 +73,8 @@ def test_every_format_comes_with_a_sidecar_that_follows_the_schema(
 
 
 def test_the_index_buffer_holds_the_indices_of_the_glb(tmp_path: Path) -> None:
-    """As an engine would use it: with the vertices of the GLB."""
+    """For each level, the buffer has the GLB's indices, and the same triangles in the order for
+    back faces."""
     assert cards(tmp_path / "hair.glb", *BAKED, "--levels", "3", "--index-buffer") == 0
     content, glb = sidecar_of(tmp_path / "hair.glb"), Glb(tmp_path / "hair.glb")
     indices = np.frombuffer((tmp_path / "hair.indices.bin").read_bytes(), "<u2")
@@ -111,7 +112,7 @@ def test_a_baked_atlas_is_packed_as_the_engine_wants_it(tmp_path: Path) -> None:
 def test_only_a_picture_of_alpha_alone_is_linked_as_opacity(
     tmp_path: Path, packing: str, alpha: str
 ) -> None:
-    """Plain importers take the mean of all channels."""
+    """Plain importers read opacity as the mean of all channels."""
     assert cards(tmp_path / "hair.obj", *BAKED, "--packing", packing, "--levels", "1") == 0
     material = (tmp_path / "hair.mtl").read_text(encoding="utf-8")
     linked = [line.split()[-1] for line in material.splitlines() if line.startswith("map_d")]
@@ -154,7 +155,8 @@ def test_a_viewer_that_knows_nothing_of_us_shows_one_level_in_the_hairs_colour(
     expected = np.exp(-power * np.sqrt(melanin_absorption(0.5, 0.6)))
     base = oiio_pixels(tmp_path / "hair_base.png")[..., :3].reshape(-1, 3)
     factor = np.where(base > 0.04045, ((base + 0.055) / 1.055) ** 2.4, base / 12.92)
-    albedo = plain_albedo(expected * factor)  # `bench engines` judges it
+    # `bench engines` judges this fit
+    albedo = plain_albedo(expected * factor)
     np.testing.assert_allclose(linear.mean(0), albedo.mean(0), rtol=0.03)
 
 
@@ -195,7 +197,7 @@ def test_usd_shows_one_level_of_many_and_says_how_colours_are_coded(
         for prim in stage.Traverse()
         if prim.HasAttribute(name := "inputs:sourceColorSpace")
     }
-    # without one it is "auto": sRGB for eight bits, linear for more
+    # without this attribute it is "auto": sRGB for eight bits, linear for more
     assert spaces.get(sidecar_of(path)["textures"]["color"]["file"]) == space
 
     def shown() -> list[str]:
@@ -226,7 +228,7 @@ def test_both_models_give_all_their_values(tmp_path: Path) -> None:
     for name, values in expected.items():
         file = tmp_path / material["tables"][name]["file"]
         np.testing.assert_array_equal(oiio_pixels(file), values.astype(np.float32))
-        # games by Godot read it without a library: a row of a channel lies in it as it is
+        # uncompressed rows: games in Godot read them without a library
         assert values[0, :, 1].astype("<f4").tobytes() in file.read_bytes()
 
 
@@ -237,7 +239,7 @@ def test_a_failure_in_the_middle_leaves_the_old_files(
     monkeypatch: pytest.MonkeyPatch,
     capfd: pytest.CaptureFixture[str],
 ) -> None:
-    """The disk is full when the last file is written."""
+    """The disk is full at the last file: all old files are kept."""
     assert cards(tmp_path / f"hair{suffix}", "--levels", "1") == 0
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
 
@@ -272,7 +274,7 @@ def test_a_folder_that_may_not_be_written_to_keeps_its_files(
 
 @contextmanager
 def small_disk(folder: Path, size: int) -> Iterator[Path]:
-    """A disk of this many bytes."""
+    """A mounted disk of this many bytes."""
     folder.mkdir()
     command = ["mount", "-t", "tmpfs", "-o", f"size={size}", "none", str(folder)]
     if subprocess.run(command, capture_output=True).returncode:
@@ -289,7 +291,7 @@ def small_disk(folder: Path, size: int) -> Iterator[Path]:
 def test_a_disk_that_becomes_full_at_the_mesh_keeps_its_files(
     tmp_path: Path, suffix: str, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    """All textures fit, and half of the mesh; names have letters of two scripts."""
+    """There is room for all textures and half of the mesh. File names mix two scripts."""
     name = f"Zöpfe 头发{suffix}"
     options = ("--textures", "dds", "--levels", "1", *BAKED, "--set", "atlas.size=256")
     assert cards(tmp_path / name, *options) == 0
@@ -310,7 +312,7 @@ def test_a_disk_that_becomes_full_at_the_mesh_keeps_its_files(
 
 @contextmanager
 def nobody() -> Iterator[None]:
-    """Without the rights of root, whom no folder refuses."""
+    """Drop the rights of root, who may write to any folder."""
     is_root = os.geteuid() == 0
     if is_root:
         os.seteuid(65534)
@@ -326,7 +328,8 @@ def nobody() -> Iterator[None]:
 def test_a_file_that_cannot_be_replaced_leaves_all_old_files(
     tmp_path: Path, refused: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As where another program holds one of them open."""
+    """The third or first move fails, such as where another program has the file open; the new files
+    are kept in another folder."""
     assert cards(tmp_path / "hair.glb", "--levels", "1") == 0
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
     really, moves = os.replace, []
@@ -417,7 +420,7 @@ def test_a_button_writes_under_the_hairs_name(sphere: Any, tmp_path: Path) -> No
 def test_an_export_with_a_folder_is_that_folder_and_nothing_else(
     sphere: Any, tmp_path: Path
 ) -> None:
-    """A second time, too, from where the folder lies and from within it."""
+    """The folder is the same on a second export, from beside it and from within it."""
     grown(sphere, "Hair")
     loose, out = tmp_path / "loose" / "Hair.glb", tmp_path / "Hair.glb"
     options = {"own_levels": True, "levels": 1}
@@ -469,7 +472,7 @@ def test_the_suffix_follows_the_format() -> None:
 
 @pytest.mark.slow(instead="test_a_button_writes_under_the_hairs_name")
 def test_a_collections_exporter_writes_all_its_hair(sphere: Any, tmp_path: Path) -> None:
-    """With something else selected, or nothing."""
+    """The selection does not matter: here nothing is selected."""
     collection = bpy.data.collections.new("Assets")
     bpy.context.scene.collection.children.link(collection)
     for name in ("Front", "Haar/Ä.001"):
@@ -511,7 +514,7 @@ def test_a_sidecar_says_how_colours_are_stored(suffix: str, space: str) -> None:
 
 
 def test_a_glb_changes_with_its_look_and_with_nothing_else(tmp_path: Path) -> None:
-    """Engines look at its bytes to see whether there is anything to import again."""
+    """Engines import a GLB again only if its bytes change; the look alone must change them."""
     looks = {"one": "1", "two": "1", "three": "3"}
     written = {}
     for folder, strength in looks.items():

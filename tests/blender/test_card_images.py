@@ -1,4 +1,4 @@
-"""The artist's pictures for hair cards: as Blender holds them, from files, missing and broken."""
+"""An artist's pictures for hair cards: from Blender's images and from files, missing and broken."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def values(channels: int, seed: int = 3) -> np.ndarray:
 
 @pytest.fixture
 def write(tmp_path: Path) -> Any:
-    """Writes a picture into a file and gives its path."""
+    """A function that writes a picture into a file and returns its path."""
     files = pytest.importorskip("hairloom.addon.exchange.textures.texture_files")
     pytest.importorskip("OpenImageIO")
 
@@ -46,7 +46,7 @@ def write(tmp_path: Path) -> Any:
     ("suffix", "depth"), [(".png", "uint8"), (".png", "uint16"), (".exr", "float")]
 )
 def test_an_image_reads_as_its_file(write: Any, suffix: str, depth: str, is_color: bool) -> None:
-    """Whatever Blender makes of it: it decodes 16 bits by sRGB, and multiplies with alpha."""
+    """Blender's own conversions are undone: it decodes 16 bits as sRGB, and multiplies by alpha."""
     pixels = values(4)
     pixels[..., 3] = np.maximum(pixels[..., 3], 0.2)
     path = write(f"picture{suffix}", pixels, is_color=is_color, depth=depth)
@@ -179,7 +179,8 @@ def test_a_wrong_picture_on_the_command_line_is_named(
 def test_without_openimageio_blender_reads_and_writes(
     write: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """In 8 bits, and with the same values."""
+    """Blender's reader and writer give the same values as OpenImageIO, to 8 bits in written
+    files."""
     color, data = values(3), values(1)
     files = {
         "color": write("color.png", color, is_color=True),

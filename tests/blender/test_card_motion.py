@@ -1,4 +1,4 @@
-"""Cards in motion: what files hold, played by readers of our own making and by others'."""
+"""Cards in motion: exported files against the simulation, played by our readers and by others."""
 
 from __future__ import annotations
 
@@ -51,7 +51,8 @@ SETTINGS = SettingsMap(
 
 @pytest.fixture(scope="module")
 def motion() -> GuideMotion:
-    """Hair grown here on a head that shakes; the guides lag behind, each as a wave of its own."""
+    """Hair grown here, on a head that shakes. Guides lag behind the head, and each swings at its
+    own phase."""
     grown = read_inputs(Sources(), GrowSettings(strand_count=400, length=0.12))
     scalp = grown.strands.take(np.flatnonzero(grown.strands.group == 0))
     rig = rig_flow.prepare(scalp, grown.head, GuideSettings(guide_count=60), place="x")
@@ -93,7 +94,7 @@ def test_the_first_view_of_a_page_holds_all_places_that_hair_is_carried_to(
 
 
 def simulated(motion: GuideMotion, written: WrittenCards, frame: int) -> list[np.ndarray]:
-    """The corners of all triangles of each level in the world, (triangle_count, 3, 3)."""
+    """The corners of all triangles of each level, world space, (triangle_count, 3, 3) each."""
     rig: Rig = motion.rig
     corners = []
     for level in written.levels:
@@ -103,7 +104,7 @@ def simulated(motion: GuideMotion, written: WrittenCards, frame: int) -> list[np
 
 
 def head_matrix(motion: GuideMotion, frame: int) -> np.ndarray:
-    """How the head has moved, which turns as one piece."""
+    """The matrix of the head, which moves rigidly."""
     return motion.at(frame)[0].matrix
 
 
@@ -124,7 +125,8 @@ def off(found: list[np.ndarray], expected: list[np.ndarray]) -> np.ndarray:
 def test_skinned_cards_are_the_simulated_ones(
     motion: GuideMotion, joints: tuple[Path, WrittenCards]
 ) -> None:
-    """Index by index in all levels, with the head's motion put back; and they do move."""
+    """Skinned corners, with the head's motion added, are within 1 % of the hair's length (RMS) of
+    the simulated ones in all levels; the motion itself is over five times larger."""
     path, written = joints
     player, told = Player(path), written.motion
     assert told["joints_in_chain"] <= 16
@@ -140,7 +142,8 @@ def test_skinned_cards_are_the_simulated_ones(
     steps = np.diff(motion.rig.guide_grid, axis=1)
     assert length == typical(np.linalg.norm(steps, axis=2).sum(axis=1))
     assert rms < 0.01 * length
-    assert rms == pytest.approx(told["error"]["root_mean_square"], rel=0.2)  # corners count twice
+    # within 20 %, because vertices count once for each corner here
+    assert rms == pytest.approx(told["error"]["root_mean_square"], rel=0.2)
     assert np.sqrt(np.mean(np.square(moved))) > 5.0 * rms
 
 
@@ -158,7 +161,7 @@ def test_the_head_is_in_the_root_joint_where_it_is_asked_for(
 def test_khronos_validator_finds_no_fault(joints: tuple[Path, WrittenCards]) -> None:
     report = validated(joints[0])
     assert report["issues"]["numErrors"] == 0, report
-    # the meshes lie below a node that stays where it is, as in Blender's own files
+    # as in Blender's own files, the skinned meshes have a parent node, which does not move
     warning = 1
     grave = [each for each in report["issues"]["messages"] if each["severity"] <= warning]
     codes = {message["code"] for message in grave}
@@ -186,13 +189,13 @@ def test_weights_are_four_of_sum_one_and_levels_share_the_joints(
 def test_panda3d_plays_the_same(
     motion: GuideMotion, joints: tuple[Path, WrittenCards], tmp_path: Path
 ) -> None:
-    """Its own skinning and its own clock."""
+    """Panda3D's own skinning and timing agree with our player to 1.5 mm."""
     for module in ("panda3d", "gltf"):
         if importlib.util.find_spec(module) is None:
             pytest.skip(f"{module} is missing: `make setup` installs it")
     path, written = joints
     output = tmp_path / "bounds.json"
-    frames = [4, 12, 20, 28]  # its reader shows frame 1 for frame 0
+    frames = [4, 12, 20, 28]  # Panda3D's reader shows frame 1 for frame 0
     command = [sys.executable, str(PANDA_MOTION), str(path), str(output), str(RATE)]
     command += [str(frame) for frame in frames]
     result = subprocess.run(command, capture_output=True, text=True, timeout=120)
@@ -210,7 +213,7 @@ def test_panda3d_plays_the_same(
 def test_a_motion_texture_holds_the_simulated_cards(
     motion: GuideMotion, tmp_path: Path, depth: str
 ) -> None:
-    """From the GLB's texels, the sidecar and the EXR alone, as a vertex shader reads them."""
+    """Decoded as a vertex shader would, from the GLB's texels, the sidecar and the EXR."""
     library = pytest.importorskip("OpenImageIO")
     path = tmp_path / "hair.glb"
     written = write(path, motion, kind="texture", motion_space="world", motion_depth=depth)
@@ -246,11 +249,11 @@ def test_a_motion_texture_holds_the_simulated_cards(
             for name in ("normal", "tangent"):
                 expected = GLB.placed(getattr(mesh_now, name)[corners])
                 np.testing.assert_allclose(pictures[name][row, column], expected, atol=6e-4)
-    # a half holds 11 bits of how far a vertex goes, here less than 12.5 cm
+    # half floats have 11 significant bits; offsets here are below 12.5 cm
     assert worst < (0.125 * 2.0**-11 + 1e-6 if depth == "half" else 1e-6)
     error = told["error"]
     assert error["root_mean_square"] <= error["percentile_99"] <= error["worst"]
-    # some of the frames, along one axis, and all frames in space
+    # the stored error is in 3D, over all frames; `worst` is along one axis, over three frames
     assert worst - 1e-6 <= error["worst"] <= 2.0 * worst if depth == "half" else not error["worst"]
 
 
@@ -295,7 +298,7 @@ def test_the_sidecar_follows_the_schema(
 
 @pytest.fixture(scope="module")
 def card_edits(motion: GuideMotion) -> CardEdits:
-    """One card moved, one deleted, and a copy of one."""
+    """Edits: one card moved, one deleted, one copied."""
     build = result_of(build_steps(CardInputs(motion.rig, SETTINGS))).build
     mesh, made = build.finest, build.made
     assert made is not None
@@ -340,7 +343,7 @@ def test_edited_cards_move_too(
 def test_every_format_has_the_edits(
     motion: GuideMotion, card_edits: CardEdits, tmp_path: Path, suffix: str
 ) -> None:
-    """Blender's importers give back as many triangles as the edited cards have."""
+    """Blender's importers read as many triangles as the edited cards have."""
     path = tmp_path / f"hair.{suffix}"
     inputs = CardInputs(motion.rig, SETTINGS, edits=card_edits)
     written = write_cards(path, inputs, CardOutput())

@@ -1,4 +1,4 @@
-"""Cards in motion by a button and by the command line, and work on them that is cancelled."""
+"""Cards in motion, exported by a button, by the command line, and cancelled halfway."""
 
 from __future__ import annotations
 
@@ -64,7 +64,8 @@ def test_the_command_line_writes_a_bake(tmp_path: Path, capfd: Any) -> None:
 @pytest.mark.slow
 @pytest.mark.usefixtures("extension")
 def test_a_button_writes_the_bake(sphere: Any, tmp_path: Path) -> None:
-    """Its frames, or some of them; without a bake it says so, and nothing is written."""
+    """The button writes all frames of the bake or a chosen range; without a bake it reports an
+    error and writes nothing."""
     bpy.ops.object.select_all(action="DESELECT")
     sphere.select_set(True)
     bpy.context.view_layer.objects.active = sphere
@@ -127,7 +128,7 @@ def test_a_button_writes_the_bake(sphere: Any, tmp_path: Path) -> None:
 def test_cancelled_in_its_midst_it_leaves_the_old_files(
     kind: str, amid: str, sphere: Any, tmp_path: Path
 ) -> None:
-    """The steps that Esc closes in the window, as far as each of them."""
+    """The steps are closed at this stage, as Esc in the window does."""
     bpy.context.view_layer.objects.active = sphere
     bpy.ops.hairloom.grow(strand_count=40, length=0.05)
     hair, scene = bpy.context.object, bpy.context.scene

@@ -1,4 +1,4 @@
-"""Hair cards as objects in the artist's scene."""
+"""Hair cards as objects in a scene."""
 
 from itertools import pairwise
 from types import SimpleNamespace
@@ -15,7 +15,8 @@ from hairloom.addon.ui.long_work import threaded
 
 @pytest.fixture
 def hair(new_hair, sphere):
-    """A hedgehog of 60 strands in two groups on a sphere, to be few cards of a small picture."""
+    """A hedgehog of 60 strands in two groups on a sphere, set up for few cards with a small
+    texture."""
     made = new_hair(sphere)
     cards, texture = made.data.hairloom.cards, made.data.hairloom.card_texture
     cards.source, cards.card_count, cards.levels, cards.fly_aways = "clusters", 12, 3, 0.0
@@ -34,7 +35,8 @@ def press():
 
 
 def test_cards_that_are_cancelled_leave_the_scene_as_it_was(hair):
-    """Esc closes the steps, before the first cards and before they are made again."""
+    """Esc closes the steps, once before the first cards exist and once before they are made
+    again."""
     before = sorted(obj.name for obj in bpy.data.objects)
     for _ in range(2):
         points = {obj.name: world_points(obj) for obj in card_objects(hair)}
@@ -102,7 +104,7 @@ def test_the_mesh_holds_what_an_engine_or_a_node_tree_needs(hair):
     second = np.empty((len(mesh.loops), 2), np.float32)
     mesh.uv_layers[1].uv.foreach_get("vector", second.ravel())
     np.testing.assert_allclose(second, np.stack([occlusion, along], axis=1)[corners], atol=1e-6)
-    # Blender shades with our normals, which lean outwards from the flat triangles
+    # Blender shades with our normals, which lean outwards relative to the flat triangles
     shown = np.empty((len(mesh.loops), 3), np.float32)
     mesh.corner_normals.foreach_get("vector", shown.ravel())
     np.testing.assert_allclose(shown, values(obj, "custom_normal", 3)[corners], atol=1e-3)
@@ -143,7 +145,7 @@ def test_another_texture_may_have_another_size(hair):
 @pytest.mark.parametrize("name", ["Backup", "Hair Cards", "Zoë's"])
 @pytest.mark.parametrize("reopened", [False, True])
 def test_a_copy_of_the_cards_is_left_alone(hair, name, reopened, tmp_path):
-    """Whatever it is called, even as the cards were called before."""
+    """The copy's name does not matter, not even the cards' former name."""
     press()
     obj = card_objects(hair)[0]
     obj.name = "Fringe"
@@ -183,7 +185,7 @@ def test_where_the_cards_are_gone_their_copy_is_left_alone(hair):
 def test_cards_lie_on_hair_that_was_moved_scaled_and_mirrored(hair, sphere, scale):
     moved = Matrix.LocRotScale((0.3, -0.2, 0.1), None, scale)
     sphere.matrix_world = moved @ sphere.matrix_world
-    hair.data.hairloom.cards.card_count = 60  # a strand each
+    hair.data.hairloom.cards.card_count = 60  # a card for each strand
     bpy.context.view_layer.update()
     press()
     obj = card_objects(hair)[0]
@@ -194,13 +196,14 @@ def test_cards_lie_on_hair_that_was_moved_scaled_and_mirrored(hair, sphere, scal
     strands = strands @ matrix[:3, :3].T + matrix[:3, 3]
     np.testing.assert_allclose(points.min(axis=0), strands.min(axis=0), atol=0.01)
     np.testing.assert_allclose(points.max(axis=0), strands.max(axis=0), atol=0.01)
-    # in the object's own space faces and normals look the same way
+    # in object space, faces and normals point the same way
     own = np.empty((len(obj.data.polygons), 3), np.float32)
     obj.data.polygons.foreach_get("normal", own.ravel())
     corners = np.empty(len(obj.data.loops), np.int32)
     obj.data.loops.foreach_get("vertex_index", corners)
     normals = values(obj, "custom_normal", 3)[corners.reshape(-1, 3)].mean(axis=1)
-    # but for facets that turn away from the normals of their upright hair; mirrored ones would all
+    # except facets that turn away from the normals of their upright hair; if mirrored, all would
+    # fail
     assert ((own * normals).sum(axis=1) > 0.0).mean() > 0.9
 
 

@@ -1,4 +1,4 @@
-"""The web page beside an export: from the command line and from the dialog, with all of the set."""
+"""The web page beside an export, from the command line and the dialog, with its embedded files."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ LEVELS = ("--levels", "2")
 
 
 def asset_of(path: Path) -> dict[str, Any]:
-    """What lies in a page, its files as bytes."""
+    """The asset embedded in a page, its files as bytes."""
     (content,) = re.findall(r'id="asset">(.*?)</script>', path.read_text("utf-8"), re.S)
     asset = json.loads(content)
     asset["files"] = {
@@ -40,7 +40,7 @@ def asset_of(path: Path) -> dict[str, Any]:
 
 @pytest.mark.slow(instead="test_a_page_is_part_of_the_set")
 def test_a_page_holds_all_that_its_sidecar_names(tmp_path: Path) -> None:
-    """The same levels as the GLB beside it, the order of back faces, the head."""
+    """The page has the GLB's triangles in each level, an order of back faces, and the head."""
     assert cards(tmp_path / "hair.glb", *BAKED, *LEVELS, "--page", "--page-texture", "512") == 0
     beside, asset = sidecar_of(tmp_path / "hair.glb"), asset_of(tmp_path / "hair.html")
     assert beside["page"] == "hair.html"
@@ -81,7 +81,7 @@ def small_indices(file: Glb, node: str) -> np.ndarray:
 
 
 def test_a_page_is_part_of_the_set(tmp_path: Path) -> None:
-    """Another export replaces it; one of somebody else is kept."""
+    """Another export replaces the page. Someone else's page is kept under another name."""
     assert cards(tmp_path / "hair.glb", "--levels", "1", "--page", "--no-page-head") == 0
     names = sorted(each.name for each in tmp_path.iterdir())
     first = (tmp_path / "hair.html").read_bytes()
@@ -121,7 +121,7 @@ def test_a_page_beside_another_format_is_refused(
 
 
 def test_the_dialog_writes_a_page_into_the_folder(sphere: Any, tmp_path: Path) -> None:
-    """Whatever the hair is called."""
+    """Quotes and HTML in the hair's name do no harm."""
     grown(sphere, "</script> \"Zopf\" 'ä'")
     options = {"own_levels": True, "levels": 1, "page": True, "own_folder": True}
     bpy.ops.hairloom.export_cards(filepath=str(tmp_path / "Zöpfe.glb"), **options)

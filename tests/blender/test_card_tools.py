@@ -1,4 +1,4 @@
-"""Tools for cards by hand: width, twist and tile in Edit Mode, and a card along a curve."""
+"""Card tools: width, twist and tile in Edit Mode, and a card along a curve."""
 
 import bpy
 import numpy as np
@@ -58,7 +58,7 @@ def test_twist_turns_the_tip_by_the_angle_and_keeps_widths(hair):
     np.testing.assert_allclose(now[0], before[0], atol=1e-6)
     across = [each[:, 2] - each[:, 0] for each in (before, now)]
     cosine = np.einsum("ri,ri->r", *across) / widths(before) ** 2
-    # rows that are not square to the card keep the part along it
+    # the component of a row along the card's axis is not turned
     middle = (before[:, 0] + before[:, 2]) / 2.0
     axis = np.gradient(middle, axis=0)
     axis /= np.linalg.norm(axis, axis=1)[:, None]
@@ -163,7 +163,7 @@ def test_without_numbers_a_curve_gets_the_width_and_tile_of_its_neighbours(hair,
     obj = make(hair)
     near = grid(obj, 3)
     middle = (near[:, 0] + near[:, 2]) / 2.0
-    # the line ends above the root of a card that shows another tile
+    # the line ends above the root of a card with another tile
     tile = [int(corners(obj, card, "UVMap")[:, 0].mean() * 4) for card in range(12)]
     other = next(card for card in range(12) if tile[card] != tile[3])
     tip = grid(obj, other)[0, 1]

@@ -1,4 +1,4 @@
-"""Cards that ride are led out of a head, as Blender's own search finds it."""
+"""Riding cards are led out of a head, tested against Blender's own ray casts and nearest points."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ WAYS = ((1.0, 0.1, 0.9), (-0.3, 1.0, 0.8), (0.1, -0.2, 1.0))
 
 
 def depths(points: np.ndarray, head: Surface) -> np.ndarray:
-    """How deep each point is in the head's triangles, by Blender: 0 outside, [m]."""
+    """The depth of each point inside the head by Blender's BVH, 0 outside [m]."""
     tree = BVHTree.FromPolygons(head.positions.tolist(), head.triangles.tolist())
     found = np.zeros(len(points))
     for number, point in enumerate(points):
@@ -59,7 +59,7 @@ def test_no_card_enters_a_head_deeper_than_at_rest() -> None:
     contacts = CardContacts(
         solids, CardClearance.at(*carried, cards.row, cards.offsets, solids, KEPT)
     )
-    # all fall to the left, many through the head
+    # all strands fall to the left, many through the head
     fall = guides[:, :1] + along * np.array([-0.8, 0.1, -0.6], np.float32)
     at_rest = depths(mesh.positions, head)
     riding = depths(follow_guides(cards, fall, turns).positions, head)

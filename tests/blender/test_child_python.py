@@ -1,4 +1,4 @@
-"""Another Python beside this Blender: it has the same packages, or Blender itself stands in."""
+"""The Python that runs readers: one with this Blender's packages, otherwise Blender itself."""
 
 import importlib.util
 import os
@@ -19,14 +19,14 @@ SCRIPT = "import os, sys, numpy\nopen(sys.argv[-1], 'w').write(numpy.__file__)\n
 
 @pytest.fixture
 def afresh():
-    """The command is looked for once a session."""
+    """`python_command` without its cache, which otherwise lasts for a session."""
     child_python.found_python.cache_clear()
     yield child_python.python_command
     child_python.found_python.cache_clear()
 
 
 def numpy_of(command, folder):
-    """Where a command's Python has its numpy; it runs a script as a reader does."""
+    """The path of numpy in a command's Python, found by a script that runs as a reader does."""
     script, path, result = folder / "script.py", folder / "groom.abc", folder / "result"
     script.write_text(SCRIPT.format(code=0))
     path.write_bytes(b"any")
@@ -68,7 +68,7 @@ def test_blender_itself_runs_a_script(tmp_path):
 
 
 def test_a_python_without_the_packages_is_passed_over(afresh, monkeypatch, tmp_path):
-    """Where no Python has them it is Blender, and where that is a module it is nothing."""
+    """If no Python has the packages, it is Blender; if Blender is a Python module, it is none."""
     lacking = tmp_path / "python-lacking"
     lacking.write_text("#!/bin/sh\nexit 1\n")
     lacking.chmod(0o755)
@@ -79,7 +79,7 @@ def test_a_python_without_the_packages_is_passed_over(afresh, monkeypatch, tmp_p
 
 
 def test_a_python_that_is_only_slow_is_tried_again(afresh, monkeypatch):
-    """A cold disk at the first import does not decide for the whole session."""
+    """A slow first import, as from a cold disk, does not decide for the whole session."""
     is_slow = True
     real = child_python.run_child
 
@@ -120,7 +120,7 @@ def test_a_program_that_is_no_python_is_not_taken(monkeypatch, tmp_path):
 
 
 def test_the_python_of_the_folder_of_modules_is_found(monkeypatch, tmp_path):
-    """Where Blender does not name it: as official builds have it."""
+    """As in official builds, where `sys.executable` is Blender."""
     program = tmp_path / "bin" / f"python{sys.version_info[0]}.{sys.version_info[1]}"
     program.parent.mkdir()
     program.touch()

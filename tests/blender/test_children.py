@@ -1,4 +1,4 @@
-"""Children between guides, from the artist's buttons to a bake and the command line."""
+"""Children between guides: in the panel, in a preview, in a bake and on the command line."""
 
 import json
 from dataclasses import replace
@@ -30,7 +30,7 @@ LAST = 6
 
 @pytest.fixture
 def hair(new_hair, sphere):
-    """60 curves on a head, with 200 children between them."""
+    """60 guide curves on a head, with 200 children between them."""
     hair = new_hair(sphere)
     children = hair.data.hairloom.children
     children.method, children.strand_count = "multi", 200
@@ -40,7 +40,7 @@ def hair(new_hair, sphere):
 
 @pytest.fixture
 def moving(hair, sphere, tmp_path):
-    """The same on a head that is thrown about for some frames."""
+    """`hair` on a head that moves."""
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = 1, LAST
     for frame, x in ((1, 0.0), (3, 0.1), (LAST, -0.05)):
@@ -53,7 +53,7 @@ def moving(hair, sphere, tmp_path):
 
 
 def catch_up(evaluated):
-    """What a timer does once edits have settled."""
+    """Update the previews, as a timer does once edits have settled."""
     bpy.context.view_layer.update()
     scene_events.catch_up(evaluated())
 
@@ -189,7 +189,7 @@ def test_weights_that_cannot_be_used_are_said(hair, sphere, evaluated):
 
 
 def tips(session):
-    """Of the children, by their roots."""
+    """The children's strands by the bytes of their root."""
     rig = session.rig
     each = np.split(rig.strands.points, rig.strands.offsets[1:-1])[rig.own_count :]
     return {strand[0].tobytes(): strand for strand in each}

@@ -1,4 +1,4 @@
-"""Hair follows a brush at once; what follows later is what it would be without the brush."""
+"""Hair follows a brush at once, and what arrives later equals a rebuild without the brush."""
 
 import threading
 
@@ -25,7 +25,7 @@ def hair(new_hair, sphere):
 
 @pytest.fixture
 def session(hair, evaluated, monkeypatch):
-    """Previewed as in a window."""
+    """A preview whose rebuilds do not block, as in a window."""
     made = previews.start(hair, evaluated())
     monkeypatch.setattr(latest_job, "is_blocking", lambda: False)
     yield made
@@ -33,7 +33,7 @@ def session(hair, evaluated, monkeypatch):
 
 
 def stroke(hair, curves, angle=0.3):
-    """Turns curves around their roots, as a brush does that keeps lengths."""
+    """Turn curves around their roots, as a brush that keeps lengths does."""
     points, offsets = curve_points(hair.data), curve_offsets(hair.data)
     turn = np.eye(3, dtype=np.float32)
     turn[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
@@ -54,7 +54,7 @@ def arrive(session, evaluated):
 
 
 def rebuilt(hair, evaluated):
-    """What a preview begun now shows."""
+    """Strands and occlusion of a preview that starts now."""
     fresh = Session(hair, evaluated())
     return fresh.rig.strands.points, fresh.snapshot.occlusion
 
@@ -84,8 +84,8 @@ def test_at_the_end_it_is_bit_for_bit_what_a_rebuild_makes(hair, session, evalua
 
 
 def test_an_undo_brings_back_the_very_hair(hair, session, evaluated):
-    """Before the rest has come, and after it: there children keep the guides of the combed hair
-    until the rest comes again."""
+    """Undo works before and after the rebuild has arrived. After it, children keep the combed
+    guides until the next rebuild arrives."""
     before, points, groom = drawn(session), curve_points(hair.data), session.groom
     own = session.rig.strands.offsets[session.rig.own_count]
     stroke(hair, range(5))
@@ -138,7 +138,7 @@ def test_hair_that_plays_is_not_put_to_rest_by_the_first_touch(hair, session, ev
 
 @pytest.fixture
 def group(hair, sphere):
-    """By which its children grow."""
+    """The density of the children, a vertex group."""
     group = sphere.vertex_groups.new(name="Hair")
     group.add([v.index for v in sphere.data.vertices], 1.0, "REPLACE")
     hair.hairloom.children_density = "Hair"
@@ -146,7 +146,7 @@ def group(hair, sphere):
 
 
 def paint(group, weight):
-    """Half of the head, as a brush does."""
+    """Set the weights of half of the head, as a brush does."""
     sphere = next(obj for obj in bpy.data.objects if group.name in obj.vertex_groups)
     group.add([v.index for v in sphere.data.vertices if v.co.x > 0.0], weight, "REPLACE")
     sphere.data.update_tag()
@@ -206,7 +206,7 @@ def test_hair_that_plays_waits_for_what_is_made_of_the_paint(hair, group, sessio
 
 
 def test_guides_are_lines_while_brushes_comb_them(hair, session, evaluated):
-    """Blender's own curves stay hidden; those on the far side of the head are not drawn."""
+    """Blender's own curves stay hidden. Guides on the far side of the head are not drawn."""
     assert overlay.drawing_of(session.uid).lines == ()
     bpy.ops.object.mode_set(mode="SCULPT_CURVES")
     bpy.context.view_layer.update()
@@ -235,7 +235,7 @@ def test_new_curves_are_no_stroke(hair, session, evaluated):
 
 
 def test_a_combed_head_that_moved_since_takes_hair_along(hair, session, evaluated):
-    """Curves are compared at rest, wherever hair and head are now."""
+    """Strokes are detected on the curves at rest, wherever hair and head are now."""
     hair.parent.location.x += 0.5
     bpy.context.view_layer.update()
     before = drawn(session)
@@ -248,7 +248,8 @@ def test_a_combed_head_that_moved_since_takes_hair_along(hair, session, evaluate
 def test_combed_hair_comes_in_the_light_before_and_keeps_strokes_made_since(
     hair, session, evaluated, monkeypatch
 ):
-    """Its own light is put on the hair as the next stroke has left it."""
+    """Combed hair has the old light at first. Its own light arrives later and leaves newer strokes
+    alone."""
     opened, lit = threading.Event(), session_module.lit
     monkeypatch.setattr(session_module, "lit", lambda *given: opened.wait(60.0) and lit(*given))
     monkeypatch.setattr(latest_job, "is_blocking", lambda: False)

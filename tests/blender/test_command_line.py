@@ -1,4 +1,4 @@
-"""The command line as a farm calls it: exit codes, messages, and nothing half-written."""
+"""The command line as a farm calls it: exit codes, messages, no incomplete files."""
 
 from __future__ import annotations
 
@@ -37,16 +37,16 @@ f 2/2 3/3 5/5
 f 3/3 4/4 5/5
 f 4/4 1/1 5/5
 """
-#: as Blender runs verbs
+#: verbs run with the extension enabled
 pytestmark = pytest.mark.usefixtures("extension")
 
-#: of what verbs write; others write a folder
+#: of the files that verbs write; the other verbs write folders
 SUFFIXES = {"export": ".tfx", "cards": ".glb", "render": ".png"}
 SMALL = ["--set", "guides.guide_count=20", "--set", "guides.cv_count=8"]
 
 
 def hair_on_pyramid(strand_count: int = 60, cv_count: int = 8) -> StrandSet:
-    """Straight hair that stands on the pyramid of HEAD_OBJ as OBJ's Y up places it."""
+    """Straight hair on the pyramid of HEAD_OBJ, as importing that OBJ (Y up) places it."""
     random = np.random.default_rng(5)
     root = random.uniform(-0.05, 0.05, (strand_count, 3)) * [1.0, 0.0, 1.0] + [0.0, -0.075, 0.0]
     along = np.linspace(0.0, 0.1, cv_count)[None, :, None] * np.array([0.3, -1.0, 0.2])
@@ -74,7 +74,8 @@ def groom(tmp_path: Path) -> Path:
 
 
 def tfx_bytes(positions: np.ndarray, version: float = 4.0) -> bytes:
-    """A TressFX v4 file by formats' table, written without our writer: positions (s, v, 3)."""
+    """A TressFX v4 file by the table of the formats page, made without our writer; positions (s, v,
+    3)."""
     strands, vertices = positions.shape[:2]
     header = struct.pack("<f8I", version, strands, vertices, 160, 0, 0, 0, 0, 0).ljust(160, b"\0")
     block = np.ones((strands, vertices, 4), "<f4")
@@ -267,7 +268,7 @@ def test_simulate_render_and_export_agree_on_the_motion(
     pixels = np.array(image.pixels[:]).reshape(48, 64, 4)
     bpy.data.images.remove(image)
     assert np.ptp(pixels[..., :3]) > 0.2, "the picture is empty"
-    # a bake brings its own head, which is not taken for the built-in one
+    # a bake has its own head; the built-in one is not used
     alone = tmp_path / "alone.png"
     assert command_line.run(["render", *drawn, "--output", str(alone)]) == 0 and alone.exists()
     wrong = ["--bake", str(bake), "--frame", "13", "--output", str(tmp_path / "none.png")]
@@ -276,7 +277,7 @@ def test_simulate_render_and_export_agree_on_the_motion(
 
 
 def test_the_demo_writes_everything_the_report_names(tmp_path: Path, gpu_context: object) -> None:
-    """The built-in head and groom, small."""
+    """A small demo on the built-in head and groom."""
     small = [
         "--set",
         "children.method=none",
@@ -294,7 +295,7 @@ def test_the_demo_writes_everything_the_report_names(tmp_path: Path, gpu_context
     report = json.loads((tmp_path / "report.json").read_text())
     for name in report["outputs"]:
         assert (tmp_path / name).stat().st_size > 0
-    # with a quarter as many brow hairs, and a tenth as many lashes
+    # a quarter as many brow hairs as strands, and a tenth as many lashes
     assert report["strands"] == 300 + 75 + 30 and report["guides"] == 40
     assert report["children"] == 0 and "found from the groom" in report["widths"]
     assert {"still.png", "close_up.png", "motion.png", "cards.png"} <= set(report["outputs"])
@@ -309,7 +310,7 @@ def test_the_demo_writes_everything_the_report_names(tmp_path: Path, gpu_context
 
 @pytest.fixture
 def walking_head(extension: None) -> bpy.types.Object:
-    """A tetrahedron that walks 0.5 m along x from frame 1 to 5, seen in frame 3."""
+    """A tetrahedron that moves 0.5 m along x from frame 1 to 5; the current frame is 3."""
     scene = bpy.context.scene
     mesh = bpy.data.meshes.new("Walking")
     corners = [(-1, -1, 0), (1, -1, 0), (0, 1, 0), (0, 0, -1)]
@@ -326,7 +327,7 @@ def walking_head(extension: None) -> bpy.types.Object:
 
 
 def standing_hair() -> StrandSet:
-    """25 strands that stand on the tetrahedron's top where it is in frame 3."""
+    """25 strands on top of the tetrahedron at frame 3."""
     random = np.random.default_rng(3)
     roots = random.uniform(-0.2, 0.2, (25, 1, 3)) * [1, 1, 0] + [0.25, 0, 0]
     points = (roots + np.linspace([0, 0, 0.0], [0, 0, 0.3], 8)).astype(np.float32)
@@ -334,7 +335,8 @@ def standing_hair() -> StrandSet:
 
 
 def test_the_scene_moves_the_head(tmp_path: Path, walking_head: bpy.types.Object) -> None:
-    """With --animated hair follows the object's own animation, and the scene's frame stays."""
+    """With --animated, hair follows the head's animation, and the scene's current frame is
+    unchanged."""
     write_curves("Walking hair", standing_hair(), walking_head, bpy.context.scene.collection)
     bake = tmp_path / "bake"
     arguments = ["simulate", "--groom", "Walking hair", "--animated", *SMALL]
@@ -348,7 +350,7 @@ def test_the_scene_moves_the_head(tmp_path: Path, walking_head: bpy.types.Object
 
 
 def guides_of(folder: Path) -> np.ndarray:
-    """The guides of all frames of a bake, (frame_count, guide_count, cv_count, 3)."""
+    """The guides in all frames of a bake, (frame_count, guide_count, cv_count, 3)."""
     bake = Cache(folder)
     frames = range(bake.facts.first, bake.facts.last + 1)
     return np.stack([bake.frame(frame)["guides"] for frame in frames])

@@ -1,4 +1,4 @@
-"""Copies made while hair is previewed: it plays on, and they are hair of their own."""
+"""Copies made during a preview: the preview goes on, and copies are hair in their own right."""
 
 from types import SimpleNamespace
 
@@ -19,7 +19,7 @@ LINKED = pytest.mark.parametrize("linked", [False, True], ids=["Shift-D", "Alt-D
 
 @pytest.fixture
 def playing(new_hair, sphere, evaluated):
-    """Hair on a head, which plays: its hair, head and session."""
+    """Hair that plays on a head: `hair`, `head` and `session`."""
     hair = new_hair(sphere)
     hair.hairloom.dynamics.device = "numpy"
     hair.hairloom.dynamics.collider_resolution = 8
@@ -29,7 +29,7 @@ def playing(new_hair, sphere, evaluated):
 
 
 def duplicated(*objects, linked):
-    """As the keys do: what is selected, which the copies are then."""
+    """Duplicate objects as Blender's keys do: they act on the selection, and select the copies."""
     for obj in bpy.context.selected_objects:
         obj.select_set(False)
     for obj in objects:
@@ -42,7 +42,8 @@ def duplicated(*objects, linked):
 
 
 def goes_on(playing):
-    """It alone is previewed, plays as before, and nobody needs to be told of anything."""
+    """Assert that this hair is the only one previewed, still swings, and that no notice is
+    shown."""
     assert previews.sessions() == (playing.session,) and previews.notice() == ""
     assert playing.session.is_playing and swings(playing.session)
 
@@ -116,7 +117,7 @@ def test_hair_of_the_same_name_from_a_file(link, playing, evaluated, tmp_path):
     theirs = wanted.objects[0]
     bpy.context.view_layer.update()
     goes_on(playing)
-    playing.hair.name = "Wig"  # the one by that name is another from now on
+    playing.hair.name = "Wig"  # "Hair" may now be another object
     assert (bpy.data.objects.get("Hair") == theirs) == link
     goes_on(playing)
     second = previews.start(theirs, evaluated())

@@ -43,7 +43,7 @@ def written(strands, surface=None):
 
 
 def raw_curves(points, counts):
-    """Curves object from any numbers, also such that no StrandSet would take."""
+    """A Curves object from any numbers, even those that StrandSet refuses."""
     curves = bpy.data.hair_curves.new("Raw")
     curves.add_curves(list(counts))
     curves.position_data.foreach_set("vector", np.asarray(points, np.float32).ravel())
@@ -193,7 +193,8 @@ def test_written_on_a_moved_head_strands_stay_where_they_are(evaluated, sphere):
 
 
 def test_blenders_own_surface_node_accepts_the_attachment(evaluated, sphere):
-    """Deform Curves on Surface moves the strands with the mesh and finds no invalid UV."""
+    """Blender's Deform Curves on Surface moves the strands with the mesh and reports no invalid
+    UV."""
     from hairloom.addon.blender.scene.surfaces import read_surface
     from hairloom.addon.groom.roots import bind_roots
 
@@ -230,7 +231,7 @@ ZIGZAG = 0.05 * np.array([[0, 0, 0], [1, 0, 1], [0, 0.2, 2], [1, 0, 3], [0, 0, 4
 
 
 def typed(kind, points=ZIGZAG, **attributes):
-    """Two curves of this type, the second straight up, with radii that grow to the tip."""
+    """Two curves of this type; the second is straight up. Radii grow to the tip."""
     straight = np.linspace(0.0, 0.4, len(points))[:, None] * [0, 0, 1] + [1.0, 0, 0]
     obj = raw_curves(np.concatenate([points, straight]), (len(points),) * 2)
     curves = obj.data
@@ -269,7 +270,8 @@ WEIGHTS = np.tile(np.float32([1.0, 3.0, 1.0, 0.5, 1.0, 1.0]), 2)
     ],
 )
 def test_curves_of_every_type_are_where_blender_draws_them(kind, attributes, evaluated):
-    """Against Blender's own conversion to a mesh, within 1 mm all along curves of 35 cm."""
+    """Strands are within 1 to 2 mm of Blender's own conversion to a mesh, all along curves of 35
+    cm."""
     obj = typed(kind, **attributes)
     read = read_curves(obj, evaluated())
     assert read.dropped == {}
@@ -293,7 +295,7 @@ def test_curves_of_every_type_are_where_blender_draws_them(kind, attributes, eva
 
 
 def smoothed(strand):
-    """Points along the curve that is drawn of a strand (count, 3)."""
+    """Points along the curve that is drawn for a strand (count, 3)."""
     count = max(1600 // (len(strand) - 1), 8)
     u = np.tile(np.linspace(0.0, 1.0, count), len(strand) - 1)
     segment = np.repeat(np.arange(len(strand) - 1), count)
@@ -308,7 +310,7 @@ def test_curves_that_are_no_hair_are_named(evaluated):
 
 
 def test_custom_knots_are_named(extension):
-    """Without evaluating them: Blender crashes where there are none."""
+    """The curves are not evaluated: Blender crashes if custom knots are missing."""
     curves = bpy.data.hair_curves.new("NURBS")
     curves.add_curves([6, 6])
     curves.set_types(type="NURBS")
@@ -321,7 +323,7 @@ def test_custom_knots_are_named(extension):
 
 
 def test_curves_of_several_types_keep_their_order_and_points(evaluated):
-    """Catmull-Rom curves among others stay bit for bit."""
+    """Catmull-Rom curves among other types are unchanged bit for bit."""
     obj = typed("CATMULL_ROM")
     obj.data.set_types(type="NURBS", indices=[1])
     read = read_curves(obj, evaluated()).strands
@@ -331,7 +333,8 @@ def test_curves_of_several_types_keep_their_order_and_points(evaluated):
 
 
 def test_handles_go_with_the_points_that_are_combed(evaluated):
-    """Combing, settling and trimming move points: the curve keeps its shape there."""
+    """Combing, settling and trimming move points; handles move with them, so the curve's shape is
+    kept."""
     obj = typed("BEZIER", **HANDLES)
     before = read_curves(obj, evaluated()).strands.points.copy()
     own = read_own_curves(obj, evaluated())

@@ -1,4 +1,4 @@
-"""What Hairloom keeps beside scenes, bakes and takes, read when it holds anything at all."""
+"""Reading the files beside scenes, bakes and takes, whatever they contain."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""Our DDS files in Blender, which has a reader of its own."""
+"""Our DDS files, read by Blender's own reader."""
 
 from importlib.util import find_spec
 

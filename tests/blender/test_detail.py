@@ -1,6 +1,6 @@
-"""Detail, what is left out, and what the viewport shows of it: from the settings to the snapshot.
+"""Detail, culling, and their overlays in the viewport: from the settings to the snapshot.
 
-That it is drawn is tested in tests/gpu, and in a window in tests/window.
+Drawing is tested in tests/gpu, and in a window in tests/window.
 """
 
 from types import SimpleNamespace
@@ -32,7 +32,7 @@ def update():
 
 
 def surface_of(head):
-    """The mesh of an object that has not been moved."""
+    """The mesh of an object without transform."""
     mesh = head.data
     mesh.calc_loop_triangles()
     positions = np.array([vertex.co for vertex in mesh.vertices], np.float32)
@@ -65,7 +65,7 @@ def test_of_children_the_last_to_grow_are_the_first_to_go(new_hair, sphere, eval
     hair.data.hairloom.children.strand_count = 240
     rank = drawing(previews.start(hair, evaluated())).snapshot.rank
     assert (np.diff(rank[60:]) > 0.0).all() and rank[60] == 0.0 and rank[-1] < 1.0
-    # and the artist's own keep their share
+    # the artist's own strands have ranks spread evenly from 0 to 1
     assert sorted(rank[:60]) == pytest.approx(np.arange(60) / 60, abs=1e-6)
 
 
@@ -94,7 +94,7 @@ def test_balls_inside_the_head_follow_it(preview):
 
 
 def test_balls_stay_inside_a_head_that_bends(sphere):
-    """Its front is pressed in by more and more; what is pressed in is never in a ball."""
+    """The front is pressed in deeper and deeper; no vertex is ever inside a sphere."""
     surface = surface_of(sphere)
     occluder_spheres = OccluderSpheres(surface, surface.positions)
     radius = occluder_spheres.at(Pose(surface.positions, np.eye(4)))[:, 3].sum()
@@ -124,7 +124,7 @@ def test_a_head_that_is_not_seen_hides_nothing(how, preview):
         update()
         shown = drawing(session).snapshot
         assert shown.occluder_spheres is None and shown.detail.culling == "none"
-    # what is not solid is not in the way without overlays either
+    # a head that is shown as a solid, transparent or not, hides hair in views without overlays
     assert (drawing(session).head is None) is (how != "glass")
     head.hide_set(False)
     head.display_type, head.color[3] = "TEXTURED", 1.0
@@ -203,7 +203,8 @@ def test_statistics_begin_with_nothing():
 
 
 def test_stretch_and_depth_know_the_style_and_the_colliders(preview, evaluated):
-    """At rest and while it plays, where the head is then."""
+    """The view "stretch" keeps the strands at rest, and "depth" the head as a collider, where it is
+    during play."""
     hair, head, session = preview
     hair.hairloom.debug_view = "stretch"
     assert drawing(session).snapshot.rest is session.rig.strands.points

@@ -1,4 +1,4 @@
-"""The render engine in the background: pictures, passes, and what Blender asks of engines."""
+"""The render engine in background mode: pictures, passes, and Blender's calls to engines."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ pytestmark = [pytest.mark.draws(light=False), pytest.mark.usefixtures("gpu_conte
 
 
 def test_radiance_arrives_as_it_is(stage: Any, tmp_path: Path) -> None:
-    """A white diffuse ball in a world of 0.5 shines as that world does."""
+    """A white diffuse ball in a uniform world of radiance 0.5 has radiance 0.5."""
     add_ball()
     found = picture(tmp_path)
     assert found.shape == (SIZE, SIZE, 4)
@@ -31,7 +31,7 @@ def test_radiance_arrives_as_it_is(stage: Any, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("transform", ["Standard", "AgX"])
 def test_radiance_is_shown_as_blender_shows_it(stage: Any, tmp_path: Path, transform: str) -> None:
-    """What is saved is what Blender makes of an image of this very radiance."""
+    """The saved file equals that of a Blender image with the same radiance."""
     stage.view_settings.view_transform = transform
     settings = stage.render.image_settings
     settings.file_format, settings.color_depth = "PNG", "16"
@@ -57,7 +57,8 @@ def test_hair_is_drawn_and_two_renders_are_the_same(
 
 
 def test_mesh_depth_and_coverage_are_those_of_workbench(stage: Any, tmp_path: Path) -> None:
-    """Of a ball before a cube, in a picture that is not square, through a shifted lens."""
+    """A ball in front of a cube, with non-square pixels and a shifted lens, compared with
+    Workbench."""
     add_ball()
     bpy.ops.mesh.primitive_cube_add(size=0.2, location=(0.1, 0.2, 0.05), rotation=(0.3, 0.4, 0.5))
     render, camera = stage.render, stage.camera.data
@@ -101,7 +102,7 @@ def test_depth_and_object_index_of_hair(
 
 
 def test_border_percentage_and_film(stage: Any, tmp_path: Path) -> None:
-    """A region is that region of the whole picture, cropped to it or not."""
+    """A border gives the same part of the whole picture, and resolution follows the percentage."""
     add_ball(color=(0.8, 0.2, 0.1))
     stage.hairloom.picture.samples = 2
     render = stage.render
@@ -121,7 +122,8 @@ def test_border_percentage_and_film(stage: Any, tmp_path: Path) -> None:
 
 
 def test_the_region_of_a_view_is_that_of_the_picture(stage: Any) -> None:
-    """In a camera's view the scene's, wherever the camera's frame lies in it; else the view's."""
+    """In a camera view it is the scene's border within the camera's frame; otherwise it is the
+    view's own border."""
     from types import SimpleNamespace
 
     from hairloom.addon.blender.engine.engine_camera import view_rectangle
@@ -130,7 +132,7 @@ def test_the_region_of_a_view_is_that_of_the_picture(stage: Any) -> None:
     render.resolution_x, render.resolution_y = 200, 100
     camera.data.shift_x, camera.data.shift_y = 0.1, -0.2
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    # the frame is the middle of the view, half as wide and half as high
+    # the camera's frame covers the middle of the view, half its width and height
     matrix = np.array(camera.calc_matrix_camera(depsgraph, x=200, y=100))
     matrix[:2] *= 0.5
     region = SimpleNamespace(view_perspective="CAMERA", window_matrix=matrix)
@@ -151,7 +153,7 @@ def test_the_region_of_a_view_is_that_of_the_picture(stage: Any) -> None:
 
 
 def test_motion_blur_spreads_over_the_way(stage: Any, tmp_path: Path) -> None:
-    """A ball that flies by is as dense in each place as it is long there, and loses nothing."""
+    """The blurred alpha has the same sum, and is as much wider as the ball moves in a frame."""
     stage.render.film_transparent = True
     stage.hairloom.picture.samples = stage.hairloom.picture.motion_steps = 16
     ball = add_ball(0.05)
@@ -168,13 +170,14 @@ def test_motion_blur_spreads_over_the_way(stage: Any, tmp_path: Path) -> None:
     assert abs(blurred.sum() / sharp.sum() - 1.0) < 0.02
     columns = [np.flatnonzero(each.max(axis=0) > 0.02) for each in (sharp, blurred)]
     width = [each[-1] - each[0] for each in columns]
-    # 0.2 m in a frame, seen from 1 m by a lens that sees 0.72 m
+    # 0.2 m in a frame, seen from 1 m, where the lens covers 0.72 m
     assert abs(width[1] - width[0] - 0.2 / 0.72 * SIZE) < 2.0
     assert stage.frame_current == 2 and stage.frame_subframe == 0.0
 
 
 def test_stretched_time_is_stretched_once(stage: Any, tmp_path: Path) -> None:
-    """A shutter that hardly opens shows what is seen without motion blur."""
+    """Time remapping is applied once: with a very short shutter, the picture equals one without
+    motion blur."""
     stage.hairloom.picture.samples = stage.hairloom.picture.motion_steps = 2
     ball = add_ball(0.05)
     for frame, x in ((1, -0.2), (21, 0.2)):
@@ -232,7 +235,7 @@ def test_panels_serve_the_engine_and_let_go(empty_scene: None) -> None:
 def test_a_cancelled_render_keeps_what_there_is(
     stage: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Two samples of 64 are a whole picture."""
+    """Cancelled after two of 64 samples, the picture equals one of two samples."""
     from hairloom.addon.blender.engine import engine
 
     add_ball()
@@ -257,7 +260,7 @@ def test_both_eyes_of_a_stereo_camera(stage: Any, tmp_path: Path) -> None:
     eyes = [passes_in(tmp_path / f"picture_{side}.exr") for side in "LR"]
     alphas = [found["ViewLayer.Combined"][..., 3] for found in eyes]
     places = [np.average(np.arange(SIZE), weights=alpha.sum(axis=0)) for alpha in alphas]
-    # parallax of a point at 1 m, whose eyes meet at 2 m, through a lens that sees 0.72 m there
+    # parallax of a point at 1 m, with convergence at 2 m, where the lens covers 0.72 m at 1 m
     assert abs(abs(places[0] - places[1]) - 0.05 / 0.72 * SIZE) < 0.3
 
 
@@ -267,7 +270,7 @@ def test_both_eyes_of_a_stereo_camera(stage: Any, tmp_path: Path) -> None:
 def test_what_is_out_of_focus_is_as_soft_as_in_cycles(
     stage: Any, tmp_path: Path, aperture: str
 ) -> None:
-    """A ball that covers as much of each pixel, focused on an object behind it."""
+    """A ball, focused on an object behind it, covers as much of each pixel as in Cycles."""
     add_ball(0.08)
     target = bpy.data.objects.new("Target", None)
     target.location = (0.7, 1.5, 0.0)
@@ -289,7 +292,7 @@ def test_what_is_out_of_focus_is_as_soft_as_in_cycles(
     theirs = picture(tmp_path)[..., 3]
     assert ((theirs > 0.05) & (theirs < 0.95)).mean() > 0.02
     difference = np.abs(ours - theirs)
-    # blades that turn the other way are off by 0.0017 and 0.057
+    # blades that turn the other way differ by 0.0017 and 0.057
     assert difference.mean() < 0.001 and np.quantile(difference, 0.99) < 0.03
 
 
@@ -300,7 +303,7 @@ def test_a_blurred_render_that_is_cancelled_goes_to_no_other_frame(
     from hairloom.addon.blender.engine.engine_still import Still
 
     class Cancelled:
-        """The engine of an artist who presses Esc after two samples."""
+        """An engine that is cancelled after two samples."""
 
         def __init__(self, own: Any) -> None:
             self.own, self.asked, self.places = own, 0, list[float]()
@@ -330,7 +333,7 @@ def test_a_blurred_render_that_is_cancelled_goes_to_no_other_frame(
 
 def test_a_render_leaves_nothing_unused_on_the_gpu(stage: Any, tmp_path: Path) -> None:
     bpy.ops.mesh.primitive_cube_add(size=0.2)
-    gc.collect()  # other tests may have left cycles
+    gc.collect()  # other tests may have left reference cycles
     gpu_objects.free_unused()
     rendered(tmp_path)
     left = gpu_objects.bytes_in_use()

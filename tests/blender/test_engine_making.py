@@ -1,4 +1,4 @@
-"""Rendered mode does not stop the window: its hair is made in a thread, and renders wait for it."""
+"""Rendered mode builds hair in a thread without blocking the window; renders wait for it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ COUNT = 60
 
 
 class Gate:
-    """Holds hair back that is made elsewhere than in the main thread; notes who made what."""
+    """Holds back hair that is built outside the main thread, and records the threads."""
 
     def __init__(self) -> None:
         self.opened, self.makers = threading.Event(), list[str]()
@@ -53,7 +53,7 @@ def hair(new_hair: Callable[..., Any], sphere: Any) -> Any:
 
 
 class View:
-    """Reads as a 3D view in Rendered mode does: again and again, as long as hair is pending."""
+    """Reads the scene as a 3D view in Rendered mode does: repeatedly, while hair is pending."""
 
     def __init__(self) -> None:
         self.reader = SceneReader()
@@ -257,7 +257,7 @@ def test_the_picture_keeps_its_hair_until_the_preview_has_its_own(
 
 
 def test_hair_is_made_again_whatever_of_it_is_other_now(hair: Any, sphere: Any) -> None:
-    """Seeds, UVs of roots, the head's triangles and its UVs."""
+    """Hair is built again for other seeds, root UVs, triangles of the head, or UVs of the head."""
 
     def made() -> Any:
         return engine_hair.read_groom(hair, bpy.context.evaluated_depsgraph_get())

@@ -1,4 +1,4 @@
-"""What of a scene the render engine draws, and what an artist may throw at it."""
+"""The parts of a scene that the render engine draws, and unusual or bad input."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ pytestmark = [pytest.mark.draws, pytest.mark.usefixtures("gpu_context", "extensi
 
 
 def test_view_layers_and_holdouts(stage: Any, tmp_path: Path) -> None:
-    """Each layer has what is in it; a holdout is a hole."""
+    """Each view layer draws its own collections. A holdout has alpha 0."""
     stage.render.film_transparent = True
     collections = [bpy.data.collections.new(name) for name in ("One", "Two")]
     for collection, x in zip(collections, (-0.15, 0.15), strict=True):
@@ -52,7 +52,8 @@ def test_view_layers_and_holdouts(stage: Any, tmp_path: Path) -> None:
 def test_hair_may_be_a_hole(
     stage: Any, new_hair: Callable[..., Any], sphere: Any, tmp_path: Path, way: str
 ) -> None:
-    """Before a wall it takes as much away as it covers alone; meshes before it stay."""
+    """In front of a wall, a holdout removes the alpha that the hair has alone. Meshes in front of
+    it stay."""
     stage.render.film_transparent = True
     stage.hairloom.picture.samples = 16
     hair = new_hair(sphere)
@@ -83,7 +84,8 @@ def test_hair_may_be_a_hole(
 def test_previewed_hair_is_seen_as_its_object_is(
     stage: Any, new_hair: Callable[..., Any], sphere: Any
 ) -> None:
-    """The reader leaves it out and says how it takes part, whatever a preview wrote to the copy."""
+    """The reader omits previewed hair, and takes holdout and visibility from the original, not from
+    the copy that the preview has changed."""
     from hairloom.addon.blender.engine.engine_scene import SceneReader
 
     hair, reader = new_hair(sphere), SceneReader()
@@ -148,7 +150,8 @@ def test_texts_metaballs_and_instances_are_drawn(stage: Any, tmp_path: Path) -> 
 def test_hair_of_instances_is_as_thick_and_lit_as_it_looks(
     sphere: Any, new_hair: Callable[..., Any], shown_as: str
 ) -> None:
-    """Twice as large is twice as thick, and vectors of light are mirrored with the hair."""
+    """Twice the scale gives twice the radius or depth, and light's vectors are mirrored with the
+    hair."""
     hair = new_hair(sphere)
     settings = hair.data.hairloom
     settings.card_drawing.shown_as, settings.card_occlusion.rays = shown_as, 4
@@ -165,7 +168,7 @@ def test_hair_of_instances_is_as_thick_and_lit_as_it_looks(
 
 
 def vectors_of(snapshot: Any) -> list[np.ndarray]:
-    """Where light comes to hair from, and where skin lies: (n, 3) each, world space."""
+    """Per point, the vectors towards light, and those towards skin, in world space, (n, 3) each."""
     drawn, layout = snapshot.cards or snapshot, snapshot.layout
     if snapshot.cards is None:
         group = np.zeros(layout.strand_count, np.int32)
@@ -178,7 +181,7 @@ def vectors_of(snapshot: Any) -> list[np.ndarray]:
 
 
 def test_a_mesh_that_is_edited_is_seen_as_it_is(sphere: Any) -> None:
-    """Rendered mode in Edit Mode: Blender keeps its data elsewhere."""
+    """Rendered mode in Edit Mode, where Blender keeps the mesh's data elsewhere."""
     before, edited = (seen_in(mode, sphere) for mode in ("OBJECT", "EDIT"))
     assert len(before) == len(edited) == 1
     for one, other in zip(before, edited, strict=True):
@@ -222,7 +225,7 @@ def test_the_camera_may_be_inside_of_hair_and_head(
 def test_hair_is_rendered_as_it_was_baked(
     stage: Any, new_hair: Callable[..., Any], sphere: Any, tmp_path: Path
 ) -> None:
-    """Frames and moments between them, although the curves themselves are hidden then."""
+    """At frames and subframes, although the curves themselves are hidden in renders then."""
     from hairloom.addon.blender.bakes import playback
     from hairloom.addon.blender.engine import engine_hair
 
@@ -259,7 +262,7 @@ def test_a_bake_has_the_animated_settings_of_the_frame(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Though renders leave out the hair that has them."""
+    """The settings are those of the original hair, which is hidden in renders."""
     from hairloom.addon.blender.engine import engine_hair
 
     hair = new_hair(sphere)

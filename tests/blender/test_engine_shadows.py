@@ -1,4 +1,4 @@
-"""Shadows of meshes on meshes as the render engine has them, beside those of Cycles."""
+"""Shadows of meshes on meshes in the render engine, compared with Cycles."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ pytestmark = [pytest.mark.draws, pytest.mark.usefixtures("gpu_context", "extensi
 
 @pytest.fixture
 def props(stage: Any) -> Any:
-    """A ground of 40 m, a turned block and a floating ball, white, before a dark world."""
+    """A ground of 40 m, a turned block and a floating ball, all white, in a black world. Returns
+    the ball."""
     set_world((0.0, 0.0, 0.0))
     bpy.ops.mesh.primitive_plane_add(size=40.0)
     bpy.ops.mesh.primitive_cube_add(size=0.6, location=(0.0, 0.0, 0.35), rotation=(0.2, 0.1, 0.5))
@@ -49,7 +50,8 @@ def add_light(kind: str, energy: float, **where: Any) -> Any:
 def test_shadows_lie_where_cycles_has_them(
     stage: Any, props: Any, kind: str, tmp_path: Path
 ) -> None:
-    """Under small lights, with no light thrown back: but for edges the pictures are the same."""
+    """With point-like lights and without bounces, pictures differ from Cycles only at shadows'
+    edges."""
     light = add_light(
         kind,
         3.0 if kind == "SUN" else 150.0,
@@ -73,7 +75,8 @@ def test_shadows_lie_where_cycles_has_them(
 
 
 def test_what_is_not_to_throw_a_shadow_throws_none(stage: Any, props: Any, tmp_path: Path) -> None:
-    """A light without shadows, objects without, the scene without; each is brighter."""
+    """Without the shadow of one object, of all objects or of the light, the picture gets
+    brighter."""
     light = add_light("SUN", 3.0, rotation_euler=(0.5, 0.5, 0.3))
     with_all = picture(tmp_path)[..., 0].mean()
     props.visible_shadow = False
@@ -87,7 +90,7 @@ def test_what_is_not_to_throw_a_shadow_throws_none(stage: Any, props: Any, tmp_p
 
 
 def test_motion_moves_shadows(stage: Any, props: Any, tmp_path: Path) -> None:
-    """In an animation, where maps are kept from frame to frame only as long as nothing moves."""
+    """Shadow maps are kept from frame to frame only while nothing moves."""
     add_light("SUN", 3.0, rotation_euler=(0.5, 0.5, 0.3))
     before = picture(tmp_path)[..., 0]
     props.location.x += 0.2

@@ -1,4 +1,4 @@
-"""The verb `export`: what the artist's operators write, for jobs without a window."""
+"""The verb `export` writes what the operators write, without a window."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ SMALL = ["--set", "guides.guide_count=12", "--set", "guides.cv_count=8"]
 
 @pytest.fixture
 def run(tmp_path: Path) -> Callable[..., dict[str, Any]]:
-    """Runs the verb; gives its report."""
+    """A function that runs the verb and returns its report."""
 
     def done(*arguments: str, output: str, code: int = 0) -> dict[str, Any]:
         report = tmp_path / "report.json"
@@ -42,7 +42,8 @@ def run(tmp_path: Path) -> Callable[..., dict[str, Any]]:
 
 
 def on_sphere(*, coloured: bool = True) -> Groom:
-    """40 strands of 5 and 9 points on the sphere of radius 0.1 m, with all that USD holds."""
+    """40 strands of 5 or 9 points on the sphere of radius 0.1 m, with every attribute that USD
+    stores."""
     random = np.random.default_rng(4)
     counts = np.where(np.arange(40) % 2, 5, 9)
     outward = random.normal(size=(40, 3))

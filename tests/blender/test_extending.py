@@ -1,4 +1,4 @@
-"""The recipes of docs/dev/extending.md are followed to the letter, and what they add is used."""
+"""Each recipe of docs/dev/extending.md is applied literally, and its result is used."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from typing import Any
 import pytest
 from recipes import REPOSITORY, copy_with_recipes, listed_files, recipes
 
-#: Spring bones of engines have a drag and capsules of their own.
+#: spring bones of engines have their own drag and capsules
 SPRINGS = {"addon/exchange/cards/glb_springs.py"}
-#: In the copy with all recipes applied: what each has added, used as its reader would use it.
+#: for each recipe: code that uses its result, run in a copy where all recipes are applied
 USES = {
     "A collider shape": """
 import numpy as np
@@ -116,7 +116,7 @@ facts["page"] = verb_docs.page(command_line.VERBS)
 
 @pytest.fixture(scope="module")
 def facts(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
-    """What the uses above found, by recipe."""
+    """The facts that the uses above have computed, by recipe."""
     tree = tmp_path_factory.mktemp("extended")
     copy_with_recipes(tree)
     lines = [
@@ -139,7 +139,7 @@ def facts(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]
 
 
 def files_with(part: str) -> set[str]:
-    """Sources in which a name has this word, or a text is this word."""
+    """Sources in which a name contains this word, or a string is this word."""
     found = set()
     for folder, kind in (("addon", "*.py"), ("gpu_shaders", "*.glsl")):
         for path in (REPOSITORY / folder).rglob(kind):
@@ -149,7 +149,7 @@ def files_with(part: str) -> set[str]:
 
 
 def _names(path: Path) -> str:
-    """All names and short texts of a file, in snake_case, one a line."""
+    """All names and short strings of a file in snake_case, one per line."""
     text = path.read_text(encoding="utf-8")
     if path.suffix == ".py":
         kinds = (tokenize.NAME, tokenize.STRING)
@@ -172,9 +172,10 @@ def test_every_block_fits_the_sources(tmp_path: Path) -> None:
 
 def test_the_places_of_a_force_are_complete() -> None:
     others = {"addon/dynamics/constraints.py", "addon/dynamics/settings.py"}
-    others |= {"addon/dynamics/force_fields.py", "addon/blender/scene/forces.py"}  # Blender's
+    # Blender's force fields
+    others |= {"addon/dynamics/force_fields.py", "addon/blender/scene/forces.py"}
     others |= {"gpu_shaders/lib_force_fields.glsl", "addon/wet_flow.py"}
-    others |= {"addon/dynamics/settle_settings.py"}  # where there is none
+    others |= {"addon/dynamics/settle_settings.py"}  # it sets drag to 0
     others |= SPRINGS | {"addon/cards/spring_bones.py", "addon/cards/spring_fit.py"}
     assert listed_files("A force or constraint") - others == files_with("drag") - others
 
@@ -187,7 +188,7 @@ def test_the_places_of_a_collider_shape_are_complete() -> None:
 @pytest.mark.slow
 def test_a_collider_shape(facts: dict[str, dict[str, Any]]) -> None:
     found = facts["A collider shape"]
-    assert found["fell"] > 0.02  # over the edge of the box
+    assert found["fell"] > 0.02  # it falls over the edge of the box
     assert found["depth"] < 2.0e-4
     assert found["difference"] < 1.0e-3
 

@@ -1,4 +1,4 @@
-"""The extension as artists get it: its manifest, its zip, and what Blender does with them."""
+"""The extension as users get it: its manifest and its zips, and Blender installing them."""
 
 import hashlib
 import importlib
@@ -23,12 +23,12 @@ from hairloom.addon.blender.preview.handlers import HANDLERS
 REPOSITORY = Path(__file__).resolve().parents[2]
 SCRIPTS = Path(bpy.utils.system_resource("SCRIPTS"))
 EXTENSION_TOOL = SCRIPTS / "addons_core/bl_pkg/cli/blender_ext.py"
-#: folders and files that a user of the zip has no use for
+#: folders and files that are of no use to users of the zip
 NOT_FOR_USERS = ("tests", "tools", "docs", "bench", "out", "dist", "Makefile", "pyproject.toml")
 
 
 def extension_tool(*arguments):
-    """Blender's own packager, as `blender --command extension` runs it."""
+    """Run Blender's own packager, as `blender --command extension` does."""
     done = subprocess.run(
         [sys.executable, str(EXTENSION_TOOL), *map(str, arguments)], capture_output=True, text=True
     )
@@ -37,7 +37,8 @@ def extension_tool(*arguments):
 
 
 def in_fresh_blender(script, resources):
-    """Runs a script in a new Blender with user folders of its own; what it prints last as JSON."""
+    """Run a script in a new Blender with its own user folders; returns its last line of JSON, and
+    all output."""
     wheel = [sys.executable, script]
     program = [bpy.app.binary_path, "-b", "--python-exit-code", "1", "--python", script]
     done = subprocess.run(
@@ -53,7 +54,7 @@ def in_fresh_blender(script, resources):
 
 @pytest.fixture(scope="module")
 def wheels():
-    """The packages that go into the zip, fetched where they are not there yet."""
+    """Names of the wheels that go into the zips; missing ones are fetched."""
     done = subprocess.run(
         [sys.executable, REPOSITORY / "tools" / "fetch_wheels.py"], capture_output=True, text=True
     )
@@ -64,13 +65,13 @@ def wheels():
 
 @pytest.fixture(scope="module")
 def zips(wheels, tmp_path_factory):
-    """(system, Python) -> the zip for that build of Blender, its wheels as they were fetched."""
+    """(system, Python) -> the zip for that build of Blender, with the wheels as fetched."""
     return made_zips(tmp_path_factory.mktemp("quick"), "--quick")
 
 
 @pytest.fixture(scope="module")
 def tight_zips(wheels, tmp_path_factory):
-    """The same as artists get them."""
+    """(system, Python) -> the zip that users get, with wheels packed tighter."""
     return made_zips(tmp_path_factory.mktemp("dist"))
 
 
@@ -87,7 +88,7 @@ def made_zips(folder, *options):
 
 @pytest.fixture(scope="module")
 def built(zips):
-    """That of the Blender which runs this."""
+    """The zip for the Blender that runs this test."""
     return zips["linux-x64", sys.version_info[:2]]
 
 
@@ -109,7 +110,7 @@ def manifest():
 
 
 def tracked(folder):
-    """What lies below a folder of the repository and belongs to the extension."""
+    """The files below a folder of the repository, except caches."""
     return {
         path.relative_to(REPOSITORY).as_posix()
         for path in (REPOSITORY / folder).rglob("*")
@@ -138,19 +139,19 @@ def test_a_wheel_that_is_packed_tighter_has_the_same_files(tmp_path, monkeypatch
     monkeypatch.setattr(make_zips, "PACKED", tmp_path)
     wheel = io.BytesIO()
     with zipfile.ZipFile(wheel, "w", zipfile.ZIP_DEFLATED) as archive:
-        part = os.urandom(50_000)  # comes again too far away for Deflate
+        part = os.urandom(50_000)  # repeated at a distance that Deflate cannot reach
         for name, content in (("a/b.so", part * 4), ("a-1.dist-info/LICENSE", b"free")):
             entry = zipfile.ZipInfo(name)
             entry.external_attr = 0o100755 << 16
             archive.writestr(entry, content, zipfile.ZIP_DEFLATED)
-    for _ in range(2):  # made, and kept from before
+    for _ in range(2):  # packed, then from the cache
         packed = make_zips.packed_tighter(wheel.getvalue())
         assert content_of(io.BytesIO(packed)) == content_of(wheel)
         assert len(packed) < 0.3 * len(wheel.getvalue())
 
 
 def check_wheels(zips, wheels, manifest):
-    """File by file, as they may be packed another way."""
+    """Compare wheels file by file, since they may be compressed differently."""
     import fetch_wheels
 
     assert manifest["wheels"] == [f"./wheels/{name}" for name in wheels]
@@ -178,7 +179,7 @@ def content_of(wheel):
 
 @pytest.mark.parametrize("build", make_zips.BUILDS)
 def test_every_build_of_blender_gets_a_zip_with_one_wheel_of_each_package(zips, manifest, build):
-    """By Blender's own code: none that it would refuse, and none that it would not install."""
+    """By Blender's own code: the zip has only wheels that this build accepts and installs."""
     system, python = build
     tool = make_zips.packager()
     with zipfile.ZipFile(zips[build]) as archive:
@@ -195,7 +196,7 @@ def test_every_build_of_blender_gets_a_zip_with_one_wheel_of_each_package(zips, 
 
 
 def test_a_wheel_that_cannot_be_had_is_named(tmp_path):
-    """No network, and a sum that is not the file's; what is there stays."""
+    """Without a network, or with a wrong checksum; no file is left."""
     import fetch_wheels
 
     name, digest = next(iter(fetch_wheels.wanted().items()))
@@ -205,7 +206,7 @@ def test_a_wheel_that_cannot_be_had_is_named(tmp_path):
 
 
 def test_what_the_validator_does_not_check_is_right(wheels, manifest):
-    """It accepts unknown licences, schema versions, keys and websites."""
+    """Blender's validator accepts unknown licences, schema versions, keys and websites."""
     assert manifest["schema_version"] == "1.0.0"
     assert manifest["id"] == "hairloom"
     assert manifest["type"] == "add-on"
@@ -225,7 +226,7 @@ def test_what_the_validator_does_not_check_is_right(wheels, manifest):
 
 
 def used_permissions():
-    """What the code uses of what Blender's extensions have to declare."""
+    """The permissions that the code needs, of those that Blender's extensions must declare."""
     code = "\n".join(
         path.read_text(encoding="utf-8") for path in (REPOSITORY / "addon").rglob("*.py")
     )
@@ -241,7 +242,8 @@ def used_permissions():
 
 
 def test_the_bill_of_materials_names_what_the_zip_carries(wheels, names, tmp_path):
-    """By the schema of CycloneDX; each part has a license that is known, and its text is there."""
+    """Valid by CycloneDX's schema; each part has a known licence, and each wheel contains its
+    text."""
     validation = pytest.importorskip("cyclonedx.validation", reason="it is for development alone")
     schema = importlib.import_module("cyclonedx.schema")
     path = tmp_path / "hairloom.cdx.json"
@@ -278,7 +280,7 @@ def test_the_zip_holds_all_that_runs_and_nothing_else(names):
 
 
 def test_no_module_edits_the_path_or_takes_its_name_for_granted():
-    """Blender renames the package, and shows a policy violation for entries in sys.path."""
+    """Blender renames the package, and reports entries in sys.path as a policy violation."""
     files = list((REPOSITORY / "addon").rglob("*.py"))
     assert len(files) > 200
     for file in files:
@@ -373,7 +375,7 @@ def test_it_installs_from_the_zip_and_goes_on_and_off_ten_times(tight, tmp_path)
     assert answer["has_compressor"]
     packages = ("alembic3d", "archspec", "etcpak")
     assert [each.split("-")[0] for each in answer["packages"]] == list(packages)
-    if bpy.app.binary_path:  # the module finds that of our own requirements first
+    if bpy.app.binary_path:  # the Blender module finds the one of our own requirements first
         assert Path(answer["alembic"]).is_relative_to(resources)
     assert not Path(answer["numpy"]).is_relative_to(resources), "Blender's own numpy stays"
     assert answer["read"] and set(answer["read"]) == {50}

@@ -1,4 +1,4 @@
-"""Cloth of many faces is made beside the window's work; nothing waits for it."""
+"""Cloth with many faces is built in a thread, and nothing blocks until it is ready."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ FRAME = 1.0 / 24.0
 
 @pytest.fixture
 def sheet(flag):
-    """The flag, whose cloth is made in a thread however small it is."""
+    """The flag; its cloth is built in a thread, whatever its size."""
     before, fabrics.AT_ONCE = fabrics.AT_ONCE, 0
     bpy.context.view_layer.update()
     yield flag

@@ -1,4 +1,4 @@
-"""The farm's template, run as Open Job Description's own program runs it: docs/farm."""
+"""The farm template of docs/farm, run by Open Job Description's own program."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ REPOSITORY = Path(__file__).parents[2]
 TEMPLATE = REPOSITORY / "docs" / "farm" / "hairloom.yaml"
 CHARACTERS = ("anna", "ben")
 FRAMES = 4
-#: stands for Blender: leaves out what comes before Hairloom's own arguments
+#: replaces Blender; drops the arguments before Hairloom's own
 BLENDER = f"""#!/bin/sh
 shift 3
 exec "{sys.executable}" "{REPOSITORY / "tools" / "headless.py"}" "$@"
@@ -39,7 +39,7 @@ def openjd(*arguments: str) -> subprocess.CompletedProcess[str]:
 
 @pytest.fixture
 def folder(sphere: Any, new_hair: Callable[..., Any], tmp_path: Path) -> Path:
-    """A folder with a small scene for each character, and what stands for Blender."""
+    """A folder with a small scene for each character, and the script that replaces Blender."""
     if sys.platform == "win32":
         pytest.skip("what stands for Blender is a shell script")
     hair, scene = new_hair(sphere), bpy.context.scene
@@ -73,7 +73,7 @@ def run(folder: Path, step: str, *more: str, chunk: int = 2) -> subprocess.Compl
 
 
 def at_once(*tasks: Callable[[], subprocess.CompletedProcess[str]]) -> list[int]:
-    """Runs them side by side, as workers of a farm do; gives their exit codes."""
+    """Run tasks in parallel, as workers of a farm do; returns their exit codes."""
     with ThreadPoolExecutor(len(tasks)) as pool:
         return [done.returncode for done in pool.map(lambda task: task(), tasks)]
 
@@ -87,8 +87,8 @@ def strands_of(folder: Path, name: str, first: int) -> Callable[..., Any]:
 
 
 def made(folder: Path) -> dict[str, int]:
-    """File -> when it was written; reports are written by every run. Frames of a bake lie in a
-    folder of their writer, whatever its name is."""
+    """File -> time of writing, without reports, which every run writes. The folder of a bake's
+    frames, whose name differs per writer, is called "frames"."""
     files = (file for file in (folder / "out").rglob("*") if file.is_file())
     times = {
         file.relative_to(folder / "out").as_posix(): file.stat().st_mtime_ns

@@ -1,4 +1,4 @@
-"""Distance fields that are made beside the window's work: hair waits for them, at rest."""
+"""Distance fields that are built in a thread: hair stays at rest until they are ready."""
 
 import threading
 import weakref
@@ -33,7 +33,7 @@ def no_fields(same_fields, monkeypatch):
 
 @pytest.fixture
 def gate(monkeypatch):
-    """Holds fields back until it is opened."""
+    """Fields are held back until this event is set."""
     opened, make = threading.Event(), DistanceField.from_surface
 
     def wait_and_make(*arguments, **named):
@@ -85,12 +85,12 @@ def test_only_the_youngest_fields_are_kept(sphere, evaluated, extension):
 
 
 def fields_wanted():
-    """Settings of one field more than are kept."""
+    """Settings for one more field than the cache keeps."""
     return [DynamicsSettings(collider_resolution=16 + number) for number in range(fields.KEPT + 1)]
 
 
 def made_beside(surface):
-    """More fields than are kept, as previews have them made; the oldest of them."""
+    """Build more fields than are kept, as previews do; returns a weak reference to the oldest."""
     for settings in fields_wanted():
         with pytest.raises(fields.NotMadeYetError):
             fields.field_of(surface, settings, place="Head", blocking=False)
@@ -218,7 +218,7 @@ def test_the_field_that_ships_is_the_one_that_would_be_made(same_fields):
     made = same_fields(surface, settings)
     assert ships.cell == made.cell
     np.testing.assert_array_equal(ships.low, made.low)
-    # another processor rounds in another way
+    # other processors round differently
     np.testing.assert_allclose(ships.values, made.values, rtol=0.0, atol=1e-7)
 
 

@@ -1,4 +1,4 @@
-"""Fins in Blender: a mesh moves as cloth, and is bit for bit the same afterwards."""
+"""Fins in Blender: a mesh moves as cloth, and is the same bit for bit afterwards."""
 
 from pathlib import Path
 
@@ -28,7 +28,7 @@ def test_the_operator_adds_one_modifier_and_takes_the_active_group(flag):
 
 
 def test_new_cloth_collides_with_nothing_as_the_page_says(flag, evaluated):
-    """Even where the hair of the scene has colliders."""
+    """Not even with the colliders of the scene's hair."""
     assert flag.hairloom.collider is None and flag.hairloom.collider_collection is None
     assert started(flag, evaluated).obstacles.parts == []
     page = (Path(__file__).parents[2] / "docs" / "dynamics.md").read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Fins through undo, saving, playback and bakes, and what they leave as it was."""
+"""Fins through undo, saving, playback and bakes, and what stays as it was afterwards."""
 
 import bpy
 import numpy as np
@@ -62,7 +62,7 @@ def test_a_saved_file_keeps_fin_and_settings(flag, evaluated, tmp_path):
 
 
 def play_away_from(before, flag, evaluated):
-    """Preview and play until it is well away from where it was."""
+    """Preview and play until the cloth is more than 5 cm away from `before`."""
     fins.start(flag, evaluated())
     previews.play(evaluated())
     previews.advance(evaluated(), 0.5)
@@ -129,7 +129,7 @@ def test_attributes_of_the_modifier_stay_out_of_the_mesh(flag, evaluated):
 
 
 def frames_of(obj, frames):
-    """What Blender shows in each frame, going there one after the other; object space."""
+    """The vertices that Blender shows in each frame, stepping through the frames; object space."""
     found = {}
     for frame in frames:
         bpy.context.scene.frame_set(frame)

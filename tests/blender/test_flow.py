@@ -1,4 +1,4 @@
-"""Strokes in a scene: drawn, combed along, edited and combed along again, taken back."""
+"""Strokes in a scene: drawn, combed along, edited and combed along again, and removed."""
 
 import bpy
 import numpy as np
@@ -17,7 +17,7 @@ def hair(new_hair, sphere):
 
 
 def ring(name="Stroke", radius=RADIUS, backwards=False):
-    """A curve around the sphere's equator, seen from above against the clock."""
+    """A curve around the sphere's equator, counterclockwise seen from above."""
     data = bpy.data.curves.new(name, "CURVE")
     data.dimensions = "3D"
     spline = data.splines.new("POLY")
@@ -44,7 +44,8 @@ def comb(**values):
 
 
 def around(hair):
-    """How far each tip near the equator has gone around the sphere [m], and all points' heights."""
+    """The distance that each tip near the equator has moved around the sphere [m], and the
+    distances of all points from its centre."""
     grid = curve_points(hair.data).reshape(-1, 8, 3)
     root, tip = grid[:, 0], grid[:, -1]
     near = np.abs(root[:, 2]) < 0.03

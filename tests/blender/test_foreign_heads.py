@@ -1,4 +1,4 @@
-"""Hairstyles on heads that are not the built-in one: by topology, by fitting and by landmarks."""
+"""Hairstyles on heads other than the built-in one: by topology, by fitting and by landmarks."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -38,9 +38,9 @@ from hairloom.addon.groom.head_fit import LANDMARKS, Warp
 from hairloom.addon.ui import operators_hairstyles
 
 pytestmark = [pytest.mark.usefixtures("extension")]
-#: vertices of MakeHuman's skin, and with the helpers for clothes
+#: vertex count of MakeHuman's skin, and of skin and helpers for clothes
 BODY, WITH_HELPERS = 13380, 19158
-#: where the other heads stand [m], how much larger they are, and how far turned around Z [radians]
+#: transform of the other heads: position [m], scale, turn around Z [radians]
 PLACE, LARGER, TURNED = np.array([3.0, -1.0, 1.5]), 1.3, 0.4
 
 
@@ -55,7 +55,7 @@ def depsgraph() -> bpy.types.Depsgraph:
 
 
 def shaped(points: np.ndarray) -> np.ndarray:
-    """Another person: a wide jaw, a high skull, a long nose."""
+    """Another person's shape: a wide jaw, a high skull, a long nose."""
     x, y, z = np.array(points, np.float64).T
     wide = 1.0 + 0.12 * np.exp(-(((z + 0.08) / 0.06) ** 2))
     high = 1.0 + 0.10 / (1.0 + np.exp(-z / 0.02))
@@ -83,7 +83,7 @@ def mesh_object(name: str, positions: np.ndarray, polygons: list[list[int]]) -> 
 
 
 def makehuman(count: int = BODY) -> bpy.types.Object:
-    """A shaped head whose vertices have MakeHuman's numbers; the body has no faces."""
+    """A shaped head with MakeHuman's vertex numbers; the body has no faces."""
     bust = load_bust()
     positions = np.zeros((count, 3))
     known = bust.makehuman >= 0
@@ -93,7 +93,8 @@ def makehuman(count: int = BODY) -> bpy.types.Object:
 
 
 def scan(ratio: float = 0.3) -> bpy.types.Object:
-    """The same head as other triangles, fewer, in metres of another scale, turned, and not MH's."""
+    """The same head with fewer, other triangles, at another scale, turned, and without MakeHuman's
+    topology."""
     bust = load_bust()
     faces = [face.tolist() for face in bust_polygons()]
     skin = [face for face, kind in zip(faces, bust.material, strict=True) if kind == 0]
@@ -110,7 +111,7 @@ def roots_of(hair: bpy.types.Object) -> np.ndarray:
 
 
 def away(points: np.ndarray, head: bpy.types.Object) -> float:
-    """How far they are from the mesh at most, as Blender's own search finds it [m]."""
+    """The largest distance of the points from the mesh, by Blender's own search [m]."""
     mesh, back = head.evaluated_get(depsgraph()), head.matrix_world.inverted()
     far = 0.0
     for point in points:
@@ -122,8 +123,8 @@ def away(points: np.ndarray, head: bpy.types.Object) -> float:
 
 
 def inside_by_rays(points: np.ndarray, head: bpy.types.Object, deep: float) -> int:
-    """How many points an odd number of faces hides in each of three directions, farther than
-    `deep` [m] from every face."""
+    """The number of points that are inside and farther than `deep` [m] from every face. Inside
+    means an odd number of crossings in each of three directions."""
     surface = read_surface(head, depsgraph(), need_uv=False, place=head.name)
     tree = BVHTree.FromPolygons(surface.positions.tolist(), surface.triangles.tolist())
     count = 0
@@ -146,8 +147,8 @@ def crossings(tree: BVHTree, start: Vector, ray: tuple[float, float, float]) -> 
 
 
 def by_barycentric(style: Hairstyle, positions: np.ndarray) -> np.ndarray:
-    """Where roots are on the built-in head's polygons with other positions, found in the map by
-    looking at every triangle."""
+    """Positions of the roots on the built-in head with other vertex positions; each root's triangle
+    in UV space is found by testing all triangles."""
     bust = load_bust()
     corners, _ = bust.fans
     uv = bust.uv[bust.corner_uv[corners]].astype(np.float64)
@@ -170,7 +171,7 @@ def test_a_posed_mesh_of_makehumans_has_roots_at_the_same_places_of_its_faces(co
     human, style = makehuman(count), named_hairstyle("buzz_cut")
     assert has_makehuman_topology(human.data)
     human.location, human.rotation_euler, human.scale = (1, 2, 3), (0.3, -0.2, 0.9), (2, 2, 2)
-    # a pose: what is above the neck nods
+    # a pose: everything above the neck nods
     human.shape_key_add(name="Basis")
     nod = human.shape_key_add(name="Nod")
     rest = np.array([vertex.co[:] for vertex in human.data.vertices])
@@ -189,7 +190,7 @@ def test_a_posed_mesh_of_makehumans_has_roots_at_the_same_places_of_its_faces(co
     known = load_bust().makehuman >= 0
     places[known] = (posed @ matrix[:3, :3].T + matrix[:3, 3])[load_bust().makehuman[known]]
     wanted = by_barycentric(style, places)
-    # of a quad that is not flat, Blender may see the other diagonal
+    # Blender may split a quad that is not flat along the other diagonal
     gap = np.linalg.norm(roots_of(hair) - wanted, axis=1) / 2.0
     assert np.median(gap) < 1e-5 and gap.max() < 5e-4
     assert away(roots_of(hair)[::40], human) < 1e-5
@@ -224,7 +225,7 @@ def test_landmarks_are_guessed_where_they_are_on_another_person() -> None:
         true = stood(shaped(np.array([LANDMARKS[name][1]])))[0]
         gap = np.linalg.norm(np.array(obj.matrix_world.translation) - true) / LARGER
         assert gap < 0.009, name
-    # others are not added again, and one that was deleted is
+    # existing landmarks are not added again, a deleted one is
     bpy.data.objects.remove(landmarks_of(head)["nose"])
     again, _ = at_once(add_landmarks(head, depsgraph(), bpy.context.collection))
     assert [obj.hairloom.landmark for obj in again] == ["nose"]
@@ -241,7 +242,7 @@ def test_on_a_scan_roots_are_on_the_skin_and_no_strand_is_in_it(name: str) -> No
     assert strands.strand_count > 0.95 * len(style.guides.group)
     assert away(strands.roots[::20], head) < 2e-5
     assert inside_by_rays(strands.points[::41], head, deep=0.0012) == 0
-    # where the same roots are on this person, whose shape the fit does not know
+    # true places of the same roots on this person, whose shape the fit has no access to
     true = stood(shaped(by_barycentric(style, load_bust().positions)))
     if strands.strand_count == len(true):
         gap = np.linalg.norm(strands.roots - true, axis=1) / LARGER
@@ -305,7 +306,7 @@ def test_hair_follows_a_head_whose_shape_has_changed_and_landmarks_that_were_dra
     lengths = [read_curves(one, depsgraph()).strands.lengths() for one in (hair, wanted)]
     assert np.median(lengths[0]) == pytest.approx(np.median(lengths[1]), rel=0.01)
     assert roots_of(hair) == pytest.approx(roots_of(wanted), abs=1e-3)
-    # one that lies down is the same head, whose landmarks are not guessed again as it lies
+    # after a rotation the head has the same shape, so its landmarks are not guessed again
     head.matrix_world = Matrix.Rotation(1.3, 4, "X") @ Matrix.Translation((0.3, 0.0, 0.0))
     before = roots_of(hair)
     at_once(fit_again([hair], depsgraph()))
@@ -320,7 +321,7 @@ def test_hair_follows_a_head_whose_shape_has_changed_and_landmarks_that_were_dra
 @pytest.mark.slow
 @pytest.mark.parametrize("nodes", ["Duplicate Hair Curves", "Half"])
 def test_modifiers_that_change_how_many_curves_there_are_do_not_take_others_away(nodes) -> None:
-    """Which of the curves they have brought into the head is not known then."""
+    """With other curve counts, it is unknown which curves were led into the head."""
     head = scan()
     hair = added("curls", head).hair
     count = len(hair.data.curves)
@@ -336,7 +337,7 @@ def test_modifiers_that_change_how_many_curves_there_are_do_not_take_others_away
 
 
 def every_second_curve() -> bpy.types.NodeTree:
-    """Nodes that delete every second curve."""
+    """A node group that deletes every second curve."""
     tree = bpy.data.node_groups.new("Half", "GeometryNodeTree")
     for side in ("INPUT", "OUTPUT"):
         tree.interface.new_socket("Geometry", in_out=side, socket_type="NodeSocketGeometry")
@@ -386,7 +387,7 @@ def everything() -> set[str]:
 
 
 def refused(head: bpy.types.Object, problem: str, **options: str) -> None:
-    """With a sentence and a remedy, and with the scene as it was."""
+    """Assert an error with a remedy, and an unchanged scene."""
     before = everything()
     with pytest.raises(HairloomError, match=problem) as error:
         added("buzz_cut", head, **options)
@@ -504,7 +505,7 @@ def test_a_warp_brings_points_to_where_they_should_be_and_leaves_far_ones() -> N
     warp = Warp(np.eye(4)).bending(source, wanted, 0.3, 0.0)
     assert np.abs(warp(source) - wanted).max() < 1e-9
     assert np.abs(warp(source + 5.0) - source - 5.0).max() == 0.0
-    bent = warp.bending(wanted, source, 0.3, 0.0)  # back again
+    bent = warp.bending(wanted, source, 0.3, 0.0)  # the inverse warp
     assert np.abs(bent(source) - source).max() < 1e-9
 
 

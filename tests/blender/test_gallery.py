@@ -15,7 +15,7 @@ from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.command_line.job_options import chosen_settings
 
 ALL = [picture for section in gallery.SECTIONS for picture in section.pictures]
-#: of a picture and of all of them, so that the page loads at once
+#: size limits of a picture and of all pictures, so that the page loads fast
 MOST_BYTES, MOST_BYTES_IN_ALL = 250_000, 4_000_000
 
 
@@ -33,7 +33,7 @@ def test_the_page_shows_each_picture_that_is_there_and_small() -> None:
 
 @pytest.mark.parametrize("picture", ALL, ids=lambda picture: picture.name)
 def test_a_command_is_valid(picture: gallery.Picture) -> None:
-    """Its options are known, and so are its presets, its parameters and their values."""
+    """Its options, presets, parameters and values are all known."""
     tool, *arguments = shlex.split(picture.command)
     options = command_line.parser().parse_args(arguments)
     assert tool == gallery.HEADLESS

@@ -1,4 +1,5 @@
-"""Handles in the 3D view: where they are, what they are dragged for, and when they are there."""
+"""Handles in the 3D view: their places, the properties that they change, and when they are
+shown."""
 
 from __future__ import annotations
 
@@ -20,7 +21,7 @@ pytestmark = pytest.mark.draws(light=False)
 
 
 class Recorded:
-    """A gizmo that only keeps what it is given."""
+    """A gizmo that only records its settings."""
 
     def __init__(self, kind: str) -> None:
         self.kind, self.target = kind, None
@@ -34,12 +35,12 @@ class Recorded:
         self.get, self.set = get, set
 
     def tip(self) -> np.ndarray:
-        """Where an arrow is (3,)."""
+        """The position of an arrow's tip (3,)."""
         return np.array(self.matrix_basis @ Vector((0.0, 0.0, self.get())))
 
 
 def handles(kind: Any) -> Any:
-    """A group's gizmos, as Blender makes and places them."""
+    """A gizmo group, with its gizmos made and placed as Blender does it."""
     made: list[Recorded] = []
 
     def new(name: str) -> Recorded:
@@ -70,7 +71,7 @@ def make_active(obj: Any) -> None:
 
 @pytest.fixture
 def hair(new_hair: Callable[..., Any], sphere: Any, evaluated: Any) -> Any:
-    """Hair in the wind, previewed, with its overlay."""
+    """Previewed hair in the wind, with its overlay."""
     made = new_hair(sphere)
     wind = made.hairloom.dynamics
     wind.wind_speed, wind.wind_direction, wind.wind_elevation = 4.0, 0.7, -0.4
@@ -92,7 +93,8 @@ def test_the_winds_arrow_ends_where_the_overlays_does(hair: Any) -> None:
 
 
 def test_rings_turn_the_wind_as_the_mouse_turns_them(hair: Any) -> None:
-    """Blender counts clockwise around z: turned back by its angle, x is where the wind blows."""
+    """Blender measures angles clockwise around z: a ring rotated back by its angle has its x axis
+    along the wind."""
     turns, wind = handles(gizmos.HAIRLOOM_GGT_wind).turns, hair.hairloom.dynamics
     level = Vector((math.cos(wind.wind_direction), math.sin(wind.wind_direction), 0.0))
     along = math.cos(wind.wind_elevation) * level
@@ -158,7 +160,7 @@ def test_so_has_what_stops_cloth(sphere: Any) -> None:
     [("CIRCLE", "automatic", 0), ("SPHERE", "automatic", 0), ("ARROWS", "capsule", 2)],
 )
 def test_an_empty_is_dragged_at_its_border(shown_as: str, shape: str, axis: int) -> None:
-    """Though it is turned, scaled and moved."""
+    """The handle is at the border also if the Empty is turned, scaled and moved."""
     empty = bpy.data.objects.new("Empty", None)
     empty.empty_display_type, empty.empty_display_size = shown_as, 0.3
     empty.hairloom.collider_shape = shape

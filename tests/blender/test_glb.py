@@ -1,4 +1,5 @@
-"""Hair cards as GLB, read back by hand: order, attributes, material; and what Blender keeps."""
+"""Hair cards as GLB, read back without a library: order, attributes and material; Blender's scene
+is unchanged."""
 
 from __future__ import annotations
 
@@ -27,7 +28,7 @@ TEXTURE = TextureSettings(variant_width=32, height=128)
 
 
 def hair(count: int = 120, seed: int = 2) -> CardMesh:
-    """Cards that hang around a sphere of 10 cm, each at its own distance, in random order."""
+    """Cards around a sphere of 10 cm, each at its own distance, in random order."""
     random = np.random.default_rng(seed)
     distance = random.permutation(np.linspace(0.1, 0.16, count))
     angle = random.uniform(0.0, 2.0 * np.pi, count)
@@ -65,7 +66,7 @@ def test_index_order_is_the_sorted_order(written: Path, sorted_hair: CardMesh) -
 
 
 def test_index_order_is_kept_whatever_it_is(tmp_path: Path) -> None:
-    """An order that no exporter would choose by itself: every triangle at random."""
+    """A random order of triangles, which no exporter would choose by itself."""
     mesh = hair(30)
     shuffle = np.random.default_rng(0).permutation(len(mesh.triangles))
     mesh = replace(mesh, triangles=mesh.triangles[shuffle], card=mesh.card[shuffle])
@@ -75,7 +76,7 @@ def test_index_order_is_kept_whatever_it_is(tmp_path: Path) -> None:
 
 
 def test_cards_come_from_the_inside_to_the_outside(written: Path) -> None:
-    """From the file alone, of the order of its triangles at their roots."""
+    """The file's triangles near the roots, in index order, lie farther and farther outside."""
     file = Glb(written)
     corners = to_blender(file.corners("POSITION"))
     assert len(corners) == 120 * 12 * 2 * 2
@@ -130,7 +131,7 @@ def test_the_embedded_picture_is_the_texture(
     pixels = pixels.reshape(texture.shape)
     np.testing.assert_allclose(pixels[..., 3], texture[..., 3], atol=0.51 / 255.0)
     coded = 1.055 * texture[..., :3] ** (1 / 2.4) - 0.055
-    # also where alpha is 0: otherwise dark fringes
+    # also where alpha is 0, otherwise there are dark fringes
     np.testing.assert_allclose(pixels[..., :3], coded, atol=0.51 / 255.0)
 
 
@@ -145,13 +146,13 @@ def test_custom_attributes_only_where_they_are_asked_for(
 
 
 def block_counts() -> dict[str, int]:
-    """How many data-blocks of every kind there are."""
+    """The number of data-blocks of every kind."""
     kinds = [p.identifier for p in bpy.data.bl_rna.properties if p.type == "COLLECTION"]
     return {kind: len(getattr(bpy.data, kind)) for kind in kinds}
 
 
 def test_the_users_scene_is_left_alone(sorted_hair: CardMesh, tmp_path: Path) -> None:
-    """In edit mode, on a second view layer, at another frame."""
+    """In Edit Mode, in a second view layer, at another frame."""
     bpy.ops.mesh.primitive_cube_add()
     window, scene = bpy.context.window, bpy.context.scene
     window.view_layer = scene.view_layers.new("second")

@@ -1,4 +1,4 @@
-"""Hair cards as GLB in programs that we did not write: Khronos's validator and Panda3D."""
+"""Hair cards as GLB in independent programs: Khronos's validator and Panda3D."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ PANDA_VIEW = Path(__file__).parent / "panda_view.py"
 
 @pytest.fixture(scope="module")
 def curtain() -> tuple[CardMesh, np.ndarray]:
-    """Cards that hang around a circle, sorted, and their texture, whose tips dissolve."""
+    """Sorted cards around a circle, and their texture, which fades out at the tips."""
     angle = np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)
     out = np.stack([np.cos(angle), np.sin(angle), np.zeros(40)], axis=-1)
     fall = np.linspace([0.0, 0.0, 0.1], [0.0, 0.0, -0.1], 8)
@@ -54,7 +54,7 @@ def test_khronos_validator_finds_no_fault(
 def test_khronos_validator_sees_a_damaged_file(
     curtain: tuple[CardMesh, np.ndarray], tmp_path: Path
 ) -> None:
-    """The test above can fail."""
+    """A damaged file, which shows that the test above can fail."""
     path = tmp_path / "cards.glb"
     write_glb(path, curtain[0], None)
     path.write_bytes(path.read_bytes().replace(b'"VEC3"', b'"VEC5"', 1))
@@ -62,7 +62,7 @@ def test_khronos_validator_sees_a_damaged_file(
 
 
 def drawn_by_panda(path: Path, size: int, extent: float) -> np.ndarray:
-    """What Panda3D draws looking along +Y at the origin, (size, size, 3), row 0 at the bottom."""
+    """Panda3D's picture, looking along +Y at the origin, (size, size, 3), row 0 at the bottom."""
     for module in ("panda3d", "gltf"):
         if importlib.util.find_spec(module) is None:
             pytest.skip(f"{module} is missing: `make setup` installs it")
@@ -78,7 +78,7 @@ def area_of(one: np.ndarray, two: np.ndarray) -> np.ndarray:
 
 
 def filtered(texture: np.ndarray, uv: np.ndarray) -> np.ndarray:
-    """Between the four texels around each place, as engines filter; it does not repeat."""
+    """Bilinear texture lookup, clamped at the edges, as engines filter."""
     height, width = texture.shape[:2]
     place = uv * (width, height) - 0.5
     low = np.floor(place).astype(int)
@@ -97,8 +97,8 @@ def filtered(texture: np.ndarray, uv: np.ndarray) -> np.ndarray:
 def composed(mesh: CardMesh, texture: np.ndarray, size: int, extent: float) -> np.ndarray:
     """The same picture, triangle by triangle: filtered texture, depth test and write, blend over.
 
-    The filter matters most where it makes alpha: a pixel of hardly any still writes depth and hides
-    what is drawn later behind it. How many such pixels there are depends on the order of the cards.
+    Filtering matters most for alpha: a pixel of tiny alpha still writes depth and hides everything
+    that is drawn later behind it. The number of such pixels depends on the order of the cards.
     """
     picture, depth = np.zeros((size, size, 3)), np.full((size, size), np.inf)
     pixel = (mesh.positions[:, [0, 2]].astype(np.float64) / extent + 0.5) * size - 0.5
@@ -143,7 +143,7 @@ def test_panda3d_draws_what_a_slow_compositor_draws(
 def test_panda3d_composes_what_a_slow_compositor_composes(
     curtain: tuple[CardMesh, np.ndarray], tmp_path: Path
 ) -> None:
-    """Cards of one colour and alpha each, so that no filter of textures is in the way."""
+    """Each card has one colour and alpha, so that texture filters make no difference."""
     mesh, _ = curtain
     random, columns = np.random.default_rng(7), mesh.atlas.columns
     colors = np.concatenate([random.random((columns, 3)), np.full((columns, 1), 0.5)], axis=1)
@@ -170,7 +170,8 @@ def test_panda3d_composes_what_a_slow_compositor_composes(
 
 @pytest.mark.slow(instead="test_panda3d_draws_what_a_slow_compositor_draws")
 def test_panda3d_blends_in_index_order(tmp_path: Path) -> None:
-    """Four sheets one behind the other, each of one colour: the blend tells the order."""
+    """Four sheets one behind another, each of one colour: the blended colour depends on the
+    order."""
     depths = [0.3, 0.1, 0.2, 0.0]  # the viewer is at -y, so this is no depth order
     guides = np.array([[[0, y, 0.1], [0, y, -0.1]] for y in depths], np.float32)
     settings = CardSettings(segment_count=1, column_count=1, tip_width=1.0, bend=0.0)

@@ -1,4 +1,5 @@
-"""The budget of GPU memory in the preferences, in the panel, and where a view's picture is kept."""
+"""The budget of GPU memory: in the preferences, in the panel, and for the pictures that views
+keep."""
 
 from __future__ import annotations
 
@@ -51,7 +52,7 @@ def test_the_panel_says_what_to_do_where_more_is_taken(
         return [one.text for one in problems_of(hair, session) if "GPU" in one.text]
 
     gpu_objects.free_unused()
-    before = gpu_objects.bytes_in_use()  # other tests of this process hold some
+    before = gpu_objects.bytes_in_use()  # other tests of this process hold some memory
     budget = 128 + round(before / MEGABYTE)
     chosen(budget)
     assert not told()

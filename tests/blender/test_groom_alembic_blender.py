@@ -1,4 +1,4 @@
-"""Groom Alembic beside Blender's own Alembic, in one process and in both directions."""
+"""Groom Alembic and Blender's own Alembic in one process, in both directions."""
 
 from pathlib import Path
 
@@ -32,7 +32,7 @@ def strands():
 
 
 def curves_of(objects):
-    """World positions of the only hair among these objects."""
+    """World-space points of the only hair among these objects."""
     (hair,) = [each for each in objects if each.type == "CURVES"]
     points = np.empty(3 * len(hair.data.points), np.float32)
     hair.data.position_data.foreach_get("vector", points)
@@ -44,7 +44,7 @@ def test_blender_reads_what_we_write_and_we_what_it_writes(strands, tmp_path):
     bpy.ops.wm.read_factory_settings(use_empty=True)
     ours, blenders = tmp_path / "ours.abc", tmp_path / "blenders.abc"
     picture = bpy.data.images.new("Any", 4, 4, float_buffer=True)
-    for _ in range(2):  # in turn, so that each library works when the other has
+    for _ in range(2):  # alternating, so that each library runs after the other
         write_groom_alembic(ours, Groom(strands), PRESETS["blender"])
         bpy.ops.wm.alembic_import(filepath=str(ours), as_background_job=False)
         np.testing.assert_allclose(curves_of(bpy.context.scene.objects), strands.points, atol=1e-6)
@@ -52,7 +52,7 @@ def test_blender_reads_what_we_write_and_we_what_it_writes(strands, tmp_path):
         read = read_groom_alembic(blenders, python=python_for(blenders))
         np.testing.assert_allclose(read.strands.points, strands.points, atol=1e-6)
         np.testing.assert_allclose(read.strands.radius, strands.radius, rtol=1e-5)
-        # OpenEXR has Imath too
+        # OpenEXR also contains Imath
         picture.filepath_raw, picture.file_format = str(tmp_path / "a.exr"), "OPEN_EXR"
         picture.save()
         assert Path(picture.filepath_raw).stat().st_size > 100

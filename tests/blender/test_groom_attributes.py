@@ -1,4 +1,4 @@
-"""What a groom says beside its strands, kept on hair curves."""
+"""Attributes of a groom beside its strands, stored on hair curves."""
 
 from dataclasses import replace
 
@@ -30,7 +30,7 @@ def full_groom(counts=(2, 5, 16, 3), seed=0):
         root_uv=rng.random((len(counts), 2)),
         color=rng.random((offsets[-1], 3)) * 3.0,
     )
-    # IDs that no float32 can tell apart
+    # IDs that float32 cannot distinguish
     ids = (1 << 30) + np.arange(len(counts))
     return Groom(
         strands,
@@ -100,8 +100,8 @@ def test_what_is_of_dropped_curves_is_dropped_with_them():
 
 
 def test_modifiers_carry_it_along():
-    """A modifier that reverses nothing but makes new geometry: names are custom properties, which
-    geometry nodes drop."""
+    """The modifier only moves points, but makes new geometry, which drops the custom properties
+    that hold names."""
     groom = full_groom()
     hair = written(groom)
     tree = bpy.data.node_groups.new("Same", "GeometryNodeTree")
@@ -124,7 +124,7 @@ def test_a_strand_with_a_colour_that_cannot_be_used_has_none(faulty):
     hair = written(groom)
     opaque = np.ones((len(groom.color), 4), np.float32)
     opaque[:, :3] = groom.color
-    opaque[3, 1] = faulty  # of the second strand
+    opaque[3, 1] = faulty  # in the second strand
     hair.data.attributes["color"].data.foreach_set("color", opaque.ravel())
     read = read_back(hair).color
     assert np.isnan(read[2:7]).all()
@@ -164,7 +164,7 @@ def test_a_colour_of_whole_curves_and_of_bytes_counts_too():
     assert color[start : start + 16] == pytest.approx(
         np.tile([[0.3185, 0.0, 1.0]], (16, 1)), abs=1e-3
     )
-    assert (color[:start] == 1.0).all()  # what Blender gives to new ones
+    assert (color[:start] == 1.0).all()  # Blender's default for a new attribute
 
 
 def test_attributes_of_another_kind_are_left_alone():

@@ -65,7 +65,7 @@ def test_blender_exports_what_we_read(empty_scene: Any, tmp_path: Path, suffix: 
 
 
 def test_blender_imports_what_we_write(empty_scene: Any, tmp_path: Path) -> None:
-    """Through another axis and unit, which Blender turns back."""
+    """Written with another up axis and unit, which Blender converts back."""
     expected = strands()
     path = tmp_path / "hair.usdc"
     write_usd(path, Groom(expected, strand_id=[5, 6, 7]), up="Y", scale=0.01)

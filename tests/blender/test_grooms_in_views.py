@@ -1,4 +1,4 @@
-"""Grooms in one 3D view shade each other, as in a render and as theory says."""
+"""Grooms in one 3D view shade each other, tested against a render and against Beer's law."""
 
 from __future__ import annotations
 
@@ -44,8 +44,8 @@ CAMERA = Camera(
 def sheet(
     height: float, count: int, radius: float = 2.0e-4, seed: int = 1, **changes: Any
 ) -> Snapshot:
-    """Level strands side by side at about one height, 0.4 m wide, of which the sun goes straight
-    through."""
+    """Horizontal parallel strands at about one height, on 0.4 m by 0.4 m; sunlight passes straight
+    through the sheet."""
     random = np.random.default_rng(seed)
     strands = np.zeros((count, 6, 3), np.float32)
     strands[..., 0] = np.linspace(-0.2, 0.2, 6)
@@ -66,7 +66,8 @@ def sheet(
 
 @pytest.fixture
 def view(monkeypatch: pytest.MonkeyPatch) -> Iterator[SmallView]:
-    monkeypatch.setattr(views, "_addresses", lambda: iter((ADDRESS,)))  # no window shows it
+    # no window shows this view
+    monkeypatch.setattr(views, "_addresses", lambda: iter((ADDRESS,)))
     overlay._overlay.drawn.clear()
     yield SmallView(CAMERA)
     overlay._overlay.drawn.clear()
@@ -74,7 +75,7 @@ def view(monkeypatch: pytest.MonkeyPatch) -> Iterator[SmallView]:
 
 
 def row_of(height: float, y: float) -> int:
-    """Where it is seen in the view."""
+    """The row of the view's pixels in which a point at this height and y appears."""
     seen = CAMERA.projection @ CAMERA.view @ np.array([0.0, y, height, 1.0])
     return int(0.5 * SIZE * (1.0 + seen[1]))
 
@@ -84,7 +85,7 @@ def shown_in(view: SmallView) -> list[Any]:
 
 
 def of_render(*grooms: Snapshot) -> np.ndarray:
-    """One sample of the same by the render engine, scene-linear."""
+    """One sample of these grooms by the render engine, scene-linear."""
     drawn = tuple(DrawnGroom(number, each) for number, each in enumerate(grooms))
     scene = SceneSnapshot(grooms=drawn, lights=grooms[0].lights, ambient=grooms[0].ambient)
     target = Target()
@@ -93,14 +94,14 @@ def of_render(*grooms: Snapshot) -> np.ndarray:
 
 
 def code_of(radiance: np.ndarray) -> np.ndarray:
-    """What Blender shows by its view transform Standard, 0 to 1."""
+    """The display values, 0 to 1, of Blender's view transform Standard."""
     light = np.clip(radiance, 0.0, 1.0)
     curved = 1.055 * np.maximum(light, 0.0031308) ** (1.0 / 2.4) - 0.055
     return np.where(light <= 0.0031308, 12.92 * light, curved)
 
 
 def radiance_of(written: np.ndarray) -> np.ndarray:
-    """Of what a view was given, the radiance that it shows."""
+    """The radiance that a view shows for the values written into it."""
     code = np.maximum(written, 0.0) ** (1.0 / 2.2)
     return np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4)
 
@@ -115,7 +116,7 @@ FORMS = {
 @pytest.mark.alike
 @pytest.mark.parametrize("form", FORMS)
 def test_hair_has_the_colours_of_a_render(view: SmallView, form: str) -> None:
-    """Three grooms above each other, opaque, so that each pixel is of one strand."""
+    """Three opaque grooms, one above another, so that each pixel shows one strand."""
     changes = [replace(VOLUME, **each) for each in FORMS[form]]
     low, middle, high = (
         sheet(height, 400, seed=seed, volume=volume)
@@ -132,17 +133,18 @@ def test_hair_has_the_colours_of_a_render(view: SmallView, form: str) -> None:
 
 @pytest.mark.parametrize("shadows", ["deep", "slices"])
 def test_light_after_a_groom_is_what_beers_law_says(view: SmallView, shadows: str) -> None:
-    """A sheet of strands that cover half of the light's way, above a strand of another groom:
-    exp(-1/2) of the sun arrives there."""
+    """A sheet that covers half of the light's cross-section, above strands of another groom:
+    exp(-1/2) of the sunlight arrives."""
     volume = replace(VOLUME, shadows=shadows, layers=16, resolution=64)
-    dim = Light.sun((0.0, 0.0, -1.0), (1.0, 1.0, 1.0), 0.5)  # nothing is brighter than white
+    dim = Light.sun((0.0, 0.0, -1.0), (1.0, 1.0, 1.0), 0.5)  # keeps all pixels below white
     few = sheet(0.0, 12, radius=1.0e-3, volume=volume, lights=(dim,))
     above = sheet(0.1, 400, radius=2.5e-4, volume=volume, lights=(dim,))
     alone, both = (
         radiance_of(view.shows(**grooms)[..., :3])
         for grooms in ({"a": few}, {"a": few, "b": above})
     )
-    rows = row_of(0.0, -0.2), row_of(0.1, -0.2)  # of the lower sheet alone, before the upper one
+    # rows that show only the lower sheet, in front of the upper one
+    rows = row_of(0.0, -0.2), row_of(0.1, -0.2)
     middle = slice(rows[0] + 1, rows[1] - 1), slice(SIZE // 4, -SIZE // 4)
     seen = alone[middle].min(axis=2) > 0.0
     assert seen.sum() > 40 and alone.max() < 0.9
@@ -152,7 +154,7 @@ def test_light_after_a_groom_is_what_beers_law_says(view: SmallView, shadows: st
 
 
 def test_what_happens_to_one_groom_is_seen_on_the_others(view: SmallView) -> None:
-    """A view keeps its picture until another groom moves, is hidden or goes."""
+    """A view keeps its picture until another groom moves, is hidden or removed."""
     layered = replace(OPAQUE, transparency="layers")
     low = sheet(0.0, 400, strand_settings=layered)
     high = sheet(0.1, 400, seed=2, strand_settings=layered)
@@ -162,7 +164,7 @@ def test_what_happens_to_one_groom_is_seen_on_the_others(view: SmallView) -> Non
     calls = gpu_calls(lambda: again.append(view.drawn()))
     assert calls["draws"] == 2 and not calls.get("dispatches"), "nothing is looked up"
     np.testing.assert_allclose(again[0], both, atol=1.0 / 510.0)
-    below = slice(0, row_of(0.1, -0.2) - 1)  # of the lower groom alone
+    below = slice(0, row_of(0.1, -0.2) - 1)  # rows that show only the lower groom
     for name, grooms in (
         ("moved", {"a": low, "b": moved}),
         ("back", {"a": low, "b": high}),
@@ -171,7 +173,7 @@ def test_what_happens_to_one_groom_is_seen_on_the_others(view: SmallView) -> Non
         ("gone", {"a": low}),
     ):
         view.shows(**grooms)
-        found = view.drawn()  # comes to rest
+        found = view.drawn()  # the view is at rest
         kept = {key: each for key, each in grooms.items() if each is not None}
         views.forget_views()
         overlay._overlay.drawn.clear()
@@ -195,7 +197,7 @@ def test_the_maps_of_a_groom_go_with_it(view: SmallView) -> None:
 
 
 def test_cards_of_one_groom_shade_strands_of_another_and_are_drawn_last(view: SmallView) -> None:
-    """As in a render: half the light, below a card that covers half."""
+    """As in a render: half of the light arrives below a card with alpha 0.5."""
     dim = Light.sun((0.0, 0.0, -1.0), (1.0, 1.0, 1.0), 0.5)
     few = sheet(0.0, 12, radius=1.0e-3, lights=(dim,))
     flat = card((-0.2, -0.2), (0.2, 0.2), 0.0)
@@ -217,7 +219,8 @@ def test_cards_of_one_groom_shade_strands_of_another_and_are_drawn_last(view: Sm
 
 
 def test_grooms_far_apart_know_the_same_lights() -> None:
-    """Of ten lamps each groom knows the eight that are brightest at its own hair."""
+    """Grooms in one view share lights: of ten lamps, the eight that are brightest at the first
+    groom."""
     lamps = [Light.point((float(x), 0.0, 0.5), (1.0, 1.0, 1.0), 10.0) for x in range(10)]
     ends = [sheet(0.0, 4, lights=brightest(lamps, np.array([x, 0.0, 0.0]))) for x in (0.0, 9.0)]
     assert ends[0].lights != ends[1].lights
@@ -243,10 +246,12 @@ def test_a_clipping_region_may_cut_the_head_away_that_hides_hair(view: SmallView
 def test_without_overlays_hair_is_there_and_its_head_hides_it(
     view: SmallView, left: float, engine: str
 ) -> None:
-    """EEVEE leaves no depths then, and Cycles those of nothing."""
+    """Without overlays EEVEE leaves depth 0 and Cycles depth 1, so our own depth of the head hides
+    hair."""
     hair = sheet(0.0, 400)
     corners = np.float32([[-1, -0.05, -1], [0, -0.05, -1], [0, -0.05, 1], [-1, -0.05, 1]])
-    wall = Surface(corners, np.int32([[0, 1, 2], [0, 2, 3]]))  # in the left half, amid the hair
+    # in the left half, in the middle of the hair's depth
+    wall = Surface(corners, np.int32([[0, 1, 2], [0, 2, 3]]))
     all_hair = view.shows(a=hair)[..., 3]
     view.context.scene.render.engine = engine
     view.space.shading.type = "RENDERED"

@@ -1,4 +1,4 @@
-"""Grooms that feel each other: played, baked, in any order, with others that rest or are baked."""
+"""Grooms that interact: played, baked, in any order, with others at rest or baked."""
 
 from pathlib import Path
 
@@ -21,7 +21,8 @@ LAST = 6
 
 @pytest.fixture
 def two(new_hair, sphere, tmp_path):
-    """Two grooms that stand through each other on a head that turns, each softer than the other."""
+    """Two grooms whose strands interpenetrate, on a head that turns; one is softer than the
+    other."""
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = 1, LAST
     for frame, angle in ((1, 0.0), (LAST, 1.5)):
@@ -41,7 +42,7 @@ def two(new_hair, sphere, tmp_path):
 
 
 def previewed(*grooms):
-    """From rest as it is in the first frame."""
+    """Start previews of these grooms at rest in the first frame."""
     previews.stop_all()
     bpy.context.scene.frame_set(1)
     for hair in grooms:
@@ -49,7 +50,7 @@ def previewed(*grooms):
 
 
 def played(*grooms, last=LAST):
-    """Of each, the guides in each frame while the scene goes through them."""
+    """For each groom, the guides in each frame as the scene steps through the frames."""
     shown = [[] for _ in grooms]
     for frame in range(1, last + 1):
         bpy.context.scene.frame_set(frame)
@@ -64,7 +65,7 @@ def baked(*grooms):
 
 
 def alone(two):
-    """What each does without the other."""
+    """The motion of each groom when the other is hidden in renders."""
     previewed(*two)
     found = []
     for hair, other in (two, two[::-1]):
@@ -103,7 +104,7 @@ def test_a_bake_of_both_is_what_was_played_and_the_same_each_time(two):
 
 @pytest.mark.slow(instead="test_a_bake_of_one_beside_one_that_is_baked")
 def test_a_bake_of_one_beside_one_at_rest(two):
-    """As it is played where the other does not follow the timeline."""
+    """It equals playback in which the other groom does not follow the timeline."""
     one, other = two
     by_itself = alone(two)[0]
     other.hairloom.bake.follows = False
@@ -117,7 +118,7 @@ def test_a_bake_of_one_beside_one_at_rest(two):
 
 
 def test_a_bake_of_one_beside_one_that_is_baked(two):
-    """Which plays on as it was baked."""
+    """The other groom plays its bake meanwhile."""
     one, other = two
     baked(other)
     previewed(*two)
@@ -129,7 +130,7 @@ def test_a_bake_of_one_beside_one_that_is_baked(two):
 
 
 def test_a_bake_leaves_out_hair_that_cannot_be_used_and_says_so(two):
-    """Such as Blender's Empty Hair on the same head."""
+    """Such as Blender's Empty Hair on the same head, without curves."""
     one, other = two
     other.hide_render = True
     (expected,) = baked(one)
@@ -226,7 +227,8 @@ def test_a_bake_is_out_of_date_once_other_hair_has_changed(two):
 
 
 def test_a_bake_is_out_of_date_by_what_moves_other_hair_in_its_frame(two):
-    """Not by keyframes on its settings in frames that have them, nor by its name."""
+    """Keyframes on the other hair's settings do not make a bake stale in frames that have them, nor
+    does its name."""
     one, other = two
     scene = bpy.context.scene
     scene.frame_end = 3

@@ -1,4 +1,4 @@
-"""Hair keeps the settings that it grows by, and follows them as long as nobody has combed it."""
+"""Hair stores its growth settings, and follows them until somebody combs it."""
 
 import bpy
 import numpy as np
@@ -39,7 +39,7 @@ def test_a_groom_keeps_what_it_has_grown_by(grown):
 
 
 def test_an_edit_makes_the_hair_that_its_settings_say(grown, sphere):
-    """The same as grown from the start, by the pure function alone."""
+    """The result equals the pure function `grow` with these settings."""
     before = lengths(grown)
     own = grown.data.hairloom.grow
     own.length, own.droop = 0.05, 0.2
@@ -130,7 +130,7 @@ def test_weights_come_from_a_group_and_a_problem_is_told_and_goes(grown, sphere)
 
 
 def test_an_image_says_where_and_how_long_hair_grows(grown, sphere):
-    """Dark below and a half above; of another name than a vertex group, which comes first."""
+    """The image is black below and 0.5 above. A vertex group of the same name takes precedence."""
     layer, vertices = sphere.data.uv_layers.active, sphere.data.vertices
     for loop in sphere.data.loops:
         layer.uv[loop.index].vector = (0.5, 0.5 + 2.0 * vertices[loop.vertex_index].co.z)
@@ -218,7 +218,7 @@ def test_hair_of_a_scaled_head_keeps_its_widths(grown, sphere, scale):
 
 
 def test_curves_that_grow_again_are_all_selected(grown):
-    """As Blender takes curves without its attribute; with one, new curves would not be."""
+    """Blender treats curves without the attribute as selected; with it, new curves would not be."""
     set_attribute(grown.data, ".selection", "POINT", np.ones(len(grown.data.points), bool))
     grown.data.hairloom.grow.length = 0.05
     assert lengths(grown).max() < 0.052
@@ -226,7 +226,7 @@ def test_curves_that_grow_again_are_all_selected(grown):
 
 
 def test_hair_that_blender_does_not_evaluate_says_so(grown, sphere):
-    """It would grow on a head without its modifiers, and where that has been before."""
+    """It would grow on a head without its modifiers, at an old position."""
     collection = bpy.data.collections.new("Kept")
     bpy.context.scene.collection.children.link(collection)
     for obj in (sphere, grown):

@@ -1,4 +1,4 @@
-"""The material of a look, as Cycles evaluates it; the node's own inputs: test_principled.py."""
+"""The material of a look as Cycles evaluates it; test_principled.py tests the node's own inputs."""
 
 from __future__ import annotations
 
@@ -21,7 +21,8 @@ from hairloom.addon.shading.marschner.pigment import absorption_color, color_abs
 from hairloom.addon.shading.settings import ShadingSettings
 from hairloom.addon.strands import StrandSet
 
-#: strands side by side before the camera, one a pixel, upright, from the picture's lower edge up
+#: vertical strands side by side in front of the camera, one per pixel, from the picture's lower
+#: edge up
 ROW, TALL = 64, 16
 
 
@@ -48,7 +49,7 @@ def hair(new_hair: Callable[..., Any], stage: Any) -> Any:
 
 
 def evaluated_input(hair: Any, name: str, folder: Path) -> np.ndarray:
-    """What Cycles finds for an input of the node, (rows from the roots up, strands, 3)."""
+    """An input of the hair node as Cycles evaluates it, (rows from the roots up, strands, 3)."""
     tree = hair.data.materials[0].node_tree
     node = next(each for each in tree.nodes if each.type == "BSDF_HAIR_PRINCIPLED")
     light = tree.nodes.new("ShaderNodeEmission")

@@ -1,6 +1,6 @@
-"""Hair over the pictures of Blender's own engines: what is drawn, and what becomes of the scene.
+"""Hair drawn over pictures of Blender's own engines: the picture, and the state of the scene.
 
-Cycles stands for both engines: it is the one that draws without a GPU, always in the same way.
+Cycles represents both engines: it works without a GPU, and its pictures are reproducible.
 """
 
 from __future__ import annotations
@@ -27,20 +27,20 @@ from hairloom.addon.strands import StrandSet  # noqa: E402
 
 pytestmark = [pytest.mark.draws, pytest.mark.usefixtures("gpu_context", "extension")]
 
-#: of each pixel, and where pictures of both engines are compared; pixels a side
+#: samples per pixel, samples where pictures of both engines are compared, and pixels per side
 SAMPLES, FINE, SIZE = 4, 8, 120
-#: of the hair: strands, points of each, radius [m]
+#: strand count, points per strand and radius [m] of the hair
 COUNT, POINTS, RADIUS = 8000, 4, 0.00015
 
 
 @pytest.fixture
 def cycles(stage: Any) -> Any:
-    """The stage as Cycles renders it, with the same noise in each picture."""
+    """The stage, rendered by Cycles with the same noise in each picture."""
     stage.render.engine = "CYCLES"
     stage.cycles.use_denoising = False
     stage.cycles.use_adaptive_sampling, stage.cycles.max_bounces = False, 0
     sample(stage, SAMPLES)
-    # small hair is thinned out
+    # hair in a small picture would be thinned out
     stage.render.resolution_x = stage.render.resolution_y = SIZE
     return stage
 
@@ -51,13 +51,13 @@ def sample(scene: Any, times: int) -> None:
 
 @pytest.fixture
 def hairy(cycles: Any, sphere: Any, new_hair: Callable[..., Any]) -> Any:
-    """A ball with some hair on the stage, in the light of the world alone."""
+    """A ball with hair on the stage, lit only by the world."""
     cycles.camera.location.y = -0.6
     return dense(new_hair, sphere)
 
 
 def dense(new_hair: Callable[..., Any], head: Any = None) -> Any:
-    """What our renderer is for: many thin strands; as thick at their tips as Cycles has them."""
+    """Many thin strands, whose tips are as thick as in Cycles."""
     outward = np.random.default_rng(1).normal(size=(COUNT, 1, 3))
     outward /= np.linalg.norm(outward, axis=2, keepdims=True)
     points = outward * np.linspace(0.1, 0.18, POINTS)[None, :, None]
@@ -69,7 +69,7 @@ def dense(new_hair: Callable[..., Any], head: Any = None) -> Any:
 
 
 def rendered(folder: Path) -> np.ndarray:
-    """The picture after compositing, (height, width, 4) scene-linear, premultiplied."""
+    """The picture after compositing, (height, width, 4), scene-linear, premultiplied."""
     scene = bpy.context.scene
     settings = scene.render.image_settings
     settings.file_format, settings.color_depth, settings.color_mode = "OPEN_EXR", "32", "RGBA"
@@ -92,13 +92,13 @@ def differs(one: np.ndarray, other: np.ndarray, by: float = 0.01) -> np.ndarray:
 
 
 def grown(mask: np.ndarray) -> np.ndarray:
-    """A mask and the pixels beside it."""
+    """A mask, dilated by one pixel."""
     padded = np.pad(mask, 1)
     return np.any([padded[y : y + SIZE, x : x + SIZE] for y in range(3) for x in range(3)], axis=0)
 
 
 def blocks(image: np.ndarray) -> np.ndarray:
-    """Means of 10 x 10 pixels: which strand lies where in a pixel does not count."""
+    """Means of 10 x 10 pixels, which do not depend on the places of strands within a pixel."""
     return image.reshape(SIZE // 10, 10, SIZE // 10, 10).mean(axis=(1, 3))
 
 
@@ -119,7 +119,8 @@ def links_of(tree: Any) -> set[tuple[str, str, str, str]]:
 def test_hair_covers_what_it_covers_in_cycles_and_nothing_else_changes(
     cycles: Any, hairy: Any, tmp_path: Path
 ) -> None:
-    """Without shadows all other pixels are Cycles', bit for bit."""
+    """Coverage agrees with Cycles to 0.05 per block; without shadows, all other pixels are Cycles'
+    bit for bit."""
     sample(cycles, FINE)
     hairy.data.hairloom.volume.shadows = "none"
     cycles.render.film_transparent = True
@@ -139,7 +140,8 @@ def test_hair_covers_what_it_covers_in_cycles_and_nothing_else_changes(
 def test_hair_behind_a_mesh_is_hidden_at_its_very_edge(
     cycles: Any, hairy: Any, tmp_path: Path
 ) -> None:
-    """The edge of a black plate that glows: a pixel shows as much hair as Cycles shows sky."""
+    """A plate in front of the right half hides all hair behind it, and alpha at its edge does not
+    exceed 1."""
     set_world((0.0, 0.0, 0.0))
     bpy.ops.mesh.primitive_plane_add(
         size=1.0, location=(0.503, -0.3, 0.0), rotation=(np.pi / 2.0, 0.0, 0.0)
@@ -149,7 +151,7 @@ def test_hair_behind_a_mesh_is_hidden_at_its_very_edge(
     cycles.render.film_transparent = True
     cycles.hairloom.use_hair_scene = True
     alpha = rendered(tmp_path)[..., 3]
-    # the plate is where alpha is 1 without hair, its edge in between
+    # the plate is where alpha is 1 without hair; at its edge alpha is between 0 and 1
     cycles.hairloom.use_hair_scene = False
     plate = bald(hairy, tmp_path)[..., 3]
     hair_alone = alpha - plate
@@ -162,10 +164,11 @@ def test_hair_behind_a_mesh_is_hidden_at_its_very_edge(
 def test_shadow_on_a_mesh_is_as_dark_as_in_cycles(
     cycles: Any, new_hair: Callable[..., Any], tmp_path: Path
 ) -> None:
-    """A ball of hair between a sun and the floor, seen past the hair."""
+    """A ball of hair between a sun and the floor; the shadow is compared where no hair covers the
+    floor."""
     sample(cycles, FINE)
     hair = dense(new_hair)
-    # without light that hair sends on, as of a matt black one
+    # no scattering: the hair acts as if it were black
     hair.data.hairloom.volume.scattering = False
     hair.location.z = 0.2
     set_world((0.0, 0.0, 0.0))
@@ -176,13 +179,13 @@ def test_shadow_on_a_mesh_is_as_dark_as_in_cycles(
     without, native = bald(hair, tmp_path), rendered(tmp_path)
     cycles.hairloom.use_hair_scene = True
     ours = rendered(tmp_path)
-    # hair in front of the floor is not to count
+    # leave out hair in front of the floor
     floor = (without[..., 0] > 0.1) & (np.arange(SIZE) < SIZE // 2)[:, None]
     taken = [1.0 - (found / np.maximum(without, 1e-6))[..., 0][floor] for found in (native, ours)]
     assert taken[0].mean() > 0.01
     assert taken[1].mean() == pytest.approx(taken[0].mean(), rel=0.15)
     assert np.corrcoef(*taken)[0, 1] > 0.9
-    # where no shadow falls the floor is Cycles', not ours
+    # where no shadow falls, the floor is Cycles' bit for bit
     assert (ours == without).all(axis=2)[floor].mean() > 0.2
 
 
@@ -230,7 +233,7 @@ def test_an_artists_compositor_is_extended_and_given_back(
     inverted = rendered(tmp_path)
     cycles.hairloom.use_hair_scene = False
     assert links_of(tree) == before and cycles.compositing_node_group == tree
-    # the world's 0.5 inverted, far from all hair; and hair before it is inverted
+    # the world's 0.5 is unchanged by inversion, far from all hair; hair is inverted too
     np.testing.assert_array_equal(inverted[0, 0], plain[0, 0])
     assert differs(inverted, plain).mean() > 0.02
 
@@ -283,7 +286,7 @@ def test_where_the_hair_cannot_be_laid_over_blender_draws_it(
 
 
 def test_time_of_the_hair_is_stretched_as_that_of_its_scene(cycles: Any, tmp_path: Path) -> None:
-    """The hair scene shows the moment that Blender's own engine shows."""
+    """With time remapping, the hair scene is at the same frame as Blender's own engine."""
     cycles.hairloom.use_hair_scene = True
     cycles.render.frame_map_old, cycles.render.frame_map_new = 100, 200
     cycles.frame_set(50)
@@ -321,7 +324,7 @@ def test_files_that_were_saved_amid_a_render_are_healed(
     hair_scene.hide_hair(cycles)
     path = str(tmp_path / "amid.blend")
     handler = hair_scene.heal
-    bpy.app.handlers.save_pre.remove(handler)  # an autosave has none
+    bpy.app.handlers.save_pre.remove(handler)  # autosaves do not call this handler
     try:
         bpy.ops.wm.save_as_mainfile(filepath=path, copy=True)
     finally:
@@ -346,7 +349,7 @@ def test_a_hair_scene_goes_with_the_scene_whose_hair_it_draws(cycles: Any, tmp_p
 def test_moving_hair_is_blurred_and_baked_as_by_our_own_engine(
     cycles: Any, hairy: Any, sphere: Any, tmp_path: Path, is_baked: bool
 ) -> None:
-    """Without its head hair covers the same of each pixel, sample by sample."""
+    """Without its head, hair has the same alpha as in our own engine, in every sample."""
     cycles.frame_start, cycles.frame_end = 1, 3
     for frame, x in ((1, -0.1), (3, 0.1)):
         sphere.location.x = x
@@ -385,7 +388,7 @@ def test_a_border_that_is_rendered_alone_has_its_hair(
 
 @pytest.fixture
 def window(cycles: Any) -> Any:
-    """A pane that shines behind the hair, off its middle; the world is dim."""
+    """A bright pane behind the hair, off-centre, in a dim world."""
     set_world((0.05, 0.05, 0.05))
     bpy.ops.mesh.primitive_plane_add(
         size=0.5, location=(0.1, 0.4, 0.1), rotation=(np.pi / 2.0, 0.0, 0.0)
@@ -411,7 +414,8 @@ def with_bright_shafts(hair: Any) -> ShaftSettings:
 def test_a_window_throws_the_shafts_of_the_reference_cut_by_the_hair(
     cycles: Any, hairy: Any, window: Any, tmp_path: Path, engine: str
 ) -> None:
-    """Of samples that are each a little elsewhere; the picture without shafts is their mean."""
+    """Shafts are computed per jittered sample; the reference uses the mean of the samples as the
+    picture without shafts."""
     cycles.hairloom.use_hair_scene = True
     cycles.render.engine = engine
     without = rendered(tmp_path)
@@ -434,7 +438,8 @@ def test_a_window_throws_the_shafts_of_the_reference_cut_by_the_hair(
 def test_a_bright_place_of_the_world_throws_shafts_once(
     cycles: Any, hairy: Any, tmp_path: Path
 ) -> None:
-    """It is a light as well, which counts where a transparent film hides the world."""
+    """A bright place is also extracted as a light, which counts only if a transparent film hides
+    the world."""
     cycles.hairloom.use_hair_scene = True
     _set_spot(cycles)
     shafts = hairy.data.hairloom.shafts
@@ -456,7 +461,7 @@ def test_a_bright_place_of_the_world_throws_shafts_once(
 
 
 def _set_spot(scene: Any) -> None:
-    """A grey world with a small bright place beside the ball, as the camera sees them."""
+    """A grey world with a small bright spot beside the ball, as seen from the camera."""
     directions, _ = panorama_directions(64, 128)
     is_spot = directions @ np.array([0.34, 0.94, 0.0]) > np.cos(np.radians(2.5))
     set_panorama(scene, np.where(is_spot, 400.0, 0.05)[..., None] * np.ones(3))
@@ -484,7 +489,7 @@ def test_shafts_over_cycles_leave_its_file_format_and_all_else_as_it_was(
 def test_a_lamp_throws_shafts_over_cycles_and_a_mesh_cuts_them(
     cycles: Any, hairy: Any, tmp_path: Path
 ) -> None:
-    """A lamp beside the ball of hair, and a plate above it, nearer to the camera."""
+    """A lamp beside the ball of hair, and a small cube above it, nearer to the camera."""
     set_world((0.0, 0.0, 0.0))
     cycles.camera.location.y = -1.0
     bpy.ops.object.light_add(type="POINT", location=(0.4, 0.5, 0.0))
@@ -498,7 +503,7 @@ def test_a_lamp_throws_shafts_over_cycles_and_a_mesh_cuts_them(
     middle, lamp = SIZE // 2, int(haze[SIZE // 2].argmax())
     assert haze.min() > -1e-4 and haze[middle, lamp] > 0.2
     assert haze[middle + 22, lamp] < 0.85 * haze[middle - 22, lamp]
-    # behind the edge of the hair light falls faster than in the open
+    # behind the hair's edge, light falls off faster than in the open
     assert haze[middle, lamp - 40] < 0.5 * haze[middle - 40, lamp]
 
 
@@ -537,7 +542,7 @@ def test_an_orthographic_camera_sees_shafts_of_bright_things(
 def test_a_white_world_over_cycles_stays_as_it_is(
     cycles: Any, hairy: Any, tmp_path: Path, light: float
 ) -> None:
-    """Hair before it is small, so nearly all of the picture is bright."""
+    """The hair is small, so nearly all of the picture is bright."""
     set_world((light, light, light))
     cycles.camera.location.y = -4.0
     cycles.hairloom.use_hair_scene = True

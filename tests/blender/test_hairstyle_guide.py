@@ -1,4 +1,4 @@
-"""The hairstyles that docs/hairstyles.md makes from nothing, step by step, by operators."""
+"""The hairstyles that docs/hairstyles.md builds from nothing, step by step, with operators."""
 
 import sys
 from pathlib import Path
@@ -20,7 +20,7 @@ STEPS = steps()
 
 
 class Walk:
-    """A hairstyle after one step after the other."""
+    """Runs the steps of a hairstyle one after another; each returns roots and tips."""
 
     def __init__(self, name):
         self.known, self.codes = {"bpy": bpy}, iter(STEPS[name])

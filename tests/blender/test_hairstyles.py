@@ -1,4 +1,5 @@
-"""Hairstyles: each is added as ordinary hair curves with ordinary modifiers, or not at all."""
+"""Hairstyles: each is added completely, as ordinary hair curves with ordinary modifiers, or not at
+all."""
 
 import importlib
 import json
@@ -41,7 +42,7 @@ from hairloom.addon.ui import operators_hairstyles
 
 pytestmark = [pytest.mark.usefixtures("extension")]
 NAMES = [entry.name for entry in shipped()]
-#: what grows on any mesh
+#: styles for any mesh
 FUR = ["short_coat", "shaggy_coat"]
 ON_HEADS = [name for name in NAMES if name not in FUR]
 TOOLS = Path(__file__).parents[2] / "tools"
@@ -49,7 +50,7 @@ TOOLS = Path(__file__).parents[2] / "tools"
 
 @pytest.fixture
 def few(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Styles are added without their children, which take most of the time."""
+    """Add styles without their children, which take most of the time."""
 
     def with_few(name: str) -> Hairstyle:
         style = named_hairstyle(name)
@@ -102,7 +103,7 @@ def test_each_style_that_ships_is_curves_on_the_scalp_with_its_settings(
     look = named_preset(style.presets[0]).settings
     assert hair.data.hairloom.shading.base_color[:] == pytest.approx(look.base_color)
     assert hair.hairloom.children_density in head.vertex_groups
-    # roots on the skin, as Blender's own nearest point finds it
+    # roots are on the skin by Blender's own nearest-point search
     roots = read_curves(hair, depsgraph()).strands.roots
     evaluated = head.evaluated_get(depsgraph())
     for root in roots[:: len(roots) // 30]:
@@ -141,7 +142,7 @@ def test_fur_grows_on_any_mesh_and_by_its_size(name: str) -> None:
     for size in (0.2, 20.0):
         hair = added(style, monkey(size))
         assert [one.node_group.name for one in hair.modifiers] == [m.nodes for m in style.modifiers]
-        hair.modifiers.clear()  # what it grew as
+        hair.modifiers.clear()  # keeps the grown curves
         strands = read_curves(hair, depsgraph()).strands
         count = style.settings["grow"]["strand_count"]
         assert 0.85 * count < strands.strand_count < count, "none on the eyes' back, in the head"
@@ -178,7 +179,7 @@ def test_fur_grows_on_the_selected_mesh_in_one_step() -> None:
 @pytest.mark.usefixtures("few")
 @pytest.mark.parametrize("style", ["brows", "lashes"])
 def test_brows_and_lashes_from_nothing_come_once(style: str) -> None:
-    """With a head that has none of the other."""
+    """The added head has brows or lashes only, not both."""
     bpy.ops.hairloom.add_hairstyle(style=style, plays=False)
     assert {obj.name for obj in bpy.data.objects} == {"Head", f"Head {style.title()}"}
 
@@ -223,7 +224,7 @@ def test_curls_of_a_giant_are_as_much_larger(head: bpy.types.Object) -> None:
     bpy.context.view_layer.update()
     after = read_curves(added(style, head), depsgraph()).strands
     off = np.abs(after.lengths() / before.lengths() / 20.0 - 1.0)
-    # where two locks are as near, rounding decides which of them a curve joins
+    # where two clumps are equally near, rounding decides which one a curve joins
     assert (off < 1e-3).mean() > 0.97 and off.max() < 0.2
 
 
@@ -233,7 +234,7 @@ def test_from_nothing_there_is_a_head_with_brows_and_lashes() -> None:
     names = {obj.name for obj in bpy.data.objects}
     assert names == {"Head", "Head Brows and Lashes", "Head Buzz Cut"}
     assert bpy.context.object.name == "Head Buzz Cut" and len(previews.sessions()) == 2
-    # the next one grows on the same head, whatever is active
+    # the next style grows on the same head, whatever object is active
     bpy.ops.hairloom.add_hairstyle(style="stubble", plays=False)
     assert sum(is_bust(obj) for obj in bpy.data.objects) == 1
 
@@ -260,7 +261,7 @@ def test_one_undo_takes_it_all_away(head: bpy.types.Object) -> None:
 
 
 def refused(style: Hairstyle, head: bpy.types.Object, problem: str) -> None:
-    """With a sentence and a remedy, and with the scene as it was."""
+    """Assert an error with a remedy, and an unchanged scene."""
     before = everything()
     with pytest.raises(HairloomError, match=problem) as error:
         added(style, head)
@@ -268,7 +269,8 @@ def refused(style: Hairstyle, head: bpy.types.Object, problem: str) -> None:
 
 
 def test_hair_that_is_fitted_again_is_as_it_was_added(head: bpy.types.Object) -> None:
-    """On an object that is larger, moved and turned; with nothing of what it had settled into."""
+    """On a scaled, moved and turned head, hair returns to its added shape, and a settled shape is
+    discarded."""
     hair = added(named_hairstyle("buzz_cut"), head)
     added_points, radius = curve_points(hair.data), read_attribute(hair.data, "radius", "POINT")
     hair.hairloom.dynamics.sag_compensation = 0.5

@@ -1,4 +1,4 @@
-"""How heads are drawn: by their own materials, as the bust, or as plain skin."""
+"""The look of heads: their own materials, those of the bust, or plain skin."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def in_scene(obj: bpy.types.Object) -> Surface:
 
 
 def cube(name: str, colors: list[tuple[float, float, float]]) -> bpy.types.Object:
-    """A cube whose faces have these materials in turn."""
+    """A cube whose faces have materials of these colours in turn."""
     bpy.ops.mesh.primitive_cube_add()
     obj = bpy.context.object
     obj.name = name
@@ -46,7 +46,7 @@ def cube(name: str, colors: list[tuple[float, float, float]]) -> bpy.types.Objec
 
 @pytest.mark.parametrize("tone", few_in_commits(["light", "dark"]))
 def test_the_bust_of_a_scene_looks_as_the_built_in_one(tone: str) -> None:
-    """By the materials that it has there, whatever --skin says."""
+    """The materials in the scene decide, whatever --skin says."""
     bust = bust_object("Bust in a scene", tone)
     surface, wanted = in_scene(bust), built_in_head().look(tone)
     found = head_look(bust.name, surface, "medium")
@@ -95,7 +95,7 @@ def test_another_mesh_has_its_own_materials_or_plain_skin(tmp_path: Path) -> Non
     depsgraph = bpy.context.evaluated_depsgraph_get()
     bare = read_surface(plain, depsgraph, need_uv=False, place="cube")
     assert head_look("Plain", bare, "light") is None
-    # a bake's mesh that has changed since is not drawn by the materials of another one
+    # materials of another mesh are not used for a bake's mesh that has changed since
     fewer = Surface(bare.positions, bare.triangles[:-1], None)
     assert head_look("Painted", fewer, "light") is None
 

@@ -1,4 +1,4 @@
-"""Help: panels, settings and buttons open pages of the documentation that are there."""
+"""Help of panels, settings and buttons opens existing pages of the documentation."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ pytestmark = pytest.mark.usefixtures("extension")
 
 @pytest.fixture(scope="module")
 def pages(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The pages as they are in the zip."""
+    """The help pages as in the zip."""
     return make_help.write_help(tmp_path_factory.mktemp("help") / "help")
 
 
@@ -66,14 +66,14 @@ def test_every_page_and_the_tools_count_for_the_checksum(tmp_path: Path) -> None
 
 
 def is_there(address: str) -> bool:
-    """Whether a page has this heading."""
+    """Whether a page exists and has this heading."""
     parts = urlparse(address)
     page = Path(unquote(parts.path))
     return page.is_file() and (not parts.fragment or f'id="{parts.fragment}"' in page.read_text())
 
 
 def found(name: str) -> str | None:
-    """What Blender opens at F1."""
+    """The address that Blender opens for F1."""
     address: str | None = WM_OT_doc_view_manual._lookup_rna_url(name, verbose=False)
     return address
 
@@ -95,7 +95,7 @@ def test_the_pages_need_nothing_that_was_left_out(pages: Path) -> None:
         text = page.read_text("utf-8")
         assert "<img" not in text and "_images/" not in text, page
         for source in re.findall(r'<(?:script|link)[^>]+(?:src|href)="([^"?#]+)', text):
-            is_of_site = source.endswith("versions.js")  # the site's menu of other versions
+            is_of_site = source.endswith("versions.js")  # the site's version menu
             assert is_of_site or (page.parent / source).exists(), f"{page.name} loads {source}"
 
 

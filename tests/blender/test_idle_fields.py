@@ -1,4 +1,4 @@
-"""What is greyed out says why on its face, with no room that it does not have."""
+"""Greyed-out fields and buttons show the reason in their own text, within the width they have."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from hairloom.addon.ui import (
 )
 
 pytestmark = pytest.mark.usefixtures("extension")
-#: [pixels] in the field of a number beside its value, and at UI scale 1 on a button of half a row
+#: width [pixels at UI scale 1] of a number's field beside its value, and of a button of half a row
 IN_FIELD, ON_BUTTON, FONT_SIZE = 118, 102, 11
 
 
@@ -54,7 +54,7 @@ def test_a_field_says_what_it_needs_and_stays_where_it_is(hair):
 
 
 def fields(draw, *arguments):
-    """Whose fields are drawn, and whether they can be set."""
+    """(owner, name, whether it can be set) of each field that is drawn."""
 
     class Fields(Layout):
         drawn = ()
@@ -122,7 +122,7 @@ def test_without_hair_preview_says_what_to_do(extension):
 
 
 def test_no_reason_is_cut(extension):
-    """Of all fields; and of the texts that buttons of half a row have."""
+    """Reasons fit in all fields, and texts on buttons of half a row."""
     blf.size(0, FONT_SIZE)
     defaults = SimpleNamespace(**{section: kind() for section, kind in ALL_SETTINGS.items()})
     cut = []

@@ -1,4 +1,4 @@
-"""Textures written by Blender itself, where its Python has no OpenImageIO."""
+"""Textures written by Blender itself, for a Blender whose Python lacks OpenImageIO."""
 
 import bpy
 import numpy as np
@@ -17,7 +17,7 @@ def without_openimageio(monkeypatch):
 
 
 def stored(path):
-    """As the file has it, (height, width, 4), row 0 at the bottom."""
+    """The stored values of a file, (height, width, 4), row 0 at the bottom."""
     image = bpy.data.images.load(str(path))
     try:
         image.alpha_mode = "CHANNEL_PACKED"
@@ -50,7 +50,7 @@ def test_other_formats_are_refused(tmp_path):
 
 @pytest.mark.parametrize("most_bytes", [0, 3000])
 def test_a_full_disk_is_told_and_keeps_what_was_there(most_bytes, tmp_path):
-    """Blender's PNG writer is silent about it."""
+    """Blender's PNG writer does not report a full disk."""
     path = tmp_path / "a.png"
     path.write_bytes(b"old")
     noise = np.random.default_rng(4).random((96, 96, 4)).astype(np.float32)

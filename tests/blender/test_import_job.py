@@ -1,4 +1,4 @@
-"""The verb `import`, and grooms of all formats for the other verbs."""
+"""The verb `import`, and groom files of all formats in the other verbs."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from hairloom.addon.strands import StrandSet
 
 pytestmark = pytest.mark.usefixtures("extension")
 
-#: a box of 20 x 20 x 20 cm on the ground, as .obj has it with Y up
+#: a box of 20 x 20 x 20 cm on the ground, as an .obj with Y up
 HEAD_OBJ = """
 v -0.1 0 -0.1
 v 0.1 0 -0.1
@@ -54,12 +54,12 @@ WRITERS: dict[str, Callable[[Path, Groom], Any]] = {
     ".tfx": write_tfx,
     ".hair": write_hair_file,
 }
-if importlib.util.find_spec("pxr") is None:  # some Linux distributions build Blender without
+if importlib.util.find_spec("pxr") is None:  # some Linux distributions build Blender without it
     del WRITERS[".usdc"]
 
 
 def hairdo() -> Groom:
-    """Straight hair on the top of the box; every fifth strand is a guide."""
+    """Straight hair on top of the box; every fifth strand is a guide."""
     random = np.random.default_rng(5)
     root = random.uniform(-0.09, 0.09, (50, 1, 3)) * [1.0, 1.0, 0.0] + [0.0, 0.0, 0.2]
     points = root + np.linspace(0.0, 0.1, 8)[:, None] * [0.3, 0.1, 1.0]
@@ -145,7 +145,8 @@ def test_a_head_that_is_none_is_named(
 
 
 def test_a_head_of_several_meshes_is_one(tmp_path: Path) -> None:
-    """With an eye in front of it, whose UV map has another name; each vertex stays where it was."""
+    """The head has an eye in front, whose UV map has another name. Joined, all vertices keep their
+    places."""
     corners = {"head": ((0.0, 0.0, 0.1), 0.2), "eye": ((0.0, -0.1, 0.15), 0.02)}
     for name, (place, size) in corners.items():
         bpy.ops.mesh.primitive_cube_add(size=size, location=place)
@@ -215,7 +216,7 @@ def test_other_verbs_take_grooms_of_all_formats(tmp_path: Path, head: Path, suff
 
 
 def test_axes_and_scale_of_a_groom_are_passed_on(tmp_path: Path, head: Path) -> None:
-    """A .tfx has Y up; read as if it had Z up, its numbers stay as they are."""
+    """A .tfx has Y up. Read with Z up, its numbers are not converted."""
     write_tfx(tmp_path / "hair.tfx", hairdo())
     sources = Sources(str(tmp_path / "hair.tfx"), str(head), groom_up="Z", groom_scale=2.0)
     x, y, z = hairdo().without_guides().strands.points.T
@@ -224,7 +225,7 @@ def test_axes_and_scale_of_a_groom_are_passed_on(tmp_path: Path, head: Path) -> 
 
 
 def test_files_in_centimetres_are_told_and_both_can_be_scaled(tmp_path: Path, head: Path) -> None:
-    """A box of 24 m and hair on it; the collider is of the head's space."""
+    """A box of 24 m with hair. The collider is scaled as the head is."""
     large = np.array([line.split()[1:] for line in HEAD_OBJ.splitlines() if line[:2] == "v "])
     vertices = [f"v {' '.join(map(str, row))}" for row in large.astype(float) * 120.0]
     others = [line for line in HEAD_OBJ.splitlines() if line[:2] != "v "]
@@ -253,7 +254,7 @@ def test_only_heads_of_files_can_be_scaled() -> None:
 
 
 def test_hair_beside_its_head_is_told(tmp_path: Path, head: Path) -> None:
-    """Two centimetres above a box of 20: near enough to be bound to it, and no error."""
+    """Hair 2 cm above a box of 20 cm is near enough to be bound to it: a note, not an error."""
     moved = np.eye(4)
     moved[2, 3] = 0.02
     strands = hairdo().without_guides().strands

@@ -1,4 +1,4 @@
-"""Every module of the extension can be imported in the Blender that is here."""
+"""Every module of the extension can be imported in the current Blender."""
 
 import importlib
 import pkgutil

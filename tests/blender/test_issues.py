@@ -1,4 +1,4 @@
-"""Warnings where the artist looks, each with a button that mends."""
+"""Warnings in the panel, each with a button that fixes it."""
 
 import bpy
 import numpy as np
@@ -14,7 +14,7 @@ def told(hair):
 
 
 def fix(hair):
-    """Press the one button there is."""
+    """Press the button of the only issue."""
     (issue,) = diagnostics.issues_of(hair, previews.session_of(hair))
     group, name = issue.operator.split(".")
     assert getattr(getattr(bpy.ops, group), name)() == {"FINISHED"}
@@ -92,7 +92,7 @@ def test_roots_in_the_air_are_counted_and_snapped(new_hair, sphere):
     hair = new_hair(sphere)
     points = np.empty((len(hair.data.position_data), 3), np.float32)
     hair.data.position_data.foreach_get("vector", points.ravel())
-    points[: 20 * 8] *= 1.4  # twenty strands begin 4 cm above the sphere
+    points[: 20 * 8] *= 1.4  # twenty strands start 4 cm above the sphere
     hair.data.position_data.foreach_set("vector", points.ravel())
     preview(hair)
     (issue,) = diagnostics.issues_of(hair, previews.session_of(hair))
@@ -177,7 +177,7 @@ def test_instances_that_the_preview_leaves_out_are_told(new_hair, sphere):
     assert diagnostics.instances_note(hair) == ""
     outer, inner = bpy.data.collections.new("Outer"), bpy.data.collections.new("Inner")
     outer.children.link(inner)
-    inner.objects.link(sphere)  # an instance of the head alone is no matter
+    inner.objects.link(sphere)  # instances of the head alone do not matter
     twin = bpy.data.objects.new("Twin", None)
     bpy.context.collection.objects.link(twin)
     twin.instance_type, twin.instance_collection = "COLLECTION", outer
@@ -215,7 +215,8 @@ def test_instances_by_geometry_nodes_are_told_too(what, new_hair, sphere):
 
 
 def instancing(obj, what):
-    """A modifier that puts an instance on each point; the node that says of what."""
+    """Add a modifier that puts an instance on each point; returns the node that chooses the
+    instance."""
     tree = bpy.data.node_groups.new("Instances", "GeometryNodeTree")
     for way in ("INPUT", "OUTPUT"):
         tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")

@@ -1,4 +1,4 @@
-"""Cards that were built last are not built again, and never taken where anything has changed."""
+"""Cards that were built last are reused, but never after a change that affects them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from hairloom.addon.blender.scene.curves import write_curves
 
 
 def counted(monkeypatch: pytest.MonkeyPatch, owner: Any, name: str) -> list[str]:
-    """One entry for each call."""
+    """Record each call of a function in the returned list."""
     calls: list[str] = []
     make = getattr(owner, name)
 
@@ -41,8 +41,8 @@ def builds(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 @pytest.fixture
 def hair(new_hair: Callable[..., Any], sphere: Any, tmp_path: Path) -> Any:
-    """A hedgehog of 60 strands on a sphere that frames move, to be few cards of a small picture,
-    with a texture of the artist's own."""
+    """A hedgehog of 60 strands on a keyframed sphere, set up for few cards with a small texture and
+    an artist's picture."""
     sphere.location.x = 0.0
     sphere.keyframe_insert("location", frame=1)
     sphere.location.x = 0.2
@@ -76,7 +76,7 @@ def make() -> None:
 
 
 def written(folder: Path) -> dict[str, bytes]:
-    """All files of an export of the hair."""
+    """All files of an export of the active hair."""
     folder.mkdir()
     assert bpy.ops.hairloom.export_cards(filepath=str(folder / "cards.glb")) == {"FINISHED"}
     return {path.name: path.read_bytes() for path in sorted(folder.iterdir())}
@@ -130,7 +130,7 @@ def shade_less(hair: Any, _folder: Path) -> None:
 
 
 def paint_over_the_picture_on_disk(_hair: Any, folder: Path) -> None:
-    """As another program does, and Blender reads it again."""
+    """Another program changes the file, and Blender reloads it."""
     image = bpy.data.images["Base"]
     other = bpy.data.images.new("Other", 32, 32)
     other.pixels.foreach_set(np.full(32 * 32 * 4, 0.2, np.float32))
@@ -162,7 +162,7 @@ def go_to_another_frame(_hair: Any, _folder: Path) -> None:
 
 
 def add_other_hair(hair: Any, _folder: Path) -> None:
-    """Which shades this one."""
+    """Add hair that shades this hair."""
     from hedgehogs import hedgehog
 
     other = write_curves("Other", hedgehog(), hair.data.surface, bpy.context.collection)
@@ -202,7 +202,7 @@ def test_cards_are_not_taken_for_others(
 def test_what_was_changed_and_changed_back_is_the_same(
     hair: Any, tmp_path: Path, builds: list[str]
 ) -> None:
-    """As by undo."""
+    """Such as by undo."""
     make()
     hair.data.hairloom.cards.card_count = 14
     hair.data.hairloom.cards.card_count = 12
@@ -233,7 +233,7 @@ def test_an_atlas_is_drawn_again_where_a_gpu_has_come_or_gone(
 
 @pytest.fixture
 def last(monkeypatch: pytest.MonkeyPatch) -> list[weakref.ref[build.MappedCards]]:
-    """All cards that were kept, as long as they are."""
+    """Weak references to all cards that were ever kept."""
     found: list[weakref.ref[build.MappedCards]] = []
     keep = KeptCards.keep
 
@@ -277,7 +277,7 @@ def test_nothing_is_kept_for_ever(hair: Any, end: Any, last: list[Any]) -> None:
 def test_what_is_built_next_takes_the_place_of_the_last_before_it_is_built(
     hair: Any, last: list[Any]
 ) -> None:
-    """So that both are never in memory at once."""
+    """The old cards are freed first, so that both are never in memory at once."""
     make()
     hair.data.hairloom.cards.card_count = 14
     steps = bpy.types.HAIRLOOM_OT_make_cards.steps(SimpleNamespace(), bpy.context)

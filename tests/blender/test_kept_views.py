@@ -1,4 +1,4 @@
-"""When a 3D view that shows its kept picture is drawn again, and what counts as a change of it."""
+"""When a 3D view that shows a kept picture is drawn again, and which changes count."""
 
 from __future__ import annotations
 

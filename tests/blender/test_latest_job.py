@@ -1,4 +1,4 @@
-"""Work beside the window: what is wanted last is made, and nothing twice."""
+"""Background jobs: only the latest request is built, and nothing is built twice."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from hairloom.addon.errors import HairloomError  # noqa: E402
 
 
 class Workshop:
-    """Makes upper case of keys, each once its gate is open; what is asked for fails.
+    """Turns keys into upper case, each once its gate is open.
 
-    begun: keys, in order. taken: what arrived, None for what came to nothing.
+    begun: keys in the order in which work began. taken: results, None for work without one.
     """
 
     def __init__(self) -> None:

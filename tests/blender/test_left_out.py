@@ -1,4 +1,4 @@
-"""Previews of what another scene has, or of what is hidden so that Blender evaluates it no more."""
+"""Previews of objects that Blender does not evaluate: in other scenes, or hidden."""
 
 from types import SimpleNamespace
 
@@ -19,7 +19,7 @@ FRAME = 1.0 / 24.0
 
 
 def show(name):
-    """The scene of this name, which is made if there is none, in the window."""
+    """Show the scene of this name in the window; it is made if it does not exist."""
     scene = bpy.data.scenes.get(name) or bpy.data.scenes.new(name)
     bpy.context.window.scene = scene
     update()
@@ -45,7 +45,7 @@ def exclude(is_hidden):
 
 @pytest.fixture
 def groom(preview, evaluated):
-    """Hair and a head with a modifier in a collection of their own, previewed: head, session."""
+    """Previewed hair on a head with a modifier, in their own collection: (head, session)."""
     hair, head, session = preview
     previews.stop(session)
     collection = bpy.data.collections.new("Groom")

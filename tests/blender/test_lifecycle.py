@@ -1,4 +1,4 @@
-"""Enabling and disabling, again and again, leaves nothing behind."""
+"""Enabling and disabling the extension repeatedly leaves nothing behind."""
 
 import bpy
 import pytest
@@ -16,7 +16,7 @@ pytestmark = pytest.mark.portable
 
 @pytest.fixture
 def commands(no_extension, monkeypatch):
-    """The command line verbs that Blender knows; it has no list of its own."""
+    """The registered command line verbs, recorded here because Blender has no list of them."""
     known = []
     add, remove = bpy.utils.register_cli_command, bpy.utils.unregister_cli_command
 
@@ -35,7 +35,7 @@ def commands(no_extension, monkeypatch):
 
 
 def traces():
-    """All of Hairloom that Blender can know of."""
+    """Everything of Hairloom that is registered in Blender."""
     handlers = {
         name: [f"{each.__module__}.{each.__qualname__}" for each in handlers]
         for name in dir(bpy.app.handlers)
@@ -72,7 +72,7 @@ EXTENDED_MENUS = (
 
 @pytest.fixture(autouse=True)
 def menus_can_be_counted():
-    """Blender turns a menu's draw into a list the first time that anything is appended to it."""
+    """Blender turns a menu's draw function into a list when something is first appended to it."""
     for name in EXTENDED_MENUS:
         getattr(bpy.types, name).append(_nothing)
     yield
@@ -183,7 +183,7 @@ def test_the_root_package_is_the_one_that_blender_knows():
 
 
 def test_shortcuts_are_offered_without_keys(extension):
-    """They wait in Blender's keymap for a key that the artist gives them."""
+    """They are in Blender's keymap, without keys, so that artists can assign keys."""
     keymap = bpy.context.window_manager.keyconfigs.addon.keymaps["3D View"]
     offered = {operator for operator, _ in menus.SHORTCUTS}
     ours = [item for item in keymap.keymap_items if item.idname in offered]
@@ -194,7 +194,8 @@ def test_shortcuts_are_offered_without_keys(extension):
 
 
 def test_what_the_status_bar_says_goes_in_all_workspaces(preview, evaluated, monkeypatch):
-    """Blender writes into the workspace of its context, whatever it is asked for."""
+    """Blender writes the text into its context's workspace, not into the one that the method is
+    called on."""
     said = {}
 
     def status_text_set(_workspace, text):

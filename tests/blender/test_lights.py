@@ -1,4 +1,4 @@
-"""What is read of a scene's lights; that they shine as in Cycles, tests/gpu/test_radiometry.py."""
+"""Lights read from a scene; tests/gpu/test_radiometry.py compares their light with Cycles."""
 
 from __future__ import annotations
 
@@ -44,7 +44,8 @@ def warnings(*suns: Light) -> tuple[str, ...]:
 
 
 def test_eight_that_are_brightest_at_the_hair_are_kept_and_the_artist_is_told():
-    """Not the most powerful: a weak one near by counts for more than a strong one far away."""
+    """Irradiance at the hair counts, not power: a weak lamp nearby precedes a strong one far
+    away."""
     for place in range(LIGHT_CAPACITY):
         add("POINT", (0.0, 0.0, 1.0 + place), energy=10.0)
     assert len(lights()) == LIGHT_CAPACITY
@@ -111,7 +112,7 @@ def test_parents_carry_and_scale_a_panel():
 def test_scales_of_nought_and_mirrored_ones_are_read(kind, scale):
     add(kind, energy=10.0).scale = scale
     found = lights()
-    # an area light of no width and a lamp without a direction shine on nothing
+    # an area light without width and a lamp without direction give no light
     assert len(found) == 1 or kind != "POINT"
     for light in found:
         irradiance = light_irradiance(light, np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]]))
@@ -160,7 +161,8 @@ STUDIO_WORLDS = Path(bpy.utils.system_resource("DATAFILES")) / "studiolights" / 
 
 
 def view(kind: str, lights: bool, has_world: bool, picture: str = "forest.exr") -> Any:
-    """The shading of a 3D view; without a picture of a world, as in Solid mode."""
+    """The shading settings of a 3D view; picture: its studio HDRI, "" for none, as in Solid
+    mode."""
     names = ("type", "use_scene_lights", "use_scene_world")
     names += ("use_scene_lights_render", "use_scene_world_render")
     values = (kind, lights, has_world, lights, has_world)
@@ -174,13 +176,13 @@ def view(kind: str, lights: bool, has_world: bool, picture: str = "forest.exr") 
 
 
 def bare(**values: Any) -> Snapshot:
-    """No hair in this light."""
+    """A snapshot without hair in this light."""
     return Snapshot(np.zeros((0, 2, 3), np.float32), np.ones((0, 2), np.float32), **values)
 
 
 def test_hair_is_lit_as_blender_lights_the_rest_and_never_black() -> None:
-    """By the view's own picture of a world where Blender lights by it, and by the studio's lights
-    wherever there is no light at all."""
+    """By the view's HDRI if Blender uses it, and by the studio lights if there is no light at
+    all."""
     studio, lamp, world = three_point_lights(np.eye(4)), Light.sun((0, 0, -1), (1, 1, 1), 1.0), 0.3
     sun = Light("sun", (1.0, 0.0, 0.0), (2.0, 2.0, 2.0), of_world=True)
 
@@ -216,7 +218,7 @@ def test_the_views_picture_turns_and_gets_brighter() -> None:
     shading.studiolight_intensity, shading.studiolight_rotate_z = 1.0, 0.5 * np.pi
     turned = studio_environment(shading)
     assert turned.ambient == pytest.approx(still.ambient)
-    # what a view looks up is turned by a quarter, so its light goes round the other way
+    # the lookup is turned by a quarter, so the light turns the other way
     x, y, z = np.eye(3)
     assert light_from(turned, -y) == pytest.approx(light_from(still, x), rel=1e-3)
     assert light_from(turned, z) == pytest.approx(light_from(still, z), rel=1e-3)

@@ -1,4 +1,4 @@
-"""Operators whose work is long, where there is no window: all at once, by the same steps."""
+"""Operators with long work run all steps at once where there is no window."""
 
 from __future__ import annotations
 
@@ -141,7 +141,7 @@ def test_the_status_bar_offers_esc_as_long_as_it_cancels() -> None:
 def test_esc_is_offered_as_long_as_it_cancels(
     is_committed: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Beside the progress, and by a button that is greyed out meanwhile."""
+    """The Esc icon beside the progress, and Esc in the message of the greyed-out button."""
     work, progress = HAIRLOOM_OT_test_work, Progress("3 of 4", 0.75, is_committed=is_committed)
     running = SimpleNamespace(operator=work, label=work.bl_label, progress=progress)
     monkeypatch.setattr(long_work, "_running", running)
@@ -156,7 +156,7 @@ def test_esc_is_offered_as_long_as_it_cancels(
 
 @pytest.mark.usefixtures("extension")
 def test_a_bake_is_not_deleted_while_other_work_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Which the button says, rather than that there is no bake."""
+    """The button reports the other work as the reason, not that there is no bake."""
     running = SimpleNamespace(label="Make Cards", progress=Progress("3 of 4"))
     monkeypatch.setattr(long_work, "_running", running)
     with pytest.raises(RuntimeError, match="Make Cards goes on; Esc cancels it"):

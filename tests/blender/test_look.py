@@ -1,5 +1,5 @@
-"""The look in a session: quick tables while a slider moves, full ones when it rests; and in the
-panels: only what acts."""
+"""A look in a session: quick tables while a slider moves, full tables when it stops. Panels show
+only what has an effect."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from hairloom.addon.ui import sections
 
 @pytest.fixture
 def preview(new_hair: Any, sphere: Any, evaluated: Any) -> Any:
-    """(shading group, session) of hair by the model Marschner."""
+    """(shading settings, session) of hair with the Marschner model."""
     hair = new_hair(sphere)
     hair.data.hairloom.shading.model = "marschner"
     return hair.data.hairloom.shading, previews.start(hair, evaluated())
@@ -28,7 +28,7 @@ def preview(new_hair: Any, sphere: Any, evaluated: Any) -> Any:
 
 @pytest.fixture
 def window(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As if Blender had one, where tables are refined."""
+    """Pretend that there is a window, so that tables are refined later."""
 
     class App:
         background = False
@@ -41,7 +41,7 @@ def window(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def table_size(session: Any) -> int:
-    """Of what is drawn."""
+    """The table size of the drawn snapshot."""
     drawing = overlay.drawing_of(session.uid)
     assert drawing is not None
     size: int = drawing.snapshot.table_size
@@ -98,13 +98,13 @@ def test_nothing_ticks_on_when_hairloom_is_disabled(preview: Any, window: None) 
 
 
 def drawn_in_look(hair: Any) -> tuple[list[str], set[str]]:
-    """The parameters that the section Look and those below it draw, in order, and those of them
-    that are greyed out."""
+    """The parameters that the section Look and its subsections draw, in order, and the greyed-out
+    ones among them."""
     found: list[str] = []
     grey: set[str] = set()
 
     class Layout:
-        """Takes what a layout is asked for, and notes the properties of shading."""
+        """Accepts any call of a layout, and records the properties of shading."""
 
         def __init__(self, *, active: bool = True) -> None:
             self.active = active
@@ -125,7 +125,8 @@ def drawn_in_look(hair: Any) -> tuple[list[str], set[str]]:
 
 KAJIYA_KAY = {parameter.name for parameter in KajiyaKaySettings.parameters()}
 MARSCHNER = {parameter.name for parameter in MarschnerSettings.parameters()}
-#: parameters of both models that act with one pigment of Marschner alone
+#: pigment of Marschner -> parameters that both models have, and that Marschner uses with this
+#: pigment only
 PIGMENTS = {
     "color": {"base_color"},
     "melanin": {"melanin", "redness"},

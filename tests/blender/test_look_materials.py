@@ -1,4 +1,4 @@
-"""The material of a look follows the look, as long as nobody else has changed its nodes."""
+"""The material of a look follows the look until somebody else changes its nodes."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def test_it_follows_in_a_file_that_was_saved(hair, tmp_path):
 
 
 def test_a_preset_writes_the_material_once(hair, monkeypatch):
-    """Though it sets each of its settings by itself."""
+    """A preset sets its settings one by one."""
     (settings, *_) = named_preset("looks/blond").all
     written, put = [], look_materials.put_look
     monkeypatch.setattr(look_materials, "put_look", lambda each: written.append(each) or put(each))
@@ -100,7 +100,7 @@ def test_what_is_set_together_is_one_change(hair):
 
 
 def test_a_duplicate_follows_its_own_look(hair):
-    """Blender gives it the same material."""
+    """Blender gives a duplicate the same material."""
     hair.data.hairloom.shading.melanin = 0.2
     twin = hair.copy()
     twin.data = hair.data.copy()

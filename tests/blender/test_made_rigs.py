@@ -1,5 +1,4 @@
-"""Strands that are made ready for a preview or a dialog are not made again for a file, and never
-taken where anything has changed since."""
+"""Rigs that were built for a preview or a dialog are reused for files, but never after a change."""
 
 from __future__ import annotations
 
@@ -25,7 +24,7 @@ from hairloom.addon.ui import operators_export_check
 
 @pytest.fixture
 def made(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """The names of hair, each time it is made ready."""
+    """The names of hair, one for each time that a rig is prepared."""
     names: list[str] = []
     prepare = rigs.rig_flow.prepare
 
@@ -39,7 +38,7 @@ def made(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 @pytest.fixture
 def hair(new_hair: Callable[..., Any], sphere: Any) -> Iterator[Any]:
-    """With children that are painted, a parting, and a head that frames move."""
+    """Hair with children of a painted density, a parting, and a keyframed head."""
     group = sphere.vertex_groups.new(name="Thick")
     count = len(sphere.data.vertices)
     group.add(list(range(count)), 1.0, "REPLACE")
@@ -118,7 +117,7 @@ def go_to_another_frame(_hair: Any) -> None:
 
 
 def undo_a_stroke(hair: Any) -> None:
-    """As undo does, which puts other curves into the same object."""
+    """Undo replaces the curves of the object."""
     points = np.empty(len(hair.data.points) * 3, np.float32)
     hair.data.position_data.foreach_get("vector", points)
     hair.data.position_data.foreach_set("vector", points * np.float32(1.01))
@@ -157,7 +156,7 @@ def test_a_file_of_previewed_hair_has_its_strands(
 def test_strands_of_a_preview_are_not_taken_for_other_hair(
     hair: Any, evaluated: Any, tmp_path: Path, made: list[str], change: Any
 ) -> None:
-    """Though the preview has not read it yet."""
+    """Even if the preview has not read the change yet."""
     before = written(tmp_path / "before.tfx")
     previews.start(hair, evaluated())
     change(hair)
@@ -185,7 +184,7 @@ def test_strands_of_a_preview_are_taken_again_once_it_has_read_an_edit(
 def test_strands_of_a_bake_are_those_that_were_baked(
     hair: Any, evaluated: Any, tmp_path: Path, made: list[str]
 ) -> None:
-    """And a file has those of the curves, as they are made now."""
+    """A bake previews the baked rig; a file gets the rig of the present curves."""
     bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, 2
     hair.hairloom.dynamics.collider_resolution = 16
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "file.blend"))

@@ -1,4 +1,4 @@
-"""Make Real: what other tools get is what Hairloom draws."""
+"""Make Real writes the strands that Hairloom draws into curves for other tools."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ RED = (0.8, 0.02, 0.03)
 
 @pytest.fixture
 def hair(new_hair: Callable[..., Any], sphere: Any) -> Any:
-    """Curves of which some are red, with children, a tint, grey and thin tips."""
+    """Curves, the left half red, with children, a tip tint, grey strands and thin tips."""
     strands: StrandSet = hedgehog()
     is_left = np.repeat(strands.roots[:, 0] < 0.0, strands.point_counts)[:, None]
     made = new_hair(sphere, replace(strands, color=np.where(is_left, RED, np.nan)))
@@ -58,7 +58,7 @@ def test_every_strand_is_there_at_its_place(hair: Any) -> None:
 
 
 def test_every_strand_keeps_its_noise(hair: Any) -> None:
-    """Also as a file has it, beside curves that Blender has made since, and from a bake."""
+    """Seeds are kept when curves are added later, and in a bake."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     seeds = strand_seeds(MadeRig.of(hair, read_source(hair, depsgraph)).rig)
     assert (np.diff(seeds) != 1).any(), "children have others than their numbers"
@@ -76,7 +76,7 @@ def test_every_strand_keeps_its_noise(hair: Any) -> None:
 def test_it_moves_as_it_was_painted_on_the_curves(
     hair: Any, domain: str, children: str, evaluated: Any
 ) -> None:
-    """Of children, as they are mixed; what is held still stays so."""
+    """Children get the weighted values of their guides; unsimulated strands stay unsimulated."""
     hair.data.hairloom.children.method = children
     is_left = curve_points(hair.data)[:, 0] < 0.0
     place = np.tile(np.linspace(0.0, 1.0, 8), len(hair.data.curves))
@@ -99,21 +99,22 @@ def test_it_moves_as_it_was_painted_on_the_curves(
         now = canvas.mask(name, evaluated()).grid
         assert now[: len(roots)] == pytest.approx(before, abs=2e-3)
         assert now.min() >= 0.0 and now.max() <= before.max() + 1e-5
-        far = np.abs(made.strands.roots[:, 0]) > 0.07  # whose guides are on their side
+        # all guides of these children are on their side
+        far = np.abs(made.strands.roots[:, 0]) > 0.07
         sides = made.strands.roots[far, 0] < 0.0
         assert (now[far].max(axis=1) > 0.0).tolist() == sides.tolist()
 
 
 @pytest.mark.slow
 def test_it_is_drawn_as_the_hair_was(hair: Any, stage: Any, tmp_path: Path) -> None:
-    """By our own engine: the very same picture."""
+    """Our engine's picture is the same, except for the shadows."""
     add_ball(0.1)
     light = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
     stage.collection.objects.link(light)
     bpy.context.view_layer.objects.active = hair
     hair.select_set(True)
     stage.camera.location.y = -0.6
-    stage.render.resolution_x = stage.render.resolution_y = 256  # all strands are drawn
+    stage.render.resolution_x = stage.render.resolution_y = 256  # enough pixels to draw all strands
     before = picture(tmp_path)
     real = made_real()
     assert hair.hide_render and not real.hide_render
@@ -122,10 +123,11 @@ def test_it_is_drawn_as_the_hair_was(hair: Any, stage: Any, tmp_path: Path) -> N
     without = picture(tmp_path)
     is_hair = np.abs(before - without).max(axis=-1) > 0.02
     assert is_hair.mean() > 0.1
-    assert np.abs(after - before)[is_hair].mean() < 0.02  # other strands throw the shadows
+    assert np.abs(after - before)[is_hair].mean() < 0.02  # other strands cast the shadows
     real.hide_render = False
     real.data.hairloom.shading.base_color = (1.0, 1.0, 1.0)
-    np.testing.assert_allclose(picture(tmp_path), after, atol=1e-3)  # colours are its own
+    # colours are stored in the curves
+    np.testing.assert_allclose(picture(tmp_path), after, atol=1e-3)
 
 
 def test_the_hair_stays_and_undo_is_there(hair: Any) -> None:

@@ -1,4 +1,4 @@
-"""Hair that is made beside the window's work: what was there is shown until it arrives."""
+"""Hair that is built in a thread: the previous state is shown until it arrives."""
 
 import threading
 from dataclasses import replace
@@ -44,7 +44,7 @@ def in_window(monkeypatch):
 
 @pytest.fixture
 def gate(in_window, monkeypatch):
-    """Holds hair back until it is opened."""
+    """Building hair is held back until this event is set."""
     opened, ranks = threading.Event(), rig_flow.strand_ranks
 
     def wait_and_make(*arguments, **named):
@@ -64,7 +64,7 @@ def hair(new_hair, sphere):
 
 
 def arrive(session):
-    """Until nothing is being made."""
+    """Run timer steps until nothing is pending."""
     take_steps_until(lambda: not (session.is_pending and previews.sessions()))
 
 
@@ -144,7 +144,7 @@ def test_what_the_gpu_gets_of_strands_is_laid_out_in_the_thread(
 
 @pytest.fixture
 def light_gate(in_window, monkeypatch):
-    """Holds light back until it is opened."""
+    """Computing light is held back until this event is set."""
     opened, lit = threading.Event(), session_module.lit
 
     def wait_and_light(groom, report):
@@ -157,7 +157,7 @@ def light_gate(in_window, monkeypatch):
 
 
 def light_of(hair, evaluated):
-    """What a preview begun now has, when all of it is there."""
+    """The complete light of a preview that starts now."""
     return build(GroomSource(hair, evaluated()).request, is_drawn=True).light
 
 
@@ -265,7 +265,7 @@ def test_blenders_playback_and_a_bake_wait_for_no_timer(hair, evaluated, in_wind
 
 @pytest.fixture
 def playing(hair, evaluated, in_window, sphere):
-    """Hair that swings."""
+    """The session of hair that swings."""
     session = previews.start(hair, evaluated())
     arrive(session)
     previews.play(evaluated())
@@ -276,7 +276,7 @@ def playing(hair, evaluated, in_window, sphere):
 
 
 def hold(monkeypatch):
-    """From now on hair is held back until the gate is opened."""
+    """From now on, preparing hair is held back until the returned event is set."""
     opened, prepare = threading.Event(), rig_flow.prepare
 
     def wait_and_prepare(*arguments, **named):
@@ -300,7 +300,7 @@ def test_old_hair_plays_until_the_new_is_made(playing, hair, evaluated, monkeypa
     opened.set()
     arrive(playing)
     assert len(grid_of(playing)) > COUNT and playing.is_playing
-    # no step has been taken since: the same guides are where they were
+    # no step has run since: the same guides are at the same places
     assert np.array_equal(playing.solver.guides()[:, -1], tips)
     at_rest = motion_flow.carried_guides(playing.rig, playing.solver.pose)[:, -1]
     assert np.abs(tips - at_rest).max() > 1e-3, "the hair did not swing"
@@ -308,7 +308,7 @@ def test_old_hair_plays_until_the_new_is_made(playing, hair, evaluated, monkeypa
 
 @pytest.fixture
 def contacts(monkeypatch):
-    """Of each clearance that is found: whether in a thread, and the clearance."""
+    """For each clearance that is computed: whether in a thread, and the clearance."""
     of_each, find = [], lead_out.clearance_at
 
     def recorded(*arguments):
@@ -321,8 +321,8 @@ def contacts(monkeypatch):
 
 
 def knows_contacts(session, contacts):
-    """Whether the contacts that were found once, beside the window's work, are those that hair at
-    rest would find here."""
+    """Whether the clearance was computed once, in a thread, and the session uses it; asserts that
+    it equals that of hair at rest here."""
     ((is_beside, found),) = contacts
     motion, settings = session.solver.motion, session.settings[DynamicsSettings]
     begun = motion_flow.begin(session.rig, motion.pose)
@@ -393,7 +393,7 @@ def test_hair_that_begins_again_in_play_knows_how_far_it_stays_from_colliders(
 def test_hair_that_arrives_in_play_knows_how_far_it_stays_from_colliders(
     playing, hair, evaluated, contacts
 ):
-    """Found beside the window's work, where it is the same as the next frame would find."""
+    """Computed in the thread, and equal to what the next frame would compute."""
     previews.advance(evaluated(), FRAME)
     contacts.clear()
     hair.data.hairloom.children.strand_count = 3 * COUNT
@@ -469,7 +469,7 @@ def test_ambient_light_needs_no_other_strands(playing, hair, evaluated, monkeypa
 
 @pytest.mark.parametrize("is_combed", [False, True])
 def test_how_strong_ambient_light_is_finds_no_light_again(hair, evaluated, monkeypatch, is_combed):
-    """But that of hair which was combed as well."""
+    """Only changed strands need new light, not a changed strength."""
     session = previews.start(hair, evaluated())
     found, make = [], light_flow.sky_field
     monkeypatch.setattr(light_flow, "sky_field", lambda *given: found.append("sky") or make(*given))
@@ -548,7 +548,7 @@ def test_orders_tell_whether_they_give_the_same_rig(hair, evaluated, extension):
 
 @pytest.fixture
 def moving(sphere):
-    """The head is thrown about, and Blender plays as soon as it is told so."""
+    """A head that shakes from frame 1 to 12."""
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = 1, 12
     for frame, x in ((1, 0.0), (5, 0.1), (12, -0.05)):
@@ -571,7 +571,7 @@ def test_playback_goes_on_before_the_hair_is_made(hair, moving, evaluated, gate,
     session = previews.start(hair, evaluated())
     fields.field_of(session.source.head, session.settings[DynamicsSettings], place="Head")
     monkeypatch.setattr(playback, "is_played", lambda: True)
-    before = rounds(session, 1, 2, 3, 4)  # would wait for the gate for ever
+    before = rounds(session, 1, 2, 3, 4)  # would wait for the gate forever if it blocked
     assert (
         not session.is_made
         and not session.is_playing
@@ -590,7 +590,7 @@ def test_playback_goes_on_before_the_hair_is_made(hair, moving, evaluated, gate,
     assert np.abs(after.reshape(-1, 3) - at_rest).max() > 1e-3, "it does not swing"
     second = rounds(session, *range(1, 8))
     previews.stop(session)
-    bpy.context.scene.frame_set(1)  # where the first preview has begun, too
+    bpy.context.scene.frame_set(1)  # the frame in which the first preview began
     monkeypatch.setattr(latest_job, "is_blocking", lambda: True)
     again = previews.start(hair, evaluated())
     np.testing.assert_array_equal(second, rounds(again, *range(1, 8)))
@@ -673,7 +673,7 @@ def test_hair_of_another_scale_is_told_of_a_dense_head_as_of_any(new_hair, evalu
 
 
 def test_hair_of_another_scene_is_not_waited_for(hair, evaluated, in_window):
-    """Previewed in one scene, and another is shown before it is made."""
+    """Hair previewed in one scene cannot be finished while another scene is shown."""
     session = previews.start(hair, evaluated())
     bpy.context.window.scene = bpy.data.scenes.new("Elsewhere")
     with pytest.raises(HairloomError, match="another scene"):
@@ -683,7 +683,7 @@ def test_hair_of_another_scene_is_not_waited_for(hair, evaluated, in_window):
 def test_hair_that_is_made_while_another_scene_is_shown_arrives_with_its_own(
     hair, evaluated, in_window, monkeypatch
 ):
-    bpy.context.scene.frame_set(5)  # at its first frame hair begins to play, which waits
+    bpy.context.scene.frame_set(5)  # in its first frame hair would start to play, which waits
     session = previews.start(hair, evaluated())
     window, scene, refreshed = bpy.context.window, bpy.context.scene, []
     monkeypatch.setattr(previews, "refresh_views", lambda: refreshed.append(True))

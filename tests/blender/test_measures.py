@@ -1,4 +1,4 @@
-"""Times and memory, as panel and viewport report them."""
+"""Times and memory in the panel and the viewport."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ from hairloom.addon.blender.sessions import measures
 def test_the_median_of_the_last_frames_is_told(monkeypatch):
     now, times = [0.0], measures.FrameTimes()
     monkeypatch.setattr(measures.time, "perf_counter", lambda: now[0])
-    for spent in (0.004, 0.004, 0.9):  # one slow frame is none of them
+    for spent in (0.004, 0.004, 0.9):  # the median ignores one slow frame
         with times.measured("simulation"):
             now[0] += spent
     assert times.milliseconds("simulation") == pytest.approx(4.0)
@@ -63,7 +63,7 @@ def test_a_session_measures_itself(new_hair, sphere, evaluated):
 
 
 def test_figures_are_those_of_the_frame_that_is_shown(new_hair, sphere, evaluated):
-    """Found by hand from the strands that are drawn and a head that is a ball."""
+    """Figures equal those computed from the drawn strands and a spherical head."""
     hair = new_hair(sphere)
     sphere.hairloom.collider_shape = "sphere"
     session = previews.start(hair, evaluated())
@@ -78,7 +78,7 @@ def test_figures_are_those_of_the_frame_that_is_shown(new_hair, sphere, evaluate
     assert found.strands_stretch_max_percent == pytest.approx(
         100.0 * np.abs(length / 0.08 - 1.0).max(), abs=1e-3
     )
-    # points at rest on the sphere itself may count as outside or not; its ball is around all of it
+    # roots on the sphere may count as inside or outside, so they are left out of the depth
     depth = 0.1 - np.linalg.norm(points[:, 1:] - [0.05, 0.0, 0.0], axis=2).min()
     assert found.strands_penetration_max_mm == pytest.approx(max(0.0, 1000.0 * depth), abs=0.1)
     previews.advance(evaluated(), 1.0 / 24.0)

@@ -1,4 +1,4 @@
-"""Materials of meshes: what is read of them, and pictures on a plane beside Cycles'."""
+"""Materials of meshes: the values that are read, and textured planes compared with Cycles."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def picture(name: str, pixels: np.ndarray, space: str = "sRGB") -> bpy.types.Ima
 
 @pytest.fixture
 def material() -> bpy.types.Material:
-    """Principled, with nothing that shines."""
+    """A Principled material without specular reflection."""
     made = bpy.data.materials.new("Skin")
     node = made.node_tree.nodes["Principled BSDF"]
     node.inputs["Roughness"].default_value = 1.0
@@ -44,7 +44,7 @@ def material() -> bpy.types.Material:
 
 
 def give(material: bpy.types.Material, image: bpy.types.Image | None, socket: str) -> Any:
-    """Its picture for an input of Principled."""
+    """Connect an image texture to an input of Principled; returns its node."""
     tree = material.node_tree
     texture = tree.nodes.new("ShaderNodeTexImage")
     texture.image, texture.interpolation = image, "Linear"
@@ -73,7 +73,7 @@ def test_values_are_read(material: bpy.types.Material) -> None:
 
 
 def test_a_picture_is_read_as_light_and_kept(material: bpy.types.Material) -> None:
-    """A stored 0.5 is 0.214 of light; the same array comes again while the image is the same."""
+    """A stored sRGB 0.5 is 0.214 scene-linear. The array is reused while the image is the same."""
     pixels = np.full((4, 6, 4), 0.5)
     pixels[..., 3] = 0.25
     texture = give(material, picture("Checks", pixels), "Base Color")
@@ -82,7 +82,7 @@ def test_a_picture_is_read_as_light_and_kept(material: bpy.types.Material) -> No
     assert found.pictures is not None and found.pictures.color is not None
     assert found.pictures.color.shape == (4, 6, 4)
     assert found.color == pytest.approx((0.2140, 0.2140, 0.2140), abs=2e-3)
-    # its alpha counts only where it is asked for
+    # alpha counts only if it is connected
     assert found.transparency == "opaque" and (found.pictures.color[..., 3] == 1.0).all()
     again = material_of(material).pictures
     assert again is not None and again.color is found.pictures.color
@@ -139,7 +139,8 @@ def test_nodes_that_are_not_read_are_told(material: bpy.types.Material) -> None:
 
 
 def square() -> Surface:
-    """From -0.5 to 0.5 in x and y, with a map that is turned by a quarter and a half as wide."""
+    """A square from -0.5 to 0.5 in x and y, whose UVs are rotated by 90 degrees and half as
+    wide."""
     corners = np.array([[-0.5, -0.5, 0], [0.5, -0.5, 0], [0.5, 0.5, 0], [-0.5, 0.5, 0]])
     triangles = np.array([[0, 1, 2], [0, 2, 3]])
     uv = np.array([[0.0, 0.0], [0.0, 1.0], [-0.5, 1.0], [-0.5, 0.0]])
@@ -147,7 +148,7 @@ def square() -> Surface:
 
 
 def waves() -> tuple[np.ndarray, np.ndarray]:
-    """Stored values of a colour that runs from left to right, and of normals of waves both ways."""
+    """Stored values of a colour gradient, and of a normal map of waves in both directions."""
     place = (np.arange(32) + 0.5) / 32.0
     color = np.ones((32, 32, 4))
     color[..., 0], color[..., 1], color[..., 2] = place, place[:, None], 0.5
@@ -197,7 +198,8 @@ def of_cycles(material: bpy.types.Material, sun: np.ndarray, folder: Path) -> np
 def test_a_plane_with_pictures_is_as_in_cycles(
     material: bpy.types.Material, tmp_path: Path, bump: float, level: float, roughness: float
 ) -> None:
-    """Matt, and with the boundary that Principled has."""
+    """For matt and glossy planes, the mean difference from Cycles is below 1 % of the mean
+    radiance, and its 99th percentile below 0.03."""
     from hairloom.addon.render import frame
 
     inputs = material.node_tree.nodes["Principled BSDF"].inputs
@@ -241,7 +243,7 @@ def test_a_plane_with_pictures_is_as_in_cycles(
 @pytest.mark.usefixtures("gpu_context")
 @pytest.mark.parametrize("transparency", ["opaque", "hashed", "blended"])
 def test_meshes_cover_as_much_as_their_alpha_says(transparency: str) -> None:
-    """A red sheet of half alpha that is named first, over a blue one."""
+    """A red sheet with alpha 0.5 over a blue one; the red one comes first in the list."""
     from hairloom.addon.render import frame
 
     surface = square()
@@ -272,7 +274,8 @@ def test_meshes_cover_as_much_as_their_alpha_says(transparency: str) -> None:
 
 @pytest.mark.usefixtures("gpu_context")
 def test_blended_meshes_are_drawn_from_far_to_near() -> None:
-    """Whatever their order: the nearer of two sheets of half alpha is seen more."""
+    """In either order of the list, the nearer of two sheets with alpha 0.5 has the larger
+    weight."""
     from hairloom.addon.render import frame
 
     surface, none = square(), np.zeros((0, 2, 3), np.float32)
@@ -297,7 +300,7 @@ def test_blended_meshes_are_drawn_from_far_to_near() -> None:
 
 
 def test_the_engine_tells_what_is_missing(sphere: Any, new_hair: Any, material: Any) -> None:
-    """A picture's file; and a head's UVs, once a shadow on it is to be soft."""
+    """Warnings name a missing file, and a head without UVs once its shadows are soft."""
     from hairloom.addon.blender.engine.engine_scene import SceneReader
 
     def warnings() -> str:

@@ -1,4 +1,4 @@
-"""Hair mirrored: by signs alone on what is its own mirror image, attached on all else."""
+"""Mirroring hair: on a symmetric mesh only signs change, on other meshes roots are attached."""
 
 import bpy
 import numpy as np
@@ -17,7 +17,7 @@ FLIP = np.array([-1.0, 1.0, 1.0], np.float32)
 
 @pytest.fixture
 def egg():
-    """A head that is its own mirror image bit for bit: half of a ball, mirrored."""
+    """A head that is symmetric bit for bit: a half sphere, mirrored."""
     bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1, segments=24, ring_count=12)
     head = bpy.context.object
     head.name = "Head"
@@ -35,7 +35,7 @@ def egg():
 
 
 def hedgehog():
-    """Straight strands around a ball, 5 and 8 points each."""
+    """Straight strands around a ball, with 5 and 8 points in turn."""
     outward = np.random.default_rng(1).normal(size=(60, 3))
     outward /= np.linalg.norm(outward, axis=1, keepdims=True)
     counts = np.tile([5, 8], 30)
@@ -46,7 +46,7 @@ def hedgehog():
 
 
 def on_surface(head):
-    """The same with roots that lie on its facets."""
+    """The hedgehog with its roots on the facets of the head."""
     strands = hedgehog()
     depsgraph = bpy.context.evaluated_depsgraph_get()
     surface = read_surface(head, depsgraph, need_uv=False, place="Head")
@@ -56,7 +56,7 @@ def on_surface(head):
 
 
 def curves_of(hair):
-    """Points of each curve."""
+    """The points of each curve."""
     return np.split(curve_points(hair.data), curve_offsets(hair.data)[1:-1])
 
 
@@ -78,7 +78,7 @@ def test_on_a_symmetric_head_only_signs_change(new_hair, egg):
     for number, old in enumerate(np.flatnonzero(side > 0)):
         assert np.array_equal(after[number], before[old])
         assert np.array_equal(after[count + number], before[old] * FLIP)
-    bpy.ops.hairloom.mirror_hair(side="negative")  # the same hair again
+    bpy.ops.hairloom.mirror_hair(side="negative")  # gives the same hair
     again = {each.tobytes() for each in curves_of(hair)}
     assert again == {(each + 0.0).tobytes() for each in after}
 
@@ -88,7 +88,7 @@ def test_curves_keep_what_they_carry(new_hair, egg):
     hair = new_hair(egg, strands)
     curves, count = hair.data, strands.strand_count
     random = np.random.default_rng(2)
-    own = np.linalg.norm(strands.roots - [0.1, 0.0, 0.0], axis=1)  # each curve's own number
+    own = np.linalg.norm(strands.roots - [0.1, 0.0, 0.0], axis=1)  # a number for each curve
     values = {
         "radius": ("POINT", random.uniform(1e-5, 1e-4, strands.point_count)),
         "color": ("POINT", random.random((strands.point_count, 4))),
@@ -115,7 +115,7 @@ def test_curves_keep_what_they_carry(new_hair, egg):
     closest = read_attribute(curves, "groom_closest_guide_1", "CURVE")
     across = dict(zip(ids.tolist(), np.roll(ids, half).tolist(), strict=True))
     assert closest[half:].tolist() == [across[each] for each in closest[:half].tolist()]
-    # those that named a curve which is gone name the mirrored one that is nearest to where it was
+    # guides that no longer exist are replaced by the mirrored ones nearest to their places
     roots = np.array([each[0] for each in curves_of(hair)])[half:]
     for number, named in zip(source.tolist(), closest[:half].tolist(), strict=True):
         was = count - 1 - number

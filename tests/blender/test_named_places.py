@@ -1,4 +1,4 @@
-"""What a page says of a button, its name and where it is, is so in the panels and menus."""
+"""Pages name buttons and places as panels and menus do."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from hairloom.addon.ui.sections import SECTIONS, SESSION_SECTIONS
 pytestmark = pytest.mark.usefixtures("extension")
 
 REPOSITORY = Path(__file__).parents[2]
-#: pages that speak to artists; decisions name what was then
+#: pages for artists; decisions keep the names of their time
 PAGES = [
     REPOSITORY / "README.md",
     *sorted((REPOSITORY / "docs").glob("*.md")),
@@ -31,8 +31,8 @@ OPERATORS = {
 
 
 def buttons() -> dict[str, set[str]]:
-    """Operator -> the texts of its buttons, other than of an icon alone; what is not constant in
-    the code is left out with its operator."""
+    """Operator -> the texts of its buttons, except those with an icon alone. Operators with a text
+    that is not constant in the code are left out."""
     found: dict[str, set[str]] = {}
     unknown = {""}
     for file in sorted((REPOSITORY / "addon" / "ui").rglob("*.py")):
@@ -56,7 +56,7 @@ def buttons() -> dict[str, set[str]]:
 
 
 def test_pages_name_a_button_by_what_stands_on_it() -> None:
-    """Not by the operator's own name, where no button says that."""
+    """Pages do not use an operator's name if its button shows another text."""
     texts = set().union(*buttons().values())
     unseen = {
         OPERATORS[name] for name, on in buttons().items() if OPERATORS[name] not in on | texts
@@ -72,8 +72,8 @@ def test_pages_name_a_button_by_what_stands_on_it() -> None:
 
 
 def test_each_button_is_named_on_a_page() -> None:
-    """By what stands on it, or by its operator's name, which is that of one with an icon alone.
-    Those of a dialog or a list of reports explain themselves."""
+    """By its text, or by its operator's name if it has only an icon. Buttons of dialogs and of the
+    list of reports need no page."""
     icons = {f"hairloom.{name}" for name in ("bake_free", "fin_remove", "remove_spheres")}
     explained = ("hairloom.export_", "hairloom.import_", "hairloom.copy_reports")
     text = " ".join(

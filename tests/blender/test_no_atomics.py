@@ -1,4 +1,4 @@
-"""Pictures where images have no atomics, as an artist gets them: F12, stills, and what says so."""
+"""Pictures without image atomics: F12, stills, and messages about them."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def automatic() -> Iterator[None]:
 def test_a_render_is_calm_without_atomics(
     stage: Any, new_hair: Callable[..., Any], sphere: Any, tmp_path: Path
 ) -> None:
-    """One sample is asked for; hashed strands take as many as make them calm."""
+    """Hashed strands take 16 samples although one is set, and agree with layers to 1 %."""
     hair = new_hair(sphere)
     hair.data.hairloom.strands.fullness = 20.0
     picture_settings = stage.hairloom.picture
@@ -63,7 +63,8 @@ def test_a_render_is_calm_without_atomics(
 def test_a_render_shares_what_was_drawn_elsewhere(
     stage: Any, new_hair: Callable[..., Any], sphere: Any, tmp_path: Path
 ) -> None:
-    """It has a GPU context of its own, in which framebuffers of another one cannot be bound."""
+    """A render has its own GPU context, in which framebuffers of another context cannot be
+    bound."""
     hair = new_hair(sphere)
     hair.data.hairloom.strands.transparency = "hashed"
     hair.data.hairloom.strands.fullness = 20.0
@@ -109,7 +110,7 @@ def test_the_preferences_forbid_them_and_the_self_test_says_so(monkeypatch: Any)
 def test_the_preview_is_drawn_without_atomics(
     new_hair: Callable[..., Any], sphere: Any, evaluated: Callable[[], Any]
 ) -> None:
-    """What a 3D view shows of a groom, with its shadow on the body: noisy, and as bright."""
+    """The preview of a groom with its shadow on the body: noisy, but as bright."""
     hair = new_hair(sphere)
     hair.data.hairloom.strands.fullness = 20.0
     session = previews.start(hair, evaluated())

@@ -1,4 +1,4 @@
-"""A machine without a GPU and without a software driver: a sentence, not a crash of Blender."""
+"""Without a GPU and a software driver, Blender reports an error and does not crash."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def test_verbs_that_draw_say_so_and_write_nothing(arguments: list[str], tmp_path
 
 @pytest.mark.slow
 def test_cards_are_made_all_the_same(tmp_path: Path) -> None:
-    """Their atlas is drawn by numpy then."""
+    """numpy draws the atlas instead."""
     output = tmp_path / "cards.glb"
     done = without_gpu(VERB, "cards", "--output", str(output), *FEW)
     assert done.returncode == 0, done.stderr

@@ -1,4 +1,4 @@
-"""Lists of ties, partings, strokes and trim shapes are as high for thirty as for one."""
+"""Lists of ties, partings, strokes and trim shapes are as high with thirty entries as with one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Everything that hair collides with: kinds of objects, how they move and deform."""
+"""Everything that hair collides with: kinds of objects, their motion and deformation."""
 
 import math
 
@@ -28,7 +28,8 @@ def scene(extension):
 
 
 def rig(mesh, name="Rig"):
-    """A mesh carried by one bone of an armature, which stands still as an object does."""
+    """Bind a mesh to one bone of an armature, whose object stands still; returns a function that
+    poses the bone."""
     armature = bpy.data.armatures.new(name)
     obj = bpy.data.objects.new(name, armature)
     bpy.context.scene.collection.objects.link(obj)
@@ -109,15 +110,15 @@ def test_a_stretched_ball_is_an_ellipsoid(scene):
 
 
 def test_a_capsule_lies_along_the_longest_side_with_round_ends(scene):
-    """A box of 0.2, made 0.8 long by its scale: its capsule ends at 0.4 and is 0.1 thick."""
+    """A box of 0.2, scaled to a length of 0.8: its capsule ends at 0.4 and has a radius of 0.1."""
     cube = scene.cube(0.2, "capsule")
     cube.scale = (1, 4, 1)
-    cube.rotation_euler.z = math.pi / 2  # its y becomes the world's x
+    cube.rotation_euler.z = math.pi / 2  # its y axis becomes the world's x axis
     (posed,) = moved(scene.obstacles())
     assert isinstance(posed.collider, CapsuleCollider)
     assert distance_now(posed, (0.5, 0, 0)) == pytest.approx(0.1, abs=1e-6)
     assert distance_now(posed, (0.2, 0, 0.25)) == pytest.approx(0.15, abs=1e-6)
-    corner = 0.3 + 0.1 / math.sqrt(2.0)  # on the round end
+    corner = 0.3 + 0.1 / math.sqrt(2.0)  # on the rounded end
     assert distance_now(posed, (corner, corner - 0.3, 0)) == pytest.approx(0.0, abs=1e-6)
 
 
@@ -148,14 +149,14 @@ def test_things_go_the_way_from_frame_to_frame_with_a_bow(scene):
     found = scene.obstacles()
     for posed in moved(found):
         np.testing.assert_allclose(posed.matrix_before, posed.matrix_now)
-    for place in (0.1, 0.3, 0.6):  # faster and faster
+    for place in (0.1, 0.3, 0.6):  # it accelerates
         ball.location.x = cube.location.x = place
         last = moved(found)
     assert len(last) == 2
     for posed in last:
         went = posed.matrix_now[0, 3] - posed.matrix_before[0, 3]
         assert went == pytest.approx(0.3, abs=1e-5)
-        # 0.1, 0.3, 0.6 lie on x = 0.3 + 0.25 s + 0.05 s^2 of this frame: its middle is at 0.4375
+        # 0.1, 0.3, 0.6 lie on x = 0.3 + 0.25 s + 0.05 s^2 in this frame; its middle is at 0.4375
         assert posed.matrix_at(0.5)[0, 3] - posed.matrix_before[0, 3] == pytest.approx(
             0.1375, abs=1e-5
         )
@@ -213,7 +214,7 @@ def test_one_ball_that_turns_turns_its_collider(scene):
 
 @pytest.mark.parametrize("subdivided", [False, True])
 def test_a_mesh_that_an_armature_turns_is_followed(scene, subdivided):
-    """The object stands still and its vertices move: within 0.1 mm."""
+    """The object stands still and its vertices move; within 0.1 mm."""
     bpy.ops.mesh.primitive_monkey_add(size=0.2)
     head = scene.add(bpy.context.object)
     pose = rig(head)
@@ -239,7 +240,7 @@ def test_a_mesh_that_an_armature_turns_and_its_object_carries(scene):
 
 
 def long_body():
-    """A mesh whose upper half alone goes with its pose; and the pose."""
+    """A mesh whose upper half follows a bone, and the function that poses the bone."""
     bpy.ops.mesh.primitive_cylinder_add(radius=0.1, depth=2.0, vertices=16)
     body = bpy.context.object
     bpy.ops.object.mode_set(mode="EDIT")
@@ -253,8 +254,8 @@ def long_body():
 
 @pytest.mark.slow
 def test_the_head_is_followed_at_its_roots_where_the_body_bends(scene):
-    """A long body whose upper half turns: its collider goes with the vertices at the top, in the
-    body's shape."""
+    """A long body whose upper half turns: its collider follows the vertices at the roots and has
+    the body's bent shape."""
     body, pose = long_body()
     at_rest = read_surface(body, depsgraph(), need_uv=False, place="Body")
     roots = np.flatnonzero(at_rest.positions[:, 2] > 0.9)
@@ -270,7 +271,7 @@ def test_the_head_is_followed_at_its_roots_where_the_body_bends(scene):
         assert found.warnings == ()
         assert posed.collider is not found.parts[0].distance
         now = read_surface(body, depsgraph(), need_uv=False, place="Body").positions
-        now = now[np.abs(now[:, 2]) > 0.2]  # the middle folds
+        now = now[np.abs(now[:, 2]) > 0.2]  # without the middle, which folds
         distance, _ = signed_distance(now, [posed])
         cell = posed.collider.cell
         assert np.median(np.abs(distance)) < 0.05 * cell
@@ -286,7 +287,7 @@ def test_the_head_is_followed_at_its_roots_where_the_body_bends(scene):
 
 
 def test_a_look_at_colliders_between_two_frames_changes_no_motion(scene):
-    """Such as that of an overlay, once the body has bent."""
+    """Such as the look of an overlay, after the body has bent."""
     body, pose = long_body()
     scene.add(body)
     found = [scene.obstacles(), scene.obstacles()]
@@ -301,7 +302,7 @@ def test_a_look_at_colliders_between_two_frames_changes_no_motion(scene):
     assert min(swellings[:2]) > 0.01 and swellings[2] == 0.0
 
 
-# --- what is used again
+# --- reuse
 
 
 def test_a_head_that_is_bent_as_before_has_the_same_field(scene):

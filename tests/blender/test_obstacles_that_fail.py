@@ -1,4 +1,4 @@
-"""Colliders that cannot be used, or are hidden, deleted or changed in mid-play."""
+"""Colliders that are unusable, or are hidden, deleted or changed during play."""
 
 import math
 
@@ -63,7 +63,7 @@ def test_what_cannot_be_used_is_told_by_name_and_the_others_go_on(scene, make):
 
 
 def test_a_mesh_that_is_not_closed_collides_and_is_told(scene):
-    """A box without its first face, with one that looks inwards, and with a wall within."""
+    """A box without its first face, with a face that is turned inwards, and with a wall inside."""
     cube = scene.cube()
     assert scene.obstacles().warnings == ()
     corners = [vertex.co[:] for vertex in cube.data.vertices]
@@ -101,7 +101,7 @@ def test_excluded_from_the_view_layer(scene):
     cube.location.x = 3.0
     (posed,) = moved(found)
     assert found.warnings == ()
-    np.testing.assert_allclose(posed.matrix_before, posed.matrix_now)  # back without a leap
+    np.testing.assert_allclose(posed.matrix_before, posed.matrix_now)  # it returns without a jump
 
 
 def test_hidden_with_the_eye_it_still_collides(scene):
@@ -188,7 +188,7 @@ def test_a_chosen_collider_stands_in_for_the_head(scene, sphere):
 
 
 def test_a_collection_in_which_nothing_collides_is_named(scene):
-    """And one that is deleted leaves the surface alone, without a word."""
+    """A deleted collection leaves only the surface, without a warning."""
     plain = bpy.data.objects.new("Plain", None)
     scene.add(plain)
     assert "nothing in the collection Colliders collides" in scene.obstacles().warnings[0]

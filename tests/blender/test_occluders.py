@@ -1,4 +1,4 @@
-"""Cards of other grooms shade those that are made, written or sorted, by choice."""
+"""Cards of other grooms can shade cards that are made, written or sorted."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
 
 @pytest.fixture
 def hair(new_hair, sphere):
-    """A hedgehog on a sphere, with cards, and a larger copy of them that is nobody's."""
+    """A hedgehog on a sphere, with cards of its own."""
     made = new_hair(sphere)
     groom = made.data.hairloom
     groom.cards.source, groom.cards.card_count, groom.cards.levels = "clusters", 12, 2
@@ -99,7 +99,7 @@ def test_grooms_without_cards_shade_by_their_strands(hair, new_hair, sphere):
     bpy.context.view_layer.objects.active = hair
     press()
     assert openness(card_objects(hair)[0]).mean() < alone.mean() - 0.02
-    # its own cards stand for them once there are some
+    # once it has cards, these replace its strands as occluders
     bpy.context.view_layer.objects.active = strands
     strands.data.hairloom.atlas.source = "made"
     press()
@@ -118,7 +118,7 @@ def test_hair_that_cannot_be_used_shades_nothing_and_says_why(hair, new_hair, sp
 
 @pytest.fixture
 def shaded(hair, new_hair, sphere, evaluated):
-    """Hair shown as cards, and other hair that shades them by its strands."""
+    """Hair shown as cards, and other hair whose strands shade them."""
     strands = new_hair(sphere)
     strands.name = "Shading"
     strands.data.hairloom.strands.fullness = 20.0
@@ -131,12 +131,12 @@ def shaded(hair, new_hair, sphere, evaluated):
 
 
 def shown(session):
-    """Occlusion of the cards that are shown."""
+    """The occlusion of the cards that are drawn."""
     return overlay.drawing_of(session.uid).snapshot.cards.mesh.occlusion
 
 
 def follow(evaluated):
-    """What Blender's events lead to."""
+    """Run the handlers of an update."""
     bpy.context.view_layer.update()
     scene_events.updated(evaluated())
     scene_events.catch_up(evaluated())
@@ -191,7 +191,7 @@ def test_undo_has_cards_shaded_again(shaded, evaluated):
     session, strands = shaded
     near = shown(session)
     strands.location.x = 5.0
-    bpy.context.view_layer.update()  # as undo does it, which tells nobody of objects
+    bpy.context.view_layer.update()  # as undo does, without update events for objects
     scene_events.undone()
     scene_events.catch_up(evaluated())
     assert shown(session).mean() > near.mean() + 0.02
@@ -204,13 +204,13 @@ def test_hair_that_moves_with_other_hair_keeps_its_shade(shaded, sphere, evaluat
     follow(evaluated)
     assert strands.matrix_world != before, "both are children of the head"
     assert shown(session) is near, "the same cards, elsewhere"
-    session.cards.forget()  # built once more, where they are now
+    session.cards.forget()  # built again at the new place
     session.take_settings()
     np.testing.assert_allclose(shown(session), near, atol=0.02)
 
 
 def threads_of(name):
-    """Those that run under this name."""
+    """The running threads of this name."""
     return {each for each in threading.enumerate() if each.name == name}
 
 
@@ -258,7 +258,7 @@ def test_a_render_has_the_shade_of_other_hair_as_it_is(shaded, evaluated):
 
 
 def test_hair_that_cannot_be_made_ready_is_told_of_by_the_cards(shaded, hair, evaluated):
-    """Its roots lie far from its head, which is found out in the thread."""
+    """Its roots are far from its head, which is detected only in the thread."""
     session, strands = shaded
     strands.data.attributes["position"].data[0].vector.x = np.inf
     for each in strands.data.attributes["position"].data:

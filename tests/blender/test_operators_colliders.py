@@ -1,4 +1,4 @@
-"""The operator that fits spheres: what it makes, that it follows, undoes, and can be removed."""
+"""The operator that fits spheres: its result, and how it is followed, undone and removed."""
 
 import math
 
@@ -37,7 +37,7 @@ def empties(mesh):
 
 
 def balls(mesh):
-    """World centers (n, 3) and radii (n,) as Blender shows them."""
+    """World-space centers (n, 3) and radii (n,) as Blender displays them."""
     bpy.context.view_layer.update()
     found = empties(mesh)
     centers = np.array([empty.matrix_world.translation for empty in found])
@@ -51,7 +51,8 @@ def moved(matrix, points):
 
 
 def rig(mesh):
-    """A mesh carried by one bone of an armature that stands still as an object."""
+    """Bind a mesh to one bone of an armature, whose object stands still; returns a function that
+    poses the bone."""
     armature = bpy.data.armatures.new("Rig")
     obj = bpy.data.objects.new("Rig", armature)
     bpy.context.scene.collection.objects.link(obj)
@@ -86,7 +87,7 @@ def test_spheres_are_empties_in_a_collection_of_their_own(monkey):
 
 
 def test_they_cover_suzanne_within_the_stated_error(monkey):
-    """Against her own vertices, after Blender has placed the empties."""
+    """Measured at her vertices, after Blender has placed the empties."""
     fit(60)
     centers, radii = balls(monkey)
     vertices = np.array([monkey.matrix_world @ vertex.co for vertex in monkey.data.vertices])
@@ -112,7 +113,7 @@ def test_radii_are_metres_whatever_the_scale_of_the_mesh(monkey, scale):
 
 @pytest.mark.parametrize("modifier", few_in_commits(["SUBSURF", None, "TRIANGULATE"]))
 def test_they_follow_what_an_armature_does(monkey, modifier):
-    """The object stands still; within 0.1 mm, and fitted in a pose as well as at rest."""
+    """The object stands still. Spheres, fitted in a pose, follow to 0.1 mm."""
     pose = rig(monkey)
     if modifier:
         monkey.modifiers.new(modifier, modifier)
@@ -154,7 +155,7 @@ def test_the_numbers_are_told(monkey, capfd):
 
 def test_the_hair_of_the_mesh_uses_them(new_hair, sphere):
     hair = new_hair(sphere)
-    fit(8)  # the hair is active: its head is meant
+    fit(8)  # the hair is active, and its head gets the spheres
     (collection,) = spheres.fitted_collections(sphere)
     assert hair.hairloom.collider_collection == collection
     depsgraph = bpy.context.evaluated_depsgraph_get()
@@ -172,7 +173,7 @@ def test_spheres_of_another_mesh_that_the_artist_has_chosen_stay(new_hair, spher
     (of_body,) = spheres.fitted_collections(body)
     hair.hairloom.collider_collection = of_body
     fit(8)
-    fit(8)  # again: nothing comes twice
+    fit(8)  # again: nothing is added twice
     (of_head,) = spheres.fitted_collections(sphere)
     used = hair.hairloom.collider_collection
     assert (
@@ -184,7 +185,7 @@ def test_spheres_of_another_mesh_that_the_artist_has_chosen_stay(new_hair, spher
 
 @pytest.mark.slow(instead="test_the_hair_of_the_mesh_uses_them")
 def test_colliders_that_the_artist_has_chosen_stay(new_hair, sphere):
-    sphere.scale.z = 3.0  # one ball would do for a sphere
+    sphere.scale.z = 3.0  # a sphere would get one ball only
     hair = new_hair(sphere)
     own = bpy.data.collections.new("Own")
     hair.hairloom.collider_collection = own
@@ -271,7 +272,7 @@ def test_the_operator_takes_all_settings_of_the_fit(monkey):
 
 
 def test_hair_stays_out_of_fitted_spheres_that_an_armature_swings(monkey):
-    """Long hair all around, the head shaken by a bone: below 0.1 mm."""
+    """Long hair all around, on a head that a bone shakes: penetration stays below 0.1 mm."""
     pose = rig(monkey)
     fit(30)
     owner = bpy.data.objects.new("Owner", None)

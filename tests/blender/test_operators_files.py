@@ -1,4 +1,4 @@
-"""The artist's buttons for files: they do it, or say what is wrong, where, and what to do."""
+"""The buttons for files do their work, or report what is wrong, where, and what to do."""
 
 import bpy
 import numpy as np
@@ -21,7 +21,8 @@ def grown(head, **settings):
 
 @pytest.fixture
 def told(capfd):
-    """What the operators have reported since the last call; a report never is a traceback."""
+    """A function that returns the operators' reports since its last call, and refuses
+    tracebacks."""
 
     def read():
         captured = capfd.readouterr()
@@ -92,7 +93,7 @@ def test_guides_grow_along_the_normals_where_and_as_long_as_painted(sphere):
 
 
 def test_a_group_is_read_after_the_modifiers(sphere):
-    """One strand from each vertex that Blender shows, twice as many behind a mirror."""
+    """One strand for each vertex of the evaluated mesh: twice as many with a Mirror modifier."""
     weights = paint_upper_half(sphere, "Scalp")
     modifier = sphere.modifiers.new("Mirror", "MIRROR")
     modifier.use_axis, modifier.use_mirror_merge = (True, False, False), False

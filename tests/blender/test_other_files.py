@@ -1,4 +1,4 @@
-"""Grooms from other files and older versions, and settings that are animated or driven."""
+"""Grooms from other files and older versions, and animated or driven settings."""
 
 from pathlib import Path
 
@@ -22,7 +22,7 @@ from hairloom.addon.errors import HairloomError
 from hairloom.addon.shading.settings import ShadingSettings
 from hairloom.addon.shading.volume.settings import VolumeSettings
 
-#: Saved before there were shadows, cards that are shown, densities and debug views.
+#: saved before there were shadows, displayed cards, densities and debug views
 OLD = Path(__file__).parents[1] / "data" / "first_settings.blend"
 
 
@@ -55,7 +55,7 @@ def settings(hair):
 
 
 def plays(hair):
-    """Whether hair lags behind a head that is pushed."""
+    """Whether previewed hair lags behind a head that moves."""
     session = previews.start(hair, bpy.context.evaluated_depsgraph_get())
     assert previews.play(bpy.context.evaluated_depsgraph_get()) == []
     return swings(session)
@@ -95,7 +95,7 @@ def test_an_override_has_settings_of_its_own_which_last(override, tmp_path):
 
 @pytest.fixture
 def override(library):
-    """Hair of the library, overridden with its curves and its head."""
+    """Hair of the library, overridden together with its curves and its head."""
     scene, layer = bpy.context.scene, bpy.context.view_layer
     brought(library, link=True).override_hierarchy_create(scene, layer)
     hair = next(obj for obj in scene.objects if obj.type == "CURVES")
@@ -112,10 +112,11 @@ def saved_and_loaded(tmp_path):
 
 
 def test_groups_that_the_library_has_not_got_are_kept_on_overrides(override, tmp_path):
-    override.data.hairloom.shafts.strength = 0.75  # nobody has looked at these in the library
+    # these settings were never touched in the library
+    override.data.hairloom.shafts.strength = 0.75
     override.data.hairloom.children.method = "multi"
     override.hairloom.bake.in_renders = not (before := override.hairloom.bake.in_renders)
-    bpy.ops.ed.undo_push(message="Set")  # Blender compares with the library then, too
+    bpy.ops.ed.undo_push(message="Set")  # Blender also compares with the library at an undo step
     hair = saved_and_loaded(tmp_path)
     assert hair.data.override_library is not None
     assert hair.data.hairloom.shafts.strength == 0.75
@@ -142,7 +143,7 @@ def test_pictures_of_cards_and_whose_they_are_can_be_overridden(override, tmp_pa
 
 
 def test_an_override_plays_the_bake_of_the_library_until_it_is_baked_itself(library, tmp_path):
-    """In a file of another folder, whose path to the bake would be another one."""
+    """Also in a file in another folder, where the relative path of the bake points elsewhere."""
     bpy.ops.wm.open_mainfile(filepath=library)
     hair, scene = bpy.data.objects["Hair"], bpy.context.scene
     scene.frame_end = 2
@@ -170,7 +171,7 @@ def test_an_override_plays_the_bake_of_the_library_until_it_is_baked_itself(libr
 
 @pytest.fixture
 def shot(library, tmp_path):
-    """A file in a folder of its own that links hair which is baked in its library; that bake."""
+    """A file in its own folder, which links hair that is baked in its library; and that bake."""
     bpy.ops.wm.open_mainfile(filepath=library)
     hair, scene = bpy.data.objects["Hair"], bpy.context.scene
     hair.hairloom.dynamics.device = "numpy"
@@ -199,7 +200,7 @@ def test_linked_hair_is_not_baked_over_the_bake_of_its_library(shot, capfd):
 
 
 def test_a_scene_that_would_not_play_the_bake_of_linked_hair_is_not_saved(shot, tmp_path, capfd):
-    """The bake itself may go into a folder, for an export of it."""
+    """The bake itself may be written to a folder, to be exported."""
     file, folder, saved = shot[0], tmp_path / "out", tmp_path / "played.blend"
     bake = ["bake", "--scene", file, "--output", str(folder)]
     for option in (["--save"], ["--save-as", str(saved)]):
@@ -212,7 +213,8 @@ def test_a_scene_that_would_not_play_the_bake_of_linked_hair_is_not_saved(shot, 
 
 @pytest.mark.parametrize("is_alone", [True, False])
 def test_hair_of_an_instance_is_said_to_be_left_out(library, new_hair, tmp_path, capfd, is_alone):
-    """The usual layout of characters in a shot, whose hair the render engine draws."""
+    """The usual layout of shots: collection instances of characters, whose hair the render engine
+    draws."""
     if not is_alone:
         new_hair()
     empty = bpy.data.objects.new("Anna", None)
@@ -245,7 +247,7 @@ def test_a_file_of_an_old_version_has_what_was_set_and_defaults_for_the_rest(ext
 
 
 def keyed(owner, path, values):
-    """Keyframes of a setting: frame -> value."""
+    """Keyframe a setting: frame -> value."""
     group, _, name = path.rpartition(".")
     for frame, value in values.items():
         setattr(owner.path_resolve(group) if group else owner, name, value)
@@ -253,7 +255,7 @@ def keyed(owner, path, values):
 
 
 def driven(owner, path, source):
-    """A setting that is the x of an object."""
+    """Drive a setting by the x coordinate of an object."""
     driver = owner.driver_add(path).driver
     driver.type = "SUM"
     variable = driver.variables.new()
@@ -343,7 +345,8 @@ def test_an_animated_wind_blows_hair_in_playback_and_in_a_bake(
 
 
 def test_an_override_is_baked_and_shown_in_renders(override, tmp_path):
-    """Its collection is overridden as well and takes no other objects, so the scene's does."""
+    """The overridden collection takes no other objects, so the copy is put in the scene's
+    collection."""
     override.hairloom.dynamics.collider_resolution = 8
     override.hairloom.bake.folder = str(tmp_path / "bake")
     bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, 2
@@ -354,7 +357,7 @@ def test_an_override_is_baked_and_shown_in_renders(override, tmp_path):
 
 
 def a_ring():
-    """Around z, above the head."""
+    """An Empty, a ring around z above the head."""
     ring = bpy.data.objects.new("Ring", None)
     ring.empty_display_type, ring.empty_display_size = "CIRCLE", 0.09
     ring.rotation_euler.x, ring.location.z = np.pi / 2.0, 0.12  # Blender draws circles around y
@@ -362,7 +365,8 @@ def a_ring():
 
 
 def held_strands(hair, head):
-    """How many strands are held while the head is pushed; all of them go with what holds them."""
+    """The number of held strands, after asserting that they follow their anchor when the head
+    moves."""
     session = previews.start(hair, bpy.context.evaluated_depsgraph_get())
     assert previews.play(bpy.context.evaluated_depsgraph_get()) == []
     rig = session.rig

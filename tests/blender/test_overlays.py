@@ -1,4 +1,4 @@
-"""Lines in the viewport for what acts on the hair: each lies on what it stands for."""
+"""Overlay lines in the viewport lie on the things that they represent."""
 
 import threading
 
@@ -140,7 +140,7 @@ def test_each_light_has_a_line_towards_it(preview):
 
 
 def played(preview, evaluated, kind):
-    """Hair that plays and shows an overlay: the session, and the lines of that."""
+    """Hair that plays with an overlay: (session, lines of the overlay)."""
     hair, _, session = preview
     previews.play(evaluated())
     hair.hairloom.shown_overlays = {kind}

@@ -1,4 +1,4 @@
-"""What people type after --set."""
+"""Values after --set on the command line."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Hair curves in colours of their own: read, previewed, baked, made into cards, exported."""
+"""Hair curves with their own colours: read, previewed, baked, made into cards, exported."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ RED, BLUE = (0.8, 0.02, 0.03), (0.01, 0.05, 0.6)
 
 
 def two_colored(none: tuple[float, ...] = BLUE) -> StrandSet:
-    """A hedgehog, red where x < 0 and blue elsewhere."""
+    """A hedgehog, red where x < 0, blue or `none` elsewhere."""
     strands = hedgehog()
     is_left = np.repeat(strands.roots[:, 0] < 0.0, strands.point_counts)[:, None]
     return replace(strands, color=np.where(is_left, RED, none))
@@ -101,7 +101,7 @@ def test_a_bake_keeps_points_by_need(hair: Any, evaluated: Callable[[], Any]) ->
 @pytest.mark.draws
 @pytest.mark.slow
 def test_cards_have_the_colours_of_their_strands(hair: Any, evaluated: Callable[[], Any]) -> None:
-    """What a card's texel shows is the mean of red and blue, or one of them."""
+    """At least a fifth of the texels with hair are red, and a fifth blue."""
     groom = hair.data.hairloom
     groom.atlas.size = "512"
     groom.card_occlusion.rays, groom.cards.order_by = 1, "distance"

@@ -1,4 +1,4 @@
-"""The head of a web page: the mesh and the materials that the head has."""
+"""The head of a web page has the mesh and the materials of the head."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from hairloom.addon.exchange.textures.texture_files import read_texture
 
 
 def arrays(page: PageHead) -> tuple[np.ndarray, ...]:
-    """Corners of the triangles in world space, their normals and their UVs."""
+    """The triangles' corners in Blender's axes, their normals and their UVs."""
     triangles = np.frombuffer(page.files["head.triangles"], np.uint32).reshape(-1, 3)
     x, y, z = np.frombuffer(page.files["head.positions"], np.float32).reshape(-1, 3).T
     normal_x, normal_y, normal_z = (
@@ -47,7 +47,7 @@ def test_our_bust_has_its_skin_and_its_eyes(tmp_path: Path) -> None:
 
 
 def test_a_picture_is_what_the_renderer_has(tmp_path: Path) -> None:
-    """As OpenImageIO reads it."""
+    """The page's picture, read by OpenImageIO, equals the renderer's."""
     bust = built_in_head()
     page = PageHead.of(tmp_path / "hair.glb", bust.surface, bust.look("dark"), GLB)
     file = tmp_path / "skin.webp"

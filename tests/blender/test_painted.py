@@ -1,4 +1,4 @@
-"""Settings that are painted, read from Blender: every kind of map, and what goes wrong with it."""
+"""Painted settings, read from Blender: every kind of map, and faulty maps."""
 
 from __future__ import annotations
 
@@ -26,7 +26,8 @@ from hairloom.addon.blender.sessions.session import Session
 from hairloom.addon.blender.viewport import motion_lines, overlay
 from hairloom.addon.errors import HairloomError
 
-#: how far [m] from the border between the halves is far enough: the sphere's faces are coarse
+#: distance [m] from the border between the halves beyond which values count: the sphere's faces are
+#: coarse
 FAR = 0.05
 
 
@@ -43,7 +44,7 @@ def is_top(sphere: Any) -> list[float]:
 
 
 def paint(kind: str, hair: Any, sphere: Any) -> None:
-    """The upper half 1 and the lower 0, by the name Top."""
+    """Paint the upper half 1 and the lower half 0, named "Top"."""
     mesh, top = sphere.data, is_top(sphere)
     if kind == "group":
         group = sphere.vertex_groups.new(name="Top")
@@ -83,7 +84,7 @@ def factors(session: Any) -> Any:
 
 
 def assert_halves(session: Any, found: Any) -> None:
-    """1 above, 0 below."""
+    """Assert factors of 1 above and 0 below."""
     height = session.rig.strands.roots[session.rig.guides, 2]
     assert (height > FAR).sum() > 3 and (height < -FAR).sum() > 3
     np.testing.assert_allclose(found[:, height > FAR], 1.0, atol=1e-5)
@@ -128,7 +129,8 @@ def test_points_of_nurbs_are_painted_where_they_are_drawn(
     paint("point", hair, sphere)
     hair.data.set_types(type="NURBS")
     ends = hair.data.attributes.new("knots_mode", "INT8", "CURVE")
-    ends.data.foreach_set("value", [1] * len(ends.data))  # it reaches its first and last point
+    # the curve ends at its first and last point
+    ends.data.foreach_set("value", [1] * len(ends.data))
     hair.hairloom.dynamics.style_root_mask = "Top"
     session = started(hair, evaluated)
     assert session.warnings == ()
@@ -139,7 +141,7 @@ def test_points_of_nurbs_are_painted_where_they_are_drawn(
 
 
 def test_what_is_painted_moves_otherwise(hair: Any, sphere: Any, evaluated: Any) -> None:
-    """Stiff above and limp below, on a head that is moved aside."""
+    """Stiff above and limp below, on a head that moves sideways."""
     scene, dynamics = bpy.context.scene, hair.hairloom.dynamics
     scene.frame_start, scene.frame_end = 1, 8
     for frame, x in ((1, 0.0), (5, 0.2)):
@@ -201,7 +203,7 @@ def test_a_map_of_zeros_is_said_with_what_is_to_be_done(
 
 
 def test_an_image_of_several_tiles_is_refused(hair: Any, sphere: Any, evaluated: Any) -> None:
-    """Blender gives the pixels of the first tile, which would be all of the surface's."""
+    """Blender returns only the first tile's pixels, which would apply to the whole surface."""
     image = bpy.data.images.new("Film", 8, 8, tiled=True)
     assert read_map(sphere, evaluated(), "Film").shape == (len(sphere.data.vertices),)
     image.tiles.new(1002)

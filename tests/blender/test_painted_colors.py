@@ -1,4 +1,5 @@
-"""Hair in colours painted on its surface: what Blender samples there, and where it goes."""
+"""Hair in colours painted on its surface: compared with Blender's own sampling, and in all
+outputs."""
 
 from __future__ import annotations
 
@@ -21,7 +22,7 @@ from hairloom.addon.blender.viewport import overlay
 from hairloom.addon.exchange.hair_file import read_hair_file
 
 RED, BLUE = (0.8, 0.02, 0.03, 1.0), (0.01, 0.05, 0.6, 1.0)
-#: name of what is painted
+#: name of the painted map
 MAP = "Ombre"
 
 
@@ -38,7 +39,7 @@ def unwrapped(sphere: Any) -> Any:
 
 
 def paint(kind: str, sphere: Any, tmp_path: Path | None = None) -> None:
-    """Other colours at every element or pixel."""
+    """Paint a random colour at every element or pixel."""
     mesh, random = sphere.data, np.random.default_rng(3)
     if kind.endswith("image"):
         unwrapped(sphere)
@@ -68,7 +69,7 @@ def paint(kind: str, sphere: Any, tmp_path: Path | None = None) -> None:
 
 
 def sampled_by_blender(kind: str, sphere: Any, places: Any, evaluated: Any) -> Any:
-    """What geometry nodes find on the surface nearest to places, (n, 4)."""
+    """The values that geometry nodes sample on the surface nearest to these places, (n, 4)."""
     mesh = bpy.data.meshes.new("Places")
     mesh.from_pydata(places.tolist(), [], [])
     obj = bpy.data.objects.new("Places", mesh)
@@ -157,7 +158,7 @@ def test_each_strand_has_what_blender_samples_at_its_root(
 
 
 def paint_halves(sphere: Any, bottom: Any = BLUE) -> Any:
-    """Red above and another colour below, at the corners of faces."""
+    """Red above and another colour below, at face corners."""
     attribute = sphere.data.attributes.new(MAP, "FLOAT_COLOR", "CORNER")
     centers = np.array([each.center.z for each in sphere.data.polygons])
     counts = [each.loop_total for each in sphere.data.polygons]
@@ -167,7 +168,7 @@ def paint_halves(sphere: Any, bottom: Any = BLUE) -> Any:
 
 
 def assert_halves(color: Any, roots: Any, bottom: Any = BLUE) -> None:
-    """color: (n, 3) of strands that stand at roots."""
+    """Assert colours (n, 3) of strands at these roots."""
     expected = np.where(roots[:, 2:] > 0.0, RED, bottom)[:, :3]
     clear = np.abs(roots[:, 2]) > 0.005
     assert clear.sum() > 20
@@ -257,7 +258,7 @@ def test_a_head_that_is_mirrored_is_painted_as_it_is(
     hair: Any, sphere: Any, evaluated: Any
 ) -> None:
     sphere.scale = (-1.0, 1.0, 1.0)
-    # by vertex: a root lies on an edge, and of which face its corners are is left to chance
+    # per vertex: roots lie on edges, and which face's corners would count is arbitrary
     paint("FLOAT_COLOR POINT", sphere)
     session = started(hair, evaluated)
     roots, offsets = session.rig.rest_frames.origin, session.rig.strands.offsets
@@ -330,7 +331,7 @@ def test_real_hair_and_materials_have_what_is_painted(
 def test_curves_that_are_replaced_have_what_is_painted_under_the_new_ones(
     sphere: Any, extension: None, is_changed: bool
 ) -> None:
-    """Also where an artist has changed the material's nodes, which stay so."""
+    """Also if an artist has changed the material's nodes, which are kept."""
     paint_halves(sphere)
     bpy.ops.hairloom.add_groom(strand_count=150, plays=False)
     hair = bpy.context.object

@@ -1,4 +1,4 @@
-"""A panel keeps still: it is as high in every state of the selected hair."""
+"""Panels have the same height in every state of the selected hair."""
 
 from types import SimpleNamespace
 
@@ -35,14 +35,14 @@ from hairloom.addon.ui import (
 from hairloom.addon.ui.selection import make_active
 
 pytestmark = pytest.mark.usefixtures("extension")
-#: [pixels] of the sidebar and of Properties, as Blender opens them
+#: widths of the sidebar and of Properties [pixels], as Blender opens them
 WIDTHS = (280, 340)
-#: of texts, and how wide labels of fields in the sidebar may be [pixels], at UI scale 1; a window
-#: shows "Length Variation", of 88, and cuts "Sag Correction", of 101
+#: font size, and the widest label of a field in the sidebar [pixels], at UI scale 1: windows show
+#: "Length Variation", of 88, and cut "Sag Correction", of 101
 FONT_SIZE, LABEL_WIDTH = 11, 92
-#: how wide one beside a checkbox may be [pixels]: it has the other part of its row
+#: widest label beside a checkbox [pixels]: it has the other part of its row
 TOGGLE_WIDTH = 118
-#: sections that are drawn without a look at how wide they are
+#: sections that are drawn independently of the width
 OTHERS = (
     operators_bake.draw_bake,
     sections.draw_dynamics,
@@ -55,7 +55,7 @@ OTHERS = (
     operators_show.draw_show,
     operators_grow.draw_grow,
 )
-#: operators that show their progress instead of their button
+#: operators that replace their button by their progress
 JOBS = (
     operators_bake.HAIRLOOM_OT_bake,
     operators_cards.HAIRLOOM_OT_make_cards,
@@ -91,7 +91,7 @@ def height(draw, *arguments):
 
 
 def context_of(width):
-    """Blender's context, as a panel of this width has it."""
+    """Blender's context in a panel of this width."""
     return SimpleNamespace(
         space_data=None,
         region=SimpleNamespace(width=width),
@@ -105,7 +105,7 @@ def context_of(width):
 
 
 def states(hair, folder):
-    """Brings hair into one state after another; gives their names."""
+    """Bring hair into one state after another; yields their names."""
     yield "not previewed"
     bpy.ops.hairloom.preview()
     yield "at rest"
@@ -175,7 +175,8 @@ def test_nothing_below_moves_whatever_happens_to_the_hair(hair, monkeypatch, tmp
 
 
 def test_a_head_that_has_brows_gets_hair_from_the_same_panel():
-    """Whether brows or head are selected; without either the button says why it does nothing."""
+    """Selected brows or a selected head offer it; without either, the button shows why it is greyed
+    out."""
     bpy.ops.hairloom.add_hairstyle(style="brows", plays=False)
     brows = bpy.context.object
     head = brows.data.surface
@@ -197,13 +198,13 @@ def test_a_head_that_has_brows_gets_hair_from_the_same_panel():
 
 
 def test_no_label_is_cut(extension):
-    """Of all panels: measured by Blender's own font, in the part of a row that labels have."""
+    """Labels of all panels fit into their part of a row, measured with Blender's own font."""
     blf.size(0, FONT_SIZE)
     cut, count = [], 0
     for section, settings in ALL_SETTINGS.items():
         for parameter in settings.parameters():
             if parameter.kind == "mask":
-                continue  # it stands beside its slider, without a label
+                continue  # it is beside its slider, without a label
             width = blf.dimensions(0, parameter.label)[0]
             count += 1
             if width > (TOGGLE_WIDTH if parameter.kind == "toggle" else LABEL_WIDTH):
@@ -233,7 +234,7 @@ def test_all_problems_are_counted_and_the_worst_has_its_button(hair):
 
 
 def test_rows_are_counted(hair):
-    """Of the layout that counts: a row counts once, a column all."""
+    """The test's own layout: a row counts once, a column all its items."""
     layout = Layout([])
     row = layout.row()
     row.label(text="one")

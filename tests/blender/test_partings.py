@@ -1,4 +1,4 @@
-"""Partings in a scene: drawn, read, followed by the preview, combed from, taken away."""
+"""Partings in a scene: drawn, read, followed by the preview, combed from, removed."""
 
 import bmesh
 import bpy
@@ -20,7 +20,7 @@ RADIUS = 0.1
 
 
 def cap(count=400, points=8, length=0.06):
-    """Strands that stand on the upper half of the sphere."""
+    """Strands on the upper half of the sphere."""
     outward = np.random.default_rng(3).normal(size=(count, 3))
     outward[:, 2] = np.abs(outward[:, 2])
     outward /= np.linalg.norm(outward, axis=1, keepdims=True)
@@ -42,7 +42,7 @@ def hair(new_hair, sphere):
 
 
 def arch(x=0.0, kind="POLY", radius=RADIUS, collection=True):
-    """A curve over the sphere from front to back, at this x."""
+    """A curve over the sphere from front to back at this x."""
     data = bpy.data.curves.new("Line", "CURVE")
     data.dimensions = "3D"
     spline = data.splines.new("POLY")
@@ -58,7 +58,7 @@ def arch(x=0.0, kind="POLY", radius=RADIUS, collection=True):
 
 
 def mixes_both_sides(session, x=0.0):
-    """How many children blend guides from both sides of the plane at this x."""
+    """The number of children that blend guides from both sides of the plane at this x."""
     rig = session.rig
     root = rig.strands.roots[rig.guides]
     weights = rig.weights.weight[rig.own_count :] > 0.0
@@ -83,7 +83,7 @@ def test_no_child_blends_both_sides_and_the_preview_follows(hair, evaluated):
     session.read_again(evaluated())
     assert mixes_both_sides(session) == 0
     before = session.rig
-    line.location.x = 0.03  # over x = 0.03 now, a little away from the sphere
+    line.location.x = 0.03  # now over x = 0.03, a little away from the sphere
     bpy.context.view_layer.update()
     assert session.has_other_partings()
     session.read_again(evaluated())
@@ -101,7 +101,7 @@ def test_no_child_blends_both_sides_and_the_preview_follows(hair, evaluated):
 
 
 def wire():
-    """A line over the sphere as a mesh of three edges."""
+    """A mesh of three edges over the sphere."""
     mesh = bpy.data.meshes.new("Wire")
     corners = [(0.0, -0.1, 0.0), (0.0, -0.07, 0.07), (0.0, 0.0, 0.1), (0.0, 0.07, 0.07)]
     mesh.from_pydata(corners, [(0, 1), (1, 2), (2, 3)], [])
@@ -154,7 +154,7 @@ def test_a_head_that_turns_with_its_parting_builds_nothing_again(hair, sphere, e
     session.read_again(evaluated())
     turned = np.array(sphere.matrix_world)[:3, :3]
     assert np.allclose(turned @ turned.T, np.eye(3), atol=1e-5)
-    # it was added to a head that has turned, and belongs to where the hair was then
+    # added after the head has turned, it applies to the hair in that pose
     partings = session.source.partings
     assert np.abs(partings[-59:, :, 0] - 0.02).max() < 1e-5
 
@@ -275,8 +275,8 @@ def test_a_render_after_a_parting_has_moved_has_other_children(hair, evaluated):
 
 @pytest.mark.parametrize("data", ["Y up", "Z up"])
 def test_a_new_line_goes_with_its_head(data, new_hair):
-    """The same line on a head whose data have Y up, in centimetres; and one that turns with a head
-    which looks to the side."""
+    """On a head whose data are in centimetres with Y up it is the same line; on a turned head it
+    turns along."""
     turn = Matrix.Rotation(0.5 * np.pi, 4, "X") @ Matrix.Scale(0.01, 4)
     if data == "Z up":
         turn = Matrix.Rotation(0.5 * np.pi, 4, "Z")

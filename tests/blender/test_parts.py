@@ -1,4 +1,4 @@
-"""Work of which threads do parts: here and now, in the window, cancelled, and failed."""
+"""Work whose parts run in threads: at once, in the window, cancelled, and failed."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def quadrupled(value: int) -> Parts[int]:
 
 @pytest.mark.parametrize(("value", "wanted"), [(3, 12), (9, -1)])
 def test_both_ways_have_the_same_result(value: int, wanted: int) -> None:
-    """An error is raised where the work waits for the part, which may go on without it."""
+    """An error of a part is raised at its `yield`, where the work may catch it."""
     assert at_once(quadrupled(value)) == wanted
     assert result_of(in_parts(quadrupled(value))) == wanted
 
@@ -72,14 +72,14 @@ def test_in_the_window_parts_are_beside_it_and_say_what_they_are() -> None:
 
 
 def everything() -> dict[str, list[str]]:
-    """Names of all that is in the file, and what of it is hidden."""
+    """Names of all data-blocks of the file, and of the hidden objects."""
     kinds = [kind for kind in bpy.data.bl_rna.properties if kind.type == "COLLECTION"]
     found = {k.identifier: [each.name for each in getattr(bpy.data, k.identifier)] for k in kinds}
     return {**found, "hidden": [obj.name for obj in bpy.data.objects if obj.hide_viewport]}
 
 
 def cancelled(operator: type[Any], stage: str, **values: Any) -> None:
-    """Take an operator's own steps until it is at this stage, and cancel it there."""
+    """Run an operator's own steps up to this stage, and cancel it there."""
     members = {"bl_label": operator.bl_label, "report": lambda *_: None, **values}
     if hasattr(operator, "_head"):
         members["_head"] = operator._head
@@ -111,12 +111,12 @@ def test_hair_that_is_not_made_real_after_all_is_shown(stage: str, sphere: Any) 
 
 @pytest.mark.usefixtures("extension")
 def test_hair_that_does_not_grow_again_after_all_is_as_it_was_combed(sphere: Any) -> None:
-    """Of two grooms neither has grown when the second is cancelled."""
+    """Two grooms grow; if the second is cancelled, neither has changed."""
     grooms, combed = [], []
     for count in (60, 70):
         bpy.ops.hairloom.grow(strand_count=count, length=0.1)
         grooms.append(bpy.context.object)
-    grooms[0].select_set(True)  # beside the active one, which grows first
+    grooms[0].select_set(True)  # the active one grows first
     for hair in grooms:
         put_points(hair.data, curve_points(hair.data) * np.float32(1.1))
         combed.append(curve_points(hair.data))
@@ -139,7 +139,7 @@ def test_what_was_added_goes_where_work_fails_and_stays_where_it_ends() -> None:
 
 
 def test_what_was_there_stays_though_another_file_was_loaded() -> None:
-    """The work is ended when the other file is there already."""
+    """Cancelling removes nothing from a file that was loaded meanwhile."""
 
     def work() -> Parts[None]:
         with taken_back() as note:

@@ -1,4 +1,4 @@
-"""The passes of a render, against Cycles' and Blender's own readers."""
+"""The passes of a render, compared with Cycles and with Blender's own readers."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ BLENDERS = tuple(
 
 @pytest.fixture
 def thick(stage: Any, sphere: Any, new_hair: Callable[..., Any]) -> Any:
-    """Opaque thick curves on a ball, as thick at their tips as at their roots."""
+    """Thick opaque curves on a ball, with the same radius at tips and roots."""
     outward = np.random.default_rng(1).normal(size=(COUNT, 1, 3))
     outward /= np.linalg.norm(outward, axis=2, keepdims=True)
     along = np.linspace(0.0, 1.0, POINTS)[None, :, None]
@@ -50,7 +50,7 @@ def asks_for(layer: Any, *names: str) -> None:
 
 
 def of_cycles(stage: Any, folder: Path) -> dict[str, np.ndarray]:
-    """The passes of the same scene by Cycles, in the middle of each pixel."""
+    """Cycles' passes of the same scene, sampled at pixel centres."""
     stage.render.engine = "CYCLES"
     stage.cycles.samples, stage.cycles.use_denoising, stage.cycles.max_bounces = 1, False, 0
     stage.cycles.use_adaptive_sampling, stage.cycles.pixel_filter_type = False, "BOX"
@@ -61,7 +61,8 @@ def of_cycles(stage: Any, folder: Path) -> dict[str, np.ndarray]:
 
 
 def matte_of(stage: Any, scene: Any, name: str, folder: Path) -> np.ndarray:
-    """What Blender's own Cryptomatte node selects by a name, in a render of the stage."""
+    """The matte that Blender's own Cryptomatte node extracts for a name, in a render of the
+    stage."""
     tree = stage.compositing_node_group or bpy.data.node_groups.new("Matte", "CompositorNodeTree")
     if not len(tree.interface.items_tree):
         tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
@@ -84,7 +85,7 @@ def matte_of(stage: Any, scene: Any, name: str, folder: Path) -> np.ndarray:
 
 
 def noted(path: Path) -> dict[str, str]:
-    """What a file says of its Cryptomattes."""
+    """The Cryptomatte metadata of a file."""
     file = OpenImageIO.ImageInput.open(str(path))
     found = {each.name: each.value for each in file.spec().extra_attribs if "crypto" in each.name}
     file.close()
@@ -99,7 +100,7 @@ def pass_of(found: dict[str, np.ndarray], name: str) -> np.ndarray:
 def test_depth_motion_and_normals_are_those_of_cycles(
     stage: Any, sphere: Any, thick: Any, tmp_path: Path, lens: str
 ) -> None:
-    """Of hair that goes with its head, and of the head, while the camera turns."""
+    """Hair moves with its head while the camera turns."""
     stage.camera.data.type, stage.camera.data.ortho_scale = lens, 0.6
     asks_for(stage.view_layers[0], *BLENDERS[:4])
     thick.pass_index, sphere.pass_index = 7, 3
@@ -114,10 +115,10 @@ def test_depth_motion_and_normals_are_those_of_cycles(
     assert {0.0, 3.0, 7.0} == set(np.unique(numbers[0])) == set(np.unique(numbers[1]))
     assert (numbers[0] == numbers[1]).mean() > 0.98
     depths = [pass_of(found, "Depth") for found in (ours, theirs)]
-    # elsewhere another strand is nearest, at an edge
+    # at other pixels, along edges, another strand is nearest
     same = (numbers[0] == numbers[1]) & (numbers[0] > 0.0) & (np.abs(depths[0] - depths[1]) < 0.02)
     assert same.sum() > 0.97 * (numbers[1] > 0.0).sum()
-    # Cycles meets the surface of a strand, which is drawn as flat
+    # Cycles hits the surface of a round strand; ours are flat ribbons
     differs = np.abs(depths[0] - depths[1])
     assert differs[same].max() < 2.0 * RADIUS and np.median(differs[same]) < 1.0e-3
     vectors = [pass_of(found, "Vector") for found in (ours, theirs)]
@@ -128,9 +129,9 @@ def test_depth_motion_and_normals_are_those_of_cycles(
     on_head = same & (numbers[0] == 3.0)
     assert np.abs(normals[0] - normals[1])[on_head].max() < 0.02
     on_hair = same & (numbers[0] == 7.0)
-    # of a flat ribbon in place of a round strand: the mean over its width
+    # a flat ribbon has the normal that a round strand has on average over its width
     assert (normals[0] * normals[1]).sum(axis=2)[on_hair].mean() > 0.75
-    # far behind all, where the camera alone moves things
+    # the background, which only the camera moves
     if lens == "PERSP":
         sky = vectors[0][0, 0]
         focal = SIZE * stage.camera.data.lens / stage.camera.data.sensor_width
@@ -142,7 +143,8 @@ def test_depth_motion_and_normals_are_those_of_cycles(
 def test_blenders_cryptomatte_node_selects_what_hair_covers(
     stage: Any, sphere: Any, new_hair: Any, tmp_path: Path
 ) -> None:
-    """Of thin strands whose alpha is that of the picture, before the head and beside it."""
+    """The matte of thin strands, in front of the head and beside it, equals their alpha in the
+    picture."""
     hair = new_hair(sphere)
     hair.data.hairloom.strands.fullness = 8.0
     asks_for(stage.view_layers[0], "use_pass_cryptomatte_object", *OWN)
@@ -208,7 +210,7 @@ def test_over_cycles_passes_are_of_hair_alone_and_follow_the_view_layer(
     np.testing.assert_array_equal(over["Object Index"], np.where(is_hair, 7.0, 0.0))
     for name in ("Depth", "Strand Index", "Vector", "Normal", "Hair Tangent"):
         mine, theirs = pass_of(own, name), over[name]
-        if name == "Vector":  # a File Output node writes three numbers of it
+        if name == "Vector":  # a File Output node writes only three of its channels
             mine = mine[..., :3]
         np.testing.assert_allclose(theirs[is_hair], mine[is_hair], atol=1e-6, err_msg=name)
     assert (over["Depth"][~is_hair] == np.float32(1.0e10)).all()
@@ -221,7 +223,8 @@ def test_over_cycles_passes_are_of_hair_alone_and_follow_the_view_layer(
 
 
 def layers_of(stage: Any, scene: Any, folder: Path) -> dict[str, np.ndarray]:
-    """All outputs of a Render Layers node in a render of the stage, by a File Output node."""
+    """All outputs of a Render Layers node, written by a File Output node in a render of the
+    stage."""
     tree = stage.compositing_node_group
     layers = next(node for node in tree.nodes if getattr(node, "scene", None) == scene)
     out = tree.nodes.new("CompositorNodeOutputFile")
@@ -261,7 +264,7 @@ def test_without_passes_nothing_is_drawn_for_them(
 def test_a_region_two_grooms_and_two_layers(
     stage: Any, thick: Any, new_hair: Any, tmp_path: Path
 ) -> None:
-    """Each layer has the passes that it asks for; those of a region are those of the whole."""
+    """Each layer has its own passes; those of a region equal a part of the whole."""
     other = new_hair()
     other.name, other.location.x = "Other", 0.1
     other.data.hairloom.strands.fullness = 20.0
@@ -305,7 +308,8 @@ def test_one_pixel_and_both_eyes(stage: Any, sphere: Any, thick: Any, tmp_path: 
 def test_the_shadow_of_hair_is_what_it_takes_of_the_picture(
     stage: Any, thick: Any, tmp_path: Path
 ) -> None:
-    """Of a sun alone, on the head: the picture without hair's shadow, times the factor."""
+    """With a single sun, the head's picture equals the picture without hair shadow times the
+    pass."""
     set_world((0.0, 0.0, 0.0))
     bpy.ops.object.light_add(type="SUN", rotation=(0.5, 0.0, 0.0))
     asks_for(stage.view_layers[0], "use_pass_object_index", "use_shadow")
@@ -325,8 +329,8 @@ def test_the_shadow_of_hair_is_what_it_takes_of_the_picture(
 def test_baked_hair_moves_as_its_copy_does(
     stage: Any, sphere: Any, thick: Any, tmp_path: Path
 ) -> None:
-    """Simulated, so that it lags behind the head: no pixel of a strand moves more, or less, than
-    the points of that curve, which Blender projects."""
+    """Simulated hair lags behind its head. Vectors at a strand's pixels are within the range of its
+    points' motion, projected by Blender."""
     from bpy_extras.object_utils import world_to_camera_view
     from mathutils import Vector
 

@@ -1,5 +1,4 @@
-"""A verb writes over nothing that it reads, and over no other kind of file; it says so before any
-work."""
+"""A verb refuses, before any work, to overwrite its inputs or a file of another kind."""
 
 from __future__ import annotations
 
@@ -23,7 +22,7 @@ pytestmark = pytest.mark.usefixtures("extension")
 RENDER = ["render", "--scene", "wig.blend", "--groom", "Hair"]
 EXPORT = ["export", "--groom", "hair.tfx"]
 PNG = "--output writes a .png file"
-#: arguments, and what is said of them
+#: arguments and message
 REFUSED = [
     ([*RENDER, "--output", "wig.blend"], PNG),
     ([*RENDER, "--output", "kept"], PNG),
@@ -56,7 +55,7 @@ REFUSED = [
 def folder(
     sphere: Any, new_hair: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> Path:
-    """A scene with hair on a head, a groom, and what else an artist has."""
+    """A scene with hair on a head, a groom, and other files of an artist."""
     new_hair(sphere)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "wig.blend"))
     write_tfx(tmp_path / "hair.tfx", Groom(hedgehog()))

@@ -1,4 +1,4 @@
-"""Bakes in renders: what a render shows is what was baked, in this process and in a fresh one."""
+"""Bakes in renders: a render shows what was baked, in this process and in a new one."""
 
 import subprocess
 import sys
@@ -33,7 +33,7 @@ bpy.ops.render.render(animation=True)
 
 @pytest.fixture
 def scene(new_hair, sphere, tmp_path):
-    """A white head with hair that is thrown to the right, seen from the front."""
+    """Thick hair that moves to the right, seen from the front; its head is hidden."""
     new_hair(sphere)
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = 1, LAST
@@ -64,7 +64,7 @@ def scene(new_hair, sphere, tmp_path):
 
 
 def in_another_blender(script, folder):
-    """The command that runs a script in a new process of the Blender that this is."""
+    """The command that runs a script in a new process of the same Blender."""
     if bpy.app.module:
         return [sys.executable, "-c", script]
     file = folder / "script.py"
@@ -74,7 +74,7 @@ def in_another_blender(script, folder):
 
 
 def coverage(path):
-    """(SIZE, SIZE) alpha of a picture, its lowest row first."""
+    """The alpha of a picture, (SIZE, SIZE), row 0 at the bottom."""
     picture = bpy.data.images.load(str(path), check_existing=False)
     pixels = np.empty(SIZE * SIZE * 4, np.float32)
     picture.pixels.foreach_get(pixels)
@@ -83,7 +83,7 @@ def coverage(path):
 
 
 def expected(strands):
-    """(SIZE, SIZE), 1 where these strands pass, as the camera sees them."""
+    """A mask, (SIZE, SIZE), 1 where the camera sees these strands pass."""
     along = np.linspace(0.0, 1.0, 64)[:, None]
     between = strands[:, :-1, None] * (1.0 - along) + strands[:, 1:, None] * along
     pixel = ((between.reshape(-1, 3)[:, [2, 0]] / 0.8 + 0.5) * SIZE).astype(int)
@@ -94,7 +94,7 @@ def expected(strands):
 
 
 def shows(picture, strands):
-    """The share of a picture's hair and of the strands that lie on each other."""
+    """Intersection over union of the picture's hair and the strands."""
     seen, wanted = picture > 0.3, expected(strands) > 0.0
     return (seen & wanted).sum() / (seen | wanted).sum()
 
@@ -160,7 +160,8 @@ def test_a_render_changes_nothing_of_what_the_viewport_shows(scene, evaluated):
 
 
 def test_motion_blur_smears_the_hair_between_two_frames(scene, tmp_path):
-    """Cycles asks for the hair at moments between frames: the picture covers the way of both."""
+    """Cycles reads the hair at subframes: the blurred picture also covers the next frame's
+    strands."""
     bpy.ops.hairloom.bake()
     cache = playback.cache_of(bpy.data.objects["Hair"])
     scene.cycles.samples = 64
@@ -244,7 +245,7 @@ def test_a_copy_whose_bake_is_gone_is_told_once_and_stays(scene, tmp_path, capfd
 
 @pytest.fixture
 def fin(extension, tmp_path):
-    """A flag that hangs by its upper edge from an object that moves."""
+    """A flag that is pinned at its upper edge and moves."""
     bpy.ops.mesh.primitive_grid_add(x_subdivisions=6, y_subdivisions=6, size=0.4)
     flag = bpy.context.object
     group = flag.vertex_groups.new(name="Pins")
@@ -262,7 +263,7 @@ def fin(extension, tmp_path):
 
 
 def shown(flag):
-    """(vertex_count, 3) as evaluated, object space."""
+    """The evaluated vertices, (vertex_count, 3), object space."""
     bpy.context.view_layer.update()
     mesh = flag.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
     positions = np.empty((len(mesh.vertices), 3), np.float32)

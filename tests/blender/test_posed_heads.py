@@ -1,4 +1,5 @@
-"""Hair that no modifier attaches, on a posed head: it does not matter in which frame it is read."""
+"""Hair without an attaching modifier, on a posed head: it is the same, whatever frame it is read
+in."""
 
 import bpy
 import numpy as np
@@ -20,13 +21,13 @@ from hairloom.addon.blender.strands.read_hair import ExportRequest
 from hairloom.addon.groom.roots import bind_roots
 
 REST, POSED = 1, 4
-#: [m]; strands turn by frames in float32.
+#: tolerance [m]: frames turn strands in float32
 SAME = 1e-5
 
 
 @pytest.fixture
 def hair(new_hair, sphere):
-    """On a ball that a bone turns by 40 degrees and moves by 0.3 m, through four frames."""
+    """Hair on a ball that a bone turns by 40 degrees and moves by 0.3 m, over four frames."""
     made = new_hair(sphere, hedgehog(80, seed=3))
     made.hairloom.dynamics.collider_resolution = 8
     attach_roots(made)
@@ -49,7 +50,7 @@ def hair(new_hair, sphere):
 
 
 def attach_roots(hair):
-    """Gives its curves their root UVs, as all hair has that Hairloom or Blender put onto a mesh."""
+    """Give curves root UVs, as all hair has that Hairloom or Blender puts on a mesh."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     source = read_source(hair, depsgraph)
     bound = bind_roots(source.strands, source.head, place="").strands
@@ -63,7 +64,7 @@ def go_to(frame):
 
 
 def expected(hair):
-    """Its strands as the bone carries them in the posed frame."""
+    """Strands as the bone carries them to the posed frame."""
     depsgraph = go_to(REST)
     rest = read_curves(hair, depsgraph).strands.points
     bone = bpy.data.objects["Armature"].pose.bones[0]
@@ -103,7 +104,7 @@ def test_what_blender_has_put_there_stays(hair):
 
 
 def attached(hair):
-    """By Blender's own node, in a modifier as an artist adds it."""
+    """Attach hair with Blender's own node, in a modifier as an artist adds it."""
     hair.data.surface.add_rest_position_attribute = True
     hair.data.surface_uv_map = hair.data.surface.data.uv_layers.active.name
     with_modifier(hair, ("GeometryNodeDeformCurvesOnSurface", {}))
@@ -130,7 +131,7 @@ def test_attached_hair_that_is_read_again_in_a_pose_is_the_same(hair):
 
 
 def test_muted_hair_dynamics_leave_hair_on_its_skin(hair, sphere):
-    """Those of Blender's own Empty Hair, which put it there."""
+    """Tested with the modifier of Blender's own Empty Hair."""
     select(sphere)
     bpy.ops.object.curves_empty_hair_add()
     empty = bpy.context.object
@@ -159,7 +160,7 @@ def test_a_head_that_is_subdivided_but_not_posed_moves_no_hair(hair, sphere):
     source = read_source(hair, depsgraph)
     assert source.rest is None
     assert np.array_equal(source.strands.points, read_curves(hair, depsgraph).strands.points)
-    # and hair that is as far off the smooth skin as at rest, in a pose
+    # in a pose, hair is as far from the smooth skin as at rest
     assert read_source(hair, go_to(POSED)).strands.points == pytest.approx(expected(hair), abs=1e-2)
 
 
@@ -178,7 +179,7 @@ def test_a_shape_key_is_a_pose_too(new_hair, sphere):
 
 
 def test_hair_of_a_head_that_shape_keys_have_formed_is_told_from_its_basis(hair, sphere):
-    """As MPFB forms faces: the hair has grown on the formed face, before an armature poses it."""
+    """As in MPFB: hair has grown on the formed face, before an armature poses it."""
     sphere.shape_key_add(name="Basis")
     for name, factor in (("Wide", 1.3), ("Muted", 5.0)):
         key = sphere.shape_key_add(name=name)
@@ -270,7 +271,7 @@ def test_made_real_it_is_stored_as_it_was(hair):
 
 
 def test_a_preview_far_from_the_rest_pose_starts(hair):
-    """Where all roots are farther from the head than it is large."""
+    """In a pose where all roots are farther from the head at rest than it is large."""
     bone = bpy.data.objects["Armature"].pose.bones[0]
     bone.location.x = 5.0
     bone.keyframe_insert("location", frame=POSED)

@@ -1,4 +1,4 @@
-"""Presets as the artist's menu and the command line apply them, and those of the artist's own."""
+"""Presets, shipped and own ones, applied by the menu and by the command line."""
 
 from __future__ import annotations
 
@@ -32,7 +32,8 @@ def hair(new_hair: Callable[..., bpy.types.Object]) -> bpy.types.Object:
 
 @pytest.mark.parametrize("name", [entry.name for entry in presets.shipped("volume")])
 def test_shadows_keep_key_fill_and_rim_light(name: str) -> None:
-    """Occlusion, which stands in for a light without a map, is 30 % darker on blond hair."""
+    """Lights without a map are shadowed by occlusion instead, which is 30 % darker on blond
+    hair."""
     assert presets.named_preset(name).settings.max_lights >= 3
 
 
@@ -47,7 +48,7 @@ def test_a_look_goes_onto_the_selected_hair(hair: bpy.types.Object, name: str) -
 
 @pytest.mark.parametrize("section", list(preset_chooser.KINDS))
 def test_the_panel_knows_which_preset_the_hair_has(hair: bpy.types.Object, section: str) -> None:
-    """Values are stored with seven digits, and each preset is found again by them."""
+    """Values are stored with seven digits; each preset is still recognised by them."""
     choices = bpy.context.window_manager.hairloom_presets
     for entry in presets.shipped(section):
         setattr(choices, section, entry.name)
@@ -67,7 +68,7 @@ def test_hair_with_a_setting_of_its_own_has_no_preset(hair: bpy.types.Object) ->
 
 
 def test_a_new_groom_has_the_look_that_it_was_given(hair: bpy.types.Object) -> None:
-    """It would keep colours of its own, and has none."""
+    """Its colour source is "own", which only counts once its curves have colours."""
     choices = bpy.context.window_manager.hairloom_presets
     dress(hair, ("looks/brown",))
     assert hair.data.hairloom.shading.color_source == "own"
@@ -102,7 +103,7 @@ def test_dynamics_go_onto_the_object(hair: bpy.types.Object) -> None:
 
 
 def test_settings_that_a_groom_does_not_keep_are_refused(hair: bpy.types.Object) -> None:
-    """All that it does keep are named."""
+    """The message names all settings that it does keep."""
     with pytest.raises(HairloomError, match="no 'settle' settings") as told:
         presets.apply(ALL_SETTINGS["settle"](), hair)
     assert "shading, " in str(told.value) and "volume" in str(told.value)
@@ -133,7 +134,7 @@ def test_the_command_line_takes_presets_and_single_values_over_them(tmp_path: Pa
 def test_a_preset_file_is_applied_and_kept(
     hair: bpy.types.Object, own_folder: Path, tmp_path: Path
 ) -> None:
-    """As one drops it into the viewport; another one of the same title is kept beside it."""
+    """Dropped into the viewport; another preset of the same title is added beside it."""
     file = tmp_path / "theirs.json"
     data = json.loads((presets.PRESET_FOLDER / "looks" / "red.json").read_text())
     file.write_text(json.dumps(data | {"title": "Theirs"}))
@@ -163,7 +164,7 @@ def test_what_is_no_preset_of_hair_is_refused_and_not_kept(
 
 @pytest.fixture
 def own_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
-    """Where the artist's own presets go in a test; not made yet."""
+    """A folder for the artist's own presets that does not exist yet."""
     folder = tmp_path / "presets"
     monkeypatch.setattr(presets, "own_folder", lambda: folder)
     return folder
@@ -315,13 +316,15 @@ def test_only_own_presets_can_be_deleted(own_folder: Path, tmp_path: Path, name:
 
 
 def test_without_an_installed_extension_presets_go_to_blenders_settings() -> None:
-    """Blender itself knows the folder of an installed one; see tests/window/session_look.py."""
+    """Blender itself provides the folder of an installed extension; see
+    tests/window/session_look.py."""
     folder = presets.own_folder()
     assert folder.is_absolute() and folder.parts[-2:] == ("hairloom", "presets")
 
 
 def test_a_picture_beside_a_preset_goes_with_it(extension: Any, own_folder: Path) -> None:
-    """That it is shown: tests/window/session_look.py; without a window Blender has no icons."""
+    """tests/window/session_look.py tests that it is shown; without a window Blender has no
+    icons."""
     own_folder.mkdir()
     data = {"hairloom": PRESET_VERSION, "section": "shading", "title": "Seen", "values": {}}
     (own_folder / "seen.json").write_text(json.dumps(data))
@@ -346,7 +349,7 @@ def test_the_look_under_water_brings_its_shafts_of_light_with_it(hair: bpy.types
 
 
 def test_a_title_stands_for_one_preset(hair: bpy.types.Object, own_folder: Path) -> None:
-    """An artist may call a look of their own as one that ships."""
+    """An artist may give an own look the title of a shipped one."""
     assert presets.titles("dynamics")["Soft and long"] == "dynamics/soft"
     for title in ("Brown", "Mine"):
         bpy.ops.hairloom.save_preset(title=title)
@@ -356,7 +359,7 @@ def test_a_title_stands_for_one_preset(hair: bpy.types.Object, own_folder: Path)
 
 
 def test_a_title_in_capitals_is_the_same_title(hair: bpy.types.Object, own_folder: Path) -> None:
-    """As the dialog says, and as files are on Windows and macOS."""
+    """As the dialog states, and as file names behave on Windows and macOS."""
     for title, width in (("Bob", 0.1), ("BOB", 0.2)):
         hair.data.hairloom.shading.width_r = width
         bpy.ops.hairloom.save_preset(title=title)

@@ -1,4 +1,5 @@
-"""Reading the Principled Hair of a material; the mapping itself: tests/pure/test_principled.py."""
+"""Reading the Principled Hair of a material; tests/pure/test_principled.py tests the mapping
+itself."""
 
 from __future__ import annotations
 
@@ -20,7 +21,7 @@ def hair(new_hair: Any) -> Any:
 
 
 def material(hair: Any, **inputs: Any) -> Any:
-    """A material with the node at its output, as Blender's own for hair; back comes the node."""
+    """A material with the node at its output, as Blender's default for hair; returns the node."""
     made = bpy.data.materials.new("Hair")
     made.node_tree.nodes.clear()
     node = made.node_tree.nodes.new("ShaderNodeBsdfHairPrincipled")
@@ -37,7 +38,7 @@ def look(hair: Any) -> Any:
 
 
 def test_our_defaults_are_those_of_the_node(hair: Any) -> None:
-    """So that inputs that a node hides count as Blender counts them."""
+    """Inputs that a node hides then have the values that Blender uses."""
     node, ours = material(hair), vars(PrincipledHair())
     assert (node.model, node.parametrization) == (ours["model"], ours["parametrization"])
     found = {"model", "parametrization"}
@@ -127,7 +128,7 @@ def test_it_is_found_behind_other_nodes(hair: Any, way: str) -> None:
 
 
 def test_without_such_a_node_it_is_refused_and_the_button_is_grey(hair: Any) -> None:
-    for _ in range(2):  # without a material, then with one that has another node
+    for _ in range(2):  # first without a material, then with one that has another node
         assert not has_principled_hair(hair)
         with pytest.raises(HairloomError, match="no Principled Hair"):
             look(hair)

@@ -1,4 +1,4 @@
-"""Blender properties from parameter declarations, and what becomes of their values."""
+"""Blender properties from parameter declarations, and their values."""
 
 import math
 import subprocess
@@ -29,7 +29,7 @@ SECTIONS = list(groups.SECTION_GROUPS)
 
 @pytest.fixture
 def group_of(new_hair):
-    """Gives the property group of a section on a new hair object."""
+    """A function that returns the property group of a section on a new hair object."""
     hair = new_hair()
     hair.data.hairloom.widths.property_unset("method")
     hair.data.hairloom.children.property_unset("method")
@@ -42,7 +42,7 @@ def group_of(new_hair):
 
 
 def differing(section, check):
-    """What is not as `check` wants it, for every parameter of a section at once."""
+    """The parameters of a section that fail `check`, with the messages."""
     found = {}
     for parameter in ALL_SETTINGS[section].parameters():
         try:
@@ -82,7 +82,7 @@ def test_properties_show_what_was_declared(section, group_of):
 
 @pytest.mark.parametrize("section", SECTIONS)
 def test_every_value_that_blender_takes_is_one_that_settings_take(section, group_of):
-    """Blender stores float32: the ends of the range must not fall outside of it by rounding."""
+    """Blender stores float32: rounding must not put the ends of a range outside it."""
     group, settings = group_of(section), ALL_SETTINGS[section]
 
     def check(parameter):
@@ -149,7 +149,7 @@ def test_checkboxes_in_headers_go_back_to_what_was_declared(new_hair):
 
 
 def test_choices_and_toggles_have_properties_too(extension):
-    """No parameter uses them yet; the next one that does must find them working."""
+    """A section that only this test declares has both kinds."""
     from dataclasses import dataclass
 
     from hairloom.addon.params import Settings, choice, toggle
@@ -186,8 +186,9 @@ def _another(value, parameter):
 
 
 def test_keyframes_change_nothing_that_needs_other_hair(new_hair):
-    """No frame reads the hair again: what would need it takes no keyframes, but for water, of which
-    look and weight follow, and Only Selected, for whose warning alone curves are read again."""
+    """No frame reads the hair again, so properties that would need it cannot be keyed; except
+    wetness, which look and weight follow, and Only Selected, for which curves are read again only
+    to warn."""
     hair, tried, known = new_hair(), 0, {"wetness", "only_selected"}
     hair.data.hairloom.children.method = "multi"
     for owner in (hair.data, hair):
@@ -247,7 +248,8 @@ for name in ("Hair", "Bare"):
 
 @pytest.mark.skipif(not bpy.app.module, reason="starts another Python that has bpy")
 def test_a_file_from_before_shadows_shows_the_default_and_keeps_what_was_set(new_hair, tmp_path):
-    """In another process: values that no file holds are declared ones, all others the artist's."""
+    """Opened in another process: values that the file does not store are defaults, all others the
+    artist's."""
     hair, bare = new_hair(), new_hair()
     bare.name = "Bare"
     hair.data.hairloom.volume.shadows = "slices"

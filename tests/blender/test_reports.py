@@ -1,4 +1,4 @@
-"""What operators have reported can be read again."""
+"""Reports of operators can be read again later."""
 
 from __future__ import annotations
 

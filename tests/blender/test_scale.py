@@ -1,4 +1,4 @@
-"""Scenes of any size and unit scale: the same motion, warnings, children and cards."""
+"""Scenes of any size and unit scale have the same motion, warnings, children and cards."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ FRAMES = 3
 
 
 def curled(scale: float) -> StrandSet:
-    """Hair that stands on the sphere of radius 0.1 m and begins to fall."""
+    """Hair that stands on the sphere of radius 0.1 m and bends to one side, scaled."""
     outward = np.random.default_rng(1).normal(size=(60, 3))
     outward /= np.linalg.norm(outward, axis=1, keepdims=True)
     along = np.linspace(0.0, 1.0, 8)[:, None]
@@ -39,7 +39,8 @@ def curled(scale: float) -> StrandSet:
 def told(
     sphere: Any, new_hair: Callable[..., Any], evaluated: Callable[[], Any], scale: float
 ) -> tuple[np.ndarray, dict[str, Any]]:
-    """Strands of some frames of a head that moves, over its size; and all that is said of them."""
+    """Strands over some frames of a moving head, divided by the scale; and all messages about
+    them."""
     head = sphere.copy()
     head.data = sphere.data.copy()
     head.data.transform(Matrix.Scale(scale, 4))
@@ -76,7 +77,8 @@ def told(
     return np.array(frames), said
 
 
-# powers of two: on a sphere, whose triangles are alike, rounding decides where children come first
+# powers of two: on a sphere with equal triangles, rounding would decide where the first children
+# grow
 @pytest.mark.slow(
     instead="tests/pure/groom/test_children.py::test_children_are_the_same_at_any_scale"
 )
@@ -97,7 +99,7 @@ def test_a_scene_of_another_size_moves_and_warns_the_same(
 def test_the_unit_scale_only_changes_how_numbers_are_shown(
     sphere: Any, new_hair: Callable[..., Any], evaluated: Callable[[], Any], unit: float
 ) -> None:
-    """As with Blender's own physics, which takes gravity in units of the scene."""
+    """As in Blender's own physics, which takes gravity in scene units."""
     one, said = told(sphere, new_hair, evaluated, 1.0)
     bpy.context.scene.unit_settings.scale_length = unit
     other, said_again = told(sphere, new_hair, evaluated, 1.0)

@@ -1,4 +1,4 @@
-"""Scenes that verbs save: there whole, or the one before, also where Blender says nothing."""
+"""Scenes that verbs save: a complete new file or the old one, even if Blender reports no error."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def test_a_file_that_is_cut_short_anywhere_is_not_whole(
     for length in (0, 3, 10, 1000, size // 2, *range(size - 100, size)):
         cut.write_bytes(content[:length])
         assert not is_whole(cut), f"{length} of {size}"
-    if is_compressed:  # space was free again before the end was written
+    if is_compressed:  # space became free again before the end was written
         cut.write_bytes(content[: size // 2] + content[size // 2 + 100 :])
         assert not is_whole(cut)
 
@@ -37,7 +37,7 @@ def test_a_file_that_is_cut_short_anywhere_is_not_whole(
 def test_a_disk_that_is_full_leaves_the_scene_before(
     tmp_path: Path, sphere: Any, part: float
 ) -> None:
-    """Blender itself calls a cut file finished, and replaces the old one with it."""
+    """Blender itself takes a truncated file as finished, and replaces the old one with it."""
     path = tmp_path / "wig.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     before = path.read_bytes()
@@ -80,7 +80,7 @@ def test_the_versions_before_are_kept_as_in_blender(
 def test_a_scene_that_is_open_elsewhere_stays_and_the_new_one_is_kept(
     tmp_path: Path, sphere: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """By Windows' rules: what is open is not replaced."""
+    """Under Windows' rule, an open file cannot be replaced: the new scene is kept beside it."""
     path = tmp_path / "wig.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     before, real = path.read_bytes(), moving.os.replace

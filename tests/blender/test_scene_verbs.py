@@ -1,4 +1,4 @@
-"""Verbs that change a scene: each does what its button does, and saves it, or leaves all alone."""
+"""Verbs that change a scene do what the button does and save it, or change nothing."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ FEW = [
 
 @pytest.fixture
 def scene(sphere: Any, new_hair: Callable[..., Any], tmp_path: Path) -> Path:
-    """A saved file with hair on a head, and another one open."""
+    """A saved file with hair on a head; the open scene is empty."""
     new_hair(sphere)
     group = sphere.vertex_groups.new(name="Top")
     group.add([v.index for v in sphere.data.vertices if v.co.z > 0.05], 1.0, "REPLACE")
@@ -58,7 +58,7 @@ def make_active(obj: bpy.types.Object) -> None:
 
 
 def run(scene: Path, verb: str, *arguments: str) -> dict[str, Any]:
-    """Change the scene into another file, which is open then; gives the report."""
+    """Run a verb that saves to another file, and open that; returns the report."""
     report, output = scene.with_name("report.json"), scene.with_name("out.blend")
     saving = ["--output", str(output), "--report", str(report)]
     before = scene.read_bytes()
@@ -92,7 +92,7 @@ def test_the_verb_grows_hair_as_the_button_does_but_for_what_its_row_names(scene
         few = {"method": "normals", "strand_count": 40, "length": 0.05}
         assert bpy.ops.hairloom.add_groom(plays=False, **few) == {"FINISHED"}
         bpy.context.object.data.hairloom.children.method = "none"
-        # hair that has grown brings no colours, so that either source is the look
+        # grown hair has no colours, so both sources give the same look
         bpy.data.objects[name].data.hairloom.shading.color_source = "own"
         verb, button = (
             GroomSettings.of(each).sections for each in (bpy.data.objects[name], bpy.context.object)
@@ -202,7 +202,7 @@ def test_a_mesh_becomes_a_fin_and_a_mesh_again(scene: Path) -> None:
 
 
 def test_spheres_are_fitted_and_removed(scene: Path) -> None:
-    """To a head four times as long as wide: no single ball covers it, however it is cut into
+    """The head is four times as long as wide, so that a single ball never covers it, whatever its
     triangles."""
     bpy.ops.wm.open_mainfile(filepath=str(scene))
     for vertex in bpy.data.objects["Head"].data.vertices:
@@ -297,7 +297,7 @@ def test_bad_input_saves_nothing(
 
 
 def test_a_scene_that_moves_keeps_its_bakes(scene: Path, tmp_path: Path) -> None:
-    """The folder of a bake is named as seen from the new place."""
+    """The bake's folder is stored relative to the new place."""
     other = tmp_path / "shots" / "seven" / "wig.blend"
     quick = ["--set", "dynamics.device=numpy", "--set", "dynamics.collider_resolution=8"]
     bake = ["bake", "--scene", str(scene), "--frames", "1", "3", *quick]
@@ -312,7 +312,8 @@ def test_a_scene_that_moves_keeps_its_bakes(scene: Path, tmp_path: Path) -> None
 
 
 def test_hair_is_made_ready(scene: Path) -> None:
-    """Loose hair on a bare head gets a surface, UVs, roots on it and its scale into the curves."""
+    """Loose hair on a head without UVs gets a surface, UVs and roots on it, and its scale is
+    applied."""
     bpy.ops.wm.open_mainfile(filepath=str(scene))
     hair, head = bpy.data.objects["Hair"], bpy.data.objects["Head"]
     hair.data.surface = hair.parent = None
@@ -330,7 +331,7 @@ def test_hair_is_made_ready(scene: Path) -> None:
     points = np.empty(len(hair.data.points) * 3, np.float32)
     hair.data.position_data.foreach_get("vector", points)
     roots = points.reshape(len(hair.data.curves), -1, 3)[:, 0]
-    # the ball has flat faces, and its scaled hair began up to 2 cm above it
+    # the ball's faces are flat, and its scaled hair started up to 2 cm above it
     np.testing.assert_allclose(np.linalg.norm(roots, axis=1), 0.1, atol=2e-3)
 
 
@@ -375,7 +376,7 @@ def test_the_self_test_tells_what_this_machine_can_do(
 
 @pytest.mark.slow
 def test_hair_of_a_scene_is_taken_with_its_own_settings(scene: Path, tmp_path: Path) -> None:
-    """What the artist has set goes into files; --set goes over it."""
+    """Files have the artist's settings; --set overrides them."""
     bpy.ops.wm.open_mainfile(filepath=str(scene))
     groom = bpy.data.objects["Hair"].data.hairloom
     groom.children.method, groom.children.strand_count = "single", 300
@@ -396,7 +397,7 @@ def test_hair_of_a_scene_is_taken_with_its_own_settings(scene: Path, tmp_path: P
 def test_settings_that_no_object_has_are_refused(
     scene: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The head is a mesh: its hair has the settings of cards, and only cloth has dynamics."""
+    """The head is a mesh: cards are settings of its hair, and only cloth has dynamics."""
     for setting in ("cards.card_count=50", "dynamics.damping=2"):
         whole = ["run", "make_cards", "--scene", str(scene), "--object", "Head", "--set", setting]
         assert command_line.run([*whole, "--output", str(scene.with_name("out.blend"))]) == 1
@@ -413,7 +414,7 @@ def test_settings_that_no_object_has_are_refused(
 def test_a_render_of_a_scene_draws_its_hair(
     scene: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """As an export writes it; of several it has to be said which."""
+    """With a single groom, none needs to be named; with several, the error lists them."""
     report = scene.with_name("report.json")
     simulated = ["simulate", "--scene", str(scene), "--report", str(report), "--seconds", "0.05"]
     small = ["--set", "dynamics.device=numpy", "--set", "dynamics.collider_resolution=8"]
@@ -435,7 +436,8 @@ def test_a_render_of_a_scene_draws_its_hair(
 @pytest.mark.alike
 @pytest.mark.parametrize("how", ["collection", "collider", "left out"])
 def test_a_shake_of_a_groom_stays_out_of_its_colliders(scene: Path, how: str) -> None:
-    """A ball in the midst of it: the shake begins, and hair is led out of it at a walk."""
+    """A ball in the middle of the hair: when the shake starts, hair is led out of it at a limited
+    speed."""
     middle, radius = np.array([0.0, 0.16, -0.05]), 0.06
     bpy.ops.wm.open_mainfile(filepath=str(scene))
     hair = bpy.data.objects["Hair"]
@@ -463,7 +465,7 @@ def test_a_shake_of_a_groom_stays_out_of_its_colliders(scene: Path, how: str) ->
 
 
 def exported(scene: Path, *arguments: str, code: int = 0) -> dict[str, Any]:
-    """The report of an export as .tfx."""
+    """The report of an export to .tfx."""
     report, output = scene.with_name("report.json"), scene.with_name("out.tfx")
     whole = ["export", "--scene", str(scene), *arguments, "--report", str(report)]
     assert command_line.run([*whole, "--output", str(output)]) == code
@@ -472,7 +474,7 @@ def exported(scene: Path, *arguments: str, code: int = 0) -> dict[str, Any]:
 
 
 def beside(scene: Path, make: Callable[[bpy.types.Object], bpy.types.Object]) -> None:
-    """Add to the scene's file what this makes of its hair."""
+    """Add an object made from the scene's hair to the scene's file."""
     bpy.ops.wm.open_mainfile(filepath=str(scene))
     bpy.context.collection.objects.link(make(bpy.data.objects["Hair"]))
     bpy.ops.wm.save_mainfile()
@@ -498,7 +500,7 @@ def empty_curves(_hair: bpy.types.Object) -> bpy.types.Object:
 def test_jobs_on_all_hair_of_a_scene_leave_out_what_is_hidden_or_empty(
     scene: Path, make: Callable[[Any], Any], said: str
 ) -> None:
-    """As Make Real hides the hair that it was made from."""
+    """Make Real, for example, hides the hair that it has converted."""
     plain = ["--set", "children.method=none"]
     alone = exported(scene, *plain)["preflight"]["strands"]
     beside(scene, make)
@@ -585,7 +587,7 @@ def test_strands_of_a_scene_that_are_left_out_are_named_or_refused(
 def test_options_that_mean_nothing_are_refused(
     scene: Path, capsys: pytest.CaptureFixture[str], arguments: str, option: str, why: str
 ) -> None:
-    """With the option that was given, and nothing is written."""
+    """The error names the option, and nothing is written."""
     verb, *more = arguments.split()
     output = {"export": "out.tfx", "render": "out.png", "sheet": "out.png", "cards": "out.glb"}
     made = "out.abc" if "alembic" in more else output.get(verb, "out")
@@ -598,7 +600,7 @@ def test_options_that_mean_nothing_are_refused(
 
 
 def test_hair_of_a_scene_leaves_as_it_is_at_a_frame(scene: Path) -> None:
-    """As its modifiers move it, or its bake."""
+    """Exported roots follow the animated object."""
     bpy.ops.wm.open_mainfile(filepath=str(scene))
     hair = bpy.data.objects["Hair"]
     for frame in (1, 30):
@@ -616,7 +618,7 @@ def test_hair_of_a_scene_leaves_as_it_is_at_a_frame(scene: Path) -> None:
 
 
 def test_hair_of_a_scene_is_held_to_what_jobs_ask_of_files(scene: Path) -> None:
-    """UVs with --strict, and weights that children can grow by."""
+    """UVs with --strict, and the vertex group that children grow by."""
     children = ["--set", "children.method=multi", "--set", "children.strand_count=200"]
     fraction = {}
     for which in ([], ["--children-density", "Top"]):

@@ -1,4 +1,4 @@
-"""What buttons and jobs are about, in a view layer that Blender has not put in order yet."""
+"""The objects that buttons and jobs act on, in a view layer that Blender has not updated yet."""
 
 from types import SimpleNamespace
 
@@ -20,7 +20,7 @@ from hairloom.addon.ui.selection import chosen_hair
 
 @pytest.fixture
 def hair(new_hair, sphere):
-    """On a sphere that is selected, beside an object that was just removed."""
+    """Hair on a selected sphere, beside an object that was just removed."""
     hair = new_hair(sphere)
     other = bpy.data.objects.new("Other", None)
     bpy.context.collection.objects.link(other)
@@ -42,7 +42,7 @@ def test_an_object_that_was_just_removed_is_no_obstacle(hair, sphere):
 
 
 def test_nor_for_cards_beside_it(hair):
-    """Cards that are shown are built with the depsgraph as it is."""
+    """Displayed cards are built with the depsgraph as it is."""
     depsgraph = bpy.context.view_layer.depsgraph
     assert read_occluders(CardOcclusionSettings(others=True), hair, depsgraph).cards() == ((), ())
 
@@ -58,7 +58,7 @@ def test_nor_for_the_mesh_that_hair_grows_from(hair, sphere):
 
 
 def test_hair_on_a_selected_mesh_is_not_that_which_is_hidden(hair, sphere):
-    """As Make Real hides it; where there is none but hidden hair, its panels are shown."""
+    """Such as after Make Real. If there is only hidden hair, its panels are shown."""
     combed = hair.copy()
     bpy.context.collection.objects.link(combed)
     hair.hide_render = hair.hide_viewport = True
@@ -70,7 +70,7 @@ def test_hair_on_a_selected_mesh_is_not_that_which_is_hidden(hair, sphere):
 
 
 def test_a_pinned_properties_editor_is_about_the_hair_that_it_shows(hair, new_hair):
-    """The object or its curves may be pinned; a mesh is no hair."""
+    """The object or its curves may be pinned; a pinned mesh does not count."""
     other = new_hair()
     screens = (each for each in bpy.data.screens if each.name == "Layout")
     area = next(each for each in next(screens).areas if each.type == "PROPERTIES")
@@ -78,7 +78,7 @@ def test_a_pinned_properties_editor_is_about_the_hair_that_it_shows(hair, new_ha
     with bpy.context.temp_override(area=area):
         assert chosen_hair(bpy.context)[0] == other
         for pinned in (hair, hair.data):
-            space.pin_id = None  # Blender takes only what is of the kind that is pinned
+            space.pin_id = None  # Blender accepts only an ID of the kind that is pinned
             space.pin_id, space.use_pin_id = pinned, True
             assert chosen_hair(bpy.context) == [hair]
             assert HAIRLOOM_PT_data.poll(bpy.context)
@@ -91,7 +91,7 @@ def test_a_pinned_properties_editor_is_about_the_hair_that_it_shows(hair, new_ha
 
 
 def test_hair_of_another_view_layer_is_not_selected_but_told(hair, sphere):
-    """As when it is previewed in a scene that is not shown."""
+    """Such as hair that is previewed in a scene that is not shown."""
     bpy.ops.hairloom.preview()
     bpy.context.window.scene = bpy.data.scenes.new("Other")
     assert chosen_hair(bpy.context) == [hair]

@@ -1,4 +1,4 @@
-"""The self-test of the Preferences page finds what works, and what does not."""
+"""The self-test of the Preferences page finds out what works and what does not."""
 
 import bpy
 import numpy as np

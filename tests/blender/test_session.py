@@ -1,4 +1,4 @@
-"""The live session of a groom: it follows its head and takes over what the artist edits.
+"""The live session of a groom follows its head and the artist's edits.
 
 The window's part (drawing, the modal Play) is tested in tests/window.
 """
@@ -29,7 +29,7 @@ def test_the_preview_begins_with_the_hair_as_it_is(preview):
     hair, _, session = preview
     positions = np.array([point.position for point in hair.data.points])
     assert grid_of(session).shape == (60, session.settings[GuideSettings].cv_count, 3)
-    # roots and tips stay where they are when strands are resampled
+    # resampling keeps roots and tips in place
     assert grid_of(session)[:, 0] == pytest.approx(positions[0::8], abs=1e-6)
     assert grid_of(session)[:, -1] == pytest.approx(positions[7::8], abs=1e-6)
 
@@ -228,7 +228,7 @@ def test_hidden_hair_is_not_drawn(preview):
 
 
 def test_each_view_layer_draws_what_it_shows(preview):
-    """Two windows may show two of them."""
+    """Two windows may show different view layers."""
     hair, _, session = preview
     scene = bpy.context.scene
     first, other = bpy.context.view_layer, scene.view_layers.new("Other")
@@ -244,7 +244,7 @@ def test_each_view_layer_draws_what_it_shows(preview):
 
 
 def is_drawn_in(session, scene, layer):
-    """By the 3D view of a window that shows this view layer."""
+    """Whether the 3D view of a window that shows this view layer draws the session."""
     space = SimpleNamespace(as_pointer=lambda: 1)
     context = SimpleNamespace(space_data=space, scene=scene, view_layer=layer)
     return session.uid in dict(overlay.shown_in(context))
@@ -319,7 +319,7 @@ def test_the_preview_button_reports_bad_input_without_a_traceback(new_hair, capf
 def test_scaled_or_mirrored_hair_is_as_the_engine_renders_it(
     new_hair, sphere, evaluated, is_headless, scale
 ):
-    """As long, as thick and as wide apart, once edits have settled."""
+    """Once edits have settled, lengths, radii and spacing equal those of the render engine."""
     hair = new_hair(None if is_headless else sphere)
     hair.data.hairloom.widths.method = "own"
     first = previews.start(hair, evaluated())

@@ -1,4 +1,4 @@
-"""Hair that plays: it lags behind, falls, and stays out of what it collides with."""
+"""Hair that plays lags behind its head, falls, and stays out of colliders."""
 
 import bpy
 import numpy as np
@@ -28,7 +28,7 @@ def test_playing_hair_lags_behind_and_returns_when_stopped(preview, evaluated):
 
 
 def test_a_head_that_stands_still_is_the_same_one_in_the_next_frame(preview, evaluated):
-    """So that nothing is found or uploaded of it again."""
+    """Otherwise it would be processed and uploaded again."""
     _, head, session = preview
     previews.play(evaluated())
     heads = []

@@ -1,4 +1,4 @@
-"""Previews survive what artists do, or end with a reason; the file's data stay as they were."""
+"""Previews survive artists' actions or end with a reason; the file's data are unchanged."""
 
 import bpy
 import numpy as np
@@ -192,7 +192,7 @@ def test_a_head_without_faces_or_uvs_is_a_warning(new_hair, sphere, evaluated):
 
 
 def test_a_moment_without_a_gpu_is_waited_for(preview, evaluated, monkeypatch):
-    """Blender has no context from a window's closing to the next redraw."""
+    """Blender has no GPU context between a window's closing and the next redraw."""
     _, _, session = preview
     done = []
     monkeypatch.setattr(previews, "is_interrupted", lambda: True)

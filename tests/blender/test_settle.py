@@ -1,4 +1,4 @@
-"""Settle: combed hair falls onto head and shoulders, keeps that shape, and can go back."""
+"""Settle: combed hair falls onto head and shoulders, keeps that shape, and can be restored."""
 
 import bpy
 import numpy as np
@@ -17,13 +17,13 @@ from hairloom.addon.dynamics.settle_settings import SettleSettings
 from hairloom.addon.strands import StrandSet
 
 RADIUS = 0.1
-#: how far settled hair moves at most in two seconds of simulation on a head that stands still [m]:
-#: as far as combed hair does, by what gravity does to it in a substep
+#: how far settled hair may move in two seconds of simulation on a still head [m]: as far as gravity
+#: moves combed hair in a substep
 AT_REST = 5e-4
 
 
 def lying(count=5, points=12, length=0.3):
-    """Straight curves that stand out sideways, far from the sphere that they hang from."""
+    """Straight curves that stand out sideways from the sphere's side."""
     begin = np.zeros((count, 1, 3))
     begin[:, 0] = [RADIUS, 0.0, 0.0] + np.arange(count)[:, None] * [0.0, 0.001, 0.0]
     along = np.linspace(0.0, length, points)[:, None] * [1.0, 0.0, 0.0]
@@ -41,7 +41,7 @@ def strand_set(curves):
 
 
 def steps(hair):
-    """The length of each segment, and 0 at roots [m]."""
+    """The length of each segment, 0 at roots [m]."""
     length = np.linalg.norm(np.diff(curve_points(hair.data), axis=0), axis=1)
     length = np.concatenate([[0.0], length])
     length[curve_offsets(hair.data)[:-1]] = 0.0
@@ -53,7 +53,8 @@ def settle(**values):
 
 
 def test_hair_without_stiffness_hangs_straight_down_from_its_roots(new_hair, sphere):
-    """Its first segment is the root's; the rest is a chain at rest, which is vertical."""
+    """The first segment has the root's direction; the rest is a chain at rest, which is
+    vertical."""
     hair = new_hair(sphere, lying())
     settle(stiffness=0.0, seconds=6.0)
     grid = curve_points(hair.data).reshape(5, 12, 3)
@@ -66,7 +67,8 @@ def test_hair_without_stiffness_hangs_straight_down_from_its_roots(new_hair, sph
 def test_hair_falls_by_its_whole_weight_whatever_is_seen_of_its_motion_and_under_water(
     new_hair, sphere
 ):
-    """And not where its gravity is painted 0."""
+    """Neither the simulated fraction nor water changes the result; strands with a gravity mask of 0
+    stay."""
     found = []
     for values in ({}, {"simulated": 0.0, "buoyancy": 1.0, "drag": 5.0, "simulated_mask": "Few"}):
         hair = new_hair(sphere, lying())
@@ -95,7 +97,7 @@ def test_stiffness_holds_hair_up(new_hair, sphere):
 
 
 def test_lengths_are_kept_and_nothing_is_in_the_head(new_hair, sphere):
-    """Of curves with different counts, that fall from all sides onto a sphere of flat faces."""
+    """Curves with different point counts fall from all sides onto a faceted sphere."""
     random = np.random.default_rng(2)
     outward = random.normal(size=(80, 3))
     outward /= np.linalg.norm(outward, axis=1, keepdims=True)
@@ -136,7 +138,7 @@ def test_settled_hair_is_at_rest_in_motion(new_hair, sphere, evaluated, preset):
     settle(seconds=3.0)
     assert moved() < AT_REST
     hair.hairloom.dynamics.sag_compensation = 0.0
-    assert moved() > 10 * AT_REST  # the test can fail
+    assert moved() > 10 * AT_REST  # shows that the assertion above can fail
 
 
 def test_back_to_combed_is_exact_and_settling_again_begins_there(new_hair, sphere):
@@ -203,7 +205,8 @@ def trim(hair):
 
 @pytest.mark.parametrize("order", ["settle, trim", "trim, settle"])
 def test_what_is_taken_back_takes_later_tools_along(order, new_hair, sphere):
-    """And no earlier ones: hair that has settled first still has, once its trim is taken back."""
+    """Undoing a tool also undoes later ones, but not earlier ones: hair that settled before a trim
+    is still settled."""
     past_reports.clear()
     hair = new_hair(sphere)
     hair.hairloom.dynamics.sag_compensation = 0.5
@@ -252,7 +255,8 @@ def test_linked_duplicates_share_settled_curves_and_carry_their_weight_alike(new
 
 @pytest.mark.parametrize("domain", ["surface", "curves", "control points"])
 def test_hair_falls_as_painted_where_a_modifier_adds_curves(domain, new_hair, sphere):
-    """Those that fall are from before it; a selection that does not act changes nothing."""
+    """The curves from before the modifier fall. A selection without Only Selected changes
+    nothing."""
     hair = new_hair(sphere, lying())
     if domain == "surface":
         sphere.vertex_groups.new(name="Few").add(range(len(sphere.data.vertices)), 0.0, "REPLACE")
@@ -298,7 +302,8 @@ def test_of_several_hairs_all_settle_or_none(new_hair, sphere):
 
 @pytest.mark.slow
 def test_modifiers_act_on_what_has_settled(extension):
-    """A modifier that curls does so once: the curves themselves keep their points and lengths."""
+    """The curves keep their number of points and their lengths, so the modifier curls them only
+    once."""
     bpy.ops.hairloom.add_hairstyle(style="curls", plays=False)
     hair = bpy.context.object
     before, number = steps(hair), len(curve_points(hair.data))
@@ -310,7 +315,7 @@ def test_modifiers_act_on_what_has_settled(extension):
 
 @pytest.mark.slow
 def test_moved_and_scaled_hair_settles_where_it_is(new_hair, sphere):
-    """Down is the world's, and what is written is in the object's own space."""
+    """Down is the world's, and the result is stored in object space."""
     sphere.location, sphere.rotation_euler = (1.0, 2.0, 3.0), (0.0, 1.2, 0.4)
     sphere.scale = (2.0, 2.0, 2.0)
     bpy.context.view_layer.update()

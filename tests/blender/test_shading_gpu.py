@@ -1,4 +1,4 @@
-"""Marschner's tables on the GPU as Blender has it: filtered right, kept, shared, made again."""
+"""Marschner's tables on Blender's GPU: filtered correctly, cached, shared, and built again."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def frame() -> Any:
 
 
 def snapshot_of(frame: Any, shading: ShadingSettings, **more: Any) -> Any:
-    """A fan of broad straight strands in the plane y = 0 under one sun before them."""
+    """A fan of wide straight strands in the plane y = 0, lit by one sun."""
     angle = np.radians(np.linspace(-40.0, 40.0, 9))
     tips = 0.4 * np.stack([np.sin(angle), 0.0 * angle, np.cos(angle)], axis=-1)
     strands = np.stack([0.25 * tips, tips], axis=1).astype(np.float32)
@@ -50,7 +50,7 @@ def snapshot_of(frame: Any, shading: ShadingSettings, **more: Any) -> Any:
 
 
 def drawn(frame: Any, snapshot: Any, passes: Any = None) -> np.ndarray:
-    """Seen from -y, x from -0.25 to 0.25 and z from 0 to 0.5."""
+    """The picture seen from -y, with x from -0.25 to 0.25 and z from 0 to 0.5."""
     camera = frame.Camera(
         frame.look_at((0.0, -1.0, 0.25), (0.0, 0.0, 0.25)), frame.orthographic(0.5, 1.0, 0.0, 3.0)
     )
@@ -60,7 +60,7 @@ def drawn(frame: Any, snapshot: Any, passes: Any = None) -> np.ndarray:
 
 @pytest.mark.parametrize("melanin", [0.2, 0.9])
 def test_strands_have_the_light_of_the_reference(frame: Any, melanin: float) -> None:
-    """On every backend, where a straight strand is looked up between all texels."""
+    """A straight strand reads between texels, on every backend."""
     shading = replace(PLAIN, pigment="melanin", melanin=melanin)
     snapshot = snapshot_of(frame, shading)
     picture = drawn(frame, snapshot)
@@ -88,7 +88,8 @@ def test_strands_have_the_light_of_the_reference(frame: Any, melanin: float) -> 
 def test_tables_are_made_once_a_shape_and_shared(
     frame: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Colour and strengths make none; a shape does, and again only when many others came."""
+    """Colours and strengths build no new table. A new shape does, and an old one only after
+    CAPACITY others."""
     from hairloom.addon.render import marschner_textures
 
     made: list[Any] = []
@@ -116,7 +117,7 @@ def test_tables_are_made_once_a_shape_and_shared(
 
 
 def test_models_take_turns_in_one_pass(frame: Any) -> None:
-    """And after all that lies on the GPU was released."""
+    """Also after everything on the GPU was released."""
     from hairloom.addon.render import shader_program
     from hairloom.addon.render.mesh_pass import MeshPass
     from hairloom.addon.render.strand_pass import StrandPass

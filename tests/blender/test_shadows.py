@@ -1,4 +1,4 @@
-"""Shadows of hair and meshes as they are drawn, on the GPU as Blender has it."""
+"""Shadows of hair and meshes as drawn on Blender's GPU."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SIZE = 64
 PLAIN = ShadingSettings(color_variation=0.0, shift_noise=0.0, sparkle=0.0)
 WIDE = StrandSettings(tip_width=1.0, minimum_width=0.0)
 FORMS = [form for form, _, _ in SHADOWS if form != "none"]
-#: straight down
+#: shines straight down
 SUN = Light.sun((0.0, 0.0, -1.0), (1.0, 1.0, 1.0), 3.0)
 
 
@@ -45,7 +45,7 @@ def curtain(count: int, spacing: float, height: float) -> np.ndarray:
 
 
 def seen(frame: Any, snapshot: Any, height: float = 0.2) -> np.ndarray:
-    """From below; `height` [m] from side to side."""
+    """Seen from below; the picture covers `height` [m]."""
     view = frame.look_at((0.0, 0.0, -1.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0))
     camera = frame.Camera(view, frame.orthographic(height, 1.0, 0.0, 3.0))
     picture: np.ndarray = frame.render_image(snapshot, camera, SIZE, SIZE, 1)
@@ -60,7 +60,7 @@ def snapshot_of(frame: Any, strands: np.ndarray, **more: Any) -> Any:
         "shading": PLAIN,
         "strand_settings": WIDE,
         "detail": DetailSettings(culling="none", lod_size=0.0),
-        # so that the hair's volume faces the light
+        # the hair's volume faces the light
         "volume_center": np.array([0.0, 0.0, -9.0], np.float32),
         "table_size": PREVIEW_SIZE,
     }
@@ -78,12 +78,12 @@ def of_form(form: str, **more: Any) -> VolumeSettings:
 def test_hair_behind_hair_has_the_light_that_is_left(
     frame: Any, form: str, extinction: float
 ) -> None:
-    """Strands that cover a third of the plane above a strand leave exp(-K / 3)."""
+    """A strand below strands that cover a third of the area gets exp(-K / 3) of the light."""
     above, below = curtain(33, 6.0e-3, 0.03), curtain(1, 1.0, 0.0)
     strands = np.concatenate([below, above])
     radius = np.full(strands.shape[:2], 1.0e-3, np.float32)
-    radius[0] = 1.0e-4  # it hardly shades itself
-    # texels that do not know single strands
+    radius[0] = 1.0e-4  # thin, so that it hardly shades itself
+    # coarse texels, which average over many strands
     volume = of_form(form, extinction=extinction, resolution=16)
     lit = seen(frame, snapshot_of(frame, below, radius=radius[:1], volume=volume), 1e-3)
     shaded = seen(frame, snapshot_of(frame, strands, radius=radius, volume=volume), 1e-3)
@@ -96,7 +96,7 @@ def test_hair_behind_hair_has_the_light_that_is_left(
 
 @pytest.mark.parametrize("form", FORMS)
 def test_a_mesh_between_hair_and_light_leaves_it_dark(frame: Any, form: str) -> None:
-    """Whether it is drawn or only throws its shadow; half of the hair lies behind it."""
+    """Half of the hair is behind the mesh, which is drawn or only casts a shadow."""
     roof = Surface(
         np.array([[0, -1, 0.1], [1, -1, 0.1], [1, 1, 0.1], [0, 1, 0.1]], np.float32),
         np.array([[0, 1, 2], [0, 2, 3]], np.int32),
@@ -105,14 +105,15 @@ def test_a_mesh_between_hair_and_light_leaves_it_dark(frame: Any, form: str) -> 
     for more in ({"casters": (roof,)}, {"meshes": (frame.MeshSnapshot.of(roof),)}):
         picture = seen(frame, snapshot_of(frame, strands, volume=of_form(form), **more))
         hair = picture[20:44, 14:50, 0]
-        # seen from below, x runs to the left
+        # seen from below, x points to the left
         assert hair[:, :16].max() < 1e-6 or hair[:, 20:].max() < 1e-6
         assert max(hair[:, :16].mean(), hair[:, 20:].mean()) > 0.01
 
 
 @pytest.mark.parametrize("form", FORMS)
 def test_hair_shades_the_skin_below(frame: Any, form: str) -> None:
-    """Where there is hair above, half of it covered, and not beside it."""
+    """Below hair that covers half of the area the floor has exp(-1/2) of the light; beside it, all
+    of it."""
     floor = Surface(
         np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], np.float32),
         np.array([[0, 1, 2], [0, 2, 3]], np.int32),
@@ -134,7 +135,7 @@ def test_hair_shades_the_skin_below(frame: Any, form: str) -> None:
 
 
 def ends() -> Iterator[tuple[str, Any]]:
-    """Each parameter's name with each of its extreme values."""
+    """Each parameter's name with each of its choices or range limits."""
     for parameter in VolumeSettings.parameters():
         if parameter.kind == "choice":
             yield from ((parameter.name, identifier) for identifier, _, _ in parameter.choices)
@@ -151,7 +152,8 @@ def ends() -> Iterator[tuple[str, Any]]:
 def test_no_end_of_a_range_draws_anything_but_numbers(
     frame: Any, model: str, name: str, value: Any
 ) -> None:
-    """With lights around, in the hair and behind it, and one beyond those that throw shadows."""
+    """Extremes give finite pixels with lights around, within and behind the hair, and more lights
+    than get shadows."""
     lights = (
         SUN,
         Light.point((0.0, 0.0, 0.001), (1, 1, 1), 1.0),
@@ -169,7 +171,7 @@ def test_no_end_of_a_range_draws_anything_but_numbers(
 
 
 def test_light_from_strand_to_strand_brightens_light_hair_and_not_black(frame: Any) -> None:
-    """Seen from the dark side, where no light comes straight; in shares of what falls on top."""
+    """Seen from the dark side, which no light reaches directly."""
     strands = np.concatenate([curtain(40, 2.0e-3, 0.002 * layer) for layer in range(8)])
     gain = []
     for melanin in (0.1, 1.0):

@@ -1,4 +1,5 @@
-"""Shells beside the strands that they stand for, in the scene, and as files in foreign readers."""
+"""Shells, compared with the strands that they represent, in the scene, and as files in other
+readers."""
 
 from __future__ import annotations
 
@@ -41,12 +42,12 @@ SHORT = (
 )
 
 
-#: of the ball and its fur
+#: bounds of the ball and its fur
 BOUNDS = np.full(3, -0.112), np.full(3, 0.112)
 
 
 def fur_on_ball(count: int = 8000, length: float = 0.012) -> tuple[StrandSet, Surface]:
-    """Combed down, on a ball of radius 0.1 m."""
+    """Fur that is combed down, on a ball of radius 0.1 m."""
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4, radius=0.1)
     mesh = bpy.context.object.data
     positions = np.array([vertex.co for vertex in mesh.vertices], np.float32)
@@ -67,7 +68,7 @@ def fur_on_ball(count: int = 8000, length: float = 0.012) -> tuple[StrandSet, Su
 
 @pytest.fixture(scope="module")
 def fur_and_shells() -> tuple[Snapshot, Snapshot]:
-    """Of one ball, in even light, without shadows."""
+    """Fur and shells on the same ball, without occlusion and shadows."""
     strands, head = fur_on_ball()
     rig = rig_flow.prepare(strands, head, GuideSettings(guide_count=40), place="fur")
     settings = SettingsMap(CardSettings(kind="shells", levels=1, max_triangles=6000))
@@ -93,7 +94,7 @@ def fur_and_shells() -> tuple[Snapshot, Snapshot]:
 def test_shells_cover_as_much_as_strands_from_eight_sides_in_their_colour(
     gpu_context: Any, fur_and_shells: tuple[Snapshot, Snapshot], eighth: int
 ) -> None:
-    """Within a tenth of the strands, as cards are asked for."""
+    """Coverage and mean colour are within 10 % of the strands', the limit for cards."""
     turn = 2.0 * np.pi * eighth / 8
     side = (np.sin(turn), -np.cos(turn), 0.3)
     camera = frame_camera(BOUNDS, side, 0.5, 1.0)
@@ -122,7 +123,7 @@ def test_files_of_shells_are_read_by_blenders_importers(tmp_path: Path, suffix: 
         mesh = found[level["node"]]
         assert len(mesh.polygons) == level["triangles"]
         assert all(len(polygon.vertices) == 3 for polygon in mesh.polygons)
-    # from the inside to the outside: layer by layer, each with as many triangles
+    # layers from the inside to the outside, with equal numbers of triangles
     layer = found[levels[0]["node"]].uv_layers[1]
     along = np.empty(len(layer.uv) * 2, np.float32)
     layer.uv.foreach_get("vector", along)

@@ -1,4 +1,4 @@
-"""What a shot needs of moving hair: cuts without a whip, hair that already moves, slow motion."""
+"""Moving hair in shots: cuts without a whip, hair that already moves at the start, slow motion."""
 
 import bpy
 import numpy as np
@@ -20,7 +20,7 @@ SOFT = {"style_root": 1.0, "style_tip": 0.2, "sag_compensation": 0.0}
 
 @pytest.fixture(params=few_in_commits(["numpy", "compute"]))
 def playing(request, gpu_context, new_hair, sphere, evaluated):
-    """Soft hair on a head, which plays: its settings, the head, the session."""
+    """Soft hair that plays on a head: (settings, head, session)."""
     hair = new_hair(sphere)
     settings = hair.hairloom.dynamics
     for name, value in SOFT.items():
@@ -40,7 +40,7 @@ def advance(evaluated, frames=1, each=lambda frame: None):
 
 
 def on_head(session, head):
-    """Guides as the head sees them."""
+    """Guides in the head's local space."""
     inverse = np.array(head.matrix_world.inverted())
     return session.solver.guides() @ inverse[:3, :3].T + inverse[:3, 3]
 
@@ -93,7 +93,7 @@ def test_either_limit_finds_its_jump(playing, evaluated, limit):
 
 
 def test_a_fast_car_is_no_jump(playing, evaluated):
-    """Five metres a frame, evenly: only its first frame could be one."""
+    """A constant 5 m per frame: only the first frame could count as a jump."""
     _, head, session = playing
     advance(evaluated, 2, lambda frame: setattr(head.location, "x", 5.0 * (frame + 1)))
     advance(evaluated, 1, lambda frame: setattr(head.location, "x", 15.0))
@@ -121,7 +121,7 @@ def test_frozen_hair_goes_along_and_then_goes_on(playing, evaluated):
 
 @pytest.mark.parametrize("is_cut", [True, False])
 def test_hair_goes_along_as_far_as_it_is_simulated(playing, evaluated, is_cut):
-    """At a cut and frozen: what is not selected, or nothing of it, is exactly in its style."""
+    """At a cut and when frozen, unselected or unsimulated hair is exactly in its style."""
     settings, head, session = playing
     chosen = np.arange(0, len(session.hair.found().data.curves), 2)
     select(session.hair.found(), "CURVE", chosen)
@@ -143,7 +143,7 @@ def test_hair_goes_along_as_far_as_it_is_simulated(playing, evaluated, is_cut):
 
 
 def test_the_end_of_slow_motion_is_no_cut(playing, evaluated):
-    """The head goes evenly in the scene's time, and so do the roots in their last frame."""
+    """The head moves at a constant rate of scene time, so do the roots in the last frame."""
     settings, head, session = playing
 
     def driven(frame):
@@ -183,7 +183,7 @@ def test_pre_roll_is_what_frames_at_the_start_would_be(playing, evaluated):
 
 
 def test_a_bake_has_all_of_them(new_hair, sphere, tmp_path):
-    """Pre-roll, a cut in frame 4, and hair frozen by a keyframe from frame 6 on."""
+    """Pre-roll, a cut in frame 4, and hair that is frozen by keyframes from frame 6 on."""
     hair = new_hair(sphere)
     scene, settings = bpy.context.scene, hair.hairloom.dynamics
     scene.frame_start, scene.frame_end = 1, 8
@@ -233,13 +233,13 @@ def test_without_inheriting_it_lags(playing, evaluated):
 
 
 def select(hair, domain, chosen):
-    """Curves by number, as Sculpt or Edit Mode of curves writes it."""
+    """Select curves by index, as Sculpt Mode or Edit Mode of curves stores it."""
     curves = hair.data
     attribute = curves.attributes.get(".selection")
     if attribute is None:
         attribute = curves.attributes.new(".selection", "BOOLEAN", domain)
     values = np.isin(np.arange(len(curves.curves)), chosen)
-    if domain == "POINT":  # one of its points alone
+    if domain == "POINT":  # only one of a curve's points
         firsts = np.array([curve.first_point_index for curve in curves.curves])
         values = np.isin(np.arange(len(curves.points)), firsts[values])
     attribute.data.foreach_set("value", values)
@@ -247,7 +247,7 @@ def select(hair, domain, chosen):
 
 @pytest.mark.parametrize("domain", ["CURVE", "POINT"])
 def test_only_selected_curves_are_simulated(playing, evaluated, domain):
-    """Guides that are not selected are exactly where their style is."""
+    """Unselected guides are exactly in their style."""
     settings, head, session = playing
     hair = session.hair.found()
     chosen = np.arange(0, len(hair.data.curves), 2)
@@ -266,8 +266,8 @@ def test_only_selected_curves_are_simulated(playing, evaluated, domain):
 
 
 def test_keyframes_turn_only_selected_on_and_off(new_hair, sphere, tmp_path, evaluated):
-    """In frames 1, 2 and 4 all are simulated, in frame 3 those that are selected; no frame of the
-    bake is out of date, until others are selected."""
+    """All curves are simulated in frames 1, 2 and 4, only selected ones in frame 3. No frame of the
+    bake is stale until the selection changes; then only frame 3 is."""
     hair, scene = new_hair(sphere), bpy.context.scene
     for name, value in SOFT.items():
         setattr(hair.hairloom.dynamics, name, value)
@@ -319,7 +319,7 @@ def test_a_selection_of_nothing_is_named(playing, evaluated):
 
 
 def test_frozen_hair_that_inherits_goes_on_without_a_whip(playing, evaluated):
-    """The head goes on moving while time stands still, and has turned when it goes on."""
+    """The head moves and turns on while time stands still."""
     settings, head, session = playing
     settings.inherit_location = settings.inherit_rotation = 1.0
     settings.gravity, settings.jump_turn, settings.jump_distance = 0.0, 0.0, 0.0

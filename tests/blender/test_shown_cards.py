@@ -32,7 +32,7 @@ def preview(new_hair, sphere, evaluated):
 
 @pytest.fixture
 def in_window(preview, monkeypatch):
-    """The same preview, where cards are built beside the window."""
+    """The preview, with cards that are built in a thread as in a window."""
     monkeypatch.setattr(latest_job, "is_blocking", lambda: False)
     return preview
 
@@ -42,7 +42,7 @@ def drawn(session):
 
 
 def served(session):
-    """The cards that are shown once all that is on its way is built."""
+    """The displayed cards once all pending builds have arrived."""
     take_steps_until(lambda: not session.cards.is_pending)
     return drawn(session).cards
 
@@ -209,7 +209,7 @@ def test_cancel_shows_strands_in_place_of_cards_that_are_being_built(in_window):
 
 @pytest.mark.slow(instead="test_in_a_window_old_cards_stay_until_others_are_built")
 def test_cards_of_the_rig_before_stay_until_those_of_other_hair_are_built(in_window, evaluated):
-    """They do not ride on guides that they are not tied to, but are drawn as is set now."""
+    """Old cards do not ride on new guides, but they are drawn with the current settings."""
     hair, _, session = in_window
     before = drawn(session).cards
     position = hair.data.attributes["position"]

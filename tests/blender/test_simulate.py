@@ -1,4 +1,4 @@
-"""The verb `simulate`: it is the bake of a scene, whose wind and gravity move the hair."""
+"""The verb `simulate` equals a bake of the scene, whose wind and gravity move the hair."""
 
 import bpy
 import numpy as np
@@ -55,7 +55,7 @@ def test_the_scenes_gravity_is_used(scene, tmp_path):
 
 
 def test_files_are_simulated_as_the_same_scene_is_baked(new_hair, sphere, tmp_path):
-    """Bit for bit, with a collider that is not the head."""
+    """All arrays are equal bit for bit, with a collider that is not the head."""
     hair = new_hair(sphere)
     groom, head, ball = tmp_path / "hair.tfx", tmp_path / "head.obj", tmp_path / "ball.obj"
     bpy.ops.hairloom.export_tressfx(filepath=str(groom))

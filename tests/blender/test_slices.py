@@ -1,4 +1,4 @@
-"""Show Opacity Map and Show Skin Shadow: maps as files of the command line and as images."""
+"""Show Opacity Map and Show Skin Shadow: maps as files from the command line, and as images."""
 
 from __future__ import annotations
 
@@ -45,11 +45,11 @@ def test_render_writes_the_layers_side_by_side(
     assert command_line.run([*arguments, "--set", "volume.shadows=none"]) == 1
     assert "--slices" in capfd.readouterr().err and not picture.exists()
     arguments += ["--set", "volume.shadows=slices", "--set", "volume.resolution=64"]
-    # few strands that stand for many would get a coarser map
+    # few strands that represent many would get a coarser map
     arguments += ["--set", "volume.max_lights=2", "--set", "widths.method=own"]
     assert command_line.run(arguments) == 0
     image = bpy.data.images.load(str(slices))
-    # one light below the other
+    # the maps of both lights, one above the other
     assert tuple(image.size) == (4 * 66, 2 * 4 * 66)
     assert np.ptp(np.array(image.pixels[:]).reshape(-1, 4)[:, 0]) > 0.5
     bpy.data.images.remove(image)
@@ -89,7 +89,7 @@ def test_an_image_shows_them_and_is_the_same_each_time(new_hair: Any, sphere: An
 
 @pytest.mark.slow
 def test_render_writes_the_skin_shadow(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    """White where no hair is in the way, dark below it, a map for each light."""
+    """A map for each light: white where no hair blocks it, dark below hair."""
     shadow, picture = tmp_path / "skin.png", tmp_path / "a.png"
     arguments = ["render", *SMALL, "--output", str(picture), "--skin-shadow", str(shadow)]
     assert command_line.run([*arguments, "--set", "volume.shadows=none"]) == 1

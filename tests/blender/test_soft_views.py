@@ -1,4 +1,5 @@
-"""A view at rest takes samples of soft shadows until it has all; any change is hard at once."""
+"""A view at rest collects samples of soft shadows up to a limit; any change has hard shadows at
+once."""
 
 from __future__ import annotations
 
@@ -34,7 +35,7 @@ FLOOR = Surface(
 
 
 def sheet(height: float, y: float) -> Snapshot:
-    """Level strands side by side, above a floor that their shadow lies on."""
+    """Horizontal parallel strands above a floor that their shadow falls on."""
     random = np.random.default_rng(1)
     strands = np.zeros((150, 4, 3), np.float32)
     strands[..., 0] = np.linspace(-0.12, 0.12, 4)
@@ -57,7 +58,8 @@ GROOMS = {"low": sheet(0.06, 0.0), "high": sheet(0.2, -0.05)}
 
 @pytest.fixture(params=["perspective", "orthographic"])
 def view(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[SmallView]:
-    """Of a camera, on a machine with a GPU, as its window asks for redraws."""
+    """A camera's view on a machine that claims to have a GPU, with redraws as its window requests
+    them."""
     is_flat = request.param == "orthographic"
     projection = orthographic(0.5, 1.0, 0.1, 3.0) if is_flat else perspective(0.5, 1.0, 0.1, 3.0)
     monkeypatch.setattr(views, "_addresses", lambda: iter((ADDRESS,)))
@@ -74,7 +76,7 @@ def view(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Ite
 
 
 def hardened(view: SmallView, grooms: dict[str, Snapshot]) -> np.ndarray:
-    """The view as these grooms have come to rest in it."""
+    """The picture of these grooms at rest, with hard shadows."""
     view.shows(**grooms)
     for each in views.known_views():
         assert not each.is_soft
@@ -83,7 +85,7 @@ def hardened(view: SmallView, grooms: dict[str, Snapshot]) -> np.ndarray:
 
 
 def softened(view: SmallView) -> tuple[np.ndarray, int]:
-    """The view once nothing asks for samples any more, and after how many redraws that is."""
+    """The view once it requests no more samples, and the number of redraws until then."""
     for redraws in range(3 * SAMPLES):
         softening._ask()
         if not softening._softening.is_due:
@@ -106,7 +108,7 @@ def mean_of_hard(view: SmallView, grooms: dict[str, Snapshot]) -> np.ndarray:
 @pytest.mark.alike
 @pytest.mark.parametrize("names", [("low",), ("low", "high")])
 def test_a_view_at_rest_becomes_soft(view: SmallView, names: tuple[str, ...]) -> None:
-    """Hair and its shadow on the floor are, nearly, the mean of hard pictures."""
+    """Hair and its shadow on the floor approximate the mean of pictures with hard shadows."""
     grooms = {name: GROOMS[name] for name in names}
     expected, hard = mean_of_hard(view, grooms), hardened(view, grooms)
     soft, redraws = softened(view)
@@ -117,7 +119,7 @@ def test_a_view_at_rest_becomes_soft(view: SmallView, names: tuple[str, ...]) ->
 
 
 def test_what_changes_is_hard_at_once(view: SmallView) -> None:
-    """To the same bits as where shadows never become soft; and no sample counts that was taken."""
+    """A changed picture equals one with hard shadows bit for bit, and no earlier samples count."""
     hard = hardened(view, GROOMS)
     turned = {
         name: replace(each, lights=(replace(SUN, power=(1.0, 2.0, 2.0)),))

@@ -1,4 +1,4 @@
-"""Which view gets samples of soft shadows, and when."""
+"""Scheduling of soft shadows: which view gets samples, and when."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ NARROW = Light.sun((0.0, 0.0, -1.0), (1.0, 1.0, 1.0), 1.0)
 
 
 class Sums:
-    """In place of what needs a GPU."""
+    """Replaces the sums of samples, which need a GPU."""
 
     def __init__(self) -> None:
         self.count = 0
@@ -30,7 +30,7 @@ class Sums:
 
 
 class Pass:
-    """Of strands; remembers which views it was to forget."""
+    """Replaces a strand pass; records the views that it should forget."""
 
     def __init__(self) -> None:
         self.forgotten: list[object] = []
@@ -50,7 +50,7 @@ def two_views(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[views.View, vie
 
 
 def sampled(view: views.View, samples: int, fragments: int = 100) -> Pass:
-    """A redraw that takes a sample."""
+    """Simulate a redraw that takes a sample."""
     assert softening.takes_sample(view) and not softening.takes_sample(view)
     hair = Pass()
     is_shown = softening.is_next_shown(view, samples)
@@ -117,9 +117,8 @@ def test_what_is_to_be_drawn_afresh_gets_no_sample_before(
 def test_a_sample_tells_whether_a_soft_view_is_still_right(
     two_views: tuple[views.View, ...], fragments: int
 ) -> None:
-    """It is if as much of its hair is seen as before; else all samples are taken again, and the
-    view stays soft meanwhile.
-    """
+    """It is right if it shows as much hair as before. If not, all samples are taken again;
+    meanwhile the view stays soft."""
     view, _ = two_views
     softening.soften(view)
     for _ in range(10):
@@ -142,7 +141,7 @@ def test_a_sample_tells_whether_a_soft_view_is_still_right(
 def test_what_is_shown_among_samples_is_checked_after_them(
     two_views: tuple[views.View, ...],
 ) -> None:
-    """Samples that take long do not begin again with each redraw."""
+    """Slow series of samples do not start again with each redraw."""
     view, _ = two_views
     view.picture.marks = ("kept",)
     softening.soften(view)
@@ -179,7 +178,7 @@ def test_without_memory_a_view_stays_hard(
 
 
 def test_a_view_that_others_draw_keeps_none_waiting(two_views: tuple[views.View, ...]) -> None:
-    """It was asked for a sample, and none came."""
+    """Such as a view that got no sample after it requested one."""
     view, other = two_views
     view.wants_more = other.wants_more = True
     softening._ask()
@@ -199,7 +198,7 @@ def test_what_moves_slowly_is_not_at_rest_between_its_frames(
 
 
 def test_one_point_of_a_lamp_lights_all_grooms(two_views: tuple[views.View, ...]) -> None:
-    """Its disk faces their middle."""
+    """The lamp's disk faces the middle of all grooms."""
     lamp = Light.point((0.0, 0.0, 2.0), (1.0, 1.0, 1.0), 1.0, 0.1)
     softening.sums().count = 3
 

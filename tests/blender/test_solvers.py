@@ -1,4 +1,5 @@
-"""The two solvers: numpy as `motion_flow`, compute as numpy, and the way from one to the other."""
+"""The two solvers: numpy compared with `motion_flow`, compute with numpy; and changing between
+them."""
 
 from __future__ import annotations
 
@@ -35,8 +36,9 @@ from hairloom.addon.strands import StrandSet
 pytestmark = pytest.mark.draws(light=False)
 
 RATE = 30.0
-#: With local shape a few guides in a hundred are so ill-conditioned that numpy, too, drifts away
-#: from itself by centimetres when it starts one rounding off. Without it rounding grows to 0.1 mm.
+#: With local shape, a few guides in a hundred are so ill-conditioned that even numpy differs from
+#: itself by centimetres when it starts one rounding error apart. Without it, rounding grows to 0.1
+#: mm.
 SETTINGS = DynamicsSettings(bend=0.0)
 
 
@@ -58,7 +60,8 @@ def advance(solver: Any, poses: list[Pose], settings: DynamicsSettings = SETTING
 
 
 def agree(found: np.ndarray, expected: np.ndarray, share: float = 1.0) -> bool:
-    """Within micrometres for most strands, and within half a millimetre for this share of them."""
+    """Whether the median difference of strands is below 5 micrometres, and that of this fraction of
+    them below half a millimetre."""
     apart = np.abs(found - expected).reshape(-1, 16 * 3).max(axis=1)
     return bool(np.median(apart) < 5.0e-6 and np.quantile(apart, share) < 5.0e-4)
 
@@ -95,7 +98,7 @@ def test_numpy_is_the_pipeline(rig: Rig, poses: list[Pose]) -> None:
 def test_both_agree_on_a_shaken_head(
     rig: Rig, poses: list[Pose], settings: DynamicsSettings, share: float
 ) -> None:
-    """A second of shaking; `share` is that of the strands which have to agree."""
+    """A second of shaking. `share` is the fraction of strands that have to agree."""
     both = numpy, compute = NumpySolver(rig), ComputeSolver(rig)
     for solver in both:
         advance(solver, poses[1:], settings)
@@ -111,7 +114,7 @@ def test_both_agree_on_a_shaken_head(
 @pytest.mark.slow(instead="test_both_agree_on_a_shaken_head")
 @pytest.mark.usefixtures("gpu_context")
 def test_coils_bounce_alike_and_keep_their_lengths() -> None:
-    """A row of them hangs from what is thrown up and down, and then held still."""
+    """A row of coils, whose upper ends swing up and down and are then held still."""
     along, roots = np.linspace(0.0, 1.0, 200), np.arange(24)[:, None] * [0.02, 0.0, 0.0]
     angle = 2.0 * np.pi * 12.0 * along
     around = 0.006 * np.minimum(1.0, 20.0 * along)
@@ -144,7 +147,8 @@ def test_coils_bounce_alike_and_keep_their_lengths() -> None:
 
 @pytest.mark.usefixtures("gpu_context")
 def test_strands_that_are_led_out_do_not_depend_on_who_looks(rig: Rig, poses: list[Pose]) -> None:
-    """They go on from how they were bent in the frame before, shown or not; a rest forgets it."""
+    """Led strands continue from their shape in the frame before, whether strands are read or not. A
+    rest resets them."""
     low, high = rig.head.bounds()
     ball = SphereCollider(tuple((low + high) / 2.0), 0.55 * float(np.max(high - low)))
 
@@ -251,7 +255,7 @@ def test_automatic_takes_the_gpu(rig: Rig) -> None:
 
 @pytest.mark.skipif(not bpy.app.module, reason="it needs Blender as a module, to start another")
 def test_without_a_gpu_numpy_it_is() -> None:
-    """In a Blender of its own: once there is a GPU, it stays."""
+    """In a separate Blender, since a GPU that is once initialised stays."""
     script = (
         "import sys, bpy, numpy\n"
         f"sys.path.insert(0, {str(REPOSITORY / 'tools')!r})\n"

@@ -1,4 +1,4 @@
-"""Pictures on the stage: the same at any size, on Blender's own film, and with the stage's name."""
+"""Pictures on a stage: the same at any scale, with Blender's view transforms, chosen by name."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ STAGES = {"daylight", "dramatic", "plain", "studio"}
 
 
 def half_a_head(surface: Surface) -> StrandSet:
-    """Drooping strands on the upper half of a ball of radius 0.1 m, but for its face."""
+    """Drooping strands on the upper half of a ball of radius 0.1 m, except the face."""
     outward = np.random.default_rng(7).normal(size=(1400, 3))
     outward /= np.linalg.norm(outward, axis=1, keepdims=True)
     outward = outward[(outward[:, 2] > 0.0) & (outward[:, 1] > -0.5)]
@@ -84,7 +84,8 @@ def head(extension: None, sphere: bpy.types.Object) -> Surface:
 @pytest.mark.draws
 @pytest.mark.usefixtures("gpu_context")
 def test_a_picture_is_the_same_at_any_size(head: Surface) -> None:
-    """Hair and head a thousand times smaller and larger: framing, light, shadows and skin."""
+    """Framing, light, shadows and skin are the same if hair and head are a thousand times smaller
+    or larger."""
     strands = half_a_head(head)
     pictures = {
         scale: still(studio_of(*scaled(strands, head, scale)), is_transparent=True)
@@ -119,7 +120,7 @@ def test_the_stages_that_ship_are_four_and_the_studio_is_the_default() -> None:
 @pytest.mark.draws
 @pytest.mark.usefixtures("gpu_context", "extension")
 def test_a_stage_is_chosen_by_its_name_and_changed_by_set(tmp_path: Path) -> None:
-    """In the corner of the picture is the edge of the backdrop, as the film shows it."""
+    """The picture's corner shows the backdrop's edge, as the view transform displays it."""
 
     def corner(*options: str) -> np.ndarray:
         path = tmp_path / "still.png"
@@ -150,7 +151,8 @@ def shown(linear: np.ndarray, path: Path, **stage: object) -> np.ndarray:
 
 @pytest.mark.usefixtures("extension")
 def test_highlights_roll_off_on_film(tmp_path: Path) -> None:
-    """What is four times and eight times as bright as white differs; without a film it is cut."""
+    """Radiances of one, four and eight times white are displayed differently; with Standard they
+    are clipped."""
     greys = np.repeat([0.18, 1.0, 4.0, 8.0], 16).reshape(1, 64, 1) * np.ones((8, 1, 3))
     linear = np.concatenate([greys, np.ones((8, 64, 1))], axis=2)
     codes = {
@@ -168,7 +170,7 @@ def test_highlights_roll_off_on_film(tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("extension")
 def test_a_soft_gradient_has_no_bands(tmp_path: Path) -> None:
-    """The mean over a column is what was asked for, between the steps of 8 bits."""
+    """Dithering: a column's mean is the exact value, between the steps of 8 bits."""
     ramp = np.linspace(0.02, 0.024, 64)
     colors = np.ones((256, 1, 1)) * ramp[None, :, None] * np.ones(3)
     linear = np.concatenate([colors, np.ones((256, 64, 1))], axis=2)
@@ -204,7 +206,7 @@ def test_a_film_that_this_blender_does_not_have_is_told(
 
 @pytest.mark.usefixtures("gpu_context")
 def test_skin_that_hair_sees_lights_it(head: Surface) -> None:
-    """Blond hair beside the same hair that takes what lies beneath it for a plane."""
+    """Compared with the same hair whose light treats the skin below as a plane."""
     rig = rig_flow.prepare(half_a_head(head), head, GuideSettings(), place="hair")
     groom = prepared(rig, AmbientSettings())
     settings = GroomSettings().with_settings(named_preset("looks/blond").settings)
@@ -218,7 +220,7 @@ def test_skin_that_hair_sees_lights_it(head: Surface) -> None:
 @pytest.mark.slow
 @pytest.mark.usefixtures("gpu_context", "extension")
 def test_hardly_any_hair_is_burnt(tmp_path: Path) -> None:
-    """On every stage a channel of no more than half a percent of the hair's pixels is full."""
+    """On every stage at most 0.5 % of the hair's pixels have a channel above 0.98."""
     head, file = built_in_head(), tmp_path / "still.png"
     grown = grow_with_face(head.surface, GrowSettings(strand_count=1500), head.weights)
     rig = rig_flow.prepare(grown, head.surface, GuideSettings(), place="hair", widths="found")

@@ -1,4 +1,4 @@
-"""Bakes that are out of date are told before and after their motion is written to a file."""
+"""Stale bakes are reported before and after their motion is written to a file."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ LAST = 4
 
 @pytest.fixture
 def baked(new_hair: Any, sphere: Any, tmp_path: Path) -> tuple[Any, Any]:
-    """Hair and the head that carries it along, baked; the scene stands in the second frame."""
+    """Baked hair on a head that moves; the current frame is 2."""
     hair, scene = new_hair(sphere), bpy.context.scene
     scene.frame_start, scene.frame_end = 1, LAST
     for frame, x in ((1, 0.0), (LAST, 0.1)):
@@ -52,7 +52,7 @@ def changed(baked: tuple[Any, Any], evaluated: Callable[[], Any]) -> Callable[[]
 
 @pytest.mark.parametrize("frame", [0, 1, 2, LAST, LAST + 5])
 def test_a_new_bake_is_up_to_date_in_any_frame(frame: int, changed: Any) -> None:
-    for subframe in (0.0, 0.5):  # between two frames, where motion blur looks, too
+    for subframe in (0.0, 0.5):  # also between frames, for motion blur
         bpy.context.scene.frame_set(frame, subframe=subframe)
         assert changed() == ()
 
@@ -110,7 +110,8 @@ def test_a_collider_that_is_disabled_or_thickened_is_told(baked: Any, changed: A
     body = bpy.data.objects.new("Body", head.data.copy())
     colliders.objects.link(body)
     hair.hairloom.collider_collection = colliders
-    thick = body.modifiers.new("Solidify", "SOLIDIFY")  # which moves no vertex from frame to frame
+    # a deforming modifier that moves no vertex from frame to frame
+    thick = body.modifiers.new("Solidify", "SOLIDIFY")
     list(Bake.of([hair], bpy.context.scene).steps())
     assert changed() == ()
     thick.thickness = 0.05

@@ -1,4 +1,4 @@
-"""The first five minutes: grooms on a mesh, on empty hair, of particles; a sample scene."""
+"""Starting: grooms on a mesh, on empty hair, from particles; and the sample scene."""
 
 import bpy
 import numpy as np
@@ -49,9 +49,8 @@ def test_a_groom_is_grown_dressed_previewed_and_active(sphere):
 
 @pytest.mark.parametrize("name", ["add_groom", "grow"])
 def test_a_new_groom_can_be_adjusted(sphere, name):
-    """Blender shows Adjust Last Operation only where the operator could run once more as things
-    are afterwards, which is with the new hair active; it then grows on the same mesh.
-    """
+    """Blender shows Adjust Last Operation only if the operator could run again in the new state,
+    with the new hair active. It then grows on the same mesh."""
     operator = getattr(bpy.ops.hairloom, name)
     operator(**FEW)
     first = bpy.context.object
@@ -110,7 +109,8 @@ def test_hair_fitted_to_a_doll_and_to_a_giant_falls_as_on_a_head(length):
 
 
 def swing_of_new_hair(size):
-    """How far the tips of hair on a ball move in half a second, as a share of its length."""
+    """How far the tips of new hair on a ball move in half a second, as a fraction of the hair's
+    length."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     bpy.ops.mesh.primitive_uv_sphere_add(radius=0.5 * size)
     bpy.ops.hairloom.add_groom("EXEC_DEFAULT", strand_count=60)
@@ -149,7 +149,7 @@ def test_the_sample_scene_is_a_scene_of_its_own_that_moves():
     assert scene != before and [obj.name for obj in before.objects] == ["Cube"]
     assert scene.render.engine == "HAIRLOOM" and scene.camera is not None
     assert sum(obj.type == "LIGHT" for obj in scene.objects) == 3
-    # as its fields show lengths of hair: "6 mm", where a new scene of Blender's has "0.006 m"
+    # lengths then read "6 mm", where a new Blender scene shows "0.006 m"
     assert scene.unit_settings.length_unit == "ADAPTIVE"
     (session,) = previews.sessions()
     assert session.warnings == () and session.head is not None
@@ -202,7 +202,7 @@ def test_hair_that_has_a_look_keeps_it(new_hair, sphere):
 
 
 def test_all_selected_hair_is_taken_and_counted(new_hair, sphere):
-    """Though one of it cannot be used."""
+    """Although one of the objects cannot be used."""
     hair = [new_hair(sphere) for _ in range(2)]
     curves = bpy.data.hair_curves.new("Empty")
     empty = bpy.data.objects.new("Empty", curves)
@@ -220,7 +220,7 @@ def test_cancelling_takes_none_of_several_hairs(new_hair, sphere, evaluated):
     grooms = [new_hair(sphere) for _ in range(2)]
     work = together(starting.take_over(hair, evaluated(), ("looks/blond",)) for hair in grooms)
     next(work)
-    work.send(None)  # the second one's part is on its way
+    work.send(None)  # the part of the second groom is running
     work.close()
     assert all(map(starting.is_untouched, grooms))
 
@@ -287,7 +287,8 @@ def test_particle_hair_that_is_dropped_is_reported(sphere):
 
 @pytest.mark.slow
 def test_hair_of_a_scene_that_is_not_shown_waits_for_it():
-    """Its head is not evaluated there: no vertex count fits, which is nobody's fault."""
+    """Its head is not evaluated meanwhile, so vertex counts differ, which must not end the
+    preview."""
     own = bpy.context.scene
     bpy.ops.hairloom.sample_scene()
     sample, (session,) = bpy.context.scene, previews.sessions()
@@ -306,7 +307,7 @@ def test_hair_of_a_scene_that_is_not_shown_waits_for_it():
 
 
 class Editor:
-    """A Properties editor with some tabs, as `SpaceProperties` has them."""
+    """A Properties editor with some tabs, like `SpaceProperties`."""
 
     def __init__(self, *tabs):
         self.tabs, self.shown = tabs, tabs[0]

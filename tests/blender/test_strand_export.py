@@ -1,4 +1,4 @@
-"""Strands out of the open scene, read back by Alembic's own lower level and by usd-core."""
+"""Strands exported from the open scene, read back by Alembic's low-level API and by usd-core."""
 
 from __future__ import annotations
 
@@ -142,7 +142,7 @@ def test_curves_that_are_all_guides_are_strands_for_the_check_as_for_the_file(
 def test_what_the_hair_says_of_itself_is_in_the_file(new_hair: Any, tmp_path: Path) -> None:
     strands = replace(hedgehog(), color=np.random.default_rng(3).random((480, 3)))
     hair = new_hair(strands=strands)
-    is_guide = np.arange(60) % 20 < 2  # of both groups
+    is_guide = np.arange(60) % 20 < 2  # two in each group
     said = Groom(
         strands,
         strand_id=np.arange(60) * 3 + 7,
@@ -197,7 +197,7 @@ def test_several_hairs_are_groups_of_one_groom(new_hair: Any, sphere: Any, tmp_p
 def test_hairs_whose_names_are_one_as_files_get_two(
     new_hair: Any, sphere: Any, tmp_path: Path
 ) -> None:
-    """Hair.001 and hair_001 are one file on Windows, where the second would replace the first."""
+    """On Windows, hair_001 would overwrite the file of Hair.001."""
     other = write_curves("hair_001", hedgehog(20, 5, seed=2), sphere, bpy.context.collection)
     hair = new_hair(sphere)
     hair.name = "Hair.001"

@@ -1,4 +1,4 @@
-"""Strands in motion out of the open scene: of bakes and of modifiers, in steps and cancelled."""
+"""Moving strands exported from the open scene: from bakes and modifiers, in steps and cancelled."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def told(capfd: pytest.CaptureFixture[str]) -> Callable[[], str]:
 
 @pytest.fixture
 def swinging(new_hair: Any, sphere: Any, tmp_path: Path) -> tuple[Any, Any]:
-    """Hair on a head that is thrown about for some frames: (hair, head)."""
+    """Hair on a head that shakes for some frames: (hair, head)."""
     return thrown(new_hair(sphere), sphere, LAST, tmp_path / "bake", peak=3)
 
 
@@ -107,7 +107,8 @@ def test_a_bake_keeps_what_its_curves_say(swinging: Any, tmp_path: Path) -> None
     np.testing.assert_array_equal(own["groom_id"], np.arange(60)[1::2] + 9)
     written, expected = own["groom_color"].reshape(30, 15, 3), color.reshape(60, 8, 3)[1::2]
     np.testing.assert_allclose(written[:, [0, -1]], expected[:, [0, -1]], atol=1e-6)
-    np.testing.assert_allclose(written[:, ::2], expected, atol=1e-5)  # straight: evenly spaced
+    # on straight strands, new points are evenly spaced
+    np.testing.assert_allclose(written[:, ::2], expected, atol=1e-5)
 
 
 def test_frames_that_were_not_baked_are_named_and_nothing_is_written(
@@ -183,7 +184,7 @@ def test_widths_are_those_of_the_first_frame_wherever_the_scene_is(
 def test_children_follow_guides_that_modifiers_move(
     new_hair: Any, sphere: Any, tmp_path: Path
 ) -> None:
-    """All points go up by as much, so the children between them do."""
+    """All points move up equally, and so do the children between them."""
     hair = new_hair(sphere)
     hair.data.hairloom.guides.guide_count = 60
     hair.data.hairloom.children.method = "multi"
@@ -216,7 +217,7 @@ def test_curves_that_come_and_go_are_told_and_leave_nothing(new_hair: Any, tmp_p
 
 @needs_usd
 def test_a_cancelled_export_leaves_the_old_file(swinging: Any, tmp_path: Path) -> None:
-    """As Esc does in the window: what was begun is given up in the middle."""
+    """Esc in the window gives up work halfway in the same way."""
     hair, _ = swinging
     bake(hair)
     for suffix, kind in ((".abc", ALEMBIC), (".usdc", USD)):

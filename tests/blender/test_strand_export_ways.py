@@ -1,4 +1,4 @@
-"""What goes with exports of strands: bones, the check, collections, and the way in again."""
+"""Exports of strands: bones, the check, collections, and importing the files again."""
 
 from __future__ import annotations
 
@@ -31,7 +31,8 @@ def told(capfd: pytest.CaptureFixture[str]) -> Callable[[], str]:
 
 
 def skinned(head: Any) -> Any:
-    """An armature whose bones hold the upper and the lower half of a head; one does not deform."""
+    """Skin a head to two bones, for its upper and lower half, and a third that does not deform;
+    returns the armature."""
     armature = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
     bpy.context.collection.objects.link(armature)
     bpy.context.view_layer.objects.active = armature
@@ -99,7 +100,7 @@ def test_bones_that_were_renamed_are_told(
     renamed: tuple[str, ...],
     sentence: str,
 ) -> None:
-    """As where a rig was made again: Blender renames the groups of its own bones."""
+    """As after a rig was rebuilt: Blender renames only the groups of its own bones."""
     armature = skinned(sphere)
     new_hair(sphere)
     for name in renamed:
@@ -113,7 +114,7 @@ def test_bones_that_were_renamed_are_told(
 def test_an_armature_that_is_scaled_by_100_changes_nothing(
     new_hair: Any, sphere: Any, tmp_path: Path
 ) -> None:
-    """As FBX files in centimetres come in: the armature is large, and the head in it small."""
+    """As imported from FBX in centimetres: a large armature with a small head in it."""
     armature = skinned(sphere)
     new_hair(sphere)
     bpy.ops.hairloom.export_tressfx(filepath=str(tmp_path / "hair.tfx"))
@@ -219,7 +220,7 @@ def test_without_alembics_library_usd_is_offered(
 
 
 def test_hair_of_guides_alone_is_written_as_strands(new_hair: Any, tmp_path: Path) -> None:
-    """As an import leaves it that puts guides apart."""
+    """As an import with separate guides leaves it."""
     hair = new_hair()
     store_groom(hair.data, Groom(hedgehog(), is_guide=np.ones(60, bool)))
     bpy.ops.hairloom.export_hair(filepath=str(tmp_path / "a.hair"))
@@ -285,7 +286,7 @@ def test_what_is_written_comes_in_again(
 
 
 def test_esc_says_how_many_of_several_files_are_written() -> None:
-    """It is pressed as the frames of the second begin."""
+    """Esc is pressed when the frames of the second file begin."""
     still = SimpleNamespace(frames=None, write=lambda path: Outcome(f"Wrote {path}", {}))
     moving = SimpleNamespace(frames=range(2), frame_count=2)
     plans = [(Path("a.abc"), still), (Path("b.abc"), moving)]

@@ -1,4 +1,4 @@
-"""Strands of files into the scene: what the artist's button makes of them, and what it says."""
+"""Importing strands from files: the resulting objects and reports."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -19,12 +19,12 @@ from hairloom.addon.strands import StrandSet
 
 pytestmark = pytest.mark.usefixtures("extension")
 
-#: where the roots of the other axes would have to be, far from a sphere at the origin
+#: places the hair far from a sphere at the origin, so that wrong axes show
 PLACE = np.array([0.3, -0.4, 1.6], np.float32)
 
 
 def hairdo(count=60, place=PLACE):
-    """Hair of a head at a place; every tenth strand is a guide."""
+    """Hair of a head at this place; every tenth strand is a guide."""
     random = np.random.default_rng(3)
     outward = random.normal(size=(count, 3))
     outward /= np.linalg.norm(outward, axis=1, keepdims=True)
@@ -68,7 +68,7 @@ def write(path, groom):
 
 @pytest.fixture
 def head(sphere):
-    """The sphere where the hair is, active and selected."""
+    """The sphere, moved to the hair's place, active and selected."""
     sphere.location = PLACE.tolist()
     bpy.context.view_layer.update()
     return sphere
@@ -76,7 +76,7 @@ def head(sphere):
 
 @pytest.fixture
 def told(capfd):
-    """What the operator has reported; a report never is a traceback."""
+    """A function that returns the operator's reports, and refuses tracebacks."""
 
     def read():
         captured = capfd.readouterr()
@@ -87,7 +87,7 @@ def told(capfd):
 
 
 def imported(path, **options):
-    """The objects that a file became, the active one first."""
+    """Import a file; returns its objects, the active one first."""
     assert bpy.ops.hairloom.import_strands(filepath=str(path), **options) == {"FINISHED"}
     active = bpy.context.view_layer.objects.active
     return [active, *(each for each in bpy.context.selected_objects if each != active)]
@@ -125,7 +125,7 @@ def test_hair_is_bound_to_the_active_mesh(tmp_path, head, told, suffix):
     u, v = strands.root_uv.T
     out = expected.roots - PLACE
     angle = np.abs((np.arctan2(out[:, 1], out[:, 0]) / (2 * np.pi) + 0.5) % 1.0 - u)
-    assert np.median(np.minimum(angle, 1 - angle)) < 0.02  # as the sphere is unwrapped
+    assert np.median(np.minimum(angle, 1 - angle)) < 0.02  # agrees with the sphere's UVs
     assert np.abs(np.arcsin(out[:, 2] / 0.1) / np.pi + 0.5 - v).max() < 0.05
 
 
@@ -277,7 +277,7 @@ def test_a_factor_that_was_too_small_is_told_as_what_to_set(tmp_path, head, told
 def test_hair_with_other_axes_that_is_near_by_chance_comes_in_with_a_warning(
     tmp_path, sphere, told
 ):
-    """A head at the origin: turned hair of its upper half is not far from it."""
+    """With the head at the origin, turned hair of its upper half is still near it."""
     groom = hairdo(place=np.zeros(3, np.float32))
     sphere.scale = (1.0, 1.3, 0.8)
     sphere.location.z = 0.02
@@ -303,7 +303,7 @@ def test_hair_of_an_odd_size_without_a_head_is_a_warning(tmp_path, told, scale, 
 
 
 def test_hair_and_head_in_centimetres_are_told_and_scaled_together(tmp_path, head, told):
-    """A head of 24 m at the origin, in an object of its own scale, and hair on it."""
+    """A head of 24 m at the origin, whose object has its own scale, and hair on it."""
     head.scale *= 100.0
     head.location *= 100.0
     bpy.context.view_layer.update()
@@ -351,7 +351,7 @@ def test_a_head_without_faces_is_refused(tmp_path, head, told):
 
 
 def test_what_the_button_makes_is_what_other_functions_of_ours_read(tmp_path, head):
-    """Preview, cards and exports read hair by these."""
+    """Previews, cards and exports read hair with these functions."""
     (hair,) = imported(write(tmp_path / "hair.abc", hairdo()))
     assert bpy.ops.hairloom.export_cards.poll()
     assert bpy.context.view_layer.objects.active == hair
@@ -359,7 +359,7 @@ def test_what_the_button_makes_is_what_other_functions_of_ours_read(tmp_path, he
 
 
 def test_blenders_own_exports_of_hair_come_in(tmp_path, head, told):
-    """Hair curves as Blender's Alembic and USD exporters write them: without our attributes."""
+    """Blender's Alembic and USD exporters write hair curves without our attributes."""
     needs_usd()
     groom = hairdo()
     (hair,) = imported(write(tmp_path / "hair.abc", groom))

@@ -1,4 +1,4 @@
-"""Importing strands as the window does it: in a thread, with a process that Esc ends."""
+"""Importing strands in steps, as in a window: in a thread, with a child process that Esc ends."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ WRITERS: dict[str, Callable[[Path, Groom], Any]] = {
     ".usdc": write_usd,
     ".tfx": write_tfx,
 }
-#: What reads a file, and never comes to its end; it says which process it is.
+#: a reader that never ends; it writes its process ID
 ENDLESS = """
 import os, sys, time
 open(os.path.join({folder!r}, "number"), "w").write(str(os.getpid()))
@@ -44,7 +44,7 @@ time.sleep(600)
 
 @pytest.fixture
 def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder of our own for temporary files."""
+    """A private folder for temporary files."""
     folder = tmp_path / "temporary"
     folder.mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(folder))
@@ -53,7 +53,7 @@ def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def endless(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Files are read for ever; this one gets the number of the process."""
+    """Replace the reader by an endless one; returns the file that gets its process ID."""
     script = tmp_path / "endless.py"
     script.write_text(ENDLESS.format(folder=str(tmp_path)))
     command = (sys.executable, str(script))
@@ -64,7 +64,7 @@ def endless(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def begun(*paths: Path) -> Generator[Any]:
-    """The operator's steps, as a click begins them."""
+    """The operator's steps, as a click starts them."""
     operator = SimpleNamespace(
         onto_mesh=True,
         up="FILE",
@@ -94,7 +94,7 @@ def runs(number: int) -> bool:
 def test_esc_half_way_leaves_no_process_no_file_and_no_object(
     tmp_path: Path, temporary: Path, endless: Path, sphere: Any, suffix: str
 ) -> None:
-    """The first file has been read by then; neither of both is in the scene."""
+    """The first file has been read by then, but neither file is in the scene."""
     first, second = tmp_path / "first.tfx", tmp_path / f"second{suffix}"
     for path in (first, second):
         WRITERS[path.suffix](path, Groom(hedgehog()))
@@ -115,7 +115,7 @@ def test_esc_half_way_leaves_no_process_no_file_and_no_object(
 def test_the_button_and_the_command_line_give_the_same(
     tmp_path: Path, sphere: Any, suffix: str
 ) -> None:
-    """One waits for a thread, the other one reads by itself."""
+    """The button waits for a thread; the function reads in the main thread."""
     path = tmp_path / f"hair{suffix}"
     WRITERS[suffix](path, Groom(hedgehog()))
     with collected_reports() as reports:
@@ -156,7 +156,7 @@ def test_files_that_cannot_be_used_are_reported_in_their_order(tmp_path: Path) -
 def test_a_file_is_read_once_even_where_it_does_not_fit(
     tmp_path: Path, sphere: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What would make it fit is found without another wait."""
+    """The scale that would fit is found without reading the file again."""
     path = tmp_path / "hair.tfx"
     write_tfx(path, Groom(hedgehog()), scale=0.01)
     read, real = [], import_groom.read_strands

@@ -1,6 +1,6 @@
-"""Trim, Flow, Mirror and their like say what they make, and leave no trace when cancelled.
+"""Trim, Flow, Mirror and similar tools report progress and leave no trace when cancelled.
 
-Each is stopped while its first part is on its way, as Esc does it in the window.
+Each is cancelled while its first part is running, as Esc does in the window.
 """
 
 from __future__ import annotations
@@ -77,7 +77,8 @@ JOBS = {
 
 
 def stand_in(kind):
-    """An operator with its defaults, which steps can be asked of without Blender's own call."""
+    """A placeholder for an operator with default properties, whose `steps` can be called without
+    Blender."""
     values = {
         name: own.keywords.get("default")
         for name, own in getattr(kind, "__annotations__", {}).items()
@@ -110,7 +111,7 @@ def test_it_says_what_it_makes_and_leaves_nothing_when_it_is_cancelled(job, hair
 
 @pytest.fixture
 def trimmed(hair, tmp_path):
-    """Hair that was trimmed and has settled in another file, with all that there is, overridden."""
+    """Hair that was trimmed and settled in another file, overridden with all its data."""
     with_plane(hair)
     bpy.ops.hairloom.trim_to_shape()
     COMBED.keep(hair)
@@ -131,7 +132,7 @@ def overridden_hair(folder):
     + ["mirror_hair", "comb_flow", "comb_parting"],
 )
 def test_curves_of_a_library_override_are_left_alone(tool, trimmed):
-    """Blender ignores points that are written into them, but takes curves away."""
+    """Blender ignores new points of such curves, but would delete curves."""
     hair = trimmed
     hair.hairloom.hairstyle = "bob"
     hair.hairloom.dynamics.sag_compensation = 0.5

@@ -12,7 +12,7 @@ from hairloom.addon.errors import HairloomError
 
 
 def volume(surface):
-    """Signed: positive where the triangles face outwards."""
+    """The signed volume, positive where triangles face outwards."""
     a, b, c = np.moveaxis(surface.corners.astype(np.float64), 1, 0)
     return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
 
@@ -45,7 +45,7 @@ def test_modifiers_are_applied(cube, evaluated):
 
 
 def test_uvs_belong_to_their_corners(cube, evaluated):
-    """With UVs made from the positions, each corner must carry its own."""
+    """UVs are made from the positions, so that each corner's UV can be checked."""
     mesh = cube.data
     for loop, uv in zip(mesh.loops, mesh.uv_layers.active.uv, strict=True):
         position = mesh.vertices[loop.vertex_index].co

@@ -1,4 +1,4 @@
-"""What a farm depends on: reports of failures, progress lines, interrupted and repeated tasks."""
+"""Features that farms need: reports of failures, progress lines, interrupted and repeated tasks."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ QUICK = ["--set", "dynamics.device=numpy", "--set", "dynamics.collider_resolutio
 
 @pytest.fixture
 def scene(sphere: Any, new_hair: Callable[..., Any], tmp_path: Path) -> Path:
-    """A saved file with hair on a head, and another one open."""
+    """A saved file with hair on a head; the open scene is empty."""
     new_hair(sphere)
     path = tmp_path / "wig.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
@@ -40,7 +40,7 @@ def scene(sphere: Any, new_hair: Callable[..., Any], tmp_path: Path) -> Path:
 
 @pytest.fixture
 def task(scene: Path, tmp_path: Path) -> Callable[..., dict[str, Any]]:
-    """Bakes the scene as a farm's task does; gives the report."""
+    """A function that bakes the scene as a farm's task does and returns the report."""
 
     def run(*more: str, code: int = 0) -> dict[str, Any]:
         report = tmp_path / "report.json"
@@ -66,7 +66,7 @@ def test_a_task_that_is_done_is_not_done_again(
 def test_the_report_of_a_task_that_is_skipped_still_names_outputs_and_notes(
     task: Callable[..., dict[str, Any]], scene: Path
 ) -> None:
-    """A farm that runs a job again, for one task that has failed, loses no notes of the others."""
+    """When a farm repeats a job because one task failed, the notes of the others are kept."""
     bpy.ops.wm.open_mainfile(filepath=str(scene))
     bpy.data.objects["Hair"].data.surface = bpy.data.objects["Hair"].parent = None
     bpy.ops.wm.save_mainfile()
@@ -111,7 +111,7 @@ def test_a_task_is_done_again_when_anything_has_changed(
 
 
 def test_a_job_whose_folders_are_moved_together_is_still_done(scene: Path, tmp_path: Path) -> None:
-    """All that it has written is seen from its stamp: scene, bake, and the scene that plays it."""
+    """The stamp has relative paths to the scene, the bake and the scene that plays it."""
     job, report = tmp_path / "job", tmp_path / "report.json"
     (job / "scenes").mkdir(parents=True)
     shutil.copy(scene, job / "scenes" / "wig.blend")
@@ -156,7 +156,7 @@ def test_a_linked_library_is_an_input(
 def test_a_picture_that_is_missing_is_an_input(
     task: Callable[..., dict[str, Any]], scene: Path, tmp_path: Path
 ) -> None:
-    """As on a machine that does not see its disk: once it is there, the task is done again."""
+    """As on a machine that cannot access the disk: once the file exists, the task is done again."""
     picture = tmp_path / "skin.png"
     shutil.copy(REPOSITORY / "docs" / "images" / "still.jpg", picture)
     bpy.ops.wm.open_mainfile(filepath=str(scene))
@@ -171,7 +171,7 @@ def test_a_picture_that_is_missing_is_an_input(
 
 @pytest.fixture
 def export(scene: Path, tmp_path: Path) -> Callable[..., int]:
-    """Exports the motion of the scene's hair as a farm's task does; gives the exit code."""
+    """A function that exports the hair's motion as a farm's task does and returns the exit code."""
 
     def run(*more: str) -> int:
         arguments = ["export", "--scene", str(scene), "--frames", "1", "3", "--skip-existing"]
@@ -239,7 +239,7 @@ def test_what_a_heads_file_names_is_an_input(extension: None, tmp_path: Path) ->
 def test_files_that_blender_brings_along_are_no_inputs(
     task: Callable[..., dict[str, Any]], scene: Path, tmp_path: Path
 ) -> None:
-    """Nodes of its own assets, linked as the asset browser does it."""
+    """Node groups of Blender's own assets, linked as the asset browser links them."""
     assets = Path(bpy.utils.resource_path("LOCAL") or bpy.utils.resource_path("SYSTEM"))
     (nodes,) = assets.glob("datafiles/assets/**/procedural_hair_node_assets.blend")
     bpy.ops.wm.open_mainfile(filepath=str(scene))
@@ -284,7 +284,7 @@ def test_a_report_that_cannot_be_written_fails_the_task(extension: None, tmp_pat
 def test_a_fault_of_ours_is_in_the_report_too(
     task: Callable[..., dict[str, Any]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Never the report of the run before."""
+    """The report is never that of an earlier run."""
     task()
     monkeypatch.setattr(command_line, "check_numbers", lambda _options: 1 / 0)
     with pytest.raises(ZeroDivisionError):
@@ -296,7 +296,7 @@ def test_a_fault_of_ours_is_in_the_report_too(
 def test_the_report_of_a_task_that_is_killed_says_so(
     task: Callable[..., dict[str, Any]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As it is on the disk while the task runs."""
+    """While the task runs, its report on disk says "begun"."""
     task()
     found: list[str] = []
 
@@ -324,7 +324,7 @@ def test_a_farm_reads_status_and_progress(
 @pytest.mark.skipif(not bpy.app.module, reason="tools/headless.py needs Blender as a module")
 @pytest.mark.slow
 def test_an_interrupted_task_leaves_nothing(scene: Path, tmp_path: Path) -> None:
-    """As a farm does it: a process that is sent SIGTERM, here as well by Ctrl-C's SIGINT."""
+    """A farm sends SIGTERM to the process, and Ctrl-C sends SIGINT."""
     for number in (signal.SIGINT, signal.SIGTERM):
         report, bake = tmp_path / f"{number}.json", tmp_path / f"bake{number}"
         command = [sys.executable, "tools/headless.py", "bake", "--scene", str(scene), *QUICK]
@@ -372,4 +372,4 @@ def test_signals_are_as_before_afterwards() -> None:
     assert caught.value.exit_code == 130
     assert signal.getsignal(signal.SIGINT) is before
     with interruption.interruptible():
-        interruption.stop_if_asked()  # the one before is forgotten
+        interruption.stop_if_asked()  # the earlier signal is forgotten

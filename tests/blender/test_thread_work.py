@@ -1,4 +1,4 @@
-"""Work in a thread that asks the main thread for what only that one may do."""
+"""Work in a thread that requests steps from the main thread."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from hairloom.addon.blender.base.thread_work import GivenUpError, ThreadWork
 
 
 def counting(seen: list[Any], last: int) -> Generator[None, None, int]:
-    """Steps that note where they are done, and that they were closed."""
+    """Steps that record their threads, and that they were closed."""
     try:
         for _ in range(last):
             seen.append(threading.current_thread())

@@ -1,4 +1,4 @@
-"""Hair ties in a scene: found, carried, baked, let go of."""
+"""Hair ties in a scene: found, carried, baked, released."""
 
 import json
 
@@ -23,7 +23,7 @@ RADIUS = 0.09
 
 
 def ring(kind="circle", place=(0.0, 0.0, 0.12)):
-    """A ring around z above the head, that goes with it."""
+    """A tie around z above the head, which follows the head."""
     if kind in ("circle", "ball"):
         obj = bpy.data.objects.new("Ring", None)
         obj.empty_display_type = "CIRCLE" if kind == "circle" else "SPHERE"
@@ -52,7 +52,7 @@ def tie(hair, *rings):
 
 
 def wavy():
-    """Strands that stand on the sphere, with slack between root and ring."""
+    """Strands on the sphere, with slack between root and tie."""
     random = np.random.default_rng(5)
     outward = random.normal([0.0, 0.0, 1.0], 0.5, (60, 1, 3))
     outward /= np.linalg.norm(outward, axis=2, keepdims=True)
@@ -65,12 +65,13 @@ def wavy():
 
 @pytest.fixture
 def swinging(new_hair, sphere, tmp_path):
-    """Hair on a head that is thrown about for some frames: (hair, head)."""
+    """Hair on a head that shakes for some frames: (hair, head)."""
     return thrown(new_hair(sphere), sphere, LAST, tmp_path / "bake")
 
 
 def escape(session):
-    """How far held strands are from where they are held, at most [m], where they reach it."""
+    """The largest distance [m] of held strands from their holds, among those long enough to reach
+    them."""
     rig, pose, strands = session.rig, session.solver.pose, grid_of(session)
     holds = rig.holds.where(pose.anchors)
     first = holds.place.astype(int)
@@ -106,7 +107,7 @@ def played(hair, first=1, last=LAST):
 @pytest.mark.alike
 @pytest.mark.parametrize("kind", ["circle", "ball", "curve", "torus"])
 def test_a_ring_of_any_kind_holds_what_passes_through_it(swinging, evaluated, kind):
-    """Those whose direction meets the disc at z = 0.12 within the ring, however it is made."""
+    """It holds the strands that cross its disc at z = 0.12, whatever kind of object it is."""
     hair, _ = swinging
     tie(hair, ring(kind))
     session = previews.start(hair, evaluated())
@@ -134,7 +135,7 @@ def test_held_strands_stay_with_a_ring_that_moves_by_itself(
     hair.hairloom.dynamics.device = device
     one = ring()
     one.keyframe_insert("location", frame=1)
-    one.location.z += 0.002  # as far as these strands reach
+    one.location.z += 0.002  # as far as these strands can reach
     one.keyframe_insert("location", frame=LAST)
     bpy.context.scene.frame_set(1)
     tie(hair, one)
@@ -227,7 +228,7 @@ def test_tips_on_a_mesh_follow_its_deformation(swinging, evaluated):
 
 
 def test_a_renamed_mesh_holds_the_same_tips(swinging, evaluated):
-    """Also where it is read again while its head is in another pose than at rest."""
+    """Also when hair is read again while the mesh is away from its place at rest."""
     hair, _ = swinging
     bpy.ops.mesh.primitive_uv_sphere_add(radius=0.18, segments=24, ring_count=12)
     bun = bpy.context.object
@@ -243,8 +244,8 @@ def test_a_renamed_mesh_holds_the_same_tips(swinging, evaluated):
 
 
 def test_tips_are_held_where_a_vertex_group_says(swinging, evaluated):
-    """Where it is one half between vertices, so within one of them; a bake knows it, and a message
-    names one that is missing."""
+    """Tips are held where the interpolated weight is at least 0.5, tested to within one edge. A
+    bake becomes stale, and a missing group is named."""
     hair, head = swinging
     bpy.ops.mesh.primitive_uv_sphere_add(radius=0.18, segments=24, ring_count=12)
     bun = bpy.context.object
@@ -358,7 +359,7 @@ def test_ties_survive_saving_and_opening(swinging, tmp_path, evaluated):
 
 
 def bone_in(head):
-    """An armature whose one bone moves the head's vertices."""
+    """An armature with one bone that moves all of the head's vertices."""
     bpy.ops.object.armature_add()
     rig = bpy.context.object
     rig.name = "Rig"
@@ -402,7 +403,7 @@ def test_ties_move_with_bones(new_hair, sphere, evaluated, how):
     turned = session.solver.pose.anchors[0, :3, :3]
     assert np.degrees(np.arccos((np.trace(turned) - 1.0) / 2.0)) == pytest.approx(38.0, abs=4.0)
     assert np.linalg.norm((grid_of(session) - begun)[:, -1], axis=1).max() > 0.05
-    # the bone carries head and ring alike, so that the hair is as long between them as before
+    # the bone carries head and tie alike, so the distance between them is unchanged
     root = grid_of(session)[session.rig.holds.strand, 0]
     assert np.isfinite(root).all()
 

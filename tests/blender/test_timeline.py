@@ -1,4 +1,4 @@
-"""Hair follows Blender's timeline: each frame once, the same each time, at rest where it jumps."""
+"""Hair follows Blender's timeline: each frame once, reproducibly, at rest after jumps."""
 
 import math
 
@@ -19,7 +19,7 @@ LAST = 10
 
 @pytest.fixture
 def swinging(new_hair, sphere, evaluated, tmp_path):
-    """Previewed hair on a head that is thrown about: (hair, head, session)."""
+    """Previewed hair on a head that shakes: (hair, head, session)."""
     hair, head = thrown(new_hair(sphere), sphere, LAST, tmp_path / "bake")
     bpy.context.scene.frame_set(5)
     return hair, head, previews.start(hair, evaluated())
@@ -31,7 +31,7 @@ def go(*frames):
 
 
 def lag(session):
-    """How far the tips are from where the style, carried by the head, would have them [m]."""
+    """The largest distance of the tips from their style, carried by the head [m]."""
     head = bpy.data.objects["Head"]
     style = session.source.strands.grid[:, -1] - session.source.strands.grid[:, 0]
     offset = grid_of(session)[:, -1] - grid_of(session)[:, 0] - style
@@ -222,7 +222,7 @@ def test_what_is_not_a_number_ends_the_preview_with_a_reason(what, when, swingin
 
 
 def test_a_driver_that_gives_no_number_is_no_matter(swinging):
-    """Blender itself refuses it."""
+    """Blender itself ignores the value."""
     _, head, session = swinging
     head.driver_add("location", 1).driver.expression = "float('nan')"
     go(1, 2, 3, 4)

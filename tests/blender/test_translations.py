@@ -1,4 +1,4 @@
-"""Texts to translate: all of them are in the template, and a language file reaches Blender."""
+"""Translatable texts are all in the template, and a language file reaches Blender."""
 
 import json
 
@@ -16,8 +16,8 @@ TEXTS_OF_ALL_KINDS = (
     "Colour and shine of the strands",
 )
 
-#: context -> what panels draw beside the names of operators and settings: a text, either of two,
-#: what a button or a field says while it is idle, a heading
+#: context -> texts that panels draw besides names of operators and settings: a text, either of two,
+#: the reason on an idle button or field, a heading
 DRAWN = {
     "*": ("No problems", "Hairstyles", "as the scene", "Cryptomatte"),
     "Operator": ("Add Hair", "To Material", "Select a Head"),

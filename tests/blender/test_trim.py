@@ -1,4 +1,4 @@
-"""Hair in a scene trimmed to meshes and Empties, trimmed again, and taken back."""
+"""Hair is trimmed to meshes and Empties, trimmed again, and restored."""
 
 from itertools import pairwise
 
@@ -54,7 +54,7 @@ def test_hair_ends_on_a_ball_around_the_head(hair):
     after = curve_points(hair.data).reshape(-1, 8, 3)
     reach = np.linalg.norm(after[:, -1], axis=1)
     assert reach.max() < 0.15 + 1e-6
-    assert reach.min() > 0.15 * 0.99  # its facets
+    assert reach.min() > 0.15 * 0.99  # the ball has facets
     assert (after[:, 0] == before.reshape(-1, 8, 3)[:, 0]).all()
     ways = np.cross(after[:, -1], before.reshape(-1, 8, 3)[:, -1])
     assert np.abs(ways).max() < 1e-7
@@ -80,7 +80,8 @@ def test_hair_passes_no_plane_and_follows_it_again_when_it_moves(hair):
 
 
 def bezier_hair(sphere):
-    """Legacy Bézier curves that rise from the sphere, converted to hair curves; the last is low."""
+    """Legacy Bézier curves that rise from the sphere, converted to hair curves; the last one stays
+    low."""
     data = bpy.data.curves.new("Bezier", "CURVE")
     data.dimensions = "3D"
     for height in (0.02, 0.02, 0.001):
@@ -101,7 +102,7 @@ def bezier_hair(sphere):
 
 
 def drawn(hair):
-    """Where Blender draws the curves, as points of each."""
+    """The points of the curves as Blender draws them."""
     tree = bpy.data.node_groups.new("Drawn", "GeometryNodeTree")
     for side in ("INPUT", "OUTPUT"):
         tree.interface.new_socket("Geometry", in_out=side, socket_type="NodeSocketGeometry")
@@ -120,7 +121,7 @@ def drawn(hair):
 
 
 def test_nodes_find_curves_where_they_have_been_trimmed_to(hair):
-    """Even if they have gone along them before, so that Blender has kept what they found."""
+    """Even if nodes have evaluated them before, and Blender has cached the result."""
     before = drawn(hair)[:, 2].max()
     shape = empty(0.12)
     trim(hair, shape)
@@ -130,7 +131,7 @@ def test_nodes_find_curves_where_they_have_been_trimmed_to(hair):
 
 
 def test_bezier_curves_are_drawn_where_they_have_been_trimmed_to(extension, sphere):
-    """And not by handles that stay where they were, or as long as they were."""
+    """Handles must not keep their old places or lengths."""
     hair = bezier_hair(sphere)
     before = drawn(hair)
     assert before[:, 2].max() > 0.07

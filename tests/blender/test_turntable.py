@@ -1,4 +1,4 @@
-"""Turntables and contact sheets: whole turns, whole files, and messages where there are none."""
+"""Turntables and contact sheets: full turns, complete files, and error messages otherwise."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def table(hair: bpy.types.Object, tmp_path: Path) -> Turntable:
 
 
 def data_blocks() -> list[str]:
-    """But for the image in which Blender shows what was rendered last."""
+    """Names of all data-blocks, except the image of the last render."""
     images = [image for image in bpy.data.images if image.type != "RENDER_RESULT"]
     return [block.name for block in (*bpy.data.scenes, *bpy.data.objects, *images)]
 
@@ -77,7 +77,7 @@ def test_one_press_gives_pictures_and_a_video(hair: bpy.types.Object, tmp_path: 
 
 
 def test_a_video_shows_the_pictures_as_they_are(tmp_path: Path) -> None:
-    """Each of one colour, so that only the codec's rounding lies between, and in their order."""
+    """Frames of one colour each, so that only the codec rounds; they are in order."""
     frames, colors = [], [(0.8, 0.1, 0.1), (0.1, 0.7, 0.2), (0.2, 0.3, 0.9)]
     for index, color in enumerate(colors):
         path = tmp_path / f"{index}.png"
@@ -107,7 +107,7 @@ def test_after_a_whole_turn_it_is_the_same_picture(table: Turntable) -> None:
 def test_the_groom_stays_whole_in_view_and_does_not_drift(
     table: Turntable, size: tuple[int, int]
 ) -> None:
-    """Also one that is long to one side of its head, and high up."""
+    """Also if the groom is high up and long to one side of its head."""
     points = table.points.copy() + [0.5, -0.2, 3.0]
     along = np.tile(np.linspace(0.0, 0.4, 16), len(points) // 16)
     points[::7] += along[::7, None] * np.array([1.0, 0.2, 0.0])
@@ -131,8 +131,8 @@ def test_the_groom_stays_whole_in_view_and_does_not_drift(
 @pytest.mark.slow
 @pytest.mark.parametrize(("top", "foot"), [(0.3, 0.3), (0.1, 0.5)])
 def test_feet_are_not_cut_off_however_wide_they_stand(top: float, foot: float) -> None:
-    """A body that is a round pillar or a cone, at all turns: within the picture, and it fills that
-    but for the studio's room around."""
+    """A body that is a pillar or a cone fills the picture at all turns, except for the studio's
+    margin."""
     random = np.random.default_rng(1)
     height, angle = np.array([0.0, 1.8])[random.integers(0, 2, 4000)], random.uniform(0, 6.3, 4000)
     reach = np.where(height > 0.0, top, foot)
@@ -218,7 +218,7 @@ def test_what_fails_leaves_nothing(table: Turntable, monkeypatch: pytest.MonkeyP
 
 @pytest.mark.parametrize("part", [0.1, 0.5, 0.9])
 def test_a_video_on_a_full_disk_is_none(tmp_path: Path, part: float) -> None:
-    """Blender itself calls half a video finished."""
+    """Blender itself takes half a video as finished."""
     pictures = np.random.default_rng(0).random((6, 64, 64, 4)).astype(np.float32)
     frames = [tmp_path / f"f_{number:04}.png" for number in range(len(pictures))]
     for frame, picture in zip(frames, pictures, strict=True):
@@ -277,7 +277,8 @@ def test_a_folder_that_is_a_file_is_named(table: Turntable, tmp_path: Path) -> N
 def test_a_picture_that_another_program_holds_keeps_all_and_the_new_ones(
     table: Turntable, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """By Windows' rules: what is open is not replaced. A turn never is of two grooms."""
+    """Under Windows' rule that open files cannot be replaced, a turn still never mixes two
+    grooms."""
     list(table.steps())
     before = {path.name: path.read_bytes() for path in table.folder.iterdir()}
     held, real = table.files[2], moving.os.replace

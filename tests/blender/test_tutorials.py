@@ -1,4 +1,4 @@
-"""The tutorials: their steps work as they stand, and have their pictures."""
+"""Tutorials: their steps work literally, and their pictures exist."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def test_a_page_has_a_step_of_python_for_each_and_its_pictures(name: str) -> Non
     text = page.read_text(encoding="utf-8")
     numbered = re.findall(r"^\d\. ", text, flags=re.M)
     assert 4 <= len(numbered) <= 6
-    # what is done in an engine has none
+    # the step in an engine has no code
     assert len(numbered) - len(tutorial(name)) == (name == "cards_into_godot")
     pictures = re.findall(r"\]\((\.\./images/\S+)\)", text)
     assert pictures and all((page.parent / each).is_file() for each in pictures)
@@ -53,7 +53,8 @@ def test_a_page_has_a_step_of_python_for_each_and_its_pictures(name: str) -> Non
 
 @pytest.mark.parametrize("name", TUTORIALS)
 def test_what_a_page_names_in_italics_is_on_a_button_or_a_field(name: str) -> None:
-    """Each part of a path such as *Dynamics > Bake* that is ours."""
+    """Each of our names in paths such as *Dynamics > Bake* is a text of the extension or a
+    preset."""
     text = tutorial_page(name).read_text(encoding="utf-8").partition("```")[0].replace("\n", " ")
     texts = "\n".join(
         path.read_text(encoding="utf-8") for path in (REPOSITORY / "addon").rglob("*.py")
@@ -64,12 +65,12 @@ def test_what_a_page_names_in_italics_is_on_a_button_or_a_field(name: str) -> No
     assert missing <= BLENDERS, missing - BLENDERS
 
 
-#: what Blender, an engine or a style's own file has on its buttons
+#: names of buttons in Blender and engines, and of a style's own file
 BLENDERS = {
     *("Add", "Curve", "Properties", "Data", "Render", "Render Animation", "Sculpt Mode", "Comb"),
     *("EEVEE", "Cycles", "Motion Blur", "Project", "Project Settings", "Plugins", "Brows"),
     *("Hairloom", "Delete", "Edit Mode", "Object Mode"),
-    "Head Hair",  # of the sample scene, by the name of its head
+    "Head Hair",  # named after the head of the sample scene
 }
 
 
@@ -80,7 +81,7 @@ def test_first_hair_grows_on_the_scalp_and_turns_red(tmp_path: Path) -> None:
     short = curve_points(hair.data)
     assert len(hair.data.curves) > 800 and previews.session_of(hair) is not None
     walk.step()
-    # hangs from the head, and the longer it is the lower
+    # longer hair hangs lower
     assert curve_points(hair.data)[:, 2].min() < short[:, 2].min() - 0.03
     walk.step()
     look = hair.data.hairloom.shading

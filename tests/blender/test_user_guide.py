@@ -1,4 +1,4 @@
-"""Every panel of Hairloom stands in a picture of the user guide."""
+"""Every panel of Hairloom is in a picture of the user guide."""
 
 import re
 import sys
@@ -44,7 +44,7 @@ def test_the_pictures_show_what_stands_on_the_panels():
 
 
 def test_what_is_kept_of_panels_has_labels_defaults_buttons_and_keyframes():
-    """So that the test above can fail."""
+    """Shows that the test above can fail."""
     now = panel_texts.texts()
     assert {"Guides: 762, no keyframes", "Add Modifier", "Detail: adaptive"} <= set(now["strands"])
     assert "Look: Brown" in now["preferences"]

@@ -1,4 +1,4 @@
-"""Verbs and buttons: what an artist can do in the window, a farm can do without one."""
+"""Whatever an artist can do in the window, a farm can do with verbs."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from hairloom.addon.blender.command_line.verb_docs import page
 
 DOCS = Path(__file__).parents[2] / "docs"
 
-#: buttons that act on a view or a session alone, and leave nothing behind
+#: buttons that act only on a view or a session and change no data
 WINDOW_ONLY = {
     "show_problems",
     "help",
@@ -36,7 +36,7 @@ WINDOW_ONLY = {
     "choose_hairstyle",
     "show_settings",
     "show_export_check",
-    # what is selected in Edit Mode
+    # act on the selection in Edit Mode
     "card_width",
     "card_twist",
     "card_tile",
@@ -120,7 +120,7 @@ def test_the_guide_names_every_verb_and_no_option_that_is_not_there() -> None:
 def test_a_name_that_no_file_can_have_is_named(
     option: str, suffix: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    """pathlib raises where it is asked for a file with a name of over 255 bytes."""
+    """pathlib raises an error for file names longer than 255 bytes."""
     name, picture = "a" * 300 + suffix, tmp_path / "still.png"
     assert run(["render", option, name, "--output", str(picture)]) == 1
     (said,) = [line for line in capfd.readouterr().err.splitlines() if "hairloom:" in line]

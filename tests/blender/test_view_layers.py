@@ -1,4 +1,4 @@
-"""Hair in several view layers: Blender's own strands go out of the way in each, and come back."""
+"""Hair in several view layers: Blender's own strands are hidden in each, and shown again."""
 
 import bpy
 import pytest
@@ -9,7 +9,7 @@ from hairloom.addon.blender.viewport import overlay
 
 @pytest.fixture
 def layers(new_hair, sphere):
-    """Two view layers that both hold the hair, evaluated."""
+    """Two evaluated view layers that both contain the hair."""
     new_hair(sphere)
     found = [bpy.context.view_layer, bpy.context.scene.view_layers.new("Too")]
     update(found)

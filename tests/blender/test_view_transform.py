@@ -1,6 +1,6 @@
-"""What of a scene's view transform a 3D view shows, and that our table shows the same.
+"""The scene's view transform in 3D views, and the table that reproduces it.
 
-That Blender's window shows it so: tests/window/session_look.py.
+tests/window/session_look.py tests it in Blender's window.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def nothing_kept() -> Any:
 
 
 def shading(kind: str = "RENDERED", *, lights: bool = True, world: bool = True) -> Any:
-    """A view's shading; what the other modes have is set against it."""
+    """A view's shading settings; those of the other modes have the opposite values."""
     is_rendered = kind == "RENDERED"
     return SimpleNamespace(
         type=kind,
@@ -51,7 +51,7 @@ def shading(kind: str = "RENDERED", *, lights: bool = True, world: bool = True) 
 
 
 def hair_colours(count: int = 4000) -> np.ndarray[Any, Any]:
-    """As lit hair has them: from black to above white, no channel under an eighth of another."""
+    """Colours as of lit hair: from black to above white, no channel below an eighth of another."""
     random = np.random.default_rng(1)
     level = 2.0 ** random.uniform(-10.0, 3.0, (count, 1))
     return (level * 2.0 ** random.uniform(-3.0, 0.0, (count, 3))).astype(np.float32)
@@ -72,7 +72,7 @@ LOOKS = {
 
 @pytest.mark.parametrize("view", LOOKS.values(), ids=LOOKS)
 def test_the_table_shows_what_blender_saves(view: ColorView) -> None:
-    """A white balance turns the colours away from the axes along which the table is exact."""
+    """With a white balance, colours are off the axes along which the table is exact."""
     hair_worst = 3.0 if view.white_balance is None else 5.0
     display = Display(DisplayTable(shown_by_blender(view, table_radiances())))
     for colours, worst in ((hair_colours(), hair_worst), (all_colours(), 6.0)):
@@ -83,7 +83,7 @@ def test_the_table_shows_what_blender_saves(view: ColorView) -> None:
 
 
 def test_exposure_and_gamma_need_no_other_table() -> None:
-    """They act in front of the transform and behind it, as Blender itself has it."""
+    """They act before and after the transform, as in Blender itself."""
     table = DisplayTable(shown_by_blender(ColorView(transform="AgX"), table_radiances()))
     scene, colours = bpy.context.scene, hair_colours(500)
     scene.view_settings.exposure, scene.view_settings.gamma = 1.5, 1.3
@@ -108,7 +108,7 @@ def test_rgb_curves_are_taken_over() -> None:
 
 
 def saved_by_scene(colours: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
-    """Code values as the open scene itself saves them."""
+    """The display values that the open scene itself saves."""
     scene, path = bpy.context.scene, f"{bpy.app.tempdir}saved.png"
     picture = scene.render.image_settings
     picture.file_format, picture.color_mode, picture.color_depth = "PNG", "RGB", "16"
@@ -198,8 +198,8 @@ def test_a_transform_that_cannot_be_read_is_told_and_not_tried_again(
 def test_a_full_disk_is_no_other_colours_and_nothing_that_python_must_not_see(
     most_bytes: int, tmp_path: Path
 ) -> None:
-    """A picture that is cut short. The error must hold none of the data that Blender has freed:
-    garbage collection then would crash Blender."""
+    """A truncated picture is an error. It must not refer to data that Blender has freed: garbage
+    collection would then crash Blender."""
     held = []
     with full_disk(most_bytes), pytest.raises((OSError, RuntimeError)) as raised:
         shown_by_blender(LOOKS["AgX"], hair_colours())

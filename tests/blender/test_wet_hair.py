@@ -1,4 +1,4 @@
-"""Wet hair in Blender: what acts is not what is stored."""
+"""Wet hair in Blender: water changes the settings in effect, not the stored ones."""
 
 from __future__ import annotations
 
@@ -51,14 +51,14 @@ def test_a_bake_of_dry_hair_is_out_of_date_once_it_is_wet(hair: Any) -> None:
     hair.data.hairloom.shading.wetness = 0.5
     assert settings_part(hair) != before
     hair.data.hairloom.shading.wetness = 0.0
-    hair.data.hairloom.shading.dust = 0.5  # which has no weight
+    hair.data.hairloom.shading.dust = 0.5  # dust has no weight
     assert settings_part(hair) == before
 
 
 def test_hair_that_becomes_wet_is_baked_with_the_children_of_its_first_frame(
     hair: Any, tmp_path: Any
 ) -> None:
-    """Their bake is up to date in each frame, and the preview has its hair."""
+    """The bake is up to date in every frame, and the preview uses its hair."""
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = 1, 3
     hair.hairloom.bake.folder, hair.hairloom.dynamics.device = str(tmp_path / "bake"), "numpy"
@@ -75,7 +75,7 @@ def test_hair_that_becomes_wet_is_baked_with_the_children_of_its_first_frame(
 
 
 def test_hair_made_real_has_its_water_within_it(hair: Any) -> None:
-    """Once: the look of real hair is dry, and its colours are those of wet hair."""
+    """Water counts once: real hair has a dry look, and the colours of wet hair."""
     shading = hair.data.hairloom.shading
     shading.base_color, shading.color_variation, shading.wetness = (0.4, 0.2, 0.1), 0.0, 1.0
     look = GroomSettings.of(hair)[ShadingSettings]

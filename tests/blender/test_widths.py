@@ -1,4 +1,4 @@
-"""How wide strands are: the same in the preview, the engine, cards, bakes and every file."""
+"""Widths of strands are the same in the preview, the engine, cards, bakes and every file."""
 
 from __future__ import annotations
 
@@ -25,7 +25,8 @@ COUNT, POINTS = 60, 40
 
 @pytest.fixture
 def hair(new_hair: Callable[..., Any], sphere: bpy.types.Object) -> bpy.types.Object:
-    """Waves with more points than are simulated, of widths that cannot be hair: they are found."""
+    """Waves with more points than are simulated, and with impossible widths, so that widths are
+    found."""
     outward = np.random.default_rng(1).normal(size=(COUNT, 3))
     outward /= np.linalg.norm(outward, axis=1, keepdims=True)
     along = np.linspace(0.0, 1.0, POINTS)[:, None]
@@ -44,7 +45,8 @@ def hair(new_hair: Callable[..., Any], sphere: bpy.types.Object) -> bpy.types.Ob
 
 @pytest.fixture
 def shown(hair: bpy.types.Object, evaluated: Callable[[], Any]) -> np.ndarray:
-    """Radius of each strand at its root as the preview draws it, (COUNT,) [m]."""
+    """The radius of each strand as the preview draws it, constant along the strand, (COUNT,)
+    [m]."""
     session = previews.start(hair, evaluated())
     assert session.rig.widths.is_found
     radius: np.ndarray = session.rig.strands.radius.reshape(COUNT, -1)
@@ -56,7 +58,7 @@ def shown(hair: bpy.types.Object, evaluated: Callable[[], Any]) -> np.ndarray:
 def test_every_file_has_the_widths_of_the_preview(
     hair: bpy.types.Object, shown: np.ndarray, tmp_path: Path, kind: StrandFormat
 ) -> None:
-    """At all points of the curves, in the unit of each engine."""
+    """At all points of the curves, in each engine's unit."""
     export = getattr(bpy.ops.hairloom, f"export_{kind.name}")
     for layout in kind.layouts:
         path = tmp_path / f"{layout.name}{kind.suffixes[0]}"
@@ -90,7 +92,7 @@ def test_the_engine_draws_the_widths_of_the_preview(
 
 
 def test_own_widths_are_written_as_they_are(hair: bpy.types.Object, tmp_path: Path) -> None:
-    """They taper as the artist drew them, whatever the number of points in the simulation."""
+    """They taper as drawn by the artist, whatever the number of simulated points."""
     taper = np.tile(np.linspace(2.0e-4, 5.0e-5, POINTS), COUNT)
     hair.data.attributes["radius"].data.foreach_set("value", taper.astype(np.float32))
     hair.data.hairloom.widths.method = "own"

@@ -1,4 +1,4 @@
-"""What is read of the world, against Cycles, which another Blender renders it with."""
+"""Light of the world, compared with a rendering by Cycles in another Blender."""
 
 from __future__ import annotations
 
@@ -37,7 +37,8 @@ def uneven() -> np.ndarray:
 
 
 def by_cycles(scene: Any) -> Environment:
-    """The same world by another Blender: a node that changes nothing keeps ours from reading it."""
+    """The same world, rendered by another Blender: a Gamma node of 1 prevents reading it
+    directly."""
     tree, shader = scene.world.node_tree, background(scene)
     gamma = tree.nodes.new("ShaderNodeGamma")
     tree.links.new(shader.inputs["Color"].links[0].from_socket, gamma.inputs["Color"])
@@ -128,7 +129,8 @@ def test_a_mapping_turns_it_as_in_cycles(scene: Any, kind: str) -> None:
 
 @pytest.mark.slow
 def test_the_views_picture_turns_as_blenders_nodes_do(scene: Any, tmp_path: Any) -> None:
-    """Blender lights Material Preview by a Vector Rotate around Z, of the view's own angle."""
+    """Blender's Material Preview rotates the world by a Vector Rotate around Z with the view's
+    angle."""
     node, tree = set_panorama(scene, uneven()), scene.world.node_tree
     node.image.filepath_raw, node.image.file_format = str(tmp_path / "view.exr"), "OPEN_EXR"
     node.image.save()
@@ -142,7 +144,7 @@ def test_the_views_picture_turns_as_blenders_nodes_do(scene: Any, tmp_path: Any)
 
 
 def test_a_sky_is_rendered_once(scene: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its sun stands where the node says; other nodes' values are another sky."""
+    """Its sun has the node's elevation; other values of the node are another sky."""
     tree = scene.world.node_tree
     sky = tree.nodes.new("ShaderNodeTexSky")
     sky.sky_type, sky.sun_size = "MULTIPLE_SCATTERING", np.radians(3.0)
@@ -158,7 +160,7 @@ def test_a_sky_is_rendered_once(scene: Any, monkeypatch: pytest.MonkeyPatch) -> 
     found = read_environment(scene)
     assert not world_notes(scene) and found.harmonics is not None
     assert np.arcsin(found.suns[0].vector[2]) == pytest.approx(0.6, abs=0.02)
-    # bluer above than at the horizon
+    # bluer overhead than at the horizon
     above, beside = light_from(found, np.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]))
     assert above[2] / above[0] > beside[2] / beside[0]
     assert read_environment(scene) is found and len(runs) == 1
@@ -169,7 +171,7 @@ def test_a_sky_is_rendered_once(scene: Any, monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_in_the_window_it_is_rendered_beside(scene: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A plain colour until it is there, and what was there before until another one is."""
+    """Until it arrives, the plain colour is used; later, the previous result."""
     tree = scene.world.node_tree
     gradient = tree.nodes.new("ShaderNodeTexGradient")
     tree.links.new(gradient.outputs["Color"], background(scene).inputs["Color"])

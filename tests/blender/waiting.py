@@ -1,4 +1,4 @@
-"""How tests wait for what a thread makes."""
+"""Waiting for the results of threads."""
 
 import time
 from collections.abc import Callable
@@ -7,14 +7,14 @@ from typing import Any
 from hairloom.addon.blender.base import latest_job
 from hairloom.addon.blender.preview import previews
 
-#: What a thread has to do is done by then [s], however slow the machine.
+#: timeout [s] for work in a thread, however slow the machine
 PATIENCE_S = 120.0
-#: A thread gets on only while the main one sleeps: Python runs one of them at a time.
+#: sleep of the main thread [s]: Python runs one thread at a time, so others need it to sleep
 PAUSE_S = 0.002
 
 
 def until(is_so: Callable[[], Any]) -> None:
-    """Wait until this is so."""
+    """Wait until a condition holds."""
     end = time.monotonic() + PATIENCE_S
     while not is_so():
         assert time.monotonic() < end, "it does not come"
@@ -22,12 +22,12 @@ def until(is_so: Callable[[], Any]) -> None:
 
 
 def until_it_plays(session: Any, evaluated: Callable[[], Any], duration: float) -> None:
-    """Ticks of Play's clock until this hair begins, which waits for its colliders."""
+    """Tick Play's clock until this hair, which waits for its colliders, starts to play."""
     until(lambda: previews.advance(evaluated(), duration) or session.is_playing)
 
 
 def take_steps_until(is_so: Callable[[], Any]) -> None:
-    """Take steps as Blender's timer does, until this is so."""
+    """Run steps as Blender's timer does, until a condition holds."""
 
     def is_so_after_a_step() -> bool:
         if is_so():
