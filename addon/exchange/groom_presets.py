@@ -140,7 +140,7 @@ def _warnings(groom: Groom, written: Groom, preset: GroomPreset) -> list[str]:
     strands = written.strands
     if not strands.strand_count:
         what = "guides" if preset.parts == "guides" else "strands"
-        return [f"The engine will receive no {what}"]
+        return [f"The engine will see no {what}"]
     warnings = []
     zero = int((strands.radius <= 0.0).sum())
     if zero:

@@ -108,7 +108,8 @@ def read_hairstyle(path: Path, kinds: Mapping[str, type[Settings]]) -> Hairstyle
     version = data.get("hairloom_style")
     if version != STYLE_VERSION:
         raise HairloomError(
-            f"style version {version!r} is not known to this Hairloom (it knows {STYLE_VERSION})",
+            f"style version {version!r} is not supported by this Hairloom (it supports "
+            f"{STYLE_VERSION})",
             place=place,
             remedy="Update Hairloom, or choose another style",
         )

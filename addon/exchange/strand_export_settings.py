@@ -202,5 +202,5 @@ def _check_options(kind: StrandFormat, settings: StrandExportSettings) -> None:
             raise HairloomError(
                 f"{kind.title} does not have the option '{parameter.label}'",
                 place=parameter.name,
-                remedy="Leave the option out, or choose another format",
+                remedy="Omit the option, or choose another format",
             )

@@ -159,6 +159,6 @@ def format_of(path: Path, name: str | None = None) -> tuple[Path, StrandFormat]:
         raise HairloomError(
             f"'{path.suffix}' is not the suffix of {named.title}",
             place=str(path),
-            remedy=f"Use {named.suffixes[0]}, or leave out the format",
+            remedy=f"Use {named.suffixes[0]}, or omit the format",
         )
     return path.with_name(path.name + named.suffixes[0]), named

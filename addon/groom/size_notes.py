@@ -34,7 +34,8 @@ def size_note(hair: tuple[str, Floats] | None, head: tuple[str, Floats] | None) 
         options = " ".join(f"{option} 0.01" for option in wrong)
         each = "both" if len(wrong) > 1 else sizes[wrong[0]][0]
         return (
-            f"{large}, as in centimetres or decimetres. Scale {each} by 0.01 ({options}) or by 0.1."
+            f"{large}, as if in centimetres or decimetres. Scale {each} by 0.01 ({options}) "
+            "or by 0.1."
         )
     if "--groom-scale" in sizes and sizes["--groom-scale"][1] < MIN_EXTENT:
         return f"{large}. Import hair with another scale (--groom-scale)."

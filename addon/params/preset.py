@@ -120,7 +120,8 @@ def migrated(data: dict[str, Any], place: str) -> dict[str, Any]:
     version = data.get("hairloom")
     if not isinstance(version, int) or isinstance(version, bool) or version > PRESET_VERSION:
         raise HairloomError(
-            f"preset version {version!r} is not known to this Hairloom (it knows {PRESET_VERSION})",
+            f"preset version {version!r} is not supported by this Hairloom (it supports "
+            f"{PRESET_VERSION})",
             place=place,
             remedy="Update Hairloom",
         )

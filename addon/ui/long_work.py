@@ -208,7 +208,7 @@ def is_free(operator: Any) -> bool:
     if _running is None:
         return True
     esc = "; Esc cancels it" if _is_cancellable() else ""
-    operator.poll_message_set(f"{_running.label} goes on{esc}")
+    operator.poll_message_set(f"{_running.label} is still running{esc}")
     return False
 
 

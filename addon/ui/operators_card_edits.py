@@ -115,9 +115,13 @@ class HAIRLOOM_OT_card_tile(bpy.types.Operator):
                 (
                     "next",
                     "Next",
-                    "Next tile after that of each card, from the last on to the first",
+                    "The tile after that of each card; the first one follows the last",
                 ),
-                ("previous", "Previous", "Previous tile before that of each card"),
+                (
+                    "previous",
+                    "Previous",
+                    "The tile before that of each card; the last one precedes the first",
+                ),
                 ("number", "Number", "The same tile for all cards"),
             ),
         ),

@@ -34,7 +34,7 @@ class HAIRLOOM_OT_trim_to_shape(LongWork, bpy.types.Operator):
             return False
         if any(trim_shapes_of(hair) or _chosen(hair, context) for hair in chosen_hair(context)):
             return True
-        cls.poll_message_set("Select a closed mesh, a flat mesh or an Empty beside the hair")
+        cls.poll_message_set("Select a closed mesh, a flat mesh or an Empty together with the hair")
         return False
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:

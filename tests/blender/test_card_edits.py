@@ -305,7 +305,7 @@ def test_cards_without_uvs_are_refused(hair, capfd):
     places = corners(obj, 3)
     obj.data.uv_layers.remove(obj.data.uv_layers["UVMap"])
     select(hair)
-    with pytest.raises(RuntimeError, match="lost its UV map"):
+    with pytest.raises(RuntimeError, match="its UV map is missing"):
         bpy.ops.hairloom.make_cards()
     np.testing.assert_array_equal(corners(obj, 3), places)
     assert bpy.ops.hairloom.discard_card_edits() == {"FINISHED"}
@@ -448,7 +448,7 @@ def test_cards_that_cannot_be_read_are_drawn_as_made(hair, evaluated):
         scene_events.updated(evaluated())
         scene_events.catch_up(evaluated())
         assert lowest(drawn(session), 3) < edited - 0.9
-        assert any("lost its UV map" in each for each in session.cards.warnings)
+        assert any("its UV map is missing" in each for each in session.cards.warnings)
     finally:
         previews.stop_all()
 

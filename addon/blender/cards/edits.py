@@ -145,7 +145,7 @@ def _tile_layer(mesh: bpy.types.Mesh) -> bpy.types.MeshUVLoopLayer:
     own = [layer for layer in mesh.uv_layers if layer.name != OCCLUSION_LAYER]
     if not own:
         raise HairloomError(
-            "it has lost its UV map, so it is unknown what its cards show",
+            "its UV map is missing, so it is unknown what its cards show",
             place=mesh.name,
             remedy=f"Undo, or give it a UV map called {TILE_LAYER}, or press Discard Edits",
         )

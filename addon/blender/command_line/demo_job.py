@@ -23,7 +23,7 @@ from .verb import Verb
 
 
 def demo(job: Job) -> None:
-    """Do it all: simulate, stills, contact sheet, hair cards, strands and report.json."""
+    """Run everything: simulation, stills, contact sheet, hair cards, strands and report.json."""
     report, folder = job.report, job.output
     pictures = named_pictures(job.options.texture)
     with TemporaryDirectory() as bake:

@@ -45,7 +45,7 @@ from .verb import Verb
 
 
 def export(job: Job) -> None:
-    """Write the strands for an engine, at rest, at a frame of a bake, or over frames."""
+    """Export strands for an engine: at rest, in a frame of a bake, or over several frames."""
     options, report = job.options, job.report
     path, kind = format_of(job.output, options.format)
     if not options.preflight:

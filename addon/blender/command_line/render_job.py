@@ -24,7 +24,7 @@ SHEET_SIZE = 360, 270
 
 
 def render(job: Job) -> None:
-    """Draw a still, at rest or at a frame of a bake, and a contact sheet of its motion."""
+    """Draw a still at rest or in a frame of a bake, and a contact sheet of the motion."""
     options = job.options
     _check(job)
     hair = posed_hair(job)

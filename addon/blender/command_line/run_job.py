@@ -69,7 +69,7 @@ OPERATORS = (*_OF_SCENES, *_OF_PRESETS)
 
 
 def run_operator(job: Job) -> None:
-    """Run one of Hairloom's operators on objects of a scene, with settings; without one, list them.
+    """Run one of Hairloom's operators on objects of a scene, or only change their settings.
 
     Each works as its button does. --preset and --set SECTION.NAME=VALUE change the settings of the
     objects first, --set NAME=VALUE is a property of the operator.

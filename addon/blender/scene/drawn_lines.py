@@ -140,7 +140,7 @@ def new_line(hair: bpy.types.Object, name: str, context: bpy.types.Context) -> b
         raise HairloomError(
             "its surface has no faces below the middle line, so no line can be placed there",
             place=head.name,
-            remedy="Draw a curve on the surface, and select it beside the hair",
+            remedy="Draw a curve on the surface, and select it together with the hair",
         )
     data = bpy.data.curves.new(name, "CURVE")
     data.dimensions = "3D"

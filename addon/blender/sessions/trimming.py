@@ -30,7 +30,7 @@ def trim_to_shapes(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Pa
         raise HairloomError(
             f"it has no trim shape{f' ({reason})' if reason else ''}",
             place=hair.name,
-            remedy="Select a closed mesh, a flat one or an Empty beside the hair",
+            remedy="Select a closed mesh, a flat one or an Empty together with the hair",
         )
     own = read_own_curves(hair, depsgraph, BEFORE_TRIM.before(hair))
     title = f"Trimming {own.strands.strand_count:,} curves"

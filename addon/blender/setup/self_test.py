@@ -112,9 +112,11 @@ def _limits() -> str:
     """The capabilities of the GPU that passes need; a missing texture format is a failure."""
     found = capabilities()
     if found.missing_formats:
-        raise RuntimeError(f"there are no textures as {', '.join(found.missing_formats)}")
+        raise RuntimeError(
+            f"textures of these formats are missing: {', '.join(found.missing_formats)}"
+        )
     if found.dispatch_ms is None:
-        raise RuntimeError("a small compute shader does not write what it should")
+        raise RuntimeError("a small compute shader writes wrong values")
     groups = " x ".join(map(str, found.group_size))
     return (
         f"textures of {found.texture_size:,} texels and {found.texture_layers:,} layers, groups of "

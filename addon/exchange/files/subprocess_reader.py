@@ -96,7 +96,7 @@ def damaged(path: Path, problem: str) -> HairloomError:
     return HairloomError(
         problem,
         place=str(path),
-        remedy="It is cut short, damaged or made otherwise: copy or export it again",
+        remedy="It is cut short, damaged or of another kind: copy or export it again",
     )
 
 

@@ -639,10 +639,10 @@ def test_preflight_warns(change: Any, preset: Any, warning: str) -> None:
 
 def test_preflight_of_nothing_says_so() -> None:
     none = groom().take(np.array([], int))
-    assert preflight(none, UNREAL)["warnings"] == ["The engine will receive no strands"]
+    assert preflight(none, UNREAL)["warnings"] == ["The engine will see no strands"]
     no_guides = replace(groom(), is_guide=np.zeros(6, bool))
     guides = replace(UNREAL, parts="guides")
-    assert preflight(no_guides, guides)["warnings"] == ["The engine will receive no guides"]
+    assert preflight(no_guides, guides)["warnings"] == ["The engine will see no guides"]
 
 
 @pytest.mark.parametrize(
