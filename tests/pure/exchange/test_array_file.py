@@ -1,4 +1,4 @@
-"""Arrays in .npz files: the same as numpy reads, and nothing but ValueError for damage."""
+"""Arrays in .npz files: the same as numpy reads, and only ValueError for damaged files."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ ARRAYS = {
     "names": np.array(["scalp", "fringe"]),
     "none": np.zeros((0, 3), np.int32),
 }
-#: what hurts in the text that describes an array
+#: harmful parts of the text that describes an array
 TOKENS = (b"9" * 30, b"(((", b"-1", b"1e9", b"[" * 3000, b"|O", b"|V0", b"'", b"None", b"\0", b"4,")
 
 
@@ -43,7 +43,7 @@ def test_arrays_are_those_that_numpy_reads(tmp_path: Path) -> None:
 
 
 def described(text: bytes) -> bytes:
-    """A file with one array whose description is this text; its sums are right."""
+    """A file with one array whose description is this text, with valid checksums."""
     head = b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w") as archive:
@@ -112,7 +112,7 @@ def damaged(content: bytes, random: np.random.Generator) -> bytes:
 
 
 def damaged_zip(content: bytes, random: np.random.Generator) -> bytes:
-    """The same with descriptions changed, and sums that are right again."""
+    """The same file with changed descriptions and valid checksums."""
     stream = io.BytesIO()
     with zipfile.ZipFile(io.BytesIO(content)) as old, zipfile.ZipFile(stream, "w") as new:
         for name in old.namelist():

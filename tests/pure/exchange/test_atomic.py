@@ -1,4 +1,4 @@
-"""A file is there complete or not at all."""
+"""A file is written completely or not at all."""
 
 from __future__ import annotations
 
@@ -147,7 +147,7 @@ def test_a_link_stays_a_link(tmp_path: Path) -> None:
 def test_a_file_that_another_program_holds_stays_and_the_new_one_is_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """By Windows' rules: what is open is not replaced."""
+    """As on Windows, where an open file cannot be replaced."""
     target = tmp_path / "groom.tfx"
     target.write_bytes(b"old")
     (tmp_path / "groom new.tfx").write_bytes(b"from before")
@@ -268,7 +268,7 @@ def test_a_write_protected_file_is_refused_before_any_work(
 def test_a_new_file_is_on_the_disk_before_it_has_the_old_ones_mode(
     write: Callable[[Path], None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """With a mode of 0444 nobody but root may open it again."""
+    """With a mode of 0444, only root could open it again to flush it."""
     (tmp_path / "groom.tfx").write_bytes(b"old")
     calls: list[str] = []
     for module, name in ((atomic, "flush"), (file_set, "flush"), (shutil, "copymode")):

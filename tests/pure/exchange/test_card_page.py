@@ -1,4 +1,4 @@
-"""A web page that shows an asset: one file that needs no other, whatever its texts are."""
+"""A web page that shows an asset: one self-contained file, whatever texts it contains."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from hairloom.addon.exchange.cards.card_page import CardPage, page_text
 from hairloom.addon.exchange.cards.glb_file import GlbFile
 from hairloom.addon.exchange.cards.page_asset import small_glb, small_maps
 
-#: what ends an element, begins a comment, is no ASCII, or is a field of the template
+#: text that would end an element, begin a comment or fill a field of the template; not ASCII
 HOSTILE = "</script><script>alert(1)</script> \"Zöpfe\" 'ü' <!-- & {{script}} 头发 </title>"
 
 
 class Reader(HTMLParser):
-    """Elements with their attributes, and the text of each kind."""
+    """The elements of a page with their attributes, and the texts of each kind."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -123,7 +123,7 @@ def test_the_viewer_is_made_of_its_sources() -> None:
 
 
 def glb() -> tuple[bytes, np.ndarray, np.ndarray]:
-    """A GLB with one mesh and one picture; its positions, and its indices."""
+    """A GLB with one mesh and one picture, the mesh's positions, and its indices."""
     draw = np.random.default_rng(5)
     positions = draw.uniform(-0.13, 0.21, (60, 3)).astype(np.float32)
     normals = draw.normal(size=(60, 3))
@@ -166,7 +166,7 @@ def test_rounded_vertices_compress_better() -> None:
 
 
 def maps() -> dict[str, np.ndarray]:
-    """Two tiles beside each other: all hair on the left, none on the right."""
+    """Two tiles side by side: all hair on the left, none on the right."""
     draw = np.random.default_rng(2)
     alpha = np.zeros((64, 128), np.float32)
     alpha[:, :64] = draw.uniform(0.5, 1.0, (64, 64))
@@ -194,7 +194,7 @@ def test_a_pages_maps_are_scaled_down_and_bare_texels_hold_the_mean() -> None:
 
 
 def test_directions_that_are_straight_stay_straight() -> None:
-    """As 8 bits have them: 128 is 0.5, and any other step turned all strands."""
+    """In 8 bits 0.5 is 128; any other value would turn all strands."""
     straight = np.full((8, 8, 3), (0.5, 1.0, 0.5), np.float32)
     small = small_maps({**maps(), "tangent": straight, "normal": straight}, AtlasGrid(2, 1), 128)
     for name in ("tangent", "normal"):

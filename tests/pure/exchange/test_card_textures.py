@@ -1,4 +1,4 @@
-"""Packed textures as files: every preset in every format, names, and writes that fail midway."""
+"""Packed textures as files: every preset in every format, names, and failing writes."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ oiio = pytest.importorskip("OpenImageIO", reason="textures are read and written 
 needs_compressor = pytest.mark.skipif(find_spec("etcpak") is None, reason="there is no etcpak")
 
 SIZE = (48, 32)
-#: between two bytes, so that rounding to them changes nothing
+#: halfway between two bytes, so that rounding to bytes does not matter
 THRESHOLD = 152.5 / 255
 THREE = ("color", "base", "normal", "tangent")
 EACH_FORMAT = [
     pytest.param(each, marks=needs_compressor) if each == "dds" else each for each in FORMATS
 ]
-#: largest error of a value that was not compressed
+#: largest error of an uncompressed value
 STEPS = {"png": 0.51 / 255, "exr": 2.0**-11, "dds_plain": 0.51 / 255}
 
 
 def smooth_maps() -> dict[str, np.ndarray]:
-    """Every map changes in its own way, and goes on where alpha is 0, as the bake has it."""
+    """Maps that all vary differently and continue where alpha is 0, as in a bake."""
     x, y = np.linspace(0, 1, SIZE[1]), np.linspace(0, 1, SIZE[0])[:, None]
     maps = {}
     for index, name in enumerate(MEANINGS):
@@ -105,7 +105,7 @@ def test_dds_files_have_every_level_with_its_coverage(tmp_path: Path) -> None:
 
 
 def test_what_lies_beside_the_hair_never_shows_in_smaller_levels(tmp_path: Path) -> None:
-    """Also in files that hold no alpha themselves."""
+    """Also in files without an alpha channel."""
     alpha = np.zeros((32, 32), np.float32)
     alpha[:, 5::8] = 1.0
     base = np.zeros((32, 32, 3), np.float32)
@@ -121,7 +121,7 @@ def test_what_lies_beside_the_hair_never_shows_in_smaller_levels(tmp_path: Path)
 
 
 def test_the_writer_can_be_another(tmp_path: Path) -> None:
-    """Blender's own, where there is no OpenImageIO."""
+    """Blender writes the textures where there is no OpenImageIO."""
     told = []
 
     def write(path: Path, pixels: np.ndarray, **how: object) -> None:

@@ -1,4 +1,4 @@
-"""DDS files: headers by the specification, and all their levels as OpenImageIO reads them."""
+"""DDS files: headers against the specification, and all levels as OpenImageIO reads them."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ needs_compressor = pytest.mark.skipif(find_spec("etcpak") is None, reason="there
 
 #: DXGI_FORMAT values of dxgiformat.h
 RGBA8, RGBA8_SRGB, BC4, BC5, BC7, BC7_SRGB = 28, 29, 80, 83, 98, 99
-#: bytes of a block of 4 x 4
+#: bytes per block of 4 x 4 texels
 BLOCK = {BC4: 8, BC5: 16, BC7: 16, BC7_SRGB: 16}
 
 
 def smooth_picture(width: int, height: int, channels: int) -> np.ndarray:
-    """Channels that change with each other, as those of pictures do, and no two rows alike."""
+    """A picture with correlated channels, as in photographs, and without equal rows."""
     x, y = np.linspace(0, 1, width), np.linspace(0, 1, height)[:, None]
     channel = [0.5 + 0.45 * np.sin(3.0 * x + (2.0 + k) * y + k) for k in range(channels)]
     return np.stack(np.broadcast_arrays(*channel), axis=-1).astype(np.float32)
@@ -38,7 +38,7 @@ def levels_of(width: int, height: int, channels: int) -> list[np.ndarray]:
 
 
 def read_levels(path: Path) -> list[np.ndarray]:
-    """As OpenImageIO, which has a decoder of its own, has them, row 0 at the bottom."""
+    """All levels as decoded by OpenImageIO, which has its own decoder, row 0 at the bottom."""
     config = oiio.ImageSpec()
     config.attribute("oiio:UnassociatedAlpha", 1)
     source = oiio.ImageInput.open(str(path), config)
@@ -54,7 +54,7 @@ def read_levels(path: Path) -> list[np.ndarray]:
 
 
 def header_of(path: Path) -> dict[str, int | bytes]:
-    """By the documented layout of DDS_HEADER and DDS_HEADER_DXT10, little-endian."""
+    """The fields of DDS_HEADER and DDS_HEADER_DXT10, by their documented layout, little-endian."""
     data = path.read_bytes()[:148]
     names = ["magic", "size", "flags", "height", "width", "pitch", "depth", "levels"]
     found = dict(zip(names, struct.unpack_from("<4s7I", data), strict=True))
@@ -128,7 +128,7 @@ def test_header_and_size(
 
 
 def block_ranges(level: np.ndarray) -> np.ndarray:
-    """(height, width, channels): what each channel spans within a texel's block, in bytes."""
+    """(height, width, channels): the range of each channel in a texel's block [1 / 255]."""
     height, width = level.shape[:2]
     full = np.pad(level, ((0, -height % 4), (0, -width % 4), (0, 0)), mode="edge")
     blocks = full.reshape(full.shape[0] // 4, 4, full.shape[1] // 4, 4, -1)
@@ -144,10 +144,10 @@ def block_ranges(level: np.ndarray) -> np.ndarray:
 def test_every_level_comes_back(
     width: int, height: int, is_compressed: bool, channels: int, tmp_path: Path
 ) -> None:
-    """BC4 and BC5 have 8 values from a block's least to its greatest: an error of a 14th at most.
+    """BC4 and BC5 have 8 values over a block's range, so errors are at most a 14th of it.
 
-    The rest is rounding, ours and the reader's. BC7 fits lines through colours; what channels that
-    bend on their own lose is an experience.
+    More is added by rounding, ours and the reader's. BC7 fits lines through colours; its limit for
+    channels that vary independently is empirical.
     """
     path, levels = tmp_path / "a.dds", levels_of(width, height, channels)
     write_dds(path, levels, is_compressed=is_compressed)
@@ -169,7 +169,7 @@ def test_every_level_comes_back(
 
 @needs_compressor
 def test_colours_are_stored_as_srgb_and_alpha_as_it_is(tmp_path: Path) -> None:
-    """Also where alpha is 0."""
+    """Colours are kept also where alpha is 0."""
     image = np.zeros((16, 16, 4), np.float32) + [0.2, 0.5, 0.05, 0.25]
     image[:8, :, 3] = 0.0
     for is_compressed in (True, False):
@@ -187,7 +187,7 @@ def test_colours_are_stored_as_srgb_and_alpha_as_it_is(tmp_path: Path) -> None:
 
 @needs_compressor
 def test_normal_maps_keep_x_and_y_in_bc5(tmp_path: Path) -> None:
-    """From which an engine has z; plain files keep all three."""
+    """An engine computes z from them. Uncompressed files keep all three."""
     vectors = np.random.default_rng(2).normal(size=(8, 8, 3)) * [0.3, 0.3, 0] + [0, 0, 1]
     vectors /= np.linalg.norm(vectors, axis=-1, keepdims=True)
     vectors = np.repeat(np.repeat(vectors, 4, axis=0), 4, axis=1)
@@ -205,7 +205,8 @@ def test_normal_maps_keep_x_and_y_in_bc5(tmp_path: Path) -> None:
 
 @needs_compressor
 def test_hair_survives_compression(tmp_path: Path) -> None:
-    """Single strands on nothing, the hardest that cards have: alpha, and colours where it is."""
+    """Single strands before nothing, the hardest case of cards: errors of alpha, and of colours
+    where alpha is high."""
     random = np.random.default_rng(9)
     alpha = np.zeros((128, 128), np.float32)
     for middle in random.uniform(4, 124, 20):

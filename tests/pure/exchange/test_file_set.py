@@ -1,4 +1,4 @@
-"""Files that belong together are there all at once, or the old ones stay."""
+"""Files that belong together are replaced all at once, or the old ones stay."""
 
 from __future__ import annotations
 
@@ -73,12 +73,12 @@ def test_what_went_wrong_names_the_files_own_folder(tmp_path: Path) -> None:
 def test_a_disk_that_fills_up_while_files_are_replaced_leaves_what_was_there(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, last: int
 ) -> None:
-    """One of the old files was not there, and is not there then."""
+    """A file that did not exist before does not exist afterwards."""
     write(tmp_path, "old", FILES[:2])
     replace, left = os.replace, [last]
 
     def full(source: Path, target: Path) -> None:
-        # what was there can be put back
+        # old files can be moved back
         if "old" not in Path(source).parts and Path(target).parent == tmp_path:
             left[0] -= 1
             if left[0] == -1:
@@ -140,7 +140,8 @@ def test_a_link_stays_a_link_and_keeps_its_content_in_a_failure(tmp_path: Path) 
 def test_a_writer_killed_while_files_are_replaced_is_finished_by_the_next(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, moved: int
 ) -> None:
-    """Killed after so many files: never old ones and new ones for good."""
+    """Killed after `moved` files: the next writer completes the set, so that old and new files do
+    not stay mixed."""
     write(tmp_path, "old", FILES[:2])
     replace, left = os.replace, [moved]
 
@@ -189,7 +190,7 @@ def test_a_file_that_was_saved_since_is_newer_than_a_killed_writers(
 def test_a_file_that_another_program_holds_keeps_all_and_the_new_ones(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, held: str
 ) -> None:
-    """By Windows' rules: what is open is not replaced."""
+    """As on Windows, where an open file cannot be replaced."""
     write(tmp_path, "old")
     replace = os.replace
 
@@ -213,7 +214,8 @@ def test_a_file_that_another_program_holds_keeps_all_and_the_new_ones(
 def test_who_holds_a_file_is_waited_for_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Windows does not replace an open file; what was never replaced need not be put back."""
+    """As on Windows, where an open file cannot be replaced. Files that were not replaced are not
+    moved back."""
     write(tmp_path, "old")
     moved: list[str] = []
 

@@ -1,4 +1,4 @@
-"""Damaged files of all formats that are read, and writers killed in their work.
+"""Damaged files of all formats that can be read, and writers that are killed while they write.
 
 `bench/_exchange_files.py` does the same with 10,000 files and 100 kills of each format.
 """
@@ -29,7 +29,7 @@ def with_library(kind: str, package: str) -> Any:
 
 
 FORMATS = ("tfx", "hair", "preset")
-#: what libraries parse, in another process that takes its time
+#: formats that libraries parse, slowly, in another process
 APART = tuple(
     with_library(kind, package)
     for kind, package in (("abc", "alembic3d"), ("usdc", "pxr"), ("usda", "pxr"))
@@ -39,7 +39,7 @@ FILES, FILES_APART, KILLS = 150, 6, 6
 
 
 def report(tool: str, *arguments: str) -> dict[str, Any]:
-    """What a tool says in a process of its own, which may crash."""
+    """The report of a tool that runs in its own process, since it may crash."""
     in_package = str(REPOSITORY / "tools" / "in_package.py")
     command = [sys.executable, in_package, tool, *arguments]
     environment = {**os.environ, **same_packages(), "OPENBLAS_NUM_THREADS": "1"}
@@ -64,14 +64,14 @@ def test_damage_to_what_libraries_parse_is_told_too(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", few_in_commits(WRITTEN))
 def test_a_killed_writer_leaves_the_old_file_or_the_new_one(kind: str) -> None:
-    """And what it leaves beside goes with the next write."""
+    """The next write removes its temporary files."""
     found = report("kill_writes", kind, str(KILLS))
     assert (found["trials"], found["failures"], found["leftovers"]) == (KILLS, 0, 0)
     assert found["mixed"] == 0
 
 
 def test_killing_a_plain_writer_is_seen() -> None:
-    """The trials above can fail."""
+    """A writer that is not atomic makes the trials above fail."""
     assert report("kill_writes", "plain", str(KILLS))["failures"] > 0
 
 
@@ -91,7 +91,7 @@ def test_kills_come_in_the_midst_of_writing() -> None:
     ],
 )
 def test_readers_that_fail_are_seen(monkeypatch: pytest.MonkeyPatch, read: Any, seen: str) -> None:
-    """The fuzzing above can fail."""
+    """Bad readers make the fuzzing above fail."""
     monkeypatch.setitem(fuzz_files.READERS, "tfx", read)
     monkeypatch.setattr(fuzz_files, "SLOWEST", 0.5)
     (failure,) = fuzz_files.fuzzed("tfx", 1)["failures"]
@@ -122,7 +122,7 @@ def test_the_files_to_be_damaged_are_sound(kind: str, tmp_path: Path) -> None:
 
 
 def test_a_large_preset_is_refused_before_it_is_read(tmp_path: Path) -> None:
-    """JSON takes twenty times its size and more in memory."""
+    """In memory, JSON takes twenty times its size and more."""
     path = tmp_path / "damaged.tfx"
     path.write_text("[" + "[]," * 400_000 + "[]]")
     fuzz_files.tracemalloc.start()
@@ -133,7 +133,7 @@ def test_a_large_preset_is_refused_before_it_is_read(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("value", ["9" * 400, "Infinity", "-1e999", "9" * 5000, "[" * 100_000])
 def test_values_beyond_reason_are_no_value_of_a_preset(tmp_path: Path, value: str) -> None:
-    """Each of these raises an error of its own in Python: they all become messages."""
+    """Each of these raises another error in Python; all become messages."""
     path = tmp_path / "preset.json"
     values = f'{{"cv_count": {value}}}'
     path.write_text(f'{{"hairloom": 1, "section": "guides", "values": {values}}}')

@@ -1,4 +1,4 @@
-"""A GLB taken apart and put together."""
+"""Reading and writing GLB files."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ pytestmark = pytest.mark.portable
 
 
 def written(content: dict[str, object], binary: bytes) -> bytes:
-    """A GLB by the specification alone."""
+    """A GLB packed by hand from the specification."""
     text = json.dumps(content).encode()
     text += b" " * (-len(text) % 4)
     chunks = struct.pack("<I4s", len(text), b"JSON") + text
@@ -44,7 +44,7 @@ def test_what_is_put_in_is_found() -> None:
 
 
 def test_nodes_of_meshes_are_known_by_name() -> None:
-    """Beside bones, which may have the same name or none."""
+    """Bones can have the same name or none and are ignored."""
     file = GlbFile.of(EMPTY, "x")
     file.append("nodes", {"name": "hair"})
     numbers = [file.append("nodes", {"name": name, "mesh": 0}) for name in ("hair", "Ä")]

@@ -1,4 +1,4 @@
-"""Groom Alembic against the lower level of Alembic's own library, and against foreign files."""
+"""Groom Alembic, read with the low level of Alembic's library, and files of other programs."""
 
 from __future__ import annotations
 
@@ -62,13 +62,13 @@ def groom() -> Groom:
 
 
 def straight(count: int = 2) -> Groom:
-    """One strand, a metre long, that stands at (1, 2, 3)."""
+    """One upright strand, a metre long, with its root at (1, 2, 3)."""
     points = np.array([1.0, 2.0, 3.0]) + np.linspace([0, 0, 0], [0, 0, 1], count)
     return Groom(StrandSet(points, [0, count], np.full(count, 4e-5), [0]))
 
 
 def first_below(path: Path) -> Iterator[tuple[Any, Any]]:
-    """The object below the top one, and what lies below that."""
+    """The single object below the top, with each of its children."""
     top = Abc.IArchive(str(path)).getTop()
     (above,) = list(top.children)
     for each in above.children:
@@ -167,7 +167,8 @@ def test_unity_gets_all_strands_in_an_object_for_each_group(tmp_path: Path) -> N
 
 
 def test_groups_are_in_memory_one_at_a_time(tmp_path: Path) -> None:
-    """Unity's file has an object for each; what Alembic itself keeps is not counted here."""
+    """Unity's file has an object for each group. Memory of Alembic's own library is not counted
+    here."""
     count, groups = 10_000, 40
     points = np.random.default_rng(3).random((count * 16, 3), np.float32)
     strands = StrandSet(
@@ -294,8 +295,8 @@ def moving(path: Path, points: Any, places: Any, *, inherits: bool = True) -> No
     """A curve from (0, 0, 0) to (0, 1, 0) below two transforms, the outer one 5 to the right.
 
     Args:
-        points, places: time [s] -> how far the curve is up, and the inner transform to the right;
-            times at equal steps.
+        points, places: time [s] -> offset of the curve upwards, and of the inner transform to the
+            right, at equal time steps.
     """
 
     def sampling(times: Any) -> int:
@@ -396,7 +397,7 @@ def foreign(path: Path, application: str = "Maya") -> None:
 
 
 def test_bezier_curves_become_points_on_them(tmp_path: Path) -> None:
-    """At thirds, where De Casteljau's construction has them; widths are those of ends, as Blender
+    """Points at thirds, against De Casteljau's construction; widths are those of ends, as Blender
     writes them."""
     archive = Abc.CreateArchiveWithInfo(str(tmp_path / "a.abc"), "Blender", "")
     schema = AbcGeom.OCurves(archive.getTop(), "hair").getSchema()
@@ -522,7 +523,7 @@ def test_missing_files_and_folders_are_told(tmp_path: Path) -> None:
     instead="tests/pure/exchange/test_fuzz.py::test_damage_to_what_libraries_parse_is_told_too"
 )
 def test_damaged_files_are_told_or_read(tmp_path: Path) -> None:
-    """A sample of what was done with thousands: cut files, and bytes by chance among the last."""
+    """A sample of thousands of trials: cut files, and random bytes near the end."""
     path = tmp_path / "a.abc"
     write_groom_alembic(path, groom())
     content, random = path.read_bytes(), np.random.default_rng(3)
@@ -585,7 +586,7 @@ def test_what_cannot_be_written_leaves_the_old_file(tmp_path: Path) -> None:
 
 
 def test_a_full_disk_is_told(tmp_path: Path) -> None:
-    """A limit on the size of files stands for the disk."""
+    """Simulated with a limit on the size of files."""
     path = tmp_path / "a.abc"
     path.write_bytes(b"old")
     with full_disk(2000), pytest.raises(HairloomError, match="this file cannot be written"):
@@ -595,7 +596,7 @@ def test_a_full_disk_is_told(tmp_path: Path) -> None:
 
 
 def test_the_reader_of_curves_is_a_program_of_its_own(tmp_path: Path) -> None:
-    """It must run where the package, and with it Blender, is not."""
+    """It must run without the package, and so without Blender."""
     from hairloom.addon.exchange.alembic import alembic_curves
 
     write_groom_alembic(tmp_path / "a.abc", groom())

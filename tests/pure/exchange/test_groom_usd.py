@@ -1,5 +1,5 @@
-"""Grooms as USD, looked at with OpenUSD's own calls: what a file of ours says, and what ours can
-read of files that others might write."""
+"""Grooms as USD: our files, read with OpenUSD's own API, and our reader on files as other programs
+write them."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SUFFIXES = [".usdc", ".usda", ".usd"]
 
 
 def full_groom() -> Groom:
-    """Strands of different lengths with everything that a groom can say."""
+    """Strands of different point counts with every attribute that a groom can have."""
     random = np.random.default_rng(3)
     offsets = np.concatenate([[0], np.cumsum(COUNTS)])
     points, strands = int(offsets[-1]), len(COUNTS)
@@ -108,7 +108,7 @@ def _primvars(prim: Any) -> list[Any]:
 
 @pytest.mark.parametrize("layout", USD.layouts, ids=lambda layout: layout.name)
 def test_a_strand_of_a_metre_is_where_it_belongs(tmp_path: Path, layout: Any) -> None:
-    """Measured by the stage's own unit and axis: from (1, 2, 3) a metre up."""
+    """In the stage's own unit and axis: from (1, 2, 3) a metre up."""
     strand = StrandSet([[1, 2, 3], [1, 2, 3.5], [1, 2, 4]], [0, 3], [0.0005] * 3, [0])
     space, scale = layout.space, 1.0 / layout.space.per_metre
     write_usd(tmp_path / "a.usda", Groom(strand), up=space.up, scale=scale)
@@ -212,7 +212,7 @@ def test_motion_becomes_time_samples(tmp_path: Path, by_group: bool) -> None:
 def test_long_motion_goes_to_the_file_as_it_comes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Saved after each frame, the file holds what a file saved once does."""
+    """A file that is saved after each frame equals one that is saved once."""
     monkeypatch.setattr("hairloom.addon.exchange.usd.groom_usd._WAITING", 0)
     groom, path, sizes = full_groom(), tmp_path / "a.usdc", []
 
@@ -271,7 +271,7 @@ def add_curves(
     return curves
 
 
-#: The curves' matrices as USD's documentation has them, for (t^3, t^2, t, 1).
+#: Matrices of curves from USD's documentation, for (t^3, t^2, t, 1).
 MATRICES = {
     "bezier": np.array([[-1, 3, -3, 1], [3, -6, 3, 0], [-3, 3, 0, 0], [1, 0, 0, 0]]),
     "bspline": np.array([[-1, 3, -3, 1], [3, -6, 3, 0], [-3, 0, 3, 0], [1, 4, 1, 0]]) / 6,
@@ -280,7 +280,7 @@ MATRICES = {
 
 
 def on_curve(basis: str, points: np.ndarray, pinned: bool, per_segment: int) -> np.ndarray:
-    """Segment by segment, straight from the definition."""
+    """Points on a curve, segment by segment from the definition."""
     if pinned and basis != "bezier":
         ends = 2 * points[0] - points[1], 2 * points[-1] - points[-2]
         points = np.vstack([ends[0], points, ends[1]])
@@ -535,7 +535,7 @@ for path in sorted(Path(sys.argv[2]).iterdir()):
     ],
 )
 def test_damaged_files_are_refused_or_read(tmp_path: Path, suffix: str, count: int) -> None:
-    """Cut, overwritten and shortened files, read in a process of its own that must end well."""
+    """Cut, overwritten and shortened files; the process that reads them must not crash."""
     groom = full_groom()
     write_usd(tmp_path / f"whole{suffix}", groom, motion=motion_of(groom, 2))
     folder = tmp_path / "damaged"

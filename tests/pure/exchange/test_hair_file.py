@@ -32,7 +32,7 @@ def packed(
     transparency: float = 0.0,
     color: tuple[float, float, float] = (1.0, 1.0, 1.0),
 ) -> bytes:
-    """128 bytes of header, field by field, and the blocks."""
+    """A file packed by hand: 128 bytes of header, and the blocks."""
     header = struct.pack("<4s4I", b"HAIR", strands, points, arrays, segments)
     header += struct.pack("<5f", thickness, transparency, *color)
     return header + b"made by hand".ljust(88, b"\0") + b"".join(blocks)
@@ -145,7 +145,7 @@ def test_hair_of_one_colour_stays_so(path: Path, color: float) -> None:
 
 
 def test_written_file_is_what_the_specification_says(path: Path) -> None:
-    """Read back with struct alone; what is the same for all strands stands in the header."""
+    """Read back with struct alone; values that all strands share are in the header."""
     strands = StrandSet(POINTS, np.arange(0, 10, 3), np.full(9, 4e-5), np.zeros(3))
     write_hair_file(path, strands, scale=0.01)
     content = path.read_bytes()

@@ -1,4 +1,4 @@
-"""Hairstyle files: they come back as written, and what is damaged is a clear error."""
+"""Hairstyle files: they are read as written, and damage is a clear error."""
 
 import json
 import pickle
@@ -136,7 +136,7 @@ def test_guides_that_are_damaged_missing_or_code(path: Path) -> None:
         torn = bytearray(whole)
         torn[place] ^= 0xFF
         guides.write_bytes(bytes(torn))
-        # a flipped bit may also be in what nobody reads
+        # a flipped bit may also lie in a part that is not read
         with suppress(HairloomError):
             read_hairstyle(path, ALL_SETTINGS)
     for content in (b"", whole[: len(whole) // 2], pickle.dumps({"root_uv": 1})):

@@ -1,4 +1,4 @@
-"""Mip maps: sizes, coverage, colours without fringes, unit vectors, tiles that stay apart."""
+"""Mip maps: sizes, coverage, colours without fringes, unit vectors, separate tiles."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ THRESHOLD = 0.5
 
 
 def hair_alpha(width: int, height: int, grid: AtlasGrid, seed: int = 3) -> np.ndarray:
-    """Strands that taper and wander, from a few in a tile to many, as a bake covers texels."""
+    """Alpha as in a bake: strands that taper and wander, from few to many per tile."""
     random = np.random.default_rng(seed)
     alpha = np.zeros((height, width), np.float32)
     for tile in range(grid.tile_count):
@@ -63,7 +63,7 @@ def test_levels_go_down_to_one_texel_as_gpus_have_them(width: int, height: int) 
 
 @pytest.mark.parametrize(("width", "height"), [(64, 32), (31, 17), (45, 64)])
 def test_values_are_the_mean_of_the_area(width: int, height: int) -> None:
-    """Of any size: the last texel is the mean of all, and the first level's that of its area."""
+    """At any size, the last texel is the mean of all, and a texel of level 1 that of its area."""
     image = np.random.default_rng(2).random((height, width)).astype(np.float32)
     chain = mip_chain(image)
     np.testing.assert_allclose(chain[-1], image.mean(), atol=1e-6)
@@ -73,7 +73,8 @@ def test_values_are_the_mean_of_the_area(width: int, height: int) -> None:
 
 
 def test_coverage_is_kept_within_a_hundredth() -> None:
-    """Of the whole atlas, and of each tile while it has texels enough to say so; in bytes too."""
+    """For each tile, as long as it has 16 texels, also after rounding to bytes. Plain averaging
+    loses more than two hundredths of the whole."""
     grid = AtlasGrid(4, 2)
     alpha = hair_alpha(1024, 512, grid)
     levels = alpha_chain(alpha, threshold=THRESHOLD, grid=grid)
@@ -103,7 +104,7 @@ def test_coverage_is_kept_for_any_threshold(threshold: float) -> None:
 
 
 def test_hair_neither_vanishes_nor_appears() -> None:
-    """A single strand is there at all levels; a tile without hair, or of opaque hair, stays so."""
+    """A single strand stays visible at all levels; empty and opaque tiles stay as they are."""
     grid = AtlasGrid(3, 1)
     alpha = np.zeros((64, 192), np.float32)
     alpha[:, 100] = 1.0  # a strand in the middle tile
@@ -121,7 +122,7 @@ def test_hair_neither_vanishes_nor_appears() -> None:
 
 
 def test_opaque_hair_stays_opaque() -> None:
-    """Where coverage grows on average, one factor for all alphas would make its middle clear."""
+    """Where averaging raises coverage, one factor for all alphas would make the middle clear."""
     across = np.abs(np.linspace(-1.0, 1.0, 256))
     alpha = np.broadcast_to(np.clip(2.0 - 2.2 * across, 0.0, 1.0), (256, 256)).astype(np.float32)
     for level in alpha_chain(alpha)[:5]:
@@ -130,7 +131,7 @@ def test_opaque_hair_stays_opaque() -> None:
 
 
 def test_colours_have_no_dark_fringes() -> None:
-    """What lies beside the strands, black here, weighs nothing as long as there is hair."""
+    """The colour beside the strands, black here, has no weight as long as there is hair."""
     grid = AtlasGrid(2, 1)
     alpha = hair_alpha(256, 128, grid)
     color = np.array([0.8, 0.5, 0.3], np.float32)
@@ -182,7 +183,7 @@ def test_strand_ids_are_those_of_strands() -> None:
     ("width", "columns"), [(256, 4), (256, 8), (200, 5), (256, 3), (300, 7), (1000, 6)]
 )
 def test_tiles_stay_apart(width: int, columns: int) -> None:
-    """Each tile has a colour of its own: no level mixes them while a tile has four texels."""
+    """Each tile has its own colour, which no level mixes while a tile has four texels."""
     grid = AtlasGrid(columns, 2)
     tile = np.floor((np.arange(width) + 0.5) * columns / width).astype(int)
     row = np.arange(128) // 64

@@ -1,4 +1,4 @@
-"""What else a file depends on is found by the names in it."""
+"""The files that a file depends on are found by the names in it."""
 
 from __future__ import annotations
 

@@ -31,5 +31,5 @@ def test_a_name_that_differs_in_case_alone_is_found(tmp_path: Path) -> None:
     (tmp_path / "Hair.glb").touch()
     assert alike_beside(tmp_path / "Hair.glb") == "" == alike_beside(tmp_path / "hair.fbx")
     assert alike_beside(tmp_path / "nowhere" / "hair.glb") == ""
-    if not (tmp_path / "hair.glb").exists():  # this system tells them apart
+    if not (tmp_path / "hair.glb").exists():  # a case-sensitive file system
         assert alike_beside(tmp_path / "hair.glb") == "Hair.glb"

@@ -1,4 +1,4 @@
-"""The sidecar says what the mesh is and how Scheuermann's passes draw it."""
+"""The sidecar describes the mesh and how Scheuermann's passes draw it."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ SCHEMA = json.loads(
 
 
 def triangles(count: int = 1, **cards: np.ndarray) -> CardMesh:
-    """Triangles beside each other, of which two make a card."""
+    """Triangles side by side; each pair is a card."""
     corners = np.array([[0.0, 0.0, 0.0], [1.0, 2.0, 0.0], [0.0, 0.0, 3.0]])
     return CardMesh(
         positions=np.concatenate([corners + [number, 0.0, 0.0] for number in range(count)]),
@@ -52,7 +52,7 @@ def card_file(**changes: Any) -> CardFile:
 
 
 def read(cards: CardFile) -> dict[str, Any]:
-    """What is in the file, which follows the schema."""
+    """The content of the file, validated against the schema."""
     content = json.loads(sidecar_text(cards))
     jsonschema.Draft202012Validator(SCHEMA).validate(content)
     return content
@@ -93,7 +93,7 @@ def test_every_format_follows_the_schema(file_format) -> None:
 
 
 def test_ranges_tell_groups_layers_and_cards_apart() -> None:
-    """Six triangles of three cards, of which the first comes between the others."""
+    """Six triangles of three cards; the first card comes between the others."""
     mesh = triangles(6, group=np.array([0, 0, 7]), layer=np.array([1, 0, 0]))
     mesh = replace(mesh, card=np.array([1, 1, 0, 0, 2, 2]))
     (level,) = read(card_file(levels=(mesh,)))["levels"]
@@ -146,7 +146,7 @@ def test_levels_are_found_in_the_index_buffer() -> None:
 
 
 def test_many_vertices_need_wide_indices() -> None:
-    """An index of 65,535 is what some engines end a strip with."""
+    """The index 65,535 ends a strip in some engines."""
     for count, kind, width in ((21_845, "uint16", 2), (21_846, "uint32", 4)):
         mesh = triangles(count)
         buffer = index_buffer([mesh])
@@ -191,7 +191,7 @@ def test_textures_beside_are_named_with_how_they_are_read() -> None:
 
 
 def test_a_sidecar_that_is_nested_deeply_is_read_or_none_of_ours(tmp_path: Path) -> None:
-    """Deep enough to be read, perhaps too deep to be walked through, and too deep to be read."""
+    """Depths that can be read, that are perhaps too deep to traverse, and that cannot be read."""
     ours = {f"hair{suffix}" for suffix in (".hairloom.json", ".mtl", ".bin", ".glb")}
     for depth, found in ((400, [ours]), (900, [ours, set()]), (100_000, [set()])):
         nested = (

@@ -1,4 +1,4 @@
-"""What killed writers left beside a file goes with the next write; what others write stays."""
+"""The next write removes temporary files of killed writers, and keeps those of running ones."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from hairloom.addon.exchange.files.stale_temp_files import remove_stale_files, t
 
 @pytest.fixture
 def ended() -> int:
-    """The number of a process that has ended."""
+    """The id of a process that has ended."""
     process = subprocess.Popen([sys.executable, "-c", ""])
     process.wait()
     return process.pid
@@ -70,7 +70,7 @@ def test_what_others_write_or_own_stays(
 def test_what_a_power_cut_or_another_machine_left_goes_after_a_day(
     tmp_path: Path, ended: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A machine that was started again is another place."""
+    """A machine that was restarted counts as another one."""
     with monkeypatch.context() as patched:
         patched.setattr(stale_temp_files, "_here", lambda: "0" * 8)
         file, folder = (left_by(os.getpid(), tmp_path / "a.glb", patched, s) for s in (None, ""))

@@ -1,4 +1,4 @@
-"""The one way in for files of strands: suffixes, axes, scales, and guides."""
+"""`read_strands`, for files of all formats: suffixes, axes, scales, and guides."""
 
 from __future__ import annotations
 
@@ -73,8 +73,8 @@ def test_what_was_written_in_any_format_is_read_by_its_suffix(tmp_path: Path, su
 def test_axes_and_scale_of_every_format_can_be_told(
     tmp_path: Path, suffix: str, scale: float, up: str
 ) -> None:
-    """All but .usdc and .hair are written with Y up; read with Z up, their numbers stay as they
-    are."""
+    """All but .usdc and .hair are written with Y up; read with Z up, their coordinates stay
+    unconverted."""
     path, hair = tmp_path / f"hair{suffix}", groom().strands.points
     write(path, groom())
     read = read_strands(path, up=up, scale=scale, parts="both").strands
@@ -198,7 +198,7 @@ def test_still_hair_that_is_written_at_each_frame_has_no_motion(
 
 
 def stage_of_curves(path: Path, counts: list[int], basis: str = "") -> Usd.Stage:
-    """Curves side by side, each a metre long and straight, of this many points."""
+    """Straight curves side by side, each a metre long, with these point counts."""
     stage = Usd.Stage.CreateNew(str(path))
     UsdGeom.SetStageMetersPerUnit(stage, 1.0)
     UsdGeom.SetStageUpAxis(stage, "Z")

@@ -1,4 +1,4 @@
-"""Strands to files of all four formats by one call, and what is said of them before."""
+"""Writing strands to files of all formats with one call, and the messages before it."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def groom(name: str = "hair", seed: int = 1, *, has_uv: bool = True) -> Groom:
 
 
 def guided(**options: object) -> Groom:
-    """The same with copies of two guides behind, and what rides on them."""
+    """The same with copies of two guides at the end, and all strands' guides and weights."""
     random = np.random.default_rng(5)
     weight = random.dirichlet((1.0, 1.0, 1.0), COUNT)
     guide = random.integers(0, 2, (COUNT, 3))
@@ -82,7 +82,7 @@ def test_the_suffix_says_the_format(suffix: str, tmp_path: Path) -> None:
     read = readers.get(suffix, read_usd)(path)
     strands = read.strands
     assert strands.strand_count == COUNT
-    if suffix != ".tfx":  # eight points there
+    if suffix != ".tfx":  # which has eight points
         np.testing.assert_allclose(strands.points, groom().strands.points, atol=1e-6)
 
 

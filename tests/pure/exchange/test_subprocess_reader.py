@@ -1,4 +1,4 @@
-"""A script that reads a file in another process: however it ends, it is a message."""
+"""A script that reads a file in another process: however it fails, the result is a message."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def run(path: Path, script: str, **options: object) -> None:
 
 @contextmanager
 def begun_processes() -> Iterator[list[subprocess.Popen[bytes]]]:
-    """Those that are started meanwhile."""
+    """The processes that are started within this context."""
     before, begun = subprocess.Popen, []
 
     def popen(*arguments: Any, **options: Any) -> subprocess.Popen[bytes]:
@@ -77,7 +77,7 @@ def test_every_bad_end_is_a_message(path: Path, script: str, message: str) -> No
 
 
 def test_a_script_without_an_end_is_ended(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """However slowly it starts."""
+    """Also if it starts slowly."""
     monkeypatch.setattr(subprocess_reader, "_PATIENCE", 1.0)
     with (
         begun_processes() as begun,
@@ -88,7 +88,7 @@ def test_a_script_without_an_end_is_ended(path: Path, monkeypatch: pytest.Monkey
 
 
 def test_a_child_whose_work_is_given_up_is_ended(path: Path) -> None:
-    """By who no longer waits for it, in the midst of its work or right after its start."""
+    """Whoever no longer waits for it ends it, amid its work or right after its start."""
     number = path.with_name("number")
     endless = f"import os\nopen({str(number)!r}, 'w').write(str(os.getpid()))\nwhile True: pass"
     path.with_name("script.py").write_text(endless)
@@ -138,7 +138,7 @@ PLANTED = "import pathlib; pathlib.Path(__file__).with_name('it_ran').touch()"
 def test_no_code_of_the_current_folder_or_the_environment_is_run(
     path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As in a downloaded project, or with a variable that another program has set."""
+    """Such code could come with a downloaded project, or from a variable that a program sets."""
     planted = tmp_path / "planted"
     planted.mkdir()
     for module in ("ctypes", "numpy", "sitecustomize", "usercustomize", "json"):
@@ -152,7 +152,7 @@ def test_no_code_of_the_current_folder_or_the_environment_is_run(
     run(path, "import ctypes, numpy, json, sys; open(sys.argv[-1], 'w').write('read')")
     assert path.with_name("result").read_text() == "read"
     assert not (planted / "it_ran").exists()
-    monkeypatch.delenv("PYTHONHOME")  # without which the trap would not start at all
+    monkeypatch.delenv("PYTHONHOME")  # with it Python would not start at all
     environment = dict(os.environ)
     subprocess.run([sys.executable, "-c", "import numpy"], env=environment, capture_output=True)
     assert (planted / "it_ran").exists(), "the trap works"

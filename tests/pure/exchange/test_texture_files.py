@@ -1,4 +1,4 @@
-"""Textures through files: every format and depth and back, and files that are no pictures."""
+"""Texture files: every format and depth there and back, and files that are not pictures."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ FORMATS = [(suffix, depth) for suffix, depths in DEPTHS.items() for depth in dep
 
 
 def random_picture(channels: int) -> np.ndarray:
-    """Rows and columns that cannot be mistaken; in the first row alpha is 0."""
+    """A picture in which any swap of rows or columns shows; in the first row alpha is 0."""
     image = np.random.default_rng(7).random((13, 9, channels)).astype(np.float32)
     if channels in (2, 4):
         image[0, :, -1] = 0.0
@@ -49,7 +49,7 @@ def test_values_come_back(suffix: str, depth: str, channels: int, tmp_path: Path
 
 
 def test_colour_stays_where_alpha_is_zero(tmp_path: Path) -> None:
-    """OpenImageIO's own way would make it black."""
+    """By default OpenImageIO would make it black."""
     image = np.full((4, 4, 4), 0.8, np.float32)
     image[..., 3] = 0.0
     for suffix, depth in FORMATS:
@@ -80,7 +80,7 @@ def test_row_zero_is_the_lowest(tmp_path: Path) -> None:
 
 
 def test_the_srgb_curve() -> None:
-    """Against values of IEC 61966-2-1, and there and back."""
+    """Against values of IEC 61966-2-1, and a round trip."""
     linear = np.array([0.0, 0.0031308, 0.18, 0.5, 1.0])
     coded = np.array([0.0, 0.04045, 0.461356, 0.735357, 1.0])
     np.testing.assert_allclose(srgb_encoded(linear), coded, atol=1e-5)
@@ -89,7 +89,7 @@ def test_the_srgb_curve() -> None:
 
 
 def png_header(width: int, height: int) -> bytes:
-    """A PNG that says to be this large, and holds nothing."""
+    """A PNG that declares this size but has no pixels."""
     head = struct.pack(">II5B", width, height, 8, 0, 0, 0, 0)
     chunk = b"IHDR" + head
     return (
@@ -129,7 +129,7 @@ def test_missing_files_and_folders_are_named(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("suffix", "depth"), FORMATS)
 def test_damaged_files_read_as_pictures_or_say_why(suffix: str, depth: str, tmp_path: Path) -> None:
-    """Cut short: always an error. Bytes changed: a picture or an error, and nothing else."""
+    """A cut file always gives an error, changed bytes give a picture or an error."""
     random, path = np.random.default_rng(11), tmp_path / f"texture{suffix}"
     write_texture(path, random_picture(4), is_color=False, depth=depth)
     whole, errors = path.read_bytes(), 0
@@ -181,7 +181,7 @@ def test_a_failed_write_keeps_what_was_there(
 def test_a_full_disk_is_told_and_keeps_what_was_there(
     suffix: str, depth: str, most_bytes: int, tmp_path: Path
 ) -> None:
-    """Not all writers of OpenImageIO say so."""
+    """Not all of OpenImageIO's writers report it."""
     resource = pytest.importorskip("resource", reason="limits are those of POSIX")
     path = tmp_path / f"a{suffix}"
     path.write_bytes(b"old")
@@ -197,7 +197,7 @@ def test_a_full_disk_is_told_and_keeps_what_was_there(
 
 
 def test_packed_textures_are_never_multiplied(tmp_path: Path) -> None:
-    """What lies in the fourth channel is no alpha to an EXR file, and reads back as it was."""
+    """EXR files do not treat the fourth channel as alpha; it is read back as written."""
     image = random_picture(4)
     for suffix, depth in FORMATS:
         path = tmp_path / f"p{suffix}"
@@ -208,7 +208,7 @@ def test_packed_textures_are_never_multiplied(tmp_path: Path) -> None:
 
 
 def straight_spec() -> oiio.ImageSpec:
-    """Asks OpenImageIO for values as they are stored."""
+    """The configuration with which OpenImageIO returns values as they are stored."""
     config = oiio.ImageSpec()
     config.attribute("oiio:UnassociatedAlpha", 1)
     return config
@@ -229,7 +229,7 @@ def test_without_openimageio_there_is_a_plain_message(
 
 @pytest.mark.parametrize(("suffix", "depth"), FORMATS)
 def test_a_file_has_no_time(suffix: str, depth: str, tmp_path: Path) -> None:
-    """So that the same pixels are the same bytes whenever they are written."""
+    """The same pixels give the same bytes whenever they are written."""
     path = tmp_path / f"texture{suffix}"
     write_texture(path, random_picture(3), is_color=False, depth=depth)
     date = oiio.ImageInput.open(str(path)).spec().get_string_attribute("DateTime")

@@ -1,4 +1,4 @@
-"""Packing presets: what each channel holds, what engines disagree about, and unpacking again."""
+"""Packing presets: the content of each channel, the differences between engines, and unpacking."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def channel(preset: str, suffix: str, letter: str, maps: dict[str, np.ndarray]) 
 
 @pytest.mark.parametrize("preset", PRESETS)
 def test_unpacking_by_the_roles_gives_the_maps_back(preset: str) -> None:
-    """By nothing but the words that the sidecar holds."""
+    """Using only the words of the sidecar."""
     maps, found = random_maps(), {}
     for texture in packed(maps, preset):
         assert texture.pixels.shape == (5, 7, len(texture.roles))
@@ -58,7 +58,7 @@ def test_unpacking_by_the_roles_gives_the_maps_back(preset: str) -> None:
 
 
 def test_the_names_and_channels_that_unreal_asks_for() -> None:
-    """Its layouts "Card Default" and "Card Compact", by the names of their slots."""
+    """Against the slot names of its layouts "Card Default" and "Card Compact"."""
     slots = {
         "_Depth": "depth",
         "_Coverage": "alpha",
@@ -94,7 +94,7 @@ def test_the_names_and_channels_that_unreal_asks_for() -> None:
     ],
 )
 def test_green_runs_as_the_engine_has_it(preset: str, suffix: str, is_down: bool) -> None:
-    """Up the picture but in Unreal: a direction that leans to the tip has green above 0.5."""
+    """Upwards, except in Unreal: a direction that leans towards the tip has green above 0.5."""
     maps = random_maps()
     up = np.array([0.6, 0.8, 0.0]) * 0.5 + 0.5
     maps["normal"] = maps["tangent"] = np.broadcast_to(up, (5, 7, 3)).astype(np.float32)
@@ -105,10 +105,10 @@ def test_green_runs_as_the_engine_has_it(preset: str, suffix: str, is_down: bool
 
 @pytest.mark.parametrize(("preset", "suffix"), [("gltf", "_anisotropy"), ("godot", "_flow")])
 def test_anisotropy_stretches_highlights_across_strands(preset: str, suffix: str) -> None:
-    """KHR_materials_anisotropy: roughness grows along the direction; on hair that is across it.
+    """KHR_materials_anisotropy stores the direction of the greater roughness, across the strand.
 
-    The strand's own direction is at a right angle to it, and strength is 1 where the engine
-    looks for it: blue in glTF, alpha in Godot.
+    It is at a right angle to the strand's direction. Strength is 1 in the channel that the engine
+    reads: blue in glTF, alpha in Godot.
     """
     maps = random_maps()
     angle = np.random.default_rng(1).uniform(-np.pi, np.pi, (5, 7))
@@ -173,7 +173,7 @@ def test_what_cannot_be_packed_is_named() -> None:
 
 
 def test_the_documentation_has_the_same_tables() -> None:
-    """docs/card_textures.md, a row for each file."""
+    """docs/card_textures.md has a row for each file."""
     page = Path(__file__).parents[3] / "docs" / "card_textures.md"
     sections = re.split(r"^### (\w+)$", page.read_text(encoding="utf-8"), flags=re.MULTILINE)
     written = dict(zip(sections[1::2], sections[2::2], strict=True))

@@ -1,4 +1,4 @@
-"""Bones of TressFX grooms against bytes packed by hand, and weights against ones known."""
+"""Bones of TressFX grooms against bytes packed by hand, and weights against known ones."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Influence = tuple[int, float]
 def packed(
     strands: list[list[Influence]], names: tuple[str, ...] = NAMES, first_index: int = 0
 ) -> bytes:
-    """A file field by field; strands of fewer than four influences are filled up by none."""
+    """A file packed by hand; strands with fewer than four influences are padded with none."""
     content = struct.pack("<i", len(names))
     for index, name in enumerate(names, first_index):
         text = name.encode() + b"\0"
@@ -48,7 +48,8 @@ def path(tmp_path: Path) -> Path:
 
 
 def test_written_file_is_what_the_loader_reads(path: Path) -> None:
-    """Byte for byte, but for bones of no weight: the first bone instead of none."""
+    """Byte for byte, except that an influence without weight names the first bone instead of
+    none."""
     path.write_bytes(WHOLE)
     weights = read_tfxbone(path)
     write_tfxbone(path, weights)

@@ -70,7 +70,7 @@ def z_up(points: np.ndarray) -> np.ndarray:
 
 
 def from_top(uv: np.ndarray) -> np.ndarray:
-    """v as Direct3D counts it, from the top of the picture."""
+    """UVs with v as in Direct3D, from the top of the picture."""
     return uv * [1.0, -1.0] + [0.0, 1.0]
 
 
@@ -101,7 +101,7 @@ def test_version_3_is_read_as_packed(tmp_path: Path) -> None:
     assert groom.version == "3"
     np.testing.assert_array_equal(groom.strands.grid, z_up(positions()))
     np.testing.assert_allclose(groom.strands.root_uv, from_top(uv))
-    # its header says two follow hairs and both ends held
+    # its header declares two follow hairs and that both ends are held
     assert groom.follow_count == 2 and "2 follow hairs" in groom.notes[0]
     assert groom.is_held.all()
 
@@ -192,7 +192,7 @@ def test_round_trip_is_exact(tmp_path: Path, up: str) -> None:
 
 
 def test_a_metre_at_a_known_place_in_units_of_the_file(tmp_path: Path) -> None:
-    """Y up and centimetres, as TressFX's samples; read back with struct alone."""
+    """Y up and in centimetres, as in TressFX's samples; read back with struct alone."""
     path = tmp_path / "groom.tfx"
     points = [[0.1, 0.2, z] for z in np.linspace(1.0, 2.0, 4)]
     write_tfx(path, StrandSet(points, [0, 4], np.full(4, 5e-5), [0]), scale=0.01)
@@ -210,7 +210,7 @@ def test_colours_go_through_exactly_and_are_resampled_with_the_points(tmp_path: 
     color = np.random.default_rng(0).random((56, 3)).astype(np.float32)
     assert write_tfx(path, replace(strands, color=color)) == ()
     np.testing.assert_array_equal(read_tfx(path).groom.color, color)
-    # colours that are the places stay so
+    # colours that equal positions still do
     places = np.abs(strands.points)
     straight = strands.with_points(np.abs(np.repeat(strands.roots, 8, axis=0)) + places * 0.0)
     straight = straight.with_points(straight.points + np.tile(np.arange(8.0), 7)[:, None])

@@ -1,4 +1,4 @@
-"""USD files that were written to do harm: each is refused in time, and not in this process."""
+"""Malicious USD files: each is refused in time, and in another process."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def nested_prims() -> str:
 
 
 def laughs(levels: int, leaf: str, *, is_instanceable: bool = True) -> str:
-    """Each class holds the one before twice, so that the last one holds 2^levels leaves."""
+    """A file in which each class contains the one before twice, the last one 2^levels leaves."""
     also = "instanceable = true\n " if is_instanceable else ""
     text = ['#usda 1.0\n(defaultPrim = "World")\n', f'class "C0" {{\n{leaf}}}\n']
     for level in range(1, levels + 1):
@@ -78,7 +78,7 @@ def test_a_text_that_refers_to_a_damaged_crate_does_not_reach_this_process(tmp_p
 
 
 def test_a_few_instances_are_hair(tmp_path: Path) -> None:
-    """What is refused above is refused for its size alone."""
+    """A small file of the same kind is read: those above are refused for their size alone."""
     path = tmp_path / "groom.usda"
     path.write_text(laughs(4, CURVE))
     begun = time.perf_counter()
@@ -87,7 +87,7 @@ def test_a_few_instances_are_hair(tmp_path: Path) -> None:
 
 
 def test_many_prims_are_told_of_together(tmp_path: Path) -> None:
-    """A line each would be thousands."""
+    """A line for each would make thousands."""
     path = tmp_path / "groom.usda"
     path.write_text(laughs(4, CURVE))
     notes = read_usd(path).notes
@@ -96,7 +96,7 @@ def test_many_prims_are_told_of_together(tmp_path: Path) -> None:
 
 
 def test_what_is_packed_comes_back() -> None:
-    """Arrays of one layout follow each other in the file; prims differ in what they have."""
+    """Arrays of one layout are concatenated in the file, for prims with different attributes."""
     random = np.random.default_rng(0)
     prims: list[Arrays] = [
         {
@@ -120,6 +120,7 @@ def test_what_is_packed_comes_back() -> None:
 
 
 def test_many_prims_are_a_few_arrays() -> None:
-    """An array in a file costs more than reading a prim: 20,000 prims took 9 s so."""
+    """An array in a file costs more than reading a prim: with arrays for each, 20,000 prims took
+    9 s."""
     prims = [{"points": np.zeros((2, 3)), "name": np.array("a")} for _ in range(1000)]
     assert len(packed(prims)) < 10

@@ -1,4 +1,4 @@
-"""Writers by Windows' rules: long paths, names without case, files that somebody has open."""
+"""Writers under Windows' rules: path length, names without case, open files."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def write_alone(path: Path) -> None:
 
 
 def deep(folder: Path, length: int) -> Path:
-    """A folder whose path has this many letters."""
+    """A new folder whose path has this many letters."""
     while len(str(folder)) < length:
         folder /= "x" * min(50, max(length - len(str(folder)) - 1, 1))
     folder.mkdir(parents=True)
@@ -41,7 +41,7 @@ def deep(folder: Path, length: int) -> Path:
 def test_a_path_that_is_too_long_is_said_to_be(
     tmp_path: Path, write: Callable[[Path], None]
 ) -> None:
-    """The file's own path would be short enough, but not the one while it is written."""
+    """The file's own path is short enough, but that of its temporary file is not."""
     path = deep(tmp_path, LIMIT - 30) / "groom.tfx"
     path.write_bytes(b"old")
     assert len(str(path)) < LIMIT
@@ -70,7 +70,7 @@ def test_another_reason_is_not_taken_for_the_length(tmp_path: Path) -> None:
 
 
 def test_a_neighbour_whose_name_differs_in_case_is_kept(tmp_path: Path) -> None:
-    """There both names are the same file, so that the new one would replace it."""
+    """On Windows both names are one file, so the new one would replace it."""
     own = tmp_path / "HAIR_BASE.PNG"
     own.write_bytes(b"the artist's")
     with windows_rules():
@@ -97,7 +97,7 @@ def test_a_file_that_is_open_stays_and_the_new_ones_are_kept(
 
 
 def test_what_a_killed_writer_left_may_be_open(tmp_path: Path) -> None:
-    """A virus scanner looks at it: it goes with a later writer."""
+    """A virus scanner may have it open; then a later writer removes it."""
     folder = temporary_beside(tmp_path / "a.tfx", suffix="")
     file = temporary_beside(tmp_path / "b.tfx")
     dead = [each.with_name(each.name.replace(f"-{os.getpid()}-", "-99999999-")) for each in

@@ -1,4 +1,4 @@
-"""A head for the tests of this room: an egg with UVs, upright, facing -Y."""
+"""A head for the tests of `groom/`: an egg with UVs, upright, facing -Y."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def egg() -> Surface:
 
 
 def _welded(positions: np.ndarray) -> np.ndarray:
-    """For each vertex the first one at its place, so that normals see no seam."""
+    """For each vertex the first one at its place, so that normals have no seam."""
     _, first, inverse = np.unique(
         positions.round(9), axis=0, return_index=True, return_inverse=True
     )

@@ -1,4 +1,4 @@
-"""Automatic children: as many as cover a body, counted by rays through strands as capsules."""
+"""Automatic children: as many as cover a body, counted with rays through strands."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SIDE = 0.2  # [m]
 
 
 def fur(across: int, length: float, factor: float = 1.0) -> StrandSet:
-    """Straight strands on a square, evenly but for a little chance, that lean by 60 degrees."""
+    """Straight strands on a square, in a slightly random grid, that lean by 60 degrees."""
     step = (np.arange(across) + 0.5) / across
     places = np.stack(np.meshgrid(step, step), axis=-1).reshape(-1, 2) - 0.5
     places += np.random.default_rng(1).uniform(-0.3, 0.3, places.shape) / across
@@ -55,7 +55,7 @@ def rig_of(strands: StrandSet, head: Surface | None, method: str = "auto") -> ri
 
 
 def hits(rig: rig_flow.Rig, rays: int = 400) -> Floats:
-    """How many strands each of some rays meets that go straight down to the middle, (rays,)."""
+    """The number of strands that random vertical rays in the middle meet, (rays,)."""
     place = np.random.default_rng(2).uniform(-0.25, 0.25, (rays, 2)) * SIDE
     grid = rig.strands.grid[..., :2].astype(np.float64)
     radius = rig.strands.radius.reshape(len(grid), -1)[:, 0]
@@ -76,7 +76,7 @@ def test_few_strands_get_the_children_that_cover_the_body(across: int, length: f
         rig_of(fur(across, length), sheet(), "none"),
         rig_of(fur(across, length), sheet()),
     )
-    # seen from above, leaning hair is 0.87 as long
+    # sin(60 degrees): the length of leaning hair seen from above
     assert hits(covered).mean() >= 0.87 * 4.0 > hits(bare).mean()
     assert (hits(covered) == 0.0).mean() < 0.05 < (hits(bare) == 0.0).mean()
     assert f"{covered.child_count:,} added, since {across**2:,} curves" in covered.children_line
@@ -85,7 +85,7 @@ def test_few_strands_get_the_children_that_cover_the_body(across: int, length: f
 
 
 def test_the_same_light_is_blocked_with_and_without() -> None:
-    """What a strand stands for beyond its width is either width of children or extinction."""
+    """The hair that a strand represents beyond its width becomes children or extinction."""
     blocked = []
     for method in ("none", "auto"):
         rig = rig_of(fur(32, 0.05), sheet(), method)
@@ -97,7 +97,7 @@ def test_the_same_light_is_blocked_with_and_without() -> None:
 @pytest.mark.slow(instead="test_few_strands_get_the_children_that_cover_the_body")
 @pytest.mark.parametrize("across", [60, 120])
 def test_long_hair_gets_strands_of_a_few_hairs(across: int) -> None:
-    """They cover the body, but would look like noodles from near."""
+    """Strands that just cover the body would look like noodles from near."""
     rig = rig_of(fur(across, 0.2), sheet())
     each = rig.widths.hairs
     assert each == pytest.approx(3.5, rel=0.1)
@@ -114,7 +114,7 @@ def test_enough_strands_stay_as_combed() -> None:
 
 
 def test_a_few_curves_may_be_anything() -> None:
-    """Guides, fly-aways, whiskers: the artist decides."""
+    """They could be guides, fly-aways or whiskers, so the artist decides."""
     rig = rig_of(fur(30, 0.2), sheet())
     assert rig.child_count == 0 and "900 curves may be guides" in rig.children_line
     assert rig_of(fur(1, 0.2), sheet()).children_line == ""
@@ -122,7 +122,7 @@ def test_a_few_curves_may_be_anything() -> None:
 
 @pytest.mark.slow
 def test_brows_and_lashes_get_none_and_keep_their_widths() -> None:
-    """However few strands the head of hair beside them has."""
+    """However few strands the rest of the hair has."""
     brows, widths = fur(12, 0.004, 0.2), []
     face = replace(brows, group=np.full(brows.strand_count, BROWS))
     for across in (40, 80):
@@ -159,7 +159,7 @@ def test_no_unit_of_length_is_assumed(factor: float) -> None:
 
 
 def test_children_are_as_straight_as_their_curves() -> None:
-    """Short hair does not get the frizz of a head of hair, and baby hair bends but a little."""
+    """Short hair does not get the frizz of long hair, and baby hair bends only a little."""
     rig = rig_of(fur(32, 0.05), sheet())
     assert rig.child_count > 0
     grid = rig.strands.grid.astype(np.float64)
@@ -169,7 +169,7 @@ def test_children_are_as_straight_as_their_curves() -> None:
 
 
 def test_a_row_of_lashes_is_left_alone() -> None:
-    """Lashes cover nothing."""
+    """Lashes cover no skin."""
     across = np.linspace(-0.015, 0.015, 1024)
     root = np.stack([across, 0.3 * across**2, 0.0 * across], axis=1)
     points = root[:, None] + np.linspace(0.0, 0.009, 5)[:, None] * np.array([0.0, 0.6, 0.8])

@@ -1,4 +1,4 @@
-"""Roots like blue noise: every beginning the same and spread, as dense as asked for."""
+"""Blue-noise roots: a smaller number is the beginning of a larger one, spread by the density."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def points(surface: Surface, roots: Samples) -> Floats:
 
 
 def nearest(of: Floats) -> Floats:
-    """Distance of each point to the nearest other one, (n,), by looking at all."""
+    """Distance of each point to the nearest other one, (n,), by brute force."""
     squared = ((of[:, None] - of[None]) ** 2).sum(axis=2)
     np.fill_diagonal(squared, np.inf)
     return np.sqrt(squared.min(axis=1))
@@ -76,7 +76,7 @@ def test_roots_have_names_of_their_own(egg: Surface) -> None:
 @pytest.mark.alike
 @pytest.mark.parametrize("factor", [1e-3, 1.0 / 1024.0, 1.7, 1e3, 1024.0])
 def test_another_size_hardly_changes_the_roots(egg: Surface, factor: float) -> None:
-    """Rounding differs there, and none at all between sizes whose ratio is a power of two."""
+    """Only rounding differs, and not even that if the ratio is a power of two."""
     sized = replace(egg, positions=egg.positions * np.float32(factor))
     one, other = spread(egg, 5000, None, 1), spread(sized, 5000, None, 1)
     places = dict(zip(one.key.tolist(), one.barycentric, strict=True))
@@ -88,7 +88,7 @@ def test_another_size_hardly_changes_the_roots(egg: Surface, factor: float) -> N
 
 
 def test_an_edit_changes_the_roots_beside_it_alone() -> None:
-    """A triangle that is moved away, of 288: nearly all roots of the others stay."""
+    """If one of 288 triangles is removed, nearly all roots of the others stay."""
     surface = sheet()
     moved = surface.triangles.copy()
     moved[100] = 0
@@ -99,7 +99,7 @@ def test_an_edit_changes_the_roots_beside_it_alone() -> None:
 
 
 def test_a_part_of_a_surface_has_the_roots_of_the_whole_there() -> None:
-    """As far as no dart was kept out by one beyond the border, and as one kept out by that."""
+    """Except near the border, where darts beyond it reject others, which reject others in turn."""
     pieces = Pieces.of(sheet(), None)
     left = pieces.take(pieces.point[..., 0].max(axis=1) < 0.51)
     whole = spread_roots(pieces, 1000, 1)
@@ -118,10 +118,10 @@ def test_roots_lie_inside_their_triangles(egg: Surface) -> None:
 
 
 def test_every_beginning_is_spread_like_blue_noise() -> None:
-    """Distances of nearest neighbours against those of a hexagonal grid, the best there is.
+    """Distances of nearest neighbours against those of a hexagonal grid, the optimum.
 
-    White noise has a mean of 0.47 and hardly any least distance; darts alone, thrown until no more
-    fit, have a least distance of 0.77.
+    White noise has a mean of 0.47 and a minimum near 0; pure dart throwing, until no more fit, has
+    a minimum of 0.77.
     """
     surface = sheet()
     roots = points(surface, spread(surface, 3000, None, 1))
@@ -137,7 +137,7 @@ def test_every_beginning_is_spread_like_blue_noise() -> None:
 
 
 def test_distances_follow_the_density() -> None:
-    """Sixteen times as dense is four times as near, and neither half lies closer than its own."""
+    """With sixteen times the density, distances are a quarter; both halves keep their minimum."""
     surface = sheet()
     density = np.where(surface.positions[:, 0] < 0.5, 1.0, 16.0)
     roots = points(surface, spread(surface, 3000, density, 2))
@@ -150,9 +150,9 @@ def test_distances_follow_the_density() -> None:
 
 
 def test_counts_follow_area_and_density(egg: Surface) -> None:
-    """Roots in slices of the egg against the integral of the density over them, as chi-square.
+    """The chi-square of roots in slices of the egg against the integral of the density.
 
-    Of white noise chi-square has the mean of its degrees of freedom, here 11; of blue noise less.
+    For white noise its mean is the degrees of freedom, here 11; for blue noise it is smaller.
     """
     density = 1.2 + np.sin(20.0 * egg.positions[:, 2]).astype(np.float64)
     count = 20_000
@@ -172,7 +172,8 @@ def test_counts_follow_area_and_density(egg: Surface) -> None:
 
 
 def test_density_is_linear_within_a_triangle() -> None:
-    """One triangle, dense at one corner: b has the density b, whose mean is 1 / 2."""
+    """One triangle with density at one corner: its coordinate b has the density b, and the mean
+    1 / 2."""
     surface = Surface([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
     barycentric = spread(surface, 4000, np.array([1.0, 0.0, 0.0]), 6).barycentric
     assert barycentric.mean(axis=0) == pytest.approx([0.5, 0.25, 0.25], abs=0.005)
@@ -203,13 +204,14 @@ def test_nowhere_to_grow_is_told(egg: Surface) -> None:
 
 
 def stacked_sheets() -> Surface:
-    """A thousand faces on top of each other, which share the room of one."""
+    """A thousand coincident faces."""
     triangles = np.tile([[0, 1, 2]], (1000, 1))
     return Surface([[0, 0, 0], [1, 0, 0], [0, 1, 0]], triangles)
 
 
 def needle_and_dust() -> Surface:
-    """A sliver a million times as long as wide, one without area, and specks around a point."""
+    """A sliver a million times as long as wide, one without area, and tiny triangles around a
+    point."""
     speck = np.random.default_rng(8).normal(0.0, 1e-6, (300, 3)) + [0.5, 0.5, 0.5]
     corners = [[0, 0, 0], [1, 0, 0], [0, 1e-6, 0], [0, 0, 1], [0, 0, 2], [0, 0, 3]]
     return Surface(np.concatenate([corners, speck]), np.arange(306).reshape(-1, 3))
@@ -229,7 +231,8 @@ def test_odd_surfaces_get_their_roots_in_order(surface: Surface) -> None:
 
 
 def test_a_full_surface_goes_on_with_plain_roots(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where every level counts as full, all after the first are plain, in an order of their own."""
+    """If every level counts as full, all roots after the first level are white noise, in a fixed
+    order."""
     monkeypatch.setattr(blue_noise, "_FULL", 2.0)
     monkeypatch.setattr(blue_noise, "_FIRST_SURE", 0.0)
     surface = sheet()

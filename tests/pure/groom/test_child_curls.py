@@ -1,4 +1,4 @@
-"""Children that curl, by the formula of helices, and those that fly away."""
+"""Children that curl, against the formula of a helix, and fly-aways."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def grown(wanted: ChildrenSettings, cv_count: int = 9) -> Floats:
 
 
 def helix_length(wanted: ChildrenSettings) -> float:
-    """Of the helix around a straight guide, by 100,000 chords."""
+    """The length of the helix around a straight guide, by 100,000 chords."""
     part, size = np.linspace(0.0, 1.0, 100_001), typical(standing().lengths())
     radius = wanted.curl * size * along(wanted.curl_along, part)
     angle = 2.0 * np.pi * part * LENGTH / (wanted.curl_length * size)
@@ -106,7 +106,7 @@ def test_without_curls_and_fly_aways_nothing_changes() -> None:
 
 
 def test_combed_children_curl_and_stray_as_they_grew() -> None:
-    """Their shapes follow from what they keep, bit for bit."""
+    """Shapes computed again from the stored growth are the same, bit for bit."""
     wanted = settings(curl=0.03, fly_aways=0.3, clump=0.5, frizz=0.01, length_variation=0.3)
     guides = standing()
     made = make_children(guides, SURFACE, wanted, place="test")
@@ -132,11 +132,11 @@ def test_fly_aways_stray_smoothly_and_the_farther_the_nearer_to_their_tips() -> 
     grid = grown(settings(strand_count=2000, fly_aways=1.0), cv_count=17)
     away = np.linalg.norm(grid - [0.0, 0.0, 1.0] * grid[..., 2:], axis=2).mean(axis=0)
     assert (np.diff(away) > 0.0).all()
-    assert (np.diff(away, n=2) > -1e-4 * LENGTH).all()  # it leaves its path along it
+    assert (np.diff(away, n=2) > -1e-4 * LENGTH).all()  # it leaves its path tangentially
     assert 0.05 < away[-1] / LENGTH < 0.35
     step = np.diff(grid, axis=1)
     step /= np.linalg.norm(step, axis=2, keepdims=True)
     turn = np.arccos(np.clip(np.einsum("scj,scj->sc", step[:, 1:], step[:, :-1]), -1.0, 1.0))
-    # the tangent is at most 0.55 (1 + 1) and grows with the part, its wave turns 0.8 times
+    # the tangent is at most 0.55 (1 + 1), grows along the strand, and its wave turns 0.8 times
     most = 0.55 * (2.0 + 2.0 * np.pi * 0.8) / 16
     assert turn.max() < most

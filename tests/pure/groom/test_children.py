@@ -1,4 +1,4 @@
-"""Children: a smaller number is the beginning of a larger one, and none crosses what parts hair."""
+"""Children: a smaller number is the beginning of a larger one, and none crosses a parting."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from hairloom.addon.strands.nearest import nearest_points
 
 
 def spread_guides(surface: Surface, count: int = 100, seed: int = 1) -> StrandSet:
-    """Guides at random places of a sheet from 0 to 1, each with a way of its own, mostly up."""
+    """Guides at random places of a sheet from 0 to 1, in random, mostly upward directions."""
     random = np.random.default_rng(seed)
     root = random.random((count, 3)) * [1.0, 1.0, 0.0]
     return guides_at(surface, root, random.normal(0.0, 0.05, (count, 3)) + [0.1, 0.0, 0.5])
@@ -47,7 +47,7 @@ def groomed(egg: Surface) -> StrandSet:
 def test_more_children_move_none(
     egg: Surface, groomed: StrandSet, way: str, is_painted: bool
 ) -> None:
-    """Bit for bit, over the count at which clumps get clumps of their own."""
+    """Bit for bit, also beyond the count at which clumps get clumps of their own."""
     density = np.maximum(egg.positions[:, 2], 0.0) if is_painted else None
     values = {"clump": 0.8, "clump_size": 5, "frizz": 0.002, "length_variation": 0.3}
     values |= {"baby_hair": 0.7}
@@ -98,7 +98,7 @@ def test_children_are_bound_where_they_start(egg: Surface, groomed: StrandSet) -
 
 
 def test_children_grow_among_guides_and_end_where_they_end() -> None:
-    """Guides in two squares of one sheet; a gap between them of ten spacings stays bare."""
+    """Guides in two rectangles of one sheet; a gap of ten spacings between them stays bare."""
     surface = sheet(40)
     x, y = np.meshgrid(np.linspace(0.1, 0.3, 9), np.linspace(0.1, 0.9, 33))
     left = np.stack([x.ravel(), y.ravel(), 0.0 * x.ravel()], axis=1)
@@ -117,7 +117,7 @@ def test_children_grow_among_guides_and_end_where_they_end() -> None:
     columns, _, _ = np.histogram2d(
         at[:, 0], at[:, 1], bins=[[0.1, 0.2, 0.3], np.linspace(0.1, 0.9, 9)]
     )
-    assert columns.min() > 0.8 * columns.max()  # everywhere between guides alike
+    assert columns.min() > 0.8 * columns.max()  # evenly between guides
 
 
 def test_sparse_guides_are_as_good_as_dense_ones() -> None:
@@ -147,7 +147,7 @@ def test_the_inside_of_a_shell_stays_bare() -> None:
 
 
 def test_few_guides_on_one_large_triangle_get_all_their_children() -> None:
-    """A hundred thousandth of the triangle's area is near guides."""
+    """Only a hundred-thousandth of the triangle's area is near guides."""
     surface = Surface([[-50, -50, 0], [100, -50, 0], [-50, 100, 0]], [[0, 1, 2]])
     guides = spread_guides(surface, 50)
     at = make_children(guides, surface, settings(), place="test").strands.roots
@@ -169,8 +169,8 @@ def test_a_density_says_where_and_how_many() -> None:
 
 
 def test_a_brush_moves_those_alone_that_it_touches() -> None:
-    """Of fewer where it paints less, all were there before; elsewhere more are added, as there are
-    as many of all."""
+    """Where less density is painted, a part of the former roots stays; elsewhere more are added,
+    since the total is constant."""
     surface = sheet(20)
     guides = spread_guides(surface, 300)
     away = np.linalg.norm(surface.positions[:, :2] - [0.4, 0.5], axis=1)
@@ -250,7 +250,7 @@ def test_groups_are_never_mixed(egg: Surface, groomed: StrandSet, way: str) -> N
 
 
 def combed_apart() -> tuple[Surface, StrandSet]:
-    """A flat scalp parted at x = 0.5: hair falls to the left of it and to the right."""
+    """A flat scalp parted at x = 0.5, with hair that falls to the left and to the right."""
     surface = sheet()
     random = np.random.default_rng(2)
     root = random.random((150, 3)) * [1.0, 1.0, 0.0]
@@ -261,7 +261,7 @@ def combed_apart() -> tuple[Surface, StrandSet]:
 
 @pytest.mark.parametrize("way", ["multi", "single"])
 def test_a_parting_stays(way: str) -> None:
-    """Every child goes to one side in full; if partings are mixed some go nowhere."""
+    """Every child falls entirely to one side; if partings are mixed, some fall to none."""
     surface, guides = combed_apart()
 
     def least_sideways(**values: Any) -> float:
@@ -272,12 +272,13 @@ def test_a_parting_stays(way: str) -> None:
     assert least_sideways(parting=np.radians(60.0)) > 0.299
     if way == "multi":
         assert least_sideways(parting=np.pi) < 0.15
-    # nor do clumps reach across: one that did would turn its members back
+    # nor do clumps reach across, which would turn their members back
     assert least_sideways(parting=np.radians(60.0), clump=1.0) > 0.2
 
 
 def test_three_guides_of_which_two_go_apart_are_not_mixed() -> None:
-    """Fanned out by 40 degrees each: the outer two are 80 apart, more than the parting allows."""
+    """Fanned out by 40 degrees each, so that the outer two are 80 apart, beyond the parting
+    angle."""
     surface = sheet()
     angle = np.radians(np.linspace(-80.0, 80.0, 5))
     way = np.stack([np.sin(angle), 0.0 * angle, np.cos(angle)], axis=1)
@@ -297,7 +298,7 @@ def test_three_guides_of_which_two_go_apart_are_not_mixed() -> None:
 
 
 def turned(grid: Floats) -> Floats:
-    """A quarter of a circle in place of each straight strand."""
+    """Straight strands replaced with quarter circles."""
     angle = np.linspace(0.0, 0.5 * np.pi, grid.shape[1])
     arc = np.stack([1.0 - np.cos(angle), 0.0 * angle, np.sin(angle)], axis=1) * 0.3
     return grid[:, :1] + arc
@@ -313,7 +314,7 @@ def test_lengths_lie_in_the_range_and_on_the_way_of_the_guides() -> None:
     assert share.min() == pytest.approx(0.4, abs=0.02)
     assert share.max() == pytest.approx(1.0, abs=0.02)
     assert share.mean() == pytest.approx(0.7, abs=0.02)
-    # all points stay on the circle, the tips along the circle at the length that is left
+    # all points stay on the circle, and tips are at the remaining length along it
     middle = cut.roots + np.array([0.3, 0.0, 0.0], np.float32)
     away = np.linalg.norm(cut.grid - middle[:, None], axis=2)
     assert away == pytest.approx(np.full(away.shape, 0.3), abs=1e-3)  # chords would be 1.4e-3 off
@@ -322,12 +323,12 @@ def test_lengths_lie_in_the_range_and_on_the_way_of_the_guides() -> None:
 
 
 def test_scattered_children_differ_from_their_neighbours_as_guides_do() -> None:
-    """Else fur lies in patches around its guides, each of which answers light in its own way."""
+    """Otherwise fur would form patches around its guides that reflect light differently."""
     surface, guides = sheet(), spread_guides(sheet(), 400)
     ways = guides.grid[:, -1] - guides.grid[:, 0]
 
     def unlike(scatter: float) -> float:
-        """How far the way of a child is from its nearest neighbour's, as a rule."""
+        """Mean difference of a child's vector from root to tip and its nearest neighbour's."""
         made = make_children(
             guides, surface, settings(strand_count=4000, scatter=scatter), place="test"
         ).strands.grid
@@ -351,7 +352,7 @@ def test_more_scattered_children_move_none() -> None:
 
 
 def test_clump_draws_the_tips_of_locks_together() -> None:
-    """By the factor that it says, towards one of the first children; roots and middles stay."""
+    """By the factor `clump`, towards one of the first children; roots and clump middles stay."""
     surface = sheet()
     guides = spread_guides(surface, 400)
     count, size = 2000, 16
@@ -372,14 +373,14 @@ def test_clump_draws_the_tips_of_locks_together() -> None:
     share = np.linspace(0.0, 1.0, 9)[None, :, None]
     expected = 0.7 * share * (loose.grid[middle] - loose.grid[middles:])
     assert move == pytest.approx(expected, abs=1e-6)
-    # it is the nearest one, so clumps are compact
+    # the middle is the nearest one, so clumps are compact
     root = loose.roots
     apart = np.linalg.norm(root[middles:, None] - root[None, :middles], axis=2)
     assert (apart.argmin(axis=1) == middle).mean() > 0.99
 
 
 def test_locks_stay_as_large_as_children_get_more() -> None:
-    """Each of twice as many children goes with one of twice as many middles."""
+    """With twice as many children there are twice as many clump middles."""
     surface = sheet()
     guides = spread_guides(surface, 200)
     chosen = settings(strand_count=16_384, clump=1.0, clump_size=32)
@@ -413,7 +414,7 @@ def test_frizz_strays_as_far_as_it_says_and_not_at_the_root(
 
 
 def test_frizz_is_smooth_and_of_the_length_it_says(egg: Surface) -> None:
-    """Between CVs it turns little: it changes sides about twice a wave, and never at each CV."""
+    """It changes sides about twice per wave, and not at every CV."""
     straight = GrowSettings(
         method="normals",
         strand_count=200,
@@ -444,7 +445,7 @@ def test_frizz_is_smooth_and_of_the_length_it_says(egg: Surface) -> None:
 def test_children_are_the_same_at_any_scale(
     egg: Surface, groomed: StrandSet, method: str, factor: float
 ) -> None:
-    """With all that shapes them: as many, on the same places, of the same shape."""
+    """With all settings that shape them: the same number, places and shapes."""
     chosen = ChildrenSettings(method=method, strand_count=1000)
     one = make_children(groomed, egg, chosen, place="test")
     larger = replace(egg, positions=egg.positions * np.float32(factor))
@@ -487,7 +488,7 @@ def of_no_length(surface: Surface) -> StrandSet:
 
 
 def guide_pairs(surface: Surface) -> StrandSet:
-    """Each place twice, so that the nearest other guide is nowhere else."""
+    """Each guide twice, so that its nearest neighbour is at the same place."""
     guides = spread_guides(surface, 30)
     return guides.take(np.repeat(np.arange(30), 2))
 

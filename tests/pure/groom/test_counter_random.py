@@ -1,4 +1,4 @@
-"""Random numbers by name: those of SplitMix64, even, and independent of each other."""
+"""Random numbers by name: those of SplitMix64, uniform and independent."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from hairloom.addon.groom.counter_random import named, normal, uniform
 
 
 def test_mixing_is_that_of_splitmix64() -> None:
-    """The first outputs of the published generator for the seed 0."""
+    """Against the first outputs of the published generator for the seed 0."""
     step = 0x9E3779B97F4A7C15
     states = np.array([0, step, 2 * step % 2**64], np.uint64)
     expected = [0xE220A8397B1DCDAF, 0x6E789E6AA1B965F4, 0x06C45D188009454F]

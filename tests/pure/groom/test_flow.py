@@ -1,4 +1,4 @@
-"""Flow: hair near strokes goes where they go, by the formulas of circles and straight lines."""
+"""Flow: hair near strokes follows them, against the formulas of circles and straight lines."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from hairloom.addon.groom.roots import bind_roots
 from hairloom.addon.strands import StrandSet, Surface
 
 SURFACE = sheet()
-#: everything near follows wholly, lying flat
+#: all hair within reach follows completely, lying flat
 WHOLE: dict[str, Any] = {"amount": 1.0, "reach": 1.0, "falloff": 0.0, "lift": 0.0}
 
 
@@ -41,7 +41,8 @@ def test_hair_beside_a_straight_stroke_goes_its_direction() -> None:
 
 @pytest.mark.parametrize(("cv_count", "off"), [(9, 2e-3), (33, 1.5e-4)])
 def test_hair_beside_a_circle_runs_around_it(cv_count: int, off: float) -> None:
-    """From a root on it, strands lie on the circle: it is off by the square of the segments."""
+    """A strand with its root on a circular stroke lies on the circle, with an error in the square
+    of the segment length."""
     angle, radius = np.linspace(0.0, 1.9 * np.pi, 4000), 0.2
     circle = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1) * radius
     circle += [0.5, 0.5, 0.0]
@@ -64,7 +65,7 @@ def test_lift_and_strokes_that_rise_lift_hair_by_their_slope() -> None:
 
 
 def test_it_fades_with_the_distance_and_ends_at_the_reach() -> None:
-    """By the smooth step, of hair so short that it is everywhere as far away as its root."""
+    """Against the smooth step, for hair so short that it is as far away as its root."""
     line = [[0.0, 0.5, 0.0], [1.0, 0.5, 0.0]]
     y = np.array([0.53, 0.55, 0.6, 0.64, 0.7])
     strands = standing(np.stack([0.0 * y + 0.4, y, 0.0 * y], axis=1), length=2e-3, cv_count=2)
@@ -100,7 +101,7 @@ def test_two_strokes_meet_in_their_mean() -> None:
 
 
 def test_hair_stays_on_a_sphere_that_it_follows(egg: Surface) -> None:
-    """Around the egg's equator at z = 0, an ellipse of half-axes 8 and 10 cm."""
+    """Along the egg's equator at z = 0, an ellipse with half-axes of 8 and 10 cm."""
     angle = np.linspace(0.0, 1.5 * np.pi, 400)
     around = np.stack([0.08 * np.cos(angle), 0.1 * np.sin(angle), 0.0 * angle], axis=1)
     root = around[[40]]
@@ -114,7 +115,7 @@ def test_hair_stays_on_a_sphere_that_it_follows(egg: Surface) -> None:
 
 
 def test_a_direction_turns_with_the_surface_between_stroke_and_hair(egg: Surface) -> None:
-    """A stroke along the equator, and hair a sixth of it farther: along the ellipse there."""
+    """Hair a sixth of the equator away from a stroke along it follows the ellipse there."""
     angle = np.linspace(-0.02, 0.02, 9)
     stroke = np.stack([0.08 * np.cos(angle), 0.1 * np.sin(angle), 0.0 * angle], axis=1)
     there = np.pi / 3.0

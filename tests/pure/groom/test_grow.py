@@ -1,4 +1,4 @@
-"""Grown hair: bound, of the lengths asked for, outside of the head, falling."""
+"""Grown hair: bound, of the set length, outside the head, falling."""
 
 from __future__ import annotations
 
@@ -27,7 +27,8 @@ def grown(egg: Surface) -> StrandSet:
 
 
 def outside_by(points: np.ndarray) -> np.ndarray:
-    """How far outside of the egg: (|p / axes| - 1) times its least semi-axis, a lower bound."""
+    """A lower bound of the distance outside the egg: (|p / axes| - 1) times the smallest
+    semi-axis."""
     return (np.linalg.norm(points / [0.08, 0.1, 0.12], axis=-1) - 1.0) * 0.08
 
 
@@ -67,7 +68,7 @@ def test_hair_stays_out_of_the_head(grown: StrandSet) -> None:
 
 
 def test_without_pushing_out_it_would_go_through(egg: Surface) -> None:
-    """The test above can fail: straight strands of the same roots, falling, pass the head."""
+    """The test above can fail: straight falling strands from the same roots enter the head."""
     strands = grow(egg, PLAIN, scalp_density(egg))
     straight = strands.roots[:, None] + np.linspace(0, 0.2, 16)[:, None] * np.array(
         [0.0, 0.0, -1.0]
@@ -112,7 +113,7 @@ def test_locks_draw_tips_together(egg: Surface) -> None:
 
 
 def test_clumps_draw_no_strand_across_the_parting(egg: Surface) -> None:
-    """Or it would have to go through the head, and is pushed out over the face."""
+    """Otherwise it would have to pass the head, and would be pushed out over the face."""
     settings = GrowSettings(strand_count=1500, wave=0.0, frizz=0.0)
     grid = grow(egg, settings, scalp_density(egg)).grid
     # at the back of the head both sides hang beside each other
@@ -122,8 +123,8 @@ def test_clumps_draw_no_strand_across_the_parting(egg: Surface) -> None:
 
 
 def along_skin(grid: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """From root to tip of strands on the egg: the unit way along the skin there, (n, 3), and the
-    sine of the angle to it, (n,)."""
+    """The direction from root to tip of strands on the egg: its unit vector along the skin, (n, 3),
+    and the sine of the angle to the skin, (n,)."""
     way = grid[:, -1] - grid[:, 0]
     way /= np.linalg.norm(way, axis=1, keepdims=True)
     normal = grid[:, 0] / np.array([0.08, 0.1, 0.12]) ** 2
@@ -135,7 +136,7 @@ def along_skin(grid: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.mark.parametrize("length", [0.012, 0.035])
 def test_short_hair_lies_as_it_grows(egg: Surface, length: float) -> None:
-    """Forward on the forehead, down at the nape, around the whorl, and no spines anywhere."""
+    """Forward on the forehead, down at the nape, around the whorl, and nowhere like spines."""
     settings = GrowSettings(strand_count=1500, length=length)
     grid = grow(egg, settings, scalp_density(egg)).grid.astype(np.float64)
     way, sine = along_skin(grid)
@@ -168,7 +169,7 @@ def test_long_hair_is_combed_whatever_the_whorl(egg: Surface) -> None:
 
 
 def test_hair_bends_over_its_length_not_over_centimetres(egg: Surface) -> None:
-    """Half as long on a head half as large is the same groom."""
+    """Half the length on a head of half the size gives the same groom."""
 
     def tips(scale: float) -> np.ndarray:
         settings = GrowSettings(
@@ -187,7 +188,7 @@ def test_hair_bends_over_its_length_not_over_centimetres(egg: Surface) -> None:
 
 
 def test_no_strand_folds_back_on_itself(egg: Surface) -> None:
-    """Not even where its clump lies on the other side of the head; the skin may add a little."""
+    """Not even where its clump is on the other side of the head; no bend exceeds 90 degrees."""
     for clump_size in (30, 200):
         settings = GrowSettings(strand_count=400, clump=1.0, clump_size=clump_size)
         segment = np.diff(grow(egg, settings).grid, axis=1)
@@ -231,7 +232,7 @@ def test_a_head_without_faces_is_told(egg: Surface) -> None:
 
 
 def test_hair_bridges_hollows_and_lies_over_bumps() -> None:
-    """Over a plane, in arcs of 5 mm: the hollow one bends half as much, the other stays."""
+    """Over a plane, in arcs of 5 mm: a hollow arc is flattened to less than half, a bump stays."""
     corners = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
     plane = Surface(corners, np.array([[0, 1, 2], [0, 2, 3]]))
     along = np.linspace(0.0, 0.3, 16)
@@ -249,7 +250,7 @@ def test_hair_bridges_hollows_and_lies_over_bumps() -> None:
 
 @pytest.mark.parametrize("back", [1.0, -1.0])
 def test_hair_is_combed_back_or_forward_along_the_skin(egg: Surface, back: float) -> None:
-    """By (0, +-1, -0.35) without its part across the egg, whose normal is the gradient of its
+    """Against (0, +-1, -0.35) without its component along the normal, the gradient of the egg's
     equation."""
     settings = replace(
         PLAIN, comb_back=back, lift=0.0, droop=0.0, whorl=0.0, volume=0.0, clearance=0.0

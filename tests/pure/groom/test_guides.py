@@ -1,4 +1,4 @@
-"""Guides: fair shares, even spread, and the same ones again for the same seed."""
+"""Guides: fair numbers per group, even spread, and the same ones for the same seed."""
 
 from __future__ import annotations
 
@@ -53,7 +53,8 @@ def test_shares_of_random_groups_are_fair() -> None:
 
 
 def test_guides_spread_over_each_group() -> None:
-    """Farthest-point sampling is a 2-approximation: cover and separation match (Gonzalez 1985)."""
+    """Farthest-point sampling is a 2-approximation: guides are no closer to each other than the
+    largest distance of a root from its guide (Gonzalez 1985)."""
     root = square(4000)
     group = (root[:, 0] > 0.7).astype(np.int64)
     strands = strands_at(root, group)

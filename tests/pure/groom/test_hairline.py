@@ -1,4 +1,4 @@
-"""Where hair ends it gets finer, as skin there has half the neighbours and finer hair."""
+"""Hair gets finer at its border, where roots have neighbours on one side only."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from hairloom.addon.strands import StrandSet
 
 
 def strewn_grid(count: int) -> Floats:
-    """Points on a square from 0 to 1, each at random within a cell of its own."""
+    """Points on a square from 0 to 1, each at a random place of its own cell."""
     cell = np.stack(np.meshgrid(*[np.arange(count)] * 2), axis=-1).reshape(-1, 2)
     place = (cell + np.random.default_rng(5).random(cell.shape)) / count
     return np.pad(place, ((0, 0), (0, 1)))
 
 
 ROOTS = strewn_grid(60)
-#: how far each root is from the border of the square
+#: distance of each root from the border of the square
 INSIDE = np.minimum(ROOTS, 1.0 - ROOTS)[:, :2].min(axis=1)
 SPACING = 1.0 / 60.0
 
@@ -36,7 +36,7 @@ def children(**values: float) -> Children:
 
 
 def test_roots_on_a_straight_border_have_half_a_disk_around_them() -> None:
-    """Against the middle of a half disk, at 4 / (3 pi) of its radius, filled by brute force."""
+    """Against the centroid of a half disk, at 4 / (3 pi) of its radius, also by brute force."""
     x, y = np.meshgrid(np.linspace(-1.0, 1.0, 301), np.linspace(0.0, 1.0, 151))
     disk = np.stack([x, y, 0.0 * x], axis=-1).reshape(-1, 3)
     disk = disk[np.linalg.norm(disk, axis=1) <= 1.0]
@@ -61,9 +61,9 @@ def test_few_roots_and_roots_in_one_place_have_no_border() -> None:
 
 
 def test_strands_at_the_border_are_finer_than_others() -> None:
-    """Neighbours on one side alone are farther away, which would make them wider.
+    """Their neighbours, on one side only, are farther away, which would make them wider.
 
-    The hair is so long that what covers a head decides.
+    The hair is long enough for widths to depend on the coverage of a head.
     """
     found, _ = with_widths(upright(2.0), "found")
     width = 2.0 * found.radius[found.offsets[:-1]]

@@ -1,4 +1,4 @@
-"""Painted masks: nothing where they are 0, the whole setting where they are 1, and only there."""
+"""Painted masks: no effect where they are 0, the whole setting where they are 1."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from hairloom.addon.strands.kept import NOTHING_KEPT, Kept
 
 HEAD = sheet()
 ONES = np.ones(len(HEAD.positions))
-#: a half, with nothing in between but across the middle
+#: 1 on one half and 0 on the other, with a step at the middle
 HALF = np.where(HEAD.positions[:, 0] > 0.0, 1.0, 0.0)
 BOLD = ChildrenSettings(
     method="multi",
@@ -42,9 +42,9 @@ BOLD = ChildrenSettings(
     baby_hair=0.0,
     fly_aways=1.0,
 )
-#: those that shape what has no curls, and so keep their point counts
+#: settings other than curls, which keep point counts
 STRAIGHT = ["length", "clump", "frizz", "fly_aways"]
-#: what each setting is without its effect
+#: value of each setting without effect
 WITHOUT = {"clump": 0.0, "frizz": 0.0, "fly_aways": 0.0}
 
 
@@ -99,7 +99,7 @@ def test_a_mask_of_zero_is_the_setting_at_zero_bit_by_bit(name: str) -> None:
 
 
 def test_curls_are_multiplied() -> None:
-    """Around straight paths: the radius is how far points are from them."""
+    """Around straight paths, the largest distance of points is the radius."""
     guides = rig_of(BOLD).grown.shapes
     plain = {"frizz": 0.0, "fly_aways": 0.0, "curl": 0.02, "length": 1.0}
     smooth = BOLD.from_dict(BOLD.as_dict() | plain, "test")
@@ -125,7 +125,7 @@ def test_curls_are_multiplied() -> None:
 
 
 def test_lengths_are_multiplied() -> None:
-    """Against the lengths of children that are not cut: a fraction of their own curve."""
+    """Against the lengths of uncut children."""
     whole = rig_of(BOLD.from_dict(BOLD.as_dict() | {"length": 1.0, "frizz": 0.0}, "test"))
     straight = BOLD.from_dict(BOLD.as_dict() | {"frizz": 0.0}, "test")
     cut = rig_of(straight, on_head("length", 0.5 * ONES))
@@ -140,7 +140,7 @@ def test_half_a_mask_shapes_its_half_alone(name: str) -> None:
     masked = rig_of(BOLD, on_head(name, HALF))
     none, whole = rig_of(BOLD, on_head(name, 0.0 * ONES)), rig_of(BOLD)
     root = children(masked)[:, 0]
-    # of one child a clump takes its middle from the other half; what lies between is mixed
+    # not near the middle, where clumps reach across and values are interpolated
     left, right = root[:, 0] < -0.04, root[:, 0] > 0.04
     np.testing.assert_array_equal(children(masked)[left], children(none)[left])
     np.testing.assert_array_equal(children(masked)[right], children(whole)[right])
@@ -156,7 +156,8 @@ def test_a_strong_mask_draws_no_child_beyond_its_clump() -> None:
 
 @pytest.mark.parametrize("name", STRAIGHT)
 def test_a_brush_gives_what_a_rebuild_makes_and_shapes_no_others(name: str) -> None:
-    """More children than one level of clumps has, so that some are drawn by some that are drawn."""
+    """With more children than one level of clumps holds, so that some clump to children that
+    themselves clump."""
     many = BOLD.from_dict(BOLD.as_dict() | {"strand_count": 6000}, "test")
     rig = rig_of(many)
     now, whole = painted(rig, None, on_head(name, HALF)), rig_of(many, on_head(name, HALF))
@@ -215,7 +216,7 @@ def test_scatter_where_it_is_painted_is_that_of_the_setting() -> None:
 
 
 def test_an_image_is_seen_as_bilinear_sampling_says() -> None:
-    """Against the four pixels around each place, one by one."""
+    """Against a loop over places with the four pixels around each."""
     random = np.random.default_rng(2)
     pixels, uv = random.random((5, 7), np.float32), random.random((9, 3, 2), np.float32)
     triangle, barycentric = random.integers(0, 9, 50), random.dirichlet(np.ones(3), 50)
@@ -233,7 +234,8 @@ def test_an_image_is_seen_as_bilinear_sampling_says() -> None:
 
 
 def test_what_is_painted_on_curves_is_mixed_as_their_points_are() -> None:
-    """The place along the curve at every point: guides have it at theirs, children half way."""
+    """With `along` painted at each point, guides have it at their CVs, and 0.5 as a whole; between
+    two curves, values are interpolated."""
     own = curves()
     along = np.concatenate([np.linspace(0.0, 1.0, count) for count in own.point_counts])
     mask = StrandMask.of_points(own, along.astype(np.float32))
@@ -249,8 +251,8 @@ def test_what_is_painted_on_curves_is_mixed_as_their_points_are() -> None:
 
 
 def test_children_take_what_is_painted_on_their_guides() -> None:
-    """Guides of one half are painted 0: children there are those of the setting at 0. Brows come
-    first, so that guides of children have other numbers than curves."""
+    """Where guides are painted 0, children are as with the setting at 0. Brows come first, so that
+    guides of children have other indices than curves."""
     own = replace(curves(), group=np.where(np.arange(60) < 9, BROWS, 0))
     is_right = own.roots[:, 0] > 0.0
     masks = Masks({"frizz": StrandMask(is_right.astype(np.float32)[:, None])})

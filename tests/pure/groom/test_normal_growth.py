@@ -1,4 +1,4 @@
-"""Strands along the normals: straight or lying, as long as said, where the density says."""
+"""Strands along the normals: straight or lying, of the set length, by the density."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def test_one_strand_a_vertex_stands_on_it_along_the_normal(sphere: Surface) -> N
     assert strands.roots == pytest.approx(sphere.positions, abs=1e-7)
     outward = sphere.positions / np.linalg.norm(sphere.positions, axis=1, keepdims=True)
     along = np.einsum("scj,sj->sc", directions(strands), outward)
-    assert along.min() > 0.9999  # of a welded sphere the normals are nearly exact
+    assert along.min() > 0.9999  # the normals of a welded sphere are nearly exact
     assert strands.grid[:, -1] == pytest.approx(outward * 1.1, abs=2e-3)
 
 
@@ -131,7 +131,7 @@ def test_the_seed_decides_and_nothing_else_does(egg: Surface) -> None:
 
 
 def test_length_weights_multiply_the_length(sphere: Surface) -> None:
-    """At the vertices exactly, between them linearly; length variation only shortens."""
+    """Exactly at vertices, linearly between them; length variation only shortens."""
     height = (sphere.positions[:, 2] + 1.0) / 2.0
     strands = grow_along_normals(sphere, PER_VERTEX, length=height)
     vertex = height > 0.0
@@ -164,7 +164,8 @@ def test_one_strand_a_vertex_above_the_threshold(sphere: Surface) -> None:
 
 
 def test_strands_follow_the_density_even_on_few_triangles() -> None:
-    """Chi-square of the roots on a square of two triangles, density x: shares (2 i + 1) / 64."""
+    """Chi-square of the roots on a square of two triangles with density x, against the fractions
+    (2 i + 1) / 64."""
     square = Surface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
     settings = GrowSettings(method="normals", strand_count=6400)
     x, y, _ = grow_along_normals(square, settings, square.positions[:, 0]).roots.T
@@ -174,7 +175,7 @@ def test_strands_follow_the_density_even_on_few_triangles() -> None:
     assert ((counts - expected) ** 2 / expected).sum() < 24.3
     # and across it evenly
     assert ((np.histogram(y, 8, (0.0, 1.0))[0] - 800.0) ** 2 / 800.0).sum() < 24.3
-    # the same test tells even hair from this: it can fail
+    # the test rejects uniform hair
     even = np.histogram(grow_along_normals(square, settings).roots[:, 0], 8, (0.0, 1.0))[0]
     assert ((even - expected) ** 2 / expected).sum() > 1000.0
 

@@ -1,4 +1,4 @@
-"""Partings: which side of a line a root is on is known from the line's own formula."""
+"""Partings: the sides of roots against the formula of the line."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ SURFACE = sheet()
 
 
 def waved(y: Floats) -> Floats:
-    """Where the line is, x of y."""
+    """The line's x at y."""
     return 0.5 + 0.08 * np.sin(9.0 * y)
 
 
 def line(first: float = -0.05, last: float = 1.05, pieces: int = 120) -> Floats:
-    """The straight pieces of the line, drawn a little above the sheet."""
+    """The straight pieces of the line, a little above the sheet."""
     y = np.linspace(first, last, pieces + 1)
     points = np.stack([waved(y), y, np.full(len(y), 0.01)], axis=1)
     return np.stack([points[:-1], points[1:]], axis=1)
@@ -35,7 +35,7 @@ def is_right(points: Floats) -> Bools:
 
 
 def upright(count: int = 150, **values: Any) -> StrandSet:
-    """Guides that stand up, so that nothing but a line parts them; none lies on the line."""
+    """Upright guides, which only a line can part; none lies on the line."""
     random = np.random.default_rng(4)
     root = random.random((count, 3)) * [1.0, 1.0, 0.0]
     root = root[np.abs(root[:, 0] - waved(root[:, 1])) > 1e-3]
@@ -67,7 +67,8 @@ def test_no_child_blends_guides_of_both_sides_and_each_takes_its_own(values: Any
 
 
 def test_groups_of_both_sides_are_kept_as_well() -> None:
-    """The nearest guide before the line decides about the group, not the nearest one."""
+    """The nearest guide on the same side of the line decides about the group, not the nearest of
+    all."""
     random = np.random.default_rng(2)
     guides = upright()
     guides = StrandSet(
@@ -87,7 +88,7 @@ def test_groups_of_both_sides_are_kept_as_well() -> None:
 
 
 def test_clumps_stay_on_their_side() -> None:
-    """Drawn together wholly, strands that stand upright end above their clump's middle."""
+    """With full clumping, upright strands end above the middle of their clump."""
     partings = Partings.of(line(), SURFACE)
     chosen = settings(strand_count=4000, clump=1.0, clump_size=8, parting=3.0)
     for lines, count in ((partings, 0), (None, 20)):
@@ -121,7 +122,7 @@ def test_own_strands_follow_guides_of_their_side() -> None:
 
 
 def test_crossed_is_what_brute_force_finds_on_a_plane() -> None:
-    """Two ends are on different sides of a line that runs through all of the sheet, or not."""
+    """Brute force: two ends are on different sides of a line across the whole sheet, or not."""
     random = np.random.default_rng(7)
     root, other = random.random((1500, 3)), random.random((1500, 5, 3))
     root[:, 2] = other[..., 2] = 0.0
@@ -137,7 +138,8 @@ def test_crossed_is_what_brute_force_finds_on_a_plane() -> None:
 
 
 def test_a_line_on_the_other_side_of_a_head_parts_nothing(egg: Surface) -> None:
-    """From the front over the top to the back, of an egg whose half-axes are 8, 10 and 12 cm."""
+    """A line from the front over the top to the back of an egg with half-axes of 8, 10 and 12
+    cm."""
     angle = np.linspace(0.1, np.pi - 0.1, 30)
     arch = np.stack([np.zeros(30), 0.1 * np.cos(angle), 0.12 * np.sin(angle)], axis=1)
     partings = Partings.of(np.stack([arch[:-1], arch[1:]], axis=1), egg)

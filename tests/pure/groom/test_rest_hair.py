@@ -1,4 +1,4 @@
-"""Hair that is stored on its undeformed surface, and is put onto the posed one."""
+"""Hair that is stored on the undeformed surface, and transferred to the posed one."""
 
 from dataclasses import replace
 
@@ -11,7 +11,7 @@ from hairloom.addon.strands import StrandSet, Surface
 
 
 def turned(points, angle=0.7, shift=(0.0, 0.0, 0.0)):
-    """By an angle around y."""
+    """Points turned by an angle around y."""
     c, s = np.cos(angle), np.sin(angle)
     return (points @ np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]]) + shift).astype(
         np.float32
@@ -20,7 +20,7 @@ def turned(points, angle=0.7, shift=(0.0, 0.0, 0.0)):
 
 @pytest.fixture
 def ball():
-    """A unit ball of squares, with UVs by place."""
+    """A unit ball of quads, with UVs from longitude and latitude."""
     v, u = (each.ravel() for each in np.meshgrid(np.linspace(0.1, 3.0, 20), np.arange(30) * 0.2))
     points = np.column_stack([np.sin(v) * np.cos(u), np.sin(v) * np.sin(u), np.cos(v)])
     column, row = (each.ravel() for each in np.meshgrid(np.arange(29), np.arange(19)))
@@ -34,7 +34,7 @@ def ball():
 
 @pytest.fixture
 def hair(ball):
-    """Curved strands on some of its faces, with their root UVs."""
+    """Curved strands on some of the ball's faces, with their root UVs."""
     faces = np.arange(0, len(ball.triangles), 7)
     roots = ball.corners[faces].mean(axis=1)
     along = np.linspace(0.0, 0.4, 5)[None, :, None]
@@ -47,7 +47,7 @@ def hair(ball):
 
 
 def test_a_turn_in_place_turns_the_hair(ball, hair):
-    """All roots lie on the turned ball as well: the UVs alone tell."""
+    """All roots lie on the turned ball as well, so that only UVs show the turn."""
     posed = replace(ball, positions=turned(ball.positions))
     found = RestHair.found(hair, [ball], posed)
     assert found is not None and found.surface is ball and found.strands is hair
@@ -63,7 +63,7 @@ def test_far_away_it_is_told_without_uvs(ball, hair):
 
 
 def test_hair_that_stands_on_the_posed_surface_stays(ball, hair):
-    """Which a modifier of Blender has put there, or which has grown there."""
+    """A modifier of Blender has moved it there, or it has grown there."""
     posed = replace(ball, positions=turned(ball.positions))
     there = hair.with_points(turned(hair.points))
     assert RestHair.found(there, [ball], posed) is None
@@ -80,7 +80,7 @@ def test_what_is_not_posed_is_left_alone(ball, hair):
 
 
 def test_a_surface_that_swells_lifts_its_hair(ball, hair):
-    """UVs of the nearest points are the same then; the distance tells."""
+    """The UVs of the nearest points stay the same, so that only the distance shows it."""
     posed = replace(ball, positions=ball.positions * np.float32(1.1))
     found = RestHair.found(hair, [ball], posed)
     assert found is not None
@@ -102,7 +102,7 @@ def test_other_triangles_and_no_strands_are_none(ball, hair):
 
 
 def test_of_several_that_one_counts_on_which_the_roots_stand(ball, hair):
-    """A face that a shape key has formed, and an armature turns."""
+    """A face that is deformed by a shape key and turned by an armature."""
     formed = replace(ball, positions=ball.positions * np.float32([1.3, 1.0, 0.9]))
     posed = replace(ball, positions=turned(formed.positions))
     there = carried(hair, ball, formed)
@@ -113,7 +113,7 @@ def test_of_several_that_one_counts_on_which_the_roots_stand(ball, hair):
 
 
 def test_there_and_back_is_the_same(ball, hair):
-    """Bound strands go by what they are bound to."""
+    """Bound strands follow their triangles there and back."""
     posed = replace(ball, positions=turned(ball.positions, 1.9, (0.3, 0.0, 0.0)))
     bound = bind_roots(carried(hair, ball, posed), posed, place="").strands
     assert carried(bound, posed, ball).points == pytest.approx(hair.points, abs=1e-5)

@@ -1,4 +1,4 @@
-"""Which unit and axes would make a groom fit its head."""
+"""The unit and axes that would make a groom fit its head."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Binding and following: rest is exact, rigid motion passes through, wrong scales are told."""
+"""Binding and following: rest is exact, rigid motion is kept, wrong scales are reported."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def frames_of(strands: StrandSet, positions: Floats, surface: Surface) -> RootFr
 
 
 def rotation(axis: tuple[float, float, float], angle: float) -> Floats:
-    """Rodrigues' formula."""
+    """A rotation matrix, by Rodrigues' formula."""
     x, y, z = np.array(axis) / np.linalg.norm(axis)
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     return np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
@@ -97,7 +97,7 @@ def test_rigid_motion_passes_through(egg: Surface) -> None:
     strands = bind_roots(hair_on(egg, 300, offset=0.003), egg, place="test").strands
     turn, shift = rotation((1.0, 2.0, -0.5), 2.2), np.array([0.3, -0.1, 0.2])
     rest = frames_of(strands, egg.positions, egg)
-    # in float64, so that only what `follow` does is seen
+    # in float64, to see the errors of `follow` alone
     now = frames_of(strands, egg.positions.astype(np.float64) @ turn.T + shift, egg)
     expected = strands.grid.astype(np.float64) @ turn.T + shift
     assert np.abs(followed(strands, rest, now) - expected).max() < 1e-7
@@ -147,8 +147,8 @@ def test_a_groom_in_another_unit_is_told_with_the_factor_back(egg: Surface, unit
 def test_hair_of_a_head_between_the_legs_of_a_larger_body_is_of_another_scale(
     egg: Surface,
 ) -> None:
-    """A groom a tenth as large at the foot of a body, which stands on the ground: nearer to it than
-    a seventh of its size."""
+    """A groom of a tenth of the size lies at the feet of a standing body, nearer to it than 0.15 of
+    the body's size."""
     low, _ = egg.bounds()
     body = Surface(egg.positions - low * [0.0, 0.0, 1.0], egg.triangles)
     whole = hair_on(body, 200)
@@ -161,7 +161,8 @@ def test_hair_of_a_head_between_the_legs_of_a_larger_body_is_of_another_scale(
 
 
 def test_roots_beside_the_surface_are_loose_and_by_how_much(egg: Surface) -> None:
-    """Moved along z by a tenth of its size: no root is farther, and the median is near that."""
+    """Roots moved along z by a tenth of the surface's size are no farther than that from it, and
+    their looseness is more than a fifth of that."""
     strands = hair_on(egg, 200)
     assert bind_roots(strands, egg, place="hair.tfx").looseness(egg) == 0.0
     step = 0.1 * float(np.linalg.norm(np.ptp(egg.positions, axis=0)))

@@ -1,4 +1,4 @@
-"""Where hair grows: uniform by area and density, evenly spaced, on top and back of a head."""
+"""Where hair grows: in proportion to area and density, evenly spaced, on top and back of a head."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hairloom.addon.strands import Surface
 
 
 def test_roots_are_uniform_by_area(egg: Surface) -> None:
-    """As many roots on each patch as its share of the area says (binomial bounds)."""
+    """The number of roots on a patch is in proportion to its area, within binomial bounds."""
     count = 20_000
     triangle, weights = sample_roots(egg, count, None, np.random.default_rng(1))
     corners = egg.corners.astype(np.float64)
@@ -39,7 +39,7 @@ def test_roots_follow_the_density(egg: Surface) -> None:
     area = np.linalg.norm(
         np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
     )
-    # of two functions that are linear on a triangle: area / 12 (sum d_i z_i + sum d_i sum z_j)
+    # integral of two linear functions over a triangle: area / 12 (sum d_i z_i + sum d_i sum z_j)
     product = (on_corner * z).sum(axis=1) + on_corner.sum(axis=1) * z.sum(axis=1)
     expected = (area * product).sum() / 12.0 / (area * on_corner.sum(axis=1)).sum() * 3.0
     assert expected > 0.02
@@ -47,7 +47,7 @@ def test_roots_follow_the_density(egg: Surface) -> None:
 
 
 def test_roots_keep_their_distance_better_than_chance(egg: Surface) -> None:
-    """Fewer close pairs than white noise of the same number has."""
+    """Fewer close pairs than in white noise of the same number."""
 
     def nearest(points: np.ndarray) -> np.ndarray:
         squared = ((points[:, None] - points[None]) ** 2).sum(axis=2)
@@ -78,7 +78,7 @@ def test_cranium_of_an_egg_is_as_deep_as_the_egg(egg: Surface) -> None:
 
 
 def test_shoulders_do_not_move_the_cranium(egg: Surface) -> None:
-    """A wide and deep box under the egg."""
+    """A wide and deep box below the egg does not change the cranium."""
     shoulders = np.array(
         [[x, y, z] for x in (-0.3, 0.3) for y in (-0.15, 0.2) for z in (-0.5, -0.2)]
     )

@@ -1,4 +1,4 @@
-"""Files whose numbers are no metres: what is said of them, and that others are left in peace."""
+"""Notes on files whose numbers are not metres, and none on others."""
 
 from __future__ import annotations
 

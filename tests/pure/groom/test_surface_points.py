@@ -1,4 +1,4 @@
-"""The skin that growing hair keeps out of, looked up by a grid."""
+"""The grid by which growing hair keeps out of the skin."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def around(egg: Surface, seed: int, count: int = 2000) -> np.ndarray:
 
 
 def again(egg: Surface) -> Surface:
-    """The same surface, on which nothing is known yet."""
+    """The same surface without cached results."""
     return Surface(egg.positions, egg.triangles)
 
 

@@ -1,4 +1,4 @@
-"""What is held, and where: rings, balls and surfaces against places that are known."""
+"""Holds of rings, balls and surfaces, against known places."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ def strands(*lines: list[tuple[float, float, float]]) -> StrandSet:
 
 
 def straight(x: float = 0.0, count: int = 11) -> list[tuple[float, float, float]]:
-    """From z = 1 to z = 0 in equal steps."""
+    """A strand from z = 1 to z = 0 in equal steps."""
     return [(x, 0.0, 1.0 - z) for z in np.linspace(0.0, 1.0, count)]
 
 
@@ -33,7 +33,8 @@ def ground(size: float = 1.0, z: float = 0.0) -> Surface:
 
 @pytest.mark.parametrize("ball", [False, True])
 def test_a_tie_holds_what_passes_through_it(ball: bool) -> None:
-    """One strand through the middle, one within, one that passes by, one that ends before it."""
+    """Held are a strand through the middle and one inside, not one outside or one that ends before
+    it."""
     hair = strands(straight(), straight(0.4, 6), straight(0.6), straight()[:3])
     holds = find_holds(hair, Holders((ring(0.27, 0.5 if not ball else 0.45, ball=ball),)))
     assert holds is not None
@@ -51,7 +52,7 @@ def test_a_strand_is_held_where_it_passes_first() -> None:
 
 
 def test_no_place_is_before_the_third_point() -> None:
-    """The root decides about the first two; strands of two points are never held."""
+    """The root sets the first two points, so strands of two points are never held."""
     hair = strands(straight(), [(0.0, 0.0, 1.0), (0.0, 0.0, 0.0)], straight(count=3))
     holds = find_holds(hair, Holders((ring(0.96),)))
     assert holds is not None
@@ -101,7 +102,8 @@ def test_what_holds_nothing_is_named() -> None:
 
 @pytest.mark.parametrize("ball", [False, True])
 def test_strange_strands_do_no_harm(ball: bool) -> None:
-    """Of no length, folded back on themselves, with two points at one place, at the tip too."""
+    """Strands of no length, folded back on themselves, and with coincident points, also at the
+    tip."""
     there = straight()
     hair = strands(
         [(0.0, 0.0, 0.5)] * 5, [*there[:7], *there[6:3:-1]], [*there[:5], there[4], *there[5:]],

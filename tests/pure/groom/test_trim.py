@@ -1,4 +1,4 @@
-"""Trim: strands end where straight lines, circles and brute force say that they leave a shape."""
+"""Trim: strands are cut where they leave a shape, against formulas and brute force."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ DOWN = np.array([0.0, 0.0, -1.0])
 
 
 def straight(roots: Floats, way: Floats, counts: Floats | int = 9) -> StrandSet:
-    """Strands from these roots by these ways, with points that get farther apart."""
+    """Straight strands from these roots along `way`, with spacing that grows towards the tip."""
     number = np.broadcast_to(counts, len(roots))
     parts = [np.linspace(0.0, 1.0, count) ** 1.5 for count in number]
     points = [root + part[:, None] * w for root, part, w in zip(roots, parts, way, strict=True)]
@@ -57,14 +57,14 @@ def test_straight_hair_ends_on_the_plane_and_keeps_its_points() -> None:
 
 
 def test_a_curve_keeps_its_shape_up_to_the_cut() -> None:
-    """Half circles, cut by a plane through a third of them: all points stay on the circle."""
+    """A half circle, cut by a plane at a third: all points stay on the circle."""
     angle = np.linspace(0.0, np.pi, 25)
     circle = 0.2 * np.stack([1.0 - np.cos(angle), 0.0 * angle, np.sin(angle)], axis=1)
     strands = StrandSet(circle, np.array([0, 25]), np.full(25, 1e-4), np.zeros(1))
     at = 0.2 * (1.0 - np.cos(np.pi / 3.0))
     cut = trimmed(strands, [Plane(np.array([at, 0.0, 0.0]), np.array([1.0, 0.0, 0.0]))])
     away = np.linalg.norm(cut.points - [0.2, 0.0, 0.0], axis=1) - 0.2
-    # polylines through its points are off by 4e-4, and so are drawn curves in their first segment
+    # polylines through its points are off by 4e-4, as is the first segment of drawn curves
     assert np.abs(away).max() < 3e-4
     assert np.abs(away[4:]).max() < 1e-5
     assert cut.points[-1, 0] == pytest.approx(at, abs=1e-7)

@@ -1,4 +1,4 @@
-"""Weights: against a slow search, never across groups or partings, and without jumps."""
+"""Weights: against a slow search, not across groups or partings, and without jumps."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def square(count: int, seed: int) -> Floats:
 
 
 def slow_weights(root: Floats, guide_root: Floats) -> dict[int, float]:
-    """Franke and Little for one strand among the guides of its group, as in the paper."""
+    """Franke and Little's weights of one strand among the guides of its group, as in the paper."""
     distance = np.linalg.norm(guide_root.astype(float) - root.astype(float), axis=1)
     nearest = np.argsort(distance)[:4]
     reach = distance[nearest[3]]
@@ -48,7 +48,7 @@ def test_a_guide_rides_on_itself_alone() -> None:
 
 
 def test_weights_have_no_jumps() -> None:
-    """Each guide's weight along a line of roots changes in proportion to the step."""
+    """Along a line of roots, the change of each guide's weight is proportional to the step."""
     guide_root = square(30, 4)
     guide_group = np.zeros(30, np.int64)
 
@@ -155,7 +155,7 @@ def test_children_take_the_group_of_their_nearest_guide() -> None:
 
 @pytest.mark.parametrize("parting", [20.0, 60.0, 100.0])
 def test_all_guides_of_a_child_go_together(parting: float) -> None:
-    """Each with each, and the nearest is always one of them."""
+    """Any two of them are within the parting angle, and the nearest guide is one of them."""
     random = np.random.default_rng(5)
     root, guide_root = square(2000, 6), square(200, 7)
     way = random.normal(size=(200, 3)) * [0.6, 0.6, 0.1] + UP
@@ -174,7 +174,7 @@ def test_all_guides_of_a_child_go_together(parting: float) -> None:
 
 
 def test_a_child_between_two_guides_of_its_side_mixes_both() -> None:
-    """The two guides beyond the parting are nearer than the second one of its own side."""
+    """Although both guides beyond the parting are nearer than the second one of its own side."""
     guide_root = np.array([[0.0, 0, 0], [3, 0, 0], [0, 1.5, 0], [1, 1.5, 0]])
     side = np.array([[-1.0, 0, 0], [-1, 0, 0], [1, 0, 0], [1, 0, 0]])
     root = np.array([[0.7, 0.0, 0.0]])
@@ -182,7 +182,7 @@ def test_a_child_between_two_guides_of_its_side_mixes_both() -> None:
     found = child_weights(root, guide_root, np.zeros(4), grid, np.radians(60.0))
     assert found.guide[0, :2].tolist() == [0, 1]
     assert found.weight[0, 2] == 0.0
-    # Franke and Little with twice the farthest guide as R, where there is no fourth one
+    # Franke and Little; without a fourth guide R is twice the distance of the farthest one
     raw = np.array([(4.6 - 0.7) / 0.7, (4.6 - 2.3) / 2.3])
     assert found.weight[0, :2] == pytest.approx(raw / raw.sum(), abs=1e-5)
 

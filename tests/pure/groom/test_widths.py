@@ -1,4 +1,4 @@
-"""Found widths against what is known of a head: 120,000 hairs of 0.08 mm on 600 cm2."""
+"""Found widths against figures of a human head: 120,000 hairs of 0.08 mm on 600 cm2."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ LENGTH = 0.25  # [m]
 
 
 def head_of_hair(count: int, factor: float = 1.0, *, has_widths: bool = False) -> StrandSet:
-    """Strands that stand on half a sphere, evenly spread (Fibonacci's spiral)."""
+    """Strands with roots on half a sphere, evenly spread (Fibonacci's spiral)."""
     height = (np.arange(count) + 0.5) / count
     turn = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(count)
     across = np.sqrt(1.0 - height**2)
     normal = np.stack([across * np.cos(turn), across * np.sin(turn), height], axis=1)
     root = normal * np.sqrt(AREA / (2.0 * np.pi))
-    # they hang, as hair does, rather than spread out
+    # they hang, as hair does
     along = np.linspace(0.0, LENGTH, 4)[:, None] * np.array([0.0, 0.0, -1.0])
     points = (root[:, None] + along).reshape(-1, 3) * factor
     return StrandSet(
@@ -62,14 +62,14 @@ def test_few_strands_take_as_much_light_as_many() -> None:
     for count in (2000, 20_000, 40_000):
         strands, widths = with_widths(head_of_hair(count))
         spacing = np.sqrt(AREA / count)
-        wide = 2.0 * np.percentile(strands.radius, 95.0)  # some are apart by chance
+        wide = 2.0 * np.percentile(strands.radius, 95.0)  # some are isolated by chance
         assert wide <= 0.25 * spacing * 1.3, "a quarter of the spacing"
         taken.append(count * 2.0 * strands.radius.mean() * widths.extinction)
     np.testing.assert_allclose(taken, taken[-1], rtol=0.06)
 
 
 def test_a_part_of_a_groom_is_as_wide_as_all_of_it_even_where_it_lies_deep() -> None:
-    """A ponytail: its strands leave a disk and fill a volume, where more of them lie deeper."""
+    """A ponytail: strands from a disk that fill a volume, most of them deep inside."""
     rng, count = np.random.default_rng(2), 30_000
     root = np.sqrt(rng.random((count, 1))) * 0.02
     turn = rng.random((count, 1)) * 2.0 * np.pi
@@ -139,7 +139,7 @@ def test_numbers_that_are_no_widths_are_not_known(bad: float) -> None:
 
 @pytest.mark.parametrize("count", [1, 2, 5, 300])
 def test_without_any_spacing_the_length_decides(count: int) -> None:
-    """One strand, or all of them in the same place."""
+    """One strand, or several in the same place."""
     one = head_of_hair(1)
     points = np.tile(one.points, (count, 1))
     strands = StrandSet(
@@ -151,7 +151,7 @@ def test_without_any_spacing_the_length_decides(count: int) -> None:
 
 
 def test_tufts_have_widths() -> None:
-    """Twenty strands out of each of a few places, beside some that stand alone."""
+    """Twenty strands from each of a few places, beside single ones."""
     one = head_of_hair(600)
     points = one.grid.copy()
     points[100:] -= points[100:, :1] - np.repeat(points[100::20, :1], 20, axis=0)
