@@ -1,4 +1,4 @@
-# All that one does here, in one place. `make` alone lists it.
+# The tasks of this repository; `make` alone lists them.
 .DEFAULT_GOAL := help
 .PHONY: help setup demo lint wheels test tests-of-a-commit test-ui test-engines test-all bench docs site gallery pictures styles zip lock clean
 
@@ -24,21 +24,21 @@ lint: setup
 	@mkdir -p out/typed && ln -sfn ../.. out/typed/hairloom
 	.venv/bin/mypy
 
-# What draws comes first: its tests are the longest, and none is to be left over at the end.
+# Tests that draw come first: they are the longest, and none should run alone at the end.
 TESTS = tests/blender tests/gpu tests/pure
-# One thread each: those of OpenBLAS wait for each other by spinning, on processors that are taken.
+# One thread each: OpenBLAS's threads wait for each other by spinning, on busy processors.
 PYTEST = OPENBLAS_NUM_THREADS=1 $(PYTHON) -m pytest -q -n 2 --dist worksteal
 
 # To show the values of an assert, pytest rewrites all tests, which takes each process as long as a
-# hundred tests. So only what has failed is run with it, a second time; it has failed all the same.
-# A commit compiles shaders without LLVM's optimization, which takes longer than what they are to do.
+# hundred tests. So only failed tests are run with it, a second time; the target fails all the same.
+# For a commit, shaders are compiled without LLVM's optimization, which takes longer than running them.
 tests-of-a-commit: export GALLIVM_PERF = nopt
 tests-of-a-commit: setup
 	$(PYTEST) -m "not slow" --assert=plain $(TESTS) || \
 	    { $(PYTHON) -m pytest -q -m "not slow" --last-failed --last-failed-no-failures=none $(TESTS); false; }
 
-# Side by side, as mypy keeps one processor busy, the longest tests come first, and what zips bring
-# along is waited for.
+# In parallel: mypy keeps one processor busy, the longest tests come first, and fetching the zips'
+# wheels takes little of a processor.
 test: setup ## lint, types, and the tests that a commit has to pass and that need no window
 	@$(PYTHON) tools/timings.py test_minutes $(MAKE) --no-print-directory -j 3 wheels lint tests-of-a-commit
 

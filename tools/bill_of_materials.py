@@ -2,8 +2,8 @@
 
 python tools/bill_of_materials.py OUTPUT.json
 
-It lists the wheels that the zip carries, as their own metadata and tools/wheels.sha256 have them,
-and the data that is not ours. Nothing in it depends on when or where it was made.
+It lists the wheels in the zip, from their own metadata and tools/wheels.sha256, and the third-party
+data. It does not depend on when or where it is made.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from cyclonedx.output.json import JsonV1Dot6
 from fetch_wheels import FOLDER, REPOSITORY, wanted
 from packageurl import PackageURL
 
-#: What the zip holds beside wheels that is not ours: name, license, description.
+#: Third-party parts of the zip beside wheels: name, license, description.
 DATA = (
     ("MakeHuman base mesh", "CC0-1.0", "addon/blender/scene/bust.npz is made from it"),
     ("three.js 0.187.0", "MIT", "addon/exchange/cards/page/viewer.min.js has parts of it"),
 )
-#: Licenses that a wheel names in words -> their identifiers.
+#: Licenses as named in a wheel's metadata -> SPDX identifiers.
 _IDENTIFIERS = {"MIT License": "MIT"}
 _NAMESPACE = UUID("6ba7b811-9dad-11d1-80b4-00c04fd430c8")
 

@@ -53,7 +53,7 @@ class Shots:
     def built(
         self, way: str, levels: int = 1, count: int = CARDS, edits: Any = None
     ) -> tuple[Any, Any]:
-        """Cards in this way, and how they are drawn."""
+        """Cards built by this method, and how they are drawn."""
         settings, builds = self.settings, of_addon("blender.cards.build")
         chosen = of_addon("params").SettingsMap(
             settings["cards"](source=way, card_count=count, levels=levels),
@@ -65,8 +65,8 @@ class Shots:
         return made.build, tied.drawn(tied.rest, chosen)
 
     def cards(self, mesh: Any, drawn: Any, back: Any = None) -> Any:
-        """These cards of those that are drawn, with the order of their back faces."""
-        seen = drawn.skin_seen if mesh is drawn.mesh else None  # of its vertices
+        """A picture of these cards alone of all drawn ones, with the order of their back faces."""
+        seen = drawn.skin_seen if mesh is drawn.mesh else None  # one value per vertex
         shown = replace(drawn, mesh=mesh, back_triangles=back, skin_seen=seen)
         return self._studio.card_picture(shown, WIDTH, HEIGHT, SAMPLES)
 
@@ -78,7 +78,7 @@ def of_layer(mesh: Any, layer: int) -> Any:
 
 
 def edited(build: Any) -> Any:
-    """Edits as of an artist: on one side the tips of long cards are flicked out and wider, on the
+    """Edits like an artist's: on one side the tips of long cards are flicked out and wider, on the
     other side outer ones are deleted."""
     edits, mesh = of_addon("cards.edits"), build.finest
     surface = of_addon("strands").Surface(mesh.positions, mesh.triangles, mesh.uv[mesh.triangles])

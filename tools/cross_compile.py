@@ -1,8 +1,8 @@
-"""Programs as other compilers see them: Vulkan's GLSL, SPIR-V, Metal's language and HLSL.
+"""Shader programs in other compilers: Vulkan's GLSL, SPIR-V, Metal's language and HLSL.
 
-Blender gives a program's text to the driver of the backend that runs. This writes the same text
-with the same declarations for glslang, and what spirv-val and SPIRV-Cross say of it. It shows what
-our text does wrong, not what Blender's own wrapper for Metal does with it. The compilers are
+Blender gives a program's text to the driver of the running backend. This writes the same text with
+the same declarations for glslang, and collects the errors of glslang, spirv-val and SPIRV-Cross. It
+finds errors of our text, not of Blender's own wrapper for Metal. The compilers are
 Debian's glslang-tools, spirv-tools and spirv-cross: those of this machine, or of the Debian that
 tools/window_blender has installed.
 """
@@ -39,8 +39,8 @@ _SUFFIXES = {"vertex": "vert", "fragment": "frag", "compute": "comp"}
 _BUILTINS = """#define gl_VertexID gl_VertexIndex
 #define gl_InstanceID gl_InstanceIndex
 """
-#: what programs for Metal must not need, from Blender's sources (see docs/dev/gpu.md): the most of
-#: each thing, and the formats of images that a program may both read and write
+#: limits of programs on Metal, from Blender's sources (see docs/dev/gpu.md); and the formats of
+#: images that a program may both read and write
 METAL_LIMITS = {
     "samplers": 64,
     "images": 8,
@@ -58,7 +58,7 @@ METAL_LIMITS = {
 _READ_WRITE = {"R32F", "R32UI", "R32I", "RGBA32F", "RGBA32UI", "RGBA32I", "RGBA16F"}
 
 
-#: what each compiler says of each stage in a folder; a file is left only where it complains
+#: runs the compilers on each stage in a folder; a file of messages is left only if one fails
 _SCRIPT = """
 for file in *.vert *.frag *.comp; do
     [ -e "$file" ] || continue
@@ -86,11 +86,10 @@ def _debian() -> Path:
 
 
 def compile_all(folder: Path) -> dict[str, dict[str, str]]:
-    """What compilers complain of, by kind ("spirv", "metal", "hlsl") and file; nothing where they
-    do not.
+    """The compilers' messages by kind ("spirv", "metal", "hlsl") and file, of failures alone.
 
     Args:
-        folder: below the repository: only that is there in the other Debian.
+        folder: within the repository, which is all that the other Debian sees.
     """
     script = ["sh", "-ec", f"cd '{folder}'{_SCRIPT}"]
     if not all(map(shutil.which, COMPILERS)):
@@ -190,5 +189,5 @@ def _components(kind: str) -> int:
 
 
 def beyond_metal(found: Mapping[str, int]) -> list[str]:
-    """What of its demands Metal has not."""
+    """The demands that exceed Metal's limits."""
     return [f"{name} {found[name]}" for name, most in METAL_LIMITS.items() if found[name] > most]

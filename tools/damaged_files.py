@@ -1,6 +1,6 @@
-"""Sound files of every format of strands, and presets, and ways to damage them.
+"""Valid files of every format of strands, and presets, and methods to damage them.
 
-Every file comes from a seed and a number, so that `mutated(FORMAT, SEED, number)` makes it again.
+Every file follows from a seed and a number, so that `mutated(FORMAT, SEED, number)` makes it again.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from hairloom.addon.exchange.tressfx_layout import HEADER_3, HEADER_4
 from hairloom.addon.exchange.usd.groom_usd import write_usd
 from hairloom.addon.strands import StrandSet
 
-#: counts and offsets that hurt
+#: extreme counts and offsets
 EXTREMES = (0, 1, 2, 3, 63, 65, 255, 0xFFFF, 0x10000, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF)
 NUMBERS = (np.nan, np.inf, -np.inf, 3.0e38, -3.0e38, 1.0e-45, -0.0, 1.0e9)
 TOKENS = (
@@ -55,7 +55,7 @@ def mutated(kind: str, seed: int, number: int) -> bytes:
 
 @cache
 def originals(kind: str) -> tuple[tuple[bytes, ...], tuple[bytes, ...]]:
-    """Sound files of a format, small ones and large ones, to be damaged."""
+    """Valid files of a format, small ones and large ones, to be damaged."""
     if kind == "preset":
         return tuple(file.read_bytes() for file in sorted(REPOSITORY.glob("presets/*/*.json"))), ()
     with tempfile.TemporaryDirectory() as folder:
@@ -66,7 +66,7 @@ def originals(kind: str) -> tuple[tuple[bytes, ...], tuple[bytes, ...]]:
 
 
 def sample(strand_count: int, seed: int = 0, *, point_count: int = 0) -> Groom:
-    """A groom with all that formats hold; strands of 3 to 8 points, or of `point_count`."""
+    """A groom with all attributes of the formats; strands of 3 to 8 points, or of `point_count`."""
     random = np.random.default_rng([strand_count, seed])
     counts = random.integers(3, 9, strand_count)
     if point_count:
@@ -151,7 +151,7 @@ MAKERS: dict[str, Callable[[Path, int], Iterator[bytes]]] = {
     "usdc": _usd_files,
     "usda": _usd_files,
 }
-#: what libraries parse, not we
+#: formats that libraries parse
 OF_LIBRARIES = ("abc", "usdc", "usda")
 
 

@@ -21,7 +21,7 @@ _INDEX = re.compile(r"^\| About .*?(?=^## )", re.MULTILINE | re.DOTALL)
 
 
 def with_index(text: str) -> str:
-    """The page with the index that its entries ask for."""
+    """The page with the index of its entries."""
     return _INDEX.sub(lambda _: index(text) + "\n", text, count=1)
 
 
@@ -39,5 +39,5 @@ def index(text: str) -> str:
 
 
 def _anchor(title: str) -> str:
-    """As GitHub makes it of a heading."""
+    """The anchor that GitHub makes for a heading."""
     return re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-")

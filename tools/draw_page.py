@@ -1,7 +1,7 @@
-"""Serves the folder it lies in to a browser without a window, and keeps what its page sends back.
+"""Serves its own folder to a browser without a window, and stores what the page posts.
 
 python3 draw_page.py [SECONDS]: what index.html posts to NAME becomes the file NAME, until it posts
-"done"; exit code 1 and the reason where it posts that to "failed", or is not done after so long.
+to "done". Exit code 1, with the reason, if it posts one to "failed", or is not done after SECONDS.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ BROWSER += ("--enable-unsafe-swiftshader", "--disable-dev-shm-usage")
 
 
 class Handler(http.server.SimpleHTTPRequestHandler):
-    """Hands out files, and takes what index.html posts."""
+    """Serves files, and stores what index.html posts."""
 
     problem: str | None = "the browser never answered"
     answered = threading.Event()
@@ -39,7 +39,7 @@ class Handler(http.server.SimpleHTTPRequestHandler):
         self.end_headers()
 
     def log_message(self, format: str, *arguments: object) -> None:
-        """Quiet: what fails comes as an answer."""
+        """Silent: the page posts failures."""
 
 
 def main(seconds: float = LONGEST) -> int:

@@ -1,4 +1,4 @@
-"""Opens a page from its file in a browser without a window or a network, and does what is asked.
+"""Opens a page from its file in a browser without a window or a network, and performs steps.
 
 python3 drive_page.py PAGE.html STEPS.json OUTPUT
 
@@ -6,8 +6,8 @@ STEPS.json is a list of steps: {"evaluate": JavaScript} for its value, {"picture
 in the folder OUTPUT, {"key": NAME} for a press, {"wait": JavaScript} until it is true,
 {"screen": [width, height, scale]}, {"media": {feature: value}}, {"block_webgl": true} and
 {"open": true}.
-OUTPUT/report.json then has the values, what the console said, and what was asked of a network.
-The browser is driven through a pipe, so that nothing but its standard library is needed.
+OUTPUT/report.json then has the values, the console's messages, and the requests.
+The browser is driven through a pipe, so that only Python's standard library is needed.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ NO_WEBGL = """HTMLCanvasElement.prototype.getContext = new Proxy(
 
 
 class Browser:
-    """One page in Chromium. complaints: what its console said beside plain notes; requests: the
-    addresses that it asked for."""
+    """One page in Chromium. complaints: errors and warnings of its console; requests: the addresses
+    that it requested."""
 
     def __init__(self, profile: str) -> None:
         to_browser, self._out = os.pipe()

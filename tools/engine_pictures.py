@@ -1,13 +1,12 @@
-"""Draws what the render engine gives, and hair over Blender's own engines, for docs/engine.md and
-docs/light_shafts.md.
+"""Draws pictures of the render engine, and of hair over Blender's own engines, for docs/engine.md
+and docs/light_shafts.md.
 
 python tools/engine_pictures.py FOLDER
 
-FOLDER gets engine.png: picture, distance and object mask. The head is the built-in one with a
-groom, her face a material of its own, before a wall; rendered as an artist would, by the engine,
-into a file of many layers. over_engines.jpg: the sample scene by EEVEE and Cycles, with
-*Hairloom Hair*, and by Hairloom. And light_shafts.jpg: the head before a bright window, without
-shafts and with them, and under water.
+FOLDER gets engine.png: picture, distance and object mask of the built-in head with a groom, in
+front of a wall, rendered by the engine into a multilayer file, as by an artist. over_engines.jpg:
+the sample scene by EEVEE and Cycles, with *Hairloom Hair*, and by Hairloom. And light_shafts.jpg:
+the head in front of a bright window, without shafts and with them, and under water.
 """
 
 import importlib
@@ -23,12 +22,12 @@ from mathutils import Vector
 from small_pictures import write_small
 
 SIZE, SAMPLES, STRANDS, THICKER = 340, 16, 12000, 1.5
-#: of hair over Blender's own engines
+#: of pictures of hair over Blender's own engines
 OVER_SIZE, OVER_SAMPLES = 480, 64
-#: of light shafts
+#: of pictures of light shafts
 SHAFT_SAMPLES = 6
 WORLD = (0.12, 0.15, 0.2, 1.0)
-#: of the world in a room and under water; the bars of a window: where they are, and how large [m]
+#: colours of the world in a room and under water; the places and sizes of a window's bars [m]
 ROOM = (0.03, 0.03, 0.04, 1.0)
 SEA = (0.01, 0.04, 0.06, 1.0)
 BARS = (
@@ -134,7 +133,7 @@ def by_each_engine(work: Path) -> list[Path]:
 
 
 def put_behind(toward: Any, size: tuple[float, float], material: Any) -> Any:
-    """A pane that faces the camera, this far behind the head along the view."""
+    """A pane that faces the camera, at this offset from the target."""
     bpy.ops.mesh.primitive_plane_add(size=1.0, location=TARGET + toward)
     pane = bpy.context.object
     pane.rotation_euler = (CAMERA - TARGET).to_track_quat("Z", "Y").to_euler()
@@ -206,7 +205,7 @@ def opaque(colors: Any) -> Any:
 
 
 def distances(depth: Any) -> Any:
-    """White what is near, grey what is far, black where nothing is."""
+    """A picture of depth: white near, grey far, black where nothing is."""
     is_there = depth < 1.0e9
     near, far = depth[is_there].min(), np.percentile(depth[is_there], 98.0)
     share = np.clip((depth - near) / (far - near), 0.0, 1.0)

@@ -1,12 +1,12 @@
-"""Fetches the Python packages that the extension's zip brings along into wheels/.
+"""Fetches the Python packages of the extension's zip into wheels/.
 
 python tools/fetch_wheels.py
 
-tools/wheels.sha256 has a line for each of them as `sha256sum` writes it: only a file with that sum
-is taken, and one that is there already is not fetched again, so that this needs no network twice.
-Blender installs those of its own platform, which it reads from blender_manifest.toml; both lists
-name the same files. They come from PyPI, or from where pip is told to look (PIP_INDEX_URL,
-PIP_FIND_LINKS).
+tools/wheels.sha256 has a line for each of them, as `sha256sum` writes it: only a file with that sum
+is accepted, and an existing one is not fetched again, so that a second run needs no network.
+Blender installs those for its own platform, which it reads from blender_manifest.toml; both lists
+name the same files. They come from PyPI, or from the sources that pip is configured for
+(PIP_INDEX_URL, PIP_FIND_LINKS).
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from pathlib import Path
 REPOSITORY = Path(__file__).resolve().parents[1]
 TABLE = REPOSITORY / "tools" / "wheels.sha256"
 FOLDER = REPOSITORY / "wheels"
-#: of Blender 5.2, for packages that ask for no more than any Python 3
+#: of Blender 5.2, for packages that accept any Python 3
 PYTHON = "3.13"
 AT_A_TIME = 4
 
 
 class FetchError(Exception):
-    """A wheel that could not be had, and what to do about it."""
+    """A wheel could not be fetched; the message names a remedy."""
 
 
 def wanted(table: Path = TABLE) -> dict[str, str]:
@@ -42,7 +42,7 @@ def is_there(path: Path, digest: str) -> bool:
 
 
 def pip_options(name: str) -> list[str]:
-    """What pip must be told to take this wheel and not the one of the machine it runs on."""
+    """pip's options for this wheel, instead of the one for the machine it runs on."""
     _, _, *_, python, abi, platforms = name.removesuffix(".whl").split("-")
     version = python.split(".")[-1][2:]
     options = ["--python-version", version if len(version) > 1 else PYTHON, "--abi", abi]
@@ -52,7 +52,7 @@ def pip_options(name: str) -> list[str]:
 
 
 def fetch(name: str, digest: str, folder: Path = FOLDER) -> None:
-    """Raises FetchError where there is no such wheel, no network, or no place to write."""
+    """Fetch a wheel; raises FetchError if pip cannot get it, OSError if it cannot be written."""
     package, version, *_ = name.split("-")
     folder.mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory(dir=folder) as temporary:
@@ -87,7 +87,7 @@ def main() -> int:
             return False
         return True
 
-    # the network is waited for, not the processor
+    # threads, as the network takes the time
     with ThreadPoolExecutor(AT_A_TIME) as pool:
         return 0 if all(list(pool.map(fetched, missing))) else 1
 

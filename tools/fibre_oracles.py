@@ -1,9 +1,9 @@
-"""Brute force by which Marschner's lobes are measured, for tests and benchmarks.
+"""Brute-force references for Marschner's lobes, for tests and benchmarks.
 
-`traced_lobes` are rays in space through a glass cylinder, the truth for N_p; `scattered_energy`
-sums S over the sphere.
+`traced_lobes` traces rays in space through a glass cylinder, the reference for N_p;
+`scattered_energy` sums S over the sphere.
 
-Nothing of the plane across the fibre is used here, no Bravais index and no closed form: hit points,
+The normal plane of the fibre, Bravais indices and closed forms are not used here: hit points,
 normals, reflection and refraction are vectors, and Fresnel's formulas are those in space.
 """
 
@@ -27,7 +27,7 @@ from hairloom.addon.shading.marschner.scattering import azimuthal_lobes
 
 BIN_COUNT = 360
 
-#: On either side of TRT's caustic, where N_p has a pole, nothing is compared, [rad]
+#: Width on either side of TRT's caustic, where N_p has a pole, that is not compared [rad]
 _CAUSTIC_MARGIN = np.radians(3.0)
 
 
@@ -36,12 +36,12 @@ def traced_lobes(
 ) -> tuple[Floats, Floats]:
     """Histograms of phi and energies of the lobes p = 0, 1, ...
 
-    The light comes from azimuth 0 and inclination theta, on a smooth cylinder around z. Of the
-    fibre, index and absorption count.
+    The light comes from azimuth 0 and inclination theta, on a smooth cylinder around z. Only the
+    fibre's index and absorption count.
 
     Returns:
-        (order_count, BIN_COUNT, 3) density over phi in [-pi, pi], and (order_count, 3) the share of
-        the light.
+        (order_count, BIN_COUNT, 3) density over phi in [-pi, pi], and (order_count, 3) the fraction
+        of the light.
     """
     index = fibre.index_of_refraction
     random = np.random.default_rng(seed)
@@ -90,10 +90,10 @@ def lobe_errors(traced: Floats, theta: float, fibre: Fibre) -> tuple[float, floa
 
 
 def scattered_energy(fibre: Fibre, theta_i: Floats) -> Floats:
-    """All that S sends out for unit light from theta_i, (n,), of a channel each, (n, 3).
+    """The energy that S scatters of unit light from theta_i, (n,), by channel, (n, 3).
 
-    S cos^2 theta_r summed over the sphere. Around the fibre S depends on theta_d alone, so that
-    each cone's circle is summed once.
+    S cos^2 theta_r is summed over the sphere. Azimuthally, S depends on theta_d alone, so that each
+    cone's circle is summed once.
     """
     theta_r = ((np.arange(720) + 0.5) / 720 - 0.5) * np.pi
     phi = (np.arange(180) + 0.5) / 180 * np.pi
@@ -128,7 +128,8 @@ def _histogram(ways: Floats, weight: Floats) -> Floats:
 
 
 def _glass(cos_in: Floats, ratio: float) -> tuple[Floats, Floats]:
-    """Fresnel's reflectance and the cosine behind, in space; ratio is n before over n behind."""
+    """Fresnel's reflectance and the cosine of refraction, in space; ratio: n before over n
+    behind."""
     cos_out = np.sqrt(np.maximum(1.0 - ratio**2 * (1.0 - cos_in**2), 0.0))
     across = (ratio * cos_in - cos_out) / (ratio * cos_in + cos_out)
     along = (cos_in - ratio * cos_out) / (cos_in + ratio * cos_out)

@@ -1,4 +1,4 @@
-"""Runs all benchmarks, short, and writes what they find: bench/figures.json and docs/figures.md.
+"""Runs all benchmarks, short, and writes their figures: bench/figures.json and docs/figures.md.
 
 python tools/figures.py            all of them, in half an hour; `make bench`
 python tools/figures.py NAME ...   some again; the figures of the others stay
@@ -32,7 +32,7 @@ MAX_MINUTES = 30.0
 LONGEST = 600.0
 #: processors that may be busy before a benchmark begins, and for how long they are watched [s]
 MAX_BUSY, WATCHED = 0.3, 1.0
-#: what says how the figures of a benchmark came about, beside the figures
+#: keys of a benchmark's JSON that describe the run, and are no figures
 ABOUT = ("reference", "limits", "missed")
 ABOUT += ("backend", "renderer", "is_software", "blender", "python", "numpy")
 _QUOTE = re.compile(
@@ -42,13 +42,13 @@ _QUOTE = re.compile(
 
 @dataclass(frozen=True)
 class Short:
-    """What of a benchmark is run with all others, and what is left out for the time it takes."""
+    """The arguments of a benchmark's short run, and what it leaves out to save time."""
 
     arguments: str = ""
     left_out: str = ""
 
 
-#: in the order of the data's way
+#: in the order of the data flow
 BENCHES: dict[str, Short] = {
     "curves_read": Short(),
     "styles": Short("bob edit", "22 styles, and other heads"),
@@ -80,7 +80,7 @@ BENCHES: dict[str, Short] = {
 
 
 def measure(names: list[str]) -> int:
-    """Run them one after another, and write what each has found as soon as it has."""
+    """Run benchmarks one after another, and write the figures of each as soon as it ends."""
     kept = known()
     begin, is_all = time.monotonic(), len(names) == len(BENCHES)
     for number, name in enumerate(names, 1):
@@ -107,7 +107,8 @@ def write(kept: Mapping[str, Any]) -> None:
 
 
 def run(name: str) -> dict[str, Any]:
-    """What a benchmark found, in a process of its own; `ended` is false if it has found nothing."""
+    """The result of a benchmark, run in its own process; `ended` is false if it printed no
+    figures."""
     command = [sys.executable, str(REPOSITORY / "tools" / "bench.py"), name]
     command += BENCHES[name].arguments.split()
     ran = {
@@ -134,7 +135,7 @@ def run(name: str) -> dict[str, Any]:
 
 
 def busy_processors() -> float:
-    """How many processors other work takes; 0 where the system does not tell."""
+    """How many processors other work takes; 0 if the system does not report it."""
     told = Path("/proc/stat")
     if not told.is_file():
         return 0.0
@@ -149,7 +150,7 @@ def busy_processors() -> float:
 
 
 def machine() -> dict[str, str]:
-    """On what it is computed."""
+    """The processor that computes."""
     cores = os.cpu_count() or 1
     names = Path("/proc/cpuinfo")
     text = names.read_text(encoding="utf-8") if names.is_file() else ""
@@ -166,7 +167,7 @@ def known() -> dict[str, Any]:
 
 
 def page(kept: Mapping[str, Any]) -> str:
-    """docs/figures.md, whole."""
+    """The text of docs/figures.md."""
     benches: dict[str, Any] = kept["benches"]
     ended = {name: found for name, found in benches.items() if found["ended"]}
     limits = sum(len(found["limits"]) for found in ended.values())
@@ -230,14 +231,14 @@ def measured_on(found: Mapping[str, Any]) -> str:
 
 
 def about(name: str) -> str:
-    """The first paragraph of what a benchmark says of itself."""
+    """The first paragraph of a benchmark's docstring."""
     source = (BENCHMARKS / f"{name}.py").read_text(encoding="utf-8")
     told = (ast.get_docstring(ast.parse(source)) or "").split("\n\n")[0]
     return " ".join(told.split())
 
 
 def number(value: Any) -> str:
-    """As the page shows it: three digits that count, or a word."""
+    """A value as the page shows it: three significant digits, or a word."""
     if isinstance(value, bool) or value is None or isinstance(value, (str, list)):
         return ", ".join(map(str, value)) or "none" if isinstance(value, list) else str(value)
     if isinstance(value, int) or (value == round(value) and abs(value) < 1e6):
@@ -248,10 +249,10 @@ def number(value: Any) -> str:
 
 
 def quoted(text: str, kept: Mapping[str, Any]) -> str:
-    """The text of a page with each figure that it quotes as it was found last.
+    """The text of a page with the latest value of each figure that it quotes.
 
-    What follows the number stays: `[41 times](figures.md "refinement.node_ratio")`. A percentage of
-    a figure that is a fraction is counted as such.
+    Text after the number stays: `[41 times](figures.md "refinement.node_ratio")`. A figure that is
+    a fraction is converted if the quote is a percentage.
 
     Raises:
         KeyError: no benchmark found a figure of this name.

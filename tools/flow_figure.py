@@ -1,8 +1,8 @@
 """The figure of docs/dev/architecture.md: who calls whom in the three flows, floor by floor.
 
 Each flow is a tree of calls: a line is a file of addon/ and a function or class in it, indented
-under its caller. `tests/pure/test_flow_figure.py` holds every line against the source: the function
-is there, and the caller's file imports it and names it. `make docs` draws the figure.
+under its caller. `tests/pure/test_flow_figure.py` checks every line against the source: the
+function exists, and the caller's file imports and names it. `make docs` draws the figure.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from pathlib import Path
 REPOSITORY = Path(__file__).resolve().parents[1]
 FIGURE = REPOSITORY / "docs" / "images" / "flows.svg"
 
-#: Floors from the top of the house to its ground: a call goes down, data comes back up by value.
+#: Floors from top to bottom: calls go down, data comes back up by value.
 _FLOORS = """
     ui
     blender/command_line blender/setup blender/engine blender/pictures blender/preview
@@ -147,7 +147,8 @@ def _every(steps: list[Step]) -> list[Step]:
 
 
 def _place(steps: list[Step], column: int) -> int:
-    """A column for each leaf, a caller above its first call; calls within a floor go down a row."""
+    """Place a leaf in each column, a caller above its first call; calls within a floor go down a
+    row."""
     for step in steps:
         for called in step.calls:
             called.row = step.row + 1 if called.floor == step.floor else 0

@@ -1,11 +1,11 @@
-"""Damaged files of every format that Hairloom reads: a clear error or a sound groom.
+"""Damaged files of every format that Hairloom reads must give a clear error or a valid groom.
 
 python tools/in_package.py fuzz_files FORMAT COUNT [SEED]    a line of JSON
 
-The files are those of `damaged_files`. A failure is any other exception than HairloomError, one
-without a place or a remedy, a groom that is not sound, more than SLOWEST seconds, or more memory
-than MOST_TIMES the file and MOST_BESIDE. Of Alembic and USD, which their libraries parse, only the
-end of this process, the messages and the grooms count, and SLOWEST_APART seconds.
+The files are those of `damaged_files`. A failure is an exception other than HairloomError, one
+without a place or a remedy, an invalid groom, more than SLOWEST seconds, or more memory than
+MOST_TIMES the file and MOST_BESIDE. For Alembic and USD, which libraries parse in another process,
+memory does not count, and the limit is SLOWEST_APART seconds.
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ def fuzzed(kind: str, count: int, seed: int = 0) -> dict[str, Any]:
 def judged(
     read: Callable[[Path], Any], path: Path, most_seconds: float = SLOWEST
 ) -> tuple[str, float, int]:
-    """How reading a file went: "read", "refused" or what was wrong; seconds; bytes at the most."""
+    """The outcome of reading a file: "read", "refused" or the problem; seconds; peak bytes."""
     tracemalloc.reset_peak()
     before = tracemalloc.get_traced_memory()[0]
     started = time.perf_counter()
@@ -130,7 +130,7 @@ def _are_whole(color: Any, offsets: Any) -> bool:
 
 
 def unsound(found: Any) -> str:
-    """What is wrong with what a reader gave; empty where nothing is."""
+    """What is wrong with a reader's result; empty if nothing is."""
     if isinstance(found, ReadGroom):
         strands, color = found.strands, found.groom.color
         sound = [
@@ -145,7 +145,7 @@ def unsound(found: Any) -> str:
 
 
 class _Hang(BaseException):
-    """Not to be caught by a reader."""
+    """Reading hangs; no reader may catch this."""
 
 
 @contextmanager

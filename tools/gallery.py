@@ -4,7 +4,7 @@ python tools/gallery.py [NAME ...]       draw all pictures, or some, and write t
 python tools/gallery.py --page           write the page alone
 python tools/gallery.py --bear FILE.obj  write the mesh that fur grows on
 
-Each picture is one command of SECTIONS, which is run here as the page shows it to its reader.
+Each picture comes from a command of SECTIONS, which runs here as the page shows it.
 """
 
 import argparse
@@ -42,7 +42,7 @@ smoother.
 class Picture:
     """One picture and what draws it.
 
-    name: of its file and of what the reader's command writes.
+    name: of its file, and of the file that the reader's command writes.
     title: what is shown.
     options: of the verb `render`, without size and output.
     """
@@ -67,7 +67,7 @@ class Section:
 
 
 def of_presets(folder: str, options: str) -> tuple[Picture, ...]:
-    """A picture for each preset of a folder, whose name takes the place of {} in the options."""
+    """A picture for each preset of a folder, whose name replaces {} in the options."""
     return tuple(
         Picture(
             f"{folder}_{path.stem}",
@@ -201,7 +201,7 @@ SECTIONS = (
 
 
 def page() -> str:
-    """docs/gallery.md, whole."""
+    """The text of docs/gallery.md."""
     return "\n".join([HEADING, *(_shown(section) for section in SECTIONS)])
 
 
@@ -246,7 +246,8 @@ def draw(names: list[str]) -> None:
 
 
 def command_line() -> Callable[[str], None]:
-    """What runs a command here, so that Blender starts once, and each hair is grown once."""
+    """A function that runs a command in this process, so that Blender starts once, and each groom
+    is grown once."""
     import bpy  # noqa: F401  it must come before gpu, which lives inside it
     import gpu
 

@@ -1,4 +1,4 @@
-"""What a piece of work asks of the gpu module: what it reads back, draws, dispatches and makes."""
+"""Counts a piece of work's calls of the gpu module: readbacks, draws and dispatches."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ _CALLS = {
 
 
 def gpu_calls(work: Callable[[], Any]) -> Counter[str]:
-    """How often work does what, in this thread. Types of the gpu module cannot be changed, so the
-    interpreter is asked for the calls of built-in functions.
+    """Number of calls by `work` in this thread, by kind. Types of the gpu module cannot be patched,
+    so the interpreter's profiler reports calls of built-in functions.
     """
     found: Counter[str] = Counter()
 

@@ -1,4 +1,4 @@
-"""Grooms of guides that go through frames together, for tests and benchmarks."""
+"""Grooms of guides that are simulated together, for tests and benchmarks."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ class Groom:
     """Guides in motion.
 
     Args:
-        grid: at rest, (guide_count, cv_count, 3) [m]. settings: None: it is not simulated.
-        state: from which it goes on; None: from rest.
-        make_pass: gives a DynamicsPass of a state; None: numpy.
-        gravity: in terms of the earth's.
+        grid: at rest, (guide_count, cv_count, 3) [m]. settings: None: the groom is not simulated.
+        state: to start from; None: rest.
+        make_pass: makes a DynamicsPass from a state; None: numpy.
+        gravity: as a multiple of the earth's.
     """
 
     def __init__(
@@ -55,7 +55,7 @@ class Groom:
         return self._state if self._pass is None else self._pass.read()
 
     def wait(self) -> None:
-        """Until the GPU has come to the frame's end, and its guides are here."""
+        """Wait until the GPU has finished the frame, and its guides are read back."""
         if self._pass is not None:
             self._pass.read()
 
@@ -83,10 +83,10 @@ def play_frame(
     duration: float,
     near: Sequence[frozenset[int]] | None = None,
 ) -> None:
-    """Through a frame, in which their styles go to these targets.
+    """Simulate a frame, in which the grooms' styles move to these targets.
 
     Args:
-        near: of each groom, the numbers of those that it feels; None: all others.
+        near: for each groom, the numbers of the grooms that it feels; None: all others.
     """
     numbers = frozenset(range(len(grooms)))
     near = near or [numbers - {number} for number in numbers]

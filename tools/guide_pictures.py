@@ -1,9 +1,9 @@
-"""Takes the pictures of docs/user_guide.md from where the window session has left them.
+"""Copies the pictures of docs/user_guide.md from the output of the window session.
 
 make test-ui SESSIONS=session_guide_pictures
 python tools/guide_pictures.py FOLDER
 
-What stands on the panels is kept beside them, see tools/panel_texts.py.
+The contents of the panels are stored beside them, see tools/panel_texts.py.
 """
 
 import shutil

@@ -1,5 +1,5 @@
-"""The steps of docs/hairstyles.md and of the tutorials: their blocks of Python, which pictures and
-tests walk.
+"""The steps of docs/hairstyles.md and of the tutorials: their blocks of Python, which tools for
+pictures and tests run.
 """
 
 import re
@@ -22,7 +22,7 @@ def tutorial_page(name: str) -> Path:
 
 
 def tutorial(name: str) -> list[str]:
-    """The code of each step of a tutorial; it knows `bpy`, a `folder` and a `last_frame`."""
+    """The code of each step of a tutorial; it may use `bpy`, a `folder` and a `last_frame`."""
     return steps(tutorial_page(name))["tutorial"]
 
 

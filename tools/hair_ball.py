@@ -10,9 +10,9 @@ ARC = 0.5
 
 
 def combed_strands(count: int, cv_count: int = 12, lift: float = 0.03) -> np.ndarray:
-    """Strands whose roots lie by chance, (n <= count, cv_count, 3) float32.
+    """Strands with random roots, (n <= count, cv_count, 3) float32.
 
-    In a pattern of roots neighbours would always hide the same side of a strand. Strands that would
+    With regular roots, neighbours would always hide the same side of a strand. Strands that would
     grow over the lower pole are left out.
 
     Args:

@@ -1,5 +1,5 @@
-"""Draws the pictures of docs/hairstyles.md: each hairstyle that it makes from nothing, after each
-of its steps.
+"""Draws the pictures of docs/hairstyles.md: each hairstyle that the page makes from nothing, after
+each of its steps.
 
 python tools/hairstyle_pictures.py FOLDER [NAME ...]
 """

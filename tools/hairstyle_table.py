@@ -15,7 +15,7 @@ _TABLE = re.compile(rf"^\| {' [|] '.join(_HEADING)} \|\n(?:\|.*\n)*", re.MULTILI
 
 
 def with_table(text: str) -> str:
-    """The page with the table that the hairstyles ask for."""
+    """The page with the table of the present hairstyles."""
     return _TABLE.sub(lambda _: table(), text, count=1)
 
 

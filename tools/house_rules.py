@@ -1,6 +1,6 @@
-"""Reads the tree: rooms and their arrows, circles, tables that change, names that nobody calls.
+"""Reads the tree: imports between rooms, import circles, names that change, unused names.
 
-tests/pure/test_house.py holds the rules; bench/house.py prints the figures.
+tests/pure/test_house.py checks the rules; bench/house.py prints the figures.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ BLENDER = {
     "mathutils",
 }
 
-#: modules that stand beside the rooms: the ground floor, and the flows over the pure rooms
+#: modules that every room may import; the pure rooms; and the modules over them
 GROUND = {"errors", "arrays"}
 PURE = {"params", "strands", "groom", "dynamics", "refine", "shading", "cards", "exchange"}
 FLOWS = {
@@ -43,10 +43,10 @@ FLOWS = {
     "parameters",
 }
 
-#: The rooms of blender/, in the order of the data: properties say what is read from the scene with
-#: its colliders and bakes; cards and strands leave it; a session moves it, the viewport shows it,
-#: the preview keeps both in step with Blender; pictures and the engine draw it; setup begins with
-#: it, and the command line calls it all.
+#: The rooms of blender/, in the order of the data flow: properties determine what is read from the
+#: scene with its colliders and bakes; cards and strands export it; a session simulates it, the
+#: viewport shows it, the preview keeps both in step with Blender; pictures and the engine draw it;
+#: setup creates it, and the command line calls all of them.
 BLENDER_ROOMS = (
     "base",
     "properties",
@@ -64,7 +64,7 @@ BLENDER_ROOMS = (
     "command_line",
 )
 
-#: room -> what it may import, beside itself, the ground floor, the standard library and numpy
+#: room -> what it may import, beside itself, GROUND, the standard library and numpy
 MAY_IMPORT: dict[str, set[str]] = {
     "errors": set(),
     "arrays": set(),
@@ -114,7 +114,7 @@ def room_of(name: str) -> str:
 
 
 def arrow_back(room: str, target: str) -> str:
-    """Why a room of blender/ may not import another; empty where it may, or is none."""
+    """Why a room of blender/ may not import another; empty if it may, or if one is no such room."""
     one, other = (name.removeprefix("blender.") for name in (room, target))
     if not (room.startswith("blender.") and target.startswith("blender.")):
         return ""
@@ -138,13 +138,13 @@ def imports_of(file: Path, addon: Path = ADDON) -> Iterator[tuple[int, str]]:
 
 
 def is_declaration(name: str, addon: Path = ADDON) -> bool:
-    """Whether it is of a module that declares what an artist can choose: settings or formats."""
+    """Whether a name is from a module that declares an artist's choices: settings or formats."""
     file = addon.joinpath(*name.lstrip(".").split(".")[:-1]).with_suffix(".py")
     return file.stem.endswith(("settings", "formats")) and file.is_file()
 
 
 def violations(addon: Path) -> list[str]:
-    """Every import that the table above does not allow."""
+    """Every import that MAY_IMPORT does not allow."""
     found = []
     for file in sorted(addon.rglob("*.py")):
         room = room_of(module_name(file, addon))
@@ -188,7 +188,7 @@ def import_graph(addon: Path) -> dict[str, set[str]]:
 
 
 def import_circle(addon: Path = ADDON) -> list[str]:
-    """The modules of a circle of imports; empty where there is none."""
+    """The modules of a circle of imports; empty if there is none."""
     try:
         list(graphlib.TopologicalSorter(import_graph(addon)).static_order())
     except graphlib.CycleError as error:
@@ -198,21 +198,21 @@ def import_circle(addon: Path = ADDON) -> list[str]:
 
 @cache
 def _nodes(file: Path) -> list[ast.AST]:
-    """All of a module's syntax, the module itself first."""
+    """All syntax nodes of a module, the module itself first."""
     return list(ast.walk(ast.parse(file.read_text(encoding="utf-8"))))
 
 
-#: what changes a list, a dict or a set
+#: methods that change a list, a dict or a set
 _CHANGING = {"append", "add", "update", "pop", "popitem", "clear", "discard", "remove", "extend"}
 _CHANGING |= {"setdefault", "insert", "difference_update", "appendleft", "popleft", "subtract"}
 
 
-#: Names that modules may change, at most.
+#: Upper limit of `mutable_names`.
 MOST_MUTABLE = 20
 
 
 def mutable_names(addon: Path = ADDON) -> list[str]:
-    """Names of modules that functions bind again or whose contents they change."""
+    """Names of modules that functions rebind or whose contents are changed."""
     found = []
     for file in sorted(addon.rglob("*.py")):
         changed: set[str] = set()
@@ -233,7 +233,7 @@ def mutable_names(addon: Path = ADDON) -> list[str]:
 
 
 def _bound(file: Path) -> set[str]:
-    """Names that the module itself binds, and none that a function has for itself."""
+    """Names that the module itself binds and that no function binds locally."""
     bound: set[str] = set()
     own: set[str] = set()
     module = _nodes(file)[0]
@@ -287,8 +287,8 @@ _OF_BLENDER |= {"update_script_node", "draw_item", "setup", "draw_prepare"}
 def unused_names(repository: Path = REPOSITORY) -> list[str]:
     """Functions, classes and methods that nothing in the add-on uses.
 
-    What a shader has under the same name is wanted, and so are references: shaders and fast code
-    are tested against them.
+    Names that shaders have too do not count, nor do references: shaders and fast code are tested
+    against them.
     """
     addon = repository / "addon"
     used: Counter[str] = Counter()
@@ -326,8 +326,8 @@ WANTED = {
 
 
 def files_that_list_sections(sections: dict[str, str], addon: Path = ADDON) -> list[str]:
-    """Files that name two of five sections of settings, or their classes: lists of them, in which
-    most new ones would have to stand too.
+    """Files that name two of five sections of settings, or their classes: lists to which most new
+    ones would have to be added.
 
     Args:
         sections: section -> name of its class.
@@ -349,7 +349,7 @@ def files_that_list_sections(sections: dict[str, str], addon: Path = ADDON) -> l
 
 
 def renamed_arguments(addon: Path = ADDON) -> list[str]:
-    """Names under "Args:" that the function has no argument of."""
+    """Names under "Args:" that are no arguments of the function."""
     found = []
     for file in sorted(addon.rglob("*.py")):
         functions = (node for node in _nodes(file) if isinstance(node, ast.FunctionDef))

@@ -1,4 +1,4 @@
-"""Kills a process while it writes, many times: the old files or the new ones must be there.
+"""Kills a process while it writes, many times: afterwards the old or the new files must be there.
 
 python tools/in_package.py kill_writes FORMAT TRIALS [SEED]    a JSON line, see `killed`
 
@@ -29,9 +29,9 @@ from hairloom.addon.exchange.tressfx import write_tfx
 from hairloom.addon.exchange.usd.groom_usd import write_usd
 
 STRANDS = 3000
-#: the child is killed within the time of this many writes from its first one on
+#: the child is killed within the time that this many writes take
 WRITES = 4.0
-#: what is exported as a set, beside the file that is asked for
+#: files that are exported as a set with the target
 OTHERS = ("hair_base.png", "hair_normal.png", "hair.json")
 
 
@@ -51,7 +51,7 @@ def _write_set(path: Path, version: int) -> None:
 
 
 def _write_plainly(path: Path, version: int) -> None:
-    """What all the others must not do; that this one is caught shows that the trials can fail."""
+    """A writer that is not atomic; that it is caught shows that the trials can fail."""
     path.write_bytes(bytes([version]) * 3_000_000)
 
 
@@ -82,13 +82,13 @@ def main(arguments: list[str]) -> int:
 def killed(
     write: Callable[[Path, int], object], target: Path, trials: int, seed: int
 ) -> dict[str, int]:
-    """Kill a writer this many times and look at what it left.
+    """Kill a writer this many times, and check the files that it left.
 
     Returns:
-        trials; failures: a file that is neither the old one nor the new one; amid: kills that left
-        something half-written beside the target, those that came in time; mixed: sets with old and
-        new files once the next writer looks at the folder; leftovers: what still lies beside the
-        target after one write more.
+        trials; failures: a file that is neither the old one nor the new one; amid: kills during a
+        write, which left temporary files beside the target; mixed: sets with old and new files,
+        after the next writer's removal of stale files; leftovers: files that are still beside the
+        target after one more write.
     """
     random = np.random.default_rng(seed)
     folder, versions, seconds = target.parent, [], 0.0
@@ -117,7 +117,7 @@ def killed(
 
 
 def _content(folder: Path) -> dict[str, bytes]:
-    """What lies there, without hidden files; Alembic files, which have a date, by their size."""
+    """The visible files of a folder; Alembic files, which hold a date, by size and end."""
     files = [path for path in folder.iterdir() if not path.name.startswith(".")]
     return {
         path.name: repr((path.stat().st_size, is_finished(path))).encode()
@@ -128,7 +128,7 @@ def _content(folder: Path) -> dict[str, bytes]:
 
 
 def _write_apart(write: Callable[[Path, int], object], target: Path, version: int) -> None:
-    """In a child too: libraries have threads, which would not come along into the next one."""
+    """Write in a child too: threads that libraries start here would be lost in the next fork."""
     child = os.fork()
     if child == 0:
         try:

@@ -2,8 +2,8 @@
 
 python tools/make_bust.py base.obj
 
-`base.obj` of the MakeHuman project gives the skin. Eyes and vertex groups are made here. Written is
-addon/blender/scene/bust.npz, whose arrays addon/blender/scene/bust_data.py describes.
+The skin is from `base.obj` of the MakeHuman project; eyes and vertex groups are made here. The
+output is addon/blender/scene/bust.npz, whose arrays addon/blender/scene/bust_data.py describes.
 """
 
 import sys
@@ -19,17 +19,17 @@ from mathutils.bvhtree import BVHTree
 OUTPUT = Path(__file__).parents[1] / "addon" / "blender" / "scene" / "bust.npz"
 #: MakeHuman's unit [m]
 DECIMETRE = 0.1
-#: of the skull, in MakeHuman's space turned to Z up [m]; it becomes the origin
+#: middle of the skull, in MakeHuman's space turned to Z up [m]; it becomes the origin
 MIDDLE = np.array([0.0, -0.06, 0.735])
 
 # From here on places are in metres around that origin: x to the left of the bust, -y ahead, z up.
-#: how far the shoulders are let down, and each lip is moved to the other [m]; height of the mouth
+#: how far shoulders are lowered, and each lip is moved to the other; height of the mouth [m]
 SHOULDERS_DOWN, LIPS_CLOSED, MOUTH = 0.034, 0.0013, -0.0755
 #: the cut, seen from the front: a superellipse with this middle, these half axes and this power
 CUT_HEIGHT, CUT_HALF, CUT_POWER = -0.10, (0.158, 0.158), 2.4
 #: corners this near to the cut are moved onto it, so that no slivers are left [m]
 SNAP = 0.004
-#: what lies deeper in the mouth and the eye sockets is left out (island, y)
+#: island -> y behind which the mouth and the eye sockets are left out [m]
 DEEPEST = {1: -0.07, 2: -0.062, 3: -0.062}
 
 EYE, EYE_RADIUS = np.array([0.0307767, -0.064535, -0.0065861]), 0.01495
@@ -38,8 +38,8 @@ EYE_RINGS, EYE_CORNERS = (5, 10, 16, 22, 26, 30, 38, 50, 65, 82, 100), 16
 #: how far the cornea stands out [m], and the angle at which it ends [degrees]
 CORNEA, CORNEA_END = 0.0009, 30.0
 
-#: islands of the map: MakeHuman's box (left, bottom, right, top), the corner that it gets, and how
-#: much larger it is there
+#: islands of the UV map: MakeHuman's box (left, bottom, right, top), its new corner, and the factor
+#: of its size
 ISLANDS = (
     ((0.63, 0.14, 1.0, 0.83), (0.01, 0.02), 1.36),
     ((0.74, 0.0, 0.94, 0.14), (0.53, 0.02), 1.0),
@@ -48,7 +48,7 @@ ISLANDS = (
     ((0.16, 0.66, 0.60, 0.99), (0.53, 0.50), 1.0),
 )
 EYE_MAPS, EYE_MAP_RADIUS = ((0.645, 0.30), (0.875, 0.30)), 0.105
-#: the corner of what closes the cut in the map, and units of the map a metre
+#: UV corner of the cap that closes the cut, and UV units per metre
 CAP_CORNER, CAP_SCALE = (0.53, 0.82), 0.75
 
 #: Lines on the head as seen from an upright axis through (0, AXIS): angle from the front [degrees],
@@ -90,7 +90,7 @@ BROW = (
 )
 #: edges from the seam between face and socket to the rim of the lid
 RIM_RING = 3
-#: how far around a point what hides it counts [m], and in how many directions it is looked for
+#: reach of the rays that find occlusion [m], and their number per point
 CAVITY_REACH, CAVITY_RAYS = 0.02, 96
 
 
@@ -112,7 +112,7 @@ class Mesh:
         return np.split(corners, np.cumsum(self.sizes)[:-1])
 
     def compact(self) -> "Mesh":
-        """Without the vertices and UVs that no polygon has."""
+        """The mesh without unused vertices and UVs."""
         vertices, corner_vertex = np.unique(self.corner_vertex, return_inverse=True)
         uvs, corner_uv = np.unique(self.corner_uv, return_inverse=True)
         return Mesh(self.positions[vertices], self.uv[uvs], self.sizes, corner_vertex, corner_uv)
@@ -143,7 +143,7 @@ def read_skin(path: Path) -> Mesh:
 
 
 def relaxed(mesh: Mesh) -> Mesh:
-    """With shoulders let down from the pose in which MakeHuman models them, and lips that meet."""
+    """The mesh with shoulders lowered from the pose of MakeHuman's model, and closed lips."""
     x, y, z = mesh.positions.T
     let_down = (
         SHOULDERS_DOWN * smooth_step((np.abs(x) - 0.04) / 0.14) * smooth_step((-0.10 - z) / 0.05)
@@ -155,7 +155,7 @@ def relaxed(mesh: Mesh) -> Mesh:
 
 
 def above_cut(positions: np.ndarray) -> np.ndarray:
-    """How far inside of the cut points lie, about [m]; negative outside."""
+    """How far inside the cut points are, approximately [m]; negative outside."""
     across = np.abs(positions[:, 0]) / CUT_HALF[0]
     down = np.maximum(CUT_HEIGHT - positions[:, 2], 0.0) / CUT_HALF[1]
     radius = (across**CUT_POWER + down**CUT_POWER) ** (1.0 / CUT_POWER)
@@ -163,7 +163,7 @@ def above_cut(positions: np.ndarray) -> np.ndarray:
 
 
 def cut(mesh: Mesh) -> Mesh:
-    """What lies inside of the cut, its border exactly on it."""
+    """The part of a mesh inside the cut, with its border exactly on it."""
     positions = snapped(mesh.positions)
     inside = above_cut(positions)
     inside[np.abs(inside) < 1e-7] = 0.0
@@ -232,7 +232,7 @@ def chosen(mesh: Mesh, wanted: np.ndarray) -> Mesh:
 
 
 def shallow(mesh: Mesh) -> Mesh:
-    """Without the depths of the mouth and the eye sockets, which have islands of their own."""
+    """The mesh without the depths of the mouth and the eye sockets, which are separate islands."""
     first = np.concatenate([[0], np.cumsum(mesh.sizes)[:-1]])
     depth = np.minimum.reduceat(mesh.positions[mesh.corner_vertex, 1], first)
     island = island_of(mesh.uv)[mesh.corner_uv[first]]
@@ -241,7 +241,7 @@ def shallow(mesh: Mesh) -> Mesh:
 
 
 def island_of(uv: np.ndarray) -> np.ndarray:
-    """Which of ISLANDS holds a place of MakeHuman's map, -1 for none."""
+    """The number in ISLANDS of the island that holds each UV of MakeHuman's map, -1 for none."""
     island = np.full(len(uv), -1)
     for number, (box, _, _) in enumerate(ISLANDS):
         island[((uv >= box[:2]) & (uv <= box[2:])).all(axis=1)] = number
@@ -249,7 +249,7 @@ def island_of(uv: np.ndarray) -> np.ndarray:
 
 
 def laid_out(mesh: Mesh) -> Mesh:
-    """The map with its islands in their new places."""
+    """The mesh with the islands of its map in their new places."""
     uv, island = mesh.uv.copy(), island_of(mesh.uv)
     assert (island >= 0).all(), "a place of the map that no island holds"
     for number, (box, corner, factor) in enumerate(ISLANDS):
@@ -259,7 +259,7 @@ def laid_out(mesh: Mesh) -> Mesh:
 
 
 def cap(mesh: Mesh) -> Mesh:
-    """What closes the cut: a strip along it, from the front to the back, by itself."""
+    """A separate mesh that closes the cut: a strip along it, from the front to the back."""
     ring = mesh.positions[border(mesh)]
     across, down = ring[:, 0] / CUT_HALF[0], (CUT_HEIGHT - ring[:, 2]) / CUT_HALF[1]
     turn = np.arctan2(across, down)
@@ -353,7 +353,7 @@ def smooth_step(value: np.ndarray) -> np.ndarray:
 def inside_line(positions: np.ndarray, line: tuple[tuple[float, ...], ...]) -> np.ndarray:
     """0 outside of a closed line on the head, rising to 1 over its soft edge inside."""
     x, y, z = positions.T
-    # as long as on the head, whose radius is about 8.5 cm
+    # angles as lengths on the head, whose radius is about 8.5 cm
     to_metres = np.radians(1.0) * 0.085
     place = np.stack([np.degrees(np.arctan2(np.abs(x), AXIS - y)) * to_metres, z], axis=1)
     corners = np.array(line)
@@ -403,8 +403,8 @@ def lips(mesh: Mesh, mouth: np.ndarray) -> np.ndarray:
 
 
 def lid_rims(mesh: Mesh, sockets: np.ndarray) -> np.ndarray:
-    """1 on the outer rims of the lids, a few rings of vertices before those where the skin of the
-    face meets that of the sockets.
+    """1 on the outer rims of the lids, a few rings of vertices away from the seam between the face
+    and the sockets.
 
     Args:
         sockets: (corner_count,) whether a corner is of a socket's island.
@@ -423,13 +423,13 @@ def lid_rims(mesh: Mesh, sockets: np.ndarray) -> np.ndarray:
         for start, end in ((one, other), (other, one)):
             beside = end[ring[start] == step]
             ring[beside] = np.minimum(ring[beside], step + 1)
-    # none grow in the inner corner, with its caruncle
+    # no lashes in the inner corner, at the caruncle
     away = np.abs(mesh.positions[:, 0]) - EYE[0]
     return (ring == RIM_RING) * smooth_step((away + 0.0115) / 0.003)
 
 
 def cavities(mesh: Mesh) -> np.ndarray:
-    """The fraction of the directions around each vertex that lead out of every fold."""
+    """The fraction of the directions around each vertex that is not occluded by nearby skin."""
     tree = BVHTree.FromPolygons(mesh.positions.tolist(), mesh.polygons(mesh.corner_vertex))
     normals = vertex_normals(mesh)
     number = np.arange(CAVITY_RAYS) + 0.5
@@ -437,13 +437,13 @@ def cavities(mesh: Mesh) -> np.ndarray:
     turn = np.pi * (1.0 + 5.0**0.5) * number
     ring = np.sqrt(1.0 - height**2)
     sphere = np.stack([ring * np.cos(turn), ring * np.sin(turn), height], axis=1)
-    # around the normal, as many as the cosine of their angle asks for
+    # rays are cosine-weighted about the normal
     free = np.empty(len(mesh.positions))
     for vertex, (point, normal) in enumerate(zip(mesh.positions, normals, strict=True)):
         rays = sphere + normal
         start = Vector(point + 1e-4 * normal)
         hits = [tree.ray_cast(start, Vector(ray), CAVITY_REACH)[3] for ray in rays]
-        # what is farther hides less
+        # farther hits occlude less
         hidden = sum(1.0 - hit / CAVITY_REACH for hit in hits if hit is not None)
         free[vertex] = 1.0 - hidden / CAVITY_RAYS
     return free

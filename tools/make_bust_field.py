@@ -2,7 +2,7 @@
 
 python tools/make_bust_field.py
 
-It is made again where the head, its resolution or how a field is made changes; a test says so.
+Run it again when the head, the resolution or the computation of fields changes; a test fails then.
 """
 
 import importlib

@@ -42,7 +42,7 @@ Angles are shown here in degrees: write `22deg`, since a bare 22 is 22 radians.
 
 
 def parameter_tables() -> str:
-    """docs/parameters.md, whole."""
+    """The text of docs/parameters.md."""
     load_package()
     parameters = importlib.import_module(f"{PACKAGE}.addon.parameters")
     docs = importlib.import_module(f"{PACKAGE}.addon.params.docs")
@@ -52,7 +52,7 @@ def parameter_tables() -> str:
 
 
 def verb_tables() -> str:
-    """docs/verbs.md, whole; it takes a Blender to know."""
+    """The text of docs/verbs.md; needs Blender."""
     load_package()
     command_line = importlib.import_module(f"{PACKAGE}.addon.blender.command_line.command_line")
     return str(
@@ -63,7 +63,7 @@ def verb_tables() -> str:
 
 
 def texts_to_translate() -> str:
-    """translations/template.json, whole; it takes a Blender to know."""
+    """The text of translations/template.json; needs Blender."""
     load_package().register()
     translations = importlib.import_module(f"{PACKAGE}.addon.ui.translations")
     classes = importlib.import_module(f"{PACKAGE}.addon.registration").CLASSES

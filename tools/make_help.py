@@ -1,9 +1,8 @@
 """Writes the pages that *Help* opens in Blender: the site without its pictures, as `help/`.
 
-`make zip` puts them into the extension, so that they are there without a network, and of the
-version that is installed. Without pictures they take one megabyte of the zip, with them fourteen.
-
-Sphinx takes ten seconds, so what is there stays until something has changed that it is made from.
+`make zip` adds them to the extension, so that they need no network and match the installed version.
+Without pictures they take one megabyte of the zip, with them fourteen. Sphinx takes ten seconds, so
+pages are only written again when their sources have changed.
 
     python tools/make_help.py
 """
@@ -19,15 +18,15 @@ from pathlib import Path
 from make_site import PAGES, REPOSITORY, write_site
 
 HELP = REPOSITORY / "help"
-#: of what they were made: a checksum
+#: checksum of the sources of the pages
 MADE_OF = REPOSITORY / "out" / "help.sum"
-#: of the site, what reading does not need
+#: files of the site that reading does not need
 _LEFT_OUT = shutil.ignore_patterns("_images", "_sources", "_downloads", "images", "*.inv", "*.map")
 _PICTURE = re.compile(r"<a [^>]*image-reference[^>]*>\s*<img [^>]*>\s*</a>|<img [^>]*>")
 
 
 def made_of(repository: Path = REPOSITORY) -> str:
-    """A checksum of all files that the pages are made of, and of the tools that make them."""
+    """A checksum of all sources of the pages, and of the tools that make them."""
     own = ("tools/make_help.py", "tools/make_site.py", "requirements.lock", "blender_manifest.toml")
     files = [repository / name for name in (*PAGES, *own)]
     for folder in ("docs", "tools/site"):
@@ -40,18 +39,18 @@ def made_of(repository: Path = REPOSITORY) -> str:
 
 
 def fresh_help() -> None:
-    """See that those of this state of the repository are there."""
+    """Write the pages, unless they are those of this state of the repository."""
     now = made_of()
     if HELP.is_dir() and MADE_OF.is_file() and MADE_OF.read_text() == now:
         return
-    MADE_OF.unlink(missing_ok=True)  # should it be interrupted
+    MADE_OF.unlink(missing_ok=True)  # in case writing is interrupted
     write_help()
     MADE_OF.parent.mkdir(exist_ok=True)
     MADE_OF.write_text(now)
 
 
 def write_help(folder: Path = HELP) -> Path:
-    """Write them instead of those that are there."""
+    """Write the pages in place of existing ones."""
     with tempfile.TemporaryDirectory() as site:
         version = write_site(Path(site))
         shutil.rmtree(folder, ignore_errors=True)

@@ -20,9 +20,9 @@ from pathlib import Path
 from guide_steps import TUTORIALS
 
 REPOSITORY = Path(__file__).resolve().parents[1]
-#: what becomes pages, beside all of docs
+#: files that become pages, beside all of docs
 PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "gpu_shaders/README.md")
-#: the menu: for whom, and what
+#: the menu: readers -> pages
 MENU = {
     "Artists": (
         "docs/quick_start",
@@ -102,7 +102,7 @@ def write_site(site: Path, repository: Path = REPOSITORY) -> Path:
 
 
 def _gather(repository: Path, pages: Path) -> None:
-    """Copy what becomes pages, the first of them with the menu, and the pictures of presets."""
+    """Copy the sources of pages, the first of them with the menu, and the pictures of presets."""
     shutil.copytree(repository / "docs", pages / "docs")
     pictures = [each.relative_to(repository) for each in (repository / "presets").rglob("*.png")]
     for file in (*map(Path, PAGES), *pictures):

@@ -51,10 +51,10 @@ def make(names: list[str]) -> None:
 
 
 def rig_of(name: str, most: int = 1_000_000) -> tuple[Any, bpy.types.Object]:
-    """A style added to a new scene by the artist's own way, made ready to be drawn.
+    """The rig and the hair object of a style, added to a new scene as by an artist.
 
     Args:
-        most: children.
+        most: limit of the number of children.
     """
     bpy.ops.wm.read_factory_settings(use_empty=True)
     setup = of_addon("blender.setup.hairstyles")
@@ -86,7 +86,7 @@ def animal() -> bpy.types.Object:
 
 
 def studio_of(rig: Any, hair: bpy.types.Object) -> Any:
-    """Draws this hair in its own look."""
+    """A studio that draws this hair in its own look."""
     parameters, of = of_addon("parameters").ALL_SETTINGS, of_addon
     is_bust = of("blender.setup.hairstyles").is_bust(hair.parent)
     own = of("blender.command_line.object_settings").own_settings(hair)
@@ -101,7 +101,8 @@ def studio_of(rig: Any, hair: bpy.types.Object) -> Any:
 
 
 def camera_at(rig: Any, direction: tuple[float, float, float], aspect: float) -> Any:
-    """It holds the hair, and the head down to the shoulders; of brows and lashes the face."""
+    """A camera that frames the hair and the head down to the shoulders; for brows and lashes, the
+    face."""
     low, high = rig.strands.bounds()
     if of_addon("strands.face").is_face_hair(rig.strands.group).all():
         low, high = low - 0.02, high + 0.02
@@ -113,7 +114,7 @@ def camera_at(rig: Any, direction: tuple[float, float, float], aspect: float) ->
 
 
 def draw_thumbnail(name: str) -> None:
-    """hairstyles/NAME.png, with fewer strands: it is small."""
+    """Draw hairstyles/NAME.png, with fewer strands, as it is small."""
     rig, hair = rig_of(name, THUMBNAIL_STRANDS)
     camera = camera_at(rig, THUMBNAIL_VIEWS.get(name, VIEWS[1]), 1.0)
     size = THUMBNAIL, THUMBNAIL, SAMPLES
@@ -125,7 +126,7 @@ def draw_thumbnail(name: str) -> None:
 
 
 def draw(name: str, folder: Path) -> None:
-    """NAME.png: the style from the front, three quarters, the side and the back."""
+    """Draw NAME.png: the style from the front, three quarters, the side and the back."""
     rig, hair = rig_of(name)
     studio = studio_of(rig, hair)
     pictures = [

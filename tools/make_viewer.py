@@ -1,8 +1,8 @@
-"""Bundles what a web page of an export runs: our viewer, our loader and what they use of three.js.
+"""Bundles the script of an exported web page: our viewer and loader, and what they use of three.js.
 
 python tools/make_viewer.py
 
-It needs `make setup`. A test holds the bundle to its sources.
+It needs `make setup`. A test compares the bundle with its sources.
 """
 
 from __future__ import annotations

@@ -3,9 +3,9 @@
 python tools/make_zips.py dist            as artists get them
 python tools/make_zips.py dist --quick    with wheels as they were fetched, much sooner
 
-Blender's own packager makes one zip of everything, and takes wheels apart by platform alone. Its
-official builds have one Python, those of Linux distributions may have a newer one: so there is one
-zip for each of both, and each is small (docs/dev/decisions.md, 148 and 338).
+Blender's own packager makes one zip of everything, and separates wheels by platform alone. Official
+builds of Blender have one Python, those of Linux distributions may have a newer one, so each gets
+its own, smaller zip (docs/dev/decisions.md, 148 and 338).
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ BUILDS = [
     ("macos-arm64", OFFICIAL),
     ("linux-x64", (3, 14)),
 ]
-#: where large wheels are packed by LZMA: Blender's Python is built with it there
+#: large wheels are packed by LZMA on this system, where Blender's Python has it; least bytes
 LZMA_SYSTEM, LZMA_BYTES = "linux-x64", 10_000_000
 #: the wheels packed by LZMA, which takes 20 s each
 PACKED = REPOSITORY / "out" / "wheels"
@@ -58,7 +58,7 @@ def packager() -> Any:
 
 
 def wheels_for(wheels: list[str], system: str, python: tuple[int, int]) -> list[str]:
-    """Those of these file names that a build of Blender can use."""
+    """The wheels, by file name, that a build of Blender can use."""
     tool = packager()
 
     def suits(name: str) -> bool:
@@ -82,8 +82,8 @@ def manifest_for(manifest: str, system: str, wheels: list[str]) -> str:
 def packed_tighter(wheel: bytes) -> bytes:
     """A wheel of the same files, packed by LZMA.
 
-    alembic3d's largest library for Linux holds the table of its names three times, too far apart
-    for Deflate to find: its wheel of 13.0 MB takes 8.0.
+    alembic3d's largest library for Linux holds the table of its symbols three times, too far apart
+    for Deflate: its wheel shrinks from 13.0 MB to 8.0.
     """
     kept = PACKED / f"{hashlib.sha256(wheel).hexdigest()}.whl"
     if not kept.is_file():
@@ -101,7 +101,7 @@ def packed_tighter(wheel: bytes) -> bytes:
 def write_zip(
     whole: Path, folder: Path, system: str, python: tuple[int, int], is_quick: bool = False
 ) -> Path:
-    """The part of the whole zip that one build of Blender takes."""
+    """Write the zip for one build of Blender, a part of the whole zip."""
     other = "" if python == OFFICIAL else f"_python{python[0]}{python[1]}"
     path = folder / f"{whole.stem}-{system.replace('-', '_')}{other}.zip"
     partial = path.with_suffix(".part")
@@ -120,7 +120,7 @@ def write_zip(
                 content = packed_tighter(content)
             if entry.filename == MANIFEST:
                 content = manifest_for(content.decode(), system, kept).encode()
-            # wheels, which Blender's packager only stores, still lose a fiftieth
+            # wheels, which Blender's packager only stores, still shrink by a fiftieth
             new.writestr(entry, content, zipfile.ZIP_DEFLATED, compresslevel=9)
     os.replace(partial, path)
     return path
@@ -128,7 +128,7 @@ def write_zip(
 
 def main(folder: Path, is_quick: bool = False) -> int:
     folder.mkdir(parents=True, exist_ok=True)
-    fresh_help()  # which is packed
+    fresh_help()  # it is packed
     with tempfile.TemporaryDirectory() as temporary:
         command = [sys.executable, extension_tool(), "build", "--source-dir", REPOSITORY]
         done = subprocess.run([*map(str, command), "--output-dir", temporary])

@@ -1,8 +1,8 @@
-"""Draws the pictures that move, which loop: of docs/quick_start.md and the tutorials.
+"""Draws the looping animations of docs/quick_start.md and the tutorials.
 
 python tools/motion_pictures.py FOLDER
 
-Code hosts show animated WebP where a page shows a picture, and play no film that lies beside it.
+They are animated WebP, which code hosts show as pictures of a page, unlike films.
 """
 
 import sys
@@ -40,14 +40,14 @@ def main(folder: Path) -> None:
     turn(hair.data.surface)
     bake = hair.hairloom.bake
     with tempfile.TemporaryDirectory() as scratch:
-        # the first time around brings the hair to where it is at the end of each
+        # after a first loop, hair begins each loop where it ends
         bake.folder, bake.use_own_range, bake.first, bake.last = scratch, True, 1, 2 * LOOP
         bpy.ops.hairloom.bake()
         write_loop(folder / "turning.webp", drawn(scene, Path(scratch)))
 
 
 def turn(head: Any) -> None:
-    """Keyframes that go around for ever, smoothly."""
+    """Keyframes that loop smoothly."""
     head.animation_data_clear()
     for part, angle, nod in (*TURNS, (1.0, *TURNS[0][1:])):
         head.rotation_euler = np.radians((nod, 0.0, angle))
@@ -58,7 +58,7 @@ def turn(head: Any) -> None:
 
 
 def drawn(scene: Any, scratch: Path) -> list[Image.Image]:
-    """The second time around."""
+    """Pictures of the second loop."""
     scene.render.resolution_x = scene.render.resolution_y = SIDE
     scene.render.image_settings.file_format = "PNG"
     pictures = []
@@ -72,7 +72,7 @@ def drawn(scene: Any, scratch: Path) -> list[Image.Image]:
 
 
 def write_loop(path: Path, pictures: list[Image.Image]) -> None:
-    """Write pictures that follow each other without end."""
+    """Write pictures as an endless loop."""
     first, *others = pictures
     first.save(
         path,

@@ -1,8 +1,8 @@
-"""What stands on the panels that docs/user_guide.md pictures: texts, fields, their defaults and
-whether they take keyframes. It is kept beside the pictures, so that a test says which of them show
-what is no more.
+"""The contents of the panels that docs/user_guide.md pictures: texts, fields, their defaults and
+whether they take keyframes. They are stored beside the pictures, so that a test finds outdated
+pictures.
 
-tools/guide_pictures.py writes it as it takes the pictures.
+tools/guide_pictures.py writes them as it copies the pictures.
 """
 
 import importlib
@@ -21,12 +21,12 @@ sys.path.append(str(REPOSITORY / "tests" / "window"))
 from guide_panels import PICTURES
 
 KEPT = REPOSITORY / "docs" / "images" / "panels.json"
-#: what is drawn of a mesh
+#: beginnings of the names of panels that are drawn for a mesh
 OF_MESHES = ("collider", "fin", "sidebar_mesh_cards", "sidebar_fin")
 
 
 class Recorder:
-    """In place of Blender's UILayout: notes what stands there, and changes nothing."""
+    """Replaces Blender's UILayout: records the contents, and changes nothing."""
 
     def __init__(self) -> None:
         self.noted: list[str] = []
@@ -36,7 +36,7 @@ class Recorder:
             object.__setattr__(self, name, value)
 
     def __getattr__(self, name: str) -> Callable[..., Any]:
-        """Any other call of a layout: its text is noted, and what it gives is drawn into."""
+        """Any other call of a layout: its text is recorded, and its result records too."""
 
         def call(*_: Any, text: str = "", heading: str = "", **__: Any) -> Any:
             self.noted += [each for each in (text, heading) if each]
@@ -73,7 +73,8 @@ def _field(known: Any, text: str | None) -> str:
 
 @contextmanager
 def _lines_unbroken() -> Iterator[None]:
-    """Lines are broken by the width of a panel's region, and there is none without a window."""
+    """Draw texts without line breaks, which depend on a panel's region: without a window there is
+    none."""
 
     def draw(layout: Any, _context: Any, text: str, *_: Any, **__: Any) -> None:
         layout.label(text=text)
@@ -88,8 +89,8 @@ def _lines_unbroken() -> Iterator[None]:
 
 
 def texts() -> dict[str, list[str]]:
-    """Picture -> what stands on its panels, of new hair on a mesh that is cloth, which it adds to
-    the open scene."""
+    """Picture -> the contents of its panels, for new hair on a cloth mesh, which are added to the
+    open scene."""
     bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1)
     mesh = bpy.context.object
     bpy.ops.hairloom.fin_add()
@@ -119,7 +120,7 @@ def kept() -> dict[str, list[str]]:
 
 
 def keep() -> None:
-    """Write down what stands on the panels now."""
+    """Store the present contents of the panels."""
     load_package().register()
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     KEPT.write_text(json.dumps(texts(), indent=1) + "\n", encoding="utf-8")

@@ -20,10 +20,10 @@ LOOKS = REPOSITORY / "presets" / "looks"
 #: [pixels]; thumbnails are square
 THUMBNAIL, WIDTH, HEIGHT, SAMPLES = 192, 210, 250, 2
 STRANDS = 20000
-#: of the hair, from the side of which there is more to see
+#: direction of the view, from the side that shows more of the hair; its margin
 DIRECTION, MARGIN = (-0.75, -1.0, 0.25), 0.78
 BACKDROP = (0.045, 0.05, 0.058)
-#: of each channel of a thumbnail; few, so that a picture of hair stays a small file
+#: levels of each channel of a thumbnail; few, so that its file is small
 SHADES = 64
 
 
@@ -32,7 +32,7 @@ def of_addon(module: str) -> Any:
 
 
 def wig(strand_count: int = STRANDS) -> Any:
-    """Shoulder-long hair on the built-in head with its brows and lashes, made ready to move."""
+    """The rig of shoulder-long hair on the built-in head, with its brows and lashes."""
     settings = of_addon("parameters").ALL_SETTINGS
     grown = settings["grow"](strand_count=strand_count)
     bust = of_addon("blender.scene.built_in_head").built_in_head()
@@ -55,7 +55,7 @@ def studio_of(rig: Any, *settings: Any) -> Any:
 
 
 def against(view: np.ndarray) -> tuple[Any, ...]:
-    """A sun behind the hair and a weak one before it, which hang on the camera."""
+    """A sun behind the hair and a weak one in front of it, fixed to the camera."""
     sun = of_addon("shading.lights").Light.sun
     to_world = np.linalg.inv(view)[:3, :3]
     suns = (((0.35, 0.5, -1.0), (1.0, 0.97, 0.93), 3.0), ((-0.6, 0.3, 0.6), (0.8, 0.9, 1.0), 0.6))
@@ -63,7 +63,7 @@ def against(view: np.ndarray) -> tuple[Any, ...]:
 
 
 def coarse(picture: Any) -> Any:
-    """The same picture in a few shades, as they are shown."""
+    """The picture with SHADES levels per displayed channel."""
     shown = of_addon("blender.base.images").display_encoded(picture)
     shown = np.round(shown * (SHADES - 1)) / (SHADES - 1)
     alpha = shown[..., 3:]
@@ -72,7 +72,7 @@ def coarse(picture: Any) -> Any:
 
 
 def write_thumbnail(path: Path, picture: Any) -> None:
-    """The picture as a small file: all of them go into the zip."""
+    """Write a picture as a small file, since all go into the zip."""
     of_addon("blender.base.images").write_png(path, coarse(picture))
     with Image.open(path) as written:
         written.load()

@@ -34,7 +34,7 @@ def turned(rig: Any, angle: float) -> Any:
 
 
 def moved(rig: Any, dynamics: Any) -> tuple[Any, Any]:
-    """Pose and strands after the head has turned to the front, and a moment more."""
+    """Pose and strands a moment after the head has turned to the front."""
     motion_flow = of_addon("motion_flow")
     angles = [-TURN * (1.0 - min(frame / TURNING, 1.0)) for frame in range(FRAMES)]
     motion = motion_flow.begin(rig, turned(rig, angles[0]))

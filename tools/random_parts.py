@@ -1,19 +1,19 @@
-"""Into how many Blenders the random actions of tests/window/session_random.py are split."""
+"""Splits the random actions of tests/window/session_random.py among Blenders."""
 
 from __future__ import annotations
 
-#: Actions that one Blender can do. On Vulkan Mesa's software driver lets it draw so much and no
-#: more, see docs/troubleshooting.md: 250 actions leave up to 40,000 memory maps of 65,530.
+#: Most actions of one Blender. On Vulkan, Mesa's software driver limits how much it can draw, see
+#: docs/troubleshooting.md: 250 actions use up to 40,000 of 65,530 memory maps.
 MOST_ACTIONS = {"opengl": 500, "vulkan": 250}
-#: between a seed and the one that its next part has
+#: difference of a seed from that of its next part
 NEXT_PART = 1000
 
 
 def random_parts(seeds: list[str], actions: int, backend: str) -> list[dict[str, str]]:
     """The settings of each Blender.
 
-    What is left of a seed goes on in another Blender, with an empty file and a seed of its own:
-    1003 after 3. So each part is played again alone, without what came before it.
+    The remaining actions of a seed are played in another Blender, with an empty file and their own
+    seed: 1003 after 3. So each part can be repeated without those before it.
     """
     parts = []
     for seed in seeds:

@@ -14,7 +14,7 @@ import gpu
 import numpy as np
 from extension_loader import PACKAGE, load_package
 
-#: guides and hair of the Nalu demo, whose few strands are wide enough to tell their pieces apart
+#: guides and strands of the Nalu demo, few and wide enough to tell their pieces apart
 GUIDES, CHILDREN = 762, 4095
 #: as many children as a head of hair has
 WHOLE = 20_000
@@ -69,7 +69,7 @@ def picture(rig: Any, look: dict[str, Any], camera: Any = None, samples: int = S
 
 
 def close_camera(rig: Any, reach: float) -> Any:
-    """Before the hair over the temple, showing `reach` [m] from bottom to top."""
+    """A camera in front of the hair over the temple, showing `reach` [m] from bottom to top."""
     camera = of_addon("render.camera")
     points = rig.strands.points.astype(np.float64)
     target = points[np.linalg.norm(points - TEMPLE, axis=1).argmin()]

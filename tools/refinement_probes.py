@@ -1,4 +1,4 @@
-"""What is drawn of refined strands, for tests and benchmarks: corners, and the GPU's factors."""
+"""Refined strands as they are drawn, for tests and benchmarks: corners, and the GPU's factors."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def adaptive_points(points: Floats, factors: Ints) -> tuple[Floats, Ints]:
-    """The corners of what is drawn: (point_count, 3) float32 and offsets (strand_count + 1,).
+    """The corners of the drawn strands: (point_count, 3) float32 and offsets (strand_count + 1,).
 
     Args:
         points: (strand_count, cv_count, 3).
@@ -23,7 +23,7 @@ def adaptive_points(points: Floats, factors: Ints) -> tuple[Floats, Ints]:
     """
     offsets = np.zeros(len(factors) + 1, np.int64)
     np.cumsum(stations(factors)[:, -1] + 1, out=offsets[1:])
-    # the tip is a place of its own at the end of the last segment
+    # the tip is one more place, at the end of the last segment
     counts = factors.astype(np.int64)
     counts[:, -1] += 1
     strand_count, segment_count = factors.shape
@@ -47,7 +47,7 @@ def read_factors(order: DetailOrder, strand_count: int, cv_count: int) -> Ints:
 
 
 def point_textures(snapshot: Any) -> dict[str, Any]:
-    """The textures from which detail is found, as the draw of a snapshot makes them."""
+    """The textures that detail is computed from, as a snapshot's draw makes them."""
     from hairloom.addon.render.strand_curves import spans_texture
     from hairloom.addon.render.textures import texture_from
 

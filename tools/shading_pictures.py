@@ -1,9 +1,9 @@
-"""Draws where highlights lie, for docs/shading.md: a ball of combed blond hair.
+"""Draws the places of highlights, for docs/shading.md: a ball of combed blond hair.
 
 python tools/shading_pictures.py FOLDER
 
-From the left: R alone, TRT alone, TT alone against the light, the whole of Marschner's model with
-the light before the ball, and Kajiya-Kay. Lobes alone are without shadows and scattering.
+From the left: R alone, TRT alone, TT alone against the light, all of Marschner's model with the
+light in front of the ball, and Kajiya-Kay. Lobes alone are without shadows and scattering.
 """
 
 import importlib
@@ -23,7 +23,7 @@ BLOND = REPOSITORY / "presets" / "looks" / "blond.json"
 STRANDS, RADIUS = 16_000, 0.003
 #: side of a picture [pixels]; what it shows from bottom to top [m]
 SIZE, HEIGHT, SAMPLES = 250, 2.3, 4
-#: along these light shines, past the eye and towards it
+#: directions of light: past the eye, and towards it
 FORWARD, AGAINST = (0.1, -0.25, -1.0), (-0.45, -0.35, 0.8)
 STRENGTH = 3.0
 
@@ -33,7 +33,7 @@ def of_addon(module: str) -> Any:
 
 
 def alone(blond: Any, lobe: str) -> Any:
-    """One lobe of the look, without what stands in for light from strand to strand."""
+    """One lobe of the look, without approximate multiple scattering."""
     others = {f"strength_{name}": 0.0 for name in ("r", "tt", "trt", "higher") if name != lobe}
     return replace(blond, fake_scattering=0.0, **others)
 

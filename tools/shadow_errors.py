@@ -1,7 +1,7 @@
-"""How far opacity maps are from counting the strands between light and place one by one.
+"""Errors of opacity maps, against counting the strands between light and point one by one.
 
-The mean error of T at random places of strands, over the mean of T, by ways to lay layers. Needs
-the package `hairloom`.
+The mean error of T at random points of strands, relative to the mean of T, by method of placing
+layers. Needs the package `hairloom`.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ SLICES, LAYERS = (4, 8, 16, 64, 255), (4, 8, 16)
 
 
 def slice_spans(resolution: int) -> LayerSpans:
-    """Of slices: all of depth, in each texel."""
+    """The spans of slices: the whole depth, in each texel."""
     all_of_it = np.tile([1.0, 0.0, 0.0], (resolution, resolution, 1))
     return LayerSpans(0.0 * all_of_it, all_of_it, 1)
 
 
 @dataclass(frozen=True)
 class Places:
-    """Random places of strands, what was counted there, and what maps are made of."""
+    """Random points of strands, T as counted there, and the coverage that maps are made from."""
 
     exact: Coverage
     texel: np.ndarray
@@ -44,7 +44,7 @@ class Places:
     counted: np.ndarray
 
     def error(self, settings: VolumeSettings, ends: np.ndarray) -> float:
-        """With layers that end there; spans as coarse as the shader has them."""
+        """The error with layers of these ends, and spans as coarse as the shader's."""
         spans = slice_spans(RESOLUTION)
         if settings.shadows == "deep":
             spans = self.exact.spans(START_TEXELS)
@@ -64,7 +64,7 @@ def errors(
     slices: tuple[int, ...] = SLICES,
     layers: tuple[int, ...] = LAYERS,
 ) -> dict[str, float]:
-    """By way: none is light without shadow, slicesN, deepN.
+    """Errors by method: slicesN, deepN; none is light without shadow.
 
     Args:
         strands: (strand_count, cv_count, 3) [m] float64. radius: of all of them [m].

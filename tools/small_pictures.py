@@ -1,8 +1,8 @@
-"""Keeps pictures of hair as small files: a PNG can hardly pack its noise, a JPEG can."""
+"""Stores pictures of hair as small files: JPEG compresses their noise, PNG hardly does."""
 
 from pathlib import Path
 
-#: of a JPEG, up to 100; from here on strands stay clean
+#: of a JPEG, up to 100; the lowest at which strands are clean
 QUALITY = 92
 
 

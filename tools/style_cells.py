@@ -1,8 +1,8 @@
 """The scalp parted like brickwork, as for box braids: rows of cells around the crown.
 
 A place is two angles, seen from the middle of the head: down from the crown, and around it from the
-forehead on. Places with the same angles on both sides of a parting are what keeps it straight: a
-child goes with the guide that is nearest.
+forehead on. Guides at mirrored places on both sides of a parting keep it straight, since a child
+follows the nearest guide.
 """
 
 import itertools
@@ -16,16 +16,16 @@ from style_growth import Head, Roots, ramp, unit
 BESIDE, APART = 0.0008, 0.0055
 #: guides along the hairline, beyond those of cells
 AT_HAIRLINE = 160
-#: hair leans to the border of its cell, this far from the cell's middle to its partings, so that
-#: partings are thin and have straight edges; and by how much of its way there
+#: hair leans to the border of its cell, so that partings are thin and have straight edges: the
+#: border's place between the cell's middle and its partings, and how far hair leans towards it
 BORDER, LEAN = 0.86, 0.9
 TURN = 2.0 * np.pi
 
 
 @dataclass(frozen=True)
 class Cells:
-    """roots: of guides (n,). cell, section: in which they are (n,), section of three strips of it.
-    border: (n, 3), on the skin, where hair of each leans to before it is drawn to the middle.
+    """roots: of guides (n,). cell: of each (n,). section: of each, one of its cell's three strips
+    (n,). border: (n, 3), where on the skin its hair leans to before it is drawn to the middle.
     """
 
     roots: Roots
@@ -41,8 +41,8 @@ class Cells:
 
 @dataclass(frozen=True)
 class _Row:
-    """begin, end: how far down [rad]. lines: partings between its cells (n,), around, ascending.
-    radius: how far an angle of 1 goes around at its end [m].
+    """begin, end: angles down from the crown [rad]. lines: angles around of the partings between
+    its cells (n,), ascending. radius: length around, at its end, of an angle of 1 [m].
     """
 
     begin: float
@@ -52,7 +52,7 @@ class _Row:
 
     @property
     def sizes(self) -> np.ndarray:
-        """Of its cells, around (n,)."""
+        """The angles around of its cells (n,)."""
         return np.diff(np.append(self.lines, self.lines[0] + TURN))
 
 
@@ -67,7 +67,7 @@ class _Brickwork:
         angles, turns = np.linspace(0.0, 2.2, 120), np.linspace(-np.pi, np.pi, 97)
         lines = np.stack([self.on_skin(angles, np.full(120, turn)) for turn in turns[::4]])
         walked = np.cumsum(np.linalg.norm(np.diff(lines, axis=1), axis=2).mean(axis=0))
-        # four cells meet at the crown, which are as large as others
+        # four cells meet at the crown, as large as others
         edges = np.append(0.0, np.arange(1.13 * width, walked[-1], width))
         edges = np.interp(edges, np.append(0.0, walked), angles)
         self.rows = []
@@ -75,7 +75,7 @@ class _Brickwork:
             ring = self.on_skin(np.full(97, end), turns)
             length = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(ring, axis=0), axis=1)))
             count = round(0.5 * (begin + end) / end * length[-1] / width) if number else 4
-            # those of a row begin in the middle of those of the row before
+            # cells of a row begin at the middles of those of the row before
             part = (np.arange(count) + 0.5 * ((number + 1) % 2)) / count
             around = np.sort(np.interp((part + 0.5) % 1.0 * length[-1], length, turns))
             self.rows.append(_Row(begin, end, around, length[-1] / TURN))
@@ -86,7 +86,7 @@ class _Brickwork:
         return self._head.left_by(self.middle, ray)
 
     def of_row(self, number: int) -> tuple[np.ndarray, np.ndarray]:
-        """Guides: how far down in the row, 0 to 1, and around [rad]."""
+        """Guides of a row: how far down in it, 0 to 1, and around [rad]."""
         row, near = self.rows[number], BESIDE / self._width
         lines, sizes = row.lines[:, None], row.sizes[:, None]
         places = [(1.0 - near, self._beside_end(number))]
@@ -102,7 +102,7 @@ class _Brickwork:
         )
 
     def _beside_end(self, number: int) -> np.ndarray:
-        """Around, of guides on both sides of the parting at the end of a row."""
+        """Angles around of guides on both sides of the parting at the end of a row."""
         row, after = self.rows[number : number + 2]
         corners = np.sort(np.concatenate([row.lines, after.lines]))
         inset, found = BESIDE / row.radius, []
@@ -116,7 +116,7 @@ class _Brickwork:
         return np.concatenate(found)
 
     def cells(self) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
-        """Of each row: places of guides on the skin, their borders, cells and sections."""
+        """For each row: places of guides on the skin, their borders, cells and sections."""
         count = 0
         for number, row in enumerate(self.rows[:-1]):
             down, around = self.of_row(number)
@@ -141,7 +141,7 @@ class _Brickwork:
 def parted_in_cells(head: Head, width: float) -> Cells:
     """Cells of this width [m] on the scalp, and guides in them, more of them beside partings.
 
-    What the hairline leaves of a cell is its neighbour's if it is less than half.
+    If the hairline leaves less than half of a cell, its neighbour takes the rest.
     """
     rows = _Brickwork(head, width).cells()
     place, border, cell, section = map(np.concatenate, zip(*rows, strict=True))
@@ -163,7 +163,8 @@ def parted_in_cells(head: Head, width: float) -> Cells:
 
 
 def _joined(cells: Cells) -> Cells:
-    """Those with few guides joined to the cell beside them, the numbers without gaps."""
+    """Cells, of which those with few guides are joined to the cell beside them; numbers have no
+    gaps."""
     cell, section, place = cells.cell.copy(), cells.section.copy(), cells.roots.place
     size = np.bincount(cell)
     is_small = size < 0.5 * np.median(size[size > 0])

@@ -1,7 +1,7 @@
-"""What hairstyles are grown with: the built-in head as their place, combs, scissors, gravity.
+"""The tools that hairstyles are grown with: the built-in head, combing, cutting, gravity.
 
-All is in metres on the built-in head, which is upright, looks to -Y and has the origin in the
-middle of its skull. A lock is one guide; locks are (lock_count, cv_count, 3), roots first.
+All lengths are in metres on the built-in head, which is upright, looks to -Y and has the origin in
+the middle of its skull. A lock is one guide; locks are (lock_count, cv_count, 3), roots first.
 """
 
 import importlib
@@ -15,13 +15,13 @@ from extension_loader import PACKAGE
 from mathutils.bvhtree import BVHTree
 
 UP = np.array([0.0, 0.0, 1.0])
-#: where hair grows away from in a whorl: the crown
+#: the crown, from which hair grows away in a whorl
 CROWN = np.array([0.012, 0.062, 0.092])
-#: balls over the right ear and above it, on which hair that covers ears lies: where, and the radius
+#: balls over the right ear and above it, which hair over the ears lies on: place and radius
 EAR_COVER = (((0.0155, 0.012, -0.008), 0.075), ((0.02, 0.012, 0.03), 0.063))
 GRAVITY, FRAME = np.array([0.0, 0.0, -9.81]), 1.0 / 24.0
 
-#: a direction for each point (n, 3) of locks with these roots (n, 3), `reached` (n,) [m] along
+#: directions at points (n, 3) of locks, from the locks' roots and the points' `reached` (n,) [m]
 type Flow = Callable[[np.ndarray, "Roots", np.ndarray], np.ndarray]
 
 
@@ -101,7 +101,8 @@ class Head:
         return self.collider, *(colliders.PosedCollider(b, np.eye(4), np.eye(4)) for b in balls)
 
     def away(self, points: np.ndarray, over_ears: bool = False) -> tuple[np.ndarray, np.ndarray]:
-        """How far points (n, 3) are from the skin, negative inside, and which way leads away."""
+        """Distances of points (n, 3) from the skin, negative inside, and directions away from
+        it."""
         found = of_addon("dynamics.colliders.signed_distance").signed_distance
         solid = self.with_ears_covered if over_ears else (self.collider,)
         distance, outward = found(points, solid, 0.08)
@@ -168,11 +169,11 @@ class Head:
 
         Args:
             length: of each [m].
-            lift: how much they leave along the normal rather than along the flow, 0 to 1.
+            lift: how much they leave along the normal instead of the flow, 0 to 1.
             follow: how much they turn into the flow on each centimetre, 0 to 1.
-            hug: how much they turn back to the skin, at points (n, 3), for each centimetre that
-                they are further from it than `clearance`.
-            clearance: how far from the skin they stay, by how far they have come [m].
+            hug: how much they turn back to the skin, at points (n, 3), for each centimetre of
+                distance beyond `clearance`.
+            clearance: least distance from the skin, by the length reached [m].
             over_ears: whether they lie over the ears rather than around them.
         """
         count = len(roots.place)
@@ -213,10 +214,10 @@ class Head:
         over_ears: bool = False,
         **settings: float,
     ) -> np.ndarray:
-        """Locks after they have fallen onto head and shoulders, by the product's own solver.
+        """Locks after they have fallen onto head and shoulders, by the extension's solver.
 
         Args:
-            settings: of dynamics, over those of hair that keeps hardly any style.
+            settings: of dynamics, instead of those of hair that hardly keeps its style.
         """
         rig_flow, motion_flow = of_addon("rig_flow"), of_addon("motion_flow")
         all_settings = of_addon("parameters").ALL_SETTINGS
@@ -252,7 +253,7 @@ class Head:
 
         Args:
             knot: (n, 3), where each ends, outside of the head.
-            clearance: how far from the skin they lie, half way.
+            clearance: distance from the skin that they keep, except near roots.
         """
         middle = np.array([0.0, 0.015, 0.015])
         first, last = roots.place - middle, knot - middle
@@ -273,7 +274,7 @@ class Head:
         return locks
 
     def kept_out(self, locks: np.ndarray, clearance: float = 0.0015) -> np.ndarray:
-        """Locks without points nearer to the skin than this, but those near roots."""
+        """Locks whose points are at least this far from the skin, except near roots."""
         kept = locks.copy()
         for cv in range(1, locks.shape[1]):
             for _ in range(3):
@@ -284,7 +285,7 @@ class Head:
         return kept
 
     def strands(self, roots: Roots, locks: np.ndarray, group: np.ndarray | None = None) -> Any:
-        """As a StrandSet that is bound to the head."""
+        """Locks as a StrandSet that is bound to the head."""
         strands = of_addon("groom.grown").bound_strands(
             locks, roots.triangle, roots.barycentric, self.surface
         )
@@ -293,14 +294,14 @@ class Head:
         return importlib.import_module("dataclasses").replace(strands, group=group)
 
     def shapes(self, roots: Roots, locks: np.ndarray, group: np.ndarray | None = None) -> Any:
-        """As a style keeps them."""
+        """Locks as a style stores them."""
         rooted = of_addon("strands.rooted_shapes").RootedShapes
         return rooted.of(self.strands(roots, locks, group), self.surface)
 
 
 def waved(locks: np.ndarray, height: np.ndarray, length: float, phase: np.ndarray) -> np.ndarray:
-    """Locks with flat waves from side to side over those below, as long hair has; those that lie
-    over each other wave at the same heights.
+    """Locks with flat sideways waves, like long hair; locks that lie over each other wave at the
+    same heights.
 
     Args:
         height: of the waves at each point (n, cv_count) [m].
@@ -321,7 +322,7 @@ def cut(locks: np.ndarray, inside: Callable[[np.ndarray], np.ndarray]) -> np.nda
     """Locks cut where they leave a shape for the first time, with as many points as before.
 
     Args:
-        inside: of points (n, 3), how far within the shape, negative outside, (n,).
+        inside: how far points (n, 3) are within the shape, negative outside, (n,).
     """
     count, cv_count = locks.shape[:2]
     value = inside(locks.reshape(-1, 3)).reshape(count, cv_count)
@@ -356,5 +357,5 @@ def evenly(paths: np.ndarray, cv_count: int) -> np.ndarray:
 
 
 def along_skin(direction: np.ndarray, roots: Roots) -> np.ndarray:
-    """Directions laid onto the skin at the roots."""
+    """Directions projected onto the skin at the roots."""
     return unit(direction - roots.normal * (direction * roots.normal).sum(axis=1)[:, None])

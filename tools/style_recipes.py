@@ -66,9 +66,9 @@ def curled(
 
     Args:
         start: how far along a lock curls begin, 0 to 1.
-        stray: how much locks differ in where their turns are, 0 to 1.
+        stray: how much the places of turns vary between locks, 0 to 1.
         finer: how often each segment is halved first.
-        apart: those nearer to each other than this curl as one lock [m].
+        apart: locks nearer to each other than this curl as one [m].
     """
     inputs = {
         "Radius": radius,
@@ -85,8 +85,8 @@ def clumped(factor: float, apart: float) -> Any:
     """Blender's Clump node.
 
     Args:
-        factor: how near to each other locks come, 0 to 1.
-        apart: those nearer to each other than this are one lock [m].
+        factor: how much locks are drawn together, 0 to 1.
+        apart: locks nearer to each other than this clump together [m].
     """
     inputs = {
         "Factor": factor,
@@ -98,7 +98,7 @@ def clumped(factor: float, apart: float) -> Any:
 
 
 def toward(x: Any, y: Any, z: Any) -> np.ndarray:
-    """Directions (n, 3) of parts that are numbers or (n,)."""
+    """Directions (n, 3) of components that are numbers or (n,)."""
     return np.stack(np.broadcast_arrays(x, y, z), axis=1).astype(float)
 
 
@@ -128,7 +128,7 @@ def crop_fade(head: Head) -> Any:
     roots = head.roots(2000, "scalp")
     _, y, z = roots.place.T
     top = ramp(0.056, 0.082, z + 0.012 * ramp(0.0, 0.09, y))
-    # from stubble at the ears and the neck, over what clippers leave, to the scissors' work
+    # from stubble at ears and neck, over clipped hair, to hair that is cut with scissors
     faded = z - 0.02 * ramp(0.075, 0.02, y)
     short = 0.0006 + 0.0024 * ramp(-0.065, 0.02, faded) + 0.008 * ramp(0.005, 0.062, faded)
     bundle = bundles(head, roots, (top > 0.4).astype(int), 420)
@@ -168,7 +168,7 @@ def crop_fade(head: Head) -> Any:
 
 
 def on_skull(points: np.ndarray) -> np.ndarray:
-    """How much hair lies on the head, which it does not further down, where it hangs."""
+    """How strongly hair lies on the head; further down it hangs freely."""
     return 1.2 * ramp(-0.02, 0.04, points[:, 2])
 
 
@@ -189,7 +189,7 @@ def swept(at: float, back: float) -> Any:
 
 
 def short_at_ears(roots: Roots) -> np.ndarray:
-    """A factor of the length: sideburns and what is right above the ears do not cover them."""
+    """A factor of the length: sideburns and hair right above the ears do not cover them."""
     _, y, z = roots.place.T
     above_ear = ramp(-0.045, -0.03, y) * ramp(0.05, 0.035, y) * ramp(0.045, 0.022, z)
     return 1.0 - 0.8 * above_ear
@@ -202,7 +202,7 @@ def spread(roots: Roots) -> np.ndarray:
 
 def swept_over(at: float, bundle: np.ndarray) -> Any:
     """Hair that is combed from a parting at x = `at`, over the top and back, and down at the sides;
-    the locks of a bundle (n,) go their own way together."""
+    the locks of a bundle (n,) vary alike."""
     own = of_bundle(bundle)
 
     def flow(points: np.ndarray, roots: Roots, reached: np.ndarray) -> np.ndarray:
@@ -326,22 +326,22 @@ def parts(roots: Roots, at: float, in_front: np.ndarray | bool = False) -> np.nd
 
 
 def layers(most: float, per_length: float = 0.14) -> Callable[[np.ndarray], np.ndarray]:
-    """How far hair keeps from the skin: what comes from further up lies over the rest."""
+    """The distance that hair keeps from the skin: hair from further up lies over the rest."""
     return lambda reached: 0.002 + np.minimum(per_length * reached, most)
 
 
 def in_layers(roots: Roots, most: float, over: float = 0.08) -> Callable[[np.ndarray], np.ndarray]:
-    """How far hair keeps from the skin, after it has come `over` far: what grows further up lies
-    over the rest."""
+    """The distance that hair keeps from the skin, in full after a length of `over`: hair from
+    further up lies over the rest."""
     layer = 0.25 + 0.55 * ramp(-0.06, 0.1, roots.height) + 0.2 * roots.random[:, 2]
     return lambda reached: 0.002 + most * layer * np.minimum(reached / over, 1.0)
 
 
 def bundles(head: Head, roots: Roots, group: np.ndarray, count: int) -> np.ndarray:
-    """The bundle of each lock (n,), as hair falls in bundles: those beside each other.
+    """The bundle of each lock (n,): hair falls in bundles of adjacent locks.
 
     Args:
-        group: (n,) which never share a bundle.
+        group: of each lock (n,); groups share no bundle.
         count: of bundles.
     """
     middles = head.roots(count, "scalp", 3).place
@@ -356,10 +356,10 @@ def of_bundle(bundle: np.ndarray, seed: int = 2) -> np.ndarray:
 
 
 def in_bundles(locks: np.ndarray, bundle: np.ndarray, factor: float) -> np.ndarray:
-    """Locks drawn towards the middle of their bundle (n,), the nearer to their tips the more.
+    """Locks drawn towards the middle of their bundle (n,), more so near their tips.
 
     Args:
-        factor: how near to each other tips come, 0 to 1.
+        factor: how much tips are drawn together, 0 to 1.
     """
     sums = np.zeros((bundle.max() + 1, *locks.shape[1:]))
     np.add.at(sums, bundle, locks)
@@ -375,7 +375,7 @@ def bob(head: Head) -> Any:
 
     def flow(points: np.ndarray, roots: Roots, reached: np.ndarray) -> np.ndarray:
         inward = ramp(-0.05, -0.1, points[:, 2])[:, None] * unit(points * (1.0, 1.0, 0.0))
-        # what grows at the forehead goes back first, so that it does not lie on it
+        # hair at the forehead goes back first, so that it does not lie on the forehead
         first = ramp(-0.02, -0.08, roots.place[:, 1]) * ramp(0.06, 0.02, reached)
         back = first[:, None] * np.array([0.0, 0.9, 0.8])
         return unit(falls(points, roots, reached)) - 0.5 * inward + back
@@ -408,8 +408,8 @@ def bob(head: Head) -> Any:
 
 
 def before_shoulders(roots: Roots) -> np.ndarray:
-    """Which locks fall before the shoulders and not behind: locks beside each other alike, and
-    without a line between them."""
+    """Which locks fall in front of the shoulders instead of behind: adjacent locks alike, with an
+    irregular border between both."""
     x, y, z = 55.0 * roots.place.T
     uneven = 0.012 * (np.sin(x + 1.3 * z) + np.sin(0.8 * y - 1.1 * z + 2.0))
     return roots.place[:, 1] + uneven + 0.012 * (roots.random[:, 3] - 0.5) < 0.024
@@ -423,7 +423,7 @@ def draped(at: float, in_front: np.ndarray) -> Any:
     def flow(points: np.ndarray, roots: Roots, reached: np.ndarray) -> np.ndarray:
         x, y, z = points.T
         low = ramp(-0.02, -0.12, z)[:, None]
-        # what grows further back lies nearer to the shoulder
+        # hair from further back lies nearer to the shoulder
         rear = ramp(-0.06, 0.02, roots.place[:, 1])
         side = np.where(roots.place[:, 0] > at, 1.0, -1.0)
         beside = side * (0.045 + 0.03 * roots.random[:, 1] + 0.02 * rear)
@@ -497,16 +497,16 @@ def long_wavy(head: Head) -> Any:
     group = parts(roots, -0.02, in_front)
     bundle = bundles(head, roots, group, 110)
     own = of_bundle(bundle)
-    # bundles end at heights of their own, those from further up the higher
+    # each bundle ends at its own height, higher if it is from further up
     hem = hem_at(roots, in_front, -0.245, 0.05)
     hem += (0.035 + 0.045 * ramp(-0.02, 0.09, roots.height)) * own[:, 3]
     locks = evenly(long_locks(head, roots, in_front, hem, -0.02, 0.017), 40)
     locks = in_bundles(locks, bundle, 0.72)
-    # some lie over others
+    # some bundles lie over others
     low = ramp(0.05, -0.07, locks[..., 2])
     over = 0.009 * own[:, 2, None] * low
     locks = locks + over[..., None] * unit(locks * (1.0, 1.0, 0.0))
-    # bundles beside each other wave at about the same heights, but none like the next
+    # adjacent bundles wave at about the same heights, but not alike
     x, y, z = 25.0 * roots.place.T
     phase = 0.7 * (np.sin(x + 0.7 * z) + np.sin(1.1 * y - 0.6 * x)) + 4.2 * own[:, 0]
     phase += 0.5 * (roots.random[:, 2] - 0.5)
@@ -537,7 +537,7 @@ def layered_fringe(head: Head) -> Any:
     is_fringe = (np.abs(x) < np.minimum(0.008 - 1.1 * (y + 0.022), 0.06)) & (z > 0.035)
     in_front = before_shoulders(roots)
     group = np.where(is_fringe, 5, parts(roots, 0.0, in_front))
-    # three layers: what grows from the top ends further up, around the face most of all
+    # three layers: hair from the top ends further up, most of all around the face
     uneven = np.sin(70.0 * x + 2.0) + np.sin(60.0 * y) + 1.2 * (roots.random[:, 1] - 0.5)
     layer = np.digitize(uneven, (-0.3, 0.6))
     hem = hem_at(roots, in_front, -0.215, 0.035) + 0.045 * layer * ramp(-0.01, 0.07, z)
@@ -585,10 +585,10 @@ def layered_fringe(head: Head) -> Any:
 def curls(head: Head) -> Any:
     roots = head.roots(1700, "scalp")
     in_front = before_shoulders(roots)
-    # shorter from the crown down, so that ends make a round outline
+    # hair from near the crown ends further up, so that ends make a round outline
     hem = hem_at(roots, in_front, -0.175, 0.09) + 0.05 * ramp(0.03, 0.1, roots.height)
     locks = evenly(long_locks(head, roots, in_front, hem, -0.03, 0.034, 0.13), 22)
-    # they cross each other on their way
+    # locks cross each other
     s = np.linspace(0.0, 1.0, 22)
     turns = 2.0 * np.pi * (s[None, :, None] * 0.9 + roots.random[:, None, 1:])
     locks += 0.014 * ramp(0.15, 0.8, s)[:, None] * (np.sin(turns) * (1.0, 1.0, 0.4))
@@ -613,7 +613,7 @@ def coils(head: Head) -> Any:
     back = before_ear[:, None] * np.array([0.0, 0.9, 0.3])
 
     def flow(points: np.ndarray, roots: Roots, reached: np.ndarray) -> np.ndarray:
-        # each coil goes its own way, and hangs the further out the more
+        # each coil wanders by itself, and droops more the further out it is
         wander = 30.0 * reached[:, None] + 2.0 * np.pi * roots.random[:, 1:]
         droop = ramp(0.01, 0.08, reached)[:, None] * np.array([0.0, 0.25, -1.1])
         return unit(points - np.array([0.0, 0.015, 0.0])) + back + droop + 0.2 * np.sin(wander)
@@ -689,7 +689,8 @@ KNOT = np.array([0.0, 0.128, 0.045])
 
 
 def section(roots: Roots, knot: np.ndarray) -> np.ndarray:
-    """Where each lock is in the round section of a tail, (n, 2) up to 1: as around the knot."""
+    """The place of each lock in the round cross-section of a tail, (n, 2) up to 1: as its root
+    around the knot."""
     seen = roots.place - knot
     angle = np.arctan2(seen[:, 2], seen[:, 0])
     far = np.sqrt(np.argsort(np.argsort(np.linalg.norm(seen, axis=1))) / len(seen))
@@ -739,7 +740,7 @@ def ponytail(head: Head) -> Any:
     # it swells after the tie and tapers to a point
     radius = 0.0075 + 0.024 * ramp(0.02, 0.4, s) - 0.022 * ramp(0.45, 1.0, s)
     tail = tube(line, radius, place, np.array([1.0, 0.0, 0.0]))
-    # strands of other lengths, which wave and stray more towards their tips
+    # strands of different lengths, which wave and stray more towards their tips
     phase = 2.0 * np.pi * roots.random[:, None, 1:]
     waves = np.sin(2.0 * np.pi * 1.4 * s[None, :, None] + 0.25 * phase) + 0.6 * np.sin(
         2.0 * np.pi * 2.1 * s[None, :, None] + phase
@@ -757,7 +758,7 @@ def ponytail(head: Head) -> Any:
     tail[below] = KNOT + rise[..., None] * axis + 0.0105 * ring
     drawn = head.gathered(roots, tail[:, 0], 20)
     locks = evenly(np.concatenate([drawn[:, :-1], tail], axis=1), 40)
-    # beside the neck they would look like an earring from in front
+    # loose hairs beside the neck would look like an earring from the front
     at_edge = (z < -0.045) & (np.abs(x) < 0.024)
     is_loose = at_edge & (roots.random[:, 3] < 0.07)
     locks[is_loose] = loose_hairs(head, roots.take(np.flatnonzero(is_loose)), 40)
@@ -850,16 +851,17 @@ def braid(head: Head) -> Any:
     )
 
 
-#: of box braids: how wide cells are, how thick the strands of a plait, how long one turn of it [m]
+#: of box braids: width of cells, thickness of a plait's strands, length of a plait's turn [m]
 CELL, THICK, PLAIT = 0.024, 0.003, 0.026
 
 
 def braid_lines(head: Head, bases: Roots, cv_count: int) -> np.ndarray:
-    """Where braids from these roots fall, (n, cv_count, 3): aside from a parting, and back."""
+    """The lines of braids from these roots, (n, cv_count, 3), which fall aside from a parting, and
+    back."""
     x, y, z = bases.place.T
     length = 0.225 - 0.03 * ramp(0.02, 0.08, z) + 0.035 * ramp(-0.045, -0.06, y)
     falls = parted(0.0, 0.45)
-    # those at the forehead and on the parting go back first, so that none falls over the eyes
+    # braids at the forehead and on the parting go back first, so that none falls over the eyes
     first = 4.5 * ramp(-0.01, -0.05, y) + 4.0 * ramp(0.016, 0.004, np.abs(x))
 
     def flow(points: np.ndarray, roots: Roots, reached: np.ndarray) -> np.ndarray:
@@ -1100,7 +1102,7 @@ def moustache(head: Head) -> Any:
 
 
 def fur(length: float, lift: float, **values: Any) -> dict[str, Any]:
-    """Growth on any mesh, as long as on one of a head's size."""
+    """Settings of growth on any mesh; the length is for a mesh of a head's size."""
     return {"method": "normals", "cv_count": 8, "length": length, "lift": lift} | values
 
 

@@ -46,7 +46,7 @@ def grown(**values: Any) -> Any:
 
 
 def picture(hair: Any) -> np.ndarray:
-    """The hair as it is now."""
+    """A picture of the hair as it is now."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     for session in list(of_addon("blender.preview.previews").sessions()):
         of_addon("blender.preview.previews").stop(session)
@@ -56,7 +56,7 @@ def picture(hair: Any) -> np.ndarray:
 
 
 def sheet(folder: Path, name: str, pictures: list[np.ndarray]) -> None:
-    """Side by side, as a small file."""
+    """Write pictures side by side, as a small file."""
     images = of_addon("blender.base.images")
     with tempfile.TemporaryDirectory() as drawn:
         images.write_png(Path(drawn) / "sheet.png", images.contact_sheet(pictures, len(pictures)))
@@ -64,7 +64,7 @@ def sheet(folder: Path, name: str, pictures: list[np.ndarray]) -> None:
 
 
 def grow(folder: Path) -> None:
-    """One groom, edited."""
+    """Draw one groom while it is edited."""
     hair = grown(length=0.24)
     own = hair.data.hairloom.grow
     pictures = [picture(hair)]
@@ -90,7 +90,7 @@ def parting(folder: Path) -> None:
     sheet(folder, "parting.jpg", [*pictures, picture(hair)])
 
 
-#: strokes of a swept fringe on the built-in head: what they go through, on its skin or near [m]
+#: strokes of a swept fringe on the built-in head: points on their way, on its skin or near [m]
 STROKES = {
     "Fringe": ((0.035, -0.04, 0.1), (-0.01, -0.065, 0.09), (-0.06, -0.06, 0.05)),
     "Top": ((0.035, 0.01, 0.115), (-0.03, 0.0, 0.11), (-0.07, -0.02, 0.06)),
@@ -149,7 +149,7 @@ def shaken(hair: Any) -> np.ndarray:
 
 
 def painted(folder: Path) -> None:
-    """Stiffness on one half of the head."""
+    """Draw stiffness painted on one half of the head."""
     pictures = []
     for name in ("", "Stiff"):
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
@@ -170,7 +170,7 @@ def painted(folder: Path) -> None:
 
 
 def colored(folder: Path) -> None:
-    """Highlights on the head, and lighter tips over them."""
+    """Draw highlights painted on the head, and lighter tips over them."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     bpy.ops.hairloom.add_hairstyle(style="long_straight", plays=False)
     hair = bpy.context.object
@@ -187,7 +187,7 @@ def colored(folder: Path) -> None:
 
 
 def paint_highlights(mesh: Any, size: int = 512, samples: int = 4_000_000) -> None:
-    """An image with blond locks on nothing, from the front to the back, as one paints it."""
+    """An image of blond locks on a transparent ground, from front to back, like a painted one."""
     random = np.random.default_rng(1)
     mesh.calc_loop_triangles()
     corners = np.array([each.loops[:] for each in mesh.loop_triangles])

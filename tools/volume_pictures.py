@@ -1,4 +1,4 @@
-"""Draws what opacity maps miss, for docs/shading.md.
+"""Draws the errors of opacity maps, for docs/shading.md.
 
 python tools/volume_pictures.py FOLDER
 
@@ -43,7 +43,7 @@ class Chart:
     def line(
         self, start: tuple[float, float], end: tuple[float, float], color: Any, width: float
     ) -> None:
-        """Between two places [pixels], its rim a pixel soft."""
+        """A line between two places [pixels], its edge a pixel soft."""
         y, x = np.mgrid[:HIGH, :WIDE] + 0.5
         along = np.subtract(end, start)
         share = ((x - start[0]) * along[0] + (y - start[1]) * along[1]) / max(along @ along, 1e-9)
@@ -53,7 +53,7 @@ class Chart:
         self.pixels[..., :3] += cover * (np.array(color) - self.pixels[..., :3])
 
     def word(self, place: tuple[float, float], text: str, color: Any, size: int = 15) -> None:
-        """Centred on a place [pixels]."""
+        """A text centred on a place [pixels]."""
         # like gpu, they live inside bpy
         blf, imbuf = importlib.import_module("blf"), importlib.import_module("imbuf")
         blf.size(0, size)
@@ -69,7 +69,7 @@ class Chart:
 
 
 def error_chart(errors: dict[str, float]) -> Any:
-    """Error over how many slices or layers there are, both in octaves."""
+    """A chart of error over the number of slices or layers, both axes logarithmic."""
     chart = Chart()
     most, least = 5.0, 0.1
 

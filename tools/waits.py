@@ -35,7 +35,7 @@ def waits(folder: Path = ADDON) -> list[str]:
 
 
 def endless_waits() -> list[str]:
-    """Those of which nobody has said why they end."""
+    """Waits without a reason in ENDS."""
     return [each for each in waits() if each not in ENDS]
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from extension_loader import REPOSITORY
 from small_pictures import write_small
 
-#: what the browser's machine sees of this one
+#: a folder that the browser's sandbox sees
 SCRATCH = REPOSITORY / "out" / "web_page"
 STYLE = "bob"
 STEPS = (

@@ -1,5 +1,5 @@
-// How far guides have left the shape in which their roots carry them; one invocation a CV. What rode on
-// guides before strands turned with them; only for bench/_strands_cost.py.
+// Displacements of guides from the shape that their roots carry; one invocation per CV. For the earlier
+// method of riding of summed_ride.comp.glsl, kept for bench/_strands_cost.py alone.
 #include "lib_root_frame.glsl"
 #include "lib_strand_texel.glsl"
 

@@ -1,5 +1,5 @@
-// Strands carried by their own roots take on the mean displacement of their guides; one invocation a
-// strand. What rode on guides before strands turned with them; only for bench/_strands_cost.py.
+// Adds the weighted displacements of guides to strands that their own roots carry; one invocation per
+// strand. An earlier method, without turns of segments, kept for bench/_strands_cost.py alone.
 #include "lib_root_frame.glsl"
 #include "lib_strand_texel.glsl"
 

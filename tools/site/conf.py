@@ -1,4 +1,4 @@
-"""What Sphinx is told: tools/make_site.py gathers the pages and runs it."""
+"""The configuration of Sphinx, which tools/make_site.py runs on the gathered pages."""
 
 import os
 
@@ -7,7 +7,7 @@ copyright = "The Hairloom developers"
 release = version = os.environ["HAIRLOOM_VERSION"]
 extensions = ["myst_parser"]
 root_doc = "README"
-#: headings are led to as on GitHub, where the same pages are read
+#: anchors of headings as on GitHub, where the same pages are read
 myst_heading_anchors = 4
 templates_path = ["templates"]
 html_theme = "furo"
