@@ -46,8 +46,7 @@ def cards(output: Path, *more: str) -> int:
 
 
 def sidecar_of(path: Path) -> dict[str, Any]:
-    """The sidecar of an export, validated against the schema; all files that it names must
-    exist."""
+    """The sidecar of an export, valid by the schema; all files that it names must exist."""
     content = json.loads(path.with_suffix(".hairloom.json").read_text(encoding="utf-8"))
     jsonschema.Draft202012Validator(SCHEMA).validate(content)
     textures = content["textures"].values()

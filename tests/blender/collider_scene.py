@@ -50,7 +50,7 @@ def depsgraph():
 
 
 def distance_now(posed, point):
-    """The distance of a point (3,), world space, from a collider at the frame's end, to first
+    """Distance [m] between collider and point (3,), world space, at the frame's end, first
     order."""
     inverse = np.linalg.inv(posed.matrix_now)
     local = transform_points(inverse, np.array(point, np.float32)[:, None])

@@ -105,8 +105,7 @@ _is_enabled = False
 
 @pytest.fixture
 def extension(empty_scene: None) -> Iterator[None]:
-    """Hairloom registered, as when its extension is enabled: once for all tests, reset after
-    each."""
+    """Hairloom registered, as when its extension is enabled: once, and reset after each test."""
     global _is_enabled
     if not _is_enabled:
         hairloom.register()
@@ -135,8 +134,7 @@ def sphere() -> Any:
 
 @pytest.fixture
 def new_hair(extension: None) -> Callable[..., Any]:
-    """A function that makes a hair curves object from strands (by default a hedgehog), with or
-    without a head."""
+    """A function that makes hair curves on a head or without one, by default a hedgehog."""
     from hairloom.addon.blender.scene.curves import write_curves
 
     def make(head: Any = None, strands: StrandSet | None = None) -> Any:
@@ -191,8 +189,7 @@ def stage(extension: None) -> Any:
 
 @pytest.fixture
 def flag(extension):
-    """A flat sheet of 11 x 11 vertices, 0.4 m wide, made a fin that is pinned along its edge at
-    -x."""
+    """A flat sheet of 11 x 11 vertices, 0.4 m wide, made a fin that is pinned along its -x edge."""
     bpy.ops.mesh.primitive_grid_add(x_subdivisions=10, y_subdivisions=10, size=0.4)
     obj = bpy.context.object
     obj.name = "Flag"

@@ -25,8 +25,7 @@ def background(scene: Any) -> Any:
 
 
 def set_panorama(scene: Any, radiance: np.ndarray, kind: str = "EQUIRECTANGULAR") -> Any:
-    """Light the world with an Environment Texture of these pixels, row 0 at the bottom; returns its
-    node."""
+    """Light the world with a panorama of these pixels, row 0 at the bottom; returns its node."""
     rows, columns = radiance.shape[:2]
     image = bpy.data.images.new("Panorama", columns, rows, float_buffer=True)
     image.colorspace_settings.name = "Linear Rec.709"

@@ -10,16 +10,14 @@ from glb_files import Glb
 
 
 class Player:
-    """Plays a skinned GLB vertex by vertex, by section 3.7.3 and appendix C of the
-    specification."""
+    """Plays a skinned GLB vertex by vertex (specification, section 3.7.3 and appendix C)."""
 
     def __init__(self, path: Path) -> None:
         self.file = Glb(path)
         self.json = self.file.json
 
     def corners(self, seconds: float) -> list[np.ndarray]:
-        """The corners of all triangles of each skinned node, sorted by node name, in Blender's
-        axes."""
+        """The corners of all triangles of each skinned node, by node name, in Blender's axes."""
         return [points[index] for points, index in self._placed(seconds)]
 
     def vertices(self, seconds: float) -> np.ndarray:

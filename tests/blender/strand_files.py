@@ -1,5 +1,4 @@
-"""Strands for tests of exports, and readers of their files by Alembic's low-level API and
-usd-core."""
+"""Strands for tests of exports; readers of their files: Alembic's low-level API, usd-core."""
 
 from __future__ import annotations
 

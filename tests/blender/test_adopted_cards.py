@@ -39,8 +39,7 @@ ROWS = 4
 
 @pytest.fixture
 def shells(sphere):
-    """Vertical strips of quads around the ball, the shells in no order of distance; u runs to the
-    tip."""
+    """Vertical strips of quads around the ball, not sorted by distance; u runs to the tip."""
     positions, faces, uv = [], [], []
     for shell in SHELLS:
         for turn in np.linspace(0.0, 2.0 * np.pi, 6, endpoint=False):

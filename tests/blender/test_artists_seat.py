@@ -124,8 +124,7 @@ SCENES = [nothing_there, a_mesh, hair_in_the_air, hair_on_a_mesh, a_mesh_in_edit
 
 @pytest.mark.parametrize("scene", SCENES, ids=lambda scene: scene.__name__)
 def test_a_button_that_is_greyed_out_says_why(new_hair, scene):
-    """No operator falls back on Blender's text for a poll without a reason, "context is
-    incorrect"."""
+    """No operator shows Blender's text for a poll without a reason, "context is incorrect"."""
     scene(new_hair)
     mute, greyed = [], 0
     for name in dir(bpy.ops.hairloom):

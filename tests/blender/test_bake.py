@@ -131,8 +131,7 @@ def test_a_preview_begun_elsewhere_shows_the_very_same_strands(swinging, evaluat
 
 
 def test_baked_hair_has_the_size_of_its_bake(swinging, evaluated):
-    """A new scale of the head shows once the hair is baked again or its bake is deleted, also
-    during a preview."""
+    """A changed scale of the head shows once the bake is remade or deleted, also in a preview."""
     hair, head = swinging
     previews.start(hair, evaluated())
     bake(hair)
@@ -689,8 +688,7 @@ def test_the_buttons_bake_and_delete(swinging, tmp_path):
 
 
 def test_a_bake_knows_how_far_its_strands_stretch_and_how_deep_they_are(swinging):
-    """The stored figures equal those that are computed from the bake's frames and the head as a
-    sphere."""
+    """The stored figures equal those computed from the bake's frames, with the head as a sphere."""
     hair, head = swinging
     head.hairloom.collider_shape = "sphere"
     bake(hair)

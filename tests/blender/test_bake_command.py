@@ -185,8 +185,7 @@ def test_the_bake_of_the_command_line_is_that_of_the_button(file, tmp_path):
 
 
 def test_a_baked_frame_is_drawn(file, tmp_path):
-    """The verb `render` draws baked frames, and its report notes what has changed since the
-    bake."""
+    """The verb `render` draws baked frames; its report notes changes since the bake."""
     assert command_line.run(["bake", "--scene", str(file), "--save"]) == 0
     picture, report = tmp_path / "hair.png", tmp_path / "report.json"
     arguments = ["render", "--scene", str(file), "--groom", "Hair", "--bake", "--width", "96"]

@@ -104,8 +104,7 @@ def test_between_two_frames_solids_go_straight(mesh):
 
 @pytest.fixture(params=few_in_commits(["sphere", "mesh"]))
 def swinging(request, new_hair, sphere, tmp_path):
-    """Hair that falls over the sphere, drawn as cards. Flat faces of the mesh lie up to 1.7 mm
-    inside the sphere."""
+    """Hair that falls over the sphere, drawn as cards. Mesh faces lie up to 1.7 mm inside it."""
     hair, head = thrown(new_hair(sphere), sphere, LAST, tmp_path / "bake")
     head.hairloom.collider_shape = request.param
     hair.hairloom.dynamics.collider_resolution = 64

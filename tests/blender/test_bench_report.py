@@ -75,8 +75,7 @@ def test_a_part_that_is_unknown_ends_a_benchmark() -> None:
     few_in_commits(sorted(name for name, short in figures.BENCHES.items() if short.arguments)),
 )
 def test_each_benchmark_refuses_a_part_that_it_has_not(name: str) -> None:
-    """A mistyped part ends the benchmark with an error; it does not measure everything or
-    nothing."""
+    """A mistyped part is an error; the benchmark does not measure everything or nothing."""
     command = [sys.executable, str(figures.REPOSITORY / "tools" / "bench.py"), name, "mistyped"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300)
     assert done.returncode != 0, done.stdout

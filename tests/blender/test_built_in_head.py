@@ -31,8 +31,7 @@ def test_it_is_a_head_of_real_size_around_its_skull() -> None:
 
 
 def test_its_mesh_is_clean() -> None:
-    """No duplicate faces, no edge with more than two faces, no face without area, no overlapping
-    UVs."""
+    """No duplicate or empty faces, no edge with more than two faces, no overlapping UVs."""
     bust = load_bust()
     mesh = bust_object("Bust", None).data
     assert not mesh.validate()

@@ -338,8 +338,7 @@ def test_edited_cards_go_with_their_skin(hair, sphere):
 
 @pytest.mark.parametrize("scale", few_in_commits([(-1.0, 1.0, 1.0), (2.0, 2.0, 2.0)]))
 def test_edited_cards_go_with_the_object(hair, sphere, scale):
-    """Remade cards keep edits where the head was moved, scaled or mirrored: the mesh is in the
-    hair's space."""
+    """Meshes of cards are in the hair's space: edits survive a moved, scaled or mirrored head."""
     sphere.location, sphere.scale = (1.0, 2.0, 3.0), scale
     bpy.context.view_layer.update()
     obj = make(hair)
@@ -500,8 +499,7 @@ def test_exported_cards_have_the_edits(hair, evaluated, tmp_path):
 
 
 def test_a_card_whose_uvs_are_folded_has_the_indices_of_its_file(hair, evaluated, tmp_path):
-    """The indices also match for a card with a flipped corner, whose triangles there share only a
-    vertex."""
+    """Indices also match for a card whose folded UVs leave triangles that share only a vertex."""
     hair.data.hairloom.cards.column_count = 2
     obj = make(hair)
     uv = obj.data.uv_layers["UVMap"].uv

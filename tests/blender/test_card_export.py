@@ -111,8 +111,7 @@ def test_fbx_keeps_order_attributes_and_levels(levels: list[CardMesh], tmp_path:
 
 
 def mirrored(levels: list[CardMesh]) -> list[CardMesh]:
-    """Levels as if an artist had mirrored the cards: u runs the other way, strands and faces are
-    unchanged."""
+    """Levels whose cards an artist has mirrored: u is reversed, strands and faces are unchanged."""
     return [replace(mesh, uv=np.abs([1.0, 0.0] - mesh.uv).astype(np.float32)) for mesh in levels]
 
 
@@ -120,8 +119,7 @@ def mirrored(levels: list[CardMesh]) -> list[CardMesh]:
 def test_glb_says_which_way_strands_run(
     levels: list[CardMesh], tmp_path: Path, is_mirrored: bool
 ) -> None:
-    """The sidecar's formula gives the strands' direction from the GLB's normals and tangents, also
-    for mirrored UVs."""
+    """The sidecar's formula gives the strands' direction, also for mirrored UVs."""
     assert "TANGENT.w * cross(NORMAL, TANGENT.xyz)" in GLB.attributes["TANGENT"]
     path = written(tmp_path, mirrored(levels) if is_mirrored else levels, GLB)
     file = GlbFile.of(path.read_bytes(), str(path))
@@ -246,8 +244,7 @@ def test_a_disk_that_is_full_for_the_levels_of_usd_is_told(
 
 
 def test_the_users_blocks_keep_their_names(levels: list[CardMesh], tmp_path: Path) -> None:
-    """Blocks in the scene already have the names that the export needs: they keep them, and the
-    file has them too."""
+    """Blocks in the scene keep the names that the export needs; the file has them too."""
     mesh = bpy.data.meshes.new(f"{NODE}_LOD0")
     obj = bpy.data.objects.new(f"{NODE}_LOD0", mesh)
     bpy.context.scene.collection.objects.link(obj)

@@ -73,8 +73,7 @@ def test_every_format_comes_with_a_sidecar_that_follows_the_schema(
 
 
 def test_the_index_buffer_holds_the_indices_of_the_glb(tmp_path: Path) -> None:
-    """For each level, the buffer has the GLB's indices, and the same triangles in the order for
-    back faces."""
+    """For each level, the buffer has the GLB's indices, then its triangles in back-face order."""
     assert cards(tmp_path / "hair.glb", *BAKED, "--levels", "3", "--index-buffer") == 0
     content, glb = sidecar_of(tmp_path / "hair.glb"), Glb(tmp_path / "hair.glb")
     indices = np.frombuffer((tmp_path / "hair.indices.bin").read_bytes(), "<u2")

@@ -179,8 +179,7 @@ def test_a_wrong_picture_on_the_command_line_is_named(
 def test_without_openimageio_blender_reads_and_writes(
     write: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Blender's reader and writer give the same values as OpenImageIO, to 8 bits in written
-    files."""
+    """Blender's reader and writer agree with OpenImageIO, in written files to 8 bits."""
     color, data = values(3), values(1)
     files = {
         "color": write("color.png", color, is_color=True),

@@ -51,8 +51,7 @@ SETTINGS = SettingsMap(
 
 @pytest.fixture(scope="module")
 def motion() -> GuideMotion:
-    """Hair grown here, on a head that shakes. Guides lag behind the head, and each swings at its
-    own phase."""
+    """Hair on a shaking head. Guides lag behind the head, and each swings with its own phase."""
     grown = read_inputs(Sources(), GrowSettings(strand_count=400, length=0.12))
     scalp = grown.strands.take(np.flatnonzero(grown.strands.group == 0))
     rig = rig_flow.prepare(scalp, grown.head, GuideSettings(guide_count=60), place="x")

@@ -15,8 +15,7 @@ from hairloom.addon.ui.long_work import threaded
 
 @pytest.fixture
 def hair(new_hair, sphere):
-    """A hedgehog of 60 strands in two groups on a sphere, set up for few cards with a small
-    texture."""
+    """A hedgehog of 60 strands in two groups on a sphere, for few cards with a small texture."""
     made = new_hair(sphere)
     cards, texture = made.data.hairloom.cards, made.data.hairloom.card_texture
     cards.source, cards.card_count, cards.levels, cards.fly_aways = "clusters", 12, 3, 0.0
@@ -35,8 +34,7 @@ def press():
 
 
 def test_cards_that_are_cancelled_leave_the_scene_as_it_was(hair):
-    """Esc closes the steps, once before the first cards exist and once before they are made
-    again."""
+    """Esc closes the steps: once before the first cards exist, and once when they are remade."""
     before = sorted(obj.name for obj in bpy.data.objects)
     for _ in range(2):
         points = {obj.name: world_points(obj) for obj in card_objects(hair)}

@@ -248,8 +248,7 @@ def test_a_combed_head_that_moved_since_takes_hair_along(hair, session, evaluate
 def test_combed_hair_comes_in_the_light_before_and_keeps_strokes_made_since(
     hair, session, evaluated, monkeypatch
 ):
-    """Combed hair has the old light at first. Its own light arrives later and leaves newer strokes
-    alone."""
+    """Combed hair first has the old light. Its own arrives later, and keeps newer strokes."""
     opened, lit = threading.Event(), session_module.lit
     monkeypatch.setattr(session_module, "lit", lambda *given: opened.wait(60.0) and lit(*given))
     monkeypatch.setattr(latest_job, "is_blocking", lambda: False)

@@ -74,8 +74,7 @@ def groom(tmp_path: Path) -> Path:
 
 
 def tfx_bytes(positions: np.ndarray, version: float = 4.0) -> bytes:
-    """A TressFX v4 file by the table of the formats page, made without our writer; positions (s, v,
-    3)."""
+    """A TressFX v4 file, made without our writer, by the format's table; positions (s, v, 3)."""
     strands, vertices = positions.shape[:2]
     header = struct.pack("<f8I", version, strands, vertices, 160, 0, 0, 0, 0, 0).ljust(160, b"\0")
     block = np.ones((strands, vertices, 4), "<f4")
@@ -335,8 +334,7 @@ def standing_hair() -> StrandSet:
 
 
 def test_the_scene_moves_the_head(tmp_path: Path, walking_head: bpy.types.Object) -> None:
-    """With --animated, hair follows the head's animation, and the scene's current frame is
-    unchanged."""
+    """With --animated, hair follows the head's animation; the current frame is unchanged."""
     write_curves("Walking hair", standing_hair(), walking_head, bpy.context.scene.collection)
     bake = tmp_path / "bake"
     arguments = ["simulate", "--groom", "Walking hair", "--animated", *SMALL]

@@ -42,8 +42,7 @@ def duplicated(*objects, linked):
 
 
 def goes_on(playing):
-    """Assert that this hair is the only one previewed, still swings, and that no notice is
-    shown."""
+    """Assert that only this hair is previewed, still swings, and that there is no notice."""
     assert previews.sessions() == (playing.session,) and previews.notice() == ""
     assert playing.session.is_playing and swings(playing.session)
 

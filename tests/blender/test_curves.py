@@ -193,8 +193,7 @@ def test_written_on_a_moved_head_strands_stay_where_they_are(evaluated, sphere):
 
 
 def test_blenders_own_surface_node_accepts_the_attachment(evaluated, sphere):
-    """Blender's Deform Curves on Surface moves the strands with the mesh and reports no invalid
-    UV."""
+    """Blender's Deform Curves on Surface moves strands with the mesh and finds no invalid UV."""
     from hairloom.addon.blender.scene.surfaces import read_surface
     from hairloom.addon.groom.roots import bind_roots
 
@@ -270,8 +269,7 @@ WEIGHTS = np.tile(np.float32([1.0, 3.0, 1.0, 0.5, 1.0, 1.0]), 2)
     ],
 )
 def test_curves_of_every_type_are_where_blender_draws_them(kind, attributes, evaluated):
-    """Strands are within 1 to 2 mm of Blender's own conversion to a mesh, all along curves of 35
-    cm."""
+    """Within 1 to 2 mm, curves of 35 cm agree with Blender's own conversion to a mesh."""
     obj = typed(kind, **attributes)
     read = read_curves(obj, evaluated())
     assert read.dropped == {}
@@ -333,8 +331,7 @@ def test_curves_of_several_types_keep_their_order_and_points(evaluated):
 
 
 def test_handles_go_with_the_points_that_are_combed(evaluated):
-    """Combing, settling and trimming move points; handles move with them, so the curve's shape is
-    kept."""
+    """Combing, settling and trimming move points; handles follow, so curves keep their shape."""
     obj = typed("BEZIER", **HANDLES)
     before = read_curves(obj, evaluated()).strands.points.copy()
     own = read_own_curves(obj, evaluated())

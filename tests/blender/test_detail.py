@@ -203,8 +203,7 @@ def test_statistics_begin_with_nothing():
 
 
 def test_stretch_and_depth_know_the_style_and_the_colliders(preview, evaluated):
-    """The view "stretch" keeps the strands at rest, and "depth" the head as a collider, where it is
-    during play."""
+    """The snapshot has the strands at rest for "stretch", the moved head's collider for "depth"."""
     hair, head, session = preview
     hair.hairloom.debug_view = "stretch"
     assert drawing(session).snapshot.rest is session.rig.strands.points

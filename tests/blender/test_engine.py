@@ -57,8 +57,7 @@ def test_hair_is_drawn_and_two_renders_are_the_same(
 
 
 def test_mesh_depth_and_coverage_are_those_of_workbench(stage: Any, tmp_path: Path) -> None:
-    """A ball in front of a cube, with non-square pixels and a shifted lens, compared with
-    Workbench."""
+    """A ball in front of a cube agrees with Workbench, with non-square pixels and lens shift."""
     add_ball()
     bpy.ops.mesh.primitive_cube_add(size=0.2, location=(0.1, 0.2, 0.05), rotation=(0.3, 0.4, 0.5))
     render, camera = stage.render, stage.camera.data
@@ -122,8 +121,7 @@ def test_border_percentage_and_film(stage: Any, tmp_path: Path) -> None:
 
 
 def test_the_region_of_a_view_is_that_of_the_picture(stage: Any) -> None:
-    """In a camera view it is the scene's border within the camera's frame; otherwise it is the
-    view's own border."""
+    """In a camera view it is the scene's border in the camera's frame, else the view's border."""
     from types import SimpleNamespace
 
     from hairloom.addon.blender.engine.engine_camera import view_rectangle
@@ -176,8 +174,7 @@ def test_motion_blur_spreads_over_the_way(stage: Any, tmp_path: Path) -> None:
 
 
 def test_stretched_time_is_stretched_once(stage: Any, tmp_path: Path) -> None:
-    """Time remapping is applied once: with a very short shutter, the picture equals one without
-    motion blur."""
+    """Time remapping is applied once: a very short shutter gives the picture without blur."""
     stage.hairloom.picture.samples = stage.hairloom.picture.motion_steps = 2
     ball = add_ball(0.05)
     for frame, x in ((1, -0.2), (21, 0.2)):

@@ -52,8 +52,7 @@ def test_view_layers_and_holdouts(stage: Any, tmp_path: Path) -> None:
 def test_hair_may_be_a_hole(
     stage: Any, new_hair: Callable[..., Any], sphere: Any, tmp_path: Path, way: str
 ) -> None:
-    """In front of a wall, a holdout removes the alpha that the hair has alone. Meshes in front of
-    it stay."""
+    """In front of a wall, a holdout removes the hair's alpha. Meshes in front of it stay."""
     stage.render.film_transparent = True
     stage.hairloom.picture.samples = 16
     hair = new_hair(sphere)
@@ -150,8 +149,7 @@ def test_texts_metaballs_and_instances_are_drawn(stage: Any, tmp_path: Path) -> 
 def test_hair_of_instances_is_as_thick_and_lit_as_it_looks(
     sphere: Any, new_hair: Callable[..., Any], shown_as: str
 ) -> None:
-    """Twice the scale gives twice the radius or depth, and light's vectors are mirrored with the
-    hair."""
+    """Twice the scale gives twice the radius or depth; light's vectors are mirrored with hair."""
     hair = new_hair(sphere)
     settings = hair.data.hairloom
     settings.card_drawing.shown_as, settings.card_occlusion.rays = shown_as, 4

@@ -17,8 +17,8 @@ pytestmark = [pytest.mark.draws, pytest.mark.usefixtures("gpu_context", "extensi
 
 @pytest.fixture
 def props(stage: Any) -> Any:
-    """A ground of 40 m, a turned block and a floating ball, all white, in a black world. Returns
-    the ball."""
+    """A 40 m ground, a turned block and a floating ball, white in a black world; returns the
+    ball."""
     set_world((0.0, 0.0, 0.0))
     bpy.ops.mesh.primitive_plane_add(size=40.0)
     bpy.ops.mesh.primitive_cube_add(size=0.6, location=(0.0, 0.0, 0.35), rotation=(0.2, 0.1, 0.5))
@@ -50,8 +50,7 @@ def add_light(kind: str, energy: float, **where: Any) -> Any:
 def test_shadows_lie_where_cycles_has_them(
     stage: Any, props: Any, kind: str, tmp_path: Path
 ) -> None:
-    """With point-like lights and without bounces, pictures differ from Cycles only at shadows'
-    edges."""
+    """With point-like lights and no bounces, pictures differ from Cycles only at edges."""
     light = add_light(
         kind,
         3.0 if kind == "SUN" else 150.0,
@@ -75,8 +74,7 @@ def test_shadows_lie_where_cycles_has_them(
 
 
 def test_what_is_not_to_throw_a_shadow_throws_none(stage: Any, props: Any, tmp_path: Path) -> None:
-    """Without the shadow of one object, of all objects or of the light, the picture gets
-    brighter."""
+    """The picture gets brighter without shadows of one object, of all objects, of the light."""
     light = add_light("SUN", 3.0, rotation_euler=(0.5, 0.5, 0.3))
     with_all = picture(tmp_path)[..., 0].mean()
     props.visible_shadow = False

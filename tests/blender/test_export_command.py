@@ -42,8 +42,7 @@ def run(tmp_path: Path) -> Callable[..., dict[str, Any]]:
 
 
 def on_sphere(*, coloured: bool = True) -> Groom:
-    """40 strands of 5 or 9 points on the sphere of radius 0.1 m, with every attribute that USD
-    stores."""
+    """40 strands of 5 or 9 points on the sphere of radius 0.1 m, with all that USD stores."""
     random = np.random.default_rng(4)
     counts = np.where(np.arange(40) % 2, 5, 9)
     outward = random.normal(size=(40, 3))

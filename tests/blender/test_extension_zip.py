@@ -37,8 +37,8 @@ def extension_tool(*arguments):
 
 
 def in_fresh_blender(script, resources):
-    """Run a script in a new Blender with its own user folders; returns its last line of JSON, and
-    all output."""
+    """Run a script in a new Blender with own user folders; returns its last JSON line and
+    output."""
     wheel = [sys.executable, script]
     program = [bpy.app.binary_path, "-b", "--python-exit-code", "1", "--python", script]
     done = subprocess.run(
@@ -242,8 +242,7 @@ def used_permissions():
 
 
 def test_the_bill_of_materials_names_what_the_zip_carries(wheels, names, tmp_path):
-    """Valid by CycloneDX's schema; each part has a known licence, and each wheel contains its
-    text."""
+    """It is valid by CycloneDX's schema; licences are known, and wheels contain their texts."""
     validation = pytest.importorskip("cyclonedx.validation", reason="it is for development alone")
     schema = importlib.import_module("cyclonedx.schema")
     path = tmp_path / "hairloom.cdx.json"

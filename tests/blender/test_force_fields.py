@@ -45,8 +45,7 @@ def push_at(owner, place=(0.0, 0.0, 0.5)):
 
 @pytest.mark.parametrize("case", CASES)
 def test_particles_of_blender_feel_the_same(owner, case):
-    """At 40 moving places around the field, the difference from Blender is under a thousandth of
-    the largest force."""
+    """At 40 moving places, the error relative to Blender's largest force is below 1/1000."""
     points = np.random.default_rng(2).uniform(-1.0, 1.0, (40, 3))
     assert error_of(*CASES[case], points) < 1e-3
 

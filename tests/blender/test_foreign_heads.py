@@ -93,8 +93,7 @@ def makehuman(count: int = BODY) -> bpy.types.Object:
 
 
 def scan(ratio: float = 0.3) -> bpy.types.Object:
-    """The same head with fewer, other triangles, at another scale, turned, and without MakeHuman's
-    topology."""
+    """The same head with fewer triangles, scaled and turned, without MakeHuman's topology."""
     bust = load_bust()
     faces = [face.tolist() for face in bust_polygons()]
     skin = [face for face, kind in zip(faces, bust.material, strict=True) if kind == 0]

@@ -1,5 +1,4 @@
-"""Handles in the 3D view: their places, the properties that they change, and when they are
-shown."""
+"""Handles in the 3D view: their places, their properties, and when they are shown."""
 
 from __future__ import annotations
 
@@ -93,8 +92,7 @@ def test_the_winds_arrow_ends_where_the_overlays_does(hair: Any) -> None:
 
 
 def test_rings_turn_the_wind_as_the_mouse_turns_them(hair: Any) -> None:
-    """Blender measures angles clockwise around z: a ring rotated back by its angle has its x axis
-    along the wind."""
+    """Blender turns rings clockwise around z: turned back by its angle, x points along the wind."""
     turns, wind = handles(gizmos.HAIRLOOM_GGT_wind).turns, hair.hairloom.dynamics
     level = Vector((math.cos(wind.wind_direction), math.sin(wind.wind_direction), 0.0))
     along = math.cos(wind.wind_elevation) * level

@@ -1,5 +1,4 @@
-"""Hair cards as GLB, read back without a library: order, attributes and material; Blender's scene
-is unchanged."""
+"""Hair cards as GLB, parsed without a library; the export leaves Blender's scene unchanged."""
 
 from __future__ import annotations
 

@@ -170,8 +170,7 @@ def test_panda3d_composes_what_a_slow_compositor_composes(
 
 @pytest.mark.slow(instead="test_panda3d_draws_what_a_slow_compositor_draws")
 def test_panda3d_blends_in_index_order(tmp_path: Path) -> None:
-    """Four sheets one behind another, each of one colour: the blended colour depends on the
-    order."""
+    """Four sheets of one colour each, one behind another: their blend shows the order."""
     depths = [0.3, 0.1, 0.2, 0.0]  # the viewer is at -y, so this is no depth order
     guides = np.array([[[0, y, 0.1], [0, y, -0.1]] for y in depths], np.float32)
     settings = CardSettings(segment_count=1, column_count=1, tip_width=1.0, bend=0.0)

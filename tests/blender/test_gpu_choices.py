@@ -1,5 +1,4 @@
-"""The budget of GPU memory: in the preferences, in the panel, and for the pictures that views
-keep."""
+"""The budget of GPU memory: in the preferences, in the panel, and for pictures kept by views."""
 
 from __future__ import annotations
 

@@ -100,8 +100,7 @@ def test_what_is_of_dropped_curves_is_dropped_with_them():
 
 
 def test_modifiers_carry_it_along():
-    """The modifier only moves points, but makes new geometry, which drops the custom properties
-    that hold names."""
+    """The modifier makes new geometry, which drops the custom properties that hold names."""
     groom = full_groom()
     hair = written(groom)
     tree = bpy.data.node_groups.new("Same", "GeometryNodeTree")

@@ -44,8 +44,7 @@ CAMERA = Camera(
 def sheet(
     height: float, count: int, radius: float = 2.0e-4, seed: int = 1, **changes: Any
 ) -> Snapshot:
-    """Horizontal parallel strands at about one height, on 0.4 m by 0.4 m; sunlight passes straight
-    through the sheet."""
+    """Horizontal parallel strands, 0.4 m by 0.4 m; sunlight falls straight through the sheet."""
     random = np.random.default_rng(seed)
     strands = np.zeros((count, 6, 3), np.float32)
     strands[..., 0] = np.linspace(-0.2, 0.2, 6)
@@ -219,8 +218,7 @@ def test_cards_of_one_groom_shade_strands_of_another_and_are_drawn_last(view: Sm
 
 
 def test_grooms_far_apart_know_the_same_lights() -> None:
-    """Grooms in one view share lights: of ten lamps, the eight that are brightest at the first
-    groom."""
+    """Grooms in one view share the eight lamps, of ten, that are brightest at the first groom."""
     lamps = [Light.point((float(x), 0.0, 0.5), (1.0, 1.0, 1.0), 10.0) for x in range(10)]
     ends = [sheet(0.0, 4, lights=brightest(lamps, np.array([x, 0.0, 0.0]))) for x in (0.0, 9.0)]
     assert ends[0].lights != ends[1].lights
@@ -246,8 +244,7 @@ def test_a_clipping_region_may_cut_the_head_away_that_hides_hair(view: SmallView
 def test_without_overlays_hair_is_there_and_its_head_hides_it(
     view: SmallView, left: float, engine: str
 ) -> None:
-    """Without overlays EEVEE leaves depth 0 and Cycles depth 1, so our own depth of the head hides
-    hair."""
+    """Without overlays, EEVEE leaves depth 0 and Cycles depth 1: the head's own depth is used."""
     hair = sheet(0.0, 400)
     corners = np.float32([[-1, -0.05, -1], [0, -0.05, -1], [0, -0.05, 1], [-1, -0.05, 1]])
     # in the left half, in the middle of the hair's depth

@@ -21,8 +21,7 @@ LAST = 6
 
 @pytest.fixture
 def two(new_hair, sphere, tmp_path):
-    """Two grooms whose strands interpenetrate, on a head that turns; one is softer than the
-    other."""
+    """Two grooms that interpenetrate on a turning head; one is softer than the other."""
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = 1, LAST
     for frame, angle in ((1, 0.0), (LAST, 1.5)):
@@ -227,8 +226,7 @@ def test_a_bake_is_out_of_date_once_other_hair_has_changed(two):
 
 
 def test_a_bake_is_out_of_date_by_what_moves_other_hair_in_its_frame(two):
-    """Keyframes on the other hair's settings do not make a bake stale in frames that have them, nor
-    does its name."""
+    """The other hair's keyed settings, in frames that have them, and its name change nothing."""
     one, other = two
     scene = bpy.context.scene
     scene.frame_end = 3

@@ -119,8 +119,7 @@ def links_of(tree: Any) -> set[tuple[str, str, str, str]]:
 def test_hair_covers_what_it_covers_in_cycles_and_nothing_else_changes(
     cycles: Any, hairy: Any, tmp_path: Path
 ) -> None:
-    """Coverage agrees with Cycles to 0.05 per block; without shadows, all other pixels are Cycles'
-    bit for bit."""
+    """Blocks agree with Cycles' alpha to 0.05; without shadows, other pixels are Cycles' own."""
     sample(cycles, FINE)
     hairy.data.hairloom.volume.shadows = "none"
     cycles.render.film_transparent = True
@@ -140,8 +139,7 @@ def test_hair_covers_what_it_covers_in_cycles_and_nothing_else_changes(
 def test_hair_behind_a_mesh_is_hidden_at_its_very_edge(
     cycles: Any, hairy: Any, tmp_path: Path
 ) -> None:
-    """A plate in front of the right half hides all hair behind it, and alpha at its edge does not
-    exceed 1."""
+    """A plate in front of the right half hides the hair; alpha at its edge does not exceed 1."""
     set_world((0.0, 0.0, 0.0))
     bpy.ops.mesh.primitive_plane_add(
         size=1.0, location=(0.503, -0.3, 0.0), rotation=(np.pi / 2.0, 0.0, 0.0)
@@ -164,8 +162,7 @@ def test_hair_behind_a_mesh_is_hidden_at_its_very_edge(
 def test_shadow_on_a_mesh_is_as_dark_as_in_cycles(
     cycles: Any, new_hair: Callable[..., Any], tmp_path: Path
 ) -> None:
-    """A ball of hair between a sun and the floor; the shadow is compared where no hair covers the
-    floor."""
+    """A ball of hair between a sun and the floor, compared where no hair covers the floor."""
     sample(cycles, FINE)
     hair = dense(new_hair)
     # no scattering: the hair acts as if it were black
@@ -438,8 +435,7 @@ def test_a_window_throws_the_shafts_of_the_reference_cut_by_the_hair(
 def test_a_bright_place_of_the_world_throws_shafts_once(
     cycles: Any, hairy: Any, tmp_path: Path
 ) -> None:
-    """A bright place is also extracted as a light, which counts only if a transparent film hides
-    the world."""
+    """A bright place is also a light, which only counts if a transparent film hides the world."""
     cycles.hairloom.use_hair_scene = True
     _set_spot(cycles)
     shafts = hairy.data.hairloom.shafts

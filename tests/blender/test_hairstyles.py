@@ -1,5 +1,4 @@
-"""Hairstyles: each is added completely, as ordinary hair curves with ordinary modifiers, or not at
-all."""
+"""Hairstyles: each is added as ordinary hair curves with ordinary modifiers, or not at all."""
 
 import importlib
 import json
@@ -269,8 +268,7 @@ def refused(style: Hairstyle, head: bpy.types.Object, problem: str) -> None:
 
 
 def test_hair_that_is_fitted_again_is_as_it_was_added(head: bpy.types.Object) -> None:
-    """On a scaled, moved and turned head, hair returns to its added shape, and a settled shape is
-    discarded."""
+    """On a scaled, moved and turned head, hair gets its added shape, not the settled one, back."""
     hair = added(named_hairstyle("buzz_cut"), head)
     added_points, radius = curve_points(hair.data), read_attribute(hair.data, "radius", "POINT")
     hair.hairloom.dynamics.sag_compensation = 0.5

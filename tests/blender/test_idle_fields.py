@@ -23,7 +23,8 @@ from hairloom.addon.ui import (
 )
 
 pytestmark = pytest.mark.usefixtures("extension")
-#: width [pixels at UI scale 1] of a number's field beside its value, and of a button of half a row
+#: text widths [pixels at UI scale 1] in a number's field beside its value, and on a button of half
+#: a row; font size
 IN_FIELD, ON_BUTTON, FONT_SIZE = 118, 102, 11
 
 

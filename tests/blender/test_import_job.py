@@ -145,8 +145,7 @@ def test_a_head_that_is_none_is_named(
 
 
 def test_a_head_of_several_meshes_is_one(tmp_path: Path) -> None:
-    """The head has an eye in front, whose UV map has another name. Joined, all vertices keep their
-    places."""
+    """The head has an eye whose UV map has another name; joined, all vertices keep their places."""
     corners = {"head": ((0.0, 0.0, 0.1), 0.2), "eye": ((0.0, -0.1, 0.15), 0.02)}
     for name, (place, size) in corners.items():
         bpy.ops.mesh.primitive_cube_add(size=size, location=place)

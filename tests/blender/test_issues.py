@@ -215,8 +215,7 @@ def test_instances_by_geometry_nodes_are_told_too(what, new_hair, sphere):
 
 
 def instancing(obj, what):
-    """Add a modifier that puts an instance on each point; returns the node that chooses the
-    instance."""
+    """Put an instance on each point by a modifier; returns the node that chooses the instance."""
     tree = bpy.data.node_groups.new("Instances", "GeometryNodeTree")
     for way in ("INPUT", "OUTPUT"):
         tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")

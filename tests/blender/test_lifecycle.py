@@ -194,8 +194,7 @@ def test_shortcuts_are_offered_without_keys(extension):
 
 
 def test_what_the_status_bar_says_goes_in_all_workspaces(preview, evaluated, monkeypatch):
-    """Blender writes the text into its context's workspace, not into the one that the method is
-    called on."""
+    """Blender writes the text into the context's workspace, whatever workspace is addressed."""
     said = {}
 
     def status_text_set(_workspace, text):

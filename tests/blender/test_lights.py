@@ -44,8 +44,7 @@ def warnings(*suns: Light) -> tuple[str, ...]:
 
 
 def test_eight_that_are_brightest_at_the_hair_are_kept_and_the_artist_is_told():
-    """Irradiance at the hair counts, not power: a weak lamp nearby precedes a strong one far
-    away."""
+    """Irradiance at the hair counts: a weak lamp nearby precedes a powerful one far away."""
     for place in range(LIGHT_CAPACITY):
         add("POINT", (0.0, 0.0, 1.0 + place), energy=10.0)
     assert len(lights()) == LIGHT_CAPACITY
@@ -161,8 +160,7 @@ STUDIO_WORLDS = Path(bpy.utils.system_resource("DATAFILES")) / "studiolights" / 
 
 
 def view(kind: str, lights: bool, has_world: bool, picture: str = "forest.exr") -> Any:
-    """The shading settings of a 3D view; picture: its studio HDRI, "" for none, as in Solid
-    mode."""
+    """A 3D view's shading; picture: its studio HDRI, "" for none, as in Solid mode."""
     names = ("type", "use_scene_lights", "use_scene_world")
     names += ("use_scene_lights_render", "use_scene_world_render")
     values = (kind, lights, has_world, lights, has_world)
@@ -181,8 +179,7 @@ def bare(**values: Any) -> Snapshot:
 
 
 def test_hair_is_lit_as_blender_lights_the_rest_and_never_black() -> None:
-    """By the view's HDRI if Blender uses it, and by the studio lights if there is no light at
-    all."""
+    """The view's HDRI is used where Blender uses it, studio lights if there is no light at all."""
     studio, lamp, world = three_point_lights(np.eye(4)), Light.sun((0, 0, -1), (1, 1, 1), 1.0), 0.3
     sun = Light("sun", (1.0, 0.0, 0.0), (2.0, 2.0, 2.0), of_world=True)
 

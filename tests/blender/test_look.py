@@ -98,8 +98,7 @@ def test_nothing_ticks_on_when_hairloom_is_disabled(preview: Any, window: None) 
 
 
 def drawn_in_look(hair: Any) -> tuple[list[str], set[str]]:
-    """The parameters that the section Look and its subsections draw, in order, and the greyed-out
-    ones among them."""
+    """The parameters drawn by the section Look and its subsections, and the greyed-out ones."""
     found: list[str] = []
     grey: set[str] = set()
 

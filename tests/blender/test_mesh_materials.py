@@ -139,8 +139,7 @@ def test_nodes_that_are_not_read_are_told(material: bpy.types.Material) -> None:
 
 
 def square() -> Surface:
-    """A square from -0.5 to 0.5 in x and y, whose UVs are rotated by 90 degrees and half as
-    wide."""
+    """A square from -0.5 to 0.5 in x and y; its UVs are rotated by 90 degrees and half as wide."""
     corners = np.array([[-0.5, -0.5, 0], [0.5, -0.5, 0], [0.5, 0.5, 0], [-0.5, 0.5, 0]])
     triangles = np.array([[0, 1, 2], [0, 2, 3]])
     uv = np.array([[0.0, 0.0], [0.0, 1.0], [-0.5, 1.0], [-0.5, 0.0]])
@@ -274,8 +273,7 @@ def test_meshes_cover_as_much_as_their_alpha_says(transparency: str) -> None:
 
 @pytest.mark.usefixtures("gpu_context")
 def test_blended_meshes_are_drawn_from_far_to_near() -> None:
-    """In either order of the list, the nearer of two sheets with alpha 0.5 has the larger
-    weight."""
+    """In either order of the list, the nearer of two sheets with alpha 0.5 weighs more."""
     from hairloom.addon.render import frame
 
     surface, none = square(), np.zeros((0, 2, 3), np.float32)

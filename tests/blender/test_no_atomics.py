@@ -63,8 +63,7 @@ def test_a_render_is_calm_without_atomics(
 def test_a_render_shares_what_was_drawn_elsewhere(
     stage: Any, new_hair: Callable[..., Any], sphere: Any, tmp_path: Path
 ) -> None:
-    """A render has its own GPU context, in which framebuffers of another context cannot be
-    bound."""
+    """A render's own GPU context cannot bind framebuffers of another context."""
     hair = new_hair(sphere)
     hair.data.hairloom.strands.transparency = "hashed"
     hair.data.hairloom.strands.fullness = 20.0

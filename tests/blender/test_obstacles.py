@@ -28,8 +28,7 @@ def scene(extension):
 
 
 def rig(mesh, name="Rig"):
-    """Bind a mesh to one bone of an armature, whose object stands still; returns a function that
-    poses the bone."""
+    """Bind a mesh to a bone of a still armature; returns a function that poses the bone."""
     armature = bpy.data.armatures.new(name)
     obj = bpy.data.objects.new(name, armature)
     bpy.context.scene.collection.objects.link(obj)

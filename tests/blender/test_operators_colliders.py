@@ -51,8 +51,7 @@ def moved(matrix, points):
 
 
 def rig(mesh):
-    """Bind a mesh to one bone of an armature, whose object stands still; returns a function that
-    poses the bone."""
+    """Bind a mesh to a bone of a still armature; returns a function that poses the bone."""
     armature = bpy.data.armatures.new("Rig")
     obj = bpy.data.objects.new("Rig", armature)
     bpy.context.scene.collection.objects.link(obj)

@@ -21,8 +21,7 @@ def grown(head, **settings):
 
 @pytest.fixture
 def told(capfd):
-    """A function that returns the operators' reports since its last call, and refuses
-    tracebacks."""
+    """A function that returns reports since its last call, and refuses tracebacks."""
 
     def read():
         captured = capfd.readouterr()

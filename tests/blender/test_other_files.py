@@ -213,8 +213,7 @@ def test_a_scene_that_would_not_play_the_bake_of_linked_hair_is_not_saved(shot, 
 
 @pytest.mark.parametrize("is_alone", [True, False])
 def test_hair_of_an_instance_is_said_to_be_left_out(library, new_hair, tmp_path, capfd, is_alone):
-    """The usual layout of shots: collection instances of characters, whose hair the render engine
-    draws."""
+    """The usual layout of shots: instances of characters, whose hair the render engine draws."""
     if not is_alone:
         new_hair()
     empty = bpy.data.objects.new("Anna", None)
@@ -345,8 +344,7 @@ def test_an_animated_wind_blows_hair_in_playback_and_in_a_bake(
 
 
 def test_an_override_is_baked_and_shown_in_renders(override, tmp_path):
-    """The overridden collection takes no other objects, so the copy is put in the scene's
-    collection."""
+    """The overridden collection takes no other objects, so the scene's collection gets the copy."""
     override.hairloom.dynamics.collider_resolution = 8
     override.hairloom.bake.folder = str(tmp_path / "bake")
     bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, 2
@@ -365,8 +363,7 @@ def a_ring():
 
 
 def held_strands(hair, head):
-    """The number of held strands, after asserting that they follow their anchor when the head
-    moves."""
+    """The number of held strands, all of which must follow their anchor when the head moves."""
     session = previews.start(hair, bpy.context.evaluated_depsgraph_get())
     assert previews.play(bpy.context.evaluated_depsgraph_get()) == []
     rig = session.rig

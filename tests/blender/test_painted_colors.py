@@ -1,5 +1,4 @@
-"""Hair in colours painted on its surface: compared with Blender's own sampling, and in all
-outputs."""
+"""Hair in colours painted on its surface, compared with Blender's sampling, and in all outputs."""
 
 from __future__ import annotations
 

@@ -175,8 +175,7 @@ def test_nothing_below_moves_whatever_happens_to_the_hair(hair, monkeypatch, tmp
 
 
 def test_a_head_that_has_brows_gets_hair_from_the_same_panel():
-    """Selected brows or a selected head offer it; without either, the button shows why it is greyed
-    out."""
+    """Selected brows or their head offer it; without either, the button shows the reason."""
     bpy.ops.hairloom.add_hairstyle(style="brows", plays=False)
     brows = bpy.context.object
     head = brows.data.surface

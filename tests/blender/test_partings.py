@@ -275,8 +275,7 @@ def test_a_render_after_a_parting_has_moved_has_other_children(hair, evaluated):
 
 @pytest.mark.parametrize("data", ["Y up", "Z up"])
 def test_a_new_line_goes_with_its_head(data, new_hair):
-    """On a head whose data are in centimetres with Y up it is the same line; on a turned head it
-    turns along."""
+    """The line is the same with Y up and centimetres in the head's data, and turns with a head."""
     turn = Matrix.Rotation(0.5 * np.pi, 4, "X") @ Matrix.Scale(0.01, 4)
     if data == "Z up":
         turn = Matrix.Rotation(0.5 * np.pi, 4, "Z")

@@ -61,8 +61,7 @@ def of_cycles(stage: Any, folder: Path) -> dict[str, np.ndarray]:
 
 
 def matte_of(stage: Any, scene: Any, name: str, folder: Path) -> np.ndarray:
-    """The matte that Blender's own Cryptomatte node extracts for a name, in a render of the
-    stage."""
+    """The matte of a name by Blender's own Cryptomatte node, in a render of the stage."""
     tree = stage.compositing_node_group or bpy.data.node_groups.new("Matte", "CompositorNodeTree")
     if not len(tree.interface.items_tree):
         tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
@@ -143,8 +142,7 @@ def test_depth_motion_and_normals_are_those_of_cycles(
 def test_blenders_cryptomatte_node_selects_what_hair_covers(
     stage: Any, sphere: Any, new_hair: Any, tmp_path: Path
 ) -> None:
-    """The matte of thin strands, in front of the head and beside it, equals their alpha in the
-    picture."""
+    """The matte of thin strands, in front of the head and beside it, equals their alpha."""
     hair = new_hair(sphere)
     hair.data.hairloom.strands.fullness = 8.0
     asks_for(stage.view_layers[0], "use_pass_cryptomatte_object", *OWN)
@@ -223,8 +221,7 @@ def test_over_cycles_passes_are_of_hair_alone_and_follow_the_view_layer(
 
 
 def layers_of(stage: Any, scene: Any, folder: Path) -> dict[str, np.ndarray]:
-    """All outputs of a Render Layers node, written by a File Output node in a render of the
-    stage."""
+    """All outputs of a Render Layers node in a render of the stage, read from a file."""
     tree = stage.compositing_node_group
     layers = next(node for node in tree.nodes if getattr(node, "scene", None) == scene)
     out = tree.nodes.new("CompositorNodeOutputFile")
@@ -308,8 +305,7 @@ def test_one_pixel_and_both_eyes(stage: Any, sphere: Any, thick: Any, tmp_path: 
 def test_the_shadow_of_hair_is_what_it_takes_of_the_picture(
     stage: Any, thick: Any, tmp_path: Path
 ) -> None:
-    """With a single sun, the head's picture equals the picture without hair shadow times the
-    pass."""
+    """With a single sun, the pass times the picture without hair shadow gives the picture."""
     set_world((0.0, 0.0, 0.0))
     bpy.ops.object.light_add(type="SUN", rotation=(0.5, 0.0, 0.0))
     asks_for(stage.view_layers[0], "use_pass_object_index", "use_shadow")

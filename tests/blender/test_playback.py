@@ -160,8 +160,7 @@ def test_a_render_changes_nothing_of_what_the_viewport_shows(scene, evaluated):
 
 
 def test_motion_blur_smears_the_hair_between_two_frames(scene, tmp_path):
-    """Cycles reads the hair at subframes: the blurred picture also covers the next frame's
-    strands."""
+    """Cycles reads subframes: the blurred picture also covers the next frame's strands."""
     bpy.ops.hairloom.bake()
     cache = playback.cache_of(bpy.data.objects["Hair"])
     scene.cycles.samples = 64

@@ -1,5 +1,4 @@
-"""Hair without an attaching modifier, on a posed head: it is the same, whatever frame it is read
-in."""
+"""Hair without an attaching modifier, on a posed head, is the same whatever frame it is read in."""
 
 import bpy
 import numpy as np

@@ -32,8 +32,7 @@ def hair(new_hair: Callable[..., bpy.types.Object]) -> bpy.types.Object:
 
 @pytest.mark.parametrize("name", [entry.name for entry in presets.shipped("volume")])
 def test_shadows_keep_key_fill_and_rim_light(name: str) -> None:
-    """Lights without a map are shadowed by occlusion instead, which is 30 % darker on blond
-    hair."""
+    """Lights without a map use occlusion instead of shadows, which is 30 % darker on blond hair."""
     assert presets.named_preset(name).settings.max_lights >= 3
 
 
@@ -323,8 +322,7 @@ def test_without_an_installed_extension_presets_go_to_blenders_settings() -> Non
 
 
 def test_a_picture_beside_a_preset_goes_with_it(extension: Any, own_folder: Path) -> None:
-    """tests/window/session_look.py tests that it is shown; without a window Blender has no
-    icons."""
+    """tests/window/session_look.py tests its display; without a window Blender has no icons."""
     own_folder.mkdir()
     data = {"hairloom": PRESET_VERSION, "section": "shading", "title": "Seen", "values": {}}
     (own_folder / "seen.json").write_text(json.dumps(data))

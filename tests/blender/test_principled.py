@@ -1,5 +1,4 @@
-"""Reading the Principled Hair of a material; tests/pure/test_principled.py tests the mapping
-itself."""
+"""Reading a material's Principled Hair; tests/pure/test_principled.py tests the mapping itself."""
 
 from __future__ import annotations
 

@@ -186,9 +186,8 @@ def _another(value, parameter):
 
 
 def test_keyframes_change_nothing_that_needs_other_hair(new_hair):
-    """No frame reads the hair again, so properties that would need it cannot be keyed; except
-    wetness, which look and weight follow, and Only Selected, for which curves are read again only
-    to warn."""
+    """No frame reads the hair again, so properties that need it cannot be keyed. Exceptions:
+    wetness, which look and weight follow, and Only Selected, which reads curves only to warn."""
     hair, tried, known = new_hair(), 0, {"wetness", "only_selected"}
     hair.data.hairloom.children.method = "multi"
     for owner in (hair.data, hair):
@@ -248,8 +247,7 @@ for name in ("Hair", "Bare"):
 
 @pytest.mark.skipif(not bpy.app.module, reason="starts another Python that has bpy")
 def test_a_file_from_before_shadows_shows_the_default_and_keeps_what_was_set(new_hair, tmp_path):
-    """Opened in another process: values that the file does not store are defaults, all others the
-    artist's."""
+    """Another process opens the file: values that it does not store have their defaults."""
     hair, bare = new_hair(), new_hair()
     bare.name = "Bare"
     hair.data.hairloom.volume.shadows = "slices"

@@ -39,8 +39,7 @@ def curled(scale: float) -> StrandSet:
 def told(
     sphere: Any, new_hair: Callable[..., Any], evaluated: Callable[[], Any], scale: float
 ) -> tuple[np.ndarray, dict[str, Any]]:
-    """Strands over some frames of a moving head, divided by the scale; and all messages about
-    them."""
+    """Strands in frames of a moving head, divided by the scale, and all messages about them."""
     head = sphere.copy()
     head.data = sphere.data.copy()
     head.data.transform(Matrix.Scale(scale, 4))

@@ -202,8 +202,7 @@ def test_a_mesh_becomes_a_fin_and_a_mesh_again(scene: Path) -> None:
 
 
 def test_spheres_are_fitted_and_removed(scene: Path) -> None:
-    """The head is four times as long as wide, so that a single ball never covers it, whatever its
-    triangles."""
+    """The head is four times as long as wide, so that no single ball covers it."""
     bpy.ops.wm.open_mainfile(filepath=str(scene))
     for vertex in bpy.data.objects["Head"].data.vertices:
         vertex.co.x *= 4.0
@@ -312,8 +311,7 @@ def test_a_scene_that_moves_keeps_its_bakes(scene: Path, tmp_path: Path) -> None
 
 
 def test_hair_is_made_ready(scene: Path) -> None:
-    """Loose hair on a head without UVs gets a surface, UVs and roots on it, and its scale is
-    applied."""
+    """Loose hair on a head without UVs gets a surface, UVs, roots on it, and an applied scale."""
     bpy.ops.wm.open_mainfile(filepath=str(scene))
     hair, head = bpy.data.objects["Hair"], bpy.data.objects["Head"]
     hair.data.surface = hair.parent = None
@@ -436,8 +434,7 @@ def test_a_render_of_a_scene_draws_its_hair(
 @pytest.mark.alike
 @pytest.mark.parametrize("how", ["collection", "collider", "left out"])
 def test_a_shake_of_a_groom_stays_out_of_its_colliders(scene: Path, how: str) -> None:
-    """A ball in the middle of the hair: when the shake starts, hair is led out of it at a limited
-    speed."""
+    """A ball in the middle of the hair: as the shake starts, hair leaves it at a limited speed."""
     middle, radius = np.array([0.0, 0.16, -0.05]), 0.06
     bpy.ops.wm.open_mainfile(filepath=str(scene))
     hair = bpy.data.objects["Hair"]

@@ -53,8 +53,7 @@ def settle(**values):
 
 
 def test_hair_without_stiffness_hangs_straight_down_from_its_roots(new_hair, sphere):
-    """The first segment has the root's direction; the rest is a chain at rest, which is
-    vertical."""
+    """The first segment has the root's direction; the rest hangs vertically as a chain at rest."""
     hair = new_hair(sphere, lying())
     settle(stiffness=0.0, seconds=6.0)
     grid = curve_points(hair.data).reshape(5, 12, 3)
@@ -67,8 +66,7 @@ def test_hair_without_stiffness_hangs_straight_down_from_its_roots(new_hair, sph
 def test_hair_falls_by_its_whole_weight_whatever_is_seen_of_its_motion_and_under_water(
     new_hair, sphere
 ):
-    """Neither the simulated fraction nor water changes the result; strands with a gravity mask of 0
-    stay."""
+    """The simulated fraction and water change nothing; strands with a gravity mask of 0 stay."""
     found = []
     for values in ({}, {"simulated": 0.0, "buoyancy": 1.0, "drag": 5.0, "simulated_mask": "Few"}):
         hair = new_hair(sphere, lying())
@@ -205,8 +203,7 @@ def trim(hair):
 
 @pytest.mark.parametrize("order", ["settle, trim", "trim, settle"])
 def test_what_is_taken_back_takes_later_tools_along(order, new_hair, sphere):
-    """Undoing a tool also undoes later ones, but not earlier ones: hair that settled before a trim
-    is still settled."""
+    """Undoing a tool undoes later ones too, but no earlier ones, such as a settle before a trim."""
     past_reports.clear()
     hair = new_hair(sphere)
     hair.hairloom.dynamics.sag_compensation = 0.5
@@ -255,8 +252,7 @@ def test_linked_duplicates_share_settled_curves_and_carry_their_weight_alike(new
 
 @pytest.mark.parametrize("domain", ["surface", "curves", "control points"])
 def test_hair_falls_as_painted_where_a_modifier_adds_curves(domain, new_hair, sphere):
-    """The curves from before the modifier fall. A selection without Only Selected changes
-    nothing."""
+    """The curves from before the modifier fall. Without Only Selected, a selection is ignored."""
     hair = new_hair(sphere, lying())
     if domain == "surface":
         sphere.vertex_groups.new(name="Few").add(range(len(sphere.data.vertices)), 0.0, "REPLACE")
@@ -302,8 +298,7 @@ def test_of_several_hairs_all_settle_or_none(new_hair, sphere):
 
 @pytest.mark.slow
 def test_modifiers_act_on_what_has_settled(extension):
-    """The curves keep their number of points and their lengths, so the modifier curls them only
-    once."""
+    """The curves keep their number of points and lengths, so the modifier curls them once."""
     bpy.ops.hairloom.add_hairstyle(style="curls", plays=False)
     hair = bpy.context.object
     before, number = steps(hair), len(curve_points(hair.data))

@@ -88,8 +88,7 @@ def test_strands_have_the_light_of_the_reference(frame: Any, melanin: float) -> 
 def test_tables_are_made_once_a_shape_and_shared(
     frame: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Colours and strengths build no new table. A new shape does, and an old one only after
-    CAPACITY others."""
+    """Colours and strengths need no new table; new shapes do, old ones after CAPACITY others."""
     from hairloom.addon.render import marschner_textures
 
     made: list[Any] = []

@@ -112,8 +112,7 @@ def test_a_mesh_between_hair_and_light_leaves_it_dark(frame: Any, form: str) -> 
 
 @pytest.mark.parametrize("form", FORMS)
 def test_hair_shades_the_skin_below(frame: Any, form: str) -> None:
-    """Below hair that covers half of the area the floor has exp(-1/2) of the light; beside it, all
-    of it."""
+    """Below hair that covers half of the area, exp(-1/2) of the light is left; beside it, all."""
     floor = Surface(
         np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], np.float32),
         np.array([[0, 1, 2], [0, 2, 3]], np.int32),
@@ -152,8 +151,7 @@ def ends() -> Iterator[tuple[str, Any]]:
 def test_no_end_of_a_range_draws_anything_but_numbers(
     frame: Any, model: str, name: str, value: Any
 ) -> None:
-    """Extremes give finite pixels with lights around, within and behind the hair, and more lights
-    than get shadows."""
+    """Pixels are finite with lights around, in and behind the hair, more than get shadows."""
     lights = (
         SUN,
         Light.point((0.0, 0.0, 0.001), (1, 1, 1), 1.0),

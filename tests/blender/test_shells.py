@@ -1,5 +1,4 @@
-"""Shells, compared with the strands that they represent, in the scene, and as files in other
-readers."""
+"""Shells, compared with the strands that they represent, and as files in other readers."""
 
 from __future__ import annotations
 

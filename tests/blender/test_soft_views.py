@@ -1,5 +1,4 @@
-"""A view at rest collects samples of soft shadows up to a limit; any change has hard shadows at
-once."""
+"""A view at rest collects samples of soft shadows; any change shows hard shadows at once."""
 
 from __future__ import annotations
 
@@ -58,8 +57,7 @@ GROOMS = {"low": sheet(0.06, 0.0), "high": sheet(0.2, -0.05)}
 
 @pytest.fixture(params=["perspective", "orthographic"])
 def view(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[SmallView]:
-    """A camera's view on a machine that claims to have a GPU, with redraws as its window requests
-    them."""
+    """A camera's view on a machine that claims to have a GPU, and whose window allows redraws."""
     is_flat = request.param == "orthographic"
     projection = orthographic(0.5, 1.0, 0.1, 3.0) if is_flat else perspective(0.5, 1.0, 0.1, 3.0)
     monkeypatch.setattr(views, "_addresses", lambda: iter((ADDRESS,)))

@@ -1,5 +1,4 @@
-"""The two solvers: numpy compared with `motion_flow`, compute with numpy; and changing between
-them."""
+"""The two solvers: numpy against `motion_flow`, compute against numpy, and changing solvers."""
 
 from __future__ import annotations
 
@@ -147,8 +146,7 @@ def test_coils_bounce_alike_and_keep_their_lengths() -> None:
 
 @pytest.mark.usefixtures("gpu_context")
 def test_strands_that_are_led_out_do_not_depend_on_who_looks(rig: Rig, poses: list[Pose]) -> None:
-    """Led strands continue from their shape in the frame before, whether strands are read or not. A
-    rest resets them."""
+    """Led strands continue from the frame before, whether they are read or not, until a rest."""
     low, high = rig.head.bounds()
     ball = SphereCollider(tuple((low + high) / 2.0), 0.55 * float(np.max(high - low)))
 

@@ -84,8 +84,7 @@ def head(extension: None, sphere: bpy.types.Object) -> Surface:
 @pytest.mark.draws
 @pytest.mark.usefixtures("gpu_context")
 def test_a_picture_is_the_same_at_any_size(head: Surface) -> None:
-    """Framing, light, shadows and skin are the same if hair and head are a thousand times smaller
-    or larger."""
+    """A picture is the same if hair and head are a thousand times smaller or larger."""
     strands = half_a_head(head)
     pictures = {
         scale: still(studio_of(*scaled(strands, head, scale)), is_transparent=True)
@@ -151,8 +150,7 @@ def shown(linear: np.ndarray, path: Path, **stage: object) -> np.ndarray:
 
 @pytest.mark.usefixtures("extension")
 def test_highlights_roll_off_on_film(tmp_path: Path) -> None:
-    """Radiances of one, four and eight times white are displayed differently; with Standard they
-    are clipped."""
+    """Radiances of one, four and eight times white stay distinct; Standard clips them."""
     greys = np.repeat([0.18, 1.0, 4.0, 8.0], 16).reshape(1, 64, 1) * np.ones((8, 1, 3))
     linear = np.concatenate([greys, np.ones((8, 64, 1))], axis=2)
     codes = {

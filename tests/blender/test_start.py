@@ -109,8 +109,7 @@ def test_hair_fitted_to_a_doll_and_to_a_giant_falls_as_on_a_head(length):
 
 
 def swing_of_new_hair(size):
-    """How far the tips of new hair on a ball move in half a second, as a fraction of the hair's
-    length."""
+    """How far tips of new hair on a ball move in half a second, relative to the hair's length."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     bpy.ops.mesh.primitive_uv_sphere_add(radius=0.5 * size)
     bpy.ops.hairloom.add_groom("EXEC_DEFAULT", strand_count=60)
@@ -287,8 +286,7 @@ def test_particle_hair_that_is_dropped_is_reported(sphere):
 
 @pytest.mark.slow
 def test_hair_of_a_scene_that_is_not_shown_waits_for_it():
-    """Its head is not evaluated meanwhile, so vertex counts differ, which must not end the
-    preview."""
+    """Its head is not evaluated meanwhile; the differing vertex count must not end the preview."""
     own = bpy.context.scene
     bpy.ops.hairloom.sample_scene()
     sample, (session,) = bpy.context.scene, previews.sessions()

@@ -77,8 +77,7 @@ JOBS = {
 
 
 def stand_in(kind):
-    """A placeholder for an operator with default properties, whose `steps` can be called without
-    Blender."""
+    """A placeholder for an operator with default properties, to call `steps` without Blender."""
     values = {
         name: own.keywords.get("default")
         for name, own in getattr(kind, "__annotations__", {}).items()

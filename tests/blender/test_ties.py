@@ -70,8 +70,7 @@ def swinging(new_hair, sphere, tmp_path):
 
 
 def escape(session):
-    """The largest distance [m] of held strands from their holds, among those long enough to reach
-    them."""
+    """The largest distance [m] of held strands, if long enough, from their holds."""
     rig, pose, strands = session.rig, session.solver.pose, grid_of(session)
     holds = rig.holds.where(pose.anchors)
     first = holds.place.astype(int)

@@ -80,8 +80,7 @@ def test_hair_passes_no_plane_and_follows_it_again_when_it_moves(hair):
 
 
 def bezier_hair(sphere):
-    """Legacy Bézier curves that rise from the sphere, converted to hair curves; the last one stays
-    low."""
+    """Legacy Bézier curves that rise from the sphere, the last one low, as hair curves."""
     data = bpy.data.curves.new("Bezier", "CURVE")
     data.dimensions = "3D"
     for height in (0.02, 0.02, 0.001):

@@ -131,8 +131,7 @@ def test_the_groom_stays_whole_in_view_and_does_not_drift(
 @pytest.mark.slow
 @pytest.mark.parametrize(("top", "foot"), [(0.3, 0.3), (0.1, 0.5)])
 def test_feet_are_not_cut_off_however_wide_they_stand(top: float, foot: float) -> None:
-    """A body that is a pillar or a cone fills the picture at all turns, except for the studio's
-    margin."""
+    """A pillar or a cone fills the picture at all turns, except for the studio's margin."""
     random = np.random.default_rng(1)
     height, angle = np.array([0.0, 1.8])[random.integers(0, 2, 4000)], random.uniform(0, 6.3, 4000)
     reach = np.where(height > 0.0, top, foot)
@@ -277,8 +276,7 @@ def test_a_folder_that_is_a_file_is_named(table: Turntable, tmp_path: Path) -> N
 def test_a_picture_that_another_program_holds_keeps_all_and_the_new_ones(
     table: Turntable, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Under Windows' rule that open files cannot be replaced, a turn still never mixes two
-    grooms."""
+    """Under Windows' rule, open files cannot be replaced: a turn then never mixes two grooms."""
     list(table.steps())
     before = {path.name: path.read_bytes() for path in table.folder.iterdir()}
     held, real = table.files[2], moving.os.replace

@@ -53,8 +53,7 @@ def test_a_page_has_a_step_of_python_for_each_and_its_pictures(name: str) -> Non
 
 @pytest.mark.parametrize("name", TUTORIALS)
 def test_what_a_page_names_in_italics_is_on_a_button_or_a_field(name: str) -> None:
-    """Each of our names in paths such as *Dynamics > Bake* is a text of the extension or a
-    preset."""
+    """Our names in paths such as *Dynamics > Bake* are texts of the extension or of a preset."""
     text = tutorial_page(name).read_text(encoding="utf-8").partition("```")[0].replace("\n", " ")
     texts = "\n".join(
         path.read_text(encoding="utf-8") for path in (REPOSITORY / "addon").rglob("*.py")

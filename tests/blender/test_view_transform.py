@@ -39,7 +39,7 @@ def nothing_kept() -> Any:
 
 
 def shading(kind: str = "RENDERED", *, lights: bool = True, world: bool = True) -> Any:
-    """A view's shading settings; those of the other modes have the opposite values."""
+    """A view's shading settings; those of the other modes are off."""
     is_rendered = kind == "RENDERED"
     return SimpleNamespace(
         type=kind,

@@ -25,8 +25,7 @@ COUNT, POINTS = 60, 40
 
 @pytest.fixture
 def hair(new_hair: Callable[..., Any], sphere: bpy.types.Object) -> bpy.types.Object:
-    """Waves with more points than are simulated, and with impossible widths, so that widths are
-    found."""
+    """Waves with more points than are simulated, too thin for hair, so that widths are found."""
     outward = np.random.default_rng(1).normal(size=(COUNT, 3))
     outward /= np.linalg.norm(outward, axis=1, keepdims=True)
     along = np.linspace(0.0, 1.0, POINTS)[:, None]
@@ -45,8 +44,7 @@ def hair(new_hair: Callable[..., Any], sphere: bpy.types.Object) -> bpy.types.Ob
 
 @pytest.fixture
 def shown(hair: bpy.types.Object, evaluated: Callable[[], Any]) -> np.ndarray:
-    """The radius of each strand as the preview draws it, constant along the strand, (COUNT,)
-    [m]."""
+    """The radius of each strand in the preview, the same at all its points, (COUNT,) [m]."""
     session = previews.start(hair, evaluated())
     assert session.rig.widths.is_found
     radius: np.ndarray = session.rig.strands.radius.reshape(COUNT, -1)

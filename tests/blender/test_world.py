@@ -37,8 +37,7 @@ def uneven() -> np.ndarray:
 
 
 def by_cycles(scene: Any) -> Environment:
-    """The same world, rendered by another Blender: a Gamma node of 1 prevents reading it
-    directly."""
+    """The same world rendered by another Blender: a Gamma of 1 prevents our reading it."""
     tree, shader = scene.world.node_tree, background(scene)
     gamma = tree.nodes.new("ShaderNodeGamma")
     tree.links.new(shader.inputs["Color"].links[0].from_socket, gamma.inputs["Color"])
@@ -129,8 +128,7 @@ def test_a_mapping_turns_it_as_in_cycles(scene: Any, kind: str) -> None:
 
 @pytest.mark.slow
 def test_the_views_picture_turns_as_blenders_nodes_do(scene: Any, tmp_path: Any) -> None:
-    """Blender's Material Preview rotates the world by a Vector Rotate around Z with the view's
-    angle."""
+    """Material Preview rotates the world by a Vector Rotate around Z with the view's angle."""
     node, tree = set_panorama(scene, uneven()), scene.world.node_tree
     node.image.filepath_raw, node.image.file_format = str(tmp_path / "view.exr"), "OPEN_EXR"
     node.image.save()
