@@ -24,8 +24,8 @@ class CardSettings(Settings):
             (
                 "auto",
                 "Automatic",
-                "Shells if hair is short compared with its area of skin, such as fur and stubble, "
-                "and its cards are not edited; else cards",
+                "Shells if hair is short compared with the extent of its skin, such as fur and "
+                "stubble, and its cards are not edited; else cards",
             ),
         ),
         label="Kind",

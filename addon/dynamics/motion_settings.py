@@ -45,7 +45,7 @@ class MotionSettings(Settings):
     drag: float = number(
         0.0,
         label="Drag",
-        description="Quadratic drag through air or water, per metre travelled; a few units in "
+        description="Quadratic drag through air or water, per metre travelled; typically a few in "
         "water",
         soft=(0.0, 10.0),
         hard=(0.0, 1000.0),

@@ -72,7 +72,7 @@ class DynamicsSettings(MotionSettings):
     style_root: float = number(
         4.0,
         label="Root Stiffness",
-        description="Stiffness that holds the roots to the style, in swings per second",
+        description="Stiffness that holds hair to its style near the root, in swings per second",
         soft=(0.0, 10.0),
         hard=(0.0, 1000.0),
         unit="rate",
@@ -83,7 +83,7 @@ class DynamicsSettings(MotionSettings):
     style_tip: float = number(
         1.2,
         label="Tip Stiffness",
-        description="Stiffness that holds the tips to the style, in swings per second",
+        description="Stiffness that holds hair to its style at the tip, in swings per second",
         soft=(0.0, 10.0),
         hard=(0.0, 1000.0),
         unit="rate",
@@ -209,7 +209,7 @@ class DynamicsSettings(MotionSettings):
         True,
         label="Long Range",
         description="Limit each point's distance from its root, both along the strand and "
-        "straight, to that at rest; for relaxation",
+        "straight, to that at rest; acts with relaxation only",
         source="Kim, Chentanez and Mueller 2012",
         panel="Lengths",
     )
@@ -241,7 +241,8 @@ class DynamicsSettings(MotionSettings):
     radius_root: float = number(
         0.004,
         label="Root Radius",
-        description="Distance that roots keep from colliders, as a fraction of the hair's length",
+        description="Distance that hair keeps from colliders near its root, as a fraction of its "
+        "length",
         soft=(0.0, 0.05),
         hard=(0.0, 1.0),
         source='"Pearl" configuration, Nguyen and Donnelly 2005',
@@ -250,8 +251,8 @@ class DynamicsSettings(MotionSettings):
     radius_tip: float = number(
         0.016,
         label="Tip Radius",
-        description="Distance that tips keep from colliders, as a fraction of the hair's length; "
-        "large enough that no collider slips between points",
+        description="Distance that hair keeps from colliders at its tip, as a fraction of its "
+        "length; large enough that no collider slips between points",
         soft=(0.0, 0.1),
         hard=(0.0, 1.0),
         source='"Pearl" configuration, Nguyen and Donnelly 2005',

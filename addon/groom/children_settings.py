@@ -64,8 +64,8 @@ class ChildrenSettings(Settings):
     scatter: float = number(
         0.0,
         label="Scatter",
-        description="Radius within which each child picks the guides for its shape at random, in "
-        "multiples of the distance between guides. Use it for fur, where neighbouring hairs differ",
+        description="Random distance from which each child takes its shape, in multiples of the "
+        "spacing of guides. Use it for fur, whose hairs differ from their neighbours",
         soft=(0.0, 2.0),
         hard=(0.0, 100.0),
         shown_when=when("children.method", "multi"),

@@ -20,7 +20,7 @@ MODELS = (
 )
 
 PIGMENTS = (
-    ("color", "Colour", "Set the colour that a mass of hair shall have"),
+    ("color", "Colour", "Set the colour of a mass of hair, from which absorption follows"),
     ("melanin", "Melanin", "Set the pigments of natural hair"),
     ("absorption", "Absorption", "Set absorption directly"),
 )
