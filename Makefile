@@ -9,12 +9,12 @@ help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/\1|\2/' | \
 	    awk -F '|' '{ printf "  make %-13s %s\n", $$1, $$2 }'
 
-setup: ## make .venv from the lock file; nothing to do when it is there
+setup: ## make .venv from the lock file, unless it is up to date
 	@tools/setup
 
 STYLE = long_wavy
 
-demo: setup ## the whole way, on STYLE=bob or a groom: GROOM=x.tfx HEAD=x.obj COLLIDER=x.obj OPTIONS="..." OUT=out, all optional
+demo: setup ## the whole pipeline, on STYLE=bob or a groom: GROOM=x.tfx HEAD=x.obj COLLIDER=x.obj OPTIONS="..." OUT=out, all optional
 	$(PYTHON) tools/headless.py demo $(if $(GROOM),--groom "$(GROOM)",--style $(STYLE)) $(if $(HEAD),--head "$(HEAD)") \
 	    $(if $(COLLIDER),--collider "$(COLLIDER)") --output "$(OUT)" $(OPTIONS)
 
@@ -39,29 +39,29 @@ tests-of-a-commit: setup
 
 # In parallel: mypy keeps one processor busy, the longest tests come first, and fetching the zips'
 # wheels takes little of a processor.
-test: setup ## lint, types, and the tests that a commit has to pass and that need no window
+test: setup ## lint, types, and the tests for a commit that need no window
 	@$(PYTHON) tools/timings.py test_minutes $(MAKE) --no-print-directory -j 3 wheels lint tests-of-a-commit
 
 wheels: setup
 	@$(PYTHON) tools/fetch_wheels.py
 
-test-ui: zip ## the same in a Blender with a window, OpenGL and Vulkan; SESSIONS="session_x" for some
+test-ui: zip ## tests in a Blender with a window, on OpenGL and Vulkan; SESSIONS="session_x" for some
 	tools/window_blender install
 	$(PYTHON) tools/test_ui.py $(SESSIONS)
 
-test-all: lint zip ## everything, on both backends: before an issue is resolved
+test-all: lint zip ## all tests, on both backends: before an issue is resolved
 	$(PYTEST) $(TESTS)
 	tools/window_blender install
 	$(PYTHON) tools/test_ui.py --all
 	$(PYTHON) -m pytest -q tests/engines
 
-test-engines: setup ## exported cards drawn by Godot and by three.js, held against our own picture
+test-engines: setup ## compare exported cards, drawn by Godot and by three.js, with our own picture
 	$(PYTHON) -m pytest -q tests/engines
 
-bench: setup ## NAME=x runs bench/x.py; without a name all, short, into docs/figures.md, half an hour
+bench: setup ## NAME=x runs bench/x.py; without NAME all, short, into docs/figures.md, half an hour
 	@$(PYTHON) tools/$(if $(NAME),bench.py $(NAME),figures.py)
 
-docs: setup ## write what the documentation takes from the code
+docs: setup ## write the parts of the documentation that come from the code
 	$(PYTHON) tools/make_docs.py
 
 site: setup ## the documentation as a site in out/site, to be read from the folder or put on a server

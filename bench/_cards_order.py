@@ -2,7 +2,7 @@
 
 A pixel is wrong if its colour after the four passes is off by more than 1/255, with a random colour
 for each card and the texture's alpha (see `cards.order_check`). Figures are fractions of the pixels
-that hair covers, over VIEW_COUNT views around the head, from none of which the order was learnt.
+that hair covers, over VIEW_COUNT views around the head, none of which the order was learnt from.
 Times are processor times, as other programs may run.
 """
 

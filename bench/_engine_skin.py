@@ -1,7 +1,7 @@
 """The soft shadow on Sintel's head: its difference across UV seams, and its cost.
 
 The sheet out/skin_sheet.png: the UV-space map before and after light has spread along the skin;
-below them the forehead with the plain comparison of depths, and with the soft shadow.
+below them the forehead with the plain shadow, and with the soft one.
 """
 
 from __future__ import annotations

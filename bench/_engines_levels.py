@@ -8,7 +8,7 @@ mean over the pixels that show hair.
   are drawn, while the camera moves by a hundredth of its distance per picture; only the levels
   change, the camera's own motion is left out.
 - levels_at_once_flip: difference of one level from the next, without cross-fade.
-- levels_moved_flip: what the camera's own motion by a hundredth changes, with one level.
+- levels_moved_flip: difference by the camera's own motion by a hundredth, with one level.
 - levels_light_percent, levels_area_percent: largest relative difference of the next level in
   brightness, and in the area that it covers.
 

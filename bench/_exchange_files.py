@@ -83,8 +83,8 @@ def _fuzzed(kind: str, count: int) -> dict[str, Any]:
 
 
 def kill_figures(trials: int) -> dict[str, float]:
-    """Kills, files that were neither old nor new, kills that left something half-written, sets of
-    old and new files, and what still lay there after one write more.
+    """Numbers of kills, of files that were neither old nor new, of kills amid a write, of sets of
+    old and new files, and of files that were left after one more write (see `kill_writes.killed`).
 
     Args:
         trials: kills of the writer of each format.

@@ -195,9 +195,9 @@ def judged(
 
     Args:
         places: paths, of which a message must name one.
-        there: what is in the folder after the run.
-        error: what the run has raised.
-        is_second: whether another writer may have come last, so that its result is shown.
+        there: the files in the folder after the run.
+        error: the exception that the run has raised, if any.
+        is_second: whether another writer may have written last, so that its result is there.
     """
     kept = {
         name: content

@@ -83,7 +83,7 @@ class Way:
 @dataclass(frozen=True)
 class RandomRun:
     """Guides (guide_count, cv_count, 3) at rest on a head, the room of their curls (see `start`),
-    and all that acts on them."""
+    and everything that acts on them."""
 
     grid: np.ndarray
     settings: DynamicsSettings

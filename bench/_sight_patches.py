@@ -1,7 +1,7 @@
 """Patches of standing, leaning or lying blond strands on black ground under one sun, beside Cycles.
 
-Cycles renders the same picture with few and with many bounces, which shows how many strands light
-meets before it reaches the eye. Means are taken over the middle of a patch, so that only light
+Cycles renders the same picture with few and with many bounces, which shows how many strands scatter
+light before it reaches the eye. Means are taken over the middle of a patch, so that only light
 among strands counts: no outline, no head, no hairstyle.
 """
 

@@ -7,7 +7,7 @@ distances from the mesh's triangles, of points inside the mesh that are outside 
 if the hair's median length were 25 cm: grooms come in any unit. So are jumps: changes, from one
 frame to the next, in the displacement that leading out adds to where strands ride. A jump is a flip
 if it exceeds the same limit within one of 16 parts of the way between the two frames; otherwise the
-motion is steady. It is a flip of leading out if where the strand rides does not jump in that part.
+motion is steady. It is a flip of leading out if the ridden strand does not jump in that part.
 
 Cards of Sintel's hair that ride on the guides in the demo's shake: how deep vertices are that are
 outside at rest, and how many cards have any deeper than a millimetre; how much deeper the others

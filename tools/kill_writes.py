@@ -117,7 +117,7 @@ def killed(
 
 
 def _content(folder: Path) -> dict[str, bytes]:
-    """The visible files of a folder; Alembic files, which hold a date, by size and end."""
+    """The visible files of a folder; of Alembic files, which hold a date, size and completeness."""
     files = [path for path in folder.iterdir() if not path.name.startswith(".")]
     return {
         path.name: repr((path.stat().st_size, is_finished(path))).encode()

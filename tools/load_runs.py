@@ -1,4 +1,4 @@
-"""Runs what a commit has to pass, again and again, beside processes that keep the machine busy.
+"""Runs the checks for a commit again and again, beside processes that keep the machine busy.
 
 python tools/load_runs.py [RUNS] [BUSY]      ten runs beside two processes
 
@@ -21,7 +21,7 @@ BUSY = "while True: pass"
 
 
 class Run(TypedDict):
-    """One run: of which commit, when it ended, for how long, and its exit code."""
+    """One run: its commit, date of its end, duration, and exit code."""
 
     commit: str
     date: str
@@ -30,7 +30,7 @@ class Run(TypedDict):
 
 
 def kept() -> list[Run]:
-    """All runs that were made, the last at the end."""
+    """All runs so far, the last at the end."""
     found: list[Run] = json.loads(FILE.read_text()) if FILE.is_file() else []
     return found
 

@@ -1,10 +1,10 @@
-"""Makes what comes from the code: tables of parameters and verbs, the figure of the flows, the
-texts to translate, the page of the gallery, the table of hairstyles, the index of the decisions,
-the shading of cards in HLSL, the figures that pages quote, the pictures.
+"""Makes the documentation's parts that come from the code: tables of parameters and verbs, the
+figure of the flows, the texts to translate, the page of the gallery, the table of hairstyles, the
+index of the decisions, the shading of cards in HLSL, the figures that pages quote, the pictures.
 
 python tools/make_docs.py [--check | --pictures]
 
---check fails when docs/parameters.md is not what the code would write; --pictures also runs the
+--check fails if docs/parameters.md is not up to date with the code; --pictures also runs the
 demo, keeps its pictures in docs/images, and draws those of docs/refinement.md,
 docs/shading.md and docs/engine.md with the thumbnails of the presets. `make gallery` draws those of
 docs/gallery.md.

@@ -3,7 +3,7 @@
 python tools/make_styles.py [NAME ...]                write hairstyles/NAME.json and NAME.npz
 python tools/make_styles.py --pictures FOLDER [NAME ...]   then draw each from four sides, and its
                                                            thumbnail, hairstyles/NAME.png
-python tools/make_styles.py --draw-only --pictures FOLDER [NAME ...]   draw what there is
+python tools/make_styles.py --draw-only --pictures FOLDER [NAME ...]   draw existing ones
 
 The recipes are in tools/style_recipes.py, what they grow with in tools/style_growth.py.
 """

@@ -163,8 +163,7 @@ def parted_in_cells(head: Head, width: float) -> Cells:
 
 
 def _joined(cells: Cells) -> Cells:
-    """Cells, of which those with few guides are joined to the cell beside them; numbers have no
-    gaps."""
+    """Cells with few guides joined to the cell beside them, and renumbered without gaps."""
     cell, section, place = cells.cell.copy(), cells.section.copy(), cells.roots.place
     size = np.bincount(cell)
     is_small = size < 0.5 * np.median(size[size > 0])

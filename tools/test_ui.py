@@ -1,6 +1,6 @@
 """Tests Hairloom in a Blender that has a window, on OpenGL and on Vulkan.
 
-python tools/test_ui.py                 what a commit has to pass
+python tools/test_ui.py                 the checks for a commit
 python tools/test_ui.py --all           everything, on both backends
 python tools/test_ui.py SESSION ...     only these window sessions, on both backends
 
