@@ -1,4 +1,4 @@
-"""For how long long jobs in the window neither report progress nor let keys be handled.
+"""The longest time for which jobs in the window neither report progress nor handle keys.
 
 Measured is the longest time for which a job keeps Blender's main thread: until its first report of
 progress, and from one report to the next. Drawing is left out.
