@@ -1,4 +1,4 @@
-"""Curves along the strand: through their values, smooth, and never outside of them."""
+"""Curves along the strand: through their values, smooth, and within their range."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def test_it_goes_through_its_values(curve: tuple[float, ...]) -> None:
 
 @pytest.mark.parametrize("curve", CURVES)
 def test_it_is_monotone_between_two_values(curve: tuple[float, ...]) -> None:
-    """So it never leaves their range either (Fritsch and Carlson 1980)."""
+    """So it stays within their range as well (Fritsch and Carlson 1980)."""
     for (left, right), (one, other) in zip(pairwise(PLACES), pairwise(curve), strict=True):
         piece = along(curve, np.linspace(left, right, 1001))
         steps = np.diff(piece) * np.sign(other - one)
@@ -37,7 +37,7 @@ def test_it_is_monotone_between_two_values(curve: tuple[float, ...]) -> None:
 
 @pytest.mark.parametrize("curve", CURVES)
 def test_its_slope_has_no_jumps(curve: tuple[float, ...]) -> None:
-    """Between slopes a step of 1/4000 apart; a jump would not shrink with the step."""
+    """Slopes that are 1/4000 apart differ little; a jump would not shrink with the step."""
     slope = np.diff(along(curve, EVERYWHERE)) * 4000.0
     assert np.abs(np.diff(slope)).max() < 0.04
 

@@ -1,4 +1,4 @@
-"""The table of the docs: one row a parameter, in the artist's units."""
+"""The table of the docs: one row per parameter, in the artist's units."""
 
 from __future__ import annotations
 
@@ -39,7 +39,8 @@ def test_angles_are_shown_in_degrees() -> None:
 
 @pytest.mark.parametrize("kind", ALL_SETTINGS.values(), ids=ALL_SETTINGS)
 def test_what_the_table_allows_as_code_is_taken(kind: type[Settings]) -> None:
-    """Of a choice all that there is, and the default among it."""
+    """A setting accepts all values that its row shows as code, the default among them; a choice
+    shows all."""
     rows = [line for line in table(kind).splitlines() if line.startswith("| **")]
     for row, parameter in zip(rows, kind.parameters(), strict=True):
         default, allowed = (re.findall("`(.+?)`", row.split("|")[cell]) for cell in (2, 4))
@@ -71,7 +72,8 @@ def test_a_factor_without_those_limits_is_not_called_one_from_0_to_1() -> None:
 
 @pytest.mark.parametrize("kind", ALL_SETTINGS.values(), ids=ALL_SETTINGS)
 def test_what_an_artist_reads_stands_alone_and_is_in_round_degrees(kind: type[Settings]) -> None:
-    """A tooltip shows neither its neighbours nor what the code calls a point of a strand."""
+    """A tooltip appears without its neighbours, so it must not refer to them ("The same"), and
+    avoids the term CV."""
     for parameter in kind.parameters():
         assert not parameter.description.startswith("The same"), parameter.name
         assert "CV" not in parameter.description, parameter.name

@@ -1,4 +1,4 @@
-"""Parameters: checked when made, named in errors, and declared in full everywhere."""
+"""Parameters: validated when created, named in errors, and declared completely."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ def _all_parameters() -> list[tuple[type[Settings], Parameter]]:
 
 
 def test_the_table_of_parameter_sets_is_complete() -> None:
-    """All but the bases that sets share, which name no section."""
+    """It has all sets except shared base classes, which have no section."""
     assert {kind.__qualname__ for kind in _all_settings() if kind.section} == {
         kind.__qualname__ for kind in ALL_SETTINGS.values()
     }

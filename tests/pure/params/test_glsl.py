@@ -1,4 +1,4 @@
-"""std140 by the letter of the specification, against what `params.glsl` writes."""
+"""The layout that `params.glsl` writes, against the std140 rules of the specification."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ALIGNMENT = {"float": (4, 4), "int": (4, 4), "vec3": (16, 12)}
 
 @dataclass(frozen=True, kw_only=True)
 class Mixed(Settings):
-    """Every case of the layout: a vec3 at a boundary, behind one, two and three scalars."""
+    """Every case of the layout: a vec3 at a boundary, and after one, two and three scalars."""
 
     section: ClassVar[str] = "mixed"
     title: ClassVar[str] = "Mixed"
@@ -34,7 +34,7 @@ class Mixed(Settings):
 
 
 def members(settings: type[Settings]) -> list[tuple[str, str]]:
-    """(type, name) of each member, read from the GLSL text itself."""
+    """(type, name) of each member, parsed from the GLSL text."""
     lines = struct_source(settings, "Block").splitlines()
     assert lines[0] == "struct Block {"
     assert lines[-1] == "};"
@@ -42,7 +42,7 @@ def members(settings: type[Settings]) -> list[tuple[str, str]]:
 
 
 def offsets(settings: type[Settings]) -> tuple[list[int], int]:
-    """Offset of each member and the size of the struct, by the rules alone."""
+    """Offset of each member and size of the struct, by the rules of std140."""
     end, found = 0, []
     for kind, _ in members(settings):
         alignment, size = ALIGNMENT[kind]
@@ -88,7 +88,7 @@ STRUCTS = {name: kind for name, kind in ALL_SETTINGS.items() if not has_curves(k
 
 
 def test_a_set_with_curves_is_no_struct() -> None:
-    """std140 has no place for them, and nothing is dropped in silence."""
+    """Curves have no layout here and raise an error instead of being dropped silently."""
     assert "dynamics" not in STRUCTS
     for write in (lambda kind: struct_source(kind, "Block"), lambda kind: struct_values(kind())):
         with pytest.raises(AssertionError, match=r"dynamics: .*style_along"):

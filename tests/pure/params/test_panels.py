@@ -1,4 +1,4 @@
-"""Where and when parameters are drawn stands in their declarations, and names what there is."""
+"""The panels and conditions in parameter declarations name existing panels and settings."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def test_conditions_ask_for_values_or_for_what_is_not_0() -> None:
 
 
 def variants(changed: str) -> list[SimpleNamespace]:
-    """The defaults, and these with each switch, choice or number of this section set otherwise."""
+    """The defaults, and the defaults with one switch, choice or number of this section changed."""
     found = [DEFAULTS]
     for parameter in ALL_SETTINGS[changed].parameters():
         others: tuple[object, ...] = tuple(name for name, _, _ in parameter.choices)

@@ -1,4 +1,4 @@
-"""Presets: they come back as saved, and errors name file, value and remedy."""
+"""Presets: they are read as saved, and errors name file, value and remedy."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def test_bytes_that_are_no_text_and_a_missing_file_are_refused(tmp_path: Path) -
 def test_older_versions_go_up_one_step_at_a_time(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Version n - 2 called the length "size", version n - 1 counted it in centimetres."""
+    """Version n - 2 names the length "size", version n - 1 stores it in centimetres."""
 
     def renamed(data: dict[str, Any]) -> dict[str, Any]:
         return data | {"values": {"length_cm": data["values"]["size"]}}

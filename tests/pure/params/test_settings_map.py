@@ -1,4 +1,4 @@
-"""The map of settings: typed by class, equal by what it says."""
+"""The map of settings: typed by class, equal by content."""
 
 from __future__ import annotations
 

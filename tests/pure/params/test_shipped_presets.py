@@ -1,4 +1,4 @@
-"""Every preset that ships is checked by the same reader that an artist's files pass."""
+"""Every shipped preset is checked with the reader for artists' files."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def test_presets_ship() -> None:
 
 
 def test_the_quick_start_shows_each_preset_above_its_name() -> None:
-    """But looks and stages, which have sheets of their own."""
+    """Except looks and stages, which have their own sheets."""
     page = (FOLDER.parent / "docs" / "quick_start.md").read_text(encoding="utf-8")
     rows = [line.strip("| ").split(" | ") for line in page.splitlines() if line.startswith("|")]
     named: dict[str, str] = {}
@@ -87,7 +87,8 @@ def test_what_a_preset_brings_along_is_checked(tmp_path: Path, also: object) -> 
 
 
 def test_the_strengths_and_widths_of_the_looks_are_those_of_their_page() -> None:
-    """Other strengths than 1, of each look or of all others that are as lit hair is."""
+    """docs/shading.md lists all strengths other than 1, for single looks or for all natural
+    ones."""
     page = (FOLDER.parent / "docs" / "shading.md").read_text(encoding="utf-8")
     said: dict[str, dict[str, float]] = {}
     rows = re.findall(r"^\| ([a-z ]+) \| ((?:R|TRT) [^|]+)\|", page, flags=re.M)

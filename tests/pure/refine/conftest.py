@@ -1,4 +1,4 @@
-"""The exact curve in the picture, by brute force, and how far a drawn line is from it."""
+"""The exact curve in the picture, by brute force, and the error of drawn lines."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def distance_to_line(points: Floats, corners: Floats) -> Floats:
 
 
 def drawn_error(coefficients: Floats, pieces: int, view: PictureView) -> float:
-    """How far the exact curve is from `pieces` straight pieces of it, at most [pixels]."""
+    """Largest distance [pixels] of the exact curve from its drawing in straight `pieces`."""
     exact, _ = seen(curve(coefficients, np.linspace(0.0, 1.0, SAMPLES)), view)
     corners, _ = seen(curve(coefficients, np.arange(pieces + 1) / pieces), view)
     return float(distance_to_line(exact, corners).max())

@@ -1,4 +1,4 @@
-"""Culling: what is left out is nowhere to be seen, by rays; balls lie inside a real head."""
+"""Culling: rays prove that culled strands are invisible; balls lie inside a real head."""
 
 from __future__ import annotations
 
@@ -50,7 +50,8 @@ def seen_past(points: Floats, ball: Floats, eye: Floats) -> np.ndarray:
 def test_nothing_of_a_hidden_strand_is_seen(
     exact: Any, name: str, eye: tuple[float, float, float]
 ) -> None:
-    """2,000 points of each curve's exact segments, and the edges of what is drawn, meet a ball."""
+    """Rays to the eye meet a ball, from many points of each exact curve and of the drawn line's
+    edges."""
     view = look_at(eye, (0.0, 0.1, 0.0))
     picture = PictureView(view, PROJECTIONS[name], WIDTH, HEIGHT)
     random = np.random.default_rng(len(name))
@@ -61,7 +62,7 @@ def test_nothing_of_a_hidden_strand_is_seen(
     shades = shades_of(BALLS, picture, HALF_WIDTH, RADIUS)
     is_hidden = hidden(points, shades)
     assert 40 < is_hidden.sum() < 3500
-    # those that a little less of a ball would not hide
+    # those that slightly smaller balls would not hide
     is_close = is_hidden & ~hidden(points, shades_of(BALLS, picture, 5.0 * HALF_WIDTH, RADIUS))
     assert is_close.sum() > 20
     homogeneous = Camera(view, picture.projection).eye
@@ -81,13 +82,14 @@ def test_nothing_of_a_hidden_strand_is_seen(
 
 @pytest.mark.parametrize("name", PROJECTIONS)
 def test_what_is_behind_a_ball_is_found(name: str) -> None:
-    """Short strands just inside the region are hidden, just outside and before it not."""
+    """Short strands just inside the hidden region are hidden, those just outside or before it are
+    not."""
     picture = PictureView(look_at((0, -3, 0), (0, 0, 0)), PROJECTIONS[name], WIDTH, HEIGHT)
     shades = shades_of(BALLS[:1], picture, 0.5, 0.0)
     places = np.array([[0, 0.6, 0], [0.4, 0.5, 0], [0, -0.6, 0], [0.9, 0.6, 0], [0, -4.0, 0]])
     points = places[:, None] + np.linspace(0.0, 0.02, 4)[:, None] * [0.0, 1.0, 0.0]
     assert hidden(points, shades).tolist() == [True, True, False, False, False]
-    # one CV that looks out is enough to be drawn
+    # one visible CV is enough for a strand to be drawn
     out = points[:1].copy()
     out[0, 3] = [1.5, 0.7, 0.0]
     assert not hidden(out, shades).any()
@@ -116,13 +118,13 @@ def test_roots_on_the_far_side_face_away() -> None:
     roots = np.array([[0, -1, 0], [0, 1, 0], [1, 0.1, 0], [1, -0.4, 0]], float)
     center = np.zeros(3)
     assert faces_away(roots, center, np.array([0, -1.0, 0, 0])).tolist() == [0, 1, 1, 0]
-    # from near one sees less of a ball
+    # from near, less of a ball is visible
     assert faces_away(roots, center, np.array([0, -2.0, 0, 1])).tolist() == [0, 1, 1, 1]
 
 
 @pytest.fixture(scope="module")
 def sintel(shared_data: Path) -> tuple[Surface, Floats]:
-    """The body with its holes, Z up, and the roots of its hair."""
+    """The body, which has holes, Z up, and the roots of its hair."""
     folder = shared_data / "sintel"
     vertices, triangles = [], []
     for line in (folder / "sintel.obj").read_text().splitlines():
@@ -159,7 +161,7 @@ def test_balls_lie_inside_a_real_head_that_has_holes(
 
 
 def test_a_cup_hides_no_more_than_when_it_is_closed() -> None:
-    """Of an open half ball: no ball stands out of its opening."""
+    """The balls of an open half ball do not stick out of its opening."""
     theta, phi = np.meshgrid(np.linspace(0.0, np.pi / 2, 9), np.arange(24) * np.pi / 12)
     rings = np.stack(
         [np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1

@@ -1,4 +1,4 @@
-"""Strands of curled guides that are drawn out: thinner coils of the same length."""
+"""Strands of curled guides that are stretched: thinner coils of the same length."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ STILL = Pose(None, np.eye(4))
 
 
 def coils(count: int = 3, straight: int = 0) -> Rig:
-    """Side by side, down along -Z, each a guide; the last ones are straight."""
+    """Coils side by side along -Z, each a guide; the last `straight` ones are straight."""
     along = np.linspace(0.0, 1.0, POINTS)
     angle = 2.0 * np.pi * TURNS * along
     radius = np.where(np.arange(count)[:, None] < count - straight, RADIUS, 0.0)
@@ -29,14 +29,14 @@ def coils(count: int = 3, straight: int = 0) -> Rig:
 
 
 def on_its_axis(rig: Rig) -> Rig:
-    """With guides that are straight to the last bit."""
+    """A rig with exactly straight guides."""
     line = rig.guide_grid.copy()
     line[..., :2] = line[:, :1, :2]
     return Rig(rig.strands, None, rig.guides, line, rig.weights, None)
 
 
 def drawn(rig: Rig, factor: float) -> np.ndarray:
-    """Guides that are as much longer along Z, all of them but their root segments."""
+    """Guides stretched by a factor, all segments but the first."""
     guides = rig.guide_grid.astype(np.float64)
     way = np.diff(guides, axis=1)
     way[:, 1:] *= factor
@@ -51,7 +51,7 @@ def segments(rig: Rig, points: np.ndarray) -> np.ndarray:
 
 
 def radius_of(rig: Rig, points: np.ndarray) -> float:
-    """Of the middle turns, by their mean distance from the first coil's axis."""
+    """The radius of the first coil's middle turns, as the mean distance from its axis."""
     grid = points[: rig.strands.point_counts[0]].astype(np.float64)
     some = grid[len(grid) // 4 : -len(grid) // 4, :2]
     return float(np.linalg.norm(some - some.mean(axis=0), axis=1).mean())
@@ -128,7 +128,7 @@ def test_what_is_seen_is_continuous_and_then_all() -> None:
 
 
 def test_straight_hair_among_curls_stays_straight_however_short_these_get() -> None:
-    """It leans by a hundredth; were it pushed together as a curl is, it would zigzag."""
+    """It leans by a hundredth; if it were compressed like a curl, it would zigzag."""
     lean = np.float32([[0.01, -0.01], [0.0, 0.0], [1.0, 1.0]])
     for extension in (-0.3, 0.4):
         axis = np.float32([[0.0, 0.0], [0.0, 0.0], [1.0, 1.0], [extension, extension]])

@@ -1,4 +1,4 @@
-"""Detail factors: the error bound by brute force, what is outside, the ragged points, the modes."""
+"""Detail factors: the error bound by brute force, segments outside, ragged points, the modes."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ WIDTH, HEIGHT = 960, 720
 
 
 def shifted(projection: Floats, x: float, y: float) -> Floats:
-    """The same with the middle of the picture elsewhere, as a lens that is shifted."""
+    """The same projection with a lens shift."""
     result = projection.copy()
     result[0, 2], result[1, 2] = x, y
     return result
@@ -42,7 +42,8 @@ PROJECTIONS = {
 
 
 def wandering(random: np.random.Generator, projection: Floats, count: int) -> Floats:
-    """Strands of six CVs in view space, all about the picture, from far to through the eye."""
+    """Strands of six CVs in view space, in and around the picture, from far away to behind the
+    eye."""
     depth = np.exp(random.uniform(np.log(0.05), np.log(5.0), (count, 1)))
     if projection[3, 3] == 1.0:
         depth = np.ones_like(depth)
@@ -54,7 +55,7 @@ def wandering(random: np.random.Generator, projection: Floats, count: int) -> Fl
 
 
 def cusps(random: np.random.Generator, projection: Floats, count: int) -> Floats:
-    """There and back again, over CVs that lie in one place."""
+    """Strands that turn back on themselves, with coincident CVs."""
     strands = wandering(random, projection, count)
     strands[:, 2] = strands[:, 0]
     strands[:, 4:] = strands[:, 3:4]
@@ -63,7 +64,7 @@ def cusps(random: np.random.Generator, projection: Floats, count: int) -> Floats
 
 
 def receding(random: np.random.Generator, projection: Floats, count: int) -> Floats:
-    """Nearly along the line of sight, where perspective bends what is straight in speed."""
+    """Strands almost along the line of sight, where perspective makes the speed uneven."""
     strands = wandering(random, projection, count)
     along = random.uniform(1.0, 8.0, (count, 1)) * np.linspace(0.0, 1.0, 6) ** 2
     near = strands[:, 0] * 0.1
@@ -71,7 +72,8 @@ def receding(random: np.random.Generator, projection: Floats, count: int) -> Flo
 
 
 def bows(random: np.random.Generator, projection: Floats, count: int) -> Floats:
-    """Parabolas that leave their chords by about half a pixel: one piece is just enough."""
+    """Parabolas that deviate from their chords by about half a pixel, so that one piece is just
+    enough."""
     strands = wandering(random, projection, count)
     start, way = strands[:, :1], strands[:, 1:2] - strands[:, :1]
     distance = 1.0 if projection[3, 3] == 1.0 else -start[:, :, 2:]
@@ -116,7 +118,7 @@ def test_the_line_is_everywhere_within_the_error_of_the_exact_curve(
         for strand, pieces in zip(points, factors, strict=True):
             for coefficients, n in zip(exact.power_basis(strand), pieces, strict=True):
                 if n == MOST:
-                    continue  # no promise there
+                    continue  # the bound does not hold at the maximum
                 curve = exact.curve(coefficients, np.linspace(0.0, 1.0, exact.SAMPLES))
                 _, clip = exact.seen(curve, view)
                 is_seen = (np.abs(clip[:, :3]) <= clip[:, 3:]).all(axis=1)
@@ -129,7 +131,8 @@ def test_the_line_is_everywhere_within_the_error_of_the_exact_curve(
 
 
 def test_a_segment_in_sight_never_counts_as_outside(exact: Any) -> None:
-    """What is one piece because it is outside: no sample of curve or chord is in the picture."""
+    """Segments that get one piece for being outside have no sample of curve or chord in the
+    picture."""
     random = np.random.default_rng(5)
     for projection in PROJECTIONS.values():
         view = PictureView(look_at((0.0, -1.0, 0.3), (0, 0, 0)), projection, WIDTH, HEIGHT)
@@ -148,7 +151,7 @@ def test_a_segment_in_sight_never_counts_as_outside(exact: Any) -> None:
 
 
 def wide(view: PictureView) -> PictureView:
-    """A picture as sharp as this one and 50 times as large, with planes far from everything."""
+    """A picture of the same resolution per angle, 50 times as large, with distant clip planes."""
     projection = view.projection.copy()
     projection[:2] /= 50.0
     if projection[3, 3] == 0.0:
@@ -160,7 +163,8 @@ def wide(view: PictureView) -> PictureView:
 
 
 def test_factors_are_hardly_more_than_what_the_error_needs(exact: Any, shared_data: Path) -> None:
-    """On a real groom, the whole head in view: 1.06 times the least, found by trying all."""
+    """Against the least factors, by brute force, on a real groom with the whole head in view; the
+    measured ratio is 1.06."""
     path = shared_data / "sintel" / "SintelHairOriginal-sintel_hair.16points.tfx"
     grid = read_tfx(path).strands.grid
     bounds = grid.min(axis=(0, 1)), grid.max(axis=(0, 1))
@@ -191,7 +195,7 @@ def least_pieces(
 
 @pytest.mark.parametrize("mode", ["adaptive", "heuristic", "fixed"])
 def test_nothing_depends_on_what_else_is_there(mode: str) -> None:
-    """More strands than a chunk, none at all, two CVs."""
+    """A strand's factors are the same alone; for more strands than a chunk, none, and two CVs."""
     random = np.random.default_rng(8)
     view = PictureView(look_at((0, -3, 0), (0, 0, 0)), PROJECTIONS["usual"], WIDTH, HEIGHT)
     points = np.cumsum(random.normal(0.0, 0.1, (2500, 5, 3)), axis=1).astype(np.float32)
@@ -215,14 +219,15 @@ def test_fixed_takes_the_same_everywhere_whatever_other_modes_may_take() -> None
 
 
 def test_the_heuristic_counts_pixels_and_the_larger_angle() -> None:
-    """Against numbers by hand: 1 m is 100 pixels; pieces of 10.5 pixels where it bends enough."""
+    """Against hand-computed numbers: 1 m is 100 pixels, with pieces of 10.5 pixels where strands
+    bend enough."""
     projection = orthographic(7.2, ASPECT, -10.0, 10.0)
     view = PictureView(np.eye(4), projection, WIDTH, HEIGHT)
     turn = np.deg2rad([0.0, 0.0, 30.0, 100.0, 100.0])
     way = np.stack([np.cos(turn), np.sin(turn), np.zeros(5)], axis=1)
     points = np.vstack([np.zeros(3), np.cumsum(way, axis=0)])[None].astype(np.float32)
     factors = detail_factors(points, view, DetailSettings(mode="heuristic", piece_length=10.5))
-    # angles beside each segment: 0, 30; 30, 70; 70, 0 degrees; 45 count as all
+    # angles at the segments' ends: 0, 30; 30, 70; 70, 0 degrees; from 45 on, factors are whole
     assert factors.tolist() == [[1, 7, 10, 10, 1]]
 
 

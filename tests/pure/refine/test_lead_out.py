@@ -1,4 +1,4 @@
-"""Strands led out of colliders: solids whose distance is known, lengths, and what stays."""
+"""Strands led out of colliders: distances to known solids, lengths, and unaffected strands."""
 
 from __future__ import annotations
 
@@ -41,12 +41,13 @@ def still(collider: Collider, *shift: float) -> tuple[PosedCollider, ...]:
 
 
 def at(places: np.ndarray) -> Carry:
-    """Roots carry points there."""
+    """A `Carry` that returns these places for all points."""
     return lambda index, strands: places[index]
 
 
 def lines(begin: np.ndarray, end: np.ndarray, counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Straight strands (n, 3) to (n, 3) of any point counts, and their offsets."""
+    """Straight strands from `begin` (n, 3) to `end` (n, 3) with these point counts, and their
+    offsets."""
     points = [
         one + np.linspace(0.0, 1.0, count)[:, None] * (other - one)
         for one, other, count in zip(begin, end, counts, strict=True)
@@ -85,7 +86,7 @@ def test_strands_go_around_a_ball_and_keep_their_segments(across) -> None:
 
 
 def test_what_comes_after_goes_along_in_its_shape() -> None:
-    """A strand that only its second point brings near."""
+    """Only the second point of the strand is too near; the rest moves along in its shape."""
     points = np.array([[0, 0, 0.102], [0.05, 0, 0.08], [0.1, 0.02, 0.1], [0.12, 0, 0.15]])
     points = points.astype(np.float32)
     now, offsets = points.copy(), np.array([0, 4])
@@ -111,7 +112,7 @@ def test_what_was_inside_may_stay_as_deep_and_no_deeper(across) -> None:
 
 
 def test_what_was_inside_comes_out_as_it_moves_away() -> None:
-    """It began 2 mm deep, and has swung aside by 1.5 mm, and by 20 mm."""
+    """A strand 2 mm deep at rest that swings aside by 1.5 mm, and by 20 mm."""
     points = np.array([[0, 0, 0.1], [0, 0.01, 0.0975], [0, 0.02, 0.096]], np.float32)
     offsets, colliders = np.array([0, 3]), still(BALL)
     clearance = clearance_at(points, offsets, colliders, KEPT)
@@ -127,7 +128,7 @@ def test_what_was_inside_comes_out_as_it_moves_away() -> None:
 
 
 def test_a_fold_from_which_no_segment_leads_out() -> None:
-    """A bowl of balls: a strand that dives in is led past its rim."""
+    """In a bowl of balls, a strand that dives in is led out past its rim."""
     angle = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
     rings = [
         np.stack([r * np.cos(angle), r * np.sin(angle), np.full(24, height)], axis=1)
@@ -177,7 +178,7 @@ def test_led_strands_are_put_where_they_were(across) -> None:
 
 
 def test_a_strand_between_guides_that_part_goes_around() -> None:
-    """A ball rises between two guides; the strand half way would go through it."""
+    """A ball rises between two guides; the strand halfway between them would pass through it."""
     along = np.linspace(0.0, 0.3, 16)
     grid = np.zeros((3, 16, 3))
     grid[..., 1] = -along
@@ -216,7 +217,8 @@ def test_a_strand_between_guides_that_part_goes_around() -> None:
 
 
 def test_hair_beside_a_sheet_that_its_grid_makes_thicker_stays_on_its_side() -> None:
-    """A sheet of 3 mm, turned, in cells of 9 mm: what lies 2 mm beside it lies in the grid."""
+    """A turned sheet of 3 mm in cells of 9 mm: its distance field has hair 2 mm beside it
+    inside."""
     corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
     quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     triangles = [t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))]
@@ -248,7 +250,7 @@ def test_hair_beside_a_sheet_that_its_grid_makes_thicker_stays_on_its_side() -> 
 
 
 def test_a_strand_that_nothing_leads_out_is_as_its_root_carries_it() -> None:
-    """It rides into a ball of balls that close around its root."""
+    """It rides into a shell of balls that encloses its root."""
     random = np.random.default_rng(3)
     centers = random.normal(size=(400, 3))
     centers *= 0.05 / np.linalg.norm(centers, axis=1, keepdims=True)
@@ -262,7 +264,7 @@ def test_a_strand_that_nothing_leads_out_is_as_its_root_carries_it() -> None:
 
 
 def dives(tilt: float) -> np.ndarray:
-    """Down into the ball from above, nearly straight."""
+    """A strand straight down into the ball from above, with a slight tilt along x."""
     along = np.linspace(0.0, 0.15, 12)[:, None]
     return (np.array([0.0, 0.0, 0.12]) + along * [tilt, 0.0, -1.0]).astype(np.float32)
 
@@ -272,7 +274,7 @@ def test_a_strand_that_could_go_either_way_goes_where_it_went_before() -> None:
     clearance = clearance_at(rest + 1.0, offsets, colliders, KEPT)
 
     def led(tilts: list[float], *, remembers: bool) -> np.ndarray:
-        """The tip, frame by frame."""
+        """The tip in each frame."""
         tips, leans = [], NO_LEANS
         for tilt in tilts:
             now = dives(tilt)

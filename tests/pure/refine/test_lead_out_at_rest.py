@@ -1,4 +1,4 @@
-"""Children at rest: none goes through the head, which is a ball here, so that depths are known."""
+"""Children at rest: none passes through the head, here a ball, so that depths are known."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def parted() -> StrandSet:
 
 
 def strand_set(grid: np.ndarray) -> StrandSet:
-    """Of points (n, cv_count, 3)."""
+    """Strands with these points (n, cv_count, 3)."""
     count, cv_count, _ = grid.shape
     return StrandSet(
         points=grid.reshape(-1, 3),
@@ -75,7 +75,7 @@ def made(ball: Surface, field: DistanceField | None) -> Rig:
 
 
 def depth(strands: StrandSet) -> np.ndarray:
-    """How deep each is in the ball at most [m]."""
+    """The greatest depth of each strand in the ball [m]."""
     away = np.linalg.norm(strands.points.astype(float), axis=1)
     return RADIUS - np.minimum.reduceat(away, strands.offsets[:-1])
 
@@ -92,7 +92,7 @@ def test_children_that_went_through_the_head_go_around_it(
     kept = DynamicsSettings().radius_root * float(np.median(after.strands.lengths()))
     assert found[own:].max() < DEEP * 1.1 * kept
     assert after.child_count > 0.9 * before.child_count
-    # what the artist drew is as it was
+    # the artist's strands are unchanged
     first = slice(0, int(after.strands.offsets[own]))
     np.testing.assert_array_equal(after.strands.points[first], before.strands.points[first])
     assert len(after.weights.guide) == after.strands.strand_count

@@ -1,4 +1,4 @@
-"""Riding on guides: against the rotations written out one by one, exact where it can be."""
+"""Riding on guides: against explicit rotation matrices, and exact where possible."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def set_of(points: Floats, offsets: Ints) -> StrandSet:
 
 
 def rode(rest: Floats, weights: GuideWeights, guides: Floats, now: Floats) -> Floats:
-    """Strands of one CV count, (strand_count, cv_count, 3)."""
+    """`ride` for strands with the same number of CVs, (strand_count, cv_count, 3)."""
     offsets = np.arange(len(rest) + 1) * rest.shape[1]
     riders = Riders.of(set_of(rest.reshape(-1, 3), offsets), guides, weights)
     return ride(rest.reshape(-1, 3), riders, guides, now).reshape(rest.shape)
@@ -55,7 +55,7 @@ def lengths(grid: Floats) -> Floats:
 
 
 def turning(one: Any, other: Any) -> Floats:
-    """The least rotation matrix from one vector to another."""
+    """The smallest rotation from one vector to another, as a matrix."""
     one, other = one / np.linalg.norm(one), other / np.linalg.norm(other)
     cross, cosine = np.cross(one, other), one @ other
     skew = np.array([[0, -cross[2], cross[1]], [cross[2], 0, -cross[0]], [-cross[1], cross[0], 0]])
@@ -63,7 +63,7 @@ def turning(one: Any, other: Any) -> Floats:
 
 
 def quaternion(matrix: Any) -> Floats:
-    """Of a rotation by less than half a turn."""
+    """The quaternion of a rotation by less than half a turn."""
     real = 0.5 * np.sqrt(1.0 + np.trace(matrix))
     axis = [matrix[2, 1] - matrix[1, 2], matrix[0, 2] - matrix[2, 0], matrix[1, 0] - matrix[0, 1]]
     return np.array([*(np.array(axis) / (4.0 * real)), real])
@@ -81,7 +81,7 @@ def rotation(q: Any) -> Floats:
 
 
 def one_by_one(rest: Floats, weights: GuideWeights, guides: Floats, now: Floats) -> Floats:
-    """The same in plain loops, by rotation matrices in double precision."""
+    """The same as `rode` in plain loops, with rotation matrices in double precision."""
     rest, guides, now = (each.astype(np.float64) for each in (rest, guides, now))
     turns = np.empty((len(guides), guides.shape[1] - 1, 3, 3))
     for guide in range(len(guides)):
@@ -123,7 +123,7 @@ def test_agrees_with_the_rotations_one_by_one(strand_count: int, cv_count: int) 
 
 
 def test_small_turns_need_no_look_at_their_signs(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The shorter path gives the very bits of the one that looks."""
+    """For small turns, the shortcut without sign checks gives the same bits."""
     guides, rest = walks(9, 16, 2), walks(60, 16, 3)
     now = guides + np.linspace(0.0, 0.03, 16)[:, None] * np.float32([1.0, 0.5, 0.2])
     weights = random_weights(60, 9)
@@ -188,7 +188,7 @@ def coil(turns: int, cv_count: int, length: float = 0.2, radius: float = 0.008) 
 
 
 def test_a_coil_stays_this_coil_on_a_guide_that_bends_to_an_arc() -> None:
-    """Its windings lie around the arc as they lay around the straight guide."""
+    """Its windings keep their distance from the guide and the coil its length."""
     strand, bend = coil(20, 400), 0.2 / (np.pi / 2)
     coils = set_of(strand, np.array([0, 400]))
     line = center_lines(coils, 16).grid
@@ -251,8 +251,8 @@ def test_guides_that_turn_against_each_other_by_half_a_turn() -> None:
 
 
 def test_guides_that_came_to_one_direction_from_two_sides_agree() -> None:
-    """One has turned by 200 degrees, the other by 160 the other way: the same rotation. A strand
-    beside theirs rides on a guide at rest."""
+    """One has turned by 200 degrees, the other by -160, which is the same rotation. Another strand
+    rides on a guide at rest."""
     straight = walks(3, 16, 2, straying=0.0)
     now = straight.copy()
     for guide, end in enumerate((200.0, -160.0)):
@@ -268,7 +268,7 @@ def test_guides_that_came_to_one_direction_from_two_sides_agree() -> None:
 
 @pytest.mark.parametrize("strand_count", [0, 1, 700, 2500])
 def test_strands_of_any_number_of_points(strand_count: int) -> None:
-    """Each as if it were alone."""
+    """Each strand rides as it does alone."""
     guides, now = walks(20, 9, 2), walks(20, 9, 3)
     weights = random_weights(strand_count, 20)
     counts = np.random.default_rng(6).integers(2, 30, strand_count)
@@ -284,7 +284,7 @@ def test_strands_of_any_number_of_points(strand_count: int) -> None:
 
 
 def test_riding_takes_little_more_memory_than_its_result() -> None:
-    """The most that is taken at once grows with the strands, not with three times the strands."""
+    """Memory beyond the result is below 4 MB for any number of strands."""
     guides = walks(20, 7, 2)
     for strand_count in (20_000, 60_000):
         rest = walks(strand_count, 7, 3).reshape(-1, 3)

@@ -50,7 +50,7 @@ def test_segments_share_their_ends_and_tangents() -> None:
 
 
 def test_the_ends_go_straight_on() -> None:
-    """At root and tip the tangent is that of the first and last segment."""
+    """At root and tip, tangents are those of the first and last segment."""
     grid = grid_of(20, 5)
     control = bezier(grid)
     assert 3.0 * (control[:, 0, 1] - control[:, 0, 0]) == pytest.approx(

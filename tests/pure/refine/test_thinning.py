@@ -1,4 +1,4 @@
-"""Thinning: even ranks, shares and widths without jumps, coverage that stays, by brute force."""
+"""Thinning: even ranks, fractions and widths without jumps, and coverage by brute force."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from hairloom.addon.refine.thinning import (
 )
 from hairloom.addon.render.camera import look_at, orthographic, perspective
 
-#: Samples across a pixel of the coverage below.
+#: Samples across a pixel for the coverage below.
 SAMPLES = 5
 
 
 def on_a_ball(count: int, seed: int = 0) -> Floats:
-    """Random places on the upper half, denser on one side."""
+    """Random places on the upper half of a ball, denser on one side."""
     random = np.random.default_rng(seed)
     places = random.normal(size=(8 * count, 3))
     places /= np.linalg.norm(places, axis=1, keepdims=True)
@@ -47,7 +47,7 @@ def test_each_rank_is_there_once(count: int) -> None:
 
 @pytest.mark.parametrize("share", [0.5, 0.3, 0.125])
 def test_low_ranks_are_the_same_groom_but_sparser(share: float) -> None:
-    """Each patch keeps its share, far more evenly than if strands were drawn by lot."""
+    """Each patch keeps its fraction of strands, far more evenly than in random samples."""
     roots = on_a_ball(8000)
     assert len(roots) == 8000
     ranks = even_ranks(roots)
@@ -81,7 +81,7 @@ def test_all_strands_are_drawn_from_the_full_size_on() -> None:
 
 
 def test_a_strand_gets_thin_before_it_is_gone() -> None:
-    """From pixel to pixel of the groom's height no width changes by more than a tenth."""
+    """As the groom's height shrinks by a pixel, no width changes by more than a tenth."""
     ranks = np.linspace(0.0, 0.999, 500)
     settings = DetailSettings(lod_size=300.0, min_density=0.0)
     before = width_factor(ranks, drawn_fraction(310.0, settings))
@@ -100,7 +100,7 @@ def test_widths_are_made_up_as_far_as_strands_do_not_hide_each_other() -> None:
         factors = width_factor(ranks, share, widening(share, 0.0, 0.0))
         assert factors.mean() == pytest.approx(1.0, abs=1e-4)
     assert widening(WHOLE, 30.0, 0.01) == pytest.approx(1.0)
-    # many layers: less, and the less the wider strands are beside the groom
+    # many layers: less widening, and even less for strands that are wide relative to the groom
     few, many = widening(0.125, 1.0, 0.01), widening(0.125, 30.0, 0.01)
     assert 1.0 < many < few < 1.0 / 0.1
     assert widening(0.125, 30.0, 0.03) < many
@@ -157,12 +157,12 @@ def test_the_groom_covers_as_much_when_it_is_thinned(shared_data: Path, height: 
     assert drawn.mean() == pytest.approx(0.125, abs=0.001)
     full = covered(grid, np.ones(len(grid)), seen)
     assert covered(grid[drawn], factors[drawn], seen) == pytest.approx(full, rel=0.015)
-    # the width alone, made up in full, would swell the outline
+    # widths that compensate fully would swell the outline
     assert covered(grid[drawn], np.full(drawn.sum(), 1.0 / 0.11), seen) > 1.05 * full
 
 
 def covered(grid: Floats, width: Floats, view: PictureView) -> float:
-    """Pixels that ribbons of these widths [pixels] cover, by points all over them."""
+    """The number of pixels that ribbons of these widths [pixels] cover, by brute force."""
     clip = np.concatenate([grid, np.ones((*grid.shape[:2], 1))], axis=2) @ view.view_projection.T
     corners = (clip[..., :2] / clip[..., 3:] + 1.0) * view.half_size * SAMPLES
     way = np.diff(corners, axis=1)
@@ -171,7 +171,7 @@ def covered(grid: Floats, width: Floats, view: PictureView) -> float:
     picture = np.zeros((view.height * SAMPLES, view.width * SAMPLES), bool)
     steps_along = int(np.ceil(1.4 * length.max()))
     steps_across = int(np.ceil(1.4 * SAMPLES * width.max()))
-    # a point fills a sample, which is as wide as a sample
+    # a point fills a whole sample, so half a sample is left out on each side
     side = (width[:, None, None] * SAMPLES - 1.0) * across
     for along in (np.arange(steps_along) + 0.5) / steps_along:
         middle = corners[:, :-1] + along * way

@@ -1,4 +1,4 @@
-"""Cameras: the matrices against what they must do to points."""
+"""Cameras: matrices tested by the points that they project."""
 
 from __future__ import annotations
 

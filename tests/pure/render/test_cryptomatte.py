@@ -1,4 +1,4 @@
-"""Cryptomatte: hashes that others have published, and what ranks keep."""
+"""Cryptomatte: published hashes, and the content of ranks."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hairloom.addon.render.cryptomatte import Coverages, matte_bits, matte_id, m
 @pytest.mark.parametrize(
     ("key", "seed", "found"),
     [
-        # of the verification by SMHasher and its users
+        # from SMHasher's verification and its users
         (b"", 0, 0),
         (b"", 1, 0x514E28B7),
         (b"", 0xFFFFFFFF, 0x81F16F39),
@@ -32,7 +32,7 @@ def test_the_hash_is_murmur_3(key: bytes, seed: int, found: int) -> None:
 @pytest.mark.parametrize(
     ("name", "found"),
     [
-        # of the tests of the Nuke plug-in that came with the specification
+        # from the tests of the Nuke plug-in that came with the specification
         ("hello", 6.0705627102400005616e-17),
         ("равнина", -1.3192631212399999468e-25),
         ("mädchen", 6.2361298211599995797e25),

@@ -1,4 +1,5 @@
-"""Strands in classes of pieces: nothing is lost, little is wasted, the order is always the same."""
+"""Strands in classes by number of pieces: all are drawn, little is wasted, and the order is
+fixed."""
 
 from __future__ import annotations
 

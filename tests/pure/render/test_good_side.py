@@ -1,4 +1,4 @@
-"""From which side hair is seen: before the face, before a sheet, beside a beast."""
+"""The side from which hair is shown: before a face, before a sheet, beside an animal."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ TURNS = (0.0, 75.0, 180.0, 262.0)
 
 
 def ball(radius: float, squeeze: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> Surface:
-    """A sphere of triangles, squeezed along the axes."""
+    """A sphere of triangles, scaled along the axes."""
     rows, columns = 20, 40
     down, around = np.meshgrid(
         np.linspace(0.0, np.pi, rows + 1), 2.0 * np.pi * np.arange(columns) / columns, indexing="ij"
@@ -39,7 +39,7 @@ def spikes(roots: np.ndarray, outward: np.ndarray, length: float) -> np.ndarray:
 
 
 def head() -> tuple[np.ndarray, Surface]:
-    """A ball with hair all over but for a face towards -Y."""
+    """A ball with hair all over except for a face towards -Y."""
     outward = np.random.default_rng(3).normal(size=(1500, 3))
     outward /= np.linalg.norm(outward, axis=1, keepdims=True)
     outward = outward[(outward[:, 1] > -0.55) & (outward[:, 2] > -0.6)]
@@ -47,8 +47,8 @@ def head() -> tuple[np.ndarray, Surface]:
 
 
 def cropped() -> tuple[np.ndarray, Surface]:
-    """The same head with hair that is as short, on a long bare neck: its hair is seen best from
-    behind, and its neck from all sides."""
+    """A head with very short hair on a long bare neck: its hair is visible best from behind, its
+    neck from all sides."""
     outward = np.random.default_rng(6).normal(size=(3000, 3))
     outward /= np.linalg.norm(outward, axis=1, keepdims=True)
     x, y, z = outward.T
@@ -62,7 +62,7 @@ def cropped() -> tuple[np.ndarray, Surface]:
 
 
 def sheet() -> tuple[np.ndarray, Surface]:
-    """Hair that hangs before a wall, which is bare behind."""
+    """Hair that hangs before a wall whose back is bare."""
     places = np.random.default_rng(4).uniform(-0.5, 0.5, (900, 2))
     roots = np.stack([places[:, 0], np.zeros(900), places[:, 1]], axis=1)
     corners = np.array([[-0.5, 0, -0.5], [0.5, 0, -0.5], [0.5, 0, 0.5], [-0.5, 0, 0.5]], np.float32)
@@ -71,7 +71,7 @@ def sheet() -> tuple[np.ndarray, Surface]:
 
 
 def beast() -> tuple[np.ndarray, Surface]:
-    """Fur all over a long body but for the snout at its end towards -Y."""
+    """Fur all over a long body except for the snout at its end towards -Y."""
     outward = np.random.default_rng(5).normal(size=(3000, 3))
     outward /= np.linalg.norm(outward, axis=1, keepdims=True)
     outward = outward[outward[:, 1] > -0.8]
@@ -80,7 +80,7 @@ def beast() -> tuple[np.ndarray, Surface]:
 
 
 def coat() -> tuple[np.ndarray, Surface]:
-    """Fur all over the same body, that lies towards its tail at +Y."""
+    """Fur all over the same body, combed towards its tail at +Y."""
     outward = np.random.default_rng(5).normal(size=(3000, 3))
     outward /= np.linalg.norm(outward, axis=1, keepdims=True)
     squeeze = (0.5, 1.6, 0.6)
@@ -89,7 +89,8 @@ def coat() -> tuple[np.ndarray, Surface]:
 
 
 def crest() -> tuple[np.ndarray, Surface]:
-    """A bare upright body with a crest from its brow, towards -Y, down its back, that lies back."""
+    """A bare upright body that faces -Y, with a crest from its brow down its back that lies
+    backwards."""
     across, around = np.random.default_rng(7).uniform((-0.75, 0.2), (0.75, 2.8), (3000, 2)).T
     roots = np.stack([across, -np.cos(around + 0.6), np.sin(around + 0.6)], axis=1)
     roots *= 1.0 / np.linalg.norm(roots, axis=1, keepdims=True)
@@ -114,7 +115,7 @@ def turned(strands: np.ndarray, body: Surface, degrees: float) -> tuple[np.ndarr
 
 
 def away(direction: np.ndarray, degrees: float) -> float:
-    """Angle [degrees] to where -Y has been turned, seen from above."""
+    """Angle [degrees] between a direction, seen from above, and -Y turned by `degrees`."""
     angle = np.arctan2(direction[0], -direction[1]) - np.radians(degrees)
     return abs(float(np.degrees((angle + np.pi) % (2.0 * np.pi) - np.pi)))
 
@@ -130,7 +131,7 @@ def test_the_front_is_found_wherever_it_is(shape, degrees: float) -> None:
 
 @pytest.mark.parametrize("degrees", TURNS)
 def test_a_coat_is_seen_against_its_lie(degrees: float) -> None:
-    """Light leaves a strand in a cone around it: seen with its lie, a coat shows dark ends."""
+    """Light leaves a strand in a cone around it, so a coat seen along its lie shows dark tips."""
     side = side_of(*turned(*coat(), degrees))
     assert away(side.front, degrees) < 12.0
     assert 15.0 < away(side.three_quarter, degrees) < 45.0
@@ -145,7 +146,7 @@ def test_a_coat_that_lies_to_no_side_has_a_front_all_the_same() -> None:
 
 @pytest.mark.parametrize("degrees", TURNS)
 def test_a_crest_is_seen_from_the_side_of_the_face(degrees: float) -> None:
-    """Most of it is seen from behind, and hardly any from where a face is seen best."""
+    """Although most of it is visible from behind, and hardly any from where a face is seen best."""
     side = side_of(*turned(*crest(), degrees))
     assert away(side.front, degrees) < 15.0
     assert 50.0 < away(side.three_quarter, degrees) < 80.0
@@ -160,7 +161,7 @@ def test_a_carpet_is_seen_from_above() -> None:
 
 
 def test_a_face_is_not_seen_from_above_wherever_the_hair_is() -> None:
-    """Hair of the crown alone is seen best from above, and the face as well."""
+    """Although hair of the crown alone is visible best from above."""
     strands, body = head()
     crown = strands[strands[:, 0, 2] > 0.06]
     assert 100 < len(crown) < len(strands) // 2
@@ -195,7 +196,7 @@ def test_views_turn_to_the_side_that_is_seen() -> None:
 
 @pytest.mark.parametrize("aspect", [0.5, 1.0, 1.8])
 def test_points_touch_the_frame_and_stay_within(aspect: float) -> None:
-    """One axis is filled from border to border, the other is in the middle."""
+    """One axis is filled from border to border, the other is centred."""
     points = np.random.default_rng(2).normal(size=(500, 3)) * (3.0, 0.4, 1.0) + (7.0, 5.0, -2.0)
     camera = frame_points(points, (-0.4, -1.0, 0.3), 0.6, aspect, margin=1.25)
     clip = np.append(points, np.ones((500, 1)), axis=1) @ (camera.projection @ camera.view).T

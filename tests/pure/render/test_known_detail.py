@@ -1,4 +1,4 @@
-"""How many slots strands that move get."""
+"""The number of slots for moving strands."""
 
 from __future__ import annotations
 

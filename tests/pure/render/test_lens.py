@@ -24,7 +24,7 @@ def shown(camera: Camera, point: Floats) -> Floats:
 
 @pytest.mark.parametrize("camera", CAMERAS)
 def test_what_is_in_focus_stays_where_it_is_and_what_is_not_spreads(camera: Camera) -> None:
-    """By similar triangles: a place p of the lens moves a point by p (1 - depth / focus)."""
+    """Against similar triangles: a place p on the lens moves a point by p (1 - depth / focus)."""
     lens = Lens(radius=0.03, focus=1.7)
     right, up = camera.view[0, :3], camera.view[1, :3]
     for depth in (1.0, 1.7, 4.0):
@@ -46,18 +46,18 @@ def test_the_eye_goes_to_its_place_of_the_lens() -> None:
 
 @pytest.mark.parametrize("blades", [0, 2, 3, 5, 8])
 def test_samples_are_even_over_the_aperture(blades: int) -> None:
-    """By its area and its moments: a circle's, or a regular polygon's."""
+    """Against the moments of a disk, or of a regular polygon."""
     lens = Lens(radius=2.0, focus=1.0, blades=blades, rotation=0.4)
     places = lens.places(4096)
     np.testing.assert_array_equal(places[0], 0.0)
     np.testing.assert_array_equal(places[:100], lens.places(100))
     assert np.linalg.norm(places, axis=1).max() <= 2.0 + 1e-12
     np.testing.assert_allclose(places.mean(axis=0), 0.0, atol=0.01)
-    # mean of squared distances from the middle: R^2 / 2; of a polygon R^2 (2 + cos(2 pi / n)) / 6
+    # mean squared distance from the centre: R^2 / 2; of a polygon R^2 (2 + cos(2 pi / n)) / 6
     square = 2.0 if blades < 3 else 4.0 * (2.0 + np.cos(2.0 * np.pi / blades)) / 6.0
     assert (places**2).sum(axis=1).mean() == pytest.approx(square, rel=0.01)
     if blades >= 3:
-        # no corner is farther out than the sides allow, in the direction of the middle of each side
+        # no place lies beyond a side
         for side in range(blades):
             angle = 0.4 + (side + 0.5) * 2.0 * np.pi / blades
             along = places @ [np.cos(angle), np.sin(angle)]

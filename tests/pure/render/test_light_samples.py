@@ -1,4 +1,4 @@
-"""Points of lights: their mean is the whole light, and they fill it evenly."""
+"""Sample points of lights: their mean is the whole light, and they fill it evenly."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ POINTS = np.array([[0.0, 0.0, 0.0], [0.3, -0.2, 0.1], [-0.2, 0.1, -0.4]])
 
 
 def arriving(light: Light) -> np.ndarray:
-    """The vector irradiance at the points: what a matt surface sees of a light."""
+    """The vector irradiance of a light at POINTS."""
     towards, irradiance = light_at(light, POINTS)
     return towards * irradiance[:, :1]
 
@@ -64,7 +64,7 @@ def test_every_point_of_a_lamp_gives_the_hair_as_much(name: str) -> None:
 
 @pytest.mark.parametrize("is_ball", [False, True])
 def test_the_rim_of_a_spot_is_as_wide_as_its_lamp_makes_it(is_ball: bool) -> None:
-    """The part of the disk's own points that light each place through a sharp cone."""
+    """Against the fraction of the lamp's points that light a place through a sharp cone."""
     cone = Cone(TURNED, np.radians(60.0), 0.0)
     light = Light.spot((0.0, 0.0, 2.0), WHITE, 40.0, cone, 0.3, is_ball)
     points = np.linspace([0.0, 0.0, 0.0], [2.0, 0.0, 0.0], 400)
@@ -82,7 +82,7 @@ def test_the_rim_of_a_spot_is_as_wide_as_its_lamp_makes_it(is_ball: bool) -> Non
 
 
 def test_a_sun_fills_its_angle() -> None:
-    """Even over the disk, half of it is within 0.707 of its radius."""
+    """Uniform over the disk: half of the samples lie within sqrt(0.5) of its radius."""
     light = LIGHTS["sun"]
     found = np.array([lights_at((light,), sample, np.zeros(3))[0].vector for sample in range(512)])
     angles = np.arccos(np.clip(found @ np.array(light.vector), -1.0, 1.0))

@@ -1,4 +1,4 @@
-"""Where what a pixel sees was and will be, and how it faces."""
+"""Position in time and normal of what a pixel sees: hair, meshes, or nothing."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def test_motion_is_from_before_to_now_and_from_now_to_after_both_backwards() -> 
 
 
 def test_a_strand_is_a_curve_through_its_points() -> None:
-    """A parabola, which the cubic form has exactly between inner points."""
+    """Against a parabola, which the cubic interpolation reproduces between inner points."""
     x = np.arange(5.0)
     points = np.stack([x, x**2, 0.0 * x], axis=1)[None].repeat(3, axis=0)
     points[1] += 1.0

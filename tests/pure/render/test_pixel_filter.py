@@ -1,4 +1,4 @@
-"""Samples lie as the filter weighs, and a camera looks where it is told to."""
+"""Samples are distributed by the filter's weights, and cameras are shifted by them."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def test_the_first_sample_is_the_middle_and_more_begin_with_fewer() -> None:
 
 
 def test_samples_have_the_moments_of_the_filter() -> None:
-    """Of the window of Blackman and Harris, integrated here by itself."""
+    """Against the moments of the Blackman-Harris window, integrated here."""
     x = np.linspace(-0.5, 0.5, 20001)
     weight = (
         0.35875
@@ -44,7 +44,7 @@ def test_samples_have_the_moments_of_the_filter() -> None:
 
 
 def test_samples_lie_more_evenly_than_chance() -> None:
-    """Half of them on either side of any axis, to within two of 64."""
+    """Each side of an axis has half of 64 samples, to within two."""
     places = jitters(64, 1.5)
     assert (np.abs((places > 0.0).sum(axis=0) - 32) <= 2).all()
 

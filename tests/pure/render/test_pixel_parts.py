@@ -1,4 +1,4 @@
-"""Parts of a picture: together they are all of it, and each has room."""
+"""Parts of a picture: together they cover it, and each fits into memory."""
 
 from __future__ import annotations
 
@@ -41,7 +41,8 @@ def test_counts_beyond_32_bits_are_added_up() -> None:
 
 
 def test_a_part_is_cut_until_it_is_one_depth_of_one_pixel() -> None:
-    """The farther half comes first, so that the nearer one is drawn over it."""
+    """The farther half comes first, so that the nearer one is drawn over it; each part is halved
+    down to one layer of one pixel."""
     part, steps = PixelPart(3, 8), 0
     while part.halves:
         one, other = part.halves

@@ -1,4 +1,4 @@
-"""What the grooms of a scene know of its meshes."""
+"""Meshes of a scene in the snapshots of its grooms."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def hair_at(x: float) -> Snapshot:
 
 
 def test_light_comes_back_to_each_groom_off_its_own_head() -> None:
-    """In the head's colour, whatever other meshes throw shadows."""
+    """In the colour of its head, whatever other meshes cast shadows."""
     colors = {0.0: (0.1, 0.2, 0.3), 5.0: (0.8, 0.6, 0.4)}
     heads = tuple(
         MeshSnapshot.of(Surface(CORNERS + np.float32([x, 0.0, 0.0]), TRIANGLES), color)

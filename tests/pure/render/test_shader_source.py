@@ -1,4 +1,4 @@
-"""Composition of shaders as text; no GPU is needed, and none is imported."""
+"""Composition of shaders as text, without a GPU."""
 
 from __future__ import annotations
 
@@ -80,9 +80,9 @@ def test_shipped_shaders_compose(file: Path) -> None:
     ids=lambda file: file.name,
 )
 def test_libraries_and_structs_hold_no_resources(file: Path) -> None:
-    """So that any shader, and any test, can use them with resources of its own.
+    """Any shader or test can then use them with its own resources.
 
-    A sampler that a function is given is none: without `uniform` it cannot be declared.
+    A sampler parameter of a function does not count: only `uniform` declares a resource.
     """
     code = re.sub(r"//.*", "", file.read_text(encoding="utf-8"))
     assert not re.search(r"\b(uniform|image\w*|buffer|layout|void main)\b", code)

@@ -1,4 +1,4 @@
-"""Where points of strands lie in a texture: each strand whole in one row, none upon another."""
+"""The layout of strands' points in a texture: each strand in one row, without overlap."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def layout_of(counts: object) -> StrandLayout:
 
 
 def numbered(layout: StrandLayout) -> np.ndarray:
-    """Pixels that hold the number of their point, from 1 on."""
+    """Pixels that store the number of their point, from 1 on."""
     return layout.pixels(np.arange(1, layout.point_count + 1, dtype=np.float32)[:, None])[..., 0]
 
 

@@ -1,4 +1,4 @@
-"""Ambient occlusion: against a slab in closed form and against rays marched one by one."""
+"""Ambient occlusion: against a slab in closed form and against ray marching."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def straight_hair(count: int, radius: float = 1e-3) -> StrandSet:
 
 
 def test_the_sky_is_whole_and_its_directions_integrate_polynomials() -> None:
-    """Lebedev's 26 points are exact to degree 7: mean of x^2, x^4, x^2 y^2 and z^6."""
+    """Lebedev's 26 points are exact up to degree 7: means of x^2, x^4, x^2 y^2 and z^6."""
     steps, shares = zip(*sky_directions(0.0), strict=True)
     unit = np.array(steps) / np.linalg.norm(steps, axis=1, keepdims=True)
     weight = np.array(shares)
@@ -66,7 +66,7 @@ def test_running_sums_agree_with_walking_cell_by_cell(step: tuple[int, int, int]
 
 
 def test_uniform_slab_in_closed_form() -> None:
-    """Transmittance exp(-tau (depth below the top or above the bottom) / |cos|), wide slab."""
+    """Against the transmittance of a wide slab, exp(-tau (distance to top or bottom) / |cos|)."""
     depth = np.zeros((151, 151, 24), np.float32)
     depth[:, :, 2:22] = 0.11
     found = sky_openness(depth, 0.0)[75, 75]
@@ -84,7 +84,7 @@ def test_uniform_slab_in_closed_form() -> None:
 
 
 def test_optical_depth_is_the_area_of_the_hair() -> None:
-    """Summed over all cells: (pi / 4) x the strands' silhouette 2 r l, over the cell's face."""
+    """Summed over all cells: (pi / 4) x the strands' area 2 r l, over the area of a cell's face."""
     strands = straight_hair(50)
     grid = grid_around(strands, 40)
     depth = hair_depth(strands, grid)
@@ -132,7 +132,7 @@ def test_agrees_with_rays_marched_one_by_one() -> None:
 
 
 def carpet(length: float) -> StrandSet:
-    """Dense upright fur on a square of 1 m, which leans so that it lies across all cells."""
+    """Dense upright fur on a square of 1 m that is tilted, so that it lies askew to the cells."""
     place = np.linspace(-0.5, 0.5, 160)
     x, y = (each.ravel() for each in np.meshgrid(place, place))
     root = np.stack([x, y, 0.04 * x + 0.02 * y], axis=1)
@@ -145,7 +145,7 @@ def carpet(length: float) -> StrandSet:
 
 
 def test_even_fur_on_a_large_body_is_shaded_evenly() -> None:
-    """Every place of it is like every other, however the cells lie."""
+    """All places get the same shade, whatever their position in the cells."""
     fur = carpet(0.03)
     settings = AmbientSettings(extinction=8.0, ao_bias=1.0, upper_fraction=1.0)
     found = ambient_occlusion(fur, fur.points, None, settings).reshape(-1, 6)
@@ -163,7 +163,7 @@ def test_cells_are_fine_only_where_hair_is_short_and_never_too_many() -> None:
 
 
 def test_many_directions_say_the_same_as_twenty_six() -> None:
-    """The quadrature against 2,000 directions spread over the sphere (Fibonacci)."""
+    """The quadrature against 600 directions spread over the sphere (Fibonacci)."""
     strands = straight_hair(400)
     grid = grid_around(strands, 24)
     depth = hair_depth(strands, grid)
@@ -204,7 +204,7 @@ def test_open_at_the_outside_and_dark_at_the_scalp() -> None:
 
 
 def test_the_body_shuts_out_the_light_from_behind_and_only_that() -> None:
-    """Without hair's shade: what a ball 1.5 cells smaller hides of the sky, and all inside."""
+    """Without hair: against the sky that a ball 1.5 cells smaller hides; inside all is hidden."""
     strands = hair_on_ball()
     settings = AmbientSettings(extinction=0.0, ao_bias=1.0, upper_fraction=0.0, cell_count=96)
     on_ball = ambient_occlusion(strands, strands.roots * 1.01, ball(0.08), settings)
@@ -225,8 +225,8 @@ def openness(
 
 
 def test_openness_knows_from_where_light_comes() -> None:
-    """Over a ball and without hair's shade light comes from all around but a cone: its mean and
-    its vector outward are integrals of that, and nothing points along the ball."""
+    """Over a ball without hair, light comes from everywhere except a cone: mean and outward vector
+    are integrals over that, and the vector has no part along the ball."""
     strands = hair_on_ball()
     outward = strands.roots / np.linalg.norm(strands.roots, axis=1, keepdims=True)
     found = openness(strands, strands.roots * 1.01, ball(0.08), 0.0, 96)
@@ -249,7 +249,7 @@ def test_openness_is_less_in_the_hair_than_at_its_tips() -> None:
 
 
 def test_a_thin_sheet_shades_neither_of_its_sides() -> None:
-    """An ear: a plate 2 mm thick. Its shell would come out at the other side."""
+    """Like an ear, a plate 2 mm thick: the shell inside it would come out at the other side."""
     plate = ball(1.0)
     plate = Surface(plate.positions * [0.001, 0.08, 0.08], plate.triangles)
     strands = straight_hair(50)
@@ -300,7 +300,8 @@ def test_no_hair_and_no_points() -> None:
 
 
 def test_skin_is_dark_only_under_the_hair() -> None:
-    """A ball with hair on its upper half only: the skin under it loses more light than the rest."""
+    """On a ball with hair on its upper half only, skin under hair loses more light than the
+    rest."""
     skin = ball(0.08)
     strands = hair_on_ball()
     upper = strands.take(np.flatnonzero(strands.roots[:, 2] > 0.0))
@@ -312,7 +313,7 @@ def test_skin_is_dark_only_under_the_hair() -> None:
 
 
 def test_sums_of_light_are_those_of_each_direction() -> None:
-    """Weighted, and added up; also where each direction has cells of its own."""
+    """Weighted sums against single directions; also if each direction has its own cells."""
     random = np.random.default_rng(6)
     depth = random.random((5, 7, 6)).astype(np.float32)
     steps = [step for step, _ in sky_directions(0.0)][3::2]

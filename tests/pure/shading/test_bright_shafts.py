@@ -1,4 +1,4 @@
-"""Shafts from what is bright: what counts as bright, where its middles are, and what is added."""
+"""Shafts from bright regions: their threshold, their centres, and the light that is added."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def black() -> np.ndarray:
 
 
 def window(*corners: int, light: float = 5.0) -> np.ndarray:
-    """A dark picture with a bright rectangle: rows and columns from and to."""
+    """A dark picture with a bright rectangle; corners: bottom, top, left, right."""
     picture = np.full((HEIGHT, WIDTH, 4), 0.1)
     bottom, top, left, right = corners or (40, 80, 60, 100)
     picture[bottom:top, left:right, :3] = light
@@ -50,7 +50,7 @@ def regions_of(seen: np.ndarray) -> BrightRegions:
 
 
 def test_what_is_bright_is_its_formula() -> None:
-    """Nothing up to the threshold, half of what is above it one knee on, nearly all far above."""
+    """Nothing up to the threshold, half of the excess one knee above it, nearly all far above."""
     grey = np.array([0.0, 0.999, 1.0, 1.5, 11.0])[:, None] * np.ones(3)
     kept = bright_part(grey, 1.0)
     assert kept[:, 0] == pytest.approx([0.0, 0.0, 0.0, 0.25, 100.0 / 10.5])
@@ -97,7 +97,7 @@ def test_two_windows_far_apart_each_throw_their_own() -> None:
     found = regions_of(seen)
     assert sorted(round(each.center[0]) for each in found.regions) == [18, 142]
     light = added(seen)[..., 0]
-    # each shines towards the other
+    # each window shines towards the other
     assert light[60, 30] > 0.1 and light[60, 130] > 0.1
     assert np.abs(light - light[:, ::-1]).max() < 0.02
 
@@ -111,7 +111,7 @@ def test_all_that_is_bright_belongs_to_regions_in_full() -> None:
 
 
 def test_light_that_moves_moves_its_shafts_without_a_jump() -> None:
-    """A window that crosses the lattice, pixel by pixel."""
+    """The centre of a window that crosses the lattice pixel by pixel moves continuously."""
     before = None
     for left in range(20, 60, 1):
         now = np.array(regions_of(window(50, 70, left, left + 30)).regions[0].center)
@@ -121,13 +121,13 @@ def test_light_that_moves_moves_its_shafts_without_a_jump() -> None:
 
 
 def test_beside_a_window_its_light_falls_by_the_formula() -> None:
-    """Straight out from the middle, 20 pixels from it to its edge."""
+    """On a line from its middle outwards; the edge is 20 pixels away."""
     light = added(window())[60, 80:, 0] / (ON.bright_strength * (16.0 / 4.5))
     radius = np.arange(80) + 0.5
     inside = -np.expm1(-np.minimum(radius, 20.0) / LENGTH)
     expected = inside * np.exp(-np.maximum(radius - 20.0, 0.0) / LENGTH)
     expected /= -np.expm1(-radius / LENGTH)
-    # pixels of the edge are half of it
+    # pixels at the edge are half covered
     assert np.abs(light - expected)[2:].max() < 0.03
 
 

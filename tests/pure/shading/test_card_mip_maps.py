@@ -1,4 +1,4 @@
-"""Textures with their mip maps in them, and what cards cover at a slant."""
+"""Textures that contain their mip maps, and the coverage of slanted cards."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def packed(picture: np.ndarray, *, is_repeated: bool = False) -> np.ndarray:
 @pytest.mark.parametrize("height", [1, 2, 5, 40, 63, 64, 2048])
 @pytest.mark.parametrize("width", [1, 2, 3, 96, 97])
 def test_levels_lie_apart(width: int, height: int) -> None:
-    """Each with its border, none over another, all within the texture."""
+    """All levels with their borders lie within the texture, without overlap."""
     levels = [np.full((max(height >> n, 1), max(width >> n, 1), 1), n + 1.0) for n in range(LEVELS)]
     whole = packed_levels(levels, is_repeated=False)
     assert picture_size(whole.shape[1], whole.shape[0]) == (width, height)
@@ -53,7 +53,7 @@ def test_middle_of_a_texel_is_the_texel() -> None:
 
 
 def test_tiles_do_not_run_into_each_other() -> None:
-    """At all levels and places, however near the edge of a tile."""
+    """At all levels and places, also at the edge of a tile."""
     tile = np.kron(np.arange(8.0).reshape(2, 4), np.ones((32, 32)))[..., None] / 8.0
     place = np.random.default_rng(2).random((4000, 2))
     level = np.random.default_rng(3).uniform(0.0, LEVELS - 1.0, 4000)
@@ -81,7 +81,8 @@ def test_level_is_where_a_pixel_is_as_large_as_a_texel() -> None:
 
 
 def test_slant_brings_strands_nearer() -> None:
-    """Thin hair: cards of all turns cover what one covers on the mean, times how narrow it is."""
+    """With thin hair, a compensated card covers the same at any turn: an uncompensated one's
+    mean."""
     turns = np.linspace(0.0, 2.0 * np.pi, 1000, endpoint=False)
     across = np.stack([np.cos(turns), np.sin(turns), 0.0 * turns], axis=-1)
     tangent, to_eye = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
@@ -91,7 +92,7 @@ def test_slant_brings_strands_nearer() -> None:
     )
     turned = np.abs(across[:, 0]) > MIN_FACING
     assert shown[turned] == pytest.approx(alpha * MEAN_FACING, rel=0.06)
-    # nothing stays nothing, all stays all, whichever way a strand leans to the eye
+    # 0 stays 0 and 1 stays 1, however a strand leans towards the eye
     leaning = np.array([0.6, 0.0, 0.8])
     assert (view_compensated_alpha(np.zeros(1000), across, tangent, leaning) == 0.0).all()
     assert (view_compensated_alpha(np.ones(1000), across, tangent, leaning) == 1.0).all()

@@ -1,4 +1,4 @@
-"""The card textures' promises: opaque inside, clear at the sides, seeded, stretched, seamless."""
+"""Card textures: opaque inside, clear at the sides, seeded, stretched, seamless."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def test_noise_is_even_and_stretched(along: int) -> None:
 @pytest.mark.parametrize("name", ["shift", "noise", "base"])
 @pytest.mark.parametrize("wander", [0.0, 0.1])
 def test_seams_are_no_larger_than_differences_within(name: str, wander: float) -> None:
-    """Shift and noise across the whole texture and along it, base across each column."""
+    """At the seams of shift and noise in both directions, and of base across each column."""
     texture = getattr(hair_textures(replace(SETTINGS, wander=wander), 3), name)
     texture = texture.mean(axis=-1) if texture.ndim == 3 else texture
     parts = columns(texture, 3) if name == "base" else [texture]
@@ -101,7 +101,7 @@ def test_seams_are_no_larger_than_differences_within(name: str, wander: float) -
 
 
 def test_strands_never_meet() -> None:
-    """At the largest wander a strand's place still grows from left to right in every row."""
+    """Even at the largest wander, strands keep their order from left to right in every row."""
     drift = strand_drift(np.random.default_rng(3), (256, 512), 0.1)
     place = (np.arange(512) + 0.5) / 512 + drift
     assert (np.diff(place, axis=1) > 0.0).all()
@@ -110,12 +110,12 @@ def test_strands_never_meet() -> None:
 
 
 def test_the_slope_leads_along_the_strands() -> None:
-    """What a strand is made of hardly changes along it, but does straight up."""
+    """The name of a strand hardly changes along the slope, but does straight up."""
     random = np.random.default_rng(5)
     drift = strand_drift(random, (512, 256), 0.1)
     slope = strand_slope(drift, 1)
     assert np.abs(slope).max() > 0.2
-    place = (np.arange(256) + 0.5) / 256 + drift  # names the strand
+    place = (np.arange(256) + 0.5) / 256 + drift  # identifies the strand
 
     def gone_astray(step: np.ndarray) -> float:
         column = np.arange(256) + step[100]
@@ -126,7 +126,7 @@ def test_the_slope_leads_along_the_strands() -> None:
 
 
 def test_the_tangent_map_moves_highlights_as_the_shift_does() -> None:
-    """Without wander, to first order; and it holds unit vectors."""
+    """To first order, without wander; the map stores unit vectors."""
     shift = np.linspace(0.0, 1.0, 11)
     texel = tangent_map(np.zeros(11), shift)
     np.testing.assert_allclose(np.linalg.norm(2.0 * texel - 1.0, axis=-1), 1.0, atol=1e-12)
@@ -135,7 +135,7 @@ def test_the_tangent_map_moves_highlights_as_the_shift_does() -> None:
         mapped = mapped_tangent(texel, tangent, normal, strength)
         found = shifted_tangent(mapped, normal, primary)
         expected = shifted_tangent(tangent, normal, primary + strength * (shift - 0.5))
-        # a map adds its unit vector to the shift, whence the second order
+        # the second-order error: a map stores a normalized vector
         np.testing.assert_allclose(found, expected, atol=2e-3)
 
 

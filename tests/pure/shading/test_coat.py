@@ -1,4 +1,4 @@
-"""Hair in water and dust, against light that is counted through a film of water."""
+"""Wet and dusty hair, against light that is followed through a film of water."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ WET, DUSTY = replace(DRY, wetness=1.0), replace(DRY, dust=0.6)
 
 
 def reflected(index: float, cosine: np.ndarray) -> np.ndarray:
-    """Fresnel's equations for light that comes from a medium of index 1 into one of this index."""
+    """Reflectance by Fresnel's equations for light from index 1 into a medium of this index."""
     sine = np.sqrt(1.0 - cosine**2) / index
     inner = np.sqrt(np.maximum(1.0 - sine**2, 0.0))
     across = (cosine - index * inner) / (cosine + index * inner)
@@ -28,14 +28,15 @@ def reflected(index: float, cosine: np.ndarray) -> np.ndarray:
 
 
 def test_a_film_keeps_what_fresnel_has_of_diffuse_light() -> None:
-    """The mean over a half sphere, weighted by the cosine, of what water reflects from within."""
+    """Against water's internal reflectance, averaged over the half sphere, weighted by the
+    cosine."""
     cosine = np.sqrt((np.arange(200_000) + 0.5) / 200_000)
     assert pytest.approx(reflected(1.0 / 1.333, cosine).mean(), abs=2e-3) == KEPT
 
 
 def test_wet_colour_is_that_of_light_followed_through_the_film() -> None:
-    """Of light in the hair a part c comes back; of that the film lets some out, and the rest goes
-    in again."""
+    """Against a series: hair reflects the fraction c of its light; the film lets some of that out
+    and reflects the rest back into the hair."""
     color = np.array([[0.02, 0.2, 0.5], [0.9, 0.99, 1e-4]])
     light, out = np.ones(color.shape), np.zeros(color.shape)
     for _ in range(2000):
@@ -64,8 +65,8 @@ def test_dust_has_its_colour_and_water_darkens_that_too() -> None:
     [("kajiya_kay", 0.5, 0.007), ("kajiya_kay", 1.0, 0.007), ("marschner", 0.5, 0.06)],
 )
 def test_dust_covers_grey_strands_too(model: str, fraction: float, off: float) -> None:
-    """The mean of all strands comes as near to its colour as it covers them, and none stays grey
-    under all of it."""
+    """The mean colour of all strands approaches dust's as dust covers them; under full dust no
+    strand stays grey."""
     dry = replace(DRY, model=model, grey_fraction=fraction, color_variation=0.0, tip_tint=0.0)
     for dust in (0.0, 0.1, 0.5, 0.9, 1.0):
         drawn = strand_colors(SEEDS, ROOT, coated(replace(dry, dust=dust)))
@@ -99,7 +100,7 @@ def test_a_look_in_dust_is_dull() -> None:
 
 
 def half_width(exponent: float) -> float:
-    """Of Kajiya-Kay's highlight, where half of it is left [rad]."""
+    """Half width at half maximum of Kajiya-Kay's highlight [rad]."""
     angle = np.linspace(0.0, 1.5, 15001)
     half_vectors = np.stack([np.sin(angle), np.cos(angle), 0.0 * angle], axis=-1)
     left = strand_specular(np.array([1.0, 0.0, 0.0]), half_vectors, exponent)

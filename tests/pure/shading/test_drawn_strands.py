@@ -1,4 +1,4 @@
-"""Width and colour of strands for those who bake them, against what strands are drawn by."""
+"""Width and colour of strands for bakes, against those with which strands are drawn."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def test_radii_are_scaled_and_taper_evenly() -> None:
 
 @pytest.mark.parametrize("model", ["kajiya_kay", "marschner"])
 def test_strands_vary_about_the_mean(model: str) -> None:
-    """Evenly about 1 where the colour itself varies; where its absorption does, a little more."""
+    """Around 1 if the colour itself varies; a little above if its absorption varies."""
     shading = ShadingSettings(model=model, base_color=BROWN, color_variation=0.5)
     factor = strand_variation(np.arange(4000), 6, shading)
     assert factor.shape == (4000, 6, 3)
@@ -65,7 +65,8 @@ def test_grey_on_black_hair_stays_within_bounds(model: str) -> None:
 
 
 def test_a_base_texture_gives_strands_their_own_absorption() -> None:
-    """That of the strand itself, from the mean of the card and how the strand's colour differs."""
+    """The mean absorption of the card and the colour factor of a strand give the strand's own
+    absorption."""
     shading = ShadingSettings(
         model="marschner", base_color=BROWN, tip_tint=0.8, color_variation=0.5, grey_fraction=0.2
     )
@@ -94,7 +95,7 @@ RED, BLUE, GREEN = (0.8, 0.02, 0.03), (0.01, 0.05, 0.6), (0.02, 0.4, 0.05)
 
 @pytest.mark.parametrize("model", ["kajiya_kay", "marschner"])
 def test_a_card_has_the_own_colours_of_its_strands(model: str) -> None:
-    """Its look times the factor is each strand's colour, the look's where a strand has none."""
+    """Its look times the factor is each strand's colour, or the look's if the strand has none."""
     shading = ShadingSettings(
         model=model, pigment="melanin", base_color=BROWN, color_variation=0.0, tip_tint=0.0
     )
@@ -123,7 +124,7 @@ def test_the_look_alone_leaves_own_colours_out() -> None:
 
 @pytest.mark.parametrize("model", ["kajiya_kay", "marschner"])
 def test_dye_leaves_natural_brows_as_they_are(model: str) -> None:
-    """Nor their tips; but all hair has the look's colour where the look says so."""
+    """Also at their tips; by default brows have the look's colour as all hair has."""
     dyed = ShadingSettings(
         model=model, base_color=RED, tip_color=BLUE, tip_tint=1.0, color_variation=0.0
     )
@@ -135,7 +136,7 @@ def test_dye_leaves_natural_brows_as_they_are(model: str) -> None:
     found = strand_variation(seeds, 6, natural, None, group)
     np.testing.assert_array_equal(found[[0, 3]], plain[[0, 3]])
     assert own_colors(None, np.repeat(group[:, None], 6, axis=1), dyed) is None
-    # the factor times the mean of the card, which is dyed, is brown all along, up to its bound
+    # the factor times the card's mean, which is dyed, is brown everywhere, up to its bound
     if model == "kajiya_kay":
         tints = found[1] / plain[1]
         dye = strand_base(np.linspace(0, 1, 6), np.full(6, 0.5), np.ones(6), dyed)

@@ -1,4 +1,4 @@
-"""Panoramas as suns and harmonics, against integrals that are known."""
+"""Panoramas as suns and spherical harmonics, against known integrals."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ QUARTER = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 
 
 def whole(environment: Environment) -> np.ndarray:
-    """All of its light, over all directions [W/m^2]."""
+    """The integral of its light over all directions [W/m^2]."""
     return 4.0 * np.pi * np.array(environment.ambient) + sum(
         (np.array(sun.power) for sun in environment.suns), np.zeros(3)
     )
@@ -60,7 +60,7 @@ def test_an_even_world_is_its_color_alone() -> None:
 @pytest.mark.parametrize(
     ("radiance", "irradiance"),
     [
-        # of a sky that is bright above, and of one that is bright at the zenith and the nadir
+        # a sky that is bright above, and one that is bright at zenith and nadir
         (1.0 + 0.5 * UP, lambda z: 1.0 + 0.5 * 2.0 / 3.0 * z),
         (1.0 + 0.25 * (3.0 * UP**2 - 1.0), lambda z: 1.0 + 0.25 * 0.25 * (3.0 * z**2 - 1.0)),
     ],
@@ -74,7 +74,7 @@ def test_irradiance_of_an_analytic_sky(radiance: np.ndarray, irradiance: object)
 
 
 def test_irradiance_of_half_a_sky() -> None:
-    """(1 + cos) / 2 of it on a slanted surface; order 2 has it within 4 %."""
+    """(1 + cos) / 2 on a slanted surface, to which order 2 comes within 4 %."""
     found = environment_of(np.where(UP > 0.0, 1.0, 0.0) * WHITE)
     normals = DIRECTIONS[::8, ::8]
     assert not found.suns
@@ -91,13 +91,13 @@ def test_a_bright_disk_is_a_sun(degrees: float) -> None:
     is_sun = (DIRECTIONS @ towards > np.cos(np.radians(degrees)))[..., None]
     found = environment_of(np.where(is_sun, color, 0.2))
     (sun,) = found.suns
-    # a disk of few pixels has its middle off by a part of one
+    # the centre of a disk of few pixels is off by part of a pixel
     assert np.degrees(np.arccos(min(towards @ sun.vector, 1.0))) < 0.7
     angle = float((ANGLES * is_sun[..., 0]).sum())
     assert sun.power == pytest.approx(color * angle, rel=0.02)
     assert found.ambient == pytest.approx(0.2 * WHITE, rel=0.05)
     assert sun.of_world and sun.casts_shadow
-    # as wide as the pixels that it covers; a single one is a point
+    # as wide as the pixels that it covers; a single pixel is a point
     width = 2.0 * np.arccos(1.0 - angle / (2.0 * np.pi))
     assert sun.angle == pytest.approx(width if is_sun.sum() > 1 else 0.0, rel=0.15)
 
@@ -123,7 +123,7 @@ def test_reduced_pictures_have_the_same_light(size: tuple[int, int]) -> None:
 
 
 def test_pixels_that_are_no_light_are_black() -> None:
-    """One channel that is not finite makes its pixel black, as in Cycles; negative ones count 0."""
+    """One non-finite channel makes its pixel black, as in Cycles; negative values count as 0."""
     picture = np.full((64, 128, 3), 0.5)
     black = picture.copy()
     black[10, 20] = black[30, 40] = black[50, 60] = 0.0
@@ -160,7 +160,7 @@ def test_a_quarter_turn_is_a_shift_of_columns() -> None:
 
 
 def test_eight_corners_have_all_light() -> None:
-    """And as much from above as there is: half a sky of 1 + z gives 3 pi of the 4 pi."""
+    """And the right part from above: the upper half of a sky of 1 + z has 3 pi of 4 pi."""
     found = environment_of((1.0 + UP) * WHITE)
     lights = corner_light(found, np.arange(8))
     assert lights.sum(axis=0) == pytest.approx(4.0 * np.pi * WHITE, rel=1e-4)
@@ -170,7 +170,8 @@ def test_eight_corners_have_all_light() -> None:
 
 @pytest.mark.parametrize("size", [PREVIEW_SIZE, DEFAULT_SIZE])
 def test_white_hair_in_a_white_world_is_white(size: int) -> None:
-    """The furnace: hair that keeps all light, in the open, sends as much as comes, on average."""
+    """The white furnace: without absorption and occlusion, hair reflects on average as much light
+    as it receives."""
     look = ShadingSettings(fake_scattering=0.0, volume_shadow=0.0, sparkle=0.0, shift_noise=0.0)
     tables = marschner_tables(fibre_of(look), size)
     random, count = np.random.default_rng(3), 4000
@@ -200,7 +201,7 @@ def test_white_hair_in_a_white_world_is_white(size: int) -> None:
 
 
 def test_paths_of_openness() -> None:
-    """Half a sky, as above a head: nothing in the way above, all that counts below."""
+    """With half a sky, as above a head, the path is 0 upwards and the maximum downwards."""
     openness = np.array([0.5, 0.0, 0.0, 0.75])
     up, down = np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, -1.0])
     assert open_path(openness, up) == pytest.approx([0.0, np.log(1000.0)])

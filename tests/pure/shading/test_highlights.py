@@ -1,9 +1,9 @@
-"""Where highlights lie along a strand, and what colour they have: the looks that ship.
+"""Place and colour of the highlights along a strand, for the shipped looks.
 
 The strand lies on a ball, from its top over its front down to the lower pole. Eye and light are
-before the ball unless told otherwise; places are degrees from the middle towards the tip. Document
-001: blond hair has three visible highlights, R, TRT and, against the light, TT; black hair has one.
-Kajiya-Kay knows no light that passes through, so its blond hair has two.
+before the ball by default; places are degrees from the middle towards the tip. Document 001: blond
+hair has three visible highlights, R, TRT and, against the light, TT; black hair has one. Kajiya-Kay
+has no transmitted light, so its blond hair has two.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ LOOKS = Path(__file__).parents[3] / "presets" / "looks"
 MODELS = ("kajiya_kay", "marschner")
 PLACES = np.linspace(-75.0, 75.0, 601)
 TO_EYE = np.array([0.0, -1.0, 0.0])
-#: a maximum lower than this share of the highest is none that is seen
+#: a maximum counts as visible from this fraction of the highest one
 LEAST = 0.1
 
 
 def look(name: str, model: str) -> ShadingSettings:
-    """A look without noise and without what stands in for light from strand to strand."""
+    """A look without noise and without fake scattering between strands."""
     shipped = read_any_preset(LOOKS / f"{name}.json", ALL_SETTINGS).settings
     return replace(
         shipped,
@@ -43,7 +43,7 @@ def look(name: str, model: str) -> ShadingSettings:
 
 
 def profile(settings: ShadingSettings, to_light: np.ndarray = TO_EYE) -> np.ndarray:
-    """Light to the eye along the strand, (601, 3)."""
+    """Light towards the eye along the strand, (601, 3)."""
     polar = np.radians(PLACES + 90.0)
     nought, half = np.zeros_like(polar), np.full_like(polar, 0.5)
     normal = np.stack([nought, -np.sin(polar), np.cos(polar)], axis=-1)
@@ -88,7 +88,7 @@ def test_blond_has_a_coloured_highlight_to_the_root_and_a_paler_one_to_the_tip(m
 
 
 def test_the_first_highlight_is_white_in_marschner() -> None:
-    """It never was inside of the hair; Kajiya-Kay tints both."""
+    """Its light has not been inside the hair. Kajiya-Kay tints both highlights."""
     _, (_, warmth) = highlights(profile(look("blond", "marschner")))
     assert warmth == pytest.approx(1.0, abs=0.1)
 
@@ -111,7 +111,7 @@ def test_separation_moves_the_first_by_itself_and_the_second_by_twice_as_much() 
 
 @pytest.mark.parametrize("model", MODELS)
 def test_light_from_above_moves_both_highlights_up(model: str) -> None:
-    """To where the strand is across the half vector: by half of what the light is raised."""
+    """To where the strand is across the half vector: by half the angle by which the light rises."""
     raised = np.radians(30.0)
     above = np.array([0.0, -np.cos(raised), np.sin(raised)])
     before = highlights(profile(look("blond", model)))

@@ -26,7 +26,7 @@ def unit(vectors: np.ndarray) -> np.ndarray:
 
 
 def published_shader(tangent, normal, to_light, to_eye, shift, mask, settings):
-    """Scheuermann's pixel shader as it is published, one pixel, plain Python."""
+    """Scheuermann's published pixel shader for one pixel, in plain Python."""
 
     def dot(a, b):
         return sum(p * q for p, q in zip(a, b, strict=True))
@@ -87,7 +87,7 @@ def test_specular_is_strongest_across_the_strand() -> None:
     lobe = strand_specular(np.broadcast_to(X, half.shape), half, 40.0)
     assert lobe.argmax() == 90 and lobe[90] == 1.0
     assert lobe[60] == pytest.approx(math.sin(math.radians(60)) ** 40)
-    # beyond 90 degrees, smoothstep(-1, 0, cos) takes light away
+    # beyond 90 degrees, smoothstep(-1, 0, cos) attenuates
     assert lobe[120] == pytest.approx(0.5 * lobe[60])
 
 
@@ -108,7 +108,7 @@ def test_sparkle_dims_the_second_highlight_only() -> None:
 
 
 def test_light_from_behind_the_eye_is_finite() -> None:
-    """Towards the light and towards the eye cancel out: there is no half vector."""
+    """The directions to light and eye cancel out, so that there is no half vector."""
     shaded = kajiya_kay(X, Z, Y, -Y, np.array(0.5), np.array(0.5), ShadingSettings())
     assert np.isfinite(shaded).all()
 
@@ -132,10 +132,10 @@ def test_strand_normal_of_a_strand_that_points_outward(tangent: np.ndarray) -> N
 
 
 def highlight_place(shift: float) -> float:
-    """Where along a hair that lies on a sphere the first highlight is, 0 root to 1 tip.
+    """The place of the first highlight along a hair on a sphere, 0 root to 1 tip.
 
-    The hair runs down a meridian from near the pole to near the equator; light and eye are
-    together at 45 degrees above the equator, so that the unshifted highlight is at its middle.
+    The hair runs down a meridian from near the pole to near the equator; light and eye are both
+    at 45 degrees above the equator, so that the unshifted highlight is at its middle.
     """
     settings = ShadingSettings(
         primary_shift=shift, secondary_strength=0.0, shift_noise=0.0, primary_exponent=200.0
@@ -152,7 +152,7 @@ def highlight_place(shift: float) -> float:
 
 
 def test_positive_shift_moves_the_highlight_to_the_tip() -> None:
-    """By geometry: T' is across H where the polar angle has grown by atan(shift)."""
+    """By geometry: T' is perpendicular to H where the polar angle has grown by atan(shift)."""
     assert highlight_place(0.0) == pytest.approx(0.5, abs=0.01)
     for shift in (0.1, 0.2, -0.1, -0.2):
         moved = math.degrees(math.atan(shift)) / 80.0

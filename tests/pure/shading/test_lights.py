@@ -1,4 +1,4 @@
-"""Lights: Blender's units, and how they are packed for the GPU."""
+"""Lights: Blender's units, and packing for the GPU."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from hairloom.addon.shading.lights import (
 
 
 def test_point_light_sends_its_whole_power_through_any_sphere() -> None:
-    """Irradiance summed over a sphere around the light is its power, whatever the radius."""
+    """The irradiance integrated over a sphere around the light is its power, for any radius."""
     random = np.random.default_rng(1)
     directions = random.normal(size=(1000, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
@@ -68,7 +68,7 @@ def test_a_radius_softens_what_is_near_and_leaves_what_is_far() -> None:
 def test_spot_is_a_point_light_inside_of_its_cone() -> None:
     spot = Light.spot((0.0, 0.0, 2.0), WHITE, 30.0, Cone(AXES, np.radians(60.0), 0.5))
     point = Light.point((0.0, 0.0, 2.0), WHITE, 30.0)
-    # half of the rim, of which half of 1 - cos(30 degrees) is bright
+    # `middle`: halfway through the rim, the outer half of 1 - cos(30 degrees)
     middle = np.arccos(1.0 - 0.75 * (1.0 - np.cos(np.radians(30.0))))
     angles = np.array([0.0, np.radians(20.0), middle, np.radians(30.01), np.pi / 2.0, np.pi])
     points = 2.0 * np.stack([np.sin(angles), 0.0 * angles, 1.0 - np.cos(angles)], axis=1)
@@ -95,7 +95,7 @@ PANELS = {
 @pytest.mark.alike
 @pytest.mark.parametrize("light", PANELS.values(), ids=PANELS)
 def test_area_light_sends_its_whole_power_to_its_front(light: Light) -> None:
-    """Summed over a plane before it, and over a far hemisphere; none behind."""
+    """Integrated over a plane before it, and over a far hemisphere; none goes behind."""
     across = np.linspace(-1.0, 1.0, 400)
     stretched = np.sinh(7.0 * across) * 0.02
     x, y = np.meshgrid(stretched, stretched)
@@ -116,7 +116,7 @@ def test_area_light_sends_its_whole_power_to_its_front(light: Light) -> None:
 
 @pytest.mark.parametrize("name", PANELS)
 def test_area_light_against_the_sum_over_its_points(name: str) -> None:
-    """Off its axis, and as near as half of its width."""
+    """Against a sum over 360,000 points of its area, also off its axis and near it."""
     light = PANELS[name]
     panel = light.panel
     assert panel is not None
@@ -159,7 +159,8 @@ def test_packed_lanes() -> None:
 
 
 def test_the_brightest_lights_come_first_and_the_weakest_are_left_out() -> None:
-    """Not by their power: a sun of 3 W/m^2 is brighter than lamps of 100 W five metres away."""
+    """Irradiance counts, not power: a sun of 3 W/m^2 is brighter than lamps of 100 W five metres
+    away."""
     lamps = [Light.point((5.0 + n, 0.0, 0.0), WHITE, 100.0) for n in range(9)]
     sun = Light.sun((0.0, 0.0, -1.0), WHITE, 3.0)
     block = pack_lights(brightest((*lamps, sun), np.zeros(3)), (0.0, 0.0, 0.0)).reshape(-1, 4)
@@ -170,7 +171,7 @@ def test_the_brightest_lights_come_first_and_the_weakest_are_left_out() -> None:
 
 
 def test_studio_hangs_on_the_camera() -> None:
-    """Turning the camera turns the lights: in view space they stay where they are."""
+    """The lights turn with the camera, so that they are fixed in view space."""
     turn = np.eye(4)
     turn[:3, :3] = [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
     for still, turned in zip(three_point_lights(np.eye(4)), three_point_lights(turn), strict=True):

@@ -1,4 +1,4 @@
-"""The looks that ship: complete, and each with a picture of its own."""
+"""The shipped looks: complete, and each with its own picture."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from hairloom.addon.shading.settings import ShadingSettings
 FOLDER = Path(__file__).parents[3] / "presets" / "looks"
 LOOKS = sorted(FOLDER.glob("*.json"))
 ASKED_FOR = ["black", "brown", "blond", "red", "grey", "dyed", "wet", "under_water", "stylised"]
-#: as `make pictures` draws them: [pixels], and the most bytes
+#: pictures by `make pictures`: side [pixels] and largest size [bytes]
 SIDE, LARGEST = 192, 45_000
 
 every_look = pytest.mark.parametrize("path", LOOKS, ids=lambda path: path.stem)
@@ -28,8 +28,8 @@ def test_all_that_were_asked_for_are_there() -> None:
 
 @every_look
 def test_a_look_names_every_value(path: Path) -> None:
-    """So it gives the same whatever was there before, also when defaults change; but for names of
-    what an artist has painted, which a look leaves alone.
+    """So a look gives the same result after any other settings, also when defaults change. It has
+    no names of painted attributes, which it leaves alone.
     """
     named = set(json.loads(path.read_text(encoding="utf-8"))["values"])
     assert named == {each.name for each in ShadingSettings.parameters() if each.kind not in NAMING}
@@ -44,7 +44,8 @@ def test_a_look_has_a_small_square_picture(path: Path) -> None:
 
 
 def test_looks_differ_in_both_models() -> None:
-    """Turning the model leaves a look its colour: what either model asks for is set."""
+    """A look sets the values of both models, so that it keeps its character when the model
+    changes."""
     settings = [read_any_preset(path, ALL_SETTINGS).settings for path in LOOKS]
     for asked in (("primary_strength",), ("strength_r", "width_r")):
         names = ("base_color", "wetness", *asked)

@@ -1,4 +1,4 @@
-"""N_p against rays traced in space through a glass cylinder, and against the sum of the energy."""
+"""N_p against rays traced in 3D through a glass cylinder, and against energy conservation."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def test_energies_agree_with_the_rays(theta: float) -> None:
 @pytest.mark.parametrize("index", [1.0, 1.01, 1.3, 1.55, 2.0, 4.0])
 @pytest.mark.parametrize("eccentricity", [1.0, 0.85, 2.0])
 def test_white_furnace_around_the_fibre(index: float, eccentricity: float) -> None:
-    """R, TT, TRT and the rest, summed over phi, make 1 for every cone."""
+    """R, TT, TRT and higher orders, integrated over phi, sum to 1 for every cone."""
     cos_d = np.cos(np.radians([0.0, 20.0, 45.0, 60.0, 75.0, 85.0, 89.0]))
     phi = (np.arange(20_000) + 0.5) / 20_000 * np.pi
     fibre = replace(CLEAR, index_of_refraction=index, eccentricity=eccentricity)
@@ -73,7 +73,7 @@ def test_white_furnace_around_the_fibre(index: float, eccentricity: float) -> No
 
 @pytest.mark.parametrize("width", few_in_commits(np.radians([25.0, 3.0, 60.0])))
 def test_a_rough_surface_spreads_light_and_keeps_it(width: float) -> None:
-    """A Gaussian takes exp(-k^2 width^2 / 2) of the k-th harmonic, and nothing of the mean."""
+    """A Gaussian scales the k-th harmonic by exp(-k^2 width^2 / 2) and keeps the mean."""
     cos_d = np.cos(np.radians([0.0, 40.0, 70.0]))
     phi = (np.arange(1440) + 0.5) / 1440 * np.pi
     smooth = Fibre(absorption=ABSORPTION)
@@ -97,7 +97,7 @@ def test_a_nearly_smooth_surface_is_smooth() -> None:
 
 
 def test_blurred_caustics_keep_their_energy_and_color() -> None:
-    """Away from the width of the blur the lobe is as it was; its integral is that over h."""
+    """The integral of the blurred lobe over phi equals the lobe's energy, integrated over h."""
     cos_d = np.cos(np.radians([0.0, 30.0, 50.0]))
     phi = (np.arange(40_000) + 0.5) / 40_000 * np.pi
     fibre = Fibre(absorption=ABSORPTION)
@@ -120,7 +120,7 @@ def test_caustic_is_where_the_turn_turns() -> None:
 
 
 def test_glints_of_ordinary_hair_lie_where_the_light_turns() -> None:
-    """Across the fibre, index 1.55: the turning point at cos^2 gamma = (n^2 - 1) / 3."""
+    """For light across the fibre, at index 1.55: the caustic at cos^2 gamma = (n^2 - 1) / 3."""
     gamma = np.arccos(np.sqrt((1.55**2 - 1.0) / 3.0))
     expected = 4.0 * np.arcsin(np.sin(gamma) / 1.55) - 2.0 * gamma
     assert np.degrees(expected) == pytest.approx(18.6, abs=0.1)
@@ -135,7 +135,7 @@ def test_fresnel_at_normal_incidence_and_at_grazing() -> None:
     bravais = bravais_index(1.55, np.array(1.0))
     assert fresnel(np.array(0.0), 1.55, bravais) == pytest.approx((0.55 / 2.55) ** 2)
     assert fresnel(np.array(np.pi / 2), 1.55, bravais) == pytest.approx(1.0)
-    brewster = np.arctan(1.55)  # what lies in the plane passes whole: half of the other is left
+    brewster = np.arctan(1.55)  # p-polarized light passes whole; the mean is half of the other
     across = np.sin(brewster - (np.pi / 2 - brewster)) ** 2
     assert fresnel(np.array(brewster), 1.55, bravais) == pytest.approx(0.5 * across)
 

@@ -1,4 +1,4 @@
-"""M_p: its measure, its narrow limit, and which way the highlights move."""
+"""M_p: its normalization, its narrow limit, and the direction in which highlights move."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ THETA = np.radians([0.0, 20.0, -20.0, 45.0, -45.0, 70.0, -70.0, 85.0, -85.0, 90.
 
 
 def marschner_gaussian(theta_h: Floats, width: float, shift: float) -> Floats:
-    """Half of the unit Gaussian of theta_h: Marschner's M_p, the narrow limit of ours."""
+    """Marschner's M_p, half of the unit Gaussian of theta_h: the narrow limit of ours."""
     return np.exp(-0.5 * ((theta_h + shift) / width) ** 2) / (2.0 * np.sqrt(2.0 * np.pi) * width)
 
 
 @pytest.mark.parametrize("width", [0.5, 2.0, 5.0, 10.0, 30.0, 90.0])
 @pytest.mark.parametrize("shift", [0.0, 3.0, -6.0])
 def test_each_lobe_integrates_to_one(width: float, shift: float) -> None:
-    """Over all directions that the shift turns into [-pi/2, pi/2], in their measure."""
+    """Over all directions that the shift turns into [-pi/2, pi/2], with their measure."""
     shift = np.radians(shift)
     lobe = longitudinal_lobe(np.radians(width), shift)
     turned = ((np.arange(10_000) + 0.5) / 10_000 - 0.5) * np.pi
@@ -54,9 +54,9 @@ def test_narrow_lobes_are_marschners(width: float) -> None:
 
 
 def traced_tilt(tilt: float, index: float) -> tuple[float, float, float]:
-    """Lean towards the tip of R, TT, TRT for light across the fibre: rays in the plane of T.
+    """Lean of R, TT and TRT towards the tip for light across the fibre, by rays in the plane of T.
 
-    The scales' outer normals lean to the root: x is the way to the tip, y is up to the light.
+    The scales' outer normals lean towards the root; x points to the tip, y to the light.
     """
 
     def mirror(way: Floats, normal: Floats) -> Floats:
@@ -82,7 +82,7 @@ def traced_tilt(tilt: float, index: float) -> tuple[float, float, float]:
 
 
 def test_r_leaves_towards_the_root_and_trt_towards_the_tip() -> None:
-    """By -2, +1 and +4 tilts; rays through tilted scales say so, with 1.1 and 4.2."""
+    """By -2, +1 and +4 tilts. Rays traced through tilted scales give -2, 1.1 and 4.2."""
     tilt = np.radians(2.0)
     lobes = longitudinal_lobes(Fibre(cuticle_tilt=tilt))
     theta_r = np.radians(np.linspace(-30.0, 30.0, 60_001))
@@ -92,7 +92,7 @@ def test_r_leaves_towards_the_root_and_trt_towards_the_tip() -> None:
 
 
 def test_highlight_of_r_lies_nearer_to_the_tip_on_a_head() -> None:
-    """A strand over a ball from its top (root) down, light and eye on the same level."""
+    """On a strand over a ball, from its top (the root) down, with light and eye at one height."""
     angle = np.radians(np.linspace(30.0, 150.0, 24_001))
     tangent = np.stack([np.cos(angle), 0.0 * angle, -np.sin(angle)], axis=1)
     to_light = np.broadcast_to([1.0, 0.0, 0.0], tangent.shape)

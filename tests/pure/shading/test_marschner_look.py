@@ -1,4 +1,4 @@
-"""From settings to light: pigment, tints, grey strands, noises, and the ends of every range."""
+"""From settings to light: pigment, tints, grey strands, noise, and the ends of every range."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def tables() -> MarschnerTables:
 
 
 def light(tables: MarschnerTables, settings: ShadingSettings, count: int = 300) -> Floats:
-    """Of strands, lights and eyes at random."""
+    """Light from random strands, with random directions to light and eye."""
     random = np.random.default_rng(4)
     directions = random.normal(size=(4, count, 3))
     tangent, normal, to_light, to_eye = directions / np.linalg.norm(directions, axis=-1)[..., None]
@@ -89,7 +89,7 @@ def test_strands_differ_in_pigment_and_the_grey_ones_have_hardly_any() -> None:
     settings = replace(PLAIN, color_variation=0.5, grey_fraction=0.25)
     noise = np.linspace(0.0, 1.0, 11)
     found = strand_absorption(settings, np.zeros(11), noise, np.ones(11))
-    assert (np.diff(found, axis=0) < 0.0).all()  # more noise, brighter, as with Kajiya-Kay
+    assert (np.diff(found, axis=0) < 0.0).all()  # more noise is brighter, as with Kajiya-Kay
     root = np.array(fibre_of(settings).absorption)
     assert found[[0, 5, 10]] == pytest.approx(np.outer([1.5, 1.0, 0.5], root))
     grey = strand_absorption(settings, np.zeros(11), np.full(11, 0.5), noise)

@@ -1,4 +1,4 @@
-"""S: both ways round the same, and the white furnace."""
+"""S: reciprocity, and the white furnace."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def test_reciprocity(fibre: Fibre) -> None:
     ],
 )
 def test_white_furnace(change: dict) -> None:
-    """R + TT + TRT + rest = 1."""
+    """R + TT + TRT + higher orders = 1."""
     theta_i = np.radians(np.linspace(-85.0, 85.0, 35))
     total = scattered_energy(replace(CLEAR, cuticle_tilt=0.0, **change), theta_i)[:, 0]
     assert total == pytest.approx(1.0, abs=0.003)
@@ -65,7 +65,7 @@ def test_the_furnace_sums_what_s_itself_scatters() -> None:
 
 @pytest.mark.parametrize(("tilt", "least"), [(2.0, 0.85), (3.0, 0.78), (8.0, 0.53)])
 def test_white_furnace_of_tilted_scales(tilt: float, least: float) -> None:
-    """Nothing gains at any angle; on one side, tilted scales lose light to their edges."""
+    """No angle gains energy; on one side, tilted scales lose light at their edges."""
     fibre = replace(CLEAR, cuticle_tilt=np.radians(tilt))
     theta_i = np.radians(np.linspace(-85.0, 85.0, 35))
     total = scattered_energy(fibre, theta_i)[:, 0]

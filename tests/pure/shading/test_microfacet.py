@@ -1,4 +1,4 @@
-"""The boundary of a surface against what is known of it: Fresnel's limits, and its energy."""
+"""Reflection at a surface: the limits of Fresnel's equations, and energy."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hairloom.addon.shading.microfacet import (
 
 
 def hemisphere(rows: int, columns: int) -> tuple[np.ndarray, np.ndarray]:
-    """Directions around +z, and the solid angle of each."""
+    """Directions over the hemisphere around +z, and the solid angle of each."""
     height = (np.arange(rows) + 0.5) / rows
     turn = (np.arange(columns) + 0.5) * 2.0 * np.pi / columns
     ring = np.sqrt(1.0 - height**2)

@@ -1,4 +1,4 @@
-"""Shafts of light: polar coordinates, the blur along them, and where lights are on the screen."""
+"""Shafts of light: polar coordinates, the radial blur, and positions of lights on the screen."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ NOTHING = np.zeros((HEIGHT, WIDTH)), np.ones((HEIGHT, WIDTH))
 
 
 def smooth_picture() -> np.ndarray:
-    """Waves that a pixel resolves, (height, width, 3) in [0, 1]."""
+    """Waves that pixels resolve, (height, width, 3) in [0, 1]."""
     y, x = np.mgrid[:HEIGHT, :WIDTH] / 12.0
     return 0.5 + 0.5 * np.stack([np.sin(x), np.cos(y), np.sin(x + y)], axis=-1)
 
@@ -47,7 +47,7 @@ def test_to_polar_coordinates_and_back_is_the_same_picture(center: tuple[float, 
 
 
 def test_a_ray_of_the_grid_runs_straight_away_from_the_light() -> None:
-    """Of a picture that holds x and y, each ray holds a line out from the centre."""
+    """In polar coordinates of a picture of x and y, each ray is a line from the centre."""
     y, x = np.mgrid[:HEIGHT, :WIDTH] + 0.5
     grid = PolarGrid.over((50.0, 40.0), WIDTH, HEIGHT, 64)
     away = to_polar(np.stack([x, y], axis=-1), grid) - (50.0, 40.0)
@@ -60,8 +60,8 @@ def test_a_ray_of_the_grid_runs_straight_away_from_the_light() -> None:
 
 
 def test_the_blur_is_its_formula() -> None:
-    """Behind an edge where V falls from 1 to 0 the blur falls as exp(-s / l), but for what no
-    longer counts of the way to the light.
+    """Behind an edge where V falls from 1 to 0, the blur falls as exp(-s / l), normalized by the
+    weights of the way to the light.
     """
     grid = PolarGrid.over((0.0, 60.0), WIDTH, HEIGHT, 2000)
     rays = np.ones((grid.angles, grid.radii, 1))
@@ -74,7 +74,7 @@ def test_the_blur_is_its_formula() -> None:
 
 
 def test_haze_without_anything_in_it_is_the_formula() -> None:
-    """And the brightness at a light of irradiance pi is that of matt white, at strength 1."""
+    """At strength 1, the brightness at a light of irradiance pi is that of matt white."""
     light = Light.sun((0.0, -1.0, 0.0), (1.0, 0.5, 0.25), np.pi)
     (seen,) = lights_on_screen([light], VIEW, PROJECTION, WIDTH, HEIGHT, ON)
     assert seen.center == pytest.approx((80.0, 60.0))
@@ -97,7 +97,7 @@ def test_a_bar_throws_its_shaft_away_from_the_light_and_only_there() -> None:
     share = light_shafts(black, alpha, depth, [light], ON.samples)[..., 0] / open_picture
     assert share[60, 66] < 0.92 and share[60, 66] < share[60, 90] < share[60, 130] < 1.0
     assert share[60, :58].min() > 0.999 and share[90, 66:108].min() > 0.999
-    # twice the bar's distance from the light the shaft is twice as wide
+    # at twice the bar's distance from the light, the shaft is twice as wide
     assert share[60 + 16, 90] < 0.999 and share[60 + 24, 90] > 0.999
 
 
@@ -140,7 +140,7 @@ def test_strength_is_a_factor_and_length_0_changes_nothing() -> None:
         (Light.point((0.0, -2.0 + 1e-9, 0.0), (1, 1, 1), 99.0), (80.0, 60.0)),
         (Light.point((0.0, 0.0, 2.0 * np.tan(np.radians(20.0))), (1, 1, 1), 99.0), (80.0, 120.0)),
         (Light.point((0.0, 0.0, 1.0), (1, 1, 1), 99.0), (80.0, 60.0 + 60.0 / 0.72794)),
-        (Light.sun((-1.0, -0.001, 0.0), (1, 1, 1), 4.0), None),  # seen, but much too far aside
+        (Light.sun((-1.0, -0.001, 0.0), (1, 1, 1), 4.0), None),  # ahead, but much too far aside
     ],
 )
 def test_where_a_light_is_on_the_screen(light: Light, place: tuple[float, float] | None) -> None:
@@ -154,7 +154,7 @@ def test_where_a_light_is_on_the_screen(light: Light, place: tuple[float, float]
 
 
 def test_the_picture_has_no_jump_as_a_light_leaves_it() -> None:
-    """From just inside of the border to just outside, where the grid is another one."""
+    """From just inside the border to just outside, where another grid is used."""
     alpha, depth = np.zeros((HEIGHT, WIDTH)), np.ones((HEIGHT, WIDTH))
     alpha[40:80:8, 20:], depth[40:80:8, 20:] = 1.0, 0.5
     black = np.zeros((HEIGHT, WIDTH, 4))
@@ -167,7 +167,7 @@ def test_the_picture_has_no_jump_as_a_light_leaves_it() -> None:
 
 
 def test_a_part_of_a_picture_is_as_it_is_in_the_whole() -> None:
-    """Drawn alone by a projection of its own, where nothing outside of it throws shafts."""
+    """Drawn alone with its own projection, in a scene where nothing outside it throws shafts."""
     light = Light.point((0.05, 0.2, 0.03), (1.0, 0.8, 0.6), 200.0)
     alpha, depth = np.zeros((HEIGHT, WIDTH)), np.ones((HEIGHT, WIDTH))
     alpha[50:80:6, 60:120], depth[50:80:6, 60:120] = 0.7, 0.5

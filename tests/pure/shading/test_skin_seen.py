@@ -1,4 +1,4 @@
-"""Skin that hair sees, against rays that are counted and means that are known."""
+"""Skin seen from hair, against brute-force rays and known means."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ RADIUS = 0.1
 
 
 def ball(radius: float = RADIUS, rings: int = 48) -> Surface:
-    """A ball around the origin, faces outwards."""
+    """A ball around the origin whose faces point outwards."""
     polar, round_ = np.meshgrid(
         np.linspace(0.0, np.pi, rings + 1),
         np.linspace(0.0, 2.0 * np.pi, 2 * rings + 1),
@@ -61,7 +61,7 @@ def hair(points: np.ndarray, radius: float) -> StrandSet:
 
 
 def spikes(count: int = 40, length: float = 0.12) -> StrandSet:
-    """Straight out of the ball, too thin to be in any light's way."""
+    """Strands straight out of the ball, too thin to block light."""
     random = np.random.default_rng(3)
     out = random.normal(size=(count, 1, 3))
     out /= np.linalg.norm(out, axis=-1, keepdims=True)
@@ -69,8 +69,8 @@ def spikes(count: int = 40, length: float = 0.12) -> StrandSet:
 
 
 def light_of_ball(points: np.ndarray, to_light: np.ndarray) -> np.ndarray:
-    """The light that comes to points off a white ball lit by one sun, its mean over all directions
-    over that of a surface which faces the sun: by rays, without any grid.
+    """Mean light over all directions at points beside a white ball under one sun, relative to a
+    surface that faces the sun, by rays without a grid.
     """
     random = np.random.default_rng(5)
     ways = random.normal(size=(4000, 3))
@@ -89,7 +89,7 @@ def light_of_ball(points: np.ndarray, to_light: np.ndarray) -> np.ndarray:
 def test_light_off_a_ball_is_that_of_rays() -> None:
     strands = spikes()
     seen = skin_seen(strands, strands.points, ball(), 1.0)
-    # in cells a ball is half a cell larger; farther away, 26 directions hit one or do not
+    # nearer, cells make the ball half a cell larger; farther away, few of 26 directions hit it
     away = np.linalg.norm(strands.points, axis=1) / RADIUS
     some = (away > 1.35) & (away < 1.9)
     sun = np.array([0.6, 0.0, 0.8])
@@ -100,7 +100,7 @@ def test_light_off_a_ball_is_that_of_rays() -> None:
 
 
 def test_what_lies_right_beneath_is_not_far() -> None:
-    """Next to the ball all skin is beneath, and its normal is the ball's; away from it none is."""
+    """At the ball all skin is right beneath, with the ball's normal; away from it none is."""
     strands = spikes()
     seen = skin_seen(strands, strands.points, ball(), 1.0)
     height = np.linalg.norm(strands.points, axis=1) - RADIUS
@@ -114,7 +114,7 @@ def test_what_lies_right_beneath_is_not_far() -> None:
 
 
 def test_a_root_a_little_below_the_skin_sees_it() -> None:
-    """Cells within the body, which lie around it, know of nothing."""
+    """Although it lies among cells inside the body, which have no values."""
     strands = spikes()
     out = strands.roots / np.linalg.norm(strands.roots, axis=1, keepdims=True)
     seen = skin_seen(strands, (RADIUS - 0.005) * out, ball(), 1.0)
@@ -122,7 +122,7 @@ def test_a_root_a_little_below_the_skin_sees_it() -> None:
 
 
 def test_no_light_comes_off_skin_within_a_body() -> None:
-    """A ball within a larger one is lit by nothing."""
+    """A ball inside a larger one receives no light."""
     strands, one, around = spikes(), ball(), ball(2.6 * RADIUS)
     both = Surface(
         np.concatenate([one.positions, around.positions]),
@@ -135,7 +135,7 @@ def test_no_light_comes_off_skin_within_a_body() -> None:
 
 
 def cloud(count: int, low: float, high: float) -> tuple[StrandSet, float]:
-    """Short strands around the ball, evenly between two radii, and their depth straight out."""
+    """Short strands around the ball, evenly between two radii, and their radial optical depth."""
     random = np.random.default_rng(8)
     half, width = 0.01, 3e-4
     out, across = random.normal(size=(2, count, 3))
@@ -149,15 +149,15 @@ def cloud(count: int, low: float, high: float) -> tuple[StrandSet, float]:
 
 
 def outside_of(strands: StrandSet) -> StrandSet:
-    """Short strands farther out than others, too thin to be in any light's way."""
+    """Short strands farther out than others, too thin to block light."""
     out = strands.points[::2] / np.linalg.norm(strands.points[::2], axis=-1, keepdims=True)
     outside = 2.0 * RADIUS * out[:400]
     return hair(np.stack([outside, 1.005 * outside], axis=1), 1e-9)
 
 
 def test_hair_in_the_way_is_counted_on_both_ways() -> None:
-    """Light goes to the ball through a cloud around it, and back: each time, in all directions that
-    there are, through one to one and a half of its depth straight out.
+    """Light goes to the ball and back through a cloud around it: each time, on average over all
+    directions, through 1 to 1.5 times its radial depth.
     """
     strands, depth = cloud(6000, 1.3 * RADIUS, 1.8 * RADIUS)
     seen = skin_seen(strands, outside_of(strands).points, ball(), 1.0)
@@ -165,8 +165,8 @@ def test_hair_in_the_way_is_counted_on_both_ways() -> None:
 
 
 def test_hair_on_the_side_of_the_light_shades_the_skin() -> None:
-    """Beside a ball with hair on its right, light from the left comes off it, and from the right
-    hardly any; without the hair both do alike."""
+    """With hair on the right of a ball, light from the left is reflected by it, but hardly any from
+    the right; without the hair both are."""
     around, depth = cloud(60_000, 1.15 * RADIUS, 1.5 * RADIUS)
     middle = around.points[::2]
     is_right = middle[:, 0] > 0.25 * np.linalg.norm(middle, axis=1)
@@ -187,8 +187,8 @@ def test_hair_on_the_side_of_the_light_shades_the_skin() -> None:
 
 
 def test_gaps_let_through_what_a_spread_of_depths_does() -> None:
-    """The mean of exp(-x tau) over a gamma distribution with a variance of GAPS times its mean,
-    over that where strands take PART.
+    """Against means of exp(-x tau) over gamma-distributed depths with a variance of GAPS times the
+    squared mean, relative to strands that absorb PART.
     """
     random = np.random.default_rng(2)
     depths = random.gamma(1.0 / GAPS, GAPS, 400_000)
@@ -199,7 +199,7 @@ def test_gaps_let_through_what_a_spread_of_depths_does() -> None:
 
 
 def test_light_off_one_normal_is_that_of_a_matt_surface() -> None:
-    """q0 and q of a cosine give the cosine back, and those of light from everywhere its mean."""
+    """q0 and q of a cosine reproduce the cosine, and those of uniform light its mean."""
     random = np.random.default_rng(4)
     lights = random.normal(size=(500, 3))
     lights /= np.linalg.norm(lights, axis=-1, keepdims=True)
@@ -216,7 +216,7 @@ def seen_at_rest(strands: StrandSet, head: Surface) -> np.ndarray | None:
 
 
 def test_what_strands_see_turns_with_them() -> None:
-    """By the axes of the strand, a quarter of a turn around the head is none."""
+    """In the axes of the strand, values do not change when hair and head turn by 90 degrees."""
     strands, head = spikes(), ball()
     turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     turned = replace(strands, points=strands.points @ turn.T)
@@ -224,7 +224,7 @@ def test_what_strands_see_turns_with_them() -> None:
     one, other = (seen_at_rest(*each) for each in ((strands, head), (turned, turned_head)))
     assert one is not None
     assert other is not None
-    # depth is of hardly any hair
+    # the depth is that of almost no hair
     np.testing.assert_allclose(other[:, :7], one[:, :7], atol=0.02)
     assert one[:, 4].max() > 0.7, "spikes run along the normal of what lies beneath"
 
@@ -262,8 +262,8 @@ def test_a_plane_alone_is_as_before() -> None:
 def test_skin_in_cells_is_found_once_for_hair_that_keeps_its_grid(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """As under a comb; and for other cells or another head again. The field is the same to the
-    bit."""
+    """As under a comb; other cells or another head are computed again. The field is the same bit
+    for bit."""
     found: list[int] = []
     cut = skin_seen_module.small_triangles
     monkeypatch.setattr(

@@ -1,4 +1,4 @@
-"""The stage: as bright at any size, its lights where it says, and a soft backdrop."""
+"""The stage: the same brightness at any size, the positions of its lights, and a soft backdrop."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def test_the_backdrop_fades_evenly_from_its_centre() -> None:
     np.testing.assert_array_equal(picture, picture[::-1])
     corner, center = picture[0, 0, 0], stage.backdrop_center[0]
     assert 0.1 < corner < 0.1 + 0.08 * center
-    # as large as one likes, it is the same picture
+    # the same picture at any resolution
     np.testing.assert_allclose(backdrop(stage, 183, 123)[1::3, 1::3], picture, atol=1e-6)
 
 

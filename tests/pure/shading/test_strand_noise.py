@@ -1,4 +1,4 @@
-"""The strands' noise: its hash against whole-number arithmetic, and what shading relies on."""
+"""The strands' noise: its hash against integer arithmetic, and properties that shading needs."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from hairloom.addon.shading.strand_noise import SEED_LIMIT, hash_integer, hash_u
 
 
 def wellons(value: int) -> int:
-    """lowbias32 in Python's own unbounded integers."""
+    """lowbias32 in Python's unbounded integers."""
     value ^= value >> 16
     value = value * 0x7FEB352D % 2**32
     value ^= value >> 15

@@ -1,4 +1,4 @@
-"""Moving points against float64 matrix products."""
+"""Transformed points against float64 matrix products."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Centre lines: what few CVs can show of a curl."""
+"""Centre lines: the part of a curl's shape that few CVs can represent."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hairloom.addon.strands.resample import resample
 
 
 def coils(turns: tuple[int, ...], cv_count: int = 800, radius: float = 0.008) -> StrandSet:
-    """One of each number of turns, 25 cm long, along -Z."""
+    """A coil for each number of turns, 25 cm long, along -Z."""
     along = np.linspace(0.0, 1.0, cv_count)
     grid = [
         np.stack(
@@ -59,7 +59,7 @@ def test_what_cvs_can_follow_is_merely_resampled() -> None:
 
 
 def test_strands_of_that_many_points_become_even_too() -> None:
-    """As those of any other count: strands ride by how far along their guides they are."""
+    """As strands of any other count, since strands ride by their place along their guides."""
     place = np.linspace(0.0, 1.0, 16) ** 2
     straight = strand_set(place[None, :, None] * np.array([0.0, 0.0, -0.25]))
     lines = center_lines(straight, 16).grid
@@ -67,7 +67,7 @@ def test_strands_of_that_many_points_become_even_too() -> None:
 
 
 def test_the_mean_is_that_of_the_strand_around_each_cv() -> None:
-    """Against the integral with the tent, by brute force."""
+    """Against a brute-force integral weighted by a tent function."""
     strands, cv_count = coils((9,)), 10
     lines = center_lines(strands, cv_count).grid[0]
     dense = resample(strands, 9 * 5000 + 1).grid[0].astype(np.float64)
@@ -78,7 +78,7 @@ def test_the_mean_is_that_of_the_strand_around_each_cv() -> None:
 
 
 def test_a_line_does_not_depend_on_other_strands() -> None:
-    """Bit for bit, whatever points the others have: what is kept of them is compared so."""
+    """Bit for bit, whatever points others have, since cached lines are compared bit by bit."""
     coil, other = coils((9,)), coils((5, 7), cv_count=120)
     both = center_lines(joined(other, coil), 10)
     assert np.array_equal(both.grid[2], center_lines(coil, 10).grid[0])

@@ -40,7 +40,7 @@ def test_each_fault_is_counted_once_and_named() -> None:
 
 @pytest.mark.parametrize("factor", [1e-6, 1e-3, 1e3])
 def test_hair_of_any_size_is_kept(factor: float) -> None:
-    """Stubble of a millimetre on a face two metres up; what has no length never has one."""
+    """Stubble of a millimetre on a face two metres up is kept; a strand of no length is not."""
     roots = np.random.default_rng(1).uniform(-0.1, 0.1, (50, 1, 3)) + [0.0, 0.0, 2.0]
     curves = roots + np.linspace(0.0, 1e-3, 5)[:, None] * [0.0, -1.0, 0.0]
     curves[7] = curves[7, 0]
@@ -75,7 +75,7 @@ def test_an_empty_curve_at_the_end_is_dropped_and_spares_its_neighbour() -> None
 
 
 def test_a_strand_that_ends_in_a_point_stays_pointed() -> None:
-    """At its tip, or at both ends; what is no width at all is as wide as most of the hair."""
+    """At its tip, or at both ends. Invalid widths become as wide as most of the hair."""
     points = np.zeros((20, 3))
     points[:, 2] = np.arange(20)
     tapered, spindle = np.linspace(1e-2, 0.0, 5), np.float64([0.0, 2e-3, 1e-2, 2e-3, 0.0])

@@ -19,7 +19,7 @@ BOX = Surface(BOX_CORNERS, [q[:3] for q in BOX_QUADS] + [(q[0], q[2], q[3]) for 
 
 
 def ericson(p: Floats, a: Floats, b: Floats, c: Floats) -> Floats:
-    """ClosestPtPointTriangle of Real-Time Collision Detection, section 5.1.5, one at a time."""
+    """ClosestPtPointTriangle of Real-Time Collision Detection, section 5.1.5, for one point."""
     ab, ac, ap = b - a, c - a, p - a
     d1, d2 = ab @ ap, ac @ ap
     if d1 <= 0 and d2 <= 0:
@@ -108,7 +108,7 @@ def test_sliver_is_answered_to_within_its_width() -> None:
 
 
 def test_middle_of_a_sphere_is_equally_far_from_everything() -> None:
-    """All triangles are candidates: the widest search there is, over the limit of pairs."""
+    """All triangles are candidates, the widest possible search, beyond the limit of pairs."""
     around, up = np.meshgrid(np.linspace(0, 2 * np.pi, 129)[:-1], np.linspace(0, np.pi, 65))
     positions = np.stack(
         [np.sin(up) * np.cos(around), np.sin(up) * np.sin(around), np.cos(up)], axis=-1
@@ -146,7 +146,8 @@ def test_reach_keeps_near_answers_and_tells_far_ones_apart() -> None:
 def test_points_that_lie_together_agree_with_all_triangles(
     spread: float, shift: float, reach: float
 ) -> None:
-    """In clusters of many points near to and far from a soup of triangles of all sizes."""
+    """Against all triangles: clusters of points near and far from a soup of triangles of all
+    sizes."""
     random = np.random.default_rng(11)
     sizes = random.uniform(0.01, 0.4, (300, 1, 1))
     corners = random.uniform(-1, 1, (300, 1, 3)) + sizes * random.normal(size=(300, 3, 3))
@@ -165,7 +166,7 @@ def test_points_that_lie_together_agree_with_all_triangles(
 
 
 def test_a_cluster_in_the_middle_of_a_ball_finds_the_nearest_of_all_its_triangles() -> None:
-    """Each of so many may be the nearest one, so that they are searched point by point."""
+    """So many triangles may be the nearest one that the search goes point by point."""
     random = np.random.default_rng(12)
     directions = random.normal(size=(4000, 1, 3))
     directions /= np.linalg.norm(directions, axis=2, keepdims=True)

@@ -1,4 +1,4 @@
-"""The hair's own colours on their way from curves to strands that are drawn."""
+"""The hair's own colours, from curves to drawn strands."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def sheet() -> Surface:
 
 
 def halves(left: tuple[float, ...] = RED, right: tuple[float, ...] = BLUE) -> StrandSet:
-    """Guides that stand on the square, of one colour on each side of x = 0."""
+    """Upright guides on the square, with one colour on each side of x = 0."""
     x, y = (each.ravel() for each in np.meshgrid(*[np.linspace(-0.09, 0.09, 10)] * 2))
     height = np.linspace(0.0, 0.1, 4)
     grid = np.stack(np.broadcast_arrays(x[:, None], y[:, None], height), axis=-1)
@@ -94,7 +94,7 @@ def halves(left: tuple[float, ...] = RED, right: tuple[float, ...] = BLUE) -> St
 
 @pytest.mark.parametrize("way", ["multi", "single"])
 def test_children_mix_the_colours_of_their_guides(way: str) -> None:
-    """By the very weights that they ride on; a third colour is nowhere."""
+    """With the weights by which they ride."""
     children = ChildrenSettings(method=way, strand_count=300)
     settings = GuideSettings(guide_count=100, cv_count=4)
     rig = rig_flow.prepare(halves(), sheet(), settings, place="a wig", children=children)

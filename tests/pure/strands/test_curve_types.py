@@ -1,5 +1,5 @@
-"""Points on Bezier curves, NURBS and polygons: against closed forms; against Blender's own
-conversion in tests/blender/test_curves.py."""
+"""Points on Bezier curves, NURBS and polygons against closed forms. tests/blender/test_curves.py
+compares them with Blender's conversion."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from hairloom.addon.strands.curve_types import (
 def shapes_of(
     points: Floats, kind: CurveType, order: int = 4, knots: Knots = Knots.ENDPOINT
 ) -> CurveShapes:
-    """Of a single curve through or near these points."""
+    """The shape of a single curve with these control points."""
     one = np.ones(1, np.int32)
     weight = np.ones(len(points), np.float32)
     return CurveShapes(kind * one, 12 * one, order * one, knots * one, weight, points, points)
@@ -31,7 +31,7 @@ def drawn(points: Floats, shapes: CurveShapes) -> DrawnCurves:
 
 
 def test_a_quarter_of_a_circle_is_a_quarter_of_a_circle() -> None:
-    """As NURBS of order 3 with the middle point's weight the cosine of 45 degrees."""
+    """As NURBS of order 3 whose middle point has the weight cos(45 degrees)."""
     points = np.float32([[1, 0, 0], [1, 1, 0], [0, 1, 0]])
     shapes = shapes_of(points, CurveType.NURBS, order=3)
     found = drawn(points, replace(shapes, weight=np.float32([1.0, np.sqrt(0.5), 1.0])))
@@ -51,7 +51,7 @@ def test_nurbs_with_knots_of_bezier_curves_are_bezier_curves() -> None:
 
 def test_values_go_along_with_the_points() -> None:
     points = np.linspace(0.0, 1.0, 5)[:, None] * np.float32([0.0, 0.0, 1.0])
-    handle = np.float32([0.0, 0.0, 1.0 / 12.0])  # where a Bezier curve goes straight at one speed
+    handle = np.float32([0.0, 0.0, 1.0 / 12.0])  # a straight Bezier curve at constant speed
     for kind in CurveType:
         shapes = shapes_of(points, kind, order=3)
         found = drawn(points, replace(shapes, left=points - handle, right=points + handle))

@@ -1,4 +1,4 @@
-"""Tangents and twist-free normals of curves whose frames are known in closed form."""
+"""Tangents and twist-free normals, against curves with frames in closed form."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def test_reversal_and_parallel_root_normal_stay_finite() -> None:
 
 
 def test_tangents_of_strands_one_after_the_other() -> None:
-    """As those of each strand by itself."""
+    """Against those of each strand alone."""
     grid = np.random.default_rng(4).normal(size=(20, 5, 3))
     found = strand_tangents(grid.reshape(-1, 3).T, np.arange(21) * 5).T
     assert found.reshape(20, 5, 3) == pytest.approx(tangents(grid))

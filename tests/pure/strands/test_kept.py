@@ -1,4 +1,4 @@
-"""What is kept changes nothing but the time."""
+"""Cached results equal computed ones."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from hairloom.addon.strands.nearest import nearest_points
 
 
 def cloud(count: int, seed: int, rounded: int | None = None) -> np.ndarray:
-    """Points in a cube; on a grid of this many places along its side, where many are as near."""
+    """Random points in a cube, optionally rounded to a grid, where many distances are equal."""
     points = np.random.default_rng(seed).uniform(-1.0, 1.0, (count, 3))
     return (points if rounded is None else np.round(points * rounded) / rounded).astype(np.float32)
 
 
 def change(points: np.ndarray, kind: str, seed: int) -> np.ndarray:
-    """Some of the points moved, taken away, added, or all of them shuffled."""
+    """The points with some moved, removed or added, or all shuffled."""
     random = np.random.default_rng(seed)
     some = random.choice(len(points), max(len(points) // 20, 1), replace=False)
     if kind == "moved":
@@ -72,7 +72,7 @@ def test_few_places_are_asked_again(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_only_new_rows_are_made() -> None:
-    """Wherever others have been; and numbers of any kind count bit by bit."""
+    """Rows are found wherever they were before; values of any type are compared bit by bit."""
     kept, asked = Kept(), []
     rows = np.random.default_rng(3).normal(size=(50, 4, 3)).astype(np.float32)
     key = np.arange(50, dtype=np.uint64)

@@ -1,4 +1,4 @@
-"""Edges of a box, of which each fault is known; and places that are one."""
+"""Faults at the edges of a box, against known ones, and coincident places."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def test_each_fault_is_counted() -> None:
     odd = edges_of(Surface(CORNERS, turned))
     assert not odd.are_closed
     assert (odd.open_count, odd.crowded_count, odd.opposed_count) == (0, 0, 3)
-    # a wall within, along two edges of the box and two diagonals of its faces, which are edges too
+    # an inner wall along two edges of the box and two diagonals of its faces, edges as well
     wall = np.concatenate([TRIANGLES, [(0, 3, 7), (0, 7, 4)]])
     inner = edges_of(Surface(CORNERS, wall))
     assert not inner.are_closed

@@ -1,4 +1,4 @@
-"""The order of points along a curve that fills space."""
+"""The order of points along a space-filling curve."""
 
 import numpy as np
 

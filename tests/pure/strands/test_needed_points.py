@@ -1,4 +1,4 @@
-"""As many points as strands need: shapes are kept, by brute force."""
+"""As many points as strands need: shapes are kept, tested by brute force."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hairloom.addon.strands.needed_points import LOST, MAX_POINTS, STRAY, with_n
 
 
 def coil(turns: float, count: int) -> Floats:
-    """25 cm along -Z, 8 mm around it."""
+    """A coil of 25 cm along -Z with a radius of 8 mm."""
     along = np.linspace(0.0, 1.0, count)
     angle = 2.0 * np.pi * turns * along
     return np.stack([0.008 * np.cos(angle), 0.008 * np.sin(angle), -0.25 * along], axis=1)
@@ -53,8 +53,8 @@ def test_no_strand_loses_length_or_strays() -> None:
 
 
 def test_points_are_hardly_more_than_a_circle_needs() -> None:
-    """A chord over the angle a of a circle strays by 1 - cos(a / 2) of the radius, and is by the
-    square of a over 24 shorter."""
+    """A chord over the angle a of a circle strays by 1 - cos(a / 2) of the radius, and is shorter
+    by a^2 / 24."""
     strand = ragged(coil(6, 4000))
     (count,) = with_needed_points(strand, 16).point_counts.tolist()
     length = float(strand.lengths()[0])
@@ -88,7 +88,8 @@ def test_kinks_that_even_points_would_miss_keep_their_points() -> None:
 
 
 def test_a_coil_of_twenty_turns_keeps_its_length() -> None:
-    """Whatever points it comes with: few would be put inside of the curve, on its chords."""
+    """With any number of input points; resampling a polyline of few points would put new ones on
+    its chords, inside the curve."""
     for count in (400, 1000, 5000):
         strands = ragged(coil(20, count))
         kept = with_needed_points(strands, 16).lengths() / strands.lengths()

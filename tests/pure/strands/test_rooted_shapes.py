@@ -1,4 +1,4 @@
-"""Strands by root UV and shape: the same again on the same surface, and carried to others."""
+"""Strands stored by root UV and shape: restored on the same surface, and transferred to others."""
 
 from dataclasses import replace
 
@@ -14,7 +14,7 @@ RANDOM = np.random.default_rng(5)
 
 
 def dome(side: int = 9, *, mirrored: bool = False) -> Surface:
-    """A bulge over the unit square, whose map is the square seen from above."""
+    """A bulge over the unit square, whose UVs are x and y."""
     across = np.linspace(0.0, 1.0, side)
     u, v = (part.ravel() for part in np.meshgrid(across, across))
     positions = np.stack([u, v, 0.3 * np.sin(3.0 * u) + 0.2 * v * v], axis=1)
@@ -48,7 +48,7 @@ def test_the_same_strands_come_back_on_the_same_surface(mirrored: bool) -> None:
 
 
 def test_a_turned_and_larger_surface_carries_them_as_one() -> None:
-    """Held against the matrix itself."""
+    """Against the matrix itself."""
     surface = dome()
     strands = strands_on(surface)
     angle, scale = 0.7, 2.5

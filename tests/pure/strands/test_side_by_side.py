@@ -31,7 +31,7 @@ def test_answers_come_in_order_and_errors_come_through(monkeypatch: pytest.Monke
 def test_nearest_points_are_the_same_in_several_threads(
     threads: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Against all distances; points that lie on each other are as near, and the first counts."""
+    """Against all distances; of coincident points the first counts."""
     monkeypatch.setattr(nearest, "THREADS", threads)
     random = np.random.default_rng(1)
     places = random.random((nearest._MANY + 501, 3))

@@ -1,4 +1,4 @@
-"""`StrandSet`: what it refuses, and that its ragged arithmetic agrees with plain loops."""
+"""`StrandSet`: invalid input, and its ragged arithmetic against plain loops."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`Surface`: what it refuses, normals known in closed form, and mirroring."""
+"""`Surface`: invalid input, normals in closed form, and mirroring."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ QUADS = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (
 
 
 def cube() -> Surface:
-    """All faces counter-clockwise seen from outside, cut along one diagonal each."""
+    """A cube whose faces are counter-clockwise from outside, each split along one diagonal."""
     triangles = [q[:3] for q in QUADS] + [(q[0], q[2], q[3]) for q in QUADS]
     uv = np.random.default_rng(1).random((12, 3, 2))
     return Surface(CORNERS, triangles, uv)
@@ -29,12 +29,12 @@ def test_triangle_normals_point_out_of_the_cube() -> None:
 
 
 def test_vertex_normals_do_not_see_the_diagonals() -> None:
-    """Weighted by angle they are the cube's diagonals, however its faces are cut."""
+    """Weighted by angle, they are the cube's diagonals, however its faces are split."""
     assert cube().vertex_normals() == pytest.approx(CORNERS / np.sqrt(3.0), abs=1e-6)
 
 
 def split(surface: Surface, is_split: Any) -> Surface:
-    """With vertices of their own for these triangles, as files have them along seams."""
+    """A surface in which these triangles have their own vertices, as in files along seams."""
     positions, triangles = list(surface.positions), surface.triangles.copy()
     for triangle in np.flatnonzero(is_split):
         triangles[triangle] = len(positions) + np.arange(3)
@@ -43,8 +43,8 @@ def split(surface: Surface, is_split: Any) -> Surface:
 
 
 def test_vertex_normals_do_not_see_seams_but_hard_edges() -> None:
-    """A tube of 24 sides, parted on one half, has the normals of the whole one; a box that is
-    parted everywhere has those of its faces."""
+    """A tube of 24 sides with one half split has the normals of the whole tube; a fully split box
+    has those of its faces."""
     angle = 2.0 * np.pi * np.arange(24) / 24
     rings = [np.stack([np.cos(angle), np.sin(angle), np.full(24, z)], axis=1) for z in (0, 1, 2)]
     one = np.arange(48)

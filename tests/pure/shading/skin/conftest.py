@@ -1,4 +1,4 @@
-"""Surfaces with UV maps of which we know everything."""
+"""Surfaces with known UV maps."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def square() -> Callable[..., Surface]:
 
 @pytest.fixture
 def two_islands() -> Surface:
-    """The square cut along x = 0.1: its right half lies turned, smaller and far off in the map."""
+    """The square cut along x = 0.1: in the map its right half is turned, smaller and far away."""
     whole = plane()
     assert whole.corner_uv is not None
     uv = whole.corner_uv.astype(np.float64)

@@ -1,4 +1,4 @@
-"""Light that spreads along the skin: what is kept, how far it gets, and seams."""
+"""Light that spreads along the skin: energy, distance, and seams."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def spread(values: np.ndarray, layout: SkinLayout, softness: float) -> np.ndarra
 
 
 def both_sides(values: np.ndarray, layout: SkinLayout) -> tuple[np.ndarray, np.ndarray]:
-    """Values at places along all seams, as one side has them and as the other."""
+    """Values at places along all seams, read from one side and from the other."""
     share = np.linspace(0.0, 1.0, 9)[None, :, None]
     place = layout.seams[:, :1] * (1.0 - share) + layout.seams[:, 1:] * share
     islands = np.repeat(layout.seam_islands, 9, axis=0)
@@ -46,7 +46,7 @@ def test_what_is_the_same_everywhere_stays(two_islands: Surface) -> None:
 def test_light_gets_as_far_in_metres_however_the_map_is_stretched(
     square: Callable[..., Surface], stretched: tuple[float, float]
 ) -> None:
-    """One lit place: all of its light is still there, and its variance is the softness squared."""
+    """One lit place keeps its energy, and its variance is the squared softness."""
     surface, softness = square(), 0.008
     uv = np.asarray(surface.corner_uv) * stretched
     layout = skin_layout(Surface(surface.positions, surface.triangles, uv), 512)
@@ -58,13 +58,13 @@ def test_light_gets_as_far_in_metres_however_the_map_is_stretched(
     place = shown(layout, surface)
     for axis in range(2):
         variance = float((found * (place[..., axis] - place[row, column, axis]) ** 2).sum())
-        # a Gaussian that ends after 2.5 standard deviations has 0.91 of its variance
+        # a Gaussian cut off at 2.5 standard deviations has 0.91 of its variance
         assert np.sqrt(variance) == pytest.approx(softness * np.sqrt(0.91), rel=0.03)
 
 
 @pytest.mark.slow(instead="test_no_seam_is_seen")
 def test_light_goes_on_across_a_seam(two_islands: Surface, square: Callable[..., Surface]) -> None:
-    """An edge of shadow beside the seam is as soft as on a plane that was not cut."""
+    """A shadow's edge beside the seam is as soft as on a plane without seams."""
     whole = square()
     softness, edge = 0.006, 0.096
 
@@ -85,7 +85,7 @@ def test_light_goes_on_across_a_seam(two_islands: Surface, square: Callable[...,
 
 @pytest.mark.parametrize("softness", few_in_commits([0.001, 0.004, 0.01]))
 def test_no_seam_is_seen(two_islands: Surface, softness: float) -> None:
-    """Stripes of shadow that cross the seam slantwise, with the hardest edges there are."""
+    """With hard-edged stripes of shadow that cross the seam at a slant, both sides agree."""
     layout = skin_layout(two_islands, 512)
     place = shown(layout, two_islands)
     stripes = np.sin(120.0 * place[..., 1] + 50.0 * place[..., 0]) > 0.0

@@ -24,7 +24,7 @@ def shown(layout: SkinLayout, surface: Surface) -> np.ndarray:
 
 
 def test_each_texel_shows_its_own_place(square: Callable[..., Surface]) -> None:
-    """Inside, and in the rim beyond it the nearest place."""
+    """Inside the island its own place, and in the rim around it the nearest place."""
     surface = square()
     layout = skin_layout(surface, 128)
     margin = 128 // 8
@@ -36,17 +36,17 @@ def test_each_texel_shows_its_own_place(square: Callable[..., Surface]) -> None:
     assert np.abs(shown(layout, surface)[is_shown][:, :2] - expected[is_shown]).max() < 1e-6
     inside = ((middle > 0.0) & (middle < 0.2)).all(axis=-1)
     assert is_shown[inside].all() and layout.stretch[inside] == pytest.approx(texel)
-    # no more than is needed for looking up between texels
+    # no more than interpolation between texels needs
     assert 0 < is_shown.sum() - inside.sum() < 9 * (128 - 2 * margin)
 
 
 def test_beyond_a_seam_texels_show_what_lies_across_it(two_islands: Surface) -> None:
-    """As if the other island went on: a plane that is cut goes on as the plane."""
+    """Against the uncut plane: the texels continue it beyond the seam."""
     layout = skin_layout(two_islands, 512)
     left = layout.triangle_island[0]
     place = layout.place[layout.triangle_island == left]
     corner = two_islands.corners[layout.triangle_island == left][..., :2].astype(float)
-    # the left half's own way from the world to the map, gone on with beyond its borders
+    # the left half's own affine map between texels and the world, extrapolated
     map_of = np.linalg.lstsq(
         np.concatenate([place.reshape(-1, 2), np.ones((place.size // 2, 1))], axis=1),
         corner.reshape(-1, 2),
@@ -80,13 +80,13 @@ def test_where_a_map_lies_says_nothing(two_islands: Surface, way: str) -> None:
     surface = replace(two_islands, corner_uv=changed)
     before, layout = skin_layout(two_islands, 128), skin_layout(surface, 128)
     island = before.island[:, ::-1] if way == "mirrored" else before.island
-    # rounding of 32 bits moves a texel on a border here and there
+    # float32 rounding changes single texels on borders
     assert ((island >= 0) != (layout.island >= 0)).mean() < 0.002
     assert uv_notes(surface) == ()
 
 
 def test_where_triangles_overlap_nothing_is_shown(square: Callable[..., Surface]) -> None:
-    """The right half lies mirrored upon the left one, but for a strip."""
+    """In the map the right half lies mirrored on the left one, except for a strip."""
     surface = square()
     uv = np.array(surface.corner_uv)
     uv[..., 0] = np.where(uv[..., 0] > 0.625, 1.25 - uv[..., 0], uv[..., 0])
@@ -116,7 +116,7 @@ def test_maps_of_no_use_have_an_empty_layout_and_a_message(
 
 
 def test_triangles_without_area_are_left_out(square: Callable[..., Surface]) -> None:
-    """In the map, in the world, and both."""
+    """Triangles without area in the map, in the world, and in both."""
     surface = square()
     uv = np.array(surface.corner_uv)
     uv[0], uv[1, :, 0] = 0.5, 0.3

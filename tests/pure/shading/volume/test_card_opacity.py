@@ -1,4 +1,4 @@
-"""What a card takes from the light, and what of it counts at the card itself."""
+"""The light that a card blocks, and the part of it that counts at the card itself."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from hairloom.addon.strands import StrandSet
 
 
 def test_depth_of_a_card_is_that_of_strands_at_random() -> None:
-    """So many strands that they leave as much open as it does."""
+    """Against random strands that leave the same fraction uncovered."""
     random, strands = np.random.default_rng(1), 400
     covered = np.zeros(200_000, bool)
     for start in random.random(strands):
@@ -57,7 +57,7 @@ def directions(count: int = 4000) -> np.ndarray:
 
 
 def test_shade_of_strands_is_their_mean_shadow() -> None:
-    """Cylinders seen from many directions: length across the view times width, and the taper."""
+    """Against tapered cylinders from many directions: projected length times width."""
     random = np.random.default_rng(7)
     grid = np.cumsum(random.normal(0.0, 0.01, (20, 40, 3)), axis=1)
     radius = np.full((20, 40), 5.0e-5)
@@ -72,7 +72,8 @@ def test_shade_of_strands_is_their_mean_shadow() -> None:
 
 
 def test_shade_of_cards_is_their_mean_shadow() -> None:
-    """A bent strip of half-clear texture from many directions: |area . view| tau."""
+    """Against a bent strip with a partly transparent texture from many directions: |area . view|
+    tau."""
     t = np.linspace(0.0, 2.0, 30)
     line = np.stack([np.cos(t), np.sin(t), np.zeros(30)], axis=1)
     positions = np.stack([line, line + [0.0, 0.0, 0.3]], axis=1).reshape(-1, 3)
@@ -89,7 +90,8 @@ def test_shade_of_cards_is_their_mean_shadow() -> None:
 
 
 def test_strands_thinner_than_what_lights_resolve_count_by_their_mean() -> None:
-    """Every fourth texel opaque, as thin strands are: a quarter is covered, also at the edges."""
+    """With every fourth texel opaque, as in a texture of thin strands, a quarter is covered, also
+    at the edges."""
     alpha = np.zeros((18, 22), np.float32)
     alpha[:, ::4] = 1.0
     alpha[:, 20:] = 0.25
@@ -106,8 +108,8 @@ def test_light_tells_no_level_apart_in_which_tiles_are_too_small() -> None:
 
 
 def test_even_cards_count_the_same_from_all_sides_of_their_strands() -> None:
-    """Turned to a light a card is as wide as |cos| shows it; on the mean of all turns it counts as
-    a flat one does."""
+    """A card's projected width is |cos|; compensated, it counts the same at any turn, and on
+    average as much as an uncompensated one."""
     turns = np.linspace(0.0, 2.0 * np.pi, 3000, endpoint=False)
     across = 3.0 * np.stack([np.cos(turns), np.sin(turns), 0.0 * turns], axis=-1)
     tangent, way = np.array([0.0, 0.0, 1.0]), np.array([0.8, 0.0, 0.6])
@@ -119,8 +121,8 @@ def test_even_cards_count_the_same_from_all_sides_of_their_strands() -> None:
 
 
 def test_a_slab_of_hair_covers_what_its_strands_do_from_any_side() -> None:
-    """n strands of a unit's length and width w to the unit of skin cover n w sin(t, e) / |n . e|:
-    those that lie alone what was baked, from straight above."""
+    """n strands of unit length and width w per unit of skin cover n w sin(t, e) / |n . e|. Only for
+    lying strands seen from straight above is this the baked coverage."""
     up = np.array([0.0, 0.0, 2.0])
     angle = np.linspace(0.0, 1.2, 7)
     eye = np.stack([np.sin(angle), 0.0 * angle, np.cos(angle)], axis=-1)
@@ -138,8 +140,8 @@ def test_a_slab_of_hair_covers_what_its_strands_do_from_any_side() -> None:
 def test_light_that_comes_to_the_strand_of_a_card_that_is_seen(
     seen: float, lit: float, near: float
 ) -> None:
-    """Against strands thrown at random into columns: an eye meets the first of its own, light those
-    of another; it comes from the front, from behind, from both sides."""
+    """Against random strands in columns: the eye meets the first strand of one column, light passes
+    those of another, from the front, from behind and from both sides."""
     random = np.random.default_rng(0)
     count = random.poisson(seen, 2_000_000)
     first = 1.0 - random.random(len(count)) ** (1.0 / np.maximum(count, 1))
@@ -153,7 +155,7 @@ def test_light_that_comes_to_the_strand_of_a_card_that_is_seen(
 
 
 def test_counts_that_are_out_of_the_ordinary() -> None:
-    """None, as many for the eye as for the light, and more than can be told apart."""
+    """No strands, equal counts for eye and light, and counts beyond float resolution."""
     counts = np.array([0.0, 2.0, 1e9])
     before, beyond = own_strands(counts, counts, 0.0, 1.0)
     expected = np.array([0.0, -np.log(0.5 * (1.0 + np.exp(-2.0))), np.log(2.0)])
@@ -163,8 +165,8 @@ def test_counts_that_are_out_of_the_ordinary() -> None:
 
 @pytest.mark.parametrize("tau", [0.05, 0.7, 3.0])
 def test_the_tips_beside_one_that_is_seen(tau: float) -> None:
-    """Against strands thrown at random, of which each counts 0.8; light comes from the front, from
-    behind, from aside."""
+    """Against random strands that each count 0.8, with light from the front, from behind and from
+    the side."""
     count = np.random.default_rng(0).poisson(tau, 400_000)
     others = 0.8 * (count[count > 0] - 1.0).mean()
     for front in (1.0, 0.0, 0.5):

@@ -1,4 +1,4 @@
-"""Dual scattering against strands met at random, stacks of layers, and what must stay whole."""
+"""Dual scattering against random strands, stacks of layers, and energy conservation."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def table() -> Fractions:
 
 
 def at(table: Fractions, absorption: float, cos_d: float) -> tuple[np.ndarray, np.ndarray]:
-    """Shares of the nearest texel, by lobe."""
+    """Forward and backward fractions of the nearest texel, by lobe."""
     row = round(float(absorption_place(np.array(absorption))) * (FRACTIONS_SIZE - 1))
     column = round(cos_d * (FRACTIONS_SIZE - 1))
     return table.forward[row, column], table.backward[row, column]
@@ -55,7 +55,7 @@ def test_passing_is_the_mean_over_strands_met_at_random() -> None:
 
 @pytest.mark.parametrize(("a_f", "a_b"), [(0.8, 0.15), (0.3, 0.3), (0.05, 0.02), (0.0, 0.5)])
 def test_what_returns_is_that_of_a_deep_stack(a_f: float, a_b: float) -> None:
-    """Layers added one by one with all that passes to and fro between them."""
+    """Against layers that are added one by one, with all reflections between them."""
     back = 0.0
     for _ in range(4000):
         back = a_b + a_f**2 * back / (1.0 - a_b * back)
@@ -81,7 +81,7 @@ def test_white_hair_gives_all_light_back_and_no_hair_more() -> None:
 
 
 def test_shares_are_those_of_the_lobes(table: Fractions) -> None:
-    """Integrated finely over the reference's lobes, and whole for a clear fibre."""
+    """Against a fine integral over the reference's lobes; they sum to 1 for a clear fibre."""
     turn = (np.arange(4000) + 0.5) / 4000
     for cos_d in (1.0, 16 / 31):
         clear = replace(FIBRE, absorption=(0.0, 0.0, 0.0))
@@ -93,7 +93,7 @@ def test_shares_are_those_of_the_lobes(table: Fractions) -> None:
 
 
 def test_what_hair_sends_on_is_the_mean_over_strands_that_lie_any_way(table: Fractions) -> None:
-    """Strands by chance, each of which meets as much light as it is broad."""
+    """Against random strands, each weighted by its projected width."""
     alike = ShadingSettings(color_variation=0.0, grey_fraction=0.0)
     absorption = strand_absorption(alike, np.zeros(1), np.full(1, 0.5), np.full(1, 0.5))
     random = np.random.default_rng(6)
@@ -111,7 +111,7 @@ def test_what_hair_sends_on_is_the_mean_over_strands_that_lie_any_way(table: Fra
 def test_more_pigment_sends_less_on_and_back(table: Fractions) -> None:
     assert (np.diff(table.forward.sum(axis=-1), axis=0) <= 1e-5).all()
     assert (np.diff(table.backward.sum(axis=-1), axis=0) <= 1e-5).all()
-    # what the surface reflects is left of black hair
+    # black hair reflects only at its surface
     assert table.forward[-1, -1].sum() + table.backward[-1, -1].sum() < 0.1
 
 
@@ -157,7 +157,7 @@ def test_light_hair_is_brighter_and_carries_light_farther(table: Fractions) -> N
 
 
 def skin_light(a_f: float, a_b: float, skin: float, **more: float) -> float:
-    """What comes off the skin, of light head on and an eye beside it unless said otherwise."""
+    """Light that the skin reflects; by default lit head on, with the eye beside the light."""
     values = {"phi": 0.0, "tau": 0.0, "beyond": 0.0, "facing": 1.0} | more
     lobes = [np.tile([0.0, share, 0.0, 0.0], (3, 1)) for share in (a_f, a_b)]
     phi, tau, beyond, facing = (np.array(values[name]) for name in values)
@@ -168,7 +168,7 @@ def test_skin_behind_a_strand_that_hides_nothing_is_lambert() -> None:
     for skin, facing in ((0.5, 1.0), (0.2, 0.3)):
         found = skin_light(1.0, 0.0, skin, facing=facing, beyond=4.0)
         assert found == pytest.approx(skin * facing / np.pi, rel=1e-3)
-    # an eye on the other side sees none of it through the strand
+    # an eye on the other side sees only backward scattering
     assert skin_light(1.0, 0.0, 0.5, phi=np.pi) == pytest.approx(0.0, abs=1e-6)
     assert skin_light(0.6, 0.1, 0.5, phi=np.pi) == pytest.approx(0.1 * 0.5 / np.pi, rel=0.02)
 
@@ -181,7 +181,8 @@ def test_black_skin_and_skin_in_the_dark_give_nothing() -> None:
 @pytest.mark.parametrize("facing", [1.0, 0.5])
 @pytest.mark.parametrize("beyond", [0.1, 0.5, 2.0])
 def test_even_light_comes_back_through_the_strands_it_meets(beyond: float, facing: float) -> None:
-    """Rays off the skin into all directions, each through as many strands as its slant asks for."""
+    """Against rays from the skin in all directions, each through strands in proportion to the
+    secant of its angle."""
     a_f, skin = 0.7, 0.4
     random = np.random.default_rng(4)
     upward = np.sqrt(random.random(100_000))  # Lambert's

@@ -1,4 +1,4 @@
-"""The space of a light's map: what it covers, and that it holds still."""
+"""The space of a light's map: its coverage, and its stability."""
 
 from __future__ import annotations
 
@@ -49,7 +49,8 @@ def test_all_points_of_a_ray_share_a_place_and_get_deeper(light: Light) -> None:
 
 @pytest.mark.parametrize("light", LIGHTS.values(), ids=LIGHTS)
 def test_a_strand_is_as_broad_as_its_outline(light: Light) -> None:
-    """In a map: whichever way it runs, wherever it is, against the two rays that touch it."""
+    """A strand's width in the map, for any direction and place, against the two rays that touch
+    it."""
     frame = light_frame(light, BALL)
     assert frame is not None
     random, thin = np.random.default_rng(3), 1e-6
@@ -65,7 +66,7 @@ def test_a_strand_is_as_broad_as_its_outline(light: Light) -> None:
 
 
 def spot(place: tuple[float, float, float], along: tuple[float, float, float]) -> Light:
-    """Of 60 degrees."""
+    """A spot with a cone of 1 rad."""
     back = -np.asarray(along) / np.linalg.norm(along)
     right = np.cross([0.1, 0.7, 0.3], back)
     right /= np.linalg.norm(right)
@@ -81,7 +82,8 @@ def test_a_point_light_amidst_the_hair_has_no_map() -> None:
 def test_a_map_of_a_light_within_the_ball_opens_the_way_it_shines(
     along: tuple[float, float, float],
 ) -> None:
-    """A spot's own way; a point's to the middle of the ball. Nothing of the way is cut off."""
+    """Along a spot's own axis, or from a point light to the middle of the ball; all places within
+    the widest cone are in the map."""
     place = np.array([0.01, -0.02, 0.13])
     for light in (spot(tuple(place), along), Light.point(tuple(place), (1, 1, 1), 3.0)):
         frame = light_frame(light, BALL)
@@ -105,7 +107,7 @@ def test_a_spot_at_the_rim_that_shines_away_has_no_map() -> None:
 
 
 def test_a_light_that_nears_the_ball_changes_its_map_without_a_jump() -> None:
-    """Where the cone around the ball gets too wide, the widest takes its place."""
+    """Where the cone around the ball would get too wide, the widest cone replaces it."""
     rim = BALL.radius / np.sin(WIDEST)
     frames = [
         light_frame(Light.point(BALL.center + [0.0, 0.0, rim + step], (1, 1, 1), 3.0), BALL)
@@ -123,7 +125,7 @@ def test_what_is_behind_a_light_is_outside_of_its_map() -> None:
 
 
 def test_small_motion_moves_the_ball_by_whole_steps_or_not_at_all() -> None:
-    """So that texels do not swim: most small moves leave the very same ball."""
+    """Most small motions keep the same ball, so that texels do not swim."""
     random = np.random.default_rng(2)
     points = random.normal(size=(500, 3)) * 0.1
     balls = [ball_around(points + np.array([1e-4 * step, 0.0, 0.0])) for step in range(60)]

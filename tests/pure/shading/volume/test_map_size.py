@@ -1,4 +1,4 @@
-"""Opacity maps stay within what GPU and memory allow."""
+"""Opacity maps stay within the limits of GPU and memory."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def test_what_fits_is_drawn_as_asked() -> None:
 @pytest.mark.parametrize("shadows", ["slices", "deep"])
 @pytest.mark.parametrize("map_count", [1, 2, 8])
 def test_too_large_maps_get_fewer_texels_and_a_note(shadows: str, map_count: int) -> None:
-    """As many as just fit, with all lights and layers."""
+    """The most that fit, with all lights and layers."""
     settings = VolumeSettings(shadows=shadows, slices=64, layers=64, resolution=2048)
     asked, drawn = asked_size(settings, map_count), fitted_size(settings, map_count, ROOM)
     assert asked.bytes > ROOM >= drawn.bytes
@@ -46,7 +46,7 @@ def test_a_small_gpu_sets_the_side() -> None:
     assert small.side == 1024
     note = size_note(settings, 1, ROOM, small)
     assert "larger than this GPU's textures" in note and "GPU Memory" not in note
-    # `starts` of eight maps stand above one another
+    # `starts` of eight maps are stacked in one texture
     assert fitted_size(settings, 8, ROOM, largest_side=256).side == 4 * 256 // 8
 
 
@@ -58,7 +58,7 @@ def test_bytes_are_those_of_the_textures() -> None:
 
 def test_strands_that_stand_for_many_get_texels_of_half_their_spacing() -> None:
     full = asked_size(VolumeSettings(), 1)
-    assert even_size(full, 0.0, 0.3) == full  # they stand for themselves alone
+    assert even_size(full, 0.0, 0.3) == full  # each strand represents only itself
     assert even_size(full, 0.6 / 1024, 0.3) == full
     sparse = even_size(full, 0.6 / 100, 0.3)
     assert (sparse.side, sparse.mesh_side) == (200, 512)

@@ -1,4 +1,4 @@
-"""How lights see all meshes of a scene."""
+"""The frames in which lights draw all meshes of a scene."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def test_all_that_a_light_shines_on_is_in_a_frame(light: Light, count: int) -> N
 
 
 def test_a_spot_has_its_own_cone() -> None:
-    """Narrower than all meshes together; as wide as its object's scale makes it."""
+    """Its cone is narrower than the meshes, and is scaled with its object."""
     spot = Light.spot((0.5, 0.0, 4.0), WHITE, 1.0, Cone(AXES, 0.4, 0.0))
     (frame,) = mesh_frames(spot, BALL)
     rim = np.array([[0.5 + 3.0 * np.tan(0.2), 0.0, 1.0]])

@@ -1,4 +1,4 @@
-"""Opacity maps in numpy against strands counted one by one."""
+"""Opacity maps in numpy against strands that are counted one by one."""
 
 from __future__ import annotations
 
@@ -48,7 +48,8 @@ def test_layers_end_one_behind_the_other_and_the_last_behind_all(settings: Volum
 
 
 def test_weights_give_back_what_grows_evenly() -> None:
-    """Sums that grow with depth as hair of one density would make them come out exactly."""
+    """Sums that grow linearly with depth, as in hair of constant density, are reproduced
+    exactly."""
     ends = np.array([0.1, 0.3, 0.4, 1.0])
     depth = np.linspace(-0.2, 1.0, 50)
     found = layer_weights(depth, ends) @ ends
@@ -64,7 +65,8 @@ def hair(count: int = 2000) -> tuple[np.ndarray, np.ndarray]:
 
 
 def counted(light: Light = SUN) -> tuple[Coverage, np.ndarray, np.ndarray, np.ndarray]:
-    """Coverage; texels of random places, where these are in the map [texels], and their depths."""
+    """Coverage, and for random places on strands: their texels, positions in the map [texels], and
+    depths."""
     strands, radius = hair()
     frame = light_frame(light, ball_around(strands))
     assert frame is not None
@@ -75,7 +77,7 @@ def counted(light: Light = SUN) -> tuple[Coverage, np.ndarray, np.ndarray, np.nd
 
 
 def test_coverage_is_length_times_width() -> None:
-    """Of strands across the light, over the area of a texel; whatever the texels are."""
+    """For strands across the light: over the area of a texel, whatever the resolution."""
     strands, radius = hair()
     strands[..., 2] = 0.0
     frame = light_frame(SUN, ball_around(strands))
@@ -116,7 +118,7 @@ def test_at_the_ends_of_layers_sums_are_exact(shadows: str) -> None:
     starts, thickness = in_texels(own)
     for number, end in enumerate(ends[:-1]):
         depth = starts[filled] + end * thickness[filled]
-        # a piece may lie just at the end
+        # a piece may lie exactly at the end
         before, after = (found.optical_depth(filled, depth + step) for step in (-1e-9, 1e-9))
         held = layers[filled, number]
         assert (before < held + 1e-6).all() and (held < after + 1e-6).all()
@@ -144,12 +146,12 @@ def without_slopes(spans: LayerSpans) -> LayerSpans:
 
 
 def in_texels(spans: LayerSpans) -> tuple[np.ndarray, np.ndarray]:
-    """Where layers start and how thick they are in the middles of blocks."""
+    """Start and thickness of layers at the centres of blocks."""
     return spans.start[..., 0].ravel(), np.maximum(spans.thickness[..., 0], MIN_THICKNESS).ravel()
 
 
 def test_deep_layers_lie_between_the_first_and_the_last_hair() -> None:
-    """Of a texel, or of all texels of a block."""
+    """The first and last hair of a texel, or of all texels of a block."""
     found = counted()[0]
     for block in (1, 4):
         side = SIZE // block
@@ -165,7 +167,7 @@ def test_deep_layers_lie_between_the_first_and_the_last_hair() -> None:
 
 
 def test_layers_go_on_from_block_to_block_as_planes_but_not_over_edges() -> None:
-    """Exact on a slope; no slope leads from a lock to the hair behind it."""
+    """Exact on a slope; planes do not interpolate between a lock and the hair behind it."""
     row, column = np.mgrid[:8, :8]
     slope = 0.2 + 0.03 * column + 0.01 * row
     planes = LayerSpans.between(slope, slope + 0.1, 4)
@@ -182,8 +184,8 @@ def test_layers_go_on_from_block_to_block_as_planes_but_not_over_edges() -> None
 
 
 def test_hair_that_light_grazes_is_evenly_lit() -> None:
-    """The face of a slab of strands, the sun 25 degrees above it: no hair is in the way of its
-    light. With one start a block, the face was bright and dark in turn.
+    """A slab of strands whose face no hair shades, with the sun 25 degrees above it. With one start
+    per block, the face had bright and dark bands.
     """
     random, count = np.random.default_rng(3), 6000
     strands = np.zeros((count, 2, 3))
@@ -215,7 +217,7 @@ def tau_in_texels(
     place: np.ndarray,
     depth: np.ndarray,
 ) -> np.ndarray:
-    """Of one texel each, at places in them."""
+    """Optical depth at places, each from its own texel alone."""
     row, column = np.divmod(texel, found.resolution)
     weights = layer_weights(spans.fraction(row, column, place, depth), ends)
     tau: np.ndarray = (found.layers(ends, spans)[texel] * weights).sum(axis=1)
@@ -227,7 +229,7 @@ def mean_error(
     settings: VolumeSettings,
     extinction: float,
 ) -> float:
-    """Of the transmittance at random places."""
+    """Mean error of the transmittance at random places."""
     found, texel, place, depth = of
     exact = transmittance(found.optical_depth(texel, depth), extinction)
     ends = layer_ends(settings)
@@ -264,8 +266,8 @@ def test_four_deep_layers_beat_sixteen_slices_on_a_head_of_hair() -> None:
 
 @pytest.mark.parametrize("radius", few_in_commits([3e-3, 1e-3]))
 def test_default_maps_leave_as_much_light_as_strands_counted_one_by_one(radius: float) -> None:
-    """In the mean over the half of a head's hair that the head does not hide, which maps leave out.
-    A bias of a hundredth left thick hair 1.56 times as much.
+    """On average over the half of the hair that the head does not hide; these maps have no head. A
+    bias of 0.01 let through 1.56 times the light in thick hair.
     """
     strands, settings = combed_strands(6000), VolumeSettings()
     frame = light_frame(SUN, ball_around(strands))
@@ -279,7 +281,7 @@ def test_default_maps_leave_as_much_light_as_strands_counted_one_by_one(radius: 
     column, row = np.floor(place * size).astype(np.int64).T
     texel, ends = row * size + column, layer_ends(settings)
     tau = tau_in_texels(found, found.spans(4), ends, texel, size * place, depth - settings.bias)
-    # but for the strand itself
+    # without the strand itself
     exact = transmittance(found.optical_depth(texel, depth - 1e-4), settings.extinction).mean()
     assert transmittance(tau, settings.extinction).mean() == pytest.approx(exact, rel=0.16)
 
@@ -321,7 +323,7 @@ def test_transmittance_stays_a_share(extinction: float) -> None:
 
 
 def crossed(strands: np.ndarray, radius: float, lamp: np.ndarray, place: np.ndarray) -> int:
-    """How many segments lie within their radius of the straight way from a lamp to a place."""
+    """The number of segments that a ray from a lamp to a place meets."""
     start, along = strands[:, :-1].reshape(-1, 3), np.diff(strands, axis=1).reshape(-1, 3)
     way = place - lamp
     off = start - lamp
@@ -336,7 +338,7 @@ def crossed(strands: np.ndarray, radius: float, lamp: np.ndarray, place: np.ndar
 
 @pytest.mark.slow
 def test_a_lamp_within_the_ball_counts_as_many_strands_as_its_rays_meet() -> None:
-    """Also towards the rim of its wide map, whichever way strands run there."""
+    """Against rays, also near the border of its wide map, for strands of all directions."""
     random, radius, lamp = np.random.default_rng(7), 5e-4, np.array([0.0, 0.02, 0.07])
     middles = random.uniform(-0.1, 0.1, size=(16000, 3))
     is_hair = (np.linalg.norm(middles, axis=1) < 0.1) & (
@@ -366,7 +368,7 @@ def test_a_lamp_within_the_ball_counts_as_many_strands_as_its_rays_meet() -> Non
 
 
 def light_through_slab(count: int, *, is_even: bool) -> float:
-    """The mean light behind strands that lie side by side, evenly, and are 2 layers together."""
+    """Mean light behind evenly spaced parallel strands with a total optical depth of 2."""
     random = np.random.default_rng(5)
     strands = np.zeros((count, 2, 3))
     strands[:, :, 0] = -1.0, 1.0
@@ -376,7 +378,7 @@ def light_through_slab(count: int, *, is_even: bool) -> float:
     ball = ball_around(strands)
     frame = light_frame(SUN, ball)
     assert frame is not None
-    # four of them lie one over another
+    # four strands overlap at any place
     spacing, asked = 4.0 * 2.0 / count, asked_size(VolumeSettings(resolution=256), 1)
     size = even_size(asked, spacing if is_even else 0.0, ball.radius)
     found = coverage(strands.astype(np.float32), radius, frame, size.side)
@@ -391,7 +393,8 @@ def light_through_slab(count: int, *, is_even: bool) -> float:
 
 
 def test_a_slab_lets_as_much_light_through_by_few_strands_as_by_many() -> None:
-    """In texels that strands leave empty too much of it comes through (Jensen's inequality)."""
+    """Against exp(-2). With texels smaller than gaps, too much light comes through (Jensen's
+    inequality)."""
     for count in (60, 240, 1200):
         assert light_through_slab(count, is_even=True) == pytest.approx(np.exp(-2.0), rel=0.08)
     assert light_through_slab(60, is_even=False) > 3.0 * np.exp(-2.0)

@@ -1,4 +1,4 @@
-"""Which lights throw shadows, and what the artist is told of those that do not."""
+"""Which lights cast shadows, and the messages about those that do not."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from hairloom.addon.shading.volume.shadow_lights import shadow_frames, shadow_wa
 
 BALL = Ball(np.array([0.1, 0.0, 1.5]), 0.2)
 SUN = Light.sun((0.0, 0.0, -1.0), (1, 1, 1), 3.0)
-#: as the panel shows them
+#: labels in the panel
 LABELS = {each.name: each.label for each in VolumeSettings.parameters()}
 DEEP = VolumeSettings(shadows="deep", max_lights=2)
 #: shines along +x
@@ -66,7 +66,7 @@ def test_a_spot_that_misses_the_hair_is_told(place: tuple[float, float, float]) 
 
 
 def test_a_spot_of_a_scaled_object_lights_as_far_as_its_cone_is_squeezed() -> None:
-    """Just off the hair as it is; three times as wide it lights it."""
+    """A spot just misses the hair; with a cone that is scaled by three it lights the hair."""
     lamp, place = spot(-1.0, 0.9, 1.5), np.array([BALL.center])
     assert lamp.cone is not None and not light_irradiance(lamp, place).any()
     axes = tuple(tuple(row) for row in np.array(CONE.axes) / np.array([[3.0], [3.0], [1.0]]))
