@@ -30,9 +30,9 @@ from .selection import chosen_hair, needs_hair
 TICKS_PER_SECOND = 120.0
 #: The key of the ticks in `latest_job.watch`.
 TICKS = "play"
-STATUS = "Hairloom plays. Move the head or the sliders. Esc: stop, the hair returns to its style"
+STATUS = "Hairloom plays. Move the head or the sliders. Esc: stop, and return the hair to its style"
 PAUSED = "Hairloom is paused: press Resume in its panel. Esc: stop"
-WAITING = "{names}: plays as soon as all that it needs is made. Esc: cancel"
+WAITING = "{names}: plays as soon as everything it needs is ready. Esc: cancel"
 
 
 class HAIRLOOM_OT_preview(bpy.types.Operator):

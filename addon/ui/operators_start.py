@@ -154,7 +154,7 @@ class HAIRLOOM_OT_use_groom(LongWork, bpy.types.Operator):
             raise problems[0]
         yield from beginning(self, context, taken, plays=chosen.plays)
         if len(grooms) > 1:
-            report(self, "INFO", f"Hairloom took {len(taken)} of {len(grooms)} grooms")
+            report(self, "INFO", f"Hairloom now previews {len(taken)} of {len(grooms)} grooms")
 
 
 class HAIRLOOM_OT_convert_particles(LongWork, bpy.types.Operator):

@@ -149,7 +149,7 @@ def test_esc_is_offered_as_long_as_it_cancels(
     row = SimpleNamespace(progress=lambda **_: None, label=lambda icon="", **_: icons.append(icon))
     assert draw_progress(SimpleNamespace(row=lambda **_: row), work)
     assert icons == ["BLANK1" if is_committed else "EVENT_ESC"]
-    with pytest.raises(RuntimeError, match="Test Work goes on") as refused:
+    with pytest.raises(RuntimeError, match="Test Work is still running") as refused:
         bpy.ops.hairloom.test_work()
     assert ("Esc" in str(refused.value)) is not is_committed
 
@@ -159,7 +159,7 @@ def test_a_bake_is_not_deleted_while_other_work_goes_on(monkeypatch: pytest.Monk
     """The button reports the other work as the reason, not that there is no bake."""
     running = SimpleNamespace(label="Make Cards", progress=Progress("3 of 4"))
     monkeypatch.setattr(long_work, "_running", running)
-    with pytest.raises(RuntimeError, match="Make Cards goes on; Esc cancels it"):
+    with pytest.raises(RuntimeError, match="Make Cards is still running; Esc cancels it"):
         bpy.ops.hairloom.bake_free()
 
 

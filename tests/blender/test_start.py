@@ -212,7 +212,7 @@ def test_all_selected_hair_is_taken_and_counted(new_hair, sphere):
     with pytest.raises(RuntimeError, match="Empty"):
         bpy.ops.hairloom.use_groom()
     assert {each.name for each in previews.sessions()} == {each.name for each in hair}
-    assert "Hairloom took 2 of 3 grooms" in [each.text for each in past_reports]
+    assert "Hairloom now previews 2 of 3 grooms" in [each.text for each in past_reports]
 
 
 def test_cancelling_takes_none_of_several_hairs(new_hair, sphere, evaluated):

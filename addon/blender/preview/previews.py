@@ -39,7 +39,7 @@ from .phases import Event, Phase
 from .preview import KnownBake, Preview, rig_for
 
 #: Notes on hair that is about to play, and on hair that is not made yet.
-WAITING, BUILDING = "plays as soon as its collider is made", "is being made"
+WAITING, BUILDING = "plays as soon as its collider is ready", "is being made"
 
 
 class Previews(dict[int, Preview]):
