@@ -1,4 +1,4 @@
-"""What the GPU tests share: compute shaders that write numbers, and scenes to draw."""
+"""Fixtures of the GPU tests: compute shaders that write values, and scenes to draw."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.fixture(scope="session")
 def frame(gpu_context: Any) -> Any:
-    """The module that draws a frame."""
+    """The module `frame`, with a GPU context."""
     from hairloom.addon.render import frame
 
     return frame
@@ -29,7 +29,7 @@ def frame(gpu_context: Any) -> Any:
 
 @pytest.fixture(scope="session")
 def square_camera(frame: Any) -> Callable[..., Any]:
-    """Makes an orthographic camera of x and z from 0 to `size` [m], along +y."""
+    """A function that makes an orthographic camera along +y for x and z from 0 to `size` [m]."""
 
     def make(size: float) -> Any:
         middle = size / 2
@@ -43,7 +43,8 @@ def square_camera(frame: Any) -> Callable[..., Any]:
 
 @pytest.fixture
 def compute(gpu_context: Any) -> Callable[..., np.ndarray]:
-    """Run a compute shader of tests/gpu/shaders over a grid, back comes (height, width, 4)."""
+    """A function that runs a compute shader of tests/gpu/shaders over a grid and returns
+    (height, width, 4)."""
     from hairloom.addon.render.shader_program import ShaderRecipe, program
     from hairloom.addon.render.shader_source import SHADER_FOLDER
     from hairloom.addon.render.textures import texture_from, texture_to_array, volume_from

@@ -1,4 +1,4 @@
-"""Pictures that are added up: exact, whole in spite of a broken sample, and drawn as they are."""
+"""Accumulated pictures: exact, not spoilt by a broken sample, and drawn unchanged."""
 
 from __future__ import annotations
 

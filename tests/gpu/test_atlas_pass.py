@@ -1,4 +1,4 @@
-"""The atlas as it is baked on the GPU, against its reference."""
+"""The atlas baked on the GPU, against its reference."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def baked_maps() -> Any:
 
 
 def wavy(count: int, half: float, seed: int = 0) -> FlatStrands:
-    """Strands that wind their way up the atlas, of all depths and colours."""
+    """Strands that wind up the atlas, of all depths and colours."""
     random = np.random.default_rng(seed)
     along = np.linspace(0.05, 0.95, STATIONS)
     start, phase = random.uniform(0.2, 0.8, count), random.uniform(0.0, 6.0, count)
@@ -57,7 +57,7 @@ def wavy(count: int, half: float, seed: int = 0) -> FlatStrands:
     ids=["wide", "odd size", "thinner than a sample"],
 )
 def test_the_pass_agrees_with_the_reference(baked_maps: Any, size: int, half: float) -> None:
-    """But for samples on an edge, and for half floats."""
+    """Except for samples on an edge, and for half-float rounding."""
     flat = wavy(12, half)
     ours, reference = baked_maps(flat, size), sampled_maps(flat, size)
     assert ours.base_gain == reference.base_gain == 1.5
@@ -71,7 +71,7 @@ def test_the_pass_agrees_with_the_reference(baked_maps: Any, size: int, half: fl
 
 
 def test_blocks_join_without_a_seam(baked_maps: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Many small blocks, the upper ones less high, show what one shows."""
+    """Many small blocks, with lower ones at the top, give the same as one."""
     flat, size = wavy(12, 0.02), 80
     whole = baked_maps(flat, size)
     monkeypatch.setattr(bake, "_MAX_ACROSS", 40)
@@ -86,7 +86,7 @@ def test_blocks_join_without_a_seam(baked_maps: Any, monkeypatch: pytest.MonkeyP
 
 
 def test_thin_strands_cover_as_much_as_they_are_wide(baked_maps: Any) -> None:
-    """Forty upright strands, each a fiftieth of a pixel wide."""
+    """For forty upright strands, each a fiftieth of a pixel wide."""
     place = np.zeros((40, STATIONS, 2), np.float32)
     place[..., 0] = np.linspace(0.1, 0.9, 40)[:, None]
     place[..., 1] = np.linspace(0.0, 1.0, STATIONS)

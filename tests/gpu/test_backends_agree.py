@@ -1,6 +1,6 @@
-"""Pictures of hair as a volume, drawn the same way on each backend.
+"""Pictures of hair as a volume, drawn alike on each backend.
 
-Where HAIRLOOM_PICTURES names a folder they are kept there under the backend's name, so that
+If HAIRLOOM_PICTURES names a folder, they are saved there under the backend's name, so that
 tools/test_ui.py can compare them by FLIP.
 """
 
@@ -33,7 +33,7 @@ VOLUMES = {
 
 
 def picture(volume: VolumeSettings) -> np.ndarray:
-    """A ball of blond hair under a sun and a lamp, shown as a screen would, (SIZE, SIZE, 3)."""
+    """A ball of blond hair under a sun and a lamp, in display values, (SIZE, SIZE, 3)."""
     from hairloom.addon.render.frame import (
         Camera,
         MeshSnapshot,

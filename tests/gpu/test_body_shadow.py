@@ -19,7 +19,7 @@ from hairloom.addon.strands import Surface
 pytestmark = pytest.mark.usefixtures("gpu_context")
 
 SIZE = 64
-#: hair that sends nothing on of what it takes
+#: hair that does not scatter light forward
 BLACK = ShadingSettings(model="kajiya_kay")
 SUN = Light.sun((0.0, 0.0, -1.0), (1.0, 1.0, 1.0), 3.0)
 FLOOR = Surface(
@@ -44,7 +44,7 @@ def shadow(
     eye: tuple[float, float, float] = (0.0, -2.0, 0.6),
     shading: ShadingSettings = BLACK,
 ) -> np.ndarray:
-    """Over white, (SIZE, SIZE): what is left of it. Strands cover half of the middle."""
+    """The remaining brightness over white, (SIZE, SIZE). Strands cover half of the middle."""
     import gpu
 
     from hairloom.addon.render.body_shadow import BodyShadow
@@ -79,15 +79,15 @@ def shadow(
 
 
 def shown(light: Any) -> Any:
-    """How bright skin is in this light, (..., 3) or one number: by the power 2.2 of code values, as
-    Blender lays what is drawn over its picture."""
+    """Luminance of skin in this light, (..., 3) or one number, as code values to the power of 2.2,
+    in which Blender blends overlays."""
     code = 1.055 * (light * np.array(SKIN) / np.pi) ** (1.0 / 2.4) - 0.055
     return code**2.2 @ [0.2126, 0.7152, 0.0722]
 
 
 @pytest.mark.parametrize("shadows", ["slices", "deep"])
 def test_skin_is_as_much_darker_on_the_screen_as_hair_leaves_of_its_light(shadows: str) -> None:
-    """Beneath strands that cover half of it; beside them it is as it was."""
+    """Under strands that cover half of it, against exp(-0.5); beside them nothing changes."""
     found = shadow(SUN, shadows=shadows)
     expected = shown(3.0 * np.exp(-0.5)) / shown(3.0)
     assert found[30:34, 30:34].mean() == pytest.approx(expected, abs=0.04)
@@ -124,7 +124,7 @@ def test_from_below_and_behind_other_things_there_is_none() -> None:
 
 
 def test_a_mesh_that_is_there_already_is_covered_without_gaps() -> None:
-    """Its depths come from another transformation; still every pixel is met."""
+    """Its depths come from another transformation, but every pixel is covered."""
     import gpu
 
     from hairloom.addon.render.body_shadow import BodyShadow

@@ -1,4 +1,4 @@
-"""Shafts from what is bright: the shaders against the reference, and a window in a drawn scene."""
+"""Shafts from bright regions: the shaders against the reference, and a window in a drawn scene."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ ON = ShaftSettings(
 VIEW = look_at((0.0, -2.0, 0.0), (0.0, 0.0, 0.0))
 CAMERA = Camera(VIEW, perspective(np.radians(40.0), WIDTH / HEIGHT, 0.1, 10.0))
 FLAT = Camera(VIEW, orthographic(1.5, 1.1, 0.0, 5.0))
-#: the place behind which nothing is
+#: nothing behind the picture
 BLACK = (0.0, 0.0, 0.0, 0.0)
 
 
 @pytest.fixture
 def window() -> np.ndarray:
-    """A bright window with bars behind strands of many colours and alphas, premultiplied; a lamp
-    far from it, and the wall behind all.
+    """A premultiplied picture: a bright window with bars behind strands of many colours and alphas,
+    a lamp far from it, and a wall behind all.
     """
     random = np.random.default_rng(5)
     picture = np.zeros((HEIGHT, WIDTH, 4), np.float32)
@@ -90,7 +90,7 @@ def test_the_shafts_of_a_window_are_the_reference(
 def test_broken_pixels_are_the_reference_too(
     shafts: Callable[..., np.ndarray], window: np.ndarray
 ) -> None:
-    """Those that are so themselves aside."""
+    """Except at the broken pixels themselves."""
     broken = window.copy()
     broken[70, 50:53, :3] = [[np.nan] * 3, [np.inf, 1.0, 0.0], [1e30, 1e6, -3.0]]
     found, expected = shafts(broken), reference(broken, ON, CAMERA)
@@ -103,7 +103,7 @@ def test_broken_pixels_are_the_reference_too(
 def test_what_lies_behind_a_picture_throws_shafts_through_it(
     shafts: Callable[..., np.ndarray], window: np.ndarray
 ) -> None:
-    """Hair over another engine's picture, and over one colour."""
+    """For hair over another engine's picture, and over one colour."""
     hair = np.zeros_like(window)
     hair[40:70, 60:64] = (0.1, 0.05, 0.02, 0.7)
     length = shaft_length(CAMERA.projection, HEIGHT, ON.length)
@@ -140,7 +140,7 @@ def test_a_white_world_stays_as_it_is(shafts: Callable[..., np.ndarray]) -> None
 
 
 def scene(settings: ShaftSettings, emission: float = 5.0) -> Snapshot:
-    """Hair before a window that shines, in a room with a lamp."""
+    """Hair before a shining window, in a room with a lamp."""
     corners = np.array([[-0.4, 0.5, -0.3], [0.4, 0.5, -0.3], [0.4, 0.5, 0.3], [-0.4, 0.5, 0.3]])
     surface = Surface(corners.astype(np.float32), np.array([[0, 1, 2], [0, 2, 3]], np.int32))
     pane = MeshSnapshot.of(surface, (0.0, 0.0, 0.0))
@@ -158,7 +158,7 @@ def scene(settings: ShaftSettings, emission: float = 5.0) -> Snapshot:
 
 @pytest.mark.parametrize("samples", [1, 2])
 def test_the_shafts_of_a_window_in_a_drawn_scene_are_the_reference(samples: int) -> None:
-    """The picture without shafts is what they are made of."""
+    """The reference is computed from the picture without shafts."""
     from hairloom.addon.render.frame import render_image
 
     wall = (0.05, 0.06, 0.08, 1.0)
@@ -174,7 +174,7 @@ def test_the_shafts_of_a_window_in_a_drawn_scene_are_the_reference(samples: int)
 
 
 def test_lights_and_bright_things_add_up_in_a_drawn_scene() -> None:
-    """Haze of lights is no bright thing itself."""
+    """The haze of lights does not count as a bright region itself."""
     from hairloom.addon.render.frame import render_image
 
     strong = replace(ON, strength=5.0)

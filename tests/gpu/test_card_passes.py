@@ -1,4 +1,4 @@
-"""The passes in which cards are drawn, their states, and the orders of triangles."""
+"""The passes that draw cards, their states, and the orders of triangles."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ LOOK = {
     "shading": ShadingSettings(model="kajiya_kay", base_color=(0.8, 0.6, 0.4)),
 }
 THREE = CardDrawingSettings(passes="three")
-#: the words of the paper, for each pass: alpha test, colour, depth write, depth test, culled faces
+#: from the paper, for each pass: alpha test, colour, depth write, depth test, culled faces
 PAPER = {
     "four": (
         (True, False, True, "LESS", "NONE"),
@@ -51,7 +51,7 @@ PAPER = {
 
 
 def mesh_of(*cards: tuple[float, float, float, float, float]) -> CardMesh:
-    """Rectangles (low x, low z, high x, high z, y) that face -y; a greater low x: that face +y."""
+    """Rectangles (low x, low z, high x, high z, y) that face -y, or +y if low x > high x."""
     return flat_cards.mesh_of(*(card((x0, z0), (x1, z1), y) for x0, z0, x1, z1, y in cards))
 
 
@@ -81,7 +81,7 @@ def snapshot_of(
 
 
 def painted(frame: Any, cards: list[Any], view: Any, textures: HairTextures) -> np.ndarray:
-    """Each card drawn alone, put over each other in numpy, the farthest first."""
+    """Cards drawn one by one and composited in numpy, the farthest first."""
     picture = np.zeros((SIZE, SIZE, 4), np.float32)
     for each in cards:
         alone = frame.render_image(snapshot_of(mesh_of(each), textures), view, SIZE, SIZE, 1)
@@ -94,7 +94,7 @@ def painted(frame: Any, cards: list[Any], view: Any, textures: HairTextures) -> 
 def test_states_are_those_of_the_paper(
     frame: Any, monkeypatch: Any, scheme: str, model: str
 ) -> None:
-    """The state that is set at each draw, with `skip_clear` as the paper has it."""
+    """The GPU state at each draw, with `skip_clear` as in the paper."""
     from hairloom.addon.render import card_pass
 
     now: dict[str, Any] = {}
@@ -144,7 +144,7 @@ def test_states_are_those_of_the_paper(
 
 
 def _tests_alpha(recipe: Any) -> bool:
-    """Whether it may discard: the two places in the shader are in these two branches."""
+    """Whether a program can discard, which the shader does in two branches."""
     defines = dict(recipe.defines)
     source = Path(recipe.folders[0] / recipe.fragment).read_text(encoding="utf-8")
     prime, shaded = source.split("#else\n#  include")
@@ -164,7 +164,7 @@ def test_three_passes_draw_the_same_where_nothing_overlaps(frame: Any) -> None:
     )
     opaque = four[..., 3] == 1.0
     assert opaque.mean() > 0.01 and ((four[..., 3] > 0.0) & ~opaque).mean() > 0.15
-    # pixels below the least alpha, and those from the opaque one on, are the only that may differ
+    # only pixels below the minimum alpha or above the opaque one may differ
     assert np.abs(four - three).max() < 0.011
     assert np.abs(four - three).mean() < 1e-4
 
@@ -190,7 +190,7 @@ def test_a_head_hides_cards_behind_it(frame: Any, drawing: CardDrawingSettings) 
 @pytest.mark.parametrize("passes", ["four", "three"])
 @pytest.mark.parametrize("y", [-1.0, 2.0])
 def test_the_order_of_a_view_is_the_painters(frame: Any, y: float, passes: str) -> None:
-    """Cards in any order in the mesh, seen from both sides: from +y their backs."""
+    """For cards in any order in the mesh, seen from the front and from +y, from behind."""
     shuffled = [STACK[index] for index in (3, 0, 4, 2, 1)]
     view = camera(frame, y)
     drawing = CardDrawingSettings(order="view", passes=passes)
@@ -199,17 +199,17 @@ def test_the_order_of_a_view_is_the_painters(frame: Any, y: float, passes: str) 
     )
     far_first = sorted(STACK, key=lambda each: -each[4] if y < 0.0 else each[4])
     expected = painted(frame, far_first, view, hairy())
-    # three passes leave out what is below the least alpha
+    # three passes drop pixels below the minimum alpha
     assert np.abs(picture - expected).max() < (1e-5 if passes == "four" else 0.02)
     static = frame.render_image(snapshot_of(mesh_of(*shuffled), hairy()), view, SIZE, SIZE, 1)
     assert np.abs(static - expected).max() > 0.1, "the mesh's own order must be wrong here"
 
 
 def test_back_faces_have_an_order_of_their_own(frame: Any) -> None:
-    """From behind, cards in order from the inside to the outside come nearest first."""
+    """From behind, the order from the inside to the outside is nearest first."""
     mesh, view = mesh_of(*STACK), camera(frame, 2.0)
     expected = painted(frame, list(reversed(STACK)), view, hairy())
-    # of a card's two triangles neither hides the other
+    # a card's two triangles do not overlap
     back = mesh.triangles[::-1]
     picture = frame.render_image(snapshot_of(mesh, hairy(), back=back), view, SIZE, SIZE, 1)
     assert np.abs(picture - expected).max() < 1e-5
@@ -248,8 +248,8 @@ def test_an_order_goes_up_only_when_it_changes(frame: Any, monkeypatch: Any) -> 
 
 
 def test_clear_pixels_hide_what_comes_later_only_without_the_test(frame: Any) -> None:
-    """Why the last pass tests alpha by default: in the paper's own states the nearest card hides,
-    where it is clear, what is drawn after it.
+    """Why the last pass tests alpha by default: with the paper's states, clear parts of the nearest
+    card hide cards that are drawn after it.
     """
     mesh = mesh_of((0.0, 0.0, 1.0, 1.0, 0.1), (0.0, 0.0, 1.0, 1.0, 0.5))
     mesh = dataclasses.replace(
@@ -265,7 +265,7 @@ def test_clear_pixels_hide_what_comes_later_only_without_the_test(frame: Any) ->
 
 
 def test_a_normal_map_bends_the_normal(frame: Any) -> None:
-    """The twin of `mapped_normal`, seen through the diffuse term."""
+    """The twin of `mapped_normal`, tested through the diffuse term."""
     texel = np.float32((0.8, 0.6, 0.85))
     bent = constant(noise=0.5, normal=np.broadcast_to(texel, (4, 4, 3)))
     sun = Light.sun((-0.6, 0.7, -0.2), (1.0, 1.0, 1.0), 3.0)
@@ -288,7 +288,7 @@ def test_a_normal_map_bends_the_normal(frame: Any) -> None:
 
 
 def test_what_the_viewport_is_given(frame: Any) -> None:
-    """Straight colours as its handlers have to write them, then times alpha."""
+    """Colours as viewport handlers must write them: encoded unpremultiplied, then times alpha."""
     import gpu
 
     from hairloom.addon.exchange.textures.srgb import srgb_encoded

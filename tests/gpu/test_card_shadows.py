@@ -26,19 +26,19 @@ pytestmark = pytest.mark.usefixtures("gpu_context")
 
 SIZE = 32
 FORMS = ["slices", "deep"]
-#: from where the eye is, along +y
+#: shines from the eye, along +y
 SUN = Light.sun((0.0, 1.0, 0.0), (1.0, 1.0, 1.0), 3.0)
 PLAIN = ShadingSettings(base_color=(0.5, 0.4, 0.3))
 
 
 def card(low: float, high: float, y: float, u: tuple[float, float] = (0.0, 1.0)) -> Any:
-    """From x = low to high, z from 0 to 1; one whose low is the greater faces +y."""
+    """A card from x = low to high, z from 0 to 1. If low > high, it faces +y."""
     made = flat_cards.card((low, 0.0), (high, 1.0), y, u=u)
     return made if low < high else {**made, "normal": -made["normal"]}
 
 
 def textures_of(alpha: Any) -> HairTextures:
-    """Of one colour; alpha from u = 0 to u = 1."""
+    """Textures of one colour; `alpha` from u = 0 to u = 1."""
     alpha = np.repeat(np.atleast_2d(np.float32(alpha)), 2, axis=0)
     half = np.full((2, 2), 0.5, np.float32)
     white = np.ones((2, 2, 3), np.float32)
@@ -46,7 +46,7 @@ def textures_of(alpha: Any) -> HairTextures:
 
 
 def behind(frame: Any) -> Any:
-    """Sees the cards from the dark side: x from right to left."""
+    """A camera that sees the cards from the dark side, with x from right to left."""
     return camera(frame, 3.0)
 
 
@@ -69,12 +69,13 @@ def of_form(form: str, **more: Any) -> VolumeSettings:
 def test_a_card_behind_cards_has_the_light_that_they_leave(
     frame: Any, form: str, alpha: float, model: str
 ) -> None:
-    """Two before one half of it, none before the other; it faces away from them."""
+    """Against (1 - alpha)^2 where two cards are before a third one, which faces away from them, and
+    against the light without them where none is."""
     look = dataclasses.replace(PLAIN, model=model)
     back = card(1.0, 0.0, 0.6, (1.0, 1.0))
     back["normal"] = -back["normal"]  # to the light
     fronts = [card(0.0, 0.5, y, (0.0, 0.0)) for y in (0.0, 0.2)]
-    # the last one alone is seen, as only that is opaque
+    # the last one is the only opaque one
     textures = textures_of([alpha, 1.0])
     found, alone = (
         drawn(frame, mesh_of(*cards), textures, of_form(form), shading=look)[16, :, 0]
@@ -89,7 +90,7 @@ def test_a_card_behind_cards_has_the_light_that_they_leave(
 
 @pytest.mark.parametrize("form", FORMS)
 def test_thin_cards_take_less_of_the_light(frame: Any, form: str) -> None:
-    """tau counts by the thickness, of those in front and of the card itself."""
+    """tau is scaled by the thickness, of cards in front and of the card itself."""
     back = card(1.0, 0.0, 0.6, (1.0, 1.0))
     back["normal"] = -back["normal"]
     mesh = mesh_of(card(0.0, 0.5, 0.0, (0.0, 0.0)), back)
@@ -115,7 +116,7 @@ def test_thin_cards_take_less_of_the_light(frame: Any, form: str) -> None:
 def test_even_cards_shade_as_much_from_all_sides_of_their_strands(
     frame: Any, form: str, turn: float
 ) -> None:
-    """A card turned about its strands before a wall of hair, of which nothing is in its own way."""
+    """A card turned about its strands before a wall of hair without self-shadowing."""
     wall = card(1.0, 0.0, 2.0, (1.0, 1.0))
     wall["normal"] = -wall["normal"]
     turned = card(0.0, 1.0, 0.0, (0.0, 0.0))
@@ -146,7 +147,8 @@ def test_even_cards_shade_as_much_from_all_sides_of_their_strands(
 def test_other_strands_of_a_deep_card_are_before_the_one_that_is_seen(
     frame: Any, form: str, depth: float
 ) -> None:
-    """Of a card that faces eye and light: of long hair some of them, of short hair none."""
+    """On a card that faces eye and light: with long hair some strands are before the seen one, with
+    short hair none."""
     alpha, volume = 0.9, of_form(form, bias=1.0e-6)
     deep = np.full(4, depth, np.float32)
     mesh = mesh_of(card(0.0, 1.0, 1.0))
@@ -169,8 +171,8 @@ def test_other_strands_of_a_deep_card_are_before_the_one_that_is_seen(
 
 
 def test_light_is_looked_up_at_the_strand_that_is_seen(frame: Any) -> None:
-    """It comes from aside, past a small card: before the plane of a deep one, and behind the
-    foremost of its strands."""
+    """Light from the side is blocked by a small card before the plane of another card. On a deep
+    card, the foremost strands lie before the small card and are lit."""
     mesh = mesh_of(card(0.0, 1.0, 1.0), card(0.0, 0.3, 0.8))
     sun = Light.sun((1.0, 1.0, 0.0), (1.0, 1.0, 1.0), 3.0)
     shade = []
@@ -193,8 +195,8 @@ def test_light_is_looked_up_at_the_strand_that_is_seen(frame: Any) -> None:
 
 @pytest.mark.parametrize("form", FORMS)
 def test_locks_that_a_light_does_not_tell_apart_take_what_they_are(frame: Any, form: str) -> None:
-    """Sixteen locks across a card, some thirty times smaller than the map: the wall behind meets
-    their mean tau, not that of their mean alpha."""
+    """Sixteen locks across a card, finer than the map's texels: the wall behind gets their mean
+    tau, not the tau of their mean alpha."""
     stripes = np.tile(np.repeat([0.1, 0.9], 32), 8)
     textures = textures_of(np.append(stripes, np.ones(512)))
     textures = dataclasses.replace(textures, alpha=np.repeat(textures.alpha, 256, axis=0))
@@ -224,7 +226,7 @@ def test_cards_shade_the_skin_and_a_mesh_shades_cards(frame: Any, form: str) -> 
         frame.look_at((0.5, -3.0, 0.5), (0.5, 0.0, 0.5), up=(0.0, 0.0, 1.0)),
         frame.orthographic(1.0, 1.0, 0.0, 9.0),
     )
-    # seen past the cards
+    # the wall as seen past the cards
     past = frame.Camera(
         frame.look_at((2.5, -1.0, 0.5), (0.4, 0.3, 0.5)), frame.orthographic(1.0, 1.0, 0.0, 9.0)
     )
@@ -264,7 +266,7 @@ def test_light_from_strand_to_strand_brightens_light_cards_and_not_black(frame: 
 
 
 def test_cards_gain_the_light_off_far_skin_of_the_reference(frame: Any) -> None:
-    """With a tangent that is at no right angle to the normal, which counts by CardMesh.axes."""
+    """Also with a tangent not perpendicular to the normal, as CardMesh.axes uses it."""
     bent = {**card(1.0, 0.0, 0.0), "tangent": np.repeat([[0.0, 0.6, -0.8]], 4, axis=0)}
     mesh, textures = mesh_of(bent), textures_of([1.0, 1.0])
     look = dataclasses.replace(

@@ -1,4 +1,5 @@
-"""Mip maps of cards and what cards cover at a slant: the shaders against Python, and by eye."""
+"""Mip maps of cards, and the coverage of slanted cards: the shaders against Python, and in
+pictures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Drawn cards against the Python reference, their four passes against sorting by brute force."""
+"""Drawn cards against the Python reference, and their four passes against brute-force sorting."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ def front(frame: Any) -> Any:
     return camera(frame)
 
 
-#: a rectangle whose corners are shut in by different amounts
+#: a rectangle whose corners have different occlusion
 card = partial(flat_cards.card, occlusion=(0.4, 0.6, 0.8, 1.0))
 
 
 def sampled(texture: np.ndarray, u: np.ndarray, v: np.ndarray, *, repeats: bool) -> np.ndarray:
-    """A texture filtered linearly."""
+    """A texture sampled with linear filtering."""
     height, width = texture.shape[:2]
     x, y = u * width - 0.5, v * height - 0.5
     left, below = np.floor(x).astype(int), np.floor(y).astype(int)
@@ -68,7 +68,7 @@ LOOK = ShadingSettings(
 def test_a_pixel_has_the_colour_of_the_reference(
     frame: Any, front: Any, kind: str, tangent_map: bool
 ) -> None:
-    """One flat card that fills the picture, its vertex data, textures, lights and settings."""
+    """One flat card that fills the picture: vertex data, textures, lights and settings."""
     if kind == "constant":
         textures = constant((0.5, 0.7, 0.9), 1.0, 0.8, 0.3, (0.6, 0.95, 0.3))
     else:
@@ -118,8 +118,8 @@ def test_a_pixel_has_the_colour_of_the_reference(
 def test_marschner_shades_cards_as_strands(
     frame: Any, front: Any, color_noise: float, sky: tuple[float, ...] | None
 ) -> None:
-    """A card has the colours of the reference of a strand in its place; its base texture says how
-    that strand's colour differs from the mean. sky: its openness by its axes, if it is known."""
+    """Against the reference of a strand at the same place; the base texture is the ratio of that
+    strand's colour to the mean. sky: openness in the card's axes, or None."""
     from hairloom.addon.shading.environment import (
         CORNER_BLUR,
         Environment,
@@ -199,10 +199,9 @@ def over(layers: list[tuple[np.ndarray, np.ndarray]], background: np.ndarray) ->
 
 
 def test_four_passes_match_sorting(frame: Any, front: Any) -> None:
-    """Cards in the order from back to front, some with their backs to the eye behind all others.
+    """Cards in order from back to front; some, behind all others, show their backs.
 
-    Each card is drawn alone first: sorted by its depth and blended in numpy the pictures must give
-    the one that is drawn at once.
+    Against the pictures of single cards, sorted by depth and blended in numpy.
     """
     textures = hair_textures(TextureSettings(variant_width=24, height=24, strand_count=6), 1)
     background = np.array([0.2, 0.1, 0.3, 1.0], np.float32)
@@ -235,7 +234,7 @@ def test_four_passes_match_sorting(frame: Any, front: Any) -> None:
 
 
 def test_opaque_parts_hide_what_is_drawn_later_behind_them(frame: Any, front: Any) -> None:
-    """The order is the wrong way round: where the nearest card is opaque it still wins."""
+    """Even in the wrong order, the opaque parts of the nearest card hide the others."""
     near, far = card((0.0, 0.0), (1.0, 1.0), 0.1), card((0.0, 0.0), (1.0, 1.0), 0.5)
     far["occlusion"] = np.zeros(4)  # black
     look = {"ambient": (1.0, 1.0, 1.0), "shading": PLAIN}
@@ -246,7 +245,7 @@ def test_opaque_parts_hide_what_is_drawn_later_behind_them(frame: Any, front: An
 
 
 def test_clear_parts_hide_nothing(frame: Any, front: Any) -> None:
-    """The same wrong order: through the nearest card, where it is clear, the other one is seen."""
+    """Even in the wrong order, the other card is visible through clear parts of the nearest one."""
     near, far = card((0.0, 0.0), (1.0, 1.0), 0.1), card((0.0, 0.0), (1.0, 1.0), 0.5)
     near["uv"] = near["uv"] * [0.0, 1.0] + [0.1, 0.0]
     far["uv"] = far["uv"] * [0.0, 1.0] + [0.9, 0.0]
@@ -284,7 +283,7 @@ def test_a_mesh_before_a_card_hides_it_and_one_behind_shines_through(
 
 
 def test_equal_depth_loses_no_pixel(frame: Any) -> None:
-    """Opaque cards at all angles: what has primed the depth must be shaded, to the last pixel."""
+    """For opaque cards at all angles, every pixel that has primed the depth is shaded."""
     random = np.random.default_rng(4)
     cards = []
     for _ in range(60):

@@ -1,7 +1,7 @@
-"""What opaque strands cover against brute force in numpy, from the definition of a ribbon.
+"""Coverage of opaque strands against brute force in numpy, from the definition of a ribbon.
 
-Every pixel centre is tried against every quad whose bounding box holds it. Nothing here is taken
-from the shader: the curve comes from the Catmull-Rom matrix, its direction in the picture from two
+Every pixel centre is tested against every quad whose bounding box contains it. Nothing comes from
+the shader: the curve is from the Catmull-Rom matrix, its direction in the picture from two
 projected points, a quad's inside from the signs of its triangles' edges.
 """
 
@@ -22,7 +22,8 @@ CATMULL_ROM = 0.5 * np.array([[0, 2, 0, 0], [-1, 0, 1, 0], [2, -5, 4, -1], [-1, 
 
 
 def stations(values: np.ndarray, pieces: int, ahead: float = 0.0) -> np.ndarray:
-    """Curve points (S, (C - 1) * pieces + 1, k) of CV values (S, C, k), moved on by `ahead`."""
+    """Curve points (S, (C - 1) * pieces + 1, k) of CV values (S, C, k), at parameters plus
+    `ahead`."""
     first = 2.0 * values[:, :1] - values[:, 1:2]
     last = 2.0 * values[:, -1:] - values[:, -2:-1]
     padded = np.concatenate([first, values, last], axis=1)
@@ -93,7 +94,7 @@ def _in_triangle(triangles: np.ndarray, point: np.ndarray) -> np.ndarray:
 
 
 def curly_groom(strand_count: int) -> np.ndarray:
-    """Strands that leave a ball and curl, so that they meet the camera at all angles."""
+    """Strands that leave a ball and curl, at all angles to the camera."""
     random = np.random.default_rng(2)
     direction = random.normal(size=(strand_count, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
@@ -128,7 +129,7 @@ def test_coverage_is_that_of_the_definition(
 
 
 def test_coverage_of_the_real_groom(frame: Any, shared_data: Path) -> None:
-    """Every fifth strand of Sintel, as wide as five."""
+    """Every fifth strand of Sintel's hair, five times as wide."""
     from hairloom.addon.exchange.tressfx import read_tfx
 
     groom = read_tfx(shared_data / "sintel" / "SintelHairOriginal-sintel_hair.16points.tfx")

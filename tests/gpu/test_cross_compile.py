@@ -1,8 +1,8 @@
-"""Programs as compilers see them that do not run here: SPIR-V, Metal's language and HLSL.
+"""Programs compiled for targets that do not run here: SPIR-V, Metal's language and HLSL.
 
-Tests that draw and compute much are run once more in a process of their own, which writes down all
-programs that they compile. Blender wraps our text for Metal in its own way: what passes here may
-still fail there, what fails here fails there as well.
+Tests that use many programs are run once more in their own process, which records all programs that
+they compile. Blender wraps our text for Metal in its own way: programs that pass here can still
+fail there, but those that fail here also fail there.
 """
 
 from __future__ import annotations
@@ -32,11 +32,11 @@ needs_compilers = pytest.mark.skipif(
     not cross_compile.is_possible(),
     reason="apt-get install glslang-tools spirv-tools spirv-cross, or tools/window_blender install",
 )
-#: those that strands and cards without atomics are drawn by
+#: tests whose programs draw strands and cards without atomics
 FEW = (
     "tests/gpu/test_no_atomics.py::test_no_program_with_atomics_is_made_where_they_are_forbidden",
 )
-#: they compile programs of every file of gpu_shaders/, see `test_all_files_are_compiled`
+#: tests that compile programs of every file of gpu_shaders/, see `test_all_files_are_compiled`
 ALL = (
     *FEW,
     "tests/gpu/test_no_atomics.py::test_atomics_that_do_nothing_are_noticed",
@@ -82,8 +82,8 @@ ALL = (
     "tests/gpu/test_uneven_strands.py::test_few_points_are_the_same_curves_as_many",
     "tests/gpu/test_uneven_strands.py::test_tint_and_taper_go_by_length_however_points_are_spaced",
 )
-#: programs that Metal is never given: what their names begin with. What moves is counted for layers
-#: alone, which Metal does not draw; nor does a view without layers take samples.
+#: prefixes of the names of programs that are not used on Metal, which draws no layers: moving hair
+#: is counted for layers only, and views without layers take no samples
 NOT_ON_METAL = (
     "probe",
     "detail_demand",
@@ -94,7 +94,7 @@ NOT_ON_METAL = (
     "strand_layers_order",
     "body_shadow_sample",
 )
-#: of Direct3D, which Blender does not draw by: it lays out constants otherwise, and has no points
+#: errors specific to Direct3D, which Blender does not use: another layout of constants, no points
 NOT_IN_HLSL = ("cannot be expressed with either HLSL packing", "Unsupported builtin in HLSL: 1")
 PLAIN = ShaderRecipe(name="x", compute="x.comp.glsl")
 
@@ -106,7 +106,7 @@ def chosen(request: pytest.FixtureRequest) -> str:
 
 @pytest.fixture(scope="module")
 def folder(chosen: str) -> Iterator[Path]:
-    """Where the programs are, written by `record_programs`."""
+    """The folder with the programs, written by `record_programs`."""
     (REPOSITORY / "out").mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="programs_", dir=REPOSITORY / "out") as name:
         _record(Path(name), ALL if chosen == "all" else FEW)
@@ -148,7 +148,8 @@ def is_on_metal(program: dict[str, Any]) -> bool:
 
 
 def test_all_files_are_compiled(programs: list[dict[str, Any]], chosen: str) -> None:
-    """No file of a stage is left out; add a test to ALL that draws by it."""
+    """Every shader file of a stage is compiled; for a new file, add a test to ALL that draws with
+    it."""
     seen = {stage for program in programs for stage in program["stages"]}
     files = {path.name for path in SHADER_FOLDER.glob("*.*.glsl")}
     assert seen <= files and (chosen == "few" or files == seen)
@@ -165,7 +166,7 @@ def test_no_program_needs_what_metal_has_not(programs: list[dict[str, Any]]) -> 
 
 @needs_compilers
 def test_programs_are_valid_spirv_and_metal(programs: list[dict[str, Any]], folder: Path) -> None:
-    """programs_spirv_invalid and programs_msl_failed: both none."""
+    """The figures programs_spirv_invalid and programs_msl_failed are 0."""
     found = cross_compile.compile_all(folder)
     of_metal = {file for each in programs if is_on_metal(each) for file in each["files"]}
     hlsl = {

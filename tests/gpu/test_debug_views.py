@@ -1,4 +1,4 @@
-"""The debug views: colours that show detail factors, guides and groups, and what dynamics do."""
+"""The debug views: colours for detail factors, guides and groups, and for states of dynamics."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ from hairloom.addon.strands import Surface
 
 pytestmark = pytest.mark.usefixtures("gpu_context")
 
-#: every strand in its own pieces, none left out
+#: every strand in its own pieces, none culled
 BARE = DetailSettings(culling="none", lod_size=0.0)
-#: a ball that hides nothing in these pictures, but has to be looked at
+#: a ball that hides nothing in these pictures, but needs the culling program
 OCCLUDER_SPHERES = np.array([[3.0, 3.0, 3.0, 0.1]], np.float32)
 
 
@@ -56,7 +56,7 @@ def chromaticity(pixel: np.ndarray) -> np.ndarray:
 def test_the_detail_view_shows_factors_by_colour(
     frame: Any, front: Any, occluder_spheres: np.ndarray | None
 ) -> None:
-    """From blue for one piece over green for eight to red for sixty-four."""
+    """From blue for 1 piece through green for 8 to red for 64."""
     strands = np.zeros((1, 3, 3), np.float32)
     strands[0, :, 2] = [-0.4, 0.0, 0.4]
     settings = StrandSettings(fullness=60.0, tip_width=1.0)
@@ -76,7 +76,7 @@ def test_the_detail_view_shows_factors_by_colour(
 
 
 def test_the_detail_view_colours_each_segment_by_its_own_factor(frame: Any, front: Any) -> None:
-    """Straight segments beside bent ones, more of them than a texel has factors."""
+    """With straight and bent segments, more than the factors of one texel."""
     strand = np.zeros((1, 25, 3), np.float32)
     strand[0, :, 2] = np.linspace(-0.45, 0.45, 25)
     strand[0, 20:, 0] = 0.02 * np.array([1, 0, 1, 0, 1])
@@ -145,7 +145,7 @@ def hue_of(pixel: np.ndarray) -> float:
 
 
 def upright_strands(count: int, cv_count: int) -> np.ndarray:
-    """Beside each other across the picture, (count, cv_count, 3)."""
+    """Upright strands side by side across the picture, (count, cv_count, 3)."""
     strands = np.zeros((count, cv_count, 3), np.float32)
     strands[..., 0] = (np.arange(count)[:, None] + 0.5) / count - 0.5
     strands[..., 2] = np.linspace(-0.4, 0.4, cv_count)
@@ -158,7 +158,7 @@ WIDE = StrandSettings(fullness=60.0, tip_width=1.0)
 def test_stretch_is_red_where_segments_are_longer_and_blue_where_they_are_shorter(
     frame: Any, front: Any
 ) -> None:
-    """The middle one of three segments of each strand has changed."""
+    """The middle segment of three in each strand has changed its length."""
     changes = np.array([-0.02, -0.01, -0.005, 0.0, 0.005, 0.01, 0.02, 0.5])
     strands = upright_strands(len(changes), 4)
     rest = strands.copy()
@@ -195,7 +195,7 @@ def test_stretch_is_red_where_segments_are_longer_and_blue_where_they_are_shorte
 def test_depth_is_the_distance_from_colliders(
     frame: Any, front: Any, kind: str, error: float
 ) -> None:
-    """What the centre and the radius of a ball say; a field has it by cells."""
+    """Against the formula of a ball; a distance field samples it in cells."""
     strands = upright_strands(20, 9)
     center, radius = np.array([-0.1, 0.0, 0.0]), 0.25
     posed = np.eye(4)
@@ -222,11 +222,11 @@ def test_depth_is_the_distance_from_colliders(
             point = np.array([strands[place, 0, 0], 0.0, (row + 0.5) / 200.0 - 0.5])
             away = (np.linalg.norm(point - center) - radius) / size
             inside, outside = 0.16 * (1.0 - min(-away, 1.0)), 0.33 + 0.33 * min(away / 10.0, 1.0)
-            if abs(away) > 0.05:  # there the hue jumps
+            if abs(away) > 0.05:  # nearer, the hue jumps
                 expected.append(inside if away < 0.0 else outside)
                 found.append(hue_of(picture[row, 5 + 10 * place]))
     apart = np.abs(np.array(found) - expected)
-    apart = np.minimum(apart, 1.0 - apart)  # red is 0 and 1
+    apart = np.minimum(apart, 1.0 - apart)  # red is both 0 and 1
     assert np.ptp(expected) > 0.6 and apart.max() < error
 
 

@@ -1,4 +1,4 @@
-"""Detail on the GPU against numpy's, and the pictures that come of it."""
+"""Detail factors on the GPU against numpy, and the pictures drawn with them."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ from hairloom.addon.strands import Surface
 pytestmark = pytest.mark.usefixtures("gpu_context")
 
 WIDTH, HEIGHT = 320, 240
-#: every strand in its own pieces, none left out
+#: every strand in its own pieces, none culled
 BARE = DetailSettings(culling="none", lod_size=0.0)
-#: balls inside of the one that `curly` grows from
+#: balls inside the ball of `curly`
 OCCLUDER_SPHERES = np.array([[0.0, 0.0, 0.0, 0.095], [0.02, 0.0, 0.03, 0.06]], np.float32)
 FIXED_64 = dataclasses.replace(BARE, mode="fixed", subdivisions=64)
 
@@ -44,14 +44,14 @@ def curly(strand_count: int, cv_count: int) -> np.ndarray:
 
 
 def snapshot_of(frame: Any, strands: np.ndarray, detail: DetailSettings, **more: Any) -> Any:
-    """Opaque, so that what is covered says where strands are."""
+    """A snapshot of opaque strands, whose coverage shows their places."""
     radius = np.full(strands.shape[:2], 5e-4, np.float32)
     settings = {"strand_settings": StrandSettings(transparency="none"), **more}
     return frame.Snapshot(strands, radius, detail=detail, **settings)
 
 
 def cameras(frame: Any) -> dict[str, Any]:
-    """From afar, so near that strands pass the eye, and without perspective."""
+    """Cameras far away, so near that strands pass the eye, and without perspective."""
     aspect = WIDTH / HEIGHT
     return {
         "whole": frame.Camera(
@@ -69,7 +69,7 @@ def cameras(frame: Any) -> dict[str, Any]:
 def computed(
     strands: np.ndarray, camera: Any, detail: DetailSettings, **more: Any
 ) -> tuple[np.ndarray, Any]:
-    """Factors (strand_count, cv_count - 1) as the GPU finds them, and the order."""
+    """The GPU's factors (strand_count, cv_count - 1) and its order of strands."""
     from hairloom.addon.render import frame
     from hairloom.addon.render.detail_pass import DetailPass
 
@@ -84,12 +84,12 @@ def computed(
 def test_factors_and_culling_are_those_of_numpy(
     frame: Any, mode: str, seen: str, cv_count: int
 ) -> None:
-    """But for values on the very edge between two factors, where rounding decides.
+    """Except for values exactly between two factors, where rounding decides.
 
-    Of a straight segment that passes the eye's plane within 2 cm rounding is all there is.
+    The curvature of a straight segment that passes within 2 cm of the eye's plane is only rounding.
     """
     strands, camera = curly(700, cv_count), cameras(frame)[seen]
-    most = 5 if mode == "fixed" else 60  # which that mode does not show
+    most = 5 if mode == "fixed" else 60  # a setting that the mode "fixed" ignores
     detail = DetailSettings(
         mode=mode, error=0.05, piece_length=2.0, subdivisions=7, max_subdivisions=most
     )
@@ -120,7 +120,7 @@ def test_strands_that_face_away_are_those_of_numpy(frame: Any, seen: str) -> Non
 
 
 def drawn_of(order: Any) -> np.ndarray:
-    """The strands that are drawn, in rising order; they stand in the order class by class."""
+    """The drawn strands in ascending order; within each class of the order they ascend too."""
     from hairloom.addon.render.textures import texture_to_array
 
     count = sum(drawn.count for drawn in order.classes)
@@ -146,7 +146,7 @@ def test_factors_of_more_strands_than_a_texture_has_rows(frame: Any) -> None:
 def test_stations_are_those_of_the_cpu(
     frame: Any, compute: Callable[..., np.ndarray], cv_count: int
 ) -> None:
-    """To 1e-5 of the hair's length, and beyond the tip they fall onto it."""
+    """To 1e-5 of the hair's length; stations beyond the tip are at the tip."""
     strands = curly(200, cv_count)
     camera = cameras(frame)["inside"]
     view = PictureView(camera.view, camera.projection, WIDTH, HEIGHT)
@@ -178,9 +178,9 @@ def test_stations_are_those_of_the_cpu(
 @pytest.mark.slow(instead="test_factors_and_culling_are_those_of_numpy")
 @pytest.mark.parametrize("seen", few_in_commits(["whole", "inside"]))
 def test_the_picture_is_that_of_sixty_four_pieces(frame: Any, seen: str) -> None:
-    """Strands are where they should be within half a pixel, none broken.
+    """Strands are within half a pixel of their places, and none is broken.
 
-    Chords are shorter than their curves, and a ribbon narrows a little where they meet: the tight
+    Chords are shorter than their curves, and a ribbon narrows a little where they join: the tight
     curls of this groom lose 2.5 % of their coverage, Sintel's hair 0.1 %.
     """
     strands, camera = curly(150, 16), cameras(frame)[seen]
@@ -196,14 +196,14 @@ def test_the_picture_is_that_of_sixty_four_pieces(frame: Any, seen: str) -> None
 
 
 def around(pixels: np.ndarray) -> np.ndarray:
-    """These pixels and their neighbours."""
+    """A mask of these pixels and their neighbours."""
     wide = np.pad(pixels, 1)
     wide = wide[:-2] | wide[1:-1] | wide[2:]
     return wide[:, :-2] | wide[:, 1:-1] | wide[:, 2:]
 
 
 def test_a_bent_ribbon_has_no_hole(frame: Any) -> None:
-    """A broad strand in an S: where 64 pieces cover all of a pixel, so do the adaptive ones."""
+    """On a broad S-shaped strand, adaptive pieces cover every pixel that 64 pieces cover fully."""
     angle = np.linspace(0.0, 2.0 * np.pi, 12)
     strand = np.stack([np.sin(angle) * 0.3, 0.0 * angle, angle / 2.0 / np.pi - 0.5], axis=-1)
     strands = strand[None].astype(np.float32)
@@ -265,7 +265,7 @@ def test_two_views_in_turn_and_nothing_computed_twice(frame: Any, monkeypatch: A
 
 
 def test_points_that_the_gpu_moves_get_new_detail(frame: Any) -> None:
-    """A groom that comes nearer within one texture is divided more finely."""
+    """A groom whose points come nearer in the same texture gets more pieces."""
     from hairloom.addon.groom.weights import GuideWeights
     from hairloom.addon.refine.ride import Riders
     from hairloom.addon.render.ride_pass import RidePass
@@ -295,7 +295,7 @@ def test_points_that_the_gpu_moves_get_new_detail(frame: Any) -> None:
 
 
 def test_statistics_are_what_was_drawn(frame: Any) -> None:
-    """Three straight strands of four segments, and one that bends; two vertices a station."""
+    """Three straight strands of four segments and a bent one; two vertices per station."""
     from hairloom.addon.render.strand_pass import Statistics
 
     strands = np.zeros((4, 5, 3), np.float32)
@@ -339,7 +339,7 @@ def test_detail_is_counted_in_pixels_of_the_final_picture(frame: Any) -> None:
     instead="tests/pure/refine/test_thinning.py::test_the_groom_covers_as_much_when_it_is_thinned"
 )
 def test_an_eighth_of_the_strands_covers_as_much_as_all(frame: Any, shared_data: Path) -> None:
-    """Sintel's hair, from near to far."""
+    """For Sintel's hair, from near to far."""
     from hairloom.addon.exchange.tressfx import read_tfx
 
     groom = read_tfx(shared_data / "sintel" / "SintelHairOriginal-sintel_hair.16points.tfx")
@@ -361,7 +361,7 @@ def test_an_eighth_of_the_strands_covers_as_much_as_all(frame: Any, shared_data:
 
 
 def test_thinned_strands_are_those_of_low_rank_and_fade(frame: Any) -> None:
-    """As the groom gets smaller each goes thinner before it is gone."""
+    """As the groom gets smaller, each strand gets thinner before it disappears."""
     strands = curly(400, 5)
     rank = np.random.default_rng(7).permutation(400) / 400.0
     camera, shares = cameras(frame)["whole"], []
@@ -375,7 +375,8 @@ def test_thinned_strands_are_those_of_low_rank_and_fade(frame: Any) -> None:
 
 
 def test_an_instance_that_is_scaled_is_thinned_as_large_as_it_is(frame: Any) -> None:
-    """The same ranks, as the engine places an instance of a groom."""
+    """A scaled instance, as the render engine places it, keeps the same ranks as a groom of that
+    size."""
     strands, rank = curly(400, 5), np.random.default_rng(7).permutation(400) / 400.0
     detail, camera = dataclasses.replace(BARE, lod_size=1000.0), cameras(frame)["whole"]
     small = snapshot_of(frame, strands * np.float32(0.2), detail, rank=rank)
@@ -393,7 +394,7 @@ def test_an_instance_that_is_scaled_is_thinned_as_large_as_it_is(frame: Any) -> 
 
 
 def head_of_hair(frame: Any, detail: DetailSettings) -> Any:
-    """A ball with short and with long curly hair all around, and what it hides behind."""
+    """A ball with short and long curly hair all around, and the occluder spheres inside it."""
     around, up = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, 49), np.linspace(0.0, np.pi, 25))
     positions = 0.1 * np.stack(
         [np.sin(up) * np.cos(around), np.sin(up) * np.sin(around), np.cos(up)], axis=-1
@@ -428,7 +429,7 @@ def test_hidden_strands_change_no_pixel(frame: Any, mode: str, seen: str) -> Non
 
 
 def test_all_strands_may_be_hidden(frame: Any) -> None:
-    """Then nothing is drawn, and nothing fails."""
+    """Then the picture is empty, without an error."""
     strands = np.zeros((5, 3, 3), np.float32)
     strands[:, :, 1] = [0.5, 0.6, 0.7]
     passes = frame.MeshPass(), frame.StrandPass()

@@ -1,4 +1,4 @@
-"""The table of a view transform: its shaper, and the shader's look-up against the one in Python."""
+"""The table of a view transform: its shaper, and the look-up in the shader against Python."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import pytest
 
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
 
-#: off by this much where a GPU rounds the weights of its filter to 8 bits, in code values
+#: largest error, in code values, where a GPU rounds the weights of its filter to 8 bits
 FILTER_ERROR = 0.6 / 255.0
 
 
 @pytest.fixture
 def table(gpu_context: Any) -> Any:
-    """A transform that mixes channels and bends, as view transforms do."""
+    """A transform that mixes channels and is nonlinear, as view transforms are."""
     from hairloom.addon.render.display import DisplayTable, table_radiances
 
     mixed = table_radiances() @ np.array([[0.8, 0.1, 0.0], [0.15, 0.7, 0.2], [0.05, 0.2, 0.8]])
@@ -64,7 +64,7 @@ RADIANCES = [
 def test_the_shader_shows_what_the_reference_shows(
     gpu_context: Any, table: Any, radiance: tuple[float, float, float], gain: float, gamma: float
 ) -> None:
-    """Twins: Display.shown and display_code with its gamma, in the strand program itself."""
+    """Display.shown against its twin display_code with its gamma, in the strand program itself."""
     from hairloom.addon.render.display import Display
 
     display = Display(table, gain, gamma)
@@ -80,7 +80,7 @@ def test_without_a_display_it_is_plain_standard(gpu_context: Any) -> None:
 def drawn(
     gpu_context: Any, radiance: tuple[float, float, float], display: Any
 ) -> np.ndarray[Any, Any]:
-    """What a strand of this radiance, which fills the picture, writes for the viewport."""
+    """The viewport output of a strand of this radiance that fills the picture."""
     from hairloom.addon.render.camera import Camera, look_at, orthographic
     from hairloom.addon.render.snapshot import Snapshot
     from hairloom.addon.render.strand_pass import StrandPass

@@ -1,4 +1,4 @@
-"""What drawing borrows it gives back, and what it writes for Blender's viewport."""
+"""Drawing restores the GPU state, and writes the right values for Blender's viewport."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def offscreen(gpu_context: Any) -> Any:
 
 @pytest.fixture
 def white(gpu_context: Any) -> Any:
-    """A snapshot that fills the picture with a grey of 0.5, and its camera."""
+    """A snapshot that fills the picture with grey 0.5, and its camera."""
     from hairloom.addon.render.camera import Camera, look_at, orthographic
     from hairloom.addon.render.snapshot import Snapshot
 

@@ -1,4 +1,4 @@
-"""Dual scattering in the shader against dual scattering in Python."""
+"""Dual scattering: the shader against Python."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ SETTINGS = {
 
 @pytest.mark.parametrize("settings", SETTINGS.values(), ids=SETTINGS)
 def test_dual_scattering(compute: Callable[..., np.ndarray], settings: ShadingSettings) -> None:
-    """Over all angles, from clear hair to black, from the outside to deep inside."""
+    """For all angles, from clear to black hair, from the outside to deep inside."""
     random = np.random.default_rng(11)
     fibre = fibre_of(settings)
     table = fractions(marschner_tables(fibre, PREVIEW_SIZE))
@@ -84,7 +84,7 @@ def test_dual_scattering(compute: Callable[..., np.ndarray], settings: ShadingSe
 
 @pytest.mark.parametrize("settings", SETTINGS.values(), ids=SETTINGS)
 def test_scattering_light(compute: Callable[..., np.ndarray], settings: ShadingSettings) -> None:
-    """From directions to light, where tau is known and where it is not."""
+    """From directions to light, with and without a known tau."""
     random = np.random.default_rng(12)
     tables = marschner_tables(fibre_of(settings), PREVIEW_SIZE)
     table = fractions(tables)

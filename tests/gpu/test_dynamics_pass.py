@@ -1,4 +1,4 @@
-"""Dynamics on the GPU against numpy's: the same motion within rounding, and the same promises."""
+"""Dynamics on the GPU against numpy: the same motion within rounding, and the same guarantees."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ from hairloom.addon.dynamics.state import DynamicsState, start
 from hairloom.addon.dynamics.step import Drive, advance, grid_at_frame_end
 from hairloom.addon.errors import HairloomError
 
-#: [m] of difference in half a second, in free air and at colliders. Both forms round to float32 but
-#: sum in another order. What that starts, 1e-7 m, grows as long as hair is limp, and more where
-#: friction or a last Newton step is taken by one form and by a hair not by the other.
+#: tolerances [m] after half a second, in free air and at colliders. Both forms use float32 but sum
+#: in another order. The initial difference, 1e-7 m, grows as long as hair is limp, and more where
+#: one form just applies friction or a last Newton step and the other just does not.
 FREE, TOUCHING = 1e-4, 5e-4
-#: Else that last Newton step is worth up to 0.2 % of a segment, and in longer substeps drift grows
-#: faster.
+#: Otherwise the last Newton step changes up to 0.2 % of a segment's length, and longer substeps let
+#: the difference grow faster.
 TIGHT = {"length_tolerance": 0.0001, "substep_rate": 240.0}
 LIMP = {"style_root": 0.3, "style_tip": 0.0, "bend": 0.1, "style_damping": 0.5}
 
@@ -62,7 +62,7 @@ def curly(guide_count: int, cv_count: int) -> np.ndarray:
 
 
 def shaking(time: float) -> np.ndarray:
-    """A head that says no, 25 degrees about z, and goes 5 cm along x, once a second."""
+    """A head that shakes by 25 degrees about z and moves by 5 cm along x, once a second."""
     swing = np.sin(np.pi * min(time, 0.5)) ** 2 * np.sin(2.0 * np.pi * time)
     matrix = np.eye(4)
     matrix[:2, :2] = [
@@ -96,7 +96,7 @@ def plate_field() -> DistanceField:
 
 @dataclass(eq=False)
 class Scene:
-    """Guides on a shaking head; `on_head` go with it, `standing` stand still."""
+    """Guides on a shaking head; colliders `on_head` move with it, `standing` ones stand still."""
 
     values: dict[str, Any] = field(default_factory=dict)
     guide_count: int = 40
@@ -108,10 +108,10 @@ class Scene:
     is_curled: bool = False
     fps: float = 60.0
     is_bent: bool = True
-    swing: float = 1.0  # colliders swing so many times as far
-    is_combed: bool = False  # guides stay no farther from colliders than they are at first
-    is_blended: bool = False  # not all of what is shown is simulated
-    is_painted: bool = False  # each guide has its own numbers
+    swing: float = 1.0  # factor of the colliders' motion
+    is_combed: bool = False  # colliders push guides no farther away than they are at rest
+    is_blended: bool = False  # shown guides are a blend of style and simulation
+    is_painted: bool = False  # each guide has its own values
 
     @property
     def settings(self) -> DynamicsSettings:
@@ -127,7 +127,7 @@ class Scene:
 
     @property
     def room(self) -> np.ndarray | None:
-        """Of two guides in three, most of their segments."""
+        """The stretch of segments: of most of them in two guides of three, else 0."""
         if not self.is_curled:
             return None
         random = np.random.default_rng(8)
@@ -137,7 +137,7 @@ class Scene:
 
     @cached_property
     def held(self) -> Held | None:
-        """Every second tip, and a tie around every third guide."""
+        """Held CVs: every second tip, and a tie around every third guide."""
         if not self.is_held:
             return None
         held = np.zeros((self.guide_count, self.cv_count), bool)
@@ -183,14 +183,14 @@ class Scene:
 
     @property
     def simulated(self) -> np.ndarray | None:
-        """None of some guides, all of others."""
+        """The simulated fraction of each guide, from 0 to 1."""
         if not self.is_blended:
             return None
         return np.linspace(-0.2, 1.2, self.guide_count).clip(0.0, 1.0).astype(np.float32)
 
     @cached_property
     def painted(self) -> PaintedGuides | None:
-        """Stiffness also along the guides."""
+        """Random factors; those of stiffness also vary along the guides."""
         if not self.is_painted:
             return None
         random = np.random.default_rng(3)
@@ -212,20 +212,20 @@ BALL = SphereCollider(np.array([0.0, 0.0, 0.0]), 0.095)
 IN_THE_WAY = SphereCollider(np.array([0.05, 0.05, 0.2]), 0.05)
 AT_TIPS = SphereCollider(np.array([0.0, 0.05, 0.28]), 0.1)
 ROD = CapsuleCollider(np.array([-0.2, 0.05, 0.12]), np.array([0.2, 0.1, 0.16]), 0.03)
-#: So thin that segments collide with it, and so far out that it goes several times its own width in
-#: a substep.
+#: Thin enough for segments to collide with it, and far enough out to move by several times its
+#: width in a substep.
 FINGER = CapsuleCollider(np.array([-0.2, 0.1, 0.2]), np.array([0.2, 0.12, 0.24]), 0.006)
 CLUSTER = SphereSetCollider(
     np.array([[0.0, 0.0, 0.0], [0.03, 0.0, 0.02], [-0.04, 0.02, 0.0], [0.0, -0.03, 0.04]]),
     np.array([0.09, 0.07, 0.06, 0.06]),
 )
 
-#: numpy lets rounding of the world's coordinates pass as well, which adds up where curls give.
+#: numpy also tolerates rounding errors of world coordinates, which add up in stretching curls.
 LOOSE = {"length_tolerance": 0.02}
 
 PERMUTATION = np.random.default_rng(3).permutation(256)
 _ABOVE = {"center": (0.05, -0.1, 0.35), "axis": (0.48, 0.6, 0.64)}
-#: Every kind, shape and falloff, each strong enough to be seen.
+#: Every kind, shape and falloff, each with a visible effect.
 FIELDS = (
     ForceField("wind", **_ABOVE, strength=12.0, shape="plane", flow=1.0, across=1.0),
     ForceField("wind", strength=-6.0, falloff="tube", radial=Falloff(0.5, 0.02, 0.3)),
@@ -340,7 +340,7 @@ AT_COLLIDERS = {
     "2 CVs": Scene(cv_count=2, on_head=(BALL,)),
 }
 UNTOUCHED = [AT_COLLIDERS["out of reach"], AT_COLLIDERS["2 CVs"]]
-#: Of these a commit has 8 CVs, whose programs compile three times as fast as with 16.
+#: Commits test these with 8 CVs, whose programs compile three times as fast as with 16.
 LONG_AT_COLLIDERS = (
     "capsule",
     "finger",
@@ -364,7 +364,7 @@ SLOW_AT_COLLIDERS += (
     "relaxation",
 )
 SLOW_IN_AIR = ("64 CVs", "32 CVs", "blended and held", "half the force fields in wind")
-#: What two others do, each by itself.
+#: Combinations of features that other cases test separately.
 SLOW_IN_AIR += ("held curls", "curls with relaxation", "held at 24 frames a second")
 SLOW_IN_AIR += tuple(f"{kind} field" for kind in KINDS if f"{kind} field" in IN_AIR)
 
@@ -409,7 +409,7 @@ def test_equals_numpy_in_air(make_pass: Any, scene: Scene) -> None:
 
 @pytest.mark.parametrize("speed", few_in_commits([3.5, 4.0]))
 def test_equals_numpy_where_a_finger_is_drawn_through_hair(make_pass: Any, speed: float) -> None:
-    """All guides meet what goes farther in a substep than a segment is long."""
+    """All guides meet a finger that moves by more than a segment's length in a substep."""
     grid = np.zeros((6, 16, 3), np.float32)
     grid[..., 0] = np.linspace(-0.05, 0.05, 6)[:, None]
     grid[..., 2] = np.linspace(0.0, -0.25, 16)
@@ -442,7 +442,7 @@ def test_equals_numpy_at_colliders(make_pass: Any, scene: Scene) -> None:
 
 
 def test_guides_take_another_style_in_mid_play(make_pass: Any) -> None:
-    """Longer, and of another shape, while they move."""
+    """A longer style of another shape, while guides move."""
     scene = Scene()
     state = scene.start()
     dynamics = make_pass(state)
@@ -458,7 +458,7 @@ def test_guides_take_another_style_in_mid_play(make_pass: Any) -> None:
 
 
 def played(scene: Scene) -> DynamicsState:
-    """The state of numpy after half a second."""
+    """The state after half a second in numpy."""
     state = scene.start()
     for drive in scene.drives(0.5):
         state = advance(state, drive, scene.settings, 1.0 / scene.fps)
@@ -472,7 +472,7 @@ def test_more_guides_than_a_texture_has_rows(make_pass: Any) -> None:
 
 @dataclass(eq=False)
 class Bundle(Scene):
-    """Guides side by side that hang through each other, as many as lie in three columns."""
+    """Guides that hang through each other, enough for three columns of the texture."""
 
     guide_count: int = 300
 
@@ -496,8 +496,8 @@ FALLING = {
 }
 
 
-#: What rounding puts on the other side of a cell's border pushes others a little more or less, so
-#: these are as close as hair that touches something.
+#: Points that rounding moves across a cell's border push others a little differently, so the
+#: tolerance is that of contacts.
 AMONG_OTHERS = {
     "sparse": Scene({"volume": 1.0, "style_tip": 0.6}, guide_count=150),
     "other substeps": Scene(
@@ -515,7 +515,8 @@ def test_hair_among_hair_equals_numpy(make_pass: Any, scene: Scene) -> None:
 
 
 def test_grooms_that_feel_each_other_equal_numpy(make_pass: Any) -> None:
-    """Two halves of a bundle, of which one is on the GPU, or both are; each beside itself alone."""
+    """Two halves of a bundle with one or both on the GPU, and without interaction for
+    comparison."""
     scene, seconds = Bundle(FALLING, fps=24.0), 0.25
     targets = [scene.carried(number) for number in range(round(seconds * scene.fps) + 1)]
     halves, ends = (slice(0, None, 2), slice(1, None, 2)), {}
@@ -555,7 +556,7 @@ def test_hair_among_hair_is_the_same_to_the_last_bit_every_time(make_pass: Any) 
 
 
 def test_what_hair_feels_goes_on_where_the_form_is_switched(make_pass: Any) -> None:
-    """Frames of 7 and 8 substeps, of which hair feels each third."""
+    """In frames of 7 and 8 substeps, with interaction in every third substep."""
     scene = Bundle(FALLING, fps=24.0)
     state = mixed = scene.start()
     for frame, drive in enumerate(scene.drives(0.5)):
@@ -571,7 +572,7 @@ def test_what_hair_feels_goes_on_where_the_form_is_switched(make_pass: Any) -> N
 
 
 def test_one_may_switch_the_form_in_mid_motion(make_pass: Any) -> None:
-    """Numpy, GPU, numpy, GPU: what each hands on is what it was, to the last bit."""
+    """Numpy and GPU in turn: the state is handed over bit for bit."""
     scene = Scene(on_head=(BALL,), fps=50.0)
     state = mixed = scene.start()
     for frame, drive in enumerate(scene.drives(0.5)):
@@ -614,7 +615,7 @@ def test_a_frame_without_a_substep_moves_only_what_is_shown(make_pass: Any) -> N
 
 
 def test_frames_shorter_than_a_substep(make_pass: Any) -> None:
-    """With all that the table of moments holds, which then has no rows."""
+    """With all effects of the table of moments, which has no rows then."""
     scene = Scene({"wind_speed": 6.0, "gusts": 1.0}, on_head=(BALL,), fps=1000.0)
     assert_equal(scene, make_pass, TOUCHING, seconds=0.05)
 
@@ -635,7 +636,7 @@ def test_twice_the_same_to_the_last_bit(make_pass: Any) -> None:
     "solid", few_by_name({"ball": BALL, "field": ball_field(0.095), "set": CLUSTER}, "ball")
 )
 def test_no_stretch_and_no_penetration(make_pass: Any, solid: Collider) -> None:
-    """The promises of the numpy step, with default settings and limp hair alike."""
+    """The guarantees of the numpy step, with default settings and with limp hair."""
     for values in ({}, LIMP):
         scene = Scene(values, guide_count=100, on_head=(solid,))
         settings = DynamicsSettings(**values)
@@ -651,7 +652,7 @@ def test_no_stretch_and_no_penetration(make_pass: Any, solid: Collider) -> None:
 @pytest.mark.alike
 @pytest.mark.parametrize("number", range(12))
 def test_any_settings_stay_finite(make_pass: Any, number: int) -> None:
-    """Values from all of the range that a parameter may have, and a head that jerks."""
+    """Random values from the hard or soft ranges, and a head that jerks."""
     random = np.random.default_rng([8, number])
     values: dict[str, Any] = {}
     for parameter in DynamicsSettings.parameters():
@@ -745,7 +746,7 @@ def test_release_with_all_shaders(make_pass: Any) -> None:
 def test_the_format_for_metal_keeps_the_same_motion(
     gpu_context: Any, monkeypatch: pytest.MonkeyPatch, pairs: str
 ) -> None:
-    """Through a read-back, after which another pass goes on."""
+    """Also through a read-back, after which another pass continues."""
     from hairloom.addon.render import dynamics_pass
 
     scene, positions = Scene(guide_count=8), []

@@ -1,4 +1,4 @@
-"""The world's light in the shader against Python, and in pictures."""
+"""The world's light: the shader against Python, and in pictures."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ QUARTER = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 
 
 def sky() -> Environment:
-    """Of many colours, brightest to one side, and with a sun."""
+    """A sky of many colours, brightest at one side, with a sun."""
     directions, _ = panorama_directions(32, 64)
     x, y, z = np.moveaxis(directions, -1, 0)
     radiance = np.stack([1.0 + 0.8 * x, 0.8 + 0.4 * y * z, 0.7 + 0.6 * z * x], axis=-1)
@@ -64,7 +64,7 @@ def test_twins(compute: Callable[..., np.ndarray]) -> None:
 
 
 def lit(environment: Environment, turn: np.ndarray, model: str = "marschner") -> Snapshot:
-    """Hair on a ball, all of it turned."""
+    """Hair on a ball, both turned, in this light."""
     points = combed_strands(1500)
     radius = np.full(points.shape[:2], 0.01, np.float32)
     positions, triangles = ball_mesh(24)
@@ -103,7 +103,7 @@ def test_turning_the_world_is_turning_all_else(frame: Any, model: str) -> None:
 
 
 def test_an_even_panorama_is_a_plain_world(frame: Any) -> None:
-    """Bit for bit, since it has no harmonics; and those of nought change nothing."""
+    """Bit for bit, since it has no harmonics; harmonics of 0 change nothing either."""
     environment = environment_of(np.full((8, 16, 3), 0.4))
     plain = lit(Environment((0.4, 0.4, 0.4)), np.eye(3))
     by_picture = lit(environment, np.eye(3))

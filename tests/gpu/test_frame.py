@@ -1,4 +1,4 @@
-"""Drawn pictures against brute force, against the Python reference, and against themselves."""
+"""Drawn pictures against brute force, the Python reference, and each other."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def uprights(x: np.ndarray, radius: float, y: float = 0.0) -> tuple[np.ndarray, 
 
 
 def test_a_pixel_has_the_colour_of_the_reference(frame: Any) -> None:
-    """One broad ribbon: positions, tangents, noise, lights and settings reach the shader right."""
+    """One broad ribbon: positions, tangents, noise, lights and settings in the shader are right."""
     strand = np.array([[[-0.1, 0.0, 0.0], [0.1, 0.0, 0.02]]], np.float32)
     radius, occlusion = np.full((1, 2), 0.05, np.float32), np.array([[0.4, 0.8]], np.float32)
     shading = ShadingSettings(model="kajiya_kay", noise_cells=7.0)
@@ -94,7 +94,7 @@ def test_a_pixel_has_the_colour_of_the_reference(frame: Any) -> None:
 
 
 def hairy_sphere(frame: Any, **shading: float) -> Any:
-    """A unit sphere whose hair runs down the meridians; one sun behind the eye, level with both."""
+    """A unit sphere with hair down its meridians, and a sun behind the eye at the same height."""
     around = np.radians(np.arange(0.0, 360.0, 0.6))[:, None]
     polar = np.radians(np.linspace(20.0, 160.0, 24))[None, :]
     strands = np.stack(
@@ -120,7 +120,7 @@ def hairy_sphere(frame: Any, **shading: float) -> Any:
 
 @pytest.mark.parametrize("shift", few_in_commits([0.3, 0.15, 0.0, -0.15, -0.3]))
 def test_positive_shift_moves_the_highlight_to_the_tips(frame: Any, shift: float) -> None:
-    """Roots are at the top, tips at the bottom: the band must sink by atan(shift)."""
+    """With roots at the top and tips at the bottom, the band moves down by atan(shift)."""
     camera = frame.Camera(
         frame.look_at((0.0, -5.0, 0.0), (0.0, 0.0, 0.0)), frame.orthographic(2.2, 1.0, 1.0, 9.0)
     )
@@ -130,13 +130,13 @@ def test_positive_shift_moves_the_highlight_to_the_tips(frame: Any, shift: float
     middle = slice(70, 80)
     band = frame.render_image(lit, camera, 150, 150, 2)[:, middle, 1].mean(axis=1)
     band -= frame.render_image(matt, camera, 150, 150, 2)[:, middle, 1].mean(axis=1)
-    # The diffuse term dims the highlight towards the shadow, so its peak is a little short of it.
+    # The diffuse term dims the highlight towards the shadow and moves its peak a little.
     height = np.arcsin(rows[band.argmax()])
     assert height == pytest.approx(-np.arctan(shift), abs=0.03)
 
 
 def test_a_mesh_hides_what_is_behind_it_only(frame: Any, front: Any) -> None:
-    """Strands before, behind, and a square over the left half."""
+    """Strands before and behind a square over the left half."""
     square = np.array([[0, 0, 0], [0.5, 0, 0], [0.5, 0, 1], [0, 0, 1]], np.float32)
     blue = frame.MeshSnapshot.of(
         Surface(square, np.array([[0, 1, 2], [0, 2, 3]])), color=(0.0, 0.0, 1.0)
@@ -163,7 +163,7 @@ def test_a_mesh_hides_what_is_behind_it_only(frame: Any, front: Any) -> None:
 
 @pytest.mark.parametrize("side", [-1.0, 1.0])
 def test_both_sides_of_a_mesh_are_lit_alike(frame: Any, front: Any, side: float) -> None:
-    """A square at 45 degrees whose normal points away from the eye or to it, lit from before."""
+    """A square at 45 degrees whose normal points away from or to the eye, lit from the front."""
     corners = np.array([[0, -0.5, 0], [1, -0.5, 0], [1, 0.5, 1], [0, 0.5, 1]], np.float32)
     square = Surface(corners, np.array([[0, 1, 2], [0, 2, 3]])[:, :: int(side)])
     normals = square.vertex_normals()
@@ -180,7 +180,7 @@ def test_both_sides_of_a_mesh_are_lit_alike(frame: Any, front: Any, side: float)
 
 
 def test_more_strands_than_a_texture_has_rows(frame: Any) -> None:
-    """20,000 strands, each in a cell of its own, each with a brightness that names it."""
+    """20,000 strands, each in its own cell and with a brightness that identifies it."""
     columns, rows = 200, 100
     x, z = np.meshgrid((np.arange(columns) + 0.5) / columns, (np.arange(rows) + 0.5) / rows)
     strands = np.zeros((columns * rows, 3, 3), np.float32)
@@ -241,7 +241,8 @@ def test_two_frames_are_identical_and_passes_may_be_kept(frame: Any) -> None:
 
 
 def test_points_on_the_gpu_look_like_uploaded_ones(frame: Any) -> None:
-    """Bit for bit at rest; turned, when rounding moves edges by 1e-7 m, in nearly all pixels."""
+    """Bit for bit at rest; in nearly all pixels when turned, since rounding moves edges by 1e-7
+    m."""
     from hairloom.addon.groom.weights import GuideWeights
     from hairloom.addon.refine.ride import Riders
     from hairloom.addon.render.ride_pass import RidePass
@@ -297,7 +298,7 @@ def test_points_on_the_gpu_that_do_not_fit_or_are_gone_are_refused(frame: Any, f
 
 
 def test_thin_opaque_strands_get_the_minimum_width(frame: Any, front: Any) -> None:
-    """Widths count in pixels of the finished picture, whatever the samples."""
+    """Widths are in pixels of the final picture, whatever the number of samples."""
     strands, radius = uprights(np.array([0.25, 0.75]), 1e-6)
     for samples, width in ((1, 2.0), (4, 0.5), (4, 1.0)):
         settings = dataclasses.replace(RIBBON, minimum_width=width, transparency="none")
@@ -310,7 +311,8 @@ def test_thin_opaque_strands_get_the_minimum_width(frame: Any, front: Any) -> No
 def test_strands_are_as_wide_where_pixels_are_not_square(
     frame: Any, front: Any, transparency: str
 ) -> None:
-    """Upright, lying and oblique ones cover the same part of a picture of half as many columns."""
+    """Upright, lying and oblique strands cover the same fraction of a picture with half the
+    columns."""
     settings = dataclasses.replace(RIBBON, transparency=transparency)
     for direction in ((0.0, 0.0, 0.6), (0.6, 0.0, 0.0), (0.4, 0.0, 0.4)):
         strand = np.array([0.2, 0.0, 0.2]) + np.array([[0.0], [1.0]]) * direction
@@ -340,7 +342,7 @@ def test_radius_scale_and_taper(frame: Any, front: Any) -> None:
 
 
 def test_samples_are_averaged_premultiplied(frame: Any, front: Any) -> None:
-    """A half-covered white pixel is half white and half there, over any background."""
+    """A half-covered white pixel is half white with an alpha of 0.5, over any background."""
     strands, radius = uprights(np.array([0.25]), 0.1250)
     snapshot = frame.Snapshot(
         strands, radius, ambient=(1.0, 1.0, 1.0), shading=PLAIN, strand_settings=RIBBON
@@ -368,7 +370,7 @@ def test_snapshots_refuse_arrays_that_do_not_fit(frame: Any) -> None:
 
 
 def test_strands_around_and_behind_the_eye(frame: Any) -> None:
-    """Nothing bursts across the picture when hair passes through the camera."""
+    """No strand fills the picture when hair passes through the camera."""
     strands, radius = uprights(np.array([0.0]), 0.001)
     strands[0] = [[0.02, -1.0, 0.0], [0.02, 1.0, 0.0]]
     snapshot = frame.Snapshot(strands, radius, strand_settings=RIBBON)

@@ -1,4 +1,4 @@
-"""A budget of GPU memory: what gives way, in which order, and what of it is seen."""
+"""A budget of GPU memory: what is reduced, in which order, and the effect on pictures."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def no_choice(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 @pytest.fixture
 def hair(frame: Any) -> Any:
-    """Strands from side to side, at all depths, with shadows."""
+    """Strands across the picture, at all depths, with shadows."""
     random = np.random.default_rng(1)
     ends = random.uniform(-1.0, 1.0, (3000, 2, 3)).astype(np.float32)
     return frame.Snapshot(
@@ -54,7 +54,7 @@ def view_of(frame: Any) -> Any:
 
 @pytest.fixture
 def drawn(frame: Any, monkeypatch: pytest.MonkeyPatch) -> Callable[[Any], tuple[np.ndarray, Any]]:
-    """Draws into lists of its own: the picture, and how it was drawn."""
+    """A function that draws with its own lists: the picture, and its statistics."""
     from hairloom.addon.render import strand_pass
     from hairloom.addon.render.mesh_pass import MeshPass
     from hairloom.addon.render.strand_layers import StrandLayers
@@ -136,7 +136,7 @@ def test_shadow_maps_of_many_grooms_share_half_of_it(hair: Any) -> None:
 
 
 def test_a_draw_says_once_that_its_maps_have_fewer_texels(frame: Any, hair: Any) -> None:
-    """As the budget has it, and the number of grooms."""
+    """The number of texels depends on the budget and on the number of grooms."""
     from hairloom.addon.render.strand_pass import StrandPass
 
     passes = frame.MeshPass(), StrandPass()
@@ -155,7 +155,7 @@ def test_a_draw_says_once_that_its_maps_have_fewer_texels(frame: Any, hair: Any)
 
 
 def test_maps_do_not_depend_on_what_else_is_there(hair: Any) -> None:
-    """Else a farm's picture would differ from that in the window."""
+    """Otherwise a render farm's picture would differ from the window's."""
     from hairloom.addon.render.strand_pass import StrandPass
 
     gpu_memory.choose_budget(8)
@@ -167,7 +167,7 @@ def test_maps_do_not_depend_on_what_else_is_there(hair: Any) -> None:
 
 
 def test_each_thread_has_its_own_number_of_grooms() -> None:
-    """A render draws beside the viewport."""
+    """A render can draw while the viewport does."""
     found = []
     with gpu_memory.shared_by(4):
         thread = threading.Thread(

@@ -1,4 +1,4 @@
-"""GPU objects are freed by the thread that made them, wherever their last reference goes."""
+"""GPU objects are freed by the thread that made them, wherever their last reference is dropped."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def _in_thread(action: Callable[[], object]) -> None:
 
 
 def _collected_there(box: list[Any]) -> None:
-    """A cycle that only the collector frees, and the thread is where it runs."""
+    """Drop the object in a cycle, which the garbage collector frees in another thread."""
     cycle = {"texture": box.pop()}
     cycle["cycle"] = cycle
     del cycle
@@ -44,7 +44,7 @@ def _collected_there(box: list[Any]) -> None:
 
 
 def mine() -> list[Any]:
-    """What this thread has made and is kept."""
+    """The kept objects that this thread has made."""
     return gpu_objects._KEPT.owned[threading.get_ident()].objects
 
 
@@ -56,7 +56,7 @@ def mine() -> list[Any]:
     ],
 )
 def test_what_another_thread_drops_waits_for_its_own(drop: Callable[[list[Any]], None]) -> None:
-    """On Vulkan a texture that a thread frees before its upload has run crashes Blender."""
+    """On Vulkan, Blender crashes if another thread frees a texture before its upload has run."""
     kept = _filled(1.0)
     for value in range(20):
         box = [_filled(value)]
@@ -81,7 +81,7 @@ def test_making_another_frees_what_nothing_uses() -> None:
 def test_a_render_thread_leaves_what_it_made_to_the_main_thread(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The thread has no context here, so what it would make and read is a stand-in."""
+    """The thread has no GPU context here, so a fake class replaces the textures that it makes."""
 
     class Made:
         def __init__(self, *_: Any, **__: Any) -> None:
@@ -95,7 +95,7 @@ def test_a_render_thread_leaves_what_it_made_to_the_main_thread(
 
     def render() -> None:
         made.append(gpu_objects.texture((1, 1), format="R32F"))
-        gpu_objects.texture((1, 1), format="R32F")  # of no use any more when the thread ends
+        gpu_objects.texture((1, 1), format="R32F")  # unused when the thread ends
         gpu_objects.hand_over()
 
     gpu_objects.free_unused()
@@ -105,7 +105,7 @@ def test_a_render_thread_leaves_what_it_made_to_the_main_thread(
     assert set(gpu_objects._KEPT.owned) == {threading.get_ident()}
     assert [each is made[0] for each in mine() if isinstance(each, Made)] == [True]
     assert reads == [1], "nothing has waited for the thread's commands"
-    gpu_objects.hand_over()  # the main thread's stay its own
+    gpu_objects.hand_over()  # the main thread keeps its own objects
     assert any(each is made[0] for each in mine())
 
 
@@ -135,7 +135,7 @@ def test_all_formats_that_passes_make_have_a_size() -> None:
 
 
 def test_nothing_else_makes_gpu_objects() -> None:
-    """The module's list is whole only if all objects are made there."""
+    """The module's list is complete only if it creates all objects."""
     addon = Path(gpu_objects.__file__).parents[1]
     makers = {
         path.name
@@ -146,6 +146,6 @@ def test_nothing_else_makes_gpu_objects() -> None:
 
 
 def _code(path: Path) -> str:
-    """Without what never comes to the GPU: descriptions of vertices, shaders and stages."""
+    """A file's code without descriptions of vertices, shaders and stages, which need no GPU."""
     descriptions = r"gpu\.types\.GPU(VertFormat|ShaderCreateInfo|StageInterfaceInfo)\("
     return re.sub(descriptions, "", path.read_text())

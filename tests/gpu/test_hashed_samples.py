@@ -1,4 +1,4 @@
-"""Hashed alpha from sample to sample: one shows a pattern, their mean how much is let through."""
+"""Hashed alpha over samples: one sample shows a pattern, the mean converges to alpha."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def camera_of(frame: Any) -> Any:
 
 
 def sheet(frame: Any, height: float, color: tuple[float, float, float], **looks: Any) -> Any:
-    """A square that fills the picture; from below, where `turned`."""
+    """A square that fills the picture and faces up, or down if `turned`."""
     corners = np.float32([[-1, -1, height], [1, -1, height], [1, 1, height], [-1, 1, height]])
     triangles = np.int32([[0, 1, 2], [0, 2, 3]])
     if looks.pop("turned", False):
@@ -55,7 +55,7 @@ def scene_of(frame: Any, *meshes: Any) -> Any:
 
 
 def test_the_first_sample_is_the_pattern_of_the_paper(frame: Any) -> None:
-    """Interleaved gradient noise, Jimenez 2014."""
+    """Against interleaved gradient noise (Jimenez 2014)."""
     red = sheet(frame, 0.0, (1.0, 0.0, 0.0), alpha=0.4, transparency="hashed")
     (seen,) = samples_of(frame, scene_of(frame, red), camera_of(frame), 1)
     y, x = np.mgrid[:SIZE, :SIZE]
@@ -66,7 +66,7 @@ def test_the_first_sample_is_the_pattern_of_the_paper(frame: Any) -> None:
 
 @pytest.mark.parametrize("turned", [False, True])
 def test_many_samples_are_as_dense_as_alpha_in_each_pixel(frame: Any, turned: bool) -> None:
-    """Also of two sheets before each other, which show the same side or not, and a floor."""
+    """For two sheets before a floor, which show the same side or not, against composited alpha."""
     hashed: dict[str, Any] = {"alpha": 0.4, "transparency": "hashed"}
     red = sheet(frame, 0.2, (1.0, 0.0, 0.0), **hashed)
     green = sheet(frame, 0.0, (0.0, 1.0, 0.0), turned=turned, **hashed)
@@ -80,7 +80,7 @@ def test_many_samples_are_as_dense_as_alpha_in_each_pixel(frame: Any, turned: bo
 
 
 def test_hashed_strands_come_to_what_they_cover(frame: Any) -> None:
-    """Their noise gets less by the root of the samples."""
+    """Their noise decreases with the square root of the number of samples."""
     x = np.linspace(-0.4, 0.4, 40)
     strands = np.zeros((40, 2, 3), np.float32)
     strands[:, :, 0] = x[:, None]

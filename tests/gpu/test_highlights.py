@@ -1,6 +1,6 @@
-"""Highlights as they are drawn, on a ball of combed hair: where the reference has them.
+"""Highlights in drawn pictures of a ball of combed hair, against the reference.
 
-tests/pure/shading/test_highlights.py says why there are so many of them, and of what colour.
+tests/pure/shading/test_highlights.py explains their number and colours.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ FROM_THE_EYE = (0.0, 0.0, -1.0)
 
 @pytest.fixture(scope="module")
 def draw() -> Callable[..., np.ndarray]:
-    """Draw a look on the ball by a light that shines along a direction, (SIZE, SIZE, 4)."""
+    """A function that draws a look on the ball, lit along a direction, (SIZE, SIZE, 4)."""
     from hairloom.addon.render import frame
 
     strands = combed_strands(12_000, cv_count=8, lift=0.004)
@@ -69,7 +69,7 @@ def look(name: str, model: str) -> ShadingSettings:
 
 
 def highlights(picture: np.ndarray) -> list[tuple[float, np.ndarray]]:
-    """From the root on: degrees beyond the equator, to the tip, and the colour of each maximum."""
+    """Place of each maximum, from root to tip, in degrees beyond the equator, and its colour."""
     middle = picture[:, SIZE // 2 - 8 : SIZE // 2 + 8, :3].mean(axis=1)
     smooth = np.apply_along_axis(np.convolve, 0, middle, np.full(5, 0.2), "same")
     bright = smooth.mean(axis=-1)
@@ -93,7 +93,7 @@ def test_blond_shows_two_and_black_one(draw: Any, model: str) -> None:
 
 
 def test_separation_sets_where_marschners_two_lie(draw: Any) -> None:
-    """R at one tilt beyond the equator, TRT at two before it; a pixel is 0.75 degrees."""
+    """R is one tilt beyond the equator, TRT two tilts before it; a pixel is 0.75 degrees."""
     blond = look("blond", "marschner")
     (second, _), (first, _) = highlights(draw(blond, FROM_THE_EYE))
     tilt = np.degrees(blond.cuticle_tilt)
@@ -103,7 +103,7 @@ def test_separation_sets_where_marschners_two_lie(draw: Any) -> None:
 
 @pytest.mark.slow
 def test_the_outline_shines_against_the_light_on_blond_alone(draw: Any) -> None:
-    """The third highlight, TT: as bright as the others without what lights the front."""
+    """The third highlight, TT, is as bright as the others, with no light at the front."""
     behind = (-0.5, 0.0, 0.87)
     front = draw(look("blond", "marschner"), FROM_THE_EYE)[..., :3].max(axis=(0, 1)).mean()
     row = slice(SIZE // 2 - 20, SIZE // 2 + 20)

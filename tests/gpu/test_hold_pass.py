@@ -1,4 +1,4 @@
-"""Strands brought to where they are held: the GPU against numpy."""
+"""Strands moved to the places that hold them: the GPU against numpy."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ pytestmark = pytest.mark.usefixtures("gpu_context")
 
 @pytest.fixture(scope="module")
 def rig() -> Rig:
-    """120 strands of 0.2 m; two balls hold some of them, a sheet some tips."""
+    """120 strands of 0.2 m; two balls hold some of them, a sheet holds some tips."""
     random = np.random.default_rng(3)
     way = random.normal([0.0, 0.0, 0.4], 0.4, (120, 12, 3)) * 0.02
     points = random.normal(0.0, 0.02, (120, 1, 3)) + way.cumsum(axis=1)
@@ -61,7 +61,7 @@ def test_equals_numpy(rig: Rig) -> None:
     ride = RidePass(rig.strands, rig.root_holds, rig.guides, rig.guide_grid, rig.riders, rig.holds)
     for seed in range(3):
         pose = pose_of(rig, seed)
-        if seed == 2:  # a tie that is gone holds nothing
+        if seed == 2:  # a removed tie holds nothing
             gone = pose.anchors.copy()
             gone[0] = np.nan
             pose = replace(pose, anchors=gone)
@@ -79,7 +79,7 @@ def test_equals_numpy(rig: Rig) -> None:
 
 
 def test_strands_of_any_point_counts(rig: Rig) -> None:
-    """The pass alone, on strands of 4 to 40 points that lie in rows one after the other."""
+    """The pass alone, on strands of 4 to 40 points that are packed into rows."""
     from hairloom.addon.groom.ties import find_holds
     from hairloom.addon.refine.hold import hold
     from hairloom.addon.render.hold_pass import HoldPass

@@ -1,4 +1,4 @@
-"""Shadows of grooms on each other and on meshes: strands shade alike, in one groom or in more."""
+"""Shadows of grooms on each other and on meshes: strands shade alike in one groom or in several."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ FLOOR = Surface(
 
 
 def sheet(height: float, count: int = 400, seed: int = 1) -> np.ndarray:
-    """Level strands side by side, each at a height of its own, (count, 6, 3)."""
+    """Level strands side by side, each at its own height, (count, 6, 3)."""
     random = np.random.default_rng(seed)
     strands = np.zeros((count, 6, 3), np.float32)
     strands[..., 0] = np.linspace(-0.2, 0.2, 6)
@@ -71,12 +71,12 @@ def picture(*grooms: DrawnGroom, camera: Camera = CAMERA, **scene: Any) -> np.nd
 
 
 def test_a_mesh_has_the_shadow_of_all_grooms(gpu_context: Any) -> None:
-    """Three sheets above each other let as much light through as the same strands in one groom."""
+    """Three sheets above each other transmit as much light as the same strands in one groom."""
     sheets = [sheet(height, seed=seed) for seed, height in enumerate((0.2, 0.3, 0.4))]
     alone = picture(groom("a", np.concatenate(sheets)))[:, :, 0]
     shared = picture(*(groom(str(i), each) for i, each in enumerate(sheets)))[:, :, 0]
     one = picture(groom("a", sheets[0]))[:, :, 0]
-    # below the hair in the picture lies the floor's middle with its shadow
+    # in the picture, the floor's middle with its shadow is below the hair
     is_floor = np.zeros((SIZE, SIZE), bool)
     is_floor[20:50, 30:98] = True
     lit, expected, least = (each[is_floor].mean() for each in (shared, alone, one))
@@ -89,8 +89,8 @@ def test_a_mesh_has_the_shadow_of_all_grooms(gpu_context: Any) -> None:
 def test_hair_has_the_shadow_of_other_grooms(
     gpu_context: Any, transparency: str, model: str
 ) -> None:
-    """A sheet below another one, seen from its side, is as dark in two grooms as in one, and
-    brighter without it. On average over sizes: the strands meet the texels of each otherwise.
+    """A sheet below another one, seen from the side, is as dark in two grooms as in one, and
+    brighter alone. Averaged over sizes, since the texels of the maps lie differently on strands.
     """
     look = {
         "strand_settings": replace(LOOK, transparency=transparency),
@@ -210,7 +210,7 @@ def test_light_from_each_side_may_shade_and_none_without_light(gpu_context: Any)
 
 
 def test_views_in_other_light_keep_what_lies_between(gpu_context: Any) -> None:
-    """Two views in turn look nothing up again, until the other hair moves."""
+    """Two views that are drawn in turn keep their look-ups until the other hair moves."""
     from hairloom.addon.render.accumulation import Target
     from hairloom.addon.render.groom_pass import GroomPass
     from hairloom.addon.render.strand_pass import InView
@@ -243,7 +243,7 @@ def test_views_in_other_light_keep_what_lies_between(gpu_context: Any) -> None:
 
 
 def test_masks_hold_what_alpha_shows(gpu_context: Any, compute: Callable[..., Any]) -> None:
-    """A sheet with holes lets the object behind it through, in both passes."""
+    """Through a sheet with holes, the object behind it appears in both passes."""
     from hairloom.addon.render.accumulation import Target
     from hairloom.addon.render.nearest import FAR_AWAY
     from hairloom.addon.render.scene_pass import ScenePass

@@ -1,4 +1,4 @@
-"""A view's picture that is kept is shown again, and nothing else is asked of the GPU."""
+"""A view's kept picture is shown again without other work for the GPU."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ BACKGROUND = (0.2, 0.1, 0.0, 0.3)
 
 @pytest.fixture(scope="module")
 def scene(frame: Any) -> Any:
-    """Two grooms of wide, thin and short strands before and behind a mesh."""
+    """Two grooms of random strands before and behind a mesh."""
     random = np.random.default_rng(3)
     ends = random.uniform(-0.5, 0.5, (2, 400, 2, 3)).astype(np.float32)
     square = np.array([[-0.3, 0, -0.3], [0.3, 0, -0.3], [0.3, 0.1, 0.4]], np.float32)
@@ -33,7 +33,7 @@ def scene(frame: Any) -> Any:
 
 
 def drawn(grooms: Any, camera: Any, draw_hair: Any) -> np.ndarray:
-    """Colours and depths of a view, in which a mesh is, and then hair, (SIZE, SIZE, 5)."""
+    """Colours and depths of a view with a mesh and then hair, (SIZE, SIZE, 5)."""
     import gpu
 
     from hairloom.addon.render.mesh_pass import MeshPass
@@ -51,7 +51,7 @@ def drawn(grooms: Any, camera: Any, draw_hair: Any) -> np.ndarray:
 
 
 def test_what_is_shown_again_is_what_was_drawn(frame: Any, scene: Any) -> None:
-    """Beside a mesh that hides some of it, of two grooms."""
+    """For two grooms with a mesh that hides some of their hair."""
     from hairloom.addon.render.kept_picture import KeptPicture
     from hairloom.addon.render.strand_pass import InView
 
@@ -173,7 +173,7 @@ def test_shadows_lag_while_a_view_turns_and_are_exact_once_it_rests(frame: Any, 
 
 
 def test_views_beside_each_other_keep_what_is_theirs(frame: Any, scene: Any) -> None:
-    """Two views in turn compute no detail and draw no map again, and are what each is alone."""
+    """Two views in turn do not compute detail or draw maps again, and look as each does alone."""
     from hairloom.addon.render.strand_pass import InView
 
     grooms, _ = scene
@@ -204,7 +204,7 @@ def test_views_beside_each_other_keep_what_is_theirs(frame: Any, scene: Any) -> 
 
 
 def test_views_in_the_same_light_share_its_maps(frame: Any, scene: Any) -> None:
-    """Until one of them turns with its studio."""
+    """Until one of them turns, and its studio lights with it."""
     grooms, camera = scene
     groom, own = replace(grooms[0], lights=studio(camera)), frame.StrandPass()
     first = own.opacity(groom, view="a")

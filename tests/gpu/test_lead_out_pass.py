@@ -24,7 +24,7 @@ KEPT, MOVED = 0.001, 2.0e-4  # [m]
 
 
 def posed(*, moved: float) -> tuple[PosedCollider, ...]:
-    """A box, a capsule and two balls, turned and scaled a little."""
+    """A box, a capsule and two balls, slightly turned and scaled."""
     axis = np.linspace(-0.2, 0.2, 24)
     nodes = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1)
     beside = np.abs(nodes) - 0.06
@@ -43,7 +43,7 @@ def posed(*, moved: float) -> tuple[PosedCollider, ...]:
 
 
 def strands(count: int, fewest: int, most: int) -> tuple[np.ndarray, np.ndarray]:
-    """Waves from all sides through the solids."""
+    """Wavy strands from all sides through the solids."""
     random = np.random.default_rng(2)
     counts = random.integers(fewest, most + 1, count)
     points = []
@@ -59,7 +59,8 @@ def strands(count: int, fewest: int, most: int) -> tuple[np.ndarray, np.ndarray]
 
 
 def with_held(clearance: Clearance, offsets: np.ndarray) -> Clearance:
-    """Every fourth strand goes with its root up to a point in its first half."""
+    """A clearance in which every fourth strand is fixed to its root up to a point in its first
+    half."""
     random, counts = np.random.default_rng(7), np.diff(offsets)
     held = np.where(np.arange(len(counts)) % 4, 0, counts * random.uniform(0.0, 0.5, len(counts)))
     held = held.astype(np.int32)
@@ -102,7 +103,7 @@ def test_equals_numpy(
     leading = LeadOutPass(layout, UploadedColliders())
 
     def lead(texture: Any, colliders: tuple[PosedCollider, ...]) -> None:
-        seen = leading.begin(colliders, 1 << 20)  # so many rounds that it takes all steps itself
+        seen = leading.begin(colliders, 1 << 20)  # the limit lets the pass take all steps itself
         if seen is not None:
             assert not seen.at_once
             leading.lead(texture, seen, carrying, 1)
@@ -135,7 +136,7 @@ def test_equals_numpy(
     assert stuck(points) > 0.2
     np.testing.assert_allclose(steps(found()[:, :3], offsets), steps(points, offsets), atol=2e-6)
 
-    # after a release it goes on
+    # it continues after a release
     before, led_before, again = found(), leading.led(), texture_from(texels, "RGBA32F")
     leading.release()
     lead(again, posed(moved=0.0))

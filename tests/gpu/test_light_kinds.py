@@ -1,4 +1,4 @@
-"""Shaders hold no more kinds of light than a moment has: the picture is that of all kinds."""
+"""Shaders contain only the kinds of light that a scene has, with the same picture as with all."""
 
 from __future__ import annotations
 

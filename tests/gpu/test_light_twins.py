@@ -1,4 +1,4 @@
-"""Lights in the shader against lights in Python, and both where numbers run out."""
+"""Lights: the shader against Python, and both at numerical limits."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from hairloom.addon.shading.lights import (
 )
 
 HERE, WHITE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
-#: rows: right, up and ahead of something that is turned
+#: a random rotation; rows: right, up and ahead
 TURNED = np.linalg.qr(np.random.default_rng(5).normal(size=(3, 3)))[0]
 
 
@@ -53,7 +53,7 @@ TWINS = {
 def computed(
     compute: Callable[..., np.ndarray], light: Light, points: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Direction and irradiance at points (n, 3), as the shader has them."""
+    """The shader's directions and irradiances at points (n, 3)."""
     found = compute(
         "lights.glsl",
         (len(points), 2),
@@ -73,13 +73,13 @@ def test_twins(compute: Callable[..., np.ndarray], light: Light) -> None:
     direction, irradiance = computed(compute, light, points)
     exact = points.astype(np.float64)
     expected = light_irradiance(light, exact)
-    # what is a hundredth of what comes at best from there is dark
+    # less than a hundredth of the maximum at a distance counts as dark
     least = 1e-2 * np.array(light.power) / (np.pi * np.sum(exact * exact, axis=1)[:, None])
     is_lit = (expected > least).all(axis=1)
     assert is_lit.sum() > 10
     most = tolerance(1e-4, 1e-3)
     assert (np.abs(irradiance - expected) <= most * np.maximum(expected, least)).all()
-    # edge-on to a panel little light arrives, and rounding turns its direction
+    # edge-on to a panel little light arrives, and rounding changes its direction
     edge_on = np.maximum(1.0, 30.0 * (least / np.maximum(expected, least)).max(axis=1))
     turned = np.abs(direction - light_at(light, exact)[0]).max(axis=1)
     assert (turned <= 1e-4 * edge_on)[is_lit].all()
@@ -105,7 +105,7 @@ EXTREMES = {
 
 @pytest.mark.parametrize("light", EXTREMES.values(), ids=EXTREMES)
 def test_nothing_is_infinite(compute: Callable[..., np.ndarray], light: Light) -> None:
-    """At the light itself, in its plane, on its rim and axis, very near and very far."""
+    """Also at the light itself, in its plane, on its rim and axis, very near and very far."""
     steps = (0.0, 1e-9, 1e-6, 1e-3, 0.5, 1e4)
     row = np.array([*steps, *(-step for step in steps[1:])])
     points = np.stack(np.meshgrid(row, row, row), axis=-1).reshape(-1, 3).astype(np.float32)

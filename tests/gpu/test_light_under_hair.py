@@ -1,4 +1,4 @@
-"""Light that hair sends on to what lies under it, drawn, against the reference."""
+"""Light that hair scatters forward onto surfaces below it, in pictures, against the reference."""
 
 from __future__ import annotations
 
@@ -54,7 +54,8 @@ def snapshot_of(shading: ShadingSettings, *, scattering: bool, is_skin: bool) ->
 
 
 def left_on_the_floor(snapshot: Any) -> np.ndarray:
-    """The share of light that arrives under the hair, seen from between the two, (n, 3)."""
+    """The fraction of light that arrives under the hair, seen from between hair and floor, (n,
+    3)."""
     from hairloom.addon.render.frame import Camera, look_at, orthographic, render_image
 
     camera = Camera(
@@ -66,7 +67,8 @@ def left_on_the_floor(snapshot: Any) -> np.ndarray:
 
 @pytest.mark.parametrize("is_skin", [False, True], ids=["mesh", "skin"])
 def test_skin_under_hair_has_what_hair_sends_on(*, is_skin: bool) -> None:
-    """Of tau, found where hair sends nothing on, it takes the share that the reference says."""
+    """Against the reference's transmittance with forward scattering, for the tau that is measured
+    without it."""
     straight = left_on_the_floor(snapshot_of(BLOND, scattering=False, is_skin=is_skin))
     found = left_on_the_floor(snapshot_of(BLOND, scattering=True, is_skin=is_skin))
     assert np.ptp(straight, axis=1).max() < 1e-6
@@ -80,7 +82,7 @@ def test_skin_under_hair_has_what_hair_sends_on(*, is_skin: bool) -> None:
 
 
 def test_the_soft_edge_of_a_meshs_shadow_has_no_colour_of_hair() -> None:
-    """Hair stands on either side, a plate is in the way."""
+    """A plate blocks the light, and hair stands only at the sides."""
     snapshot = snapshot_of(BLOND, scattering=True, is_skin=True)
     plate = Surface((0.2 * CORNERS + [-0.2, 0.0, 0.4]).astype(np.float32), TRIANGLES)
     aside = snapshot.points.copy()

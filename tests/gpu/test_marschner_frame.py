@@ -1,4 +1,4 @@
-"""Marschner as it is drawn: pixels against the reference, highlights that do not flicker."""
+"""Marschner's model in drawn pictures: pixels against the reference, and stable highlights."""
 
 from __future__ import annotations
 
@@ -66,7 +66,8 @@ LOOKS = {
 def test_a_pixel_has_the_colour_of_the_reference(
     frame: Any, shading: ShadingSettings, size: int
 ) -> None:
-    """Broad straight ribbons under a sun before and a lamp behind them, the whole fragment."""
+    """The complete fragment shader, on broad straight ribbons with a sun before and a lamp behind
+    them."""
     strands = ribbons()
     seeds = np.arange(7) * 1009 + 12
     ambient = (0.1, 0.2, 0.3)
@@ -123,7 +124,7 @@ def test_a_pixel_has_the_colour_of_the_reference(
     assert np.abs(found[..., :3] / expected - 1.0).max() < tolerance(2e-3, 4e-3)
 
 
-#: as light_flow.skin_seen_by has it: received, beneath, depth
+#: as from light_flow.skin_seen_by: received, beneath, depth
 SEEN = np.float32([0.6, 0.15, -0.8, 0.4, 0.1, 0.5, -0.2, 4.0])
 PLAIN = replace(
     ShadingSettings(model="marschner", pigment="melanin", melanin=0.4),
@@ -186,7 +187,7 @@ def test_strands_gain_the_light_of_the_reference(frame: Any, transparency: str) 
 
 
 def ribbons() -> np.ndarray:
-    """Broad and straight, side by side, and turned, so that some stand in a highlight."""
+    """Broad straight ribbons side by side, turned so that some show a highlight."""
     ends = np.array([[-0.1, 0.0, 0.0], [0.1, 0.0, 0.02]])
     each = [
         ends + [0.0, 0.0, 0.05 * place] + [[0.0, 0.0, 0.0], [0.0, 0.04 * place, 0.0]]
@@ -200,7 +201,8 @@ def before_ribbons(frame: Any) -> Any:
 
 
 def on_ribbons(strands: np.ndarray, camera: Any) -> tuple[np.ndarray, ...]:
-    """Nine pixels along each: column, row, how far along, point, tangent, normal and to the eye."""
+    """Nine pixels along each ribbon: column, row, place along it, point, tangent, normal and
+    direction to the eye."""
     chord = (strands[:, 1:] - strands[:, :1]).astype(np.float64)
     column, row, along = seen_pixels(strands[:, :1], chord, camera.projection @ camera.view, 601)
     point = strands[:, :1] + along[..., None] * chord
@@ -213,9 +215,9 @@ def on_ribbons(strands: np.ndarray, camera: Any) -> tuple[np.ndarray, ...]:
 def seen_pixels(
     root: np.ndarray, chord: np.ndarray, matrix: np.ndarray, size: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Nine pixels along each straight strand, and what of the strand lies across from their middle.
+    """Nine pixels along each straight strand, and the strand's places nearest to their centres.
 
-    Returns column, row and how far along, each (strands, 9).
+    Returns column, row and place along the strand, each (strands, 9).
     """
 
     def pixels_of(along: np.ndarray) -> np.ndarray:
@@ -235,7 +237,7 @@ def seen_pixels(
 
 
 def sheet(pixels: int, cycle: float, swing: float) -> np.ndarray:
-    """Upright strands, one a column of pixels, that wave in depth, a cycle in so many pixels."""
+    """Upright strands, one per column of pixels, with waves in depth of `cycle` pixels."""
     height = np.linspace(-0.1, 1.1, 16 * pixels)
     phase = np.random.default_rng(1).random((pixels, 1)) * 2.0 * np.pi
     rate = 2.0 * np.pi * pixels / cycle
@@ -250,7 +252,7 @@ def without_levels(tables: MarschnerTables) -> MarschnerTables:
     return replace(tables, longitudinal=np.repeat(tables.longitudinal[:1], 6, axis=0))
 
 
-#: towards the light; the eye is at -y
+#: directions to the light; the eye is at -y
 BEFORE = ((0.62, -0.78, 0.13), (-0.75, -0.6, -0.28), (-0.9, -0.3, 0.3), (0.98, -0.2, 0.0))
 BEHIND = (-0.62, 0.78, -0.13)
 
@@ -266,9 +268,9 @@ BEHIND = (-0.62, 0.78, -0.13)
 def test_highlights_on_waves_do_not_flicker(
     frame: Any, monkeypatch: pytest.MonkeyPatch, cycle: float, swing: float
 ) -> None:
-    """One sample a pixel comes close to 64 of them, where without levels it is far off.
+    """One sample per pixel is close to 64 samples; without table levels it is not.
 
-    Light from behind stays what it is: theta_h hardly changes, and nothing may be blurred.
+    For light from behind theta_h hardly changes, so levels must blur nothing.
     """
     from hairloom.addon.render import marschner_textures
 
@@ -287,7 +289,7 @@ def test_highlights_on_waves_do_not_flicker(
     )
 
     def drawn(samples: int) -> np.ndarray:
-        """(lights, rows, columns) of green."""
+        """The green channel, (lights, rows, columns)."""
         pictures = []
         for direction in (*BEFORE, BEHIND):
             snapshot = frame.Snapshot(
@@ -305,7 +307,7 @@ def test_highlights_on_waves_do_not_flicker(
         return np.array(pictures)
 
     def off(pictures: np.ndarray) -> np.ndarray:
-        """Root of the mean square for each light, as a factor of its mean."""
+        """Root mean square error for each light, relative to its mean."""
         return np.sqrt(np.mean((pictures - exact) ** 2, axis=(1, 2))) / exact.mean(axis=(1, 2))
 
     exact, filtered = drawn(8), drawn(1)

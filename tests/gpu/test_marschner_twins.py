@@ -1,4 +1,4 @@
-"""Marschner's model and the hair's colours: GLSL against Python, number by number."""
+"""Marschner's model and the hair's colours: GLSL against Python, value by value."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from hairloom.addon.shading.settings import ShadingSettings
 from hairloom.addon.shading.tint import tip_fraction
 
 ROWS, COLUMNS = 96, 128
-#: both are of the goal: GLSL within 1e-3 of Python
+#: both are the required accuracy: GLSL within 1e-3 of Python
 RELATIVE, OF_PEAK = 1.0e-3, 1.0e-5
 
 
@@ -40,14 +40,14 @@ def unit(vectors: np.ndarray) -> np.ndarray:
 
 
 def texels(*parts: np.ndarray) -> np.ndarray:
-    """Lanes side by side, filled up to four, float32."""
+    """Values side by side as channels, padded to four, float32."""
     packed = np.concatenate([np.atleast_3d(part) for part in parts], axis=-1)
     return np.pad(packed, ((0, 0), (0, 0), (0, 4 - packed.shape[-1]))).astype(np.float32)
 
 
 def agree(found: np.ndarray, expected: np.ndarray, relative: float = RELATIVE) -> bool:
-    """Within so much of itself, or within 1e-5 of the brightest; on a GPU, within what its sampler
-    is off in three steps between texels."""
+    """Whether values agree within `relative`, or within 1e-5 of the brightest one; on a GPU, within
+    the error of three linear interpolations by its sampler."""
     of_peak = tolerance(OF_PEAK, 3.0 * SUBTEXEL)
     allowed = np.maximum(relative * np.abs(expected), of_peak * np.abs(expected).max())
     return bool(np.isfinite(found).all() and (np.abs(found - expected) <= allowed).all())
@@ -58,7 +58,7 @@ def directions(seed: int) -> np.ndarray:
 
 
 def test_angles(compute: Callable[..., np.ndarray]) -> None:
-    """Also where both directions are one, opposite, or along the strand."""
+    """Also if both directions are equal, opposite, or along the strand."""
     tangents, lights, eyes = directions(1), directions(2), directions(3)
     eyes[0], eyes[1] = lights[0], -lights[1]
     lights[2], lights[3], eyes[3] = tangents[2], tangents[3], -tangents[3]
@@ -101,7 +101,8 @@ def look_up_textures(tables: MarschnerTables) -> dict[str, np.ndarray]:
 
 @pytest.mark.parametrize("settings", SHAPES.values(), ids=SHAPES)
 def test_look_up(compute: Callable[..., np.ndarray], settings: ShadingSettings) -> None:
-    """Over all angles, their ends too, all levels and more, from clear hair to black."""
+    """For all angles including their limits, for all levels and beyond, from clear to black
+    hair."""
     random = np.random.default_rng(7)
     tables = marschner_tables(fibre_of(settings), PREVIEW_SIZE)
     theta_i = np.linspace(-0.5 * np.pi, 0.5 * np.pi, COLUMNS)[None, :] + np.zeros((ROWS, 1))
@@ -128,7 +129,7 @@ def test_look_up(compute: Callable[..., np.ndarray], settings: ShadingSettings) 
     theta_i, theta_r, phi, level = np.moveaxis(packed[0].astype(np.float64), -1, 0)
     absorption = packed[1][..., :3].astype(np.float64)
     expected = look_up(tables, theta_i, theta_r, phi, absorption, np.array(strengths), level)
-    # as light uses it: where it grazes, S itself has no bounds
+    # with the cosine, as for light: S itself is unbounded at grazing angles
     cosine = np.cos(theta_i)[..., None]
     assert agree(found * cosine, expected * cosine)
 
@@ -139,7 +140,7 @@ def test_light(compute: Callable[..., np.ndarray], settings: ShadingSettings) ->
     tables = marschner_tables(fibre_of(settings), PREVIEW_SIZE)
     tangents, lights, eyes = directions(1), directions(2), directions(3)
     normals = strand_normal(directions(4).astype(np.float64), tangents, np.zeros(3))
-    # many near the first highlight: the eye in the mirror's cone
+    # many near the first highlight, with the eye in the specular cone
     mirrored = lights - 2.0 * np.sum(lights * tangents, axis=-1, keepdims=True) * tangents
     eyes[::2] = unit(mirrored + 0.2 * eyes)[::2]
     shift, sparkle, level = random.random((3, ROWS, COLUMNS)) * [[[1.0]], [[1.0]], [[5.0]]]
@@ -191,7 +192,7 @@ def test_colors(compute: Callable[..., np.ndarray], changes: dict[str, Any]) -> 
     settings = ShadingSettings(**changes)
     places = np.random.default_rng(9).random((1, 400, 3)).astype(np.float32)
     places[0, :5, 0] = 0.0, 1.0, settings.tint_start, settings.tint_end, 0.5
-    # black and more than white among them
+    # including black, and colours above white
     roots = np.random.default_rng(10).uniform(0.0, 1.2, (1, 400, 3)).astype(np.float32) ** 3
     roots[0, 0] = 0.0
     found = compute(

@@ -19,7 +19,7 @@ from hairloom.addon.strands import Surface
 WHITE = (1.0, 1.0, 1.0)
 UP = np.array([0.0, 0.0, 1.0])
 DOWN = Cone(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), 1.4, 0.1)
-#: middles and sides of boxes that stand on the ground or float above it [m]
+#: centres and sides of boxes on or above the ground [m]
 BOXES = (((0.0, 0.0, 0.5), 1.0), ((-1.6, 0.7, 1.5), 0.5), ((1.5, -0.4, 0.2), 0.4))
 LIGHTS = {
     "sun": Light.sun((0.5, 0.6, -0.7), WHITE, 3.0),
@@ -37,7 +37,7 @@ SETTINGS = MeshShadowSettings(mesh_resolution=512)
 
 
 def box(center: tuple[float, float, float], side: float) -> Surface:
-    """Triangles with four vertices a face."""
+    """A box of triangles with four vertices per face."""
     faces = []
     for axis in range(3):
         for sign in (-0.5, 0.5):
@@ -58,7 +58,7 @@ SCENE = (ground(), *(box(*each) for each in BOXES))
 
 
 def is_lit(light: Light, points: np.ndarray) -> np.ndarray:
-    """Whether no box is in the way, by the slabs between its faces."""
+    """Whether no box blocks the light, by ray tests against the slabs of its faces."""
     way = np.asarray(light.vector) - (0.0 if light.kind == "sun" else points)
     way = np.broadcast_to(way, points.shape)
     farthest = np.inf if light.kind == "sun" else 1.0
@@ -74,7 +74,7 @@ def is_lit(light: Light, points: np.ndarray) -> np.ndarray:
 def found_light(
     compute: Callable[..., np.ndarray], maps: Any, points: np.ndarray, normals: np.ndarray
 ) -> np.ndarray:
-    """What the shader finds of the first two lights, (n, 2)."""
+    """The light that the shader finds from the first two lights, (n, 2)."""
     textures = {"points": points, "normals": np.broadcast_to(normals, points.shape)}
     return compute(
         "mesh_light.glsl",
@@ -96,7 +96,7 @@ def maps_of(casters: Any, lights: Any, settings: MeshShadowSettings = SETTINGS) 
 
 
 def texel_at(light: Light, points: np.ndarray) -> np.ndarray:
-    """How large a texel is on the ground there, along its longer side, (n,) [m]."""
+    """Size of a texel on the ground at these points, along its longer side, (n,) [m]."""
     ball = ball_of_casters([extent_of(each) for each in SCENE])
     assert ball is not None
     size = np.full(len(points), np.inf)
@@ -114,8 +114,7 @@ def texel_at(light: Light, points: np.ndarray) -> np.ndarray:
 def test_shadows_on_the_ground_are_those_of_rays(
     gpu_context: Any, compute: Callable[..., np.ndarray], name: str
 ) -> None:
-    """Wherever it shines, but as near to an edge as the disk is wide; there are both light and
-    shadow."""
+    """At lit and at shaded points, except within the filter disk's width of an edge."""
     light, random = LIGHTS[name], np.random.default_rng(5)
     points = np.zeros((12000, 3))
     points[:, :2] = random.uniform(-4.0, 4.0, (12000, 2))
@@ -138,7 +137,7 @@ def test_shadows_on_the_ground_are_those_of_rays(
 def test_an_edge_lies_where_it_should(
     gpu_context: Any, compute: Callable[..., np.ndarray], name: str
 ) -> None:
-    """Half of the light is left within half a texel of it, and no bias moves it."""
+    """The place of half light is within half a texel of the edge; bias does not move it."""
     light = {
         "sun": Light.sun((0.5, 0.0, -1.0), WHITE, 3.0),
         "lamp": Light.point((-1.5, 0.2, 2.0), WHITE, 100.0),
@@ -160,8 +159,8 @@ def test_an_edge_lies_where_it_should(
 
 
 def along_an_edge(compute: Callable[..., np.ndarray], resolution: int) -> np.ndarray:
-    """What is left of a sun beside the oblique edge of a sheet's shadow: a row for each distance
-    from -0.1 to 0.1 m, (150, 100)."""
+    """The remaining light of a sun beside the oblique edge of a sheet's shadow: a row for each
+    distance from -0.1 to 0.1 m, (150, 100)."""
     sheet, angle = ground(1.0, 1.0), np.radians(20.0)
     along = np.array([np.cos(angle), np.sin(angle), 0.0])
     across = np.cross(UP, along)
@@ -177,7 +176,8 @@ def along_an_edge(compute: Callable[..., np.ndarray], resolution: int) -> np.nda
 
 
 def test_an_oblique_edge_has_no_steps(gpu_context: Any, compute: Callable[..., np.ndarray]) -> None:
-    """It is as bright all along; where texels alone decide it goes from dark to light."""
+    """Brightness is nearly constant along it; with unfiltered texels it ranges from dark to
+    light."""
     found = along_an_edge(compute, 1024)
     assert found[0].max() == 0.0 and found[-1].min() > 0.999
     assert np.ptp(found, axis=1).max() < 0.12
@@ -196,7 +196,7 @@ def test_an_edge_is_as_soft_at_any_resolution(
 
 
 def test_samples_of_a_picture_ask_places_all_around(gpu_context: Any) -> None:
-    """So that the mean of them has smooth edges: within a texel to each side, each way alike."""
+    """Shifts up to a texel, evenly in all directions, give smooth edges in the mean of samples."""
     maps = maps_of((ground(), box((0.0, 0.0, 0.5), 1.0)), (LIGHTS["sun"],))
     shifts = np.array(
         [maps.feature(sample).blocks["mesh_shadows"][1][-4:-2] for sample in range(64)]
@@ -212,7 +212,7 @@ def test_samples_of_a_picture_ask_places_all_around(gpu_context: Any) -> None:
 
 
 def test_nothing_shades_itself(gpu_context: Any, compute: Callable[..., np.ndarray]) -> None:
-    """Nor the ground under a low sun, nor the sides of a box, nor a ball of many triangles."""
+    """Not the ground under a low sun, nor the sides of a box, nor a ball of many triangles."""
     sun = Light.sun((0.9, 0.35, -0.12), WHITE, 3.0)
     turns, rises = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, 129), np.linspace(0.0, np.pi, 65))
     ball = np.stack(
@@ -253,7 +253,7 @@ def test_the_shader_agrees_with_its_twin(
         expected = mesh_light(frame, depths, points, normals)
         assert 0.03 < (expected < 0.5).mean() < 0.9
         found = found_light(compute, maps, points, normals)[:, 0]
-        # where a depth is the very one that it is compared with rounding decides
+        # rounding decides where compared depths are equal
         assert (np.abs(found - expected) > 1e-3).mean() < 2e-3
 
 
@@ -272,7 +272,7 @@ def test_each_light_has_its_maps_when_all_are_amidst_meshes(gpu_context: Any) ->
 
 
 def test_alpha_lets_light_through(gpu_context: Any, compute: Callable[..., np.ndarray]) -> None:
-    """Of a sheet with a picture that covers half of it, and of one that is half there."""
+    """For a sheet with a picture that covers half of it, and for one with an alpha of 0.5."""
     from hairloom.addon.render.snapshot import MeshPictures, MeshSnapshot
 
     sun = Light.sun((0.0, 0.0, -1.0), WHITE, 3.0)
@@ -306,7 +306,7 @@ def test_maps_are_drawn_only_when_something_moved(gpu_context: Any) -> None:
     moved = (*SCENE[:-1], box((1.4, -0.4, 0.2), 0.4))
     second = shadows.maps(moved, (sun,), SETTINGS)
     assert second is not first
-    # as large as before and at the same place, so that the light's frame is the same too
+    # the same size and place, so that the light's frame is the same too
     holed = (*moved[:-1], Surface(moved[-1].positions, moved[-1].triangles[2:]))
     third = shadows.maps(holed, (sun,), SETTINGS)
     assert third is not second and np.array_equal(third.values, second.values)

@@ -1,4 +1,4 @@
-"""What moves is drawn without reading anything back, and nothing of it is missing."""
+"""Moving hair is drawn without read-backs, and completely."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from hairloom.addon.strands import Surface
 pytestmark = pytest.mark.usefixtures("gpu_context")
 
 SIZE = 128
-#: a view, by name, as the overlay knows one
+#: the name of a view, as in the overlay
 VIEW = "a view"
 
 
 def curls(frame: Any, *, outward: float = 1.0, **more: Any) -> Any:
-    """A ball with curly hair of 5 to 20 cm, all of it on the side of +y where `outward` is 0."""
+    """A ball with curly hair of 5 to 20 cm, only on the side of +y if `outward` is 0."""
     random = np.random.default_rng(5)
     out = random.normal(size=(1500, 1, 3))
     out[..., 1] = np.where(outward > 0.0, out[..., 1], np.abs(out[..., 1]) + 1.0)
@@ -53,7 +53,7 @@ def seen_from(frame: Any, degrees: float = 0.0, distance: float = 1.0) -> Any:
 
 
 def drawn(frame: Any, own: Any, groom: Any, camera: Any, **options: Any) -> Any:
-    """The picture (SIZE, SIZE, 4), over a mesh, and what was asked of the GPU for the hair."""
+    """The picture over a mesh, (SIZE, SIZE, 4), and the number of GPU calls for the hair."""
     import gpu
 
     from hairloom.addon.render.mesh_pass import MeshPass
@@ -79,7 +79,7 @@ def moved(groom: Any, number: int) -> Any:
 
 
 def test_what_moves_waits_for_nothing_and_is_what_is_drawn_at_rest(frame: Any) -> None:
-    """It plays, and the view turns, with its lights or without; and then it rests."""
+    """While hair plays and the view turns, with or without its lights; then both rest."""
     lit = curls(frame, lights=three_point_lights(seen_from(frame).view), volume=VolumeSettings())
     for groom in (curls(frame), lit):
         own = frame.StrandPass()
@@ -99,7 +99,7 @@ def test_what_moves_waits_for_nothing_and_is_what_is_drawn_at_rest(frame: Any) -
 
 
 def test_a_view_that_turns_is_as_bright_and_covers_as_much(frame: Any) -> None:
-    """With three layers in place of eight, in other places of each pixel."""
+    """With three layers instead of eight, at other places in each pixel."""
     from hairloom.addon.render.strand_layers import LAYERS_OF_PIXELS
 
     own, groom = frame.StrandPass(), curls(frame)
@@ -116,7 +116,7 @@ def test_a_view_that_turns_is_as_bright_and_covers_as_much(frame: Any) -> None:
 
 
 def test_other_strands_are_counted_first(frame: Any) -> None:
-    """More of them, or in more pieces: what was known says nothing of these."""
+    """Other strands, or more pieces: counts from before do not apply."""
     own, groom = frame.StrandPass(), curls(frame)
     drawn(frame, own, groom, seen_from(frame))
     fewer = frame.Snapshot(groom.points[:900].reshape(100, 9, 3), np.full((100, 9), 3e-4))
@@ -126,7 +126,7 @@ def test_other_strands_are_counted_first(frame: Any) -> None:
 
 
 def test_a_jump_coarsens_strands_and_loses_none(frame: Any, monkeypatch: Any) -> None:
-    """All were behind the head, and the view is on their side at once; and it comes much nearer."""
+    """All were hidden by the head, and the view jumps to their side and much nearer."""
     from hairloom.addon.render.known_detail import KnownDetail
 
     spheres = np.array([[0.0, 0.0, 0.0, 0.098]], np.float32)
@@ -136,7 +136,7 @@ def test_a_jump_coarsens_strands_and_loses_none(frame: Any, monkeypatch: Any) ->
     drawn(frame, own, groom, seen_from(frame, distance=3.0))
     before = own.statistics
     camera = seen_from(frame, degrees=180.0, distance=0.7)
-    # nor does it know how much nearer
+    # the number of slots does not adapt to the distance either
     monkeypatch.setattr(KnownDetail, "slots_at", lambda self, _: len(groom.roots))
     found, calls = drawn(frame, own, groom, camera, is_moving=True)
     still = frame.StrandPass()
@@ -159,7 +159,7 @@ def blurred(picture: np.ndarray) -> np.ndarray:
 def test_fragments_without_room_are_made_up_for(
     frame: Any, monkeypatch: Any, radius: float, rows: int
 ) -> None:
-    """With room for two thirds of those that are expected: fewer strands, each wider."""
+    """With memory for two thirds of the expected fragments, fewer but wider strands are drawn."""
     from hairloom.addon.render import strand_pass
     from hairloom.addon.render.strand_layers import StrandLayers
 
@@ -183,7 +183,7 @@ def test_fragments_without_room_are_made_up_for(
 
 @pytest.mark.parametrize("fullness", [0.2, 1.0, 20.0])
 def test_no_more_fragments_come_than_were_expected(frame: Any, fullness: float) -> None:
-    """From afar and so near that strands pass the eye; and not many times fewer come."""
+    """From far away and so near that strands pass the eye; the estimate is not much too high."""
     from hairloom.addon.render.strand_layers import LAYERS_OF_PIXELS
 
     groom = replace(

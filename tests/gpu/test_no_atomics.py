@@ -1,7 +1,8 @@
-"""Drawing on GPUs whose images have no atomics: pictures beside those with, and what is never made.
+"""Drawing on GPUs without image atomics: pictures against those with atomics, and programs that
+must not be compiled.
 
-Layers and deep opacity maps with atomics are the reference: other tests hold them against sorting
-and against counted strands.
+Layers and deep opacity maps with atomics are the reference; other tests compare them with sorting
+and with counted strands.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ CHOICES = ("automatic", "never")
 
 @pytest.fixture
 def choose() -> Iterator[Any]:
-    """Choose image atomics, and leave them as they were."""
+    """A function that chooses image atomics; the choice is reset afterwards."""
     from hairloom.addon.render import capabilities
 
     yield capabilities.choose_image_atomics
@@ -44,7 +45,7 @@ def choose() -> Iterator[Any]:
 
 @pytest.fixture
 def made(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[Any]]:
-    """The recipes of all programs that are compiled from here on; none is there from before."""
+    """The recipes of all programs that are compiled from here on, without cached ones."""
     from hairloom.addon.render import shader_program
 
     recipes: list[Any] = []
@@ -58,14 +59,14 @@ def made(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[Any]]:
     monkeypatch.setattr(shader_program, "_PROGRAMS", programs)
     monkeypatch.setattr(shader_program, "_compiled", recorded)
     yield recipes
-    # shaders have to live until all are released
+    # shaders must stay referenced until all are released
     before |= {
         replace(each, name=f"{each.name}, {len(before)}"): programs[each] for each in programs
     }
 
 
 def dome(count: int = 1500, cv_count: int = 12) -> tuple[np.ndarray, np.ndarray]:
-    """Hair that stands on the upper half of a ball of 10 cm, and falls."""
+    """Hair that leaves the upper half of a ball of 10 cm, and falls."""
     random = np.random.default_rng(3)
     away = random.normal(size=(count, 3))
     away[:, 2] = np.abs(away[:, 2])
@@ -76,7 +77,7 @@ def dome(count: int = 1500, cv_count: int = 12) -> tuple[np.ndarray, np.ndarray]
 
 
 def wall(frame: Any) -> Any:
-    """Amidst the hair, so that it hides some of it."""
+    """A wall amid the hair that hides some of it."""
     corners = np.array([[0.02, y, z] for y in (-0.3, 0.3) for z in (-0.1, 0.12)], np.float32)
     return frame.MeshSnapshot.of(Surface(corners, np.array([[0, 1, 2], [1, 3, 2]], np.int32)))
 
@@ -99,7 +100,7 @@ def camera_of(frame: Any) -> Any:
 
 
 def accumulated(frame: Any, snapshot: Any) -> np.ndarray:
-    """The mean of samples, as the render engine takes them."""
+    """The mean of samples as in the render engine."""
     from hairloom.addon.render.camera_window import jittered
     from hairloom.addon.render.mesh_pass import MeshPass
     from hairloom.addon.render.pixel_filter import jitters
@@ -131,7 +132,7 @@ def test_what_the_gpu_can_do_is_found_once(monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def probe_anew(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As in a Blender that has just started."""
+    """Forget the result of the probe, as if Blender had just started."""
     from hairloom.addon.render import capabilities
 
     monkeypatch.setattr(capabilities, "_probed", cache(capabilities._probed.__wrapped__))
@@ -141,7 +142,8 @@ def probe_anew(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_atomics_that_do_nothing_are_noticed(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, change: str
 ) -> None:
-    """A driver that takes the program and writes nothing, or only part of it, or takes it not."""
+    """Drivers that compile the program but write nothing or too little, and one that does not
+    compile it."""
     from hairloom.addon.render import capabilities as module
     from hairloom.addon.render.shader_source import SHADER_FOLDER
 
@@ -214,7 +216,7 @@ def uses_atomics(recipe: Any) -> bool:
 def test_no_program_with_atomics_is_made_where_they_are_forbidden(
     frame: Any, choose: Any, made: list[Any], monkeypatch: pytest.MonkeyPatch, choice: str
 ) -> None:
-    """Strands as layers, deep maps of strands, and of cards."""
+    """For layers of strands, and for deep maps of strands and cards."""
 
     probe_anew(monkeypatch)
     choose(choice)
@@ -225,7 +227,7 @@ def test_no_program_with_atomics_is_made_where_they_are_forbidden(
 
 
 def draw_cards(frame: Any) -> np.ndarray:
-    """Two cards that let light through before a third one, whose dark side is seen."""
+    """Two cards that let light through before a third one, seen from its dark side."""
     half = np.full((2, 2), 0.5, np.float32)
     alpha = np.float32([[0.3, 1.0], [0.3, 1.0]])
     textures = HairTextures(
@@ -241,7 +243,7 @@ def draw_cards(frame: Any) -> np.ndarray:
 
 
 def test_shadows_of_cards_need_no_atomics(frame: Any, choose: Any) -> None:
-    """test_card_shadows.py holds them against what light is left."""
+    """The same pictures with and without; test_card_shadows.py compares them with formulas."""
     pictures = []
     for choice in CHOICES:
         choose(choice)
@@ -263,7 +265,7 @@ def both_ways(frame: Any, choose: Any) -> tuple[np.ndarray, ...]:
 
 
 def test_accumulated_strands_are_layers(frame: Any, choose: Any) -> None:
-    """Among them a wall, before and behind which hair lies in the same pixels."""
+    """Also in pixels where hair lies before and behind a wall."""
     with_, without = both_ways(frame, choose)
     off, hair = without - with_, with_[..., 3] > 0.0
     assert np.abs(off[..., :3]).mean() < 0.02 and np.abs(off[hair]).mean() < 0.03
@@ -272,7 +274,7 @@ def test_accumulated_strands_are_layers(frame: Any, choose: Any) -> None:
 
 
 def test_they_look_like_layers(frame: Any, choose: Any) -> None:
-    """Mean FLIP (Andersson et al. 2020); hair fills the picture."""
+    """By mean FLIP (Andersson et al. 2020), with hair that fills the picture."""
     flip = pytest.importorskip("flip_evaluator")
     codes = [
         np.clip(0.8 * each[..., :3], 0.0, 1.0).astype(np.float32) ** (1 / 2.2)
@@ -282,7 +284,7 @@ def test_they_look_like_layers(frame: Any, choose: Any) -> None:
 
 
 def test_deep_maps_are_the_same(frame: Any, choose: Any) -> None:
-    """Where layers start, and the picture of opaque strands in their light."""
+    """The starts of layers, and the picture of opaque strands in their light."""
     from hairloom.addon.render.strand_pass import StrandPass
 
     starts, pictures = {}, {}
@@ -296,7 +298,7 @@ def test_deep_maps_are_the_same(frame: Any, choose: Any) -> None:
         pictures[choice] = frame.render_image(snapshot, camera_of(frame), SIZE, SIZE, 1)
     with_, without = starts.values()
     assert 0.2 < (with_ <= 1.0).mean() < 0.95
-    # right at the border of two texels rounding decides
+    # rounding decides at borders of texels
     assert (np.abs(with_ - without) > 1e-6).mean() < 1e-3
     lit = pictures["automatic"][..., :3]
     off = np.abs(pictures["never"] - pictures["automatic"])[..., :3]
@@ -304,7 +306,7 @@ def test_deep_maps_are_the_same(frame: Any, choose: Any) -> None:
 
 
 def test_the_choice_counts_for_maps_that_are_there(frame: Any, choose: Any) -> None:
-    """They are drawn again, by the other program."""
+    """Existing maps are drawn again with the other program."""
     from hairloom.addon.render.strand_pass import StrandPass
 
     own, snapshot = StrandPass(), shown(frame, "none")
@@ -318,7 +320,7 @@ def test_the_choice_counts_for_maps_that_are_there(frame: Any, choose: Any) -> N
 def test_strands_of_few_and_of_many_points_leave_no_gaps(
     gpu_context: Any, choose: Any, lengths: str
 ) -> None:
-    """One strand across the whole map, in one piece, and in a hundred."""
+    """One strand across the whole map, in one segment and in a hundred."""
     from hairloom.addon.render.opacity_pass import OpacityPass
     from hairloom.addon.render.strand_layout import StrandLayout, strand_rows
     from hairloom.addon.render.textures import texture_from
@@ -340,7 +342,7 @@ def test_strands_of_few_and_of_many_points_leave_no_gaps(
 
 
 def test_sequences_are_even_and_independent() -> None:
-    """Alone each is stratified; of two, the product of both chances comes out."""
+    """Each sequence is stratified, and joint frequencies of two are products of their own."""
     random = np.random.default_rng(5)
     seeds = random.integers(0, 1 << 32, (2, 2, 4000, 1), dtype=np.uint32)
     one, other = (scrambled(np.arange(SAMPLES), *each) for each in seeds)

@@ -1,4 +1,4 @@
-"""Opacity maps drawn on the GPU against strands counted one by one."""
+"""Opacity maps drawn on the GPU against strands that are counted one by one."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ LIGHTS = {
 
 
 def dome(count: int = 3000, cv_count: int = 12, radius: float = 2e-4) -> tuple[Any, Any]:
-    """Hair that stands on the upper half of a ball of 10 cm, and falls."""
+    """Hair that leaves the upper half of a ball of 10 cm, and falls."""
     random = np.random.default_rng(3)
     away = random.normal(size=(count, 3))
     away[:, 2] = np.abs(away[:, 2])
@@ -79,9 +79,9 @@ def drawn(
 
 
 def balls(strands: np.ndarray, count: int = 4) -> list[Ball]:
-    """Balls around hair whose maps have their texels elsewhere in it each.
+    """Balls around hair that differ a little, so that the texels of their maps lie elsewhere.
 
-    What one map counts too much because of where its texels lie, another counts too little.
+    Errors from the position of texels cancel on average.
     """
     tight, random = ball_around(strands), np.random.default_rng(4)
     return [
@@ -104,7 +104,7 @@ def layers_of(maps: Any) -> np.ndarray:
 @pytest.mark.parametrize("light", LIGHTS.values(), ids=LIGHTS)
 @pytest.mark.parametrize("shadows", ["slices", "deep"])
 def test_sums_are_those_of_the_strands(gpu_context: Any, light: Light, shadows: str) -> None:
-    """All coverage is there, and lies where it should, give or take a texel."""
+    """All coverage is in the map, at its place within a texel."""
     strands, radius = dome(1000)
     settings = VolumeSettings(
         shadows=shadows, slices=8, layers=8, resolution=128, strand_fraction=1.0
@@ -121,7 +121,7 @@ def test_sums_are_those_of_the_strands(gpu_context: Any, light: Light, shadows: 
         blocks = [each.reshape(8, 16, 8, 16).sum(axis=(1, 3)) for each in (found, expected)]
         assert np.abs(blocks[0] - blocks[1]).max() < 0.05 * blocks[1].max()
     found, expected = np.mean(sums, axis=0)
-    # under a wide angle strands that bend are not everywhere as broad as at their CVs
+    # in wide maps, the width of bent strands differs between CVs
     is_wide = is_within(light, ball_around(strands))
     assert found == pytest.approx(expected, rel=2e-2 if is_wide else 4e-3)
 
@@ -198,8 +198,8 @@ def test_strands_that_stand_for_many_are_blurred_and_meshes_are_not(
 def test_hair_that_a_mesh_hides_from_the_light_is_left_out(
     gpu_context: Any, compute: Callable[..., np.ndarray], light: str, shadows: str
 ) -> None:
-    """A wall with an edge amidst the hair: lit places meet as many strands as counted one by one,
-    at least as nearly as where the hair behind the wall is in the maps too.
+    """A wall whose edge is amid the hair: at lit places, errors against counted strands are no
+    larger than those of maps that contain the hair behind the wall.
     """
     from hairloom.addon.render.opacity_pass import OpacityPass
 
@@ -243,13 +243,13 @@ def test_hair_that_a_mesh_hides_from_the_light_is_left_out(
         error.append(np.abs(np.exp(-found[:, 0]) - np.exp(-counted)))
     assert 500 < (lit < 1.0).sum() < 5000
     assert sums[1] < 0.95 * sums[0]
-    # where there is hair before the wall, layers end at the last of it
+    # before the wall, layers end at the last hair there
     assert shadows == "slices" or (thick[1] < 0.7 * thick[0]).sum() > 5
     assert error[1][lit > 0.0].mean() < 1.002 * error[0][lit > 0.0].mean()
 
 
 def spans_of(maps: Any) -> LayerSpans:
-    """Where the first map's layers start, and how thick they are together."""
+    """Start and total thickness of the first map's layers."""
     side = maps.slots[0].width
     if maps.starts is None:
         return slice_spans(side)
@@ -267,7 +267,7 @@ def spans_of(maps: Any) -> LayerSpans:
 
 
 def path_at(compute: Callable[..., np.ndarray], maps: Any, points: np.ndarray) -> np.ndarray:
-    """What the shader finds, (n, 3)."""
+    """The shader's results for points, (n, 3)."""
     return compute(
         "light_path.glsl",
         (len(points), 1),
@@ -284,7 +284,8 @@ def path_at(compute: Callable[..., np.ndarray], maps: Any, points: np.ndarray) -
 def test_a_strand_finds_itself_in_the_map_as_often_as_is_taken_off(
     gpu_context: Any, compute: Callable[..., np.ndarray], light: Light
 ) -> None:
-    """Strands far apart, each a chord of the ball: all that a light path meets is the strand."""
+    """With a single strand, a chord of the ball, a light path meets only the strand itself; the
+    expected own depth is subtracted."""
     random = np.random.default_rng(8)
     settings = VolumeSettings(shadows="deep", resolution=256, strand_fraction=1.0, bias=0.0)
     for radius in (1e-4, 5e-4, 1.5e-3):
@@ -309,7 +310,7 @@ def test_a_strand_finds_itself_in_the_map_as_often_as_is_taken_off(
                 assert np.abs(twin[:, 0] - expected[-1]).max() < 1e-4
                 left.append(of_strands(compute, "strand_path.glsl", maps, points, along, radius))
         assert np.mean(found) == pytest.approx(np.mean(expected), rel=0.06)
-        # at such places it is neither in its own way nor behind itself
+        # then it shades itself neither from the front nor from behind
         assert np.mean(np.array(left)[..., 0]) < 0.2 * np.mean(expected)
         assert np.mean(np.array(left)[..., 1]) < 0.2 * np.mean(expected)
 
@@ -322,7 +323,7 @@ def of_strands(
     along: np.ndarray,
     radius: float,
 ) -> np.ndarray:
-    """What a shader finds at strands that run along these directions, (n, 4)."""
+    """A shader's results for strands with these directions, (n, 4)."""
     places = np.concatenate([points, np.full((len(points), 1), radius)], axis=1)
     return compute(
         shader,
@@ -343,7 +344,7 @@ def of_strands(
 def test_strands_that_hide_less_shade_less(
     gpu_context: Any, transparency: str, opacity: float
 ) -> None:
-    """Half of tau where they hide half; without transparency they hide all."""
+    """Half of tau at an opacity of 0.5; without transparency all of it."""
     strands, radius = dome(300)
     settings = VolumeSettings(shadows="deep", layers=8, resolution=64, strand_fraction=1.0)
     look = StrandSettings(tip_width=1.0, transparency=transparency, opacity=opacity)
@@ -358,7 +359,7 @@ def test_strands_that_hide_less_shade_less(
 
 @pytest.mark.parametrize("light", LIGHTS.values(), ids=LIGHTS)
 def test_depths_of_large_meshes_are_those_of_rays(gpu_context: Any, light: Light) -> None:
-    """Two triangles aslant, one far larger than the hair, one right across a light within it."""
+    """Two slanted triangles, one much larger than the hair, one close to a light amid the hair."""
     from hairloom.addon.render.opacity_pass import OpacityPass
 
     strands, radius = dome(50)
@@ -387,13 +388,14 @@ def test_depths_of_large_meshes_are_those_of_rays(gpu_context: Any, light: Light
         assert is_hit.sum() > 300
         # a ray along the triangle's edge may miss or meet it
         differs = np.abs(found - expected) > 1e-4
-        # edges of triangles alone
+        # only at edges of triangles
         assert differs.mean() < tolerance(0.03, 0.04)
         assert not differs[2:-2, 2:-2][inner(is_hit)[2:-2, 2:-2]].any()
 
 
 def depths_of_rays(frame: LightFrame, corners: np.ndarray) -> np.ndarray:
-    """Where rays through the middles of texels meet a triangle, (64, 64); 1 where they miss."""
+    """Depths at which rays through the centres of texels meet a triangle, (64, 64); 1 if they
+    miss."""
     across = (np.arange(64) + 0.5) / 32.0 - 1.0
     y, x = np.meshgrid(across, across, indexing="ij")
     rows = frame.to_map[[0, 1]][:, None, None] - np.stack([x, y])[..., None] * frame.to_map[3]
@@ -410,7 +412,7 @@ def depths_of_rays(frame: LightFrame, corners: np.ndarray) -> np.ndarray:
 
 
 def inner(is_hit: np.ndarray) -> np.ndarray:
-    """Those of these texels whose neighbours are also among them."""
+    """The texels whose neighbours are also in the mask."""
     shifted = [np.roll(is_hit, (y, x), (0, 1)) for y in (-1, 0, 1) for x in (-1, 0, 1)]
     found: np.ndarray = np.logical_and.reduce(shifted)
     return found
@@ -438,7 +440,7 @@ def test_a_map_is_drawn_again_only_when_something_changed(gpu_context: Any) -> N
 def test_more_layers_than_one_pass_can_draw(
     gpu_context: Any, compute: Callable[..., np.ndarray]
 ) -> None:
-    """64 slices in three passes, nearer to what is counted than 8."""
+    """64 slices in three passes have smaller errors than 8."""
     strands, radius = dome()
     error = []
     for count in (8, 64):
@@ -471,7 +473,7 @@ def test_a_light_in_the_hair_throws_no_shadow(
 
 
 def test_hair_that_moves_keeps_its_textures(gpu_context: Any) -> None:
-    """Textures made again in every frame pile up on Vulkan as long as nothing is read back."""
+    """On Vulkan, textures that are created in every frame pile up until something is read back."""
     from hairloom.addon.render.opacity_pass import OpacityPass
 
     strands, radius = dome(50)
@@ -519,7 +521,7 @@ def test_textures_that_are_kept_hold_nothing_of_the_frame_before(gpu_context: An
 def test_maps_too_large_for_memory_are_drawn_smaller_and_still_right(
     gpu_context: Any, compute: Callable[..., np.ndarray], shadows: str
 ) -> None:
-    """Eight lights with all layers there are, under a limit that leaves them few texels."""
+    """Eight lights with the most layers, with a memory limit that allows few texels."""
     from hairloom.addon.render import gpu_memory
     from hairloom.addon.render.opacity_pass import OpacityPass
 
@@ -557,7 +559,7 @@ def test_of_twenty_lights_the_strongest_throw_shadows(gpu_context: Any) -> None:
 
 
 def test_strands_of_the_lowest_ranks_throw_the_shadow_of_all(gpu_context: Any) -> None:
-    """Half of the strands: where the others are makes no difference, nor does their order."""
+    """With half of the strands, neither the places of the others nor their order matter."""
     from hairloom.addon.render.opacity_pass import OpacityPass
 
     strands, radius = dome()

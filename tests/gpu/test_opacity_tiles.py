@@ -1,4 +1,4 @@
-"""The picture of a map's layers against what the map holds."""
+"""The picture of a map's layers against the map's content."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ LAMP = Light.point((0.0, 0.0, 0.0), (1, 1, 1), 1.0)
 
 
 def hair() -> np.ndarray:
-    """A slope of strands across x: the farther in x, the lower."""
+    """Strands that descend along x."""
     strands = np.zeros((200, 4, 3), np.float32)
     x = np.random.default_rng(1).uniform(-0.1, 0.1, 200)
     strands[..., 0], strands[..., 2] = x[:, None], -0.5 * x[:, None]
@@ -53,7 +53,7 @@ def tiles_of(settings: VolumeSettings, *lights: Light) -> tuple[Any, np.ndarray]
 
 
 def tile(picture: np.ndarray, number: int, columns: int, side: int) -> np.ndarray:
-    """One of them, row 0 at the bottom."""
+    """One tile of the picture, row 0 at the bottom."""
     row, column = divmod(number, columns)
     top = len(picture) - row * (side + GAP)
     left = column * (side + GAP)
@@ -80,7 +80,7 @@ def test_deep_layers_have_their_starts_before_them() -> None:
     starts = tile(picture, 0, 3, 64)
     kept = np.asarray(maps.starts.read()).reshape(16, 32)[:, :16]
     kept = np.minimum(kept / float(1 << 24), 1.0)
-    # planes: the mean of a block is what its middle has
+    # starts are planes, so the mean of a block is the value at its centre
     means = starts.reshape(16, 4, 16, 4).mean(axis=(1, 3))
     assert np.allclose(means, 1.0 - kept, atol=1e-5)
     light = [tile(picture, number, 3, 64).mean() for number in range(1, 9)]

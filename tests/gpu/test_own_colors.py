@@ -1,4 +1,4 @@
-"""Hair in its own colours against the same hair in a look of these colours."""
+"""Hair in its own colours, against the same hair with a look of these colours."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ pytestmark = pytest.mark.usefixtures("gpu_context")
 SIZE, CVS, COUNT = 48, 4, 24
 RED, BLUE, GREEN = (0.6, 0.03, 0.02), (0.02, 0.05, 0.7), (0.05, 0.4, 0.06)
 LIGHTS = (Light.sun((0.3, 0.9, -0.4), (1.0, 0.95, 0.9), 3.0),)
-#: what acts on top of the colour
+#: a look with all effects that modify the colour
 VARIED = ShadingSettings(
     color_variation=0.5, grey_fraction=0.2, tip_tint=0.6, tip_color=(0.3, 0.2, 0.1)
 )
 
 
 def curtain(color: np.ndarray | None = None) -> dict[str, Any]:
-    """Upright strands from x = 0 to 1, none over another, in the colours of their strands."""
+    """Upright strands from x = 0 to 1 that do not overlap, in their own colours."""
     strands = np.zeros((COUNT, CVS, 3), np.float32)
     strands[..., 0] = ((np.arange(COUNT) + 0.5) / COUNT)[:, None]
     strands[..., 2] = np.linspace(0.0, 1.0, CVS)
@@ -68,9 +68,9 @@ def halves(left: Any, right: Any) -> np.ndarray:
 def test_hair_of_two_colours_is_drawn_as_two_looks(
     frame: Any, model: str, transparency: str
 ) -> None:
-    """Also its variation, tints and grey strands, and what is scattered from strand to strand."""
+    """Also with variation, tints, grey strands, and scattering between strands."""
     shading = replace(VARIED, model=model)
-    # maps of opacity in one model, none in the other
+    # opacity maps for one model, none for the other
     volume = VolumeSettings(shadows="deep" if model == "marschner" else "none")
     more = {"transparency": transparency, "volume": volume}
     found = drawn(frame, curtain(halves(RED, BLUE)), shading, **more)
@@ -96,7 +96,7 @@ def test_strands_without_a_colour_have_the_looks(frame: Any, model: str) -> None
 
 @pytest.mark.parametrize("transparency", ["none", "layers"])
 def test_a_colour_changes_along_a_strand(frame: Any, transparency: str) -> None:
-    """As a tint from root to tip would: linear between the CVs."""
+    """As a tint from root to tip: linear between the CVs."""
     shading = ShadingSettings(color_variation=0.0, primary_strength=0.0, secondary_strength=0.0)
     along = np.linspace(0.0, 1.0, CVS)[:, None]
     fading = np.array(RED) * (1.0 - along) + np.array(BLUE) * along
@@ -123,7 +123,7 @@ def test_a_colour_changes_along_a_strand(frame: Any, transparency: str) -> None:
 
 
 def test_the_look_alone_and_other_colours_are_drawn_from_then_on(frame: Any) -> None:
-    """With one pass: what lies on the GPU follows the snapshot."""
+    """With one pass: data on the GPU follows the snapshot."""
     shading = replace(VARIED, base_color=GREEN)
     red, blue, plain = curtain(halves(RED, RED)), curtain(halves(BLUE, BLUE)), curtain()
     of_look = replace(shading, color_source="look")
@@ -140,7 +140,8 @@ def test_the_look_alone_and_other_colours_are_drawn_from_then_on(frame: Any) -> 
 @pytest.mark.parametrize("transparency", ["hashed", "layers"])
 @pytest.mark.parametrize("model", ["kajiya_kay", "marschner"])
 def test_natural_brows_are_drawn_without_the_dye(frame: Any, model: str, transparency: str) -> None:
-    """As hair of that colour would, without tints: the left half of the strands are brows."""
+    """The left half of the strands are brows, which look like hair of their colour without
+    tints."""
     dyed = replace(VARIED, model=model, base_color=BLUE, tip_tint=1.0, grey_fraction=0.0)
     natural = replace(dyed, brow_source="natural", brow_color=RED)
     group = np.where(np.arange(COUNT) < COUNT // 2, BROWS, 0)

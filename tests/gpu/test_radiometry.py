@@ -1,4 +1,4 @@
-"""Our lights against Cycles': the same numbers must give the same brightness."""
+"""Our lights against Cycles': the same values must give the same brightness."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ CORNERS = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], np.float32)
 
 @pytest.fixture
 def cycles(gpu_context: Any, tmp_path: Path) -> Iterator[Any]:
-    """A scene with a matt square seen from above; give it a light, render it, and read it."""
+    """A function that renders a light on a matt square, seen from above, in Cycles."""
     import bpy
 
     from hairloom.addon.blender.scene.lights import read_lights
@@ -127,7 +127,7 @@ def test_point(cycles: Any) -> None:
     assert ours(read)[INNER] == pytest.approx(theirs[INNER], rel=0.005)
 
 
-#: what is set on the light; its place; how it is turned [degrees]; its object's scale
+#: settings of the light, its location, its rotation [degrees], and its object's scale
 SPOTS = {
     "narrow, rim": (
         {"spot_size": np.radians(50.0), "spot_blend": 0.3},
@@ -222,7 +222,7 @@ CASES = {
 }
 
 
-#: What another has too.
+#: Cases that others cover.
 SLOW = (
     *("spot: narrow, rim", "spot: ball with a radius", "area: square, far", "area: disk, near"),
     *("area: ellipse, far", "area: disk of narrow spread, far", "ball of a given radiance"),
@@ -231,10 +231,10 @@ SLOW = (
 
 @pytest.mark.parametrize("case", few_by_name(CASES, *SLOW))
 def test_as_cycles_has_it(cycles: Any, case: tuple[str, dict[str, Any], Any]) -> None:
-    """Within 1.5 % of the brightest, pixel by pixel, and 0.15 % of it on average.
+    """Pixels differ by less than 1.5 % of the brightest, and by 0.15 % of it on average.
 
-    The worst are the rim of a spot with a radius, and the rim of a narrow spread right before its
-    panel; what is in closed form is within Cycles' noise.
+    The largest errors are at the rim of a spot with a radius, and at the rim of a narrow spread
+    close to its panel; light in closed form is within Cycles' noise.
     """
     import bpy
 

@@ -19,8 +19,8 @@ from hairloom.addon.strands import StrandSet, Surface
 
 pytestmark = pytest.mark.usefixtures("gpu_context")
 
-#: [m], for a head of 0.2 m that stands 1.6 m high: float32 steps are 1.2e-7 there, and directions
-#: of segments of 3 cm are known to a few times 1e-6
+#: [m], for a head of 0.2 m at a height of 1.6 m: float32 has steps of 1.2e-7 there, and directions
+#: of segments of 3 cm have errors of a few times 1e-6
 TOLERANCE = 4.0e-6
 ABOVE_GROUND = np.array([0.1, -0.2, 1.6])
 
@@ -47,9 +47,9 @@ def rig_on(
     guide_count: int = 9,
     above: tuple[float, float, float] = (0.001, 0.001, 0.001),
 ) -> Rig:
-    """Bent strands of 0.2 m, with roots a little above their triangles in turn.
+    """Bent strands of 0.2 m, with roots a little above successive triangles.
 
-    Guides and weights are at random.
+    Guides and weights are random.
     """
     random = np.random.default_rng(1)
     triangle = barycentric = None
@@ -98,10 +98,10 @@ def deformed(head: Surface) -> Pose:
 
 
 def simulated(rig: Rig, pose: Pose, seed: int = 2) -> np.ndarray:
-    """Guides that have swung away from where their roots carry them, by up to some centimetres."""
+    """Guides that have swung by up to some centimetres from where their roots carry them."""
     guides = motion_flow.carried_guides(rig, pose)
     swing = np.random.default_rng(seed).normal(scale=0.02, size=guides.shape)
-    swing[:, 0] *= np.arange(len(guides))[:, None] % 2  # every other one leaves its root too
+    swing[:, 0] *= np.arange(len(guides))[:, None] % 2  # every other one also leaves its root
     return (guides + swing).astype(np.float32)
 
 
@@ -177,7 +177,8 @@ def test_hair_without_a_head_goes_with_a_matrix() -> None:
 
 
 def test_hair_on_triangles_without_area() -> None:
-    """A point, an edge without length, three needles, a good one: the same axes of help."""
+    """Against numpy for triangles that are a point, have no area, or are fine: both use the same
+    fallback axes."""
     corner = np.array([0.1, 0.2, 1.5])
     edge = np.array([0.25, 0.0, 0.0])
     ends = [
@@ -191,7 +192,7 @@ def test_hair_on_triangles_without_area() -> None:
     head = Surface(np.reshape(ends, (-1, 3)), np.arange(18).reshape(6, 3))
     rig = rig_on(head, 24)
     good = head.positions.reshape(6, 3, 3)[np.array([5, 0, 1, 2, 3, 4])].reshape(-1, 3)
-    for positions in (head.positions, good):  # the flat ones become others
+    for positions in (head.positions, good):  # flat triangles change places
         pose = Pose(positions, np.eye(4))
         guides = simulated(rig, pose)
         expected = motion_flow.strands_at(rig, pose, guides)
@@ -230,7 +231,8 @@ def test_guides_may_lie_on_the_gpu_already() -> None:
 def test_the_middle_of_all_roots_follows_the_head(
     above: tuple[float, float, float], tolerance: float
 ) -> None:
-    """Roots that all stand to one side of the surface lead it astray by no more than twice that."""
+    """Against the exact mean; if all roots lie above the surface, the error is at most twice their
+    height."""
     rig = rig_on(ball(), 2000, above=above)
     pose = deformed(rig.head)
     ride = pass_of(rig)
@@ -263,7 +265,7 @@ def test_guides_of_another_shape_are_refused() -> None:
 
 
 def coiled(count: int = 200) -> Rig:
-    """Coils and straight strands that lean, with few guides."""
+    """Leaning coils and straight strands, with few guides."""
     random = np.random.default_rng(5)
     along = np.linspace(0.0, 1.0, 160)
     angle = 2.0 * np.pi * 8.0 * along
@@ -299,7 +301,8 @@ def test_curls_are_drawn_out_as_in_numpy() -> None:
 
 @pytest.mark.parametrize("rounds", [8, 1 << 20])
 def test_strands_that_ride_are_led_out(monkeypatch: pytest.MonkeyPatch, rounds: int) -> None:
-    """In the pass that moves them, or, where its loops would have too many rounds, behind it."""
+    """In the pass that moves them, or in a later one if its loops would have too many
+    iterations."""
     from hairloom.addon.render import ride_pass
 
     monkeypatch.setattr(ride_pass, "_POINT_ROUNDS", rounds)
@@ -328,7 +331,7 @@ def test_strands_that_ride_are_led_out(monkeypatch: pytest.MonkeyPatch, rounds: 
     shift = motion_flow.carried(rig, pose) - motion_flow.strands_at(rig, pose, guides)
     assert np.abs(shift[is_held]).max() > 0.01
 
-    # the next frames start from how those before them were bent
+    # each frame starts from the leans of the one before
     along = np.linspace(0.0, 1.0, guides.shape[1])[:, None]
     for frame in (1.0, 2.0, 3.0):
         moved = guides + frame * np.float32([0.0, 0.004, 0.0]) * along
@@ -342,7 +345,7 @@ def test_strands_that_ride_are_led_out(monkeypatch: pytest.MonkeyPatch, rounds: 
     forgotten = motion_flow.strands_and_led(rig, replace(after, leans=NO_LEANS))[0]
     is_other = np.abs(expected - forgotten).max(axis=1) > 10.0 * TOLERANCE
     assert np.maximum.reduceat(is_other, offsets[:-1]).mean() > 0.1
-    # a jump to this frame remembers nothing
+    # after a jump to this frame there is no memory
     ride.ride(pose.head_positions, pose.matrix, moved, None, posed)
     found = ride.read()
     off = np.abs(found - forgotten).max(axis=1)
@@ -351,7 +354,7 @@ def test_strands_that_ride_are_led_out(monkeypatch: pytest.MonkeyPatch, rounds: 
     first.leading.take(clearance)
     first.ride(pose.head_positions, pose.matrix, moved, None, posed)
     np.testing.assert_array_equal(first.read(), found)
-    # long after, nothing has led them, and they are where they ride
+    # long after, nothing leads them out, and they are where they ride
     ride.ride(pose.head_positions, pose.matrix, guides, None, posed)
     beyond = turned(0.0, (9.0, 0.0, 0.0))
     far = (PosedCollider(head, beyond, beyond),)

@@ -1,4 +1,4 @@
-"""What is nearest, tangents and coverages of a drawn scene, against numpy and the picture."""
+"""Nearest strands, tangents and coverages of a drawn scene, against numpy and the picture."""
 
 from __future__ import annotations
 
@@ -68,7 +68,8 @@ def straight(count: int, seed: int) -> np.ndarray:
 
 
 def nearest_by_hand(camera: Camera, strands: np.ndarray, radius: float) -> tuple[Any, Any]:
-    """Of each pixel's middle the nearest strand, or -1, and whether its neighbours see the same."""
+    """The nearest strand at each pixel's centre, or -1, and whether all its neighbours see the
+    same."""
     middles = np.stack(np.meshgrid(np.arange(SIZE) + 0.5, np.arange(SIZE) + 0.5), axis=2)
     ends = projected(camera, strands, (SIZE, SIZE))
     clip = strands @ (camera.projection @ camera.view)[:3, :3].T  # for w alone
@@ -106,7 +107,7 @@ def test_the_nearest_strand_is_that_of_brute_force(frame: Any, kind: str) -> Non
     both = np.where(found.groom == 1, 12, 0) + found.strand
     assert (both == expected)[is_inside].mean() > 0.99
     assert ((found.groom >= 0) == (expected >= 0)).mean() > 0.97
-    # and where along it: the place that is seen there
+    # and the place along it, by the point that is seen there
     snapshots = [groom.snapshot for groom in scene.grooms]
     places = projected(camera, found.on_strands(snapshots, np.zeros((SIZE, SIZE, 3))), (SIZE, SIZE))
     middles = np.stack(np.meshgrid(np.arange(SIZE) + 0.5, np.arange(SIZE) + 0.5), axis=2)
@@ -136,7 +137,7 @@ def test_meshes_carry_what_their_vertices_have_to_pixels(frame: Any) -> None:
 def test_tangents_are_those_of_the_strands_as_strong_as_they_cover(
     frame: Any, transparency: str
 ) -> None:
-    """Two wide strands that cross, the nearer one of which lets half of the other one through."""
+    """Weighted by coverage, for two wide crossing strands; the nearer one has an opacity of 0.5."""
     from hairloom.addon.render.accumulation import Target
     from hairloom.addon.render.scene_pass import ScenePass
 
@@ -154,7 +155,8 @@ def test_tangents_are_those_of_the_strands_as_strong_as_they_cover(
 
 
 def test_coverages_are_the_alpha_of_the_picture(frame: Any) -> None:
-    """Two grooms that lie in one another before a plate that fills half, and a holdout."""
+    """For two interpenetrating grooms before a plate that fills half of the picture, and a
+    holdout."""
     from hairloom.addon.render.accumulation import Target
     from hairloom.addon.render.scene_pass import ScenePass
 
@@ -183,7 +185,7 @@ def test_coverages_are_the_alpha_of_the_picture(frame: Any) -> None:
 
 
 def test_strands_thinner_than_a_pixel_are_found_and_nearest_wherever_they_are(frame: Any) -> None:
-    """As wide as *Min Width*, whatever their transparency."""
+    """With the width *Min Width*, whatever their transparency."""
     from hairloom.addon.render.accumulation import Target
     from hairloom.addon.render.scene_pass import ScenePass
 

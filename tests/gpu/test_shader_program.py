@@ -1,4 +1,4 @@
-"""Shaders that fail say where; shaders that run are bound completely."""
+"""Failing shaders report the place of the error; running shaders have complete bindings."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def test_missing_and_unknown_resources_are_refused(recipes: Any) -> None:
 
 
 def test_an_image_may_be_read_and_written(recipes: Any, gpu_context: Any) -> None:
-    """In one dimension, and with a define: each texel of a row is multiplied in place."""
+    """A one-dimensional image with a define: each texel of a row is multiplied in place."""
     import numpy as np
 
     from hairloom.addon.render.textures import texture_from, texture_to_array

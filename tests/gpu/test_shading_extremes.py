@@ -1,4 +1,4 @@
-"""Every parameter of the look at both ends of its hard range: nothing infinite, nothing black."""
+"""Every parameter of the look at both ends of its hard range: no infinite and no black pixels."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ def names_of(settings: type[Settings]) -> list[str]:
 
 
 IDENTIFIERS = [identifier for identifier, _, _ in MODELS]
-#: what is black by itself
+#: values that are black by definition
 DARK = {("kajiya_kay", "base_color", (0.0, 0.0, 0.0))}
-#: what leaves nothing of a strand
+#: values that make strands invisible
 INVISIBLE = {("fullness", 0.0), ("opacity", 0.0)}
-#: what else a parameter needs to be seen
+#: other values that a parameter needs for a visible effect
 TINTED = {"tip_tint": 1.0}
 NEEDS: dict[str, dict[str, Any]] = {
     "tip_color": TINTED,
@@ -56,7 +56,7 @@ OWN = {
 
 
 def ends(settings: Settings) -> Iterator[tuple[str, Any]]:
-    """Each parameter's name with each of its extreme values; names have none."""
+    """Each parameter's name with each of its extreme values, except names of attributes."""
     for parameter in settings.parameters():
         if parameter.kind in NAMING:
             continue
@@ -71,7 +71,8 @@ def ends(settings: Settings) -> Iterator[tuple[str, Any]]:
 
 
 def drawn(frame: Any, shading: ShadingSettings, strands: StrandSettings) -> np.ndarray:
-    """A tuft of bent hair that also meets the eye end-on, lit from before, behind and along."""
+    """A tuft of bent hair, some of it end-on to the eye, lit from the front, from behind and along
+    it."""
     around = np.linspace(0.0, 2.0 * np.pi, 60, endpoint=False)
     outward = np.stack([np.cos(around), np.sin(around), 0.3 + 0.0 * around], axis=-1)
     along = np.linspace(0.0, 1.0, 8)[:, None]

@@ -1,4 +1,4 @@
-"""Lights and hair that an opacity map cannot do justice to: the rest of the picture stays right."""
+"""Lights and hair that opacity maps cannot represent: the rest of the picture stays right."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def frame() -> Any:
 
 
 def curtain(x: float, seed: int = 1) -> np.ndarray:
-    """Strands that hang side by side in y, 0.2 m wide and high, at one x."""
+    """A curtain of hanging strands at one x, 0.2 m wide along y and 0.2 m high."""
     y = np.random.default_rng(seed).uniform(-0.1, 0.1, 120)
     strands = np.zeros((len(y), 6, 3), np.float32)
     strands[..., 0], strands[..., 1] = x, y[:, None]
@@ -63,7 +63,7 @@ def snapshot_of(frame: Any, volume: VolumeSettings, *lights: Light, **more: Any)
 
 
 def drawn(frame: Any, *arguments: Any, from_x: float = 1.0, **more: Any) -> np.ndarray:
-    """Seen along x."""
+    """The picture, seen along x."""
     camera = frame.Camera(
         frame.look_at((from_x, 0.0, 0.0), (0.0, 0.0, 0.0)), frame.orthographic(0.2, 1.0, 0.0, 3.0)
     )
@@ -93,20 +93,20 @@ def test_a_lamp_amidst_the_hair_leaves_the_shadows_of_others_as_they_are(
     )
     assert alone[..., 0].max() > 0.01 and unshaded[..., 0].max() > 0.01
     assert np.allclose(both[..., :3], (alone + unshaded)[..., :3], rtol=1e-3)
-    # nor does it take the place of one that could throw a shadow
+    # nor does it replace a light that could cast a shadow
     assert np.array_equal(both, drawn(frame, of_form(form, max_lights=1), *lights))
 
 
 @pytest.mark.parametrize("form", FORMS)
 def test_a_lamp_between_hair_is_shaded_before_it_and_not_behind(frame: Any, form: str) -> None:
-    """Two curtains on each side of the lamp; it is nearer to those at x > 0, and looks at the rest.
+    """Two curtains on each side of a lamp nearer to those at x > 0, so that its map is of the rest.
 
-    Seen from -x the outer curtain there lies in the shadow of the inner; from +x it has none.
+    Seen from -x, the outer curtain is in the shadow of the inner one; seen from +x it is not.
     """
     light = lamp(0.055, 0.0, 0.0)
     hair = HAIR[HAIR[:, 0, 0] != np.float32(0.04)]
     for from_x, is_shaded in ((-1.0, True), (1.0, False)):
-        # so that what is to be seen faces the lamp
+        # the visible hair faces the lamp
         away = np.array([9.0 * from_x, 0.0, 0.0], np.float32)
         lit, shaded = (
             drawn(frame, volume, light, strands=hair, from_x=from_x, volume_center=away)[..., 0]
@@ -131,7 +131,7 @@ def test_a_spot_that_shines_away_changes_nothing(frame: Any, form: str) -> None:
 def test_hair_of_no_extent_leaves_the_rest_of_the_picture(
     frame: Any, form: str, model: str
 ) -> None:
-    """One strand, all of whose CVs lie in one place, of the radius 0."""
+    """One strand of radius 0 whose CVs coincide."""
     wall = Surface(
         np.array([[-0.1, -1, -1], [-0.1, 1, -1], [-0.1, 1, 1], [-0.1, -1, 1]], np.float32),
         np.array([[0, 1, 2], [0, 2, 3]], np.int32),
@@ -182,7 +182,7 @@ def test_of_twenty_lights_the_first_eight_shine_and_two_throw_shadows(
 
 @pytest.mark.parametrize("form", FORMS)
 def test_both_ends_of_the_extinction(frame: Any, form: str) -> None:
-    """At 0 all hair is lit as if it were alone, at 1000 what lies in front still is."""
+    """At 0 all hair is lit as if alone, at 1000 the hair in front still is."""
     light = Light.sun((-1.0, 0.0, 0.0), (1.0, 1.0, 1.0), 3.0)
     front = HAIR[HAIR[:, 0, 0] == np.float32(0.08)]
     alone = drawn(frame, VolumeSettings(shadows="none"), light, strands=front)

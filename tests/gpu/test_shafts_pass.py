@@ -35,7 +35,7 @@ type Scene = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 @pytest.fixture
 def scene() -> Scene:
-    """Random strokes: samples' colour (h, w, 4) and depth (h, w), and the averaged picture."""
+    """Random strokes: colour (h, w, 4) and depth (h, w) of samples, and the averaged picture."""
     random = np.random.default_rng(8)
     height, width = HEIGHT * SAMPLES, WIDTH * SAMPLES
     drawn, depth = np.zeros((height, width, 4), np.float32), np.ones((height, width), np.float32)

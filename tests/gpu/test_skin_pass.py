@@ -1,4 +1,4 @@
-"""Soft shadows on skin as they are drawn, against their reference and against the compare."""
+"""Soft shadows on skin in drawn pictures, against their reference and hard shadows."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ SIDES = 16
 
 
 def ball(radius: float = 0.1) -> Surface:
-    """A sphere of quads by latitude and longitude; each eighth around is an island of the map."""
+    """A sphere of quads by latitude and longitude; in the map each eighth is an island."""
     around = np.linspace(0.0, 2.0 * np.pi, SIDES + 1)
     polar = np.linspace(0.15, np.pi - 0.15, SIDES // 2 + 1)
     p, a = np.meshgrid(polar, around, indexing="ij")
@@ -37,7 +37,7 @@ def ball(radius: float = 0.1) -> Surface:
     triangles = np.concatenate([first, np.stack([low, up + 1, low + 1], axis=1)])
     places = np.stack([a / (2.0 * np.pi), 1.0 - p / np.pi], axis=-1).reshape(-1, 2)
     uv = places[triangles]
-    # a gap after each eighth, and every second one upside down
+    # a gap after each eighth; every second one is upside down
     eighth = np.tile(column // 2, 2)
     uv[..., 0] += 0.1 * eighth[:, None]
     uv[eighth % 2 == 1, :, 1] *= -1.0
@@ -45,7 +45,7 @@ def ball(radius: float = 0.1) -> Surface:
 
 
 def strip(heights: float = 0.14, count: int = 40) -> tuple[np.ndarray, np.ndarray]:
-    """Strands close together above half of the ball: all light there stays in them."""
+    """Dense strands above half of the ball, which block all light there."""
     strands = np.zeros((count, 6, 3), np.float32)
     strands[..., 0] = np.linspace(-0.12, -0.005, count)[:, None]
     strands[..., 1] = np.linspace(-0.12, 0.12, 6)
@@ -75,7 +75,7 @@ def frame() -> Any:
 
 
 def drawn(frame: Any, snapshot: Any, size: int = 96) -> tuple[np.ndarray, Any]:
-    """Seen from the front and above, without the hair; and the pass."""
+    """The picture from the front and above, without the hair, and the mesh pass."""
     import gpu
 
     from hairloom.addon.render.mesh_pass import MeshPass
@@ -113,7 +113,7 @@ def test_the_blur_is_its_twins(softness: float) -> None:
 
 
 def test_the_light_that_hair_leaves_has_its_color(compute: Callable[..., np.ndarray]) -> None:
-    """Each colour is taken by its own part where nothing has spread; and none is below nought."""
+    """Without spreading, each channel is reduced by its own fraction; no channel is negative."""
     forward = np.array([0.9, 0.35, 0.05])
     depth = np.linspace(0.0, 12.0, 50)
     mean = 1.0 - forward.mean()
@@ -126,7 +126,7 @@ def test_the_light_that_hair_leaves_has_its_color(compute: Callable[..., np.ndar
 
     expected = np.exp(-depth[:, None] * (1.0 - forward))
     np.testing.assert_allclose(found(np.exp(-depth * mean)), expected, rtol=1e-3, atol=1e-6)
-    # what a seam's two sides have in common may be less than nothing
+    # the common value of a seam's two sides can be negative
     np.testing.assert_array_equal(found(np.full(50, -1.0e-3)), 0.0)
 
 
@@ -136,7 +136,7 @@ def test_look_ups_and_closed_corners_are_their_twins(
     from hairloom.addon.render.skin_pass import SKIN_TEXTURES, closing_shifts, layout_textures
     from hairloom.addon.render.textures import texture_from, texture_to_array
 
-    # four islands around a point: the corners of a cut plane
+    # four islands around a point, the quarters of a cut plane
     line = np.linspace(0.0, 0.2, 5)
     x, y = np.meshgrid(line, line)
     row, column = np.divmod(np.arange(16), 4)
@@ -179,7 +179,7 @@ def test_look_ups_and_closed_corners_are_their_twins(
 
 
 def test_the_map_holds_what_is_in_the_way_of_the_light(frame: Any) -> None:
-    """With hardly any softness the map is the shadow of hair above, and of the ball on itself."""
+    """With almost no softness, the map is the shadow of the hair above and of the ball itself."""
     surface = ball()
     _, mesh_pass = drawn(frame, snapshot_of(frame, surface, is_skin=True, softness=1e-6))
     (shadow,) = mesh_pass.skin.drawn
@@ -194,12 +194,12 @@ def test_the_map_holds_what_is_in_the_way_of_the_light(frame: Any) -> None:
     dark_side = is_shown & is_amid & (place[..., 2] < -0.03)
     assert found[open_sky].mean() > 0.98
     assert found[below_hair].mean() == pytest.approx(np.exp(-40 * 8.0e-3 / 0.115), abs=0.05)
-    # a little light falls through the ball, which is open at both poles
+    # a little light passes through the ball, which is open at both poles
     assert found[dark_side].mean() < 0.06
 
 
 def test_without_softness_the_shadow_is_that_of_other_meshes(frame: Any) -> None:
-    """As without UVs, and hardly another with little softness."""
+    """As without UVs; with little softness it hardly differs."""
     surface = ball()
     plain, _ = drawn(frame, snapshot_of(frame, surface, is_skin=False))
     bare, _ = drawn(frame, snapshot_of(frame, replace(surface, corner_uv=None), is_skin=True))
@@ -224,7 +224,7 @@ def test_soft_shadows_have_soft_edges_and_keep_their_light(frame: Any) -> None:
 
 
 def test_no_seam_is_seen_in_the_map(frame: Any) -> None:
-    """Below the edge of the hair's shadow, which crosses seams."""
+    """Both sides of seams agree where the edge of the hair's shadow crosses them."""
     _, mesh_pass = drawn(frame, snapshot_of(frame, ball(), is_skin=True, softness=0.003))
     (shadow,) = mesh_pass.skin.drawn
     values, layout = shadow.picture(), shadow.layout
@@ -238,7 +238,7 @@ def test_no_seam_is_seen_in_the_map(frame: Any) -> None:
 
 
 def test_a_head_in_parts_is_as_the_whole(frame: Any) -> None:
-    """As the engine hands it over, a part a material: one shadow goes on from part to part."""
+    """The render engine passes one part per material; the shadow continues across parts."""
     from hairloom.addon.render.snapshot import Skin
 
     snapshot = snapshot_of(frame, ball(), is_skin=True, softness=0.01)

@@ -1,4 +1,4 @@
-"""Hair in a viewport that is smaller than its target stays in it, whatever is drawn on the way."""
+"""Hair in a viewport smaller than its target stays in it, whatever is drawn in between."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hairloom.addon.shading.settings import StrandSettings
 
 pytestmark = pytest.mark.usefixtures("gpu_context")
 
-#: the target, and where in it the viewport lies: left, bottom, width, height
+#: size of the target, and the viewport in it: left, bottom, width, height
 SIZE, VIEWPORT = (90, 70), (13, 7, 48, 40)
 BACKGROUND = (0.2, 0.1, 0.0, 0.3)
 
@@ -32,8 +32,8 @@ BACKGROUND = (0.2, 0.1, 0.0, 0.3)
     ),
 )
 def test_hair_stays_in_its_viewport(frame: Any, transparency: str, keeps: bool) -> None:
-    """With shadow maps, which have targets of their own; as the view moves, rests and is shown
-    again. Strands reach far beyond the viewport on all sides.
+    """With shadow maps, which have their own targets, while the view moves, rests and is shown
+    again. Strands extend far beyond the viewport on all sides.
     """
     import gpu
 

@@ -23,7 +23,7 @@ from hairloom.addon.strands import Surface
 pytestmark = pytest.mark.usefixtures("gpu_context")
 
 SIZE, SAMPLES = 64, 12
-#: what a view is called in the light of its lights, and in that of a sample
+#: names of the view with its own lights, and with those of a sample
 HARD, SAMPLE = "hard", "sample"
 WHITE = (1.0, 1.0, 1.0)
 SUN = Light.sun((0.5, 0.2, -1.0), WHITE, 3.0, np.radians(20.0))
@@ -37,13 +37,13 @@ FLOOR = Surface(
 
 
 def area() -> Light:
-    """A square of half a metre that shines down."""
+    """A square panel of half a metre that shines down."""
     panel = Panel((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0), 0.25, 0.25)
     return Light.area((-0.3, 0.0, 0.7), WHITE, 8.0, panel)
 
 
 def groom(x: float, height: float, *lights: Light) -> Snapshot:
-    """A tuft above the floor, whose shadow lies beside it."""
+    """A tuft above the floor, with its shadow beside it."""
     random = np.random.default_rng(int(10 * height))
     roots = random.uniform(-0.06, 0.06, (500, 3)) * [1.0, 1.0, 0.3] + [x, 0.0, height]
     ends = roots + random.normal(0.0, 0.01, (500, 3)) + [0.0, 0.08, 0.02]
@@ -61,9 +61,9 @@ def groom(x: float, height: float, *lights: Light) -> Snapshot:
 
 
 class View:
-    """A view that looks at grooms on a floor, as a viewport does.
+    """A view of grooms on a floor, as in a viewport.
 
-    depth: of its last redraw.
+    depth: the depth texture of its last redraw.
     """
 
     def __init__(self, grooms: Sequence[Snapshot], camera: Camera) -> None:
@@ -79,7 +79,7 @@ class View:
         self.kept, self.soft, self.meshes = KeptPicture(), SoftPicture(), MeshPass()
 
     def redraw(self, draw: Any, background: float, depth: float = 1.0) -> np.ndarray:
-        """What is in a view of this grey with the depths of the floor, or of something before it,
+        """The view's colours over this grey, with the floor's depths or with `depth` before it,
         (SIZE, SIZE, 4).
         """
         import gpu
@@ -149,8 +149,8 @@ class View:
 
 
 def still(grooms: Sequence[Snapshot], camera: Camera) -> tuple[np.ndarray, np.ndarray]:
-    """Light of hair over a black floor, and what it leaves of the light on the floor by colour, as
-    a render has them, (SIZE, SIZE, 3) each.
+    """From a render: the light of hair over a black floor, and the fraction of light that it leaves
+    on the floor, (SIZE, SIZE, 3) each.
     """
     from hairloom.addon.render.accumulation import Target
     from hairloom.addon.render.scene_pass import ScenePass
@@ -179,7 +179,7 @@ def still(grooms: Sequence[Snapshot], camera: Camera) -> tuple[np.ndarray, np.nd
 
 
 def floor_light(lights: Sequence[Light], camera: Camera) -> np.ndarray:
-    """What a matt white floor sends on of all light, (SIZE, SIZE, 3)."""
+    """The light that a matt white floor reflects, (SIZE, SIZE, 3)."""
     across = (np.arange(SIZE) + 0.5) / SIZE * 2.0 - 1.0
     x, y = np.meshgrid(across, across)
     ends = []
@@ -197,7 +197,7 @@ def floor_light(lights: Sequence[Light], camera: Camera) -> np.ndarray:
 
 
 def encoded(light: np.ndarray) -> np.ndarray:
-    """As a viewport without a view transform of its own takes it."""
+    """Values for a viewport without its own view transform."""
     light = np.clip(light, 0.0, 1.0)
     code = np.where(light < 0.0031308, 12.92 * light, 1.055 * light ** (1.0 / 2.4) - 0.055)
     return code**2.2
@@ -212,15 +212,15 @@ def rms(difference: np.ndarray) -> float:
 
 
 def hair_alpha(grooms: Sequence[Snapshot], camera: Camera) -> np.ndarray:
-    """How much of each pixel hair covers, (SIZE, SIZE)."""
+    """The hair's coverage of each pixel, (SIZE, SIZE)."""
     bare = [replace(each, casters=(), lights=()) for each in grooms]
     view = View(bare, camera)
     black, white = (view.redraw(lambda: view.draw_hair(bare, None), grey) for grey in (0.0, 1.0))
     return 1.0 - (white - black)[..., 1]
 
 
-#: lights, camera, grooms, and the limit for shadows on the floor: where those of two grooms lie on
-#: each other, a view has each take its part of all light
+#: lights, camera, grooms, and the limit for shadows on the floor: where the shadows of two grooms
+#: overlap, a view lets each remove its fraction of all light
 CASES = {
     "sun": ((SUN,), PERSPECTIVE, 1, 0.005),
     "panel": ((area(),), PERSPECTIVE, 1, 0.005),
@@ -230,7 +230,7 @@ CASES = {
 
 @pytest.mark.parametrize("case", few_in_commits(reversed(CASES), 2))
 def test_the_mean_is_that_of_a_still(case: str) -> None:
-    """Of hair, and of its shadow on what the view holds; what is hard is far from it."""
+    """For hair and for its shadow on the view's content; hard shadows are far off."""
     lights, camera, count, limit = CASES[case]
     grooms = [groom(0.0, 0.12, *lights), groom(0.1, 0.2, *lights)][:count]
     light, left = still(grooms, camera)
@@ -252,14 +252,14 @@ def test_the_mean_is_that_of_a_still(case: str) -> None:
 
 @pytest.mark.parametrize("background", [0.0, 0.5])
 def test_one_sample_is_what_is_hard(background: float) -> None:
-    """The first one has the middle of all lights."""
+    """The first sample is at the centre of all lights."""
     view = View([groom(0.0, 0.12, SUN)], PERSPECTIVE)
     off = np.abs(view.softened(1, background) - view.hard(background))
     assert off.max() < 1.0 / 510.0
 
 
 def test_grooms_that_know_other_meshes_shade_the_floor_as_they_do_hard() -> None:
-    """The map of one of them has a sheet in the way of the sun, outside of the picture."""
+    """In the map of one groom, a sheet outside the picture blocks the sun."""
     sheet = replace(FLOOR, positions=FLOOR.positions * [0.5, 1.0, 1.0] + [-0.5, 0.0, 0.6])
     grooms = [groom(0.0, 0.12, SUN), groom(0.1, 0.2, SUN)]
     hair_alone = hair_alpha(grooms, PERSPECTIVE)
@@ -283,7 +283,7 @@ def test_a_sample_leaves_a_view_as_it_was_but_for_the_depth_of_hair() -> None:
 
 
 def test_samples_say_how_much_of_the_hair_is_hidden() -> None:
-    """As many fragments each time; fewer where something is before them."""
+    """The number of fragments is the same each time, and 0 where something is before all hair."""
     grooms = [groom(0.0, 0.12, SUN)]
     view, statistics = View(grooms, PERSPECTIVE), []
     for depth in (1.0, 1.0, 0.0):

@@ -1,5 +1,5 @@
-"""The penumbra of a sun that fills an angle, against the part of its disk that an edge leaves: in
-scenes, and in stills of one groom.
+"""The penumbra of a sun with an angle, in scenes and in stills of one groom, against the part of
+its disk that an edge leaves visible.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def matt(surface: Surface) -> MeshSnapshot:
 
 
 def camera_above() -> Camera:
-    """From above the ground and below what shades it."""
+    """A camera above the ground, with clip planes below what shades it."""
     return Camera(
         look_at((0.0, 0.0, 4.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0)),
         orthographic(0.6, 1.0, 3.7, 5.0),
@@ -44,7 +44,7 @@ def camera_above() -> Camera:
 
 
 def mean_row(scene: SceneSnapshot) -> np.ndarray:
-    """The middle row of the picture, of all samples."""
+    """The middle row of the picture, averaged over all samples."""
     from hairloom.addon.render.accumulation import Target
     from hairloom.addon.render.scene_pass import ScenePass
     from hairloom.addon.render.textures import texture_to_array
@@ -59,19 +59,19 @@ def mean_row(scene: SceneSnapshot) -> np.ndarray:
 
 
 def segment_left(place: np.ndarray) -> np.ndarray:
-    """The part of a unit disk that lies to the right of a line at -place."""
+    """The fraction of a unit disk to the right of a line at -place."""
     x = np.clip(place, -1.0, 1.0)
     return 0.5 + (np.arcsin(x) + x * np.sqrt(1.0 - x * x)) / np.pi
 
 
 def shaded_by_disk() -> np.ndarray:
-    """The part of the sun's disk that an edge above x = 0 leaves along a row."""
+    """The fraction of the sun's disk that an edge above x = 0 leaves visible along a row."""
     place = (np.arange(SIZE) + 0.5) / SIZE * 0.6 - 0.3
     return segment_left(place / (HEIGHT * np.tan(0.5 * ANGLE)))
 
 
 def test_an_edge_has_the_penumbra_of_the_disk(gpu_context: Any) -> None:
-    """A sheet covers all to the left of x = 0, above what the camera sees."""
+    """For a sheet over x < 0 above the camera's near plane."""
     ground = matt(square((-4.0, -4.0), (4.0, 4.0), 0.0))
     sheet = matt(square((-3.0, -3.0), (0.0, 3.0), HEIGHT))
     sun = Light.sun((0.0, 0.0, -1.0), WHITE, np.pi, ANGLE)
@@ -87,7 +87,7 @@ def test_an_edge_has_the_penumbra_of_the_disk(gpu_context: Any) -> None:
 
 
 def curtain() -> Snapshot:
-    """Hair over the left half of what the camera sees."""
+    """Hair above the left half of the picture."""
     x = np.linspace(-0.5, 0.0, 400)
     ends = np.array([[[0.0, -0.5, HEIGHT], [0.0, 0.5, HEIGHT]]])
     strands = (ends + x[:, None, None] * [1.0, 0.0, 0.0]).astype(np.float32)
@@ -96,7 +96,8 @@ def curtain() -> Snapshot:
 
 
 def shaded_row(found: np.ndarray) -> np.ndarray:
-    """How much of the sun is left along a row under the curtain, as fractions of its open end."""
+    """The fraction of the sun that is visible along a row under the curtain's edge: 0 at its closed
+    end, 1 at its open end."""
     open_, closed = found[-8:].mean(), found[:8].mean()
     assert open_ == pytest.approx(1.0, abs=0.02) and closed < 0.4
     return (found - closed) / (open_ - closed)
@@ -141,7 +142,7 @@ def test_a_still_is_shaded_softly(gpu_context: Any) -> None:
 
 
 def test_the_samples_of_a_still_fill_its_pixels_evenly(gpu_context: Any) -> None:
-    """In the light of a point they are those of one picture that is drawn larger."""
+    """In the light of a point light, they are the pixels of one larger picture."""
     from hairloom.addon.render.frame import render_image
 
     tilted = matt(square((-0.2, -0.1), (0.17, 0.21), 0.0))

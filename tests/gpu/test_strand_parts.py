@@ -1,4 +1,4 @@
-"""Strands as layers with little memory: drawn in parts, they are the same, and none is missing."""
+"""Layers of strands with little memory: drawn in parts, the picture is the same and complete."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from hairloom.addon.strands import Surface
 pytestmark = pytest.mark.usefixtures("gpu_context")
 
 SIZE = 64
-#: rows of memory that hold few of a picture's fragments, and that hold all of them
+#: rows of memory for few of a picture's fragments, and for all of them
 FEW, MANY = 2, 3072
 
 
 @pytest.fixture(scope="module")
 def front(square_camera: Any) -> Any:
-    """A pixel is a metre; x and z from 0 to SIZE, along +y."""
+    """A camera along +y for x and z from 0 to SIZE, with pixels of a metre."""
     return square_camera(SIZE)
 
 
 @pytest.fixture
 def with_rows(monkeypatch: pytest.MonkeyPatch) -> Any:
-    """A pass whose lists have so many rows of memory, at most."""
+    """A function that makes a pass with at most this many rows of memory for lists."""
     from hairloom.addon.render import strand_pass
     from hairloom.addon.render.strand_layers import StrandLayers
 
@@ -70,7 +70,7 @@ def crossing(frame: Any, seed: int, count: int = 1500, **more: Any) -> Any:
 
 
 def sheets(frame: Any, depths: np.ndarray, opacity: float) -> Any:
-    """Strands so wide that each covers all of a picture; the farther, the darker."""
+    """Strands that each cover the whole picture, darker with distance."""
     ends = np.zeros((len(depths), 2, 3))
     ends[..., 0], ends[..., 1] = SIZE / 2, depths[:, None]
     ends[..., 2] = -SIZE, 2 * SIZE
@@ -85,7 +85,7 @@ def brightness_of(depths: np.ndarray) -> np.ndarray:
 def test_grooms_and_a_mesh_in_parts_are_the_same_picture(
     frame: Any, front: Any, with_rows: Any
 ) -> None:
-    """In a part of a target that others have drawn into, of which the mesh hides strands."""
+    """In a viewport of a target with existing content, where the mesh hides strands."""
     import gpu
 
     from hairloom.addon.render.mesh_pass import MeshPass
@@ -175,7 +175,7 @@ def test_no_pixel_is_without_hair_that_hashed_strands_cover(
 def test_pixels_that_have_no_room_are_drawn_by_depth(
     frame: Any, front: Any, with_rows: Any
 ) -> None:
-    """Against what thousands of sheets, nearest first, let through in theory."""
+    """Against the theoretical composite of thousands of sheets, nearest first."""
     random = np.random.default_rng(5)
     depths, opacity = random.uniform(-40.0, 40.0, 5000), 4.0 / 4095.0
     own = with_rows(1)
@@ -203,7 +203,8 @@ def test_nearest_strands_hide_all_others_wherever_a_pixel_has_no_room(
 
 
 def test_what_cannot_be_drawn_is_told(frame: Any, front: Any, with_rows: Any) -> None:
-    """More than there is memory for, all at one depth of one pixel; or than a driver can order."""
+    """More fragments at one depth of one pixel than there is memory for, or than a driver can
+    order."""
     from hairloom.addon.render.strand_layers import LONGEST_IN_SOFTWARE, is_software
 
     opacity = 4.0 / 4095.0
@@ -244,7 +245,7 @@ def test_little_memory_makes_more_parts_and_not_a_crash(
 def test_thousands_of_layers_in_a_pixel_are_drawn_at_once(
     frame: Any, front: Any, with_rows: Any, opacity: float
 ) -> None:
-    """As theory has them, by a software driver too, which ends a shader after so many rounds."""
+    """Against theory, also with a software driver, which limits a shader's iterations."""
     count = 12_000
     depths = np.linspace(-40.0, 40.0, count)
     alpha = round(opacity * 4095.0) / 4095.0  # as lists hold it
@@ -260,7 +261,7 @@ def test_thousands_of_layers_in_a_pixel_are_drawn_at_once(
 
 
 def test_long_lists_leave_nothing_unshaded(frame: Any, front: Any, with_rows: Any) -> None:
-    """Thousands of white strands in a pixel are white, although a driver may end long loops."""
+    """Thousands of white strands in a pixel are white, although drivers may abort long loops."""
     random = np.random.default_rng(8)
     depths = random.uniform(-40.0, 40.0, 20000)
     shown = replace(sheets(frame, depths, 4.0 / 4095.0), occlusion=None)
@@ -272,7 +273,7 @@ def test_long_lists_leave_nothing_unshaded(frame: Any, front: Any, with_rows: An
 def test_more_layers_in_a_pixel_than_a_software_driver_can_count(
     frame: Any, front: Any, with_rows: Any
 ) -> None:
-    """20,000 strands, each so faint that it is hardly there, hide all, and the nearer ones more."""
+    """20,000 very faint strands cover everything, against the theoretical composite."""
     from hairloom.addon.render.mesh_pass import MeshPass
 
     count, opacity = 20_000, 0.003
@@ -284,7 +285,7 @@ def test_more_layers_in_a_pixel_than_a_software_driver_can_count(
     ]
     share = alpha * (1.0 - alpha) ** np.arange(count)
     assert picture[3] == pytest.approx(1.0, abs=1e-3)
-    # a layer of the eight that stand for all may stand for an eighth of the light
+    # each of the eight shaded layers can represent an eighth of the light
     assert picture[:3] == pytest.approx(float(share @ brightness_of(depths)), abs=0.125 * 0.8)
     assert passes[1].statistics.layers.missing == 0
 
@@ -292,7 +293,7 @@ def test_more_layers_in_a_pixel_than_a_software_driver_can_count(
 def test_strands_that_no_driver_orders_at_once_are_drawn_a_few_times(
     frame: Any, with_rows: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Not once for each half of all depths, of which hair has hardly any, until it is met."""
+    """Bisecting the whole depth range, most of which is empty, would need many draws."""
     from hairloom.addon.render.strand_drawing import StrandDrawing
     from hairloom.addon.render.strand_layers import is_software
 

@@ -1,4 +1,4 @@
-"""Strands that hide a share of a pixel: against areas, and against all layers sorted in numpy."""
+"""Strands that cover part of a pixel: against areas, and against all layers sorted in numpy."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from hairloom.addon.strands import Surface
 pytestmark = pytest.mark.usefixtures("gpu_context")
 
 SIZE = 96
-#: the colour of a strand is its occlusion, and nothing else
+#: a look in which a strand's colour equals its occlusion
 FLAT = ShadingSettings(model="kajiya_kay", base_color=(1.0, 1.0, 1.0), color_variation=0.0)
 WHITE = (1.0, 1.0, 1.0)
 COLORED = replace(FLAT, tip_color=(0.1, 0.3, 1.0), tip_tint=1.0, tint_start=0.0, tint_end=1.0)
@@ -32,7 +32,7 @@ COLORED = replace(FLAT, tip_color=(0.1, 0.3, 1.0), tip_tint=1.0, tint_start=0.0,
 
 @pytest.fixture(scope="module")
 def front(square_camera: Any) -> Any:
-    """A pixel is a metre; x and z from 0 to SIZE, along +y."""
+    """A camera along +y for x and z from 0 to SIZE, with pixels of a metre."""
     return square_camera(SIZE)
 
 
@@ -69,7 +69,7 @@ def test_coverage_is_that_of_numpy(compute: Callable[..., np.ndarray]) -> None:
 def test_what_a_strand_covers_is_its_width(
     frame: Any, front: Any, width: float, degrees: float
 ) -> None:
-    """Summed over rows, or columns, that it crosses, wherever it lies among the pixels."""
+    """The coverage summed over each row or column that it crosses, wherever it lies."""
     turn = np.radians(degrees)
     direction = np.array([np.sin(turn), 0.0, np.cos(turn)])
     across = 0 if degrees <= 45.0 else 1
@@ -79,7 +79,7 @@ def test_what_a_strand_covers_is_its_width(
         strand = np.stack([middle - 200.0 * direction, middle + 200.0 * direction])[None]
         picture = frame.render_image(snapshot_of(frame, strand, width / 2.0), front, SIZE, SIZE, 1)
         sums = picture[..., 3].sum(axis=1 - across)[30:-30]
-        # alpha is kept in steps of 1 / 4095, of which a row may have a few
+        # alpha has steps of 1 / 4095, and errors of several pixels in a row add up
         most = tolerance(1e-3, SUBPIXEL)
         assert sums == pytest.approx(np.full(sums.shape, expected), abs=most)
         assert np.allclose(picture[..., :3], picture[..., 3:], atol=1e-5), "premultiplied"
@@ -135,7 +135,7 @@ def layers_of(
 def test_crossing_strands_are_those_sorted_in_numpy(
     frame: Any, width: float, opacity: float
 ) -> None:
-    """In perspective, up to dozens over each other, each of a colour that changes along it."""
+    """In perspective, with dozens of layers, for strands whose colours change along them."""
     random = np.random.default_rng(7)
     strands, brightness = crossing(160, random)
     camera = frame.Camera(
@@ -169,15 +169,15 @@ def test_crossing_strands_are_those_sorted_in_numpy(
 
 
 def over_layers(depth, alpha, colors, **limits):
-    """Layers of pixels one over the other, premultiplied (pixel_count, 4)."""
+    """Composited layers of pixels, premultiplied (pixel_count, 4)."""
     light = np.einsum("pn,pnc->pc", layer_fractions(depth, alpha, **limits), colors)
     return np.column_stack([light, 1.0 - np.prod(1.0 - alpha, axis=-1)])
 
 
 def seen_at_points(strands: np.ndarray, width: float, brightness: np.ndarray) -> float:
-    """Mean brightness of the nearest strand at places of the picture, where there is one.
+    """Mean brightness of the nearest strand at random places, where there is one.
 
-    Strands are straight and opaque, along +y from the eye, without perspective.
+    For straight opaque strands, seen along +y without perspective.
     """
     places = np.random.default_rng(2).uniform(0.0, SIZE, (6000, 2))
     ends = strands[..., [0, 2]]
@@ -194,7 +194,7 @@ def seen_at_points(strands: np.ndarray, width: float, brightness: np.ndarray) ->
 
 @pytest.mark.parametrize("opacity", few_in_commits([0.3, 1.0]))
 def test_hair_is_as_bright_in_small_pictures(frame: Any, front: Any, opacity: float) -> None:
-    """Strands get darker farther in, and the fewer pixels, the more of them lie in each."""
+    """Inner strands are darker, and in small pictures each pixel holds more of them."""
     random = np.random.default_rng(14)
     width, count = 0.35, 2500
     strands, _ = crossing(count, random)
@@ -221,7 +221,8 @@ def test_hair_is_as_bright_in_small_pictures(frame: Any, front: Any, opacity: fl
 
 
 def test_layers_that_are_shaded_stand_for_all_of_them() -> None:
-    """So many at most, and with all of the light; what has much of it by what it has."""
+    """At most LAYERS of them are shaded, with weights that sum to all light; layers with much light
+    keep their own weight."""
     random = np.random.default_rng(15)
     depths, alphas = random.random((500, 60)), 0.3 * random.random((500, 60)) ** 2
     alphas[:, 7] = 0.6
@@ -239,7 +240,7 @@ def test_layers_that_are_shaded_stand_for_all_of_them() -> None:
 
 @pytest.mark.parametrize("mode", ["fixed", "adaptive"])
 def test_no_order_of_strands_changes_the_picture(frame: Any, mode: str) -> None:
-    """Among them many in one plane, where depths are equal."""
+    """Many of the strands lie in one plane and have equal depths."""
     random = np.random.default_rng(8)
     strands, brightness = crossing(600, random)
     strands[:200, :, 1] = 0.0
@@ -289,7 +290,7 @@ def test_a_mesh_hides_layers_behind_it(frame: Any, front: Any) -> None:
 
 
 def test_what_comes_later_is_hidden_by_hair_that_hides(frame: Any, front: Any) -> None:
-    """Depth is written where more than half is hidden, and only there."""
+    """Depth is written only where hair covers more than half."""
     import gpu
 
     from hairloom.addon.render.strand_pass import StrandPass
@@ -327,7 +328,7 @@ def test_what_is_not_there_draws_nothing(
 
 @pytest.mark.parametrize("transparency", ["layers", "hashed"])
 def test_bad_hair_gives_finite_pictures(frame: Any, transparency: str) -> None:
-    """Strands without length, through the eye, wider than the picture, too many in a pixel."""
+    """Strands without length, through the eye, and too many in one pixel."""
     random = np.random.default_rng(10)
     strands, _ = crossing(300, random)
     strands[:50, 1] = strands[:50, 0]
@@ -349,7 +350,7 @@ def test_bad_hair_gives_finite_pictures(frame: Any, transparency: str) -> None:
 
 
 def test_an_empty_groom_and_other_sizes(frame: Any, front: Any) -> None:
-    """Buffers are made again, or kept, as pictures of other sizes come between."""
+    """Buffers are recreated or kept as pictures of other sizes are drawn in between."""
     from hairloom.addon.render.mesh_pass import MeshPass
     from hairloom.addon.render.strand_pass import StrandPass
 

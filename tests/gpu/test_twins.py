@@ -1,4 +1,4 @@
-"""GLSL against its Python twins, number by number, and the bytes of uniform blocks."""
+"""GLSL against its Python twins, value by value, and the layout of uniform blocks."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def test_kajiya_kay(compute: Callable[..., np.ndarray], settings: ShadingSetting
         tangent, normal, light[..., :3], eye[..., :3], light[..., 3], eye[..., 3], settings
     )
     assert expected.max() > 1.5, "the grid must meet highlights"
-    # 1e-4 of the light that a highlight of strength 1 sends out; a strength magnifies rounding
+    # 1e-4 of the light of a highlight of strength 1; higher strengths magnify rounding
     strength = max(1.0, settings.primary_strength, settings.secondary_strength)
     assert np.abs(found[..., :3] - expected).max() < 1e-4 * strength
     along, grey = np.zeros(light.shape[:2]), np.ones(light.shape[:2])
@@ -92,7 +92,7 @@ def test_kajiya_kay(compute: Callable[..., np.ndarray], settings: ShadingSetting
 
 
 def test_strand_normal(compute: Callable[..., np.ndarray]) -> None:
-    """Also where strands point straight outward, where any perpendicular will do."""
+    """Also for strands straight outwards, where any perpendicular will do."""
     tangents = directions(40, 60).astype(np.float32)
     random = np.random.default_rng(5)
     points = random.normal(size=tangents.shape)
@@ -129,7 +129,7 @@ def test_noise_agrees_bit_by_bit(compute: Callable[..., np.ndarray]) -> None:
 
 
 def test_microfacets(compute: Callable[..., np.ndarray]) -> None:
-    """From mirror to chalk, from all sides, and where there is nothing to reflect."""
+    """From mirror to chalk, from all sides, and without reflectance."""
     random = np.random.default_rng(17)
     rows, columns = 12, 400
     kinds = [(f, r) for f in (0.0, 0.028, 0.25) for r in (0.0, 0.15, 0.45, 1.0)]
@@ -139,7 +139,7 @@ def test_microfacets(compute: Callable[..., np.ndarray]) -> None:
     eyes = random.normal(size=normals.shape).astype(np.float32)
     eyes /= np.linalg.norm(eyes, axis=-1, keepdims=True)
     lights = random.normal(size=normals.shape).astype(np.float32)
-    # half of them beside the mirror's direction
+    # half of them near the mirror direction
     mirrored = 2.0 * np.sum(normals * eyes, axis=-1, keepdims=True) * normals - eyes
     lights[:, ::2] = (mirrored + 0.05 * lights)[:, ::2]
     lights /= np.linalg.norm(lights, axis=-1, keepdims=True)
@@ -188,7 +188,7 @@ def test_lights(compute: Callable[..., np.ndarray]) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class OddSettings(Settings):
-    """Members in an order that meets every rule of std140."""
+    """Members in an order that needs every rule of std140."""
 
     section: ClassVar[str] = "odd"
 
@@ -250,7 +250,7 @@ def test_sine(compute: Callable[..., np.ndarray]) -> None:
 def test_collider_distance(
     compute: Callable[..., np.ndarray], solid: SphereCollider | CapsuleCollider | DistanceField
 ) -> None:
-    """Also outside of a field's grid, at its border, and at a ball's very center."""
+    """Also outside a field's grid, at its border, and at the exact center of a ball."""
     from hairloom.addon.render.collider_textures import field_texels, round_texels
 
     random = np.random.default_rng(4)
@@ -283,7 +283,7 @@ def test_collider_distance(
 def test_signed_distance(
     compute: Callable[..., np.ndarray], chosen: tuple[int, ...], reach: float
 ) -> None:
-    """Of several colliders of all kinds, or of one, moved, turned and scaled."""
+    """For several colliders of all kinds, or for one, moved, turned and scaled."""
     from hairloom.addon.render.collider_textures import ColliderTextures
 
     random = np.random.default_rng(8)
@@ -321,8 +321,8 @@ def test_signed_distance(
     distance, outward = signed_distance(points[..., :3].reshape(-1, 3), posed, reach)
     assert (distance < 0.0).any() and (distance > 0.04).any()
     off = np.abs(found[..., 3].ravel() - distance)
-    # a field's distance is divided by its gradient's length: a driver's root is good to 1e-5
+    # a field's distance is divided by its gradient's length; square roots of drivers have 1e-5
     assert off.max() < (tolerance(2e-5, 2e-4) if 1 in chosen else 2e-6)
-    # at borders of cells, and where two solids are as near, rounding decides
+    # rounding decides at borders of cells and at equal distances to two solids
     off = np.abs(found[..., :3].reshape(-1, 3) - outward).max(axis=1)
     assert (off > 1e-3).sum() <= 6

@@ -1,5 +1,5 @@
-"""Strands of few points beside strands of many, drawn at once: as the same strands drawn alone, and
-as the same curves in many points."""
+"""Strands of few and of many points drawn together, against the same strands drawn alone, and
+against the same curves with many points."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def straight(count: int, cv_count: int, start: float = -0.4, end: float = 0.4) -
 
 
 def coils(count: int, cv_count: int = MANY, turns: float = 12.0) -> np.ndarray:
-    """Upright coils a little before them."""
+    """Upright coils a little before the straight strands."""
     angle = np.linspace(0.0, 2.0 * np.pi * turns, cv_count)
     strands = straight(count, cv_count, -0.35, 0.42)
     strands[..., 0] += 0.03 * np.cos(angle)
@@ -46,7 +46,8 @@ def coils(count: int, cv_count: int = MANY, turns: float = 12.0) -> np.ndarray:
 
 
 def of_grids(*grids: np.ndarray) -> dict[str, Any]:
-    """What a snapshot has of these strands, in turn, each with its noise and its shade."""
+    """A snapshot's arguments for these strands in sequence, each with its own noise and
+    occlusion."""
     counts = np.concatenate([np.full(len(grid), grid.shape[1]) for grid in grids])
     offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
     points = np.concatenate([grid.reshape(-1, 3) for grid in grids])
@@ -78,14 +79,14 @@ def drawn(frame: Any, parts: dict[str, Any], transparency: str = "none", **more:
 
 
 def apart(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """The largest difference in each pixel."""
+    """The largest difference of channels in each pixel."""
     return np.asarray(np.abs(one - other).max(axis=2))
 
 
 @pytest.mark.parametrize("mode", ["adaptive", "heuristic", "fixed"])
 @pytest.mark.parametrize("transparency", ["none", "layers"])
 def test_both_at_once_are_both_alone(frame: Any, transparency: str, mode: str) -> None:
-    """Strands that do not overlap: their pictures lie side by side."""
+    """For strands that do not overlap in the picture."""
     few, many = straight(9, FEW, -0.45, -0.1), coils(5) * [0.5, 1.0, 1.0] + [0.25, 0.0, 0.0]
     look = {
         "shading": replace(TINTED, color_source="own", color_variation=0.3),
@@ -103,7 +104,7 @@ def test_both_at_once_are_both_alone(frame: Any, transparency: str, mode: str) -
 @pytest.mark.parametrize("shadows", few_in_commits(["deep", "slices"]))
 @pytest.mark.parametrize("model", few_in_commits(["marschner", "kajiya_kay"]))
 def test_few_points_are_the_same_curves_as_many(frame: Any, model: str, shadows: str) -> None:
-    """Also in their own shadow and in that of others, and with all that goes by the way along."""
+    """Also in shadows of their own and of others, and with all effects that vary along strands."""
     curves = [straight(40, FEW), coils(12, turns=6.0)]
     dense = [_refined(grid, 2 * MANY - 1) for grid in curves]
     look: dict[str, Any] = {
@@ -114,7 +115,7 @@ def test_few_points_are_the_same_curves_as_many(frame: Any, model: str, shadows:
     }
     few, many = (drawn(frame, _uncolored(*grids), **look) for grids in (curves, dense))
     assert many[..., 3].mean() > 0.2
-    # shadows of curls are ribbons straight between points, so that edges of shadows move a little
+    # shadows of curls are straight between points, so their edges move a little
     assert apart(few, many).mean() < 0.01
     assert apart(_coarse(few), _coarse(many)).max() < 0.02
 
@@ -125,7 +126,7 @@ def _coarse(picture: np.ndarray) -> np.ndarray:
 
 
 def _refined(grid: np.ndarray, cv_count: int) -> np.ndarray:
-    """The drawn curves themselves, in so many points."""
+    """The drawn curves, sampled at `cv_count` points."""
     place = np.linspace(0.0, grid.shape[1] - 1, cv_count)
     segment = np.minimum(place.astype(int), grid.shape[1] - 2)
     made = [
