@@ -1,4 +1,4 @@
-"""Where the engines are."""
+"""The sandbox in which the engines run."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ SANDBOX = str(REPOSITORY / "tools" / "window_blender")
 
 @pytest.fixture(scope="module")
 def sandbox() -> str:
-    """The program that runs a command where the engines are."""
+    """The program that runs a command in the sandbox with the engines."""
     result = subprocess.run([SANDBOX, "engines"], capture_output=True, text=True)
     if result.returncode == 77:
         pytest.skip(result.stderr.strip().splitlines()[-1])

@@ -1,5 +1,5 @@
-"""Springs in Godot, by the add-on of docs/engines, and in a browser, by the module: they move as
-our own do."""
+"""Springs in Godot, with the add-on of docs/engines, and in a browser, with the module, move as our
+own do."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ from hairloom.addon.exchange.cards.glb_skin import add_head_bone
 
 HERE = Path(__file__).parent
 ENGINES = REPOSITORY / "docs" / "engines"
-#: the engines run where nothing but the repository is seen
+#: in the repository: the engines run in a sandbox that sees nothing else
 OUTPUT = REPOSITORY / "out" / "engines" / "springs"
 PROJECT = OUTPUT / "godot"
-#: Of the hair's length: Godot reckons in single precision.
+#: tolerance as a fraction of the hair's length: Godot computes in single precision
 MOST_OFF = 1.0e-3
 
 
 @pytest.fixture(scope="module")
 def told(motion: GuideMotion) -> dict[str, Any]:  # noqa: F811
-    """An asset, and how the head moves; what the sidecar says of the springs, and the joints in
-    each step as we move them, in the world."""
+    """Writes an asset and the head's motion; the sidecar's entry on the springs, with our positions
+    of all joints in each step, in world space."""
     shutil.rmtree(OUTPUT, ignore_errors=True)
     glb = OUTPUT / "asset" / "hair.glb"
     glb.parent.mkdir(parents=True)
@@ -50,7 +50,7 @@ def told(motion: GuideMotion) -> dict[str, Any]:  # noqa: F811
 
 
 def copied(kind: str, folder: Path) -> None:
-    """What an engine sees."""
+    """Copy the files for an engine: its program, the asset and the head's motion."""
     shutil.copytree(HERE / kind, folder)
     shutil.copytree(OUTPUT / "asset", folder / "asset")
     shutil.copy2(OUTPUT / "poses.json", folder)
@@ -74,7 +74,8 @@ def project(told: dict[str, Any], sandbox: str) -> Path:
 def test_godot_moves_springs_as_we_do(
     told: dict[str, Any], project: Path, sandbox: str, is_imported: bool
 ) -> None:
-    """A file that no editor has imported, and one that the add-on has made a scene of."""
+    """With a file that no editor has imported, and with one that the add-on has imported as a
+    scene."""
     if is_imported:
         run_godot(sandbox, "--path", str(project), "--import")
         (project / "asset" / "hair.glb").unlink()
@@ -94,7 +95,7 @@ def run_godot(sandbox: str, *options: str) -> None:
 
 
 def rigged(glb: Path) -> None:
-    """Below a character's bone, as hair of a rigged head is written: joints stay in place."""
+    """Put the hair below a character's bone, as for a rigged head; joints stay in place."""
     file = GlbFile.of(glb.read_bytes(), str(glb))
     bone = np.eye(4)
     bone[:3] = [[1.0, 0.0, 0.0, 0.1], [0.0, 0.0, -1.0, 0.2], [0.0, 1.0, 0.0, 1.4]]
@@ -122,6 +123,6 @@ def test_our_module_hands_springs_to_three_vrm(
     assert result.returncode == 0, result.stderr
     found = json.loads((site / "joints.json").read_text(encoding="utf-8"))
     assert found["said"] == []
-    assert found["isWhole"]  # a copy is bound to joints of its own
-    assert not found["hasSprings"]  # which those of the original do not move
+    assert found["isWhole"]  # a copy is bound to its own joints
+    assert not found["hasSprings"]  # which the original's springs do not move
     check(told, found["frames"])

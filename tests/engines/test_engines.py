@@ -1,6 +1,6 @@
-"""Cards in real engines: three.js in Chromium, and Godot, by the shaders of docs/engines.
+"""Cards in real engines: three.js in Chromium, and Godot, with the shaders of docs/engines.
 
-Both run where `tools/window_blender run` runs; `tools/window_blender engines` gets them there.
+Both run in the sandbox of `tools/window_blender run`, installed by `tools/window_blender engines`.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from hairloom.addon.exchange.textures.texture_files import read_texture
 HERE = Path(__file__).parent
 ENGINES = REPOSITORY / "docs" / "engines"
 THREE = REPOSITORY / "tools" / "node" / "node_modules" / "three"
-#: what lies beside the files of an asset
+#: other files in an asset's folder
 OF_ENGINES = shutil.ignore_patterns("godot*", "game", "web*")
 
 
@@ -66,7 +66,7 @@ def godot_project(asset: Asset, name: str) -> Path:
 
 
 def run_godot(sandbox: str, *options: str, window: bool = True) -> str:
-    """What it says; no script and no shader may fail."""
+    """Godot's output, in which no script and no shader may fail."""
     command = [sandbox, "run"]
     if window:
         command += [str(REPOSITORY / "tools" / "with_xvfb"), "godot", "--quit-after", "1000"]
@@ -80,19 +80,19 @@ def run_godot(sandbox: str, *options: str, window: bool = True) -> str:
     return said
 
 
-#: of fog that hides all, as a screen shows it
+#: display values of fog that hides everything
 FOG = np.array([0x33, 0x66, 0x99]) / 255.0
 
 
 def check_fog(asset: Asset, drawn: Path) -> None:
-    """Where there is hair in our picture, there is fog."""
+    """Where our picture has hair, the median colour is that of the fog."""
     theirs = read_texture(drawn, is_color=False)[..., :3]
     is_hair = read_encoded(asset.picture).max(axis=-1) > 0.1
     np.testing.assert_allclose(np.median(theirs[is_hair], axis=0), FOG, atol=2.0 / 255.0)
 
 
 def indices_of(glb: Path, node: str) -> np.ndarray:
-    """Of the triangles of a node's mesh, (triangle_count, 3)."""
+    """The triangles of a node's mesh, (triangle_count, 3)."""
     file = GlbFile.of(glb.read_bytes(), str(glb))
     mesh = file.content["meshes"][file.content["nodes"][file.node(node)]["mesh"]]
     indices = file.values(mesh["primitives"][0]["indices"])
@@ -100,16 +100,18 @@ def indices_of(glb: Path, node: str) -> np.ndarray:
 
 
 def check_order(asset: Asset, written: Path) -> None:
-    """Each triangle is at its place; Godot turns all of them over."""
+    """Each triangle keeps its place in the order; Godot reverses the winding of all."""
     theirs = np.array(json.loads(written.read_text(encoding="utf-8"))).reshape(-1, 3)
     ours = indices_of(asset.folder / "cards.glb", "cards_LOD0")
     np.testing.assert_array_equal(np.sort(theirs, axis=1), np.sort(ours, axis=1))
 
 
 def ranges_of(asset: Asset) -> list[list[float]]:
-    """From where to where each level is shown [m], by a camera of 75 degrees: each begins where the
-    last one ends, in the middle of the band where both are drawn, and that is where the hair takes
-    up the fraction of a screen that the file says; 0 for the end of the last."""
+    """The range of distances [m] of each level, for a field of view of 75 degrees.
+
+    Each level begins where the one before ends, in the middle of the band in which both are drawn;
+    there the hair covers the fraction of the screen that the file states. The last one ends at 0.
+    """
     path = asset.folder / "cards.glb"
     file = GlbFile.of(path.read_bytes(), str(path))
     extras = file.content["nodes"][file.node("cards_LOD0")]["extras"]
@@ -125,7 +127,7 @@ def ranges_of(asset: Asset) -> list[list[float]]:
 
 
 def test_godot_draws_cards_as_we_do(asset: Asset, sandbox: str) -> None:
-    """Files that no editor has imported."""
+    """With files that no editor has imported."""
     project = godot_project(asset, "godot")
     run_godot(sandbox, "--path", str(project), "--", str(project))
     check(asset, project / "godot.png")
@@ -137,7 +139,7 @@ def test_godot_draws_cards_as_we_do(asset: Asset, sandbox: str) -> None:
 
 
 def test_a_game_that_godot_exported_draws_cards_as_we_do(asset: Asset, sandbox: str) -> None:
-    """Imported by the add-on, packed without the files themselves, played from elsewhere."""
+    """Imported by the add-on, packed without the source files, run from another folder."""
     project, game = godot_project(asset, "godot_editor"), asset.folder / "game"
     game.mkdir()
     said = run_godot(sandbox, "--path", str(project), "--import", window=False)
@@ -171,17 +173,17 @@ def test_three_js_draws_cards_as_we_do(asset: Asset, sandbox: str) -> None:
     shown = json.loads((site / "levels.json").read_text(encoding="utf-8"))
     sidecar = json.loads((asset.folder / "cards.hairloom.json").read_text(encoding="utf-8"))
     assert shown.pop("begins") == pytest.approx([begin for begin, _ in ranges_of(asset)], rel=1e-5)
-    assert shown.pop("shared") is True  # passes have the vertices in common
+    assert shown.pop("shared") is True  # passes share vertices
     assert shown == {"plain": ["cards_LOD0"], "second": sidecar["levels"][1]["triangles"]}
 
 
-#: how far the second level has taken over where `fading` looks at it
+#: fraction of the second level in the view of `fading`
 SHARE = 0.3
 
 
 def fading(asset: Asset, folder: Path) -> None:
-    """An asset whose first level is giving way to the second at the view's distance: the field of
-    view is such that this one is 2 % nearer than the distance that the file states."""
+    """An asset whose first level fades to the second at the view's distance: the field of view
+    makes this 2 % nearer than the distance that the file states."""
     shutil.copytree(asset.folder, folder, ignore=OF_ENGINES)
     view = json.loads((folder / "view.json").read_text(encoding="utf-8"))
     sidecar = json.loads((folder / "cards.hairloom.json").read_text(encoding="utf-8"))
@@ -195,8 +197,8 @@ def fading(asset: Asset, folder: Path) -> None:
 
 
 def check_fade(folder: Path, *mixed: str) -> None:
-    """Each pixel is that of one of the two levels, of the right share that of the coarser one, and
-    both are spread evenly; at once, all are those of one."""
+    """Each pixel is from one of the two levels, and the coarser one has the right fraction; without
+    cross-fade, all pixels are from one level."""
     names = ("fine", "coarse", "at_once", *mixed)
     pictures = {
         name: read_texture(folder / f"{name}.png", is_color=False)[..., :3] for name in names
@@ -210,14 +212,14 @@ def check_fade(folder: Path, *mixed: str) -> None:
         of_fine, of_coarse = (
             np.abs(pictures[name] - each).max(axis=-1) < 1.5 / 255.0 for each in (fine, coarse)
         )
-        # hair of another size is rounded in another way: a handful of pixels at edges of cards
+        # rounding differs for hair of another size, in a few pixels at edges of cards
         assert (of_fine | of_coarse).mean() > 0.9999, name
         share = of_coarse[tells].mean()
         assert share == pytest.approx(SHARE, abs=0.03), name
 
 
 def test_godot_fades_levels_pixel_by_pixel(baked: Asset, sandbox: str) -> None:
-    """With the add-on in another folder than usual."""
+    """Also with the add-on in an unusual folder."""
     project = baked.folder / "godot_fade"
     shutil.copytree(HERE / "godot_fade", project)
     shutil.copytree(ENGINES / "godot", project / "tools" / "hair cards")
@@ -242,8 +244,8 @@ def test_three_js_fades_levels_pixel_by_pixel(baked: Asset, sandbox: str) -> Non
 
 
 def test_three_js_draws_hair_in_scenes_of_many_kinds(baked: Asset, sandbox: str) -> None:
-    """A mirror that draws the hair from far away changes no pixel of it; a logarithmic depth buffer
-    hides none; clipping planes cut it."""
+    """A mirror that draws the hair from far away changes no pixel, nor does a logarithmic depth
+    buffer (except for rounding); clipping planes cut the hair."""
     if not THREE.is_dir():
         pytest.skip("three.js is missing: `make setup` installs it")
     site = baked.folder / "web_scene"
@@ -262,9 +264,9 @@ def test_three_js_draws_hair_in_scenes_of_many_kinds(baked: Asset, sandbox: str)
     assert json.loads((site / "mirrors.json").read_text(encoding="utf-8"))["mirrors"] == 1
     assert (np.abs(plain - bare).max(axis=-1) > 0.1).mean() > 0.1, "there is hair in it"
     np.testing.assert_array_equal(mirror, plain)
-    # cards that touch are told apart by other bits of depth
+    # touching cards differ in other bits of depth
     assert (np.abs(logarithmic - plain).max(axis=-1) > 8.0 / 255.0).mean() < 0.002
-    np.testing.assert_array_equal(clipped[..., 0], bare[..., 0])  # the ball is blue alone
+    np.testing.assert_array_equal(clipped[..., 0], bare[..., 0])  # the ball is pure blue
     assert clipped[..., 2].max() == 0.0, "the planes cut all meshes"
 
 
@@ -297,7 +299,7 @@ def test_three_js_shows_what_can_be_shown_and_says_what_is_wrong(
     assert whole["said"] == [] and whole["levels"] == 3 and whole["filled"] > 0.1
     for found in (whole, *seen.values()):
         assert found["bare"] == []
-        # three.js keeps a table of its own for plain materials
+        # three.js keeps its own table for plain materials
         assert found["left"]["textures"] <= 1 < found["held"]
         assert found["left"]["geometries"] == found["left"]["programs"] == 0
     assert whole["left"]["textures"] == 0
@@ -310,7 +312,7 @@ def test_three_js_shows_what_can_be_shown_and_says_what_is_wrong(
         assert all(sentence in each for each in found["said"]), damage.__name__
         is_plain = damage in (without_sidecar, garbage, other_levels)
         assert found["levels"] == (0 if is_plain else 3)
-        # where it was, as large and about as light
+        # at the same place, of the same size and similar brightness
         assert found["filled"] == pytest.approx(whole["filled"], rel=0.05), damage.__name__
         assert found["off"] < 0.03, damage.__name__
         assert 0.3 < found["light"] / whole["light"] < 3.0, damage.__name__
@@ -338,16 +340,16 @@ def test_godot_shows_what_can_be_shown_and_says_what_is_wrong(baked: Asset, sand
     assert seen["whole"]["filled"] > 0.1
     for damage, sentence in DAMAGES.items():
         name = damage.__name__
-        if damage is without_index_buffer:  # its order for back faces has no place in Godot
+        if damage is without_index_buffer:  # Godot cannot use its order of back faces
             assert sentences[name] == []
             continue
-        if damage is quantised:  # Godot 4.6 does not read such files; without the add-on neither
+        if damage is quantised:  # Godot 4.6 does not read such files, with or without the add-on
             assert seen[name] is None and "cannot be read" in sentences[name][-1]
             continue
         expected = {without_sidecar: "no sidecar", garbage: "no sidecar"}.get(damage, sentence)
         assert sentences[name] and all(expected in each for each in sentences[name]), name
         is_plain = damage in (without_sidecar, garbage, other_levels)
         assert (seen[name]["own"] == 0) == is_plain, name
-        # a plain material is lit from all sides, ours by the sun alone
+        # a plain material is lit from all sides, ours only by the sun
         filled = pytest.approx(seen["whole"]["filled"], rel=0.4 if is_plain else 0.1)
         assert seen[name]["filled"] == filled, name

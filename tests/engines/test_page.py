@@ -1,4 +1,4 @@
-"""The web page of an export in Chromium: from its file, without a network."""
+"""The web page of an export in Chromium, opened from a file, without a network."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ from hairloom.addon.exchange.textures.texture_files import read_texture
 
 TOOLS = REPOSITORY / "tools"
 NAME = '</script> "Zöpfe" 头发'
-#: A page smooths edges, which our picture here does not: half of the difference. The rest comes of
-#: fewer shades in its textures.
+#: Half of the difference is from the page's anti-aliasing, which our picture lacks, the rest from
+#: fewer levels in its textures.
 MOST_MEAN, MOST_LIGHT = 2.0 / 255.0, 0.05
-#: the picture of an own view that an engine draws: one sun in front of black, without the panel
+#: draws the same view as the engines: one sun, a black background, no panel
 OWN_VIEW = """(({ hair, scene, camera, redraw }, view) => {
   scene.background = null;
   scene.traverse((each) => { if (each.isLight) each.intensity = 0; });
@@ -69,11 +69,11 @@ def asset(gpu_context: Any) -> Asset:
 
 
 def driven(sandbox: str, asset: Asset, name: str, *steps: dict[str, Any]) -> dict[str, Any]:
-    """What the browser says; pictures lie in the folder `name` of the asset."""
+    """The browser's report of these steps; pictures are saved in the asset's folder `name`."""
     folder = asset.folder / name
     folder.mkdir()
     page = folder / "a page äö.html"
-    shutil.copy2(asset.folder / "cards.html", page)  # alone: nothing lies beside it
+    shutil.copy2(asset.folder / "cards.html", page)  # no other file is beside it
     (folder / "steps.json").write_text(json.dumps(steps), encoding="utf-8")
     command = [sandbox, "run", "python3", str(TOOLS / "drive_page.py")]
     command += [str(page), str(folder / "steps.json"), str(folder)]
@@ -91,7 +91,7 @@ STILL = {"media": {"prefers-reduced-motion": "reduce"}}
 
 
 def chosen(selector: str) -> dict[str, str]:
-    """A click, and then a redraw."""
+    """A step that clicks an element, which causes a redraw."""
     return {"evaluate": f"document.querySelector({json.dumps(selector)}).click()"}
 
 
@@ -137,7 +137,7 @@ def test_a_page_opens_from_its_file_and_its_controls_change_the_picture(
 
 
 def test_a_page_draws_cards_as_we_do(asset: Asset, sandbox: str) -> None:
-    """The same view as the engines'."""
+    """With the same view as in the tests of engines."""
     view = {
         "eye": glb_axes(EYE),
         "target": glb_axes(TARGET),
@@ -168,7 +168,7 @@ def test_without_webgl_a_page_says_so(asset: Asset, sandbox: str) -> None:
 
 
 def test_motion_plays_unless_less_of_it_is_wanted(asset: Asset, sandbox: str) -> None:
-    """Without an animation the camera goes around."""
+    """Without an animation the camera moves around the hair, unless reduced motion is preferred."""
     angle = "hairloom.controls.getAzimuthalAngle()"
     pressed = {"evaluate": "document.querySelector('#play').getAttribute('aria-pressed')"}
     steps = [{"screen": [300, 300, 1]}, {"open": True}, pressed]
@@ -181,8 +181,8 @@ def test_motion_plays_unless_less_of_it_is_wanted(asset: Asset, sandbox: str) ->
     assert still["values"][3] == "false" and still["values"][4] == still["values"][-1]
 
 
-#: the median way of the roots of the hair since the page has opened, as the head sees it and as the
-#: world does [m]
+#: the median distance [m] that roots have moved since the page was opened, relative to the head and
+#: in world space
 WAY_OF_ROOTS = """(() => {
   const { hair, scene } = hairloom;
   const [mesh] = hair.levels[0].object.children;

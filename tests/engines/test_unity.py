@@ -1,7 +1,7 @@
-"""The package for Unity, compiled and run where Unity is not.
+"""The package for Unity, compiled and run without Unity.
 
-Its C# runs against stubs of what it calls (unity/Stubs.cs), its shaders go through glslang's HLSL
-with stubs of what they include. What Unity itself makes of both is not seen here.
+Its C# runs against stubs of the API that it calls (unity/Stubs.cs), its shaders are compiled by
+glslang's HLSL front end with stubs of their includes. The behaviour of Unity itself is not tested.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ ENTRIES = {
     "fragment_of_depth": "frag",
     "fragment_of_normal": "frag",
 }
-#: Unity's passes that only opaque pixels have
+#: Unity's passes that draw only opaque pixels
 OPAQUE_MODES = ("ShadowCaster", "DepthOnly", "DepthNormalsOnly")
 
 
@@ -64,7 +64,7 @@ def asset(gpu_context: Any) -> Asset:
 
 @pytest.fixture(scope="module")
 def imported(sandbox: str) -> Callable[..., dict[str, Any]]:
-    """Imports a GLB as Unity would call the package."""
+    """A function that imports a GLB, calling the package as Unity does."""
     program = OUTPUT / "unity.exe"
     OUTPUT.mkdir(parents=True, exist_ok=True)
     sources = sorted([*HERE.glob("*.cs"), *(PACKAGE / "Editor").glob("*.cs")])
@@ -98,7 +98,7 @@ def glb_of(folder: Path) -> Path:
 
 
 def values(glb: Path, node: str) -> dict[str, np.ndarray]:
-    """What the file holds of a level, by another reader."""
+    """A level's attributes and indices in the file, read independently of the package."""
     file = GlbFile.of(glb.read_bytes(), str(glb))
     part = file.content["meshes"][file.content["nodes"][file.node(node)]["mesh"]]["primitives"][0]
     found = {name: np.asarray(file.values(number)) for name, number in part["attributes"].items()}
@@ -108,7 +108,7 @@ def values(glb: Path, node: str) -> dict[str, np.ndarray]:
 def level(
     hair: dict[str, Any], number: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[Any]]:
-    """Positions, normals, directions of strands, and the triangles of each part."""
+    """A level's positions, normals, strand directions, and the triangles of each part."""
     mesh = hair["meshes"][number]
     vectors = (np.reshape(mesh[name], (-1, 3)) for name in ("positions", "normals", "tangents"))
     place, normal, along = vectors
@@ -147,7 +147,8 @@ def test_back_faces_have_the_order_of_the_index_buffer(asset: Asset, hair: dict[
 
 
 def test_a_mirror_leaves_fronts_in_front(asset: Asset, hair: dict[str, Any]) -> None:
-    """Unity's fronts are clockwise, its axes left-handed: the same cross product tells fronts."""
+    """Unity's front faces are clockwise and its axes left-handed, so the same cross product
+    identifies front faces."""
     node = sidecar_of(asset.folder)["levels"][0]["node"]
     file = values(glb_of(asset.folder), node)
     place, normal, _, parts = level(hair, 0)
@@ -163,7 +164,7 @@ def test_a_mirror_leaves_fronts_in_front(asset: Asset, hair: dict[str, Any]) -> 
 
 
 def test_strands_run_from_root_to_tip(asset: Asset, hair: dict[str, Any]) -> None:
-    """Along each edge on which a strand goes on, its direction leads on too."""
+    """Along each edge that follows a strand, the strand's direction points towards the tip."""
     place, normal, along, parts = level(hair, 0)
     how_far = np.array(hair["meshes"][0]["along"])
     begin, end = np.concatenate([parts[0][:, [0, 1]], parts[0][:, [1, 2]]]).T
@@ -196,7 +197,8 @@ def test_levels_end_one_after_the_other_where_the_file_has_them_end_together(
     coverage: list[float] | None,
     heights: list[float],
 ) -> None:
-    """Unity refuses all levels otherwise. A file has such where a coarser level is as good."""
+    """Unity rejects all levels otherwise. A file has equal ends if a coarser level is equally
+    good."""
     folder = damaged(asset.folder, OUTPUT / "unity_damaged", lambda folder: None)
     glb = glb_of(folder)
     file = GlbFile.of(glb.read_bytes(), str(glb))
@@ -221,7 +223,7 @@ def test_levels_fade_into_each_other_unless_that_is_turned_off(
 
 
 def test_materials_are_the_passes_of_the_sidecar(asset: Asset, hair: dict[str, Any]) -> None:
-    """Of their passes, states, values and textures."""
+    """With the sidecar's passes, states, values and textures."""
     sidecar = sidecar_of(asset.folder)
     assert [each["queue"] for each in hair["materials"]] == sorted(
         each["queue"] for each in hair["materials"]
@@ -307,7 +309,7 @@ def test_textures_keep_their_values(asset: Asset, hair: dict[str, Any]) -> None:
 
 
 def test_what_comes_after_the_glb_is_noticed(asset: Asset, hair: dict[str, Any]) -> None:
-    """Textures that were imported without their sidecar are imported again, once."""
+    """Textures that were imported before their sidecar existed are imported again, once."""
     sidecar = sidecar_of(asset.folder)
     sidecar_file = next(asset.folder.glob("*.hairloom.json")).name
     assert set(hair["sources"]) == {sidecar_file, sidecar["index_buffer"]["file"]}
@@ -332,7 +334,7 @@ def _cut_off(folder: Path) -> None:
 
 
 def _compressed(folder: Path) -> None:
-    """As by meshopt: the bytes lie in another buffer."""
+    """Make a GLB look compressed by meshopt, with its bytes in another buffer."""
     glb = glb_of(folder)
     content = glb.read_bytes().replace(b'"buffer":0,', b'"buffer":1,')
     assert content != glb.read_bytes()
@@ -427,7 +429,7 @@ def test_in_the_high_definition_pipeline_alpha_comes_with_the_colour_or_with_a_w
 
 @pytest.mark.parametrize("loop", ["", "-D_FORWARD_PLUS", "-D_CLUSTER_LIGHT_LOOP"])
 def test_every_light_is_seen_once(sandbox: str, loop: str) -> None:
-    """Where clusters hold lamps alone, suns have a loop of their own."""
+    """With clustered lights, which contain only lamps, suns have their own loop."""
     options = ["-E", "-D", "-S", "frag", f"-I{HERE}", "-D_ADDITIONAL_LIGHTS", *loop.split()]
     done = subprocess.run(
         [sandbox, "run", "glslangValidator", *options, str(SHADERS)],
@@ -465,7 +467,8 @@ def test_the_shaders_compile(sandbox: str, entry: str) -> None:
 def test_its_shading_is_that_of_the_other_engines(
     sandbox: str, gpu_context: Any, tmp_path: Path
 ) -> None:
-    """HLSL by glslang and SPIRV-Cross beside the text that it was made from, both on the GPU."""
+    """HLSL, compiled by glslang and SPIRV-Cross, against the text that it is made from, both on the
+    GPU."""
     probe = (HERE / "probe.glsl").read_text(encoding="utf-8")
     shading = hair_hlsl.SOURCE.read_text(encoding="utf-8")
     text = hair_hlsl.hlsl(shading + probe) + PROBE_HLSL

@@ -1,8 +1,8 @@
-"""The importer for Unreal, run where Unreal is not.
+"""The importer for Unreal, run without Unreal.
 
-Its script runs against a stub of the module `unreal` (unreal/unreal_stub.py), whose names are those
-of Epic's pages; the HLSL of its nodes goes through glslang and runs on the GPU beside the text that
-it was made from. What Unreal itself makes of both is not seen here.
+Its script runs against a stub of the module `unreal` (unreal/unreal_stub.py) with the names of
+Epic's documentation; the HLSL of its nodes is compiled by glslang and compared on the GPU with the
+text that it is made from. The behaviour of Unreal itself is not tested.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ def _empty_project(unreal: ModuleType) -> None:
 
 
 def triangles_of(fbx: str) -> list[int]:
-    """Of each level of an FBX file, by ufbx."""
+    """The number of triangles of each level of an FBX file, read with ufbx."""
     result = OUTPUT / "unreal_mesh.json"
     command = [sys.executable, str(MESH_VIEW), fbx, str(result)]
     if subprocess.run(command, capture_output=True, timeout=120).returncode:
@@ -95,7 +95,7 @@ def code_of(material: Any, about: str) -> str:
 
 
 def attributes_of(material: Any) -> dict[str, Any]:
-    """Pin of the material -> the node that goes there."""
+    """Pin of the material -> the node that is connected to it."""
     (node,) = (each for each in material.values[""] if "the material" in each.inputs)
     return {pin: source for pin, (source, _) in node.inputs.items() if pin != "the material"}
 
@@ -104,7 +104,7 @@ def attributes_of(material: Any) -> dict[str, Any]:
 def test_directions_are_read_from_the_channels_that_hold_them(
     importer: ModuleType, packing: str
 ) -> None:
-    """What the node reckons of a texel of each packing is the direction in front of packing."""
+    """The node's code decodes a texel of each packing to the direction before packing."""
     plan = sys.modules["hairloom_plan"]
     tangent = np.array([0.3, 0.9, 0.6], np.float32)
     for texture in packed({"tangent": tangent[None, None]}, packing):
@@ -119,7 +119,7 @@ def test_directions_are_read_from_the_channels_that_hold_them(
 
 @pytest.mark.parametrize("packing", PRESETS)
 def test_each_picture_has_the_colour_space_of_its_file(importer: ModuleType, packing: str) -> None:
-    """Though a file of colours may hold alpha as well, which is linear."""
+    """Even if a colour texture also contains alpha, which is linear."""
     shapes = {"base": (1, 1, 3), "color": (1, 1, 3), "tangent": (1, 1, 3)}
     maps = {name: np.ones(shapes.get(name, (1, 1)), np.float32) for name in MEANINGS}
     maps["normal"] = maps["tangent"]
@@ -158,7 +158,7 @@ def test_all_of_an_export_comes_into_the_project(
 def test_triangles_stay_in_their_order_and_levels_where_the_file_says(
     importer: ModuleType, unreal: ModuleType, asset: Asset
 ) -> None:
-    """The switch is set while Unreal builds the mesh, and is put back."""
+    """The console variable is set while Unreal builds the mesh, and restored afterwards."""
     importer.main([str(asset.folder / "cards.fbx"), "/Game/Hair"])
     mesh, sidecar = unreal.assets["/Game/Hair/SM_cards"], sidecar_of(asset.folder)
     assert mesh.order == 2 and unreal.console_variables["r.TriangleOrderOptimization"] == 1
@@ -206,7 +206,7 @@ def test_the_material_is_hair_of_unreal(
 
 
 def test_a_highlight_is_as_wide_as_ours() -> None:
-    """Of Unreal's: exp(-(theta_i + theta_r)^2 / 2 roughness^4); theta_h is half of that sum."""
+    """Against Unreal's exp(-(theta_i + theta_r)^2 / 2 roughness^4); theta_h is half of that sum."""
     plan = importlib.import_module("hairloom_plan")
     width = 0.1
     marschner = {"model": "marschner", "values": {"width_r": width}}
@@ -318,7 +318,7 @@ def test_what_cannot_be_read_is_named_in_one_sentence(
 
 
 def test_what_can_be_shown_is_shown(importer: ModuleType, unreal: ModuleType, asset: Asset) -> None:
-    """Files of another name with letters that content folders do not take, and without alpha."""
+    """Files without alpha, whose name has characters that content folders do not allow."""
     folder = _copied(asset)
     alpha = sidecar_of(folder)["textures"]["alpha"]["file"]
     (folder / alpha).unlink()
@@ -338,7 +338,7 @@ def test_what_can_be_shown_is_shown(importer: ModuleType, unreal: ModuleType, as
 def test_hair_of_another_folder_is_replaced_on_demand_alone(
     importer: ModuleType, unreal: ModuleType, asset: Asset
 ) -> None:
-    """Two exports of one name, in folders of their own."""
+    """For two exports with the same name in different folders."""
     first, second = (str(_copied(asset, f"unreal_{name}") / "cards.fbx") for name in ("a", "b"))
     assert importer.main([first, "/Game/Hair"]) == 0
     before, unreal.log_lines[:] = dict(unreal.assets), []
@@ -397,13 +397,14 @@ def test_the_nodes_shade_as_the_other_engines_do(
     asset: Asset,
     tmp_path: Path,
 ) -> None:
-    """Bodies of the Custom nodes by glslang and SPIRV-Cross, beside the GLSL, both on the GPU."""
+    """The code of the Custom nodes, compiled by glslang and SPIRV-Cross, against the GLSL, both on
+    the GPU."""
     importer.main([str(asset.folder / "cards.fbx"), "/Game/Hair"])
     material, sidecar = unreal.assets["/Game/Hair/M_cards"], sidecar_of(asset.folder)
     probe = PROBE.read_text(encoding="utf-8")
     waves = probe[: probe.index("vec4 probe(")]
     shading = hair_hlsl.SOURCE.read_text(encoding="utf-8")
-    # glslang takes functions inside of functions for recursion: the struct stands before them
+    # glslang mistakes functions inside functions for recursion, so the struct comes before them
     struct = hair_hlsl.nodes(shading)
     struct = struct.replace("HairloomShading shading", "static HairloomShading shading")
     others = hair_hlsl.hlsl(shading + waves)
@@ -418,7 +419,7 @@ def test_the_nodes_shade_as_the_other_engines_do(
     np.testing.assert_allclose(found, expected, atol=2e-5, rtol=2e-4)
 
 
-#: what a pin gets where its value differs from pixel to pixel, in HLSL and in GLSL
+#: input of pins that vary from pixel to pixel, in HLSL and in GLSL
 WAVES = {
     "Base": "probe_vector(x, 1.0)",
     "Card": "probe_vector(x, 4.0).xy",
@@ -432,8 +433,8 @@ DIRECTION, SHIFT = "probe_vector(x, 7.0)", "probe_wave(x, 7.0)"
 
 
 def nodes_of(material: Any) -> str:
-    """The Custom nodes as functions of their pins, as Unreal writes them, and a program that calls
-    them: the colour where y is 0, else the direction, and the coverage."""
+    """The Custom nodes as functions of their pins, as in Unreal's generated code, and a program
+    that calls them: the colour for y below 0.5, else the direction, and the coverage as alpha."""
     functions, calls = [], {}
     for pin, node in attributes_of(material).items():
         if pin not in ("BaseColor", "Normal", "OpacityMask"):
@@ -441,7 +442,7 @@ def nodes_of(material: Any) -> str:
         values = {name: value_of(name, *node.inputs[name]) for name in pins_of(node)}
         kinds = ", ".join(f"{kind} {name}" for name, (kind, _) in values.items())
         size = node.values["output_type"][-1].replace("1", "")
-        # no derivative is the same in a program that runs over an array
+        # derivatives have no meaning in a program that runs over an array
         code = node.values["code"].replace("cross(ddx(Position), ddy(Position))", "Position")
         struct = hair_hlsl.NODES.read_text(encoding="utf-8")
         assert code.startswith(struct)
@@ -460,7 +461,7 @@ def pins_of(node: Any) -> list[str]:
 
 
 def value_of(name: str, source: Any, output: str) -> tuple[str, str]:
-    """Kind and value of what a pin gets: a parameter's own, or waves."""
+    """Type and value of a pin's input: that of a parameter, or waves."""
     value = source.values.get("default_value")
     if isinstance(value, float | int):
         return "float", f"{value:.9g}"
@@ -473,7 +474,7 @@ def value_of(name: str, source: Any, output: str) -> tuple[str, str]:
 
 
 def expected_glsl(sidecar: dict[str, Any]) -> str:
-    """The same by the shared shading, from the sidecar."""
+    """The same with the shared shading, from the sidecar."""
     material, textures = sidecar["material"], sidecar["textures"]
     values = material["values"]
     names = ["tip_tint", "tint_start", "tint_end", "grey_fraction", "base_color", "tip_color"]

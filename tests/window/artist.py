@@ -1,7 +1,7 @@
-"""An artist's hands and eyes in a window session: mouse and keys, and what the screen shows.
+"""An artist's hands and eyes in a window session: mouse and keys, and the content of the screen.
 
-Events are sent one a tick, as Blender wants them: call what yields by `yield from`. Screens are
-pictures as `driver.screenshot` gives them.
+Events are sent one per tick, as Blender needs them; call generators with `yield from`. Screens are
+pictures from `driver.screenshot`.
 """
 
 import subprocess
@@ -16,8 +16,8 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from driver import of_hairloom, until
 from mathutils import Euler, Vector
 
-#: Buttons of our panel, the first of its tab: x from the sidebar's left edge as a part of its
-#: width, y in pixels from its top at UI scale 1.
+#: Buttons of our panel, the first of its tab: x from the sidebar's left edge as a fraction of its
+#: width, y from its top in pixels at UI scale 1.
 SIDEBAR_BUTTONS = {
     "hairloom.preview": (0.45, 46),
     "hairloom.play": (0.2, 72),
@@ -36,7 +36,7 @@ def region(kind: str) -> Any:
 
 
 def press(key: str, x: int = 0, y: int = 0) -> Iterator[int]:
-    """A key, with the mouse at a pixel of the window, from its lower left corner."""
+    """Press a key with the mouse at a pixel of the window, counted from its lower left corner."""
     window = bpy.context.window
     for value in ("PRESS", "RELEASE"):
         window.event_simulate(key, value, x=x, y=y)
@@ -44,15 +44,15 @@ def press(key: str, x: int = 0, y: int = 0) -> Iterator[int]:
 
 
 def click(x: int, y: int) -> Iterator[int]:
-    """The left mouse button at a pixel of the window, from its lower left corner."""
+    """Click the left mouse button at a pixel of the window, counted from its lower left corner."""
     window = bpy.context.window
     window.event_simulate("MOUSEMOVE", "NOTHING", x=x, y=y)
     yield 1
-    yield 1  # the button under it must have been drawn as such
+    yield 1  # Blender must have drawn the button as hovered
     for value in ("PRESS", "RELEASE"):
         window.event_simulate("LEFTMOUSE", value, x=x, y=y)
         yield 1
-    yield 1  # what is clicked acts after its event
+    yield 1  # the button acts after its event
 
 
 def open_our_sidebar() -> Iterator[int]:
@@ -63,7 +63,7 @@ def open_our_sidebar() -> Iterator[int]:
 
 
 def sidebar_button(operator: str) -> tuple[int, int]:
-    """Where a button of our panel is in the window."""
+    """The place of a button of our panel in the window."""
     sidebar, (across, below) = region("UI"), SIDEBAR_BUTTONS[operator]
     scale = bpy.context.preferences.system.ui_scale
     top = sidebar.y + sidebar.height
@@ -73,20 +73,20 @@ def sidebar_button(operator: str) -> tuple[int, int]:
 def field(
     area: Any, kind: str, path: str, across: float = 0.7, expected: tuple[int, int] | None = None
 ) -> Iterator[int]:
-    """Moves the mouse over a part of an area until it is on the field of a property.
+    """Move the mouse over a region of an area until it is on the field of a property.
 
     Args:
-        path: how the property's data path ends.
-        across: the part of the area's width at which the mouse moves down.
-        expected: where in the window the mouse looks first.
+        path: the end of the property's data path.
+        across: the fraction of the region's width at which the mouse moves down.
+        expected: the place in the window to try first.
 
     Returns:
-        where in the window that is.
+        the field's place in the window.
     """
     part = next(each for each in area.regions if each.type == kind)
     x = part.x + int(across * part.width)
     rows = [(x, y) for y in range(part.y + part.height - 5, part.y + 5, -12)]
-    # a mouse that comes from elsewhere is noticed later than one that moves on by a row
+    # Blender notices a jump of the mouse later than a move by a row
     for x, y in ([expected] * 4 if expected else []) + rows:
         bpy.context.window.event_simulate("MOUSEMOVE", "NOTHING", x=x, y=y)
         yield 1
@@ -98,10 +98,10 @@ def field(
 
 
 def new_head(*, keeps_light: bool = False, **shape: int) -> Any:
-    """A ball of radius 0.1 m named Head, alone, or with the camera and the light of a new file.
+    """A ball of radius 0.1 m named Head, alone or with the camera and the light of a new file.
 
     Args:
-        shape: segments and rings of the ball, as its operator has them.
+        shape: `segments` and `ring_count` of the operator that adds it.
     """
     for obj in list(bpy.data.objects):
         if obj.type == "MESH" or not keeps_light:
@@ -113,7 +113,7 @@ def new_head(*, keeps_light: bool = False, **shape: int) -> Any:
 
 
 def new_fringe(strand_count: int) -> tuple[Any, Any, Any]:
-    """A fringe above a ball, under a sun from above the eye: head, hair and sun."""
+    """A fringe above a ball, with a sun from above the eye: head, hair and sun."""
     head = new_head(segments=48, ring_count=24)
     bpy.ops.object.shade_smooth()
     group = head.vertex_groups.new(name="Crown")
@@ -135,13 +135,13 @@ def new_fringe(strand_count: int) -> tuple[Any, Any, Any]:
 
 
 def hide_floor() -> None:
-    """And what else Blender draws over hair and head."""
+    """Hide the floor and other overlays that Blender draws over hair and head."""
     overlays = viewport().spaces.active.overlay
     overlays.show_floor = overlays.show_cursor = overlays.show_object_origins = False
 
 
 def look_from_front(distance: float) -> None:
-    """At the origin, along +Y, from this far away [m]."""
+    """Look at the origin along +Y from this distance [m]."""
     view = viewport().spaces.active.region_3d
     view.view_perspective = "PERSP"
     view.view_location = (0.0, 0.0, 0.0)
@@ -150,7 +150,7 @@ def look_from_front(distance: float) -> None:
 
 
 def share_of_view(obj: Any) -> float:
-    """How high an object is in the viewport, as a part of the viewport's height."""
+    """The height of an object in the viewport, as a fraction of the viewport's height."""
     view = region("WINDOW")
     corners = (obj.matrix_world @ Vector(corner) for corner in obj.bound_box)
     places = [location_3d_to_region_2d(view, view.data, corner) for corner in corners]
@@ -161,35 +161,35 @@ def share_of_view(obj: Any) -> float:
 def viewport_pixels(screen: np.ndarray) -> np.ndarray:
     """The viewport between toolbar and sidebar, (height, width, 3) in 0 to 1, top row first."""
     view, header, tools, sidebar = (region(k) for k in ("WINDOW", "HEADER", "TOOLS", "UI"))
-    # the tool settings' header lies over the view as well, below the header; so does the text
+    # the header of the tool settings and the text also overlap the view, below the header
     top = header.y - 2 * header.height
     left, right = tools.x + tools.width, sidebar.x if sidebar.width > 1 else view.x + view.width
     return _rectangle(screen, left, right, view.y, top)
 
 
 def pixels(label: str) -> np.ndarray:
-    """The viewport as it is now, as `viewport_pixels`; the screenshot is kept."""
+    """The current viewport, as `viewport_pixels`; the screenshot is saved."""
     return viewport_pixels(driver.screenshot(label))
 
 
 def picture(label: str) -> Iterator[int]:
-    """As `pixels`, once the viewport shows what was set."""
+    """As `pixels`, once the viewport shows all changes."""
     yield
     return pixels(label)
 
 
 def changed(before: np.ndarray, after: np.ndarray, at_least: float = 0.1) -> float:
-    """Share of the pixels that differ by more than Blender's own anti-aliasing does."""
+    """The fraction of pixels that differ by more than Blender's anti-aliasing does."""
     return float((np.abs(after - before).max(axis=2) > at_least).mean())
 
 
 def pixels_at_rest(label: str) -> Iterator[int]:
-    """As `picture`, once Blender has drawn all samples of its own anti-aliasing."""
+    """As `picture`, once Blender has drawn all samples of its anti-aliasing."""
     return (yield from at_rest(label, lambda: pixels(label)))
 
 
 def at_rest(label: str, look: Callable[[], np.ndarray], count: int = 3) -> Iterator[int]:
-    """What something looks like when that has been the same for this many drawings in a row."""
+    """A picture that has been the same for this many redraws in a row."""
     seen: list[np.ndarray] = []
     while len(seen) < count or not all(np.array_equal(each, seen[-1]) for each in seen[-count:]):
         assert len(seen) < 500, f"{label} does not come to rest"
@@ -199,34 +199,34 @@ def at_rest(label: str, look: Callable[[], np.ndarray], count: int = 3) -> Itera
 
 
 def hair_is_made() -> Iterator[int]:
-    """Ticks until the hair of all previews is there: it is made in a thread."""
+    """Wait until the hair of all previews is made, which happens in a thread."""
     live = of_hairloom("previews")
     yield from until(lambda: all(each.is_made for each in live.sessions()), "no hair is made")
 
 
 def file_browser() -> Any:
-    """The area that asks for a file, in whichever window; None when there is none."""
+    """The file browser's area in any window, or None."""
     windows = bpy.context.window_manager.windows
     areas = [area for window in windows for area in window.screen.areas]
     return next((area for area in areas if area.type == "FILE_BROWSER"), None)
 
 
 def redrawn(area: Any) -> Iterator[int]:
-    """Blender draws what is tagged in each turn of its loop, and comes to a tick once a turn."""
+    """Redraw an area: Blender draws tagged areas and runs ticks once per iteration of its loop."""
     area.tag_redraw()
     yield 1
     yield 1
 
 
 def confirm_file(folder: Path | None = None) -> Iterator[int]:
-    """The button of a file browser that fills the window, in this folder instead of its own."""
+    """Confirm a file browser that fills the window, optionally in this folder."""
     yield from until(lambda: file_browser() is not None, "no file browser opens")
     yield from redrawn(file_browser())
     browser = file_browser()
     if folder is not None:
         browser.spaces.active.params.directory = bytes(str(folder), "utf-8")
-    # Blender closes the browser under the mouse, and crashes over one that has not been drawn
-    # since its folder changed
+    # Blender closes the browser under the mouse, and crashes if it was not redrawn since its
+    # folder changed
     x, y = browser.x + browser.width // 2, browser.y + browser.height // 2
     bpy.context.window.event_simulate("MOUSEMOVE", "NOTHING", x=x, y=y)
     yield from redrawn(browser)
@@ -244,7 +244,7 @@ def viewport_middle(screen: np.ndarray, reach: int = 20) -> np.ndarray:
 
 
 def side_by_side() -> None:
-    """Gives each window its part of the screen: nothing else keeps them from covering another."""
+    """Give each window its part of the screen, so that none covers another."""
     found = subprocess.run(
         ["xdotool", "search", "--onlyvisible", "--class", "blender"],
         check=True,
@@ -261,12 +261,12 @@ def side_by_side() -> None:
 
 
 def picture_of(window: Any, area: Any, screen: np.ndarray) -> np.ndarray:
-    """What an area of a window shows; as `viewport_pixels`."""
+    """The content of a window's area, as in `viewport_pixels`."""
     part = next(each for each in area.regions if each.type == "WINDOW")
     x, y = window.x + part.x, window.y + part.y
     return _rectangle(screen, x, x + part.width, y, y + part.height)
 
 
 def _rectangle(screen: np.ndarray, left: int, right: int, bottom: int, top: int) -> np.ndarray:
-    """A part of the screen, counted from below, in 0 to 1."""
+    """A part of the screen, with rows counted from the bottom, as values from 0 to 1."""
     return screen[len(screen) - top : len(screen) - bottom, left:right] / 255.0

@@ -1,4 +1,4 @@
-"""Pictures of parts of the window: a region as far as it is used, a popup, some side by side."""
+"""Pictures of parts of the window: the used part of a region, a popup, several side by side."""
 
 import subprocess
 
@@ -8,21 +8,20 @@ import numpy as np
 import screen
 from artist import viewport
 
-#: [pixels] space between columns; more than that of a row have changed where a popup has come; the
-#: frame of an area
+#: [pixels] space between columns; changed pixels in a row of a popup, at least; frame of an area
 GAP, SOLID, EDGE = 6, 100, 8
 GREY, COLOURS = "#303030", 200
-#: a channel differs by more than this where there is something
+#: a channel of content differs by more than this from the background
 SEEN = 8
-#: how wide a picture of the whole window is drawn [pixels]
+#: width of a picture of the whole window [pixels]
 WIDTH = 800
 
-#: names of the pictures that are kept
+#: names of saved pictures
 made: set[str] = set()
 
 
 def crop(name, _area, window):
-    """What a region shows, without the empty rest below."""
+    """The content of a region, without the empty rest below."""
     whole = driver.screenshot(f"part_{name}")
     top = bpy.context.window.height - (window.y + window.height)
     part = whole[top : top + window.height, window.x : window.x + window.width]
@@ -34,7 +33,7 @@ def crop(name, _area, window):
 
 
 def changed_box(before, now):
-    """The rectangle of a popup in the view, as slices."""
+    """The rectangle of a popup in the view, as slices of rows and columns."""
     area = viewport()
     left, top = area.x + EDGE, bpy.context.window.height - (area.y + area.height) + EDGE
     right, bottom = left + area.width - 2 * EDGE, top + area.height - 2 * EDGE
@@ -45,8 +44,8 @@ def changed_box(before, now):
 
 
 def keep(name, pictures):
-    """A picture of these beside each other, in as few colours as panels have; one of the whole
-    window is narrower, too."""
+    """Save a picture of these side by side, with a small palette; one of the whole window is also
+    scaled down."""
     files = [driver.screenshot_path(f"part_{name}-{number}") for number in range(len(pictures))]
     for file, each in zip(files, pictures, strict=True):
         file.write_bytes(screen.png(each))

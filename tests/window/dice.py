@@ -1,7 +1,7 @@
-"""Dice for random actions, and the hands that do them.
+"""Random choices for actions, and helpers that perform them.
 
-An action may be refused (its button is grey, its input is wrong); it may not raise. It says by
-`dice.note` what it is about to do.
+An action may be refused (its button is grey, its input is wrong), but must not raise. It announces
+its step by `dice.note`.
 """
 
 import random
@@ -12,14 +12,14 @@ from typing import Any
 
 import bpy
 
-#: an integer is drawn from this share of its slider: many strands only take long
+#: integers are drawn from this fraction of their slider, since many strands only take long
 SHARE_OF_SLIDER = 0.05
-#: nothing is added to more objects
+#: actions add no objects to more than these
 MOST_OBJECTS = 12
 
 
 def action(weight: int = 1) -> Callable[..., Any]:
-    """Marks an action; weight: how often it comes beside the others."""
+    """A decorator that marks an action; weight: its relative frequency."""
 
     def mark(function: Callable[["Dice"], Any]) -> Any:
         function.weight = weight
@@ -33,13 +33,17 @@ def actions_in(*modules: Any) -> list[Callable[["Dice"], Any]]:
 
 
 class Dice:
-    """Chance, from a seed; and the folder in which files are written."""
+    """Random choices from a seed, and the folder for files."""
 
     def __init__(self, seed: int, folder: Path) -> None:
         self.chance, self.folder = random.Random(seed), folder
 
     def pick(self, things: Any) -> Any:
-        """One of them; a RuntimeError, as an operator's refusal, if there is none."""
+        """A random one of these things.
+
+        Raises:
+            RuntimeError: there is none; the same error as for a refused operator.
+        """
         things = list(things)
         if not things:
             raise RuntimeError("there is none")
@@ -58,7 +62,7 @@ class Dice:
         return self.pick(o for o in objects() if not types or o.type in types)
 
     def value(self, prop: Any) -> Any:
-        """Any that the property may have, seldom its hard ends."""
+        """A random value of a property, rarely an end of its hard range."""
         if prop.type == "BOOLEAN":
             return self.often(0.5)
         if prop.type == "ENUM":
@@ -78,7 +82,7 @@ class Dice:
 
 
 def objects() -> list[Any]:
-    """Of the view layer, which has gaps right after an object was removed."""
+    """The objects of the view layer, without the gaps that it has right after a removal."""
     return [obj for obj in bpy.context.view_layer.objects if obj is not None]
 
 
@@ -87,7 +91,7 @@ def views() -> list[Any]:
 
 
 def in_view() -> Any:
-    """As if the pointer were in the 3D view, if one is there."""
+    """A context as with the pointer in the 3D view, if there is one."""
     if not views():
         return nullcontext()
     area = views()[0]
@@ -103,7 +107,7 @@ def call(dice: Dice, operator: str, *how: Any, **settings: Any) -> None:
 
 
 def clicked(dice: Dice, operator: str, **settings: Any) -> None:
-    """As a button does: with its undo step, and in the window if its work is long."""
+    """Call an operator as a button does: with an undo step, and long work in the window."""
     call(dice, operator, "INVOKE_DEFAULT", True, **settings)
 
 
@@ -115,7 +119,8 @@ def select(obj: Any) -> None:
 
 
 def step(name: str) -> None:
-    """What a script changes is no undo step by itself; Blender may crash when it undoes past it."""
+    """Push an undo step for a script's changes; without one, Blender can crash when it undoes past
+    them."""
     bpy.ops.ed.undo_push(message=name)
 
 

@@ -1,10 +1,10 @@
-"""How a window session drives Blender: one step a timer tick, so that events and redraws happen.
+"""The driver of window sessions in Blender: one step per timer tick, with events and redraws.
 
 A session is a script session_NAME.py that ends with `driver.play(steps())`, where `steps` is a
-generator. What stands before a `yield` runs in one tick. `yield` goes on once the window shows what
-was set: nothing of ours is deferred any more, every 3D view has been drawn since, and that drawing
-is on the screen. `yield 1` lets one tick pass, for what is looked at while something goes on; to
-wait for anything else, ask for it by `until`. A failed assert or any exception fails the session.
+generator. The code up to a `yield` runs in one tick. A plain `yield` returns once the window shows
+all changes: none of our work is deferred any more, every 3D view has been redrawn since, and that
+redraw is on the screen. `yield 1` lets one tick pass, to look at something in progress; wait for
+anything else with `until`. A failed assert or any exception fails the session.
 """
 
 import faulthandler
@@ -23,15 +23,15 @@ import screen
 from view_mark import ViewMark
 
 TICK_S = 0.05
-#: How long Blender sleeps when it has nothing to do; it does not where events are simulated.
+#: Sleep of an idle Blender, which does not sleep by itself while events are simulated.
 SLEEP_S = 0.005
-#: A machine may be as slow as it likes: only what never comes fails.
+#: So long that slow machines pass; only an event that does not come fails.
 PATIENCE_S = 180.0
 EXTENSION = "bl_ext.user_default.hairloom"
-#: For a commit a session leaves out cases that are like others.
+#: In commits, sessions skip cases that are like others.
 IS_COMMIT = os.environ.get("HAIRLOOM_TIER") == "commit"
 
-#: Where in the extension what sessions look at is. Each module is named here and nowhere else.
+#: Modules of the extension that sessions use. Their paths are only here.
 MODULES = {
     "card_object": "blender.cards.object",
     "child_process": "exchange.files.child_process",
@@ -70,7 +70,8 @@ MODULES = {
 
 
 class Timers:
-    """Blender's timers that call Hairloom: all that it defers. Blender has no list of them."""
+    """Blender's timers that call Hairloom, for all its deferred work. Blender has no list of
+    them."""
 
     def __init__(self) -> None:
         self._seen: dict[Any, None] = {}
@@ -82,8 +83,8 @@ class Timers:
         self._register(function, **settings)
 
     def pending(self) -> list[str]:
-        """Those that are still to come, but for the ticks of hair that plays, and the draw of views
-        that come to rest, which waits for the end of these.
+        """Timers that are still registered, except for the ticks of playing hair, and the draw of
+        resting views, which waits for the end of those ticks.
         """
         return [
             f"{each.__module__}.{each.__qualname__}"
@@ -112,10 +113,10 @@ _mark = ViewMark()
 
 
 def play(steps: Iterator[float | None], *, anti_aliasing: bool = False) -> None:
-    """Plays the session, says how it ended and quits Blender.
+    """Play the session, print how it ended and quit Blender.
 
     Args:
-        anti_aliasing: leave Blender's own on.
+        anti_aliasing: leave Blender's anti-aliasing on.
     """
     ticks = _ticks(steps)
 
@@ -126,8 +127,8 @@ def play(steps: Iterator[float | None], *, anti_aliasing: bool = False) -> None:
             print("SESSION PASSED", flush=True)
             bpy.ops.wm.quit_blender()
         except BaseException:
-            # An exception in a timer neither ends Blender nor changes its exit code: the missing
-            # closing line is what tells the runner.
+            # An exception in a timer neither ends Blender nor changes its exit code: the runner
+            # notices the missing closing line.
             traceback.print_exc()
             try:
                 screenshot("failed")
@@ -135,15 +136,15 @@ def play(steps: Iterator[float | None], *, anti_aliasing: bool = False) -> None:
                 bpy.ops.wm.quit_blender()
         return None
 
-    # Else Blender draws each view eight times; first_light looks at hair as that shows it.
+    # Otherwise Blender draws each view eight times; only first_light tests hair with it.
     bpy.context.preferences.system.viewport_aa = "8" if anti_aliasing else "OFF"
-    faulthandler.enable()  # of a crash the log tells the lines of Python as well
+    faulthandler.enable()  # logs the lines of Python in a crash
     bpy.app.timers.register(tick, first_interval=1.0, persistent=True)
     bpy.app.timers.register(_sleep, persistent=True)
 
 
 def _sleep() -> float:
-    """Once in each turn of Blender's loop, which else keeps a processor busy while it waits."""
+    """Sleep in each iteration of Blender's loop, which otherwise keeps a processor busy."""
     time.sleep(SLEEP_S)
     return 0.0
 
@@ -158,8 +159,8 @@ def _ticks(steps: Iterator[float | None]) -> Iterator[float]:
 
 
 def _shown() -> Iterator[float]:
-    """Until the window shows what was set."""
-    yield 1  # events first, and what Blender evaluates after them
+    """Wait until the window shows all changes."""
+    yield 1  # events first, and Blender's evaluation after them
     while True:
         yield from until(lambda: not timers.pending(), lambda: f"deferred: {timers.pending()}")
         yield from until(lambda: bpy.context.window is not None, "there is no window")
@@ -170,7 +171,7 @@ def _shown() -> Iterator[float]:
 
 
 def until(is_so: Callable[[], Any], message: str | Callable[[], str]) -> Iterator[float]:
-    """Ticks until something is so."""
+    """Wait, tick by tick, until a condition holds."""
     end = time.monotonic() + PATIENCE_S
     while not is_so():
         if time.monotonic() > end:
@@ -179,7 +180,7 @@ def until(is_so: Callable[[], Any], message: str | Callable[[], str]) -> Iterato
 
 
 def enable_extension() -> None:
-    """Enables the installed extension; Blender itself only prints when that goes wrong."""
+    """Enable the installed extension, or fail; Blender itself only prints a failure."""
     assert addon_utils.enable(EXTENSION, default_set=True) is not None, f"{EXTENSION} fails"
     assert all(addon_utils.check(EXTENSION)), f"{EXTENSION} is not enabled"
 
@@ -195,9 +196,9 @@ def screenshot_path(label: str) -> Path:
 
 
 def screenshot(label: str) -> np.ndarray:
-    """The whole screen as it is now, kept as a file: (height, width, 3), uint8, top row first.
+    """The current screen, also saved as a file: (height, width, 3), uint8, top row first.
 
-    After a change, `yield` before it.
+    After a change, `yield` before the call.
     """
     pixels = _mark.painted_over(screen.pixels())
     screenshot_path(label).write_bytes(screen.png(pixels))

@@ -1,7 +1,7 @@
-"""Which panels stand in which picture of docs/user_guide.md, panel_NAME.png.
+"""The panels in each picture of docs/user_guide.md, panel_NAME.png.
 
-Names are those of classes behind HAIRLOOM_PT_. A picture is made of columns; a column has panels
-that are open below each other. tests/blender/test_user_guide.py holds that none is missing.
+Names are those of classes after HAIRLOOM_PT_. A picture is made of columns; a column has open
+panels below each other. tests/blender/test_user_guide.py tests that none is missing.
 """
 
 PICTURES: dict[str, tuple[tuple[str, ...], ...]] = {
@@ -38,11 +38,10 @@ PICTURES: dict[str, tuple[tuple[str, ...], ...]] = {
     "warnings": (("sidebar",),),
     "meshes": (("sidebar_mesh_cards", "sidebar_fin"), ("sidebar_fin_bake",)),
 }
-#: pictures of what is no panel: the window, popups, the options beside a list of files, and what is
-#: dragged in the view
+#: pictures without panels: the window, popups, options in the file browser, and handles in the view
 OTHERS = ("window", "start", "check", "sort", "export_cards", "export_strands")
 OTHERS += ("preferences", "handles")
-#: sections that the sidebar has too: they are pictured in Properties > Data
+#: sections that are also in the sidebar; their pictures are of Properties > Data
 TWINS = (
     "sidebar_look",
     "sidebar_grow",
@@ -54,7 +53,7 @@ TWINS = (
 
 
 def pictured(name: str) -> bool:
-    """Whether a panel's class, or what it draws, is in a picture."""
+    """Whether a panel's class, or its twin in Properties > Data, is in a picture."""
     short = name.removeprefix("HAIRLOOM_PT_")
     if short.startswith(TWINS):
         short = short.replace("sidebar_", "data_", 1)

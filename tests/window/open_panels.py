@@ -1,11 +1,11 @@
-"""All panels of Hairloom open, and there while they are wanted, so that they can be pictured."""
+"""Hairloom's panels, open and shown on demand, for pictures."""
 
 import bpy
 from driver import of_hairloom
 
 OURS, SIDEBAR = "HAIRLOOM_PT_", "HAIRLOOM_PT_sidebar"
 
-#: panels that are there, and those of them that draw what they hold
+#: panels that are shown, and those of them that draw their content
 there: set[str] = set()
 filled: set[str] = set()
 drawn: set[str] = set()
@@ -16,8 +16,7 @@ def ours():
 
 
 def only_our_panels():
-    """All of ours are open, and are there while they are wanted; Blender's own in their places are
-    gone."""
+    """Open all our panels, to be shown on demand, and remove Blender's own in the same tabs."""
     for each in all_panels(bpy.types.Panel):
         is_here = getattr(each, "bl_context", "") in ("data", "physics")
         if is_here and each.is_registered and not each.__name__.startswith(OURS):
@@ -31,7 +30,8 @@ def only_our_panels():
 
 
 def all_panels(parent):
-    """Those that others are made from come last: they cannot go before what stands below them."""
+    """All subclasses of a panel, parents last, since they cannot be unregistered before their
+    subclasses."""
     found = []
     for each in parent.__subclasses__():
         found += [*all_panels(each), each]
@@ -44,7 +44,7 @@ def polled(panel):
 
 
 def noted(panel):
-    """A panel that is there for those below it alone draws nothing."""
+    """A draw function that draws nothing if the panel is only shown as a parent."""
     original, name = panel.draw, panel.__name__
 
     def draw(self, context):
@@ -56,24 +56,24 @@ def noted(panel):
 
 
 def show(names):
-    """These panels, whole, and their parents, empty."""
+    """Show these panels with their content, and their parents empty."""
     parents = {each.__name__: getattr(each, "bl_parent_id", "") for each in ours()}
     filled.clear()
     filled.update(names)
     there.clear()
-    there.add(SIDEBAR)  # without it its tab would go, and another come
+    there.add(SIDEBAR)  # without it, the sidebar would switch to another tab
     for name in names:
         while name.startswith(OURS):
             there.add(name)
             name = parents[name]
     for area in bpy.context.screen.areas:
-        for each in area.regions:  # not the view: the hair in it is slow to draw
+        for each in area.regions:  # not the view, whose hair is slow to draw
             if each.type == ("UI" if area.type == "VIEW_3D" else "WINDOW"):
                 each.tag_redraw()
 
 
 def open_from_the_start(panel):
-    """It and those below it are registered again: Blender keeps what it once has drawn."""
+    """Register a panel and its children again as open: Blender keeps the state of drawn panels."""
     classes = of_hairloom("registration").CLASSES
     chosen = [each for each in classes if each.__name__.startswith(panel)]
     for each in reversed(chosen):

@@ -1,4 +1,4 @@
-"""What an artist may do with Blender, in any order, while hair is previewed."""
+"""Random actions of an artist with Blender while hair is previewed."""
 
 from pathlib import Path
 
@@ -7,8 +7,8 @@ from dice import MOST_OBJECTS, action, call, clicked, press, select, step, views
 
 
 def settled():
-    """Before other areas are shown: of what was made active in the same tick, Blender with several
-    windows tells areas that are in none of them by then, and crashes."""
+    """Wait before other areas are shown: with several windows, Blender notifies areas of an object
+    that became active in the same tick, and crashes if they are no longer in any window."""
     yield 0.2
 
 
@@ -83,7 +83,7 @@ def rename(dice):
     name = dice.pick(["Hair", "Head", "Hairöß", "x" * 63, "a/b:c"])
     dice.note(f"{obj.name} -> {name}")
     for each in filter(None, (obj, obj.data)):
-        if each.is_editable:  # what is linked is not
+        if each.is_editable:  # not linked
             each.name = name
     step("rename")
 

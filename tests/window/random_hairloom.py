@@ -1,4 +1,4 @@
-"""What an artist may do with Hairloom, in any order."""
+"""Random actions of an artist with Hairloom."""
 
 from pathlib import Path
 
@@ -14,8 +14,8 @@ SECTIONS = {
     bpy.types.Object: ["dynamics", "dynamics", "fin"],
 }
 MOST_GROOMS = 3
-#: buttons that put lines and rings on hair, that take them off, with the setting that names which;
-#: that shape hair, and that give it the shape before
+#: buttons that add lines and rings to hair, that remove them, each with the setting that names
+#: them, that shape hair, and (TAKEN_BACK) that restore its shape
 ADDED = ("add_parting", "add_stroke", "add_hair_tie")
 REMOVED = {
     "remove_parting": "line",
@@ -24,13 +24,13 @@ REMOVED = {
     "remove_trim_shape": "shape",
 }
 SHAPED = ("settle", "comb_parting", "comb_flow", "trim_to_shape", "mirror_hair", "grow_again")
-#: what needs a line, and the button that adds one
+#: buttons that need a line, each with the button that adds one
 LINED = {"comb_parting": "add_parting", "comb_flow": "add_stroke"}
 TAKEN_BACK = ("back_to_combed", "take_flow_back", "take_trim_back")
 
 
 def no_long_work():
-    """A script could take away what the work stands on; a mouse cannot."""
+    """Wait for the end of long work, whose data a script could remove and a mouse cannot."""
     yield from until(lambda: not of_hairloom("long_work").running(), "the work does not end")
 
 
@@ -58,7 +58,7 @@ def add_groom(dice):
 
 @action(12)
 def press_a_button(dice):
-    """Of those that are done at once."""
+    """Press a button without long work."""
     buttons = "preview play pause reset preview play pause use_groom set_surface snap_roots"
     buttons += " unwrap_surface apply_scale look_from_material mute_hair_dynamics show_settings"
     buttons += " convert_particles fin_add fin_preview fin_remove fin_reset remove_spheres"
@@ -68,7 +68,7 @@ def press_a_button(dice):
 
 @action(2)
 def press_a_slow_button(dice):
-    """Work that goes on in the window, and that Esc or what comes next may end."""
+    """Press a button whose work goes on in the window, until Esc or a later action ends it."""
     hair = dice.object("CURVES")
     select(hair)
     hair.hairloom.bake.folder = str(dice.folder / "bake")
@@ -81,7 +81,7 @@ def press_a_slow_button(dice):
 
 @action(8)
 def put_something_on_hair(dice):
-    """A parting, a stroke, a tie: a line or ring that is selected beside it, or a new one."""
+    """Add a parting, a stroke or a tie: a selected line or ring, or a new one."""
     select(dice.object("CURVES"))
     if dice.often(0.3):
         dice.object().select_set(True)
@@ -98,7 +98,7 @@ def take_something_off(dice):
 
 @action(12)
 def shape_hair(dice):
-    """By a button, whose work Esc may end; shapes to trim by are selected beside the hair."""
+    """Press a button that shapes hair, whose work Esc can end; trim shapes are selected too."""
     hair = dice.object("CURVES")
     select(hair)
     button = dice.pick(SHAPED)

@@ -1,7 +1,7 @@
-"""Eyes that read: where on the screen words stand, found by how Blender's own font draws them.
+"""Words on the screen, found by comparison with words that Blender's own font draws.
 
-So a session clicks what is written on a page of the documentation, where it is shown, and fails
-when it is called otherwise.
+A session can so click the words of a documentation page where Blender shows them, and fails if a
+button has another name.
 """
 
 from collections.abc import Iterator
@@ -16,14 +16,14 @@ import screen
 from driver import until
 from mathutils import Matrix
 
-#: how much a place is like the words, from -1 to 1, to be read as them; menus underline a letter
+#: correlation, from -1 to 1, above which words are recognized; menus underline a letter
 ALIKE = 0.9
-#: [pixels] around words that belong to them; and where other words of the same line would end and
-#: begin: on the left checkboxes are nearer than those would be
+#: [pixels] margin of words, and the gaps before and after them in which other words of the line
+#: would be; on the left, checkboxes are nearer than words
 MARGIN, BEFORE, AFTER = 1, 3, 5
-#: share of the contrast of letters with which the space beside them may differ
+#: fraction of the letters' contrast by which the space beside them may vary
 BLANK = 0.3
-#: [levels of 255] what differs by less is no letter
+#: [levels of 255] smaller differences are no letters
 FAINT = 6.0
 
 #: left, bottom, width, height, in pixels of the window
@@ -32,7 +32,7 @@ Box = tuple[int, int, int, int]
 
 @cache
 def _drawn(words: str, is_turned: bool) -> np.ndarray:
-    """How much of each pixel letters cover, (height, width), top row first."""
+    """The letters' coverage of each pixel, (height, width), top row first."""
     size = bpy.context.preferences.ui_styles[0].widget.points
     blf.size(0, size * bpy.context.preferences.system.ui_scale)
     width, height = int(blf.dimensions(0, words)[0]) + 24, 40
@@ -61,7 +61,7 @@ def _drawn(words: str, is_turned: bool) -> np.ndarray:
 
 
 def _likeness(shown: np.ndarray, letters: np.ndarray) -> np.ndarray:
-    """Normalized cross-correlation: for each place of the upper left corner, from -1 to 1."""
+    """Normalized cross-correlation, from -1 to 1, for each place of the upper left corner."""
     (height, width), (rows, columns) = shown.shape, letters.shape
     pattern = letters - letters.mean()
     pattern /= np.sqrt((pattern**2).sum())
@@ -84,7 +84,7 @@ def _likeness(shown: np.ndarray, letters: np.ndarray) -> np.ndarray:
 
 
 def _is_apart(shown: np.ndarray, letters: np.ndarray, y: int, x: int, is_turned: bool) -> bool:
-    """Whether words at a place are no part of longer ones."""
+    """Whether words at a place are not part of a longer text."""
     if is_turned:
         shown, letters, y, x = shown.T, letters.T, x, y
     rows, columns = letters.shape
@@ -96,7 +96,7 @@ def _is_apart(shown: np.ndarray, letters: np.ndarray, y: int, x: int, is_turned:
 
 
 def seen(words: str, box: Box, *, is_turned: bool = False) -> list[tuple[float, int, int]]:
-    """Where words stand in a part of the window: likeness, x and y of their middle; best first."""
+    """Words found in a part of the window: correlation, x and y of their middle; best first."""
     left, bottom, width, height = box
     top = screen.size()[1] - (bottom + height)
     shown = screen.part(left, top, width, height).astype(np.float64).mean(axis=2)
@@ -119,7 +119,7 @@ def seen(words: str, box: Box, *, is_turned: bool = False) -> list[tuple[float, 
 
 
 def width_of(words: str) -> int:
-    """[pixels] from the first letter to the last."""
+    """Width of words [pixels], from the first letter to the last."""
     return int(_drawn(words, False).shape[1]) - 2 * MARGIN
 
 
@@ -132,7 +132,7 @@ def box_of(region: Any) -> Box:
 
 
 def read(words: str, box: Box | None = None, **how: bool) -> Iterator[int]:
-    """Where words stand, once they are there: x and y of their middle."""
+    """Wait until words are shown; returns x and y of their middle."""
     found: list[tuple[float, int, int]] = []
 
     def is_there() -> bool:

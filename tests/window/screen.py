@@ -1,4 +1,4 @@
-"""What is on the X screen: read through Xlib itself, at once."""
+"""The content of the X screen, read directly through Xlib."""
 
 import ctypes
 import struct
@@ -11,7 +11,7 @@ _ALL_PLANES, _Z_PIXMAP = ctypes.c_ulong(-1), 2
 
 
 class _XImage(ctypes.Structure):
-    """The first members of Xlib's own structure."""
+    """The first members of Xlib's structure XImage."""
 
     _fields_ = (
         *((name, ctypes.c_int) for name in ("width", "height", "xoffset", "format")),
@@ -35,17 +35,17 @@ _x, _display = _connect()
 
 
 def size() -> tuple[int, int]:
-    """Width and height in pixels."""
+    """Width and height of the screen in pixels."""
     return _x.XDisplayWidth(_display, 0), _x.XDisplayHeight(_display, 0)
 
 
 def pixels() -> np.ndarray:
-    """(height, width, 3), uint8, top row first."""
+    """The screen, (height, width, 3), uint8, top row first."""
     return part(0, 0, *size())
 
 
 def part(left: int, top: int, width: int, height: int) -> np.ndarray:
-    """As `pixels`, of a rectangle within the screen: reading all of it takes as long as drawing."""
+    """As `pixels`, for a rectangle of the screen: reading all of it takes as long as drawing."""
     root = ctypes.c_ulong(_x.XDefaultRootWindow(_display))
     found = _x.XGetImage(_display, root, left, top, width, height, _ALL_PLANES, _Z_PIXMAP)
     image = found.contents

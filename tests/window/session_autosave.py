@@ -1,4 +1,4 @@
-"""Blender saves automatically while hair plays, and Esc stops hair from wherever the mouse is."""
+"""Blender saves automatically while hair plays, and Esc stops hair wherever the mouse is."""
 
 import sys
 import time
@@ -46,7 +46,7 @@ def steps():
 
 
 def autosaves(since):
-    """Files that Blender has written for itself."""
+    """Autosave files that Blender has written since then."""
     folders = {FOLDER, FOLDER.parent, Path(bpy.context.preferences.filepaths.temporary_directory)}
     found = (path for folder in folders for path in folder.glob("*autosave*.blend"))
     return [path for path in found if path.stat().st_mtime > since]

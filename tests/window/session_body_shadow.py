@@ -1,4 +1,4 @@
-"""Hair's shadow on the head that Blender draws, and the layers of its map in an Image Editor."""
+"""Hair's shadow on a head that Blender draws, and the layers of its map in an Image Editor."""
 
 import sys
 from pathlib import Path
@@ -66,7 +66,7 @@ def has_drawn():
 
 
 def hair_shades_the_head():
-    """By a light that throws shadows, and as before when it does so again."""
+    """In a light that casts shadows; without them the head is bright, and with them dark again."""
     shaded = yield from pixels_at_rest("on_body")
     sun = bpy.data.objects["Sun"].data
     sun.use_shadow = False
@@ -75,8 +75,8 @@ def hair_shades_the_head():
     )
     bare = yield from pixels_at_rest("bare")
     assert np.quantile((shaded - bare).max(axis=2), 0.995) < 0.05, "it only darkens"
-    # with neither shadows of the light nor Shadow on Surface it is the same:
-    # Blender's strands throw none
+    # without shadows of the light and without Shadow on Surface it is the same, since Blender's
+    # strands cast none
     volume().on_body = False
     none = yield from pixels_at_rest("no_shadow_at_all")
     assert changed(bare, none, 0.05) < 5e-3
@@ -84,7 +84,7 @@ def hair_shades_the_head():
     yield from until(
         lambda: changed(shaded, pixels("on_body_again"), 0.05) < 5e-3, "it does not come back"
     )
-    # a head that is not shown is not shaded
+    # a hidden head is not shaded
     bpy.data.objects["Head"].hide_set(True)
     yield from until(
         lambda: changed(shaded, pixels("hidden_head"), 0.05) > 0.02, "the head is not hidden"
@@ -98,7 +98,7 @@ def hair_shades_the_head():
 
 
 def full_shadow_is_as_dark_as_without_the_light():
-    """Where hair takes all of the sun, EEVEE's own picture without a sun is what is left."""
+    """Where hair blocks all of the sun, against EEVEE's own picture without a sun."""
     bpy.ops.object.select_all(action="DESELECT")  # no outlines
     volume().extinction, volume().on_body = 100.0, True
     shaded = yield from pixels_at_rest("full")
@@ -111,19 +111,20 @@ def full_shadow_is_as_dark_as_without_the_light():
     sun.hide_set(False)
     volume().extinction, volume().on_body, sun.data.use_shadow = 1.0, True, True
     taken, missing = (lit - shaded).mean(axis=2), (lit - dark).mean(axis=2)
-    # of the head; hair is dark, and itself shaded
+    # pixels of the head; hair is dark, and shaded itself
     is_full = (lit.mean(axis=2) > 0.45) & (missing > 0.2) & (taken > 0.75 * missing)
     away = np.abs(shaded - dark)[is_full].mean()
     assert is_full.sum() > 50 and away < 0.04, (is_full.sum(), away)
 
 
 def hair_is_there_without_overlays():
-    """Behind the head it is not: EEVEE leaves no depths without overlays."""
+    """Hair is drawn, and stays hidden behind the head, although EEVEE leaves no depths without
+    overlays."""
     overlays = viewport().spaces.active.overlay
     with_overlays = yield from pixels_at_rest("with_overlays")
     overlays.show_overlays = False
     found = yield from pixels_at_rest("without_overlays")
-    # lines of what is selected are gone
+    # selection outlines are gone
     assert changed(with_overlays, found, 0.05) < 0.05
     bpy.data.objects["Head"].hide_set(True)
     bald = yield from pixels_at_rest("without_overlays_and_head")
@@ -145,7 +146,7 @@ def layers_are_shown():
     editor = windows[-1].screen.areas[0]
     assert editor.type == "IMAGE_EDITOR"
     image = editor.spaces.active.image
-    # tiles: where layers start, and they; of few strands they are coarser than asked
+    # tiles: the starts of layers, and the layers; with few strands they are coarser than requested
     tiles = 1 + volume().layers
     columns = int(np.ceil(np.sqrt(tiles)))
     pitch, rest = divmod(image.size[0], columns)

@@ -1,5 +1,5 @@
-"""Hair cards on screen: shown in place of strands while they are built beside the window, moved,
-rendered, made into objects, sorted, exported; and left in the middle of everything."""
+"""Hair cards on screen: built in the background and shown instead of strands, moved, rendered, made
+into objects, sorted, exported; and interrupted at every stage."""
 
 import json
 import sys
@@ -53,7 +53,7 @@ def settings(section):
 
 
 class Stillness:
-    """The longest time in which the window did nothing."""
+    """The longest time for which the window was blocked."""
 
     def __init__(self):
         self.longest, self.last = 0.0, time.perf_counter()
@@ -65,7 +65,7 @@ class Stillness:
         return 0.005
 
     def since(self):
-        """It since the last call [s]."""
+        """The longest time since the last call [s]."""
         longest, self.longest = self.longest, 0.0
         return longest
 
@@ -100,7 +100,7 @@ def set_the_scene():
     cards = settings("cards")
     cards.source, cards.card_count, cards.levels = "clusters", CARDS, 2
     settings("atlas").size, settings("card_occlusion").rays = "512", 8
-    settings("strands").fullness = 6.0  # few strands are seen all the same
+    settings("strands").fullness = 6.0  # makes few strands visible
     overlays = viewport().spaces.active.overlay
     overlays.show_floor = overlays.show_cursor = overlays.show_object_origins = False
     look_from_front(0.9)
@@ -116,7 +116,7 @@ def are_shown():
 
 
 def cards_in_place_of_strands():
-    """Strands stay until cards are there, and the window lives meanwhile."""
+    """Strands are shown until cards are built, and the window stays responsive."""
     strands = yield from pixels_at_rest("strands")
     watch = Stillness()
     yield 1
@@ -136,7 +136,7 @@ def cards_in_place_of_strands():
 
 
 def a_slider_is_dragged():
-    """The old cards stay until the last ones are there."""
+    """The old cards are shown until the last ones are built."""
     watch, before = Stillness(), session().cards.counts
     yield 1
     watch.since()
@@ -212,7 +212,7 @@ def strands_again_and_undo():
 
 
 def rendered_as_cards():
-    """Rendered mode and F12 of our engine."""
+    """Cards in Rendered mode and with F12 in our engine."""
     scene, shading = bpy.context.scene, viewport().spaces.active.shading
     bpy.ops.object.light_add(type="SUN", rotation=(0.9, 0.3, 0.0))
     hair().select_set(True)
@@ -253,7 +253,7 @@ def is_making():
 
 
 def stage():
-    """What making cards does now; empty once nothing is being made."""
+    """The current stage of Make Cards; "" if it is not running."""
     work = of_hairloom("long_work")._running
     return "" if work is None else work.progress.text
 
@@ -265,7 +265,7 @@ def make_cards():
 
 
 def making_is_cancelled():
-    """Esc leaves nothing half made, at whatever stage."""
+    """Esc leaves nothing half made, at any stage."""
     reading = "Reading the hair"
     for name, is_there in (("reading", lambda: True), ("amid", lambda: stage() != reading)):
         make_cards()
@@ -279,7 +279,7 @@ def making_is_cancelled():
 
 
 def cards_are_made():
-    """Again in place, where the artist's own modifier and material stay; undone and redone."""
+    """Made again in place, with the artist's modifier and material kept; undone and redone."""
     watch = Stillness()
     make_cards()
     yield from until(lambda: not is_making(), "Make Cards does not end")
@@ -322,7 +322,7 @@ def cards_are_made():
 
 
 def a_copy_is_sorted():
-    """Sort Hair Cards on a mesh whose faces somebody has mixed up."""
+    """Sort Hair Cards on a mesh with shuffled faces."""
     finest = card_objects()[0]
     copy = finest.copy()
     copy.data = finest.data.copy()
@@ -352,7 +352,7 @@ def a_copy_is_sorted():
 
 
 def they_are_exported():
-    """File > Export; a reader of JSON finds all levels, triangles and files."""
+    """File > Export; the JSON lists all levels, triangles and files."""
     path = FOLDER / "hair.glb"
     with bpy.context.temp_override(area=viewport(), region=region("WINDOW")):
         assert bpy.ops.hairloom.export_cards(filepath=str(path)) == {"FINISHED"}
@@ -376,7 +376,7 @@ def is_building():
 
 
 def another_file_in_mid_build():
-    """What is half done ends with its file; the next one is as good as any."""
+    """Loading another file ends unfinished builds; the new file works as any."""
     hair().select_set(True)
     yield from click(*sidebar_button("hairloom.preview"))
     yield from until(is_building, "no cards are built")

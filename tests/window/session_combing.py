@@ -1,6 +1,6 @@
 """Combing under the preview: in Sculpt Mode the brush is dragged over a head of hair, and the whole
-style follows, with guides as thin lines instead of Blender's thick curves; Ctrl-Z puts it back.
-And painting: in Vertex Paint hair takes the colour of its head.
+style follows, with guides as thin lines instead of Blender's thick curves; Ctrl-Z restores it. And
+painting: in Vertex Paint hair gets the colour of its head.
 """
 
 import sys
@@ -77,7 +77,7 @@ def evaluated(hair):
 
 
 def sculpt(hair):
-    """Blender's curves stay hidden, ours are there as lines."""
+    """Blender's curves stay hidden, and ours are drawn as lines."""
     before = pixels("before_sculpting")
     bpy.ops.object.mode_set(mode="SCULPT_CURVES")
     yield
@@ -96,7 +96,7 @@ def sculpt(hair):
 
 
 def comb(hair):
-    """The mouse drags the brush across the hair: it follows while the button is down."""
+    """The mouse drags the brush across the hair, which follows while the button is down."""
     window, (x, y) = bpy.context.window, in_front()
     before, shot, offsets = session().strands, pixels("uncombed"), session().rig.strands.offsets
     window.event_simulate("MOUSEMOVE", "NOTHING", x=x, y=y)
@@ -121,7 +121,7 @@ def comb(hair):
 
 
 def in_front():
-    """Where the window shows the middle of the guide that is nearest to the eye."""
+    """The place in the window of the middle of the guide nearest to the eye."""
     view, grid = region("WINDOW"), session().rig.guide_grid
     point = grid[grid[:, -1, 1].argmin(), grid.shape[1] // 2]
     place = location_3d_to_region_2d(view, view.data, point)
@@ -129,7 +129,7 @@ def in_front():
 
 
 def settled():
-    """Until the rest has come; how long that took [s]."""
+    """Wait for the final rest hair; returns how long that took [s]."""
     began = time.monotonic()
     yield from until(
         lambda: not (session().is_stale or session().is_pending), "the rest does not come"
@@ -154,8 +154,8 @@ def undo(hair):
 
 
 def paint(hair):
-    """The brush is dragged over the head: strands there have its colour while the button is down,
-    within half a second."""
+    """The brush is dragged over the head: strands there get its colour within half a second, while
+    the button is down."""
     head, window = hair.parent, bpy.context.window
     colors = head.data.color_attributes.new("Paint", "BYTE_COLOR", "CORNER")
     colors.data.foreach_set("color", np.tile(np.float32([0.2, 0.9, 0.2, 1.0]), len(colors.data)))
@@ -189,7 +189,7 @@ def paint(hair):
 
 
 def drawn_colors():
-    """Of all points, as they are drawn."""
+    """The drawn colours of all points."""
     return of_hairloom("overlay").drawing_of(session().uid).snapshot.color
 
 

@@ -1,5 +1,5 @@
-"""The render engine on screen: Rendered mode gets better and rests, is what F12 gives, and shows
-the hair that plays."""
+"""The render engine on screen: Rendered mode refines and comes to rest, equals F12, and shows
+playing hair."""
 
 import gc
 import sys
@@ -24,12 +24,13 @@ from artist import (
 from driver import of_hairloom, until
 
 SAMPLES = 4
-#: pixels from the middle of the view that are compared
+#: [pixels] distance from the middle of the view up to which pictures are compared
 REACH = 150
 
 
 def view():
-    """What draws the viewport; the newest, where Blender has not let go of an older one yet."""
+    """The engine's object that draws the viewport; the newest one, since Blender may still hold
+    older ones."""
     kind = of_hairloom("engine").HAIRLOOM_RE_engine
     engines = [each for each in gc.get_objects() if type(each) is kind]
     return engines[-1].view if engines else None
@@ -41,7 +42,7 @@ def is_finished():
 
 
 def settled():
-    """Until a change has been taken over and all samples are there again, and shown."""
+    """Wait until a change has arrived and all samples are drawn again and shown."""
     yield
     yield from until(is_finished, "the viewport does not finish its samples")
     yield
@@ -94,7 +95,7 @@ def it_gets_better_and_rests():
 
 
 def it_is_what_f12_gives():
-    """Through a camera whose frame fills the view."""
+    """The viewport equals F12, through a camera whose frame fills the view."""
     space, main = viewport().spaces.active, region("WINDOW")
     camera = bpy.data.objects.new("Viewer", bpy.data.cameras.new("Viewer"))
     bpy.context.collection.objects.link(camera)
@@ -136,7 +137,8 @@ def it_is_what_f12_gives():
 
 
 def a_region_alone_is_drawn():
-    """The lower left quarter of the camera's frame, which is that of the view; then all again."""
+    """The lower left quarter of the camera's frame, which is also that of the view; then all
+    again."""
     yield from settled()  # F12 lets the view begin again
     whole, render, size = pixels("whole"), bpy.context.scene.render, view()._picture.size
     render.border_min_x = render.border_min_y = 0.0
@@ -148,7 +150,7 @@ def a_region_alone_is_drawn():
     inside = np.s_[REACH + 2 :, : REACH - 2]
     difference = 255.0 * np.abs(part - whole)[inside]
     print(f"a region against the whole: {difference.max():.2f} / 255 at most")
-    # single pixels, where another of the hairs in them is taken for all, differ more
+    # single pixels, in which another hair represents all, differ more
     assert np.quantile(difference, 0.999) < 1.5 and difference.max() < 9.0
     outside = part[: REACH - 2, REACH + 2 :]
     assert np.ptp(outside, axis=(0, 1)).max() < 0.02, "something is drawn beyond the region"

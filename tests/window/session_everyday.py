@@ -1,6 +1,5 @@
-"""What artists do all day: open every panel, hide, go to local view, show what acts on the hair,
-duplicate, play the animation; and what they may meet: hair without a surface, a GPU that refuses a
-shader."""
+"""Everyday actions of artists: open every panel, hide, local view, overlays, duplicate, play the
+animation; and faults: hair without a surface, a GPU that refuses a shader."""
 
 import sys
 from pathlib import Path
@@ -51,7 +50,8 @@ def steps():
 
 
 def watch_panels():
-    """All panels open, and every exception in their draw noted: Blender would only print it."""
+    """Open all panels, and record every exception of their draw functions, which Blender only
+    prints."""
     panels = [each for each in of_hairloom("registration").CLASSES if "_PT_" in each.__name__]
     for each in reversed(panels):
         bpy.utils.unregister_class(each)
@@ -96,7 +96,7 @@ def set_the_scene():
 
 
 def the_panel_keeps_still():
-    """A field below all that is said of the hair stays under the mouse, whatever is said."""
+    """A field below all messages about the hair stays under the mouse, whatever they are."""
     live, hair, places = of_hairloom("previews"), bpy.data.objects["Hair"], {}
     places["not previewed"] = yield from field(viewport(), "UI", "hide_original")
     before = places["not previewed"]
@@ -114,13 +114,13 @@ def the_panel_keeps_still():
     hair.scale.x = 1.0
     yield from click(*sidebar_button("hairloom.preview"))
     yield from until(lambda: not live.sessions(), "the preview goes on")
-    # the mouse goes in steps of half a row
+    # the mouse moves in steps of half a row
     heights = [y for _, y in places.values()]
     assert max(heights) - min(heights) < 20, f"it moves: {places}"
 
 
 def every_panel_draws():
-    """In the sidebar and in Properties > Data, without preview and with it."""
+    """All panels draw in the sidebar and in Properties > Data, with and without a preview."""
     properties = next(a for a in bpy.context.screen.areas if a.type == "PROPERTIES")
     properties.spaces.active.context = "DATA"
     yield
@@ -151,8 +151,8 @@ def every_panel_draws():
 
 
 def panels_of_the_engine(properties):
-    """They are there while the engine is chosen; Passes stands below a panel of Blender's own.
-    Hairloom Hair is there with Blender's engines."""
+    """They are shown while the engine is chosen, with Passes below a panel of Blender's own.
+    Hairloom Hair is shown with Blender's engines."""
     render = bpy.context.scene.render
     before, render.engine = render.engine, "HAIRLOOM"
     for tab in ("RENDER", "VIEW_LAYER"):
@@ -191,7 +191,8 @@ def hiding_and_local_view():
 
 
 def what_acts_on_it():
-    """What moves hair, and what it does, as lines in the view, which go with Blender's overlays."""
+    """What acts on hair, and its motion, are lines in the view that Blender's overlay switch
+    hides."""
     hair, overlay = bpy.data.objects["Hair"], viewport().spaces.active.overlay
     bpy.ops.object.light_add(type="SUN", rotation=(0.6, 0.6, 0.0))
     ball = bpy.data.objects.new("Ball", bpy.data.objects["Head"].data)
@@ -222,7 +223,8 @@ def what_acts_on_it():
 
 
 def duplicates_by_keys():
-    """Shift-D and Alt-D while hair plays: it plays on, Blender shows the copy, Ctrl-Z takes it."""
+    """Shift-D and Alt-D while hair plays: it plays on, Blender shows the copy, Ctrl-Z removes
+    it."""
     live, hair = of_hairloom("previews"), bpy.data.objects["Hair"]
     choose(hair)
     bpy.ops.ed.undo_push(message="the scene")
@@ -231,7 +233,7 @@ def duplicates_by_keys():
     names = set(bpy.data.objects.keys())
     for held in ({"shift": True}, {"alt": True}):
         yield from press_in_view("D", **held)
-        yield from press("RET")  # the copy hangs at the mouse
+        yield from press("RET")  # the copy follows the mouse
         yield from until(lambda: len(bpy.data.objects) > len(names), f"no copy by {held}")
         (copy,) = set(bpy.data.objects.keys()) - names
         yield from still_plays(f"beside a copy by {held}")
@@ -258,7 +260,7 @@ def still_plays(where):
 
 
 def shown_as(name):
-    """As what Blender itself shows an object."""
+    """The display type with which Blender shows an object."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     return bpy.data.objects[name].evaluated_get(depsgraph).display_type
 
@@ -271,7 +273,7 @@ def choose(obj):
 
 
 def blenders_own_animation():
-    """Space bar: hair that is not to be simulated goes with the head, drawn at every frame."""
+    """Space bar: hair without simulation moves with the head and is drawn in every frame."""
     live, head = of_hairloom("previews"), bpy.data.objects["Head"]
     bpy.data.objects["Hair"].hairloom.bake.follows = False
     for frame, x in ((1, 0.0), (40, 0.2)):
@@ -291,7 +293,7 @@ def blenders_own_animation():
 
 
 def hair_without_a_surface():
-    """A warning in the panel, no more."""
+    """Only a warning in the panel."""
     live = of_hairloom("previews")
     hair = bpy.data.objects["Hair"]
     live.stop_all()

@@ -31,7 +31,7 @@ from driver import of_hairloom, until
 
 STRANDS = 1500
 RED = (0.8, 0.05, 0.05)
-DISTANCE = 0.9  # of the eye [m]
+DISTANCE = 0.9  # [m], of the eye
 FILE = str(Path(bpy.app.tempdir) / "first_light.blend")
 
 
@@ -58,19 +58,19 @@ def steps():
 
 
 def set_the_scene():
-    """A head with hair in the middle of the viewport, the sidebar open at our tab."""
+    """A head with hair in the middle of the viewport, and the sidebar at our tab."""
     new_head(keeps_light=True)
     bpy.ops.object.shade_smooth()
     assert bpy.ops.hairloom.grow(strand_count=STRANDS, length=0.12) == {"FINISHED"}
     bpy.context.object.name = "Hair"
-    bpy.context.object.data.hairloom.children.method = "none"  # only its own strands are asked for
+    bpy.context.object.data.hairloom.children.method = "none"  # only its own strands
     hide_floor()
     look_from_front(DISTANCE)
     yield from open_our_sidebar()
 
 
 def preview(shading):
-    """The button in the sidebar draws the strands; once more, and all is as before."""
+    """The sidebar's button draws the strands; a second click restores the view."""
     viewport().spaces.active.shading.type = shading
     yield from wait_for_the_head()
     off = yield from pixels_at_rest(f"{shading.lower()}-off")
@@ -92,8 +92,8 @@ def preview(shading):
 
 
 def wait_for_the_head():
-    """Until it stays in the middle of the view: EEVEE compiles its shaders first, and goes on
-    showing the last picture for a while."""
+    """Wait until the head stays in the middle of the view: EEVEE compiles its shaders first, and
+    shows the last picture meanwhile."""
     yield
 
     def is_seen():
@@ -107,7 +107,7 @@ def wait_for_the_head():
 
 
 def depth_is_tested(shading):
-    """A plate before the head hides the hair; behind it, it does not."""
+    """A plate before the head hides the hair; a plate behind it does not."""
     bpy.ops.mesh.primitive_cube_add(size=0.15, location=(0.0, -0.4, 0.09))
     plate = bpy.context.object
     plate.scale.y = 0.01
@@ -124,12 +124,12 @@ def depth_is_tested(shading):
 
 
 def roughness(name):
-    """How much the middle of the view varies."""
+    """The largest standard deviation of channels in the middle of the view."""
     return viewport_middle(driver.screenshot(name)).std(axis=(0, 1)).max()
 
 
 def look_at_hair_from_above():
-    """The middle of the view on the hair over the forehead."""
+    """Centre the view on the hair over the forehead."""
     look_from_front(DISTANCE)
     viewport().spaces.active.region_3d.view_location = (0.0, 0.0, 0.09)
 
@@ -153,7 +153,7 @@ def sliders_act_at_once():
 
 
 def play_and_stop():
-    """Play by the button, move the head meanwhile, stop by ESC."""
+    """Play with the button, move the head meanwhile, stop with Esc."""
     head = bpy.data.objects["Head"]
     at_rest = live().sessions()[0].strands
     before = yield from pixels_at_rest("play-before")
@@ -185,7 +185,7 @@ def play_and_stop():
 
 
 def undo():
-    """A moved head, undone and redone; our buttons are no undo steps of their own."""
+    """A move of the head is undone and redone; our buttons add no undo steps."""
     at_rest = live().sessions()[0].strands
     bpy.ops.ed.undo_push(message="before the move")
     bpy.data.objects["Head"].location.z = 0.05
@@ -205,7 +205,7 @@ def undo():
 
 
 def save_and_reload():
-    """Loading in the middle of Play: sessions go, settings stay, and preview works again."""
+    """Loading a file during Play: sessions end, settings stay, and Preview works again."""
     yield from click(*sidebar_button("hairloom.play"))
     yield from until(live().is_playing, "the Play button did nothing")
     bpy.ops.wm.save_as_mainfile(filepath=FILE)
@@ -225,7 +225,7 @@ def save_and_reload():
 
 
 def disable():
-    """Disabling in the middle of Play leaves nothing that draws, ticks or raises."""
+    """Disabling during Play leaves nothing that draws, ticks or raises."""
     yield from click(*sidebar_button("hairloom.play"))
     yield from until(live().is_playing, "the Play button did nothing")
     on = yield from picture("before-disabling")

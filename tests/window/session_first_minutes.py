@@ -1,5 +1,5 @@
-"""The first five minutes: nothing selected, the sample scene, hair on a mesh that plays at once,
-undo, presets with pictures, warnings with a fix, export, the page in the Preferences with its test.
+"""The first five minutes: no selection, the sample scene, hair on a mesh that plays at once, undo,
+presets with pictures, warnings with a fix, export, and the test in the Preferences.
 """
 
 import os
@@ -37,7 +37,7 @@ def in_view():
 
 
 def invoke(name, **settings):
-    """As a menu does, in the 3D view."""
+    """Call an operator as a menu of the 3D view does."""
     with in_view():
         result = getattr(bpy.ops.hairloom, name)("INVOKE_DEFAULT", True, **settings)
     assert result & {"FINISHED", "RUNNING_MODAL"}, f"{name}: {result}"
@@ -73,7 +73,7 @@ def nothing_selected():
 
 
 def the_sample_scene_plays():
-    """One click: hair that moves and shines, in a scene of its own."""
+    """One click gives moving, shining hair in its own scene."""
     own = bpy.context.window.scene
     invoke("sample_scene")
     yield from until(lambda: not of_hairloom("long_work").running(), "the scene does not come")
@@ -95,7 +95,7 @@ def the_sample_scene_plays():
 
 
 def hair_on_a_mesh_of_ones_own():
-    """Add > Curve > Hairloom Groom on a selected mesh: it is grown, shines and swings at once."""
+    """Add > Curve > Hairloom Groom on a selected mesh: hair grows, shines and swings at once."""
     for obj in list(bpy.context.scene.objects):
         if obj.type == "MESH":
             bpy.data.objects.remove(obj)
@@ -148,7 +148,7 @@ def presets_have_pictures():
 
 
 def a_menu_under_the_mouse():
-    """A right click on hair offers what is done to hair."""
+    """The object menu under the mouse offers the commands for hair."""
     with in_view():
         before = driver.screenshot("no-menu")
         bpy.ops.wm.call_menu(name="HAIRLOOM_MT_object")
@@ -168,7 +168,7 @@ def a_menu_under_the_mouse():
 
 
 def a_key_of_ones_own():
-    """The shortcut that is suggested for Preview gets a key, and the key presses the button."""
+    """Preview's shortcut has no key by default; with a key of the user's it presses the button."""
     assert preview_key().type == "NONE", "Hairloom takes a key that nobody gave it"
     preview_key().type = "F19"
     count = len(live().sessions())
@@ -185,7 +185,8 @@ def a_key_of_ones_own():
 
 
 def preview_key():
-    """The item of the keymap, looked up anew: Blender makes other items when it merges keymaps."""
+    """The keymap item, looked up each time, since Blender recreates items when it merges
+    keymaps."""
     keymap = bpy.context.window_manager.keyconfigs.user.keymaps["3D View"]
     (item,) = (each for each in keymap.keymap_items if each.idname == "hairloom.preview")
     return item

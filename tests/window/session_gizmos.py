@@ -1,5 +1,5 @@
-"""Handles in the 3D view, dragged by the mouse: the wind's speed and direction, the size of a ball
-that hair collides with; each is one step of undo, and none is there where brushes are at work.
+"""Handles in the 3D view, dragged with the mouse: the wind's speed and direction, and the size of a
+colliding ball; each drag is one undo step, and no handle is shown in modes with brushes.
 """
 
 import math
@@ -29,9 +29,9 @@ from driver import of_hairloom
 
 log = traces.Log()
 STRANDS, LENGTH = 300, 0.1
-#: [m/s] of the wind, and how far a handle is dragged [pixels]
+#: speed of the wind [m/s], and the distance by which a handle is dragged [pixels]
 SPEED, DRAGGED = 6.0, 90
-#: [m] of the ball
+#: radius of the ball [m]
 RADIUS = 0.05
 
 
@@ -65,7 +65,7 @@ def groom():
 
 
 def groom_in_scene():
-    """Undo makes all objects again."""
+    """The groom's object, looked up again, since undo recreates all objects."""
     return next(obj for obj in bpy.data.objects if obj.type == "CURVES")
 
 
@@ -80,19 +80,19 @@ def ball():
 
 
 def on_screen(place):
-    """Where a place of the scene is in the window."""
+    """The pixel of the window that shows a place of the scene."""
     window = region("WINDOW")
     x, y = location_3d_to_region_2d(window, viewport().spaces.active.region_3d, place)
     return round(window.x + x), round(window.y + y)
 
 
 def is_blue(pixels):
-    """Where the overlay's lines and the handles of the wind are."""
+    """A mask of the overlay's lines and the handles of the wind."""
     return pixels[..., 2] - pixels[..., 0] > 0.3
 
 
 def drag(label, start, end):
-    """With the left button, as a hand does: not at once."""
+    """Drag with the left button, in several steps as a hand does."""
     window = bpy.context.window
     for x, y in [start] * 3:
         window.event_simulate("MOUSEMOVE", "NOTHING", x=x, y=y)
@@ -112,7 +112,7 @@ def drag(label, start, end):
 
 
 def the_winds_speed():
-    """By the arrow's head, which the mouse does not leave."""
+    """Dragged by the arrow's head, which stays under the mouse."""
     center, radius = ball()
     x, y = on_screen(center + Vector((2.0 * radius * SPEED / 10.0, 0.0, 0.0)))
     yield from drag("speed", (x, y), (x + DRAGGED, y))
@@ -126,7 +126,7 @@ def the_winds_speed():
 
 
 def the_winds_direction():
-    """By the ring around the hair, the front of which follows the mouse."""
+    """Dragged by the ring around the hair, whose front follows the mouse."""
     center, _ = ball()
     pixels = bpy.context.preferences.view.gizmo_size * of_hairloom("gizmos").RING
     aside = on_screen(center + Vector((0.01, 0.0, 0.0)))[0] - on_screen(center)[0]
@@ -143,7 +143,7 @@ def the_winds_direction():
 
 
 def a_balls_size():
-    """By the box at its border, though it is scaled."""
+    """Dragged by the box at its border, also for a scaled ball."""
     empty = bpy.data.objects.new("Ball", None)
     empty.empty_display_type, empty.empty_display_size = "SPHERE", RADIUS
     empty.location, empty.scale = (0.2, 0.0, 0.0), (2.0, 2.0, 2.0)
@@ -167,7 +167,7 @@ def a_balls_size():
 
 
 def not_under_a_brush():
-    """The arrow's head is not there to be seen, nor to be dragged."""
+    """In Sculpt Mode the arrow's head is neither shown nor draggable."""
     select(groom_in_scene())
     yield
     center, radius = ball()

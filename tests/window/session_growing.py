@@ -1,6 +1,5 @@
-"""Growing stays editable: a slider of the panel Grow is dragged and the hair follows while the
-button is down; Ctrl-Z puts both back; hair that was combed stays until Grow Again is pressed; a
-vertex group is chosen from a list.
+"""Growing stays editable: hair follows a slider of the panel Grow while it is dragged; Ctrl-Z
+restores both; combed hair stays until Grow Again is pressed; a vertex group is chosen from a list.
 """
 
 import sys
@@ -70,7 +69,7 @@ def groom():
 
 
 def drag_a_slider():
-    """The hair gets shorter while the button is down, in curves and preview."""
+    """The hair gets shorter while the button is down, as curves and in the preview."""
     long = yield from pixels_at_rest("long")
     (session,) = of_hairloom("previews").sessions()
     before = session.rig.strands
@@ -113,14 +112,14 @@ def combed_hair_stays():
     assert np.array_equal(points(), shape), "what was combed is lost"
     assert growing.losses(hair().data) == ("combed shape",)
     x, y = yield from field(viewport(), "UI", "grow.method")
-    yield from click(x, y + ROW)  # Grow Again stands above it
+    yield from click(x, y + ROW)  # Grow Again is above it
     yield from until(lambda: growing.losses(hair().data) == (), "Grow Again does nothing")
     yield
     driver.screenshot("grown-again")
 
 
 def a_group_from_a_list():
-    """A click opens the list; its one entry is chosen by arrow and Return."""
+    """A click opens the list; arrow key and Return choose its only entry."""
     x, y = yield from field(viewport(), "UI", "grow.density_group")
     yield from click(x, y)
     yield

@@ -1,6 +1,6 @@
-"""The pictures of docs/user_guide.md: every panel of ours, open, and the options of every file.
+"""The pictures of docs/user_guide.md: every open panel of ours, and the options of every file.
 
-They are left beside the screenshots, as guide_pictures-BACKEND-panel_NAME.png.
+They are saved beside the screenshots, as guide_pictures-BACKEND-panel_NAME.png.
 """
 
 import sys
@@ -30,17 +30,17 @@ from open_panels import (
 )
 
 EXPORTS = ("export_cards", "export_alembic", "export_usd", "export_tressfx", "export_hair")
-#: this many drawings in a row are the same when panels have slid to their places
+#: number of equal redraws in a row after which panels have slid to their places
 STILL = 6
-#: [pixels] how wide the Properties editor is
+#: [pixels] width of the Properties editor
 COLUMN = 340
-#: [m] away, where hair is drawn fast
+#: [m] distance at which hair is drawn fast
 FAR = 4.0
 #: [pixels] width and height of a picture of handles
 HANDLES = (380, 320)
-#: share of the window's height that is pictured
+#: fraction of the window's height in pictures
 USED = 0.8
-#: [pixels] Blender's own lines above an add-on's preferences; one names a folder of this machine
+#: [pixels] height of Blender's lines above an add-on's preferences, one with a local folder
 BLENDERS = 228
 
 
@@ -51,7 +51,7 @@ def steps():
     yield from nothing_yet()
     yield from the_sample_scene()
     keep("window", [as_far_as_used((yield from whole_screen("window")))])
-    bpy.ops.wm.read_homefile()  # panels that have been drawn stay closed
+    bpy.ops.wm.read_homefile()  # panels that were drawn before stay closed
     yield
     only_our_panels()
     yield from set_the_scene(distance=FAR)
@@ -76,7 +76,7 @@ def nothing_yet():
 
 
 def the_sample_scene():
-    """At rest, and the window as an artist has it, but without the lines of its lights."""
+    """The sample scene at rest in the default window, without the lines of its lights."""
     show([SIDEBAR])
     viewport().spaces.active.overlay.show_extras = False
     with bpy.context.temp_override(area=viewport(), region=region("WINDOW")):
@@ -87,7 +87,7 @@ def the_sample_scene():
 
 
 def set_the_scene(distance):
-    """Hair on a ball, seen from so far [m], and the window as an artist has it."""
+    """Hair on a ball, seen from this distance [m], in the default window."""
     show([SIDEBAR])
     yield from clear()
     bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1)
@@ -115,7 +115,7 @@ def panels_beside_it():
 
 
 def clear():
-    """No objects, and nothing behind the sidebar, which lets the view shine through."""
+    """Remove all objects, and overlays behind the transparent sidebar."""
     for obj in list(bpy.data.objects):
         bpy.data.objects.remove(obj)
     overlay = viewport().spaces.active.overlay
@@ -124,24 +124,24 @@ def clear():
 
 
 def is_drawn(hair, at_least=50):
-    """With its children: until they are made others stand in for them."""
+    """Whether hair is drawn with its children, after the placeholder of fewer strands."""
     drawn = of_hairloom("overlay").statistics_of(hair.session_uid)
     return drawn.strands >= at_least
 
 
 def as_far_as_used(screen):
-    """The window without the empty lower part of the Properties editor, and what is beside it."""
+    """The upper part of the window, without the empty part of the Properties editor."""
     window = bpy.context.window
     return screen[: int(USED * window.height), : window.width]
 
 
 def whole_screen(label):
-    """Once nothing slides any more."""
+    """The screen once no panel slides any more."""
     return (yield from at_rest(label, lambda: driver.screenshot(label), STILL))
 
 
 def picture(name, place):
-    """The columns of a picture, each with its panels open."""
+    """Take the columns of a picture, each with its open panels."""
     columns = []
     for number, names in enumerate(PICTURES[name]):
         full = [OURS + each for each in names]
@@ -159,8 +159,8 @@ def picture(name, place):
 
 
 def handles():
-    """What is dragged in the view: the wind that blows on the hair, and the size of a ball that it
-    collides with. Both are gone afterwards."""
+    """Take the picture of the view's handles: the wind, and the size of a colliding ball. Both are
+    removed afterwards."""
     hair, view = bpy.data.objects["Hair"], viewport().spaces.active.region_3d
     look_from_front(0.9)
     view.view_rotation = Euler((np.radians(60.0), 0.0, 0.0)).to_quaternion()
@@ -187,7 +187,7 @@ def handles():
 
 
 def around(place, screen):
-    """The part of the view that has this place of the scene in its middle."""
+    """The part of the view centred on this place of the scene."""
     view = region("WINDOW")
     x, y = location_3d_to_region_2d(view, view.data, place)
     left = int(view.x + x) - HANDLES[0] // 2
@@ -214,7 +214,7 @@ def the_sidebar():
     hair.data.surface = head
     bpy.ops.hairloom.preview()
     twins = [e.__name__ for e in ours() if e.__name__.removeprefix(OURS).startswith(TWINS)]
-    for name in twins:  # all is pictured in Properties > Data
+    for name in twins:  # their pictures are of Properties > Data
         show([name])
         yield from until(lambda name=name: name in drawn, f"{name} is not drawn")
         yield
@@ -247,7 +247,7 @@ def popups():
 
 
 def popup(name, operator, **settings):
-    """A popup is no region that scripts see: it is what has changed."""
+    """Take the picture of a popup, by what changes on screen: scripts cannot see its region."""
     view = region("WINDOW")
     x, y = view.x + view.width // 2, view.y + view.height // 2
     bpy.context.window.event_simulate("MOUSEMOVE", "NOTHING", x=x, y=y)
@@ -263,7 +263,7 @@ def popup(name, operator, **settings):
 
 
 def column():
-    """The Properties editor, in a column of its own that is as high as the viewport."""
+    """The Properties editor in its own column, as high as the viewport."""
     area = max((a for a in bpy.context.screen.areas if a.type == "PROPERTIES"), key=height)
     return area, next(each for each in area.regions if each.type == "WINDOW")
 
@@ -290,7 +290,7 @@ def of_hair():
 
 
 def tied_and_baked():
-    """Some hair goes through a ring, and a turn of the head is baked beside the file."""
+    """A ring holds some hair, and a turn of the head is baked beside the file."""
     hair, head = bpy.data.objects["Hair"], bpy.data.objects["Head"]
     bpy.context.scene.cursor.location = (0.0, 0.0, 0.16)
     choose(hair)
@@ -326,14 +326,15 @@ def of_the_engine():
 
 
 def at_the_tab():
-    """The tab in which the panels of the engine stand that are there."""
+    """The Properties editor at the tab of the shown panels of the engine."""
     area, window = column()
     area.spaces.active.context = "VIEW_LAYER" if f"{OURS}engine_passes" in there else "RENDER"
     return area, window
 
 
 def options_of_files():
-    """The right of the file browser, format by format; those of strands beside each other."""
+    """The options at the right of the file browser for each format; those of strands side by
+    side."""
     of_hairloom("previews").stop_all()
     pictures = {}
     for name in (*EXPORTS, "import_strands"):

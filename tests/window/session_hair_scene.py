@@ -1,4 +1,4 @@
-"""F12 by EEVEE with Hairloom's hair over it, in the thread of the render; undo and redo."""
+"""F12 in EEVEE with Hairloom's hair over it, in the render thread; undo and redo."""
 
 import sys
 from pathlib import Path
@@ -84,7 +84,7 @@ def hair_over_it(name="over"):
 
 
 def undo_and_redo():
-    """The hair scene comes and goes with its checkbox."""
+    """The hair scene is added and removed with its checkbox."""
     scene = bpy.context.scene
     bpy.ops.ed.undo_push(message="with")
     scene.hairloom.use_hair_scene = False

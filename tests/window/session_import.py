@@ -1,4 +1,4 @@
-"""Grooms of files in the window: the file browser of a menu entry, the popup of dropped files, Esc
+"""Import of grooms in the window: the file browser of a menu entry, the popup of dropped files, Esc
 while a file is read, undo and redo, and undo after a click."""
 
 import sys
@@ -40,7 +40,7 @@ def set_the_scene():
     of_hairloom("tressfx").write_tfx(FOLDER / "first.tfx", groom)
     of_hairloom("hair_file").write_hair_file(FOLDER / "second.hair", groom)
     with in_the_view():
-        bpy.ops.ed.undo_push(message="the scene")  # what a script changes is no step by itself
+        bpy.ops.ed.undo_push(message="the scene")  # a script's changes are no step by themselves
 
 
 def in_the_view():
@@ -74,7 +74,7 @@ def the_menu_opens_a_browser_for_its_format():
 
 
 def drop_files():
-    """What Blender does when files are dropped: it calls the operator with their names."""
+    """Call the operator with file names, as Blender does when files are dropped."""
     with in_the_view():
         assert bpy.types.HAIRLOOM_FH_strands.poll_drop(bpy.context)
         bpy.ops.hairloom.import_strands(
@@ -87,7 +87,7 @@ def drop_files():
 
 
 def esc_ends_the_process_that_reads():
-    """A process that never ends reads the second file; nothing of the first one stays either."""
+    """While an endless process reads the second file; nothing of the first file stays either."""
     module, number = of_hairloom("import_groom"), FOLDER / "number"
     real = module.read_strands
     script = f"echo $$ > '{number}'; exec sleep 600"
@@ -142,7 +142,7 @@ def undo_and_redo():
 
 
 def undo_after_a_click():
-    """What a click imports is one step, and a click after it another: keys take back one each."""
+    """An import by click is one undo step, and a later click another; keys undo one each."""
     yield from undo_by_keys()
     assert grooms() == {}
     bpy.context.preferences.view.filebrowser_display_type = "SCREEN"
@@ -164,7 +164,7 @@ def undo_after_a_click():
 
 
 def beside_the_head():
-    """A pixel of the view that shows nothing which could be selected."""
+    """A pixel of the view without anything to select."""
     view = next(each for each in viewport().regions if each.type == "WINDOW")
     return view.x + 3 * view.width // 4, view.y + view.height // 8
 

@@ -1,5 +1,5 @@
-"""Long jobs show themselves: a hairstyle is added, made real and grown again in the window. Each
-says in the panel what it makes, Esc takes all of it back, and one undo does.
+"""Progress of long jobs: a hairstyle is added, made real and grown again in the window. The panel
+shows each job's stage, Esc reverts all of it, and so does one undo.
 """
 
 import sys
@@ -27,7 +27,7 @@ from reading import box_of, read
 log = traces.Log()
 #: enough that growing takes a while
 STRANDS = 30_000
-#: [m] from which a head is a dot
+#: [m] distance at which a head is a dot
 FAR = 18.0
 #: faces along each side of a cloth that takes seconds to make
 FACES = 250
@@ -63,14 +63,14 @@ def objects():
 
 
 def begin(name, **settings):
-    """As a button of the panel does."""
+    """Start an operator as a button of the panel does."""
     with bpy.context.temp_override(area=viewport(), region=region("UI")):
         result = getattr(bpy.ops.hairloom, name)("INVOKE_DEFAULT", True, **settings)
     assert result == {"RUNNING_MODAL"}, f"{name}: {result}"
 
 
 def cancelled(at, label):
-    """By Esc, at a stage, which the panel shows."""
+    """Cancel with Esc at a stage that the panel shows."""
     yield from until(lambda: stage() == at, f"it is never {at}")
     yield 1
     if stage() == at:
@@ -117,7 +117,7 @@ def a_hairstyle():
 
 
 def beside_something_else():
-    """Where there is something else to see, the view is left alone."""
+    """If the view shows something else, it does not move."""
     bpy.ops.ed.undo()
     bpy.ops.mesh.primitive_cube_add(size=0.1)
     bpy.context.object.select_set(False)
@@ -181,7 +181,7 @@ def grown_again():
 
 
 def cloth_is_played():
-    """Play waits for cloth beside the window, and says so; Esc cancels that."""
+    """Play waits for cloth that is made in the background, and says so; Esc cancels it."""
     for obj in list(bpy.data.objects):
         bpy.data.objects.remove(obj)
     bpy.ops.mesh.primitive_grid_add(x_subdivisions=FACES, y_subdivisions=FACES, size=0.2)

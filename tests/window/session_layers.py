@@ -1,5 +1,5 @@
-"""Two view layers that both hold the hair, each in a window of its own: both show our strands and
-not Blender's, and hair that Blender plays swings in both."""
+"""Two view layers with the hair, each in its own window: both show our strands and not Blender's,
+and hair swings in both when Blender plays."""
 
 import sys
 from pathlib import Path
@@ -36,7 +36,8 @@ def steps():
 
 
 def two_view_layers_with_the_hair():
-    """One in each window: both show ours and not Blender's, whatever happens in either."""
+    """One view layer in each window: both show our strands and not Blender's, whatever happens in
+    either."""
     scene, (first, second) = bpy.context.scene, windows()
     mine, other = first.view_layer, scene.view_layers.new("Too")
     second.view_layer = other
@@ -66,7 +67,7 @@ def two_view_layers_with_the_hair():
 
 
 def ended_in_both(mine, other):
-    """Blender's own strands are back in each of them; then it is previewed again."""
+    """After the preview, both show Blender's own strands; then the preview starts again."""
     live().stop_all()
     yield
     assert not is_box(mine) and not is_box(other), "a box is left"
@@ -76,7 +77,7 @@ def ended_in_both(mine, other):
 
 
 def ours_alone(label, mine):
-    """What the second window shows of its view layer is what it shows of the first one's."""
+    """The second window shows the same with its own view layer and with the first one."""
     second = windows()[1]
     other = second.view_layer
     yield from until(lambda: is_box(mine) and is_box(other), f"{label}: {is_box(mine)}")
@@ -92,13 +93,13 @@ def ours_alone(label, mine):
 
 
 def is_box(layer):
-    """Whether Blender's own strands are out of the way in a view layer."""
+    """Whether Blender's own strands are hidden in a view layer."""
     depsgraph = layer.depsgraph  # None before a window has shown it
     return depsgraph and hair().evaluated_get(depsgraph).display_type == "WIRE"
 
 
 def played_in_both(head):
-    """Blender plays: the hair swings, though the other view layer is evaluated as well."""
+    """While Blender plays, the hair swings, although the other view layer is evaluated too."""
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = 1, 40
     for frame, x in ((1, 0.0), (20, 0.08), (40, 0.0)):
@@ -124,7 +125,7 @@ def played_in_both(head):
 
 
 def lag(session):
-    """How far the tips are from where the style would have them [m]."""
+    """Largest distance of tips from their places in the carried style [m]."""
     style = of_hairloom("motion_flow").carried(session.rig, session.solver.pose)
     tips = session.rig.strands.offsets[1:] - 1
     return float(np.abs(session.strands[tips] - style[tips]).max())

@@ -1,5 +1,5 @@
-"""Long work in the window: begun from a dialog and from the file browser, one at a time, cancelled
-by Esc, undone, repeated with other settings, and left by undo, by loading and by disabling."""
+"""Long work in the window: started from a dialog and from the file browser, one at a time,
+cancelled by Esc, undone, repeated with other settings, and ended by undo, loading and disabling."""
 
 import sys
 from pathlib import Path
@@ -24,9 +24,9 @@ from driver import of_hairloom, until
 
 FOLDER = Path(bpy.app.tempdir) / "long"
 SMALL = {"size": 64, "samples": 1}
-#: rays that take long, and such that do not
+#: numbers of rays that take long and that do not
 MANY, FEW = 4096, 64
-#: frames of a bake, whose joints take a while to fit
+#: frames of a bake, enough for the fit of joints to take a while
 MOVED = 60
 
 failures: list[str] = []
@@ -37,7 +37,7 @@ def running():
 
 
 def told():
-    """What the status bar says of it."""
+    """The work's text in the status bar."""
     work = of_hairloom("long_work")._running
     return "" if work is None else work.progress.text
 
@@ -82,7 +82,7 @@ def set_the_scene():
 
 
 def mixed_up(mesh):
-    """The same cards, their faces in an order that is wrong."""
+    """The same cards with shuffled faces."""
     bpy.context.view_layer.objects.active = bpy.data.objects["Hair Cards"]
     bpy.ops.object.mode_set(mode="EDIT")
     bpy.ops.mesh.select_all(action="SELECT")
@@ -115,7 +115,7 @@ def sort_by_dialog(rays):
 
 
 def from_a_dialog():
-    """Esc leaves the mesh as it was; the second time it comes to its end."""
+    """Esc leaves the mesh as it was; the second time the work runs to its end."""
     before = order()
     yield from sort_by_dialog(MANY)
     driver.screenshot("sorting")
@@ -138,14 +138,14 @@ def from_a_dialog():
 
 
 def repeated_at_once(repeat):
-    """Blender frees an operator that is repeated when it likes: it must not stay in the window."""
+    """A repeated operator must not run on in the window, since Blender can free it at any time."""
     with bpy.context.temp_override(area=viewport(), region=region("WINDOW")):
-        repeat("EXEC_DEFAULT", True)  # with an undo step, as a click has it
+        repeat("EXEC_DEFAULT", True)  # with an undo step, as for a click
     assert not running()
 
 
 def undone_in_mid_work():
-    """A script may undo what the work stands on."""
+    """A script can undo the data that the work uses."""
     after = order()
     yield from sort_by_dialog(MANY)
     bpy.ops.ed.undo()
@@ -166,7 +166,7 @@ def check():
 
 
 def into_a_popup():
-    """What was read is let go by Esc while it is read, and by Esc in the popup."""
+    """Data that was read is freed by Esc while it is read, and by Esc in the popup."""
     seen = of_hairloom("export_check").count
     check()
     yield from press("ESC")
@@ -204,7 +204,7 @@ def from_the_file_browser():
 
 
 def cards_in_motion():
-    """Esc while joints are fitted: what lies there stays as it was."""
+    """Esc while joints are fitted keeps existing files as they were."""
     hair, scene = bpy.data.objects["Hair"], bpy.context.scene
     head = bpy.data.objects["Head"]
     for frame, x in ((1, 0.0), (MOVED // 2, 0.1), (MOVED, -0.1)):

@@ -1,5 +1,5 @@
-"""The look on screen: hair shows a radiance as Blender itself shows it, in each shading mode and by
-each view transform; a scene without light; a slider that is refined; the panels of both models."""
+"""The look on screen: hair shows a radiance as Blender does, in each shading mode and with each
+view transform; a scene without light; a slider that is refined; the panels of both models."""
 
 import sys
 from dataclasses import replace
@@ -25,16 +25,16 @@ from artist import (
 )
 from driver import of_hairloom, until
 
-#: where Blender's own picture of a radiance is, and ours, for the hair's root and its tip
+#: places of Blender's picture of a radiance, and of ours, for the hair's root and tip
 PLANES = ((-0.25, 0.0, -0.12), (-0.25, 0.0, 0.12))
 HAIR = ((0.25, 0.0, -0.12), (0.25, 0.0, 0.12))
-#: light of the world, colour of the root, colour of the tip
+#: radiance of the world, colour of the root, colour of the tip
 LIT = ((0.5, (1.0, 0.4, 0.1), (0.04, 0.024, 0.012)), (2.0, (0.8, 0.45, 0.25), (0.09, 0.09, 0.09)))
-#: code values; what the table is off by, and the roundings of both to 8 bits
+#: [code values] for the error of the table, and rounding of both to 8 bits
 TOLERANCE = 2.0
 NO_LIGHT = 0.0
-#: of the viewport: shading, and whether the scene's lights and its world are used. A commit looks
-#: at the first four.
+#: shading of the viewport, and whether the scene's lights and its world are used. A commit tests
+#: the first four.
 MODES = (
     ("SOLID", True, True),
     ("RENDERED", True, False),
@@ -43,12 +43,12 @@ MODES = (
     ("RENDERED", False, True),
     ("MATERIAL", True, False),
 )
-#: what differs where a popup lies; how many of these it has at least, and how far inside of its
-#: corner the first picture is, in pixels
+#: difference of a popup's pixels, their minimum number, and distance [pixels] of the first picture
+#: from the popup's corner
 SEEN, POPUP_PIXELS, IN_CORNER = 8, 20_000, 40
-#: the brightest that the popup's own colour may be in any channel
+#: maximum of the popup's colour in any channel
 DARK = 36
-#: a picture of the look Dyed has more that is pink
+#: minimum number of pink pixels in a picture of the look Dyed
 PINK_PIXELS = 20
 
 
@@ -62,7 +62,7 @@ def shading():
 
 
 def color_at(picture, place, reach=6):
-    """What the screen shows of a place in the scene, in code values 0 to 255."""
+    """The screen's colour at a place in the scene, in code values 0 to 255."""
     view = region("WINDOW")
     x, y = location_3d_to_region_2d(view, viewport().spaces.active.region_3d, Vector(place))
     x, y = int(x) + view.x, int(y) + view.y
@@ -72,7 +72,8 @@ def color_at(picture, place, reach=6):
 
 
 def apart(label):
-    """How far what ours is at the hair is from what Blender shows at the planes; the latter."""
+    """The largest difference between hair and planes, Blender's colours of the planes, and those of
+    the hair."""
     picture = driver.screenshot(label)
     theirs = np.array([color_at(picture, place) for place in PLANES])
     ours = np.array([color_at(picture, place) for place in HAIR])
@@ -82,8 +83,8 @@ def apart(label):
 
 
 def agree(label, tolerance=TOLERANCE):
-    """Both show the same, and what Blender saves of these radiances, as soon as EEVEE has compiled
-    and drawn what it was asked for."""
+    """Wait, while EEVEE compiles and draws, until hair and planes show the same colours, which are
+    also those that Blender saves for these radiances."""
     yield
     shown = []
 
@@ -97,7 +98,7 @@ def agree(label, tolerance=TOLERANCE):
 
 
 def saved():
-    """Code values of the planes' radiances in a picture that Blender saves, by this view's mode."""
+    """Code values of the planes' radiances in a picture saved by Blender, for this view's mode."""
     transform = of_hairloom("view_transform")
     view, gain, gamma = transform.view_of(shading(), bpy.context.scene)
     nodes = [material.node_tree.nodes["Emission"] for material in bpy.data.materials]
@@ -120,7 +121,8 @@ def steps():
 
 
 def set_the_scene():
-    """Planes that send out a radiance, and a ribbon of hair that the world lights as strongly."""
+    """Planes that emit a radiance, and a ribbon of hair that has the same radiance in the world's
+    light."""
     bpy.data.batch_remove([*bpy.data.objects, *bpy.data.materials])
     for place in PLANES:
         bpy.ops.mesh.primitive_plane_add(size=0.2, location=place, rotation=(np.pi / 2.0, 0.0, 0.0))
@@ -133,7 +135,7 @@ def set_the_scene():
         bpy.context.object.data.materials.append(material)
         bpy.context.object.select_set(False)
     scene = bpy.context.scene
-    scene.render.preview_pixel_size, scene.eevee.taa_samples = "8", 1  # no more than is looked at
+    scene.render.preview_pixel_size, scene.eevee.taa_samples = "8", 1  # no more than is needed
     curves = bpy.data.hair_curves.new("Hair")
     curves.add_curves([2])
     curves.position_data.foreach_set("vector", np.float32([0.25, 0, -0.2, 0.25, 0, 0.2]))
@@ -159,7 +161,7 @@ def set_the_scene():
 
 
 def shine(world, *colors):
-    """The world's light on hair of these colours, and the same radiances from the planes."""
+    """Set the world's radiance and the hair's colours, and the same radiances for the planes."""
     look = bpy.data.objects["Hair"].data.hairloom.shading
     look.base_color, look.tip_color = colors
     for material, color in zip(bpy.data.materials, colors, strict=True):
@@ -187,7 +189,7 @@ def radiance_by_view_transforms():
 
 
 def every_mode_has_its_transform():
-    """The light that reaches the hair is fixed here, so that modes with another light compare."""
+    """The light on hair is fixed here, so that modes with other lights are comparable."""
     overlay, view, scene = of_hairloom("overlay"), shading(), bpy.context.scene
     lit, settings, (world, color, _) = overlay.lit, scene.view_settings, LIT[0]
     overlay.lit = lambda snapshot, *_: replace(snapshot, lights=(), ambient=(world,) * 3)
@@ -215,7 +217,7 @@ def every_mode_has_its_transform():
 
 
 def a_scene_without_light():
-    """Hair is lit by a studio then, and the artist is told; a light that comes takes over."""
+    """Then studio lights are used and the artist is informed; an added light replaces them."""
     shading().type = "RENDERED"
     shine(NO_LIGHT, *LIT[1][1:])
     yield
@@ -254,7 +256,7 @@ def a_slider_is_refined():
 
 
 def own_presets():
-    """Saved where Blender keeps what belongs to the extension, shown with a picture, deleted."""
+    """Saved in the extension's user folder, shown with a picture, deleted."""
     presets = of_hairloom("presets")
     folder = presets.own_folder()
     assert "extensions" in folder.parts and presets.own("shading") == ((), ())
@@ -276,7 +278,7 @@ def own_presets():
 
 
 def the_panels_of_both_models():
-    """Properties > Data with every section of Look open; only what acts is there."""
+    """Properties > Data with every section of Look open shows only effective settings."""
     hair = bpy.data.objects["Hair"]
     bpy.context.view_layer.objects.active = hair
     hair.select_set(True)
@@ -313,8 +315,8 @@ def the_panels_of_both_models():
 
 
 def a_picture_is_a_button(hair):
-    """A click on the picture of the hair's preset shows all, a click on one of these applies it,
-    and one undo takes it back."""
+    """A click on the picture of the hair's preset shows all pictures, a click on one applies it,
+    and one undo restores the look."""
     presets = of_hairloom("presets")
     bpy.ops.hairloom.apply_preset("EXEC_DEFAULT", True, name="looks/dyed")
     yield from until(lambda: _pink(driver.screenshot("picture")), "no picture of the look")
@@ -334,7 +336,7 @@ def a_picture_is_a_button(hair):
 
 
 def _steady(look, message):
-    """What is seen, once it is the same in two drawings one after the other."""
+    """The result of `look`, once it is the same in two successive redraws."""
     last = None
 
     def is_steady():
@@ -347,8 +349,8 @@ def _steady(look, message):
 
 
 def _pink(screen):
-    """The middle of the hair in the picture of the look Dyed, the only thing that is pink there;
-    None before Blender has read that picture."""
+    """The middle of the hair in the picture of the look Dyed, the only pink thing on screen; None
+    before Blender has loaded that picture."""
     red, green, blue = np.moveaxis(screen[:, : screen.shape[1] // 4].astype(int), 2, 0)
     rows, columns = np.nonzero((red > green + 60) & (blue > green + 20))
     if len(rows) < PINK_PIXELS:
@@ -357,9 +359,9 @@ def _pink(screen):
 
 
 def _changed_corner(before):
-    """A pixel in the picture at the lower left of the popup that has come; None before it comes.
+    """A pixel in the lower left picture of the popup; None before it opens.
 
-    The popup is darker than all else. It opens above the button or below it, as there is room.
+    The popup is darker than everything else. It opens above or below the button.
     """
     now = driver.screenshot("pictures").astype(int)
     is_popup = (np.abs(now - before).max(axis=2) > SEEN) & (now.max(axis=2) < DARK)

@@ -1,5 +1,5 @@
-"""What cuts Play short: another file, a deleted object, a disabled extension; a slider dragged with
-the mouse while hair plays; and Ctrl-Z and Ctrl-Shift-Z at each step of the quick start.
+"""Interruptions of Play: another file, a deleted object, a disabled extension; a slider dragged
+while hair plays; and Ctrl-Z and Ctrl-Shift-Z at each step of the quick start.
 """
 
 import sys
@@ -29,7 +29,7 @@ from open_panels import open_from_the_start
 
 log = traces.Log()
 STRANDS = 300
-#: pixels that the mouse drags a slider
+#: [pixels] by which the mouse drags a slider
 DRAGGED = 45
 
 
@@ -54,13 +54,13 @@ def steps():
         yield from ended(delete.__name__)
     yield from disabled_and_enabled()
     addon_utils.disable(driver.EXTENSION, default_set=True)
-    # a thread that makes a collider comes to its end
+    # a thread that makes a collider has to end first
     yield from until(lambda: traces.of_blender() == before, "something of ours is left")
     nothing_raised("disabling")
 
 
 def playing_hair():
-    """In a fresh file: hair on a ball, which swings."""
+    """Swinging hair on a ball, in a new file."""
     bpy.ops.wm.read_homefile(use_factory_startup=False)
     yield
     new_ball()
@@ -97,7 +97,7 @@ def moves(where):
 
 
 def ended(where):
-    """Nothing plays, ticks, draws, is on the GPU or has raised."""
+    """Assert that nothing plays, ticks, draws, is on the GPU or has raised."""
     yield from until(lambda: not any(traces.of_previews().values()), f"{where}: something goes on")
     pending = driver.timers.pending
     yield from until(lambda: not pending(), lambda: f"{where}: {pending()}")
@@ -109,7 +109,7 @@ def nothing_raised(where):
 
 
 def undo_and_redo_each_step():
-    """Grow, change, preset, cards, move, delete: back to nothing by keys, and forth again."""
+    """Grow, change, preset, cards, move, delete: all undone by keys, and redone."""
     bpy.ops.wm.read_homefile(use_factory_startup=False)
     yield
     new_ball()
@@ -138,7 +138,7 @@ def by_keys(states, shift):
 
 
 def state():
-    """What the quick start makes of a file."""
+    """The file's content that the quick start changes."""
     found = {}
     for obj in sorted(bpy.context.scene.objects, key=lambda obj: obj.name):
         found[obj.name] = tuple(round(x, 4) for x in obj.location)
@@ -192,7 +192,7 @@ def delete_all():
 
 
 def a_slider_is_dragged():
-    """The mouse drags a field of our panel while hair swings: both go on; Ctrl-Z takes it back."""
+    """The mouse drags a field of our panel while hair swings on; Ctrl-Z restores the value."""
     open_from_the_start("HAIRLOOM_PT_sidebar_dynamics")
     yield from playing_hair()
     look_from_front(0.45)
@@ -248,7 +248,7 @@ def another_file(folder):
 
 
 def delete_hair():
-    """By a script: the artist is told why it no longer plays."""
+    """A script deletes the hair: a notice says why it no longer plays."""
     name = hair().name
     bpy.data.objects.remove(hair())
     yield from until(lambda: live().notice() != "", "no notice")
@@ -257,7 +257,7 @@ def delete_hair():
 
 
 def delete_head():
-    """Hair without a head is told of; it may be previewed, and ends with its own object."""
+    """Hair without a head can still be previewed; the preview ends with the hair's object."""
     bpy.data.objects.remove(bpy.data.objects["Ball"])
     yield
     nothing_raised("without a head")
@@ -274,7 +274,7 @@ def delete_by_key():
 
 
 def undo_its_making():
-    """The artist knows what Ctrl-Z takes away: no notice."""
+    """If Ctrl-Z removes the hair, there is no notice."""
     yield from press_in_view("Z", ctrl=True)
     yield from until(lambda: not live().sessions(), "the preview outlives its hair")
     assert live().notice() == ""
@@ -282,7 +282,8 @@ def undo_its_making():
 
 
 def disabled_and_enabled():
-    """In mid-play: nothing goes on, the settings are kept, and it plays again."""
+    """Disabled while hair plays: everything ends, settings are kept, and it plays again after
+    enabling."""
     yield from playing_hair()
     hair().hairloom.dynamics.gusts = 0.625
     addon_utils.disable(driver.EXTENSION, default_set=True)

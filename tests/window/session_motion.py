@@ -56,7 +56,8 @@ def set_the_scene():
 
 
 def play_keeps_the_scenes_rate():
-    """What is simulated is no more than passes, in whole frames; on slow machines it is less."""
+    """Simulated time does not exceed real time and is in whole frames; slow machines simulate
+    less."""
     rate, durations = 24.0, []
     yield from click(*sidebar_button("hairloom.play"))
     yield from until(lambda: session().is_playing, "the Play button did nothing")
@@ -97,7 +98,7 @@ def pause_resume_and_reset():
 
 
 def playback_takes_over():
-    """Space while hair plays: from now on each frame of the animation moves it."""
+    """Space while hair plays: from then on each frame of Blender's animation moves it."""
     live = of_hairloom("previews")
     head, scene = bpy.data.objects["Head"], bpy.context.scene
     scene.frame_start, scene.frame_end = 1, LAST
@@ -169,7 +170,7 @@ def escape_cancels_a_bake():
 
 
 def a_render_beside_the_window():
-    """F12 renders in a thread of its own, the window goes on."""
+    """F12 renders in its own thread while the window goes on."""
     scene, hair = bpy.context.scene, bpy.data.objects["Hair"]
     assert scene.render.use_lock_interface and hair.hide_render
     camera = bpy.data.objects.new("Eye", bpy.data.cameras.new("Eye"))

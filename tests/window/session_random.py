@@ -1,6 +1,6 @@
-"""Random actions from five seeds: nothing raises, nothing crashes, nothing is left behind.
+"""Random actions from five seeds: no exception, no crash, and nothing is left behind.
 
-Each action is printed before it is done, so that the log of a crash ends with its cause. A seed
+Each action is printed before it runs, so that the log of a crash ends with its cause. A seed
 gives the same actions on every backend: HAIRLOOM_SEEDS="3" HAIRLOOM_ACTIONS="120" plays the first
 120 of seed 3 again.
 """
@@ -27,9 +27,9 @@ from driver import until
 SEEDS = [int(seed) for seed in os.environ.get("HAIRLOOM_SEEDS", "1 2 3 4 5").split()]
 ACTIONS = actions_in(random_hairloom, random_blender)
 ACTION_COUNT = int(os.environ.get("HAIRLOOM_ACTIONS", "80"))
-#: seldom an action is followed by a redraw, so that several meet in one
+#: fraction of actions that are followed by a redraw, so that several are combined in one
 REDRAWN = 0.3
-#: a part of a tick: Blender redraws, and goes on
+#: part of a tick, in which Blender redraws
 BRIEFLY = 0.1
 RAISED = ("Traceback (most recent call last)", "Error: Python:", "SystemError")
 
@@ -51,7 +51,7 @@ def steps():
             bpy.ops.wm.read_homefile(use_factory_startup=False)
             yield from until(lambda: is_at_rest(enabled), f"seed {seed}: something is left")
     addon_utils.disable(driver.EXTENSION, default_set=True)
-    # a thread that makes a collider comes to its end
+    # a thread that makes a collider has to end first
     yield from until(lambda: traces.of_blender() == before, "something of ours is left")
     assert driver.timers.pending() == []
     assert "Traceback" not in log.added(), "disabling raised"
@@ -76,14 +76,14 @@ def play(seed, folder):
 
 
 def act(dice, number):
-    """One action; whether it was refused."""
+    """Perform one action; whether it was refused."""
     action, is_refused = dice.action(ACTIONS), False
     print(f"{number} {action.__name__} at {time.process_time():.1f} s", flush=True)
     try:
         doing = action(dice)
         if isgenerator(doing):
             yield from doing
-    except RuntimeError as error:  # so Blender hands on what an operator reports
+    except RuntimeError as error:  # Blender raises it for an operator's report
         assert "Traceback" not in str(error), error
         is_refused = True
     if dice.often(REDRAWN):
@@ -94,7 +94,7 @@ def act(dice, number):
 
 
 def shrink_the_view():
-    """Drawing takes most of the time here."""
+    """A small view, since drawing takes most of the time."""
     area = next(a for a in bpy.context.window.screen.areas if a.type == "VIEW_3D")
     for direction, part in (("VERTICAL", 0.4), ("HORIZONTAL", 0.4)):
         with bpy.context.temp_override(area=area):
@@ -107,7 +107,7 @@ def shrink_the_view():
 
 
 def is_at_rest(enabled):
-    """Whether an empty file has ended all that went on."""
+    """Whether loading an empty file has ended all activity."""
     is_idle = not any(traces.of_previews().values()) and driver.timers.pending() == []
     return is_idle and traces.of_blender() == enabled
 

@@ -1,4 +1,4 @@
-"""Refinement on screen: children, the debug views, counts, what the head hides, far and near."""
+"""Refinement on screen: children, the debug views, counts, hidden strands, far and near."""
 
 import sys
 from pathlib import Path
@@ -33,7 +33,7 @@ def session():
 
 
 def statistics():
-    """Of the last draw in the viewport."""
+    """Statistics of the last draw in the viewport."""
     return of_hairloom("overlay").statistics_of(session().uid)
 
 
@@ -50,12 +50,12 @@ def hair():
 
 
 def corner(picture):
-    """Where the counts stand."""
+    """The corner with the counts."""
     return picture[-50:, :700]
 
 
 def saturation(picture):
-    """Share of the pixels that are strongly coloured, as debug views are and hair is not."""
+    """The fraction of strongly coloured pixels, as in debug views, unlike hair."""
     return float((np.ptp(picture, axis=2) > 0.4).mean())
 
 
@@ -77,7 +77,7 @@ def set_the_scene():
     bpy.ops.object.shade_smooth()
     bpy.ops.hairloom.grow(method="normals", lift=1.0, strand_count=GUIDES, length=0.08)
     bpy.context.object.name = "Hair"
-    hair().data.hairloom.strands.fullness = 3.0  # so few strands that pictures hardly show them
+    hair().data.hairloom.strands.fullness = 3.0  # few strands would hardly be visible otherwise
     overlays = viewport().spaces.active.overlay
     overlays.show_floor = overlays.show_cursor = overlays.show_object_origins = False
     look_from_front(0.7)
@@ -95,7 +95,7 @@ def children_appear():
 
 
 def strands_come(count):
-    """Once edits have settled."""
+    """Wait for this number of strands after edits."""
     yield from until(lambda: session().rig.strands.strand_count == count, f"not {count} strands")
 
 
@@ -202,7 +202,7 @@ def sliders_while_it_plays():
 
 
 def two_grooms():
-    """Counts of both stand one above the other."""
+    """The counts of both are shown one above the other."""
     twin = bpy.data.objects.new("Twin", hair().data)
     bpy.context.collection.objects.link(twin)
     twin.hairloom.show_counts = True

@@ -1,5 +1,5 @@
-"""Selected hair under the preview: no box around it, none of Blender's strands, and around the hair
-the orange outline that Blender draws around its own; alike in Solid, X-Ray and Wireframe.
+"""Selected hair under the preview: no box, none of Blender's strands, and the orange outline that
+Blender draws around its own hair; alike in Solid, X-Ray and Wireframe.
 """
 
 import sys
@@ -55,7 +55,7 @@ def choose(is_chosen):
 
 
 def outline(label):
-    """Where the orange of what is selected is drawn."""
+    """A mask of the orange outline of the selection."""
     choose(True)
     selected = yield from pixels_at_rest(f"{label}-selected")
     choose(False)
@@ -82,7 +82,7 @@ def selection_is_shown():
 
 
 def near(mask, reach=2):
-    """Also what is this many pixels beside it."""
+    """The mask, grown by this many pixels."""
     found = mask.copy()
     for axis in (0, 1):
         for step in range(1, reach + 1):
@@ -91,7 +91,8 @@ def near(mask, reach=2):
 
 
 def nothing_is_left_without_selection():
-    """With our own strands not drawn, the view is that of hidden hair: no strand and no line."""
+    """Without our strands, the view equals that of hidden hair, without strands or lines of
+    Blender's."""
     hair, space = bpy.data.objects["Hair"], viewport().spaces.active
     drawn = of_hairloom("overlay")._overlay.drawn
     kept = dict(drawn)

@@ -1,4 +1,4 @@
-"""Shadows on screen: hair in a studio's light with and without them, and while it plays."""
+"""Shadows on screen: hair in studio light with and without shadows, and while it plays."""
 
 import sys
 from pathlib import Path
@@ -56,8 +56,8 @@ def has_drawn():
 
 
 def shadows_appear():
-    """They are there from the start. The side that faces away is darker with them; each form is
-    drawn without a failure.
+    """Shadows are on by default and darken the side away from the light; each form is drawn without
+    an error.
     """
     assert volume().shadows == "deep"
     shaded = yield from pixels_at_rest("shadows_at_first")

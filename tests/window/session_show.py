@@ -1,4 +1,4 @@
-"""Showing a groom to others: a turntable that goes on in the window, one that Esc ends, a sheet."""
+"""Pictures of a groom for others: a turntable in the window, one that Esc ends, a sheet."""
 
 import sys
 from pathlib import Path
@@ -41,7 +41,7 @@ def turntable(**options):
 
 
 def a_whole_turn():
-    """Pictures and a video, while the window stays alive."""
+    """Pictures and a video, while the window stays responsive."""
     turntable(frames=FRAMES)
     yield from until(lambda: not running(), "the turntable does not end")
     names = sorted(path.name for path in FOLDER.iterdir())
@@ -53,10 +53,10 @@ def a_whole_turn():
 
 
 def a_cancelled_one():
-    """Esc ends it between two pictures; those of the turn before stay as they are."""
+    """Esc ends it between two pictures; those of the turntable before stay as they are."""
     before = {path.name: path.stat().st_mtime_ns for path in FOLDER.iterdir()}
     turntable(frames=2000)
-    third = ".Hair_0001.hl-*/*_0003.png"  # where they wait for the last one
+    third = ".Hair_0001.hl-*/*_0003.png"  # the folder until the last one is there
     yield from until(lambda: any(FOLDER.glob(third)), "no picture is drawn")
     assert running() == "Turntable"
     driver.screenshot("turning")

@@ -1,4 +1,5 @@
-"""Soft shadows of a view at rest: they come, go at once with any change, and cost nothing after."""
+"""Soft shadows of a view at rest: they appear, disappear at once with any change, and cost nothing
+afterwards."""
 
 import sys
 from pathlib import Path
@@ -21,7 +22,7 @@ from artist import (
 from driver import of_hairloom, until
 
 SAMPLES = 12
-#: share of a view's pixels by which Blender's own redraw differs
+#: fraction of a view's pixels by which Blender's own redraws differ
 SAME = 0.002
 #: how often strands were drawn, and how often as a sample of soft shadows
 counted = {"drawn": 0, "samples": 0}
@@ -53,7 +54,7 @@ def count_draws():
 
 
 def set_the_scene():
-    """A fringe above a ball, under a wide sun, in a view that is drawn in the scene's light."""
+    """A fringe above a ball, under a wide sun, in a view with the scene's lights."""
     bpy.context.scene.render.engine = "BLENDER_WORKBENCH"
     _, _, sun = new_fringe(2000)
     sun.data.angle = np.radians(20.0)
@@ -81,7 +82,7 @@ def held():
 
 
 def hard_is_what_it_was():
-    """Where no GPU draws, and with one sample where one does: the same pixels."""
+    """Without a GPU, and with one sample on a GPU, the pixels are the same."""
     picture().viewport_samples = SAMPLES
     before = yield from pixels_at_rest("no-gpu")
     of_hairloom("softening").is_software = lambda: False
@@ -97,19 +98,19 @@ def shadows_become_soft(hard):
     soft = yield from pixels_at_rest("soft")
     assert counted["samples"] >= SAMPLES
     assert changed(hard, soft, 0.05) > 0.003, changed(hard, soft, 0.05)
-    # as bright, and with smaller steps from pixel to pixel below the fringe
+    # the same brightness
     assert abs(hard.mean() - soft.mean()) < 0.01
     return soft
 
 
 def nothing_more_is_drawn(soft):
-    """However often the view is shown, but for a sample after each row of redraws, which tells
-    whether what is there is right.
+    """Nothing is drawn, however often the view is shown, except for one sample after each series of
+    redraws, which checks whether the picture is still right.
     """
     before = dict(counted)
     again = yield from pixels_at_rest("soft-again")
     assert changed(soft, again, 0.0) == 0.0
-    # on a slow machine each of these redraws is a row of its own
+    # on a slow machine each of these redraws is its own series
     assert all(each.is_soft and each.has_all for each in views())
     shown = counted["samples"]
     for _ in range(60):
@@ -118,7 +119,8 @@ def nothing_more_is_drawn(soft):
 
 
 def what_changes_is_hard_at_once(soft):
-    """And soft again where nothing is as it was, with the same pixels where all is."""
+    """After a change shadows are hard, then soft again; with the change undone, the pixels are the
+    same."""
     region, sun = viewport().spaces.active.region_3d, bpy.data.objects["Sun"]
     hair = bpy.data.objects["Hair"].data.hairloom
 
@@ -147,8 +149,8 @@ def what_changes_is_hard_at_once(soft):
 
 
 def one_sample_tells_whether_all_is_right(soft):
-    """What an engine draws later before hair: here a view that is told to look again, and then one
-    that had more hair before.
+    """An engine may draw something before the hair later. Simulated with a view that is asked to
+    check again, and with one that had more hair before.
     """
     drawn = counted["drawn"]
     for fragments, least in ((None, 1), ((1 << 30,), SAMPLES)):

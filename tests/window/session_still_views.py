@@ -1,4 +1,4 @@
-"""Views in which nothing changes show what they have drawn; whatever changes is seen at once."""
+"""Views without changes show their last picture again; any change is visible at once."""
 
 import sys
 import time
@@ -13,9 +13,9 @@ from artist import changed, look_from_front, new_head, pixels_at_rest, press, vi
 from driver import of_hairloom, until
 from gpu_calls import gpu_calls
 
-#: share of a view's pixels by which Blender's own redraw differs
+#: fraction of a view's pixels by which Blender's own redraws differ
 SAME = 0.002
-#: how often strands were drawn, and a picture was shown again
+#: how often strands were drawn, and how often a picture was shown again
 counted = {"drawn": 0, "again": 0}
 
 
@@ -71,7 +71,7 @@ def nothing_is_drawn_twice(label):
 
 
 def what_is_in_the_way_is_seen():
-    """The head goes, and comes back."""
+    """Objects before the hair hide it: a ball, and the head, which is hidden and shown again."""
     before = yield from a_ball_comes_and_goes("solid")
     for hidden in (True, False):
         bpy.data.objects["Head"].hide_set(hidden)
@@ -80,7 +80,7 @@ def what_is_in_the_way_is_seen():
 
 
 def a_ball_comes_and_goes(label):
-    """Before the hair; what the view was before is given back."""
+    """A ball before the hair is added and removed; returns the view before."""
     before = yield from pixels_at_rest(f"{label}-nothing-in-the-way")
     ball = bpy.data.objects.new("Ball", bpy.data.objects["Head"].data)
     bpy.context.scene.collection.objects.link(ball)
@@ -120,7 +120,7 @@ def after_an_orbit_shadows_are_exact():
 
 
 def what_moves_waits_for_nothing():
-    """Frames of an orbit, then of playback while hair is simulated: what each draw reads back."""
+    """In frames of an orbit, and of playback with simulation, draws read nothing back."""
     strands, reads, space = of_hairloom("strand_pass").StrandPass, [], viewport().spaces.active
     draw = strands.draw
 
@@ -146,7 +146,7 @@ def what_moves_waits_for_nothing():
 
 
 def drawn_afresh(label, *, with_maps=False):
-    """The view as it is without anything that was kept."""
+    """The view without any cached picture."""
     views = of_hairloom("views")
     for view in views._known.views.values():
         view.picture.forget()
@@ -157,10 +157,10 @@ def drawn_afresh(label, *, with_maps=False):
 
 
 def it_comes_to_rest():
-    """An engine redraws a view for its samples: hair is drawn once more after them, and no more."""
+    """An engine redraws a view for its samples; afterwards hair is drawn once more, then never."""
 
     def rests():
-        """Whether hair is drawn no more for 60 ticks; at once False where it is."""
+        """Whether hair is not drawn for 60 ticks; False as soon as it is drawn."""
         drawn = counted["drawn"]
         for _ in range(60):
             yield 1

@@ -1,4 +1,4 @@
-"""Strands out in the window: options and check in the file browser, motion in steps, Esc."""
+"""Export of strands in the window: options and check in the file browser, motion in steps, Esc."""
 
 import sys
 from pathlib import Path
@@ -107,7 +107,7 @@ def escape_leaves_the_old_file():
 
 
 def the_check_alone():
-    """By its button, one of the lowest; those below it may open popups of their own."""
+    """Click the check's button, one of the lowest; buttons below it may open their own popups."""
     check, sidebar = of_hairloom("export_check"), region("UI")
     for y in range(sidebar.y + 6, sidebar.y + sidebar.height, 12):
         yield from click(sidebar.x + sidebar.width // 2, y)

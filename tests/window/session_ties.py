@@ -1,5 +1,5 @@
-"""A ponytail as an artist makes one: Add Hair Tie in the panel, Play, the ring moved by hand while
-hair swings, deleted in mid-play, and brought back by Ctrl-Z.
+"""A ponytail made as artists do: Add Hair Tie in the panel, Play, the ring moved by hand while hair
+swings, deleted while hair plays, and restored by Ctrl-Z.
 """
 
 import sys
@@ -33,11 +33,11 @@ from open_panels import OURS, SIDEBAR, only_our_panels, show
 
 log = traces.Log()
 STRANDS, LENGTH = 400, 0.15
-#: from the field of the ties' collection to the button below it, in pixels at UI scale 1
+#: [pixels at UI scale 1] from the field of the ties' collection to the button below it
 BELOW = 22
-#: pixels that the mouse drags the ring upwards, where hair that hangs reaches it
+#: [pixels] by which the mouse drags the ring upwards, where hanging hair reaches it
 DRAGGED = 30
-#: [m] what is held is as far from the middle of the ring as at rest, but for this
+#: [m] tolerance of the distance between held points and the ring's centre
 SLACK = 0.004
 
 
@@ -70,7 +70,7 @@ def groom():
 
 
 def add_a_tie(hair):
-    """At the 3D cursor, which the artist has put where hair passes, by the button in the panel."""
+    """With the panel's button, at the 3D cursor, which is placed where hair passes."""
     cursor = bpy.context.scene.cursor
     cursor.location, along = thickest(hair)
     cursor.rotation_euler = Vector(along).to_track_quat("Y", "Z").to_euler()
@@ -88,7 +88,7 @@ def add_a_tie(hair):
 
 
 def thickest(hair):
-    """Where most strands are near each other at two thirds of their way, and which way they go."""
+    """The place with the most strands, at two thirds of their length, and their direction there."""
     grid = np.array([point.position for point in hair.data.points])
     grid = grid.reshape(len(hair.data.curves), -1, 3)
     place = 2 * grid.shape[1] // 3
@@ -108,7 +108,7 @@ def session():
 
 
 def holds():
-    """Where strands are held in what is shown; None: nowhere."""
+    """The holds of the shown strands, or None."""
     found = session().rig.holds
     found = None if found is None else found.where(session().solver.pose.anchors)
     return None if found is None or not len(found.strand) else found
@@ -121,7 +121,7 @@ def held_points():
 
 
 def farthest(ring):
-    """How far a held strand is from the middle of the ring, at most [m]."""
+    """The largest distance of a held point from the ring's centre [m]."""
     middle = np.array(ring.matrix_world.translation)
     return np.linalg.norm(held_points() - middle, axis=1).max()
 
@@ -148,7 +148,7 @@ def moves():
 
 
 def move(ring):
-    """By G and the mouse, while hair plays: the hair comes along in it."""
+    """With G and the mouse while hair plays: the hair moves along in the ring."""
     at_rest, before, shot = farthest(ring), ring.matrix_world.translation.copy(), pixels("tied")
     select(ring)
     window, area = bpy.context.window, viewport()
@@ -169,7 +169,7 @@ def move(ring):
 
 
 def delete(ring):
-    """By its key: the hair is let go and plays on, and a message names the ring."""
+    """With the Delete key: the hair is released and plays on, and a message names the ring."""
     name = ring.name
     before = held_points()
     select(ring)

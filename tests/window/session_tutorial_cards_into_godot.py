@@ -1,5 +1,5 @@
-"""The tutorial *Cards into Godot*, as far as it goes in Blender, played by mouse and keys; what is
-exported is drawn in Godot by tests/engines.
+"""Blender's part of the tutorial *Cards into Godot*, played with mouse and keys; tests/engines
+draws such an export in Godot.
 """
 
 import sys
@@ -45,7 +45,7 @@ def live():
 
 
 def some_hair():
-    """By the first step of the first tutorial."""
+    """Add hair by the first step of the first tutorial."""
     page.step(1)
     page.says("first hair")
     yield from key("A", *in_view())

@@ -31,14 +31,14 @@ from tutorials import (
 )
 
 log, page = traces.Log(), Page("comb_and_play")
-#: frames that are baked: each is drawn on the processor
+#: frames to bake, few since the CPU draws each
 LAST = 4
-#: [m] by which the parting is moved, as one types it; [pixels] from a name in the Outliner to the
+#: typed distance [m] by which the parting is moved; [pixels] from a name in the Outliner to the
 #: triangle that opens it
 ASIDE, TRIANGLE = "0.006", 28
-#: [pixels] of the hair's height below which few of its strands are drawn, and their share
+#: hair's height [pixels] below which few of its strands are drawn, and their fraction
 FAR, SPARSE = 10_000.0, 0.1
-#: [pixels] that the brush and the wind's slider are dragged
+#: [pixels] by which the brush and the wind's slider are dragged
 COMBED, SLID = 60, 30
 
 
@@ -68,7 +68,7 @@ def shape():
 
 
 def moved(before, after):
-    """Share of the points that are elsewhere."""
+    """The fraction of points that have moved."""
     return float((np.linalg.norm(after - before, axis=1) > 1e-4).mean())
 
 
@@ -138,7 +138,7 @@ def combed():
 
 
 def in_front():
-    """Where the view shows the middle of the guide that is nearest to the eye."""
+    """The place in the window of the middle of the guide nearest to the eye."""
     view = region("WINDOW")
     eye = view.data.view_matrix.inverted().translation
     (session,) = live().sessions()

@@ -20,7 +20,7 @@ from tutorials import (
 )
 
 log, page = traces.Log(), Page("eevee_shot")
-#: frames of the shot, [pixels] a side and samples: what is drawn here is on the processor
+#: frames of the shot, side [pixels] and samples, few since the CPU draws here
 LAST, SIDE, SAMPLES = 4, 128, 2
 
 

@@ -13,7 +13,7 @@ from driver import until
 from tutorials import Page, open_tab, properties, still
 
 log, page = traces.Log(), Page("look_like_cycles")
-#: [pixels] a side of the render, and samples of each: what is drawn here is on the processor
+#: side of the render [pixels], and samples of each, few since the CPU draws here
 SIDE, SAMPLES = 96, 4
 
 

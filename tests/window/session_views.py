@@ -61,7 +61,7 @@ def local_view_in_one_window():
 
 
 def another_view_layer_in_one_window():
-    """In which the collection of the hair is left out."""
+    """A view layer without the hair's collection shows no hair, while the other window does."""
     scene, second = bpy.context.scene, windows()[1]
     layer = scene.view_layers.new("Without")
     layer.layer_collection.children["Groom"].exclude = True
@@ -76,7 +76,7 @@ def another_view_layer_in_one_window():
 
 
 def another_scene_in_one_window():
-    """The preview goes on where its scene is shown, also while the other scene is worked on."""
+    """The preview goes on where its scene is shown, also while the other scene is edited."""
     first, second = windows()
     mine, other = first.scene, bpy.data.scenes.new("Other")
     second.scene = other
@@ -102,7 +102,7 @@ def another_scene_in_one_window():
 
 
 def closed_while_it_moves(second):
-    """Until the next redraw there is no GPU context: what comes in between waits for it."""
+    """Until the next redraw there is no GPU context, so requests in between wait for it."""
     with bpy.context.temp_override(window=second):
         bpy.ops.wm.window_close()
     bpy.ops.hairloom.reset()
@@ -113,7 +113,8 @@ def closed_while_it_moves(second):
 
 
 def hidden_in_every_way():
-    """By the eye, with its collection, out of the view layer; not by what hides it in renders."""
+    """Hiding by the eye icon, with the collection, or by the view layer hides hair; hiding it in
+    renders does not."""
     layer = bpy.context.view_layer.layer_collection.children["Groom"]
     (shown,) = yield from pictures("ways-shown")
     hair().hide_viewport = True
@@ -141,14 +142,14 @@ def hidden_in_every_way():
 
 
 def hair_pixels(found, shown, without):
-    """The share of pixels that are as with hair, and not as without."""
+    """The fraction of pixels that show hair: as in `shown`, not as in `without`."""
     is_hair = np.abs(shown - without).max(axis=2) > 0.1
     as_shown = np.abs(found - shown).max(axis=2) < 0.02
     return float((is_hair & as_shown).mean())
 
 
 def instances_are_told():
-    """An instance of the groom's collection has its head alone, and the panel says so."""
+    """An instance of the groom's collection shows only the head, and the panel reports it."""
     scene, note = bpy.context.scene, of_hairloom("diagnostics").instances_note
     twin = bpy.data.objects.new("Twin", None)
     twin.instance_type, twin.instance_collection = "COLLECTION", bpy.data.collections["Groom"]

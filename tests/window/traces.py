@@ -1,4 +1,4 @@
-"""What an extension may leave behind in Blender, and what Blender says when something raises."""
+"""Traces that an extension can leave in Blender, and Blender's output about exceptions."""
 
 import gc
 import os
@@ -24,7 +24,7 @@ OWNERS = ("Curves", "Object", "Scene", "WindowManager", "Mesh", "Material")
 
 
 def shortcuts() -> list[Any]:
-    """The items of Hairloom in Blender's keymaps for add-ons."""
+    """Hairloom's items in Blender's keymaps for add-ons."""
     keymaps = bpy.context.window_manager.keyconfigs.addon.keymaps
     items = [item for keymap in keymaps for item in keymap.keymap_items]
     return [
@@ -36,15 +36,15 @@ def shortcuts() -> list[Any]:
 
 
 class Log:
-    """All that this Blender has printed, from Python and from C: tools/test_ui.py keeps it."""
+    """All output of this Blender, from Python and from C, which tools/test_ui.py saves."""
 
     def __init__(self) -> None:
-        # the runner sends both streams into one file; anything else could not be read again
+        # the runner redirects both streams to one file; a pipe could not be read here
         assert stat.S_ISREG(os.fstat(1).st_mode), "send the output into a file"
         self._path, self._offset = Path("/proc/self/fd/1"), 0
 
     def added(self) -> str:
-        """What has been printed since the last call."""
+        """The output since the last call."""
         sys.stdout.flush()
         sys.stderr.flush()
         with self._path.open("rb") as stream:
@@ -55,7 +55,7 @@ class Log:
 
 
 def of_blender() -> dict[str, Any]:
-    """All of ours that Blender can know of."""
+    """Everything of ours that is registered in Blender."""
     return {
         "handlers": {
             name: [f"{each.__module__}.{each.__qualname__}" for each in handlers]
@@ -74,7 +74,7 @@ def of_blender() -> dict[str, Any]:
 
 
 def of_gpu() -> Counter[str]:
-    """How many GPU objects of each kind Python holds on to, by whatever holds them."""
+    """The number of GPU objects of each kind that Python still references."""
     kinds = tuple(each for each in vars(gpu.types).values() if isinstance(each, type))
     gc.collect()
     found, waiting = {}, list(gc.get_objects())
@@ -83,12 +83,12 @@ def of_gpu() -> Counter[str]:
             if isinstance(each, kinds):
                 found[id(each)] = type(each).__name__
             elif isinstance(each, tuple | dict) and not gc.is_tracked(each):
-                waiting.append(each)  # of things that hold nothing themselves
+                waiting.append(each)  # objects without references of their own
     return Counter(found.values())
 
 
 def of_previews() -> dict[str, Any]:
-    """What only a preview, Play or long work keeps; all empty when nothing of them goes on."""
+    """The state that only a preview, Play or long work has; all empty when none is active."""
     return {
         "previews": [each.name for each in of_hairloom("previews").simulated()],
         "draw handlers": of_hairloom("overlay")._overlay.handles,

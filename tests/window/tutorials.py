@@ -1,6 +1,6 @@
-"""A page of docs/tutorials as a person plays it, who reads a step and does it with mouse and keys.
+"""A page of docs/tutorials, played as a person would: each step is done with mouse and keys.
 
-What is clicked is named by words that stand in the step, and found where the window shows them.
+Clicked things are named by words of the step, and found where the window shows these words.
 """
 
 import re
@@ -17,11 +17,11 @@ from driver import of_hairloom, until
 from reading import Box, box_of, read, seen, whole_window, width_of
 
 PAGES = Path(__file__).resolve().parents[2] / "docs" / "tutorials"
-#: [pixels] around words where a menu that opens has changed the screen
+#: [pixels] around words in which an opening menu has changed the screen
 AROUND = 20
-#: [pixels] by how much the Properties editor is made wider
+#: [pixels] by which the Properties editor is widened
 WIDER = 160
-#: where in a panel fields are, and the picture of a preset: shares of its width
+#: places of fields, and of a preset's picture, as fractions of a panel's width
 FIELD, PICTURE = 0.7, 0.15
 #: [pixels] from *Save* up to the middle of that picture
 ABOVE_SAVE = 20
@@ -30,12 +30,12 @@ _DIGITS = ("ZERO", "ONE", "TWO", "THREE", "FOUR", "FIVE", "SIX", "SEVEN", "EIGHT
 KEYS = {str(number): name for number, name in enumerate(_DIGITS)} | {".": "PERIOD", "_": "MINUS"}
 #: [pixels] from the checkbox of a panel to its name
 CHECKBOX = 11
-#: [levels of 255] two drawings of the same differ by less
+#: [levels of 255] redraws of the same differ by less
 SAME = 8
 
 
 class Page:
-    """The steps of a page, each as its words without marks, and the one that is being done."""
+    """The steps of a page, as plain words, and the current one."""
 
     def __init__(self, name: str) -> None:
         text = (PAGES / f"{name}.md").read_text(encoding="utf-8").partition("\nMore: ")[0]
@@ -45,11 +45,11 @@ class Page:
         self._number = 0
 
     def begin(self) -> Iterator[int]:
-        """What docs/tutorials/README.md asks for."""
+        """Prepare Blender as docs/tutorials/README.md requires."""
         yield from press("ESC")  # the splash screen
         driver.enable_extension()
         preferences = bpy.context.preferences.view
-        preferences.filebrowser_display_type = "SCREEN"  # all in the one window that is looked at
+        preferences.filebrowser_display_type = "SCREEN"  # all in one window
         preferences.render_display_type = "AREA"
         view = middle(box_of(region("WINDOW")))
         yield from key("N", *view)
@@ -70,31 +70,31 @@ class Page:
         return words
 
     def click(self, words: str, box: Box | None = None, **how: Any) -> Iterator[int]:
-        """Words of this step, where they are shown."""
+        """Click words of this step where they are shown."""
         yield from click(*(yield from read(self.says(words), box, **how)))
 
     def menu(self, words: str, box: Box) -> Iterator[int]:
-        """Words of this step with > between them: the first is in this part of the window."""
+        """Choose a menu path of this step, with > between its words; the first is in `box`."""
         first, *others = self.says(words).split(" > ")
         before = screen.pixels()
         yield from click(*(yield from read(first, box)))
         yield from chosen(others, before)
 
     def right_click(self, words: str, x: int, y: int) -> Iterator[int]:
-        """And what is chosen in the menu that comes up there."""
+        """Right-click at a place, and choose a menu path there."""
         before = screen.pixels()
         yield from click(x, y, "RIGHTMOUSE")
         yield from chosen(self.says(words).split(" > "), before)
 
     def mode(self, name: str, now: str) -> Iterator[int]:
-        """One that this step tells to go to, by the menu that shows what is on now."""
+        """Switch to a mode that this step names, by the menu that shows the current mode."""
         before = screen.pixels()
         yield from click(*(yield from read(now, box_of(region("HEADER")))))
         yield from chosen([self.says(name)], before)
         yield
 
     def sample_scene(self) -> Iterator[int]:
-        """Its menu entry; Esc stops its motion."""
+        """Add the sample scene by its menu entry; Esc stops its motion."""
         own = bpy.context.window.scene
         path = "Add > Curve > Hairloom Sample Scene"
         yield from self.menu(path, box_of(region("HEADER")))
@@ -107,18 +107,18 @@ class Page:
         yield from still()
 
     def press(self, button: str, area: Any, kind: str = "WINDOW") -> Iterator[int]:
-        """A button, for which the area is scrolled."""
+        """Press a button, to which the area is scrolled."""
         yield from click(*(yield from scrolled(self.says(button), area, kind)))
 
     def open(self, panel: str, area: Any, kind: str = "WINDOW") -> Iterator[int]:
-        """A click on the name of a panel that is closed."""
+        """Open a closed panel by a click on its name."""
         yield from click(*(yield from scrolled(self.says(panel), area, kind)))
         yield
 
     def enter(
         self, label: str, value: str, path: str, area: Any, kind: str = "WINDOW"
     ) -> Iterator[int]:
-        """A value into the field beside a label; path: how its property's data path ends."""
+        """Enter a value in the field beside a label; path: the end of its property's data path."""
         x, y = yield from beside(self.says(label), path, area, kind)
         yield from entered(value, x, y)
         yield
@@ -126,20 +126,21 @@ class Page:
     def choose(
         self, label: str, entry: str, path: str, area: Any, kind: str = "WINDOW"
     ) -> Iterator[int]:
-        """An entry of the list beside a label, which the step need not name; path as in `enter`."""
+        """Choose an entry of the list beside a label, which the step need not name; path as in
+        `enter`."""
         before = screen.pixels()
         yield from click(*(yield from beside(label, path, area, kind)))
         yield from chosen([self.says(entry)], before)
         yield
 
     def tick(self, panel: str, area: Any) -> Iterator[int]:
-        """The checkbox before a panel's name."""
+        """Click the checkbox before a panel's name."""
         x, y = yield from scrolled(self.says(panel), area)
         yield from click(x - width_of(panel) // 2 - CHECKBOX, y)
         yield
 
     def render(self) -> Iterator[int]:
-        """F12, until the picture is there."""
+        """Press F12 and wait for the picture."""
         done: list[bool] = []
         handlers = bpy.app.handlers.render_complete
         handlers.append(lambda *_: done.append(True))
@@ -150,7 +151,8 @@ class Page:
         yield
 
     def picture(self, panel: str, entry: str, area: Any, kind: str = "WINDOW") -> Iterator[int]:
-        """One of the pictures that come up where that of a panel is clicked, left of *Save*."""
+        """Choose a preset's picture in the popup that opens from a panel's picture, left of
+        *Save*."""
         self.says("picture")
         yield from scrolled(self.says(panel), area, kind)
         part = part_of(area, kind)
@@ -168,14 +170,14 @@ def middle(box: Box) -> tuple[int, int]:
 
 
 def move(x: int, y: int, count: int = 2) -> Iterator[int]:
-    """The mouse to a place, where it rests for this many events until Blender has noticed."""
+    """Move the mouse to a place, with several events so that Blender notices."""
     for _ in range(count):
         bpy.context.window.event_simulate("MOUSEMOVE", "NOTHING", x=x, y=y)
         yield 1
 
 
 def click(x: int, y: int, button: str = "LEFTMOUSE", **held: bool) -> Iterator[int]:
-    """A button of the mouse at a place."""
+    """Click a mouse button at a place."""
     yield from move(x, y)
     for value in ("PRESS", "RELEASE"):
         bpy.context.window.event_simulate(button, value, x=x, y=y, **held)
@@ -184,7 +186,7 @@ def click(x: int, y: int, button: str = "LEFTMOUSE", **held: bool) -> Iterator[i
 
 
 def drag(start: tuple[int, int], end: tuple[int, int], count: int = 8) -> Iterator[int]:
-    """The left mouse button held from one place to another."""
+    """Drag with the left mouse button from one place to another."""
     yield from move(*start)
     window, (x, y) = bpy.context.window, start
     window.event_simulate("LEFTMOUSE", "PRESS", x=x, y=y)
@@ -198,14 +200,14 @@ def drag(start: tuple[int, int], end: tuple[int, int], count: int = 8) -> Iterat
 
 
 def still() -> Iterator[int]:
-    """Until no work goes on and the hair is there."""
+    """Wait until no long work runs and the hair is made."""
     yield from until(lambda: not of_hairloom("long_work").running(), "the work does not end")
     yield from hair_is_made()
     yield
 
 
 def key(name: str, x: int, y: int, **held: bool) -> Iterator[int]:
-    """A key while the mouse is at a place."""
+    """Press a key while the mouse is at a place."""
     yield from move(x, y)
     for value in ("PRESS", "RELEASE"):
         bpy.context.window.event_simulate(name, value, x=x, y=y, **held)
@@ -213,7 +215,7 @@ def key(name: str, x: int, y: int, **held: bool) -> Iterator[int]:
 
 
 def come_up(words: str, before: np.ndarray, box: Box | None = None) -> Iterator[int]:
-    """Where words are shown that were not there before: those of a menu that has opened."""
+    """Wait for words that were not shown before, as in an opening menu; returns their place."""
     found: list[tuple[int, int]] = []
 
     def is_there() -> bool:
@@ -231,7 +233,7 @@ def come_up(words: str, before: np.ndarray, box: Box | None = None) -> Iterator[
 
 
 def chosen(entries: list[str], before: np.ndarray) -> Iterator[int]:
-    """Entries of menus, each of which opens the next; before: the screen without any."""
+    """Choose entries of nested menus; before: the screen without menus."""
     for each in entries:
         x, y = yield from come_up(each, before)
         before = screen.pixels()
@@ -239,7 +241,7 @@ def chosen(entries: list[str], before: np.ndarray) -> Iterator[int]:
 
 
 def typed(text: str, x: int, y: int) -> Iterator[int]:
-    """Letters and digits, one after the other."""
+    """Type letters and digits."""
     for letter in text:
         window, name = bpy.context.window, KEYS.get(letter, letter.upper())
         window.event_simulate(name, "PRESS", unicode=letter, x=x, y=y)
@@ -249,15 +251,14 @@ def typed(text: str, x: int, y: int) -> Iterator[int]:
 
 
 def entered(text: str, x: int, y: int) -> Iterator[int]:
-    """A value into the field under the mouse: a click selects the one that is there."""
+    """Type a value into the field at a place; the click selects the old value."""
     yield from click(x, y)
     yield from typed(text, x, y)
     yield from key("RET", x, y)
 
 
 def scrolled(words: str, area: Any, kind: str = "WINDOW") -> Iterator[int]:
-    """Where words are shown in an area, which is scrolled until they are: down first, as one reads
-    on, then up."""
+    """Scroll an area, first down and then up, until words are shown; returns their place."""
     part = part_of(area, kind)
     for wheel in (None, "WHEELDOWNMOUSE", "WHEELUPMOUSE"):
         for _ in range(1 if wheel is None else 100):
@@ -269,14 +270,14 @@ def scrolled(words: str, area: Any, kind: str = "WINDOW") -> Iterator[int]:
 
 
 def below(words: str, others: str, box: Box) -> list[int]:
-    """The heights at which other words stand in a part of the window, below these."""
+    """Heights of `others` in a part of the window, below `words`."""
     heights = [y for _, _, y in seen(words, box)]
     return [y for _, _, y in seen(others, box) if heights and y < max(heights)]
 
 
 def turned(wheel: str, part: Any) -> Iterator[int]:
-    """Turns the mouse wheel over a region; whether that has moved it. What it shows need not stand
-    still: while hair plays, its panel has other times in each drawing."""
+    """Turn the mouse wheel over a region; returns whether it has scrolled. This is not judged by
+    its picture, which changes while hair plays."""
     before, (x, y) = part.view2d.region_to_view(0, 0), middle(box_of(part))
     yield from move(x, y)
     for _ in range(3):
@@ -287,7 +288,7 @@ def turned(wheel: str, part: Any) -> Iterator[int]:
 
 
 def beside(label: str, path: str, area: Any, kind: str = "WINDOW") -> Iterator[int]:
-    """Where the field of a property is that has this label."""
+    """The place of the property's field that has this label."""
     part = part_of(area, kind)
     x = part.x + int(FIELD * part.width)
 
@@ -314,14 +315,14 @@ def part_of(area: Any, kind: str) -> Any:
 
 
 def in_view() -> tuple[int, int]:
-    """A place in the viewport where no hair is."""
+    """A place in the viewport without hair."""
     view = region("WINDOW")
     return view.x + view.width // 4, view.y + view.height // 6
 
 
 def below_name(words: str, area: Any) -> Iterator[int]:
-    """Of a button that is called as its panel: the place of the same words next below the panel's
-    name, for which the area is scrolled down."""
+    """The place of a button with the same name as its panel, next below the panel's name; the area
+    is scrolled down to it."""
     part = part_of(area, "WINDOW")
     while len(places := seen(words, box_of(part))) < 2:
         assert (yield from turned("WHEELDOWNMOUSE", part)), f"there is no button '{words}'"
@@ -337,7 +338,7 @@ def properties() -> Any:
 
 
 def save_the_file() -> Iterator[int]:
-    """Where Blender proposes, under the name that it proposes."""
+    """Save the file at the place and with the name that Blender proposes."""
     yield from key("S", *in_view(), ctrl=True)
     yield from until(lambda: file_browser() is not None, "no file browser opens")
     yield from redrawn(file_browser())
@@ -348,7 +349,7 @@ def save_the_file() -> Iterator[int]:
 
 
 def widen_properties() -> Iterator[int]:
-    """Drags its edge into the viewport: no label is cut there, and hair is drawn faster."""
+    """Drag its edge into the viewport, so that no label is cut off and hair is drawn faster."""
     area = properties()
     before, y = area.width, area.y + area.height // 2
     yield from drag((area.x - 1, y), (area.x - 1 - WIDER, y))
@@ -357,7 +358,7 @@ def widen_properties() -> Iterator[int]:
 
 
 def open_tab(name: str) -> Iterator[int]:
-    """A tab of the Properties editor, which has no words: from the top each is tried."""
+    """Open a tab of the Properties editor; tabs have no words, so all are tried from the top."""
     area = properties()
     bar = part_of(area, "NAVIGATION_BAR")
     for y in range(bar.y + bar.height - 10, bar.y, -12):
@@ -369,7 +370,7 @@ def open_tab(name: str) -> Iterator[int]:
 
 
 def named_file(name: str) -> Iterator[int]:
-    """What a file browser asks for, written into its field, in the folder that it shows."""
+    """Enter a file's name in a file browser, in the folder that it shows, and confirm."""
     browser = file_browser()
     part = part_of(browser, "EXECUTE")
     yield from entered(name, part.x + part.width // 4, part.y + part.height // 2)

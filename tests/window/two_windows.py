@@ -1,4 +1,4 @@
-"""A previewed groom in two windows side by side, and what each of them shows of it."""
+"""A previewed groom in two windows side by side, and pictures of both."""
 
 import bpy
 import driver
@@ -7,7 +7,7 @@ from artist import changed, new_head, picture_of, side_by_side
 from driver import of_hairloom, until
 from mathutils import Euler
 
-#: shares of a view's pixels: what hair covers, and what Blender's own redraw differs by
+#: fractions of a view's pixels: that hair covers, and by which Blender's own redraws differ
 HAIR, SAME = 0.02, 0.002
 
 
@@ -48,7 +48,7 @@ def view_of(window):
 
 
 def look():
-    """From the front, in every window, without what is not hair."""
+    """Look from the front in every window, without overlays."""
     for window in windows():
         space = view_of(window).spaces.active
         space.overlay.show_overlays = False
@@ -59,14 +59,14 @@ def look():
 
 
 def pictures(label):
-    """The 3D view of each window, as it is now."""
+    """The current 3D view of each window."""
     yield
     shot = driver.screenshot(label)
     return [picture_of(window, view_of(window), shot) for window in windows()]
 
 
 def two_windows():
-    bpy.ops.wm.window_new_main()  # any other shares the scene and the view layer of the first
+    bpy.ops.wm.window_new_main()  # other kinds share scene and view layer with the first window
     yield
     assert len(windows()) == 2
     side_by_side()
@@ -76,7 +76,7 @@ def two_windows():
 
 
 def with_and_without(label, drawn):
-    """Whether hair is drawn in each window: hiding it changes that picture."""
+    """Assert in which windows hair is drawn: there, hiding it changes the picture."""
     shown = yield from pictures(f"{label}-shown")
     hair().hide_viewport = True
     hidden = yield from pictures(f"{label}-hidden")

@@ -1,8 +1,8 @@
-"""Tells whether what a 3D view has drawn is on the screen: each drawing is numbered by a mark.
+"""A mark in each 3D view that numbers its redraws, to detect whether a redraw is on the screen.
 
-Drawing and showing are two things: on Vulkan a picture may come to the screen later. So every 3D
-view draws a number, eight squares that are black or white, one above the other at its left edge.
-Popups and the buttons of the toolbar leave that edge free.
+On Vulkan a picture can reach the screen later than it is drawn. So every 3D view draws a number:
+eight black or white squares, one above the other at its left edge. Popups and the buttons of the
+toolbar leave that edge free.
 """
 
 from collections.abc import Iterator
@@ -15,7 +15,7 @@ import screen
 from gpu_extras.batch import batch_for_shader
 
 BITS, SIDE = 8, 4
-#: where it is: pixels from the left edge of the view, and a fraction of its height
+#: its place: pixels from the left edge of the view, and a fraction of its height
 LEFT, LOW = 2, 0.3
 BLACK, WHITE = (0.0, 0.0, 0.0, 1.0), (1.0, 1.0, 1.0, 1.0)
 
@@ -27,23 +27,23 @@ class ViewMark:
         bpy.types.SpaceView3D.draw_handler_add(self._draw, (), "WINDOW", "POST_PIXEL")
 
     def draw_again(self) -> None:
-        """Have all 3D views drawn again, with a number that none of them has shown lately."""
+        """Redraw all 3D views, with a number that none of them has shown lately."""
         self._number, self._is_wanted = self._number % 255 + 1, True
         for _, region in _views():
             region.tag_redraw()
 
     def is_shown(self) -> bool:
-        """Whether all 3D views that can be seen show that drawing."""
+        """Whether all visible 3D views show that redraw."""
         if not all(self._is_marked(window, region) for window, region in _views()):
             return False
         self._is_wanted = False
         return True
 
     def painted_over(self, shown: np.ndarray) -> np.ndarray:
-        """The screen without marks: in their places stands what is beside them."""
+        """The screen with marks replaced by the pixels beside them."""
         shown = shown.copy()
         for window, region in _views():
-            # a pixel more on each side: backends place squares half a pixel apart
+            # one more pixel on each side: backends differ by half a pixel
             left = window.x + region.x + LEFT - 1
             right = left + SIDE + 2
             bottom = len(shown) - (window.y + region.y + int(LOW * region.height)) + 1
@@ -83,7 +83,7 @@ class ViewMark:
 
 
 def _views() -> Iterator[tuple[Any, Any]]:
-    """The 3D views of all windows that no other window may cover, each with its window."""
+    """The 3D views of all windows that no other window overlaps, each with its window."""
     windows = list(bpy.context.window_manager.windows)
     for window in windows:
         if any(_meet(window, other) for other in windows if other != window):

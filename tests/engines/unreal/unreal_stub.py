@@ -1,14 +1,14 @@
-"""A stand for the module `unreal`: what hairloom_import.py calls of it, as Epic documents it.
+"""A stub of the module `unreal`, with what hairloom_import.py uses, as Epic documents it.
 
-Names, properties and arguments are those of the pages below; anything else raises, as in Unreal.
+Names, properties and arguments are those of the pages below; all others raise, as in Unreal.
 Each class has a page https://dev.epicgames.com/documentation/en-us/unreal-engine/python-api/class/NAME,
 such as .../class/MaterialEditingLibrary, StaticMeshEditorSubsystem, FbxStaticMeshImportData,
 MeshBuildSettings, GroomAsset, HairGroupsCardsSourceDescription, HairLODSettings, GroomLibrary,
-AssetImportTask, EditorAssetLibrary. Which pins the hair shading model renames, and that triangles
-are ordered where meshes are built, is in Unreal's MaterialAttributeDefinitionMap.cpp and
+AssetImportTask, EditorAssetLibrary. The pins that the hair shading model renames are in Unreal's
+MaterialAttributeDefinitionMap.cpp, the ordering of triangles while meshes are built is in
 StaticMeshBuilder.cpp.
 
-What Unreal would do with files is not here: the test fills `levels_of`, which reads the FBX.
+The stub reads no files: the test fills `levels_of`, which reads the FBX.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from typing import Any
 
 PAGE = "https://dev.epicgames.com/documentation/en-us/unreal-engine/python-api/class/"
 
-#: path in the content -> asset
+#: path in the content folder -> asset
 assets: dict[str, Any] = {}
 log_lines: list[tuple[str, str]] = []
 console_variables = {"r.TriangleOrderOptimization": 1}
 saved: list[str] = []
 #: whether assets can be saved
 can_save = True
-#: what knows how many triangles each level of an FBX file has
+#: a function that finds the number of triangles of each level in an FBX file
 levels_of: list[Callable[[str], list[int]]] = []
 
 
@@ -40,11 +40,11 @@ def reset() -> None:
     can_save = True
 
 
-# What every object has
+# Members of every object
 
 
 class Documented:
-    """An object whose editor properties are those of its page."""
+    """An object with the editor properties of its documentation page."""
 
     editor_properties: tuple[str, ...] = ()
 
@@ -114,7 +114,7 @@ _enumeration("FBXNormalGenerationMethod", "BUILT_IN MIKK_T_SPACE")
 _enumeration("HairTextureLayout", "LAYOUT0 LAYOUT1 LAYOUT2 LAYOUT3")
 _enumeration("GroomGeometryType", "STRANDS CARDS MESHES")
 
-#: of how textures are stored -> how a material has to read them
+#: (compression, sRGB) of a texture -> the sampler type that a material needs for it
 SAMPLERS = {
     ("TextureCompressionSettings.TC_DEFAULT", True): "SAMPLERTYPE_COLOR",
     ("TextureCompressionSettings.TC_MASKS", False): "SAMPLERTYPE_MASKS",
@@ -249,7 +249,7 @@ class StaticMesh(Object):
         self.materials[material_index] = new_material
 
 
-# Expressions: properties, pins that take and pins that give
+# Expressions: properties, input pins and output pins
 
 
 class MaterialExpression(Object):
@@ -315,7 +315,7 @@ class MaterialEditingLibrary:
         to_expression: MaterialExpression,
         to_input_name: str,
     ) -> bool:
-        """False, as in Unreal, where one of the two has no such pin."""
+        """Connect two pins; False, as in Unreal, if one of the expressions has no such pin."""
         takes = to_expression.takes or ("",)
         if isinstance(to_expression, sys.modules[__name__].MaterialExpressionCustom):
             pins = to_expression.values["inputs"]
@@ -341,7 +341,7 @@ class MaterialEditingLibrary:
 
     @staticmethod
     def recompile_material(material: Any) -> None:
-        """What Unreal would say of a sampler that does not fit its texture."""
+        """Assert, where Unreal would report an error, that samplers match their textures."""
         for each in material.values[""]:
             texture = each.values.get("texture")
             if texture is not None:
