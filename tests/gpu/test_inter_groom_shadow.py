@@ -161,7 +161,7 @@ def test_a_place_has_what_all_but_its_own_groom_have_in_the_way(gpu_context: Any
     assert maps[0] is not None and maps[1] is not None
     places = np.zeros((1, 8, 4), np.float32)
     places[0, :, 3] = (0.0, 1.0, 2.0, -1.0, 0.0, 1.0, 2.0, -1.0)
-    places[0, 4:, 0] = 1.0  # beside both for the first light, behind them for no light
+    places[0, 4:, 0] = 1.0  # not behind the grooms for either light
     found = texture_to_array(
         InterGroomShadow().at(
             texture_from(places, "RGBA32F"), None, [(0, maps[0]), (1, maps[1])], 2
@@ -174,7 +174,7 @@ def test_a_place_has_what_all_but_its_own_groom_have_in_the_way(gpu_context: Any
     np.testing.assert_array_equal(found[4:, 0], 0.0)
     np.testing.assert_array_equal(found[:, 1:], 0.0)
     aside = np.zeros((1, 8, 4), np.float32)
-    aside[0] = (0.0, 1.0, 0.31, 2.0)  # in the way of a light from there alone
+    aside[0] = (0.0, 1.0, 0.31, 2.0)  # behind the groom for the second light alone
     lights = (SUN, Light.sun((0.0, 1.0, 0.0), (1.0, 1.0, 1.0), 3.0))
     of_both = StrandPass().opacity(replace(groom("a", sheet(0.3)).snapshot, lights=lights))
     assert of_both is not None

@@ -105,7 +105,7 @@ def shaded_row(found: np.ndarray) -> np.ndarray:
 
 @pytest.mark.slow(instead="test_a_still_is_shaded_softly")
 def test_hair_shades_a_mesh_softly(gpu_context: Any) -> None:
-    """A curtain of hair, whose edge is at x = 0: as far as its opacity goes."""
+    """The penumbra of a curtain whose edge is at x = 0, relative to its opacity."""
     ground = matt(square((-4.0, -4.0), (4.0, 4.0), 0.0))
     scene = SceneSnapshot(
         meshes=(ground,),

@@ -1,5 +1,5 @@
-// What the module for three.js does where nothing is drawn. Prints, as JSON: whether each of two levels has the
-// pixels of the camera that draws it, though another one came between; which files addresses ask for.
+// Tests the module for three.js without drawing. Prints as JSON: whether each of two levels has the pixels of the
+// camera that draws it, although another one came between, and the files that are requested for addresses.
 import * as THREE from 'three';
 import { HairLevels, loadHairloomCards } from './hairloom_cards.js';
 
@@ -24,7 +24,7 @@ const [near, mirror] = [cameraAt(2), cameraAt(9)];
 const headset = new THREE.ArrayCamera([cameraAt(2)]);
 headset.position.z = 2;
 headset.updateMatrixWorld();
-// what is drawn is chosen for the whole picture, then a mirror in it draws all once more
+// levels are chosen for the whole picture, then a mirror in it draws all again
 [near, headset, mirror].forEach((camera) => hair.update(camera));
 const partOf = (mesh, camera) => {
   mesh.onBeforeRender(null, null, camera, mesh.geometry, mesh.material);

@@ -1,6 +1,6 @@
 """Words on the screen, found by comparison with words that Blender's own font draws.
 
-A session can so click the words of a documentation page where Blender shows them, and fails if a
+So a session can click the words of a documentation page where Blender shows them, and fails if a
 button has another name.
 """
 

@@ -1,7 +1,8 @@
 extends Node3D
-## Draws asset/cards.glb as asset/view.json asks. Writes into the folder that the command line names
-## godot.png; fog.png, the same in fog that hides all; shown.json: which meshes are shown as the loader's second level, and by Godot alone
-## where it finds the file, and from where to where each; order.json: the indices of the finest level.
+## Draws asset/cards.glb with the view of asset/view.json. Writes into the folder named by the command line:
+## godot.png; fog.png, the same in fog that hides everything; shown.json, the meshes that the loader shows for the
+## second level and for level 99, those that Godot shows alone if it finds the file, and the range of distances of
+## each; order.json, the indices of the finest level.
 
 const Cards := preload("res://addons/hairloom/hairloom_cards.gd")
 const GLB := "res://asset/cards.glb"
@@ -69,8 +70,8 @@ func _shown(scene: Node) -> Array:
 	return names
 
 
-## Of each mesh, in order: where it begins and ends to be shown [m], in the middle of what its material says.
-## It must be drawn in all of that.
+## The distances [m] at which each mesh, in order, begins and ends to be shown: the middle of its material's
+## bands. The mesh must be drawn over both bands completely.
 func _ranges(scene: Node) -> Array:
 	var ranges := []
 	for mesh in scene.find_children("*", "MeshInstance3D", true, false):

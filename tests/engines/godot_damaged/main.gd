@@ -1,7 +1,7 @@
 extends Node3D
-## Loads the file of each folder of cases.json, draws it, and writes in seen.json which meshes are drawn
-## in hair's own material, and how much of a picture they fill; null of those that cannot be read. Says
-## before each which it is.
+## Loads and draws the file of each folder of cases.json, and writes to seen.json the number of meshes with
+## hair's own material and the fraction of the picture that they fill, or null if it cannot be read. Prints the
+## name of each case first.
 
 const Cards := preload("res://addons/hairloom/hairloom_cards.gd")
 

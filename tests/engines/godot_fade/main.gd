@@ -1,7 +1,7 @@
 extends Node3D
-## Draws asset/cards.glb from view.json's eye: the first two levels alone, all levels where the first one
-## gives way to the second, the same of hair three times as large from three times as far, and with the
-## cross-fade turned off. Writes fine.png, coarse.png, both.png, scaled.png and at_once.png into the folder that the command line names.
+## Draws asset/cards.glb from view.json's eye: the first two levels alone, all levels at the distance where the
+## first fades to the second, the same for hair three times as large and far away, and with the cross-fade turned
+## off. Writes fine.png, coarse.png, both.png, scaled.png and at_once.png into the folder named by the command line.
 
 const Cards := preload("res://tools/hair cards/hairloom_cards.gd")
 const GLB := "res://asset/cards.glb"

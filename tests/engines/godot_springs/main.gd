@@ -1,6 +1,6 @@
 extends Node3D
-## Moves asset/hair.glb as poses.json says, a matrix (column by column) a frame, and writes where
-## its springs have all joints, in the world, into the file that the command line names.
+## Moves asset/hair.glb by the matrices of poses.json (column by column), one per frame, and writes the
+## world positions of all joints of its springs into the file named by the command line.
 
 const Cards := preload("res://addons/hairloom/hairloom_cards.gd")
 

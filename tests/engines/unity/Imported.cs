@@ -1,4 +1,4 @@
-// Imports a GLB as Unity would call the package, and prints what came of it as JSON.
+// Imports a GLB, calling the package as Unity does, and prints the result as JSON.
 using System;
 using System.Collections.Generic;
 using System.IO;
@@ -23,7 +23,7 @@ public static class Imported
                 new UnityEngine.Rendering.HDRenderPipelineAsset();
         }
         var before = (string[])Call(typeof(CardImporter), null, "GatherDependenciesFromSourceFile", path);
-        foreach (var texture in before.Where(File.Exists))  // imported before their sidecar was there
+        foreach (var texture in before.Where(File.Exists))  // imported before their sidecar existed
             AssetImporter.Known[texture] = new TextureImporter { assetPath = texture };
         foreach (var each in new[] { path, Sidecar.PathOf(path) })
             Call(typeof(CardPostprocessor), null, "OnPostprocessAllAssets", new[] { each }, new string[0], new string[0], new string[0]);

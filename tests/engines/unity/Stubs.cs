@@ -1,4 +1,4 @@
-// What the package calls of Unity, kept instead of drawn. Signatures are those of Unity 2022.3.
+// Stubs of the Unity API that the package calls, which record instead of draw. Signatures of Unity 2022.3.
 using System;
 using System.Collections.Generic;
 using System.Linq;
@@ -162,7 +162,7 @@ namespace UnityEngine
         public LODFadeMode fadeMode;
         public void SetLODs(LOD[] lods)
         {
-            // Unity logs this and keeps the levels that it had
+            // Unity logs this and keeps its former levels
             for (var i = 1; i < lods.Length; i++)
                 if (lods[i].screenRelativeTransitionHeight >= lods[i - 1].screenRelativeTransitionHeight)
                     throw new InvalidOperationException(

@@ -1,4 +1,4 @@
-// One number for each place, of all that cards are shaded with; written as hair_shading.gdshaderinc is.
+// Test values at each place for all inputs of the shading of cards, in the dialect of hair_shading.gdshaderinc.
 float probe_wave(float at, float number)
 {
   return 0.5 + 0.5 * sin(at * (1.0 + 0.37 * number) + number);

@@ -1,4 +1,4 @@
-// Which samples count, and where places lie among them, for test_atlas_pass.py.
+// Which samples count, and the position of places among them, for test_atlas_pass.py.
 #include "lib_atlas.glsl"
 
 void main()

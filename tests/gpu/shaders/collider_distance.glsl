@@ -1,5 +1,5 @@
-// xyz: the gradient of the distance at a point; w: the distance. Points with w 0 ask the first round
-// solid, points with w 1 the field that begins in row 0.
+// xyz: the gradient of the distance at a point; w: the distance. For points with w 0 from the first
+// round solid, with w 1 from the field that begins in row 0.
 #include "lib_collider.glsl"
 
 void main()

@@ -1,4 +1,4 @@
-// Dual scattering of angles and tau, absorptions and density, S of the strand alone and tau beyond.
+// Dual scattering from angles and tau, absorption and density, the strand's own S and tau beyond.
 #include "lib_dual.glsl"
 
 void main()

@@ -1,4 +1,4 @@
-// Evaluates lib_kajiya_kay.glsl for rows of inputs: one texel an input.
+// Evaluates lib_kajiya_kay.glsl for rows of inputs, one texel per input.
 #include "lib_kajiya_kay.glsl"
 
 void main()

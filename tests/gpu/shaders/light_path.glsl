@@ -1,4 +1,4 @@
-// What light meets on its way to points, of the light with number 0.
+// light_path of light 0 at points.
 #include "lib_opacity_look_up.glsl"
 
 void main()

@@ -1,4 +1,4 @@
-// Row 2 i: direction towards light i and how many there are; row 2 i + 1: its irradiance.
+// Row 2 i: direction to light i, and the number of lights (w); row 2 i + 1: its irradiance.
 #include "lib_lights.glsl"
 
 void main()

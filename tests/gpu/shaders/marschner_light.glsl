@@ -1,4 +1,4 @@
-// In w: of tangents the shift noise, of normals the sparkle noise, of lights the level, of eyes tau.
+// The w of inputs: shift noise in tangents, sparkle noise in normals, level in lights, tau in eyes.
 #include "lib_marschner.glsl"
 
 void main()

@@ -1,4 +1,4 @@
-// The share of the light with number 0 that meshes let through to points; y of the next one.
+// The fraction of light 0 (x) and light 1 (y) that meshes let through to points.
 #include "lib_mesh_shadows.glsl"
 
 void main()

@@ -1,4 +1,4 @@
-// x: what a boundary reflects of one light, y: the fraction that it reflects of all light.
+// x: reflection of one light by a boundary; y: the fraction of all light that it reflects.
 #include "lib_microfacet.glsl"
 
 void main()

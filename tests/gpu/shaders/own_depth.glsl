@@ -1,4 +1,4 @@
-// tau of strands themselves in the map of the light with number 0.
+// The strands' own tau in the map of light 0.
 #include "lib_opacity.glsl"
 
 void main()

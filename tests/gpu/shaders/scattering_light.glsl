@@ -1,5 +1,5 @@
-// In w: of tangents the shift noise, of normals the sparkle noise, of lights tau beyond, of eyes tau, of beneath the
-// depth.
+// The w of inputs: shift noise in tangents, sparkle noise in normals, tau beyond in lights, tau in eyes, depth in
+// beneath.
 #include "lib_dual.glsl"
 
 void main()

@@ -1,4 +1,4 @@
-// One texel a member of the struct that params/glsl.py makes.
+// One texel per member of the struct that params/glsl.py writes.
 
 void main()
 {

@@ -1,4 +1,4 @@
-// xyz: the way out of the nearest collider; w: how far it is, up to the point's w.
+// xyz: direction out of the nearest collider; w: distance to it, up to the point's w.
 #include "lib_signed_distance.glsl"
 
 void main()

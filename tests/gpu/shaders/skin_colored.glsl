@@ -1,4 +1,4 @@
-// Soft shadows in the colours of the hair that threw them: spread shadow (x) and depth (y) of places.
+// Soft shadows in the colour of the hair that casts them; places: spread shadow (x) and depth (y).
 #include "lib_skin.glsl"
 
 void main()

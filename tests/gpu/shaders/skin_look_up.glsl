@@ -1,4 +1,4 @@
-// The soft shadow at places (xy) of islands (z), and how much of it is known.
+// xyz: the soft shadow at places (xy) of islands (z); w: the known fraction of it.
 #include "lib_skin.glsl"
 
 void main()

@@ -1,4 +1,4 @@
-// Row: a strand. Column: a station of it, found and evaluated as strand.vert.glsl does; w the
+// Row: a strand. Column: one of its stations, found and evaluated as in strand.vert.glsl. w: the
 // pieces of its segment, 0 beyond the tip.
 #include "lib_strand_geometry.glsl"
 #include "lib_detail_packing.glsl"

@@ -1,5 +1,5 @@
-// places: along, colour noise, grey noise. roots: colours. Row 0 strand_absorption, 1 strand_color of
-// it, 2 strand_base with tip_fraction in w; 3 and 4 the first and the third of strands with colours.
+// places: along, colour noise, grey noise; roots: own colours. Row 0: strand_absorption, 1: its strand_color,
+// 2: strand_base with tip_fraction in w; 3 and 4: rows 0 and 2 for strands with their own colours.
 #include "lib_marschner.glsl"
 
 void main()

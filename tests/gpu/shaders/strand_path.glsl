@@ -1,4 +1,4 @@
-// What strands meet of the light with number 0, but themselves.
+// shadow_path_to_strand of light 0: without the strands themselves.
 #include "lib_shadows.glsl"
 
 void main()

@@ -1,4 +1,4 @@
-// How much of the shadows of meshes counts at places of a map.
+// The weight of mesh shadows at places of a map.
 #include "lib_opacity.glsl"
 
 void main()

@@ -41,13 +41,13 @@ def test_strands_lie_along_the_nearest_guide_of_their_group() -> None:
     guides = np.unique(owner, return_index=True)[1]
     same = np.zeros(len(grid), np.int32)
     np.testing.assert_array_equal(cluster_of_guides(grid, same, guides), owner)
-    # of two groups side by side, one of which has no guides in bundles 6 to 11
+    # two groups side by side, each with the guides of half of the bundles
     group = (np.arange(len(grid)) % 2).astype(np.int32)
     group[guides[6:]], group[guides[:6]] = 0, 1
     found = cluster_of_guides(grid, group, guides)
     np.testing.assert_array_equal(group[guides][found], group)
     np.testing.assert_array_equal(found[guides], np.arange(12))
-    # a group without any takes those of others
+    # a group without guides uses those of others
     alone = np.where(np.isin(np.arange(len(grid)), guides), 0, 1)
     np.testing.assert_array_equal(cluster_of_guides(grid, alone, guides), owner)
 
@@ -148,9 +148,9 @@ def test_the_rim_lies_along_the_parting_and_nowhere_else() -> None:
     # an average card is a square of 1 cm
     assert is_rim[away < 0.001].all()
     assert 0.001 < np.median(away[is_rim]) < 0.004 and away[is_rim].max() < 0.01
-    # hair that stands upright lies over no roots, nor does it lie under any
+    # upright hair covers no roots
     assert not at_rim(parted(lift=9.0)[0], normal, 40.0).any()
-    # a hairline: roots behind which there are none
+    # a hairline: no roots on one side
     half = grid[:, 0, 0] > 0.0
     is_rim = at_rim(grid[half], normal[half], 40.0)
     assert is_rim[away[half] < 0.0005].all() and away[half][is_rim].max() < 0.01
@@ -163,5 +163,5 @@ def test_cards_along_a_parting_hold_fewer_strands() -> None:
     assert found.max() == 99
     is_rim = at_rim(grid, normal, 40.0)
     assert 3.0 < 40.0 / (is_rim.sum() / len(np.unique(found[is_rim]))) < 5.0
-    # and none that begins elsewhere
+    # and no strands from elsewhere
     assert not set(found[is_rim].tolist()) & set(found[~is_rim].tolist())

@@ -142,7 +142,7 @@ def test_the_order_hangs_on_where_cards_are_alone(head: Surface | None, by: Sort
 @pytest.mark.parametrize("by", WAYS)
 def test_cards_that_are_sorted_stay_as_they_are(by: SortBy) -> None:
     mesh = replace(crossing_cards(), **{name: np.zeros(80) for name in OF_CARDS})
-    twice = joined([mesh, replace(mesh, card=mesh.card + 40)])  # each card lies on one like it
+    twice = joined([mesh, replace(mesh, card=mesh.card + 40)])  # each card coincides with another
     once = in_order(twice, card_orders(twice, globe(24), by, view_count=8).front)
     again = card_orders(once, globe(24), by, view_count=8)
     np.testing.assert_array_equal(again.front, np.arange(len(once.triangles)))
@@ -222,7 +222,7 @@ def test_nested_cubes_are_exactly_right_from_everywhere(by: SortBy) -> None:
         return wrong_fraction(mesh, None, front=front, back=back, view_count=12, size=96)
 
     assert share(orders.front, orders.back) < 1e-3  # pixels at an edge belong to both sides
-    assert share(orders.front, orders.front) > 0.6  # far sides the wrong way round
+    assert share(orders.front, orders.front) > 0.6  # the order is wrong for one side
     assert share(orders.back, orders.back) > 0.6
 
 
@@ -349,7 +349,7 @@ def test_pieces_are_triangles_unless_there_are_too_many() -> None:
         assert len(np.unique(card[own])) == 1
         assert len(own) <= 3
         inside = np.flatnonzero(card == card[own[0]])
-        assert np.ptp(np.searchsorted(inside, own)) == len(own) - 1  # they follow each other
+        assert np.ptp(np.searchsorted(inside, own)) == len(own) - 1  # they are consecutive
 
 
 @pytest.mark.parametrize("eye", [(0.4, -0.5, 0.3, 1.0), (0.8, -1.0, 0.6, 2.0), (0.1, 0.9, 0.2, 0)])

@@ -244,7 +244,8 @@ def kit() -> type[Kit]:
 
 @pytest.fixture(scope="session")
 def shake() -> Callable[[float], np.ndarray]:
-    """A head that says no: 25 degrees about z and 5 cm along x, once a second, smoothly begun."""
+    """A head that shakes by 25 degrees about z and 5 cm along x, once a second, with a smooth
+    beginning."""
 
     def matrix(time: float) -> np.ndarray:
         begun = np.sin(np.pi * min(time, 0.5)) ** 2

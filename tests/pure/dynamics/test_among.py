@@ -150,7 +150,7 @@ def test_neighbours_move_together():
     taken, _ = feel(rest.hair_grid, place, strength, rest.position, previous)
     assert taken[0, 2:, 7].min() > 0.0 and taken[0, 2:, 7].max() < 0.001
     others = np.delete(taken[0], 7, axis=1)
-    assert others.max() <= 0.0 and others.min() < 0.0  # and they are taken along
+    assert others.max() <= 0.0 and others.min() < 0.0  # and they are dragged along
 
 
 def test_lengths_are_kept():

@@ -209,7 +209,7 @@ def test_two_holes_are_closed_each_by_its_own_fan(kit):
     assert len(closed.positions) == len(ball.positions) + 2
     again, more = close_holes(closed)
     assert again is closed and not len(more)
-    # closed and turned the right way: the volume of a slab of a ball, by the divergence theorem
+    # closed and correctly oriented: the volume of a slab of a ball, by the divergence theorem
     a, b, c = np.moveaxis(closed.corners.astype(np.float64), 1, 0)
     volume = np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0
     exact = np.pi * (0.1**2 * 0.12 - 2.0 * 0.06**3 / 3.0)

@@ -242,7 +242,7 @@ def test_hair_bridges_hollows_and_lies_over_bumps() -> None:
     nothing = np.zeros((2, 15))
     plan = grow_module._Plan(nothing, nothing, GrowthSurface(plane, reach=0.05, cell=0.004))
     hollow, bump = grow_module._taut(grid, plan)[..., 2]
-    # the first segment keeps the way in which it leaves the skin
+    # the first segment keeps its direction from the skin
     assert np.diff(hollow[1:], 2).max() < 0.5 * np.diff(height[0], 2).max()
     assert (hollow >= height[0]).all() and hollow[8] > height[0, 8] + 0.001
     assert np.allclose(bump[2:-1], height[1, 2:-1], atol=1e-9)

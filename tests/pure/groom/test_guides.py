@@ -97,6 +97,6 @@ def test_brows_and_lashes_leave_the_guides_to_the_scalp() -> None:
     assert len(guides) == GuideSettings().guide_count
     assert of_face[0] >= 0.99 * len(guides)
     assert of_face[BROWS] >= 1 and of_face[LASHES] >= 1
-    # any other group has as many as its size asks for
+    # other groups have guides in proportion to their size
     plain = choose_guides(strands_at(square(9420), np.minimum(group, 2)), GuideSettings())
     assert (np.minimum(group, 2)[plain] == 0).sum() < 0.9 * len(plain)

@@ -254,7 +254,7 @@ def test_fur_leans_back_and_down_and_bends_to_the_skin(sphere: Surface) -> None:
     assert strands.lengths() == pytest.approx(np.full(2000, 0.1), rel=1e-4)
     step, normal = directions(strands), strands.roots.astype(np.float64)
     rise = np.einsum("scj,sj->sc", step, normal)
-    # on the flanks, far from where it stands since it leans neither way
+    # on the flanks, far from where hair is upright because it leans to neither side
     flank = np.abs(normal[:, 0]) > 0.5
     angle = np.degrees(np.arcsin(np.clip(rise[flank], -1.0, 1.0)))
     assert 35.0 < np.median(angle[:, 0]) < 55.0

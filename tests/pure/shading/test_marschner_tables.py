@@ -53,7 +53,7 @@ SHAPES = [Fibre(), Fibre(eccentricity=0.85), Fibre(azimuthal_width=np.radians(10
 def test_lobes_from_the_tables_are_within_half_a_percent_of_their_clear_peak(shape: Fibre) -> None:
     """For every absorption, relative to the peak of the lobe without absorption.
 
-    The exception are higher orders at cos theta_d below 0.3, where they are trapped light with very
+    Higher orders are an exception at cos theta_d below 0.3, where they are trapped light with very
     different path lengths: their own error reaches 4 %, but that of the sum of all lobes stays
     below 0.3 %.
     """

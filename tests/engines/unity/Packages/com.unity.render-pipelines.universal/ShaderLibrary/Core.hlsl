@@ -1,4 +1,4 @@
-// What HairloomCards.hlsl calls of Unity's own file of this name, for a compiler without Unity.
+// Stubs of what HairloomCards.hlsl uses from Unity's file of this name, for a compiler without Unity.
 #define CBUFFER_START(name) cbuffer name {
 #define CBUFFER_END };
 #define UNITY_REVERSED_Z 1

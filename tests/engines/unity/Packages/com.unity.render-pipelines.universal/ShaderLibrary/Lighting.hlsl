@@ -1,4 +1,4 @@
-// What HairloomCards.hlsl calls of Unity's own file of this name, for a compiler without Unity.
+// Stubs of what HairloomCards.hlsl uses from Unity's file of this name, for a compiler without Unity.
 struct Light
 {
     float3 direction;
@@ -16,7 +16,7 @@ struct InputData
 float4 lights[16];
 uint light_count;
 
-float4 _ShadowBias;  // of Shadows.hlsl, which this one includes
+float4 _ShadowBias;  // from Shadows.hlsl, which this file includes
 
 float3 ApplyShadowBias(float3 place, float3 normal, float3 to_light)
 {
@@ -45,7 +45,7 @@ uint GetAdditionalLightsCount() { return light_count; }
 #elif defined(_CLUSTER_LIGHT_LOOP)
 #define USE_CLUSTER_LIGHT_LOOP 1
 #endif
-#if USE_FORWARD_PLUS || USE_CLUSTER_LIGHT_LOOP  // suns come first, and its clusters hold lamps alone
+#if USE_FORWARD_PLUS || USE_CLUSTER_LIGHT_LOOP  // suns come first, and clusters contain only lamps
 #define URP_FP_DIRECTIONAL_LIGHTS_COUNT sun_count
 #define MAX_VISIBLE_LIGHTS 256
 uint sun_count;
