@@ -143,7 +143,7 @@ def check_drive(state: DynamicsState, drive: Drive, known: tuple[Floats, ...] = 
         )
     if drive.painted is not None and not drive.painted.fits(state.cv_count, state.guide_count):
         raise HairloomError(
-            f"painted values must be {state.guide_count} finite numbers, one for each guide",
+            f"painted values are not {state.guide_count} finite numbers, one for each guide",
             place="dynamics",
             remedy="Start the simulation again",
         )

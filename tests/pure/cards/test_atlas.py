@@ -186,7 +186,7 @@ def test_notes_count_short_strands() -> None:
 
 def test_an_atlas_that_is_too_small_says_by_how_much() -> None:
     settings = AtlasSettings(size="512", columns=32, rows=4, padding=8)
-    with pytest.raises(HairloomError, match=r"takes 640, which is 128 more"):
+    with pytest.raises(HairloomError, match=r"need 640, which is 128 more"):
         _ = settings.grid
     assert AtlasSettings(size="1024", columns=32, rows=4, padding=8).grid.tile_count == 128
 
