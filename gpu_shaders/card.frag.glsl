@@ -1,10 +1,10 @@
 // Cards, fragment stage: strands in textures, see addon/shading/textures.py.
 //
-// PRIME 1: only the depth of opaque pixels. CLIPPED 1: only pixels in alpha_range; without it there is no
-// discard, so that the early depth test works. TANGENT_MAP 1: a map of strand directions replaces the shift
-// texture. LAYERED 1: shells, see addon/cards/shells.py. NORMAL_MAP 1: a map bends the normal. SHADOWS of
-// hair on hair, and SCATTERING from strand to strand, as for strands; for a light without a map, the
-// occlusion is used.
+// PRIME 1: only the depth of opaque pixels. CLIPPED 1: only pixels in alpha_range; without it no pixel is
+// dropped, so that the early depth test works. TANGENT_MAP 1: a map of strand directions replaces the shift
+// texture. LAYERED 1: shells, see addon/cards/shells.py. NORMAL_MAP 1: a map bends the normal. PLACE_MAP 1:
+// a map stores how deep the visible strand lies among the others. SHADOWS of hair on hair, and SCATTERING
+// from strand to strand, as for strands; for a light without a map, the occlusion is used.
 #include "lib_card_texture.glsl"
 #if PRIME
 void main()
@@ -61,6 +61,13 @@ void main()
 #  endif
 
   SkinSeen seen = SkinSeen(card_received, card_beneath.xyz, card_beneath.w);
+  float place = -1.0;
+#  if PLACE_MAP
+  // the map shows the strands that are outermost: from behind one sees others
+  if (dot(across, to_eye) * dot(across, card_normal) > 0.0) {
+    place = card_texel(place_texture, card_uv, steps, atlas_tiles).x;
+  }
+#  endif
   float lit_alpha = alpha;
 #  if SHADOWS
   lit_alpha = card_texel_at(alpha_texture, card_uv, lit_level, atlas_tiles).x;
@@ -88,7 +95,8 @@ void main()
                                     to_eye,
                                     across,
                                     card_axis,
-                                    card_depth);
+                                    card_depth,
+                                    place);
     irradiance *= path.x < 0.0 ? card_occlusion : path.z;
     float level = 0.0;
 #  if MARSCHNER

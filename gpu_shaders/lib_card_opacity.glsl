@@ -67,7 +67,16 @@ vec2 own_strands(float seen, float own, float near, float front)
   return vec2(met, max(own - met, 0.0));
 }
 
-// The same for short hair, where one sees a tip beside others. tau: of the card; own: what light meets of it.
+// The same for a visible strand at this place in their depth: 0 at the front, 1 at the back.
+vec2 own_strands_at(float place, float own, float near, float front)
+{
+  float b = clamp(own, 0.0, {{max_seen}});
+  float ahead = exp(-b * max(place - near, 0.0)), back = exp(-b * max(1.0 - place - near, 0.0));
+  float met = -log(back * (1.0 - front) + ahead * front);  // mix() would lose what is small
+  return vec2(met, max(own - met, 0.0));
+}
+
+// As own_strands for short hair, where one sees a tip beside others. tau: of the card; own: what light meets of it.
 vec2 own_tips(float own, float tau, float front)
 {
   float few = max(tau, {{min_seen}});

@@ -34,6 +34,7 @@ class AtlasMaps:
     along: (h, w) from 0 at the strand's root to 1 at its tip.
     strand_id: (h, w) a random number for each strand, that of the outermost one in the texel.
     occlusion: (h, w) 1 open, 0 occluded, by the strands of the tile.
+    place: see `atlas_depth.places_in_depth`; not a map that is written.
     """
 
     alpha: Floats
@@ -45,6 +46,7 @@ class AtlasMaps:
     strand_id: Floats
     occlusion: Floats
     base_gain: float = 1.0
+    place: Floats | None = None
 
     @property
     def by_name(self) -> dict[str, Floats]:
@@ -53,7 +55,7 @@ class AtlasMaps:
 
 
 #: The maps by name.
-MAPS = tuple(field.name for field in fields(AtlasMaps) if field.name != "base_gain")
+MAPS = tuple(field.name for field in fields(AtlasMaps) if field.name not in ("base_gain", "place"))
 #: Values in tiles without hair.
 _EMPTY: dict[str, float | tuple[float, ...]] = {
     "base": 1.0,

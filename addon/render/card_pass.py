@@ -93,6 +93,7 @@ _SHADED_RECIPE = ShaderRecipe(
             ("LAYERED", 0),
             ("TANGENT_MAP", 0),
             ("NORMAL_MAP", 0),
+            ("PLACE_MAP", 0),
         ),
         *(("MARSCHNER", 0), ("SHADOWS", 0), ("SCATTERING", 0)),
     ),
@@ -233,13 +234,18 @@ class CardPass:
     def _maps_feature(self, cards: CardSnapshot) -> ShaderFeature:
         """The feature of programs that read the textures of these cards."""
         has_normal, has_tangent = cards.textures.normal is not None, cards.has_tangent_map
+        has_place = cards.textures.place is not None
         names = ["base", "alpha", "noise", "tangent" if has_tangent else "shift"]
-        names += ["normal"] * has_normal
+        names += ["normal"] * has_normal + ["place"] * has_place
         return ShaderFeature(
             name="_".join(names[3:]),
             textures={f"{name}_texture": ("FLOAT_2D", self._textures.of(name)) for name in names},
             numbers={"atlas_tiles": ("VEC2", tiles_of(cards.mesh.atlas))},
-            defines={"TANGENT_MAP": int(has_tangent), "NORMAL_MAP": int(has_normal)},
+            defines={
+                "TANGENT_MAP": int(has_tangent),
+                "NORMAL_MAP": int(has_normal),
+                "PLACE_MAP": int(has_place),
+            },
         )
 
     def _draw_shaded(

@@ -49,6 +49,8 @@ class HairTextures:
         are square on the card.
     normal: (height, width, 3) normal n of the strands as 0.5 n + 0.5, in the axes of `tangent`;
         None: the card's normal everywhere.
+    place: (height, width) of the visible strand in the depth of those around it, 0 at their front,
+        1 at their back; None: not known.
     """
 
     base: Floats
@@ -57,6 +59,7 @@ class HairTextures:
     noise: Floats
     tangent: Floats
     normal: Floats | None = None
+    place: Floats | None = None
 
     @property
     def card(self) -> Floats:

@@ -17,7 +17,7 @@ from hairloom.addon.shading.marschner.tables import PREVIEW_SIZE, marschner_tabl
 from hairloom.addon.shading.settings import ShadingSettings
 from hairloom.addon.shading.skin_seen import SkinSeen
 from hairloom.addon.shading.textures import HairTextures
-from hairloom.addon.shading.volume.card_opacity import MAX_ALPHA, own_strands
+from hairloom.addon.shading.volume.card_opacity import MAX_ALPHA, own_strands, own_strands_at
 from hairloom.addon.shading.volume.dual import fractions, fractions_at, off_far_skin
 from hairloom.addon.shading.volume.settings import VolumeSettings
 from hairloom.addon.strands import Surface
@@ -168,6 +168,36 @@ def test_other_strands_of_a_deep_card_are_before_the_one_that_is_seen(
     before, _ = own_strands(own, own, 0.0, 1.0)
     expected = np.exp(-before) if depth else 1.0
     assert shown / bare == pytest.approx(expected, rel=0.03)
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("place", [0.1, 0.8])
+def test_a_map_stores_how_deep_the_visible_strand_of_a_card_lies(
+    frame: Any, form: str, place: float
+) -> None:
+    """Light from the eye's side meets the strands before that place; from behind, the eye sees
+    strands that the map does not store, and they have the mean over all places."""
+    alpha, volume = 0.9, of_form(form, bias=1.0e-6)
+    facing = card(0.0, 1.0, 1.0)
+    turned = {**facing, "normal": -facing["normal"]}
+    textures = textures_of([alpha, alpha])
+    textures = dataclasses.replace(textures, place=np.full((2, 2), place, np.float32))
+    options: dict[str, Any] = {"lights": (SUN,), "ambient": (0.0, 0.0, 0.0), "shading": PLAIN}
+    even = {"is_view_compensated": True, "depth": np.full(4, 0.5, np.float32)}
+    own = -np.log(1.0 - alpha) * 2.0 / np.pi
+    known, unknown = own_strands_at(place, own, 0.0, 1.0), own_strands(own, own, 0.0, 1.0)
+    for each, (before, _) in ((facing, known), (turned, unknown)):
+        shown, bare = (
+            frame.render_image(
+                snapshot_of(mesh_of(each), textures, volume=light, cards=even, **options),
+                camera(frame),
+                SIZE,
+                SIZE,
+                1,
+            )[16, 8:24, 0]
+            for light in (volume, dataclasses.replace(volume, extinction=1.0e-6))
+        )
+        assert shown / bare == pytest.approx(np.exp(-before), rel=0.03)
 
 
 def test_light_is_looked_up_at_the_strand_that_is_seen(frame: Any) -> None:

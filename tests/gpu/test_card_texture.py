@@ -17,6 +17,7 @@ from hairloom.addon.shading.volume.card_opacity import (
     card_optical_depth,
     layer_facing,
     own_strands,
+    own_strands_at,
     own_tips,
     seen_depth,
     view_compensated_depth,
@@ -89,13 +90,14 @@ def test_level_and_slant(compute: Callable[..., np.ndarray]) -> None:
     assert (level > 1.0).mean() > 0.2
     first, second, parts = steps[..., 0], steps[..., 1], np.minimum(steps[..., 2:], 1.0)
     own = card_optical_depth(alpha) * view_compensated_depth(normals, tangents, eyes)
-    strands, tips = (
+    strands, known, tips = (
         np.stack(each, axis=-1)
         for each in (
             own_strands(first, own, second, parts[..., 0]),
+            own_strands_at(parts[..., 0], own, second, parts[..., 1]),
             own_tips(own, card_optical_depth(alpha), parts[..., 1]),
         )
     )
-    among = strands + tips + seen_depth(first)[..., None]
+    among = strands + known + tips + seen_depth(first)[..., None]
     assert found[..., 2:] == pytest.approx(among, rel=1e-3, abs=1e-3)
     assert np.ptp(among) > 1.0

@@ -18,6 +18,7 @@ import numpy as np
 from ...arrays import Floats
 from ...card_flow import bound_cards, card_build_steps, card_groom, cards_at
 from ...cards.atlas import AtlasPlan
+from ...cards.atlas_depth import places_in_depth
 from ...cards.atlas_maps import AtlasMaps, dilated
 from ...cards.atlas_settings import AtlasSettings
 from ...cards.bake import sampled_maps
@@ -276,7 +277,7 @@ def card_maps(inputs: CardInputs, build: CardBuild, draw: AtlasDraw) -> CardMaps
     gain = 1.0 if "base" in pictures else maps.base_gain
     names = ("alpha", "shift", "noise", "tangent", "normal")
     shown = {name: by_name[name] for name in names}
-    textures = HairTextures(base=by_name["base"] * gain, **shown)
+    textures = HairTextures(base=by_name["base"] * gain, **shown, place=maps.place)
     return CardMaps(
         by_name,
         textures,
@@ -329,9 +330,10 @@ def baked_atlas(
     )
     if isinstance(plan, ShellPlan):
         flat = shell_strands(plan, grid, groom.radius, UPRIGHT_SHOWN, colors)
-    else:
-        flat = flat_strands(plan, grid, groom.radius, colors)
-    return dilated(draw(flat, plan.size), plan.grid)
+        return dilated(draw(flat, plan.size), plan.grid)
+    flat = flat_strands(plan, grid, groom.radius, colors)
+    maps = dilated(draw(flat, plan.size), plan.grid)
+    return replace(maps, place=places_in_depth(maps, flat, plan))
 
 
 def has_gpu() -> bool:

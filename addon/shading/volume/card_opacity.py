@@ -124,6 +124,21 @@ def own_strands(seen: Floats, own: Floats, near: Floats, front: Floats) -> tuple
     return met, np.maximum(own - met, 0.0)
 
 
+def own_strands_at(
+    place: Floats, own: Floats, near: Floats, front: Floats
+) -> tuple[Floats, Floats]:
+    """As `own_strands`, for a visible strand whose place in their depth is known.
+
+    Args:
+        place: 0 at the front of the strands, 1 at their back.
+    """
+    b = np.clip(own, 0.0, MAX_SEEN)
+    ahead = np.exp(-b * np.maximum(place - near, 0.0))
+    back = np.exp(-b * np.maximum(1.0 - place - near, 0.0))
+    met = -np.log(back * (1.0 - front) + ahead * front)
+    return met, np.maximum(own - met, 0.0)
+
+
 def own_tips(own: Floats, tau: Floats, front: Floats) -> tuple[Floats, Floats]:
     """As `own_strands`, for short hair, whose visible tip has the others beside it.
 

@@ -13,6 +13,7 @@ void main()
               view_compensated_depth(
                   across.xyz, texelFetch(tangents, pixel, 0).xyz, texelFetch(eyes, pixel, 0).xyz);
   vec2 among = own_strands(steps.x, own, steps.y, min(steps.z, 1.0)) + seen_depth(steps.x);
+  among += own_strands_at(min(steps.z, 1.0), own, steps.y, min(steps.w, 1.0));
   among += own_tips(own, card_optical_depth(across.w), min(steps.w, 1.0));
   imageStore(result, pixel, vec4(even, wanted_level(steps.xy, steps.zw, size), among));
 }

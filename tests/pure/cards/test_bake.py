@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from hairloom.addon.cards.atlas import AtlasPlan
+from hairloom.addon.cards.atlas_depth import places_in_depth
 from hairloom.addon.cards.atlas_grid import AtlasGrid
 from hairloom.addon.cards.atlas_maps import AtlasMaps, dilated, tile_edges
 from hairloom.addon.cards.bake import sampled_maps
@@ -256,3 +257,26 @@ def test_values_go_over_from_hair_to_hair() -> None:
 def test_tiles_begin_where_the_middle_of_a_texel_does() -> None:
     assert tile_edges(128, 5).tolist() == [0, 26, 51, 77, 102, 128]
     assert tile_edges(64, 4).tolist() == [0, 16, 32, 48, 64]
+
+
+@pytest.mark.parametrize(("bend", "column"), [(0.0, 0), (0.4, 1)])
+def test_a_texel_stores_how_deep_its_strand_lies_among_others(bend: float, column: int) -> None:
+    """Straight strands at random in a slab, flat or bent about the head, against the foremost one
+    at 16 places of each texel: where it lies between the front and the back of the slab."""
+    random, count, deep, width = np.random.default_rng(2), 300, 0.3 * WIDTH, 0.03
+    across, behind = random.uniform(-0.48, 0.48, count), random.random(count)
+    grid = lines(across)
+    grid[..., 1] = (bend * WIDTH * across**2 - deep * (0.5 - behind))[:, None]
+    single = np.zeros((1, ROWS, 3), np.float32)
+    beside = slice(None, None, 1 - 2 * column)
+    plan = plan_of([count, 1][beside], AtlasGrid(2, 1))
+    flat, maps = baked(plan, np.concatenate([grid, single][beside]), width, 64)
+    tiles = np.split(places_in_depth(maps, flat, plan), 2, axis=1)
+    sample = (np.arange(32 * 16) + 0.5) / (32 * 16) - 0.5
+    is_met = np.abs(sample[:, None] - across) < 0.5 * width
+    foremost = np.where(is_met, grid[:, 0, 1], np.inf).argmin(axis=1)
+    expected = behind[foremost].reshape(32, 16).mean(axis=1)[2:-2]
+    place = tiles[column][:, 2:-2]
+    assert np.abs(place - expected).mean() < 0.05
+    assert np.corrcoef(place.mean(axis=0), expected)[0, 1] > 0.7
+    assert (tiles[1 - column] == 0.5).all()  # a single strand has no depth

@@ -15,6 +15,7 @@ from hairloom.addon.shading.volume.card_opacity import (
     layer_facing,
     lit_level,
     own_strands,
+    own_strands_at,
     own_tips,
     seen_depth,
     view_compensated_depth,
@@ -152,6 +153,9 @@ def test_light_that_comes_to_the_strand_of_a_card_that_is_seen(
     )
     for side, light in ((1.0, front), (0.0, behind), (0.5, 0.5 * (front + behind))):
         assert np.exp(-own_strands(seen, lit, near, side)[0]) == pytest.approx(light, abs=2e-3)
+        each, beyond = own_strands_at(first, lit, near, side)
+        assert np.exp(-each).mean() == pytest.approx(light, abs=2e-3)
+        assert (each + beyond == pytest.approx(lit)) and each.min() >= 0.0 <= beyond.min()
 
 
 def test_counts_that_are_out_of_the_ordinary() -> None:
