@@ -3,7 +3,7 @@
 // PRIME 1: only the depth of opaque pixels. CLIPPED 1: only pixels in alpha_range; without it no pixel is
 // dropped, so that the early depth test works. TANGENT_MAP 1: a map of strand directions replaces the shift
 // texture. LAYERED 1: shells, see addon/cards/shells.py. NORMAL_MAP 1: a map bends the normal. PLACE_MAP 1:
-// a map stores how deep the visible strand lies among the others. SHADOWS of hair on hair, and SCATTERING
+// a map stores how much deeper the visible strand lies than on average. SHADOWS of hair on hair, and SCATTERING
 // from strand to strand, as for strands; for a light without a map, the occlusion is used.
 #include "lib_card_texture.glsl"
 #if PRIME
@@ -61,11 +61,11 @@ void main()
 #  endif
 
   SkinSeen seen = SkinSeen(card_received, card_beneath.xyz, card_beneath.w);
-  float place = -1.0;
+  float deeper = 0.0;
 #  if PLACE_MAP
   // the map shows the strands that are outermost: from behind one sees others
   if (dot(across, to_eye) * dot(across, card_normal) > 0.0) {
-    place = card_texel(place_texture, card_uv, steps, atlas_tiles).x;
+    deeper = 2.0 * card_texel(place_texture, card_uv, steps, atlas_tiles).x - 1.0;
   }
 #  endif
   float lit_alpha = alpha;
@@ -96,7 +96,7 @@ void main()
                                     across,
                                     card_axis,
                                     card_depth,
-                                    place);
+                                    deeper);
     irradiance *= path.x < 0.0 ? card_occlusion : path.z;
     float level = 0.0;
 #  if MARSCHNER

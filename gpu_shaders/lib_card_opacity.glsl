@@ -67,13 +67,12 @@ vec2 own_strands(float seen, float own, float near, float front)
   return vec2(met, max(own - met, 0.0));
 }
 
-// The same for a visible strand at this place in their depth: 0 at the front, 1 at the back.
-vec2 own_strands_at(float place, float own, float near, float front)
+// The same for a strand that lies deeper than the visible ones do on average, by this fraction of their depth.
+vec2 own_strands_deeper(vec2 strands, float deeper, float front)
 {
-  float b = clamp(own, 0.0, {{max_seen}});
-  float ahead = exp(-b * max(place - near, 0.0)), back = exp(-b * max(1.0 - place - near, 0.0));
-  float met = -log(back * (1.0 - front) + ahead * front);  // mix() would lose what is small
-  return vec2(met, max(own - met, 0.0));
+  float own = strands.x + strands.y;
+  float met = clamp(strands.x + own * deeper * (2.0 * front - 1.0), 0.0, own);
+  return vec2(met, own - met);
 }
 
 // As own_strands for short hair, where one sees a tip beside others. tau: of the card; own: what light meets of it.

@@ -6,8 +6,8 @@
 
 // As shadow_path, for a place of a card with this alpha. `across`: normal of its plane, of any length.
 // VIEW_COMPENSATED: the path ends at the visible one of the strands, which fill a depth [m] about the plane;
-// depth 0 means short hair. place: of the visible strand in that depth, 0 at the
-// front; negative: not known.
+// depth 0 means short hair. deeper: than visible strands lie on average, by this
+// fraction of that depth.
 vec3 shadow_path_to_card(int index,
                          vec3 point,
                          float alpha,
@@ -16,7 +16,7 @@ vec3 shadow_path_to_card(int index,
                          vec3 across,
                          vec3 tangent,
                          float depth,
-                         float place)
+                         float deeper)
 {
 #if !SHADOWS
   return shadow_path(index, point);
@@ -27,7 +27,7 @@ vec3 shadow_path_to_card(int index,
   float seen = own * view_compensated_depth(across, tangent, to_eye);
   own *= view_compensated_depth(across, tangent, to_light);
   vec3 front = across / max(length(across), 1.0e-30) * (dot(across, to_eye) < 0.0 ? -1.0 : 1.0);
-  strand += depth * (0.5 - (place < 0.0 ? seen_depth(seen) : place)) * front;
+  strand += depth * (0.5 - seen_depth(seen)) * front;
 #  endif
   vec3 path = shadow_path(index, strand);
   if (path.x >= 0.0) {
@@ -37,9 +37,8 @@ vec3 shadow_path_to_card(int index,
     float bias = opacity.bias / length(opacity.map_depth[index].xyz);
     float near = bias * max(abs(facing), {{min_facing}}) / max(depth, {{min_depth}});
     float ahead = clamp(0.5 + {{sidedness}} * facing, 0.0, 1.0);
-    vec2 others = depth <= 0.0 ? own_tips(own, tau, ahead) :
-                  place < 0.0  ? own_strands(seen, own, near, ahead) :
-                                 own_strands_at(place, own, near, ahead);
+    vec2 others = depth > 0.0 ? own_strands_deeper(own_strands(seen, own, near, ahead), deeper, ahead) :
+                                own_tips(own, tau, ahead);
     path.xy = others + max(path.xy - own * vec2(fraction, 1.0 - fraction), 0.0);
 #  else
     path.x = max(path.x - fraction * own, 0.0);

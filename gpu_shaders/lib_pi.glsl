@@ -1,1 +1,3 @@
+// The constant pi. Holds no resources.
+
 const float PI = 3.14159265358979;

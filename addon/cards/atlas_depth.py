@@ -16,7 +16,8 @@ from .bake_strands import FlatStrands
 
 #: Nodes across and along a tile, between which the mean and the extent of depths are interpolated.
 _ACROSS, _ALONG = 5, 17
-#: Weight of the tile's own mean, in stations of strands: it decides where there are none.
+#: Weight of the tile's own mean, in stations of strands, and alpha of empty texels: they decide
+#: where there are no strands.
 _PRIOR = 1.0e-3
 #: Extent over standard deviation of evenly spread depths.
 _EXTENT = np.sqrt(12.0)
@@ -25,8 +26,9 @@ _FLAT = 1.0e-4
 
 
 def places_in_depth(maps: AtlasMaps, flat: FlatStrands, plan: AtlasPlan) -> Floats:
-    """Where the strand of each texel lies among those around it, (h, w) float32: 0 at their front,
-    1 at their back, 0.5 where they lie in a plane.
+    """How much deeper the strand of each texel lies among those around it than the visible strands
+    of its tile on average, (h, w) float32: 0.5 as deep, 0 and 1 the whole depth of the strands
+    before and behind it.
 
     The extent of strands is that of even ones with the same variance, as in `taken_over`.
     """
@@ -46,7 +48,9 @@ def places_in_depth(maps: AtlasMaps, flat: FlatStrands, plan: AtlasPlan) -> Floa
         )
         mean, deep = (along @ values[tile] @ across.T for values in (middle, extent))
         behind = 0.5 - (maps.depth[own] - mean) / np.maximum(deep, _FLAT)
-        places[own] = np.where(deep > _FLAT, np.clip(behind, 0.0, 1.0), 0.5)
+        behind = np.where(deep > _FLAT, np.clip(behind, 0.0, 1.0), 0.5)
+        visible = np.average(behind, weights=maps.alpha[own] + _PRIOR)
+        places[own] = 0.5 + 0.5 * (behind - visible)
     return places
 
 

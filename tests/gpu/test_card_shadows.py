@@ -17,7 +17,7 @@ from hairloom.addon.shading.marschner.tables import PREVIEW_SIZE, marschner_tabl
 from hairloom.addon.shading.settings import ShadingSettings
 from hairloom.addon.shading.skin_seen import SkinSeen
 from hairloom.addon.shading.textures import HairTextures
-from hairloom.addon.shading.volume.card_opacity import MAX_ALPHA, own_strands, own_strands_at
+from hairloom.addon.shading.volume.card_opacity import MAX_ALPHA, own_strands, own_strands_deeper
 from hairloom.addon.shading.volume.dual import fractions, fractions_at, off_far_skin
 from hairloom.addon.shading.volume.settings import VolumeSettings
 from hairloom.addon.strands import Surface
@@ -171,12 +171,12 @@ def test_other_strands_of_a_deep_card_are_before_the_one_that_is_seen(
 
 
 @pytest.mark.parametrize("form", FORMS)
-@pytest.mark.parametrize("place", [0.1, 0.8])
+@pytest.mark.parametrize("place", [0.4, 0.7])
 def test_a_map_stores_how_deep_the_visible_strand_of_a_card_lies(
     frame: Any, form: str, place: float
 ) -> None:
-    """Light from the eye's side meets the strands before that place; from behind, the eye sees
-    strands that the map does not store, and they have the mean over all places."""
+    """Light from the eye's side meets more strands before a deeper one; from behind, the eye sees
+    strands that the map does not store, and they have the average."""
     alpha, volume = 0.9, of_form(form, bias=1.0e-6)
     facing = card(0.0, 1.0, 1.0)
     turned = {**facing, "normal": -facing["normal"]}
@@ -185,7 +185,8 @@ def test_a_map_stores_how_deep_the_visible_strand_of_a_card_lies(
     options: dict[str, Any] = {"lights": (SUN,), "ambient": (0.0, 0.0, 0.0), "shading": PLAIN}
     even = {"is_view_compensated": True, "depth": np.full(4, 0.5, np.float32)}
     own = -np.log(1.0 - alpha) * 2.0 / np.pi
-    known, unknown = own_strands_at(place, own, 0.0, 1.0), own_strands(own, own, 0.0, 1.0)
+    unknown = own_strands(own, own, 0.0, 1.0)
+    known = own_strands_deeper(unknown, 2.0 * place - 1.0, 1.0)
     for each, (before, _) in ((facing, known), (turned, unknown)):
         shown, bare = (
             frame.render_image(

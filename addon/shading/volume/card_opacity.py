@@ -124,19 +124,18 @@ def own_strands(seen: Floats, own: Floats, near: Floats, front: Floats) -> tuple
     return met, np.maximum(own - met, 0.0)
 
 
-def own_strands_at(
-    place: Floats, own: Floats, near: Floats, front: Floats
+def own_strands_deeper(
+    strands: tuple[Floats, Floats], deeper: Floats, front: Floats
 ) -> tuple[Floats, Floats]:
-    """As `own_strands`, for a visible strand whose place in their depth is known.
+    """`own_strands` of a visible strand whose depth is known: tau grows evenly with the depth.
 
     Args:
-        place: 0 at the front of the strands, 1 at their back.
+        strands: result of `own_strands`.
+        deeper: than visible strands lie on average, as a fraction of the strands' depth.
     """
-    b = np.clip(own, 0.0, MAX_SEEN)
-    ahead = np.exp(-b * np.maximum(place - near, 0.0))
-    back = np.exp(-b * np.maximum(1.0 - place - near, 0.0))
-    met = -np.log(back * (1.0 - front) + ahead * front)
-    return met, np.maximum(own - met, 0.0)
+    own = strands[0] + strands[1]
+    met = np.clip(strands[0] + own * deeper * (2.0 * front - 1.0), 0.0, own)
+    return met, own - met
 
 
 def own_tips(own: Floats, tau: Floats, front: Floats) -> tuple[Floats, Floats]:

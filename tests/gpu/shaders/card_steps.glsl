@@ -12,8 +12,8 @@ void main()
   float own = card_optical_depth(across.w) *
               view_compensated_depth(
                   across.xyz, texelFetch(tangents, pixel, 0).xyz, texelFetch(eyes, pixel, 0).xyz);
-  vec2 among = own_strands(steps.x, own, steps.y, min(steps.z, 1.0)) + seen_depth(steps.x);
-  among += own_strands_at(min(steps.z, 1.0), own, steps.y, min(steps.w, 1.0));
-  among += own_tips(own, card_optical_depth(across.w), min(steps.w, 1.0));
+  vec2 among = own_strands(steps.x, own, steps.y, min(steps.z, 1.0));
+  among = own_strands_deeper(among, 2.0 * min(steps.w, 1.0) - 1.0, min(steps.z, 1.0));
+  among += seen_depth(steps.x) + own_tips(own, card_optical_depth(across.w), min(steps.w, 1.0));
   imageStore(result, pixel, vec4(even, wanted_level(steps.xy, steps.zw, size), among));
 }

@@ -64,7 +64,7 @@ def test_names_are_replaced_and_unknown_ones_refused(folder: Path) -> None:
 def test_folders_are_searched_in_turn(folder: Path) -> None:
     name = write(folder, '#include "lib_one.glsl"\n#include "lib_lights.glsl"\n')
     origins = {file for file, _ in compose(name, [folder, SHADER_FOLDER]).origins}
-    assert origins == {"lib_one.glsl", "lib_lights.glsl", "lib_angle.glsl"}
+    assert origins == {"lib_one.glsl", "lib_lights.glsl", "lib_angle.glsl", "lib_pi.glsl"}
 
 
 @pytest.mark.parametrize("file", sorted(SHADER_FOLDER.glob("*.glsl")), ids=lambda file: file.name)

@@ -15,7 +15,7 @@ from hairloom.addon.shading.volume.card_opacity import (
     layer_facing,
     lit_level,
     own_strands,
-    own_strands_at,
+    own_strands_deeper,
     own_tips,
     seen_depth,
     view_compensated_depth,
@@ -153,9 +153,24 @@ def test_light_that_comes_to_the_strand_of_a_card_that_is_seen(
     )
     for side, light in ((1.0, front), (0.0, behind), (0.5, 0.5 * (front + behind))):
         assert np.exp(-own_strands(seen, lit, near, side)[0]) == pytest.approx(light, abs=2e-3)
-        each, beyond = own_strands_at(first, lit, near, side)
-        assert np.exp(-each).mean() == pytest.approx(light, abs=2e-3)
-        assert (each + beyond == pytest.approx(lit)) and each.min() >= 0.0 <= beyond.min()
+
+
+@pytest.mark.parametrize("lit", [0.3, 1.5])
+def test_light_that_comes_to_a_strand_of_a_known_depth(lit: float) -> None:
+    """Against exp(-lit s), the light of a strand at s of the depth: with visible strands at random,
+    and within the first order of what each lies deeper than they do on average."""
+    random, seen = np.random.default_rng(0), 2.0
+    count = random.poisson(seen, 200_000)
+    place = 1.0 - random.random(len(count)) ** (1.0 / np.maximum(count, 1))
+    place = place[count > 0]
+    deeper = place - place.mean()
+    mean = own_strands(seen, lit, 0.0, 1.0)
+    before, beyond = own_strands_deeper(mean, deeper, 1.0)
+    assert before + beyond == pytest.approx(lit) and before.min() >= 0.0 <= beyond.min()
+    assert np.abs(np.exp(-before) - np.exp(-lit * place)).max() < 0.1 * lit
+    assert np.exp(-before).mean() == pytest.approx(np.exp(-mean[0]), rel=0.1)
+    behind, _ = own_strands_deeper(own_strands(seen, lit, 0.0, 0.0), deeper, 0.0)
+    assert np.abs(np.exp(-behind) - np.exp(-lit * (1.0 - place))).max() < 0.1 * lit
 
 
 def test_counts_that_are_out_of_the_ordinary() -> None:
