@@ -669,7 +669,7 @@ def test_hair_of_another_scale_is_told_of_a_dense_head_as_of_any(new_hair, evalu
         with pytest.raises(HairloomError) as error:
             make_it(order)
         told.append(str(error.value))
-    assert told[0] == told[1] and "another scale" in told[0]
+    assert told[0] == told[1] and "a different scale" in told[0]
 
 
 def test_hair_of_another_scene_is_not_waited_for(hair, evaluated, in_window):
