@@ -63,7 +63,7 @@ void main()
   SkinSeen seen = SkinSeen(card_received, card_beneath.xyz, card_beneath.w);
   float deeper = 0.0;
 #  if PLACE_MAP
-  // the map shows the strands that are outermost: from behind one sees others
+  // the map holds the outermost strands; from behind, others are visible
   if (dot(across, to_eye) * dot(across, card_normal) > 0.0) {
     deeper = 2.0 * card_texel(place_texture, card_uv, steps, atlas_tiles).x - 1.0;
   }

@@ -67,7 +67,7 @@ vec2 own_strands(float seen, float own, float near, float front)
   return vec2(met, max(own - met, 0.0));
 }
 
-// The same for a strand that lies deeper than the visible ones do on average, by this fraction of their depth.
+// own_strands for a strand that lies deeper than visible strands on average, by this fraction of their depth.
 vec2 own_strands_deeper(vec2 strands, float deeper, float front)
 {
   float own = strands.x + strands.y;

@@ -6,8 +6,8 @@
 
 // As shadow_path, for a place of a card with this alpha. `across`: normal of its plane, of any length.
 // VIEW_COMPENSATED: the path ends at the visible one of the strands, which fill a depth [m] about the plane;
-// depth 0 means short hair. deeper: than visible strands lie on average, by this
-// fraction of that depth.
+// depth 0 means short hair. deeper: how much deeper it lies than visible strands on average, as a fraction
+// of that depth.
 vec3 shadow_path_to_card(int index,
                          vec3 point,
                          float alpha,

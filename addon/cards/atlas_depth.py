@@ -1,8 +1,8 @@
-"""How deep the strand that a texel of an atlas shows lies among the strands around it.
+"""How deep the visible strand of each texel of an atlas lies among the strands around it.
 
-The outermost strands of a tile hide the others. Some of them lie at the front of the tile's strands
-and are lit, others lie deeper and are in the shade of those beside them. A card that is shaded as
-one surface shows neither: it looks like a scale.
+Some of the visible strands lie at the front of their tile's strands and are lit; others lie deeper,
+in the shade of their neighbours. Without that difference each card has one brightness, and hair
+looks like scales.
 """
 
 from __future__ import annotations
@@ -13,24 +13,23 @@ from ..arrays import Floats
 from .atlas import AtlasPlan
 from .atlas_maps import AtlasMaps, tile_edges
 from .bake_strands import FlatStrands
+from .taken_over import EXTENT
 
 #: Nodes across and along a tile, between which the mean and the extent of depths are interpolated.
 _ACROSS, _ALONG = 5, 17
-#: Weight of the tile's own mean, in stations of strands, and alpha of empty texels: they decide
-#: where there are no strands.
+#: Weight of the tile's mean at each node, in stations of strands, and of texels without hair in the
+#: average: they only matter where there are no strands.
 _PRIOR = 1.0e-3
-#: Extent over standard deviation of evenly spread depths.
-_EXTENT = np.sqrt(12.0)
-#: Depths that differ by less, in widths of a card, are one.
+#: Strands of less depth than this lie in a plane, in widths of a card.
 _FLAT = 1.0e-4
 
 
 def places_in_depth(maps: AtlasMaps, flat: FlatStrands, plan: AtlasPlan) -> Floats:
-    """How much deeper the strand of each texel lies among those around it than the visible strands
-    of its tile on average, (h, w) float32: 0.5 as deep, 0 and 1 the whole depth of the strands
-    before and behind it.
+    """The depth of each texel's visible strand among the strands around it, relative to the average
+    of its tile's visible strands, (h, w) float32.
 
-    The extent of strands is that of even ones with the same variance, as in `taken_over`.
+    0.5 is the average; 0 and 1 lie in front of it and behind it by the whole depth of the strands,
+    which is that of evenly spread ones with the same variance.
     """
     places = np.full(maps.depth.shape, 0.5, np.float32)
     middle, extent = _spread(flat, plan)
@@ -80,6 +79,6 @@ def _spread(flat: FlatStrands, plan: AtlasPlan) -> tuple[Floats, Floats]:
     whole = by_node.sum(axis=2, keepdims=True)
     by_node = by_node + _PRIOR * whole / np.maximum(whole[:1], 1.0)
     mean, square = by_node[1:] / np.maximum(by_node[0], 1.0e-30)
-    extent = _EXTENT * np.sqrt(np.maximum(square - mean**2, 0.0))
+    extent = EXTENT * np.sqrt(np.maximum(square - mean**2, 0.0))
     shape = (tiles, _ALONG, _ACROSS)
     return mean.reshape(shape), extent.reshape(shape)

@@ -28,7 +28,7 @@ _MIN_SEEN = 1.0e-6
 #: Hair is short if it is shorter than this many times the depth of its card.
 _SLENDER = 8.0
 #: Extent of an even distribution over its standard deviation.
-_EXTENT = np.sqrt(12.0)
+EXTENT = np.sqrt(12.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +89,7 @@ def taken_over(
         occluded[chosen] = _mean(_at(occlusion[..., None], strand, along), weight)[:, 0]
         height = np.einsum("vsi,vi->vs", away, plane[chosen])[..., None]
         variance = _mean(height**2, weight) - _mean(height, weight) ** 2
-        extent = _EXTENT * np.sqrt(np.maximum(variance[:, 0], 0.0))
+        extent = EXTENT * np.sqrt(np.maximum(variance[:, 0], 0.0))
         is_short = _mean(length[strand][..., None], weight)[:, 0] < _SLENDER * extent
         depth[chosen] = np.where(is_short, 0.0, extent)
         if light is not None and lit is not None:

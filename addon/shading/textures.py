@@ -49,8 +49,8 @@ class HairTextures:
         are square on the card.
     normal: (height, width, 3) normal n of the strands as 0.5 n + 0.5, in the axes of `tangent`;
         None: the card's normal everywhere.
-    place: (height, width) depth of the visible strand beside the average of its tile: 0.5 as deep,
-        0 and 1 by the whole depth of the strands before and behind it; None: not known.
+    place: (height, width) depth of the visible strand relative to the average of its tile, see
+        cards.atlas_depth: 0.5 is the average, more is deeper; None: not known.
     """
 
     base: Floats

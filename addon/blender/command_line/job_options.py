@@ -356,7 +356,7 @@ def _stage_preset(stage: str) -> Preset[Any]:
         raise HairloomError(
             "this preset has no settings of the stage",
             place=f"--stage {stage}",
-            remedy=f"Use {', '.join(_stages())} or give it as --preset",
+            remedy=f"Use {' or '.join(_stages())}; pass a look with --preset",
         )
     return preset
 
