@@ -14,7 +14,7 @@ from ..bakes.bake_settings import OVERRIDE, folder_of
 from ..base.report import Report
 from ..preview.bake import Bake, bakeable, free, show_in_renders
 from .job_options import add_frames_option, add_object_option, frames_of_option
-from .job_steps import Job, tell_notes
+from .job_steps import Job, report_notes
 from .object_settings import all_of_scene, named_objects, put_settings
 from .scene_files import save_scene
 from .verb import Verb
@@ -24,7 +24,7 @@ def bake(job: Job) -> None:
     """Simulate hair and cloth of a scene frame by frame and keep the motion on disk."""
     report, options = job.report, job.options
     objects, notes = _objects(options.object)
-    tell_notes(list(notes), report)
+    report_notes(list(notes), report)
     if options.delete:
         _delete(objects, report)
     else:
@@ -61,7 +61,7 @@ def _bake(objects: list[bpy.types.Object], job: Job) -> None:
     )
     write_bake(plan, report, "baking", "bake frame")
     show_in_renders(objects, bpy.context.evaluated_depsgraph_get())
-    tell_notes(plan.notes, report)
+    report_notes(plan.notes, report)
     _tell(objects, report)
 
 

@@ -31,7 +31,7 @@ from .job_options import (
     frames_of_option,
     parameters_of,
 )
-from .job_steps import Job, card_edits, finish, motion_of, read_rig, tell_notes
+from .job_steps import Job, card_edits, finish, motion_of, read_rig, report_notes
 from .places import check_not_read
 from .verb import Verb
 
@@ -57,7 +57,7 @@ def _own_pictures(job: Job) -> dict[str, Floats]:
     if hair is None:
         return {}
     pictures, warnings = chosen_pictures(hair.data.hairloom.card_images)
-    tell_notes(list(warnings), job.report)
+    report_notes(list(warnings), job.report)
     return pictures
 
 
@@ -102,7 +102,7 @@ def written_cards(
     if written.figures is not None:
         report.facts.update(written.figures.as_dict())
     print(order_line(written.build.wrong_fraction), flush=True)
-    tell_notes(list(written.notes), report)
+    report_notes(list(written.notes), report)
     for file in written.files:
         report.add_output(file)
     return written

@@ -29,7 +29,7 @@ from .idle_options import check_idle_options
 from .import_job import IMPORT
 from .inputs import Sources
 from .job_options import check_numbers, chosen_settings
-from .job_steps import Job, tell_notes
+from .job_steps import Job, report_notes
 from .object_settings import all_of_scene, hair_named, is_groom, named_objects
 from .places import check_outputs, check_report
 from .render_job import RENDER
@@ -219,7 +219,7 @@ def _styled(options: argparse.Namespace, report: Report) -> str:
     added = at_once(
         add_hairstyle(style, head, depsgraph, collection, hairline=options.children_density or "")
     )
-    tell_notes([*added.warnings, *added.done], report)
+    report_notes([*added.warnings, *added.done], report)
     bpy.context.view_layer.update()
     return str(added.hair.name)
 
@@ -233,7 +233,7 @@ def _only_groom(options: argparse.Namespace, report: Report) -> str | None:
     if not options.scene or options.head or getattr(options, "bake", None):
         return None
     found, notes = all_of_scene(is_groom, "--groom")
-    tell_notes(list(notes), report)
+    report_notes(list(notes), report)
     grooms = [obj.name for obj in found]
     if len(grooms) > 1:
         raise HairloomError(

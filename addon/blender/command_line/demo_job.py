@@ -16,7 +16,7 @@ from ..cards.textures import named_pictures
 from ..pictures.studio import Studio
 from .cards_job import written_cards
 from .job_options import add_motion_options, add_picture_options, add_texture_option
-from .job_steps import Job, PosedHair, open_studio, read_rig, tell_notes
+from .job_steps import Job, PosedHair, open_studio, read_rig, report_notes
 from .render_job import write_sheet, write_still
 from .simulate_job import at_rest, simulated
 from .verb import Verb
@@ -34,7 +34,7 @@ def demo(job: Job) -> None:
         still = write_still(job, folder / "still.png", studio, PosedHair.of_rest(rig))
         _write_close_up(job, folder / "close_up.png", studio, rig)
         write_sheet(job, folder / "motion.png", studio, motion)
-    tell_notes(list(studio.notes), report)
+    report_notes(list(studio.notes), report)
     written = written_cards(job, folder / "cards.glb", rig, pictures)
     _write_card_still(job, folder / "cards.png", studio, rig, written, still)
     with report.stage("write strands"):

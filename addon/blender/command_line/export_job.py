@@ -38,7 +38,15 @@ from .job_options import (
     frames_of_option,
     parameters_of,
 )
-from .job_steps import Job, job_colors, motion_of, read_hair, read_rig, tell_drops, tell_notes
+from .job_steps import (
+    Job,
+    job_colors,
+    motion_of,
+    read_hair,
+    read_rig,
+    report_dropped_strands,
+    report_notes,
+)
 from .object_settings import named_grooms, put_settings
 from .places import check_not_read
 from .verb import Verb
@@ -60,12 +68,12 @@ def export(job: Job) -> None:
     facts = plan.check()
     report.facts.update(preflight=facts, dropped=plan.dropped)
     if options.preflight:
-        tell_notes(list(plan.notes), report)
+        report_notes(list(plan.notes), report)
         _tell_check(facts, options.preflight)
         return
     with report.stage("write strands"):
         outcome = plan.write(path, None if frames is None else _counted(job, plan))
-    tell_notes(list(outcome.warnings), report)
+    report_notes(list(outcome.warnings), report)
     for file in plan.files:
         report.add_output(file)
     print(outcome.result)
@@ -90,7 +98,7 @@ def _of_objects(
     """Hair of the scene, as the artist's operators write it."""
     options, depsgraph = job.options, bpy.context.evaluated_depsgraph_get()
     hair, notes = named_grooms(options.object)
-    tell_notes(list(notes), job.report)
+    report_notes(list(notes), job.report)
     for each in hair:
         put_settings(each, options.preset, options.set)
         if options.children_density:
@@ -108,7 +116,7 @@ def _of_objects(
         for folder in filter(None, map(folder_of, hair if plan.moving else ())):
             job.report.add_input(folder)  # also an empty one, as a later bake may fill it
         plan = plan.standing() if still else plan
-    tell_drops(job, plan.dropped, ", ".join(each.name for each in hair))
+    report_dropped_strands(job, plan.dropped, ", ".join(each.name for each in hair))
     return plan
 
 

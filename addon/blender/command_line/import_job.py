@@ -14,7 +14,7 @@ from ..base.outcome import dropped_phrase
 from ..scene.mesh_files import import_mesh_file, scale_object
 from ..strands.import_groom import GUIDES, Ground, StrandImport, import_strands, read_ground
 from .job_options import add_head_scale_option
-from .job_steps import Job, tell_notes
+from .job_steps import Job, report_notes
 from .object_settings import named_objects, put_settings
 from .verb import Verb
 
@@ -24,7 +24,7 @@ def import_grooms(job: Job) -> None:
     options, report = job.options, job.report
     choices = StrandImport(options.groom_up, options.groom_scale, options.guides)
     ground, notes = _ground(options.head, options.head_scale)
-    tell_notes([*notes, *(ground.notes if ground else ())], report)
+    report_notes([*notes, *(ground.notes if ground else ())], report)
     objects: list[dict[str, Any]] = []
     for path in options.files:
         with report.stage("import"):
@@ -35,7 +35,7 @@ def import_grooms(job: Job) -> None:
                 place=str(path),
                 remedy="Fix the groom, or omit --strict",
             )
-        tell_notes(list(outcome.warnings), report)
+        report_notes(list(outcome.warnings), report)
         print(
             "; ".join(filter(None, (outcome.result, dropped_phrase(outcome.dropped)))), flush=True
         )

@@ -71,7 +71,7 @@ def read_hair(job: Job) -> Inputs:
     print("reading", job.sources.groom or "(a groom grown here)", flush=True)
     with report.stage("read inputs"):
         inputs = read_inputs(job.sources, job.settings[GrowSettings])
-    tell_drops(job, inputs.dropped, inputs.groom_name)
+    report_dropped_strands(job, inputs.dropped, inputs.groom_name)
     notes, groom = list(inputs.notes), inputs.groom
     takes_motion = getattr(job.options, "animated", False)
     if groom is not None and groom.motion is not None and not takes_motion:
@@ -80,7 +80,7 @@ def read_hair(job: Job) -> Inputs:
             f"{name}: it moves, and only its first frame is read. To bring its motion into a "
             "scene, use the verb import."
         )
-    tell_notes(notes, report)
+    report_notes(notes, report)
     report.facts["dropped"] = inputs.dropped
     return inputs
 
@@ -90,10 +90,10 @@ def read_rig(job: Job) -> tuple[Rig, Inputs]:
     inputs, report = read_hair(job), job.report
     with report.stage("bind roots, choose guides"):
         rig = rig_from(_source(job, inputs), job.settings, place=inputs.groom_name)
-    tell_notes([f"{inputs.groom_name}: {note}" for note in rig.notes], report)
+    report_notes([f"{inputs.groom_name}: {note}" for note in rig.notes], report)
     for line in filter(None, (rig.children_line, rig.widths.line, rig.guides_line)):
         print(f"{line}.", flush=True)
-    tell_rig(report, rig, inputs.groom_name)
+    report_rig(report, rig, inputs.groom_name)
     return colored_rig(job, rig), inputs
 
 
@@ -102,7 +102,7 @@ def _source(job: Job, inputs: Inputs) -> Source:
     hair, holding = job.hair, Holding()
     if hair is not None:
         holding = Holding.of(hair, bpy.context.evaluated_depsgraph_get())
-    tell_notes(list(holding.warnings), job.report)
+    report_notes(list(holding.warnings), job.report)
     return Source(
         inputs.strands,
         inputs.dropped,
@@ -152,11 +152,11 @@ def read_job_masks(
     head = bpy.data.objects.get(inputs.head_object or "")
     canvas = Canvas(hair, head, inputs.head, inputs.strands, kept)
     found = {of: canvas.mask(name, depsgraph) for of, name in names.items()}
-    tell_notes(list(canvas.masks(settings, depsgraph)[1]), job.report)
+    report_notes(list(canvas.masks(settings, depsgraph)[1]), job.report)
     return found
 
 
-def tell_rig(report: Report, rig: Rig, name: str) -> None:
+def report_rig(report: Report, rig: Rig, name: str) -> None:
     """Add the counts and bounds of a rig to the report."""
     low, high = rig.strands.bounds()
     report.facts.update(
@@ -174,7 +174,7 @@ def tell_rig(report: Report, rig: Rig, name: str) -> None:
     )
 
 
-def tell_drops(job: Job, dropped: Mapping[str, int], place: str) -> None:
+def report_dropped_strands(job: Job, dropped: Mapping[str, int], place: str) -> None:
     """Print what was dropped of the hair of this name; with --strict that is an error."""
     if not dropped:
         return
@@ -188,7 +188,7 @@ def tell_drops(job: Job, dropped: Mapping[str, int], place: str) -> None:
     print(f"hairloom: {place}: dropped strands: {reasons}", flush=True)
 
 
-def tell_notes(notes: list[str], report: Report) -> None:
+def report_notes(notes: list[str], report: Report) -> None:
     """Print notes for the artist, and add them to the report."""
     for note in notes:
         print(f"hairloom: {note}", flush=True)
@@ -233,8 +233,8 @@ def motion_of(job: Job, frames: range | None = None) -> BakedGuides:
         motion = BakedGuides.of(hair, frames)
     motion = replace(motion, rig=colored_rig(job, motion.rig))
     job.report.add_input(motion.cache.folder)
-    tell_notes(list(motion.notes), job.report)
-    tell_rig(job.report, motion.rig, motion.cache.facts.owner)
+    report_notes(list(motion.notes), job.report)
+    report_rig(job.report, motion.rig, motion.cache.facts.owner)
     return motion
 
 
@@ -262,7 +262,7 @@ def card_edits(job: Job) -> CardEdits | None:
     if hair is None or getattr(job.options, "discard_edits", False):
         return None
     edits, notes = groom_edits(hair, bpy.context.evaluated_depsgraph_get())
-    tell_notes(list(notes), job.report)
+    report_notes(list(notes), job.report)
     return edits
 
 
@@ -273,7 +273,7 @@ def open_studio(job: Job, rig: Rig) -> Studio:
     edits = card_edits(job)
     look = look_of_head(job.sources, rig.head)
     studio = Studio(groom, GroomSettings(job.settings), look=look, edits=edits)
-    tell_notes(list(studio.warnings), job.report)
+    report_notes(list(studio.warnings), job.report)
     return studio
 
 

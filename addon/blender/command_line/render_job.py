@@ -15,7 +15,7 @@ from ..bakes.guide_motion import BakedGuides
 from ..base.images import contact_sheet, write_png
 from ..pictures.studio import Studio
 from .job_options import add_moment_options, add_picture_options
-from .job_steps import Job, PosedHair, finish, motion_of, open_studio, posed_hair, tell_notes
+from .job_steps import Job, PosedHair, finish, motion_of, open_studio, posed_hair, report_notes
 from .verb import Verb
 
 SHEET_COLUMNS, SHEET_ROWS = 4, 3
@@ -36,7 +36,7 @@ def render(job: Job) -> None:
         _write_slices(job, Path(options.slices), studio, hair)
     if options.skin_shadow:
         _write_skin_shadow(job, Path(options.skin_shadow), studio, hair)
-    tell_notes(list(studio.notes), job.report)
+    report_notes(list(studio.notes), job.report)
     finish(job, job.output)
 
 

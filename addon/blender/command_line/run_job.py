@@ -13,7 +13,7 @@ from ...errors import HairloomError
 from ..base.objects import check_editable
 from ..base.outcome import Reports, collected_reports
 from .job_options import add_object_option, add_save_option
-from .job_steps import Job, tell_notes
+from .job_steps import Job, report_notes
 from .object_settings import check_sections, named_objects, put_settings
 from .overrides import plain_value
 from .scene_files import check_saving, save_scene
@@ -96,7 +96,7 @@ def run_operator(job: Job) -> None:
         job.report.facts["messages"] = reports.messages
         for message in reports.messages:
             print(message, flush=True)
-        tell_notes(reports.warnings, job.report)
+        report_notes(reports.warnings, job.report)
     if is_of_scene:
         with job.report.stage("save scene"):
             saved = save_scene(options.output)

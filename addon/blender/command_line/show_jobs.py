@@ -7,7 +7,7 @@ import argparse
 from ..pictures.sheet import Sheet
 from ..pictures.turntable import LIGHTS, Turntable, TurntableSettings
 from .job_options import add_moment_options, add_picture_options
-from .job_steps import Job, finish, open_studio, posed_hair, tell_notes
+from .job_steps import Job, finish, open_studio, posed_hair, report_notes
 from .verb import Verb
 
 
@@ -31,7 +31,7 @@ def turntable(job: Job) -> None:
     with report.stage("draw turntable"):
         for done in turn.steps():
             progress.show(done)
-    tell_notes([*turn.notes, *studio.notes], report)
+    report_notes([*turn.notes, *studio.notes], report)
     for path in turn.files:
         report.add_output(path)
     finish(job, job.output)
@@ -57,7 +57,7 @@ def sheet(job: Job) -> None:
         for done in drawn.steps():
             progress.show(done)
     studio.write(job.output, drawn.picture)
-    tell_notes(list(studio.notes), report)
+    report_notes(list(studio.notes), report)
     finish(job, job.output)
 
 

@@ -29,7 +29,7 @@ from ..strands.import_groom import cut_notes, let_move
 from .bake_job import write_bake
 from .inputs import Inputs
 from .job_options import add_motion_options
-from .job_steps import Job, finish, read_hair, read_job_masks, tell_notes
+from .job_steps import Job, finish, read_hair, read_job_masks, report_notes
 from .object_settings import put_map
 from .verb import Verb
 
@@ -151,7 +151,7 @@ def _hair_of_open_scene(job: Job, inputs: Inputs) -> bpy.types.Object:
         if inputs.groom is not None and inputs.groom.motion is not None:
             let_move(hair, inputs.groom.motion)
             cut = cut_notes(inputs.groom.motion)
-            tell_notes([f"{inputs.groom_name}: {note}" for note in cut], job.report)
+            report_notes([f"{inputs.groom_name}: {note}" for note in cut], job.report)
     hair.data.surface = head
     if job.sources.collider is not None and inputs.collider is not None:
         collider = bpy.data.objects.get(job.sources.collider)
