@@ -30,7 +30,7 @@ from .groom.weights import guide_weights
 from .light_flow import ambient_of, directional_light, rest_fields
 from .motion_flow import carried_guides, root_turns
 from .params import SettingsMap
-from .rig_flow import Begun, Pose, Rig, Solids, root_normals
+from .rig_flow import MotionStart, Pose, Rig, Solids, root_normals
 from .shading.ambient import occlusion_by
 from .shading.ambient_settings import AmbientSettings
 from .shading.drawn_strands import drawn_radius, own_colors
@@ -121,22 +121,24 @@ def cards_at(rig: Rig, cards: CardBinding, pose: Pose, guides_now: Floats) -> Ca
 def _contacts(rig: Rig, cards: CardBinding, solids: Solids) -> CardContacts | None:
     """The colliders of a pose with the clearances of cards, which are computed once per motion."""
     colliders = solids.colliders
-    if not colliders or not solids.begun.colliders:
+    if not colliders or not solids.motion_start.colliders:
         return None
     for known, clearance in cards.met:
-        if known is solids.begun or known.is_as(solids.begun):
+        if known is solids.motion_start or known.is_as(solids.motion_start):
             return CardContacts(colliders, clearance)
-    clearance = card_clearance(rig, cards, solids.begun)
-    cards.met[:] = [(solids.begun, clearance)]
+    clearance = card_clearance(rig, cards, solids.motion_start)
+    cards.met[:] = [(solids.motion_start, clearance)]
     return CardContacts(colliders, clearance)
 
 
-def card_clearance(rig: Rig, cards: CardBinding, begun: Begun) -> CardClearance:
+def card_clearance(rig: Rig, cards: CardBinding, start: MotionStart) -> CardClearance:
     """How far cards stay from colliders, from where their roots carry them as a motion begins."""
-    guides = carried_guides(rig, begun.pose)
-    spines, vertices = carried_cards(cards, guides, root_turns(rig, begun.pose))
-    standing = tuple(each.at_end() for each in begun.colliders)
-    return CardClearance.at(spines, vertices, cards.row, cards.offsets, standing, begun.kept)
+    guides = carried_guides(rig, start.pose)
+    spines, vertices = carried_cards(cards, guides, root_turns(rig, start.pose))
+    standing = tuple(each.at_end() for each in start.colliders)
+    return CardClearance.at(
+        spines, vertices, cards.row, cards.offsets, standing, start.max_clearance
+    )
 
 
 class CardMeasure:
@@ -165,10 +167,10 @@ class CardMeasure:
         if solids is None:
             return
         if self._were_outside is None:
-            begun = solids.begun
-            guides = carried_guides(self._rig, begun.pose)
-            _, vertices = carried_cards(self._cards, guides, root_turns(self._rig, begun.pose))
-            standing = tuple(each.at_end() for each in begun.colliders)
+            start = solids.motion_start
+            guides = carried_guides(self._rig, start.pose)
+            _, vertices = carried_cards(self._cards, guides, root_turns(self._rig, start.pose))
+            standing = tuple(each.at_end() for each in start.colliders)
             self._were_outside = are_outside(vertices[self._by_card], standing)
         points = mesh.positions[self._by_card]
         depth = strand_depths(points, self._offsets, solids.colliders, self._were_outside)

@@ -53,20 +53,21 @@ MANY_INSIDE = 0.01
 
 
 @dataclass(frozen=True, eq=False)
-class Begun:
+class MotionStart:
     """The start of a motion, from which clearances between hair and colliders are computed.
 
-    pose: of the body. colliders: as they stood. kept: how far hair stays from them at most [m].
+    pose: of the body. colliders: as they stood. max_clearance: how far hair stays from them at
+        most [m].
     """
 
     pose: Pose
     colliders: tuple[PosedCollider, ...]
-    kept: float
+    max_clearance: float
 
-    def is_as(self, other: Begun) -> bool:
+    def is_as(self, other: MotionStart) -> bool:
         """Whether both give the same clearances."""
         return (
-            self.kept == other.kept
+            self.max_clearance == other.max_clearance
             and self.pose.is_as(other.pose)
             and len(self.colliders) == len(other.colliders)
             and all(map(PosedCollider.stands_as, self.colliders, other.colliders))
@@ -77,7 +78,7 @@ class Solids(Protocol):
     """The colliders that hair stays out of at one moment of a motion."""
 
     @property
-    def begun(self) -> Begun: ...
+    def motion_start(self) -> MotionStart: ...
 
     @property
     def colliders(self) -> tuple[PosedCollider, ...]:
@@ -88,7 +89,7 @@ class Solids(Protocol):
 class SimulatedSolids:
     """The solids of a simulated motion; implements `Solids`."""
 
-    begun: Begun
+    motion_start: MotionStart
     colliders: tuple[PosedCollider, ...]
 
 

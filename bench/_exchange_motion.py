@@ -32,7 +32,7 @@ from hairloom.addon.dynamics.colliders import DistanceField, PosedCollider  # no
 from hairloom.addon.dynamics.settings import DynamicsSettings  # noqa: E402
 from hairloom.addon.exchange.cards.card_formats import GLB  # noqa: E402
 from hairloom.addon.params import SettingsMap  # noqa: E402
-from hairloom.addon.rig_flow import Begun, Rig, SimulatedSolids  # noqa: E402
+from hairloom.addon.rig_flow import MotionStart, Rig, SimulatedSolids  # noqa: E402
 
 RATE = 60.0
 
@@ -99,9 +99,9 @@ def shaken(rig: Rig, seconds: float) -> MadeMotion:
         guides.append(motion.guides)
         earlier, before = before.matrix, now
     assert motion.clearance is not None
-    begun = Begun(first, posed[0], motion.clearance.kept)
+    start = MotionStart(first, posed[0], motion.clearance.kept)
     poses = [
-        replace(pose, solids=SimulatedSolids(begun, colliders))
+        replace(pose, solids=SimulatedSolids(start, colliders))
         for pose, colliders in zip((first, *later), posed, strict=True)
     ]
     return MadeMotion(rig, range(len(poses)), RATE, lambda frame: (poses[frame], guides[frame]))

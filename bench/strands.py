@@ -53,7 +53,7 @@ from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.motion_flow import Motion
 from hairloom.addon.params import SettingsMap
 from hairloom.addon.refine.lead_out import NOT_LED, LedOut
-from hairloom.addon.rig_flow import Begun, Pose, Rig, SimulatedSolids
+from hairloom.addon.rig_flow import MotionStart, Pose, Rig, SimulatedSolids
 from hairloom.addon.strands import StrandSet, Surface
 from hairloom.addon.strands.arc_length import lengths, steps
 from hairloom.addon.strands.closest_point import ClosestPointSearch
@@ -320,14 +320,14 @@ def card_figures(rig: Rig) -> dict[str, float]:
     longer, wider, folded = (np.zeros(len(each)) for each in (length, width, length))
     straight = _folds(mesh.positions, rows, lines)
     scale = MEDIAN_LENGTH / np.median(lengths(rig.strands.points, rig.strands.offsets))
-    owner, begun, costs, jumped = card_of_vertex(mesh), None, [], []
+    owner, motion_start, costs, jumped = card_of_vertex(mesh), None, [], []
     correction = np.zeros_like(mesh.positions)
     for motion, matrix, _, _ in played(rig, collider, shake_at, FPS):
-        if begun is None:
+        if motion_start is None:
             assert motion.clearance is not None
             standing = (PosedCollider(collider, np.eye(4), np.eye(4)),)
-            begun = Begun(rig.rest_pose, standing, motion.clearance.kept)
-        pose = replace(motion.pose, solids=SimulatedSolids(begun, motion.colliders))
+            motion_start = MotionStart(rig.rest_pose, standing, motion.clearance.kept)
+        pose = replace(motion.pose, solids=SimulatedSolids(motion_start, motion.colliders))
         (riding, now), cost = _timed(rig, cards, (motion.pose, pose), motion.guides)
         costs.append(cost)
         before, correction = correction, now - riding

@@ -37,7 +37,7 @@ from hairloom.addon.dynamics.colliders import (  # noqa: E402
 from hairloom.addon.dynamics.colliders.bent_field import BentField  # noqa: E402
 from hairloom.addon.dynamics.settings import DynamicsSettings  # noqa: E402
 from hairloom.addon.errors import HairloomError  # noqa: E402
-from hairloom.addon.rig_flow import Begun, Pose  # noqa: E402
+from hairloom.addon.rig_flow import MotionStart, Pose  # noqa: E402
 from hairloom.addon.strands import Surface  # noqa: E402
 
 LAST, RADIUS = 9, 0.1
@@ -70,22 +70,22 @@ def solids(mesh: Surface, bend: float) -> tuple[PosedCollider, ...]:
 
 def test_solids_come_back_as_they_were(mesh):
     posed, points = solids(mesh, 0.5), np.random.default_rng(2).normal(0.0, 0.3, (2000, 3))
-    begun = Begun(Pose(None, np.eye(4)), solids(mesh, 0.0), 0.001)
-    constants = solid_constants(begun, (mesh,), SETTINGS)
+    start = MotionStart(Pose(None, np.eye(4)), solids(mesh, 0.0), 0.001)
+    constants = solid_constants(start, (mesh,), SETTINGS)
     baked = BakedSolids.of(constants)
     found = baked.at(solid_arrays(posed, (mesh,)), blocking=True)
-    for one, other in ((posed, found.colliders), (begun.colliders, found.begun.colliders)):
+    for one, other in ((posed, found.colliders), (start.colliders, found.motion_start.colliders)):
         expected, got = (signed_distance(points, each) for each in (one, other))
         np.testing.assert_allclose(got[0], expected[0], atol=1e-6)
         np.testing.assert_allclose(got[1], expected[1], atol=1e-4)
-    assert found.begun.kept == 0.001
+    assert found.motion_start.max_clearance == 0.001
     assert BakedSolids.of({}) is None, "a bake of a version that did not keep them"
 
 
 def test_damaged_solids_say_so(mesh):
     posed = solids(mesh, 0.5)
-    begun = Begun(Pose(None, np.eye(4)), posed, 0.001)
-    baked = BakedSolids.of(solid_constants(begun, (mesh,), SETTINGS))
+    start = MotionStart(Pose(None, np.eye(4)), posed, 0.001)
+    baked = BakedSolids.of(solid_constants(start, (mesh,), SETTINGS))
     arrays = solid_arrays(posed, (mesh,))
     arrays["solid_shapes"] = arrays["solid_shapes"][:5]
     with pytest.raises(HairloomError, match="colliders are damaged"):

@@ -31,36 +31,38 @@ from ...dynamics.colliders import (
 from ...dynamics.colliders.bent_field import BentField
 from ...dynamics.settings import DynamicsSettings
 from ...errors import HairloomError
-from ...rig_flow import Begun, Pose, Solids
+from ...rig_flow import MotionStart, Pose, Solids
 from ...strands import Surface
 from ..colliders.fields import NotMadeYetError, field_of
 from .simulated import Arrays
 
 _BALL, _CAPSULE, _BALLS, _MESH = range(4)
-_BEGUN = "begun_"
+_START_PREFIX = "begun_"
 #: arrays whose length may differ between frames
-LISTS = frozenset({"solids", "solid_matrices", "solid_balls", "solid_shapes"})
+VARIABLE_LENGTH = frozenset({"solids", "solid_matrices", "solid_balls", "solid_shapes"})
 
 
-def solid_constants(begun: Begun, meshes: Sequence[Surface], settings: DynamicsSettings) -> Arrays:
+def solid_constants(
+    start: MotionStart, meshes: Sequence[Surface], settings: DynamicsSettings
+) -> Arrays:
     """The arrays that all frames share.
 
     Args:
         meshes: those of all mesh colliders, at rest.
     """
     arrays: Arrays = {
-        "kept": np.array(begun.kept),
+        "kept": np.array(start.max_clearance),
         "collider_resolution": np.array(settings.collider_resolution),
-        f"{_BEGUN}matrix": np.asarray(begun.pose.matrix, np.float64),
+        f"{_START_PREFIX}matrix": np.asarray(start.pose.matrix, np.float64),
     }
-    for name, array in (("head", begun.pose.head_positions), ("anchors", begun.pose.anchors)):
+    for name, array in (("head", start.pose.head_positions), ("anchors", start.pose.anchors)):
         if array is not None:
-            arrays[_BEGUN + name] = array
+            arrays[_START_PREFIX + name] = array
     for number, mesh in enumerate(meshes):
         arrays[f"mesh_{number}_positions"] = mesh.positions
         arrays[f"mesh_{number}_triangles"] = mesh.triangles
-    found = solid_arrays(begun.colliders, meshes)
-    return arrays | {_BEGUN + name: array for name, array in found.items()}
+    found = solid_arrays(start.colliders, meshes)
+    return arrays | {_START_PREFIX + name: array for name, array in found.items()}
 
 
 def solid_arrays(colliders: Sequence[PosedCollider], meshes: Sequence[Surface]) -> Arrays:
@@ -103,7 +105,7 @@ def solids_between(frame: Arrays, there: Arrays, fraction: float) -> Arrays:
     one where a collider was added or removed."""
     if "solids" not in frame or not np.array_equal(frame["solids"], there["solids"]):
         return frame
-    moving = LISTS - {"solids"}
+    moving = VARIABLE_LENGTH - {"solids"}
     return frame | {name: frame[name] + (there[name] - frame[name]) * fraction for name in moving}
 
 
@@ -132,7 +134,7 @@ class BakedSolids:
     @classmethod
     def of(cls, constants: Arrays) -> Self | None:
         """None for a bake without colliders, or of a version that did not keep them."""
-        return cls(constants) if f"{_BEGUN}solids" in constants else None
+        return cls(constants) if f"{_START_PREFIX}solids" in constants else None
 
     def at(self, frame: Arrays, *, blocking: bool) -> Solids | None:
         """The colliders of a frame; None where it has none.
@@ -143,7 +145,7 @@ class BakedSolids:
         return _FrameSolids(self, frame, blocking) if "solids" in frame else None
 
     @cached_property
-    def begun(self) -> Begun:
+    def motion_start(self) -> MotionStart:
         """Where the motion began.
 
         Raises:
@@ -151,19 +153,19 @@ class BakedSolids:
         """
         known = self.constants
         try:
-            own = {name: known[_BEGUN + name] for name in LISTS}
-            head, anchors = (known.get(_BEGUN + name) for name in ("head", "anchors"))
-            pose = Pose(head, known[f"{_BEGUN}matrix"], anchors)
-            kept = float(known["kept"])
+            own = {name: known[_START_PREFIX + name] for name in VARIABLE_LENGTH}
+            head, anchors = (known.get(_START_PREFIX + name) for name in ("head", "anchors"))
+            pose = Pose(head, known[f"{_START_PREFIX}matrix"], anchors)
+            max_clearance = float(known["kept"])
         except (KeyError, ValueError, TypeError) as error:
             raise _damaged(error) from error
-        return Begun(pose, self.colliders(own, blocking=True), kept)
+        return MotionStart(pose, self.colliders(own, blocking=True), max_clearance)
 
     def colliders(self, frame: Arrays, *, blocking: bool) -> tuple[PosedCollider, ...]:
         """The colliders where they are in a frame.
 
         Raises:
-            HairloomError: as `begun`.
+            HairloomError: as `motion_start`.
             NotMadeYetError: a field is being made, and the call is not blocking.
         """
         try:
@@ -214,8 +216,8 @@ class _FrameSolids:
     is_blocking: bool
 
     @property
-    def begun(self) -> Begun:
-        return self.bake.begun
+    def motion_start(self) -> MotionStart:
+        return self.bake.motion_start
 
     @cached_property
     def colliders(self) -> tuple[PosedCollider, ...]:

@@ -35,14 +35,14 @@ from ...exchange.files.atomic import check_folder_place, remedy_for, write_bytes
 from ...exchange.files.moving import flush, flush_names
 from ...exchange.files.names import length_remark
 from ...exchange.files.stale_temp_files import MARK, is_stale, is_temporary, mark
-from .baked_solids import LISTS
+from .baked_solids import VARIABLE_LENGTH
 from .simulated import Arrays
 
 #: Version of the format, beyond what `layout` describes. 2: strands may have points of their own.
 #: 3: frames hold the strands that were led out of colliders.
 VERSION = 3
 #: Arrays whose length may differ between frames.
-_LISTS = frozenset({"led_strands", "led_points"}) | LISTS
+_VARIABLE_LENGTH = frozenset({"led_strands", "led_points"}) | VARIABLE_LENGTH
 FACTS, CONSTANTS = "cache.json", "constants.npz"
 _OURS = re.compile(r"cache\.json|constants\.npz|frame_-?\d{5,7}\.npz")
 _FRAMES = re.compile(rf"frames-{MARK}")
@@ -111,7 +111,7 @@ class CacheWriter:
 
     def add(self, frame: int, arrays: Arrays, frame_hash: str) -> None:
         """Frames come in order; all hold arrays of the same names, types and shapes, except for the
-        lengths of `_LISTS`."""
+        lengths of `_VARIABLE_LENGTH`."""
         layout = {name: [kind, list(shape)] for name, (kind, shape) in _layout_of(arrays).items()}
         assert not self._frame_hashes or layout == self._layout, "the frames of a bake are alike"
         self._layout = layout
@@ -260,9 +260,9 @@ class Cache:
 
 
 def _layout_of(arrays: Arrays) -> dict[str, tuple[str, tuple[int, ...]]]:
-    """Type and shape of each array; `_LISTS` count as if they were empty."""
+    """Type and shape of each array; `_VARIABLE_LENGTH` count as if they were empty."""
     return {
-        name: (str(a.dtype), (0, *a.shape[1:]) if name in _LISTS else tuple(a.shape))
+        name: (str(a.dtype), (0, *a.shape[1:]) if name in _VARIABLE_LENGTH else tuple(a.shape))
         for name, a in arrays.items()
     }
 

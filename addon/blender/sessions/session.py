@@ -24,7 +24,7 @@ from ...paint_flow import painted
 from ...refine.lead_out import Clearance
 from ...render.ride_pass import RideTexels
 from ...render.snapshot import Snapshot
-from ...rig_flow import Begun, Pose, Rig, SimulatedSolids, Solids
+from ...rig_flow import MotionStart, Pose, Rig, SimulatedSolids, Solids
 from ...strands import Surface
 from ...strands.arc_length import lengths
 from ..bakes.baked_rig import BakedRig, RestMatrices, frame_arrays, led_in, rig_arrays
@@ -98,7 +98,7 @@ class Session:
         self.obstacles: Obstacles | None = None
         self.is_playing = False
         self.is_stale = False
-        self._begun: Begun | None = None
+        self._motion_start: MotionStart | None = None
         self._is_recorded = False
         self._contacts = FirstContacts()
         self._posed: tuple[PosedCollider, ...] = ()
@@ -218,10 +218,10 @@ class Session:
     def constants(self) -> Arrays:
         """See `baked_rig.rig_arrays` and `baked_solids.solid_constants`."""
         arrays = rig_arrays(self.groom.rig, self._source.rests)
-        if self._begun is None:
+        if self._motion_start is None:
             return arrays
         settings = self.settings[DynamicsSettings]
-        return arrays | solid_constants(self._begun, self._collider_meshes, settings)
+        return arrays | solid_constants(self._motion_start, self._collider_meshes, settings)
 
     def rig_hash(self, depsgraph: bpy.types.Depsgraph) -> str:
         """See `simulated.Simulated`."""
@@ -495,7 +495,7 @@ class Session:
         """
         self._take_style(depsgraph)
         pose, self.figures, self.card_figures = self._pose(depsgraph), None, None
-        self._begun, self._is_recorded, self.known_hair = None, False, KnownHair()
+        self._motion_start, self._is_recorded, self.known_hair = None, False, KnownHair()
         _, self._field_notes = force_fields_of(self.hair.found(), depsgraph)
         if not self.is_playing or self.obstacles is None:
             self.solver.rest(pose)
@@ -504,7 +504,7 @@ class Session:
             start = self._start(pose, self._posed)
             self.solver.rest(pose, self._contacts.known(start))
             kept = start.settings.radius_root * self.solver.size
-            self._begun = Begun(pose, self._posed, kept)
+            self._motion_start = MotionStart(pose, self._posed, kept)
             painted = self._source.painted_guides(self.rig)
             self.solver.meet(self._posed, start.settings, painted)
             self._contacts.keep(start, self.solver.motion)
@@ -675,8 +675,8 @@ class Session:
 
     def new_measure(self) -> Measure:
         """A measure for the frames since rest; the hair must be simulated."""
-        assert self._begun is not None, "it is simulated"
-        pose, posed, rig = self._begun.pose, self._begun.colliders, self.rig
+        assert self._motion_start is not None, "it is simulated"
+        pose, posed, rig = self._motion_start.pose, self._motion_start.colliders, self.rig
         guides = start(motion_flow.carried_guides(rig, pose), rig.curl_room)
         return Measure(guides, motion_flow.carried(rig, pose), rig.strands.offsets, posed)
 
@@ -748,7 +748,9 @@ class Session:
         """The solids that cards are led out of."""
         if self._is_recorded:
             return self.solver.pose.solids
-        return None if self._begun is None else SimulatedSolids(self._begun, self._posed)
+        return (
+            None if self._motion_start is None else SimulatedSolids(self._motion_start, self._posed)
+        )
 
 
 @dataclass(frozen=True, eq=False)
