@@ -43,7 +43,7 @@ FRAME_RATES = (12.0, 24.0, 30.0, 60.0, 120.0)
 #: separately, so that each seed keeps its run.
 _NOT_DRAWN = {"device", "collider_resolution", "curl_stretch", "curl_bounce"} | {
     "animated_style",
-    "simulated",
+    "influence",
 }
 #: Most sweeps over segments in a second of simulation; with more, a run takes minutes.
 _SWEEPS = 60_000

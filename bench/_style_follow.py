@@ -27,12 +27,12 @@ def style_follow() -> dict[str, object]:
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     hair, scene = _hair(), bpy.context.scene
     settings, times = hair.hairloom.dynamics, {}
-    settings.simulated = 0.0
+    settings.influence = 0.0
     session = previews.start(hair, bpy.context.evaluated_depsgraph_get())
     hair.hairloom.bake.follows = True
     worst = max(_error(session, frame) for frame in range(1, FRAMES + 1))
     count, device = session.rig.strands.strand_count, session.solver.form
-    settings.simulated = 1.0
+    settings.influence = 1.0
     for kind in ("animated", "read once"):
         settings.animated_style = kind == "animated"
         session.read_again(bpy.context.evaluated_depsgraph_get())

@@ -136,7 +136,7 @@ def check_drive(state: DynamicsState, drive: Drive, known: tuple[Floats, ...] = 
         )
     if drive.simulated is not None and drive.simulated.shape != (state.guide_count,):
         raise HairloomError(
-            f"there are values of Simulated for {drive.simulated.shape} guides, but the "
+            f"there are values of Influence for {drive.simulated.shape} guides, but the "
             f"simulation has {state.guide_count}",
             place="dynamics",
             remedy="Start the simulation again",

@@ -18,7 +18,7 @@ from .settings import DynamicsSettings
 from .style import StyleBand, painted_band
 
 #: Factors of these only blend the visible motion; they do not affect the simulation.
-_SEEN = frozenset({"simulated", "only_selected"})
+_SEEN = frozenset({"influence", "only_selected"})
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,11 +62,11 @@ def simulated_of(
     `blend.blended`; None: all of it for all guides."""
     factors = {} if painted is None else painted.factors
     by_selection = settings.only_selected and "only_selected" in factors
-    if settings.simulated == 1.0 and not by_selection and "simulated" not in factors:
+    if settings.influence == 1.0 and not by_selection and "influence" not in factors:
         return None
-    fraction = np.full(guide_count, settings.simulated, np.float32)
-    if painted is not None and "simulated" in factors:
-        fraction = painted.of_guides(settings, "simulated").astype(np.float32)
+    fraction = np.full(guide_count, settings.influence, np.float32)
+    if painted is not None and "influence" in factors:
+        fraction = painted.of_guides(settings, "influence").astype(np.float32)
     if by_selection:
         fraction *= factors["only_selected"].mean(axis=0).astype(np.float32)
     return fraction

@@ -11,13 +11,13 @@ _DUE = 1.0e-6
 
 
 def due_substeps(
-    time_left: float, duration: float, longest_frame: float, dt: float
+    time_left: float, duration: float, max_frame_time: float, dt: float
 ) -> tuple[float, int, float]:
     """The simulated duration [s], how many substeps are due, and the time left after them [s].
 
     Args:
         time_left: [s] of earlier frames that is not yet simulated.
-        duration: [s] of this frame; at most `longest_frame` of it is simulated.
+        duration: [s] of this frame; at most `max_frame_time` of it is simulated.
         dt: [s] of a substep.
 
     Raises:
@@ -29,7 +29,7 @@ def due_substeps(
             place="dynamics",
             remedy="Check the scene's frame rate",
         )
-    duration = min(duration, longest_frame)
+    duration = min(duration, max_frame_time)
     time = time_left + duration
     count = math.floor(time / dt + _DUE) if duration else 0
     left = time - count * dt

@@ -44,9 +44,9 @@ class DynamicsSettings(MotionSettings):
         unit="rate",
         source="Jakobsen 2001; fixed step with accumulator, Fiedler 2004",
     )
-    longest_frame: float = number(
+    max_frame_time: float = number(
         0.25,
-        label="Longest Frame",
+        label="Max Frame Time",
         description="Maximum time to simulate between two frames",
         soft=(0.05, 1.0),
         hard=(0.01, 10.0),
@@ -170,9 +170,9 @@ class DynamicsSettings(MotionSettings):
         panel="Style",
         is_animatable=False,
     )
-    simulated: float = number(
+    influence: float = number(
         1.0,
-        label="Simulated",
+        label="Influence",
         description="Blend between style and simulation: 0 follows the style exactly, 1 is fully "
         "simulated",
         soft=(0.0, 1.0),

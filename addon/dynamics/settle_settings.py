@@ -42,7 +42,7 @@ class SettleSettings(Settings):
         held = dict.fromkeys(("style_root", "style_tip", "bend"), self.stiffness)
         return replace(
             own.multiplied(**held),
-            simulated=1.0,
+            influence=1.0,
             only_selected=False,
             sag_compensation=0.0,
             buoyancy=0.0,

@@ -70,7 +70,7 @@ def steps(
 ) -> Steps[DynamicsState]:
     """`advance` as a generator that stops to feel other hair, see `neighbours.Steps`."""
     dt = 1.0 / settings.substep_rate
-    longest = settings.longest_frame
+    longest = settings.max_frame_time
     duration, count, left = due_substeps(state.time_left, duration, longest, dt)
     check_drive(state, drive, tuple(style.grid for style in state.styles))
     if not count:

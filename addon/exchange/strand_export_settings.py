@@ -43,7 +43,7 @@ class StrandExportSettings(Settings):
             (USUAL, "Default", "The format's usual program: Unreal for Alembic, Blender for USD"),
             *_engines(),
         ),
-        label="For",
+        label="Target",
         description="Program that the file is for; sets unit, axes and contents",
         panel="Engine",
     )
@@ -90,7 +90,7 @@ class StrandExportSettings(Settings):
                 "The strands, and copies of the guides that are marked as guides",
             ),
         ),
-        label="What",
+        label="Contents",
         description="What to write; TressFX calls all of it guides",
         panel="Include",
     )
@@ -110,7 +110,7 @@ class StrandExportSettings(Settings):
     )
     point_uv: bool = toggle(
         False,
-        label="UVs of Points",
+        label="Point UVs",
         description="Also write UVs of points. TressFX: u across the strands, v along them. "
         ".hair: root UVs as LuxCore does; other programs may reject such a file",
         panel="Include",
@@ -134,9 +134,9 @@ class StrandExportSettings(Settings):
         hard=(0, 8),
         panel="TressFX",
     )
-    fills_groups: bool = toggle(
+    pad_to_64: bool = toggle(
         False,
-        label="Fill up to 64",
+        label="Pad to 64",
         description="Repeat the last strand up to a multiple of 64, as TressFX simulates 64 at a "
         "time; its own loader does this by itself, others may not",
         panel="TressFX",

@@ -94,7 +94,7 @@ TRESSFX = StrandFormat(
         "bones",
         "vertex_count",
         "held_count",
-        "fills_groups",
+        "pad_to_64",
         "point_uv",
     ),
     has_motion=False,

@@ -111,12 +111,12 @@ def _write_tressfx(
             vertex_count=count,
             parts="both",  # they are chosen already
             held_count=settings.held_count,
-            multiple_of_64=settings.fills_groups,
+            multiple_of_64=settings.pad_to_64,
             vertex_uv=settings.point_uv,
         )
         if part.bones is not None:
             strands = part.strands.strand_count
-            filled = strands + (-strands % STRANDS_AT_ONCE if settings.fills_groups else 0)
+            filled = strands + (-strands % STRANDS_AT_ONCE if settings.pad_to_64 else 0)
             write_tfxbone(file.with_suffix(".tfxbone"), part.bones, filled)
         return notes
 

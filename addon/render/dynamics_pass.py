@@ -190,7 +190,7 @@ class DynamicsPass:
 
     def steps(self, drive: Drive, settings: DynamicsSettings, duration: float) -> Steps[None]:
         """As `advance`, in steps between which other grooms' hair is exchanged."""
-        state, dt, longest = self._state, 1.0 / settings.substep_rate, settings.longest_frame
+        state, dt, longest = self._state, 1.0 / settings.substep_rate, settings.max_frame_time
         duration, count, left = due_substeps(state.time_left, duration, longest, dt)
         check_drive(state, drive, tuple(style for style, _ in self._styles))
         carried = state.carried

@@ -53,7 +53,7 @@ _OPERATORS = (
     ("fit_again", "hairstyles#on-your-own-head"),
     ("grow", "styling#grow"),
     ("settle", "styling#settle"),
-    ("back_to_combed", "styling#settle"),
+    ("revert_settle", "styling#settle"),
     ("parting", "styling#partings"),
     ("stroke", "styling#flow"),
     ("flow", "styling#flow"),

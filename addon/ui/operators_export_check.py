@@ -108,7 +108,7 @@ def _engines() -> list[tuple[str, str, str]]:
 
 
 _ENGINE = {
-    "name": "For",
+    "name": "Target",
     "description": "Engine and file format to check for",
     "items": _engines(),
     "default": _engines()[0][0],

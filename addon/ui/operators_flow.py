@@ -1,4 +1,4 @@
-"""Flow: Add Stroke, Remove Stroke, Comb Along Flow and Take Flow Back, and their panel."""
+"""Flow: Add Stroke, Remove Stroke, Comb Along Flow and Revert Flow, and their panel."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from .drawing import draw_button
 from .long_work import LongWork, Steps, draw_progress, in_parts
 from .object_lists import draw_objects
 from .reports import reporting, tell
+from .revert_shape import RevertsShape
 from .selection import chosen_hair, in_object_mode, needs_hair, once_each
-from .take_back import TakesBack
 
 
 class HAIRLOOM_OT_add_stroke(bpy.types.Operator):
@@ -96,12 +96,12 @@ class HAIRLOOM_OT_comb_flow(LongWork, bpy.types.Operator):
             tell(self, outcome)
 
 
-class HAIRLOOM_OT_take_flow_back(TakesBack, bpy.types.Operator):
+class HAIRLOOM_OT_revert_flow(RevertsShape, bpy.types.Operator):
     """Restore the shape of the selected hair from before it was combed along strokes. Later
     combing, settling and trimming is lost"""
 
-    bl_idname = "hairloom.take_flow_back"
-    bl_label = "Take Flow Back"
+    bl_idname = "hairloom.revert_flow"
+    bl_label = "Revert Flow"
     bl_options = {"REGISTER", "UNDO"}
     shape = BEFORE_FLOW
     idle = "The selected hair was not combed along strokes: press Comb Along Flow"
@@ -117,12 +117,12 @@ def draw_flow(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
         return
     row = column.row(align=True)
     draw_button(row, "hairloom.comb_flow", "No Strokes Yet", icon="FORCE_CURVE")
-    draw_button(row, "hairloom.take_flow_back", "Not Combed", icon="LOOP_BACK")
+    draw_button(row, "hairloom.revert_flow", "Not Combed", icon="LOOP_BACK")
 
 
 CLASSES = (
     HAIRLOOM_OT_add_stroke,
     HAIRLOOM_OT_remove_stroke,
     HAIRLOOM_OT_comb_flow,
-    HAIRLOOM_OT_take_flow_back,
+    HAIRLOOM_OT_revert_flow,
 )

@@ -1,4 +1,4 @@
-"""Settle and Back to Combed, and their buttons."""
+"""Settle and Revert Settle, and their buttons."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from ..dynamics.settle_settings import SettleSettings
 from .drawing import draw_button
 from .long_work import LongWork, Progress, Steps, as_progress, draw_progress
 from .reports import tell
+from .revert_shape import RevertsShape
 from .selection import chosen_hair, in_object_mode, needs_hair, once_each
-from .take_back import TakesBack
 
 
 class HAIRLOOM_OT_settle(LongWork, bpy.types.Operator):
@@ -40,12 +40,12 @@ class HAIRLOOM_OT_settle(LongWork, bpy.types.Operator):
             tell(self, write())
 
 
-class HAIRLOOM_OT_back_to_combed(TakesBack, bpy.types.Operator):
+class HAIRLOOM_OT_revert_settle(RevertsShape, bpy.types.Operator):
     """Restore the shape of the selected hair from before it settled. Later combing and trimming is
     lost"""
 
-    bl_idname = "hairloom.back_to_combed"
-    bl_label = "Back to Combed"
+    bl_idname = "hairloom.revert_settle"
+    bl_label = "Revert Settle"
     bl_options = {"REGISTER", "UNDO"}
     shape = COMBED
     idle = "The selected hair has not settled: press Settle first"
@@ -58,7 +58,7 @@ def draw_settle(layout: bpy.types.UILayout) -> None:
         return
     row = layout.row(align=True)
     draw_button(row, "hairloom.settle", icon="SORT_ASC")
-    draw_button(row, "hairloom.back_to_combed", "Not Settled", icon="LOOP_BACK")
+    draw_button(row, "hairloom.revert_settle", "Not Settled", icon="LOOP_BACK")
 
 
-CLASSES = (HAIRLOOM_OT_settle, HAIRLOOM_OT_back_to_combed)
+CLASSES = (HAIRLOOM_OT_settle, HAIRLOOM_OT_revert_settle)

@@ -1,4 +1,4 @@
-"""Trim to Shape, Remove Trim Shape and Take Trim Back, and their panel."""
+"""Trim to Shape, Remove Trim Shape and Revert Trim, and their panel."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from .drawing import draw_button
 from .long_work import LongWork, Steps, draw_progress, in_parts
 from .object_lists import draw_objects
 from .reports import reporting, tell
+from .revert_shape import RevertsShape
 from .selection import chosen_hair, in_object_mode, needs_hair, once_each
-from .take_back import TakesBack
 
 
 class HAIRLOOM_OT_trim_to_shape(LongWork, bpy.types.Operator):
@@ -76,12 +76,12 @@ class HAIRLOOM_OT_remove_trim_shape(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class HAIRLOOM_OT_take_trim_back(TakesBack, bpy.types.Operator):
+class HAIRLOOM_OT_revert_trim(RevertsShape, bpy.types.Operator):
     """Restore the shape of the selected hair from before it was trimmed. Later combing and settling
     is lost"""
 
-    bl_idname = "hairloom.take_trim_back"
-    bl_label = "Take Trim Back"
+    bl_idname = "hairloom.revert_trim"
+    bl_label = "Revert Trim"
     bl_options = {"REGISTER", "UNDO"}
     shape = BEFORE_TRIM
     idle = "The selected hair is not trimmed: press Trim to Shape"
@@ -102,11 +102,11 @@ def draw_trim(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
         return
     row = column.row(align=True)
     draw_button(row, "hairloom.trim_to_shape", "Select a Shape", icon="MOD_BOOLEAN")
-    draw_button(row, "hairloom.take_trim_back", "Not Trimmed", icon="LOOP_BACK")
+    draw_button(row, "hairloom.revert_trim", "Not Trimmed", icon="LOOP_BACK")
 
 
 CLASSES = (
     HAIRLOOM_OT_trim_to_shape,
     HAIRLOOM_OT_remove_trim_shape,
-    HAIRLOOM_OT_take_trim_back,
+    HAIRLOOM_OT_revert_trim,
 )

@@ -60,7 +60,7 @@ def seen(hair: Any, evaluated: Any) -> StrandSet:
 
 
 def test_at_0_hair_is_where_blender_shows_its_curves(moving: Any, evaluated: Any) -> None:
-    moving.hairloom.dynamics.simulated = 0.0
+    moving.hairloom.dynamics.influence = 0.0
     session = session_at_start(moving, evaluated)
     first = seen(moving, evaluated).points
     for frame in range(1, LAST + 1):
@@ -90,7 +90,7 @@ def test_what_is_painted_0_goes_with_the_style_and_the_rest_is_simulated(
     group = head.vertex_groups.new(name="Loose")
     upper = [vertex.index for vertex in head.data.vertices if vertex.co.z > -0.02]
     group.add(upper, 1.0, "REPLACE")
-    moving.hairloom.dynamics.simulated_mask = "Loose"
+    moving.hairloom.dynamics.influence_mask = "Loose"
     session = session_at_start(moving, evaluated)
     is_upper = session.rig.strands.roots[session.rig.guides, 2]
     for frame in range(1, LAST + 1):
@@ -106,7 +106,7 @@ def test_what_is_painted_0_goes_with_the_style_and_the_rest_is_simulated(
 
 
 def test_a_bake_has_the_style_of_each_frame(moving: Any, evaluated: Any) -> None:
-    moving.hairloom.dynamics.simulated = 0.3
+    moving.hairloom.dynamics.influence = 0.3
     session = session_at_start(moving, evaluated)
     played = []
     for frame in range(1, LAST + 1):
@@ -163,7 +163,7 @@ def test_a_groom_that_moves_in_a_file_comes_with_all_its_frames(
     )
     assert "moving in 8 frames" in outcome.result and hair.hairloom.dynamics.animated_style
     hair.hairloom.dynamics.device = moving.hairloom.dynamics.device
-    hair.hairloom.dynamics.simulated = 0.0
+    hair.hairloom.dynamics.influence = 0.0
     session = session_at_start(hair, evaluated)
     for frame, points in enumerate(shown, 1):
         bpy.context.scene.frame_set(frame)
@@ -173,7 +173,7 @@ def test_a_groom_that_moves_in_a_file_comes_with_all_its_frames(
 
 
 def test_both_forms_agree_halfway(moving: Any, evaluated: Any) -> None:
-    moving.hairloom.dynamics.simulated = 0.5
+    moving.hairloom.dynamics.influence = 0.5
     session, found = session_at_start(moving, evaluated), []
     for form in ("numpy", "compute"):
         moving.hairloom.dynamics.device = form
@@ -186,7 +186,7 @@ def test_both_forms_agree_halfway(moving: Any, evaluated: Any) -> None:
 
 def test_the_verb_simulates_the_style_of_each_frame(moving: Any, tmp_path: Any) -> None:
     """The verb and a bake in the scene store equal arrays in each frame."""
-    moving.hairloom.dynamics.simulated = 0.3
+    moving.hairloom.dynamics.influence = 0.3
     for _ in Bake.of([moving], bpy.context.scene).steps():
         pass
     baked, verb = Cache(Path(moving.hairloom.bake.folder)), tmp_path / "verb"

@@ -87,9 +87,9 @@ def test_combed_again_it_begins_from_the_shape_before(hair):
     comb(reach=0.6, falloff=0.2)
     assert around(hair)[0].max() < -0.05  # the other direction, not a mixture of both
     again = curve_points(hair.data)
-    assert bpy.ops.hairloom.take_flow_back() == {"FINISHED"}
+    assert bpy.ops.hairloom.revert_flow() == {"FINISHED"}
     assert np.array_equal(curve_points(hair.data), before)
-    assert not bpy.ops.hairloom.take_flow_back.poll()
+    assert not bpy.ops.hairloom.revert_flow.poll()
     comb(reach=0.6, falloff=0.2)
     assert np.array_equal(curve_points(hair.data), again)
 
@@ -101,7 +101,7 @@ def test_what_a_brush_has_combed_since_is_not_lost(hair):
     hair.data.position_data.foreach_set("vector", brushed.ravel())
     comb(amount=0.0)
     assert np.abs(curve_points(hair.data) - brushed).max() < 1e-6
-    bpy.ops.hairloom.take_flow_back()
+    bpy.ops.hairloom.revert_flow()
     assert np.array_equal(curve_points(hair.data), brushed)
 
 

@@ -198,7 +198,7 @@ def test_undo_and_kept_shapes(new_hair, egg):
     bpy.ops.ed.undo_push(message="trimmed")
     bpy.ops.hairloom.mirror_hair()
     past_reports.clear()
-    bpy.ops.hairloom.take_trim_back()
+    bpy.ops.hairloom.revert_trim()
     assert not any("are lost, too" in each.text for each in past_reports), "it is mirrored, too"
     expected = [each for each in long if each[0, 0] > 0.0]
     expected += [each * FLIP for each in expected]

@@ -68,7 +68,7 @@ def test_hair_falls_by_its_whole_weight_whatever_is_seen_of_its_motion_and_under
 ):
     """The simulated fraction and water change nothing; strands with a gravity mask of 0 stay."""
     found = []
-    for values in ({}, {"simulated": 0.0, "buoyancy": 1.0, "drag": 5.0, "simulated_mask": "Few"}):
+    for values in ({}, {"influence": 0.0, "buoyancy": 1.0, "drag": 5.0, "influence_mask": "Few"}):
         hair = new_hair(sphere, lying())
         few = hair.data.attributes.new("Few", "FLOAT", "CURVE")
         few.data.foreach_set("value", [0.0, 0.0, 1.0, 1.0, 1.0])
@@ -139,7 +139,7 @@ def test_settled_hair_is_at_rest_in_motion(new_hair, sphere, evaluated, preset):
     assert moved() > 10 * AT_REST  # shows that the assertion above can fail
 
 
-def test_back_to_combed_is_exact_and_settling_again_begins_there(new_hair, sphere):
+def test_revert_settle_is_exact_and_settling_again_begins_there(new_hair, sphere):
     hair = new_hair(sphere)
     hair.hairloom.dynamics.sag_compensation = 0.5
     combed = curve_points(hair.data)
@@ -152,11 +152,11 @@ def test_back_to_combed_is_exact_and_settling_again_begins_there(new_hair, spher
     held = curve_points(hair.data)
     assert np.abs(held - combed).max() < 0.5 * np.abs(once - combed).max()
     assert hair.hairloom.dynamics.sag_compensation == 1.0
-    assert bpy.ops.hairloom.back_to_combed() == {"FINISHED"}
+    assert bpy.ops.hairloom.revert_settle() == {"FINISHED"}
     assert (curve_points(hair.data) == combed).all()
     assert hair.hairloom.dynamics.sag_compensation == 0.5
     assert not COMBED.is_there(hair)
-    assert not bpy.ops.hairloom.back_to_combed.poll()
+    assert not bpy.ops.hairloom.revert_settle.poll()
 
 
 @pytest.mark.slow
@@ -167,7 +167,7 @@ def test_hair_that_was_combed_since_goes_back_to_that(new_hair, sphere):
     points[7] += 0.002
     hair.data.position_data.foreach_set("vector", points.ravel())
     settle(seconds=0.3)
-    bpy.ops.hairloom.back_to_combed()
+    bpy.ops.hairloom.revert_settle()
     assert (curve_points(hair.data) == points).all()
 
 
@@ -183,7 +183,7 @@ def test_curves_drawn_since_and_curves_that_cannot_be_used_stay_as_they_are(new_
     now = curve_points(hair.data)
     now[-3:] = [[0.2, 0.0, 0.0], [0.3, 0.0, 0.0], [0.4, 0.0, 0.0]]
     hair.data.position_data.foreach_set("vector", now.ravel())
-    bpy.ops.hairloom.back_to_combed()
+    bpy.ops.hairloom.revert_settle()
     back = curve_points(hair.data)
     assert (back[-3:] == now[-3:]).all()
     assert (back[:-3] == combed).all()
@@ -212,7 +212,7 @@ def test_what_is_taken_back_takes_later_tools_along(order, new_hair, sphere):
         trim(hair) if tool == "trim" else settle(seconds=0.2)
         shapes.append(curve_points(hair.data))
     first, second = (
-        {"settle": "back_to_combed", "trim": "take_trim_back"}[tool] for tool in order.split(", ")
+        {"settle": "revert_settle", "trim": "revert_trim"}[tool] for tool in order.split(", ")
     )
     twin = hair.copy()
     twin.data = hair.data.copy()
@@ -228,8 +228,8 @@ def test_what_is_taken_back_takes_later_tools_along(order, new_hair, sphere):
     bpy.context.view_layer.objects.active = twin
     getattr(bpy.ops.hairloom, second)()
     assert (curve_points(twin.data) == shapes[1]).all()
-    assert COMBED.is_there(twin) is (second == "take_trim_back")
-    assert twin.hairloom.dynamics.sag_compensation == (0.5 if second == "back_to_combed" else 1.0)
+    assert COMBED.is_there(twin) is (second == "revert_trim")
+    assert twin.hairloom.dynamics.sag_compensation == (0.5 if second == "revert_settle" else 1.0)
     assert len([each for each in past_reports if "are lost, too" in each.text]) == 1
 
 
@@ -246,7 +246,7 @@ def test_linked_duplicates_share_settled_curves_and_carry_their_weight_alike(new
     hair.select_set(False)
     twin.select_set(True)
     bpy.context.view_layer.objects.active = twin
-    bpy.ops.hairloom.back_to_combed()
+    bpy.ops.hairloom.revert_settle()
     assert {each: each.hairloom.dynamics.sag_compensation for each in sags} == sags
 
 

@@ -131,7 +131,7 @@ def test_hair_goes_along_as_far_as_it_is_simulated(playing, evaluated, is_cut):
     advance(evaluated, 3, lambda frame: setattr(head.location, "x", 0.05 * frame**2))
     settings.time_scale = 1.0 if is_cut else 0.0
     for simulated, is_seen in ((1.0, np.isin(session.rig.guides, chosen)), (0.0, False)):
-        settings.simulated = simulated
+        settings.influence = simulated
         session.take_settings()
         advance(evaluated, 1, lambda frame: cut(head))
         style = motion_flow.style_of_guides(session.rig, session.solver.pose)

@@ -55,7 +55,7 @@ def test_bones_of_a_skinned_head_lie_beside_tressfx(
 ) -> None:
     skinned(sphere)
     new_hair(sphere)
-    bpy.ops.hairloom.export_tressfx(filepath=str(tmp_path / "hair.tfx"), up="Z", fills_groups=True)
+    bpy.ops.hairloom.export_tressfx(filepath=str(tmp_path / "hair.tfx"), up="Z", pad_to_64=True)
     read = read_tfx(tmp_path / "hair.tfx", up="Z").strands
     assert read.strand_count == 64 and set(read.point_counts) == {8}
     bones = read_tfxbone(tmp_path / "hair.tfxbone")

@@ -127,7 +127,7 @@ def overridden_hair(folder):
 
 @pytest.mark.parametrize(
     "tool",
-    ["grow_again", "fit_again", "settle", "back_to_combed", "trim_to_shape", "take_trim_back"]
+    ["grow_again", "fit_again", "settle", "revert_settle", "trim_to_shape", "revert_trim"]
     + ["mirror_hair", "comb_flow", "comb_parting"],
 )
 def test_curves_of_a_library_override_are_left_alone(tool, trimmed):

@@ -74,9 +74,9 @@ def test_hair_passes_no_plane_and_follows_it_again_when_it_moves(hair):
     bpy.context.view_layer.update()
     trim(hair)
     assert tips(hair)[:, 2].min() == pytest.approx(-0.15, abs=1e-7)
-    assert bpy.ops.hairloom.take_trim_back() == {"FINISHED"}
+    assert bpy.ops.hairloom.revert_trim() == {"FINISHED"}
     assert np.array_equal(curve_points(hair.data), before)
-    assert not bpy.ops.hairloom.take_trim_back.poll()
+    assert not bpy.ops.hairloom.revert_trim.poll()
 
 
 def bezier_hair(sphere):
@@ -125,7 +125,7 @@ def test_nodes_find_curves_where_they_have_been_trimmed_to(hair):
     shape = empty(0.12)
     trim(hair, shape)
     assert before > 0.15 and drawn(hair)[:, 2].max() < 0.12 + 1e-6
-    assert bpy.ops.hairloom.take_trim_back() == {"FINISHED"}
+    assert bpy.ops.hairloom.revert_trim() == {"FINISHED"}
     assert drawn(hair)[:, 2].max() == pytest.approx(before, abs=1e-7)
 
 
@@ -138,7 +138,7 @@ def test_bezier_curves_are_drawn_where_they_have_been_trimmed_to(extension, sphe
     after = drawn(hair)
     assert after[:, 2].max() < 0.0101
     assert np.array_equal(after[after[:, 1] > 0.025], before[before[:, 1] > 0.025]), "it was low"
-    assert bpy.ops.hairloom.take_trim_back() == {"FINISHED"}
+    assert bpy.ops.hairloom.revert_trim() == {"FINISHED"}
     assert drawn(hair) == pytest.approx(before, abs=1e-6)
 
 

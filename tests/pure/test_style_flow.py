@@ -112,7 +112,7 @@ def test_nothing_of_it_is_simulated_at_0_and_all_of_it_at_1() -> None:
     begun, pose = motion_flow.begin(rig, rig.rest_pose), pose_of(rig, matrix)
 
     def shown(simulated: np.ndarray | None) -> np.ndarray:
-        painted = None if simulated is None else PaintedGuides({"simulated": simulated[None]})
+        painted = None if simulated is None else PaintedGuides({"influence": simulated[None]})
         motion = motion_flow.advance(
             rig,
             begun,

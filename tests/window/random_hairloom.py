@@ -15,7 +15,7 @@ SECTIONS = {
 }
 MOST_GROOMS = 3
 #: buttons that add lines and rings to hair, that remove them, each with the setting that names
-#: them, that shape hair, and (TAKEN_BACK) that restore its shape
+#: them, that shape hair, and (REVERTS) that restore its shape
 ADDED = ("add_parting", "add_stroke", "add_hair_tie")
 REMOVED = {
     "remove_parting": "line",
@@ -26,7 +26,7 @@ REMOVED = {
 SHAPED = ("settle", "comb_parting", "comb_flow", "trim_to_shape", "mirror_hair", "grow_again")
 #: buttons that need a line, each with the button that adds one
 LINED = {"comb_parting": "add_parting", "comb_flow": "add_stroke"}
-TAKEN_BACK = ("back_to_combed", "take_flow_back", "take_trim_back")
+REVERTS = ("revert_settle", "revert_flow", "revert_trim")
 
 
 def no_long_work():
@@ -113,7 +113,7 @@ def shape_hair(dice):
         yield from press("ESC")
     yield from no_long_work()
     if dice.often(0.5):
-        clicked(dice, f"hairloom.{dice.pick(TAKEN_BACK)}")
+        clicked(dice, f"hairloom.{dice.pick(REVERTS)}")
 
 
 @action(2)

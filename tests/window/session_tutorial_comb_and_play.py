@@ -156,7 +156,7 @@ def settled():
     yield from until(lambda: moved(before, shape()) > 0.5, "nothing falls")
     yield from still()
     driver.screenshot("settled")
-    page.says("Back to Combed")
+    page.says("Revert Settle")
 
 
 def played():

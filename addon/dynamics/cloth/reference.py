@@ -28,7 +28,7 @@ def advance_cloth_slowly(
 ) -> ClothState:
     """Reference of `cloth.step.advance_cloth`; see there."""
     dt = 1.0 / settings.substep_rate
-    duration = min(duration, settings.longest_frame)
+    duration = min(duration, settings.max_frame_time)
     time = state.time_left + duration
     count = math.floor(time / dt + 1.0e-6) if duration else 0
     cloth = _Cloth(state, drive, settings)

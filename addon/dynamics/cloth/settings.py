@@ -43,9 +43,9 @@ class FinSettings(MotionSettings):
         source="Macklin et al. 2019",
         panel="Steps",
     )
-    longest_frame: float = number(
+    max_frame_time: float = number(
         0.25,
-        label="Longest Frame",
+        label="Max Frame Time",
         description="Maximum time to simulate between two frames",
         soft=(0.05, 1.0),
         hard=(0.01, 10.0),

@@ -85,7 +85,7 @@ def advance_cloth(
         HairloomError: a drive that does not fit the state or is not finite, or a bad duration.
     """
     dt = 1.0 / settings.substep_rate
-    duration, count, left = due_substeps(state.time_left, duration, settings.longest_frame, dt)
+    duration, count, left = due_substeps(state.time_left, duration, settings.max_frame_time, dt)
     if not count:
         return replace(state, time_left=left)
     frame = _prepare(state, drive, settings, dt)

@@ -48,7 +48,7 @@ def advance_slowly(
 ) -> DynamicsState:
     """Reference of `step.advance`; see there."""
     dt = 1.0 / settings.substep_rate
-    duration = min(duration, settings.longest_frame)
+    duration = min(duration, settings.max_frame_time)
     time = state.time_left + duration
     count = math.floor(time / dt + 1.0e-6) if duration else 0
     guides = [_Guide(state, drive, g, settings) for g in range(state.guide_count)]

@@ -92,8 +92,8 @@ def test_blocks_have_their_own_columns(kit):
 
 
 def test_what_is_painted_stays_in_the_range_of_its_setting():
-    painted = PaintedGuides({"volume": np.full((1, 3), 100.0), "simulated": np.full((1, 3), 5.0)})
-    settings = DynamicsSettings(volume=0.5, simulated=0.5)
+    painted = PaintedGuides({"volume": np.full((1, 3), 100.0), "influence": np.full((1, 3), 5.0)})
+    settings = DynamicsSettings(volume=0.5, influence=0.5)
     frame = painted_frame(painted, settings, 8, 3, 1.0 / 180.0)
     np.testing.assert_array_equal(frame.volume, np.full(3, 2.0), "half of it times 2 is all")
     np.testing.assert_array_equal(simulated_of(painted, settings, 3), np.ones(3))

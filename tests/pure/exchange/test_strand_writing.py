@@ -94,7 +94,7 @@ def test_a_suffix_or_engine_that_is_not_known_is_named(tmp_path: Path) -> None:
             StrandExportSettings(engine="maya"),
             "no layout for 'maya'.*unreal, unity, blender",
         ),
-        ("hair.tfx", StrandExportSettings(engine="unreal"), "TressFX does not have.*'For'"),
+        ("hair.tfx", StrandExportSettings(engine="unreal"), "TressFX does not have.*'Target'"),
         ("hair.abc", StrandExportSettings(up="Y"), "Groom Alembic does not have.*'Up'"),
         ("hair.hair", StrandExportSettings(vertex_count="8"), ".hair does not have.*'Vertices'"),
     ):
@@ -169,7 +169,7 @@ def test_groups_whose_names_become_one_stay_apart(tmp_path: Path, suffix: str) -
 def test_bones_of_the_last_strand_fill_up_to_64(tmp_path: Path) -> None:
     bones = strongest_bones(("a", "b"), np.eye(2)[np.arange(COUNT) % 2])
     hair = replace(groom(), bones=bones)
-    write_strands(tmp_path / "hair.tfx", hair, StrandExportSettings(fills_groups=True))
+    write_strands(tmp_path / "hair.tfx", hair, StrandExportSettings(pad_to_64=True))
     assert read_tfx(tmp_path / "hair.tfx").strands.strand_count == 64
     held = read_tfxbone(tmp_path / "hair.tfxbone")
     assert held.strand_count == 64 and (held.bone[COUNT:, 0] == 1).all()

@@ -72,7 +72,7 @@ def test_all_that_may_be_painted_is_declared() -> None:
     of_children = ("scatter", "length", "clump", "frizz", "fly_aways", "curl", "width")
     assert masks_of(ChildrenSettings) == {name: f"{name}_mask" for name in of_children}
     of_motion = {"gravity", "damping", "style_root", "style_tip", "style_damping", "bend", "volume"}
-    assert masks_of(DynamicsSettings).keys() == of_motion | {"simulated"}
+    assert masks_of(DynamicsSettings).keys() == of_motion | {"influence"}
     named = {"clump_mask": "Crown", "frizz_mask": "", "width_mask": "Front"}
     for method, found in (
         ("multi", {"clump": "Crown", "width": "Front"}),

@@ -12,7 +12,7 @@ from .reports import reporting
 from .selection import chosen_hair, in_object_mode, needs_hair
 
 
-class TakesBack:
+class RevertsShape:
     """Base of an operator, before bpy.types.Operator.
 
     shape: the kept shape. idle: text of a greyed-out button.
