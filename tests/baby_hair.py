@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from small_wig import GUIDES, curves, sheet
+from small_wig import GUIDES, sheet, wig_strands
 
 from hairloom.addon import rig_flow
 from hairloom.addon.arrays import Bools
@@ -14,7 +14,7 @@ def wig() -> rig_flow.Rig:
     children = ChildrenSettings(
         method="multi", strand_count=500, length_variation=0.0, baby_hair=0.8
     )
-    return rig_flow.prepare(curves(), sheet(), GUIDES, place="a wig", children=children)
+    return rig_flow.prepare(wig_strands(), sheet(), GUIDES, place="a wig", children=children)
 
 
 def short_strands(rig: rig_flow.Rig) -> Bools:

@@ -33,17 +33,17 @@ def without_sidecar(folder: Path) -> None:
     (folder / "cards.hairloom.json").unlink()
 
 
-def garbage(folder: Path) -> None:
+def with_garbage_sidecar(folder: Path) -> None:
     (folder / "cards.hairloom.json").write_text("{no", encoding="utf-8")
 
 
-def renamed(folder: Path) -> None:
+def with_renamed_files(folder: Path) -> None:
     """Mesh and sidecar renamed; the sidecar still refers to cards.glb."""
     for end in (".glb", ".hairloom.json"):
         (folder / f"cards{end}").rename(folder / f"{NAME}{end}")
 
 
-def other_levels(folder: Path) -> None:
+def with_other_levels(folder: Path) -> None:
     """The sidecar of another hair lies beside the mesh."""
 
     def change(content: dict[str, Any]) -> None:
@@ -60,7 +60,7 @@ def without_textures(folder: Path) -> None:
             (folder / roles[role]["file"]).unlink()
 
 
-def cut_off_table(folder: Path) -> None:
+def with_cut_off_table(folder: Path) -> None:
     table = folder / sidecar_of(folder)["material"]["tables"]["azimuthal"]["file"]
     table.write_bytes(table.read_bytes()[:50_000])
 
@@ -75,14 +75,14 @@ def _finest(file: GlbFile) -> dict[str, Any]:
     return dict(file.content["meshes"][node["mesh"]]["primitives"][0])
 
 
-def _changed(folder: Path, change: Callable[[GlbFile], None]) -> None:
+def _change_glb(folder: Path, change: Callable[[GlbFile], None]) -> None:
     path = folder / "cards.glb"
     file = GlbFile.of(path.read_bytes(), str(path))
     change(file)
     path.write_bytes(file.data())
 
 
-def reordered(folder: Path) -> None:
+def with_reordered_triangles(folder: Path) -> None:
     """The same triangles in another order, as after vertex cache optimisation."""
 
     def change(file: GlbFile) -> None:
@@ -94,7 +94,7 @@ def reordered(folder: Path) -> None:
         content = np.random.default_rng(3).permutation(indices).tobytes()
         file.binary[begin : begin + len(content)] = content
 
-    _changed(folder, change)
+    _change_glb(folder, change)
 
 
 def without_unused(folder: Path) -> None:
@@ -104,10 +104,10 @@ def without_unused(folder: Path) -> None:
         for mesh in file.content["meshes"]:
             mesh["primitives"][0]["attributes"].pop("TEXCOORD_1")
 
-    _changed(folder, change)
+    _change_glb(folder, change)
 
 
-def quantised(folder: Path) -> None:
+def with_quantised_positions(folder: Path) -> None:
     """KHR_mesh_quantization of positions: 16 bits, scaled back by the node."""
 
     def change(file: GlbFile) -> None:
@@ -140,7 +140,7 @@ def quantised(folder: Path) -> None:
         for key in ("extensionsUsed", "extensionsRequired"):
             content.setdefault(key, []).append("KHR_mesh_quantization")
 
-    _changed(folder, change)
+    _change_glb(folder, change)
 
 
 def with_mirrored_cards(folder: Path) -> None:
@@ -156,7 +156,7 @@ def with_mirrored_cards(folder: Path) -> None:
             tangents[is_mirrored] *= -1.0
             attributes["TANGENT"] = file.add(tangents, "VEC4", target=34962)
 
-    _changed(folder, change)
+    _change_glb(folder, change)
 
 
 def with_turned_tangents(folder: Path) -> None:
@@ -175,19 +175,19 @@ def with_turned_tangents(folder: Path) -> None:
 #: damage -> words of the one message about it; "": no message
 DAMAGES: dict[Callable[[Path], None], str] = {
     without_sidecar: "is missing",
-    garbage: "is no sidecar",
-    renamed: "names cards.glb",
-    other_levels: "its sidecar",
+    with_garbage_sidecar: "is no sidecar",
+    with_renamed_files: "names cards.glb",
+    with_other_levels: "its sidecar",
     without_textures: "is missing",
-    cut_off_table: "cannot be read",
+    with_cut_off_table: "cannot be read",
     without_index_buffer: "is missing",
-    reordered: "another program has changed",
+    with_reordered_triangles: "another program has changed",
     without_unused: "another program has changed",
-    quantised: "",  # 65,536 steps: not visible
+    with_quantised_positions: "",  # 65,536 steps: not visible
 }
 
 
-def damaged(folder: Path, target: Path, damage: Callable[[Path], None]) -> Path:
+def damaged_copy(folder: Path, target: Path, damage: Callable[[Path], None]) -> Path:
     """A damaged copy of an export's files."""
     shutil.rmtree(target, ignore_errors=True)
     target.mkdir(parents=True)

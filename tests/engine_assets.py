@@ -39,11 +39,11 @@ IRRADIANCE = 4.0
 AMBIENT = {"kajiya_kay": 0.3, "marschner": 0.0}
 NEAR, FAR = 0.05, 5.0
 
-MOST_MEAN = 1.0 / 255.0
+MAX_MEAN_DIFFERENCE = 1.0 / 255.0
 #: Largest fraction of pixels that may differ by more than 8 / 255: engines make mip maps in another
 #: way, which sharp highlights show. Without denser alpha at grazing angles, baked cards would reach
 #: 0.022.
-MOST_DIFFERENT = {"kajiya_kay": 0.03, "marschner": 0.005, "baked": 0.015}
+MAX_DIFFERENT_FRACTION = {"kajiya_kay": 0.03, "marschner": 0.005, "baked": 0.015}
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Asset:
     picture: np.ndarray
 
 
-def curtain() -> StrandSet:
+def curtain_strands() -> StrandSet:
     """Strands that hang around a circle."""
     angle = np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)
     out = np.stack([np.cos(angle), np.sin(angle), np.zeros(40)], axis=-1)
@@ -72,7 +72,7 @@ def glb_axes(vector: Any) -> list[float]:
     return [float(vector[0]), float(vector[2]), -float(vector[1])]
 
 
-def written_asset(
+def write_asset(
     folder_name: str,
     look_name: str,
     export: CardExportSettings,
@@ -97,7 +97,7 @@ def written_asset(
         strand_count=6,
         highlights="shift" if model == "kajiya_kay" else "tangent",
     )
-    rig = rig_flow.prepare(curtain(), None, GuideSettings(), place="curtain")
+    rig = rig_flow.prepare(curtain_strands(), None, GuideSettings(), place="curtain")
     settings = SettingsMap(
         CardSettings(source="clusters" if is_baked else "guides", width_factor=1.5, card_count=40),
         AtlasSettings(source="baked" if is_baked else "made", size="512", columns=8),
@@ -118,10 +118,10 @@ def written_asset(
         "far": FAR,
     }
     (folder / "view.json").write_text(json.dumps(view), encoding="utf-8")
-    return Asset(folder, by_hairloom(written, look))
+    return Asset(folder, render_with_hairloom(written, look))
 
 
-def by_hairloom(written: WrittenCards, look: ShadingSettings) -> np.ndarray:
+def render_with_hairloom(written: WrittenCards, look: ShadingSettings) -> np.ndarray:
     from hairloom.addon.render.camera import Camera, look_at, perspective
     from hairloom.addon.render.card_snapshot import CardSnapshot
     from hairloom.addon.render.frame import render_image
@@ -145,14 +145,16 @@ def by_hairloom(written: WrittenCards, look: ShadingSettings) -> np.ndarray:
     return render_image(snapshot, Camera(look_at(EYE, TARGET), projection), SIZE, SIZE, 1)
 
 
-def check(asset: Asset, drawn: Path) -> None:
+def check_picture(asset: Asset, picture_path: Path) -> None:
     """The engine's picture equals ours within limits, both in display values."""
-    theirs = read_texture(drawn, is_color=False)[..., :3]
+    theirs = read_texture(picture_path, is_color=False)[..., :3]
     ours = read_encoded(asset.picture)
     difference = np.abs(theirs - ours)
     assert (ours.max(axis=-1) > 0.1).mean() > 0.1  # there is hair in it
-    assert difference.mean() < MOST_MEAN
-    assert (difference.max(axis=-1) > 8.0 / 255.0).mean() < MOST_DIFFERENT[asset.folder.name]
+    assert difference.mean() < MAX_MEAN_DIFFERENCE
+    assert (difference.max(axis=-1) > 8.0 / 255.0).mean() < MAX_DIFFERENT_FRACTION[
+        asset.folder.name
+    ]
 
 
 def read_encoded(linear: np.ndarray) -> np.ndarray:

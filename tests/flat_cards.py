@@ -44,7 +44,7 @@ def mesh_of(*cards: dict[str, np.ndarray]) -> CardMesh:
     return CardMesh(**joined, card=np.repeat(np.arange(len(cards)), 2))
 
 
-def constant(
+def constant_textures(
     base: Any = 1.0,
     alpha: float = 1.0,
     shift: float = 0.5,

@@ -21,7 +21,7 @@ PLAIN: dict[str, Any] = {
 }
 
 
-def settings(**values: Any) -> ChildrenSettings:
+def children_settings(**values: Any) -> ChildrenSettings:
     return ChildrenSettings(**(PLAIN | {"strand_count": 400} | values))
 
 
@@ -37,12 +37,12 @@ def sheet(cells: int = 10, size: float = 1.0) -> Surface:
 
 
 def guides_at(
-    surface: Surface, root: Any, way: Any, group: Ints | None = None, cv_count: int = 9
+    surface: Surface, root: Any, direction: Any, group: Ints | None = None, cv_count: int = 9
 ) -> StrandSet:
-    """Straight guides, bound to the surface; `root` and `way` (from root to tip): (guide_count,
+    """Straight guides, bound to the surface; `root` and `direction` (root to tip): (guide_count,
     3)."""
-    root, way = np.asarray(root, np.float64), np.asarray(way, np.float64)
-    grid = root[:, None] + np.linspace(0.0, 1.0, cv_count)[:, None] * way[:, None]
+    root, direction = np.asarray(root, np.float64), np.asarray(direction, np.float64)
+    grid = root[:, None] + np.linspace(0.0, 1.0, cv_count)[:, None] * direction[:, None]
     strands = StrandSet(
         grid.reshape(-1, 3),
         np.arange(len(root) + 1) * cv_count,

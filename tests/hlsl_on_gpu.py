@@ -12,8 +12,8 @@ from hairloom.addon.shading.marschner.fibre import Fibre
 from hairloom.addon.shading.marschner.tables import marschner_tables
 
 
-def probed_hlsl(hlsl: Path, text: str, sandbox: str, folder: Path) -> np.ndarray:
-    """The result of a fragment program in HLSL, see `probed`.
+def probe_hlsl(hlsl: Path, text: str, sandbox: str, folder: Path) -> np.ndarray:
+    """The result of a fragment program in HLSL, see `probe_glsl`.
 
     Args:
         hlsl: the file to write `text` to, where the sandbox's programs can read it.
@@ -26,7 +26,7 @@ def probed_hlsl(hlsl: Path, text: str, sandbox: str, folder: Path) -> np.ndarray
     for command in (compile_it, ["spirv-cross", "--version", "430", str(program)]):
         done = subprocess.run([sandbox, "run", *command], capture_output=True, text=True)
         assert done.returncode == 0, done.stdout + done.stderr
-    return probed(folder / "hlsl.glsl", _as_function(done.stdout), "at = place; main_of_hlsl()")
+    return probe_glsl(folder / "hlsl.glsl", _as_function(done.stdout), "at = place; main_of_hlsl()")
 
 
 def _as_function(text: str) -> str:
@@ -42,7 +42,7 @@ def _as_function(text: str) -> str:
     return text.replace("void main()", "void main_of_hlsl()")
 
 
-def probed(file: Path, text: str, call: str) -> np.ndarray:
+def probe_glsl(file: Path, text: str, call: str) -> np.ndarray:
     """Both models at 4,096 places, (64, 128, 4)."""
     import gpu
 

@@ -22,7 +22,7 @@ def sheet(*, has_uv: bool = True) -> Surface:
     return Surface(positions, triangles, uv if has_uv else None)
 
 
-def curves(count: int = 60) -> StrandSet:
+def wig_strands(count: int = 60) -> StrandSet:
     """Strands of six points that lean over to +X."""
     root = np.random.default_rng(2).uniform(-0.09, 0.09, (count, 3)) * [1.0, 1.0, 0.0]
     along = np.linspace(0.0, 1.0, 6)[:, None] * np.array([0.05, 0.0, 0.1])
@@ -30,14 +30,14 @@ def curves(count: int = 60) -> StrandSet:
     return StrandSet(points, np.arange(count + 1) * 6, np.full(6 * count, 1e-4), np.zeros(count))
 
 
-def turned(strands: StrandSet, number: np.ndarray, angle: float) -> StrandSet:
-    """Strands of which those in `number` are turned about Z, around their roots."""
+def turn_strands(strands: StrandSet, indices: np.ndarray, angle: float) -> StrandSet:
+    """Strands of which those in `indices` are turned about Z, around their roots."""
     points = strands.points.copy()
     turn = np.array(
         [[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]]
     )
-    for strand in number:
-        own = slice(strands.offsets[strand], strands.offsets[strand + 1])
-        root = points[own][0]
-        points[own] = root + (points[own] - root) @ turn.T
+    for strand in indices:
+        points_of_strand = slice(strands.offsets[strand], strands.offsets[strand + 1])
+        root = points[points_of_strand][0]
+        points[points_of_strand] = root + (points[points_of_strand] - root) @ turn.T
     return strands.with_points(points)

@@ -18,19 +18,19 @@ from unittest import mock
 
 from hairloom.addon.exchange.files import names
 
-LIMIT = 259
+MAX_PATH_LENGTH = 259
 #: functions that take a path first, and those that take two
-_ONE = (
+_ONE_PATH_CALLS = (
     *("open", "mkdir", "rmdir", "unlink", "stat", "lstat", "scandir", "listdir", "chmod"),
     *("access", "utime", "listxattr", "getxattr", "setxattr"),
 )
-_TWO = ("replace", "rename", "link")
+_TWO_PATH_CALLS = ("replace", "rename", "link")
 #: these fail if another program has the file open
-_ALONE = ("rmdir", "unlink", "replace", "rename")
+_CALLS_REFUSED_IF_OPEN = ("rmdir", "unlink", "replace", "rename")
 
 
 @contextmanager
-def windows_rules(held: Collection[Path] = ()) -> Iterator[None]:
+def windows_rules(open_files: Collection[Path] = ()) -> Iterator[None]:
     """Apply the rules within this context.
 
     Args:
@@ -39,20 +39,20 @@ def windows_rules(held: Collection[Path] = ()) -> Iterator[None]:
 
     def checked(real: Callable[..., Any], count: int) -> Callable[..., Any]:
         def call(*arguments: Any, **options: Any) -> Any:
-            paths = [_as_there(each) for each in arguments[:count]]
-            if real.__name__ in _ALONE:
+            paths = [_path_in_stored_case(each) for each in arguments[:count]]
+            if real.__name__ in _CALLS_REFUSED_IF_OPEN:
                 for path in paths:
-                    _refuse_held(path, held)
+                    _refuse_open_files(path, open_files)
             return real(*paths, *arguments[count:], **options)
 
         return call
 
     with ExitStack() as stack:
-        stack.enter_context(mock.patch.object(names, "MAX_PATH", LIMIT))
+        stack.enter_context(mock.patch.object(names, "MAX_PATH", MAX_PATH_LENGTH))
         stack.enter_context(mock.patch.object(shutil, "_use_fd_functions", new=False))
         for module, name, count in (
-            *((os, name, 1) for name in _ONE if hasattr(os, name)),
-            *((os, name, 2) for name in _TWO),
+            *((os, name, 1) for name in _ONE_PATH_CALLS if hasattr(os, name)),
+            *((os, name, 2) for name in _TWO_PATH_CALLS),
             (builtins, "open", 1),
             (io, "open", 1),
         ):
@@ -64,7 +64,7 @@ def windows_rules(held: Collection[Path] = ()) -> Iterator[None]:
 _real_listdir = os.listdir
 
 
-def _as_there(path: Any) -> Any:
+def _path_in_stored_case(path: Any) -> Any:
     """The path of an existing file whose name differs only in case, or the path itself.
 
     Raises:
@@ -73,7 +73,7 @@ def _as_there(path: Any) -> Any:
     if not isinstance(path, (str, os.PathLike)):
         return path
     text = os.fspath(path)
-    if len(os.path.abspath(text)) > LIMIT:
+    if len(os.path.abspath(text)) > MAX_PATH_LENGTH:
         raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), text)
     folder, name = os.path.split(os.path.abspath(text))
     try:
@@ -87,6 +87,6 @@ def _as_there(path: Any) -> Any:
     )
 
 
-def _refuse_held(path: Any, held: Collection[Path]) -> None:
-    if any(each == Path(path) or each.is_relative_to(path) for each in held):
+def _refuse_open_files(path: Any, open_files: Collection[Path]) -> None:
+    if any(each == Path(path) or each.is_relative_to(path) for each in open_files):
         raise PermissionError(errno.EACCES, "Access is denied", os.fspath(path), None, None)

@@ -14,7 +14,7 @@ from hairloom.addon.blender.command_line import command_line
 SCHEMA = json.loads(
     (Path(__file__).parents[2] / "docs" / "sidecar.schema.json").read_text(encoding="utf-8")
 )
-SMALL = (
+SMALL_OPTIONS = (
     *(
         "--set",
         "children.method=none",
@@ -28,7 +28,7 @@ SMALL = (
     *("--set", "atlas.source=made"),
     *("--set", "card_texture.height=64", "--set", "card_texture.variant_width=32"),
 )
-BAKED = (
+BAKED_OPTIONS = (
     *(
         "--set",
         "cards.source=clusters",
@@ -41,11 +41,11 @@ BAKED = (
 )
 
 
-def cards(output: Path, *more: str) -> int:
-    return command_line.run(["cards", *SMALL, *more, "--output", str(output)])
+def export_cards(output: Path, *options: str) -> int:
+    return command_line.run(["cards", *SMALL_OPTIONS, *options, "--output", str(output)])
 
 
-def sidecar_of(path: Path) -> dict[str, Any]:
+def read_sidecar(path: Path) -> dict[str, Any]:
     """The sidecar of an export, valid by the schema; all files that it names must exist."""
     content = json.loads(path.with_suffix(".hairloom.json").read_text(encoding="utf-8"))
     jsonschema.Draft202012Validator(SCHEMA).validate(content)
@@ -58,7 +58,7 @@ def sidecar_of(path: Path) -> dict[str, Any]:
     return content
 
 
-def grown(sphere: Any, name: str) -> Any:
+def grow_hair(sphere: Any, name: str) -> Any:
     bpy.ops.object.select_all(action="DESELECT")
     sphere.select_set(True)
     bpy.context.view_layer.objects.active = sphere

@@ -7,11 +7,11 @@ from hairloom.addon.blender.colliders.obstacles import Obstacles
 from hairloom.addon.dynamics.colliders import transform_points
 from hairloom.addon.dynamics.settings import DynamicsSettings
 
-FRAME = 1.0 / 60.0
-COARSE = DynamicsSettings(collider_resolution=16)
+FRAME_S = 1.0 / 60.0
+COARSE_SETTINGS = DynamicsSettings(collider_resolution=16)
 
 
-class Scene:
+class ColliderScene:
     """An owner without a head, with its colliders in a collection."""
 
     def __init__(self):
@@ -41,7 +41,7 @@ class Scene:
         return self.add(bpy.context.object, shape)
 
     def obstacles(self, known=None):
-        return Obstacles.of(self.owner, None, None, COARSE, depsgraph(), known)
+        return Obstacles.of(self.owner, None, None, COARSE_SETTINGS, depsgraph(), known)
 
 
 def depsgraph():
@@ -58,5 +58,5 @@ def distance_now(posed, point):
     return float(distance[0] / np.linalg.norm(inverse[:3, :3].T @ gradient[:, 0]))
 
 
-def moved(found, duration=FRAME):
-    return found.move(depsgraph(), duration)
+def move_obstacles(obstacles, duration=FRAME_S):
+    return obstacles.move(depsgraph(), duration)

@@ -9,8 +9,8 @@ import pytest
 bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
 
 from engine_stage import SIZE, set_world  # noqa: E402
+from function_cache import cache_function  # noqa: E402
 from hedgehogs import hedgehog  # noqa: E402
-from made_once import once  # noqa: E402
 
 import hairloom  # noqa: E402  it is loaded by tests/conftest.py
 from hairloom.addon import light_flow, registration  # noqa: E402
@@ -27,7 +27,7 @@ from hairloom.addon.strands import StrandSet  # noqa: E402
 
 
 @pytest.fixture(autouse=True, scope="session")
-def same_fields() -> Iterator[Any]:
+def cached_distance_fields() -> Iterator[Any]:
     """Build the distance field of each mesh once for all tests: a field takes seconds, most tests
     use the same head, and tests/pure covers the fields themselves. Yields the original
     `from_surface`."""
@@ -50,7 +50,7 @@ def same_fields() -> Iterator[Any]:
 
 
 @pytest.fixture(autouse=True, scope="session")
-def made_before() -> Iterator[None]:
+def cached_functions() -> Iterator[None]:
     """Cache slow functions that depend on their arguments alone: most tests use the same hair on
     the same head, and tests/pure covers these functions."""
 
@@ -59,15 +59,15 @@ def made_before() -> Iterator[None]:
 
     with pytest.MonkeyPatch.context() as patch:
         for name in ("sky_field", "openness_field", "skin_field"):
-            once(patch, light_flow, name, also=cells)
+            cache_function(patch, light_flow, name, extra_key=cells)
         for name in ("above_skin", "wrong_fraction"):
-            once(patch, card_build, name)
+            cache_function(patch, card_build, name)
         for name in ("grow", "grow_with_face"):
-            once(patch, inputs, name)
-        once(patch, child_roots, "_roots_among")
-        once(patch, skin_layouts, "skin_layout")
-        once(patch, spheres, "fit_spheres")
-        once(patch, motion, "fit_spheres")
+            cache_function(patch, inputs, name)
+        cache_function(patch, child_roots, "_roots_among")
+        cache_function(patch, skin_layouts, "skin_layout")
+        cache_function(patch, spheres, "fit_spheres")
+        cache_function(patch, motion, "fit_spheres")
         yield
 
 
@@ -78,7 +78,7 @@ def empty_scene() -> None:
 
 
 @pytest.fixture(autouse=True)
-def numpy_unless_asked(request: pytest.FixtureRequest) -> Iterator[None]:
+def numpy_by_default(request: pytest.FixtureRequest) -> Iterator[None]:
     """Simulate hair with numpy, except in tests that draw or request a GPU: software drivers take
     up to a minute to compile the shader, and whether an earlier test has started the GPU varies."""
     with pytest.MonkeyPatch.context() as patch:

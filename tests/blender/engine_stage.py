@@ -20,7 +20,7 @@ def set_world(color: tuple[float, float, float]) -> None:
     tree.links.new(background.outputs[0], output.inputs["Surface"])
 
 
-def background(scene: Any) -> Any:
+def background_node(scene: Any) -> Any:
     return next(node for node in scene.world.node_tree.nodes if node.type == "BACKGROUND")
 
 
@@ -35,7 +35,7 @@ def set_panorama(scene: Any, radiance: np.ndarray, kind: str = "EQUIRECTANGULAR"
     tree = scene.world.node_tree
     node = tree.nodes.new("ShaderNodeTexEnvironment")
     node.image, node.projection = image, kind
-    tree.links.new(node.outputs["Color"], background(scene).inputs["Color"])
+    tree.links.new(node.outputs["Color"], background_node(scene).inputs["Color"])
     return node
 
 
@@ -50,8 +50,8 @@ def add_ball(radius: float = 0.15, color: tuple[float, float, float] = (1.0, 1.0
     return ball
 
 
-def rendered(folder: Path) -> dict[str, np.ndarray]:
-    """Render, and read back all passes with `passes_in`."""
+def render_passes(folder: Path) -> dict[str, np.ndarray]:
+    """Render, and read back all passes with `read_passes`."""
     scene = bpy.context.scene
     settings = scene.render.image_settings
     if hasattr(settings, "media_type"):
@@ -61,10 +61,10 @@ def rendered(folder: Path) -> dict[str, np.ndarray]:
     path = folder / "picture.exr"
     scene.render.filepath = str(path)
     bpy.ops.render.render(write_still=True)
-    return passes_in(path) if path.is_file() else {}
+    return read_passes(path) if path.is_file() else {}
 
 
-def passes_in(path: Path) -> dict[str, np.ndarray]:
+def read_passes(path: Path) -> dict[str, np.ndarray]:
     """All passes of a file: name -> (height, width, channels), row 0 at the bottom."""
     import OpenImageIO
 
@@ -78,11 +78,11 @@ def passes_in(path: Path) -> dict[str, np.ndarray]:
     return found
 
 
-def picture(folder: Path) -> np.ndarray:
-    return rendered(folder)["ViewLayer.Combined"]
+def render_picture(folder: Path) -> np.ndarray:
+    return render_passes(folder)["ViewLayer.Combined"]
 
 
-def coded(path: Path) -> np.ndarray:
+def read_encoded_pixels(path: Path) -> np.ndarray:
     image = bpy.data.images.load(str(path))
     image.colorspace_settings.is_data = True
     pixels = np.empty(len(image.pixels), np.float32)

@@ -5,39 +5,39 @@ import numpy as np
 
 from hairloom.addon.blender.preview import fins
 
-FRAME = 1.0 / 60.0
+FRAME_S = 1.0 / 60.0
 
 
-def update():
+def update_view_layer():
     bpy.context.view_layer.update()
 
 
-def rest_of(obj):
+def rest_vertices(obj):
     """The vertices of the original mesh, object space."""
     rest = np.empty((len(obj.data.vertices), 3), np.float32)
     obj.data.vertices.foreach_get("co", rest.ravel())
     return rest
 
 
-def shown(obj, evaluated):
+def evaluated_vertices(obj, evaluated):
     """The vertices of the evaluated mesh, world space; the original vertices come first."""
-    there = obj.evaluated_get(evaluated())
-    points = np.empty((len(there.data.vertices), 3), np.float32)
-    there.data.vertices.foreach_get("co", points.ravel())
-    matrix = np.array(there.matrix_world)
+    evaluated_obj = obj.evaluated_get(evaluated())
+    points = np.empty((len(evaluated_obj.data.vertices), 3), np.float32)
+    evaluated_obj.data.vertices.foreach_get("co", points.ravel())
+    matrix = np.array(evaluated_obj.matrix_world)
     return points @ matrix[:3, :3].T + matrix[:3, 3]
 
 
-def play(session, evaluated, frames, each=lambda frame: None):
+def play_frames(session, evaluated, frames, before_frame=lambda frame: None):
     for frame in range(frames):
-        each(frame)
-        update()
-        session.advance(evaluated(), FRAME)
-        update()
+        before_frame(frame)
+        update_view_layer()
+        session.advance(evaluated(), FRAME_S)
+        update_view_layer()
 
 
-def started(obj, evaluated):
-    update()
+def start_fin(obj, evaluated):
+    update_view_layer()
     session = fins.start(obj, evaluated())
     session.play(evaluated())
     return session

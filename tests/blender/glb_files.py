@@ -100,7 +100,7 @@ def node_program() -> str:
     return program
 
 
-def validated(path: Path) -> dict[str, Any]:
+def validator_report(path: Path) -> dict[str, Any]:
     """The report of Khronos's validator."""
     if not (VALIDATOR_FOLDER / "node_modules" / "gltf-validator").is_dir():
         pytest.skip("Khronos's glTF validator is missing: `make setup` installs it")

@@ -8,7 +8,7 @@ from hairloom.addon.blender.bakes.cache import Cache
 from hairloom.addon.blender.sessions.session import Session
 
 
-def grid_of(session: Session) -> Floats:
+def strand_grid(session: Session) -> Floats:
     """The strands that a session shows."""
     return session.strands.reshape(session.rig.strands.strand_count, -1, 3)
 

@@ -3,7 +3,7 @@
 import bpy
 
 
-def with_modifier(obj, *nodes):
+def add_nodes_modifier(obj, *nodes):
     """Add a geometry nodes modifier that passes the curves through these nodes in turn."""
     tree = bpy.data.node_groups.new("Nodes", "GeometryNodeTree")
     for in_out in ("INPUT", "OUTPUT"):
@@ -19,7 +19,7 @@ def with_modifier(obj, *nodes):
     obj.modifiers.new("Nodes", "NODES").node_group = tree
 
 
-def mode_of(modifier):
+def hair_dynamics_mode(modifier):
     """The input "Mode" of a modifier that uses Blender's Hair Dynamics."""
     sockets = modifier.node_group.interface.items_tree
     (mode,) = (each for each in sockets if each.item_type == "SOCKET" and each.name == "Mode")

@@ -5,7 +5,7 @@ from pathlib import Path
 import bpy
 
 
-def overridden(folder: Path) -> list[bpy.types.Object]:
+def library_overrides(folder: Path) -> list[bpy.types.Object]:
     """Save all objects of the scene in a library file, in one collection, and link them back as
     overrides, in the same order."""
     file, collection = str(folder / "library.blend"), bpy.data.collections.new("Character")

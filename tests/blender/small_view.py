@@ -15,7 +15,7 @@ from hairloom.addon.render.snapshot import Snapshot
 from hairloom.addon.render.textures import texture_to_array
 
 SIZE, ADDRESS = 64, 7
-NOTHING = (0.0, 0.0, 0.0, 0.0)
+TRANSPARENT = (0.0, 0.0, 0.0, 0.0)
 
 
 class SmallView:
@@ -66,7 +66,7 @@ class SmallView:
         return self.drawn()
 
     def drawn(self) -> np.ndarray:
-        self.target.sized(SIZE, SIZE).clear(NOTHING)
+        self.target.sized(SIZE, SIZE).clear(TRANSPARENT)
         with self.target.drawing():
             gpu.state.active_framebuffer_get().clear(depth=self.depth)
             overlay._draw_strands(self.context)

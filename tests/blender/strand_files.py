@@ -16,14 +16,14 @@ pytest.importorskip("alembic3d", reason="it is missing: `make setup` installs it
 from alembic3d import Abc, AbcGeom
 
 
-def straight(place: tuple[float, float, float] = (1.0, 2.0, 3.0)) -> StrandSet:
+def straight_strands(place: tuple[float, float, float] = (1.0, 2.0, 3.0)) -> StrandSet:
     """Two straight vertical strands, 1 m long; the root of the first is at `place`."""
     points = np.array(place) + np.linspace([0, 0, 0], [0, 0, 1], 5)
     both = np.concatenate([points, points + (0.1, 0.0, 0.0)])
     return StrandSet(both, [0, 5, 10], np.full(10, 4e-5), [0, 0])
 
 
-def curves_of(path: Path) -> dict[str, dict[str, Any]]:
+def read_alembic_curves(path: Path) -> dict[str, dict[str, Any]]:
     """The Curves objects of an Alembic file by name: points of all samples, times, attributes."""
     archive = Abc.IArchive(str(path))
     (above,) = list(archive.getTop().children)
@@ -57,7 +57,7 @@ needs_usd = pytest.mark.skipif(
 )
 
 
-def stage_of(path: Path) -> tuple[Any, Any]:
+def read_usd_curves(path: Path) -> tuple[Any, Any]:
     """The stage, and its only BasisCurves prim."""
     usd = pytest.importorskip("pxr.Usd", reason="usd-core is missing: `make setup` installs it")
     from pxr import UsdGeom

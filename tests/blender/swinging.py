@@ -8,14 +8,14 @@ from typing import Any
 
 import bpy
 import numpy as np
-from grids import grid_of
+from grids import strand_grid
 
-FRAME = 1.0 / 24.0  # [s]
+FRAME_S = 1.0 / 24.0  # [s]
 #: distance that the head moves in each of FRAMES frames [m]
 STEP, FRAMES = 0.03, 4
 
 
-def thrown(hair: Any, head: Any, last: int, bake: Path, peak: int = 4) -> tuple[Any, Any]:
+def shake_head(hair: Any, head: Any, last: int, bake: Path, peak: int = 4) -> tuple[Any, Any]:
     """Key the head from frame 1 to `last` and set the hair up to be solved fast on the CPU."""
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = 1, last
@@ -29,26 +29,28 @@ def thrown(hair: Any, head: Any, last: int, bake: Path, peak: int = 4) -> tuple[
     return hair, head
 
 
-def play(
-    evaluated: Callable[[], Any], frames: int, each: Callable[[int], None] = lambda frame: None
+def play_frames(
+    evaluated: Callable[[], Any],
+    frames: int,
+    before_frame: Callable[[int], None] = lambda frame: None,
 ) -> None:
-    """Let the preview play freely; `each` is called before each frame."""
+    """Let the preview play freely; `before_frame` is called before each frame."""
     from hairloom.addon.blender.preview import previews
 
     for frame in range(frames):
-        each(frame)
+        before_frame(frame)
         bpy.context.view_layer.update()
         previews.advance(evaluated(), 1.0 / 60.0)
 
 
-def swings(session: Any) -> bool:
+def tips_lag(session: Any) -> bool:
     """Whether the tips lag behind a head that moves from rest, while the roots follow it."""
     from hairloom.addon.blender.preview import previews
 
     previews.rest(bpy.context.evaluated_depsgraph_get(), keep_playing=True)
-    head, before = session.head.found(), grid_of(session)
+    head, before = session.head.found(), strand_grid(session)
     for _ in range(FRAMES):
         head.location.x += STEP
-        previews.advance(bpy.context.evaluated_depsgraph_get(), FRAME)
-    offset = grid_of(session) - before - [FRAMES * STEP, 0.0, 0.0]
+        previews.advance(bpy.context.evaluated_depsgraph_get(), FRAME_S)
+    offset = strand_grid(session) - before - [FRAMES * STEP, 0.0, 0.0]
     return bool(offset[:, -1, 0].mean() < -0.005 and np.abs(offset[:, 0]).max() < 1e-5)

@@ -11,10 +11,10 @@ import bpy
 import numpy as np
 import pytest
 from bake_files import contents, frames_in
-from fin_motion import shown
+from fin_motion import evaluated_vertices
 from gpu_rounding import is_same
-from grids import baked_grid, grid_of
-from swinging import thrown
+from grids import baked_grid, strand_grid
+from swinging import shake_head
 from windows_rules import windows_rules
 
 from hairloom.addon.blender.bakes import groom_hashes, playback
@@ -34,7 +34,7 @@ LAST = 8
 @pytest.fixture
 def swinging(new_hair, sphere, tmp_path):
     """Hair on a head that shakes for some frames: (hair, head)."""
-    return thrown(new_hair(sphere), sphere, LAST, tmp_path / "bake")
+    return shake_head(new_hair(sphere), sphere, LAST, tmp_path / "bake")
 
 
 def bake(*objects, **options):
@@ -43,7 +43,7 @@ def bake(*objects, **options):
 
 
 def drawn(hair):
-    return grid_of(previews.session_of(hair))
+    return strand_grid(previews.session_of(hair))
 
 
 def played(hair, first=1, last=LAST):
@@ -452,7 +452,7 @@ def test_frames_that_are_open_elsewhere_go_when_their_writer_is_gone(tmp_path):
 
     bake(1)
     (held,) = folder.glob("frames-*/frame_000001.npz")
-    with windows_rules(held=[held]):
+    with windows_rules(open_files=[held]):
         bake(2)
         assert Cache(folder).frame(1)["value"].tolist() == [2, 2, 2]
     assert held.is_file()
@@ -781,10 +781,10 @@ def test_while_hair_is_baked_cloth_shows_its_bake_as_on_the_timeline(
     there = []
     for frame in range(1, LAST + 1):
         scene.frame_set(frame)
-        there.append(shown(flag, evaluated))
+        there.append(evaluated_vertices(flag, evaluated))
     assert np.ptp(there, axis=0).max() > 0.001, "it does not move"
     scene.frame_set(1)
-    during = [shown(flag, evaluated) for _ in Bake.of([hair], scene).steps()]
+    during = [evaluated_vertices(flag, evaluated) for _ in Bake.of([hair], scene).steps()]
     np.testing.assert_array_equal(during, there)
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from swinging import thrown
+from swinging import shake_head
 from tiers import few_in_commits
 
 bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
@@ -105,7 +105,7 @@ def test_between_two_frames_solids_go_straight(mesh):
 @pytest.fixture(params=few_in_commits(["sphere", "mesh"]))
 def swinging(request, new_hair, sphere, tmp_path):
     """Hair that falls over the sphere, drawn as cards. Mesh faces lie up to 1.7 mm inside it."""
-    hair, head = thrown(new_hair(sphere), sphere, LAST, tmp_path / "bake")
+    hair, head = shake_head(new_hair(sphere), sphere, LAST, tmp_path / "bake")
     head.hairloom.collider_shape = request.param
     hair.hairloom.dynamics.collider_resolution = 64
     hair.hairloom.dynamics.style_root = 0.0

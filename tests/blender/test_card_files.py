@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from glb_files import Glb, validated
+from glb_files import Glb, validator_report
 from tiers import few_in_commits
 
 from hairloom.addon.errors import HairloomError
@@ -33,7 +33,7 @@ from hairloom.addon.shading.settings import ShadingSettings
 bpy = pytest.importorskip("bpy", reason="exporters need Blender or the bpy module")
 pytest.importorskip("jsonschema", reason="it is missing: `make setup` installs it")
 
-from card_exports import BAKED, cards, grown, sidecar_of  # noqa: E402
+from card_exports import BAKED_OPTIONS, export_cards, grow_hair, read_sidecar  # noqa: E402
 
 from hairloom.addon.blender.cards import files  # noqa: E402
 from hairloom.addon.blender.cards.textures import (  # noqa: E402
@@ -62,8 +62,8 @@ def test_every_format_comes_with_a_sidecar_that_follows_the_schema(
 ) -> None:
     if suffix == ".usda" and not bpy.app.build_options.usd:
         pytest.skip("this Blender was built without USD")
-    assert cards(tmp_path / f"hair{suffix}", "--levels", "2") == 0
-    content = sidecar_of(tmp_path / f"hair{suffix}")
+    assert export_cards(tmp_path / f"hair{suffix}", "--levels", "2") == 0
+    content = read_sidecar(tmp_path / f"hair{suffix}")
     assert [level["node"] for level in content["levels"]] == ["hair_LOD0", "hair_LOD1"]
     assert content["levels"][1]["triangles"] < 0.6 * content["levels"][0]["triangles"]
     assert set(content["textures"]) >= {"color", "base", "alpha", "shift", "noise", "tangent"}
@@ -74,8 +74,10 @@ def test_every_format_comes_with_a_sidecar_that_follows_the_schema(
 
 def test_the_index_buffer_holds_the_indices_of_the_glb(tmp_path: Path) -> None:
     """For each level, the buffer has the GLB's indices, then its triangles in back-face order."""
-    assert cards(tmp_path / "hair.glb", *BAKED, "--levels", "3", "--index-buffer") == 0
-    content, glb = sidecar_of(tmp_path / "hair.glb"), Glb(tmp_path / "hair.glb")
+    assert (
+        export_cards(tmp_path / "hair.glb", *BAKED_OPTIONS, "--levels", "3", "--index-buffer") == 0
+    )
+    content, glb = read_sidecar(tmp_path / "hair.glb"), Glb(tmp_path / "hair.glb")
     indices = np.frombuffer((tmp_path / "hair.indices.bin").read_bytes(), "<u2")
     nodes = {node["name"]: node for node in glb.json["nodes"]}
     assert len(content["levels"]) == 3
@@ -96,8 +98,11 @@ def test_the_index_buffer_holds_the_indices_of_the_glb(tmp_path: Path) -> None:
 
 
 def test_a_baked_atlas_is_packed_as_the_engine_wants_it(tmp_path: Path) -> None:
-    assert cards(tmp_path / "hair.fbx", *BAKED, "--packing", "gltf", "--levels", "1") == 0
-    content = sidecar_of(tmp_path / "hair.fbx")
+    assert (
+        export_cards(tmp_path / "hair.fbx", *BAKED_OPTIONS, "--packing", "gltf", "--levels", "1")
+        == 0
+    )
+    content = read_sidecar(tmp_path / "hair.fbx")
     color, alpha = (content["textures"][role] for role in ("color", "alpha"))
     assert color["file"] == alpha["file"] == "hair_baseColor.png"
     assert (color["channels"], alpha["channels"]) == ("rgb", "a")
@@ -112,7 +117,10 @@ def test_only_a_picture_of_alpha_alone_is_linked_as_opacity(
     tmp_path: Path, packing: str, alpha: str
 ) -> None:
     """Plain importers read opacity as the mean of all channels."""
-    assert cards(tmp_path / "hair.obj", *BAKED, "--packing", packing, "--levels", "1") == 0
+    assert (
+        export_cards(tmp_path / "hair.obj", *BAKED_OPTIONS, "--packing", packing, "--levels", "1")
+        == 0
+    )
     material = (tmp_path / "hair.mtl").read_text(encoding="utf-8")
     linked = [line.split()[-1] for line in material.splitlines() if line.startswith("map_d")]
     assert linked == [alpha] * bool(alpha)
@@ -130,8 +138,8 @@ def test_a_viewer_that_knows_nothing_of_us_shows_one_level_in_the_hairs_colour(
         "--set",
         "shading.redness=0.6",
     )
-    assert cards(path, *melanin, "--levels", "3") == 0
-    assert not validated(path)["issues"]["numErrors"]
+    assert export_cards(path, *melanin, "--levels", "3") == 0
+    assert not validator_report(path)["issues"]["numErrors"]
     glb = Glb(path)
     nodes, (scene,) = glb.json["nodes"], glb.json["scenes"]
     waiting, met = list(scene["nodes"]), []
@@ -161,7 +169,7 @@ def test_a_viewer_that_knows_nothing_of_us_shows_one_level_in_the_hairs_colour(
 
 def test_the_occlusion_of_a_vertex_is_what_a_viewer_reads_from_the_ramp(tmp_path: Path) -> None:
     path = tmp_path / "hair.glb"
-    assert cards(path, "--levels", "1") == 0
+    assert export_cards(path, "--levels", "1") == 0
     glb = Glb(path)
     (material,) = glb.json["materials"]
     assert material["occlusionTexture"]["texCoord"] == 1
@@ -189,7 +197,7 @@ def test_usd_shows_one_level_of_many_and_says_how_colours_are_coded(
         pytest.skip("this Blender was built without USD")
     usd = pytest.importorskip("pxr.Usd", reason="usd-core is missing: `make setup` installs it")
     path = tmp_path / f"hair{suffix}"
-    assert cards(path, "--levels", "3", "--textures", textures) == 0
+    assert export_cards(path, "--levels", "3", "--textures", textures) == 0
     stage = usd.Stage.Open(str(path))
     spaces = {
         prim.GetAttribute("inputs:file").Get().path: prim.GetAttribute(name).Get()
@@ -197,7 +205,7 @@ def test_usd_shows_one_level_of_many_and_says_how_colours_are_coded(
         if prim.HasAttribute(name := "inputs:sourceColorSpace")
     }
     # without this attribute it is "auto": sRGB for eight bits, linear for more
-    assert spaces.get(sidecar_of(path)["textures"]["color"]["file"]) == space
+    assert spaces.get(read_sidecar(path)["textures"]["color"]["file"]) == space
 
     def shown() -> list[str]:
         return [prim.GetName() for prim in stage.Traverse() if prim.GetTypeName() == "Mesh"]
@@ -212,8 +220,8 @@ def test_usd_shows_one_level_of_many_and_says_how_colours_are_coded(
 def test_both_models_give_all_their_values(tmp_path: Path) -> None:
     for model in ("kajiya_kay", "marschner"):
         path = tmp_path / f"{model}.glb"
-        assert cards(path, "--set", f"shading.model={model}", "--levels", "1") == 0
-        material = sidecar_of(path)["material"]
+        assert export_cards(path, "--set", f"shading.model={model}", "--levels", "1") == 0
+        material = read_sidecar(path)["material"]
         assert material["model"] == model
         assert set(material["values"]) == set(material["units"]) == set(material["meanings"])
         assert ("primary_shift" in material["values"]) == (model == "kajiya_kay")
@@ -239,14 +247,16 @@ def test_a_failure_in_the_middle_leaves_the_old_files(
     capfd: pytest.CaptureFixture[str],
 ) -> None:
     """The disk is full at the last file: all old files are kept."""
-    assert cards(tmp_path / f"hair{suffix}", "--levels", "1") == 0
+    assert export_cards(tmp_path / f"hair{suffix}", "--levels", "1") == 0
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
 
     def full(_content: object) -> str:
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(files, "sidecar_text", full)
-    assert cards(tmp_path / f"hair{suffix}", "--set", "grow.length=0.2", "--levels", "2") == 1
+    assert (
+        export_cards(tmp_path / f"hair{suffix}", "--set", "grow.length=0.2", "--levels", "2") == 1
+    )
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
     told = capfd.readouterr().err
     assert f"{tmp_path / f'hair{suffix}'}: " in told and "No space left on device" in told
@@ -259,12 +269,12 @@ def test_a_folder_that_may_not_be_written_to_keeps_its_files(
 ) -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        assert cards(folder / "hair.glb", "--levels", "1") == 0
+        assert export_cards(folder / "hair.glb", "--levels", "1") == 0
         before = {path.name: path.read_bytes() for path in folder.iterdir()}
         folder.chmod(0o555)
         try:
             with nobody():
-                assert cards(folder / "hair.glb", "--set", "grow.length=0.2") == 1
+                assert export_cards(folder / "hair.glb", "--set", "grow.length=0.2") == 1
         finally:
             folder.chmod(0o755)
         assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
@@ -292,9 +302,9 @@ def test_a_disk_that_becomes_full_at_the_mesh_keeps_its_files(
 ) -> None:
     """There is room for all textures and half of the mesh. File names mix two scripts."""
     name = f"Zöpfe 头发{suffix}"
-    options = ("--textures", "dds", "--levels", "1", *BAKED, "--set", "atlas.size=256")
-    assert cards(tmp_path / name, *options) == 0
-    assert sidecar_of(tmp_path / name)["file"] == name
+    options = ("--textures", "dds", "--levels", "1", *BAKED_OPTIONS, "--set", "atlas.size=256")
+    assert export_cards(tmp_path / name, *options) == 0
+    assert read_sidecar(tmp_path / name)["file"] == name
     sizes = {path.name: path.stat().st_size for path in tmp_path.iterdir()}
     kept = b"of another day"
     pages = sum(-(-size // 4096) for file, size in sizes.items() if file != name)
@@ -302,7 +312,7 @@ def test_a_disk_that_becomes_full_at_the_mesh_keeps_its_files(
     with small_disk(tmp_path / "disk", 4096 * pages) as disk:
         (disk / name).write_bytes(kept)
         capfd.readouterr()
-        assert cards(disk / name, *options) == 1
+        assert export_cards(disk / name, *options) == 1
         assert {path.name: path.read_bytes() for path in disk.iterdir()} == {name: kept}
     said = capfd.readouterr().err
     assert "Traceback" not in said and said.count("cannot be written") == 1
@@ -329,7 +339,7 @@ def test_a_file_that_cannot_be_replaced_leaves_all_old_files(
 ) -> None:
     """The third or first move fails, such as where another program has the file open; the new files
     are kept in another folder."""
-    assert cards(tmp_path / "hair.glb", "--levels", "1") == 0
+    assert export_cards(tmp_path / "hair.glb", "--levels", "1") == 0
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
     really, moves = os.replace, []
 
@@ -341,7 +351,7 @@ def test_a_file_that_cannot_be_replaced_leaves_all_old_files(
         really(source, target)
 
     monkeypatch.setattr(os, "replace", replace)
-    assert cards(tmp_path / "hair.glb", "--set", "grow.length=0.2", "--levels", "1") == 1
+    assert export_cards(tmp_path / "hair.glb", "--set", "grow.length=0.2", "--levels", "1") == 1
     assert len(moves) == refused
     kept = tmp_path / "hair new"
     assert {path.name for path in kept.iterdir()} == set(before)
@@ -352,11 +362,11 @@ def test_a_file_that_cannot_be_replaced_leaves_all_old_files(
 
 def test_files_of_an_artist_are_kept_and_own_ones_replaced(tmp_path: Path, capfd: Any) -> None:
     (tmp_path / "hair_base.png").write_bytes(b"painted")
-    assert cards(tmp_path / "hair.glb", "--levels", "1") == 0
+    assert export_cards(tmp_path / "hair.glb", "--levels", "1") == 0
     assert (tmp_path / "hair_base old.png").read_bytes() == b"painted"
     assert "hair_base.png already existed" in capfd.readouterr().out
     names = {path.name for path in tmp_path.iterdir()}
-    assert cards(tmp_path / "hair.glb", "--set", "grow.length=0.2", "--levels", "1") == 0
+    assert export_cards(tmp_path / "hair.glb", "--set", "grow.length=0.2", "--levels", "1") == 0
     assert {path.name for path in tmp_path.iterdir()} == names, "its own are no artist's"
     assert "there already" not in capfd.readouterr().out
 
@@ -369,31 +379,31 @@ def test_meshes_that_would_have_one_sidecar_are_not_written_into_one_folder(
     (tmp_path / "hair.hairloom.json").write_text('{"hairloom_sidecar": 1, "file": "hair.fbx"}')
     (tmp_path / "Brows.glb").touch()
     for name, other in (("hair.glb", "hair.fbx"), ("brows.glb", "Brows.glb")):
-        assert cards(tmp_path / name, *BAKED, "--levels", "1") == 1
+        assert export_cards(tmp_path / name, *BAKED_OPTIONS, "--levels", "1") == 1
         assert f"{other} is in this folder" in capfd.readouterr().err
         assert not (tmp_path / name).exists()
     assert len(list(tmp_path.iterdir())) == 3
 
 
 def test_a_picture_is_not_replaced_by_what_is_made_of_it(tmp_path: Path, capfd: Any) -> None:
-    assert cards(tmp_path / "hair.glb", "--levels", "1") == 0
+    assert export_cards(tmp_path / "hair.glb", "--levels", "1") == 0
     base = tmp_path / "hair_base.png"
     before = base.read_bytes()
-    assert cards(tmp_path / "hair.glb", "--texture", f"base={base}", "--levels", "1") == 1
+    assert export_cards(tmp_path / "hair.glb", "--texture", f"base={base}", "--levels", "1") == 1
     assert "under another name" in capfd.readouterr().err and base.read_bytes() == before
-    assert cards(tmp_path / "other.glb", "--texture", f"base={base}", "--levels", "1") == 0
+    assert export_cards(tmp_path / "other.glb", "--texture", f"base={base}", "--levels", "1") == 0
 
 
 def test_the_format_may_be_named_and_others_are_refused(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    assert cards(tmp_path / "hair.v1", "--format", "obj", "--levels", "1") == 0
+    assert export_cards(tmp_path / "hair.v1", "--format", "obj", "--levels", "1") == 0
     assert (tmp_path / "hair.v1.obj").is_file()
-    assert sidecar_of(tmp_path / "hair.v1.obj")["levels"][0]["node"] == "hair_v1"
+    assert read_sidecar(tmp_path / "hair.v1.obj")["levels"][0]["node"] == "hair_v1"
     capfd.readouterr()
-    assert cards(tmp_path / "hair.stl") == 1
+    assert export_cards(tmp_path / "hair.stl") == 1
     assert "Use .glb" in capfd.readouterr().err
-    assert cards(tmp_path / "hair.glb", "--levels", "9") == 1
+    assert export_cards(tmp_path / "hair.glb", "--levels", "9") == 1
     assert "levels" in capfd.readouterr().err
 
 
@@ -401,16 +411,16 @@ def test_a_name_that_is_too_long_for_what_lies_beside_is_refused_before_any_work
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(files, "build_steps", lambda *_, **__: pytest.fail("it has begun"))
-    assert cards(tmp_path / f"{'x' * 240}.glb", "--levels", "1") == 1
+    assert export_cards(tmp_path / f"{'x' * 240}.glb", "--levels", "1") == 1
     assert "Choose a shorter name" in capfd.readouterr().err
 
 
 def test_a_button_writes_under_the_hairs_name(sphere: Any, tmp_path: Path) -> None:
-    grown(sphere, "Haar/Ä.001")
+    grow_hair(sphere, "Haar/Ä.001")
     out = tmp_path / "Haar_Ä.obj"
     options = {"own_levels": True, "levels": 2, "index_buffer": True}
     assert bpy.ops.hairloom.export_cards(filepath=str(out), **options) == {"FINISHED"}
-    nodes = [level["node"] for level in sidecar_of(out)["levels"]]
+    nodes = [level["node"] for level in read_sidecar(out)["levels"]]
     assert nodes == ["Haar_Ä_001_LOD0", "Haar_Ä_001_LOD1"]
     assert [line[2:] for line in out.read_text("utf-8").splitlines() if line[:2] == "o "] == nodes
 
@@ -420,7 +430,7 @@ def test_an_export_with_a_folder_is_that_folder_and_nothing_else(
     sphere: Any, tmp_path: Path
 ) -> None:
     """The folder is the same on a second export, from beside it and from within it."""
-    grown(sphere, "Hair")
+    grow_hair(sphere, "Hair")
     loose, out = tmp_path / "loose" / "Hair.glb", tmp_path / "Hair.glb"
     options = {"own_levels": True, "levels": 1}
     bpy.ops.hairloom.export_cards(filepath=str(loose), **options)
@@ -440,7 +450,7 @@ def test_no_folder_stays_of_an_export_that_fails(
     def fail(*_: Any, **__: Any) -> None:
         raise HairloomError("it broke", place="mesh", remedy="Wait")
 
-    grown(sphere, "Hair")
+    grow_hair(sphere, "Hair")
     monkeypatch.setattr(files, "write_card_mesh", fail)
     with pytest.raises(RuntimeError, match="it broke"):
         bpy.ops.hairloom.export_cards(filepath=str(tmp_path / "Hair.glb"), own_folder=True)
@@ -475,7 +485,7 @@ def test_a_collections_exporter_writes_all_its_hair(sphere: Any, tmp_path: Path)
     collection = bpy.data.collections.new("Assets")
     bpy.context.scene.collection.children.link(collection)
     for name in ("Front", "Haar/Ä.001"):
-        collection.objects.link(grown(sphere, name))
+        collection.objects.link(grow_hair(sphere, name))
     bpy.ops.object.select_all(action="DESELECT")
     bpy.context.view_layer.objects.active = None
     layer = bpy.context.view_layer.layer_collection.children["Assets"]
@@ -485,7 +495,7 @@ def test_a_collections_exporter_writes_all_its_hair(sphere: Any, tmp_path: Path)
     exporter.export_properties.filepath = str(tmp_path / "hair.glb")
     assert bpy.ops.collection.export_all() == {"FINISHED"}
     for name in ("Front", "Haar_Ä_001"):
-        (level, *_) = sidecar_of(tmp_path / f"hair_{name}.glb")["levels"]
+        (level, *_) = read_sidecar(tmp_path / f"hair_{name}.glb")["levels"]
         assert level["node"].startswith(name)
     exporter.export_properties.filepath = str(tmp_path / "folders" / "hair.glb")
     exporter.export_properties.own_folder = True
@@ -495,7 +505,7 @@ def test_a_collections_exporter_writes_all_its_hair(sphere: Any, tmp_path: Path)
 
 
 def test_a_collection_without_hair_is_told(sphere: Any, tmp_path: Path) -> None:
-    grown(sphere, "Hair")
+    grow_hair(sphere, "Hair")
     bpy.data.collections.new("Empty")
     for name in ("Empty", "Nowhere"):
         with pytest.raises(RuntimeError, match=f"Collection '{name}': there is no hair to write"):
@@ -519,9 +529,9 @@ def test_a_glb_changes_with_its_look_and_with_nothing_else(tmp_path: Path) -> No
     for folder, strength in looks.items():
         (tmp_path / folder).mkdir()
         path = tmp_path / folder / "hair.glb"
-        assert cards(path, "--levels", "1", "--set", f"shading.strength_r={strength}") == 0
+        assert export_cards(path, "--levels", "1", "--set", f"shading.strength_r={strength}") == 0
         written[folder] = {each.name: each.read_bytes() for each in path.parent.iterdir()}
     assert written["one"] == written["two"] and "hair_paths.exr" in written["one"]
     changed = {name for name, data in written["one"].items() if data != written["three"].get(name)}
     assert changed == {"hair.glb", "hair.hairloom.json"}
-    validated(tmp_path / "three" / "hair.glb")
+    validator_report(tmp_path / "three" / "hair.glb")

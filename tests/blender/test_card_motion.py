@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from glb_files import Glb, validated
+from glb_files import Glb, validator_report
 from glb_player import Player
 from shaken import MadeMotion, shaken_poses
 from test_card_page import asset_of
@@ -158,7 +158,7 @@ def test_the_head_is_in_the_root_joint_where_it_is_asked_for(
 
 
 def test_khronos_validator_finds_no_fault(joints: tuple[Path, WrittenCards]) -> None:
-    report = validated(joints[0])
+    report = validator_report(joints[0])
     assert report["issues"]["numErrors"] == 0, report
     # as in Blender's own files, the skinned meshes have a parent node, which does not move
     warning = 1

@@ -10,7 +10,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy", reason="writing cards needs Blender or the bpy module")
 
-from waiting import until  # noqa: E402
+from waiting import wait_until  # noqa: E402
 
 from hairloom.addon.blender.cards.files import CardExport, CardOutput  # noqa: E402
 from hairloom.addon.blender.command_line import command_line  # noqa: E402
@@ -157,7 +157,7 @@ def test_cancelled_in_its_midst_it_leaves_the_old_files(
         CardOutput(settings=CardExportSettings(motion=kind)),
     )
     making = plan.building()
-    until(making.run_main_thread_steps)
+    wait_until(making.run_main_thread_steps)
     writing = plan.writing(making.result())
     for text, _ in writing:
         if text == amid:

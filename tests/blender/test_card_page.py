@@ -16,7 +16,7 @@ from glb_files import Glb
 bpy = pytest.importorskip("bpy", reason="exporters need Blender or the bpy module")
 pytest.importorskip("jsonschema", reason="it is missing: `make setup` installs it")
 
-from card_exports import BAKED, cards, grown, sidecar_of  # noqa: E402
+from card_exports import BAKED_OPTIONS, export_cards, grow_hair, read_sidecar  # noqa: E402
 
 from hairloom.addon.blender.cards import files  # noqa: E402
 from hairloom.addon.errors import HairloomError  # noqa: E402
@@ -41,8 +41,13 @@ def asset_of(path: Path) -> dict[str, Any]:
 @pytest.mark.slow(instead="test_a_page_is_part_of_the_set")
 def test_a_page_holds_all_that_its_sidecar_names(tmp_path: Path) -> None:
     """The page has the GLB's triangles in each level, an order of back faces, and the head."""
-    assert cards(tmp_path / "hair.glb", *BAKED, *LEVELS, "--page", "--page-texture", "512") == 0
-    beside, asset = sidecar_of(tmp_path / "hair.glb"), asset_of(tmp_path / "hair.html")
+    assert (
+        export_cards(
+            tmp_path / "hair.glb", *BAKED_OPTIONS, *LEVELS, "--page", "--page-texture", "512"
+        )
+        == 0
+    )
+    beside, asset = read_sidecar(tmp_path / "hair.glb"), asset_of(tmp_path / "hair.html")
     assert beside["page"] == "hair.html"
     own = json.loads(asset["files"]["hair.hairloom.json"])
     roles = [each for each in own["textures"].values() if isinstance(each, dict) and "file" in each]
@@ -82,17 +87,17 @@ def small_indices(file: Glb, node: str) -> np.ndarray:
 
 def test_a_page_is_part_of_the_set(tmp_path: Path) -> None:
     """Another export replaces the page. Someone else's page is kept under another name."""
-    assert cards(tmp_path / "hair.glb", "--levels", "1", "--page", "--no-page-head") == 0
+    assert export_cards(tmp_path / "hair.glb", "--levels", "1", "--page", "--no-page-head") == 0
     names = sorted(each.name for each in tmp_path.iterdir())
     first = (tmp_path / "hair.html").read_bytes()
     assert "hair.html" in names and not [each for each in names if each.startswith(".")]
     assert "head.positions" not in asset_of(tmp_path / "hair.html")["files"]
-    assert cards(tmp_path / "hair.glb", *LEVELS, "--page", "--no-page-head") == 0
+    assert export_cards(tmp_path / "hair.glb", *LEVELS, "--page", "--no-page-head") == 0
     assert sorted(each.name for each in tmp_path.iterdir()) == names
     assert (tmp_path / "hair.html").read_bytes() != first
-    assert cards(tmp_path / "other.glb", "--levels", "1") == 0
+    assert export_cards(tmp_path / "other.glb", "--levels", "1") == 0
     (tmp_path / "other.html").write_text("mine", encoding="utf-8")
-    assert cards(tmp_path / "other.glb", "--levels", "1", "--page") == 0
+    assert export_cards(tmp_path / "other.glb", "--levels", "1", "--page") == 0
     assert (tmp_path / "other old.html").read_text("utf-8") == "mine"
 
 
@@ -105,24 +110,24 @@ def test_what_was_there_stays_where_a_page_fails(
     def fail(*_: Any) -> None:
         raise HairloomError("it broke", place="page", remedy="Wait")
 
-    assert cards(tmp_path / "hair.glb", "--levels", "1", "--page") == 0
+    assert export_cards(tmp_path / "hair.glb", "--levels", "1", "--page") == 0
     before = {each.name: each.read_bytes() for each in tmp_path.iterdir()}
     monkeypatch.setattr(files, "write_page", fail)
-    assert cards(tmp_path / "hair.glb", *LEVELS, "--page") == 1
+    assert export_cards(tmp_path / "hair.glb", *LEVELS, "--page") == 1
     assert {each.name: each.read_bytes() for each in tmp_path.iterdir()} == before
 
 
 def test_a_page_beside_another_format_is_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert cards(tmp_path / "hair.obj", "--page") == 1
+    assert export_cards(tmp_path / "hair.obj", "--page") == 1
     assert "a web page needs a GLB" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
 
 
 def test_the_dialog_writes_a_page_into_the_folder(sphere: Any, tmp_path: Path) -> None:
     """Quotes and HTML in the hair's name do no harm."""
-    grown(sphere, "</script> \"Zopf\" 'ä'")
+    grow_hair(sphere, "</script> \"Zopf\" 'ä'")
     options = {"own_levels": True, "levels": 1, "page": True, "own_folder": True}
     bpy.ops.hairloom.export_cards(filepath=str(tmp_path / "Zöpfe.glb"), **options)
     asset = asset_of(tmp_path / "Zöpfe" / "Zöpfe.html")

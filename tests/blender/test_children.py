@@ -6,7 +6,7 @@ from dataclasses import replace
 import bpy
 import numpy as np
 import pytest
-from grids import baked_grid, grid_of
+from grids import baked_grid, strand_grid
 
 from hairloom.addon import rig_flow
 from hairloom.addon.blender.bakes import playback
@@ -66,7 +66,7 @@ def played(session):
     shown = []
     for frame in range(1, LAST + 1):
         bpy.context.scene.frame_set(frame)
-        shown.append(grid_of(session))
+        shown.append(strand_grid(session))
     return np.array(shown)
 
 
@@ -305,7 +305,7 @@ def test_a_bake_of_children_plays_back_bit_for_bit(moving, evaluated):
     previews.stop(session)
     bpy.context.scene.frame_set(4)
     again = previews.start(moving, evaluated())
-    np.testing.assert_array_equal(grid_of(again), shown[3])
+    np.testing.assert_array_equal(strand_grid(again), shown[3])
     assert previews.previews[again.uid].bake.changed == ()
 
 
@@ -362,12 +362,12 @@ def test_hair_that_plays_goes_on_while_children_change(moving, sphere, evaluated
     catch_up(evaluated)
     assert session.is_playing and session.rig.strands.strand_count == 110
     np.testing.assert_array_equal(session.solver.guides(), guides)
-    np.testing.assert_allclose(grid_of(session)[:60, -1], guides[:, -1], atol=1e-3)
+    np.testing.assert_allclose(strand_grid(session)[:60, -1], guides[:, -1], atol=1e-3)
     go(2)
     assert np.abs(session.solver.guides() - guides).max() > 0.01
     moving.data.hairloom.guides.guide_count = 30
     catch_up(evaluated)
-    assert session.is_playing and grid_of(session).shape[0] == 110, "other guides begin at rest"
+    assert session.is_playing and strand_grid(session).shape[0] == 110, "other guides begin at rest"
     go(1)
     assert previews.sessions() == (session,)
 
@@ -376,15 +376,15 @@ def test_undo_brings_the_children_back(hair, evaluated):
     bpy.context.preferences.edit.use_global_undo = True
     bpy.ops.ed.undo_push(message="begin")
     session = previews.start(hair, evaluated())
-    before = grid_of(session)
+    before = strand_grid(session)
     bpy.data.objects["Hair"].data.hairloom.children.strand_count = 90
     bpy.ops.ed.undo_push(message="fewer")
     catch_up(evaluated)
-    assert grid_of(session).shape[0] == 150
+    assert strand_grid(session).shape[0] == 150
     bpy.ops.ed.undo()
     catch_up(evaluated)
     assert previews.sessions() == (session,)
-    np.testing.assert_allclose(grid_of(session), before, atol=1e-6)
+    np.testing.assert_allclose(strand_grid(session), before, atol=1e-6)
 
 
 @pytest.mark.slow

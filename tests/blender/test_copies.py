@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import bpy
 import numpy as np
 import pytest
-from grids import baked_grid, grid_of
-from swinging import swings
+from grids import baked_grid, strand_grid
+from swinging import tips_lag
 
 from hairloom.addon.blender.bakes import playback
 from hairloom.addon.blender.base.objects import head_of
@@ -44,7 +44,7 @@ def duplicated(*objects, linked):
 def goes_on(playing):
     """Assert that only this hair is previewed, still swings, and that there is no notice."""
     assert previews.sessions() == (playing.session,) and previews.notice() == ""
-    assert playing.session.is_playing and swings(playing.session)
+    assert playing.session.is_playing and tips_lag(playing.session)
 
 
 @LINKED
@@ -71,10 +71,10 @@ def test_a_duplicate_of_hair_and_head_goes_with_its_own_head(linked, playing, ev
     bpy.context.view_layer.update()
     session = previews.start(twin, evaluated())
     assert session.warnings == ()
-    assert grid_of(session).mean(axis=(0, 1))[0] == pytest.approx(1.0, abs=0.02)
+    assert strand_grid(session).mean(axis=(0, 1))[0] == pytest.approx(1.0, abs=0.02)
     previews.play(evaluated())
-    other = grid_of(playing.session)
-    assert swings(session) and swings(playing.session)
+    other = strand_grid(playing.session)
+    assert tips_lag(session) and tips_lag(playing.session)
     assert np.abs(other[..., 0]).max() < 0.5, "the first stays where it is"
     found = engine_hair.read_groom(twin, evaluated())
     assert found.points.mean(axis=0)[0] > 1.0
@@ -90,7 +90,7 @@ def test_hair_that_shares_its_curves_is_combed_and_coloured_together(playing, ev
     bpy.context.view_layer.update()
     scene_events.catch_up(evaluated())
     for session in sessions:
-        assert grid_of(session)[0, -1] == pytest.approx([0.0, 0.0, 0.5], abs=1e-5)
+        assert strand_grid(session)[0, -1] == pytest.approx([0.0, 0.0, 0.5], abs=1e-5)
         assert overlay.drawing_of(session.uid).snapshot.shading.ambient == 0.5
 
 

@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 from mathutils import Euler, Matrix
-from node_modifiers import with_modifier
+from node_modifiers import add_nodes_modifier
 
 from hairloom.addon.blender.base.attributes import set_attribute
 from hairloom.addon.blender.scene.curves import (
@@ -88,7 +88,7 @@ def test_more_points_than_are_moved_at_once(evaluated):
 def test_modifiers_are_applied(evaluated):
     strands = ragged(counts=(16, 16))
     obj = written(strands)
-    with_modifier(
+    add_nodes_modifier(
         obj,
         ("GeometryNodeSetPosition", {"Offset": (0.0, 0.0, 1.0)}),
         ("GeometryNodeResampleCurve", {"Count": 5}),
@@ -202,7 +202,7 @@ def test_blenders_own_surface_node_accepts_the_attachment(evaluated, sphere):
     points = np.stack([corners, corners * 1.5], axis=1).reshape(-1, 3)
     loose = StrandSet(points, np.arange(31) * 2, np.full(60, 1e-4), np.zeros(30))
     obj = written(bind_roots(loose, surface, place="hair").strands, sphere)
-    with_modifier(obj, ("GeometryNodeDeformCurvesOnSurface", {}))
+    add_nodes_modifier(obj, ("GeometryNodeDeformCurvesOnSurface", {}))
     sphere.shape_key_add(name="Basis")
     raised = sphere.shape_key_add(name="Raised")
     for point in raised.points:

@@ -13,7 +13,14 @@ from tiers import few_in_commits
 
 bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
 
-from engine_stage import SIZE, add_ball, coded, passes_in, picture, rendered  # noqa: E402
+from engine_stage import (  # noqa: E402
+    SIZE,
+    add_ball,
+    read_encoded_pixels,
+    read_passes,
+    render_passes,
+    render_picture,
+)
 
 from hairloom.addon.blender.engine import engine_view  # noqa: E402
 from hairloom.addon.render import gpu_objects  # noqa: E402
@@ -24,7 +31,7 @@ pytestmark = [pytest.mark.draws(light=False), pytest.mark.usefixtures("gpu_conte
 def test_radiance_arrives_as_it_is(stage: Any, tmp_path: Path) -> None:
     """A white diffuse ball in a uniform world of radiance 0.5 has radiance 0.5."""
     add_ball()
-    found = picture(tmp_path)
+    found = render_picture(tmp_path)
     assert found.shape == (SIZE, SIZE, 4)
     np.testing.assert_allclose(found, np.full((SIZE, SIZE, 4), (0.5, 0.5, 0.5, 1.0)), atol=1e-6)
 
@@ -40,7 +47,7 @@ def test_radiance_is_shown_as_blender_shows_it(stage: Any, tmp_path: Path, trans
     plain = bpy.data.images.new("Plain", SIZE, SIZE, float_buffer=True)
     plain.pixels.foreach_set([0.5, 0.5, 0.5, 1.0] * (SIZE * SIZE))
     plain.save_render(str(tmp_path / "plain.png"), scene=stage)
-    shown = [coded(tmp_path / f"{name}.png") for name in ("rendered", "plain")]
+    shown = [read_encoded_pixels(tmp_path / f"{name}.png") for name in ("rendered", "plain")]
     np.testing.assert_array_equal(*shown)
     assert 160 < 255.0 * shown[0].mean() < 190
 
@@ -48,10 +55,10 @@ def test_radiance_is_shown_as_blender_shows_it(stage: Any, tmp_path: Path, trans
 def test_hair_is_drawn_and_two_renders_are_the_same(
     stage: Any, new_hair: Callable[..., Any], sphere: Any, tmp_path: Path
 ) -> None:
-    bald = picture(tmp_path)
+    bald = render_picture(tmp_path)
     hair = new_hair(sphere)
     hair.data.hairloom.strands.fullness = 20.0
-    first, second = picture(tmp_path), picture(tmp_path)
+    first, second = render_picture(tmp_path), render_picture(tmp_path)
     np.testing.assert_array_equal(first, second)
     assert (np.abs(first - bald)[..., :3].max(axis=2) > 0.05).mean() > 0.01
 
@@ -72,7 +79,7 @@ def test_mesh_depth_and_coverage_are_those_of_workbench(stage: Any, tmp_path: Pa
         found = {}
         for engine in ("HAIRLOOM", "BLENDER_WORKBENCH"):
             render.engine = engine
-            found[engine] = rendered(tmp_path)
+            found[engine] = render_passes(tmp_path)
         ours, theirs = found.values()
         depths = [each["ViewLayer.Depth"][..., 0] for each in (ours, theirs)]
         is_there = [depth < 1.0e4 for depth in depths]
@@ -91,7 +98,7 @@ def test_depth_and_object_index_of_hair(
     sphere.pass_index, hair.pass_index = 3, 7
     layer = stage.view_layers[0]
     layer.use_pass_z = layer.use_pass_object_index = True
-    found = rendered(tmp_path)
+    found = render_passes(tmp_path)
     numbers = found["ViewLayer.Object Index"][..., 0]
     assert set(np.unique(numbers)) == {0.0, 3.0, 7.0}
     depth = found["ViewLayer.Depth"][..., 0]
@@ -106,18 +113,18 @@ def test_border_percentage_and_film(stage: Any, tmp_path: Path) -> None:
     stage.hairloom.picture.samples = 2
     render = stage.render
     render.film_transparent = True
-    whole = picture(tmp_path)
+    whole = render_picture(tmp_path)
     assert whole[0, 0, 3] == 0.0 and whole[SIZE // 2, SIZE // 2, 3] == 1.0
     render.use_border = True
     render.border_min_x, render.border_max_x = 0.25, 0.75
     render.border_min_y, render.border_max_y = 0.5, 1.0
     render.use_crop_to_border = True
-    part = picture(tmp_path)
+    part = render_picture(tmp_path)
     assert part.shape == (SIZE // 2, SIZE // 2, 4)
     np.testing.assert_allclose(part, whole[SIZE // 2 :, SIZE // 4 : -SIZE // 4], atol=1e-4)
     render.use_border = False
     render.resolution_percentage = 50
-    assert picture(tmp_path).shape == (SIZE // 2, SIZE // 2, 4)
+    assert render_picture(tmp_path).shape == (SIZE // 2, SIZE // 2, 4)
 
 
 def test_the_region_of_a_view_is_that_of_the_picture(stage: Any) -> None:
@@ -162,9 +169,9 @@ def test_motion_blur_spreads_over_the_way(stage: Any, tmp_path: Path) -> None:
         for key in curve.keyframe_points:
             key.interpolation = "LINEAR"
     stage.frame_set(2)
-    sharp = picture(tmp_path)[..., 3]
+    sharp = render_picture(tmp_path)[..., 3]
     stage.render.use_motion_blur, stage.render.motion_blur_shutter = True, 1.0
-    blurred = picture(tmp_path)[..., 3]
+    blurred = render_picture(tmp_path)[..., 3]
     assert abs(blurred.sum() / sharp.sum() - 1.0) < 0.02
     columns = [np.flatnonzero(each.max(axis=0) > 0.02) for each in (sharp, blurred)]
     width = [each[-1] - each[0] for each in columns]
@@ -183,17 +190,17 @@ def test_stretched_time_is_stretched_once(stage: Any, tmp_path: Path) -> None:
     stage.render.frame_map_old, stage.render.frame_map_new = 100, 200
     stage.frame_set(20)
     stage.render.film_transparent = True
-    sharp = picture(tmp_path)[..., 3]
+    sharp = render_picture(tmp_path)[..., 3]
     stage.render.use_motion_blur, stage.render.motion_blur_shutter = True, 0.01
     assert sharp.any(), "there is a ball"
-    np.testing.assert_allclose(picture(tmp_path)[..., 3], sharp, atol=0.02)
+    np.testing.assert_allclose(render_picture(tmp_path)[..., 3], sharp, atol=0.02)
 
 
 @pytest.mark.parametrize("kind", ["nothing", "empty"])
 def test_without_a_camera_the_report_says_so(stage: Any, tmp_path: Path, kind: str) -> None:
     stage.camera = None if kind == "nothing" else bpy.data.objects.new("Empty", None)
     with pytest.raises(RuntimeError, match="camera"):
-        rendered(tmp_path)
+        render_passes(tmp_path)
 
 
 def curves_of(obj: Any) -> Iterator[Any]:
@@ -237,13 +244,13 @@ def test_a_cancelled_render_keeps_what_there_is(
 
     add_ball()
     stage.hairloom.picture.samples = 2
-    two = picture(tmp_path)
+    two = render_picture(tmp_path)
     asked = iter(range(100))
     monkeypatch.setattr(
         engine.HAIRLOOM_RE_engine, "test_break", lambda _: next(asked) >= 2, raising=False
     )
     stage.hairloom.picture.samples = 64
-    np.testing.assert_allclose(picture(tmp_path), two, atol=1e-6)
+    np.testing.assert_allclose(render_picture(tmp_path), two, atol=1e-6)
     assert next(asked) < 10
 
 
@@ -253,8 +260,8 @@ def test_both_eyes_of_a_stereo_camera(stage: Any, tmp_path: Path) -> None:
     stage.render.use_multiview = True
     stage.camera.data.stereo.interocular_distance = 0.1
     stage.camera.data.stereo.convergence_distance = 2.0
-    rendered(tmp_path)
-    eyes = [passes_in(tmp_path / f"picture_{side}.exr") for side in "LR"]
+    render_passes(tmp_path)
+    eyes = [read_passes(tmp_path / f"picture_{side}.exr") for side in "LR"]
     alphas = [found["ViewLayer.Combined"][..., 3] for found in eyes]
     places = [np.average(np.arange(SIZE), weights=alpha.sum(axis=0)) for alpha in alphas]
     # parallax of a point at 1 m, with convergence at 2 m, where the lens covers 0.72 m at 1 m
@@ -283,10 +290,10 @@ def test_what_is_out_of_focus_is_as_soft_as_in_cycles(
         dof.aperture_fstop = 8.0
     stage.render.film_transparent = True
     stage.hairloom.picture.samples = 256
-    ours = picture(tmp_path)[..., 3]
+    ours = render_picture(tmp_path)[..., 3]
     stage.render.engine, stage.cycles.samples = "CYCLES", 1024
     stage.cycles.use_denoising = stage.cycles.use_adaptive_sampling = False
-    theirs = picture(tmp_path)[..., 3]
+    theirs = render_picture(tmp_path)[..., 3]
     assert ((theirs > 0.05) & (theirs < 0.95)).mean() > 0.02
     difference = np.abs(ours - theirs)
     # blades that turn the other way differ by 0.0017 and 0.057
@@ -322,7 +329,7 @@ def test_a_blurred_render_that_is_cancelled_goes_to_no_other_frame(
     add_ball()
     stage.render.use_motion_blur = True
     stage.hairloom.picture.samples = stage.hairloom.picture.motion_steps = 32
-    picture(tmp_path)
+    render_picture(tmp_path)
     (found,) = cancelled
     assert len(found.places) == 3, "two moments, and back"
     assert found.places[-1] == stage.frame_current
@@ -332,7 +339,7 @@ def test_a_render_leaves_nothing_unused_on_the_gpu(stage: Any, tmp_path: Path) -
     bpy.ops.mesh.primitive_cube_add(size=0.2)
     gc.collect()  # other tests may have left reference cycles
     gpu_objects.free_unused()
-    rendered(tmp_path)
+    render_passes(tmp_path)
     left = gpu_objects.bytes_in_use()
     gc.collect()
     gpu_objects.free_unused()

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from waiting import take_steps_until, until
+from waiting import take_steps_until, wait_until
 
 bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
 
@@ -78,7 +78,7 @@ class View:
                 found = self.read()
             return False
 
-        until(is_there)
+        wait_until(is_there)
         return found
 
 
@@ -162,7 +162,7 @@ def test_two_views_of_other_hair_leave_each_other_theirs(
     for _ in range(2):
         for name, view in views.items():
             view.read(is_shown=lambda obj, name=name: obj.name in (name, "Head"))
-    until(lambda: latest_job.take_steps() is None)
+    wait_until(lambda: latest_job.take_steps() is None)
     for name, view in views.items():
         shown = view.read(is_shown=lambda obj, name=name: obj.name in (name, "Head"))
         assert len(shown) == 1 and not view.reader.pending
@@ -222,7 +222,7 @@ def test_an_error_that_is_told_again_and_again_does_not_grow(
             lengths.append(sum(len(list(traceback.walk_tb(e.__traceback__))) for e in causes if e))
 
     read()
-    until(lambda: latest_job.take_steps() is None)
+    wait_until(lambda: latest_job.take_steps() is None)
     for _ in range(4):
         read()
     assert len(set(lengths[1:])) == 1

@@ -12,7 +12,7 @@ from grids import baked_grid
 
 bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
 
-from engine_stage import SIZE, add_ball, picture, rendered  # noqa: E402
+from engine_stage import SIZE, add_ball, render_passes, render_picture  # noqa: E402
 
 from hairloom.addon.blender.engine import engine_hair  # noqa: E402
 from hairloom.addon.blender.engine.engine_meshes import read_meshes  # noqa: E402
@@ -36,7 +36,7 @@ def test_view_layers_and_holdouts(stage: Any, tmp_path: Path) -> None:
     second.layer_collection.children["One"].exclude = True
     third = stage.view_layers.new("Third")
     third.layer_collection.children["One"].holdout = True
-    found = rendered(tmp_path)
+    found = render_passes(tmp_path)
     covered = {
         name: (
             found[f"{name}.Combined"][:, : SIZE // 2, 3].max(),
@@ -60,24 +60,24 @@ def test_hair_may_be_a_hole(
     hair.data.hairloom.strands.transparency = way
     hair.data.hairloom.strands.opacity = 0.7
     bpy.data.objects.remove(sphere)
-    alone = picture(tmp_path)[..., 3]
+    alone = render_picture(tmp_path)[..., 3]
     assert alone.max() > 0.1 and 0.005 < alone.mean() < 0.9
     wall = add_ball(1.5)
     wall.location.y = 2.0
-    assert picture(tmp_path)[..., 3].min() > 0.99
+    assert render_picture(tmp_path)[..., 3].min() > 0.99
     hair.is_holdout = True
-    np.testing.assert_allclose(picture(tmp_path)[..., 3], 1.0 - alone, atol=2e-3)
+    np.testing.assert_allclose(render_picture(tmp_path)[..., 3], 1.0 - alone, atol=2e-3)
     wall.location.y, wall.scale = -0.6, (0.1,) * 3
-    assert picture(tmp_path)[SIZE // 2, SIZE // 2, 3] == 1.0
+    assert render_picture(tmp_path)[SIZE // 2, SIZE // 2, 3] == 1.0
     hair.is_holdout = False
     bpy.data.objects.remove(wall)
     apart = bpy.data.collections.new("Apart")
     stage.collection.children.link(apart)
     stage.collection.objects.unlink(hair)
     apart.objects.link(hair)
-    assert picture(tmp_path)[..., 3].max() > 0.1
+    assert render_picture(tmp_path)[..., 3].max() > 0.1
     stage.view_layers[0].layer_collection.children["Apart"].indirect_only = True
-    assert picture(tmp_path)[..., 3].max() == 0.0
+    assert render_picture(tmp_path)[..., 3].max() == 0.0
 
 
 def test_previewed_hair_is_seen_as_its_object_is(
@@ -129,19 +129,19 @@ def test_texts_metaballs_and_instances_are_drawn(stage: Any, tmp_path: Path) -> 
     ]
     for each in add:
         each()
-        assert picture(tmp_path)[..., 3].mean() > 0.01
+        assert render_picture(tmp_path)[..., 3].mean() > 0.01
         bpy.data.objects.remove(bpy.context.object)
     inside = bpy.data.collections.new("Inside")
     ball = add_ball(0.05)
     stage.collection.objects.unlink(ball)
     inside.objects.link(ball)
-    assert picture(tmp_path)[..., 3].max() == 0.0
+    assert render_picture(tmp_path)[..., 3].max() == 0.0
     for x in (-0.1, 0.1):
         empty = bpy.data.objects.new("Empty", None)
         empty.instance_type, empty.instance_collection = "COLLECTION", inside
         empty.location.x = x
         stage.collection.objects.link(empty)
-    alpha = picture(tmp_path)[SIZE // 2, :, 3]
+    alpha = render_picture(tmp_path)[SIZE // 2, :, 3]
     assert np.count_nonzero(np.diff((alpha > 0.5).astype(int))) == 4
 
 
@@ -203,11 +203,11 @@ def test_hidden_in_renders_is_not_drawn(
     hair = new_hair(sphere)
     sphere.hide_render = True
     hair.data.hairloom.strands.fullness = 20.0
-    assert picture(tmp_path)[..., 3].max() > 0.5
+    assert render_picture(tmp_path)[..., 3].max() > 0.5
     hair.visible_camera = False
-    assert picture(tmp_path)[..., 3].max() == 0.0
+    assert render_picture(tmp_path)[..., 3].max() == 0.0
     hair.visible_camera, hair.hide_render = True, True
-    assert picture(tmp_path)[..., 3].max() == 0.0
+    assert render_picture(tmp_path)[..., 3].max() == 0.0
 
 
 def test_the_camera_may_be_inside_of_hair_and_head(
@@ -216,7 +216,7 @@ def test_the_camera_may_be_inside_of_hair_and_head(
     new_hair(sphere)
     for y in (-0.12, 0.0):
         stage.camera.location.y = y
-        found = picture(tmp_path)
+        found = render_picture(tmp_path)
         assert np.isfinite(found).all() and found[..., 3].min() > 0.99
 
 
@@ -249,7 +249,7 @@ def test_hair_is_rendered_as_it_was_baked(
             np.testing.assert_array_equal(found.points, expected.reshape(-1, 3))
     stage.view_layers[0].use_pass_object_index = True
     hair.data.hairloom.strands.fullness = 20.0
-    numbers = rendered(tmp_path)["ViewLayer.Object Index"]
+    numbers = render_passes(tmp_path)["ViewLayer.Object Index"]
     assert (numbers == 5.0).any()
 
 
@@ -289,10 +289,10 @@ def test_a_bake_has_the_animated_settings_of_the_frame(
 
 def test_bad_input_is_told(stage: Any, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     stage.world = None
-    assert picture(tmp_path)[..., :3].max() == 0.0
+    assert render_picture(tmp_path)[..., :3].max() == 0.0
     assert "Lights: there is no light" in capfd.readouterr().out
     stage.camera.data.type = "PANO"
-    picture(tmp_path)
+    render_picture(tmp_path)
     assert "panoramic cameras are not drawn" in capfd.readouterr().out
     render = stage.render
     render.use_border, render.border_min_x, render.border_max_x = True, 0.5, 0.501

@@ -10,7 +10,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
 
-from engine_stage import add_ball, picture, set_world  # noqa: E402
+from engine_stage import add_ball, render_picture, set_world  # noqa: E402
 
 pytestmark = [pytest.mark.draws, pytest.mark.usefixtures("gpu_context", "extension")]
 
@@ -61,11 +61,11 @@ def test_shadows_lie_where_cycles_has_them(
         light.data.angle = 0.0
     else:
         light.data.shadow_soft_size = 0.0
-    found = picture(tmp_path)[..., 0]
+    found = render_picture(tmp_path)[..., 0]
     stage.render.engine = "CYCLES"
     cycles = stage.cycles
     cycles.samples, cycles.use_denoising, cycles.max_bounces = 16, False, 0
-    expected = picture(tmp_path)[..., 0]
+    expected = render_picture(tmp_path)[..., 0]
     scale = np.percentile(expected, 95)
     away = np.abs(found - expected) / scale
     assert expected.max() > 0.1 and (expected < 0.02 * scale).mean() > 0.015
@@ -76,23 +76,23 @@ def test_shadows_lie_where_cycles_has_them(
 def test_what_is_not_to_throw_a_shadow_throws_none(stage: Any, props: Any, tmp_path: Path) -> None:
     """The picture gets brighter without shadows of one object, of all objects, of the light."""
     light = add_light("SUN", 3.0, rotation_euler=(0.5, 0.5, 0.3))
-    with_all = picture(tmp_path)[..., 0].mean()
+    with_all = render_picture(tmp_path)[..., 0].mean()
     props.visible_shadow = False
-    without_ball = picture(tmp_path)[..., 0].mean()
+    without_ball = render_picture(tmp_path)[..., 0].mean()
     stage.hairloom.mesh_shadows.mesh_shadows = False
-    without_any = picture(tmp_path)[..., 0].mean()
+    without_any = render_picture(tmp_path)[..., 0].mean()
     stage.hairloom.mesh_shadows.mesh_shadows = True
     light.data.use_shadow = False
     assert with_all < without_ball < without_any
-    assert picture(tmp_path)[..., 0].mean() == pytest.approx(without_any, rel=1e-6)
+    assert render_picture(tmp_path)[..., 0].mean() == pytest.approx(without_any, rel=1e-6)
 
 
 def test_motion_moves_shadows(stage: Any, props: Any, tmp_path: Path) -> None:
     """Shadow maps are kept from frame to frame only while nothing moves."""
     add_light("SUN", 3.0, rotation_euler=(0.5, 0.5, 0.3))
-    before = picture(tmp_path)[..., 0]
+    before = render_picture(tmp_path)[..., 0]
     props.location.x += 0.2
-    moved = picture(tmp_path)[..., 0]
+    moved = render_picture(tmp_path)[..., 0]
     props.location.x -= 0.2
-    np.testing.assert_array_equal(picture(tmp_path)[..., 0], before)
+    np.testing.assert_array_equal(render_picture(tmp_path)[..., 0], before)
     assert (np.abs(moved - before) > 0.05).mean() > 0.005

@@ -12,7 +12,7 @@ import bpy
 import numpy as np
 import pytest
 from grids import baked_grid
-from strand_files import needs_usd, stage_of
+from strand_files import needs_usd, read_usd_curves
 
 from hairloom.addon.blender.bakes import playback
 from hairloom.addon.blender.command_line import command_line
@@ -67,7 +67,7 @@ def test_a_grooms_file_keeps_all_that_it_says(
     write_usd(tmp_path / "in.usdc", groom)
     source = ["--groom", str(tmp_path / "in.usdc"), "--head", "Head", *SMALL]
     report = run(*source, "--engine", "unreal", output="out.usdc")
-    _, curves = stage_of(tmp_path / "out.usdc")
+    _, curves = read_usd_curves(tmp_path / "out.usdc")
     from pxr import UsdGeom
 
     primvars = UsdGeom.PrimvarsAPI(curves)
@@ -153,7 +153,7 @@ def test_a_simulation_moves_in_usd(
     shake = ["--seconds", "0.2", "--frame-rate", "30", "--output", str(bake)]
     assert command_line.run(["simulate", *source, *shake]) == 0
     run(*source, "--bake", str(bake), "--frames", "2", "5", output="out.usdc")
-    stage, curves = stage_of(tmp_path / "out.usdc")
+    stage, curves = read_usd_curves(tmp_path / "out.usdc")
     assert (stage.GetStartTimeCode(), stage.GetEndTimeCode()) == (2.0, 5.0)
     assert stage.GetTimeCodesPerSecond() == 30.0
     for frame in (2, 5):
@@ -186,7 +186,7 @@ def test_hair_of_the_scene_leaves_with_its_bake(
         sphere.keyframe_insert("location", frame=frame)
     list(Bake.of([hair], bpy.context.scene, frames=range(1, 5)).steps())
     report = run("--object", "Hair", "--frames", "1", "4", output="out.usdc")
-    _, curves = stage_of(tmp_path / "out.usdc")
+    _, curves = read_usd_curves(tmp_path / "out.usdc")
     cache = playback.cache_of(hair)
     assert cache is not None
     for frame in range(1, 5):

@@ -7,7 +7,7 @@ import threading
 import bpy
 import numpy as np
 import pytest
-from waiting import until
+from waiting import wait_until
 
 from hairloom.addon.blender.colliders.fields import NotMadeYetError
 from hairloom.addon.blender.preview import fins, previews
@@ -33,7 +33,7 @@ def test_play_begins_once_its_cloth_is_made_as_if_it_had_waited(sheet, evaluated
     previews.begin(session, evaluated(), blocking=False)
     assert preview.phase is Phase.WAITING and session.state is None
     assert previews.is_playing() and previews.waiting() == ("Flag",)
-    until(lambda: session.is_made)
+    wait_until(lambda: session.is_made)
     previews.advance(evaluated(), FRAME)
     assert preview.phase is Phase.FREE and previews.waiting() == ()
     begun = session.state
@@ -64,7 +64,7 @@ def test_a_mesh_that_moves_is_waited_for_once(sheet, evaluated):
         session.play(evaluated(), blocking=False)
     sheet.location.x = 0.3
     bpy.context.view_layer.update()
-    until(lambda: session.is_made)
+    wait_until(lambda: session.is_made)
     session.play(evaluated(), blocking=False)
     assert session.state.position[0].mean() == pytest.approx(0.3, abs=1e-6)
     size = float(np.linalg.norm(np.ptp(session.state.position, axis=1)))
@@ -75,7 +75,7 @@ def test_another_mesh_is_made_anew_and_the_same_is_kept(sheet, evaluated):
     session = fins.start(sheet, evaluated())
     with pytest.raises(NotMadeYetError):
         session.play(evaluated(), blocking=False)
-    until(lambda: session.is_made)
+    wait_until(lambda: session.is_made)
     session.play(evaluated(), blocking=False)
     first = session.state.fabric
     session.play(evaluated(), blocking=False)
@@ -84,7 +84,7 @@ def test_another_mesh_is_made_anew_and_the_same_is_kept(sheet, evaluated):
     bpy.context.view_layer.update()
     with pytest.raises(NotMadeYetError):
         session.play(evaluated(), blocking=False)
-    until(lambda: session.is_made)
+    wait_until(lambda: session.is_made)
     session.play(evaluated(), blocking=False)
     assert session.state.fabric.pin[60] == 1.0
 
@@ -104,7 +104,7 @@ def test_playback_goes_on_and_its_next_round_begins_at_the_first_frame(
     monkeypatch.setattr(preview_module, "_is_exact", lambda: False)
     bpy.context.scene.frame_set(1)
     assert preview.phase is Phase.DEFERRED and session.state is None
-    until(lambda: session.is_made)
+    wait_until(lambda: session.is_made)
     for frame in (2, 3, 1, 2):
         bpy.context.scene.frame_set(frame)
         assert preview.phase is Phase.TIMELINE, f"frame {frame}"

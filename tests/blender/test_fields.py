@@ -6,8 +6,8 @@ import weakref
 import bpy
 import numpy as np
 import pytest
-from grids import grid_of
-from waiting import until, until_it_plays
+from grids import strand_grid
+from waiting import wait_until, wait_until_playing
 
 from hairloom.addon.blender.colliders import fields
 from hairloom.addon.blender.preview import previews, scene_events
@@ -24,8 +24,8 @@ FRAME = 1.0 / 60.0
 
 
 @pytest.fixture(autouse=True)
-def no_fields(same_fields, monkeypatch):
-    monkeypatch.setattr(DistanceField, "from_surface", same_fields)
+def no_fields(cached_distance_fields, monkeypatch):
+    monkeypatch.setattr(DistanceField, "from_surface", cached_distance_fields)
     fields.forget()
     yield
     fields.forget()
@@ -46,7 +46,7 @@ def gate(monkeypatch):
 
 
 def until_made():
-    until(fields.are_made)
+    wait_until(fields.are_made)
 
 
 def surface_of(obj, evaluated):
@@ -125,7 +125,7 @@ def test_hair_that_waits_for_its_collider_is_at_rest_and_then_plays(
 ):
     hair = new_hair(sphere)
     session = previews.start(hair, evaluated())
-    at_rest = grid_of(session)
+    at_rest = strand_grid(session)
     assert previews.play(evaluated(), blocking=False) == []
     assert (
         previews.is_playing()
@@ -137,15 +137,15 @@ def test_hair_that_waits_for_its_collider_is_at_rest_and_then_plays(
     previews.advance(evaluated(), FRAME)
     previews.rest(evaluated(), keep_playing=True)
     assert previews.previews[session.uid].phase is Phase.WAITING
-    assert grid_of(session) == pytest.approx(at_rest + [0.05, 0.0, 0.0], abs=2e-6)
+    assert strand_grid(session) == pytest.approx(at_rest + [0.05, 0.0, 0.0], abs=2e-6)
     gate.set()
-    until_it_plays(session, evaluated, FRAME)
+    wait_until_playing(session, evaluated, FRAME)
     assert previews.previews[session.uid].phase is not Phase.WAITING
     sphere.location.x = 0.08
     evaluated()
     previews.advance(evaluated(), FRAME)
     carried = at_rest + [0.08, 0.0, 0.0]
-    assert np.abs(grid_of(session) - carried)[:, -1].max() > 1e-3, "tips stay behind"
+    assert np.abs(strand_grid(session) - carried)[:, -1].max() > 1e-3, "tips stay behind"
 
 
 def test_stop_while_hair_waits_ends_the_waiting(new_hair, sphere, evaluated, gate):
@@ -167,7 +167,7 @@ def test_a_collider_that_cannot_be_made_is_left_out_with_a_warning_as_ever(
     hair.hairloom.collider = bpy.context.object
     session = previews.start(hair, evaluated())
     previews.play(evaluated(), blocking=False)
-    until_it_plays(session, evaluated, FRAME)
+    wait_until_playing(session, evaluated, FRAME)
     assert any("encloses no volume" in warning for warning in session.warnings)
 
 
@@ -182,7 +182,7 @@ def test_more_meshes_than_are_kept_are_all_waited_for(new_hair, sphere, evaluate
     hair.hairloom.collider_collection = colliders
     session = previews.start(hair, evaluated())
     previews.play(evaluated(), blocking=False)
-    until_it_plays(session, evaluated, FRAME)
+    wait_until_playing(session, evaluated, FRAME)
     assert len(session.obstacles.parts) == fields.KEPT + 3
 
 
@@ -212,10 +212,10 @@ def test_the_field_of_the_built_in_head_ships(monkeypatch):
 
 
 @pytest.mark.slow(instead="test_the_field_of_the_built_in_head_ships")
-def test_the_field_that_ships_is_the_one_that_would_be_made(same_fields):
+def test_the_field_that_ships_is_the_one_that_would_be_made(cached_distance_fields):
     surface, settings = built_in_head().surface, DynamicsSettings()
     ships = fields.field_of(surface, settings, place="Head")
-    made = same_fields(surface, settings)
+    made = cached_distance_fields(surface, settings)
     assert ships.cell == made.cell
     np.testing.assert_array_equal(ships.low, made.low)
     # other processors round differently

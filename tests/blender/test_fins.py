@@ -5,7 +5,14 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from fin_motion import FRAME, play, rest_of, shown, started, update
+from fin_motion import (
+    FRAME_S,
+    evaluated_vertices,
+    play_frames,
+    rest_vertices,
+    start_fin,
+    update_view_layer,
+)
 from mathutils import Matrix
 
 from hairloom.addon.blender.preview import fins, previews
@@ -30,29 +37,29 @@ def test_the_operator_adds_one_modifier_and_takes_the_active_group(flag):
 def test_new_cloth_collides_with_nothing_as_the_page_says(flag, evaluated):
     """Not even with the colliders of the scene's hair."""
     assert flag.hairloom.collider is None and flag.hairloom.collider_collection is None
-    assert started(flag, evaluated).obstacles.parts == []
+    assert start_fin(flag, evaluated).obstacles.parts == []
     page = (Path(__file__).parents[2] / "docs" / "dynamics.md").read_text(encoding="utf-8")
     cloth = " ".join(page.partition("\n## Cloth\n")[2].partition("\n## ")[0].split())
     assert "until you set one it collides with nothing" in cloth
 
 
 def test_removing_it_leaves_nothing(flag, evaluated):
-    rest = rest_of(flag)
-    session = started(flag, evaluated)
-    play(session, evaluated, 3)
+    rest = rest_vertices(flag)
+    session = start_fin(flag, evaluated)
+    play_frames(session, evaluated, 3)
     assert bpy.ops.hairloom.fin_remove() == {"FINISHED"}
     assert previews.simulated() == ()
     assert len(flag.modifiers) == len(bpy.data.node_groups) == 0
     assert POSITION not in flag.data.attributes
-    assert np.array_equal(rest_of(flag), rest)
+    assert np.array_equal(rest_vertices(flag), rest)
 
 
 def test_it_falls_from_its_pins_and_blender_shows_it(flag, evaluated):
-    rest = rest_of(flag)
-    session = started(flag, evaluated)
-    before = shown(flag, evaluated)
-    play(session, evaluated, 20)
-    now = shown(flag, evaluated)
+    rest = rest_vertices(flag)
+    session = start_fin(flag, evaluated)
+    before = evaluated_vertices(flag, evaluated)
+    play_frames(session, evaluated, 20)
+    now = evaluated_vertices(flag, evaluated)
     pinned = rest[:, 0] < -0.19
     assert now[pinned] == pytest.approx(before[pinned], abs=1e-6)
     assert now[~pinned, 2].min() < -0.1
@@ -63,10 +70,10 @@ def test_it_falls_from_its_pins_and_blender_shows_it(flag, evaluated):
     cosine = (normals * session.normals()).sum(axis=1)
     assert cosine.min() > 0.99, "normals are those of the cloth"
     session.stop(evaluated())
-    assert np.array_equal(rest_of(flag), rest)
+    assert np.array_equal(rest_vertices(flag), rest)
     assert POSITION not in flag.data.attributes
-    update()
-    assert np.array_equal(shown(flag, evaluated), before)
+    update_view_layer()
+    assert np.array_equal(evaluated_vertices(flag, evaluated), before)
 
 
 def test_pins_follow_an_animated_parent(flag, evaluated):
@@ -80,16 +87,16 @@ def test_pins_follow_an_animated_parent(flag, evaluated):
         parent.keyframe_insert("location", frame=frame)
         parent.keyframe_insert("rotation_euler", frame=frame)
     bpy.context.scene.frame_set(1)
-    session = started(flag, evaluated)
-    rest = rest_of(flag)
+    session = start_fin(flag, evaluated)
+    rest = rest_vertices(flag)
     pinned = rest[:, 0] < -0.19
     for frame in range(2, 14):
         bpy.context.scene.frame_set(frame)
         session.advance(evaluated(), 1.0 / 24.0)
-    update()
+    update_view_layer()
     matrix = np.array(flag.matrix_world)
     carried = rest @ matrix[:3, :3].T + matrix[:3, 3]
-    now = shown(flag, evaluated)
+    now = evaluated_vertices(flag, evaluated)
     assert now[pinned] == pytest.approx(carried[pinned], abs=1e-5)
     assert np.abs(now - carried)[~pinned].max() > 0.02
 
@@ -109,31 +116,31 @@ def test_pins_follow_an_armature_and_shape_keys(flag, evaluated):
     key = flag.shape_key_add(name="Up")
     for point in key.data:
         point.co.z += 0.05
-    session = started(flag, evaluated)
-    rest = rest_of(flag)
+    session = start_fin(flag, evaluated)
+    rest = rest_vertices(flag)
     pinned = rest[:, 0] < -0.19
 
     def pose(frame):
         rig.pose.bones["Bone"].matrix_basis = Matrix.Translation((0.0, 0.02 * (frame + 1), 0.0))
         key.value = (frame + 1) / 10.0
 
-    play(session, evaluated, 10, pose)
+    play_frames(session, evaluated, 10, pose)
     moved = rig.pose.bones["Bone"].matrix.translation
     assert np.abs(np.array(moved)).max() > 0.1
     expected = rest[pinned] + np.array(moved) + np.array([0.0, 0.0, 0.05])
-    assert shown(flag, evaluated)[pinned] == pytest.approx(expected, abs=1e-5)
+    assert evaluated_vertices(flag, evaluated)[pinned] == pytest.approx(expected, abs=1e-5)
 
 
 def test_a_frame_that_was_recorded_is_shown_again_exactly(flag, evaluated):
     flag.rotation_euler = (0.3, 0.2, 0.1)
-    session = started(flag, evaluated)
-    play(session, evaluated, 8)
-    frame, drawn = session.recorded(), shown(flag, evaluated)
-    play(session, evaluated, 4)
-    assert not np.array_equal(shown(flag, evaluated), drawn)
+    session = start_fin(flag, evaluated)
+    play_frames(session, evaluated, 8)
+    frame, drawn = session.recorded(), evaluated_vertices(flag, evaluated)
+    play_frames(session, evaluated, 4)
+    assert not np.array_equal(evaluated_vertices(flag, evaluated), drawn)
     session.show_recorded(frame)
-    update()
-    assert np.array_equal(shown(flag, evaluated), drawn)
+    update_view_layer()
+    assert np.array_equal(evaluated_vertices(flag, evaluated), drawn)
     assert np.array_equal(session.recorded()["position"], frame["position"])
     assert all(array.dtype != object for array in (session.constants() | frame).values())
     with pytest.raises(HairloomError, match="Bake again"):
@@ -143,8 +150,8 @@ def test_a_frame_that_was_recorded_is_shown_again_exactly(flag, evaluated):
 def test_two_runs_are_alike(flag, evaluated):
     ends = []
     for _ in range(2):
-        session = started(flag, evaluated)
-        play(session, evaluated, 10)
+        session = start_fin(flag, evaluated)
+        play_frames(session, evaluated, 10)
         ends.append(session.recorded()["position"])
         session.stop(evaluated())
         previews.stop(session)
@@ -152,16 +159,16 @@ def test_two_runs_are_alike(flag, evaluated):
 
 
 def test_hashes_tell_what_has_changed(flag, evaluated):
-    session = started(flag, evaluated)
+    session = start_fin(flag, evaluated)
     rig_hash, frame_hash = session.rig_hash(evaluated()), session.frame_hash(evaluated())
     assert session.rig_hash(evaluated()) == rig_hash
     assert session.frame_hash(evaluated()) == frame_hash
     flag.location.x = 1.0
-    update()
+    update_view_layer()
     assert session.rig_hash(evaluated()) == rig_hash
     assert session.frame_hash(evaluated()) != frame_hash
     flag.vertex_groups["Pins"].add([60], 0.5, "REPLACE")
-    update()
+    update_view_layer()
     assert session.rig_hash(evaluated()) != rig_hash
 
 
@@ -170,10 +177,10 @@ def test_it_stays_out_of_a_collider(flag, evaluated):
     ball = bpy.context.object
     ball.hairloom.collider_shape = "sphere"
     flag.hairloom.collider = ball
-    session = started(flag, evaluated)
-    play(session, evaluated, 40)
+    session = start_fin(flag, evaluated)
+    play_frames(session, evaluated, 40)
     assert session.obstacles.warnings == ()
-    away = np.linalg.norm(shown(flag, evaluated) - np.array(ball.location), axis=1)
+    away = np.linalg.norm(evaluated_vertices(flag, evaluated) - np.array(ball.location), axis=1)
     assert away.min() > 0.1
     assert away.min() < 0.105, "it lies on the ball"
 
@@ -182,18 +189,18 @@ def test_the_wind_of_the_scene_blows(flag, evaluated):
     bpy.ops.object.effector_add(type="WIND", rotation=(0.0, 0.0, 0.0))
     bpy.context.object.field.strength = 20.0
     flag.hairloom.fin.gravity = 0.0
-    session = started(flag, evaluated)
-    play(session, evaluated, 20)
-    assert shown(flag, evaluated)[:, 2].max() > 0.05
+    session = start_fin(flag, evaluated)
+    play_frames(session, evaluated, 20)
+    assert evaluated_vertices(flag, evaluated)[:, 2].max() > 0.05
 
 
 def test_modifiers_below_go_on_from_the_cloth(flag, evaluated):
     flag.modifiers.new("Smooth", "SUBSURF").levels = 1
     flag.modifiers.new("Thick", "SOLIDIFY").thickness = 0.01
-    session = started(flag, evaluated)
-    play(session, evaluated, 10)
-    assert len(shown(flag, evaluated)) > 400
-    assert shown(flag, evaluated)[:, 2].min() < -0.02
+    session = start_fin(flag, evaluated)
+    play_frames(session, evaluated, 10)
+    assert len(evaluated_vertices(flag, evaluated)) > 400
+    assert evaluated_vertices(flag, evaluated)[:, 2].min() < -0.02
     assert len(session.recorded()["position"]) == 121
 
 
@@ -201,21 +208,21 @@ def test_modifiers_below_go_on_from_the_cloth(flag, evaluated):
 def test_a_modifier_above_that_makes_vertices_is_said(flag, evaluated, kind, place):
     flag.modifiers.new("Culprit", kind)
     flag.modifiers.move(1, place)
-    update()
+    update_view_layer()
     with pytest.raises(HairloomError, match=r"Culprit.*below Hairloom Cloth"):
         fins.start(flag, evaluated())
 
 
 def test_a_modifier_below_that_reorders_vertices_is_said(flag, evaluated):
     flag.modifiers.new("Fewer", "DECIMATE").ratio = 0.5
-    update()
+    update_view_layer()
     with pytest.raises(HairloomError, match="Fewer"):
         fins.start(flag, evaluated())
 
 
 def test_a_modifier_that_is_off_is_said(flag, evaluated):
     fin_modifier(flag).show_viewport = False
-    update()
+    update_view_layer()
     with pytest.raises(HairloomError, match="turned off"):
         fins.start(flag, evaluated())
 
@@ -236,13 +243,13 @@ def change_topology(flag):
     ],
 )
 def test_what_breaks_in_mid_play_ends_it_with_a_notice(flag, evaluated, change, says):
-    session = started(flag, evaluated)
+    session = start_fin(flag, evaluated)
     previews.play(evaluated())
-    play(session, evaluated, 2)
+    play_frames(session, evaluated, 2)
     bpy.context.view_layer.objects.active = flag
     change(flag)
-    update()
-    previews.advance(evaluated(), FRAME)
+    update_view_layer()
+    previews.advance(evaluated(), FRAME_S)
     assert previews.simulated() == ()
     assert says in previews.notice()
     if bpy.context.object is not None and bpy.context.object.mode == "EDIT":
@@ -251,20 +258,20 @@ def test_what_breaks_in_mid_play_ends_it_with_a_notice(flag, evaluated, change, 
 
 def test_a_missing_pin_group_is_said_and_none_falls(flag, evaluated):
     flag.hairloom.fin.pin_group = "Nowhere"
-    update()
+    update_view_layer()
     with pytest.raises(HairloomError, match="Nowhere"):
         fins.start(flag, evaluated())
     flag.hairloom.fin.pin_group = ""
-    session = started(flag, evaluated)
+    session = start_fin(flag, evaluated)
     assert "no vertex is pinned" in session.warnings[0]
-    before = shown(flag, evaluated)
-    play(session, evaluated, 5)
-    assert (shown(flag, evaluated) - before)[:, 2].max() < -0.01
+    before = evaluated_vertices(flag, evaluated)
+    play_frames(session, evaluated, 5)
+    assert (evaluated_vertices(flag, evaluated) - before)[:, 2].max() < -0.01
 
 
 def test_a_mesh_of_two_fins_is_said(flag, evaluated):
     twin = flag.copy()
     bpy.context.collection.objects.link(twin)
-    update()
+    update_view_layer()
     with pytest.raises(HairloomError, match="Single User"):
         fins.start(flag, evaluated())

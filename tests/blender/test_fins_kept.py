@@ -3,7 +3,7 @@
 import bpy
 import numpy as np
 import pytest
-from fin_motion import play, rest_of, shown, started, update
+from fin_motion import evaluated_vertices, play_frames, rest_vertices, start_fin, update_view_layer
 
 from hairloom.addon.blender.preview import fins, previews, scene_events
 from hairloom.addon.blender.preview.bake import Bake
@@ -26,39 +26,41 @@ def test_undo_and_redo_of_the_operator(extension, evaluated):
 def test_undo_in_mid_play_goes_on_or_rests(flag, evaluated):
     bpy.context.preferences.edit.use_global_undo = True
     bpy.ops.ed.undo_push(message="begin")
-    session = started(flag, evaluated)
-    play(session, evaluated, 5)
+    session = start_fin(flag, evaluated)
+    play_frames(session, evaluated, 5)
     flag.location.x = 0.1
     bpy.ops.ed.undo_push(message="move")
     bpy.ops.ed.undo()
     scene_events.catch_up(evaluated())
     flag = bpy.data.objects["Flag"]
-    play(session, evaluated, 2)
+    play_frames(session, evaluated, 2)
     assert previews.simulated() == (session,)
     session.stop(evaluated())
     assert POSITION not in flag.data.attributes
 
 
 def test_a_saved_file_keeps_fin_and_settings(flag, evaluated, tmp_path):
-    rest = rest_of(flag)
+    rest = rest_vertices(flag)
     flag.hairloom.fin.stretch = 0.25
-    session = started(flag, evaluated)
-    play(session, evaluated, 5)
-    drawn = shown(flag, evaluated)
+    session = start_fin(flag, evaluated)
+    play_frames(session, evaluated, 5)
+    drawn = evaluated_vertices(flag, evaluated)
     file = str(tmp_path / "fin.blend")
     bpy.ops.wm.save_as_mainfile(filepath=file)
     bpy.ops.wm.open_mainfile(filepath=file)
     flag = bpy.data.objects["Flag"]
     assert previews.simulated() == ()
     assert flag.hairloom.fin.stretch == 0.25 and flag.hairloom.fin.pin_group == "Pins"
-    update()
-    assert shown(flag, evaluated) == pytest.approx(drawn, abs=1e-6), "the moment that was saved"
+    update_view_layer()
+    assert evaluated_vertices(flag, evaluated) == pytest.approx(drawn, abs=1e-6), (
+        "the moment that was saved"
+    )
     assert is_shown(flag)
     bpy.context.view_layer.objects.active = flag
     assert bpy.ops.hairloom.fin_reset() == {"FINISHED"}
     assert not is_shown(flag)
-    assert np.array_equal(rest_of(flag), rest)
-    started(flag, evaluated)
+    assert np.array_equal(rest_vertices(flag), rest)
+    start_fin(flag, evaluated)
 
 
 def play_away_from(before, flag, evaluated):
@@ -66,20 +68,20 @@ def play_away_from(before, flag, evaluated):
     fins.start(flag, evaluated())
     previews.play(evaluated())
     previews.advance(evaluated(), 0.5)
-    update()
-    assert np.abs(shown(flag, evaluated) - before).max() > 0.05
+    update_view_layer()
+    assert np.abs(evaluated_vertices(flag, evaluated) - before).max() > 0.05
 
 
 @pytest.mark.parametrize("end", ["stop", "by itself", "a file that cannot be opened"])
 def test_however_its_preview_ends_it_is_at_rest(end, flag, evaluated, tmp_path):
-    before = shown(flag, evaluated)
+    before = evaluated_vertices(flag, evaluated)
     play_away_from(before, flag, evaluated)
     if end == "stop":
         previews.stop_all()
     elif end == "by itself":
         flag.modifiers.new("Array", "ARRAY")
         flag.modifiers.move(1, 0)
-        update()
+        update_view_layer()
         previews.advance(evaluated(), 0.5)
         assert "Preview of Flag ended" in previews.notice()
     else:
@@ -93,11 +95,11 @@ def test_a_bake_is_shown_after_the_preview_too(flag, evaluated, tmp_path):
     for _ in Bake.of([flag], bpy.context.scene, frames=range(1, 4), folder=tmp_path).steps():
         pass
     bpy.context.scene.frame_set(3)
-    baked = shown(flag, evaluated)
+    baked = evaluated_vertices(flag, evaluated)
     play_away_from(baked, flag, evaluated)
     previews.stop_all()
-    update()
-    assert np.array_equal(shown(flag, evaluated), baked)
+    update_view_layer()
+    assert np.array_equal(evaluated_vertices(flag, evaluated), baked)
 
 
 def test_buttons_say_why_they_are_grey(extension):
@@ -113,7 +115,7 @@ def test_buttons_say_why_they_are_grey(extension):
 
 
 def test_enabled_fins_start_together(flag, evaluated):
-    update()
+    update_view_layer()
     assert fins.start_enabled(evaluated()) == []
     assert [each.name for each in previews.simulated()] == ["Flag"]
     assert bpy.ops.hairloom.fin_preview() == {"FINISHED"}
@@ -123,7 +125,7 @@ def test_enabled_fins_start_together(flag, evaluated):
 
 
 def test_attributes_of_the_modifier_stay_out_of_the_mesh(flag, evaluated):
-    started(flag, evaluated)
+    start_fin(flag, evaluated)
     assert INDEX not in flag.data.attributes
     assert INDEX in flag.evaluated_get(evaluated()).data.attributes
 
@@ -147,7 +149,7 @@ def test_playback_simulates_it_and_a_bake_shows_exactly_that(flag, evaluated, tm
     bpy.context.scene.frame_set(1)
     session = fins.start(flag, evaluated())
     simulated = frames_of(flag, range(1, 9))
-    assert np.array_equal(simulated[1], rest_of(flag))
+    assert np.array_equal(simulated[1], rest_vertices(flag))
     assert simulated[8][:, 2].min() < -0.1
     previews.stop(session)
     for _ in Bake.of([flag], bpy.context.scene, frames=range(1, 9), folder=tmp_path).steps():
@@ -170,8 +172,8 @@ def test_other_attributes_stay_as_they_are(flag, evaluated):
         return active, [each.name for each in mesh.attributes], mesh.uv_layers.active_index
 
     before = known()
-    session = started(flag, evaluated)
-    play(session, evaluated, 2)
+    session = start_fin(flag, evaluated)
+    play_frames(session, evaluated, 2)
     assert known() != before
     session.stop(evaluated())
     assert known() == before

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mathutils import Matrix, Vector
 from mathutils.bvhtree import BVHTree
-from overriding import overridden
+from overriding import library_overrides
 from tiers import few_in_commits
 
 from hairloom.addon.blender.base.parts import at_once
@@ -524,7 +524,7 @@ def test_what_may_be_a_head() -> None:
 
 def test_an_overridden_head_gets_no_weights_that_are_not_saved(tmp_path):
     makehuman()
-    (head,) = overridden(tmp_path)
+    (head,) = library_overrides(tmp_path)
     with pytest.raises(HairloomError, match="cannot change the mesh"):
         added("bob", head)
     assert not head.vertex_groups and not bpy.data.hair_curves

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from glb_files import validated, write_glb
+from glb_files import validator_report, write_glb
 from guide_cards import build_cards
 
 from hairloom.addon.cards.card_mesh import CardMesh
@@ -46,7 +46,7 @@ def test_khronos_validator_finds_no_fault(
     mesh, texture = curtain
     path = tmp_path / "cards.glb"
     write_glb(path, mesh, texture if has_texture else None, portable=portable)
-    report = validated(path)
+    report = validator_report(path)
     assert (report["issues"]["numErrors"], report["issues"]["numWarnings"]) == (0, 0), report
     assert report["info"]["totalTriangleCount"] == len(mesh.triangles)
 
@@ -58,7 +58,7 @@ def test_khronos_validator_sees_a_damaged_file(
     path = tmp_path / "cards.glb"
     write_glb(path, curtain[0], None)
     path.write_bytes(path.read_bytes().replace(b'"VEC3"', b'"VEC5"', 1))
-    assert validated(path)["issues"]["numErrors"] > 0
+    assert validator_report(path)["issues"]["numErrors"] > 0
 
 
 def drawn_by_panda(path: Path, size: int, extent: float) -> np.ndarray:

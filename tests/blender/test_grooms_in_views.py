@@ -11,9 +11,9 @@ import pytest
 
 bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
 
-from flat_cards import card, constant, mesh_of, snapshot_of  # noqa: E402
+from flat_cards import card, constant_textures, mesh_of, snapshot_of  # noqa: E402
 from gpu_calls import gpu_calls  # noqa: E402
-from small_view import ADDRESS, NOTHING, SIZE, SmallView  # noqa: E402
+from small_view import ADDRESS, SIZE, TRANSPARENT, SmallView  # noqa: E402
 
 from hairloom.addon.blender.viewport import overlay, views  # noqa: E402
 from hairloom.addon.render import gpu_objects  # noqa: E402
@@ -88,7 +88,7 @@ def of_render(*grooms: Snapshot) -> np.ndarray:
     drawn = tuple(DrawnGroom(number, each) for number, each in enumerate(grooms))
     scene = SceneSnapshot(grooms=drawn, lights=grooms[0].lights, ambient=grooms[0].ambient)
     target = Target()
-    ScenePass().draw(scene, CAMERA, target, (SIZE, SIZE), NOTHING)
+    ScenePass().draw(scene, CAMERA, target, (SIZE, SIZE), TRANSPARENT)
     return texture_to_array(target.color)
 
 
@@ -203,7 +203,7 @@ def test_cards_of_one_groom_shade_strands_of_another_and_are_drawn_last(view: Sm
     for name in ("positions", "normal", "tangent"):
         flat[name] = flat[name] @ np.float64([[1, 0, 0], [0, 0, 1], [0, -1, 0]])
     flat["positions"][:, 2] = 0.1
-    above = snapshot_of(mesh_of(flat), constant(alpha=0.5), volume=VOLUME, lights=(dim,))
+    above = snapshot_of(mesh_of(flat), constant_textures(alpha=0.5), volume=VOLUME, lights=(dim,))
     above = replace(above, shading=LOOK, ambient=few.ambient)
     alone, both = (
         radiance_of(view.shows(**grooms)[..., :3])

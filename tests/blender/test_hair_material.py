@@ -10,7 +10,7 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from engine_stage import picture
+from engine_stage import render_picture
 
 from hairloom.addon.blender.properties.presets import apply
 from hairloom.addon.blender.scene.curves import set_colors
@@ -56,7 +56,7 @@ def evaluated_input(hair: Any, name: str, folder: Path) -> np.ndarray:
     tree.links.new(node.inputs[name].links[0].from_socket, light.inputs["Color"])
     output = next(each for each in tree.nodes if each.type == "OUTPUT_MATERIAL")
     tree.links.new(light.outputs[0], output.inputs["Surface"])
-    return picture(folder)[..., :3]
+    return render_picture(folder)[..., :3]
 
 
 ALONG = np.broadcast_to(((np.arange(64) + 0.5) / 64)[:, None], (64, ROW))

@@ -3,7 +3,7 @@
 import bpy
 import numpy as np
 import pytest
-from node_modifiers import mode_of
+from node_modifiers import hair_dynamics_mode
 
 from hairloom.addon.blender.preview import diagnostics, previews
 from hairloom.addon.blender.scene.curves import read_curves
@@ -165,7 +165,7 @@ def test_blenders_dynamics_are_muted(sphere, extension):
     bpy.ops.object.curves_empty_hair_add()
     hair = bpy.context.object
     assert told(hair) == [], "as it is added it only puts hair onto its surface"
-    mode_of(hair.modifiers[0]).value = "Physics (Experimental)"
+    hair_dynamics_mode(hair.modifiers[0]).value = "Physics (Experimental)"
     hair.update_tag()
     assert told(hair) == ["hairloom.mute_hair_dynamics"]
     fix(hair)

@@ -7,7 +7,7 @@ from collections.abc import Generator, Iterator
 from typing import Any
 
 import pytest
-from waiting import PATIENCE_S, take_steps_until
+from waiting import TIMEOUT_S, take_steps_until
 
 bpy = pytest.importorskip("bpy", reason="its timer is Blender's")
 
@@ -42,7 +42,7 @@ class Workshop:
         self.begun.append(key)
 
         def work(thread: ThreadWork[str]) -> str:
-            assert self.gates[key].wait(PATIENCE_S)
+            assert self.gates[key].wait(TIMEOUT_S)
             try:
                 thread.report("last part")
             finally:

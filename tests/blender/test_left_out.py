@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import bpy
 import numpy as np
 import pytest
-from fin_motion import started, update
-from grids import grid_of
-from swinging import play
+from fin_motion import start_fin, update_view_layer
+from grids import strand_grid
+from swinging import play_frames
 
 from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.preview.phases import Phase
@@ -22,7 +22,7 @@ def show(name):
     """Show the scene of this name in the window; it is made if it does not exist."""
     scene = bpy.data.scenes.get(name) or bpy.data.scenes.new(name)
     bpy.context.window.scene = scene
-    update()
+    update_view_layer()
     return scene
 
 
@@ -61,9 +61,9 @@ def groom(preview, evaluated):
 @pytest.mark.parametrize("hide", [hide_objects, hide_collection, exclude])
 def test_hidden_hair_is_read_again_when_it_is_shown(hide, groom, evaluated):
     head, session = groom
-    at_rest = grid_of(session)
+    at_rest = strand_grid(session)
     hide(True)
-    update()
+    update_view_layer()
     bpy.context.scene.frame_set(2)
     head.location.x = 1.0
     scene_events.undone()
@@ -71,21 +71,21 @@ def test_hidden_hair_is_read_again_when_it_is_shown(hide, groom, evaluated):
     assert previews.sessions() == (session,) and previews.notice() == ""
     assert not overlay.drawing_of(session.uid).is_visible
     hide(False)
-    update()
+    update_view_layer()
     scene_events.catch_up(evaluated())
     assert overlay.drawing_of(session.uid).is_visible and not session.is_stale
-    assert grid_of(session) == pytest.approx(at_rest + np.array([1.0, 0.0, 0.0]), abs=1e-6)
+    assert strand_grid(session) == pytest.approx(at_rest + np.array([1.0, 0.0, 0.0]), abs=1e-6)
 
 
 def test_hidden_hair_that_plays_goes_on_when_it_is_shown(groom, evaluated):
     _, session = groom
     previews.play(evaluated())
-    play(evaluated, 3)
+    play_frames(evaluated, 3)
     hide_collection(True)
-    play(evaluated, 3)
+    play_frames(evaluated, 3)
     assert previews.is_playing() and previews.notice() == ""
     hide_collection(False)
-    play(evaluated, 3)
+    play_frames(evaluated, 3)
     assert phase_of(session) is Phase.FREE and session.is_playing
 
 
@@ -100,12 +100,12 @@ def test_play_begins_hair_of_its_own_scene_alone(groom, evaluated, new_hair):
 
 def test_stop_stops_hair_and_cloth_of_another_scene(groom, flag, evaluated):
     head, session = groom
-    scene, at_rest = bpy.context.scene, grid_of(session)
-    started(flag, evaluated)
+    scene, at_rest = bpy.context.scene, strand_grid(session)
+    start_fin(flag, evaluated)
     previews.play(evaluated())
     for step in range(4):
         head.location.x = 0.02 * (step + 1)
-        play(evaluated, 1)
+        play_frames(evaluated, 1)
     assert is_shown(flag)
     show("Other")
     assert previews.is_playing()
@@ -115,7 +115,7 @@ def test_stop_stops_hair_and_cloth_of_another_scene(groom, flag, evaluated):
     show(scene.name)
     scene_events.catch_up(evaluated())
     carried = at_rest + np.array([head.location.x, 0.0, 0.0])
-    assert grid_of(session) == pytest.approx(carried, abs=2e-6)
+    assert strand_grid(session) == pytest.approx(carried, abs=2e-6)
 
 
 def test_each_scene_that_plays_goes_on_in_a_window_of_its_own(

@@ -9,7 +9,7 @@ from typing import Any
 
 import bpy
 import pytest
-from waiting import until
+from waiting import wait_until
 
 from hairloom.addon.blender.base.thread_work import GivenUpError, ThreadWork
 from hairloom.addon.cards.steps import result_of
@@ -127,7 +127,7 @@ def test_closing_gives_the_thread_up() -> None:
     next(steps)
     steps.close()
     may_go_on.set()
-    until(thread.run_main_thread_steps)
+    wait_until(thread.run_main_thread_steps)
     with pytest.raises(GivenUpError):
         thread.result()
 

@@ -10,7 +10,7 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from engine_stage import add_ball, picture
+from engine_stage import add_ball, render_picture
 from hedgehogs import hedgehog
 
 from hairloom.addon.blender.bakes.baked_rig import RestMatrices, baked_rig_of, rig_arrays
@@ -115,19 +115,19 @@ def test_it_is_drawn_as_the_hair_was(hair: Any, stage: Any, tmp_path: Path) -> N
     hair.select_set(True)
     stage.camera.location.y = -0.6
     stage.render.resolution_x = stage.render.resolution_y = 256  # enough pixels to draw all strands
-    before = picture(tmp_path)
+    before = render_picture(tmp_path)
     real = made_real()
     assert hair.hide_render and not real.hide_render
-    after = picture(tmp_path)
+    after = render_picture(tmp_path)
     real.hide_render = True
-    without = picture(tmp_path)
+    without = render_picture(tmp_path)
     is_hair = np.abs(before - without).max(axis=-1) > 0.02
     assert is_hair.mean() > 0.1
     assert np.abs(after - before)[is_hair].mean() < 0.02  # other strands cast the shadows
     real.hide_render = False
     real.data.hairloom.shading.base_color = (1.0, 1.0, 1.0)
     # colours are stored in the curves
-    np.testing.assert_allclose(picture(tmp_path), after, atol=1e-3)
+    np.testing.assert_allclose(render_picture(tmp_path), after, atol=1e-3)
 
 
 def test_the_hair_stays_and_undo_is_there(hair: Any) -> None:

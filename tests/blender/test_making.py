@@ -6,8 +6,8 @@ from dataclasses import replace
 import bpy
 import numpy as np
 import pytest
-from grids import grid_of
-from waiting import take_steps_until, until, until_it_plays
+from grids import strand_grid
+from waiting import take_steps_until, wait_until, wait_until_playing
 
 from hairloom.addon import light_flow, motion_flow, rig_flow
 from hairloom.addon.arrays import same_content
@@ -230,15 +230,15 @@ def test_nothing_is_left_of_light_that_is_found_for_hair_that_goes(hair, evaluat
 def test_play_waits_for_the_hair(hair, evaluated, gate):
     session = previews.start(hair, evaluated())
     assert previews.play(evaluated(), blocking=False) == []
-    until(fields.are_made)
+    wait_until(fields.are_made)
     previews.advance(evaluated(), FRAME)
     assert previews.previews[session.uid].phase is Phase.WAITING and not session.is_playing
     with pytest.raises(fields.NotMadeYetError):
         session.play(evaluated(), blocking=False)
     gate.set()
     arrive(session)
-    until_it_plays(session, evaluated, FRAME)
-    assert len(grid_of(session)) == COUNT
+    wait_until_playing(session, evaluated, FRAME)
+    assert len(strand_grid(session)) == COUNT
 
 
 def test_play_begins_and_simulates_in_frames_of_their_own(hair, evaluated, gate):
@@ -246,7 +246,7 @@ def test_play_begins_and_simulates_in_frames_of_their_own(hair, evaluated, gate)
     previews.play(evaluated(), blocking=False)
     gate.set()
     arrive(session)
-    until_it_plays(session, evaluated, FRAME)
+    wait_until_playing(session, evaluated, FRAME)
     assert session.solver.motion.clearance is not None
     assert not session.solver.motion.duration, "it begins"
     previews.advance(evaluated(), FRAME)
@@ -293,13 +293,13 @@ def test_old_hair_plays_until_the_new_is_made(playing, hair, evaluated, monkeypa
     hair.data.hairloom.children.strand_count = 300
     scene_events.catch_up(evaluated())
     assert playing.is_pending and not playing.is_stale
-    before = grid_of(playing)
+    before = strand_grid(playing)
     previews.advance(evaluated(), FRAME)
-    assert len(grid_of(playing)) == COUNT and not np.array_equal(grid_of(playing), before)
+    assert len(strand_grid(playing)) == COUNT and not np.array_equal(strand_grid(playing), before)
     tips = playing.solver.guides()[:, -1]
     opened.set()
     arrive(playing)
-    assert len(grid_of(playing)) > COUNT and playing.is_playing
+    assert len(strand_grid(playing)) > COUNT and playing.is_playing
     # no step has run since: the same guides are at the same places
     assert np.array_equal(playing.solver.guides()[:, -1], tips)
     at_rest = motion_flow.carried_guides(playing.rig, playing.solver.pose)[:, -1]
@@ -345,7 +345,7 @@ def test_contacts_are_found_once_beside_the_work_of_the_window(
     arrive(session)
     assert previews.play(evaluated(), blocking=False) == []
     assert previews.previews[session.uid].phase is Phase.WAITING
-    until_it_plays(session, evaluated, FRAME)
+    wait_until_playing(session, evaluated, FRAME)
     previews.rest(evaluated(), keep_playing=True)
     session.rest(evaluated())
     assert knows_contacts(session, contacts)
@@ -361,7 +361,7 @@ def test_play_does_not_wait_for_ever_for_a_body_that_moves(hair, evaluated, in_w
         previews.advance(evaluated(), FRAME)
         return session.is_playing
 
-    until(moves_on)
+    wait_until(moves_on)
     begun, alone = session.solver.motion, motion_flow.begin(session.rig, session.solver.pose)
     expected = motion_flow.with_clearance(
         session.rig, alone, session.posed, session.settings[DynamicsSettings]
@@ -373,7 +373,7 @@ def test_a_frame_of_blenders_playback_is_not_put_off_for_contacts(hair, evaluate
     session = previews.start(hair, evaluated())
     arrive(session)
     session.make_fields(evaluated())
-    until(fields.are_made)
+    wait_until(fields.are_made)
     session.play(evaluated(), blocking=False, is_frame=True)
     assert session.is_playing and session.solver.motion.clearance is not None
 
@@ -459,11 +459,11 @@ def test_edits_while_hair_is_made_arrive_too(playing, hair, evaluated, monkeypat
 
 def test_ambient_light_needs_no_other_strands(playing, hair, evaluated, monkeypatch):
     monkeypatch.setattr(rig_flow, "prepare", None)
-    rig, motion, before = playing.rig, grid_of(playing), playing.snapshot.occlusion
+    rig, motion, before = playing.rig, strand_grid(playing), playing.snapshot.occlusion
     hair.data.hairloom.ambient.strength = 0.2
     scene_events.catch_up(evaluated())
     arrive(playing)
-    assert playing.rig is rig and np.array_equal(grid_of(playing), motion)
+    assert playing.rig is rig and np.array_equal(strand_grid(playing), motion)
     assert playing.snapshot.occlusion.mean() > before.mean()
 
 
@@ -562,7 +562,7 @@ def rounds(session, *frames):
     found = []
     for frame in frames:
         bpy.context.scene.frame_set(frame)
-        found.append(grid_of(session))
+        found.append(strand_grid(session))
     return np.array(found)
 
 
@@ -610,7 +610,7 @@ def test_playback_goes_on_before_a_collider_is_made(hair, moving, evaluated, mon
     rounds(session, 1, 2, 3)
     assert session.is_made and not session.is_playing and previews.previews[session.uid].is_deferred
     opened.set()
-    until(fields.are_made)
+    wait_until(fields.are_made)
     rounds(session, 4)
     assert session.is_playing and not previews.previews[session.uid].is_deferred
 
@@ -689,7 +689,7 @@ def test_hair_that_is_made_while_another_scene_is_shown_arrives_with_its_own(
     monkeypatch.setattr(previews, "refresh_views", lambda: refreshed.append(True))
     window.scene = bpy.data.scenes.new("Elsewhere")
     evaluated()
-    until(lambda: session.has_arrived)
+    wait_until(lambda: session.has_arrived)
     for _ in range(3):
         latest_job.take_steps()
     assert not refreshed and not session.is_made, "the other scene is left alone"

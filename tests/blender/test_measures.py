@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 import pytest
-from grids import grid_of
+from grids import strand_grid
 
 from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.sessions import measures
@@ -72,7 +72,7 @@ def test_figures_are_those_of_the_frame_that_is_shown(new_hair, sphere, evaluate
     previews.advance(evaluated(), 1.0 / 24.0)
     assert session.figures is None
     session.measure()
-    found, points = session.figures, grid_of(session)
+    found, points = session.figures, strand_grid(session)
     assert session.are_figures_current
     length = np.linalg.norm(np.diff(points, axis=1), axis=2).sum(axis=1)
     assert found.strands_stretch_max_percent == pytest.approx(

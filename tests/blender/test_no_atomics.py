@@ -13,7 +13,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
 
-from engine_stage import SIZE, picture  # noqa: E402
+from engine_stage import SIZE, render_picture  # noqa: E402
 
 from hairloom.addon.blender.preview import previews  # noqa: E402
 from hairloom.addon.blender.setup import self_test  # noqa: E402
@@ -51,7 +51,7 @@ def test_a_render_is_calm_without_atomics(
     for samples, choice in ((16, "automatic"), (1, "never"), (16, "never")):
         picture_settings.samples = samples
         capabilities.choose_image_atomics(choice)
-        pictures[samples, choice] = picture(tmp_path)
+        pictures[samples, choice] = render_picture(tmp_path)
     wanted = pictures[16, "automatic"]
     np.testing.assert_array_equal(pictures[1, "never"], pictures[16, "never"])
     off = np.abs(pictures[1, "never"] - wanted)[..., :3]
@@ -67,14 +67,14 @@ def test_a_render_shares_what_was_drawn_elsewhere(
     hair = new_hair(sphere)
     hair.data.hairloom.strands.transparency = "hashed"
     hair.data.hairloom.strands.fullness = 20.0
-    before = picture(tmp_path)
+    before = render_picture(tmp_path)
     HASHED_STRANDS.release()
     camera = Camera(look_at((0.4, -0.5, 0.3), (0.0, 0.0, 0.0)), perspective(0.4, 1.0, 0.05, 5.0))
     points = np.linspace((0.0, 0.0, -0.1), (0.0, 0.0, 0.1), 4, dtype=np.float32)[None]
     settings = StrandSettings(transparency="hashed")
     one = Snapshot(points, np.full((1, 4), 0.01, np.float32), strand_settings=settings)
     assert render_image(one, camera, SIZE, SIZE, 1)[..., 3].any()
-    np.testing.assert_array_equal(picture(tmp_path), before)
+    np.testing.assert_array_equal(render_picture(tmp_path), before)
 
 
 def test_stills_take_more_samples_without_atomics() -> None:

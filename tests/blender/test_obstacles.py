@@ -5,7 +5,7 @@ import math
 import bpy
 import numpy as np
 import pytest
-from collider_scene import COARSE, Scene, depsgraph, distance_now, moved
+from collider_scene import COARSE_SETTINGS, ColliderScene, depsgraph, distance_now, move_obstacles
 from mathutils import Matrix, Vector
 
 from hairloom.addon.blender.base.objects import Body
@@ -24,7 +24,7 @@ from hairloom.addon.strands import Surface
 
 @pytest.fixture
 def scene(extension):
-    return Scene()
+    return ColliderScene()
 
 
 def rig(mesh, name="Rig"):
@@ -55,7 +55,7 @@ TURN = Matrix.Translation((0.1, -0.2, 0.3)) @ Matrix.Rotation(0.7, 4, (1, 2, 3))
 
 def test_nothing_to_collide_with(scene):
     scene.owner.hairloom.collider_collection = None
-    assert moved(scene.obstacles()) == ()
+    assert move_obstacles(scene.obstacles()) == ()
     assert scene.obstacles().warnings == ()
 
 
@@ -66,10 +66,10 @@ def test_each_object_collides_as_its_kind(scene):
     scene.cube(shape="capsule", name="C")
     scene.cube(shape="none", name="D")
     found = scene.obstacles()
-    kinds = sorted(type(posed.collider).__name__ for posed in moved(found))
+    kinds = sorted(type(posed.collider).__name__ for posed in move_obstacles(found))
     assert kinds == ["CapsuleCollider", "DistanceField", "SphereSetCollider"]
     assert found.warnings == ()
-    (balls,) = [p for p in moved(found) if isinstance(p.collider, SphereSetCollider)]
+    (balls,) = [p for p in move_obstacles(found) if isinstance(p.collider, SphereSetCollider)]
     assert len(balls.collider.radii) == 2
 
 
@@ -81,14 +81,14 @@ def test_an_empty_that_is_no_sphere_a_lamp_and_the_owner_are_left_alone(scene):
         scene.add(obj)
     scene.add(scene.owner)
     found = scene.obstacles()
-    assert moved(found) == () and len(found.warnings) == 1
+    assert move_obstacles(found) == () and len(found.warnings) == 1
     assert "nothing in the collection" in found.warnings[0]
 
 
 def test_a_ball_is_as_large_as_blender_shows_it(scene):
     ball = scene.ball(0.1, (1, 0, 0))
     ball.scale = (2, 2, 2)
-    (posed,) = moved(scene.obstacles())
+    (posed,) = move_obstacles(scene.obstacles())
     assert distance_now(posed, (1.0, 0.0, 0.5)) == pytest.approx(0.3, abs=1e-6)
 
 
@@ -96,13 +96,13 @@ def test_a_mesh_as_sphere_holds_its_longest_side(scene):
     cube = scene.cube(0.2, "sphere", place=(0, 0, 1))
     for vertex in cube.data.vertices:
         vertex.co.x *= 2.0
-    (posed,) = moved(scene.obstacles())
+    (posed,) = move_obstacles(scene.obstacles())
     assert distance_now(posed, (0.0, 0.0, 1.5)) == pytest.approx(0.3, abs=1e-6)
 
 
 def test_a_stretched_ball_is_an_ellipsoid(scene):
     scene.ball(0.1).scale = (3, 1, 1)
-    (posed,) = moved(scene.obstacles())
+    (posed,) = move_obstacles(scene.obstacles())
     assert isinstance(posed.collider, SphereCollider)
     assert distance_now(posed, (0.4, 0, 0)) == pytest.approx(0.1, abs=1e-6)
     assert distance_now(posed, (0, 0.4, 0)) == pytest.approx(0.3, abs=1e-6)
@@ -113,7 +113,7 @@ def test_a_capsule_lies_along_the_longest_side_with_round_ends(scene):
     cube = scene.cube(0.2, "capsule")
     cube.scale = (1, 4, 1)
     cube.rotation_euler.z = math.pi / 2  # its y axis becomes the world's x axis
-    (posed,) = moved(scene.obstacles())
+    (posed,) = move_obstacles(scene.obstacles())
     assert isinstance(posed.collider, CapsuleCollider)
     assert distance_now(posed, (0.5, 0, 0)) == pytest.approx(0.1, abs=1e-6)
     assert distance_now(posed, (0.2, 0, 0.25)) == pytest.approx(0.15, abs=1e-6)
@@ -124,7 +124,7 @@ def test_a_capsule_lies_along_the_longest_side_with_round_ends(scene):
 def test_an_empty_as_capsule_stands_along_z(scene):
     empty = scene.ball(0.2)
     empty.hairloom.collider_shape = "capsule"
-    (posed,) = moved(scene.obstacles())
+    (posed,) = move_obstacles(scene.obstacles())
     assert distance_now(posed, (0, 0, 0.3)) == pytest.approx(0.1, abs=1e-6)
     assert distance_now(posed, (0.3, 0, 0)) == pytest.approx(0.2, abs=1e-6)
 
@@ -133,7 +133,7 @@ def test_an_empty_as_capsule_stands_along_z(scene):
 def test_a_mesh_that_is_mirrored_or_scaled(scene, scale):
     cube = scene.cube(0.2, place=(1, 0, 0))
     cube.scale, cube.rotation_euler.z = scale, 0.4
-    (posed,) = moved(scene.obstacles())
+    (posed,) = move_obstacles(scene.obstacles())
     assert isinstance(posed.collider, DistanceField)
     half = 0.1 * abs(scale[2])
     assert distance_now(posed, (1, 0, half + 0.02)) == pytest.approx(0.02, abs=2e-3)
@@ -146,11 +146,11 @@ def test_a_mesh_that_is_mirrored_or_scaled(scene, scale):
 def test_things_go_the_way_from_frame_to_frame_with_a_bow(scene):
     ball, cube = scene.ball(), scene.cube()
     found = scene.obstacles()
-    for posed in moved(found):
+    for posed in move_obstacles(found):
         np.testing.assert_allclose(posed.matrix_before, posed.matrix_now)
     for place in (0.1, 0.3, 0.6):  # it accelerates
         ball.location.x = cube.location.x = place
-        last = moved(found)
+        last = move_obstacles(found)
     assert len(last) == 2
     for posed in last:
         went = posed.matrix_now[0, 3] - posed.matrix_before[0, 3]
@@ -165,10 +165,10 @@ def test_after_rest_there_is_no_speed_and_no_bow(scene):
     ball = scene.ball()
     found = scene.obstacles()
     ball.location.x = 0.5
-    moved(found)
+    move_obstacles(found)
     ball.location.x = 2.0
     found.rest(depsgraph())
-    (posed,) = moved(found)
+    (posed,) = move_obstacles(found)
     assert posed.matrix_before[0, 3] == posed.matrix_now[0, 3] == pytest.approx(2.0, abs=1e-6)
     assert posed.matrix_earlier is None
 
@@ -178,12 +178,12 @@ def test_balls_that_move_apart_become_another_set(scene):
     other = scene.ball(0.2, (0.5, 0, 0), name="B")
     other.parent = None
     found = scene.obstacles()
-    (before,) = moved(found)
-    (still,) = moved(found)
+    (before,) = move_obstacles(found)
+    (still,) = move_obstacles(found)
     assert still.collider is before.collider, "its grid is made once"
     other.location.x = 0.9
     parent.scale = (2, 2, 2)
-    (posed,) = moved(found)
+    (posed,) = move_obstacles(found)
     assert distance_now(posed, (1.2, 0, 0)) == pytest.approx(0.1, abs=1e-5)
     assert distance_now(posed, (-0.3, 0, 0)) == pytest.approx(0.1, abs=1e-5)
 
@@ -194,9 +194,9 @@ def test_balls_that_go_together_stay_one_set(scene):
     for number in range(5):
         scene.ball(0.05, (0.1 * number, 0, 0), name=f"B{number}").parent = parent
     found = scene.obstacles()
-    (before,) = moved(found)
+    (before,) = move_obstacles(found)
     parent.matrix_world = TURN @ Matrix.Scale(2.0, 4)
-    (posed,) = moved(found)
+    (posed,) = move_obstacles(found)
     assert posed.collider is before.collider
     place = TURN @ Vector((0.8, 0, 0))
     outward = TURN.to_3x3() @ Vector((1, 0, 0))
@@ -207,7 +207,7 @@ def test_one_ball_that_turns_turns_its_collider(scene):
     ball = scene.ball()
     found = scene.obstacles()
     ball.rotation_euler.z = 0.5
-    (posed,) = moved(found)
+    (posed,) = move_obstacles(found)
     np.testing.assert_allclose(posed.matrix_now[:2, 0], [math.cos(0.5), math.sin(0.5)], atol=1e-6)
 
 
@@ -221,7 +221,7 @@ def test_a_mesh_that_an_armature_turns_is_followed(scene, subdivided):
         head.modifiers.new("Subdivision", "SUBSURF").levels = 1
     found = scene.obstacles()
     pose(TURN)
-    (posed,) = moved(found)
+    (posed,) = move_obstacles(found)
     np.testing.assert_allclose(posed.matrix_now, TURN, atol=1e-4)
     (warning,) = found.warnings
     assert "only one face" in warning, "the monkey's eyes are loose parts without backs"
@@ -234,7 +234,7 @@ def test_a_mesh_that_an_armature_turns_and_its_object_carries(scene):
     pose(Matrix.Rotation(0.5, 4, "Z"))
     bpy.data.objects["Rig"].matrix_world = TURN
     cube.parent = bpy.data.objects["Rig"]
-    (posed,) = moved(found)
+    (posed,) = move_obstacles(found)
     np.testing.assert_allclose(posed.matrix_now, TURN @ Matrix.Rotation(0.5, 4, "Z"), atol=1e-5)
 
 
@@ -266,7 +266,7 @@ def test_the_head_is_followed_at_its_roots_where_the_body_bends(scene):
         pose(Matrix.Identity(4))
         found = Obstacles.of(scene.owner, head, at_rest, fine, depsgraph(), None, chosen)
         pose(turn)
-        (posed,) = moved(found)
+        (posed,) = move_obstacles(found)
         assert found.warnings == ()
         assert posed.collider is not found.parts[0].distance
         now = read_surface(body, depsgraph(), need_uv=False, place="Body").positions
@@ -294,7 +294,7 @@ def test_a_look_at_colliders_between_two_frames_changes_no_motion(scene):
     for angle in (0.2, 0.4, 0.4):
         pose(Matrix.Rotation(angle, 4, "X"))
         found[0].standing(depsgraph())
-        (looked,), (alone,) = map(moved, found)
+        (looked,), (alone,) = map(move_obstacles, found)
         np.testing.assert_array_equal(looked.matrix_now, alone.matrix_now)
         assert looked.swelling == alone.swelling
         swellings.append(alone.swelling)
@@ -311,34 +311,34 @@ def test_a_head_that_is_bent_as_before_has_the_same_field(scene):
     scene.owner.hairloom.collider_collection = None
 
     def of(known):
-        return Obstacles.of(scene.owner, head, at_rest, COARSE, depsgraph(), known)
+        return Obstacles.of(scene.owner, head, at_rest, COARSE_SETTINGS, depsgraph(), known)
 
     straight = of(None)
     pose(Matrix.Rotation(0.3, 4, "X"))
-    (bent,) = moved(straight)
+    (bent,) = move_obstacles(straight)
     again = of(straight)
-    assert moved(again)[0].collider is bent.collider
+    assert move_obstacles(again)[0].collider is bent.collider
     assert bent.collider is not again.parts[0].distance
     pose(Matrix.Rotation(0.4, 4, "X"))
-    assert moved(of(again))[0].collider is not bent.collider
+    assert move_obstacles(of(again))[0].collider is not bent.collider
 
 
 def test_fields_are_made_once_and_again_when_the_mesh_or_resolution_differs(scene):
     cube = scene.cube()
     pose = rig(cube)
     found = scene.obstacles()
-    first = moved(found)[0].collider
+    first = move_obstacles(found)[0].collider
     pose(TURN)
     cube.location.y = 2.0
     again = scene.obstacles(found)
-    assert moved(again)[0].collider is first
+    assert move_obstacles(again)[0].collider is first
     cube.data.vertices[0].co.x += 0.1
     other = scene.obstacles(again)
-    assert moved(other)[0].collider is not first
+    assert move_obstacles(other)[0].collider is not first
     finer = Obstacles.of(
         scene.owner, None, None, DynamicsSettings(collider_resolution=20), depsgraph(), other
     )
-    assert moved(finer)[0].collider is not moved(other)[0].collider
+    assert move_obstacles(finer)[0].collider is not move_obstacles(other)[0].collider
 
 
 def test_a_mesh_of_other_vertices_is_made_anew_when_play_begins_again(scene):
@@ -346,7 +346,7 @@ def test_a_mesh_of_other_vertices_is_made_anew_when_play_begins_again(scene):
     found = scene.obstacles()
     cube.modifiers.new("Subdivision", "SUBSURF").levels = 2
     again = scene.obstacles(found)
-    (posed,) = moved(again)
+    (posed,) = move_obstacles(again)
     assert again.warnings == ()
     assert posed.collider is not found.parts[0].distance
 
@@ -357,9 +357,9 @@ def test_one_root_or_none_is_enough_to_follow_a_head(scene, sphere):
     head = Body.at_rest(sphere, depsgraph())
     alone = Surface(at_rest.positions, at_rest.triangles[:0])
     for surface, roots in ((at_rest, np.array([5])), (at_rest, np.zeros(0, int))):
-        found = Obstacles.of(scene.owner, head, surface, COARSE, depsgraph(), None, roots)
+        found = Obstacles.of(scene.owner, head, surface, COARSE_SETTINGS, depsgraph(), None, roots)
         pose(TURN)
-        np.testing.assert_allclose(moved(found)[0].matrix_now, TURN, atol=1e-5)
+        np.testing.assert_allclose(move_obstacles(found)[0].matrix_now, TURN, atol=1e-5)
         pose(Matrix.Identity(4))
-    found = Obstacles.of(scene.owner, head, alone, COARSE, depsgraph(), None)
-    assert moved(found) == () and "no faces" in found.warnings[0]
+    found = Obstacles.of(scene.owner, head, alone, COARSE_SETTINGS, depsgraph(), None)
+    assert move_obstacles(found) == () and "no faces" in found.warnings[0]

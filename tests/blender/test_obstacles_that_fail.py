@@ -5,7 +5,7 @@ import math
 import bpy
 import numpy as np
 import pytest
-from collider_scene import COARSE, Scene, depsgraph, distance_now, moved
+from collider_scene import COARSE_SETTINGS, ColliderScene, depsgraph, distance_now, move_obstacles
 
 from hairloom.addon.blender.base.objects import Body
 from hairloom.addon.blender.colliders.obstacles import Obstacles, sources_of
@@ -15,7 +15,7 @@ from hairloom.addon.errors import HairloomError
 
 @pytest.fixture
 def scene(extension):
-    return Scene()
+    return ColliderScene()
 
 
 def plane(scene):
@@ -57,7 +57,7 @@ def test_what_cannot_be_used_is_told_by_name_and_the_others_go_on(scene, make):
     bad = make(scene)
     scene.ball()
     found = scene.obstacles()
-    assert len(moved(found)) == 1
+    assert len(move_obstacles(found)) == 1
     (warning,) = found.warnings
     assert warning.startswith(bad.name + ":") and warning.count(".") >= 2
 
@@ -80,7 +80,7 @@ def test_a_mesh_that_is_not_closed_collides_and_is_told(scene):
         cube.data = bpy.data.meshes.new("Wrong")
         cube.data.from_pydata(corners, [], wrong)
         found = scene.obstacles()
-        assert len(moved(found)) == 1
+        assert len(move_obstacles(found)) == 1
         (warning,) = [text for text in found.warnings if words in text]
         assert warning.startswith("Cube: ")
 
@@ -92,14 +92,14 @@ def test_excluded_from_the_view_layer(scene):
     scene.colliders.objects.unlink(cube)
     away.objects.link(cube)
     found = scene.obstacles()
-    assert len(moved(found)) == 1 and found.warnings == ()
+    assert len(move_obstacles(found)) == 1 and found.warnings == ()
     layer = bpy.context.view_layer.layer_collection.children["Colliders"]
     layer.children["Away"].exclude = True
-    assert moved(found) == ()
+    assert move_obstacles(found) == ()
     assert "Away" in found.warnings[0]
     layer.children["Away"].exclude = False
     cube.location.x = 3.0
-    (posed,) = moved(found)
+    (posed,) = move_obstacles(found)
     assert found.warnings == ()
     np.testing.assert_allclose(posed.matrix_before, posed.matrix_now)  # it returns without a jump
 
@@ -108,58 +108,58 @@ def test_hidden_with_the_eye_it_still_collides(scene):
     ball = scene.ball()
     ball.hide_set(True)
     found = scene.obstacles()
-    assert len(moved(found)) == 1 and found.warnings == ()
+    assert len(move_obstacles(found)) == 1 and found.warnings == ()
     ball.location.x = 1.0
-    assert moved(found)[0].matrix_now[0, 3] == pytest.approx(1.0, abs=1e-6)
+    assert move_obstacles(found)[0].matrix_now[0, 3] == pytest.approx(1.0, abs=1e-6)
 
 
 def test_deleted_in_mid_play(scene):
     cube, ball, other = scene.cube(), scene.ball(name="A"), scene.ball(0.1, (1, 0, 0), "B")
     found = scene.obstacles()
-    assert len(moved(found)) == 2
+    assert len(move_obstacles(found)) == 2
     bpy.data.objects.remove(cube)
     bpy.data.objects.remove(ball)
-    (posed,) = moved(found)
+    (posed,) = move_obstacles(found)
     assert len(posed.collider.radii) == 1
     assert distance_now(posed, (1.3, 0, 0)) == pytest.approx(0.2, abs=1e-6)
     assert ["Cube" in text or "A:" in text for text in found.warnings] == [True, True]
     bpy.data.objects.remove(other)
-    assert moved(found) == ()
+    assert move_obstacles(found) == ()
 
 
 def test_scaled_to_nothing_and_back_in_mid_play(scene):
     cube, ball, stretched = scene.cube(), scene.ball(), scene.ball(name="Stretched")
     stretched.scale = (1, 1, 2)
     found = scene.obstacles()
-    assert len(moved(found)) == 3
+    assert len(move_obstacles(found)) == 3
     for obj in (cube, ball, stretched):
         obj.scale = (0, 0, 0)
-    assert moved(found) == ()
+    assert move_obstacles(found) == ()
     assert len(found.warnings) >= 3
     for obj in (cube, ball, stretched):
         obj.scale = (1, 1, 1)
-    assert len(moved(found)) == 3 and found.warnings == ()
+    assert len(move_obstacles(found)) == 3 and found.warnings == ()
 
 
 def test_another_mesh_in_mid_play(scene):
     cube = scene.cube()
     found = scene.obstacles()
     cube.modifiers.new("Subdivision", "SUBSURF").levels = 2
-    assert moved(found) == ()
+    assert move_obstacles(found) == ()
     assert "vertices" in found.warnings[0]
     cube.modifiers.clear()
-    assert len(moved(found)) == 1 and found.warnings == ()
+    assert len(move_obstacles(found)) == 1 and found.warnings == ()
 
 
 def test_the_head_that_is_gone_is_an_error(scene, sphere):
     head = Body.at_rest(sphere, depsgraph())
     at_rest = read_surface(sphere, depsgraph(), need_uv=False, place="Head")
     scene.ball()
-    found = Obstacles.of(scene.owner, head, at_rest, COARSE, depsgraph(), None)
-    assert len(moved(found)) == 2
+    found = Obstacles.of(scene.owner, head, at_rest, COARSE_SETTINGS, depsgraph(), None)
+    assert len(move_obstacles(found)) == 2
     bpy.data.objects.remove(sphere)
     with pytest.raises(HairloomError, match="gone"):
-        moved(found)
+        move_obstacles(found)
 
 
 def test_a_head_without_volume_is_told_and_the_others_go_on(scene):
@@ -168,8 +168,8 @@ def test_a_head_without_volume_is_told_and_the_others_go_on(scene):
     at_rest = read_surface(cap, depsgraph(), need_uv=False, place="Cap")
     scene.ball()
     head = Body.at_rest(cap, depsgraph())
-    found = Obstacles.of(scene.owner, head, at_rest, COARSE, depsgraph(), None)
-    assert len(moved(found)) == 1
+    found = Obstacles.of(scene.owner, head, at_rest, COARSE_SETTINGS, depsgraph(), None)
+    assert len(move_obstacles(found)) == 1
     assert "Grid" in found.warnings[0]
 
 
@@ -179,12 +179,15 @@ def test_a_chosen_collider_stands_in_for_the_head(scene, sphere):
     scene.owner.hairloom.collider_collection = None
     bpy.ops.mesh.primitive_cube_add(size=0.1, location=(0, 0, 1))
     scene.owner.hairloom.collider = bpy.context.object
-    found = Obstacles.of(scene.owner, head, at_rest, COARSE, depsgraph(), None)
-    (posed,) = moved(found)
+    found = Obstacles.of(scene.owner, head, at_rest, COARSE_SETTINGS, depsgraph(), None)
+    (posed,) = move_obstacles(found)
     assert distance_now(posed, (0, 0, 1.1)) == pytest.approx(0.05, abs=2e-3)
     sphere.hairloom.collider_shape = "none"
     scene.owner.hairloom.collider = None
-    assert moved(Obstacles.of(scene.owner, head, at_rest, COARSE, depsgraph(), None)) == ()
+    assert (
+        move_obstacles(Obstacles.of(scene.owner, head, at_rest, COARSE_SETTINGS, depsgraph(), None))
+        == ()
+    )
 
 
 def test_a_collection_in_which_nothing_collides_is_named(scene):
@@ -214,7 +217,7 @@ def test_two_grooms_have_their_own_colliders(scene):
     names = [{obj.name for obj in sources_of(owner, None)} for owner in (scene.owner, other)]
     assert names == [{"Own", "Both"}, {"Both"}]
     assert len(scene.obstacles().parts) == 2
-    assert len(Obstacles.of(other, None, None, COARSE, depsgraph(), None).parts) == 1
+    assert len(Obstacles.of(other, None, None, COARSE_SETTINGS, depsgraph(), None).parts) == 1
 
 
 def test_a_mesh_that_bends_scaled_to_nothing_and_back(scene):
@@ -222,10 +225,10 @@ def test_a_mesh_that_bends_scaled_to_nothing_and_back(scene):
     cube.shape_key_add(name="Basis")
     cube.shape_key_add(name="Wide").data[0].co *= 1.2
     found = scene.obstacles()
-    assert len(moved(found)) == 2
+    assert len(move_obstacles(found)) == 2
     cube.scale = (0, 0, 0)
-    assert len(moved(found)) == 1
+    assert len(move_obstacles(found)) == 1
     assert [text for text in found.warnings if "Cube: its scale is zero" in text]
     cube.scale = (1, 1, 1)
-    assert len(moved(found)) == 2 and found.warnings == ()
+    assert len(move_obstacles(found)) == 2 and found.warnings == ()
     assert ball.name == "Ball"

@@ -5,8 +5,8 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from grids import baked_grid, grid_of
-from swinging import FRAME, swings
+from grids import baked_grid, strand_grid
+from swinging import FRAME_S, tips_lag
 from tiers import few_in_commits
 
 from hairloom.addon.blender.bakes import playback
@@ -58,7 +58,7 @@ def plays(hair):
     """Whether previewed hair lags behind a head that moves."""
     session = previews.start(hair, bpy.context.evaluated_depsgraph_get())
     assert previews.play(bpy.context.evaluated_depsgraph_get()) == []
-    return swings(session)
+    return tips_lag(session)
 
 
 @pytest.mark.slow
@@ -75,8 +75,8 @@ def test_a_linked_groom_is_shown_as_it_is_there(library):
     assert settings(hair) == (2.0, 0.5) and hair.library is not None
     session = previews.start(hair, bpy.context.evaluated_depsgraph_get())
     assert previews.play(bpy.context.evaluated_depsgraph_get()) == []
-    previews.advance(bpy.context.evaluated_depsgraph_get(), FRAME)
-    assert np.isfinite(grid_of(session)).all() and previews.notice() == ""
+    previews.advance(bpy.context.evaluated_depsgraph_get(), FRAME_S)
+    assert np.isfinite(strand_grid(session)).all() and previews.notice() == ""
 
 
 def test_an_override_has_settings_of_its_own_which_last(override, tmp_path):
@@ -324,7 +324,7 @@ def test_an_animated_wind_blows_hair_in_playback_and_in_a_bake(
     hair.hairloom.dynamics.collider_resolution = 16
     session = previews.start(hair, evaluated())
     frames(scene, 6)
-    still = grid_of(session)
+    still = strand_grid(session)
     path = "hairloom.dynamics.wind_speed"
     if way == "keyframe":
         keyed(hair, path, {1: 0.0, 3: 40.0})
@@ -336,7 +336,7 @@ def test_an_animated_wind_blows_hair_in_playback_and_in_a_bake(
             source.keyframe_insert("location", frame=frame)
         driven(hair, path, source)
     frames(scene, 6)
-    blown = grid_of(session)
+    blown = strand_grid(session)
     assert (blown - still)[:, -1, 0].mean() > 0.005
     list(Bake.of([hair], scene).steps())
     baked = baked_grid(playback.cache_of(hair), 6)
@@ -368,12 +368,12 @@ def held_strands(hair, head):
     assert previews.play(bpy.context.evaluated_depsgraph_get()) == []
     rig = session.rig
     at = (rig.holds.strand, np.round(rig.holds.place).astype(int))
-    before = grid_of(session)[at]
+    before = strand_grid(session)[at]
     for _ in range(4):
         head.location.x += 0.02
-        previews.advance(bpy.context.evaluated_depsgraph_get(), FRAME)
+        previews.advance(bpy.context.evaluated_depsgraph_get(), FRAME_S)
     np.testing.assert_allclose(
-        grid_of(session)[at] - before, [[0.08, 0, 0]] * len(before), atol=4e-3
+        strand_grid(session)[at] - before, [[0.08, 0, 0]] * len(before), atol=4e-3
     )
     assert session.warnings == ()
     count = len(rig.holds.strand)

@@ -14,7 +14,7 @@ from tiers import few_in_commits
 bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
 
 import OpenImageIO  # noqa: E402
-from engine_stage import SIZE, passes_in, rendered, set_world  # noqa: E402
+from engine_stage import SIZE, read_passes, render_passes, set_world  # noqa: E402
 
 from hairloom.addon.blender.engine import hair_scene  # noqa: E402
 from hairloom.addon.render.cryptomatte import matte_id  # noqa: E402
@@ -55,7 +55,7 @@ def of_cycles(stage: Any, folder: Path) -> dict[str, np.ndarray]:
     stage.cycles.samples, stage.cycles.use_denoising, stage.cycles.max_bounces = 1, False, 0
     stage.cycles.use_adaptive_sampling, stage.cycles.pixel_filter_type = False, "BOX"
     stage.cycles.filter_width = 0.01
-    found = rendered(folder)
+    found = render_passes(folder)
     stage.render.engine = "HAIRLOOM"
     return found
 
@@ -109,7 +109,7 @@ def test_depth_motion_and_normals_are_those_of_cycles(
         sphere.keyframe_insert("location", frame=frame)
         stage.camera.keyframe_insert("rotation_euler", frame=frame)
     stage.frame_set(2)
-    ours, theirs = rendered(tmp_path), of_cycles(stage, tmp_path)
+    ours, theirs = render_passes(tmp_path), of_cycles(stage, tmp_path)
     numbers = [pass_of(found, "Object Index") for found in (ours, theirs)]
     assert {0.0, 3.0, 7.0} == set(np.unique(numbers[0])) == set(np.unique(numbers[1]))
     assert (numbers[0] == numbers[1]).mean() > 0.98
@@ -146,7 +146,7 @@ def test_blenders_cryptomatte_node_selects_what_hair_covers(
     hair = new_hair(sphere)
     hair.data.hairloom.strands.fullness = 8.0
     asks_for(stage.view_layers[0], "use_pass_cryptomatte_object", *OWN)
-    found = rendered(tmp_path)
+    found = render_passes(tmp_path)
     alpha = pass_of(found, "Hair Alpha")
     assert 0.02 < (alpha > 0.0).mean() < 0.6 and alpha.max() < 0.999
     said = noted(tmp_path / "picture.exr")
@@ -158,10 +158,10 @@ def test_blenders_cryptomatte_node_selects_what_hair_covers(
     inside = head + matte > 0.999
     assert inside.mean() > 0.03 and (head[inside] < 0.999).any()
     stage.render.film_transparent, stage.compositing_node_group = True, None
-    whole = pass_of(rendered(tmp_path), "Combined")[..., 3]
+    whole = pass_of(render_passes(tmp_path), "Combined")[..., 3]
     np.testing.assert_allclose(head + matte, whole, atol=1e-5)
     stage.view_layers[0].use_pass_cryptomatte_object = False
-    np.testing.assert_array_equal(pass_of(rendered(tmp_path), "Hair Alpha"), alpha)
+    np.testing.assert_array_equal(pass_of(render_passes(tmp_path), "Hair Alpha"), alpha)
     assert not noted(tmp_path / "picture.exr")
 
 
@@ -176,7 +176,7 @@ def test_names_and_coverages_are_those_of_cycles(
     stage.cycles.samples, stage.cycles.use_denoising, stage.cycles.max_bounces = 32, False, 0
     for engine, found in mattes.items():
         stage.render.engine, stage.compositing_node_group = engine, None
-        rendered(tmp_path)
+        render_passes(tmp_path)
         said = noted(tmp_path / "picture.exr")
         (place,) = {key.split("/")[1] for key in said}
         manifests[engine] = (place, json.loads(said[f"cryptomatte/{place}/manifest"]))
@@ -196,7 +196,7 @@ def test_over_cycles_passes_are_of_hair_alone_and_follow_the_view_layer(
 ) -> None:
     asks_for(stage.view_layers[0], *BLENDERS, *OWN)
     thick.pass_index, sphere.pass_index = 7, 3
-    own = rendered(tmp_path)
+    own = render_passes(tmp_path)
     stage.render.engine, stage.cycles.samples = "CYCLES", 1
     stage.hairloom.use_hair_scene = True
     hair = hair_scene.hair_scene_of(stage)
@@ -235,7 +235,7 @@ def layers_of(stage: Any, scene: Any, folder: Path) -> dict[str, np.ndarray]:
             tree.links.new(socket, out.inputs[socket.name])
     bpy.ops.render.render()
     (path,) = folder.glob("layers*.exr")
-    return {name.rpartition(".")[2]: np.squeeze(each) for name, each in passes_in(path).items()}
+    return {name.rpartition(".")[2]: np.squeeze(each) for name, each in read_passes(path).items()}
 
 
 def test_without_passes_nothing_is_drawn_for_them(
@@ -243,10 +243,10 @@ def test_without_passes_nothing_is_drawn_for_them(
 ) -> None:
     new_hair(sphere)
     stage.view_layers[0].use_pass_z = False
-    plain = rendered(tmp_path)
+    plain = render_passes(tmp_path)
     assert set(plain) == {"ViewLayer.Combined"}
     asks_for(stage.view_layers[0], *BLENDERS, *OWN)
-    found = rendered(tmp_path)
+    found = render_passes(tmp_path)
     assert len(found) == 1 + 4 + 3 + 4
     np.testing.assert_array_equal(found["ViewLayer.Combined"], plain["ViewLayer.Combined"])
     for name in ("nearest", "tangents", "coverages", "on_meshes"):
@@ -255,7 +255,7 @@ def test_without_passes_nothing_is_drawn_for_them(
         setattr(stage.view_layers[0], name, False)
     for name in OWN:
         setattr(stage.view_layers[0].hairloom, name, False)
-    assert set(rendered(tmp_path)) == {"ViewLayer.Combined"}
+    assert set(render_passes(tmp_path)) == {"ViewLayer.Combined"}
 
 
 def test_a_region_two_grooms_and_two_layers(
@@ -269,7 +269,7 @@ def test_a_region_two_grooms_and_two_layers(
     second = stage.view_layers.new("Second")
     second.use_pass_z = False
     asks_for(second, "use_strand_index")
-    whole = rendered(tmp_path)
+    whole = render_passes(tmp_path)
     names = {name for name in whole if name.startswith("Second")}
     assert names == {"Second.Combined", "Second.Strand Index"}
     np.testing.assert_array_equal(whole["Second.Strand Index"], whole["ViewLayer.Strand Index"])
@@ -279,7 +279,7 @@ def test_a_region_two_grooms_and_two_layers(
     render.use_border = render.use_crop_to_border = True
     render.border_min_x, render.border_max_x = 0.25, 0.75
     render.border_min_y, render.border_max_y = 0.5, 1.0
-    part = rendered(tmp_path)
+    part = render_passes(tmp_path)
     for name in ("Object Index", "Strand Index", "CryptoObject00", "Depth"):
         cut = whole[f"ViewLayer.{name}"][SIZE // 2 :, SIZE // 4 : 3 * SIZE // 4]
         assert np.isclose(part[f"ViewLayer.{name}"], cut, atol=0.01).mean() > 0.99, name
@@ -290,13 +290,13 @@ def test_one_pixel_and_both_eyes(stage: Any, sphere: Any, thick: Any, tmp_path: 
     asks_for(stage.view_layers[0], *BLENDERS, *OWN)
     stage.render.resolution_x = stage.render.resolution_y = 4
     stage.render.resolution_percentage = 25
-    assert all(np.isfinite(each).all() for each in rendered(tmp_path).values())
+    assert all(np.isfinite(each).all() for each in render_passes(tmp_path).values())
     stage.render.resolution_x = stage.render.resolution_y = SIZE
     stage.render.resolution_percentage = 100
     stage.render.use_multiview = True
     stage.camera.data.stereo.interocular_distance = 0.1
-    rendered(tmp_path)
-    eyes = [passes_in(tmp_path / f"picture_{side}.exr") for side in "LR"]
+    render_passes(tmp_path)
+    eyes = [read_passes(tmp_path / f"picture_{side}.exr") for side in "LR"]
     for name in ("Strand Index", "Hair Alpha", "Depth"):
         one, other = (pass_of(found, name) for found in eyes)
         assert (one != other).any() and one.any()
@@ -310,9 +310,9 @@ def test_the_shadow_of_hair_is_what_it_takes_of_the_picture(
     bpy.ops.object.light_add(type="SUN", rotation=(0.5, 0.0, 0.0))
     asks_for(stage.view_layers[0], "use_pass_object_index", "use_shadow")
     thick.pass_index = 7
-    shaded = rendered(tmp_path)
+    shaded = render_passes(tmp_path)
     thick.data.hairloom.volume.shadows = "none"
-    bare = rendered(tmp_path)
+    bare = render_passes(tmp_path)
     factor = shaded["ViewLayer.Hair Shadow"]
     is_head = (pass_of(shaded, "Object Index") == 0.0) & (pass_of(bare, "Combined")[..., 0] > 0.05)
     taken = (factor < 0.97).any(axis=2) & is_head
@@ -352,7 +352,7 @@ def test_baked_hair_moves_as_its_copy_does(
     moves = np.concatenate([seen[0] - seen[1], seen[1] - seen[2]], axis=2)
     assert np.abs(moves).max() > 1.0 and moves.std(axis=(0, 1)).max() > 0.2
     stage.frame_set(2)
-    found = rendered(tmp_path)
+    found = render_passes(tmp_path)
     strand = pass_of(found, "Strand Index").astype(int) - 1
     vectors, own = pass_of(found, "Vector")[strand >= 0], moves[strand[strand >= 0]]
     assert len(vectors) > 200

@@ -7,7 +7,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from grids import baked_grid, grid_of
+from grids import baked_grid, strand_grid
 from tiers import few_in_commits
 
 from hairloom.addon.blender.bakes import playback
@@ -152,9 +152,9 @@ def test_a_render_changes_nothing_of_what_the_viewport_shows(scene, evaluated):
     hair = bpy.data.objects["Hair"]
     session = previews.start(hair, evaluated())
     scene.frame_set(4)
-    before = grid_of(session)
+    before = strand_grid(session)
     bpy.ops.render.render()
-    np.testing.assert_array_equal(grid_of(session), before)
+    np.testing.assert_array_equal(strand_grid(session), before)
     assert previews.sessions() == (session,) and scene.frame_current == 4
     assert not playback._known.is_rendering
 

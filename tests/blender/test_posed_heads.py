@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 import pytest
 from hedgehogs import hedgehog
-from node_modifiers import mode_of, with_modifier
+from node_modifiers import add_nodes_modifier, hair_dynamics_mode
 from selecting import select
 
 from hairloom.addon.blender.base.parts import at_once
@@ -106,7 +106,7 @@ def attached(hair):
     """Attach hair with Blender's own node, in a modifier as an artist adds it."""
     hair.data.surface.add_rest_position_attribute = True
     hair.data.surface_uv_map = hair.data.surface.data.uv_layers.active.name
-    with_modifier(hair, ("GeometryNodeDeformCurvesOnSurface", {}))
+    add_nodes_modifier(hair, ("GeometryNodeDeformCurvesOnSurface", {}))
     bpy.context.view_layer.update()
 
 
@@ -140,7 +140,7 @@ def test_muted_hair_dynamics_leave_hair_on_its_skin(hair, sphere):
     )
     empty.data.surface_uv_map = sphere.data.uv_layers.active.name
     (modifier,) = empty.modifiers
-    mode = mode_of(modifier)
+    mode = hair_dynamics_mode(modifier)
     assert not own_dynamics(empty), "as it is added it simulates nothing"
     mode.value = "Physics (Experimental)"
     empty.update_tag()

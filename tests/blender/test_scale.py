@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from grids import grid_of
+from grids import strand_grid
 from mathutils import Matrix
 from tiers import few_in_commits
 
@@ -57,7 +57,7 @@ def told(
         head.location.x += 0.02 * scale
         bpy.context.view_layer.update()
         previews.advance(evaluated(), 1.0 / 24.0)
-        frames.append(np.asarray(grid_of(session), np.float64) / scale)
+        frames.append(np.asarray(strand_grid(session), np.float64) / scale)
     check = ExportCheck.of([hair])
     warnings = {}
     for kind in STRAND_FORMATS:

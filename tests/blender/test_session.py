@@ -9,9 +9,9 @@ from types import SimpleNamespace
 import bpy
 import numpy as np
 import pytest
-from grids import grid_of
+from grids import strand_grid
 from mathutils import Matrix
-from swinging import play
+from swinging import play_frames
 
 from hairloom.addon.blender.base.objects import layer_key
 from hairloom.addon.blender.engine import engine_hair
@@ -28,29 +28,29 @@ def update():
 def test_the_preview_begins_with_the_hair_as_it_is(preview):
     hair, _, session = preview
     positions = np.array([point.position for point in hair.data.points])
-    assert grid_of(session).shape == (60, session.settings[GuideSettings].cv_count, 3)
+    assert strand_grid(session).shape == (60, session.settings[GuideSettings].cv_count, 3)
     # resampling keeps roots and tips in place
-    assert grid_of(session)[:, 0] == pytest.approx(positions[0::8], abs=1e-6)
-    assert grid_of(session)[:, -1] == pytest.approx(positions[7::8], abs=1e-6)
+    assert strand_grid(session)[:, 0] == pytest.approx(positions[0::8], abs=1e-6)
+    assert strand_grid(session)[:, -1] == pytest.approx(positions[7::8], abs=1e-6)
 
 
 def test_hair_follows_the_moved_and_turned_head_rigidly(preview):
     _, head, session = preview
-    before = grid_of(session)
+    before = strand_grid(session)
     matrix = Matrix.LocRotScale((0.5, -1.0, 2.0), Matrix.Rotation(1.2, 3, (1, 2, 3)), None)
     head.matrix_world = matrix
     update()
     linear, moved = np.array(matrix)[:3, :3], np.array(matrix)[:3, 3]
-    assert grid_of(session) == pytest.approx(before @ linear.T + moved, abs=2e-5)
+    assert strand_grid(session) == pytest.approx(before @ linear.T + moved, abs=2e-5)
 
 
 def test_hair_follows_a_deformed_head(preview):
     _, head, session = preview
-    before = grid_of(session)
+    before = strand_grid(session)
     swell = head.modifiers.new("Swell", "DISPLACE")
     swell.mid_level, swell.strength = 0.0, 0.01
     update()
-    outward = grid_of(session)[:, 0] - before[:, 0]
+    outward = strand_grid(session)[:, 0] - before[:, 0]
     length = np.linalg.norm(outward, axis=1)
     assert length == pytest.approx(np.full(60, 0.01), rel=0.1)
 
@@ -59,10 +59,10 @@ def test_without_a_surface_hair_follows_its_own_object(new_hair, evaluated):
     hair = new_hair()
     session = previews.start(hair, evaluated())
     assert "no surface" in session.source.warnings[0]
-    before = grid_of(session)
+    before = strand_grid(session)
     hair.location = (1.0, 2.0, 3.0)
     update()
-    assert grid_of(session) == pytest.approx(before + np.array([1.0, 2.0, 3.0]), abs=1e-6)
+    assert strand_grid(session) == pytest.approx(before + np.array([1.0, 2.0, 3.0]), abs=1e-6)
 
 
 def test_sliders_act_at_once(preview):
@@ -87,7 +87,7 @@ def test_guide_settings_act_once_edits_have_settled(preview, evaluated):
 
 def test_animated_settings_and_heads_are_followed_frame_by_frame(preview):
     hair, head, session = preview
-    before = grid_of(session)
+    before = strand_grid(session)
     shading = hair.data.hairloom.shading
     for frame, value in ((1, 0.0), (11, 1.0)):
         shading.ambient = value
@@ -96,7 +96,7 @@ def test_animated_settings_and_heads_are_followed_frame_by_frame(preview):
         head.keyframe_insert("location", frame=frame)
     bpy.context.scene.frame_set(11)
     assert overlay.drawing_of(session.uid).snapshot.shading.ambient == 1.0
-    assert grid_of(session) == pytest.approx(before + np.array([1.0, 0.0, 0.0]), abs=1e-5)
+    assert strand_grid(session) == pytest.approx(before + np.array([1.0, 0.0, 0.0]), abs=1e-5)
 
 
 def test_edited_curves_are_read_again_and_others_left_alone(preview, evaluated):
@@ -125,8 +125,8 @@ def test_edited_curves_are_read_again_and_others_left_alone(preview, evaluated):
     update()
     scene_events.catch_up(evaluated())
     assert session.rig is not rig
-    assert grid_of(session)[0, -1] == pytest.approx([0.0, 0.25, 0.5], abs=1e-5)
-    assert grid_of(session)[1, 0] == pytest.approx(
+    assert strand_grid(session)[0, -1] == pytest.approx([0.0, 0.25, 0.5], abs=1e-5)
+    assert strand_grid(session)[1, 0] == pytest.approx(
         rig.strands.roots[1] + np.array([0, 0.25, 0]), abs=1e-5
     )
 
@@ -160,7 +160,7 @@ def test_another_surface_begins_the_preview_anew(preview, evaluated):
     assert session.head.handle.name == "Other"
     other.location.x = 1.0
     update()
-    assert grid_of(session)[:, 0, 0].mean() == pytest.approx(1.0, abs=0.05)
+    assert strand_grid(session)[:, 0, 0].mean() == pytest.approx(1.0, abs=0.05)
 
 
 def test_blenders_own_strands_are_hidden_in_the_evaluated_copy_only(preview, evaluated):
@@ -214,7 +214,7 @@ def test_a_preview_adds_and_changes_no_data(new_hair, sphere, evaluated):
     hair = bpy.data.objects["Hair"]
     session = previews.start(hair, evaluated())
     previews.play(evaluated())
-    play(evaluated, 2)
+    play_frames(evaluated, 2)
     previews.stop(session)
     assert {data.name_full for data in bpy.data.user_map()} == before
 
@@ -283,7 +283,7 @@ def test_two_grooms_on_one_head_go_separate_ways(new_hair, sphere, evaluated):
     assert previews.sessions() == (second,)
     sphere.location.x = 1.0
     update()
-    assert grid_of(second)[:, 0].mean(axis=0)[0] == pytest.approx(1.0, abs=0.05)
+    assert strand_grid(second)[:, 0].mean(axis=0)[0] == pytest.approx(1.0, abs=0.05)
 
 
 def test_the_buttons_say_why_they_do_not_work(extension, sphere):

@@ -3,28 +3,28 @@
 import bpy
 import numpy as np
 import pytest
-from grids import grid_of
-from swinging import play
+from grids import strand_grid
+from swinging import play_frames
 
 from hairloom.addon.blender.preview import previews
 
 
 def test_playing_hair_lags_behind_and_returns_when_stopped(preview, evaluated):
     _, head, session = preview
-    at_rest = grid_of(session)
+    at_rest = strand_grid(session)
     assert previews.play(evaluated()) == []
 
     def push(frame):
         head.location.x = 0.02 * (frame + 1)
 
-    play(evaluated, 6, push)
+    play_frames(evaluated, 6, push)
     carried = at_rest + np.array([head.location.x, 0.0, 0.0])
-    offset = grid_of(session) - carried
+    offset = strand_grid(session) - carried
     assert np.abs(offset[:, 0]).max() < 1e-5, "roots go with the head"
     assert offset[:, -1, 0].mean() < -0.005, "tips stay behind"
     previews.rest(evaluated(), keep_playing=False)
     assert not previews.is_playing()
-    assert grid_of(session) == pytest.approx(carried, abs=2e-6)
+    assert strand_grid(session) == pytest.approx(carried, abs=2e-6)
 
 
 def test_a_head_that_stands_still_is_the_same_one_in_the_next_frame(preview, evaluated):
@@ -34,7 +34,7 @@ def test_a_head_that_stands_still_is_the_same_one_in_the_next_frame(preview, eva
     heads = []
     for place in (0.0, 0.0, 0.1):
         head.location.x = place
-        play(evaluated, 1)
+        play_frames(evaluated, 1)
         heads += session.snapshot.casters
     assert heads[0] is heads[1] and heads[1] is not heads[2]
     moved = heads[2].positions - heads[1].positions
@@ -43,23 +43,23 @@ def test_a_head_that_stands_still_is_the_same_one_in_the_next_frame(preview, eva
 
 def test_without_motion_gravity_alone_pulls_unheld_hair_down(preview, evaluated):
     hair, _, session = preview
-    at_rest = grid_of(session)
+    at_rest = strand_grid(session)
     hair.hairloom.dynamics.sag_compensation = 0.0
     previews.play(evaluated())
-    play(evaluated, 12)
-    assert (grid_of(session) - at_rest)[:, -1, 2].mean() < -0.001
+    play_frames(evaluated, 12)
+    assert (strand_grid(session) - at_rest)[:, -1, 2].mean() < -0.001
     previews.rest(evaluated(), keep_playing=False)
     bpy.context.scene.use_gravity = False
     previews.play(evaluated())
-    play(evaluated, 12)
-    assert np.abs(grid_of(session) - at_rest).max() < 1e-3
+    play_frames(evaluated, 12)
+    assert np.abs(strand_grid(session) - at_rest).max() < 1e-3
 
 
 def test_hair_stays_out_of_the_head_that_moves_into_it(preview, evaluated):
     _, head, session = preview
     previews.play(evaluated())
-    play(evaluated, 10, lambda frame: setattr(head.location, "z", 0.01 * (frame + 1)))
-    distance = np.linalg.norm(grid_of(session) - np.array(head.location), axis=2)
+    play_frames(evaluated, 10, lambda frame: setattr(head.location, "z", 0.01 * (frame + 1)))
+    distance = np.linalg.norm(strand_grid(session) - np.array(head.location), axis=2)
     assert distance[:, 2:].min() > 0.098
 
 
@@ -71,7 +71,7 @@ def test_a_chosen_collider_is_used_in_place_of_the_head(preview, evaluated):
     assert previews.play(evaluated()) == []
     (part,) = session.obstacles.parts
     assert part.carrier.body.handle.name == cube.name
-    play(evaluated, 2, lambda frame: setattr(cube.location, "x", 0.1 * frame))
+    play_frames(evaluated, 2, lambda frame: setattr(cube.location, "x", 0.1 * frame))
     assert part.track.before[:3, 3] == pytest.approx([0.1, 0.0, 0.0], abs=1e-6)
 
 
@@ -113,7 +113,7 @@ def test_a_collider_that_cannot_be_used_is_a_warning_and_play_goes_on(preview, e
     (warning,) = session.warnings
     assert "Points" in warning
     assert previews.is_playing()
-    play(evaluated, 2)
+    play_frames(evaluated, 2)
     assert previews.session_of(hair) is session
 
 

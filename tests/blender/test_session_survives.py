@@ -3,7 +3,7 @@
 import bpy
 import numpy as np
 import pytest
-from grids import grid_of
+from grids import strand_grid
 
 from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.viewport import overlay
@@ -34,7 +34,7 @@ def test_curves_may_become_fewer_and_none(preview, evaluated):
     hair.data.remove_curves(indices=list(range(50)))
     update()
     scene_events.catch_up(evaluated())
-    assert grid_of(session).shape[0] == 10
+    assert strand_grid(session).shape[0] == 10
     hair.data.remove_curves()
     update()
     scene_events.catch_up(evaluated())
@@ -45,11 +45,11 @@ def test_curves_may_become_fewer_and_none(preview, evaluated):
 
 def test_renaming_is_no_matter(preview):
     hair, head, session = preview
-    before = grid_of(session)
+    before = strand_grid(session)
     hair.name, head.name = "Wig", "Bust"
     head.location.x = 1.0
     update()
-    assert grid_of(session) == pytest.approx(before + np.array([1.0, 0.0, 0.0]), abs=1e-6)
+    assert strand_grid(session) == pytest.approx(before + np.array([1.0, 0.0, 0.0]), abs=1e-6)
 
 
 @pytest.mark.parametrize("which", ["Hair", "Head"])
@@ -73,7 +73,7 @@ def test_undo_and_redo_of_a_moved_head_and_edited_hair(new_hair, sphere, evaluat
     hair = new_hair(sphere)
     bpy.ops.ed.undo_push(message="begin")
     session = previews.start(hair, evaluated())
-    begin = grid_of(session)
+    begin = strand_grid(session)
     sphere.location.x = 1.0
     hair.data.position_data[7].vector = (0.0, 0.0, 0.5)
     hair.data.hairloom.shading.ambient = 0.125
@@ -82,12 +82,12 @@ def test_undo_and_redo_of_a_moved_head_and_edited_hair(new_hair, sphere, evaluat
     bpy.ops.ed.undo()
     scene_events.catch_up(evaluated())
     assert previews.sessions() == (session,)
-    assert grid_of(session) == pytest.approx(begin, abs=1e-6)
+    assert strand_grid(session) == pytest.approx(begin, abs=1e-6)
     assert overlay.drawing_of(session.uid).snapshot.shading.ambient == 1.0
 
     bpy.ops.ed.redo()
     scene_events.catch_up(evaluated())
-    assert grid_of(session)[0, -1] == pytest.approx([1.0, 0.0, 0.5], abs=1e-5)
+    assert strand_grid(session)[0, -1] == pytest.approx([1.0, 0.0, 0.5], abs=1e-5)
     assert overlay.drawing_of(session.uid).snapshot.shading.ambient == 0.125
 
 
@@ -116,7 +116,7 @@ def test_a_new_file_knows_nothing_of_the_one_before(preview, evaluated):
 
 def test_another_scene_in_the_window_does_not_end_the_preview(preview):
     _, head, session = preview
-    before, window, scene = grid_of(session), bpy.context.window, bpy.context.scene
+    before, window, scene = strand_grid(session), bpy.context.window, bpy.context.scene
     window.scene = bpy.data.scenes.new("Elsewhere")
     window.scene.collection.objects.link(bpy.data.objects.new("Thing", None))
     update()
@@ -128,7 +128,7 @@ def test_another_scene_in_the_window_does_not_end_the_preview(preview):
     head.location.x = 1.0
     update()
     assert overlay.drawing_of(session.uid).is_visible
-    assert grid_of(session) == pytest.approx(before + np.array([1.0, 0.0, 0.0]), abs=1e-6)
+    assert strand_grid(session) == pytest.approx(before + np.array([1.0, 0.0, 0.0]), abs=1e-6)
 
 
 def test_sculpting_hides_blenders_own_strands(preview, evaluated):
@@ -138,7 +138,7 @@ def test_sculpting_hides_blenders_own_strands(preview, evaluated):
     update()
     assert hair.evaluated_get(evaluated()).display_type == "WIRE"
     scene_events.catch_up(evaluated())
-    assert grid_of(session)[0, -1] == pytest.approx([0.0, 0.0, 0.5], abs=1e-5)
+    assert strand_grid(session)[0, -1] == pytest.approx([0.0, 0.0, 0.5], abs=1e-5)
     bpy.ops.object.mode_set(mode="OBJECT")
     update()
     assert hair.evaluated_get(evaluated()).display_type == "WIRE"
@@ -152,9 +152,9 @@ def test_a_final_render_does_not_disturb_the_preview(preview):
     scene.collection.objects.link(camera)
     scene.camera, scene.render.engine = camera, "BLENDER_WORKBENCH"
     scene.render.resolution_x = scene.render.resolution_y = 16
-    before = grid_of(session)
+    before = strand_grid(session)
     bpy.ops.render.render()
-    assert grid_of(session) == pytest.approx(before, abs=1e-7)
+    assert strand_grid(session) == pytest.approx(before, abs=1e-7)
     assert previews.sessions() == (session,)
 
 

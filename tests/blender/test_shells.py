@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from card_exports import cards, sidecar_of
-from glb_files import validated
+from card_exports import export_cards, read_sidecar
+from glb_files import validator_report
 from tiers import few_in_commits
 
 bpy = pytest.importorskip("bpy", reason="exporters need Blender or the bpy module")
@@ -107,12 +107,12 @@ def test_shells_cover_as_much_as_strands_from_eight_sides_in_their_colour(
 @pytest.mark.parametrize("suffix", few_in_commits([".glb", ".fbx"]))
 def test_files_of_shells_are_read_by_blenders_importers(tmp_path: Path, suffix: str) -> None:
     file = tmp_path / f"fur{suffix}"
-    assert cards(file, *SHORT, "--levels", "2") == 0
-    levels = sidecar_of(file)["levels"]
+    assert export_cards(file, *SHORT, "--levels", "2") == 0
+    levels = read_sidecar(file)["levels"]
     assert 450 <= levels[0]["triangles"] <= 600
     assert levels[1]["triangles"] <= 300
     if suffix == ".glb":
-        issues = validated(file)["issues"]
+        issues = validator_report(file)["issues"]
         assert issues["numErrors"] == issues["numWarnings"] == 0, issues["messages"]
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     read = bpy.ops.import_scene.gltf if suffix == ".glb" else bpy.ops.wm.fbx_import
@@ -132,7 +132,7 @@ def test_files_of_shells_are_read_by_blenders_importers(tmp_path: Path, suffix: 
 
 
 def test_long_hair_as_shells_is_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    assert cards(tmp_path / "hair.glb", *SHORT, "--set", "grow.length=0.4") == 1
+    assert export_cards(tmp_path / "hair.glb", *SHORT, "--set", "grow.length=0.4") == 1
     assert "shells show hair up to" in capfd.readouterr().err
     assert not list(tmp_path.iterdir())
 

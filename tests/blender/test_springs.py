@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from glb_files import to_blender, validated
+from glb_files import to_blender, validator_report
 from glb_player import Player
 from test_card_motion import FRAMES, RATE, head_matrix, motion, off, simulated, write  # noqa: F401
 from three_springs import MODULE, MovedByThree, moved_by_three, rest_of
@@ -58,7 +58,7 @@ def moved(
 
 
 def test_khronos_validator_finds_no_fault(springs: tuple[Path, WrittenCards]) -> None:
-    report = validated(springs[0])
+    report = validator_report(springs[0])
     assert report["issues"]["numErrors"] == 0, report
     grave = [each for each in report["issues"]["messages"] if each["severity"] <= 1]
     assert {each["code"] for each in grave} <= {"NODE_SKINNED_MESH_NON_ROOT"}, report
@@ -140,7 +140,7 @@ def test_below_a_bone_springs_move_as_before(
     head = np.stack([head_matrix(motion, frame) for frame in range(FRAMES)])
     found = moved_by_three(carried[0], head, RATE, len(moved.rest))
     np.testing.assert_allclose(found.places, moved.places, atol=1e-6)
-    report = validated(carried[0])
+    report = validator_report(carried[0])
     assert report["issues"]["numErrors"] == 0, report
 
 

@@ -3,7 +3,7 @@
 import bpy
 import numpy as np
 import pytest
-from grids import grid_of
+from grids import strand_grid
 
 from hairloom.addon.blender.base.outcome import collected_reports, past_reports
 from hairloom.addon.blender.base.parts import at_once, together
@@ -115,11 +115,11 @@ def swing_of_new_hair(size):
     bpy.ops.hairloom.add_groom("EXEC_DEFAULT", strand_count=60)
     (session,) = previews.sessions()
     previews.play(bpy.context.evaluated_depsgraph_get())
-    at_first = grid_of(session).copy()
+    at_first = strand_grid(session).copy()
     for _ in range(12):
         previews.advance(bpy.context.evaluated_depsgraph_get(), 1.0 / 24.0)
     length = bpy.context.object.dimensions.z
-    return np.linalg.norm(grid_of(session) - at_first, axis=-1).max() / length
+    return np.linalg.norm(strand_grid(session) - at_first, axis=-1).max() / length
 
 
 @pytest.mark.slow
@@ -152,10 +152,10 @@ def test_the_sample_scene_is_a_scene_of_its_own_that_moves():
     assert scene.unit_settings.length_unit == "ADAPTIVE"
     (session,) = previews.sessions()
     assert session.warnings == () and session.head is not None
-    first = grid_of(session)
+    first = strand_grid(session)
     for frame in range(1, 10):
         scene.frame_set(frame)
-    assert np.abs(grid_of(session) - first).max() > 0.01
+    assert np.abs(strand_grid(session) - first).max() > 0.01
     head = scene.objects["Head"]
     scene.frame_set(1)
     at_start = head.rotation_euler.copy()
@@ -170,7 +170,7 @@ def test_the_camera_of_the_sample_sees_all_of_its_hair():
 
     bpy.ops.hairloom.sample_scene()
     scene, (session,) = bpy.context.scene, previews.sessions()
-    places = grid_of(session).reshape(-1, 3)[::97]
+    places = strand_grid(session).reshape(-1, 3)[::97]
     seen = np.array([world_to_camera_view(scene, scene.camera, Vector(p)) for p in places])
     assert (seen[:, :2] > 0.0).all() and (seen[:, :2] < 1.0).all() and (seen[:, 2] > 0.0).all()
     assert np.ptp(seen[:, 1]) > 0.4, "hair is small in the picture"

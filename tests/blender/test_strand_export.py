@@ -10,7 +10,14 @@ import bpy
 import numpy as np
 import pytest
 from hedgehogs import hedgehog
-from strand_files import curves_of, needs_usd, push_up, stage_of, straight, to_unreal
+from strand_files import (
+    needs_usd,
+    push_up,
+    read_alembic_curves,
+    read_usd_curves,
+    straight_strands,
+    to_unreal,
+)
 
 from hairloom.addon.blender.scene.curves import write_curves
 from hairloom.addon.blender.scene.groom_attributes import store_groom
@@ -26,10 +33,10 @@ from hairloom.addon.strands import StrandSet
 def test_a_strand_of_a_metre_stands_where_unreal_looks_for_it(
     new_hair: Any, tmp_path: Path
 ) -> None:
-    new_hair(strands=straight())
+    new_hair(strands=straight_strands())
     path = tmp_path / "hair.abc"
     assert bpy.ops.hairloom.export_alembic(filepath=str(path), parts="strands") == {"FINISHED"}
-    (curves,) = curves_of(path).values()
+    (curves,) = read_alembic_curves(path).values()
     np.testing.assert_allclose(curves["points"][0][0], [100.0, -200.0, 300.0], rtol=1e-6)
     np.testing.assert_allclose(curves["points"][0][4], [100.0, -200.0, 400.0], rtol=1e-6)
     np.testing.assert_allclose(curves["groom_width"], 8e-3, rtol=1e-6)
@@ -47,10 +54,10 @@ def test_a_strand_of_a_metre_stands_where_unreal_looks_for_it(
 def test_usd_says_its_unit_and_axes(
     new_hair: Any, tmp_path: Path, engine: str, up: str, unit: float, root: Any
 ) -> None:
-    new_hair(strands=straight())
+    new_hair(strands=straight_strands())
     path = tmp_path / "hair.usdc"
     bpy.ops.hairloom.export_usd(filepath=str(path), engine=engine, parts="strands")
-    stage, curves = stage_of(path)
+    stage, curves = read_usd_curves(path)
     from pxr import UsdGeom
 
     assert (UsdGeom.GetStageUpAxis(stage), UsdGeom.GetStageMetersPerUnit(stage)) == (up, unit)
@@ -60,12 +67,12 @@ def test_usd_says_its_unit_and_axes(
 
 @needs_usd
 def test_own_axes_and_unit_go_over_those_of_the_program(new_hair: Any, tmp_path: Path) -> None:
-    new_hair(strands=straight())
+    new_hair(strands=straight_strands())
     path = tmp_path / "hair.usda"
     bpy.ops.hairloom.export_usd(
         filepath=str(path), engine="unreal", up="Y", scale=0.1, parts="strands"
     )
-    _, curves = stage_of(path)
+    _, curves = read_usd_curves(path)
     np.testing.assert_allclose(curves.GetPointsAttr().Get()[0], (10.0, 30.0, -20.0), rtol=1e-6)
     bpy.ops.hairloom.export_hair(filepath=str(tmp_path / "h.hair"), up="Y", scale=0.01)
     read = read_hair_file(tmp_path / "h.hair", up="Z", scale=1.0).strands
@@ -79,7 +86,7 @@ def test_guides_lie_beside_the_strands_and_name_what_rides_on_them(
     hair.data.hairloom.guides.guide_count = 7
     path = tmp_path / "hair.abc"
     bpy.ops.hairloom.export_alembic(filepath=str(path))
-    (curves,) = curves_of(path).values()
+    (curves,) = read_alembic_curves(path).values()
     guide, ids = curves["groom_guide"] == 1, curves["groom_id"]
     assert (len(guide), guide.sum()) == (67, 7) and len(np.unique(ids)) == 67
     assert np.isin(curves["groom_closest_guides"], ids[guide]).all()
@@ -100,15 +107,15 @@ def test_guides_lie_beside_the_strands_and_name_what_rides_on_them(
 def test_modifiers_are_in_the_file_and_the_scene_is_untouched(
     new_hair: Any, tmp_path: Path
 ) -> None:
-    hair = new_hair(strands=straight())
+    hair = new_hair(strands=straight_strands())
     push_up(hair, 0.25)
     before = np.empty(30, np.float32)
     hair.data.position_data.foreach_get("vector", before)
     blocks = {data.name_full for data in bpy.data.user_map()}
     path = tmp_path / "hair.abc"
     bpy.ops.hairloom.export_alembic(filepath=str(path), parts="strands")
-    (curves,) = curves_of(path).values()
-    expected = to_unreal(straight().points + np.array([0.0, 0.0, 0.25]))
+    (curves,) = read_alembic_curves(path).values()
+    expected = to_unreal(straight_strands().points + np.array([0.0, 0.0, 0.25]))
     np.testing.assert_allclose(curves["points"][0], expected, rtol=1e-5)
     after = np.empty(30, np.float32)
     hair.data.position_data.foreach_get("vector", after)
@@ -123,7 +130,7 @@ def test_point_counts_of_their_own_stay(new_hair: Any, tmp_path: Path) -> None:
     offsets = np.concatenate([[0], np.cumsum(counts)])
     new_hair(strands=StrandSet(points * 0.1, offsets, np.full(counts.sum(), 5e-5), [0] * 4))
     bpy.ops.hairloom.export_alembic(filepath=str(tmp_path / "a.abc"), parts="strands")
-    (curves,) = curves_of(tmp_path / "a.abc").values()
+    (curves,) = read_alembic_curves(tmp_path / "a.abc").values()
     np.testing.assert_array_equal(curves["counts"], counts)
 
 
@@ -152,7 +159,7 @@ def test_what_the_hair_says_of_itself_is_in_the_file(new_hair: Any, tmp_path: Pa
     store_groom(hair.data, said)
     path = tmp_path / "hair.abc"
     bpy.ops.hairloom.export_alembic(filepath=str(path), by_group=True)
-    found = curves_of(path)
+    found = read_alembic_curves(path)
     assert set(found) == {"crown", "nape"}
     for group, name in ((0, "crown"), (1, "nape")):
         own = strands.group == group
@@ -165,10 +172,10 @@ def test_what_the_hair_says_of_itself_is_in_the_file(new_hair: Any, tmp_path: Pa
 
 
 def test_hair_without_a_colour_has_that_of_its_look(new_hair: Any, tmp_path: Path) -> None:
-    hair = new_hair(strands=straight())
+    hair = new_hair(strands=straight_strands())
     hair.data.hairloom.shading.base_color = (0.25, 0.5, 0.75)
     bpy.ops.hairloom.export_alembic(filepath=str(tmp_path / "a.abc"))
-    (curves,) = curves_of(tmp_path / "a.abc").values()
+    (curves,) = read_alembic_curves(tmp_path / "a.abc").values()
     np.testing.assert_allclose(curves["groom_color"], np.tile([0.25, 0.5, 0.75], (20, 1)))
 
 
@@ -178,7 +185,7 @@ def test_several_hairs_are_groups_of_one_groom(new_hair: Any, sphere: Any, tmp_p
     brows.select_set(True)
     path = tmp_path / "both.abc"
     bpy.ops.hairloom.export_alembic(filepath=str(path), by_group=True)
-    found = curves_of(path)
+    found = read_alembic_curves(path)
     assert set(found) == {"Hair_0", "Hair_1", "Brows_0", "Brows_1"}
     ids = np.concatenate([each["groom_id"] for each in found.values()])
     assert len(np.unique(ids)) == len(ids)
@@ -189,7 +196,7 @@ def test_several_hairs_are_groups_of_one_groom(new_hair: Any, sphere: Any, tmp_p
         filepath=str(tmp_path / "x.abc"), several="each", parts="strands"
     )
     assert {p.name for p in tmp_path.glob("x*.abc")} == {"x_Hair.abc", "x_Brows.abc"}
-    (one,) = curves_of(tmp_path / "x_Brows.abc").values()
+    (one,) = read_alembic_curves(tmp_path / "x_Brows.abc").values()
     assert len(one["counts"]) == 20
     assert scalp.name == "Hair"
 
@@ -218,5 +225,5 @@ def test_children_are_strands_and_their_guides_are_marked(
     hair.data.hairloom.children.method = "multi"
     hair.data.hairloom.children.strand_count = 200
     bpy.ops.hairloom.export_alembic(filepath=str(tmp_path / "a.abc"))
-    (curves,) = curves_of(tmp_path / "a.abc").values()
+    (curves,) = read_alembic_curves(tmp_path / "a.abc").values()
     assert curves["groom_guide"].sum() == 60 and len(curves["groom_guide"]) == 320

@@ -13,9 +13,16 @@ import pytest
 from bake_files import frames_in
 from grids import baked_grid
 from hedgehogs import hedgehog
-from strand_files import curves_of, needs_usd, push_up, stage_of, straight, to_unreal
-from swinging import thrown
-from waiting import until
+from strand_files import (
+    needs_usd,
+    push_up,
+    read_alembic_curves,
+    read_usd_curves,
+    straight_strands,
+    to_unreal,
+)
+from swinging import shake_head
+from waiting import wait_until
 
 from hairloom.addon.blender.bakes import playback
 from hairloom.addon.blender.preview.bake import Bake
@@ -39,7 +46,7 @@ def told(capfd: pytest.CaptureFixture[str]) -> Callable[[], str]:
 @pytest.fixture
 def swinging(new_hair: Any, sphere: Any, tmp_path: Path) -> tuple[Any, Any]:
     """Hair on a head that shakes for some frames: (hair, head)."""
-    return thrown(new_hair(sphere), sphere, LAST, tmp_path / "bake", peak=3)
+    return shake_head(new_hair(sphere), sphere, LAST, tmp_path / "bake", peak=3)
 
 
 def bake(*objects: Any, **options: Any) -> None:
@@ -57,8 +64,8 @@ def test_each_frame_is_that_of_the_bake(swinging: Any, tmp_path: Path) -> None:
     assert bpy.context.scene.frame_current == 3
     cache = playback.cache_of(hair)
     assert cache is not None
-    (curves,) = curves_of(abc).values()
-    stage, prim = stage_of(usd)
+    (curves,) = read_alembic_curves(abc).values()
+    stage, prim = read_usd_curves(usd)
     rate = bpy.context.scene.render.fps
     assert len(curves["points"]) == LAST and stage.GetTimeCodesPerSecond() == rate
     np.testing.assert_allclose(curves["times"], np.arange(1, LAST + 1) / rate)
@@ -77,7 +84,7 @@ def test_guides_of_a_bake_move_as_their_strands_do(swinging: Any, tmp_path: Path
     hair.data.hairloom.guides.guide_count = 9
     bake(hair)
     bpy.ops.hairloom.export_alembic(filepath=str(tmp_path / "a.abc"), frames="own", first=2, last=4)
-    (curves,) = curves_of(tmp_path / "a.abc").values()
+    (curves,) = read_alembic_curves(tmp_path / "a.abc").values()
     (line,) = ExportCheck.of([hair]).motion_lines(use_bake=True)
     assert line == "Hair: bake of frames 1 to 6 at 24 fps"
     cache = playback.cache_of(hair)
@@ -101,7 +108,7 @@ def test_a_bake_keeps_what_its_curves_say(swinging: Any, tmp_path: Path) -> None
     bpy.ops.hairloom.export_alembic(
         filepath=str(path), frames="own", first=1, last=2, parts="strands", by_group=True
     )
-    found = curves_of(path)
+    found = read_alembic_curves(path)
     assert set(found) == {"Hair_0", "nape"}
     own = found["nape"]
     np.testing.assert_array_equal(own["groom_id"], np.arange(60)[1::2] + 9)
@@ -133,16 +140,16 @@ def test_frames_that_were_not_baked_are_named_and_nothing_is_written(
 def test_hair_without_a_bake_moves_as_its_modifiers_move_it(
     new_hair: Any, tmp_path: Path, told: Callable[[], str]
 ) -> None:
-    hair = new_hair(strands=straight())
+    hair = new_hair(strands=straight_strands())
     push_up(hair, 0.1, frame_driven=True)
     bpy.context.scene.frame_set(2)
     path = tmp_path / "hair.usdc"
     bpy.ops.hairloom.export_usd(filepath=str(path), frames="own", first=1, last=4)
     assert "no bake" in told()
     assert bpy.context.scene.frame_current == 2
-    _, curves = stage_of(path)
+    _, curves = read_usd_curves(path)
     for frame in range(1, 5):
-        expected = straight().points + np.array([0.0, 0.0, 0.1 * frame])
+        expected = straight_strands().points + np.array([0.0, 0.0, 0.1 * frame])
         np.testing.assert_allclose(curves.GetPointsAttr().Get(frame), expected, rtol=1e-5)
     bake_too = {"use_bake": False, "frames": "own", "first": 1, "last": 4}
     bpy.ops.hairloom.export_usd(filepath=str(path), **bake_too)
@@ -175,7 +182,7 @@ def test_widths_are_those_of_the_first_frame_wherever_the_scene_is(
         assert bpy.context.scene.frame_current_final == playhead + 0.25
         written.append(path.read_bytes())
     assert written[0] == written[1]
-    _, curves = stage_of(path)
+    _, curves = read_usd_curves(path)
     widths = np.array(curves.GetWidthsAttr().Get())
     np.testing.assert_allclose(widths[:480], 2.0 * 3e-5, rtol=1e-4)
 
@@ -192,7 +199,7 @@ def test_children_follow_guides_that_modifiers_move(
     push_up(hair, 0.02, frame_driven=True)
     bpy.context.scene.frame_set(0)
     bpy.ops.hairloom.export_usd(filepath=str(tmp_path / "a.usdc"), frames="own", first=0, last=3)
-    _, curves = stage_of(tmp_path / "a.usdc")
+    _, curves = read_usd_curves(tmp_path / "a.usdc")
     first, last = (np.array(curves.GetPointsAttr().Get(frame)) for frame in (0, 3))
     rise = (last - first).reshape(160, -1, 3)
     np.testing.assert_allclose(rise[:60], np.broadcast_to([0, 0, 0.06], rise[:60].shape), atol=1e-6)
@@ -201,7 +208,7 @@ def test_children_follow_guides_that_modifiers_move(
 
 @needs_usd
 def test_curves_that_come_and_go_are_told_and_leave_nothing(new_hair: Any, tmp_path: Path) -> None:
-    hair = new_hair(strands=straight())
+    hair = new_hair(strands=straight_strands())
     plan = StrandExport.of(
         [hair],
         bpy.context.evaluated_depsgraph_get(),
@@ -229,10 +236,10 @@ def test_a_cancelled_export_leaves_the_old_file(swinging: Any, tmp_path: Path) -
         )
         positions = plan.positions()
         work = plan.writing(path, positions)
-        until(lambda w=work, p=plan: w.run_main_thread_steps() or p.done >= 3)
+        wait_until(lambda w=work, p=plan: w.run_main_thread_steps() or p.done >= 3)
         work.give_up()
         positions.close()
-        until(work.run_main_thread_steps)
+        wait_until(work.run_main_thread_steps)
         assert plan.done >= 3
         assert path.read_bytes() == b"old"
     assert {p.name for p in tmp_path.iterdir()} == {"bake", "hair.abc", "hair.usdc"}
@@ -250,9 +257,9 @@ def test_in_steps_the_same_file_is_written_as_at_once(swinging: Any, tmp_path: P
             plan.write(path)
         else:
             work = plan.writing(path, plan.positions())
-            until(work.run_main_thread_steps)
+            wait_until(work.run_main_thread_steps)
             assert "frames 1 to 6" in work.result().result
-    once, steps = (curves_of(tmp_path / name) for name in ("once.abc", "steps.abc"))
+    once, steps = (read_alembic_curves(tmp_path / name) for name in ("once.abc", "steps.abc"))
     for name, curves in once.items():
         for one, other in zip(curves["points"], steps[name]["points"], strict=True):
             np.testing.assert_array_equal(one, other)
@@ -260,7 +267,7 @@ def test_in_steps_the_same_file_is_written_as_at_once(swinging: Any, tmp_path: P
 
 def test_motion_into_a_format_without_is_refused(new_hair: Any, tmp_path: Path) -> None:
     plan = StrandExport.of(
-        [new_hair(strands=straight())],
+        [new_hair(strands=straight_strands())],
         bpy.context.evaluated_depsgraph_get(),
         TRESSFX,
         StrandExportSettings(),

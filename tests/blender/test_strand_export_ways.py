@@ -12,7 +12,7 @@ import bpy
 import numpy as np
 import pytest
 from hedgehogs import hedgehog
-from strand_files import curves_of, needs_usd, straight
+from strand_files import needs_usd, read_alembic_curves, straight_strands
 from tfxbone_reader import read_tfxbone
 
 from hairloom.addon.blender.base.outcome import Outcome
@@ -212,7 +212,7 @@ def test_without_alembics_library_usd_is_offered(
 ) -> None:
     import sys
 
-    new_hair(strands=straight())
+    new_hair(strands=straight_strands())
     monkeypatch.setitem(sys.modules, "alembic3d", None)
     with pytest.raises(RuntimeError, match=r"alembic3d.*Use USD instead"):
         bpy.ops.hairloom.export_alembic(filepath=str(tmp_path / "a.abc"))
@@ -226,10 +226,10 @@ def test_hair_of_guides_alone_is_written_as_strands(new_hair: Any, tmp_path: Pat
     bpy.ops.hairloom.export_hair(filepath=str(tmp_path / "a.hair"))
     assert read_hair_file(tmp_path / "a.hair").strands.strand_count == 60
     bpy.ops.hairloom.export_alembic(filepath=str(tmp_path / "a.abc"))
-    (curves,) = curves_of(tmp_path / "a.abc").values()
+    (curves,) = read_alembic_curves(tmp_path / "a.abc").values()
     assert "groom_guide" not in curves
     bpy.ops.hairloom.export_alembic(filepath=str(tmp_path / "g.abc"), parts="guides")
-    (curves,) = curves_of(tmp_path / "g.abc").values()
+    (curves,) = read_alembic_curves(tmp_path / "g.abc").values()
     assert curves["groom_guide"].all()
 
 

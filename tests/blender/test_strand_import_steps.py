@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from hedgehogs import hedgehog
 from strand_files import needs_usd
-from waiting import until
+from waiting import wait_until
 
 from hairloom.addon.blender.base.outcome import collected_reports
 from hairloom.addon.blender.strands import import_groom
@@ -100,13 +100,13 @@ def test_esc_half_way_leaves_no_process_no_file_and_no_object(
         WRITERS[path.suffix](path, Groom(hedgehog()))
     steps = begun(first, second)
     seen = []
-    until(lambda: seen.append(next(steps)) or is_there(endless))
+    wait_until(lambda: seen.append(next(steps)) or is_there(endless))
     number = int(endless.read_text())
     assert runs(number) and seen[-1].text == f"Reading second{suffix}, 2 of 2"
     assert seen[-1].is_idle and not seen[-1].is_committed
     steps.close()
-    until(lambda: not runs(number))
-    until(lambda: not list(temporary.iterdir()))
+    wait_until(lambda: not runs(number))
+    wait_until(lambda: not list(temporary.iterdir()))
     assert [obj.name for obj in bpy.data.objects] == ["Head"]
     assert len(bpy.data.hair_curves) == 0 and not sphere.add_rest_position_attribute
 

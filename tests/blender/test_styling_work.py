@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import bpy
 import numpy as np
 import pytest
-from overriding import overridden
+from overriding import library_overrides
 
 from hairloom.addon.blender.base.parts import Part, at_once, together
 from hairloom.addon.blender.colliders import ties
@@ -120,7 +120,7 @@ def trimmed(hair, tmp_path):
 
 
 def overridden_hair(folder):
-    hair = next(obj for obj in overridden(folder) if obj.type == "CURVES")
+    hair = next(obj for obj in library_overrides(folder) if obj.type == "CURVES")
     chosen(hair)
     return hair
 

@@ -16,7 +16,7 @@ from typing import Any
 
 import bpy
 import pytest
-from waiting import PATIENCE_S
+from waiting import TIMEOUT_S
 
 from hairloom.addon.blender.bakes.cache import Cache
 from hairloom.addon.blender.base import interruption
@@ -334,12 +334,12 @@ def test_an_interrupted_task_leaves_nothing(scene: Path, tmp_path: Path) -> None
             process = subprocess.Popen(
                 command, cwd=REPOSITORY, stdout=file, stderr=file, env=os.environ
             )
-            end = time.monotonic() + PATIENCE_S
+            end = time.monotonic() + TIMEOUT_S
             while "baking: 0/5000" not in log.read_text() and "baking: 1" not in log.read_text():
                 assert time.monotonic() < end and process.poll() is None, log.read_text()
                 time.sleep(0.05)
             process.send_signal(number)
-            assert process.wait(PATIENCE_S) == 128 + number, log.read_text()
+            assert process.wait(TIMEOUT_S) == 128 + number, log.read_text()
         assert json.loads(report.read_text())["status"] == "interrupted"
         left = [file for file in tmp_path.iterdir() if file.name.startswith((bake.name, "."))]
         assert left == [], "something half-written remains"

@@ -7,7 +7,7 @@ from collections.abc import Generator
 from typing import Any
 
 import pytest
-from waiting import PATIENCE_S, until
+from waiting import TIMEOUT_S, wait_until
 
 pytest.importorskip("bpy", reason="what serves it runs inside Blender")
 
@@ -28,12 +28,12 @@ def counting(seen: list[Any], last: int) -> Generator[None, None, int]:
 def test_what_is_asked_is_done_by_who_serves_and_a_part_at_a_time() -> None:
     seen: list[Any] = []
     work = ThreadWork(lambda work: 10 * work.on_main_thread(counting(seen, 3)), "test")
-    until(lambda: work.wants_main_thread)
+    wait_until(lambda: work.wants_main_thread)
     assert not seen, "it did it by itself"
     for done in (1, 2, 3):
         assert not work.run_main_thread_steps(duration=0.0)
         assert seen == [threading.main_thread()] * done
-    until(lambda: work.run_main_thread_steps(duration=0.0))
+    wait_until(lambda: work.run_main_thread_steps(duration=0.0))
     assert work.result() == 30 and not work.wants_main_thread
     assert seen[-1] == "closed"
 
@@ -54,7 +54,7 @@ def test_what_fails_is_raised_in_the_thread_and_told_by_the_result() -> None:
         raise ValueError("in vain")
 
     work = ThreadWork(try_it, "test")
-    until(work.run_main_thread_steps)
+    wait_until(work.run_main_thread_steps)
     assert [str(each) for each in caught] == ["no more memory"]
     assert work.stage == "another try"
     with pytest.raises(ValueError, match="in vain"):
@@ -64,11 +64,11 @@ def test_what_fails_is_raised_in_the_thread_and_told_by_the_result() -> None:
 def test_who_gives_up_closes_what_was_begun_and_ends_the_thread() -> None:
     seen: list[Any] = []
     work = ThreadWork(lambda work: work.on_main_thread(counting(seen, 1000)), "test")
-    until(lambda: work.wants_main_thread)
+    wait_until(lambda: work.wants_main_thread)
     work.run_main_thread_steps(duration=0.0)
     work.give_up()
     assert seen[-1] == "closed", "what it holds is freed by the thread"
-    until(work.run_main_thread_steps)
+    wait_until(work.run_main_thread_steps)
     with pytest.raises(GivenUpError):
         work.result()
 
@@ -77,7 +77,7 @@ def test_work_that_was_given_up_asks_and_goes_on_no_more() -> None:
     given_up, ended = threading.Event(), []
 
     def go_on(work: ThreadWork[None]) -> None:
-        given_up.wait(PATIENCE_S)
+        given_up.wait(TIMEOUT_S)
         for goes_on in (lambda: work.report("next"), lambda: work.on_main_thread(counting([], 1))):
             try:
                 goes_on()
@@ -87,7 +87,7 @@ def test_work_that_was_given_up_asks_and_goes_on_no_more() -> None:
     work = ThreadWork(go_on, "test")
     work.give_up()
     given_up.set()
-    until(work.run_main_thread_steps)
+    wait_until(work.run_main_thread_steps)
     assert ended == [True, True]
 
 
@@ -97,13 +97,13 @@ def test_who_gives_up_ends_the_child_that_is_waited_for() -> None:
     def wait_for_a_child(work: ThreadWork[None]) -> None:
         with work.ending(ended.set):
             waiting.set()
-            assert ended.wait(PATIENCE_S)
+            assert ended.wait(TIMEOUT_S)
 
     work = ThreadWork(wait_for_a_child, "test")
-    assert waiting.wait(PATIENCE_S) and not ended.is_set()
+    assert waiting.wait(TIMEOUT_S) and not ended.is_set()
     work.give_up()
     assert ended.is_set(), "it waits for the thread"
-    until(lambda: work.is_done)
+    wait_until(lambda: work.is_done)
     with pytest.raises(GivenUpError):
         work.result()
 
@@ -114,13 +114,13 @@ def test_work_that_was_given_up_begins_no_child_and_one_that_has_ended_is_left_a
     def work_with_children(work: ThreadWork[None]) -> None:
         with work.ending(lambda: ended.append("the first")):
             begun.append("the first")
-        assert given_up.wait(PATIENCE_S)
+        assert given_up.wait(TIMEOUT_S)
         with work.ending(lambda: ended.append("the second")):
             begun.append("the second")
 
     work = ThreadWork(work_with_children, "test")
-    until(lambda: begun)
+    wait_until(lambda: begun)
     work.give_up()
     given_up.set()
-    until(lambda: work.is_done)
+    wait_until(lambda: work.is_done)
     assert begun == ["the first"] and ended == []

@@ -5,9 +5,9 @@ import json
 import bpy
 import numpy as np
 import pytest
-from grids import baked_grid, grid_of
+from grids import baked_grid, strand_grid
 from mathutils import Matrix
-from swinging import thrown
+from swinging import shake_head
 from tiers import few_in_commits
 
 from hairloom.addon.blender.bakes import playback
@@ -66,12 +66,12 @@ def wavy():
 @pytest.fixture
 def swinging(new_hair, sphere, tmp_path):
     """Hair on a head that shakes for some frames: (hair, head)."""
-    return thrown(new_hair(sphere), sphere, LAST, tmp_path / "bake")
+    return shake_head(new_hair(sphere), sphere, LAST, tmp_path / "bake")
 
 
 def escape(session):
     """The largest distance [m] of held strands, if long enough, from their holds."""
-    rig, pose, strands = session.rig, session.solver.pose, grid_of(session)
+    rig, pose, strands = session.rig, session.solver.pose, strand_grid(session)
     holds = rig.holds.where(pose.anchors)
     first = holds.place.astype(int)
     part = (holds.place - first)[:, None]
@@ -99,7 +99,7 @@ def played(hair, first=1, last=LAST):
     shown = []
     for frame in range(first, last + 1):
         bpy.context.scene.frame_set(frame)
-        shown.append(grid_of(previews.session_of(hair)))
+        shown.append(strand_grid(previews.session_of(hair)))
     return np.array(shown)
 
 
@@ -216,11 +216,11 @@ def test_tips_on_a_mesh_follow_its_deformation(swinging, evaluated):
     hair.data.hairloom.guides.tip_distance = 0.1
     session = previews.start(hair, evaluated())
     assert len(session.rig.holds.strand) > 50
-    before = grid_of(session)
+    before = strand_grid(session)
     swell = bun.modifiers.new("Swell", "DISPLACE")
     swell.mid_level, swell.strength = 0.0, -0.01
     bpy.context.view_layer.update()
-    after = grid_of(session)
+    after = strand_grid(session)
     inwards = np.linalg.norm((after - before)[session.rig.holds.strand, -1], axis=1)
     assert inwards == pytest.approx(np.full(len(inwards), 0.01), rel=0.2)
     assert np.abs(after[:, 0] - before[:, 0]).max() < 1e-6
@@ -395,15 +395,15 @@ def test_ties_move_with_bones(new_hair, sphere, evaluated, how):
     tie(hair, one)
     session = previews.start(hair, evaluated())
     assert len(session.rig.holds.strand) > 3
-    begun = grid_of(session)
+    begun = strand_grid(session)
     for frame in range(2, LAST + 1):
         bpy.context.scene.frame_set(frame)
         assert escape(session) < 1e-3
     turned = session.solver.pose.anchors[0, :3, :3]
     assert np.degrees(np.arccos((np.trace(turned) - 1.0) / 2.0)) == pytest.approx(38.0, abs=4.0)
-    assert np.linalg.norm((grid_of(session) - begun)[:, -1], axis=1).max() > 0.05
+    assert np.linalg.norm((strand_grid(session) - begun)[:, -1], axis=1).max() > 0.05
     # the bone carries head and tie alike, so the distance between them is unchanged
-    root = grid_of(session)[session.rig.holds.strand, 0]
+    root = strand_grid(session)[session.rig.holds.strand, 0]
     assert np.isfinite(root).all()
 
 

@@ -5,9 +5,9 @@ import math
 import bpy
 import numpy as np
 import pytest
-from grids import grid_of
+from grids import strand_grid
 from mathutils import Matrix
-from swinging import thrown
+from swinging import shake_head
 from tiers import few_in_commits
 
 from hairloom.addon.blender.bakes import playback
@@ -20,7 +20,7 @@ LAST = 10
 @pytest.fixture
 def swinging(new_hair, sphere, evaluated, tmp_path):
     """Previewed hair on a head that shakes: (hair, head, session)."""
-    hair, head = thrown(new_hair(sphere), sphere, LAST, tmp_path / "bake")
+    hair, head = shake_head(new_hair(sphere), sphere, LAST, tmp_path / "bake")
     bpy.context.scene.frame_set(5)
     return hair, head, previews.start(hair, evaluated())
 
@@ -34,9 +34,11 @@ def lag(session):
     """The largest distance of the tips from their style, carried by the head [m]."""
     head = bpy.data.objects["Head"]
     style = session.source.strands.grid[:, -1] - session.source.strands.grid[:, 0]
-    offset = grid_of(session)[:, -1] - grid_of(session)[:, 0] - style
-    assert np.isfinite(grid_of(session)).all()
-    assert np.abs(grid_of(session)[:, 0].mean(axis=0)[0] - head.matrix_world.translation.x) < 0.02
+    offset = strand_grid(session)[:, -1] - strand_grid(session)[:, 0] - style
+    assert np.isfinite(strand_grid(session)).all()
+    assert (
+        np.abs(strand_grid(session)[:, 0].mean(axis=0)[0] - head.matrix_world.translation.x) < 0.02
+    )
     return float(np.linalg.norm(offset, axis=1).max())
 
 
@@ -47,7 +49,7 @@ def test_playing_twice_from_the_first_frame_gives_identical_bits(swinging):
         shown = []
         for frame in range(1, LAST + 1):
             go(frame)
-            shown.append(grid_of(session))
+            shown.append(strand_grid(session))
         runs.append(np.array(shown))
         go(7)
     np.testing.assert_array_equal(runs[0], runs[1])
@@ -71,11 +73,11 @@ def test_hair_rests_at_the_first_frame_and_where_the_playhead_jumps(swinging):
 def test_the_same_frame_again_keeps_the_hair_as_it_is(swinging):
     _, head, session = swinging
     go(1, 2, 3)
-    before = grid_of(session)
+    before = strand_grid(session)
     go(3)
     head.update_tag()
     bpy.context.view_layer.update()
-    np.testing.assert_array_equal(grid_of(session), before)
+    np.testing.assert_array_equal(strand_grid(session), before)
     go(4)
     assert lag(session) > 0.005
 
@@ -150,14 +152,14 @@ def test_paused_hair_holds_and_goes_on(swinging, evaluated):
     head.location.x += 0.1
     bpy.context.view_layer.update()
     previews.advance(evaluated(), 1 / 24)
-    held = grid_of(session)
+    held = strand_grid(session)
     assert bpy.ops.hairloom.pause() == {"FINISHED"}
     previews.advance(evaluated(), 1 / 24)
-    np.testing.assert_array_equal(grid_of(session), held)
+    np.testing.assert_array_equal(strand_grid(session), held)
     assert previews.is_paused()
     assert bpy.ops.hairloom.pause() == {"FINISHED"}
     previews.advance(evaluated(), 1 / 24)
-    assert np.abs(grid_of(session) - held).max() > 1e-4
+    assert np.abs(strand_grid(session) - held).max() > 1e-4
     assert bpy.ops.hairloom.reset() == {"FINISHED"}
     assert lag(session) < 1e-5 and previews.is_playing()
     previews.rest(evaluated(), keep_playing=False)
@@ -193,7 +195,7 @@ def test_a_head_of_no_size_or_turned_inside_out_gives_no_nonsense(scale, swingin
     bpy.context.view_layer.update()
     go(3, 4, 5)
     assert previews.session_of(hair) is session, previews.notice()
-    assert np.isfinite(grid_of(session)).all()
+    assert np.isfinite(strand_grid(session)).all()
     assert scale or "scale is zero" in previews.previews[session.uid].problems
     head.scale = (1.0, 1.0, 1.0)
     go(1, 2)

@@ -7,7 +7,7 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from engine_stage import background, set_panorama
+from engine_stage import background_node, set_panorama
 from waiting import take_steps_until
 
 from hairloom.addon.blender.scene import world as world_module
@@ -38,7 +38,7 @@ def uneven() -> np.ndarray:
 
 def by_cycles(scene: Any) -> Environment:
     """The same world rendered by another Blender: a Gamma of 1 prevents our reading it."""
-    tree, shader = scene.world.node_tree, background(scene)
+    tree, shader = scene.world.node_tree, background_node(scene)
     gamma = tree.nodes.new("ShaderNodeGamma")
     tree.links.new(shader.inputs["Color"].links[0].from_socket, gamma.inputs["Color"])
     tree.links.new(gamma.outputs["Color"], shader.inputs["Color"])
@@ -67,7 +67,7 @@ def test_no_world_is_black_and_one_without_nodes_has_its_color(scene: Any) -> No
 
 @pytest.mark.parametrize("has_node", [False, True])
 def test_a_plain_color_is_even(scene: Any, has_node: bool) -> None:
-    shader = background(scene)
+    shader = background_node(scene)
     shader.inputs["Color"].default_value = (0.1, 0.2, 0.4, 1.0)
     shader.inputs["Strength"].default_value = 2.0
     if has_node:
@@ -83,7 +83,7 @@ def test_a_plain_color_is_even(scene: Any, has_node: bool) -> None:
 def test_an_image_lights_from_where_its_pixels_are(scene: Any) -> None:
     radiance = uneven()
     set_panorama(scene, radiance)
-    background(scene).inputs["Strength"].default_value = 0.7
+    background_node(scene).inputs["Strength"].default_value = 0.7
     found = read_environment(scene)
     directions, solid_angle = panorama_directions(64, 128)
     (sun,) = found.suns
@@ -97,7 +97,7 @@ def test_an_image_lights_from_where_its_pixels_are(scene: Any) -> None:
 @pytest.mark.slow(instead="test_an_image_lights_from_where_its_pixels_are")
 def test_an_image_lights_as_in_cycles(scene: Any) -> None:
     set_panorama(scene, uneven())
-    background(scene).inputs["Strength"].default_value = 0.7
+    background_node(scene).inputs["Strength"].default_value = 0.7
     found = read_environment(scene)
     assert found.harmonics is not None and len(found.suns) == 1
     assert read_environment(scene) is found, "nothing has changed"
@@ -147,7 +147,7 @@ def test_a_sky_is_rendered_once(scene: Any, monkeypatch: pytest.MonkeyPatch) -> 
     sky = tree.nodes.new("ShaderNodeTexSky")
     sky.sky_type, sky.sun_size = "MULTIPLE_SCATTERING", np.radians(3.0)
     sky.sun_elevation = 0.6
-    tree.links.new(sky.outputs[0], background(scene).inputs["Color"])
+    tree.links.new(sky.outputs[0], background_node(scene).inputs["Color"])
     runs: list[Any] = []
     run = world_module.run_child
     monkeypatch.setattr(
@@ -172,7 +172,7 @@ def test_in_the_window_it_is_rendered_beside(scene: Any, monkeypatch: pytest.Mon
     """Until it arrives, the plain colour is used; later, the previous result."""
     tree = scene.world.node_tree
     gradient = tree.nodes.new("ShaderNodeTexGradient")
-    tree.links.new(gradient.outputs["Color"], background(scene).inputs["Color"])
+    tree.links.new(gradient.outputs["Color"], background_node(scene).inputs["Color"])
 
     def arrived() -> Environment:
         take_steps_until(lambda: not world_module._job.is_pending)
@@ -182,7 +182,7 @@ def test_in_the_window_it_is_rendered_beside(scene: Any, monkeypatch: pytest.Mon
     assert plain.harmonics is None
     first = arrived()
     assert first.harmonics is not None and not world_notes(scene)
-    background(scene).inputs["Strength"].default_value = 3.0
+    background_node(scene).inputs["Strength"].default_value = 3.0
     monkeypatch.setattr(world_module, "run_child", lambda *_, **__: fail())
     assert read_environment(scene, blocking=False) is first
     assert arrived() is not first and "no such program" in world_notes(scene)[0]
@@ -197,8 +197,8 @@ def test_nodes_that_cannot_be_rendered_leave_the_plain_color(
 ) -> None:
     tree = scene.world.node_tree
     noise = tree.nodes.new("ShaderNodeTexNoise")
-    tree.links.new(noise.outputs["Color"], background(scene).inputs["Color"])
-    background(scene).inputs["Color"].default_value = (0.3, 0.2, 0.1, 1.0)
+    tree.links.new(noise.outputs["Color"], background_node(scene).inputs["Color"])
+    background_node(scene).inputs["Color"].default_value = (0.3, 0.2, 0.1, 1.0)
     monkeypatch.setattr(world_module, "run_child", lambda *_, **__: fail())
     assert read_environment(scene).ambient == pytest.approx((0.3, 0.2, 0.1))
     (note,) = world_notes(scene)
@@ -210,7 +210,7 @@ def test_a_missing_file_is_said_and_black(scene: Any) -> None:
     node = tree.nodes.new("ShaderNodeTexEnvironment")
     node.image = bpy.data.images.new("Gone", 4, 2)
     node.image.source, node.image.filepath = "FILE", "//gone.exr"
-    tree.links.new(node.outputs["Color"], background(scene).inputs["Color"])
+    tree.links.new(node.outputs["Color"], background_node(scene).inputs["Color"])
     assert read_environment(scene).is_black
     (note,) = world_notes(scene)
     assert "Gone" in note and "Find Missing Files" in note

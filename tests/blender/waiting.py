@@ -8,31 +8,31 @@ from hairloom.addon.blender.base import latest_job
 from hairloom.addon.blender.preview import previews
 
 #: timeout [s] for work in a thread, however slow the machine
-PATIENCE_S = 120.0
+TIMEOUT_S = 120.0
 #: sleep of the main thread [s]: Python runs one thread at a time, so others need it to sleep
-PAUSE_S = 0.002
+POLL_S = 0.002
 
 
-def until(is_so: Callable[[], Any]) -> None:
+def wait_until(condition: Callable[[], Any]) -> None:
     """Wait until a condition holds."""
-    end = time.monotonic() + PATIENCE_S
-    while not is_so():
+    end = time.monotonic() + TIMEOUT_S
+    while not condition():
         assert time.monotonic() < end, "it does not come"
-        time.sleep(PAUSE_S)
+        time.sleep(POLL_S)
 
 
-def until_it_plays(session: Any, evaluated: Callable[[], Any], duration: float) -> None:
+def wait_until_playing(session: Any, evaluated: Callable[[], Any], duration: float) -> None:
     """Tick Play's clock until this hair, which waits for its colliders, starts to play."""
-    until(lambda: previews.advance(evaluated(), duration) or session.is_playing)
+    wait_until(lambda: previews.advance(evaluated(), duration) or session.is_playing)
 
 
-def take_steps_until(is_so: Callable[[], Any]) -> None:
+def take_steps_until(condition: Callable[[], Any]) -> None:
     """Run steps as Blender's timer does, until a condition holds."""
 
-    def is_so_after_a_step() -> bool:
-        if is_so():
+    def holds_after_a_step() -> bool:
+        if condition():
             return True
         latest_job.take_steps()
         return False
 
-    until(is_so_after_a_step)
+    wait_until(holds_after_a_step)

@@ -21,16 +21,16 @@ pytest.importorskip("bpy", reason="writing cards needs Blender or the bpy module
 
 from damaged_assets import (
     DAMAGES,
-    damaged,
-    garbage,
-    other_levels,
-    quantised,
+    damaged_copy,
+    with_garbage_sidecar,
     with_mirrored_cards,
+    with_other_levels,
+    with_quantised_positions,
     with_turned_tangents,
     without_index_buffer,
     without_sidecar,
 )
-from engine_assets import SIZE, Asset, check, read_encoded, written_asset
+from engine_assets import SIZE, Asset, check_picture, read_encoded, write_asset
 
 from hairloom.addon.cards.export_settings import CardExportSettings
 from hairloom.addon.exchange.cards.glb_file import GlbFile
@@ -45,7 +45,7 @@ OF_ENGINES = shutil.ignore_patterns("godot*", "game", "web*")
 
 @pytest.fixture(scope="module", params=["kajiya_kay", "marschner", "baked"])
 def asset(request: pytest.FixtureRequest, gpu_context: Any) -> Asset:
-    made = written_asset(request.param, request.param, CardExportSettings(index_buffer=True))
+    made = write_asset(request.param, request.param, CardExportSettings(index_buffer=True))
     with_mirrored_cards(made.folder)
     if request.param == "baked":
         with_turned_tangents(made.folder)
@@ -54,7 +54,7 @@ def asset(request: pytest.FixtureRequest, gpu_context: Any) -> Asset:
 
 @pytest.fixture(scope="module")
 def baked(gpu_context: Any) -> Asset:
-    return written_asset("damaged", "baked", CardExportSettings(index_buffer=True))
+    return write_asset("damaged", "baked", CardExportSettings(index_buffer=True))
 
 
 def godot_project(asset: Asset, name: str) -> Path:
@@ -130,7 +130,7 @@ def test_godot_draws_cards_as_we_do(asset: Asset, sandbox: str) -> None:
     """With files that no editor has imported."""
     project = godot_project(asset, "godot")
     run_godot(sandbox, "--path", str(project), "--", str(project))
-    check(asset, project / "godot.png")
+    check_picture(asset, project / "godot.png")
     check_fog(asset, project / "fog.png")
     check_order(asset, project / "order.json")
     shown = json.loads((project / "shown.json").read_text(encoding="utf-8"))
@@ -149,7 +149,7 @@ def test_a_game_that_godot_exported_draws_cards_as_we_do(asset: Asset, sandbox: 
     shutil.rmtree(project)
     said = run_godot(sandbox, "--main-pack", str(pack), "--", str(game))
     assert "WARNING" not in said and "ERROR" not in said, said
-    check(asset, game / "godot.png")
+    check_picture(asset, game / "godot.png")
     check_order(asset, game / "order.json")
     shown = json.loads((game / "shown.json").read_text(encoding="utf-8"))
     np.testing.assert_allclose(shown.pop("ranges"), ranges_of(asset), rtol=1e-5)
@@ -168,7 +168,7 @@ def test_three_js_draws_cards_as_we_do(asset: Asset, sandbox: str) -> None:
     command = [sandbox, "run", "python3", str(site / "draw_page.py")]
     result = subprocess.run(command, capture_output=True, text=True, timeout=300)
     assert result.returncode == 0, result.stderr
-    check(asset, site / "three.png")
+    check_picture(asset, site / "three.png")
     check_fog(asset, site / "fog.png")
     shown = json.loads((site / "levels.json").read_text(encoding="utf-8"))
     sidecar = json.loads((asset.folder / "cards.hairloom.json").read_text(encoding="utf-8"))
@@ -283,11 +283,11 @@ def test_three_js_shows_what_can_be_shown_and_says_what_is_wrong(
     cases = {"whole": lambda folder: None} | {each.__name__: each for each in DAMAGES}
     files = {}
     for name, damage in cases.items():
-        (glb,) = damaged(baked.folder, site / name, damage).glob("*.glb")
+        (glb,) = damaged_copy(baked.folder, site / name, damage).glob("*.glb")
         files[name] = glb.name
     for textures in ("exr", "dds"):
         settings = CardExportSettings(index_buffer=True, textures=textures)
-        made = written_asset(f"damaged_{textures}", "baked", settings)
+        made = write_asset(f"damaged_{textures}", "baked", settings)
         shutil.copytree(made.folder, site / textures)
         files[textures] = "cards.glb"
     (site / "cases.json").write_text(json.dumps(files), encoding="utf-8")
@@ -310,7 +310,7 @@ def test_three_js_shows_what_can_be_shown_and_says_what_is_wrong(
         found = seen.pop(damage.__name__)
         assert bool(found["said"]) == bool(sentence), damage.__name__
         assert all(sentence in each for each in found["said"]), damage.__name__
-        is_plain = damage in (without_sidecar, garbage, other_levels)
+        is_plain = damage in (without_sidecar, with_garbage_sidecar, with_other_levels)
         assert found["levels"] == (0 if is_plain else 3)
         # at the same place, of the same size and similar brightness
         assert found["filled"] == pytest.approx(whole["filled"], rel=0.05), damage.__name__
@@ -326,7 +326,7 @@ def test_godot_shows_what_can_be_shown_and_says_what_is_wrong(baked: Asset, sand
     cases = {"whole": lambda folder: None} | {each.__name__: each for each in DAMAGES}
     files = {}
     for name, damage in cases.items():
-        (glb,) = damaged(baked.folder, project / name, damage).glob("*.glb")
+        (glb,) = damaged_copy(baked.folder, project / name, damage).glob("*.glb")
         files[name] = glb.name
     (project / "cases.json").write_text(json.dumps(files), encoding="utf-8")
     said = run_godot(sandbox, "--path", str(project), "--", str(project))
@@ -343,12 +343,16 @@ def test_godot_shows_what_can_be_shown_and_says_what_is_wrong(baked: Asset, sand
         if damage is without_index_buffer:  # Godot cannot use its order of back faces
             assert sentences[name] == []
             continue
-        if damage is quantised:  # Godot 4.6 does not read such files, with or without the add-on
+        if (
+            damage is with_quantised_positions
+        ):  # Godot 4.6 does not read such files, with or without the add-on
             assert seen[name] is None and "cannot be read" in sentences[name][-1]
             continue
-        expected = {without_sidecar: "no sidecar", garbage: "no sidecar"}.get(damage, sentence)
+        expected = {without_sidecar: "no sidecar", with_garbage_sidecar: "no sidecar"}.get(
+            damage, sentence
+        )
         assert sentences[name] and all(expected in each for each in sentences[name]), name
-        is_plain = damage in (without_sidecar, garbage, other_levels)
+        is_plain = damage in (without_sidecar, with_garbage_sidecar, with_other_levels)
         assert (seen[name]["own"] == 0) == is_plain, name
         # a plain material is lit from all sides, ours only by the sun
         filled = pytest.approx(seen["whole"]["filled"], rel=0.4 if is_plain else 0.1)

@@ -26,7 +26,7 @@ from engine_assets import (
     Asset,
     glb_axes,
     read_encoded,
-    written_asset,
+    write_asset,
 )
 from test_card_motion import motion, write  # noqa: F401
 
@@ -65,7 +65,7 @@ OWN_VIEW = """(({ hair, scene, camera, redraw }, view) => {
 @pytest.fixture(scope="module")
 def asset(gpu_context: Any) -> Asset:
     settings = CardExportSettings(page=True, page_texture="2048")
-    return written_asset("page", "baked", settings, NAME)
+    return write_asset("page", "baked", settings, NAME)
 
 
 def driven(sandbox: str, asset: Asset, name: str, *steps: dict[str, Any]) -> dict[str, Any]:

@@ -24,18 +24,18 @@ pytest.importorskip("bpy", reason="writing cards needs Blender or the bpy module
 from damaged_assets import (
     DAMAGES,
     change_sidecar,
-    damaged,
-    other_levels,
-    quantised,
-    renamed,
-    reordered,
+    damaged_copy,
     with_mirrored_cards,
+    with_other_levels,
+    with_quantised_positions,
+    with_renamed_files,
+    with_reordered_triangles,
     without_index_buffer,
     without_textures,
     without_unused,
 )
-from engine_assets import OUTPUT, Asset, written_asset
-from hlsl_on_gpu import probed, probed_hlsl
+from engine_assets import OUTPUT, Asset, write_asset
+from hlsl_on_gpu import probe_glsl, probe_hlsl
 
 from hairloom.addon.cards.export_settings import CardExportSettings
 from hairloom.addon.exchange.cards.glb_file import GlbFile
@@ -57,7 +57,7 @@ OPAQUE_MODES = ("ShadowCaster", "DepthOnly", "DepthNormalsOnly")
 
 @pytest.fixture(scope="module")
 def asset(gpu_context: Any) -> Asset:
-    made = written_asset("unity", "marschner", CardExportSettings(index_buffer=True))
+    made = write_asset("unity", "marschner", CardExportSettings(index_buffer=True))
     with_mirrored_cards(made.folder)
     return made
 
@@ -199,7 +199,7 @@ def test_levels_end_one_after_the_other_where_the_file_has_them_end_together(
 ) -> None:
     """Unity rejects all levels otherwise. A file has equal ends if a coarser level is equally
     good."""
-    folder = damaged(asset.folder, OUTPUT / "unity_damaged", lambda folder: None)
+    folder = damaged_copy(asset.folder, OUTPUT / "unity_damaged", lambda folder: None)
     glb = glb_of(folder)
     file = GlbFile.of(glb.read_bytes(), str(glb))
     extras = file.content["nodes"][file.node("cards_LOD0")]["extras"]
@@ -269,7 +269,9 @@ def test_directions_are_read_from_the_channels_that_hold_them(
         content["textures"]["tangent"] |= {"channels": channels, "inverted": inverted}
         content["textures"]["normal"] = content["textures"]["tangent"] | {"channels": channels}
 
-    folder = damaged(asset.folder, OUTPUT / "unity_damaged", lambda at: change_sidecar(at, change))
+    folder = damaged_copy(
+        asset.folder, OUTPUT / "unity_damaged", lambda at: change_sidecar(at, change)
+    )
     found = imported(glb_of(folder))["materials"][0]["values"]
     assert [found[f"_tangent_{axis}"] for axis in "xyz"] == lanes
     assert found["_has_normal_map"] == (2 if len(channels) == 2 else 1)
@@ -361,7 +363,7 @@ def _elsewhere(folder: Path) -> None:
     ("damage", "message"),
     [
         (_without_sidecar, "missing"),
-        (other_levels, "which its sidecar names"),
+        (with_other_levels, "which its sidecar names"),
         (_cut_off, "cut off"),
         (_compressed, "another program has changed it"),
         (_garbage, "no JSON"),
@@ -384,12 +386,19 @@ def test_what_cannot_be_read_is_named(
 
 
 @pytest.mark.parametrize(
-    "damage", [renamed, without_textures, without_index_buffer, reordered, without_unused]
+    "damage",
+    [
+        with_renamed_files,
+        without_textures,
+        without_index_buffer,
+        with_reordered_triangles,
+        without_unused,
+    ],
 )
 def test_what_can_be_shown_is_shown(
     imported: Callable[..., dict[str, Any]], asset: Asset, damage: Callable[[Path], None]
 ) -> None:
-    folder = damaged(asset.folder, OUTPUT / "unity_damaged", damage)
+    folder = damaged_copy(asset.folder, OUTPUT / "unity_damaged", damage)
     found = imported(glb_of(folder))
     assert not found["errors"] and len(found["meshes"]) == 3
     assert found["warnings"] and all(DAMAGES[damage] in each for each in found["warnings"])
@@ -398,14 +407,14 @@ def test_what_can_be_shown_is_shown(
         (0, True) if damage is without_textures else (1, values["_base_gain"] == 1.0)
     )
     _, _, _, (_, back, front) = level(found, 0)
-    has_own_order = damage in (renamed, without_textures)
+    has_own_order = damage in (with_renamed_files, without_textures)
     assert (back != front).any() == has_own_order
 
 
 def test_rounded_positions_are_where_they_were(
     imported: Callable[..., dict[str, Any]], asset: Asset, hair: dict[str, Any]
 ) -> None:
-    folder = damaged(asset.folder, OUTPUT / "unity_damaged", quantised)
+    folder = damaged_copy(asset.folder, OUTPUT / "unity_damaged", with_quantised_positions)
     found = imported(glb_of(folder))
     assert not found["errors"] and not found["warnings"]
     place, _, _, parts = level(found, 0)
@@ -417,7 +426,7 @@ def test_rounded_positions_are_where_they_were(
 def test_in_the_high_definition_pipeline_alpha_comes_with_the_colour_or_with_a_warning(
     imported: Callable[..., dict[str, Any]], asset: Asset
 ) -> None:
-    folder = damaged(asset.folder, OUTPUT / "unity_damaged", lambda folder: None)
+    folder = damaged_copy(asset.folder, OUTPUT / "unity_damaged", lambda folder: None)
     (said,) = imported(glb_of(folder), "hdrp")["warnings"]
     assert "packing Unity HDRP" in said
     sidecar = next(folder.glob("*.hairloom.json"))
@@ -472,9 +481,9 @@ def test_its_shading_is_that_of_the_other_engines(
     probe = (HERE / "probe.glsl").read_text(encoding="utf-8")
     shading = hair_hlsl.SOURCE.read_text(encoding="utf-8")
     text = hair_hlsl.hlsl(shading + probe) + PROBE_HLSL
-    found = probed_hlsl(OUTPUT / "unity_probe.hlsl", text, sandbox, tmp_path)
+    found = probe_hlsl(OUTPUT / "unity_probe.hlsl", text, sandbox, tmp_path)
     glsl = shading + probe + PROBE_GLSL
-    expected = probed(tmp_path / "glsl.glsl", glsl, "result_of_probe = probe_both(place)")
+    expected = probe_glsl(tmp_path / "glsl.glsl", glsl, "result_of_probe = probe_both(place)")
     assert np.isfinite(expected).all() and expected.std(axis=(0, 1)).min() > 0.01
     np.testing.assert_allclose(found, expected, atol=2e-5, rtol=2e-4)
 

@@ -26,8 +26,8 @@ from extension_loader import REPOSITORY
 
 pytest.importorskip("bpy", reason="writing cards needs Blender or the bpy module")
 
-from engine_assets import OUTPUT, Asset, written_asset
-from hlsl_on_gpu import probed, probed_hlsl
+from engine_assets import OUTPUT, Asset, write_asset
+from hlsl_on_gpu import probe_glsl, probe_hlsl
 
 from hairloom.addon.blender.cards.textures import texture_channels, texture_roles
 from hairloom.addon.cards.export_settings import CardExportSettings
@@ -44,7 +44,7 @@ LOOKS = {"kajiya_kay": "unreal", "marschner": "hairloom", "baked": "unreal_compa
 @pytest.fixture(scope="module", params=LOOKS)
 def asset(request: pytest.FixtureRequest, gpu_context: Any) -> Asset:
     settings = CardExportSettings(packing=LOOKS[request.param])
-    return written_asset(f"unreal_{request.param}", request.param, settings, file="cards.fbx")
+    return write_asset(f"unreal_{request.param}", request.param, settings, file="cards.fbx")
 
 
 @pytest.fixture(scope="module")
@@ -411,9 +411,9 @@ def test_the_nodes_shade_as_the_other_engines_do(
     others = others[others.index("float probe_wave") :].removesuffix(hair_hlsl.ENDING)
     others = others.replace("hair_unit", "shading.hair_unit")
     text = struct + others + nodes_of(material)
-    found = probed_hlsl(OUTPUT / "unreal_probe.hlsl", text, sandbox, tmp_path)
+    found = probe_hlsl(OUTPUT / "unreal_probe.hlsl", text, sandbox, tmp_path)
     glsl = shading + waves + expected_glsl(sidecar)
-    expected = probed(tmp_path / "glsl.glsl", glsl, "result_of_probe = probe_both(place)")
+    expected = probe_glsl(tmp_path / "glsl.glsl", glsl, "result_of_probe = probe_both(place)")
     assert np.isfinite(expected).all()
     assert (expected.std(axis=(0, 1)) > 0.01).sum() >= 3
     np.testing.assert_allclose(found, expected, atol=2e-5, rtol=2e-4)

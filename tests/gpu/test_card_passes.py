@@ -9,7 +9,7 @@ from typing import Any
 import flat_cards
 import numpy as np
 import pytest
-from flat_cards import camera, card, constant
+from flat_cards import camera, card, constant_textures
 
 from hairloom.addon.cards.card_mesh import CardMesh
 from hairloom.addon.cards.drawing_settings import CardDrawingSettings
@@ -256,7 +256,7 @@ def test_clear_pixels_hide_what_comes_later_only_without_the_test(frame: Any) ->
         mesh, uv=np.repeat([[0.1, 0.5], [0.9, 0.5]], 4, axis=0).astype(np.float32)
     )
     alpha = np.repeat([[0.0, 0.0, 0.5, 0.5]], 4, axis=0).astype(np.float32)
-    textures = dataclasses.replace(constant(noise=0.5), alpha=alpha)
+    textures = dataclasses.replace(constant_textures(noise=0.5), alpha=alpha)
     for skip_clear, expected in ((True, 0.5), (False, 0.0)):
         drawing = CardDrawingSettings(skip_clear=skip_clear)
         shown = snapshot_of(mesh, textures, drawing)
@@ -267,13 +267,13 @@ def test_clear_pixels_hide_what_comes_later_only_without_the_test(frame: Any) ->
 def test_a_normal_map_bends_the_normal(frame: Any) -> None:
     """The twin of `mapped_normal`, tested through the diffuse term."""
     texel = np.float32((0.8, 0.6, 0.85))
-    bent = constant(noise=0.5, normal=np.broadcast_to(texel, (4, 4, 3)))
+    bent = constant_textures(noise=0.5, normal=np.broadcast_to(texel, (4, 4, 3)))
     sun = Light.sun((-0.6, 0.7, -0.2), (1.0, 1.0, 1.0), 3.0)
     view, mesh = camera(frame), mesh_of((0.0, 0.0, 1.0, 1.0, 0.0))
     light = {"lights": (sun,), "ambient": (0.0, 0.0, 0.0)}
     flat, mapped = (
         frame.render_image(snapshot_of(mesh, textures, **light), view, 8, 8, 1)[4, 4, :3]
-        for textures in (constant(noise=0.5), bent)
+        for textures in (constant_textures(noise=0.5), bent)
     )
     normal, tangent = np.array([0.0, -1.0, 0.0]), np.array([0.0, 0.0, -1.0])
     to_light, to_eye = -np.array([-0.6, 0.7, -0.2]), np.array([0.0, -1.0, 0.0])
@@ -295,7 +295,9 @@ def test_what_the_viewport_is_given(frame: Any) -> None:
     from hairloom.addon.render.card_pass import CardPass
 
     dim = {"lights": (Light.sun((0.2, 0.7, -0.4), (1.0, 0.9, 0.8), 0.4),)}
-    shown = snapshot_of(mesh_of((0.0, 0.0, 1.0, 1.0, 0.0)), constant(alpha=0.5, noise=0.5), **dim)
+    shown = snapshot_of(
+        mesh_of((0.0, 0.0, 1.0, 1.0, 0.0)), constant_textures(alpha=0.5, noise=0.5), **dim
+    )
     linear = frame.render_image(shown, camera(frame), 8, 8, 1)[4, 4]
     offscreen = gpu.types.GPUOffScreen(8, 8, format="RGBA32F")
     with offscreen.bind():

@@ -9,7 +9,7 @@ from typing import Any
 import flat_cards
 import numpy as np
 import pytest
-from flat_cards import camera, constant, mesh_of, snapshot_of
+from flat_cards import camera, constant_textures, mesh_of, snapshot_of
 
 from hairloom.addon.shading.card_look import card_base, mapped_tangent
 from hairloom.addon.shading.kajiya_kay import kajiya_kay
@@ -70,7 +70,7 @@ def test_a_pixel_has_the_colour_of_the_reference(
 ) -> None:
     """One flat card that fills the picture: vertex data, textures, lights and settings."""
     if kind == "constant":
-        textures = constant((0.5, 0.7, 0.9), 1.0, 0.8, 0.3, (0.6, 0.95, 0.3))
+        textures = constant_textures((0.5, 0.7, 0.9), 1.0, 0.8, 0.3, (0.6, 0.95, 0.3))
     else:
         made = hair_textures(TextureSettings(variant_width=32, height=24, strand_count=6), 2)
         textures = dataclasses.replace(made, alpha=np.ones_like(made.alpha))
@@ -146,7 +146,7 @@ def test_marschner_shades_cards_as_strands(
     mesh = mesh_of(card((0.0, 0.0), (1.0, 1.0), 0.0, tilt=tilt))
     snapshot = snapshot_of(
         mesh,
-        constant(own / mean, noise=0.3, shift=0.7),
+        constant_textures(own / mean, noise=0.3, shift=0.7),
         cards={} if sky is None else {"openness": np.tile(np.float32(sky), (4, 1))},
         lights=LIGHTS,
         ambient=AMBIENT,
@@ -239,7 +239,7 @@ def test_opaque_parts_hide_what_is_drawn_later_behind_them(frame: Any, front: An
     far["occlusion"] = np.zeros(4)  # black
     look = {"ambient": (1.0, 1.0, 1.0), "shading": PLAIN}
     picture = frame.render_image(
-        snapshot_of(mesh_of(near, far), constant(), **look), front, 8, 8, 1
+        snapshot_of(mesh_of(near, far), constant_textures(), **look), front, 8, 8, 1
     )
     assert (picture[..., 0] > 0.3).all()
 
@@ -250,7 +250,7 @@ def test_clear_parts_hide_nothing(frame: Any, front: Any) -> None:
     near["uv"] = near["uv"] * [0.0, 1.0] + [0.1, 0.0]
     far["uv"] = far["uv"] * [0.0, 1.0] + [0.9, 0.0]
     alpha = np.repeat([[0.0, 0.0, 0.5, 0.5]], 4, axis=0).astype(np.float32)
-    textures = dataclasses.replace(constant(), alpha=alpha)
+    textures = dataclasses.replace(constant_textures(), alpha=alpha)
     picture = frame.render_image(snapshot_of(mesh_of(near, far), textures), front, 8, 8, 1)
     assert picture[..., 3] == pytest.approx(0.5, abs=1e-3)
 
@@ -267,7 +267,7 @@ def test_a_mesh_before_a_card_hides_it_and_one_behind_shines_through(
     picture = frame.render_image(
         snapshot_of(
             dataclasses.replace(cards, occlusion=np.ones(8)),
-            constant((1.0, 0.0, 0.0), alpha=0.5),
+            constant_textures((1.0, 0.0, 0.0), alpha=0.5),
             meshes=(mesh,),
             ambient=(1.0, 1.0, 1.0),
             shading=PLAIN,
@@ -292,7 +292,9 @@ def test_equal_depth_loses_no_pixel(frame: Any) -> None:
         each["positions"] = each["positions"] @ turn + random.uniform(-0.3, 0.3, 3)
         each["occlusion"] = np.ones(4)
         cards.append(each)
-    snapshot = snapshot_of(mesh_of(*cards), constant(), ambient=(1.0, 1.0, 1.0), shading=PLAIN)
+    snapshot = snapshot_of(
+        mesh_of(*cards), constant_textures(), ambient=(1.0, 1.0, 1.0), shading=PLAIN
+    )
     camera = frame.frame_camera(
         (np.full(3, -0.4), np.full(3, 0.4)), (0.3, -1.0, 0.2), np.radians(40), 1.0
     )
@@ -309,9 +311,11 @@ def test_equal_depth_loses_no_pixel(frame: Any) -> None:
 def test_passes_keep_what_did_not_change(frame: Any, front: Any) -> None:
     from hairloom.addon.render.card_pass import CardPass
 
-    first = snapshot_of(mesh_of(card((0.0, 0.0), (1.0, 1.0), 0.0)), constant(), shading=PLAIN)
+    first = snapshot_of(
+        mesh_of(card((0.0, 0.0), (1.0, 1.0), 0.0)), constant_textures(), shading=PLAIN
+    )
     second = dataclasses.replace(
-        first, cards=dataclasses.replace(first.cards, textures=constant((1.0, 0.0, 0.0)))
+        first, cards=dataclasses.replace(first.cards, textures=constant_textures((1.0, 0.0, 0.0)))
     )
     kept = CardPass()
     for shown in (first, second, first):
@@ -324,7 +328,7 @@ def test_passes_keep_what_did_not_change(frame: Any, front: Any) -> None:
 def test_state_is_as_it_was_found(gpu_context: Any, frame: Any, front: Any) -> None:
     from hairloom.addon.render.card_pass import CardPass
 
-    snapshot = snapshot_of(mesh_of(card((0.0, 0.0), (1.0, 1.0), 0.0)), constant(alpha=0.5))
+    snapshot = snapshot_of(mesh_of(card((0.0, 0.0), (1.0, 1.0), 0.0)), constant_textures(alpha=0.5))
     state = gpu_context.state
     offscreen = gpu_context.types.GPUOffScreen(8, 8, format="RGBA32F")
 

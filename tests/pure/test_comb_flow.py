@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from small_wig import GUIDES, curves, sheet, turned
+from small_wig import GUIDES, sheet, turn_strands, wig_strands
 
 from hairloom.addon import rig_flow
 from hairloom.addon.comb_flow import combed
@@ -26,7 +26,7 @@ def test_it_is_what_a_rebuild_makes(method: str, clump: float) -> None:
     """Against a full rebuild. The turn is small, so that each strand keeps its guides; the children
     are so many that clumps have several levels."""
     settings = ChildrenSettings(method=method, strand_count=5000, clump=clump, frizz=0.02)
-    before, after = curves(), turned(curves(), COMBED, 0.05)
+    before, after = wig_strands(), turn_strands(wig_strands(), COMBED, 0.05)
     rig, whole = rig_of(before, settings), rig_of(after, settings)
     now = combed(rig, after.take(COMBED), COMBED)
     np.testing.assert_array_equal(now.strands.offsets, whole.strands.offsets)
@@ -39,10 +39,10 @@ def test_it_is_what_a_rebuild_makes(method: str, clump: float) -> None:
 
 def test_one_stroke_after_another_and_back_leaves_nothing() -> None:
     settings = ChildrenSettings(method="multi", strand_count=5000)
-    before = curves()
+    before = wig_strands()
     first, second = (
-        turned(before, COMBED, 0.3),
-        turned(turned(before, COMBED, 0.3), COMBED + 1, 0.2),
+        turn_strands(before, COMBED, 0.3),
+        turn_strands(turn_strands(before, COMBED, 0.3), COMBED + 1, 0.2),
     )
     rig = rig_of(before, settings)
     now = combed(combed(rig, first.take(COMBED), COMBED), second.take(COMBED + 1), COMBED + 1)
@@ -55,7 +55,7 @@ def test_one_stroke_after_another_and_back_leaves_nothing() -> None:
 
 def test_curves_of_other_point_counts_keep_those_of_the_rig() -> None:
     """A curl that a brush has straightened keeps the number of points that it had in the rig."""
-    strands = curves()
+    strands = wig_strands()
     angle = np.linspace(0.0, 30.0, 200)
     coil = np.stack([0.01 * np.cos(angle) - 0.01, 0.01 * np.sin(angle), 0.003 * angle], axis=1)
     points = np.concatenate([strands.points, coil.astype(np.float32)])

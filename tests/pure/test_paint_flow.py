@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from small_wig import GUIDES, curves, sheet, turned
+from small_wig import GUIDES, sheet, turn_strands, wig_strands
 
 from hairloom.addon import rig_flow
 from hairloom.addon.arrays import Floats
@@ -24,7 +24,7 @@ def dab(weight: float, x: float = 0.0) -> Floats:
 
 def rig_of(density: Floats | None, settings: ChildrenSettings, **others: object) -> rig_flow.Rig:
     return rig_flow.prepare(
-        others.get("strands", curves()),
+        others.get("strands", wig_strands()),
         HEAD,
         GUIDES,
         place="a wig",
@@ -105,7 +105,7 @@ def test_a_brush_that_goes_back_brings_back_the_very_children() -> None:
 
 def test_what_was_painted_is_combed_as_all_hair_is() -> None:
     settings = ChildrenSettings(method="multi", strand_count=5000, clump=0.0)
-    after = turned(curves(), COMBED, 0.05)
+    after = turn_strands(wig_strands(), COMBED, 0.05)
     now = combed(painted(rig_of(EVEN, settings), dab(3.0)), after.take(COMBED), COMBED)
     whole = shapes(rig_of(dab(3.0), settings, strands=after))
     for root, strand in shapes(now).items():

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from baby_hair import short_strands, wig
-from small_wig import GUIDES, curves, sheet
+from small_wig import GUIDES, sheet, wig_strands
 
 from hairloom.addon import motion_flow, rig_flow
 from hairloom.addon.card_flow import card_groom
@@ -15,7 +15,7 @@ from hairloom.addon.strands import Surface
 
 
 def rig_of(children: ChildrenSettings | None, head: Surface | None) -> rig_flow.Rig:
-    return rig_flow.prepare(curves(), head, GUIDES, place="a wig", children=children)
+    return rig_flow.prepare(wig_strands(), head, GUIDES, place="a wig", children=children)
 
 
 def test_none_is_as_without_the_setting() -> None:
@@ -34,7 +34,7 @@ def test_an_artist_reads_which_curves_are_simulated() -> None:
     )
     more = rig_of(ChildrenSettings(method="multi", strand_count=2000), sheet())
     assert more.guides_line == f"{some.guides_line}. 2,000 children follow, too"
-    few = rig_flow.prepare(curves(20), sheet(), GUIDES, place="a wig")
+    few = rig_flow.prepare(wig_strands(20), sheet(), GUIDES, place="a wig")
     assert few.guides_line == "All 20 curves are simulated, with 6 points each"
 
 
@@ -100,7 +100,11 @@ def test_low_ranks_are_an_even_sparser_groom() -> None:
     """Each quarter of the sheet has about a quarter of the strands of low rank."""
     for children in (None, ChildrenSettings(method="multi", strand_count=700)):
         rig = rig_flow.prepare(
-            curves(300 if children else 1000), sheet(), GUIDES, place="a wig", children=children
+            wig_strands(300 if children else 1000),
+            sheet(),
+            GUIDES,
+            place="a wig",
+            children=children,
         )
         rank = rig_flow.strand_ranks(rig)
         assert sorted(rank) == pytest.approx(np.arange(1000) / 1000, abs=4e-3)
@@ -134,7 +138,7 @@ def test_baby_hair_is_fine_where_widths_are_found() -> None:
     def widths(baby_hair: float) -> tuple[np.ndarray, np.ndarray]:
         children = replace(settings, baby_hair=baby_hair)
         rig = rig_flow.prepare(
-            curves(), sheet(), GUIDES, place="a wig", children=children, widths="found"
+            wig_strands(), sheet(), GUIDES, place="a wig", children=children, widths="found"
         )
         assert rig.widths.is_found
         first = rig.strands.offsets[:-1]

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from small_wig import curves, sheet, turned
+from small_wig import sheet, turn_strands, wig_strands
 from tiers import few_in_commits
 
 from hairloom.addon import rig_flow
@@ -52,7 +52,7 @@ def same(one: Any, other: Any, where: str = "rig") -> None:
 
 def combed(strands: StrandSet, stroke: int) -> StrandSet:
     number = np.random.default_rng(stroke).choice(strands.strand_count, 5, replace=False)
-    return turned(strands, number, 0.4 * (stroke + 1))
+    return turn_strands(strands, number, 0.4 * (stroke + 1))
 
 
 def painted(stroke: int) -> np.ndarray:
@@ -83,7 +83,7 @@ def test_it_is_what_is_made_from_nothing(
     settings: ChildrenSettings, guides: int, does: Callable[..., Any]
 ) -> None:
     kept, field = Kept(), block()
-    strands, density = curves(), np.ones(len(HEAD.positions), np.float32)
+    strands, density = wig_strands(), np.ones(len(HEAD.positions), np.float32)
 
     def made(kept: dict[str, Kept]) -> rig_flow.Rig:
         return rig_flow.prepare(

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from small_wig import GUIDES, curves, sheet
+from small_wig import GUIDES, sheet, wig_strands
 
 from hairloom.addon import motion_flow, rig_flow
 from hairloom.addon.dynamics.painted import PaintedGuides
@@ -52,7 +52,7 @@ def pose_of(rig: Rig, matrix: np.ndarray) -> Pose:
 def test_it_is_what_a_rebuild_makes(moved_by: str) -> None:
     """Against a full rebuild: the hair's object moves with the surface, or stands still while nodes
     carry the curves with the surface."""
-    rig, now = rig_of(curves()), bowed(curves(), 0.04, 1.3)
+    rig, now = rig_of(wig_strands()), bowed(wig_strands(), 0.04, 1.3)
     matrix = turned()
     back = np.linalg.inv(matrix) if moved_by == "object" else np.eye(4)
     found = styled(rig, at_rest(rig, now.transformed(matrix), pose_of(rig, matrix), back))
@@ -64,21 +64,21 @@ def test_it_is_what_a_rebuild_makes(moved_by: str) -> None:
 
 def test_children_bow_as_all_curves_around_them_do() -> None:
     plain = {"clump": 0.0, "frizz": 0.0, "length_variation": 0.0, "baby_hair": 0.0}
-    rig = rig_of(curves(), ChildrenSettings(method="multi", strand_count=500, **plain))
-    found = styled(rig, bowed(curves(), 0.04)).strands.grid
+    rig = rig_of(wig_strands(), ChildrenSettings(method="multi", strand_count=500, **plain))
+    found = styled(rig, bowed(wig_strands(), 0.04)).strands.grid
     along = np.linspace(0.0, 1.0, found.shape[1])[:, None]
     expected = rig.strands.grid + along**2 * np.array([0.0, 0.04, 0.0])
     np.testing.assert_allclose(found, expected, atol=1e-5)
 
 
 def test_hair_moves_in_its_object_though_its_surface_goes_elsewhere() -> None:
-    rig, now = rig_of(curves(), None), bowed(curves(), 0.04)
+    rig, now = rig_of(wig_strands(), None), bowed(wig_strands(), 0.04)
     found = styled(rig, at_rest(rig, now, pose_of(rig, turned()), np.eye(4)))
     np.testing.assert_array_equal(found.strands.points, now.points)
 
 
 def test_children_of_a_bake_ride_on_the_guides_of_the_frame() -> None:
-    rig, now = rig_of(curves()), bowed(curves(), 0.04)
+    rig, now = rig_of(wig_strands()), bowed(wig_strands(), 0.04)
     whole = styled(rig, now).strands.points
     found = styled(replace(rig, grown=None), now).strands.points
     away, moved = (np.linalg.norm(found - each, axis=1) for each in (whole, rig.strands.points))
@@ -86,8 +86,8 @@ def test_children_of_a_bake_ride_on_the_guides_of_the_frame() -> None:
 
 
 def test_hair_comes_to_rest_in_another_style_as_if_it_had_begun_there() -> None:
-    rig, settings = rig_of(curves(), None), DynamicsSettings(style_damping=20.0)
-    now = styled(rig, bowed(curves(), 0.04, 1.3))
+    rig, settings = rig_of(wig_strands(), None), DynamicsSettings(style_damping=20.0)
+    now = styled(rig, bowed(wig_strands(), 0.04, 1.3))
     other = motion_flow.with_style(now, motion_flow.begin(rig, rig.rest_pose))
     there = motion_flow.begin(now, rig.rest_pose)
     for _ in range(48):
@@ -106,7 +106,7 @@ def test_hair_comes_to_rest_in_another_style_as_if_it_had_begun_there() -> None:
 
 
 def test_nothing_of_it_is_simulated_at_0_and_all_of_it_at_1() -> None:
-    rig = rig_of(curves(), None)
+    rig = rig_of(wig_strands(), None)
     matrix, count = turned(0.2), len(rig.guides)
     fractions = np.where(np.arange(count) % 2 == 0, 0.0, 1.0).astype(np.float32)
     begun, pose = motion_flow.begin(rig, rig.rest_pose), pose_of(rig, matrix)

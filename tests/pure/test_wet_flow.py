@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from small_wig import GUIDES, curves, sheet
+from small_wig import GUIDES, sheet, wig_strands
 
 from hairloom.addon import rig_flow
 from hairloom.addon.dynamics.settings import DynamicsSettings
@@ -48,7 +48,7 @@ def test_a_heavier_mass_swings_slower_and_loses_less() -> None:
 def test_children_of_wet_hair_lie_closer_in_their_clumps() -> None:
     def gap(settings: ChildrenSettings) -> float:
         """Mean distance of a child's tip from the nearest other tip [m]."""
-        rig = rig_flow.prepare(curves(), sheet(), GUIDES, place="a wig", children=settings)
+        rig = rig_flow.prepare(wig_strands(), sheet(), GUIDES, place="a wig", children=settings)
         tips = rig.strands.grid[60:, -1]
         away = np.linalg.norm(tips[:, None] - tips[None], axis=2)
         np.fill_diagonal(away, np.inf)
@@ -66,7 +66,7 @@ def test_children_of_wet_hair_lie_closer_in_their_clumps() -> None:
 
 
 def test_own_colours_of_strands_are_wet_too() -> None:
-    strands = curves()
+    strands = wig_strands()
     color = np.full((strands.point_count, 3), 0.4, np.float32)
     colored = replace(strands, color=color)
     np.testing.assert_allclose(

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tails import SOFT, cells_of, locks, squeezed, tail, turned
+from tails import SOFT_STYLE, cell_count, rotation_matrix, squeezed_tail, tail, two_locks
 from tiers import few_in_commits
 
 from hairloom.addon.dynamics import among
@@ -27,7 +27,7 @@ def played(grid, settings, seconds=2.0, fps=24.0, state=None):
 
 @pytest.mark.parametrize("volume", few_in_commits([0.4, 1.0]))
 def test_as_without_a_grid(volume):
-    rest, position, previous, turn, middle = squeezed()
+    rest, position, previous, turn, middle = squeezed_tail()
     grid, settings = rest.hair_grid, DynamicsSettings(volume=volume)
     strength = Strength.of(settings, DT)
     found = feel(grid, grid.place(turn, middle), strength, position, previous)
@@ -45,7 +45,7 @@ def test_as_without_a_grid(volume):
 @pytest.mark.slow(instead="test_as_without_a_grid")
 def test_a_frame_as_without_a_grid():
     grid = tail(12, 8)
-    settings = DynamicsSettings(volume=1.0, length_tolerance=0.0001, **SOFT)
+    settings = DynamicsSettings(volume=1.0, length_tolerance=0.0001, **SOFT_STYLE)
     fast = slow = start(grid)
     for frame in range(4):
         target = grid + np.float32([0.01 * frame, 0.0, 0.0])
@@ -59,7 +59,7 @@ def test_a_frame_as_without_a_grid():
 
 
 def test_the_order_of_guides_changes_no_bit():
-    rest, position, previous, turn, middle = squeezed(60)
+    rest, position, previous, turn, middle = squeezed_tail(60)
     order = np.random.default_rng(6).permutation(60)
     other = replace(rest, position=rest.position[:, :, order], strands=rest.strands[order])
     strength = Strength.of(DynamicsSettings(volume=1.0), DT)
@@ -78,7 +78,7 @@ def test_the_order_of_guides_changes_no_bit():
 
 @pytest.mark.parametrize("angle", [0.0, 0.4, 2.0])
 def test_at_rest_it_does_nothing_wherever_the_head_is(angle):
-    grid, turn, move = tail(300), turned(angle), np.array([3.0, -1.0, 0.5])
+    grid, turn, move = tail(300), rotation_matrix(angle), np.array([3.0, -1.0, 0.5])
     rest = start(grid).rest
     here = (grid @ turn.T + move).astype(np.float32)
     rows = np.ascontiguousarray(here.transpose(2, 1, 0))
@@ -103,8 +103,8 @@ def test_hair_at_rest_stays_at_rest():
 def test_a_ponytail_keeps_its_volume():
     grid = tail(600)
     kept = {
-        volume: cells_of(played(grid, DynamicsSettings(volume=volume, **SOFT)).grid)
-        / cells_of(grid)
+        volume: cell_count(played(grid, DynamicsSettings(volume=volume, **SOFT_STYLE)).grid)
+        / cell_count(grid)
         for volume in (0.0, 1.0)
     }
     assert kept[0.0] < 0.5
@@ -112,7 +112,7 @@ def test_a_ponytail_keeps_its_volume():
 
 
 def test_it_comes_to_rest_under_its_weight():
-    settings = DynamicsSettings(volume=1.0, **SOFT)
+    settings = DynamicsSettings(volume=1.0, **SOFT_STYLE)
     state = played(tail(300), settings, 4.0)
     assert state.push.any()  # the push carries hair
     speed = np.linalg.norm(state.position - state.previous, axis=0) / DT
@@ -121,7 +121,7 @@ def test_it_comes_to_rest_under_its_weight():
 
 
 def test_locks_do_not_swing_through_each_other():
-    grid, side = locks(100)
+    grid, side = two_locks(100)
     along = np.linspace(0.0, 1.0, grid.shape[1])
     wrong = {}
     for volume in (0.0, 1.0):
@@ -154,13 +154,13 @@ def test_neighbours_move_together():
 
 
 def test_lengths_are_kept():
-    state = played(tail(200), DynamicsSettings(volume=1.0, **SOFT), 1.0)
+    state = played(tail(200), DynamicsSettings(volume=1.0, **SOFT_STYLE), 1.0)
     lengths = np.linalg.norm(np.diff(state.grid, axis=1), axis=2)
     np.testing.assert_allclose(lengths, state.rest.length.T, rtol=0.003)
 
 
 def test_the_frame_rate_does_not_matter():
-    grid, settings = tail(150), DynamicsSettings(volume=1.0, **SOFT)
+    grid, settings = tail(150), DynamicsSettings(volume=1.0, **SOFT_STYLE)
     one, other = (played(grid, settings, 1.0, fps) for fps in (20.0, 60.0))
     assert np.abs(one.position - other.position).max() < 1e-4
 
@@ -177,7 +177,7 @@ def test_a_guide_counts_for_its_strands():
 
 def test_hair_that_is_a_kilometre_apart():
     grid = np.concatenate([tail(50), tail(50) + np.float32([1000.0, 0.0, 0.0])])
-    state = played(grid, DynamicsSettings(volume=1.0, **SOFT), 0.5)
+    state = played(grid, DynamicsSettings(volume=1.0, **SOFT_STYLE), 0.5)
     assert np.isfinite(state.position).all()
     hair_grid = state.rest.hair_grid
     assert max(hair_grid.counts) <= among.SIDE
@@ -192,11 +192,11 @@ def test_few_guides_and_guides_without_length(grid):
 
 def test_turned_on_in_mid_play():
     grid = tail(100)
-    state = played(grid, DynamicsSettings(**SOFT), 0.1)
+    state = played(grid, DynamicsSettings(**SOFT_STYLE), 0.1)
     assert state.push is None
-    on = played(grid, DynamicsSettings(volume=1.0, **SOFT), 0.1, state=state)
+    on = played(grid, DynamicsSettings(volume=1.0, **SOFT_STYLE), 0.1, state=state)
     assert on.push is not None
-    assert played(grid, DynamicsSettings(**SOFT), 0.1, state=on).push is None
+    assert played(grid, DynamicsSettings(**SOFT_STYLE), 0.1, state=on).push is None
 
 
 def test_how_far_ahead():

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from grooms_together import Groom, play_frame
-from tails import SOFT, cells_of, locks, squeezed, tail, turned
+from tails import SOFT_STYLE, cell_count, rotation_matrix, squeezed_tail, tail, two_locks
 
 from hairloom.addon.dynamics import among
 from hairloom.addon.dynamics.among import Among, HairGrid, Neighbours, Others, Strength
@@ -16,7 +16,7 @@ from hairloom.addon.dynamics.state import start
 from hairloom.addon.dynamics.step import Drive, advance, steps
 
 FRAME, DT = 1.0 / 24.0, 1.0 / 180.0
-FULL = DynamicsSettings(volume=1.0, **SOFT)
+FULL = DynamicsSettings(volume=1.0, **SOFT_STYLE)
 
 
 def swayed(grooms, frames, near=None, sway=0.05):
@@ -32,7 +32,7 @@ def swayed(grooms, frames, near=None, sway=0.05):
 def test_as_without_a_grid():
     """Against the form without a grid, with other hair that moves, of various mass, some far
     away."""
-    rest, position, previous, turn, middle = squeezed()
+    rest, position, previous, turn, middle = squeezed_tail()
     random, settings = np.random.default_rng(3), DynamicsSettings(volume=1.0)
     at_rest = np.concatenate([tail(12, 8, seed=4).reshape(-1, 3) + [0.01, 0.0, 0.0]] * 2)
     at_rest[96:] += [5.0, 0.0, 0.0]
@@ -84,7 +84,7 @@ def test_two_halves_of_a_groom_move_as_it_does():
         off = [one - ends[0] for one, ends in zip(joined, whole, strict=True)]
         away[name] = np.linalg.norm(off, axis=-1).mean()
         if name == "together":
-            kept = cells_of(joined[-1]) / cells_of(whole[-1][0])
+            kept = cell_count(joined[-1]) / cell_count(whole[-1][0])
     assert away["together"] < 0.0002
     assert away["together"] < 0.1 * away["apart"]
     assert away["together"] < 0.025 * away["none"]
@@ -92,7 +92,7 @@ def test_two_halves_of_a_groom_move_as_it_does():
 
 
 def test_locks_of_two_grooms_do_not_swing_through_each_other():
-    grid, side = locks(100)
+    grid, side = two_locks(100)
     along, wrong = np.linspace(0.0, 1.0, grid.shape[1])[:, None], {}
     for volume in (0.0, 1.0):
         grooms = []
@@ -116,7 +116,7 @@ def test_locks_of_two_grooms_do_not_swing_through_each_other():
 def test_at_rest_nothing_acts_wherever_the_head_is(angle):
     """No push between two grooms that are combed into each other."""
     one, other = tail(300), tail(200, seed=2) * np.float32(1.03)
-    rest, turn, move = start(one).rest, turned(angle), np.array([3.0, -1.0, 0.5])
+    rest, turn, move = start(one).rest, rotation_matrix(angle), np.array([3.0, -1.0, 0.5])
     style = Style(lambda: other, hair_of(other, np.ones(200)), other)
     known = KnownHair().meeting(rest, one, {1: style})
     assert known.grid is not rest.hair_grid
@@ -175,7 +175,7 @@ def test_neighbours_that_is_far_away_changes_no_bit():
 
 def test_hair_that_goes_straight_is_felt():
     """A lock without simulation that is moved into a hanging one pushes it."""
-    grid, side = locks(100)
+    grid, side = two_locks(100)
     still, moved = grid[side > 0.0], grid[side < 0.0]
     for settings in (FULL, replace(FULL, volume=0.0)):
         hanging, brought = Groom(still, settings), Groom(moved, None)

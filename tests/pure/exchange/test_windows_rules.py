@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from windows_rules import LIMIT, windows_rules
+from windows_rules import MAX_PATH_LENGTH, windows_rules
 
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.files.atomic import write_bytes_atomic
@@ -42,12 +42,14 @@ def test_a_path_that_is_too_long_is_said_to_be(
     tmp_path: Path, write: Callable[[Path], None]
 ) -> None:
     """The file's own path is short enough, but that of its temporary file is not."""
-    path = deep(tmp_path, LIMIT - 30) / "groom.tfx"
+    path = deep(tmp_path, MAX_PATH_LENGTH - 30) / "groom.tfx"
     path.write_bytes(b"old")
-    assert len(str(path)) < LIMIT
+    assert len(str(path)) < MAX_PATH_LENGTH
     with windows_rules(), pytest.raises(HairloomError) as raised:
         write(path)
-    assert f"and {LIMIT} work here" in raised.value.problem and raised.value.place == str(path)
+    assert f"and {MAX_PATH_LENGTH} work here" in raised.value.problem and raised.value.place == str(
+        path
+    )
     assert raised.value.remedy == "Choose a folder with a shorter path"
     assert path.read_bytes() == b"old" and list(path.parent.iterdir()) == [path]
 
@@ -56,7 +58,7 @@ def test_a_path_that_is_too_long_is_said_to_be(
 def test_a_path_that_is_just_short_enough_is_written(
     tmp_path: Path, write: Callable[[Path], None]
 ) -> None:
-    path = deep(tmp_path, LIMIT - 90) / "groom.tfx"
+    path = deep(tmp_path, MAX_PATH_LENGTH - 90) / "groom.tfx"
     with windows_rules():
         write(path)
     assert path.read_bytes() == b"new"
@@ -86,7 +88,7 @@ def test_a_file_that_is_open_stays_and_the_new_ones_are_kept(
 ) -> None:
     path = tmp_path / "groom.tfx"
     path.write_bytes(b"old")
-    with windows_rules(held=[path]), pytest.raises(HairloomError, match="Access is denied"):
+    with windows_rules(open_files=[path]), pytest.raises(HairloomError, match="Access is denied"):
         write(path)
     assert path.read_bytes() == b"old"
     kept = tmp_path / "groom new"
@@ -105,7 +107,7 @@ def test_what_a_killed_writer_left_may_be_open(tmp_path: Path) -> None:
     dead[0].mkdir()
     (dead[0] / "a.tfx").touch()
     dead[1].touch()
-    with windows_rules(held=[dead[0] / "a.tfx", dead[1]]):
+    with windows_rules(open_files=[dead[0] / "a.tfx", dead[1]]):
         remove_stale_files(tmp_path)
         write_alone(tmp_path / "c.tfx")
     assert all(each.exists() for each in dead)

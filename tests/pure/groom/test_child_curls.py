@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from flat_ground import guides_at, settings, sheet
+from flat_ground import children_settings, guides_at, sheet
 
 from hairloom.addon import rig_flow
 from hairloom.addon.arrays import Floats
@@ -45,7 +45,7 @@ def helix_length(wanted: ChildrenSettings) -> float:
 
 @pytest.mark.parametrize(("curl", "turn"), [(0.03, 0.2), (0.1, 0.11)])
 def test_curls_are_helices_around_the_path(curl: float, turn: float) -> None:
-    grid = grown(settings(curl=curl, curl_length=turn, curl_along=EVEN))[:, 1:]
+    grid = grown(children_settings(curl=curl, curl_length=turn, curl_along=EVEN))[:, 1:]
     part, size = np.linspace(0.0, 1.0, grid.shape[1] + 1)[1:], typical(standing().lengths())
     step = 2.0 * np.pi * part[0] * LENGTH / (turn * size)
     away = np.hypot(grid[..., 0], grid[..., 1])
@@ -59,7 +59,7 @@ def test_curls_are_helices_around_the_path(curl: float, turn: float) -> None:
 
 @pytest.mark.parametrize(("curl", "turn"), [(0.02, 0.5), (0.03, 0.12), (0.02, 0.06), (0.05, 0.05)])
 def test_no_curl_loses_more_length_than_points_by_need_may(curl: float, turn: float) -> None:
-    wanted = settings(curl=curl, curl_length=turn, strand_count=100)
+    wanted = children_settings(curl=curl, curl_length=turn, strand_count=100)
     rig = rig_flow.prepare(
         standing(16), SURFACE, GuideSettings(cv_count=16), place="test", children=wanted
     )
@@ -71,9 +71,11 @@ def test_no_curl_loses_more_length_than_points_by_need_may(curl: float, turn: fl
 
 
 def test_a_clump_winds_as_one_and_clumps_each_their_own_way() -> None:
-    wanted = settings(curl=0.04, curl_along=EVEN, clump=0.05, clump_size=200)
+    wanted = children_settings(curl=0.04, curl_along=EVEN, clump=0.05, clump_size=200)
     made = make_children(standing(), SURFACE, wanted, place="test")
-    plain = make_children(standing(), SURFACE, settings(clump=0.05, clump_size=200), place="test")
+    plain = make_children(
+        standing(), SURFACE, children_settings(clump=0.05, clump_size=200), place="test"
+    )
     count = made.strands.grid.shape[1]
     path = plain.strands.grid[:, [0, -1]]
     aside = made.strands.grid[:, -1] - path[:, -1]
@@ -89,25 +91,27 @@ def test_a_clump_winds_as_one_and_clumps_each_their_own_way() -> None:
 
 
 def test_curls_that_have_no_room_say_so_and_are_finite(monkeypatch: pytest.MonkeyPatch) -> None:
-    wanted = settings(curl=0.02, curl_length=0.005, strand_count=100)
+    wanted = children_settings(curl=0.02, curl_length=0.005, strand_count=100)
     made = make_children(standing(), SURFACE, wanted, place="test")
     assert made.strands.grid.shape[1] == 512
     assert any("Curls need 4,801 points per child and have 512" in each for each in made.notes)
     monkeypatch.setattr(children, "CHILD_POINTS", 10_000)
-    many = settings(curl=0.02, curl_length=0.1, strand_count=10_000 // 50)
+    many = children_settings(curl=0.02, curl_length=0.1, strand_count=10_000 // 50)
     count = make_children(standing(), SURFACE, many, place="test").growth.cv_count
     assert count == 50
 
 
 def test_without_curls_and_fly_aways_nothing_changes() -> None:
-    plain = grown(settings(frizz=0.01, clump=0.5))
-    other = settings(frizz=0.01, clump=0.5, curl_length=0.5, curl_along=EVEN)
+    plain = grown(children_settings(frizz=0.01, clump=0.5))
+    other = children_settings(frizz=0.01, clump=0.5, curl_length=0.5, curl_along=EVEN)
     assert np.array_equal(plain, grown(other))
 
 
 def test_combed_children_curl_and_stray_as_they_grew() -> None:
     """Shapes computed again from the stored growth are the same, bit for bit."""
-    wanted = settings(curl=0.03, fly_aways=0.3, clump=0.5, frizz=0.01, length_variation=0.3)
+    wanted = children_settings(
+        curl=0.03, fly_aways=0.3, clump=0.5, frizz=0.01, length_variation=0.3
+    )
     guides = standing()
     made = make_children(guides, SURFACE, wanted, place="test")
     chosen = np.arange(3, 400, 7)
@@ -116,20 +120,22 @@ def test_combed_children_curl_and_stray_as_they_grew() -> None:
 
 
 def test_fly_aways_are_as_many_as_they_should_and_keep_their_lengths() -> None:
-    plain = grown(settings(strand_count=3000))
-    few, more = (grown(settings(strand_count=3000, fly_aways=part)) for part in (0.1, 0.25))
+    plain = grown(children_settings(strand_count=3000))
+    few, more = (
+        grown(children_settings(strand_count=3000, fly_aways=part)) for part in (0.1, 0.25)
+    )
     strays, others = ((each != plain).any(axis=(1, 2)) for each in (few, more))
     assert strays.mean() == pytest.approx(0.1, abs=4.0 * np.sqrt(0.09 / 3000))
     assert others.mean() == pytest.approx(0.25, abs=4.0 * np.sqrt(0.19 / 3000))
     assert np.array_equal(few[strays], more[strays])
     length = np.linalg.norm(np.diff(more, axis=1), axis=2).sum(axis=1)
     assert np.abs(length - LENGTH).max() < 1e-6
-    fewer = grown(settings(strand_count=1000, fly_aways=0.25))
+    fewer = grown(children_settings(strand_count=1000, fly_aways=0.25))
     assert np.array_equal(fewer, more[:1000])
 
 
 def test_fly_aways_stray_smoothly_and_the_farther_the_nearer_to_their_tips() -> None:
-    grid = grown(settings(strand_count=2000, fly_aways=1.0), cv_count=17)
+    grid = grown(children_settings(strand_count=2000, fly_aways=1.0), cv_count=17)
     away = np.linalg.norm(grid - [0.0, 0.0, 1.0] * grid[..., 2:], axis=2).mean(axis=0)
     assert (np.diff(away) > 0.0).all()
     assert (np.diff(away, n=2) > -1e-4 * LENGTH).all()  # it leaves its path tangentially

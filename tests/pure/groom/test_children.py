@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from flat_ground import guides_at, settings, sheet
+from flat_ground import children_settings, guides_at, sheet
 from tiers import few_in_commits
 
 from hairloom.addon.arrays import Floats
@@ -53,7 +53,7 @@ def test_more_children_move_none(
     values |= {"baby_hair": 0.7}
 
     def children(count: int) -> Children:
-        chosen = settings(method=way, strand_count=count, **values)
+        chosen = children_settings(method=way, strand_count=count, **values)
         return make_children(groomed, egg, chosen, density, place="test")
 
     most = children(9000)
@@ -104,7 +104,7 @@ def test_children_grow_among_guides_and_end_where_they_end() -> None:
     left = np.stack([x.ravel(), y.ravel(), 0.0 * x.ravel()], axis=1)
     root = np.concatenate([left, left + [0.45, 0.0, 0.0]])
     guides = guides_at(surface, root, np.tile([0.0, 0.0, 0.2], (len(root), 1)))
-    children = make_children(guides, surface, settings(strand_count=3000), place="test")
+    children = make_children(guides, surface, children_settings(strand_count=3000), place="test")
     at = children.strands.roots
     margin = 0.41 * 0.0354  # the third neighbour of a corner is across a square of guides
     assert children.notes == ()
@@ -128,7 +128,9 @@ def test_sparse_guides_are_as_good_as_dense_ones() -> None:
     flat = np.concatenate([dense.reshape(-1, 2), sparse.reshape(-1, 2)])
     root = np.concatenate([flat, np.zeros((len(flat), 1))], axis=1)
     guides = guides_at(surface, root, np.tile([0.0, 0.0, 0.2], (len(root), 1)))
-    at = make_children(guides, surface, settings(strand_count=4000), place="test").strands.roots
+    at = make_children(
+        guides, surface, children_settings(strand_count=4000), place="test"
+    ).strands.roots
     is_inside = (at[:, 1] > 0.1) & (at[:, 1] < 0.9)
     in_dense = is_inside & (at[:, 0] > 0.05) & (at[:, 0] < 0.45)
     in_sparse = is_inside & (at[:, 0] > 0.57) & (at[:, 0] < 0.97)
@@ -142,7 +144,7 @@ def test_the_inside_of_a_shell_stays_bare() -> None:
         np.concatenate([outside.positions, inside.positions]),
         np.concatenate([outside.triangles, inside.triangles + len(outside.positions)]),
     )
-    at = make_children(spread_guides(both), both, settings(), place="test").strands.roots
+    at = make_children(spread_guides(both), both, children_settings(), place="test").strands.roots
     assert (at[:, 2] == 0.0).all()
 
 
@@ -150,7 +152,7 @@ def test_few_guides_on_one_large_triangle_get_all_their_children() -> None:
     """Only a hundred-thousandth of the triangle's area is near guides."""
     surface = Surface([[-50, -50, 0], [100, -50, 0], [-50, 100, 0]], [[0, 1, 2]])
     guides = spread_guides(surface, 50)
-    at = make_children(guides, surface, settings(), place="test").strands.roots
+    at = make_children(guides, surface, children_settings(), place="test").strands.roots
     assert len(at) == 400
     assert at.min() > -0.3
     assert at.max() < 1.3
@@ -161,7 +163,9 @@ def test_a_density_says_where_and_how_many() -> None:
     guides = spread_guides(surface, 300)
     density = np.where(surface.positions[:, 0] < 0.5, 1.0, 3.0)
     density[surface.positions[:, 1] > 0.7] = 0.0
-    children = make_children(guides, surface, settings(strand_count=2000), density, place="test")
+    children = make_children(
+        guides, surface, children_settings(strand_count=2000), density, place="test"
+    )
     at = children.strands.roots
     assert children.notes == ()
     assert at[:, 1].max() <= 0.75
@@ -177,7 +181,9 @@ def test_a_brush_moves_those_alone_that_it_touches() -> None:
 
     def roots(weight: float) -> tuple[set[bytes], set[bytes]]:
         density = np.where(away < 0.2, weight, 1.0)
-        made = make_children(guides, surface, settings(strand_count=2000), density, place="test")
+        made = make_children(
+            guides, surface, children_settings(strand_count=2000), density, place="test"
+        )
         at = made.strands.roots
         gap = np.linalg.norm(at[:, :2] - [0.4, 0.5], axis=1)
         return {p.tobytes() for p in at[gap < 0.13]}, {p.tobytes() for p in at[gap > 0.27]}
@@ -190,7 +196,7 @@ def test_a_brush_moves_those_alone_that_it_touches() -> None:
 def test_a_painted_area_without_guides_stays_bare_and_is_told() -> None:
     surface = sheet(20, 10.0)
     guides = spread_guides(surface, 100)
-    children = make_children(guides, surface, settings(), np.ones(441), place="test")
+    children = make_children(guides, surface, children_settings(), np.ones(441), place="test")
     assert children.strands.strand_count == 400
     assert children.strands.roots.max() < 2.0
     assert [note for note in children.notes if "stays bare" in note]
@@ -204,7 +210,7 @@ def test_in_the_middle_of_three_guides_a_child_is_their_mean() -> None:
     surface = Surface(corners, [[0, 1, 2]])
     ways = np.array([[0.1, 0.0, 1.0], [0.0, 0.2, 1.0], [0.0, 0.0, 1.3]])
     guides = guides_at(surface, corners, ways)
-    children = make_children(guides, surface, settings(strand_count=2000), place="test")
+    children = make_children(guides, surface, children_settings(strand_count=2000), place="test")
     roots, weights = children.strands.roots, children.weights.weight
     middle = np.linalg.norm(roots - corners.mean(axis=0), axis=1).argmin()
     assert weights[middle] == pytest.approx(np.full(3, 1 / 3), abs=0.05)
@@ -217,7 +223,7 @@ def test_in_the_middle_of_three_guides_a_child_is_their_mean() -> None:
 def test_a_child_is_its_root_and_the_weighted_ways_of_its_guides(
     egg: Surface, groomed: StrandSet
 ) -> None:
-    children = make_children(groomed, egg, settings(width=2.0), place="test")
+    children = make_children(groomed, egg, children_settings(width=2.0), place="test")
     strands, weights = children.strands, children.weights
     grid, radius = groomed.grid.astype(np.float64), groomed.radius.reshape(-1, 12)
     for child in range(0, 400, 7):
@@ -231,7 +237,7 @@ def test_a_child_is_its_root_and_the_weighted_ways_of_its_guides(
 
 
 def test_single_strands_run_beside_their_nearest_guide(egg: Surface, groomed: StrandSet) -> None:
-    children = make_children(groomed, egg, settings(method="single"), place="test")
+    children = make_children(groomed, egg, children_settings(method="single"), place="test")
     weights, strands = children.weights, children.strands
     apart = np.linalg.norm(strands.roots[:, None] - groomed.roots[None], axis=2)
     assert (weights.guide == apart.argmin(axis=1)[:, None]).all()
@@ -265,7 +271,7 @@ def test_a_parting_stays(way: str) -> None:
     surface, guides = combed_apart()
 
     def least_sideways(**values: Any) -> float:
-        chosen = settings(method=way, strand_count=3000, clump_size=8, **values)
+        chosen = children_settings(method=way, strand_count=3000, clump_size=8, **values)
         grid = make_children(guides, surface, chosen, place="test").strands.grid
         return float(np.abs(grid[:, -1, 0] - grid[:, 0, 0]).min())
 
@@ -285,7 +291,7 @@ def test_three_guides_of_which_two_go_apart_are_not_mixed() -> None:
     place = np.array([[0.2, 0.2], [0.8, 0.2], [0.5, 0.5], [0.2, 0.8], [0.8, 0.8]])
     root = np.concatenate([place, np.zeros((5, 1))], axis=1)
     guides = guides_at(surface, root, way)
-    chosen = settings(strand_count=2000, parting=np.radians(65.0))
+    chosen = children_settings(strand_count=2000, parting=np.radians(65.0))
     weights = make_children(guides, surface, chosen, place="test").weights
     for one, two in itertools.combinations(range(3), 2):
         both = (weights.weight[:, one] > 0.0) & (weights.weight[:, two] > 0.0)
@@ -308,8 +314,10 @@ def test_lengths_lie_in_the_range_and_on_the_way_of_the_guides() -> None:
     surface = sheet()
     guides = spread_guides(surface)
     guides = guides.with_points(turned(guides.grid).reshape(-1, 3))
-    whole = make_children(guides, surface, settings(), place="test").strands
-    cut = make_children(guides, surface, settings(length_variation=0.6), place="test").strands
+    whole = make_children(guides, surface, children_settings(), place="test").strands
+    cut = make_children(
+        guides, surface, children_settings(length_variation=0.6), place="test"
+    ).strands
     share = cut.lengths() / whole.lengths()
     assert share.min() == pytest.approx(0.4, abs=0.02)
     assert share.max() == pytest.approx(1.0, abs=0.02)
@@ -330,7 +338,7 @@ def test_scattered_children_differ_from_their_neighbours_as_guides_do() -> None:
     def unlike(scatter: float) -> float:
         """Mean difference of a child's vector from root to tip and its nearest neighbour's."""
         made = make_children(
-            guides, surface, settings(strand_count=4000, scatter=scatter), place="test"
+            guides, surface, children_settings(strand_count=4000, scatter=scatter), place="test"
         ).strands.grid
         near, _ = nearest_points(made[:, 0], made[:, 0], 2)
         way = made[:, -1] - made[:, 0]
@@ -345,7 +353,7 @@ def test_scattered_children_differ_from_their_neighbours_as_guides_do() -> None:
 def test_more_scattered_children_move_none() -> None:
     surface, guides = sheet(), spread_guides(sheet())
     few, many = (
-        make_children(guides, surface, settings(strand_count=n, scatter=1.0), place="test")
+        make_children(guides, surface, children_settings(strand_count=n, scatter=1.0), place="test")
         for n in (100, 400)
     )
     np.testing.assert_array_equal(few.strands.grid, many.strands.grid[:100])
@@ -356,8 +364,10 @@ def test_clump_draws_the_tips_of_locks_together() -> None:
     surface = sheet()
     guides = spread_guides(surface, 400)
     count, size = 2000, 16
-    loose = make_children(guides, surface, settings(strand_count=count), place="test").strands
-    chosen = settings(strand_count=count, clump=0.7, clump_size=size)
+    loose = make_children(
+        guides, surface, children_settings(strand_count=count), place="test"
+    ).strands
+    chosen = children_settings(strand_count=count, clump=0.7, clump_size=size)
     drawn = make_children(guides, surface, chosen, place="test").strands
     middles = 4096 // size
     assert (drawn.roots == loose.roots).all()
@@ -383,7 +393,7 @@ def test_locks_stay_as_large_as_children_get_more() -> None:
     """With twice as many children there are twice as many clump middles."""
     surface = sheet()
     guides = spread_guides(surface, 200)
-    chosen = settings(strand_count=16_384, clump=1.0, clump_size=32)
+    chosen = children_settings(strand_count=16_384, clump=1.0, clump_size=32)
     tips = make_children(guides, surface, chosen, place="test").strands.grid[:, -1]
     for first, last in ((0, 4096), (4096, 8192), (8192, 16_384)):
         places = np.unique(tips[:last].round(5), axis=0)
@@ -395,10 +405,12 @@ def test_frizz_strays_as_far_as_it_says_and_not_at_the_root(
     egg: Surface, groomed: StrandSet
 ) -> None:
     flat = (1.0, 1.0, 1.0, 1.0, 1.0)
-    calm = make_children(groomed, egg, settings(strand_count=2000), place="test").strands.grid
+    calm = make_children(
+        groomed, egg, children_settings(strand_count=2000), place="test"
+    ).strands.grid
 
     def strayed(**values: Any) -> Floats:
-        chosen = settings(strand_count=2000, frizz=0.004, **values)
+        chosen = children_settings(strand_count=2000, frizz=0.004, **values)
         grid = make_children(groomed, egg, chosen, place="test").strands.grid
         assert (grid[:, 0] == calm[:, 0]).all()
         return np.asarray(grid - calm) / float(np.median(groomed.lengths()))
@@ -424,10 +436,10 @@ def test_frizz_is_smooth_and_of_the_length_it_says(egg: Surface) -> None:
         segment_ratio=1.0,
     )
     guides = grow(egg, straight)
-    calm = make_children(guides, egg, settings(), place="test").strands.grid
+    calm = make_children(guides, egg, children_settings(), place="test").strands.grid
 
     def sides(frizz_length: float) -> float:
-        chosen = settings(frizz=0.008, frizz_length=frizz_length / 0.3)
+        chosen = children_settings(frizz=0.008, frizz_length=frizz_length / 0.3)
         stray = make_children(guides, egg, chosen, place="test").strands.grid - calm
         return float((np.diff(np.sign(stray[:, 1:, 0]), axis=1) != 0.0).sum(axis=1).mean())
 
@@ -467,14 +479,14 @@ def test_children_are_the_same_at_any_scale(
 
 def test_no_guides_and_nowhere_to_grow_are_told(egg: Surface, groomed: StrandSet) -> None:
     with pytest.raises(HairloomError, match="no guides"):
-        make_children(groomed.take(np.zeros(0, np.int64)), egg, settings(), place="test")
+        make_children(groomed.take(np.zeros(0, np.int64)), egg, children_settings(), place="test")
     with pytest.raises(HairloomError, match="no area"):
-        make_children(groomed, egg, settings(), np.zeros(len(egg.positions)), place="test")
+        make_children(groomed, egg, children_settings(), np.zeros(len(egg.positions)), place="test")
     with pytest.raises(HairloomError, match="vertices"):
-        make_children(groomed, egg, settings(), np.ones(3), place="test")
+        make_children(groomed, egg, children_settings(), np.ones(3), place="test")
     flat = Surface(0.0 * egg.positions, egg.triangles)
     with pytest.raises(HairloomError, match="no area"):
-        make_children(groomed, flat, settings(), place="test")
+        make_children(groomed, flat, children_settings(), place="test")
 
 
 def all_in_one_place(surface: Surface) -> StrandSet:
@@ -527,7 +539,7 @@ def test_odd_guides_still_get_children(
 def test_a_tuft_stays_close_to_its_guides() -> None:
     surface = sheet()
     guides = all_in_one_place(surface)
-    at = make_children(guides, surface, settings(), place="test").strands.roots
+    at = make_children(guides, surface, children_settings(), place="test").strands.roots
     away = np.linalg.norm(at - [0.5, 0.5, 0.0], axis=1)
     assert away.max() <= 0.11 * guides.lengths().mean()
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from flat_ground import guides_at, settings, sheet
+from flat_ground import children_settings, guides_at, sheet
 
 from hairloom.addon.arrays import Floats
 from hairloom.addon.groom.children import Children, make_children
@@ -31,7 +31,7 @@ def upright(length: float = 0.3) -> StrandSet:
 
 
 def children(**values: float) -> Children:
-    chosen = settings(strand_count=8000, **values)
+    chosen = children_settings(strand_count=8000, **values)
     return make_children(upright(), sheet(), chosen, place="test")
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from small_wig import GUIDES, curves, sheet
+from small_wig import GUIDES, sheet, wig_strands
 
 from hairloom.addon import rig_flow
 from hairloom.addon.arrays import Floats
@@ -56,7 +56,13 @@ def rig_of(
 ) -> rig_flow.Rig:
     ground = rig_flow.ChildGround(masks=masks)
     return rig_flow.prepare(
-        own or curves(), HEAD, GUIDES, place="a wig", children=settings, ground=ground, kept=kept
+        own or wig_strands(),
+        HEAD,
+        GUIDES,
+        place="a wig",
+        children=settings,
+        ground=ground,
+        kept=kept,
     )
 
 
@@ -193,7 +199,13 @@ def test_widths_are_multiplied_whatever_their_method() -> None:
         def radius(masks: Masks, method: str = method) -> Floats:
             ground = rig_flow.ChildGround(masks=masks)
             rig = rig_flow.prepare(
-                curves(), HEAD, GUIDES, place="a wig", children=BOLD, ground=ground, widths=method
+                wig_strands(),
+                HEAD,
+                GUIDES,
+                place="a wig",
+                children=BOLD,
+                ground=ground,
+                widths=method,
             )
             return rig.strands.radius.reshape(rig.strands.strand_count, -1)[rig.own_count :, 0]
 
@@ -236,7 +248,7 @@ def test_an_image_is_seen_as_bilinear_sampling_says() -> None:
 def test_what_is_painted_on_curves_is_mixed_as_their_points_are() -> None:
     """With `along` painted at each point, guides have it at their CVs, and 0.5 as a whole; between
     two curves, values are interpolated."""
-    own = curves()
+    own = wig_strands()
     along = np.concatenate([np.linspace(0.0, 1.0, count) for count in own.point_counts])
     mask = StrandMask.of_points(own, along.astype(np.float32))
     np.testing.assert_allclose(mask.at_points(own), along, atol=1e-5)
@@ -253,7 +265,7 @@ def test_what_is_painted_on_curves_is_mixed_as_their_points_are() -> None:
 def test_children_take_what_is_painted_on_their_guides() -> None:
     """Where guides are painted 0, children are as with the setting at 0. Brows come first, so that
     guides of children have other indices than curves."""
-    own = replace(curves(), group=np.where(np.arange(60) < 9, BROWS, 0))
+    own = replace(wig_strands(), group=np.where(np.arange(60) < 9, BROWS, 0))
     is_right = own.roots[:, 0] > 0.0
     masks = Masks({"frizz": StrandMask(is_right.astype(np.float32)[:, None])})
     masked, whole = rig_of(BOLD, masks, own=own), rig_of(BOLD, own=own)

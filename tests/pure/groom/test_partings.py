@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from flat_ground import guides_at, settings, sheet
+from flat_ground import children_settings, guides_at, sheet
 
 from hairloom.addon.arrays import Bools, Floats
 from hairloom.addon.groom.children import make_children
@@ -54,7 +54,7 @@ def both_sides(guides: StrandSet, weights: Any) -> Bools:
 )
 def test_no_child_blends_guides_of_both_sides_and_each_takes_its_own(values: Any) -> None:
     guides, partings = upright(), Partings.of(line(), SURFACE)
-    chosen = settings(strand_count=3000, **values)
+    chosen = children_settings(strand_count=3000, **values)
     made = make_children(guides, SURFACE, chosen, None, partings, place="test")
     assert not both_sides(guides, made.weights).any()
     root = made.strands.roots
@@ -81,7 +81,9 @@ def test_groups_of_both_sides_are_kept_as_well() -> None:
         guides.root_barycentric,
     )
     partings = Partings.of(line(), SURFACE)
-    made = make_children(guides, SURFACE, settings(strand_count=2000), None, partings, place="test")
+    made = make_children(
+        guides, SURFACE, children_settings(strand_count=2000), None, partings, place="test"
+    )
     assert not both_sides(guides, made.weights).any()
     group = guides.group[made.weights.guide]
     assert (group == group[:, :1]).all()
@@ -90,7 +92,7 @@ def test_groups_of_both_sides_are_kept_as_well() -> None:
 def test_clumps_stay_on_their_side() -> None:
     """With full clumping, upright strands end above the middle of their clump."""
     partings = Partings.of(line(), SURFACE)
-    chosen = settings(strand_count=4000, clump=1.0, clump_size=8, parting=3.0)
+    chosen = children_settings(strand_count=4000, clump=1.0, clump_size=8, parting=3.0)
     for lines, count in ((partings, 0), (None, 20)):
         made = make_children(upright(), SURFACE, chosen, None, lines, place="test")
         root, tip = made.strands.grid[:, 0], made.strands.grid[:, -1]
@@ -101,7 +103,9 @@ def test_clumps_stay_on_their_side() -> None:
 
 def test_beyond_its_end_a_line_parts_nothing() -> None:
     guides, partings = upright(), Partings.of(line(last=0.5, pieces=60), SURFACE)
-    made = make_children(guides, SURFACE, settings(strand_count=3000), None, partings, place="test")
+    made = make_children(
+        guides, SURFACE, children_settings(strand_count=3000), None, partings, place="test"
+    )
     mixed, y = both_sides(guides, made.weights), made.strands.roots[:, 1]
     assert not mixed[y < 0.35].any()
     assert mixed[y > 0.65].sum() > 30

@@ -5,10 +5,10 @@ from __future__ import annotations
 from types import ModuleType, SimpleNamespace
 from typing import Any
 
-import made_once
+import function_cache
 import numpy as np
 import pytest
-from made_once import CAPACITY, Unknown, digest, once
+from function_cache import CAPACITY, UnhashableError, cache_function, digest
 
 from hairloom.addon.params import SettingsMap
 from hairloom.addon.shading.ambient_settings import AmbientSettings
@@ -50,7 +50,7 @@ def test_what_differs_in_anything_is_another() -> None:
 
 @pytest.mark.parametrize("value", [lambda: 1, SimpleNamespace(a=1), np.array([None]), {1}])
 def test_what_nobody_can_look_into_is_unknown(value: Any) -> None:
-    with pytest.raises(Unknown):
+    with pytest.raises(UnhashableError):
         digest(value)
 
 
@@ -67,7 +67,7 @@ def module(monkeypatch: pytest.MonkeyPatch) -> Any:
         return float(np.sum(values)) + module.cells
 
     module.summed = summed
-    once(monkeypatch, module, "summed", also=lambda: module.cells)
+    cache_function(monkeypatch, module, "summed", extra_key=lambda: module.cells)
     return module
 
 
@@ -100,6 +100,6 @@ def test_only_the_latest_are_kept(module: Any) -> None:
 
 def test_a_function_is_itself_again_afterwards() -> None:
     with pytest.MonkeyPatch.context() as patch:
-        once(patch, made_once, "digest")
-        assert made_once.digest is not digest
-    assert made_once.digest is digest
+        cache_function(patch, function_cache, "digest")
+        assert function_cache.digest is not digest
+    assert function_cache.digest is digest
