@@ -29,9 +29,9 @@ from damaged_files import sample
 from hairloom.addon.blender.bakes.cache import Cache, CacheWriter, Facts
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.alembic.groom_alembic import write_groom_alembic
-from hairloom.addon.exchange.files import moving, subprocess_reader
+from hairloom.addon.exchange.files import file_moves, subprocess_reader
 from hairloom.addon.exchange.files.atomic import write_text_atomic
-from hairloom.addon.exchange.files.file_set import kept_aside, written_together
+from hairloom.addon.exchange.files.file_set import atomic_file_set, back_up_foreign_files
 from hairloom.addon.exchange.files.stale_temp_files import remove_stale_files
 from hairloom.addon.exchange.hair_file import read_hair_file, write_hair_file
 from hairloom.addon.exchange.tfxbone import strongest_bones, write_tfxbone
@@ -68,10 +68,10 @@ class Verb:
 
 
 def _write_set(path: Path, version: int) -> None:
-    with written_together(path) as folder:
+    with atomic_file_set(path) as folder:
         for name in (path.name, f"{path.stem}_base.png", f"{path.stem}.hairloom.json"):
             (folder / name).write_bytes(bytes([version]) * 50_000)
-        kept_aside(folder, path, {f"{path.stem}_base.png", f"{path.stem}.hairloom.json"})
+        back_up_foreign_files(folder, path, {f"{path.stem}_base.png", f"{path.stem}.hairloom.json"})
 
 
 def _write_bake(path: Path, version: int) -> None:
@@ -383,8 +383,8 @@ def _held_for_a_moment(at: int, _path: Path, _verb: Verb, _random: Any) -> Itera
         real(source, target)
 
     with (
-        mock.patch.object(moving, "PATIENCE", 10.0),
-        mock.patch.object(moving, "_PAUSE", 0.0005),
+        mock.patch.object(file_moves, "MAX_WAIT", 10.0),
+        mock.patch.object(file_moves, "_PAUSE", 0.0005),
         mock.patch.object(os, "replace", replace),
     ):
         yield

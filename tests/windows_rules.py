@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 from unittest import mock
 
-from hairloom.addon.exchange.files import names
+from hairloom.addon.exchange.files import file_names
 
 MAX_PATH_LENGTH = 259
 #: functions that take a path first, and those that take two
@@ -48,7 +48,7 @@ def windows_rules(open_files: Collection[Path] = ()) -> Iterator[None]:
         return call
 
     with ExitStack() as stack:
-        stack.enter_context(mock.patch.object(names, "MAX_PATH", MAX_PATH_LENGTH))
+        stack.enter_context(mock.patch.object(file_names, "MAX_PATH", MAX_PATH_LENGTH))
         stack.enter_context(mock.patch.object(shutil, "_use_fd_functions", new=False))
         for module, name, count in (
             *((os, name, 1) for name in _ONE_PATH_CALLS if hasattr(os, name)),

@@ -21,7 +21,7 @@ from damaged_files import sample
 
 from hairloom.addon.exchange.alembic.groom_alembic import is_finished, write_groom_alembic
 from hairloom.addon.exchange.files.atomic import write_text_atomic
-from hairloom.addon.exchange.files.file_set import written_together
+from hairloom.addon.exchange.files.file_set import atomic_file_set
 from hairloom.addon.exchange.files.stale_temp_files import remove_stale_files
 from hairloom.addon.exchange.hair_file import write_hair_file
 from hairloom.addon.exchange.tfxbone import strongest_bones, write_tfxbone
@@ -45,7 +45,7 @@ def _write_text(path: Path, version: int) -> None:
 
 
 def _write_set(path: Path, version: int) -> None:
-    with written_together(path) as folder:
+    with atomic_file_set(path) as folder:
         for name in (path.name, *OTHERS):
             (folder / name).write_bytes(bytes([version]) * 500_000)
 

@@ -13,7 +13,7 @@ WAITING = {"wait", "sleep", "join", "result", "take_made", "attempt", "run_main_
 #: function -> why it ends
 ENDS = {
     "cards/order_pairs.py:pairs_by_view": "each turn takes one view",
-    "exchange/files/moving.py:move": "after PATIENCE seconds",
+    "exchange/files/file_moves.py:move_file": "after MAX_WAIT seconds",
     "blender/preview/previews.py:finish": "each turn takes one result; another scene is refused",
     "blender/sessions/session.py:finish": "each turn takes one result, of which none is begun here",
     "ui/long_work.py:threaded": "gives back at every turn, and Esc closes it",

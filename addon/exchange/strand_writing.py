@@ -12,10 +12,10 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..errors import HairloomError
 from .alembic.groom_alembic import write_groom_alembic
-from .files.atomic import unwritable
-from .files.file_set import kept_aside, written_together
-from .files.moving import free_name, move
-from .files.names import as_compared, distinct_names, plain_name
+from .files.atomic import write_error
+from .files.file_moves import move_file, unused_path
+from .files.file_names import identifier_name, name_key, unique_names
+from .files.file_set import atomic_file_set, back_up_foreign_files
 from .groom import Groom, GroomMotion, points_of
 from .groom_presets import GroomPreset, chosen_strands
 from .hair_file import write_hair_file
@@ -134,11 +134,11 @@ def _bones_set_aside(written: Collection[Path]) -> tuple[str, ...]:
     for bones in sorted({file.with_suffix(".tfxbone") for file in written} - set(written)):
         if not bones.is_file():
             continue
-        kept = free_name(bones.with_stem(f"{bones.stem} old"))
+        kept = unused_path(bones.with_stem(f"{bones.stem} old"))
         try:
-            move(bones, kept)
+            move_file(bones, kept)
         except OSError as error:
-            raise unwritable(bones, error.strerror or str(error)) from error
+            raise write_error(bones, error.strerror or str(error)) from error
         notes.append(f"{bones.name} belongs to other strands, and is kept as {kept.name}.")
     return tuple(notes)
 
@@ -177,10 +177,10 @@ def _write_files(
     groom = _part(groom, chosen, layout.parts)
     files = _group_files(path, groom) if layout.is_split else {path: np.arange(len(chosen))}
     notes: list[str] = []
-    with written_together(next(iter(files))) as folder:
+    with atomic_file_set(next(iter(files))) as folder:
         for file, strands in files.items():
             notes += write(folder / file.name, groom.take(strands))
-        notes += kept_aside(folder, path, _of_earlier(files))
+        notes += back_up_foreign_files(folder, path, _of_earlier(files))
         written = sorted(
             (path.with_name(file.name) for file in folder.iterdir()),
             key=lambda file: (file not in files, file.name),
@@ -201,10 +201,10 @@ def _group_files(path: Path, groom: Groom) -> dict[Path, Ints]:
     numbers = np.unique(groom.strands.group).tolist()
     if len(numbers) < 2:
         return {path: np.arange(groom.strands.strand_count)}
-    names = [plain_name(groom.group_names.get(number, f"group{number}")) for number in numbers]
-    taken = Counter(map(as_compared, names))
-    endings = distinct_names(
-        name if taken[as_compared(name)] == 1 else f"{name}_{number}"
+    names = [identifier_name(groom.group_names.get(number, f"group{number}")) for number in numbers]
+    taken = Counter(map(name_key, names))
+    endings = unique_names(
+        name if taken[name_key(name)] == 1 else f"{name}_{number}"
         for name, number in zip(names, numbers, strict=True)
     )
     return {

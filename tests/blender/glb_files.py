@@ -19,7 +19,7 @@ pytest.importorskip("bpy", reason="writing a GLB needs Blender or the bpy module
 
 from hairloom.addon.blender.cards.exporters import CardLook, write_card_mesh
 from hairloom.addon.exchange.cards.card_formats import GLB
-from hairloom.addon.exchange.files.file_set import written_together
+from hairloom.addon.exchange.files.file_set import atomic_file_set
 
 VALIDATOR_FOLDER = Path(__file__).parents[2] / "tools" / "node"
 
@@ -34,7 +34,7 @@ def write_glb(
 ) -> None:
     """Write a GLB that holds one level of cards and no sidecar."""
     look = CardLook(card=texture)
-    with written_together(path) as folder:
+    with atomic_file_set(path) as folder:
         write_card_mesh(folder / path.name, [mesh], GLB, look, name=name, portable=portable)
 
 

@@ -26,7 +26,7 @@ from hairloom.addon.blender.engine import engine_hair
 from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.preview.bake import Bake, free
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.exchange.files import moving, stale_temp_files
+from hairloom.addon.exchange.files import file_moves, stale_temp_files
 
 LAST = 8
 
@@ -361,7 +361,7 @@ def test_what_a_killed_bake_leaves_goes_with_the_next(swinging, tmp_path, monkey
     folder, shown = tmp_path / "bake", frames_in(tmp_path / "bake")
     with monkeypatch.context() as dying:
         dying.setattr(stale_temp_files.os, "getpid", lambda: 4_000_000)
-        left = folder / f"frames-{stale_temp_files.mark()}"
+        left = folder / f"frames-{stale_temp_files.writer_tag()}"
     shutil.copytree(shown, left)
     assert Cache(folder).frame(LAST)["guides"].shape == (60, 16, 3)
     assert frames_in(folder) == shown
@@ -401,7 +401,7 @@ def test_a_bake_that_cannot_take_its_place_is_kept(swinging, tmp_path, monkeypat
         replace(source, target)
 
     with monkeypatch.context() as windows:
-        windows.setattr(moving.os, "replace", held)
+        windows.setattr(file_moves.os, "replace", held)
         with pytest.raises(HairloomError, match="cannot replace") as raised:
             bake(hair)
     assert frames_in(folder) == shown and Cache(folder).frame(LAST)
@@ -485,7 +485,7 @@ def test_of_several_bakes_all_are_replaced_or_none(swinging, tmp_path, monkeypat
         replace(source, target)
 
     with monkeypatch.context() as windows:
-        windows.setattr(moving.os, "replace", held)
+        windows.setattr(file_moves.os, "replace", held)
         with pytest.raises(HairloomError, match="cannot replace"):
             bake(hair, twin)
     assert [frames_in(tmp_path / name) for name in ("bake", "twin")] == shown

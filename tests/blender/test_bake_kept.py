@@ -8,7 +8,7 @@ from hairloom.addon.blender.bakes import baked_copy, playback
 from hairloom.addon.blender.preview import handlers, previews
 from hairloom.addon.blender.preview.bake import Bake, show_in_renders
 from hairloom.addon.blender.preview.diagnostics import issues_of
-from hairloom.addon.exchange.files.names import as_compared, folder_name
+from hairloom.addon.exchange.files.file_names import name_key, safe_folder_name
 
 
 @pytest.fixture
@@ -101,21 +101,21 @@ def test_a_file_that_cannot_be_opened_leaves_hair_to_be_seen(hair, evaluated, tm
     ],
 )
 def test_a_name_chooses_no_folder_but_its_own(name, folder, tmp_path):
-    assert folder_name(name) == folder
-    inside = tmp_path / "cache" / folder_name(name)
+    assert safe_folder_name(name) == folder
+    inside = tmp_path / "cache" / safe_folder_name(name)
     assert inside.resolve().parent == (tmp_path / "cache").resolve()
 
 
 def test_names_that_are_one_on_some_system_get_two_folders():
-    taken = {as_compared(folder_name("Hair"))}
-    assert folder_name("hair", taken) == "hair_2"
-    assert folder_name("Cafe\u0301") == folder_name("Caf\u00e9")
+    taken = {name_key(safe_folder_name("Hair"))}
+    assert safe_folder_name("hair", taken) == "hair_2"
+    assert safe_folder_name("Cafe\u0301") == safe_folder_name("Caf\u00e9")
 
 
 def test_versions_of_a_file_with_a_long_name_get_two_folders():
     """Studios put the version at the end of long names."""
     stems = [f"show_episode_12_sequence_0400_shot_0130_lighting_final_v{n:03}" for n in range(3)]
-    folders = {folder_name(stem) for stem in stems}
+    folders = {safe_folder_name(stem) for stem in stems}
     assert len(folders) == 3 and max(map(len, folders)) <= 50
 
 

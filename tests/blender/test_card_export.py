@@ -21,7 +21,7 @@ from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.cards.card_formats import FBX, GLB, OBJ, USD, CardFormat, format_of
 from hairloom.addon.exchange.cards.glb_file import GlbFile
 from hairloom.addon.exchange.files.axes import from_z_up
-from hairloom.addon.exchange.files.file_set import written_together
+from hairloom.addon.exchange.files.file_set import atomic_file_set
 from hairloom.addon.exchange.usd.usd_levels import with_level_variants
 
 bpy = pytest.importorskip("bpy", reason="Blender's exporters need Blender or the bpy module")
@@ -70,7 +70,7 @@ def written(
     suffix: str = "",
 ) -> Path:
     path = folder / f"hair{suffix or file_format.suffixes[0]}"
-    with written_together(path) as staging:
+    with atomic_file_set(path) as staging:
         write_card_mesh(
             staging / path.name, levels, file_format, LOOK, name=NAME, portable=portable
         )

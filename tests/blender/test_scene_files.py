@@ -11,7 +11,7 @@ from full_disk import full_disk
 
 from hairloom.addon.blender.command_line.scene_files import is_whole, open_scene, save_scene
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.exchange.files import moving
+from hairloom.addon.exchange.files import file_moves
 
 pytestmark = pytest.mark.usefixtures("extension")
 
@@ -83,14 +83,14 @@ def test_a_scene_that_is_open_elsewhere_stays_and_the_new_one_is_kept(
     """Under Windows' rule, an open file cannot be replaced: the new scene is kept beside it."""
     path = tmp_path / "wig.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    before, real = path.read_bytes(), moving.os.replace
+    before, real = path.read_bytes(), file_moves.os.replace
 
     def held(source: Any, target: Any) -> None:
         if Path(target) == path:
             raise PermissionError(13, "Access is denied", str(source), None, str(target))
         real(source, target)
 
-    monkeypatch.setattr(moving.os, "replace", held)
+    monkeypatch.setattr(file_moves.os, "replace", held)
     with pytest.raises(HairloomError, match="as it was") as raised:
         save_scene()
     assert "wig new.blend" in raised.value.remedy

@@ -29,7 +29,7 @@ from hairloom.addon.blender.pictures.studio import FIELD_OF_VIEW, MARGIN
 from hairloom.addon.blender.pictures.turntable import Turntable, TurntableSettings
 from hairloom.addon.blender.properties.presets import shipped
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.exchange.files import moving, stale_temp_files
+from hairloom.addon.exchange.files import file_moves, stale_temp_files
 from hairloom.addon.render.camera import frame_points
 
 pytestmark = [pytest.mark.draws(light=False), pytest.mark.usefixtures("gpu_context")]
@@ -192,7 +192,7 @@ def test_the_next_turn_removes_what_a_killed_one_left(
     ended.wait()
     with monkeypatch.context() as patched:
         patched.setattr(stale_temp_files.os, "getpid", lambda: ended.pid)
-        left = stale_temp_files.temporary_beside(table.folder / "turntable")
+        left = stale_temp_files.temporary_path(table.folder / "turntable")
     left.mkdir(parents=True)
     (left / "turntable_0001.png").write_text("half")
     steps = table.steps()
@@ -279,14 +279,14 @@ def test_a_picture_that_another_program_holds_keeps_all_and_the_new_ones(
     """Under Windows' rule, open files cannot be replaced: a turn then never mixes two grooms."""
     list(table.steps())
     before = {path.name: path.read_bytes() for path in table.folder.iterdir()}
-    held, real = table.files[2], moving.os.replace
+    held, real = table.files[2], file_moves.os.replace
 
     def replace(source: Any, target: Any) -> None:
         if Path(target) == held:
             raise PermissionError(13, "Access is denied", str(source), None, str(target))
         real(source, target)
 
-    monkeypatch.setattr(moving.os, "replace", replace)
+    monkeypatch.setattr(file_moves.os, "replace", replace)
     table.points = table.points * np.float32(1.5)
     with pytest.raises(HairloomError, match="all are as they were") as raised:
         list(table.steps())

@@ -40,7 +40,7 @@ def test_ui_may_know_what_pure_rooms_declare_and_nothing_else() -> None:
     for name in (
         "strand_writing.write_strands",
         "nothing_formats.SUFFIXES",
-        "files.names.plain_name",
+        "files.file_names.identifier_name",
     ):
         assert not is_declaration(f".exchange.{name}")
 

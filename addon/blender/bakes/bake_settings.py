@@ -9,7 +9,7 @@ from typing import Any
 import bpy
 
 from ...errors import HairloomError
-from ...exchange.files.names import as_compared, folder_name
+from ...exchange.files.file_names import name_key, safe_folder_name
 from .cache import owner_and_file
 
 #: Folder beside Blender files; it holds one folder of bakes for each file.
@@ -150,20 +150,20 @@ def folder_names(objects: Sequence[bpy.types.Object]) -> list[str]:
     taken: set[str] = set()
     names = []
     for obj in objects:
-        names.append(folder_name(obj.name, taken))
-        taken.add(as_compared(names[-1]))
+        names.append(safe_folder_name(obj.name, taken))
+        taken.add(name_key(names[-1]))
     return names
 
 
 def _beside(obj: bpy.types.Object) -> str:
     stem = Path(file_name(obj)).stem
-    return f"{_BESIDE}/{folder_name(stem, fallback='file')}"
+    return f"{_BESIDE}/{safe_folder_name(stem, fallback='file')}"
 
 
 def _own_folder(obj: bpy.types.Object, beside: str) -> str:
     named = (other.hairloom.bake.folder for other in _others(obj))
-    taken = {as_compared(Path(folder).name) for folder in named if folder}
-    return f"{beside}/{folder_name(obj.name, taken)}"
+    taken = {name_key(Path(folder).name) for folder in named if folder}
+    return f"{beside}/{safe_folder_name(obj.name, taken)}"
 
 
 def _is_shared(obj: bpy.types.Object) -> bool:
@@ -176,7 +176,7 @@ def _place_of(obj: bpy.types.Object) -> str:
     """A key of the object's folder, equal for paths that are one folder on some file system; empty
     where none is set."""
     folder = folder_of(obj)
-    return "" if folder is None else as_compared(str(folder.resolve()))
+    return "" if folder is None else name_key(str(folder.resolve()))
 
 
 def _others(obj: bpy.types.Object) -> list[bpy.types.Object]:

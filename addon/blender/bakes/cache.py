@@ -31,10 +31,10 @@ import numpy as np
 from ...dynamics.figures import Figures
 from ...errors import HairloomError
 from ...exchange.files.array_file import read_arrays
-from ...exchange.files.atomic import check_folder_place, remedy_for, write_bytes_atomic
-from ...exchange.files.moving import flush, flush_names
-from ...exchange.files.names import length_remark
-from ...exchange.files.stale_temp_files import MARK, is_stale, is_temporary, mark
+from ...exchange.files.atomic import check_folder_writable, remedy_for, write_bytes_atomic
+from ...exchange.files.file_moves import flush_file, flush_folder
+from ...exchange.files.file_names import length_remark
+from ...exchange.files.stale_temp_files import WRITER_TAG, is_stale, is_temporary, writer_tag
 from .baked_solids import VARIABLE_LENGTH
 from .simulated import Arrays
 
@@ -45,7 +45,7 @@ VERSION = 3
 _VARIABLE_LENGTH = frozenset({"led_strands", "led_points"}) | VARIABLE_LENGTH
 FACTS, CONSTANTS = "cache.json", "constants.npz"
 _OURS = re.compile(r"cache\.json|constants\.npz|frame_-?\d{5,7}\.npz")
-_FRAMES = re.compile(rf"frames-{MARK}")
+_FRAMES = re.compile(rf"frames-{WRITER_TAG}")
 #: [bytes]: a frame takes some hundred, and JSON may take twenty times its size in memory.
 _LARGEST_FACTS = 1 << 25
 #: Frames kept in memory: the one that is shown, and its neighbours for motion blur.
@@ -92,7 +92,7 @@ class CacheWriter:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self._frames = folder / f"frames-{mark()}"
+        self._frames = folder / f"frames-{writer_tag()}"
         self._frame_hashes: list[str] = []
         self._layout: dict[str, list[Any]] = {}
         self._content: dict[str, Any] = {}
@@ -128,7 +128,7 @@ class CacheWriter:
         self._content = {"version": VERSION, **asdict(facts), "layout": self._layout}
         self._content["frame_hashes"] = self._frame_hashes
         write_bytes_atomic(self._frames / FACTS, _text(self._content, "."))
-        flush_names(self.folder)
+        flush_folder(self.folder)
         self._is_whole = True
 
     def publish(self) -> None:
@@ -176,7 +176,7 @@ class CacheWriter:
         try:
             with open(self._frames / name, "wb") as file:
                 np.savez(file, allow_pickle=False, **arrays)
-            flush(self._frames / name)
+            flush_file(self._frames / name)
         except OSError as error:
             raise _unwritable(self.folder, error) from error
 
@@ -187,7 +187,7 @@ def check_bake_folder(folder: Path) -> None:
     Raises:
         HairloomError: nothing can be written there, or it holds files that are not of a bake.
     """
-    check_folder_place(folder)
+    check_folder_writable(folder)
     try:
         if folder.exists():
             _check_ours(folder)
@@ -455,7 +455,7 @@ def _damaged(path: Path, why: str) -> HairloomError:
 
 def _unwritable(folder: Path, error: OSError) -> HairloomError:
     why = error.strerror or str(error)
-    remark = length_remark(folder / f"frames-{mark()}" / _frame_name(0), why)
+    remark = length_remark(folder / f"frames-{writer_tag()}" / _frame_name(0), why)
     return HairloomError(
         f"the bake cannot be written ({why}{remark})",
         place=str(folder),

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from ...exchange.files.names import distinct_names, no_device, plain_name
+from ...exchange.files.file_names import avoid_device_name, identifier_name, unique_names
 
 
 def file_stem(hair_name: str) -> str:
     """A file's name after the hair in it, without characters or names that file systems refuse."""
-    return no_device(plain_name(hair_name))
+    return avoid_device_name(identifier_name(hair_name))
 
 
 def in_own_folder(path: Path) -> Path:
@@ -27,5 +27,5 @@ def files_of(path: Path, hair_names: Sequence[str]) -> list[Path]:
     """
     if len(hair_names) == 1:
         return [path]
-    stems = distinct_names(f"{path.stem}_{file_stem(name)}" for name in hair_names)
+    stems = unique_names(f"{path.stem}_{file_stem(name)}" for name in hair_names)
     return [path.with_stem(stem) for stem in stems]

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...arrays import Floats
 from ...errors import HairloomError
-from ...exchange.files.atomic import DISK_FULL, atomic_write, unwritable
+from ...exchange.files.atomic import DISK_FULL, atomic_write, write_error
 from ...exchange.textures import texture_files
 from ...exchange.textures.srgb import srgb_decoded, srgb_encoded
 
@@ -155,7 +155,7 @@ def save_coded_png(path: Path, coded: Floats, *, has_alpha: bool = True) -> None
         with atomic_write(path) as temporary:
             image.save(filepath=str(temporary))
             if not texture_files.has_its_end(temporary):
-                raise unwritable(path, DISK_FULL)
+                raise write_error(path, DISK_FULL)
 
 
 def webp_of(path: Path, coded: Floats, side: int, quality: int) -> bytes:
@@ -181,7 +181,7 @@ def webp_of(path: Path, coded: Floats, side: int, quality: int) -> bytes:
             image.save(filepath=str(file), quality=quality)
             return file.read_bytes()
         except (RuntimeError, OSError) as error:
-            raise unwritable(path, str(error)) from error
+            raise write_error(path, str(error)) from error
         finally:
             file.unlink(missing_ok=True)
 

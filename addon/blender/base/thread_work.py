@@ -74,8 +74,8 @@ class ThreadWork[T]:
 
     @contextmanager
     def committing(self) -> Iterator[None]:
-        """In the thread, for `exchange.files.moving.committing`: files are moved to their places,
-        and `give_up` waits until all are.
+        """In the thread, for `exchange.files.file_moves.commit_context`: files are moved to their
+        places, and `give_up` waits until all are.
 
         Raises:
             GivenUpError: the work was given up before.
@@ -88,8 +88,8 @@ class ThreadWork[T]:
 
     @contextmanager
     def ending(self, end: Callable[[], None]) -> Iterator[None]:
-        """In the thread, for `exchange.files.child_process.ending`: `give_up` also ends the child
-        process.
+        """In the thread, for `exchange.files.child_process.kill_context`: `give_up` also ends the
+        child process.
 
         Raises:
             GivenUpError: the work was given up.

@@ -22,8 +22,8 @@ from ...arrays import Floats
 from ...cards.card_mesh import CardMesh
 from ...errors import HairloomError
 from ...exchange.cards.card_formats import FBX, GLB, OBJ, USD, CardFormat
-from ...exchange.files.atomic import DISK_FULL, as_system_says, unwritable
-from ...exchange.files.names import plain_name
+from ...exchange.files.atomic import DISK_FULL, write_error, write_failure_reason
+from ...exchange.files.file_names import identifier_name
 from ...exchange.textures.srgb import srgb_decoded
 from ...strands.vectors import unit
 from ..base.parts import new_blocks_removed
@@ -55,7 +55,7 @@ class CardLook:
 
 def level_names(name: str, count: int) -> tuple[str, ...]:
     """The names of the objects of `count` levels of detail, finest first."""
-    plain = plain_name(name)
+    plain = identifier_name(name)
     return (plain,) if count == 1 else tuple(f"{plain}_LOD{level}" for level in range(count))
 
 
@@ -73,7 +73,7 @@ def write_card_mesh(
 
     Args:
         path: in a folder of its own, as some exporters write more than one file; see
-            `exchange.files.file_set.written_together`.
+            `exchange.files.file_set.atomic_file_set`.
         name: the hair's name in the file.
         portable: without custom attributes, which some engines refuse.
         texels: for each level, (vertex_count, 2) for a third UV map, see `card_scene`.
@@ -90,8 +90,8 @@ def write_card_mesh(
             with redirect_stdout(StringIO()), redirect_stderr(said):  # no running commentary
                 _EXPORTERS[file_format.name](path, portable)
         except RuntimeError as error:
-            if as_system_says(path, _reason(error)) == DISK_FULL:
-                raise unwritable(path, DISK_FULL) from error
+            if write_failure_reason(path, _reason(error)) == DISK_FULL:
+                raise write_error(path, DISK_FULL) from error
             print(said.getvalue(), end="", file=sys.stderr)
             raise HairloomError(
                 f"Blender's exporter of {file_format.title} failed ({_reason(error)})",
@@ -241,10 +241,10 @@ def card_scene(
         texels: for each level, (vertex_count, 2): a third UV map, with v from the top.
     """
     names = level_names(name, len(levels))
-    with _free_names({plain_name(name), *names}), new_blocks_removed():
-        scene = bpy.data.scenes.new(plain_name(name))
-        material = _new_material(look, plain_name(name), file_format)
-        parent = _new_parent(scene, plain_name(name)) if len(levels) > 1 else None
+    with _free_names({identifier_name(name), *names}), new_blocks_removed():
+        scene = bpy.data.scenes.new(identifier_name(name))
+        material = _new_material(look, identifier_name(name), file_format)
+        parent = _new_parent(scene, identifier_name(name)) if len(levels) > 1 else None
         for number, (level, level_name) in enumerate(zip(levels, names, strict=True)):
             mesh = bpy.data.meshes.new(level_name)
             uv_maps = _uv_maps(level, texels[number] if len(texels) else None, file_format)

@@ -31,9 +31,9 @@ from ...exchange.cards.glb_plain import screen_coverage, with_levels, with_mater
 from ...exchange.cards.glb_springs import HeadBone
 from ...exchange.cards.index_buffer import index_buffer
 from ...exchange.cards.sidecar import SUFFIX, CardFile, files_of_earlier, other_owner, sidecar_text
-from ...exchange.files.atomic import check_place
-from ...exchange.files.file_set import kept_aside, written_together
-from ...exchange.files.names import alike_beside
+from ...exchange.files.atomic import check_writable
+from ...exchange.files.file_names import name_in_other_case
+from ...exchange.files.file_set import atomic_file_set, back_up_foreign_files
 from ...exchange.textures.card_textures import WrittenTexture, of_one_size
 from ...exchange.textures.texture_packing import packed
 from ...exchange.usd.usd_levels import with_level_variants
@@ -189,8 +189,8 @@ def check_output(path: Path, output: CardOutput, motion: GuideMotion | None) -> 
         HairloomError: the path, the format, or motion in this format.
     """
     path, file_format = format_of(path, output.format)
-    check_place(path)
-    check_place(path.with_name(path.stem + _LONGEST))
+    check_writable(path)
+    check_writable(path.with_name(path.stem + _LONGEST))
     _check_neighbours(path)
     check_exporter(file_format, str(path))
     check_page(output.settings, file_format, str(path))
@@ -205,7 +205,7 @@ def _check_neighbours(path: Path) -> None:
     Raises:
         HairloomError: naming the other file.
     """
-    other = other_owner(path) or alike_beside(path)
+    other = other_owner(path) or name_in_other_case(path)
     if other:
         raise HairloomError(
             f"{other} is in this folder, and its companion files would have the same names",
@@ -249,10 +249,10 @@ def file_steps(
     """
     path, file_format = format_of(path, output.format)
     check_cards(made.build.levels, str(path))
-    with written_together(path) as folder:
+    with atomic_file_set(path) as folder:
         writer = _Writer(folder / path.name, made, settings, output, file_format, stage, head)
         said = yield from writer.steps(motion)
-        said += kept_aside(folder, path, files_of_earlier(path))
+        said += back_up_foreign_files(folder, path, files_of_earlier(path))
         names = {file.name for file in folder.iterdir() if file.is_file()}
     beside = sorted(names - {path.name, path.stem + SUFFIX})
     files = (path.name, *beside, path.stem + SUFFIX)

@@ -8,7 +8,7 @@ import os
 from pathlib import Path
 
 from ...errors import HairloomError
-from ...exchange.files.atomic import check_folder_place, check_place
+from ...exchange.files.atomic import check_folder_writable, check_writable
 from .verb import Verb
 
 #: options for files to write beside --output, and their suffix
@@ -48,7 +48,7 @@ def check_outputs(verb: Verb, options: argparse.Namespace) -> None:
     if output is None:
         return
     if verb.writes_folder:
-        check_folder_place(output)
+        check_folder_writable(output)
         check_not_read(output, options)
     else:
         _check_file(output, "output", verb.suffix, options)
@@ -91,7 +91,7 @@ def _check_file(path: Path, name: str, suffix: str, options: argparse.Namespace)
             place=str(path),
             remedy=f"Choose a name that ends in {suffix}",
         )
-    check_place(path)
+    check_writable(path)
     check_not_read(path, options)
     others = [each for each in _OUTPUTS if each != name and getattr(options, each, None)]
     if any(_is_same(path, getattr(options, each)) for each in others):

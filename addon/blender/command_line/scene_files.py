@@ -15,12 +15,12 @@ import numpy as np
 from ...errors import HairloomError
 from ...exchange.files.atomic import (
     DISK_FULL,
-    as_system_says,
     atomic_write,
-    check_place,
-    unwritable,
+    check_writable,
+    write_error,
+    write_failure_reason,
 )
-from ...exchange.files.stale_temp_files import temporary_beside
+from ...exchange.files.stale_temp_files import temporary_path
 from ..bakes.bake_settings import folder_of, shown_folder_of
 from ..base.suspension import suspended
 
@@ -75,7 +75,7 @@ def check_saving(output: Path | None, *, over: bool) -> None:
         raise HairloomError(
             "the file name of a scene must end in .blend", place=str(output), remedy="Add .blend"
         )
-    check_place(Path(bpy.data.filepath) if output is None else output)
+    check_writable(Path(bpy.data.filepath) if output is None else output)
 
 
 def save_scene(path: Path | None = None) -> Path:
@@ -96,10 +96,10 @@ def save_scene(path: Path | None = None) -> Path:
         try:
             bpy.ops.wm.save_as_mainfile(filepath=str(temporary), copy=True)
         except RuntimeError as error:
-            why = as_system_says(target, str(error).removeprefix("Error:").strip())
-            raise unwritable(target, why) from error
+            why = write_failure_reason(target, str(error).removeprefix("Error:").strip())
+            raise write_error(target, why) from error
         if not is_whole(temporary):
-            raise unwritable(target, DISK_FULL)
+            raise write_error(target, DISK_FULL)
         if target is own:
             _keep_versions(target.resolve())
     return target
@@ -142,7 +142,7 @@ def _keep_versions(path: Path) -> None:
         if newer.exists():
             os.replace(newer, older)
     if count:
-        beside = temporary_beside(path)
+        beside = temporary_path(path)
         try:
             shutil.copy2(path, beside)
             os.replace(beside, names[1])

@@ -22,7 +22,7 @@ from typing import Any
 import bpy
 
 from ...errors import HairloomError
-from ...exchange.files.atomic import check_place, write_text_atomic
+from ...exchange.files.atomic import check_writable, write_text_atomic
 from ...exchange.named_files import named_files
 from ...params.preset import preset_as_dict
 from ..base.digests import digest
@@ -64,7 +64,7 @@ class Stamp:
             )
         output = Path(os.path.abspath(output))  # so that "." has a name
         self.path = output.with_name(output.name + SUFFIX)
-        check_place(self.path)
+        check_writable(self.path)
         self.reported: dict[str, Any] = {}
         self._folder = self.path.parent
         self._asked = _asked(options, self._folder)

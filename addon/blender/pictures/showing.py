@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import bpy
 
 from ...arrays import Floats
-from ...exchange.files.names import no_device
+from ...exchange.files.file_names import avoid_device_name
 from ...paint_flow import colored
 from ...rig_flow import Pose
 from ...shading.ambient_settings import AmbientSettings
@@ -66,7 +66,7 @@ def shown_groom(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Shown
 
 def file_name(name: str) -> str:
     """A file name for a data-block's name."""
-    return no_device(re.sub(r"[^\w .-]+", "_", name).strip(" .") or "groom")
+    return avoid_device_name(re.sub(r"[^\w .-]+", "_", name).strip(" .") or "groom")
 
 
 def _studio(hair: bpy.types.Object, groom: PreparedGroom, settings: GroomSettings) -> Studio:

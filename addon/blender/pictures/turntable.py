@@ -17,8 +17,8 @@ import numpy as np
 
 from ...arrays import Floats
 from ...errors import HairloomError
-from ...exchange.files.atomic import folder_unwritable, unwritable
-from ...exchange.files.file_set import written_together
+from ...exchange.files.atomic import folder_write_error, write_error
+from ...exchange.files.file_set import atomic_file_set
 from ...render.camera import Camera
 from ...rig_flow import Pose
 from ...shading.lights import Light
@@ -171,7 +171,7 @@ class Turntable:
             try:
                 path.unlink()
             except OSError as error:
-                raise unwritable(path, error.strerror or str(error)) from error
+                raise write_error(path, error.strerror or str(error)) from error
 
     def _write_video(self, beside: Path, frames: list[Path]) -> None:
         """Write a video, or note why there is none; the pictures are written in any case."""
@@ -218,9 +218,9 @@ def _written_when_done(first: Path) -> Iterator[Path]:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise folder_unwritable(folder, error.strerror or str(error)) from error
+        raise folder_write_error(folder, error.strerror or str(error)) from error
     try:
-        with written_together(first) as beside:
+        with atomic_file_set(first) as beside:
             yield beside
     except BaseException:
         if is_new and folder.is_dir() and not any(folder.iterdir()):

@@ -12,7 +12,7 @@ from pathlib import Path
 import bpy
 
 from ...errors import HairloomError
-from ...exchange.files.atomic import as_system_says, atomic_write
+from ...exchange.files.atomic import atomic_write, write_failure_reason
 
 #: codecs that Blender may have been built with, the most widely supported first
 _CODECS = ("H264", "MPEG4")
@@ -51,7 +51,7 @@ def write_video(
                 why = str(error).strip()
             if temporary.is_file() and temporary.stat().st_size:
                 if not is_whole(temporary):
-                    raise _failed(path, as_system_says(path, "it was cut short"), _FREE_SPACE)
+                    raise _failed(path, write_failure_reason(path, "it was cut short"), _FREE_SPACE)
                 return
         raise _failed(path, why)
 

@@ -20,7 +20,7 @@ import bpy
 
 from ...errors import HairloomError
 from ...exchange.files.atomic import write_text_atomic
-from ...exchange.files.names import as_compared, folder_name
+from ...exchange.files.file_names import name_key, safe_folder_name
 from ...parameters import ALL_SETTINGS
 from ...params import Settings
 from ...params.preset import Preset, preset_as_dict, read_any_preset
@@ -290,11 +290,11 @@ def _file_for(stem: str, title: str, section: str) -> Path:
     known = _of_title(title, section)
     if known is not None:
         return known.path
-    taken = {as_compared(path.stem) for path in _own_files()}
-    return own_folder() / f"{folder_name(stem, taken, 'preset')}.json"
+    taken = {name_key(path.stem) for path in _own_files()}
+    return own_folder() / f"{safe_folder_name(stem, taken, 'preset')}.json"
 
 
 def _of_title(title: str, section: str) -> Entry | None:
     """The artist's own preset with a title, ignoring case."""
     entries, _ = own(section)
-    return next((each for each in entries if as_compared(each.title) == as_compared(title)), None)
+    return next((each for each in entries if name_key(each.title) == name_key(title)), None)

@@ -12,7 +12,7 @@ from typing import Any
 import bpy
 
 from ...arrays import Floats
-from ...exchange.files.moving import committing
+from ...exchange.files.file_moves import commit_context
 from ...exchange.groom import Groom, GroomMotion
 from ...exchange.groom_presets import chosen_parts
 from ...exchange.joined_grooms import joined_bones, joined_grooms
@@ -153,7 +153,7 @@ class StrandExport:
         """`write` in a thread, which has the main thread produce each frame of `positions`."""
 
         def work(thread: ThreadWork[Outcome]) -> Outcome:
-            committing.set(thread.committing)  # a context variable of this thread alone
+            commit_context.set(thread.committing)  # a context variable of this thread alone
             return self.write(path, _asked(thread, positions))
 
         return ThreadWork(work, "Hairloom strands")

@@ -38,7 +38,7 @@ DEEPEST = 64
 MAX_TIMES = 10_000
 #: Exit codes, as `run_reader` expects them: after an error that is reported on stderr; where the
 #: results cannot be written.
-REPORTED, NO_ROOM = 3, 4
+EXIT_REPORTED, EXIT_NO_SPACE = 3, 4
 
 #: In Alembic's enumerations. Curves of other bases run through their points, or near them.
 _CUBIC, _BEZIER, _PERIODIC = 0, 1, 1
@@ -241,12 +241,12 @@ def _main(path: str, result: str) -> int:
         found = read_curves(path)
     except (ImportError, RuntimeError, ValueError, LookupError, MemoryError) as error:
         print(str(error).strip() or type(error).__name__, file=sys.stderr)
-        return REPORTED
+        return EXIT_REPORTED
     try:
         with open(result, "wb") as file:
             np.savez(file, allow_pickle=False, **found)
     except OSError:
-        return NO_ROOM
+        return EXIT_NO_SPACE
     return 0
 
 

@@ -21,8 +21,8 @@ from ...arrays import Floats, Ints
 from ...errors import HairloomError
 from ...strands import StrandSet
 from ...strands.resample import arc_length_positions
-from ..files.atomic import as_system_says, atomic_write, check_free_space, unwritable
-from ..files.names import distinct_names, plain_name
+from ..files.atomic import atomic_write, check_free_space, write_error, write_failure_reason
+from ..files.file_names import identifier_name, unique_names
 from ..groom import Groom, GroomMotion, points_of
 from ..groom_presets import MIN_WIDTH, UNREAL, GroomPreset, chosen_strands
 from .alembic_library import alembic_library, array_of, sample_of, scope_of, write_parameter
@@ -65,10 +65,10 @@ def write_groom_alembic(
             traceback.clear_frames(error.__traceback__)
             if not isinstance(error, RuntimeError):
                 raise
-            why = as_system_says(path, str(error).strip() or "no reason given")
-            raise unwritable(path, why) from error
+            why = write_failure_reason(path, str(error).strip() or "no reason given")
+            raise write_error(path, why) from error
         if not is_finished(temporary):
-            raise unwritable(path, as_system_says(path, "the disk may be full"))
+            raise write_error(path, write_failure_reason(path, "the disk may be full"))
 
 
 def is_finished(path: Path) -> bool:
@@ -140,12 +140,12 @@ def _chosen(groom: Groom, preset: GroomPreset) -> Iterator[tuple[str, Ints | Non
     count = groom.strands.strand_count
     wanted = chosen_strands(groom, preset.parts)
     if not preset.is_split:
-        yield plain_name(groom.name), None if len(wanted) == count else wanted
+        yield identifier_name(groom.name), None if len(wanted) == count else wanted
         return
     group = groom.strands.group[wanted]
     numbers = np.unique(group).tolist()
-    names = distinct_names(
-        plain_name(groom.group_names.get(each, f"{groom.name}_{each}")) for each in numbers
+    names = unique_names(
+        identifier_name(groom.group_names.get(each, f"{groom.name}_{each}")) for each in numbers
     )
     for name, number in zip(names, numbers, strict=True):
         yield name, wanted[group == number]
@@ -167,7 +167,7 @@ def _write(
     points, strands = sum(int(each.sum()) for each in counts), sum(map(len, counts))
     check_free_space(path, points * _POINT_BYTES + strands * _STRAND_BYTES + _HEADER_BYTES)
     archive, time = _archive(library, path, groom, motion)
-    top = library.geom.OXform(archive.getTop(), f"{plain_name(groom.name)}_groom")
+    top = library.geom.OXform(archive.getTop(), f"{identifier_name(groom.name)}_groom")
     _write_version(library, top.getSchema().getUserProperties(), groom, preset)
     frames = iter([groom.strands.points] if motion is None else motion.positions)
     first = _checked(next(frames, None), groom)

@@ -11,9 +11,9 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ...errors import HairloomError
-from .moving import committing, flush, flush_names, free_name, move
-from .names import check_name, length_remark
-from .stale_temp_files import remove_stale_files, temporary_beside
+from .file_moves import commit_context, flush_file, flush_folder, move_file, unused_path
+from .file_names import check_utf8_name, length_remark
+from .stale_temp_files import remove_stale_files, temporary_path
 
 #: reasons why nothing can be written
 IS_FOLDER = "a folder has this name"
@@ -39,11 +39,11 @@ _ANY_REMEDY = (
     "file"
 )
 #: A disk with fewer free bytes is full: a file system needs some of them itself.
-_FULL = 1 << 16
+_MIN_FREE_BYTES = 1 << 16
 
 
 @contextmanager
-def atomic_write(path: Path, *, keeps: bool = True) -> Iterator[Path]:
+def atomic_write(path: Path, *, keep_on_failure: bool = True) -> Iterator[Path]:
     """A path beside `path` to write to; it replaces `path` when the block succeeds.
 
     The temporary path has the same suffix, so that exporters accept it. Missing folders are made.
@@ -51,35 +51,35 @@ def atomic_write(path: Path, *, keeps: bool = True) -> Iterator[Path]:
     process left in the folder is removed.
 
     Args:
-        keeps: if another program holds the old file, keep the complete new one beside it, since it
-            may have taken minutes to write.
+        keep_on_failure: if another program holds the old file, keep the complete new one beside it,
+            since it may have taken minutes to write.
 
     Raises:
         HairloomError: nothing can be written there, or the block wrote no file.
     """
     target = Path(os.path.realpath(path))  # through a link, as plain writing goes
-    temporary = temporary_beside(target)
+    temporary = temporary_path(target)
     try:
         _check_writable(target)
     except OSError as error:
-        raise unwritable(path, error.strerror or str(error)) from error
+        raise write_error(path, error.strerror or str(error)) from error
     try:
         yield temporary
         if not temporary.is_file():
-            raise unwritable(path, "nothing was written")
-        flush(temporary)  # first, since the old file's mode may not allow it
+            raise write_error(path, "nothing was written")
+        flush_file(temporary)  # first, since the old file's mode may not allow it
         if target.exists():
             shutil.copymode(target, temporary)
         try:
-            with committing.get()():
-                move(temporary, target)
+            with commit_context.get()():
+                move_file(temporary, target)
         except PermissionError as error:
-            if not keeps:
+            if not keep_on_failure:
                 raise
-            raise _kept(temporary, target, path, error) from error
-        flush_names(target.parent)
+            raise _keep_new_file(temporary, target, path, error) from error
+        flush_folder(target.parent)
     except OSError as error:
-        raise unwritable(path, error.strerror or str(error)) from error
+        raise write_error(path, error.strerror or str(error)) from error
     finally:
         temporary.unlink(missing_ok=True)
 
@@ -90,7 +90,7 @@ def write_bytes_atomic(path: Path, content: bytes | bytearray | memoryview) -> N
     Raises:
         HairloomError: nothing can be written there.
     """
-    with atomic_write(path, keeps=False) as temporary:
+    with atomic_write(path, keep_on_failure=False) as temporary:
         temporary.write_bytes(content)
 
 
@@ -105,22 +105,22 @@ def write_text_atomic(path: Path, text: str) -> None:
 
 def _check_writable(target: Path) -> None:
     """Fail now rather than after a long export."""
-    check_name(target)
+    check_utf8_name(target)
     with suppress(FileNotFoundError):
         os.stat(target)  # a name that is too long, or below a file
-    why = why_not_replaced(target)
+    why = reason_not_replaceable(target)
     if why:
         raise PermissionError(errno.EACCES, why)
     target.parent.mkdir(parents=True, exist_ok=True)
     remove_stale_files(target.parent)
     # under another name, so that nobody else can see the right one before it is used
-    trial = temporary_beside(target)
+    trial = temporary_path(target)
     trial.touch(exist_ok=False)
     trial.unlink()
 
 
-def _kept(temporary: Path, target: Path, path: Path, error: OSError) -> HairloomError:
-    kept = free_name(target.with_name(f"{target.stem} new{target.suffix}"))
+def _keep_new_file(temporary: Path, target: Path, path: Path, error: OSError) -> HairloomError:
+    kept = unused_path(target.with_name(f"{target.stem} new{target.suffix}"))
     os.rename(temporary, kept)
     return HairloomError(
         f"this file cannot be replaced ({error.strerror or error}); it is as it was",
@@ -129,13 +129,13 @@ def _kept(temporary: Path, target: Path, path: Path, error: OSError) -> Hairloom
     )
 
 
-def check_place(path: Path) -> None:
+def check_writable(path: Path) -> None:
     """Refuse a place that nothing can be written to before long work begins; writes nothing.
 
     Raises:
         HairloomError: what has this name cannot be replaced, or no file can be made in its folder.
     """
-    check_name(path)
+    check_utf8_name(path)
     if not path.name:
         raise HairloomError(
             "this names a folder, not a file",
@@ -143,22 +143,25 @@ def check_place(path: Path) -> None:
             remedy="Give a file name; if it comes from a variable, that may be empty",
         )
     try:
-        why = why_not_replaced(path) or _why_no_file(path)
+        why = reason_not_replaceable(path) or reason_not_creatable(path)
     except OSError as error:  # a name that is too long
         why = error.strerror or str(error)
     if why:
-        raise unwritable(path, why)
+        raise write_error(path, why)
 
 
-def check_folder_place(folder: Path) -> None:
+def check_folder_writable(folder: Path) -> None:
     """Refuse a folder that files cannot be written into; it need not be there yet.
 
     Raises:
         HairloomError: a file has this name, or no file can be made there.
     """
-    check_name(folder)
+    check_utf8_name(folder)
     try:
-        is_file, why = folder.exists() and not folder.is_dir(), _why_no_file(folder / "file")
+        is_file, why = (
+            folder.exists() and not folder.is_dir(),
+            reason_not_creatable(folder / "file"),
+        )
     except OSError as error:  # a name that is too long
         is_file, why = False, error.strerror or str(error)
     if is_file:
@@ -166,17 +169,17 @@ def check_folder_place(folder: Path) -> None:
             "a file has this name", place=str(folder), remedy="Choose a folder, or a new name"
         )
     if why:
-        raise folder_unwritable(folder, why)
+        raise folder_write_error(folder, why)
 
 
-def why_not_replaced(path: Path) -> str:
+def reason_not_replaceable(path: Path) -> str:
     """Why what is at this path cannot be replaced by a file; empty where it can."""
     if path.is_dir():
         return IS_FOLDER
     return IS_PROTECTED if path.exists() and not os.access(path, os.W_OK) else ""
 
 
-def folder_unwritable(folder: Path, why: str) -> HairloomError:
+def folder_write_error(folder: Path, why: str) -> HairloomError:
     """The message for a folder that nothing can be written into."""
     return HairloomError(
         f"nothing can be written into this folder ({why})",
@@ -185,7 +188,7 @@ def folder_unwritable(folder: Path, why: str) -> HairloomError:
     )
 
 
-def _why_no_file(path: Path) -> str:
+def reason_not_creatable(path: Path) -> str:
     """Why no file can be made here, nor the folders that it needs; empty where one can."""
     folder = next(each for each in path.absolute().parents if each.exists())
     if not folder.is_dir():
@@ -193,12 +196,12 @@ def _why_no_file(path: Path) -> str:
     return "" if os.access(folder, os.W_OK | os.X_OK) else _NO_RIGHTS
 
 
-def unwritable(path: Path, why: str) -> HairloomError:
+def write_error(path: Path, why: str) -> HairloomError:
     """The message for a place where nothing can be written.
 
     why: as the system says it, or as one of the reasons above.
     """
-    remark = length_remark(temporary_beside(path), why)
+    remark = length_remark(temporary_path(path), why)
     return HairloomError(
         f"this file cannot be written ({why}{remark})",
         place=str(path),
@@ -211,11 +214,11 @@ def remedy_for(why: str) -> str:
     return _REMEDIES.get(why, _ANY_REMEDY)
 
 
-def as_system_says(path: Path, why: str) -> str:
+def write_failure_reason(path: Path, why: str) -> str:
     """Why a library could not write beside this path: a full disk, which few libraries report, or
     else what the library says."""
-    free = shutil.disk_usage(path.parent).free if path.parent.is_dir() else _FULL
-    return DISK_FULL if free < _FULL else why
+    free = shutil.disk_usage(path.parent).free if path.parent.is_dir() else _MIN_FREE_BYTES
+    return DISK_FULL if free < _MIN_FREE_BYTES else why
 
 
 def check_free_space(path: Path, size: int) -> None:

@@ -21,8 +21,8 @@ _NO_WINDOW = getattr(subprocess, "CREATE_NO_WINDOW", 0)
 
 #: Makes the context of a child's run, from the function that kills the child. Callers that may
 #: cancel the work set it; it may raise instead.
-ending: ContextVar[Callable[[Callable[[], None]], AbstractContextManager[object]]] = ContextVar(
-    "ending", default=nullcontext
+kill_context: ContextVar[Callable[[Callable[[], None]], AbstractContextManager[object]]] = (
+    ContextVar("kill_context", default=nullcontext)
 )
 
 
@@ -50,7 +50,7 @@ def run_child(
     )
     with child:
         try:
-            with ending.get()(child.kill):
+            with kill_context.get()(child.kill):
                 output, errors = child.communicate(timeout=seconds)
         finally:
             child.kill()  # where it has ended this does nothing

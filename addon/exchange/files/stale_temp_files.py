@@ -18,31 +18,33 @@ import time
 from functools import cache
 from pathlib import Path
 
-from .moving import move
+from .file_moves import move_file
 
 #: The part of such a name that identifies its writer.
-MARK = r"hl-(?P<place>[0-9a-f]{8})-(?P<process>\d{1,10})-[0-9a-f]{8}"
-_OURS = re.compile(rf"\..*\.{MARK}(\.[^.]*)?")
+WRITER_TAG = r"hl-(?P<host>[0-9a-f]{8})-(?P<process>\d{1,10})-[0-9a-f]{8}"
+_TEMP_NAME = re.compile(rf"\..*\.{WRITER_TAG}(\.[^.]*)?")
 #: Marks a folder of files that belong together as complete.
-COMPLETE = ".complete"
+COMPLETE_MARKER = ".complete"
 #: Seconds without a change after which a writer whose process cannot be checked counts as gone.
 _ABANDONED = 86_400.0
 
 
-def temporary_beside(path: Path, suffix: str | None = None) -> Path:
+def temporary_path(path: Path, suffix: str | None = None) -> Path:
     """A unique hidden name in the same folder, with this suffix or that of `path`."""
     # no longer than other names, which have 255 bytes at most
-    return path.with_name(f".{path.stem[:20]}.{mark()}{path.suffix if suffix is None else suffix}")
+    return path.with_name(
+        f".{path.stem[:20]}.{writer_tag()}{path.suffix if suffix is None else suffix}"
+    )
 
 
-def mark() -> str:
-    """A unique part of a name that tells which process writes there, see MARK."""
-    return f"hl-{_here()}-{os.getpid()}-{secrets.token_hex(4)}"
+def writer_tag() -> str:
+    """A unique part of a name that tells which process writes there, see WRITER_TAG."""
+    return f"hl-{_host_id()}-{os.getpid()}-{secrets.token_hex(4)}"
 
 
 def is_temporary(name: str) -> bool:
     """Whether this is the name of a temporary file."""
-    return _OURS.fullmatch(name) is not None
+    return _TEMP_NAME.fullmatch(name) is not None
 
 
 def is_stale(path: str | Path, name: re.Match[str]) -> bool:
@@ -52,11 +54,11 @@ def is_stale(path: str | Path, name: re.Match[str]) -> bool:
     has ended, count as gone after a day without a change.
 
     Args:
-        name: of the file or folder, matched by a pattern with the groups of MARK.
+        name: of the file or folder, matched by a pattern with the groups of WRITER_TAG.
     """
-    if name["place"] != _here() or os.name != "posix":
+    if name["host"] != _host_id() or os.name != "posix":
         return _is_abandoned(path)
-    return not _is_writing(int(name["process"]))
+    return not _is_running(int(name["process"]))
 
 
 def remove_stale_files(folder: Path) -> None:
@@ -70,26 +72,26 @@ def remove_stale_files(folder: Path) -> None:
     with os.scandir(folder) as entries:
         hidden = [entry for entry in entries if entry.name.startswith(".")]
     for entry in hidden:
-        name = _OURS.fullmatch(entry.name)
+        name = _TEMP_NAME.fullmatch(entry.name)
         if name is None or not is_stale(entry.path, name):
             continue
         if entry.is_dir(follow_symlinks=False):
-            if os.path.isfile(os.path.join(entry.path, COMPLETE)):
-                put_in_place(Path(entry.path), folder)
+            if os.path.isfile(os.path.join(entry.path, COMPLETE_MARKER)):
+                finish_file_set(Path(entry.path), folder)
             shutil.rmtree(entry.path, ignore_errors=True)
         else:
             with contextlib.suppress(OSError):  # another one may remove it as well
                 os.unlink(entry.path)
 
 
-def put_in_place(staging: Path, folder: Path) -> None:
+def finish_file_set(staging: Path, folder: Path) -> None:
     """Move the remaining files of a complete set to their places, but not over newer ones."""
-    complete = (staging / COMPLETE).stat().st_mtime_ns
+    complete = (staging / COMPLETE_MARKER).stat().st_mtime_ns
     for file in sorted(staging.iterdir()):
         target = Path(os.path.realpath(folder / file.name))  # through a link
         is_newer = target.exists() and target.stat().st_mtime_ns > complete
-        if file.is_file() and file.name != COMPLETE and not is_newer:
-            move(file, target)
+        if file.is_file() and file.name != COMPLETE_MARKER and not is_newer:
+            move_file(file, target)
 
 
 def _is_abandoned(path: str | Path) -> bool:
@@ -100,7 +102,7 @@ def _is_abandoned(path: str | Path) -> bool:
         return False
 
 
-def _is_writing(process: int) -> bool:
+def _is_running(process: int) -> bool:
     """Whether the process runs. Not for Windows, where signal 0 would end it."""
     try:
         os.kill(process, 0)
@@ -112,7 +114,7 @@ def _is_writing(process: int) -> bool:
 
 
 @cache
-def _here() -> str:
+def _host_id() -> str:
     """A name for where process numbers are those of this process: machines and containers may share
     folders."""
     numbers, machine = "", ""

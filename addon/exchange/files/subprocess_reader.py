@@ -1,7 +1,7 @@
 """Reading a file in another process, so that a library that crashes on it does not end Blender.
 
-That process runs a script that imports none of our modules. It ends with REPORTED after an error
-that it has written to stderr.
+That process runs a script that imports none of our modules. It ends with EXIT_REPORTED after an
+error that it has written to stderr.
 """
 
 from __future__ import annotations
@@ -14,14 +14,17 @@ from subprocess import TimeoutExpired
 
 from ...errors import HairloomError
 from .child_process import python_program, run_child
-from .names import check_name
+from .file_names import check_utf8_name
 
 #: exit codes of a script: after an error that is on stderr; where its results cannot be written
-REPORTED, NO_ROOM = 3, 4
+EXIT_REPORTED, EXIT_NO_SPACE = 3, 4
 #: Exit codes where Linux or macOS has ended a process, and why: it took too much time, or memory.
-_ENDED = {-24: "since it took too long for a file of this size", -9: "as when memory runs out"}
+_KILLED_BY_SYSTEM = {
+    -24: "since it took too long for a file of this size",
+    -9: "as when memory runs out",
+}
 #: Seconds for any file, and bytes that a slow disk reads in each further second.
-_PATIENCE, _BYTES_A_SECOND = 60.0, 4.0e6
+_MIN_SECONDS, _BYTES_A_SECOND = 60.0, 4.0e6
 
 
 def run_reader(
@@ -44,36 +47,37 @@ def run_reader(
     Raises:
         HairloomError: no Python can be started, it takes too long, or it ends otherwise.
     """
-    check_name(path)
+    check_utf8_name(path)
     files = [str(each.absolute()) for each in (path, *results)]
     command = [*(python or this_python(path)), str(script.absolute()), "--", *files]
-    patience = _PATIENCE + path.stat().st_size / _BYTES_A_SECOND
+    seconds = _MIN_SECONDS + path.stat().st_size / _BYTES_A_SECOND
     try:
-        done = run_child(command, seconds=patience, settings=settings)
+        finished = run_child(command, seconds=seconds, settings=settings)
     except TimeoutExpired as error:
-        raise damaged(
-            path, f"{library}'s library could not read it within {patience:.0f} s"
+        raise damaged_error(
+            path, f"{library}'s library could not read it within {seconds:.0f} s"
         ) from error
     except OSError as error:
         raise _no_python(path, str(error)) from error
-    if done.returncode == REPORTED:
-        lines = done.stderr.decode(errors="replace").strip().splitlines() or ["no reason"]
-        raise damaged(path, refusal(library, lines[-1]))
-    if done.returncode in _ENDED:
+    if finished.returncode == EXIT_REPORTED:
+        lines = finished.stderr.decode(errors="replace").strip().splitlines() or ["no reason"]
+        raise damaged_error(path, refusal_text(library, lines[-1]))
+    if finished.returncode in _KILLED_BY_SYSTEM:
         raise HairloomError(
-            f"the process that read it was ended by the system, {_ENDED[done.returncode]}",
+            "the process that read it was ended by the system, "
+            f"{_KILLED_BY_SYSTEM[finished.returncode]}",
             place=str(path),
             remedy="Close other programs and try again; if that does not help, export it again "
             "with fewer strands",
         )
-    if done.returncode == NO_ROOM:
+    if finished.returncode == EXIT_NO_SPACE:
         raise HairloomError(
             "the data cannot be written to the folder for temporary files",
             place=str(path),
             remedy=f"Free some space in {tempfile.gettempdir()}",
         )
-    if done.returncode:
-        raise damaged(path, f"{library}'s library failed on it, code {done.returncode}")
+    if finished.returncode:
+        raise damaged_error(path, f"{library}'s library failed on it, code {finished.returncode}")
 
 
 def this_python(path: Path) -> tuple[str, ...]:
@@ -87,11 +91,11 @@ def this_python(path: Path) -> tuple[str, ...]:
     return python_program(sys.executable)
 
 
-def refusal(library: str, reason: str) -> str:
+def refusal_text(library: str, reason: str) -> str:
     return f"{library}'s library cannot read it and says: {reason.rstrip('.')}"
 
 
-def damaged(path: Path, problem: str) -> HairloomError:
+def damaged_error(path: Path, problem: str) -> HairloomError:
     """The error for a file that its library cannot read."""
     return HairloomError(
         problem,

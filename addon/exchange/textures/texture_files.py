@@ -19,7 +19,7 @@ import numpy as np
 
 from ...arrays import Floats
 from ...errors import HairloomError
-from ..files.atomic import as_system_says, atomic_write, unwritable
+from ..files.atomic import atomic_write, write_error, write_failure_reason
 from .srgb import srgb_decoded, srgb_encoded
 
 #: The largest side of a texture on every GPU that Blender supports [pixels].
@@ -142,7 +142,7 @@ def write_texture(
         done = target is not None and target.open(str(temporary), spec)
         done = done and target.write_image(np.ascontiguousarray(image))
         if not (done and target.close() and has_its_end(temporary)):
-            raise unwritable(path, as_system_says(path, _reason(target or library)))
+            raise write_error(path, write_failure_reason(path, _reason(target or library)))
 
 
 def has_its_end(path: Path) -> bool:

@@ -24,9 +24,9 @@ from numpy.typing import NDArray
 
 from ...arrays import Floats, Ints
 from ...errors import HairloomError
-from ..files.atomic import as_system_says, atomic_write, unwritable
+from ..files.atomic import atomic_write, write_error, write_failure_reason
 from ..files.axes import from_z_up
-from ..files.names import distinct_names, plain_name
+from ..files.file_names import identifier_name, unique_names
 from ..groom import Groom, GroomMotion, points_of
 from .usd_library import SUFFIXES, usd_library
 from .usd_reader import summary
@@ -98,7 +98,7 @@ def write_usd(
                 _write_motion(usd, stage, parts, motion, space, path)
             stage.GetRootLayer().Save()
         except usd.Tf.ErrorException as error:
-            raise unwritable(path, as_system_says(path, summary(error))) from error
+            raise write_error(path, write_failure_reason(path, summary(error))) from error
 
 
 def _checked(up: str, scale: float, path: Path) -> UsdSpace:
@@ -117,7 +117,7 @@ def _root(usd: ModuleType, stage: Any, groom: Groom, space: UsdSpace) -> Any:
     geometry = usd.UsdGeom
     geometry.SetStageMetersPerUnit(stage, space.scale)
     geometry.SetStageUpAxis(stage, getattr(geometry.Tokens, space.up.lower()))
-    prim = geometry.Xform.Define(stage, f"/{plain_name(groom.name)}").GetPrim()
+    prim = geometry.Xform.Define(stage, f"/{identifier_name(groom.name)}").GetPrim()
     prim.SetDisplayName(groom.name)
     prim.AddAppliedSchema("GroomAPI")
     stage.SetDefaultPrim(prim)
@@ -146,8 +146,8 @@ def _parts(groom: Groom, by_group: bool) -> Iterator[tuple[str, _Part]]:
         yield "strands", _Part(slice(None), groom)
         return
     numbers = np.unique(groom.strands.group).tolist()
-    names = distinct_names(
-        plain_name(groom.group_names.get(each, ""), f"group_{each}".replace("-", "_"))
+    names = unique_names(
+        identifier_name(groom.group_names.get(each, ""), f"group_{each}".replace("-", "_"))
         for each in numbers
     )
     for name, group in zip(names, numbers, strict=True):

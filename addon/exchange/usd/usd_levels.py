@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
 
-from ..files.atomic import as_system_says, unwritable
+from ..files.atomic import write_error, write_failure_reason
 from .usd_library import usd_library
 from .usd_reader import summary
 
@@ -27,7 +27,7 @@ def with_level_variants(path: Path, nodes: Sequence[str]) -> None:
     try:
         _make_variants(pxr, path, nodes)
     except pxr.Tf.ErrorException as error:
-        raise unwritable(path, as_system_says(path, summary(error))) from error
+        raise write_error(path, write_failure_reason(path, summary(error))) from error
 
 
 def _make_variants(pxr: ModuleType, path: Path, nodes: Sequence[str]) -> None:

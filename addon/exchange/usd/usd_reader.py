@@ -4,7 +4,7 @@
 
 A damaged file makes OpenUSD crash, and a text of a few kilobytes can describe more prims than any
 machine holds. So only this process opens files, and it has limits of time, memory and prims. It
-imports no other module of ours. It ends with REPORTED, and a line on stderr, after an error.
+imports no other module of ours. It ends with EXIT_REPORTED, and a line on stderr, after an error.
 
 The result has, for each BasisCurves in the file's order, all of it `packed`:
 
@@ -40,7 +40,7 @@ from numpy.typing import NDArray
 type Arrays = dict[str, NDArray[Any]]
 
 #: as `run_reader` expects them: after an error that is on stderr; where results cannot be written
-REPORTED, NO_ROOM = 3, 4
+EXIT_REPORTED, EXIT_NO_SPACE = 3, 4
 #: What grooms have beside points and widths.
 PRIMVARS = (
     "groom_id",
@@ -298,10 +298,10 @@ def _main(path: str, result: str) -> int:
         with open(result, "wb") as file:
             np.savez(file, allow_pickle=False, **found)
     except OSError:
-        return NO_ROOM
+        return EXIT_NO_SPACE
     except (Tf.ErrorException, _TooMuchError, RuntimeError, ValueError, MemoryError) as error:
         print(ascii(summary(error)), file=sys.stderr)
-        return REPORTED
+        return EXIT_REPORTED
     return 0
 
 

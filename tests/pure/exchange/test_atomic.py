@@ -12,17 +12,17 @@ from pathlib import Path
 import pytest
 
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.exchange.files import atomic, file_set, moving
+from hairloom.addon.exchange.files import atomic, file_moves, file_set
 from hairloom.addon.exchange.files.atomic import (
-    as_system_says,
     atomic_write,
-    check_folder_place,
-    check_place,
+    check_folder_writable,
+    check_writable,
     remedy_for,
     write_bytes_atomic,
+    write_failure_reason,
     write_text_atomic,
 )
-from hairloom.addon.exchange.files.file_set import written_together
+from hairloom.addon.exchange.files.file_set import atomic_file_set
 
 pytestmark = pytest.mark.portable
 
@@ -85,9 +85,9 @@ def test_a_place_is_refused_before_any_work(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     for target in (tmp_path / "file" / "new" / "a.glb", tmp_path):
         with pytest.raises(HairloomError) as caught:
-            check_place(target)
+            check_writable(target)
         assert caught.value.place == str(target)
-    check_place(tmp_path / "new" / "folder" / "a.glb")
+    check_writable(tmp_path / "new" / "folder" / "a.glb")
     assert names(tmp_path) == ["file"], "nothing is written"
 
 
@@ -99,9 +99,9 @@ def test_a_folder_is_refused_before_any_work(tmp_path: Path) -> None:
             pytest.raises(HairloomError, match=said) as caught,
         ):
             patched.setattr(os, "access", lambda *_: False)  # root may write anywhere
-            check_folder_place(target)
+            check_folder_writable(target)
         assert caught.value.place == str(target)
-    check_folder_place(tmp_path / "new" / "folder")
+    check_folder_writable(tmp_path / "new" / "folder")
     assert names(tmp_path) == ["file"], "nothing is written"
 
 
@@ -117,10 +117,10 @@ def test_a_library_that_does_not_say_that_the_disk_is_full(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path, said = tmp_path / "a.usdc", "Couldn't map file: bad arguments to mmap()"
-    assert as_system_says(path, said) == said
+    assert write_failure_reason(path, said) == said
     full = shutil.disk_usage(tmp_path)._replace(free=0)
     monkeypatch.setattr(shutil, "disk_usage", lambda _: full)
-    assert as_system_says(path, said) == os.strerror(errno.ENOSPC)
+    assert write_failure_reason(path, said) == os.strerror(errno.ENOSPC)
 
 
 @pytest.mark.skipif(os.name != "posix", reason="file modes are POSIX")
@@ -151,7 +151,7 @@ def test_a_file_that_another_program_holds_stays_and_the_new_one_is_kept(
     target = tmp_path / "groom.tfx"
     target.write_bytes(b"old")
     (tmp_path / "groom new.tfx").write_bytes(b"from before")
-    monkeypatch.setattr(moving.os, "replace", held)
+    monkeypatch.setattr(file_moves.os, "replace", held)
     with (
         pytest.raises(HairloomError, match=r"groom new 2\.tfx"),
         atomic_write(target) as temporary,
@@ -179,9 +179,9 @@ def test_a_file_that_is_held_for_a_moment_is_waited_for(
             held(source, target)
         replace(source, target)
 
-    monkeypatch.setattr(moving, "PATIENCE", 10.0)
-    monkeypatch.setattr(moving, "_PAUSE", 0.001)
-    monkeypatch.setattr(moving.os, "replace", at_first)
+    monkeypatch.setattr(file_moves, "MAX_WAIT", 10.0)
+    monkeypatch.setattr(file_moves, "_PAUSE", 0.001)
+    monkeypatch.setattr(file_moves.os, "replace", at_first)
     write_bytes_atomic(tmp_path / "groom.tfx", b"new")
     assert (tmp_path / "groom.tfx").read_bytes() == b"new" and len(tries) == 3
 
@@ -192,7 +192,7 @@ def write_alone(target: Path) -> None:
 
 
 def write_set(target: Path) -> None:
-    with written_together(target) as folder:
+    with atomic_file_set(target) as folder:
         (folder / target.name).write_bytes(b"new")
 
 
@@ -205,13 +205,13 @@ def test_what_is_given_up_when_it_is_whole_replaces_nothing(tmp_path: Path) -> N
         raise KeyboardInterrupt
         yield
 
-    token = moving.committing.set(given_up)
+    token = file_moves.commit_context.set(given_up)
     try:
         for write in (write_alone, write_set):
             with pytest.raises(KeyboardInterrupt):
                 write(target)
     finally:
-        moving.committing.reset(token)
+        file_moves.commit_context.reset(token)
     assert target.read_bytes() == b"old" and names(tmp_path) == ["groom.tfx"]
 
 
@@ -226,7 +226,7 @@ def test_a_drive_that_flushes_no_names_is_no_failure(
             raise OSError(22, "Invalid argument")
         fsync(descriptor)
 
-    monkeypatch.setattr(moving.os, "fsync", refused)
+    monkeypatch.setattr(file_moves.os, "fsync", refused)
     write_bytes_atomic(tmp_path / "groom.tfx", b"new")
     assert (tmp_path / "groom.tfx").read_bytes() == b"new"
 
@@ -240,7 +240,7 @@ def test_a_name_of_255_bytes_is_written(tmp_path: Path) -> None:
 @pytest.mark.skipif(os.name != "posix", reason="names are UTF-16 on Windows")
 def test_a_name_that_is_not_utf_8_is_a_message(tmp_path: Path) -> None:
     path = tmp_path / os.fsdecode(b"h\xffair.tfx")
-    for write in (write_alone, write_set, check_place):
+    for write in (write_alone, write_set, check_writable):
         with pytest.raises(HairloomError, match="not UTF-8") as caught:
             write(path)
         str(caught.value).encode("utf-8")
@@ -257,7 +257,7 @@ def test_a_write_protected_file_is_refused_before_any_work(
     monkeypatch.setattr(os, "access", lambda path, mode: path != target and access(path, mode))
     with monkeypatch.context() as patched:
         patched.setattr(Path, "write_bytes", lambda *_: pytest.fail("the block must not run"))
-        for refused in (write, check_place):
+        for refused in (write, check_writable):
             with pytest.raises(HairloomError, match="write-protected") as caught:
                 refused(target)
             assert caught.value.place == str(target) and "Allow" in caught.value.remedy
@@ -271,7 +271,7 @@ def test_a_new_file_is_on_the_disk_before_it_has_the_old_ones_mode(
     """With a mode of 0444, only root could open it again to flush it."""
     (tmp_path / "groom.tfx").write_bytes(b"old")
     calls: list[str] = []
-    for module, name in ((atomic, "flush"), (file_set, "flush"), (shutil, "copymode")):
+    for module, name in ((atomic, "flush_file"), (file_set, "flush_file"), (shutil, "copymode")):
         monkeypatch.setattr(module, name, lambda *_, name=name: calls.append(name))
     write(tmp_path / "groom.tfx")
-    assert calls == ["flush", "copymode"]
+    assert calls == ["flush_file", "copymode"]

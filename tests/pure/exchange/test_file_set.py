@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.exchange.files import file_set, moving, stale_temp_files
+from hairloom.addon.exchange.files import file_moves, file_set, stale_temp_files
 from hairloom.addon.exchange.files.atomic import write_bytes_atomic
-from hairloom.addon.exchange.files.file_set import written_together
+from hairloom.addon.exchange.files.file_set import atomic_file_set
 
 pytestmark = pytest.mark.portable
 
@@ -31,7 +31,7 @@ def contents(folder: Path) -> dict[str, str]:
 
 def test_all_files_come_at_the_end_under_their_names(tmp_path: Path) -> None:
     target = tmp_path / "new" / "hair.glb"
-    with written_together(target) as folder:
+    with atomic_file_set(target) as folder:
         write(folder, "whole")
         assert [path.name.startswith(".") for path in target.parent.iterdir()] == [True]
     assert contents(target.parent) == dict.fromkeys(sorted(FILES), "whole")
@@ -42,7 +42,7 @@ def test_a_failing_writer_leaves_what_was_there(
     tmp_path: Path, failure: type[BaseException]
 ) -> None:
     write(tmp_path, "old")
-    with pytest.raises(failure), written_together(tmp_path / "hair.glb") as folder:
+    with pytest.raises(failure), atomic_file_set(tmp_path / "hair.glb") as folder:
         write(folder, "new", FILES[:2])
         raise failure
     assert contents(tmp_path) == dict.fromkeys(sorted(FILES), "old")
@@ -53,7 +53,7 @@ def test_folders_that_were_made_go_where_nothing_comes_into_them(
     tmp_path: Path, failure: type[BaseException]
 ) -> None:
     (tmp_path / "mine").mkdir()
-    with pytest.raises(failure), written_together(tmp_path / "mine/a/b/hair.glb") as folder:
+    with pytest.raises(failure), atomic_file_set(tmp_path / "mine/a/b/hair.glb") as folder:
         write(folder, "new", FILES[:2])
         raise failure
     assert list(tmp_path.iterdir()) == [tmp_path / "mine"]
@@ -63,7 +63,7 @@ def test_folders_that_were_made_go_where_nothing_comes_into_them(
 def test_what_went_wrong_names_the_files_own_folder(tmp_path: Path) -> None:
     with (
         pytest.raises(HairloomError) as caught,
-        written_together(tmp_path / "hair.glb") as folder,
+        atomic_file_set(tmp_path / "hair.glb") as folder,
     ):
         raise HairloomError("it is full", place=str(folder / "hair_base.png"), remedy="Wait")
     assert str(caught.value) == f"{tmp_path / 'hair_base.png'}: it is full. Wait."
@@ -85,10 +85,10 @@ def test_a_disk_that_fills_up_while_files_are_replaced_leaves_what_was_there(
                 raise OSError(errno.ENOSPC, "No space left on device")
         replace(source, target)
 
-    monkeypatch.setattr(moving.os, "replace", full)
+    monkeypatch.setattr(file_moves.os, "replace", full)
     with (
         pytest.raises(HairloomError, match="No space left"),
-        written_together(tmp_path / "hair.glb") as folder,
+        atomic_file_set(tmp_path / "hair.glb") as folder,
     ):
         write(folder, "new")
     assert contents(tmp_path) == dict.fromkeys(FILES[:2], "old")
@@ -98,7 +98,7 @@ def test_a_name_that_a_folder_has_replaces_nothing(tmp_path: Path) -> None:
     (tmp_path / "hair_base.png").mkdir()
     with (
         pytest.raises(HairloomError, match="a folder has this name") as caught,
-        written_together(tmp_path / "hair.glb") as folder,
+        atomic_file_set(tmp_path / "hair.glb") as folder,
     ):
         write(folder, "new")
     assert caught.value.place == str(tmp_path / "hair_base.png")
@@ -109,7 +109,7 @@ def test_impossible_places_are_named_before_anything_is_written(tmp_path: Path) 
     in_the_way = tmp_path / "file"
     in_the_way.write_text("")
     for target in (in_the_way / "hair.glb", tmp_path / ("x" * 300)):
-        with pytest.raises(HairloomError) as caught, written_together(target):
+        with pytest.raises(HairloomError) as caught, atomic_file_set(target):
             pytest.fail("the block must not run")
         assert caught.value.place == str(target)
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
@@ -118,7 +118,7 @@ def test_impossible_places_are_named_before_anything_is_written(tmp_path: Path) 
 def test_a_writer_without_the_main_file_is_an_error(tmp_path: Path) -> None:
     with (
         pytest.raises(HairloomError, match="nothing was written"),
-        written_together(tmp_path / "hair.glb") as folder,
+        atomic_file_set(tmp_path / "hair.glb") as folder,
     ):
         write(folder, "new", FILES[1:])
     assert list(tmp_path.iterdir()) == []
@@ -131,7 +131,7 @@ def test_a_link_stays_a_link_and_keeps_its_content_in_a_failure(tmp_path: Path) 
     real.write_text("old")
     link = tmp_path / "hair.glb"
     link.symlink_to(real)
-    with written_together(link) as folder:
+    with atomic_file_set(link) as folder:
         write(folder, "new")
     assert link.is_symlink() and real.read_text() == "new"
 
@@ -155,12 +155,12 @@ def test_a_writer_killed_while_files_are_replaced_is_finished_by_the_next(
         replace(source, target)
 
     with monkeypatch.context() as dying:
-        dying.setattr(moving.os, "replace", killed)
+        dying.setattr(file_moves.os, "replace", killed)
         dying.setattr(file_set, "_restore", lambda *_: None)
         dying.setattr(file_set.shutil, "rmtree", lambda *_, **__: None)
         dying.setattr(Path, "unlink", lambda *_, **__: None)
         dying.setattr(stale_temp_files.os, "getpid", lambda: 4_000_000)
-        with contextlib.suppress(KilledError), written_together(tmp_path / "hair.glb") as folder:
+        with contextlib.suppress(KilledError), atomic_file_set(tmp_path / "hair.glb") as folder:
             write(folder, "new")
     write_bytes_atomic(tmp_path / "another.tfx", b"")
     (tmp_path / "another.tfx").unlink()
@@ -172,11 +172,11 @@ def test_a_file_that_was_saved_since_is_newer_than_a_killed_writers(
 ) -> None:
     with monkeypatch.context() as dying:
         dying.setattr(stale_temp_files.os, "getpid", lambda: 4_000_000)
-        staging = stale_temp_files.temporary_beside(tmp_path / "hair.glb", "")
+        staging = stale_temp_files.temporary_path(tmp_path / "hair.glb", "")
     staging.mkdir()
     write(staging, "new")
-    (staging / stale_temp_files.COMPLETE).touch()
-    os.utime(staging / stale_temp_files.COMPLETE, (1, 1))
+    (staging / stale_temp_files.COMPLETE_MARKER).touch()
+    os.utime(staging / stale_temp_files.COMPLETE_MARKER, (1, 1))
     write(tmp_path, "artist's", FILES[:1])
     stale_temp_files.remove_stale_files(tmp_path)
     assert contents(tmp_path) == {
@@ -199,10 +199,10 @@ def test_a_file_that_another_program_holds_keeps_all_and_the_new_ones(
             raise PermissionError(errno.EACCES, "Access is denied", str(source), None, str(target))
         replace(source, target)
 
-    monkeypatch.setattr(moving.os, "replace", refused)
+    monkeypatch.setattr(file_moves.os, "replace", refused)
     with (
         pytest.raises(HairloomError, match="hair new") as caught,
-        written_together(tmp_path / "hair.glb") as folder,
+        atomic_file_set(tmp_path / "hair.glb") as folder,
     ):
         write(folder, "new")
     assert caught.value.place == str(tmp_path / held)
@@ -225,10 +225,10 @@ def test_who_holds_a_file_is_waited_for_once(
             raise PermissionError(errno.EACCES, "held", str(target))
         os.replace(source, target)
 
-    monkeypatch.setattr(file_set, "move", held)
+    monkeypatch.setattr(file_set, "move_file", held)
     with (
         pytest.raises(HairloomError, match="all are as they were"),
-        written_together(tmp_path / "hair.glb") as folder,
+        atomic_file_set(tmp_path / "hair.glb") as folder,
     ):
         write(folder, "new")
     assert moved.count(FILES[1]) == 1
@@ -243,7 +243,7 @@ def test_a_write_protected_file_beside_the_main_one_keeps_all_and_the_new_ones(
     monkeypatch.setattr(os, "access", lambda path, mode: path != protected and access(path, mode))
     with (
         pytest.raises(HairloomError, match=r"write-protected.*hair new") as caught,
-        written_together(tmp_path / "hair.glb") as folder,
+        atomic_file_set(tmp_path / "hair.glb") as folder,
     ):
         write(folder, "new")
     assert caught.value.place == str(protected)

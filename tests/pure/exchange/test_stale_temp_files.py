@@ -11,8 +11,8 @@ import pytest
 
 from hairloom.addon.exchange.files import stale_temp_files
 from hairloom.addon.exchange.files.atomic import write_bytes_atomic
-from hairloom.addon.exchange.files.file_set import written_together
-from hairloom.addon.exchange.files.stale_temp_files import remove_stale_files, temporary_beside
+from hairloom.addon.exchange.files.file_set import atomic_file_set
+from hairloom.addon.exchange.files.stale_temp_files import remove_stale_files, temporary_path
 
 
 @pytest.fixture
@@ -26,11 +26,11 @@ def ended() -> int:
 def left_by(process: int, path: Path, monkeypatch: pytest.MonkeyPatch, suffix: str | None) -> Path:
     with monkeypatch.context() as patched:
         patched.setattr(stale_temp_files.os, "getpid", lambda: process)
-        return temporary_beside(path, suffix)
+        return temporary_path(path, suffix)
 
 
 def write_set(path: Path) -> None:
-    with written_together(path) as folder:
+    with atomic_file_set(path) as folder:
         (folder / path.name).write_bytes(b"new")
 
 
@@ -54,9 +54,9 @@ def test_what_others_write_or_own_stays(
     tmp_path: Path, ended: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "groom.abc"
-    ours = temporary_beside(path)
+    ours = temporary_path(path)
     another = left_by(os.getppid(), path, monkeypatch, None)
-    monkeypatch.setattr(stale_temp_files, "_here", lambda: "0" * 8)
+    monkeypatch.setattr(stale_temp_files, "_host_id", lambda: "0" * 8)
     elsewhere = left_by(ended, path, monkeypatch, None)
     monkeypatch.undo()
     foreign = [tmp_path / name for name in (".groom.abc", ".hl-1-2-3", f".a.hl-{ended}", "b.hl-1")]
@@ -72,7 +72,7 @@ def test_what_a_power_cut_or_another_machine_left_goes_after_a_day(
 ) -> None:
     """A machine that was restarted counts as another one."""
     with monkeypatch.context() as patched:
-        patched.setattr(stale_temp_files, "_here", lambda: "0" * 8)
+        patched.setattr(stale_temp_files, "_host_id", lambda: "0" * 8)
         file, folder = (left_by(os.getpid(), tmp_path / "a.glb", patched, s) for s in (None, ""))
     file.write_bytes(b"half")
     folder.mkdir()

@@ -78,7 +78,7 @@ def test_every_bad_end_is_a_message(path: Path, script: str, message: str) -> No
 
 def test_a_script_without_an_end_is_ended(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Also if it starts slowly."""
-    monkeypatch.setattr(subprocess_reader, "_PATIENCE", 1.0)
+    monkeypatch.setattr(subprocess_reader, "_MIN_SECONDS", 1.0)
     with (
         begun_processes() as begun,
         pytest.raises(HairloomError, match="could not read it within 1 s"),
@@ -107,7 +107,7 @@ def test_a_child_whose_work_is_given_up_is_ended(path: Path) -> None:
         thread.join()
 
     def run_it() -> int:
-        child_process.ending.set(soon)
+        child_process.kill_context.set(soon)
         return child_process.run_child(command, seconds=60.0).returncode
 
     assert contextvars.Context().run(run_it) == -signal.SIGKILL
@@ -116,7 +116,7 @@ def test_a_child_whose_work_is_given_up_is_ended(path: Path) -> None:
         raise InterruptedError
 
     def begin_it() -> None:
-        child_process.ending.set(at_once)
+        child_process.kill_context.set(at_once)
         child_process.run_child(command, seconds=60.0)
 
     with begun_processes() as begun, pytest.raises(InterruptedError):

@@ -11,18 +11,18 @@ from windows_rules import MAX_PATH_LENGTH, windows_rules
 
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.files.atomic import write_bytes_atomic
-from hairloom.addon.exchange.files.file_set import kept_aside, written_together
-from hairloom.addon.exchange.files.names import distinct_names, no_device
-from hairloom.addon.exchange.files.stale_temp_files import remove_stale_files, temporary_beside
+from hairloom.addon.exchange.files.file_names import avoid_device_name, unique_names
+from hairloom.addon.exchange.files.file_set import atomic_file_set, back_up_foreign_files
+from hairloom.addon.exchange.files.stale_temp_files import remove_stale_files, temporary_path
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="Windows has rules of its own")
 
 
 def write_set(path: Path) -> None:
-    with written_together(path) as folder:
+    with atomic_file_set(path) as folder:
         (folder / path.name).write_bytes(b"new")
         (folder / f"{path.stem}_base.png").write_bytes(b"new")
-        kept_aside(folder, path)
+        back_up_foreign_files(folder, path)
 
 
 def write_alone(path: Path) -> None:
@@ -100,8 +100,8 @@ def test_a_file_that_is_open_stays_and_the_new_ones_are_kept(
 
 def test_what_a_killed_writer_left_may_be_open(tmp_path: Path) -> None:
     """A virus scanner may have it open; then a later writer removes it."""
-    folder = temporary_beside(tmp_path / "a.tfx", suffix="")
-    file = temporary_beside(tmp_path / "b.tfx")
+    folder = temporary_path(tmp_path / "a.tfx", suffix="")
+    file = temporary_path(tmp_path / "b.tfx")
     dead = [each.with_name(each.name.replace(f"-{os.getpid()}-", "-99999999-")) for each in
             (folder, file)]  # fmt: skip
     dead[0].mkdir()
@@ -118,7 +118,7 @@ def test_what_a_killed_writer_left_may_be_open(tmp_path: Path) -> None:
 
 def test_names_that_are_one_there_get_numbers() -> None:
     names = ["Hair", "hair", "Caf\u00e9", "Cafe\u0301", "hair_2", "Beard"]
-    assert distinct_names(names) == [
+    assert unique_names(names) == [
         "Hair",
         "hair_2",
         "Caf\u00e9",
@@ -126,7 +126,7 @@ def test_names_that_are_one_there_get_numbers() -> None:
         "hair_2_2",
         "Beard",
     ]
-    assert [no_device(each) for each in ("con", "Aux.001", "console", "nul")] == [
+    assert [avoid_device_name(each) for each in ("con", "Aux.001", "console", "nul")] == [
         "_con",
         "_Aux.001",
         "console",

@@ -22,7 +22,7 @@ MAX_PATH = 259 if os.name == "nt" else 4095
 _MAX_LETTERS = 50
 
 
-def check_name(path: Path) -> None:
+def check_utf8_name(path: Path) -> None:
     """Refuse a path that most libraries cannot take.
 
     Raises:
@@ -46,7 +46,7 @@ def length_remark(path: Path, why: str) -> str:
     return f"; while it is written its path has {length} letters, and {MAX_PATH} work here"
 
 
-def plain_name(name: str, fallback: str = "hair") -> str:
+def identifier_name(name: str, fallback: str = "hair") -> str:
     """A name of letters, digits and underscores that starts with no digit; letters of all scripts.
 
     Slashes, dots and the like, which are paths or namespaces to one program or another, become
@@ -59,55 +59,55 @@ def plain_name(name: str, fallback: str = "hair") -> str:
     return plain if plain.isidentifier() else f"_{plain}"
 
 
-def folder_name(name: str, taken: Container[str] = (), fallback: str = "hair") -> str:
+def safe_folder_name(name: str, used_keys: Container[str] = (), fallback: str = "hair") -> str:
     """A name for a folder that every system accepts, and that leads nowhere else.
 
     Args:
-        taken: names that are in use, in the form of `as_compared`.
+        used_keys: names that are in use, in the form of `name_key`.
     """
     composed = unicodedata.normalize("NFC", name)
     plain = _UNSAFE.sub("_", composed).strip(". ") or fallback
     if len(plain) > _MAX_LETTERS:  # versions of a long name often differ at its end alone
         digest = hashlib.sha256(plain.encode()).hexdigest()[:8]
         plain = f"{plain[: _MAX_LETTERS - 9].strip('. ')}_{digest}"
-    return _free(no_device(plain), taken)
+    return _unused_name(avoid_device_name(plain), used_keys)
 
 
-def no_device(name: str) -> str:
+def avoid_device_name(name: str) -> str:
     """This name, or another one where Windows would open a device by it."""
     return f"_{name}" if _DEVICES.fullmatch(name) else name
 
 
-def distinct_names(names: Iterable[str]) -> list[str]:
+def unique_names(names: Iterable[str]) -> list[str]:
     """These names, with a number added to those that equal an earlier one on some system."""
     found: list[str] = []
-    taken: set[str] = set()
+    used_keys: set[str] = set()
     for name in names:
-        found.append(_free(name, taken))
-        taken.add(as_compared(found[-1]))
+        found.append(_unused_name(name, used_keys))
+        used_keys.add(name_key(found[-1]))
     return found
 
 
-def _free(name: str, taken: Container[str]) -> str:
+def _unused_name(name: str, used_keys: Container[str]) -> str:
     choices = (name, *(f"{name}_{number}" for number in range(2, 10_000)))
-    return next(each for each in choices if as_compared(each) not in taken)
+    return next(each for each in choices if name_key(each) not in used_keys)
 
 
-def alike_beside(path: Path) -> str:
+def name_in_other_case(path: Path) -> str:
     """The name of another file in the folder that equals this one on systems that ignore case; ""
     where there is none."""
-    wanted = as_compared(path.name)
+    wanted = name_key(path.name)
     there = sorted(path.parent.iterdir()) if path.parent.is_dir() else []
-    alike = (each for each in there if each.name != path.name and as_compared(each.name) == wanted)
+    alike = (each for each in there if each.name != path.name and name_key(each.name) == wanted)
     # where the system itself ignores case, the other name is this file's
-    return next((each.name for each in alike if not _is_one(each, path)), "")
+    return next((each.name for each in alike if not _is_same_file(each, path)), "")
 
 
-def _is_one(path: Path, other: Path) -> bool:
+def _is_same_file(path: Path, other: Path) -> bool:
     return other.exists() and os.path.samefile(path, other)
 
 
-def as_compared(name: str) -> str:
+def name_key(name: str) -> str:
     """A form that is the same for names that any system takes as one, as Windows and macOS ignore
     case."""
     return unicodedata.normalize("NFC", name).casefold()

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from hairloom.addon.exchange.files.names import alike_beside, plain_name
+from hairloom.addon.exchange.files.file_names import identifier_name, name_in_other_case
 
 
 @pytest.mark.parametrize(
@@ -23,13 +23,15 @@ from hairloom.addon.exchange.files.names import alike_beside, plain_name
     ],
 )
 def test_names_are_identifiers(name: str, plain: str) -> None:
-    assert plain_name(name) == plain
-    assert plain_name(name).isidentifier()
+    assert identifier_name(name) == plain
+    assert identifier_name(name).isidentifier()
 
 
 def test_a_name_that_differs_in_case_alone_is_found(tmp_path: Path) -> None:
     (tmp_path / "Hair.glb").touch()
-    assert alike_beside(tmp_path / "Hair.glb") == "" == alike_beside(tmp_path / "hair.fbx")
-    assert alike_beside(tmp_path / "nowhere" / "hair.glb") == ""
+    assert (
+        name_in_other_case(tmp_path / "Hair.glb") == "" == name_in_other_case(tmp_path / "hair.fbx")
+    )
+    assert name_in_other_case(tmp_path / "nowhere" / "hair.glb") == ""
     if not (tmp_path / "hair.glb").exists():  # a case-sensitive file system
-        assert alike_beside(tmp_path / "hair.glb") == "Hair.glb"
+        assert name_in_other_case(tmp_path / "hair.glb") == "Hair.glb"

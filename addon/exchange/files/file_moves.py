@@ -13,22 +13,22 @@ from pathlib import Path
 
 #: Makes the context in which new files replace old ones. Callers that may cancel the work set it;
 #: it may raise instead, which leaves all files as they were.
-committing: ContextVar[Callable[[], AbstractContextManager[object]]] = ContextVar(
-    "committing", default=nullcontext
+commit_context: ContextVar[Callable[[], AbstractContextManager[object]]] = ContextVar(
+    "commit_context", default=nullcontext
 )
 #: Seconds for which another program may hold a file: a virus scanner, an indexer, a backup. Only
 #: Windows refuses to replace a file that is open.
-PATIENCE = 10.0 if os.name == "nt" else 0.0
+MAX_WAIT = 10.0 if os.name == "nt" else 0.0
 _PAUSE = 0.1
 
 
-def move(source: Path, target: Path) -> None:
+def move_file(source: Path, target: Path) -> None:
     """Let a file replace another one, in one step where both are on one disk.
 
     Raises:
         OSError: it cannot be done, or another program keeps one of them for too long.
     """
-    end = time.monotonic() + PATIENCE
+    end = time.monotonic() + MAX_WAIT
     while True:
         try:
             os.replace(source, target)
@@ -44,7 +44,7 @@ def move(source: Path, target: Path) -> None:
             return
 
 
-def flush(file: Path) -> None:
+def flush_file(file: Path) -> None:
     """Wait until a file's content is on the disk.
 
     Raises:
@@ -57,7 +57,7 @@ def flush(file: Path) -> None:
         os.close(descriptor)
 
 
-def flush_names(folder: Path) -> None:
+def flush_folder(folder: Path) -> None:
     """Wait until the names in a folder are on the disk, where the system can be asked for that.
 
     Some network drives refuse it. The files are in their places by then, so that is no failure.
@@ -72,7 +72,7 @@ def flush_names(folder: Path) -> None:
         os.close(descriptor)
 
 
-def free_name(path: Path) -> Path:
+def unused_path(path: Path) -> Path:
     """This path, or a numbered one beside it, which does not exist yet."""
     names = (path, *(path.with_name(f"{path.stem} {n}{path.suffix}") for n in range(2, 10_000)))
     return next(each for each in names if not os.path.lexists(each))
