@@ -153,22 +153,22 @@ def new_hair(extension: None) -> Callable[..., Any]:
 
 
 @pytest.fixture
-def preview(new_hair: Any, sphere: Any, evaluated: Any) -> tuple[Any, Any, Any]:
+def preview(new_hair: Any, sphere: Any, get_depsgraph: Any) -> tuple[Any, Any, Any]:
     """Hair on a head, previewed: (hair, head, session)."""
     from hairloom.addon.blender.preview import previews
 
     hair = new_hair(sphere)
-    return hair, sphere, previews.start(hair, evaluated())
+    return hair, sphere, previews.start(hair, get_depsgraph())
 
 
 @pytest.fixture
-def evaluated() -> Callable[[], Any]:
+def get_depsgraph() -> Callable[[], Any]:
     """A function that returns the current evaluated dependency graph."""
     return lambda: bpy.context.evaluated_depsgraph_get()
 
 
 @pytest.fixture
-def stage(extension: None) -> Any:
+def engine_scene(extension: None) -> Any:
     """A scene with a camera 1 m in front of the origin, rendered by our engine."""
     scene = bpy.context.scene
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
@@ -188,7 +188,7 @@ def stage(extension: None) -> Any:
 
 
 @pytest.fixture
-def flag(extension):
+def flag_object(extension):
     """A flat sheet of 11 x 11 vertices, 0.4 m wide, made a fin that is pinned along its -x edge."""
     bpy.ops.mesh.primitive_grid_add(x_subdivisions=10, y_subdivisions=10, size=0.4)
     obj = bpy.context.object

@@ -19,25 +19,25 @@ def rest_vertices(obj):
     return rest
 
 
-def evaluated_vertices(obj, evaluated):
+def evaluated_vertices(obj, get_depsgraph):
     """The vertices of the evaluated mesh, world space; the original vertices come first."""
-    evaluated_obj = obj.evaluated_get(evaluated())
+    evaluated_obj = obj.evaluated_get(get_depsgraph())
     points = np.empty((len(evaluated_obj.data.vertices), 3), np.float32)
     evaluated_obj.data.vertices.foreach_get("co", points.ravel())
     matrix = np.array(evaluated_obj.matrix_world)
     return points @ matrix[:3, :3].T + matrix[:3, 3]
 
 
-def play_frames(session, evaluated, frames, before_frame=lambda frame: None):
+def play_frames(session, get_depsgraph, frames, before_frame=lambda frame: None):
     for frame in range(frames):
         before_frame(frame)
         update_view_layer()
-        session.advance(evaluated(), FRAME_S)
+        session.advance(get_depsgraph(), FRAME_S)
         update_view_layer()
 
 
-def start_fin(obj, evaluated):
+def start_fin(obj, get_depsgraph):
     update_view_layer()
-    session = fins.start(obj, evaluated())
-    session.play(evaluated())
+    session = fins.start(obj, get_depsgraph())
+    session.play(get_depsgraph())
     return session

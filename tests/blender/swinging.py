@@ -30,7 +30,7 @@ def shake_head(hair: Any, head: Any, last: int, bake: Path, peak: int = 4) -> tu
 
 
 def play_frames(
-    evaluated: Callable[[], Any],
+    get_depsgraph: Callable[[], Any],
     frames: int,
     before_frame: Callable[[int], None] = lambda frame: None,
 ) -> None:
@@ -40,7 +40,7 @@ def play_frames(
     for frame in range(frames):
         before_frame(frame)
         bpy.context.view_layer.update()
-        previews.advance(evaluated(), 1.0 / 60.0)
+        previews.advance(get_depsgraph(), 1.0 / 60.0)
 
 
 def tips_lag(session: Any) -> bool:

@@ -74,9 +74,11 @@ def layer(mesh, name):
     return found
 
 
-def test_faces_are_ordered_from_the_inside_to_the_outside(shells, sphere, evaluated):
+def test_faces_are_ordered_from_the_inside_to_the_outside(shells, sphere, get_depsgraph):
     before = polygons(shells.data)
-    done = sort_mesh(shells, evaluated(), SortOptions(head=sphere, by="distance", occlusion=None))
+    done = sort_mesh(
+        shells, get_depsgraph(), SortOptions(head=sphere, by="distance", occlusion=None)
+    )
     assert (done.card_count, done.face_count) == (24, 96)
     assert done.notes == ()
     points = np.array([vertex.co for vertex in shells.data.vertices])
@@ -86,20 +88,24 @@ def test_faces_are_ordered_from_the_inside_to_the_outside(shells, sphere, evalua
     ]
     assert np.diff(distance).min() > -1e-6
     assert sorted(polygons(shells.data)) == sorted(before)
-    again = sort_mesh(shells, evaluated(), SortOptions(head=sphere, by="distance", occlusion=None))
+    again = sort_mesh(
+        shells, get_depsgraph(), SortOptions(head=sphere, by="distance", occlusion=None)
+    )
     assert again.moved == 0 < done.moved
 
 
-def test_cards_know_their_way_though_u_runs_along_them(shells, sphere, evaluated):
-    cards = read_cards(shells, evaluated(), SortOptions(head=sphere)).cards.mesh
+def test_cards_know_their_way_though_u_runs_along_them(shells, sphere, get_depsgraph):
+    cards = read_cards(shells, get_depsgraph(), SortOptions(head=sphere)).cards.mesh
     np.testing.assert_allclose(cards.along, (0.05 - cards.positions[:, 2]) / 0.1, atol=1e-5)
     np.testing.assert_allclose(cards.tangent[:, 2], -1.0, atol=1e-5)
     outward = np.einsum("ij,ij->i", cards.normal[:, :2], cards.positions[:, :2])
     assert outward.min() > 0.0
 
 
-def test_occlusion_is_an_attribute_and_a_map_that_keep_to_their_vertices(shells, sphere, evaluated):
-    sort_mesh(shells, evaluated(), SortOptions(head=sphere, occlusion=QUICK))
+def test_occlusion_is_an_attribute_and_a_map_that_keep_to_their_vertices(
+    shells, sphere, get_depsgraph
+):
+    sort_mesh(shells, get_depsgraph(), SortOptions(head=sphere, occlusion=QUICK))
     mesh = shells.data
     openness, along = values(mesh, "occlusion"), values(mesh, "along")
     shell = np.linalg.norm([vertex.co[:2] for vertex in mesh.vertices], axis=1)
@@ -108,13 +114,13 @@ def test_occlusion_is_an_attribute_and_a_map_that_keep_to_their_vertices(shells,
     corner = np.array([loop.vertex_index for loop in mesh.loops])
     np.testing.assert_allclose(layer(mesh, "Occlusion"), np.stack([openness, along], 1)[corner])
     assert mesh.uv_layers.active.name == "Hair"
-    uv = read_cards(shells, evaluated(), SortOptions(head=sphere)).cards.mesh.uv
+    uv = read_cards(shells, get_depsgraph(), SortOptions(head=sphere)).cards.mesh.uv
     # it must not be taken for the UVs of the texture
     mesh.uv_layers.active = mesh.uv_layers["Occlusion"]
-    again = read_cards(shells, evaluated(), SortOptions(head=sphere)).cards.mesh.uv
+    again = read_cards(shells, get_depsgraph(), SortOptions(head=sphere)).cards.mesh.uv
     np.testing.assert_array_equal(again, uv)
     once = layer(mesh, "Occlusion")
-    sort_mesh(shells, evaluated(), SortOptions(head=sphere, occlusion=QUICK))
+    sort_mesh(shells, get_depsgraph(), SortOptions(head=sphere, occlusion=QUICK))
     np.testing.assert_allclose(layer(mesh, "Occlusion"), once, atol=1e-6)
     assert len(mesh.uv_layers) == 2
 
@@ -189,11 +195,11 @@ def everything(obj):
     return found
 
 
-def test_all_that_a_mesh_has_survives(shells, sphere, evaluated):
+def test_all_that_a_mesh_has_survives(shells, sphere, get_depsgraph):
     decorated(shells)
     bpy.context.view_layer.update()
     before = everything(shells)
-    done = sort_mesh(shells, evaluated(), SortOptions(head=sphere, occlusion=None))
+    done = sort_mesh(shells, get_depsgraph(), SortOptions(head=sphere, occlusion=None))
     assert done.moved > 50
     after = everything(shells)
     assert set(after) == set(before)
@@ -202,7 +208,7 @@ def test_all_that_a_mesh_has_survives(shells, sphere, evaluated):
 
 
 def test_shape_keys_and_modifiers_that_bend_are_seen_and_those_that_add_are_told(
-    shells, sphere, evaluated
+    shells, sphere, get_depsgraph
 ):
     shells.shape_key_add(name="Basis")
     key = shells.shape_key_add(name="Aside")
@@ -210,42 +216,42 @@ def test_shape_keys_and_modifiers_that_bend_are_seen_and_those_that_add_are_told
         point.co.x += 1.0
     key.value = 1.0
     bpy.context.view_layer.update()
-    source = read_cards(shells, evaluated(), SortOptions(head=sphere))
+    source = read_cards(shells, get_depsgraph(), SortOptions(head=sphere))
     assert source.cards.mesh.positions[:, 0].min() > 0.8
     shells.modifiers.new("Thick", "SOLIDIFY").thickness = 0.01
     bpy.context.view_layer.update()
-    done = sort_mesh(shells, evaluated(), SortOptions(head=sphere, occlusion=None))
+    done = sort_mesh(shells, get_depsgraph(), SortOptions(head=sphere, occlusion=None))
     assert any("Modifiers" in note for note in done.notes)
     assert done.face_count == 96
 
 
-def test_a_mirrored_object_is_sorted_and_shaded_as_the_plain_one(shells, sphere, evaluated):
-    plain = read_cards(shells, evaluated(), SortOptions(head=sphere)).cards.mesh
-    sort_mesh(shells, evaluated(), SortOptions(head=sphere, occlusion=QUICK))
+def test_a_mirrored_object_is_sorted_and_shaded_as_the_plain_one(shells, sphere, get_depsgraph):
+    plain = read_cards(shells, get_depsgraph(), SortOptions(head=sphere)).cards.mesh
+    sort_mesh(shells, get_depsgraph(), SortOptions(head=sphere, occlusion=QUICK))
     wanted = values(shells.data, "occlusion"), layer(shells.data, "Occlusion")
     for vertex in shells.data.vertices:
         vertex.co.x *= -1.0
     shells.scale = (-1.0, 1.0, 1.0)
     bpy.context.view_layer.update()
-    mirrored = read_cards(shells, evaluated(), SortOptions(head=sphere)).cards.mesh
+    mirrored = read_cards(shells, get_depsgraph(), SortOptions(head=sphere)).cards.mesh
     outward = np.einsum("ij,ij->i", mirrored.normal, plain.normal)
     assert outward.shape == plain.along.shape
     assert (mirrored.normal[:, :2] * mirrored.positions[:, :2]).sum(axis=1).min() > 0.0
-    sort_mesh(shells, evaluated(), SortOptions(head=sphere, occlusion=QUICK))
+    sort_mesh(shells, get_depsgraph(), SortOptions(head=sphere, occlusion=QUICK))
     np.testing.assert_allclose(values(shells.data, "occlusion"), wanted[0], atol=1e-4)
     np.testing.assert_allclose(layer(shells.data, "Occlusion"), wanted[1], atol=1e-4)
 
 
-def test_a_vertex_group_is_drawn_after_all_others(shells, sphere, evaluated):
+def test_a_vertex_group_is_drawn_after_all_others(shells, sphere, get_depsgraph):
     group = shells.vertex_groups.new(name="Inner")
     inner = [v.index for v in shells.data.vertices if np.linalg.norm(v.co[:2]) < 0.115]
     group.add(inner, 1.0, "REPLACE")
     choices = SortOptions(head=sphere, dangling="Inner", occlusion=None)
-    sort_mesh(shells, evaluated(), choices)
+    sort_mesh(shells, get_depsgraph(), choices)
     last = [set(face.vertices) <= set(inner) for face in shells.data.polygons]
     assert sum(last) == 24 and all(last[-24:])
     with pytest.raises(HairloomError, match="no vertex group 'Outer'"):
-        sort_mesh(shells, evaluated(), SortOptions(head=sphere, dangling="Outer"))
+        sort_mesh(shells, get_depsgraph(), SortOptions(head=sphere, dangling="Outer"))
 
 
 def clear_material(obj):
@@ -260,25 +266,25 @@ def clear_material(obj):
     material.node_tree.links.new(picture.outputs["Alpha"], surface.inputs["Alpha"])
 
 
-def test_alpha_comes_from_the_material(shells, sphere, evaluated):
-    sort_mesh(shells, evaluated(), SortOptions(head=sphere, occlusion=QUICK))
+def test_alpha_comes_from_the_material(shells, sphere, get_depsgraph):
+    sort_mesh(shells, get_depsgraph(), SortOptions(head=sphere, occlusion=QUICK))
     opaque = values(shells.data, "occlusion")
     clear_material(shells)
-    done = sort_mesh(shells, evaluated(), SortOptions(head=sphere, occlusion=QUICK))
+    done = sort_mesh(shells, get_depsgraph(), SortOptions(head=sphere, occlusion=QUICK))
     clear = values(shells.data, "occlusion")
     assert done.notes == ()
     assert (clear >= opaque - 1e-6).all() and clear.mean() > opaque.mean() + 0.1
     clear_material(shells)
-    (note,) = sort_mesh(shells, evaluated(), SortOptions(head=sphere, occlusion=QUICK)).notes
+    (note,) = sort_mesh(shells, get_depsgraph(), SortOptions(head=sphere, occlusion=QUICK)).notes
     assert "several alpha pictures" in note and "'Clear' was used" in note
 
 
-def test_the_order_goes_by_what_the_material_lets_see(shells, sphere, evaluated):
+def test_the_order_goes_by_what_the_material_lets_see(shells, sphere, get_depsgraph):
     """Sorting by pieces uses the material's alpha: fully transparent cards hide nothing and keep
     the order of distance."""
 
     def order(by):
-        sort_mesh(shells, evaluated(), SortOptions(head=sphere, by=by, occlusion=None))
+        sort_mesh(shells, get_depsgraph(), SortOptions(head=sphere, by=by, occlusion=None))
         return polygons(shells.data)
 
     sphere.location.x = 0.4  # so that the best order differs from the order of distance
@@ -326,17 +332,17 @@ def test_what_cannot_be_sorted_is_told(extension, shells, sphere):
     assert not bpy.ops.hairloom.sort_cards.poll()
 
 
-def test_doubtful_cards_are_noted(sphere, evaluated):
+def test_doubtful_cards_are_noted(sphere, get_depsgraph):
     flat = [(0, 0, 0.2), (0.1, 0, 0.2), (0.1, 0.1, 0.2), (0, 0.1, 0.2)]
     square = [(0, 0), (1, 0), (1, 1), (0, 1)]
     one = new_mesh("One", flat, [(0, 1, 2, 3)], square)
     bpy.context.collection.objects.link(bpy.data.objects.new("Twin", one.data))
-    notes = sort_mesh(one, evaluated(), SortOptions()).notes
+    notes = sort_mesh(one, get_depsgraph(), SortOptions()).notes
     for expected in ("are connected", "no head", "2 objects share the mesh 'One'"):
         assert any(expected in note for note in notes)
     point = [(0.0, 0.0, 0.3)] * 4
     two = new_mesh("Two", flat + point, [(0, 1, 2, 3), (4, 5, 6, 7)], square * 2)
-    notes = sort_mesh(two, evaluated(), SortOptions(head=sphere)).notes
+    notes = sort_mesh(two, get_depsgraph(), SortOptions(head=sphere)).notes
     assert any("has any area" in note for note in notes)
     assert np.isfinite(layer(two.data, "Occlusion")).all()
 
@@ -344,21 +350,21 @@ def test_doubtful_cards_are_noted(sphere, evaluated):
 @pytest.mark.parametrize("name", few_in_commits(["long01", "ponytail01"]))
 @pytest.mark.slow
 def test_real_cards_leave_blender_in_their_order(
-    extension, evaluated, shared_data: Path, tmp_path: Path, name: str
+    extension, get_depsgraph, shared_data: Path, tmp_path: Path, name: str
 ):
     for file in ("mh_base", name):
         path = shared_data / "makehuman" / f"{file}.obj"
         bpy.ops.wm.obj_import(filepath=str(path), global_scale=0.1)
     hair, body = (bpy.data.objects[each] for each in (name, "mh_base"))
     uv = {tuple(face.vertices): None for face in hair.data.polygons}
-    done = sort_mesh(hair, evaluated(), SortOptions(head=body, occlusion=QUICK))
+    done = sort_mesh(hair, get_depsgraph(), SortOptions(head=body, occlusion=QUICK))
     assert done.moved > 0.5 * done.face_count
     sorted_faces = polygons(hair.data)
     assert {vertices for vertices, _ in sorted_faces} == set(uv)
     unshaded = SortOptions(head=body, occlusion=None)
-    assert sort_mesh(hair, evaluated(), unshaded).moved == 0
+    assert sort_mesh(hair, get_depsgraph(), unshaded).moved == 0
     reorder_faces(hair.data, np.random.default_rng(0).permutation(done.face_count))
-    assert sort_mesh(hair, evaluated(), unshaded).moved > 0.5 * done.face_count
+    assert sort_mesh(hair, get_depsgraph(), unshaded).moved > 0.5 * done.face_count
     assert polygons(hair.data) == sorted_faces
     hair.select_set(True)
     body.select_set(False)
@@ -373,7 +379,7 @@ def test_real_cards_leave_blender_in_their_order(
 
 
 @pytest.mark.parametrize("taken", ["Occlusion", "occlusion", "along"])
-def test_what_the_artist_has_called_like_ours_is_not_replaced(shells, sphere, evaluated, taken):
+def test_what_the_artist_has_called_like_ours_is_not_replaced(shells, sphere, get_depsgraph, taken):
     mesh = shells.data
     if taken == "Occlusion":
         mesh.uv_layers.new(name=taken)
@@ -381,6 +387,6 @@ def test_what_the_artist_has_called_like_ours_is_not_replaced(shells, sphere, ev
         mesh.attributes.new(taken, "INT", "FACE")
     before = polygons(mesh)
     with pytest.raises(HairloomError, match=f"already has the .*{taken}"):
-        sort_mesh(shells, evaluated(), SortOptions(head=sphere, occlusion=QUICK))
+        sort_mesh(shells, get_depsgraph(), SortOptions(head=sphere, occlusion=QUICK))
     assert polygons(mesh) == before
-    sort_mesh(shells, evaluated(), SortOptions(head=sphere, occlusion=None))
+    sort_mesh(shells, get_depsgraph(), SortOptions(head=sphere, occlusion=None))

@@ -46,37 +46,37 @@ def moving(request: Any, gpu_context: Any, new_hair: Any, sphere: Any, tmp_path:
     return hair
 
 
-def session_at_start(hair: Any, evaluated: Any) -> Any:
-    session = previews.start(hair, evaluated())
+def session_at_start(hair: Any, get_depsgraph: Any) -> Any:
+    session = previews.start(hair, get_depsgraph())
     assert session.solver.form == hair.hairloom.dynamics.device
     hair.hairloom.bake.follows = True
     bpy.context.scene.frame_set(1)
     return session
 
 
-def seen(hair: Any, evaluated: Any) -> StrandSet:
+def seen(hair: Any, get_depsgraph: Any) -> StrandSet:
     """The curves as Blender itself evaluates them."""
-    return read_curves(hair, evaluated()).strands
+    return read_curves(hair, get_depsgraph()).strands
 
 
-def test_at_0_hair_is_where_blender_shows_its_curves(moving: Any, evaluated: Any) -> None:
+def test_at_0_hair_is_where_blender_shows_its_curves(moving: Any, get_depsgraph: Any) -> None:
     moving.hairloom.dynamics.influence = 0.0
-    session = session_at_start(moving, evaluated)
-    first = seen(moving, evaluated).points
+    session = session_at_start(moving, get_depsgraph)
+    first = seen(moving, get_depsgraph).points
     for frame in range(1, LAST + 1):
         bpy.context.scene.frame_set(frame)
-        now = seen(moving, evaluated)
+        now = seen(moving, get_depsgraph)
         assert apart(session.strands, session.rig.strands.offsets, now) < 2e-6, frame
     assert np.abs(now.points - first).max() > 0.05
 
 
 def test_at_1_hair_lags_behind_its_style_and_has_the_lengths_of_that(
-    moving: Any, evaluated: Any
+    moving: Any, get_depsgraph: Any
 ) -> None:
-    session = session_at_start(moving, evaluated)
+    session = session_at_start(moving, get_depsgraph)
     for frame in range(1, LAST + 1):
         bpy.context.scene.frame_set(frame)
-    now, rig = seen(moving, evaluated), session.rig
+    now, rig = seen(moving, get_depsgraph), session.rig
     assert 0.005 < apart(session.strands, rig.strands.offsets, now) < 0.1
     lengths = rig.strands.with_points(session.strands).lengths()
     np.testing.assert_allclose(lengths, now.lengths(), rtol=0.01)
@@ -84,18 +84,18 @@ def test_at_1_hair_lags_behind_its_style_and_has_the_lengths_of_that(
 
 
 def test_what_is_painted_0_goes_with_the_style_and_the_rest_is_simulated(
-    moving: Any, evaluated: Any
+    moving: Any, get_depsgraph: Any
 ) -> None:
     head = moving.data.surface
     group = head.vertex_groups.new(name="Loose")
     upper = [vertex.index for vertex in head.data.vertices if vertex.co.z > -0.02]
     group.add(upper, 1.0, "REPLACE")
     moving.hairloom.dynamics.influence_mask = "Loose"
-    session = session_at_start(moving, evaluated)
+    session = session_at_start(moving, get_depsgraph)
     is_upper = session.rig.strands.roots[session.rig.guides, 2]
     for frame in range(1, LAST + 1):
         bpy.context.scene.frame_set(frame)
-    rig, now = session.rig, seen(moving, evaluated)
+    rig, now = session.rig, seen(moving, get_depsgraph)
     lines = now.take(rig.guides)
     away = [
         apart(guide, np.array([0, len(guide)]), lines.take(np.array([number])))
@@ -105,9 +105,9 @@ def test_what_is_painted_0_goes_with_the_style_and_the_rest_is_simulated(
     assert lower.max() < 2e-3 and upper.min() > 5e-3  # CVs lie on the chords between points
 
 
-def test_a_bake_has_the_style_of_each_frame(moving: Any, evaluated: Any) -> None:
+def test_a_bake_has_the_style_of_each_frame(moving: Any, get_depsgraph: Any) -> None:
     moving.hairloom.dynamics.influence = 0.3
-    session = session_at_start(moving, evaluated)
+    session = session_at_start(moving, get_depsgraph)
     played = []
     for frame in range(1, LAST + 1):
         bpy.context.scene.frame_set(frame)
@@ -123,16 +123,16 @@ def test_a_bake_has_the_style_of_each_frame(moving: Any, evaluated: Any) -> None
     bpy.context.scene.frame_set(5)
     np.testing.assert_allclose(session.strands, played[4], atol=2e-6)
     previews.stop(session)
-    fresh = previews.start(moving, evaluated())
+    fresh = previews.start(moving, get_depsgraph())
     assert fresh.rig.strands.point_count == len(played[4])
     np.testing.assert_allclose(fresh.strands, played[4], atol=2e-6)
 
 
 def test_curves_that_are_lost_in_mid_play_leave_the_last_style_that_fits(
-    moving: Any, evaluated: Any
+    moving: Any, get_depsgraph: Any
 ) -> None:
     lose_curves(moving, 5)
-    session = session_at_start(moving, evaluated)
+    session = session_at_start(moving, get_depsgraph)
     for frame in range(1, 5):
         bpy.context.scene.frame_set(frame)
     assert not any("Animated Style" in each for each in session.warnings)
@@ -145,36 +145,36 @@ def test_curves_that_are_lost_in_mid_play_leave_the_last_style_that_fits(
 
 
 def test_a_groom_that_moves_in_a_file_comes_with_all_its_frames(
-    moving: Any, evaluated: Any, tmp_path: Path
+    moving: Any, get_depsgraph: Any, tmp_path: Path
 ) -> None:
     """An imported animated file gives each frame's points and is the animated style at once."""
     pytest.importorskip("alembic3d", reason="it is missing: `make setup` installs it")
     shown = []
     for frame in range(1, LAST + 1):
         bpy.context.scene.frame_set(frame)
-        shown.append(seen(moving, evaluated).points)
-    strands = seen(moving, evaluated)
+        shown.append(seen(moving, get_depsgraph).points)
+    strands = seen(moving, get_depsgraph)
     rate, path = 24.0, tmp_path / "hair.abc"
     first = Groom(strands.with_points(shown[0]))
     write_groom_alembic(path, first, motion=GroomMotion(shown, rate))
     bpy.context.scene.frame_set(1)
     (hair,), outcome = import_strands(
-        path, read_ground(moving.data.surface, evaluated()), bpy.context.collection
+        path, read_ground(moving.data.surface, get_depsgraph()), bpy.context.collection
     )
     assert "moving in 8 frames" in outcome.result and hair.hairloom.dynamics.animated_style
     hair.hairloom.dynamics.device = moving.hairloom.dynamics.device
     hair.hairloom.dynamics.influence = 0.0
-    session = session_at_start(hair, evaluated)
+    session = session_at_start(hair, get_depsgraph)
     for frame, points in enumerate(shown, 1):
         bpy.context.scene.frame_set(frame)
-        np.testing.assert_allclose(seen(hair, evaluated).points, points, atol=1e-6)
+        np.testing.assert_allclose(seen(hair, get_depsgraph).points, points, atol=1e-6)
         expected = strands.with_points(points)
         assert apart(session.strands, session.rig.strands.offsets, expected) < 2e-6
 
 
-def test_both_forms_agree_halfway(moving: Any, evaluated: Any) -> None:
+def test_both_forms_agree_halfway(moving: Any, get_depsgraph: Any) -> None:
     moving.hairloom.dynamics.influence = 0.5
-    session, found = session_at_start(moving, evaluated), []
+    session, found = session_at_start(moving, get_depsgraph), []
     for form in ("numpy", "compute"):
         moving.hairloom.dynamics.device = form
         for frame in range(1, LAST + 1):

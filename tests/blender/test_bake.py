@@ -55,10 +55,10 @@ def played(hair, first=1, last=LAST):
     return np.array(shown)
 
 
-def test_a_bake_equals_playback_bit_for_bit(swinging, evaluated):
+def test_a_bake_equals_playback_bit_for_bit(swinging, get_depsgraph):
     hair, _ = swinging
     hair.hairloom.dynamics.radius_root = 0.5  # wide enough that swinging strands touch the head
-    previews.start(hair, evaluated())
+    previews.start(hair, get_depsgraph())
     live_strands = played(hair)
     assert np.ptp(live_strands[:, :, -1] - live_strands[:, :, 0], axis=0).max() > 0.01
     assert len(previews.session_of(hair).solver.led().strands), "the head pushes some strands"
@@ -74,13 +74,13 @@ def test_a_bake_equals_playback_bit_for_bit(swinging, evaluated):
 
 
 @pytest.mark.usefixtures("gpu_context")
-def test_a_bake_on_the_gpu_equals_playback_on_the_gpu_bit_for_bit(swinging, evaluated):
+def test_a_bake_on_the_gpu_equals_playback_on_the_gpu_bit_for_bit(swinging, get_depsgraph):
     """Baked guides and drawn strands equal playback; strands ridden from the bake on the CPU, as
     for renders, are within 2e-6 m."""
     hair, _ = swinging
     hair.hairloom.dynamics.device = "compute"
     hair.hairloom.dynamics.radius_root = 0.5  # wide enough that swinging strands touch the head
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     guides, strands = [], []
     for frame in range(1, LAST + 1):
         bpy.context.scene.frame_set(frame)
@@ -101,14 +101,16 @@ def test_a_bake_on_the_gpu_equals_playback_on_the_gpu_bit_for_bit(swinging, eval
 
 
 @pytest.mark.parametrize("previewed", [True, False])
-def test_a_bake_is_the_same_with_and_without_a_preview(previewed, swinging, evaluated, tmp_path):
+def test_a_bake_is_the_same_with_and_without_a_preview(
+    previewed, swinging, get_depsgraph, tmp_path
+):
     hair, _ = swinging
     bake(hair)
     first = Cache(tmp_path / "bake")
     frames = {n: first.frame(n) for n in range(1, LAST + 1)}
     if previewed:
         bpy.context.scene.frame_set(1)
-        previews.start(hair, evaluated())
+        previews.start(hair, get_depsgraph())
     bake(hair)
     second = Cache(tmp_path / "bake")
     assert second.facts == first.facts
@@ -117,30 +119,30 @@ def test_a_bake_is_the_same_with_and_without_a_preview(previewed, swinging, eval
             np.testing.assert_array_equal(second.frame(number)[name], array)
 
 
-def test_a_preview_begun_elsewhere_shows_the_very_same_strands(swinging, evaluated):
+def test_a_preview_begun_elsewhere_shows_the_very_same_strands(swinging, get_depsgraph):
     """A preview that starts after the head has moved uses the rig of the bake."""
     hair, _ = swinging
     bake(hair)
     cache = playback.cache_of(hair)
     bpy.context.scene.frame_set(5)
-    previews.start(hair, evaluated())
+    previews.start(hair, get_depsgraph())
     np.testing.assert_array_equal(drawn(hair), baked_grid(cache, 5))
     assert previews.previews[hair.session_uid].bake.changed == ()
     bpy.context.scene.frame_set(2)
     np.testing.assert_array_equal(drawn(hair), baked_grid(cache, 2))
 
 
-def test_baked_hair_has_the_size_of_its_bake(swinging, evaluated):
+def test_baked_hair_has_the_size_of_its_bake(swinging, get_depsgraph):
     """A changed scale of the head shows once the bake is remade or deleted, also in a preview."""
     hair, head = swinging
-    previews.start(hair, evaluated())
+    previews.start(hair, get_depsgraph())
     bake(hair)
     bpy.context.scene.frame_set(3)
     small = drawn(hair)
     head.scale = (2.0, 2.0, 2.0)
     bpy.context.view_layer.update()
     session = previews.session_of(hair)
-    scene_events.catch_up(evaluated())
+    scene_events.catch_up(get_depsgraph())
     assert previews.session_of(hair) is session, "it does not begin over again and again"
     bpy.context.scene.frame_set(4)
     bpy.context.scene.frame_set(3)
@@ -152,42 +154,42 @@ def test_baked_hair_has_the_size_of_its_bake(swinging, evaluated):
     np.testing.assert_allclose(lengths[1], 2.0 * lengths[0], rtol=0.02)
     head.scale = (1.0, 1.0, 1.0)
     bpy.context.view_layer.update()
-    scene_events.catch_up(evaluated())
-    free(hair, evaluated())
-    rendered = engine_hair.read_groom(hair, evaluated()).points
+    scene_events.catch_up(get_depsgraph())
+    free(hair, get_depsgraph())
+    rendered = engine_hair.read_groom(hair, get_depsgraph()).points
     np.testing.assert_allclose(previews.session_of(hair).strands, rendered, atol=1e-6)
 
 
-def test_a_preview_that_began_in_another_size_shows_the_bake_that_is_made(swinging, evaluated):
+def test_a_preview_that_began_in_another_size_shows_the_bake_that_is_made(swinging, get_depsgraph):
     hair, head = swinging
     for frame, size in ((1, 1.0), (LAST, 2.0)):
         head.scale = (size, size, size)
         head.keyframe_insert("scale", frame=frame)
     bake(hair)
     alone = baked_grid(playback.cache_of(hair), 5)
-    free(hair, evaluated())
+    free(hair, get_depsgraph())
     bpy.context.scene.frame_set(5)
-    previews.start(hair, evaluated())
+    previews.start(hair, get_depsgraph())
     bake(hair)
     np.testing.assert_array_equal(baked_grid(playback.cache_of(hair), 5), alone)
     np.testing.assert_array_equal(drawn(hair), alone)
 
 
-def test_a_deformed_head_carries_baked_hair(swinging, evaluated):
+def test_a_deformed_head_carries_baked_hair(swinging, get_depsgraph):
     hair, head = swinging
     swell = head.modifiers.new("Swell", "DISPLACE")
     swell.mid_level = 0.0
     for frame, strength in ((1, 0.0), (LAST, 0.05)):
         swell.strength = strength
         swell.keyframe_insert("strength", frame=frame)
-    previews.start(hair, evaluated())
+    previews.start(hair, get_depsgraph())
     shown = played(hair)
     assert np.linalg.norm(shown[-1, :, 0] - shown[0, :, 0], axis=1).max() > 0.04
     bake(hair)
     np.testing.assert_array_equal(played(hair), shown)
 
 
-def test_hair_without_a_head_is_baked(new_hair, evaluated, tmp_path):
+def test_hair_without_a_head_is_baked(new_hair, get_depsgraph, tmp_path):
     hair = new_hair()
     scene = bpy.context.scene
     scene.frame_end = 4
@@ -197,15 +199,15 @@ def test_hair_without_a_head_is_baked(new_hair, evaluated, tmp_path):
     hair.hairloom.bake.folder = str(tmp_path / "bake")
     hair.hairloom.dynamics.device = "numpy"
     scene.frame_set(1)
-    previews.start(hair, evaluated())
+    previews.start(hair, get_depsgraph())
     shown = played(hair, last=4)
     bake(hair)
     np.testing.assert_array_equal(played(hair, last=4), shown)
 
 
-def test_what_has_changed_since_is_said_and_the_bake_still_plays(swinging, evaluated):
+def test_what_has_changed_since_is_said_and_the_bake_still_plays(swinging, get_depsgraph):
     hair, head = swinging
-    previews.start(hair, evaluated())
+    previews.start(hair, get_depsgraph())
     bake(hair)
     scene, uid = bpy.context.scene, hair.session_uid
     shown = played(hair)
@@ -235,26 +237,26 @@ def test_what_has_changed_since_is_said_and_the_bake_still_plays(swinging, evalu
     np.testing.assert_array_equal(drawn(hair), shown[3])
     hair.data.position_data[3].vector.x += 0.01
     bpy.context.view_layer.update()
-    scene_events.catch_up(evaluated())
+    scene_events.catch_up(get_depsgraph())
     assert "hair" in changed_at(5)
 
 
-def test_a_bake_of_another_solver_is_out_of_date(swinging, evaluated, monkeypatch):
+def test_a_bake_of_another_solver_is_out_of_date(swinging, get_depsgraph, monkeypatch):
     hair, _ = swinging
     bake(hair)
-    previews.start(hair, evaluated())
+    previews.start(hair, get_depsgraph())
     assert previews.previews[hair.session_uid].bake.changed == ()
     previews.stop_all()
     monkeypatch.setattr(groom_hashes, "SOLVER_VERSION", SOLVER_VERSION + 1)
-    previews.start(hair, evaluated())
+    previews.start(hair, get_depsgraph())
     assert previews.previews[hair.session_uid].bake.changed == ("solver",)
 
 
-def test_a_head_that_is_posed_by_hand_takes_its_hair_along(swinging, evaluated):
+def test_a_head_that_is_posed_by_hand_takes_its_hair_along(swinging, get_depsgraph):
     hair, head = swinging
     bake(hair)
     bpy.context.scene.frame_set(4)
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     baked = drawn(hair)
     head.location.y = 0.5
     bpy.context.view_layer.update()
@@ -277,9 +279,9 @@ def test_the_bake_of_another_scene_is_not_replaced_without_a_word(swinging):
     assert f"bake of frames 1 to {LAST} was replaced, as 2 scenes share" in note
 
 
-def test_a_bake_can_be_left_out_and_is_simulated_again(swinging, evaluated):
+def test_a_bake_can_be_left_out_and_is_simulated_again(swinging, get_depsgraph):
     hair, _ = swinging
-    previews.start(hair, evaluated())
+    previews.start(hair, get_depsgraph())
     bake(hair)
     hair.hairloom.dynamics.damping = 9.0
     baked = played(hair)
@@ -290,7 +292,7 @@ def test_a_bake_can_be_left_out_and_is_simulated_again(swinging, evaluated):
     np.testing.assert_array_equal(played(hair), baked)
 
 
-def test_cancelling_leaves_the_bake_before_untouched(swinging, evaluated, tmp_path):
+def test_cancelling_leaves_the_bake_before_untouched(swinging, get_depsgraph, tmp_path):
     hair, _ = swinging
     bake(hair)
     before = contents(tmp_path / "bake")
@@ -502,11 +504,11 @@ def test_a_bake_through_a_link_stays_on_the_other_disk(swinging, tmp_path):
     assert Cache(tmp_path / "large_disk").frame(LAST)["guides"].shape == (60, 16, 3)
 
 
-def test_a_folder_beside_that_is_called_old_is_not_touched(swinging, evaluated, tmp_path):
+def test_a_folder_beside_that_is_called_old_is_not_touched(swinging, get_depsgraph, tmp_path):
     hair, _ = swinging
     (tmp_path / "bake.old").mkdir()
     (tmp_path / "bake.old" / "project.txt").write_text("mine")
-    previews.start(hair, evaluated())
+    previews.start(hair, get_depsgraph())
     assert playback.cache_of(hair) is None
     bake(hair)
     assert (tmp_path / "bake.old" / "project.txt").read_text() == "mine"
@@ -523,12 +525,12 @@ def test_a_folder_with_other_files_is_not_touched(swinging, tmp_path):
     assert [path.name for path in (tmp_path / "bake").iterdir()] == ["diary.txt"]
 
 
-def test_deleting_a_bake_leaves_what_is_not_its_own(swinging, evaluated, tmp_path):
+def test_deleting_a_bake_leaves_what_is_not_its_own(swinging, get_depsgraph, tmp_path):
     hair, _ = swinging
-    previews.start(hair, evaluated())
+    previews.start(hair, get_depsgraph())
     bake(hair)
     (tmp_path / "bake" / "diary.txt").write_text("mine")
-    free(hair, evaluated())
+    free(hair, get_depsgraph())
     assert [path.name for path in (tmp_path / "bake").iterdir()] == ["diary.txt"]
     assert previews.previews[hair.session_uid].bake is None
     assert not bpy.ops.hairloom.bake_free.poll()
@@ -563,7 +565,7 @@ def test_every_file_has_bakes_of_its_own(swinging, tmp_path):
     assert frames_in(first) == shown
 
 
-def test_a_folder_with_the_bake_of_another_file_is_refused(swinging, evaluated, tmp_path):
+def test_a_folder_with_the_bake_of_another_file_is_refused(swinging, get_depsgraph, tmp_path):
     hair, _ = swinging
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot_v1.blend"))
     bake(hair)
@@ -572,13 +574,13 @@ def test_a_folder_with_the_bake_of_another_file_is_refused(swinging, evaluated, 
     hair = bpy.data.objects["Hair"]
     with pytest.raises(HairloomError, match=r"the bake of Hair in shot_v1\.blend"):
         bake(hair)
-    free(hair, evaluated())
+    free(hair, get_depsgraph())
     assert hair.hairloom.bake.folder == "" and frames_in(tmp_path / "bake") == shown
     bake(hair, folder=tmp_path / "bake")  # a folder that is given explicitly is taken
     assert Cache(tmp_path / "bake").facts.file == "shot_v2.blend"
 
 
-def test_a_renamed_groom_keeps_its_bake_where_another_gets_its_name(swinging, evaluated):
+def test_a_renamed_groom_keeps_its_bake_where_another_gets_its_name(swinging, get_depsgraph):
     hair, _ = swinging
     bake(hair)
     folder = folder_of(hair)
@@ -590,7 +592,7 @@ def test_a_renamed_groom_keeps_its_bake_where_another_gets_its_name(swinging, ev
     assert Cache(folder).facts.owner == "Renamed"
     hair.name = "Again"
     other.name = "Renamed"
-    free(hair, evaluated())
+    free(hair, get_depsgraph())
     assert not folder.exists()
     bake(other)
     hair.hairloom.bake.folder = other.hairloom.bake.folder
@@ -618,7 +620,7 @@ def test_a_duplicate_is_baked_into_a_folder_of_its_own(swinging, tmp_path):
     "damage",
     ["no frame", "cut off", "another shape", "pickled", "no json", "newer", "no constants"],
 )
-def test_a_damaged_bake_is_told_and_the_hair_simulated(damage, swinging, evaluated, tmp_path):
+def test_a_damaged_bake_is_told_and_the_hair_simulated(damage, swinging, get_depsgraph, tmp_path):
     hair, _ = swinging
     bake(hair)
     folder = tmp_path / "bake"
@@ -638,7 +640,7 @@ def test_a_damaged_bake_is_told_and_the_hair_simulated(damage, swinging, evaluat
         (folder / "cache.json").write_text(json.dumps(facts | {"version": 99}))
     elif damage == "no constants":
         (frames_in(folder) / "constants.npz").unlink()
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     if damage == "no constants":  # only renders need them
         with pytest.raises(HairloomError, match="Bake again"):
             baked_grid(playback.cache_of(hair), 3)
@@ -733,15 +735,15 @@ def test_led_strands_that_are_not_of_the_groom_are_refused(strands, count, swing
         playback.strands_in(playback.cache_of(hair), 2)
 
 
-def test_a_render_has_the_rig_of_the_newest_bake(swinging, evaluated):
+def test_a_render_has_the_rig_of_the_newest_bake(swinging, get_depsgraph):
     """Strands at rest are unchanged, but other guides move them."""
     hair, _ = swinging
     bake(hair)
-    engine_hair.read_groom(hair, evaluated())
+    engine_hair.read_groom(hair, get_depsgraph())
     before = engine_hair._kept[hair.session_uid].made.rig
     hair.data.hairloom.guides.guide_count = 10
     bake(hair)
-    engine_hair.read_groom(hair, evaluated())
+    engine_hair.read_groom(hair, get_depsgraph())
     after = engine_hair._kept[hair.session_uid].made.rig
     np.testing.assert_array_equal(before.strands.points, after.strands.points)
     assert len(after.guides) == 10 < len(before.guides)
@@ -773,18 +775,20 @@ def test_two_names_of_one_folder_are_one_folder(swinging, tmp_path):
 
 
 def test_while_hair_is_baked_cloth_shows_its_bake_as_on_the_timeline(
-    swinging, flag, evaluated, tmp_path
+    swinging, flag_object, get_depsgraph, tmp_path
 ):
     hair, scene = swinging[0], bpy.context.scene
-    flag.hairloom.bake.folder = str(tmp_path / "flag")
-    bake(flag)
+    flag_object.hairloom.bake.folder = str(tmp_path / "flag")
+    bake(flag_object)
     there = []
     for frame in range(1, LAST + 1):
         scene.frame_set(frame)
-        there.append(evaluated_vertices(flag, evaluated))
+        there.append(evaluated_vertices(flag_object, get_depsgraph))
     assert np.ptp(there, axis=0).max() > 0.001, "it does not move"
     scene.frame_set(1)
-    during = [evaluated_vertices(flag, evaluated) for _ in Bake.of([hair], scene).steps()]
+    during = [
+        evaluated_vertices(flag_object, get_depsgraph) for _ in Bake.of([hair], scene).steps()
+    ]
     np.testing.assert_array_equal(during, there)
 
 

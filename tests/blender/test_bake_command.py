@@ -260,7 +260,9 @@ def _half_covered_head_that_swells(new_hair, sphere):
 
 
 @pytest.mark.slow(instead="test_a_baked_frame_is_drawn")
-def test_the_whole_of_a_deformed_head_is_drawn(new_hair, sphere, evaluated, tmp_path, monkeypatch):
+def test_the_whole_of_a_deformed_head_is_drawn(
+    new_hair, sphere, get_depsgraph, tmp_path, monkeypatch
+):
     """The drawn vertices are those that Blender evaluates, with or without roots on them."""
     _half_covered_head_that_swells(new_hair, sphere)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "wig.blend"))
@@ -276,7 +278,7 @@ def test_the_whole_of_a_deformed_head_is_drawn(new_hair, sphere, evaluated, tmp_
     arguments += ["--height", "32", "--samples", "1", "--output", str(tmp_path / "hair.png")]
     assert command_line.run(arguments) == 0
     bpy.context.scene.frame_set(LAST)
-    head = bpy.data.objects["Head"].evaluated_get(evaluated())
+    head = bpy.data.objects["Head"].evaluated_get(get_depsgraph())
     expected = np.array([head.matrix_world @ vertex.co for vertex in head.to_mesh().vertices])
     assert np.ptp(expected[:, 0]) > 0.29, "the shape key acts"
     np.testing.assert_allclose(drawn[0], expected, atol=1e-6)

@@ -27,7 +27,7 @@ def bake(*hair):
     show_in_renders(list(hair), bpy.context.evaluated_depsgraph_get())
 
 
-def test_hair_whose_copy_is_deleted_is_offered_to_renders_again(hair, evaluated):
+def test_hair_whose_copy_is_deleted_is_offered_to_renders_again(hair, get_depsgraph):
     bake(hair)
     assert hair.hide_render
     for collection in hair.hairloom.bake.copy.users_collection:
@@ -69,16 +69,16 @@ def test_a_copy_shows_no_bake_of_other_strands(hair, new_hair, sphere, tmp_path,
     assert [tuple(point.vector) for point in copy.data.position_data] == shown
 
 
-def test_a_file_that_cannot_be_opened_leaves_hair_to_be_seen(hair, evaluated, tmp_path):
-    session = previews.start(hair, evaluated())
+def test_a_file_that_cannot_be_opened_leaves_hair_to_be_seen(hair, get_depsgraph, tmp_path):
+    session = previews.start(hair, get_depsgraph())
     assert session is not None
-    assert hair.evaluated_get(evaluated()).display_type == "WIRE"
+    assert hair.evaluated_get(get_depsgraph()).display_type == "WIRE"
     (tmp_path / "broken.blend").write_bytes(b"no file of Blender's")
     with pytest.raises(RuntimeError):
         bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "broken.blend"))
     hair = bpy.data.objects["Hair"]
     assert previews.session_of(hair) is None
-    assert hair.evaluated_get(evaluated()).display_type == hair.display_type != "WIRE"
+    assert hair.evaluated_get(get_depsgraph()).display_type == hair.display_type != "WIRE"
 
 
 @pytest.mark.parametrize(

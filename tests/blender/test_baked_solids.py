@@ -45,8 +45,8 @@ SETTINGS = DynamicsSettings(collider_resolution=16)
 
 
 @pytest.fixture
-def mesh(sphere, evaluated) -> Surface:
-    return read_surface(sphere, evaluated(), need_uv=False, place="sphere")
+def mesh(sphere, get_depsgraph) -> Surface:
+    return read_surface(sphere, get_depsgraph(), need_uv=False, place="sphere")
 
 
 def solids(mesh: Surface, bend: float) -> tuple[PosedCollider, ...]:
@@ -123,9 +123,9 @@ def positions(hair) -> np.ndarray:
 
 
 @pytest.mark.draws(light=False)
-def test_cards_of_a_bake_are_those_that_played(swinging, evaluated):
+def test_cards_of_a_bake_are_those_that_played(swinging, get_depsgraph):
     hair, head = swinging
-    previews.start(hair, evaluated())
+    previews.start(hair, get_depsgraph())
     flat = 0.0 if head.hairloom.collider_shape == "sphere" else 0.0017
     played, depth = [], 0.0
     for frame in range(1, LAST + 1):
@@ -143,7 +143,7 @@ def test_cards_of_a_bake_are_those_that_played(swinging, evaluated):
     for frame in range(1, LAST + 1):
         bpy.context.scene.frame_set(frame)
         np.testing.assert_allclose(positions(hair), played[frame - 1], atol=2e-6)
-    rendered = read_groom(hair, evaluated()).cards.mesh.positions
+    rendered = read_groom(hair, get_depsgraph()).cards.mesh.positions
     np.testing.assert_allclose(rendered, played[-1], atol=2e-6)
     solids = playback.solids_in(cache, 4, 0.5)
     np.testing.assert_allclose(solids.colliders[0].matrix_now[0, 3], _middle(cache, 4), atol=1e-6)
@@ -155,10 +155,10 @@ def _middle(cache, frame: int) -> float:
 
 
 @pytest.mark.draws(light=False)
-def test_exported_cards_are_led_out_too(swinging, evaluated):
+def test_exported_cards_are_led_out_too(swinging, get_depsgraph):
     hair, head = swinging
     flat = 0.0 if head.hairloom.collider_shape == "sphere" else 0.0017
-    previews.start(hair, evaluated())
+    previews.start(hair, get_depsgraph())
     mesh = previews.session_of(hair).snapshot.cards.mesh
     list(Bake.of([hair], bpy.context.scene).steps())
     motion = BakedGuides.of(hair)

@@ -51,17 +51,17 @@ def farthest_from(points: np.ndarray, line: np.ndarray) -> float:
 @pytest.mark.draws(light=False)
 @pytest.mark.parametrize("nodes", NODES)
 def test_what_blenders_nodes_make_is_drawn(
-    nodes: str, new_hair: Callable[..., Any], sphere: Any, evaluated: Callable[[], Any]
+    nodes: str, new_hair: Callable[..., Any], sphere: Any, get_depsgraph: Callable[[], Any]
 ) -> None:
     short = hedgehog(count=24, points=40)
     roots = np.repeat(short.points[short.offsets[:-1]], 40, axis=0)
     hair = new_hair(sphere, replace(short, points=roots + 3.0 * (short.points - roots)))
     add_hair_nodes(hair, nodes, NODES[nodes])
     bpy.context.view_layer.update()
-    expected = made_by_blender(hair, evaluated())
+    expected = made_by_blender(hair, get_depsgraph())
     straight = [np.linalg.norm(each[-1] - each[0]) for each in expected]
     assert sum(straight) < 0.99 * sum(map(length, expected)), "they bend it"
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     strands = session.rig.strands
     drawn = np.split(strands.points, strands.offsets[1:-1])
     assert len(drawn) == len(expected) and session.warnings == ()

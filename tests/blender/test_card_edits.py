@@ -415,18 +415,18 @@ def test_edits_are_in_the_file(hair, tmp_path):
     assert edits(bpy.data.objects["Hair"]).edited == 1
 
 
-def test_what_is_drawn_has_the_edits(hair, evaluated):
+def test_what_is_drawn_has_the_edits(hair, get_depsgraph):
     """The preview updates when Edit Mode ends, without Make Cards."""
     obj = make(hair)
     hair.data.hairloom.card_drawing.shown_as = "cards"
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     try:
         before = drawn(session)
         assert before.card_count == 12
         move(obj, 3, by=(0.0, 0.0, 1.0))
         delete(obj, 5, 6)
-        scene_events.updated(evaluated())
-        scene_events.catch_up(evaluated())
+        scene_events.updated(get_depsgraph())
+        scene_events.catch_up(get_depsgraph())
         now = drawn(session)
         assert now.card_count == 10
         np.testing.assert_allclose(lowest(now, 3), lowest(before, 3) + 1.0, atol=1e-5)
@@ -434,18 +434,18 @@ def test_what_is_drawn_has_the_edits(hair, evaluated):
         previews.stop_all()
 
 
-def test_cards_that_cannot_be_read_are_drawn_as_made(hair, evaluated):
+def test_cards_that_cannot_be_read_are_drawn_as_made(hair, get_depsgraph):
     obj = make(hair)
     move(obj, 3, by=(0.0, 0.0, 1.0))
     hair.data.hairloom.card_drawing.shown_as = "cards"
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     try:
         edited = lowest(drawn(session), 3)
         obj.data.uv_layers.remove(obj.data.uv_layers["UVMap"])
         obj.data.update_tag()
         bpy.context.view_layer.update()
-        scene_events.updated(evaluated())
-        scene_events.catch_up(evaluated())
+        scene_events.updated(get_depsgraph())
+        scene_events.catch_up(get_depsgraph())
         assert lowest(drawn(session), 3) < edited - 0.9
         assert any("its UV map is missing" in each for each in session.cards.warnings)
     finally:
@@ -460,11 +460,11 @@ def lowest(mesh, card):
     return mesh.positions[mesh.triangles[mesh.card == card]][..., 2].min()
 
 
-def test_edited_cards_ride_on_the_guides(hair, evaluated):
+def test_edited_cards_ride_on_the_guides(hair, get_depsgraph):
     """A card that was moved follows its guides as the other cards do."""
     obj = make(hair)
     move(obj, 3, by=(0.0, 0.0, 0.02))
-    built = BuiltCards.now(read_inputs(hair, evaluated())[0])
+    built = BuiltCards.now(read_inputs(hair, get_depsgraph())[0])
     rig = built.rig
     away = np.array([0.1, 0.2, 0.3], np.float32)
     still, moved = (
@@ -480,12 +480,12 @@ def test_edited_cards_ride_on_the_guides(hair, evaluated):
     )
 
 
-def test_exported_cards_have_the_edits(hair, evaluated, tmp_path):
+def test_exported_cards_have_the_edits(hair, get_depsgraph, tmp_path):
     """Blender's glTF importer finds the moved card, and not the deleted one."""
     obj = make(hair)
     move(obj, 3, by=(0.0, 0.0, 1.0))
     delete(obj, 5)
-    export = CardExport.of(hair, evaluated(), tmp_path / "cards.glb", CardOutput(), levels=1)
+    export = CardExport.of(hair, get_depsgraph(), tmp_path / "cards.glb", CardOutput(), levels=1)
     written = result_of(export.writing(result_of(build_steps(export.inputs))))
     assert "1 edited and 1 deleted cards kept" in written.result
     sidecar = json.loads((tmp_path / "cards.hairloom.json").read_text())
@@ -498,7 +498,7 @@ def test_exported_cards_have_the_edits(hair, evaluated, tmp_path):
     assert sidecar["levels"][0]["cards"] == 11
 
 
-def test_a_card_whose_uvs_are_folded_has_the_indices_of_its_file(hair, evaluated, tmp_path):
+def test_a_card_whose_uvs_are_folded_has_the_indices_of_its_file(hair, get_depsgraph, tmp_path):
     """Indices also match for a card whose folded UVs leave triangles that share only a vertex."""
     hair.data.hairloom.cards.column_count = 2
     obj = make(hair)
@@ -517,7 +517,7 @@ def test_a_card_whose_uvs_are_folded_has_the_indices_of_its_file(hair, evaluated
             uv[loop].vector[0] = low + middle - across if is_folded else across
     settings = CardExportSettings(index_buffer=True)
     path, output = tmp_path / "cards.glb", CardOutput(settings=settings)
-    export = CardExport.of(hair, evaluated(), path, output, levels=1)
+    export = CardExport.of(hair, get_depsgraph(), path, output, levels=1)
     result_of(export.writing(result_of(build_steps(export.inputs))))
     (level,) = json.loads((tmp_path / "cards.hairloom.json").read_text())["levels"]
     glb = Glb(path)

@@ -52,10 +52,10 @@ def moving(hair, sphere, tmp_path):
     return hair
 
 
-def catch_up(evaluated):
+def catch_up(get_depsgraph):
     """Update the previews, as a timer does once edits have settled."""
     bpy.context.view_layer.update()
-    scene_events.catch_up(evaluated())
+    scene_events.catch_up(get_depsgraph())
 
 
 def bake(hair):
@@ -78,9 +78,9 @@ def upper_half(head, name):
 
 
 @pytest.mark.parametrize("way", ["multi", "single"])
-def test_guides_come_first_and_children_after_them(way, hair, evaluated):
+def test_guides_come_first_and_children_after_them(way, hair, get_depsgraph):
     hair.data.hairloom.children.method = way
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     rig = session.rig
     assert (len(rig.guides), rig.strands.strand_count) == (60, 260)
     np.testing.assert_array_equal(rig.guides, np.arange(60))
@@ -93,10 +93,10 @@ def test_guides_come_first_and_children_after_them(way, hair, evaluated):
     assert overlay.drawing_of(session.uid).snapshot.strand_count == 260
 
 
-def test_none_is_the_artists_own_hair(new_hair, sphere, evaluated):
+def test_none_is_the_artists_own_hair(new_hair, sphere, get_depsgraph):
     hair = new_hair(sphere)
     hair.data.hairloom.children.strand_count = 17
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     plain = rig_flow.prepare(
         session.source.strands, session.source.head, session.settings[GuideSettings], place="Hair"
     )
@@ -106,27 +106,27 @@ def test_none_is_the_artists_own_hair(new_hair, sphere, evaluated):
     assert not session.is_stale, "settings of children that are not there change nothing"
 
 
-def test_more_children_leave_those_before_bit_for_bit(hair, evaluated):
-    session = previews.start(hair, evaluated())
+def test_more_children_leave_those_before_bit_for_bit(hair, get_depsgraph):
+    session = previews.start(hair, get_depsgraph())
     before = session.rig
     hair.data.hairloom.children.strand_count = 300
     assert session.is_stale
-    catch_up(evaluated)
+    catch_up(get_depsgraph)
     assert session.rig.strands.strand_count == 360 and not session.is_stale
     np.testing.assert_array_equal(session.rig.strands.grid[:260], before.strands.grid)
     np.testing.assert_array_equal(session.rig.weights.guide[:260], before.weights.guide)
     np.testing.assert_array_equal(session.rig.weights.weight[:260], before.weights.weight)
 
 
-def test_no_children_at_all_are_the_guides(hair, evaluated):
+def test_no_children_at_all_are_the_guides(hair, get_depsgraph):
     hair.data.hairloom.children.strand_count = 0
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     assert session.rig.strands.strand_count == len(session.rig.guides) == 60
 
 
 @pytest.mark.slow
-def test_a_hundred_thousand_children_are_made(hair, evaluated):
-    session = previews.start(hair, evaluated())
+def test_a_hundred_thousand_children_are_made(hair, get_depsgraph):
+    session = previews.start(hair, get_depsgraph())
     rig = rig_flow.prepare(
         session.source.strands,
         session.source.head,
@@ -138,53 +138,53 @@ def test_a_hundred_thousand_children_are_made(hair, evaluated):
     np.testing.assert_array_equal(rig.strands.grid[:260], session.rig.strands.grid)
 
 
-def test_without_a_surface_there_are_no_children_and_a_note_says_why(new_hair, evaluated):
+def test_without_a_surface_there_are_no_children_and_a_note_says_why(new_hair, get_depsgraph):
     hair = new_hair()
     hair.data.hairloom.children.method = "multi"
     hair.data.hairloom.guides.guide_count = 20
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     assert (session.rig.strands.strand_count, session.rig.child_count) == (60, 0)
     (note,) = session.rig.notes
     assert f"Hair: {note}" in session.warnings and "surface" in note
 
 
-def test_children_grow_where_the_artist_has_painted(hair, sphere, evaluated):
+def test_children_grow_where_the_artist_has_painted(hair, sphere, get_depsgraph):
     upper_half(sphere, "Top")
     hair.hairloom.children_density = "Top"
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     assert session.warnings == ()
     assert session.rig.strands.roots[60:, 2].min() > -0.03
     assert session.rig.strands.roots[:60, 2].min() < -0.05, "guides are the artist's"
 
 
-def test_painted_weights_are_followed(hair, sphere, evaluated):
+def test_painted_weights_are_followed(hair, sphere, get_depsgraph):
     group = upper_half(sphere, "Top")
     hair.hairloom.children_density = "Top"
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     rig = session.rig
     sphere.data.update()
     bpy.context.view_layer.update()
     assert session.is_stale
-    catch_up(evaluated)
+    catch_up(get_depsgraph)
     assert session.rig is rig, "touched but not changed"
     group.add([v.index for v in sphere.data.vertices], 1.0, "REPLACE")
     sphere.data.update()
-    catch_up(evaluated)
+    catch_up(get_depsgraph)
     assert session.rig is not rig
     assert session.rig.strands.roots[60:, 2].min() < -0.05
 
 
-def test_weights_that_cannot_be_used_are_said(hair, sphere, evaluated):
+def test_weights_that_cannot_be_used_are_said(hair, sphere, get_depsgraph):
     sphere.vertex_groups.new(name="Nowhere")
     hair.hairloom.children_density = "Nowhere"
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     (warning,) = session.warnings
     assert warning.startswith("Head: ") and "'Nowhere'" in warning and "Paint" in warning
     assert session.rig.strands.strand_count == 260
     broken = sphere.data.attributes.new("Broken", "FLOAT", "POINT")
     broken.data[0].value = float("nan")
     hair.hairloom.children_density = "Broken"
-    catch_up(evaluated)
+    catch_up(get_depsgraph)
     assert "'Broken'" in session.warnings[0] and session.rig.strands.strand_count == 260
 
 
@@ -196,10 +196,10 @@ def tips(session):
 
 
 @pytest.mark.parametrize("kind", ["group", "attribute"])
-def test_a_mask_shapes_the_children_where_it_is_painted(hair, sphere, evaluated, kind):
+def test_a_mask_shapes_the_children_where_it_is_painted(hair, sphere, get_depsgraph, kind):
     children = hair.data.hairloom.children
     children.frizz = 0.05
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     before = tips(session)
     if kind == "group":
         upper_half(sphere, "Top")
@@ -207,11 +207,11 @@ def test_a_mask_shapes_the_children_where_it_is_painted(hair, sphere, evaluated,
         top = sphere.data.attributes.new("Top", "FLOAT", "POINT")
         top.data.foreach_set("value", [float(v.co.z > 0.0) for v in sphere.data.vertices])
     children.frizz_mask = "Top"
-    catch_up(evaluated)
+    catch_up(get_depsgraph)
     after = tips(session)
     assert session.warnings == () and after.keys() == before.keys()
     children.frizz_mask, children.frizz = "", 0.0
-    catch_up(evaluated)
+    catch_up(get_depsgraph)
     smooth = tips(session)
     for root, strand in after.items():
         if strand[0, 2] > 0.03:
@@ -221,25 +221,25 @@ def test_a_mask_shapes_the_children_where_it_is_painted(hair, sphere, evaluated,
             assert not np.array_equal(strand, before[root])
 
 
-def test_a_brush_on_a_mask_is_followed_with_the_update(hair, sphere, evaluated):
+def test_a_brush_on_a_mask_is_followed_with_the_update(hair, sphere, get_depsgraph):
     children = hair.data.hairloom.children
     children.length_variation = 0.0
     group = upper_half(sphere, "Top")
     children.length_mask = "Top"
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     own, lengths = session.rig.own_count, session.rig.strands.lengths()
     group.add([v.index for v in sphere.data.vertices], 0.5, "REPLACE")
     sphere.data.update_tag()
     bpy.context.view_layer.update()
     at_once = session.rig.strands.lengths()[own:]
     assert session.is_stale and not np.allclose(at_once, lengths[own:])
-    catch_up(evaluated)
+    catch_up(get_depsgraph)
     assert session.rig.strands.lengths()[own:] == pytest.approx(at_once, rel=1e-3)
 
 
-def test_masks_that_cannot_be_used_are_said_and_act_nowhere(hair, sphere, evaluated):
+def test_masks_that_cannot_be_used_are_said_and_act_nowhere(hair, sphere, get_depsgraph):
     children = hair.data.hairloom.children
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     before = session.rig.strands.points
     broken = sphere.data.attributes.new("Broken", "FLOAT", "POINT")
     broken.data[0].value = float("nan")
@@ -251,17 +251,17 @@ def test_masks_that_cannot_be_used_are_said_and_act_nowhere(hair, sphere, evalua
         ("Numbers", "INT on POINT"),
     ):
         children.frizz_mask = name
-        catch_up(evaluated)
+        catch_up(get_depsgraph)
         (warning,) = session.warnings
         assert warning.startswith("Head: ") and f"'{name}'" in warning and said in warning
         np.testing.assert_array_equal(session.rig.strands.points, before)
     children.frizz_mask = "Nowhere"
-    catch_up(evaluated)
+    catch_up(get_depsgraph)
     (warning,) = session.warnings
     assert "'Nowhere' is 0 everywhere, and so is Frizz" in warning
     assert not np.array_equal(session.rig.strands.points, before)
     children.frizz_mask = ""
-    catch_up(evaluated)
+    catch_up(get_depsgraph)
     assert session.warnings == ()
     np.testing.assert_array_equal(session.rig.strands.points, before)
 
@@ -278,23 +278,23 @@ def test_a_bake_is_stale_once_a_mask_is_painted(hair, sphere):
     assert differences(hashes[1], hashes[2]) == ("children",)
 
 
-def test_an_unknown_density_is_said_and_a_bake_refuses_it(hair, sphere, evaluated):
+def test_an_unknown_density_is_said_and_a_bake_refuses_it(hair, sphere, get_depsgraph):
     upper_half(sphere, "Top")
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     hair.hairloom.children_density = "Bottom"
-    catch_up(evaluated)
+    catch_up(get_depsgraph)
     (warning,) = session.warnings
     assert warning.startswith("Head: ") and "'Bottom'" in warning and "Top" in warning
     assert session.rig.strands.strand_count == 260, "children grow everywhere until it is mended"
     with pytest.raises(HairloomError, match="Bottom"):
         Bake.of([hair], bpy.context.scene)
     hair.hairloom.children_density = "Top"
-    catch_up(evaluated)
+    catch_up(get_depsgraph)
     assert session.warnings == () and session.rig.strands.roots[60:, 2].min() > -0.03
 
 
-def test_a_bake_of_children_plays_back_bit_for_bit(moving, evaluated):
-    session = previews.start(moving, evaluated())
+def test_a_bake_of_children_plays_back_bit_for_bit(moving, get_depsgraph):
+    session = previews.start(moving, get_depsgraph())
     shown = played(session)
     assert np.ptp(shown[:, 60:, -1] - shown[:, 60:, 0], axis=0).max() > 0.01
     bake(moving)
@@ -304,12 +304,12 @@ def test_a_bake_of_children_plays_back_bit_for_bit(moving, evaluated):
         np.testing.assert_array_equal(baked_grid(cache, frame), shown[frame - 1])
     previews.stop(session)
     bpy.context.scene.frame_set(4)
-    again = previews.start(moving, evaluated())
+    again = previews.start(moving, get_depsgraph())
     np.testing.assert_array_equal(strand_grid(again), shown[3])
     assert previews.previews[again.uid].bake.changed == ()
 
 
-def test_a_bake_keeps_what_there_was_to_say(new_hair, evaluated, tmp_path):
+def test_a_bake_keeps_what_there_was_to_say(new_hair, get_depsgraph, tmp_path):
     hair = new_hair()
     hair.data.hairloom.children.method = "multi"
     hair.hairloom.bake.folder = str(tmp_path / "bake")
@@ -317,19 +317,19 @@ def test_a_bake_keeps_what_there_was_to_say(new_hair, evaluated, tmp_path):
     bpy.context.scene.frame_end = 2
     plan = Bake.of([hair], bpy.context.scene)
     list(plan.steps())
-    (note,) = previews.start(hair, evaluated()).rig.notes
+    (note,) = previews.start(hair, get_depsgraph()).rig.notes
     assert f"Hair: {note}" in plan.notes
     assert playback.rig_in(playback.cache_of(hair)).rig.notes == (note,)
 
 
 @pytest.mark.slow
-def test_a_bake_says_when_children_have_changed(moving, sphere, evaluated):
+def test_a_bake_says_when_children_have_changed(moving, sphere, get_depsgraph):
     upper_half(sphere, "Top")
-    session = previews.start(moving, evaluated())
+    session = previews.start(moving, get_depsgraph())
     bake(moving)
 
     def changed():
-        catch_up(evaluated)
+        catch_up(get_depsgraph)
         return previews.previews[session.uid].bake.changed
 
     children = moving.data.hairloom.children
@@ -345,59 +345,59 @@ def test_a_bake_says_when_children_have_changed(moving, sphere, evaluated):
     assert changed() == ("children",)
 
 
-def test_hair_that_plays_goes_on_while_children_change(moving, sphere, evaluated):
-    session = previews.start(moving, evaluated())
-    previews.play(evaluated())
+def test_hair_that_plays_goes_on_while_children_change(moving, sphere, get_depsgraph):
+    session = previews.start(moving, get_depsgraph())
+    previews.play(get_depsgraph())
 
     def go(frames):
         for _ in range(frames):
             sphere.location.x += 0.02
             bpy.context.view_layer.update()
-            previews.advance(evaluated(), 1.0 / 24.0)
+            previews.advance(get_depsgraph(), 1.0 / 24.0)
 
     go(4)
     guides = session.solver.guides()
     moving.data.hairloom.children.strand_count = 50
     moving.data.hairloom.children.frizz = 0.004
-    catch_up(evaluated)
+    catch_up(get_depsgraph)
     assert session.is_playing and session.rig.strands.strand_count == 110
     np.testing.assert_array_equal(session.solver.guides(), guides)
     np.testing.assert_allclose(strand_grid(session)[:60, -1], guides[:, -1], atol=1e-3)
     go(2)
     assert np.abs(session.solver.guides() - guides).max() > 0.01
     moving.data.hairloom.guides.guide_count = 30
-    catch_up(evaluated)
+    catch_up(get_depsgraph)
     assert session.is_playing and strand_grid(session).shape[0] == 110, "other guides begin at rest"
     go(1)
     assert previews.sessions() == (session,)
 
 
-def test_undo_brings_the_children_back(hair, evaluated):
+def test_undo_brings_the_children_back(hair, get_depsgraph):
     bpy.context.preferences.edit.use_global_undo = True
     bpy.ops.ed.undo_push(message="begin")
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     before = strand_grid(session)
     bpy.data.objects["Hair"].data.hairloom.children.strand_count = 90
     bpy.ops.ed.undo_push(message="fewer")
-    catch_up(evaluated)
+    catch_up(get_depsgraph)
     assert strand_grid(session).shape[0] == 150
     bpy.ops.ed.undo()
-    catch_up(evaluated)
+    catch_up(get_depsgraph)
     assert previews.sessions() == (session,)
     np.testing.assert_allclose(strand_grid(session), before, atol=1e-6)
 
 
 @pytest.mark.slow
-def test_cards_are_one_a_guide_and_tressfx_holds_all(hair, evaluated, tmp_path, capfd):
+def test_cards_are_one_a_guide_and_tressfx_holds_all(hair, get_depsgraph, tmp_path, capfd):
     settings = hair.data.hairloom
     settings.cards.source, settings.atlas.size = "guides", "512"
     settings.cards.order_by, settings.card_occlusion.rays = "distance", 16
     assert bpy.ops.hairloom.export_cards(filepath=str(tmp_path / "cards.glb")) == {"FINISHED"}
     assert "Wrote 60 cards" in capfd.readouterr().out
-    plan = StrandExport.of([hair], evaluated(), TRESSFX, StrandExportSettings(up="Z"))
+    plan = StrandExport.of([hair], get_depsgraph(), TRESSFX, StrandExportSettings(up="Z"))
     assert "260 strands" in plan.write(tmp_path / "hair.tfx").result
     written = read_tfx(tmp_path / "hair.tfx", up="Z", scale=1.0).strands
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     np.testing.assert_allclose(written.points, session.rig.strands.points, atol=1e-6)
 
 

@@ -24,9 +24,9 @@ def hair(new_hair, sphere):
 
 
 @pytest.fixture
-def session(hair, evaluated, monkeypatch):
+def session(hair, get_depsgraph, monkeypatch):
     """A preview whose rebuilds do not block, as in a window."""
-    made = previews.start(hair, evaluated())
+    made = previews.start(hair, get_depsgraph())
     monkeypatch.setattr(latest_job, "is_blocking", lambda: False)
     yield made
     scene_events.clear()
@@ -48,18 +48,18 @@ def drawn(session):
     return np.array(session.strands)
 
 
-def arrive(session, evaluated):
-    scene_events.catch_up(evaluated())
+def arrive(session, get_depsgraph):
+    scene_events.catch_up(get_depsgraph())
     take_steps_until(lambda: not session.is_pending)
 
 
-def rebuilt(hair, evaluated):
+def rebuilt(hair, get_depsgraph):
     """Strands and occlusion of a preview that starts now."""
-    fresh = Session(hair, evaluated())
+    fresh = Session(hair, get_depsgraph())
     return fresh.rig.strands.points, fresh.snapshot.occlusion
 
 
-def test_strands_follow_with_the_update_and_nothing_else_moves(hair, session, evaluated):
+def test_strands_follow_with_the_update_and_nothing_else_moves(hair, session, get_depsgraph):
     before, snapshot = drawn(session), session.snapshot
     stroke(hair, range(5))
     after = drawn(session)
@@ -73,17 +73,17 @@ def test_strands_follow_with_the_update_and_nothing_else_moves(hair, session, ev
     assert session.is_stale, "the rest is to come"
 
 
-def test_at_the_end_it_is_bit_for_bit_what_a_rebuild_makes(hair, session, evaluated):
+def test_at_the_end_it_is_bit_for_bit_what_a_rebuild_makes(hair, session, get_depsgraph):
     for number in range(3):
         stroke(hair, range(4 * number, 4 * number + 4))
-    arrive(session, evaluated)
-    points, occlusion = rebuilt(hair, evaluated)
+    arrive(session, get_depsgraph)
+    points, occlusion = rebuilt(hair, get_depsgraph)
     np.testing.assert_array_equal(session.rig.strands.points, points)
     np.testing.assert_array_equal(session.snapshot.occlusion, occlusion)
     assert not session.is_stale
 
 
-def test_an_undo_brings_back_the_very_hair(hair, session, evaluated):
+def test_an_undo_brings_back_the_very_hair(hair, session, get_depsgraph):
     """Undo works before and after the rebuild has arrived. After it, children keep the combed
     guides until the next rebuild arrives."""
     before, points, groom = drawn(session), curve_points(hair.data), session.groom
@@ -92,19 +92,19 @@ def test_an_undo_brings_back_the_very_hair(hair, session, evaluated):
     put_points(hair.data, points)
     bpy.context.view_layer.update()
     np.testing.assert_allclose(drawn(session), before, atol=1e-6)
-    arrive(session, evaluated)
+    arrive(session, get_depsgraph)
     np.testing.assert_array_equal(drawn(session), before)
     assert session.groom is groom, "made once, not again"
     stroke(hair, range(5))
-    arrive(session, evaluated)
+    arrive(session, get_depsgraph)
     put_points(hair.data, points)
     bpy.context.view_layer.update()
     np.testing.assert_allclose(drawn(session)[:own], before[:own], atol=1e-6)
-    arrive(session, evaluated)
+    arrive(session, get_depsgraph)
     np.testing.assert_array_equal(drawn(session), before)
 
 
-def test_blenders_undo_and_redo_are_followed(hair, session, evaluated):
+def test_blenders_undo_and_redo_are_followed(hair, session, get_depsgraph):
     bpy.ops.ed.undo_push(message="before")
     before = drawn(session)
     stroke(hair, range(5))
@@ -116,21 +116,21 @@ def test_blenders_undo_and_redo_are_followed(hair, session, evaluated):
         np.testing.assert_allclose(drawn(session), wanted, atol=1e-6)
 
 
-def test_a_stroke_amid_a_build_is_not_lost_when_that_arrives(hair, session, evaluated):
+def test_a_stroke_amid_a_build_is_not_lost_when_that_arrives(hair, session, get_depsgraph):
     stroke(hair, range(5))
-    scene_events.catch_up(evaluated())
+    scene_events.catch_up(get_depsgraph())
     stroke(hair, range(10, 15))
     shown = drawn(session)
     take_steps_until(lambda: not session.is_pending)
     own = session.rig.strands.offsets[session.rig.own_count]
     np.testing.assert_allclose(drawn(session)[:own], shown[:own], atol=1e-6)
-    arrive(session, evaluated)
-    np.testing.assert_array_equal(session.rig.strands.points, rebuilt(hair, evaluated)[0])
+    arrive(session, get_depsgraph)
+    np.testing.assert_array_equal(session.rig.strands.points, rebuilt(hair, get_depsgraph)[0])
 
 
-def test_hair_that_plays_is_not_put_to_rest_by_the_first_touch(hair, session, evaluated):
-    previews.play(evaluated())
-    previews.advance(evaluated(), 1.0 / 60.0)
+def test_hair_that_plays_is_not_put_to_rest_by_the_first_touch(hair, session, get_depsgraph):
+    previews.play(get_depsgraph())
+    previews.advance(get_depsgraph(), 1.0 / 60.0)
     solver = session.solver
     stroke(hair, range(5))
     assert session.solver is solver and session.is_playing
@@ -158,8 +158,8 @@ def roots(session):
     return {root.tobytes() for root in session.rig.strands.roots[own:]}
 
 
-def test_children_follow_a_density_with_the_update(hair, group, session, evaluated):
-    arrive(session, evaluated)
+def test_children_follow_a_density_with_the_update(hair, group, session, get_depsgraph):
+    arrive(session, get_depsgraph)
     before, snapshot = roots(session), session.snapshot
     paint(group, 0.2)
     after, drawn_now = roots(session), drawn(session)
@@ -167,50 +167,50 @@ def test_children_follow_a_density_with_the_update(hair, group, session, evaluat
     assert session.snapshot.layout is snapshot.layout
     assert session.is_stale, "the rest is to come"
     assert {p.tobytes() for p in drawn_now[session.rig.strands.offsets[:-1]]} >= after
-    arrive(session, evaluated)
+    arrive(session, get_depsgraph)
     assert roots(session) == after
-    points, occlusion = rebuilt(hair, evaluated)
+    points, occlusion = rebuilt(hair, get_depsgraph)
     np.testing.assert_array_equal(session.rig.strands.points, points)
     np.testing.assert_array_equal(session.snapshot.occlusion, occlusion)
 
 
-def test_an_undo_of_painting_brings_back_the_very_hair(hair, group, session, evaluated):
-    arrive(session, evaluated)
+def test_an_undo_of_painting_brings_back_the_very_hair(hair, group, session, get_depsgraph):
+    arrive(session, get_depsgraph)
     before, groom = drawn(session), session.groom
     paint(group, 0.2)
     paint(group, 1.0)
-    arrive(session, evaluated)
+    arrive(session, get_depsgraph)
     np.testing.assert_array_equal(drawn(session), before)
     assert session.groom is groom, "made once, not again"
 
 
-def test_painting_amid_a_build_is_not_lost_when_that_arrives(hair, group, session, evaluated):
-    arrive(session, evaluated)
+def test_painting_amid_a_build_is_not_lost_when_that_arrives(hair, group, session, get_depsgraph):
+    arrive(session, get_depsgraph)
     paint(group, 0.5)
-    scene_events.catch_up(evaluated())
+    scene_events.catch_up(get_depsgraph())
     paint(group, 0.1)
     painted = roots(session)
     take_steps_until(lambda: not session.is_pending)
     assert roots(session) == painted
-    arrive(session, evaluated)
-    np.testing.assert_array_equal(session.rig.strands.points, rebuilt(hair, evaluated)[0])
+    arrive(session, get_depsgraph)
+    np.testing.assert_array_equal(session.rig.strands.points, rebuilt(hair, get_depsgraph)[0])
 
 
-def test_hair_that_plays_waits_for_what_is_made_of_the_paint(hair, group, session, evaluated):
-    arrive(session, evaluated)
-    previews.play(evaluated())
-    previews.advance(evaluated(), 1.0 / 60.0)
+def test_hair_that_plays_waits_for_what_is_made_of_the_paint(hair, group, session, get_depsgraph):
+    arrive(session, get_depsgraph)
+    previews.play(get_depsgraph())
+    previews.advance(get_depsgraph(), 1.0 / 60.0)
     solver, before = session.solver, roots(session)
     paint(group, 0.2)
     assert session.solver is solver and roots(session) == before
 
 
-def test_guides_are_lines_while_brushes_comb_them(hair, session, evaluated):
+def test_guides_are_lines_while_brushes_comb_them(hair, session, get_depsgraph):
     """Blender's own curves stay hidden. Guides on the far side of the head are not drawn."""
     assert overlay.drawing_of(session.uid).lines == ()
     bpy.ops.object.mode_set(mode="SCULPT_CURVES")
     bpy.context.view_layer.update()
-    assert hair.evaluated_get(evaluated()).display_type == "WIRE"
+    assert hair.evaluated_get(get_depsgraph()).display_type == "WIRE"
     (lines,) = overlay.drawing_of(session.uid).lines
     grid = session.rig.guide_grid
     np.testing.assert_allclose(lines.points.reshape(len(grid), -1, 2, 3)[:, :, 0], grid[:, :-1])
@@ -223,18 +223,18 @@ def test_guides_are_lines_while_brushes_comb_them(hair, session, evaluated):
     hair.hairloom.hide_original = False
     bpy.context.view_layer.update()
     assert overlay.drawing_of(session.uid).lines == ()
-    assert hair.evaluated_get(evaluated()).display_type != "WIRE"
+    assert hair.evaluated_get(get_depsgraph()).display_type != "WIRE"
     bpy.ops.object.mode_set(mode="OBJECT")
 
 
-def test_new_curves_are_no_stroke(hair, session, evaluated):
+def test_new_curves_are_no_stroke(hair, session, get_depsgraph):
     before = drawn(session)
     hair.data.add_curves([6])
     bpy.context.view_layer.update()
     np.testing.assert_array_equal(drawn(session), before)
 
 
-def test_a_combed_head_that_moved_since_takes_hair_along(hair, session, evaluated):
+def test_a_combed_head_that_moved_since_takes_hair_along(hair, session, get_depsgraph):
     """Strokes are detected on the curves at rest, wherever hair and head are now."""
     hair.parent.location.x += 0.5
     bpy.context.view_layer.update()
@@ -246,7 +246,7 @@ def test_a_combed_head_that_moved_since_takes_hair_along(hair, session, evaluate
 
 
 def test_combed_hair_comes_in_the_light_before_and_keeps_strokes_made_since(
-    hair, session, evaluated, monkeypatch
+    hair, session, get_depsgraph, monkeypatch
 ):
     """Combed hair first has the old light. Its own arrives later, and keeps newer strokes."""
     opened, lit = threading.Event(), session_module.lit
@@ -254,10 +254,10 @@ def test_combed_hair_comes_in_the_light_before_and_keeps_strokes_made_since(
     monkeypatch.setattr(latest_job, "is_blocking", lambda: False)
     fields = session.groom.light.fields
     stroke(hair, range(5))
-    scene_events.catch_up(evaluated())
+    scene_events.catch_up(get_depsgraph())
     take_steps_until(lambda: session.is_lighting)
     assert session.groom.light.is_quick and session.groom.light.fields is fields
-    wanted = rebuilt(hair, evaluated)[1]
+    wanted = rebuilt(hair, get_depsgraph)[1]
     assert not np.array_equal(session.snapshot.occlusion, wanted)
     assert np.abs(session.snapshot.occlusion - wanted).mean() < 0.05
     stroke(hair, range(10, 15))
@@ -267,7 +267,7 @@ def test_combed_hair_comes_in_the_light_before_and_keeps_strokes_made_since(
     np.testing.assert_array_equal(drawn(session), shown)
     np.testing.assert_array_equal(session.rig.strands.points, combed)
     np.testing.assert_array_equal(session.snapshot.occlusion, wanted)
-    arrive(session, evaluated)
-    points, occlusion = rebuilt(hair, evaluated)
+    arrive(session, get_depsgraph)
+    points, occlusion = rebuilt(hair, get_depsgraph)
     np.testing.assert_array_equal(session.rig.strands.points, points)
     np.testing.assert_array_equal(session.snapshot.occlusion, occlusion)

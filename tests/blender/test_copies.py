@@ -18,13 +18,13 @@ LINKED = pytest.mark.parametrize("linked", [False, True], ids=["Shift-D", "Alt-D
 
 
 @pytest.fixture
-def playing(new_hair, sphere, evaluated):
+def playing(new_hair, sphere, get_depsgraph):
     """Hair that plays on a head: `hair`, `head` and `session`."""
     hair = new_hair(sphere)
     hair.hairloom.dynamics.device = "numpy"
     hair.hairloom.dynamics.collider_resolution = 8
-    session = previews.start(hair, evaluated())
-    assert previews.play(evaluated()) == []
+    session = previews.start(hair, get_depsgraph())
+    assert previews.play(get_depsgraph()) == []
     return SimpleNamespace(hair=hair, head=sphere, session=session)
 
 
@@ -48,11 +48,11 @@ def goes_on(playing):
 
 
 @LINKED
-def test_a_duplicate_beside_hair_that_plays_is_shown_by_blender(linked, playing, evaluated):
+def test_a_duplicate_beside_hair_that_plays_is_shown_by_blender(linked, playing, get_depsgraph):
     twin, _ = duplicated(playing.hair, linked=linked)
     goes_on(playing)
-    assert twin.evaluated_get(evaluated()).display_type == "TEXTURED"
-    assert playing.hair.evaluated_get(evaluated()).display_type == "WIRE"
+    assert twin.evaluated_get(get_depsgraph()).display_type == "TEXTURED"
+    assert playing.hair.evaluated_get(get_depsgraph()).display_type == "WIRE"
     assert twin.hairloom.dynamics.device == "numpy"
     twin.hairloom.dynamics.gusts, twin.data.hairloom.shading.ambient = 0.875, 0.25
     bpy.data.objects.remove(twin)
@@ -64,49 +64,49 @@ def test_a_duplicate_beside_hair_that_plays_is_shown_by_blender(linked, playing,
 
 
 @LINKED
-def test_a_duplicate_of_hair_and_head_goes_with_its_own_head(linked, playing, evaluated):
+def test_a_duplicate_of_hair_and_head_goes_with_its_own_head(linked, playing, get_depsgraph):
     twin, head = duplicated(playing.hair, playing.head, linked=linked)
     assert head_of(twin) == head and head_of(playing.hair) == playing.head
     head.location = (1.0, 0.5, 0.0)
     bpy.context.view_layer.update()
-    session = previews.start(twin, evaluated())
+    session = previews.start(twin, get_depsgraph())
     assert session.warnings == ()
     assert strand_grid(session).mean(axis=(0, 1))[0] == pytest.approx(1.0, abs=0.02)
-    previews.play(evaluated())
+    previews.play(get_depsgraph())
     other = strand_grid(playing.session)
     assert tips_lag(session) and tips_lag(playing.session)
     assert np.abs(other[..., 0]).max() < 0.5, "the first stays where it is"
-    found = engine_hair.read_groom(twin, evaluated())
+    found = engine_hair.read_groom(twin, get_depsgraph())
     assert found.points.mean(axis=0)[0] > 1.0
 
 
-def test_hair_that_shares_its_curves_is_combed_and_coloured_together(playing, evaluated):
+def test_hair_that_shares_its_curves_is_combed_and_coloured_together(playing, get_depsgraph):
     twin, _ = duplicated(playing.hair, linked=True)
-    sessions = playing.session, previews.start(twin, evaluated())
-    previews.rest(evaluated(), keep_playing=False)
+    sessions = playing.session, previews.start(twin, get_depsgraph())
+    previews.rest(get_depsgraph(), keep_playing=False)
     twin.data.hairloom.shading.ambient = 0.5
     playing.hair.data.position_data[7].vector = (0.0, 0.0, 0.5)
     playing.hair.data.update_tag()
     bpy.context.view_layer.update()
-    scene_events.catch_up(evaluated())
+    scene_events.catch_up(get_depsgraph())
     for session in sessions:
         assert strand_grid(session)[0, -1] == pytest.approx([0.0, 0.0, 0.5], abs=1e-5)
         assert overlay.drawing_of(session.uid).snapshot.shading.ambient == 0.5
 
 
-def test_a_duplicate_that_is_undone(playing, evaluated):
+def test_a_duplicate_that_is_undone(playing, get_depsgraph):
     bpy.context.preferences.edit.use_global_undo = True
     bpy.ops.ed.undo_push(message="begin")
     duplicated(playing.hair, playing.head, linked=False)
     bpy.ops.ed.undo_push(message="duplicate")
     bpy.ops.ed.undo()
     assert len(bpy.data.objects) == 2
-    scene_events.catch_up(evaluated())
+    scene_events.catch_up(get_depsgraph())
     goes_on(playing)
 
 
 @pytest.mark.parametrize("link", [False, True], ids=["appended", "linked"])
-def test_hair_of_the_same_name_from_a_file(link, playing, evaluated, tmp_path):
+def test_hair_of_the_same_name_from_a_file(link, playing, get_depsgraph, tmp_path):
     file = str(tmp_path / "groom.blend")
     bpy.ops.wm.save_as_mainfile(filepath=file, copy=True)
     with bpy.data.libraries.load(file, link=link) as (_, wanted):
@@ -119,11 +119,11 @@ def test_hair_of_the_same_name_from_a_file(link, playing, evaluated, tmp_path):
     playing.hair.name = "Wig"  # "Hair" may now be another object
     assert (bpy.data.objects.get("Hair") == theirs) == link
     goes_on(playing)
-    second = previews.start(theirs, evaluated())
+    second = previews.start(theirs, get_depsgraph())
     assert set(previews.sessions()) == {playing.session, second} and previews.notice() == ""
 
 
-def test_names_that_are_exchanged(playing, evaluated):
+def test_names_that_are_exchanged(playing, get_depsgraph):
     twin, head = duplicated(playing.hair, playing.head, linked=False)
     for one, other in ((playing.hair, twin), (playing.head, head)):
         name, one.name = one.name, "Between"
@@ -134,7 +134,7 @@ def test_names_that_are_exchanged(playing, evaluated):
 
 
 @pytest.mark.parametrize("kind", ["NEW", "LINK_COPY", "FULL_COPY"])
-def test_a_copy_in_another_scene(kind, playing, evaluated):
+def test_a_copy_in_another_scene(kind, playing, get_depsgraph):
     window, first = bpy.context.window, bpy.context.scene
     if kind == "NEW":
         second = bpy.data.scenes.new("Second")
@@ -153,13 +153,13 @@ def test_a_copy_in_another_scene(kind, playing, evaluated):
     if kind == "FULL_COPY":
         assert not drawn.is_visible
         assert head_of(hair) in tuple(second.objects), "it grows from the copied head"
-        previews.start(hair, evaluated())
+        previews.start(hair, get_depsgraph())
         previews.stop(previews.session_of(hair))
     else:
         goes_on(playing)
     window.scene = first
     bpy.context.view_layer.update()
-    scene_events.catch_up(evaluated())
+    scene_events.catch_up(get_depsgraph())
     assert overlay.drawing_of(playing.session.uid).is_visible
     goes_on(playing)
 

@@ -59,33 +59,33 @@ def same(one, other):
     )
 
 
-def test_what_is_written_is_read_back_bit_for_bit(evaluated):
+def test_what_is_written_is_read_back_bit_for_bit(get_depsgraph):
     strands = ragged()
-    read = read_curves(written(strands), evaluated())
+    read = read_curves(written(strands), get_depsgraph())
     assert same(read.strands, strands)
     assert read.dropped == {}
 
 
-def test_world_space_follows_a_turned_scaled_and_mirrored_object(evaluated):
+def test_world_space_follows_a_turned_scaled_and_mirrored_object(get_depsgraph):
     strands = ragged()
     obj = written(strands)
     matrix = Matrix.LocRotScale((1, 2, 3), Euler((0.3, 0.7, -1.1)), (2.0, 3.0, -0.5))
     obj.matrix_world = matrix
-    read = read_curves(obj, evaluated()).strands
+    read = read_curves(obj, get_depsgraph()).strands
     expected = [matrix @ obj.data.points[i].position for i in range(strands.point_count)]
     assert read.points == pytest.approx(np.array(expected), abs=1e-5)
     assert read.radius == pytest.approx(strands.radius * math.cbrt(3.0), rel=1e-5)
 
 
-def test_more_points_than_are_moved_at_once(evaluated):
+def test_more_points_than_are_moved_at_once(get_depsgraph):
     strands = ragged(counts=(4,) * 5000)
     obj = written(strands)
     obj.matrix_world = Matrix.Translation((10.0, 0.0, 0.0))
-    read = read_curves(obj, evaluated()).strands
+    read = read_curves(obj, get_depsgraph()).strands
     assert read.points == pytest.approx(strands.points + np.array([10.0, 0.0, 0.0]), abs=2e-6)
 
 
-def test_modifiers_are_applied(evaluated):
+def test_modifiers_are_applied(get_depsgraph):
     strands = ragged(counts=(16, 16))
     obj = written(strands)
     add_nodes_modifier(
@@ -93,27 +93,27 @@ def test_modifiers_are_applied(evaluated):
         ("GeometryNodeSetPosition", {"Offset": (0.0, 0.0, 1.0)}),
         ("GeometryNodeResampleCurve", {"Count": 5}),
     )
-    assert len(obj.evaluated_get(evaluated()).data.points) == 10
-    read = read_curves(obj, evaluated()).strands
+    assert len(obj.evaluated_get(get_depsgraph()).data.points) == 10
+    read = read_curves(obj, get_depsgraph()).strands
     assert read.roots == pytest.approx(strands.roots + np.array([0.0, 0.0, 1.0]), abs=1e-6)
 
 
 @pytest.mark.parametrize("name", ["groom_group_id", "group"])
-def test_groups_are_known_by_two_names(name, evaluated):
+def test_groups_are_known_by_two_names(name, get_depsgraph):
     obj = written(ragged())
     if "groom_group_id" in obj.data.attributes:
         obj.data.attributes.remove(obj.data.attributes["groom_group_id"])
     obj.data.attributes.new(name, "INT", "CURVE").data.foreach_set("value", [7, 7, 8, 9])
-    assert read_curves(obj, evaluated()).strands.group.tolist() == [7, 7, 8, 9]
+    assert read_curves(obj, get_depsgraph()).strands.group.tolist() == [7, 7, 8, 9]
 
 
-def test_a_group_attribute_of_another_kind_is_no_group(evaluated):
+def test_a_group_attribute_of_another_kind_is_no_group(get_depsgraph):
     obj = written(ragged(counts=(3,)))
     obj.data.attributes.new("group", "FLOAT_COLOR", "CURVE")
-    assert read_curves(obj, evaluated()).strands.group.tolist() == [0]
+    assert read_curves(obj, get_depsgraph()).strands.group.tolist() == [0]
 
 
-def test_unusable_curves_are_dropped_and_counted(evaluated):
+def test_unusable_curves_are_dropped_and_counted(get_depsgraph):
     nan, inf = float("nan"), float("inf")
     curves = [
         [(0, 0, 0), (0, 0, 1)],
@@ -125,7 +125,7 @@ def test_unusable_curves_are_dropped_and_counted(evaluated):
     ]
     obj = raw_curves([p for curve in curves for p in curve], [len(curve) for curve in curves])
     obj.location.x = 100.0
-    read = read_curves(obj, evaluated())
+    read = read_curves(obj, get_depsgraph())
     assert read.dropped == {
         "fewer than two points": 1,
         "a point that is not finite": 2,
@@ -135,9 +135,9 @@ def test_unusable_curves_are_dropped_and_counted(evaluated):
     assert read.strands.roots.tolist() == [[100, 0, 0], [105, 0, 0]]
 
 
-def test_the_short_way_for_sound_curves_gives_what_clean_gives(evaluated):
+def test_the_short_way_for_sound_curves_gives_what_clean_gives(get_depsgraph):
     strands = ragged(counts=(2, 3, 16))
-    read = read_curves(written(strands), evaluated())
+    read = read_curves(written(strands), get_depsgraph())
     cleaned = clean(
         strands.points,
         strands.offsets,
@@ -150,54 +150,56 @@ def test_the_short_way_for_sound_curves_gives_what_clean_gives(evaluated):
 
 
 @pytest.mark.parametrize("bad", [0.0, -1.0, float("nan"), float("inf")])
-def test_a_bad_radius_is_replaced(bad, evaluated):
+def test_a_bad_radius_is_replaced(bad, get_depsgraph):
     strands = ragged(counts=(3, 3))
     obj = written(strands)
     obj.data.attributes["radius"].data[4].value = bad
-    radius = read_curves(obj, evaluated()).strands.radius
+    radius = read_curves(obj, get_depsgraph()).strands.radius
     assert np.isfinite(radius).all() and (radius > 0.0).all()
     assert radius[:4] == pytest.approx(strands.radius[:4])
 
 
-def test_no_curves_give_an_empty_set(evaluated):
+def test_no_curves_give_an_empty_set(get_depsgraph):
     empty = bpy.data.objects.new("Empty", bpy.data.hair_curves.new("Empty"))
     bpy.context.collection.objects.link(empty)
-    assert read_curves(empty, evaluated()).strands.strand_count == 0
+    assert read_curves(empty, get_depsgraph()).strands.strand_count == 0
 
 
-def test_an_empty_set_can_be_written(evaluated):
+def test_an_empty_set_can_be_written(get_depsgraph):
     obj = written(ragged().take(np.array([], int)))
-    assert read_curves(obj, evaluated()).strands.strand_count == 0
+    assert read_curves(obj, get_depsgraph()).strands.strand_count == 0
 
 
-def test_other_objects_are_refused_with_a_remedy(evaluated, sphere):
+def test_other_objects_are_refused_with_a_remedy(get_depsgraph, sphere):
     legacy = bpy.data.objects.new("Legacy", bpy.data.curves.new("Legacy", "CURVE"))
     bpy.context.collection.objects.link(legacy)
     for obj, words in ((legacy, "Convert"), (sphere, "particle hair")):
         with pytest.raises(HairloomError, match=words) as raised:
-            read_curves(obj, evaluated())
+            read_curves(obj, get_depsgraph())
         assert raised.value.place == obj.name
 
 
-def test_written_on_a_moved_head_strands_stay_where_they_are(evaluated, sphere):
+def test_written_on_a_moved_head_strands_stay_where_they_are(get_depsgraph, sphere):
     sphere.matrix_world = Matrix.LocRotScale((1, 2, 3), Euler((0.3, 0.7, -1.1)), (2, 2, 2))
     bpy.context.view_layer.update()
     strands = ragged()
     obj = written(strands, sphere)
-    assert read_curves(obj, evaluated()).strands.points == pytest.approx(strands.points, abs=2e-6)
+    assert read_curves(obj, get_depsgraph()).strands.points == pytest.approx(
+        strands.points, abs=2e-6
+    )
     assert (obj.data.surface, obj.parent) == (sphere, sphere)
     assert obj.data.surface_uv_map == sphere.data.uv_layers.active.name
     sphere.location.x += 1.0
-    moved = read_curves(obj, evaluated()).strands.points
+    moved = read_curves(obj, get_depsgraph()).strands.points
     assert moved == pytest.approx(strands.points + np.array([1.0, 0.0, 0.0]), abs=2e-6)
 
 
-def test_blenders_own_surface_node_accepts_the_attachment(evaluated, sphere):
+def test_blenders_own_surface_node_accepts_the_attachment(get_depsgraph, sphere):
     """Blender's Deform Curves on Surface moves strands with the mesh and finds no invalid UV."""
     from hairloom.addon.blender.scene.surfaces import read_surface
     from hairloom.addon.groom.roots import bind_roots
 
-    surface = read_surface(sphere, evaluated(), need_uv=True, place="head")
+    surface = read_surface(sphere, get_depsgraph(), need_uv=True, place="head")
     corners = surface.corners.mean(axis=1)[30:60]
     points = np.stack([corners, corners * 1.5], axis=1).reshape(-1, 3)
     loose = StrandSet(points, np.arange(31) * 2, np.full(60, 1e-4), np.zeros(30))
@@ -208,20 +210,22 @@ def test_blenders_own_surface_node_accepts_the_attachment(evaluated, sphere):
     for point in raised.points:
         point.co.z += 0.25
     raised.value = 1.0
-    moved = read_curves(obj, evaluated()).strands.points
+    moved = read_curves(obj, get_depsgraph()).strands.points
     assert obj.modifiers[0].node_warnings[:] == []
     assert moved == pytest.approx(points + np.array([0.0, 0.0, 0.25]), abs=1e-4)
 
 
-def test_imported_motion_goes_straight_from_frame_to_frame_on_both_sides_of_0(new_hair, evaluated):
+def test_imported_motion_goes_straight_from_frame_to_frame_on_both_sides_of_0(
+    new_hair, get_depsgraph
+):
     hair = new_hair()
-    rest = read_curves(hair, evaluated()).strands.points
+    rest = read_curves(hair, get_depsgraph()).strands.points
     positions = [rest + np.float32([10.0 + frame, 0.0, 0.0]) for frame in range(-2, 3)]
     store_motion(hair, -2, np.array(positions, np.float32))
     for time in (-3.0, -1.5, -0.75, -0.25, 0.25, 1.5, 2.5):
         frame = int(np.floor(time))
         bpy.context.scene.frame_set(frame, subframe=time - frame)
-        read = read_curves(hair, evaluated()).strands
+        read = read_curves(hair, get_depsgraph()).strands
         expected = rest + [10.0 + np.clip(time, -2.0, 2.0), 0.0, 0.0]
         np.testing.assert_allclose(read.points, expected, atol=2e-6, err_msg=f"{time}")
 
@@ -268,10 +272,10 @@ WEIGHTS = np.tile(np.float32([1.0, 3.0, 1.0, 0.5, 1.0, 1.0]), 2)
         ("NURBS", {"nurbs_order": [7, 7]}),
     ],
 )
-def test_curves_of_every_type_are_where_blender_draws_them(kind, attributes, evaluated):
+def test_curves_of_every_type_are_where_blender_draws_them(kind, attributes, get_depsgraph):
     """Within 1 to 2 mm, curves of 35 cm agree with Blender's own conversion to a mesh."""
     obj = typed(kind, **attributes)
-    read = read_curves(obj, evaluated())
+    read = read_curves(obj, get_depsgraph())
     assert read.dropped == {}
     obj.select_set(True)
     bpy.context.view_layer.objects.active = obj
@@ -300,10 +304,10 @@ def smoothed(strand):
     return points_at(strand[None], np.zeros(len(u), int), segment, u)
 
 
-def test_curves_that_are_no_hair_are_named(evaluated):
+def test_curves_that_are_no_hair_are_named(get_depsgraph):
     closed = typed("BEZIER", cyclic=np.array([True, False]), **HANDLES)
-    assert read_curves(closed, evaluated()).dropped == {"no end (Toggle Cyclic opens them)": 1}
-    own = read_own_curves(closed, evaluated())
+    assert read_curves(closed, get_depsgraph()).dropped == {"no end (Toggle Cyclic opens them)": 1}
+    own = read_own_curves(closed, get_depsgraph())
     assert own.kept.tolist() == [1] and own.strands.point_count == 6
 
 
@@ -320,21 +324,21 @@ def test_custom_knots_are_named(extension):
     assert unfit_curves(curves) == {}
 
 
-def test_curves_of_several_types_keep_their_order_and_points(evaluated):
+def test_curves_of_several_types_keep_their_order_and_points(get_depsgraph):
     """Catmull-Rom curves among other types are unchanged bit for bit."""
     obj = typed("CATMULL_ROM")
     obj.data.set_types(type="NURBS", indices=[1])
-    read = read_curves(obj, evaluated()).strands
+    read = read_curves(obj, get_depsgraph()).strands
     counts = read.point_counts.tolist()
     assert counts[0] == 6 and counts[1] > 6
     np.testing.assert_array_equal(read.points[:6], ZIGZAG.astype(np.float32))
 
 
-def test_handles_go_with_the_points_that_are_combed(evaluated):
+def test_handles_go_with_the_points_that_are_combed(get_depsgraph):
     """Combing, settling and trimming move points; handles follow, so curves keep their shape."""
     obj = typed("BEZIER", **HANDLES)
-    before = read_curves(obj, evaluated()).strands.points.copy()
-    own = read_own_curves(obj, evaluated())
-    write_own_curves(obj, own, own.strands.points + np.float32([0, 0.2, 0]), evaluated())
-    after = read_curves(obj, evaluated()).strands.points
+    before = read_curves(obj, get_depsgraph()).strands.points.copy()
+    own = read_own_curves(obj, get_depsgraph())
+    write_own_curves(obj, own, own.strands.points + np.float32([0, 0.2, 0]), get_depsgraph())
+    after = read_curves(obj, get_depsgraph()).strands.points
     np.testing.assert_allclose(after, before + [0, 0.2, 0], atol=1e-6)

@@ -59,11 +59,11 @@ def test_the_snapshot_knows_guides_groups_and_ranks(preview):
     assert len(np.unique(snapshot.rank)) == 60
 
 
-def test_of_children_the_last_to_grow_are_the_first_to_go(new_hair, sphere, evaluated):
+def test_of_children_the_last_to_grow_are_the_first_to_go(new_hair, sphere, get_depsgraph):
     hair = new_hair(sphere)
     hair.data.hairloom.children.method = "multi"
     hair.data.hairloom.children.strand_count = 240
-    rank = drawing(previews.start(hair, evaluated())).snapshot.rank
+    rank = drawing(previews.start(hair, get_depsgraph())).snapshot.rank
     assert (np.diff(rank[60:]) > 0.0).all() and rank[60] == 0.0 and rank[-1] < 1.0
     # the artist's own strands have ranks spread evenly from 0 to 1
     assert sorted(rank[:60]) == pytest.approx(np.arange(60) / 60, abs=1e-6)
@@ -134,8 +134,8 @@ def test_a_head_that_is_not_seen_hides_nothing(how, preview):
     assert drawing(session).snapshot.occluder_spheres is not None
 
 
-def test_hair_without_a_head_has_nothing_to_hide_it(new_hair, evaluated):
-    session = previews.start(new_hair(), evaluated())
+def test_hair_without_a_head_has_nothing_to_hide_it(new_hair, get_depsgraph):
+    session = previews.start(new_hair(), get_depsgraph())
     assert drawing(session).snapshot.occluder_spheres is None
 
 
@@ -202,13 +202,13 @@ def test_statistics_begin_with_nothing():
     )
 
 
-def test_stretch_and_depth_know_the_style_and_the_colliders(preview, evaluated):
+def test_stretch_and_depth_know_the_style_and_the_colliders(preview, get_depsgraph):
     """The snapshot has the strands at rest for "stretch", the moved head's collider for "depth"."""
     hair, head, session = preview
     hair.hairloom.debug_view = "stretch"
     assert drawing(session).snapshot.rest is session.rig.strands.points
     hair.hairloom.debug_view = "depth"
-    session.play(evaluated())
+    session.play(get_depsgraph())
     head.location.x += 0.5
     bpy.context.view_layer.update()
     (solid,) = drawing(session).snapshot.solids

@@ -28,7 +28,7 @@ from hairloom.addon.render import gpu_objects  # noqa: E402
 pytestmark = [pytest.mark.draws(light=False), pytest.mark.usefixtures("gpu_context", "extension")]
 
 
-def test_radiance_arrives_as_it_is(stage: Any, tmp_path: Path) -> None:
+def test_radiance_arrives_as_it_is(engine_scene: Any, tmp_path: Path) -> None:
     """A white diffuse ball in a uniform world of radiance 0.5 has radiance 0.5."""
     add_ball()
     found = render_picture(tmp_path)
@@ -37,23 +37,25 @@ def test_radiance_arrives_as_it_is(stage: Any, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("transform", ["Standard", "AgX"])
-def test_radiance_is_shown_as_blender_shows_it(stage: Any, tmp_path: Path, transform: str) -> None:
+def test_radiance_is_shown_as_blender_shows_it(
+    engine_scene: Any, tmp_path: Path, transform: str
+) -> None:
     """The saved file equals that of a Blender image with the same radiance."""
-    stage.view_settings.view_transform = transform
-    settings = stage.render.image_settings
+    engine_scene.view_settings.view_transform = transform
+    settings = engine_scene.render.image_settings
     settings.file_format, settings.color_depth = "PNG", "16"
-    stage.render.filepath = str(tmp_path / "rendered.png")
+    engine_scene.render.filepath = str(tmp_path / "rendered.png")
     bpy.ops.render.render(write_still=True)
     plain = bpy.data.images.new("Plain", SIZE, SIZE, float_buffer=True)
     plain.pixels.foreach_set([0.5, 0.5, 0.5, 1.0] * (SIZE * SIZE))
-    plain.save_render(str(tmp_path / "plain.png"), scene=stage)
+    plain.save_render(str(tmp_path / "plain.png"), scene=engine_scene)
     shown = [read_encoded_pixels(tmp_path / f"{name}.png") for name in ("rendered", "plain")]
     np.testing.assert_array_equal(*shown)
     assert 160 < 255.0 * shown[0].mean() < 190
 
 
 def test_hair_is_drawn_and_two_renders_are_the_same(
-    stage: Any, new_hair: Callable[..., Any], sphere: Any, tmp_path: Path
+    engine_scene: Any, new_hair: Callable[..., Any], sphere: Any, tmp_path: Path
 ) -> None:
     bald = render_picture(tmp_path)
     hair = new_hair(sphere)
@@ -63,17 +65,17 @@ def test_hair_is_drawn_and_two_renders_are_the_same(
     assert (np.abs(first - bald)[..., :3].max(axis=2) > 0.05).mean() > 0.01
 
 
-def test_mesh_depth_and_coverage_are_those_of_workbench(stage: Any, tmp_path: Path) -> None:
+def test_mesh_depth_and_coverage_are_those_of_workbench(engine_scene: Any, tmp_path: Path) -> None:
     """A ball in front of a cube agrees with Workbench, with non-square pixels and lens shift."""
     add_ball()
     bpy.ops.mesh.primitive_cube_add(size=0.2, location=(0.1, 0.2, 0.05), rotation=(0.3, 0.4, 0.5))
-    render, camera = stage.render, stage.camera.data
+    render, camera = engine_scene.render, engine_scene.camera.data
     render.resolution_x, render.resolution_y, render.pixel_aspect_x = 400, 300, 1.2
     camera.shift_x, camera.shift_y = 0.05, -0.08
     render.film_transparent = True
-    stage.view_layers[0].use_pass_z = True
-    stage.hairloom.picture.samples = 1
-    stage.display.render_aa = "OFF"
+    engine_scene.view_layers[0].use_pass_z = True
+    engine_scene.hairloom.picture.samples = 1
+    engine_scene.display.render_aa = "OFF"
     for kind in ("PERSP", "ORTHO"):
         camera.type, camera.ortho_scale = kind, 0.8
         found = {}
@@ -91,12 +93,12 @@ def test_mesh_depth_and_coverage_are_those_of_workbench(stage: Any, tmp_path: Pa
 
 
 def test_depth_and_object_index_of_hair(
-    stage: Any, new_hair: Callable[..., Any], sphere: Any, tmp_path: Path
+    engine_scene: Any, new_hair: Callable[..., Any], sphere: Any, tmp_path: Path
 ) -> None:
     hair = new_hair(sphere)
     hair.data.hairloom.strands.fullness = 20.0
     sphere.pass_index, hair.pass_index = 3, 7
-    layer = stage.view_layers[0]
+    layer = engine_scene.view_layers[0]
     layer.use_pass_z = layer.use_pass_object_index = True
     found = render_passes(tmp_path)
     numbers = found["ViewLayer.Object Index"][..., 0]
@@ -107,11 +109,11 @@ def test_depth_and_object_index_of_hair(
     assert (depth[numbers == 0.0] == 1.0e10).all()
 
 
-def test_border_percentage_and_film(stage: Any, tmp_path: Path) -> None:
+def test_border_percentage_and_film(engine_scene: Any, tmp_path: Path) -> None:
     """A border gives the same part of the whole picture, and resolution follows the percentage."""
     add_ball(color=(0.8, 0.2, 0.1))
-    stage.hairloom.picture.samples = 2
-    render = stage.render
+    engine_scene.hairloom.picture.samples = 2
+    render = engine_scene.render
     render.film_transparent = True
     whole = render_picture(tmp_path)
     assert whole[0, 0, 3] == 0.0 and whole[SIZE // 2, SIZE // 2, 3] == 1.0
@@ -127,13 +129,13 @@ def test_border_percentage_and_film(stage: Any, tmp_path: Path) -> None:
     assert render_picture(tmp_path).shape == (SIZE // 2, SIZE // 2, 4)
 
 
-def test_the_region_of_a_view_is_that_of_the_picture(stage: Any) -> None:
+def test_the_region_of_a_view_is_that_of_the_picture(engine_scene: Any) -> None:
     """In a camera view it is the scene's border in the camera's frame, else the view's border."""
     from types import SimpleNamespace
 
     from hairloom.addon.blender.engine.engine_camera import view_rectangle
 
-    camera, render = stage.camera, stage.render
+    camera, render = engine_scene.camera, engine_scene.render
     render.resolution_x, render.resolution_y = 200, 100
     camera.data.shift_x, camera.data.shift_y = 0.1, -0.2
     depsgraph = bpy.context.evaluated_depsgraph_get()
@@ -157,10 +159,10 @@ def test_the_region_of_a_view_is_that_of_the_picture(stage: Any) -> None:
     assert view_rectangle(context, depsgraph, 400, 200) == (0, 50, 200, 0)
 
 
-def test_motion_blur_spreads_over_the_way(stage: Any, tmp_path: Path) -> None:
+def test_motion_blur_spreads_over_the_way(engine_scene: Any, tmp_path: Path) -> None:
     """The blurred alpha has the same sum, and is as much wider as the ball moves in a frame."""
-    stage.render.film_transparent = True
-    stage.hairloom.picture.samples = stage.hairloom.picture.motion_steps = 16
+    engine_scene.render.film_transparent = True
+    engine_scene.hairloom.picture.samples = engine_scene.hairloom.picture.motion_steps = 16
     ball = add_ball(0.05)
     for frame, x in ((1, -0.2), (3, 0.2)):
         ball.location.x = x
@@ -168,37 +170,37 @@ def test_motion_blur_spreads_over_the_way(stage: Any, tmp_path: Path) -> None:
     for curve in curves_of(ball):
         for key in curve.keyframe_points:
             key.interpolation = "LINEAR"
-    stage.frame_set(2)
+    engine_scene.frame_set(2)
     sharp = render_picture(tmp_path)[..., 3]
-    stage.render.use_motion_blur, stage.render.motion_blur_shutter = True, 1.0
+    engine_scene.render.use_motion_blur, engine_scene.render.motion_blur_shutter = True, 1.0
     blurred = render_picture(tmp_path)[..., 3]
     assert abs(blurred.sum() / sharp.sum() - 1.0) < 0.02
     columns = [np.flatnonzero(each.max(axis=0) > 0.02) for each in (sharp, blurred)]
     width = [each[-1] - each[0] for each in columns]
     # 0.2 m in a frame, seen from 1 m, where the lens covers 0.72 m
     assert abs(width[1] - width[0] - 0.2 / 0.72 * SIZE) < 2.0
-    assert stage.frame_current == 2 and stage.frame_subframe == 0.0
+    assert engine_scene.frame_current == 2 and engine_scene.frame_subframe == 0.0
 
 
-def test_stretched_time_is_stretched_once(stage: Any, tmp_path: Path) -> None:
+def test_stretched_time_is_stretched_once(engine_scene: Any, tmp_path: Path) -> None:
     """Time remapping is applied once: a very short shutter gives the picture without blur."""
-    stage.hairloom.picture.samples = stage.hairloom.picture.motion_steps = 2
+    engine_scene.hairloom.picture.samples = engine_scene.hairloom.picture.motion_steps = 2
     ball = add_ball(0.05)
     for frame, x in ((1, -0.2), (21, 0.2)):
         ball.location.x = x
         ball.keyframe_insert("location", frame=frame)
-    stage.render.frame_map_old, stage.render.frame_map_new = 100, 200
-    stage.frame_set(20)
-    stage.render.film_transparent = True
+    engine_scene.render.frame_map_old, engine_scene.render.frame_map_new = 100, 200
+    engine_scene.frame_set(20)
+    engine_scene.render.film_transparent = True
     sharp = render_picture(tmp_path)[..., 3]
-    stage.render.use_motion_blur, stage.render.motion_blur_shutter = True, 0.01
+    engine_scene.render.use_motion_blur, engine_scene.render.motion_blur_shutter = True, 0.01
     assert sharp.any(), "there is a ball"
     np.testing.assert_allclose(render_picture(tmp_path)[..., 3], sharp, atol=0.02)
 
 
 @pytest.mark.parametrize("kind", ["nothing", "empty"])
-def test_without_a_camera_the_report_says_so(stage: Any, tmp_path: Path, kind: str) -> None:
-    stage.camera = None if kind == "nothing" else bpy.data.objects.new("Empty", None)
+def test_without_a_camera_the_report_says_so(engine_scene: Any, tmp_path: Path, kind: str) -> None:
+    engine_scene.camera = None if kind == "nothing" else bpy.data.objects.new("Empty", None)
     with pytest.raises(RuntimeError, match="camera"):
         render_passes(tmp_path)
 
@@ -237,29 +239,29 @@ def test_panels_serve_the_engine_and_let_go(empty_scene: None) -> None:
 
 
 def test_a_cancelled_render_keeps_what_there_is(
-    stage: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    engine_scene: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Cancelled after two of 64 samples, the picture equals one of two samples."""
     from hairloom.addon.blender.engine import engine
 
     add_ball()
-    stage.hairloom.picture.samples = 2
+    engine_scene.hairloom.picture.samples = 2
     two = render_picture(tmp_path)
     asked = iter(range(100))
     monkeypatch.setattr(
         engine.HAIRLOOM_RE_engine, "test_break", lambda _: next(asked) >= 2, raising=False
     )
-    stage.hairloom.picture.samples = 64
+    engine_scene.hairloom.picture.samples = 64
     np.testing.assert_allclose(render_picture(tmp_path), two, atol=1e-6)
     assert next(asked) < 10
 
 
-def test_both_eyes_of_a_stereo_camera(stage: Any, tmp_path: Path) -> None:
-    stage.render.film_transparent = True
+def test_both_eyes_of_a_stereo_camera(engine_scene: Any, tmp_path: Path) -> None:
+    engine_scene.render.film_transparent = True
     add_ball(0.05)
-    stage.render.use_multiview = True
-    stage.camera.data.stereo.interocular_distance = 0.1
-    stage.camera.data.stereo.convergence_distance = 2.0
+    engine_scene.render.use_multiview = True
+    engine_scene.camera.data.stereo.interocular_distance = 0.1
+    engine_scene.camera.data.stereo.convergence_distance = 2.0
     render_passes(tmp_path)
     eyes = [read_passes(tmp_path / f"picture_{side}.exr") for side in "LR"]
     alphas = [found["ViewLayer.Combined"][..., 3] for found in eyes]
@@ -272,27 +274,27 @@ def test_both_eyes_of_a_stereo_camera(stage: Any, tmp_path: Path) -> None:
     "aperture", few_in_commits(["circle", "three blades", "narrow", "orthographic"])
 )
 def test_what_is_out_of_focus_is_as_soft_as_in_cycles(
-    stage: Any, tmp_path: Path, aperture: str
+    engine_scene: Any, tmp_path: Path, aperture: str
 ) -> None:
     """A ball, focused on an object behind it, covers as much of each pixel as in Cycles."""
     add_ball(0.08)
     target = bpy.data.objects.new("Target", None)
     target.location = (0.7, 1.5, 0.0)
-    stage.collection.objects.link(target)
-    dof = stage.camera.data.dof
+    engine_scene.collection.objects.link(target)
+    dof = engine_scene.camera.data.dof
     dof.use_dof, dof.aperture_fstop, dof.focus_object = True, 0.5, target
     if aperture == "three blades":
         dof.aperture_blades, dof.aperture_rotation = 3, 0.5
     if aperture == "narrow":
         dof.aperture_ratio = 2.0
     if aperture == "orthographic":
-        stage.camera.data.type, stage.camera.data.ortho_scale = "ORTHO", 0.6
+        engine_scene.camera.data.type, engine_scene.camera.data.ortho_scale = "ORTHO", 0.6
         dof.aperture_fstop = 8.0
-    stage.render.film_transparent = True
-    stage.hairloom.picture.samples = 256
+    engine_scene.render.film_transparent = True
+    engine_scene.hairloom.picture.samples = 256
     ours = render_picture(tmp_path)[..., 3]
-    stage.render.engine, stage.cycles.samples = "CYCLES", 1024
-    stage.cycles.use_denoising = stage.cycles.use_adaptive_sampling = False
+    engine_scene.render.engine, engine_scene.cycles.samples = "CYCLES", 1024
+    engine_scene.cycles.use_denoising = engine_scene.cycles.use_adaptive_sampling = False
     theirs = render_picture(tmp_path)[..., 3]
     assert ((theirs > 0.05) & (theirs < 0.95)).mean() > 0.02
     difference = np.abs(ours - theirs)
@@ -301,7 +303,7 @@ def test_what_is_out_of_focus_is_as_soft_as_in_cycles(
 
 
 def test_a_blurred_render_that_is_cancelled_goes_to_no_other_frame(
-    stage: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    engine_scene: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from hairloom.addon.blender.engine import engine
     from hairloom.addon.blender.engine.engine_still import Still
@@ -327,15 +329,15 @@ def test_a_blurred_render_that_is_cancelled_goes_to_no_other_frame(
     cancelled: list[Cancelled] = []
     monkeypatch.setattr(engine, "Still", lambda own, depsgraph: Still(Cancelled(own), depsgraph))
     add_ball()
-    stage.render.use_motion_blur = True
-    stage.hairloom.picture.samples = stage.hairloom.picture.motion_steps = 32
+    engine_scene.render.use_motion_blur = True
+    engine_scene.hairloom.picture.samples = engine_scene.hairloom.picture.motion_steps = 32
     render_picture(tmp_path)
     (found,) = cancelled
     assert len(found.places) == 3, "two moments, and back"
-    assert found.places[-1] == stage.frame_current
+    assert found.places[-1] == engine_scene.frame_current
 
 
-def test_a_render_leaves_nothing_unused_on_the_gpu(stage: Any, tmp_path: Path) -> None:
+def test_a_render_leaves_nothing_unused_on_the_gpu(engine_scene: Any, tmp_path: Path) -> None:
     bpy.ops.mesh.primitive_cube_add(size=0.2)
     gc.collect()  # other tests may have left reference cycles
     gpu_objects.free_unused()

@@ -22,19 +22,19 @@ from hairloom.addon.strands import StrandSet  # noqa: E402
 pytestmark = [pytest.mark.draws, pytest.mark.usefixtures("gpu_context", "extension")]
 
 
-def test_view_layers_and_holdouts(stage: Any, tmp_path: Path) -> None:
+def test_view_layers_and_holdouts(engine_scene: Any, tmp_path: Path) -> None:
     """Each view layer draws its own collections. A holdout has alpha 0."""
-    stage.render.film_transparent = True
+    engine_scene.render.film_transparent = True
     collections = [bpy.data.collections.new(name) for name in ("One", "Two")]
     for collection, x in zip(collections, (-0.15, 0.15), strict=True):
-        stage.collection.children.link(collection)
+        engine_scene.collection.children.link(collection)
         ball = add_ball(0.1)
         ball.location.x = x
-        stage.collection.objects.unlink(ball)
+        engine_scene.collection.objects.unlink(ball)
         collection.objects.link(ball)
-    second = stage.view_layers.new("Second")
+    second = engine_scene.view_layers.new("Second")
     second.layer_collection.children["One"].exclude = True
-    third = stage.view_layers.new("Third")
+    third = engine_scene.view_layers.new("Third")
     third.layer_collection.children["One"].holdout = True
     found = render_passes(tmp_path)
     covered = {
@@ -50,11 +50,11 @@ def test_view_layers_and_holdouts(stage: Any, tmp_path: Path) -> None:
 @pytest.mark.alike
 @pytest.mark.parametrize("way", ["none", "hashed", "layers"])
 def test_hair_may_be_a_hole(
-    stage: Any, new_hair: Callable[..., Any], sphere: Any, tmp_path: Path, way: str
+    engine_scene: Any, new_hair: Callable[..., Any], sphere: Any, tmp_path: Path, way: str
 ) -> None:
     """In front of a wall, a holdout removes the hair's alpha. Meshes in front of it stay."""
-    stage.render.film_transparent = True
-    stage.hairloom.picture.samples = 16
+    engine_scene.render.film_transparent = True
+    engine_scene.hairloom.picture.samples = 16
     hair = new_hair(sphere)
     hair.data.hairloom.strands.fullness = 60.0
     hair.data.hairloom.strands.transparency = way
@@ -72,16 +72,16 @@ def test_hair_may_be_a_hole(
     hair.is_holdout = False
     bpy.data.objects.remove(wall)
     apart = bpy.data.collections.new("Apart")
-    stage.collection.children.link(apart)
-    stage.collection.objects.unlink(hair)
+    engine_scene.collection.children.link(apart)
+    engine_scene.collection.objects.unlink(hair)
     apart.objects.link(hair)
     assert render_picture(tmp_path)[..., 3].max() > 0.1
-    stage.view_layers[0].layer_collection.children["Apart"].indirect_only = True
+    engine_scene.view_layers[0].layer_collection.children["Apart"].indirect_only = True
     assert render_picture(tmp_path)[..., 3].max() == 0.0
 
 
 def test_previewed_hair_is_seen_as_its_object_is(
-    stage: Any, new_hair: Callable[..., Any], sphere: Any
+    engine_scene: Any, new_hair: Callable[..., Any], sphere: Any
 ) -> None:
     """The reader omits previewed hair, and takes holdout and visibility from the original, not from
     the copy that the preview has changed."""
@@ -101,7 +101,7 @@ def test_previewed_hair_is_seen_as_its_object_is(
 
 
 def test_instances_of_previewed_hair_are_drawn_and_leave_it_as_it_is(
-    stage: Any, new_hair: Callable[..., Any]
+    engine_scene: Any, new_hair: Callable[..., Any]
 ) -> None:
     from hairloom.addon.blender.engine.engine_scene import SceneReader
 
@@ -110,7 +110,7 @@ def test_instances_of_previewed_hair_are_drawn_and_leave_it_as_it_is(
     empty = bpy.data.objects.new("Empty", None)
     empty.instance_type, empty.instance_collection = "COLLECTION", inside
     empty.location.x, empty.is_holdout = 1.0, True
-    stage.collection.objects.link(empty)
+    engine_scene.collection.objects.link(empty)
     reader, depsgraph = SceneReader(), bpy.context.evaluated_depsgraph_get()
     both = [groom.key for groom in reader.read(depsgraph).grooms]
     assert len(both) == 2
@@ -120,8 +120,8 @@ def test_instances_of_previewed_hair_are_drawn_and_leave_it_as_it_is(
     assert (seen.is_seen, seen.is_holdout) == (True, False)
 
 
-def test_texts_metaballs_and_instances_are_drawn(stage: Any, tmp_path: Path) -> None:
-    stage.render.film_transparent = True
+def test_texts_metaballs_and_instances_are_drawn(engine_scene: Any, tmp_path: Path) -> None:
+    engine_scene.render.film_transparent = True
     add: list[Callable[[], Any]] = [
         lambda: bpy.ops.object.text_add(rotation=(np.pi / 2.0, 0.0, 0.0), scale=(0.3,) * 3),
         lambda: bpy.ops.object.metaball_add(radius=0.1),
@@ -133,14 +133,14 @@ def test_texts_metaballs_and_instances_are_drawn(stage: Any, tmp_path: Path) -> 
         bpy.data.objects.remove(bpy.context.object)
     inside = bpy.data.collections.new("Inside")
     ball = add_ball(0.05)
-    stage.collection.objects.unlink(ball)
+    engine_scene.collection.objects.unlink(ball)
     inside.objects.link(ball)
     assert render_picture(tmp_path)[..., 3].max() == 0.0
     for x in (-0.1, 0.1):
         empty = bpy.data.objects.new("Empty", None)
         empty.instance_type, empty.instance_collection = "COLLECTION", inside
         empty.location.x = x
-        stage.collection.objects.link(empty)
+        engine_scene.collection.objects.link(empty)
     alpha = render_picture(tmp_path)[SIZE // 2, :, 3]
     assert np.count_nonzero(np.diff((alpha > 0.5).astype(int))) == 4
 
@@ -197,9 +197,9 @@ def seen_in(mode: str, obj: Any) -> tuple[Any, ...]:
 
 
 def test_hidden_in_renders_is_not_drawn(
-    stage: Any, new_hair: Callable[..., Any], sphere: Any, tmp_path: Path
+    engine_scene: Any, new_hair: Callable[..., Any], sphere: Any, tmp_path: Path
 ) -> None:
-    stage.render.film_transparent = True
+    engine_scene.render.film_transparent = True
     hair = new_hair(sphere)
     sphere.hide_render = True
     hair.data.hairloom.strands.fullness = 20.0
@@ -211,24 +211,24 @@ def test_hidden_in_renders_is_not_drawn(
 
 
 def test_the_camera_may_be_inside_of_hair_and_head(
-    stage: Any, new_hair: Callable[..., Any], sphere: Any, tmp_path: Path
+    engine_scene: Any, new_hair: Callable[..., Any], sphere: Any, tmp_path: Path
 ) -> None:
     new_hair(sphere)
     for y in (-0.12, 0.0):
-        stage.camera.location.y = y
+        engine_scene.camera.location.y = y
         found = render_picture(tmp_path)
         assert np.isfinite(found).all() and found[..., 3].min() > 0.99
 
 
 def test_hair_is_rendered_as_it_was_baked(
-    stage: Any, new_hair: Callable[..., Any], sphere: Any, tmp_path: Path
+    engine_scene: Any, new_hair: Callable[..., Any], sphere: Any, tmp_path: Path
 ) -> None:
     """At frames and subframes, although the curves themselves are hidden in renders then."""
     from hairloom.addon.blender.bakes import playback
     from hairloom.addon.blender.engine import engine_hair
 
     hair = new_hair(sphere)
-    stage.frame_start, stage.frame_end = 1, 4
+    engine_scene.frame_start, engine_scene.frame_end = 1, 4
     for frame, x in ((1, -0.2), (4, 0.2)):
         sphere.location.x = x
         sphere.keyframe_insert("location", frame=frame)
@@ -236,25 +236,25 @@ def test_hair_is_rendered_as_it_was_baked(
     hair.hairloom.dynamics.collider_resolution = 8
     hair.hairloom.bake.folder = str(tmp_path / "bake")
     hair.pass_index = 5
-    stage.frame_set(1)
+    engine_scene.frame_set(1)
     assert bpy.ops.hairloom.bake() == {"FINISHED"}
     assert hair.hide_render and hair.hairloom.bake.copy is not None
     copy = hair.hairloom.bake.copy
     for frame, subframe in ((2, 0.0), (2, 0.25)):
-        stage.frame_set(frame, subframe=subframe)
+        engine_scene.frame_set(frame, subframe=subframe)
         depsgraph = bpy.context.evaluated_depsgraph_get()
         expected = baked_grid(playback.cache_of(hair), frame, subframe)
         for obj in (copy, hair):
             found = engine_hair.read_groom(obj, depsgraph)
             np.testing.assert_array_equal(found.points, expected.reshape(-1, 3))
-    stage.view_layers[0].use_pass_object_index = True
+    engine_scene.view_layers[0].use_pass_object_index = True
     hair.data.hairloom.strands.fullness = 20.0
     numbers = render_passes(tmp_path)["ViewLayer.Object Index"]
     assert (numbers == 5.0).any()
 
 
 def test_a_bake_has_the_animated_settings_of_the_frame(
-    stage: Any,
+    engine_scene: Any,
     new_hair: Callable[..., Any],
     sphere: Any,
     tmp_path: Path,
@@ -271,7 +271,7 @@ def test_a_bake_has_the_animated_settings_of_the_frame(
     hair.hairloom.dynamics.device = "numpy"
     hair.hairloom.dynamics.collider_resolution = 8
     hair.hairloom.bake.folder = str(tmp_path / "bake")
-    stage.frame_start, stage.frame_end = 1, 3
+    engine_scene.frame_start, engine_scene.frame_end = 1, 3
     assert bpy.ops.hairloom.bake() == {"FINISHED"}
     widths = []
     read_groom = engine_hair.read_groom
@@ -282,23 +282,25 @@ def test_a_bake_has_the_animated_settings_of_the_frame(
         return read_groom(obj, depsgraph)
 
     monkeypatch.setattr(engine_hair, "read_groom", seen)
-    stage.render.filepath = str(tmp_path / "frame_")
+    engine_scene.render.filepath = str(tmp_path / "frame_")
     bpy.ops.render.render(animation=True)
     assert sorted(set(widths)) == pytest.approx([1.0, 3.0, 5.0])
 
 
-def test_bad_input_is_told(stage: Any, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    stage.world = None
+def test_bad_input_is_told(
+    engine_scene: Any, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    engine_scene.world = None
     assert render_picture(tmp_path)[..., :3].max() == 0.0
     assert "Lights: there is no light" in capfd.readouterr().out
-    stage.camera.data.type = "PANO"
+    engine_scene.camera.data.type = "PANO"
     render_picture(tmp_path)
     assert "panoramic cameras are not drawn" in capfd.readouterr().out
-    render = stage.render
+    render = engine_scene.render
     render.use_border, render.border_min_x, render.border_max_x = True, 0.5, 0.501
     with pytest.raises(RuntimeError, match=r"too small|pixels"):
         bpy.ops.render.render()
     render.use_border = False
-    stage.camera = None
+    engine_scene.camera = None
     with pytest.raises(RuntimeError, match=r"(?i)camera"):
         bpy.ops.render.render()

@@ -16,7 +16,7 @@ pytestmark = [pytest.mark.draws, pytest.mark.usefixtures("gpu_context", "extensi
 
 
 @pytest.fixture
-def props(stage: Any) -> Any:
+def props(engine_scene: Any) -> Any:
     """A 40 m ground, a turned block and a floating ball, white in a black world; returns the
     ball."""
     set_world((0.0, 0.0, 0.0))
@@ -32,8 +32,11 @@ def props(stage: Any) -> Any:
         if obj.type == "MESH":
             obj.data.materials.clear()
             obj.data.materials.append(bpy.data.materials["Diffuse"])
-    stage.camera.location, stage.camera.rotation_euler = (0.6, -3.0, 2.6), (0.86, 0.0, 0.2)
-    stage.hairloom.picture.samples = 16
+    engine_scene.camera.location, engine_scene.camera.rotation_euler = (
+        (0.6, -3.0, 2.6),
+        (0.86, 0.0, 0.2),
+    )
+    engine_scene.hairloom.picture.samples = 16
     return ball
 
 
@@ -48,7 +51,7 @@ def add_light(kind: str, energy: float, **where: Any) -> Any:
 
 @pytest.mark.parametrize("kind", ["SUN", "POINT", "SPOT"])
 def test_shadows_lie_where_cycles_has_them(
-    stage: Any, props: Any, kind: str, tmp_path: Path
+    engine_scene: Any, props: Any, kind: str, tmp_path: Path
 ) -> None:
     """With point-like lights and no bounces, pictures differ from Cycles only at edges."""
     light = add_light(
@@ -62,8 +65,8 @@ def test_shadows_lie_where_cycles_has_them(
     else:
         light.data.shadow_soft_size = 0.0
     found = render_picture(tmp_path)[..., 0]
-    stage.render.engine = "CYCLES"
-    cycles = stage.cycles
+    engine_scene.render.engine = "CYCLES"
+    cycles = engine_scene.cycles
     cycles.samples, cycles.use_denoising, cycles.max_bounces = 16, False, 0
     expected = render_picture(tmp_path)[..., 0]
     scale = np.percentile(expected, 95)
@@ -73,21 +76,23 @@ def test_shadows_lie_where_cycles_has_them(
     assert (away > 0.2).mean() < 0.008
 
 
-def test_what_is_not_to_throw_a_shadow_throws_none(stage: Any, props: Any, tmp_path: Path) -> None:
+def test_what_is_not_to_throw_a_shadow_throws_none(
+    engine_scene: Any, props: Any, tmp_path: Path
+) -> None:
     """The picture gets brighter without shadows of one object, of all objects, of the light."""
     light = add_light("SUN", 3.0, rotation_euler=(0.5, 0.5, 0.3))
     with_all = render_picture(tmp_path)[..., 0].mean()
     props.visible_shadow = False
     without_ball = render_picture(tmp_path)[..., 0].mean()
-    stage.hairloom.mesh_shadows.mesh_shadows = False
+    engine_scene.hairloom.mesh_shadows.mesh_shadows = False
     without_any = render_picture(tmp_path)[..., 0].mean()
-    stage.hairloom.mesh_shadows.mesh_shadows = True
+    engine_scene.hairloom.mesh_shadows.mesh_shadows = True
     light.data.use_shadow = False
     assert with_all < without_ball < without_any
     assert render_picture(tmp_path)[..., 0].mean() == pytest.approx(without_any, rel=1e-6)
 
 
-def test_motion_moves_shadows(stage: Any, props: Any, tmp_path: Path) -> None:
+def test_motion_moves_shadows(engine_scene: Any, props: Any, tmp_path: Path) -> None:
     """Shadow maps are kept from frame to frame only while nothing moves."""
     add_light("SUN", 3.0, rotation_euler=(0.5, 0.5, 0.3))
     before = render_picture(tmp_path)[..., 0]

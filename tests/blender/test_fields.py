@@ -49,18 +49,18 @@ def until_made():
     wait_until(fields.are_made)
 
 
-def surface_of(obj, evaluated):
-    return read_surface(obj, evaluated(), need_uv=False, place=obj.name)
+def surface_of(obj, get_depsgraph):
+    return read_surface(obj, get_depsgraph(), need_uv=False, place=obj.name)
 
 
-def test_a_field_is_the_same_whoever_makes_it_and_is_made_once(sphere, evaluated, extension):
-    surface = surface_of(sphere, evaluated)
+def test_a_field_is_the_same_whoever_makes_it_and_is_made_once(sphere, get_depsgraph, extension):
+    surface = surface_of(sphere, get_depsgraph)
     with pytest.raises(fields.NotMadeYetError):
         fields.field_of(surface, COARSE, place="Head", blocking=False)
     beside = fields.field_of(surface, COARSE, place="Head")
     alone = DistanceField.from_surface(surface, COARSE)
     assert np.array_equal(beside.values, alone.values) and beside.cell == alone.cell
-    again = surface_of(sphere, evaluated)
+    again = surface_of(sphere, get_depsgraph)
     assert fields.field_of(again, COARSE, place="Another head", blocking=False) is beside
     finer = DynamicsSettings(collider_resolution=17)
     assert fields.field_of(again, finer, place="Head") is not beside
@@ -75,8 +75,8 @@ def test_what_cannot_be_made_is_told_each_time_it_is_asked_for():
 
 
 @pytest.mark.slow(instead="test_a_field_is_the_same_whoever_makes_it_and_is_made_once")
-def test_only_the_youngest_fields_are_kept(sphere, evaluated, extension):
-    surface = surface_of(sphere, evaluated)
+def test_only_the_youngest_fields_are_kept(sphere, get_depsgraph, extension):
+    surface = surface_of(sphere, get_depsgraph)
     first, *others = fields_wanted()
     oldest = fields.field_of(surface, first, place="Head")
     for settings in others:
@@ -103,75 +103,77 @@ def made_beside(surface):
 
 
 @pytest.mark.slow
-def test_previews_keep_the_youngest_fields_only(new_hair, sphere, evaluated, extension):
-    oldest = made_beside(surface_of(sphere, evaluated))
-    previews.start(new_hair(sphere), evaluated())
+def test_previews_keep_the_youngest_fields_only(new_hair, sphere, get_depsgraph, extension):
+    oldest = made_beside(surface_of(sphere, get_depsgraph))
+    previews.start(new_hair(sphere), get_depsgraph())
     assert oldest() is None
 
 
 @pytest.mark.slow
-def test_a_preview_takes_no_field_from_hair_that_waits_for_it(new_hair, sphere, evaluated, gate):
-    waiting = previews.start(new_hair(sphere), evaluated())
-    previews.play(evaluated(), blocking=False)
+def test_a_preview_takes_no_field_from_hair_that_waits_for_it(
+    new_hair, sphere, get_depsgraph, gate
+):
+    waiting = previews.start(new_hair(sphere), get_depsgraph())
+    previews.play(get_depsgraph(), blocking=False)
     gate.set()
-    oldest = made_beside(surface_of(sphere, evaluated))
+    oldest = made_beside(surface_of(sphere, get_depsgraph))
     assert previews.previews[waiting.uid].phase is Phase.WAITING
-    previews.start(new_hair(sphere), evaluated())
+    previews.start(new_hair(sphere), get_depsgraph())
     assert oldest() is not None
 
 
 def test_hair_that_waits_for_its_collider_is_at_rest_and_then_plays(
-    new_hair, sphere, evaluated, gate
+    new_hair, sphere, get_depsgraph, gate
 ):
     hair = new_hair(sphere)
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     at_rest = strand_grid(session)
-    assert previews.play(evaluated(), blocking=False) == []
+    assert previews.play(get_depsgraph(), blocking=False) == []
     assert (
         previews.is_playing()
         and previews.previews[session.uid].phase is Phase.WAITING
         and not session.is_playing
     )
     sphere.location.x = 0.05
-    evaluated()
-    previews.advance(evaluated(), FRAME)
-    previews.rest(evaluated(), keep_playing=True)
+    get_depsgraph()
+    previews.advance(get_depsgraph(), FRAME)
+    previews.rest(get_depsgraph(), keep_playing=True)
     assert previews.previews[session.uid].phase is Phase.WAITING
     assert strand_grid(session) == pytest.approx(at_rest + [0.05, 0.0, 0.0], abs=2e-6)
     gate.set()
-    wait_until_playing(session, evaluated, FRAME)
+    wait_until_playing(session, get_depsgraph, FRAME)
     assert previews.previews[session.uid].phase is not Phase.WAITING
     sphere.location.x = 0.08
-    evaluated()
-    previews.advance(evaluated(), FRAME)
+    get_depsgraph()
+    previews.advance(get_depsgraph(), FRAME)
     carried = at_rest + [0.08, 0.0, 0.0]
     assert np.abs(strand_grid(session) - carried)[:, -1].max() > 1e-3, "tips stay behind"
 
 
-def test_stop_while_hair_waits_ends_the_waiting(new_hair, sphere, evaluated, gate):
-    session = previews.start(new_hair(sphere), evaluated())
-    previews.play(evaluated(), blocking=False)
-    previews.rest(evaluated(), keep_playing=False)
+def test_stop_while_hair_waits_ends_the_waiting(new_hair, sphere, get_depsgraph, gate):
+    session = previews.start(new_hair(sphere), get_depsgraph())
+    previews.play(get_depsgraph(), blocking=False)
+    previews.rest(get_depsgraph(), keep_playing=False)
     assert not previews.is_playing()
     gate.set()
     until_made()
-    previews.advance(evaluated(), FRAME)
+    previews.advance(get_depsgraph(), FRAME)
     assert not previews.is_playing() and not session.is_playing
 
 
 def test_a_collider_that_cannot_be_made_is_left_out_with_a_warning_as_ever(
-    new_hair, sphere, evaluated, extension
+    new_hair, sphere, get_depsgraph, extension
 ):
     hair = new_hair(sphere)
     bpy.ops.mesh.primitive_plane_add(size=0.1)
     hair.hairloom.collider = bpy.context.object
-    session = previews.start(hair, evaluated())
-    previews.play(evaluated(), blocking=False)
-    wait_until_playing(session, evaluated, FRAME)
+    session = previews.start(hair, get_depsgraph())
+    previews.play(get_depsgraph(), blocking=False)
+    wait_until_playing(session, get_depsgraph, FRAME)
     assert any("encloses no volume" in warning for warning in session.warnings)
 
 
-def test_more_meshes_than_are_kept_are_all_waited_for(new_hair, sphere, evaluated, extension):
+def test_more_meshes_than_are_kept_are_all_waited_for(new_hair, sphere, get_depsgraph, extension):
     hair = new_hair(sphere)
     hair.hairloom.dynamics.collider_resolution = 16
     colliders = bpy.data.collections.new("Colliders")
@@ -180,21 +182,21 @@ def test_more_meshes_than_are_kept_are_all_waited_for(new_hair, sphere, evaluate
         bpy.ops.mesh.primitive_cube_add(size=0.02, location=(1.0 + number, 0.0, 0.0))
         colliders.objects.link(bpy.context.object)
     hair.hairloom.collider_collection = colliders
-    session = previews.start(hair, evaluated())
-    previews.play(evaluated(), blocking=False)
-    wait_until_playing(session, evaluated, FRAME)
+    session = previews.start(hair, get_depsgraph())
+    previews.play(get_depsgraph(), blocking=False)
+    wait_until_playing(session, get_depsgraph, FRAME)
     assert len(session.obstacles.parts) == fields.KEPT + 3
 
 
-def test_blenders_playback_waits_and_takes_over(new_hair, sphere, evaluated, extension):
+def test_blenders_playback_waits_and_takes_over(new_hair, sphere, get_depsgraph, extension):
     hair = new_hair(sphere)
     hair.hairloom.bake.follows = True
-    session = previews.start(hair, evaluated())
-    previews.play(evaluated(), blocking=False)
+    session = previews.start(hair, get_depsgraph())
+    previews.play(get_depsgraph(), blocking=False)
     bpy.context.scene.frame_set(bpy.context.scene.frame_start)
-    previews.previews[session.uid].follow(evaluated())
+    previews.previews[session.uid].follow(get_depsgraph())
     assert session.is_playing and previews.previews[session.uid].phase is not Phase.WAITING
-    previews.advance(evaluated(), FRAME)
+    previews.advance(get_depsgraph(), FRAME)
     scene_events.clear()
 
 

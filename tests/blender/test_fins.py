@@ -20,88 +20,90 @@ from hairloom.addon.blender.scene.fin_modifier import POSITION, fin_modifier
 from hairloom.addon.errors import HairloomError
 
 
-def test_the_operator_adds_one_modifier_and_takes_the_active_group(flag):
-    assert fin_modifier(flag) == flag.modifiers[-1]
-    assert flag.hairloom.fin.pin_group == "Pins"
+def test_the_operator_adds_one_modifier_and_takes_the_active_group(flag_object):
+    assert fin_modifier(flag_object) == flag_object.modifiers[-1]
+    assert flag_object.hairloom.fin.pin_group == "Pins"
     bpy.ops.hairloom.fin_add()
-    assert len(flag.modifiers) == 1
+    assert len(flag_object.modifiers) == 1
     other = bpy.data.objects.new("Other", bpy.data.meshes.new("Other"))
     bpy.context.collection.objects.link(other)
     bpy.context.view_layer.objects.active = other
     other.select_set(True)
     bpy.ops.hairloom.fin_add()
-    assert other.modifiers[0].node_group == flag.modifiers[0].node_group
+    assert other.modifiers[0].node_group == flag_object.modifiers[0].node_group
     assert len(bpy.data.node_groups) == 1
 
 
-def test_new_cloth_collides_with_nothing_as_the_page_says(flag, evaluated):
+def test_new_cloth_collides_with_nothing_as_the_page_says(flag_object, get_depsgraph):
     """Not even with the colliders of the scene's hair."""
-    assert flag.hairloom.collider is None and flag.hairloom.collider_collection is None
-    assert start_fin(flag, evaluated).obstacles.parts == []
+    assert (
+        flag_object.hairloom.collider is None and flag_object.hairloom.collider_collection is None
+    )
+    assert start_fin(flag_object, get_depsgraph).obstacles.parts == []
     page = (Path(__file__).parents[2] / "docs" / "dynamics.md").read_text(encoding="utf-8")
     cloth = " ".join(page.partition("\n## Cloth\n")[2].partition("\n## ")[0].split())
     assert "until you set one it collides with nothing" in cloth
 
 
-def test_removing_it_leaves_nothing(flag, evaluated):
-    rest = rest_vertices(flag)
-    session = start_fin(flag, evaluated)
-    play_frames(session, evaluated, 3)
+def test_removing_it_leaves_nothing(flag_object, get_depsgraph):
+    rest = rest_vertices(flag_object)
+    session = start_fin(flag_object, get_depsgraph)
+    play_frames(session, get_depsgraph, 3)
     assert bpy.ops.hairloom.fin_remove() == {"FINISHED"}
     assert previews.simulated() == ()
-    assert len(flag.modifiers) == len(bpy.data.node_groups) == 0
-    assert POSITION not in flag.data.attributes
-    assert np.array_equal(rest_vertices(flag), rest)
+    assert len(flag_object.modifiers) == len(bpy.data.node_groups) == 0
+    assert POSITION not in flag_object.data.attributes
+    assert np.array_equal(rest_vertices(flag_object), rest)
 
 
-def test_it_falls_from_its_pins_and_blender_shows_it(flag, evaluated):
-    rest = rest_vertices(flag)
-    session = start_fin(flag, evaluated)
-    before = evaluated_vertices(flag, evaluated)
-    play_frames(session, evaluated, 20)
-    now = evaluated_vertices(flag, evaluated)
+def test_it_falls_from_its_pins_and_blender_shows_it(flag_object, get_depsgraph):
+    rest = rest_vertices(flag_object)
+    session = start_fin(flag_object, get_depsgraph)
+    before = evaluated_vertices(flag_object, get_depsgraph)
+    play_frames(session, get_depsgraph, 20)
+    now = evaluated_vertices(flag_object, get_depsgraph)
     pinned = rest[:, 0] < -0.19
     assert now[pinned] == pytest.approx(before[pinned], abs=1e-6)
     assert now[~pinned, 2].min() < -0.1
     assert now == pytest.approx(session.state.position.T, abs=1e-5)
-    there = flag.evaluated_get(evaluated()).data
+    there = flag_object.evaluated_get(get_depsgraph()).data
     normals = np.empty((121, 3), np.float32)
     there.vertex_normals.foreach_get("vector", normals.ravel())
     cosine = (normals * session.normals()).sum(axis=1)
     assert cosine.min() > 0.99, "normals are those of the cloth"
-    session.stop(evaluated())
-    assert np.array_equal(rest_vertices(flag), rest)
-    assert POSITION not in flag.data.attributes
+    session.stop(get_depsgraph())
+    assert np.array_equal(rest_vertices(flag_object), rest)
+    assert POSITION not in flag_object.data.attributes
     update_view_layer()
-    assert np.array_equal(evaluated_vertices(flag, evaluated), before)
+    assert np.array_equal(evaluated_vertices(flag_object, get_depsgraph), before)
 
 
-def test_pins_follow_an_animated_parent(flag, evaluated):
+def test_pins_follow_an_animated_parent(flag_object, get_depsgraph):
     parent = bpy.data.objects.new("Parent", None)
     bpy.context.collection.objects.link(parent)
-    flag.parent = parent
-    flag.scale = (1.5, 1.0, 0.5)
+    flag_object.parent = parent
+    flag_object.scale = (1.5, 1.0, 0.5)
     for frame, x in ((1, 0.0), (13, 0.3)):
         parent.location.x = x
         parent.rotation_euler.z = x
         parent.keyframe_insert("location", frame=frame)
         parent.keyframe_insert("rotation_euler", frame=frame)
     bpy.context.scene.frame_set(1)
-    session = start_fin(flag, evaluated)
-    rest = rest_vertices(flag)
+    session = start_fin(flag_object, get_depsgraph)
+    rest = rest_vertices(flag_object)
     pinned = rest[:, 0] < -0.19
     for frame in range(2, 14):
         bpy.context.scene.frame_set(frame)
-        session.advance(evaluated(), 1.0 / 24.0)
+        session.advance(get_depsgraph(), 1.0 / 24.0)
     update_view_layer()
-    matrix = np.array(flag.matrix_world)
+    matrix = np.array(flag_object.matrix_world)
     carried = rest @ matrix[:3, :3].T + matrix[:3, 3]
-    now = evaluated_vertices(flag, evaluated)
+    now = evaluated_vertices(flag_object, get_depsgraph)
     assert now[pinned] == pytest.approx(carried[pinned], abs=1e-5)
     assert np.abs(now - carried)[~pinned].max() > 0.02
 
 
-def test_pins_follow_an_armature_and_shape_keys(flag, evaluated):
+def test_pins_follow_an_armature_and_shape_keys(flag_object, get_depsgraph):
     data = bpy.data.armatures.new("Rig")
     rig = bpy.data.objects.new("Rig", data)
     bpy.context.collection.objects.link(rig)
@@ -109,169 +111,173 @@ def test_pins_follow_an_armature_and_shape_keys(flag, evaluated):
     bpy.ops.object.mode_set(mode="EDIT")
     data.edit_bones.new("Bone").tail = (0.0, 0.0, 0.1)
     bpy.ops.object.mode_set(mode="OBJECT")
-    flag.vertex_groups.new(name="Bone").add(range(121), 1.0, "REPLACE")
-    flag.modifiers.new("Armature", "ARMATURE").object = rig
-    flag.modifiers.move(1, 0)
-    flag.shape_key_add(name="Basis")
-    key = flag.shape_key_add(name="Up")
+    flag_object.vertex_groups.new(name="Bone").add(range(121), 1.0, "REPLACE")
+    flag_object.modifiers.new("Armature", "ARMATURE").object = rig
+    flag_object.modifiers.move(1, 0)
+    flag_object.shape_key_add(name="Basis")
+    key = flag_object.shape_key_add(name="Up")
     for point in key.data:
         point.co.z += 0.05
-    session = start_fin(flag, evaluated)
-    rest = rest_vertices(flag)
+    session = start_fin(flag_object, get_depsgraph)
+    rest = rest_vertices(flag_object)
     pinned = rest[:, 0] < -0.19
 
     def pose(frame):
         rig.pose.bones["Bone"].matrix_basis = Matrix.Translation((0.0, 0.02 * (frame + 1), 0.0))
         key.value = (frame + 1) / 10.0
 
-    play_frames(session, evaluated, 10, pose)
+    play_frames(session, get_depsgraph, 10, pose)
     moved = rig.pose.bones["Bone"].matrix.translation
     assert np.abs(np.array(moved)).max() > 0.1
     expected = rest[pinned] + np.array(moved) + np.array([0.0, 0.0, 0.05])
-    assert evaluated_vertices(flag, evaluated)[pinned] == pytest.approx(expected, abs=1e-5)
+    assert evaluated_vertices(flag_object, get_depsgraph)[pinned] == pytest.approx(
+        expected, abs=1e-5
+    )
 
 
-def test_a_frame_that_was_recorded_is_shown_again_exactly(flag, evaluated):
-    flag.rotation_euler = (0.3, 0.2, 0.1)
-    session = start_fin(flag, evaluated)
-    play_frames(session, evaluated, 8)
-    frame, drawn = session.recorded(), evaluated_vertices(flag, evaluated)
-    play_frames(session, evaluated, 4)
-    assert not np.array_equal(evaluated_vertices(flag, evaluated), drawn)
+def test_a_frame_that_was_recorded_is_shown_again_exactly(flag_object, get_depsgraph):
+    flag_object.rotation_euler = (0.3, 0.2, 0.1)
+    session = start_fin(flag_object, get_depsgraph)
+    play_frames(session, get_depsgraph, 8)
+    frame, drawn = session.recorded(), evaluated_vertices(flag_object, get_depsgraph)
+    play_frames(session, get_depsgraph, 4)
+    assert not np.array_equal(evaluated_vertices(flag_object, get_depsgraph), drawn)
     session.show_recorded(frame)
     update_view_layer()
-    assert np.array_equal(evaluated_vertices(flag, evaluated), drawn)
+    assert np.array_equal(evaluated_vertices(flag_object, get_depsgraph), drawn)
     assert np.array_equal(session.recorded()["position"], frame["position"])
     assert all(array.dtype != object for array in (session.constants() | frame).values())
     with pytest.raises(HairloomError, match="Bake again"):
         session.show_recorded({"position": frame["position"][:-1]})
 
 
-def test_two_runs_are_alike(flag, evaluated):
+def test_two_runs_are_alike(flag_object, get_depsgraph):
     ends = []
     for _ in range(2):
-        session = start_fin(flag, evaluated)
-        play_frames(session, evaluated, 10)
+        session = start_fin(flag_object, get_depsgraph)
+        play_frames(session, get_depsgraph, 10)
         ends.append(session.recorded()["position"])
-        session.stop(evaluated())
+        session.stop(get_depsgraph())
         previews.stop(session)
     assert np.array_equal(*ends)
 
 
-def test_hashes_tell_what_has_changed(flag, evaluated):
-    session = start_fin(flag, evaluated)
-    rig_hash, frame_hash = session.rig_hash(evaluated()), session.frame_hash(evaluated())
-    assert session.rig_hash(evaluated()) == rig_hash
-    assert session.frame_hash(evaluated()) == frame_hash
-    flag.location.x = 1.0
+def test_hashes_tell_what_has_changed(flag_object, get_depsgraph):
+    session = start_fin(flag_object, get_depsgraph)
+    rig_hash, frame_hash = session.rig_hash(get_depsgraph()), session.frame_hash(get_depsgraph())
+    assert session.rig_hash(get_depsgraph()) == rig_hash
+    assert session.frame_hash(get_depsgraph()) == frame_hash
+    flag_object.location.x = 1.0
     update_view_layer()
-    assert session.rig_hash(evaluated()) == rig_hash
-    assert session.frame_hash(evaluated()) != frame_hash
-    flag.vertex_groups["Pins"].add([60], 0.5, "REPLACE")
+    assert session.rig_hash(get_depsgraph()) == rig_hash
+    assert session.frame_hash(get_depsgraph()) != frame_hash
+    flag_object.vertex_groups["Pins"].add([60], 0.5, "REPLACE")
     update_view_layer()
-    assert session.rig_hash(evaluated()) != rig_hash
+    assert session.rig_hash(get_depsgraph()) != rig_hash
 
 
-def test_it_stays_out_of_a_collider(flag, evaluated):
+def test_it_stays_out_of_a_collider(flag_object, get_depsgraph):
     bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1, location=(0.0, 0.0, -0.12))
     ball = bpy.context.object
     ball.hairloom.collider_shape = "sphere"
-    flag.hairloom.collider = ball
-    session = start_fin(flag, evaluated)
-    play_frames(session, evaluated, 40)
+    flag_object.hairloom.collider = ball
+    session = start_fin(flag_object, get_depsgraph)
+    play_frames(session, get_depsgraph, 40)
     assert session.obstacles.warnings == ()
-    away = np.linalg.norm(evaluated_vertices(flag, evaluated) - np.array(ball.location), axis=1)
+    away = np.linalg.norm(
+        evaluated_vertices(flag_object, get_depsgraph) - np.array(ball.location), axis=1
+    )
     assert away.min() > 0.1
     assert away.min() < 0.105, "it lies on the ball"
 
 
-def test_the_wind_of_the_scene_blows(flag, evaluated):
+def test_the_wind_of_the_scene_blows(flag_object, get_depsgraph):
     bpy.ops.object.effector_add(type="WIND", rotation=(0.0, 0.0, 0.0))
     bpy.context.object.field.strength = 20.0
-    flag.hairloom.fin.gravity = 0.0
-    session = start_fin(flag, evaluated)
-    play_frames(session, evaluated, 20)
-    assert evaluated_vertices(flag, evaluated)[:, 2].max() > 0.05
+    flag_object.hairloom.fin.gravity = 0.0
+    session = start_fin(flag_object, get_depsgraph)
+    play_frames(session, get_depsgraph, 20)
+    assert evaluated_vertices(flag_object, get_depsgraph)[:, 2].max() > 0.05
 
 
-def test_modifiers_below_go_on_from_the_cloth(flag, evaluated):
-    flag.modifiers.new("Smooth", "SUBSURF").levels = 1
-    flag.modifiers.new("Thick", "SOLIDIFY").thickness = 0.01
-    session = start_fin(flag, evaluated)
-    play_frames(session, evaluated, 10)
-    assert len(evaluated_vertices(flag, evaluated)) > 400
-    assert evaluated_vertices(flag, evaluated)[:, 2].min() < -0.02
+def test_modifiers_below_go_on_from_the_cloth(flag_object, get_depsgraph):
+    flag_object.modifiers.new("Smooth", "SUBSURF").levels = 1
+    flag_object.modifiers.new("Thick", "SOLIDIFY").thickness = 0.01
+    session = start_fin(flag_object, get_depsgraph)
+    play_frames(session, get_depsgraph, 10)
+    assert len(evaluated_vertices(flag_object, get_depsgraph)) > 400
+    assert evaluated_vertices(flag_object, get_depsgraph)[:, 2].min() < -0.02
     assert len(session.recorded()["position"]) == 121
 
 
 @pytest.mark.parametrize(("kind", "place"), [("SUBSURF", 0), ("MIRROR", 0)])
-def test_a_modifier_above_that_makes_vertices_is_said(flag, evaluated, kind, place):
-    flag.modifiers.new("Culprit", kind)
-    flag.modifiers.move(1, place)
+def test_a_modifier_above_that_makes_vertices_is_said(flag_object, get_depsgraph, kind, place):
+    flag_object.modifiers.new("Culprit", kind)
+    flag_object.modifiers.move(1, place)
     update_view_layer()
     with pytest.raises(HairloomError, match=r"Culprit.*below Hairloom Cloth"):
-        fins.start(flag, evaluated())
+        fins.start(flag_object, get_depsgraph())
 
 
-def test_a_modifier_below_that_reorders_vertices_is_said(flag, evaluated):
-    flag.modifiers.new("Fewer", "DECIMATE").ratio = 0.5
+def test_a_modifier_below_that_reorders_vertices_is_said(flag_object, get_depsgraph):
+    flag_object.modifiers.new("Fewer", "DECIMATE").ratio = 0.5
     update_view_layer()
     with pytest.raises(HairloomError, match="Fewer"):
-        fins.start(flag, evaluated())
+        fins.start(flag_object, get_depsgraph())
 
 
-def test_a_modifier_that_is_off_is_said(flag, evaluated):
-    fin_modifier(flag).show_viewport = False
+def test_a_modifier_that_is_off_is_said(flag_object, get_depsgraph):
+    fin_modifier(flag_object).show_viewport = False
     update_view_layer()
     with pytest.raises(HairloomError, match="turned off"):
-        fins.start(flag, evaluated())
+        fins.start(flag_object, get_depsgraph())
 
 
-def change_topology(flag):
-    flag.data.clear_geometry()
-    flag.data.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
+def change_topology(flag_object):
+    flag_object.data.clear_geometry()
+    flag_object.data.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
 
 
 @pytest.mark.parametrize(
     ("change", "says"),
     [
         (change_topology, "Play again"),
-        (lambda flag: bpy.ops.object.mode_set(mode="EDIT"), "Edit Mode"),
-        (lambda flag: flag.modifiers.clear(), "not cloth"),
-        (lambda flag: setattr(flag, "scale", (1.0, 0.0, 1.0)), "scale"),
-        (lambda flag: bpy.data.objects.remove(flag), "gone"),
+        (lambda flag_object: bpy.ops.object.mode_set(mode="EDIT"), "Edit Mode"),
+        (lambda flag_object: flag_object.modifiers.clear(), "not cloth"),
+        (lambda flag_object: setattr(flag_object, "scale", (1.0, 0.0, 1.0)), "scale"),
+        (lambda flag_object: bpy.data.objects.remove(flag_object), "gone"),
     ],
 )
-def test_what_breaks_in_mid_play_ends_it_with_a_notice(flag, evaluated, change, says):
-    session = start_fin(flag, evaluated)
-    previews.play(evaluated())
-    play_frames(session, evaluated, 2)
-    bpy.context.view_layer.objects.active = flag
-    change(flag)
+def test_what_breaks_in_mid_play_ends_it_with_a_notice(flag_object, get_depsgraph, change, says):
+    session = start_fin(flag_object, get_depsgraph)
+    previews.play(get_depsgraph())
+    play_frames(session, get_depsgraph, 2)
+    bpy.context.view_layer.objects.active = flag_object
+    change(flag_object)
     update_view_layer()
-    previews.advance(evaluated(), FRAME_S)
+    previews.advance(get_depsgraph(), FRAME_S)
     assert previews.simulated() == ()
     assert says in previews.notice()
     if bpy.context.object is not None and bpy.context.object.mode == "EDIT":
         bpy.ops.object.mode_set(mode="OBJECT")
 
 
-def test_a_missing_pin_group_is_said_and_none_falls(flag, evaluated):
-    flag.hairloom.fin.pin_group = "Nowhere"
+def test_a_missing_pin_group_is_said_and_none_falls(flag_object, get_depsgraph):
+    flag_object.hairloom.fin.pin_group = "Nowhere"
     update_view_layer()
     with pytest.raises(HairloomError, match="Nowhere"):
-        fins.start(flag, evaluated())
-    flag.hairloom.fin.pin_group = ""
-    session = start_fin(flag, evaluated)
+        fins.start(flag_object, get_depsgraph())
+    flag_object.hairloom.fin.pin_group = ""
+    session = start_fin(flag_object, get_depsgraph)
     assert "no vertex is pinned" in session.warnings[0]
-    before = evaluated_vertices(flag, evaluated)
-    play_frames(session, evaluated, 5)
-    assert (evaluated_vertices(flag, evaluated) - before)[:, 2].max() < -0.01
+    before = evaluated_vertices(flag_object, get_depsgraph)
+    play_frames(session, get_depsgraph, 5)
+    assert (evaluated_vertices(flag_object, get_depsgraph) - before)[:, 2].max() < -0.01
 
 
-def test_a_mesh_of_two_fins_is_said(flag, evaluated):
-    twin = flag.copy()
+def test_a_mesh_of_two_fins_is_said(flag_object, get_depsgraph):
+    twin = flag_object.copy()
     bpy.context.collection.objects.link(twin)
     update_view_layer()
     with pytest.raises(HairloomError, match="Single User"):
-        fins.start(flag, evaluated())
+        fins.start(flag_object, get_depsgraph())

@@ -10,7 +10,7 @@ from hairloom.addon.blender.preview.bake import Bake
 from hairloom.addon.blender.scene.fin_modifier import INDEX, POSITION, fin_modifier, is_shown
 
 
-def test_undo_and_redo_of_the_operator(extension, evaluated):
+def test_undo_and_redo_of_the_operator(extension, get_depsgraph):
     bpy.context.preferences.edit.use_global_undo = True
     bpy.ops.mesh.primitive_grid_add(x_subdivisions=3, y_subdivisions=3)
     name = bpy.context.object.name
@@ -23,83 +23,83 @@ def test_undo_and_redo_of_the_operator(extension, evaluated):
     assert fin_modifier(bpy.data.objects[name]) is not None
 
 
-def test_undo_in_mid_play_goes_on_or_rests(flag, evaluated):
+def test_undo_in_mid_play_goes_on_or_rests(flag_object, get_depsgraph):
     bpy.context.preferences.edit.use_global_undo = True
     bpy.ops.ed.undo_push(message="begin")
-    session = start_fin(flag, evaluated)
-    play_frames(session, evaluated, 5)
-    flag.location.x = 0.1
+    session = start_fin(flag_object, get_depsgraph)
+    play_frames(session, get_depsgraph, 5)
+    flag_object.location.x = 0.1
     bpy.ops.ed.undo_push(message="move")
     bpy.ops.ed.undo()
-    scene_events.catch_up(evaluated())
-    flag = bpy.data.objects["Flag"]
-    play_frames(session, evaluated, 2)
+    scene_events.catch_up(get_depsgraph())
+    flag_object = bpy.data.objects["Flag"]
+    play_frames(session, get_depsgraph, 2)
     assert previews.simulated() == (session,)
-    session.stop(evaluated())
-    assert POSITION not in flag.data.attributes
+    session.stop(get_depsgraph())
+    assert POSITION not in flag_object.data.attributes
 
 
-def test_a_saved_file_keeps_fin_and_settings(flag, evaluated, tmp_path):
-    rest = rest_vertices(flag)
-    flag.hairloom.fin.stretch = 0.25
-    session = start_fin(flag, evaluated)
-    play_frames(session, evaluated, 5)
-    drawn = evaluated_vertices(flag, evaluated)
+def test_a_saved_file_keeps_fin_and_settings(flag_object, get_depsgraph, tmp_path):
+    rest = rest_vertices(flag_object)
+    flag_object.hairloom.fin.stretch = 0.25
+    session = start_fin(flag_object, get_depsgraph)
+    play_frames(session, get_depsgraph, 5)
+    drawn = evaluated_vertices(flag_object, get_depsgraph)
     file = str(tmp_path / "fin.blend")
     bpy.ops.wm.save_as_mainfile(filepath=file)
     bpy.ops.wm.open_mainfile(filepath=file)
-    flag = bpy.data.objects["Flag"]
+    flag_object = bpy.data.objects["Flag"]
     assert previews.simulated() == ()
-    assert flag.hairloom.fin.stretch == 0.25 and flag.hairloom.fin.pin_group == "Pins"
+    assert flag_object.hairloom.fin.stretch == 0.25 and flag_object.hairloom.fin.pin_group == "Pins"
     update_view_layer()
-    assert evaluated_vertices(flag, evaluated) == pytest.approx(drawn, abs=1e-6), (
+    assert evaluated_vertices(flag_object, get_depsgraph) == pytest.approx(drawn, abs=1e-6), (
         "the moment that was saved"
     )
-    assert is_shown(flag)
-    bpy.context.view_layer.objects.active = flag
+    assert is_shown(flag_object)
+    bpy.context.view_layer.objects.active = flag_object
     assert bpy.ops.hairloom.fin_reset() == {"FINISHED"}
-    assert not is_shown(flag)
-    assert np.array_equal(rest_vertices(flag), rest)
-    start_fin(flag, evaluated)
+    assert not is_shown(flag_object)
+    assert np.array_equal(rest_vertices(flag_object), rest)
+    start_fin(flag_object, get_depsgraph)
 
 
-def play_away_from(before, flag, evaluated):
+def play_away_from(before, flag_object, get_depsgraph):
     """Preview and play until the cloth is more than 5 cm away from `before`."""
-    fins.start(flag, evaluated())
-    previews.play(evaluated())
-    previews.advance(evaluated(), 0.5)
+    fins.start(flag_object, get_depsgraph())
+    previews.play(get_depsgraph())
+    previews.advance(get_depsgraph(), 0.5)
     update_view_layer()
-    assert np.abs(evaluated_vertices(flag, evaluated) - before).max() > 0.05
+    assert np.abs(evaluated_vertices(flag_object, get_depsgraph) - before).max() > 0.05
 
 
 @pytest.mark.parametrize("end", ["stop", "by itself", "a file that cannot be opened"])
-def test_however_its_preview_ends_it_is_at_rest(end, flag, evaluated, tmp_path):
-    before = evaluated_vertices(flag, evaluated)
-    play_away_from(before, flag, evaluated)
+def test_however_its_preview_ends_it_is_at_rest(end, flag_object, get_depsgraph, tmp_path):
+    before = evaluated_vertices(flag_object, get_depsgraph)
+    play_away_from(before, flag_object, get_depsgraph)
     if end == "stop":
         previews.stop_all()
     elif end == "by itself":
-        flag.modifiers.new("Array", "ARRAY")
-        flag.modifiers.move(1, 0)
+        flag_object.modifiers.new("Array", "ARRAY")
+        flag_object.modifiers.move(1, 0)
         update_view_layer()
-        previews.advance(evaluated(), 0.5)
+        previews.advance(get_depsgraph(), 0.5)
         assert "Preview of Flag ended" in previews.notice()
     else:
         (tmp_path / "bad.blend").write_bytes(b"no file of Blender's")
         with pytest.raises(RuntimeError):
             bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "bad.blend"))
-    assert previews.simulated() == () and not is_shown(flag)
+    assert previews.simulated() == () and not is_shown(flag_object)
 
 
-def test_a_bake_is_shown_after_the_preview_too(flag, evaluated, tmp_path):
-    for _ in Bake.of([flag], bpy.context.scene, frames=range(1, 4), folder=tmp_path).steps():
+def test_a_bake_is_shown_after_the_preview_too(flag_object, get_depsgraph, tmp_path):
+    for _ in Bake.of([flag_object], bpy.context.scene, frames=range(1, 4), folder=tmp_path).steps():
         pass
     bpy.context.scene.frame_set(3)
-    baked = evaluated_vertices(flag, evaluated)
-    play_away_from(baked, flag, evaluated)
+    baked = evaluated_vertices(flag_object, get_depsgraph)
+    play_away_from(baked, flag_object, get_depsgraph)
     previews.stop_all()
     update_view_layer()
-    assert np.array_equal(evaluated_vertices(flag, evaluated), baked)
+    assert np.array_equal(evaluated_vertices(flag_object, get_depsgraph), baked)
 
 
 def test_buttons_say_why_they_are_grey(extension):
@@ -114,20 +114,20 @@ def test_buttons_say_why_they_are_grey(extension):
     bpy.ops.object.mode_set(mode="OBJECT")
 
 
-def test_enabled_fins_start_together(flag, evaluated):
+def test_enabled_fins_start_together(flag_object, get_depsgraph):
     update_view_layer()
-    assert fins.start_enabled(evaluated()) == []
+    assert fins.start_enabled(get_depsgraph()) == []
     assert [each.name for each in previews.simulated()] == ["Flag"]
     assert bpy.ops.hairloom.fin_preview() == {"FINISHED"}
     assert previews.simulated() == ()
-    flag.hairloom.fin.enabled = False
-    assert fins.start_enabled(evaluated()) == [] and previews.simulated() == ()
+    flag_object.hairloom.fin.enabled = False
+    assert fins.start_enabled(get_depsgraph()) == [] and previews.simulated() == ()
 
 
-def test_attributes_of_the_modifier_stay_out_of_the_mesh(flag, evaluated):
-    start_fin(flag, evaluated)
-    assert INDEX not in flag.data.attributes
-    assert INDEX in flag.evaluated_get(evaluated()).data.attributes
+def test_attributes_of_the_modifier_stay_out_of_the_mesh(flag_object, get_depsgraph):
+    start_fin(flag_object, get_depsgraph)
+    assert INDEX not in flag_object.data.attributes
+    assert INDEX in flag_object.evaluated_get(get_depsgraph()).data.attributes
 
 
 def frames_of(obj, frames):
@@ -142,27 +142,27 @@ def frames_of(obj, frames):
     return found
 
 
-def test_playback_simulates_it_and_a_bake_shows_exactly_that(flag, evaluated, tmp_path):
+def test_playback_simulates_it_and_a_bake_shows_exactly_that(flag_object, get_depsgraph, tmp_path):
     for frame, x in ((1, 0.0), (10, 0.2)):
-        flag.location.x = x
-        flag.keyframe_insert("location", frame=frame)
+        flag_object.location.x = x
+        flag_object.keyframe_insert("location", frame=frame)
     bpy.context.scene.frame_set(1)
-    session = fins.start(flag, evaluated())
-    simulated = frames_of(flag, range(1, 9))
-    assert np.array_equal(simulated[1], rest_vertices(flag))
+    session = fins.start(flag_object, get_depsgraph())
+    simulated = frames_of(flag_object, range(1, 9))
+    assert np.array_equal(simulated[1], rest_vertices(flag_object))
     assert simulated[8][:, 2].min() < -0.1
     previews.stop(session)
-    for _ in Bake.of([flag], bpy.context.scene, frames=range(1, 9), folder=tmp_path).steps():
+    for _ in Bake.of([flag_object], bpy.context.scene, frames=range(1, 9), folder=tmp_path).steps():
         pass
     for preview in (False, True):
         if preview:
-            fins.start(flag, evaluated())
-        for frame, points in frames_of(flag, (8, 3, 1, 5)).items():
+            fins.start(flag_object, get_depsgraph())
+        for frame, points in frames_of(flag_object, (8, 3, 1, 5)).items():
             assert np.array_equal(points, simulated[frame])
 
 
-def test_other_attributes_stay_as_they_are(flag, evaluated):
-    mesh = flag.data
+def test_other_attributes_stay_as_they_are(flag_object, get_depsgraph):
+    mesh = flag_object.data
     for name, kind in (("A", "FLOAT"), ("B", "FLOAT_COLOR")):
         mesh.attributes.new(name, kind, "POINT")
     mesh.attributes.active = mesh.attributes["A"]
@@ -172,8 +172,8 @@ def test_other_attributes_stay_as_they_are(flag, evaluated):
         return active, [each.name for each in mesh.attributes], mesh.uv_layers.active_index
 
     before = known()
-    session = start_fin(flag, evaluated)
-    play_frames(session, evaluated, 2)
+    session = start_fin(flag_object, get_depsgraph)
+    play_frames(session, get_depsgraph, 2)
     assert known() != before
-    session.stop(evaluated())
+    session.stop(get_depsgraph())
     assert known() == before

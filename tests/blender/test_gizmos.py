@@ -69,12 +69,12 @@ def make_active(obj: Any) -> None:
 
 
 @pytest.fixture
-def hair(new_hair: Callable[..., Any], sphere: Any, evaluated: Any) -> Any:
+def hair(new_hair: Callable[..., Any], sphere: Any, get_depsgraph: Any) -> Any:
     """Previewed hair in the wind, with its overlay."""
     made = new_hair(sphere)
     wind = made.hairloom.dynamics
     wind.wind_speed, wind.wind_direction, wind.wind_elevation = 4.0, 0.7, -0.4
-    previews.start(made, evaluated())
+    previews.start(made, get_depsgraph())
     made.hairloom.shown_overlays = {"wind"}
     make_active(made)
     return made

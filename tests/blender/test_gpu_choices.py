@@ -42,10 +42,10 @@ def test_the_preference_is_the_budget_and_is_never_too_little_to_draw() -> None:
 
 
 def test_the_panel_says_what_to_do_where_more_is_taken(
-    new_hair: Callable[..., Any], sphere: Any, evaluated: Callable[[], Any]
+    new_hair: Callable[..., Any], sphere: Any, get_depsgraph: Callable[[], Any]
 ) -> None:
     hair = new_hair(sphere)
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
 
     def told() -> list[str]:
         return [one.text for one in problems_of(hair, session) if "GPU" in one.text]

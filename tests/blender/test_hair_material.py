@@ -39,12 +39,12 @@ def row() -> StrandSet:
 
 
 @pytest.fixture
-def hair(new_hair: Callable[..., Any], stage: Any) -> Any:
-    camera = stage.camera.data
+def hair(new_hair: Callable[..., Any], engine_scene: Any) -> Any:
+    camera = engine_scene.camera.data
     camera.type, camera.ortho_scale = "ORTHO", 1.0
-    stage.render.engine = "CYCLES"
-    stage.cycles.samples, stage.cycles.use_denoising = 1, False
-    stage.cycles.pixel_filter_type, stage.cycles.max_bounces = "BOX", 0
+    engine_scene.render.engine = "CYCLES"
+    engine_scene.cycles.samples, engine_scene.cycles.use_denoising = 1, False
+    engine_scene.cycles.pixel_filter_type, engine_scene.cycles.max_bounces = "BOX", 0
     return new_hair(strands=row())
 
 

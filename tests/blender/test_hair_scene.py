@@ -34,15 +34,15 @@ COUNT, POINTS, RADIUS = 8000, 4, 0.00015
 
 
 @pytest.fixture
-def cycles(stage: Any) -> Any:
+def cycles(engine_scene: Any) -> Any:
     """The stage, rendered by Cycles with the same noise in each picture."""
-    stage.render.engine = "CYCLES"
-    stage.cycles.use_denoising = False
-    stage.cycles.use_adaptive_sampling, stage.cycles.max_bounces = False, 0
-    sample(stage, SAMPLES)
+    engine_scene.render.engine = "CYCLES"
+    engine_scene.cycles.use_denoising = False
+    engine_scene.cycles.use_adaptive_sampling, engine_scene.cycles.max_bounces = False, 0
+    sample(engine_scene, SAMPLES)
     # hair in a small picture would be thinned out
-    stage.render.resolution_x = stage.render.resolution_y = SIZE
-    return stage
+    engine_scene.render.resolution_x = engine_scene.render.resolution_y = SIZE
+    return engine_scene
 
 
 def sample(scene: Any, times: int) -> None:
@@ -251,11 +251,11 @@ def test_scenes_that_have_a_compositor_in_common_keep_their_own_hair(
 
 
 def test_hairlooms_own_engine_draws_hair_once(
-    stage: Any, sphere: Any, new_hair: Any, tmp_path: Path
+    engine_scene: Any, sphere: Any, new_hair: Any, tmp_path: Path
 ) -> None:
     new_hair(sphere)
     alone = rendered(tmp_path)
-    stage.hairloom.use_hair_scene = True
+    engine_scene.hairloom.use_hair_scene = True
     np.testing.assert_array_equal(rendered(tmp_path), alone)
 
 

@@ -289,12 +289,12 @@ def test_what_is_built_next_takes_the_place_of_the_last_before_it_is_built(
 
 
 def test_cards_of_previewed_hair_are_of_its_strands(
-    hair: Any, tmp_path: Path, evaluated: Any, monkeypatch: pytest.MonkeyPatch
+    hair: Any, tmp_path: Path, get_depsgraph: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     hair.data.hairloom.children.method = "multi"
     hair.data.hairloom.children.strand_count = 100
     own = afresh(tmp_path / "own")
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     made = counted(monkeypatch, rigs.rig_flow, "prepare")
     assert afresh(tmp_path / "previewed") == own and not made
     comb(hair, tmp_path)

@@ -95,9 +95,9 @@ def test_ten_times_on_and_off_leave_nothing(commands):
         assert commands == []
 
 
-def test_disabling_ends_previews_and_timers(new_hair, sphere, evaluated):
+def test_disabling_ends_previews_and_timers(new_hair, sphere, get_depsgraph):
     hair = new_hair(sphere)
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     hair.data.hairloom.guides.guide_count = 5
     assert bpy.app.timers.is_registered(scene_events._read_again)
     hairloom.unregister()
@@ -105,7 +105,7 @@ def test_disabling_ends_previews_and_timers(new_hair, sphere, evaluated):
         assert previews.sessions() == ()
         assert overlay.drawing_of(session.uid) is None
         assert not bpy.app.timers.is_registered(scene_events._read_again)
-        assert hair.evaluated_get(evaluated()).display_type == "TEXTURED"
+        assert hair.evaluated_get(get_depsgraph()).display_type == "TEXTURED"
     finally:
         hairloom.register()
 
@@ -193,7 +193,7 @@ def test_shortcuts_are_offered_without_keys(extension):
     assert hasattr(bpy.types, pie.properties.name)
 
 
-def test_what_the_status_bar_says_goes_in_all_workspaces(preview, evaluated, monkeypatch):
+def test_what_the_status_bar_says_goes_in_all_workspaces(preview, get_depsgraph, monkeypatch):
     """Blender writes the text into the context's workspace, whatever workspace is addressed."""
     said = {}
 
@@ -203,7 +203,7 @@ def test_what_the_status_bar_says_goes_in_all_workspaces(preview, evaluated, mon
     monkeypatch.setattr(bpy.types.WorkSpace, "status_text_set", status_text_set)
     everywhere = [workspace.name for workspace in bpy.data.workspaces]
     assert len(everywhere) > 1
-    previews.play(evaluated())
+    previews.play(get_depsgraph())
     operators_preview.start_ticking()
     assert said == dict.fromkeys(everywhere, operators_preview.STATUS)
     operators_preview.stop_ticking()

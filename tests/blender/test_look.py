@@ -19,11 +19,11 @@ from hairloom.addon.ui import sections
 
 
 @pytest.fixture
-def preview(new_hair: Any, sphere: Any, evaluated: Any) -> Any:
+def preview(new_hair: Any, sphere: Any, get_depsgraph: Any) -> Any:
     """(shading settings, session) of hair with the Marschner model."""
     hair = new_hair(sphere)
     hair.data.hairloom.shading.model = "marschner"
-    return hair.data.hairloom.shading, previews.start(hair, evaluated())
+    return hair.data.hairloom.shading, previews.start(hair, get_depsgraph())
 
 
 @pytest.fixture

@@ -141,11 +141,11 @@ CHANGES = (
 
 
 def test_a_file_of_previewed_hair_has_its_strands(
-    hair: Any, evaluated: Any, tmp_path: Path, made: list[str]
+    hair: Any, get_depsgraph: Any, tmp_path: Path, made: list[str]
 ) -> None:
     own = written(tmp_path / "own.tfx")
     assert made == ["Hair"]
-    previews.start(hair, evaluated())
+    previews.start(hair, get_depsgraph())
     made.clear()
     assert written(tmp_path / "again.tfx") == own and not made, "the preview has them"
     previews.stop(previews.sessions()[0])
@@ -154,11 +154,11 @@ def test_a_file_of_previewed_hair_has_its_strands(
 
 @pytest.mark.parametrize("change", CHANGES, ids=lambda change: change.__name__)
 def test_strands_of_a_preview_are_not_taken_for_other_hair(
-    hair: Any, evaluated: Any, tmp_path: Path, made: list[str], change: Any
+    hair: Any, get_depsgraph: Any, tmp_path: Path, made: list[str], change: Any
 ) -> None:
     """Even if the preview has not read the change yet."""
     before = written(tmp_path / "before.tfx")
-    previews.start(hair, evaluated())
+    previews.start(hair, get_depsgraph())
     change(hair)
     bpy.context.view_layer.update()
     made.clear()
@@ -169,11 +169,11 @@ def test_strands_of_a_preview_are_not_taken_for_other_hair(
 
 
 def test_strands_of_a_preview_are_taken_again_once_it_has_read_an_edit(
-    hair: Any, evaluated: Any, tmp_path: Path, made: list[str]
+    hair: Any, get_depsgraph: Any, tmp_path: Path, made: list[str]
 ) -> None:
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     comb(hair)
-    session.read_again(evaluated())
+    session.read_again(get_depsgraph())
     made.clear()
     found = written(tmp_path / "found.tfx")
     assert not made
@@ -182,7 +182,7 @@ def test_strands_of_a_preview_are_taken_again_once_it_has_read_an_edit(
 
 
 def test_strands_of_a_bake_are_those_that_were_baked(
-    hair: Any, evaluated: Any, tmp_path: Path, made: list[str]
+    hair: Any, get_depsgraph: Any, tmp_path: Path, made: list[str]
 ) -> None:
     """A bake previews the baked rig; a file gets the rig of the present curves."""
     bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, 2
@@ -190,7 +190,7 @@ def test_strands_of_a_bake_are_those_that_were_baked(
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "file.blend"))
     assert bpy.ops.hairloom.bake() == {"FINISHED"}
     previews.stop_all()
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     assert session.rig.child_count and session.rig.grown is None, "it has those of the bake"
     assert not previews.made_rigs()
     made.clear()
@@ -199,11 +199,11 @@ def test_strands_of_a_bake_are_those_that_were_baked(
 
 
 def test_hair_that_is_not_made_yet_is_made_for_the_file(
-    hair: Any, evaluated: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    hair: Any, get_depsgraph: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     own = written(tmp_path / "own.tfx")
     monkeypatch.setattr(latest_job, "is_blocking", lambda: False)
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     assert not session.is_made and written(tmp_path / "found.tfx") == own
 
 
@@ -233,21 +233,21 @@ def own_bytes(folder: Path) -> bytes:
 
 
 def test_the_dialog_takes_strands_of_the_preview(
-    hair: Any, evaluated: Any, made: list[str]
+    hair: Any, get_depsgraph: Any, made: list[str]
 ) -> None:
-    previews.start(hair, evaluated())
+    previews.start(hair, get_depsgraph())
     made.clear()
     check = ExportCheck.of([hair], previews.made_rigs())
-    list(check.reading(evaluated(), TRESSFX, StrandExportSettings()))
-    check.refresh(evaluated(), TRESSFX, StrandExportSettings())
+    list(check.reading(get_depsgraph(), TRESSFX, StrandExportSettings()))
+    check.refresh(get_depsgraph(), TRESSFX, StrandExportSettings())
     assert check.lines and not made
 
 
 def test_frames_of_children_are_of_strands_that_were_made_once(
-    hair: Any, evaluated: Any, made: list[str]
+    hair: Any, get_depsgraph: Any, made: list[str]
 ) -> None:
     plan = StrandExport.of(
-        [hair], evaluated(), ALEMBIC, StrandExportSettings(use_bake=False), frames=range(1, 3)
+        [hair], get_depsgraph(), ALEMBIC, StrandExportSettings(use_bake=False), frames=range(1, 3)
     )
     assert made == ["Hair"]
     one, two = plan.positions()

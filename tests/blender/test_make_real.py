@@ -74,7 +74,7 @@ def test_every_strand_keeps_its_noise(hair: Any) -> None:
 @pytest.mark.parametrize("domain", ["CURVE", "POINT"])
 @pytest.mark.parametrize("children", ["none", "multi"])
 def test_it_moves_as_it_was_painted_on_the_curves(
-    hair: Any, domain: str, children: str, evaluated: Any
+    hair: Any, domain: str, children: str, get_depsgraph: Any
 ) -> None:
     """Children get the weighted values of their guides; unsimulated strands stay unsimulated."""
     hair.data.hairloom.children.method = children
@@ -87,16 +87,16 @@ def test_it_moves_as_it_was_painted_on_the_curves(
     set_attribute(hair.data, SELECTION, "CURVE", is_left)
     dynamics = hair.hairloom.dynamics
     dynamics.style_root_mask, dynamics.only_selected = "Stiff", True
-    source = read_source(hair, evaluated())
+    source = read_source(hair, get_depsgraph())
     canvas = Canvas(hair, hair.parent, source.head, source.strands, source.kept)
-    was = {name: canvas.mask(name, evaluated()).grid for name in ("Stiff", SELECTION)}
+    was = {name: canvas.mask(name, get_depsgraph()).grid for name in ("Stiff", SELECTION)}
     real = made_real()
-    assert not [each for each in GroomSource(real, evaluated()).warnings if "Stiff" in each]
-    made = read_source(real, evaluated())
+    assert not [each for each in GroomSource(real, get_depsgraph()).warnings if "Stiff" in each]
+    made = read_source(real, get_depsgraph())
     canvas = Canvas(real, real.parent, made.head, made.strands, made.kept)
     roots = source.strands.roots
     for name, before in was.items():
-        now = canvas.mask(name, evaluated()).grid
+        now = canvas.mask(name, get_depsgraph()).grid
         assert now[: len(roots)] == pytest.approx(before, abs=2e-3)
         assert now.min() >= 0.0 and now.max() <= before.max() + 1e-5
         # all guides of these children are on their side
@@ -106,15 +106,17 @@ def test_it_moves_as_it_was_painted_on_the_curves(
 
 
 @pytest.mark.slow
-def test_it_is_drawn_as_the_hair_was(hair: Any, stage: Any, tmp_path: Path) -> None:
+def test_it_is_drawn_as_the_hair_was(hair: Any, engine_scene: Any, tmp_path: Path) -> None:
     """Our engine's picture is the same, except for the shadows."""
     add_ball(0.1)
     light = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
-    stage.collection.objects.link(light)
+    engine_scene.collection.objects.link(light)
     bpy.context.view_layer.objects.active = hair
     hair.select_set(True)
-    stage.camera.location.y = -0.6
-    stage.render.resolution_x = stage.render.resolution_y = 256  # enough pixels to draw all strands
+    engine_scene.camera.location.y = -0.6
+    engine_scene.render.resolution_x = engine_scene.render.resolution_y = (
+        256  # enough pixels to draw all strands
+    )
     before = render_picture(tmp_path)
     real = made_real()
     assert hair.hide_render and not real.hide_render

@@ -72,28 +72,28 @@ def shown(session):
     return overlay.drawing_of(session.uid)
 
 
-def is_box(hair, evaluated):
-    return hair.evaluated_get(evaluated()).display_type == "WIRE"
+def is_box(hair, get_depsgraph):
+    return hair.evaluated_get(get_depsgraph()).display_type == "WIRE"
 
 
-def test_a_preview_shows_blenders_strands_until_its_own_are_made(hair, evaluated, gate):
-    session = previews.start(hair, evaluated())
+def test_a_preview_shows_blenders_strands_until_its_own_are_made(hair, get_depsgraph, gate):
+    session = previews.start(hair, get_depsgraph())
     assert not session.is_made and session.is_pending
     assert shown(session).snapshot.strand_count == 0 and "is being made" in shown(session).note
-    assert not is_box(hair, evaluated)
+    assert not is_box(hair, get_depsgraph)
     assert bpy.app.timers.is_registered(latest_job.take_steps)
     gate.set()
     arrive(session)
     assert session.is_made and shown(session).note == ""
-    assert shown(session).snapshot.strand_count == COUNT and is_box(hair, evaluated)
+    assert shown(session).snapshot.strand_count == COUNT and is_box(hair, get_depsgraph)
 
 
 @pytest.mark.parametrize("view", ["stretch", "depth"])
 def test_hair_that_is_being_made_may_be_coloured_by_what_it_has_not_yet(
-    view, hair, evaluated, gate
+    view, hair, get_depsgraph, gate
 ):
     hair.hairloom.debug_view = view
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     assert shown(session).snapshot.strand_count == 0
     gate.set()
     arrive(session)
@@ -101,8 +101,8 @@ def test_hair_that_is_being_made_may_be_coloured_by_what_it_has_not_yet(
     assert shown(session).snapshot.strand_count == COUNT
 
 
-def test_cancel_ends_the_preview_of_hair_that_is_being_made(hair, evaluated, gate):
-    session = previews.start(hair, evaluated())
+def test_cancel_ends_the_preview_of_hair_that_is_being_made(hair, get_depsgraph, gate):
+    session = previews.start(hair, get_depsgraph())
     hair.select_set(True)
     bpy.context.view_layer.objects.active = hair
     assert not session.is_made and bpy.ops.hairloom.cancel_build() == {"FINISHED"}
@@ -112,12 +112,12 @@ def test_cancel_ends_the_preview_of_hair_that_is_being_made(hair, evaluated, gat
     assert previews.session_of(hair) is None
 
 
-def test_what_a_thread_makes_is_the_same_to_the_bit(hair, evaluated, in_window):
+def test_what_a_thread_makes_is_the_same_to_the_bit(hair, get_depsgraph, in_window):
     hair.data.hairloom.children.method = "multi"
     hair.data.hairloom.children.strand_count = 500
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     arrive(session)
-    alone = build(GroomSource(hair, evaluated()).request, is_drawn=True)
+    alone = build(GroomSource(hair, get_depsgraph()).request, is_drawn=True)
     assert np.array_equal(session.rig.strands.points, alone.rig.strands.points)
     assert np.array_equal(session.rig.weights.weight, alone.rig.weights.weight)
     assert np.array_equal(session.snapshot.occlusion, alone.light.occlusion)
@@ -126,7 +126,7 @@ def test_what_a_thread_makes_is_the_same_to_the_bit(hair, evaluated, in_window):
 
 @pytest.mark.usefixtures("gpu_context")
 def test_what_the_gpu_gets_of_strands_is_laid_out_in_the_thread(
-    hair, evaluated, in_window, monkeypatch
+    hair, get_depsgraph, in_window, monkeypatch
 ):
     laid_out, lay_out = [], RideTexels.of
 
@@ -136,7 +136,7 @@ def test_what_the_gpu_gets_of_strands_is_laid_out_in_the_thread(
         return lay_out(strands, *others)
 
     monkeypatch.setattr(RideTexels, "of", recorded)
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     arrive(session)
     assert session.solver.form == "compute"
     assert [beside for strands, beside in laid_out if strands is session.rig.strands] == [True]
@@ -156,9 +156,9 @@ def light_gate(in_window, monkeypatch):
     opened.set()
 
 
-def light_of(hair, evaluated):
+def light_of(hair, get_depsgraph):
     """The complete light of a preview that starts now."""
-    return build(GroomSource(hair, evaluated()).request, is_drawn=True).light
+    return build(GroomSource(hair, get_depsgraph()).request, is_drawn=True).light
 
 
 def has_light(snapshot, light):
@@ -168,11 +168,11 @@ def has_light(snapshot, light):
     )
 
 
-def test_hair_is_shown_before_its_light_is_found(hair, evaluated, light_gate):
-    session, whole = previews.start(hair, evaluated()), light_of(hair, evaluated)
+def test_hair_is_shown_before_its_light_is_found(hair, get_depsgraph, light_gate):
+    session, whole = previews.start(hair, get_depsgraph()), light_of(hair, get_depsgraph)
     take_steps_until(lambda: session.is_made)
     quick = shown(session).snapshot
-    assert session.is_lighting and session.is_pending and is_box(hair, evaluated)
+    assert session.is_lighting and session.is_pending and is_box(hair, get_depsgraph)
     assert quick.occlusion.shape == whole.occlusion.shape and not has_light(quick, whole)
     assert quick.openness.shape == whole.openness.shape
     assert quick.skin_seen.shape == whole.skin_seen.shape
@@ -184,42 +184,42 @@ def test_hair_is_shown_before_its_light_is_found(hair, evaluated, light_gate):
     assert after.points is quick.points and after.layout is quick.layout
 
 
-def test_a_picture_waits_for_the_light(hair, evaluated, in_window):
-    session, whole = previews.start(hair, evaluated()), light_of(hair, evaluated)
+def test_a_picture_waits_for_the_light(hair, get_depsgraph, in_window):
+    session, whole = previews.start(hair, get_depsgraph()), light_of(hair, get_depsgraph)
     take_steps_until(lambda: session.is_made)
     assert session.is_lighting
-    picture = shown_groom(hair, evaluated())
+    picture = shown_groom(hair, get_depsgraph())
     assert not session.is_pending and has_light(session.snapshot, whole)
     assert has_light(snapshot_of(picture.studio._groom), whole)
 
 
 def test_other_hair_is_made_while_light_is_found_which_nobody_wants_then(
-    hair, evaluated, light_gate
+    hair, get_depsgraph, light_gate
 ):
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     take_steps_until(lambda: session.is_made)
     first = session.groom
     assert session.is_lighting
     hair.data.hairloom.children.method = "multi"
     hair.data.hairloom.children.strand_count = 300
-    scene_events.catch_up(evaluated())
+    scene_events.catch_up(get_depsgraph())
     assert not session.is_lighting
     take_steps_until(lambda: session.groom is not first)
     quick = session.groom.light
     assert session.is_lighting and quick.fields is first.light.fields, "in the light before"
     light_gate.set()
     arrive(session)
-    assert has_light(shown(session).snapshot, light_of(hair, evaluated))
+    assert has_light(shown(session).snapshot, light_of(hair, get_depsgraph))
 
 
-def test_nothing_is_left_of_light_that_is_found_for_hair_that_goes(hair, evaluated, light_gate):
-    session = previews.start(hair, evaluated())
+def test_nothing_is_left_of_light_that_is_found_for_hair_that_goes(hair, get_depsgraph, light_gate):
+    session = previews.start(hair, get_depsgraph())
     take_steps_until(lambda: session.is_made)
     previews.stop(session)
     assert not session.is_pending and previews.session_of(hair) is None
     light_gate.set()
     take_steps_until(lambda: not latest_job.is_watched(session))
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     take_steps_until(lambda: session.is_made)
     assert session.is_lighting
     scene_events.clear()
@@ -227,51 +227,51 @@ def test_nothing_is_left_of_light_that_is_found_for_hair_that_goes(hair, evaluat
     assert not session.is_pending
 
 
-def test_play_waits_for_the_hair(hair, evaluated, gate):
-    session = previews.start(hair, evaluated())
-    assert previews.play(evaluated(), blocking=False) == []
+def test_play_waits_for_the_hair(hair, get_depsgraph, gate):
+    session = previews.start(hair, get_depsgraph())
+    assert previews.play(get_depsgraph(), blocking=False) == []
     wait_until(fields.are_made)
-    previews.advance(evaluated(), FRAME)
+    previews.advance(get_depsgraph(), FRAME)
     assert previews.previews[session.uid].phase is Phase.WAITING and not session.is_playing
     with pytest.raises(fields.NotMadeYetError):
-        session.play(evaluated(), blocking=False)
+        session.play(get_depsgraph(), blocking=False)
     gate.set()
     arrive(session)
-    wait_until_playing(session, evaluated, FRAME)
+    wait_until_playing(session, get_depsgraph, FRAME)
     assert len(strand_grid(session)) == COUNT
 
 
-def test_play_begins_and_simulates_in_frames_of_their_own(hair, evaluated, gate):
-    session = previews.start(hair, evaluated())
-    previews.play(evaluated(), blocking=False)
+def test_play_begins_and_simulates_in_frames_of_their_own(hair, get_depsgraph, gate):
+    session = previews.start(hair, get_depsgraph())
+    previews.play(get_depsgraph(), blocking=False)
     gate.set()
     arrive(session)
-    wait_until_playing(session, evaluated, FRAME)
+    wait_until_playing(session, get_depsgraph, FRAME)
     assert session.solver.motion.clearance is not None
     assert not session.solver.motion.duration, "it begins"
-    previews.advance(evaluated(), FRAME)
+    previews.advance(get_depsgraph(), FRAME)
     assert session.solver.motion.duration == FRAME
 
 
-def test_blenders_playback_and_a_bake_wait_for_no_timer(hair, evaluated, in_window):
-    session = previews.start(hair, evaluated())
-    session.play(evaluated())
+def test_blenders_playback_and_a_bake_wait_for_no_timer(hair, get_depsgraph, in_window):
+    session = previews.start(hair, get_depsgraph())
+    session.play(get_depsgraph())
     assert session.is_made and session.is_playing and not session.is_pending
     hair.data.hairloom.guides.guide_count = 7
     assert session.is_stale
-    assert simulated_for(hair, evaluated()) is session
+    assert simulated_for(hair, get_depsgraph()) is session
     assert len(session.rig.guides) == 7
 
 
 @pytest.fixture
-def playing(hair, evaluated, in_window, sphere):
+def playing(hair, get_depsgraph, in_window, sphere):
     """The session of hair that swings."""
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     arrive(session)
-    previews.play(evaluated())
+    previews.play(get_depsgraph())
     sphere.location.x = 0.05
     for _ in range(3):
-        previews.advance(evaluated(), FRAME)
+        previews.advance(get_depsgraph(), FRAME)
     return session
 
 
@@ -287,14 +287,14 @@ def hold(monkeypatch):
     return opened
 
 
-def test_old_hair_plays_until_the_new_is_made(playing, hair, evaluated, monkeypatch):
+def test_old_hair_plays_until_the_new_is_made(playing, hair, get_depsgraph, monkeypatch):
     opened = hold(monkeypatch)
     hair.data.hairloom.children.method = "multi"
     hair.data.hairloom.children.strand_count = 300
-    scene_events.catch_up(evaluated())
+    scene_events.catch_up(get_depsgraph())
     assert playing.is_pending and not playing.is_stale
     before = strand_grid(playing)
-    previews.advance(evaluated(), FRAME)
+    previews.advance(get_depsgraph(), FRAME)
     assert len(strand_grid(playing)) == COUNT and not np.array_equal(strand_grid(playing), before)
     tips = playing.solver.guides()[:, -1]
     opened.set()
@@ -339,26 +339,26 @@ def knows_contacts(session, contacts):
 
 
 def test_contacts_are_found_once_beside_the_work_of_the_window(
-    hair, evaluated, in_window, contacts
+    hair, get_depsgraph, in_window, contacts
 ):
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     arrive(session)
-    assert previews.play(evaluated(), blocking=False) == []
+    assert previews.play(get_depsgraph(), blocking=False) == []
     assert previews.previews[session.uid].phase is Phase.WAITING
-    wait_until_playing(session, evaluated, FRAME)
-    previews.rest(evaluated(), keep_playing=True)
-    session.rest(evaluated())
+    wait_until_playing(session, get_depsgraph, FRAME)
+    previews.rest(get_depsgraph(), keep_playing=True)
+    session.rest(get_depsgraph())
     assert knows_contacts(session, contacts)
 
 
-def test_play_does_not_wait_for_ever_for_a_body_that_moves(hair, evaluated, in_window, sphere):
-    session = previews.start(hair, evaluated())
+def test_play_does_not_wait_for_ever_for_a_body_that_moves(hair, get_depsgraph, in_window, sphere):
+    session = previews.start(hair, get_depsgraph())
     arrive(session)
-    previews.play(evaluated(), blocking=False)
+    previews.play(get_depsgraph(), blocking=False)
 
     def moves_on():
         sphere.location.x += 0.01
-        previews.advance(evaluated(), FRAME)
+        previews.advance(get_depsgraph(), FRAME)
         return session.is_playing
 
     wait_until(moves_on)
@@ -369,38 +369,38 @@ def test_play_does_not_wait_for_ever_for_a_body_that_moves(hair, evaluated, in_w
     np.testing.assert_array_equal(begun.clearance.points, expected.clearance.points)
 
 
-def test_a_frame_of_blenders_playback_is_not_put_off_for_contacts(hair, evaluated, in_window):
-    session = previews.start(hair, evaluated())
+def test_a_frame_of_blenders_playback_is_not_put_off_for_contacts(hair, get_depsgraph, in_window):
+    session = previews.start(hair, get_depsgraph())
     arrive(session)
-    session.make_fields(evaluated())
+    session.make_fields(get_depsgraph())
     wait_until(fields.are_made)
-    session.play(evaluated(), blocking=False, is_frame=True)
+    session.play(get_depsgraph(), blocking=False, is_frame=True)
     assert session.is_playing and session.solver.motion.clearance is not None
 
 
 def test_hair_that_begins_again_in_play_knows_how_far_it_stays_from_colliders(
-    playing, hair, evaluated, contacts
+    playing, hair, get_depsgraph, contacts
 ):
-    previews.advance(evaluated(), FRAME)
+    previews.advance(get_depsgraph(), FRAME)
     contacts.clear()
     hair.data.hairloom.guides.guide_count = 9
-    scene_events.catch_up(evaluated())
+    scene_events.catch_up(get_depsgraph())
     arrive(playing)
     assert len(playing.rig.guides) == 9 and not playing.solver.motion.duration, "it begins again"
     assert knows_contacts(playing, contacts)
 
 
 def test_hair_that_arrives_in_play_knows_how_far_it_stays_from_colliders(
-    playing, hair, evaluated, contacts
+    playing, hair, get_depsgraph, contacts
 ):
     """Computed in the thread, and equal to what the next frame would compute."""
-    previews.advance(evaluated(), FRAME)
+    previews.advance(get_depsgraph(), FRAME)
     contacts.clear()
     hair.data.hairloom.children.strand_count = 3 * COUNT
     hair.data.hairloom.children.method = "multi"
-    scene_events.catch_up(evaluated())
+    scene_events.catch_up(get_depsgraph())
     arrive(playing)
-    previews.advance(evaluated(), FRAME)
+    previews.advance(get_depsgraph(), FRAME)
     ((is_beside, found),) = contacts
     assert is_beside and playing.solver.motion.clearance is found
     motion, settings = playing.solver.motion, playing.settings[DynamicsSettings]
@@ -413,11 +413,11 @@ def test_hair_that_arrives_in_play_knows_how_far_it_stays_from_colliders(
     assert np.isfinite(found.points).any() and found.kept == expected.kept
 
 
-def test_of_many_settings_the_last_one_counts(playing, hair, evaluated, monkeypatch):
+def test_of_many_settings_the_last_one_counts(playing, hair, get_depsgraph, monkeypatch):
     opened = hold(monkeypatch)
     for count in (10, 11, 12):
         hair.data.hairloom.guides.guide_count = count
-        scene_events.catch_up(evaluated())
+        scene_events.catch_up(get_depsgraph())
     made, take = [], type(playing).take_made
     monkeypatch.setattr(
         type(playing), "take_made", lambda s, d: (take(s, d), made.append(len(s.rig.guides)))
@@ -428,10 +428,10 @@ def test_of_many_settings_the_last_one_counts(playing, hair, evaluated, monkeypa
     assert playing.settings[GuideSettings].guide_count == 12 and not playing.is_stale
 
 
-def test_what_acts_at_once_meanwhile_is_kept(playing, hair, evaluated, monkeypatch):
+def test_what_acts_at_once_meanwhile_is_kept(playing, hair, get_depsgraph, monkeypatch):
     opened = hold(monkeypatch)
     hair.data.hairloom.guides.guide_count = 9
-    scene_events.catch_up(evaluated())
+    scene_events.catch_up(get_depsgraph())
     hair.data.hairloom.strands.fullness = 3.0
     assert shown(playing).snapshot.strand_settings.fullness == 3.0
     assert not playing.is_stale
@@ -441,52 +441,54 @@ def test_what_acts_at_once_meanwhile_is_kept(playing, hair, evaluated, monkeypat
     assert len(playing.rig.guides) == 9
 
 
-def test_edits_while_hair_is_made_arrive_too(playing, hair, evaluated, monkeypatch):
+def test_edits_while_hair_is_made_arrive_too(playing, hair, get_depsgraph, monkeypatch):
     opened = hold(monkeypatch)
     for scale in (0.9, 0.8):
         points = np.empty(len(hair.data.points) * 3, np.float32)
         hair.data.position_data.foreach_get("vector", points)
         hair.data.position_data.foreach_set("vector", points * np.float32(scale))
-        scene_events.updated(evaluated())
-        scene_events.catch_up(evaluated())
+        scene_events.updated(get_depsgraph())
+        scene_events.catch_up(get_depsgraph())
     opened.set()
     arrive(playing)
-    wanted = build(GroomSource(hair, evaluated()).request, is_drawn=False).rig.strands
+    wanted = build(GroomSource(hair, get_depsgraph()).request, is_drawn=False).rig.strands
     length = np.linalg.norm(np.diff(wanted.grid, axis=1), axis=2).sum()
     now = np.linalg.norm(np.diff(playing.rig.strands.grid, axis=1), axis=2).sum()
     assert now == pytest.approx(length, rel=1e-3)
 
 
-def test_ambient_light_needs_no_other_strands(playing, hair, evaluated, monkeypatch):
+def test_ambient_light_needs_no_other_strands(playing, hair, get_depsgraph, monkeypatch):
     monkeypatch.setattr(rig_flow, "prepare", None)
     rig, motion, before = playing.rig, strand_grid(playing), playing.snapshot.occlusion
     hair.data.hairloom.ambient.strength = 0.2
-    scene_events.catch_up(evaluated())
+    scene_events.catch_up(get_depsgraph())
     arrive(playing)
     assert playing.rig is rig and np.array_equal(strand_grid(playing), motion)
     assert playing.snapshot.occlusion.mean() > before.mean()
 
 
 @pytest.mark.parametrize("is_combed", [False, True])
-def test_how_strong_ambient_light_is_finds_no_light_again(hair, evaluated, monkeypatch, is_combed):
+def test_how_strong_ambient_light_is_finds_no_light_again(
+    hair, get_depsgraph, monkeypatch, is_combed
+):
     """Only changed strands need new light, not a changed strength."""
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     found, make = [], light_flow.sky_field
     monkeypatch.setattr(light_flow, "sky_field", lambda *given: found.append("sky") or make(*given))
     hair.data.hairloom.ambient.strength, hair.data.hairloom.ambient.ao_bias = 0.2, 0.8
     if is_combed:
         hair.data.position_data[7].vector.z += 0.02
         hair.data.update_tag()
-    session.read_again(evaluated())
+    session.read_again(get_depsgraph())
     assert bool(found) == is_combed
-    own = build(GroomSource(hair, evaluated()).request, is_drawn=True)
+    own = build(GroomSource(hair, get_depsgraph()).request, is_drawn=True)
     assert same_content(session.groom.light, own.light)
     np.testing.assert_array_equal(session.groom.head_occlusion, own.head_occlusion)
 
 
 @pytest.mark.parametrize("end", ["stop", "delete", "load"])
-def test_an_end_in_the_middle_leaves_nothing(end, hair, evaluated, gate):
-    session = previews.start(hair, evaluated())
+def test_an_end_in_the_middle_leaves_nothing(end, hair, get_depsgraph, gate):
+    session = previews.start(hair, get_depsgraph())
     if end == "stop":
         previews.stop(session)
     elif end == "delete":
@@ -510,7 +512,7 @@ def test_hair_that_cannot_be_made_ends_the_preview_with_a_notice(playing, hair, 
 
 
 def test_a_failure_of_what_nobody_wants_any_more_is_no_matter(
-    playing, hair, evaluated, monkeypatch
+    playing, hair, get_depsgraph, monkeypatch
 ):
     opened, prepare = threading.Event(), rig_flow.prepare
 
@@ -523,23 +525,23 @@ def test_a_failure_of_what_nobody_wants_any_more_is_no_matter(
     monkeypatch.setattr(rig_flow, "prepare", fail_for_five)
     for count in (5, 6):
         hair.data.hairloom.guides.guide_count = count
-        scene_events.catch_up(evaluated())
+        scene_events.catch_up(get_depsgraph())
     opened.set()
     arrive(playing)
     assert previews.sessions() == (playing,) and len(playing.rig.guides) == 6
 
 
-def test_pictures_are_of_whole_hair(hair, evaluated, in_window):
-    previews.start(hair, evaluated())
-    assert len(shown_groom(hair, evaluated()).points) == 16 * COUNT
+def test_pictures_are_of_whole_hair(hair, get_depsgraph, in_window):
+    previews.start(hair, get_depsgraph())
+    assert len(shown_groom(hair, get_depsgraph()).points) == 16 * COUNT
 
 
-def test_orders_tell_whether_they_give_the_same_rig(hair, evaluated, extension):
-    reading = GroomSource(hair, evaluated())
+def test_orders_tell_whether_they_give_the_same_rig(hair, get_depsgraph, extension):
+    reading = GroomSource(hair, get_depsgraph())
     order = reading.request
-    assert order.gives_rig_of(order) and reading.read_again(evaluated()) is None
+    assert order.gives_rig_of(order) and reading.read_again(get_depsgraph()) is None
     hair.data.hairloom.guides.guide_count = 5
-    other = reading.read_again(evaluated())
+    other = reading.read_again(get_depsgraph())
     assert isinstance(other, BuildRequest) and not other.gives_rig_of(order)
     assert reading.settings[GuideSettings].guide_count != 5, "it is not shown yet"
     reading.accept(other)
@@ -566,9 +568,9 @@ def rounds(session, *frames):
     return np.array(found)
 
 
-def test_playback_goes_on_before_the_hair_is_made(hair, moving, evaluated, gate, monkeypatch):
+def test_playback_goes_on_before_the_hair_is_made(hair, moving, get_depsgraph, gate, monkeypatch):
     hair.hairloom.dynamics.device = "numpy"
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     fields.field_of(session.source.head, session.settings[DynamicsSettings], place="Head")
     monkeypatch.setattr(playback, "is_played", lambda: True)
     before = rounds(session, 1, 2, 3, 4)  # would wait for the gate forever if it blocked
@@ -577,7 +579,7 @@ def test_playback_goes_on_before_the_hair_is_made(hair, moving, evaluated, gate,
         and not session.is_playing
         and previews.previews[session.uid].is_deferred
     )
-    assert not is_box(hair, evaluated), "Blender's own strands are there until then"
+    assert not is_box(hair, get_depsgraph), "Blender's own strands are there until then"
     assert before[3, :, 0, 0].mean() > before[0, :, 0, 0].mean() + 0.01, "it goes with its body"
     gate.set()
     arrive(session)
@@ -592,11 +594,11 @@ def test_playback_goes_on_before_the_hair_is_made(hair, moving, evaluated, gate,
     previews.stop(session)
     bpy.context.scene.frame_set(1)  # the frame in which the first preview began
     monkeypatch.setattr(latest_job, "is_blocking", lambda: True)
-    again = previews.start(hair, evaluated())
+    again = previews.start(hair, get_depsgraph())
     np.testing.assert_array_equal(second, rounds(again, *range(1, 8)))
 
 
-def test_playback_goes_on_before_a_collider_is_made(hair, moving, evaluated, monkeypatch):
+def test_playback_goes_on_before_a_collider_is_made(hair, moving, get_depsgraph, monkeypatch):
     opened, from_surface = threading.Event(), DistanceField.from_surface
 
     def wait_and_make(*arguments, **named):
@@ -604,7 +606,7 @@ def test_playback_goes_on_before_a_collider_is_made(hair, moving, evaluated, mon
         return from_surface(*arguments, **named)
 
     monkeypatch.setattr(DistanceField, "from_surface", wait_and_make)
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     monkeypatch.setattr(latest_job, "is_blocking", lambda: False)
     monkeypatch.setattr(playback, "is_played", lambda: True)
     rounds(session, 1, 2, 3)
@@ -615,12 +617,12 @@ def test_playback_goes_on_before_a_collider_is_made(hair, moving, evaluated, mon
     assert session.is_playing and not previews.previews[session.uid].is_deferred
 
 
-def test_old_hair_goes_on_in_playback_too(playing, hair, moving, evaluated, monkeypatch):
+def test_old_hair_goes_on_in_playback_too(playing, hair, moving, get_depsgraph, monkeypatch):
     opened = hold(monkeypatch)
     monkeypatch.setattr(playback, "is_played", lambda: True)
     rounds(playing, 1, 2)
     hair.data.hairloom.guides.guide_count = 7
-    scene_events.catch_up(evaluated())
+    scene_events.catch_up(get_depsgraph())
     shown = rounds(playing, 3, 4, 1, 2)
     assert (
         playing.is_pending and playing.is_playing and not previews.previews[playing.uid].is_deferred
@@ -631,17 +633,17 @@ def test_old_hair_goes_on_in_playback_too(playing, hair, moving, evaluated, monk
     assert len(playing.rig.guides) == 7
 
 
-def test_a_step_of_a_frame_waits_to_be_exact(hair, moving, evaluated, gate):
-    session = previews.start(hair, evaluated())
+def test_a_step_of_a_frame_waits_to_be_exact(hair, moving, get_depsgraph, gate):
+    session = previews.start(hair, get_depsgraph())
     threading.Timer(0.3, gate.set).start()
     rounds(session, 1, 2)
     assert session.is_made and session.is_playing
 
 
-def test_what_stands_in_on_a_dense_head_searches_a_part_of_it(new_hair, evaluated, monkeypatch):
+def test_what_stands_in_on_a_dense_head_searches_a_part_of_it(new_hair, get_depsgraph, monkeypatch):
     bpy.ops.mesh.primitive_ico_sphere_add(radius=0.1, subdivisions=5)
     hair = new_hair(bpy.context.object)
-    order = GroomSource(hair, evaluated()).request
+    order = GroomSource(hair, get_depsgraph()).request
     head, searched, bind = order.source.head, [], rig_flow.bind_roots
     assert len(head.triangles) > prepared_groom._LARGE
 
@@ -659,9 +661,9 @@ def test_what_stands_in_on_a_dense_head_searches_a_part_of_it(new_hair, evaluate
     assert np.array_equal(carried, made.rig.strands.points)
 
 
-def test_hair_of_another_scale_is_told_of_a_dense_head_as_of_any(new_hair, evaluated):
+def test_hair_of_another_scale_is_told_of_a_dense_head_as_of_any(new_hair, get_depsgraph):
     bpy.ops.mesh.primitive_ico_sphere_add(radius=0.1, subdivisions=5)
-    order = GroomSource(new_hair(bpy.context.object), evaluated()).request
+    order = GroomSource(new_hair(bpy.context.object), get_depsgraph()).request
     large = order.source.strands.transformed(np.diag([1000.0, 1000.0, 1000.0, 1.0]))
     order = replace(order, source=replace(order.source, strands=large))
     told = []
@@ -672,28 +674,28 @@ def test_hair_of_another_scale_is_told_of_a_dense_head_as_of_any(new_hair, evalu
     assert told[0] == told[1] and "a different scale" in told[0]
 
 
-def test_hair_of_another_scene_is_not_waited_for(hair, evaluated, in_window):
+def test_hair_of_another_scene_is_not_waited_for(hair, get_depsgraph, in_window):
     """Hair previewed in one scene cannot be finished while another scene is shown."""
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     bpy.context.window.scene = bpy.data.scenes.new("Elsewhere")
     with pytest.raises(HairloomError, match="another scene"):
-        previews.finish(session, evaluated())
+        previews.finish(session, get_depsgraph())
 
 
 def test_hair_that_is_made_while_another_scene_is_shown_arrives_with_its_own(
-    hair, evaluated, in_window, monkeypatch
+    hair, get_depsgraph, in_window, monkeypatch
 ):
     bpy.context.scene.frame_set(5)  # in its first frame hair would start to play, which waits
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     window, scene, refreshed = bpy.context.window, bpy.context.scene, []
     monkeypatch.setattr(previews, "refresh_views", lambda: refreshed.append(True))
     window.scene = bpy.data.scenes.new("Elsewhere")
-    evaluated()
+    get_depsgraph()
     wait_until(lambda: session.has_arrived)
     for _ in range(3):
         latest_job.take_steps()
     assert not refreshed and not session.is_made, "the other scene is left alone"
     window.scene = scene
-    evaluated()
+    get_depsgraph()
     take_steps_until(lambda: session.is_made)
     assert refreshed and overlay.drawing_of(session.uid).is_made

@@ -54,22 +54,22 @@ def test_an_array_counts_once_and_a_view_is_its_array():
     assert measures.array_bytes(held, held) == 4010
 
 
-def test_a_session_measures_itself(new_hair, sphere, evaluated):
-    session = previews.start(new_hair(sphere), evaluated())
-    session.play(evaluated())
-    session.advance(evaluated(), 1.0 / 24.0)
+def test_a_session_measures_itself(new_hair, sphere, get_depsgraph):
+    session = previews.start(new_hair(sphere), get_depsgraph())
+    session.play(get_depsgraph())
+    session.advance(get_depsgraph(), 1.0 / 24.0)
     assert session.times.milliseconds("simulation") > 0.0
     assert measures.array_bytes(session.rig) >= session.rig.strands.points.nbytes
 
 
-def test_figures_are_those_of_the_frame_that_is_shown(new_hair, sphere, evaluated):
+def test_figures_are_those_of_the_frame_that_is_shown(new_hair, sphere, get_depsgraph):
     """Figures equal those computed from the drawn strands and a spherical head."""
     hair = new_hair(sphere)
     sphere.hairloom.collider_shape = "sphere"
-    session = previews.start(hair, evaluated())
-    previews.begin(session, evaluated(), blocking=True)
+    session = previews.start(hair, get_depsgraph())
+    previews.begin(session, get_depsgraph(), blocking=True)
     sphere.location.x += 0.05
-    previews.advance(evaluated(), 1.0 / 24.0)
+    previews.advance(get_depsgraph(), 1.0 / 24.0)
     assert session.figures is None
     session.measure()
     found, points = session.figures, strand_grid(session)
@@ -81,15 +81,15 @@ def test_figures_are_those_of_the_frame_that_is_shown(new_hair, sphere, evaluate
     # roots on the sphere may count as inside or outside, so they are left out of the depth
     depth = 0.1 - np.linalg.norm(points[:, 1:] - [0.05, 0.0, 0.0], axis=2).min()
     assert found.strands_penetration_max_mm == pytest.approx(max(0.0, 1000.0 * depth), abs=0.1)
-    previews.advance(evaluated(), 1.0 / 24.0)
+    previews.advance(get_depsgraph(), 1.0 / 24.0)
     assert session.figures is found and not session.are_figures_current, "of another moment"
-    previews.rest(evaluated(), keep_playing=True)
+    previews.rest(get_depsgraph(), keep_playing=True)
     assert session.figures is None
 
 
-def test_measuring_needs_hair_that_is_simulated(new_hair, sphere, evaluated):
-    session = previews.start(new_hair(sphere), evaluated())
+def test_measuring_needs_hair_that_is_simulated(new_hair, sphere, get_depsgraph):
+    session = previews.start(new_hair(sphere), get_depsgraph())
     assert not bpy.ops.hairloom.measure.poll()
-    session.play(evaluated())
+    session.play(get_depsgraph())
     assert bpy.ops.hairloom.measure() == {"FINISHED"}
     assert session.figures.strands_stretch_max_percent < 1e-3

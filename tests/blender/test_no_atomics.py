@@ -41,12 +41,12 @@ def automatic() -> Iterator[None]:
 
 @pytest.mark.slow(instead="test_the_preview_is_drawn_without_atomics")
 def test_a_render_is_calm_without_atomics(
-    stage: Any, new_hair: Callable[..., Any], sphere: Any, tmp_path: Path
+    engine_scene: Any, new_hair: Callable[..., Any], sphere: Any, tmp_path: Path
 ) -> None:
     """Hashed strands take 16 samples although one is set, and agree with layers to 1 %."""
     hair = new_hair(sphere)
     hair.data.hairloom.strands.fullness = 20.0
-    picture_settings = stage.hairloom.picture
+    picture_settings = engine_scene.hairloom.picture
     pictures = {}
     for samples, choice in ((16, "automatic"), (1, "never"), (16, "never")):
         picture_settings.samples = samples
@@ -61,7 +61,7 @@ def test_a_render_is_calm_without_atomics(
 
 @pytest.mark.slow(instead="test_the_preview_is_drawn_without_atomics")
 def test_a_render_shares_what_was_drawn_elsewhere(
-    stage: Any, new_hair: Callable[..., Any], sphere: Any, tmp_path: Path
+    engine_scene: Any, new_hair: Callable[..., Any], sphere: Any, tmp_path: Path
 ) -> None:
     """A render's own GPU context cannot bind framebuffers of another context."""
     hair = new_hair(sphere)
@@ -107,12 +107,12 @@ def test_the_preferences_forbid_them_and_the_self_test_says_so(monkeypatch: Any)
 
 
 def test_the_preview_is_drawn_without_atomics(
-    new_hair: Callable[..., Any], sphere: Any, evaluated: Callable[[], Any]
+    new_hair: Callable[..., Any], sphere: Any, get_depsgraph: Callable[[], Any]
 ) -> None:
     """The preview of a groom with its shadow on the body: noisy, but as bright."""
     hair = new_hair(sphere)
     hair.data.hairloom.strands.fullness = 20.0
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     target, pictures = Target(), []
     camera = Camera(look_at((0.4, -0.5, 0.3), (0.0, 0.0, 0.0)), perspective(0.4, 1.0, 0.05, 5.0))
     for choice in ("automatic", "never"):

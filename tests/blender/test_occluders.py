@@ -117,7 +117,7 @@ def test_hair_that_cannot_be_used_shades_nothing_and_says_why(hair, new_hair, sp
 
 
 @pytest.fixture
-def shaded(hair, new_hair, sphere, evaluated):
+def shaded(hair, new_hair, sphere, get_depsgraph):
     """Hair shown as cards, and other hair whose strands shade them."""
     strands = new_hair(sphere)
     strands.name = "Shading"
@@ -125,7 +125,7 @@ def shaded(hair, new_hair, sphere, evaluated):
     groom = hair.data.hairloom
     groom.card_occlusion.others, groom.card_drawing.shown_as = True, "cards"
     bpy.context.view_layer.update()
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     yield session, strands
     previews.stop_all()
 
@@ -135,27 +135,27 @@ def shown(session):
     return overlay.drawing_of(session.uid).snapshot.cards.mesh.occlusion
 
 
-def follow(evaluated):
+def follow(get_depsgraph):
     """Run the handlers of an update."""
     bpy.context.view_layer.update()
-    scene_events.updated(evaluated())
-    scene_events.catch_up(evaluated())
+    scene_events.updated(get_depsgraph())
+    scene_events.catch_up(get_depsgraph())
 
 
-def test_the_preview_follows_other_hair(shaded, evaluated):
+def test_the_preview_follows_other_hair(shaded, get_depsgraph):
     session, strands = shaded
     near = shown(session)
-    follow(evaluated)
+    follow(get_depsgraph)
     assert shown(session) is near, "nothing has moved"
     strands.location.x = 5.0
-    follow(evaluated)
+    follow(get_depsgraph)
     assert shown(session).mean() > near.mean() + 0.02
 
 
 @pytest.mark.parametrize(
     "way", few_in_commits(["deleted", "hidden", "left out of renders and views"])
 )
-def test_the_preview_follows_other_hair_that_goes_and_comes(shaded, evaluated, way):
+def test_the_preview_follows_other_hair_that_goes_and_comes(shaded, get_depsgraph, way):
     session, strands = shaded
     near, before = shown(session), session.cards.shaded_by
     if way == "hidden":
@@ -164,44 +164,44 @@ def test_the_preview_follows_other_hair_that_goes_and_comes(shaded, evaluated, w
         bpy.data.objects.remove(strands)
     else:
         strands.hide_viewport = True
-    follow(evaluated)
+    follow(get_depsgraph)
     assert shown(session).mean() > near.mean() + 0.02 and session.cards.shaded_by == frozenset()
     if way == "deleted":
         return
     strands.hide_set(False)
     strands.hide_viewport = False
-    follow(evaluated)
+    follow(get_depsgraph)
     np.testing.assert_array_equal(shown(session), near)
     assert session.cards.shaded_by == before
 
 
-def test_the_preview_follows_the_settings_of_other_hair(shaded, evaluated):
+def test_the_preview_follows_the_settings_of_other_hair(shaded, get_depsgraph):
     session, strands = shaded
     near = shown(session)
     strands.data.hairloom.strands.fullness = 1.0
-    scene_events.catch_up(evaluated())
+    scene_events.catch_up(get_depsgraph())
     assert shown(session).mean() > near.mean() + 0.02
     before = shown(session)
     strands.data.hairloom.shading.color_variation = 0.5
-    scene_events.catch_up(evaluated())
+    scene_events.catch_up(get_depsgraph())
     assert shown(session) is before, "colours shade nothing"
 
 
-def test_undo_has_cards_shaded_again(shaded, evaluated):
+def test_undo_has_cards_shaded_again(shaded, get_depsgraph):
     session, strands = shaded
     near = shown(session)
     strands.location.x = 5.0
     bpy.context.view_layer.update()  # as undo does, without update events for objects
     scene_events.undone()
-    scene_events.catch_up(evaluated())
+    scene_events.catch_up(get_depsgraph())
     assert shown(session).mean() > near.mean() + 0.02
 
 
-def test_hair_that_moves_with_other_hair_keeps_its_shade(shaded, sphere, evaluated):
+def test_hair_that_moves_with_other_hair_keeps_its_shade(shaded, sphere, get_depsgraph):
     session, strands = shaded
     near, before = shown(session), strands.matrix_world.copy()
     sphere.location.x, sphere.rotation_euler.z = 0.25, 1.0
-    follow(evaluated)
+    follow(get_depsgraph)
     assert strands.matrix_world != before, "both are children of the head"
     assert shown(session) is near, "the same cards, elsewhere"
     session.cards.forget()  # built again at the new place
@@ -214,7 +214,7 @@ def threads_of(name):
     return {each for each in threading.enumerate() if each.name == name}
 
 
-def test_other_hair_is_made_into_cards_in_the_thread(shaded, evaluated, monkeypatch):
+def test_other_hair_is_made_into_cards_in_the_thread(shaded, get_depsgraph, monkeypatch):
     session, strands = shaded
     threads = []
     occluder_of = card_flow.occluder_of
@@ -226,24 +226,24 @@ def test_other_hair_is_made_into_cards_in_the_thread(shaded, evaluated, monkeypa
     )
     near = shown(session)
     strands.location.x = 5.0
-    follow(evaluated)
+    follow(get_depsgraph)
     assert session.cards.is_pending and shown(session) is near
     first = threads_of("hairloom cards")
     strands.location.x = 0.0
     strands.rotation_euler.z += 0.3
-    follow(evaluated)
+    follow(get_depsgraph)
     assert threads_of("hairloom cards") - first, "it moves while a build is pending"
     take_steps_until(lambda: not session.cards.is_pending)
     assert shown(session) is not near
     assert threads and threading.main_thread() not in threads
 
 
-def test_a_render_has_the_shade_of_other_hair_as_it_is(shaded, evaluated):
+def test_a_render_has_the_shade_of_other_hair_as_it_is(shaded, get_depsgraph):
     session, strands = shaded
     hair = session.hair.found()
 
     def rendered():
-        return read_groom(hair, evaluated()).cards.mesh.occlusion
+        return read_groom(hair, get_depsgraph()).cards.mesh.occlusion
 
     near = rendered()
     np.testing.assert_allclose(near, shown(session), atol=1e-6)
@@ -257,14 +257,14 @@ def test_a_render_has_the_shade_of_other_hair_as_it_is(shaded, evaluated):
     assert rendered().mean() > near.mean() + 0.02
 
 
-def test_hair_that_cannot_be_made_ready_is_told_of_by_the_cards(shaded, hair, evaluated):
+def test_hair_that_cannot_be_made_ready_is_told_of_by_the_cards(shaded, hair, get_depsgraph):
     """Its roots are far from its head, which is detected only in the thread."""
     session, strands = shaded
     strands.data.attributes["position"].data[0].vector.x = np.inf
     for each in strands.data.attributes["position"].data:
         each.vector = each.vector * 1000.0
     strands.data.update_tag()
-    follow(evaluated)
+    follow(get_depsgraph)
     assert any("It occludes nothing" in note for note in session.cards.warnings)
 
 
@@ -278,10 +278,10 @@ def test_own_cards_and_coarser_levels_and_other_meshes_are_left_out(hair, sphere
     assert len(shade.mesh.triangles) == len(card_objects(hair)[0].data.polygons)
 
 
-def test_they_shade_what_is_sorted(hair, other, evaluated):
+def test_they_shade_what_is_sorted(hair, other, get_depsgraph):
     def sorted_by(others):
         choices = SortOptions(occlusion=CardOcclusionSettings(rays=64, others=others))
-        sort_mesh(other, evaluated(), choices)
+        sort_mesh(other, get_depsgraph(), choices)
         return openness(other).mean()
 
     assert sorted_by(True) < sorted_by(False) - 0.02

@@ -268,44 +268,48 @@ def frames(scene, last):
         scene.frame_set(frame)
 
 
-def test_keyframes_and_drivers_act_in_preview_and_engine(new_hair, sphere, evaluated):
+def test_keyframes_and_drivers_act_in_preview_and_engine(new_hair, sphere, get_depsgraph):
     hair, scene = new_hair(sphere), bpy.context.scene
     source = bpy.data.objects.new("Source", None)
     scene.collection.objects.link(source)
     keyed(hair.data, "hairloom.strands.fullness", {1: 1.0, 5: 3.0})
     driven(hair.data, "hairloom.shading.ambient", source)
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     source.location.x = 0.75
     scene.frame_set(5)
     snapshot = overlay.drawing_of(session.uid).snapshot
     assert (snapshot.strand_settings.fullness, snapshot.shading.ambient) == (3.0, 0.75)
-    found = engine_hair.read_groom(hair, evaluated())
+    found = engine_hair.read_groom(hair, get_depsgraph())
     assert (found.strand_settings.fullness, found.shading.ambient) == (3.0, 0.75)
 
 
 @pytest.mark.slow(instead="test_keyframes_and_drivers_act_in_preview_and_engine")
 @pytest.mark.parametrize("is_previewed", few_in_commits([True, False]))
 def test_a_rendered_animation_has_the_settings_of_each_frame(
-    is_previewed, stage, new_hair, sphere, evaluated, monkeypatch, tmp_path
+    is_previewed, engine_scene, new_hair, sphere, get_depsgraph, monkeypatch, tmp_path
 ):
     hair, source = new_hair(sphere), bpy.data.objects.new("Source", None)
-    stage.collection.objects.link(source)
+    engine_scene.collection.objects.link(source)
     keyed(hair.data, "hairloom.strands.fullness", {1: 1.0, 3: 3.0})
     keyed(hair, "hairloom.debug_view", {1: "none", 3: "guide"})
     driven(hair.data, "hairloom.shading.ambient", source)
     keyed(source, "location", {1: (0.0, 0.0, 0.0), 3: (1.0, 0.0, 0.0)})
     if is_previewed:
-        previews.start(hair, evaluated())
+        previews.start(hair, get_depsgraph())
     found, read = {}, engine_hair.read_groom
 
     def reading(*arguments, **named):
         snapshot = read(*arguments, **named)
         values = snapshot.strand_settings.fullness, snapshot.shading.ambient
-        found[stage.frame_current] = (*values, snapshot.debug_view)
+        found[engine_scene.frame_current] = (*values, snapshot.debug_view)
         return snapshot
 
     monkeypatch.setattr(engine_hair, "read_groom", reading)
-    stage.frame_start, stage.frame_end, stage.render.filepath = 1, 3, str(tmp_path / "frame_")
+    engine_scene.frame_start, engine_scene.frame_end, engine_scene.render.filepath = (
+        1,
+        3,
+        str(tmp_path / "frame_"),
+    )
     bpy.ops.render.render(animation=True)
     assert found[1] == (1.0, 0.0, "none") and found[2][:2] == pytest.approx((2.0, 0.5))
     assert found[3] == (3.0, 1.0, "guide")
@@ -313,7 +317,7 @@ def test_a_rendered_animation_has_the_settings_of_each_frame(
 
 @pytest.mark.parametrize("way", ["keyframe", "driver"])
 def test_an_animated_wind_blows_hair_in_playback_and_in_a_bake(
-    way, new_hair, sphere, evaluated, tmp_path
+    way, new_hair, sphere, get_depsgraph, tmp_path
 ):
     hair, scene = new_hair(sphere), bpy.context.scene
     scene.frame_start, scene.frame_end = 1, 6
@@ -322,7 +326,7 @@ def test_an_animated_wind_blows_hair_in_playback_and_in_a_bake(
     hair.hairloom.dynamics.gusts = 0.0
     hair.hairloom.dynamics.device = "numpy"
     hair.hairloom.dynamics.collider_resolution = 16
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     frames(scene, 6)
     still = strand_grid(session)
     path = "hairloom.dynamics.wind_speed"

@@ -26,11 +26,11 @@ pytestmark = pytest.mark.draws(light=False)
 
 
 @pytest.fixture
-def preview(new_hair, sphere, evaluated):
+def preview(new_hair, sphere, get_depsgraph):
     """Hair on a head, previewed: (hair, head, session)."""
     hair = new_hair(sphere)
     hair.hairloom.dynamics.collider_resolution = 16
-    return hair, sphere, previews.start(hair, evaluated())
+    return hair, sphere, previews.start(hair, get_depsgraph())
 
 
 def overlays(session):
@@ -87,13 +87,13 @@ def test_nothing_is_drawn_until_it_is_wanted(preview):
     assert overlays(session) == ()
 
 
-def test_the_box_of_a_field_is_around_its_mesh_and_follows_it(preview, evaluated):
+def test_the_box_of_a_field_is_around_its_mesh_and_follows_it(preview, get_depsgraph):
     hair, head, session = preview
-    previews.play(evaluated())
+    previews.play(get_depsgraph())
     for x in (0.0, 0.3):
         head.location.x = x
         bpy.context.view_layer.update()
-        previews.advance(evaluated(), 0.04)
+        previews.advance(get_depsgraph(), 0.04)
         points = lines_of(hair, session, "colliders")
         assert len(points) == 24
         middle, size = (points.min(axis=0) + points.max(axis=0)) / 2.0, np.ptp(points, axis=0)
@@ -139,18 +139,18 @@ def test_each_light_has_a_line_towards_it(preview):
     assert sorted(ways[:, 2]) == pytest.approx([1.0, 1.0], abs=1e-3), "a sun shines down"
 
 
-def played(preview, evaluated, kind):
+def played(preview, get_depsgraph, kind):
     """Hair that plays with an overlay: (session, lines of the overlay)."""
     hair, _, session = preview
-    previews.play(evaluated())
+    previews.play(get_depsgraph())
     hair.hairloom.shown_overlays = {kind}
     return session, overlays(session)
 
 
 def test_stretch_shows_each_segment_of_the_guides_once_and_none_at_rest_as_stretched(
-    preview, evaluated
+    preview, get_depsgraph
 ):
-    session, found = played(preview, evaluated, "stretch")
+    session, found = played(preview, get_depsgraph, "stretch")
     guides = session.solver.guides()
     (lines,) = found
     assert lines.color == motion_lines.STRETCHES[0][1]
@@ -162,9 +162,9 @@ def test_stretch_shows_each_segment_of_the_guides_once_and_none_at_rest_as_stret
     np.testing.assert_allclose(worst, longer[3, -2:], atol=1e-6)
 
 
-def test_contacts_show_what_touches_and_how_deep_the_rest_is(preview, evaluated, monkeypatch):
+def test_contacts_show_what_touches_and_how_deep_the_rest_is(preview, get_depsgraph, monkeypatch):
     """A ball around a tip."""
-    session, _ = played(preview, evaluated, "contacts")
+    session, _ = played(preview, get_depsgraph, "contacts")
     tip = session.solver.guides()[0, -1]
     center = (tip + [0.004, 0.0, 0.0]).astype(np.float32)
     ball = PosedCollider(SphereCollider(center, 0.01), np.eye(4), np.eye(4))
@@ -176,8 +176,8 @@ def test_contacts_show_what_touches_and_how_deep_the_rest_is(preview, evaluated,
     np.testing.assert_allclose(away[:, 1], 0.01, rtol=1e-3)
 
 
-def test_density_shows_the_cells_that_two_slices_cut(preview, evaluated):
-    session, found = played(preview, evaluated, "density")
+def test_density_shows_the_cells_that_two_slices_cut(preview, get_depsgraph):
+    session, found = played(preview, get_depsgraph, "density")
     guides = session.solver.guides()
     cell = session.solver.motion.dynamics.rest.hair_grid.cell
     squares = np.concatenate([lines.points.reshape(-1, 8, 3) for lines in found])

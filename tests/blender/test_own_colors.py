@@ -38,9 +38,9 @@ def hair(new_hair: Callable[..., Any], sphere: Any) -> Any:
 
 
 def test_painting_the_curves_is_seen_in_the_preview(
-    hair: Any, evaluated: Callable[[], Any]
+    hair: Any, get_depsgraph: Callable[[], Any]
 ) -> None:
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     shown = overlay.drawing_of(session.uid).snapshot
     assert without_strands(shown).strand_count == 0, "where cards are shown"
     grid = two_colored().color_grid
@@ -51,34 +51,34 @@ def test_painting_the_curves_is_seen_in_the_preview(
     hair.data.attributes["color"].data.foreach_set("color", opaque)
     hair.data.update_tag()
     bpy.context.view_layer.update()
-    scene_events.catch_up(evaluated())
+    scene_events.catch_up(get_depsgraph())
     painted = overlay.drawing_of(session.uid).snapshot
     np.testing.assert_allclose(painted.color, np.broadcast_to(BLUE, painted.color.shape), atol=1e-6)
-    scene_events.catch_up(evaluated())
+    scene_events.catch_up(get_depsgraph())
     assert overlay.drawing_of(session.uid).snapshot.color is painted.color, "nothing has changed"
 
 
 def test_colours_of_wet_hair_are_seen_in_the_preview(
-    hair: Any, evaluated: Callable[[], Any]
+    hair: Any, get_depsgraph: Callable[[], Any]
 ) -> None:
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     dry = overlay.drawing_of(session.uid).snapshot.color
     for wetness in (1.0, 0.0):
         hair.data.hairloom.shading.wetness = wetness
-        scene_events.catch_up(evaluated())
+        scene_events.catch_up(get_depsgraph())
         shown = overlay.drawing_of(session.uid).snapshot.color
         expected = coated_color(dry, ShadingSettings(wetness=wetness))
         np.testing.assert_allclose(shown, expected, atol=1e-6)
 
 
-def test_a_bake_keeps_the_colours(hair: Any, evaluated: Callable[[], Any]) -> None:
-    rig = previews.start(hair, evaluated()).rig
+def test_a_bake_keeps_the_colours(hair: Any, get_depsgraph: Callable[[], Any]) -> None:
+    rig = previews.start(hair, get_depsgraph()).rig
     found = baked_rig_of(rig_arrays(rig, RestMatrices(np.eye(4), np.eye(4))), "here").rig
     np.testing.assert_array_equal(found.strands.color, rig.strands.color)
 
 
-def test_a_bake_keeps_points_by_need(hair: Any, evaluated: Callable[[], Any]) -> None:
-    rig = previews.start(hair, evaluated()).rig
+def test_a_bake_keeps_points_by_need(hair: Any, get_depsgraph: Callable[[], Any]) -> None:
+    rig = previews.start(hair, get_depsgraph()).rig
     strands = rig.strands
     kept = np.arange(strands.point_count) % 16 % 5 == 0
     kept[: strands.point_count // 2] = True
@@ -100,14 +100,16 @@ def test_a_bake_keeps_points_by_need(hair: Any, evaluated: Callable[[], Any]) ->
 
 @pytest.mark.draws
 @pytest.mark.slow
-def test_cards_have_the_colours_of_their_strands(hair: Any, evaluated: Callable[[], Any]) -> None:
+def test_cards_have_the_colours_of_their_strands(
+    hair: Any, get_depsgraph: Callable[[], Any]
+) -> None:
     """At least a fifth of the texels with hair are red, and a fifth blue."""
     groom = hair.data.hairloom
     groom.atlas.size = "512"
     groom.card_occlusion.rays, groom.cards.order_by = 1, "distance"
     groom.shading.color_variation = groom.shading.tip_tint = 0.0
     groom.card_drawing.shown_as = "cards"
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     cards = overlay.drawing_of(session.uid).snapshot.cards
     assert cards.base_color == pytest.approx(np.maximum(RED, BLUE), abs=1e-6)
     shown = cards.textures.base * np.array(cards.base_color)
@@ -117,35 +119,37 @@ def test_cards_have_the_colours_of_their_strands(hair: Any, evaluated: Callable[
         assert is_alike.sum() > 0.2 * is_hair.sum()
 
 
-def test_exports_have_the_colours_that_are_drawn(hair: Any, evaluated: Callable[[], Any]) -> None:
+def test_exports_have_the_colours_that_are_drawn(
+    hair: Any, get_depsgraph: Callable[[], Any]
+) -> None:
     groom = hair.data.hairloom
     groom.shading.model, groom.shading.base_color = "kajiya_kay", (0.25, 0.5, 0.75)
-    own = still_hair(hair, evaluated(), ExportRequest(guides=False)).groom.color
+    own = still_hair(hair, get_depsgraph(), ExportRequest(guides=False)).groom.color
     np.testing.assert_allclose(own, two_colored().color, atol=1e-6)
     groom.shading.color_source = "look"
     request = ExportRequest(guides=False)
-    assert np.unique(still_hair(hair, evaluated(), request).groom.color, axis=0) == pytest.approx(
-        np.array([[0.25, 0.5, 0.75]])
-    )
-    assert still_hair(hair, evaluated(), replace(request, color=False)).groom.color is None
+    assert np.unique(
+        still_hair(hair, get_depsgraph(), request).groom.color, axis=0
+    ) == pytest.approx(np.array([[0.25, 0.5, 0.75]]))
+    assert still_hair(hair, get_depsgraph(), replace(request, color=False)).groom.color is None
 
 
 def test_strands_without_a_colour_are_exported_in_the_looks(
-    new_hair: Callable[..., Any], sphere: Any, evaluated: Callable[[], Any]
+    new_hair: Callable[..., Any], sphere: Any, get_depsgraph: Callable[[], Any]
 ) -> None:
     hair = new_hair(sphere, two_colored((np.nan,) * 3))
     hair.data.hairloom.shading.base_color = (0.25, 0.5, 0.75)
-    out = still_hair(hair, evaluated(), ExportRequest(guides=False, color=False))
+    out = still_hair(hair, get_depsgraph(), ExportRequest(guides=False, color=False))
     expected = two_colored((0.25, 0.5, 0.75)).color
     np.testing.assert_allclose(out.groom.color, expected, atol=1e-6)
     assert sum("have no usable colour" in note for note in out.notes) == 1
 
 
 def test_children_are_exported_in_the_colours_of_their_guides(
-    hair: Any, evaluated: Callable[[], Any]
+    hair: Any, get_depsgraph: Callable[[], Any]
 ) -> None:
     hair.data.hairloom.children.method = "single"
     hair.data.hairloom.children.strand_count = 100
-    color = still_hair(hair, evaluated(), ExportRequest(guides=False)).groom.color
+    color = still_hair(hair, get_depsgraph(), ExportRequest(guides=False)).groom.color
     is_one = [np.isclose(color, one, atol=1e-5).all(axis=1) for one in (RED, BLUE)]
     assert (is_one[0] | is_one[1]).all() and is_one[0].any() and is_one[1].any()

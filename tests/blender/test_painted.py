@@ -74,9 +74,9 @@ def paint(kind: str, hair: Any, sphere: Any) -> None:
             hair.data.attributes.new("Top", "FLOAT", "POINT").data.foreach_set("value", of_points)
 
 
-def started(hair: Any, evaluated: Any) -> Any:
+def started(hair: Any, get_depsgraph: Any) -> Any:
     bpy.context.view_layer.update()
-    return previews.start(hair, evaluated())
+    return previews.start(hair, get_depsgraph())
 
 
 def factors(session: Any) -> Any:
@@ -91,9 +91,9 @@ def assert_halves(session: Any, found: Any) -> None:
     np.testing.assert_allclose(found[:, height < -FAR], 0.0, atol=1e-5)
 
 
-def catch_up(evaluated: Any) -> None:
+def catch_up(get_depsgraph: Any) -> None:
     bpy.context.view_layer.update()
-    scene_events.catch_up(evaluated())
+    scene_events.catch_up(get_depsgraph())
 
 
 KINDS = ("group", "face", "corner colour", "image", "curve", "point")
@@ -101,7 +101,7 @@ KINDS = ("group", "face", "corner colour", "image", "curve", "point")
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_each_kind_of_map_is_what_guides_are_painted_with(
-    hair: Any, sphere: Any, evaluated: Any, kind: str
+    hair: Any, sphere: Any, get_depsgraph: Any, kind: str
 ) -> None:
     paint(kind, hair, sphere)
     dynamics, children = hair.hairloom.dynamics, hair.data.hairloom.children
@@ -109,7 +109,7 @@ def test_each_kind_of_map_is_what_guides_are_painted_with(
     dynamics.style_root_mask = "Top"
     children.method, children.strand_count, children.width_mask = "multi", 100, "Top"
     hair.hairloom.children_density = "Top"
-    session = started(hair, evaluated)
+    session = started(hair, get_depsgraph)
     assert session.warnings == ()
     found = factors(session)
     assert found.keys() == {"style_root"}
@@ -124,7 +124,7 @@ def test_each_kind_of_map_is_what_guides_are_painted_with(
 
 
 def test_points_of_nurbs_are_painted_where_they_are_drawn(
-    hair: Any, sphere: Any, evaluated: Any
+    hair: Any, sphere: Any, get_depsgraph: Any
 ) -> None:
     paint("point", hair, sphere)
     hair.data.set_types(type="NURBS")
@@ -132,7 +132,7 @@ def test_points_of_nurbs_are_painted_where_they_are_drawn(
     # the curve ends at its first and last point
     ends.data.foreach_set("value", [1] * len(ends.data))
     hair.hairloom.dynamics.style_root_mask = "Top"
-    session = started(hair, evaluated)
+    session = started(hair, get_depsgraph)
     assert session.warnings == ()
     found = factors(session)["style_root"]
     height = session.rig.strands.roots[session.rig.guides, 2]
@@ -140,7 +140,7 @@ def test_points_of_nurbs_are_painted_where_they_are_drawn(
     assert found[:, height > FAR].mean() > 0.99 and found[:, height < -FAR].mean() < 0.01
 
 
-def test_what_is_painted_moves_otherwise(hair: Any, sphere: Any, evaluated: Any) -> None:
+def test_what_is_painted_moves_otherwise(hair: Any, sphere: Any, get_depsgraph: Any) -> None:
     """Stiff above and limp below, on a head that moves sideways."""
     scene, dynamics = bpy.context.scene, hair.hairloom.dynamics
     scene.frame_start, scene.frame_end = 1, 8
@@ -152,7 +152,7 @@ def test_what_is_painted_moves_otherwise(hair: Any, sphere: Any, evaluated: Any)
     ends = []
     for name in ("", "Top"):
         dynamics.style_root_mask = dynamics.style_tip_mask = name
-        session = started(hair, evaluated)
+        session = started(hair, get_depsgraph)
         hair.hairloom.bake.follows = True
         scene.frame_set(1)
         for frame in range(2, 7):
@@ -165,96 +165,98 @@ def test_what_is_painted_moves_otherwise(hair: Any, sphere: Any, evaluated: Any)
     assert np.median(apart[height < -FAR]) > 1e-3
 
 
-def test_a_map_that_breaks_stays_as_it_was_last(hair: Any, sphere: Any, evaluated: Any) -> None:
+def test_a_map_that_breaks_stays_as_it_was_last(hair: Any, sphere: Any, get_depsgraph: Any) -> None:
     paint("face", hair, sphere)
     dynamics = hair.hairloom.dynamics
-    session = started(hair, evaluated)
+    session = started(hair, get_depsgraph)
     dynamics.gravity_mask = "Top"
     assert session.is_stale, "it is to be read"
-    catch_up(evaluated)
+    catch_up(get_depsgraph)
     before = factors(session)["gravity"].copy()
     assert_halves(session, before)
     sphere.data.attributes["Top"].data[0].value = float("nan")
     sphere.data.update_tag()
-    catch_up(evaluated)
+    catch_up(get_depsgraph)
     (warning,) = session.warnings
     assert warning.startswith("Head: ") and "'Top'" in warning and "last state is used" in warning
     assert ".." not in warning
     np.testing.assert_array_equal(factors(session)["gravity"], before)
     dynamics.gravity_mask = "Gone"
-    catch_up(evaluated)
+    catch_up(get_depsgraph)
     (warning,) = session.warnings
     assert "neither a vertex group nor an attribute named 'Gone'" in warning
     assert "Top" in warning, "those that there are"
     assert session._source.painted_guides(session.rig) is None
     dynamics.gravity_mask = ""
-    catch_up(evaluated)
+    catch_up(get_depsgraph)
     assert session.warnings == () and session._source.painted_guides(session.rig) is None
 
 
 def test_a_map_of_zeros_is_said_with_what_is_to_be_done(
-    hair: Any, sphere: Any, evaluated: Any
+    hair: Any, sphere: Any, get_depsgraph: Any
 ) -> None:
     sphere.vertex_groups.new(name="Nothing")
     hair.hairloom.dynamics.bend_mask = "Nothing"
-    (warning,) = started(hair, evaluated).warnings
+    (warning,) = started(hair, get_depsgraph).warnings
     assert "'Nothing' is 0 everywhere, and so is Bend Stiffness" in warning
     assert "Paint it" in warning
 
 
-def test_an_image_of_several_tiles_is_refused(hair: Any, sphere: Any, evaluated: Any) -> None:
+def test_an_image_of_several_tiles_is_refused(hair: Any, sphere: Any, get_depsgraph: Any) -> None:
     """Blender returns only the first tile's pixels, which would apply to the whole surface."""
     image = bpy.data.images.new("Film", 8, 8, tiled=True)
-    assert read_map(sphere, evaluated(), "Film").shape == (len(sphere.data.vertices),)
+    assert read_map(sphere, get_depsgraph(), "Film").shape == (len(sphere.data.vertices),)
     image.tiles.new(1002)
-    triangles = len(read_surface(sphere, evaluated(), need_uv=True, place="Head").triangles)
+    triangles = len(read_surface(sphere, get_depsgraph(), need_uv=True, place="Head").triangles)
     for read in (
-        lambda: read_map(sphere, evaluated(), "Film"),
-        lambda: painted_colors(sphere, "Film", evaluated(), triangles, place="Hair"),
+        lambda: read_map(sphere, get_depsgraph(), "Film"),
+        lambda: painted_colors(sphere, "Film", get_depsgraph(), triangles, place="Hair"),
     ):
         with pytest.raises(HairloomError, match="has several tiles") as error:
             read()
         assert "Use an image of one tile" in str(error.value)
     hair.hairloom.dynamics.gravity_mask = "Film"
-    assert any("several tiles" in each for each in GroomSource(hair, evaluated()).warnings)
+    assert any("several tiles" in each for each in GroomSource(hair, get_depsgraph()).warnings)
 
 
-def test_an_image_is_read_again_once_it_is_painted(hair: Any, sphere: Any, evaluated: Any) -> None:
+def test_an_image_is_read_again_once_it_is_painted(
+    hair: Any, sphere: Any, get_depsgraph: Any
+) -> None:
     paint("image", hair, sphere)
     hair.hairloom.dynamics.volume_mask = "Top"
     image, material = bpy.data.images["Top"], bpy.data.materials.new("Skin")
     material.node_tree.nodes.new("ShaderNodeTexImage").image = image
     sphere.data.materials.append(material)
-    session = started(hair, evaluated)
+    session = started(hair, get_depsgraph)
     image.pixels.foreach_set(np.full(64 * 4 * 4, 0.25, np.float32))
     image.update_tag()
     bpy.context.view_layer.update()
     assert session.is_stale
-    catch_up(evaluated)
+    catch_up(get_depsgraph)
     np.testing.assert_allclose(factors(session)["volume"], 0.25, atol=2e-3)
 
 
 def test_an_image_is_read_again_by_a_preview_that_has_the_hair_of_its_bake(
-    hair: Any, sphere: Any, evaluated: Any, tmp_path: Any
+    hair: Any, sphere: Any, get_depsgraph: Any, tmp_path: Any
 ) -> None:
     paint("image", hair, sphere)
     hair.hairloom.dynamics.volume_mask = "Top"
     hair.hairloom.bake.folder, bpy.context.scene.frame_end = str(tmp_path / "bake"), 1
     list(Bake.of([hair], bpy.context.scene).steps())
     baked = rig_for(hair, bpy.context.scene)
-    session = Session(hair, evaluated(), baked=baked)
+    session = Session(hair, get_depsgraph(), baked=baked)
     assert baked is not None and session.warnings == ()
     bpy.data.images["Top"].pixels.foreach_set(np.full(64 * 4 * 4, 0.25, np.float32))
-    session.read_again(evaluated())
+    session.read_again(get_depsgraph())
     assert session.warnings == ()
     np.testing.assert_allclose(factors(session)["volume"], 0.25, atol=2e-3)
 
 
 def test_the_overlay_shows_what_is_painted_as_it_is_painted(
-    hair: Any, sphere: Any, evaluated: Any
+    hair: Any, sphere: Any, get_depsgraph: Any
 ) -> None:
     paint("group", hair, sphere)
-    session = started(hair, evaluated)
+    session = started(hair, get_depsgraph)
     hair.hairloom.shown_overlays = {"paint"}
     assert overlay.drawing_of(session.uid).lines == (), "nothing is chosen"
     hair.hairloom.shown_map = "Top"
@@ -320,7 +322,7 @@ def test_a_preset_keeps_what_is_painted_and_may_bring_names_of_its_own(hair: Any
 
 
 def test_a_dab_reads_the_vertex_groups_once_for_children_and_overlay(
-    hair: Any, sphere: Any, evaluated: Any, monkeypatch: pytest.MonkeyPatch
+    hair: Any, sphere: Any, get_depsgraph: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     every = [vertex.index for vertex in sphere.data.vertices]
     for name in ("Top", "Long", "Clumped"):
@@ -328,9 +330,9 @@ def test_a_dab_reads_the_vertex_groups_once_for_children_and_overlay(
     children = hair.data.hairloom.children
     children.method, children.strand_count, hair.hairloom.children_density = "multi", 100, "Top"
     children.length_mask, children.clump_mask, children.clump = "Long", "Clumped", 0.5
-    session = started(hair, evaluated)
+    session = started(hair, get_depsgraph)
     hair.hairloom.shown_overlays, hair.hairloom.shown_map = {"paint"}, "Long"
-    catch_up(evaluated)
+    catch_up(get_depsgraph)
     read, of = [], Memberships.of
     monkeypatch.setattr(Memberships, "of", lambda mesh: read.append(mesh) or of(mesh))
     for name, weight in (("Long", 0.5), ("Top", 0.2), ("Long", 0.3)):
@@ -339,13 +341,13 @@ def test_a_dab_reads_the_vertex_groups_once_for_children_and_overlay(
         sphere.data.update_tag()
         read.clear()
         bpy.context.view_layer.update()
-        shown = session.shown_map(evaluated())
+        shown = session.shown_map(get_depsgraph())
         assert len(read) == 1
         assert name != "Long" or np.isclose(shown, weight).any(), "the overlay is of this dab"
         assert name != "Long" or (session.rig.strands.lengths() != length).any()
 
 
-def test_weights_are_those_that_each_vertex_has(sphere: Any, evaluated: Any) -> None:
+def test_weights_are_those_that_each_vertex_has(sphere: Any, get_depsgraph: Any) -> None:
     random, count = np.random.default_rng(2), len(sphere.data.vertices)
     wanted = {}
     for name in ("One", "Two", "Three"):
@@ -355,18 +357,18 @@ def test_weights_are_those_that_each_vertex_has(sphere: Any, evaluated: Any) -> 
             group.add([vertex], float(weights[vertex]), "REPLACE")
         wanted[name] = weights
     for name, weights in wanted.items():
-        np.testing.assert_allclose(read_weights(sphere, evaluated(), name), weights, atol=1e-7)
+        np.testing.assert_allclose(read_weights(sphere, get_depsgraph(), name), weights, atol=1e-7)
 
 
 def test_the_overlay_of_a_map_on_the_curves_follows_another_number_of_curves(
-    hair: Any, sphere: Any, evaluated: Any
+    hair: Any, sphere: Any, get_depsgraph: Any
 ) -> None:
     soft = hair.data.attributes.new("Soft", "FLOAT", "CURVE")
     soft.data.foreach_set("value", np.full(len(hair.data.curves), 0.25, np.float32))
-    session = started(hair, evaluated)
+    session = started(hair, get_depsgraph)
     hair.hairloom.shown_overlays, hair.hairloom.shown_map = {"paint"}, "Soft"
-    assert np.allclose(session.shown_map(evaluated()), 0.25)
+    assert np.allclose(session.shown_map(get_depsgraph()), 0.25)
     hair.data.remove_curves(indices=[0, 1, 2])
-    catch_up(evaluated)
-    shown = session.shown_map(evaluated())
+    catch_up(get_depsgraph)
+    shown = session.shown_map(get_depsgraph())
     assert shown is not None and np.allclose(shown, 0.25)

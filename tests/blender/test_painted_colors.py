@@ -67,7 +67,7 @@ def paint(kind: str, sphere: Any, tmp_path: Path | None = None) -> None:
     attribute.data.foreach_set("color", colors.ravel())
 
 
-def sampled_by_blender(kind: str, sphere: Any, places: Any, evaluated: Any) -> Any:
+def sampled_by_blender(kind: str, sphere: Any, places: Any, get_depsgraph: Any) -> Any:
     """The values that geometry nodes sample on the surface nearest to these places, (n, 4)."""
     mesh = bpy.data.meshes.new("Places")
     mesh.from_pydata(places.tolist(), [], [])
@@ -100,7 +100,7 @@ def sampled_by_blender(kind: str, sphere: Any, places: Any, evaluated: Any) -> A
     link(store.outputs["Geometry"], out.inputs[0])
     obj.modifiers.new("Sample", "NODES").node_group = tree
     bpy.context.view_layer.update()
-    attribute = obj.evaluated_get(evaluated()).data.attributes["found"]
+    attribute = obj.evaluated_get(get_depsgraph()).data.attributes["found"]
     found = np.empty(4 * len(places), np.float32)
     attribute.data.foreach_get("color", found)
     return found.reshape(-1, 4)
@@ -110,14 +110,14 @@ def shown(session: Any) -> Any:
     return overlay.drawing_of(session.uid).snapshot
 
 
-def started(hair: Any, evaluated: Any) -> Any:
+def started(hair: Any, get_depsgraph: Any) -> Any:
     bpy.context.view_layer.update()
-    return previews.start(hair, evaluated())
+    return previews.start(hair, get_depsgraph())
 
 
-def catch_up(evaluated: Any) -> None:
+def catch_up(get_depsgraph: Any) -> None:
     bpy.context.view_layer.update()
-    scene_events.catch_up(evaluated())
+    scene_events.catch_up(get_depsgraph())
 
 
 KINDS = (
@@ -137,19 +137,19 @@ KINDS = (
 @pytest.mark.parametrize("children", ["none", "multi"])
 @pytest.mark.parametrize("kind", KINDS)
 def test_each_strand_has_what_blender_samples_at_its_root(
-    hair: Any, sphere: Any, evaluated: Any, tmp_path: Path, kind: str, children: str
+    hair: Any, sphere: Any, get_depsgraph: Any, tmp_path: Path, kind: str, children: str
 ) -> None:
     sphere.location, sphere.scale = (0.3, -0.1, 0.2), (1.0, 0.8, 1.2)
     paint(kind, sphere, tmp_path)
     groom = hair.data.hairloom
     groom.children.method, groom.children.strand_count = children, 200
     assert MAP in colors_of_groom(groom.shading, bpy.context, "omb")
-    session = started(hair, evaluated)
+    session = started(hair, get_depsgraph)
     assert session.warnings == ()
     rig, snapshot = session.rig, shown(session)
     assert rig.child_count == (200 if children == "multi" else 0)
     roots = rig.rest_frames.origin
-    expected = sampled_by_blender(kind, sphere, roots, evaluated)[:, :3]
+    expected = sampled_by_blender(kind, sphere, roots, get_depsgraph)[:, :3]
     color = snapshot.color.reshape(-1, 3)
     offsets = rig.strands.offsets
     np.testing.assert_allclose(color[offsets[:-1]], expected, atol=2e-3)
@@ -175,12 +175,12 @@ def assert_halves(color: Any, roots: Any, bottom: Any = BLUE) -> None:
 
 
 def test_a_dab_is_seen_at_once_and_children_keep_their_own_roots(
-    hair: Any, sphere: Any, evaluated: Any
+    hair: Any, sphere: Any, get_depsgraph: Any
 ) -> None:
     attribute = paint_halves(sphere)
     children = hair.data.hairloom.children
     children.method, children.strand_count = "multi", 300
-    session = started(hair, evaluated)
+    session = started(hair, get_depsgraph)
     rig, starts = session.rig, session.rig.strands.offsets[:-1]
     assert_halves(shown(session).color[starts], rig.strands.roots)
     points = shown(session).points
@@ -191,19 +191,19 @@ def test_a_dab_is_seen_at_once_and_children_keep_their_own_roots(
     now = shown(session)
     assert np.unique(now.color, axis=0) == pytest.approx(np.array([[0.1, 0.5, 0.2]]))
     np.testing.assert_array_equal(now.points, points)
-    catch_up(evaluated)
+    catch_up(get_depsgraph)
     assert session.rig is rig, "nothing was made again"
     hair.data.hairloom.shading.color_map = ""
-    catch_up(evaluated)
+    catch_up(get_depsgraph)
     assert shown(session).color is None
 
 
-def test_an_image_is_seen_once_it_is_painted(hair: Any, sphere: Any, evaluated: Any) -> None:
+def test_an_image_is_seen_once_it_is_painted(hair: Any, sphere: Any, get_depsgraph: Any) -> None:
     paint("image", sphere)
     image, material = bpy.data.images[MAP], bpy.data.materials.new("Skin")
     material.node_tree.nodes.new("ShaderNodeTexImage").image = image
     sphere.data.materials.append(material)
-    session = started(hair, evaluated)
+    session = started(hair, get_depsgraph)
     image.pixels.foreach_set(np.ones(24 * 16 * 4, np.float32))
     image.update_tag()
     bpy.context.view_layer.update()
@@ -211,12 +211,12 @@ def test_an_image_is_seen_once_it_is_painted(hair: Any, sphere: Any, evaluated: 
 
 
 def test_what_is_transparent_has_the_curves_own_colour_or_the_looks(
-    hair: Any, sphere: Any, evaluated: Any
+    hair: Any, sphere: Any, get_depsgraph: Any
 ) -> None:
     look = hair.data.hairloom.shading
     look.base_color, look.color_source = (0.25, 0.5, 0.125), "look"
     paint_halves(sphere, (0.0, 0.0, 0.0, 0.0))
-    session = started(hair, evaluated)
+    session = started(hair, get_depsgraph)
     roots, starts = session.rig.strands.roots, session.rig.strands.offsets[:-1]
     below = roots[:, 2] < -0.005
     assert np.isnan(shown(session).color[starts][below]).all()
@@ -224,13 +224,13 @@ def test_what_is_transparent_has_the_curves_own_colour_or_the_looks(
     own.data.foreach_set("color", np.tile(np.float32([0.5, 0.25, 0.75, 1.0]), len(own.data)))
     look.color_source = "own"
     hair.data.update_tag()
-    catch_up(evaluated)
+    catch_up(get_depsgraph)
     assert_halves(shown(session).color[starts], roots, (0.5, 0.25, 0.75, 1.0))
     look.color_source = "look"
     half = np.tile(np.float32([0.75, 0.0, 0.5, 0.5]), len(sphere.data.loops))
     sphere.data.attributes[MAP].data.foreach_set("color", half)
     sphere.data.update_tag()
-    catch_up(evaluated)
+    catch_up(get_depsgraph)
     mixed = 0.5 * (np.array([0.75, 0.0, 0.5]) + (0.25, 0.5, 0.125))
     np.testing.assert_allclose(shown(session).color[starts], np.tile(mixed, (60, 1)), atol=1e-6)
     look.base_color = (0.0, 0.0, 0.0)
@@ -238,7 +238,7 @@ def test_what_is_transparent_has_the_curves_own_colour_or_the_looks(
 
 
 def test_brows_that_keep_their_colour_are_not_painted(
-    new_hair: Any, sphere: Any, evaluated: Any
+    new_hair: Any, sphere: Any, get_depsgraph: Any
 ) -> None:
     from hedgehogs import hedgehog
 
@@ -247,56 +247,56 @@ def test_brows_that_keep_their_colour_are_not_painted(
     look = hair.data.hairloom.shading
     look.color_map, look.brow_source = MAP, "natural"
     paint_halves(sphere, RED)
-    session = started(hair, evaluated)
+    session = started(hair, get_depsgraph)
     color = shown(session).color.reshape(60, -1, 3)
     assert np.isnan(color[:30]).all()
     np.testing.assert_allclose(color[30:], np.broadcast_to(RED[:3], color[30:].shape), atol=1e-6)
 
 
 def test_a_head_that_is_mirrored_is_painted_as_it_is(
-    hair: Any, sphere: Any, evaluated: Any
+    hair: Any, sphere: Any, get_depsgraph: Any
 ) -> None:
     sphere.scale = (-1.0, 1.0, 1.0)
     # per vertex: roots lie on edges, and which face's corners would count is arbitrary
     paint("FLOAT_COLOR POINT", sphere)
-    session = started(hair, evaluated)
+    session = started(hair, get_depsgraph)
     roots, offsets = session.rig.rest_frames.origin, session.rig.strands.offsets
-    expected = sampled_by_blender("FLOAT_COLOR POINT", sphere, roots, evaluated)[:, :3]
+    expected = sampled_by_blender("FLOAT_COLOR POINT", sphere, roots, get_depsgraph)[:, :3]
     np.testing.assert_allclose(shown(session).color[offsets[:-1]], expected, atol=2e-3)
 
 
 @pytest.mark.parametrize("children", ["none", "multi"])
 def test_exports_have_what_is_painted(
-    hair: Any, sphere: Any, evaluated: Any, children: str
+    hair: Any, sphere: Any, get_depsgraph: Any, children: str
 ) -> None:
     paint_halves(sphere)
     groom = hair.data.hairloom
     groom.children.method, groom.children.strand_count = children, 100
     for guides in (False, True):
-        found = still_hair(hair, evaluated(), ExportRequest(guides=guides, color=False)).groom
+        found = still_hair(hair, get_depsgraph(), ExportRequest(guides=guides, color=False)).groom
         starts = found.strands.offsets[:-1]
         assert_halves(found.color[starts], found.strands.points[starts])
 
 
 def test_a_render_has_what_is_painted_and_keeps_its_hair(
-    hair: Any, sphere: Any, evaluated: Any
+    hair: Any, sphere: Any, get_depsgraph: Any
 ) -> None:
     attribute = paint_halves(sphere)
     bpy.context.view_layer.update()
-    first = read_groom(hair, evaluated())
+    first = read_groom(hair, get_depsgraph())
     starts = first.layout.offsets[:-1]
     assert_halves(first.color[starts], first.points[starts])
     attribute.data.foreach_set("color", np.tile(np.float32(RED), len(attribute.data)))
     sphere.data.update_tag()
     bpy.context.view_layer.update()
-    second = read_groom(hair, evaluated())
+    second = read_groom(hair, get_depsgraph())
     assert np.unique(second.color, axis=0) == pytest.approx(np.array([RED[:3]]))
     assert second.occlusion is first.occlusion, "the hair was not made again"
-    assert read_groom(hair, evaluated()).color is second.color, "nor its colours"
+    assert read_groom(hair, get_depsgraph()).color is second.color, "nor its colours"
 
 
 def test_real_hair_and_materials_have_what_is_painted(
-    hair: Any, sphere: Any, evaluated: Any
+    hair: Any, sphere: Any, get_depsgraph: Any
 ) -> None:
     paint_halves(sphere)
     look = hair.data.hairloom.shading
@@ -359,7 +359,7 @@ def test_curves_that_are_replaced_have_what_is_painted_under_the_new_ones(
 
 
 def test_a_verb_writes_what_is_painted(
-    hair: Any, sphere: Any, evaluated: Any, tmp_path: Path
+    hair: Any, sphere: Any, get_depsgraph: Any, tmp_path: Path
 ) -> None:
     paint_halves(sphere)
     made = tmp_path / "hair.hair"
@@ -372,12 +372,12 @@ def test_a_verb_writes_what_is_painted(
 
 
 @pytest.mark.draws
-def test_cards_have_what_is_painted(hair: Any, sphere: Any, evaluated: Any) -> None:
+def test_cards_have_what_is_painted(hair: Any, sphere: Any, get_depsgraph: Any) -> None:
     attribute = paint_halves(sphere)
     groom = hair.data.hairloom
     groom.atlas.size, groom.cards.order_by, groom.card_occlusion.rays = "512", "distance", 1
     groom.shading.color_variation, groom.card_drawing.shown_as = 0.0, "cards"
-    session = started(hair, evaluated)
+    session = started(hair, get_depsgraph)
     cards = shown(session).cards
     assert cards.base_color == pytest.approx(np.maximum(RED, BLUE)[:3], abs=1e-6)
     shares = cards.textures.base * np.array(cards.base_color)
@@ -387,12 +387,12 @@ def test_cards_have_what_is_painted(hair: Any, sphere: Any, evaluated: Any) -> N
         assert is_alike.sum() > 0.2 * is_hair.sum()
     attribute.data.foreach_set("color", np.tile(np.float32(BLUE), len(attribute.data)))
     sphere.data.update_tag()
-    catch_up(evaluated)
+    catch_up(get_depsgraph)
     assert shown(session).cards.base_color == pytest.approx(BLUE[:3], abs=1e-6)
 
 
 def test_a_bake_shows_what_is_painted_since(
-    hair: Any, sphere: Any, evaluated: Any, tmp_path: Path
+    hair: Any, sphere: Any, get_depsgraph: Any, tmp_path: Path
 ) -> None:
     attribute = paint_halves(sphere)
     scene = bpy.context.scene
@@ -402,14 +402,14 @@ def test_a_bake_shows_what_is_painted_since(
     bpy.context.view_layer.update()
     assert bpy.ops.hairloom.bake() == {"FINISHED"}
     copy = hair.hairloom.bake.copy
-    first = read_groom(copy, evaluated())
+    first = read_groom(copy, get_depsgraph())
     starts = first.layout.offsets[:-1]
     assert_halves(first.color[starts], first.points[starts])
     assert copy.data.attributes["color"].data[0].color[:] != (0.0, 0.0, 0.0, 0.0)
     attribute.data.foreach_set("color", np.tile(np.float32(BLUE), len(attribute.data)))
     sphere.data.update_tag()
     bpy.context.view_layer.update()
-    second = read_groom(copy, evaluated())
+    second = read_groom(copy, get_depsgraph())
     assert np.unique(second.color, axis=0) == pytest.approx(np.array([BLUE[:3]]))
 
 
@@ -451,21 +451,21 @@ def a_number(sphere: Any) -> None:
     ],
 )
 def test_what_cannot_be_used_is_said_and_hair_keeps_its_colour(
-    hair: Any, sphere: Any, evaluated: Any, spoil: Any, says: str, remedy: str
+    hair: Any, sphere: Any, get_depsgraph: Any, spoil: Any, says: str, remedy: str
 ) -> None:
     spoil(sphere)
-    session = started(hair, evaluated)
+    session = started(hair, get_depsgraph)
     (warning,) = (each for each in session.warnings if "UVs, so exported" not in each)
     assert warning.startswith("Head: ") and says in warning and remedy in warning
     assert warning.endswith("Until then the look's colour is used")
     assert shown(session).color is None
     request = ExportRequest(guides=False, color=False)
-    assert still_hair(hair, evaluated(), request).groom.color is None
+    assert still_hair(hair, get_depsgraph(), request).groom.color is None
 
 
-def test_hair_without_a_surface_says_so(new_hair: Any, evaluated: Any) -> None:
+def test_hair_without_a_surface_says_so(new_hair: Any, get_depsgraph: Any) -> None:
     hair = new_hair()
     hair.data.hairloom.shading.color_map = MAP
-    session = started(hair, evaluated)
+    session = started(hair, get_depsgraph)
     assert any("needs a surface, and it has none" in each for each in session.warnings)
     assert shown(session).color is None

@@ -74,29 +74,29 @@ def add(hair, *lines):
         line.select_set(False)
 
 
-def test_no_child_blends_both_sides_and_the_preview_follows(hair, evaluated):
-    session = previews.start(hair, evaluated())
+def test_no_child_blends_both_sides_and_the_preview_follows(hair, get_depsgraph):
+    session = previews.start(hair, get_depsgraph())
     assert mixes_both_sides(session) > 50
     line = arch()
     add(hair, line)
     assert session.has_other_partings()
-    session.read_again(evaluated())
+    session.read_again(get_depsgraph())
     assert mixes_both_sides(session) == 0
     before = session.rig
     line.location.x = 0.03  # now over x = 0.03, a little away from the sphere
     bpy.context.view_layer.update()
     assert session.has_other_partings()
-    session.read_again(evaluated())
+    session.read_again(get_depsgraph())
     assert session.rig is not before
     assert mixes_both_sides(session) > 20
     for point in line.data.splines[0].points:
         point.co.x = -0.03
     bpy.context.view_layer.update()
-    session.read_again(evaluated())
+    session.read_again(get_depsgraph())
     assert mixes_both_sides(session) == 0
     assert bpy.ops.hairloom.remove_parting(line=line.name) == {"FINISHED"}
     assert line.name in bpy.context.scene.objects
-    session.read_again(evaluated())
+    session.read_again(get_depsgraph())
     assert mixes_both_sides(session) > 50
 
 
@@ -137,21 +137,21 @@ def test_all_that_changes_a_line_is_seen_and_what_carries_it_is_not(edit, hair, 
 
 
 @pytest.mark.slow
-def test_a_head_that_turns_with_its_parting_builds_nothing_again(hair, sphere, evaluated):
+def test_a_head_that_turns_with_its_parting_builds_nothing_again(hair, sphere, get_depsgraph):
     line = arch()
     line.parent = sphere
     add(hair, line)
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     rig = session.rig
     sphere.rotation_euler.z = 1.0
     bpy.context.view_layer.update()
     assert not session.has_other_partings()
-    session.read_again(evaluated())
+    session.read_again(get_depsgraph())
     assert session.rig is rig
     other = arch(0.02)
     other.parent = sphere
     add(hair, other)
-    session.read_again(evaluated())
+    session.read_again(get_depsgraph())
     turned = np.array(sphere.matrix_world)[:3, :3]
     assert np.allclose(turned @ turned.T, np.eye(3), atol=1e-5)
     # added after the head has turned, it applies to the hair in that pose
@@ -160,12 +160,12 @@ def test_a_head_that_turns_with_its_parting_builds_nothing_again(hair, sphere, e
 
 
 @pytest.mark.slow
-def test_without_a_selected_curve_a_line_is_drawn_on_the_head(extension, evaluated):
+def test_without_a_selected_curve_a_line_is_drawn_on_the_head(extension, get_depsgraph):
     bpy.ops.hairloom.add_hairstyle(style="bob", plays=False)
     hair = bpy.context.object
     add(hair)
     (line,) = partings_of(hair)
-    pieces = pieces_of(line, evaluated())
+    pieces = pieces_of(line, get_depsgraph())
     assert line.parent == hair.parent
     assert np.abs(pieces[..., 0]).max() < 0.005
     assert pieces[..., 1].min() < -0.03
@@ -233,12 +233,12 @@ def test_what_is_no_line_on_the_head_is_refused(hair, wrong):
     assert not partings_of(hair)
 
 
-def test_a_parting_that_becomes_unusable_is_a_warning(hair, evaluated):
+def test_a_parting_that_becomes_unusable_is_a_warning(hair, get_depsgraph):
     line = arch()
     add(hair, line)
     line.data.splines.clear()
     bpy.context.view_layer.update()
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     assert any("no length" in warning for warning in session.warnings)
     with pytest.raises(RuntimeError, match="no partings"):
         bpy.ops.hairloom.comb_parting()
@@ -259,16 +259,16 @@ def test_the_verbs_part_a_file(hair, tmp_path):
     assert not np.array_equal(curve_points(hair.data), cap().points)
 
 
-def test_a_render_after_a_parting_has_moved_has_other_children(hair, evaluated):
+def test_a_render_after_a_parting_has_moved_has_other_children(hair, get_depsgraph):
     line = arch()
     add(hair, line)
     assert line.session_uid in engine_hair.uids_of(hair), "Rendered mode does not read it again"
-    before = engine_hair.read_groom(hair, evaluated())
-    again = engine_hair.read_groom(hair, evaluated())
+    before = engine_hair.read_groom(hair, get_depsgraph())
+    again = engine_hair.read_groom(hair, get_depsgraph())
     assert again.radius is before.radius, "it is kept"
     line.location.x = 0.03
     bpy.context.view_layer.update()
-    after = engine_hair.read_groom(hair, evaluated())
+    after = engine_hair.read_groom(hair, get_depsgraph())
     assert not np.array_equal(after.points, before.points)
     engine_hair.forget()
 

@@ -147,10 +147,10 @@ def test_a_fresh_process_renders_the_bake_of_a_saved_file(scene, tmp_path):
         assert np.argmax(fits) == frame - 1 and fits[frame - 1] > 0.4
 
 
-def test_a_render_changes_nothing_of_what_the_viewport_shows(scene, evaluated):
+def test_a_render_changes_nothing_of_what_the_viewport_shows(scene, get_depsgraph):
     bpy.ops.hairloom.bake()
     hair = bpy.data.objects["Hair"]
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     scene.frame_set(4)
     before = strand_grid(session)
     bpy.ops.render.render()
@@ -261,18 +261,18 @@ def fin(extension, tmp_path):
     return flag
 
 
-def shown(flag):
+def shown(flag_object):
     """The evaluated vertices, (vertex_count, 3), object space."""
     bpy.context.view_layer.update()
-    mesh = flag.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    mesh = flag_object.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
     positions = np.empty((len(mesh.vertices), 3), np.float32)
     mesh.vertices.foreach_get("co", positions.ravel())
     return positions
 
 
-def test_a_baked_fin_equals_playback_and_plays_without_a_preview(fin, evaluated):
+def test_a_baked_fin_equals_playback_and_plays_without_a_preview(fin, get_depsgraph):
     assert bakeable(fin)
-    previews.add(simulated_for(fin, evaluated()), evaluated())
+    previews.add(simulated_for(fin, get_depsgraph()), get_depsgraph())
     frames = range(1, LAST + 1)
     played = []
     for frame in frames:

@@ -37,7 +37,7 @@ def curled(scale: float) -> StrandSet:
 
 
 def told(
-    sphere: Any, new_hair: Callable[..., Any], evaluated: Callable[[], Any], scale: float
+    sphere: Any, new_hair: Callable[..., Any], get_depsgraph: Callable[[], Any], scale: float
 ) -> tuple[np.ndarray, dict[str, Any]]:
     """Strands in frames of a moving head, divided by the scale, and all messages about them."""
     head = sphere.copy()
@@ -50,18 +50,18 @@ def told(
     hair.data.hairloom.children.method = "multi"
     hair.data.hairloom.children.strand_count = 100
     hair.hairloom.dynamics.device = "numpy"
-    session = previews.start(hair, evaluated())
-    previews.play(evaluated())
+    session = previews.start(hair, get_depsgraph())
+    previews.play(get_depsgraph())
     frames = []
     for _ in range(FRAMES):
         head.location.x += 0.02 * scale
         bpy.context.view_layer.update()
-        previews.advance(evaluated(), 1.0 / 24.0)
+        previews.advance(get_depsgraph(), 1.0 / 24.0)
         frames.append(np.asarray(strand_grid(session), np.float64) / scale)
     check = ExportCheck.of([hair])
     warnings = {}
     for kind in STRAND_FORMATS:
-        check.refresh(evaluated(), kind, StrandExportSettings())
+        check.refresh(get_depsgraph(), kind, StrandExportSettings())
         warnings[kind.name] = check.warnings
     said = {
         "warnings": warnings,
@@ -83,10 +83,10 @@ def told(
 )
 @pytest.mark.parametrize("scale", few_in_commits([2.0**-10, 2.0**10]))
 def test_a_scene_of_another_size_moves_and_warns_the_same(
-    sphere: Any, new_hair: Callable[..., Any], evaluated: Callable[[], Any], scale: float
+    sphere: Any, new_hair: Callable[..., Any], get_depsgraph: Callable[[], Any], scale: float
 ) -> None:
-    one, said = told(sphere, new_hair, evaluated, 1.0)
-    other, said_again = told(sphere, new_hair, evaluated, scale)
+    one, said = told(sphere, new_hair, get_depsgraph, 1.0)
+    other, said_again = told(sphere, new_hair, get_depsgraph, scale)
     assert said_again == said
     assert said["children"] == 100
     assert np.abs(one[-1] - one[0] - [0.02 * (FRAMES - 1), 0.0, 0.0]).max() > 0.005
@@ -96,11 +96,11 @@ def test_a_scene_of_another_size_moves_and_warns_the_same(
 @pytest.mark.parametrize("unit", few_in_commits([0.01, 1000.0]))
 @pytest.mark.slow
 def test_the_unit_scale_only_changes_how_numbers_are_shown(
-    sphere: Any, new_hair: Callable[..., Any], evaluated: Callable[[], Any], unit: float
+    sphere: Any, new_hair: Callable[..., Any], get_depsgraph: Callable[[], Any], unit: float
 ) -> None:
     """As in Blender's own physics, which takes gravity in scene units."""
-    one, said = told(sphere, new_hair, evaluated, 1.0)
+    one, said = told(sphere, new_hair, get_depsgraph, 1.0)
     bpy.context.scene.unit_settings.scale_length = unit
-    other, said_again = told(sphere, new_hair, evaluated, 1.0)
+    other, said_again = told(sphere, new_hair, get_depsgraph, 1.0)
     np.testing.assert_array_equal(other, one)
     assert said_again == said

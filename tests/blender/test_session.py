@@ -55,9 +55,9 @@ def test_hair_follows_a_deformed_head(preview):
     assert length == pytest.approx(np.full(60, 0.01), rel=0.1)
 
 
-def test_without_a_surface_hair_follows_its_own_object(new_hair, evaluated):
+def test_without_a_surface_hair_follows_its_own_object(new_hair, get_depsgraph):
     hair = new_hair()
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     assert "no surface" in session.source.warnings[0]
     before = strand_grid(session)
     hair.location = (1.0, 2.0, 3.0)
@@ -77,11 +77,11 @@ def test_sliders_act_at_once(preview):
     assert snapshot.device_points is before.device_points
 
 
-def test_guide_settings_act_once_edits_have_settled(preview, evaluated):
+def test_guide_settings_act_once_edits_have_settled(preview, get_depsgraph):
     hair, _, session = preview
     hair.data.hairloom.guides.guide_count = 7
     assert session.is_stale
-    scene_events.catch_up(evaluated())
+    scene_events.catch_up(get_depsgraph())
     assert len(session.rig.guides) == 7
 
 
@@ -99,31 +99,31 @@ def test_animated_settings_and_heads_are_followed_frame_by_frame(preview):
     assert strand_grid(session) == pytest.approx(before + np.array([1.0, 0.0, 0.0]), abs=1e-5)
 
 
-def test_edited_curves_are_read_again_and_others_left_alone(preview, evaluated):
+def test_edited_curves_are_read_again_and_others_left_alone(preview, get_depsgraph):
     hair, head, session = preview
     head.location.y = 0.25
     update()
-    scene_events.catch_up(evaluated())
+    scene_events.catch_up(get_depsgraph())
     rig = session.rig
     hair.data.update_tag()
     update()
-    scene_events.catch_up(evaluated())
+    scene_events.catch_up(get_depsgraph())
     assert session.rig is rig, "tagged but not changed"
     attributes, uv = hair.data.attributes, np.full(120, 0.25, np.float32)
     attributes.new("strand_seed", "INT", "CURVE").data.foreach_set("value", [7] * 60)
     hair.data.update_tag()
     update()
-    scene_events.catch_up(evaluated())
+    scene_events.catch_up(get_depsgraph())
     assert (session.snapshot.seed == 7).all()
     attributes.new("surface_uv_coordinate", "FLOAT2", "CURVE").data.foreach_set("vector", uv)
     hair.data.update_tag()
     update()
-    scene_events.catch_up(evaluated())
+    scene_events.catch_up(get_depsgraph())
     assert (session.rig.strands.root_uv == 0.25).all()
     rig = session.rig
     hair.data.position_data[7].vector = (0.0, 0.0, 0.5)
     update()
-    scene_events.catch_up(evaluated())
+    scene_events.catch_up(get_depsgraph())
     assert session.rig is not rig
     assert strand_grid(session)[0, -1] == pytest.approx([0.0, 0.25, 0.5], abs=1e-5)
     assert strand_grid(session)[1, 0] == pytest.approx(
@@ -131,7 +131,7 @@ def test_edited_curves_are_read_again_and_others_left_alone(preview, evaluated):
     )
 
 
-def test_rounding_far_from_the_origin_is_no_edit(preview, evaluated):
+def test_rounding_far_from_the_origin_is_no_edit(preview, get_depsgraph):
     hair, head, session = preview
     rig = session.rig
     for place in ((3.0, -2.0, 1.5), (-40.0, 7.0, 0.3)):
@@ -139,23 +139,23 @@ def test_rounding_far_from_the_origin_is_no_edit(preview, evaluated):
         update()
         hair.data.update_tag()
         update()
-        scene_events.catch_up(evaluated())
+        scene_events.catch_up(get_depsgraph())
         assert session.rig is rig
     hair.data.position_data[7].vector.x += 0.001
     hair.data.update_tag()
     update()
-    scene_events.catch_up(evaluated())
+    scene_events.catch_up(get_depsgraph())
     assert session.rig is not rig
 
 
-def test_another_surface_begins_the_preview_anew(preview, evaluated):
+def test_another_surface_begins_the_preview_anew(preview, get_depsgraph):
     hair, head, _ = preview
     other = head.copy()
     other.data, other.name = head.data.copy(), "Other"
     bpy.context.collection.objects.link(other)
     hair.data.surface = other
     update()
-    scene_events.catch_up(evaluated())
+    scene_events.catch_up(get_depsgraph())
     (session,) = previews.sessions()
     assert session.head.handle.name == "Other"
     other.location.x = 1.0
@@ -163,30 +163,30 @@ def test_another_surface_begins_the_preview_anew(preview, evaluated):
     assert strand_grid(session)[:, 0, 0].mean() == pytest.approx(1.0, abs=0.05)
 
 
-def test_blenders_own_strands_are_hidden_in_the_evaluated_copy_only(preview, evaluated):
+def test_blenders_own_strands_are_hidden_in_the_evaluated_copy_only(preview, get_depsgraph):
     hair, head, session = preview
     shown, hidden = ("TEXTURED", True), ("WIRE", False)
 
     def display(obj):
         return obj.display_type, obj.visible_camera
 
-    assert display(hair.evaluated_get(evaluated())) == hidden
+    assert display(hair.evaluated_get(get_depsgraph())) == hidden
     assert display(hair) == shown
     head.location.x = 1.0
     update()
-    assert display(hair.evaluated_get(evaluated())) == hidden
+    assert display(hair.evaluated_get(get_depsgraph())) == hidden
     hair.hairloom.hide_original = False
-    assert display(hair.evaluated_get(evaluated())) == shown
+    assert display(hair.evaluated_get(get_depsgraph())) == shown
     hair.hairloom.hide_original = True
-    assert display(hair.evaluated_get(evaluated())) == hidden
+    assert display(hair.evaluated_get(get_depsgraph())) == hidden
     previews.stop(session)
-    assert display(hair.evaluated_get(evaluated())) == shown
+    assert display(hair.evaluated_get(get_depsgraph())) == shown
     assert display(hair) == shown
 
 
-def test_blenders_own_strands_throw_no_shadow_where_ours_lies_on_the_head(preview, evaluated):
+def test_blenders_own_strands_throw_no_shadow_where_ours_lies_on_the_head(preview, get_depsgraph):
     hair, _, session = preview
-    assert not hair.evaluated_get(evaluated()).visible_shadow, "from the start"
+    assert not hair.evaluated_get(get_depsgraph()).visible_shadow, "from the start"
     for shadows, on_body, throws in (
         ("deep", True, False),
         ("deep", False, True),
@@ -195,26 +195,26 @@ def test_blenders_own_strands_throw_no_shadow_where_ours_lies_on_the_head(previe
     ):
         hair.data.hairloom.volume.shadows = shadows
         hair.data.hairloom.volume.on_body = on_body
-        assert hair.evaluated_get(evaluated()).visible_shadow is throws
+        assert hair.evaluated_get(get_depsgraph()).visible_shadow is throws
     assert hair.visible_shadow
     previews.stop(session)
-    assert hair.evaluated_get(evaluated()).visible_shadow
+    assert hair.evaluated_get(get_depsgraph()).visible_shadow
 
 
-def test_hair_on_no_head_keeps_the_shadow_of_blenders_own_strands(new_hair, evaluated):
+def test_hair_on_no_head_keeps_the_shadow_of_blenders_own_strands(new_hair, get_depsgraph):
     hair = new_hair()
-    previews.start(hair, evaluated())
+    previews.start(hair, get_depsgraph())
     assert hair.data.hairloom.volume.on_body
-    assert hair.evaluated_get(evaluated()).visible_shadow
+    assert hair.evaluated_get(get_depsgraph()).visible_shadow
 
 
-def test_a_preview_adds_and_changes_no_data(new_hair, sphere, evaluated):
+def test_a_preview_adds_and_changes_no_data(new_hair, sphere, get_depsgraph):
     new_hair(sphere)
     before = {data.name_full for data in bpy.data.user_map()}
     hair = bpy.data.objects["Hair"]
-    session = previews.start(hair, evaluated())
-    previews.play(evaluated())
-    play_frames(evaluated, 2)
+    session = previews.start(hair, get_depsgraph())
+    previews.play(get_depsgraph())
+    play_frames(get_depsgraph, 2)
     previews.stop(session)
     assert {data.name_full for data in bpy.data.user_map()} == before
 
@@ -274,9 +274,9 @@ def test_scene_lights_are_followed(preview):
     assert overlay.drawing_of(session.uid).snapshot.lights[0].power == (2.0, 2.0, 2.0)
 
 
-def test_two_grooms_on_one_head_go_separate_ways(new_hair, sphere, evaluated):
+def test_two_grooms_on_one_head_go_separate_ways(new_hair, sphere, get_depsgraph):
     one, two = new_hair(sphere), new_hair(sphere)
-    first, second = previews.start(one, evaluated()), previews.start(two, evaluated())
+    first, second = previews.start(one, get_depsgraph()), previews.start(two, get_depsgraph())
     two.data.hairloom.shading.ambient = 0.5
     assert overlay.drawing_of(first.uid).snapshot.shading.ambient == 1.0
     previews.stop(first)
@@ -317,17 +317,17 @@ def test_the_preview_button_reports_bad_input_without_a_traceback(new_hair, capf
 @pytest.mark.parametrize("scale", [(2.0, 2.0, 2.0), (1.0, 3.0, 0.5), (-1.0, 1.0, 1.0)])
 @pytest.mark.parametrize("is_headless", [False, True])
 def test_scaled_or_mirrored_hair_is_as_the_engine_renders_it(
-    new_hair, sphere, evaluated, is_headless, scale
+    new_hair, sphere, get_depsgraph, is_headless, scale
 ):
     """Once edits have settled, lengths, radii and spacing equal those of the render engine."""
     hair = new_hair(None if is_headless else sphere)
     hair.data.hairloom.widths.method = "own"
-    first = previews.start(hair, evaluated())
+    first = previews.start(hair, get_depsgraph())
     carrier = hair if is_headless else sphere
     carrier.matrix_world = Matrix.LocRotScale((0.3, 0, 0), Matrix.Rotation(0.5, 3, "X"), scale)
     update()
-    scene_events.catch_up(evaluated())
-    session, rendered = previews.session_of(hair), engine_hair.read_groom(hair, evaluated())
+    scene_events.catch_up(get_depsgraph())
+    session, rendered = previews.session_of(hair), engine_hair.read_groom(hair, get_depsgraph())
     assert session is not first
     shown = session.snapshot
     np.testing.assert_allclose(session.strands, rendered.points, atol=1e-6)
@@ -337,44 +337,44 @@ def test_scaled_or_mirrored_hair_is_as_the_engine_renders_it(
     carrier.location.y = 1.0
     carrier.rotation_euler.z = 1.0
     update()
-    scene_events.catch_up(evaluated())
+    scene_events.catch_up(get_depsgraph())
     assert previews.session_of(hair) is session, "moved and turned it is carried"
 
 
-def test_hair_that_plays_keeps_its_size_until_it_is_at_rest(preview, evaluated):
+def test_hair_that_plays_keeps_its_size_until_it_is_at_rest(preview, get_depsgraph):
     hair, head, session = preview
     length = session.rig.rest_lengths
-    previews.play(evaluated())
+    previews.play(get_depsgraph())
     head.scale = (2.0, 2.0, 2.0)
     update()
-    scene_events.catch_up(evaluated())
-    previews.advance(evaluated(), 1.0 / 24.0)
+    scene_events.catch_up(get_depsgraph())
+    previews.advance(get_depsgraph(), 1.0 / 24.0)
     assert previews.session_of(hair) is session and previews.is_playing()
-    previews.rest(evaluated(), keep_playing=False)
+    previews.rest(get_depsgraph(), keep_playing=False)
     again = previews.session_of(hair)
     assert again.rig.rest_lengths == pytest.approx(2.0 * length, rel=1e-5)
     assert not previews.is_playing()
 
 
-def test_hair_of_no_size_is_not_made_again(new_hair, evaluated):
+def test_hair_of_no_size_is_not_made_again(new_hair, get_depsgraph):
     hair = new_hair()
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     update()
     hair.scale = (0.0, 0.0, 0.0)
     update()
-    scene_events.catch_up(evaluated())
+    scene_events.catch_up(get_depsgraph())
     assert previews.session_of(hair) is session, previews.notice()
     hair.scale = (1.0, 1.0, 1.0)
     update()
-    scene_events.catch_up(evaluated())
+    scene_events.catch_up(get_depsgraph())
     assert previews.session_of(hair) is session
 
 
-def test_hair_that_was_scaled_goes_on_with_the_timeline(preview, evaluated):
+def test_hair_that_was_scaled_goes_on_with_the_timeline(preview, get_depsgraph):
     hair, head, _ = preview
     bpy.context.scene.frame_set(1)
     head.scale = (2.0, 2.0, 2.0)
     update()
-    scene_events.catch_up(evaluated())
+    scene_events.catch_up(get_depsgraph())
     bpy.context.scene.frame_set(2)
     assert previews.session_of(hair).is_playing, "from this frame on"

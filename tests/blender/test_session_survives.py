@@ -29,15 +29,15 @@ def test_a_defect_ends_the_preview_and_is_told_once(preview, monkeypatch, capfd)
     assert capfd.readouterr().err.count("Traceback") == 1
 
 
-def test_curves_may_become_fewer_and_none(preview, evaluated):
+def test_curves_may_become_fewer_and_none(preview, get_depsgraph):
     hair, _, session = preview
     hair.data.remove_curves(indices=list(range(50)))
     update()
-    scene_events.catch_up(evaluated())
+    scene_events.catch_up(get_depsgraph())
     assert strand_grid(session).shape[0] == 10
     hair.data.remove_curves()
     update()
-    scene_events.catch_up(evaluated())
+    scene_events.catch_up(get_depsgraph())
     assert previews.sessions() == ()
     assert "Hair" in previews.notice()
     assert overlay.drawing_of(session.uid) is None
@@ -68,11 +68,11 @@ def test_a_head_with_other_vertices_ends_the_preview_with_a_notice(preview):
     assert "vertices" in previews.notice()
 
 
-def test_undo_and_redo_of_a_moved_head_and_edited_hair(new_hair, sphere, evaluated):
+def test_undo_and_redo_of_a_moved_head_and_edited_hair(new_hair, sphere, get_depsgraph):
     bpy.context.preferences.edit.use_global_undo = True
     hair = new_hair(sphere)
     bpy.ops.ed.undo_push(message="begin")
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     begin = strand_grid(session)
     sphere.location.x = 1.0
     hair.data.position_data[7].vector = (0.0, 0.0, 0.5)
@@ -80,13 +80,13 @@ def test_undo_and_redo_of_a_moved_head_and_edited_hair(new_hair, sphere, evaluat
     bpy.ops.ed.undo_push(message="change")
 
     bpy.ops.ed.undo()
-    scene_events.catch_up(evaluated())
+    scene_events.catch_up(get_depsgraph())
     assert previews.sessions() == (session,)
     assert strand_grid(session) == pytest.approx(begin, abs=1e-6)
     assert overlay.drawing_of(session.uid).snapshot.shading.ambient == 1.0
 
     bpy.ops.ed.redo()
-    scene_events.catch_up(evaluated())
+    scene_events.catch_up(get_depsgraph())
     assert strand_grid(session)[0, -1] == pytest.approx([1.0, 0.0, 0.5], abs=1e-5)
     assert overlay.drawing_of(session.uid).snapshot.shading.ambient == 0.125
 
@@ -103,12 +103,12 @@ def test_loading_a_file_drops_all_previews_and_keeps_the_settings(preview, tmp_p
     assert bpy.data.objects["Hair"].data.hairloom.shading.ambient == 0.125
 
 
-def test_a_new_file_knows_nothing_of_the_one_before(preview, evaluated):
+def test_a_new_file_knows_nothing_of_the_one_before(preview, get_depsgraph):
     _, head, _ = preview
-    previews.play(evaluated())
+    previews.play(get_depsgraph())
     previews.pause(True)
     bpy.data.objects.remove(head)
-    previews.advance(evaluated(), 1.0)
+    previews.advance(get_depsgraph(), 1.0)
     previews.previews.notice = "Preview of Hair ended"
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     assert previews.notice() == "" and not previews.previews.is_paused
@@ -131,17 +131,17 @@ def test_another_scene_in_the_window_does_not_end_the_preview(preview):
     assert strand_grid(session) == pytest.approx(before + np.array([1.0, 0.0, 0.0]), abs=1e-6)
 
 
-def test_sculpting_hides_blenders_own_strands(preview, evaluated):
+def test_sculpting_hides_blenders_own_strands(preview, get_depsgraph):
     hair, _, session = preview
     bpy.ops.object.mode_set(mode="SCULPT_CURVES")
     hair.data.position_data[7].vector = (0.0, 0.0, 0.5)
     update()
-    assert hair.evaluated_get(evaluated()).display_type == "WIRE"
-    scene_events.catch_up(evaluated())
+    assert hair.evaluated_get(get_depsgraph()).display_type == "WIRE"
+    scene_events.catch_up(get_depsgraph())
     assert strand_grid(session)[0, -1] == pytest.approx([0.0, 0.0, 0.5], abs=1e-5)
     bpy.ops.object.mode_set(mode="OBJECT")
     update()
-    assert hair.evaluated_get(evaluated()).display_type == "WIRE"
+    assert hair.evaluated_get(get_depsgraph()).display_type == "WIRE"
 
 
 @pytest.mark.slow
@@ -159,48 +159,48 @@ def test_a_final_render_does_not_disturb_the_preview(preview):
 
 
 @pytest.mark.parametrize("groom", ["none", "one point each"])
-def test_hair_that_cannot_be_used_is_refused_with_a_remedy(groom, new_hair, evaluated):
+def test_hair_that_cannot_be_used_is_refused_with_a_remedy(groom, new_hair, get_depsgraph):
     hair = new_hair()
     hair.data.remove_curves()
     if groom != "none":
         hair.data.add_curves([1, 1, 1])
     with pytest.raises(HairloomError) as raised:
-        previews.start(hair, evaluated())
+        previews.start(hair, get_depsgraph())
     assert raised.value.place == "Hair" and raised.value.remedy
     assert previews.sessions() == ()
 
 
-def test_a_groom_of_another_scale_is_refused(new_hair, sphere, evaluated):
+def test_a_groom_of_another_scale_is_refused(new_hair, sphere, get_depsgraph):
     hair = new_hair(sphere)
     hair.scale = (100.0, 100.0, 100.0)
     with pytest.raises(HairloomError, match="scale"):
-        previews.start(hair, evaluated())
+        previews.start(hair, get_depsgraph())
 
 
-def test_a_head_without_faces_or_uvs_is_a_warning(new_hair, sphere, evaluated):
+def test_a_head_without_faces_or_uvs_is_a_warning(new_hair, sphere, get_depsgraph):
     hair = new_hair(sphere)
     while sphere.data.uv_layers:
         sphere.data.uv_layers.remove(sphere.data.uv_layers[0])
     sphere.data.update()
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     assert "Unwrap" in session.source.warnings[0]
     previews.stop(session)
     sphere.data.clear_geometry()
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     assert "no faces" in session.source.warnings[0]
     assert session.rig.head is None
 
 
-def test_a_moment_without_a_gpu_is_waited_for(preview, evaluated, monkeypatch):
+def test_a_moment_without_a_gpu_is_waited_for(preview, get_depsgraph, monkeypatch):
     """Blender has no GPU context between a window's closing and the next redraw."""
     _, _, session = preview
     done = []
     monkeypatch.setattr(previews, "is_interrupted", lambda: True)
-    previews.attempt(previews.previews[session.uid], evaluated(), lambda: done.append(session))
+    previews.attempt(previews.previews[session.uid], get_depsgraph(), lambda: done.append(session))
     assert done == [] and previews.sessions() == (session,) and session.is_stale
     monkeypatch.setattr(previews, "is_interrupted", lambda: False)
     assert not bpy.app.timers.is_registered(scene_events._read_again)
     update()
     assert bpy.app.timers.is_registered(scene_events._read_again), "nobody looks again"
-    scene_events.catch_up(evaluated())
+    scene_events.catch_up(get_depsgraph())
     assert not session.is_stale and previews.notice() == ""

@@ -118,17 +118,17 @@ def test_lengths_are_kept_and_nothing_is_in_the_head(new_hair, sphere):
 
 
 @pytest.mark.parametrize("preset", few_in_commits(["dynamics/soft", "dynamics/natural"]))
-def test_settled_hair_is_at_rest_in_motion(new_hair, sphere, evaluated, preset):
+def test_settled_hair_is_at_rest_in_motion(new_hair, sphere, get_depsgraph, preset):
     hair = new_hair(sphere)
     bpy.ops.hairloom.apply_preset(name=preset)
     hair.hairloom.dynamics.device = "numpy"
 
     def moved():
-        session = previews.start(hair, evaluated())
-        session.play(evaluated())
+        session = previews.start(hair, get_depsgraph())
+        session.play(get_depsgraph())
         before = session.strands.copy()
         for _ in range(48):
-            session.advance(evaluated(), 1.0 / 24.0)
+            session.advance(get_depsgraph(), 1.0 / 24.0)
         away = np.linalg.norm(session.strands - before, axis=1).max()
         previews.stop(session)
         return away
@@ -272,10 +272,10 @@ def test_hair_falls_as_painted_where_a_modifier_adds_curves(domain, new_hair, sp
     assert np.abs(np.delete(tips, moving)).max() < 1e-4
 
 
-def test_until_its_end_nothing_changes(new_hair, sphere, evaluated):
+def test_until_its_end_nothing_changes(new_hair, sphere, get_depsgraph):
     hair = new_hair(sphere)
     combed = curve_points(hair.data)
-    work = settle_hair(hair, evaluated(), SettleSettings())
+    work = settle_hair(hair, get_depsgraph(), SettleSettings())
     parts = [next(work) for _ in range(5)]
     assert parts == sorted(parts)
     work.close()

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.draws(light=False)
 
 
 @pytest.fixture
-def preview(new_hair, sphere, evaluated):
+def preview(new_hair, sphere, get_depsgraph):
     """Hair on the sphere, shown as cards."""
     hair = new_hair(sphere)
     hair.data.hairloom.cards.source = "guides"
@@ -25,7 +25,7 @@ def preview(new_hair, sphere, evaluated):
     hair.data.hairloom.cards.order_by = "distance"
     hair.data.hairloom.atlas.size = "256"
     hair.data.hairloom.card_drawing.shown_as = "cards"
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     yield hair, sphere, session
     previews.stop_all()
 
@@ -77,13 +77,13 @@ def test_colourings_are_seen_on_strands(preview):
     assert drawn(session).strand_count == 60 and drawn(session).cards is None
 
 
-def test_cards_go_with_the_head(preview, evaluated):
+def test_cards_go_with_the_head(preview, get_depsgraph):
     _, head, session = preview
     before = drawn(session).cards.mesh
     head.location.x = 0.5
     head.rotation_euler.z = 1.0
     bpy.context.view_layer.update()
-    scene_events.updated(evaluated())
+    scene_events.updated(get_depsgraph())
     after = drawn(session).cards.mesh
     turn = np.array(head.matrix_world)
     expected = before.positions @ turn[:3, :3].T + turn[:3, 3]
@@ -91,15 +91,15 @@ def test_cards_go_with_the_head(preview, evaluated):
     np.testing.assert_allclose(after.normal, before.normal @ turn[:3, :3].T, atol=1e-3)
 
 
-def test_cards_swing_with_their_guides(preview, evaluated):
+def test_cards_swing_with_their_guides(preview, get_depsgraph):
     _, head, session = preview
-    session.play(evaluated())
+    session.play(get_depsgraph())
     before = drawn(session).cards
     head.location.x = 0.1
     bpy.context.view_layer.update()
     for _ in range(5):
-        session.advance(evaluated(), 0.04)
-        previews.publish(previews.previews[session.uid], evaluated())
+        session.advance(get_depsgraph(), 0.04)
+        previews.publish(previews.previews[session.uid], get_depsgraph())
     after = drawn(session).cards
     assert after.mesh.triangles is before.mesh.triangles
     moved = after.mesh.positions - before.mesh.positions
@@ -109,26 +109,26 @@ def test_cards_swing_with_their_guides(preview, evaluated):
     assert np.isfinite(after.mesh.positions).all()
 
 
-def test_undo_brings_strands_back(preview, evaluated):
+def test_undo_brings_strands_back(preview, get_depsgraph):
     hair, _, session = preview
     hair.data.hairloom.card_drawing.shown_as = "strands"
     hair.data.hairloom.card_drawing.shown_as = "cards"
     scene_events.undone()
-    scene_events.catch_up(evaluated())
+    scene_events.catch_up(get_depsgraph())
     assert drawn(session).cards is not None
 
 
-def test_a_render_shows_the_same_cards(preview, evaluated):
+def test_a_render_shows_the_same_cards(preview, get_depsgraph):
     hair, _, session = preview
-    shown = read_groom(hair, evaluated())
+    shown = read_groom(hair, get_depsgraph())
     assert shown.strand_count == 0
     np.testing.assert_allclose(
         shown.cards.mesh.positions, drawn(session).cards.mesh.positions, atol=1e-6
     )
-    again = read_groom(hair, evaluated())
+    again = read_groom(hair, get_depsgraph())
     assert again.cards.mesh.triangles is shown.cards.mesh.triangles, "nothing is built again"
     hair.data.hairloom.card_drawing.shown_as = "strands"
-    assert read_groom(hair, evaluated()).strand_count == 60
+    assert read_groom(hair, get_depsgraph()).strand_count == 60
 
 
 def test_in_a_window_old_cards_stay_until_others_are_built(in_window):
@@ -208,7 +208,7 @@ def test_cancel_shows_strands_in_place_of_cards_that_are_being_built(in_window):
 
 
 @pytest.mark.slow(instead="test_in_a_window_old_cards_stay_until_others_are_built")
-def test_cards_of_the_rig_before_stay_until_those_of_other_hair_are_built(in_window, evaluated):
+def test_cards_of_the_rig_before_stay_until_those_of_other_hair_are_built(in_window, get_depsgraph):
     """Old cards do not ride on new guides, but they are drawn with the current settings."""
     hair, _, session = in_window
     before = drawn(session).cards
@@ -218,8 +218,8 @@ def test_cards_of_the_rig_before_stay_until_those_of_other_hair_are_built(in_win
     position.data.foreach_set("vector", places * 1.1)
     hair.data.update_tag()
     bpy.context.view_layer.update()
-    scene_events.updated(evaluated())
-    scene_events.catch_up(evaluated())
+    scene_events.updated(get_depsgraph())
+    scene_events.catch_up(get_depsgraph())
     take_steps_until(lambda: not session.is_pending)
     assert session.cards.is_pending
     assert np.array_equal(drawn(session).cards.mesh.positions, before.mesh.positions)

@@ -41,11 +41,13 @@ def baked(new_hair: Any, sphere: Any, tmp_path: Path) -> tuple[Any, Any]:
 
 
 @pytest.fixture
-def changed(baked: tuple[Any, Any], evaluated: Callable[[], Any]) -> Callable[[], tuple[str, ...]]:
+def changed(
+    baked: tuple[Any, Any], get_depsgraph: Callable[[], Any]
+) -> Callable[[], tuple[str, ...]]:
     def look() -> tuple[str, ...]:
         cache = playback.cache_of(baked[0])
         assert cache is not None
-        return changed_since(baked[0], cache, evaluated())
+        return changed_since(baked[0], cache, get_depsgraph())
 
     return look
 
@@ -129,17 +131,19 @@ def test_a_head_of_other_vertices_is_told_and_stops_nothing(baked: Any, changed:
 
 
 def test_motion_of_strands_and_of_cards_says_so(
-    baked: Any, tmp_path: Path, evaluated: Any, capfd: pytest.CaptureFixture[str]
+    baked: Any, tmp_path: Path, get_depsgraph: Any, capfd: pytest.CaptureFixture[str]
 ) -> None:
     hair, frames = baked[0], range(1, LAST + 1)
 
     def notes() -> list[tuple[str, ...]]:
-        plan = StrandExport.of([hair], evaluated(), ALEMBIC, StrandExportSettings(), frames=frames)
+        plan = StrandExport.of(
+            [hair], get_depsgraph(), ALEMBIC, StrandExportSettings(), frames=frames
+        )
         return [BakedGuides.of(hair).notes, tuple(n for n in plan.notes if "bake" in n)]
 
     def line() -> str:
         check = ExportCheck.of([hair])
-        check.refresh(evaluated(), ALEMBIC, StrandExportSettings())
+        check.refresh(get_depsgraph(), ALEMBIC, StrandExportSettings())
         return check.motion_lines(use_bake=True)[0]
 
     assert notes() == [(), ()] and "out of date" not in line()
@@ -147,7 +151,7 @@ def test_motion_of_strands_and_of_cards_says_so(
     for (note,) in notes():
         assert "out of date (settings)" in note and "Bake again" in note
     assert line().endswith("at 24 fps, out of date (settings)")
-    still = StrandExport.of([hair], evaluated(), ALEMBIC, StrandExportSettings())
+    still = StrandExport.of([hair], get_depsgraph(), ALEMBIC, StrandExportSettings())
     assert not any("out of date" in note for note in still.notes), "a still has no motion"
 
     capfd.readouterr()

@@ -215,9 +215,9 @@ def test_all_selected_hair_is_taken_and_counted(new_hair, sphere):
     assert "Hairloom now previews 2 of 3 grooms" in [each.text for each in past_reports]
 
 
-def test_cancelling_takes_none_of_several_hairs(new_hair, sphere, evaluated):
+def test_cancelling_takes_none_of_several_hairs(new_hair, sphere, get_depsgraph):
     grooms = [new_hair(sphere) for _ in range(2)]
-    work = together(starting.take_over(hair, evaluated(), ("looks/blond",)) for hair in grooms)
+    work = together(starting.take_over(hair, get_depsgraph(), ("looks/blond",)) for hair in grooms)
     next(work)
     work.send(None)  # the part of the second groom is running
     work.close()
@@ -348,11 +348,11 @@ def with_principled_hair(hair):
     hair.data.materials.append(material)
 
 
-def test_hair_that_nobody_dressed_has_the_look_of_its_material(new_hair, sphere, evaluated):
+def test_hair_that_nobody_dressed_has_the_look_of_its_material(new_hair, sphere, get_depsgraph):
     hair = new_hair(sphere)
     with_principled_hair(hair)
     _, done = at_once(
-        starting.take_over(hair, evaluated(), chosen_presets(preferences(bpy.context)))
+        starting.take_over(hair, get_depsgraph(), chosen_presets(preferences(bpy.context)))
     )
     assert done == ("took its look from the material 'Auburn'",)
     shading = hair.data.hairloom.shading
@@ -360,20 +360,20 @@ def test_hair_that_nobody_dressed_has_the_look_of_its_material(new_hair, sphere,
     assert shading.base_color[:] == pytest.approx((0.3, 0.06, 0.02), rel=1e-3)
 
 
-def test_a_look_that_was_set_stays_whatever_the_material(new_hair, sphere, evaluated):
+def test_a_look_that_was_set_stays_whatever_the_material(new_hair, sphere, get_depsgraph):
     hair = new_hair(sphere)
     with_principled_hair(hair)
     hair.data.hairloom.shading.tip_tint = 0.5
     _, done = at_once(
-        starting.take_over(hair, evaluated(), chosen_presets(preferences(bpy.context)))
+        starting.take_over(hair, get_depsgraph(), chosen_presets(preferences(bpy.context)))
     )
     shading = hair.data.hairloom.shading
     assert done == () and shading.base_color[:] == pytest.approx(ShadingSettings().base_color)
 
 
-def test_hair_with_colours_of_its_own_keeps_them_as_it_is_dressed(new_hair, sphere, evaluated):
+def test_hair_with_colours_of_its_own_keeps_them_as_it_is_dressed(new_hair, sphere, get_depsgraph):
     hair = new_hair(sphere)
-    at_once(starting.take_over(hair, evaluated(), chosen_presets(preferences(bpy.context))))
+    at_once(starting.take_over(hair, get_depsgraph(), chosen_presets(preferences(bpy.context))))
     assert hair.data.hairloom.shading.color_source == "own"
     bpy.ops.hairloom.apply_preset(name="looks/blond")
     assert hair.data.hairloom.shading.color_source == "look", "a look that was chosen is seen"

@@ -105,11 +105,11 @@ def played(hair, first=1, last=LAST):
 
 @pytest.mark.alike
 @pytest.mark.parametrize("kind", ["circle", "ball", "curve", "torus"])
-def test_a_ring_of_any_kind_holds_what_passes_through_it(swinging, evaluated, kind):
+def test_a_ring_of_any_kind_holds_what_passes_through_it(swinging, get_depsgraph, kind):
     """It holds the strands that cross its disc at z = 0.12, whatever kind of object it is."""
     hair, _ = swinging
     tie(hair, ring(kind))
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     out = session.rig.strands.roots / 0.1
     length = 0.12 / np.maximum(out[:, 2], 1e-6)
     inside = length * np.hypot(out[:, 0], out[:, 1])
@@ -128,7 +128,7 @@ def test_a_ring_of_any_kind_holds_what_passes_through_it(swinging, evaluated, ki
 
 @pytest.mark.parametrize("device", few_in_commits(["numpy", "compute"]))
 def test_held_strands_stay_with_a_ring_that_moves_by_itself(
-    new_hair, swinging, evaluated, gpu_context, device
+    new_hair, swinging, get_depsgraph, gpu_context, device
 ):
     hair = new_hair(swinging[1], wavy())
     hair.hairloom.dynamics.device = device
@@ -138,18 +138,18 @@ def test_held_strands_stay_with_a_ring_that_moves_by_itself(
     one.keyframe_insert("location", frame=LAST)
     bpy.context.scene.frame_set(1)
     tie(hair, one)
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     for frame in range(2, LAST + 1):
         bpy.context.scene.frame_set(frame)
         assert escape(session) < 1e-3
     assert session.solver.form == device
 
 
-def test_a_tie_that_is_deleted_in_mid_play_lets_go(swinging, evaluated):
+def test_a_tie_that_is_deleted_in_mid_play_lets_go(swinging, get_depsgraph):
     hair, _ = swinging
     one = ring()
     tie(hair, one)
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     played(hair, 1, 4)
     assert escape(session) < 1e-3
     rig = session.rig
@@ -164,11 +164,11 @@ def test_a_tie_that_is_deleted_in_mid_play_lets_go(swinging, evaluated):
 
 @pytest.mark.alike
 @pytest.mark.parametrize("how", ["disabled", "scaled to zero", "taken out", "head at zero"])
-def test_what_cannot_hold_is_said_and_holds_nothing(swinging, evaluated, how):
+def test_what_cannot_hold_is_said_and_holds_nothing(swinging, get_depsgraph, how):
     hair, head = swinging
     one = ring()
     collection = tie(hair, one)
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     played(hair, 1, 3)
     if how == "disabled":
         one.hide_viewport = True
@@ -186,35 +186,35 @@ def test_what_cannot_hold_is_said_and_holds_nothing(swinging, evaluated, how):
     assert bool(said) == (how != "taken out")
 
 
-def test_a_ring_beside_the_hair_is_said(swinging, evaluated):
+def test_a_ring_beside_the_hair_is_said(swinging, get_depsgraph):
     hair, _ = swinging
     tie(hair, ring(place=(9.0, 0.0, 0.0)))
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     assert any("No hair passes through the tie Ring" in text for text in session.warnings)
     assert np.isfinite(played(hair)).all()
 
 
-def test_what_cannot_be_a_tie_is_said(swinging, evaluated):
+def test_what_cannot_be_a_tie_is_said(swinging, get_depsgraph):
     hair, _ = swinging
     light = bpy.data.objects.new("Lamp", bpy.data.lights.new("Lamp", "POINT"))
     flat = bpy.data.objects.new("Dot", bpy.data.meshes.new("Dot"))
     for obj in (light, flat):
         bpy.context.collection.objects.link(obj)
     tie(hair, light, flat)
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     text = " ".join(session.warnings)
     assert "Lamp: it is a light object" in text
     assert "Dot: its points do not form a ring" in text
 
 
-def test_tips_on_a_mesh_follow_its_deformation(swinging, evaluated):
+def test_tips_on_a_mesh_follow_its_deformation(swinging, get_depsgraph):
     hair, head = swinging
     bpy.ops.mesh.primitive_uv_sphere_add(radius=0.18, segments=24, ring_count=12)
     bun = bpy.context.object
     bun.name, bun.parent = "Bun", head
     hair.hairloom.tip_surface = bun
     hair.data.hairloom.guides.tip_distance = 0.1
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     assert len(session.rig.holds.strand) > 50
     before = strand_grid(session)
     swell = bun.modifiers.new("Swell", "DISPLACE")
@@ -226,23 +226,23 @@ def test_tips_on_a_mesh_follow_its_deformation(swinging, evaluated):
     assert np.abs(after[:, 0] - before[:, 0]).max() < 1e-6
 
 
-def test_a_renamed_mesh_holds_the_same_tips(swinging, evaluated):
+def test_a_renamed_mesh_holds_the_same_tips(swinging, get_depsgraph):
     """Also when hair is read again while the mesh is away from its place at rest."""
     hair, _ = swinging
     bpy.ops.mesh.primitive_uv_sphere_add(radius=0.18, segments=24, ring_count=12)
     bun = bpy.context.object
     hair.hairloom.tip_surface = bun
     hair.data.hairloom.guides.tip_distance = 0.1
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     held = session.rig.holds
     bun.location.z += 0.5
     bun.name = "Knot"
     bpy.context.view_layer.update()
-    session.read_again(evaluated())
+    session.read_again(get_depsgraph())
     assert session.rig.holds is held
 
 
-def test_tips_are_held_where_a_vertex_group_says(swinging, evaluated):
+def test_tips_are_held_where_a_vertex_group_says(swinging, get_depsgraph):
     """Tips are held where the interpolated weight is at least 0.5, tested to within one edge. A
     bake becomes stale, and a missing group is named."""
     hair, head = swinging
@@ -251,17 +251,17 @@ def test_tips_are_held_where_a_vertex_group_says(swinging, evaluated):
     bun.name, bun.parent = "Bun", head
     hair.hairloom.tip_surface = bun
     hair.data.hairloom.guides.tip_distance = 0.1
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     everywhere = set(session.rig.holds.strand)
     tips = session.rig.strands.points[session.rig.strands.offsets[1:] - 1]
     list(Bake.of([hair], bpy.context.scene).steps())
     cache = playback.cache_of(hair)
     on_right = [vertex.index for vertex in bun.data.vertices if vertex.co.x > 0.01]
     bun.vertex_groups.new(name="Right").add(on_right, 1.0, "REPLACE")
-    assert changed_since(hair, cache, evaluated()) == ()
+    assert changed_since(hair, cache, get_depsgraph()) == ()
     hair.hairloom.tip_group = "Right"
-    assert changed_since(hair, cache, evaluated()) == ("ties",)
-    session = previews.start(hair, evaluated())
+    assert changed_since(hair, cache, get_depsgraph()) == ("ties",)
+    session = previews.start(hair, get_depsgraph())
     held = set(session.rig.holds.strand)
     spacing = 0.18 * 2.0 * np.pi / 24
     local = moved_by(np.linalg.inv(np.array(bun.matrix_world)), tips)[:, 0]
@@ -269,7 +269,7 @@ def test_tips_are_held_where_a_vertex_group_says(swinging, evaluated):
     assert on_it and on_it <= held < everywhere
     assert all(local[one] > -spacing for one in held)
     hair.hairloom.tip_group = "Left"
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     assert session.rig.holds is None
     assert any("Bun: it has neither" in text and "'Left'" in text for text in session.warnings)
 
@@ -278,37 +278,37 @@ def moved_by(matrix, points):
     return points @ matrix[:3, :3].T + matrix[:3, 3]
 
 
-def test_a_bake_keeps_what_ties_hold(swinging, evaluated):
+def test_a_bake_keeps_what_ties_hold(swinging, get_depsgraph):
     hair, _ = swinging
     one = ring()
     tie(hair, one)
-    previews.start(hair, evaluated())
+    previews.start(hair, get_depsgraph())
     live = played(hair)
     list(Bake.of([hair], bpy.context.scene).steps())
     np.testing.assert_array_equal(played(hair), live)
     cache = playback.cache_of(hair)
     bpy.context.scene.frame_set(3)
-    assert changed_since(hair, cache, evaluated()) == ()
+    assert changed_since(hair, cache, get_depsgraph()) == ()
     np.testing.assert_array_equal(baked_grid(cache, 3), live[2])
     assert playback.pose_in(cache, 3, 0.5).anchors.shape == (1, 4, 4)
     one.location.z += 0.01
     bpy.context.view_layer.update()
-    assert changed_since(hair, cache, evaluated()) == ("ties",)
+    assert changed_since(hair, cache, get_depsgraph()) == ("ties",)
     one.location.z -= 0.01
     hair.hairloom.tie_collection = None
-    assert "ties" in changed_since(hair, cache, evaluated())
+    assert "ties" in changed_since(hair, cache, get_depsgraph())
 
 
-def test_a_tie_that_is_added_while_previewing_is_taken_over(swinging, evaluated):
+def test_a_tie_that_is_added_while_previewing_is_taken_over(swinging, get_depsgraph):
     from hairloom.addon.blender.preview import scene_events
 
     hair, _ = swinging
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     assert session.rig.holds is None
     tie(hair, ring())
     bpy.context.view_layer.update()
     assert session.is_stale
-    scene_events.catch_up(evaluated())
+    scene_events.catch_up(get_depsgraph())
     assert len(previews.session_of(hair).rig.holds.strand) > 3
     assert not session.is_stale
 
@@ -344,7 +344,7 @@ def test_what_cannot_hold_hair_becomes_no_tie(swinging):
     assert hair.hairloom.tie_collection is None
 
 
-def test_ties_survive_saving_and_opening(swinging, tmp_path, evaluated):
+def test_ties_survive_saving_and_opening(swinging, tmp_path, get_depsgraph):
     hair, _ = swinging
     tie(hair, ring())
     hair.hairloom.tip_surface = bpy.data.objects["Head"]
@@ -353,7 +353,7 @@ def test_ties_survive_saving_and_opening(swinging, tmp_path, evaluated):
     hair = bpy.data.objects["Hair"]
     assert hair.hairloom.tie_collection.name == "Ties"
     assert hair.hairloom.tip_surface.name == "Head"
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     assert len(session.rig.holds.strand) > 3
 
 
@@ -370,7 +370,7 @@ def bone_in(head):
 
 
 @pytest.mark.parametrize("how", ["child of the bone", "skinned"])
-def test_ties_move_with_bones(new_hair, sphere, evaluated, how):
+def test_ties_move_with_bones(new_hair, sphere, get_depsgraph, how):
     rig = bone_in(sphere)
     hair = new_hair(sphere)
     hair.hairloom.dynamics.device = "numpy"
@@ -393,7 +393,7 @@ def test_ties_move_with_bones(new_hair, sphere, evaluated, how):
     bone.keyframe_insert("rotation_euler", frame=LAST)
     bpy.context.scene.frame_set(1)
     tie(hair, one)
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     assert len(session.rig.holds.strand) > 3
     begun = strand_grid(session)
     for frame in range(2, LAST + 1):
@@ -407,10 +407,10 @@ def test_ties_move_with_bones(new_hair, sphere, evaluated, how):
     assert np.isfinite(root).all()
 
 
-def test_undo_brings_back_a_tie_that_was_deleted(swinging, evaluated):
+def test_undo_brings_back_a_tie_that_was_deleted(swinging, get_depsgraph):
     hair, _ = swinging
     tie(hair, ring())
-    previews.start(hair, evaluated())
+    previews.start(hair, get_depsgraph())
     bpy.ops.ed.undo_push(message="before")
     bpy.data.objects.remove(bpy.data.objects["Ring"])
     bpy.ops.ed.undo_push(message="deleted")
@@ -425,10 +425,10 @@ def test_undo_brings_back_a_tie_that_was_deleted(swinging, evaluated):
     assert not [text for text in session.warnings if "Ring" in text]
 
 
-def test_verbs_hold_hair_by_its_ties_as_the_window_does(swinging, tmp_path, evaluated):
+def test_verbs_hold_hair_by_its_ties_as_the_window_does(swinging, tmp_path, get_depsgraph):
     hair, _ = swinging
     tie(hair, ring())
-    expected = len(np.unique(previews.start(hair, evaluated()).rig.holds.strand))
+    expected = len(np.unique(previews.start(hair, get_depsgraph()).rig.holds.strand))
     report, output = tmp_path / "report.json", str(tmp_path / "hair.tfx")
     arguments = ["export", "--groom", "Hair", "--output", output, "--report", str(report)]
     assert command_line.run(arguments) == 0

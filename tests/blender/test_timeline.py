@@ -18,11 +18,11 @@ LAST = 10
 
 
 @pytest.fixture
-def swinging(new_hair, sphere, evaluated, tmp_path):
+def swinging(new_hair, sphere, get_depsgraph, tmp_path):
     """Previewed hair on a head that shakes: (hair, head, session)."""
     hair, head = shake_head(new_hair(sphere), sphere, LAST, tmp_path / "bake")
     bpy.context.scene.frame_set(5)
-    return hair, head, previews.start(hair, evaluated())
+    return hair, head, previews.start(hair, get_depsgraph())
 
 
 def go(*frames):
@@ -127,42 +127,42 @@ def test_without_simulate_on_playback_hair_only_follows(swinging):
 
 
 def test_free_play_is_shaken_by_dragging_and_handed_over_to_playback(
-    swinging, evaluated, monkeypatch
+    swinging, get_depsgraph, monkeypatch
 ):
     _, _, session = swinging
     go(1)
-    previews.play(evaluated())
+    previews.play(get_depsgraph())
     assert previews.is_playing()
     go(4)
-    previews.advance(evaluated(), 1 / 24)
+    previews.advance(get_depsgraph(), 1 / 24)
     assert previews.is_playing() and lag(session) > 0.005
     monkeypatch.setattr(playback, "is_played", lambda: True)
     go(5)
     assert not previews.is_playing() and session.is_playing
     assert lag(session) > 0.005, "it goes on from where it was"
-    previews.play(evaluated())
+    previews.play(get_depsgraph())
     assert previews.is_playing() and lag(session) < 1e-5
 
 
-def test_paused_hair_holds_and_goes_on(swinging, evaluated):
+def test_paused_hair_holds_and_goes_on(swinging, get_depsgraph):
     _, head, session = swinging
     head.animation_data_clear()
-    previews.play(evaluated())
+    previews.play(get_depsgraph())
     assert not bpy.ops.hairloom.pause.poll() or previews.is_playing()
     head.location.x += 0.1
     bpy.context.view_layer.update()
-    previews.advance(evaluated(), 1 / 24)
+    previews.advance(get_depsgraph(), 1 / 24)
     held = strand_grid(session)
     assert bpy.ops.hairloom.pause() == {"FINISHED"}
-    previews.advance(evaluated(), 1 / 24)
+    previews.advance(get_depsgraph(), 1 / 24)
     np.testing.assert_array_equal(strand_grid(session), held)
     assert previews.is_paused()
     assert bpy.ops.hairloom.pause() == {"FINISHED"}
-    previews.advance(evaluated(), 1 / 24)
+    previews.advance(get_depsgraph(), 1 / 24)
     assert np.abs(strand_grid(session) - held).max() > 1e-4
     assert bpy.ops.hairloom.reset() == {"FINISHED"}
     assert lag(session) < 1e-5 and previews.is_playing()
-    previews.rest(evaluated(), keep_playing=False)
+    previews.rest(get_depsgraph(), keep_playing=False)
     assert not previews.is_playing() and not bpy.ops.hairloom.pause.poll()
 
 
@@ -204,11 +204,11 @@ def test_a_head_of_no_size_or_turned_inside_out_gives_no_nonsense(scale, swingin
 
 @pytest.mark.parametrize("what", ["a vertex", "the object"])
 @pytest.mark.parametrize("when", ["in playback", "while it plays freely"])
-def test_what_is_not_a_number_ends_the_preview_with_a_reason(what, when, swinging, evaluated):
+def test_what_is_not_a_number_ends_the_preview_with_a_reason(what, when, swinging, get_depsgraph):
     hair, head, _ = swinging
     go(1, 2)
     if when == "while it plays freely":
-        previews.play(evaluated())
+        previews.play(get_depsgraph())
     curves = np.array([point.position for point in hair.data.points])
     if what == "a vertex":
         head.data.vertices[7].co.x = math.nan
@@ -217,7 +217,7 @@ def test_what_is_not_a_number_ends_the_preview_with_a_reason(what, when, swingin
         head.matrix_world = Matrix(((math.nan,) * 4,) * 4)
     head.data.update()
     go(3)
-    previews.advance(evaluated(), 1 / 24)
+    previews.advance(get_depsgraph(), 1 / 24)
     assert previews.sessions() == ()
     assert "Head" in previews.notice() and "not a finite number" in previews.notice()
     np.testing.assert_array_equal(curves, [point.position for point in hair.data.points])

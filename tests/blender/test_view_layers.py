@@ -61,7 +61,9 @@ def test_a_layer_that_a_window_changes_to_is_evaluated(layers):
     assert not bpy.app.timers.is_registered(timer), "a timer is left"
 
 
-def test_a_local_view_in_a_workspace_that_no_window_shows_has_no_hair(new_hair, sphere, evaluated):
+def test_a_local_view_in_a_workspace_that_no_window_shows_has_no_hair(
+    new_hair, sphere, get_depsgraph
+):
     hair, window = new_hair(sphere), bpy.context.window
     hair.select_set(False)
     sphere.select_set(True)
@@ -75,5 +77,5 @@ def test_a_local_view_in_a_workspace_that_no_window_shows_has_no_hair(new_hair, 
     region = next(each for each in area.regions if each.type == "WINDOW")
     with bpy.context.temp_override(window=window, screen=screen, area=area, region=region):
         assert bpy.ops.view3d.localview(frame_selected=False) == {"FINISHED"}
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     assert area.spaces.active.as_pointer() in overlay.drawing_of(session.uid).hidden_in

@@ -43,9 +43,9 @@ def hair(new_hair: Callable[..., Any], sphere: bpy.types.Object) -> bpy.types.Ob
 
 
 @pytest.fixture
-def shown(hair: bpy.types.Object, evaluated: Callable[[], Any]) -> np.ndarray:
+def shown(hair: bpy.types.Object, get_depsgraph: Callable[[], Any]) -> np.ndarray:
     """The radius of each strand in the preview, the same at all its points, (COUNT,) [m]."""
-    session = previews.start(hair, evaluated())
+    session = previews.start(hair, get_depsgraph())
     assert session.rig.widths.is_found
     radius: np.ndarray = session.rig.strands.radius.reshape(COUNT, -1)
     assert np.ptp(radius[:, 0]) > 0.0 and (radius == radius[:, :1]).all()
@@ -70,9 +70,9 @@ def test_every_file_has_the_widths_of_the_preview(
 
 
 def test_cards_are_made_of_strands_as_wide_as_the_preview_draws_them(
-    hair: bpy.types.Object, shown: np.ndarray, evaluated: Callable[[], Any]
+    hair: bpy.types.Object, shown: np.ndarray, get_depsgraph: Callable[[], Any]
 ) -> None:
-    inputs, _, _ = read_inputs(hair, evaluated())
+    inputs, _, _ = read_inputs(hair, get_depsgraph())
     look = StrandSettings(fullness=1.5)
     groom = card_groom(inputs.rig, look)
     own = np.repeat(shown[:, None], groom.radius.shape[1], axis=1)
@@ -81,11 +81,11 @@ def test_cards_are_made_of_strands_as_wide_as_the_preview_draws_them(
 
 
 def test_the_engine_draws_the_widths_of_the_preview(
-    hair: bpy.types.Object, shown: np.ndarray, evaluated: Callable[[], Any]
+    hair: bpy.types.Object, shown: np.ndarray, get_depsgraph: Callable[[], Any]
 ) -> None:
-    snapshot = read_groom(hair, evaluated())
+    snapshot = read_groom(hair, get_depsgraph())
     np.testing.assert_array_equal(snapshot.radius, np.repeat(shown, POINTS))
-    inputs, _, _ = read_inputs(hair, evaluated())
+    inputs, _, _ = read_inputs(hair, get_depsgraph())
     assert snapshot.extinction == inputs.rig.widths.extinction > 1.0
 
 

@@ -21,9 +21,9 @@ def wait_until(condition: Callable[[], Any]) -> None:
         time.sleep(POLL_S)
 
 
-def wait_until_playing(session: Any, evaluated: Callable[[], Any], duration: float) -> None:
+def wait_until_playing(session: Any, get_depsgraph: Callable[[], Any], duration: float) -> None:
     """Tick Play's clock until this hair, which waits for its colliders, starts to play."""
-    wait_until(lambda: previews.advance(evaluated(), duration) or session.is_playing)
+    wait_until(lambda: previews.advance(get_depsgraph(), duration) or session.is_playing)
 
 
 def take_steps_until(condition: Callable[[], Any]) -> None:
