@@ -37,21 +37,21 @@ from .shading.drawn_strands import drawn_radius, own_colors
 from .shading.settings import ShadingSettings, StrandSettings
 from .strands.arc_length import lengths
 
-_AS_THEY_ARE = StrandSettings()
+_DEFAULT_STRANDS = StrandSettings()
 
 
 def card_build_steps(
     rig: Rig,
     settings: SettingsMap,
     alpha_of: AlphaOf = lambda _build: None,
-    others: Sequence[CardOccluder] = (),
+    occluders: Sequence[CardOccluder] = (),
     edits: CardEdits | None = None,
 ) -> Generator[str, None, CardBuild]:
     """Cards at rest in all levels of detail, with occlusion, sorted from inside to outside.
 
     Args:
         alpha_of: bakes the atlas and returns its alpha; see `cards.build`.
-        others: cards of other grooms, which shade these, world space.
+        occluders: cards of other grooms, which shade these, world space.
         edits: the artist's changes to cards made before, which are kept.
 
     Yields the name of the next stage; returns the cards.
@@ -74,13 +74,13 @@ def card_build_steps(
         light=light.reshape(*strands.grid.shape[:2], -1),
     )
     sections = settings[CardSettings], settings[AtlasSettings], settings[CardOcclusionSettings]
-    build = yield from card_steps(groom, *sections, alpha_of, others, edits)
+    build = yield from card_steps(groom, *sections, alpha_of, occluders, edits)
     if build.shell_layers:
         build = replace(build, light=directional_light(fields, build.finest.positions))
     return build
 
 
-def card_groom(rig: Rig, drawn: StrandSettings = _AS_THEY_ARE) -> CardGroom:
+def card_groom(rig: Rig, strand_settings: StrandSettings = _DEFAULT_STRANDS) -> CardGroom:
     """The strands that cards are made from, without their occlusion.
 
     Baby hair is left out: its single strands lie on the skin along hairlines and partings, where
@@ -88,14 +88,14 @@ def card_groom(rig: Rig, drawn: StrandSettings = _AS_THEY_ARE) -> CardGroom:
     """
     number = np.delete(np.arange(rig.strands.strand_count), rig.baby_hair)
     strands = card_strands(rig.strands.take(number) if len(rig.baby_hair) else rig.strands)
-    radius = drawn_radius(strands.radius.reshape(strands.strand_count, -1), drawn)
+    radius = drawn_radius(strands.radius.reshape(strands.strand_count, -1), strand_settings)
     # guides are the artist's own strands, which come first, so they keep their numbers
     return CardGroom(strands, number, rig.guides, radius, root_normals(rig)[number], rig.head)
 
 
-def occluder_of(rig: Rig, drawn: StrandSettings = _AS_THEY_ARE) -> CardOccluder:
+def occluder_of(rig: Rig, strand_settings: StrandSettings = _DEFAULT_STRANDS) -> CardOccluder:
     """Cards that represent this groom's strands where they shade other grooms, world space."""
-    return strand_occluder(card_groom(rig, drawn))
+    return strand_occluder(card_groom(rig, strand_settings))
 
 
 def bound_cards(rig: Rig, mesh: CardMesh) -> CardBinding:
@@ -124,7 +124,7 @@ def _contacts(rig: Rig, cards: CardBinding, solids: Solids) -> CardContacts | No
     if not colliders or not solids.motion_start.colliders:
         return None
     for known, clearance in cards.met:
-        if known is solids.motion_start or known.is_as(solids.motion_start):
+        if known is solids.motion_start or known.is_same_as(solids.motion_start):
             return CardContacts(colliders, clearance)
     clearance = card_clearance(rig, cards, solids.motion_start)
     cards.met[:] = [(solids.motion_start, clearance)]

@@ -13,58 +13,65 @@ from dataclasses import replace
 import numpy as np
 
 from .arrays import Floats, Ints
-from .rig_flow import Grown, Rig
+from .rig_flow import GrownChildren, Rig
 from .strands import StrandSet
 from .strands.center_lines import center_lines
 from .strands.needed_points import with_points
 from .strands.resample import resample
 
 
-def combed(rig: Rig, curves: StrandSet, number: Ints, *, is_animated: bool = False) -> Rig:
+def combed_rig(
+    rig: Rig, curves: StrandSet, curve_indices: Ints, *, is_animated: bool = False
+) -> Rig:
     """The rig after some of the artist's curves have moved.
 
     Args:
         curves: the n curves that moved, world space at rest, as they are now.
-        number: (n,) ascending, their indices among the rig's own strands.
+        curve_indices: (n,) ascending, their indices among the rig's own strands.
         is_animated: whether strands have kept their own points, see `rig_flow.prepare`.
     """
     strands, cv_count = rig.strands, rig.guide_grid.shape[1]
     points = strands.points.copy()
-    counts, before = strands.point_counts[number], curves.point_counts
+    counts, before = strands.point_counts[curve_indices], curves.point_counts
     is_even = before > counts if is_animated else before != counts
-    _put(points, strands.offsets, number, with_points(curves, counts, is_even))
+    _write_strands(points, strands.offsets, curve_indices, with_points(curves, counts, is_even))
     guide_grid = rig.guide_grid.copy()
-    guides = np.flatnonzero(np.isin(rig.guides, number))
+    guides = np.flatnonzero(np.isin(rig.guides, curve_indices))
     if len(guides):
-        moved = curves.take(np.searchsorted(number, rig.guides[guides]))
+        moved = curves.take(np.searchsorted(curve_indices, rig.guides[guides]))
         guide_grid[guides] = center_lines(moved, cv_count).grid
-    grown, own = rig.grown, rig.own_count
+    grown, own = rig.grown_children, rig.own_count
     if grown is not None and own is not None:
-        grown, touched = _grown(grown, strands, points, number)
+        grown, touched = _with_moved_parents(grown, strands, points, curve_indices)
         if len(touched):
-            put_children(points, strands.offsets, grown, touched, own)
-    return replace(rig, strands=replace(strands, points=points), guide_grid=guide_grid, grown=grown)
+            write_children(points, strands.offsets, grown, touched, own)
+    return replace(
+        rig, strands=replace(strands, points=points), guide_grid=guide_grid, grown_children=grown
+    )
 
 
-def _grown(grown: Grown, strands: StrandSet, points: Floats, number: Ints) -> tuple[Grown, Ints]:
+def _with_moved_parents(
+    grown: GrownChildren, strands: StrandSet, points: Floats, moved_strands: Ints
+) -> tuple[GrownChildren, Ints]:
     """Children with their parents as these are now, and which of the rig's children to shape again.
 
     Args:
-        strands: of the rig. points: of these strands now. number: the strands that have moved.
+        strands: of the rig. points: of these strands now. moved_strands: the
+            indices of those that have moved.
     """
-    is_moved = np.isin(grown.parents, number)
+    is_moved = np.isin(grown.parents, moved_strands)
     parents = np.flatnonzero(is_moved)
     if not len(parents):
         return grown, parents
     grid = grown.shapes.grid.copy()
-    moved = _taken(strands, points, grown.parents[parents])
+    moved = _with_new_points(strands, points, grown.parents[parents])
     grid[parents] = resample(moved, grid.shape[1]).grid
     shapes = replace(grown.shapes, points=grid.reshape(-1, 3))
-    touched = np.flatnonzero(grown.growth.touched(is_moved)[grown.kept])
+    touched = np.flatnonzero(grown.growth.touched(is_moved)[grown.rig_children])
     return replace(grown, shapes=shapes), touched
 
 
-def _taken(strands: StrandSet, points: Floats, chosen: Ints) -> StrandSet:
+def _with_new_points(strands: StrandSet, points: Floats, chosen: Ints) -> StrandSet:
     """Some of the strands with new points; `points` are those of all strands."""
     counts = strands.point_counts[chosen]
     offsets = np.concatenate([[0], np.cumsum(counts)])
@@ -72,27 +79,29 @@ def _taken(strands: StrandSet, points: Floats, chosen: Ints) -> StrandSet:
     return strands.take(chosen).with_points(points[picked])
 
 
-def put_children(points: Floats, offsets: Ints, grown: Grown, chosen: Ints, own: int) -> None:
+def write_children(
+    points: Floats, offsets: Ints, grown: GrownChildren, chosen: Ints, own_count: int
+) -> None:
     """Write the shapes of some of a rig's children into `points`, with their old point counts.
 
     Args:
         chosen: (n,) indices among the rig's children, for which `grown.kept` ascends.
-        own: the number of strands before the children.
+        own_count: the number of strands before the children.
     """
-    children = _strands(grown.growth.shapes(grown.shapes.grid, grown.kept[chosen]))
-    counts = (offsets[1:] - offsets[:-1])[own + chosen]
+    children = _strands_of_grid(grown.growth.shapes(grown.shapes.grid, grown.rig_children[chosen]))
+    counts = (offsets[1:] - offsets[:-1])[own_count + chosen]
     children = with_points(children, counts, children.point_counts != counts)
-    _put(points, offsets, own + chosen, children)
+    _write_strands(points, offsets, own_count + chosen, children)
 
 
-def _strands(grid: Floats) -> StrandSet:
+def _strands_of_grid(grid: Floats) -> StrandSet:
     """Strands of these points, (n, count, 3), with dummy radii and groups."""
     count, points = grid.shape[1], grid.reshape(-1, 3)
     offsets = np.arange(len(grid) + 1) * count
     return StrandSet(points, offsets, np.ones(len(points)), np.zeros(len(grid), np.int32))
 
 
-def _put(points: Floats, offsets: Ints, number: Ints, strands: StrandSet) -> None:
+def _write_strands(points: Floats, offsets: Ints, indices: Ints, strands: StrandSet) -> None:
     """Overwrite the strands of these numbers, which have the same point counts, in `points`."""
-    first = np.repeat(offsets[number] - strands.offsets[:-1], strands.point_counts)
+    first = np.repeat(offsets[indices] - strands.offsets[:-1], strands.point_counts)
     points[first + np.arange(len(strands.points))] = strands.points

@@ -35,16 +35,16 @@ from .strands.kept import same_rows
 from .strands.vectors import cross_rows, dot_rows
 
 #: Points whose directions are computed at once, so that they stay in the cache.
-AT_ONCE = 1 << 14
+POINTS_PER_CHUNK = 1 << 14
 #: Three directions at each point, three times (point_count, 3), see `strand_axes`.
 type Axes = tuple[Floats, Floats, Floats]
 #: Number of strands that represent all where light off far skin is blocked.
 SHADING_STRANDS = 6000
 #: Coarse fields: cells along the longest side, cells in all, cells along the longest side of the
 #: skin's field, and strands.
-_COARSE_CELLS, _COARSE_MOST, _COARSE_SKIN, _COARSE_STRANDS = 24, 8_000, 20, 2000
+_COARSE_CELLS, _MAX_COARSE_CELLS, _COARSE_SKIN, _COARSE_STRANDS = 24, 8_000, 20, 2000
 #: Settings that `ambient.sky_field` does not depend on.
-_NOT_OF_SKY = ("strength", "ao_bias", "scalp_extinction")
+_SKY_INDEPENDENT = ("strength", "ao_bias", "scalp_extinction")
 #: Quick light is looked up at every fourth point of a strand, and at its last one.
 _STRIDE = 4
 
@@ -66,7 +66,7 @@ class HairLight:
     occlusion: (point_count,), 1 where nothing shades.
     openness: (point_count, 4), see `ambient.openness_field`: the mean, and a vector in the strand's
         axes. The vector turns with the strand, so in motion it stays as accurate as occlusion.
-    skin_seen: (point_count, 8), see `skin_seen_by`; None without a head.
+    skin_seen: (point_count, 8), see `skin_seen_along_axes`; None without a head.
     fields: the ones that light was looked up in; None without strands.
     is_quick: whether these fields are coarse, or those of earlier hair.
     """
@@ -93,7 +93,7 @@ def rest_light(
     with ThreadPoolExecutor(1) as beside:
         skin_field = beside.submit(rest_skin_field, rig)
         skin = beside.submit(
-            lambda: _skin(axes, skin_field.result(), lambda field: field.at(points))
+            lambda: _skin_seen(axes, skin_field.result(), lambda field: field.at(points))
         )
         fields = LightFields(*_sky_fields(rig, settings, report), skin_field.result())
         return _light(rig, settings, fields, axes, lambda field: field.at(points), skin.result())
@@ -117,7 +117,7 @@ def _sky_fields(
     return sky, openness
 
 
-def relit(
+def updated_light(
     rig: Rig, light: HairLight, before: AmbientSettings, settings: AmbientSettings
 ) -> HairLight | None:
     """The light of a rig after a change of settings, bit for bit as `rest_light`.
@@ -132,7 +132,7 @@ def relit(
     if light.is_quick or fields is None or before.cell_count != settings.cell_count:
         return None
     sky = fields.sky
-    looks = {name: getattr(settings, name) for name in _NOT_OF_SKY}
+    looks = {name: getattr(settings, name) for name in _SKY_INDEPENDENT}
     if replace(before, **looks) != settings:
         cells = HairCells.of(rig.strands, rig.head, settings.cell_count)
         sky = sky_field(cells, ambient_of(rig, settings))
@@ -141,21 +141,21 @@ def relit(
 
 
 def quick_light(
-    rig: Rig, settings: AmbientSettings, known: tuple[Rig, HairLight] | None
+    rig: Rig, settings: AmbientSettings, earlier: tuple[Rig, HairLight] | None
 ) -> HairLight:
     """An approximation of `rest_light` in a fraction of the time.
 
     Args:
-        known: earlier hair much like this, and its light; None: there is none.
+        earlier: earlier hair much like this, and its light; None: there is none.
     """
     strands = rig.strands
     if not strands.strand_count:
         return _NO_LIGHT
-    before, light = (None, None) if known is None else known
+    before, light = (None, None) if earlier is None else earlier
     fields = None if light is None else light.fields
     if before is None or light is None or fields is None:
         fields = _coarse_fields(rig, settings)
-        return _looked_up(rig, settings, fields, strands)
+        return _interpolated_light(rig, settings, fields, strands)
     if (fields.skin is None) != (rig.head is None):
         return rest_light(rig, settings)
     number = same_rows(strands.roots, before.strands.roots)
@@ -173,38 +173,42 @@ def quick_light(
         is_quick=True,
     )
     if len(others):
-        _put(found, strands, others, _looked_up(rig, settings, fields, strands.take(others)))
+        _write_light(
+            found, strands, others, _interpolated_light(rig, settings, fields, strands.take(others))
+        )
     return found
 
 
-def _put(light: HairLight, strands: StrandSet, chosen: Ints, own: HairLight) -> None:
+def _write_light(
+    light: HairLight, strands: StrandSet, chosen: Ints, light_of_chosen: HairLight
+) -> None:
     """Write the light of some strands into that of all."""
     is_own = np.zeros(strands.strand_count, bool)
     is_own[chosen] = True
     points = np.flatnonzero(np.repeat(is_own, strands.point_counts))
-    light.occlusion[points] = own.occlusion
-    light.openness[points] = own.openness
-    if light.skin_seen is not None and own.skin_seen is not None:
-        light.skin_seen[points] = own.skin_seen
+    light.occlusion[points] = light_of_chosen.occlusion
+    light.openness[points] = light_of_chosen.openness
+    if light.skin_seen is not None and light_of_chosen.skin_seen is not None:
+        light.skin_seen[points] = light_of_chosen.skin_seen
 
 
-def _looked_up(
+def _interpolated_light(
     rig: Rig, settings: AmbientSettings, fields: LightFields, strands: StrandSet
 ) -> HairLight:
     """Quick light of some of a rig's strands: looked up at few points, and interpolated linearly
     between these."""
-    chosen, before, part = _few_points(strands)
-    few, axes = strands.points[chosen], _few_axes(strands, chosen, rig.strands)
+    chosen, before, fraction = _lookup_points(strands)
+    few, axes = strands.points[chosen], _axes_at(strands, chosen, rig.strands)
 
-    def look(field: Field) -> Floats:
+    def sample(field: Field) -> Floats:
         return field.at(few)
 
-    light = _light(rig, settings, fields, axes, look, _skin(axes, fields.skin, look))
+    light = _light(rig, settings, fields, axes, sample, _skin_seen(axes, fields.skin, sample))
     seen = light.skin_seen
     return HairLight(
-        _between(light.occlusion[:, None], before, part)[:, 0],
-        _between(light.openness, before, part),
-        None if seen is None else _between(seen, before, part),
+        _interpolated(light.occlusion[:, None], before, fraction)[:, 0],
+        _interpolated(light.openness, before, fraction),
+        None if seen is None else _interpolated(seen, before, fraction),
         fields,
         is_quick=True,
     )
@@ -218,31 +222,31 @@ def _light(
     settings: AmbientSettings,
     fields: LightFields,
     axes: Axes,
-    look: Callable[[Field], Floats],
+    sample: Callable[[Field], Floats],
     skin_seen: Floats | None,
 ) -> HairLight:
     """Args:
-    look: returns the values of a field at all points, (k, point_count).
+    sample: returns the values of a field at all points, (k, point_count).
     """
-    occlusion = occlusion_by(look(fields.sky)[0], ambient_of(rig, settings))
-    openness = np.ascontiguousarray(look(fields.openness).T)
-    openness[:, 1:] = by_axes(openness[:, 1:], axes)
+    occlusion = occlusion_by(sample(fields.sky)[0], ambient_of(rig, settings))
+    openness = np.ascontiguousarray(sample(fields.openness).T)
+    openness[:, 1:] = components_along(openness[:, 1:], axes)
     return HairLight(occlusion, openness, skin_seen, fields)
 
 
-def _skin(axes: Axes, field: Field | None, look: Callable[[Field], Floats]) -> Floats | None:
-    return None if field is None else skin_seen_by(axes, look(field))
+def _skin_seen(axes: Axes, field: Field | None, sample: Callable[[Field], Floats]) -> Floats | None:
+    return None if field is None else skin_seen_along_axes(axes, sample(field))
 
 
 def _coarse_fields(rig: Rig, settings: AmbientSettings) -> LightFields:
-    few, step = few_strands(rig.strands, _COARSE_STRANDS)
-    cells = HairCells.of(few, rig.head, _COARSE_CELLS, _COARSE_MOST)
+    few, step = subsampled_strands(rig.strands, _COARSE_STRANDS)
+    cells = HairCells.of(few, rig.head, _COARSE_CELLS, _MAX_COARSE_CELLS)
     sky = sky_field(cells, ambient_of(rig, settings).multiplied(extinction=step))
     open_field = openness_field(cells, step * rig.widths.extinction)
     return LightFields(sky, open_field, rest_skin_field(rig, _COARSE_SKIN, _COARSE_STRANDS))
 
 
-def _few_points(strands: StrandSet) -> tuple[Ints, Ints, Floats]:
+def _lookup_points(strands: StrandSet) -> tuple[Ints, Ints, Floats]:
     """The points to look up, (k,); for each point of the strands the index of the last of these at
     or before it, and how far it is from there to the next, 0 to 1."""
     offsets, number = strands.offsets, np.arange(strands.point_count)
@@ -253,24 +257,24 @@ def _few_points(strands: StrandSet) -> tuple[Ints, Ints, Floats]:
     return chosen, before, (number - chosen[before]).astype(np.float32) / gap[before]
 
 
-def _between(values: Floats, before: Ints, part: Floats) -> Floats:
+def _interpolated(values: Floats, before: Ints, fraction: Floats) -> Floats:
     """Values at all points, (n, k), interpolated from those at few points, (few, k)."""
     found = np.empty((len(before), values.shape[1]), np.float32)
     last = len(values) - 1
-    for first in range(0, len(before), AT_ONCE):
-        some = slice(first, first + AT_ONCE)
+    for first in range(0, len(before), POINTS_PER_CHUNK):
+        some = slice(first, first + POINTS_PER_CHUNK)
         low, high = before[some], np.minimum(before[some] + 1, last)
         one = values.take(low, axis=0)
         target = np.subtract(values.take(high, axis=0), one, out=found[some])
-        target *= part[some, None]
+        target *= fraction[some, None]
         target += one
     return found
 
 
-def _few_axes(strands: StrandSet, chosen: Ints, among: StrandSet) -> Axes:
-    """`strand_axes` at the chosen points, (k,), with normals in the volume of the hair `among`."""
+def _axes_at(strands: StrandSet, chosen: Ints, hair: StrandSet) -> Axes:
+    """`strand_axes` at the chosen points, (k,), with normals in the volume of the hair `hair`."""
     tangent = tangents_at(strands.points, strands.offsets, chosen)
-    away = np.ascontiguousarray(strands.points[chosen].T) - _middle(among)
+    away = np.ascontiguousarray(strands.points[chosen].T) - _mean_root(hair)
     normal = volume_normal_rows(away, tangent)
     return tangent.T, normal.T, cross_rows(tangent, normal).T
 
@@ -279,8 +283,8 @@ def strand_axes(strands: StrandSet) -> Axes:
     """Three directions at each point: the strand's tangent, its normal in the volume of the hair,
     and across both."""
     axes = np.empty((3, 3, strands.point_count), np.float32)
-    count, center = max(strands.strand_count, 1), _middle(strands)
-    step = max(AT_ONCE * count // max(strands.point_count, 1), 1)
+    count, center = max(strands.strand_count, 1), _mean_root(strands)
+    step = max(POINTS_PER_CHUNK * count // max(strands.point_count, 1), 1)
     for first in range(0, strands.strand_count, step):
         offsets = strands.offsets[first : first + step + 1]
         some = slice(offsets[0], offsets[-1])
@@ -293,7 +297,7 @@ def strand_axes(strands: StrandSet) -> Axes:
     return tangent.T, normal.T, across.T
 
 
-def _middle(strands: StrandSet) -> Floats:
+def _mean_root(strands: StrandSet) -> Floats:
     """The mean of the roots, (3, 1) float32 [m]."""
     total = strands.roots.sum(axis=0, dtype=np.float64)[:, None]
     middle: Floats = (total / max(strands.strand_count, 1)).astype(np.float32)
@@ -303,56 +307,58 @@ def _middle(strands: StrandSet) -> Floats:
 def directional_light(fields: LightFields, points: Floats) -> Floats:
     """Openness and skin seen at points (n, 3), as rows (n, k) in world axes.
 
-    Rows may be averaged over points before `light_by_axes` turns them into light.
+    Rows may be averaged over points before `light_along_axes` turns them into light.
     """
     found = [field.at(points) for field in (fields.openness, fields.skin) if field is not None]
     return np.ascontiguousarray(np.concatenate(found).T)
 
 
-def light_by_axes(axes: Axes, light: Floats) -> tuple[Floats, Floats | None]:
+def light_along_axes(axes: Axes, light: Floats) -> tuple[Floats, Floats | None]:
     """The openness (n, 4) and skin seen (n, 8) of `HairLight`, from rows of `directional_light`."""
     openness, skin = np.ascontiguousarray(light[:, :4]), np.ascontiguousarray(light[:, 4:].T)
-    openness[:, 1:] = by_axes(openness[:, 1:], axes)
-    return openness, skin_seen_by(axes, skin) if len(skin) else None
+    openness[:, 1:] = components_along(openness[:, 1:], axes)
+    return openness, skin_seen_along_axes(axes, skin) if len(skin) else None
 
 
 def rest_skin_field(
-    rig: Rig, cell_count: int | None = None, most: int = SHADING_STRANDS
+    rig: Rig, cell_count: int | None = None, max_strands: int = SHADING_STRANDS
 ) -> Field | None:
     """The field of the skin seen, see `skin_seen.skin_field`; None without a head."""
     if rig.head is None or not rig.strands.strand_count:
         return None
     # a part of the strands is enough: cells are coarser than the gaps between strands
-    some, step = few_strands(rig.strands, most)
+    some, step = subsampled_strands(rig.strands, max_strands)
     radius = drawn_radius(some.radius, StrandSettings(), even(some.offsets))
     some = replace(some, radius=radius.astype(np.float32))
     return skin_field(some, rig.head, step * rig.widths.extinction, cell_count)
 
 
-def few_strands(strands: StrandSet, most: int) -> tuple[StrandSet, int]:
-    """At most `most` of the strands, and how many strands each of these represents."""
-    step = -(-strands.strand_count // most)
+def subsampled_strands(strands: StrandSet, max_count: int) -> tuple[StrandSet, int]:
+    """At most `max_count` of the strands, and how many strands each of these represents."""
+    step = -(-strands.strand_count // max_count)
     return strands.take(np.arange(0, strands.strand_count, step)), step
 
 
-def skin_seen_by(axes: Axes, found: Floats) -> Floats:
+def skin_seen_along_axes(axes: Axes, values: Floats) -> Floats:
     """`received`, `beneath` and `depth` of `skin_seen.SkinSeen`, (n, 8), with vectors in the axes
     at each point.
 
     Args:
-        found: values of `rest_skin_field` at points, (k, n).
+        values: values of `rest_skin_field` at points, (k, n).
     """
-    seen = seen_by(found)
-    received, beneath = (by_axes(each, axes) for each in (seen.received[:, 1:], seen.beneath))
+    seen = seen_by(values)
+    received, beneath = (
+        components_along(each, axes) for each in (seen.received[:, 1:], seen.beneath)
+    )
     parts = seen.received[:, :1], received, beneath, seen.depth[:, None]
     return np.concatenate(parts, axis=1, dtype=np.float32)
 
 
-def by_axes(vectors: Floats, axes: Axes) -> Floats:
+def components_along(vectors: Floats, axes: Axes) -> Floats:
     """The components of vectors (n, 3) along the axes, (n, 3) float32."""
     found = np.empty((len(vectors), 3), np.float32)
-    for first in range(0, len(vectors), AT_ONCE):
-        some = slice(first, first + AT_ONCE)
+    for first in range(0, len(vectors), POINTS_PER_CHUNK):
+        some = slice(first, first + POINTS_PER_CHUNK)
         rows = np.ascontiguousarray(vectors[some].T)
         for column, axis in zip(found.T, axes, strict=True):
             column[some] = dot_rows(rows, axis[some].T)

@@ -77,27 +77,27 @@ class Motion:
 
     guides: (guide_count, cv_count, 3) [m], simulated, with their roots in this pose.
     carried_guides: the same without dynamics: their rest shape carried by the roots.
-    carried_earlier: `carried_guides` one frame earlier; None at the start.
+    previous_carried_guides: `carried_guides` one frame earlier; None at the start.
     duration: of the last frame [s]; 0 at the start. hair_time: the same in the hair's own time.
     colliders: as they stand at the last frame's end.
     clearance: how far strands stay from colliders; None before there are any.
     guide_clearance: the same for guides.
     leans: how leading out bent strands in the frame before.
-    begun: the pose in which the motion began; the dynamics stores the style in that pose.
+    start_pose: the pose in which the motion began; the dynamics stores the style in that pose.
     """
 
     dynamics: DynamicsState
     guides: Floats
     carried_guides: Floats
     pose: Pose
-    carried_earlier: Floats | None = None
+    previous_carried_guides: Floats | None = None
     duration: float = 0.0
     hair_time: float = 0.0
     colliders: tuple[PosedCollider, ...] = ()
     clearance: Clearance | None = None
     guide_clearance: GuideClearance | None = None
     leans: Leans = NO_LEANS
-    begun: Pose | None = None
+    start_pose: Pose | None = None
 
     def drive(self, frame: FrameInput, target: Floats, held: Held | None) -> Drive:
         """What acts in a frame that carries the guides to `target`."""
@@ -106,7 +106,7 @@ class Motion:
             target,
             frame.colliders,
             frame.gravity,
-            self.carried_earlier if frame.duration else None,
+            self.previous_carried_guides if frame.duration else None,
             frame.force_fields,
             self.duration / frame.duration if frame.duration else 1.0,
             held,
@@ -116,14 +116,14 @@ class Motion:
         )
 
 
-def carried(rig: Rig, pose: Pose) -> Floats:
+def carried_strands(rig: Rig, pose: Pose) -> Floats:
     """Rest shapes of all strands, each carried rigidly by its own root, (point_count, 3)."""
     strands = rig.strands
     return follow(strands.points, strands.offsets, motions_of(rig, pose))
 
 
 def carried_guides(rig: Rig, pose: Pose, precision: type = np.float32) -> Floats:
-    """`carried` for the guides, (guide_count, cv_count, 3)."""
+    """`carried_strands` for the guides, (guide_count, cv_count, 3)."""
     return _carried_guides(rig, motions_of(rig, pose, rig.guides), precision)
 
 
@@ -174,8 +174,8 @@ def held_cvs(rig: Rig, pose: Pose) -> Held | None:
 def begin(rig: Rig, pose: Pose) -> Motion:
     """Hair at rest in this pose."""
     guides = style_of_guides(rig, pose)
-    state = start(guides, rig.curl_room, rig.strands_of_guides)
-    return Motion(state, guides, guides, pose, begun=pose)
+    state = start(guides, rig.curl_room, rig.strands_per_guide)
+    return Motion(state, guides, guides, pose, start_pose=pose)
 
 
 def with_style(rig: Rig, motion: Motion) -> Motion:
@@ -184,8 +184,8 @@ def with_style(rig: Rig, motion: Motion) -> Motion:
     Args:
         rig: of the same groom with its curves in other shapes, see `style_flow`.
     """
-    state, begun = motion.dynamics, motion.begun or motion.pose
-    style = start(style_of_guides(rig, begun), rig.curl_room, rig.strands_of_guides)
+    state, start_pose = motion.dynamics, motion.start_pose or motion.pose
+    style = start(style_of_guides(rig, start_pose), rig.curl_room, rig.strands_per_guide)
     # so that distances, which settings give in fractions of it, stay as they are
     rest = replace(style.rest, size=state.rest.size)
     return replace(motion, dynamics=replace(state, rest=rest))
@@ -225,7 +225,7 @@ def steps(rig: Rig, motion: Motion, frame: FrameInput, led: LedOut = NOT_LED) ->
         motion.clearance,
         motion.guide_clearance,
         led.leans,
-        motion.begun,
+        motion.start_pose,
     )
 
 
@@ -238,7 +238,7 @@ def has_jumped(
     False in the frame after a jump, since the speed before is not known.
     """
     is_first = not motion.duration
-    if (motion.carried_earlier is None and not is_first) or not len(rig.guides):
+    if (motion.previous_carried_guides is None and not is_first) or not len(rig.guides):
         return False
     chosen = np.arange(0, len(rig.guides), max(len(rig.guides) // JUMP_GUIDES, 1))
     roots = rig.guide_grid[chosen, :PINNED]
@@ -248,9 +248,9 @@ def has_jumped(
     before = motion.carried_guides[chosen, :PINNED].reshape(-1, 3).astype(np.float64)
     here = before.mean(axis=0)
     displacement = now.mean(axis=0) - here
-    if motion.carried_earlier is not None:
-        earlier = motion.carried_earlier[chosen, :PINNED].reshape(-1, 3).mean(axis=0)
-        displacement = displacement - (here - earlier) * (duration / motion.duration)
+    if motion.previous_carried_guides is not None:
+        previous = motion.previous_carried_guides[chosen, :PINNED].reshape(-1, 3).mean(axis=0)
+        displacement = displacement - (here - previous) * (duration / motion.duration)
     extent = float(np.linalg.norm(np.ptp(rig.guide_grid.reshape(-1, 3), axis=0)))
     if 0.0 < settings.jump_distance * extent < float(np.linalg.norm(displacement)):
         return True
@@ -259,7 +259,7 @@ def has_jumped(
     return 0.0 < settings.jump_turn < angle
 
 
-def go_along(rig: Rig, motion: Motion, frame: FrameInput) -> Motion:
+def advance_rigidly(rig: Rig, motion: Motion, frame: FrameInput) -> Motion:
     """A frame without dynamics: each guide moves rigidly with its root.
 
     After a jump hair has no velocity; frozen hair keeps the one that it had. Where guides show less
@@ -270,13 +270,13 @@ def go_along(rig: Rig, motion: Motion, frame: FrameInput) -> Motion:
     turn = root_turns(rig, pose) @ np.linalg.pinv(root_turns(rig, motion.pose))
     root = state.grid[:, :1]
 
-    def taken_along(rows: Floats) -> Floats:
+    def moved_rigidly(rows: Floats) -> Floats:
         grid = rows.transpose(2, 1, 0)
         moved = np.einsum("nij,nkj->nki", turn, grid - root) + target[:, :1]
         return rows_of(moved.astype(np.float32), "dynamics")
 
-    position = taken_along(state.position)
-    previous = taken_along(state.previous) if is_frozen else position
+    position = moved_rigidly(state.position)
+    previous = moved_rigidly(state.previous) if is_frozen else position
     carried = NOT_MOVED
     if is_frozen:
         roots = Carrier.through(root_sample(motion.carried_guides), root_sample(target))
@@ -299,11 +299,11 @@ def go_along(rig: Rig, motion: Motion, frame: FrameInput) -> Motion:
         frame.colliders,
         motion.clearance,
         motion.guide_clearance,
-        begun=motion.begun,
+        start_pose=motion.start_pose,
     )
 
 
-def style_seen(rig: Rig, pose: Pose, source: Rig) -> Style:
+def neighbour_style(rig: Rig, pose: Pose, source: Rig) -> Style:
     """The groom's style in this pose, as other grooms see it.
 
     Args:
@@ -312,7 +312,7 @@ def style_seen(rig: Rig, pose: Pose, source: Rig) -> Style:
     return Style(partial(style_of_guides, rig, pose), source.hair_of_guides, source)
 
 
-def reach(rig: Rig, pose: Pose) -> tuple[Floats, float]:
+def bounding_sphere(rig: Rig, pose: Pose) -> tuple[Floats, float]:
     """A sphere around all guides in this pose, however they swing: middle (3,) and radius [m]."""
     if not len(rig.guides):
         return np.zeros(3), 0.0
@@ -322,7 +322,7 @@ def reach(rig: Rig, pose: Pose) -> tuple[Floats, float]:
     at_rest = rig.guide_grid[chosen, :PINNED]
     now = follow(at_rest.reshape(-1, 3), offsets, motions).reshape(at_rest.shape)
     first, last = (float(np.linalg.norm(np.diff(grid, axis=1))) for grid in (at_rest, now))
-    middle, radius = rig.reach
+    middle, radius = rig.rest_sphere
     moved = (now[:, 0].astype(np.float64) - at_rest[:, 0]).mean(axis=0)
     return middle + moved, radius * (last / first if first else 1.0)
 
@@ -342,36 +342,36 @@ def with_clearance(
     their style.
     """
     simulated, size = simulated_of(painted, settings, len(rig.guides)), motion.dynamics.rest.size
-    kept, reach = settings.radius_root * size, farthest_kept(settings, size)
+    max_distance, reach = settings.radius_root * size, farthest_kept(settings, size)
     before = tuple(posed.at_begin() for posed in colliders)
     strands, guides = motion.clearance, motion.guide_clearance
     if simulated is not None and not simulated.any():
         strands = None
-    elif colliders and (strands is None or strands.kept != kept):
-        strands = strand_clearance(rig, motion.pose, before, kept)
+    elif colliders and (strands is None or strands.kept != max_distance):
+        strands = strand_clearance(rig, motion.pose, before, max_distance)
     if colliders and (guides is None or guides.reach != reach):
         guides = guide_clearance(motion.carried_guides, before, reach)
     return replace(motion, clearance=strands, guide_clearance=guides)
 
 
 def strand_clearance(
-    rig: Rig, pose: Pose, colliders: tuple[PosedCollider, ...], kept: float
+    rig: Rig, pose: Pose, colliders: tuple[PosedCollider, ...], max_distance: float
 ) -> Clearance:
     """How far strands stay from still colliders, measured where their roots carry them now.
 
     Args:
-        kept: the largest such distance [m].
+        max_distance: the largest such distance [m].
     """
-    # an unmoved rig's points are what `carried` would return, bit for bit
-    points = rig.strands.points if _is_unmoved(rig, pose) else carried(rig, pose)
-    return clearance_at(points, rig.strands.offsets, colliders, kept)
+    # an unmoved rig's points are what `carried_strands` would return, bit for bit
+    points = rig.strands.points if _is_unmoved(rig, pose) else carried_strands(rig, pose)
+    return clearance_at(points, rig.strands.offsets, colliders, max_distance)
 
 
 def strands_and_led(rig: Rig, motion: Motion) -> tuple[Floats, LedOut]:
     """All strands at this moment of a running motion, (point_count, 3) [m], and those of them that
     were led out of colliders."""
     pose, offsets = motion.pose, rig.strands.offsets
-    points, motions = _ridden(rig, pose, motion.guides)
+    points, motions = _ridden_strands(rig, pose, motion.guides)
     if motion.clearance is None:
         return held_strands(rig, pose, points), NOT_LED
     carry = partial(motions.carried, rig.strands.points)
@@ -388,13 +388,13 @@ def strands_at(rig: Rig, pose: Pose, guides_now: Floats, led: LedOut = NOT_LED) 
         guides_now: (guide_count, cv_count, 3) [m], simulated or baked, world space.
         led: strands that were led out of colliders.
     """
-    points = _ridden(rig, pose, guides_now)[0]
+    points = _ridden_strands(rig, pose, guides_now)[0]
     points = held_strands(rig, pose, points)
     led.put(points, rig.strands.offsets)
     return points
 
 
-def _ridden(rig: Rig, pose: Pose, guides_now: Floats) -> tuple[Floats, RootMotions]:
+def _ridden_strands(rig: Rig, pose: Pose, guides_now: Floats) -> tuple[Floats, RootMotions]:
     """All strands riding on guides, and how their roots have moved."""
     motions = motions_of(rig, pose)
     # in the guides' own precision, so that guides that only their roots move turn by exactly 0
@@ -405,9 +405,9 @@ def _ridden(rig: Rig, pose: Pose, guides_now: Floats) -> tuple[Floats, RootMotio
 def strands_at_rest(rig: Rig, pose: Pose) -> Floats:
     """All strands in their style, in the shape of `strands_at`."""
     if rig.holds is None and _is_unmoved(rig, pose):
-        return rig.strands.points  # as `carried` would, bit for bit
+        return rig.strands.points  # as `carried_strands` would, bit for bit
     if held_guides(rig, pose) is None:
-        return held_strands(rig, pose, carried(rig, pose))  # guides at rest move nothing
+        return held_strands(rig, pose, carried_strands(rig, pose))  # guides at rest move nothing
     return strands_at(rig, pose, style_of_guides(rig, pose))
 
 

@@ -17,13 +17,13 @@ from typing import Any
 import numpy as np
 
 from .arrays import Floats, Ints
-from .comb_flow import put_children
+from .comb_flow import write_children
 from .dynamics.painted import PaintedGuides
 from .groom.child_roots import ChildRoots, child_roots
 from .groom.masks import NO_MASKS, Masks, Places, StrandMask
 from .groom.painted_color import PaintedColor
 from .groom.roots import RootFrames, root_frames
-from .rig_flow import Grown, Rig
+from .rig_flow import GrownChildren, Rig
 from .shading.coat import coated_color
 from .shading.drawn_strands import look_color, natural_strands
 from .shading.settings import ShadingSettings
@@ -32,10 +32,10 @@ from .strands.arc_length import along
 from .strands.kept import same_rows
 
 #: The lowest opacity that premultiplied paint is divided by.
-_FAINTEST = 1.0e-6
+_MIN_OPACITY = 1.0e-6
 
 
-def painted(rig: Rig, density: Floats | None, masks: Masks = NO_MASKS) -> Rig:
+def painted_rig(rig: Rig, density: Floats | None, masks: Masks = NO_MASKS) -> Rig:
     """The rig with its children as a new density and new masks make them.
 
     Args:
@@ -45,28 +45,31 @@ def painted(rig: Rig, density: Floats | None, masks: Masks = NO_MASKS) -> Rig:
     Raises:
         HairloomError: as `child_roots`.
     """
-    rig = _masked(rig, masks)
-    grown, own, head = rig.grown, rig.own_count, rig.head
+    rig = _with_masks(rig, masks)
+    grown, own, head = rig.grown_children, rig.own_count, rig.head
     assert grown is not None and own is not None and head is not None
     settings = grown.growth.settings
     roots = child_roots(grown.shapes, head, settings.strand_count, density, settings.seed)
-    number, grown = _grown(roots, head, grown)
+    number, grown = _with_grown_roots(roots, head, grown)
     is_wanted = np.zeros(len(grown.growth.root), bool)
     is_wanted[number] = True
-    gone = np.flatnonzero(~is_wanted[grown.kept])
-    is_wanted[grown.kept] = False
-    come = np.flatnonzero(is_wanted)
-    if not len(gone):
+    removed = np.flatnonzero(~is_wanted[grown.rig_children])
+    is_wanted[grown.rig_children] = False
+    added = np.flatnonzero(is_wanted)
+    if not len(removed):
         return rig
     # if fewer come than go, some are drawn twice until `prepare` has found how many there are
-    come = np.sort(np.resize(come if len(come) else number, len(gone)))
-    kept = grown.kept.copy()
-    kept[gone] = come
-    grown = replace(grown, kept=kept)
-    return replace(_moved(rig, roots, grown, own + gone, number, come), grown=grown)
+    added = np.sort(np.resize(added if len(added) else number, len(removed)))
+    rig_children = grown.rig_children.copy()
+    rig_children[removed] = added
+    grown = replace(grown, rig_children=rig_children)
+    return replace(
+        _with_replaced_children(rig, roots, grown, own + removed, number, added),
+        grown_children=grown,
+    )
 
 
-def colored(rig: Rig, painted: PaintedColor | None, look: ShadingSettings) -> Rig:
+def with_painted_colors(rig: Rig, painted: PaintedColor | None, look: ShadingSettings) -> Rig:
     """The rig with painted colours, see `with_colors`."""
     strands = with_colors(rig.strands, painted, look)
     return rig if strands is rig.strands else replace(rig, strands=strands)
@@ -110,10 +113,12 @@ def with_colors(
 def _coated(painted: Floats, look: ShadingSettings) -> Floats:
     """Premultiplied colours (n, 4) as the look's water and dust change them, (n, 3)."""
     opacity = painted[:, 3:]
-    return opacity * coated_color(painted[:, :3] / np.maximum(opacity, _FAINTEST), look)
+    return opacity * coated_color(painted[:, :3] / np.maximum(opacity, _MIN_OPACITY), look)
 
 
-def _grown(roots: ChildRoots, head: Surface, grown: Grown) -> tuple[Ints, Grown]:
+def _with_grown_roots(
+    roots: ChildRoots, head: Surface, grown: GrownChildren
+) -> tuple[Ints, GrownChildren]:
     """The index of each root's child in the growth, (n,), and the growth with new ones added."""
     growth = grown.growth
     number = same_rows(roots.point, growth.root)
@@ -121,7 +126,7 @@ def _grown(roots: ChildRoots, head: Surface, grown: Grown) -> tuple[Ints, Grown]
     number[new] = len(growth.root) + np.arange(len(new))
     if not len(new):
         return number, grown
-    more = growth.with_more(roots.take(new), head, grown.shapes, grown.kept)
+    more = growth.with_more(roots.take(new), head, grown.shapes, grown.rig_children)
     return number, replace(grown, growth=more)
 
 
@@ -146,10 +151,10 @@ def painted_strands(rig: Rig, mask: StrandMask) -> Floats:
     strands, count = rig.strands, mask.grid.shape[1]
     own = strands.strand_count if rig.own_count is None else rig.own_count
     values = mask.along(Places.of_strands(strands, np.arange(own)), count)
-    if rig.grown is not None:
-        weights, kept = rig.grown.growth.weights, rig.grown.kept
+    if rig.grown_children is not None:
+        weights, kept = rig.grown_children.growth.weights, rig.grown_children.rig_children
         between = Places(None, None, weights.guide[kept], weights.weight[kept])
-        of_children = mask.of(rig.grown.parents).along(between, count)
+        of_children = mask.of(rig.grown_children.parents).along(between, count)
         values = np.concatenate([values, of_children], axis=1)
     if count == 1:
         return values[0].astype(np.float32)
@@ -161,11 +166,11 @@ def painted_strands(rig: Rig, mask: StrandMask) -> Floats:
     return found
 
 
-def _masked(rig: Rig, masks: Masks) -> Rig:
+def _with_masks(rig: Rig, masks: Masks) -> Rig:
     """The rig with its children as these masks shape them."""
-    grown, own, strands, head = rig.grown, rig.own_count, rig.strands, rig.head
+    grown, own, strands, head = rig.grown_children, rig.own_count, rig.strands, rig.head
     assert grown is not None and own is not None and head is not None
-    growth, kept = grown.growth, grown.kept
+    growth, kept = grown.growth, grown.rig_children
     masks = masks.of(grown.parents)
     if masks == growth.masks:
         return rig
@@ -182,52 +187,59 @@ def _masked(rig: Rig, masks: Masks) -> Rig:
     grown = replace(grown, growth=growth)
     touched = np.flatnonzero(growth.clumps.with_members(is_other)[kept])
     points = strands.points.copy()
-    put_children(points, strands.offsets, grown, touched, own)
+    write_children(points, strands.offsets, grown, touched, own)
     finer = np.append(np.ones(own, np.float32), growth.fineness[kept] / fineness)
     radius = strands.radius * np.repeat(finer, strands.point_counts)
-    return replace(rig, strands=replace(strands, points=points, radius=radius), grown=grown)
+    return replace(
+        rig, strands=replace(strands, points=points, radius=radius), grown_children=grown
+    )
 
 
-def _moved(
-    rig: Rig, roots: ChildRoots, grown: Grown, strand: Ints, number: Ints, come: Ints
+def _with_replaced_children(
+    rig: Rig,
+    roots: ChildRoots,
+    grown: GrownChildren,
+    replaced: Ints,
+    root_children: Ints,
+    new_children: Ints,
 ) -> Rig:
     """The rig with some of its strands replaced by other children of the growth.
 
     Args:
-        roots: of the children `number`, (n,), of the growth.
-        strand: (m,) the rig's strands that are replaced.
-        come: (m,) ascending, the children of the growth that replace them.
+        roots: of the children `root_children`, (n,), of the growth.
+        replaced: (m,) the rig's strands that are replaced.
+        new_children: (m,) ascending, the children of the growth that replace them.
     """
     strands, own, head = rig.strands, rig.own_count, rig.head
     assert own is not None and head is not None and rig.rest_frames is not None
     points = strands.points.copy()
-    put_children(points, strands.offsets, grown, strand - own, own)
-    order = np.argsort(number)
-    of_root = order[np.searchsorted(number[order], come)]
+    write_children(points, strands.offsets, grown, replaced - own, own)
+    order = np.argsort(root_children)
+    of_root = order[np.searchsorted(root_children[order], new_children)]
     triangle, barycentric = roots.triangle[of_root], roots.barycentric[of_root]
     frames = root_frames(head.positions, head.triangles, triangle, barycentric)
-    assert rig.grown is not None
-    before = rig.grown.growth.fineness[rig.grown.kept[strand - own]]
+    assert rig.grown_children is not None
+    before = rig.grown_children.growth.fineness[rig.grown_children.rig_children[replaced - own]]
     finer = np.ones(strands.strand_count, np.float32)
-    finer[strand] = grown.growth.fineness[come] / before
+    finer[replaced] = grown.growth.fineness[new_children] / before
     moved = replace(
         strands,
         points=points,
         radius=strands.radius * np.repeat(finer, strands.point_counts),
-        root_triangle=_with(strands.root_triangle, strand, triangle),
-        root_barycentric=_with(strands.root_barycentric, strand, barycentric),
+        root_triangle=_with_rows(strands.root_triangle, replaced, triangle),
+        root_barycentric=_with_rows(strands.root_barycentric, replaced, barycentric),
     )
     rest_frames = RootFrames(
-        _with(rig.rest_frames.origin, strand, frames.origin),
-        _with(rig.rest_frames.rotation, strand, frames.rotation),
+        _with_rows(rig.rest_frames.origin, replaced, frames.origin),
+        _with_rows(rig.rest_frames.rotation, replaced, frames.rotation),
     )
     return replace(rig, strands=moved, rest_frames=rest_frames)
 
 
-def _with[Rows: np.ndarray](rows: Rows | None, chosen: Ints, others: Rows) -> Rows:
+def _with_rows[Rows: np.ndarray](rows: Rows | None, chosen: Ints, new_rows: Rows) -> Rows:
     """A copy of rows (n, ...) with the chosen ones replaced."""
     assert rows is not None
     found: Any = rows.copy()
-    found[chosen] = others
+    found[chosen] = new_rows
     whole: Rows = found
     return whole

@@ -49,7 +49,7 @@ from .strands.resample import resample
 from .strands.vectors import unit_or
 
 #: A note is given if more than this fraction of children cannot be led out of the head.
-MANY_INSIDE = 0.01
+NOTED_FRACTION_INSIDE = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,11 +64,11 @@ class MotionStart:
     colliders: tuple[PosedCollider, ...]
     max_clearance: float
 
-    def is_as(self, other: MotionStart) -> bool:
+    def is_same_as(self, other: MotionStart) -> bool:
         """Whether both give the same clearances."""
         return (
             self.max_clearance == other.max_clearance
-            and self.pose.is_as(other.pose)
+            and self.pose.is_same_as(other.pose)
             and len(self.colliders) == len(other.colliders)
             and all(map(PosedCollider.stands_as, self.colliders, other.colliders))
         )
@@ -108,7 +108,7 @@ class Pose:
     anchors: Floats | None = None
     solids: Solids | None = None
 
-    def is_as(self, other: Pose) -> bool:
+    def is_same_as(self, other: Pose) -> bool:
         """Whether hair is carried to the same places, bit for bit."""
         if not are_same(self.anchors, other.anchors):
             return False
@@ -118,18 +118,18 @@ class Pose:
 
 
 @dataclass(frozen=True, eq=False)
-class Grown:
+class GrownChildren:
     """How the children of a rig have grown, so that those of combed curves can be shaped again.
 
     parents: which of the artist's own strands they grew between. shapes: of these strands,
         resampled to one point count.
-    kept: which of the grown children are in the rig.
+    rig_children: which of the grown children are in the rig.
     """
 
     growth: Growth
     parents: Ints
     shapes: StrandSet
-    kept: Ints
+    rig_children: Ints
 
 
 @dataclass(frozen=True)
@@ -147,7 +147,7 @@ class Rig:
     widths: how wide the strands are, and why.
     children_line: for the artist, whether automatic children were added, and why; may be empty.
     holds: where strands are held by ties or by a surface; None: nowhere.
-    grown: how its children have grown; None without any, and in a rig that comes from a bake.
+    grown_children: how they have grown; None without any, and in a rig that comes from a bake.
     baked_baby_hair: the strands that are baby hair, in a rig that comes from a bake.
     """
 
@@ -162,15 +162,17 @@ class Rig:
     widths: Widths = field(default_factory=Widths)
     children_line: str = ""
     holds: Holds | None = None
-    grown: Grown | None = None
+    grown_children: GrownChildren | None = None
     baked_baby_hair: Ints = field(default_factory=lambda: np.zeros(0, np.int32))
 
     @property
     def baby_hair(self) -> Ints:
         """The strands that are short, fine hair of the hairline and of partings."""
-        if self.grown is None or self.own_count is None:
+        if self.grown_children is None or self.own_count is None:
             return self.baked_baby_hair
-        return self.own_count + np.flatnonzero(self.grown.growth.is_baby[self.grown.kept])
+        return self.own_count + np.flatnonzero(
+            self.grown_children.growth.is_baby[self.grown_children.rig_children]
+        )
 
     @property
     def guides_line(self) -> str:
@@ -209,7 +211,7 @@ class Rig:
         return curl_room(self.strands.take(self.guides).lengths(), self.guide_grid)
 
     @cached_property
-    def strands_of_guides(self) -> Floats:
+    def strands_per_guide(self) -> Floats:
         """How many strands each guide represents, (guide_count,): the sum of its weights."""
         guide, weight = self.weights.guide.ravel(), self.weights.weight.ravel()
         return np.bincount(guide, weight, len(self.guides))
@@ -217,10 +219,10 @@ class Rig:
     @cached_property
     def hair_of_guides(self) -> Floats:
         """See `dynamics.neighbours.hair_of`."""
-        return hair_of(self.guide_grid, self.strands_of_guides)
+        return hair_of(self.guide_grid, self.strands_per_guide)
 
     @cached_property
-    def reach(self) -> tuple[Floats, float]:
+    def rest_sphere(self) -> tuple[Floats, float]:
         """The middle (3,) of the guides' roots at rest, and how far guides reach from it [m]."""
         middle = self.guide_grid[:, 0].mean(axis=0, dtype=np.float64)
         away = np.linalg.norm(self.guide_grid[:, 0] - middle, axis=1)
@@ -263,7 +265,7 @@ class Rig:
 
 
 @dataclass(frozen=True, eq=False)
-class ChildGround:
+class ChildPlacement:
     """What decides, apart from their settings, where children grow; at rest.
 
     density: (vertex_count,) how densely they grow on the head; None: wherever guides are near.
@@ -278,7 +280,7 @@ class ChildGround:
     head_field: Callable[[], DistanceField | None] = lambda: None
 
 
-BARE = ChildGround()
+DEFAULT_PLACEMENT = ChildPlacement()
 
 
 def prepare(
@@ -288,7 +290,7 @@ def prepare(
     *,
     place: str,
     children: ChildrenSettings | None = None,
-    ground: ChildGround = BARE,
+    placement: ChildPlacement = DEFAULT_PLACEMENT,
     widths: str = "own",
     holders: Holders = NO_HOLDERS,
     kept: Kept = NOTHING_KEPT,
@@ -302,7 +304,7 @@ def prepare(
         head: world space at rest, or None for hair that only follows its object.
         place: names the groom in error messages.
         children: None: there are none.
-        ground: its partings part the artist's own strands, too.
+        placement: its partings part the artist's own strands, too.
         widths: one of `groom.widths.METHODS`.
         holders: ties and a surface of tips, at rest.
         kept: intermediate results of the last rig, reused where strands have not changed, as when
@@ -316,10 +318,10 @@ def prepare(
         raise HairloomError(
             "it has no strands that can be used", place=place, remedy="Choose hair that has strands"
         )
-    bound, away = strands, 0.0
+    bound, root_distance = strands, 0.0
     if head is not None:
         held = bind_roots(strands, head, place=place)
-        bound, away = held.strands, held.looseness(head)
+        bound, root_distance = held.strands, held.looseness(head)
     if is_animated:
         own = with_own_points(bound, settings.cv_count)
     else:
@@ -331,20 +333,20 @@ def prepare(
     guides = choose_guides(lines, settings, kind)
     guide_lines = lines.take(guides)
     parted = None
-    if ground.partings is not None and len(ground.partings) and head is not None:
-        parted = Partings.of(ground.partings, head)
+    if placement.partings is not None and len(placement.partings) and head is not None:
+        parted = Partings.of(placement.partings, head)
     guide_kind = None if kind is None else kind[guides]
     weights = _weights(lines, guide_lines, kind, guide_kind, parted)
-    notes = (*_loose(away), *_lost_length(bound, own))
-    rig = Rig(own, head, guides, guide_lines.grid, weights, _frames(own, head), notes)
-    growing = _Growing(ground, parted, kept, is_animated)
+    notes = (*_loose_root_notes(root_distance), *_lost_length_notes(bound, own))
+    rig = Rig(own, head, guides, guide_lines.grid, weights, _rest_frames(own, head), notes)
+    growing = _ChildContext(placement, parted, kept, is_animated)
     if children is not None and children.method == "auto":
-        rig = _automatic(rig, children, growing, widths, place)
+        rig = _with_automatic_children(rig, children, growing, widths, place)
     else:
         if children is not None and children.method != "none":
             rig = _with_children(rig, children, growing, place)
         strands, found = with_widths(
-            rig.strands, widths, number=_numbers(rig), fineness=_fineness(rig), kept=kept
+            rig.strands, widths, number=_grown_numbers(rig), fineness=_fineness(rig), kept=kept
         )
         rig = replace(rig, strands=strands, widths=found)
     if holds is None:
@@ -355,41 +357,45 @@ def prepare(
     return replace(rig, holds=holds, notes=(*rig.notes, *idle(holds, holders)))
 
 
-def _loose(away: float) -> tuple[str, ...]:
-    """A note on roots that lie `away` [m] from the surface; none where that is 0."""
-    if not away:
+def _loose_root_notes(distance: float) -> tuple[str, ...]:
+    """A note on roots that lie `distance` [m] from the surface; none where that is 0."""
+    if not distance:
         return ()
     return (
-        f"its roots lie {1e3 * away:.3g} mm from the surface (median), so they float beside it. "
-        "Check unit, up axis and place of both, or press Snap to Surface.",
+        f"its roots lie {1e3 * distance:.3g} mm from the surface (median), so they float beside "
+        "it. Check unit, up axis and place of both, or press Snap to Surface.",
     )
 
 
 @dataclass(frozen=True)
-class _Growing:
+class _ChildContext:
     """What children depend on beside the artist's strands, see `prepare`."""
 
-    ground: ChildGround
+    ground: ChildPlacement
     partings: Partings | None
     kept: Kept
     is_animated: bool
 
 
-def _numbers(rig: Rig) -> Ints | None:
+def _grown_numbers(rig: Rig) -> Ints | None:
     """The rig's strands, numbered as if no child were left out; None: none is."""
-    if rig.grown is None or rig.own_count is None:
+    if rig.grown_children is None or rig.own_count is None:
         return None
-    return np.concatenate([np.arange(rig.own_count), rig.own_count + rig.grown.kept])
+    return np.concatenate(
+        [np.arange(rig.own_count), rig.own_count + rig.grown_children.rig_children]
+    )
 
 
 def _fineness(rig: Rig) -> Floats | None:
     """The width of each strand over that of the hair around it, (strand_count,); None: all 1."""
-    if rig.grown is None or rig.own_count is None:
+    if rig.grown_children is None or rig.own_count is None:
         return None
-    return np.append(np.ones(rig.own_count), rig.grown.growth.fineness[rig.grown.kept])
+    return np.append(
+        np.ones(rig.own_count), rig.grown_children.growth.fineness[rig.grown_children.rig_children]
+    )
 
 
-def _lost_length(strands: StrandSet, own: StrandSet) -> tuple[str, ...]:
+def _lost_length_notes(strands: StrandSet, own: StrandSet) -> tuple[str, ...]:
     """A note on strands that need more points than they may have."""
     kept = own.lengths() / np.maximum(strands.lengths(), np.float32(1.0e-30))
     lost = 1.0 - kept[kept < 1.0 - LOST]
@@ -407,10 +413,10 @@ def _hair_length(strands: StrandSet) -> float:
     return typical(strands.lengths())
 
 
-def _automatic(
+def _with_automatic_children(
     rig: Rig,
     settings: ChildrenSettings,
-    growing: _Growing,
+    growing: _ChildContext,
     widths: str,
     place: str,
 ) -> Rig:
@@ -466,7 +472,7 @@ def _weights(
 def _with_children(
     rig: Rig,
     settings: ChildrenSettings,
-    growing: _Growing,
+    growing: _ChildContext,
     place: str,
 ) -> Rig:
     """The artist's own strands, and children grown between them."""
@@ -490,7 +496,7 @@ def _with_children(
         place=place,
         kept=kept,
     )
-    made, chosen = _outside(made, ground.head_field(), _hair_length(shapes), kept)
+    made, chosen = _led_out_of_head(made, ground.head_field(), _hair_length(shapes), kept)
     if growing.is_animated:
         children = with_own_points(made.strands, cv_count)
     else:
@@ -499,7 +505,9 @@ def _with_children(
     if len(rig.guides) < own.strand_count:
         # their shapes come from neighbours among all strands, their motion from guides alone
         lines = center_lines(own.take(rig.guides), cv_count)
-        weights = _weights(_lines(made.strands, cv_count, kept), lines, partings=growing.partings)
+        weights = _weights(
+            _child_center_lines(made.strands, cv_count, kept), lines, partings=growing.partings
+        )
     else:
         weights = replace(made.weights, guide=parents[made.weights.guide])
     return Rig(
@@ -511,14 +519,14 @@ def _with_children(
             np.concatenate([rig.weights.guide, weights.guide]),
             np.concatenate([rig.weights.weight, weights.weight]),
         ),
-        _frames(strands, head),
+        _rest_frames(strands, head),
         (*rig.notes, *made.notes, *notes),
         own_count=own.strand_count,
-        grown=Grown(made.growth, parents, shapes, chosen),
+        grown_children=GrownChildren(made.growth, parents, shapes, chosen),
     )
 
 
-def _lines(children: StrandSet, cv_count: int, kept: Kept) -> StrandSet:
+def _child_center_lines(children: StrandSet, cv_count: int, kept: Kept) -> StrandSet:
     """The centre lines of children, which have one point count; widths are dummies."""
 
     def of(some: Ints) -> tuple[Floats]:
@@ -533,7 +541,7 @@ def _lines(children: StrandSet, cv_count: int, kept: Kept) -> StrandSet:
     )
 
 
-def _outside(
+def _led_out_of_head(
     made: Children, head: DistanceField | None, length: float, kept: Kept
 ) -> tuple[Children, Ints]:
     """Children led out of the head, without those that cannot be, and their indices among all.
@@ -552,7 +560,7 @@ def _outside(
     led = made.strands.with_points(grid.reshape(-1, 3))
     chosen, lost = np.flatnonzero(is_out), int((~is_out).sum())
     notes = made.notes
-    if lost > MANY_INSIDE * len(is_out):
+    if lost > NOTED_FRACTION_INSIDE * len(is_out):
         notes += (
             f"{lost:,} of {len(is_out):,} children would lie in the surface, so they are left "
             "out. Comb the curves around them farther out.",
@@ -586,7 +594,7 @@ def _parents(own: StrandSet) -> Ints:
     return np.flatnonzero(~is_face | is_face.all()).astype(np.int32)
 
 
-def _frames(strands: StrandSet, head: Surface | None) -> RootFrames | None:
+def _rest_frames(strands: StrandSet, head: Surface | None) -> RootFrames | None:
     if head is None:
         return None
     assert strands.root_triangle is not None and strands.root_barycentric is not None

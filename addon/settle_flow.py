@@ -27,14 +27,14 @@ from .strands.vectors import unit
 #: At most this many curves are simulated; the others ride on them.
 _MAX_GUIDES = 4096
 #: Duration of a frame [s], and how many there are at least before hair counts as at rest.
-_FRAME, _FEWEST = 1.0 / 24.0, 12
+_FRAME, _MIN_FRAMES = 1.0 / 24.0, 12
 #: Hair is at rest where no CV moves farther in a frame than this fraction of the hair's length.
-_STILL = 1.0e-4
+_REST_MOTION = 1.0e-4
 #: Limits of the CVs that guides have.
 _MIN_CVS, _MAX_CVS = 8, 64
 
 
-def guides_that_fall(strands: StrandSet, own: GuideSettings) -> GuideSettings:
+def settle_guide_settings(strands: StrandSet, own: GuideSettings) -> GuideSettings:
     """Settings that simulate all curves, with the median of their point counts."""
     typical = int(np.median(strands.point_counts)) if strands.strand_count else own.cv_count
     cv_count = min(max(typical, own.cv_count, _MIN_CVS), _MAX_CVS)
@@ -60,7 +60,7 @@ def settle(
         painted: factors of its dynamics at each guide; those that hide motion are ignored.
     """
     falling = settings.falling(own)
-    still = _STILL * float(np.median(rig.rest_lengths))
+    max_rest_motion = _REST_MOTION * float(np.median(rig.rest_lengths))
     motion = motion_flow.begin(rig, pose)
     frame_count = round(settings.seconds / _FRAME)
     seen = None if painted is None else painted.all_seen()
@@ -69,12 +69,15 @@ def settle(
         before = motion.guides
         motion = motion_flow.advance(rig, motion, frame)
         yield (number + 1) / frame_count
-        if number >= _FEWEST and np.abs(motion.guides - before).max(initial=0.0) < still:
+        if (
+            number >= _MIN_FRAMES
+            and np.abs(motion.guides - before).max(initial=0.0) < max_rest_motion
+        ):
             break
     return motion_flow.strands_and_led(rig, motion)[0]
 
 
-def as_curves(
+def settled_curves(
     curves: StrandSet, rig: Rig, fallen: Floats, head: DistanceField | None
 ) -> tuple[StrandSet, Bools]:
     """The artist's curves in their fallen shapes, each segment as long as it was, and which of them

@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from .arrays import Floats
-from .comb_flow import combed
+from .comb_flow import combed_rig
 from .motion_flow import motions_of
 from .refine.ride import ride
 from .rig_flow import Pose, Rig
@@ -23,30 +23,30 @@ from .strands import StrandSet
 from .strands.root_motions import RootMotions
 
 
-def at_rest(rig: Rig, curves: StrandSet, pose: Pose, back: Floats) -> StrandSet:
+def curves_at_rest(rig: Rig, curves: StrandSet, pose: Pose, to_rest: Floats) -> StrandSet:
     """The artist's own curves of this moment, brought back to where the rig is.
 
     Args:
         curves: all of them, world space now.
         pose: where the body is now.
-        back: (4, 4) from where the hair's object is now to where it was at rest.
+        to_rest: (4, 4) from where the hair's object is now to where it was at rest.
     """
-    is_there = np.allclose(back, np.eye(4))
-    by_object = curves if is_there else curves.transformed(back)
+    is_there = np.allclose(to_rest, np.eye(4))
+    by_object = curves if is_there else curves.transformed(to_rest)
     if rig.head is None:
         return by_object
-    by_surface = carried_back(curves, motions_of(rig, pose, slice(curves.strand_count)))
-    return min(by_object, by_surface, key=lambda strands: _away(rig, strands))
+    by_surface = carried_to_rest(curves, motions_of(rig, pose, slice(curves.strand_count)))
+    return min(by_object, by_surface, key=lambda strands: _mean_root_distance(rig, strands))
 
 
-def styled(rig: Rig, curves: StrandSet) -> Rig:
+def rig_with_style(rig: Rig, curves: StrandSet) -> Rig:
     """The rig with another style.
 
     Args:
         curves: all of the artist's own, at rest.
     """
-    now = combed(rig, curves, np.arange(curves.strand_count), is_animated=True)
-    return now if rig.grown is not None else _with_children_riding(rig, now)
+    now = combed_rig(rig, curves, np.arange(curves.strand_count), is_animated=True)
+    return now if rig.grown_children is not None else _with_children_riding(rig, now)
 
 
 def _with_children_riding(rig: Rig, now: Rig) -> Rig:
@@ -61,7 +61,7 @@ def _with_children_riding(rig: Rig, now: Rig) -> Rig:
     return replace(now, strands=now.strands.with_points(points))
 
 
-def carried_back(strands: StrandSet, motions: RootMotions) -> StrandSet:
+def carried_to_rest(strands: StrandSet, motions: RootMotions) -> StrandSet:
     """Strands that follow their roots, brought back to rest; inverse of `groom.roots.follow`."""
     strand = np.repeat(np.arange(strands.strand_count), strands.point_counts)
     turn = motions.turn.transpose(2, 0, 1).astype(np.float64) + np.eye(3)
@@ -71,7 +71,7 @@ def carried_back(strands: StrandSet, motions: RootMotions) -> StrandSet:
     return replace(strands, points=(local + origin[strand]).astype(np.float32))
 
 
-def _away(rig: Rig, strands: StrandSet) -> float:
+def _mean_root_distance(rig: Rig, strands: StrandSet) -> float:
     """How far roots are from those of the rig, on average [m]."""
     own = rig.strands.roots[: strands.strand_count]
     return float(np.linalg.norm(strands.roots - own, axis=1).mean())

@@ -19,14 +19,14 @@ from .shading.coat import coated, is_coated
 from .shading.settings import ShadingSettings
 
 #: Water that soaked hair holds, over its own mass.
-WATER = 1.0
+SOAKED_WATER_MASS = 1.0
 #: How far soaking closes the gap between the artist's clumping and full clumping.
-CLUMPED = 0.75
+SOAKED_CLUMPING = 0.75
 #: The factors of frizz and fly-aways in soaked hair.
-_FRIZZ_LEFT, _FLY_AWAYS_LEFT = 0.25, 0.0
+_SOAKED_FRIZZ, _SOAKED_FLY_AWAYS = 0.25, 0.0
 
 
-def acting(settings: SettingsMap) -> SettingsMap:
+def effective_settings(settings: SettingsMap) -> SettingsMap:
     """The settings with the effects of water and dust; not to be applied twice."""
     look = settings[ShadingSettings]
     if not is_coated(look):
@@ -34,7 +34,7 @@ def acting(settings: SettingsMap) -> SettingsMap:
     return settings.with_settings(
         coated(look),
         wet_children(settings[ChildrenSettings], look.wetness),
-        heavier(settings[DynamicsSettings], look.wetness),
+        wet_dynamics(settings[DynamicsSettings], look.wetness),
     )
 
 
@@ -43,18 +43,18 @@ def wet_children(settings: ChildrenSettings, wetness: float) -> ChildrenSettings
     if not wetness:
         return settings
     return replace(
-        settings, clump=settings.clump + wetness * CLUMPED * (1.0 - settings.clump)
+        settings, clump=settings.clump + wetness * SOAKED_CLUMPING * (1.0 - settings.clump)
     ).multiplied(
-        frizz=1.0 + wetness * (_FRIZZ_LEFT - 1.0),
-        fly_aways=1.0 + wetness * (_FLY_AWAYS_LEFT - 1.0),
+        frizz=1.0 + wetness * (_SOAKED_FRIZZ - 1.0),
+        fly_aways=1.0 + wetness * (_SOAKED_FLY_AWAYS - 1.0),
     )
 
 
-def heavier(settings: DynamicsSettings, wetness: float) -> DynamicsSettings:
+def wet_dynamics(settings: DynamicsSettings, wetness: float) -> DynamicsSettings:
     """Settings of the motion of hair of this wetness, 0 to 1."""
     if not wetness:
         return settings
-    mass = 1.0 + WATER * wetness
+    mass = 1.0 + SOAKED_WATER_MASS * wetness
     slower, weaker = mass**-0.5, 1.0 / mass
     return settings.multiplied(
         style_root=slower,

@@ -59,7 +59,7 @@ def ponytail(count: int, *, children: ChildrenSettings | None = None) -> Ponytai
         GuideSettings(cv_count=POINTS),
         place="ponytail",
         children=children,
-        ground=rig_flow.ChildGround(bust.weights["scalp"] if children is not None else None),
+        placement=rig_flow.ChildPlacement(bust.weights["scalp"] if children is not None else None),
         widths="auto",
         holders=Holders((Tie("Scrunchy", shape),)),
     )

@@ -28,7 +28,7 @@ class CardSnapshot:
     openness: (vertex_count, 4), how much of the world's light comes straight to each vertex, by
         direction in `mesh.axes`, see ambient.openness_field; None: derived from occlusion.
     skin_seen: (vertex_count, 8), the skin that each vertex sees, in `mesh.axes`, see
-        light_flow.skin_seen_by; None: skin right beneath, as on a plane.
+        light_flow.skin_seen_along_axes; None: skin right beneath, as on a plane.
     depth: (vertex_count,) [m], depth that the strands of the card fill; None: all lie in its plane.
     device: the card_textures.CardTextures shared by all passes that draw these cards; None: each
         pass makes its own.

@@ -181,8 +181,8 @@ class Snapshot:
     occlusion: (point_count,) fraction of ambient light that arrives, 0 to 1; None: 1 everywhere.
     openness: (point_count, 4), how much of the world's light comes straight to each point, by
         direction, see ambient.openness_field; None: derived from occlusion and the hair's volume.
-    skin_seen: (point_count, 8), the skin that each point sees, see light_flow.skin_seen_by; None:
-        skin right beneath, as under hair on a plane.
+    skin_seen: (point_count, 8), the skin that each point sees, see
+        light_flow.skin_seen_along_axes; None: skin right beneath, as under hair on a plane.
     color: (point_count, 3) scene-linear, the strands' own colours; NaN all along a strand, or None
         for all, means the look's colour. Used if the look requires it, see
         drawn_strands.drawn_color.

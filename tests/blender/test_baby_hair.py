@@ -35,7 +35,7 @@ def test_the_atlas_shows_the_strands_that_its_plan_names() -> None:
     _, plan = uncut_cards(groom, settings, AtlasSettings(size="256"), card)
     assert plan is not None
     without = replace(
-        rig, strands=rig.strands.take(np.flatnonzero(~short_strands(rig))), grown=None
+        rig, strands=rig.strands.take(np.flatnonzero(~short_strands(rig))), grown_children=None
     )
     found, expected = (baked_atlas(each, plan, look, drawn) for each in (rig, without))
     assert (expected.alpha > 0.0).mean() > 0.05

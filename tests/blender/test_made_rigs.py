@@ -191,7 +191,9 @@ def test_strands_of_a_bake_are_those_that_were_baked(
     assert bpy.ops.hairloom.bake() == {"FINISHED"}
     previews.stop_all()
     session = previews.start(hair, get_depsgraph())
-    assert session.rig.child_count and session.rig.grown is None, "it has those of the bake"
+    assert session.rig.child_count and session.rig.grown_children is None, (
+        "it has those of the bake"
+    )
     assert not previews.made_rigs()
     made.clear()
     written(tmp_path / "own.tfx")

@@ -585,10 +585,10 @@ def test_playback_goes_on_before_the_hair_is_made(hair, moving, get_depsgraph, g
     arrive(session)
     begun = rounds(session, 5)[0]
     assert session.is_playing and not previews.previews[session.uid].is_deferred
-    at_rest = motion_flow.carried(session.rig, session.solver.pose)
+    at_rest = motion_flow.carried_strands(session.rig, session.solver.pose)
     np.testing.assert_array_equal(begun.reshape(-1, 3), at_rest)
     after = rounds(session, 6, 7)[1]
-    at_rest = motion_flow.carried(session.rig, session.solver.pose)
+    at_rest = motion_flow.carried_strands(session.rig, session.solver.pose)
     assert np.abs(after.reshape(-1, 3) - at_rest).max() > 1e-3, "it does not swing"
     second = rounds(session, *range(1, 8))
     previews.stop(session)
@@ -657,7 +657,7 @@ def test_what_stands_in_on_a_dense_head_searches_a_part_of_it(new_hair, get_deps
     assert made.rig.head is head and made.is_placeholder
     wanted = bind(made.rig.strands, head, place="Hair").strands
     assert np.array_equal(made.rig.strands.root_triangle, wanted.root_triangle)
-    carried = motion_flow.carried(made.rig, made.rig.rest_pose)
+    carried = motion_flow.carried_strands(made.rig, made.rig.rest_pose)
     assert np.array_equal(carried, made.rig.strands.points)
 
 

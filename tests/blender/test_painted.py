@@ -117,7 +117,7 @@ def test_each_kind_of_map_is_what_guides_are_painted_with(
         session.rig.guide_grid.shape[1] if kind == "point" else 1
     )
     assert_halves(session, found["style_root"])
-    growth = session.rig.grown.growth
+    growth = session.rig.grown_children.growth
     assert growth.root[:, 2].min() > -FAR, "children grow above alone"
     widths = growth.factors["width"]
     assert (np.median(widths), widths.max()) == pytest.approx((1.0, 1.0), abs=1e-6)

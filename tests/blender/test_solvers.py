@@ -79,7 +79,7 @@ def test_numpy_is_the_pipeline(rig: Rig, poses: list[Pose]) -> None:
     assert np.array_equal(solver.guides(), motion.guides)
     assert np.array_equal(solver.strands(), motion_flow.strands_and_led(rig, motion)[0])
     solver.rest(poses[3])
-    assert np.array_equal(solver.strands(), motion_flow.carried(rig, poses[3]))
+    assert np.array_equal(solver.strands(), motion_flow.carried_strands(rig, poses[3]))
 
 
 @pytest.mark.usefixtures("gpu_context")

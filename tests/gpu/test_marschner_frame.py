@@ -124,7 +124,7 @@ def test_a_pixel_has_the_colour_of_the_reference(
     assert np.abs(found[..., :3] / expected - 1.0).max() < tolerance(2e-3, 4e-3)
 
 
-#: as from light_flow.skin_seen_by: received, beneath, depth
+#: as from light_flow.skin_seen_along_axes: received, beneath, depth
 SEEN = np.float32([0.6, 0.15, -0.8, 0.4, 0.1, 0.5, -0.2, 4.0])
 PLAIN = replace(
     ShadingSettings(model="marschner", pigment="melanin", melanin=0.4),

@@ -126,7 +126,7 @@ def test_strands_ride_as_in_numpy_on_a_deformed_head() -> None:
         assert np.abs(found - expected).max() < TOLERANCE
     assert np.abs(found - rig.strands.points).max() > 0.1, "it has gone a long way"
     ride.carry(pose.head_positions, pose.matrix)
-    assert np.abs(ride.read() - motion_flow.carried(rig, pose)).max() < TOLERANCE
+    assert np.abs(ride.read() - motion_flow.carried_strands(rig, pose)).max() < TOLERANCE
 
 
 def test_what_a_thread_has_laid_out_shows_the_same() -> None:
@@ -172,7 +172,7 @@ def test_hair_without_a_head_goes_with_a_matrix() -> None:
     expected = motion_flow.strands_at(rig, pose, guides)
     # the matrix is rounded to float32, and strands are three metres from the origin
     assert np.abs(shown(ride, pose, guides) - expected).max() < 4.0 * TOLERANCE
-    carried = motion_flow.carried(rig, pose)[rig.strands.offsets[:-1]].mean(axis=0)
+    carried = motion_flow.carried_strands(rig, pose)[rig.strands.offsets[:-1]].mean(axis=0)
     assert ride.points.center == pytest.approx(carried, abs=2.0e-6)
 
 
@@ -237,7 +237,7 @@ def test_the_middle_of_all_roots_follows_the_head(
     pose = deformed(rig.head)
     ride = pass_of(rig)
     ride.carry(pose.head_positions, pose.matrix)
-    expected = motion_flow.carried(rig, pose)[rig.strands.offsets[:-1]].mean(axis=0)
+    expected = motion_flow.carried_strands(rig, pose)[rig.strands.offsets[:-1]].mean(axis=0)
     assert ride.points.center == pytest.approx(expected, abs=tolerance)
 
 
@@ -296,7 +296,7 @@ def test_curls_are_drawn_out_as_in_numpy() -> None:
     other = type(ride)(rig.strands, None, rig.guides, rig.guide_grid, plain)
     assert np.abs(shown(other, pose, now.astype(np.float32)) - found).max() > 0.02
     ride.carry(None, matrix)
-    assert np.abs(ride.read() - motion_flow.carried(rig, pose)).max() < TOLERANCE
+    assert np.abs(ride.read() - motion_flow.carried_strands(rig, pose)).max() < TOLERANCE
 
 
 @pytest.mark.parametrize("rounds", [8, 1 << 20])
@@ -310,7 +310,7 @@ def test_strands_that_ride_are_led_out(monkeypatch: pytest.MonkeyPatch, rounds: 
     ride, pose, offsets = pass_of(rig), deformed(rig.head), rig.strands.offsets
     head = SphereCollider(ABOVE_GROUND, 0.11)
     posed = (PosedCollider(head, pose.matrix, pose.matrix),)
-    begun = clearance_at(motion_flow.carried(rig, pose), offsets, posed, 0.001)
+    begun = clearance_at(motion_flow.carried_strands(rig, pose), offsets, posed, 0.001)
     held = np.where(np.arange(700) % 5, 0, 4).astype(np.int32)
     number = np.arange(len(begun.points)) - np.repeat(offsets[:-1], np.diff(offsets))
     is_held = number <= np.repeat(held, np.diff(offsets))
@@ -328,7 +328,7 @@ def test_strands_that_ride_are_led_out(monkeypatch: pytest.MonkeyPatch, rounds: 
     off = np.abs(ride.read() - expected).max(axis=1)
     assert (np.maximum.reduceat(off, offsets[:-1]) > TOLERANCE).mean() < 0.03
     assert off[is_held].max() < TOLERANCE
-    shift = motion_flow.carried(rig, pose) - motion_flow.strands_at(rig, pose, guides)
+    shift = motion_flow.carried_strands(rig, pose) - motion_flow.strands_at(rig, pose, guides)
     assert np.abs(shift[is_held]).max() > 0.01
 
     # each frame starts from the leans of the one before

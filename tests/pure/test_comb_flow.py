@@ -7,7 +7,7 @@ import pytest
 from small_wig import GUIDES, sheet, turn_strands, wig_strands
 
 from hairloom.addon import rig_flow
-from hairloom.addon.comb_flow import combed
+from hairloom.addon.comb_flow import combed_rig
 from hairloom.addon.groom.child_clumps import Clumps
 from hairloom.addon.groom.children_settings import ChildrenSettings
 from hairloom.addon.strands import StrandSet
@@ -28,7 +28,7 @@ def test_it_is_what_a_rebuild_makes(method: str, clump: float) -> None:
     settings = ChildrenSettings(method=method, strand_count=5000, clump=clump, frizz=0.02)
     before, after = wig_strands(), turn_strands(wig_strands(), COMBED, 0.05)
     rig, whole = rig_of(before, settings), rig_of(after, settings)
-    now = combed(rig, after.take(COMBED), COMBED)
+    now = combed_rig(rig, after.take(COMBED), COMBED)
     np.testing.assert_array_equal(now.strands.offsets, whole.strands.offsets)
     np.testing.assert_allclose(now.strands.points, whole.strands.points, atol=2e-6)
     np.testing.assert_allclose(now.guide_grid, whole.guide_grid, atol=1e-7)
@@ -45,11 +45,13 @@ def test_one_stroke_after_another_and_back_leaves_nothing() -> None:
         turn_strands(turn_strands(before, COMBED, 0.3), COMBED + 1, 0.2),
     )
     rig = rig_of(before, settings)
-    now = combed(combed(rig, first.take(COMBED), COMBED), second.take(COMBED + 1), COMBED + 1)
+    now = combed_rig(
+        combed_rig(rig, first.take(COMBED), COMBED), second.take(COMBED + 1), COMBED + 1
+    )
     both = np.union1d(COMBED, COMBED + 1)
-    at_once = combed(rig, second.take(both), both)
+    at_once = combed_rig(rig, second.take(both), both)
     np.testing.assert_array_equal(now.strands.points, at_once.strands.points)
-    back = combed(now, before.take(both), both)
+    back = combed_rig(now, before.take(both), both)
     np.testing.assert_allclose(back.strands.points, rig.strands.points, atol=1e-7)
 
 
@@ -65,7 +67,7 @@ def test_curves_of_other_point_counts_keep_those_of_the_rig() -> None:
     straight = StrandSet(
         np.linspace(coil[0], coil[-1], 200), [0, 200], np.full(200, 1e-4), np.zeros(1)
     )
-    now = combed(rig, straight, np.array([60]))
+    now = combed_rig(rig, straight, np.array([60]))
     np.testing.assert_array_equal(now.strands.offsets, rig.strands.offsets)
     shape = now.strands.points[now.strands.offsets[60] :]
     count = len(shape)

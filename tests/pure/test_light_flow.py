@@ -12,7 +12,7 @@ from spheres import ball
 from hairloom.addon import light_flow, rig_flow
 from hairloom.addon.arrays import Floats, same_content
 from hairloom.addon.groom.settings import GuideSettings
-from hairloom.addon.light_flow import quick_light, relit, rest_light
+from hairloom.addon.light_flow import quick_light, rest_light, updated_light
 from hairloom.addon.rig_flow import Rig
 from hairloom.addon.shading import skin_seen
 from hairloom.addon.shading.ambient import occlusion_by
@@ -149,7 +149,7 @@ def test_other_settings_find_again_what_depends_on_them_and_no_more(
             return make(*arguments)
 
         monkeypatch.setattr(light_flow, name, counted)
-    other = relit(rig, light, COARSE, settings)
+    other = updated_light(rig, light, COARSE, settings)
     assert other is not None and again == found
     assert same_content(other, own)
 
@@ -159,9 +159,9 @@ def test_light_that_has_other_cells_or_is_quick_is_found_as_a_whole(
 ) -> None:
     monkeypatch.setattr(skin_seen, "_CELLS", 12)
     light = rest_light(rig, COARSE)
-    assert relit(rig, light, COARSE, replace(COARSE, cell_count=20)) is None
+    assert updated_light(rig, light, COARSE, replace(COARSE, cell_count=20)) is None
     quick = quick_light(rig, COARSE, None)
-    assert relit(rig, quick, COARSE, replace(COARSE, strength=0.3)) is None
+    assert updated_light(rig, quick, COARSE, replace(COARSE, strength=0.3)) is None
     none = replace(rig, strands=rig.strands.take(np.arange(0)))
     nothing = rest_light(none, COARSE)
-    assert relit(none, nothing, COARSE, replace(COARSE, strength=0.3)) is None
+    assert updated_light(none, nothing, COARSE, replace(COARSE, strength=0.3)) is None

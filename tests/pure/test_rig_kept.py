@@ -92,7 +92,7 @@ def test_it_is_what_is_made_from_nothing(
             GuideSettings(guide_count=guides, cv_count=8),
             place="a wig",
             children=settings,
-            ground=rig_flow.ChildGround(
+            placement=rig_flow.ChildPlacement(
                 density,
                 Masks({name: SurfaceMask.of_vertices(HEAD, density) for name in PAINTED}),
                 head_field=lambda: field,

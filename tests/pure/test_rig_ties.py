@@ -290,7 +290,9 @@ def test_brows_go_with_the_face() -> None:
             rig, motion, FrameInput(pose, (), DynamicsSettings(), GRAVITY, 1.0 / 24.0)
         )
         points = motion_flow.strands_and_led(rig, motion)[0].reshape(6, 8, 3)
-        off = np.abs(points - motion_flow.carried(rig, pose).reshape(6, 8, 3)).max(axis=(1, 2))
+        off = np.abs(points - motion_flow.carried_strands(rig, pose).reshape(6, 8, 3)).max(
+            axis=(1, 2)
+        )
         assert off[:2].max() < 1e-6
     assert off[2:].min() > 0.001
     alone = rig_flow.prepare(strands.take(np.arange(2)), None, settings, place="brows")

@@ -15,7 +15,7 @@ from hairloom.addon.groom.children_settings import ChildrenSettings
 from hairloom.addon.motion_flow import FrameInput
 from hairloom.addon.rig_flow import Pose, Rig
 from hairloom.addon.strands import StrandSet
-from hairloom.addon.style_flow import at_rest, styled
+from hairloom.addon.style_flow import curves_at_rest, rig_with_style
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
 CHILDREN = ChildrenSettings(method="multi", strand_count=2000, clump=0.6, frizz=0.02)
@@ -55,7 +55,9 @@ def test_it_is_what_a_rebuild_makes(moved_by: str) -> None:
     rig, now = rig_of(wig_strands()), bowed(wig_strands(), 0.04, 1.3)
     matrix = turned()
     back = np.linalg.inv(matrix) if moved_by == "object" else np.eye(4)
-    found = styled(rig, at_rest(rig, now.transformed(matrix), pose_of(rig, matrix), back))
+    found = rig_with_style(
+        rig, curves_at_rest(rig, now.transformed(matrix), pose_of(rig, matrix), back)
+    )
     whole = rig_of(now, None)
     own = whole.strands.point_count
     np.testing.assert_allclose(found.strands.points[:own], whole.strands.points, atol=1e-6)
@@ -65,7 +67,7 @@ def test_it_is_what_a_rebuild_makes(moved_by: str) -> None:
 def test_children_bow_as_all_curves_around_them_do() -> None:
     plain = {"clump": 0.0, "frizz": 0.0, "length_variation": 0.0, "baby_hair": 0.0}
     rig = rig_of(wig_strands(), ChildrenSettings(method="multi", strand_count=500, **plain))
-    found = styled(rig, bowed(wig_strands(), 0.04)).strands.grid
+    found = rig_with_style(rig, bowed(wig_strands(), 0.04)).strands.grid
     along = np.linspace(0.0, 1.0, found.shape[1])[:, None]
     expected = rig.strands.grid + along**2 * np.array([0.0, 0.04, 0.0])
     np.testing.assert_allclose(found, expected, atol=1e-5)
@@ -73,21 +75,21 @@ def test_children_bow_as_all_curves_around_them_do() -> None:
 
 def test_hair_moves_in_its_object_though_its_surface_goes_elsewhere() -> None:
     rig, now = rig_of(wig_strands(), None), bowed(wig_strands(), 0.04)
-    found = styled(rig, at_rest(rig, now, pose_of(rig, turned()), np.eye(4)))
+    found = rig_with_style(rig, curves_at_rest(rig, now, pose_of(rig, turned()), np.eye(4)))
     np.testing.assert_array_equal(found.strands.points, now.points)
 
 
 def test_children_of_a_bake_ride_on_the_guides_of_the_frame() -> None:
     rig, now = rig_of(wig_strands()), bowed(wig_strands(), 0.04)
-    whole = styled(rig, now).strands.points
-    found = styled(replace(rig, grown=None), now).strands.points
+    whole = rig_with_style(rig, now).strands.points
+    found = rig_with_style(replace(rig, grown_children=None), now).strands.points
     away, moved = (np.linalg.norm(found - each, axis=1) for each in (whole, rig.strands.points))
     assert away.mean() < 0.25 * moved.mean(), "not clumped and frizzed again"
 
 
 def test_hair_comes_to_rest_in_another_style_as_if_it_had_begun_there() -> None:
     rig, settings = rig_of(wig_strands(), None), DynamicsSettings(style_damping=20.0)
-    now = styled(rig, bowed(wig_strands(), 0.04, 1.3))
+    now = rig_with_style(rig, bowed(wig_strands(), 0.04, 1.3))
     other = motion_flow.with_style(now, motion_flow.begin(rig, rig.rest_pose))
     there = motion_flow.begin(now, rig.rest_pose)
     for _ in range(48):

@@ -15,30 +15,35 @@ from hairloom.addon.paint_flow import with_colors
 from hairloom.addon.params import SettingsMap
 from hairloom.addon.shading.coat import coated_color
 from hairloom.addon.shading.settings import ShadingSettings
-from hairloom.addon.wet_flow import WATER, acting, heavier, wet_children
+from hairloom.addon.wet_flow import (
+    SOAKED_WATER_MASS,
+    effective_settings,
+    wet_children,
+    wet_dynamics,
+)
 
 WET = ShadingSettings(wetness=1.0)
 
 
 def test_dry_settings_are_the_same_object() -> None:
     settings = SettingsMap(ShadingSettings(melanin=0.3), ChildrenSettings(clump=0.2))
-    assert acting(settings) is settings
+    assert effective_settings(settings) is settings
 
 
 def test_the_settings_of_looks_children_and_motion_act_together() -> None:
     dry = SettingsMap(WET, ChildrenSettings(), DynamicsSettings())
-    wet = acting(dry)
+    wet = effective_settings(dry)
     assert wet[ShadingSettings].width_r < dry[ShadingSettings].width_r
     assert wet[ChildrenSettings] == wet_children(dry[ChildrenSettings], 1.0)
-    assert wet[DynamicsSettings] == heavier(dry[DynamicsSettings], 1.0)
+    assert wet[DynamicsSettings] == wet_dynamics(dry[DynamicsSettings], 1.0)
 
 
 def test_a_heavier_mass_swings_slower_and_loses_less() -> None:
     """Frequency and rate of decay of m x'' = -(k x + c x') for the larger mass."""
-    stiffness, loss, mass = 30.0, 0.4, 1.0 + WATER
+    stiffness, loss, mass = 30.0, 0.4, 1.0 + SOAKED_WATER_MASS
     dry, wet = (np.roots([m, loss, stiffness])[0] for m in (1.0, mass))
     settings = DynamicsSettings()
-    after = heavier(settings, 1.0)
+    after = wet_dynamics(settings, 1.0)
     # abs() of the root is the undamped frequency
     assert after.style_tip / settings.style_tip == pytest.approx(abs(wet / dry), rel=1e-6)
     assert after.damping / settings.damping == pytest.approx(wet.real / dry.real, rel=1e-6)

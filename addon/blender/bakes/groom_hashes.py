@@ -19,7 +19,7 @@ from ...groom.masks import SELECTION, mask_names
 from ...groom.settings import GuideSettings
 from ...groom.width_settings import WidthSettings
 from ...rig_flow import Pose
-from ...wet_flow import heavier
+from ...wet_flow import wet_dynamics
 from ..base.attributes import read_attribute
 from ..base.mesh_arrays import corner_vertices, vertex_places
 from ..base.objects import head_of, matrix_of
@@ -169,7 +169,7 @@ def _dynamics(hair: bpy.types.Object) -> DynamicsSettings:
     """The dynamics settings alone, which each frame needs. The device is left out, since the motion
     is the same on all of them."""
     settings = settings_of(hair.hairloom.dynamics, DynamicsSettings)
-    return replace(heavier(settings, hair.data.hairloom.shading.wetness), device="automatic")
+    return replace(wet_dynamics(settings, hair.data.hairloom.shading.wetness), device="automatic")
 
 
 def collider_places(

@@ -33,8 +33,8 @@ from ...cards.shell_plan import ShellPlan, shell_strands
 from ...cards.steps import map_progress, result_of
 from ...errors import HairloomError
 from ...exchange.textures.card_textures import of_one_size
-from ...light_flow import light_by_axes
-from ...paint_flow import colored
+from ...light_flow import light_along_axes
+from ...paint_flow import with_painted_colors
 from ...params import SettingsMap
 from ...render.atlas_pass import baked_maps, baking
 from ...render.card_snapshot import CardSnapshot
@@ -127,7 +127,7 @@ def read_inputs(
     else:
         triangle_count = None if rig.head is None else len(rig.head.triangles)
         colors, notes = read_colors(hair, depsgraph, triangle_count)
-    rig = colored(rig, colors, settings[ShadingSettings])
+    rig = with_painted_colors(rig, colors, settings[ShadingSettings])
     pictures, problems = chosen_pictures(hair.data.hairloom.card_images)
     occluders = read_occluders(settings[CardOcclusionSettings], hair)
     edits, doubts = groom_edits(hair, depsgraph) if keep_edits else (None, ())
@@ -367,7 +367,7 @@ class BuiltCards:
     def of(cls, rig: Rig, cards: MappedCards) -> BuiltCards:
         build, maps = cards.build, cards.maps
         mesh, strands, textures = build.finest, rig.strands, maps.textures
-        light = None if build.light is None else light_by_axes(mesh.axes, build.light)
+        light = None if build.light is None else light_along_axes(mesh.axes, build.light)
         openness, skin_seen = light or (None, None)
         if build.shell_layers:  # their vertices stand above the hair that they show
             openness = None

@@ -13,7 +13,7 @@ from ...groom.children_settings import ChildrenSettings
 from ...groom.settings import GuideSettings
 from ...groom.width_settings import WidthSettings
 from ...params import SettingsMap
-from ...rig_flow import ChildGround, Rig
+from ...rig_flow import ChildPlacement, Rig
 from ...strands.kept import NOTHING_KEPT, Kept
 from ..properties.groom_settings import GroomSettings
 from ..scene.source import Source
@@ -41,7 +41,7 @@ def rig_from(
         settings[GuideSettings],
         place=place,
         children=settings[ChildrenSettings],
-        ground=ChildGround(
+        placement=ChildPlacement(
             source.density, source.masks, source.partings, lambda: solid_of(source.head)
         ),
         widths=settings[WidthSettings].method,

@@ -19,12 +19,12 @@ from ...groom.children_settings import ChildrenSettings
 from ...groom.masks import Mask, Masks, mask_names
 from ...groom.painted_color import PaintedColor
 from ...groom.settings import GrowSettings
-from ...paint_flow import colored
+from ...paint_flow import with_painted_colors
 from ...params import Settings, SettingsMap
 from ...rig_flow import Pose, Rig
 from ...shading.ambient_settings import AmbientSettings
 from ...shading.settings import ShadingSettings
-from ...wet_flow import acting
+from ...wet_flow import effective_settings
 from ..bakes.guide_motion import BakedGuides
 from ..base.report import Report
 from ..cards.edits import groom_edits
@@ -57,7 +57,7 @@ class Job:
 
     @cached_property
     def settings(self) -> SettingsMap:
-        return acting(self.chosen)
+        return effective_settings(self.chosen)
 
     @property
     def hair(self) -> bpy.types.Object | None:
@@ -117,7 +117,7 @@ def _source(job: Job, inputs: Inputs) -> Source:
 
 def colored_rig(job: Job, rig: Rig) -> Rig:
     """The rig with the colours of the colour map; raises as `job_colors`."""
-    return colored(rig, job_colors(job, rig), job.settings[ShadingSettings])
+    return with_painted_colors(rig, job_colors(job, rig), job.settings[ShadingSettings])
 
 
 def job_colors(job: Job, rig: Rig) -> PaintedColor | None:

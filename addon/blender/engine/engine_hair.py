@@ -21,7 +21,7 @@ from ...cards.follow import moved_mesh
 from ...cards.occlusion_settings import CardOcclusionSettings
 from ...errors import HairloomError
 from ...groom.painted_color import PaintedColor
-from ...paint_flow import colored
+from ...paint_flow import with_painted_colors
 from ...render.snapshot import Snapshot
 from ...rig_flow import Rig
 from ...shading.ambient_settings import AmbientSettings
@@ -67,7 +67,7 @@ class _Made:
 
     def colored(self, colors: PaintedColor | None, look: ShadingSettings) -> Rig:
         """The rig with the colours of a colour map; the same object if they have not changed."""
-        rig = colored(self.rig, colors, look)
+        rig = with_painted_colors(self.rig, colors, look)
         for known in self._colored:
             if are_same(known.strands.color, rig.strands.color):
                 return known

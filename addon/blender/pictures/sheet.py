@@ -14,7 +14,7 @@ from ...render.camera import Camera
 from ...rig_flow import Pose
 from ...shading.settings import ShadingSettings
 from ...shading.shafts_settings import ShaftSettings
-from ...wet_flow import acting
+from ...wet_flow import effective_settings
 from ..base.images import contact_sheet
 from ..properties.presets import named_preset, shipped
 from .studio import Studio
@@ -88,7 +88,7 @@ class Sheet:
         camera = self._camera(self._studio.side.three_quarter, self._held)
         try:
             for entry in shipped("shading"):
-                look = acting(SettingsMap(*named_preset(entry.name).all))
+                look = effective_settings(SettingsMap(*named_preset(entry.name).all))
                 parts = look[ShadingSettings], look[ShaftSettings]
                 self._studio.settings = worn.with_settings(*parts)
                 yield entry.title, self._seen(camera)

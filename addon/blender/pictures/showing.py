@@ -9,7 +9,7 @@ import bpy
 
 from ...arrays import Floats
 from ...exchange.files.file_names import avoid_device_name
-from ...paint_flow import colored
+from ...paint_flow import with_painted_colors
 from ...rig_flow import Pose
 from ...shading.ambient_settings import AmbientSettings
 from ...shading.settings import ShadingSettings
@@ -51,14 +51,14 @@ def shown_groom(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Shown
         session = previews.session_of(hair)
     if isinstance(session, Session):
         look, groom = session.settings[ShadingSettings], session.groom
-        groom = replace(groom, rig=colored(groom.rig, session.source.colors, look))
+        groom = replace(groom, rig=with_painted_colors(groom.rig, session.source.colors, look))
         studio = _studio(hair, groom, session.settings)
         solver = session.solver
         guides = solver.guides()
         return ShownGroom(studio, solver.pose, session.strands, guides, studio.warnings)
     request = GroomSource(hair, depsgraph).request
     settings, colors = request.settings, request.source.colors
-    rig = colored(requested_rig(request), colors, settings[ShadingSettings])
+    rig = with_painted_colors(requested_rig(request), colors, settings[ShadingSettings])
     studio = _studio(hair, prepared(rig, settings[AmbientSettings]), settings)
     notes = (*request.source.warnings, *rig.notes, *studio.warnings)
     return ShownGroom(studio, rig.rest_pose, rig.strands.points, rig.guide_grid, notes)

@@ -62,8 +62,8 @@ class Bystander:
         return self._guides
 
     def style_seen(self) -> Style:
-        """See `motion_flow.style_seen`."""
-        return motion_flow.style_seen(self.rig, self.pose, self._own)
+        """See `motion_flow.neighbour_style`."""
+        return motion_flow.neighbour_style(self.rig, self.pose, self._own)
 
 
 class Bystanders(dict[int, Bystander]):

@@ -17,7 +17,7 @@ from ...parameters import ALL_SETTINGS, sections_of
 from ...params import Owner, Settings, SettingsMap
 from ...shading.ambient_settings import AmbientSettings
 from ...shading.settings import ShadingSettings
-from ...wet_flow import acting
+from ...wet_flow import effective_settings
 from .card_group import picture_names
 from .properties import settings_of
 
@@ -68,7 +68,7 @@ class GroomSettings:
             )
         )
         return cls(
-            acting(chosen),
+            effective_settings(chosen),
             picture_names(groom.card_images),
             character.children_density,
             character.debug_view,

@@ -41,7 +41,7 @@ class BaseSolver:
         return motion_flow.has_jumped(self._rig, self._motion, pose, settings, duration)
 
     def go_along(self, frame: FrameInput) -> None:
-        self._take(motion_flow.go_along(self._rig, self.motion, frame))
+        self._take(motion_flow.advance_rigidly(self._rig, self.motion, frame))
 
     def carry(self, pose: Pose, guides: Floats, led: LedOut = NOT_LED) -> None:
         self._take(carried_motion(self._rig, self._motion, pose, guides))

@@ -100,7 +100,7 @@ class ComputeSolver(BaseSolver):
             motion,
             carried_guides=target,
             pose=frame.pose,
-            carried_earlier=motion.carried_guides,
+            previous_carried_guides=motion.carried_guides,
             duration=frame.duration,
             hair_time=frame.hair_time,
             colliders=frame.colliders,

@@ -33,7 +33,7 @@ class Start:
         """Whether rig, pose and colliders are the same; `with_clearance` compares the settings."""
         return (
             self.rig is other.rig
-            and self.pose.is_as(other.pose)
+            and self.pose.is_same_as(other.pose)
             and len(self.colliders) == len(other.colliders)
             and all(map(PosedCollider.stands_as, self.colliders, other.colliders))
         )

@@ -24,7 +24,7 @@ from ...strands import StrandSet, Surface
 from ...strands.affine import moved
 from ...strands.clean import Cleaned
 from ...strands.kept import Kept
-from ...style_flow import at_rest, styled
+from ...style_flow import curves_at_rest, rig_with_style
 from ..bakes.baked_rig import BakedRig, RestMatrices
 from ..bakes.groom_hashes import groom_frame_hash, groom_rig_hash
 from ..base.objects import Body, head_of, matrix_of
@@ -379,9 +379,9 @@ class GroomSource:
         self._style_warning = _misfit(hair.name, curves, known.curves, depsgraph)
         if not self._style_warning:
             back = self.hair.rest @ np.linalg.pinv(matrix_of(hair, depsgraph))
-            curves = at_rest(rig, curves, self.pose(rig, depsgraph), back)
+            curves = curves_at_rest(rig, curves, self.pose(rig, depsgraph), back)
             if not _same_places(curves, known.curves, back):
-                known = _Styled(rig, curves, styled(rig, curves))
+                known = _Styled(rig, curves, rig_with_style(rig, curves))
         self._styled = known
         return known.rig
 

@@ -184,7 +184,7 @@ def _drawn(
     """As `prepared`, without the cached data for motion."""
     light, relit = None if known is None else known.light, None
     if known is not None and light is not None and known.rig is rig and known.ambient != ambient:
-        relit = light_flow.relit(rig, light, known.ambient, ambient)
+        relit = light_flow.updated_light(rig, light, known.ambient, ambient)
     before = None if known is None or light is None else (known.rig, light)
     if known is not None and not _same_hair(known.rig, rig):
         known = None
@@ -192,7 +192,7 @@ def _drawn(
     if relit is not None:
         light = relit
     elif light is None or is_other or (light.is_quick and not is_quick):
-        find = partial(quick_light, known=before) if is_quick else rest_light
+        find = partial(quick_light, earlier=before) if is_quick else rest_light
         light = find(rig, ambient)
     report("what the head hides")
     occluders = None if known is None else known.occluders

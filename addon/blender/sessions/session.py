@@ -12,7 +12,7 @@ import numpy as np
 
 from ... import motion_flow
 from ...arrays import Floats
-from ...comb_flow import combed
+from ...comb_flow import combed_rig
 from ...dynamics.colliders import PosedCollider
 from ...dynamics.figures import CardFigures, Figures, Measure
 from ...dynamics.neighbours import KnownHair, Steps, Style, alone
@@ -20,7 +20,7 @@ from ...dynamics.settings import DynamicsSettings
 from ...dynamics.state import start
 from ...errors import HairloomError
 from ...motion_flow import FrameInput, Motion
-from ...paint_flow import painted
+from ...paint_flow import painted_rig
 from ...refine.lead_out import Clearance
 from ...render.ride_pass import RideTexels
 from ...render.snapshot import Snapshot
@@ -146,7 +146,7 @@ class Session:
         """The rig, and what it was made from; None if it has not grown children itself, as before
         it is made and when it comes from a bake."""
         request, groom = self._made
-        if groom.rig.grown is None:
+        if groom.rig.grown_children is None:
             return None
         return MadeRig(request.source, request.settings, groom.rig)
 
@@ -399,7 +399,7 @@ class Session:
         moved = self._source.moved_curves(depsgraph)
         if moved is None:
             return
-        self.groom = replace(self.groom, rig=combed(self.groom.rig, *moved))
+        self.groom = replace(self.groom, rig=combed_rig(self.groom.rig, *moved))
         self.solver = NumpySolver.at_rest(self.rig, self._pose(depsgraph))
         self._show()
 
@@ -424,13 +424,13 @@ class Session:
         Raises:
             HairloomError: as `rest`.
         """
-        if self.is_playing or self.rig.grown is None or self.rig.holds is not None:
+        if self.is_playing or self.rig.grown_children is None or self.rig.holds is not None:
             return
         if self.settings[DynamicsSettings].animated_style:
             return
         if not self._source.has_other_paint(depsgraph):
             return
-        self.groom = replace(self.groom, rig=painted(self.rig, *self._source.painted))
+        self.groom = replace(self.groom, rig=painted_rig(self.rig, *self._source.painted))
         self.solver = NumpySolver.at_rest(self.rig, self._pose(depsgraph))
         self._color()  # children stand elsewhere
         self._show()
@@ -532,7 +532,7 @@ class Session:
         Raises:
             HairloomError: as `rest`.
         """
-        return not self._pose(depsgraph).is_as(self.solver.pose)
+        return not self._pose(depsgraph).is_same_as(self.solver.pose)
 
     def play(
         self, depsgraph: bpy.types.Depsgraph, *, blocking: bool = True, is_frame: bool = False
@@ -641,8 +641,8 @@ class Session:
         return self.solver.guides()
 
     def style_seen(self) -> Style:
-        """See `motion_flow.style_seen`."""
-        return motion_flow.style_seen(self.rig, self.solver.pose, self.groom.rig)
+        """See `motion_flow.neighbour_style`."""
+        return motion_flow.neighbour_style(self.rig, self.solver.pose, self.groom.rig)
 
     def _simulate(
         self, depsgraph: bpy.types.Depsgraph, duration: float, time_scale: float = 1.0
@@ -678,7 +678,7 @@ class Session:
         assert self._motion_start is not None, "it is simulated"
         pose, posed, rig = self._motion_start.pose, self._motion_start.colliders, self.rig
         guides = start(motion_flow.carried_guides(rig, pose), rig.curl_room)
-        return Measure(guides, motion_flow.carried(rig, pose), rig.strands.offsets, posed)
+        return Measure(guides, motion_flow.carried_strands(rig, pose), rig.strands.offsets, posed)
 
     def measure_into(self, measure: Measure) -> None:
         """Add the present frame to a measure; reads strands back from a GPU."""
@@ -701,7 +701,7 @@ class Session:
         rig = self.rig
         if rig.head is not None:
             return rig.strands.points
-        return motion_flow.carried(rig, self.solver.pose)
+        return motion_flow.carried_strands(rig, self.solver.pose)
 
     def solids(self, depsgraph: bpy.types.Depsgraph) -> tuple[PosedCollider, ...]:
         """The colliders of the hair at this moment; none until they are made."""

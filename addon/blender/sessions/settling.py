@@ -58,14 +58,14 @@ def settle_hair(
     strands = own.strands
     if read.rest is not None and read.head is not None:
         strands = carried(strands, read.rest.surface, read.head)
-    guides = settle_flow.guides_that_fall(strands, source.settings[GuideSettings])
+    guides = settle_flow.settle_guide_settings(strands, source.settings[GuideSettings])
     rig = rig_flow.prepare(
         strands,
         read.head,
         guides,
         place=hair.name,
         holders=read.holders,
-        ground=rig_flow.ChildGround(partings=read.partings),
+        placement=rig_flow.ChildPlacement(partings=read.partings),
     )
     _check_roots(hair, rig)
     dynamics, pose = source.settings[DynamicsSettings], source.pose(rig, depsgraph)
@@ -77,7 +77,7 @@ def settle_hair(
     painted = painted_guides(rig, masks) if masks else None
     fallen = yield from settle_flow.settle(rig, pose, posed, dynamics, settings, gravity, painted)
     head = solid_of(rig.head)
-    settled, is_out = settle_flow.as_curves(strands, rig, fallen, head)
+    settled, is_out = settle_flow.settled_curves(strands, rig, fallen, head)
     if read.rest is not None and read.head is not None:
         settled = carried(settled, read.head, read.rest.surface)
     return lambda: _stored(hair, own, settled, is_out, warnings, depsgraph)

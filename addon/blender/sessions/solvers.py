@@ -83,7 +83,7 @@ class Solver(Protocol):
         """Whether the head has moved suddenly, as at a cut, see `motion_flow.has_jumped`."""
 
     def go_along(self, frame: FrameInput) -> None:
-        """A frame in which hair moves rigidly with its roots, see `motion_flow.go_along`."""
+        """A frame in which hair moves rigidly with its roots, see `motion_flow.advance_rigidly`."""
 
     def carry(self, pose: Pose, guides: Floats, led: LedOut = NOT_LED) -> None:
         """Show guides of a bake, (guide_count, cv_count, 3) [m, world], and its strands that were

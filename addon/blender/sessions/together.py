@@ -47,7 +47,7 @@ class Felt(Protocol):
         """Its guides, (guide_count, cv_count, 3) [m, world]."""
 
     def style_seen(self) -> Style:
-        """See `motion_flow.style_seen`."""
+        """See `motion_flow.neighbour_style`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +117,7 @@ def _begun(grooms: list[Felt]) -> list[_Begin]:
     feeling = {each.uid for each in grooms if isinstance(each, Session) and each.feels_hair}
     if not feeling or len(grooms) < 2:
         return []
-    balls = {each.uid: motion_flow.reach(each.rig, each.pose) for each in grooms}
+    balls = {each.uid: motion_flow.bounding_sphere(each.rig, each.pose) for each in grooms}
     near = {uid: _touching(uid, balls) for uid in feeling}
     taking_part = frozenset().union(*near.values(), (uid for uid in near if near[uid]))
     return [

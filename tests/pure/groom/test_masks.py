@@ -23,7 +23,7 @@ from hairloom.addon.groom.masks import (
     mask_names,
     masks_of,
 )
-from hairloom.addon.paint_flow import painted, painted_guides
+from hairloom.addon.paint_flow import painted_guides, painted_rig
 from hairloom.addon.strands import StrandSet
 from hairloom.addon.strands.face import BROWS
 from hairloom.addon.strands.kept import NOTHING_KEPT, Kept
@@ -54,14 +54,14 @@ def rig_of(
     kept: Kept = NOTHING_KEPT,
     own: StrandSet | None = None,
 ) -> rig_flow.Rig:
-    ground = rig_flow.ChildGround(masks=masks)
+    placement = rig_flow.ChildPlacement(masks=masks)
     return rig_flow.prepare(
         own or wig_strands(),
         HEAD,
         GUIDES,
         place="a wig",
         children=settings,
-        ground=ground,
+        placement=placement,
         kept=kept,
     )
 
@@ -106,7 +106,7 @@ def test_a_mask_of_zero_is_the_setting_at_zero_bit_by_bit(name: str) -> None:
 
 def test_curls_are_multiplied() -> None:
     """Around straight paths, the largest distance of points is the radius."""
-    guides = rig_of(BOLD).grown.shapes
+    guides = rig_of(BOLD).grown_children.shapes
     plain = {"frizz": 0.0, "fly_aways": 0.0, "curl": 0.02, "length": 1.0}
     smooth = BOLD.from_dict(BOLD.as_dict() | plain, "test")
 
@@ -166,11 +166,11 @@ def test_a_brush_gives_what_a_rebuild_makes_and_shapes_no_others(name: str) -> N
     themselves clump."""
     many = BOLD.from_dict(BOLD.as_dict() | {"strand_count": 6000}, "test")
     rig = rig_of(many)
-    now, whole = painted(rig, None, on_head(name, HALF)), rig_of(many, on_head(name, HALF))
+    now, whole = painted_rig(rig, None, on_head(name, HALF)), rig_of(many, on_head(name, HALF))
     np.testing.assert_allclose(children(now), children(whole), atol=2e-6)
     is_same = (children(now) == children(rig)).all(axis=(1, 2))
     assert 0.3 < is_same.mean() < 0.7
-    back = painted(now, None)
+    back = painted_rig(now, None)
     np.testing.assert_allclose(children(back), children(rig), atol=1e-7)
 
 
@@ -197,14 +197,14 @@ def test_widths_are_multiplied_whatever_their_method() -> None:
     for method in ("own", "found"):
 
         def radius(masks: Masks, method: str = method) -> Floats:
-            ground = rig_flow.ChildGround(masks=masks)
+            placement = rig_flow.ChildPlacement(masks=masks)
             rig = rig_flow.prepare(
                 wig_strands(),
                 HEAD,
                 GUIDES,
                 place="a wig",
                 children=BOLD,
-                ground=ground,
+                placement=placement,
                 widths=method,
             )
             return rig.strands.radius.reshape(rig.strands.strand_count, -1)[rig.own_count :, 0]
@@ -213,7 +213,10 @@ def test_widths_are_multiplied_whatever_their_method() -> None:
         np.testing.assert_allclose(half, 0.5 * whole, rtol=1e-5)
     assert not len(rig_of(BOLD, on_head("width", HALF)).baby_hair), "fine, but no baby hair"
     rig = rig_of(BOLD)
-    now, again = painted(rig, None, on_head("width", HALF)), rig_of(BOLD, on_head("width", HALF))
+    now, again = (
+        painted_rig(rig, None, on_head("width", HALF)),
+        rig_of(BOLD, on_head("width", HALF)),
+    )
     np.testing.assert_allclose(now.strands.radius, again.strands.radius, rtol=1e-5)
     assert np.ptp(now.strands.radius) > 0.0
 
@@ -221,8 +224,8 @@ def test_widths_are_multiplied_whatever_their_method() -> None:
 def test_scatter_where_it_is_painted_is_that_of_the_setting() -> None:
     wild = BOLD.from_dict(BOLD.as_dict() | {"scatter": 0.5}, "test")
     half, whole, none = rig_of(wild, on_head("scatter", HALF)), rig_of(wild), rig_of(BOLD)
-    weights = [each.grown.growth.weights.weight for each in (half, whole, none)]
-    x = half.grown.growth.root[:, 0]
+    weights = [each.grown_children.growth.weights.weight for each in (half, whole, none)]
+    x = half.grown_children.growth.root[:, 0]
     np.testing.assert_array_equal(weights[0][x > 0.04], weights[1][x > 0.04])
     np.testing.assert_array_equal(weights[0][x < -0.04], weights[2][x < -0.04])
 
@@ -270,13 +273,15 @@ def test_children_take_what_is_painted_on_their_guides() -> None:
     masks = Masks({"frizz": StrandMask(is_right.astype(np.float32)[:, None])})
     masked, whole = rig_of(BOLD, masks, own=own), rig_of(BOLD, own=own)
     none = rig_of(BOLD, on_head("frizz", 0.0 * ONES), own=own)
-    guide = masked.grown.growth.weights.guide
-    are_right = is_right[masked.grown.parents][guide].all(axis=1)
-    are_left = ~is_right[masked.grown.parents][guide].any(axis=1)
-    assert masked.grown.parents[0] == 9 and are_right.sum() > 100 and are_left.sum() > 100
+    guide = masked.grown_children.growth.weights.guide
+    are_right = is_right[masked.grown_children.parents][guide].all(axis=1)
+    are_left = ~is_right[masked.grown_children.parents][guide].any(axis=1)
+    assert masked.grown_children.parents[0] == 9 and are_right.sum() > 100 and are_left.sum() > 100
     np.testing.assert_allclose(children(masked)[are_right], children(whole)[are_right], atol=1e-7)
     np.testing.assert_array_equal(children(masked)[are_left], children(none)[are_left])
-    np.testing.assert_allclose(children(painted(whole, None, masks)), children(masked), atol=2e-6)
+    np.testing.assert_allclose(
+        children(painted_rig(whole, None, masks)), children(masked), atol=2e-6
+    )
 
 
 def test_guides_of_a_rig_have_their_own_factors() -> None:

@@ -70,7 +70,7 @@ def made(ball: Surface, field: DistanceField | None) -> Rig:
         GuideSettings(),
         place="parted",
         children=ChildrenSettings(method="multi", strand_count=400, parting=0.0),
-        ground=rig_flow.ChildGround(density, head_field=lambda: field),
+        placement=rig_flow.ChildPlacement(density, head_field=lambda: field),
     )
 
 
