@@ -10,13 +10,13 @@ import numpy as np
 
 from ..arrays import Floats
 from ..errors import HairloomError
-from .among import Among, Strength
 from .clearance import GuideClearance
 from .colliders import PosedCollider
 from .constraints import PINNED
 from .contacts import BETWEEN, BETWEEN_RADIUS, radius_of_all
 from .force_fields import NO_FIELDS, ForceFields
 from .forces import Damped, combed_gravity, felt_gravity
+from .hair_grid import HairInteraction, InteractionStrength
 from .held import Held
 from .neighbours import Stop
 from .painted import PaintedFrame, PaintedGuides, painted_frame
@@ -209,7 +209,7 @@ class Frame:
     air: Air | None
     force_fields: ForceFields | None  # None where none acts
     size: float  # of the hair [m], see `state.Rest`
-    among: Among | None  # None if hair does not feel other hair
+    interaction: HairInteraction | None  # None if hair does not feel other hair
     painted: PaintedFrame | None  # None where nothing is painted
     begun: LastStep | KnownStep  # see `DynamicsState.carried`
     speed_ratio: float  # of a substep to the one before the frame
@@ -224,14 +224,14 @@ class Frame:
         dt: float,
     ) -> Frame:
         turn: Floats = np.eye(3)
-        among, painted = None, None
+        interaction, painted = None, None
         if drive.painted is not None and drive.painted.is_of_motion:
             painted = painted_frame(drive.painted, settings, state.cv_count, state.guide_count, dt)
         if state.guide_count:
             before, now = (sample(grid) for grid in (drive.target_before, drive.target_now))
             turn = rotation_from(state.rest.sample, (before + now) / 2.0)
             volume = None if painted is None else painted.volume
-            among = _among(state, drive, settings, turn, dt, volume)
+            interaction = _hair_interaction(state, drive, settings, turn, dt, volume)
         matrix = style_band(settings, state.cv_count, dt)
         air, fields = air_of(settings), drive.force_fields.by(settings.force_fields)
         time, left, size = state.time, state.time_left, state.rest.size
@@ -248,7 +248,7 @@ class Frame:
             air,
             fields,
             size,
-            among,
+            interaction,
             painted,
             state.carried,
             dt / state.substep if state.substep else 1.0,
@@ -256,13 +256,15 @@ class Frame:
 
     def pieces(self, count: int) -> list[range]:
         """Ranges of substeps in which guides are independent of each other."""
-        return [range(count)] if self.among is None else self.among.pieces(count)
+        return (
+            [range(count)] if self.interaction is None else self.interaction.substep_ranges(count)
+        )
 
     def stop(self, rest: Rest, number: int, read: Callable[[], tuple[Floats, Floats]]) -> Stop:
         """The stop before a substep in which hair feels hair, see `Stop`."""
-        assert self.among is not None, "it feels"
+        assert self.interaction is not None, "it feels"
         step = self.dt / self.duration
-        ahead = self.among.strength.ahead * step
+        ahead = self.interaction.strength.look_ahead * step
         return Stop(self.span(number)[0], step, ahead, rest, self.drive.target_before, read)
 
     @property
@@ -307,28 +309,28 @@ class Frame:
         return self.air.at(roots, self.time + number * self.dt) * np.float32(self.dt)
 
 
-def _among(
+def _hair_interaction(
     state: DynamicsState,
     drive: Drive,
     settings: DynamicsSettings,
     turn: Floats,
     dt: float,
     volume: Floats | None,
-) -> Among | None:
+) -> HairInteraction | None:
     """The hair grid in a frame; None if hair does not feel other hair.
 
     The grid is placed at the roots halfway through the frame, and turned with the groom.
 
     Args:
-        volume: see `Among`.
+        volume: see `HairInteraction`.
     """
-    strength = Strength.of(settings, dt)
+    strength = InteractionStrength.of(settings, dt)
     if strength is None or state.cv_count <= PINNED:
         return None
     grid = state.rest.hair_grid
     ends = [target[:, 0].mean(axis=0, dtype=np.float64) for target in drive.targets[:2]]
-    place = grid.place(turn, (ends[0] + ends[1]) / 2.0)
-    return Among(grid, place, turn, strength, round(state.time / dt), volume)
+    placement = grid.placement(turn, (ends[0] + ends[1]) / 2.0)
+    return HairInteraction(grid, placement, turn, strength, round(state.time / dt), volume)
 
 
 @dataclass(frozen=True)

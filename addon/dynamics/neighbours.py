@@ -1,5 +1,5 @@
 """Several grooms are advanced through a frame together: each feels the CVs of the others in its own
-grid, see `among`.
+grid, see `hair_grid`.
 
     when they first meet    density at rest: the others' style, placed in the groom's grid as it
                             then is relative to the groom
@@ -20,22 +20,22 @@ from functools import cached_property
 import numpy as np
 
 from ..arrays import Floats
-from .among import (
-    COARSEST,
-    HEAVIEST,
-    MASS,
-    REACHED,
+from .hair_grid import (
+    MARGIN_CELLS,
+    MAX_CELL,
+    MAX_MASS,
+    MEAN_MASS,
     HairGrid,
+    NeighbourCvs,
     Neighbours,
-    Others,
-    hair_of_cvs,
+    hair_length_of_cvs,
 )
 from .state import Rest, as_rows
 from .turn import rotation_from, sample
 
 #: If the mean CV of another groom has less mass than this, only one in several of its guides is
 #: used, with the mass of all of them.
-LIGHTEST = MASS // 4
+LIGHTEST = MEAN_MASS // 4
 #: Moments of a frame that differ by less than this are the same.
 ONE_MOMENT = 1.0e-6
 
@@ -98,7 +98,7 @@ def hair_of(guides: Floats, strands: Floats) -> Floats:
     """
     lengths = np.linalg.norm(np.diff(guides, axis=1), axis=2).sum(axis=1)
     size = float(np.median(lengths)) if len(lengths) else 0.0
-    return hair_of_cvs(strands, size, guides.shape[1], len(guides))
+    return hair_length_of_cvs(strands, size, guides.shape[1], len(guides))
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +113,7 @@ class KnownHair:
     """
 
     rest: Rest | None = None
-    at_rest: Mapping[int, tuple[object, Others | None]] = field(default_factory=dict)
+    at_rest: Mapping[int, tuple[object, NeighbourCvs | None]] = field(default_factory=dict)
     grid: HairGrid | None = None
     among: frozenset[int] = frozenset()
 
@@ -141,7 +141,7 @@ class KnownHair:
             return KnownHair(rest, known, self.grid, among)
         grid = rest.hair_grid
         if parts:
-            met = Others.of(tuple(parts.values()))
+            met = NeighbourCvs.joined(tuple(parts.values()))
             grid = HairGrid.at_rest(rest.position, rest.size, rest.strands, met)
         return KnownHair(rest, known, grid, among)
 
@@ -228,13 +228,15 @@ class Mover:
         assert grid is not None, "they have met"
         motion = (self._here - self._before) * np.float32(stop.ahead / stop.step)
         own, moment = (self._here + motion).reshape(3, -1), stop.moment + stop.ahead
-        seen = Others.of([each._seen(moment, stop.step, grid.unit) for each in others.values()])
-        seen = seen.near(own, 2.0 * (REACHED + 1) * grid.cell)
+        seen = NeighbourCvs.joined(
+            [each._seen(moment, stop.step, grid.hair_per_mass) for each in others.values()]
+        )
+        seen = seen.near_box(own, 2.0 * (MARGIN_CELLS + 1) * grid.cell)
         if grid is stop.rest.hair_grid and not seen.mass.any():
             return None
         return Neighbours(grid, seen, own)
 
-    def _seen(self, moment: float, step: float, unit: float) -> Others:
+    def _seen(self, moment: float, step: float, unit: float) -> NeighbourCvs:
         """This groom's CVs at a moment of the frame, as another groom feels them.
 
         Args:
@@ -251,10 +253,10 @@ class Mover:
             )
             motion = here - before
             here = here + motion * np.float32((moment - stop.moment) / stop.step)
-            return Others(here, motion * np.float32(step / stop.step), mass)
+            return NeighbourCvs(here, motion * np.float32(step / stop.step), mass)
         here, end = (_rows(guides[chosen]) for guides in self._straight.ends)
         moved = end - here
-        return Others(here + moved * np.float32(moment), moved * np.float32(step), mass)
+        return NeighbourCvs(here + moved * np.float32(moment), moved * np.float32(step), mass)
 
 
 def go_together(movers: Sequence[Mover]) -> None:
@@ -269,17 +271,19 @@ def go_together(movers: Sequence[Mover]) -> None:
             mover.go_on(other)
 
 
-def _at_rest(rest: Rest, style: Floats, other: Style) -> Others | None:
+def _at_rest(rest: Rest, style: Floats, other: Style) -> NeighbourCvs | None:
     """The CVs of another groom's style near a groom at rest, moved together with the groom to where
     its motion began; None: there are none."""
     grid, guides = rest.hair_grid, other.read()
-    chosen, mass = _masses(other.hair, grid.unit, guides.shape[1])
+    chosen, mass = _masses(other.hair, grid.hair_per_mass, guides.shape[1])
     turn = rotation_from(rest.sample, sample(style))
     middle = style[:, 0].mean(axis=0, dtype=np.float64)
     back = (guides[chosen].astype(np.float64) - middle) @ turn + grid.middle
     points = _rows(back)
-    all_of_it = Others(points, np.zeros_like(points), mass)
-    near = all_of_it.near(rest.position.reshape(3, -1), (REACHED + 1) * COARSEST * rest.size)
+    all_of_it = NeighbourCvs(points, np.zeros_like(points), mass)
+    near = all_of_it.near_box(
+        rest.position.reshape(3, -1), (MARGIN_CELLS + 1) * MAX_CELL * rest.size
+    )
     return near if near.mass.any() else None
 
 
@@ -289,7 +293,7 @@ def _masses(hair: Floats, unit: float, cv_count: int) -> tuple[slice, Floats]:
     lightest = LIGHTEST / max(len(hair), 1)
     every = int(max(LIGHTEST / max(float(mass.mean()), lightest), 1.0)) if len(hair) else 1
     chosen = slice(every // 2, None, every)
-    mass = np.rint(np.clip(mass[chosen] * every, 0.0, HEAVIEST))
+    mass = np.rint(np.clip(mass[chosen] * every, 0.0, MAX_MASS))
     return chosen, np.tile(mass.astype(np.float32), cv_count)
 
 

@@ -14,8 +14,8 @@ import numpy as np
 
 from ..arrays import Floats
 from ..errors import HairloomError
-from .among import HairGrid
 from .constraints import PINNED
+from .hair_grid import HairGrid
 from .rigid_path import NOT_MOVED, KnownStep, LastStep
 from .style import LocalShape, local_shape
 from .turn import rest_sample

@@ -1,7 +1,7 @@
 """One frame of motion, in fixed substeps.
 
     repeat substep_rate times a second:
-        among        at some substeps: forces between hair and other hair
+        hair grid    at some substeps: forces between hair and other hair
         brake        quadratic drag
         blow         the scene's force fields push, slow down and turn
         predict      Verlet: inertia, damping, gravity, wind
@@ -16,9 +16,9 @@ References: Jakobsen 2001, "Advanced Character Physics"; Nguyen and Donnelly 200
 and Rendering in the Nalu Demo", GPU Gems 2, chapter 23; Han and Harada 2012. `reference/` has a
 scalar implementation, one CV at a time.
 
-Guides are independent of each other between two moments at which hair feels hair (`among`), or for
-the whole frame if it does not. So they are advanced in blocks that fit into the cache; a guide's
-motion is the same to the last bit in any block.
+Guides are independent of each other between two moments at which hair feels hair (`hair_grid`), or
+for the whole frame if it does not. So they are advanced in blocks that fit into the cache; a
+guide's motion is the same to the last bit in any block.
 
 Time shorter than a substep is left in the state for the next frame, so the result does not depend
 on the frame rate; `grid_at_frame_end` bridges it for drawing.
@@ -84,12 +84,14 @@ def steps(
     slices, pieces = _blocks(state.guide_count), frame.pieces(count)
     made = (Block.of(state, frame, styles, guides) for guides in slices)
     blocks = made if len(pieces) == 1 else list(made)
-    push = None if frame.among is None else state.push
+    push = None if frame.interaction is None else state.push
     for numbers in pieces:
-        if frame.among is not None and (push is None or frame.among.is_due(numbers[0])):
-            other = yield frame.stop(state.rest, numbers[0], partial(_copies, position, previous))
-            among = frame.among.beside(other)
-            taken, push = among.feel(position, previous)
+        if frame.interaction is not None and (push is None or frame.interaction.is_due(numbers[0])):
+            neighbours = yield frame.stop(
+                state.rest, numbers[0], partial(_copies, position, previous)
+            )
+            interaction = frame.interaction.with_neighbours(neighbours)
+            taken, push = interaction.friction_and_push(position, previous)
             previous += taken
         for guides, block in zip(slices, blocks, strict=True):
             here, before = position[:, :, guides].copy(), previous[:, :, guides].copy()

@@ -58,10 +58,10 @@ from ..dynamics.schedule import due_substeps
 from ..dynamics.settings import DynamicsSettings
 from ..dynamics.state import DynamicsState, Rest, as_rows
 from ..dynamics.step import displacement_beside_root, turned_beside_root
-from .among_pass import AmongPass
 from .capabilities import pair_format
 from .collider_textures import NOT_FOLLOWED, UploadedColliders
 from .dynamics_block import bands_of, block_of, carriers_of, moments_of, own_of, spans_of
+from .hair_grid_pass import HairGridPass
 from .shader_program import ShaderRecipe, program, released_with_shaders
 from .strand_layout import from_strand_rows, strand_rows
 from .textures import UniformBlock, texture_from, texture_to_array
@@ -244,7 +244,7 @@ class DynamicsPass:
         """Release everything on the GPU; the next frame continues from the last state read."""
         self._textures: dict[str, Any] = {}
         self._is_bridged = self._is_pushed = False
-        self._block, self._among = UniformBlock(), AmongPass()
+        self._block, self._hair_grid = UniformBlock(), HairGridPass()
         self._colliders.release()
         self._styles: list[tuple[Floats, Any]] = []  # of the last frame, with their textures
         self._held: Held | None = None
@@ -299,16 +299,20 @@ class DynamicsPass:
 
     def _steps(self, frame: Frame, count: int, speed_ratio: float) -> Steps[None]:
         """All substeps of a frame; the first is `speed_ratio` times as long as the one before."""
-        self._is_pushed &= frame.among is not None
+        self._is_pushed &= frame.interaction is not None
         if frame.painted is not self._painted:
             self._upload_painted(frame)
         for numbers in frame.pieces(count):
             first, end = numbers[0], numbers[-1] + 1
-            if frame.among is not None and (frame.among.is_due(first) or not self._is_pushed):
+            if frame.interaction is not None and (
+                frame.interaction.is_due(first) or not self._is_pushed
+            ):
                 ratio = 1.0 if first else speed_ratio
                 read = partial(self._read_moving, ratio)
-                among = frame.among.beside((yield frame.stop(self._state.rest, first, read)))
-                self._among.feel(among, self._textures, ratio, pair_format())
+                interaction = frame.interaction.with_neighbours(
+                    (yield frame.stop(self._state.rest, first, read))
+                )
+                self._hair_grid.update_pushes(interaction, self._textures, ratio, pair_format())
                 self._is_pushed = True
             for begin in range(first, end, SUBSTEPS_AT_ONCE):
                 part = min(end - begin, SUBSTEPS_AT_ONCE)
@@ -335,7 +339,7 @@ class DynamicsPass:
             relaxation=settings.length_solver == "relaxation",
             held=frame.drive.held is not None,
             springs=state.rest.room is not None and settings.curl_stretch > 0.0,
-            pushed=frame.among is not None,
+            pushed=frame.interaction is not None,
             air=frame.air is not None,
             force_fields=frame.force_fields is not None,
             collider_count=len(posed),

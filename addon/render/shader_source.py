@@ -17,7 +17,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from ..cards.bake import SAMPLES, SPARSE_RANGE, SPARSE_STEPS
-from ..dynamics import among, blend, springs
+from ..dynamics import blend, hair_grid, springs
 from ..dynamics.colliders.signed_distance import FLATTEST
 from ..dynamics.constraints import CONTACT_WEIGHT, HELD, HELD_SWEEPS, PINNED
 from ..dynamics.contacts import (
@@ -126,11 +126,11 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
         "contact_weight": repr(float(CONTACT_WEIGHT)),
         "held_weight": repr(float(HELD)),
         "steepest_spring": repr(float(springs.STEEPEST)),
-        "among_limit": repr(float(among.FASTEST * among.MOTION)),
-        "among_slack": repr(among.SLACK),
-        "among_farthest": repr(among.FARTHEST),
-        "among_pressed": repr(among.PRESSED),
-        "among_tiny": repr(among.TINY),
+        "hair_grid_max_motion": repr(float(hair_grid.MAX_MOTION * hair_grid.MOTION_UNITS)),
+        "hair_grid_density_tolerance": repr(hair_grid.DENSITY_TOLERANCE),
+        "hair_grid_max_shift": repr(hair_grid.MAX_SHIFT),
+        "hair_grid_pressed_friction": repr(hair_grid.PRESSED_FRICTION),
+        "hair_grid_min_density": repr(hair_grid.MIN_DENSITY),
         "blend_opposite": repr(float(blend.OPPOSITE)),
         "held_sweeps": str(HELD_SWEEPS),
         "hold_sweeps": str(SWEEPS),

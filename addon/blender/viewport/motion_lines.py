@@ -9,9 +9,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...arrays import Bools, Floats, Ints
-from ...dynamics.among import BEGIN
 from ...dynamics.colliders import signed_distance
 from ...dynamics.contacts import radius_of_all
+from ...dynamics.hair_grid import GRID_OFFSET
 from ...dynamics.settings import DynamicsSettings
 from ...dynamics.turn import rotation_from, sample
 from ..sessions.session import Session
@@ -90,15 +90,15 @@ def density_lines(session: Session) -> Colored:
     grid = rest.hair_grid
     turn = rotation_from(rest.sample, sample(guides))
     middle = guides[:, 0].mean(axis=0, dtype=np.float64)
-    place = grid.place(turn, middle)
-    at_rest, _ = _cells(grid.place(np.eye(3), grid.middle).cells(rest.position), grid.mass)
+    place = grid.placement(turn, middle)
+    at_rest, _ = _cells(grid.placement(np.eye(3), grid.middle).to_cells(rest.position), grid.mass)
     usual = float(at_rest.mean())
-    mass, cell = _cells(place.cells(np.ascontiguousarray(guides.transpose(2, 1, 0))), grid.mass)
+    mass, cell = _cells(place.to_cells(np.ascontiguousarray(guides.transpose(2, 1, 0))), grid.mass)
     for across in (0, 1):
-        is_cut = cell[:, across] == np.floor(BEGIN[across])
+        is_cut = cell[:, across] == np.floor(GRID_OFFSET[across])
         squares = _squares(cell[is_cut], across)
         for color, chosen in _classes(mass[is_cut] / usual, DENSITIES):
-            corners = (squares[chosen].reshape(-1, 3) - BEGIN) * grid.cell
+            corners = (squares[chosen].reshape(-1, 3) - GRID_OFFSET) * grid.cell
             yield color, corners @ turn.T + middle
 
 

@@ -14,10 +14,10 @@ import numpy as np
 
 from ...arrays import Floats
 from ...params.curve import along as curve_along
-from ..among import FELT_PER_SECOND
 from ..constraints import CONTACT_WEIGHT, HELD, HELD_SWEEPS, PINNED, ROUNDING
 from ..contacts import BETWEEN, MORE_ROUNDS, PART_PASSES, PARTS
 from ..frame import Frame, carried_after, inherits
+from ..hair_grid import UPDATES_PER_SECOND
 from ..rigid_path import Carry, Rigid
 from ..settings import DynamicsSettings
 from ..springs import STEEPEST, give, stiffness
@@ -26,7 +26,6 @@ from ..step import Drive
 from ..trajectory import curvature
 from ..turn import best_rotation
 from ..wind import air_of
-from .among import Hair, feel_slowly
 from .contacts import (
     Moment,
     Plane,
@@ -37,6 +36,7 @@ from .contacts import (
     push_out,
 )
 from .force_fields import blown_slowly
+from .hair_grid import GroomPoints, friction_and_push_reference
 from .shape import frames, hold, jacobian_of
 
 #: Painted settings with a single value per guide.
@@ -85,14 +85,14 @@ def _carried(carry: Carry, points: Floats) -> Floats:
 
 
 class _Push:
-    """Forces between guides, computed at some substeps, see `among`."""
+    """Forces between guides, computed at some substeps, see `hair_grid`."""
 
     def __init__(
         self, state: DynamicsState, drive: Drive, settings: DynamicsSettings, dt: float
     ) -> None:
         self.state, self.settings, self.dt = state, settings, dt
         self.is_felt = settings.volume > 0.0 and state.cv_count > PINNED
-        self.substeps = max(round(1.0 / (FELT_PER_SECOND * dt)), 1)
+        self.substeps = max(round(1.0 / (UPDATES_PER_SECOND * dt)), 1)
         self.first = round(state.time / dt)
         self.rows = state.push if self.is_felt else None
         self.middles = (drive.target_before + drive.target_now).transpose(2, 1, 0) / 2.0
@@ -114,10 +114,12 @@ class _Push:
         turn = best_rotation(rest.position, self.middles)
         middle = self.middles[:, 0].mean(axis=1, dtype=np.float64)
         at_rest = np.concatenate([guide.rest for guide in guides])
-        hair = Hair(here, here - before, turn, middle)
+        hair = GroomPoints(here, here - before, turn, middle)
         cv_count = len(here) // len(guides)
         volume = np.repeat([guide.settings.volume for guide in guides], cv_count)
-        taken, push = feel_slowly(rest.hair_grid, at_rest, hair, volume, self.dt, self.substeps)
+        taken, push = friction_and_push_reference(
+            rest.hair_grid, at_rest, hair, volume, self.dt, self.substeps
+        )
         for guide, own in zip(guides, np.split(taken, len(guides)), strict=True):
             guide.previous = guide.previous + own
         self.rows = push.reshape(len(guides), -1, 3).transpose(2, 1, 0).astype(np.float32)

@@ -7,10 +7,20 @@ import pytest
 from grooms_together import Groom, play_frame
 from tails import SOFT_STYLE, cell_count, rotation_matrix, squeezed_tail, tail, two_locks
 
-from hairloom.addon.dynamics import among
-from hairloom.addon.dynamics.among import Among, HairGrid, Neighbours, Others, Strength
+from hairloom.addon.dynamics import hair_grid
+from hairloom.addon.dynamics.hair_grid import (
+    HairGrid,
+    HairInteraction,
+    InteractionStrength,
+    NeighbourCvs,
+    Neighbours,
+)
 from hairloom.addon.dynamics.neighbours import KnownHair, Style, alone, hair_of
-from hairloom.addon.dynamics.reference.among import Beside, Hair, feel_slowly
+from hairloom.addon.dynamics.reference.hair_grid import (
+    GroomPoints,
+    NeighbourPoints,
+    friction_and_push_reference,
+)
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import start
 from hairloom.addon.dynamics.step import Drive, advance, steps
@@ -43,20 +53,24 @@ def test_as_without_a_grid():
     def rows(points):
         return np.ascontiguousarray(points.T, np.float32)
 
-    still = Others(rows(at_rest), np.zeros_like(rows(at_rest)), mass)
+    still = NeighbourCvs(rows(at_rest), np.zeros_like(rows(at_rest)), mass)
     grid = HairGrid.at_rest(rest.position, rest.size, rest.strands, still)
-    strength = Strength.of(settings, DT)
-    plain = Among(rest.hair_grid, rest.hair_grid.place(turn, middle), turn, strength, 0)
-    ahead = position + (position - previous) * np.float32(strength.ahead)
-    other = Neighbours(grid, Others(rows(here), rows(motion), mass), ahead.reshape(3, -1))
-    found = plain.beside(other).feel(position, previous)
+    strength = InteractionStrength.of(settings, DT)
+    plain = HairInteraction(
+        rest.hair_grid, rest.hair_grid.placement(turn, middle), turn, strength, 0
+    )
+    ahead = position + (position - previous) * np.float32(strength.look_ahead)
+    other = Neighbours(grid, NeighbourCvs(rows(here), rows(motion), mass), ahead.reshape(3, -1))
+    found = plain.with_neighbours(other).friction_and_push(position, previous)
     flat = [each.transpose(2, 1, 0).reshape(-1, 3).astype(float) for each in (position, previous)]
-    beside = Beside(here, motion, mass.astype(float))
-    hair = Hair(flat[0], flat[0] - flat[1], turn, middle.astype(float), beside)
+    beside = NeighbourPoints(here, motion, mass.astype(float))
+    hair = GroomPoints(flat[0], flat[0] - flat[1], turn, middle.astype(float), beside)
     own = rest.position.transpose(2, 1, 0).reshape(-1, 3).astype(float)
-    volumes, beside = np.ones(len(own)), Beside(at_rest, at_rest * 0.0, mass.astype(float))
-    expected = feel_slowly(grid, own, hair, volumes, DT, strength.substeps, beside)
-    without = feel_slowly(grid, own, replace_others(hair), volumes, DT, strength.substeps)
+    volumes, beside = np.ones(len(own)), NeighbourPoints(at_rest, at_rest * 0.0, mass.astype(float))
+    expected = friction_and_push_reference(grid, own, hair, volumes, DT, strength.substeps, beside)
+    without = friction_and_push_reference(
+        grid, own, replace_others(hair), volumes, DT, strength.substeps
+    )
     for one, slow, other in zip(found, expected, without, strict=True):
         one = one.transpose(2, 1, 0).reshape(-1, 3)
         assert (np.abs(slow - other).max(axis=1) > 1e-6).mean() > 0.3  # they act on many
@@ -64,7 +78,7 @@ def test_as_without_a_grid():
 
 
 def replace_others(hair):
-    return Hair(hair.here, hair.motion, hair.turn, hair.middle)
+    return GroomPoints(hair.position, hair.motion, hair.rotation, hair.middle)
 
 
 def test_two_halves_of_a_groom_move_as_it_does():
@@ -125,16 +139,16 @@ def test_at_rest_nothing_acts_wherever_the_head_is(angle):
         for grid in (one, other)
     ]
     points = rows[1].reshape(3, -1)
-    mass = np.full(points.shape[1], among.MASS, np.float32)
-    others = Others(points, np.zeros_like(points), mass)
-    place = rest.hair_grid.place(turn, one[:, 0].mean(axis=0) @ turn.T + move)
-    strength = Strength.of(FULL, DT)
+    mass = np.full(points.shape[1], hair_grid.MEAN_MASS, np.float32)
+    others = NeighbourCvs(points, np.zeros_like(points), mass)
+    place = rest.hair_grid.placement(turn, one[:, 0].mean(axis=0) @ turn.T + move)
+    strength = InteractionStrength.of(FULL, DT)
     felt = Neighbours(known.grid, others, rows[0].reshape(3, -1))
-    plain = Among(rest.hair_grid, place, turn, strength, 0)
-    taken, push = plain.beside(felt).feel(rows[0], rows[0])
-    assert not taken.any() and not push.any()
+    plain = HairInteraction(rest.hair_grid, place, turn, strength, 0)
+    slowed, push = plain.with_neighbours(felt).friction_and_push(rows[0], rows[0])
+    assert not slowed.any() and not push.any()
     apart = Neighbours(rest.hair_grid, others, rows[0].reshape(3, -1))
-    _, push = plain.beside(apart).feel(rows[0], rows[0])
+    _, push = plain.with_neighbours(apart).friction_and_push(rows[0], rows[0])
     assert push.any(), "it is what they are at rest that keeps them still"
 
 
@@ -170,7 +184,7 @@ def test_neighbours_that_is_far_away_changes_no_bit():
     swayed([beside, far], 6)
     assert np.array_equal(by_itself.state.position, beside.state.position)
     assert np.isfinite(far.state.position).all()
-    assert max(beside.known.grid.counts) <= among.SIDE
+    assert max(beside.known.grid.counts) <= hair_grid.MAX_CELLS_PER_AXIS
 
 
 def test_hair_that_goes_straight_is_felt():
@@ -220,7 +234,7 @@ def test_neighbours_counts_for_the_strands_it_stands_for():
         hair = hair_of(guides, np.full(len(guides), strands))
         style = Style(lambda guides=guides: guides, hair, guides)
         grid = KnownHair().meeting(rest, one, {1: style}).grid
-        found.append((grid.density * grid.cell**-3).mean())
+        found.append((grid.rest_density * grid.cell**-3).mean())
     np.testing.assert_allclose(found, found[0], rtol=0.1)
 
 
@@ -234,8 +248,8 @@ def test_an_animated_style_does_not_forget_how_others_were_combed():
     second = first.meeting(start(bent).rest, bent, {1: style})
     assert second.at_rest[1][1] is first.at_rest[1][1]
     expected = KnownHair().meeting(start(bent).rest, one, {1: replace(style, read=lambda: other)})
-    np.testing.assert_allclose(second.grid.density, expected.grid.density, rtol=0.02)
-    assert np.abs(second.grid.density - first.grid.density).max() > 0.1
+    np.testing.assert_allclose(second.grid.rest_density, expected.grid.rest_density, rtol=0.02)
+    assert np.abs(second.grid.rest_density - first.grid.rest_density).max() > 0.1
 
 
 def test_what_is_known_of_others_is_kept():

@@ -7,9 +7,14 @@ import pytest
 from tails import SOFT_STYLE, cell_count, rotation_matrix, squeezed_tail, tail, two_locks
 from tiers import few_in_commits
 
-from hairloom.addon.dynamics import among
-from hairloom.addon.dynamics.among import AHEAD, HairGrid, Strength, feel
-from hairloom.addon.dynamics.reference.among import Hair, feel_slowly
+from hairloom.addon.dynamics import hair_grid as grid_module
+from hairloom.addon.dynamics.hair_grid import (
+    LOOK_AHEAD,
+    HairGrid,
+    InteractionStrength,
+    friction_and_push,
+)
+from hairloom.addon.dynamics.reference.hair_grid import GroomPoints, friction_and_push_reference
 from hairloom.addon.dynamics.reference.step import advance_slowly
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import start
@@ -29,13 +34,13 @@ def played(grid, settings, seconds=2.0, fps=24.0, state=None):
 def test_as_without_a_grid(volume):
     rest, position, previous, turn, middle = squeezed_tail()
     grid, settings = rest.hair_grid, DynamicsSettings(volume=volume)
-    strength = Strength.of(settings, DT)
-    found = feel(grid, grid.place(turn, middle), strength, position, previous)
+    strength = InteractionStrength.of(settings, DT)
+    found = friction_and_push(grid, grid.placement(turn, middle), strength, position, previous)
     flat = [rows.transpose(2, 1, 0).reshape(-1, 3).astype(float) for rows in (position, previous)]
-    hair = Hair(flat[0], flat[0] - flat[1], turn, middle.astype(float))
+    hair = GroomPoints(flat[0], flat[0] - flat[1], turn, middle.astype(float))
     at_rest = rest.position.transpose(2, 1, 0).reshape(-1, 3).astype(float)
     volumes = np.full(len(at_rest), volume)
-    expected = feel_slowly(grid, at_rest, hair, volumes, DT, strength.substeps)
+    expected = friction_and_push_reference(grid, at_rest, hair, volumes, DT, strength.substeps)
     for one, other in zip(found, expected, strict=True):
         one = one.transpose(2, 1, 0).reshape(-1, 3)
         assert (np.abs(other).max(axis=1) > 1e-6).mean() > 0.3  # it acts on many of them
@@ -62,10 +67,10 @@ def test_the_order_of_guides_changes_no_bit():
     rest, position, previous, turn, middle = squeezed_tail(60)
     order = np.random.default_rng(6).permutation(60)
     other = replace(rest, position=rest.position[:, :, order], strands=rest.strands[order])
-    strength = Strength.of(DynamicsSettings(volume=1.0), DT)
-    place = rest.hair_grid.place(turn, middle)
-    found = feel(rest.hair_grid, place, strength, position, previous)
-    again = feel(
+    strength = InteractionStrength.of(DynamicsSettings(volume=1.0), DT)
+    place = rest.hair_grid.placement(turn, middle)
+    found = friction_and_push(rest.hair_grid, place, strength, position, previous)
+    again = friction_and_push(
         replace(other.hair_grid, middle=rest.hair_grid.middle),
         place,
         strength,
@@ -82,22 +87,22 @@ def test_at_rest_it_does_nothing_wherever_the_head_is(angle):
     rest = start(grid).rest
     here = (grid @ turn.T + move).astype(np.float32)
     rows = np.ascontiguousarray(here.transpose(2, 1, 0))
-    place = rest.hair_grid.place(turn, grid[:, 0].mean(axis=0) @ turn.T + move)
-    strength = Strength.of(DynamicsSettings(volume=1.0), DT)
-    taken, push = feel(rest.hair_grid, place, strength, rows, rows)
-    assert not taken.any() and not push.any()
+    place = rest.hair_grid.placement(turn, grid[:, 0].mean(axis=0) @ turn.T + move)
+    strength = InteractionStrength.of(DynamicsSettings(volume=1.0), DT)
+    slowed, push = friction_and_push(rest.hair_grid, place, strength, rows, rows)
+    assert not slowed.any() and not push.any()
 
 
 def test_hair_at_rest_stays_at_rest():
     """With weight carried by the style, as by default, hair comes to the same rest as without
     volume."""
     grid = tail(200)
-    alone, among_others = (
+    alone, with_volume = (
         played(grid, DynamicsSettings(volume=volume), 4.0) for volume in (0.0, 1.0)
     )
-    assert not among_others.push.any()
-    assert np.abs(among_others.position - alone.position).max() < 5e-6
-    assert np.abs(among_others.position - among_others.previous).max() / DT < 1e-4
+    assert not with_volume.push.any()
+    assert np.abs(with_volume.position - alone.position).max() < 5e-6
+    assert np.abs(with_volume.position - with_volume.previous).max() / DT < 1e-4
 
 
 def test_a_ponytail_keeps_its_volume():
@@ -145,11 +150,11 @@ def test_neighbours_move_together():
     rest = start(grid).rest
     previous = rest.position.copy()
     previous[0, :, 7] -= 0.001
-    place = rest.hair_grid.place(np.eye(3), rest.hair_grid.middle)
-    strength = Strength.of(DynamicsSettings(volume=1.0), DT)
-    taken, _ = feel(rest.hair_grid, place, strength, rest.position, previous)
-    assert taken[0, 2:, 7].min() > 0.0 and taken[0, 2:, 7].max() < 0.001
-    others = np.delete(taken[0], 7, axis=1)
+    place = rest.hair_grid.placement(np.eye(3), rest.hair_grid.middle)
+    strength = InteractionStrength.of(DynamicsSettings(volume=1.0), DT)
+    slowed, _ = friction_and_push(rest.hair_grid, place, strength, rest.position, previous)
+    assert slowed[0, 2:, 7].min() > 0.0 and slowed[0, 2:, 7].max() < 0.001
+    others = np.delete(slowed[0], 7, axis=1)
     assert others.max() <= 0.0 and others.min() < 0.0  # and they are dragged along
 
 
@@ -168,7 +173,7 @@ def test_the_frame_rate_does_not_matter():
 def test_a_guide_counts_for_its_strands():
     grid = tail(100)
     even, uneven = (start(grid, strands=strands).rest for strands in (None, np.ones(100)))
-    assert np.array_equal(even.hair_grid.density, uneven.hair_grid.density)
+    assert np.array_equal(even.hair_grid.rest_density, uneven.hair_grid.rest_density)
     strands = np.ones(100)
     strands[50:] = 3.0
     heavy = start(grid, strands=strands).rest.hair_grid
@@ -180,8 +185,8 @@ def test_hair_that_is_a_kilometre_apart():
     state = played(grid, DynamicsSettings(volume=1.0, **SOFT_STYLE), 0.5)
     assert np.isfinite(state.position).all()
     hair_grid = state.rest.hair_grid
-    assert max(hair_grid.counts) <= among.SIDE
-    assert hair_grid.cell <= among.COARSEST * state.rest.size * 1.001
+    assert max(hair_grid.counts) <= grid_module.MAX_CELLS_PER_AXIS
+    assert hair_grid.cell <= grid_module.MAX_CELL * state.rest.size * 1.001
 
 
 @pytest.mark.parametrize("grid", [tail(1), tail(3, 2), np.zeros((5, 6, 3), np.float32)])
@@ -200,8 +205,8 @@ def test_turned_on_in_mid_play():
 
 
 def test_how_far_ahead():
-    strength = Strength.of(DynamicsSettings(volume=0.5), DT)
+    strength = InteractionStrength.of(DynamicsSettings(volume=0.5), DT)
     assert strength.substeps == 3
-    assert strength.ahead == AHEAD * 3
-    assert Strength.of(DynamicsSettings(), DT) is None
+    assert strength.look_ahead == LOOK_AHEAD * 3
+    assert InteractionStrength.of(DynamicsSettings(), DT) is None
     assert isinstance(start(tail(4)).rest.hair_grid, HairGrid)

@@ -1,9 +1,9 @@
 // Hair among hair: applies friction to the motion of each CV, and stores pressure and cohesion for the
 // substeps. One invocation per CV.
 //
-// Twin of feel in addon/dynamics/among.py.
+// Twin of feel in addon/dynamics/hair_grid.py.
 #include "lib_strand_texel.glsl"
-#include "lib_among.glsl"
+#include "lib_hair_grid.glsl"
 
 // Twin of own_part: the CV's own part of the density (x), and its gradient (yzw).
 vec4 own_part(vec3 part)
@@ -17,19 +17,19 @@ vec4 own_part(vec3 part)
 void main()
 {
   ivec2 id = ivec2(gl_GlobalInvocationID.xy);
-  if (id.x >= CV_COUNT || id.y >= among.counts.w) {
+  if (id.x >= CV_COUNT || id.y >= grid.counts.w) {
     return;
   }
   ivec2 texel = strand_texel(id.y, id.x, CV_COUNT);
   vec4 here = imageLoad(positions, texel);
   vec3 before = vec3(imageLoad(previous_positions, texel).xy, here.w);
   vec4 rest = texelFetch(hair_at_rest, texel, 0);
-  AmongCv cv = among_cv(among, here.xyz, before);
-  ivec3 counts = among.counts.xyz;
-  ivec3 low = among_wrapped(cv.low, counts);
-  ivec2 across = ivec2(low.x, among_after(low.x, counts.x)) * counts.z;
-  ivec2 up = ivec2(low.y, among_after(low.y, counts.y));
-  ivec2 deep = ivec2(low.z, among_after(low.z, counts.z));
+  HairGridCv cv = hair_grid_cv(grid, here.xyz, before);
+  ivec3 counts = grid.counts.xyz;
+  ivec3 low = wrapped_cell(cv.low, counts);
+  ivec2 across = ivec2(low.x, cell_after(low.x, counts.x)) * counts.z;
+  ivec2 up = ivec2(low.y, cell_after(low.y, counts.y));
+  ivec2 deep = ivec2(low.z, cell_after(low.z, counts.z));
   vec4 found = vec4(0.0);
   vec3 gradient = vec3(0.0);
   for (int i = 0; i < 8; i++) {
@@ -41,19 +41,19 @@ void main()
     gradient += texelFetch(gradients, cell, 0).xyz * weight;
   }
   vec4 own = own_part(cv.part);
-  found -= among_lanes(among, cv.motion, rest.z) * own.x;
+  found -= mass_and_motion(grid, cv.motion, rest.z) * own.x;
   gradient -= own.yzw * rest.z;
-  float density = max(found.x, {{among_tiny}});
+  float density = max(found.x, {{hair_grid_min_density}});
   float ratio = found.x / rest.y;
-  float over = clamp(ratio - (1.0 + {{among_slack}}), 0.0, 1.0);
-  float under = clamp(rest.x / rest.y - ratio - {{among_slack}}, 0.0, 1.0);
-  vec3 shift = gradient * ((under * among.strength.y - over * among.strength.x) * rest.w / density);
-  shift *= {{among_farthest}} / max(length(shift), {{among_farthest}});
-  vec3 push = among.into_x.xyz * shift.x + among.into_y.xyz * shift.y + among.into_z.xyz * shift.z;
-  float rubbed = 1.0 - exp(-among.strength.z * (min(ratio, 1.0) + over * {{among_pressed}}) * rest.w);
-  vec3 mean = found.yzw / (among.whole * density);
-  before += (cv.motion - mean) * (rubbed / among.speed_ratio);
-  imageStore(pushes, texel, vec4(push * among.strength.w, 0.0));
+  float over = clamp(ratio - (1.0 + {{hair_grid_density_tolerance}}), 0.0, 1.0);
+  float under = clamp(rest.x / rest.y - ratio - {{hair_grid_density_tolerance}}, 0.0, 1.0);
+  vec3 shift = gradient * ((under * grid.strength.y - over * grid.strength.x) * rest.w / density);
+  shift *= {{hair_grid_max_shift}} / max(length(shift), {{hair_grid_max_shift}});
+  vec3 push = grid.to_cells_x.xyz * shift.x + grid.to_cells_y.xyz * shift.y + grid.to_cells_z.xyz * shift.z;
+  float friction = 1.0 - exp(-grid.strength.z * (min(ratio, 1.0) + over * {{hair_grid_pressed_friction}}) * rest.w);
+  vec3 mean = found.yzw / (grid.units_per_metre * density);
+  before += (cv.motion - mean) * (friction / grid.speed_ratio);
+  imageStore(pushes, texel, vec4(push * grid.strength.w, 0.0));
   imageStore(positions, texel, vec4(here.xyz, before.z));
   imageStore(previous_positions, texel, vec4(before.xy, 0.0, 0.0));
 }

@@ -1,18 +1,18 @@
 // Hair among hair: smoothed sums of the cells, and the gradient of density. One invocation per cell.
 //
-// Twin of _fields in addon/dynamics/among.py.
-#include "lib_among.glsl"
+// Twin of _fields in addon/dynamics/hair_grid.py.
+#include "lib_hair_grid.glsl"
 
 void main()
 {
-  ivec3 counts = among.counts.xyz;
+  ivec3 counts = grid.counts.xyz;
   ivec2 id = ivec2(gl_GlobalInvocationID.xy);
   if (id.x >= counts.x * counts.z || id.y >= counts.y) {
     return;
   }
   ivec3 cell = ivec3(id.x / counts.z, id.y, id.x % counts.z);
-  ivec3 before = ivec3(among_before(cell.x, counts.x), among_before(cell.y, counts.y), among_before(cell.z, counts.z));
-  ivec3 after = ivec3(among_after(cell.x, counts.x), among_after(cell.y, counts.y), among_after(cell.z, counts.z));
+  ivec3 before = ivec3(cell_before(cell.x, counts.x), cell_before(cell.y, counts.y), cell_before(cell.z, counts.z));
+  ivec3 after = ivec3(cell_after(cell.x, counts.x), cell_after(cell.y, counts.y), cell_after(cell.z, counts.z));
   vec4 found = vec4(0.0);
   vec3 gradient = vec3(0.0);
   for (int i = 0; i < 3; i++) {

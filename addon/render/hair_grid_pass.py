@@ -1,4 +1,5 @@
-"""Hair among hair on the GPU: `dynamics.among.feel` for guides that are in textures.
+"""Forces between hair on the GPU: `dynamics.hair_grid.friction_and_push` for guides that are in
+textures.
 
     hair_at_rest   RGBA32F in the layout of strand_layout.strand_rows: for each CV x its density at
                    rest, y the density above which it is crowded, z its mass, w the painted factor
@@ -7,7 +8,8 @@
     densities      RGBA32F: the same, smoothed
     gradients      RGBA32F: xyz gradient of the smoothed mass
 
-    other_places, other_steps   RGBA32F, a texel for each CV of other hair: its place and mass, and
+    other_positions, other_motions   RGBA32F, a texel for each CV of other hair: its place and mass,
+        and
                    its motion in a substep
 
 CVs are drawn as points and summed by blending, which needs no atomics. Sums are exact as long as
@@ -22,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Floats
-from ..dynamics.among import BEGIN, MOTION, Among, HairGrid, Others
+from ..dynamics.hair_grid import GRID_OFFSET, MOTION_UNITS, HairGrid, HairInteraction, NeighbourCvs
 from . import gpu_objects
 from .ribbons import Ribbons
 from .shader_program import ShaderProgram, ShaderRecipe, program
@@ -30,7 +32,7 @@ from .strand_layout import strand_rows
 from .textures import UniformBlock, drawing_into, drawing_state, texture_from
 
 _GROUP = (16, 4)
-_FEWEST = 1024
+_MIN_POINTS = 1024
 
 
 @lru_cache(maxsize=32)
@@ -38,51 +40,51 @@ def deposit_recipe(cv_count: int) -> ShaderRecipe:
     """The program that deposits CVs into the cells."""
     names = ("positions", "previous_positions", "hair_at_rest")
     return ShaderRecipe(
-        name="among_deposit",
-        vertex="among_deposit.vert.glsl",
-        fragment="among_deposit.frag.glsl",
-        structs=("struct_among.glsl",),
-        blocks=(("Among", "among"),),
+        name="hair_grid_deposit",
+        vertex="hair_grid_deposit.vert.glsl",
+        fragment="hair_grid_deposit.frag.glsl",
+        structs=("struct_hair_grid.glsl",),
+        blocks=(("HairGrid", "grid"),),
         textures=tuple(("FLOAT_2D", name) for name in names),
-        varyings=(("flat", "VEC4", "lanes"),),
+        varyings=(("flat", "VEC4", "mass_motion"),),
         outputs=(("VEC4", "cell_sums"),),
         defines=(("CV_COUNT", cv_count),),
     )
 
 
-OTHERS_RECIPE = ShaderRecipe(
-    name="among_others",
-    vertex="among_others.vert.glsl",
-    fragment="among_deposit.frag.glsl",
-    structs=("struct_among.glsl",),
-    blocks=(("Among", "among"),),
-    textures=(("FLOAT_2D", "other_places"), ("FLOAT_2D", "other_steps")),
-    varyings=(("flat", "VEC4", "lanes"),),
+NEIGHBOUR_RECIPE = ShaderRecipe(
+    name="hair_grid_deposit_other",
+    vertex="hair_grid_deposit_other.vert.glsl",
+    fragment="hair_grid_deposit.frag.glsl",
+    structs=("struct_hair_grid.glsl",),
+    blocks=(("HairGrid", "grid"),),
+    textures=(("FLOAT_2D", "other_positions"), ("FLOAT_2D", "other_motions")),
+    varyings=(("flat", "VEC4", "mass_motion"),),
     outputs=(("VEC4", "cell_sums"),),
 )
 
 FIELDS_RECIPE = ShaderRecipe(
-    name="among_fields",
-    compute="among_fields.comp.glsl",
-    structs=("struct_among.glsl",),
-    blocks=(("Among", "among"),),
+    name="hair_grid_fields",
+    compute="hair_grid_fields.comp.glsl",
+    structs=("struct_hair_grid.glsl",),
+    blocks=(("HairGrid", "grid"),),
     textures=(("FLOAT_2D", "cell_sums"),),
     images=(("RGBA32F", "densities"), ("RGBA32F", "gradients")),
 )
 
 
 @lru_cache(maxsize=32)
-def feel_recipe(cv_count: int, pairs: str) -> ShaderRecipe:
+def forces_recipe(cv_count: int, pairs: str) -> ShaderRecipe:
     """The program that applies friction, and computes what pushes the guides until the next run.
 
     Args:
         pairs: see capabilities.pair_format.
     """
     return ShaderRecipe(
-        name="among_feel",
-        compute="among_feel.comp.glsl",
-        structs=("struct_among.glsl",),
-        blocks=(("Among", "among"),),
+        name="hair_grid_forces",
+        compute="hair_grid_forces.comp.glsl",
+        structs=("struct_hair_grid.glsl",),
+        blocks=(("HairGrid", "grid"),),
         textures=tuple(("FLOAT_2D", name) for name in ("densities", "gradients", "hair_at_rest")),
         images=(
             ("RGBA32F", "positions", "READ_WRITE"),
@@ -94,7 +96,7 @@ def feel_recipe(cv_count: int, pairs: str) -> ShaderRecipe:
     )
 
 
-class AmongPass:
+class HairGridPass:
     """The grid of one groom's guides on the GPU. Creating one does not touch the GPU."""
 
     def __init__(self) -> None:
@@ -105,7 +107,9 @@ class AmongPass:
         self._textures: dict[str, Any] = {}
         self._target: Any = None
 
-    def feel(self, among: Among, guides: dict[str, Any], speed_ratio: float, pairs: str) -> None:
+    def update_pushes(
+        self, interaction: HairInteraction, guides: dict[str, Any], speed_ratio: float, pairs: str
+    ) -> None:
         """Update the motion of guides, and what pushes them.
 
         Args:
@@ -113,15 +117,15 @@ class AmongPass:
             speed_ratio: length of the coming substep over that of the one before it.
             pairs: the format of previous_positions.
         """
-        if among.grid is not self._grid or among.volume is not self._volume:
-            self._make(among.grid, among.volume)
-        if among.place.counts != self._counts:
-            self._make_cells(among.place.counts)
-        cv_count, guide_count = among.grid.density.shape
-        x, y, z = among.place.counts
-        block = self._block.holding(_block_of(among, speed_ratio))
-        if among.others is not None:
-            self._textures |= _textures_of(among.others)
+        if interaction.grid is not self._grid or interaction.volume is not self._volume:
+            self._make(interaction.grid, interaction.volume)
+        if interaction.placement.counts != self._counts:
+            self._make_cells(interaction.placement.counts)
+        cv_count, guide_count = interaction.grid.rest_density.shape
+        x, y, z = interaction.placement.counts
+        block = self._block.holding(_block_of(interaction, speed_ratio))
+        if interaction.neighbour_cvs is not None:
+            self._textures |= _textures_of(interaction.neighbour_cvs)
         textures = {**guides, **self._textures}
         with (
             drawing_into(self._target),
@@ -130,19 +134,23 @@ class AmongPass:
             self._target.clear(color=(0.0, 0.0, 0.0, 0.0))
             shader = _bound(deposit_recipe(cv_count), block, textures)
             self._points.points(guide_count * cv_count).draw(shader.shader)
-            if among.others is not None:
-                shader = _bound(OTHERS_RECIPE, block, textures)
-                self._points.points(_room_for(len(among.others.mass))).draw(shader.shader)
+            if interaction.neighbour_cvs is not None:
+                shader = _bound(NEIGHBOUR_RECIPE, block, textures)
+                self._points.points(_point_capacity(len(interaction.neighbour_cvs.mass))).draw(
+                    shader.shader
+                )
         for recipe, size in (
             (FIELDS_RECIPE, (x * z, y)),
-            (feel_recipe(cv_count, pairs), (cv_count, guide_count)),
+            (forces_recipe(cv_count, pairs), (cv_count, guide_count)),
         ):
             _bound(recipe, block, textures).dispatch(*size)
 
     def _make(self, grid: HairGrid, volume: Floats | None) -> None:
-        mass = np.broadcast_to(grid.mass, grid.density.shape)
+        mass = np.broadcast_to(grid.mass, grid.rest_density.shape)
         part = np.broadcast_to(np.float32(1.0) if volume is None else volume, mass.shape)
-        numbers = np.stack([grid.density.T, grid.full.T, mass.T, part.T], axis=-1)
+        numbers = np.stack(
+            [grid.rest_density.T, grid.pressure_threshold.T, mass.T, part.T], axis=-1
+        )
         self._textures["hair_at_rest"] = texture_from(strand_rows(numbers), "RGBA32F")
         self._grid, self._volume = grid, volume
 
@@ -154,39 +162,39 @@ class AmongPass:
         self._counts = counts
 
 
-def _room_for(count: int) -> int:
+def _point_capacity(count: int) -> int:
     """How many points are drawn for CVs of other hair: rounded up, so that few batches are made."""
-    return max(1 << max(count - 1, 0).bit_length(), _FEWEST)
+    return max(1 << max(count - 1, 0).bit_length(), _MIN_POINTS)
 
 
-def _textures_of(others: Others) -> dict[str, Any]:
-    count = len(others.mass)
-    places, steps = np.zeros((2, _room_for(count), 1, 4), np.float32)
-    places[:count, 0, :3], places[:count, 0, 3] = others.here.T, others.mass
-    steps[:count, 0, :3] = others.step.T
-    found = {"other_places": places, "other_steps": steps}
+def _textures_of(neighbour_cvs: NeighbourCvs) -> dict[str, Any]:
+    count = len(neighbour_cvs.mass)
+    positions, motions = np.zeros((2, _point_capacity(count), 1, 4), np.float32)
+    positions[:count, 0, :3], positions[:count, 0, 3] = neighbour_cvs.position.T, neighbour_cvs.mass
+    motions[:count, 0, :3] = neighbour_cvs.motion.T
+    found = {"other_positions": positions, "other_motions": motions}
     return {name: texture_from(strand_rows(rows), "RGBA32F") for name, rows in found.items()}
 
 
 def _bound(recipe: ShaderRecipe, block: Any, textures: dict[str, Any]) -> ShaderProgram:
     shader = program(recipe)
     shader.bind(
-        blocks={"among": block},
+        blocks={"grid": block},
         textures={name: textures[name] for _, name in recipe.textures},
         images={name: textures[name] for _, name, *_ in recipe.images},
     )
     return shader
 
 
-def _block_of(among: Among, speed_ratio: float) -> Floats:
-    """`Among` of gpu_shaders/struct_among.glsl in std140, float32."""
-    grid, place, strength = among.grid, among.place, among.strength
+def _block_of(interaction: HairInteraction, speed_ratio: float) -> Floats:
+    """`HairGrid` of gpu_shaders/struct_hair_grid.glsl in std140, float32."""
+    grid, placement, strength = interaction.grid, interaction.placement, interaction.strength
     values = np.zeros((8, 4), np.float32)
-    values[0].view(np.int32)[:] = (*place.counts, grid.density.shape[1])
-    values[1] = (*place.middle, grid.cell)
-    values[2:5, :3], values[2:5, 3] = place.into, BEGIN
-    scale = strength.scale(grid.cell)
-    values[5] = strength.push, strength.pull, strength.friction, scale
-    values[6, :3] = speed_ratio, MOTION / grid.cell, strength.ahead
-    values[7].view(np.int32)[:3] = place.low
+    values[0].view(np.int32)[:] = (*placement.counts, grid.rest_density.shape[1])
+    values[1] = (*placement.middle, grid.cell)
+    values[2:5, :3], values[2:5, 3] = placement.world_to_cells, GRID_OFFSET
+    scale = strength.displacement_factor(grid.cell)
+    values[5] = strength.pressure, strength.cohesion, strength.friction, scale
+    values[6, :3] = speed_ratio, MOTION_UNITS / grid.cell, strength.look_ahead
+    values[7].view(np.int32)[:3] = placement.lowest_cell
     return values.ravel()

@@ -1,5 +1,5 @@
 // Hair among hair: deposit of CVs into the cells, fragment stage.
 void main()
 {
-  cell_sums = lanes;
+  cell_sums = mass_motion;
 }
