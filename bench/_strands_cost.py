@@ -165,7 +165,7 @@ def _on_gpu(rig: Rig, rest: RootFrames, motions: Sequence[Motion]) -> tuple[floa
         form(rig.strands, rig.root_holds, rig.guides, rig.guide_grid, rig.riders, rig.holds)
         for form in (RidePass, _SummedPass)
     )
-    ours.leading.take(motions[0].clearance)
+    ours.lead_out.set_clearance(motions[0].clearance)
 
     def shown(form: RidePass, frames: Sequence[Motion]) -> Floats:
         for motion in frames:

@@ -6,18 +6,18 @@
 void main()
 {
   ivec2 texel = ivec2(gl_GlobalInvocationID.xy);
-  if (any(greaterThanEqual(texel, imageSize(between)))) {
+  if (any(greaterThanEqual(texel, imageSize(other_tau)))) {
     return;
   }
   vec4 place = texelFetch(places, texel, 0);
   if (place.w == float(own_number) || place.w < 0.0) {
     return;
   }
-  vec4 tau = imageLoad(between, texel);
+  vec4 tau = imageLoad(other_tau, texel);
   for (int light = 0; light < light_count; light++) {
     if (opacity.light[light].x >= 0.0) {
       tau[light] += opacity.extinction * light_path(light, place.xyz).x;
     }
   }
-  imageStore(between, texel, tau);
+  imageStore(other_tau, texel, tau);
 }

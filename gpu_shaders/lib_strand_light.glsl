@@ -1,6 +1,6 @@
 // Radiance of a strand towards the eye, from all lights and the world. SHADOWS of strands on strands come
 // from opacity maps; for a light without one, from the occlusion and how much the hair's volume faces it.
-// With SCATTERING light goes from strand to strand. OTHER_TAU: `between` is the optical depth of hair that
+// With SCATTERING light goes from strand to strand. OTHER_TAU: `other_tau` is the optical depth of hair that
 // is not in the maps, for the first lights. OWN_COLOR: strands have their own colours, `own`, instead of the
 // look's; w is 0 where a strand has none.
 //
@@ -37,7 +37,7 @@ vec3 strand_radiance(vec3 point,
                      float along,
                      float occlusion,
                      vec4 openness,
-                     vec4 between,
+                     vec4 other_tau,
                      vec4 own,
                      SkinSeen seen,
                      uint seed)
@@ -100,7 +100,7 @@ vec3 strand_radiance(vec3 point,
     light_at(lights, index, point, to_light, irradiance);
     vec3 path = shadow_path_to_strand(index, point, tangent, radius, strands.opacity);
 #ifdef OTHER_TAU
-    path.x += path.x >= 0.0 && index < {{other_tau_lights}} ? between[index] : 0.0;
+    path.x += path.x >= 0.0 && index < {{other_tau_lights}} ? other_tau[index] : 0.0;
 #endif
     irradiance *= path.x < 0.0 ? occlusion : path.z;
     float level = 0.0;

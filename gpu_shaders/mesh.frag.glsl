@@ -79,7 +79,7 @@ void main()
   vec3 mirrored = light_from(lights, reflect(-to_eye, normal), vec2(1.0));
   vec3 radiance = (matt * matt_light(lights, normal) + reflected * mirrored) * mesh_occlusion;
 #ifdef OTHER_TAU
-  vec4 between = texelFetch(inter_groom_shadow, ivec2(gl_FragCoord.xy), 0);
+  vec4 other_tau = texelFetch(inter_groom_shadow, ivec2(gl_FragCoord.xy), 0);
 #endif
   for (int index = 0; index < int(lights.ambient_and_count.w); index++) {
     vec3 to_light, irradiance;
@@ -109,7 +109,7 @@ void main()
     }
     reaching = mix(reaching, colored, is_spread);
 #ifdef OTHER_TAU
-    reaching *= exp((index < {{other_tau_lights}} ? -between[index] : 0.0) * (1.0 - hair_forward));
+    reaching *= exp((index < {{other_tau_lights}} ? -other_tau[index] : 0.0) * (1.0 - hair_forward));
 #endif
     float shine = ggx_reflection(normal, to_light, to_eye, mesh_specular, mesh_roughness);
     radiance += irradiance * reaching * facing * (matt / PI + shine);

@@ -45,7 +45,7 @@ void main()
                                known);
 #endif
 #ifdef OTHER_TAU
-  vec4 between = texelFetch(inter_groom_shadow, ivec2(gl_FragCoord.xy), 0);
+  vec4 other_tau = texelFetch(inter_groom_shadow, ivec2(gl_FragCoord.xy), 0);
 #endif
   vec3 all_light = matt_light(lights, normal) * mesh_occlusion;
   vec3 left = all_light;
@@ -69,7 +69,7 @@ void main()
     }
 #endif
 #ifdef OTHER_TAU
-    by_hair *= exp((index < {{other_tau_lights}} ? -between[index] : 0.0) * (1.0 - hair_forward));
+    by_hair *= exp((index < {{other_tau_lights}} ? -other_tau[index] : 0.0) * (1.0 - hair_forward));
 #endif
     vec3 arriving = past_meshes * facing / PI * irradiance;
     all_light += arriving;

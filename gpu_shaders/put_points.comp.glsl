@@ -8,8 +8,8 @@ void main()
   if (index >= point_count) {
     return;
   }
-  ivec2 own = counted_texel(index);
-  ivec2 texel = ivec2(texelFetch(led_texels, own, 0).xy);
-  vec3 point = texelFetch(led_points, own, 0).xyz;
+  ivec2 stored_texel = counted_texel(index);
+  ivec2 texel = ivec2(texelFetch(led_texels, stored_texel, 0).xy);
+  vec3 point = texelFetch(led_points, stored_texel, 0).xyz;
   imageStore(cv_points, texel, vec4(point, imageLoad(cv_points, texel).w));
 }

@@ -2,7 +2,7 @@
 // Twin of ride in addon/refine/ride.py after follow in addon/groom/roots.py. One invocation per strand.
 //
 // Defines: HAS_CURLS, where curls may stretch; HAS_CLEARANCE, where strands are led out of colliders: then
-// the steps IS_HELD and IS_NEAR of lead_out.comp.glsl are done here, where their inputs are at hand.
+// the steps CARRY_ROOTS and FIND_NEAR of lead_out.comp.glsl are done here, where their inputs are at hand.
 #include "lib_root_frame.glsl"
 #include "lib_strand_texel.glsl"
 #include "lib_turn.glsl"
@@ -15,20 +15,20 @@
 
 // Where a segment of a strand rides: between the middles of two consecutive segments of a guide. The texel
 // behind the last segment may be read, with weight 0.
-struct Seat {
+struct GuideSegment {
   ivec2 before;  // texel of the first of the two
   float fraction;
 };
 
-// The seat at a place along a guide [segments].
-Seat seat_at(int guide, float place)
+// The guide segments at a place along a guide [segments].
+GuideSegment seat_at(int guide, float place)
 {
-  float held = clamp(place - 0.5, 0.0, float(segment_count - 1));
-  int before = int(held);
-  return Seat(strand_texel(guide, before, segment_count + 1), held - float(before));
+  float from_middle = clamp(place - 0.5, 0.0, float(segment_count - 1));
+  int before = int(from_middle);
+  return GuideSegment(strand_texel(guide, before, segment_count + 1), from_middle - float(before));
 }
 
-vec4 turn_at(Seat seat)
+vec4 turn_at(GuideSegment seat)
 {
   vec4 near = imageLoad(guide_turns, seat.before);
   vec4 far = imageLoad(guide_turns, seat.before + ivec2(1, 0));
@@ -36,7 +36,7 @@ vec4 turn_at(Seat seat)
 }
 
 #ifdef HAS_CURLS
-vec4 axis_at(Seat seat)
+vec4 axis_at(GuideSegment seat)
 {
   vec4 near = imageLoad(guide_axes, seat.before);
   vec4 far = imageLoad(guide_axes, seat.before + ivec2(1, 0));
@@ -64,15 +64,15 @@ void main()
     displacement += weight[k] * imageLoad(guide_turns, shift).xyz;
   }
 #ifdef HAS_CLEARANCE
-  int held = span.factors;  // the last point that moves rigidly with the root
-  displacement = held > 0 ? vec3(0.0) : displacement;
+  int last_held = span.factors;  // the last point that moves rigidly with the root
+  displacement = last_held > 0 ? vec3(0.0) : displacement;
   // a strand that was bent in the frame before is led out from its root on
-  bool was_bent = imageLoad(states, counted_texel(strand)).z > turned_back;
+  bool was_bent = imageLoad(states, counted_texel(strand)).z > turn_back_angle;
   int first_near = was_bent ? 1 : 0;
   Solid solid = solid_at(0);
 #endif
   imageStore(cv_points, span.first, vec4(follow(rest.xyz, motion) + displacement, rest.w));
-  float reached = 0.0;
+  float arc_length = 0.0;
   int point = 0;
   // a strand has at least one segment; software drivers run loops once even if their condition is false
   do {
@@ -80,7 +80,7 @@ void main()
     vec4 next = imageLoad(rest_points, span_texel(span, point));
     vec3 edge = next.xyz - rest.xyz;
     float size = length(edge);
-    vec3 place = (reached + 0.5 * size) * per_meter;
+    vec3 place = (arc_length + 0.5 * size) * per_meter;
     vec4 blend = weight.x * turn_at(seat_at(guide.x, place.x));
     for (int k = 1; k < 3; k++) {
       vec4 turn = turn_at(seat_at(guide[k], place[k]));
@@ -100,22 +100,22 @@ void main()
 #endif
     change += turn_change(blend, carried);
 #ifdef HAS_CLEARANCE
-    change = point <= held ? vec3(0.0) : change;
+    change = point <= last_held ? vec3(0.0) : change;
 #endif
     displacement += change;
-    reached += size;
+    arc_length += size;
     rest = next;
     vec3 here = follow(rest.xyz, motion) + displacement;
     imageStore(cv_points, span_texel(span, point), vec4(here, rest.w));
 #ifdef HAS_CLEARANCE
     float clearance = imageLoad(clearances, span_texel(span, point)).x;
-    float wanted = min(clearance + length(displacement), kept);
-    float lack = wanted - signed_distance(solid, here, kept).w;
-    first_near = first_near == 0 && lack > {{lead_slack}} * kept ? point : first_near;
+    float wanted = min(clearance + length(displacement), max_clearance);
+    float shortfall = wanted - signed_distance(solid, here, max_clearance).w;
+    first_near = first_near == 0 && shortfall > {{lead_slack}} * max_clearance ? point : first_near;
 #endif
   } while (point + 1 < span.count);
 #ifdef HAS_CLEARANCE
-  float is_moved = was_bent ? 2.0 : held > 0 || first_near > 0 ? 1.0 : 0.0;
+  float is_moved = was_bent ? 2.0 : last_held > 0 || first_near > 0 ? 1.0 : 0.0;
   imageStore(states, counted_texel(strand), vec4(is_moved, float(first_near), 0.0, 0.0));
 #endif
 }

@@ -69,9 +69,9 @@ void main()
   vec3 radiance = tangent;
 #else
   vec2 place = strand_along_and_occlusion;
-  vec4 between = vec4(0.0), own = vec4(0.0), openness = vec4(0.0);
+  vec4 other_tau = vec4(0.0), own = vec4(0.0), openness = vec4(0.0);
 #  ifdef OTHER_TAU
-  between = strand_other_tau;
+  other_tau = strand_other_tau;
 #  endif
 #  ifdef OWN_COLOR
   own = strand_own_color;
@@ -90,7 +90,7 @@ void main()
                                   place.x,
                                   place.y,
                                   openness,
-                                  between,
+                                  other_tau,
                                   own,
                                   seen,
                                   seed);

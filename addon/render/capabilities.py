@@ -99,7 +99,7 @@ def pair_format() -> str:
     return "RGBA32F" if gpu.platform.backend_type_get() == "METAL" else "RG32F"
 
 
-def reads_back() -> bool:
+def can_read_own_writes() -> bool:
     """Whether an invocation can read texels that it has written. On Metal that needs a fence (Metal
     Shading Language Specification, "Texture Functions"), which scripts cannot have."""
     return bool(gpu.platform.backend_type_get() != "METAL")

@@ -109,7 +109,7 @@ class ColliderTextures:
         )
 
     @cached_property
-    def rounds_of_distance(self) -> int:
+    def distance_iterations(self) -> int:
         """Loop iterations for the distance of one point to all colliders."""
         is_round = self.own[:, 0, 3] < 0.0
         if len(self.own) == 1 and not is_round.any():

@@ -31,9 +31,9 @@ class HairOnMeshes:
 
     def release(self) -> None:
         """See shader_program.released_with_shaders."""
-        self._places, self._between = MeshPlaces(), InterGroomShadow()
+        self._places, self._inter_groom_shadow = MeshPlaces(), InterGroomShadow()
 
-    def at(
+    def other_tau(
         self,
         groups: Mapping[int, Sequence[MeshSnapshot]],
         maps: Sequence[OpacityMaps],
@@ -41,7 +41,7 @@ class HairOnMeshes:
         camera: Camera,
         size: tuple[int, int],
     ) -> Any:
-        """The argument `between` of MeshPass.draw; None if there is only one groom.
+        """The argument `other_tau` of MeshPass.draw; None if there is only one groom.
 
         Args:
             groups: meshes by the index, in `maps`, of the maps with which they are drawn.
@@ -51,7 +51,9 @@ class HairOnMeshes:
         self._target.sized(*size).clear(_NOWHERE)
         with self._target.drawing():
             self._places.draw(_placed(groups, camera.sample), camera, *size)
-        return self._between.at(self._target.color, None, list(enumerate(maps)), light_count)
+        return self._inter_groom_shadow.other_tau(
+            self._target.color, None, list(enumerate(maps)), light_count
+        )
 
 
 def _placed(groups: Mapping[int, Sequence[MeshSnapshot]], sample: int) -> list[Placed]:

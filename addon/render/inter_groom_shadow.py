@@ -22,7 +22,7 @@ from .shader_program import ShaderRecipe
 from .shader_source import OTHER_TAU_LIGHTS
 
 #: number of a groom that no place has
-NOBODY = -5
+NO_GROOM = -5
 
 
 _RECIPE = ShaderRecipe(
@@ -30,7 +30,7 @@ _RECIPE = ShaderRecipe(
     compute="inter_groom_shadow.comp.glsl",
     structs=("struct_opacity.glsl",),
     textures=(("FLOAT_2D", "places"),),
-    images=(("RGBA32F", "between", "READ_WRITE"),),
+    images=(("RGBA32F", "other_tau", "READ_WRITE"),),
     integers=("light_count", "own_number"),
 )
 
@@ -44,11 +44,13 @@ class InterGroomShadow:
     def release(self) -> None:
         """Release everything on the GPU; the next call makes it again."""
         self._blocks: list[UniformBlocks] = []
-        self._found: Any = None
-        self._made_of: tuple[Any, ...] = ()
-        self._kept: Sequence[tuple[int, OpacityMaps]] = ()  # so that their ids are not reused
+        self._other_tau: Any = None
+        self._inputs: tuple[Any, ...] = ()
+        self._kept_grooms: Sequence[
+            tuple[int, OpacityMaps]
+        ] = ()  # so that their ids are not reused
 
-    def at(
+    def other_tau(
         self,
         places: Any,
         serial: int | None,
@@ -63,14 +65,14 @@ class InterGroomShadow:
             serial: changes whenever the places change; None: they always do.
             grooms: number and maps of each groom that may cast a shadow.
         """
-        made_of = (serial, light_count, *((number, id(maps)) for number, maps in grooms))
+        inputs = (serial, light_count, *((number, id(maps)) for number, maps in grooms))
         size = places.width, places.height
-        if self._found is None or (self._found.width, self._found.height) != size:
-            self._found = gpu_objects.texture(size, format="RGBA32F")
-        elif serial is not None and made_of == self._made_of:
-            return self._found
-        self._made_of, self._kept = made_of, grooms
-        self._found.clear(format="FLOAT", value=(0.0, 0.0, 0.0, 0.0))
+        if self._other_tau is None or (self._other_tau.width, self._other_tau.height) != size:
+            self._other_tau = gpu_objects.texture(size, format="RGBA32F")
+        elif serial is not None and inputs == self._inputs:
+            return self._other_tau
+        self._inputs, self._kept_grooms = inputs, grooms
+        self._other_tau.clear(format="FLOAT", value=(0.0, 0.0, 0.0, 0.0))
         self._blocks += [UniformBlocks() for _ in range(len(grooms) - len(self._blocks))]
         for block, (number, maps) in zip(self._blocks, grooms, strict=False):
             shader = bound(
@@ -78,14 +80,14 @@ class InterGroomShadow:
                 [maps.feature],
                 block,
                 textures={"places": places},
-                images={"between": self._found},
+                images={"other_tau": self._other_tau},
                 integers={
                     "light_count": min(light_count, OTHER_TAU_LIGHTS),
                     "own_number": number,
                 },
             )
             shader.dispatch(size[0], size[1])
-        return self._found
+        return self._other_tau
 
 
 def may_shade(maps: OpacityMaps, ball: Ball) -> bool:
@@ -96,12 +98,12 @@ def may_shade(maps: OpacityMaps, ball: Ball) -> bool:
     """
     rows = maps.values[: 5 * 4 * LIGHT_CAPACITY].reshape(5, LIGHT_CAPACITY, 4)
     for x, y, w, depth, light in rows[:, :OTHER_TAU_LIGHTS].swapaxes(0, 1).astype(np.float64):
-        if light[0] >= 0.0 and _reaches(x, y, w, depth, ball):
+        if light[0] >= 0.0 and _may_reach(x, y, w, depth, ball):
             return True
     return False
 
 
-def _reaches(x: Floats, y: Floats, w: Floats, depth: Floats, ball: Ball) -> bool:
+def _may_reach(x: Floats, y: Floats, w: Floats, depth: Floats, ball: Ball) -> bool:
     """Whether any of the ball is in a map, at or behind the depth at which the map begins."""
     center = np.append(ball.center, 1.0)
     if depth @ center + ball.radius * np.linalg.norm(depth[:3]) < 0.0:

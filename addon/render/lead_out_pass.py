@@ -8,7 +8,7 @@ in the layouts of `strand_layout`.
     clearances    R32F: distance that each point keeps where its root carries it [m]
     states        RGBA32F: state of each strand, x whether it is led out, see lead_out.comp.glsl
     near_strands, near_counts RGBA32F: strands that are too near, see lead_out.comp.glsl
-    leans         RGBA32F: xyz bend of the segment that ends at a point, see lead_out.Leans
+    segment_bends RGBA32F: xyz bend of the segment that ends at a point, see lead_out.Leans
     led_points    RGBA32F: xyz position of points that are led out [m, world]
     led_texels    RG32F: texels of points that were led out earlier
     cv_points     RGBA32F: xyz position now [m, world], changed in place
@@ -35,7 +35,7 @@ from ..refine.lead_out import (
     LedOut,
 )
 from . import gpu_objects
-from .capabilities import reads_back
+from .capabilities import can_read_own_writes
 from .collider_textures import ColliderTextures, SolidKinds, UploadedColliders
 from .shader_program import ShaderRecipe, program
 from .shader_source import LEAD_BLOCK
@@ -44,59 +44,73 @@ from .textures import texture_from, texture_to_array
 
 _GROUP = (64, 1)
 #: replaces infinity on the GPU [m]
-_ENDLESS = np.float32(1.0e30)
+_INFINITE = np.float32(1.0e30)
 #: larger than any bend of a segment
-_UPRIGHT_AGAIN = 4.0
+_MAX_TURN_BACK = 4.0
 #: Most iterations of all loops of a shader; software drivers end one after a few more.
-_ROUNDS = 60_000
+_MAX_ITERATIONS = 60_000
 #: step -> its images
-_STEPS = {
-    "HELD": (("cv_points", "READ_WRITE"), ("states", "READ_WRITE")),
-    "NEAR": (("states", "READ_WRITE"),),
-    "COUNTED": (("near_counts", "WRITE"),),
-    "LISTED": (("near_strands", "WRITE"),),
-    "BENT": (("cv_points", "READ_WRITE"), ("states", "READ_WRITE"), ("leans", "READ_WRITE")),
-    "LED": (("cv_points", "READ_WRITE"), ("states", "READ_WRITE"), ("led_points", "READ_WRITE")),
-    "PUT": (
+_IMAGES = {
+    "CARRY_ROOTS": (("cv_points", "READ_WRITE"), ("states", "READ_WRITE")),
+    "FIND_NEAR": (("states", "READ_WRITE"),),
+    "COUNT_NEAR": (("near_counts", "WRITE"),),
+    "LIST_NEAR": (("near_strands", "WRITE"),),
+    "KEEP_BENDS": (
         ("cv_points", "READ_WRITE"),
         ("states", "READ_WRITE"),
-        ("leans", "READ_WRITE"),
+        ("segment_bends", "READ_WRITE"),
+    ),
+    "LEAD_OUT": (
+        ("cv_points", "READ_WRITE"),
+        ("states", "READ_WRITE"),
+        ("led_points", "READ_WRITE"),
+    ),
+    "STORE_POINTS": (
+        ("cv_points", "READ_WRITE"),
+        ("states", "READ_WRITE"),
+        ("segment_bends", "READ_WRITE"),
         ("led_points", "READ_WRITE"),
     ),
 }
-_CARRYING = ("strand_spans", "rest_points", "root_motions")
+_CARRY_TEXTURES = ("strand_spans", "rest_points", "root_motions")
 _TEXTURES = {
-    "HELD": _CARRYING,
-    "NEAR": (*_CARRYING, "cv_points", "clearances"),
-    "COUNTED": ("states",),
-    "LISTED": ("states", "near_counts"),
-    "BENT": ("strand_spans", "near_strands"),
-    "LED": (*_CARRYING, "near_strands", "clearances"),
-    "PUT": (*_CARRYING, "near_strands"),
+    "CARRY_ROOTS": _CARRY_TEXTURES,
+    "FIND_NEAR": (*_CARRY_TEXTURES, "cv_points", "clearances"),
+    "COUNT_NEAR": ("states",),
+    "LIST_NEAR": ("states", "near_counts"),
+    "KEEP_BENDS": ("strand_spans", "near_strands"),
+    "LEAD_OUT": (*_CARRY_TEXTURES, "near_strands", "clearances"),
+    "STORE_POINTS": (*_CARRY_TEXTURES, "near_strands"),
 }
-_OF_POINTS = ("mover_count", "first_point", "point_end")
+_POINT_RANGE = ("mover_count", "first_point", "point_end")
 _INTEGERS = {
-    "HELD": _OF_POINTS,
-    "NEAR": _OF_POINTS,
-    "COUNTED": (),
-    "LISTED": (),
-    "BENT": ("lane_count",),
-    "LED": (*_OF_POINTS, "lane_count", "first_attempt", "attempt_end"),
-    "PUT": ("mover_count", "lane_count"),
+    "CARRY_ROOTS": _POINT_RANGE,
+    "FIND_NEAR": _POINT_RANGE,
+    "COUNT_NEAR": (),
+    "LIST_NEAR": (),
+    "KEEP_BENDS": ("lane_count",),
+    "LEAD_OUT": (*_POINT_RANGE, "lane_count", "first_attempt", "attempt_end"),
+    "STORE_POINTS": ("mover_count", "lane_count"),
 }
 #: step -> most strands per invocation
-_INVOCATION = {"COUNTED": LEAD_BLOCK, "LISTED": LEAD_BLOCK, "BENT": 8, "LED": 8, "PUT": 8}
+_STRANDS_PER_INVOCATION = {
+    "COUNT_NEAR": LEAD_BLOCK,
+    "LIST_NEAR": LEAD_BLOCK,
+    "KEEP_BENDS": 8,
+    "LEAD_OUT": 8,
+    "STORE_POINTS": 8,
+}
 #: step -> its numbers
 _NUMBERS = {
-    "HELD": ("turned_back",),
-    "NEAR": ("kept",),
-    "BENT": ("turned_back",),
-    "LED": ("kept",),
-    "PUT": ("kept",),
+    "CARRY_ROOTS": ("turn_back_angle",),
+    "FIND_NEAR": ("max_clearance",),
+    "KEEP_BENDS": ("turn_back_angle",),
+    "LEAD_OUT": ("max_clearance",),
+    "STORE_POINTS": ("max_clearance",),
 }
 #: steps that read colliders
-_ASKING = ("NEAR", "LED")
-PUT_RECIPE = ShaderRecipe(
+_STEPS_WITH_COLLIDERS = ("FIND_NEAR", "LEAD_OUT")
+STORED_POINTS_RECIPE = ShaderRecipe(
     name="put_points",
     compute="put_points.comp.glsl",
     textures=(("FLOAT_2D", "led_points"), ("FLOAT_2D", "led_texels")),
@@ -111,10 +125,10 @@ def lead_out_recipe(steps: tuple[str, ...], solids: SolidKinds | None) -> Shader
     """The program of one step, or of several that are done one after the other for each strand.
 
     Args:
-        steps: keys of _STEPS, see lead_out.comp.glsl.
+        steps: keys of _IMAGES, see lead_out.comp.glsl.
         solids: kinds of the colliders that it reads; None: it reads none.
     """
-    defines = tuple((f"IS_{step}", 1) for step in steps)
+    defines = tuple((step, 1) for step in steps)
     names, integers = _of_all(_TEXTURES, steps), ("strand_count", *_of_all(_INTEGERS, steps))
     if solids is not None:
         names += solids.textures
@@ -124,7 +138,7 @@ def lead_out_recipe(steps: tuple[str, ...], solids: SolidKinds | None) -> Shader
         name=f"lead_out_{'_'.join(steps).lower()}",
         compute="lead_out.comp.glsl",
         textures=tuple(("FLOAT_2D", name) for name in names),
-        images=tuple(("RGBA32F", *image) for image in _of_all(_STEPS, steps)),
+        images=tuple(("RGBA32F", *image) for image in _of_all(_IMAGES, steps)),
         integers=integers,
         numbers=tuple(("FLOAT", name) for name in _of_all(_NUMBERS, steps)),
         group_size=_GROUP,
@@ -151,20 +165,20 @@ class LeadOutPass:
         self._solids: ColliderTextures | None = None
         self.release()
 
-    def take(self, clearance: Clearance | None) -> None:
+    def set_clearance(self, clearance: Clearance | None) -> None:
         """Use the clearance of a motion from now on; None: it has none yet."""
         if clearance is not self._clearance:
             self.release()
             self._clearance = clearance
 
-    def begin(
-        self, posed: tuple[PosedCollider, ...], point_rounds: int, since: float = np.inf
-    ) -> Seen | None:
+    def begin_frame(
+        self, posed: tuple[PosedCollider, ...], iterations_per_point: int, since: float = np.inf
+    ) -> LeadOutInputs | None:
         """The inputs of a frame in which strands are led out of these; None if they are not.
 
         Args:
-            point_rounds: loop iterations per point in the pass that moves strands, see
-                `Seen.at_once`.
+            iterations_per_point: loop iterations per point in the pass that moves strands, see
+                `LeadOutInputs.finds_near_while_riding`.
             since: time since the frame that this one continues [s]; infinite if it continues none.
 
         Raises:
@@ -181,46 +195,54 @@ class LeadOutPass:
         for name, texture in (("rounds", solids.rounds), ("fields", solids.fields)):
             if texture is not None:
                 textures[name] = texture
-        rounds = self._layout.longest * (point_rounds + solids.rounds_of_distance)
+        iterations = self._layout.longest * (iterations_per_point + solids.distance_iterations)
         kinds = solids.kinds
-        return Seen(
+        return LeadOutInputs(
             textures,
             self._textures["states"],
             kinds,
             {name: len(posed) for name in kinds.integers},
             self._clearance.kept,
-            min(TURNING_BACK * since, _UPRIGHT_AGAIN),
-            rounds <= _ROUNDS,
+            min(TURNING_BACK * since, _MAX_TURN_BACK),
+            iterations <= _MAX_ITERATIONS,
         )
 
-    def lead(self, cv_points: Any, seen: Seen, carrying: dict[str, Any], mover_count: int) -> None:
+    def lead(
+        self,
+        cv_points: Any,
+        inputs: LeadOutInputs,
+        carry_textures: dict[str, Any],
+        mover_count: int,
+    ) -> None:
         """Lead strands out, see `refine.lead_out.lead_out`.
 
         Args:
-            seen: of this frame; if `at_once`, the pass before has found the strands that are too
-                near.
-            carrying: the textures rest_points and root_motions.
+            inputs: of this frame; if `finds_near_while_riding`, the pass before has found the
+                strands that are too near.
+            carry_textures: the textures rest_points and root_motions.
             mover_count: number of root motions.
 
         Raises:
             ShaderError: the shader does not compile here.
         """
-        textures = self._textures | carrying | seen.textures | {"cv_points": cv_points}
-        integers = {"mover_count": mover_count, **seen.integers}
-        numbers = {"kept": seen.kept, "turned_back": seen.turned_back}
-        for step in (() if seen.at_once else ("HELD", "NEAR")) + ("COUNTED", "LISTED"):
+        textures = self._textures | carry_textures | inputs.textures | {"cv_points": cv_points}
+        integers = {"mover_count": mover_count, **inputs.integers}
+        numbers = {"max_clearance": inputs.max_clearance, "turn_back_angle": inputs.turn_back_angle}
+        steps = () if inputs.finds_near_while_riding else ("CARRY_ROOTS", "FIND_NEAR")
+        for step in (*steps, "COUNT_NEAR", "LIST_NEAR"):
             self._run((step,), textures, integers, numbers)
-        is_short = self._points_at_once() >= ATTEMPTS * self._layout.longest
-        if is_short and reads_back():  # each further dispatch costs as much as leading some strands
-            every = {**integers, "first_attempt": 0, "attempt_end": ATTEMPTS}
-            self._run(("BENT", "LED", "PUT"), textures, every, numbers)
+        fits_one_dispatch = self._points_per_dispatch() >= ATTEMPTS * self._layout.longest
+        # each further dispatch costs as much as leading some strands
+        if fits_one_dispatch and can_read_own_writes():
+            all_attempts = {**integers, "first_attempt": 0, "attempt_end": ATTEMPTS}
+            self._run(("KEEP_BENDS", "LEAD_OUT", "STORE_POINTS"), textures, all_attempts, numbers)
             return
-        self._run(("BENT",), textures, integers, numbers)
-        for attempt in (0,) if is_short else range(ATTEMPTS):
-            end = ATTEMPTS if is_short else attempt + 1
-            now = {**integers, "first_attempt": attempt, "attempt_end": end}
-            self._run(("LED",), textures, now, numbers)
-        self._run(("PUT",), textures, integers, numbers)
+        self._run(("KEEP_BENDS",), textures, integers, numbers)
+        for attempt in (0,) if fits_one_dispatch else range(ATTEMPTS):
+            end = ATTEMPTS if fits_one_dispatch else attempt + 1
+            attempt_integers = {**integers, "first_attempt": attempt, "attempt_end": end}
+            self._run(("LEAD_OUT",), textures, attempt_integers, numbers)
+        self._run(("STORE_POINTS",), textures, integers, numbers)
 
     def put(self, cv_points: Any, led: LedOut) -> None:
         """Set strands to the points to which they were led earlier, see `LedOut.put`.
@@ -236,7 +258,7 @@ class LeadOutPass:
         texels = np.repeat(spans[:, :2], counts, axis=0)
         texels[:, 0] += number_in_piece(counts)
         points = np.pad(led.points, ((0, 0), (0, 1)))
-        shader = program(PUT_RECIPE)
+        shader = program(STORED_POINTS_RECIPE)
         textures = {
             "led_points": texture_from(strand_rows(points[:, None]), "RGBA32F"),
             "led_texels": texture_from(strand_rows(texels[:, None]), "RG32F"),
@@ -246,7 +268,7 @@ class LeadOutPass:
         )
         shader.dispatch(count)
 
-    def led(self) -> Ints:
+    def led_strands(self) -> Ints:
         """The strands that the last `lead` has led out, (n,), read back."""
         states = self._textures.get("states")
         if states is None:
@@ -262,13 +284,13 @@ class LeadOutPass:
         """Upload constant data, and make the textures that the shaders write."""
         layout, textures = self._layout, self._textures
         if "clearances" not in textures:
-            values = np.maximum(clearance.points, -_ENDLESS)[:, None]
+            values = np.maximum(clearance.points, -_INFINITE)[:, None]
             textures["clearances"] = texture_from(layout.pixels(values), "R32F")
             spans = layout.spans[:, None].copy()
             spans[:, 0, 3] = clearance.held
             textures["strand_spans"] = texture_from(strand_rows(spans), "RGBA32F")
             textures["led_points"] = _empty(layout.size)
-            textures["leans"] = _empty(layout.size)
+            textures["segment_bends"] = _empty(layout.size)
             blocks = -(-layout.strand_count // LEAD_BLOCK)
             textures["near_counts"] = _empty(strand_rows_size(blocks, 1))
             textures["near_strands"] = _empty(strand_rows_size(layout.strand_count + 1, 1))
@@ -279,53 +301,54 @@ class LeadOutPass:
     def _run(
         self,
         steps: tuple[str, ...],
-        taken: dict[str, Any],
+        textures: dict[str, Any],
         integers: dict[str, int],
         numbers: dict[str, float],
     ) -> None:
         """Run some steps for all points of all strands, in as few dispatches as drivers allow."""
         assert self._solids is not None
-        is_asking = any(step in _ASKING for step in steps)
-        recipe = lead_out_recipe(steps, self._solids.kinds if is_asking else None)
+        reads_colliders = any(step in _STEPS_WITH_COLLIDERS for step in steps)
+        recipe = lead_out_recipe(steps, self._solids.kinds if reads_colliders else None)
         shader, count = program(recipe), self._layout.strand_count
-        invocations = -(-count // _INVOCATION.get(steps[0], 1))
-        known = integers | {"strand_count": count, "lane_count": invocations}
-        at_once = self._points_at_once() if is_asking else _ROUNDS
+        invocations = -(-count // _STRANDS_PER_INVOCATION.get(steps[0], 1))
+        all_integers = integers | {"strand_count": count, "lane_count": invocations}
+        points_per_dispatch = self._points_per_dispatch() if reads_colliders else _MAX_ITERATIONS
         end = self._layout.longest if "first_point" in recipe.integers else 1
-        for first in range(0, end, at_once):
-            known |= {"first_point": first, "point_end": first + at_once}
+        for first in range(0, end, points_per_dispatch):
+            all_integers |= {"first_point": first, "point_end": first + points_per_dispatch}
             shader.bind(
-                textures={name: taken[name] for _, name in recipe.textures},
-                images={name: taken[name] for _, name, *_ in recipe.images},
-                integers={name: known[name] for name in recipe.integers},
+                textures={name: textures[name] for _, name in recipe.textures},
+                images={name: textures[name] for _, name, *_ in recipe.images},
+                integers={name: all_integers[name] for name in recipe.integers},
                 numbers={name: numbers[name] for _, name in recipe.numbers},
             )
             shader.dispatch(invocations)
 
-    def _points_at_once(self) -> int:
-        """How many points of a strand one dispatch can lead, including the steps BENT and PUT."""
+    def _points_per_dispatch(self) -> int:
+        """How many points of a strand one dispatch can lead, including the steps KEEP_BENDS and
+        STORE_POINTS."""
         assert self._solids is not None
-        a_point = 4 + (SWEEPS + TRIES + HALVINGS + 4) * (1 + self._solids.rounds_of_distance)
-        return max(_ROUNDS // (a_point * _INVOCATION["LED"]), 1)
+        per_point = 4 + (SWEEPS + TRIES + HALVINGS + 4) * (1 + self._solids.distance_iterations)
+        return max(_MAX_ITERATIONS // (per_point * _STRANDS_PER_INVOCATION["LEAD_OUT"]), 1)
 
 
 @dataclass(frozen=True)
-class Seen:
+class LeadOutInputs:
     """The inputs for leading strands out of colliders in one frame.
 
     textures: strand_spans, clearances and the colliders. states: an image. kinds, integers: of the
-    colliders. kept: largest distance that points keep [m]. turned_back: angle by which segments
-    turn back since the frame before [rad]. at_once: whether the pass that moves strands can do the
-    steps HELD and NEAR.
+    colliders. max_clearance: largest distance that points keep [m]. turn_back_angle: angle by which
+    segments turn back since the frame before [rad]. finds_near_while_riding: whether the pass that
+    moves strands can do the steps CARRY_ROOTS and FIND_NEAR.
     """
 
     textures: dict[str, Any]
     states: Any
     kinds: SolidKinds
     integers: dict[str, int]
-    kept: float
-    turned_back: float
-    at_once: bool
+    max_clearance: float
+    turn_back_angle: float
+    finds_near_while_riding: bool
 
 
 def _empty(size: tuple[int, int]) -> Any:

@@ -71,7 +71,7 @@ class MeshPass:
         output: str = "scene_linear",
         opacity: OpacityMaps | None = None,
         shadows: MeshShadows | None = None,
-        between: Any = None,
+        other_tau: Any = None,
     ) -> None:
         """Draw all meshes of the snapshot into the bound framebuffer, depth-tested.
 
@@ -79,8 +79,8 @@ class MeshPass:
             opacity: the hair's maps, see StrandPass.opacity.
             shadows: of all meshes; without them, meshes shade each other only within the hair's
                 maps.
-            between: optical depth of other hair at each pixel of the target, see InterGroomShadow;
-                only used with `opacity`. Others as in StrandPass.draw.
+            other_tau: optical depth of other hair at each pixel of the target, see
+                InterGroomShadow; only used with `opacity`. Others as in StrandPass.draw.
         """
         # a hole in the picture shows neither the mesh nor a shadow on it
         seen = [mesh for mesh in snapshot.meshes if not mesh.is_holdout]
@@ -90,7 +90,7 @@ class MeshPass:
         integers = {"output_encoding": output_index(output)}
         for number, (mesh, _, batch) in enumerate(_far_to_near(self._batches, camera)):
             features = [*shared, *self._mesh_features(mesh, skins.get(id(mesh)))]
-            features += _moment_features(mesh, number, camera.sample, opacity and between)
+            features += _moment_features(mesh, number, camera.sample, opacity and other_tau)
             with _state_for(mesh):
                 batch.draw(bound(_RECIPE, features, self._blocks, integers=integers).shader)
         self._pictures.forget_but(snapshot.meshes)
@@ -104,7 +104,7 @@ class MeshPass:
         *,
         opacity: OpacityMaps | None = None,
         shadows: MeshShadows | None = None,
-        between: Any = None,
+        other_tau: Any = None,
     ) -> None:
         """Draw the shadow of hair on all meshes of the snapshot into the bound framebuffer,
         depth-tested: the fraction of light that hair lets through, by colour.
@@ -117,7 +117,7 @@ class MeshPass:
         shared = _shared(snapshot, camera, (width, height), opacity, shadows)
         for number, (mesh, _, batch) in enumerate(_far_to_near(self._batches, camera)):
             features = [*shared, *self._cover_features(mesh, skins.get(id(mesh)))]
-            features += _moment_features(mesh, number, camera.sample, opacity and between)
+            features += _moment_features(mesh, number, camera.sample, opacity and other_tau)
             with _state_for(mesh):
                 batch.draw(bound(_SHADOW_RECIPE, features, self._blocks).shader)
         self._pictures.forget_but(snapshot.meshes)
@@ -219,12 +219,12 @@ def _shared(
 
 
 def _moment_features(
-    mesh: MeshSnapshot, number: int, sample: int, between: Any
+    mesh: MeshSnapshot, number: int, sample: int, other_tau: Any
 ) -> Iterable[ShaderFeature]:
     """The features of one mesh that depend on the sample."""
-    # `between` holds the nearest mesh that is not blended
-    if between is not None and mesh.transparency != "blended":
-        yield _inter_groom_feature(between)
+    # `other_tau` is that at the nearest mesh that is not blended
+    if other_tau is not None and mesh.transparency != "blended":
+        yield _inter_groom_feature(other_tau)
     if mesh.transparency == "hashed":
         yield _hashed_feature(number, sample)
 
@@ -243,11 +243,11 @@ def _alpha_feature(mesh: MeshSnapshot) -> ShaderFeature:
     )
 
 
-def _inter_groom_feature(between: Any) -> ShaderFeature:
+def _inter_groom_feature(other_tau: Any) -> ShaderFeature:
     """The feature of programs that read the optical depth of other hair per pixel."""
     return ShaderFeature(
         name="others",
-        textures={"inter_groom_shadow": ("FLOAT_2D", between)},
+        textures={"inter_groom_shadow": ("FLOAT_2D", other_tau)},
         defines={"OTHER_TAU": 1},
     )
 

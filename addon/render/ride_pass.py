@@ -103,7 +103,9 @@ def _ride_recipe(*, curls: bool, solids: SolidKinds | None = None) -> ShaderReci
         textures=tuple(("FLOAT_2D", name) for name in names),
         images=images,
         integers=tuple(integers),
-        numbers=() if solids is None else (("FLOAT", "kept"), ("FLOAT", "turned_back")),
+        numbers=()
+        if solids is None
+        else (("FLOAT", "max_clearance"), ("FLOAT", "turn_back_angle")),
         group_size=(64, 1),
         defines=defines,
     )
@@ -111,7 +113,7 @@ def _ride_recipe(*, curls: bool, solids: SolidKinds | None = None) -> ShaderReci
 
 GUIDES_RECIPE, CURLED_GUIDES_RECIPE = _guides_recipe(curls=False), _guides_recipe(curls=True)
 #: Loop iterations of ride.comp.glsl per point, without those for colliders.
-_POINT_ROUNDS = 8
+_ITERATIONS_PER_POINT = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,7 +168,7 @@ class RidePass:
         colliders: uploads shared with other passes; None: its own.
         texels: of these strands, if already made.
 
-    leading: the pass that leads strands out of colliders.
+    lead_out: the pass that leads strands out of colliders.
     """
 
     def __init__(
@@ -187,8 +189,8 @@ class RidePass:
         self._root_mean = strands.roots.mean(axis=0, dtype=np.float64)
         layout = StrandLayout(strands.offsets) if texels is None else texels.layout
         self.points = DevicePoints(layout)
-        self._held = None if holds is None else HoldPass(holds, self.points.layout)
-        self.leading = LeadOutPass(self.points.layout, colliders or UploadedColliders())
+        self._hold_pass = None if holds is None else HoldPass(holds, self.points.layout)
+        self.lead_out = LeadOutPass(self.points.layout, colliders or UploadedColliders())
         self.release()
         released_with_shaders(self)
         released_with_shaders(self.points)  # a snapshot may outlive this pass
@@ -234,7 +236,7 @@ class RidePass:
             head_positions, matrix, anchors: as in `carry`.
             guides_now: (guide_count, cv_count, 3) [m], world space, or a texture RGBA32F that
                 holds them in the layout of strand_layout.strand_rows.
-            colliders: out of which strands are led, once `leading` has their clearance.
+            colliders: out of which strands are led, once `lead_out` has their clearance.
             led: strands that were led out of colliders earlier.
             since: time since the last frame [s], if this one continues it; else infinite.
 
@@ -260,7 +262,7 @@ class RidePass:
 
     def read_led(self) -> LedOut:
         """The strands that were led out of colliders, read back."""
-        led = self.leading.led()
+        led = self.lead_out.led_strands()
         if not len(led):
             return NOT_LED
         return LedOut.of(led, self.read(), self._strands.offsets)
@@ -269,9 +271,9 @@ class RidePass:
         """Release everything on the GPU; the next frame uploads it again."""
         self._textures: dict[str, Any] = {}
         self.points.release()
-        self.leading.release()
-        if self._held is not None:
-            self._held.release()
+        self.lead_out.release()
+        if self._hold_pass is not None:
+            self._hold_pass.release()
 
     @property
     def _segment_count(self) -> int:
@@ -376,8 +378,8 @@ class RidePass:
     ) -> None:
         textures, count = self._textures, self._strands.strand_count
         is_curled = self._riders.gives is not None and turns == "guide_turns"
-        seen = self.leading.begin(colliders, _POINT_ROUNDS, since)
-        taken = _named(textures, "root_motions", "guide_weights", "strand_spans")
+        inputs = self.lead_out.begin_frame(colliders, _ITERATIONS_PER_POINT, since)
+        ride_textures = _named(textures, "root_motions", "guide_weights", "strand_spans")
         images = {"cv_points": self.points.texture, **_named(textures, "rest_points")}
         images |= {"guide_turns": textures[turns]}
         images |= _named(textures, "guide_axes") if is_curled else {}
@@ -388,21 +390,24 @@ class RidePass:
             "mover_count": self._mover_count,
         }
         numbers = {}
-        if seen is not None and seen.at_once:
-            solids = seen.kinds
-            taken |= seen.textures
-            images |= {"states": seen.states, "clearances": taken.pop("clearances")}
-            integers = integers | seen.integers
-            numbers = {"kept": seen.kept, "turned_back": seen.turned_back}
+        if inputs is not None and inputs.finds_near_while_riding:
+            solids = inputs.kinds
+            ride_textures |= inputs.textures
+            images |= {"states": inputs.states, "clearances": ride_textures.pop("clearances")}
+            integers = integers | inputs.integers
+            numbers = {
+                "max_clearance": inputs.max_clearance,
+                "turn_back_angle": inputs.turn_back_angle,
+            }
         shader = program(_ride_recipe(curls=is_curled, solids=solids))
-        shader.bind(textures=taken, images=images, integers=integers, numbers=numbers)
+        shader.bind(textures=ride_textures, images=images, integers=integers, numbers=numbers)
         shader.dispatch(count)
-        if seen is not None:
-            carrying = _named(textures, "rest_points", "root_motions")
-            self.leading.lead(self.points.texture, seen, carrying, self._mover_count)
-        if self._held is not None:
-            self._held.hold(self.points.texture, textures["rest_points"], anchors)
-        self.leading.put(self.points.texture, led)
+        if inputs is not None:
+            carry_textures = _named(textures, "rest_points", "root_motions")
+            self.lead_out.lead(self.points.texture, inputs, carry_textures, self._mover_count)
+        if self._hold_pass is not None:
+            self._hold_pass.hold(self.points.texture, textures["rest_points"], anchors)
+        self.lead_out.put(self.points.texture, led)
         self.points.serial += 1
 
 

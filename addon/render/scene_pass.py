@@ -297,7 +297,7 @@ class ScenePass:
             groups.setdefault(index, []).append(mesh)
         found = [each for groom in shading if (each := maps[groom.key]) is not None]
         light_count = len(kept_lights(scene.lights))
-        between = self._hair_on_meshes.at(groups, found, light_count, camera, size)
+        other_tau = self._hair_on_meshes.other_tau(groups, found, light_count, camera, size)
         for index, meshes in groups.items():
             groom = None if index < 0 else shading[index]
             light = scene.unlit_by_hair() if groom is None else scene.lit(groom)
@@ -311,7 +311,7 @@ class ScenePass:
                 *size,
                 opacity=opacity,
                 shadows=shadows,
-                between=between,
+                other_tau=other_tau,
             )
 
     def _forget_but(self, scene: SceneSnapshot) -> None:

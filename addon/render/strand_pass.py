@@ -40,7 +40,7 @@ from .display import Display
 from .feature_programs import UniformBlocks
 from .hair_ball import HairBall
 from .hashed_strands import HASHED_STRANDS
-from .inter_groom_shadow import NOBODY, InterGroomShadow
+from .inter_groom_shadow import NO_GROOM, InterGroomShadow
 from .kept_picture import KeptPicture
 from .marschner_textures import marschner_feature, scattering_feature
 from .opacity_maps import OpacityMaps
@@ -123,12 +123,12 @@ class Statistics:
 class _Lit:
     """The shadows for one set of lights. light: these lights; None before the first draw.
 
-    between: the optical depth of other grooms for them.
+    inter_groom_shadow: the optical depth of other grooms for them.
     """
 
     light: tuple[Light, ...] | None = None
     opacity: OpacityPass = field(default_factory=OpacityPass)
-    between: InterGroomShadow = field(default_factory=InterGroomShadow)
+    inter_groom_shadow: InterGroomShadow = field(default_factory=InterGroomShadow)
 
 
 @dataclass(eq=False)
@@ -225,7 +225,7 @@ class StrandPass:
         if content == "light" and not is_debug:
             maps = self.opacity(snapshot, view=view.name, is_turning=view.is_turning)
         if content == "light" and not others:
-            own.lit.between.release()  # else it keeps maps of grooms that are gone
+            own.lit.inter_groom_shadow.release()  # else it keeps maps of grooms that are gone
         drawing = StrandDrawing(
             order=order,
             ribbon=self._ribbons.of,
@@ -236,7 +236,7 @@ class StrandPass:
                 self._curves(snapshot),
             ),
             shading=(
-                tuple(self._shading(snapshot, maps, own.lit.between, others))
+                tuple(self._shading(snapshot, maps, own.lit.inter_groom_shadow, others))
                 if content == "light"
                 else (self._tangents(snapshot),)
             ),
@@ -371,7 +371,7 @@ class StrandPass:
         self,
         snapshot: Snapshot,
         maps: OpacityMaps | None,
-        between: InterGroomShadow,
+        inter_groom_shadow: InterGroomShadow,
         others: Sequence[OpacityMaps],
     ) -> Iterator[ShaderFeature]:
         """The features of all programs that shade these strands.
@@ -401,14 +401,14 @@ class StrandPass:
             if "cv_received" in self._textures:
                 yield self._skin_feature()
         if others:
-            yield self._inter_groom_feature(between, others, len(snapshot.lights))
+            yield self._inter_groom_feature(inter_groom_shadow, others, len(snapshot.lights))
 
     def _inter_groom_feature(
-        self, between: InterGroomShadow, others: Sequence[OpacityMaps], light_count: int
+        self, inter_groom_shadow: InterGroomShadow, others: Sequence[OpacityMaps], light_count: int
     ) -> ShaderFeature:
         """The feature of programs that read the optical depth of other hair per CV."""
-        points, grooms = self._textures["cv_points"], [(NOBODY, other) for other in others]
-        found = between.at(points, self._points_serial, grooms, light_count)
+        points, grooms = self._textures["cv_points"], [(NO_GROOM, other) for other in others]
+        found = inter_groom_shadow.other_tau(points, self._points_serial, grooms, light_count)
         return ShaderFeature(
             name="others",
             textures={"cv_other_tau": ("FLOAT_2D", found)},

@@ -126,17 +126,17 @@ def test_what_lies_beside_or_before_a_groom_is_not_asked(gpu_context: Any) -> No
 
 
 def test_places_without_a_serial_are_asked_anew_and_nothing_adds_up(gpu_context: Any) -> None:
-    from hairloom.addon.render.inter_groom_shadow import NOBODY, InterGroomShadow
+    from hairloom.addon.render.inter_groom_shadow import NO_GROOM, InterGroomShadow
     from hairloom.addon.render.strand_pass import StrandPass
     from hairloom.addon.render.textures import texture_from, texture_to_array
 
     maps = StrandPass().opacity(replace(groom("a", sheet(0.3)).snapshot, lights=(SUN,)))
     assert maps is not None
-    between = InterGroomShadow()
+    shadow = InterGroomShadow()
 
     def found(x: float, serial: int | None) -> np.ndarray:
         places = np.tile(np.float32([x, 0.0, 0.0, 1.0]), (8, 8, 1))
-        texture = between.at(texture_from(places, "RGBA32F"), serial, [(NOBODY, maps)], 1)
+        texture = shadow.other_tau(texture_from(places, "RGBA32F"), serial, [(NO_GROOM, maps)], 1)
         return texture_to_array(texture)[..., 0]
 
     below = found(0.0, None)
@@ -163,7 +163,7 @@ def test_a_place_has_what_all_but_its_own_groom_have_in_the_way(gpu_context: Any
     places[0, :, 3] = (0.0, 1.0, 2.0, -1.0, 0.0, 1.0, 2.0, -1.0)
     places[0, 4:, 0] = 1.0  # not behind the grooms for either light
     found = texture_to_array(
-        InterGroomShadow().at(
+        InterGroomShadow().other_tau(
             texture_from(places, "RGBA32F"), None, [(0, maps[0]), (1, maps[1])], 2
         )
     )[0]
@@ -179,7 +179,9 @@ def test_a_place_has_what_all_but_its_own_groom_have_in_the_way(gpu_context: Any
     of_both = StrandPass().opacity(replace(groom("a", sheet(0.3)).snapshot, lights=lights))
     assert of_both is not None
     for count in (1, 2):
-        texture = InterGroomShadow().at(texture_from(aside, "RGBA32F"), None, [(0, of_both)], count)
+        texture = InterGroomShadow().other_tau(
+            texture_from(aside, "RGBA32F"), None, [(0, of_both)], count
+        )
         way = texture_to_array(texture)[0, 0]
         assert way[0] == 0.0 and (way[1] > 0.0) == (count == 2)
 

@@ -70,12 +70,12 @@ def with_held(clearance: Clearance, offsets: np.ndarray) -> Clearance:
 
 
 @pytest.mark.parametrize(
-    ("fewest", "most", "reads_back"),
+    ("fewest", "most", "can_read_own_writes"),
     [(9, 9, True), (9, 9, False), (2, 60, True)],
     ids=["at once", "as on Metal", "in parts"],
 )
 def test_equals_numpy(
-    monkeypatch: pytest.MonkeyPatch, fewest: int, most: int, reads_back: bool
+    monkeypatch: pytest.MonkeyPatch, fewest: int, most: int, can_read_own_writes: bool
 ) -> None:
     from hairloom.addon.render import lead_out_pass
     from hairloom.addon.render.collider_textures import UploadedColliders
@@ -84,7 +84,7 @@ def test_equals_numpy(
     from hairloom.addon.render.strand_layout import StrandLayout
     from hairloom.addon.render.textures import texture_from, texture_to_array
 
-    monkeypatch.setattr(lead_out_pass, "reads_back", lambda: reads_back)
+    monkeypatch.setattr(lead_out_pass, "can_read_own_writes", lambda: can_read_own_writes)
     points, offsets = strands(600, fewest, most)
     layout = StrandLayout(offsets)
     texels = layout.pixels(np.column_stack([points, np.full(len(points), 1e-4)]))
@@ -92,7 +92,7 @@ def test_equals_numpy(
     matrix = np.eye(4)
     matrix[:3, 3] = 0.0, MOVED, 0.0
     carried = points + np.float32([0.0, MOVED, 0.0])
-    carrying = {
+    carry_textures = {
         "rest_points": texture_from(texels, "RGBA32F"),
         "root_motions": texture_from(matrix_motion(matrix), "RGBA32F"),
     }
@@ -103,23 +103,25 @@ def test_equals_numpy(
     leading = LeadOutPass(layout, UploadedColliders())
 
     def lead(texture: Any, colliders: tuple[PosedCollider, ...]) -> None:
-        seen = leading.begin(colliders, 1 << 20)  # the limit lets the pass take all steps itself
-        if seen is not None:
-            assert not seen.at_once
-            leading.lead(texture, seen, carrying, 1)
+        inputs = leading.begin_frame(
+            colliders, 1 << 20
+        )  # the limit lets the pass take all steps itself
+        if inputs is not None:
+            assert not inputs.finds_near_while_riding
+            leading.lead(texture, inputs, carry_textures, 1)
 
     lead(now, posed(moved=0.0))
     np.testing.assert_array_equal(found()[:, :3], points, "no motion has begun")
 
     clearance = with_held(clearance_at(points, offsets, posed(moved=-0.05), KEPT), offsets)
-    leading.take(clearance)
+    leading.set_clearance(clearance)
     expected = points.copy()
     led, _ = lead_out(
         expected, lambda index, _: carried[index], offsets, posed(moved=0.0), clearance
     )
     lead(now, posed(moved=0.0))
     assert 100 < len(led) < 550
-    assert len(np.setxor1d(led, leading.led())) <= 2, "rounding decides few"
+    assert len(np.setxor1d(led, leading.led_strands())) <= 2, "rounding decides few"
     off = np.maximum.reduceat(np.abs(found()[:, :3] - expected).max(axis=1), offsets[:-1])
     assert np.median(off[led]) < 2e-6
     assert (off > 1e-4).mean() < 0.08, "where two solids are as near, rounding decides"
@@ -137,13 +139,13 @@ def test_equals_numpy(
     np.testing.assert_allclose(steps(found()[:, :3], offsets), steps(points, offsets), atol=2e-6)
 
     # it continues after a release
-    before, led_before, again = found(), leading.led(), texture_from(texels, "RGBA32F")
+    before, led_before, again = found(), leading.led_strands(), texture_from(texels, "RGBA32F")
     leading.release()
     lead(again, posed(moved=0.0))
     np.testing.assert_array_equal(layout.values(texture_to_array(again)), before)
-    np.testing.assert_array_equal(leading.led(), led_before)
+    np.testing.assert_array_equal(leading.led_strands(), led_before)
     lead(again, ())
-    assert not len(leading.led())
+    assert not len(leading.led_strands())
 
 
 def test_puts_what_was_led_earlier() -> None:

@@ -320,7 +320,7 @@ def test_strands_that_ride_are_led_out(monkeypatch: pytest.MonkeyPatch, rounds: 
         motion_flow.begin(rig, pose), guides=guides, colliders=posed, clearance=clearance
     )
     expected, led = motion_flow.strands_and_led(rig, motion)
-    ride.leading.take(clearance)
+    ride.lead_out.set_clearance(clearance)
     ride.ride(pose.head_positions, pose.matrix, guides, None, posed)
     found = ride.read_led()
     assert 200 < len(led.strands) < 650
@@ -351,7 +351,7 @@ def test_strands_that_ride_are_led_out(monkeypatch: pytest.MonkeyPatch, rounds: 
     off = np.abs(found - forgotten).max(axis=1)
     assert (np.maximum.reduceat(off, offsets[:-1]) > TOLERANCE).mean() < 0.03
     first = pass_of(rig)
-    first.leading.take(clearance)
+    first.lead_out.set_clearance(clearance)
     first.ride(pose.head_positions, pose.matrix, moved, None, posed)
     np.testing.assert_array_equal(first.read(), found)
     # long after, nothing leads them out, and they are where they ride

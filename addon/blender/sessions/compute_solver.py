@@ -56,7 +56,7 @@ class ComputeSolver(BaseSolver):
             self._colliders,
             texels,
         )
-        self._ride.leading.take(self._motion.clearance)
+        self._ride.lead_out.set_clearance(self._motion.clearance)
 
     @property
     def motion(self) -> Motion:
@@ -81,7 +81,7 @@ class ComputeSolver(BaseSolver):
         self._motion = motion_flow.with_clearance(
             self._rig, self._motion, colliders, settings, painted
         )
-        self._ride.leading.take(self._motion.clearance)
+        self._ride.lead_out.set_clearance(self._motion.clearance)
 
     def steps(self, frame: FrameInput) -> Steps[None]:
         if self._is_baked:
@@ -154,7 +154,7 @@ class ComputeSolver(BaseSolver):
             self._dynamics.release()
             self._dynamics = None
         self._motion, self._led, self._since = motion, NOT_LED, np.inf
-        self._ride.leading.take(motion.clearance)
+        self._ride.lead_out.set_clearance(motion.clearance)
         self._is_baked = self._is_resting = self._is_drawn = False
 
     def _draw(self) -> None:
