@@ -31,7 +31,7 @@ from .light_flow import ambient_of, directional_light, rest_fields
 from .motion_flow import carried_guides, root_turns
 from .params import SettingsMap
 from .rig_flow import MotionStart, Pose, Rig, Solids, root_normals
-from .shading.ambient import occlusion_by
+from .shading.ambient import occlusion_from_sky
 from .shading.ambient_settings import AmbientSettings
 from .shading.drawn_strands import drawn_radius, own_colors
 from .shading.settings import ShadingSettings, StrandSettings
@@ -63,7 +63,7 @@ def card_build_steps(
     strands = groom.strands
     ambient = settings[AmbientSettings]
     fields = rest_fields(rig, ambient)
-    occlusion = occlusion_by(fields.sky.at(strands.points)[0], ambient_of(rig, ambient))
+    occlusion = occlusion_from_sky(fields.sky.at(strands.points)[0], ambient_of(rig, ambient))
     light = directional_light(fields, strands.points)
     of_points = np.repeat(strands.group, strands.point_counts)
     color = own_colors(strands.color, of_points, settings[ShadingSettings])

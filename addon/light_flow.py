@@ -18,7 +18,7 @@ from .arrays import Floats, Ints
 from .rig_flow import Rig
 from .shading.ambient import (
     HairCells,
-    occlusion_by,
+    occlusion_from_sky,
     openness_field,
     skin_occlusion,
     sky_field,
@@ -27,7 +27,7 @@ from .shading.ambient_settings import AmbientSettings
 from .shading.density_grid import Field
 from .shading.drawn_strands import drawn_radius
 from .shading.settings import StrandSettings
-from .shading.skin_seen import seen_by, skin_field
+from .shading.skin_seen import skin_field, skin_seen_from
 from .strands import StrandSet
 from .strands.arc_length import even
 from .strands.frames import strand_tangents, tangents_at, volume_normal_rows
@@ -136,7 +136,7 @@ def updated_light(
     if replace(before, **looks) != settings:
         cells = HairCells.of(rig.strands, rig.head, settings.cell_count)
         sky = sky_field(cells, ambient_of(rig, settings))
-    occlusion = occlusion_by(sky.at(rig.strands.points)[0], ambient_of(rig, settings))
+    occlusion = occlusion_from_sky(sky.at(rig.strands.points)[0], ambient_of(rig, settings))
     return replace(light, occlusion=occlusion, fields=replace(fields, sky=sky))
 
 
@@ -228,7 +228,7 @@ def _light(
     """Args:
     sample: returns the values of a field at all points, (k, point_count).
     """
-    occlusion = occlusion_by(sample(fields.sky)[0], ambient_of(rig, settings))
+    occlusion = occlusion_from_sky(sample(fields.sky)[0], ambient_of(rig, settings))
     openness = np.ascontiguousarray(sample(fields.openness).T)
     openness[:, 1:] = components_along(openness[:, 1:], axes)
     return HairLight(occlusion, openness, skin_seen, fields)
@@ -346,7 +346,7 @@ def skin_seen_along_axes(axes: Axes, values: Floats) -> Floats:
     Args:
         values: values of `rest_skin_field` at points, (k, n).
     """
-    seen = seen_by(values)
+    seen = skin_seen_from(values)
     received, beneath = (
         components_along(each, axes) for each in (seen.received[:, 1:], seen.beneath)
     )

@@ -24,9 +24,9 @@ from .groom.masks import NO_MASKS, Masks, Places, StrandMask
 from .groom.painted_color import PaintedColor
 from .groom.roots import RootFrames, root_frames
 from .rig_flow import GrownChildren, Rig
-from .shading.coat import coated_color
 from .shading.drawn_strands import look_color, natural_strands
 from .shading.settings import ShadingSettings
+from .shading.wet_and_dusty import wet_and_dusty_color
 from .strands import StrandSet, Surface
 from .strands.arc_length import along
 from .strands.kept import same_rows
@@ -86,7 +86,7 @@ def with_colors(
     """
     own = strands.color if look.color_source == "own" else None
     if own is not None:
-        own = coated_color(own, look)
+        own = wet_and_dusty_color(own, look)
     if not look.color_map:
         is_as_it_is = own is None or own is strands.color
         return strands if is_as_it_is else replace(strands, color=own)
@@ -113,7 +113,7 @@ def with_colors(
 def _coated(painted: Floats, look: ShadingSettings) -> Floats:
     """Premultiplied colours (n, 4) as the look's water and dust change them, (n, 3)."""
     opacity = painted[:, 3:]
-    return opacity * coated_color(painted[:, :3] / np.maximum(opacity, _MIN_OPACITY), look)
+    return opacity * wet_and_dusty_color(painted[:, :3] / np.maximum(opacity, _MIN_OPACITY), look)
 
 
 def _with_grown_roots(

@@ -15,8 +15,8 @@ from dataclasses import replace
 from .dynamics.settings import DynamicsSettings
 from .groom.children_settings import ChildrenSettings
 from .params import SettingsMap
-from .shading.coat import coated, is_coated
 from .shading.settings import ShadingSettings
+from .shading.wet_and_dusty import is_wet_or_dusty, wet_and_dusty_look
 
 #: Water that soaked hair holds, over its own mass.
 SOAKED_WATER_MASS = 1.0
@@ -29,10 +29,10 @@ _SOAKED_FRIZZ, _SOAKED_FLY_AWAYS = 0.25, 0.0
 def effective_settings(settings: SettingsMap) -> SettingsMap:
     """The settings with the effects of water and dust; not to be applied twice."""
     look = settings[ShadingSettings]
-    if not is_coated(look):
+    if not is_wet_or_dusty(look):
         return settings
     return settings.with_settings(
-        coated(look),
+        wet_and_dusty_look(look),
         wet_children(settings[ChildrenSettings], look.wetness),
         wet_dynamics(settings[DynamicsSettings], look.wetness),
     )

@@ -25,7 +25,7 @@ float shown(vec3 radiance)
 vec2 all_and_left(vec3 point, vec3 normal, vec3 facet)
 {
   normal = facing_normal(normal, normal, facet, normalize(view.eye.xyz - view.eye.w * point));
-  vec3 all_light = matt_light(lights, normal);
+  vec3 all_light = diffuse_light(lights, normal);
   vec3 left = all_light;
   for (int index = 0; index < int(lights.ambient_and_count.w); index++) {
     vec3 to_light, irradiance;

@@ -135,10 +135,10 @@ vec3 off_far_skin(
     float outward, mat3x4 forward, mat3x4 backward, vec3 to_light, SkinSeen seen, vec3 skin)
 {
   vec3 a_f = sum_of_lobes(forward), a_b = sum_of_lobes(backward);
-  vec3 taken = sqrt(max((1.0 - a_f) * (1.0 - a_f) - a_b * a_b, 0.0));
+  vec3 absorbed = sqrt(max((1.0 - a_f) * (1.0 - a_f) - a_b * a_b, 0.0));
   vec3 onward = 0.5 * (a_f * (1.0 + outward) + a_b * (1.0 - outward));
-  vec3 lit = 2.0 / PI * skin * far_light(seen.received, to_light);
-  return lit * through_hair(seen.depth, taken) * onward;
+  vec3 lit = 2.0 / PI * skin * far_skin_light(seen.received, to_light);
+  return lit * through_hair(seen.depth, absorbed) * onward;
 }
 
 // Light that a strand among others scatters to the eye from one light. As marschner_light, but without its

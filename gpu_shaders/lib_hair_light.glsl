@@ -73,7 +73,7 @@ vec3 hair_light(vec3 tangent,
 // Light from the world that hair scatters to the eye. Marschner's model takes it as eight lights;
 // Kajiya-Kay's shades a matt surface, shadowed by ambient occlusion alone.
 //
-// openness: see open_path.
+// openness: see path_from_openness.
 vec3 hair_ambient(float occlusion,
                   vec4 openness,
                   vec3 tangent,
@@ -86,14 +86,14 @@ vec3 hair_ambient(float occlusion,
                   SkinSeen seen)
 {
 #  if !MARSCHNER
-  return occlusion * hair * matt_light(lights, normal);
+  return occlusion * hair * diffuse_light(lights, normal);
 #  else
-  float level = table_level(CORNER_BLUR, longitudinal);
+  float level = table_level(OCTANT_BLUR, longitudinal);
   vec3 radiance = vec3(0.0);
-  for (int corner = 0; corner < 8; corner++) {
-    vec3 towards = corner_direction(corner);
-    vec3 path = vec3(open_path(openness, towards), 1.0);
-    radiance += corner_light(lights, corner) * hair_light(tangent,
+  for (int octant = 0; octant < 8; octant++) {
+    vec3 towards = octant_direction(octant);
+    vec3 path = vec3(path_from_openness(openness, towards), 1.0);
+    radiance += octant_light(lights, octant) * hair_light(tangent,
                                                           normal,
                                                           towards,
                                                           to_eye,

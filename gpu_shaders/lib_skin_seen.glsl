@@ -15,21 +15,23 @@ SkinSeen plane_beneath(vec3 normal)
   return SkinSeen(vec4(0.0), normal, 0.0);
 }
 
-// The fraction of a light that arrives from far skin, through hair that absorbs the fraction {{part}}.
-float far_light(vec4 received, vec3 to_light)
+// The fraction of a light that arrives from far skin, through hair that absorbs the fraction
+// {{absorbed_fraction}}.
+float far_skin_light(vec4 received, vec3 to_light)
 {
   float size = length(received.yzw);
-  float even = max(1.0 - 0.5 * size / max(received.x, 1.0e-6), 0.0);
+  float uniform_part = max(1.0 - 0.5 * size / max(received.x, 1.0e-6), 0.0);
   float facing = max(dot(received.yzw, to_light), 0.0) / max(size, 1.0e-6);
-  return received.x * (even + (1.0 - even) * 4.0 * facing);
+  return received.x * (uniform_part + (1.0 - uniform_part) * 4.0 * facing);
 }
 
-// Transmittance of hair with gaps whose strands absorb the fraction `taken`, over that at {{part}}, for which
-// `received` holds. At the edge of a card the depth may be extrapolated beyond its vertices.
-vec3 through_hair(float depth, vec3 taken)
+// Transmittance of hair with gaps whose strands absorb the fraction `absorbed`, over that at
+// {{absorbed_fraction}}, for which `received` holds. At the edge of a card the depth may be extrapolated
+// beyond its vertices.
+vec3 through_hair(float depth, vec3 absorbed)
 {
-  float gaps = {{gaps}} * max(depth, 0.0);
-  return pow((1.0 + gaps * taken) / (1.0 + gaps * {{part}}), vec3(-1.0 / {{gaps}}));
+  float clumped = {{clumping}} * max(depth, 0.0);
+  return pow((1.0 + clumped * absorbed) / (1.0 + clumped * {{absorbed_fraction}}), vec3(-1.0 / {{clumping}}));
 }
 
 // A vector from its components along a strand or card, along its normal, and across both.

@@ -82,7 +82,7 @@ vec3 strand_radiance(vec3 point,
 #  ifdef OPENNESS
   openness.yzw = from_axes(openness.yzw, tangent, normal);
 #  else
-  openness = openness_by_occlusion(occlusion, unit_or(point - volume_center, normal));
+  openness = openness_from_occlusion(occlusion, unit_or(point - volume_center, normal));
 #  endif
   radiance = shading.ambient * hair_ambient(occlusion,
                                             openness,

@@ -76,8 +76,8 @@ void main()
 #endif
   float reflected = reflected_fraction(dot(normal, to_eye), mesh_specular, mesh_roughness);
   vec3 matt = base * (1.0 - reflected);
-  vec3 mirrored = light_from(lights, reflect(-to_eye, normal), vec2(1.0));
-  vec3 radiance = (matt * matt_light(lights, normal) + reflected * mirrored) * mesh_occlusion;
+  vec3 mirrored = radiance_from(lights, reflect(-to_eye, normal), vec2(1.0));
+  vec3 radiance = (matt * diffuse_light(lights, normal) + reflected * mirrored) * mesh_occlusion;
 #ifdef OTHER_TAU
   vec4 other_tau = texelFetch(inter_groom_shadow, ivec2(gl_FragCoord.xy), 0);
 #endif

@@ -47,7 +47,7 @@ void main()
 #ifdef OTHER_TAU
   vec4 other_tau = texelFetch(inter_groom_shadow, ivec2(gl_FragCoord.xy), 0);
 #endif
-  vec3 all_light = matt_light(lights, normal) * mesh_occlusion;
+  vec3 all_light = diffuse_light(lights, normal) * mesh_occlusion;
   vec3 left = all_light;
   for (int index = 0; index < int(lights.ambient_and_count.w); index++) {
     vec3 to_light, irradiance;

@@ -102,7 +102,9 @@ def main(folder: Path) -> None:
     )
     sheet, stages = [], ((studio_stage, None), (dark, against))
     for path in sorted(LOOKS.glob("*.json")):
-        look = of_addon("shading.coat").coated(presets.named_preset(f"looks/{path.stem}").settings)
+        look = of_addon("shading.wet_and_dusty").wet_and_dusty_look(
+            presets.named_preset(f"looks/{path.stem}").settings
+        )
         for stage, lights in stages:
             studio.settings = studio.settings.with_settings(look, stage)
             if lights is None:

@@ -10,7 +10,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..cards.card_mesh import CardMesh
 from ..cards.sort import order_from
-from ..shading.environment import openness_by_occlusion
+from ..shading.environment import openness_from_occlusion
 from . import gpu_objects
 from .card_snapshot import CardSnapshot
 
@@ -103,7 +103,7 @@ def _vertices(cards: CardSnapshot) -> Any:
     if seen is None:
         seen = np.broadcast_to(_PLANE, (len(mesh.positions), 8))
     if openness is None:
-        openness = openness_by_occlusion(mesh.occlusion, _AWAY).astype(np.float32)
+        openness = openness_from_occlusion(mesh.occlusion, _AWAY).astype(np.float32)
     if depth is None:
         depth = np.zeros(len(mesh.positions), np.float32)
     values = {

@@ -121,7 +121,7 @@ class ScenePass:
             if shafts is not None:
                 into, behind = apart.light, apart.behind or plain(sky)
                 lights = [
-                    each for each in scene.lights if not (apart.shows_world and each.of_world)
+                    each for each in scene.lights if not (apart.shows_world and each.is_from_world)
                 ]
                 shafts_apart(into, color, depth, behind, camera, lights, shafts)
         elif shafts is not None:

@@ -44,7 +44,7 @@ from ..shading.lights import HARMONIC_COUNT, LIGHT_CAPACITY
 from ..shading.microfacet import MIN_ROUGHNESS
 from ..shading.skin.diffusion import KERNEL_REACH, KERNEL_TAPS, SKIN_LIGHTS
 from ..shading.skin.layout import CLOSING
-from ..shading.skin_seen import GAPS, PART
+from ..shading.skin_seen import ABSORBED_FRACTION, CLUMPING
 from ..shading.volume.card_opacity import (
     APART,
     MAX_ALPHA,
@@ -185,8 +185,8 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
         "start_texels": str(START_TEXELS),
         "tile_gap": str(TILE_GAP),
         "midpoint_absorption": repr(MIDPOINT),
-        "gaps": repr(GAPS),
-        "part": repr(PART),
+        "clumping": repr(CLUMPING),
+        "absorbed_fraction": repr(ABSORBED_FRACTION),
         "max_alpha": repr(MAX_ALPHA),
         "unknown_beyond": repr(UNKNOWN_BEYOND),
         "start_scale": repr(START_SCALE),

@@ -45,16 +45,16 @@ class HairCells:
 
     @classmethod
     def of(
-        cls, strands: StrandSet, body: Surface | None, cell_count: int, most: int | None = None
+        cls, strands: StrandSet, body: Surface | None, cell_count: int, max_cells: int | None = None
     ) -> Self:
         """Args: see ambient_occlusion and grid_around."""
-        grid = grid_around(strands, cell_count, most)
+        grid = grid_around(strands, cell_count, max_cells)
         hair = hair_depth(strands, grid)
         if body is None:
             return cls(grid, hair, None)
-        whole = grid.in_blocks()
+        whole = grid.aligned_to_blocks()
         of_body = body.latest(_body_depth, whole.low, whole.cell, whole.shape)
-        return cls(grid, hair, grid.part(of_body, whole))
+        return cls(grid, hair, grid.crop(of_body, whole))
 
     def depth(self, extinction: float) -> Floats:
         """Optical depth of hair and body across each cell."""
@@ -78,7 +78,7 @@ def ambient_occlusion(
     if not strands.strand_count or not len(points):
         return np.ones(len(points), np.float32)
     cells = HairCells.of(strands, body, settings.cell_count)
-    return occlusion_by(sky_field(cells, settings).at(points)[0], settings)
+    return occlusion_from_sky(sky_field(cells, settings).at(points)[0], settings)
 
 
 def sky_field(cells: HairCells, settings: AmbientSettings) -> Field:
@@ -87,10 +87,12 @@ def sky_field(cells: HairCells, settings: AmbientSettings) -> Field:
     return Field(cells.grid, open_sky[None])
 
 
-def occlusion_by(sky: Floats, settings: AmbientSettings) -> Floats:
+def occlusion_from_sky(sky: Floats, settings: AmbientSettings) -> Floats:
     """As `ambient_occlusion`, from the openness of points to the sky, (n,)."""
-    seen = sky / np.float32(settings.ao_bias)
-    found: Floats = (1.0 - settings.strength * (1.0 - np.minimum(seen, 1.0))).astype(np.float32)
+    open_fraction = sky / np.float32(settings.ao_bias)
+    found: Floats = (1.0 - settings.strength * (1.0 - np.minimum(open_fraction, 1.0))).astype(
+        np.float32
+    )
     return found
 
 
@@ -101,8 +103,10 @@ def openness_field(cells: HairCells, extinction: float) -> Field:
     A point's own cell does not count: hair that is seen lies on the light's side of its cell.
     """
     steps, weights = zip(*sky_directions(0.0), strict=True)
-    moments = np.array(weights) * with_mean(unit_steps(steps))
-    return Field(cells.grid, summed_light(cells.depth(extinction), steps, moments, own=0.0))
+    moments = np.array(weights) * moment_weights(unit_steps(steps))
+    return Field(
+        cells.grid, summed_light(cells.depth(extinction), steps, moments, own_fraction=0.0)
+    )
 
 
 def _body_depth(body: Surface, low: Floats, cell: float, shape: tuple[int, int, int]) -> Floats:
@@ -124,10 +128,10 @@ def sky_directions(upper_fraction: float) -> Iterator[tuple[Step, float]]:
         step for step in itertools.product((-1, 0, 1), (-1, 0, 1), (-1, 0, 1)) if any(step)
     ]
     up = np.array([max(z, 0) / np.linalg.norm((x, y, z)) for x, y, z in steps])
-    even = np.array([_DIRECTION_WEIGHTS[sum(map(abs, step))] for step in steps])
+    uniform = np.array([_DIRECTION_WEIGHTS[sum(map(abs, step))] for step in steps])
     # from above only: the lobe up^4 is about as wide as the directions lie apart
-    above = even * up**4
-    fraction = (1.0 - upper_fraction) * even + upper_fraction * above / above.sum()
+    above = uniform * up**4
+    fraction = (1.0 - upper_fraction) * uniform + upper_fraction * above / above.sum()
     return ((step, float(weight)) for step, weight in zip(steps, fraction, strict=True) if weight)
 
 
@@ -138,38 +142,40 @@ def unit_steps(steps: Sequence[Step]) -> Floats:
     return result
 
 
-def with_mean(directions: Floats) -> Floats:
+def moment_weights(directions: Floats) -> Floats:
     """Weights that sum light from directions, rows (3, n), to a mean q0 and a vector q, (4, n)."""
     return np.concatenate([np.ones((1, directions.shape[1])), 3.0 * directions])
 
 
-def summed_light(depth: Floats, steps: Sequence[Step], weights: Floats, own: float = 0.5) -> Floats:
+def summed_light(
+    depth: Floats, steps: Sequence[Step], weights: Floats, own_fraction: float = 0.5
+) -> Floats:
     """Weighted sums, over some of the 26 directions, of the fraction of light that reaches each
     cell from there, (k, *depth.shape) float32.
 
     Args:
         weights: (k, step_count).
-        own: see depth_towards.
+        own_fraction: see depth_towards.
     """
     total = np.zeros((len(weights), *depth.shape), np.float32)
     weights = weights.astype(np.float32)
-    for some, layer, crossed in _layers(depth[None], steps, own):
+    for numbers, layer, crossed in _layers(depth[None], steps, own_fraction):
         through = np.exp(np.negative(crossed, out=crossed), out=crossed)
-        total[:, *layer] += np.tensordot(weights[:, some], through, axes=1)
+        total[:, *layer] += np.tensordot(weights[:, numbers], through, axes=1)
     return total
 
 
-def depth_towards(depth: Floats, steps: Sequence[Step], own: float = 0.5) -> Floats:
+def depth_towards(depth: Floats, steps: Sequence[Step], own_fraction: float = 0.5) -> Floats:
     """Optical depth from each cell out of the grid along some of the 26 directions,
-    (step_count, *grid) float32: the fraction `own` of the cell itself, half from its centre, then
-    every cell on the way, each crossed over the length of the step.
+    (step_count, *grid) float32: the fraction `own_fraction` of the cell itself, half from its
+    centre, then every cell on the way, each crossed over the length of the step.
 
     Args:
         depth: of cells, (step_count, *grid), or (1, *grid) where all directions have the same.
     """
     found = np.empty((len(steps), *depth.shape[1:]), np.float32)
-    for some, layer, crossed in _layers(depth, steps, own):
-        found[some, *layer] = crossed
+    for numbers, layer, crossed in _layers(depth, steps, own_fraction):
+        found[numbers, *layer] = crossed
     return found
 
 
@@ -178,7 +184,7 @@ type Layer = tuple[int | slice, ...]
 
 
 def _layers(
-    depth: Floats, steps: Sequence[Step], own: float
+    depth: Floats, steps: Sequence[Step], own_fraction: float
 ) -> Iterator[tuple[Ints, Layer, Floats]]:
     """For each layer of cells: numbers of k steps, the layer across their longest axis, and the
     optical depth along these steps from its cells, (k, cells, cells), see depth_towards. Layer by
@@ -186,30 +192,30 @@ def _layers(
     """
     along = np.abs(steps).argmax(axis=1)
     for axis, side in itertools.product(range(3), (-1, 1)):
-        some = np.flatnonzero((along == axis) & (np.array(steps)[:, axis] == side))
-        own_depth = depth if len(depth) == 1 else depth[some]
-        layers = np.ascontiguousarray(np.moveaxis(own_depth, axis + 1, 0))
-        length = np.linalg.norm(np.take(steps, some, axis=0), axis=1)[:, None, None]
-        others = np.delete(np.take(steps, some, axis=0), axis, axis=1).tolist()
-        before, beyond = np.zeros((2, len(some), *layers.shape[2:]), np.float32)
-        for number in range(len(layers))[::-side] if len(some) else ():
-            crossed = before + np.float32(own) * layers[number]
+        numbers = np.flatnonzero((along == axis) & (np.array(steps)[:, axis] == side))
+        cell_depth = depth if len(depth) == 1 else depth[numbers]
+        layers = np.ascontiguousarray(np.moveaxis(cell_depth, axis + 1, 0))
+        length = np.linalg.norm(np.take(steps, numbers, axis=0), axis=1)[:, None, None]
+        cross_steps = np.delete(np.take(steps, numbers, axis=0), axis, axis=1).tolist()
+        before, beyond = np.zeros((2, len(numbers), *layers.shape[2:]), np.float32)
+        for number in range(len(layers))[::-side] if len(numbers) else ():
+            crossed = before + np.float32(own_fraction) * layers[number]
             crossed *= length.astype(np.float32)
-            yield some, (*[slice(None)] * axis, number), crossed
+            yield numbers, (*[slice(None)] * axis, number), crossed
             before += layers[number]
             beyond[:] = 0.0
-            for target, source, step in zip(beyond, before, others, strict=True):
+            for target, source, step in zip(beyond, before, cross_steps, strict=True):
                 add_shifted(target, source, step)
             before, beyond = beyond, before
 
 
 def add_shifted(target: Floats, source: Floats, step: list[int]) -> None:
     """target[i, j] += source[i + step[0], j + step[1]] where that exists."""
-    to, at = [], []
+    target_slices, source_slices = [], []
     for size, shift in zip(target.shape, step, strict=True):
-        to.append(slice(max(0, -shift), size - max(0, shift)))
-        at.append(slice(max(0, shift), size - max(0, -shift)))
-    target[tuple(to)] += source[tuple(at)]
+        target_slices.append(slice(max(0, -shift), size - max(0, shift)))
+        source_slices.append(slice(max(0, shift), size - max(0, -shift)))
+    target[tuple(target_slices)] += source[tuple(source_slices)]
 
 
 def skin_occlusion(strands: StrandSet, skin: Surface, settings: AmbientSettings) -> Floats:

@@ -22,22 +22,22 @@ from ..strands.vectors import dot_rows
 #: How far below the surface the middle of the body's shell lies [cells].
 _SHELL_DEPTH = 2.5
 #: Number of cell sizes in each doubling, and of cells along the side of a block.
-_SIZES, _BLOCK = 16, 16
+_SIZES_PER_DOUBLING, _BLOCK_SIDE = 16, 16
 #: Minimum number of cells along a typical hair, so that fur on a large body is not lost in one
 #: layer of cells; and the maximum number of all cells, which limits the former.
-_ALONG_HAIR, _MAX_CELLS = 6, 1_000_000
+_MIN_CELLS_ALONG_HAIR, _MAX_CELLS = 6, 1_000_000
 #: Hair smaller than this gets cells as if it were that large [m].
 _SMALLEST_HAIR = 1.0e-9
 #: Minimum of the hair's size, as a fraction of its distance from the origin, and of a cell's size,
 #: as a fraction of the hair's.
-_FINEST = 1.0e-9
+_MIN_RELATIVE_SIZE = 1.0e-9
 #: Optical depth of a cell of the body: exp(-30) is nothing.
 _OPAQUE = 30.0
 #: Segments that are cut up at once: numpy blocks other threads while it counts, so more would
 #: freeze the window.
-_AT_ONCE = 1 << 17
+_SEGMENTS_PER_BATCH = 1 << 17
 #: Points looked up at once: they stay in the cache.
-_LOOK_UPS = 1 << 14
+_POINTS_PER_BATCH = 1 << 14
 
 
 @dataclass(frozen=True)
@@ -58,16 +58,16 @@ class Grid:
         """Number of the low corner's cell in the lattice, (3,)."""
         return np.rint(self.low / self.cell).astype(np.int64)
 
-    def in_blocks(self) -> Grid:
+    def aligned_to_blocks(self) -> Grid:
         """The grid of whole blocks of the lattice that holds this one."""
-        first = self.first // _BLOCK * _BLOCK
-        last = -(-(self.first + np.array(self.shape)) // _BLOCK) * _BLOCK
+        first = self.first // _BLOCK_SIDE * _BLOCK_SIDE
+        last = -(-(self.first + np.array(self.shape)) // _BLOCK_SIDE) * _BLOCK_SIDE
         return Grid.of_cells(first, last - first, self.cell)
 
-    def part(self, values: Floats, whole: Grid) -> Floats:
+    def crop(self, values: Floats, whole: Grid) -> Floats:
         """This grid's values out of those of a grid that contains it."""
-        begin = self.first - whole.first
-        x, y, z = map(slice, begin, begin + np.array(self.shape))
+        first = self.first - whole.first
+        x, y, z = map(slice, first, first + np.array(self.shape))
         return values[x, y, z]
 
     def coordinates(self, points: Floats) -> Floats:
@@ -88,24 +88,31 @@ class Field:
         return sample(self.values, self.grid.coordinates(points))
 
 
-def grid_around(strands: StrandSet, cell_count: int, most: int | None = None) -> Grid:
+def grid_around(strands: StrandSet, cell_count: int, max_cells: int | None = None) -> Grid:
     """Cells over all strands, with two empty ones on each side: without these at most `cell_count`
-    along the longest side, or more for short hair, see `_ALONG_HAIR`.
+    along the longest side, or more for short hair, see `_MIN_CELLS_ALONG_HAIR`.
 
     They belong to one of few lattices through the origin, so that hair keeps its cells while it is
     combed.
 
     Args:
-        most: maximum number of all cells for short hair; None: `_MAX_CELLS`.
+        max_cells: maximum number of all cells for short hair; None: `_MAX_CELLS`.
     """
     low, high = (corner.astype(np.float64) for corner in strands.bounds())
     farthest = float(np.maximum(np.abs(low), np.abs(high)).max())
-    size = max(float((high - low).max()), _SMALLEST_HAIR, _FINEST * farthest)
-    least = size / (cell_count - 1)
-    volume = float(np.prod(np.maximum(high - low, least)))
-    finest = (volume / (most or _MAX_CELLS)) ** (1.0 / 3.0)
-    least = min(least, max(_typical_reach(strands) / _ALONG_HAIR, finest, size * _FINEST))
-    cell = 2.0 ** (np.ceil(np.log2(least) * _SIZES) / _SIZES)
+    size = max(float((high - low).max()), _SMALLEST_HAIR, _MIN_RELATIVE_SIZE * farthest)
+    max_cell_size = size / (cell_count - 1)
+    volume = float(np.prod(np.maximum(high - low, max_cell_size)))
+    min_cell_size = (volume / (max_cells or _MAX_CELLS)) ** (1.0 / 3.0)
+    max_cell_size = min(
+        max_cell_size,
+        max(
+            _typical_reach(strands) / _MIN_CELLS_ALONG_HAIR,
+            min_cell_size,
+            size * _MIN_RELATIVE_SIZE,
+        ),
+    )
+    cell = 2.0 ** (np.ceil(np.log2(max_cell_size) * _SIZES_PER_DOUBLING) / _SIZES_PER_DOUBLING)
     first = np.floor(low / cell).astype(np.int64) - 2
     last = np.floor(high / cell).astype(np.int64) + 2
     return Grid.of_cells(first, last + 1 - first, float(cell))
@@ -121,34 +128,34 @@ def hair_depth(strands: StrandSet, grid: Grid) -> Floats:
     """Optical depth of the hair across each cell, sigma x cell, of the grid's shape."""
     splat = np.zeros(int(np.prod(grid.shape)))
     tips = strands.offsets[1:] - 1
-    for first in range(0, strands.point_count - 1, _AT_ONCE):
-        some = slice(first, min(first + _AT_ONCE, strands.point_count - 1))
-        to_next_root = tips[np.searchsorted(tips, some.start) : np.searchsorted(tips, some.stop)]
-        splat += _area_in_cells(strands, some, to_next_root - first, grid)
+    for first in range(0, strands.point_count - 1, _SEGMENTS_PER_BATCH):
+        cvs = slice(first, min(first + _SEGMENTS_PER_BATCH, strands.point_count - 1))
+        to_next_root = tips[np.searchsorted(tips, cvs.start) : np.searchsorted(tips, cvs.stop)]
+        splat += _area_in_cells(strands, cvs, to_next_root - first, grid)
     # area per volume x cell = area / cell^2; spread as a trilinear splat would, on average
-    return _spread((splat / grid.cell**2).reshape(grid.shape).astype(np.float32))
+    return _blurred((splat / grid.cell**2).reshape(grid.shape).astype(np.float32))
 
 
-def _area_in_cells(strands: StrandSet, some: slice, none: Ints, grid: Grid) -> Floats:
+def _area_in_cells(strands: StrandSet, cvs: slice, tip_numbers: Ints, grid: Grid) -> Floats:
     """Mean projected area, in each cell, of the segments that begin at these CVs, (cell_count,)
     [m^2].
 
     Args:
-        none: numbers of those CVs that are tips and begin no segment.
+        tip_numbers: numbers of those CVs that are tips and begin no segment.
     """
     # by axes, as numpy is slow at rows of three
-    points = grid.coordinates(strands.points[some.start : some.stop + 1]).T + np.float32(0.5)
+    points = grid.coordinates(strands.points[cvs.start : cvs.stop + 1]).T + np.float32(0.5)
     points = np.ascontiguousarray(points)
     start, step = points[:, :-1], points[:, 1:] - points[:, :-1]
     length = np.sqrt(dot_rows(step, step))  # in cells
-    length[none] = 0.0
+    length[tip_numbers] = 0.0
     pieces = np.maximum(1, np.ceil(length / np.float32(0.7))).astype(np.int64)
-    radius = strands.radius[some.start : some.stop + 1]
+    radius = strands.radius[cvs.start : cvs.stop + 1]
     area = (np.pi / 4.0 * grid.cell) * (radius[1:] + radius[:-1]) * length / pieces
     found: Floats = np.zeros(int(np.prod(grid.shape)))
     for count in np.unique(pieces).tolist():
-        own = np.flatnonzero(pieces == count)
-        begin, whole, part = start[:, own], step[:, own], area[own]
+        members = np.flatnonzero(pieces == count)
+        begin, whole, part = start[:, members], step[:, members], area[members]
         for piece in range(count):
             middle = begin + whole * np.float32((piece + 0.5) / count)
             found += np.bincount(_flat_index(middle, grid), part, minlength=len(found))
@@ -164,11 +171,11 @@ def body_depth(body: Surface, grid: Grid) -> Floats:
     shell, is_inside = _inset(body, grid)
     corners = shell[body.triangles[is_inside[body.triangles].all(axis=1)]]
     high = grid.low + grid.cell * np.array(grid.shape)
-    points = small_triangles(corners, grid.cell, grid.low, high).mean(axis=1)
+    points = subdivided_triangles(corners, grid.cell, grid.low, high).mean(axis=1)
     coordinates = np.floor((points - grid.low) / grid.cell).astype(np.int64)
     is_near = ((coordinates >= 0) & (coordinates < grid.shape)).all(axis=1)
     depth[tuple(coordinates[is_near].T)] = _OPAQUE
-    return _thickened(depth)
+    return _dilated(depth)
 
 
 def _inset(body: Surface, grid: Grid) -> tuple[Floats, Bools]:
@@ -184,9 +191,9 @@ def _inset(body: Surface, grid: Grid) -> tuple[Floats, Bools]:
     if len(near) and len(body.triangles):
         # one vertex is tested for all that lie in one cell and face the same way
         cells = np.floor(shell[near] / grid.cell).astype(np.int64)
-        alike = np.concatenate([cells, normals[near] > 0.0], axis=1)
-        _, asked, number = np.unique(alike, axis=0, return_index=True, return_inverse=True)
-        is_inside[near] = _is_below(shell[near[asked]], body, 0.7 * inward)[number.ravel()]
+        keys = np.concatenate([cells, normals[near] > 0.0], axis=1)
+        _, samples, number = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+        is_inside[near] = _is_below(shell[near[samples]], body, 0.7 * inward)[number.ravel()]
     return shell, is_inside
 
 
@@ -206,10 +213,10 @@ def sample(grids: Floats, coordinates: Floats) -> Floats:
     found = np.empty((len(grids), len(coordinates)), np.float32)
     shape, flat = grids.shape[1:], grids.reshape(len(grids), -1)
     along_x, along_y = shape[1] * shape[2], shape[2]
-    for first in range(0, len(coordinates), _LOOK_UPS):
-        some = slice(first, first + _LOOK_UPS)
+    for first in range(0, len(coordinates), _POINTS_PER_BATCH):
+        batch = slice(first, first + _POINTS_PER_BATCH)
         # by axes, as numpy is slow at rows of three
-        inside = np.ascontiguousarray(coordinates[some].T, np.float32)
+        inside = np.ascontiguousarray(coordinates[batch].T, np.float32)
         for place, count in zip(inside, shape, strict=True):
             np.clip(place, 0.0, count - 1, out=place)
         cell = np.minimum(inside.astype(np.int32), np.array(shape, np.int32)[:, None] - 2)
@@ -218,14 +225,16 @@ def sample(grids: Floats, coordinates: Floats) -> Floats:
         corners = [low + (along_x * x + along_y * y) for x in (0, 1) for y in (0, 1)]
         ends = [(corner, corner + 1) for corner in corners]
         for grid, target in zip(flat, found, strict=True):
-            edges = [_between(grid.take(one), grid.take(other), inside[2]) for one, other in ends]
-            near = _between(edges[0], edges[1], inside[1])
-            far = _between(edges[2], edges[3], inside[1])
-            target[some] = _between(near, far, inside[0])
+            edges = [
+                _lerp_in_place(grid.take(one), grid.take(other), inside[2]) for one, other in ends
+            ]
+            near = _lerp_in_place(edges[0], edges[1], inside[1])
+            far = _lerp_in_place(edges[2], edges[3], inside[1])
+            target[batch] = _lerp_in_place(near, far, inside[0])
     return found
 
 
-def _between(one: Floats, other: Floats, part: Floats) -> Floats:
+def _lerp_in_place(one: Floats, other: Floats, part: Floats) -> Floats:
     """Linear interpolation, written to `one`; overwrites `other` too."""
     other -= one
     other *= part
@@ -241,7 +250,7 @@ def _flat_index(points: Floats, grid: Grid) -> Ints:
     return (x * grid.shape[1] + y) * grid.shape[2] + z
 
 
-def _spread(values: Floats) -> Floats:
+def _blurred(values: Floats) -> Floats:
     """Each value shared with its neighbours along each axis, 1/8, 3/4, 1/8; the border is empty."""
     for axis in range(3):
         shared = 0.75 * values
@@ -252,7 +261,7 @@ def _spread(values: Floats) -> Floats:
     return values
 
 
-def _thickened(values: Floats) -> Floats:
+def _dilated(values: Floats) -> Floats:
     """The largest of each cell and its six neighbours: no diagonal step gets through a shell."""
     result = values.copy()
     for axis in range(3):
@@ -262,7 +271,7 @@ def _thickened(values: Floats) -> Floats:
     return result
 
 
-def small_triangles(corners: Floats, size: float, low: Floats, high: Floats) -> Floats:
+def subdivided_triangles(corners: Floats, size: float, low: Floats, high: Floats) -> Floats:
     """Triangles (t, 3, 3) cut up until no edge is longer than size, (n, 3, 3), near the box only.
 
     Triangles are quartered until they are small; what leaves the box is dropped on the way, so

@@ -9,10 +9,10 @@ becomes
   of the direction (Ramamoorthi and Hanrahan 2001, "An Efficient Representation for Irradiance
   Environment Maps"). The light on a matt surface is the same polynomial with each order damped.
 
-Marschner's hair is lit from the eight corners of a cube as by eight more lights, each for the light
-from an eighth of all directions; their occlusion comes from a grid (ambient.openness_field), not
-from maps. Kajiya-Kay's is lit as a matt surface. Twin of gpu_shaders/lib_environment.glsl, and of
-`hair_ambient` in lib_hair_light.glsl.
+Marschner's hair is lit from the middles of the eight octants as by eight more lights, each for the
+light from an eighth of all directions; their occlusion comes from a grid (ambient.openness_field),
+not from maps. Kajiya-Kay's is lit as a matt surface. Twin of gpu_shaders/lib_environment.glsl, and
+of `hair_ambient` in lib_hair_light.glsl.
 """
 
 from __future__ import annotations
@@ -27,27 +27,27 @@ from ..arrays import Floats, Ints
 from .lights import Color, Light
 from .luminance import LUMINANCE
 
-#: size of the reduced panorama, from which suns and harmonics are found [pixels]
+#: size of the downsampled panorama, from which suns and harmonics are found [pixels]
 ROWS, COLUMNS = 128, 256
 #: damping of orders 1 and 2 by Lambert's cosine, relative to order 0
-MATT = (2.0 / 3.0, 1.0 / 4.0)
+LAMBERT_DAMPING = (2.0 / 3.0, 1.0 / 4.0)
 #: damping of orders 1 and 2 by the mean over an eighth of all directions, at its middle
-EIGHTH = (0.5 * np.sqrt(3.0), 2.0 / np.pi)
+OCTANT_DAMPING = (0.5 * np.sqrt(3.0), 2.0 / np.pi)
 #: minimum fraction of a direction's light that arrives: that is seven strands
-CLOSED = 1.0e-3
+MIN_OPENNESS = 1.0e-3
 #: angle over which light from an eighth of all directions blurs a highlight along the strand [rad]
-CORNER_BLUR = np.pi / 8.0
+OCTANT_BLUR = np.pi / 8.0
 #: a lobe's minimum brightness over the mean around it; its radius [rad]; its minimum fraction of
 #: all light
-_BRIGHTER, _LOBE, _LOBE_LIGHT = 3.0, np.radians(25.0), 0.03
+_MIN_CONTRAST, _LOBE_RADIUS, _MIN_LOBE_FRACTION = 3.0, np.radians(25.0), 0.03
 _MAX_SUNS = 2
 #: number of the brightest pixels, which may be a lobe's middle; radius of the light summed around
 #: each [rad]
-_CANDIDATES, _SMOOTH = 1024, np.radians(12.0)
+_CANDIDATES, _SMOOTHING_RADIUS = 1024, np.radians(12.0)
 #: harmonics are left out if all are below this fraction of the ambient light
-_EVEN = 1e-3
+_MIN_VARIATION = 1e-3
 #: mean squares of the eight harmonics over all directions
-_SQUARES = np.array([1 / 3, 1 / 3, 1 / 3, 1 / 15, 1 / 15, 4 / 5, 1 / 15, 4 / 15])
+_MEAN_SQUARES = np.array([1 / 3, 1 / 3, 1 / 3, 1 / 15, 1 / 15, 4 / 5, 1 / 15, 4 / 15])
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +69,7 @@ class Environment:
 
 def world_suns(lights: tuple[Light, ...]) -> tuple[Light, ...]:
     """The lights that are bright lobes of the world."""
-    return tuple(light for light in lights if light.of_world)
+    return tuple(light for light in lights if light.is_from_world)
 
 
 def environment_of(panorama: Floats, turn: Floats | None = None) -> Environment:
@@ -78,19 +78,21 @@ def environment_of(panorama: Floats, turn: Floats | None = None) -> Environment:
     Args:
         turn: (3, 3) from the panorama's directions to those of the world; None: they are the same.
     """
-    radiance = reduced(panorama)
+    radiance = downsampled(panorama)
     directions, weights = panorama_directions(*radiance.shape[:2])
     if turn is not None:
         directions = directions @ np.asarray(turn).T
     directions, weights = directions.reshape(-1, 3), weights.ravel()
-    rest, suns = _without_suns(radiance.reshape(-1, 3), directions, weights)
-    ambient = weights @ rest / (4.0 * np.pi)
-    projected = (harmonics_at(directions) * weights[:, None]).T @ rest
-    harmonics = projected / (4.0 * np.pi * _SQUARES[:, None])
-    is_even = bool((np.abs(harmonics) <= _EVEN * max(float(ambient.max()), 1e-30)).all())
+    remainder, suns = _split_suns(radiance.reshape(-1, 3), directions, weights)
+    ambient = weights @ remainder / (4.0 * np.pi)
+    projected = (harmonics_at(directions) * weights[:, None]).T @ remainder
+    harmonics = projected / (4.0 * np.pi * _MEAN_SQUARES[:, None])
+    is_uniform = bool(
+        (np.abs(harmonics) <= _MIN_VARIATION * max(float(ambient.max()), 1e-30)).all()
+    )
     red, green, blue = ambient.tolist()
     return Environment(
-        (red, green, blue), None if is_even else harmonics.astype(np.float32), tuple(suns)
+        (red, green, blue), None if is_uniform else harmonics.astype(np.float32), tuple(suns)
     )
 
 
@@ -107,7 +109,7 @@ def panorama_directions(rows: int, columns: int) -> tuple[Floats, Floats]:
     return directions, np.broadcast_to(band, (rows, columns))
 
 
-def reduced(panorama: Floats) -> Floats:
+def downsampled(panorama: Floats) -> Floats:
     """A panorama of about ROWS x COLUMNS pixels at most, with the same light: every pixel counts,
     and small panoramas have theirs divided.
 
@@ -116,63 +118,65 @@ def reduced(panorama: Floats) -> Floats:
     for axis, count in enumerate((ROWS, COLUMNS)):
         panorama = np.repeat(panorama, max(count // panorama.shape[axis], 1), axis=axis)
     edges = np.linspace(-0.5 * np.pi, 0.5 * np.pi, len(panorama) + 1)
-    by_rows = _averaged(panorama, ROWS, np.diff(np.sin(edges)))
+    by_rows = _area_means(panorama, ROWS, np.diff(np.sin(edges)))
     by_columns = np.moveaxis(by_rows, 1, 0)
-    return np.moveaxis(_averaged(by_columns, COLUMNS, np.ones(len(by_columns))), 0, 1)
+    return np.moveaxis(_area_means(by_columns, COLUMNS, np.ones(len(by_columns))), 0, 1)
 
 
-def _averaged(picture: Floats, most: int, weights: Floats) -> Floats:
-    """Weighted means of at most `most` equal parts of the first axis."""
+def _area_means(picture: Floats, max_count: int, weights: Floats) -> Floats:
+    """Weighted means of at most `max_count` equal parts of the first axis."""
     count = len(picture)
-    edges = np.linspace(0.0, count, min(count, most) + 1)
+    edges = np.linspace(0.0, count, min(count, max_count) + 1)
     found = []
     for low, high in itertools.pairwise(edges):
         inside = np.arange(int(low), min(int(np.ceil(high - 1e-9)), count))
         # a pixel that lies in two parts counts in each by its overlap
         cover = np.minimum(inside + 1.0, high) - np.maximum(inside, low)
         cover = cover * weights[inside]
-        found.append(np.tensordot(cover / cover.sum(), _lit(picture[inside]), 1))
+        found.append(np.tensordot(cover / cover.sum(), _finite_radiance(picture[inside]), 1))
     return np.array(found)
 
 
-def _lit(pixels: Floats) -> Floats:
+def _finite_radiance(pixels: Floats) -> Floats:
     """Pixels as Cycles reads them: black where a channel is not finite."""
     is_finite = np.isfinite(pixels).all(axis=-1, keepdims=True)
     return np.where(is_finite, np.maximum(pixels, 0.0), 0.0).astype(np.float64)
 
 
-def _without_suns(
+def _split_suns(
     radiance: Floats, directions: Floats, weights: Floats
 ) -> tuple[Floats, list[Light]]:
     """What remains of the radiance, and the brightest lobes as suns, brightest first."""
-    whole = float(weights @ radiance @ LUMINANCE)
+    total = float(weights @ radiance @ LUMINANCE)
     suns: list[Light] = []
-    while len(suns) < _MAX_SUNS and whole > 0.0:
+    while len(suns) < _MAX_SUNS and total > 0.0:
         bright = radiance @ LUMINANCE
         # the remainder of a lobe is not another sun
         for sun in suns:
-            bright[directions @ np.array(sun.vector) > np.cos(2.0 * _LOBE)] = 0.0
-        is_near = directions @ _brightest(bright * weights, directions) > np.cos(_LOBE)
+            bright[directions @ np.array(sun.vector) > np.cos(2.0 * _LOBE_RADIUS)] = 0.0
+        is_near = directions @ _brightest_direction(bright * weights, directions) > np.cos(
+            _LOBE_RADIUS
+        )
         around = float(weights[~is_near] @ bright[~is_near] / weights[~is_near].sum())
-        excess = np.maximum(bright - _BRIGHTER * around, 0.0) / np.maximum(bright, 1e-30)
-        taken = radiance * np.where(is_near, excess, 0.0)[:, None]
-        flux = taken @ LUMINANCE * weights
-        if flux.sum() < _LOBE_LIGHT * whole:
+        excess = np.maximum(bright - _MIN_CONTRAST * around, 0.0) / np.maximum(bright, 1e-30)
+        lobe = radiance * np.where(is_near, excess, 0.0)[:, None]
+        flux = lobe @ LUMINANCE * weights
+        if flux.sum() < _MIN_LOBE_FRACTION * total:
             break
         middle = flux @ directions
         # of a disk: 1 - cos is on average half of that at its rim
         depth = 1.0 - float(np.linalg.norm(middle)) / float(flux.sum())
         angle = 2.0 * float(np.arccos(np.clip(1.0 - 2.0 * depth, 0.0, 1.0)))
-        light = Light.sun(-middle, weights @ taken, 1.0, angle)
-        suns.append(replace(light, of_world=True, name="World"))
-        radiance = radiance - taken
+        light = Light.sun(-middle, weights @ lobe, 1.0, angle)
+        suns.append(replace(light, is_from_world=True, name="World"))
+        radiance = radiance - lobe
     return radiance, suns
 
 
-def _brightest(flux: Floats, directions: Floats) -> Floats:
+def _brightest_direction(flux: Floats, directions: Floats) -> Floats:
     """The direction with the most flux around it."""
     strongest = np.argsort(flux)[-_CANDIDATES:]
-    around = directions[strongest] @ directions[strongest].T > np.cos(_SMOOTH)
+    around = directions[strongest] @ directions[strongest].T > np.cos(_SMOOTHING_RADIUS)
     middle: Floats = directions[strongest[(around @ flux[strongest]).argmax()]]
     return middle
 
@@ -183,43 +187,44 @@ def harmonics_at(directions: Floats) -> Floats:
     return np.stack([x, y, z, x * y, y * z, 3.0 * z * z - 1.0, x * z, x * x - y * y], axis=-1)
 
 
-def light_from(
-    environment: Environment, directions: Floats, kept: tuple[float, float] = (1.0, 1.0)
+def radiance_from(
+    environment: Environment, directions: Floats, damping: tuple[float, float] = (1.0, 1.0)
 ) -> Floats:
-    """Radiance from directions (..., 3) without the suns, with orders 1 and 2 damped by `kept`."""
+    """Radiance from directions (..., 3) without the suns, with orders 1 and 2 damped by
+    `damping`."""
     ambient = np.broadcast_to(environment.ambient, np.shape(directions))
     if environment.harmonics is None:
         return ambient
-    damped = np.repeat(kept, (3, 5))[:, None] * environment.harmonics
+    damped = np.repeat(damping, (3, 5))[:, None] * environment.harmonics
     return np.maximum(ambient + harmonics_at(directions) @ damped, 0.0)
 
 
-def matt_light(environment: Environment, normals: Floats) -> Floats:
+def diffuse_light(environment: Environment, normals: Floats) -> Floats:
     """Irradiance over pi on surfaces with normals (..., 3), without the suns."""
-    return light_from(environment, normals, MATT)
+    return radiance_from(environment, normals, LAMBERT_DAMPING)
 
 
-def corner_direction(corner: Ints) -> Floats:
+def octant_direction(octant: Ints) -> Floats:
     """The direction that represents an eighth of all directions, 0 to 7, (..., 3)."""
-    sides = np.stack([corner & 1, (corner >> 1) & 1, corner >> 2], axis=-1)
+    sides = np.stack([octant & 1, (octant >> 1) & 1, octant >> 2], axis=-1)
     found: Floats = (2.0 * sides - 1.0) / np.sqrt(3.0)
     return found
 
 
-def corner_light(environment: Environment, corner: Ints) -> Floats:
-    """Irradiance from a corner on a surface that faces it, (..., 3)."""
-    return 0.5 * np.pi * light_from(environment, corner_direction(corner), EIGHTH)
+def octant_light(environment: Environment, octant: Ints) -> Floats:
+    """Irradiance from an octant on a surface that faces its middle, (..., 3)."""
+    return 0.5 * np.pi * radiance_from(environment, octant_direction(octant), OCTANT_DAMPING)
 
 
-def open_path(openness: Floats, towards: Floats) -> Floats:
+def path_from_openness(openness: Floats, towards: Floats) -> Floats:
     """Number of strands between a place of hair and a direction, and beyond the place, (..., 2).
 
     Args:
         openness: (..., 4), see ambient.openness_field. towards: (..., 3).
     """
-    mean, bent = openness[..., 0], np.sum(openness[..., 1:] * towards, axis=-1)
-    both: Floats = np.stack([mean + bent, mean - bent], axis=-1)
-    return -np.log(np.clip(both, CLOSED, 1.0))
+    mean, directional = openness[..., 0], np.sum(openness[..., 1:] * towards, axis=-1)
+    openings: Floats = np.stack([mean + directional, mean - directional], axis=-1)
+    return -np.log(np.clip(openings, MIN_OPENNESS, 1.0))
 
 
 def hair_ambient(
@@ -230,19 +235,19 @@ def hair_ambient(
     Args:
         openness: (..., 4), see ambient.openness_field.
         hair_light: light of one lamp that hair sends out, (..., 3), radiance over irradiance, by
-            the direction towards the lamp (..., 3) and `open_path` there (..., 2).
+            the direction towards the lamp (..., 3) and `path_from_openness` there (..., 2).
     """
     found = np.zeros((*openness.shape[:-1], 3))
-    corners = np.arange(8)
+    octants = np.arange(8)
     for power, toward in zip(
-        corner_light(environment, corners), corner_direction(corners), strict=True
+        octant_light(environment, octants), octant_direction(octants), strict=True
     ):
         towards = np.broadcast_to(toward, found.shape)
-        found += power * hair_light(towards, open_path(openness, towards))
+        found += power * hair_light(towards, path_from_openness(openness, towards))
     return found
 
 
-def openness_by_occlusion(occlusion: Floats, away: Floats) -> Floats:
+def openness_from_occlusion(occlusion: Floats, away: Floats) -> Floats:
     """Openness (..., 4) where only occlusion (...) is known: towards `away`, outwards of the hair,
     (..., 3)."""
     ahead = np.concatenate([np.ones((*away.shape[:-1], 1)), away], axis=-1)

@@ -81,7 +81,8 @@ class Light:
     panel: of an area light.
     casts_shadow: whether hair and meshes block it.
     name: as the artist sees it.
-    of_world: it is a bright lobe of the world, and shines only where the world's light is used.
+    is_from_world: it is a bright lobe of the world, and shines only where the world's light is
+    used.
     """
 
     kind: Literal["sun", "point", "spot", "area"]
@@ -93,7 +94,7 @@ class Light:
     panel: Panel | None = None
     casts_shadow: bool = True
     name: str = field(default="", compare=False)
-    of_world: bool = False
+    is_from_world: bool = False
     angle: float = 0.0
 
     @classmethod

@@ -17,7 +17,7 @@ from hairloom.addon.blender.scene.world import studio_environment
 from hairloom.addon.blender.sessions.session import Session
 from hairloom.addon.blender.viewport.overlay import lit
 from hairloom.addon.render.snapshot import Snapshot
-from hairloom.addon.shading.environment import light_from
+from hairloom.addon.shading.environment import radiance_from
 from hairloom.addon.shading.lights import (
     LIGHT_CAPACITY,
     Light,
@@ -49,7 +49,7 @@ def test_eight_that_are_brightest_at_the_hair_are_kept_and_the_artist_is_told():
         add("POINT", (0.0, 0.0, 1.0 + place), energy=10.0)
     assert len(lights()) == LIGHT_CAPACITY
     assert warnings() == ()
-    sun = Light("sun", (1.0, 0.0, 0.0), (2.0, 2.0, 2.0), of_world=True)
+    sun = Light("sun", (1.0, 0.0, 0.0), (2.0, 2.0, 2.0), is_from_world=True)
     (warning,) = warnings(sun)
     assert warning.startswith("Lights: 9 shine here (1 from the world), but")
     far = add("POINT", (0.0, 0.0, 100.0), energy=1000.0)
@@ -181,7 +181,7 @@ def bare(**values: Any) -> Snapshot:
 def test_hair_is_lit_as_blender_lights_the_rest_and_never_black() -> None:
     """The view's HDRI is used where Blender uses it, studio lights if there is no light at all."""
     studio, lamp, world = three_point_lights(np.eye(4)), Light.sun((0, 0, -1), (1, 1, 1), 1.0), 0.3
-    sun = Light("sun", (1.0, 0.0, 0.0), (2.0, 2.0, 2.0), of_world=True)
+    sun = Light("sun", (1.0, 0.0, 0.0), (2.0, 2.0, 2.0), is_from_world=True)
 
     def shown(shading: Any, lamps: Any, grey: float) -> Any:
         snapshot = lit(bare(lights=lamps, ambient=(grey, grey, grey)), shading, studio)
@@ -217,8 +217,8 @@ def test_the_views_picture_turns_and_gets_brighter() -> None:
     assert turned.ambient == pytest.approx(still.ambient)
     # the lookup is turned by a quarter, so the light turns the other way
     x, y, z = np.eye(3)
-    assert light_from(turned, -y) == pytest.approx(light_from(still, x), rel=1e-3)
-    assert light_from(turned, z) == pytest.approx(light_from(still, z), rel=1e-3)
+    assert radiance_from(turned, -y) == pytest.approx(radiance_from(still, x), rel=1e-3)
+    assert radiance_from(turned, z) == pytest.approx(radiance_from(still, z), rel=1e-3)
 
 
 def test_a_light_that_is_deleted_shines_no_longer(new_hair: Any, sphere: Any) -> None:

@@ -17,8 +17,8 @@ from hairloom.addon.blender.cards.show import without_strands  # noqa: E402
 from hairloom.addon.blender.preview import previews, scene_events  # noqa: E402
 from hairloom.addon.blender.strands.read_hair import ExportRequest, still_hair  # noqa: E402
 from hairloom.addon.blender.viewport import overlay  # noqa: E402
-from hairloom.addon.shading.coat import coated_color  # noqa: E402
 from hairloom.addon.shading.settings import ShadingSettings  # noqa: E402
+from hairloom.addon.shading.wet_and_dusty import wet_and_dusty_color  # noqa: E402
 from hairloom.addon.strands import StrandSet  # noqa: E402
 
 RED, BLUE = (0.8, 0.02, 0.03), (0.01, 0.05, 0.6)
@@ -67,7 +67,7 @@ def test_colours_of_wet_hair_are_seen_in_the_preview(
         hair.data.hairloom.shading.wetness = wetness
         scene_events.catch_up(get_depsgraph())
         shown = overlay.drawing_of(session.uid).snapshot.color
-        expected = coated_color(dry, ShadingSettings(wetness=wetness))
+        expected = wet_and_dusty_color(dry, ShadingSettings(wetness=wetness))
         np.testing.assert_allclose(shown, expected, atol=1e-6)
 
 

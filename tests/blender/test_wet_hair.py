@@ -17,9 +17,9 @@ from hairloom.addon.blender.preview.preview import rig_for
 from hairloom.addon.blender.properties.groom_settings import GroomSettings
 from hairloom.addon.blender.scene.source import read_source
 from hairloom.addon.dynamics.settings import DynamicsSettings
-from hairloom.addon.shading.coat import coated_color
 from hairloom.addon.shading.drawn_strands import look_color
 from hairloom.addon.shading.settings import ShadingSettings
+from hairloom.addon.shading.wet_and_dusty import wet_and_dusty_color
 
 
 @pytest.fixture
@@ -79,7 +79,7 @@ def test_hair_made_real_has_its_water_within_it(hair: Any) -> None:
     shading = hair.data.hairloom.shading
     shading.base_color, shading.color_variation, shading.wetness = (0.4, 0.2, 0.1), 0.0, 1.0
     look = GroomSettings.of(hair)[ShadingSettings]
-    expected = coated_color(np.array([0.4, 0.2, 0.1]), ShadingSettings(wetness=1.0))
+    expected = wet_and_dusty_color(np.array([0.4, 0.2, 0.1]), ShadingSettings(wetness=1.0))
     np.testing.assert_allclose(look_color(look), expected, rtol=1e-5)
     assert bpy.ops.hairloom.make_real() == {"FINISHED"}
     real = bpy.context.active_object

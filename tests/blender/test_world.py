@@ -14,8 +14,8 @@ from hairloom.addon.blender.scene import world as world_module
 from hairloom.addon.blender.scene.world import read_environment, world_notes
 from hairloom.addon.shading.environment import (
     Environment,
-    light_from,
     panorama_directions,
+    radiance_from,
 )
 
 DIRECTIONS, _ = panorama_directions(12, 24)
@@ -49,8 +49,8 @@ def by_cycles(scene: Any) -> Environment:
 
 def assert_alike(found: Environment, expected: Environment) -> None:
     assert found.ambient == pytest.approx(expected.ambient, rel=0.02)
-    assert light_from(found, DIRECTIONS) == pytest.approx(
-        light_from(expected, DIRECTIONS), abs=0.05
+    assert radiance_from(found, DIRECTIONS) == pytest.approx(
+        radiance_from(expected, DIRECTIONS), abs=0.05
     )
     for ours, theirs in zip(found.suns, expected.suns, strict=True):
         assert np.degrees(np.arccos(min(np.dot(ours.vector, theirs.vector), 1.0))) < 1.0
@@ -159,7 +159,7 @@ def test_a_sky_is_rendered_once(scene: Any, monkeypatch: pytest.MonkeyPatch) -> 
     assert not world_notes(scene) and found.harmonics is not None
     assert np.arcsin(found.suns[0].vector[2]) == pytest.approx(0.6, abs=0.02)
     # bluer overhead than at the horizon
-    above, beside = light_from(found, np.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]))
+    above, beside = radiance_from(found, np.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]))
     assert above[2] / above[0] > beside[2] / beside[0]
     assert read_environment(scene) is found and len(runs) == 1
     sky.sun_elevation = 0.5

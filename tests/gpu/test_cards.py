@@ -121,10 +121,10 @@ def test_marschner_shades_cards_as_strands(
     """Against the reference of a strand at the same place; the base texture is the ratio of that
     strand's colour to the mean. sky: openness in the card's axes, or None."""
     from hairloom.addon.shading.environment import (
-        CORNER_BLUR,
+        OCTANT_BLUR,
         Environment,
         hair_ambient,
-        openness_by_occlusion,
+        openness_from_occlusion,
     )
     from hairloom.addon.shading.marschner.look import (
         fibre_of,
@@ -154,7 +154,7 @@ def test_marschner_shades_cards_as_strands(
     )
     picture = frame.render_image(snapshot, front, SIZE, SIZE, 1)
     tables = marschner_tables(shape_of(fibre_of(look)), snapshot.table_size)
-    level = table_level(CORNER_BLUR, snapshot.table_size)
+    level = table_level(OCTANT_BLUR, snapshot.table_size)
     for row, column in ((20, 30), (48, 50), (90, 7)):
         u, z = (column + 0.5) / SIZE, (row + 0.5) / SIZE
         point = np.array([u, 0.0, z])
@@ -174,7 +174,7 @@ def test_marschner_shades_cards_as_strands(
             absorption=absorption,
             shading=look,
         )
-        openness = openness_by_occlusion(occlusion, normal)
+        openness = openness_from_occlusion(occlusion, normal)
         if sky is not None:
             axes = np.stack([each[0] for each in mesh.axes])
             openness = np.append(sky[0], np.array(sky[1:]) @ axes)

@@ -16,12 +16,12 @@ from hairloom.addon.render.camera import Camera, look_at, perspective
 from hairloom.addon.render.snapshot import MeshSnapshot, Snapshot
 from hairloom.addon.shading.environment import (
     Environment,
-    corner_light,
+    diffuse_light,
     environment_of,
-    light_from,
-    matt_light,
-    open_path,
+    octant_light,
     panorama_directions,
+    path_from_openness,
+    radiance_from,
 )
 from hairloom.addon.shading.lights import pack_lights
 from hairloom.addon.shading.settings import ShadingSettings
@@ -56,11 +56,13 @@ def test_twins(compute: Callable[..., np.ndarray]) -> None:
         blocks={"lights": ("Lights", block)},
         structs=("struct_lights.glsl",),
     )
-    assert found[0, :, :3] == pytest.approx(light_from(environment, towards, (0.9, 0.7)), abs=1e-5)
-    assert found[1, :, :3] == pytest.approx(matt_light(environment, towards), abs=1e-5)
-    corners = corner_light(environment, np.arange(count) % 8)
+    assert found[0, :, :3] == pytest.approx(
+        radiance_from(environment, towards, (0.9, 0.7)), abs=1e-5
+    )
+    assert found[1, :, :3] == pytest.approx(diffuse_light(environment, towards), abs=1e-5)
+    corners = octant_light(environment, np.arange(count) % 8)
     assert found[2, :, :3] == pytest.approx(corners, abs=1e-5)
-    assert found[3, :, :2] == pytest.approx(open_path(openness, towards), abs=1e-3)
+    assert found[3, :, :2] == pytest.approx(path_from_openness(openness, towards), abs=1e-3)
 
 
 def lit(environment: Environment, turn: np.ndarray, model: str = "marschner") -> Snapshot:

@@ -12,10 +12,10 @@ from tiers import few_in_commits
 
 from hairloom.addon.refine.settings import DetailSettings
 from hairloom.addon.shading.environment import (
-    CORNER_BLUR,
+    OCTANT_BLUR,
     Environment,
     hair_ambient,
-    openness_by_occlusion,
+    openness_from_occlusion,
 )
 from hairloom.addon.shading.kajiya_kay import strand_normal
 from hairloom.addon.shading.lights import Light, light_at
@@ -104,7 +104,7 @@ def test_a_pixel_has_the_colour_of_the_reference(
     away = (point - CENTER) / np.linalg.norm(point - CENTER, axis=-1, keepdims=True)
     expected += hair_ambient(
         Environment(ambient),
-        openness_by_occlusion(occlusion, away),
+        openness_from_occlusion(occlusion, away),
         lambda towards, path: marschner_light(
             tables,
             tangent,
@@ -115,7 +115,7 @@ def test_a_pixel_has_the_colour_of_the_reference(
             sparkle,
             absorption,
             shading,
-            level=table_level(CORNER_BLUR, size),
+            level=table_level(OCTANT_BLUR, size),
             tau=path[..., 0],
         ),
     )

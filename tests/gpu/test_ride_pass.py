@@ -305,7 +305,7 @@ def test_strands_that_ride_are_led_out(monkeypatch: pytest.MonkeyPatch, rounds: 
     iterations."""
     from hairloom.addon.render import ride_pass
 
-    monkeypatch.setattr(ride_pass, "_POINT_ROUNDS", rounds)
+    monkeypatch.setattr(ride_pass, "_ITERATIONS_PER_POINT", rounds)
     rig = rig_on(ball(), 700)
     ride, pose, offsets = pass_of(rig), deformed(rig.head), rig.strands.offsets
     head = SphereCollider(ABOVE_GROUND, 0.11)

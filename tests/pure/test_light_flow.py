@@ -15,7 +15,7 @@ from hairloom.addon.groom.settings import GuideSettings
 from hairloom.addon.light_flow import quick_light, rest_light, updated_light
 from hairloom.addon.rig_flow import Rig
 from hairloom.addon.shading import skin_seen
-from hairloom.addon.shading.ambient import occlusion_by
+from hairloom.addon.shading.ambient import occlusion_from_sky
 from hairloom.addon.shading.ambient_settings import AmbientSettings
 from hairloom.addon.strands import StrandSet
 
@@ -58,7 +58,7 @@ def test_quick_light_is_the_fields_at_some_points_and_straight_between(rig: Rig)
     quick = quick_light(other, SETTINGS, (rig, light))
     assert quick.is_quick and not light.is_quick and quick.fields is fields
     factors = light_flow.ambient_of(rig, SETTINGS)
-    own = occlusion_by(fields.sky.at(other.strands.points)[0], factors)
+    own = occlusion_from_sky(fields.sky.at(other.strands.points)[0], factors)
     first, last = rig.strands.offsets[:-1], rig.strands.offsets[1:] - 1
     for at in (first, last):
         np.testing.assert_array_equal(quick.occlusion[at], own[at])

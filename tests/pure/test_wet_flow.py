@@ -13,8 +13,8 @@ from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.groom.children_settings import ChildrenSettings
 from hairloom.addon.paint_flow import with_colors
 from hairloom.addon.params import SettingsMap
-from hairloom.addon.shading.coat import coated_color
 from hairloom.addon.shading.settings import ShadingSettings
+from hairloom.addon.shading.wet_and_dusty import wet_and_dusty_color
 from hairloom.addon.wet_flow import (
     SOAKED_WATER_MASS,
     effective_settings,
@@ -75,7 +75,7 @@ def test_own_colours_of_strands_are_wet_too() -> None:
     color = np.full((strands.point_count, 3), 0.4, np.float32)
     colored = replace(strands, color=color)
     np.testing.assert_allclose(
-        with_colors(colored, None, WET).color, coated_color(color, WET), rtol=1e-6
+        with_colors(colored, None, WET).color, wet_and_dusty_color(color, WET), rtol=1e-6
     )
     assert with_colors(colored, None, ShadingSettings()) is colored
     by_look = replace(WET, color_source="look")

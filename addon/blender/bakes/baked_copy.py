@@ -8,8 +8,8 @@ from __future__ import annotations
 import bpy
 
 from ...paint_flow import with_colors
-from ...shading.coat import coated
 from ...shading.settings import ShadingSettings
+from ...shading.wet_and_dusty import wet_and_dusty_look
 from ..base.attributes import read_attribute, set_attribute
 from ..base.objects import link_into, remove_hair
 from ..properties.properties import settings_of
@@ -102,7 +102,7 @@ def _fill(
     depsgraph: bpy.types.Depsgraph,
 ) -> None:
     """The bake's strands at rest, with the look of the hair."""
-    look = coated(settings_of(hair.data.hairloom.shading, ShadingSettings))
+    look = wet_and_dusty_look(settings_of(hair.data.hairloom.shading, ShadingSettings))
     head = rig.rig.head
     colors, _ = read_colors(hair, depsgraph, None if head is None else len(head.triangles))
     strands = with_colors(rig.rig.strands, colors, look)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import bpy
 
 from ...errors import HairloomError
-from ...shading.coat import coated
 from ...shading.settings import ShadingSettings
+from ...shading.wet_and_dusty import wet_and_dusty_look
 from ..properties import changed
 from ..properties.properties import settings_of
 from .hair_material import is_as_made, is_behind, look_material, put_colors, put_look_material
@@ -77,7 +77,7 @@ def _put_again(owner: bpy.types.Curves) -> None:
 
 
 def _look_of(curves: bpy.types.Curves) -> ShadingSettings:
-    return coated(settings_of(curves.hairloom.shading, ShadingSettings))
+    return wet_and_dusty_look(settings_of(curves.hairloom.shading, ShadingSettings))
 
 
 LISTENER = ("settings", follow)

@@ -27,7 +27,7 @@ from ...arrays import Floats
 from ...errors import HairloomError
 from ...exchange.files.child_process import python_program, run_child
 from ...exchange.textures.texture_files import read_texture
-from ...shading.environment import Environment, environment_of, reduced
+from ...shading.environment import Environment, downsampled, environment_of
 from ..base.blender_program import blender_command
 from ..base.images import read_image
 from ..base.latest_job import LatestJob
@@ -96,7 +96,7 @@ def _studio(path: str, rotation: float, intensity: float) -> Environment:
 def _studio_panorama(path: str) -> Floats | None:
     """None: it cannot be read, and Blender's own view is black."""
     try:
-        return reduced(_rgb(read_texture(Path(path), is_color=True)))
+        return downsampled(_rgb(read_texture(Path(path), is_color=True)))
     except HairloomError as error:
         print(f"Studio light: {error}")
         return None
@@ -275,7 +275,7 @@ def _panorama(uid: int, _state: Hashable) -> Floats:
     """
     image = next(each for each in bpy.data.images if each.session_uid == uid)
     pixels = read_image(image, is_color=True, place=f"Image '{image.name}'")
-    return reduced(pixels[..., :3] * pixels[..., 3:])
+    return downsampled(pixels[..., :3] * pixels[..., 3:])
 
 
 def _rgb(picture: Floats) -> Floats:

@@ -19,12 +19,12 @@ from ...render.hair_ball import HairBall
 from ...render.snapshot import SECTIONS, Snapshot
 from ...render.strand_layout import StrandLayout
 from ...rig_flow import Pose, Rig, Solids, strand_seeds
-from ...shading.coat import is_coated
 from ...shading.marschner.look import fibre_of
 from ...shading.marschner.tables import DEFAULT_SIZE, PREVIEW_SIZE, shape_of
 from ...shading.settings import ShadingSettings
 from ...shading.volume.settings import VolumeSettings
 from ...shading.volume.shadow_lights import shadow_warnings
+from ...shading.wet_and_dusty import is_wet_or_dusty
 from ...strands import Surface
 from ..cards.show import ShownCards
 from ..properties.groom_settings import GroomSettings
@@ -160,7 +160,7 @@ class GroomPicture:
     def take_settings(self, rig: Rig, was: GroomSettings, now: GroomSettings) -> bool:
         """Take over settings that act at once; returns whether `show` must be called again."""
         looks = was[ShadingSettings], now[ShadingSettings]
-        if looks[0] != looks[1] and any(look.color_map or is_coated(look) for look in looks):
+        if looks[0] != looks[1] and any(look.color_map or is_wet_or_dusty(look) for look in looks):
             self.take_colors(rig, self._colors, now)
         self.snapshot = with_settings(self.snapshot, now)
         if not shapes_alike(was[ShadingSettings], now[ShadingSettings]) and not bpy.app.background:

@@ -20,8 +20,8 @@ from ...groom.settings import GrowSettings
 from ...groom.widths import with_widths
 from ...parameters import ALL_SETTINGS
 from ...refine.lead_out_at_rest import are_inside, led_out_at_rest
-from ...shading.coat import coated
 from ...shading.settings import ShadingSettings
+from ...shading.wet_and_dusty import wet_and_dusty_look
 from ...strands import StrandSet, Surface
 from ...strands.affine import mean_scale
 from ...strands.face import is_face_hair
@@ -196,7 +196,9 @@ def add_hairstyle(
         warnings = (*growth.warnings, *_leave_out_inside(hair, growth))
     hair.hairloom.children_density = masks.get("children", "")
     hair.hairloom.hairstyle = style.name
-    put_look_material(hair.data, coated(settings_of(hair.data.hairloom.shading, ShadingSettings)))
+    put_look_material(
+        hair.data, wet_and_dusty_look(settings_of(hair.data.hairloom.shading, ShadingSettings))
+    )
     done = _put(growth, head, collection)
     return AddedHair(hair, done, warnings)
 

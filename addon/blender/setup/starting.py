@@ -10,8 +10,8 @@ import numpy as np
 from ...dynamics.settings import DynamicsSettings
 from ...errors import HairloomError
 from ...groom.settings import GrowSettings
-from ...shading.coat import coated
 from ...shading.settings import ShadingSettings
+from ...shading.wet_and_dusty import wet_and_dusty_look
 from ..base.objects import head_of, link_into, remove_hair
 from ..base.parts import Part, Parts
 from ..properties.presets import apply, named_preset
@@ -108,7 +108,9 @@ def new_groom(
     )
     dress(hair, presets)
     fit_motion(hair, factor)
-    put_look_material(hair.data, coated(settings_of(hair.data.hairloom.shading, ShadingSettings)))
+    put_look_material(
+        hair.data, wet_and_dusty_look(settings_of(hair.data.hairloom.shading, ShadingSettings))
+    )
     return hair
 
 

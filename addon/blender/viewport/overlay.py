@@ -578,7 +578,7 @@ def lit[Shown: (Snapshot, SceneSnapshot)](
     scene: Snapshot | SceneSnapshot = shown
     own = Environment(scene.ambient, scene.harmonics, world_suns(scene.lights))
     world: Environment = own if used[1] else studio_environment(shading)
-    known: tuple[Light, ...] = tuple(light for light in scene.lights if used[light.of_world])
+    known: tuple[Light, ...] = tuple(light for light in scene.lights if used[light.is_from_world])
     # suns of the view's world picture come first, so that scene lights cannot displace them
     lights = known if used[1] else (*world.suns, *known)
     if not lights and world.is_black:

@@ -38,7 +38,7 @@ from ..marschner.look import (
 )
 from ..marschner.tables import MarschnerTables, bilinear, kept_light
 from ..settings import ShadingSettings
-from ..skin_seen import SkinSeen, far_light, plane_beneath, through_hair
+from ..skin_seen import SkinSeen, far_skin_light, plane_beneath, through_hair
 
 #: number of strands behind a place where it is unknown
 UNKNOWN_BEYOND = 4.0
@@ -308,11 +308,11 @@ def off_far_skin(
         forward, backward: fractions at this theta_d by colour and lobe, (..., 3, 4).
     """
     a_f, a_b = forward.sum(axis=-1), backward.sum(axis=-1)
-    taken = np.sqrt(np.maximum((1.0 - a_f) ** 2 - a_b**2, 0.0))
+    absorbed = np.sqrt(np.maximum((1.0 - a_f) ** 2 - a_b**2, 0.0))
     cosine = outward[..., None]
     onward = 0.5 * (a_f * (1.0 + cosine) + a_b * (1.0 - cosine))
-    lit = 2.0 / np.pi * skin * far_light(seen.received, to_light)[..., None]
-    return lit * through_hair(seen.depth[..., None], taken) * onward
+    lit = 2.0 / np.pi * skin * far_skin_light(seen.received, to_light)[..., None]
+    return lit * through_hair(seen.depth[..., None], absorbed) * onward
 
 
 def scattering_light(

@@ -318,9 +318,11 @@ def test_sums_of_light_are_those_of_each_direction() -> None:
     depth = random.random((5, 7, 6)).astype(np.float32)
     steps = [step for step, _ in sky_directions(0.0)][3::2]
     weights = random.normal(size=(3, len(steps)))
-    through = np.exp(-depth_towards(depth[None], steps, own=0.0))
+    through = np.exp(-depth_towards(depth[None], steps, own_fraction=0.0))
     np.testing.assert_allclose(
-        summed_light(depth, steps, weights, own=0.0), np.tensordot(weights, through, 1), atol=1e-5
+        summed_light(depth, steps, weights, own_fraction=0.0),
+        np.tensordot(weights, through, 1),
+        atol=1e-5,
     )
     factor = 1.0 + np.arange(len(steps), dtype=np.float32)[:, None, None, None]
     np.testing.assert_allclose(

@@ -7,18 +7,18 @@ import pytest
 
 from hairloom.addon.shading.environment import (
     COLUMNS,
-    CORNER_BLUR,
+    OCTANT_BLUR,
     ROWS,
     Environment,
-    corner_direction,
-    corner_light,
+    diffuse_light,
+    downsampled,
     environment_of,
     hair_ambient,
-    light_from,
-    matt_light,
-    open_path,
+    octant_direction,
+    octant_light,
     panorama_directions,
-    reduced,
+    path_from_openness,
+    radiance_from,
 )
 from hairloom.addon.shading.marschner.look import fibre_of, marschner_light
 from hairloom.addon.shading.marschner.tables import (
@@ -69,8 +69,8 @@ def test_irradiance_of_an_analytic_sky(radiance: np.ndarray, irradiance: object)
     found = environment_of(radiance * WHITE)
     normals = DIRECTIONS[::8, ::8]
     expected = irradiance(normals[..., 2])  # type: ignore[operator]
-    assert matt_light(found, normals)[..., 0] == pytest.approx(expected, abs=1e-3)
-    assert light_from(found, DIRECTIONS) == pytest.approx(radiance * WHITE, abs=2e-3)
+    assert diffuse_light(found, normals)[..., 0] == pytest.approx(expected, abs=1e-3)
+    assert radiance_from(found, DIRECTIONS) == pytest.approx(radiance * WHITE, abs=2e-3)
 
 
 def test_irradiance_of_half_a_sky() -> None:
@@ -79,7 +79,7 @@ def test_irradiance_of_half_a_sky() -> None:
     normals = DIRECTIONS[::8, ::8]
     assert not found.suns
     expected = 0.5 * (1.0 + normals[..., 2])
-    assert matt_light(found, normals)[..., 1] == pytest.approx(expected, abs=0.04)
+    assert diffuse_light(found, normals)[..., 1] == pytest.approx(expected, abs=0.04)
     assert whole(found) == pytest.approx(2.0 * np.pi * WHITE)
 
 
@@ -96,7 +96,7 @@ def test_a_bright_disk_is_a_sun(degrees: float) -> None:
     angle = float((ANGLES * is_sun[..., 0]).sum())
     assert sun.power == pytest.approx(color * angle, rel=0.02)
     assert found.ambient == pytest.approx(0.2 * WHITE, rel=0.05)
-    assert sun.of_world and sun.casts_shadow
+    assert sun.is_from_world and sun.casts_shadow
     # as wide as the pixels that it covers; a single pixel is a point
     width = 2.0 * np.arccos(1.0 - angle / (2.0 * np.pi))
     assert sun.angle == pytest.approx(width if is_sun.sum() > 1 else 0.0, rel=0.15)
@@ -119,7 +119,7 @@ def test_reduced_pictures_have_the_same_light(size: tuple[int, int]) -> None:
     _, angles = panorama_directions(*size)
     expected = np.einsum("rc,rcn->n", angles, picture)
     assert whole(environment_of(picture)) == pytest.approx(expected)
-    assert reduced(picture).shape[0] <= ROWS and reduced(picture).shape[1] <= COLUMNS
+    assert downsampled(picture).shape[0] <= ROWS and downsampled(picture).shape[1] <= COLUMNS
 
 
 def test_pixels_that_are_no_light_are_black() -> None:
@@ -128,7 +128,7 @@ def test_pixels_that_are_no_light_are_black() -> None:
     black = picture.copy()
     black[10, 20] = black[30, 40] = black[50, 60] = 0.0
     picture[10, 20, 0], picture[30, 40, 1], picture[50, 60] = np.nan, np.inf, -1e30
-    assert reduced(picture) == pytest.approx(reduced(black))
+    assert downsampled(picture) == pytest.approx(downsampled(black))
 
 
 def test_a_pixel_of_a_million_is_a_sun() -> None:
@@ -154,17 +154,17 @@ def test_a_quarter_turn_is_a_shift_of_columns() -> None:
     assert turned.suns[0].vector == pytest.approx(shifted.suns[0].vector)
     still = environment_of(picture)
     assert QUARTER @ still.suns[0].vector == pytest.approx(turned.suns[0].vector)
-    assert light_from(turned, DIRECTIONS @ QUARTER.T) == pytest.approx(
-        light_from(still, DIRECTIONS), abs=1e-5
+    assert radiance_from(turned, DIRECTIONS @ QUARTER.T) == pytest.approx(
+        radiance_from(still, DIRECTIONS), abs=1e-5
     )
 
 
-def test_eight_corners_have_all_light() -> None:
+def test_eight_octants_have_all_light() -> None:
     """And the right part from above: the upper half of a sky of 1 + z has 3 pi of 4 pi."""
     found = environment_of((1.0 + UP) * WHITE)
-    lights = corner_light(found, np.arange(8))
+    lights = octant_light(found, np.arange(8))
     assert lights.sum(axis=0) == pytest.approx(4.0 * np.pi * WHITE, rel=1e-4)
-    from_above = lights[corner_direction(np.arange(8))[:, 2] > 0.0].sum(axis=0)
+    from_above = lights[octant_direction(np.arange(8))[:, 2] > 0.0].sum(axis=0)
     assert from_above == pytest.approx(3.0 * np.pi * WHITE, rel=1e-3)
 
 
@@ -193,7 +193,7 @@ def test_white_hair_in_a_white_world_is_white(size: int) -> None:
             half,
             white,
             look,
-            level=table_level(CORNER_BLUR, size),
+            level=table_level(OCTANT_BLUR, size),
             tau=path[..., 0],
         ),
     )
@@ -204,6 +204,8 @@ def test_paths_of_openness() -> None:
     """With half a sky, as above a head, the path is 0 upwards and the maximum downwards."""
     openness = np.array([0.5, 0.0, 0.0, 0.75])
     up, down = np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, -1.0])
-    assert open_path(openness, up) == pytest.approx([0.0, np.log(1000.0)])
-    assert open_path(openness, down) == pytest.approx([np.log(1000.0), 0.0])
-    assert open_path(openness, np.array([1.0, 0.0, 0.0])) == pytest.approx([np.log(2.0)] * 2)
+    assert path_from_openness(openness, up) == pytest.approx([0.0, np.log(1000.0)])
+    assert path_from_openness(openness, down) == pytest.approx([np.log(1000.0), 0.0])
+    assert path_from_openness(openness, np.array([1.0, 0.0, 0.0])) == pytest.approx(
+        [np.log(2.0)] * 2
+    )

@@ -12,10 +12,10 @@ from hairloom.addon.groom.settings import GuideSettings
 from hairloom.addon.shading import skin_seen as skin_seen_module
 from hairloom.addon.shading.ambient_settings import AmbientSettings
 from hairloom.addon.shading.skin_seen import (
-    GAPS,
-    PART,
+    ABSORBED_FRACTION,
+    CLUMPING,
     SkinSeen,
-    far_light,
+    far_skin_light,
     plane_beneath,
     skin_field,
     skin_seen,
@@ -93,7 +93,10 @@ def test_light_off_a_ball_is_that_of_rays() -> None:
     away = np.linalg.norm(strands.points, axis=1) / RADIUS
     some = (away > 1.35) & (away < 1.9)
     sun = np.array([0.6, 0.0, 0.8])
-    found, expected = far_light(seen.received, sun)[some], light_of_ball(strands.points[some], sun)
+    found, expected = (
+        far_skin_light(seen.received, sun)[some],
+        light_of_ball(strands.points[some], sun),
+    )
     assert found.mean() == pytest.approx(expected.mean(), rel=0.25)
     assert np.corrcoef(found, expected)[0, 1] > 0.95
     assert np.abs(found - expected).mean() < 0.4 * expected.mean()
@@ -178,7 +181,7 @@ def test_hair_on_the_side_of_the_light_shades_the_skin() -> None:
 
     def light(strands: StrandSet, side: float) -> float:
         seen = skin_seen(strands, beside, ball(), 1.0)
-        return float(far_light(seen.received, np.array([side, 0.0, 0.0])).mean())
+        return float(far_skin_light(seen.received, np.array([side, 0.0, 0.0])).mean())
 
     right = around.take(np.flatnonzero(is_right))
     assert light(thin, 1.0) == pytest.approx(light(thin, -1.0), rel=0.25)
@@ -187,13 +190,13 @@ def test_hair_on_the_side_of_the_light_shades_the_skin() -> None:
 
 
 def test_gaps_let_through_what_a_spread_of_depths_does() -> None:
-    """Against means of exp(-x tau) over gamma-distributed depths with a variance of GAPS times the
-    squared mean, relative to strands that absorb PART.
+    """Against means of exp(-x tau) over gamma-distributed depths with a variance of CLUMPING times
+    the squared mean, relative to strands that absorb ABSORBED_FRACTION.
     """
     random = np.random.default_rng(2)
-    depths = random.gamma(1.0 / GAPS, GAPS, 400_000)
+    depths = random.gamma(1.0 / CLUMPING, CLUMPING, 400_000)
     for taken in (0.1, 1.0):
-        expected = np.exp(-taken * depths).mean() / np.exp(-PART * depths).mean()
+        expected = np.exp(-taken * depths).mean() / np.exp(-ABSORBED_FRACTION * depths).mean()
         found = through_hair(np.array(1.0), np.array(taken))
         assert found == pytest.approx(expected, rel=5e-3)
 
@@ -204,9 +207,9 @@ def test_light_off_one_normal_is_that_of_a_matt_surface() -> None:
     lights = random.normal(size=(500, 3))
     lights /= np.linalg.norm(lights, axis=-1, keepdims=True)
     normal = np.array([0.0, 0.6, 0.8])
-    one = far_light(0.5 * np.array([0.25, *(0.5 * normal)]) * np.ones((500, 1)), lights)
+    one = far_skin_light(0.5 * np.array([0.25, *(0.5 * normal)]) * np.ones((500, 1)), lights)
     np.testing.assert_allclose(one, 0.5 * np.maximum(lights @ normal, 0.0), atol=1e-9)
-    even = far_light(np.array([0.3, 0.0, 0.0, 0.0]) * np.ones((500, 1)), lights)
+    even = far_skin_light(np.array([0.3, 0.0, 0.0, 0.0]) * np.ones((500, 1)), lights)
     np.testing.assert_allclose(even, 0.3, atol=1e-9)
 
 
@@ -255,7 +258,7 @@ def test_hair_without_any_size(place: float) -> None:
 def test_a_plane_alone_is_as_before() -> None:
     normal = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
     seen: SkinSeen = plane_beneath(normal)
-    assert not far_light(seen.received, normal).any()
+    assert not far_skin_light(seen.received, normal).any()
     np.testing.assert_array_equal(seen.beneath, normal)
 
 
@@ -265,10 +268,10 @@ def test_skin_in_cells_is_found_once_for_hair_that_keeps_its_grid(
     """As under a comb; other cells or another head are computed again. The field is the same bit
     for bit."""
     found: list[int] = []
-    cut = skin_seen_module.small_triangles
+    cut = skin_seen_module.subdivided_triangles
     monkeypatch.setattr(
         skin_seen_module,
-        "small_triangles",
+        "subdivided_triangles",
         lambda corners, *box: found.append(len(corners)) or cut(corners, *box),
     )
     head = ball()
