@@ -33,7 +33,7 @@ from _report import chosen
 
 import hairloom
 from hairloom.addon.blender.base.images import write_png
-from hairloom.addon.blender.base.parts import at_once
+from hairloom.addon.blender.base.parts import run_parts
 from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.setup.sample_scene import add_sample_scene
 from hairloom.addon.exchange.textures.srgb import srgb_encoded
@@ -75,7 +75,7 @@ def level_figures(names: list[str]) -> dict[str, Any]:
 
 
 def _sample(site: Path) -> None:
-    scene, hair = at_once(add_sample_scene(()))
+    scene, hair = run_parts(add_sample_scene(()))
     bpy.context.window.scene = scene
     _export_head(hair.data.surface, site / "head.glb")
     verb = ["cards", "--groom", hair.name, "--output", str(site / "cards.glb")]

@@ -19,7 +19,7 @@ import OpenImageIO as oiio
 from mathutils import Vector
 
 import hairloom
-from hairloom.addon.blender.base.parts import at_once
+from hairloom.addon.blender.base.parts import run_parts
 from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.setup.sample_scene import add_sample_scene
 
@@ -61,7 +61,7 @@ def _stage() -> tuple[Any, Any, list[dict[str, Any]]]:
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     if not hasattr(bpy.types.Scene, "hairloom"):
         hairloom.register()
-    scene, hair = at_once(add_sample_scene(()))
+    scene, hair = run_parts(add_sample_scene(()))
     bpy.context.window.scene = scene
     black = bpy.data.materials.new("Black")
     black.node_tree.nodes["Principled BSDF"].inputs["Base Color"].default_value = (0, 0, 0, 1)

@@ -11,7 +11,7 @@ import time
 import bpy
 import numpy as np
 
-from hairloom.addon.blender.base.parts import at_once
+from hairloom.addon.blender.base.parts import run_parts
 from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.setup.hairstyles import add_head
 
@@ -27,7 +27,7 @@ EDITS = {
 
 def edited() -> dict[str, float]:
     """Medians of all edits [ms]: until the hair follows, and the growth alone; and the slowest."""
-    head = at_once(add_head(bpy.context.collection, "light"))
+    head = run_parts(add_head(bpy.context.collection, "light"))
     head.select_set(True)
     bpy.context.view_layer.objects.active = head
     bpy.ops.hairloom.add_groom(strand_count=STRANDS, plays=False)

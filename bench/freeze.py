@@ -27,7 +27,7 @@ from _report import report, start
 
 import hairloom
 from hairloom.addon.blender.base import latest_job
-from hairloom.addon.blender.base.parts import at_once
+from hairloom.addon.blender.base.parts import run_parts
 from hairloom.addon.blender.colliders import fields
 from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.preview.phases import Phase
@@ -107,7 +107,7 @@ def main() -> int:
     hairloom.register()
     latest_job.is_blocking = lambda: False  # as in a window
     compile_programs(given.form)
-    scene, hair = at_once(add_sample_scene(()))
+    scene, hair = run_parts(add_sample_scene(()))
     hair.hairloom.dynamics.device = given.form
     depsgraph = scene.view_layers[0].depsgraph
     stops = Stops()
@@ -178,7 +178,7 @@ def main() -> int:
 
 def compile_programs(form: str) -> None:
     """Play the sample scene once, and drop it with all that is cached of its head."""
-    scene, hair = at_once(add_sample_scene(()))
+    scene, hair = run_parts(add_sample_scene(()))
     hair.hairloom.dynamics.device = form
     depsgraph = scene.view_layers[0].depsgraph
     session = Session(hair, depsgraph)

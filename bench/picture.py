@@ -31,7 +31,7 @@ from _picture_soft_shadows import soft_shadows
 from _report import measured, report, start
 
 import hairloom
-from hairloom.addon.blender.base.parts import at_once
+from hairloom.addon.blender.base.parts import run_parts
 from hairloom.addon.blender.setup.sample_scene import add_sample_scene
 
 REFERENCE = "the engine without hair; Cycles with the same curves"
@@ -66,7 +66,7 @@ def empty_file() -> None:
 
 def scene_with_hair() -> tuple[Any, Any]:
     empty_file()
-    scene, hair = at_once(add_sample_scene(()))
+    scene, hair = run_parts(add_sample_scene(()))
     bpy.context.window.scene = scene
     scene.render.resolution_x, scene.render.resolution_y = WIDTH, HEIGHT
     scene.hairloom.picture.samples = HAIR_SAMPLES

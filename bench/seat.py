@@ -38,7 +38,7 @@ from _jobs import silent
 from _report import measured, report, start
 
 import hairloom
-from hairloom.addon.blender.base.parts import at_once
+from hairloom.addon.blender.base.parts import run_parts
 from hairloom.addon.blender.setup.sample_scene import add_sample_scene
 from hairloom.addon.blender.strands.make_real import make_real
 
@@ -113,14 +113,14 @@ def _light_in_cycles(look: str) -> float:
 
 def _sample(look: str, size: int) -> tuple[bpy.types.Scene, bpy.types.Object]:
     """The sample scene in this look, for pictures of this size."""
-    scene, hair = at_once(add_sample_scene((f"looks/{look}",), "light"))
+    scene, hair = run_parts(add_sample_scene((f"looks/{look}",), "light"))
     scene.render.resolution_x = scene.render.resolution_y = size
     return scene, hair
 
 
 def _made_real(scene: bpy.types.Scene, hair: bpy.types.Object) -> bpy.types.Object:
     with bpy.context.temp_override(scene=scene, view_layer=scene.view_layers[0]):
-        ((real, _),) = at_once(make_real([hair], scene.view_layers[0].depsgraph))
+        ((real, _),) = run_parts(make_real([hair], scene.view_layers[0].depsgraph))
     return real
 
 

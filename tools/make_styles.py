@@ -60,18 +60,18 @@ def rig_of(name: str, most: int = 1_000_000) -> tuple[Any, bpy.types.Object]:
     setup = of_addon("blender.setup.hairstyles")
     collection = bpy.context.collection
     style = setup.named_hairstyle(name)
-    at_once = of_addon("blender.base.parts").at_once
+    run_parts = of_addon("blender.base.parts").run_parts
     is_fur = setup.grows_anywhere(style)
-    head = animal() if is_fur else at_once(setup.add_head(collection, "light"))
+    head = animal() if is_fur else run_parts(setup.add_head(collection, "light"))
     bpy.context.view_layer.update()
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    hair = at_once(setup.add_hairstyle(style, head, depsgraph, collection)).hair
+    hair = run_parts(setup.add_hairstyle(style, head, depsgraph, collection)).hair
     children = hair.data.hairloom.children
     children.strand_count = min(children.strand_count, most)
     depsgraph = bpy.context.evaluated_depsgraph_get()
     source = of_addon("blender.scene.source").read_source(hair, depsgraph)
     if setup.is_bust(head) and not setup.is_of_face(style):
-        face = at_once(setup.face_hair(head, source.head, depsgraph))
+        face = run_parts(setup.face_hair(head, source.head, depsgraph))
         source = replace(source, strands=of_addon("strands.join").joined(source.strands, face))
     rig = of_addon("blender.colliders.rigs").MadeRig.of(hair, source).rig
     return rig, hair

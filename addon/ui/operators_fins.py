@@ -6,7 +6,7 @@ from typing import Any
 
 import bpy
 
-from ..blender.bakes.simulated import Simulated
+from ..blender.bakes.simulation import Simulation
 from ..blender.base.outcome import report
 from ..blender.preview import fins, previews
 from ..blender.scene.fin_modifier import (
@@ -63,7 +63,7 @@ class HAIRLOOM_OT_fin_remove(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         obj = active_mesh(context)
         assert obj is not None
-        session = previews.simulated_of(obj)
+        session = previews.simulation_of(obj)
         if session is not None:
             previews.stop(session)
         remove_modifier(obj)
@@ -84,7 +84,7 @@ class HAIRLOOM_OT_fin_preview(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         obj, depsgraph = active_mesh(context), context.evaluated_depsgraph_get()
         assert obj is not None
-        session = previews.simulated_of(obj)
+        session = previews.simulation_of(obj)
         if session is not None:
             previews.stop(session)
             return {"FINISHED"}
@@ -114,7 +114,7 @@ class HAIRLOOM_OT_fin_reset(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         obj = active_mesh(context)
         assert obj is not None
-        session = previews.simulated_of(obj)
+        session = previews.simulation_of(obj)
         if session is None:
             clear(obj.data)
         else:
@@ -127,7 +127,7 @@ def draw_fin(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     if fin_modifier(obj) is None:
         layout.operator("hairloom.fin_add", icon="MOD_CLOTH")
         return
-    fin, session = obj.hairloom.fin, previews.simulated_of(obj)
+    fin, session = obj.hairloom.fin, previews.simulation_of(obj)
     _draw_buttons(layout.row(align=True), session)
     for warning in session.warnings if session is not None else ():
         draw_message(layout, bpy.context, warning, "ERROR")
@@ -147,7 +147,7 @@ def draw_fin(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
         draw_section(body, obj.hairloom, "fin", label)
 
 
-def _draw_buttons(row: bpy.types.UILayout, session: Simulated | None) -> None:
+def _draw_buttons(row: bpy.types.UILayout, session: Simulation | None) -> None:
     if session is not None and not session.is_made:
         row.label(text="Making the cloth", icon="SORTTIME")
         row.operator("hairloom.fin_preview", text="", icon="X")

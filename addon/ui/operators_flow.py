@@ -6,7 +6,7 @@ import bpy
 from bpy.props import StringProperty
 
 from ..blender.base.outcome import report
-from ..blender.base.parts import together
+from ..blender.base.parts import batched
 from ..blender.properties.groups import operator_properties
 from ..blender.properties.properties import settings_of
 from ..blender.scene.drawn_lines import chosen_or_new_lines
@@ -92,7 +92,7 @@ class HAIRLOOM_OT_comb_flow(LongWork, bpy.types.Operator):
         settings, depsgraph = settings_of(self, FlowSettings), context.evaluated_depsgraph_get()
         grooms = once_each(filter(strokes_of, chosen_hair(context)))
         works = (comb_flow(hair, depsgraph, settings) for hair in grooms)
-        for outcome in (yield from in_parts(together(works))):
+        for outcome in (yield from in_parts(batched(works))):
             tell(self, outcome)
 
 

@@ -9,7 +9,7 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from ..blender.base.objects import objects_in
 from ..blender.base.outcome import report
-from ..blender.base.parts import taken_back
+from ..blender.base.parts import new_blocks_removed_on_error
 from ..blender.scene.bust_skin import TONES
 from ..blender.setup.foreign_heads import add_landmarks, may_be_head
 from ..blender.setup.hairstyles import (
@@ -78,7 +78,7 @@ class HAIRLOOM_OT_add_hairstyle(LongWork, bpy.types.Operator):
         style, collection = named_hairstyle(self.style), context.collection
         head = ground_mesh(context) if grows_anywhere(style) else self._head(context)
         is_new, is_alone = head is None, _is_empty(context)
-        with taken_back() as note:
+        with new_blocks_removed_on_error() as note:
             if head is None:
                 head = yield from in_parts(add_head(collection, self.skin))
                 note()

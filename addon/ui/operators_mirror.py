@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..blender.base.parts import together
+from ..blender.base.parts import batched
 from ..blender.properties.groups import operator_properties
 from ..blender.properties.properties import settings_of
 from ..blender.sessions.mirroring import mirror_hair
@@ -32,7 +32,7 @@ class HAIRLOOM_OT_mirror_hair(LongWork, bpy.types.Operator):
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         settings, depsgraph = settings_of(self, MirrorSettings), context.evaluated_depsgraph_get()
         works = (mirror_hair(hair, depsgraph, settings) for hair in once_each(chosen_hair(context)))
-        for outcome in (yield from in_parts(together(works))):
+        for outcome in (yield from in_parts(batched(works))):
             tell(self, outcome)
 
 

@@ -6,7 +6,7 @@ import bpy
 from bpy.props import StringProperty
 
 from ..blender.base.outcome import report
-from ..blender.base.parts import together
+from ..blender.base.parts import batched
 from ..blender.properties.groups import operator_properties
 from ..blender.properties.properties import settings_of
 from ..blender.scene import partings
@@ -85,7 +85,7 @@ class HAIRLOOM_OT_comb_parting(LongWork, bpy.types.Operator):
         settings, depsgraph = settings_of(self, PartingSettings), context.evaluated_depsgraph_get()
         grooms = once_each(filter(partings.partings_of, chosen_hair(context)))
         works = (comb_parting(hair, depsgraph, settings) for hair in grooms)
-        for outcome in (yield from in_parts(together(works))):
+        for outcome in (yield from in_parts(batched(works))):
             tell(self, outcome)
 
 

@@ -105,7 +105,7 @@ class HAIRLOOM_OT_play(bpy.types.Operator):
             cls.poll_message_set("Play needs a window; use the command line's simulate or bake")
             return False
         depsgraph = context.view_layer.depsgraph
-        is_previewed = depsgraph is not None and bool(previews.simulated_in(depsgraph))
+        is_previewed = depsgraph is not None and bool(previews.simulations_in(depsgraph))
         if is_previewed or any_enabled(context.view_layer) or previews.is_playing():
             return True
         return needs_hair(cls, context)
@@ -120,7 +120,7 @@ class HAIRLOOM_OT_play(bpy.types.Operator):
             stop_ticking()
             return {"FINISHED"}
         with waiting(context):
-            if not previews.simulated_in(context.evaluated_depsgraph_get()):
+            if not previews.simulations_in(context.evaluated_depsgraph_get()):
                 start_preview(self, context, chosen_hair(context))
             depsgraph = context.evaluated_depsgraph_get()
             fin_warnings = fins.start_enabled(depsgraph)
@@ -201,7 +201,7 @@ class HAIRLOOM_OT_reset(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if previews.simulated():
+        if previews.simulations():
             return True
         cls.poll_message_set("No hair is previewed: press Preview first")
         return False
@@ -237,7 +237,7 @@ class _Ticks:
             show_status(None)
             return None
         self.tell()
-        now, windows = time.perf_counter(), previews.windows_of_play()
+        now, windows = time.perf_counter(), previews.playing_windows()
         # the clock of a scene that was hidden for a while starts at this moment
         self._clocks = {uid: self._clocks.get(uid) or FrameClock(now) for uid in windows}
         for uid, window in windows.items():
@@ -256,7 +256,7 @@ class _Ticks:
             self._said = ""
             return
         text = PAUSED if previews.is_paused() else STATUS
-        if names := previews.waiting():
+        if names := previews.waiting_names():
             text = WAITING.format(names=", ".join(names))
         if text != self._said:
             self._said = text

@@ -11,7 +11,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty
 
 from ..blender.base.outcome import Outcome, report
-from ..blender.base.parts import at_once, together
+from ..blender.base.parts import batched, run_parts
 from ..blender.preview import previews
 from ..blender.scene.bust_skin import TONES
 from ..blender.scene.particle_hair import convert_particle_hair, hair_systems
@@ -144,7 +144,7 @@ class HAIRLOOM_OT_use_groom(LongWork, bpy.types.Operator):
         taken, problems = list[bpy.types.Object](), list[HairloomError]()
         grooms, depsgraph = chosen_hair(context), context.evaluated_depsgraph_get()
         works = (take_over(hair, depsgraph, chosen_presets(chosen)) for hair in grooms)
-        for hair, done in (yield from in_parts(together(works, problems.append))):
+        for hair, done in (yield from in_parts(batched(works, problems.append))):
             for one in done:
                 report(self, "INFO", f"{hair.name}: {one}")
             taken.append(hair)
@@ -182,7 +182,7 @@ class HAIRLOOM_OT_convert_particles(LongWork, bpy.types.Operator):
         made, dropped = yield from in_parts(convert_particle_hair(context, mesh))
         for hair in made:
             depsgraph = context.evaluated_depsgraph_get()
-            _, done = at_once(take_over(hair, depsgraph, chosen_presets(chosen)))
+            _, done = run_parts(take_over(hair, depsgraph, chosen_presets(chosen)))
             for one in done:
                 report(self, "INFO", f"{hair.name}: {one}")
         result = f"{mesh.name}: its particle hair was hidden and replaced by curves"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 from bpy.props import StringProperty
 
-from ..blender.base.parts import together
+from ..blender.base.parts import batched
 from ..blender.scene.kept_shape import BEFORE_TRIM
 from ..blender.scene.own_collections import put_into, take_out
 from ..blender.scene.trim_shapes import KIND, SETTING, may_trim, read_shape, trim_shapes_of
@@ -48,7 +48,7 @@ class HAIRLOOM_OT_trim_to_shape(LongWork, bpy.types.Operator):
             if trim_shapes_of(hair):
                 grooms.append(hair)
         works = (trim_to_shapes(hair, depsgraph) for hair in once_each(grooms))
-        for outcome in (yield from in_parts(together(works))):
+        for outcome in (yield from in_parts(batched(works))):
             tell(self, outcome)
 
 

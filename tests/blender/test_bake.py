@@ -20,7 +20,7 @@ from windows_rules import windows_rules
 from hairloom.addon.blender.bakes import groom_hashes, playback
 from hairloom.addon.blender.bakes.bake_settings import folder_of
 from hairloom.addon.blender.bakes.cache import Cache, CacheWriter, Facts
-from hairloom.addon.blender.bakes.simulated import SOLVER_VERSION
+from hairloom.addon.blender.bakes.simulation import SOLVER_VERSION
 from hairloom.addon.blender.base.suspension import is_suspended, suspended
 from hairloom.addon.blender.engine import engine_hair
 from hairloom.addon.blender.preview import previews, scene_events

@@ -11,7 +11,7 @@ from grids import baked_grid, strand_grid
 from hairloom.addon import rig_flow
 from hairloom.addon.blender.bakes import playback
 from hairloom.addon.blender.bakes.groom_hashes import groom_rig_hash
-from hairloom.addon.blender.bakes.simulated import differences
+from hairloom.addon.blender.bakes.simulation import differences
 from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.preview.bake import Bake

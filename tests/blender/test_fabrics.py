@@ -32,10 +32,10 @@ def test_play_begins_once_its_cloth_is_made_as_if_it_had_waited(sheet, get_depsg
     preview = previews.previews[session.uid]
     previews.begin(session, get_depsgraph(), blocking=False)
     assert preview.phase is Phase.WAITING and session.state is None
-    assert previews.is_playing() and previews.waiting() == ("Flag",)
+    assert previews.is_playing() and previews.waiting_names() == ("Flag",)
     wait_until(lambda: session.is_made)
     previews.advance(get_depsgraph(), FRAME)
-    assert preview.phase is Phase.FREE and previews.waiting() == ()
+    assert preview.phase is Phase.FREE and previews.waiting_names() == ()
     begun = session.state
     session.play(get_depsgraph())
     for one, other in ((begun.fabric, session.state.fabric), (begun, session.state)):

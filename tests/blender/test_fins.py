@@ -50,7 +50,7 @@ def test_removing_it_leaves_nothing(flag_object, get_depsgraph):
     session = start_fin(flag_object, get_depsgraph)
     play_frames(session, get_depsgraph, 3)
     assert bpy.ops.hairloom.fin_remove() == {"FINISHED"}
-    assert previews.simulated() == ()
+    assert previews.simulations() == ()
     assert len(flag_object.modifiers) == len(bpy.data.node_groups) == 0
     assert POSITION not in flag_object.data.attributes
     assert np.array_equal(rest_vertices(flag_object), rest)
@@ -256,7 +256,7 @@ def test_what_breaks_in_mid_play_ends_it_with_a_notice(flag_object, get_depsgrap
     change(flag_object)
     update_view_layer()
     previews.advance(get_depsgraph(), FRAME_S)
-    assert previews.simulated() == ()
+    assert previews.simulations() == ()
     assert says in previews.notice()
     if bpy.context.object is not None and bpy.context.object.mode == "EDIT":
         bpy.ops.object.mode_set(mode="OBJECT")

@@ -34,7 +34,7 @@ def test_undo_in_mid_play_goes_on_or_rests(flag_object, get_depsgraph):
     scene_events.catch_up(get_depsgraph())
     flag_object = bpy.data.objects["Flag"]
     play_frames(session, get_depsgraph, 2)
-    assert previews.simulated() == (session,)
+    assert previews.simulations() == (session,)
     session.stop(get_depsgraph())
     assert POSITION not in flag_object.data.attributes
 
@@ -49,7 +49,7 @@ def test_a_saved_file_keeps_fin_and_settings(flag_object, get_depsgraph, tmp_pat
     bpy.ops.wm.save_as_mainfile(filepath=file)
     bpy.ops.wm.open_mainfile(filepath=file)
     flag_object = bpy.data.objects["Flag"]
-    assert previews.simulated() == ()
+    assert previews.simulations() == ()
     assert flag_object.hairloom.fin.stretch == 0.25 and flag_object.hairloom.fin.pin_group == "Pins"
     update_view_layer()
     assert evaluated_vertices(flag_object, get_depsgraph) == pytest.approx(drawn, abs=1e-6), (
@@ -88,7 +88,7 @@ def test_however_its_preview_ends_it_is_at_rest(end, flag_object, get_depsgraph,
         (tmp_path / "bad.blend").write_bytes(b"no file of Blender's")
         with pytest.raises(RuntimeError):
             bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "bad.blend"))
-    assert previews.simulated() == () and not is_shown(flag_object)
+    assert previews.simulations() == () and not is_shown(flag_object)
 
 
 def test_a_bake_is_shown_after_the_preview_too(flag_object, get_depsgraph, tmp_path):
@@ -117,11 +117,11 @@ def test_buttons_say_why_they_are_grey(extension):
 def test_enabled_fins_start_together(flag_object, get_depsgraph):
     update_view_layer()
     assert fins.start_enabled(get_depsgraph()) == []
-    assert [each.name for each in previews.simulated()] == ["Flag"]
+    assert [each.name for each in previews.simulations()] == ["Flag"]
     assert bpy.ops.hairloom.fin_preview() == {"FINISHED"}
-    assert previews.simulated() == ()
+    assert previews.simulations() == ()
     flag_object.hairloom.fin.enabled = False
-    assert fins.start_enabled(get_depsgraph()) == [] and previews.simulated() == ()
+    assert fins.start_enabled(get_depsgraph()) == [] and previews.simulations() == ()
 
 
 def test_attributes_of_the_modifier_stay_out_of_the_mesh(flag_object, get_depsgraph):

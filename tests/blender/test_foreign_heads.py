@@ -11,7 +11,7 @@ from mathutils.bvhtree import BVHTree
 from overriding import library_overrides
 from tiers import few_in_commits
 
-from hairloom.addon.blender.base.parts import at_once
+from hairloom.addon.blender.base.parts import run_parts
 from hairloom.addon.blender.command_line.command_line import run
 from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.scene.bust_data import load_bust
@@ -46,7 +46,7 @@ PLACE, LARGER, TURNED = np.array([3.0, -1.0, 1.5]), 1.3, 0.4
 
 def added(name: str, head: bpy.types.Object, **options: str) -> AddedHair:
     style = named_hairstyle(name)
-    return at_once(add_hairstyle(style, head, depsgraph(), bpy.context.collection, **options))
+    return run_parts(add_hairstyle(style, head, depsgraph(), bpy.context.collection, **options))
 
 
 def depsgraph() -> bpy.types.Depsgraph:
@@ -217,7 +217,7 @@ def test_modifiers_that_add_and_take_vertices_do_not_hide_the_topology() -> None
 @pytest.mark.slow(instead="test_the_button_adds_to_the_selected_head_and_one_undo_takes_it_away")
 def test_landmarks_are_guessed_where_they_are_on_another_person() -> None:
     head = scan()
-    made, is_sure = at_once(add_landmarks(head, depsgraph(), bpy.context.collection))
+    made, is_sure = run_parts(add_landmarks(head, depsgraph(), bpy.context.collection))
     assert is_sure and len(made) == len(LANDMARKS) and all(obj.parent == head for obj in made)
     depsgraph()
     for name, obj in landmarks_of(head).items():
@@ -226,7 +226,7 @@ def test_landmarks_are_guessed_where_they_are_on_another_person() -> None:
         assert gap < 0.009, name
     # existing landmarks are not added again, a deleted one is
     bpy.data.objects.remove(landmarks_of(head)["nose"])
-    again, _ = at_once(add_landmarks(head, depsgraph(), bpy.context.collection))
+    again, _ = run_parts(add_landmarks(head, depsgraph(), bpy.context.collection))
     assert [obj.hairloom.landmark for obj in again] == ["nose"]
 
 
@@ -274,11 +274,11 @@ def test_a_dragged_landmark_moves_the_hair_when_it_is_fitted_again() -> None:
     hair = added("buzz_cut", head).hair
     hair.data.hairloom.children.strand_count = 1234
     before = roots_of(hair)
-    at_once(fit_again([hair], depsgraph()))
+    run_parts(fit_again([hair], depsgraph()))
     assert np.abs(roots_of(hair) - before).max() < 1e-4, "the same landmarks give the same hair"
     hairline = landmarks_of(head)["hairline"]
     hairline.location.z += 0.025
-    at_once(fit_again([hair], depsgraph()))
+    run_parts(fit_again([hair], depsgraph()))
     after = roots_of(hair)
     near = np.linalg.norm(before - stood(shaped([LANDMARKS["hairline"][1]]))[0], axis=1) < 0.045
     assert near.sum() > 10, "roots are there"
@@ -294,7 +294,7 @@ def test_hair_follows_a_head_whose_shape_has_changed_and_landmarks_that_were_dra
     larger = 1.3 * np.array([vertex.co[:] for vertex in head.data.vertices]) - (0.0, 0.0, 0.5)
     head.data.vertices.foreach_set("co", larger.ravel())
     head.data.update()
-    assert not at_once(fit_again([hair], depsgraph()))
+    assert not run_parts(fit_again([hair], depsgraph()))
     fresh = bpy.data.objects.new("Fresh", head.data.copy())
     bpy.context.collection.objects.link(fresh)
     wanted = added("buzz_cut", fresh).hair
@@ -308,12 +308,12 @@ def test_hair_follows_a_head_whose_shape_has_changed_and_landmarks_that_were_dra
     # after a rotation the head has the same shape, so its landmarks are not guessed again
     head.matrix_world = Matrix.Rotation(1.3, 4, "X") @ Matrix.Translation((0.3, 0.0, 0.0))
     before = roots_of(hair)
-    at_once(fit_again([hair], depsgraph()))
+    run_parts(fit_again([hair], depsgraph()))
     assert roots_of(hair) == pytest.approx(before, abs=1e-3)
     nose = landmarks_of(head)["nose"]
     nose.location.z += 0.004
     dragged = nose.location[:]
-    at_once(fit_again([hair], depsgraph()))
+    run_parts(fit_again([hair], depsgraph()))
     assert nose.location[:] == dragged
 
 
@@ -328,10 +328,10 @@ def test_modifiers_that_change_how_many_curves_there_are_do_not_take_others_away
         add_hair_nodes(hair, nodes, {"Amount": 3}, 1.0)
     else:
         hair.modifiers.new("Half", "NODES").node_group = every_second_curve()
-    warnings = at_once(fit_again([hair], depsgraph()))
+    warnings = run_parts(fit_again([hair], depsgraph()))
     assert any("change the number of curves" in each for each in warnings)
     hair.modifiers.clear()
-    at_once(fit_again([hair], depsgraph()))
+    run_parts(fit_again([hair], depsgraph()))
     assert len(hair.data.curves) >= count, "all that it was made with"
 
 
@@ -413,7 +413,7 @@ def test_every_second_face_missing_is_reported() -> None:
 @pytest.mark.slow(instead="test_half_a_head_is_refused")
 def test_landmarks_on_top_of_each_other_or_mistaken_are_refused() -> None:
     head = scan()
-    at_once(add_landmarks(head, depsgraph(), bpy.context.collection))
+    run_parts(add_landmarks(head, depsgraph(), bpy.context.collection))
     depsgraph()
     marks = landmarks_of(head)
     place = marks["crown"].location.copy()

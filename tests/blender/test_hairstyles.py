@@ -16,7 +16,7 @@ from tiers import few_in_commits
 
 from hairloom.addon.blender.base.attributes import read_attribute
 from hairloom.addon.blender.base.outcome import past_reports
-from hairloom.addon.blender.base.parts import at_once
+from hairloom.addon.blender.base.parts import run_parts
 from hairloom.addon.blender.command_line.command_line import run
 from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.properties.presets import named_preset
@@ -61,7 +61,7 @@ def few(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def head() -> bpy.types.Object:
-    made = at_once(add_head(bpy.context.collection, "light"))
+    made = run_parts(add_head(bpy.context.collection, "light"))
     bpy.context.view_layer.update()
     return made
 
@@ -71,7 +71,7 @@ def depsgraph() -> bpy.types.Depsgraph:
 
 
 def added(style: Hairstyle, head: bpy.types.Object) -> bpy.types.Object:
-    hair = at_once(add_hairstyle(style, head, depsgraph(), bpy.context.collection)).hair
+    hair = run_parts(add_hairstyle(style, head, depsgraph(), bpy.context.collection)).hair
     bpy.context.view_layer.update()
     return hair
 
@@ -116,14 +116,14 @@ def test_guides_outside_of_the_hairline_are_left_out_on_the_built_in_head_too(he
     vertices = head.data.vertices
     group.add([v.index for v in vertices if v.co.y < -0.02 and v.co.z > 0.03], 1.0, "REPLACE")
     adding = add_hairstyle(style, head, depsgraph(), bpy.context.collection, hairline="front")
-    hair = at_once(adding).hair
+    hair = run_parts(adding).hair
     roots = read_curves(hair, depsgraph()).strands.roots
     assert 200 < len(roots) < 500 and (roots[:, 1] < 0.0).all() and (roots[:, 2] > 0.01).all()
     group.remove(range(len(vertices)))
     chin = [v.index for v in vertices if v.co.z < -0.1 and v.co.y < -0.06]
     group.add(chin, 1.0, "REPLACE")
     with pytest.raises(HairloomError, match="zero wherever this hair grows"):
-        at_once(hairstyles.fit_again([hair], depsgraph()))
+        run_parts(hairstyles.fit_again([hair], depsgraph()))
     assert len(hair.data.curves) == len(roots)
 
 

@@ -133,19 +133,19 @@ def test_each_scene_that_plays_goes_on_in_a_window_of_its_own(
     context = SimpleNamespace(window_manager=SimpleNamespace(windows=windows))
     with monkeypatch.context() as patch:
         patch.setattr(previews, "bpy", SimpleNamespace(context=context))
-        assert list(previews.windows_of_play().values()) == [windows[2]]
+        assert list(previews.playing_windows().values()) == [windows[2]]
     show(here.name)
     previews.play(get_depsgraph())
     with monkeypatch.context() as patch:
         patch.setattr(previews, "bpy", SimpleNamespace(context=context))
-        assert list(previews.windows_of_play().values()) == [windows[0], windows[2]]
+        assert list(previews.playing_windows().values()) == [windows[0], windows[2]]
     assert phase_of(other) is Phase.FREE
 
 
 def test_each_scene_that_plays_goes_by_a_clock_of_its_own(preview, get_depsgraph, monkeypatch):
     now, window, advanced = [100.0], bpy.context.window, []
     monkeypatch.setattr(operators_preview, "time", SimpleNamespace(perf_counter=lambda: now[0]))
-    monkeypatch.setattr(previews, "windows_of_play", lambda: {1: window, 2: window})
+    monkeypatch.setattr(previews, "playing_windows", lambda: {1: window, 2: window})
     monkeypatch.setattr(previews, "advance", lambda _, duration: advanced.append(duration))
     previews.play(get_depsgraph())
     ticks = operators_preview._Ticks()

@@ -88,7 +88,7 @@ def test_what_is_set_together_is_one_change(hair):
     listener = ("settings", told.append)
     changed.subscribe(*listener)
     try:
-        with changed.together():
+        with changed.as_one_change():
             hair.data.hairloom.shading.melanin = 0.31
             hair.data.hairloom.shading.tip_tint = 0.2
             assert told == []

@@ -16,7 +16,7 @@ from hairloom.addon.blender.base import latest_job
 from hairloom.addon.blender.colliders import fields
 from hairloom.addon.blender.pictures.showing import shown_groom
 from hairloom.addon.blender.preview import previews, scene_events
-from hairloom.addon.blender.preview.bake import simulated_for
+from hairloom.addon.blender.preview.bake import simulation_for
 from hairloom.addon.blender.preview.phases import Phase
 from hairloom.addon.blender.sessions import prepared_groom
 from hairloom.addon.blender.sessions import session as session_module
@@ -259,7 +259,7 @@ def test_blenders_playback_and_a_bake_wait_for_no_timer(hair, get_depsgraph, in_
     assert session.is_made and session.is_playing and not session.is_pending
     hair.data.hairloom.guides.guide_count = 7
     assert session.is_stale
-    assert simulated_for(hair, get_depsgraph()) is session
+    assert simulation_for(hair, get_depsgraph()) is session
     assert len(session.rig.guides) == 7
 
 
@@ -326,7 +326,7 @@ def knows_contacts(session, contacts):
     ((is_beside, found),) = contacts
     motion, settings = session.solver.motion, session.settings[DynamicsSettings]
     begun = motion_flow.begin(session.rig, motion.pose)
-    standing = tuple(each.at_end() for each in session.posed)
+    standing = tuple(each.at_end() for each in session.posed_colliders)
     expected = motion_flow.with_clearance(session.rig, begun, standing, settings)
     contacts.pop()
     assert np.isfinite(found.points).any()
@@ -364,7 +364,7 @@ def test_play_does_not_wait_for_ever_for_a_body_that_moves(hair, get_depsgraph, 
     wait_until(moves_on)
     begun, alone = session.solver.motion, motion_flow.begin(session.rig, session.solver.pose)
     expected = motion_flow.with_clearance(
-        session.rig, alone, session.posed, session.settings[DynamicsSettings]
+        session.rig, alone, session.posed_colliders, session.settings[DynamicsSettings]
     )
     np.testing.assert_array_equal(begun.clearance.points, expected.clearance.points)
 

@@ -168,7 +168,7 @@ def test_contacts_show_what_touches_and_how_deep_the_rest_is(preview, get_depsgr
     tip = session.solver.guides()[0, -1]
     center = (tip + [0.004, 0.0, 0.0]).astype(np.float32)
     ball = PosedCollider(SphereCollider(center, 0.01), np.eye(4), np.eye(4))
-    monkeypatch.setattr(session, "_posed", (ball,))
+    monkeypatch.setattr(session, "_posed_colliders", (ball,))
     inside = dict(motion_lines.contact_lines(session))[motion_lines.INSIDE].reshape(-1, 2, 3)
     assert (np.abs(inside[:, 0] - tip).max(axis=1) < 1e-6).any()
     away = np.linalg.norm(inside - center, axis=2)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hairloom.addon.blender.bakes.groom_hashes import groom_rig_hash
-from hairloom.addon.blender.bakes.simulated import differences
+from hairloom.addon.blender.bakes.simulation import differences
 from hairloom.addon.blender.base.vertex_weights import Memberships, read_weights
 from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.preview.bake import Bake

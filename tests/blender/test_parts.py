@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from tiers import few_in_commits
 
-from hairloom.addon.blender.base.parts import Part, Parts, at_once, taken_back
+from hairloom.addon.blender.base.parts import Part, Parts, new_blocks_removed_on_error, run_parts
 from hairloom.addon.blender.scene.curves import curve_points, put_points
 from hairloom.addon.cards.steps import result_of
 from hairloom.addon.errors import HairloomError
@@ -49,11 +49,11 @@ def quadrupled(value: int) -> Parts[int]:
 @pytest.mark.parametrize(("value", "wanted"), [(3, 12), (9, -1)])
 def test_both_ways_have_the_same_result(value: int, wanted: int) -> None:
     """An error of a part is raised at its `yield`, where the work may catch it."""
-    assert at_once(quadrupled(value)) == wanted
+    assert run_parts(quadrupled(value)) == wanted
     assert result_of(in_parts(quadrupled(value))) == wanted
 
 
-@pytest.mark.parametrize("way", [at_once, lambda parts: result_of(in_parts(parts))])
+@pytest.mark.parametrize("way", [run_parts, lambda parts: result_of(in_parts(parts))])
 def test_an_error_that_nobody_takes_comes_out(way: Any) -> None:
     with pytest.raises(HairloomError, match="too much"):
         way(quadrupled(11))
@@ -67,7 +67,7 @@ def test_in_the_window_parts_are_beside_it_and_say_what_they_are() -> None:
     assert next(told).is_idle and threads != [threading.main_thread().name]
     may_go_on.set()
     assert result_of(told) == 8 and len(threads) == 2
-    at_once(quadrupled(2))
+    run_parts(quadrupled(2))
     assert threads[2:] == 2 * [threading.main_thread().name]
 
 
@@ -127,12 +127,12 @@ def test_hair_that_does_not_grow_again_after_all_is_as_it_was_combed(sphere: Any
 
 def test_what_was_added_goes_where_work_fails_and_stays_where_it_ends() -> None:
     before = everything()
-    with pytest.raises(HairloomError), taken_back() as note:
+    with pytest.raises(HairloomError), new_blocks_removed_on_error() as note:
         bpy.data.meshes.new("Gone")
         note()
         doubled(11)
     assert everything() == before
-    with taken_back() as note:
+    with new_blocks_removed_on_error() as note:
         bpy.data.meshes.new("Kept")
         note()
     assert "Kept" in bpy.data.meshes
@@ -142,7 +142,7 @@ def test_what_was_there_stays_though_another_file_was_loaded() -> None:
     """Cancelling removes nothing from a file that was loaded meanwhile."""
 
     def work() -> Parts[None]:
-        with taken_back() as note:
+        with new_blocks_removed_on_error() as note:
             bpy.data.meshes.new("Gone")
             note()
             yield Part("Waiting", lambda: None)

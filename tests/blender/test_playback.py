@@ -12,7 +12,7 @@ from tiers import few_in_commits
 
 from hairloom.addon.blender.bakes import playback
 from hairloom.addon.blender.preview import previews
-from hairloom.addon.blender.preview.bake import Bake, bakeable, simulated_for
+from hairloom.addon.blender.preview.bake import Bake, bakeable, simulation_for
 from hairloom.addon.blender.scene.fin_modifier import POSITION, add_modifier
 
 LAST = 6
@@ -272,7 +272,7 @@ def shown(flag_object):
 
 def test_a_baked_fin_equals_playback_and_plays_without_a_preview(fin, get_depsgraph):
     assert bakeable(fin)
-    previews.add(simulated_for(fin, get_depsgraph()), get_depsgraph())
+    previews.add(simulation_for(fin, get_depsgraph()), get_depsgraph())
     frames = range(1, LAST + 1)
     played = []
     for frame in frames:

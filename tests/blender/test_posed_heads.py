@@ -7,7 +7,7 @@ from hedgehogs import hedgehog
 from node_modifiers import add_nodes_modifier, hair_dynamics_mode
 from selecting import select
 
-from hairloom.addon.blender.base.parts import at_once
+from hairloom.addon.blender.base.parts import run_parts
 from hairloom.addon.blender.cards.build import read_inputs
 from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.preview.bake import Bake
@@ -262,7 +262,7 @@ def test_cards_are_those_of_the_rest_pose_and_say_so(hair):
 def test_made_real_it_is_stored_as_it_was(hair):
     found = []
     for frame in (REST, POSED):
-        (made,) = at_once(make_real([hair], go_to(frame)))
+        (made,) = run_parts(make_real([hair], go_to(frame)))
         found.append(curve_points(made.hair.data))
         bpy.data.objects.remove(made.hair)
         hair.hide_set(False)

@@ -6,7 +6,7 @@ import pytest
 from grids import strand_grid
 
 from hairloom.addon.blender.base.outcome import collected_reports, past_reports
-from hairloom.addon.blender.base.parts import at_once, together
+from hairloom.addon.blender.base.parts import batched, run_parts
 from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.properties.presets import named_preset
 from hairloom.addon.blender.scene import particle_hair
@@ -217,7 +217,7 @@ def test_all_selected_hair_is_taken_and_counted(new_hair, sphere):
 
 def test_cancelling_takes_none_of_several_hairs(new_hair, sphere, get_depsgraph):
     grooms = [new_hair(sphere) for _ in range(2)]
-    work = together(starting.take_over(hair, get_depsgraph(), ("looks/blond",)) for hair in grooms)
+    work = batched(starting.take_over(hair, get_depsgraph(), ("looks/blond",)) for hair in grooms)
     next(work)
     work.send(None)  # the part of the second groom is running
     work.close()
@@ -351,7 +351,7 @@ def with_principled_hair(hair):
 def test_hair_that_nobody_dressed_has_the_look_of_its_material(new_hair, sphere, get_depsgraph):
     hair = new_hair(sphere)
     with_principled_hair(hair)
-    _, done = at_once(
+    _, done = run_parts(
         starting.take_over(hair, get_depsgraph(), chosen_presets(preferences(bpy.context)))
     )
     assert done == ("took its look from the material 'Auburn'",)
@@ -364,7 +364,7 @@ def test_a_look_that_was_set_stays_whatever_the_material(new_hair, sphere, get_d
     hair = new_hair(sphere)
     with_principled_hair(hair)
     hair.data.hairloom.shading.tip_tint = 0.5
-    _, done = at_once(
+    _, done = run_parts(
         starting.take_over(hair, get_depsgraph(), chosen_presets(preferences(bpy.context)))
     )
     shading = hair.data.hairloom.shading
@@ -373,7 +373,7 @@ def test_a_look_that_was_set_stays_whatever_the_material(new_hair, sphere, get_d
 
 def test_hair_with_colours_of_its_own_keeps_them_as_it_is_dressed(new_hair, sphere, get_depsgraph):
     hair = new_hair(sphere)
-    at_once(starting.take_over(hair, get_depsgraph(), chosen_presets(preferences(bpy.context))))
+    run_parts(starting.take_over(hair, get_depsgraph(), chosen_presets(preferences(bpy.context))))
     assert hair.data.hairloom.shading.color_source == "own"
     bpy.ops.hairloom.apply_preset(name="looks/blond")
     assert hair.data.hairloom.shading.color_source == "look", "a look that was chosen is seen"

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from overriding import library_overrides
 
-from hairloom.addon.blender.base.parts import Part, at_once, together
+from hairloom.addon.blender.base.parts import Part, batched, run_parts
 from hairloom.addon.blender.colliders import ties
 from hairloom.addon.blender.scene.curves import curve_points, put_points
 from hairloom.addon.blender.scene.kept_shape import COMBED
@@ -210,7 +210,7 @@ def test_of_many_hairs_all_is_made_before_any_is_written():
         log.append(f"wrote {made}")
         return made.upper()
 
-    assert at_once(together([work("a"), work("b")])) == ["A", "B"]
+    assert run_parts(batched([work("a"), work("b")])) == ["A", "B"]
     assert log == ["made a", "made b", "wrote a", "wrote b"]
 
 
@@ -222,7 +222,7 @@ def test_where_one_of_many_fails_none_is_written():
         log.append(made)
 
     with pytest.raises(ZeroDivisionError):
-        at_once(together([work("a"), work("b")]))
+        run_parts(batched([work("a"), work("b")]))
     assert log == []
 
 
@@ -232,4 +232,4 @@ def test_a_work_of_two_parts_is_none_of_these():
         yield Part("two", int)
 
     with pytest.raises(AssertionError, match="more than one part"):
-        at_once(together([work()]))
+        run_parts(batched([work()]))

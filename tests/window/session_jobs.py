@@ -189,13 +189,13 @@ def cloth_is_played():
     yield
     live = of_hairloom("previews")
     play()
-    assert live.waiting() == ("Grid",), "Play does not wait, or no window while it does"
+    assert live.waiting_names() == ("Grid",), "Play does not wait, or no window while it does"
     yield from read("Making the cloth", box_of(region("UI")))
     driver.screenshot("cloth")
     yield from press("ESC")
     assert not live.is_playing(), "Esc does not cancel"
     play()
-    yield from until(lambda: live.is_playing() and not live.waiting(), "it never plays")
+    yield from until(lambda: live.is_playing() and not live.waiting_names(), "it never plays")
     yield from press("ESC")
     assert not live.is_playing(), "Esc does not stop it"
 

@@ -291,7 +291,7 @@ def disabled_and_enabled():
     yield from ended("disabled")
     driver.enable_extension()
     assert hair().hairloom.dynamics.gusts == 0.625, "disabling has lost a setting"
-    assert not live().simulated()
+    assert not live().simulations()
     with in_view():
         bpy.ops.hairloom.play("INVOKE_DEFAULT")
     yield from plays()

@@ -90,7 +90,7 @@ def of_gpu() -> Counter[str]:
 def of_previews() -> dict[str, Any]:
     """The state that only a preview, Play or long work has; all empty when none is active."""
     return {
-        "previews": [each.name for each in of_hairloom("previews").simulated()],
+        "previews": [each.name for each in of_hairloom("previews").simulations()],
         "draw handlers": of_hairloom("overlay")._overlay.handles,
         "drawn": sorted(of_hairloom("overlay").drawn()),
         "ticks": of_hairloom("latest_job").is_watched("play"),

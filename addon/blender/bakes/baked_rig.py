@@ -19,7 +19,7 @@ from ...groom.widths import Widths
 from ...refine.lead_out import LedOut
 from ...rig_flow import Pose, Rig
 from ...strands import StrandSet, Surface
-from .simulated import Arrays
+from .simulation import Arrays
 
 #: Relative tolerance at which sizes are equal, as Blender's matrices are rounded.
 _ROUNDING = 1.0e-4

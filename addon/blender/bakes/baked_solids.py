@@ -34,7 +34,7 @@ from ...errors import HairloomError
 from ...rig_flow import MotionStart, Pose, Solids
 from ...strands import Surface
 from ..colliders.fields import NotMadeYetError, field_of
-from .simulated import Arrays
+from .simulation import Arrays
 
 _BALL, _CAPSULE, _BALLS, _MESH = range(4)
 _START_PREFIX = "begun_"

@@ -36,7 +36,7 @@ from ...exchange.files.file_moves import flush_file, flush_folder
 from ...exchange.files.file_names import length_remark
 from ...exchange.files.stale_temp_files import WRITER_TAG, is_stale, is_temporary, writer_tag
 from .baked_solids import VARIABLE_LENGTH
-from .simulated import Arrays
+from .simulation import Arrays
 
 #: Version of the format, beyond what `layout` describes. 2: strands may have points of their own.
 #: 3: frames hold the strands that were led out of colliders.
@@ -59,7 +59,7 @@ class Facts:
     owner, file: the object, and the name of its Blender file; empty where that was not saved.
     first, last: scene frames. frame_rate: [1/s].
     form: the solver that computed it. rig_hash, frame_hashes (one per frame): see
-    `simulated.hashes`.
+    `simulation.hashes`.
     hairloom: the version that wrote it.
     figures: measurements of the motion of hair; None for cloth, and from versions that took none.
     """

@@ -41,7 +41,7 @@ from ..scene.forces import force_fields_of, gravity_of
 from ..scene.masks import image_values
 from ..scene.partings import parting_state, partings_of
 from ..scene.surfaces import read_positions
-from .simulated import SOLVER_VERSION, Hashed, hashes
+from .simulation import SOLVER_VERSION, Hashed, hashes
 
 #: The parts of a rig hash that determine the rig; the others only matter to a bake.
 RIG_PARTS = ("hair", "head", "guides", "widths", "children", "partings", "ties", "style", "paint")
@@ -53,7 +53,7 @@ def groom_rig_hash(
     settings: GroomSettings,
     scene: bpy.types.Scene,
 ) -> str:
-    """Named hashes, see `simulated.hashes`; messages report changes by these names."""
+    """Named hashes, see `simulation.hashes`; messages report changes by these names."""
     grown: dict[str, tuple[Hashed, ...]] = {}
     if settings[ChildrenSettings].method != "none":
         grown["children"] = (

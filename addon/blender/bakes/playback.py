@@ -24,7 +24,7 @@ from .bake_settings import folder_of, shown_folder_of
 from .baked_rig import BakedRig, baked_rig_of
 from .baked_solids import BakedSolids, solids_between
 from .cache import FACTS, Cache
-from .simulated import Arrays
+from .simulation import Arrays
 
 
 class _Known:

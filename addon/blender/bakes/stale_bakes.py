@@ -11,7 +11,7 @@ from ..scene.poses import read_pose
 from . import playback
 from .cache import Cache
 from .groom_hashes import groom_frame_hash, groom_rig_hash, settings_part
-from .simulated import differences
+from .simulation import differences
 
 
 def changed_since(

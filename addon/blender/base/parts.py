@@ -3,7 +3,7 @@
 Such a function is a generator. It reads from the scene, yields a part, is sent the part's result,
 and writes it into the scene. The caller decides where the parts run:
 
-    at_once                  in the calling thread: scripts, and jobs without a window
+    run_parts                in the calling thread: scripts, and jobs without a window
     ui.long_work.in_parts    in a thread, while the window shows progress and may cancel
 """
 
@@ -29,7 +29,7 @@ class Part(NamedTuple):
 type Parts[Result] = Generator[Part, Any, Result]
 
 
-def at_once[Result](parts: Parts[Result]) -> Result:
+def run_parts[Result](parts: Parts[Result]) -> Result:
     """Run all parts one after the other; a part's error is raised at the yield of that part."""
     step = partial(next, parts)
     while True:
@@ -44,7 +44,7 @@ def at_once[Result](parts: Parts[Result]) -> Result:
             step = partial(parts.throw, error)
 
 
-def together[Result](
+def batched[Result](
     works: Iterable[Parts[Result]], failed: Callable[[HairloomError], None] | None = None
 ) -> Parts[list[Result]]:
     """Several works of one part each, such as one per hair: all parts, which may fail or be
@@ -73,16 +73,16 @@ def together[Result](
 
 
 @contextmanager
-def taken_back() -> Iterator[Callable[[], None]]:
+def new_blocks_removed_on_error() -> Iterator[Callable[[], None]]:
     """Remove data-blocks that were added inside if the block fails or is cancelled.
 
     Yields a function to call after each addition, before the next part: only data-blocks added
     until then are removed. They are kept by session number, since another file may be loaded
     meanwhile.
     """
-    before, added = _numbers(), set[int]()
+    before, added = _session_uids(), set[int]()
     try:
-        yield lambda: added.update(_numbers() - before)
+        yield lambda: added.update(_session_uids() - before)
     except BaseException:  # to be cancelled raises GeneratorExit, which is no Exception
         bpy.data.batch_remove([each for each in _data_blocks() if each.session_uid in added])
         raise
@@ -91,14 +91,14 @@ def taken_back() -> Iterator[Callable[[], None]]:
 @contextmanager
 def new_blocks_removed() -> Iterator[None]:
     """Remove data-blocks that were added inside at the end, however the block ends."""
-    before = _numbers()
+    before = _session_uids()
     try:
         yield
     finally:
         bpy.data.batch_remove([each for each in _data_blocks() if each.session_uid not in before])
 
 
-def _numbers() -> set[int]:
+def _session_uids() -> set[int]:
     return {each.session_uid for each in _data_blocks()}
 
 

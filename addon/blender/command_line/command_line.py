@@ -17,7 +17,7 @@ from ...errors import HairloomError
 from ...params import SettingsMap
 from ..base.gpu_context import gpu_refusals
 from ..base.interruption import Interrupted, interruptible
-from ..base.parts import at_once
+from ..base.parts import run_parts
 from ..base.report import Report
 from ..setup.hairstyles import add_hairstyle, add_head, named_hairstyle
 from .bake_job import BAKE
@@ -214,9 +214,9 @@ def _styled(options: argparse.Namespace, report: Report) -> str:
     if options.head:
         (head,) = named_objects([options.head], lambda obj: bool(obj.type == "MESH"), "a mesh")
     else:
-        head = at_once(add_head(collection, options.skin))
+        head = run_parts(add_head(collection, options.skin))
     style, depsgraph = named_hairstyle(options.style), bpy.context.evaluated_depsgraph_get()
-    added = at_once(
+    added = run_parts(
         add_hairstyle(style, head, depsgraph, collection, hairline=options.children_density or "")
     )
     report_notes([*added.warnings, *added.done], report)

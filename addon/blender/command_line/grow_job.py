@@ -7,7 +7,7 @@ import argparse
 import bpy
 
 from ...groom.settings import GrowSettings
-from ..base.parts import at_once
+from ..base.parts import run_parts
 from ..setup.starting import new_groom
 from .job_steps import Job
 from .object_settings import named_objects, put_settings
@@ -19,7 +19,7 @@ def grow(job: Job) -> None:
     options, report = job.options, job.report
     (head,) = named_objects([options.head], lambda obj: bool(obj.type == "MESH"), "a mesh")
     with report.stage("grow"):
-        hair = at_once(
+        hair = run_parts(
             new_groom(
                 head,
                 bpy.context.evaluated_depsgraph_get(),

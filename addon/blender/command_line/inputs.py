@@ -21,7 +21,7 @@ from ...strands import StrandSet, Surface
 from ...strands.colors import color_notes
 from ...strands.join import joined
 from ..base.objects import head_of
-from ..base.parts import at_once
+from ..base.parts import run_parts
 from ..base.vertex_weights import read_weights
 from ..scene.built_in_head import HeadLook, built_in_head
 from ..scene.curves import read_curves
@@ -105,7 +105,7 @@ def read_inputs(sources: Sources, grow_settings: GrowSettings) -> Inputs:
         notes = (*notes, *_size_notes(sources, strands, head))
         mesh = bpy.data.objects.get(head_name or "")
         if sources.with_face and head is not None and mesh is not None and is_bust(mesh):
-            face = at_once(face_hair(mesh, head, bpy.context.evaluated_depsgraph_get()))
+            face = run_parts(face_hair(mesh, head, bpy.context.evaluated_depsgraph_get()))
             strands = joined(strands, face)
     else:
         assert head is not None, "the built-in one is always there"

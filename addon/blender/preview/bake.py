@@ -28,15 +28,15 @@ from ..bakes.bake_settings import (
 )
 from ..bakes.cache import CacheWriter, Facts, check_bake_folder, delete, facts_in
 from ..bakes.groom_hashes import frame_rate
-from ..bakes.simulated import Simulated
+from ..bakes.simulation import Simulation
 from ..base.objects import Handle
 from ..base.report import environment
 from ..base.suspension import suspended
 from ..scene.fin_modifier import clear, fin_modifier
 from ..scene.source import check_density
+from ..sessions.coupled_frame import CoupledFrame
 from ..sessions.fins import FinSession
 from ..sessions.session import Session
-from ..sessions.together import Together
 from . import previews
 from .bystanders import Bystanders
 
@@ -54,7 +54,7 @@ class _Part:
     folder: Path
     named: str
     replaced: str = ""
-    session: Simulated | None = None
+    session: Simulation | None = None
     writer: CacheWriter | None = None
     rig_hash: str = ""
     notes: tuple[str, ...] = ()
@@ -70,7 +70,7 @@ class _Part:
         if frame not in self.frames:
             return
         if self.writer is None or self.session is None:
-            session = self.session = simulated_for(self.found(), depsgraph)
+            session = self.session = simulation_for(self.found(), depsgraph)
             session.play(depsgraph)
             self.rig_hash = session.rig_hash(depsgraph)
             if isinstance(session, Session):
@@ -238,11 +238,11 @@ class Bake:
             scene.frame_set(frame)
             depsgraph = bpy.context.evaluated_depsgraph_get()
             with _named(frame):
-                with Together([*self._grooms_in(frame), *bystanders.values()]) as together:
+                with CoupledFrame([*self._grooms_in(frame), *bystanders.values()]) as coupled_frame:
                     for part in self.parts:
                         part.go(frame, depsgraph)
                     bystanders.move(depsgraph)
-                    together.go_on()
+                    coupled_frame.simulate_coupled()
                 for part in self.parts:
                     part.write(frame, depsgraph)
                 bystanders.join(self._grooms_in(frame), depsgraph)
@@ -302,13 +302,13 @@ def _named(frame: int) -> Iterator[None]:
         ) from error
 
 
-def simulated_for(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Simulated:
+def simulation_for(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Simulation:
     """The session of this object's preview, or a new one if there is none or its size has changed.
 
     Raises:
         HairloomError: it cannot be simulated.
     """
-    known = previews.simulated_of(obj)
+    known = previews.simulation_of(obj)
     if known is None and obj.type == "MESH":
         return FinSession(obj, depsgraph)
     if known is None or (isinstance(known, Session) and known.is_resized(depsgraph)):
@@ -320,7 +320,7 @@ def simulated_for(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Simu
     return known
 
 
-def form_of_session(session: Simulated) -> str:
+def form_of_session(session: Simulation) -> str:
     """The kind of solver that simulates it: "numpy" or "compute"."""
     return session.solver.form if isinstance(session, Session) else "numpy"
 

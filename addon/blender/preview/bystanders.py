@@ -20,7 +20,7 @@ from .preview import rig_for
 
 
 class Bystander:
-    """One such groom; implements `together.Felt`.
+    """One such groom; implements `coupled_frame.FeltGroom`.
 
     Raises:
         HairloomError: there are no hair curves, none can be used, or their scale is not the head's.
@@ -35,7 +35,7 @@ class Bystander:
 
     @property
     def is_felt(self) -> bool:
-        """See `together.Felt`."""
+        """See `coupled_frame.FeltGroom`."""
         hair = self._source.hair.handle.find()
         return hair is not None and not hair.hide_render
 
@@ -58,7 +58,7 @@ class Bystander:
         self._guides = motion_flow.style_of_guides(self.rig, self.pose)
 
     def guides(self) -> Floats:
-        """See `together.Felt`."""
+        """See `coupled_frame.FeltGroom`."""
         return self._guides
 
     def style_seen(self) -> Style:

@@ -24,7 +24,7 @@ def start_enabled(depsgraph: bpy.types.Depsgraph) -> list[str]:
     """Preview all fins of the view layer for which *Simulate* is on; returns warnings."""
     warnings = []
     for obj in fins_in(bpy.context.view_layer):
-        if obj.hairloom.fin.enabled and previews.simulated_of(obj) is None:
+        if obj.hairloom.fin.enabled and previews.simulation_of(obj) is None:
             try:
                 start(obj, depsgraph)
             except HairloomError as error:

@@ -39,7 +39,7 @@ def on_load_post(*_: Any) -> None:
 @persistent
 def on_load_fail(*_: Any) -> None:
     """The scene that was open stays open, but nothing in it is previewed any longer."""
-    registry.show_all_without()
+    registry.show_all_unpreviewed()
 
 
 @persistent

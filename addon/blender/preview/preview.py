@@ -23,7 +23,7 @@ from ..bakes import playback
 from ..bakes.baked_rig import BakedRig
 from ..bakes.cache import Cache, Facts
 from ..bakes.groom_hashes import RIG_PARTS, frame_rate, groom_rig_hash
-from ..bakes.simulated import Simulated, differences
+from ..bakes.simulation import Simulation, differences
 from ..base import latest_job
 from ..base.objects import Handle, head_of
 from ..colliders import fields
@@ -62,7 +62,7 @@ class Preview:
     Methods raise HairloomError when an object that it is made of is gone or broken.
     """
 
-    def __init__(self, session: Simulated) -> None:
+    def __init__(self, session: Simulation) -> None:
         self.session = session
         self.phase = Phase.REST
         self.frame: int | None = None

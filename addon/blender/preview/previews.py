@@ -16,7 +16,7 @@ from ...errors import HairloomError
 from ...shading.volume.settings import VolumeSettings
 from ..bakes import playback
 from ..bakes.bake_settings import folder_of
-from ..bakes.simulated import Simulated
+from ..bakes.simulation import Simulation
 from ..base import latest_job
 from ..base.gpu_context import free_soon, is_interrupted
 from ..base.latest_job import ARRIVAL_TIME, unwatch, watch
@@ -31,8 +31,8 @@ from ..cards.kept_cards import KeptCards
 from ..colliders import fields
 from ..colliders.rigs import MadeRig
 from ..scene.fin_modifier import clear, is_shown
+from ..sessions.coupled_frame import CoupledFrame
 from ..sessions.session import Session
-from ..sessions.together import Together
 from ..viewport import overlay
 from ..viewport.debug_lines import is_combed
 from .phases import Event, Phase
@@ -84,7 +84,7 @@ def start(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Session:
     return session
 
 
-def begin_over(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
+def restart(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
     """Preview a groom again, in another size or on another head; the timeline goes on.
 
     Raises:
@@ -94,7 +94,7 @@ def begin_over(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
     previews[session.uid].frame = preview.frame
 
 
-def add(session: Simulated, depsgraph: bpy.types.Depsgraph) -> None:
+def add(session: Simulation, depsgraph: bpy.types.Depsgraph) -> None:
     """Let the timeline and Play move it from now on; replaces an earlier preview of its object.
 
     Raises:
@@ -130,24 +130,24 @@ def forget_all() -> None:
     previews.built_cards.forget()
 
 
-def stop(session: Simulated) -> None:
+def stop(session: Simulation) -> None:
     """End its preview: Blender draws the hair again, and cloth is as without a preview."""
     _forget(session.uid)
     redraw_panels()
     obj = session.bodies[0].handle.find()
     if obj is not None:
-        _show_without(obj)
+        _show_unpreviewed(obj)
         refresh_views()
 
 
-def show_all_without() -> None:
+def show_all_unpreviewed() -> None:
     """Show all hair and cloth as without a preview, whatever was previewed."""
     for obj in bpy.data.objects:
-        _show_without(obj)
+        _show_unpreviewed(obj)
     refresh_views()
 
 
-def _show_without(obj: bpy.types.Object) -> None:
+def _show_unpreviewed(obj: bpy.types.Object) -> None:
     if obj.type == "CURVES":
         for depsgraph in all_depsgraphs():
             show_originals(obj, depsgraph, show=True)
@@ -157,7 +157,7 @@ def _show_without(obj: bpy.types.Object) -> None:
 
 
 def stop_all() -> None:
-    for session in simulated():
+    for session in simulations():
         stop(session)
 
 
@@ -177,12 +177,12 @@ def sessions() -> tuple[Session, ...]:
     return tuple(each.groom for each in previews.values() if each.groom is not None)
 
 
-def simulated() -> tuple[Simulated, ...]:
+def simulations() -> tuple[Simulation, ...]:
     """The grooms and fins that are previewed."""
     return tuple(each.session for each in previews.values())
 
 
-def simulated_in(depsgraph: bpy.types.Depsgraph) -> tuple[Simulated, ...]:
+def simulations_in(depsgraph: bpy.types.Depsgraph) -> tuple[Simulation, ...]:
     """The previewed grooms and fins that this depsgraph does not leave out."""
     return tuple(each.session for each in previews.values() if not each.is_left_out(depsgraph))
 
@@ -194,11 +194,11 @@ def made_rigs() -> dict[int, MadeRig]:
 
 
 def session_of(hair: bpy.types.Object | None) -> Session | None:
-    found = simulated_of(hair)
+    found = simulation_of(hair)
     return found if isinstance(found, Session) else None
 
 
-def simulated_of(obj: bpy.types.Object | None) -> Simulated | None:
+def simulation_of(obj: bpy.types.Object | None) -> Simulation | None:
     """The groom or fin of this object, if it is previewed."""
     found = None if obj is None else previews.get(obj.session_uid)
     return None if found is None else found.session
@@ -220,7 +220,7 @@ def is_playing() -> bool:
     return any(each.is_playing for each in previews.values())
 
 
-def windows_of_play() -> dict[int, bpy.types.Window]:
+def playing_windows() -> dict[int, bpy.types.Window]:
     """A window for each scene in which hair or cloth plays, by session number of the scene."""
     playing = [each for each in previews.values() if each.is_playing]
     found: dict[int, bpy.types.Window] = {}
@@ -231,7 +231,7 @@ def windows_of_play() -> dict[int, bpy.types.Window]:
     return found
 
 
-def waiting() -> tuple[str, ...]:
+def waiting_names() -> tuple[str, ...]:
     """The names of previews that play as soon as everything is made."""
     return tuple(each.session.name for each in previews.values() if each.phase is Phase.WAITING)
 
@@ -256,7 +256,7 @@ def play(depsgraph: bpy.types.Depsgraph, *, blocking: bool = True) -> list[str]:
     pause(False)
     fields.trim()
     warnings = []
-    for session in simulated_in(depsgraph):
+    for session in simulations_in(depsgraph):
         try:
             begin(session, depsgraph, blocking=blocking)
         except HairloomError as error:
@@ -264,11 +264,11 @@ def play(depsgraph: bpy.types.Depsgraph, *, blocking: bool = True) -> list[str]:
     return warnings
 
 
-def begin(session: Simulated, depsgraph: bpy.types.Depsgraph, *, blocking: bool) -> None:
+def begin(session: Simulation, depsgraph: bpy.types.Depsgraph, *, blocking: bool) -> None:
     """Play one preview freely, now or as soon as its hair and its colliders are made; see `play`.
 
     Raises:
-        HairloomError: as `Simulated.play`.
+        HairloomError: as `Simulation.play`.
     """
     preview = previews[session.uid]
     preview.release()
@@ -279,7 +279,7 @@ def begin(session: Simulated, depsgraph: bpy.types.Depsgraph, *, blocking: bool)
 
 def advance(depsgraph: bpy.types.Depsgraph, duration: float) -> None:
     """Simulate the time [s] that has passed since the last call."""
-    with together(depsgraph):
+    with coupled_frame(depsgraph):
         for preview in tuple(previews.values()):
             if preview.phase is Phase.WAITING and preview.may_begin:
                 # its first frame waits for the next tick, so that neither blocks the window long
@@ -289,12 +289,12 @@ def advance(depsgraph: bpy.types.Depsgraph, duration: float) -> None:
 
 
 @contextmanager
-def together(depsgraph: bpy.types.Depsgraph) -> Iterator[None]:
+def coupled_frame(depsgraph: bpy.types.Depsgraph) -> Iterator[None]:
     """A frame of all previewed grooms of the scene; those that feel each other move at its end."""
-    here = [each for each in simulated_in(depsgraph) if isinstance(each, Session)]
-    with Together([] if is_interrupted() else here) as frame:
+    here = [each for each in simulations_in(depsgraph) if isinstance(each, Session)]
+    with CoupledFrame([] if is_interrupted() else here) as frame:
         yield
-        for session in frame.go_on():
+        for session in frame.simulate_coupled():
             preview = previews.get(session.uid)
             if preview is not None and preview.session is session:
                 attempt(preview, depsgraph, partial(preview.finish_frame, depsgraph))
@@ -322,7 +322,7 @@ def _put_back(preview: Preview, depsgraph: bpy.types.Depsgraph, keep_playing: bo
     else:
         preview.stop(depsgraph)
         if preview.is_resized(depsgraph):
-            begin_over(preview, depsgraph)
+            restart(preview, depsgraph)
 
 
 def bake_changed(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
@@ -345,7 +345,7 @@ def _take_other_bake(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
     baked = None if groom is None else rig_for(preview.found(), depsgraph.scene)
     is_other = groom is not None and baked is not None and not baked.rests.has_size_of(groom.rests)
     if is_other or preview.is_resized(depsgraph):
-        begin_over(preview, depsgraph)
+        restart(preview, depsgraph)
     else:
         preview.take_bake(depsgraph)
 

@@ -132,7 +132,7 @@ def frame_changed(depsgraph: bpy.types.Depsgraph) -> None:
     every frame.
     """
     _, _, light_changed = changes(depsgraph)
-    with registry.together(depsgraph):
+    with registry.coupled_frame(depsgraph):
         for preview in tuple(previews.values()):
             attempt(preview, depsgraph, partial(_go, preview, depsgraph, light_changed))
 
@@ -225,7 +225,7 @@ def _read(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
     if session is None:
         preview.act(Event.RESET, depsgraph)
     elif session.has_another_head() or preview.is_resized(depsgraph):
-        registry.begin_over(preview, depsgraph)
+        registry.restart(preview, depsgraph)
     else:
         session.read_again(depsgraph, blocking=latest_job.is_blocking())
         if preview.is_to_rest:

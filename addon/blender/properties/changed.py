@@ -63,7 +63,7 @@ def passes(owner: bpy.types.ID) -> None:
 
 
 @contextmanager
-def together() -> Iterator[None]:
+def as_one_change() -> Iterator[None]:
     """All properties of a data-block that are set inside count as one change, at the end."""
     if _HELD.get() is not None:
         yield

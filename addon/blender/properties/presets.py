@@ -249,7 +249,7 @@ def apply(settings: Settings, hair: bpy.types.Object) -> None:
         group = getattr(owner, settings.section, None)
         if group is not None:
             settings = settings.with_masks_of(settings_of(group, type(settings)))
-            with changed.together():
+            with changed.as_one_change():
                 for name, value in settings.as_dict().items():
                     setattr(group, name, value)
             return

@@ -14,7 +14,7 @@ from mathutils import Matrix
 
 from ...errors import HairloomError
 from ...strands import Surface
-from ..base.parts import new_blocks_removed, taken_back
+from ..base.parts import new_blocks_removed, new_blocks_removed_on_error
 from .surfaces import read_surface, uv_map_note
 
 _IMPORTERS: dict[str, Callable[[str], Any]] = {
@@ -113,7 +113,7 @@ def _imported(path: Path) -> list[bpy.types.Object]:
     if not os.path.isfile(path):
         raise HairloomError("there is no such file", place=str(path), remedy="Check the path")
     before = {obj.session_uid for obj in bpy.data.objects}
-    with taken_back() as added:
+    with new_blocks_removed_on_error() as added:
         try:
             importer(str(path))
         except RuntimeError as error:

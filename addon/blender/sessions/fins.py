@@ -18,7 +18,7 @@ from ...dynamics.step import Drive
 from ...errors import HairloomError
 from ...rig_flow import Solids
 from ..bakes.groom_hashes import collider_places, collider_shapes, frame_rate, mesh_parts
-from ..bakes.simulated import CLOTH_VERSION, Arrays, hashes
+from ..bakes.simulation import CLOTH_VERSION, Arrays, hashes
 from ..base.mesh_arrays import triangle_corners
 from ..base.objects import Body, matrix_of, objects_in
 from ..base.vertex_weights import read_weights
@@ -31,7 +31,7 @@ from .fabrics import ClothMesh, FabricJob
 
 
 class FinSession:
-    """One fin, while it is previewed or baked; see `simulated.Simulated`.
+    """One fin, while it is previewed or baked; see `simulation.Simulation`.
 
     Raises:
         HairloomError: not a mesh with our modifier, or one that cannot be cloth.
@@ -59,7 +59,7 @@ class FinSession:
 
     @property
     def bodies(self) -> tuple[Body, ...]:
-        """See `simulated.Simulated`."""
+        """See `simulation.Simulation`."""
         return (self.body,)
 
     @property
@@ -162,7 +162,7 @@ class FinSession:
         return self.state.normals()
 
     def constants(self) -> Arrays:
-        """See `simulated.Simulated`."""
+        """See `simulation.Simulation`."""
         return {"corners": self._corners}
 
     def recorded(self) -> Arrays:
@@ -170,7 +170,7 @@ class FinSession:
         return {"position": self._shown.copy()}
 
     def show_recorded(self, frame: Arrays, solids: Solids | None = None) -> None:
-        """See `simulated.Simulated`; cloth is not led out of colliders.
+        """See `simulation.Simulation`; cloth is not led out of colliders.
 
         Raises:
             HairloomError: the frame is of another mesh.
@@ -186,7 +186,7 @@ class FinSession:
         self._show(obj, position)
 
     def rig_hash(self, depsgraph: bpy.types.Depsgraph) -> str:
-        """See `simulated.Simulated`."""
+        """See `simulation.Simulation`."""
         obj = self._found()
         modifiers = [(each.type, each.name) for each in obj.modifiers if each.show_viewport]
         return hashes(
@@ -198,7 +198,7 @@ class FinSession:
         )
 
     def frame_hash(self, depsgraph: bpy.types.Depsgraph) -> str:
-        """See `simulated.Simulated`."""
+        """See `simulation.Simulation`."""
         obj = self._found()
         carried, matrix = self._read(obj, depsgraph)
         return hashes(

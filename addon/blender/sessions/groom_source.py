@@ -423,13 +423,13 @@ class GroomSource:
             self._motion_masks = masks
 
     def rig_hash(self, depsgraph: bpy.types.Depsgraph) -> str:
-        """See `simulated.Simulated`."""
+        """See `simulation.Simulation`."""
         hair = self.hair.found()
         head = None if self.head is None else self.head.found()
         return groom_rig_hash(hair, head, self.settings, depsgraph.scene)
 
     def frame_hash(self, pose: Pose, depsgraph: bpy.types.Depsgraph) -> str:
-        """See `simulated.Simulated`."""
+        """See `simulation.Simulation`."""
         hair = self.hair.found()
         head = None if self.head is None else self.head.found()
         return groom_frame_hash(hair, head, pose, depsgraph)

@@ -30,7 +30,7 @@ from ...strands.arc_length import lengths
 from ..bakes.baked_rig import BakedRig, RestMatrices, frame_arrays, led_in, rig_arrays
 from ..bakes.baked_solids import solid_arrays, solid_constants
 from ..bakes.groom_hashes import frame_rate
-from ..bakes.simulated import Arrays
+from ..bakes.simulation import Arrays
 from ..base.latest_job import LatestJob
 from ..base.objects import Body
 from ..base.thread_work import ThreadWork
@@ -51,13 +51,13 @@ from .solvers import Solver, computed_on, form_of, solver_of
 
 
 class Session:
-    """One groom while it is previewed or baked; implements `simulated.Simulated`.
+    """One groom while it is previewed or baked; implements `simulation.Simulation`.
 
     uid, hair, head: of its objects.
     groom: the prepared groom; a placeholder until the first hair is made in a thread.
     known_hair: data about other grooms that its dynamics keeps from frame to frame.
-    has_company: whether it is simulated together with others in this frame, see `together`;
-        `waiting` then holds its steps. failure: the error of these steps.
+    is_coupled: whether it is simulated together with others in this frame, see `coupled_frame`;
+        `pending_steps` then holds them. failure: the error of these steps.
     figures, card_figures: last measurement since the hair was at rest; those of cards only while
         cards are shown. are_figures_current: whether the hair has not moved since.
 
@@ -101,12 +101,12 @@ class Session:
         self._motion_start: MotionStart | None = None
         self._is_recorded = False
         self._contacts = FirstContacts()
-        self._posed: tuple[PosedCollider, ...] = ()
+        self._posed_colliders: tuple[PosedCollider, ...] = ()
         self._field_notes: tuple[str, ...] = ()
         self._styled: Rig | None = None
         self.known_hair = KnownHair()
-        self.has_company = False
-        self.waiting: Steps[None] | None = None
+        self.is_coupled = False
+        self.pending_steps: Steps[None] | None = None
         self.failure: Exception | None = None
         self.figures: Figures | None = None
         self.card_figures: CardFigures | None = None
@@ -151,9 +151,9 @@ class Session:
         return MadeRig(request.source, request.settings, groom.rig)
 
     @property
-    def posed(self) -> tuple[PosedCollider, ...]:
+    def posed_colliders(self) -> tuple[PosedCollider, ...]:
         """The colliders in the shown frame."""
-        return self._posed
+        return self._posed_colliders
 
     @property
     def is_made(self) -> bool:
@@ -224,11 +224,11 @@ class Session:
         return arrays | solid_constants(self._motion_start, self._collider_meshes, settings)
 
     def rig_hash(self, depsgraph: bpy.types.Depsgraph) -> str:
-        """See `simulated.Simulated`."""
+        """See `simulation.Simulation`."""
         return self._source.rig_hash(depsgraph)
 
     def frame_hash(self, depsgraph: bpy.types.Depsgraph) -> str:
-        """See `simulated.Simulated`."""
+        """See `simulation.Simulation`."""
         return self._source.frame_hash(self._pose(depsgraph), depsgraph)
 
     def _pose(self, depsgraph: bpy.types.Depsgraph) -> Pose:
@@ -247,15 +247,15 @@ class Session:
 
     def _moment(self) -> _Moment | None:
         """The state from which hair that is being made will go on; None: it will start at rest."""
-        if not self.is_playing or not self._posed:
+        if not self.is_playing or not self._posed_colliders:
             return None
-        standing = tuple(each.at_end() for each in self._posed)
+        standing = tuple(each.at_end() for each in self._posed_colliders)
         settings = self.settings[DynamicsSettings]
         return _Moment(self.solver.pose, standing, settings, self.solver.size)
 
     @property
     def bodies(self) -> tuple[Body, ...]:
-        """See `simulated.Simulated`."""
+        """See `simulation.Simulation`."""
         return (self.hair,) if self.head is None else (self.hair, self.head)
 
     @property
@@ -500,13 +500,13 @@ class Session:
         if not self.is_playing or self.obstacles is None:
             self.solver.rest(pose)
         else:
-            self._posed = self.obstacles.rest(depsgraph)
-            start = self._start(pose, self._posed)
+            self._posed_colliders = self.obstacles.rest(depsgraph)
+            start = self._start(pose, self._posed_colliders)
             self.solver.rest(pose, self._contacts.known(start))
             kept = start.settings.radius_root * self.solver.size
-            self._motion_start = MotionStart(pose, self._posed, kept)
+            self._motion_start = MotionStart(pose, self._posed_colliders, kept)
             painted = self._source.painted_guides(self.rig)
-            self.solver.meet(self._posed, start.settings, painted)
+            self.solver.meet(self._posed_colliders, start.settings, painted)
             self._contacts.keep(start, self.solver.motion)
             rate = frame_rate(depsgraph.scene)
             for _ in range(self.settings[DynamicsSettings].pre_roll):
@@ -540,7 +540,7 @@ class Session:
         """Get ready to simulate, starting at rest; makes the colliders, which can take a second.
 
         Args:
-            blocking, is_frame: see `simulated.Simulated`.
+            blocking, is_frame: see `simulation.Simulation`.
 
         Raises:
             HairloomError: as `rest`, or Blender's own hair dynamics is on.
@@ -596,8 +596,8 @@ class Session:
             HairloomError: as `rest`.
         """
         steps = self._steps(depsgraph, duration)
-        if self.has_company:
-            self.waiting = steps
+        if self.is_coupled:
+            self.pending_steps = steps
         else:
             alone(steps)
 
@@ -627,7 +627,7 @@ class Session:
 
     @property
     def is_felt(self) -> bool:
-        """See `together.Felt`."""
+        """See `coupled_frame.FeltGroom`."""
         hair = self.hair.handle.find()
         return self.is_made and hair is not None and not hair.hide_render
 
@@ -651,15 +651,15 @@ class Session:
         pose, settings = self._pose(depsgraph), self.settings[DynamicsSettings]
         goes_along = not time_scale or self.solver.has_jumped(pose, settings, duration)
         if self.obstacles is not None and goes_along:
-            self._posed = self.obstacles.rest(depsgraph)
+            self._posed_colliders = self.obstacles.rest(depsgraph)
         elif self.obstacles is not None:
-            self._posed = self.obstacles.move(depsgraph, duration)
+            self._posed_colliders = self.obstacles.move(depsgraph, duration)
         else:
-            self._posed = ()
+            self._posed_colliders = ()
         fields, self._field_notes = force_fields_of(self.hair.found(), depsgraph)
         gravity, painted = gravity_of(depsgraph.scene), self._source.painted_guides(self.rig)
         frame = FrameInput(
-            pose, self._posed, settings, gravity, duration, fields, painted, time_scale
+            pose, self._posed_colliders, settings, gravity, duration, fields, painted, time_scale
         )
         if goes_along:
             self.solver.go_along(frame)
@@ -686,7 +686,7 @@ class Session:
         if self._styled is not None:
             style = motion_flow.carried_guides(rig, self.solver.pose)
             measure.take_style(start(style, rig.curl_room))
-        measure.add(self.solver.strands(), self._rest_lengths(), guides, self._posed)
+        measure.add(self.solver.strands(), self._rest_lengths(), guides, self._posed_colliders)
 
     def _rest_lengths(self) -> Floats:
         """Lengths of all strands in their style."""
@@ -714,7 +714,7 @@ class Session:
         guides, led = self.solver.guides(), self.solver.led()
         styled = self.rig if self.settings[DynamicsSettings].animated_style else None
         arrays = frame_arrays(self.solver.pose, guides, led, styled)
-        return arrays | solid_arrays(self._posed, self._collider_meshes)
+        return arrays | solid_arrays(self._posed_colliders, self._collider_meshes)
 
     @property
     def _collider_meshes(self) -> tuple[Surface, ...]:
@@ -749,7 +749,9 @@ class Session:
         if self._is_recorded:
             return self.solver.pose.solids
         return (
-            None if self._motion_start is None else SimulatedSolids(self._motion_start, self._posed)
+            None
+            if self._motion_start is None
+            else SimulatedSolids(self._motion_start, self._posed_colliders)
         )
 
 

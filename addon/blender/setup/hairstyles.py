@@ -27,7 +27,7 @@ from ...strands.affine import mean_scale
 from ...strands.face import is_face_hair
 from ...strands.rooted_shapes import RootedShapes
 from ..base.objects import check_curves_editable, check_shape_editable, head_of
-from ..base.parts import Part, Parts, taken_back
+from ..base.parts import Part, Parts, new_blocks_removed_on_error
 from ..base.vertex_weights import read_weights, set_group, weight_names
 from ..colliders.fields import solid_of
 from ..properties import previews
@@ -181,7 +181,7 @@ def add_hairstyle(
     growth = yield from _growth(style, head, depsgraph, masks)
     if growth.groups:
         check_shape_editable(head)
-    with taken_back() as note:
+    with new_blocks_removed_on_error() as note:
         hair = write_curves(
             f"{head.name} {style.title}", growth.strands, head, collection, are_found=True
         )

@@ -11,7 +11,7 @@ from mathutils import Vector
 from ...groom.face_hair import grow_with_face
 from ...groom.settings import GrowSettings
 from ...groom.widths import with_widths
-from ..base.parts import Part, Parts, taken_back
+from ..base.parts import Part, Parts, new_blocks_removed_on_error
 from ..base.vertex_weights import read_weights
 from ..scene.bust import bust_object, encoded_skin
 from ..scene.bust_data import HAIR_GROUPS
@@ -49,7 +49,7 @@ def add_sample_scene(
         skin: of the head, one of bust_skin.TONES.
     """
     yield Part("Painting the skin", partial(encoded_skin, skin))  # fills its cache
-    with taken_back() as note:
+    with new_blocks_removed_on_error() as note:
         scene, head = _scene_with_head(skin)
         note()
         layer = scene.view_layers[0]

@@ -23,7 +23,7 @@ from ...strands.affine import mean_scale
 from ..base.attributes import read_attribute
 from ..base.digests import digest
 from ..base.objects import check_curves_editable, head_of, matrix_of, objects_with
-from ..base.parts import Part, Parts, at_once
+from ..base.parts import Part, Parts, run_parts
 from ..properties import changed
 from ..properties.properties import settings_of
 from ..scene.carried_weight import carry_as_before
@@ -142,7 +142,7 @@ def follow_settings(curves: bpy.types.ID) -> None:
     users.sort(key=lambda obj: not _is_evaluated(obj, depsgraph))
     try:
         if users:
-            at_once(grow_again(users[:1], depsgraph))
+            run_parts(grow_again(users[:1], depsgraph))
     except HairloomError as error:  # shown in the panel; the artist may not have finished editing
         own.problem = str(error)
 

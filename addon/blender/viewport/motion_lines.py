@@ -71,7 +71,7 @@ def contact_lines(session: Session) -> Colored:
     size = session.solver.motion.dynamics.rest.size
     radius = radius_of_all(settings, cv_count, count, size).reshape(cv_count, count).T
     reach = max(float(radius.max(initial=0.0)) * _NEAR, 1.0e-6)
-    found = signed_distance(guides.reshape(-1, 3), session.posed, reach)
+    found = signed_distance(guides.reshape(-1, 3), session.posed_colliders, reach)
     distance, outward = found[0].reshape(count, cv_count), found[1].reshape(guides.shape)
     is_inside = (distance < 0.0) & np.isfinite(radius)
     touches = (distance <= radius * _NEAR) & (distance < reach) & ~is_inside & np.isfinite(radius)

@@ -24,7 +24,7 @@ SOLVER_VERSION = 6
 CLOTH_VERSION = 2
 
 
-class Simulated(Protocol):
+class Simulation(Protocol):
     """One groom or fin in motion.
 
     uid: session number of its object. is_playing: whether it is being simulated.

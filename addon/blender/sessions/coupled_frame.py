@@ -1,8 +1,9 @@
 """Grooms that feel each other are simulated together in each frame, see `dynamics.neighbours`.
 
-    with Together(sessions) as frame:
-        ...                 each session is moved as if it were alone; one that feels others waits
-        frame.go_on()       those that waited are simulated, all together
+    with CoupledFrame(sessions) as frame:
+        ...                         each session is moved as if it were alone; those that feel
+                                    others wait
+        frame.simulate_coupled()    those that waited are simulated, all together
 
 Others see the guides of hair that is not simulated, plays a bake or feels nothing move in straight
 lines within the frame.
@@ -24,7 +25,7 @@ from ...rig_flow import Pose, Rig
 from .session import Session
 
 
-class Felt(Protocol):
+class FeltGroom(Protocol):
     """A groom that others may feel.
 
     uid: of its object.
@@ -51,14 +52,14 @@ class Felt(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class _Begin:
+class _GroomStart:
     """A groom at the beginning of the frame.
 
     reach: radius [m] of the ball that its hair cannot leave. near: the grooms that it feels, by
     session number.
     """
 
-    groom: Felt
+    groom: FeltGroom
     style: Style
     guides: Floats
     reach: float
@@ -71,24 +72,24 @@ class _Begin:
         straight = Straight(self.guides, groom.guides, self.reach)
         if not isinstance(groom, Session):
             return Mover(groom.uid, self.style, straight)
-        waiting, known = groom.waiting, groom.known_hair
+        waiting, known = groom.pending_steps, groom.known_hair
         return Mover(groom.uid, self.style, straight, waiting, self.near, known)
 
 
-class Together:
+class CoupledFrame:
     """A frame of these grooms, from where they are now."""
 
-    def __init__(self, grooms: Iterable[Felt]) -> None:
-        self._begun = _begun([groom for groom in grooms if groom.is_felt])
+    def __init__(self, grooms: Iterable[FeltGroom]) -> None:
+        self._starts = _frame_starts([groom for groom in grooms if groom.is_felt])
 
     @property
     def _sessions(self) -> list[Session]:
-        return [each.groom for each in self._begun if isinstance(each.groom, Session)]
+        return [each.groom for each in self._starts if isinstance(each.groom, Session)]
 
     def __enter__(self) -> Self:
-        for begun in self._begun:
-            if begun.near and isinstance(begun.groom, Session):
-                begun.groom.has_company = True
+        for start in self._starts:
+            if start.near and isinstance(start.groom, Session):
+                start.groom.is_coupled = True
         return self
 
     def __exit__(
@@ -98,13 +99,13 @@ class Together:
         trace: TracebackType | None,
     ) -> None:
         for session in self._sessions:
-            session.has_company, session.waiting = False, None
+            session.is_coupled, session.pending_steps = False, None
 
-    def go_on(self) -> list[Session]:
+    def simulate_coupled(self) -> list[Session]:
         """Simulate the sessions that wait; returns them, to call `Session.finish_frame` on each."""
-        waiting = [session for session in self._sessions if session.waiting is not None]
+        waiting = [session for session in self._sessions if session.pending_steps is not None]
         if waiting:
-            movers = {begun.groom.uid: begun.mover for begun in self._begun}
+            movers = {start.groom.uid: start.mover for start in self._starts}
             go_together(tuple(movers.values()))
             for session in waiting:
                 mover = movers[session.uid]
@@ -112,16 +113,16 @@ class Together:
         return waiting
 
 
-def _begun(grooms: list[Felt]) -> list[_Begin]:
+def _frame_starts(grooms: list[FeltGroom]) -> list[_GroomStart]:
     """The grooms that feel others, and those that they feel."""
     feeling = {each.uid for each in grooms if isinstance(each, Session) and each.feels_hair}
     if not feeling or len(grooms) < 2:
         return []
     balls = {each.uid: motion_flow.bounding_sphere(each.rig, each.pose) for each in grooms}
-    near = {uid: _touching(uid, balls) for uid in feeling}
+    near = {uid: _touching_balls(uid, balls) for uid in feeling}
     taking_part = frozenset().union(*near.values(), (uid for uid in near if near[uid]))
     return [
-        _Begin(
+        _GroomStart(
             each,
             each.style_seen(),
             each.guides(),
@@ -133,7 +134,7 @@ def _begun(grooms: list[Felt]) -> list[_Begin]:
     ]
 
 
-def _touching(uid: int, balls: dict[int, tuple[Floats, float]]) -> frozenset[int]:
+def _touching_balls(uid: int, balls: dict[int, tuple[Floats, float]]) -> frozenset[int]:
     """The numbers of other balls (middle, radius) that touch this one."""
     middle, radius = balls[uid]
     return frozenset(
