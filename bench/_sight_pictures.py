@@ -32,7 +32,7 @@ from hairloom.addon import rig_flow
 from hairloom.addon.blender.pictures.studio import FIELD_OF_VIEW, Studio
 from hairloom.addon.blender.properties.groom_settings import GroomSettings
 from hairloom.addon.blender.scene.built_in_head import built_in_head
-from hairloom.addon.blender.sessions.prepared_groom import prepared
+from hairloom.addon.blender.sessions.prepared_groom import prepare_groom
 from hairloom.addon.exchange.textures.srgb import srgb_encoded
 from hairloom.addon.groom.children_settings import ChildrenSettings
 from hairloom.addon.groom.face_hair import grow_with_face
@@ -192,7 +192,7 @@ def _picture(
 
 def _studio(rig: Rig, settings: GroomSettings | None = None) -> Studio:
     settings = settings or GroomSettings()
-    return Studio(prepared(rig, settings[AmbientSettings]), settings)
+    return Studio(prepare_groom(rig, settings[AmbientSettings]), settings)
 
 
 def _pixel_size(camera: Camera, rig: Rig) -> float:

@@ -31,7 +31,7 @@ def style_follow() -> dict[str, object]:
     session = previews.start(hair, bpy.context.evaluated_depsgraph_get())
     hair.hairloom.bake.follows = True
     worst = max(_error(session, frame) for frame in range(1, FRAMES + 1))
-    count, device = session.rig.strands.strand_count, session.solver.form
+    count, device = session.rig.strands.strand_count, session.solver.device
     settings.influence = 1.0
     for kind in ("animated", "read once"):
         settings.animated_style = kind == "animated"

@@ -299,14 +299,16 @@ def draw(folder: Path) -> None:
     from hairloom.addon.blender.pictures.studio import FIELD_OF_VIEW, Studio
     from hairloom.addon.blender.properties.groom_settings import GroomSettings
     from hairloom.addon.blender.sessions.numpy_solver import NumpySolver
-    from hairloom.addon.blender.sessions.prepared_groom import prepared
+    from hairloom.addon.blender.sessions.prepared_groom import prepare_groom
     from hairloom.addon.refine.settings import DetailSettings
     from hairloom.addon.render.frame import frame_camera
     from hairloom.addon.shading.ambient_settings import AmbientSettings
 
     hair = ponytail(8000)
     settings = GroomSettings().with_settings(DetailSettings(lod_size=0.0))
-    studio = Studio(prepared(hair.rig, AmbientSettings()), settings, look=hair.bust.look("light"))
+    studio = Studio(
+        prepare_groom(hair.rig, AmbientSettings()), settings, look=hair.bust.look("light")
+    )
     points = hair.rig.strands.points
     box = points.min(axis=0) - 0.03, points.max(axis=0) + 0.03
     camera = frame_camera(box, (-0.9, 0.9, 0.25), FIELD_OF_VIEW, 480 / 600)

@@ -25,7 +25,7 @@ from _report import report
 from _report import start as start_bench
 from extension_loader import REPOSITORY
 
-from hairloom.addon.blender.sessions.prepared_groom import prepared
+from hairloom.addon.blender.sessions.prepared_groom import prepare_groom
 from hairloom.addon.blender.sessions.snapshots import snapshot_of
 from hairloom.addon.blender.setup.benchmark import hair_ball
 from hairloom.addon.dynamics.colliders import (
@@ -123,7 +123,7 @@ def first_of(work: Callable[[], None]) -> float:
 def _picture() -> Callable[[], None]:
     """A function that draws a ball of hair and reads it back."""
     rig = hair_ball(STRANDS)
-    snapshot = snapshot_of(prepared(rig, AmbientSettings(), with_occluders=False))
+    snapshot = snapshot_of(prepare_groom(rig, AmbientSettings(), with_occluders=False))
     points = rig.strands.points
     box = points.min(axis=0), points.max(axis=0)
     camera = frame_camera(box, (0.0, -1.0, 0.2), 0.5, WIDTH / HEIGHT)

@@ -166,7 +166,7 @@ def main() -> int:
         read_again(kind)
     figures = stops.figures() | {
         "strands": session.rig.strands.strand_count,
-        "computed_on": session.computed_on,
+        "computed_on": session.device_name,
         "collider_ticks": ticks,
         "collider_seconds": waited,
         **{f"{_slug(kind)}_seconds": taken for kind, taken in seconds.items()},

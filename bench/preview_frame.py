@@ -84,7 +84,7 @@ def simulated(solver: ComputeSolver, pose: rig_flow.Pose) -> None:
 
 def ridden(solver: ComputeSolver, snapshot: Snapshot) -> Snapshot:
     """The snapshot with all strands on the GPU; reading them back, 0.1 ms, waits for the end."""
-    shown = solver.shown(snapshot)
+    shown = solver.with_strands(snapshot)
     assert shown.device_points is not None
     shown.device_points.texture.read()
     return shown

@@ -116,13 +116,13 @@ def draw(tail: Ponytail, shown: list, path: Path) -> None:
     from hairloom.addon.blender.base import images
     from hairloom.addon.blender.pictures.studio import FIELD_OF_VIEW, Studio
     from hairloom.addon.blender.properties.groom_settings import GroomSettings
-    from hairloom.addon.blender.sessions.prepared_groom import prepared
+    from hairloom.addon.blender.sessions.prepared_groom import prepare_groom
     from hairloom.addon.refine.settings import DetailSettings
     from hairloom.addon.render.frame import frame_camera
     from hairloom.addon.shading.ambient_settings import AmbientSettings
 
     settings = GroomSettings().with_settings(DetailSettings(lod_size=0.0))
-    groom = prepared(tail.rig, AmbientSettings())
+    groom = prepare_groom(tail.rig, AmbientSettings())
     studio = Studio(groom, settings, look=tail.bust.look("light"))
     rest = tail.rig.strands.points
     box = rest.min(axis=0) - 0.03, rest.max(axis=0) + 0.03

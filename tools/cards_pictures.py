@@ -43,7 +43,7 @@ class Shots:
         )
         groom = of_addon("blender.properties.groom_settings").GroomSettings()
         ambient = settings["ambient"]()
-        prepared = of_addon("blender.sessions.prepared_groom").prepared(self.rig, ambient)
+        prepared = of_addon("blender.sessions.prepared_groom").prepare_groom(self.rig, ambient)
         self._studio = studio.Studio(prepared, groom, look=bust.look("light"))
 
     def strands(self) -> Any:

@@ -32,7 +32,7 @@ ui/operators_preview.py start_preview
     blender/sessions/session.py Session
       blender/sessions/groom_source.py GroomSource
         blender/scene/source.py read_source
-      blender/sessions/prepared_groom.py build
+      blender/sessions/prepared_groom.py build_groom
         rig_flow.py prepare
           groom/guides.py choose_guides
           groom/weights.py guide_weights
@@ -61,7 +61,7 @@ blender/preview/handlers.py register
       blender/preview/phases.py next_phase
       blender/sessions/session.py advance
         blender/colliders/obstacles.py Obstacles
-        blender/sessions/solvers.py solver_of
+        blender/sessions/solvers.py make_solver
           blender/sessions/compute_solver.py ComputeSolver
             render/dynamics_pass.py DynamicsPass
           blender/sessions/numpy_solver.py NumpySolver

@@ -92,7 +92,7 @@ def studio_of(rig: Any, hair: bpy.types.Object) -> Any:
     own = of("blender.command_line.object_settings").own_settings(hair)
     settings = {section: kind() for section, kind in parameters.items()} | own
     return of("blender.pictures.studio").Studio(
-        of("blender.sessions.prepared_groom").prepared(rig, settings["ambient"]),
+        of("blender.sessions.prepared_groom").prepare_groom(rig, settings["ambient"]),
         of("blender.properties.groom_settings").GroomSettings(
             of("params").SettingsMap(*settings.values())
         ),

@@ -46,7 +46,7 @@ def studio_of(rig: Any, *settings: Any) -> Any:
     """A studio for this hair, whose head has light skin."""
     all_settings = of_addon("parameters").ALL_SETTINGS
     return of_addon("blender.pictures.studio").Studio(
-        of_addon("blender.sessions.prepared_groom").prepared(rig, all_settings["ambient"]()),
+        of_addon("blender.sessions.prepared_groom").prepare_groom(rig, all_settings["ambient"]()),
         of_addon("blender.properties.groom_settings").GroomSettings(
             of_addon("params").SettingsMap(*settings, all_settings["detail"](lod_size=0.0))
         ),

@@ -61,7 +61,7 @@ def picture(rig: Any, look: dict[str, Any], camera: Any = None, samples: int = S
     groom_settings = of_addon("blender.properties.groom_settings")
     chosen = groom_settings.GroomSettings(sections, debug_view=view)
     made = studio.Studio(
-        of_addon("blender.sessions.prepared_groom").prepared(rig, ambient),
+        of_addon("blender.sessions.prepared_groom").prepare_groom(rig, ambient),
         chosen,
         look=of_addon("blender.scene.built_in_head").built_in_head().look("light"),
     )

@@ -32,7 +32,7 @@ def pictures_of(style: str) -> list[Any]:
     inputs = replace(inputs, settings=inputs.settings.with_settings(shells))
     rig, groom = inputs.rig, of_addon("blender.properties.groom_settings").GroomSettings.of(hair)
     ambient = inputs.settings[of_addon("shading.ambient_settings").AmbientSettings]
-    prepared = of_addon("blender.sessions.prepared_groom").prepared(rig, ambient)
+    prepared = of_addon("blender.sessions.prepared_groom").prepare_groom(rig, ambient)
     head = of_addon("blender.scene.built_in_head").built_in_head()
     is_bust = of_addon("blender.setup.hairstyles").is_bust(hair.parent)
     studio = of_addon("blender.pictures.studio").Studio(

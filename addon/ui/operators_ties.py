@@ -33,7 +33,9 @@ class HAIRLOOM_OT_add_hair_tie(bpy.types.Operator):
         if not rings:
             rings = [ties.new_ring(hair, context)]
         depsgraph = context.evaluated_depsgraph_get()
-        holds = [ties.held_by(hair, ring, depsgraph) for ring in rings]  # raises if one is no tie
+        holds = [
+            ties.count_held_curves(hair, ring, depsgraph) for ring in rings
+        ]  # raises if one is no tie
         ties.add_ties(hair, rings, context.scene)
         for ring, (held, count) in zip(rings, holds, strict=True):
             level = "INFO" if held else "WARNING"

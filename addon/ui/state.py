@@ -66,7 +66,7 @@ def _state(session: Session | None) -> str:
         return _being_made(session.stage)
     if preview.phase is Phase.WAITING or preview.is_deferred:
         return "waits for collider"
-    device = session.computed_on.partition(" ")[0]
+    device = session.device_name.partition(" ")[0]
     return f"{'simulated' if session.is_playing else 'at rest'}, {device}"
 
 

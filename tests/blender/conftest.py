@@ -83,7 +83,7 @@ def numpy_by_default(request: pytest.FixtureRequest) -> Iterator[None]:
     up to a minute to compile the shader, and whether an earlier test has started the GPU varies."""
     with pytest.MonkeyPatch.context() as patch:
         if not (request.node.get_closest_marker("draws") or "gpu_context" in request.fixturenames):
-            patch.setattr(solvers, "compute_available", lambda: False)
+            patch.setattr(solvers, "can_compute", lambda: False)
         yield
 
 

@@ -48,7 +48,7 @@ def moving(request: Any, gpu_context: Any, new_hair: Any, sphere: Any, tmp_path:
 
 def session_at_start(hair: Any, get_depsgraph: Any) -> Any:
     session = previews.start(hair, get_depsgraph())
-    assert session.solver.form == hair.hairloom.dynamics.device
+    assert session.solver.device == hair.hairloom.dynamics.device
     hair.hairloom.bake.follows = True
     bpy.context.scene.frame_set(1)
     return session
@@ -179,7 +179,7 @@ def test_both_forms_agree_halfway(moving: Any, get_depsgraph: Any) -> None:
         moving.hairloom.dynamics.device = form
         for frame in range(1, LAST + 1):
             bpy.context.scene.frame_set(frame)
-        assert session.solver.form == form
+        assert session.solver.device == form
         found.append(session.strands.copy())
     np.testing.assert_allclose(*found, atol=2e-4)
 

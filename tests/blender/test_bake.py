@@ -61,7 +61,9 @@ def test_a_bake_equals_playback_bit_for_bit(swinging, get_depsgraph):
     previews.start(hair, get_depsgraph())
     live_strands = played(hair)
     assert np.ptp(live_strands[:, :, -1] - live_strands[:, :, 0], axis=0).max() > 0.01
-    assert len(previews.session_of(hair).solver.led().strands), "the head pushes some strands"
+    assert len(previews.session_of(hair).solver.led_out_strands().strands), (
+        "the head pushes some strands"
+    )
     bpy.context.scene.frame_set(3)
     assert bake(hair) == list(range(1, LAST + 1))
     assert bpy.context.scene.frame_current == 3
@@ -85,9 +87,9 @@ def test_a_bake_on_the_gpu_equals_playback_on_the_gpu_bit_for_bit(swinging, get_
     for frame in range(1, LAST + 1):
         bpy.context.scene.frame_set(frame)
         guides.append(session.solver.guides())
-        led = session.solver.led()
+        led = session.solver.led_out_strands()
         strands.append(drawn(hair))
-    assert session.solver.form == "compute" and np.ptp(np.array(guides), axis=0).max() > 0.01
+    assert session.solver.device == "compute" and np.ptp(np.array(guides), axis=0).max() > 0.01
     assert len(led.strands), "the head pushes some strands"
     bake(hair)
     cache = playback.cache_of(hair)

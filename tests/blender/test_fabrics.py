@@ -21,10 +21,10 @@ FRAME = 1.0 / 24.0
 @pytest.fixture
 def sheet(flag_object):
     """The flag; its cloth is built in a thread, whatever its size."""
-    before, fabrics.AT_ONCE = fabrics.AT_ONCE, 0
+    before, fabrics.MAX_BLOCKING_TRIANGLES = fabrics.MAX_BLOCKING_TRIANGLES, 0
     bpy.context.view_layer.update()
     yield flag_object
-    fabrics.AT_ONCE = before
+    fabrics.MAX_BLOCKING_TRIANGLES = before
 
 
 def test_play_begins_once_its_cloth_is_made_as_if_it_had_waited(sheet, get_depsgraph):

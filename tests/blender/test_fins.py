@@ -139,13 +139,13 @@ def test_a_frame_that_was_recorded_is_shown_again_exactly(flag_object, get_depsg
     flag_object.rotation_euler = (0.3, 0.2, 0.1)
     session = start_fin(flag_object, get_depsgraph)
     play_frames(session, get_depsgraph, 8)
-    frame, drawn = session.recorded(), evaluated_vertices(flag_object, get_depsgraph)
+    frame, drawn = session.bake_arrays(), evaluated_vertices(flag_object, get_depsgraph)
     play_frames(session, get_depsgraph, 4)
     assert not np.array_equal(evaluated_vertices(flag_object, get_depsgraph), drawn)
     session.show_recorded(frame)
     update_view_layer()
     assert np.array_equal(evaluated_vertices(flag_object, get_depsgraph), drawn)
-    assert np.array_equal(session.recorded()["position"], frame["position"])
+    assert np.array_equal(session.bake_arrays()["position"], frame["position"])
     assert all(array.dtype != object for array in (session.constants() | frame).values())
     with pytest.raises(HairloomError, match="Bake again"):
         session.show_recorded({"position": frame["position"][:-1]})
@@ -156,7 +156,7 @@ def test_two_runs_are_alike(flag_object, get_depsgraph):
     for _ in range(2):
         session = start_fin(flag_object, get_depsgraph)
         play_frames(session, get_depsgraph, 10)
-        ends.append(session.recorded()["position"])
+        ends.append(session.bake_arrays()["position"])
         session.stop(get_depsgraph())
         previews.stop(session)
     assert np.array_equal(*ends)
@@ -207,7 +207,7 @@ def test_modifiers_below_go_on_from_the_cloth(flag_object, get_depsgraph):
     play_frames(session, get_depsgraph, 10)
     assert len(evaluated_vertices(flag_object, get_depsgraph)) > 400
     assert evaluated_vertices(flag_object, get_depsgraph)[:, 2].min() < -0.02
-    assert len(session.recorded()["position"]) == 121
+    assert len(session.bake_arrays()["position"]) == 121
 
 
 @pytest.mark.parametrize(("kind", "place"), [("SUBSURF", 0), ("MIRROR", 0)])

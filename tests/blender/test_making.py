@@ -21,7 +21,7 @@ from hairloom.addon.blender.preview.phases import Phase
 from hairloom.addon.blender.sessions import prepared_groom
 from hairloom.addon.blender.sessions import session as session_module
 from hairloom.addon.blender.sessions.groom_source import GroomSource
-from hairloom.addon.blender.sessions.prepared_groom import BuildRequest, build
+from hairloom.addon.blender.sessions.prepared_groom import BuildRequest, build_groom
 from hairloom.addon.blender.sessions.snapshots import snapshot_of
 from hairloom.addon.blender.viewport import overlay
 from hairloom.addon.dynamics.colliders import DistanceField
@@ -117,7 +117,7 @@ def test_what_a_thread_makes_is_the_same_to_the_bit(hair, get_depsgraph, in_wind
     hair.data.hairloom.children.strand_count = 500
     session = previews.start(hair, get_depsgraph())
     arrive(session)
-    alone = build(GroomSource(hair, get_depsgraph()).request, is_drawn=True)
+    alone = build_groom(GroomSource(hair, get_depsgraph()).request, is_drawn=True)
     assert np.array_equal(session.rig.strands.points, alone.rig.strands.points)
     assert np.array_equal(session.rig.weights.weight, alone.rig.weights.weight)
     assert np.array_equal(session.snapshot.occlusion, alone.light.occlusion)
@@ -138,7 +138,7 @@ def test_what_the_gpu_gets_of_strands_is_laid_out_in_the_thread(
     monkeypatch.setattr(RideTexels, "of", recorded)
     session = previews.start(hair, get_depsgraph())
     arrive(session)
-    assert session.solver.form == "compute"
+    assert session.solver.device == "compute"
     assert [beside for strands, beside in laid_out if strands is session.rig.strands] == [True]
 
 
@@ -158,7 +158,7 @@ def light_gate(in_window, monkeypatch):
 
 def light_of(hair, get_depsgraph):
     """The complete light of a preview that starts now."""
-    return build(GroomSource(hair, get_depsgraph()).request, is_drawn=True).light
+    return build_groom(GroomSource(hair, get_depsgraph()).request, is_drawn=True).light
 
 
 def has_light(snapshot, light):
@@ -451,7 +451,7 @@ def test_edits_while_hair_is_made_arrive_too(playing, hair, get_depsgraph, monke
         scene_events.catch_up(get_depsgraph())
     opened.set()
     arrive(playing)
-    wanted = build(GroomSource(hair, get_depsgraph()).request, is_drawn=False).rig.strands
+    wanted = build_groom(GroomSource(hair, get_depsgraph()).request, is_drawn=False).rig.strands
     length = np.linalg.norm(np.diff(wanted.grid, axis=1), axis=2).sum()
     now = np.linalg.norm(np.diff(playing.rig.strands.grid, axis=1), axis=2).sum()
     assert now == pytest.approx(length, rel=1e-3)
@@ -481,7 +481,7 @@ def test_how_strong_ambient_light_is_finds_no_light_again(
         hair.data.update_tag()
     session.read_again(get_depsgraph())
     assert bool(found) == is_combed
-    own = build(GroomSource(hair, get_depsgraph()).request, is_drawn=True)
+    own = build_groom(GroomSource(hair, get_depsgraph()).request, is_drawn=True)
     assert same_content(session.groom.light, own.light)
     np.testing.assert_array_equal(session.groom.head_occlusion, own.head_occlusion)
 
@@ -539,10 +539,10 @@ def test_pictures_are_of_whole_hair(hair, get_depsgraph, in_window):
 def test_orders_tell_whether_they_give_the_same_rig(hair, get_depsgraph, extension):
     reading = GroomSource(hair, get_depsgraph())
     order = reading.request
-    assert order.gives_rig_of(order) and reading.read_again(get_depsgraph()) is None
+    assert order.gives_same_rig_as(order) and reading.read_again(get_depsgraph()) is None
     hair.data.hairloom.guides.guide_count = 5
     other = reading.read_again(get_depsgraph())
-    assert isinstance(other, BuildRequest) and not other.gives_rig_of(order)
+    assert isinstance(other, BuildRequest) and not other.gives_same_rig_as(order)
     assert reading.settings[GuideSettings].guide_count != 5, "it is not shown yet"
     reading.accept(other)
     assert reading.settings[GuideSettings].guide_count == 5
@@ -645,14 +645,14 @@ def test_what_stands_in_on_a_dense_head_searches_a_part_of_it(new_hair, get_deps
     hair = new_hair(bpy.context.object)
     order = GroomSource(hair, get_depsgraph()).request
     head, searched, bind = order.source.head, [], rig_flow.bind_roots
-    assert len(head.triangles) > prepared_groom._LARGE
+    assert len(head.triangles) > prepared_groom._MAX_SEARCHED_TRIANGLES
 
     def noted(strands, surface, *, place):
         searched.append(len(surface.triangles))
         return bind(strands, surface, place=place)
 
     monkeypatch.setattr(rig_flow, "bind_roots", noted)
-    made = prepared_groom.placeholder(order)
+    made = prepared_groom.placeholder_groom(order)
     assert len(searched) == 1 and searched[0] < len(head.triangles) / 10
     assert made.rig.head is head and made.is_placeholder
     wanted = bind(made.rig.strands, head, place="Hair").strands
@@ -667,7 +667,7 @@ def test_hair_of_another_scale_is_told_of_a_dense_head_as_of_any(new_hair, get_d
     large = order.source.strands.transformed(np.diag([1000.0, 1000.0, 1000.0, 1.0]))
     order = replace(order, source=replace(order.source, strands=large))
     told = []
-    for make_it in (prepared_groom.placeholder, prepared_groom.requested_rig):
+    for make_it in (prepared_groom.placeholder_groom, prepared_groom.requested_rig):
         with pytest.raises(HairloomError) as error:
             make_it(order)
         told.append(str(error.value))

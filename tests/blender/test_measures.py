@@ -18,10 +18,10 @@ def test_the_median_of_the_last_frames_is_told(monkeypatch):
         with times.measured("simulation"):
             now[0] += spent
     assert times.milliseconds("simulation") == pytest.approx(4.0)
-    assert times.line == "simulation 4.0 ms"
-    assert measures.FrameTimes().line == ""
+    assert times.text == "simulation 4.0 ms"
+    assert measures.FrameTimes().text == ""
     now[0] += 100.0
-    assert times.line == "", "what was long ago is no news"
+    assert times.text == "", "what was long ago is no news"
 
 
 def test_a_frame_of_many_seconds_has_both_its_parts(monkeypatch):
@@ -30,7 +30,7 @@ def test_a_frame_of_many_seconds_has_both_its_parts(monkeypatch):
     for part, spent in (("simulation", 1.0), ("drawing", 12.0)):
         with times.measured(part):
             now[0] += spent
-    assert times.line == "simulation 1000.0 ms   drawing 12000.0 ms"
+    assert times.text == "simulation 1000.0 ms   drawing 12000.0 ms"
 
 
 def test_what_goes_on_is_of_the_same_frame(monkeypatch):

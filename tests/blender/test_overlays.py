@@ -157,7 +157,7 @@ def test_stretch_shows_each_segment_of_the_guides_once_and_none_at_rest_as_stret
     np.testing.assert_array_equal(lines.points[::2], guides[:, :-1].reshape(-1, 3))
     longer = guides.copy()
     longer[3, -1] = guides[3, -2] + 1.1 * (guides[3, -1] - guides[3, -2])
-    session.solver.carry(session.solver.pose, longer)
+    session.solver.show_baked(session.solver.pose, longer)
     worst = dict(motion_lines.stretch_lines(session))[motion_lines.STRETCHES[2][1]]
     np.testing.assert_allclose(worst, longer[3, -2:], atol=1e-6)
 

@@ -79,13 +79,13 @@ def test_no_child_blends_both_sides_and_the_preview_follows(hair, get_depsgraph)
     assert mixes_both_sides(session) > 50
     line = arch()
     add(hair, line)
-    assert session.has_other_partings()
+    assert session.has_changed_partings()
     session.read_again(get_depsgraph())
     assert mixes_both_sides(session) == 0
     before = session.rig
     line.location.x = 0.03  # now over x = 0.03, a little away from the sphere
     bpy.context.view_layer.update()
-    assert session.has_other_partings()
+    assert session.has_changed_partings()
     session.read_again(get_depsgraph())
     assert session.rig is not before
     assert mixes_both_sides(session) > 20
@@ -145,7 +145,7 @@ def test_a_head_that_turns_with_its_parting_builds_nothing_again(hair, sphere, g
     rig = session.rig
     sphere.rotation_euler.z = 1.0
     bpy.context.view_layer.update()
-    assert not session.has_other_partings()
+    assert not session.has_changed_partings()
     session.read_again(get_depsgraph())
     assert session.rig is rig
     other = arch(0.02)

@@ -199,7 +199,7 @@ def test_keyframes_change_nothing_that_needs_other_hair(new_hair):
                 before, value = GroomSettings.of(hair), getattr(group, parameter.name)
                 value = tuple(value) if parameter.kind in ("color", "curve") else value
                 setattr(group, parameter.name, _another(value, parameter))
-                needs_other_hair = not GroomSettings.of(hair).acts_at_once(before)
+                needs_other_hair = not GroomSettings.of(hair).needs_no_rebuild(before)
                 setattr(group, parameter.name, value)
                 is_keyed = group.bl_rna.properties[parameter.name].is_animatable
                 assert not (needs_other_hair and is_keyed), (section, parameter.name)

@@ -29,7 +29,7 @@ def test_what_is_wrong_is_told_and_the_rest_goes_on(monkeypatch, capfd):
 
     monkeypatch.setattr(self_test, "_last", ())
     monkeypatch.setattr(self_test, "render_image", broken)
-    monkeypatch.setattr(solvers, "_tried_out", lambda: "it is 1 m off after one frame")
+    monkeypatch.setattr(solvers, "_test_frame_error", lambda: "it is 1 m off after one frame")
     monkeypatch.setattr(self_test, "find_spec", lambda name: None)
     assert bpy.ops.hairloom.self_test() == {"FINISHED"}
     found = {check.name: check for check in self_test.last_report()}

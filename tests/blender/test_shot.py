@@ -28,7 +28,7 @@ def playing(request, gpu_context, new_hair, sphere, get_depsgraph):
     settings.device = request.param
     session = previews.start(hair, get_depsgraph())
     assert previews.play(get_depsgraph()) == []
-    assert session.solver.form == request.param
+    assert session.solver.device == request.param
     return settings, sphere, session
 
 

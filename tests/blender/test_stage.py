@@ -19,7 +19,7 @@ from hairloom.addon.blender.properties.groom_settings import GroomSettings
 from hairloom.addon.blender.properties.presets import named_preset, shipped
 from hairloom.addon.blender.scene.built_in_head import built_in_head
 from hairloom.addon.blender.scene.surfaces import read_surface
-from hairloom.addon.blender.sessions.prepared_groom import prepared
+from hairloom.addon.blender.sessions.prepared_groom import prepare_groom
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.groom.children_settings import ChildrenSettings
 from hairloom.addon.groom.face_hair import grow_with_face
@@ -66,7 +66,7 @@ def studio_of(
         strands, head, GuideSettings(), place="the test's hair", children=children
     )
     settings = SettingsMap(VolumeSettings(shadows="deep"), StrandSettings())
-    return Studio(prepared(rig, AmbientSettings()), GroomSettings(settings))
+    return Studio(prepare_groom(rig, AmbientSettings()), GroomSettings(settings))
 
 
 def still(studio: Studio, **options: bool) -> np.ndarray:
@@ -206,7 +206,7 @@ def test_a_film_that_this_blender_does_not_have_is_told(
 def test_skin_that_hair_sees_lights_it(head: Surface) -> None:
     """Compared with the same hair whose light treats the skin below as a plane."""
     rig = rig_flow.prepare(half_a_head(head), head, GuideSettings(), place="hair")
-    groom = prepared(rig, AmbientSettings())
+    groom = prepare_groom(rig, AmbientSettings())
     settings = GroomSettings().with_settings(named_preset("looks/blond").settings)
     both = [
         still(Studio(each, settings))
@@ -222,7 +222,7 @@ def test_hardly_any_hair_is_burnt(tmp_path: Path) -> None:
     head, file = built_in_head(), tmp_path / "still.png"
     grown = grow_with_face(head.surface, GrowSettings(strand_count=1500), head.weights)
     rig = rig_flow.prepare(grown, head.surface, GuideSettings(), place="hair", widths="found")
-    studio = Studio(prepared(rig, AmbientSettings()), GroomSettings())
+    studio = Studio(prepare_groom(rig, AmbientSettings()), GroomSettings())
     for stage, look in itertools.product(sorted(STAGES), ("brown", "blond")):
         chosen = (named_preset(name).settings for name in (f"stage/{stage}", f"looks/{look}"))
         studio.settings = GroomSettings().with_settings(*chosen)

@@ -142,7 +142,7 @@ def test_held_strands_stay_with_a_ring_that_moves_by_itself(
     for frame in range(2, LAST + 1):
         bpy.context.scene.frame_set(frame)
         assert escape(session) < 1e-3
-    assert session.solver.form == device
+    assert session.solver.device == device
 
 
 def test_a_tie_that_is_deleted_in_mid_play_lets_go(swinging, get_depsgraph):

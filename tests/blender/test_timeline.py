@@ -172,7 +172,7 @@ def test_another_form_in_the_middle_goes_on_from_where_the_hair_is(swinging):
     go(1, 2, 3, 4)
     before = lag(session)
     hair.hairloom.dynamics.device = "numpy"
-    assert session.solver.form == "numpy"
+    assert session.solver.device == "numpy"
     assert lag(session) == pytest.approx(before, abs=1e-5)
     go(5)
     assert lag(session) > 0.005

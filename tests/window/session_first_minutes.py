@@ -114,7 +114,7 @@ def hair_on_a_mesh_of_ones_own():
     grown = yield from picture("own-mesh")
     assert changed(bare, grown) > 0.02, "no hair is seen"
     parts = ("simulation", "drawing")
-    yield from until(lambda: all(part in session.times.line for part in parts), "no times")
+    yield from until(lambda: all(part in session.times.text for part in parts), "no times")
 
 
 def undo_takes_it_away():

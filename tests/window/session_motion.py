@@ -75,7 +75,7 @@ def play_keeps_the_scenes_rate():
     frames = np.array(durations) * rate
     assert np.allclose(frames, np.round(frames)) and frames.max() < 4.5, frames
     assert 0.0 < sum(durations) < passed + 0.2, (passed, sum(durations))
-    print(f"simulated {sum(durations):.2f} s in {passed:.2f} s, {session().computed_on}")
+    print(f"simulated {sum(durations):.2f} s in {passed:.2f} s, {session().device_name}")
     driver.screenshot("playing")
 
 

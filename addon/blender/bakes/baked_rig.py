@@ -37,17 +37,17 @@ class RestMatrices:
     ties: Floats = field(default_factory=lambda: np.zeros((0, 4, 4)))
 
     @property
-    def has_size(self) -> bool:
+    def is_invertible(self) -> bool:
         """Whether neither hair nor head is scaled to 0 along an axis."""
         matrices = (self.hair,) if self.head is None else (self.hair, self.head)
         return all(np.linalg.matrix_rank(each[:3, :3]) == 3 for each in matrices)
 
-    def has_size_of(self, other: RestMatrices) -> bool:
+    def has_same_size(self, other: RestMatrices) -> bool:
         """Whether hair and head have the scale and handedness of the others, whatever their
         positions and rotations."""
         if self.head is None or other.head is None:
-            return self.head is other.head and _is_as_large(self.hair, other.hair)
-        return _is_as_large(self.hair, other.hair) and _is_as_large(self.head, other.head)
+            return self.head is other.head and _has_same_scale(self.hair, other.hair)
+        return _has_same_scale(self.hair, other.hair) and _has_same_scale(self.head, other.head)
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +55,7 @@ class BakedRig:
     """The part of a groom's bake that all frames share."""
 
     rig: Rig
-    rests: RestMatrices
+    rest_matrices: RestMatrices
 
     def pose(self, frame: Arrays) -> Pose:
         """The pose of the head in a frame."""
@@ -78,9 +78,9 @@ class BakedRig:
             for each, own in zip(style, known, strict=True)
         ):
             return False
-        return led_in(frame).fits(self.rig.strands.offsets)
+        return led_out_in(frame).fits(self.rig.strands.offsets)
 
-    def styled(self, frame: Arrays) -> Rig:
+    def styled_rig(self, frame: Arrays) -> Rig:
         """The rig with the style of a frame that fits, or its own where the frame has none."""
         if "style" not in frame:
             return self.rig
@@ -97,8 +97,8 @@ class BakedRig:
             raise HairloomError(
                 "a frame belongs to another groom than the bake", place="bake", remedy="Bake again"
             )
-        rig, pose = self.styled(frame), self.pose(frame)
-        return motion_flow.strands_at(rig, pose, frame["guides"], led_in(frame))
+        rig, pose = self.styled_rig(frame), self.pose(frame)
+        return motion_flow.strands_at(rig, pose, frame["guides"], led_out_in(frame))
 
 
 def frame_arrays(pose: Pose, guides: Floats, led: LedOut, styled: Rig | None = None) -> Arrays:
@@ -124,7 +124,7 @@ def frame_arrays(pose: Pose, guides: Floats, led: LedOut, styled: Rig | None = N
     return arrays
 
 
-def led_in(frame: Arrays) -> LedOut:
+def led_out_in(frame: Arrays) -> LedOut:
     """The strands of a frame that were led out of colliders."""
     return LedOut(frame["led_strands"], frame["led_points"])
 
@@ -270,7 +270,7 @@ def _baked_rig_of(arrays: Arrays) -> BakedRig:
     return BakedRig(rig, rests)
 
 
-def _is_as_large(one: Floats, other: Floats) -> bool:
+def _has_same_scale(one: Floats, other: Floats) -> bool:
     """Whether two (4, 4) matrices give every vector the same length, and the same handedness."""
     one, other = one[:3, :3], other[:3, :3]
     lengths, known = one.T @ one, other.T @ other

@@ -86,7 +86,7 @@ class Simulation(Protocol):
     def constants(self) -> Arrays:
         """The arrays that a bake holds once, to show its frames without reading the scene."""
 
-    def recorded(self) -> Arrays:
+    def bake_arrays(self) -> Arrays:
         """The arrays of this frame, for a bake."""
 
     def show_recorded(self, frame: Arrays, solids: Solids | None = None) -> None:

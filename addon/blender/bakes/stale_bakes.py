@@ -61,11 +61,11 @@ def _moved_otherwise(
     """The names of this frame's inputs that have changed since the bake."""
     baked = playback.rig_in(cache)
     carrier, count = None, None
-    if head is not None and baked.rests.head is not None and baked.rig.head is not None:
-        carrier = Body(Handle.of(head), baked.rests.head)
+    if head is not None and baked.rest_matrices.head is not None and baked.rig.head is not None:
+        carrier = Body(Handle.of(head), baked.rest_matrices.head)
         count = len(baked.rig.head.positions)
     try:
-        pose = read_pose(Body(Handle.of(hair), baked.rests.hair), carrier, count, depsgraph)
+        pose = read_pose(Body(Handle.of(hair), baked.rest_matrices.hair), carrier, count, depsgraph)
     except HairloomError:  # another vertex count now, or values that are not finite
         return ("pose",)
     now = groom_frame_hash(hair, head if carrier else None, pose, depsgraph)

@@ -78,6 +78,6 @@ class MadeRig:
 
     def is_of(self, source: Source, settings: GroomSettings) -> bool:
         """Whether the rig made from these inputs is the same, to the last bit."""
-        return self.settings.of_rig == settings.of_rig and all(
+        return self.settings.rig_settings == settings.rig_settings and all(
             same_content(getattr(self.source, name), getattr(source, name)) for name in _OF_RIG
         )

@@ -68,7 +68,7 @@ class _TrackedTie:
         """
         obj = self.body.found()
         if is_left_out(obj, depsgraph):
-            raise _disabled(obj.name)
+            raise _disabled_error(obj.name)
         if not is_solid_scale(matrix_of(obj, depsgraph)):
             raise HairloomError(
                 "its scale is zero, so it holds no hair", place=obj.name, remedy="Correct its scale"
@@ -84,7 +84,7 @@ class _TrackedTie:
 
 
 @dataclass
-class Holding:
+class TrackedHolders:
     """The ties of one groom and the surface that holds its tips, at rest and now.
 
     holders: at rest. warnings: objects that cannot hold hair and why, in the pose last seen.
@@ -93,18 +93,18 @@ class Holding:
     holders: Holders = field(default_factory=Holders)
     _ties: tuple[_TrackedTie, ...] = ()
     _tips: Handle | None = None
-    _unusable: tuple[str, ...] = ()
-    _seen: dict[int, str] = field(default_factory=dict)
-    _idle: tuple[str, ...] = ()
+    _unusable_warnings: tuple[str, ...] = ()
+    _display_keys: dict[int, str] = field(default_factory=dict)
+    _idle_warnings: tuple[str, ...] = ()
 
     @classmethod
     def of(
         cls,
         hair: bpy.types.Object,
         depsgraph: bpy.types.Depsgraph,
-        known: Holding | None = None,
+        known: TrackedHolders | None = None,
         back: Floats | None = None,
-    ) -> Holding:
+    ) -> TrackedHolders:
         """The ties and the tip surface of hair, at rest in its present pose.
 
         Args:
@@ -115,7 +115,7 @@ class Holding:
         found, unusable = [], []
         for obj in ties_of(hair):
             try:
-                found.append(_again(_read_tie(obj, depsgraph, back), known))
+                found.append(_reused_tie(_read_tie(obj, depsgraph, back), known))
             except HairloomError as error:
                 unusable.append(str(error))
         tips = None
@@ -124,22 +124,22 @@ class Holding:
         except HairloomError as error:
             unusable.append(str(error))
         surface = hair.hairloom.tip_surface
-        if tips is not None and known is not None and known._holds_tips_by(surface):
+        if tips is not None and known is not None and known._has_tip_surface(surface):
             tips = _same_surface(tips, known.holders.tip_surface)
         return cls(
             Holders(tuple(one.tie for one in found), tips),
             tuple(found),
             None if tips is None else Handle.of(surface),
             tuple(unusable),
-            {obj.session_uid: _drawn_as(obj) for obj in holders_of(hair)},
+            {obj.session_uid: _display_key(obj) for obj in holders_of(hair)},
         )
 
-    def _holds_tips_by(self, surface: bpy.types.Object) -> bool:
+    def _has_tip_surface(self, surface: bpy.types.Object) -> bool:
         return self._tips is not None and self._tips.uid == surface.session_uid
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        return (*self._unusable, *self._idle)
+        return (*self._unusable_warnings, *self._idle_warnings)
 
     @property
     def uids(self) -> frozenset[int]:
@@ -148,11 +148,11 @@ class Holding:
         return frozenset(ties if self._tips is None else ties | {self._tips.uid})
 
     @property
-    def rests(self) -> Floats:
+    def rest_matrices(self) -> Floats:
         """(tie_count, 4, 4), matrix_world of the ties at rest."""
         return np.array([one.body.rest for one in self._ties]).reshape(-1, 4, 4)
 
-    def at_rests(self, rests: Floats) -> Holding:
+    def with_rest_matrices(self, rests: Floats) -> TrackedHolders:
         """The same ties with these rest matrices, (tie_count, 4, 4), as those of a bake."""
         if len(rests) != len(self._ties):
             return self
@@ -162,7 +162,9 @@ class Holding:
             tie = Tie(one.tie.name, back @ one.tie.shape, one.tie.is_ball)
             ties.append(_TrackedTie(Body(one.body.handle, rest), tie, moved(one.points, back)))
         holders = Holders(tuple(one.tie for one in ties), self.holders.tip_surface)
-        return Holding(holders, tuple(ties), self._tips, self._unusable, self._seen)
+        return TrackedHolders(
+            holders, tuple(ties), self._tips, self._unusable_warnings, self._display_keys
+        )
 
     def anchors(
         self, hair: bpy.types.Object, holds: Holds, depsgraph: bpy.types.Depsgraph
@@ -177,13 +179,13 @@ class Holding:
                 if one.body.handle.uid in current and np.isfinite(matrix).all():
                     matrices[number] = matrix
             except HairloomError as error:
-                idle.append(str(_lost(one.body.handle.name, error)))
+                idle.append(str(_gone_tie_error(one.body.handle.name, error)))
         positions = None
         try:
             positions = self._tip_positions(hair, holds, depsgraph)
         except HairloomError as error:
             idle.append(str(error))
-        self._idle = tuple(idle)
+        self._idle_warnings = tuple(idle)
         return anchors_of(holds, matrices, positions)
 
     def _tip_positions(
@@ -193,7 +195,7 @@ class Holding:
         if holds.surface is None or obj is None:
             return None
         if is_left_out(obj, depsgraph):
-            raise _disabled(obj.name)
+            raise _disabled_error(obj.name)
         positions = read_positions(obj, depsgraph, place=obj.name)
         if positions.shape != holds.surface.positions.shape:
             raise HairloomError(
@@ -216,7 +218,7 @@ class Holding:
             edited: session numbers of data-blocks whose geometry has changed.
         """
         return any(
-            self._seen.get(obj.session_uid) != _drawn_as(obj)
+            self._display_keys.get(obj.session_uid) != _display_key(obj)
             or (obj.data is not None and obj.data.session_uid in edited)
             for obj in holders_of(hair)
         )
@@ -264,7 +266,7 @@ def remove_tie(hair: bpy.types.Object, name: str, scene: bpy.types.Scene) -> Non
     take_out(hair, "tie_collection", "Ties", name, scene)
 
 
-def held_by(
+def count_held_curves(
     hair: bpy.types.Object, ring: bpy.types.Object, depsgraph: bpy.types.Depsgraph
 ) -> tuple[int, int]:
     """How many of the hair's curves a ring holds in the present pose, and the number of curves.
@@ -277,7 +279,7 @@ def held_by(
     return (0 if holds is None else len(holds.strand)), strands.strand_count
 
 
-def _drawn_as(obj: bpy.types.Object) -> str:
+def _display_key(obj: bpy.types.Object) -> str:
     """A key of an object's shape as far as a change of it edits no data: an Empty's display."""
     return f"{obj.empty_display_type} {obj.empty_display_size}" if obj.type == "EMPTY" else obj.type
 
@@ -293,7 +295,7 @@ def _read_tie(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, back: Float
             remedy="Use an Empty, a curve or a mesh as a tie",
         )
     if is_left_out(obj, depsgraph):
-        raise _disabled(obj.name)
+        raise _disabled_error(obj.name)
     matrix = matrix_of(obj, depsgraph)
     if not np.isfinite(matrix).all() or not is_solid_scale(matrix):
         raise HairloomError(
@@ -302,15 +304,15 @@ def _read_tie(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, back: Float
     rest = back @ matrix
     body = Body(Handle.of(obj), rest)
     if obj.type == "EMPTY":
-        shape, is_ball = _of_empty(obj)
+        shape, is_ball = _empty_tie_shape(obj)
         return _TrackedTie(body, Tie(obj.name, rest @ shape, is_ball))
     local = _points_of(obj, depsgraph)
-    shape, is_ball = _fitted(moved(local, rest).astype(np.float64), obj.name)
+    shape, is_ball = _fit_tie_shape(moved(local, rest).astype(np.float64), obj.name)
     points = moved(local, rest) if obj.type == "MESH" else np.zeros((0, 3))
     return _TrackedTie(body, Tie(obj.name, shape, is_ball), points)
 
 
-def _of_empty(obj: bpy.types.Object) -> tuple[Floats, bool]:
+def _empty_tie_shape(obj: bpy.types.Object) -> tuple[Floats, bool]:
     """The shape of a tie, and whether it is a ball. Blender draws circles around an Empty's y."""
     size = obj.empty_display_size
     shape = np.diag([size, size, size, 1.0])
@@ -325,7 +327,7 @@ def _points_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
         return np.empty((0, 3), np.float32) if mesh is None else vertex_places(mesh)
 
 
-def _fitted(points: Floats, name: str) -> tuple[Floats, bool]:
+def _fit_tie_shape(points: Floats, name: str) -> tuple[Floats, bool]:
     """The shape of a tie, and whether it is a ball, from its points (n, 3).
 
     Points spread evenly along an ellipse have a variance of half the squared half-axis along each
@@ -356,14 +358,14 @@ def _read_tips(
     if obj is None:
         return None
     if is_left_out(obj, depsgraph):
-        raise _disabled(obj.name)
+        raise _disabled_error(obj.name)
     surface = read_surface(obj, depsgraph, need_uv=False, place=obj.name)
     group = hair.hairloom.tip_group
     weight = read_weights(obj, depsgraph, group) if group else None
     return TipSurface(obj.name, surface.transformed(back), weight)
 
 
-def _again(read: _TrackedTie, known: Holding | None) -> _TrackedTie:
+def _reused_tie(read: _TrackedTie, known: TrackedHolders | None) -> _TrackedTie:
     """The tie as read before, unless its shape has changed; a new pose is no change of shape."""
     for one in () if known is None else known._ties:
         if one.body.handle.uid != read.body.handle.uid:
@@ -397,7 +399,7 @@ def _same_surface(read: TipSurface, known: TipSurface | None) -> TipSurface:
     return known if is_as_weighted else replace(known, weight=read.weight)
 
 
-def _disabled(name: str) -> HairloomError:
+def _disabled_error(name: str) -> HairloomError:
     return HairloomError(
         "it is disabled in viewports or excluded from the view layer, so it holds no hair",
         place=name,
@@ -405,7 +407,7 @@ def _disabled(name: str) -> HairloomError:
     )
 
 
-def _lost(name: str, error: HairloomError) -> HairloomError:
+def _gone_tie_error(name: str, error: HairloomError) -> HairloomError:
     if not isinstance(error, ObjectGoneError):
         return error
     return HairloomError(

@@ -29,14 +29,14 @@ from ..bakes.guide_motion import BakedGuides
 from ..base.report import Report
 from ..cards.edits import groom_edits
 from ..colliders.rigs import rig_from
-from ..colliders.ties import Holding
+from ..colliders.ties import TrackedHolders
 from ..pictures.studio import Studio
 from ..properties.groom_settings import GroomSettings
 from ..scene.curves import read_curves
 from ..scene.masks import Canvas
 from ..scene.painted_colors import painted_colors
 from ..scene.source import Source
-from ..sessions.prepared_groom import prepared
+from ..sessions.prepared_groom import prepare_groom
 from .inputs import Inputs, Sources, head_of_sources, look_of_head, named_head, read_inputs
 from .object_settings import hair_named
 
@@ -99,9 +99,9 @@ def read_rig(job: Job) -> tuple[Rig, Inputs]:
 
 def _source(job: Job, inputs: Inputs) -> Source:
     """The inputs as the source of a rig, with the ties and tip surface of hair of the scene."""
-    hair, holding = job.hair, Holding()
+    hair, holding = job.hair, TrackedHolders()
     if hair is not None:
-        holding = Holding.of(hair, bpy.context.evaluated_depsgraph_get())
+        holding = TrackedHolders.of(hair, bpy.context.evaluated_depsgraph_get())
     report_notes(list(holding.warnings), job.report)
     return Source(
         inputs.strands,
@@ -269,7 +269,7 @@ def card_edits(job: Job) -> CardEdits | None:
 def open_studio(job: Job, rig: Rig) -> Studio:
     """The studio that draws this job's hair."""
     with job.report.stage("ambient occlusion"):
-        groom = prepared(rig, job.settings[AmbientSettings])
+        groom = prepare_groom(rig, job.settings[AmbientSettings])
     edits = card_edits(job)
     look = look_of_head(job.sources, rig.head)
     studio = Studio(groom, GroomSettings(job.settings), look=look, edits=edits)

@@ -44,7 +44,7 @@ from ..properties.groom_settings import GroomSettings
 from ..scene.painted_colors import read_colors
 from ..scene.partings import partings_of
 from ..sessions.groom_source import GroomSource
-from ..sessions.prepared_groom import prepared, requested_rig
+from ..sessions.prepared_groom import prepare_groom, requested_rig
 from ..sessions.snapshots import snapshot_of, with_all_strands, with_settings
 
 
@@ -324,7 +324,7 @@ def _of_curves(
         source.masks,
         source.partings,
         source.holders,
-        settings.of_rig,
+        settings.rig_settings,
         settings[AmbientSettings],
     )
     made = _made(
@@ -344,7 +344,7 @@ def _made(
 ) -> _Made:
     def make() -> _Made:
         # a render leaves no strands out, so it needs no occluder spheres
-        groom = prepared(rig(), settings[AmbientSettings], with_occluders=False)
+        groom = prepare_groom(rig(), settings[AmbientSettings], with_occluders=False)
         return _Made(made_from, groom.rig, snapshot_of(groom), is_baked)
 
     kept = _kept.setdefault(owner.session_uid, _Kept())

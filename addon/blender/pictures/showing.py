@@ -19,7 +19,7 @@ from ..preview import previews
 from ..properties.groom_settings import GroomSettings
 from ..scene.head_look import look_below
 from ..sessions.groom_source import GroomSource
-from ..sessions.prepared_groom import PreparedGroom, prepared, requested_rig
+from ..sessions.prepared_groom import PreparedGroom, prepare_groom, requested_rig
 from ..sessions.session import Session
 from .studio import Studio
 
@@ -59,7 +59,7 @@ def shown_groom(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Shown
     request = GroomSource(hair, depsgraph).request
     settings, colors = request.settings, request.source.colors
     rig = with_painted_colors(requested_rig(request), colors, settings[ShadingSettings])
-    studio = _studio(hair, prepared(rig, settings[AmbientSettings]), settings)
+    studio = _studio(hair, prepare_groom(rig, settings[AmbientSettings]), settings)
     notes = (*request.source.warnings, *rig.notes, *studio.warnings)
     return ShownGroom(studio, rig.rest_pose, rig.strands.points, rig.guide_grid, notes)
 

@@ -94,7 +94,7 @@ class _Part:
             session.finish_frame()
             if frame > self.frames.start and self.measure is not None:
                 session.measure_into(self.measure)
-        self.writer.add(frame, session.recorded(), session.frame_hash(depsgraph))
+        self.writer.add(frame, session.bake_arrays(), session.frame_hash(depsgraph))
 
     def finish(self, rate: float) -> None:
         """Write the facts, after all frames."""
@@ -105,7 +105,7 @@ class _Part:
                 first=self.frames.start,
                 last=self.frames.stop - 1,
                 frame_rate=rate,
-                form=form_of_session(self.session),
+                form=device_of_session(self.session),
                 rig_hash=self.rig_hash,
                 hairloom=environment()["hairloom"],
                 file=file_name(self.found()),
@@ -320,9 +320,9 @@ def simulation_for(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Sim
     return known
 
 
-def form_of_session(session: Simulation) -> str:
+def device_of_session(session: Simulation) -> str:
     """The kind of solver that simulates it: "numpy" or "compute"."""
-    return session.solver.form if isinstance(session, Session) else "numpy"
+    return session.solver.device if isinstance(session, Session) else "numpy"
 
 
 def bakeable(obj: bpy.types.Object) -> bool:

@@ -14,7 +14,7 @@ from ..bakes import playback
 from ..bakes.baked_rig import BakedRig
 from ..base.objects import head_of, matrix_of, objects_in
 from ..sessions.groom_source import GroomSource
-from ..sessions.prepared_groom import build
+from ..sessions.prepared_groom import build_groom
 from ..sessions.session import Session
 from .preview import rig_for
 
@@ -29,7 +29,7 @@ class Bystander:
     def __init__(self, hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
         self._source = GroomSource(hair, depsgraph)
         self._source.use_bake(rig_for(hair, depsgraph.scene))
-        self._own = build(self._source.request, is_drawn=False).rig
+        self._rest_rig = build_groom(self._source.request, is_drawn=False).rig
         self.uid = int(hair.session_uid)
         self.move(depsgraph)
 
@@ -48,22 +48,22 @@ class Bystander:
         hair, frame = self._source.hair.found(), depsgraph.scene.frame_current
         cache = playback.cache_of(hair) if hair.hairloom.bake.is_shown else None
         if cache is not None and cache.holds(frame):
-            baked, arrays = BakedRig(self._own, self._source.rests), cache.frame(frame)
+            baked, arrays = BakedRig(self._rest_rig, self._source.rest_matrices), cache.frame(frame)
             if baked.fits(arrays):
-                self.rig: Rig = baked.styled(arrays)
+                self.rig: Rig = baked.styled_rig(arrays)
                 self.pose: Pose = baked.pose(arrays)
                 self._guides: Floats = arrays["guides"]
                 return
-        self.rig, self.pose = self._own, self._source.pose(self._own, depsgraph)
+        self.rig, self.pose = self._rest_rig, self._source.pose(self._rest_rig, depsgraph)
         self._guides = motion_flow.style_of_guides(self.rig, self.pose)
 
     def guides(self) -> Floats:
         """See `coupled_frame.FeltGroom`."""
         return self._guides
 
-    def style_seen(self) -> Style:
+    def neighbour_style(self) -> Style:
         """See `motion_flow.neighbour_style`."""
-        return motion_flow.neighbour_style(self.rig, self.pose, self._own)
+        return motion_flow.neighbour_style(self.rig, self.pose, self._rest_rig)
 
 
 class Bystanders(dict[int, Bystander]):

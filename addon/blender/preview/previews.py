@@ -343,7 +343,11 @@ def _take_other_bake(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
     preview.act(Event.STOP, depsgraph)
     groom = preview.groom
     baked = None if groom is None else rig_for(preview.found(), depsgraph.scene)
-    is_other = groom is not None and baked is not None and not baked.rests.has_size_of(groom.rests)
+    is_other = (
+        groom is not None
+        and baked is not None
+        and not baked.rest_matrices.has_same_size(groom.rest_matrices)
+    )
     if is_other or preview.is_resized(depsgraph):
         restart(preview, depsgraph)
     else:

@@ -50,7 +50,7 @@ def settings_changed(owner: bpy.types.ID) -> None:
         hair = session.hair.handle.find()
         if hair is not None and owner in (hair, hair.data):
             attempt(preview, depsgraph, partial(_take_settings, preview, session, depsgraph))
-            session.is_stale |= session.has_other_holders(set()) or session.has_other_partings()
+            session.is_stale |= session.has_changed_holders(set()) or session.has_changed_partings()
             if session.is_stale:
                 _read_again_soon()
         elif occluders_changed(session, {owner.session_uid}, depsgraph.view_layer):
@@ -87,8 +87,8 @@ def updated(depsgraph: bpy.types.Depsgraph) -> None:
         if (
             is_combed
             or is_painted
-            or session.has_other_holders(edited)
-            or session.has_other_partings()
+            or session.has_changed_holders(edited)
+            or session.has_changed_partings()
         ):
             session.is_stale = True
             session.forget_shown_map()
@@ -98,8 +98,8 @@ def updated(depsgraph: bpy.types.Depsgraph) -> None:
         if occluders_changed(session, moved, depsgraph.view_layer) or cards_edited(session, edited):
             _look_at_cards_soon(preview)
         follows = preview.phase is not Phase.FREE and is_among(session, moved)
-        brushes = [session.comb] * is_combed + [session.paint] * is_painted
-        colors = [session.color] * is_painted
+        brushes = [session.follow_combing] * is_combed + [session.follow_painted_masks] * is_painted
+        colors = [session.follow_painted_colors] * is_painted
         update = partial(
             _update, preview, session, depsgraph, follows, light_changed, brushes, colors
         )
@@ -117,7 +117,7 @@ def _update(
 ) -> None:
     """Follow lights, brushes and the body; brushes that change shape only where hair is at rest."""
     if light_changed:
-        session.light(depsgraph)
+        session.take_lights(depsgraph)
     for brush in (*colors, *(brushes if preview.phase is Phase.REST else ())):
         brush(depsgraph)
     if follows and preview.keep_or_rest(depsgraph) and preview.is_resized(depsgraph):
@@ -143,7 +143,7 @@ def _go(preview: Preview, depsgraph: bpy.types.Depsgraph, light_changed: bool) -
         session.take_settings()
         _refine_soon(session)
         if light_changed:
-            session.light(depsgraph)
+            session.take_lights(depsgraph)
     is_free = preview.phase is Phase.FREE
     if preview.found().hairloom.bake.follows:
         # freely playing hair goes on swinging while the playhead is dragged; playback takes it over
@@ -188,9 +188,9 @@ def follow_undo() -> None:
     depsgraph = bpy.context.evaluated_depsgraph_get()
     for preview, session in _grooms():
         if preview.phase is Phase.REST:
-            attempt(preview, depsgraph, partial(session.comb, depsgraph))
-            attempt(preview, depsgraph, partial(session.paint, depsgraph))
-        attempt(preview, depsgraph, partial(session.color, depsgraph))
+            attempt(preview, depsgraph, partial(session.follow_combing, depsgraph))
+            attempt(preview, depsgraph, partial(session.follow_painted_masks, depsgraph))
+        attempt(preview, depsgraph, partial(session.follow_painted_colors, depsgraph))
 
 
 def _read_again_soon() -> None:
@@ -216,7 +216,7 @@ def catch_up(depsgraph: bpy.types.Depsgraph) -> None:
     for preview, session in _grooms():
         if preview.cards_are_stale:
             preview.cards_are_stale = False
-            attempt(preview, depsgraph, session.look_at_cards_again)
+            attempt(preview, depsgraph, session.refresh_cards)
     redraw_panels()
 
 
@@ -224,7 +224,7 @@ def _read(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
     session = preview.groom
     if session is None:
         preview.act(Event.RESET, depsgraph)
-    elif session.has_another_head() or preview.is_resized(depsgraph):
+    elif session.has_changed_head() or preview.is_resized(depsgraph):
         registry.restart(preview, depsgraph)
     else:
         session.read_again(depsgraph, blocking=latest_job.is_blocking())

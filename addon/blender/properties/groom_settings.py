@@ -84,7 +84,7 @@ class GroomSettings:
         return self[CardDrawingSettings].shown_as == "cards"
 
     @property
-    def of_rig(self) -> tuple[SettingsMap, str, bool]:
+    def rig_settings(self) -> tuple[SettingsMap, str, bool]:
         """The settings that determine strands, guides and their points."""
         is_animated = self[DynamicsSettings].animated_style
         if self[ChildrenSettings].method == "none":
@@ -92,17 +92,17 @@ class GroomSettings:
         kinds = (GuideSettings, WidthSettings, ChildrenSettings)
         return self.sections.only(*kinds), self.children_density, is_animated
 
-    def acts_at_once(self, before: GroomSettings) -> bool:
+    def needs_no_rebuild(self, before: GroomSettings) -> bool:
         """Whether the settings that differ need nothing to be read or made again."""
-        return self._read == before._read
+        return self._read_settings == before._read_settings
 
     @property
-    def _read(self) -> tuple[Any, ...]:
+    def _read_settings(self) -> tuple[Any, ...]:
         """The settings that determine what is read and made."""
         names = mask_names(self[DynamicsSettings]), self[ShadingSettings].color_map
-        return self.of_rig, self[AmbientSettings], names
+        return self.rig_settings, self[AmbientSettings], names
 
-    def at_once(self, before: GroomSettings) -> GroomSettings:
+    def with_built_values_of(self, before: GroomSettings) -> GroomSettings:
         """These settings, but with earlier values of those that need the hair to be read again."""
         kinds = (GuideSettings, WidthSettings, ChildrenSettings, AmbientSettings)
         waiting = (before[kind] for kind in kinds)

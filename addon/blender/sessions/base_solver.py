@@ -22,7 +22,7 @@ class BaseSolver:
     def __init__(self, rig: Rig, motion: Motion | None) -> None:
         self._rig = rig
         self._motion = motion or motion_flow.begin(rig, rig.rest_pose)
-        self._led = NOT_LED
+        self._led_out = NOT_LED
         self._is_baked = False
 
     @property
@@ -31,7 +31,7 @@ class BaseSolver:
 
     @property
     def motion(self) -> Motion:
-        return let_go(self._rig, self._motion) if self._is_baked else self._motion
+        return restarted_motion(self._rig, self._motion) if self._is_baked else self._motion
 
     @property
     def size(self) -> float:
@@ -40,12 +40,12 @@ class BaseSolver:
     def has_jumped(self, pose: Pose, settings: DynamicsSettings, duration: float) -> bool:
         return motion_flow.has_jumped(self._rig, self._motion, pose, settings, duration)
 
-    def go_along(self, frame: FrameInput) -> None:
+    def advance_rigidly(self, frame: FrameInput) -> None:
         self._take(motion_flow.advance_rigidly(self._rig, self.motion, frame))
 
-    def carry(self, pose: Pose, guides: Floats, led: LedOut = NOT_LED) -> None:
+    def show_baked(self, pose: Pose, guides: Floats, led: LedOut = NOT_LED) -> None:
         self._take(carried_motion(self._rig, self._motion, pose, guides))
-        self._led, self._is_baked = led, True
+        self._led_out, self._is_baked = led, True
 
     def _take(self, motion: Motion) -> None:
         """Show this motion; drops earlier strands, led-out strands and baked guides."""
@@ -71,7 +71,7 @@ def carried_motion(rig: Rig, motion: Motion, pose: Pose, guides: Floats) -> Moti
     )
 
 
-def let_go(rig: Rig, shown: Motion) -> Motion:
+def restarted_motion(rig: Rig, shown: Motion) -> Motion:
     """The motion that starts from the shown guides at rest."""
     begun = motion_flow.begin(rig, shown.pose)
     rows = rows_of(shown.guides, "bake")

@@ -35,15 +35,15 @@ class ComputeSolver(BaseSolver):
         texels: see `texels_of`.
     """
 
-    form = "compute"
+    device = "compute"
 
     def __init__(
         self, rig: Rig, motion: Motion | None = None, texels: RideTexels | None = None
     ) -> None:
         super().__init__(rig, motion)
         self._is_resting = motion is None
-        self._is_drawn = False
-        self._since = np.inf  # time since the frame that leading out continues from [s]
+        self._are_strands_current = False
+        self._time_since_led = np.inf  # time since the frame that leading out continues from [s]
         self._dynamics: DynamicsPass | None = None
         self._colliders = UploadedColliders()
         self._ride = RidePass(
@@ -72,7 +72,7 @@ class ComputeSolver(BaseSolver):
         self._take(known or motion_flow.begin(self._rig, pose))
         self._is_resting = True
 
-    def meet(
+    def find_clearance(
         self,
         colliders: tuple[PosedCollider, ...],
         settings: DynamicsSettings,
@@ -87,9 +87,9 @@ class ComputeSolver(BaseSolver):
         if self._is_baked:
             self._take(self.motion)
         if self._motion.clearance is not None and not self._is_resting:
-            self._draw()  # so that motion does not depend on which frames are shown
-            self._since = frame.hair_time
-        self.meet(frame.colliders, frame.settings, frame.painted)
+            self._update_strands()  # so that motion does not depend on which frames are shown
+            self._time_since_led = frame.hair_time
+        self.find_clearance(frame.colliders, frame.settings, frame.painted)
         motion = self._motion
         if self._dynamics is None:
             self._dynamics = DynamicsPass(motion.dynamics, self._colliders)
@@ -105,11 +105,11 @@ class ComputeSolver(BaseSolver):
             hair_time=frame.hair_time,
             colliders=frame.colliders,
         )
-        self._is_resting = self._is_drawn = False
+        self._is_resting = self._are_strands_current = False
 
     def take_style(self, rig: Rig) -> None:
         if self._motion.clearance is not None and not self._is_resting:
-            self._draw()  # the last frame, with its own style
+            self._update_strands()  # the last frame, with its own style
         self._rig, self._motion = rig, motion_flow.with_style(rig, self._motion)
         self._ride.take_style(rig.strands, rig.guide_grid, rig.riders)
         if self._dynamics is not None:
@@ -124,24 +124,24 @@ class ComputeSolver(BaseSolver):
         return np.ascontiguousarray(pixels[..., :3])
 
     def strands(self) -> Floats:
-        self._draw()
+        self._update_strands()
         return self._ride.read()
 
-    def led(self) -> LedOut:
-        self._draw()
-        return self._led if self._is_baked else self._ride.read_led()
+    def led_out_strands(self) -> LedOut:
+        self._update_strands()
+        return self._led_out if self._is_baked else self._ride.read_led()
 
-    def shown(self, snapshot: Snapshot) -> Snapshot:
-        self._draw()
+    def with_strands(self, snapshot: Snapshot) -> Snapshot:
+        self._update_strands()
         return replace(snapshot, device_points=self._ride.points)
 
     def release(self) -> None:
         """Free everything on the GPU; the next frame goes on from the motion that was read back."""
-        is_resting, is_baked, led = self._is_resting, self._is_baked, self._led
+        is_resting, is_baked, led = self._is_resting, self._is_baked, self._led_out
         motion = self._motion if is_baked else self.motion
         self._ride.release()
         self._take(motion)
-        self._is_resting, self._is_baked, self._led = is_resting, is_baked, led
+        self._is_resting, self._is_baked, self._led_out = is_resting, is_baked, led
 
     @property
     def _guides_texture(self) -> Any:
@@ -153,13 +153,13 @@ class ComputeSolver(BaseSolver):
         if self._dynamics is not None:
             self._dynamics.release()
             self._dynamics = None
-        self._motion, self._led, self._since = motion, NOT_LED, np.inf
+        self._motion, self._led_out, self._time_since_led = motion, NOT_LED, np.inf
         self._ride.lead_out.set_clearance(motion.clearance)
-        self._is_baked = self._is_resting = self._is_drawn = False
+        self._is_baked = self._is_resting = self._are_strands_current = False
 
-    def _draw(self) -> None:
+    def _update_strands(self) -> None:
         """Update the strands on the GPU to this moment, once."""
-        if self._is_drawn and self._ride.points.texture is not None:
+        if self._are_strands_current and self._ride.points.texture is not None:
             return
         pose, texture = self.pose, self._guides_texture
         head, matrix, anchors = pose.head_positions, pose.matrix, pose.anchors
@@ -168,8 +168,10 @@ class ComputeSolver(BaseSolver):
         else:
             guides = self._motion.guides if texture is None else texture
             colliders = self._motion.colliders
-            self._ride.ride(head, matrix, guides, anchors, colliders, self._led, self._since)
-        self._is_drawn = True
+            self._ride.ride(
+                head, matrix, guides, anchors, colliders, self._led_out, self._time_since_led
+            )
+        self._are_strands_current = True
 
 
 def texels_of(rig: Rig) -> RideTexels:

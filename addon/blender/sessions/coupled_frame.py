@@ -47,7 +47,7 @@ class FeltGroom(Protocol):
     def guides(self) -> Floats:
         """Its guides, (guide_count, cv_count, 3) [m, world]."""
 
-    def style_seen(self) -> Style:
+    def neighbour_style(self) -> Style:
         """See `motion_flow.neighbour_style`."""
 
 
@@ -124,7 +124,7 @@ def _frame_starts(grooms: list[FeltGroom]) -> list[_GroomStart]:
     return [
         _GroomStart(
             each,
-            each.style_seen(),
+            each.neighbour_style(),
             each.guides(),
             balls[each.uid][1],
             near.get(each.uid, frozenset()),

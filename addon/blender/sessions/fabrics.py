@@ -17,7 +17,7 @@ from ..base.thread_work import ThreadWork
 from ..colliders.fields import NotMadeYetError
 
 #: Meshes with at most this many triangles take a hundredth of a second, and are waited for.
-AT_ONCE = 500
+MAX_BLOCKING_TRIANGLES = 500
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +29,7 @@ class ClothMesh:
     pin: Floats
     edges: Ints
 
-    def is_woven_as(self, other: ClothMesh) -> bool:
+    def has_same_fabric(self, other: ClothMesh) -> bool:
         """Whether everything except the positions is the same."""
         return (
             len(self.positions) == len(other.positions)
@@ -38,8 +38,8 @@ class ClothMesh:
             and np.array_equal(self.edges, other.edges)
         )
 
-    def is_as(self, other: ClothMesh) -> bool:
-        return self.is_woven_as(other) and np.array_equal(self.positions, other.positions)
+    def is_same_as(self, other: ClothMesh) -> bool:
+        return self.has_same_fabric(other) and np.array_equal(self.positions, other.positions)
 
     def fabric(self) -> Fabric:
         """The fabric of this mesh.
@@ -63,7 +63,7 @@ class FabricJob:
         """Whether it is being made."""
         return self._work is not None and not self._work.is_done
 
-    def made(self, mesh: ClothMesh, *, blocking: bool) -> Fabric:
+    def fabric_of(self, mesh: ClothMesh, *, blocking: bool) -> Fabric:
         """The fabric of this mesh. If work has begun for the same mesh in another pose, its result
         is used, so that a moving mesh is waited for only once.
 
@@ -74,20 +74,20 @@ class FabricJob:
             HairloomError: see `start_cloth`.
             NotMadeYetError: it is being made, and the call does not block.
         """
-        if blocking or len(mesh.triangles) <= AT_ONCE:
+        if blocking or len(mesh.triangles) <= MAX_BLOCKING_TRIANGLES:
             self.cancel()
-            if self._fabric is None or self._mesh is None or not self._mesh.is_as(mesh):
+            if self._fabric is None or self._mesh is None or not self._mesh.is_same_as(mesh):
                 self._mesh, self._fabric = mesh, mesh.fabric()
             return self._fabric
         work, self._work = self._work, None
-        if work is not None and self._mesh is not None and self._mesh.is_woven_as(mesh):
+        if work is not None and self._mesh is not None and self._mesh.has_same_fabric(mesh):
             if not work.is_done:
                 self._work = work
                 raise NotMadeYetError
             redraw_panels()
             self._fabric = work.result()
             return self._fabric
-        if self._fabric is None or self._mesh is None or not self._mesh.is_as(mesh):
+        if self._fabric is None or self._mesh is None or not self._mesh.is_same_as(mesh):
             self._mesh, self._fabric = mesh, None
             self._work = ThreadWork(lambda _: mesh.fabric(), "fabric")
             redraw_panels()

@@ -100,7 +100,7 @@ class FinSession:
             self._pins(obj, depsgraph),
             loose_edges_of(obj.data),
         )
-        fabric = self._named(lambda: self._fabric.made(mesh, blocking=blocking))
+        fabric = self._named(lambda: self._fabric.fabric_of(mesh, blocking=blocking))
         position = vertex_rows(self._carried)
         self.state = ClothState(position, position, fabric)
         settings = self.settings.as_dynamics()
@@ -165,7 +165,7 @@ class FinSession:
         """See `simulation.Simulation`."""
         return {"corners": self._corners}
 
-    def recorded(self) -> Arrays:
+    def bake_arrays(self) -> Arrays:
         """The vertices of this frame, (vertex_count, 3) float32, object space."""
         return {"position": self._shown.copy()}
 

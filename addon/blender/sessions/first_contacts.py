@@ -18,7 +18,7 @@ from ..colliders.fields import NotMadeYetError
 
 
 @dataclass(frozen=True, eq=False)
-class Start:
+class PlayStart:
     """The state in which hair begins to play.
 
     colliders: at rest where they are at that moment.
@@ -29,7 +29,7 @@ class Start:
     colliders: tuple[PosedCollider, ...]
     settings: DynamicsSettings
 
-    def is_as(self, other: Start) -> bool:
+    def is_same_as(self, other: PlayStart) -> bool:
         """Whether rig, pose and colliders are the same; `with_clearance` compares the settings."""
         return (
             self.rig is other.rig
@@ -48,23 +48,23 @@ class FirstContacts:
     """The motion of the start that was requested last."""
 
     def __init__(self) -> None:
-        self._start: Start | None = None
+        self._start: PlayStart | None = None
         self._motion: Motion | ThreadWork[Motion] | None = None
 
-    def keep(self, start: Start, motion: Motion) -> None:
+    def store(self, start: PlayStart, motion: Motion) -> None:
         """Store a motion that was found elsewhere."""
         self._start, self._motion = start, motion
 
-    def known(self, start: Start) -> Motion | None:
+    def known_motion(self, start: PlayStart) -> Motion | None:
         """The motion of this start, if it is known or being found; waits for it."""
-        if self._start is None or not self._start.is_as(start):
+        if self._start is None or not self._start.is_same_as(start):
             return None
         if not isinstance(self._motion, ThreadWork):
             return self._motion
         self._motion.wait()
         return self._motion.result()
 
-    def find(self, start: Start) -> None:
+    def find(self, start: PlayStart) -> None:
         """Have the motion of this start found in a thread, unless it is known. If work on an
         earlier start is done, that will do, so that a moving body is waited for only once.
 
@@ -74,7 +74,7 @@ class FirstContacts:
         if isinstance(self._motion, ThreadWork):
             if not self._motion.is_done:
                 raise NotMadeYetError
-        elif self._start is None or not self._start.is_as(start):
+        elif self._start is None or not self._start.is_same_as(start):
             self._start = start
             self._motion = ThreadWork(lambda _: start.motion(), "first contacts")
             raise NotMadeYetError

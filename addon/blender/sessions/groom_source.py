@@ -28,7 +28,7 @@ from ...style_flow import curves_at_rest, rig_with_style
 from ..bakes.baked_rig import BakedRig, RestMatrices
 from ..bakes.groom_hashes import groom_frame_hash, groom_rig_hash
 from ..base.objects import Body, head_of, matrix_of
-from ..colliders.ties import Holding
+from ..colliders.ties import TrackedHolders
 from ..properties.groom_settings import GroomSettings
 from ..scene.curves import read_curves
 from ..scene.masks import Canvas
@@ -66,15 +66,15 @@ class GroomSource:
     def __init__(self, hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
         head = head_of(hair)
         self.hair = Body.at_rest(hair, depsgraph)
-        self._holding = Holding.of(hair, depsgraph)
-        self._good: dict[str, Mask] = {}
+        self._holders = TrackedHolders.of(hair, depsgraph)
+        self._last_good_masks: dict[str, Mask] = {}
         self._shown_map: tuple[str, Mask | None] | None = None
-        self._brushed: Canvas | None = None
+        self._overlay_canvas: Canvas | None = None
         self._motion_masks = NO_MASKS
         self._painted_guides: tuple[Ints, Masks, PaintedGuides | None] | None = None
-        source = read_source(hair, depsgraph, self._good)
-        self.source = replace(source, holders=self._holding.holders)
-        self._combed = self.source.strands
+        source = read_source(hair, depsgraph, self._last_good_masks)
+        self.source = replace(source, holders=self._holders.holders)
+        self._last_curves = self.source.strands
         self.painted = self.source.density, self.source.masks
         uses_head = self.source.head is not None and head is not None
         self.head = Body.at_rest(head, depsgraph) if uses_head else None
@@ -84,9 +84,9 @@ class GroomSource:
         self._kept = Kept()
         self._read_motion_masks(self._canvas(self.source), self.settings, depsgraph)
         self._style_warning = ""
-        self._styled: _Styled | None = None
+        self._styled_rig: _StyledRig | None = None
         self.request = BuildRequest(
-            self.name, self.source, self.settings, holding=self._holding, kept=self._kept
+            self.name, self.source, self.settings, holders=self._holders, kept=self._kept
         )
         check_finite(hair.name, self.hair.rest)
 
@@ -95,9 +95,9 @@ class GroomSource:
         return self.hair.handle.name
 
     @property
-    def rests(self) -> RestMatrices:
+    def rest_matrices(self) -> RestMatrices:
         head = None if self.head is None else self.head.rest
-        return RestMatrices(self.hair.rest, head, self._holding.rests)
+        return RestMatrices(self.hair.rest, head, self._holders.rest_matrices)
 
     def is_resized(self, depsgraph: bpy.types.Depsgraph) -> bool:
         """Whether hair or head has been scaled or mirrored since rest; False if one has size 0,
@@ -108,7 +108,7 @@ class GroomSource:
         """
         head = None if self.head is None else matrix_of(self.head.found(), depsgraph)
         now = RestMatrices(matrix_of(self.hair.found(), depsgraph), head)
-        return now.has_size and not now.has_size_of(self.rests)
+        return now.is_invertible and not now.has_same_size(self.rest_matrices)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -116,19 +116,19 @@ class GroomSource:
         style = filter(None, (self._style_warning,))
         own = self.source.warnings
         motion = (each for each in self._motion_warnings if each not in own)
-        return (*own, *self._holding.warnings, *motion, *style)
+        return (*own, *self._holders.warnings, *motion, *style)
 
     @property
     def holder_uids(self) -> frozenset[int]:
         """Session numbers of what holds the hair beside its roots."""
-        return self._holding.uids
+        return self._holders.uids
 
-    def has_other_holders(self, edited: set[int]) -> bool:
-        """See `Holding.is_outdated`."""
+    def has_changed_holders(self, edited: set[int]) -> bool:
+        """See `TrackedHolders.is_outdated`."""
         hair = self.hair.handle.find()
-        return hair is not None and self.request.holding.is_outdated(hair, edited)
+        return hair is not None and self.request.holders.is_outdated(hair, edited)
 
-    def has_other_partings(self) -> bool:
+    def has_changed_partings(self) -> bool:
         """Whether partings have been added, removed, moved or edited."""
         hair = self.hair.handle.find()
         return hair is not None and not is_same_state(parting_state(hair), self._parting_state)
@@ -143,28 +143,30 @@ class GroomSource:
 
     def use_bake(self, baked: BakedRig | None) -> None:
         """Request the rig of a bake of this groom, so that it is the same to the bit."""
-        if baked is not None and (baked.rests.head is None) == (self.head is None):
+        if baked is not None and (baked.rest_matrices.head is None) == (self.head is None):
             rig = self._rig_of(baked)
-            self._holding = self._holding.at_rests(baked.rests.ties)
-            self.request = BuildRequest(self.name, self.source, self.settings, rig, self._holding)
+            self._holders = self._holders.with_rest_matrices(baked.rest_matrices.ties)
+            self.request = BuildRequest(self.name, self.source, self.settings, rig, self._holders)
 
     def _rig_of(self, baked: BakedRig) -> Rig:
         """The rig of a bake; rest becomes the place of hair and head at the bake's rest."""
-        back = baked.rests.hair @ np.linalg.pinv(self.hair.rest)
+        back = baked.rest_matrices.hair @ np.linalg.pinv(self.hair.rest)
         lines = self.source.partings
         if lines is not None:
             lines = moved(lines.reshape(-1, 3), back).reshape(-1, 2, 3)
         rig = _with_uv(baked.rig, self.source.head)
-        strands, rest = self._in_pose_of(baked, back)
+        strands, rest = self._strands_in_pose_of(baked, back)
         self.source = replace(
             self.source, strands=strands, head=rig.head, partings=lines, rest=rest
         )
-        self.hair.rest = baked.rests.hair
-        if self.head is not None and baked.rests.head is not None:
-            self.head.rest = baked.rests.head
+        self.hair.rest = baked.rest_matrices.hair
+        if self.head is not None and baked.rest_matrices.head is not None:
+            self.head.rest = baked.rest_matrices.head
         return rig
 
-    def _in_pose_of(self, baked: BakedRig, back: Floats) -> tuple[StrandSet, RestHair | None]:
+    def _strands_in_pose_of(
+        self, baked: BakedRig, back: Floats
+    ) -> tuple[StrandSet, RestHair | None]:
         """The strands in the pose of hair and head at a bake's rest; and the stored rest hair if
         they had to be moved there.
 
@@ -173,13 +175,13 @@ class GroomSource:
         """
         read, start = self.source.at_rest, self.source.at_rest.head
         strands, head = read.strands.transformed(back), baked.rig.head
-        if start is None or head is None or self.head is None or baked.rests.head is None:
+        if start is None or head is None or self.head is None or baked.rest_matrices.head is None:
             return strands, None
-        start = start.transformed(baked.rests.head @ np.linalg.pinv(self.head.rest))
+        start = start.transformed(baked.rest_matrices.head @ np.linalg.pinv(self.head.rest))
         rest = RestHair.found(strands, [start], head)
         return (strands, None) if rest is None else (rest.on(head), rest)
 
-    def has_another_head(self) -> bool:
+    def has_changed_head(self) -> bool:
         """Whether the artist has set another surface since."""
         head = head_of(self.hair.found())
         return (head and head.session_uid) != self._head_uid
@@ -202,16 +204,16 @@ class GroomSource:
         is_animated = settings[DynamicsSettings].animated_style
         if is_animated and np.array_equal(strands.offsets, before.strands.offsets):
             strands = strands.with_points(before.strands.points)  # they differ in each frame
-        if _same(strands, before.strands, back):
+        if _is_same_hair(strands, before.strands, back):
             strands, rest = before.strands, before.rest
         canvas = self._canvas(replace(before, strands=strands, kept=read.kept))
         self._read_motion_masks(canvas, settings, depsgraph)
         density, warning = read_density(hair, canvas, depsgraph)
         masks, mask_warnings = canvas.masks(settings[ChildrenSettings], depsgraph)
         colors, color_warnings = read_source_colors(hair, strands, before.head, depsgraph)
-        holding = Holding.of(hair, depsgraph, known.holding, back)
+        holding = TrackedHolders.of(hair, depsgraph, known.holders, back)
         partings, parting_warnings = before.partings, before.parting_warnings
-        if self.has_other_partings():
+        if self.has_changed_partings():
             self._parting_state = parting_state(hair)
             lines, parting_warnings = read_partings(hair, depsgraph)
             there = moved(lines.reshape(-1, 3), back).reshape(-1, 2, 3)
@@ -232,9 +234,9 @@ class GroomSource:
             partings=partings,
             parting_warnings=parting_warnings,
         )
-        request = BuildRequest(self.name, source, settings, holding=holding, kept=self._kept)
+        request = BuildRequest(self.name, source, settings, holders=holding, kept=self._kept)
         if (
-            request.gives_rig_of(known)
+            request.gives_same_rig_as(known)
             and request.settings[AmbientSettings] == known.settings[AmbientSettings]
         ):
             self.source = replace(
@@ -297,7 +299,7 @@ class GroomSource:
         Raises:
             HairloomError: the hair is gone, or no usable hair is left.
         """
-        before = self._combed
+        before = self._last_curves
         _, stored, back = self._read_curves(self.hair.found(), depsgraph)
         strands = self._on_head(stored, depsgraph)
         if not np.array_equal(strands.offsets, before.offsets):
@@ -309,10 +311,10 @@ class GroomSource:
         number = np.unique(np.searchsorted(strands.offsets, points, side="right") - 1)
         if not len(number):
             return None
-        self._combed = strands
+        self._last_curves = strands
         return strands.take(number), number
 
-    def has_other_paint(self, depsgraph: bpy.types.Depsgraph) -> bool:
+    def has_changed_paint(self, depsgraph: bpy.types.Depsgraph) -> bool:
         """Whether density or masks of children have changed since the last call, or since other
         hair was accepted.
 
@@ -321,7 +323,7 @@ class GroomSource:
         """
         hair, (density, masks) = self.hair.found(), self.painted
         canvas, settings = self._canvas(self.source), self.settings[ChildrenSettings]
-        self._brushed = canvas  # the overlay reads it before anything else is painted
+        self._overlay_canvas = canvas  # the overlay reads it before anything else is painted
         self.painted = (
             read_density(hair, canvas, depsgraph)[0],
             canvas.masks(settings, depsgraph)[0],
@@ -345,17 +347,17 @@ class GroomSource:
     def accept(self, request: BuildRequest) -> None:
         """Show the hair of this request from now on, with the present values of settings that act
         at once."""
-        self.source, self._holding = request.source, request.holding
-        self._brushed = self._shown_map = None
-        self._combed = self.source.strands
+        self.source, self._holders = request.source, request.holders
+        self._overlay_canvas = self._shown_map = None
+        self._last_curves = self.source.strands
         self.painted = self.source.density, self.source.masks
-        self.settings = GroomSettings.of(self.hair.found()).at_once(request.settings)
+        self.settings = GroomSettings.of(self.hair.found()).with_built_values_of(request.settings)
 
     def take_settings(self) -> bool:
         """Take over settings that act at once; returns whether others need new hair."""
         settings = GroomSettings.of(self.hair.found())
-        self.settings = settings.at_once(self.settings)
-        return not settings.acts_at_once(self.request.settings)
+        self.settings = settings.with_built_values_of(self.settings)
+        return not settings.needs_no_rebuild(self.request.settings)
 
     def pose(self, rig: Rig, depsgraph: bpy.types.Depsgraph) -> Pose:
         """The present pose; see `poses.read_pose`."""
@@ -363,26 +365,26 @@ class GroomSource:
         pose = read_pose(self.hair, self.head, vertex_count, depsgraph)
         if rig.holds is None:
             return pose
-        return replace(pose, anchors=self._holding.anchors(self.hair.found(), rig.holds, depsgraph))
+        return replace(pose, anchors=self._holders.anchors(self.hair.found(), rig.holds, depsgraph))
 
-    def styled(self, rig: Rig, depsgraph: bpy.types.Depsgraph) -> Rig:
+    def styled_rig(self, rig: Rig, depsgraph: bpy.types.Depsgraph) -> Rig:
         """The rig in the style of this frame's curves; if their number has changed, in that of the
         last frame that fitted, with a warning.
 
         Raises:
             HairloomError: the hair is gone.
         """
-        hair, known = self.hair.found(), self._styled
+        hair, known = self.hair.found(), self._styled_rig
         if known is None or known.base is not rig:
-            known = _Styled(rig, self.source.strands, rig)
+            known = _StyledRig(rig, self.source.strands, rig)
         curves = read_curves(hair, depsgraph).strands
-        self._style_warning = _misfit(hair.name, curves, known.curves, depsgraph)
+        self._style_warning = _curve_count_warning(hair.name, curves, known.curves, depsgraph)
         if not self._style_warning:
             back = self.hair.rest @ np.linalg.pinv(matrix_of(hair, depsgraph))
             curves = curves_at_rest(rig, curves, self.pose(rig, depsgraph), back)
-            if not _same_places(curves, known.curves, back):
-                known = _Styled(rig, curves, rig_with_style(rig, curves))
-        self._styled = known
+            if not _has_same_points(curves, known.curves, back):
+                known = _StyledRig(rig, curves, rig_with_style(rig, curves))
+        self._styled_rig = known
         return known.rig
 
     def painted_guides(self, rig: Rig) -> PaintedGuides | None:
@@ -399,7 +401,7 @@ class GroomSource:
         """The shown map at each guide, (cv_count or 1, guide_count); None: there is none."""
         name = shown_map_name(self.hair.found())
         if self._shown_map is None or self._shown_map[0] != name:
-            canvas = self._brushed or self._canvas(self.source)
+            canvas = self._overlay_canvas or self._canvas(self.source)
             mask = canvas.read(name, depsgraph)[0] if name else None
             self._shown_map = name, mask
         mask = self._shown_map[1]
@@ -408,12 +410,14 @@ class GroomSource:
 
     def forget_shown_map(self) -> None:
         """Read the shown map again when it is next needed."""
-        self._shown_map = self._brushed = None
+        self._shown_map = self._overlay_canvas = None
 
     def _canvas(self, source: Source) -> Canvas:
         """The canvas of this source."""
         hair = self.hair.found()
-        return Canvas(hair, head_of(hair), source.head, source.strands, source.kept, self._good)
+        return Canvas(
+            hair, head_of(hair), source.head, source.strands, source.kept, self._last_good_masks
+        )
 
     def _read_motion_masks(
         self, canvas: Canvas, settings: GroomSettings, depsgraph: bpy.types.Depsgraph
@@ -456,7 +460,9 @@ def shown_map_name(hair: bpy.types.Object) -> str:
     return next(filter(None, named), "")
 
 
-def _misfit(name: str, now: StrandSet, known: StrandSet, depsgraph: bpy.types.Depsgraph) -> str:
+def _curve_count_warning(
+    name: str, now: StrandSet, known: StrandSet, depsgraph: bpy.types.Depsgraph
+) -> str:
     """A warning if a frame's curves are not those that the hair was made from; else ""."""
     if np.array_equal(now.offsets, known.offsets):
         return ""
@@ -472,7 +478,7 @@ def _misfit(name: str, now: StrandSet, known: StrandSet, depsgraph: bpy.types.De
 
 
 @dataclass(frozen=True, eq=False)
-class _Styled:
+class _StyledRig:
     """A rig in the style of a frame.
 
     base: the rig that it was made from. curves: the artist's curves in that frame, at rest.
@@ -483,11 +489,11 @@ class _Styled:
     rig: Rig
 
 
-def _same(one: StrandSet, other: StrandSet, back: Floats) -> bool:
+def _is_same_hair(one: StrandSet, other: StrandSet, back: Floats) -> bool:
     """Whether two readings give the same hair, within the rounding of the transform `back`."""
     return (
         np.array_equal(one.offsets, other.offsets)
-        and _same_places(one, other, back)
+        and _has_same_points(one, other, back)
         and np.allclose(one.radius, other.radius, rtol=1e-5)
         and np.array_equal(one.group, other.group)
         and are_same(one.color, other.color)
@@ -496,7 +502,7 @@ def _same(one: StrandSet, other: StrandSet, back: Floats) -> bool:
     )
 
 
-def _same_places(one: StrandSet, other: StrandSet, back: Floats) -> bool:
+def _has_same_points(one: StrandSet, other: StrandSet, back: Floats) -> bool:
     """Whether two readings give the same points, within the rounding of the transform `back`."""
     farthest = max(np.abs(one.points).max(initial=0.0), np.abs(back[:3, 3]).max())
     return np.allclose(one.points, other.points, rtol=0.0, atol=_ROUNDING * farthest)

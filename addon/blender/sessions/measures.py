@@ -56,7 +56,7 @@ class FrameTimes:
         return [1000.0 * spent for _, spent in self._times[part]]
 
     @property
-    def line(self) -> str:
+    def text(self) -> str:
         """The times as text, such as "simulation 4.1 ms   drawing 12.3 ms"; empty if nothing was
         measured lately."""
         parts = ((part, self.milliseconds(part)) for part in PARTS)

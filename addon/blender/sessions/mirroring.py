@@ -111,14 +111,14 @@ def _replace(
     count = len(curves.curves)
     stays = np.ones(count, bool)
     stays[replaced] = False
-    gone = _Gone.of(curves, replaced)
+    gone = _RemovedCurves.of(curves, replaced)
     if len(replaced):
         curves.remove_curves(indices=replaced.tolist())
     source = (np.cumsum(stays) - 1)[source]
     offsets = curve_offsets(curves)
     counts = np.diff(offsets)[source]
     curves.add_curves(counts.tolist())
-    old = np.repeat(offsets[:-1][source], counts) + _inside(counts)
+    old = np.repeat(offsets[:-1][source], counts) + _point_numbers(counts)
     new = offsets[-1] + np.arange(len(old))
     new_curves = stays.sum() + np.arange(len(source))
     for attribute in curves.attributes.values():
@@ -138,29 +138,29 @@ def _replace(
         uv[new_curves] = made.strands.root_uv
         set_attribute(curves, "surface_uv_coordinate", "CURVE", uv)
     put_points(curves, points)
-    _name_again(curves, source, new_curves, gone)
+    _assign_ids(curves, source, new_curves, gone)
 
 
-def _inside(counts: Ints) -> Ints:
+def _point_numbers(counts: Ints) -> Ints:
     """The number of each point within its curve."""
     return number_in_piece(counts)
 
 
 @dataclass(frozen=True)
-class _Gone:
+class _RemovedCurves:
     """Curves that mirrored ones replace. id: (n,), root: (n, 3) object space [m]."""
 
     id: Ints
     root: Floats
 
     @classmethod
-    def of(cls, curves: bpy.types.Curves, replaced: Ints) -> _Gone:
+    def of(cls, curves: bpy.types.Curves, replaced: Ints) -> _RemovedCurves:
         ids = read_attribute(curves, STRAND_ID, "CURVE")
         ids = np.zeros(len(curves.curves), np.int32) if ids is None else ids
         return cls(ids[replaced], curve_points(curves)[curve_offsets(curves)[replaced]])
 
 
-def _name_again(curves: bpy.types.Curves, source: Ints, new: Ints, gone: _Gone) -> None:
+def _assign_ids(curves: bpy.types.Curves, source: Ints, new: Ints, gone: _RemovedCurves) -> None:
     """Give mirrored curves new IDs, and mirrored guides as their closest guides; references to a
     guide that is gone are replaced by the mirrored guide whose root is nearest to its root."""
     ids = read_attribute(curves, STRAND_ID, "CURVE")
@@ -179,13 +179,13 @@ def _name_again(curves: bpy.types.Curves, source: Ints, new: Ints, gone: _Gone) 
     for name in CLOSEST_GUIDES:
         closest = read_attribute(curves, name, "CURVE")
         if closest is not None:
-            closest[there] = _renamed(closest[there], gone.id[is_gone], ids[new[instead]])
-            closest[new] = _renamed(closest[new], before, mirrored_ones)
+            closest[there] = _with_replaced_ids(closest[there], gone.id[is_gone], ids[new[instead]])
+            closest[new] = _with_replaced_ids(closest[new], before, mirrored_ones)
             set_attribute(curves, name, "CURVE", closest)
     set_attribute(curves, STRAND_ID, "CURVE", ids)
 
 
-def _renamed(values: Ints, known: Ints, other: Ints) -> Ints:
+def _with_replaced_ids(values: Ints, known: Ints, other: Ints) -> Ints:
     """The values, with each that is in `known` replaced by its counterpart in `other`."""
     if not len(known):
         return values

@@ -21,7 +21,7 @@ from .base_solver import BaseSolver
 class NumpySolver(BaseSolver):
     """Solver on the CPU; the same to the last bit on every machine."""
 
-    form = "numpy"
+    device = "numpy"
 
     def __init__(self, rig: Rig, motion: Motion | None = None) -> None:
         super().__init__(rig, motion)
@@ -38,7 +38,7 @@ class NumpySolver(BaseSolver):
         self._take(known or motion_flow.begin(self._rig, pose))
         self._strands = motion_flow.strands_at_rest(self._rig, pose)
 
-    def meet(
+    def find_clearance(
         self,
         colliders: tuple[PosedCollider, ...],
         settings: DynamicsSettings,
@@ -50,13 +50,13 @@ class NumpySolver(BaseSolver):
 
     def steps(self, frame: FrameInput) -> Steps[None]:
         # so that motion does not depend on which frames are shown
-        led = NOT_LED if self._motion.clearance is None else self.led()
+        led = NOT_LED if self._motion.clearance is None else self.led_out_strands()
         motion = yield from motion_flow.steps(self._rig, self.motion, frame, led)
         self._take(motion)
 
     def take_style(self, rig: Rig) -> None:
         if self._motion.clearance is not None:
-            self.led()  # of the last frame, with its own style
+            self.led_out_strands()  # of the last frame, with its own style
         self._rig, self._motion = rig, motion_flow.with_style(rig, self._motion)
 
     def guides(self) -> Floats:
@@ -65,18 +65,20 @@ class NumpySolver(BaseSolver):
     def strands(self) -> Floats:
         if self._strands is None and self._is_baked:
             shown = self._motion
-            self._strands = motion_flow.strands_at(self._rig, shown.pose, shown.guides, self._led)
+            self._strands = motion_flow.strands_at(
+                self._rig, shown.pose, shown.guides, self._led_out
+            )
         elif self._strands is None:
-            self._strands, self._led = motion_flow.strands_and_led(self._rig, self._motion)
+            self._strands, self._led_out = motion_flow.strands_and_led(self._rig, self._motion)
         return self._strands
 
-    def led(self) -> LedOut:
+    def led_out_strands(self) -> LedOut:
         self.strands()
-        return self._led
+        return self._led_out
 
-    def shown(self, snapshot: Snapshot) -> Snapshot:
+    def with_strands(self, snapshot: Snapshot) -> Snapshot:
         return replace(snapshot, points=self.strands(), device_points=None)
 
     def _take(self, motion: Motion) -> None:
         self._motion, self._is_baked, self._strands = motion, False, None
-        self._led = NOT_LED
+        self._led_out = NOT_LED

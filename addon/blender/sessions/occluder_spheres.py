@@ -17,11 +17,11 @@ from ...strands import Surface
 from ...strands.affine import moved
 
 #: The mesh around a sphere: triangles within this many radii of its middle.
-_AROUND = 2.0
+_SEARCH_RADII = 2.0
 #: A head deforms if a vertex is off by more than this fraction of the smallest sphere's radius.
-_RIGID = 1.0e-3
+_RIGID_TOLERANCE = 1.0e-3
 #: Vertices that a sphere's transform is fitted to; more would not change it.
-_ENOUGH = 300
+_MAX_FITTED_VERTICES = 300
 
 
 class OccluderSpheres:
@@ -43,10 +43,10 @@ class OccluderSpheres:
         if pose.head_positions is None or not len(self._balls):
             return None
         bent = np.abs(moved(self._rest, pose.matrix) - pose.head_positions).max()
-        if bent <= _RIGID * self._balls[:, 3].min():
+        if bent <= _RIGID_TOLERANCE * self._balls[:, 3].min():
             return moved_spheres(self._balls, pose.matrix)
         now = [
-            _carried(ball, self._rest[around], pose.head_positions[around])
+            _moved_sphere(ball, self._rest[around], pose.head_positions[around])
             for ball, around in zip(self._balls, self._around, strict=True)
         ]
         balls = [ball for ball in now if ball is not None and ball[3] > 0.0]
@@ -57,13 +57,13 @@ def _vertices_around(head: Surface, ball: Floats) -> Ints:
     """The vertices of triangles whose box is near the ball; of all triangles, if none is."""
     corners = head.positions[head.triangles] - ball[:3]
     outside = np.maximum(corners.min(axis=1), -corners.max(axis=1)).clip(min=0.0)
-    near = (outside**2).sum(axis=1) <= (_AROUND * ball[3]) ** 2
+    near = (outside**2).sum(axis=1) <= (_SEARCH_RADII * ball[3]) ** 2
     return np.unique(head.triangles[near] if near.any() else head.triangles)
 
 
-def _carried(ball: Floats, rest: Floats, now: Floats) -> Floats | None:
+def _moved_sphere(ball: Floats, rest: Floats, now: Floats) -> Floats | None:
     """The sphere (4,), moved with the vertices around it; None if no similarity fits them."""
-    some = slice(None, None, max(len(rest) // _ENOUGH, 1))
+    some = slice(None, None, max(len(rest) // _MAX_FITTED_VERTICES, 1))
     fit = fit_similarity(rest[some], now[some])
     if fit is None:
         return None

@@ -25,7 +25,7 @@ from ...shading.ambient_settings import AmbientSettings
 from ...strands import StrandSet, Surface
 from ...strands.kept import NOTHING_KEPT, Kept
 from ..colliders.rigs import rig_from
-from ..colliders.ties import Holding
+from ..colliders.ties import TrackedHolders
 from ..properties.groom_settings import GroomSettings
 from ..scene.source import Source
 from .occluder_spheres import OccluderSpheres
@@ -33,12 +33,12 @@ from .occluder_spheres import OccluderSpheres
 type Report = Callable[[str], None]
 
 #: Number of strands of a placeholder.
-_FEW = 32
+_PLACEHOLDER_STRANDS = 32
 #: Roots farther from their surface than this fraction of its diagonal are loose; those of grooms
 #: that fit are within half of it.
-_LOOSE = 0.02
+_LOOSE_ROOT_DISTANCE = 0.02
 #: Heads with more triangles take too long to search for a placeholder.
-_LARGE = 4000
+_MAX_SEARCHED_TRIANGLES = 4000
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,14 +54,14 @@ class BuildRequest:
     source: Source
     settings: GroomSettings
     rig: Rig | None = None
-    holding: Holding = field(default_factory=Holding)
+    holders: TrackedHolders = field(default_factory=TrackedHolders)
     kept: Kept = NOTHING_KEPT
 
-    def gives_rig_of(self, other: BuildRequest) -> bool:
+    def gives_same_rig_as(self, other: BuildRequest) -> bool:
         """Whether both surely give the same rig; does not build it."""
         one, two = self.source, other.source
         return (
-            self.settings.of_rig == other.settings.of_rig
+            self.settings.rig_settings == other.settings.rig_settings
             and one.strands is two.strands
             and one.head is two.head
             and np.array_equal(one.density, two.density)  # type: ignore[arg-type]
@@ -101,7 +101,7 @@ class PreparedGroom:
         if rig.head is None or rig.rest_frames is None:
             return 0
         low, high = rig.head.bounds()
-        reach = _LOOSE * float(np.linalg.norm(high - low))
+        reach = _LOOSE_ROOT_DISTANCE * float(np.linalg.norm(high - low))
         away = np.linalg.norm(rig.strands.roots - rig.rest_frames.origin, axis=1)
         return int((away > reach).sum())
 
@@ -118,7 +118,7 @@ def requested_rig(request: BuildRequest) -> Rig:
     return rig_from(request.source, settings, place=request.name, kept=kept)
 
 
-def build(
+def build_groom(
     request: BuildRequest,
     before: tuple[BuildRequest, PreparedGroom] | None = None,
     *,
@@ -131,23 +131,23 @@ def build(
     Args:
         before: the last groom, and the request that it was made from.
         is_drawn: False leaves out what only drawing needs.
-        is_quick: whether it may have approximate light, until `lit` has found its own.
-        report: see `prepared`.
+        is_quick: whether it may have approximate light, until `with_full_light` has found its own.
+        report: see `prepare_groom`.
 
     Raises:
         HairloomError: as `requested_rig`.
     """
     report("strands")
     known = None if before is None or before[1].is_placeholder else before[1]
-    is_same = before is not None and known is not None and request.gives_rig_of(before[0])
+    is_same = before is not None and known is not None and request.gives_same_rig_as(before[0])
     rig = known.rig if known is not None and is_same else requested_rig(request)
     ambient = request.settings[AmbientSettings]
     if not is_drawn:
         return PreparedGroom(rig, ambient)
-    return prepared(rig, ambient, known, is_quick=is_quick, report=report)
+    return prepare_groom(rig, ambient, known, is_quick=is_quick, report=report)
 
 
-def prepared(
+def prepare_groom(
     rig: Rig,
     ambient: AmbientSettings,
     known: PreparedGroom | None = None,
@@ -161,19 +161,19 @@ def prepared(
     Args:
         known: the groom before; light and occluders are reused if only guides differ.
         with_occluders: False leaves out the spheres, which need a search through the head.
-        is_quick: see `build`.
+        is_quick: see `build_groom`.
         report: called before each stage with its name; may cancel by raising an exception.
     """
     report("ambient occlusion")
     with ThreadPoolExecutor(1) as beside:
         # cached properties that the window's first frame needs; numpy lets both threads run at once
         moving = beside.submit(lambda: (rig.riders, rig.root_holds, rig.strands.uneven_along))
-        groom = _drawn(rig, ambient, known, with_occluders, is_quick, report)
+        groom = _prepare_drawing(rig, ambient, known, with_occluders, is_quick, report)
         moving.result()
     return groom
 
 
-def _drawn(
+def _prepare_drawing(
     rig: Rig,
     ambient: AmbientSettings,
     known: PreparedGroom | None,
@@ -181,7 +181,7 @@ def _drawn(
     is_quick: bool,
     report: Report,
 ) -> PreparedGroom:
-    """As `prepared`, without the cached data for motion."""
+    """As `prepare_groom`, without the cached data for motion."""
     light, relit = None if known is None else known.light, None
     if known is not None and light is not None and known.rig is rig and known.ambient != ambient:
         relit = light_flow.updated_light(rig, light, known.ambient, ambient)
@@ -204,18 +204,18 @@ def _drawn(
     return PreparedGroom(rig, ambient, light, rank, occluders)
 
 
-def lit(groom: PreparedGroom, report: Report = lambda stage: None) -> PreparedGroom:
+def with_full_light(groom: PreparedGroom, report: Report = lambda stage: None) -> PreparedGroom:
     """The groom with its full light instead of quick light.
 
     Args:
-        report: see `prepared`.
+        report: see `prepare_groom`.
     """
     report("light")
     light = rest_light(groom.rig, groom.ambient, lambda: report("light"))
     return replace(groom, light=light)
 
 
-def placeholder(request: BuildRequest) -> PreparedGroom:
+def placeholder_groom(request: BuildRequest) -> PreparedGroom:
     """The groom of a session until the real one is made: a few of its strands.
 
     Raises:
@@ -224,19 +224,19 @@ def placeholder(request: BuildRequest) -> PreparedGroom:
     rig = request.rig
     if rig is None:
         source, count = request.source, request.source.strands.strand_count
-        few = source.strands.take(np.arange(0, count, max(count // _FEW, 1)))
-        rig = _quickly_bound(few, source.head, request)
+        few = source.strands.take(np.arange(0, count, max(count // _PLACEHOLDER_STRANDS, 1)))
+        rig = _placeholder_rig(few, source.head, request)
     ambient = request.settings[AmbientSettings]
     return PreparedGroom(rig, ambient, is_placeholder=True)
 
 
-def _quickly_bound(few: StrandSet, head: Surface | None, request: BuildRequest) -> Rig:
+def _placeholder_rig(few: StrandSet, head: Surface | None, request: BuildRequest) -> Rig:
     """A few strands on a head; a large head is reduced to the triangles near their roots.
 
     Raises:
         HairloomError: as `requested_rig`.
     """
-    if head is not None and len(head.triangles) > _LARGE:
+    if head is not None and len(head.triangles) > _MAX_SEARCHED_TRIANGLES:
         near = _triangles_near(few.roots, head)
         uv = None if head.corner_uv is None else head.corner_uv[near]
         part = replace(head, triangles=head.triangles[near], corner_uv=uv)

@@ -27,7 +27,7 @@ from ...render.snapshot import Snapshot
 from ...rig_flow import MotionStart, Pose, Rig, SimulatedSolids, Solids
 from ...strands import Surface
 from ...strands.arc_length import lengths
-from ..bakes.baked_rig import BakedRig, RestMatrices, frame_arrays, led_in, rig_arrays
+from ..bakes.baked_rig import BakedRig, RestMatrices, frame_arrays, led_out_in, rig_arrays
 from ..bakes.baked_solids import solid_arrays, solid_constants
 from ..bakes.groom_hashes import frame_rate
 from ..bakes.simulation import Arrays
@@ -41,13 +41,19 @@ from ..properties.groom_settings import GroomSettings
 from ..scene.forces import force_fields_of, gravity_of
 from ..scene.source import Source, dynamics_warnings, refuse_own_dynamics
 from .compute_solver import texels_of
-from .first_contacts import FirstContacts, Start
+from .first_contacts import FirstContacts, PlayStart
 from .groom_source import GroomSource
 from .measures import FrameTimes
 from .numpy_solver import NumpySolver
-from .prepared_groom import BuildRequest, PreparedGroom, build, lit, placeholder
+from .prepared_groom import (
+    BuildRequest,
+    PreparedGroom,
+    build_groom,
+    placeholder_groom,
+    with_full_light,
+)
 from .snapshots import GroomPicture
-from .solvers import Solver, computed_on, form_of, solver_of
+from .solvers import Solver, device_name, make_solver, resolved_device
 
 
 class Session:
@@ -103,7 +109,7 @@ class Session:
         self._contacts = FirstContacts()
         self._posed_colliders: tuple[PosedCollider, ...] = ()
         self._field_notes: tuple[str, ...] = ()
-        self._styled: Rig | None = None
+        self._styled_rig: Rig | None = None
         self.known_hair = KnownHair()
         self.is_coupled = False
         self.pending_steps: Steps[None] | None = None
@@ -116,7 +122,7 @@ class Session:
         )
         self.cards = self.picture.cards
         request = self._source.request
-        made = build(request, is_drawn=is_drawn) if blocking else placeholder(request)
+        made = build_groom(request, is_drawn=is_drawn) if blocking else placeholder_groom(request)
         self._take(_Built(request, made), None, depsgraph)
         if not blocking:
             self._begin()
@@ -139,7 +145,7 @@ class Session:
     @property
     def rig(self) -> Rig:
         """The rig in the style of the shown frame."""
-        return self._styled or self.groom.rig
+        return self._styled_rig or self.groom.rig
 
     @property
     def made_rig(self) -> MadeRig | None:
@@ -180,14 +186,14 @@ class Session:
         """Whether finished hair or light can be taken over."""
         return self._job.has_arrived or self._light_job.has_arrived
 
-    def has_another_head(self) -> bool:
+    def has_changed_head(self) -> bool:
         """Whether the artist has set another surface since the session began."""
-        return self._source.has_another_head()
+        return self._source.has_changed_head()
 
     @property
-    def rests(self) -> RestMatrices:
+    def rest_matrices(self) -> RestMatrices:
         """The transforms of hair, head and ties when the hair was made."""
-        return self._source.rests
+        return self._source.rest_matrices
 
     def is_resized(self, depsgraph: bpy.types.Depsgraph) -> bool:
         """Whether hair or head has been scaled or mirrored since the hair was made; motion of the
@@ -203,21 +209,21 @@ class Session:
         """Session numbers of what holds the hair beside its roots."""
         return self._source.holder_uids
 
-    def has_other_holders(self, edited: set[int]) -> bool:
+    def has_changed_holders(self, edited: set[int]) -> bool:
         """Whether ties were added or have changed shape since the hair was read.
 
         Args:
             edited: session numbers of data-blocks whose geometry has changed.
         """
-        return self._source.has_other_holders(edited)
+        return self._source.has_changed_holders(edited)
 
-    def has_other_partings(self) -> bool:
+    def has_changed_partings(self) -> bool:
         """Whether partings have been added, removed, moved or edited."""
-        return self._source.has_other_partings()
+        return self._source.has_changed_partings()
 
     def constants(self) -> Arrays:
         """See `baked_rig.rig_arrays` and `baked_solids.solid_constants`."""
-        arrays = rig_arrays(self.groom.rig, self._source.rests)
+        arrays = rig_arrays(self.groom.rig, self._source.rest_matrices)
         if self._motion_start is None:
             return arrays
         settings = self.settings[DynamicsSettings]
@@ -240,18 +246,18 @@ class Session:
         self._light_job.cancel()
 
         def begin() -> Callable[[ThreadWork[_Built]], _Built]:
-            is_on_gpu = self.solver.form == "compute"
-            return partial(_build_in_thread, request, self._made, self._moment(), is_on_gpu)
+            is_on_gpu = self.solver.device == "compute"
+            return partial(_build_in_thread, request, self._made, self._play_state(), is_on_gpu)
 
         self._job.want(request, begin)
 
-    def _moment(self) -> _Moment | None:
+    def _play_state(self) -> _PlayState | None:
         """The state from which hair that is being made will go on; None: it will start at rest."""
         if not self.is_playing or not self._posed_colliders:
             return None
         standing = tuple(each.at_end() for each in self._posed_colliders)
         settings = self.settings[DynamicsSettings]
-        return _Moment(self.solver.pose, standing, settings, self.solver.size)
+        return _PlayState(self.solver.pose, standing, settings, self.solver.size)
 
     @property
     def bodies(self) -> tuple[Body, ...]:
@@ -280,9 +286,9 @@ class Session:
         return (*self._source.warnings, *notes, *cards, *doubled, *found, *self.picture.warnings)
 
     @property
-    def computed_on(self) -> str:
+    def device_name(self) -> str:
         """The device that simulates it, such as "GPU (OpenGL, llvmpipe)"."""
-        return computed_on(self.solver.form)
+        return device_name(self.solver.device)
 
     @property
     def strands(self) -> Floats:
@@ -305,15 +311,15 @@ class Session:
         if not is_same:
             # the strands are new, but the guides go on
             motion = replace(self.solver.motion, clearance=made.clearance) if goes_on else None
-            form = self.settings[DynamicsSettings].device
-            self.solver = solver_of(groom.rig, form, motion, made.texels)
+            device = self.settings[DynamicsSettings].device
+            self.solver = make_solver(groom.rig, device, motion, made.texels)
             self._contacts = FirstContacts()
             if made.start is not None:
-                self._contacts.keep(*made.start)
-            self._styled = None
+                self._contacts.store(*made.start)
+            self._styled_rig = None
             self._take_style(depsgraph)
         self.picture.take_groom(groom, self.settings, self.source.colors)
-        self.light(depsgraph)
+        self.take_lights(depsgraph)
         if is_same or goes_on:
             self._show()
         else:
@@ -333,9 +339,9 @@ class Session:
         made = self._job.take()
         if made is not None:
             self._take(made, self.groom, depsgraph)
-            self.comb(depsgraph)  # brushes may have gone on meanwhile
-            self.color(depsgraph)
-            self.paint(depsgraph)
+            self.follow_combing(depsgraph)  # brushes may have gone on meanwhile
+            self.follow_painted_colors(depsgraph)
+            self.follow_painted_masks(depsgraph)
 
     def _take_light(self) -> None:
         """Show the last hair, which may have been combed or painted since, in its full light."""
@@ -344,7 +350,7 @@ class Session:
         request, made = self._made
         shown = found if self.groom is made else replace(self.groom, light=found.light)
         self._made, self.groom = (request, found), shown
-        self.picture.take_light(shown)
+        self.picture.take_hair_light(shown)
         self._show()
 
     def finish(self, depsgraph: bpy.types.Depsgraph) -> None:
@@ -371,10 +377,10 @@ class Session:
         request = self._source.read_again(depsgraph)
         self.is_stale = False
         if request is not None and blocking and not self.is_pending:
-            groom = build(request, self._made, is_drawn=self._is_drawn)
+            groom = build_groom(request, self._made, is_drawn=self._is_drawn)
             self._take(_Built(request, groom), self.groom, depsgraph)
             return
-        self._color()
+        self._draw_painted_colors()
         self.take_settings()
         if request is not None:
             self._begin()
@@ -384,7 +390,7 @@ class Session:
         if blocking:
             self.finish(depsgraph)
 
-    def comb(self, depsgraph: bpy.types.Depsgraph) -> None:
+    def follow_combing(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Let hair at rest follow curves that a brush has moved, as far as can be done at once;
         `read_again` does the rest later.
 
@@ -403,21 +409,21 @@ class Session:
         self.solver = NumpySolver.at_rest(self.rig, self._pose(depsgraph))
         self._show()
 
-    def color(self, depsgraph: bpy.types.Depsgraph) -> None:
+    def follow_painted_colors(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Let hair follow colours that a brush has painted; its cards wait for `read_again`.
 
         Raises:
             HairloomError: the hair is gone.
         """
         if self.is_made and self._source.read_colors(depsgraph):
-            self._color()
+            self._draw_painted_colors()
             self._show()
 
-    def _color(self) -> None:
+    def _draw_painted_colors(self) -> None:
         """Draw strands in the painted colours that were read last."""
         self.picture.take_colors(self.rig, self.source.colors, self.settings)
 
-    def paint(self, depsgraph: bpy.types.Depsgraph) -> None:
+    def follow_painted_masks(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Let children at rest follow masks that a brush has painted, as far as can be done at
         once; `read_again` does the rest later. Held hair and hair of bakes wait for that.
 
@@ -428,11 +434,11 @@ class Session:
             return
         if self.settings[DynamicsSettings].animated_style:
             return
-        if not self._source.has_other_paint(depsgraph):
+        if not self._source.has_changed_paint(depsgraph):
             return
         self.groom = replace(self.groom, rig=painted_rig(self.rig, *self._source.painted))
         self.solver = NumpySolver.at_rest(self.rig, self._pose(depsgraph))
-        self._color()  # children stand elsewhere
+        self._draw_painted_colors()  # children stand elsewhere
         self._show()
 
     def shown_map(self, depsgraph: bpy.types.Depsgraph) -> Floats | None:
@@ -455,14 +461,14 @@ class Session:
         if self.picture.take_settings(self.rig, before, self.settings):
             self._show()
         if self.settings[DynamicsSettings].device != before[DynamicsSettings].device:
-            self._change_form(self.settings[DynamicsSettings].device)
+            self._change_device(self.settings[DynamicsSettings].device)
 
     def take_cards(self) -> None:
         """Show the cards that were built in a thread."""
         self.cards.collect()
         self._show()
 
-    def look_at_cards_again(self) -> None:
+    def refresh_cards(self) -> None:
         """Update its cards after other hair that shades them may have changed, or the artist may
         have edited them in the scene."""
         self.cards.look_again()
@@ -477,15 +483,15 @@ class Session:
         """Shade with tables of full size again."""
         self.picture.refine()
 
-    def _change_form(self, form: str) -> None:
+    def _change_device(self, device: str) -> None:
         """Go on from the present motion with another solver."""
-        if form_of(form) != self.solver.form:
-            self.solver = solver_of(self.rig, form, self.solver.motion)
+        if resolved_device(device) != self.solver.device:
+            self.solver = make_solver(self.rig, device, self.solver.motion)
             self._show()
 
-    def light(self, depsgraph: bpy.types.Depsgraph) -> None:
+    def take_lights(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Take over the scene's lights and world."""
-        self.picture.light(depsgraph)
+        self.picture.take_lights(depsgraph)
 
     def rest(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Put hair into its style, carried by the head in its present pose.
@@ -501,13 +507,13 @@ class Session:
             self.solver.rest(pose)
         else:
             self._posed_colliders = self.obstacles.rest(depsgraph)
-            start = self._start(pose, self._posed_colliders)
-            self.solver.rest(pose, self._contacts.known(start))
+            start = self._play_start(pose, self._posed_colliders)
+            self.solver.rest(pose, self._contacts.known_motion(start))
             kept = start.settings.radius_root * self.solver.size
             self._motion_start = MotionStart(pose, self._posed_colliders, kept)
             painted = self._source.painted_guides(self.rig)
-            self.solver.meet(self._posed_colliders, start.settings, painted)
-            self._contacts.keep(start, self.solver.motion)
+            self.solver.find_clearance(self._posed_colliders, start.settings, painted)
+            self._contacts.store(start, self.solver.motion)
             rate = frame_rate(depsgraph.scene)
             for _ in range(self.settings[DynamicsSettings].pre_roll):
                 alone(self._simulate(depsgraph, 1.0 / rate))
@@ -517,14 +523,14 @@ class Session:
         """If the style is animated, use the curves of this frame as the style."""
         rig = self.groom.rig
         if self.settings[DynamicsSettings].animated_style and self.is_made:
-            rig = self._source.styled(rig, depsgraph)
-        self._go_by(rig)
+            rig = self._source.styled_rig(rig, depsgraph)
+        self._use_rig(rig)
 
-    def _go_by(self, rig: Rig) -> None:
+    def _use_rig(self, rig: Rig) -> None:
         """Use this rig, the groom in another style, in the solver."""
         if rig is not self.rig:
             self.solver.take_style(rig)
-        self._styled = None if rig is self.groom.rig else rig
+        self._styled_rig = None if rig is self.groom.rig else rig
 
     def has_moved(self, depsgraph: bpy.types.Depsgraph) -> bool:
         """Whether the body's pose differs from the shown one.
@@ -556,13 +562,13 @@ class Session:
         if not self.is_made:
             raise NotMadeYetError
         if not blocking and not is_frame:
-            start = self._start(self._pose(depsgraph), self.solids(depsgraph))
+            start = self._play_start(self._pose(depsgraph), self.solids(depsgraph))
             self._contacts.find(start)
         self.is_playing = True
         self.rest(depsgraph)
 
-    def _start(self, pose: Pose, standing: tuple[PosedCollider, ...]) -> Start:
-        return Start(self.rig, pose, standing, self.settings[DynamicsSettings])
+    def _play_start(self, pose: Pose, standing: tuple[PosedCollider, ...]) -> PlayStart:
+        return PlayStart(self.rig, pose, standing, self.settings[DynamicsSettings])
 
     def make_fields(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Have the distance fields of its colliders made in the background, before Play.
@@ -640,7 +646,7 @@ class Session:
         """The shown guides, (guide_count, cv_count, 3) [m, world]; reads back from a GPU."""
         return self.solver.guides()
 
-    def style_seen(self) -> Style:
+    def neighbour_style(self) -> Style:
         """See `motion_flow.neighbour_style`."""
         return motion_flow.neighbour_style(self.rig, self.solver.pose, self.groom.rig)
 
@@ -662,7 +668,7 @@ class Session:
             pose, self._posed_colliders, settings, gravity, duration, fields, painted, time_scale
         )
         if goes_along:
-            self.solver.go_along(frame)
+            self.solver.advance_rigidly(frame)
         else:
             yield from self.solver.steps(frame)
 
@@ -683,7 +689,7 @@ class Session:
     def measure_into(self, measure: Measure) -> None:
         """Add the present frame to a measure; reads strands back from a GPU."""
         guides, rig = self.solver.guides(), self.rig
-        if self._styled is not None:
+        if self._styled_rig is not None:
             style = motion_flow.carried_guides(rig, self.solver.pose)
             measure.take_style(start(style, rig.curl_room))
         measure.add(self.solver.strands(), self._rest_lengths(), guides, self._posed_colliders)
@@ -709,9 +715,9 @@ class Session:
             self.make_fields(depsgraph)
         return () if self.obstacles is None else self.obstacles.standing(depsgraph)
 
-    def recorded(self) -> Arrays:
+    def bake_arrays(self) -> Arrays:
         """See `baked_rig.frame_arrays` and `baked_solids.solid_arrays`."""
-        guides, led = self.solver.guides(), self.solver.led()
+        guides, led = self.solver.guides(), self.solver.led_out_strands()
         styled = self.rig if self.settings[DynamicsSettings].animated_style else None
         arrays = frame_arrays(self.solver.pose, guides, led, styled)
         return arrays | solid_arrays(self._posed_colliders, self._collider_meshes)
@@ -726,16 +732,16 @@ class Session:
         Raises:
             HairloomError: the frame is of another groom.
         """
-        baked = BakedRig(self.groom.rig, self._source.rests)
+        baked = BakedRig(self.groom.rig, self._source.rest_matrices)
         if not baked.fits(frame):
             raise HairloomError(
                 "its bake belongs to another groom, or to other guides",
                 place=self.name,
                 remedy="Bake again, or delete the bake",
             )
-        self._go_by(baked.styled(frame))
+        self._use_rig(baked.styled_rig(frame))
         pose = replace(baked.pose(frame), solids=solids)
-        self.solver.carry(pose, frame["guides"], led_in(frame))
+        self.solver.show_baked(pose, frame["guides"], led_out_in(frame))
         self._is_recorded, self.known_hair = True, KnownHair()
         self._show()
 
@@ -756,7 +762,7 @@ class Session:
 
 
 @dataclass(frozen=True, eq=False)
-class _Moment:
+class _PlayState:
     """The state of playing hair at one moment.
 
     colliders: at their places at that moment. size: see `Solver.size`.
@@ -781,24 +787,24 @@ class _Built:
     groom: PreparedGroom
     texels: RideTexels | None = None
     clearance: Clearance | None = None
-    start: tuple[Start, Motion] | None = None
+    start: tuple[PlayStart, Motion] | None = None
 
 
 def _build_in_thread(
     request: BuildRequest,
     before: tuple[BuildRequest, PreparedGroom],
-    moment: _Moment | None,
+    moment: _PlayState | None,
     is_on_gpu: bool,
     work: ThreadWork[_Built],
 ) -> _Built:
-    groom = build(request, before, is_drawn=True, is_quick=True, report=work.report)
+    groom = build_groom(request, before, is_drawn=True, is_quick=True, report=work.report)
     if groom.rig is before[1].rig:
         return _Built(request, groom)
     made = _Built(request, groom, texels_of(groom.rig) if is_on_gpu else None)
     if moment is None:
         return made
     if not _same_guides(groom.rig, before[1].rig):
-        start = Start(groom.rig, moment.pose, moment.colliders, moment.settings)
+        start = PlayStart(groom.rig, moment.pose, moment.colliders, moment.settings)
         return replace(made, start=(start, start.motion()))
     kept = moment.settings.radius_root * moment.size
     clearance = motion_flow.strand_clearance(groom.rig, moment.pose, moment.colliders, kept)
@@ -806,7 +812,7 @@ def _build_in_thread(
 
 
 def _light_in_thread(work: ThreadWork[PreparedGroom], groom: PreparedGroom) -> PreparedGroom:
-    return lit(groom, work.report)
+    return with_full_light(groom, work.report)
 
 
 def _same_guides(one: Rig, other: Rig) -> bool:

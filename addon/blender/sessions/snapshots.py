@@ -77,7 +77,7 @@ def with_tables(snapshot: Snapshot, size: int) -> Snapshot:
     return snapshot if snapshot.table_size == size else replace(snapshot, table_size=size)
 
 
-def shapes_alike(one: ShadingSettings, other: ShadingSettings) -> bool:
+def uses_same_tables(one: ShadingSettings, other: ShadingSettings) -> bool:
     """Whether `other` needs no new look-up tables; a change of colour never does."""
     if other.model != "marschner":
         return True
@@ -113,7 +113,7 @@ class GroomPicture:
         self._ball = HairBall()
         self._groom: PreparedGroom | None = None
         self._colors: PaintedColor | None = None
-        self._of_cards: tuple[Rig, Rig] | None = None
+        self._card_rigs: tuple[Rig, Rig] | None = None
         self._light_warnings: tuple[str, ...] = ()
         self.cards = ShownCards(hair, arrived)
 
@@ -143,7 +143,7 @@ class GroomPicture:
         self.take_colors(groom.rig, colors, settings)
         self._want_cards(groom.rig, settings)
 
-    def take_light(self, groom: PreparedGroom) -> None:
+    def take_hair_light(self, groom: PreparedGroom) -> None:
         """Use the light of this groom, which has as many strands and points as the one before."""
         assert groom.light is not None
         self._groom = groom
@@ -163,7 +163,10 @@ class GroomPicture:
         if looks[0] != looks[1] and any(look.color_map or is_wet_or_dusty(look) for look in looks):
             self.take_colors(rig, self._colors, now)
         self.snapshot = with_settings(self.snapshot, now)
-        if not shapes_alike(was[ShadingSettings], now[ShadingSettings]) and not bpy.app.background:
+        if (
+            not uses_same_tables(was[ShadingSettings], now[ShadingSettings])
+            and not bpy.app.background
+        ):
             self.snapshot = with_tables(self.snapshot, PREVIEW_SIZE)
         is_other = (
             was[DetailSettings].culling != now[DetailSettings].culling
@@ -177,8 +180,8 @@ class GroomPicture:
         if not (self._is_drawn and is_whole and settings.shows_cards):
             self.cards.forget()
             return self.snapshot.cards is not None
-        self._of_cards = rig, _with_color(rig, self.snapshot.color)
-        self.cards.want(self._of_cards[1], settings)
+        self._card_rigs = rig, _with_color(rig, self.snapshot.color)
+        self.cards.want(self._card_rigs[1], settings)
         return True
 
     @property
@@ -192,10 +195,10 @@ class GroomPicture:
 
     def _painted(self, rig: Rig) -> Rig:
         """The rig in the colours with which its cards were requested."""
-        known = self._of_cards
+        known = self._card_rigs
         return known[1] if known is not None and known[0] is rig else rig
 
-    def light(self, depsgraph: bpy.types.Depsgraph) -> None:
+    def take_lights(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Take over the scene's lights and world."""
         environment = read_environment(depsgraph.scene, blocking=bpy.app.background)
         self.snapshot = replace(
@@ -220,7 +223,7 @@ class GroomPicture:
         self.head = _head(rig, pose, self.head)
         is_shadowed = settings[VolumeSettings].shadows != "none"
         self.snapshot = replace(
-            solver.shown(self.snapshot),
+            solver.with_strands(self.snapshot),
             occluder_spheres=spheres,
             casters=() if self.head is None or not is_shadowed else (self.head,),
             cards=self.cards.now(self._painted(rig), pose, solver.guides, settings.sections),

@@ -31,7 +31,7 @@ from .compute_solver import ComputeSolver
 from .numpy_solver import NumpySolver
 
 #: Greatest distance [m] between the results of both solvers after the test frame.
-_AGREEMENT = 1.0e-4
+_MAX_DIFFERENCE = 1.0e-4
 #: Blender's identifiers of GPU backends -> their usual names
 _BACKENDS = {"OPENGL": "OpenGL", "VULKAN": "Vulkan", "METAL": "Metal"}
 
@@ -39,10 +39,10 @@ _BACKENDS = {"OPENGL": "OpenGL", "VULKAN": "Vulkan", "METAL": "Metal"}
 class Solver(Protocol):
     """Moves one groom. A new solver has its hair at rest, in the pose of the rig.
 
-    form: "numpy" or "compute".
+    device: "numpy" or "compute".
     """
 
-    form: str
+    device: str
 
     @property
     def pose(self) -> Pose:
@@ -63,7 +63,7 @@ class Solver(Protocol):
             known: the motion at rest in this pose, if it has been found already.
         """
 
-    def meet(
+    def find_clearance(
         self,
         colliders: tuple[PosedCollider, ...],
         settings: DynamicsSettings,
@@ -82,10 +82,10 @@ class Solver(Protocol):
     def has_jumped(self, pose: Pose, settings: DynamicsSettings, duration: float) -> bool:
         """Whether the head has moved suddenly, as at a cut, see `motion_flow.has_jumped`."""
 
-    def go_along(self, frame: FrameInput) -> None:
+    def advance_rigidly(self, frame: FrameInput) -> None:
         """A frame in which hair moves rigidly with its roots, see `motion_flow.advance_rigidly`."""
 
-    def carry(self, pose: Pose, guides: Floats, led: LedOut = NOT_LED) -> None:
+    def show_baked(self, pose: Pose, guides: Floats, led: LedOut = NOT_LED) -> None:
         """Show guides of a bake, (guide_count, cv_count, 3) [m, world], and its strands that were
         led out of colliders.
 
@@ -101,29 +101,29 @@ class Solver(Protocol):
     def strands(self) -> Floats:
         """Strands at frame's end, (point_count, 3) [m, world]; read back if need be."""
 
-    def led(self) -> LedOut:
+    def led_out_strands(self) -> LedOut:
         """The strands that were led out of colliders; read back if need be."""
 
-    def shown(self, snapshot: Snapshot) -> Snapshot:
+    def with_strands(self, snapshot: Snapshot) -> Snapshot:
         """The snapshot with the present strands, as an array or as a texture on the GPU."""
 
 
-def solver_of(
-    rig: Rig, form: str, motion: Motion | None = None, texels: RideTexels | None = None
+def make_solver(
+    rig: Rig, device: str, motion: Motion | None = None, texels: RideTexels | None = None
 ) -> Solver:
     """A solver for this groom.
 
     Args:
-        form: "numpy", "compute", or "automatic": compute if it works, else numpy.
+        device: "numpy", "compute", or "automatic": compute if it works, else numpy.
         motion: motion to go on from, of a solver for the same rig; None: start at rest.
         texels: see `texels_of`, if they are made already.
 
     Raises:
-        HairloomError: the form is "compute", and that does not work.
+        HairloomError: the device is "compute", and that does not work.
     """
-    if form == "numpy" or (form == "automatic" and not compute_available()):
+    if device == "numpy" or (device == "automatic" and not can_compute()):
         return NumpySolver(rig, motion)
-    if not compute_available():
+    if not can_compute():
         raise HairloomError(
             f"the GPU cannot compute here ({compute_problem()})",
             place="dynamics",
@@ -132,23 +132,23 @@ def solver_of(
     return ComputeSolver(rig, motion, texels)
 
 
-def form_of(form: str) -> str:
-    """The form that `solver_of` chooses: "numpy" or "compute"."""
-    if form == "automatic":
-        return "compute" if compute_available() else "numpy"
-    return form
+def resolved_device(device: str) -> str:
+    """The device that `make_solver` chooses: "numpy" or "compute"."""
+    if device == "automatic":
+        return "compute" if can_compute() else "numpy"
+    return device
 
 
-def computed_on(form: str) -> str:
-    """The device of a form: "CPU (numpy)", or such as "GPU (OpenGL, llvmpipe)"."""
-    if form == "numpy":
+def device_name(device: str) -> str:
+    """The name of a device: "CPU (numpy)", or such as "GPU (OpenGL, llvmpipe)"."""
+    if device == "numpy":
         return "CPU (numpy)"
     used = gpu_in_use()
     backend = _BACKENDS.get(used["backend"], used["backend"])
     return f"GPU ({backend}, {used['renderer'].partition(' (')[0]})"
 
 
-def compute_available() -> bool:
+def can_compute() -> bool:
     """Whether the GPU can simulate at the moment; the first call with a GPU runs a test."""
     return not compute_problem()
 
@@ -163,11 +163,11 @@ def compute_problem() -> str:
         gpu.platform.backend_type_get()
     except SystemError:
         return "Blender runs without a GPU"
-    return _tried_out()
+    return _test_frame_error()
 
 
 @cache
-def _tried_out() -> str:
+def _test_frame_error() -> str:
     """The error of a test frame on the GPU, compared with numpy; empty if they agree."""
     along = np.linspace(0.0, 0.2, 6)
     points = np.zeros((3, len(along), 3))
@@ -191,4 +191,4 @@ def _tried_out() -> str:
     except Exception as error:  # a driver may fail at any point, each with an error of its own
         return f"{type(error).__name__}: {error}"
     apart = float(np.abs(ends[1] - ends[0]).max())
-    return "" if apart <= _AGREEMENT else f"it is {apart:.2g} m off after one frame"
+    return "" if apart <= _MAX_DIFFERENCE else f"it is {apart:.2g} m off after one frame"

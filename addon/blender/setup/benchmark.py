@@ -36,9 +36,9 @@ from ...strands import StrandSet
 from ...strands.vectors import even_directions
 from ..base.gpu_context import ensure_gpu
 from ..base.report import environment
-from ..sessions.prepared_groom import prepared
+from ..sessions.prepared_groom import prepare_groom
 from ..sessions.snapshots import snapshot_of
-from ..sessions.solvers import Solver, computed_on, form_of, solver_of
+from ..sessions.solvers import Solver, device_name, make_solver, resolved_device
 
 #: version of the JSON; raise it when the meaning of a figure changes
 VERSION = 2
@@ -66,9 +66,9 @@ def measured(
     """
     ensure_gpu()
     rig = hair_ball(strand_count)
-    form = form_of("automatic")
-    plain = snapshot_of(prepared(rig, AmbientSettings(), with_occluders=False))
-    bench = _Bench(rig, solver_of(rig, form), StrandPass(), Target(), plain)
+    form = resolved_device("automatic")
+    plain = snapshot_of(prepare_groom(rig, AmbientSettings(), with_occluders=False))
+    bench = _Bench(rig, make_solver(rig, form), StrandPass(), Target(), plain)
     return {
         "benchmark": VERSION,
         "device": gpu.platform.renderer_get(),
@@ -76,7 +76,7 @@ def measured(
         **environment(),
         "system": platform.platform(),
         "is_software": is_software(),
-        "simulated_on": computed_on(form),
+        "simulated_on": device_name(form),
         "transparency": drawn_transparency(plain.strand_settings),
         "strands": strand_count,
         "points": POINTS,
@@ -113,7 +113,7 @@ class _Bench:
         self.shown()
 
     def shown(self) -> Snapshot:
-        return replace(self.solver.shown(self.plain), lights=self._lights)
+        return replace(self.solver.with_strands(self.plain), lights=self._lights)
 
     def camera(self, aspect: float) -> Camera:
         return frame_camera(self._box, _DIRECTION, _FIELD_OF_VIEW, aspect)

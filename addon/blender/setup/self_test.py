@@ -29,7 +29,7 @@ from ...strands import StrandSet
 from ..base.gpu_context import ensure_gpu
 from ..base.images import write_png
 from ..base.report import environment
-from ..sessions.prepared_groom import prepared
+from ..sessions.prepared_groom import prepare_groom
 from ..sessions.snapshots import snapshot_of
 from ..sessions.solvers import compute_problem
 
@@ -147,7 +147,7 @@ def _drawn(shading: ShadingSettings, volume: VolumeSettings) -> str:
     """Draw a brush of hair: it must be visible and finite, and leave the corners clear."""
     rig = _brush()
     snapshot = replace(
-        snapshot_of(prepared(rig, AmbientSettings(), with_occluders=False)),
+        snapshot_of(prepare_groom(rig, AmbientSettings(), with_occluders=False)),
         shading=shading,
         volume=volume,
         detail=DetailSettings(lod_size=0.0),

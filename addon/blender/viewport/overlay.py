@@ -487,7 +487,7 @@ def _draw_counts(context: Any) -> None:
         write_lines(context, notes)
         return
     lines = [
-        "   ".join(filter(None, (_counts_of(_overlay.drawn[uid]), drawing.times.line)))
+        "   ".join(filter(None, (_counts_of(_overlay.drawn[uid]), drawing.times.text)))
         for uid, drawing in shown_in(context)
         if drawing.counts_of
     ]
