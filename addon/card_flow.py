@@ -108,7 +108,7 @@ def bound_cards(rig: Rig, mesh: CardMesh) -> CardBinding:
     weights = guide_weights(
         lines[:, 0], group, guides[:, 0], guide_group, strand_grid=lines, guide_grid=guides
     )
-    return bind_cards(mesh, guides, weights.guide, weights.weight, rig.curl_room)
+    return bind_cards(mesh, guides, weights.guide, weights.weight, rig.curl_slack)
 
 
 def cards_at(rig: Rig, cards: CardBinding, pose: Pose, guides_now: Floats) -> CardMesh:

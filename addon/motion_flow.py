@@ -9,20 +9,20 @@ from functools import partial
 import numpy as np
 
 from .arrays import Floats, Ints
-from .dynamics.blend import seen
-from .dynamics.clearance import GuideClearance, farthest_kept, guide_clearance
+from .dynamics.blend import visible_guides
+from .dynamics.clearance import GuideClearance, guide_clearance, max_clearance
 from .dynamics.colliders import PosedCollider
 from .dynamics.constraints import PINNED
 from .dynamics.force_fields import NO_FIELDS, ForceFields
-from .dynamics.held import Held
-from .dynamics.neighbours import Steps, Style, alone
-from .dynamics.painted import PaintedGuides, simulated_of
-from .dynamics.rigid_path import NOT_MOVED, Carrier, KnownStep
+from .dynamics.groom_rotation import fit_rotation, sample_roots
+from .dynamics.held import HeldCvs
+from .dynamics.neighbours import FrameSteps, NeighbourStyle, run_alone
+from .dynamics.painted import PaintedGuides, simulated_fraction
+from .dynamics.rigid_path import AT_REST, Carrier, KnownSubstep
 from .dynamics.settings import DynamicsSettings
 from .dynamics.state import DynamicsState, rows_of, start
 from .dynamics.step import Drive, grid_at_frame_end
-from .dynamics.step import steps as dynamics_steps
-from .dynamics.turn import root_sample, rotation_from
+from .dynamics.step import advance_in_steps as dynamics_steps
 from .groom.holds import Holds
 from .groom.roots import RootFrames, follow, root_frames, root_motions
 from .refine.hold import hold
@@ -99,7 +99,7 @@ class Motion:
     leans: Leans = NO_LEANS
     start_pose: Pose | None = None
 
-    def drive(self, frame: FrameInput, target: Floats, held: Held | None) -> Drive:
+    def drive(self, frame: FrameInput, target: Floats, held: HeldCvs | None) -> Drive:
         """What acts in a frame that carries the guides to `target`."""
         return Drive(
             self.carried_guides,
@@ -111,7 +111,7 @@ class Motion:
             self.duration / frame.duration if frame.duration else 1.0,
             held,
             self.guide_clearance,
-            simulated_of(frame.painted, frame.settings, len(target)),
+            simulated_fraction(frame.painted, frame.settings, len(target)),
             frame.painted,
         )
 
@@ -162,19 +162,19 @@ def held_guides(rig: Rig, pose: Pose) -> Holds | None:
     return None if holds is None or not len(holds.strand) else holds
 
 
-def held_cvs(rig: Rig, pose: Pose) -> Held | None:
+def held_cvs(rig: Rig, pose: Pose) -> HeldCvs | None:
     """The held CVs, for the dynamics, with all CVs of brows and lashes, which follow the face."""
     holds = held_guides(rig, pose)
     if holds is None:
         return rig.held_face
     is_held = holds.held_cvs(*rig.guide_grid.shape[:2])
-    return Held(is_held if rig.held_face is None else is_held | rig.held_face.is_held)
+    return HeldCvs(is_held if rig.held_face is None else is_held | rig.held_face.is_held)
 
 
 def begin(rig: Rig, pose: Pose) -> Motion:
     """Hair at rest in this pose."""
     guides = style_of_guides(rig, pose)
-    state = start(guides, rig.curl_room, rig.strands_per_guide)
+    state = start(guides, rig.curl_slack, rig.strands_per_guide)
     return Motion(state, guides, guides, pose, start_pose=pose)
 
 
@@ -185,7 +185,7 @@ def with_style(rig: Rig, motion: Motion) -> Motion:
         rig: of the same groom with its curves in other shapes, see `style_flow`.
     """
     state, start_pose = motion.dynamics, motion.start_pose or motion.pose
-    style = start(style_of_guides(rig, start_pose), rig.curl_room, rig.strands_per_guide)
+    style = start(style_of_guides(rig, start_pose), rig.curl_slack, rig.strands_per_guide)
     # so that distances, which settings give in fractions of it, stay as they are
     rest = replace(style.rest, size=state.rest.size)
     return replace(motion, dynamics=replace(state, rest=rest))
@@ -197,10 +197,10 @@ def advance(rig: Rig, motion: Motion, frame: FrameInput, led: LedOut = NOT_LED) 
     Args:
         led: see `steps`.
     """
-    return alone(steps(rig, motion, frame, led))
+    return run_alone(steps(rig, motion, frame, led))
 
 
-def steps(rig: Rig, motion: Motion, frame: FrameInput, led: LedOut = NOT_LED) -> Steps[Motion]:
+def steps(rig: Rig, motion: Motion, frame: FrameInput, led: LedOut = NOT_LED) -> FrameSteps[Motion]:
     """`advance` with other grooms, see `dynamics.neighbours`.
 
     Args:
@@ -254,7 +254,7 @@ def has_jumped(
     extent = float(np.linalg.norm(np.ptp(rig.guide_grid.reshape(-1, 3), axis=0)))
     if 0.0 < settings.jump_distance * extent < float(np.linalg.norm(displacement)):
         return True
-    turn = rotation_from((before - here).T, np.ascontiguousarray(now.T))
+    turn = fit_rotation((before - here).T, np.ascontiguousarray(now.T))
     angle = math.acos(min(max((float(np.trace(turn)) - 1.0) / 2.0, -1.0), 1.0))
     return 0.0 < settings.jump_turn < angle
 
@@ -277,20 +277,20 @@ def advance_rigidly(rig: Rig, motion: Motion, frame: FrameInput) -> Motion:
 
     position = moved_rigidly(state.position)
     previous = moved_rigidly(state.previous) if is_frozen else position
-    carried = NOT_MOVED
+    carried = AT_REST
     if is_frozen:
-        roots = Carrier.through(root_sample(motion.carried_guides), root_sample(target))
-        before, now = (place.turned(roots.path.now.rotation) for place in state.carried.places)
+        roots = Carrier.through(sample_roots(motion.carried_guides), sample_roots(target))
+        before, now = (place.rotated(roots.path.now.rotation) for place in state.root_places.places)
         # hair goes to where its roots are at the frame's end
         begun = replace(before, shift=before.shift - now.shift)
-        carried = KnownStep((begun, replace(now, shift=np.zeros(3))))
+        carried = KnownSubstep((begun, replace(now, shift=np.zeros(3))))
     state = replace(
-        state, position=position, previous=previous, styles=(), push=None, carried=carried
+        state, position=position, previous=previous, styles=(), push=None, root_places=carried
     )
-    simulated = simulated_of(frame.painted, frame.settings, len(target))
+    simulated = simulated_fraction(frame.painted, frame.settings, len(target))
     return Motion(
         state,
-        seen(state.grid, target, simulated),
+        visible_guides(state.grid, target, simulated),
         target,
         pose,
         None,
@@ -303,13 +303,13 @@ def advance_rigidly(rig: Rig, motion: Motion, frame: FrameInput) -> Motion:
     )
 
 
-def neighbour_style(rig: Rig, pose: Pose, source: Rig) -> Style:
+def neighbour_style(rig: Rig, pose: Pose, source: Rig) -> NeighbourStyle:
     """The groom's style in this pose, as other grooms see it.
 
     Args:
         source: the same groom as it was read, where its style is animated.
     """
-    return Style(partial(style_of_guides, rig, pose), source.hair_of_guides, source)
+    return NeighbourStyle(partial(style_of_guides, rig, pose), source.hair_of_guides, source)
 
 
 def bounding_sphere(rig: Rig, pose: Pose) -> tuple[Floats, float]:
@@ -341,15 +341,18 @@ def with_clearance(
     where their roots carried them. Where nothing is simulated, strands get no clearance and follow
     their style.
     """
-    simulated, size = simulated_of(painted, settings, len(rig.guides)), motion.dynamics.rest.size
-    max_distance, reach = settings.radius_root * size, farthest_kept(settings, size)
+    simulated, size = (
+        simulated_fraction(painted, settings, len(rig.guides)),
+        motion.dynamics.rest.size,
+    )
+    max_distance, reach = settings.radius_root * size, max_clearance(settings, size)
     before = tuple(posed.at_begin() for posed in colliders)
     strands, guides = motion.clearance, motion.guide_clearance
     if simulated is not None and not simulated.any():
         strands = None
     elif colliders and (strands is None or strands.kept != max_distance):
         strands = strand_clearance(rig, motion.pose, before, max_distance)
-    if colliders and (guides is None or guides.reach != reach):
+    if colliders and (guides is None or guides.max_distance != reach):
         guides = guide_clearance(motion.carried_guides, before, reach)
     return replace(motion, clearance=strands, guide_clearance=guides)
 

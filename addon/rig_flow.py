@@ -12,8 +12,8 @@ import numpy as np
 
 from .arrays import Bools, Floats, Ints, are_same
 from .dynamics.colliders import DistanceField, PosedCollider
-from .dynamics.held import Held
-from .dynamics.neighbours import hair_of
+from .dynamics.held import HeldCvs
+from .dynamics.neighbours import hair_length_of_guides
 from .errors import HairloomError
 from .groom.automatic_children import are_few, automatic
 from .groom.children import (
@@ -40,7 +40,7 @@ from .refine.thinning import even_ranks
 from .shading.strand_noise import SEED_LIMIT
 from .strands import StrandSet, Surface
 from .strands.arc_length import typical
-from .strands.center_lines import center_lines, curl_room
+from .strands.center_lines import center_lines, curl_slack
 from .strands.face import is_face_hair
 from .strands.join import joined
 from .strands.kept import NOTHING_KEPT, Kept
@@ -196,19 +196,19 @@ class Rig:
         return own.on_lines(self.strands.take(self.guides), cv_count)
 
     @cached_property
-    def held_face(self) -> Held | None:
+    def held_face(self) -> HeldCvs | None:
         """All CVs of brows and lashes, which are too short to swing; None if there is no other hair
         or none of these."""
         is_face = is_face_hair(self.strands.group)
         chosen = is_face[self.guides] & ~is_face.all()
         if not chosen.any():
             return None
-        return Held(np.repeat(chosen[:, None], self.guide_grid.shape[1], axis=1))
+        return HeldCvs(np.repeat(chosen[:, None], self.guide_grid.shape[1], axis=1))
 
     @cached_property
-    def curl_room(self) -> Floats | None:
-        """How far curls of guides can be stretched, see `center_lines.curl_room`."""
-        return curl_room(self.strands.take(self.guides).lengths(), self.guide_grid)
+    def curl_slack(self) -> Floats | None:
+        """How far curls of guides can be stretched, see `center_lines.curl_slack`."""
+        return curl_slack(self.strands.take(self.guides).lengths(), self.guide_grid)
 
     @cached_property
     def strands_per_guide(self) -> Floats:
@@ -218,8 +218,8 @@ class Rig:
 
     @cached_property
     def hair_of_guides(self) -> Floats:
-        """See `dynamics.neighbours.hair_of`."""
-        return hair_of(self.guide_grid, self.strands_per_guide)
+        """See `dynamics.neighbours.hair_length_of_guides`."""
+        return hair_length_of_guides(self.guide_grid, self.strands_per_guide)
 
     @cached_property
     def rest_sphere(self) -> tuple[Floats, float]:
@@ -246,7 +246,7 @@ class Rig:
 
     @cached_property
     def riders(self) -> Riders:
-        return Riders.of(self.strands, self.guide_grid, self.weights, self.curl_room)
+        return Riders.of(self.strands, self.guide_grid, self.weights, self.curl_slack)
 
     @cached_property
     def radius(self) -> float:

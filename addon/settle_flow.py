@@ -63,7 +63,7 @@ def settle(
     max_rest_motion = _REST_MOTION * float(np.median(rig.rest_lengths))
     motion = motion_flow.begin(rig, pose)
     frame_count = round(settings.seconds / _FRAME)
-    seen = None if painted is None else painted.all_seen()
+    seen = None if painted is None else painted.without_display_factors()
     frame = FrameInput(pose, colliders, falling, gravity, _FRAME, painted=seen)
     for number in range(frame_count):
         before = motion.guides

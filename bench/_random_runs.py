@@ -30,7 +30,7 @@ from hairloom.addon.dynamics.force_fields import (
     ForceField,
     ForceFields,
 )
-from hairloom.addon.dynamics.held import Held
+from hairloom.addon.dynamics.held import HeldCvs
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.springs import give
 from hairloom.addon.dynamics.state import DynamicsState, start
@@ -93,7 +93,7 @@ class RandomRun:
     force_fields: ForceFields
     fps: float
     is_bent: bool
-    held: Held | None
+    held: HeldCvs | None
     room: np.ndarray | None = None
 
     def begin(self) -> DynamicsState:
@@ -137,8 +137,8 @@ def reach_of(state: DynamicsState, settings: DynamicsSettings | None = None) -> 
     if not np.isfinite(position).all() or not np.isfinite(state.previous).all():
         return Reach(np.inf, np.inf, False)
     longest = state.rest.length.astype(np.float64)
-    if state.rest.room is not None and settings is not None:
-        longest *= 1.0 + give(settings) * state.rest.room
+    if state.rest.curl_slack is not None and settings is not None:
+        longest *= 1.0 + give(settings) * state.rest.curl_slack
     rest = np.cumsum(longest, axis=0)
     straight = np.linalg.norm(position[:, 1:] - position[:, :1], axis=0)
     along = np.cumsum(np.linalg.norm(np.diff(position, axis=1), axis=0), axis=0)
@@ -169,7 +169,7 @@ def random_run(seed: int, guide_count: int = 12) -> RandomRun:
         is_tied = ties.random(guide_count) < 0.3
         for step in (0, 1):
             is_held[is_tied, first[is_tied] + step] = True
-        held = Held(is_held)
+        held = HeldCvs(is_held)
     curls = np.random.default_rng((seed, 1))
     room = None
     if curls.random() < 0.5:

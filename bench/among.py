@@ -49,7 +49,7 @@ from grooms_together import Groom, play_frame
 from hairloom.addon import register, unregister
 from hairloom.addon.dynamics.colliders import CapsuleCollider, DistanceField, PosedCollider
 from hairloom.addon.dynamics.force_fields import Falloff, ForceField, ForceFields
-from hairloom.addon.dynamics.neighbours import alone
+from hairloom.addon.dynamics.neighbours import run_alone
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import DynamicsState, start
 from hairloom.addon.dynamics.step import Drive, advance
@@ -320,7 +320,7 @@ def draw(folder: Path) -> None:
         for _ in range(round(SECONDS * FPS)):
             posed = (PosedCollider(collider, still, still),)
             soft = DynamicsSettings(volume=volume, **SOFT)
-            alone(solver.steps(FrameInput(hair.pose(still), posed, soft, GRAVITY, 1.0 / FPS)))
+            run_alone(solver.steps(FrameInput(hair.pose(still), posed, soft, GRAVITY, 1.0 / FPS)))
         pictures.append(studio.picture(hair.pose(still), solver.strands(), 480, 600, 2, camera))
     images.write_png(folder / "among.png", images.contact_sheet(pictures, 3))
 

@@ -27,7 +27,7 @@ from shaken import GRAVITY, shaken_poses
 
 from hairloom.addon import motion_flow, rig_flow
 from hairloom.addon.blender.sessions.compute_solver import ComputeSolver
-from hairloom.addon.dynamics.neighbours import alone
+from hairloom.addon.dynamics.neighbours import run_alone
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.groom.grow import grow, scalp_density
 from hairloom.addon.groom.settings import GrowSettings, GuideSettings
@@ -78,7 +78,9 @@ class Lines:
 
 def simulated(solver: ComputeSolver, pose: rig_flow.Pose) -> None:
     """Simulate a frame, and wait for its end by reading the guides back, 0.05 ms."""
-    alone(solver.steps(motion_flow.FrameInput(pose, (), DynamicsSettings(), GRAVITY, 1.0 / 60.0)))
+    run_alone(
+        solver.steps(motion_flow.FrameInput(pose, (), DynamicsSettings(), GRAVITY, 1.0 / 60.0))
+    )
     solver.guides()
 
 

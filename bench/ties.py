@@ -24,7 +24,7 @@ from hairloom.addon.blender.command_line.simulate_job import shake_matrix
 from hairloom.addon.blender.sessions.compute_solver import ComputeSolver
 from hairloom.addon.blender.sessions.numpy_solver import NumpySolver
 from hairloom.addon.dynamics.colliders import PosedCollider
-from hairloom.addon.dynamics.neighbours import alone
+from hairloom.addon.dynamics.neighbours import run_alone
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.motion_flow import FrameInput
 from hairloom.addon.strands.arc_length import lengths
@@ -81,7 +81,7 @@ def played(tail: Ponytail, shake, collider, *, compute: bool):
     for frame in range(1, round(SECONDS * FPS) + 1):
         matrix = shake(frame / FPS)
         posed = (PosedCollider(collider, before, matrix),)
-        alone(solver.steps(FrameInput(tail.pose(matrix), posed, settings, GRAVITY, 1.0 / FPS)))
+        run_alone(solver.steps(FrameInput(tail.pose(matrix), posed, settings, GRAVITY, 1.0 / FPS)))
         before, strands = matrix, solver.strands()
         assert np.isfinite(strands).all()
         escapes.append(escape(tail, solver.pose, strands))

@@ -9,17 +9,17 @@ from typing import Any
 import numpy as np
 
 from hairloom.addon.dynamics.neighbours import (
-    KnownHair,
-    Mover,
-    Steps,
-    Straight,
-    Style,
-    go_together,
-    hair_of,
+    AdvancingGroom,
+    FrameSteps,
+    KnownNeighbours,
+    LinearMotion,
+    NeighbourStyle,
+    advance_together,
+    hair_length_of_guides,
 )
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import DynamicsState, start
-from hairloom.addon.dynamics.step import Drive, steps
+from hairloom.addon.dynamics.step import Drive, advance_in_steps
 
 EARTH = np.array([0.0, 0.0, -9.81])
 
@@ -44,10 +44,10 @@ class Groom:
         gravity: float = 1.0,
     ) -> None:
         self.grid = self.style = grid
-        self.settings, self.known = settings, KnownHair()
+        self.settings, self.known = settings, KnownNeighbours()
         self.gravity = EARTH * gravity
         self._state = start(grid) if state is None else state
-        self.hair = hair_of(grid, np.ones(len(grid)))
+        self.hair = hair_length_of_guides(grid, np.ones(len(grid)))
         self._pass = None if make_pass is None else make_pass(self._state)
 
     @property
@@ -61,18 +61,20 @@ class Groom:
 
     def mover(
         self, number: int, target: np.ndarray, duration: float, near: frozenset[int]
-    ) -> Mover:
-        style = Style(partial(getattr, self, "style"), self.hair, self.grid)
-        straight = Straight(self.style, partial(np.asarray, target))
-        steps = None if self.settings is None else self._steps(self.settings, target, duration)
-        return Mover(number, style, straight, steps, near, self.known)
+    ) -> AdvancingGroom:
+        style = NeighbourStyle(partial(getattr, self, "style"), self.hair, self.grid)
+        straight = LinearMotion(self.style, partial(np.asarray, target))
+        frame_steps = (
+            None if self.settings is None else self._steps(self.settings, target, duration)
+        )
+        return AdvancingGroom(number, style, straight, frame_steps, near, self.known)
 
     def _steps(
         self, settings: DynamicsSettings, target: np.ndarray, duration: float
-    ) -> Steps[None]:
+    ) -> FrameSteps[None]:
         drive = Drive(self.style, target, (), self.gravity)
         if self._pass is None:
-            self._state = yield from steps(self._state, drive, settings, duration)
+            self._state = yield from advance_in_steps(self._state, drive, settings, duration)
         else:
             yield from self._pass.steps(drive, settings, duration)
 
@@ -94,7 +96,7 @@ def play_frame(
         groom.mover(number, target, duration, near[number])
         for number, (groom, target) in enumerate(zip(grooms, targets, strict=True))
     ]
-    go_together(movers)
+    advance_together(movers)
     for groom, mover, target in zip(grooms, movers, targets, strict=True):
         if mover.error is not None:
             raise mover.error

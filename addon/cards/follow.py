@@ -110,7 +110,7 @@ def bind_cards(
         mesh: at rest, world space.
         guides: (guide_count, cv_count, 3) [m] at rest, CVs evenly along each.
         guide, weight: (n, k) for the cards of `card_lines`, in its order.
-        room: (guide_count, cv_count - 1), see `center_lines.curl_room`; None: no curls.
+        room: (guide_count, cv_count - 1), see `center_lines.curl_slack`; None: no curls.
     """
     used = np.unique(mesh.card)
     number = np.zeros(int(used.max(initial=0)) + 1, np.int64)

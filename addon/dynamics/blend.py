@@ -12,10 +12,10 @@ from ..arrays import Floats
 from .constraints import TINY
 
 #: A blend of two unit vectors shorter than this has no direction.
-OPPOSITE = np.float32(1.0e-4)
+MIN_DIRECTION = np.float32(1.0e-4)
 
 
-def seen(simulated: Floats, style: Floats, fraction: Floats | None) -> Floats:
+def visible_guides(simulated: Floats, style: Floats, fraction: Floats | None) -> Floats:
     """The visible guides, float32: `blended`, or the simulated ones if `fraction` is None."""
     if fraction is None:
         return simulated
@@ -43,7 +43,7 @@ def blended_segment(simulated: Floats, style: Floats, fraction: Floats) -> Float
     toward, ahead = simulated / np.maximum(long, TINY), style / np.maximum(rest, TINY)
     direction = ahead + (toward - ahead) * fraction
     size = np.linalg.norm(direction, axis=-1, keepdims=True)
-    direction = np.where(size > OPPOSITE, direction / np.maximum(size, OPPOSITE), toward)
+    direction = np.where(size > MIN_DIRECTION, direction / np.maximum(size, MIN_DIRECTION), toward)
     length = rest + (long - rest) * fraction
     blend: Floats = direction * length
     return blend

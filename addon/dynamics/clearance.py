@@ -22,12 +22,12 @@ from .settings import DynamicsSettings
 class GuideClearance:
     """Distances from colliders when a motion began.
 
-    reach: [m], upper limit of the distances.
+    max_distance: [m], upper limit of the distances.
     distances: (guide_count, cv_count, 1 + len(BETWEEN)) float32 [m], of each CV, and of the points
         of the segment that ends there; 0 for points inside, which are moved out to the surface.
     """
 
-    reach: float
+    max_distance: float
     distances: Floats
 
     @cached_property
@@ -36,23 +36,23 @@ class GuideClearance:
         return np.ascontiguousarray(self.distances.transpose(2, 1, 0))
 
 
-def farthest_kept(settings: DynamicsSettings, size: float) -> float:
+def max_clearance(settings: DynamicsSettings, size: float) -> float:
     """The largest distance [m] that a CV keeps from colliders, for hair of this size [m]."""
     return size * max(settings.radius_root, settings.radius_tip)
 
 
 def guide_clearance(
-    grid: Floats, colliders: Sequence[PosedCollider], reach: float
+    grid: Floats, colliders: Sequence[PosedCollider], max_distance: float
 ) -> GuideClearance:
     """The clearance of a motion that begins now.
 
     Args:
         grid: (guide_count, cv_count, 3) world [m], at rest.
         colliders: used in their poses at the frame's end.
-        reach: [m], see `farthest_kept`.
+        max_distance: [m], see `max_clearance`.
     """
     before = grid[:, np.maximum(np.arange(grid.shape[1]) - 1, 0)]
     points = [grid, *(before + (grid - before) * np.float32(along) for along in BETWEEN)]
-    distance, _ = signed_distance(np.stack(points, axis=2).reshape(-1, 3), colliders, reach)
+    distance, _ = signed_distance(np.stack(points, axis=2).reshape(-1, 3), colliders, max_distance)
     shape = (*grid.shape[:2], len(points))
-    return GuideClearance(reach, np.maximum(distance, np.float32(0.0)).reshape(shape))
+    return GuideClearance(max_distance, np.maximum(distance, np.float32(0.0)).reshape(shape))

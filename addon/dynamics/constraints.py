@@ -85,7 +85,7 @@ def pin(position: Floats, carried: Floats, length: Floats, held: Floats | None) 
     Args:
         position, carried: (3, cv_count, guide_count) world [m].
         length: (cv_count - 1, guide_count) [m].
-        held: see `held.Held.rows`; None if no CV is held.
+        held: see `held.HeldCvs.rows`; None if no CV is held.
     """
     position[:, :PINNED] = carried[:, :PINNED]
     if held is None:

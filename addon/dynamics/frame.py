@@ -15,17 +15,17 @@ from .colliders import PosedCollider
 from .constraints import PINNED
 from .contacts import BETWEEN, BETWEEN_RADIUS, radius_of_all
 from .force_fields import NO_FIELDS, ForceFields
-from .forces import Damped, combed_gravity, felt_gravity
+from .forces import DampingFactors, compensated_gravity, effective_gravity
+from .groom_rotation import fit_rotation, sample_guides, sample_roots
 from .hair_grid import HairInteraction, InteractionStrength
-from .held import Held
+from .held import HeldCvs
 from .neighbours import Stop
 from .painted import PaintedFrame, PaintedGuides, painted_frame
-from .rigid_path import CarriedPath, Carrier, Carry, KnownStep, LastStep, Rigid
+from .rigid_path import CarriedPath, Carrier, KnownSubstep, LastSubstep, RigidMotion, RigidTransform
 from .settings import DynamicsSettings
 from .springs import Springs
 from .state import DynamicsState, Rest, StyleRows, as_rows, checked_grid
 from .style import StyleBand, style_band
-from .turn import root_sample, rotation_from, sample
 from .wind import Air, air_of
 
 
@@ -58,7 +58,7 @@ class Drive:
     target_earlier: Floats | None = None
     force_fields: ForceFields = NO_FIELDS
     earlier_ratio: float = 1.0
-    held: Held | None = None
+    held: HeldCvs | None = None
     clearance: GuideClearance | None = None
     simulated: Floats | None = None
     painted: PaintedGuides | None = None
@@ -74,9 +74,9 @@ class Drive:
         """The motion of the roots as a whole."""
         earlier = self.target_earlier
         return Carrier.through(
-            root_sample(self.target_before),
-            root_sample(self.target_now),
-            None if earlier is None else root_sample(earlier),
+            sample_roots(self.target_before),
+            sample_roots(self.target_now),
+            None if earlier is None else sample_roots(earlier),
             self.earlier_ratio,
         )
 
@@ -96,17 +96,17 @@ class Drive:
         return path.at(moment).T
 
 
-def check_drive(state: DynamicsState, drive: Drive, known: tuple[Floats, ...] = ()) -> None:
+def check_drive(state: DynamicsState, drive: Drive, checked: tuple[Floats, ...] = ()) -> None:
     """Check that a drive fits the state.
 
     Args:
-        known: target arrays that have been checked before.
+        checked: target arrays that have been checked before.
 
     Raises:
         HairloomError: a drive that does not fit the state or is not finite.
     """
     for target in drive.targets:
-        if any(target is one for one in known):
+        if any(target is one for one in checked):
             continue
         guide_count, cv_count = checked_grid(target, "style").shape[:2]
         if (guide_count, cv_count) != (state.guide_count, state.cv_count):
@@ -141,7 +141,7 @@ def check_drive(state: DynamicsState, drive: Drive, known: tuple[Floats, ...] = 
             place="dynamics",
             remedy="Start the simulation again",
         )
-    if drive.painted is not None and not drive.painted.fits(state.cv_count, state.guide_count):
+    if drive.painted is not None and not drive.painted.has_shape(state.cv_count, state.guide_count):
         raise HairloomError(
             f"painted values are not {state.guide_count} finite numbers, one for each guide",
             place="dynamics",
@@ -161,31 +161,33 @@ def check_drive(state: DynamicsState, drive: Drive, known: tuple[Floats, ...] = 
         )
 
 
-def carried_after(
+def root_places_after(
     state: DynamicsState, frame: Frame | None, drive: Drive, settings: DynamicsSettings, count: int
-) -> LastStep | KnownStep:
-    """`DynamicsState.carried` after a frame of `count` substeps.
+) -> LastSubstep | KnownSubstep:
+    """`DynamicsState.root_places` after a frame of `count` substeps.
 
     Args:
         frame: None if there are no substeps.
     """
-    if not inherits(settings):
+    if not inherits_motion(settings):
         return (
-            state.carried if frame is None else LastStep(drive.carrier.path, frame.span(count - 1))
+            state.root_places
+            if frame is None
+            else LastSubstep(drive.carrier.path, frame.span(count - 1))
         )
-    known = state.carried.places
+    places = state.root_places.places
     if frame is not None:
-        known = frame.place(count - 2), frame.place(count - 1)
-    before, now = (place.since(drive.carrier.path.now) for place in known)
-    return KnownStep((before, now))
+        places = frame.root_place(count - 2), frame.root_place(count - 1)
+    before, now = (place.relative_to(drive.carrier.path.now) for place in places)
+    return KnownSubstep((before, now))
 
 
-def inherits(settings: DynamicsSettings) -> bool:
+def inherits_motion(settings: DynamicsSettings) -> bool:
     """Whether hair takes over a part of the roots' motion without inertia."""
     return settings.inherit_location > 0.0 or settings.inherit_rotation > 0.0
 
 
-def style_rows(state: DynamicsState, drive: Drive) -> tuple[StyleRows, ...]:
+def convert_styles(state: DynamicsState, drive: Drive) -> tuple[StyleRows, ...]:
     """The drive's targets as rows, taken from the state if the last frame has converted them."""
     known = {id(style.grid): style for style in state.styles}
     return tuple(
@@ -203,15 +205,15 @@ class Frame:
     duration: float
     time: float  # [s] of the first substep, on the clock of the gusts
     time_left: float
-    turn: Floats
-    matrix: StyleBand
-    damped: Damped
+    rotation: Floats
+    style_system: StyleBand
+    damping_factors: DampingFactors
     air: Air | None
     force_fields: ForceFields | None  # None where none acts
     size: float  # of the hair [m], see `state.Rest`
     interaction: HairInteraction | None  # None if hair does not feel other hair
     painted: PaintedFrame | None  # None where nothing is painted
-    begun: LastStep | KnownStep  # see `DynamicsState.carried`
+    last_root_places: LastSubstep | KnownSubstep  # see `DynamicsState.root_places`
     speed_ratio: float  # of a substep to the one before the frame
 
     @classmethod
@@ -223,44 +225,46 @@ class Frame:
         duration: float,
         dt: float,
     ) -> Frame:
-        turn: Floats = np.eye(3)
+        rotation: Floats = np.eye(3)
         interaction, painted = None, None
-        if drive.painted is not None and drive.painted.is_of_motion:
+        if drive.painted is not None and drive.painted.affects_motion:
             painted = painted_frame(drive.painted, settings, state.cv_count, state.guide_count, dt)
         if state.guide_count:
-            before, now = (sample(grid) for grid in (drive.target_before, drive.target_now))
-            turn = rotation_from(state.rest.sample, (before + now) / 2.0)
+            before, now = (sample_guides(grid) for grid in (drive.target_before, drive.target_now))
+            rotation = fit_rotation(state.rest.sample_points, (before + now) / 2.0)
             volume = None if painted is None else painted.volume
-            interaction = _hair_interaction(state, drive, settings, turn, dt, volume)
-        matrix = style_band(settings, state.cv_count, dt)
+            interaction = _hair_interaction(state, drive, settings, rotation, dt, volume)
+        style_system = style_band(settings, state.cv_count, dt)
         air, fields = air_of(settings), drive.force_fields.by(settings.force_fields)
-        time, left, size = state.time, state.time_left, state.rest.size
+        time, time_left, size = state.time, state.time_left, state.rest.size
         return cls(
             drive,
             settings,
             dt,
             duration,
             time,
-            left,
-            turn,
-            matrix,
-            Damped.of(settings, dt),
+            time_left,
+            rotation,
+            style_system,
+            DampingFactors.of(settings, dt),
             air,
             fields,
             size,
             interaction,
             painted,
-            state.carried,
+            state.root_places,
             dt / state.substep if state.substep else 1.0,
         )
 
-    def pieces(self, count: int) -> list[range]:
+    def substep_ranges(self, count: int) -> list[range]:
         """Ranges of substeps in which guides are independent of each other."""
         return (
             [range(count)] if self.interaction is None else self.interaction.substep_ranges(count)
         )
 
-    def stop(self, rest: Rest, number: int, read: Callable[[], tuple[Floats, Floats]]) -> Stop:
+    def stop_before(
+        self, rest: Rest, number: int, read: Callable[[], tuple[Floats, Floats]]
+    ) -> Stop:
         """The stop before a substep in which hair feels hair, see `Stop`."""
         assert self.interaction is not None, "it feels"
         step = self.dt / self.duration
@@ -268,34 +272,36 @@ class Frame:
         return Stop(self.span(number)[0], step, ahead, rest, self.drive.target_before, read)
 
     @property
-    def inherits(self) -> bool:
-        """See `inherits`."""
-        return inherits(self.settings)
+    def inherits_motion(self) -> bool:
+        """See `inherits_motion`."""
+        return inherits_motion(self.settings)
 
     @property
     def style_carrier(self) -> Carrier | None:
         """See `Drive.style_carrier`."""
-        return self.drive.carrier if self.inherits else self.drive.style_carrier
+        return self.drive.carrier if self.inherits_motion else self.drive.style_carrier
 
-    def place(self, number: int) -> Rigid:
+    def root_place(self, number: int) -> RigidMotion:
         """Where the roots as a whole are after a substep, relative to the frame's begin; -1: before
         the first substep."""
         return (
-            self.begun.places[1] if number < 0 else self.drive.carrier.path.at(self.span(number)[1])
+            self.last_root_places.places[1]
+            if number < 0
+            else self.drive.carrier.path.at(self.span(number)[1])
         )
 
-    def inherited(self, number: int) -> Carry:
+    def inherited_motion(self, number: int) -> RigidTransform:
         """The motion that hair takes over from the roots without inertia in a substep; -1: in the
         last one of the frame before."""
-        settings, ratio = self.settings, 1.0
+        settings, speed_ratio = self.settings, 1.0
         if number >= 0:
-            now, before = self.place(number), self.place(number - 1)
+            now, before = self.root_place(number), self.root_place(number - 1)
         else:
-            before, now, ratio = *self.begun.places, self.speed_ratio
-        motion = now.since(before).part(
-            settings.inherit_location * ratio, settings.inherit_rotation * ratio
+            before, now, speed_ratio = *self.last_root_places.places, self.speed_ratio
+        motion = now.relative_to(before).scaled(
+            settings.inherit_location * speed_ratio, settings.inherit_rotation * speed_ratio
         )
-        return self.drive.carrier.carry(motion, before)
+        return self.drive.carrier.transform(motion, before)
 
     def span(self, number: int) -> tuple[float, float]:
         """Begin and end of a substep as fractions of the frame."""
@@ -313,7 +319,7 @@ def _hair_interaction(
     state: DynamicsState,
     drive: Drive,
     settings: DynamicsSettings,
-    turn: Floats,
+    rotation: Floats,
     dt: float,
     volume: Floats | None,
 ) -> HairInteraction | None:
@@ -329,8 +335,8 @@ def _hair_interaction(
         return None
     grid = state.rest.hair_grid
     ends = [target[:, 0].mean(axis=0, dtype=np.float64) for target in drive.targets[:2]]
-    placement = grid.placement(turn, (ends[0] + ends[1]) / 2.0)
-    return HairInteraction(grid, placement, turn, strength, round(state.time / dt), volume)
+    placement = grid.placement(rotation, (ends[0] + ends[1]) / 2.0)
+    return HairInteraction(grid, placement, rotation, strength, round(state.time / dt), volume)
 
 
 @dataclass(frozen=True)
@@ -342,10 +348,11 @@ class Block:
         substep, and its change as the path of the style bends. If the style moves on an arc,
         gravity alone.
     radius: (cv_count * n,) [m], the distance that each CV keeps from colliders; read-only.
-    between: (len(BETWEEN), cv_count * n) [m], the same for points of the segment that ends there.
-    held: (cv_count, n), see `held.Held.rows`; None if none of these guides is held.
+    segment_radius: (len(BETWEEN), cv_count * n) [m], the same for points of the segment that ends
+        there.
+    held: (cv_count, n), see `held.HeldCvs.rows`; None if none of these guides is held.
     springs: of the curled guides; None if none of these can stretch.
-    matrix, damped: those of the frame, or individual ones of each guide.
+    style_system, damping_factors: those of the frame, or individual ones of each guide.
     """
 
     rest: Rest
@@ -353,68 +360,77 @@ class Block:
     impulse: Floats
     impulse_curvature: Floats | None
     radius: Floats
-    between: Floats
+    segment_radius: Floats
     held: Floats | None
     springs: Springs | None
-    matrix: StyleBand
-    damped: Damped
+    style_system: StyleBand
+    damping_factors: DampingFactors
 
     @classmethod
     def of(
         cls, state: DynamicsState, frame: Frame, styles: tuple[StyleRows, ...], guides: slice
     ) -> Block:
         """Args:
-        styles: as `style_rows` gives them.
+        styles: as `convert_styles` gives them.
         """
         drive, settings, dt = frame.drive, frame.settings, frame.dt
         now, before, *earlier = (style.rows[:, :, guides] for style in styles)
-        since = earlier[0] if earlier else None
-        style = CarriedPath.through(before, now, since, drive.earlier_ratio, frame.style_carrier)
+        earlier_style = earlier[0] if earlier else None
+        style = CarriedPath.through(
+            before, now, earlier_style, drive.earlier_ratio, frame.style_carrier
+        )
         middle: Floats = before + (now - before) * np.float32(0.5)
         if style.carrier is not None:
             middle = style.at(0.5)
-        own = None if frame.painted is None else frame.painted.part(guides)
-        matrix, damped = frame.matrix, frame.damped
-        if own is not None:
-            matrix, damped = own.matrix, own.damped
-        felt = felt_gravity(drive.gravity, settings, frame.turn, middle) * np.float32(dt * dt)
-        if own is not None:
-            felt = felt * own.gravity
-        impulse: Floats = np.asarray(felt)
-        bent: Floats | None = None
+        painted = None if frame.painted is None else frame.painted.part(guides)
+        style_system, damping_factors = frame.style_system, frame.damping_factors
+        if painted is not None:
+            style_system, damping_factors = painted.style_system, painted.damping_factors
+        gravity = effective_gravity(drive.gravity, settings, frame.rotation, middle) * np.float32(
+            dt * dt
+        )
+        if painted is not None:
+            gravity = gravity * painted.gravity
+        impulse: Floats = np.asarray(gravity)
+        impulse_curvature: Floats | None = None
         if style.carrier is None:
-            carried = np.float32(damped.carried * (dt / frame.duration))
-            impulse = style.displacement * carried
-            impulse += felt
-            bent = None if style.curvature is None else style.curvature * carried
+            style_fraction = np.float32(damping_factors.style * (dt / frame.duration))
+            impulse = style.displacement * style_fraction
+            impulse += gravity
+            impulse_curvature = (
+                None if style.curvature is None else style.curvature * style_fraction
+            )
         radius = radius_of_all(settings, state.cv_count, before.shape[2], state.rest.size)
-        between = np.tile(radius * BETWEEN_RADIUS, (len(BETWEEN), 1))
+        segment_radius = np.tile(radius * BETWEEN_RADIUS, (len(BETWEEN), 1))
         if drive.clearance is not None:
-            known = drive.clearance.rows[:, :, guides].reshape(1 + len(BETWEEN), -1)
-            radius, between = np.minimum(radius, known[0]), np.minimum(between, known[1:])
+            clearances = drive.clearance.rows[:, :, guides].reshape(1 + len(BETWEEN), -1)
+            radius, segment_radius = (
+                np.minimum(radius, clearances[0]),
+                np.minimum(segment_radius, clearances[1:]),
+            )
         held = None if drive.held is None else drive.held.rows[:, guides]
         if held is not None and held.any():
             is_held = held.ravel() > 0.0
             radius = np.where(is_held, np.float32(-np.inf), radius)
-            between[:, is_held] = -np.inf
+            segment_radius[:, is_held] = -np.inf
         else:
             held = None
         rest = state.rest.part(guides)
-        combed = combed_gravity(drive.gravity, settings, frame.turn)
-        springs = Springs.of(rest.room, rest.length, middle, combed, held, settings, dt)
-        if springs is not None and own is not None:
-            springs = replace(springs, load=springs.load * own.gravity[springs.guides])
+        compensated = compensated_gravity(drive.gravity, settings, frame.rotation)
+        springs = Springs.of(rest.curl_slack, rest.length, middle, compensated, held, settings, dt)
+        if springs is not None and painted is not None:
+            springs = replace(springs, load=springs.load * painted.gravity[springs.guides])
         return cls(
             rest,
             style,
             impulse,
-            bent,
+            impulse_curvature,
             radius,
-            between,
+            segment_radius,
             held,
             springs,
-            matrix,
-            damped,
+            style_system,
+            damping_factors,
         )
 
     def impulse_at(self, span: tuple[float, float], begin: Floats | None, end: Floats) -> Floats:
@@ -425,10 +441,10 @@ class Block:
             begin, end: the style at its begin and end; `begin` is None unless it moves on an arc.
         """
         if begin is not None:
-            moved = end - begin
-            moved *= np.float32(self.damped.carried)
-            moved += self.impulse
-            return moved
+            displacement = end - begin
+            displacement *= np.float32(self.damping_factors.style)
+            displacement += self.impulse
+            return displacement
         if self.impulse_curvature is None:
             return self.impulse
         impulse = self.impulse_curvature * np.float32(span[0] + span[1] - 1.0)

@@ -16,7 +16,7 @@ from .constraints import PINNED
 
 
 @dataclass(frozen=True, eq=False)
-class Held:
+class HeldCvs:
     """is_held: (guide_count, cv_count); values of pinned CVs are ignored."""
 
     is_held: Bools
@@ -29,16 +29,16 @@ class Held:
         rows.flags.writeable = False
         return rows
 
-    def spread(self, values: Floats) -> Floats:
+    def interpolated(self, values: Floats) -> Floats:
         """Values (guide_count, cv_count, 3) at pinned and held CVs, extended to all others: linear
         in between, constant beyond the last one."""
-        lower, upper, weight = self._between
+        lower, upper, weight = self._interpolation
         below, above = (np.take_along_axis(values, k[..., None], axis=1) for k in (lower, upper))
         result: Floats = below + weight[..., None] * (above - below)
         return result
 
     @cached_property
-    def _between(self) -> tuple[Ints, Ints, Floats]:
+    def _interpolation(self) -> tuple[Ints, Ints, Floats]:
         """The pinned or held CVs before and after each CV, and the latter's weight."""
         known = self.is_held.copy()
         known[:, :PINNED] = True

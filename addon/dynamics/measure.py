@@ -28,8 +28,8 @@ def max_stretch(state: DynamicsState) -> float:
         return 0.0
     _, length = directions(state.position[:, PINNED - 1 :])
     is_fixed = rest > TINY
-    if state.rest.room is not None:
-        is_fixed &= state.rest.room[PINNED - 1 :] == 0.0
+    if state.rest.curl_slack is not None:
+        is_fixed &= state.rest.curl_slack[PINNED - 1 :] == 0.0
     long = np.maximum(rest, np.float32(SHORTEST * state.rest.size / len(state.rest.length)))
     change = np.divide(np.abs(length - rest), long, out=np.zeros_like(rest), where=is_fixed)
     return float(change.max())

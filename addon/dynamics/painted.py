@@ -13,12 +13,12 @@ from functools import lru_cache
 import numpy as np
 
 from ..arrays import Floats
-from .forces import Damped
+from .forces import DampingFactors
 from .settings import DynamicsSettings
 from .style import StyleBand, painted_band
 
 #: Factors of these only blend the visible motion; they do not affect the simulation.
-_SEEN = frozenset({"influence", "only_selected"})
+_DISPLAY_ONLY = frozenset({"influence", "only_selected"})
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,31 +31,33 @@ class PaintedGuides:
 
     factors: Mapping[str, Floats]
 
-    def along(self, settings: DynamicsSettings, name: str) -> Floats:
+    def at_cvs(self, settings: DynamicsSettings, name: str) -> Floats:
         """A setting at the CVs of all guides, (cv_count or 1, guide_count)."""
         return settings.painted(name, self.factors.get(name, np.ones((1, 1))))
 
-    def of_guides(self, settings: DynamicsSettings, name: str) -> Floats:
+    def per_guide(self, settings: DynamicsSettings, name: str) -> Floats:
         """A setting of each guide, (guide_count,), or (1,) if it is not painted."""
-        return self.along(settings, name).mean(axis=0)
+        return self.at_cvs(settings, name).mean(axis=0)
 
     @property
-    def is_of_motion(self) -> bool:
+    def affects_motion(self) -> bool:
         """Whether anything is painted that affects the simulation."""
-        return bool(self.factors.keys() - _SEEN)
+        return bool(self.factors.keys() - _DISPLAY_ONLY)
 
-    def all_seen(self) -> PaintedGuides:
+    def without_display_factors(self) -> PaintedGuides:
         """The same without the factors that blend the visible motion."""
-        return PaintedGuides({of: each for of, each in self.factors.items() if of not in _SEEN})
+        return PaintedGuides(
+            {of: each for of, each in self.factors.items() if of not in _DISPLAY_ONLY}
+        )
 
-    def fits(self, cv_count: int, guide_count: int) -> bool:
+    def has_shape(self, cv_count: int, guide_count: int) -> bool:
         return all(
             each.shape in ((1, guide_count), (cv_count, guide_count)) and np.isfinite(each).all()
             for each in self.factors.values()
         )
 
 
-def simulated_of(
+def simulated_fraction(
     painted: PaintedGuides | None, settings: DynamicsSettings, guide_count: int
 ) -> Floats | None:
     """The simulated fraction of each guide's visible motion, (guide_count,) float32, see
@@ -66,7 +68,7 @@ def simulated_of(
         return None
     fraction = np.full(guide_count, settings.influence, np.float32)
     if painted is not None and "influence" in factors:
-        fraction = painted.of_guides(settings, "influence").astype(np.float32)
+        fraction = painted.per_guide(settings, "influence").astype(np.float32)
     if by_selection:
         fraction *= factors["only_selected"].mean(axis=0).astype(np.float32)
     return fraction
@@ -77,22 +79,22 @@ class PaintedFrame:
     """Individual values of guides in a frame, all float32.
 
     gravity, volume: (guide_count,), factors of the groom's.
-    damped: with values for each guide.
-    matrix: see `style.StyleBand`.
+    damping_factors: with values for each guide.
+    style_system: see `style.StyleBand`.
     """
 
     gravity: Floats
     volume: Floats
-    damped: Damped
-    matrix: StyleBand
+    damping_factors: DampingFactors
+    style_system: StyleBand
 
     def part(self, guides: slice) -> PaintedFrame:
-        damped = self.damped
+        damped = self.damping_factors
         return PaintedFrame(
             self.gravity[guides],
             self.volume[guides],
-            Damped(damped.kept[guides], damped.carried[guides], damped.air[guides]),
-            self.matrix.part(guides),
+            DampingFactors(damped.velocity[guides], damped.style[guides], damped.air[guides]),
+            self.style_system.part(guides),
         )
 
 
@@ -102,21 +104,23 @@ def painted_frame(
 ) -> PaintedFrame:
     """The individual values of all guides of a groom."""
 
-    def rows(values: Floats | float) -> Floats:
-        return np.broadcast_to(np.asarray(values, np.float32), guide_count)
+    def rows(value: Floats | float) -> Floats:
+        return np.broadcast_to(np.asarray(value, np.float32), guide_count)
 
-    def times(name: str) -> Floats:
-        whole = getattr(settings, name)
-        return rows(painted.of_guides(settings, name) / whole if whole else 1.0)
+    def factor_of(name: str) -> Floats:
+        setting = getattr(settings, name)
+        return rows(painted.per_guide(settings, name) / setting if setting else 1.0)
 
-    rates = (painted.of_guides(settings, name) for name in ("style_damping", "damping"))
-    damped = Damped.of(settings, dt, *rates)
+    rates = (painted.per_guide(settings, name) for name in ("style_damping", "damping"))
+    damping_factors = DampingFactors.of(settings, dt, *rates)
     root, tip, bend = (
-        painted.along(settings, name) for name in ("style_root", "style_tip", "bend")
+        painted.at_cvs(settings, name) for name in ("style_root", "style_tip", "bend")
     )
     return PaintedFrame(
-        times("gravity"),
-        times("volume"),
-        Damped(rows(damped.kept), rows(damped.carried), rows(damped.air)),
+        factor_of("gravity"),
+        factor_of("volume"),
+        DampingFactors(
+            rows(damping_factors.velocity), rows(damping_factors.style), rows(damping_factors.air)
+        ),
         painted_band(settings, root, tip, bend, cv_count, dt),
     )

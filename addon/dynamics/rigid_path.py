@@ -21,41 +21,44 @@ from functools import cached_property
 import numpy as np
 
 from ..arrays import Floats, Ints
-from .trajectory import at, curvature
-from .turn import rotation_from
+from .groom_rotation import fit_rotation
+from .trajectory import curvature, value_at
 
 #: Rotation in a frame from which on arcs matter [rad]: below, a chord is off by at most a hundred
 #: thousandth of the distance from the axis, and a parabola by less than float32 resolves.
-ARC = math.radians(0.5)
+MIN_ARC_ANGLE = math.radians(0.5)
 #: Below this squared angle [rad^2] the first terms of series are used.
 _SMALL = 1.0e-8
 
 
 @dataclass(frozen=True)
-class Rigid:
+class RigidMotion:
     """The motion from x to rotation x + shift. rotation: (3, 3) float64. shift: (3,) [m]."""
 
     rotation: Floats
     shift: Floats
 
     @property
-    def inverse(self) -> Rigid:
-        return Rigid(self.rotation.T, -(self.rotation.T @ self.shift))
+    def inverse(self) -> RigidMotion:
+        return RigidMotion(self.rotation.T, -(self.rotation.T @ self.shift))
 
-    def since(self, other: Rigid) -> Rigid:
+    def relative_to(self, other: RigidMotion) -> RigidMotion:
         """The rotation, and the shift of the pivot, from the other place to this one."""
-        return Rigid(self.rotation @ other.rotation.T, self.shift - other.shift)
+        return RigidMotion(self.rotation @ other.rotation.T, self.shift - other.shift)
 
-    def part(self, shifted: float, turned: float) -> Rigid:
+    def scaled(self, shift_fraction: float, rotation_fraction: float) -> RigidMotion:
         """The motion with these fractions of its shift and rotation."""
-        return Rigid(rotation_of(turn_of(self.rotation) * turned), self.shift * shifted)
+        return RigidMotion(
+            rotation_matrix(rotation_vector(self.rotation) * rotation_fraction),
+            self.shift * shift_fraction,
+        )
 
-    def turned(self, turn: Floats) -> Rigid:
+    def rotated(self, rotation: Floats) -> RigidMotion:
         """The same motion in a space that is turned by a rotation (3, 3)."""
-        return Rigid(turn @ self.rotation @ turn.T, turn @ self.shift)
+        return RigidMotion(rotation @ self.rotation @ rotation.T, rotation @ self.shift)
 
 
-STILL = Rigid(np.eye(3), np.zeros(3))
+NO_MOTION = RigidMotion(np.eye(3), np.zeros(3))
 
 
 @dataclass(frozen=True)
@@ -66,21 +69,21 @@ class RigidPath:
     ratio: duration of the frame before, over that of this one.
     """
 
-    now: Rigid
-    earlier: Rigid | None = None
+    now: RigidMotion
+    earlier: RigidMotion | None = None
     ratio: float = 1.0
 
     @cached_property
     def is_arc(self) -> bool:
-        """Whether it turns by more than ARC."""
+        """Whether it turns by more than MIN_ARC_ANGLE."""
         known = self.now if self.earlier is None else self.earlier
-        turns = (turn_of(each.rotation) for each in (self.now, known))
-        return any(math.hypot(*turn) > ARC for turn in turns)
+        turns = (rotation_vector(each.rotation) for each in (self.now, known))
+        return any(math.hypot(*turn) > MIN_ARC_ANGLE for turn in turns)
 
-    def at(self, moment: float) -> Rigid:
+    def at(self, moment: float) -> RigidMotion:
         """The motion from the frame's begin to a moment, 0 its begin and 1 its end."""
         twist, bent = self._twist
-        return motion_of(at(np.zeros(6), twist, bent, moment))
+        return motion_of(value_at(np.zeros(6), twist, bent, moment))
 
     @cached_property
     def _twist(self) -> tuple[Floats, Floats | None]:
@@ -91,14 +94,14 @@ class RigidPath:
         return twist, curvature(twist_of(self.earlier), np.zeros(6), twist, self.ratio)
 
 
-def rotation_of(turn: Floats) -> Floats:
+def rotation_matrix(vector: Floats) -> Floats:
     """The rotation matrix (3, 3) of a rotation vector (3,), about it by its length [rad]."""
-    first, second, _ = _series(turn)
-    square = float(turn @ turn)
-    return _spin(turn, 1.0 - second * square, first, second)
+    first, second, _ = _series(vector)
+    square = float(vector @ vector)
+    return _rotation_polynomial(vector, 1.0 - second * square, first, second)
 
 
-def turn_of(rotation: Floats) -> Floats:
+def rotation_vector(rotation: Floats) -> Floats:
     """The rotation vector (3,) [rad] of a rotation matrix (3, 3), no longer than pi.
 
     Computed from the largest component of the quaternion, which is accurate at any angle (Shepperd
@@ -120,31 +123,31 @@ def turn_of(rotation: Floats) -> Floats:
     size = float(np.linalg.norm(quaternion[1:]))
     if not size:
         return np.zeros(3)
-    turn: Floats = quaternion[1:] * (2.0 * math.atan2(size, float(quaternion[0])) / size)
-    return turn
+    vector: Floats = quaternion[1:] * (2.0 * math.atan2(size, float(quaternion[0])) / size)
+    return vector
 
 
-def motion_of(twist: Floats) -> Rigid:
+def motion_of(twist: Floats) -> RigidMotion:
     """The rigid motion of a twist (6,)."""
-    turn = twist[:3]
-    return Rigid(rotation_of(turn), _mean_turn(turn) @ twist[3:])
+    vector = twist[:3]
+    return RigidMotion(rotation_matrix(vector), _mean_rotation(vector) @ twist[3:])
 
 
-def twist_of(motion: Rigid) -> Floats:
+def twist_of(motion: RigidMotion) -> Floats:
     """The twist (6,) of a rigid motion."""
-    turn = turn_of(motion.rotation)
-    return np.concatenate([turn, np.linalg.solve(_mean_turn(turn), motion.shift)])
+    vector = rotation_vector(motion.rotation)
+    return np.concatenate([vector, np.linalg.solve(_mean_rotation(vector), motion.shift)])
 
 
-def _mean_turn(turn: Floats) -> Floats:
+def _mean_rotation(vector: Floats) -> Floats:
     """V(w), the mean of the rotations along the path."""
-    _, second, third = _series(turn)
-    return _spin(turn, 1.0 - third * float(turn @ turn), second, third)
+    _, second, third = _series(vector)
+    return _rotation_polynomial(vector, 1.0 - third * float(vector @ vector), second, third)
 
 
-def _series(turn: Floats) -> tuple[float, float, float]:
+def _series(vector: Floats) -> tuple[float, float, float]:
     """sin a / a, (1 - cos a) / a^2 and (a - sin a) / a^3."""
-    square = float(turn @ turn)
+    square = float(vector @ vector)
     if square < _SMALL:
         return 1.0 - square / 6.0, 0.5 - square / 24.0, 1.0 / 6.0 - square / 120.0
     angle = math.sqrt(square)
@@ -156,9 +159,9 @@ def _series(turn: Floats) -> tuple[float, float, float]:
     )
 
 
-def _spin(turn: Floats, even: float, cross: float, outer: float) -> Floats:
+def _rotation_polynomial(vector: Floats, even: float, cross: float, outer: float) -> Floats:
     """even 1 + cross [w] + outer w w^T, where [w]^2 = w w^T - a^2."""
-    x, y, z = turn.tolist()
+    x, y, z = vector.tolist()
     a, b, c = cross * x, cross * y, cross * z
     p, q, r = outer * x, outer * y, outer * z
     return np.array(
@@ -186,30 +189,30 @@ class Carrier:
     ) -> Carrier:
         """The best fit to places (3, n) float64 [m] at the frame's begin, its end and earlier."""
         if not before.size:
-            return cls(np.zeros(3), RigidPath(STILL))
+            return cls(np.zeros(3), RigidPath(NO_MOTION))
         pivot = before.mean(axis=1)
-        since = None if earlier is None else _between(before, earlier)
-        return cls(pivot, RigidPath(_between(before, now), since, ratio))
+        since = None if earlier is None else _rigid_motion(before, earlier)
+        return cls(pivot, RigidPath(_rigid_motion(before, now), since, ratio))
 
-    def carry(self, motion: Rigid, begun: Rigid = STILL) -> Carry:
-        """The motion of places by `motion`, after the pivot has been moved by `begun`."""
-        origin = self.pivot + begun.shift
-        return Carry(motion.rotation, origin, origin + motion.shift)
+    def transform(self, motion: RigidMotion, start: RigidMotion = NO_MOTION) -> RigidTransform:
+        """The motion of places by `motion`, after the pivot has been moved by `start`."""
+        origin = self.pivot + start.shift
+        return RigidTransform(motion.rotation, origin, origin + motion.shift)
 
-    def seen(self, motion: Rigid) -> Carry:
+    def transform_back(self, motion: RigidMotion) -> RigidTransform:
         """The motion of places back to the frame's begin."""
         there = self.pivot + motion.shift
-        return Carry(motion.inverse.rotation, there, self.pivot)
+        return RigidTransform(motion.inverse.rotation, there, self.pivot)
 
 
-def _between(before: Floats, now: Floats) -> Rigid:
+def _rigid_motion(before: Floats, now: Floats) -> RigidMotion:
     middle = before.mean(axis=1)
-    rotation = rotation_from(before - middle[:, None], now)
-    return Rigid(rotation, now.mean(axis=1) - middle)
+    rotation = fit_rotation(before - middle[:, None], now)
+    return RigidMotion(rotation, now.mean(axis=1) - middle)
 
 
 @dataclass(frozen=True, eq=False)
-class LastStep:
+class LastSubstep:
     """Where something was as a whole at a substep's begin and end, computed on demand.
 
     path: of its frame. span: begin and end of the substep as fractions of the frame.
@@ -219,45 +222,45 @@ class LastStep:
     span: tuple[float, float]
 
     @cached_property
-    def places(self) -> tuple[Rigid, Rigid]:
+    def places(self) -> tuple[RigidMotion, RigidMotion]:
         """The places at the substep's begin and end, relative to the frame's end."""
-        begin, end = (self.path.at(moment).since(self.path.now) for moment in self.span)
+        begin, end = (self.path.at(moment).relative_to(self.path.now) for moment in self.span)
         return begin, end
 
 
 @dataclass(frozen=True, eq=False)
-class KnownStep:
-    """`LastStep` with known places."""
+class KnownSubstep:
+    """`LastSubstep` with known places."""
 
-    places: tuple[Rigid, Rigid]
+    places: tuple[RigidMotion, RigidMotion]
 
 
-NOT_MOVED = KnownStep((STILL, STILL))
+AT_REST = KnownSubstep((NO_MOTION, NO_MOTION))
 
 
 @dataclass(frozen=True)
-class Carry:
+class RigidTransform:
     """The motion from x to rotation (x - origin) + there.
 
-    rotation: (3, 3). origin, there: (3,) world [m].
+    rotation: (3, 3). origin, moved_origin: (3,) world [m].
     """
 
     rotation: Floats
     origin: Floats
-    there: Floats
+    moved_origin: Floats
 
     @property
     def texels(self) -> Floats:
-        """(4, 4) for the GPU: rows of the rotation and `there`; last the origin."""
-        rows = np.concatenate([self.rotation, self.there[:, None]], axis=1)
+        """(4, 4) for the GPU: rows of the rotation and `moved_origin`; last the origin."""
+        rows = np.concatenate([self.rotation, self.moved_origin[:, None]], axis=1)
         return np.concatenate([rows, [[*self.origin, 0.0]]])
 
-    def moved(self, rows: Floats) -> Floats:
+    def apply(self, rows: Floats) -> Floats:
         """Places (3, ...) [m] moved, in the same dtype; without BLAS, which would wake threads."""
         places = rows.reshape(3, -1)
         beside = places - self.origin.astype(rows.dtype)[:, None]
         result = np.einsum("ij,jn->in", self.rotation.astype(rows.dtype), beside)
-        result += self.there.astype(rows.dtype)[:, None]
+        result += self.moved_origin.astype(rows.dtype)[:, None]
         return result.reshape(rows.shape)
 
 
@@ -265,7 +268,7 @@ class Carry:
 class CarriedPath:
     """The path of places (3, ...) [m] within a frame.
 
-    before, displacement, curvature: see `trajectory.at`, relative to the carrier.
+    before, displacement, curvature: see `trajectory.value_at`, relative to the carrier.
     carrier: the moving frame; None: the world.
     """
 
@@ -285,22 +288,22 @@ class CarriedPath:
     ) -> CarriedPath:
         if carrier is not None:
             path = carrier.path
-            now = carrier.seen(path.now).moved(now)
+            now = carrier.transform_back(path.now).apply(now)
             if earlier is not None and path.earlier is not None:
-                earlier = carrier.seen(path.earlier).moved(earlier)
+                earlier = carrier.transform_back(path.earlier).apply(earlier)
         bent = None if earlier is None else curvature(earlier, before, now, ratio)
         return cls(before, now - before, bent, carrier)
 
-    def at(self, moment: float, place: Rigid | None = None) -> Floats:
+    def at(self, moment: float, place: RigidMotion | None = None) -> Floats:
         """The places at a moment, 0 the frame's begin and 1 its end.
 
         Args:
             place: of the carrier; None: according to its path.
         """
-        seen = at(self.before, self.displacement, self.curvature, moment)
+        seen = value_at(self.before, self.displacement, self.curvature, moment)
         if self.carrier is None:
             return seen
-        return self.carrier.carry(place or self.carrier.path.at(moment)).moved(seen)
+        return self.carrier.transform(place or self.carrier.path.at(moment)).apply(seen)
 
     def part(self, chosen: Ints | slice) -> CarriedPath:
         """The path of some of the places (3, n)."""

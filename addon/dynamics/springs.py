@@ -26,7 +26,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..strands.vectors import dot_rows
 from .constraints import PINNED, TINY, segments, spring_step
-from .forces import tension_on_style
+from .forces import style_tension
 from .settings import DynamicsSettings
 
 #: E at Curl Stretch 1, as a fraction of the extension at which the curl is straight.
@@ -60,7 +60,7 @@ class Springs:
     most: E [m], 0 where a segment cannot stretch.
     load: T_0 / kappa [m].
     softness: 1 / (kappa dt^2).
-    held: see `held.Held.rows`, of these guides; None if no guide of the block is held.
+    held: see `held.HeldCvs.rows`, of these guides; None if no guide of the block is held.
     """
 
     guides: Ints
@@ -87,7 +87,7 @@ class Springs:
             room, length: (cv_count - 1, guide_count), see `state.Rest`.
             style: (3, cv_count, guide_count) world [m].
             combed: (3,) [m/s^2], the gravity that the style carries.
-            held: (cv_count, guide_count), see `held.Held.rows`; None if no CV is held.
+            held: (cv_count, guide_count), see `held.HeldCvs.rows`; None if no CV is held.
         """
         if room is None or not settings.curl_stretch or style.shape[1] <= PINNED:
             return None
@@ -97,7 +97,7 @@ class Springs:
         kappa = stiffness(settings, style.shape[1])
         at_rest = length[PINNED - 1 :, guides]
         most = room[PINNED - 1 :, guides] * at_rest * np.float32(give(settings))
-        segment, tension = tension_on_style(combed, style[:, :, guides])
+        segment, tension = style_tension(combed, style[:, :, guides])
         load = tension * np.sqrt(dot_rows(segment, segment)) / np.float32(kappa)
         own = None if held is None else held[:, guides]
         return cls(guides, at_rest, most, load, 1.0 / (kappa * dt * dt), own)

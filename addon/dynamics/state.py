@@ -15,10 +15,10 @@ import numpy as np
 from ..arrays import Floats
 from ..errors import HairloomError
 from .constraints import PINNED
+from .groom_rotation import sample_around_mean
 from .hair_grid import HairGrid
-from .rigid_path import NOT_MOVED, KnownStep, LastStep
+from .rigid_path import AT_REST, KnownSubstep, LastSubstep
 from .style import LocalShape, local_shape
-from .turn import rest_sample
 
 
 @dataclass(frozen=True)
@@ -29,8 +29,8 @@ class Rest:
     length: (cv_count - 1, guide_count) float32 [m] of each segment.
     shape: the local shape that is kept however the guides swing.
     size: the median length of all guides [m], the unit of distances in the settings.
-    room: (cv_count - 1, guide_count) float32, the fraction of its length by which each segment can
-        be drawn out until its curls are straight; None if no guide is curled.
+    curl_slack: (cv_count - 1, guide_count) float32, the fraction of its length by which each
+        segment can be drawn out until its curls are straight; None if no guide is curled.
     strands: (guide_count,) how many strands each guide stands for; None: equally many.
     """
 
@@ -38,7 +38,7 @@ class Rest:
     length: Floats
     shape: LocalShape
     size: float = 0.0
-    room: Floats | None = None
+    curl_slack: Floats | None = None
     strands: Floats | None = None
 
     @cached_property
@@ -47,9 +47,9 @@ class Rest:
         return HairGrid.at_rest(self.position, self.size, self.strands)
 
     @cached_property
-    def sample(self) -> Floats:
-        """See `turn.rest_sample`."""
-        return rest_sample(self.position.T)
+    def sample_points(self) -> Floats:
+        """See `groom_rotation.sample_around_mean`."""
+        return sample_around_mean(self.position.T)
 
     def part(self, guides: slice) -> Rest:
         """The rest of these guides, as views."""
@@ -60,7 +60,7 @@ class Rest:
             self.length[:, guides],
             self.shape.part(guides),
             self.size,
-            None if self.room is None else self.room[:, guides],
+            None if self.curl_slack is None else self.curl_slack[:, guides],
             None if self.strands is None else self.strands[guides],
         )
 
@@ -86,7 +86,7 @@ class DynamicsState:
     styles: the last frame's styles, which the next frame need not convert and check again.
     push: (3, cv_count, guide_count) [m], the displacement of each CV by other hair in each substep,
         until it is computed again; None: compute it in the next substep.
-    carried: where the roots as a whole were in the last substep.
+    root_places: where the roots as a whole were in the last substep.
     """
 
     position: Floats
@@ -97,7 +97,7 @@ class DynamicsState:
     time: float = 0.0
     styles: tuple[StyleRows, ...] = ()
     push: Floats | None = None
-    carried: LastStep | KnownStep = NOT_MOVED
+    root_places: LastSubstep | KnownSubstep = AT_REST
 
     def __post_init__(self) -> None:
         self.position.flags.writeable = False
@@ -118,13 +118,14 @@ class DynamicsState:
 
 
 def start(
-    guide_grid: Floats, room: Floats | None = None, strands: Floats | None = None
+    guide_grid: Floats, curl_slack: Floats | None = None, strands: Floats | None = None
 ) -> DynamicsState:
     """Guides at rest in their style.
 
     Args:
         guide_grid: (guide_count, cv_count, 3) world [m], cv_count at least 2.
-        room: (guide_count, cv_count - 1), see `strands.center_lines.curl_room`; None: no curls.
+        curl_slack: (guide_count, cv_count - 1), see `strands.center_lines.curl_slack`; None: no
+            curls.
         strands: (guide_count,) how many strands each guide stands for; None: equally many.
 
     Raises:
@@ -142,7 +143,7 @@ def start(
         length=length,
         shape=local_shape(position),
         size=float(np.median(length.sum(axis=0))) if length.size else 0.0,
-        room=None if room is None else np.ascontiguousarray(room.T, np.float32),
+        curl_slack=None if curl_slack is None else np.ascontiguousarray(curl_slack.T, np.float32),
         strands=strands,
     )
     for array in (rest.length, rest.shape.curvature, rest.shape.hold, rest.shape.twist_cv):

@@ -33,25 +33,25 @@ from itertools import pairwise
 import numpy as np
 
 from ..arrays import Floats
-from .blend import seen
+from .blend import visible_guides
 from .colliders import Pose, poses_through
 from .constraints import PINNED, pin
+from .contact_solver import Chain, Outside
 from .force_fields import along_strands, blow
-from .forces import brake, predict
-from .frame import Block, Drive, Frame, carried_after, check_drive, style_rows
-from .neighbours import Steps, alone
-from .outside import Chain, Outside
-from .rigid_path import Carry
+from .forces import apply_drag, predict
+from .frame import Block, Drive, Frame, check_drive, convert_styles, root_places_after
+from .neighbours import FrameSteps, run_alone
+from .rigid_path import RigidTransform
 from .schedule import due_substeps
 from .settings import DynamicsSettings
 from .state import DynamicsState
 from .style import restore_style
 
-__all__ = ["Drive", "advance", "displacement_beside_root", "grid_at_frame_end", "steps"]
+__all__ = ["Drive", "advance", "advance_in_steps", "grid_at_frame_end", "remaining_displacement"]
 
 #: Maximum number of guides advanced together. With fewer, the overhead of numpy's calls dominates;
 #: with more, the arrays of a substep do not fit into the cache.
-BLOCK = 12_000
+MAX_BLOCK_GUIDES = 12_000
 
 
 def advance(
@@ -62,49 +62,53 @@ def advance(
     Raises:
         HairloomError: a drive that does not fit the state or is not finite, or a bad duration.
     """
-    return alone(steps(state, drive, settings, duration))
+    return run_alone(advance_in_steps(state, drive, settings, duration))
 
 
-def steps(
+def advance_in_steps(
     state: DynamicsState, drive: Drive, settings: DynamicsSettings, duration: float
-) -> Steps[DynamicsState]:
-    """`advance` as a generator that stops to feel other hair, see `neighbours.Steps`."""
+) -> FrameSteps[DynamicsState]:
+    """`advance` as a generator that stops to feel other hair, see `neighbours.FrameSteps`."""
     dt = 1.0 / settings.substep_rate
     longest = settings.max_frame_time
-    duration, count, left = due_substeps(state.time_left, duration, longest, dt)
+    duration, count, time_left = due_substeps(state.time_left, duration, longest, dt)
     check_drive(state, drive, tuple(style.grid for style in state.styles))
     if not count:
-        carried = carried_after(state, None, drive, settings, count)
-        return replace(state, time_left=left, carried=carried)
-    styles = style_rows(state, drive)
+        root_places = root_places_after(state, None, drive, settings, count)
+        return replace(state, time_left=time_left, root_places=root_places)
+    styles = convert_styles(state, drive)
     frame = Frame.of(state, drive, settings, duration, dt)
     spans = [frame.span(number) for number in range(count)]
     poses = poses_through(drive.colliders, spans)
     position, previous = state.position.copy(), _previous(state, dt)
-    slices, pieces = _blocks(state.guide_count), frame.pieces(count)
-    made = (Block.of(state, frame, styles, guides) for guides in slices)
-    blocks = made if len(pieces) == 1 else list(made)
+    slices, substep_ranges = _blocks(state.guide_count), frame.substep_ranges(count)
+    blocks_on_demand = (Block.of(state, frame, styles, guides) for guides in slices)
+    blocks = blocks_on_demand if len(substep_ranges) == 1 else list(blocks_on_demand)
     push = None if frame.interaction is None else state.push
-    for numbers in pieces:
-        if frame.interaction is not None and (push is None or frame.interaction.is_due(numbers[0])):
-            neighbours = yield frame.stop(
-                state.rest, numbers[0], partial(_copies, position, previous)
+    for substeps in substep_ranges:
+        if frame.interaction is not None and (
+            push is None or frame.interaction.is_due(substeps[0])
+        ):
+            neighbours = yield frame.stop_before(
+                state.rest, substeps[0], partial(_copy_both, position, previous)
             )
             interaction = frame.interaction.with_neighbours(neighbours)
-            taken, push = interaction.friction_and_push(position, previous)
-            previous += taken
+            slowed, push = interaction.friction_and_push(position, previous)
+            previous += slowed
         for guides, block in zip(slices, blocks, strict=True):
             here, before = position[:, :, guides].copy(), previous[:, :, guides].copy()
             pushed = None if push is None else push[:, :, guides]
             position[:, :, guides], previous[:, :, guides] = _advance_block(
-                block, here, before, pushed, frame, spans, poses, numbers
+                block, here, before, pushed, frame, spans, poses, substeps
             )
     time = state.time + count * dt
-    carried = carried_after(state, frame, drive, settings, count)
-    return DynamicsState(position, previous, state.rest, dt, left, time, styles, push, carried)
+    root_places = root_places_after(state, frame, drive, settings, count)
+    return DynamicsState(
+        position, previous, state.rest, dt, time_left, time, styles, push, root_places
+    )
 
 
-def _copies(position: Floats, previous: Floats) -> tuple[Floats, Floats]:
+def _copy_both(position: Floats, previous: Floats) -> tuple[Floats, Floats]:
     return position.copy(), previous.copy()
 
 
@@ -119,7 +123,7 @@ def _previous(state: DynamicsState, dt: float) -> Floats:
 
 def _blocks(guide_count: int) -> list[slice]:
     """All guides in blocks of nearly the same size."""
-    count = -(-guide_count // BLOCK)
+    count = -(-guide_count // MAX_BLOCK_GUIDES)
     ends = [guide_count * number // count for number in range(count + 1)] if count else [0]
     return [slice(first, last) for first, last in pairwise(ends)]
 
@@ -132,60 +136,64 @@ def _advance_block(
     frame: Frame,
     spans: list[tuple[float, float]],
     poses: list[list[Pose]],
-    numbers: range,
+    substeps: range,
 ) -> tuple[Floats, Floats]:
     """Position and previous position after these substeps; overwrites the arrays passed."""
-    settings, rest, damped = frame.settings, block.rest, block.damped
-    spare = np.empty_like(position)
-    chain = Chain(rest.length, block.held, rest.size, settings)
-    led_out = settings.depenetration_speed * rest.size * frame.dt
+    settings, rest, damping_factors = frame.settings, block.rest, block.damping_factors
+    scratch = np.empty_like(position)
+    constraints = Chain(rest.length, block.held, rest.size, settings)
+    max_exit = settings.depenetration_speed * rest.size * frame.dt
     passes = settings.contact_passes if frame.drive.colliders else 0
-    is_arc, begun = block.style.carrier is not None, None
-    if is_arc:
-        first = frame.place(numbers[0] - 1) if frame.inherits else None
-        begun = block.style.at(spans[numbers[0]][0], first)
-    inherited = frame.inherited(numbers[0] - 1) if frame.inherits else None
-    for number in numbers:
+    moves_on_arc, style_before = block.style.carrier is not None, None
+    if moves_on_arc:
+        root_place = frame.root_place(substeps[0] - 1) if frame.inherits_motion else None
+        style_before = block.style.at(spans[substeps[0]][0], root_place)
+    inherited_motion = frame.inherited_motion(substeps[0] - 1) if frame.inherits_motion else None
+    for number in substeps:
         span = spans[number]
         style = block.style.at(span[1])
         here, before = position, previous
-        if inherited is not None:
-            here, before = position, inherited.moved(previous)
-            inherited = frame.inherited(number)
-            here, before = inherited.moved(here), inherited.moved(before)
-            begun = None if begun is None else inherited.moved(begun)
-        impulse = block.impulse_at(span, begun, style)
-        begun = style if is_arc else None
+        if inherited_motion is not None:
+            here, before = position, inherited_motion.apply(previous)
+            inherited_motion = frame.inherited_motion(number)
+            here, before = inherited_motion.apply(here), inherited_motion.apply(before)
+            style_before = None if style_before is None else inherited_motion.apply(style_before)
+        impulse = block.impulse_at(span, style_before, style)
+        style_before = style if moves_on_arc else None
         if push is not None:
             impulse = impulse + push
         air_displacement = frame.air_displacement(position[:, 0], number)
         if settings.drag:
-            brake(here, before, settings.drag, air_displacement)
+            apply_drag(here, before, settings.drag, air_displacement)
         if frame.force_fields is not None:
-            _blow(here, before, frame)
+            _apply_force_fields(here, before, frame)
         if air_displacement is not None:
-            impulse = impulse + air_displacement[:, None] * np.float32(damped.air)
-        predict(here, before, impulse, damped.kept, out=spare)
-        previous, position, spare = position, spare, previous
+            impulse = impulse + air_displacement[:, None] * np.float32(damping_factors.air)
+        predict(here, before, impulse, damping_factors.velocity, out=scratch)
+        previous, position, scratch = position, scratch, previous
         pin(position, style, rest.length, block.held)
         if block.springs is not None:
-            chain = replace(chain, length=block.springs.step(position, previous, rest.length))
-        restore_style(position, style, rest.shape, block.matrix)
+            constraints = replace(
+                constraints, length=block.springs.step(position, previous, rest.length)
+            )
+        restore_style(position, style, rest.shape, block.style_system)
         pin(position, style, rest.length, block.held)
-        chain.keep_lengths(position, None)
-        outside = Outside(chain, block.radius, block.between, poses[number], led_out, passes)
-        outside.keep(position, previous)
+        constraints.keep_lengths(position, None)
+        contact_solver = Outside(
+            constraints, block.radius, block.segment_radius, poses[number], max_exit, passes
+        )
+        contact_solver.keep(position, previous)
     return position, previous
 
 
-def _blow(position: Floats, previous: Floats, frame: Frame) -> None:
+def _apply_force_fields(position: Floats, previous: Floats, frame: Frame) -> None:
     """Apply the force fields to each free CV; changes `previous`, which holds the speed."""
     fields = frame.force_fields
     assert fields is not None, "it is asked where there are any"
     here, before = (np.ascontiguousarray(rows[:, PINNED:]) for rows in (position, previous))
-    along = along_strands(position)[:, PINNED:].reshape(3, -1) if fields.is_across else None
+    directions = along_strands(position)[:, PINNED:].reshape(3, -1) if fields.is_across else None
     flat = before.reshape(3, -1)
-    blow(here.reshape(3, -1), flat, fields, frame.dt, frame.size, along)
+    blow(here.reshape(3, -1), flat, fields, frame.dt, frame.size, directions)
     previous[:, PINNED:] = before
 
 
@@ -201,33 +209,33 @@ def grid_at_frame_end(
         duration: of the frame [s].
     """
     displacement: Floats = drive.target_now[:, :1] - state.position[:, 0].T[:, None]
-    beside_root = displacement_beside_root(state.time_left, drive, duration)
-    if beside_root is not None:
-        displacement = displacement + beside_root
-    turn, grid = turned_beside_root(state, settings), state.grid
-    if turn is not None:
+    held_displacement = remaining_displacement(state.time_left, drive, duration)
+    if held_displacement is not None:
+        displacement = displacement + held_displacement
+    rotation, grid = remaining_rotation(state, settings), state.grid
+    if rotation is not None:
         root = grid[:, :1]
-        grid = Carry(turn, np.zeros(3), np.zeros(3)).moved((grid - root).T).T + root
+        grid = RigidTransform(rotation, np.zeros(3), np.zeros(3)).apply((grid - root).T).T + root
     grid = (grid + displacement).astype(np.float32)
-    return seen(grid, drive.target_now, drive.simulated)
+    return visible_guides(grid, drive.target_now, drive.simulated)
 
 
-def turned_beside_root(state: DynamicsState, settings: DynamicsSettings) -> Floats | None:
+def remaining_rotation(state: DynamicsState, settings: DynamicsSettings) -> Floats | None:
     """The rotation (3, 3) of hair about its roots in the time left over, if it inherits theirs;
     None if it does not turn."""
     if not settings.inherit_rotation or not state.time_left:
         return None
-    left = state.carried.places[1].inverse
-    return left.part(0.0, settings.inherit_rotation).rotation
+    remaining_motion = state.root_places.places[1].inverse
+    return remaining_motion.scaled(0.0, settings.inherit_rotation).rotation
 
 
-def displacement_beside_root(time_left: float, drive: Drive, duration: float) -> Floats | None:
+def remaining_displacement(time_left: float, drive: Drive, duration: float) -> Floats | None:
     """The displacement of each CV of held guides relative to its root in the time left over, in the
     shape of the targets [m]; None if nothing is held or no time is left."""
     if drive.held is None or not time_left or not duration:
         return None
     displacement: Floats = drive.target_now - drive.target_at(1.0 - min(time_left / duration, 1.0))
     displacement -= displacement[:, :1]
-    displacement = drive.held.spread(displacement)
+    displacement = drive.held.interpolated(displacement)
     displacement[~drive.held.is_held.any(axis=1)] = 0.0
     return displacement

@@ -14,7 +14,7 @@ from ..arrays import Floats
 
 #: Limits of the ratio of the durations of the frame before and this one: after a pause or hiccup it
 #: says little about the speed.
-_RATIO = (0.25, 4.0)
+_RATIO_LIMITS = (0.25, 4.0)
 
 
 def curvature(earlier: Floats, before: Floats, now: Floats, ratio: float) -> Floats:
@@ -34,10 +34,12 @@ def curvature(earlier: Floats, before: Floats, now: Floats, ratio: float) -> Flo
 
 def clamped_ratio(ratio: float) -> float:
     """The ratio of durations as `curvature` uses it."""
-    return min(max(ratio, _RATIO[0]), _RATIO[1])
+    return min(max(ratio, _RATIO_LIMITS[0]), _RATIO_LIMITS[1])
 
 
-def at(before: Floats, displacement: Floats, curvature: Floats | None, moment: float) -> Floats:
+def value_at(
+    before: Floats, displacement: Floats, curvature: Floats | None, moment: float
+) -> Floats:
     """The value at a moment of the frame, 0 its begin and 1 its end."""
     number = before.dtype.type
     if curvature is None:

@@ -85,7 +85,7 @@ class Holds:
         return np.where(np.isin(kind.ravel(), none), 0, kind.ravel() + 1)
 
     def held_cvs(self, strand_count: int, cv_count: int) -> Bools:
-        """(strand_count, cv_count), see `dynamics.held.Held`."""
+        """(strand_count, cv_count), see `dynamics.held.HeldCvs`."""
         is_held = np.zeros((strand_count, cv_count), bool)
         first = self.place.astype(np.int64)
         is_held[self.strand, first] = True

@@ -84,7 +84,7 @@ class Riders:
         Args:
             strands: at rest.
             guides: (guide_count, cv_count, 3) [m] at rest, CVs evenly along each; centre lines.
-            room: (guide_count, cv_count - 1), see `center_lines.curl_room`; None: no curls.
+            room: (guide_count, cv_count - 1), see `center_lines.curl_slack`; None: no curls.
         """
         lengths = np.linalg.norm(np.diff(guides, axis=1), axis=2).sum(axis=1, dtype=np.float64)
         per_meter = (guides.shape[1] - 1) / np.maximum(lengths, SHORTEST)

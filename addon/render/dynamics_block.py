@@ -22,7 +22,7 @@ from ..dynamics.contacts import REACH, cv_radius
 from ..dynamics.force_fields import FARTHEST
 from ..dynamics.frame import Frame
 from ..dynamics.painted import PaintedFrame
-from ..dynamics.rigid_path import STILL
+from ..dynamics.rigid_path import NO_MOTION
 from ..dynamics.settings import DynamicsSettings
 from ..dynamics.springs import give, stiffness
 from ..dynamics.style import StyleBand, style_band
@@ -44,7 +44,7 @@ def moments_of(frame: Frame, first: int, spans: Floats) -> Floats:
     table = np.zeros((len(spans), MOMENT_TEXELS, 4), np.float32)
     begin, end = spans.T
     table[:, 0, 0] = end
-    table[:, 0, 2] = part = frame.damped.carried * (end - begin)
+    table[:, 0, 2] = part = frame.damping_factors.style * (end - begin)
     if frame.drive.target_earlier is not None:
         ratio = clamped_ratio(frame.drive.earlier_ratio)
         table[:, 0, 1] = end * (end - 1.0) / (ratio * (ratio + 1.0))
@@ -71,15 +71,15 @@ def carriers_of(frame: Frame, first: int, count: int) -> Floats:
         path = carrier.path
         ends = [frame.span(number)[1] for number in range(first, first + count)]
         places = [path.at(end) for end in ends]
-        places.append(frame.place(first - 1) if frame.inherits else path.at(begin))
-        table[:, 0] = [carrier.carry(place).texels for place in places]
-        table[-1, 2] = carrier.seen(path.now).texels
-        table[-1, 3] = carrier.seen(path.earlier or STILL).texels
-        table[-1, 4] = carrier.carry(path.at(0.5)).texels
-        table[-1, 2, 3, 3] = frame.damped.carried
-    if frame.inherits:
+        places.append(frame.root_place(first - 1) if frame.inherits_motion else path.at(begin))
+        table[:, 0] = [carrier.transform(place).texels for place in places]
+        table[-1, 2] = carrier.transform_back(path.now).texels
+        table[-1, 3] = carrier.transform_back(path.earlier or NO_MOTION).texels
+        table[-1, 4] = carrier.transform(path.at(0.5)).texels
+        table[-1, 2, 3, 3] = frame.damping_factors.style
+    if frame.inherits_motion:
         numbers = (*range(first, first + count), first - 1)
-        table[:, 1] = [frame.inherited(number).texels for number in numbers]
+        table[:, 1] = [frame.inherited_motion(number).texels for number in numbers]
     table[-1, :2, 3, 3] = begin, begin * (begin - 1.0) * bend
     table[-1, 4, 3, 3] = -0.25 * bend if carrier is not None else 0.0
     return table.reshape(count + 1, 20, 4)
@@ -108,8 +108,8 @@ def block_of(
     values[7:_NUMBERS] = (
         settings.length_tolerance,
         dt,
-        frame.damped.kept,
-        frame.damped.air,
+        frame.damping_factors.velocity,
+        frame.damping_factors.air,
         settings.drag,
         settings.friction,
         settings.depenetration_speed * frame.size * dt,
@@ -130,7 +130,7 @@ def _fill_forces(vectors: Floats, frame: Frame) -> None:
     square = np.float32(frame.dt * frame.dt)
     vectors[0, :3] = pull * np.float32(1.0 - settings.buoyancy) * square
     vectors[0, 3] = clamped_ratio(frame.drive.earlier_ratio)
-    combed = (frame.turn @ pull.astype(np.float64)).astype(np.float32)
+    combed = (frame.rotation @ pull.astype(np.float64)).astype(np.float32)
     vectors[1, :3] = combed * (np.float32(settings.sag_compensation) * square)
     if frame.force_fields is not None:
         vectors[2, 3] = frame.force_fields.factor
@@ -171,13 +171,13 @@ def own_of(frame: Frame, painted: PaintedFrame, cv_count: int) -> Floats:
     """`painted_numbers` of dynamics_pass, (guide_count, cv_count, 4) float32."""
     guide_count = len(painted.gravity)
     own = np.zeros((guide_count, cv_count, 4), np.float32)
-    own[..., 0] = bends_of(painted.matrix, cv_count, guide_count)
-    damped, carried = painted.damped, float(frame.damped.carried)
+    own[..., 0] = bends_of(painted.style_system, cv_count, guide_count)
+    damped, carried = painted.damping_factors, float(frame.damping_factors.style)
     own[:, 0] = np.stack(
         [
-            damped.kept,
+            damped.velocity,
             damped.air,
-            damped.carried / carried if carried else np.zeros(guide_count),
+            damped.style / carried if carried else np.zeros(guide_count),
             painted.gravity,
         ],
         axis=1,

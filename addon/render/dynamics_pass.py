@@ -12,17 +12,18 @@ strand_layout.strand_rows:
     rest_shapes    RGBA32F: for CV i xyz curvature [m] and w hold (style.LocalShape); for CV 0 x its
                    twist CV
     rest_lengths   R32F: [m] to the next CV
-    curl_rooms     R32F: of the segment to the next CV, see Rest.room; only where curls give
-    held_cvs       R32F: 1 where a CV is held (held.Held), else 0
+    curl_rooms     R32F: of the segment to the next CV, see Rest.curl_slack; only where curls give
+    held_cvs       R32F: 1 where a CV is held (held.HeldCvs), else 0
     force_fields   RGBA32F: see force_fields.ForceFields.table; only where any act
     clearances     RGBA32F: for each CV, see clearance.GuideClearance; only with colliders
-    beside_root    RGBA32F: xyz [m], see step.displacement_beside_root; this and held_cvs only where
+    beside_root    RGBA32F: xyz [m], see step.remaining_displacement; this and held_cvs only where
                    CVs are held
     painted_bands  RGBA32F: for each CV near and far factor, inverse pivot, pull (style.StyleBand)
     painted_numbers   RGBA32F: for a guide's first CV x fraction of the speed that damping leaves, y
                    fraction of the air's speed, z and w factors on the style's motion and gravity;
                    for all others x bend; this and painted_bands only where something is painted
-    carriers       RGBA32F: four texels for each rigid motion, see rigid_path.Carry.texels. Row n:
+    carriers       RGBA32F: four texels for each rigid motion, see rigid_path.RigidTransform.texels.
+        Row n:
                    the motion of all roots to the end of substep n; the motion that hair inherits in
                    it. In the last row: the same to the begin of the first substep, with s of that
                    moment in w of the origin; the same in the substep before, with s (s - 1) in w as
@@ -47,17 +48,17 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Floats
-from ..dynamics.clearance import GuideClearance, farthest_kept
+from ..dynamics.clearance import GuideClearance, max_clearance
 from ..dynamics.constraints import PINNED
 from ..dynamics.contacts import REACH
-from ..dynamics.frame import Drive, Frame, carried_after, check_drive
-from ..dynamics.held import Held
-from ..dynamics.neighbours import Steps, alone
+from ..dynamics.frame import Drive, Frame, check_drive, root_places_after
+from ..dynamics.held import HeldCvs
+from ..dynamics.neighbours import FrameSteps, run_alone
 from ..dynamics.painted import PaintedFrame
 from ..dynamics.schedule import due_substeps
 from ..dynamics.settings import DynamicsSettings
 from ..dynamics.state import DynamicsState, Rest, as_rows
-from ..dynamics.step import displacement_beside_root, turned_beside_root
+from ..dynamics.step import remaining_displacement, remaining_rotation
 from .capabilities import pair_format
 from .collider_textures import NOT_FOLLOWED, UploadedColliders
 from .dynamics_block import bands_of, block_of, carriers_of, moments_of, own_of, spans_of
@@ -186,28 +187,28 @@ class DynamicsPass:
             HairloomError: as step.advance; or a collider that the GPU does not support.
             ShaderError: the shader does not compile here.
         """
-        alone(self.steps(drive, settings, duration))
+        run_alone(self.steps(drive, settings, duration))
 
-    def steps(self, drive: Drive, settings: DynamicsSettings, duration: float) -> Steps[None]:
+    def steps(self, drive: Drive, settings: DynamicsSettings, duration: float) -> FrameSteps[None]:
         """As `advance`, in steps between which other grooms' hair is exchanged."""
         state, dt, longest = self._state, 1.0 / settings.substep_rate, settings.max_frame_time
         duration, count, left = due_substeps(state.time_left, duration, longest, dt)
         check_drive(state, drive, tuple(style for style, _ in self._styles))
-        carried = state.carried
+        carried = state.root_places
         if state.guide_count:
             self._upload(drive)
             frame = Frame.of(state, drive, settings, duration, dt) if count else None
-            carried = carried_after(state, frame, drive, settings, count)
+            carried = root_places_after(state, frame, drive, settings, count)
             if frame is not None:
                 yield from self._steps(frame, count, dt / state.substep if state.substep else 1.0)
             self._is_bridged = left > 0.0 or not count or drive.simulated is not None
             if self._is_bridged:
-                left_over = replace(state, time_left=left, carried=carried)
-                turn = turned_beside_root(left_over, settings)
-                self._bridge(displacement_beside_root(left, drive, duration), drive.simulated, turn)
+                left_over = replace(state, time_left=left, root_places=carried)
+                turn = remaining_rotation(left_over, settings)
+                self._bridge(remaining_displacement(left, drive, duration), drive.simulated, turn)
         self._state = replace(
             state,
-            carried=carried,
+            root_places=carried,
             substep=dt if count else state.substep,
             time_left=left,
             time=state.time + count * dt,
@@ -247,7 +248,7 @@ class DynamicsPass:
         self._block, self._hair_grid = UniformBlock(), HairGridPass()
         self._colliders.release()
         self._styles: list[tuple[Floats, Any]] = []  # of the last frame, with their textures
-        self._held: Held | None = None
+        self._held: HeldCvs | None = None
         self._clearance: GuideClearance | None = None
         self._painted: PaintedFrame | None = None
 
@@ -281,13 +282,13 @@ class DynamicsPass:
         textures["rest_shapes"] = texture_from(strand_rows(rest_shapes(rest)), "RGBA32F")
         lengths = of_segments(rest.length)
         textures["rest_lengths"] = texture_from(strand_rows(lengths), "R32F")
-        if rest.room is not None:
-            textures["curl_rooms"] = texture_from(strand_rows(of_segments(rest.room)), "R32F")
+        if rest.curl_slack is not None:
+            textures["curl_rooms"] = texture_from(strand_rows(of_segments(rest.curl_slack)), "R32F")
 
     def _upload_painted(self, frame: Frame) -> None:
         painted, (cv_count, guide_count) = frame.painted, self._state.position.shape[1:]
         if painted is not None:
-            bands = bands_of(painted.matrix, cv_count, guide_count)
+            bands = bands_of(painted.style_system, cv_count, guide_count)
             self._textures["painted_bands"] = texture_from(strand_rows(bands), "RGBA32F")
             numbers = strand_rows(own_of(frame, painted, cv_count))
             self._textures["painted_numbers"] = texture_from(numbers, "RGBA32F")
@@ -297,12 +298,12 @@ class DynamicsPass:
         known = (texture for other, texture in self._styles if other is style)
         return next(known, None) or points_texture(style)
 
-    def _steps(self, frame: Frame, count: int, speed_ratio: float) -> Steps[None]:
+    def _steps(self, frame: Frame, count: int, speed_ratio: float) -> FrameSteps[None]:
         """All substeps of a frame; the first is `speed_ratio` times as long as the one before."""
         self._is_pushed &= frame.interaction is not None
         if frame.painted is not self._painted:
             self._upload_painted(frame)
-        for numbers in frame.pieces(count):
+        for numbers in frame.substep_ranges(count):
             first, end = numbers[0], numbers[-1] + 1
             if frame.interaction is not None and (
                 frame.interaction.is_due(first) or not self._is_pushed
@@ -310,7 +311,7 @@ class DynamicsPass:
                 ratio = 1.0 if first else speed_ratio
                 read = partial(self._read_moving, ratio)
                 interaction = frame.interaction.with_neighbours(
-                    (yield frame.stop(self._state.rest, first, read))
+                    (yield frame.stop_before(self._state.rest, first, read))
                 )
                 self._hair_grid.update_pushes(interaction, self._textures, ratio, pair_format())
                 self._is_pushed = True
@@ -324,7 +325,7 @@ class DynamicsPass:
         spans, is_followed, is_sharp = spans_of(frame, first, count), False, False
         table = moments_of(frame, first, spans)
         if posed:
-            reach = REACH * frame.size + farthest_kept(settings, frame.size)
+            reach = REACH * frame.size + max_clearance(settings, frame.size)
             poses = colliders.moments(posed, spans, reach, frame.size, state.cv_count)
             limit, sharp = poses.reshape(len(spans), len(posed), -1, 4)[:, :, 12, :2].T
             is_followed, is_sharp = bool((limit < NOT_FOLLOWED).any()), bool(sharp.any())
@@ -338,7 +339,7 @@ class DynamicsPass:
             state.cv_count,
             relaxation=settings.length_solver == "relaxation",
             held=frame.drive.held is not None,
-            springs=state.rest.room is not None and settings.curl_stretch > 0.0,
+            springs=state.rest.curl_slack is not None and settings.curl_stretch > 0.0,
             pushed=frame.interaction is not None,
             air=frame.air is not None,
             force_fields=frame.force_fields is not None,
@@ -349,7 +350,7 @@ class DynamicsPass:
             sharp=is_sharp,
             clearance=bool(posed) and frame.drive.clearance is not None,
             painted=frame.painted is not None,
-            inherits=frame.inherits,
+            inherits=frame.inherits_motion,
             pairs=pair_format(),
         )
         block = block_of(frame, state.guide_count, state.cv_count, count, speed_ratio)

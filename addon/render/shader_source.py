@@ -131,7 +131,7 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
         "hair_grid_max_shift": repr(hair_grid.MAX_SHIFT),
         "hair_grid_pressed_friction": repr(hair_grid.PRESSED_FRICTION),
         "hair_grid_min_density": repr(hair_grid.MIN_DENSITY),
-        "blend_opposite": repr(float(blend.OPPOSITE)),
+        "blend_opposite": repr(float(blend.MIN_DIRECTION)),
         "held_sweeps": str(HELD_SWEEPS),
         "hold_sweeps": str(SWEEPS),
         "hold_near": repr(NEAR),

@@ -21,7 +21,7 @@ from .strand_set import StrandSet
 
 #: A strand that resampling shortens by less than this fraction has no curls that its CVs miss.
 _FAITHFUL = 0.02
-#: Largest `curl_room` of a segment: where curls cancel out, it would have no limit.
+#: Largest `curl_slack` of a segment: where curls cancel out, it would have no limit.
 _WIDEST = 20.0
 #: Points averaged at once, so that they stay in the cache.
 _CHUNK = 32_768
@@ -49,7 +49,7 @@ def center_lines(strands: StrandSet, cv_count: int) -> StrandSet:
     return replace(lines, points=points.reshape(-1, 3))
 
 
-def curl_room(length: Floats, lines: Floats) -> Floats | None:
+def curl_slack(length: Floats, lines: Floats) -> Floats | None:
     """How far each segment of centre lines can be drawn out until its curls are straight, as a
     fraction of its length, (n, cv_count - 1) float32; None if no strand is curled.
 

@@ -22,7 +22,7 @@ from hairloom.addon.blender.sessions.compute_solver import ComputeSolver
 from hairloom.addon.blender.sessions.numpy_solver import NumpySolver
 from hairloom.addon.dynamics.colliders import PosedCollider, SphereCollider
 from hairloom.addon.dynamics.measure import length_changes
-from hairloom.addon.dynamics.neighbours import alone
+from hairloom.addon.dynamics.neighbours import run_alone
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.groom.grow import grow, scalp_density
@@ -55,7 +55,7 @@ def poses(rig: Rig) -> list[Pose]:
 
 def advance(solver: Any, poses: list[Pose], settings: DynamicsSettings = SETTINGS) -> None:
     for pose in poses:
-        alone(solver.steps(FrameInput(pose, (), settings, GRAVITY, 1.0 / RATE)))
+        run_alone(solver.steps(FrameInput(pose, (), settings, GRAVITY, 1.0 / RATE)))
 
 
 def agree(found: np.ndarray, expected: np.ndarray, share: float = 1.0) -> bool:
@@ -132,7 +132,7 @@ def test_coils_bounce_alike_and_keep_their_lengths() -> None:
     heights = []
     for frame in range(1, 90):
         for solver in both:
-            alone(
+            run_alone(
                 solver.steps(FrameInput(pose(frame), (), DynamicsSettings(), GRAVITY, 1.0 / RATE))
             )
         found = numpy.strands()
@@ -154,7 +154,7 @@ def test_strands_that_are_led_out_do_not_depend_on_who_looks(rig: Rig, poses: li
         solver.rest(rig.rest_pose, known)
         for before, now in pairwise(poses[:8]):
             posed = (PosedCollider(ball, before.matrix, now.matrix),)
-            alone(solver.steps(FrameInput(now, posed, SETTINGS, GRAVITY, 1.0 / RATE)))
+            run_alone(solver.steps(FrameInput(now, posed, SETTINGS, GRAVITY, 1.0 / RATE)))
             if looks:
                 solver.strands()
         return solver.strands()
@@ -201,7 +201,7 @@ def test_baked_guides_are_shown_and_let_go(rig: Rig, poses: list[Pose], form: st
     assert solver.pose is pose
     assert np.array_equal(solver.guides(), baked)
     assert np.abs(solver.strands() - source.strands()).max() < 1.0e-6
-    alone(solver.steps(FrameInput(pose, (), SETTINGS, np.zeros(3), 1.0 / RATE)))
+    run_alone(solver.steps(FrameInput(pose, (), SETTINGS, np.zeros(3), 1.0 / RATE)))
     kept = np.abs(solver.guides() - baked).max()
     assert 0.0 < kept < 0.05, "they go towards their style, at first at no speed"
     with pytest.raises(HairloomError, match="Bake again"):

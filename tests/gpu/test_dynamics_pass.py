@@ -13,7 +13,7 @@ import pytest
 from grooms_together import Groom, play_frame
 from tiers import few_by_name, few_in_commits
 
-from hairloom.addon.dynamics.clearance import GuideClearance, farthest_kept, guide_clearance
+from hairloom.addon.dynamics.clearance import GuideClearance, guide_clearance, max_clearance
 from hairloom.addon.dynamics.colliders import (
     CapsuleCollider,
     Collider,
@@ -29,7 +29,7 @@ from hairloom.addon.dynamics.force_fields import (
     ForceField,
     ForceFields,
 )
-from hairloom.addon.dynamics.held import Held
+from hairloom.addon.dynamics.held import HeldCvs
 from hairloom.addon.dynamics.measure import deepest_penetration, max_stretch
 from hairloom.addon.dynamics.painted import PaintedGuides
 from hairloom.addon.dynamics.settings import DynamicsSettings
@@ -136,14 +136,14 @@ class Scene:
         return room
 
     @cached_property
-    def held(self) -> Held | None:
+    def held(self) -> HeldCvs | None:
         """Held CVs: every second tip, and a tie around every third guide."""
         if not self.is_held:
             return None
         held = np.zeros((self.guide_count, self.cv_count), bool)
         held[::2, -1] = True
         held[::3, self.cv_count // 2 : self.cv_count // 2 + 2] = True
-        return Held(held)
+        return HeldCvs(held)
 
     def colliders(self, frame: int) -> tuple[PosedCollider, ...]:
         earlier, before, now = (shaking((frame + k) / self.fps) for k in (-1, 0, 1))
@@ -205,7 +205,7 @@ class Scene:
         if not self.is_combed:
             return None
         begun = tuple(posed.at_begin() for posed in self.colliders(0))
-        return guide_clearance(self.carried(0.0), begun, farthest_kept(self.settings, 0.2))
+        return guide_clearance(self.carried(0.0), begun, max_clearance(self.settings, 0.2))
 
 
 BALL = SphereCollider(np.array([0.0, 0.0, 0.0]), 0.095)

@@ -282,7 +282,7 @@ def coiled(count: int = 200) -> Rig:
 
 def test_curls_are_drawn_out_as_in_numpy() -> None:
     rig = coiled()
-    assert rig.curl_room is not None and 0 < rig.curl_room.any(axis=1).sum() < 30
+    assert rig.curl_slack is not None and 0 < rig.curl_slack.any(axis=1).sum() < 30
     ride, matrix = pass_of(rig), turned(0.7, (0.1, 0.0, 0.0))
     pose = Pose(None, matrix)
     guides = motion_flow.carried_guides(rig, pose).astype(np.float64)

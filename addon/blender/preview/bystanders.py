@@ -7,7 +7,7 @@ import numpy as np
 
 from ... import motion_flow
 from ...arrays import Floats
-from ...dynamics.neighbours import Style
+from ...dynamics.neighbours import NeighbourStyle
 from ...errors import HairloomError
 from ...rig_flow import Pose, Rig
 from ..bakes import playback
@@ -61,7 +61,7 @@ class Bystander:
         """See `coupled_frame.FeltGroom`."""
         return self._guides
 
-    def neighbour_style(self) -> Style:
+    def neighbour_style(self) -> NeighbourStyle:
         """See `motion_flow.neighbour_style`."""
         return motion_flow.neighbour_style(self.rig, self.pose, self._rest_rig)
 

@@ -10,7 +10,7 @@ import numpy as np
 from ... import motion_flow
 from ...arrays import Floats
 from ...dynamics.colliders import PosedCollider
-from ...dynamics.neighbours import Steps
+from ...dynamics.neighbours import FrameSteps
 from ...dynamics.painted import PaintedGuides
 from ...dynamics.settings import DynamicsSettings
 from ...motion_flow import FrameInput, Motion
@@ -83,7 +83,7 @@ class ComputeSolver(BaseSolver):
         )
         self._ride.lead_out.set_clearance(self._motion.clearance)
 
-    def steps(self, frame: FrameInput) -> Steps[None]:
+    def steps(self, frame: FrameInput) -> FrameSteps[None]:
         if self._is_baked:
             self._take(self.motion)
         if self._motion.clearance is not None and not self._is_resting:

@@ -1,7 +1,7 @@
 """Grooms that feel each other are simulated together in each frame, see `dynamics.neighbours`.
 
     with CoupledFrame(sessions) as frame:
-        ...                         each session is moved as if it were alone; those that feel
+        ...                         each session is moved as if it were run_alone; those that feel
                                     others wait
         frame.simulate_coupled()    those that waited are simulated, all together
 
@@ -20,7 +20,7 @@ import numpy as np
 
 from ... import motion_flow
 from ...arrays import Floats
-from ...dynamics.neighbours import Mover, Straight, Style, go_together
+from ...dynamics.neighbours import AdvancingGroom, LinearMotion, NeighbourStyle, advance_together
 from ...rig_flow import Pose, Rig
 from .session import Session
 
@@ -47,7 +47,7 @@ class FeltGroom(Protocol):
     def guides(self) -> Floats:
         """Its guides, (guide_count, cv_count, 3) [m, world]."""
 
-    def neighbour_style(self) -> Style:
+    def neighbour_style(self) -> NeighbourStyle:
         """See `motion_flow.neighbour_style`."""
 
 
@@ -60,20 +60,20 @@ class _GroomStart:
     """
 
     groom: FeltGroom
-    style: Style
+    style: NeighbourStyle
     guides: Floats
     reach: float
     near: frozenset[int]
 
     @property
-    def mover(self) -> Mover:
+    def mover(self) -> AdvancingGroom:
         """The groom's motion in the frame, once all grooms that do not wait have been moved."""
         groom = self.groom
-        straight = Straight(self.guides, groom.guides, self.reach)
+        straight = LinearMotion(self.guides, groom.guides, self.reach)
         if not isinstance(groom, Session):
-            return Mover(groom.uid, self.style, straight)
+            return AdvancingGroom(groom.uid, self.style, straight)
         waiting, known = groom.pending_steps, groom.known_hair
-        return Mover(groom.uid, self.style, straight, waiting, self.near, known)
+        return AdvancingGroom(groom.uid, self.style, straight, waiting, self.near, known)
 
 
 class CoupledFrame:
@@ -106,7 +106,7 @@ class CoupledFrame:
         waiting = [session for session in self._sessions if session.pending_steps is not None]
         if waiting:
             movers = {start.groom.uid: start.mover for start in self._starts}
-            go_together(tuple(movers.values()))
+            advance_together(tuple(movers.values()))
             for session in waiting:
                 mover = movers[session.uid]
                 session.known_hair, session.failure = mover.known, mover.error

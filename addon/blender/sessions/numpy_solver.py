@@ -8,7 +8,7 @@ from typing import Self
 from ... import motion_flow
 from ...arrays import Floats
 from ...dynamics.colliders import PosedCollider
-from ...dynamics.neighbours import Steps
+from ...dynamics.neighbours import FrameSteps
 from ...dynamics.painted import PaintedGuides
 from ...dynamics.settings import DynamicsSettings
 from ...motion_flow import FrameInput, Motion
@@ -48,7 +48,7 @@ class NumpySolver(BaseSolver):
             self._rig, self._motion, colliders, settings, painted
         )
 
-    def steps(self, frame: FrameInput) -> Steps[None]:
+    def steps(self, frame: FrameInput) -> FrameSteps[None]:
         # so that motion does not depend on which frames are shown
         led = NOT_LED if self._motion.clearance is None else self.led_out_strands()
         motion = yield from motion_flow.steps(self._rig, self.motion, frame, led)

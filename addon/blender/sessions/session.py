@@ -15,7 +15,7 @@ from ...arrays import Floats
 from ...comb_flow import combed_rig
 from ...dynamics.colliders import PosedCollider
 from ...dynamics.figures import CardFigures, Figures, Measure
-from ...dynamics.neighbours import KnownHair, Steps, Style, alone
+from ...dynamics.neighbours import FrameSteps, KnownNeighbours, NeighbourStyle, run_alone
 from ...dynamics.settings import DynamicsSettings
 from ...dynamics.state import start
 from ...errors import HairloomError
@@ -110,9 +110,9 @@ class Session:
         self._posed_colliders: tuple[PosedCollider, ...] = ()
         self._field_notes: tuple[str, ...] = ()
         self._styled_rig: Rig | None = None
-        self.known_hair = KnownHair()
+        self.known_hair = KnownNeighbours()
         self.is_coupled = False
-        self.pending_steps: Steps[None] | None = None
+        self.pending_steps: FrameSteps[None] | None = None
         self.failure: Exception | None = None
         self.figures: Figures | None = None
         self.card_figures: CardFigures | None = None
@@ -501,7 +501,7 @@ class Session:
         """
         self._take_style(depsgraph)
         pose, self.figures, self.card_figures = self._pose(depsgraph), None, None
-        self._motion_start, self._is_recorded, self.known_hair = None, False, KnownHair()
+        self._motion_start, self._is_recorded, self.known_hair = None, False, KnownNeighbours()
         _, self._field_notes = force_fields_of(self.hair.found(), depsgraph)
         if not self.is_playing or self.obstacles is None:
             self.solver.rest(pose)
@@ -516,7 +516,7 @@ class Session:
             self._contacts.store(start, self.solver.motion)
             rate = frame_rate(depsgraph.scene)
             for _ in range(self.settings[DynamicsSettings].pre_roll):
-                alone(self._simulate(depsgraph, 1.0 / rate))
+                run_alone(self._simulate(depsgraph, 1.0 / rate))
         self._show()
 
     def _take_style(self, depsgraph: bpy.types.Depsgraph) -> None:
@@ -605,7 +605,7 @@ class Session:
         if self.is_coupled:
             self.pending_steps = steps
         else:
-            alone(steps)
+            run_alone(steps)
 
     def finish_frame(self) -> None:
         """Finish a frame that was simulated together with others.
@@ -617,7 +617,7 @@ class Session:
         if failure is not None:
             raise failure
 
-    def _steps(self, depsgraph: bpy.types.Depsgraph, duration: float) -> Steps[None]:
+    def _steps(self, depsgraph: bpy.types.Depsgraph, duration: float) -> FrameSteps[None]:
         """The steps of `advance`. With other grooms, the measured time is that of all of them."""
         with self.times.measured("simulation"):
             self._is_recorded = False
@@ -646,13 +646,13 @@ class Session:
         """The shown guides, (guide_count, cv_count, 3) [m, world]; reads back from a GPU."""
         return self.solver.guides()
 
-    def neighbour_style(self) -> Style:
+    def neighbour_style(self) -> NeighbourStyle:
         """See `motion_flow.neighbour_style`."""
         return motion_flow.neighbour_style(self.rig, self.solver.pose, self.groom.rig)
 
     def _simulate(
         self, depsgraph: bpy.types.Depsgraph, duration: float, time_scale: float = 1.0
-    ) -> Steps[None]:
+    ) -> FrameSteps[None]:
         """Simulate a frame of this duration [s]; the hair's time runs faster by this factor."""
         pose, settings = self._pose(depsgraph), self.settings[DynamicsSettings]
         goes_along = not time_scale or self.solver.has_jumped(pose, settings, duration)
@@ -683,7 +683,7 @@ class Session:
         """A measure for the frames since rest; the hair must be simulated."""
         assert self._motion_start is not None, "it is simulated"
         pose, posed, rig = self._motion_start.pose, self._motion_start.colliders, self.rig
-        guides = start(motion_flow.carried_guides(rig, pose), rig.curl_room)
+        guides = start(motion_flow.carried_guides(rig, pose), rig.curl_slack)
         return Measure(guides, motion_flow.carried_strands(rig, pose), rig.strands.offsets, posed)
 
     def measure_into(self, measure: Measure) -> None:
@@ -691,7 +691,7 @@ class Session:
         guides, rig = self.solver.guides(), self.rig
         if self._styled_rig is not None:
             style = motion_flow.carried_guides(rig, self.solver.pose)
-            measure.take_style(start(style, rig.curl_room))
+            measure.take_style(start(style, rig.curl_slack))
         measure.add(self.solver.strands(), self._rest_lengths(), guides, self._posed_colliders)
 
     def _rest_lengths(self) -> Floats:
@@ -742,7 +742,7 @@ class Session:
         self._use_rig(baked.styled_rig(frame))
         pose = replace(baked.pose(frame), solids=solids)
         self.solver.show_baked(pose, frame["guides"], led_out_in(frame))
-        self._is_recorded, self.known_hair = True, KnownHair()
+        self._is_recorded, self.known_hair = True, KnownNeighbours()
         self._show()
 
     def _show(self) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 from ... import rig_flow
 from ...arrays import Floats
 from ...dynamics.colliders import PosedCollider
-from ...dynamics.neighbours import Steps, alone
+from ...dynamics.neighbours import FrameSteps, run_alone
 from ...dynamics.painted import PaintedGuides
 from ...dynamics.settings import DynamicsSettings
 from ...errors import HairloomError
@@ -72,7 +72,7 @@ class Solver(Protocol):
         """Find how far hair stays from colliders, see `motion_flow.with_clearance`. Without this
         call, `steps` does so."""
 
-    def steps(self, frame: FrameInput) -> Steps[None]:
+    def steps(self, frame: FrameInput) -> FrameSteps[None]:
         """One frame of motion, as `motion_flow.steps`."""
 
     def take_style(self, rig: Rig) -> None:
@@ -186,7 +186,7 @@ def _test_frame_error() -> str:
     ends = []
     try:
         for solver in (NumpySolver(rig), ComputeSolver(rig)):
-            alone(solver.steps(frame))
+            run_alone(solver.steps(frame))
             ends.append(solver.strands())
     except Exception as error:  # a driver may fail at any point, each with an error of its own
         return f"{type(error).__name__}: {error}"

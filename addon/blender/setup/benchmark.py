@@ -19,7 +19,7 @@ import gpu
 import numpy as np
 
 from ... import rig_flow
-from ...dynamics.neighbours import alone
+from ...dynamics.neighbours import run_alone
 from ...dynamics.settings import DynamicsSettings
 from ...groom.settings import GuideSettings
 from ...motion_flow import FrameInput
@@ -109,7 +109,7 @@ class _Bench:
         moved = np.eye(4)
         moved[0, 3] = 0.02 * np.sin(0.3 * self.moments)
         frame = FrameInput(Pose(None, moved), (), DynamicsSettings(), _GRAVITY, _FRAME)
-        alone(self.solver.steps(frame))
+        run_alone(self.solver.steps(frame))
         self.shown()
 
     def shown(self) -> Snapshot:

@@ -11,9 +11,9 @@ import numpy as np
 from ...arrays import Bools, Floats, Ints
 from ...dynamics.colliders import signed_distance
 from ...dynamics.contacts import radius_of_all
+from ...dynamics.groom_rotation import fit_rotation, sample_guides
 from ...dynamics.hair_grid import GRID_OFFSET
 from ...dynamics.settings import DynamicsSettings
-from ...dynamics.turn import rotation_from, sample
 from ..sessions.session import Session
 
 type Color = tuple[float, float, float, float]
@@ -88,7 +88,7 @@ def density_lines(session: Session) -> Colored:
     if not len(guides):
         return
     grid = rest.hair_grid
-    turn = rotation_from(rest.sample, sample(guides))
+    turn = fit_rotation(rest.sample_points, sample_guides(guides))
     middle = guides[:, 0].mean(axis=0, dtype=np.float64)
     place = grid.placement(turn, middle)
     at_rest, _ = _cells(grid.placement(np.eye(3), grid.middle).to_cells(rest.position), grid.mass)

@@ -11,8 +11,8 @@ import numpy as np
 from ...arrays import Floats, Ints
 from ...errors import HairloomError
 from ...strands.vectors import dot_rows
-from ..rigid_path import Rigid, RigidPath
-from ..trajectory import at, curvature
+from ..rigid_path import RigidMotion, RigidPath
+from ..trajectory import curvature, value_at
 
 #: A collider whose smallest scale is below this fraction of the largest is flat, as when it is
 #: mirrored within a frame. Then it does not collide.
@@ -90,7 +90,7 @@ class PosedCollider:
     def matrix_at(self, moment: float) -> Floats:
         """Object to world (4, 4) float64 at `moment`, 0 the frame's begin and 1 its end."""
         before, displacement, bent = self._seen
-        matrix = at(before, displacement, bent, moment)
+        matrix = value_at(before, displacement, bent, moment)
         if self._arc is None:
             return matrix
         moments = np.ravel(moment).tolist()
@@ -159,7 +159,7 @@ class PosedCollider:
         ]
 
 
-def _rigid_between(before: Floats, now: Floats) -> Rigid | None:
+def _rigid_between(before: Floats, now: Floats) -> RigidMotion | None:
     """The rigid part of the motion from one matrix to another; None if it mirrors.
 
     It moves the object's origin exactly; any other difference is a change of shape.
@@ -169,10 +169,10 @@ def _rigid_between(before: Floats, now: Floats) -> Rigid | None:
     rotation = left @ right
     if np.linalg.det(rotation) < 0.0:
         return None
-    return Rigid(rotation, now[:3, 3] - rotation @ before[:3, 3])
+    return RigidMotion(rotation, now[:3, 3] - rotation @ before[:3, 3])
 
 
-def _matrix_of(place: Rigid) -> Floats:
+def _matrix_of(place: RigidMotion) -> Floats:
     """The (4, 4) matrix of a rigid motion."""
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = place.rotation, place.shift

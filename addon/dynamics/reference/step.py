@@ -16,15 +16,15 @@ from ...arrays import Floats
 from ...params.curve import along as curve_along
 from ..constraints import CONTACT_WEIGHT, HELD, HELD_SWEEPS, PINNED, ROUNDING
 from ..contacts import BETWEEN, MORE_ROUNDS, PART_PASSES, PARTS
-from ..frame import Frame, carried_after, inherits
+from ..frame import Frame, inherits_motion, root_places_after
+from ..groom_rotation import best_rotation
 from ..hair_grid import UPDATES_PER_SECOND
-from ..rigid_path import Carry, Rigid
+from ..rigid_path import RigidMotion, RigidTransform
 from ..settings import DynamicsSettings
 from ..springs import STEEPEST, give, stiffness
 from ..state import DynamicsState
 from ..step import Drive
 from ..trajectory import curvature
-from ..turn import best_rotation
 from ..wind import air_of
 from .contacts import (
     Moment,
@@ -60,8 +60,12 @@ def advance_slowly(
     for number in range(count):
         push.before(number, guides)
         assert frame is not None
-        carries = [frame.inherited(k) for k in (number - 1, number)] if frame.inherits else []
-        placed = frame.place(number - 1) if frame.inherits else None
+        carries = (
+            [frame.inherited_motion(k) for k in (number - 1, number)]
+            if frame.inherits_motion
+            else []
+        )
+        placed = frame.root_place(number - 1) if frame.inherits_motion else None
         begin = (number * dt - state.time_left) / duration
         moment = Moment(begin, begin + dt / duration, state.time + number * dt, dt)
         for guide in guides:
@@ -73,14 +77,14 @@ def advance_slowly(
     left = max(time - count * dt, 0.0)
     substep = dt if count else state.substep
     time = state.time + count * dt
-    carried = carried_after(state, frame, drive, settings, count)
+    carried = root_places_after(state, frame, drive, settings, count)
     return DynamicsState(
         position, previous, state.rest, substep, left, time, (), push.rows, carried
     )
 
 
-def _carried(carry: Carry, points: Floats) -> Floats:
-    result: Floats = (points - carry.origin) @ carry.rotation.T + carry.there
+def _carried(carry: RigidTransform, points: Floats) -> Floats:
+    result: Floats = (points - carry.origin) @ carry.rotation.T + carry.moved_origin
     return result
 
 
@@ -149,7 +153,7 @@ class _Guide:
         self.rest_length = [float(np.linalg.norm(b - a)) for a, b in pairwise(self.rest)]
         self.push = np.zeros_like(self.x)  # by other guides, in each substep
         self.length = self.rest_length  # the lengths to keep in this substep
-        room = state.rest.room
+        room = state.rest.curl_slack
         self.room = np.zeros(len(self.length)) if room is None else room[:, guide].astype(float)
         self.size = state.rest.size
         self.held = [False] * len(self.x)
@@ -158,7 +162,7 @@ class _Guide:
         self.clearance = np.full((len(self.x), 1 + len(BETWEEN)), np.inf)
         if drive.clearance is not None:
             self.clearance = drive.clearance.distances[guide].astype(np.float64)
-        self.carrier = drive.carrier if inherits(settings) else drive.style_carrier
+        self.carrier = drive.carrier if inherits_motion(settings) else drive.style_carrier
         self.before = drive.target_before[guide].astype(np.float64)
         now, earlier = drive.target_now[guide].astype(np.float64), drive.target_earlier
         self.curvature = np.zeros_like(now)
@@ -181,7 +185,11 @@ class _Guide:
         )
 
     def substep(
-        self, drive: Drive, moment: Moment, carries: list[Carry], placed: Rigid | None
+        self,
+        drive: Drive,
+        moment: Moment,
+        carries: list[RigidTransform],
+        placed: RigidMotion | None,
     ) -> None:
         """Args:
         carries: the motion that hair takes over from the roots without inertia, in the previous
@@ -273,7 +281,7 @@ class _Guide:
         if settings.length_solver == "direct":
             self._finish_lengths(normals, settings)
 
-    def _style_at(self, fraction: float, place: Rigid | None = None) -> Floats:
+    def _style_at(self, fraction: float, place: RigidMotion | None = None) -> Floats:
         seen = (
             self.before
             + self.displacement * fraction
@@ -284,7 +292,7 @@ class _Guide:
         place, pivot = place or self.carrier.path.at(fraction), self.carrier.pivot
         return (seen - pivot) @ place.rotation.T + pivot + place.shift
 
-    def _as_carrier_sees(self, points: Floats, place: Rigid) -> Floats:
+    def _as_carrier_sees(self, points: Floats, place: RigidMotion) -> Floats:
         assert self.carrier is not None
         pivot = self.carrier.pivot
         return (points - pivot - place.shift) @ place.rotation + pivot

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hairloom.addon.dynamics.clearance import GuideClearance, farthest_kept, guide_clearance
+from hairloom.addon.dynamics.clearance import GuideClearance, guide_clearance, max_clearance
 from hairloom.addon.dynamics.colliders import Collider, PosedCollider
 from hairloom.addon.dynamics.force_fields import NO_FIELDS, ForceFields
-from hairloom.addon.dynamics.held import Held
+from hairloom.addon.dynamics.held import HeldCvs
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import DynamicsState, start
 from hairloom.addon.dynamics.step import Drive, advance
@@ -191,7 +191,7 @@ class Scene:
         targets = [moved(self.motion(t), self.grid) for t in (2 * before - now, before, now)]
         earlier = targets[0] if self.bowed else None
         colliders = self.colliders(before, now)
-        held = None if self.held is None else Held(np.asarray(self.held, bool))
+        held = None if self.held is None else HeldCvs(np.asarray(self.held, bool))
         return Drive(
             *targets[1:],
             colliders,
@@ -207,7 +207,7 @@ class Scene:
     def clearance(self) -> GuideClearance:
         begun = moved(self.motion(0.0), self.grid)
         length = np.linalg.norm(np.diff(begun, axis=1), axis=2).sum(axis=1)
-        reach = farthest_kept(self.settings, float(np.median(length)))
+        reach = max_clearance(self.settings, float(np.median(length)))
         return guide_clearance(begun, self.colliders(0.0, 0.0), reach)
 
     def play(self, seconds: float, fps: float = 60.0) -> list[DynamicsState]:

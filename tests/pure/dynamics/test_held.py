@@ -3,21 +3,21 @@
 import numpy as np
 
 from hairloom.addon.dynamics.constraints import PINNED, directions, pin
-from hairloom.addon.dynamics.held import Held
+from hairloom.addon.dynamics.held import HeldCvs
 from hairloom.addon.dynamics.settings import DynamicsSettings
 
 
 def test_pinned_cvs_count_for_nothing():
-    rows = Held(np.ones((2, 6), bool)).rows
+    rows = HeldCvs(np.ones((2, 6), bool)).rows
     assert (rows[:PINNED] == 0.0).all()
     assert (rows[PINNED:] == 1.0).all()
 
 
 def test_values_change_evenly_between_held_cvs(kit):
-    held = Held(kit.tied([True, False], 9, 5))
+    held = HeldCvs(kit.tied([True, False], 9, 5))
     values = np.zeros((2, 9, 3))
     values[:, 1], values[:, 5], values[:, 6] = 1.0, 5.0, 7.0
-    spread = held.spread(values)
+    spread = held.interpolated(values)
     np.testing.assert_allclose(spread[0, :, 1], [0, 1, 2, 3, 4, 5, 7, 7, 7])
     np.testing.assert_allclose(spread[1, :, 1], [0, 1, 1, 1, 1, 1, 1, 1, 1])
 
@@ -26,7 +26,7 @@ def test_neighbours_keep_their_distance_wherever_their_tie_goes(kit):
     """A tie that is torn off, or that shrinks to a point, leaves every length as it was."""
     rows = np.ascontiguousarray(kit.straight(3, 8).transpose(2, 1, 0))
     length = np.linalg.norm(np.diff(rows, axis=1), axis=0)
-    held = Held(kit.tied([True] * 3, 8, 4)).rows
+    held = HeldCvs(kit.tied([True] * 3, 8, 4)).rows
     carried = rows.copy()
     carried[:, 4:6, 0] += np.array([[5.0], [0.0], [0.0]])  # far away
     carried[:, 4:6, 1] = 0.9 * carried[:, 4:5, 1] + 0.1 * carried[:, 4:6, 1]  # shrunk

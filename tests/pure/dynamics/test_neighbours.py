@@ -15,7 +15,12 @@ from hairloom.addon.dynamics.hair_grid import (
     NeighbourCvs,
     Neighbours,
 )
-from hairloom.addon.dynamics.neighbours import KnownHair, Style, alone, hair_of
+from hairloom.addon.dynamics.neighbours import (
+    KnownNeighbours,
+    NeighbourStyle,
+    hair_length_of_guides,
+    run_alone,
+)
 from hairloom.addon.dynamics.reference.hair_grid import (
     GroomPoints,
     NeighbourPoints,
@@ -23,7 +28,7 @@ from hairloom.addon.dynamics.reference.hair_grid import (
 )
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import start
-from hairloom.addon.dynamics.step import Drive, advance, steps
+from hairloom.addon.dynamics.step import Drive, advance, advance_in_steps
 
 FRAME, DT = 1.0 / 24.0, 1.0 / 180.0
 FULL = DynamicsSettings(volume=1.0, **SOFT_STYLE)
@@ -131,8 +136,8 @@ def test_at_rest_nothing_acts_wherever_the_head_is(angle):
     """No push between two grooms that are combed into each other."""
     one, other = tail(300), tail(200, seed=2) * np.float32(1.03)
     rest, turn, move = start(one).rest, rotation_matrix(angle), np.array([3.0, -1.0, 0.5])
-    style = Style(lambda: other, hair_of(other, np.ones(200)), other)
-    known = KnownHair().meeting(rest, one, {1: style})
+    style = NeighbourStyle(lambda: other, hair_length_of_guides(other, np.ones(200)), other)
+    known = KnownNeighbours().updated(rest, one, {1: style})
     assert known.grid is not rest.hair_grid
     rows = [
         np.ascontiguousarray((grid @ turn.T + move).transpose(2, 1, 0), np.float32)
@@ -231,9 +236,9 @@ def test_neighbours_counts_for_the_strands_it_stands_for():
     found = []
     nine = np.repeat(other, 9, axis=0)
     for guides, strands in ((other, 10.0), (other[::2], 20.0), (nine, 10.0 / 9.0)):
-        hair = hair_of(guides, np.full(len(guides), strands))
-        style = Style(lambda guides=guides: guides, hair, guides)
-        grid = KnownHair().meeting(rest, one, {1: style}).grid
+        hair = hair_length_of_guides(guides, np.full(len(guides), strands))
+        style = NeighbourStyle(lambda guides=guides: guides, hair, guides)
+        grid = KnownNeighbours().updated(rest, one, {1: style}).grid
         found.append((grid.rest_density * grid.cell**-3).mean())
     np.testing.assert_allclose(found, found[0], rtol=0.1)
 
@@ -242,12 +247,14 @@ def test_an_animated_style_does_not_forget_how_others_were_combed():
     """The grid has the new style, and other hair as it was when they first met."""
     one, other = tail(200), tail(200, seed=2)
     places = iter([other, other + np.float32([0.01, 0.0, 0.0])])
-    style = Style(lambda: next(places), hair_of(other, np.ones(200)), other)
-    first = KnownHair().meeting(start(one).rest, one, {1: style})
+    style = NeighbourStyle(lambda: next(places), hair_length_of_guides(other, np.ones(200)), other)
+    first = KnownNeighbours().updated(start(one).rest, one, {1: style})
     bent = one * np.float32([1.1, 1.0, 1.0])
-    second = first.meeting(start(bent).rest, bent, {1: style})
-    assert second.at_rest[1][1] is first.at_rest[1][1]
-    expected = KnownHair().meeting(start(bent).rest, one, {1: replace(style, read=lambda: other)})
+    second = first.updated(start(bent).rest, bent, {1: style})
+    assert second.rest_cvs[1][1] is first.rest_cvs[1][1]
+    expected = KnownNeighbours().updated(
+        start(bent).rest, one, {1: replace(style, read_guides=lambda: other)}
+    )
     np.testing.assert_allclose(second.grid.rest_density, expected.grid.rest_density, rtol=0.02)
     assert np.abs(second.grid.rest_density - first.grid.rest_density).max() > 0.1
 
@@ -270,5 +277,8 @@ def test_what_is_known_of_others_is_kept():
 def test_alone_is_without_others():
     state = start(tail(60))
     drive = Drive(tail(60), tail(60), (), np.array([0.0, 0.0, -9.81]))
-    one, other = advance(state, drive, FULL, FRAME), alone(steps(state, drive, FULL, FRAME))
+    one, other = (
+        advance(state, drive, FULL, FRAME),
+        run_alone(advance_in_steps(state, drive, FULL, FRAME)),
+    )
     assert np.array_equal(one.position, other.position)

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hairloom.addon.dynamics.painted import PaintedGuides, painted_frame, simulated_of
+from hairloom.addon.dynamics.painted import PaintedGuides, painted_frame, simulated_fraction
 from hairloom.addon.dynamics.reference.step import advance_slowly
 from hairloom.addon.dynamics.settings import DynamicsSettings
-from hairloom.addon.dynamics.step import BLOCK, advance
+from hairloom.addon.dynamics.step import MAX_BLOCK_GUIDES, advance
 from hairloom.addon.errors import HairloomError
 
 #: tolerance [m] of float32 against float64 after 0.2 s, see test_reference
@@ -78,10 +78,10 @@ def test_hair_painted_without_volume_feels_no_other(kit, shake):
 
 def test_blocks_have_their_own_columns(kit):
     """More guides than one block holds, each with another value, move as each does alone."""
-    count = BLOCK + 30
+    count = MAX_BLOCK_GUIDES + 30
     grid = np.repeat(kit.curly(1, 6), count, axis=0)
     factor = np.linspace(0.0, 2.0, count)[None]
-    chosen = np.array([0, BLOCK // 2, BLOCK - 1, count - 1])
+    chosen = np.array([0, MAX_BLOCK_GUIDES // 2, MAX_BLOCK_GUIDES - 1, count - 1])
     ends = []
     for some in (np.arange(count), chosen):
         painted = PaintedGuides({"style_root": factor[:, some], "gravity": factor[:, some]})
@@ -96,8 +96,8 @@ def test_what_is_painted_stays_in_the_range_of_its_setting():
     settings = DynamicsSettings(volume=0.5, influence=0.5)
     frame = painted_frame(painted, settings, 8, 3, 1.0 / 180.0)
     np.testing.assert_array_equal(frame.volume, np.full(3, 2.0), "half of it times 2 is all")
-    np.testing.assert_array_equal(simulated_of(painted, settings, 3), np.ones(3))
-    assert simulated_of(None, DynamicsSettings(), 3) is None
+    np.testing.assert_array_equal(simulated_fraction(painted, settings, 3), np.ones(3))
+    assert simulated_fraction(None, DynamicsSettings(), 3) is None
 
 
 @pytest.mark.parametrize("factors", [np.ones((1, 7)), np.full((1, 8), np.nan), np.ones((4, 8))])

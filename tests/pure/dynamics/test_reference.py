@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from tiers import few_in_commits
 
-from hairloom.addon.dynamics.clearance import farthest_kept, guide_clearance
+from hairloom.addon.dynamics.clearance import guide_clearance, max_clearance
 from hairloom.addon.dynamics.colliders import (
     CapsuleCollider,
     DistanceField,
@@ -235,7 +235,7 @@ def test_segments_at_what_is_thin_and_fast(kit, is_mesh, is_combed, speed):
     if is_combed:  # near enough to make a difference
         aside = kit.translation(0.0, 0.04, 0.0)
         near = [PosedCollider(thin, aside @ motion(0.0), aside @ motion(0.0))]
-        clearance = guide_clearance(grid, near, farthest_kept(settings, 0.25))
+        clearance = guide_clearance(grid, near, max_clearance(settings, 0.25))
         assert (clearance.distances[:, 2:] < 0.01).any()
     for frame in range(4):
         times = frame / 60.0, (frame + 1) / 60.0

@@ -9,10 +9,10 @@ from hairloom.addon.dynamics.cloth.carried import pinned_path
 from hairloom.addon.dynamics.cloth.state import start_cloth
 from hairloom.addon.dynamics.colliders import PosedCollider, SphereCollider
 from hairloom.addon.dynamics.rigid_path import (
-    Rigid,
+    RigidMotion,
     motion_of,
-    rotation_of,
-    turn_of,
+    rotation_matrix,
+    rotation_vector,
     twist_of,
 )
 from hairloom.addon.dynamics.settings import DynamicsSettings
@@ -112,10 +112,10 @@ def test_an_uneven_turn_goes_through_all_three_places(kit):
 @pytest.mark.parametrize("angle", [0.0, 1e-9, 1e-5, 0.3, 2.0, 3.1, math.pi])
 def test_twists_come_back(angle):
     axis = np.array([1.0, -2.0, 2.0]) / 3.0
-    rotation = rotation_of(axis * angle)
+    rotation = rotation_matrix(axis * angle)
     np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-14)
-    np.testing.assert_allclose(np.abs(turn_of(rotation)), np.abs(axis * angle), atol=1e-7)
-    motion = Rigid(rotation, np.array([0.4, -0.1, 0.2]))
+    np.testing.assert_allclose(np.abs(rotation_vector(rotation)), np.abs(axis * angle), atol=1e-7)
+    motion = RigidMotion(rotation, np.array([0.4, -0.1, 0.2]))
     again = motion_of(twist_of(motion))
     np.testing.assert_allclose(again.rotation, motion.rotation, atol=1e-12)
     np.testing.assert_allclose(again.shift, motion.shift, atol=1e-12)
@@ -125,4 +125,6 @@ def test_every_axis_is_found():
     """The axes make each component of the quaternion the largest once."""
     for axis in (*np.eye(3), *-np.eye(3), np.array([0.6, 0.0, 0.8])):
         for angle in (0.01, 2.0, 3.1):
-            np.testing.assert_allclose(turn_of(rotation_of(axis * angle)), axis * angle, atol=1e-12)
+            np.testing.assert_allclose(
+                rotation_vector(rotation_matrix(axis * angle)), axis * angle, atol=1e-12
+            )

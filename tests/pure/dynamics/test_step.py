@@ -8,13 +8,13 @@ from hairloom.addon.dynamics import step
 from hairloom.addon.dynamics.colliders import PosedCollider, SphereCollider
 from hairloom.addon.dynamics.constraints import PINNED, TINY, directions
 from hairloom.addon.dynamics.force_fields import ForceField, ForceFields
-from hairloom.addon.dynamics.forces import weight_on_style
-from hairloom.addon.dynamics.held import Held
+from hairloom.addon.dynamics.forces import weight_across_style
+from hairloom.addon.dynamics.groom_rotation import best_rotation
+from hairloom.addon.dynamics.held import HeldCvs
 from hairloom.addon.dynamics.measure import max_stretch
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import rows_of, start
 from hairloom.addon.dynamics.step import Drive, advance, grid_at_frame_end
-from hairloom.addon.dynamics.turn import best_rotation
 from hairloom.addon.errors import HairloomError
 
 # --- style ---------------------------------------------------------------------------------------
@@ -78,7 +78,7 @@ def test_lengths_are_kept(kit, shake):
 def test_weight_on_style_leaves_no_pull_along_segments(kit):
     carried = start(kit.curly(20, 12)).position
     gravity = np.array([0.0, 0.0, -9.81], np.float32)
-    held = weight_on_style(gravity, carried)
+    held = weight_across_style(gravity, carried)
     whole = np.concatenate([np.zeros_like(held[:, :1]), held], axis=1)
     segment = np.diff(carried[:, 1:], axis=1)
     unit = segment / np.linalg.norm(segment, axis=0)
@@ -87,7 +87,7 @@ def test_weight_on_style_leaves_no_pull_along_segments(kit):
 
 def test_hanging_hair_holds_its_own_weight(kit):
     gravity = np.array([0.0, 0.0, -9.81], np.float32)
-    held = weight_on_style(gravity, start(kit.straight(3, 12)).position)
+    held = weight_across_style(gravity, start(kit.straight(3, 12)).position)
     np.testing.assert_allclose(held, 0.0, atol=1e-5)
 
 
@@ -241,7 +241,7 @@ def test_a_guide_does_not_feel_the_others(kit, shake, solver):
 def test_blocks_change_nothing(kit, shake, size, monkeypatch):
     """Also with carried weight, which turns with the mean rotation of the whole groom."""
     whole = swept(kit, shake, np.arange(30), DynamicsSettings())
-    monkeypatch.setattr(step, "BLOCK", size)
+    monkeypatch.setattr(step, "MAX_BLOCK_GUIDES", size)
     parts = swept(kit, shake, np.arange(30), DynamicsSettings())
     np.testing.assert_array_equal(parts.position, whole.position)
     np.testing.assert_array_equal(parts.previous, whole.previous)
@@ -344,7 +344,7 @@ def bad_drive(kit, **changes):
         ({"force_fields": ForceFields((ForceField("wind", strength=np.nan),))}, "force field"),
         ({"target_earlier": np.full((4, 8, 3), np.inf, np.float32)}, "not a finite number"),
         ({"target_earlier": np.zeros((4, 7, 3), np.float32)}, "Start the simulation again"),
-        ({"held": Held(np.ones((4, 7), bool))}, "Start the simulation again"),
+        ({"held": HeldCvs(np.ones((4, 7), bool))}, "Start the simulation again"),
     ],
 )
 def test_a_bad_drive_is_named(kit, changes, message):

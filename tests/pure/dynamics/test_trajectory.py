@@ -5,7 +5,7 @@ import pytest
 
 from hairloom.addon.dynamics.colliders import PosedCollider, SphereCollider
 from hairloom.addon.dynamics.rigid_path import CarriedPath, Carrier
-from hairloom.addon.dynamics.trajectory import at, curvature
+from hairloom.addon.dynamics.trajectory import curvature, value_at
 
 
 @pytest.mark.parametrize("ratio", [0.25, 0.5, 1.0, 1.7, 4.0])
@@ -21,14 +21,14 @@ def test_three_moments_give_their_parabola(ratio):
     bent = curvature(parabola(-ratio), before, now, ratio)
     for share in (0.0, 0.2, 0.5, 1.0):
         np.testing.assert_allclose(
-            at(before, now - before, bent, share), parabola(share), atol=1e-13
+            value_at(before, now - before, bent, share), parabola(share), atol=1e-13
         )
 
 
 def test_an_even_way_is_straight():
     one, way = np.ones((2, 3)), np.full((2, 3), 0.25)
     np.testing.assert_array_equal(curvature(one - way, one, one + way, 1.0), 0.0)
-    np.testing.assert_array_equal(at(one, way, None, 0.5), one + way / 2)
+    np.testing.assert_array_equal(value_at(one, way, None, 0.5), one + way / 2)
 
 
 def test_a_hiccup_does_not_throw_the_way_about():
@@ -52,7 +52,8 @@ def test_roots_stay_on_a_turning_head(kit, degrees):
         shares = np.linspace(0.0, 1.0, 21)
         away = [
             np.linalg.norm(
-                at(before, now - before, bent, s) - point @ kit.rotation(2, s * turn)[:3, :3].T
+                value_at(before, now - before, bent, s)
+                - point @ kit.rotation(2, s * turn)[:3, :3].T
             )
             for s in shares
         ]

@@ -95,7 +95,7 @@ def test_guides_that_are_off_by_what_their_solver_may_be_change_no_bit() -> None
     rest = motion_flow.strands_at(rig, STILL, rig.guide_grid)
     np.testing.assert_array_equal(rest, rig.strands.points)
     straight = on_its_axis(rig)
-    assert straight.curl_room is not None
+    assert straight.curl_slack is not None
     off = motion_flow.strands_at(straight, STILL, drawn(straight, 1.0 + 0.9 * SLACK))
     np.testing.assert_array_equal(off, rig.strands.points)
     beyond = motion_flow.strands_at(straight, STILL, drawn(straight, 1.0 + 4.0 * SLACK))
@@ -104,9 +104,9 @@ def test_guides_that_are_off_by_what_their_solver_may_be_change_no_bit() -> None
 
 def test_straight_hair_beside_curls_never_stretches() -> None:
     rig = coils(4, straight=2)
-    assert rig.curl_room is not None
+    assert rig.curl_slack is not None
     is_straight = rig.guides >= 2
-    assert not rig.curl_room[is_straight].any() and rig.curl_room[~is_straight, 1:].min() > 1.0
+    assert not rig.curl_slack[is_straight].any() and rig.curl_slack[~is_straight, 1:].min() > 1.0
     found, first = motion_flow.strands_at(rig, STILL, drawn(rig, 1.5)), rig.strands.offsets[2]
     np.testing.assert_array_equal(found[first:], rig.strands.points[first:])
     assert np.abs(found[:first] - rig.strands.points[:first]).max() > 0.3 * LENGTH
@@ -114,7 +114,7 @@ def test_straight_hair_beside_curls_never_stretches() -> None:
 
 def test_straight_hair_alone_has_no_room() -> None:
     rig = coils(2, straight=2)
-    assert rig.curl_room is None and rig.riders.gives is None
+    assert rig.curl_slack is None and rig.riders.gives is None
 
 
 def test_what_is_seen_is_continuous_and_then_all() -> None:

@@ -20,43 +20,44 @@ def best_rotation(rest: Floats, carried: Floats) -> Floats:
     Args:
         rest, carried: rows (3, cv_count, guide_count) [m].
     """
-    return rotation_from(rest_sample(rest.T), sample(carried.T))
+    return fit_rotation(sample_around_mean(rest.T), sample_guides(carried.T))
 
 
-def sample(grid: Floats) -> Floats:
+def sample_guides(grid: Floats) -> Floats:
     """The pinned CVs and the tips of evenly chosen guides, rows (3, n) float64, of a grid
     (guide_count, cv_count, 3)."""
     cvs = [*range(min(PINNED, grid.shape[1])), grid.shape[1] - 1]
-    step = max(-(-len(grid) // SAMPLED_GUIDES), 1)
-    places = np.asarray(grid)[::step, cvs]
+    stride = max(-(-len(grid) // SAMPLED_GUIDES), 1)
+    places = np.asarray(grid)[::stride, cvs]
     return np.ascontiguousarray(places.transpose(2, 1, 0), np.float64).reshape(3, -1)
 
 
-def root_sample(grid: Floats) -> Floats:
-    """The pinned CVs of evenly chosen guides, which move with the head, in the shape of `sample`.
+def sample_roots(grid: Floats) -> Floats:
+    """The pinned CVs of evenly chosen guides, which move with the head, in the shape of
+    `sample_guides`.
 
     All CVs if there are fewer than three guides, since two roots do not determine a rotation.
     """
-    step = max(-(-len(grid) // SAMPLED_GUIDES), 1)
-    places = np.asarray(grid)[::step, : PINNED if len(grid) > PINNED else None]
+    stride = max(-(-len(grid) // SAMPLED_GUIDES), 1)
+    places = np.asarray(grid)[::stride, : PINNED if len(grid) > PINNED else None]
     return np.ascontiguousarray(places.transpose(2, 1, 0), np.float64).reshape(3, -1)
 
 
-def rest_sample(grid: Floats) -> Floats:
-    """`sample` relative to its own mean."""
-    places = sample(grid)
+def sample_around_mean(grid: Floats) -> Floats:
+    """`sample_guides` relative to its own mean."""
+    places = sample_guides(grid)
     return places - places.mean(axis=1, keepdims=True) if places.size else places
 
 
-def rotation_from(rest: Floats, now: Floats) -> Floats:
-    """The rotation (3, 3) float64 from `rest_sample` to `sample`.
+def fit_rotation(rest: Floats, now: Floats) -> Floats:
+    """The rotation (3, 3) float64 from `sample_around_mean` to `sample_guides`.
 
     Kabsch 1976. A small multiple of the identity selects the smallest rotation if the groom does
     not determine one, like a single straight guide.
     """
-    spread = np.einsum("in,jn->ij", now, rest)  # no BLAS: it would wake its threads for this
-    spread.flat[::4] += 1.0e-6 * np.einsum("in,in->", rest, rest) + 1.0e-12
-    left, _, right = np.linalg.svd(spread)
+    covariance = np.einsum("in,jn->ij", now, rest)  # no BLAS: it would wake its threads for this
+    covariance.flat[::4] += 1.0e-6 * np.einsum("in,in->", rest, rest) + 1.0e-12
+    left, _, right = np.linalg.svd(covariance)
     rotation: Floats = left @ right
     if _determinant(rotation) < 0.0:
         left[:, 2] *= -1.0
