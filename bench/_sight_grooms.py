@@ -14,7 +14,7 @@ from extension_loader import REPOSITORY
 from hairloom.addon import rig_flow
 from hairloom.addon.blender.scene.built_in_head import built_in_head
 from hairloom.addon.blender.scene.mesh_files import read_mesh_file
-from hairloom.addon.exchange.joined_grooms import joined_grooms
+from hairloom.addon.exchange.join_grooms import join_grooms
 from hairloom.addon.exchange.tressfx import read_tfx
 from hairloom.addon.groom.children_settings import ChildrenSettings
 from hairloom.addon.groom.face_hair import grow_with_face
@@ -38,7 +38,7 @@ def ponytail() -> Pair:
     """Four files of one groom; it comes without a head, so its head is the hull of its roots."""
     names = ("front_top", "side", "back", "tail")
     parts = [read_tfx(_DATA / "tressfx_ponytail" / f"{name}.tfx").groom for name in names]
-    strands = joined_grooms(parts, "ponytail")[0].strands
+    strands = join_grooms(parts, "ponytail")[0].strands
     return strands, _hull(strands.roots)
 
 

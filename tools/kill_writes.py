@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 from damaged_files import sample
 
-from hairloom.addon.exchange.alembic.groom_alembic import is_finished, write_groom_alembic
+from hairloom.addon.exchange.alembic.groom_alembic import is_complete_alembic, write_groom_alembic
 from hairloom.addon.exchange.files.atomic import write_text_atomic
 from hairloom.addon.exchange.files.file_set import atomic_file_set
 from hairloom.addon.exchange.files.stale_temp_files import remove_stale_files
@@ -120,7 +120,7 @@ def _content(folder: Path) -> dict[str, bytes]:
     """The visible files of a folder; of Alembic files, which hold a date, size and completeness."""
     files = [path for path in folder.iterdir() if not path.name.startswith(".")]
     return {
-        path.name: repr((path.stat().st_size, is_finished(path))).encode()
+        path.name: repr((path.stat().st_size, is_complete_alembic(path))).encode()
         if path.suffix == ".abc"
         else path.read_bytes()
         for path in files

@@ -26,7 +26,7 @@ HERE = Path(__file__).parent
 MODULE = HERE / "node" / "node_modules" / "@pixiv" / "three-vrm-springbone"
 #: Z-up vectors to those of the file
 _AXES = np.eye(4)
-_AXES[:3, :3] = GLB.placed(np.eye(3)).T
+_AXES[:3, :3] = GLB.to_file_space(np.eye(3)).T
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,7 @@ _AT_THIRDS = np.array([[27, 0, 0, 0], [8, 12, 6, 1], [1, 6, 12, 8]], np.float32)
 
 
 @dataclass(frozen=True)
-class Mix:
+class WeightedSum:
     """Values as weighted sums of others.
 
     index: (count, terms), which values.
@@ -28,7 +28,7 @@ class Mix:
     index: Ints
     weight: Floats
 
-    def of(self, values: Floats) -> Floats:
+    def apply(self, values: Floats) -> Floats:
         """(count, ...) from (others, ...)."""
         shape = (-1,) + (1,) * (values.ndim - 1)
         total = values[self.index[:, 0]] * self.weight[:, 0].reshape(shape)
@@ -38,25 +38,25 @@ class Mix:
 
 
 @dataclass(frozen=True)
-class OnCurves:
+class CurveSampling:
     """Points on curves, and how their values follow from those in a file.
 
     offsets: (curve_count + 1,), curve c has the points offsets[c]:offsets[c + 1].
     vertex: values of points from those at control points; None: they are the same.
     varying: values of points from those at ends of segments; None: they are the same.
     varying_count: how many values of the latter kind there must be.
-    is_unfit: (curve_count,) curves left without points, because their number of control points does
-        not fit the basis; None: no curve.
+    is_invalid: (curve_count,) curves left without points, because their number of control points
+        does not fit the basis; None: no curve.
     """
 
     offsets: Ints
-    vertex: Mix | None
-    varying: Mix | None
+    vertex: WeightedSum | None
+    varying: WeightedSum | None
     varying_count: int
-    is_unfit: Bools | None = None
+    is_invalid: Bools | None = None
 
 
-def points_on_curves(basis: str, is_pinned: bool, counts: Ints) -> OnCurves:
+def points_on_curves(basis: str, is_pinned: bool, counts: Ints) -> CurveSampling:
     """The points on open curves.
 
     Args:
@@ -67,28 +67,30 @@ def points_on_curves(basis: str, is_pinned: bool, counts: Ints) -> OnCurves:
     """
     offsets = np.concatenate([[0], np.cumsum(counts, dtype=np.int64)])
     curve = np.repeat(np.arange(len(counts)), counts)
-    place = np.arange(offsets[-1]) - offsets[curve]
+    number_on_curve = np.arange(offsets[-1]) - offsets[curve]
     if basis == "bezier":
-        return _of_bezier(counts, offsets, curve, place)
-    own = np.arange(offsets[-1])
-    is_inner = (place > 0) & (place < counts[curve] - 1)
+        return _bezier_points(counts, offsets, curve, number_on_curve)
+    point = np.arange(offsets[-1])
+    is_inner = (number_on_curve > 0) & (number_on_curve < counts[curve] - 1)
     if basis == "bspline":
-        index = np.stack([np.maximum(own - 1, 0), own, np.minimum(own + 1, own[-1:])], axis=1)
+        index = np.stack(
+            [np.maximum(point - 1, 0), point, np.minimum(point + 1, point[-1:])], axis=1
+        )
         weight = np.where(is_inner[:, None], [1 / 6, 4 / 6, 1 / 6], [0.0, 1.0, 0.0])
-        mix = Mix(index, weight.astype(np.float32))
+        mix = WeightedSum(index, weight.astype(np.float32))
     else:
-        mix = Mix(own[:, None], np.ones((len(own), 1), np.float32))
+        mix = WeightedSum(point[:, None], np.ones((len(point), 1), np.float32))
     if is_pinned or basis == "linear":
-        return OnCurves(offsets, mix if basis == "bspline" else None, None, len(own))
+        return CurveSampling(offsets, mix if basis == "bspline" else None, None, len(point))
     inner_offsets = np.concatenate([[0], np.cumsum(np.maximum(counts - 2, 0))])
-    inner = Mix(mix.index[is_inner], mix.weight[is_inner])
-    is_unfit = (counts > 1) & (counts < 4)
-    return OnCurves(
+    inner = WeightedSum(mix.index[is_inner], mix.weight[is_inner])
+    is_invalid = (counts > 1) & (counts < 4)
+    return CurveSampling(
         inner_offsets,
         inner,
         None,
         int(inner_offsets[-1]),
-        is_unfit if is_unfit.any() else None,
+        is_invalid if is_invalid.any() else None,
     )
 
 
@@ -105,11 +107,11 @@ def usable_basis(basis: str, counts: Ints) -> tuple[str, tuple[str, ...]]:
     )
 
 
-def unfit_curves(on_curves: OnCurves, basis: str) -> dict[str, Bools]:
+def invalid_curves(sampling: CurveSampling, basis: str) -> dict[str, Bools]:
     """Why curves cannot be used -> which, (curve_count,); for `clean`."""
-    if on_curves.is_unfit is None:
+    if sampling.is_invalid is None:
         return {}
-    return {f"a number of points that {basis} curves cannot have": on_curves.is_unfit}
+    return {f"a number of points that {basis} curves cannot have": sampling.is_invalid}
 
 
 def _are_bezier(counts: Ints) -> Bools:
@@ -117,22 +119,24 @@ def _are_bezier(counts: Ints) -> Bools:
     return is_bezier
 
 
-def _of_bezier(counts: Ints, offsets: Ints, curve: Ints, place: Ints) -> OnCurves:
+def _bezier_points(
+    counts: Ints, offsets: Ints, curve: Ints, number_on_curve: Ints
+) -> CurveSampling:
     """As many points as control points: every third of these, and two points between them."""
     is_sound = _are_bezier(counts)
     ends = (counts + 2) // 3  # one more than segments
     end_offsets = np.concatenate([[0], np.cumsum(ends)])
-    own = np.flatnonzero(is_sound[curve])
-    curve, place = curve[own], place[own]
-    third = place % 3
+    point = np.flatnonzero(is_sound[curve])
+    curve, number_on_curve = curve[point], number_on_curve[point]
+    third = number_on_curve % 3
     fraction = (third / 3).astype(np.float32)
-    index = np.minimum((own - third)[:, None] + np.arange(4), offsets[1:][curve, None] - 1)
-    end = end_offsets[curve] + place // 3
+    index = np.minimum((point - third)[:, None] + np.arange(4), offsets[1:][curve, None] - 1)
+    end = end_offsets[curve] + number_on_curve // 3
     next_end = np.minimum(end + 1, end_offsets[1:][curve] - 1)
-    return OnCurves(
+    return CurveSampling(
         np.concatenate([[0], np.cumsum(np.where(is_sound, counts, 0))]),
-        Mix(index, _AT_THIRDS[third]),
-        Mix(np.stack([end, next_end], axis=1), np.stack([1 - fraction, fraction], axis=1)),
+        WeightedSum(index, _AT_THIRDS[third]),
+        WeightedSum(np.stack([end, next_end], axis=1), np.stack([1 - fraction, fraction], axis=1)),
         int(end_offsets[-1]),
         None if is_sound.all() else ~is_sound,
     )

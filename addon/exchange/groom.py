@@ -94,7 +94,7 @@ class Groom:
         if self.bones is not None:
             changes["bones"] = self.bones.take(strands)
         if self.motion is not None:
-            positions = self.motion.positions[:, points_of(self.strands, strands)]
+            positions = self.motion.positions[:, point_indices_of(self.strands, strands)]
             changes["motion"] = replace(self.motion, positions=positions)
         return replace(self, **changes)
 
@@ -135,10 +135,10 @@ class ReadMotion:
             rate: frames in a second; frame f is at f / rate seconds.
         """
         first, count = self._range(rate)
-        number = first + np.arange(min(count, MAX_FRAMES))
-        left, part = between(self.times, number / rate)
+        frame = first + np.arange(min(count, MAX_FRAMES))
+        left, fraction = bracket_times(self.times, frame / rate)
         near, far = self.positions[left], self.positions[left + 1]
-        return first, np.asarray(near + (far - near) * part[:, None, None], np.float32)
+        return first, np.asarray(near + (far - near) * fraction[:, None, None], np.float32)
 
     def cut_note(self, rate: float) -> str:
         """A note on frames that `at_frames` leaves out; empty without any."""
@@ -153,12 +153,12 @@ class ReadMotion:
         return first, last - first + 1
 
 
-def between(times: Floats, wanted: Floats) -> tuple[Ints, Floats]:
+def bracket_times(times: Floats, wanted: Floats) -> tuple[Ints, Floats]:
     """Which of two or more ascending times comes before each wanted time, (n,), and how far that is
     to the next, 0 to 1."""
     left = np.clip(np.searchsorted(times, wanted, side="right") - 1, 0, len(times) - 2)
-    part = (wanted - times[left]) / (times[left + 1] - times[left])
-    return left, np.clip(part, 0.0, 1.0).astype(np.float32)
+    fraction = (wanted - times[left]) / (times[left + 1] - times[left])
+    return left, np.clip(fraction, 0.0, 1.0).astype(np.float32)
 
 
 @dataclass(frozen=True)
@@ -176,7 +176,7 @@ class GroomMotion:
     first_frame: int = 1
 
 
-def points_of(strands: StrandSet, chosen: Ints) -> Ints:
+def point_indices_of(strands: StrandSet, chosen: Ints) -> Ints:
     """Indices of the points of the chosen strands, strand after strand."""
     counts = strands.point_counts[chosen].astype(np.int64)
     ends = np.cumsum(counts)

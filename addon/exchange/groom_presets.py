@@ -14,7 +14,7 @@ from .groom import Groom
 #: Thinner than any hair of any creature [m]. A width of 0 makes Unity drop all widths.
 MIN_WIDTH = 1.0e-9
 #: Widths over this fraction of the hair's length are a mistake in units.
-WIDEST = 0.1
+MAX_WIDTH_RATIO = 0.1
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class GroomPreset:
     min_points: of a curve that the engine accepts.
     max_strands: of a group that the engine accepts.
     parts: "strands" without guides, "guides" alone, or "both".
-    is_split: one curves object for each group instead of one for all.
+    splits_groups: one curves object for each group instead of one for all.
     has_curve_uv: root UVs are also written as the curves' own UVs, one for each point.
     basis: "linear", or "cubic" for Catmull-Rom, which goes through the points as well.
     """
@@ -40,7 +40,7 @@ class GroomPreset:
     min_points: int = 2
     max_strands: int | None = None
     parts: str = "both"
-    is_split: bool = False
+    splits_groups: bool = False
     has_curve_uv: bool = False
     basis: str = "linear"
 
@@ -67,7 +67,7 @@ UNITY = GroomPreset(
     min_points=3,
     max_strands=64_000,
     parts="strands",
-    is_split=True,
+    splits_groups=True,
     has_curve_uv=True,
 )
 #: As Blender's own Alembic files are, bit-exact.
@@ -81,15 +81,15 @@ BLENDER = GroomPreset(
 PRESETS = {preset.name: preset for preset in (UNREAL, UNITY, BLENDER)}
 
 
-def chosen_parts(groom: Groom, parts: str) -> Groom:
+def select_parts(groom: Groom, parts: str) -> Groom:
     """The strands, the guides, or both."""
     if parts == "strands":
         return groom.without_guides()
     return groom.guides() if parts == "guides" else groom
 
 
-def chosen_strands(groom: Groom, parts: str) -> Ints:
-    """Indices of the strands that `chosen_parts` takes."""
+def selected_strands(groom: Groom, parts: str) -> Ints:
+    """Indices of the strands that `select_parts` takes."""
     count = groom.strands.strand_count
     if parts == "both" or (parts == "strands" and groom.is_guide is None):
         return np.arange(count)
@@ -109,17 +109,17 @@ def preflight(groom: Groom, preset: GroomPreset) -> dict[str, Any]:
         warnings: sentences for the artist; only a lack of strands keeps the groom from being
             written.
     """
-    written = chosen_parts(groom, preset.parts)
+    written = select_parts(groom, preset.parts)
     strands = written.strands
     is_guide = (
         np.zeros(strands.strand_count, bool) if written.is_guide is None else written.is_guide
     )
     guides = int(is_guide.sum())
     counts = np.minimum(strands.point_counts, preset.max_points)
-    hair = strands.group if is_guide.all() else strands.group[~is_guide]
-    ids, sizes = np.unique(hair, return_counts=True)
+    visible_groups = strands.group if is_guide.all() else strands.group[~is_guide]
+    ids, sizes = np.unique(visible_groups, return_counts=True)
     corners = preset.space.to_file(np.stack(strands.bounds()))
-    scale = preset.space.per_metre
+    scale = preset.space.units_per_metre
     return {
         "preset": preset.name,
         "strands": strands.strand_count - guides,
@@ -146,7 +146,7 @@ def _warnings(groom: Groom, written: Groom, preset: GroomPreset) -> list[str]:
     if zero:
         warnings.append(f"{zero} points have no width: they are written as {MIN_WIDTH * 1e6:g} um")
     widest = 2.0 * float(strands.radius.max()) / max(float(np.median(strands.lengths())), 1.0e-30)
-    if widest > WIDEST:
+    if widest > MAX_WIDTH_RATIO:
         warnings.append(f"Widths reach {widest:.0%} of the strands' length: check the units")
     if len(np.unique(strands.group)) == 1:
         warnings.append("All strands are in one group: they can have only one material")
@@ -158,9 +158,11 @@ def _warnings(groom: Groom, written: Groom, preset: GroomPreset) -> list[str]:
     short = int((strands.point_counts < preset.min_points).sum())
     if short:
         warnings.append(f"{short} strands have fewer than {preset.min_points} points")
-    most = int(np.unique(strands.group, return_counts=True)[1].max())
-    if preset.max_strands is not None and most > preset.max_strands:
-        warnings.append(f"A group has {most} strands; the engine takes {preset.max_strands}")
+    largest_group = int(np.unique(strands.group, return_counts=True)[1].max())
+    if preset.max_strands is not None and largest_group > preset.max_strands:
+        warnings.append(
+            f"A group has {largest_group} strands; the engine takes {preset.max_strands}"
+        )
     if written.closest_guides is not None and preset.parts != "both":
         warnings.append("Closest guides are left out: they need strands and guides in one file")
     if preset.parts == "both" and (groom.is_guide is None or not groom.is_guide.any()):

@@ -24,8 +24,8 @@ from .files.axes import from_z_up, to_z_up
 from .files.binary_file import BinaryFile, write_blocks
 from .files.file_space import FileSpace
 from .groom import Groom
-from .groom_presets import chosen_parts
-from .read_groom import ReadGroom, finite, kept_points, usable
+from .groom_presets import select_parts
+from .read_groom import ReadGroom, finite_or_zero, usable_strands, values_of_kept_points
 
 _SEGMENTS, _POINTS, _THICKNESS, _TRANSPARENCY, _COLOR, _UV = 1, 2, 4, 8, 16, 32
 _DTYPES: dict[int, np.dtype[Any]] = {
@@ -95,7 +95,7 @@ def read_hair_file(path: Path, up: str = "Z", scale: float = 1.0) -> ReadHairFil
         half = np.float32(0.5) * np.float32(scale)
         radius = half * (file.default("thickness") if thickness is None else thickness)
         points = to_z_up(points, up) * np.float32(scale)
-    cleaned = usable(
+    cleaned = usable_strands(
         file,
         points,
         offsets,
@@ -122,7 +122,7 @@ def read_hair_file(path: Path, up: str = "Z", scale: float = 1.0) -> ReadHairFil
         FileSpace(up),
         notes,
         file.info,
-        finite(kept_points(transparency, offsets, cleaned)),
+        finite_or_zero(values_of_kept_points(transparency, offsets, cleaned)),
     )
 
 
@@ -151,7 +151,7 @@ def write_hair_file(
         HairloomError: no strands, a strand of more than 65,535 segments, or nothing can be written
             there.
     """
-    groom = chosen_parts(hair if isinstance(hair, Groom) else Groom(hair), parts)
+    groom = select_parts(hair if isinstance(hair, Groom) else Groom(hair), parts)
     strands = groom.strands
     if not strands.strand_count:
         raise HairloomError(
@@ -165,10 +165,12 @@ def write_hair_file(
     unit = np.float32(scale)
     arrays: dict[int, NDArray[Any]] = {_POINTS: from_z_up(strands.points, up) / unit}
     segments = strands.point_counts - 1
-    _one_or_each(header, arrays, "segments", _SEGMENTS, segments)
-    _one_or_each(header, arrays, "thickness", _THICKNESS, strands.radius * (np.float32(2.0) / unit))
+    _store_constant_or_array(header, arrays, "segments", _SEGMENTS, segments)
+    _store_constant_or_array(
+        header, arrays, "thickness", _THICKNESS, strands.radius * (np.float32(2.0) / unit)
+    )
     if groom.color is not None:
-        _one_or_each(header, arrays, "color", _COLOR, groom.color)
+        _store_constant_or_array(header, arrays, "color", _COLOR, groom.color)
     if uv and strands.root_uv is not None:
         arrays[_UV] = np.repeat(strands.root_uv, strands.point_counts, axis=0)
     if _SEGMENTS in arrays and segments.max() > MAX_SEGMENTS:
@@ -184,15 +186,15 @@ def write_hair_file(
     return _writing_notes(path.name, groom, _UV in arrays)
 
 
-def _one_or_each(
+def _store_constant_or_array(
     header: NDArray[Any], arrays: dict[int, NDArray[Any]], name: str, bit: int, values: NDArray[Any]
 ) -> None:
     """One value in the header where all are the same, else an array.
 
     White in the header means that there are no colours, so white hair gets an array, too.
     """
-    is_one = bool((values == values[:1]).all())
-    if is_one and not (bit == _COLOR and (values[0] == 1.0).all()):
+    is_constant = bool((values == values[:1]).all())
+    if is_constant and not (bit == _COLOR and (values[0] == 1.0).all()):
         header[name] = values[0]
     else:
         arrays[bit] = values
@@ -202,8 +204,8 @@ def _color(file: _HairFile, point_count: int) -> Floats | None:
     values = file.values(_COLOR)
     if values is not None:
         return values
-    same = file.default("color")
-    return None if (same == _WHITE).all() else np.broadcast_to(same, (point_count, 3))
+    default = file.default("color")
+    return None if (default == _WHITE).all() else np.broadcast_to(default, (point_count, 3))
 
 
 class _HairFile(BinaryFile):

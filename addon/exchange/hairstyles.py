@@ -34,11 +34,11 @@ from .files.atomic import write_bytes_atomic, write_text_atomic
 
 STYLE_VERSION = 1
 #: maximum bytes of a style's text and of its unpacked guides, far above those of any style
-_LONGEST_TEXT, _MAX_BYTES = 1 << 16, 1 << 26
+_MAX_TEXT_BYTES, _MAX_GUIDE_BYTES = 1 << 16, 1 << 26
 #: shapes are stored in steps of this [m]: finer than any hair is wide, and 65 cm fit into 16 bits
 _STEP = 2.0e-5
 #: the section of settings by which fur grows, which has no guides
-GROWN = "grow"
+GROW_SECTION = "grow"
 #: what masks may be for: where children grow
 MASKS = ("children",)
 #: what numpy and zipfile raise for damaged files, which may seem to be encrypted
@@ -128,7 +128,7 @@ def read_hairstyle(path: Path, kinds: Mapping[str, type[Settings]]) -> Hairstyle
         raise _damaged("its order is not a whole number", place)
     return Hairstyle(
         title=str(data.get("title") or path.stem),
-        guides=None if GROWN in settings else _guides(path.with_suffix(".npz")),
+        guides=None if GROW_SECTION in settings else _guides(path.with_suffix(".npz")),
         source=str(data.get("source", "")),
         order=order,
         masks=masks,
@@ -209,8 +209,8 @@ def _unpacked_steps(packed: Ints) -> Ints:
 
 def _text(path: Path) -> dict[str, Any]:
     try:
-        if path.stat().st_size > _LONGEST_TEXT:
-            raise ValueError(f"it has more than {_LONGEST_TEXT:,} bytes")
+        if path.stat().st_size > _MAX_TEXT_BYTES:
+            raise ValueError(f"it has more than {_MAX_TEXT_BYTES:,} bytes")
         data = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
         raise _damaged(f"this style cannot be read ({error})", str(path)) from error
@@ -245,14 +245,14 @@ def _guides(path: Path) -> RootedShapes:
     place = str(path)
     try:
         with zipfile.ZipFile(path) as archive:
-            if sum(info.file_size for info in archive.infolist()) > _MAX_BYTES:
+            if sum(info.file_size for info in archive.infolist()) > _MAX_GUIDE_BYTES:
                 raise ValueError("it has too many guides")
         with np.load(path, allow_pickle=False) as file:
             arrays = {name: file[name] for name in _ARRAYS}
     except _UNREADABLE as error:
         raise _damaged(f"the guides of this style cannot be read ({error})", place) from error
-    for name, (kind, dimensions) in _ARRAYS.items():
-        if arrays[name].dtype != kind or arrays[name].ndim != dimensions:
+    for name, (dtype, dimensions) in _ARRAYS.items():
+        if arrays[name].dtype != dtype or arrays[name].ndim != dimensions:
             raise _damaged(f"the array '{name}' has the wrong type", place)
     counts, count = arrays["counts"], len(arrays["counts"])
     fits = (

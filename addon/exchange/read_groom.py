@@ -45,7 +45,7 @@ class ReadGroom:
         return self.groom.source or Path()
 
 
-def usable(
+def usable_strands(
     file: BinaryFile,
     points: Floats,
     offsets: Ints,
@@ -66,13 +66,13 @@ def usable(
     return cleaned
 
 
-def finite(values: Floats, least: float = -np.inf) -> Floats:
-    """Values, with 0 instead of those that are not finite or less than `least`."""
-    is_sound = np.isfinite(values) & (values >= least)
+def finite_or_zero(values: Floats, minimum: float = -np.inf) -> Floats:
+    """Values, with 0 instead of those that are not finite or less than `minimum`."""
+    is_sound = np.isfinite(values) & (values >= minimum)
     return values if is_sound.all() else np.where(is_sound, values, np.float32(0.0))
 
 
-def kept_points(values: Floats, offsets: Ints, cleaned: Cleaned) -> Floats:
+def values_of_kept_points(values: Floats, offsets: Ints, cleaned: Cleaned) -> Floats:
     """Values of all points of the file, (point_count, ...), without those of dropped strands."""
     if not cleaned.dropped:
         return values
@@ -81,7 +81,7 @@ def kept_points(values: Floats, offsets: Ints, cleaned: Cleaned) -> Floats:
     return values[np.repeat(is_kept, np.diff(offsets))]
 
 
-def known_apart(identities: dict[str, Any], notes: list[str]) -> dict[str, Any]:
+def unique_identities(identities: dict[str, Any], notes: list[str]) -> dict[str, Any]:
     """IDs, and attributes that refer to them; empty if strands share an ID. Adds to `notes`."""
     numbers = identities.get("strand_id")
     if numbers is None or len(np.unique(numbers)) == len(numbers):

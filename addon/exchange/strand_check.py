@@ -34,7 +34,7 @@ def check_strands(
         "format": kind.name,
         **facts,
         "group_names": {g: groom.group_names[g] for g in facts["groups"] if g in groom.group_names},
-        "unit": _UNITS.get(round(space.per_metre, 6), f"1/{space.per_metre:g} m"),
+        "unit": _UNITS.get(round(space.units_per_metre, 6), f"1/{space.units_per_metre:g} m"),
         "up": space.up,
         "is_mirrored": space.is_mirrored,
     }
@@ -58,8 +58,8 @@ def check_lines(facts: dict[str, Any]) -> list[str]:
 
 
 def _range(values: tuple[float, float], form: str) -> str:
-    least, most = (format(value, form) for value in values)
-    return least if least == most else f"{least} to {most}"
+    lowest, highest = (format(value, form) for value in values)
+    return lowest if lowest == highest else f"{lowest} to {highest}"
 
 
 def _corner(values: list[float]) -> str:

@@ -13,7 +13,7 @@ from .strand_formats import STRAND_FORMATS, StrandFormat
 from .tressfx_layout import VERTEX_COUNTS
 
 #: the default of the format or the engine
-USUAL = "usual"
+FORMAT_DEFAULT = "usual"
 
 
 def _engines() -> tuple[tuple[str, str, str], ...]:
@@ -38,9 +38,13 @@ class StrandExportSettings(Settings):
     panels: ClassVar[tuple[str, ...]] = ("Engine", "Include", "TressFX", "Animation")
 
     engine: str = choice(
-        USUAL,
+        FORMAT_DEFAULT,
         (
-            (USUAL, "Default", "The format's usual program: Unreal for Alembic, Blender for USD"),
+            (
+                FORMAT_DEFAULT,
+                "Default",
+                "The format's usual program: Unreal for Alembic, Blender for USD",
+            ),
             *_engines(),
         ),
         label="Target",
@@ -48,9 +52,9 @@ class StrandExportSettings(Settings):
         panel="Engine",
     )
     basis: str = choice(
-        USUAL,
+        FORMAT_DEFAULT,
         (
-            (USUAL, "Default", "Straight for Alembic, curved for USD"),
+            (FORMAT_DEFAULT, "Default", "Straight for Alembic, curved for USD"),
             ("linear", "Straight", "Straight lines between points"),
             ("cubic", "Curved", "Catmull-Rom curves through the points"),
         ),
@@ -59,9 +63,9 @@ class StrandExportSettings(Settings):
         panel="Engine",
     )
     up: str = choice(
-        USUAL,
+        FORMAT_DEFAULT,
         (
-            (USUAL, "Default", "The program's up axis; Y for TressFX, Z for .hair"),
+            (FORMAT_DEFAULT, "Default", "The program's up axis; Y for TressFX, Z for .hair"),
             ("Y", "Y Up", "The file's Y axis points up, as in most engines"),
             ("Z", "Z Up", "The file's Z axis points up, as in Blender"),
         ),
@@ -79,9 +83,13 @@ class StrandExportSettings(Settings):
         panel="Engine",
     )
     parts: str = choice(
-        USUAL,
+        FORMAT_DEFAULT,
         (
-            (USUAL, "Default", "Strands and guides for Unreal, strands for other programs"),
+            (
+                FORMAT_DEFAULT,
+                "Default",
+                "Strands and guides for Unreal, strands for other programs",
+            ),
             ("strands", "Strands", "The visible strands"),
             ("guides", "Guides", "Only the guides"),
             (
@@ -159,15 +167,15 @@ def layout_of(kind: StrandFormat, settings: StrandExportSettings) -> GroomPreset
     _check_options(kind, settings)
     layout = _engine_layout(kind, settings.engine)
     space = layout.space
-    if settings.scale or settings.up != USUAL:
-        up = space.up if settings.up == USUAL else settings.up
-        space = FileSpace(up, 1.0 / settings.scale if settings.scale else space.per_metre)
+    if settings.scale or settings.up != FORMAT_DEFAULT:
+        up = space.up if settings.up == FORMAT_DEFAULT else settings.up
+        space = FileSpace(up, 1.0 / settings.scale if settings.scale else space.units_per_metre)
     return replace(
         layout,
         space=space,
-        parts=layout.parts if settings.parts == USUAL else settings.parts,
-        is_split=layout.is_split or settings.by_group,
-        basis=layout.basis if settings.basis == USUAL else settings.basis,
+        parts=layout.parts if settings.parts == FORMAT_DEFAULT else settings.parts,
+        splits_groups=layout.splits_groups or settings.by_group,
+        basis=layout.basis if settings.basis == FORMAT_DEFAULT else settings.basis,
     )
 
 
@@ -177,12 +185,12 @@ def metres_per_unit(kind: StrandFormat, settings: StrandExportSettings) -> float
     Raises:
         HairloomError: as `layout_of`.
     """
-    return settings.scale or 1.0 / layout_of(kind, settings).space.per_metre
+    return settings.scale or 1.0 / layout_of(kind, settings).space.units_per_metre
 
 
 def _engine_layout(kind: StrandFormat, engine: str) -> GroomPreset:
     """The layout for this engine, or the format's usual one."""
-    if engine == USUAL:
+    if engine == FORMAT_DEFAULT:
         return kind.layouts[0]
     for layout in kind.layouts:
         if layout.name == engine:

@@ -11,7 +11,7 @@ from .groom_presets import PRESETS, GroomPreset
 from .hair_file import MAX_SEGMENTS
 from .tressfx_layout import VERTEX_COUNTS
 
-_ENDLESS = (1 << 31) - 1
+_UNLIMITED = (1 << 31) - 1
 
 
 @dataclass(frozen=True)
@@ -37,11 +37,13 @@ class StrandFormat:
     has_motion: bool
 
 
-def _usd(name: str, title: str, up: str, per_metre: float, parts: str = "strands") -> GroomPreset:
-    unit = "Metres" if per_metre == 1.0 else "Centimetres"
+def _usd(
+    name: str, title: str, up: str, units_per_metre: float, parts: str = "strands"
+) -> GroomPreset:
+    unit = "Metres" if units_per_metre == 1.0 else "Centimetres"
     about = f"{unit}, {up} up" + (", strands and guides" if parts == "both" else "")
-    space = FileSpace(up, per_metre)
-    return GroomPreset(name, title, about, space, _ENDLESS, parts=parts, basis="cubic")
+    space = FileSpace(up, units_per_metre)
+    return GroomPreset(name, title, about, space, _UNLIMITED, parts=parts, basis="cubic")
 
 
 ALEMBIC = StrandFormat(

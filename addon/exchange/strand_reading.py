@@ -76,27 +76,29 @@ _READERS: dict[str, Reader] = {
 def _parts(groom: Groom, parts: str, path: Path) -> tuple[Groom, tuple[str, ...]]:
     """The wanted part of a groom, and notes on the rest."""
     is_guide = groom.is_guide
-    guides = 0 if is_guide is None else int(is_guide.sum())
-    others = groom.strands.strand_count - guides
+    guide_count = 0 if is_guide is None else int(is_guide.sum())
+    strand_count = groom.strands.strand_count - guide_count
     if parts == "both":
         return groom, ()
     if parts == "guides":
-        if not guides:
+        if not guide_count:
             raise HairloomError(
                 "none of its strands is marked as a guide",
                 place=str(path),
                 remedy="Import its strands instead",
             )
-        note = f"{path.name}: {others:,} strands were left out." if others else ""
-        return _untied(groom.guides()), tuple(filter(None, [note]))
-    if not guides:
-        return _untied(groom), ()
-    if not others:
-        return _untied(groom), (f"{path.name}: it holds only guides: {guides:,} of them.",)
-    note = f"{path.name}: {guides:,} guides were left out."
-    return _untied(replace(groom.without_guides(), is_guide=None)), (note,)
+        note = f"{path.name}: {strand_count:,} strands were left out." if strand_count else ""
+        return _without_closest_guides(groom.guides()), tuple(filter(None, [note]))
+    if not guide_count:
+        return _without_closest_guides(groom), ()
+    if not strand_count:
+        return _without_closest_guides(groom), (
+            f"{path.name}: it holds only guides: {guide_count:,} of them.",
+        )
+    note = f"{path.name}: {guide_count:,} guides were left out."
+    return _without_closest_guides(replace(groom.without_guides(), is_guide=None)), (note,)
 
 
-def _untied(groom: Groom) -> Groom:
+def _without_closest_guides(groom: Groom) -> Groom:
     """The groom without closest guides, which are no longer in it."""
     return replace(groom, closest_guides=None, guide_weights=None)

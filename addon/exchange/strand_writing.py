@@ -16,8 +16,8 @@ from .files.atomic import write_error
 from .files.file_moves import move_file, unused_path
 from .files.file_names import identifier_name, name_key, unique_names
 from .files.file_set import atomic_file_set, back_up_foreign_files
-from .groom import Groom, GroomMotion, points_of
-from .groom_presets import GroomPreset, chosen_strands
+from .groom import Groom, GroomMotion, point_indices_of
+from .groom_presets import GroomPreset, selected_strands
 from .hair_file import write_hair_file
 from .strand_export_settings import StrandExportSettings, layout_of, metres_per_unit
 from .strand_formats import ALEMBIC, HAIR, TRESSFX, USD, strand_format
@@ -68,7 +68,7 @@ def _write_alembic(
 ) -> WrittenStrands:
     preset = layout_of(ALEMBIC, settings)
     write_groom_alembic(path, groom, preset, motion=motion)
-    counts = groom.strands.point_counts[chosen_strands(groom, preset.parts)]
+    counts = groom.strands.point_counts[selected_strands(groom, preset.parts)]
     long = int((counts > preset.max_points).sum())
     notes: tuple[str, ...] = ()
     if long:
@@ -80,16 +80,16 @@ def _write_usd(
     path: Path, groom: Groom, settings: StrandExportSettings, motion: GroomMotion | None
 ) -> WrittenStrands:
     layout = layout_of(USD, settings)
-    chosen = chosen_strands(groom, layout.parts)
-    if motion is not None and len(chosen) < groom.strands.strand_count:
-        points = points_of(groom.strands, chosen)
-        motion = replace(motion, positions=_only(motion, points))
+    strands = selected_strands(groom, layout.parts)
+    if motion is not None and len(strands) < groom.strands.strand_count:
+        points = point_indices_of(groom.strands, strands)
+        motion = replace(motion, positions=_positions_of(motion, points))
     write_usd(
         path,
-        _part(groom, chosen, layout.parts),
+        _part(groom, strands, layout.parts),
         up=layout.space.up,
         scale=metres_per_unit(USD, settings),
-        by_group=layout.is_split,
+        by_group=layout.splits_groups,
         is_linear=layout.basis == "linear",
         motion=motion,
     )
@@ -121,10 +121,10 @@ def _write_tressfx(
         return notes
 
     written = _write_files(path, groom, layout, write)
-    return replace(written, notes=(*written.notes, *_bones_set_aside(written.files)))
+    return replace(written, notes=(*written.notes, *_set_aside_old_bones(written.files)))
 
 
-def _bones_set_aside(written: Collection[Path]) -> tuple[str, ...]:
+def _set_aside_old_bones(written: Collection[Path]) -> tuple[str, ...]:
     """Rename bones of an earlier export, which do not fit the new strands; a note for each.
 
     Raises:
@@ -173,14 +173,14 @@ def _write_files(
     write: Callable[[Path, Groom], tuple[str, ...]],
 ) -> WrittenStrands:
     """One file, or one for each group, with what lies beside them."""
-    chosen = chosen_strands(groom, layout.parts)
-    groom = _part(groom, chosen, layout.parts)
-    files = _group_files(path, groom) if layout.is_split else {path: np.arange(len(chosen))}
+    strands = selected_strands(groom, layout.parts)
+    groom = _part(groom, strands, layout.parts)
+    files = _group_files(path, groom) if layout.splits_groups else {path: np.arange(len(strands))}
     notes: list[str] = []
     with atomic_file_set(next(iter(files))) as folder:
-        for file, strands in files.items():
-            notes += write(folder / file.name, groom.take(strands))
-        notes += back_up_foreign_files(folder, path, _of_earlier(files))
+        for file, file_strands in files.items():
+            notes += write(folder / file.name, groom.take(file_strands))
+        notes += back_up_foreign_files(folder, path, _names_of_earlier_export(files))
         written = sorted(
             (path.with_name(file.name) for file in folder.iterdir()),
             key=lambda file: (file not in files, file.name),
@@ -188,7 +188,7 @@ def _write_files(
     return WrittenStrands(tuple(written), tuple(notes))
 
 
-def _of_earlier(files: Collection[Path]) -> set[str]:
+def _names_of_earlier_export(files: Collection[Path]) -> set[str]:
     """The names of files that an earlier export of this has left; none if one of them is missing,
     since the others are then of something else."""
     if not all(file.is_file() for file in files):
@@ -213,14 +213,14 @@ def _group_files(path: Path, groom: Groom) -> dict[Path, Ints]:
     }
 
 
-def _part(groom: Groom, chosen: Ints, parts: str) -> Groom:
+def _part(groom: Groom, strands: Ints, parts: str) -> Groom:
     """The chosen strands, without closest guides where these are not in the file."""
-    if len(chosen) < groom.strands.strand_count:
-        groom = groom.take(chosen)
+    if len(strands) < groom.strands.strand_count:
+        groom = groom.take(strands)
     if parts != "both" and groom.closest_guides is not None:
         return replace(groom, closest_guides=None, guide_weights=None)
     return groom
 
 
-def _only(motion: GroomMotion, points: Ints) -> Iterator[Floats]:
+def _positions_of(motion: GroomMotion, points: Ints) -> Iterator[Floats]:
     return (frame[points] for frame in motion.positions)

@@ -29,8 +29,8 @@ from .files.axes import from_z_up, to_z_up
 from .files.binary_file import write_blocks
 from .files.file_space import FileSpace
 from .groom import Groom
-from .groom_presets import chosen_parts
-from .read_groom import ReadGroom, finite, kept_points, usable
+from .groom_presets import select_parts
+from .read_groom import ReadGroom, finite_or_zero, usable_strands, values_of_kept_points
 from .tressfx_layout import HEADER_4, VERTEX_COUNTS, TressfxFile
 
 #: TressFX simulates this many strands at a time.
@@ -64,25 +64,25 @@ def read_tfx(path: Path, up: str = "Y", scale: float = 1.0) -> ReadTressfx:
     """
     file = TressfxFile(path)
     count, positions = file.vertex_count, file.positions()
-    thickness, strand_uv = file.of_strands("thickness", 1), file.of_strands("strand_uv", 2)
-    color, vertex_uv = file.of_vertices("color", 4), file.of_vertices("vertex_uv", 2)
+    thickness, strand_uv = file.strand_values("thickness", 1), file.strand_values("strand_uv", 2)
+    color, vertex_uv = file.vertex_values("color", 4), file.vertex_values("vertex_uv", 2)
     # overflow gives infinity, and strands that are not finite are dropped and counted
     with np.errstate(over="ignore", invalid="ignore"):
         points = to_z_up(positions[:, :3], up) * np.float32(scale)
         radius = None if thickness is None else thickness[:, 0] * np.float32(scale)
     offsets = np.arange(file.strand_count + 1) * count
-    cleaned = usable(
+    cleaned = usable_strands(
         file,
         points,
         offsets,
         None if radius is None else np.repeat(radius, count),
-        None if strand_uv is None else _from_top(strand_uv),
+        None if strand_uv is None else _flip_v(strand_uv),
         None if color is None else color[:, :3],
     )
     if file.position_width == 4:
-        is_held = kept_points(positions[:, 3], offsets, cleaned) == 0.0
+        is_held = values_of_kept_points(positions[:, 3], offsets, cleaned) == 0.0
     else:
-        is_held = file.held(cleaned.strands.strand_count)
+        is_held = file.held_vertices(cleaned.strands.strand_count)
     groom = Groom(
         cleaned.strands,
         name=path.stem,
@@ -95,7 +95,9 @@ def read_tfx(path: Path, up: str = "Y", scale: float = 1.0) -> ReadTressfx:
         FileSpace(up),
         _reading_notes(path.name, file, color),
         is_held,
-        None if vertex_uv is None else finite(kept_points(vertex_uv, offsets, cleaned)),
+        None
+        if vertex_uv is None
+        else finite_or_zero(values_of_kept_points(vertex_uv, offsets, cleaned)),
         file.follow_count,
     )
 
@@ -134,7 +136,7 @@ def write_tfx(
         HairloomError: no strands, a vertex count TressFX refuses, a file beyond 4 GiB, or nothing
             can be written there.
     """
-    groom = chosen_parts(hair if isinstance(hair, Groom) else Groom(hair), parts)
+    groom = select_parts(hair if isinstance(hair, Groom) else Groom(hair), parts)
     strands = groom.strands
     if not strands.strand_count:
         raise HairloomError(
@@ -149,7 +151,7 @@ def write_tfx(
     vertices[:, :held_count, 3] = 0.0
     blocks = {"positions": vertices}
     if uniform.root_uv is not None:
-        blocks["strand_uv"] = _from_top(uniform.root_uv)
+        blocks["strand_uv"] = _flip_v(uniform.root_uv)
     if vertex_uv:
         blocks["vertex_uv"] = _vertex_uv(len(grid), count)
     if uniform.color is not None:
@@ -157,11 +159,11 @@ def write_tfx(
         opaque[..., :3] = uniform.color.reshape(-1, count, 3)
         blocks["color"] = opaque
     blocks["thickness"] = uniform.radius[uniform.offsets[:-1]] / np.float32(scale)
-    added = -len(grid) % STRANDS_AT_ONCE if multiple_of_64 else 0
-    if added:
-        blocks = {name: _padded(block, added) for name, block in blocks.items()}
+    repeated_count = -len(grid) % STRANDS_AT_ONCE if multiple_of_64 else 0
+    if repeated_count:
+        blocks = {name: _padded(block, repeated_count) for name, block in blocks.items()}
     _write(path, blocks)
-    return _writing_notes(path.name, groom, uniform, added)
+    return _writing_notes(path.name, groom, uniform, repeated_count)
 
 
 def _write(path: Path, blocks: dict[str, Floats]) -> None:
@@ -169,7 +171,7 @@ def _write(path: Path, blocks: dict[str, Floats]) -> None:
     header["version"] = 4.0
     header["strand_count"], header["vertex_count"] = blocks["positions"].shape[:2]
     end = HEADER_4.itemsize
-    filed: list[NDArray[Any] | bytes] = []
+    written_blocks: list[NDArray[Any] | bytes] = []
     for name, block in blocks.items():
         gap = -end % 8  # as the format requires
         if end + gap > np.iinfo(np.uint32).max:
@@ -179,12 +181,12 @@ def _write(path: Path, blocks: dict[str, Floats]) -> None:
                 remedy="Write fewer strands, or fewer vertices per strand",
             )
         header[name] = end + gap
-        filed += [bytes(gap), np.ascontiguousarray(block, "<f4")]
+        written_blocks += [bytes(gap), np.ascontiguousarray(block, "<f4")]
         end += gap + block.size * 4
-    write_blocks(path, [header, *filed])
+    write_blocks(path, [header, *written_blocks])
 
 
-def _from_top(uv: Floats) -> Floats:
+def _flip_v(uv: Floats) -> Floats:
     """UVs (n, 2) with v flipped: Blender counts it from the bottom of a picture, and TressFX, which
     looks up colours of roots with it, from the top as Direct3D does."""
     return np.stack([uv[:, 0], 1.0 - uv[:, 1]], axis=1)
@@ -210,8 +212,8 @@ def _vertex_uv(strand_count: int, count: int) -> Floats:
     return uv
 
 
-def _padded(block: Floats, added: int) -> Floats:
-    return np.concatenate([block, np.repeat(block[-1:], added, axis=0)])
+def _padded(block: Floats, repeated_count: int) -> Floats:
+    return np.concatenate([block, np.repeat(block[-1:], repeated_count, axis=0)])
 
 
 def _reading_notes(name: str, file: TressfxFile, color: Floats | None) -> tuple[str, ...]:
@@ -226,7 +228,9 @@ def _reading_notes(name: str, file: TressfxFile, color: Floats | None) -> tuple[
     return tuple(notes)
 
 
-def _writing_notes(name: str, groom: Groom, uniform: StrandSet, added: int) -> tuple[str, ...]:
+def _writing_notes(
+    name: str, groom: Groom, uniform: StrandSet, repeated_count: int
+) -> tuple[str, ...]:
     strands, notes = groom.strands, []
     longest = int(strands.point_counts.max())
     count = len(uniform.grid[0])
@@ -241,6 +245,8 @@ def _writing_notes(name: str, groom: Groom, uniform: StrandSet, added: int) -> t
         )
     if groom.strand_id is not None or groom.closest_guides is not None:
         notes.append(f"{name}: .tfx holds no strand IDs and no closest guides.")
-    if added:
-        notes.append(f"{name}: the last strand was repeated {added} times, to a multiple of 64.")
+    if repeated_count:
+        notes.append(
+            f"{name}: the last strand was repeated {repeated_count} times, to a multiple of 64."
+        )
     return tuple(notes)

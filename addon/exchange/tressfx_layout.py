@@ -66,24 +66,24 @@ class TressfxFile(BinaryFile):
         """The number of follow hairs of each strand; only version 3 stores it."""
         return int(self._header["follow_count"]) if self.position_width == 3 else 0
 
-    def held(self, strand_count: int) -> Bools:
+    def held_vertices(self, strand_count: int) -> Bools:
         """Which vertices of these strands a file of version 3 holds, as its loader does: the
         first two, and the last two where both ends are immovable; (vertices,)."""
-        held = np.zeros((strand_count, self.vertex_count), bool)
-        held[:, :2] = True
+        is_held = np.zeros((strand_count, self.vertex_count), bool)
+        is_held[:, :2] = True
         if self._header["both_ends_immovable"]:
-            held[:, -2:] = True
-        return held.ravel()
+            is_held[:, -2:] = True
+        return is_held.ravel()
 
     def positions(self) -> Floats:
         """(vertices, position_width) float32; the fourth of them is the inverse mass."""
         return self._block("positions", self.strand_count * self.vertex_count, self.position_width)
 
-    def of_vertices(self, name: str, width: int) -> Floats | None:
+    def vertex_values(self, name: str, width: int) -> Floats | None:
         """(vertices, width) float32, or None where the file has none of them."""
         return self._optional(name, self.strand_count * self.vertex_count, width)
 
-    def of_strands(self, name: str, width: int) -> Floats | None:
+    def strand_values(self, name: str, width: int) -> Floats | None:
         """(strand_count, width) float32, or None where the file has none of them."""
         return self._optional(name, self.strand_count, width)
 

@@ -21,7 +21,7 @@ from ..blender.properties.properties import property_annotations, settings_of
 from ..blender.strands.export_check import ExportCheck
 from ..blender.strands.strand_export import StrandExport
 from ..errors import HairloomError
-from ..exchange.strand_export_settings import USUAL, StrandExportSettings
+from ..exchange.strand_export_settings import FORMAT_DEFAULT, StrandExportSettings
 from ..exchange.strand_formats import StrandFormat
 from ..params import Parameter
 from . import operators_export_check as export_check
@@ -55,8 +55,8 @@ def _as_in(kind: StrandFormat, option: Parameter) -> Parameter:
         return replace(option, default=engines[0][0], choices=engines)
     if "engine" not in kind.options and option.name in ("up", "scale"):
         space = kind.layouts[0].space
-        usual = {"up": space.up, "scale": 1.0 / space.per_metre}
-        choices = tuple(each for each in option.choices if each[0] != USUAL)
+        usual = {"up": space.up, "scale": 1.0 / space.units_per_metre}
+        choices = tuple(each for each in option.choices if each[0] != FORMAT_DEFAULT)
         return replace(option, default=usual[option.name], choices=choices)
     return option
 

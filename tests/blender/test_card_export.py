@@ -22,7 +22,7 @@ from hairloom.addon.exchange.cards.card_formats import FBX, GLB, OBJ, USD, CardF
 from hairloom.addon.exchange.cards.glb_file import GlbFile
 from hairloom.addon.exchange.files.axes import from_z_up
 from hairloom.addon.exchange.files.file_set import atomic_file_set
-from hairloom.addon.exchange.usd.usd_levels import with_level_variants
+from hairloom.addon.exchange.usd.usd_levels import add_level_variants
 
 bpy = pytest.importorskip("bpy", reason="Blender's exporters need Blender or the bpy module")
 
@@ -240,7 +240,7 @@ def test_a_disk_that_is_full_for_the_levels_of_usd_is_told(
 ) -> None:
     path = written(tmp_path, levels, USD, suffix=suffix)
     with full_disk(500), pytest.raises(HairloomError, match="this file cannot be written"):
-        with_level_variants(path, [f"{NODE}_LOD{number}" for number in range(len(levels))])
+        add_level_variants(path, [f"{NODE}_LOD{number}" for number in range(len(levels))])
 
 
 def test_the_users_blocks_keep_their_names(levels: list[CardMesh], tmp_path: Path) -> None:

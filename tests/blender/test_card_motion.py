@@ -84,12 +84,14 @@ def test_the_first_view_of_a_page_holds_all_places_that_hair_is_carried_to(
         corners = np.array(asset_of(path.with_suffix(".html"))["corners"])
         low[space], high[space] = corners.min(axis=0), corners.max(axis=0)
     roots = np.concatenate([motion.at(frame)[1][:, 0] for frame in motion.frames])
-    way = np.ptp(GLB.placed(roots), axis=0) - np.ptp(GLB.placed(motion.at(0)[1][:, 0]), axis=0)
+    way = np.ptp(GLB.to_file_space(roots), axis=0) - np.ptp(
+        GLB.to_file_space(motion.at(0)[1][:, 0]), axis=0
+    )
     assert way.max() > 0.02, "the head moves [m]"
     wider = (high["world"] - low["world"]) - (high["head"] - low["head"])
     assert (wider > 0.9 * way).all()
-    assert (low["world"] < GLB.placed(roots).min(axis=0) + 0.005).all()
-    assert (high["world"] > GLB.placed(roots).max(axis=0) - 0.005).all()
+    assert (low["world"] < GLB.to_file_space(roots).min(axis=0) + 0.005).all()
+    assert (high["world"] > GLB.to_file_space(roots).max(axis=0) - 0.005).all()
 
 
 def simulated(motion: GuideMotion, written: WrittenCards, frame: int) -> list[np.ndarray]:
@@ -243,10 +245,10 @@ def test_a_motion_texture_holds_the_simulated_cards(
                 *motion.at(frame),
             )
             corners = mesh_now.triangles.reshape(-1)
-            miss = np.abs(moved - GLB.placed(mesh_now.positions[corners]))
+            miss = np.abs(moved - GLB.to_file_space(mesh_now.positions[corners]))
             worst = max(worst, float(miss.max()))
             for name in ("normal", "tangent"):
-                expected = GLB.placed(getattr(mesh_now, name)[corners])
+                expected = GLB.to_file_space(getattr(mesh_now, name)[corners])
                 np.testing.assert_allclose(pictures[name][row, column], expected, atol=6e-4)
     # half floats have 11 significant bits; offsets here are below 12.5 cm
     assert worst < (0.125 * 2.0**-11 + 1e-6 if depth == "half" else 1e-6)

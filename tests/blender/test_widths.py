@@ -62,7 +62,9 @@ def test_every_file_has_the_widths_of_the_preview(
         path = tmp_path / f"{layout.name}{kind.suffixes[0]}"
         engine = {"engine": layout.name} if "engine" in kind.options else {}
         assert export(filepath=str(path), parts="strands", **engine) == {"FINISHED"}
-        read = read_strands(path, scale=1.0 if engine else 1.0 / layout.space.per_metre).strands
+        read = read_strands(
+            path, scale=1.0 if engine else 1.0 / layout.space.units_per_metre
+        ).strands
         assert read.has_widths
         np.testing.assert_allclose(
             read.radius, np.repeat(shown, read.point_counts), rtol=1e-5, err_msg=layout.name

@@ -32,7 +32,7 @@ from hlsl_on_gpu import probe_glsl, probe_hlsl
 from hairloom.addon.blender.cards.textures import texture_channels, texture_roles
 from hairloom.addon.cards.export_settings import CardExportSettings
 from hairloom.addon.exchange.textures.card_textures import WrittenTexture
-from hairloom.addon.exchange.textures.texture_packing import MEANINGS, PRESETS, packed
+from hairloom.addon.exchange.textures.texture_packing import MAP_MEANINGS, PRESETS, pack_textures
 
 HERE = Path(__file__).parent / "unreal"
 FOLDER = REPOSITORY / "docs" / "engines" / "unreal"
@@ -107,7 +107,7 @@ def test_directions_are_read_from_the_channels_that_hold_them(
     """The node's code decodes a texel of each packing to the direction before packing."""
     plan = sys.modules["hairloom_plan"]
     tangent = np.array([0.3, 0.9, 0.6], np.float32)
-    for texture in packed({"tangent": tangent[None, None]}, packing):
+    for texture in pack_textures({"tangent": tangent[None, None]}, packing):
         entry = texture_roles([WrittenTexture(Path("a.png"), texture.layout)], ["tangent"])
         code = plan._texel("Texel", entry["tangent"])
         texel = SimpleNamespace(**dict(zip("rgba", texture.pixels[0, 0], strict=False)))
@@ -121,11 +121,11 @@ def test_directions_are_read_from_the_channels_that_hold_them(
 def test_each_picture_has_the_colour_space_of_its_file(importer: ModuleType, packing: str) -> None:
     """Even if a colour texture also contains alpha, which is linear."""
     shapes = {"base": (1, 1, 3), "color": (1, 1, 3), "tangent": (1, 1, 3)}
-    maps = {name: np.ones(shapes.get(name, (1, 1)), np.float32) for name in MEANINGS}
+    maps = {name: np.ones(shapes.get(name, (1, 1)), np.float32) for name in MAP_MEANINGS}
     maps["normal"] = maps["tangent"]
     written = [
         WrittenTexture(Path(f"cards{texture.suffix}.png"), texture.layout)
-        for texture in packed(maps, packing)
+        for texture in pack_textures(maps, packing)
     ]
     files, roles = texture_channels(written), texture_roles(written, maps)
     for role, entry in roles.items():

@@ -154,7 +154,7 @@ def save_coded_png(path: Path, coded: Floats, *, has_alpha: bool = True) -> None
         image.file_format = "PNG"
         with atomic_write(path) as temporary:
             image.save(filepath=str(temporary))
-            if not texture_files.has_its_end(temporary):
+            if not texture_files.is_complete_picture(temporary):
                 raise write_error(path, DISK_FULL)
 
 

@@ -32,7 +32,7 @@ from ...cards.settings import CardSettings
 from ...cards.shell_plan import ShellPlan, shell_strands
 from ...cards.steps import map_progress, result_of
 from ...errors import HairloomError
-from ...exchange.textures.card_textures import of_one_size
+from ...exchange.textures.card_textures import resized_to_largest
 from ...light_flow import light_along_axes
 from ...paint_flow import with_painted_colors
 from ...params import SettingsMap
@@ -155,7 +155,7 @@ def cards_key(groom: GroomSettings) -> Hashable:
 class CardMaps:
     """The maps of cards, for files and for drawing.
 
-    by_name: the maps that are written, see exchange.texture_packing.MEANINGS.
+    by_name: the maps that are written, see exchange.texture_packing.MAP_MEANINGS.
     textures: the maps that Hairloom draws with; their base includes the gain.
     highlights: the map that breaks highlights up, "shift" or "tangent", see TextureSettings; with
         an atlas "tangent", as it holds the directions of its strands.
@@ -181,7 +181,7 @@ class CardMaps:
         look = shading if self.base_color is None else in_color(self.base_color, shading)
         base = self.textures.base
         if "along" in self.by_name:
-            sized = of_one_size({"base": base, "along": self.by_name["along"]})
+            sized = resized_to_largest({"base": base, "along": self.by_name["along"]})
             base, along = sized["base"], sized["along"]
         else:  # one row of tiles, each from root to tip
             along = np.linspace(0.0, 1.0, len(base))[:, None]

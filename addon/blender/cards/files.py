@@ -30,13 +30,19 @@ from ...exchange.cards.glb_file import GlbFile
 from ...exchange.cards.glb_plain import screen_coverage, with_levels, with_material
 from ...exchange.cards.glb_springs import HeadBone
 from ...exchange.cards.index_buffer import index_buffer
-from ...exchange.cards.sidecar import SUFFIX, CardFile, files_of_earlier, other_owner, sidecar_text
+from ...exchange.cards.sidecar import (
+    SUFFIX,
+    CardFile,
+    conflicting_owner,
+    files_of_earlier_export,
+    sidecar_text,
+)
 from ...exchange.files.atomic import check_writable
 from ...exchange.files.file_names import name_in_other_case
 from ...exchange.files.file_set import atomic_file_set, back_up_foreign_files
-from ...exchange.textures.card_textures import WrittenTexture, of_one_size
-from ...exchange.textures.texture_packing import packed
-from ...exchange.usd.usd_levels import with_level_variants
+from ...exchange.textures.card_textures import WrittenTexture, resized_to_largest
+from ...exchange.textures.texture_packing import pack_textures
+from ...exchange.usd.usd_levels import add_level_variants
 from ...exchange.usd.usd_library import usd_library
 from ...params import Settings, SettingsMap
 from ...shading.card_look import VIEW_COMPENSATED_ALPHA
@@ -205,7 +211,7 @@ def _check_neighbours(path: Path) -> None:
     Raises:
         HairloomError: naming the other file.
     """
-    other = other_owner(path) or name_in_other_case(path)
+    other = conflicting_owner(path) or name_in_other_case(path)
     if other:
         raise HairloomError(
             f"{other} is in this folder, and its companion files would have the same names",
@@ -252,7 +258,7 @@ def file_steps(
     with atomic_file_set(path) as folder:
         writer = _Writer(folder / path.name, made, settings, output, file_format, stage, head)
         said = yield from writer.steps(motion)
-        said += back_up_foreign_files(folder, path, files_of_earlier(path))
+        said += back_up_foreign_files(folder, path, files_of_earlier_export(path))
         names = {file.name for file in folder.iterdir() if file.is_file()}
     beside = sorted(names - {path.name, path.stem + SUFFIX})
     files = (path.name, *beside, path.stem + SUFFIX)
@@ -427,7 +433,7 @@ class _Writer:
                 usd_library(self.path)
             except HairloomError as error:
                 return (f"{error} Until then viewers show all levels at once.",)
-            with_level_variants(self.path, nodes)
+            add_level_variants(self.path, nodes)
         if self.file_format == GLB:
             file = GlbFile.of(self.path.read_bytes(), str(self.path))
             with_levels(file, nodes, screen_coverage(levels, self.made.build.errors))
@@ -443,7 +449,7 @@ def _direction_pictures(path: Path, maps: CardMaps) -> dict[str, bytes]:
     directions = {name: maps.by_name[name] for name in _DIRECTIONS if name in maps.by_name}
     if not directions:
         return {}
-    made = packed(of_one_size(directions), "gltf")
+    made = pack_textures(resized_to_largest(directions), "gltf")
     by_name = {each.suffix.removeprefix("_"): each.pixels for each in made}
     return {
         name: png_of(path, by_name[name]) for name in ("normal", "anisotropy") if name in by_name

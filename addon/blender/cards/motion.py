@@ -290,7 +290,7 @@ class TextureMotion:
         every = {"position": self._offsets, "normal": moved.normals, "tangent": moved.tangents}
         files = {}
         for name, parts in every.items():
-            values = self.file_format.placed(np.concatenate(parts))
+            values = self.file_format.to_file_space(np.concatenate(parts))
             if name != "position":
                 values = values / self.file_format.units_per_metre
             files[name] = f"{path.stem}_motion_{name}.exr"

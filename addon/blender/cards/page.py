@@ -15,7 +15,7 @@ from ...errors import HairloomError
 from ...exchange.cards.card_formats import GLB, CardFormat
 from ...exchange.cards.card_page import PAGE_SUFFIX, CardPage, page_text
 from ...exchange.cards.index_buffer import index_buffer
-from ...exchange.cards.page_asset import half_floats, sizes_of, small_glb, small_maps
+from ...exchange.cards.page_asset import half_floats, size_rows, small_glb, small_maps
 from ...exchange.cards.sidecar import SUFFIX, CardFile, sidecar_text
 from ...exchange.cards.sidecar_texts import ROLES
 from ...shading.settings import ShadingSettings
@@ -78,7 +78,7 @@ def write_page(
         for role, values in maps.items()
     }
     tables = {f"{role}.table": half_floats(each) for role, each in look_tables(shading).items()}
-    indices = index_buffer(sidecar.levels, backs).backs_alone()
+    indices = index_buffer(sidecar.levels, backs).back_orders_only()
     own = replace(
         sidecar,
         textures={
@@ -115,7 +115,7 @@ def write_page(
             {"title": _TITLES[role], "file": f"{role}.png", "meaning": ROLES[role][1]}
             for role in maps
         ],
-        sizes_of(len(glb), textures, levels),
+        size_rows(len(glb), textures, levels),
     )
     path.with_suffix(PAGE_SUFFIX).write_bytes(page_text(page).encode())
 
@@ -136,5 +136,5 @@ def _corners(sidecar: CardFile, carrier: Floats) -> list[list[float]]:
     extent = zip(rest.min(axis=0), rest.max(axis=0), strict=True)
     corners = np.array(list(itertools.product(*extent)))
     carried = np.einsum("fab,cb->fca", carrier[:, :3, :3], corners) + carrier[:, None, :3, 3]
-    points = sidecar.format.placed(carried.reshape(-1, 3))
+    points = sidecar.format.to_file_space(carried.reshape(-1, 3))
     return [points.min(axis=0).tolist(), points.max(axis=0).tolist()]

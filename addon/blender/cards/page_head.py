@@ -49,7 +49,7 @@ class PageHead:
         is_painted = any(_color_of(material) is not None for _, material in chosen)
         has_uv = head.corner_uv is not None and is_painted
         vertex, triangles, uv = _split(head, order, has_uv=has_uv)
-        positions = file_format.placed(head.positions[vertex])
+        positions = file_format.to_file_space(head.positions[vertex])
         normals = from_z_up(head.vertex_normals()[vertex], file_format.up)
         files = {
             "head.positions": rounded("POSITION", positions).tobytes(),

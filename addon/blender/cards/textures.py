@@ -11,7 +11,11 @@ from ...cards.atlas_grid import AtlasGrid
 from ...cards.export_settings import CardExportSettings
 from ...errors import HairloomError
 from ...exchange.textures import texture_files
-from ...exchange.textures.card_textures import WrittenTexture, of_one_size, write_card_textures
+from ...exchange.textures.card_textures import (
+    WrittenTexture,
+    resized_to_largest,
+    write_card_textures,
+)
 from ...shading.marschner.look import fibre_of
 from ...shading.marschner.tables import marschner_tables, shape_of
 from ...shading.settings import ShadingSettings
@@ -89,7 +93,7 @@ def write_textures(
         for those in _together(maps, settings)
         for texture in write_card_textures(
             folder / stem,
-            of_one_size(those),
+            resized_to_largest(those),
             settings.packing,
             file_format=settings.textures,
             grid=grid,

@@ -23,7 +23,7 @@ import bpy
 
 from ...errors import HairloomError
 from ...exchange.files.atomic import check_writable, write_text_atomic
-from ...exchange.named_files import named_files
+from ...exchange.referenced_files import referenced_files
 from ...params.preset import preset_as_dict
 from ..base.digests import digest
 from ..base.report import Report, hairloom_version
@@ -96,7 +96,7 @@ class Stamp:
         outputs = [os.path.abspath(path) for path in report.outputs]
         read = [
             *report.inputs,
-            *(named for path in self._inputs for named in named_files(Path(path))),
+            *(named for path in self._inputs for named in referenced_files(Path(path))),
         ]
         found = [os.path.abspath(path) for path in read] + _files_of_scene()
         inputs = {path: self._digest_as_read(Path(path)) for path in found} | self._inputs

@@ -15,7 +15,7 @@ import numpy as np
 
 from ...arrays import Ints
 from ...exchange.groom import Groom
-from ...exchange.read_groom import finite
+from ...exchange.read_groom import finite_or_zero
 from ..base.attributes import read_attribute, set_attribute
 
 STRAND_ID = "groom_id"
@@ -74,7 +74,7 @@ def stored_groom(
     if weights is not None and all(each is not None for each in closest):
         guides = np.stack(closest, axis=1)  # type: ignore[arg-type]
         if np.isin(guides, ids).all():
-            fields |= {"closest_guides": guides, "guide_weights": finite(weights[kept])}
+            fields |= {"closest_guides": guides, "guide_weights": finite_or_zero(weights[kept])}
     return fields
 
 

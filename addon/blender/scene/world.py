@@ -342,7 +342,7 @@ def _rendered(folder: Path, name: str, plain: tuple[float, float, float]) -> _Re
     files = str(folder / "world.blend"), str(panorama)
     try:
         command = [*program, str(_SCRIPT), "--", *files]
-        done = run_child(command, seconds=_PATIENCE, settings=settings)
+        done = run_child(command, seconds=_PATIENCE, environment=settings)
         if done.returncode == 0:
             return _Read(environment_of(_rgb(read_texture(panorama, is_color=True))))
         lines = done.stderr.decode(errors="replace").strip().splitlines()

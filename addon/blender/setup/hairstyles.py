@@ -13,7 +13,7 @@ import numpy as np
 from ...arrays import Floats
 from ...dynamics.colliders import DistanceField
 from ...errors import HairloomError
-from ...exchange.hairstyles import GROWN, Hairstyle, read_hairstyle, read_title
+from ...exchange.hairstyles import GROW_SECTION, Hairstyle, read_hairstyle, read_title
 from ...groom.face_hair import grow_face_hair
 from ...groom.grow import grow
 from ...groom.settings import GrowSettings
@@ -310,7 +310,7 @@ def _fur(
     style: Hairstyle, head: bpy.types.Object, depsgraph: bpy.types.Depsgraph
 ) -> Callable[[], _Growth]:
     factor = fitting_factor(head, depsgraph)
-    settings = fitted(GrowSettings.from_dict(style.settings[GROWN], style.title), factor)
+    settings = fitted(GrowSettings.from_dict(style.settings[GROW_SECTION], style.title), factor)
     surface = read_surface(head, depsgraph, need_uv=False, place=head.name)
     return lambda: _Growth(_outside(grow(surface, settings), solid_of(surface)), factor, factor)
 
@@ -471,7 +471,7 @@ def _size_of(head: bpy.types.Object) -> float:
 
 def _put_settings(style: Hairstyle, hair: bpy.types.Object) -> None:
     """Apply the hairstyle's own settings on top of its presets and the defaults."""
-    for section in set(style.settings) - {GROWN}:
+    for section in set(style.settings) - {GROW_SECTION}:
         kind, values = ALL_SETTINGS[section], style.settings[section]
         owners = hair.data.hairloom, hair.hairloom
         owner = next((one for one in owners if hasattr(one, section)), None)

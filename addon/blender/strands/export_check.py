@@ -11,7 +11,7 @@ import bpy
 
 from ...errors import HairloomError
 from ...exchange.groom import Groom
-from ...exchange.joined_grooms import joined_grooms
+from ...exchange.join_grooms import join_grooms
 from ...exchange.strand_check import check_lines
 from ...exchange.strand_export_settings import StrandExportSettings
 from ...exchange.strand_formats import StrandFormat
@@ -118,7 +118,7 @@ class ExportCheck:
             for each, out in zip(found, outs, strict=True):
                 if out.made is not None:
                     self._made[each.session_uid] = out.made
-            groom, lost = joined_grooms([out.groom for out in outs], found[0].name)
+            groom, lost = join_grooms([out.groom for out in outs], found[0].name)
             notes = dict.fromkeys([note for out in outs for note in out.notes])
             self._read[request] = groom, (*notes, *lost)
         return self._read[request]

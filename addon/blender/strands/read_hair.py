@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 
 from ...arrays import Floats, Ints
-from ...exchange.groom import Groom, points_of, with_guide_copies
+from ...exchange.groom import Groom, point_indices_of, with_guide_copies
 from ...groom.painted_color import PaintedColor
 from ...groom.roots import bind_roots
 from ...groom.weights import guide_weights
@@ -188,7 +188,7 @@ def _out(
     if rig is None or not request.guides:
         return ExportStrands(groom, groom.strands, np.zeros(0, np.int64))
     whole = with_guide_copies(groom, rig.guides, rig.weights.guide, rig.weights.weight)
-    return ExportStrands(whole, groom.strands, points_of(groom.strands, rig.guides))
+    return ExportStrands(whole, groom.strands, point_indices_of(groom.strands, rig.guides))
 
 
 def _with_notes(

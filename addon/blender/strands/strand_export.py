@@ -14,8 +14,8 @@ import bpy
 from ...arrays import Floats
 from ...exchange.files.file_moves import commit_context
 from ...exchange.groom import Groom, GroomMotion
-from ...exchange.groom_presets import chosen_parts
-from ...exchange.joined_grooms import joined_bones, joined_grooms
+from ...exchange.groom_presets import select_parts
+from ...exchange.join_grooms import join_bones, join_grooms
 from ...exchange.strand_check import check_strands
 from ...exchange.strand_export_settings import StrandExportSettings, layout_of
 from ...exchange.strand_formats import ALEMBIC, TRESSFX, USD, StrandFormat
@@ -84,7 +84,7 @@ class StrandExport:
             outs, moving, notes = _moving(
                 hair, depsgraph, request, frames, known, use_bake=settings.use_bake
             )
-        groom, lost = joined_grooms([out.groom for out in outs], hair[0].name)
+        groom, lost = join_grooms([out.groom for out in outs], hair[0].name)
         bones, missing = None, tuple[str, ...]()
         if with_bones:
             bones, missing = _bones(hair, depsgraph, outs)
@@ -159,7 +159,7 @@ class StrandExport:
         return ThreadWork(work, "Hairloom strands")
 
     def _outcome(self, written: WrittenStrands) -> Outcome:
-        chosen = chosen_parts(self.groom, layout_of(self.kind, self.settings).parts)
+        chosen = select_parts(self.groom, layout_of(self.kind, self.settings).parts)
         guides = 0 if chosen.is_guide is None else int(chosen.is_guide.sum())
         counts = {"strands": chosen.strands.strand_count - guides, "guides": guides}
         what = [f"{count:,} {name}" for name, count in counts.items() if count]
@@ -230,7 +230,7 @@ def _bones(
             f"{names}: no bone moves its head, so no .tfxbone was written. Write it to a separate "
             "file.",
         )
-    return (joined_bones(bones) if bones else None), tuple(notes)
+    return (join_bones(bones) if bones else None), tuple(notes)
 
 
 def _loose(hair: bpy.types.Object, bones: BoneWeights) -> list[str]:

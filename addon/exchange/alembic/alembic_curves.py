@@ -33,7 +33,7 @@ type Arrays = dict[str, NDArray[Any]]
 #: Memory that the process may take beside ten times the file's size [bytes].
 MEMORY = 4 << 30
 #: Maximum depth of objects, which form a cycle in some damaged files.
-DEEPEST = 64
+MAX_DEPTH = 64
 #: Maximum samples of motion: nearly seven minutes at 24 frames a second.
 MAX_TIMES = 10_000
 #: Exit codes, as `run_reader` expects them: after an error that is reported on stderr; where the
@@ -61,47 +61,47 @@ def read_curves(path: str) -> Arrays:
     return found
 
 
-def _walk(thing: Any, above: tuple[Any, ...], found: Arrays, depth: int) -> None:
+def _walk(thing: Any, parents: tuple[Any, ...], found: Arrays, depth: int) -> None:
     """Args:
     above: the schemas of the transforms above it, the outermost first.
     """
     from alembic3d import Abc, AbcGeom
 
-    if depth > DEEPEST:
-        raise ValueError(f"its objects lie more than {DEEPEST} deep")
+    if depth > MAX_DEPTH:
+        raise ValueError(f"its objects lie more than {MAX_DEPTH} deep")
     meta = thing.getMetaData()
     if AbcGeom.ICurves.matches(meta):
         number = sum(name.endswith("/points") for name in found)
         schema = Abc.ICompoundProperty(thing.getProperties(), ".geom")
         found[f"{number}/name"] = np.array(thing.getName())
-        found[f"{number}/matrix"] = _matrix(above)
+        found[f"{number}/matrix"] = _matrix(parents)
         _read_geometry(schema, f"{number}/", found)
-        _read_motion(schema, above, f"{number}/", found)
+        _read_motion(schema, parents, f"{number}/", found)
         _read_user(schema, found)
     elif AbcGeom.IXform.matches(meta):
         _read_user(Abc.ICompoundProperty(thing.getProperties(), ".xform"), found)
         place = AbcGeom.IXform(thing, Abc.WrapExistingFlag.kWrapExisting).getSchema()
-        above = (*above, place)
+        parents = (*parents, place)
     for child in thing.children:
-        _walk(child, above, found, depth + 1)
+        _walk(child, parents, found, depth + 1)
 
 
-def _matrix(above: tuple[Any, ...], time: float | None = None) -> NDArray[np.float64]:
+def _matrix(parents: tuple[Any, ...], time: float | None = None) -> NDArray[np.float64]:
     """(4, 4) that takes row vectors to the world, at a time, or at the first."""
     matrix = np.eye(4)
-    for place in above:
+    for place in parents:
         if not place.getValue().getInheritsXforms():
             matrix = np.eye(4)
-        around, part = _around(place, time)
+        selectors, fraction = _bracketing_samples(place, time)
         own = [
-            np.array([list(row) for row in place.getValue(*when).getMatrix()], np.float64)
-            for when in around
+            np.array([list(row) for row in place.getValue(*selector).getMatrix()], np.float64)
+            for selector in selectors
         ]
-        matrix = _mixed(own, part) @ matrix
+        matrix = _interpolated(own, fraction) @ matrix
     return matrix
 
 
-def _around(moving: Any, time: float | None) -> tuple[list[tuple[Any, ...]], float]:
+def _bracketing_samples(moving: Any, time: float | None) -> tuple[list[tuple[Any, ...]], float]:
     """Selectors of the samples before and after a time, and how far it is between them, 0 to 1;
     one selector where the time is that of a sample, or beyond all.
 
@@ -114,23 +114,23 @@ def _around(moving: Any, time: float | None) -> tuple[list[tuple[Any, ...]], flo
     sampling, count = moving.getTimeSampling(), moving.getNumSamples()
     numbers = {sampling.getFloorIndex(time, count), sampling.getCeilIndex(time, count)}
     times = [float(sampling.getSampleTime(number)) for number in sorted(numbers)]
-    part = (time - times[0]) / (times[1] - times[0]) if len(times) > 1 else 0.0
-    return [(Abc.ISampleSelector(each),) for each in times], part
+    fraction = (time - times[0]) / (times[1] - times[0]) if len(times) > 1 else 0.0
+    return [(Abc.ISampleSelector(each),) for each in times], fraction
 
 
-def _mixed(around: list[NDArray[Any]], part: float) -> NDArray[Any]:
+def _interpolated(samples: list[NDArray[Any]], fraction: float) -> NDArray[Any]:
     """Values interpolated linearly between two samples."""
-    return around[0] if len(around) == 1 else around[0] + (around[1] - around[0]) * part
+    return samples[0] if len(samples) == 1 else samples[0] + (samples[1] - samples[0]) * fraction
 
 
-def _read_motion(schema: Any, above: tuple[Any, ...], prefix: str, found: Arrays) -> None:
+def _read_motion(schema: Any, parents: tuple[Any, ...], prefix: str, found: Arrays) -> None:
     from alembic3d import Abc
 
     headers = {header.getName(): header for header in schema.propertyheaders}
     if "P" not in headers or "nVertices" not in headers:
         return
     points, counts = (Abc.IArrayProperty(schema, name) for name in ("P", "nVertices"))
-    moving = [each for each in (points, *above) if not each.isConstant()]
+    moving = [each for each in (points, *parents) if not each.isConstant()]
     if not moving:
         return
     times = np.unique(np.concatenate([_times(each) for each in moving]))
@@ -138,16 +138,18 @@ def _read_motion(schema: Any, above: tuple[Any, ...], prefix: str, found: Arrays
         raise ValueError(f"it has more than {MAX_TIMES:,} frames")
     first, positions = found[prefix + "counts"], []
     for time in times.tolist():
-        around, part = _around(points, time)
-        here = [_values(schema, headers["P"], *when).astype(np.float64) for when in around]
-        own = [np.array(counts.getValue(*when)) for when in around]
+        selectors, fraction = _bracketing_samples(points, time)
+        here = [
+            _values(schema, headers["P"], *selector).astype(np.float64) for selector in selectors
+        ]
+        own = [np.array(counts.getValue(*selector)) for selector in selectors]
         is_same = [len(each) == len(found[prefix + "points"]) for each in here]
         if not all(is_same) or not all(np.array_equal(each, first) for each in own):
             found[prefix + "ended"] = np.array(time)
             break
-        matrix = _matrix(above, time)
+        matrix = _matrix(parents, time)
         with np.errstate(over="ignore", invalid="ignore"):
-            placed = _mixed(here, part) @ matrix[:3, :3] + matrix[3, :3]
+            placed = _interpolated(here, fraction) @ matrix[:3, :3] + matrix[3, :3]
             positions.append(placed.astype(np.float32))
     found[prefix + "times"] = times[: len(positions)]
     found[prefix + "motion"] = np.array(positions, np.float32)
@@ -196,7 +198,7 @@ def _read_attributes(schema: Any, header: Any, prefix: str, found: Arrays) -> No
             found[prefix + each.getName()] = values if is_plain else values.astype(str)
 
 
-def _values(parent: Any, header: Any, *when: Any) -> NDArray[Any]:
+def _values(parent: Any, header: Any, *selector: Any) -> NDArray[Any]:
     """A property's first sample, or that of a time, of any type; indexed ones are expanded."""
     from alembic3d import Abc
 
@@ -212,9 +214,9 @@ def _values(parent: Any, header: Any, *when: Any) -> NDArray[Any]:
     kind = header.getDataType()
     typed = _VECTORS.get(kind.getExtent()) if kind.getPod().name == "kFloat32POD" else None
     if typed is None:
-        return np.array(Abc.IArrayProperty(parent, name).getValue(*when))
-    anyhow = Abc.Argument(Abc.SchemaInterpMatching.kNoMatching)
-    return np.array(getattr(Abc, typed)(parent, name, anyhow).getValue(*when))
+        return np.array(Abc.IArrayProperty(parent, name).getValue(*selector))
+    no_matching = Abc.Argument(Abc.SchemaInterpMatching.kNoMatching)
+    return np.array(getattr(Abc, typed)(parent, name, no_matching).getValue(*selector))
 
 
 def _limit_memory(path: str) -> None:

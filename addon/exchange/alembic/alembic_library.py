@@ -46,15 +46,15 @@ def alembic_library(place: str) -> Any:
     return SimpleNamespace(abc=Abc, geom=AbcGeom, core=AbcCoreAbstract, imath=imath)
 
 
-def array_of(library: Any, values: Floats | Ints) -> Any:
+def imath_array(library: Any, values: Floats | Ints) -> Any:
     """A copy of (n,) or (n, width) float32 or int32 as an array of Imath."""
     return getattr(library.imath, _FROM_BUFFER[_kind(values)])(np.ascontiguousarray(values))
 
 
-def sample_of(library: Any, values: Floats | Ints, scope: str) -> Any:
+def parameter_sample(library: Any, values: Floats | Ints, scope: str) -> Any:
     """Values of a geometry parameter; `scope` is "Constant", "Uniform" or "Vertex"."""
     make = getattr(library.geom, f"O{_PARAMETER[_kind(values)]}GeomParamSample")
-    return make(array_of(library, values), scope_of(library, scope))
+    return make(imath_array(library, values), geometry_scope(library, scope))
 
 
 def write_parameter(
@@ -62,10 +62,12 @@ def write_parameter(
 ) -> None:
     """A geometry parameter with one sample; vectors have the interpretation "vector"."""
     make = getattr(library.geom, f"O{_PARAMETER[_kind(values)]}GeomParam")
-    make(parent, name, False, scope_of(library, scope), 1).set(sample_of(library, values, scope))
+    make(parent, name, False, geometry_scope(library, scope), 1).set(
+        parameter_sample(library, values, scope)
+    )
 
 
-def scope_of(library: Any, scope: str) -> Any:
+def geometry_scope(library: Any, scope: str) -> Any:
     return getattr(library.geom.GeometryScope, f"k{scope}Scope")
 
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from ...arrays import Bools, Floats, Ints
 from ...errors import HairloomError
-from ..curve_basis import OnCurves, points_on_curves, unfit_curves, usable_basis
-from ..read_motion import ended_at, motion_of
+from ..curve_basis import CurveSampling, invalid_curves, points_on_curves, usable_basis
+from ..read_motion import join_motions, motion_end_note
 from .alembic_curves import Arrays
 
 type _Values = NDArray[Any]
@@ -21,7 +21,7 @@ _INT32 = np.iinfo(np.int32)
 
 
 @dataclass(frozen=True)
-class Joined:
+class JoinedCurves:
     """Curves as a file has them, in its unit and axes, not yet cleaned.
 
     points: (point_count, 3) float32.
@@ -34,7 +34,7 @@ class Joined:
     identities: strand_id, closest_guides and guide_weights of each curve, as far as present.
     group_names: group -> name.
     motion: times [s] and the points at these, (n, point_count, 3), or None.
-    unfit: see `unfit_curves`.
+    unfit: see `invalid_curves`.
     notes: what could not be used.
     """
 
@@ -64,26 +64,26 @@ class _Object:
     counts: Ints
     arrays: Arrays
     control_count: int
-    on_curves: OnCurves
+    sampling: CurveSampling
     notes: list[str] = field(default_factory=list)
 
-    def of_curves(self, name: str, width: int = 1) -> _Values | None:
+    def curve_values(self, name: str, width: int = 1) -> _Values | None:
         """An attribute's value for each curve, from values of curves or one for all."""
         values = self._values(name, width, (len(self.counts), 1))
         if values is None or len(values) == len(self.counts):
             return values
         return np.repeat(values, len(self.counts), axis=0)
 
-    def of_points(self, name: str, width: int = 1) -> _Values | None:
+    def point_values(self, name: str, width: int = 1) -> _Values | None:
         """An attribute's value for each point, from values of points, of curves, or one for all."""
-        curves, ends = len(self.counts), self.on_curves.varying_count
+        curves, ends = len(self.counts), self.sampling.varying_count
         values = self._values(name, width, (self.control_count, ends, curves, 1))
         if values is None:
             return None
         if len(values) == self.control_count:
-            return values if self.on_curves.vertex is None else self.on_curves.vertex.of(values)
-        if len(values) == ends and self.on_curves.varying is not None:
-            return self.on_curves.varying.of(values)
+            return values if self.sampling.vertex is None else self.sampling.vertex.apply(values)
+        if len(values) == ends and self.sampling.varying is not None:
+            return self.sampling.varying.apply(values)
         return np.repeat(values, self.counts if len(values) == curves else len(self.points), axis=0)
 
     def _values(self, name: str, width: int, counts: tuple[int, ...]) -> _Values | None:
@@ -100,7 +100,7 @@ class _Object:
         return values
 
 
-def joined(found: Arrays, path: Path) -> Joined:
+def join_curves(found: Arrays, path: Path) -> JoinedCurves:
     """All curves objects that `alembic_curves` has found.
 
     Raises:
@@ -119,22 +119,22 @@ def joined(found: Arrays, path: Path) -> Joined:
     counts = np.concatenate([each.counts for each in objects])
     widths = [_widths(each) for each in objects]
     group, names = _groups(objects)
-    guide = _uniform(objects, "groom_guide", 1, 0)
-    return Joined(
+    guide = _curve_values(objects, "groom_guide", 1, 0)
+    return JoinedCurves(
         points=np.concatenate([each.points for each in objects]),
         offsets=np.concatenate([[0], np.cumsum(counts)]),
-        widths=_side_by_side(widths, [len(each.points) for each in objects], np.nan),
+        widths=_concatenated(widths, [len(each.points) for each in objects], np.nan),
         group=group,
-        root_uv=_uniform(objects, "groom_root_uv", 2, 0.0),
-        color=_side_by_side(
-            [each.of_points("groom_color", 3) for each in objects],
+        root_uv=_curve_values(objects, "groom_root_uv", 2, 0.0),
+        color=_concatenated(
+            [each.point_values("groom_color", 3) for each in objects],
             [len(each.points) for each in objects],
             np.nan,
         ),
         is_guide=None if guide is None else guide != 0,
         identities=_identities(objects),
         group_names=names,
-        motion=motion_of([_moving(each) for each in objects]),
+        motion=join_motions([_part_motion(each) for each in objects]),
         unfit=_unfit(objects),
         notes=(*_notes(objects), *left_out),  # after all others, which add notes to the objects
     )
@@ -148,7 +148,7 @@ def _notes(objects: list[_Object]) -> tuple[str, ...]:
 
 def _unfit(objects: list[_Object]) -> dict[str, Bools]:
     """Why curves cannot be used -> which of all."""
-    of_objects = [unfit_curves(each.on_curves, str(each.arrays.get("basis"))) for each in objects]
+    of_objects = [invalid_curves(each.sampling, str(each.arrays.get("basis"))) for each in objects]
     return {
         reason: np.concatenate(
             [
@@ -174,31 +174,37 @@ def _object(found: Arrays, number: int, path: Path) -> _Object:
     own = {n.removeprefix(prefix): v for n, v in found.items() if n.startswith(prefix)}
     name, points, counts = str(own["name"]), own["points"], own["counts"]
     if points.ndim != 2 or points.shape[1] != 3 or points.dtype.kind != "f" or counts.ndim != 1:
-        raise _lying(path, name, "its points are not positions")
+        raise _broken_curves(path, name, "its points are not positions")
     counts = counts.astype(np.int64)
     if len(counts) and (counts.min() < 0 or counts.sum() != len(points)):
-        raise _lying(path, name, f"its curves need {counts.sum()} points, but it has {len(points)}")
+        raise _broken_curves(
+            path, name, f"its curves need {counts.sum()} points, but it has {len(points)}"
+        )
     basis, said = usable_basis(str(own.get("basis", "linear")), counts)
-    ended = [ended_at(float(own["ended"]), "different counts of points")] if "ended" in own else []
+    ended = (
+        [motion_end_note(float(own["ended"]), "different counts of points")]
+        if "ended" in own
+        else []
+    )
     notes = [f"{name}: {note}" for note in (*ended, *said)]
-    on_curves = points_on_curves(basis, True, counts)
-    placed = _placed(points, own["matrix"])
-    if on_curves.vertex is not None:
+    sampling = points_on_curves(basis, True, counts)
+    placed = _to_world(points, own["matrix"])
+    if sampling.vertex is not None:
         notes.append(f"{name}: its {basis} curves were converted to points on the curves")
-        placed = on_curves.vertex.of(placed)
-    return _Object(name, placed, np.diff(on_curves.offsets), own, len(points), on_curves, notes)
+        placed = sampling.vertex.apply(placed)
+    return _Object(name, placed, np.diff(sampling.offsets), own, len(points), sampling, notes)
 
 
-def _moving(each: _Object) -> tuple[Floats | None, Floats]:
-    """See `motion_of`."""
+def _part_motion(each: _Object) -> tuple[Floats | None, Floats]:
+    """See `join_motions`."""
     times, positions = each.arrays.get("times"), each.arrays.get("motion")
     if times is None or positions is None or positions.shape[1:] != (each.control_count, 3):
         return None, each.points[None]
-    vertex = each.on_curves.vertex
-    return times, positions if vertex is None else np.array([vertex.of(at) for at in positions])
+    vertex = each.sampling.vertex
+    return times, positions if vertex is None else np.array([vertex.apply(at) for at in positions])
 
 
-def _placed(points: Floats, matrix: Floats) -> Floats:
+def _to_world(points: Floats, matrix: Floats) -> Floats:
     """Points in the world; untouched, to the bit, where the object is not moved."""
     if np.array_equal(matrix, np.eye(4)):
         return points.astype(np.float32)
@@ -209,8 +215,8 @@ def _placed(points: Floats, matrix: Floats) -> Floats:
 
 def _widths(each: _Object) -> _Values | None:
     """The width at each point: as in engines, the attribute overrides the curves' own widths."""
-    widths = each.of_points("groom_width")
-    return each.of_points("widths") if widths is None else widths
+    widths = each.point_values("groom_width")
+    return each.point_values("widths") if widths is None else widths
 
 
 def _groups(objects: list[_Object]) -> tuple[Ints, dict[int, str]]:
@@ -218,7 +224,7 @@ def _groups(objects: list[_Object]) -> tuple[Ints, dict[int, str]]:
     has_ids = any("groom_group_id" in each.arrays for each in objects)
     ids, names = list[Ints](), dict[int, str]()
     for number, each in enumerate(objects):
-        own = _whole(each.of_curves("groom_group_id")) if has_ids else None
+        own = _as_int32(each.curve_values("groom_group_id")) if has_ids else None
         if own is None:
             own = np.full(len(each.counts), 0 if has_ids else number, np.int32)
         ids.append(own)
@@ -234,13 +240,13 @@ def _groups(objects: list[_Object]) -> tuple[Ints, dict[int, str]]:
 
 def _identities(objects: list[_Object]) -> Arrays:
     """IDs, and closest guides, which refer to them, with weights."""
-    ids = [_whole(each.of_curves("groom_id")) for each in objects]
+    ids = [_as_int32(each.curve_values("groom_id")) for each in objects]
     sizes = [len(each.counts) for each in objects]
-    known = None if any(each is None for each in ids) else _side_by_side(ids, sizes, 0)
-    closest = _side_by_side(
-        [_whole(o.of_curves("groom_closest_guides", 3)) for o in objects], sizes, 0
+    known = None if any(each is None for each in ids) else _concatenated(ids, sizes, 0)
+    closest = _concatenated(
+        [_as_int32(o.curve_values("groom_closest_guides", 3)) for o in objects], sizes, 0
     )
-    weights = _uniform(objects, "groom_guide_weights", 3, 0.0)
+    weights = _curve_values(objects, "groom_guide_weights", 3, 0.0)
     found: Arrays = {}
     if known is not None:
         found["strand_id"] = known
@@ -250,7 +256,7 @@ def _identities(objects: list[_Object]) -> Arrays:
     return found
 
 
-def _whole(values: _Values | None) -> Ints | None:
+def _as_int32(values: _Values | None) -> Ints | None:
     """As int32; what does not fit becomes 0."""
     if values is None:
         return None
@@ -258,13 +264,13 @@ def _whole(values: _Values | None) -> Ints | None:
     return np.where(fits, values, 0).astype(np.int32)
 
 
-def _uniform(objects: list[_Object], name: str, width: int, missing: float) -> _Values | None:
+def _curve_values(objects: list[_Object], name: str, width: int, missing: float) -> _Values | None:
     """An attribute of all curves, `missing` for objects without it; None if no object has it."""
-    values = [each.of_curves(name, width) for each in objects]
-    return _side_by_side(values, [len(each.counts) for each in objects], missing)
+    values = [each.curve_values(name, width) for each in objects]
+    return _concatenated(values, [len(each.counts) for each in objects], missing)
 
 
-def _side_by_side(parts: list[_Values | None], sizes: list[int], missing: float) -> _Values | None:
+def _concatenated(parts: list[_Values | None], sizes: list[int], missing: float) -> _Values | None:
     there = next((part for part in parts if part is not None), None)
     if there is None:
         return None
@@ -275,7 +281,7 @@ def _side_by_side(parts: list[_Values | None], sizes: list[int], missing: float)
     return np.concatenate(filled)
 
 
-def _lying(path: Path, name: str, problem: str) -> HairloomError:
+def _broken_curves(path: Path, name: str, problem: str) -> HairloomError:
     return HairloomError(
         f"the curves '{name}' are broken: {problem}",
         place=str(path),

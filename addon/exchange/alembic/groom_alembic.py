@@ -23,9 +23,15 @@ from ...strands import StrandSet
 from ...strands.resample import arc_length_positions
 from ..files.atomic import atomic_write, check_free_space, write_error, write_failure_reason
 from ..files.file_names import identifier_name, unique_names
-from ..groom import Groom, GroomMotion, points_of
-from ..groom_presets import MIN_WIDTH, UNREAL, GroomPreset, chosen_strands
-from .alembic_library import alembic_library, array_of, sample_of, scope_of, write_parameter
+from ..groom import Groom, GroomMotion, point_indices_of
+from ..groom_presets import MIN_WIDTH, UNREAL, GroomPreset, selected_strands
+from .alembic_library import (
+    alembic_library,
+    geometry_scope,
+    imath_array,
+    parameter_sample,
+    write_parameter,
+)
 
 VERSION = (1, 5)
 TOOL = "Hairloom"
@@ -67,11 +73,11 @@ def write_groom_alembic(
                 raise
             why = write_failure_reason(path, str(error).strip() or "no reason given")
             raise write_error(path, why) from error
-        if not is_finished(temporary):
+        if not is_complete_alembic(temporary):
             raise write_error(path, write_failure_reason(path, "the disk may be full"))
 
 
-def is_finished(path: Path) -> bool:
+def is_complete_alembic(path: Path) -> bool:
     """Whether an Alembic file was written to its end, as its sixth byte tells."""
     with path.open("rb") as file:
         return file.read(6) == b"Ogawa\xff"
@@ -82,21 +88,21 @@ class _Part:
     """One curves object: its name, and which strands it has; None: all, in their order."""
 
     name: str
-    chosen: Ints | None
+    strands: Ints | None
 
-    def taken(self, groom: Groom, preset: GroomPreset) -> _Taken:
+    def strands_of(self, groom: Groom, preset: GroomPreset) -> _PartStrands:
         """A copy of the object's strands, to be kept only while it is written."""
-        own = groom if self.chosen is None else groom.take(self.chosen)
-        return _Taken(own, point_cap(own.strands, preset.max_points))
+        own = groom if self.strands is None else groom.take(self.strands)
+        return _PartStrands(own, cap_points(own.strands, preset.max_points))
 
-    def point_counts(self, strands: StrandSet, most: int) -> Ints:
+    def point_counts(self, strands: StrandSet, max_points: int) -> Ints:
         """Points of each curve that is written."""
         counts = strands.point_counts
-        return np.minimum(counts if self.chosen is None else counts[self.chosen], most)
+        return np.minimum(counts if self.strands is None else counts[self.strands], max_points)
 
 
 @dataclass(frozen=True)
-class _Taken:
+class _PartStrands:
     """The strands of a curves object, and which of their points are written."""
 
     groom: Groom
@@ -112,16 +118,16 @@ class _Taken:
 
 
 @dataclass(frozen=True)
-class _Moved:
+class _FramePoints:
     """How a curves object gets its points from a frame: indices, None for all, and the cap."""
 
     points: Ints | None
     cap: PointCap | None
 
     @classmethod
-    def of(cls, part: _Part, taken: _Taken, strands: StrandSet) -> _Moved:
-        points = None if part.chosen is None else points_of(strands, part.chosen)
-        return cls(points, taken.cap)
+    def of(cls, part: _Part, part_strands: _PartStrands, strands: StrandSet) -> _FramePoints:
+        points = None if part.strands is None else point_indices_of(strands, part.strands)
+        return cls(points, part_strands.cap)
 
     def of_frame(self, frame: Floats, preset: GroomPreset) -> Floats:
         """The points that are written, in the file's space."""
@@ -130,16 +136,16 @@ class _Moved:
 
 
 def _parts(groom: Groom, preset: GroomPreset) -> list[_Part]:
-    parts = (_Part(name, chosen) for name, chosen in _chosen(groom, preset))
+    parts = (_Part(name, strands) for name, strands in _strands_of_parts(groom, preset))
     count = groom.strands.strand_count
-    return [p for p in parts if (count if p.chosen is None else len(p.chosen))]
+    return [p for p in parts if (count if p.strands is None else len(p.strands))]
 
 
-def _chosen(groom: Groom, preset: GroomPreset) -> Iterator[tuple[str, Ints | None]]:
+def _strands_of_parts(groom: Groom, preset: GroomPreset) -> Iterator[tuple[str, Ints | None]]:
     """Name and strands of each curves object; None: all of them, in their order."""
     count = groom.strands.strand_count
-    wanted = chosen_strands(groom, preset.parts)
-    if not preset.is_split:
+    wanted = selected_strands(groom, preset.parts)
+    if not preset.splits_groups:
         yield identifier_name(groom.name), None if len(wanted) == count else wanted
         return
     group = groom.strands.group[wanted]
@@ -170,21 +176,23 @@ def _write(
     top = library.geom.OXform(archive.getTop(), f"{identifier_name(groom.name)}_groom")
     _write_version(library, top.getSchema().getUserProperties(), groom, preset)
     frames = iter([groom.strands.points] if motion is None else motion.positions)
-    first = _checked(next(frames, None), groom)
-    moving = []
+    first = _check_frame(next(frames, None), groom)
+    moving_curves = []
     for part in parts:  # one after the other, so that no more than one is in memory twice
         curves = library.geom.OCurves(top, part.name, library.abc.Argument(time))
-        schema, taken = curves.getSchema(), part.taken(groom, preset)
-        moved = _Moved.of(part, taken, groom.strands)
-        schema.set(_first_sample(library, taken, preset, moved.of_frame(first, preset)))
-        _write_attributes(library, schema.getArbGeomParams(), taken, preset)
+        schema, part_strands = curves.getSchema(), part.strands_of(groom, preset)
+        frame_points = _FramePoints.of(part, part_strands, groom.strands)
+        schema.set(
+            _first_sample(library, part_strands, preset, frame_points.of_frame(first, preset))
+        )
+        _write_attributes(library, schema.getArbGeomParams(), part_strands, preset)
         if motion is not None:
-            moving.append((schema, moved))
+            moving_curves.append((schema, frame_points))
     for frame in frames:
-        checked = _checked(frame, groom)
+        checked = _check_frame(frame, groom)
         check_free_space(path, points * _POINT_BYTES + _HEADER_BYTES)
-        for schema, moved in moving:
-            schema.set(_sample(library, preset, moved.of_frame(checked, preset)))
+        for schema, frame_points in moving_curves:
+            schema.set(_sample(library, preset, frame_points.of_frame(checked, preset)))
 
 
 def _archive(library: Any, path: Path, groom: Groom, motion: GroomMotion | None) -> tuple[Any, int]:
@@ -203,7 +211,7 @@ def _archive(library: Any, path: Path, groom: Groom, motion: GroomMotion | None)
     return archive, archive.addTimeSampling(sampling)
 
 
-def _checked(frame: Floats | None, groom: Groom) -> Floats:
+def _check_frame(frame: Floats | None, groom: Groom) -> Floats:
     """A frame's points, which are as many as the groom's."""
     expected = (groom.strands.point_count, 3)
     if frame is None or frame.shape != expected or not np.isfinite(frame).all():
@@ -221,7 +229,7 @@ def _write_version(library: Any, properties: Any, groom: Groom, preset: GroomPre
     abc.OInt16Property(properties, "groom_version_major").setValue(VERSION[0])
     abc.OInt16Property(properties, "groom_version_minor").setValue(VERSION[1])
     abc.OStringProperty(properties, "groom_tool").setValue(TOOL)
-    about = f"up={space.up};per_metre={space.per_metre!r};mirrored={int(space.is_mirrored)}"
+    about = f"up={space.up};per_metre={space.units_per_metre!r};mirrored={int(space.is_mirrored)}"
     abc.OStringProperty(properties, "groom_properties").setValue(about)
 
 
@@ -230,25 +238,25 @@ def _sample(library: Any, preset: GroomPreset, points: Floats) -> Any:
     takes empty knots for broken ones."""
     geom, is_cubic = library.geom, preset.basis == "cubic"
     sample = geom.OCurvesSchemaSample()
-    sample.setPositions(array_of(library, points))
+    sample.setPositions(imath_array(library, points))
     sample.setType(geom.CurveType.kCubic if is_cubic else geom.CurveType.kLinear)
     sample.setBasis(geom.BasisType.kCatmullromBasis if is_cubic else geom.BasisType.kNoBasis)
     sample.setWrap(geom.CurvePeriodicity.kNonPeriodic)
     return sample
 
 
-def _first_sample(library: Any, part: _Taken, preset: GroomPreset, points: Floats) -> Any:
+def _first_sample(library: Any, part: _PartStrands, preset: GroomPreset, points: Floats) -> Any:
     """A sample with counts, widths and UVs, which later ones repeat."""
     sample = _sample(library, preset, points)
-    sample.setCurvesNumVertices(array_of(library, part.point_counts.astype(np.int32)))
-    sample.setWidths(sample_of(library, _widths(part, preset), "Vertex"))
+    sample.setCurvesNumVertices(imath_array(library, part.point_counts.astype(np.int32)))
+    sample.setWidths(parameter_sample(library, _widths(part, preset), "Vertex"))
     uv = part.groom.strands.root_uv
     if preset.has_curve_uv and uv is not None:
-        sample.setUVs(sample_of(library, np.repeat(uv, part.point_counts, axis=0), "Vertex"))
+        sample.setUVs(parameter_sample(library, np.repeat(uv, part.point_counts, axis=0), "Vertex"))
     return sample
 
 
-def _write_attributes(library: Any, parent: Any, part: _Taken, preset: GroomPreset) -> None:
+def _write_attributes(library: Any, parent: Any, part: _PartStrands, preset: GroomPreset) -> None:
     groom, count = part.groom, part.groom.strands.strand_count
     number = np.arange(count) if groom.strand_id is None else groom.strand_id
     uniform: dict[str, Floats | Ints | None] = {
@@ -274,22 +282,22 @@ def _write_group_names(library: Any, parent: Any, groom: Groom) -> None:
     """Write each name once, and its index for each strand."""
     if not groom.group_names:
         return
-    groups, which = np.unique(groom.strands.group, return_inverse=True)
+    groups, group_index = np.unique(groom.strands.group, return_inverse=True)
     names = library.imath.StringArray(len(groups))
     for place, group in enumerate(groups.tolist()):
         names[place] = groom.group_names.get(group, f"{groom.name}_{group}")
     # unsigned arrays cannot be made from a buffer, but from doubles
-    numbers = library.imath.DoubleArrayFromBuffer(which.astype(np.float64))
+    numbers = library.imath.DoubleArrayFromBuffer(group_index.astype(np.float64))
     indices = library.imath.UnsignedIntArray(numbers)
-    scope = scope_of(library, "Uniform")
+    scope = geometry_scope(library, "Uniform")
     sample = library.geom.OStringGeomParamSample(names, indices, scope)
     library.geom.OStringGeomParam(parent, "groom_group_name", True, scope, 1).set(sample)
 
 
-def _widths(part: _Taken, preset: GroomPreset) -> Floats:
+def _widths(part: _PartStrands, preset: GroomPreset) -> Floats:
     """Widths of the points that are written, in the file's unit."""
     width = np.maximum(part.capped(part.groom.strands.radius) * np.float32(2.0), MIN_WIDTH)
-    return (width * preset.space.per_metre).astype(np.float32)
+    return (width * preset.space.units_per_metre).astype(np.float32)
 
 
 @dataclass(frozen=True)
@@ -312,21 +320,21 @@ class PointCap:
         return values[self.left] * (1.0 - weight) + values[self.right] * weight
 
 
-def point_cap(strands: StrandSet, most: int) -> PointCap | None:
-    """`most` equally spaced points for each strand with more; None where none has more."""
+def cap_points(strands: StrandSet, max_points: int) -> PointCap | None:
+    """`max_points` equally spaced points for each strand with more; None where none has more."""
     counts = strands.point_counts
-    long = np.flatnonzero(counts > most)
+    long = np.flatnonzero(counts > max_points)
     if not len(long):
         return None
-    new_counts = np.minimum(counts, most)
+    new_counts = np.minimum(counts, max_points)
     offsets = np.concatenate([[0], np.cumsum(new_counts)]).astype(np.int32)
     first = np.repeat(strands.offsets[:-1] - offsets[:-1], new_counts)
     left = np.arange(offsets[-1]) + first
     right, weight = left.copy(), np.zeros(len(left), np.float32)
 
-    own_left, own_weight = arc_length_positions(strands.take(long), most)
-    old = points_of(strands, long)
-    places = (offsets[long][:, None] + np.arange(most)).ravel()
+    own_left, own_weight = arc_length_positions(strands.take(long), max_points)
+    old = point_indices_of(strands, long)
+    places = (offsets[long][:, None] + np.arange(max_points)).ravel()
     left[places] = old[own_left.ravel()]
     right[places] = left[places] + 1
     weight[places] = own_weight.ravel()

@@ -20,16 +20,16 @@ from ...strands.clean import clean
 from ..files.file_space import FileSpace
 from ..files.subprocess_reader import run_reader
 from ..groom import Groom
-from ..read_groom import ReadGroom, kept_points, known_apart
-from ..read_motion import sound_motion
+from ..read_groom import ReadGroom, unique_identities, values_of_kept_points
+from ..read_motion import valid_motion
 from . import alembic_curves
 from .alembic_curves import Arrays
 from .alembic_library import alembic_library
-from .alembic_objects import Joined, joined
-from .groom_alembic import is_finished
+from .alembic_objects import JoinedCurves, join_curves
+from .groom_alembic import is_complete_alembic
 
 #: Hair that extends over more than this in the file's units is in centimetres, not in metres.
-WIDEST_IN_METRES = 5.0
+MAX_EXTENT_IN_METRES = 5.0
 
 
 def read_groom_alembic(
@@ -45,7 +45,7 @@ def read_groom_alembic(
 
     Args:
         space: the file's unit and axes. None: as our own files record them; else Y up, in metres
-            where Blender wrote the file or the hair is smaller than WIDEST_IN_METRES, and in
+            where Blender wrote the file or the hair is smaller than MAX_EXTENT_IN_METRES, and in
             centimetres otherwise.
         up: "Y" or "Z", instead of that of `space`.
         factor: further factor on lengths.
@@ -58,22 +58,22 @@ def read_groom_alembic(
     """
     _check(path)
     found = _read_in_subprocess(path, python)
-    curves = joined(found, path)
+    curves = join_curves(found, path)
     notes, space = list(curves.notes), space or _recorded_space(found)
     if space is None:
         space = _guessed_space(curves)
-        unit = "metres" if space.per_metre == 1.0 else "centimetres"
+        unit = "metres" if space.units_per_metre == 1.0 else "centimetres"
         notes.append(
             f"it stores no unit and no axes, so it was read in {unit}, {up or space.up} up"
         )
-    space = replace(space, up=up or space.up, per_metre=space.per_metre / factor)
+    space = replace(space, up=up or space.up, units_per_metre=space.units_per_metre / factor)
     groom = _groom(curves, space, path, notes)
     if not with_guides:
         groom = groom.without_guides()
     if not groom.strands.strand_count:
         raise _error(path, "it holds only guides", "Read it with its guides")
     notes = [f"{path.name}: {note}." for note in notes]
-    return ReadGroom(groom, _version(found), replace(space, per_metre=1.0), tuple(notes))
+    return ReadGroom(groom, _version(found), replace(space, units_per_metre=1.0), tuple(notes))
 
 
 def _check(path: Path) -> None:
@@ -93,7 +93,7 @@ def _check(path: Path) -> None:
         raise _error(path, "this is an old Alembic file, in HDF5", "Export it again as Ogawa")
     if not start.startswith(b"Ogawa"):
         raise _error(path, "this is not an Alembic file", "Choose an .abc file")
-    if not is_finished(path):
+    if not is_complete_alembic(path):
         raise _error(path, "it was not written to its end", "Export the groom again")
 
 
@@ -115,27 +115,27 @@ def _recorded_space(found: Arrays) -> FileSpace | None:
     text = str(found.get("groom_properties", ""))
     recorded = dict(each.split("=", 1) for each in text.split(";") if "=" in each)
     try:
-        per_metre = float(recorded["per_metre"])
-        space = FileSpace(recorded["up"], per_metre, recorded["mirrored"] == "1")
+        units_per_metre = float(recorded["per_metre"])
+        space = FileSpace(recorded["up"], units_per_metre, recorded["mirrored"] == "1")
     except (KeyError, ValueError):
         return None
-    return space if space.up in ("Y", "Z") and 1e-6 < per_metre < 1e6 else None
+    return space if space.up in ("Y", "Z") and 1e-6 < units_per_metre < 1e6 else None
 
 
-def _guessed_space(curves: Joined) -> FileSpace:
+def _guessed_space(curves: JoinedCurves) -> FileSpace:
     points = curves.points[np.isfinite(curves.points).all(axis=1)]
     extent = float(np.ptp(points, axis=0).max()) if len(points) else 0.0
-    return FileSpace("Y", 1.0 if extent < WIDEST_IN_METRES else 100.0)
+    return FileSpace("Y", 1.0 if extent < MAX_EXTENT_IN_METRES else 100.0)
 
 
-def _groom(curves: Joined, space: FileSpace, path: Path, notes: list[str]) -> Groom:
+def _groom(curves: JoinedCurves, space: FileSpace, path: Path, notes: list[str]) -> Groom:
     """The usable strands of all curves as a groom; adds to `notes`."""
     # overflow gives infinity, and strands that are not finite are dropped and counted
     with np.errstate(over="ignore", invalid="ignore"):
         points = space.from_file(curves.points)
         radius = None
         if curves.widths is not None:
-            radius = curves.widths.astype(np.float32) / np.float32(2.0 * space.per_metre)
+            radius = curves.widths.astype(np.float32) / np.float32(2.0 * space.units_per_metre)
         cleaned = clean(
             points,
             curves.offsets,
@@ -151,15 +151,15 @@ def _groom(curves: Joined, space: FileSpace, path: Path, notes: list[str]) -> Gr
         raise _error(path, problem, "Export the groom again")
     kept = cleaned.kept
     identities = {name: values[kept] for name, values in curves.identities.items()}
-    optional: dict[str, Any] = known_apart(identities, notes)
+    optional: dict[str, Any] = unique_identities(identities, notes)
     if curves.is_guide is not None:
         optional["is_guide"] = curves.is_guide[kept]
     if curves.motion is not None:
         times, positions = curves.motion
         with np.errstate(over="ignore", invalid="ignore"):
             placed = space.from_file(positions.reshape(-1, 3)).reshape(positions.shape)
-        placed = np.stack([kept_points(each, curves.offsets, cleaned) for each in placed])
-        optional["motion"], note = sound_motion(times, placed)
+        placed = np.stack([values_of_kept_points(each, curves.offsets, cleaned) for each in placed])
+        optional["motion"], note = valid_motion(times, placed)
         notes += [note] if note else []
     return Groom(
         cleaned.strands,

@@ -46,7 +46,7 @@ class CardFormat:
     attributes: Mapping[str, str]
     extra: Mapping[str, str]
 
-    def placed(self, points: Floats) -> Floats:
+    def to_file_space(self, points: Floats) -> Floats:
         """Points or vectors of world space, Z up [m], in the file's axes and unit, (..., 3)."""
         return from_z_up(points, self.up) * self.units_per_metre
 

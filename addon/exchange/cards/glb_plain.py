@@ -22,7 +22,7 @@ SPECULAR = 0.9
 #: Height of a screen [pixels] on which the next level is off by one pixel where it takes over.
 SCREEN_HEIGHT = 1080.0
 #: A level of unknown error takes over at this fraction of the height of the last.
-_STEP = 0.5
+_DEFAULT_STEP = 0.5
 _CLAMPED, _LINEAR, _MIP_MAPPED = 33071, 9729, 9987
 #: the second UV map's first component is ambient occlusion, which a ramp of grey maps to itself
 _OCCLUSION_UV = 1
@@ -45,7 +45,7 @@ def with_levels(file: GlbFile, nodes: Sequence[str], coverage: Sequence[float]) 
     node = file.content["nodes"][finest]
     node.setdefault("extensions", {})[LOD] = {"ids": others}
     node.setdefault("extras", {})["MSFT_screencoverage"] = list(coverage)
-    _use(file, LOD)
+    _declare_extension(file, LOD)
 
 
 def screen_coverage(levels: Sequence[CardMesh], errors: Sequence[float]) -> list[float]:
@@ -60,7 +60,7 @@ def screen_coverage(levels: Sequence[CardMesh], errors: Sequence[float]) -> list
     fractions = [1.0]
     for number in range(1, len(levels)):
         error = errors[number] if errors else 0.0
-        own = height / (error * SCREEN_HEIGHT) if error > 0.0 else _STEP * fractions[-1]
+        own = height / (error * SCREEN_HEIGHT) if error > 0.0 else _DEFAULT_STEP * fractions[-1]
         fractions.append(min(own, fractions[-1]))
     return [round(fraction * fraction, 6) for fraction in fractions[1:]] + [0.0]
 
@@ -76,7 +76,7 @@ def with_material(file: GlbFile, pictures: Mapping[str, bytes], ramp: bytes) -> 
     (material,) = file.content["materials"]
     extensions = material.setdefault("extensions", {})
     extensions[_SPECULAR] = {"specularFactor": SPECULAR}
-    _use(file, _SPECULAR)
+    _declare_extension(file, _SPECULAR)
     occlusion = _texture(file, ramp, "occlusion ramp", _LINEAR)
     material["occlusionTexture"] = {"index": occlusion, "texCoord": _OCCLUSION_UV}
     if "normal" in pictures:
@@ -87,13 +87,13 @@ def with_material(file: GlbFile, pictures: Mapping[str, bytes], ramp: bytes) -> 
         extension.pop("anisotropyRotation", None)
         texture = _texture(file, pictures["anisotropy"], "anisotropy", _MIP_MAPPED)
         extension["anisotropyTexture"] = {"index": texture}
-        _use(file, _ANISOTROPY)
+        _declare_extension(file, _ANISOTROPY)
 
 
-def _texture(file: GlbFile, picture: bytes, name: str, small: int) -> int:
+def _texture(file: GlbFile, picture: bytes, name: str, min_filter: int) -> int:
     view = file.add_bytes(picture)
     image = {"name": name, "mimeType": "image/png", "bufferView": view}
-    sampler: dict[str, Any] = {"magFilter": _LINEAR, "minFilter": small}
+    sampler: dict[str, Any] = {"magFilter": _LINEAR, "minFilter": min_filter}
     sampler |= {"wrapS": _CLAMPED, "wrapT": _CLAMPED}
     texture = {
         "source": file.append("images", image),
@@ -102,7 +102,7 @@ def _texture(file: GlbFile, picture: bytes, name: str, small: int) -> int:
     return file.append("textures", texture)
 
 
-def _use(file: GlbFile, extension: str) -> None:
+def _declare_extension(file: GlbFile, extension: str) -> None:
     used = file.content.setdefault("extensionsUsed", [])
     if extension not in used:
         used.append(extension)

@@ -23,11 +23,11 @@ from .glb_file import GlbFile
 #: The root joint, which carries all chains.
 ROOT_JOINT = "hair_root"
 ANIMATION = "hair_motion"
-_OF_VERTICES = 34962  # ARRAY_BUFFER
+_ARRAY_BUFFER = 34962
 #: Turns Z-up vectors into the file's: (x, z, -y).
 _AXES = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 #: How far a vertex of the file may be from ours, a fraction of the hair's size.
-_SAME = 1.0e-5
+_MAX_MISMATCH = 1.0e-5
 #: Weights below this count as 0.
 _MIN_WEIGHT = 1.0e-5
 
@@ -135,15 +135,19 @@ def vertices_of(file: GlbFile, primitive: dict[str, Any], mesh: CardMesh, place:
     """
     corners = np.asarray(file.values(primitive["indices"])).reshape(-1).astype(np.int64)
     positions = np.asarray(file.values(primitive["attributes"]["POSITION"]))
-    ours = mesh.triangles.reshape(-1)
-    owner = np.full(len(positions), -1)
-    if len(corners) == len(ours):
-        owner[corners] = ours
+    expected_corners = mesh.triangles.reshape(-1)
+    vertex = np.full(len(positions), -1)
+    if len(corners) == len(expected_corners):
+        vertex[corners] = expected_corners
         low, high = mesh.bounds()
-        miss = np.abs(GLB.placed(mesh.positions[owner]) - positions).max(initial=0.0)
-        near = _SAME * float(np.max(high - low, initial=0.0))
-        if np.array_equal(owner[corners], ours) and owner.min() >= 0 and miss <= near:
-            return owner
+        mismatch = np.abs(GLB.to_file_space(mesh.positions[vertex]) - positions).max(initial=0.0)
+        tolerance = _MAX_MISMATCH * float(np.max(high - low, initial=0.0))
+        if (
+            np.array_equal(vertex[corners], expected_corners)
+            and vertex.min() >= 0
+            and mismatch <= tolerance
+        ):
+            return vertex
     raise HairloomError(
         "Blender's exporter wrote other vertices than those to be skinned",
         place=place,
@@ -155,16 +159,16 @@ def _add_weights(
     file: GlbFile, node: int, mesh: CardMesh, skin: Skin, joint_count: int, place: str
 ) -> None:
     (primitive,) = file.content["meshes"][file.content["nodes"][node]["mesh"]]["primitives"]
-    owner = vertices_of(file, primitive, mesh, place)
+    vertex = vertices_of(file, primitive, mesh, place)
     weight = np.where(skin.weight < _MIN_WEIGHT, 0.0, skin.weight)
     weight = (weight / weight.sum(axis=1, keepdims=True)).astype(np.float32)
     # the root is joint 0; entries without weight refer to it, too
     joint = np.where(weight > 0.0, (skin.joint + 1) % joint_count, 0)
     is_small = joint.max(initial=0) < 256
-    numbers: Ints = joint[owner].astype(np.uint8) if is_small else joint[owner].astype(np.uint16)
+    numbers: Ints = joint[vertex].astype(np.uint8) if is_small else joint[vertex].astype(np.uint16)
     attributes = primitive["attributes"]
-    attributes["JOINTS_0"] = file.add(numbers, "VEC4", target=_OF_VERTICES)
-    attributes["WEIGHTS_0"] = file.add(weight[owner], "VEC4", target=_OF_VERTICES)
+    attributes["JOINTS_0"] = file.add(numbers, "VEC4", target=_ARRAY_BUFFER)
+    attributes["WEIGHTS_0"] = file.add(weight[vertex], "VEC4", target=_ARRAY_BUFFER)
 
 
 def _add_joints(file: GlbFile, rest: Floats, root: Floats) -> list[int]:
@@ -176,7 +180,7 @@ def _add_joints(file: GlbFile, rest: Floats, root: Floats) -> list[int]:
     at_root[:3, 3] = root
     for chain in rest:
         parents = [at_root, *chain[:-1]]
-        owner: dict[str, Any] = first
+        parent_node: dict[str, Any] = first
         for parent, own in zip(parents, chain, strict=True):
             local = beside_parent(parent, own)
             node = {
@@ -185,8 +189,8 @@ def _add_joints(file: GlbFile, rest: Floats, root: Floats) -> list[int]:
                 "rotation": _rotation(quaternions(local[:3, :3])),
             }
             numbers.append(file.append("nodes", node))
-            owner.setdefault("children", []).append(numbers[-1])
-            owner = node
+            parent_node.setdefault("children", []).append(numbers[-1])
+            parent_node = node
     return numbers
 
 
@@ -246,18 +250,18 @@ def _add_animation(file: GlbFile, skeleton: Skeleton, joints: list[int]) -> None
             rotations, translations = keys.rotation[joint], keys.translation[joint]
             translations = translations if joint else translations - parent
             add(node, "rotation", keys.frame, _rotations(rotations), "VEC4")
-            add(node, "translation", keys.frame, GLB.placed(translations), "VEC3")
+            add(node, "translation", keys.frame, GLB.to_file_space(translations), "VEC3")
     animation = {"name": ANIMATION, "samplers": samplers, "channels": channels}
     file.append("animations", animation)
 
 
 def _vector(vector: Floats) -> list[float]:
-    return [float(value) for value in GLB.placed(vector)]
+    return [float(value) for value in GLB.to_file_space(vector)]
 
 
 def _rotations(quaternion: Floats) -> Floats:
     """Quaternions of Z-up space in the file's axes."""
-    vector = GLB.placed(quaternion[..., :3])
+    vector = GLB.to_file_space(quaternion[..., :3])
     turned: Floats = np.concatenate([vector, quaternion[..., 3:]], axis=-1)
     return turned
 

@@ -95,10 +95,10 @@ def collider_list(balls: Balls, root: Floats) -> list[dict[str, Any]]:
     """Balls and capsules, in the space of the root joint."""
     shapes: list[dict[str, Any]] = []
     for center, tail, radius in zip(balls.center, balls.tail, balls.radius, strict=True):
-        shape = {"offset": _placed(center - root), "radius": float(radius)}
+        shape = {"offset": _to_file(center - root), "radius": float(radius)}
         is_capsule = bool((center != tail).any())
         shapes.append(
-            {"capsule": {**shape, "tail": _placed(tail - root)}}
+            {"capsule": {**shape, "tail": _to_file(tail - root)}}
             if is_capsule
             else {"sphere": shape}
         )
@@ -130,7 +130,7 @@ def _extension(skeleton: SpringSkeleton, joints: list[int]) -> dict[str, Any]:
 
 def _joints(spring: dict[str, Any], node: dict[str, int]) -> list[dict[str, Any]]:
     *bones, end = spring["joints"]
-    down = GLB.placed(DOWN).tolist()
+    down = GLB.to_file_space(DOWN).tolist()
     return [
         {
             "node": node[name],
@@ -144,8 +144,8 @@ def _joints(spring: dict[str, Any], node: dict[str, int]) -> list[dict[str, Any]
     ] + [{"node": node[end]}]
 
 
-def _placed(vector: Floats) -> list[float]:
-    return [float(value) for value in GLB.placed(vector)]
+def _to_file(vector: Floats) -> list[float]:
+    return [float(value) for value in GLB.to_file_space(vector)]
 
 
 def _rounded(values: Floats) -> list[float]:

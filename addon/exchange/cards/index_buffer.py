@@ -32,7 +32,7 @@ class IndexBuffer:
     first: tuple[int, ...]
     back_first: tuple[int, ...]
 
-    def backs_alone(self) -> IndexBuffer:
+    def back_orders_only(self) -> IndexBuffer:
         """The buffer without the first orders, which the mesh has: `first` is that of the second
         ones, too."""
         begin = self.back_first[0]

@@ -21,7 +21,7 @@ _STEPS = {"POSITION": 2.0**-14, "NORMAL": 2.0**-8, "TANGENT": 2.0**-8}
 _UV_STEP = 2.0**-14
 #: Steps of values that are stored in 8 bits. Fewer steps compress better, and differences of single
 #: strands are lost among many. 128, which means no direction, is one of the steps, as is 255.
-_STORED = {"base": 4, "alpha": 4, "tangent": 4, "normal": 8, "shift": 4, "noise": 16}
+_MAP_STEPS = {"base": 4, "alpha": 4, "tangent": 4, "normal": 8, "shift": 4, "noise": 16}
 
 
 def small_glb(data: bytes, place: str) -> bytes:
@@ -87,21 +87,21 @@ def small_maps(maps: Mapping[str, Floats], grid: AtlasGrid, size: int) -> dict[s
     Where there is no hair, maps of alpha's size get their own mean over the hair.
     """
     alpha = maps["alpha"]
-    together = {name: each for name, each in maps.items() if each.shape[:2] == alpha.shape}
-    small = _with_size(together, grid, size)
+    same_size = {name: each for name, each in maps.items() if each.shape[:2] == alpha.shape}
+    small = _with_size(same_size, grid, size)
     hair = small["alpha"] > 0.0
     for name, values in small.items():
         # normals change most across the edge of a strand, where filters sample beyond it
-        kept = _grown(hair) if name == "normal" else hair
-        if name != "alpha" and kept.any():
+        mask = _dilated(hair) if name == "normal" else hair
+        if name != "alpha" and mask.any():
             small[name] = np.where(
-                kept.reshape(*kept.shape, *(1,) * (values.ndim - 2)),
+                mask.reshape(*mask.shape, *(1,) * (values.ndim - 2)),
                 values,
                 values[hair].mean(axis=0),
             )
-    for name in maps.keys() - together.keys():
+    for name in maps.keys() - same_size.keys():
         small |= _with_size({name: maps[name]}, AtlasGrid(), size)
-    return {name: _in_steps(name, small[name]) for name in maps}
+    return {name: _quantized(name, small[name]) for name in maps}
 
 
 def _with_size(maps: Mapping[str, Floats], grid: AtlasGrid, size: int) -> dict[str, Floats]:
@@ -109,16 +109,16 @@ def _with_size(maps: Mapping[str, Floats], grid: AtlasGrid, size: int) -> dict[s
     return next(level for level in levels if max(next(iter(level.values())).shape[:2]) <= size)
 
 
-def _grown(mask: Bools) -> Bools:
+def _dilated(mask: Bools) -> Bools:
     """A mask extended by the four neighbours of each texel."""
     wide = np.pad(mask, 1)
-    grown: Bools = mask | wide[2:, 1:-1] | wide[:-2, 1:-1] | wide[1:-1, 2:] | wide[1:-1, :-2]
-    return grown
+    dilated: Bools = mask | wide[2:, 1:-1] | wide[:-2, 1:-1] | wide[1:-1, 2:] | wide[1:-1, :-2]
+    return dilated
 
 
-def _in_steps(name: str, values: Floats) -> Floats:
+def _quantized(name: str, values: Floats) -> Floats:
     """Values rounded to steps of what is stored, which for colours is sRGB."""
-    step = _STORED[name] / 255.0
+    step = _MAP_STEPS[name] / 255.0
     stored = np.clip(values, 0.0, 1.0)
     if name == "base":
         stored = srgb_encoded(stored)
@@ -131,7 +131,7 @@ def half_floats(table: Floats) -> bytes:
     return np.ascontiguousarray(table, "<f2").tobytes()
 
 
-def sizes_of(glb: int, textures: Mapping[str, int], levels: list[dict[str, int]]) -> list[Any]:
+def size_rows(glb: int, textures: Mapping[str, int], levels: list[dict[str, int]]) -> list[Any]:
     """The rows of the page's table.
 
     Args:

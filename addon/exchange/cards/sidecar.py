@@ -57,8 +57,8 @@ class DrawPass:
         """Alpha of the pixels drawn, from the first to below the second; None without a test."""
         if self.pixels == "all":
             return None
-        least = {_OPAQUE: OPAQUE_ALPHA, _REST: 0.0}.get(self.pixels, MIN_ALPHA)
-        return least, OPAQUE_ALPHA if _REST in self.pixels else math.inf
+        minimum = {_OPAQUE: OPAQUE_ALPHA, _REST: 0.0}.get(self.pixels, MIN_ALPHA)
+        return minimum, OPAQUE_ALPHA if _REST in self.pixels else math.inf
 
     def as_dict(self) -> dict[str, Any]:
         blend = "source alpha, one minus source alpha" if self.is_blended else "off"
@@ -124,7 +124,7 @@ class CardFile:
 
 def sidecar_text(cards: CardFile) -> str:
     """The whole sidecar, with each list of numbers in one line."""
-    text = json.dumps(description(cards), indent=2, ensure_ascii=False)
+    text = json.dumps(sidecar_content(cards), indent=2, ensure_ascii=False)
     texts_or_lists = re.compile(r'"(?:[^"\\]|\\.)*"|\[\s+(-?[\d.][^\[\]{}"]*?)\s+\]')
     return texts_or_lists.sub(_in_one_line, text) + "\n"
 
@@ -134,7 +134,7 @@ def _in_one_line(found: re.Match[str]) -> str:
     return found[0] if found[1] is None else f"[{' '.join(found[1].split())}]"
 
 
-def files_of_earlier(path: Path) -> set[str]:
+def files_of_earlier_export(path: Path) -> set[str]:
     """The names of the files that an earlier export of this mesh has written beside it.
 
     path: of the mesh. Without a sidecar of ours the set is empty.
@@ -146,7 +146,7 @@ def files_of_earlier(path: Path) -> set[str]:
     return {path.stem + SUFFIX, *of_formats, *texts}
 
 
-def other_owner(path: Path) -> str:
+def conflicting_owner(path: Path) -> str:
     """The name of another mesh beside this one whose sidecar has the name that this one's would
     have; "" where there is none.
 
@@ -176,7 +176,7 @@ def _texts(content: object) -> Iterator[str]:
             yield from _texts(each)
 
 
-def description(cards: CardFile) -> dict[str, Any]:
+def sidecar_content(cards: CardFile) -> dict[str, Any]:
     """The sidecar as plain data."""
     atlas, finest = cards.levels[0].atlas, cards.levels[0]
     content = {
@@ -223,7 +223,7 @@ def description(cards: CardFile) -> dict[str, Any]:
 
 def _level(cards: CardFile, number: int) -> dict[str, Any]:
     mesh, scale = cards.levels[number], cards.format.units_per_metre
-    whole = card_ranges(mesh)
+    card_table = card_ranges(mesh)
     level: dict[str, Any] = {
         "node": cards.nodes[number],
         **_counts(mesh),
@@ -231,8 +231,8 @@ def _level(cards: CardFile, number: int) -> dict[str, Any]:
         **({"error": cards.errors[number] * scale} if cards.errors else {}),
         "indices": len(mesh.triangles) * 3,
         "indices_adler32": zlib.adler32(mesh.triangles.astype("<u4").tobytes()),
-        "ranges": group_ranges(mesh, by_layer=whole is not None),
-        **({} if whole is None else {"cards_in_order": whole}),
+        "ranges": group_ranges(mesh, by_layer=card_table is not None),
+        **({} if card_table is None else {"cards_in_order": card_table}),
     }
     if cards.indices is not None:
         buffer = cards.indices[1]
@@ -251,7 +251,7 @@ def _counts(mesh: CardMesh) -> dict[str, int]:
 
 
 def _bounds(file_format: CardFormat, *meshes: CardMesh) -> dict[str, list[float]]:
-    corners = file_format.placed(np.concatenate([mesh.positions for mesh in meshes]))
+    corners = file_format.to_file_space(np.concatenate([mesh.positions for mesh in meshes]))
     return {"minimum": corners.min(axis=0).tolist(), "maximum": corners.max(axis=0).tolist()}
 
 

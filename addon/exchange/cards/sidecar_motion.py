@@ -56,14 +56,14 @@ def spring_motion(tracks: CardTracks, skeleton: SpringSkeleton, error: FitError)
         **_common(tracks, "head"),
         "extension": SPRINGS,
         "root_joint": ROOT_JOINT,
-        "root_place": GLB.placed(skeleton.root).tolist(),
+        "root_place": GLB.to_file_space(skeleton.root).tolist(),
         **({"head_bone": skeleton.bone.name} if skeleton.bone else {}),
         "chains": chains,
         "joints_in_chain": joints,
         "joints": chains * joints + 1,
         "influences": rig.skins[0].joint.shape[1],
         "step_rate": STEP_RATE,
-        "gravity_direction": GLB.placed(DOWN).tolist(),
+        "gravity_direction": GLB.to_file_space(DOWN).tolist(),
         "colliders": collider_list(rig.chains.balls, skeleton.root),
         "springs": spring_list(rig),
         "error": _error(error, tracks, GLB.units_per_metre),
@@ -81,7 +81,7 @@ def joint_motion(
         **_common(tracks, space),
         "animation": ANIMATION,
         "root_joint": ROOT_JOINT,
-        "root_place": GLB.placed(skeleton.root).tolist(),
+        "root_place": GLB.to_file_space(skeleton.root).tolist(),
         "chains": rig.chains,
         "joints_in_chain": rig.joints,
         "joints": rig.chains * rig.joints + 1,
@@ -108,7 +108,7 @@ def texture_motion(
         files: position, normal and tangent -> file.
         bounds: lowest and highest corner of all frames [m], Z up.
     """
-    corners = file_format.placed(np.stack(bounds))
+    corners = file_format.to_file_space(np.stack(bounds))
     down = 1.0 if file_format == GLB else -1.0
     return {
         "kind": "texture",

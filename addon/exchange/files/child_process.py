@@ -27,14 +27,14 @@ kill_context: ContextVar[Callable[[Callable[[], None]], AbstractContextManager[o
 
 
 def run_child(
-    command: Sequence[str], *, seconds: float, settings: Mapping[str, str] | None = None
+    command: Sequence[str], *, seconds: float, environment: Mapping[str, str] | None = None
 ) -> subprocess.CompletedProcess[bytes]:
     """Run a command until it ends.
 
     Args:
         command: the program, by its full path, and its arguments.
         seconds: after which it is killed.
-        settings: further environment variables.
+        environment: further environment variables.
 
     Raises:
         OSError: it cannot be started. subprocess.TimeoutExpired: it was killed.
@@ -45,7 +45,7 @@ def run_child(
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
-        env=_environment() | dict(settings or {}),
+        env=_environment() | dict(environment or {}),
         creationflags=_NO_WINDOW,
     )
     with child:

@@ -15,22 +15,22 @@ class FileSpace:
     """How a file's numbers relate to Blender's.
 
     up: "Y" or "Z".
-    per_metre: the file's units in a metre: 100 where it is in centimetres.
+    units_per_metre: the file's units in a metre: 100 where it is in centimetres.
     is_mirrored: Blender's y points the other way, so that the file is left-handed, as Unreal is.
     """
 
     up: str = "Z"
-    per_metre: float = 1.0
+    units_per_metre: float = 1.0
     is_mirrored: bool = False
 
     def to_file(self, points: Floats) -> Floats:
         """Points (..., 3) [m] in the file's space, float32."""
         turned = from_z_up(self._mirrored(points), self.up)
-        return np.asarray(turned, np.float32) * np.float32(self.per_metre)
+        return np.asarray(turned, np.float32) * np.float32(self.units_per_metre)
 
     def from_file(self, points: Floats) -> Floats:
         """The inverse of `to_file`; exact where the unit is the metre."""
-        metres = np.asarray(points, np.float32) / np.float32(self.per_metre)
+        metres = np.asarray(points, np.float32) / np.float32(self.units_per_metre)
         return self._mirrored(to_z_up(metres, self.up))
 
     def _mirrored(self, points: Floats) -> Floats:

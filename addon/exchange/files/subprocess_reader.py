@@ -24,7 +24,7 @@ _KILLED_BY_SYSTEM = {
     -9: "as when memory runs out",
 }
 #: Seconds for any file, and bytes that a slow disk reads in each further second.
-_MIN_SECONDS, _BYTES_A_SECOND = 60.0, 4.0e6
+_MIN_SECONDS, _BYTES_PER_SECOND = 60.0, 4.0e6
 
 
 def run_reader(
@@ -34,7 +34,7 @@ def run_reader(
     *,
     library: str,
     python: Sequence[str] | None = None,
-    settings: Mapping[str, str] | None = None,
+    environment: Mapping[str, str] | None = None,
 ) -> None:
     """Run a script on a file, as SCRIPT -- FILE RESULTS, and wait until it has ended well.
 
@@ -42,7 +42,7 @@ def run_reader(
         library: the name of the library that reads it, for messages.
         python: the command that starts a Python, to which the script and its arguments are added.
             None: this one, where it is a program of its own.
-        settings: further environment variables.
+        environment: further environment variables.
 
     Raises:
         HairloomError: no Python can be started, it takes too long, or it ends otherwise.
@@ -50,9 +50,9 @@ def run_reader(
     check_utf8_name(path)
     files = [str(each.absolute()) for each in (path, *results)]
     command = [*(python or this_python(path)), str(script.absolute()), "--", *files]
-    seconds = _MIN_SECONDS + path.stat().st_size / _BYTES_A_SECOND
+    seconds = _MIN_SECONDS + path.stat().st_size / _BYTES_PER_SECOND
     try:
-        finished = run_child(command, seconds=seconds, settings=settings)
+        finished = run_child(command, seconds=seconds, environment=environment)
     except TimeoutExpired as error:
         raise damaged_error(
             path, f"{library}'s library could not read it within {seconds:.0f} s"

@@ -14,7 +14,7 @@ from ...errors import HairloomError
 from . import texture_files
 from .dds import write_dds
 from .mip_maps import mip_levels
-from .texture_packing import TextureLayout, layouts
+from .texture_packing import TextureLayout, texture_layouts
 
 #: File format -> its suffix; "dds_plain" is DDS without compression.
 FORMATS = {"png": ".png", "exr": ".exr", "dds": ".dds", "dds_plain": ".dds"}
@@ -48,7 +48,7 @@ def write_card_textures(
     Args:
         asset: folder and name, to which the suffixes of the preset are added; dots in the name
             stay.
-        maps: see `texture_packing.packed`.
+        maps: see `texture_packing.pack_textures`.
         preset: one of PRESETS.
         file_format: one of FORMATS; DDS files hold all mip maps, see `mip_levels`.
         grid: the tiles of the atlas.
@@ -65,7 +65,7 @@ def write_card_textures(
             remedy=f"Choose one of {', '.join(FORMATS)}",
         )
     written = []
-    for layout in layouts(preset, maps):
+    for layout in texture_layouts(preset, maps):
         path = asset.with_name(f"{asset.name}{layout.suffix}{FORMATS[file_format]}")
         if file_format.startswith("dds"):
             is_compressed = file_format == "dds"
@@ -74,12 +74,12 @@ def write_card_textures(
                 layout = replace(layout, channels=layout.channels[:2])
         else:
             depth = layout.depth if file_format == "png" else "half"
-            write(path, layout.packed(maps), is_color=layout.is_color, depth=depth, is_packed=True)
+            write(path, layout.pack(maps), is_color=layout.is_color, depth=depth, is_packed=True)
         written.append(WrittenTexture(path, layout))
     return written
 
 
-def of_one_size(maps: Mapping[str, Floats]) -> dict[str, Floats]:
+def resized_to_largest(maps: Mapping[str, Floats]) -> dict[str, Floats]:
     """All maps in the largest size; pixels are repeated."""
     height, width = np.max([image.shape[:2] for image in maps.values()], axis=0)
     row, column = np.arange(height)[:, None], np.arange(width)
@@ -101,11 +101,11 @@ def _write_dds(
     is_compressed: bool,
 ) -> None:
     needed = layout.sources | {"alpha"}  # the weight of all others
-    own = {name: values for name, values in maps.items() if name in needed}
-    levels = mip_levels(own, grid=grid, threshold=threshold)
+    needed_maps = {name: values for name, values in maps.items() if name in needed}
+    levels = mip_levels(needed_maps, grid=grid, threshold=threshold)
     write_dds(
         path,
-        [layout.packed(level) for level in levels],
+        [layout.pack(level) for level in levels],
         is_color=layout.is_color,
         is_normal_map=layout.is_normal_map,
         has_coverage=layout.has_coverage,

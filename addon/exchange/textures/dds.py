@@ -64,14 +64,14 @@ def write_dds(
     if is_normal_map and is_compressed:
         levels = [level[..., :2] for level in levels]
         channels = 2
-    form = (_COMPRESSED[channels] if is_compressed else _PLAIN) + (_SRGB if is_color else 0)
+    dxgi_format = (_COMPRESSED[channels] if is_compressed else _PLAIN) + (_SRGB if is_color else 0)
     alpha = _NO_ALPHA if channels < 4 else _STRAIGHT_ALPHA if has_coverage else _CUSTOM_ALPHA
     texels = [_bytes_of(level, is_color=is_color) for level in levels]
     if is_compressed:
         data = [_compressed(each, path) for each in texels]
     else:
-        data = [_in_four_channels(each).tobytes() for each in texels]
-    header = _header(width, height, len(levels), form, alpha)
+        data = [_as_rgba(each).tobytes() for each in texels]
+    header = _header(width, height, len(levels), dxgi_format, alpha)
     write_bytes_atomic(path, header + b"".join(data))
 
 
@@ -83,7 +83,7 @@ def _bytes_of(level: Floats, *, is_color: bool) -> npt.NDArray[np.uint8]:
     return np.rint(values * 255.0).astype(np.uint8)
 
 
-def _in_four_channels(texels: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
+def _as_rgba(texels: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
     """Texels with 0 for missing green and blue, and 255 for missing alpha."""
     full = np.zeros((*texels.shape[:2], 4), np.uint8)
     full[..., 3] = 255
@@ -101,7 +101,7 @@ def _compressed(texels: npt.NDArray[np.uint8], path: Path) -> bytes:
     library = _compressor(path)
     options = library.BC7CompressBlockParams()
     options.init_linear_weights()  # alpha counts as much as each colour
-    rgba = _in_four_channels(full)
+    rgba = _as_rgba(full)
     return bytes(library.compress_bc7(rgba.tobytes(), rgba.shape[1], rgba.shape[0], options))
 
 
@@ -112,22 +112,22 @@ def _bc4(values: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
     """
     height, width = values.shape
     blocks = values.reshape(height // 4, 4, width // 4, 4).swapaxes(1, 2).reshape(-1, 16)
-    most, least = blocks.max(axis=1), blocks.min(axis=1)
-    span = np.maximum(most - least, 1).astype(np.float32)
-    steps = np.rint((most[:, None] - blocks) * (7.0 / span)[:, None]).astype(np.uint8)
+    highest, lowest = blocks.max(axis=1), blocks.min(axis=1)
+    span = np.maximum(highest - lowest, 1).astype(np.float32)
+    steps = np.rint((highest[:, None] - blocks) * (7.0 / span)[:, None]).astype(np.uint8)
     # Steps down from the greatest; the code of the least comes second
     code = np.array([0, 2, 3, 4, 5, 6, 7, 1], np.uint64)[steps]
     bits = np.bitwise_or.reduce(code << np.arange(0, 48, 3, dtype=np.uint64), axis=1)
     indices = bits.astype("<u8").view(np.uint8).reshape(-1, 8)[:, :6]
-    return np.column_stack([most, least, indices])
+    return np.column_stack([highest, lowest, indices])
 
 
-def _header(width: int, height: int, level_count: int, form: int, alpha: int) -> bytes:
+def _header(width: int, height: int, level_count: int, dxgi_format: int, alpha: int) -> bytes:
     """DDS_HEADER and DDS_HEADER_DXT10 with the letters before them."""
     flags = _HAS_CAPS | _HAS_HEIGHT | _HAS_WIDTH | _HAS_FORMAT | _HAS_LEVELS
-    if form in _BLOCK_BYTES:
+    if dxgi_format in _BLOCK_BYTES:
         flags |= _HAS_SIZE
-        size = -(-width // 4) * -(-height // 4) * _BLOCK_BYTES[form]
+        size = -(-width // 4) * -(-height // 4) * _BLOCK_BYTES[dxgi_format]
     else:
         flags |= _HAS_PITCH
         size = width * 4
@@ -136,7 +136,7 @@ def _header(width: int, height: int, level_count: int, form: int, alpha: int) ->
         struct.pack("<4s7I44x", b"DDS ", 124, flags, height, width, size, 0, level_count)
         + struct.pack("<2I4s20x", 32, _IS_FOUR_LETTERS, b"DX10")
         + struct.pack("<I16x", caps)
-        + struct.pack("<5I", form, _TEXTURE_2D, 0, 1, alpha)
+        + struct.pack("<5I", dxgi_format, _TEXTURE_2D, 0, 1, alpha)
     )
 
 

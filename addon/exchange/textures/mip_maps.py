@@ -33,7 +33,7 @@ _MIN_TILE_TEXELS = 16
 #: Weight of texels without hair, so that the mean is that of all texels where none has hair.
 _MIN_WEIGHT = 1e-12
 #: Length below which a mean vector has no direction.
-_NOTHING = 1e-6
+_MIN_LENGTH = 1e-6
 
 
 def level_sizes(width: int, height: int) -> list[tuple[int, int]]:
@@ -61,18 +61,18 @@ def mip_levels(
     alpha = maps.get("alpha")
     weight = np.ones((height, width), np.float32) if alpha is None else alpha
     coverage = None if threshold is None else _coverage(weight, grid, threshold)
-    level = {name: _as_averaged(name, values, weight) for name, values in maps.items()}
+    level = {name: _weighted(name, values, weight) for name, values in maps.items()}
     yield dict(maps)
     for smaller in level_sizes(width, height)[1:]:
-        halving = _Halving.between(weight.shape, (smaller[1], smaller[0]), grid)
-        kept = {name: halving.with_most(level[name], weight) for name in LABELS if name in level}
+        halving = _Halving.for_resize(weight.shape, (smaller[1], smaller[0]), grid)
+        kept = {name: halving.heaviest(level[name], weight) for name in LABELS if name in level}
         averaged = {name: halving.mean(level[name]) for name in level if name not in kept}
         weight = halving.mean(weight)
         level = averaged | kept
-        made = {name: _as_shown(name, values, weight) for name, values in level.items()}
+        shown_level = {name: _unweighted(name, values, weight) for name, values in level.items()}
         if alpha is not None and coverage is not None and threshold is not None:
-            made["alpha"] = _with_coverage(weight, coverage, grid, threshold)
-        yield {name: made[name] for name in maps}
+            shown_level["alpha"] = _with_coverage(weight, coverage, grid, threshold)
+        yield {name: shown_level[name] for name in maps}
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ class _Taps:
     fraction: Floats
 
     @classmethod
-    def between(cls, old: int, new: int, tiles: int) -> _Taps:
+    def for_resize(cls, old: int, new: int, tiles: int) -> _Taps:
         """Fractions by how far texels overlap, within the tile of the new one."""
         ratio = old / new
         first = np.floor(np.arange(new) * ratio + 1e-9).astype(np.intp)
@@ -116,7 +116,7 @@ class _Taps:
     def is_even(self) -> bool:
         return bool(np.all(self.fraction == self.fraction[0, 0]))
 
-    def with_most(self, values: Floats, weight: Floats) -> tuple[Floats, Floats]:
+    def heaviest(self, values: Floats, weight: Floats) -> tuple[Floats, Floats]:
         """The value of greatest weight along axis 0, and that weight."""
         weights = np.where(
             self.fraction.reshape(*self.fraction.shape, 1) > 0, weight[self.index], -1.0
@@ -134,18 +134,19 @@ class _Halving:
     columns: _Taps
 
     @classmethod
-    def between(cls, old: tuple[int, ...], new: tuple[int, int], grid: AtlasGrid) -> _Halving:
+    def for_resize(cls, old: tuple[int, ...], new: tuple[int, int], grid: AtlasGrid) -> _Halving:
         return cls(
-            _Taps.between(old[0], new[0], grid.rows), _Taps.between(old[1], new[1], grid.columns)
+            _Taps.for_resize(old[0], new[0], grid.rows),
+            _Taps.for_resize(old[1], new[1], grid.columns),
         )
 
     def mean(self, values: Floats) -> Floats:
         by_rows = self.rows.mean(values)
         return np.swapaxes(self.columns.mean(np.swapaxes(by_rows, 0, 1)), 0, 1)
 
-    def with_most(self, values: Floats, weight: Floats) -> Floats:
-        by_rows, weights = self.rows.with_most(values, weight)
-        return self.columns.with_most(by_rows.T, weights.T)[0].T
+    def heaviest(self, values: Floats, weight: Floats) -> Floats:
+        by_rows, weights = self.rows.heaviest(values, weight)
+        return self.columns.heaviest(by_rows.T, weights.T)[0].T
 
 
 def _tile_of(texels: int, tiles: int) -> Ints:
@@ -153,7 +154,7 @@ def _tile_of(texels: int, tiles: int) -> Ints:
     return np.floor((np.arange(texels) + 0.5) * (tiles / texels)).astype(np.intp)
 
 
-def _as_averaged(name: str, values: Floats, weight: Floats) -> Floats:
+def _weighted(name: str, values: Floats, weight: Floats) -> Floats:
     """Values times their weight, which is never 0, so that they can be summed level by level."""
     if name == "alpha" or name in LABELS:
         return values
@@ -165,7 +166,7 @@ def _as_averaged(name: str, values: Floats, weight: Floats) -> Floats:
     return weighted
 
 
-def _as_shown(name: str, values: Floats, weight: Floats) -> Floats:
+def _unweighted(name: str, values: Floats, weight: Floats) -> Floats:
     """The values of a texture, from such sums: where there is no hair, the mean of all texels."""
     if name == "alpha" or name in LABELS:
         return values
@@ -173,7 +174,8 @@ def _as_shown(name: str, values: Floats, weight: Floats) -> Floats:
     mean = values / (by_weight + np.float32(_MIN_WEIGHT))
     if name in DIRECTIONS:
         return np.asarray(
-            0.5 * unit_or(mean, np.array([0.0, 0.0, 1.0], mean.dtype), _NOTHING) + 0.5, np.float32
+            0.5 * unit_or(mean, np.array([0.0, 0.0, 1.0], mean.dtype), _MIN_LENGTH) + 0.5,
+            np.float32,
         )
     return np.clip(mean, 0.0, 1.0)
 
@@ -205,11 +207,11 @@ def _with_coverage(alpha: Floats, coverage: Floats, grid: AtlasGrid, threshold: 
         coverage = np.array([coverage.mean()])
     kept = np.empty_like(alpha)
     for tile, fraction in zip(tiles, coverage, strict=True):
-        kept[tile] = _passing(alpha[tile], fraction, threshold)
+        kept[tile] = _with_passing_fraction(alpha[tile], fraction, threshold)
     return kept
 
 
-def _passing(alpha: Floats, fraction: float, threshold: float) -> Floats:
+def _with_passing_fraction(alpha: Floats, fraction: float, threshold: float) -> Floats:
     """Alpha, scaled so that this fraction of it passes the test, and one texel at least if any did.
 
     Castano scales all alphas by one factor. Here those that are to fail the test are scaled so; of
@@ -218,13 +220,13 @@ def _passing(alpha: Floats, fraction: float, threshold: float) -> Floats:
     if fraction == 0.0:
         return np.minimum(alpha, np.nextafter(np.float32(threshold), np.float32(0.0)))
     values = np.sort(alpha, axis=None)[::-1]
-    wanted = min(max(round(fraction * values.size), 1), values.size)
+    target_count = min(max(round(fraction * values.size), 1), values.size)
     # Equal texels pass together or not at all
     steps = np.append(np.flatnonzero(values[:-1] > values[1:]) + 1, values.size)
-    count = steps[np.argmin(np.abs(steps - wanted))]
-    border = values[count - 1 : count + 1].mean() if count < values.size else values[-1]
-    if border <= 0.0 or border >= 1.0:
+    count = steps[np.argmin(np.abs(steps - target_count))]
+    cutoff = values[count - 1 : count + 1].mean() if count < values.size else values[-1]
+    if cutoff <= 0.0 or cutoff >= 1.0:
         return alpha
-    below = alpha * (threshold / border)
-    above = threshold + (alpha - border) * ((1.0 - threshold) / (1.0 - border))
-    return np.where(alpha < border, below, above).astype(np.float32)
+    below = alpha * (threshold / cutoff)
+    above = threshold + (alpha - cutoff) * ((1.0 - threshold) / (1.0 - cutoff))
+    return np.where(alpha < cutoff, below, above).astype(np.float32)

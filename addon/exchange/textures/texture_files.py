@@ -23,7 +23,7 @@ from ..files.atomic import atomic_write, write_error, write_failure_reason
 from .srgb import srgb_decoded, srgb_encoded
 
 #: The largest side of a texture on every GPU that Blender supports [pixels].
-LARGEST_SIDE = 16384
+MAX_SIDE = 16384
 #: Maximum size, more than anybody paints [pixels]; as four float channels it takes 1 GiB.
 MAX_PIXELS = 1 << 26
 #: suffix -> the depths that such a file can have, the first being the usual one
@@ -57,11 +57,11 @@ def check_size(width: int, height: int, place: str) -> None:
     Raises:
         HairloomError: it is too large.
     """
-    if max(width, height) > LARGEST_SIDE or width * height > MAX_PIXELS:
+    if max(width, height) > MAX_SIDE or width * height > MAX_PIXELS:
         raise HairloomError(
             f"{width} x {height} pixels are too many",
             place=place,
-            remedy=f"Make it smaller: up to {LARGEST_SIDE} pixels a side, and 8192 x 8192 in all",
+            remedy=f"Make it smaller: up to {MAX_SIDE} pixels a side, and 8192 x 8192 in all",
         )
 
 
@@ -80,16 +80,16 @@ def read_texture(path: Path, *, is_color: bool) -> Floats:
     """
     library = _openimageio(path)
     if os.path.isdir(path):
-        raise _unreadable(path, "this is a folder, not a file", "Choose a picture")
+        raise _picture_error(path, "this is a folder, not a file", "Choose a picture")
     if not os.path.isfile(path):
-        raise _unreadable(path, "there is no such file", "Check the path")
+        raise _picture_error(path, "there is no such file", "Check the path")
     if not path.stat().st_size:
-        raise _unreadable(path, "the file is empty", "Save the picture again")
+        raise _picture_error(path, "the file is empty", "Save the picture again")
     config = library.ImageSpec()
     config.attribute("oiio:UnassociatedAlpha", 1)
     source = library.ImageInput.open(str(path), config)
     if source is None:
-        raise _broken(path, library)
+        raise _broken_picture(path, library)
     try:
         return _pixels(path, source, library, is_color=is_color)
     finally:
@@ -132,7 +132,7 @@ def write_texture(
         spec.alpha_channel = channels - 1
         spec.attribute("oiio:UnassociatedAlpha", int(not is_multiplied))
         spec.attribute(_STRAIGHT, int(not is_multiplied))
-    spec.attribute("oiio:ColorSpace", _space(is_color=is_color, depth=depth))
+    spec.attribute("oiio:ColorSpace", _color_space(is_color=is_color, depth=depth))
     if path.suffix.lower() != ".png":
         spec.attribute("DateTime", _NO_DATE)
     if compression is not None:
@@ -141,11 +141,11 @@ def write_texture(
         target = library.ImageOutput.create(str(temporary))
         done = target is not None and target.open(str(temporary), spec)
         done = done and target.write_image(np.ascontiguousarray(image))
-        if not (done and target.close() and has_its_end(temporary)):
+        if not (done and target.close() and is_complete_picture(temporary)):
             raise write_error(path, write_failure_reason(path, _reason(target or library)))
 
 
-def has_its_end(path: Path) -> bool:
+def is_complete_picture(path: Path) -> bool:
     """Whether a PNG has its closing chunk, since writers of PNG files do not report a full disk;
     True of other files."""
     if path.suffix.lower() != ".png":
@@ -173,12 +173,12 @@ def _pixels(path: Path, source: Any, library: Any, *, is_color: bool) -> Floats:
     spec = source.spec()
     width, height, channels = spec.width, spec.height, min(spec.nchannels, 4)
     if spec.deep or spec.depth > 1 or min(width, height, channels) < 1:
-        raise _unreadable(path, "this is not a flat picture", "Save it as a plain picture")
+        raise _picture_error(path, "this is not a flat picture", "Save it as a plain picture")
     check_size(width, height, str(path))
     image = source.read_image(0, 0, 0, channels, library.FLOAT)
     # What could not be read would come as zeros, or not at all
     if image is None or source.has_error:
-        raise _broken(path, source)
+        raise _broken_picture(path, source)
     image = np.asarray(image, np.float32).reshape(height, width, channels)
     is_straight = any(map(spec.get_int_attribute, ("oiio:UnassociatedAlpha", _STRAIGHT)))
     if channels in (2, 4) and not (is_straight or source.format_name() == "dds"):
@@ -204,7 +204,7 @@ def _with_colors(image: Floats, colors: Floats) -> Floats:
     return np.concatenate([colors, image[..., colors.shape[-1] :]], axis=-1)
 
 
-def _space(*, is_color: bool, depth: str) -> str:
+def _color_space(*, is_color: bool, depth: str) -> str:
     """OpenImageIO's name of the values' colour space."""
     if not is_color:
         return "raw"
@@ -228,15 +228,15 @@ def _depth(path: Path, depth: str | None) -> str:
     )
 
 
-def _broken(path: Path, source: Any) -> HairloomError:
-    return _unreadable(
+def _broken_picture(path: Path, source: Any) -> HairloomError:
+    return _picture_error(
         path,
         f"this file cannot be read as a picture ({_reason(source)})",
         "It is damaged or not a picture: save it again, as PNG, TIFF or EXR",
     )
 
 
-def _unreadable(path: Path, problem: str, remedy: str) -> HairloomError:
+def _picture_error(path: Path, problem: str, remedy: str) -> HairloomError:
     return HairloomError(problem, place=str(path), remedy=remedy)
 
 

@@ -26,7 +26,7 @@ from ...arrays import Floats
 from ...errors import HairloomError
 
 #: The meaning of each map, in a few words; and the value that replaces a missing one.
-MEANINGS = {
+MAP_MEANINGS = {
     "alpha": ("coverage", 1.0),
     "color": ("colour for a plain material", 1.0),
     "base": ("colour as a factor of the hair's", 1.0),
@@ -69,7 +69,7 @@ class Channel:
         """What it holds, for whoever writes the engine's material."""
         if not self.source:
             return f"always {self.constant:g}"
-        about, _ = MEANINGS[self.source]
+        about, _ = MAP_MEANINGS[self.source]
         if self.source not in _AXES:
             return f"{self.source}: {'1 - ' if self.is_inverted else ''}{about}"
         axis = _AXES[self.source].split()[self.component]
@@ -78,7 +78,7 @@ class Channel:
         value = f"0.5 - 0.5 {axis}" if self.is_inverted else f"0.5 + 0.5 {axis}"
         return f"{self.source}: {value} of the {about}"
 
-    def of(self, maps: Mapping[str, Floats]) -> Floats | float:
+    def values(self, maps: Mapping[str, Floats]) -> Floats | float:
         """The channel's values, (height, width) or one for all."""
         if not self.source:
             return self.constant
@@ -93,7 +93,7 @@ class Channel:
     def _missing(self) -> float:
         """The value of a missing map; for directions those of the card's normal, or straight up."""
         up = {"normal": 2, "tangent": 1}.get(self.source)
-        return 1.0 if up == self.component else MEANINGS[self.source][1]
+        return 1.0 if up == self.component else MAP_MEANINGS[self.source][1]
 
 
 @dataclass(frozen=True)
@@ -131,12 +131,12 @@ class TextureLayout:
         """Channel -> what it holds, in the words of the JSON sidecar."""
         return {letter: each.role for letter, each in zip("rgba", self.channels, strict=False)}
 
-    def packed(self, maps: Mapping[str, Floats]) -> Floats:
+    def pack(self, maps: Mapping[str, Floats]) -> Floats:
         """(height, width, channels) float32 in [0, 1], colours linear."""
         shape = next(iter(maps.values())).shape[:2]
         pixels: Floats = np.empty((*shape, len(self.channels)), np.float32)
         for index, channel in enumerate(self.channels):
-            pixels[..., index] = channel.of(maps)
+            pixels[..., index] = channel.values(maps)
         return pixels
 
 
@@ -167,36 +167,36 @@ class PackedTexture:
         return self.layout.roles
 
 
-def _one(name: str) -> tuple[Channel]:
+def _scalar(name: str) -> tuple[Channel]:
     return (Channel(name),)
 
 
-def _three(name: str, *inverted: int) -> tuple[Channel, ...]:
+def _vector(name: str, *inverted: int) -> tuple[Channel, ...]:
     return tuple(Channel(name, axis, axis in inverted) for axis in range(3))
 
 
 _GREEN = 1
-_COLOR = _three("color")
+_COLOR = _vector("color")
 #: for shaders that colour hair themselves, beside what a plain material shows
-_BASE = TextureLayout("_base", _three("base"), is_color=True)
+_BASE = TextureLayout("_base", _vector("base"), is_color=True)
 #: The direction across the strands, in the card's plane: (y, -x) of their tangent.
 _ACROSS = (Channel("tangent", 1), Channel("tangent", 0, is_inverted=True))
-_FINE = "uint16"
+_UINT16 = "uint16"
 _STRANDS = (Channel("along"), Channel("strand_id"), Channel("depth"))
 
 PRESETS: dict[str, tuple[TextureLayout, ...]] = {
     "hairloom": (
         TextureLayout("_color", _COLOR, is_color=True),
-        TextureLayout("_alpha", _one("alpha")),
+        TextureLayout("_alpha", _scalar("alpha")),
         _BASE,
-        TextureLayout("_normal", _three("normal"), is_normal_map=True),
-        TextureLayout("_tangent", _three("tangent"), depth=_FINE),
-        TextureLayout("_depth", _one("depth"), depth=_FINE),
-        TextureLayout("_along", _one("along"), depth=_FINE),
-        TextureLayout("_strand_id", _one("strand_id"), depth=_FINE),
-        TextureLayout("_occlusion", _one("occlusion")),
-        TextureLayout("_shift", _one("shift"), depth=_FINE),
-        TextureLayout("_noise", _one("noise")),
+        TextureLayout("_normal", _vector("normal"), is_normal_map=True),
+        TextureLayout("_tangent", _vector("tangent"), depth=_UINT16),
+        TextureLayout("_depth", _scalar("depth"), depth=_UINT16),
+        TextureLayout("_along", _scalar("along"), depth=_UINT16),
+        TextureLayout("_strand_id", _scalar("strand_id"), depth=_UINT16),
+        TextureLayout("_occlusion", _scalar("occlusion")),
+        TextureLayout("_shift", _scalar("shift"), depth=_UINT16),
+        TextureLayout("_noise", _scalar("noise")),
     ),
     "gltf": (
         TextureLayout("_baseColor", (*_COLOR, Channel("alpha")), is_color=True),
@@ -204,14 +204,14 @@ PRESETS: dict[str, tuple[TextureLayout, ...]] = {
             "_occlusionRoughnessMetallic",
             (Channel("occlusion"), Channel("roughness"), Channel(constant=0.0)),
         ),
-        TextureLayout("_normal", _three("normal"), is_normal_map=True),
+        TextureLayout("_normal", _vector("normal"), is_normal_map=True),
         TextureLayout("_anisotropy", (*_ACROSS, Channel(constant=1.0))),
         _BASE,
     ),
     "unreal": (
-        TextureLayout("_Depth", _one("depth")),
-        TextureLayout("_Coverage", _one("alpha")),
-        TextureLayout("_Tangent", _three("tangent", _GREEN)),
+        TextureLayout("_Depth", _scalar("depth")),
+        TextureLayout("_Coverage", _scalar("alpha")),
+        TextureLayout("_Tangent", _vector("tangent", _GREEN)),
         TextureLayout(
             "_Attributes", (Channel(constant=0.0), Channel("along"), Channel("strand_id"))
         ),
@@ -223,7 +223,7 @@ PRESETS: dict[str, tuple[TextureLayout, ...]] = {
         _BASE,
     ),
     "unreal_compact": (
-        TextureLayout("_TangentCoordU", (*_three("tangent", _GREEN), Channel("along"))),
+        TextureLayout("_TangentCoordU", (*_vector("tangent", _GREEN), Channel("along"))),
         TextureLayout(
             "_CoverageDepthSeed", (Channel("alpha"), Channel("depth"), Channel("strand_id"))
         ),
@@ -232,30 +232,30 @@ PRESETS: dict[str, tuple[TextureLayout, ...]] = {
     ),
     "unity_hdrp": (
         TextureLayout("_BaseColorMap", (*_COLOR, Channel("alpha")), is_color=True),
-        TextureLayout("_NormalMap", _three("normal"), is_normal_map=True),
-        TextureLayout("_AOMap", _one("occlusion")),
-        TextureLayout("_SmoothnessMask", _one("noise")),
-        TextureLayout("_HairStrandDirection", _three("tangent")),
+        TextureLayout("_NormalMap", _vector("normal"), is_normal_map=True),
+        TextureLayout("_AOMap", _scalar("occlusion")),
+        TextureLayout("_SmoothnessMask", _scalar("noise")),
+        TextureLayout("_HairStrandDirection", _vector("tangent")),
         TextureLayout("_RootIdDepth", _STRANDS),
         _BASE,
     ),
     "godot": (
         TextureLayout("_albedo", (*_COLOR, Channel("alpha")), is_color=True),
-        TextureLayout("_normal", _three("normal"), is_normal_map=True),
+        TextureLayout("_normal", _vector("normal"), is_normal_map=True),
         TextureLayout("_flow", (*_ACROSS, Channel(constant=0.5), Channel(constant=1.0))),
-        TextureLayout("_ao", _one("occlusion")),
+        TextureLayout("_ao", _scalar("occlusion")),
         TextureLayout("_rootIdDepth", _STRANDS),
         _BASE,
     ),
 }
 
 
-def layouts(preset: str, maps: Mapping[str, Floats]) -> list[TextureLayout]:
+def texture_layouts(preset: str, maps: Mapping[str, Floats]) -> list[TextureLayout]:
     """The files of a preset, without those of which all maps are missing.
 
     Raises:
-        HairloomError: no such preset, no map at all, another map than those of MEANINGS, or maps
-            of several sizes or with the wrong channels.
+        HairloomError: no such preset, no map at all, another map than those of MAP_MEANINGS, or
+            maps of several sizes or with the wrong channels.
     """
     if preset not in PRESETS:
         raise HairloomError(
@@ -267,27 +267,27 @@ def layouts(preset: str, maps: Mapping[str, Floats]) -> list[TextureLayout]:
     return [layout for layout in PRESETS[preset] if layout.sources & maps.keys()]
 
 
-def packed(maps: Mapping[str, Floats], preset: str) -> list[PackedTexture]:
+def pack_textures(maps: Mapping[str, Floats], preset: str) -> list[PackedTexture]:
     """All textures of a preset.
 
     Args:
         maps: name -> (height, width), or (height, width, 3) for base, normal and tangent, in
-            [0, 1], of one size. A missing one is replaced by a neutral value, see MEANINGS.
+            [0, 1], of one size. A missing one is replaced by a neutral value, see MAP_MEANINGS.
 
     Raises:
         HairloomError: as `layouts` does.
     """
-    return [PackedTexture(layout, layout.packed(maps)) for layout in layouts(preset, maps)]
+    return [PackedTexture(layout, layout.pack(maps)) for layout in texture_layouts(preset, maps)]
 
 
 def _check(maps: Mapping[str, Floats]) -> None:
     for name, values in maps.items():
         expected = next(iter(maps.values())).shape[:2] + ((3,) if name in _AXES else ())
-        if name not in MEANINGS or values.shape != expected or 0 in expected:
+        if name not in MAP_MEANINGS or values.shape != expected or 0 in expected:
             raise HairloomError(
                 f"the map '{name}' of shape {values.shape} cannot be packed",
                 place="Texture packing",
-                remedy=f"Use maps of one size named {', '.join(MEANINGS)}; {', '.join(_AXES)} "
+                remedy=f"Use maps of one size named {', '.join(MAP_MEANINGS)}; {', '.join(_AXES)} "
                 "have three channels",
             )
     if not maps:

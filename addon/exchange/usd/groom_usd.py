@@ -27,15 +27,15 @@ from ...errors import HairloomError
 from ..files.atomic import atomic_write, write_error, write_failure_reason
 from ..files.axes import from_z_up
 from ..files.file_names import identifier_name, unique_names
-from ..groom import Groom, GroomMotion, points_of
+from ..groom import Groom, GroomMotion, point_indices_of
 from .usd_library import SUFFIXES, usd_library
-from .usd_reader import summary
+from .usd_reader import error_summary
 
 #: The version of Epic's conventions that the names of primvars are from.
 GROOM_VERSION = (1, 5)
 
 #: Size of the frames that are kept in memory before they are saved [bytes].
-_WAITING = 1 << 28
+_MAX_UNSAVED_BYTES = 1 << 28
 
 
 @dataclass(frozen=True)
@@ -85,23 +85,23 @@ def write_usd(
         raise HairloomError(
             "there are no strands to write", place=str(path), remedy="Choose hair that has strands"
         )
-    space = _checked(up, scale, path)
+    space = _checked_space(up, scale, path)
     with atomic_write(path) as temporary:
         try:
             stage = usd.Usd.Stage.CreateNew(str(temporary))
             root = _root(usd, stage, groom, space)
             parts = [
-                _written_part(usd, root, name, part, space, is_linear)
+                _write_part(usd, root, name, part, space, is_linear)
                 for name, part in _parts(groom, by_group)
             ]
             if motion is not None:
                 _write_motion(usd, stage, parts, motion, space, path)
             stage.GetRootLayer().Save()
         except usd.Tf.ErrorException as error:
-            raise write_error(path, write_failure_reason(path, summary(error))) from error
+            raise write_error(path, write_failure_reason(path, error_summary(error))) from error
 
 
-def _checked(up: str, scale: float, path: Path) -> UsdSpace:
+def _checked_space(up: str, scale: float, path: Path) -> UsdSpace:
     from_z_up(np.zeros(3), up)  # refuses another axis
     if not (np.isfinite(scale) and scale > 0.0):
         raise HairloomError(
@@ -152,10 +152,10 @@ def _parts(groom: Groom, by_group: bool) -> Iterator[tuple[str, _Part]]:
     )
     for name, group in zip(names, numbers, strict=True):
         strands = np.flatnonzero(groom.strands.group == group)
-        yield name, _Part(points_of(groom.strands, strands), groom.take(strands))
+        yield name, _Part(point_indices_of(groom.strands, strands), groom.take(strands))
 
 
-def _written_part(
+def _write_part(
     usd: ModuleType, root: Any, name: str, part: _Part, space: UsdSpace, is_linear: bool
 ) -> tuple[Any, _Part]:
     """A prim of curves with the groom at rest, and the part that is in it."""
@@ -171,10 +171,10 @@ def _written_part(
     curves.SetWidthsInterpolation(tokens.vertex)
     _set_points(usd, curves, strands.points, float(widths.max()), space)
     primvars = usd.UsdGeom.PrimvarsAPI(curves)
-    for primvar, kind, of, values in _primvars(part.groom):
+    for primvar, kind, interpolation, values in _primvars(part.groom):
         array = _VT_ARRAYS[kind]
         value_type = usd.Sdf.ValueTypeNames.Find(f"{kind}[]")
-        primvars.CreatePrimvar(primvar, value_type, of).Set(
+        primvars.CreatePrimvar(primvar, value_type, interpolation).Set(
             getattr(usd.Vt, array).FromNumpy(np.ascontiguousarray(values))
         )
     names = _group_names(part.groom)
@@ -217,9 +217,9 @@ def _group_names(groom: Groom) -> list[str]:
     """For each strand the name of its group, empty where it has none; nothing without any."""
     if not groom.group_names:
         return []
-    groups, which = np.unique(groom.strands.group, return_inverse=True)
+    groups, group_index = np.unique(groom.strands.group, return_inverse=True)
     names = [groom.group_names.get(group, "") for group in groups.tolist()]
-    return [names[each] for each in which.tolist()]
+    return [names[each] for each in group_index.tolist()]
 
 
 def _set_points(
@@ -245,7 +245,7 @@ def _write_motion(
 ) -> None:
     """Time samples at the numbers of frames."""
     point_count = sum(part.groom.strands.point_count for _, part in parts)
-    is_binary, waiting, count = path.suffix.lower() != ".usda", 0, 0
+    is_binary, unsaved_bytes, count = path.suffix.lower() != ".usda", 0, 0
     widths = [2.0 * float(part.groom.strands.radius.max()) / space.scale for _, part in parts]
     for points in motion.positions:
         if points.shape != (point_count, 3) or not np.isfinite(points).all():
@@ -257,10 +257,12 @@ def _write_motion(
         for (curves, part), width in zip(parts, widths, strict=True):
             time = float(motion.first_frame + count)
             _set_points(usd, curves, points[part.points], width, space, time)
-        count, waiting = count + 1, waiting + points.nbytes
-        if is_binary and waiting > _WAITING:  # a binary file only grows; a text is one piece
+        count, unsaved_bytes = count + 1, unsaved_bytes + points.nbytes
+        if (
+            is_binary and unsaved_bytes > _MAX_UNSAVED_BYTES
+        ):  # a binary file only grows; a text is one piece
             stage.GetRootLayer().Save()
-            waiting = 0
+            unsaved_bytes = 0
     stage.SetTimeCodesPerSecond(motion.rate)
     stage.SetFramesPerSecond(motion.rate)
     stage.SetStartTimeCode(motion.first_frame)

@@ -20,14 +20,14 @@ from ...strands.clean import clean
 from ..files.axes import to_z_up
 from ..files.file_space import FileSpace
 from ..groom import Groom
-from ..read_groom import ReadGroom, kept_points, known_apart
-from ..read_motion import motion_of, sound_motion
-from .usd_curves import Curves, UnusableCurvesError, curves_of
+from ..read_groom import ReadGroom, unique_identities, values_of_kept_points
+from ..read_motion import join_motions, valid_motion
+from .usd_curves import Curves, UnusableCurvesError, read_prim
 from .usd_library import usd_arrays
-from .usd_reader import Arrays, unpacked
+from .usd_reader import Arrays, unpack_prims
 
 #: maximum number of prims that notes name one by one
-_FEW = 3
+_MAX_NAMED_PRIMS = 3
 
 
 def read_usd(
@@ -54,16 +54,16 @@ def read_usd(
     Raises:
         HairloomError: no OpenUSD, a file that cannot be read, or one without a usable strand.
     """
-    reading = _Reading(usd_arrays(path, python), path, up, scale, factor)
-    pieces = list(reading.pieces())
+    content = _UsdContent(usd_arrays(path, python), path, up, scale, factor)
+    pieces = list(content.pieces())
     if not pieces:
-        raise reading.nothing_found()
-    groom = _joined(pieces, path, reading.name(), reading.notes)
-    notes = tuple(f"{path.name}: {note}." for note in reading.notes)
-    return ReadGroom(groom, reading.version(), reading.axes, notes)
+        raise content.nothing_found()
+    groom = _join_pieces(pieces, path, content.name(), content.notes)
+    notes = tuple(f"{path.name}: {note}." for note in content.notes)
+    return ReadGroom(groom, content.version(), content.axes, notes)
 
 
-class _Reading:
+class _UsdContent:
     """The content of a file, and notes on it."""
 
     def __init__(
@@ -86,18 +86,18 @@ class _Reading:
     def pieces(self) -> Iterator[Curves]:
         """The curves of each prim that has usable ones."""
         notes, problems = dict[str, list[str]](), dict[str, list[str]]()
-        for prim in unpacked(self._arrays):
+        for prim in unpack_prims(self._arrays):
             path = str(prim["path"])
             try:
-                piece = curves_of(prim, self._to_blender)
+                piece = read_prim(prim, self._to_blender)
             except UnusableCurvesError as error:
                 problems.setdefault(str(error), []).append(path)
                 continue
             for note in piece.notes:
                 notes.setdefault(note, []).append(path)
             yield piece
-        self._problems = _of_prims(problems, " was left out", ", were left out")
-        self.notes += _of_prims(notes) + self._problems
+        self._problems = _prim_notes(problems, " was left out", ", were left out")
+        self.notes += _prim_notes(notes) + self._problems
         others = zip(self._arrays["others"], self._arrays["other_counts"], strict=True)
         counts = ", ".join(f"{count:,} {kind}" for kind, count in others)
         if counts:
@@ -129,32 +129,32 @@ class _Reading:
         return HairloomError(problem, place=str(self._path), remedy=remedy)
 
 
-def _of_prims(notes: dict[str, list[str]], one: str = "", many: str = "") -> list[str]:
+def _prim_notes(notes: dict[str, list[str]], one: str = "", many: str = "") -> list[str]:
     """Sentences from notes and the paths of the prims that they are on; one for many prims.
 
     one, many: text between the path or paths and the note.
     """
     found = []
     for note, paths in notes.items():
-        if len(paths) > _FEW:
+        if len(paths) > _MAX_NAMED_PRIMS:
             found.append(f"{len(paths):,} prims, such as {paths[0]}{many}: {note}")
         else:
             found += [f"{path}{one}: {note}" for path in paths]
     return found
 
 
-def _joined(pieces: list[Curves], path: Path, name: str, notes: list[str]) -> Groom:
+def _join_pieces(pieces: list[Curves], path: Path, name: str, notes: list[str]) -> Groom:
     """All pieces as one groom of usable strands; adds to `notes`."""
     counts = np.concatenate([np.diff(piece.offsets) for piece in pieces])
     offsets = np.concatenate([[0], np.cumsum(counts)])
     groups, group_names = _groups(pieces)
     with np.errstate(over="ignore", invalid="ignore"):
         cleaned = clean(
-            _together([piece.points for piece in pieces]),
+            _concatenated([piece.points for piece in pieces]),
             offsets,
-            radius=_together([_radius(piece) for piece in pieces]),
+            radius=_concatenated([_radius(piece) for piece in pieces]),
             group=groups,
-            root_uv=_of_all("root UVs", [piece.root_uv for piece in pieces], notes),
+            root_uv=_all_or_none("root UVs", [piece.root_uv for piece in pieces], notes),
             color=_colors(pieces),
             unfit=_unfit(pieces),
         )
@@ -167,11 +167,11 @@ def _joined(pieces: list[Curves], path: Path, name: str, notes: list[str]) -> Gr
         )
     if len(pieces) > 1:
         notes.append(f"its {len(pieces):,} prims of curves were joined into one groom")
-    found, motion = motion_of([(piece.times, piece.positions) for piece in pieces]), None
+    found, motion = join_motions([(piece.times, piece.positions) for piece in pieces]), None
     if found is not None:
         times, positions = found
-        kept = np.stack([kept_points(each, offsets, cleaned) for each in positions])
-        motion, note = sound_motion(times, kept)
+        kept = np.stack([values_of_kept_points(each, offsets, cleaned) for each in positions])
+        motion, note = valid_motion(times, kept)
         notes += [note] if note else []
     return Groom(
         cleaned.strands,
@@ -189,20 +189,22 @@ def _unfit(pieces: list[Curves]) -> dict[str, Bools]:
     """Why curves cannot be used -> which of all."""
     none = [np.zeros(piece.curve_count, bool) for piece in pieces]
     return {
-        reason: _together([p.unfit.get(reason, no) for p, no in zip(pieces, none, strict=True)])
+        reason: _concatenated([p.unfit.get(reason, no) for p, no in zip(pieces, none, strict=True)])
         for reason in dict.fromkeys(reason for piece in pieces for reason in piece.unfit)
     }
 
 
-def _together(arrays: list[NDArray[Any]]) -> NDArray[Any]:
+def _concatenated(arrays: list[NDArray[Any]]) -> NDArray[Any]:
     return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)
 
 
-def _of_all(what: str, arrays: list[NDArray[Any] | None], notes: list[str]) -> NDArray[Any] | None:
+def _all_or_none(
+    what: str, arrays: list[NDArray[Any] | None], notes: list[str]
+) -> NDArray[Any] | None:
     """All arrays as one; None if a prim has none, with a note if another one has."""
     known = [array for array in arrays if array is not None]
     if len(known) == len(arrays):
-        return _together(known)
+        return _concatenated(known)
     if known:
         notes.append(f"{what} were left out, which only some of its prims have")
     return None
@@ -220,7 +222,7 @@ def _colors(pieces: list[Curves]) -> Floats | None:
     if all(piece.color is None for piece in pieces):
         return None
     none = np.float32(np.nan)
-    return _together(
+    return _concatenated(
         [np.full((len(p.points), 3), none) if p.color is None else p.color for p in pieces]
     )
 
@@ -229,13 +231,15 @@ def _groups(pieces: list[Curves]) -> tuple[Ints, dict[int, str]]:
     """Groups as prims have them, else one for each prim; and their names."""
     groups: list[Ints] = []
     names: dict[int, str] = {}
-    free = max([-1, *(int(piece.group.max()) for piece in pieces if piece.group is not None)]) + 1
+    next_group = (
+        max([-1, *(int(piece.group.max()) for piece in pieces if piece.group is not None)]) + 1
+    )
     for piece in pieces:
         if piece.group is None:
-            groups.append(np.full(piece.curve_count, free, np.int32))
+            groups.append(np.full(piece.curve_count, next_group, np.int32))
             if len(pieces) > 1:
-                names[free] = piece.name
-            free += 1
+                names[next_group] = piece.name
+            next_group += 1
             continue
         groups.append(piece.group)
         if piece.group_name is not None:
@@ -243,7 +247,7 @@ def _groups(pieces: list[Curves]) -> tuple[Ints, dict[int, str]]:
             for group, first in zip(found.tolist(), firsts.tolist(), strict=True):
                 if piece.group_name[first]:
                     names[group] = piece.group_name[first]
-    return _together(groups), names
+    return _concatenated(groups), names
 
 
 def _guides(pieces: list[Curves], kept: Ints) -> Bools | None:
@@ -254,19 +258,19 @@ def _guides(pieces: list[Curves], kept: Ints) -> Bools | None:
         np.zeros(piece.curve_count, bool) if piece.is_guide is None else piece.is_guide
         for piece in pieces
     ]
-    return _together(flags)[kept]
+    return _concatenated(flags)[kept]
 
 
 def _identities(pieces: list[Curves], kept: Ints, notes: list[str]) -> dict[str, Any]:
-    """See `known_apart`."""
-    numbers = _of_all("IDs", [piece.strand_id for piece in pieces], notes)
+    """See `unique_identities`."""
+    numbers = _all_or_none("IDs", [piece.strand_id for piece in pieces], notes)
     if numbers is None:
         return {}
-    known = known_apart({"strand_id": numbers[kept]}, notes)
+    known = unique_identities({"strand_id": numbers[kept]}, notes)
     if not known:
         return {}
-    closest = _of_all("closest guides", [piece.closest_guides for piece in pieces], notes)
-    weights = _of_all("guide weights", [piece.guide_weights for piece in pieces], notes)
+    closest = _all_or_none("closest guides", [piece.closest_guides for piece in pieces], notes)
+    weights = _all_or_none("guide weights", [piece.guide_weights for piece in pieces], notes)
     if closest is None or weights is None:
         return known
     weights = weights[kept]

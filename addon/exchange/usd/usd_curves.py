@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from ...arrays import Bools, Floats, Ints
 from ...strands.affine import mean_scale, moved
 from ...strands.clean import are_widths
-from ..curve_basis import OnCurves, points_on_curves, unfit_curves, usable_basis
-from ..read_motion import ended_at
+from ..curve_basis import CurveSampling, invalid_curves, points_on_curves, usable_basis
+from ..read_motion import motion_end_note
 from .usd_reader import Arrays
 
 #: Where programs put the UVs of roots, Blender's among them; the first one found counts.
@@ -24,7 +24,7 @@ class Curves:
     """The content of a prim; None: not known. Arrays are as in `Groom`.
 
     offsets: (curve_count + 1,).
-    unfit: see `unfit_curves`.
+    unfit: see `invalid_curves`.
     notes: what had to be changed or left out.
     times, positions: of a prim that moves its times (n,) [s], and the points at these,
         (n, point_count, 3); of a still one None and (1, point_count, 3).
@@ -56,7 +56,7 @@ class UnusableCurvesError(Exception):
     """Why nothing of a prim can be used."""
 
 
-def curves_of(prim: Arrays, space: Floats) -> Curves:
+def read_prim(prim: Arrays, space: Floats) -> Curves:
     """The content of a prim as strands.
 
     Args:
@@ -79,38 +79,38 @@ def curves_of(prim: Arrays, space: Floats) -> Curves:
     wrap, kind, basis, widths_interpolation = map(str, prim["traits"])
     if kind == "linear":
         basis = "linear"
-    basis, said = usable_basis(basis, counts)
+    basis, basis_notes = usable_basis(basis, counts)
     if wrap == "periodic":
         raise UnusableCurvesError("its curves are closed")
     values = _Values(prim, points_on_curves(basis, wrap == "pinned", counts), counts)
     radius, notes = _radius(values, widths_interpolation, mean_scale(matrix))
-    notes += said
-    if values.on_curves.vertex is not None:
+    notes += basis_notes
+    if values.sampling.vertex is not None:
         notes += (f"its {basis} curves were converted to points on the curves",)
     if "ended" in prim:
-        notes += (ended_at(float(prim["ended"]), "another number of points"),)
-    color = values.of_points("groom_color", 3)
+        notes += (motion_end_note(float(prim["ended"]), "another number of points"),)
+    color = values.point_values("groom_color", 3)
     if color is None:
-        color = values.of_points("displayColor", 3)
-    ids = values.of_strands("groom_id", np.int32)
-    guide = values.of_strands("groom_guide", np.int32)
-    uvs = (values.of_strands(name, np.float32, 2) for name in _ROOT_UVS)
-    placed = moved(values.mixed(points), matrix)
+        color = values.point_values("displayColor", 3)
+    ids = values.strand_values("groom_id", np.int32)
+    guide = values.strand_values("groom_guide", np.int32)
+    uvs = (values.strand_values(name, np.float32, 2) for name in _ROOT_UVS)
+    placed = moved(values.at_points(points), matrix)
     times, positions = _motion(prim, values, space)
     return Curves(
         name=str(prim["name"]),
         points=placed,
-        offsets=values.on_curves.offsets,
+        offsets=values.sampling.offsets,
         radius=radius,
-        group=values.of_strands("groom_group_id", np.int32),
-        group_name=values.texts_of_strands("groom_group_name"),
+        group=values.strand_values("groom_group_id", np.int32),
+        group_name=values.strand_texts("groom_group_name"),
         root_uv=next((uv for uv in uvs if uv is not None), None),
         color=color,
         strand_id=ids,
         is_guide=None if guide is None else guide > 0,
-        closest_guides=values.of_strands("groom_closest_guides", np.int32, 3),
-        guide_weights=values.of_strands("groom_guide_weights", np.float32, 3),
-        unfit=unfit_curves(values.on_curves, basis),
+        closest_guides=values.strand_values("groom_closest_guides", np.int32, 3),
+        guide_weights=values.strand_values("groom_guide_weights", np.float32, 3),
+        unfit=invalid_curves(values.sampling, basis),
         notes=notes + tuple(values.notes),
         times=times,
         positions=placed[None] if times is None else positions,
@@ -122,7 +122,7 @@ def _motion(prim: Arrays, values: _Values, space: Floats) -> tuple[Floats | None
     if len(prim.get("times", ())) < 2:
         return None, np.zeros((0, 0, 3), np.float32)
     positions = [
-        moved(values.mixed(points), space @ matrix.T)  # USD has row vectors
+        moved(values.at_points(points), space @ matrix.T)  # USD has row vectors
         for points, matrix in zip(prim["motion"], prim["matrices"], strict=True)
     ]
     return prim["times"], np.array(positions, np.float32)
@@ -135,12 +135,12 @@ def _radius(
     widths = _array(values.prim.get("widths"), np.float32)
     if widths is None or not len(widths):
         return None, ("it has no widths",)
-    radius = values.on_points(widths, interpolation, "widths")
+    radius = values.values_at_points(widths, interpolation, "widths")
     if radius is None:
         return None, ()
     with np.errstate(over="ignore", invalid="ignore"):
         radius = radius * np.float32(0.5 * scale)
-    wrong = int((~are_widths(radius, values.on_curves.offsets)).sum())
+    wrong = int((~are_widths(radius, values.sampling.offsets)).sum())
     notes = (f"{wrong:,} widths are not plausible for hair and were replaced",) if wrong else ()
     return radius, notes
 
@@ -148,39 +148,39 @@ def _radius(
 class _Values:
     """A prim's primvars for each strand or each of its points, whatever their interpolation."""
 
-    def __init__(self, prim: Arrays, on_curves: OnCurves, counts: Ints) -> None:
+    def __init__(self, prim: Arrays, sampling: CurveSampling, counts: Ints) -> None:
         self.prim = prim
-        self.on_curves = on_curves
+        self.sampling = sampling
         self.notes: list[str] = []
         self._counts = counts
         self._point_count = int(counts.sum())
 
-    def mixed(self, values: Floats) -> Floats:
+    def at_points(self, values: Floats) -> Floats:
         """Points of curves from control points."""
-        mix = self.on_curves.vertex
+        mix = self.sampling.vertex
         with np.errstate(over="ignore", invalid="ignore"):
-            return values if mix is None else mix.of(values)
+            return values if mix is None else mix.apply(values)
 
-    def of_points(self, name: str, width: int) -> Floats | None:
+    def point_values(self, name: str, width: int) -> Floats | None:
         values, interpolation = self._flat(name, np.float32, width)
-        return None if values is None else self.on_points(values, interpolation, name)
+        return None if values is None else self.values_at_points(values, interpolation, name)
 
-    def on_points(self, values: Floats, interpolation: str, name: str) -> Floats | None:
+    def values_at_points(self, values: Floats, interpolation: str, name: str) -> Floats | None:
         """Values at each point; None, with a note, if their number does not fit."""
-        on_curves = self.on_curves
+        sampling = self.sampling
         expected = self._expected(interpolation)
         if len(values) == 1 or interpolation == "constant":
-            return np.repeat(values[:1], on_curves.offsets[-1], axis=0)
+            return np.repeat(values[:1], sampling.offsets[-1], axis=0)
         if len(values) != expected:
             self._unfit(name, len(values), expected, interpolation)
             return None
         if interpolation == "uniform":
-            return np.repeat(values, np.diff(on_curves.offsets), axis=0)
+            return np.repeat(values, np.diff(sampling.offsets), axis=0)
         if interpolation == "vertex":
-            return self.mixed(values)
-        return values if on_curves.varying is None else on_curves.varying.of(values)
+            return self.at_points(values)
+        return values if sampling.varying is None else sampling.varying.apply(values)
 
-    def of_strands(self, name: str, dtype: type, width: int = 1) -> NDArray[Any] | None:
+    def strand_values(self, name: str, dtype: type, width: int = 1) -> NDArray[Any] | None:
         """Values of each strand; of its root where there are more."""
         values, interpolation = self._flat(name, dtype, width)
         if values is None:
@@ -188,7 +188,7 @@ class _Values:
         rows = self._rows(name, len(values), interpolation)
         return None if rows is None else values[rows]
 
-    def texts_of_strands(self, name: str) -> list[str] | None:
+    def strand_texts(self, name: str) -> list[str] | None:
         texts, interpolation = self._flattened(name)
         if texts is None or texts.ndim != 1:
             return None
@@ -213,14 +213,14 @@ class _Values:
 
     def _lost_ends(self) -> Ints:
         """Control points of each curve that are no end of a segment."""
-        if self.on_curves.varying is None:
-            return self._counts - np.diff(self.on_curves.offsets)
+        if self.sampling.varying is None:
+            return self._counts - np.diff(self.sampling.offsets)
         return self._counts - (self._counts + 2) // 3
 
     def _expected(self, interpolation: str) -> int:
         if interpolation == "uniform":
             return len(self._counts)
-        return self._point_count if interpolation == "vertex" else self.on_curves.varying_count
+        return self._point_count if interpolation == "vertex" else self.sampling.varying_count
 
     def _flat(self, name: str, dtype: type, width: int) -> tuple[NDArray[Any] | None, str]:
         values, interpolation = self._flattened(name)

@@ -8,13 +8,13 @@ from types import ModuleType
 
 from ..files.atomic import write_error, write_failure_reason
 from .usd_library import usd_library
-from .usd_reader import summary
+from .usd_reader import error_summary
 
 #: the name of the set, and of each variant
 VARIANT_SET, _VARIANT = "LOD", "LOD{}"
 
 
-def with_level_variants(path: Path, nodes: Sequence[str]) -> None:
+def add_level_variants(path: Path, nodes: Sequence[str]) -> None:
     """Make the levels variants of their parent prim, with the finest selected.
 
     Args:
@@ -27,7 +27,7 @@ def with_level_variants(path: Path, nodes: Sequence[str]) -> None:
     try:
         _make_variants(pxr, path, nodes)
     except pxr.Tf.ErrorException as error:
-        raise write_error(path, write_failure_reason(path, summary(error))) from error
+        raise write_error(path, write_failure_reason(path, error_summary(error))) from error
 
 
 def _make_variants(pxr: ModuleType, path: Path, nodes: Sequence[str]) -> None:

@@ -76,7 +76,7 @@ def usd_arrays(path: Path, python: Sequence[str] | None = None) -> Arrays:
         # one thread: each further one reserves memory, which counts towards the limit
         one_thread = {"PXR_WORK_THREAD_LIMIT": "1"}
         script = Path(usd_reader.__file__)
-        run_reader(script, path, [result], library="USD", python=python, settings=one_thread)
+        run_reader(script, path, [result], library="USD", python=python, environment=one_thread)
         with np.load(result, allow_pickle=False) as arrays:
             return dict(arrays)
 

@@ -6,7 +6,7 @@ A damaged file makes OpenUSD crash, and a text of a few kilobytes can describe m
 machine holds. So only this process opens files, and it has limits of time, memory and prims. It
 imports no other module of ours. It ends with EXIT_REPORTED, and a line on stderr, after an error.
 
-The result has, for each BasisCurves in the file's order, all of it `packed`:
+The result has, for each BasisCurves in the file's order, all of it `pack_prims`:
 
     name, path
     matrix            (4, 4), takes row vectors to the stage
@@ -63,9 +63,9 @@ MAX_POINTS = 1 << 28
 #: Maximum prims with all instances, more than any scene has that is sent for its hair.
 MAX_PRIMS = 1_000_000
 #: Memory that a file may take beside its own size [bytes], and as a multiple of it.
-_BESIDE, _MAX_TIMES = 640 << 20, 30
+_BASE_MEMORY, _MEMORY_FACTOR = 640 << 20, 30
 #: Processor time for any file, including the start [s], and bytes that take a second more.
-_SECONDS, _BYTES_A_SECOND = 6, 1_000_000
+_MIN_SECONDS, _BYTES_PER_SECOND = 6, 1_000_000
 
 
 class _TooMuchError(Exception):
@@ -77,8 +77,8 @@ def read_curves(path: str) -> Arrays:
     from pxr import Usd, UsdGeom
 
     stage = Usd.Stage.Open(path)
-    _limit(*(layer.realPath for layer in stage.GetUsedLayers()))
-    found = _of_stage(stage)
+    _limit_process(*(layer.realPath for layer in stage.GetUsedLayers()))
+    found = _read_stage(stage)
     cache = UsdGeom.XformCache(Usd.TimeCode.EarliestTime())
     others: Counter[str] = Counter()
     curves_prims: list[Arrays] = []
@@ -88,7 +88,7 @@ def read_curves(path: str) -> Arrays:
         if prims > MAX_PRIMS:
             raise _TooMuchError(f"it has more than {MAX_PRIMS:,} prims with all instances")
         if prim.IsA(UsdGeom.BasisCurves):
-            curves = _of_curves(prim)
+            curves = _read_curves_prim(prim)
             points += len(curves.get("points", ())) * max(len(_times(prim)), 1)
             if points > MAX_POINTS:
                 raise _TooMuchError(f"it has more than {MAX_POINTS:,} points in all frames")
@@ -101,10 +101,10 @@ def read_curves(path: str) -> Arrays:
             others[str(prim.GetTypeName())] += 1
     found["others"] = np.array(sorted(others), np.str_)
     found["other_counts"] = np.array([others[kind] for kind in sorted(others)], np.int64)
-    return found | packed(curves_prims)
+    return found | pack_prims(curves_prims)
 
 
-def packed(prims: list[Arrays]) -> Arrays:
+def pack_prims(prims: list[Arrays]) -> Arrays:
     """The arrays of many prims as a few, since each array in a file takes longer than a prim:
     arrays of one name, type and shape are joined, texts become one document. Empties the prims.
 
@@ -129,7 +129,7 @@ def packed(prims: list[Arrays]) -> Arrays:
     return found
 
 
-def unpacked(arrays: Arrays) -> list[Arrays]:
+def unpack_prims(arrays: Arrays) -> list[Arrays]:
     """The arrays of each prim again, by their names."""
     prims = [
         {name: np.array(text, np.str_) for name, text in each.items()}
@@ -147,7 +147,7 @@ def _as_json(content: object) -> NDArray[Any]:
     return np.frombuffer(json.dumps(content).encode(), np.uint8)
 
 
-def _of_stage(stage: Any) -> Arrays:
+def _read_stage(stage: Any) -> Arrays:
     from pxr import UsdGeom
 
     prim = stage.GetDefaultPrim()
@@ -166,7 +166,7 @@ def _of_stage(stage: Any) -> Arrays:
     }
 
 
-def _of_curves(prim: Any) -> Arrays:
+def _read_curves_prim(prim: Any) -> Arrays:
     from pxr import UsdGeom
 
     curves, primvars = UsdGeom.BasisCurves(prim), UsdGeom.PrimvarsAPI(prim)
@@ -256,7 +256,7 @@ def _array(value: Any) -> NDArray[Any] | None:
     return None
 
 
-def summary(error: BaseException) -> str:
+def error_summary(error: BaseException) -> str:
     """An error of the library in one line, without where in its code it was."""
     try:
         text = str(error)
@@ -267,7 +267,7 @@ def summary(error: BaseException) -> str:
     return last.rpartition("-- ")[2].strip("'. ")
 
 
-def _limit(*paths: str) -> None:
+def _limit_process(*paths: str) -> None:
     """Limit memory and time of this process by the size of these files; only on Linux, which tells
     how much memory it has.
 
@@ -281,18 +281,18 @@ def _limit(*paths: str) -> None:
     size = sum(os.path.getsize(path) for path in paths if os.path.isfile(path))
     pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[5])
     limits = {
-        resource.RLIMIT_CPU: _SECONDS + size // _BYTES_A_SECOND,
-        resource.RLIMIT_DATA: pages * resource.getpagesize() + _BESIDE + _MAX_TIMES * size,
+        resource.RLIMIT_CPU: _MIN_SECONDS + size // _BYTES_PER_SECOND,
+        resource.RLIMIT_DATA: pages * resource.getpagesize() + _BASE_MEMORY + _MEMORY_FACTOR * size,
     }
     for limit, value in limits.items():
-        _, most = resource.getrlimit(limit)
-        resource.setrlimit(limit, (value, most))
+        _, hard_limit = resource.getrlimit(limit)
+        resource.setrlimit(limit, (value, hard_limit))
 
 
 def _main(path: str, result: str) -> int:
     from pxr import Tf
 
-    _limit(path)
+    _limit_process(path)
     try:
         found = read_curves(path)
         with open(result, "wb") as file:
@@ -300,7 +300,7 @@ def _main(path: str, result: str) -> int:
     except OSError:
         return EXIT_NO_SPACE
     except (Tf.ErrorException, _TooMuchError, RuntimeError, ValueError, MemoryError) as error:
-        print(ascii(summary(error)), file=sys.stderr)
+        print(ascii(error_summary(error)), file=sys.stderr)
         return EXIT_REPORTED
     return 0
 

@@ -18,7 +18,7 @@ from hairloom.addon.exchange.textures import texture_files
 from hairloom.addon.exchange.textures.card_textures import FORMATS, write_card_textures
 from hairloom.addon.exchange.textures.mip_maps import level_sizes
 from hairloom.addon.exchange.textures.texture_files import read_texture
-from hairloom.addon.exchange.textures.texture_packing import MEANINGS, PRESETS, packed
+from hairloom.addon.exchange.textures.texture_packing import MAP_MEANINGS, PRESETS, pack_textures
 
 oiio = pytest.importorskip("OpenImageIO", reason="textures are read and written through it")
 needs_compressor = pytest.mark.skipif(find_spec("etcpak") is None, reason="there is no etcpak")
@@ -38,7 +38,7 @@ def smooth_maps() -> dict[str, np.ndarray]:
     """Maps that all vary differently and continue where alpha is 0, as in a bake."""
     x, y = np.linspace(0, 1, SIZE[1]), np.linspace(0, 1, SIZE[0])[:, None]
     maps = {}
-    for index, name in enumerate(MEANINGS):
+    for index, name in enumerate(MAP_MEANINGS):
         waves = [0.5 + 0.4 * np.sin(2 * x + (1 + k) * y + index + k) for k in range(3)]
         maps[name] = np.stack(waves if name in THREE else waves[:1], axis=-1).astype(np.float32)
         maps[name] = maps[name] if name in THREE else maps[name][..., 0]
@@ -53,7 +53,7 @@ def test_files_hold_what_was_packed(preset: str, file_format: str, tmp_path: Pat
     written = write_card_textures(
         tmp_path / "Ünder.lock v1.2", maps, preset, file_format=file_format, grid=AtlasGrid(2, 1)
     )
-    wanted = packed(maps, preset)
+    wanted = pack_textures(maps, preset)
     names = [f"Ünder.lock v1.2{each.suffix}{FORMATS[file_format]}" for each in wanted]
     assert [each.path.name for each in written] == names
     assert sorted(os.listdir(tmp_path)) == sorted(names)

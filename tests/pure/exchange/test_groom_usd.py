@@ -110,7 +110,7 @@ def _primvars(prim: Any) -> list[Any]:
 def test_a_strand_of_a_metre_is_where_it_belongs(tmp_path: Path, layout: Any) -> None:
     """In the stage's own unit and axis: from (1, 2, 3) a metre up."""
     strand = StrandSet([[1, 2, 3], [1, 2, 3.5], [1, 2, 4]], [0, 3], [0.0005] * 3, [0])
-    space, scale = layout.space, 1.0 / layout.space.per_metre
+    space, scale = layout.space, 1.0 / layout.space.units_per_metre
     write_usd(tmp_path / "a.usda", Groom(strand), up=space.up, scale=scale)
     stage = stage_of(tmp_path / "a.usda")
     curves = only_curves(stage)
@@ -213,7 +213,7 @@ def test_long_motion_goes_to_the_file_as_it_comes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A file that is saved after each frame equals one that is saved once."""
-    monkeypatch.setattr("hairloom.addon.exchange.usd.groom_usd._WAITING", 0)
+    monkeypatch.setattr("hairloom.addon.exchange.usd.groom_usd._MAX_UNSAVED_BYTES", 0)
     groom, path, sizes = full_groom(), tmp_path / "a.usdc", []
 
     def frames() -> Iterator[np.ndarray]:

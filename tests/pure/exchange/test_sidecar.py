@@ -17,9 +17,9 @@ from hairloom.addon.exchange.cards.card_formats import FBX, FORMATS, GLB, USD
 from hairloom.addon.exchange.cards.index_buffer import index_buffer
 from hairloom.addon.exchange.cards.sidecar import (
     CardFile,
-    description,
-    files_of_earlier,
-    other_owner,
+    conflicting_owner,
+    files_of_earlier_export,
+    sidecar_content,
     sidecar_text,
 )
 
@@ -62,7 +62,7 @@ def test_the_schema_is_one_and_can_refuse() -> None:
     jsonschema.Draft202012Validator.check_schema(SCHEMA)
     for damage in ({"format": "stl"}, {"hairloom_sidecar": 1}, {"unknown": 1}, {"levels": []}):
         with pytest.raises(jsonschema.ValidationError):
-            jsonschema.validate(description(card_file()) | damage, SCHEMA)
+            jsonschema.validate(sidecar_content(card_file()) | damage, SCHEMA)
 
 
 def test_it_tells_what_the_mesh_is() -> None:
@@ -198,7 +198,7 @@ def test_a_sidecar_that_is_nested_deeply_is_read_or_none_of_ours(tmp_path: Path)
             '{"hairloom_sidecar": 1, "file": "hair.glb", "x": ' + "[" * depth + "]" * depth + "}"
         )
         (tmp_path / "hair.hairloom.json").write_text(nested)
-        assert files_of_earlier(tmp_path / "hair.glb") in found
+        assert files_of_earlier_export(tmp_path / "hair.glb") in found
 
 
 def test_lists_of_numbers_stand_in_one_line() -> None:
@@ -209,10 +209,14 @@ def test_lists_of_numbers_stand_in_one_line() -> None:
 
 def test_a_sidecar_of_another_mesh_that_is_there_is_known(tmp_path: Path) -> None:
     (tmp_path / "hair.v1.hairloom.json").write_text(sidecar_text(card_file()))
-    assert other_owner(tmp_path / "hair.v1.fbx") == ""  # the mesh is gone
+    assert conflicting_owner(tmp_path / "hair.v1.fbx") == ""  # the mesh is gone
     (tmp_path / "hair.v1.glb").touch()
-    assert other_owner(tmp_path / "hair.v1.fbx") == "hair.v1.glb"
-    assert other_owner(tmp_path / "hair.v1.glb") == other_owner(tmp_path / "brows.glb") == ""
+    assert conflicting_owner(tmp_path / "hair.v1.fbx") == "hair.v1.glb"
+    assert (
+        conflicting_owner(tmp_path / "hair.v1.glb")
+        == conflicting_owner(tmp_path / "brows.glb")
+        == ""
+    )
 
 
 def test_names_in_the_sidecar_keep_their_spaces() -> None:

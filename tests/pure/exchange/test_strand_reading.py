@@ -15,7 +15,7 @@ from hairloom.addon.exchange.alembic.groom_alembic import write_groom_alembic
 from hairloom.addon.exchange.groom import Groom, GroomMotion, ReadMotion
 from hairloom.addon.exchange.groom_presets import BLENDER, UNITY, UNREAL
 from hairloom.addon.exchange.hair_file import write_hair_file
-from hairloom.addon.exchange.read_motion import sound_motion
+from hairloom.addon.exchange.read_motion import valid_motion
 from hairloom.addon.exchange.strand_formats import SUFFIXES
 from hairloom.addon.exchange.strand_reading import read_strands
 from hairloom.addon.exchange.tressfx import write_tfx
@@ -90,7 +90,9 @@ def test_axes_and_scale_of_every_format_can_be_told(
 
 @pytest.mark.parametrize("preset", [UNREAL, UNITY, BLENDER], ids=lambda preset: preset.name)
 def test_our_alembic_files_say_their_own_space(tmp_path: Path, preset: Any) -> None:
-    write_groom_alembic(tmp_path / "a.abc", groom(), replace(preset, parts="both", is_split=False))
+    write_groom_alembic(
+        tmp_path / "a.abc", groom(), replace(preset, parts="both", splits_groups=False)
+    )
     read = read_strands(tmp_path / "a.abc", parts="both")
     np.testing.assert_allclose(read.strands.points, groom().strands.points, atol=1e-7)
     assert read.notes == ()
@@ -132,7 +134,7 @@ def test_several_grooms_in_a_file_become_one_and_that_is_told(tmp_path: Path) ->
     assert dict(read.groom.group_names) == {0: "front", 1: "back"}
     assert "two.usda: its 2 prims of curves were joined into one groom." in read.notes
     write_groom_alembic(
-        tmp_path / "two.abc", groom_of_groups(), replace(BLENDER, is_split=True, parts="both")
+        tmp_path / "two.abc", groom_of_groups(), replace(BLENDER, splits_groups=True, parts="both")
     )
     read = read_strands(tmp_path / "two.abc")
     assert read.strands.group.tolist() == [0, 0, 1, 1, 1]
@@ -301,7 +303,7 @@ def test_frames_beyond_the_most_that_are_read_are_counted() -> None:
 
 def test_times_that_no_scene_has_end_the_motion() -> None:
     positions = np.zeros((3, 2, 3), np.float32)
-    motion, note = sound_motion(np.array([0.0, 1.0, 1e300]), positions)
+    motion, note = valid_motion(np.array([0.0, 1.0, 1e300]), positions)
     assert motion is not None and motion.times.tolist() == [0.0, 1.0]
     assert "at 1e+300 s it has a time outside the range of a scene" in note
-    assert sound_motion(np.array([1e300, 1.5e300, 2e300]), positions)[0] is None
+    assert valid_motion(np.array([1e300, 1.5e300, 2e300]), positions)[0] is None

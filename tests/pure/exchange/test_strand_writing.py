@@ -14,7 +14,7 @@ from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.alembic.groom_alembic_read import read_groom_alembic
 from hairloom.addon.exchange.groom import Groom, GroomMotion, with_guide_copies
 from hairloom.addon.exchange.hair_file import read_hair_file
-from hairloom.addon.exchange.joined_grooms import joined_bones, joined_grooms
+from hairloom.addon.exchange.join_grooms import join_bones, join_grooms
 from hairloom.addon.exchange.strand_check import check_lines, check_strands
 from hairloom.addon.exchange.strand_export_settings import StrandExportSettings
 from hairloom.addon.exchange.strand_formats import ALEMBIC, HAIR, TRESSFX, USD
@@ -221,14 +221,14 @@ def test_what_is_cut_is_told(tmp_path: Path) -> None:
 
 
 def test_closest_guides_that_not_all_grooms_have_are_lost_with_a_note() -> None:
-    both, notes = joined_grooms([guided(), replace(groom(), name="brows")], "all")
+    both, notes = join_grooms([guided(), replace(groom(), name="brows")], "all")
     assert both.closest_guides is None and both.guide_weights is None
     assert len(notes) == 1 and "brows: no closest guides" in notes[0]
 
 
 def test_joined_grooms_keep_their_groups_guides_and_ids_apart() -> None:
     one, other = guided(), replace(guided(), name="brows", group_names={})
-    both, notes = joined_grooms([one, other], "all")
+    both, notes = join_grooms([one, other], "all")
     assert notes == () and both.strands.strand_count == 24
     assert dict(both.group_names) == {0: "hair crown", 1: "hair 4", 2: "brows 1", 3: "brows 4"}
     assert np.unique(both.strands.group).tolist() == [0, 1, 2, 3]
@@ -246,17 +246,17 @@ def test_joined_grooms_keep_their_groups_guides_and_ids_apart() -> None:
 def test_joined_grooms_lose_what_one_of_them_lacks_and_say_so() -> None:
     bald, painted = groom("bald", has_uv=False), guided()
     painted = replace(painted, strands=replace(painted.strands, color=np.ones((60, 3))))
-    both, notes = joined_grooms([painted, bald], "all")
+    both, notes = join_grooms([painted, bald], "all")
     assert both.strands.root_uv is None and both.color is None and both.closest_guides is None
     assert both.is_guide is not None and both.is_guide.sum() == 2
     assert "bald: no root UVs" in notes[0] and "bald: no colours" in notes[1]
-    assert joined_grooms([bald], "all") == (bald, ())
+    assert join_grooms([bald], "all") == (bald, ())
 
 
 def test_joined_bones_are_one_by_name() -> None:
     one = strongest_bones(("spine", "head"), np.array([[0.0, 1.0], [0.5, 0.5]]))
     other = strongest_bones(("head", "jaw"), np.array([[1.0, 0.0], [0.0, 1.0]]))
-    both = joined_bones([one, other])
+    both = join_bones([one, other])
     assert both.names == ("spine", "head", "jaw")
     assert [both.names[i] for i in both.bone[:, 0]] == ["head", "spine", "head", "jaw"]
     np.testing.assert_allclose(both.weight.sum(axis=1), 1.0)

@@ -10,7 +10,12 @@ import pytest
 
 from hairloom.addon.cards.atlas_maps import MAPS
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.exchange.textures.texture_packing import MEANINGS, PRESETS, layouts, packed
+from hairloom.addon.exchange.textures.texture_packing import (
+    MAP_MEANINGS,
+    PRESETS,
+    pack_textures,
+    texture_layouts,
+)
 
 COLORS = ("color", "base")
 THREE = ("color", "base", "normal", "tangent")
@@ -18,12 +23,12 @@ THREE = ("color", "base", "normal", "tangent")
 
 def random_maps() -> dict[str, np.ndarray]:
     random = np.random.default_rng(8)
-    shapes = {name: (5, 7, 3) if name in THREE else (5, 7) for name in MEANINGS}
+    shapes = {name: (5, 7, 3) if name in THREE else (5, 7) for name in MAP_MEANINGS}
     return {name: random.random(shape).astype(np.float32) for name, shape in shapes.items()}
 
 
 def channel(preset: str, suffix: str, letter: str, maps: dict[str, np.ndarray]) -> np.ndarray:
-    (texture,) = [each for each in packed(maps, preset) if each.suffix == suffix]
+    (texture,) = [each for each in pack_textures(maps, preset) if each.suffix == suffix]
     return texture.pixels[..., "rgba".index(letter)]
 
 
@@ -31,7 +36,7 @@ def channel(preset: str, suffix: str, letter: str, maps: dict[str, np.ndarray]) 
 def test_unpacking_by_the_roles_gives_the_maps_back(preset: str) -> None:
     """Using only the words of the sidecar."""
     maps, found = random_maps(), {}
-    for texture in packed(maps, preset):
+    for texture in pack_textures(maps, preset):
         assert texture.pixels.shape == (5, 7, len(texture.roles))
         assert texture.pixels.dtype == np.float32
         for index, role in enumerate(texture.roles.values()):
@@ -136,26 +141,26 @@ def test_colours_are_srgb_and_nothing_else_is(preset: str) -> None:
 @pytest.mark.parametrize("preset", PRESETS)
 def test_every_preset_has_what_a_card_needs(preset: str) -> None:
     held = set().union(*(layout.sources for layout in PRESETS[preset]))
-    assert {"alpha", "color", "base", "tangent"} <= held <= set(MEANINGS)
+    assert {"alpha", "color", "base", "tangent"} <= held <= set(MAP_MEANINGS)
     suffixes = [layout.suffix for layout in PRESETS[preset]]
     assert len({suffix.lower() for suffix in suffixes}) == len(suffixes)
 
 
 def test_all_maps_of_an_atlas_can_be_packed() -> None:
-    assert set(MAPS) <= set(MEANINGS)
+    assert set(MAPS) <= set(MAP_MEANINGS)
     held = set().union(*(layout.sources for layout in PRESETS["hairloom"]))
-    assert held == set(MEANINGS) - {"roughness"}
+    assert held == set(MAP_MEANINGS) - {"roughness"}
 
 
 def test_missing_maps_are_taken_as_nothing_out_of_the_ordinary() -> None:
     maps = {name: values for name, values in random_maps().items() if name in ("alpha", "color")}
-    assert [each.suffix for each in layouts("unreal", maps)] == ["_Coverage", "_Material"]
-    (tangent,) = layouts("unreal_compact", maps | {"along": maps["alpha"]})[:1]
-    np.testing.assert_allclose(tangent.packed(maps)[0, 0], [0.5, 0.0, 0.5, 0.0])  # down is tipwards
+    assert [each.suffix for each in texture_layouts("unreal", maps)] == ["_Coverage", "_Material"]
+    (tangent,) = texture_layouts("unreal_compact", maps | {"along": maps["alpha"]})[:1]
+    np.testing.assert_allclose(tangent.pack(maps)[0, 0], [0.5, 0.0, 0.5, 0.0])  # down is tipwards
     (orm,) = [each for each in PRESETS["gltf"] if each.suffix == "_occlusionRoughnessMetallic"]
-    np.testing.assert_allclose(orm.packed(maps)[0, 0], [1.0, 0.4, 0.0])
+    np.testing.assert_allclose(orm.pack(maps)[0, 0], [1.0, 0.4, 0.0])
     (normal,) = [each for each in PRESETS["gltf"] if each.suffix == "_normal"]
-    np.testing.assert_allclose(normal.packed(maps)[0, 0], [0.5, 0.5, 1.0])
+    np.testing.assert_allclose(normal.pack(maps)[0, 0], [0.5, 0.5, 1.0])
 
 
 def test_what_cannot_be_packed_is_named() -> None:
@@ -167,9 +172,9 @@ def test_what_cannot_be_packed_is_named() -> None:
         ({"alpha": maps["alpha"], "depth": maps["depth"][1:]}, "'depth'"),
     ):
         with pytest.raises(HairloomError, match=problem):
-            packed(wrong, "gltf")
+            pack_textures(wrong, "gltf")
     with pytest.raises(HairloomError, match=r"'cryengine'.*hairloom, gltf, unreal"):
-        packed(maps, "cryengine")
+        pack_textures(maps, "cryengine")
 
 
 def test_the_documentation_has_the_same_tables() -> None:

@@ -186,7 +186,7 @@ def test_round_trip_is_exact(tmp_path: Path, up: str) -> None:
     for name in ("points", "offsets", "radius"):
         np.testing.assert_array_equal(getattr(groom.strands, name), getattr(strands, name))
     np.testing.assert_allclose(groom.strands.root_uv, strands.root_uv, atol=1e-7)
-    written = TressfxFile(path).of_strands("strand_uv", 2)
+    written = TressfxFile(path).strand_values("strand_uv", 2)
     assert strands.root_uv is not None and written is not None
     np.testing.assert_allclose(written, from_top(strands.root_uv), atol=1e-7)
 

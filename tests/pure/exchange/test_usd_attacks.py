@@ -14,7 +14,7 @@ pytest.importorskip("pxr", reason="it is missing: `make setup` installs it")
 
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.usd.groom_usd_read import read_usd
-from hairloom.addon.exchange.usd.usd_reader import Arrays, packed, unpacked
+from hairloom.addon.exchange.usd.usd_reader import Arrays, pack_prims, unpack_prims
 
 CURVE = (
     'def BasisCurves "Hair" {\n int[] curveVertexCounts = [64]\n uniform token type = "linear"\n'
@@ -111,7 +111,7 @@ def test_what_is_packed_comes_back() -> None:
         for n in range(6)
     ]
     given = [dict(prim) for prim in prims]
-    found = unpacked(packed(prims))
+    found = unpack_prims(pack_prims(prims))
     for mine, theirs in zip(found, given, strict=True):
         assert mine.keys() == theirs.keys()
         for name, array in theirs.items():
@@ -123,4 +123,4 @@ def test_many_prims_are_a_few_arrays() -> None:
     """An array in a file costs more than reading a prim: with arrays for each, 20,000 prims took
     9 s."""
     prims = [{"points": np.zeros((2, 3)), "name": np.array("a")} for _ in range(1000)]
-    assert len(packed(prims)) < 10
+    assert len(pack_prims(prims)) < 10

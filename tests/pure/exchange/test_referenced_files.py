@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from hairloom.addon.exchange.named_files import named_files
+from hairloom.addon.exchange.referenced_files import referenced_files
 
 
 def made(folder: Path, *names: str) -> list[Path]:
@@ -22,9 +22,9 @@ def test_buffers_and_pictures_of_gltf(tmp_path: Path) -> None:
     uris = ["my%20head.bin", "gone.bin", "data:application/octet-stream;base64,AAAA"]
     content = {"buffers": [{"uri": uri} for uri in uris], "images": [{"uri": "pics/skin.png"}, {}]}
     (tmp_path / "head.gltf").write_text(json.dumps(content))
-    assert named_files(tmp_path / "head.gltf") == files
+    assert referenced_files(tmp_path / "head.gltf") == files
     (tmp_path / "head.gltf").write_text("[1")
-    assert named_files(tmp_path / "head.gltf") == []
+    assert referenced_files(tmp_path / "head.gltf") == []
 
 
 def test_materials_and_pictures_of_obj(tmp_path: Path) -> None:
@@ -33,7 +33,9 @@ def test_materials_and_pictures_of_obj(tmp_path: Path) -> None:
     (tmp_path / "head.obj").write_text(obj)
     (tmp_path / "my skin.mtl").write_text("newmtl a\n map_Kd -s 1 1 1 pics/my face.png\n")
     (tmp_path / "eyes.mtl").write_text("map_Bump iris.png\nmap_d gone.png\n")
-    found = {file.relative_to(tmp_path).as_posix() for file in named_files(tmp_path / "head.obj")}
+    found = {
+        file.relative_to(tmp_path).as_posix() for file in referenced_files(tmp_path / "head.obj")
+    }
     assert found == {"my skin.mtl", "eyes.mtl", "teeth.mtl", "pics/my face.png", "iris.png"}
 
 
@@ -46,9 +48,9 @@ def test_layers_and_pictures_of_usd(tmp_path: Path) -> None:
     (tmp_path / "all.usda").write_text(
         '#usda 1.0\ndef Xform "all" (\n    references = @./hair.usda@</hair>\n)\n{\n}\n'
     )
-    found = {file.name for file in named_files(tmp_path / "all.usda")}
+    found = {file.name for file in referenced_files(tmp_path / "all.usda")}
     assert found == {"hair.usda", "skin.png"}
 
 
 def test_other_files_name_none(tmp_path: Path) -> None:
-    assert named_files(*made(tmp_path, "hair.tfx")) == []
+    assert referenced_files(*made(tmp_path, "hair.tfx")) == []

@@ -21,23 +21,26 @@ _MATERIALS, _PICTURE = (
 )
 
 
-def named_files(path: Path) -> list[Path]:
+def referenced_files(path: Path) -> list[Path]:
     """The existing files that a readable file refers to: buffers and pictures of a .gltf, materials
     of an .obj and their pictures, and layers and pictures of USD."""
     suffix = path.suffix.lower()
     if suffix == ".gltf":
-        found = _of_gltf(path)
+        found = _files_of_gltf(path)
     elif suffix == ".obj":
-        materials = list(_of_lines(path, _MATERIALS))
-        found = [*materials, *(each for file in materials for each in _of_lines(file, _PICTURE))]
+        materials = list(_files_of_lines(path, _MATERIALS))
+        found = [
+            *materials,
+            *(each for file in materials for each in _files_of_lines(file, _PICTURE)),
+        ]
     elif suffix in USD_SUFFIXES:
-        found = _of_usd(path)
+        found = _files_of_usd(path)
     else:
         found = []
     return list(dict.fromkeys(each for each in found if os.path.isfile(each)))
 
 
-def _of_gltf(path: Path) -> list[Path]:
+def _files_of_gltf(path: Path) -> list[Path]:
     try:
         content: Any = json.loads(path.read_bytes())
         entries = [*content.get("buffers", ()), *content.get("images", ())]
@@ -47,7 +50,7 @@ def _of_gltf(path: Path) -> list[Path]:
     return [path.parent / unquote(uri) for uri in uris if not uri.startswith("data:")]
 
 
-def _of_lines(path: Path, line: re.Pattern[bytes]) -> Iterator[Path]:
+def _files_of_lines(path: Path, line: re.Pattern[bytes]) -> Iterator[Path]:
     """All existing files that lines may name: names may have spaces, and follow options or other
     names."""
     for found in line.finditer(path.read_bytes()):
@@ -57,7 +60,7 @@ def _of_lines(path: Path, line: re.Pattern[bytes]) -> Iterator[Path]:
         yield from filter(os.path.isfile, files)
 
 
-def _of_usd(path: Path) -> list[Path]:
+def _files_of_usd(path: Path) -> list[Path]:
     try:
         usd_library(path)
     except HairloomError:  # then it cannot have been read
