@@ -82,8 +82,8 @@ def edited(build: Any) -> Any:
     other side outer ones are deleted."""
     edits, mesh = of_addon("cards.edits"), build.finest
     surface = of_addon("strands").Surface(mesh.positions, mesh.triangles, mesh.uv[mesh.triangles])
-    record = replace(build.made, marks=edits.prints(surface, mesh.card))
-    root, tip = build.made.places[:, 0], build.made.places[:, 3]
+    record = replace(build.record, prints=edits.piece_prints(surface, mesh.card))
+    root, tip = build.record.places[:, 0], build.record.places[:, 3]
     is_long = tip[:, 2] < np.quantile(tip[:, 2], 0.6)
     is_right = root[:, 0] > np.median(root[:, 0])
     is_flicked, is_deleted = is_long & is_right, is_long & ~is_right & (mesh.layer > 0)
@@ -103,7 +103,7 @@ def edited(build: Any) -> Any:
         triangles=mesh.triangles[left],
         corner_uv=mesh.uv[mesh.triangles[left]],
     )
-    return edits.edits_of(surface, mesh.card[left], record, np.eye(4))
+    return edits.find_edits(surface, mesh.card[left], record, np.eye(4))
 
 
 def main(folder: Path) -> None:
@@ -120,21 +120,25 @@ def main(folder: Path) -> None:
         "card_ways.png",
         [
             shots.strands(),
-            shots.cards(guides.finest, along, guides.backs[0]),
-            shots.cards(build.finest, baked, build.backs[0]),
+            shots.cards(guides.finest, along, guides.back_triangles[0]),
+            shots.cards(build.finest, baked, build.back_triangles[0]),
         ],
     )
     layers = np.unique(build.finest.layer)
     sheet("card_layers.png", [shots.cards(of_layer(build.finest, n), baked) for n in layers])
     sheet(
-        "card_levels.png", [shots.cards(build.levels[n], baked, build.backs[n]) for n in (0, 2, 4)]
+        "card_levels.png",
+        [shots.cards(build.levels[n], baked, build.back_triangles[n]) for n in (0, 2, 4)],
     )
     by_hand = edited(build)
-    print(by_hand.counts.line)
+    print(by_hand.counts.report_line)
     again = [shots.built("clusters", count=count, edits=by_hand) for count in (CARDS, 400)]
     sheet(
         "card_edits.png",
-        [shots.cards(one.finest, drawn, one.backs[0]) for one, drawn in [(build, baked), *again]],
+        [
+            shots.cards(one.finest, drawn, one.back_triangles[0])
+            for one, drawn in [(build, baked), *again]
+        ],
     )
     for mesh, error in zip(build.levels, build.errors, strict=True):
         triangles, millimetres = len(mesh.triangles), error * 1000.0

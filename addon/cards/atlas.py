@@ -17,7 +17,7 @@ from ..errors import HairloomError
 from ..strands.face import is_face_hair
 from .atlas_grid import AtlasGrid
 from .atlas_settings import SIZES, AtlasSettings
-from .clusters import shared_out
+from .clusters import proportional_parts
 from .strip import CardFrames, Strips
 
 #: Minimum number of tiles that cards of brows, and of lashes, share: with one or two, the
@@ -237,7 +237,7 @@ def _shared_tiles(
 ) -> tuple[Ints, Ints]:
     """The tile of each card, (card_count,), and the card that each tile shows, (used tiles,)."""
     sizes = np.bincount(kind)
-    parts = shared_out(min(tile_count, len(kind)), sizes)
+    parts = proportional_parts(min(tile_count, len(kind)), sizes)
     faces = np.bincount(kind, is_face) > 0.0
     parts = np.maximum(parts, np.where(faces, np.minimum(_FACE_TILES, sizes), 1))
     while parts.sum() > tile_count:  # each kind keeps at least one

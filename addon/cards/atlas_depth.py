@@ -13,7 +13,7 @@ from ..arrays import Floats
 from .atlas import AtlasPlan
 from .atlas_maps import AtlasMaps, tile_edges
 from .bake_strands import FlatStrands
-from .taken_over import EXTENT
+from .strand_shading import EXTENT_OVER_DEVIATION
 
 #: Nodes across and along a tile, between which the mean and the extent of depths are interpolated.
 _ACROSS, _ALONG = 5, 17
@@ -79,6 +79,6 @@ def _spread(flat: FlatStrands, plan: AtlasPlan) -> tuple[Floats, Floats]:
     whole = by_node.sum(axis=2, keepdims=True)
     by_node = by_node + _PRIOR * whole / np.maximum(whole[:1], 1.0)
     mean, square = by_node[1:] / np.maximum(by_node[0], 1.0e-30)
-    extent = EXTENT * np.sqrt(np.maximum(square - mean**2, 0.0))
+    extent = EXTENT_OVER_DEVIATION * np.sqrt(np.maximum(square - mean**2, 0.0))
     shape = (tiles, _ALONG, _ACROSS)
     return mean.reshape(shape), extent.reshape(shape)

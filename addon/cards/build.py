@@ -11,14 +11,14 @@ import numpy as np
 from ..arrays import Floats, Ints, piece_starts
 from ..strands import StrandSet, Surface
 from ..strands.face import is_face_hair
+from .applied_edits import AppliedEdits, apply_edits
 from .atlas import AtlasPlan, plan_atlas
 from .atlas_grid import AtlasGrid
 from .atlas_settings import AtlasSettings
 from .card_mesh import CardMesh
 from .clusters import cluster_of_guides
-from .edits import CardEdits, EditCounts, MadeCards
+from .edits import CardEdits, CardRecord, EditCounts
 from .fit import cluster_of_strands, fit_strips
-from .kept_cards import KeptCards, kept_cards
 from .layers import card_layers
 from .levels import card_levels
 from .occlusion import CardOccluder, occlusion_steps
@@ -31,8 +31,8 @@ from .shells import are_wanted, build_shells
 from .short_hair import fitted_to_length
 from .sort import VIEW_COUNT, CardOrders, SortBy, card_of_vertex, in_order, order_steps
 from .steps import map_progress
+from .strand_shading import shading_from_strands
 from .strip import Strips, UncutCards, guide_strips, scattered_tiles, strip_mesh
-from .taken_over import taken_over
 
 #: Number of views from which coarser levels are sorted.
 _COARSER_VIEWS = 16
@@ -56,7 +56,8 @@ class CardGroom:
     head: in the space of the strands, or None.
     occlusion: (strand_count, cv_count) ambient occlusion of the strands, which their cards take
         over; None: rays find that of the cards.
-    light: (strand_count, cv_count, k) of the strands, see `taken_over.taken_over`, or None.
+    light: (strand_count, cv_count, k) of the strands, see `strand_shading.shading_from_strands`, or
+        None.
     """
 
     strands: StrandSet
@@ -75,7 +76,8 @@ class CardBuild:
 
     levels: finest first; all show the same atlas, and a card has the same number in each. Triangles
         are in the order in which front faces are drawn.
-    backs: the triangles of each level once more, in the order in which back faces are drawn.
+    back_triangles: the triangles of each level once more, in the order in which back faces are
+        drawn.
     errors: of each level [m], see `levels.CardLevel`: its distance from the cards at full
         resolution.
     plan: what is baked into the atlas; None: its tiles are procedural.
@@ -84,14 +86,14 @@ class CardBuild:
         `order_check.wrong_fraction`.
     order_notes: remedies where that is much.
     shape_notes: where cards differ from the settings.
-    light, depth: of each vertex of the finest level, see `taken_over.TakenOver`; None where those
-        of the strands are unknown.
-    made: the record of the cards, world space; None for shells.
+    light, depth: of each vertex of the finest level, see `strand_shading.StrandShading`; None where
+        those of the strands are unknown.
+    record: the record of the cards, world space; None for shells.
     edits: how many cards are as the artist left them; edit_notes: doubts about these.
     """
 
     levels: tuple[CardMesh, ...]
-    backs: tuple[Ints, ...]
+    back_triangles: tuple[Ints, ...]
     errors: tuple[float, ...]
     plan: AtlasPlan | ShellPlan | None
     shell_layers: int = 0
@@ -100,7 +102,7 @@ class CardBuild:
     shape_notes: tuple[str, ...] = ()
     light: Floats | None = None
     depth: Floats | None = None
-    made: MadeCards | None = None
+    record: CardRecord | None = None
     edits: EditCounts = field(default_factory=EditCounts)
     edit_notes: tuple[str, ...] = ()
 
@@ -144,29 +146,29 @@ def card_steps(
     settings, atlas, shape_notes = fitted_to_length(settings, atlas, groom.strands)
     card = card_of_strand(groom, settings)
     cards, plan = uncut_cards(groom, settings, atlas, card)
-    usual = float(np.median(cards.strips.width[:, 0])) if len(cards) else 0.0
-    kept = kept_cards(edits, cards, settings, groom.head, plan is not None) if edits else None
-    made = MadeCards.of(cards.strips, cards.tile, cards.atlas, groom.head)
-    if kept is not None:
-        cards, made = kept.cards, kept.record
+    median_width = float(np.median(cards.strips.width[:, 0])) if len(cards) else 0.0
+    applied = apply_edits(edits, cards, settings, groom.head, plan is not None) if edits else None
+    record = CardRecord.of(cards.strips, cards.tile, cards.atlas, groom.head)
+    if applied is not None:
+        cards, record = applied.cards, applied.record
     yield "Levels of detail"
     error = None
     if settings.source == "clusters":
         error = settings.error * float(np.median(groom.strands.lengths()))
-    levels = card_levels(cards, settings, error, None if kept is None else kept.numbers)
-    made = made.joined(levels[0].owner)
+    levels = card_levels(cards, settings, error, None if applied is None else applied.kept_numbers)
+    record = record.with_joined_cards(levels[0].owner)
     meshes, errors = zip(*((level.mesh, level.error) for level in levels), strict=True)
-    meshes = tuple(on_skin(mesh, groom.head, usual) for mesh in meshes)
-    meshes = tuple(above_skin(mesh, groom.head, usual) for mesh in meshes)
-    if kept is not None:
-        meshes = (kept.put_into(meshes[0]), *meshes[1:])
+    meshes = tuple(on_skin(mesh, groom.head, median_width) for mesh in meshes)
+    meshes = tuple(above_skin(mesh, groom.head, median_width) for mesh in meshes)
+    if applied is not None:
+        meshes = (applied.with_kept_mesh(meshes[0]), *meshes[1:])
     unsorted = tuple(mesh.triangles for mesh in meshes)
-    build = CardBuild(meshes, unsorted, errors, plan, shape_notes=shape_notes, made=made)
-    if kept is not None:
-        build = replace(build, edits=kept.counts, edit_notes=kept.notes)
+    build = CardBuild(meshes, unsorted, errors, plan, shape_notes=shape_notes, record=record)
+    if applied is not None:
+        build = replace(build, edits=applied.counts, edit_notes=applied.notes)
     yield "Atlas"
     alpha = alpha_of(build)
-    shading = _light_steps(groom, card, build, alpha, others, occlusion, kept)
+    shading = _occlusion_steps(groom, card, build, alpha, others, occlusion, applied)
     build = yield from _reported("Ambient occlusion", shading)
     finest = build.finest
     shaded = (finest, *(with_occlusion_of(finest, level) for level in build.levels[1:]))
@@ -185,7 +187,7 @@ def card_steps(
     return replace(
         build,
         levels=tuple(in_order(mesh, each.front) for mesh, each in pairs),
-        backs=tuple(mesh.triangles[each.back] for mesh, each in pairs),
+        back_triangles=tuple(mesh.triangles[each.back] for mesh, each in pairs),
         wrong_fraction=wrong,
         order_notes=_order_notes(wrong, settings),
     )
@@ -216,7 +218,7 @@ def _shell_steps(
         own = 1.0 - occlusion.strength * (1.0 - level.mesh.occlusion)
         meshes.append(level.mesh.with_occlusion(own.astype(np.float32)))
     errors = tuple(level.error for level in made.levels)
-    build = CardBuild(tuple(meshes), made.backs, errors, made.plan, settings.shell_layers)
+    build = CardBuild(tuple(meshes), made.back_triangles, errors, made.plan, settings.shell_layers)
     yield "Atlas"
     alpha = alpha_of(build)
     if others:
@@ -249,14 +251,14 @@ def _order_notes(wrong: float, settings: CardSettings) -> tuple[str, ...]:
     return (f"{wrong:.0%} of the hair's pixels blend in the wrong order: {remedy}",)
 
 
-def _light_steps(
+def _occlusion_steps(
     groom: CardGroom,
     card: Ints,
     build: CardBuild,
     alpha: Floats | None,
     others: Sequence[CardOccluder],
     occlusion: CardOcclusionSettings,
-    kept: KeptCards | None,
+    applied: AppliedEdits | None,
 ) -> Generator[float, None, CardBuild]:
     """The build with the light that its finest level takes over from the strands, and their
     occlusion times that by other grooms, which rays find.
@@ -273,12 +275,14 @@ def _light_steps(
         found = yield from occlusion_steps(mesh, own, bodies, occlusion)
         return _with_finest(build, mesh.with_occlusion(found))
     # the artist's own cards use the strands of the nearest made card
-    on_strands = mesh if kept is None else replace(mesh, card=kept.model[mesh.card])
-    taken = taken_over(on_strands, groom.strands.grid, groom.occlusion, groom.light, card)
-    shown: Floats = (1.0 - occlusion.strength * (1.0 - taken.occlusion)).astype(np.float32)
+    on_strands = mesh if applied is None else replace(mesh, card=applied.model_card[mesh.card])
+    of_strands = shading_from_strands(
+        on_strands, groom.strands.grid, groom.occlusion, groom.light, card
+    )
+    shown: Floats = (1.0 - occlusion.strength * (1.0 - of_strands.occlusion)).astype(np.float32)
     if others:
         shown = shown * (yield from occlusion_steps(mesh, others, [], occlusion))
-    build = replace(build, light=taken.light, depth=taken.depth)
+    build = replace(build, light=of_strands.light, depth=of_strands.depth)
     return _with_finest(build, mesh.with_occlusion(shown))
 
 

@@ -13,11 +13,11 @@ from ..errors import HairloomError
 from .atlas_grid import AtlasGrid
 
 #: A vector shorter than this has no direction.
-_SMALLEST = 1.0e-12
+_MIN_LENGTH = 1.0e-12
 
 #: Attributes of each vertex, and of each card.
-OF_VERTICES = ("positions", "uv", "along", "normal", "tangent", "occlusion")
-OF_CARDS = ("group", "layer", "tile")
+VERTEX_FIELDS = ("positions", "uv", "along", "normal", "tangent", "occlusion")
+CARD_FIELDS = ("group", "layer", "tile")
 
 
 def _empty() -> Ints:
@@ -65,23 +65,23 @@ class CardMesh:
         for name, (dtype, shape) in _layout(vertex_count, triangle_count).items():
             value: Floats | Ints = np.ascontiguousarray(getattr(self, name), dtype)
             if value.shape != shape:
-                raise _broken(f"{name} has shape {value.shape} instead of {shape}")
+                raise _invalid_mesh(f"{name} has shape {value.shape} instead of {shape}")
             if not np.isfinite(value).all():
-                raise _broken(f"{name} holds a value that is not finite")
+                raise _invalid_mesh(f"{name} holds a value that is not finite")
             object.__setattr__(self, name, value)
         if triangle_count and not 0 <= self.triangles.min() <= self.triangles.max() < vertex_count:
-            raise _broken("a triangle refers to a vertex that does not exist")
+            raise _invalid_mesh("a triangle refers to a vertex that does not exist")
         self._check_cards()
 
     def _check_cards(self) -> None:
         """Check that attributes of cards exist for all of them; empty ones become 0."""
         needed = int(self.card.max()) + 1 if len(self.card) else 0
-        for name in OF_CARDS:
+        for name in CARD_FIELDS:
             value = np.ascontiguousarray(getattr(self, name), np.int32)
             if not len(value):
                 value = np.zeros(needed, np.int32)
             if value.ndim != 1 or len(value) < needed:
-                raise _broken(f"{name} has shape {value.shape} for {needed} cards")
+                raise _invalid_mesh(f"{name} has shape {value.shape} for {needed} cards")
             object.__setattr__(self, name, value)
 
     @property
@@ -91,7 +91,7 @@ class CardMesh:
         """
         across = np.cross(self.tangent, self.normal)
         length = np.linalg.norm(across, axis=1, keepdims=True)
-        across /= np.maximum(length, _SMALLEST)
+        across /= np.maximum(length, _MIN_LENGTH)
         return np.cross(self.normal, across), self.normal, across
 
     @property
@@ -104,10 +104,10 @@ class CardMesh:
             return np.zeros(3, np.float32), np.zeros(3, np.float32)
         return self.positions.min(axis=0), self.positions.max(axis=0)
 
-    def without_loose(self) -> CardMesh:
+    def without_loose_vertices(self) -> CardMesh:
         """The same mesh without vertices that no triangle uses."""
         used = np.unique(self.triangles)
-        vertices: dict[str, Any] = {name: getattr(self, name)[used] for name in OF_VERTICES}
+        vertices: dict[str, Any] = {name: getattr(self, name)[used] for name in VERTEX_FIELDS}
         triangles = np.searchsorted(used, self.triangles)
         return replace(self, triangles=triangles, **vertices)
 
@@ -116,7 +116,7 @@ class CardMesh:
         return replace(self, occlusion=occlusion)
 
 
-def joined(meshes: Sequence[CardMesh]) -> CardMesh:
+def join_meshes(meshes: Sequence[CardMesh]) -> CardMesh:
     """All triangles in one mesh, one mesh after the other; card numbers stay as they are.
 
     The attributes of cards, and the atlas, are those of the first mesh, and must hold for all
@@ -125,7 +125,7 @@ def joined(meshes: Sequence[CardMesh]) -> CardMesh:
     starts = np.cumsum([0, *(len(mesh.positions) for mesh in meshes[:-1])])
     triangles = [mesh.triangles + start for mesh, start in zip(meshes, starts, strict=True)]
     both: dict[str, Any] = {
-        name: np.concatenate([getattr(mesh, name) for mesh in meshes]) for name in OF_VERTICES
+        name: np.concatenate([getattr(mesh, name) for mesh in meshes]) for name in VERTEX_FIELDS
     }
     card = np.concatenate([mesh.card for mesh in meshes])
     return replace(meshes[0], triangles=np.concatenate(triangles), card=card, **both)
@@ -144,7 +144,7 @@ def _layout(vertex_count: int, triangle_count: int) -> dict[str, tuple[type, tup
     }
 
 
-def _broken(problem: str) -> HairloomError:
+def _invalid_mesh(problem: str) -> HairloomError:
     return HairloomError(
         problem, place="card mesh", remedy="Build the cards again from clean strands"
     )

@@ -66,7 +66,9 @@ def cluster_strands(
     first = 0
     face = np.minimum(-(-sizes // _FACE_STRANDS), _MAX_FACE_CARDS)
     least = np.where(is_face_hair(groups), face, 1)
-    for name, wanted in zip(groups, np.maximum(shared_out(count, sizes), least), strict=True):
+    for name, wanted in zip(
+        groups, np.maximum(proportional_parts(count, sizes), least), strict=True
+    ):
         own = np.flatnonzero(group == name)
         normal = None if root_normal is None or is_face_hair(name) else root_normal[own]
         for part, parts_wanted in _parts(grid[own], normal, int(wanted)):
@@ -137,7 +139,7 @@ def cluster_of_guides(grid: Floats, group: Ints, guides: Ints) -> Ints:
     return found.astype(np.int32)
 
 
-def shared_out(count: int, sizes: Ints) -> Ints:
+def proportional_parts(count: int, sizes: Ints) -> Ints:
     """`count` split by size, one at least and no more than the size, (n,): largest remainders."""
     fraction = count * sizes / max(int(sizes.sum()), 1)
     parts = np.floor(fraction).astype(np.int64)

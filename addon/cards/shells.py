@@ -49,11 +49,12 @@ _FRONT = 0.3
 
 @dataclass(frozen=True, eq=False)
 class Shells:
-    """levels: finest first, triangles from the inside to the outside, with occlusion. backs: for
-    each level the triangles for back faces, from the outside to the inside. plan: of the atlas."""
+    """levels: finest first, triangles from the inside to the outside, with occlusion.
+    back_triangles: for each level the triangles for back faces, from the outside to the inside.
+        plan: of the atlas."""
 
     levels: tuple[CardLevel, ...]
-    backs: tuple[Ints, ...]
+    back_triangles: tuple[Ints, ...]
     plan: ShellPlan
 
 

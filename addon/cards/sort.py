@@ -25,7 +25,7 @@ import numpy as np
 from ..arrays import Floats, Ints, piece_starts
 from ..strands import Surface
 from ..strands.closest_point import closest_point
-from .card_mesh import OF_CARDS, OF_VERTICES, CardMesh
+from .card_mesh import CARD_FIELDS, VERTEX_FIELDS, CardMesh
 from .order_pairs import Pairs, all_pairs, pairs_by_view
 from .order_search import Preferences, min_broken, net_preferences
 from .steps import result_of
@@ -234,8 +234,8 @@ def canonical(mesh: CardMesh) -> Canonical:
         mesh,
         triangles=corners[order],
         card=card[mesh.card[order]],
-        **{name: getattr(mesh, name)[vertices] for name in OF_VERTICES},
-        **{name: getattr(mesh, name)[cards] for name in OF_CARDS},
+        **{name: getattr(mesh, name)[vertices] for name in VERTEX_FIELDS},
+        **{name: getattr(mesh, name)[cards] for name in CARD_FIELDS},
     )
     return Canonical(numbered, order)
 
@@ -307,7 +307,7 @@ def reordered(mesh: CardMesh, key: Floats | Ints) -> CardMesh:
     vertices = np.argsort(key[owner], kind="stable")
     place = np.empty(len(vertices), np.int32)
     place[vertices] = np.arange(len(vertices), dtype=np.int32)
-    moved = {name: getattr(mesh, name)[vertices] for name in OF_VERTICES}
+    moved = {name: getattr(mesh, name)[vertices] for name in VERTEX_FIELDS}
     return replace(
         mesh, triangles=place[mesh.triangles[triangles]], card=mesh.card[triangles], **moved
     )

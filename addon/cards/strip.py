@@ -18,7 +18,7 @@ from ..strands import StrandSet
 from ..strands.frames import tangents, transported_normals, volume_normals
 from ..strands.resample import resample
 from .atlas_grid import AtlasGrid
-from .card_mesh import CardMesh, joined
+from .card_mesh import CardMesh, join_meshes
 from .settings import CardSettings
 from .sort import reordered
 
@@ -117,7 +117,7 @@ def strip_mesh(
     meshes = [
         _part_mesh(strips, numbers, cards, column_count, settings) for numbers, strips in parts
     ]
-    return reordered(joined(meshes), np.arange(len(cards)))
+    return reordered(join_meshes(meshes), np.arange(len(cards)))
 
 
 def scattered_tiles(card_count: int, atlas: AtlasGrid, seed: int) -> Ints:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Bools, Ints
-from .card_mesh import OF_VERTICES, CardMesh
+from .card_mesh import VERTEX_FIELDS, CardMesh
 from .sort import connected_components
 
 
@@ -36,7 +36,7 @@ def with_fans_apart(mesh: CardMesh, back: Ints) -> tuple[CardMesh, Ints]:
     fan = connected_components(number.reshape(-1, 2)[:, [0, 1, 1]]).astype(np.int64)
     vertex, corner = np.unique(own.ravel() * max(len(fan), 1) + fan, return_inverse=True)
     used = vertex // max(len(fan), 1)
-    vertices: dict[str, Any] = {name: getattr(mesh, name)[used] for name in OF_VERTICES}
+    vertices: dict[str, Any] = {name: getattr(mesh, name)[used] for name in VERTEX_FIELDS}
     split = replace(mesh, triangles=corner.reshape(-1, 3), **vertices)
     place = np.empty(len(back), np.int64)
     place[np.lexsort(back.T)] = np.lexsort(triangles.T)

@@ -9,7 +9,7 @@ import bpy
 
 from ..blender.base.outcome import Outcome, report
 from ..blender.cards.build import counts_line, order_line
-from ..blender.cards.edits import groom_edits
+from ..blender.cards.edits import read_edits
 from ..blender.cards.made_objects import card_objects
 from ..blender.cards.object import CardObjectJob
 from ..blender.preview.previews import made_rigs, previews
@@ -63,14 +63,14 @@ class HAIRLOOM_OT_discard_card_edits(LongWork, bpy.types.Operator):
     def invoke(self: Any, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         hair = chosen_hair(context)[0]
         try:
-            edits, _ = groom_edits(hair, context.evaluated_depsgraph_get())
+            edits, _ = read_edits(hair, context.evaluated_depsgraph_get())
         except HairloomError:  # cards that cannot be read can still be discarded
             lost = "All edits"
         else:
             if edits is None:
                 report(self, "INFO", f"{hair.name}: its cards have no edits")
                 return {"CANCELLED"}
-            lost = edits.counts.listed
+            lost = edits.counts.summary
         return context.window_manager.invoke_confirm(
             self,
             event,
@@ -102,7 +102,7 @@ def _built(
     job.write((yield from threaded(job.building())))
     finest, levels = job.objects[0], len(job.objects)
     detail = f"{levels} levels of detail" if levels > 1 else "one level of detail"
-    lines = f"{finest.name}: {_counts(finest)}, {detail}", job.order, job.edits.line
+    lines = f"{finest.name}: {_counts(finest)}, {detail}", job.order, job.edits.report_line
     tell(operator, Outcome(". ".join(filter(None, lines)), job.dropped, job.notes))
 
 

@@ -12,7 +12,7 @@ from selecting import select
 from tiers import few_in_commits
 
 from hairloom.addon.blender.cards.build import BuiltCards, build_steps, read_inputs
-from hairloom.addon.blender.cards.edits import MADE_ATTRIBUTE, RECORD, groom_edits
+from hairloom.addon.blender.cards.edits import MADE_ATTRIBUTE, RECORD_PROPERTY, read_edits
 from hairloom.addon.blender.cards.files import CardExport, CardOutput
 from hairloom.addon.blender.cards.made_objects import card_objects
 from hairloom.addon.blender.command_line import command_line
@@ -90,7 +90,7 @@ def delete(obj, *chosen):
 
 
 def edits(hair):
-    return groom_edits(hair, bpy.context.evaluated_depsgraph_get())[0]
+    return read_edits(hair, bpy.context.evaluated_depsgraph_get())[0]
 
 
 def test_cards_that_nobody_has_touched_are_made_anew(hair):
@@ -106,21 +106,25 @@ def test_a_moved_card_stays_where_it_was_put(hair):
     obj = make(hair)
     before = {card: corners(obj, card) for card in range(12)}
     move(obj, 3)
-    assert edits(hair).edited == 1 and edits(hair).deleted == 0 and edits(hair).own == 0
+    assert (
+        edits(hair).edited_count == 1
+        and edits(hair).deleted_count == 0
+        and edits(hair).added_count == 0
+    )
     for _ in range(3):  # made again several times
         obj = make(hair)
         assert set(numbers(obj)) == set(range(12))
         np.testing.assert_allclose(corners(obj, 3), before[3] + [0.02, 0.0, 0.0], atol=1e-6)
         for card in set(range(12)) - {3}:
             np.testing.assert_allclose(corners(obj, card), before[card], atol=1e-6)
-        assert edits(hair).edited == 1
+        assert edits(hair).edited_count == 1
 
 
 def test_a_deleted_card_stays_deleted(hair):
     delete(make(hair), 5, 7)
     for _ in range(2):
         assert set(numbers(make(hair))) == set(range(12)) - {5, 7}
-        assert edits(hair).deleted == 2 and edits(hair).edited == 0
+        assert edits(hair).deleted_count == 2 and edits(hair).edited_count == 0
 
 
 def test_a_card_of_the_artists_own_stays(hair):
@@ -136,7 +140,7 @@ def test_a_card_of_the_artists_own_stays(hair):
         obj = make(hair)
         np.testing.assert_allclose(corners(obj, 2), original, atol=1e-6)
         np.testing.assert_allclose(corners(obj, -1), original + [0.0, 0.0, 0.05], atol=1e-6)
-        assert edits(hair).own == 1 and edits(hair).edited == 0
+        assert edits(hair).added_count == 1 and edits(hair).edited_count == 0
 
 
 def test_another_tile_is_kept(hair):
@@ -154,7 +158,7 @@ def test_another_tile_is_kept(hair):
 
     edit(obj, (4,), next_tile)
     chosen = corners(obj, 4, "UVMap")
-    assert edits(hair).edited == 1
+    assert edits(hair).edited_count == 1
     obj = make(hair)
     np.testing.assert_allclose(corners(obj, 4, "UVMap"), chosen, atol=1e-6)
     tile = np.empty(len(obj.data.polygons), np.int32)
@@ -190,7 +194,7 @@ def test_cards_that_were_joined_to_save_triangles_are_not_deleted(hair, seed):
     card = max(numbers(obj))
     shape = corners(obj, card)
     move(obj, card)
-    assert edits(hair).edited == 1 and edits(hair).deleted == 0
+    assert edits(hair).edited_count == 1 and edits(hair).deleted_count == 0
     for _ in range(2):
         np.testing.assert_allclose(sorted(areas(make(hair))), sorted(first), rtol=1e-5)
         np.testing.assert_allclose(corners(obj, card), shape + [0.02, 0.0, 0.0], atol=1e-6)
@@ -245,7 +249,7 @@ def test_discarding_makes_all_cards_anew_and_can_be_undone(hair):
         np.testing.assert_allclose(corners(card_objects(hair)[0], card), places, atol=1e-6)
     bpy.ops.ed.undo()
     again = bpy.data.objects["Hair"]
-    assert (edits(again).edited, edits(again).deleted) == (1, 1)
+    assert (edits(again).edited_count, edits(again).deleted_count) == (1, 1)
 
 
 def test_an_edit_that_is_undone_is_none(hair):
@@ -253,7 +257,7 @@ def test_an_edit_that_is_undone_is_none(hair):
     bpy.ops.ed.undo_push(message="made")
     move(obj, 3)
     bpy.ops.ed.undo_push(message="moved")
-    assert edits(hair).edited == 1
+    assert edits(hair).edited_count == 1
     bpy.ops.ed.undo()
     assert edits(bpy.data.objects["Hair"]) is None
 
@@ -265,7 +269,11 @@ def test_a_foreign_mesh_that_is_joined_stays_as_the_artists_own(hair):
     select(obj)
     plane.select_set(True)
     bpy.ops.object.join()
-    assert (edits(hair).own, edits(hair).edited, edits(hair).deleted) == (1, 0, 0)
+    assert (edits(hair).added_count, edits(hair).edited_count, edits(hair).deleted_count) == (
+        1,
+        0,
+        0,
+    )
     obj = make(hair)
     assert obj.hairloom.card_object.card_count == 13
     own = corners(obj, -1)
@@ -279,7 +287,11 @@ def test_without_the_numbers_cards_are_known_by_their_place(hair, capfd):
     move(obj, 3, by=(0.005, 0.0, 0.0))
     delete(obj, 5)
     obj.data.attributes.remove(obj.data.attributes[MADE_ATTRIBUTE])
-    assert (edits(hair).edited, edits(hair).deleted, edits(hair).own) == (1, 1, 0)
+    assert (edits(hair).edited_count, edits(hair).deleted_count, edits(hair).added_count) == (
+        1,
+        1,
+        0,
+    )
     obj = make(hair)
     assert "recognised by their places" in capfd.readouterr().out
     np.testing.assert_allclose(corners(obj, 3), before + [0.005, 0.0, 0.0], atol=1e-6)
@@ -291,9 +303,9 @@ def test_without_the_record_cards_are_made_anew_with_a_word(hair, capfd, record)
     obj = make(hair)
     move(obj, 3)
     if record is None:
-        del obj.data[RECORD]
+        del obj.data[RECORD_PROPERTY]
     else:
-        obj.data[RECORD] = record
+        obj.data[RECORD_PROPERTY] = record
     make(hair)
     assert "it has no record of its cards" in capfd.readouterr().out
     assert edits(hair) is None
@@ -401,7 +413,7 @@ def test_linked_cards_are_refused(hair, tmp_path):
         bpy.context.collection.objects.link(each)
     bpy.context.view_layer.update()
     linked = bpy.data.objects["Hair"]
-    assert edits(linked).edited == 1, "exports and drawings read them"
+    assert edits(linked).edited_count == 1, "exports and drawings read them"
     select(linked)
     with pytest.raises(RuntimeError, match="linked from another file"):
         bpy.ops.hairloom.make_cards()
@@ -412,7 +424,7 @@ def test_edits_are_in_the_file(hair, tmp_path):
     path = str(tmp_path / "saved.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.open_mainfile(filepath=path)
-    assert edits(bpy.data.objects["Hair"]).edited == 1
+    assert edits(bpy.data.objects["Hair"]).edited_count == 1
 
 
 def test_what_is_drawn_has_the_edits(hair, get_depsgraph):

@@ -27,7 +27,7 @@ from hairloom.addon.blender.cards.files import CardOutput, WrittenCards, write_c
 from hairloom.addon.blender.command_line.inputs import Sources, read_inputs  # noqa: E402
 from hairloom.addon.card_flow import bound_cards, cards_at  # noqa: E402
 from hairloom.addon.cards.atlas_settings import AtlasSettings  # noqa: E402
-from hairloom.addon.cards.edits import CardEdits, edits_of, prints  # noqa: E402
+from hairloom.addon.cards.edits import CardEdits, find_edits, piece_prints  # noqa: E402
 from hairloom.addon.cards.export_settings import CardExportSettings  # noqa: E402
 from hairloom.addon.cards.settings import CardSettings  # noqa: E402
 from hairloom.addon.cards.steps import result_of  # noqa: E402
@@ -301,10 +301,10 @@ def test_the_sidecar_follows_the_schema(
 def card_edits(motion: GuideMotion) -> CardEdits:
     """Edits: one card moved, one deleted, one copied."""
     build = result_of(build_steps(CardInputs(motion.rig, SETTINGS))).build
-    mesh, made = build.finest, build.made
+    mesh, made = build.finest, build.record
     assert made is not None
     surface = Surface(mesh.positions, mesh.triangles, mesh.uv[mesh.triangles])
-    record = replace(made, marks=prints(surface, mesh.card))
+    record = replace(made, prints=piece_prints(surface, mesh.card))
     positions = mesh.positions.copy()
     positions[mesh.triangles[mesh.card == 3]] += np.float32([0.0, 0.0, 0.01])
     copied = mesh.triangles[mesh.card == 7]
@@ -313,8 +313,8 @@ def card_edits(motion: GuideMotion) -> CardEdits:
     triangles = np.concatenate([mesh.triangles[left], copied + len(mesh.positions)])
     number = np.concatenate([mesh.card[left], np.full(len(copied), -1)])
     uv = np.concatenate([mesh.uv, mesh.uv])[triangles]
-    edits = edits_of(Surface(positions, triangles, uv), number, record, np.eye(4))
-    assert (edits.edited, edits.deleted, edits.own) == (1, 1, 1)
+    edits = find_edits(Surface(positions, triangles, uv), number, record, np.eye(4))
+    assert (edits.edited_count, edits.deleted_count, edits.added_count) == (1, 1, 1)
     return edits
 
 

@@ -152,7 +152,7 @@ def test_a_card_along_a_curve_stands_on_the_skin_and_stays(hair, kind, turned):
     np.testing.assert_allclose(widths(card)[0], 0.02, rtol=1e-3)
     assert int(corners(obj, -1, "UVMap")[:, 0].mean() * 4) == 1
     obj = make(hair)
-    assert edits(hair).own == 1 and obj.hairloom.card_object.card_count == 13
+    assert edits(hair).added_count == 1 and obj.hairloom.card_object.card_count == 13
     np.testing.assert_allclose(grid(obj, -1), card, atol=1e-6)
     for number, places in before.items():
         np.testing.assert_allclose(corners(obj, number), places, atol=1e-6)

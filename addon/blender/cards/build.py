@@ -62,7 +62,7 @@ from ..colliders.rigs import MadeRig
 from ..properties.groom_settings import GroomSettings
 from ..scene.painted_colors import read_colors
 from ..scene.source import read_source
-from .edits import groom_edits
+from .edits import read_edits
 from .occluders import Occluders, read_occluders
 from .textures import chosen_pictures
 
@@ -130,7 +130,7 @@ def read_inputs(
     rig = with_painted_colors(rig, colors, settings[ShadingSettings])
     pictures, problems = chosen_pictures(hair.data.hairloom.card_images)
     occluders = read_occluders(settings[CardOcclusionSettings], hair)
-    edits, doubts = groom_edits(hair, depsgraph) if keep_edits else (None, ())
+    edits, doubts = read_edits(hair, depsgraph) if keep_edits else (None, ())
     inputs = CardInputs(rig, settings, pictures, occluders, edits)
     return inputs, (*notes, *notes_of(hair, rig), *problems, *doubts), dropped
 
@@ -375,7 +375,7 @@ class BuiltCards:
             mesh,
             textures,
             maps.has_tangent_map,
-            build.backs[0],
+            build.back_triangles[0],
             is_view_compensated=maps.is_view_compensated or build.shell_layers > 0,
             is_layered=build.shell_layers > 0,
             base_color=maps.base_color,

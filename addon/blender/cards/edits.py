@@ -13,7 +13,7 @@ import numpy as np
 
 from ...arrays import Floats, Ints
 from ...cards.atlas_grid import AtlasGrid
-from ...cards.edits import CardEdits, MadeCards, edits_of
+from ...cards.edits import CardEdits, CardRecord, find_edits
 from ...errors import HairloomError
 from ...strands import Surface
 from ..base.attributes import read_attribute
@@ -25,21 +25,21 @@ from .made_objects import card_objects
 #: the face attribute: the number of the card in the record, counted from 1
 MADE_ATTRIBUTE = "made_card"
 #: the custom property of the mesh that holds the record
-RECORD = "hairloom_made"
+RECORD_PROPERTY = "hairloom_made"
 #: the UV map on the atlas
 TILE_LAYER = "UVMap"
-#: arrays of the record: name -> (dtype, shape for each card)
-_ARRAYS: dict[str, tuple[Any, tuple[int, ...]]] = {
-    "places": (np.float32, (5, 3)),
-    "tile": (np.int32, ()),
-    "marks": (np.int32, ()),
-    "stands": (np.int32, ()),
-    "triangle": (np.int32, ()),
-    "corners": (np.float32, (3, 3)),
+#: arrays of the record: key -> (field of CardRecord, dtype, shape for each card)
+_ARRAYS: dict[str, tuple[str, Any, tuple[int, ...]]] = {
+    "places": ("places", np.float32, (5, 3)),
+    "tile": ("tile", np.int32, ()),
+    "marks": ("prints", np.int32, ()),
+    "stands": ("represented_by", np.int32, ()),
+    "triangle": ("triangle", np.int32, ()),
+    "corners": ("corners", np.float32, (3, 3)),
 }
 
 
-def groom_edits(
+def read_edits(
     hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, motion: Floats | None = None
 ) -> tuple[CardEdits | None, tuple[str, ...]]:
     """The artist's edits to a groom's cards in the scene, which are to be kept, and notes; None
@@ -69,18 +69,18 @@ def groom_edits(
     matrix = matrix_of(hair, depsgraph)
     if motion is not None:
         matrix = np.linalg.pinv(motion) @ matrix
-    edits = edits_of(surface, made, record, matrix)
+    edits = find_edits(surface, made, record, matrix)
     return (edits, ()) if edits else (None, tuple(f"{obj.name}: {each}." for each in edits.notes))
 
 
 def same_edits(one: CardEdits | None, other: CardEdits | None) -> bool:
     """Whether both keep the same, wherever the hair is."""
-    return one is other if one is None else one.is_like(other)
+    return one is other if one is None else one.has_same_edits(other)
 
 
 def read_pieces(mesh: bpy.types.Mesh) -> tuple[Surface, Ints | None]:
     """All triangles of a mesh with their UVs, in its own space, and the number of the made card of
-    each, see `edits_of`.
+    each, see `find_edits`.
 
     Raises:
         HairloomError: it has no UV map.
@@ -94,40 +94,40 @@ def read_pieces(mesh: bpy.types.Mesh) -> tuple[Surface, Ints | None]:
     return Surface(positions, triangles, uv[corners]), made
 
 
-def write_record(mesh: bpy.types.Mesh, made: MadeCards, marks: Ints, matrix: Floats) -> None:
+def write_record(mesh: bpy.types.Mesh, record: CardRecord, prints: Ints, matrix: Floats) -> None:
     """Write the record of the cards in a mesh.
 
     Args:
-        made: world space.
-        marks: (card_count,) prints of the cards as they are in the mesh.
+        record: world space.
+        prints: (card_count,) prints of the cards as they are in the mesh.
         matrix: (4, 4) of the mesh's object.
     """
-    local = made.moved(np.linalg.inv(matrix))
+    local = record.moved(np.linalg.inv(matrix))
     content: dict[str, Any] = {
-        name: np.ascontiguousarray(getattr(local, name), dtype).ravel()
-        for name, (dtype, _) in _ARRAYS.items()
+        key: np.ascontiguousarray(getattr(local, field), dtype).ravel()
+        for key, (field, dtype, _) in _ARRAYS.items()
     }
-    content["marks"] = np.ascontiguousarray(marks, np.int32)
-    grid = made.grid
+    content["marks"] = np.ascontiguousarray(prints, np.int32)
+    grid = record.grid
     content["grid"] = [grid.columns, grid.rows]
     content["padding"] = list(grid.padding)
-    content["triangle_count"] = made.triangle_count
-    mesh[RECORD] = content
+    content["triangle_count"] = record.triangle_count
+    mesh[RECORD_PROPERTY] = content
 
 
 def forget_record(mesh: bpy.types.Mesh) -> None:
     """Remove the record of a mesh that does not hold cards any more."""
-    if RECORD in mesh:
-        del mesh[RECORD]
+    if RECORD_PROPERTY in mesh:
+        del mesh[RECORD_PROPERTY]
 
 
-def read_record(mesh: bpy.types.Mesh) -> MadeCards | None:
+def read_record(mesh: bpy.types.Mesh) -> CardRecord | None:
     """The record of a mesh; None if there is none, or if it was changed and is inconsistent."""
-    content = mesh.get(RECORD)
+    content = mesh.get(RECORD_PROPERTY)
     try:
         arrays = {
-            name: np.array(content[name], dtype).reshape(-1, *shape)
-            for name, (dtype, shape) in _ARRAYS.items()
+            field: np.array(content[key], dtype).reshape(-1, *shape)
+            for key, (field, dtype, shape) in _ARRAYS.items()
         }
         columns, rows = (int(each) for each in content["grid"])
         across, along = (float(each) for each in content["padding"])
@@ -138,7 +138,7 @@ def read_record(mesh: bpy.types.Mesh) -> MadeCards | None:
     count = len(arrays["places"])
     if not count or any(len(each) != count for each in arrays.values()):
         return None
-    return MadeCards(grid=grid, triangle_count=triangle_count, **arrays)
+    return CardRecord(grid=grid, triangle_count=triangle_count, **arrays)
 
 
 def _tile_layer(mesh: bpy.types.Mesh) -> bpy.types.MeshUVLoopLayer:

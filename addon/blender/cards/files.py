@@ -71,8 +71,8 @@ from .build import (
     read_inputs,
     untimed,
 )
+from .build_cache import CardBuildCache
 from .exporters import CardLook, check_cards, check_exporter, level_names, write_card_mesh
-from .kept_cards import KeptCards
 from .motion import (
     JointMotion,
     SpringMotion,
@@ -284,7 +284,7 @@ class _Writer:
     def steps(self, motion: GuideMotion | None) -> FileSteps[tuple[str, ...]]:
         """Write everything; returns notes for the artist."""
         build = self.made.build
-        parts = map(with_fans_apart, build.levels, build.backs)
+        parts = map(with_fans_apart, build.levels, build.back_triangles)
         levels, backs = zip(*parts, strict=True)
         if motion is None or self.output.settings.motion == "none":
             yield "Writing", None
@@ -498,7 +498,7 @@ class CardExport:
     """The export of one hair's cards. notes: for the artist."""
 
     hair: Handle
-    kept: KeptCards
+    kept: CardBuildCache
     path: Path
     output: CardOutput
     inputs: CardInputs
@@ -517,7 +517,7 @@ class CardExport:
         levels: int | None = None,
         frames: range | None = None,
         known: tuple[MadeRig, ...] = (),
-        kept: KeptCards | None = None,
+        kept: CardBuildCache | None = None,
     ) -> CardExport:
         """Read the hair; if motion is to be written, from its bake.
 
@@ -541,7 +541,7 @@ class CardExport:
             cards = replace(inputs.settings[CardSettings], levels=levels)
             inputs = replace(inputs, settings=inputs.settings.with_settings(cards))
         notes += stale
-        kept = KeptCards() if kept is None else kept
+        kept = CardBuildCache() if kept is None else kept
         return cls(Handle.of(hair), kept, path, output, inputs, motion, dropped, notes)
 
     def building(self) -> ThreadWork[MappedCards]:
@@ -573,7 +573,7 @@ class CardExport:
             f"{order_line(written.build.wrong_fraction)}"
         )
         if written.build.edits:
-            result += f". {written.build.edits.line}"
+            result += f". {written.build.edits.report_line}"
         return Outcome(
             f"{result}{_motion_line(written)}", self.dropped, (*self.notes, *written.notes)
         )

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...arrays import Floats, Ints
 from ...cards.card_mesh import CardMesh
-from ...cards.edits import MadeCards
+from ...cards.edits import CardRecord
 from ...cards.settings import CardSettings
 from ...cards.shaping import CardVertices, card_along, from_root, tile_shift
 from ...errors import HairloomError
@@ -127,7 +127,7 @@ def add_along_curves(
                 rooted,
                 outwards,
                 settings,
-                width=width or record.usual_width,
+                width=width or record.median_width,
                 tile=tile if tile >= 0 else int(record.tile[near]),
                 grid=record.grid,
             )
@@ -139,7 +139,7 @@ def add_along_curves(
     return len(lines)
 
 
-def _record_of(obj: bpy.types.Object) -> MadeCards:
+def _record_of(obj: bpy.types.Object) -> CardRecord:
     if obj.hairloom.card_object.shell_layers:
         raise HairloomError(
             "it holds shells, which have no cards to edit",

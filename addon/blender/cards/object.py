@@ -14,8 +14,8 @@ from mathutils import Matrix
 
 from ...arrays import Floats
 from ...cards.build import CardBuild
-from ...cards.card_mesh import OF_CARDS, CardMesh
-from ...cards.edits import UNPRINTED, EditCounts, MadeCards, prints
+from ...cards.card_mesh import CARD_FIELDS, CardMesh
+from ...cards.edits import UNPRINTED, CardRecord, EditCounts, piece_prints
 from ...errors import HairloomError
 from ...shading.settings import ShadingSettings
 from ..base.attributes import set_attribute
@@ -24,8 +24,8 @@ from ..base.thread_work import ThreadWork
 from ..colliders.rigs import MadeRig
 from ..scene.surfaces import OCCLUSION_LAYER
 from .build import MappedCards, order_line, read_inputs
+from .build_cache import CardBuildCache
 from .edits import MADE_ATTRIBUTE, TILE_LAYER, forget_record, read_pieces, write_record
-from .kept_cards import KeptCards
 from .made_objects import card_objects
 from .material import fill_image, new_material
 from .mesh import OCCLUSION_IS_OURS, fill_mesh
@@ -53,14 +53,14 @@ class CardObjectJob:
         *,
         keep_edits: bool = True,
         known: tuple[MadeRig, ...] = (),
-        kept: KeptCards | None = None,
+        kept: CardBuildCache | None = None,
     ) -> None:
         for obj in card_objects(hair):
             _check_replaceable(obj)
         self._inputs, self.notes, self.dropped = read_inputs(
             hair, depsgraph, keep_edits=keep_edits, known=known
         )
-        self._kept = KeptCards() if kept is None else kept
+        self._kept = CardBuildCache() if kept is None else kept
         self._hair, self._matrix = Handle.of(hair), matrix_of(hair, depsgraph)
         self.objects: list[bpy.types.Object] = []
         self.order = ""
@@ -128,8 +128,8 @@ def _write(
         obj.hairloom.card_object.shell_layers = build.shell_layers
         obj.hairloom.card_object.wrong_fraction = build.wrong_fraction
         _fill(obj.data, cards, matrix)
-        if not level and build.made is not None:
-            _put_on_record(obj.data, build.made, cards, matrix)
+        if not level and build.record is not None:
+            _write_card_record(obj.data, build.record, cards, matrix)
         elif not level:
             forget_record(obj.data)
         objects.append(obj)
@@ -181,23 +181,26 @@ def _fill(mesh: bpy.types.Mesh, cards: CardMesh, matrix: Floats) -> None:
             OCCLUSION_LAYER: np.stack([cards.occlusion, cards.along], 1),
         },
         points={"occlusion": cards.occlusion, "along": cards.along},
-        faces={"card": cards.card} | {name: getattr(cards, name)[cards.card] for name in OF_CARDS},
+        faces={"card": cards.card}
+        | {name: getattr(cards, name)[cards.card] for name in CARD_FIELDS},
         matrix=matrix,
     )
 
 
-def _put_on_record(mesh: bpy.types.Mesh, made: MadeCards, cards: CardMesh, matrix: Floats) -> None:
+def _write_card_record(
+    mesh: bpy.types.Mesh, record: CardRecord, cards: CardMesh, matrix: Floats
+) -> None:
     """Write the record by which the artist's changes to these cards are found later."""
-    is_made = cards.card < len(made)
+    is_made = cards.card < len(record)
     set_attribute(mesh, MADE_ATTRIBUTE, "FACE", np.where(is_made, cards.card + 1, 0))
     surface, number = read_pieces(mesh)
     assert number is not None
     # all of the artist's own cards together count as one more card
-    found = prints(surface, np.where(number < 0, len(made), number))
-    marks = made.marks.copy()
-    unprinted = np.flatnonzero(marks == UNPRINTED)
-    marks[unprinted] = found[unprinted]
-    write_record(mesh, made, marks, matrix)
+    found = piece_prints(surface, np.where(number < 0, len(record), number))
+    prints = record.prints.copy()
+    unprinted = np.flatnonzero(prints == UNPRINTED)
+    prints[unprinted] = found[unprinted]
+    write_record(mesh, record, prints, matrix)
 
 
 def _filled_image(image: bpy.types.Image | None, name: str, texture: Floats) -> bpy.types.Image:

@@ -28,7 +28,7 @@ from ..base import latest_job
 from ..base.latest_job import LatestJob, Work
 from ..properties.groom_settings import GroomSettings
 from .build import BuiltCards, CardInputs, cards_key, counts_line, order_line
-from .edits import groom_edits, same_edits
+from .edits import read_edits, same_edits
 from .occluders import Occluders, read_occluders
 from .textures import chosen_pictures
 
@@ -218,7 +218,7 @@ class ShownCards:
         """The artist's edits; if they cannot be read, there are none, with a warning."""
         depsgraph = bpy.context.view_layer.depsgraph
         try:
-            edits, self._doubts = groom_edits(self._hair(), depsgraph, self._motion)
+            edits, self._doubts = read_edits(self._hair(), depsgraph, self._motion)
         except HairloomError as error:
             edits, self._doubts = None, (str(error),)
         return edits

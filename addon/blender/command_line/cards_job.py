@@ -94,9 +94,9 @@ def written_cards(
         report.facts["card_edits"] = {
             "edited": edits.edited,
             "deleted": edits.deleted,
-            "own": edits.own,
+            "own": edits.added,
         }
-        print(edits.line, flush=True)
+        print(edits.report_line, flush=True)
     if written.motion:
         report.facts["card_motion"] = dict(written.motion)
     if written.figures is not None:

@@ -27,7 +27,7 @@ from ...shading.settings import ShadingSettings
 from ...wet_flow import effective_settings
 from ..bakes.guide_motion import BakedGuides
 from ..base.report import Report
-from ..cards.edits import groom_edits
+from ..cards.edits import read_edits
 from ..colliders.rigs import rig_from
 from ..colliders.ties import TrackedHolders
 from ..pictures.studio import Studio
@@ -261,7 +261,7 @@ def card_edits(job: Job) -> CardEdits | None:
     hair = job.hair
     if hair is None or getattr(job.options, "discard_edits", False):
         return None
-    edits, notes = groom_edits(hair, bpy.context.evaluated_depsgraph_get())
+    edits, notes = read_edits(hair, bpy.context.evaluated_depsgraph_get())
     report_notes(list(notes), job.report)
     return edits
 

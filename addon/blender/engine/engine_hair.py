@@ -35,7 +35,7 @@ from ..base.latest_job import LatestJob
 from ..base.objects import head_of
 from ..base.redraw import redraw_views
 from ..cards.build import BuiltCards, CardInputs, cards_key
-from ..cards.edits import groom_edits, same_edits
+from ..cards.edits import read_edits, same_edits
 from ..cards.occluders import Occluders, read_occluders
 from ..cards.show import as_shown
 from ..cards.textures import chosen_pictures
@@ -211,7 +211,7 @@ def read_groom(
     snapshot = replace(made.snapshot, points=strands, color=rig.strands.color)
     if settings.shows_cards:
         others = read_occluders(settings[CardOcclusionSettings], owner, depsgraph, pose.matrix)
-        edits, _ = groom_edits(owner, depsgraph, pose.matrix)
+        edits, _ = read_edits(owner, depsgraph, pose.matrix)
         built = made.cards(owner, rig, settings, others, edits)
         cards = built.at(pose, guides, settings.sections)
         snapshot = as_shown(replace(snapshot, cards=cards))

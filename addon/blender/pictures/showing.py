@@ -13,7 +13,7 @@ from ...paint_flow import with_painted_colors
 from ...rig_flow import Pose
 from ...shading.ambient_settings import AmbientSettings
 from ...shading.settings import ShadingSettings
-from ..cards.edits import groom_edits
+from ..cards.edits import read_edits
 from ..cards.textures import chosen_pictures
 from ..preview import previews
 from ..properties.groom_settings import GroomSettings
@@ -71,5 +71,5 @@ def file_name(name: str) -> str:
 
 def _studio(hair: bpy.types.Object, groom: PreparedGroom, settings: GroomSettings) -> Studio:
     pictures, _ = chosen_pictures(hair.data.hairloom.card_images)
-    edits, _ = groom_edits(hair, bpy.context.evaluated_depsgraph_get())
+    edits, _ = read_edits(hair, bpy.context.evaluated_depsgraph_get())
     return Studio(groom, settings, pictures, look_below(hair, groom.rig.head), edits)

@@ -27,7 +27,7 @@ from ..base.originals import (
     shown_depsgraphs,
 )
 from ..base.redraw import redraw_panels, redraw_views, refresh_panels
-from ..cards.kept_cards import KeptCards
+from ..cards.build_cache import CardBuildCache
 from ..colliders import fields
 from ..colliders.rigs import MadeRig
 from ..scene.fin_modifier import clear, is_shown
@@ -56,7 +56,7 @@ class Previews(dict[int, Preview]):
         super().__init__()
         self.notice, self.is_paused = "", False
         self.last_edit, self.is_reacting = 0.0, False
-        self.built_cards = KeptCards()
+        self.built_cards = CardBuildCache()
 
 
 previews = Previews()

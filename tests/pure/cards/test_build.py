@@ -86,11 +86,11 @@ def built(
 @pytest.mark.parametrize("source", few_in_commits(["baked", "made"]))
 def test_levels_share_one_atlas_and_all_that_is_known_of_cards(way: str, source: str) -> None:
     build = built(falling(800), AtlasSettings(source=source, columns=8, rows=2), source=way)
-    assert len(build.levels) == len(build.errors) == len(build.backs) == 3
+    assert len(build.levels) == len(build.errors) == len(build.back_triangles) == 3
     assert (build.plan is None) == (source == "made")
     finest = build.finest
     assert set(finest.group[np.unique(finest.card)].tolist()) == {0, 1}
-    for mesh, back in zip(build.levels, build.backs, strict=True):
+    for mesh, back in zip(build.levels, build.back_triangles, strict=True):
         assert mesh.atlas == finest.atlas
         np.testing.assert_array_equal(mesh.tile, finest.tile)
         np.testing.assert_array_equal(mesh.layer, finest.layer)
@@ -295,7 +295,7 @@ def test_the_order_is_the_one_that_was_chosen_and_its_faults_are_told(by: str) -
     runs = 1 + np.count_nonzero(np.diff(mesh.card))
     assert (runs == mesh.card_count) == (by != "pieces")
     index = {tuple(corners): n for n, corners in enumerate(mesh.triangles.tolist())}
-    back = np.array([index[tuple(corners)] for corners in build.backs[0].tolist()])
+    back = np.array([index[tuple(corners)] for corners in build.back_triangles[0].tolist()])
     again = wrong_fraction(mesh, None, back=back, view_count=8)
     assert 0.0 < build.wrong_fraction < 1.0
     assert build.wrong_fraction == pytest.approx(again)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hairloom.addon.cards.card_mesh import OF_CARDS, OF_VERTICES, CardMesh
+from hairloom.addon.cards.card_mesh import CARD_FIELDS, VERTEX_FIELDS, CardMesh
 from hairloom.addon.cards.sort import canonical
 
 #: a strip of two segments and one column
@@ -49,20 +49,20 @@ def shuffled(mesh: CardMesh, seed: int) -> CardMesh:
     turned = (random.integers(3, size=(len(triangles), 1)) + np.arange(3)) % 3
     order = random.permutation(len(triangles))
     number = random.permutation(2 * len(mesh.group))[: len(mesh.group)]
-    of_cards = {name: np.full(2 * len(mesh.group), -1) for name in OF_CARDS}
+    of_cards = {name: np.full(2 * len(mesh.group), -1) for name in CARD_FIELDS}
     for name, values in of_cards.items():
         values[number] = getattr(mesh, name)
     return replace(
         mesh,
         triangles=np.take_along_axis(triangles, turned, axis=1)[order],
         card=number[mesh.card][order],
-        **{name: getattr(mesh, name)[vertices] for name in OF_VERTICES},
+        **{name: getattr(mesh, name)[vertices] for name in VERTEX_FIELDS},
         **of_cards,
     )
 
 
 def check_same(one: CardMesh, other: CardMesh) -> None:
-    for name in (*OF_VERTICES, *OF_CARDS, "triangles", "card"):
+    for name in (*VERTEX_FIELDS, *CARD_FIELDS, "triangles", "card"):
         np.testing.assert_array_equal(getattr(one, name), getattr(other, name), name)
 
 
@@ -83,13 +83,13 @@ def test_nothing_of_a_triangle_changes_but_its_numbers() -> None:
     mesh = shuffled(scattered(), 4)
     found = canonical(mesh)
     assert sorted(found.triangle) == list(range(len(mesh.triangles)))
-    for name in OF_VERTICES:
+    for name in VERTEX_FIELDS:
         one = getattr(found.mesh, name)[found.mesh.triangles]
         other = getattr(mesh, name)[mesh.triangles[found.triangle]]
         for corners, known in zip(one, other, strict=True):
             starts = [np.array_equal(corners, np.roll(known, turn, axis=0)) for turn in range(3)]
             assert any(starts), name
-    for name in OF_CARDS:
+    for name in CARD_FIELDS:
         np.testing.assert_array_equal(
             getattr(found.mesh, name)[found.mesh.card],
             getattr(mesh, name)[mesh.card][found.triangle],
@@ -172,7 +172,7 @@ def test_vertices_in_one_place_count_alike() -> None:
     split = replace(
         whole,
         triangles=np.array([[6, 1, 3], [0, 7, 2], [2, 3, 5], [2, 5, 4]]),
-        **{name: getattr(whole, name)[[*range(6), 0, 3]] for name in OF_VERTICES},
+        **{name: getattr(whole, name)[[*range(6), 0, 3]] for name in VERTEX_FIELDS},
     )
     one, other = canonical(whole), canonical(split)
     np.testing.assert_array_equal(one.triangle, other.triangle)

@@ -8,7 +8,7 @@ from hairloom.addon.cards.clusters import (
     at_rim,
     cluster_of_guides,
     cluster_strands,
-    shared_out,
+    proportional_parts,
 )
 from hairloom.addon.strands.face import BROWS, LASHES
 
@@ -118,9 +118,9 @@ def test_more_strands_than_are_learnt_from_all_find_their_bundle() -> None:
 
 
 def test_cards_are_shared_out_by_size() -> None:
-    np.testing.assert_array_equal(shared_out(10, np.array([50, 30, 20])), [5, 3, 2])
-    np.testing.assert_array_equal(shared_out(2, np.array([1000, 1, 1])), [2, 1, 1])
-    np.testing.assert_array_equal(shared_out(100, np.array([3, 5])), [3, 5])
+    np.testing.assert_array_equal(proportional_parts(10, np.array([50, 30, 20])), [5, 3, 2])
+    np.testing.assert_array_equal(proportional_parts(2, np.array([1000, 1, 1])), [2, 1, 1])
+    np.testing.assert_array_equal(proportional_parts(100, np.array([3, 5])), [3, 5])
 
 
 def test_cards_of_brows_and_lashes_hold_few_strands() -> None:

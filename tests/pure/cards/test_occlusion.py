@@ -9,7 +9,7 @@ import pytest
 from guide_cards import build_cards
 from spheres import globe
 
-from hairloom.addon.cards.card_mesh import OF_VERTICES, CardMesh
+from hairloom.addon.cards.card_mesh import VERTEX_FIELDS, CardMesh
 from hairloom.addon.cards.occlusion import CardOccluder, even_axes, extent_of, vertex_occlusion
 from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
 from hairloom.addon.cards.settings import CardSettings
@@ -269,7 +269,7 @@ def test_nothing_and_triangles_without_area() -> None:
         one,
         triangles=one.triangles[:0],
         card=one.card[:0],
-        **{name: getattr(one, name)[:0] for name in OF_VERTICES},
+        **{name: getattr(one, name)[:0] for name in VERTEX_FIELDS},
     )
     assert vertex_occlusion(empty, [CardOccluder(empty)], [globe(16)], plain()).shape == (0,)
     mesh = stacked([0.0, 1.0])

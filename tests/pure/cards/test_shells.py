@@ -128,7 +128,7 @@ def test_layers_follow_the_combed_hair_from_the_inside_to_the_outside() -> None:
     np.testing.assert_allclose(
         mesh.tangent, np.tile([0.6, 0.0, 0.8], (len(mesh.along), 1)), atol=0.03
     )
-    back = made.backs[0]
+    back = made.back_triangles[0]
     assert (np.diff(mesh.along[back].mean(axis=1)) <= 0.0).all()
 
 

@@ -11,7 +11,7 @@ from guide_cards import build_cards
 from spheres import globe
 from tiers import few_in_commits
 
-from hairloom.addon.cards.card_mesh import OF_CARDS, OF_VERTICES, CardMesh, joined
+from hairloom.addon.cards.card_mesh import CARD_FIELDS, VERTEX_FIELDS, CardMesh, join_meshes
 from hairloom.addon.cards.order_check import wrong_fraction
 from hairloom.addon.cards.order_pairs import all_pairs, pairs_by_view
 from hairloom.addon.cards.settings import CardSettings
@@ -111,8 +111,8 @@ def shuffled(mesh: CardMesh, seed: int) -> CardMesh:
     order = random.permutation(len(mesh.triangles))
     turned = (random.integers(0, 3, (len(order), 1)) + np.arange(3)) % 3
     corners = np.argsort(vertices)[np.take_along_axis(mesh.triangles[order], turned, axis=1)]
-    of_vertices = {name: getattr(mesh, name)[vertices] for name in OF_VERTICES}
-    of_cards = {name: getattr(mesh, name)[cards] for name in OF_CARDS}
+    of_vertices = {name: getattr(mesh, name)[vertices] for name in VERTEX_FIELDS}
+    of_cards = {name: getattr(mesh, name)[cards] for name in CARD_FIELDS}
     return replace(
         mesh, triangles=corners, card=np.argsort(cards)[mesh.card[order]], **of_vertices, **of_cards
     )
@@ -141,8 +141,10 @@ def test_the_order_hangs_on_where_cards_are_alone(head: Surface | None, by: Sort
 
 @pytest.mark.parametrize("by", WAYS)
 def test_cards_that_are_sorted_stay_as_they_are(by: SortBy) -> None:
-    mesh = replace(crossing_cards(), **{name: np.zeros(80) for name in OF_CARDS})
-    twice = joined([mesh, replace(mesh, card=mesh.card + 40)])  # each card coincides with another
+    mesh = replace(crossing_cards(), **{name: np.zeros(80) for name in CARD_FIELDS})
+    twice = join_meshes(
+        [mesh, replace(mesh, card=mesh.card + 40)]
+    )  # each card coincides with another
     once = in_order(twice, card_orders(twice, globe(24), by, view_count=8).front)
     again = card_orders(once, globe(24), by, view_count=8)
     np.testing.assert_array_equal(again.front, np.arange(len(once.triangles)))
@@ -293,7 +295,7 @@ def test_coinciding_cards_keep_their_order_and_sorting_repeats_itself() -> None:
     count = len(mesh.triangles)
     six = {"group": np.zeros(6), "layer": np.zeros(6), "tile": np.zeros(6)}
     mesh = replace(mesh, **six)
-    twice = joined([mesh, replace(mesh, card=mesh.card + 3)])
+    twice = join_meshes([mesh, replace(mesh, card=mesh.card + 3)])
     one, two = (card_orders(twice, globe(24)) for _ in range(2))
     np.testing.assert_array_equal(one.front, two.front)
     np.testing.assert_array_equal(one.back, two.back)
@@ -328,7 +330,7 @@ def test_cards_without_area_and_with_gaps_in_their_numbers() -> None:
 def test_cards_that_share_all_their_vertices() -> None:
     mesh = crossing_cards(1)
     mesh = replace(mesh, group=np.zeros(2), layer=np.zeros(2), tile=np.zeros(2))
-    mesh = joined([replace(mesh, card=mesh.card + 1), mesh])
+    mesh = join_meshes([replace(mesh, card=mesh.card + 1), mesh])
     half = len(mesh.triangles) // 2
     mesh = replace(mesh, triangles=np.tile(mesh.triangles[:half], (2, 1)))
     for by in WAYS:

@@ -25,7 +25,7 @@ class _Built:
         return same_content(self.inputs, inputs)
 
 
-class KeptCards:
+class CardBuildCache:
     """At most one build; for the main thread only.
 
     A build is found by the content of its inputs, bit for bit, so nothing has to mark it as out of

@@ -13,8 +13,8 @@ import bpy
 import numpy as np
 import pytest
 
-from hairloom.addon.blender.cards import build, kept_cards
-from hairloom.addon.blender.cards.kept_cards import KeptCards
+from hairloom.addon.blender.cards import build, build_cache
+from hairloom.addon.blender.cards.build_cache import CardBuildCache
 from hairloom.addon.blender.cards.made_objects import card_objects
 from hairloom.addon.blender.colliders import rigs
 from hairloom.addon.blender.preview import previews
@@ -221,12 +221,12 @@ def test_an_atlas_is_drawn_again_where_a_gpu_has_come_or_gone(
 ) -> None:
     hair.data.hairloom.atlas.source = "baked"
     hair.data.hairloom.atlas.size, hair.data.hairloom.card_images.base = "256", None
-    for module in (build, kept_cards):
+    for module in (build, build_cache):
         monkeypatch.setattr(module, "has_gpu", lambda: False)
     make()
     written(tmp_path / "kept")
     assert len(builds) == 1
-    monkeypatch.setattr(kept_cards, "has_gpu", lambda: True)
+    monkeypatch.setattr(build_cache, "has_gpu", lambda: True)
     written(tmp_path / "drawn")
     assert len(builds) == 2
 
@@ -235,13 +235,13 @@ def test_an_atlas_is_drawn_again_where_a_gpu_has_come_or_gone(
 def last(monkeypatch: pytest.MonkeyPatch) -> list[weakref.ref[build.MappedCards]]:
     """Weak references to all cards that were ever kept."""
     found: list[weakref.ref[build.MappedCards]] = []
-    keep = KeptCards.keep
+    keep = CardBuildCache.keep
 
     def seen(self: Any, hair: Any, inputs: Any, made: Any) -> None:
         found.append(weakref.ref(made))
         keep(self, hair, inputs, made)
 
-    monkeypatch.setattr(KeptCards, "keep", seen)
+    monkeypatch.setattr(CardBuildCache, "keep", seen)
     return found
 
 

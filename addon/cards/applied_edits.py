@@ -23,87 +23,102 @@ from ..strands.frames import tangents, volume_normals
 from ..strands.vectors import unit, unit_or
 from .adopted import adopt_cards
 from .atlas_grid import AtlasGrid
-from .card_mesh import OF_VERTICES, CardMesh, joined
-from .edits import NO_PRINT, REACH, CardEdits, EditCounts, MadeCards, gaps, places_of, usual_gap
+from .card_mesh import VERTEX_FIELDS, CardMesh, join_meshes
+from .edits import (
+    MAX_MATCH_DISTANCE,
+    NO_PRINT,
+    CardEdits,
+    CardRecord,
+    EditCounts,
+    card_gaps,
+    card_places,
+    median_gap,
+)
 from .settings import CardSettings
 from .sort import reordered
 from .strip import CardFrames, Strips, UncutCards
 
 #: Motion of the skin below this fraction of a card's length is ignored.
-_STILL = 1.0e-3
+_MIN_MOTION = 1.0e-3
 #: Cards that begin farther from the head than this part of their length are reported.
-_FAR = 0.25
+_MAX_ROOT_GAP = 0.25
 #: A vector shorter than this has no direction.
-_SHORTEST = 1.0e-12
+_MIN_LENGTH = 1.0e-12
 _CHUNK = 512
 
 
 @dataclass(frozen=True, eq=False)
-class KeptCards:
+class AppliedEdits:
     """New cards with the kept ones among them.
 
     cards: all, the artist's own ones last; replaced and deleted ones are marked absent.
-    mesh: of the kept cards alone, world space, as the artist left them.
-    model: (card_count,) the new card whose strands each card represents.
+    kept_mesh: of the kept cards alone, world space, as the artist left them.
+    model_card: (card_count,) the new card whose strands each card represents.
     record: of the new cards, with the card that represents each.
     notes: for the artist.
     """
 
     cards: UncutCards
-    mesh: CardMesh
-    model: Ints
-    record: MadeCards
+    kept_mesh: CardMesh
+    model_card: Ints
+    record: CardRecord
     counts: EditCounts
     notes: tuple[str, ...]
 
     @property
-    def numbers(self) -> Ints:
+    def kept_numbers(self) -> Ints:
         """The numbers of the kept cards."""
-        return np.unique(self.mesh.card)
+        return np.unique(self.kept_mesh.card)
 
-    def put_into(self, mesh: CardMesh) -> CardMesh:
+    def with_kept_mesh(self, mesh: CardMesh) -> CardMesh:
         """The finest level with the kept cards as they are."""
-        is_made = ~np.isin(mesh.card, self.numbers)
+        is_made = ~np.isin(mesh.card, self.kept_numbers)
         rest = replace(mesh, triangles=mesh.triangles[is_made], card=mesh.card[is_made])
         both = (
-            joined([rest.without_loose(), self.mesh]) if len(rest.triangles) else self._alone(mesh)
+            join_meshes([rest.without_loose_vertices(), self.kept_mesh])
+            if len(rest.triangles)
+            else self._only_kept(mesh)
         )
         return reordered(both, np.arange(len(self.cards)))
 
-    def _alone(self, mesh: CardMesh) -> CardMesh:
-        own: dict[str, Any] = {name: getattr(self.mesh, name) for name in OF_VERTICES}
-        return replace(mesh, triangles=self.mesh.triangles, card=self.mesh.card, **own)
+    def _only_kept(self, mesh: CardMesh) -> CardMesh:
+        own: dict[str, Any] = {name: getattr(self.kept_mesh, name) for name in VERTEX_FIELDS}
+        return replace(mesh, triangles=self.kept_mesh.triangles, card=self.kept_mesh.card, **own)
 
 
-def kept_cards(
-    edits: CardEdits, cards: UncutCards, settings: CardSettings, head: Surface | None, baked: bool
-) -> KeptCards:
+def apply_edits(
+    edits: CardEdits,
+    cards: UncutCards,
+    settings: CardSettings,
+    head: Surface | None,
+    is_baked: bool,
+) -> AppliedEdits:
     """Place an artist's cards among new ones.
 
     Args:
         cards: new cards without edits, world space.
-        baked: whether the tiles show the groom's own strands, so that their contents may have
+        is_baked: whether the tiles show the groom's own strands, so that their contents may have
             changed.
     """
-    record = MadeCards.of(cards.strips, cards.tile, cards.atlas, head)
+    record = CardRecord.of(cards.strips, cards.tile, cards.atlas, head)
     before = edits.record.moved(edits.matrix)
     moves = _skin_moves(before, head)
-    places = _carried(edits, before, moves)
-    before = replace(before, places=_moved_each(before.places, moves).astype(np.float32))
-    ancestor = _ancestors(record.places, before.places)
-    has = np.flatnonzero(ancestor >= 0)
-    stands, is_free = np.full(len(record), -1, np.int32), np.zeros(len(record), bool)
-    stands[has] = before.stands[ancestor[has]]
+    places = _carried_vertices(edits, before, moves)
+    before = replace(before, places=_transform_each(before.places, moves).astype(np.float32))
+    ancestor = _matching_cards(record.places, before.places)
+    matched = np.flatnonzero(ancestor >= 0)
+    old_card, is_free = np.full(len(record), -1, np.int32), np.zeros(len(record), bool)
+    old_card[matched] = before.represented_by[ancestor[matched]]
     # a place is free if the card that represented it is gone
-    is_free[has] = ~edits.is_there[stands[has]]
-    number = np.full(len(edits.number), -1, np.int32)
-    stand_for = np.arange(len(record), dtype=np.int32)
-    for index in np.flatnonzero(edits.number >= 0):
-        mine = np.flatnonzero(stands == edits.number[index])
+    is_free[matched] = ~edits.is_present[old_card[matched]]
+    number = np.full(len(edits.card_of_piece), -1, np.int32)
+    represented_by = np.arange(len(record), dtype=np.int32)
+    for index in np.flatnonzero(edits.card_of_piece >= 0):
+        mine = np.flatnonzero(old_card == edits.card_of_piece[index])
         if len(mine):
-            was = before.places[edits.number[index]][None]
-            number[index] = mine[gaps(was, record.places[mine])[0].argmin()]
-            stand_for[mine] = number[index]
+            old_places = before.places[edits.card_of_piece[index]][None]
+            number[index] = mine[card_gaps(old_places, record.places[mine])[0].argmin()]
+            represented_by[mine] = number[index]
     is_lost = number < 0
     number[is_lost] = len(record) + np.arange(np.count_nonzero(is_lost))
     return _assembled(
@@ -111,14 +126,16 @@ def kept_cards(
         cards,
         settings,
         head,
-        replace(record, stands=stand_for),
-        _Placed(places, number, is_free, _tiles_now(edits, record, ancestor, number, baked)),
-        _counts(edits, stands, is_lost),
+        replace(record, represented_by=represented_by),
+        _PlacedPieces(
+            places, number, is_free, _current_tiles(edits, record, ancestor, number, is_baked)
+        ),
+        _counts(edits, old_card, is_lost),
     )
 
 
 @dataclass(frozen=True)
-class _Placed:
+class _PlacedPieces:
     """The kept pieces. positions: of their vertices, world space. number: (piece_count,) of each
     among the current cards. is_free: (new card count,). tile: (piece_count,)."""
 
@@ -133,29 +150,31 @@ def _assembled(
     cards: UncutCards,
     settings: CardSettings,
     head: Surface | None,
-    record: MadeCards,
-    placed: _Placed,
+    record: CardRecord,
+    placed: _PlacedPieces,
     counts: EditCounts,
-) -> KeptCards:
+) -> AppliedEdits:
     count, piece_count = len(record), len(placed.number)
     is_new = placed.number >= count
     total = count + int(np.count_nonzero(is_new))
     mesh, strips = _adopted(edits, cards, settings, head, placed)
     model = np.resize(np.arange(count, dtype=np.int32), total)
     if is_new.any():
-        near = gaps(places_of(strips.of(np.flatnonzero(is_new))), record.places).argmin(axis=1)
+        near = card_gaps(card_places(strips.of(np.flatnonzero(is_new))), record.places).argmin(
+            axis=1
+        )
         model[placed.number[is_new]] = near
-    all_strips = _with(cards.strips, placed.number, strips, total)
-    is_replaced = record.stands != np.arange(count)
+    all_strips = _with_replaced(cards.strips, placed.number, strips, total)
+    is_replaced = record.represented_by != np.arange(count)
     absent = np.zeros(total, bool)
     absent[:count] = placed.is_free | is_replaced
     strand_count = cards.strand_count[model]
-    covered = np.bincount(record.stands, cards.strand_count, count)
+    covered = np.bincount(record.represented_by, cards.strand_count, count)
     strand_count[:count] = np.where(is_replaced, strand_count[:count], covered)
     tile = cards.tile[model]
     tile[placed.number] = placed.tile
-    record.marks[absent[:count]] = NO_PRINT
-    record.marks[placed.number[~is_new]] = NO_PRINT
+    record.prints[absent[:count]] = NO_PRINT
+    record.prints[placed.number[~is_new]] = NO_PRINT
     both = replace(
         cards,
         strips=all_strips,
@@ -169,30 +188,30 @@ def _assembled(
     notes = _notes(edits, counts, strips, head, piece_count)
     if absent.all() and not piece_count:
         notes = (*notes, "all its cards were deleted; Discard Edits makes them again")
-    return KeptCards(both, mesh, model, record, counts, notes)
+    return AppliedEdits(both, mesh, model, record, counts, notes)
 
 
-def _ancestors(places: Floats, before: Floats) -> Ints:
+def _matching_cards(places: Floats, before: Floats) -> Ints:
     """The card on record that each new one belongs to, (n,); -1 for none."""
     found = np.full(len(places), -1, np.int32)
     if not len(before):
         return found
-    reach = REACH * usual_gap(before)
+    reach = MAX_MATCH_DISTANCE * median_gap(before)
     for start in range(0, len(places), _CHUNK):
-        gap = gaps(places[start : start + _CHUNK], before)
+        gap = card_gaps(places[start : start + _CHUNK], before)
         nearest = gap.argmin(axis=1)
         is_near = gap[np.arange(len(gap)), nearest] <= reach
         found[start : start + _CHUNK] = np.where(is_near, nearest, -1)
     return found
 
 
-def _counts(edits: CardEdits, stands: Ints, is_lost: Bools) -> EditCounts:
-    is_found = np.isin(np.arange(len(edits.record)), stands)
+def _counts(edits: CardEdits, old_card: Ints, is_lost: Bools) -> EditCounts:
+    is_found = np.isin(np.arange(len(edits.record)), old_card)
     return EditCounts(
-        edited=edits.edited,
+        edited=edits.edited_count,
         deleted=int(np.count_nonzero(edits.is_deleted & is_found)),
-        own=edits.own,
-        lost_edits=int(np.count_nonzero(is_lost & (edits.number >= 0))),
+        added=edits.added_count,
+        lost_edits=int(np.count_nonzero(is_lost & (edits.card_of_piece >= 0))),
         lost_deletions=int(np.count_nonzero(edits.is_deleted & ~is_found)),
     )
 
@@ -213,13 +232,13 @@ def _notes(
         center = strips.frames.center
         length = np.linalg.norm(np.diff(center, axis=1), axis=2).sum(axis=1)
         away = closest_point(center[:, 0].astype(np.float64), head).distance
-        far = int(np.count_nonzero(away > _FAR * length))
+        far = int(np.count_nonzero(away > _MAX_ROOT_GAP * length))
         if far:
             notes.append(f"{far:,} of the kept cards begin away from the head")
     return tuple(notes)
 
 
-def _skin_moves(before: MadeCards, head: Surface | None) -> Floats:
+def _skin_moves(before: CardRecord, head: Surface | None) -> Floats:
     """Motion of the skin under each card on record, (n, 4, 4), world space; the identity where it
     has hardly moved, or if it is another skin.
 
@@ -230,36 +249,36 @@ def _skin_moves(before: MadeCards, head: Surface | None) -> Floats:
     if head is None or len(head.triangles) != before.triangle_count:
         return moves
     found = _frames(head.corners[before.triangle]) @ np.linalg.inv(_frames(before.corners))
-    gap = np.linalg.norm(_moved_each(before.places, found) - before.places, axis=2).max(axis=1)
+    gap = np.linalg.norm(_transform_each(before.places, found) - before.places, axis=2).max(axis=1)
     length = np.linalg.norm(np.diff(before.places[:, :4], axis=1), axis=2).sum(axis=1)
-    has_moved = gap > _STILL * length
+    has_moved = gap > _MIN_MOTION * length
     moves[has_moved] = found[has_moved]
     return moves
 
 
-def _moved_each(points: Floats, moves: Floats) -> Floats:
+def _transform_each(points: Floats, moves: Floats) -> Floats:
     """Points (n, m, 3) moved by matrices (n, 4, 4)."""
     return np.einsum("nij,nmj->nmi", moves[:, :3, :3], points) + moves[:, None, :3, 3]
 
 
-def _carried(edits: CardEdits, before: MadeCards, moves: Floats) -> Floats:
+def _carried_vertices(edits: CardEdits, before: CardRecord, moves: Floats) -> Floats:
     """The vertices of the kept pieces, (n, 3) float32 [m, world], carried by the skin under the
     roots of their cards; own cards by the skin under the nearest card."""
     places = moved(edits.surface.positions, edits.matrix)
-    count = len(edits.number)
+    count = len(edits.card_of_piece)
     if not count:
         return places
     owner = np.zeros(len(places), np.int64)
-    owner[edits.surface.triangles] = edits.piece[:, None]
+    owner[edits.surface.triangles] = edits.piece_of_triangle[:, None]
     middle = means_by(owner, places, count)
     centers = before.places[:, :4].mean(axis=1)
-    number = np.array(edits.number)
+    number = np.array(edits.card_of_piece)
     for index in np.flatnonzero(number < 0):
         number[index] = np.linalg.norm(centers - middle[index], axis=1).argmin()
     is_still = np.array_equal(moves[number], np.tile(np.eye(4), (count, 1, 1)))
     if is_still:
         return places
-    return _moved_each(places[:, None], moves[number][owner])[:, 0].astype(np.float32)
+    return _transform_each(places[:, None], moves[number][owner])[:, 0].astype(np.float32)
 
 
 def _frames(corners: Floats) -> Floats:
@@ -267,7 +286,7 @@ def _frames(corners: Floats) -> Floats:
     a, b, c = np.moveaxis(corners.astype(np.float64), 1, 0)
     normal = np.cross(b - a, c - a)
     size = np.sqrt(np.maximum(np.linalg.norm(normal, axis=1), 1.0e-18))
-    x, z = unit_or(b - a, (1.0, 0.0, 0.0), _SHORTEST), unit_or(normal, (0.0, 0.0, 1.0), 1.0e-30)
+    x, z = unit_or(b - a, (1.0, 0.0, 0.0), _MIN_LENGTH), unit_or(normal, (0.0, 0.0, 1.0), 1.0e-30)
     frames = np.zeros((len(corners), 4, 4))
     frames[:, :3, :3] = np.stack([x, np.cross(z, x), z], axis=2) * size[:, None, None]
     frames[:, :3, 3] = corners.mean(axis=1)
@@ -275,8 +294,8 @@ def _frames(corners: Floats) -> Floats:
     return frames
 
 
-def _tiles_now(
-    edits: CardEdits, record: MadeCards, ancestor: Ints, number: Ints, baked: bool
+def _current_tiles(
+    edits: CardEdits, record: CardRecord, ancestor: Ints, number: Ints, is_baked: bool
 ) -> Ints:
     """The tile of each piece in the current atlas, (piece_count,).
 
@@ -284,26 +303,30 @@ def _tiles_now(
     changed tile, it is the tile of most new cards whose cards on record had that tile.
     """
     old = edits.record
-    then = tiles_of(edits, old.grid)
+    old_tile = piece_tiles(edits, old.grid)
     is_same_grid = record.grid == old.grid
-    chosen = then % max(record.grid.tile_count, 1)
-    if baked or not is_same_grid:
-        follows = np.flatnonzero(ancestor >= 0)
-        for index, tile in enumerate(then):
-            now = record.tile[follows][old.tile[ancestor[follows]] == tile]
+    chosen = old_tile % max(record.grid.tile_count, 1)
+    if is_baked or not is_same_grid:
+        matched = np.flatnonzero(ancestor >= 0)
+        for index, tile in enumerate(old_tile):
+            now = record.tile[matched][old.tile[ancestor[matched]] == tile]
             if len(now):
                 chosen[index] = np.bincount(now).argmax()
-    is_left = (edits.number >= 0) & (number < len(record))
-    is_left[is_left] = old.tile[edits.number[is_left]] == then[is_left]
-    chosen[is_left] = record.tile[number[is_left]]
+    is_unchanged = (edits.card_of_piece >= 0) & (number < len(record))
+    is_unchanged[is_unchanged] = (
+        old.tile[edits.card_of_piece[is_unchanged]] == old_tile[is_unchanged]
+    )
+    chosen[is_unchanged] = record.tile[number[is_unchanged]]
     return chosen.astype(np.int32)
 
 
-def tiles_of(edits: CardEdits, grid: AtlasGrid) -> Ints:
+def piece_tiles(edits: CardEdits, grid: AtlasGrid) -> Ints:
     """The tile that holds the middle of each piece's UVs, (piece_count,)."""
     assert edits.surface.corner_uv is not None
     flat = edits.surface.corner_uv.reshape(-1, 2)
-    return grid.tile_at(means_by(np.repeat(edits.piece, 3), flat, len(edits.number)))
+    return grid.tile_at(
+        means_by(np.repeat(edits.piece_of_triangle, 3), flat, len(edits.card_of_piece))
+    )
 
 
 def _adopted(
@@ -311,11 +334,11 @@ def _adopted(
     cards: UncutCards,
     settings: CardSettings,
     head: Surface | None,
-    placed: _Placed,
+    placed: _PlacedPieces,
 ) -> tuple[CardMesh, Strips]:
     """The kept cards as a mesh with their numbers, and as strips in the order of the pieces."""
     row_count = cards.strips.width.shape[1]
-    if not len(edits.number):
+    if not len(edits.card_of_piece):
         none = np.zeros(0, np.int32)
         empty = np.zeros((0, 3), np.float32)
         flat = np.zeros((0, 2), np.float32)
@@ -330,16 +353,16 @@ def _adopted(
             along=np.zeros(0, np.float32),
         )
         return mesh, cards.strips.of(none)
-    uv = _on_tiles(edits, cards.atlas, placed.tile)
+    uv = _uvs_on_tiles(edits, cards.atlas, placed.tile)
     triangles: Ints = edits.surface.triangles
     if np.linalg.det(edits.matrix[:3, :3]) < 0.0:  # a mirrored object turns its faces around
         triangles, uv = triangles[:, ::-1], uv[:, ::-1]
     surface = Surface(placed.positions, triangles, uv)
     found = adopt_cards(surface, head, direction="up", place="the edited cards")
-    adopted = _facing_as_before(found.mesh, found.corner)
+    adopted = _with_original_facing(found.mesh, found.corner)
     # pieces share no vertices, so each is a card of its own
-    of_card = np.zeros(len(edits.number), np.int32)
-    of_card[adopted.card] = edits.piece
+    of_card = np.zeros(len(edits.card_of_piece), np.int32)
+    of_card[adopted.card] = edits.piece_of_triangle
     piece = of_card[adopted.card]
     owner = np.zeros(len(adopted.positions), np.int64)
     owner[adopted.triangles] = piece[:, None]
@@ -348,11 +371,11 @@ def _adopted(
     mesh = replace(adopted, card=placed.number[piece], group=unknown, layer=unknown, tile=unknown)
     if cards.center is not None:
         mesh = _with_normals_of_volume(mesh, cards.center, across, settings)
-    strips = _strips(adopted, owner, across, (len(edits.number), row_count), settings)
+    strips = _strips(adopted, owner, across, (len(edits.card_of_piece), row_count), settings)
     return mesh, strips
 
 
-def _facing_as_before(mesh: CardMesh, triangles: Ints) -> CardMesh:
+def _with_original_facing(mesh: CardMesh, triangles: Ints) -> CardMesh:
     """With all faces oriented as the artist has left them, and normals on that side."""
     a, b, c = np.moveaxis(mesh.positions[triangles].astype(np.float64), 1, 0)
     outward, total = np.cross(b - a, c - a), np.zeros((len(mesh.positions), 3))
@@ -361,17 +384,17 @@ def _facing_as_before(mesh: CardMesh, triangles: Ints) -> CardMesh:
     return replace(mesh, triangles=triangles, normal=unit_or(total, mesh.normal, 1.0e-20))
 
 
-def _on_tiles(edits: CardEdits, grid: AtlasGrid, tile: Ints) -> Floats:
+def _uvs_on_tiles(edits: CardEdits, grid: AtlasGrid, tile: Ints) -> Floats:
     """UVs at the same places within their tiles of the current atlas, (triangle_count, 3, 2)."""
     uv, old = edits.surface.corner_uv, edits.record.grid
     assert uv is not None
-    then = tiles_of(edits, old)
-    is_same = (then == tile) & (grid == old)
-    one, two = (_rectangles(each, which) for each, which in ((old, then), (grid, tile)))
-    start, size = (each[edits.piece][:, None] for each in one)
-    new_start, new_size = (each[edits.piece][:, None] for each in two)
+    old_tile = piece_tiles(edits, old)
+    is_same = (old_tile == tile) & (grid == old)
+    one, two = (_rectangles(each, which) for each, which in ((old, old_tile), (grid, tile)))
+    start, size = (each[edits.piece_of_triangle][:, None] for each in one)
+    new_start, new_size = (each[edits.piece_of_triangle][:, None] for each in two)
     there = new_start + (uv - start) / size * new_size
-    return np.where(is_same[edits.piece][:, None, None], uv, there).astype(np.float32)
+    return np.where(is_same[edits.piece_of_triangle][:, None, None], uv, there).astype(np.float32)
 
 
 def _rectangles(grid: AtlasGrid, tile: Ints) -> tuple[Floats, Floats]:
@@ -410,15 +433,17 @@ def _strips(
     """
     count, row_count = shape
     left, right = _edges(mesh, owner, across, count, row_count)
-    between = right - left
-    width = np.linalg.norm(between, axis=2)
+    across_card = right - left
+    width = np.linalg.norm(across_card, axis=2)
     middle = (left + right) / 2.0
     tangent = tangents(middle)
     total = np.zeros((count, 3))
     np.add.at(total, owner, mesh.normal.astype(np.float64))
-    facing = np.broadcast_to(unit_or(total, (0.0, 0.0, 1.0), _SHORTEST)[:, None], middle.shape)
-    side = between - tangent * np.einsum("cri,cri->cr", between, tangent)[..., None]
-    side = unit_or(side, unit_or(np.cross(tangent, facing), (1.0, 0.0, 0.0), _SHORTEST), _SHORTEST)
+    facing = np.broadcast_to(unit_or(total, (0.0, 0.0, 1.0), _MIN_LENGTH)[:, None], middle.shape)
+    side = across_card - tangent * np.einsum("cri,cri->cr", across_card, tangent)[..., None]
+    side = unit_or(
+        side, unit_or(np.cross(tangent, facing), (1.0, 0.0, 0.0), _MIN_LENGTH), _MIN_LENGTH
+    )
     normal = np.cross(side, tangent)
     # a flipped card has its left edge on the right
     is_inward = np.einsum("cri,cri->c", normal, facing) < 0.0
@@ -453,10 +478,10 @@ def _edges(
         pieces, first = np.unique(piece[cut][order], return_index=True)
         last = np.append(first[1:], len(order)) - 1
         found[0, pieces, row], found[1, pieces, row] = place[order[first]], place[order[last]]
-    return _filled(found[0]), _filled(found[1])
+    return _filled_rows(found[0]), _filled_rows(found[1])
 
 
-def _filled(rows: Floats) -> Floats:
+def _filled_rows(rows: Floats) -> Floats:
     """Rows where no edge was found, filled with the place of the nearest row that has one."""
     number = np.arange(rows.shape[1])
     for piece in np.flatnonzero(np.isnan(rows[..., 0]).any(axis=1)):
@@ -466,16 +491,16 @@ def _filled(rows: Floats) -> Floats:
     return rows
 
 
-def _with(strips: Strips, numbers: Ints, changed: Strips, total: int) -> Strips:
+def _with_replaced(strips: Strips, numbers: Ints, changed: Strips, total: int) -> Strips:
     """All strips, with `changed` ones at these numbers, which may extend the list."""
     names = ("center", "tangent", "normal", "side")
     parts = []
     for name in names:
         values = getattr(strips.frames, name)
-        room = np.zeros((total, *values.shape[1:]), np.float32)
-        room[: len(values)] = values
-        room[numbers] = getattr(changed.frames, name)
-        parts.append(room)
+        values_of_all = np.zeros((total, *values.shape[1:]), np.float32)
+        values_of_all[: len(values)] = values
+        values_of_all[numbers] = getattr(changed.frames, name)
+        parts.append(values_of_all)
     width = np.zeros((total, strips.width.shape[1]), np.float32)
     width[: len(strips)] = strips.width
     width[numbers] = changed.width

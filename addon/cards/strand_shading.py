@@ -20,19 +20,19 @@ from .card_mesh import CardMesh
 from .sort import card_of_vertex
 
 #: Pairs of vertices and strands in one batch.
-_PAIRS = 1 << 18
+_MAX_PAIRS = 1 << 18
 #: Minimum distance of columns [m].
 _MIN_WIDTH = 1.0e-12
 #: Minimum visibility of a strand.
-_MIN_SEEN = 1.0e-6
+_MIN_VISIBILITY = 1.0e-6
 #: Hair is short if it is shorter than this many times the depth of its card.
-_SLENDER = 8.0
+_MAX_SHORT_RATIO = 8.0
 #: Extent of an even distribution over its standard deviation.
-EXTENT = np.sqrt(12.0)
+EXTENT_OVER_DEVIATION = np.sqrt(12.0)
 
 
 @dataclass(frozen=True, eq=False)
-class TakenOver:
+class StrandShading:
     """Values of each vertex of a mesh.
 
     occlusion: (vertex_count,) float32: 1 open, 0 occluded.
@@ -48,9 +48,9 @@ class TakenOver:
     depth: Floats
 
 
-def taken_over(
+def shading_from_strands(
     mesh: CardMesh, grid: Floats, occlusion: Floats, light: Floats | None, card: Ints
-) -> TakenOver:
+) -> StrandShading:
     """The values that a mesh takes over.
 
     Args:
@@ -65,55 +65,63 @@ def taken_over(
     order = np.argsort(card, kind="stable")[np.count_nonzero(card < 0) :]
     count = np.bincount(card[order])
     start = piece_starts(count)
-    own = card_of_vertex(mesh) % len(count)
+    own_card = card_of_vertex(mesh) % len(count)
     side, reach = _rows(mesh)
     plane = unit_or(np.cross(side, mesh.tangent), mesh.normal)
-    occluded, depth = np.ones(len(own), np.float32), np.zeros(len(own), np.float32)
-    lit = None if light is None else np.zeros((len(own), light.shape[2]), np.float32)
+    occluded, depth = np.ones(len(own_card), np.float32), np.zeros(len(own_card), np.float32)
+    lit = None if light is None else np.zeros((len(own_card), light.shape[2]), np.float32)
     # vertices of cards with similar numbers of strands together, so that little is left empty
-    vertices = np.argsort(count[own], kind="stable")
+    vertices = np.argsort(count[own_card], kind="stable")
     first = 0
     while first < len(vertices):
-        most = int(count[own[vertices[min(first + _PAIRS // 64, len(vertices)) - 1]]])
-        chosen = vertices[first : first + max(_PAIRS // most, 1)]
-        chosen = chosen[count[own[chosen]] <= most]
-        place = np.arange(most)
-        is_there = place < count[own[chosen], None]
-        strand = order[start[own[chosen], None] + np.where(is_there, place, 0)]
+        max_strands = int(
+            count[own_card[vertices[min(first + _MAX_PAIRS // 64, len(vertices)) - 1]]]
+        )
+        chosen = vertices[first : first + max(_MAX_PAIRS // max_strands, 1)]
+        chosen = chosen[count[own_card[chosen]] <= max_strands]
+        place = np.arange(max_strands)
+        is_there = place < count[own_card[chosen], None]
+        strand = order[start[own_card[chosen], None] + np.where(is_there, place, 0)]
         along = mesh.along[chosen]
-        away = _at(grid, strand, along) - mesh.positions[chosen, None]
+        away = _interpolated(grid, strand, along) - mesh.positions[chosen, None]
         aside = np.abs(np.einsum("vsi,vi->vs", away, side[chosen]))
         weight = np.maximum(1.0 - aside / reach[chosen, None], 0.0) * is_there
         # where no strand is near, all count equally
         weight = np.where(weight.sum(axis=1, keepdims=True) > 0.0, weight, is_there)
-        occluded[chosen] = _mean(_at(occlusion[..., None], strand, along), weight)[:, 0]
+        occluded[chosen] = _weighted_mean(
+            _interpolated(occlusion[..., None], strand, along), weight
+        )[:, 0]
         height = np.einsum("vsi,vi->vs", away, plane[chosen])[..., None]
-        variance = _mean(height**2, weight) - _mean(height, weight) ** 2
-        extent = EXTENT * np.sqrt(np.maximum(variance[:, 0], 0.0))
-        is_short = _mean(length[strand][..., None], weight)[:, 0] < _SLENDER * extent
+        variance = _weighted_mean(height**2, weight) - _weighted_mean(height, weight) ** 2
+        extent = EXTENT_OVER_DEVIATION * np.sqrt(np.maximum(variance[:, 0], 0.0))
+        is_short = (
+            _weighted_mean(length[strand][..., None], weight)[:, 0] < _MAX_SHORT_RATIO * extent
+        )
         depth[chosen] = np.where(is_short, 0.0, extent)
         if light is not None and lit is not None:
-            values = _at(light, strand, along)
-            lit[chosen] = _mean(values, weight * np.maximum(values[..., 0], _MIN_SEEN))
+            values = _interpolated(light, strand, along)
+            lit[chosen] = _weighted_mean(
+                values, weight * np.maximum(values[..., 0], _MIN_VISIBILITY)
+            )
         first += len(chosen)
-    return TakenOver(occluded, lit, depth)
+    return StrandShading(occluded, lit, depth)
 
 
-def _mean(values: Floats, weight: Floats) -> Floats:
+def _weighted_mean(values: Floats, weight: Floats) -> Floats:
     """Weighted means over strands, (vertices, k), of (vertices, strands, k); weights
     (vertices, strands)."""
     mean: Floats = np.einsum("vsk,vs->vk", values, weight) / weight.sum(axis=1, keepdims=True)
     return mean
 
 
-def _at(values: Floats, strand: Ints, along: Floats) -> Floats:
+def _interpolated(values: Floats, strand: Ints, along: Floats) -> Floats:
     """Values interpolated between CVs, (n, m, channels), of strands (n, m) at parts (n,) of their
     length."""
     place = along * (values.shape[1] - 1)
     low = np.minimum(place.astype(np.int64), values.shape[1] - 2)
     fraction = (place - low)[:, None, None]
-    between: Floats = values[strand, low[:, None]] * (1.0 - fraction)
-    return between + values[strand, low[:, None] + 1] * fraction
+    before: Floats = values[strand, low[:, None]] * (1.0 - fraction)
+    return before + values[strand, low[:, None] + 1] * fraction
 
 
 def _rows(mesh: CardMesh) -> tuple[Floats, Floats]:
@@ -122,12 +130,12 @@ def _rows(mesh: CardMesh) -> tuple[Floats, Floats]:
     card = card_of_vertex(mesh)
     order = np.lexsort((mesh.uv[:, 0], mesh.along, card))
     is_other = (np.diff(card[order]) != 0) | (np.diff(mesh.along[order]) != 0.0)
-    begins = np.concatenate([[True], is_other])
-    first = np.flatnonzero(begins)
+    is_row_start = np.concatenate([[True], is_other])
+    first = np.flatnonzero(is_row_start)
     last = np.append(first[1:], len(order)) - 1
     across = mesh.positions[order[last]] - mesh.positions[order[first]]
     width = np.maximum(np.linalg.norm(across, axis=1), _MIN_WIDTH)
     row = np.empty(len(order), np.int64)
-    row[order] = np.cumsum(begins) - 1
+    row[order] = np.cumsum(is_row_start) - 1
     reach = np.maximum(width / np.maximum(last - first, 1), _MIN_WIDTH)
     return (across / width[:, None])[row], reach[row]

@@ -17,7 +17,7 @@ from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
 from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.cards.sort import card_of_vertex
 from hairloom.addon.cards.steps import result_of
-from hairloom.addon.cards.taken_over import TakenOver, taken_over
+from hairloom.addon.cards.strand_shading import StrandShading, shading_from_strands
 from hairloom.addon.groom.settings import GuideSettings
 from hairloom.addon.params import SettingsMap
 from hairloom.addon.rig_flow import Rig
@@ -55,10 +55,10 @@ def ladder() -> CardMesh:
     )
 
 
-def of_two(grid: np.ndarray, light: np.ndarray | None = None) -> TakenOver:
+def of_two(grid: np.ndarray, light: np.ndarray | None = None) -> StrandShading:
     """A card of two strands."""
     occlusion = np.repeat([[0.2], [0.8]], 5, 1)
-    return taken_over(ladder(), grid, occlusion, light, np.array([0, 0]))
+    return shading_from_strands(ladder(), grid, occlusion, light, np.array([0, 0]))
 
 
 def upright(x: float, y: float = 0.0) -> np.ndarray:
@@ -72,7 +72,7 @@ def test_each_edge_has_the_occlusion_of_the_strand_that_runs_along_it(turn: floa
     occlusion = np.array([np.linspace(0.1, 0.3, 5), np.linspace(0.5, 0.9, 5), np.full(5, 7.0)])
     normal = np.tile([np.sin(turn), -np.cos(turn), 0.0], (6, 1))
     mesh = replace(ladder(), normal=normal)
-    found = taken_over(mesh, grid, occlusion, None, np.array([0, 0, -1])).occlusion
+    found = shading_from_strands(mesh, grid, occlusion, None, np.array([0, 0, -1])).occlusion
     np.testing.assert_allclose(found, [0.1, 0.5, 0.2, 0.7, 0.3, 0.9], rtol=1e-5)
 
 
@@ -106,10 +106,12 @@ def test_depth_is_that_of_even_strands() -> None:
     grid = np.stack([upright(0.0, y) for y in heights])
     card = np.zeros(len(grid), int)
     turned = replace(ladder(), normal=np.tile([0.0, -0.6, 0.8], (6, 1)))  # out of the plane
-    found = taken_over(turned, grid, np.ones(grid.shape[:2]), None, card)
+    found = shading_from_strands(turned, grid, np.ones(grid.shape[:2]), None, card)
     np.testing.assert_allclose(found.depth, 0.04, rtol=0.02)
     assert found.light is None
-    short = taken_over(ladder(), grid * [1.0, 6.0, 1.0], np.ones(grid.shape[:2]), None, card)
+    short = shading_from_strands(
+        ladder(), grid * [1.0, 6.0, 1.0], np.ones(grid.shape[:2]), None, card
+    )
     assert not short.depth.any()
     flat = of_two(np.stack([upright(-0.01), upright(0.01)]))
     np.testing.assert_allclose(flat.depth, 0.0, atol=1e-6)
