@@ -12,7 +12,7 @@ from hairloom.addon import registration
 REPOSITORY = Path(__file__).resolve().parents[2]
 sys.path.append(str(REPOSITORY / "tests" / "window"))
 import panel_texts  # noqa: E402
-from guide_panels import OTHERS, PICTURES, pictured  # noqa: E402
+from guide_panels import OTHER_PICTURES, PICTURES, is_pictured  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("extension")
 
@@ -22,7 +22,7 @@ def panels():
 
 
 def test_every_panel_is_in_a_picture():
-    assert [name for name in panels() if not pictured(name)] == []
+    assert [name for name in panels() if not is_pictured(name)] == []
 
 
 def test_no_picture_is_of_a_panel_that_is_gone():
@@ -33,7 +33,7 @@ def test_no_picture_is_of_a_panel_that_is_gone():
 def test_the_user_guide_shows_all_of_these_pictures():
     guide = (REPOSITORY / "docs" / "user_guide.md").read_text(encoding="utf-8")
     shown = set(re.findall(r"!\[[^\]]+\]\(images/panel_(\w+)\.png\)", guide))
-    assert shown == {*PICTURES, *OTHERS}
+    assert shown == {*PICTURES, *OTHER_PICTURES}
 
 
 @pytest.mark.slow
@@ -52,4 +52,4 @@ def test_what_is_kept_of_panels_has_labels_defaults_buttons_and_keyframes():
 
 
 def test_a_panel_that_is_in_none_is_found():
-    assert not pictured("HAIRLOOM_PT_data_braids") and pictured("HAIRLOOM_PT_sidebar_look")
+    assert not is_pictured("HAIRLOOM_PT_data_braids") and is_pictured("HAIRLOOM_PT_sidebar_look")

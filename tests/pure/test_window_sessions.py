@@ -21,7 +21,7 @@ def test_the_modules_that_sessions_look_at_are_there() -> None:
         path = ADDON.joinpath(*module.split("."))
         assert path.with_suffix(".py").is_file() or (path / "__init__.py").is_file(), module
     texts = " ".join(file.read_text(encoding="utf-8") for file in WINDOW.glob("*.py"))
-    assert set(re.findall(r'of_hairloom\("([^"]*)"\)', texts)) == set(table)
+    assert set(re.findall(r'hairloom_module\("([^"]*)"\)', texts)) == set(table)
 
 
 #: Functions that wait for ticks on purpose, to show that nothing happens meanwhile.

@@ -13,7 +13,7 @@ import bpy
 import driver
 import numpy as np
 from bpy_extras.view3d_utils import location_3d_to_region_2d
-from driver import of_hairloom, until
+from driver import hairloom_module, wait_until
 from mathutils import Euler, Vector
 
 #: Buttons of our panel, the first of its tab: x from the sidebar's left edge as a fraction of its
@@ -64,14 +64,18 @@ def open_our_sidebar() -> Iterator[int]:
 
 def sidebar_button(operator: str) -> tuple[int, int]:
     """The place of a button of our panel in the window."""
-    sidebar, (across, below) = region("UI"), SIDEBAR_BUTTONS[operator]
+    sidebar, (x_fraction, offset) = region("UI"), SIDEBAR_BUTTONS[operator]
     scale = bpy.context.preferences.system.ui_scale
     top = sidebar.y + sidebar.height
-    return int(sidebar.x + across * sidebar.width), int(top - below * scale)
+    return int(sidebar.x + x_fraction * sidebar.width), int(top - offset * scale)
 
 
-def field(
-    area: Any, kind: str, path: str, across: float = 0.7, expected: tuple[int, int] | None = None
+def find_field(
+    area: Any,
+    kind: str,
+    path: str,
+    x_fraction: float = 0.7,
+    expected: tuple[int, int] | None = None,
 ) -> Iterator[int]:
     """Move the mouse over a region of an area until it is on the field of a property.
 
@@ -83,14 +87,16 @@ def field(
     Returns:
         the field's place in the window.
     """
-    part = next(each for each in area.regions if each.type == kind)
-    x = part.x + int(across * part.width)
-    rows = [(x, y) for y in range(part.y + part.height - 5, part.y + 5, -12)]
+    target_region = next(each for each in area.regions if each.type == kind)
+    x = target_region.x + int(x_fraction * target_region.width)
+    rows = [
+        (x, y) for y in range(target_region.y + target_region.height - 5, target_region.y + 5, -12)
+    ]
     # Blender notices a jump of the mouse later than a move by a row
     for x, y in ([expected] * 4 if expected else []) + rows:
         bpy.context.window.event_simulate("MOUSEMOVE", "NOTHING", x=x, y=y)
         yield 1
-        with bpy.context.temp_override(area=area, region=part):
+        with bpy.context.temp_override(area=area, region=target_region):
             found = bpy.context.property
         if found is not None and found[1].endswith(path):
             return x, y
@@ -149,7 +155,7 @@ def look_from_front(distance: float) -> None:
     view.view_distance = distance
 
 
-def share_of_view(obj: Any) -> float:
+def height_in_view(obj: Any) -> float:
     """The height of an object in the viewport, as a fraction of the viewport's height."""
     view = region("WINDOW")
     corners = (obj.matrix_world @ Vector(corner) for corner in obj.bound_box)
@@ -172,36 +178,40 @@ def pixels(label: str) -> np.ndarray:
     return viewport_pixels(driver.screenshot(label))
 
 
-def picture(label: str) -> Iterator[int]:
+def redrawn_pixels(label: str) -> Iterator[int]:
     """As `pixels`, once the viewport shows all changes."""
     yield
     return pixels(label)
 
 
-def changed(before: np.ndarray, after: np.ndarray, at_least: float = 0.1) -> float:
+def changed_fraction(before: np.ndarray, after: np.ndarray, threshold: float = 0.1) -> float:
     """The fraction of pixels that differ by more than Blender's anti-aliasing does."""
-    return float((np.abs(after - before).max(axis=2) > at_least).mean())
+    return float((np.abs(after - before).max(axis=2) > threshold).mean())
 
 
-def pixels_at_rest(label: str) -> Iterator[int]:
-    """As `picture`, once Blender has drawn all samples of its anti-aliasing."""
-    return (yield from at_rest(label, lambda: pixels(label)))
+def still_pixels(label: str) -> Iterator[int]:
+    """As `redrawn_pixels`, once Blender has drawn all samples of its anti-aliasing."""
+    return (yield from wait_for_still_picture(label, lambda: pixels(label)))
 
 
-def at_rest(label: str, look: Callable[[], np.ndarray], count: int = 3) -> Iterator[int]:
+def wait_for_still_picture(
+    label: str, take_picture: Callable[[], np.ndarray], count: int = 3
+) -> Iterator[int]:
     """A picture that has been the same for this many redraws in a row."""
-    seen: list[np.ndarray] = []
-    while len(seen) < count or not all(np.array_equal(each, seen[-1]) for each in seen[-count:]):
-        assert len(seen) < 500, f"{label} does not come to rest"
+    pictures: list[np.ndarray] = []
+    while len(pictures) < count or not all(
+        np.array_equal(each, pictures[-1]) for each in pictures[-count:]
+    ):
+        assert len(pictures) < 500, f"{label} does not come to rest"
         yield
-        seen.append(look())
-    return seen[-1]
+        pictures.append(take_picture())
+    return pictures[-1]
 
 
-def hair_is_made() -> Iterator[int]:
+def wait_for_hair() -> Iterator[int]:
     """Wait until the hair of all previews is made, which happens in a thread."""
-    live = of_hairloom("previews")
-    yield from until(lambda: all(each.is_made for each in live.sessions()), "no hair is made")
+    live = hairloom_module("previews")
+    yield from wait_until(lambda: all(each.is_made for each in live.sessions()), "no hair is made")
 
 
 def file_browser() -> Any:
@@ -211,17 +221,17 @@ def file_browser() -> Any:
     return next((area for area in areas if area.type == "FILE_BROWSER"), None)
 
 
-def redrawn(area: Any) -> Iterator[int]:
+def redraw(area: Any) -> Iterator[int]:
     """Redraw an area: Blender draws tagged areas and runs ticks once per iteration of its loop."""
     area.tag_redraw()
     yield 1
     yield 1
 
 
-def confirm_file(folder: Path | None = None) -> Iterator[int]:
+def confirm_file_browser(folder: Path | None = None) -> Iterator[int]:
     """Confirm a file browser that fills the window, optionally in this folder."""
-    yield from until(lambda: file_browser() is not None, "no file browser opens")
-    yield from redrawn(file_browser())
+    yield from wait_until(lambda: file_browser() is not None, "no file browser opens")
+    yield from redraw(file_browser())
     browser = file_browser()
     if folder is not None:
         browser.spaces.active.params.directory = bytes(str(folder), "utf-8")
@@ -229,11 +239,11 @@ def confirm_file(folder: Path | None = None) -> Iterator[int]:
     # folder changed
     x, y = browser.x + browser.width // 2, browser.y + browser.height // 2
     bpy.context.window.event_simulate("MOUSEMOVE", "NOTHING", x=x, y=y)
-    yield from redrawn(browser)
+    yield from redraw(browser)
     main = next(each for each in browser.regions if each.type == "WINDOW")
     with bpy.context.temp_override(area=browser, region=main):
         bpy.ops.file.execute("INVOKE_DEFAULT")
-    yield from until(lambda: file_browser() is None, "the file browser stays")
+    yield from wait_until(lambda: file_browser() is None, "the file browser stays")
 
 
 def viewport_middle(screen: np.ndarray, reach: int = 20) -> np.ndarray:
@@ -243,9 +253,9 @@ def viewport_middle(screen: np.ndarray, reach: int = 20) -> np.ndarray:
     return _rectangle(screen, x - reach, x + reach, y - reach, y + reach)
 
 
-def side_by_side() -> None:
+def arrange_side_by_side() -> None:
     """Give each window its part of the screen, so that none covers another."""
-    found = subprocess.run(
+    window_ids = subprocess.run(
         ["xdotool", "search", "--onlyvisible", "--class", "blender"],
         check=True,
         capture_output=True,
@@ -254,13 +264,13 @@ def side_by_side() -> None:
     screen = subprocess.run(
         ["xdotool", "getdisplaygeometry"], check=True, capture_output=True, text=True
     ).stdout.split()
-    width, height = int(screen[0]) // len(found), screen[1]
-    for number, window in enumerate(found):
+    width, height = int(screen[0]) // len(window_ids), screen[1]
+    for number, window in enumerate(window_ids):
         subprocess.run(["xdotool", "windowsize", window, str(width), height], check=True)
         subprocess.run(["xdotool", "windowmove", window, str(number * width), "0"], check=True)
 
 
-def picture_of(window: Any, area: Any, screen: np.ndarray) -> np.ndarray:
+def area_pixels(window: Any, area: Any, screen: np.ndarray) -> np.ndarray:
     """The content of a window's area, as in `viewport_pixels`."""
     part = next(each for each in area.regions if each.type == "WINDOW")
     x, y = window.x + part.x, window.y + part.y

@@ -13,9 +13,9 @@ from typing import Any
 import bpy
 
 #: integers are drawn from this fraction of their slider, since many strands only take long
-SHARE_OF_SLIDER = 0.05
+SLIDER_FRACTION = 0.05
 #: actions add no objects to more than these
-MOST_OBJECTS = 12
+MAX_OBJECTS = 12
 
 
 def action(weight: int = 1) -> Callable[..., Any]:
@@ -36,7 +36,7 @@ class Dice:
     """Random choices from a seed, and the folder for files."""
 
     def __init__(self, seed: int, folder: Path) -> None:
-        self.chance, self.folder = random.Random(seed), folder
+        self.random, self.folder = random.Random(seed), folder
 
     def pick(self, things: Any) -> Any:
         """A random one of these things.
@@ -47,13 +47,13 @@ class Dice:
         things = list(things)
         if not things:
             raise RuntimeError("there is none")
-        return self.chance.choice(things)
+        return self.random.choice(things)
 
-    def often(self, share: float) -> bool:
-        return self.chance.random() < share
+    def happens(self, probability: float) -> bool:
+        return self.random.random() < probability
 
     def action(self, actions: list[Callable[["Dice"], Any]]) -> Callable[["Dice"], Any]:
-        return self.chance.choices(actions, [each.weight for each in actions])[0]
+        return self.random.choices(actions, [each.weight for each in actions])[0]
 
     def note(self, text: str) -> None:
         print(f"      {text}", flush=True)
@@ -64,18 +64,18 @@ class Dice:
     def value(self, prop: Any) -> Any:
         """A random value of a property, rarely an end of its hard range."""
         if prop.type == "BOOLEAN":
-            return self.often(0.5)
+            return self.happens(0.5)
         if prop.type == "ENUM":
             names = [item.identifier for item in prop.enum_items]
             return self.pick(names[:2] if names[0].isdigit() else names)
         if prop.type == "INT":
-            width = max(int((prop.soft_max - prop.soft_min) * SHARE_OF_SLIDER), 2)
-            low = prop.hard_min if self.often(0.1) else prop.soft_min
-            return self.chance.randint(low, min(prop.soft_min + width, prop.hard_max))
+            width = max(int((prop.soft_max - prop.soft_min) * SLIDER_FRACTION), 2)
+            low = prop.hard_min if self.happens(0.1) else prop.soft_min
+            return self.random.randint(low, min(prop.soft_min + width, prop.hard_max))
         ends = (prop.hard_min, prop.soft_min, prop.soft_max)
         count = prop.array_length
         values = [
-            self.pick(ends) if self.often(0.1) else self.chance.uniform(*ends[1:])
+            self.pick(ends) if self.happens(0.1) else self.random.uniform(*ends[1:])
             for _ in range(max(count, 1))
         ]
         return values if count else values[0]
@@ -90,7 +90,7 @@ def views() -> list[Any]:
     return [area for area in bpy.context.window.screen.areas if area.type == "VIEW_3D"]
 
 
-def in_view() -> Any:
+def viewport_context() -> Any:
     """A context as with the pointer in the 3D view, if there is one."""
     if not views():
         return nullcontext()
@@ -99,14 +99,14 @@ def in_view() -> Any:
     return bpy.context.temp_override(area=area, region=region)
 
 
-def call(dice: Dice, operator: str, *how: Any, **settings: Any) -> None:
-    dice.note(f"{operator} {' '.join(map(str, how))} {settings or ''}")
-    room, name = operator.split(".")
-    with in_view():
-        getattr(getattr(bpy.ops, room), name)(*how, **settings)
+def call(dice: Dice, operator: str, *arguments: Any, **settings: Any) -> None:
+    dice.note(f"{operator} {' '.join(map(str, arguments))} {settings or ''}")
+    module, name = operator.split(".")
+    with viewport_context():
+        getattr(getattr(bpy.ops, module), name)(*arguments, **settings)
 
 
-def clicked(dice: Dice, operator: str, **settings: Any) -> None:
+def press_button(dice: Dice, operator: str, **settings: Any) -> None:
     """Call an operator as a button does: with an undo step, and long work in the window."""
     call(dice, operator, "INVOKE_DEFAULT", True, **settings)
 
@@ -118,17 +118,17 @@ def select(obj: Any) -> None:
     bpy.context.view_layer.objects.active = obj
 
 
-def step(name: str) -> None:
+def push_undo_step(name: str) -> None:
     """Push an undo step for a script's changes; without one, Blender can crash when it undoes past
     them."""
     bpy.ops.ed.undo_push(message=name)
 
 
-def press(key: str, **held: bool) -> Any:
+def press(key: str, **modifiers: bool) -> Any:
     window, area = bpy.context.window, views()[0] if views() else bpy.context.window.screen.areas[0]
-    where = {"x": area.x + area.width // 2, "y": area.y + area.height // 2}
-    window.event_simulate("MOUSEMOVE", "NOTHING", **where)
+    position = {"x": area.x + area.width // 2, "y": area.y + area.height // 2}
+    window.event_simulate("MOUSEMOVE", "NOTHING", **position)
     yield 0.2
     for value in ("PRESS", "RELEASE"):
-        bpy.context.window.event_simulate(key, value, **where, **held)
+        bpy.context.window.event_simulate(key, value, **position, **modifiers)
         yield 0.2

@@ -1,10 +1,10 @@
 """The driver of window sessions in Blender: one step per timer tick, with events and redraws.
 
-A session is a script session_NAME.py that ends with `driver.play(steps())`, where `steps` is a
-generator. The code up to a `yield` runs in one tick. A plain `yield` returns once the window shows
-all changes: none of our work is deferred any more, every 3D view has been redrawn since, and that
-redraw is on the screen. `yield 1` lets one tick pass, to look at something in progress; wait for
-anything else with `until`. A failed assert or any exception fails the session.
+A session is a script session_NAME.py that ends with `driver.play_session(steps())`, where `steps`
+is a generator. The code up to a `yield` runs in one tick. A plain `yield` returns once the window
+shows all changes: none of our work is deferred any more, every 3D view has been redrawn since, and
+that redraw is on the screen. `yield 1` lets one tick pass, to look at something in progress; wait
+for anything else with `wait_until`. A failed assert or any exception fails the session.
 """
 
 import faulthandler
@@ -24,9 +24,9 @@ from view_mark import ViewMark
 
 TICK_S = 0.05
 #: Sleep of an idle Blender, which does not sleep by itself while events are simulated.
-SLEEP_S = 0.005
+IDLE_SLEEP_S = 0.005
 #: So long that slow machines pass; only an event that does not come fails.
-PATIENCE_S = 180.0
+TIMEOUT_S = 180.0
 EXTENSION = "bl_ext.user_default.hairloom"
 #: In commits, sessions skip cases that are like others.
 IS_COMMIT = os.environ.get("HAIRLOOM_TIER") == "commit"
@@ -76,9 +76,9 @@ class Timers:
     def __init__(self) -> None:
         self._seen: dict[Any, None] = {}
         self._register = bpy.app.timers.register
-        bpy.app.timers.register = self._note
+        bpy.app.timers.register = self._remember_and_register
 
-    def _note(self, function: Any, **settings: Any) -> None:
+    def _remember_and_register(self, function: Any, **settings: Any) -> None:
         self._seen[function] = None
         self._register(function, **settings)
 
@@ -91,28 +91,28 @@ class Timers:
             for each in self._seen
             if getattr(each, "__module__", "").startswith(EXTENSION)
             and bpy.app.timers.is_registered(each)
-            and not self._goes_on(each)
+            and not self._is_repeating(each)
         ]
 
     @staticmethod
-    def _goes_on(timer: Any) -> bool:
-        jobs, is_played = of_hairloom("latest_job"), _is_played()
-        if timer is of_hairloom("views")._catch_up:
+    def _is_repeating(timer: Any) -> bool:
+        jobs, is_played = hairloom_module("latest_job"), _is_animation_playing()
+        if timer is hairloom_module("views")._catch_up:
             return is_played or "play" in jobs._steps
         return timer is jobs.take_steps and set(jobs._steps) == {"play"}
 
 
-def _is_played() -> bool:
+def _is_animation_playing() -> bool:
     """Whether Blender plays its animation in any window."""
     windows = bpy.context.window_manager.windows
     return any(each.screen.is_animation_playing for each in windows)
 
 
 timers = Timers()
-_mark = ViewMark()
+_view_mark = ViewMark()
 
 
-def play(steps: Iterator[float | None], *, anti_aliasing: bool = False) -> None:
+def play_session(steps: Iterator[float | None], *, anti_aliasing: bool = False) -> None:
     """Play the session, print how it ended and quit Blender.
 
     Args:
@@ -145,35 +145,35 @@ def play(steps: Iterator[float | None], *, anti_aliasing: bool = False) -> None:
 
 def _sleep() -> float:
     """Sleep in each iteration of Blender's loop, which otherwise keeps a processor busy."""
-    time.sleep(SLEEP_S)
+    time.sleep(IDLE_SLEEP_S)
     return 0.0
 
 
 def _ticks(steps: Iterator[float | None]) -> Iterator[float]:
     for wait in steps:
         if wait is None:
-            yield from _shown()
+            yield from _wait_for_redraws()
         else:
-            assert wait <= 1, "wait for what is asked by `yield` or `until`, not for ticks"
+            assert wait <= 1, "wait for what is asked by `yield` or `wait_until`, not for ticks"
             yield wait
 
 
-def _shown() -> Iterator[float]:
+def _wait_for_redraws() -> Iterator[float]:
     """Wait until the window shows all changes."""
     yield 1  # events first, and Blender's evaluation after them
     while True:
-        yield from until(lambda: not timers.pending(), lambda: f"deferred: {timers.pending()}")
-        yield from until(lambda: bpy.context.window is not None, "there is no window")
-        _mark.draw_again()
-        yield from until(_mark.is_shown, "the 3D views are not drawn")
+        yield from wait_until(lambda: not timers.pending(), lambda: f"deferred: {timers.pending()}")
+        yield from wait_until(lambda: bpy.context.window is not None, "there is no window")
+        _view_mark.draw_again()
+        yield from wait_until(_view_mark.is_shown, "the 3D views are not drawn")
         if not timers.pending():
             return
 
 
-def until(is_so: Callable[[], Any], message: str | Callable[[], str]) -> Iterator[float]:
+def wait_until(condition: Callable[[], Any], message: str | Callable[[], str]) -> Iterator[float]:
     """Wait, tick by tick, until a condition holds."""
-    end = time.monotonic() + PATIENCE_S
-    while not is_so():
+    end = time.monotonic() + TIMEOUT_S
+    while not condition():
         if time.monotonic() > end:
             raise AssertionError(message if isinstance(message, str) else message())
         yield 1
@@ -185,7 +185,7 @@ def enable_extension() -> None:
     assert all(addon_utils.check(EXTENSION)), f"{EXTENSION} is not enabled"
 
 
-def of_hairloom(name: str) -> Any:
+def hairloom_module(name: str) -> Any:
     """A module of the enabled extension, by its name in MODULES."""
     return sys.modules[f"{EXTENSION}.addon.{MODULES[name]}"]
 
@@ -200,6 +200,6 @@ def screenshot(label: str) -> np.ndarray:
 
     After a change, `yield` before the call.
     """
-    pixels = _mark.painted_over(screen.pixels())
+    pixels = _view_mark.without_marks(screen.pixels())
     screenshot_path(label).write_bytes(screen.png(pixels))
     return pixels

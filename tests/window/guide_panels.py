@@ -39,10 +39,10 @@ PICTURES: dict[str, tuple[tuple[str, ...], ...]] = {
     "meshes": (("sidebar_mesh_cards", "sidebar_fin"), ("sidebar_fin_bake",)),
 }
 #: pictures without panels: the window, popups, options in the file browser, and handles in the view
-OTHERS = ("window", "start", "check", "sort", "export_cards", "export_strands")
-OTHERS += ("preferences", "handles")
+OTHER_PICTURES = ("window", "start", "check", "sort", "export_cards", "export_strands")
+OTHER_PICTURES += ("preferences", "handles")
 #: sections that are also in the sidebar; their pictures are of Properties > Data
-TWINS = (
+SIDEBAR_TWINS = (
     "sidebar_look",
     "sidebar_grow",
     "sidebar_dynamics",
@@ -52,9 +52,9 @@ TWINS = (
 )
 
 
-def pictured(name: str) -> bool:
+def is_pictured(name: str) -> bool:
     """Whether a panel's class, or its twin in Properties > Data, is in a picture."""
     short = name.removeprefix("HAIRLOOM_PT_")
-    if short.startswith(TWINS):
+    if short.startswith(SIDEBAR_TWINS):
         short = short.replace("sidebar_", "data_", 1)
     return any(short in column for columns in PICTURES.values() for column in columns)

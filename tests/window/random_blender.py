@@ -3,10 +3,10 @@
 from pathlib import Path
 
 import bpy
-from dice import MOST_OBJECTS, action, call, clicked, press, select, step, views
+from dice import MAX_OBJECTS, action, call, press, press_button, push_undo_step, select, views
 
 
-def settled():
+def wait_for_notifiers():
     """Wait before other areas are shown: with several windows, Blender notifies areas of an object
     that became active in the same tick, and crashes if they are no longer in any window."""
     yield 0.2
@@ -14,7 +14,7 @@ def settled():
 
 @action(14)
 def undo_or_redo_by_keys(dice):
-    shift = dice.often(0.45)
+    shift = dice.happens(0.45)
     dice.note("Ctrl-Shift-Z" if shift else "Ctrl-Z")
     yield from press("Z", ctrl=True, shift=shift)
 
@@ -32,14 +32,14 @@ def press_escape(dice):
 @action(8)
 def move_something(dice):
     obj = dice.object()
-    what = dice.pick(["location", "rotation_euler", "scale"])
-    middle, width = (1.0, 0.2) if what == "scale" else (0.0, 0.3)
-    value = [dice.chance.uniform(middle - width, middle + width) for _ in range(3)]
-    dice.note(f"{obj.name}.{what} = {value}")
-    setattr(obj, what, value)
-    if dice.often(0.3):
-        obj.keyframe_insert(what, frame=dice.chance.randint(1, 20))
-    step("move")
+    attribute = dice.pick(["location", "rotation_euler", "scale"])
+    middle, width = (1.0, 0.2) if attribute == "scale" else (0.0, 0.3)
+    value = [dice.random.uniform(middle - width, middle + width) for _ in range(3)]
+    dice.note(f"{obj.name}.{attribute} = {value}")
+    setattr(obj, attribute, value)
+    if dice.happens(0.3):
+        obj.keyframe_insert(attribute, frame=dice.random.randint(1, 20))
+    push_undo_step("move")
 
 
 @action(5)
@@ -54,12 +54,12 @@ def select_something(dice):
 def delete_something(dice):
     obj = dice.object("MESH", "CURVES", "CURVE", "EMPTY")
     dice.note(obj.name)
-    if dice.often(0.5):
+    if dice.happens(0.5):
         bpy.data.objects.remove(obj)
-        step("removed")
+        push_undo_step("removed")
     else:
         select(obj)
-        clicked(dice, "object.delete", confirm=False)
+        press_button(dice, "object.delete", confirm=False)
 
 
 @action(1)
@@ -67,14 +67,14 @@ def delete_data(dice):
     data = dice.pick([*bpy.data.hair_curves, *bpy.data.meshes])
     dice.note(repr(data))
     (bpy.data.hair_curves if data in list(bpy.data.hair_curves) else bpy.data.meshes).remove(data)
-    step("data")
+    push_undo_step("data")
 
 
 @action(3)
 def duplicate(dice):
-    if len(bpy.data.objects) < MOST_OBJECTS:
+    if len(bpy.data.objects) < MAX_OBJECTS:
         select(dice.object("MESH", "CURVES"))
-        call(dice, "object.duplicate", "EXEC_DEFAULT", True, linked=dice.often(0.5))
+        call(dice, "object.duplicate", "EXEC_DEFAULT", True, linked=dice.happens(0.5))
 
 
 @action(2)
@@ -85,25 +85,25 @@ def rename(dice):
     for each in filter(None, (obj, obj.data)):
         if each.is_editable:  # not linked
             each.name = name
-    step("rename")
+    push_undo_step("rename")
 
 
 @action(5)
 def hide_or_show(dice):
     obj = dice.object()
     dice.note(obj.name)
-    if dice.often(0.5):
+    if dice.happens(0.5):
         obj.hide_set(not obj.hide_get())
     else:
         obj.hide_viewport = not obj.hide_viewport
-    step("hide")
+    push_undo_step("hide")
 
 
 @action(1)
 def exclude_a_collection(dice):
     layer = dice.pick(bpy.context.view_layer.layer_collection.children)
     layer.exclude = not layer.exclude
-    step("exclude")
+    push_undo_step("exclude")
 
 
 @action(3)
@@ -124,7 +124,7 @@ def switch_mode(dice):
 
 @action(4)
 def go_to_a_frame(dice):
-    frame = dice.chance.randint(-2, 30)
+    frame = dice.random.randint(-2, 30)
     dice.note(str(frame))
     bpy.context.scene.frame_set(frame)
 
@@ -138,8 +138,8 @@ def play_the_animation(dice):
 @action(2)
 def save_and_load(dice):
     path = str(dice.folder / "saved.blend")
-    call(dice, "wm.save_as_mainfile", filepath=path, copy=dice.often(0.5))
-    if dice.often(0.5):
+    call(dice, "wm.save_as_mainfile", filepath=path, copy=dice.happens(0.5))
+    if dice.happens(0.5):
         call(dice, "wm.open_mainfile", filepath=path)
         yield 1
 
@@ -149,16 +149,16 @@ def append_or_link(dice):
     path = str(dice.folder / "saved.blend")
     if not Path(path).is_file() or bpy.data.filepath == path:  # no file links itself
         return
-    is_linked = dice.often(0.5)
+    is_linked = dice.happens(0.5)
     with bpy.data.libraries.load(path, link=is_linked) as (there, here):
         here.objects = there.objects[:2]
     dice.note(f"{'linked' if is_linked else 'appended'} {here.objects}")
     for obj in filter(None, here.objects):
         if obj.name not in bpy.context.scene.objects:
             bpy.context.scene.collection.objects.link(obj)
-            if is_linked and dice.often(0.5):
+            if is_linked and dice.happens(0.5):
                 obj.override_create(remap_local_usages=True)
-    step("appended")
+    push_undo_step("appended")
 
 
 @action(1)
@@ -177,15 +177,15 @@ def switch_shading(dice):
         if engine not in ("HAIRLOOM", "BLENDER_WORKBENCH"):  # they have no Material Preview
             kinds.append("MATERIAL")
         shading.type = dice.pick(kinds)
-        shading.show_xray = dice.often(0.3)
+        shading.show_xray = dice.happens(0.3)
         dice.note(f"{shading.type} {shading.show_xray}")
 
 
 @action(2)
 def switch_scene(dice):
-    if dice.often(0.3) and len(bpy.data.scenes) < 3:
+    if dice.happens(0.3) and len(bpy.data.scenes) < 3:
         call(dice, "scene.new", type=dice.pick(["NEW", "LINK_COPY"]))
-    elif dice.often(0.2):
+    elif dice.happens(0.2):
         call(dice, "scene.delete")
     else:
         bpy.context.window.scene = dice.pick(bpy.data.scenes)
@@ -194,7 +194,7 @@ def switch_scene(dice):
 
 @action(1)
 def switch_workspace(dice):
-    yield from settled()
+    yield from wait_for_notifiers()
     names = ["Layout", "Sculpting", "Modeling", "Scripting"]
     bpy.context.window.workspace = dice.pick(w for w in bpy.data.workspaces if w.name in names)
     dice.note(bpy.context.window.workspace.name)
@@ -203,19 +203,19 @@ def switch_workspace(dice):
 
 @action(2)
 def resize(dice):
-    yield from settled()
-    if dice.often(0.5):
+    yield from wait_for_notifiers()
+    if dice.happens(0.5):
         call(dice, "screen.screen_full_area")
     else:
         for area in views():
             area.spaces.active.show_region_ui = not area.spaces.active.show_region_ui
-            area.spaces.active.overlay.show_overlays = dice.often(0.7)
+            area.spaces.active.overlay.show_overlays = dice.happens(0.7)
     yield 1
 
 
 @action(1)
 def open_or_close_a_window(dice):
-    yield from settled()
+    yield from wait_for_notifiers()
     windows = bpy.context.window_manager.windows
     if len(windows) > 1:
         with bpy.context.temp_override(window=windows[-1]):

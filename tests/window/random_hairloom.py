@@ -5,42 +5,51 @@ from pathlib import Path
 import addon_utils
 import bpy
 import driver
-from dice import MOST_OBJECTS, action, call, clicked, objects, press, select, step
-from driver import of_hairloom, until
+from dice import MAX_OBJECTS, action, call, objects, press, press_button, push_undo_step, select
+from driver import hairloom_module, wait_until
 
 SECTIONS = {
     bpy.types.Curves: ["shading", "strands", "volume", "detail", "guides", "children", "skin"]
     + ["shafts", "ambient", "cards", "atlas", "card_occlusion", "card_texture", "card_drawing"],
     bpy.types.Object: ["dynamics", "dynamics", "fin"],
 }
-MOST_GROOMS = 3
+MAX_GROOMS = 3
 #: buttons that add lines and rings to hair, that remove them, each with the setting that names
 #: them, that shape hair, and (REVERTS) that restore its shape
-ADDED = ("add_parting", "add_stroke", "add_hair_tie")
-REMOVED = {
+ADDING_BUTTONS = ("add_parting", "add_stroke", "add_hair_tie")
+REMOVING_BUTTONS = {
     "remove_parting": "line",
     "remove_stroke": "stroke",
     "remove_hair_tie": "tie",
     "remove_trim_shape": "shape",
 }
-SHAPED = ("settle", "comb_parting", "comb_flow", "trim_to_shape", "mirror_hair", "grow_again")
+SHAPING_BUTTONS = (
+    "settle",
+    "comb_parting",
+    "comb_flow",
+    "trim_to_shape",
+    "mirror_hair",
+    "grow_again",
+)
 #: buttons that need a line, each with the button that adds one
-LINED = {"comb_parting": "add_parting", "comb_flow": "add_stroke"}
+BUTTONS_THAT_NEED_A_LINE = {"comb_parting": "add_parting", "comb_flow": "add_stroke"}
 REVERTS = ("revert_settle", "revert_flow", "revert_trim")
 
 
-def no_long_work():
+def wait_for_long_work():
     """Wait for the end of long work, whose data a script could remove and a mouse cannot."""
-    yield from until(lambda: not of_hairloom("long_work").running(), "the work does not end")
+    yield from wait_until(
+        lambda: not hairloom_module("long_work").running(), "the work does not end"
+    )
 
 
 @action(6)
 def add_groom(dice):
     grooms = [o for o in bpy.data.objects if o.type == "CURVES"]
-    if len(grooms) >= MOST_GROOMS:
+    if len(grooms) >= MAX_GROOMS:
         bpy.data.objects.remove(grooms[0])
-        step("removed")
-    if dice.often(0.4) or not any(o.type == "MESH" for o in objects()):
+        push_undo_step("removed")
+    if dice.happens(0.4) or not any(o.type == "MESH" for o in objects()):
         call(
             dice,
             "mesh.primitive_uv_sphere_add",
@@ -51,9 +60,9 @@ def add_groom(dice):
             radius=0.1,
         )
     select(dice.object("MESH"))
-    how = {"strand_count": dice.chance.randint(2, 150), "method": dice.pick(["combed", "normals"])}
-    clicked(dice, dice.pick(["hairloom.add_groom", "hairloom.grow"]), **how)
-    yield from no_long_work()
+    how = {"strand_count": dice.random.randint(2, 150), "method": dice.pick(["combed", "normals"])}
+    press_button(dice, dice.pick(["hairloom.add_groom", "hairloom.grow"]), **how)
+    yield from wait_for_long_work()
 
 
 @action(12)
@@ -63,7 +72,7 @@ def press_a_button(dice):
     buttons += " unwrap_surface apply_scale look_from_material mute_hair_dynamics show_settings"
     buttons += " convert_particles fin_add fin_preview fin_remove fin_reset remove_spheres"
     buttons += " bake_free check_export sort_cards show_skin_shadow measure look_to_material"
-    clicked(dice, f"hairloom.{dice.pick(buttons.split())}")
+    press_button(dice, f"hairloom.{dice.pick(buttons.split())}")
 
 
 @action(2)
@@ -73,27 +82,27 @@ def press_a_slow_button(dice):
     select(hair)
     hair.hairloom.bake.folder = str(dice.folder / "bake")
     hair.hairloom.bake.use_own_range, hair.hairloom.bake.last = True, 4
-    step("range")
-    clicked(dice, f"hairloom.{dice.pick(['bake', 'bake', 'make_cards', 'fit_spheres'])}")
+    push_undo_step("range")
+    press_button(dice, f"hairloom.{dice.pick(['bake', 'bake', 'make_cards', 'fit_spheres'])}")
     yield dice.pick([0.2, 1])
     yield from press("ESC")
 
 
 @action(8)
-def put_something_on_hair(dice):
+def add_line_or_ring(dice):
     """Add a parting, a stroke or a tie: a selected line or ring, or a new one."""
     select(dice.object("CURVES"))
-    if dice.often(0.3):
+    if dice.happens(0.3):
         dice.object().select_set(True)
-    if len(objects()) < MOST_OBJECTS:
-        clicked(dice, f"hairloom.{dice.pick(ADDED)}")
+    if len(objects()) < MAX_OBJECTS:
+        press_button(dice, f"hairloom.{dice.pick(ADDING_BUTTONS)}")
 
 
 @action(2)
-def take_something_off(dice):
+def remove_line_or_ring(dice):
     select(dice.object("CURVES"))
-    button, setting = dice.pick(REMOVED.items())
-    clicked(dice, f"hairloom.{button}", **{setting: dice.object().name})
+    button, setting = dice.pick(REMOVING_BUTTONS.items())
+    press_button(dice, f"hairloom.{button}", **{setting: dice.object().name})
 
 
 @action(12)
@@ -101,27 +110,27 @@ def shape_hair(dice):
     """Press a button that shapes hair, whose work Esc can end; trim shapes are selected too."""
     hair = dice.object("CURVES")
     select(hair)
-    button = dice.pick(SHAPED)
+    button = dice.pick(SHAPING_BUTTONS)
     if button == "trim_to_shape":
         dice.object("MESH", "EMPTY").select_set(True)
-    if button in LINED and dice.often(0.7) and len(objects()) < MOST_OBJECTS:
-        clicked(dice, f"hairloom.{LINED[button]}")
+    if button in BUTTONS_THAT_NEED_A_LINE and dice.happens(0.7) and len(objects()) < MAX_OBJECTS:
+        press_button(dice, f"hairloom.{BUTTONS_THAT_NEED_A_LINE[button]}")
     sides = {"side": dice.pick(["positive", "negative"])} if button == "mirror_hair" else {}
-    clicked(dice, f"hairloom.{button}", **sides)
-    if dice.often(0.3):
+    press_button(dice, f"hairloom.{button}", **sides)
+    if dice.happens(0.3):
         yield dice.pick([0.2, 1])
         yield from press("ESC")
-    yield from no_long_work()
-    if dice.often(0.5):
-        clicked(dice, f"hairloom.{dice.pick(REVERTS)}")
+    yield from wait_for_long_work()
+    if dice.happens(0.5):
+        press_button(dice, f"hairloom.{dice.pick(REVERTS)}")
 
 
 @action(2)
 def make_real(dice):
-    if sum(obj.type == "CURVES" for obj in bpy.data.objects) < MOST_GROOMS:
+    if sum(obj.type == "CURVES" for obj in bpy.data.objects) < MAX_GROOMS:
         select(dice.object("CURVES"))
-        clicked(dice, "hairloom.make_real")
-        yield from no_long_work()
+        press_button(dice, "hairloom.make_real")
+        yield from wait_for_long_work()
 
 
 @action(40)
@@ -136,11 +145,11 @@ def move_a_slider(dice):
     value = dice.value(prop)
     dice.note(f"{owner.name} {group.bl_rna.identifier}.{prop.identifier} = {value}")
     setattr(group, prop.identifier, value)
-    step("slider")
+    push_undo_step("slider")
 
 
 @action(6)
-def choose_for_an_object(dice):
+def set_an_object_property(dice):
     hair = dice.object("CURVES")
     ours = hair.hairloom
     name = dice.pick(["debug_view", "show_counts", "hide_original", "collider"])
@@ -150,34 +159,34 @@ def choose_for_an_object(dice):
         value = dice.value(ours.bl_rna.properties[name])
         dice.note(f"{hair.name} {name} = {value}")
         setattr(ours, name, value)
-    ours.bake.follows, ours.bake.is_shown = dice.often(0.5), dice.often(0.5)
-    step("choice")
+    ours.bake.follows, ours.bake.is_shown = dice.happens(0.5), dice.happens(0.5)
+    push_undo_step("choice")
 
 
 @action(4)
-def take_a_preset(dice):
-    presets = Path(of_hairloom("presets").PRESET_FOLDER)
+def apply_a_preset(dice):
+    presets = Path(hairloom_module("presets").PRESET_FOLDER)
     path = dice.pick(sorted(presets.rglob("*.json")))
     name = path.relative_to(presets).with_suffix("").as_posix()
-    clicked(dice, "hairloom.apply_preset", name=name)
+    press_button(dice, "hairloom.apply_preset", name=name)
 
 
 @action(1)
-def keep_a_preset(dice):
+def save_a_preset(dice):
     section = dice.pick(["shading", "dynamics", "cards"])
     call(dice, "hairloom.save_preset", section=section, title="Random")
-    if dice.often(0.5):
+    if dice.happens(0.5):
         call(dice, "hairloom.delete_preset", name="own/random")
 
 
 @action(2)
-def out_and_in_again(dice):
+def export_and_import(dice):
     formats = {"tressfx": "tfx", "hair": "hair", "alembic": "abc", "usd": "usda"}
     kind, suffix = dice.pick(formats.items())
     select(dice.object("CURVES"))
     path = str(dice.folder / f"strands.{suffix}")
     call(dice, f"hairloom.export_{kind}", filepath=path)
-    if dice.often(0.5):
+    if dice.happens(0.5):
         call(dice, "hairloom.import_strands", "EXEC_DEFAULT", True, filepath=path)
 
 
@@ -207,5 +216,5 @@ def render_a_picture(dice):
     scene.render.engine = "HAIRLOOM"
     scene.render.resolution_x, scene.render.resolution_y = 32, 24
     scene.hairloom.picture.samples, scene.hairloom.picture.motion_steps = 1, 2
-    step("camera")
+    push_undo_step("camera")
     call(dice, "render.render")

@@ -13,25 +13,25 @@ import bpy
 import gpu
 import numpy as np
 import screen
-from driver import until
+from driver import wait_until
 from mathutils import Matrix
 
 #: correlation, from -1 to 1, above which words are recognized; menus underline a letter
-ALIKE = 0.9
+MIN_CORRELATION = 0.9
 #: [pixels] margin of words, and the gaps before and after them in which other words of the line
 #: would be; on the left, checkboxes are nearer than words
-MARGIN, BEFORE, AFTER = 1, 3, 5
+WORD_MARGIN, GAP_BEFORE, GAP_AFTER = 1, 3, 5
 #: fraction of the letters' contrast by which the space beside them may vary
-BLANK = 0.3
+MAX_GAP_CONTRAST = 0.3
 #: [levels of 255] smaller differences are no letters
-FAINT = 6.0
+MIN_DEVIATION = 6.0
 
 #: left, bottom, width, height, in pixels of the window
 Box = tuple[int, int, int, int]
 
 
 @cache
-def _drawn(words: str, is_turned: bool) -> np.ndarray:
+def _draw_words(words: str, is_turned: bool) -> np.ndarray:
     """The letters' coverage of each pixel, (height, width), top row first."""
     size = bpy.context.preferences.ui_styles[0].widget.points
     blf.size(0, size * bpy.context.preferences.system.ui_scale)
@@ -55,20 +55,21 @@ def _drawn(words: str, is_turned: bool) -> np.ndarray:
     rows, columns = (np.flatnonzero(letters.max(axis=axis)) for axis in (1, 0))
     assert len(rows), f"'{words}' has no letters"
     part = letters[
-        rows[0] - MARGIN : rows[-1] + MARGIN + 1, columns[0] - MARGIN : columns[-1] + MARGIN + 1
+        rows[0] - WORD_MARGIN : rows[-1] + WORD_MARGIN + 1,
+        columns[0] - WORD_MARGIN : columns[-1] + WORD_MARGIN + 1,
     ]
     return np.rot90(part, -1) if is_turned else part
 
 
-def _likeness(shown: np.ndarray, letters: np.ndarray) -> np.ndarray:
+def _correlation(picture: np.ndarray, letters: np.ndarray) -> np.ndarray:
     """Normalized cross-correlation, from -1 to 1, for each place of the upper left corner."""
-    (height, width), (rows, columns) = shown.shape, letters.shape
+    (height, width), (rows, columns) = picture.shape, letters.shape
     pattern = letters - letters.mean()
     pattern /= np.sqrt((pattern**2).sum())
-    spectrum = np.fft.rfft2(shown) * np.fft.rfft2(pattern[::-1, ::-1], shown.shape)
-    matched = np.fft.irfft2(spectrum, shown.shape)[rows - 1 :, columns - 1 :]
+    spectrum = np.fft.rfft2(picture) * np.fft.rfft2(pattern[::-1, ::-1], picture.shape)
+    matched = np.fft.irfft2(spectrum, picture.shape)[rows - 1 :, columns - 1 :]
 
-    def summed(values: np.ndarray) -> np.ndarray:
+    def window_sums(values: np.ndarray) -> np.ndarray:
         sums = np.zeros((height + 1, width + 1))
         sums[1:, 1:] = values.cumsum(0).cumsum(1)
         return (
@@ -79,35 +80,37 @@ def _likeness(shown: np.ndarray, letters: np.ndarray) -> np.ndarray:
         )
 
     count = rows * columns
-    deviation = summed(shown**2) - summed(shown) ** 2 / count
-    return matched / np.sqrt(np.maximum(deviation, count * FAINT**2))
+    deviation = window_sums(picture**2) - window_sums(picture) ** 2 / count
+    return matched / np.sqrt(np.maximum(deviation, count * MIN_DEVIATION**2))
 
 
-def _is_apart(shown: np.ndarray, letters: np.ndarray, y: int, x: int, is_turned: bool) -> bool:
+def _is_separate(picture: np.ndarray, letters: np.ndarray, y: int, x: int, is_turned: bool) -> bool:
     """Whether words at a place are not part of a longer text."""
     if is_turned:
-        shown, letters, y, x = shown.T, letters.T, x, y
+        picture, letters, y, x = picture.T, letters.T, x, y
     rows, columns = letters.shape
-    lines = shown[y : y + rows]
+    lines = picture[y : y + rows]
     contrast = np.polyfit(letters.ravel(), lines[:, x : x + columns].ravel(), 1)[0] * 255.0
     ground = np.median(lines[:, x : x + columns])
-    beside = np.hstack((lines[:, max(x - BEFORE, 0) : x], lines[:, x + columns :][:, :AFTER]))
-    return bool(np.abs(beside - ground).max(initial=0.0) < BLANK * abs(contrast))
+    beside = np.hstack(
+        (lines[:, max(x - GAP_BEFORE, 0) : x], lines[:, x + columns :][:, :GAP_AFTER])
+    )
+    return bool(np.abs(beside - ground).max(initial=0.0) < MAX_GAP_CONTRAST * abs(contrast))
 
 
-def seen(words: str, box: Box, *, is_turned: bool = False) -> list[tuple[float, int, int]]:
+def find_words(words: str, box: Box, *, is_turned: bool = False) -> list[tuple[float, int, int]]:
     """Words found in a part of the window: correlation, x and y of their middle; best first."""
     left, bottom, width, height = box
     top = screen.size()[1] - (bottom + height)
-    shown = screen.part(left, top, width, height).astype(np.float64).mean(axis=2)
-    letters = _drawn(words, is_turned)
+    picture = screen.part(left, top, width, height).astype(np.float64).mean(axis=2)
+    letters = _draw_words(words, is_turned)
     rows, columns = letters.shape
     if rows > height or columns > width:
         return []
-    likeness = np.abs(_likeness(shown, letters))
+    likeness = np.abs(_correlation(picture, letters))
     found = []
-    for y, x in np.argwhere(likeness > ALIKE):
-        if not _is_apart(shown, letters, int(y), int(x), is_turned):
+    for y, x in np.argwhere(likeness > MIN_CORRELATION):
+        if not _is_separate(picture, letters, int(y), int(x), is_turned):
             continue
         middle = left + int(x) + columns // 2, bottom + height - int(y) - rows // 2
         found.append((float(likeness[y, x]), *middle))
@@ -120,7 +123,7 @@ def seen(words: str, box: Box, *, is_turned: bool = False) -> list[tuple[float, 
 
 def width_of(words: str) -> int:
     """Width of words [pixels], from the first letter to the last."""
-    return int(_drawn(words, False).shape[1]) - 2 * MARGIN
+    return int(_draw_words(words, False).shape[1]) - 2 * WORD_MARGIN
 
 
 def whole_window() -> Box:
@@ -131,13 +134,13 @@ def box_of(region: Any) -> Box:
     return region.x, region.y, region.width, region.height
 
 
-def read(words: str, box: Box | None = None, **how: bool) -> Iterator[int]:
+def wait_for_words(words: str, box: Box | None = None, **options: bool) -> Iterator[int]:
     """Wait until words are shown; returns x and y of their middle."""
     found: list[tuple[float, int, int]] = []
 
-    def is_there() -> bool:
-        found[:] = seen(words, box or whole_window(), **how)
+    def is_shown() -> bool:
+        found[:] = find_words(words, box or whole_window(), **options)
         return bool(found)
 
-    yield from until(is_there, f"'{words}' is not to be read")
+    yield from wait_until(is_shown, f"'{words}' is not to be read")
     return found[0][1:]

@@ -10,14 +10,14 @@ sys.path.append(str(Path(__file__).parent))
 import driver
 from artist import (
     click,
-    hair_is_made,
     look_from_front,
     new_head,
     open_our_sidebar,
     press,
     sidebar_button,
+    wait_for_hair,
 )
-from driver import of_hairloom, until
+from driver import hairloom_module, wait_until
 
 FOLDER = Path(bpy.app.tempdir)
 
@@ -32,17 +32,21 @@ def steps():
     look_from_front(0.9)
     yield from open_our_sidebar()
     yield from click(*sidebar_button("hairloom.preview"))
-    yield from hair_is_made()
+    yield from wait_for_hair()
     yield from click(*sidebar_button("hairloom.play"))
-    yield from until(of_hairloom("previews").is_playing, "the Play button did nothing")
+    yield from wait_until(hairloom_module("previews").is_playing, "the Play button did nothing")
     bpy.ops.ed.undo_push(message="An edit")  # an unchanged file is not saved
     begun = time.time()
-    yield from until(lambda: autosaves(begun), "nothing is saved while hair plays")
-    assert of_hairloom("previews").is_playing()
+    yield from wait_until(lambda: autosaves(begun), "nothing is saved while hair plays")
+    assert hairloom_module("previews").is_playing()
     print(f"autosaves while playing: {len(autosaves(begun))} in {time.time() - begun:.0f} s")
     yield from press("ESC")
-    yield from until(lambda: not of_hairloom("previews").is_playing(), "Esc does not stop it")
-    yield from until(lambda: not of_hairloom("latest_job").is_watched("play"), "it ticks on")
+    yield from wait_until(
+        lambda: not hairloom_module("previews").is_playing(), "Esc does not stop it"
+    )
+    yield from wait_until(
+        lambda: not hairloom_module("latest_job").is_watched("play"), "it ticks on"
+    )
 
 
 def autosaves(since):
@@ -52,4 +56,4 @@ def autosaves(since):
     return [path for path in found if path.stat().st_mtime > since]
 
 
-driver.play(steps())
+driver.play_session(steps())

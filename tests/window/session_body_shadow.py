@@ -9,19 +9,19 @@ import numpy as np
 sys.path.append(str(Path(__file__).parent))
 import driver
 from artist import (
-    changed,
+    changed_fraction,
     click,
     hide_floor,
     look_from_front,
     new_fringe,
     open_our_sidebar,
     pixels,
-    pixels_at_rest,
     press,
     sidebar_button,
+    still_pixels,
     viewport,
 )
-from driver import of_hairloom, until
+from driver import hairloom_module, wait_until
 
 
 def volume():
@@ -36,7 +36,7 @@ def steps():
     yield from full_shadow_is_as_dark_as_without_the_light()
     yield from hair_is_there_without_overlays()
     yield from layers_are_shown()
-    assert of_hairloom("overlay").failure() == ""
+    assert hairloom_module("overlay").failure() == ""
 
 
 def set_the_scene():
@@ -57,42 +57,45 @@ def set_the_scene():
     look_from_front(0.6)
     yield from open_our_sidebar()
     yield from click(*sidebar_button("hairloom.preview"))
-    yield from until(has_drawn, "no hair is drawn")
+    yield from wait_until(has_drawn, "no hair is drawn")
 
 
 def has_drawn():
-    overlay = of_hairloom("overlay")
+    overlay = hairloom_module("overlay")
     return any(overlay.statistics_of(uid).strands > 0 for uid in overlay.drawn())
 
 
 def hair_shades_the_head():
     """In a light that casts shadows; without them the head is bright, and with them dark again."""
-    shaded = yield from pixels_at_rest("on_body")
+    shaded = yield from still_pixels("on_body")
     sun = bpy.data.objects["Sun"].data
     sun.use_shadow = False
-    yield from until(
-        lambda: changed(shaded, pixels("bare"), 0.05) > 0.004, "hair does not shade the head"
+    yield from wait_until(
+        lambda: changed_fraction(shaded, pixels("bare"), 0.05) > 0.004,
+        "hair does not shade the head",
     )
-    bare = yield from pixels_at_rest("bare")
+    bare = yield from still_pixels("bare")
     assert np.quantile((shaded - bare).max(axis=2), 0.995) < 0.05, "it only darkens"
     # without shadows of the light and without Shadow on Surface it is the same, since Blender's
     # strands cast none
     volume().on_body = False
-    none = yield from pixels_at_rest("no_shadow_at_all")
-    assert changed(bare, none, 0.05) < 5e-3
+    none = yield from still_pixels("no_shadow_at_all")
+    assert changed_fraction(bare, none, 0.05) < 5e-3
     volume().on_body = sun.use_shadow = True
-    yield from until(
-        lambda: changed(shaded, pixels("on_body_again"), 0.05) < 5e-3, "it does not come back"
+    yield from wait_until(
+        lambda: changed_fraction(shaded, pixels("on_body_again"), 0.05) < 5e-3,
+        "it does not come back",
     )
     # a hidden head is not shaded
     bpy.data.objects["Head"].hide_set(True)
-    yield from until(
-        lambda: changed(shaded, pixels("hidden_head"), 0.05) > 0.02, "the head is not hidden"
+    yield from wait_until(
+        lambda: changed_fraction(shaded, pixels("hidden_head"), 0.05) > 0.02,
+        "the head is not hidden",
     )
-    hidden = yield from pixels_at_rest("hidden_head")
+    hidden = yield from still_pixels("hidden_head")
     volume().on_body = False
-    bare = yield from pixels_at_rest("hidden_head_bare")
-    assert changed(hidden, bare, 0.05) < 1e-3
+    bare = yield from still_pixels("hidden_head_bare")
+    assert changed_fraction(hidden, bare, 0.05) < 1e-3
     bpy.data.objects["Head"].hide_set(False)
     yield
 
@@ -101,13 +104,13 @@ def full_shadow_is_as_dark_as_without_the_light():
     """Where hair blocks all of the sun, against EEVEE's own picture without a sun."""
     bpy.ops.object.select_all(action="DESELECT")  # no outlines
     volume().extinction, volume().on_body = 100.0, True
-    shaded = yield from pixels_at_rest("full")
+    shaded = yield from still_pixels("full")
     volume().on_body = False
     sun = bpy.data.objects["Sun"]
     sun.data.use_shadow = False
-    lit = yield from pixels_at_rest("full_lit")
+    lit = yield from still_pixels("full_lit")
     sun.hide_set(True)
-    dark = yield from pixels_at_rest("full_dark")
+    dark = yield from still_pixels("full_dark")
     sun.hide_set(False)
     volume().extinction, volume().on_body, sun.data.use_shadow = 1.0, True, True
     taken, missing = (lit - shaded).mean(axis=2), (lit - dark).mean(axis=2)
@@ -121,14 +124,14 @@ def hair_is_there_without_overlays():
     """Hair is drawn, and stays hidden behind the head, although EEVEE leaves no depths without
     overlays."""
     overlays = viewport().spaces.active.overlay
-    with_overlays = yield from pixels_at_rest("with_overlays")
+    with_overlays = yield from still_pixels("with_overlays")
     overlays.show_overlays = False
-    found = yield from pixels_at_rest("without_overlays")
+    found = yield from still_pixels("without_overlays")
     # selection outlines are gone
-    assert changed(with_overlays, found, 0.05) < 0.05
+    assert changed_fraction(with_overlays, found, 0.05) < 0.05
     bpy.data.objects["Head"].hide_set(True)
-    bald = yield from pixels_at_rest("without_overlays_and_head")
-    assert changed(found, bald, 0.05) > 0.02
+    bald = yield from still_pixels("without_overlays_and_head")
+    assert changed_fraction(found, bald, 0.05) > 0.02
     bpy.data.objects["Head"].hide_set(False)
     overlays.show_overlays = True
     yield
@@ -155,4 +158,4 @@ def layers_are_shown():
     driver.screenshot("slices")
 
 
-driver.play(steps())
+driver.play_session(steps())

@@ -13,20 +13,20 @@ import numpy as np
 sys.path.append(str(Path(__file__).parent))
 import driver
 from artist import (
-    changed,
+    changed_fraction,
     click,
-    hair_is_made,
     look_from_front,
     open_our_sidebar,
-    picture,
     pixels,
-    pixels_at_rest,
     press,
+    redrawn_pixels,
     region,
     sidebar_button,
+    still_pixels,
     viewport,
+    wait_for_hair,
 )
-from driver import of_hairloom, until
+from driver import hairloom_module, wait_until
 
 STRANDS, CARDS = 400, 60
 FOLDER = Path(bpy.app.tempdir) / "cards"
@@ -36,7 +36,7 @@ failures: list[str] = []
 
 
 def live():
-    return of_hairloom("previews")
+    return hairloom_module("previews")
 
 
 def session():
@@ -106,28 +106,28 @@ def set_the_scene():
     look_from_front(0.9)
     yield from open_our_sidebar()
     yield from click(*sidebar_button("hairloom.preview"))
-    yield from hair_is_made()
+    yield from wait_for_hair()
     yield
 
 
 def are_shown():
-    drawing = of_hairloom("overlay").drawing_of(session().uid)
+    drawing = hairloom_module("overlay").drawing_of(session().uid)
     return drawing.snapshot.cards is not None and not session().cards.is_pending
 
 
 def cards_in_place_of_strands():
     """Strands are shown until cards are built, and the window stays responsive."""
-    strands = yield from pixels_at_rest("strands")
+    strands = yield from still_pixels("strands")
     watch = Stillness()
     yield 1
     watch.since()
     settings("card_drawing").shown_as = "cards"
     assert session().cards.is_pending and session().snapshot.strand_count == STRANDS
-    yield from until(are_shown, "no cards are shown")
+    yield from wait_until(are_shown, "no cards are shown")
     print(f"first cards: the window stood still for {watch.since():.2f} s", flush=True)
-    cards = yield from picture("cards")
+    cards = yield from redrawn_pixels("cards")
     assert session().cards.counts[0] >= CARDS
-    assert changed(strands, cards) > 0.005, "cards look as strands to the pixel"
+    assert changed_fraction(strands, cards) > 0.005, "cards look as strands to the pixel"
     # both are hair of one colour over the same part of the view
     empty = strands[2, 2]
     cover = [np.abs(each - empty).max(axis=2) > 0.05 for each in (strands, cards)]
@@ -144,18 +144,18 @@ def a_slider_is_dragged():
         settings("cards").card_count = count
         assert session().snapshot.cards is not None, "nothing is shown meanwhile"
         yield 1
-    yield from until(
+    yield from wait_until(
         lambda: are_shown() and session().cards.counts[0] >= 120, "the last cards do not come"
     )
     print(f"dragged to {session().cards.counts}: stood still for {watch.since():.2f} s", flush=True)
     settings("cards").card_count = CARDS
-    yield from until(lambda: are_shown() and session().cards.counts == before, "not as before")
+    yield from wait_until(lambda: are_shown() and session().cards.counts == before, "not as before")
 
 
 def hair_plays_as_cards():
     at_rest = session().snapshot.cards.mesh
     yield from click(*sidebar_button("hairloom.play"))
-    yield from until(lambda: session().is_playing, "it does not play")
+    yield from wait_until(lambda: session().is_playing, "it does not play")
     for x in (0.05, -0.05, 0.0):
         bpy.data.objects["Head"].location.x = x
         yield
@@ -171,7 +171,7 @@ def hair_plays_as_cards():
     assert moved() > 0.005, "the cards do not swing"
     yield from click(*sidebar_button("hairloom.reset"))
     yield from click(*sidebar_button("hairloom.play"))
-    yield from until(lambda: not live().is_playing(), "it plays on")
+    yield from wait_until(lambda: not live().is_playing(), "it plays on")
     yield
     np.testing.assert_allclose(
         session().snapshot.cards.mesh.positions, at_rest.positions, atol=1e-4
@@ -181,17 +181,17 @@ def hair_plays_as_cards():
 def a_look_is_chosen():
     look = settings("shading")
     look.model = "kajiya_kay"
-    yield from until(are_shown, "cards of Kajiya-Kay do not come")
-    before = yield from picture("look-before")
+    yield from wait_until(are_shown, "cards of Kajiya-Kay do not come")
+    before = yield from redrawn_pixels("look-before")
     look.base_color = (0.9, 0.1, 0.05)
-    red = yield from picture("look-red")
-    assert changed(before, red, 0.05) > 0.005
+    red = yield from redrawn_pixels("look-red")
+    assert changed_fraction(before, red, 0.05) > 0.005
     look.model = "marschner"
-    yield from until(are_shown, "cards of the other model do not come")
-    marschner = yield from picture("look-marschner")
-    assert changed(red, marschner, 0.05) > 0.003
+    yield from wait_until(are_shown, "cards of the other model do not come")
+    marschner = yield from redrawn_pixels("look-marschner")
+    assert changed_fraction(red, marschner, 0.05) > 0.003
     look.model = "kajiya_kay"
-    yield from until(are_shown, "cards of the first model do not come")
+    yield from wait_until(are_shown, "cards of the first model do not come")
 
 
 def strands_again_and_undo():
@@ -204,11 +204,11 @@ def strands_again_and_undo():
     driver.screenshot("strands-again")
     bpy.ops.ed.undo()
     assert settings("card_drawing").shown_as == "cards"
-    yield from until(are_shown, "undo brings no cards back")
+    yield from wait_until(are_shown, "undo brings no cards back")
     bpy.ops.ed.redo()
-    yield from until(lambda: session().snapshot.cards is None, "redo brings no strands back")
+    yield from wait_until(lambda: session().snapshot.cards is None, "redo brings no strands back")
     bpy.ops.ed.undo()
-    yield from until(are_shown, "undo brings no cards back again")
+    yield from wait_until(are_shown, "undo brings no cards back again")
 
 
 def rendered_as_cards():
@@ -221,7 +221,9 @@ def rendered_as_cards():
     scene.hairloom.picture.samples = scene.hairloom.picture.viewport_samples = 4
     shading.type = "RENDERED"
     yield
-    yield from until(lambda: pixels("rendered").std() > 0.05, "nothing is seen in Rendered mode")
+    yield from wait_until(
+        lambda: pixels("rendered").std() > 0.05, "nothing is seen in Rendered mode"
+    )
     camera = bpy.data.objects.new("Viewer", bpy.data.cameras.new("Viewer"))
     bpy.context.collection.objects.link(camera)
     camera.location, camera.rotation_euler = (0.0, -0.75, 0.0), (np.pi / 2.0, 0.0, 0.0)
@@ -231,7 +233,7 @@ def rendered_as_cards():
     scene.render.filepath, scene.render.image_settings.file_format = str(path), "PNG"
     bpy.context.preferences.view.render_display_type = "NONE"
     bpy.ops.render.render("INVOKE_DEFAULT", write_still=True)
-    yield from until(
+    yield from wait_until(
         lambda: path.is_file() and not bpy.app.is_job_running("RENDER"),
         "F12 writes no picture",
     )
@@ -245,16 +247,16 @@ def rendered_as_cards():
 
 
 def card_objects():
-    return of_hairloom("card_object").card_objects(hair())
+    return hairloom_module("card_object").card_objects(hair())
 
 
 def is_making():
-    return of_hairloom("long_work").running() == "Make Cards"
+    return hairloom_module("long_work").running() == "Make Cards"
 
 
 def stage():
     """The current stage of Make Cards; "" if it is not running."""
-    work = of_hairloom("long_work")._running
+    work = hairloom_module("long_work")._running
     return "" if work is None else work.progress.text
 
 
@@ -269,11 +271,11 @@ def making_is_cancelled():
     reading = "Reading the hair"
     for name, is_there in (("reading", lambda: True), ("amid", lambda: stage() != reading)):
         make_cards()
-        yield from until(is_there, f"it does not come past {reading}")
+        yield from wait_until(is_there, f"it does not come past {reading}")
         assert is_making(), "it has ended before it could be cancelled"
         driver.screenshot(f"making-{name}")
         yield from press("ESC")
-        yield from until(lambda: not is_making(), "Esc does not cancel")
+        yield from wait_until(lambda: not is_making(), "Esc does not cancel")
         assert card_objects() == [] and bpy.ops.hairloom.make_cards.poll()
         assert not bpy.data.images.get("Hair Cards") and not bpy.data.meshes.get("Hair Cards")
 
@@ -282,7 +284,7 @@ def cards_are_made():
     """Made again in place, with the artist's modifier and material kept; undone and redone."""
     watch = Stillness()
     make_cards()
-    yield from until(lambda: not is_making(), "Make Cards does not end")
+    yield from wait_until(lambda: not is_making(), "Make Cards does not end")
     print(f"Make Cards: the window stood still for {watch.since():.2f} s", flush=True)
     finest, coarser = card_objects()
     assert not finest.hide_viewport and coarser.hide_viewport
@@ -299,7 +301,7 @@ def cards_are_made():
     settings("cards").card_count = 2 * CARDS
     bpy.ops.ed.undo_push(message="before the cards are made again")
     make_cards()
-    yield from until(lambda: not is_making(), "Make Cards does not end again")
+    yield from wait_until(lambda: not is_making(), "Make Cards does not end again")
     assert card_objects() == [finest, coarser]
     assert len(finest.data.polygons) > 1.2 * count
     assert [each.name for each in finest.modifiers] == ["Thick"]
@@ -317,7 +319,7 @@ def cards_are_made():
     bpy.data.objects.remove(finest)
     yield
     make_cards()
-    yield from until(lambda: not is_making(), "a deleted object is not made again")
+    yield from wait_until(lambda: not is_making(), "a deleted object is not made again")
     assert [each.hairloom.card_object.level for each in card_objects()] == [0, 1]
 
 
@@ -379,7 +381,7 @@ def another_file_in_mid_build():
     """Loading another file ends unfinished builds; the new file works as any."""
     hair().select_set(True)
     yield from click(*sidebar_button("hairloom.preview"))
-    yield from until(is_building, "no cards are built")
+    yield from wait_until(is_building, "no cards are built")
     make_cards()
     yield 1
     bpy.ops.wm.save_as_mainfile(filepath=BLEND)
@@ -388,7 +390,7 @@ def another_file_in_mid_build():
     assert not is_making() and live().sessions() == () and live().notice() == ""
     assert settings("card_drawing").shown_as == "cards" and len(card_objects()) == 2
     yield from click(*sidebar_button("hairloom.preview"))
-    yield from until(are_shown, "no cards are shown in the file that was loaded")
+    yield from wait_until(are_shown, "no cards are shown in the file that was loaded")
     driver.screenshot("reloaded")
 
 
@@ -403,9 +405,9 @@ def disabled_in_mid_build():
     driver.enable_extension()
     yield
     yield from click(*sidebar_button("hairloom.preview"))
-    yield from until(are_shown, "no cards are shown after all")
+    yield from wait_until(are_shown, "no cards are shown after all")
     addon_utils.disable(driver.EXTENSION, default_set=True)
     yield
 
 
-driver.play(steps())
+driver.play_session(steps())

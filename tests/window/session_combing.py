@@ -15,9 +15,8 @@ sys.path.append(str(Path(__file__).parent))
 import driver
 import traces
 from artist import (
-    changed,
+    changed_fraction,
     click,
-    hair_is_made,
     hide_floor,
     look_from_front,
     new_head,
@@ -26,11 +25,12 @@ from artist import (
     press,
     region,
     sidebar_button,
+    wait_for_hair,
 )
 from dice import press as press_in_view
 from dice import select
-from driver import of_hairloom, until
-from open_panels import SIDEBAR, only_our_panels, show
+from driver import hairloom_module, wait_until
+from open_panels import SIDEBAR, only_our_panels, show_panels
 
 log = traces.Log()
 GUIDES, CHILDREN, LENGTH = 300, 20_000, 0.15
@@ -45,11 +45,11 @@ def steps():
     yield from comb(hair)
     yield from undo(hair)
     yield from paint(session().hair.found())  # which Ctrl-Z has replaced
-    assert "Traceback" not in log.added(), "something has raised"
+    assert "Traceback" not in log.new_output(), "something has raised"
 
 
 def groom():
-    show([SIDEBAR])
+    show_panels([SIDEBAR])
     yield from open_our_sidebar()
     new_head()
     hide_floor()
@@ -62,13 +62,13 @@ def groom():
     select(hair)
     yield
     yield from click(*sidebar_button("hairloom.preview"))
-    yield from hair_is_made()
+    yield from wait_for_hair()
     yield
     return hair
 
 
 def session():
-    (one,) = of_hairloom("previews").sessions()
+    (one,) = hairloom_module("previews").sessions()
     return one
 
 
@@ -82,8 +82,10 @@ def sculpt(hair):
     bpy.ops.object.mode_set(mode="SCULPT_CURVES")
     yield
     assert hair.mode == "SCULPT_CURVES"
-    yield from until(lambda: evaluated(hair).display_type == "WIRE", "Blender's curves are shown")
-    drawing = of_hairloom("overlay").drawing_of(session().uid)
+    yield from wait_until(
+        lambda: evaluated(hair).display_type == "WIRE", "Blender's curves are shown"
+    )
+    drawing = hairloom_module("overlay").drawing_of(session().uid)
     (lines,) = drawing.lines
     assert 0 < len(lines.seen_from(np.array([0.0, -9.0, 0.0, 1.0])).points) < len(lines.points)
     assert len(lines.points) == 2 * len(session().rig.guides) * (
@@ -91,7 +93,7 @@ def sculpt(hair):
     )
     yield
     shot = pixels("sculpting")
-    moved = changed(before, shot, 0.4)
+    moved = changed_fraction(before, shot, 0.4)
     assert moved < 0.05, f"{100 * moved:.1f} % of the picture is other than hair"
 
 
@@ -116,7 +118,7 @@ def comb(hair):
     yield 1
     assert (yield from settled()) is not None
     yield
-    follows = changed(shot, pixels("combed"))
+    follows = changed_fraction(shot, pixels("combed"))
     assert follows > 0.002, f"the picture stands still: {follows:.4f} of it has changed"
 
 
@@ -131,7 +133,7 @@ def in_front():
 def settled():
     """Wait for the final rest hair; returns how long that took [s]."""
     began = time.monotonic()
-    yield from until(
+    yield from wait_until(
         lambda: not (session().is_stale or session().is_pending), "the rest does not come"
     )
     took = time.monotonic() - began
@@ -142,7 +144,7 @@ def settled():
 def undo(hair):
     combed = session().rig.guide_grid
     yield from press_in_view("Z", ctrl=True)
-    yield from until(
+    yield from wait_until(
         lambda: np.abs(session().rig.guide_grid - combed).max() > 0.005, "Ctrl-Z is not followed"
     )
     yield from settled()
@@ -150,7 +152,7 @@ def undo(hair):
     driver.screenshot("undone")
     bpy.ops.object.mode_set(mode="OBJECT")
     yield
-    assert not of_hairloom("overlay").drawing_of(session().uid).lines
+    assert not hairloom_module("overlay").drawing_of(session().uid).lines
 
 
 def paint(hair):
@@ -182,7 +184,7 @@ def paint(hair):
     yield 1
     yield from settled()
     yield
-    follows = changed(shot, pixels("painted"))
+    follows = changed_fraction(shot, pixels("painted"))
     assert follows > 0.0005, f"the picture stands still: {follows:.5f} of it has changed"
     bpy.ops.object.mode_set(mode="OBJECT")
     yield
@@ -190,7 +192,7 @@ def paint(hair):
 
 def drawn_colors():
     """The drawn colours of all points."""
-    return of_hairloom("overlay").drawing_of(session().uid).snapshot.color
+    return hairloom_module("overlay").drawing_of(session().uid).snapshot.color
 
 
-driver.play(steps())
+driver.play_session(steps())

@@ -21,7 +21,7 @@ from artist import (
     viewport,
     viewport_middle,
 )
-from driver import of_hairloom, until
+from driver import hairloom_module, wait_until
 
 SAMPLES = 4
 #: [pixels] distance from the middle of the view up to which pictures are compared
@@ -31,7 +31,7 @@ REACH = 150
 def view():
     """The engine's object that draws the viewport; the newest one, since Blender may still hold
     older ones."""
-    kind = of_hairloom("engine").HAIRLOOM_RE_engine
+    kind = hairloom_module("engine").HAIRLOOM_RE_engine
     engines = [each for each in gc.get_objects() if type(each) is kind]
     return engines[-1].view if engines else None
 
@@ -44,7 +44,7 @@ def is_finished():
 def settled():
     """Wait until a change has arrived and all samples are drawn again and shown."""
     yield
-    yield from until(is_finished, "the viewport does not finish its samples")
+    yield from wait_until(is_finished, "the viewport does not finish its samples")
     yield
 
 
@@ -61,7 +61,7 @@ def steps():
     yield from a_region_alone_is_drawn()
     yield from it_begins_anew_at_a_change()
     yield from hair_plays_in_it()
-    assert of_hairloom("overlay").failure() == ""
+    assert hairloom_module("overlay").failure() == ""
 
 
 def set_the_scene():
@@ -118,7 +118,7 @@ def it_is_what_f12_gives():
     render.filepath, render.image_settings.file_format = str(path), "PNG"
     bpy.context.preferences.view.render_display_type = "NONE"
     bpy.ops.render.render("INVOKE_DEFAULT", write_still=True)
-    yield from until(
+    yield from wait_until(
         lambda: path.is_file() and not bpy.app.is_job_running("RENDER"), "F12 writes no picture"
     )
     yield
@@ -144,7 +144,7 @@ def a_region_alone_is_drawn():
     render.border_min_x = render.border_min_y = 0.0
     render.border_max_x = render.border_max_y = 0.5
     render.use_border = True
-    yield from until(lambda: view()._picture.size != size, "the region is not taken over")
+    yield from wait_until(lambda: view()._picture.size != size, "the region is not taken over")
     yield from settled()
     part = pixels("region")
     inside = np.s_[REACH + 2 :, : REACH - 2]
@@ -156,7 +156,7 @@ def a_region_alone_is_drawn():
     assert np.ptp(outside, axis=(0, 1)).max() < 0.02, "something is drawn beyond the region"
     assert np.ptp(whole[: REACH - 2, REACH + 2 :], axis=(0, 1)).max() > 0.1
     render.use_border = False
-    yield from until(lambda: view()._picture.size == size, "the region is not let go of")
+    yield from wait_until(lambda: view()._picture.size == size, "the region is not let go of")
     yield from settled()
     assert np.abs(pixels("whole_again") - whole).max() < 1.5 / 255.0
 
@@ -171,18 +171,18 @@ def it_begins_anew_at_a_change():
 
 def hair_plays_in_it():
     yield from click(*sidebar_button("hairloom.preview"))
-    overlay = of_hairloom("overlay")
-    yield from until(lambda: bool(overlay.drawn()), "the preview does not start")
+    overlay = hairloom_module("overlay")
+    yield from wait_until(lambda: bool(overlay.drawn()), "the preview does not start")
     yield from settled()
     at_rest = pixels("previewed")
     yield from click(*sidebar_button("hairloom.play"))
-    yield from until(
+    yield from wait_until(
         lambda: np.abs(pixels("played") - at_rest).max() > 0.1, "the hair does not move"
     )
     drawn = [overlay.statistics_of(uid).strands for uid in overlay.drawn()]
     assert drawn == [0], "the overlay draws the hair a second time"
     yield from click(*sidebar_button("hairloom.pause"))
-    yield from until(is_finished, "paused hair does not come to rest")
+    yield from wait_until(is_finished, "paused hair does not come to rest")
 
 
-driver.play(steps())
+driver.play_session(steps())

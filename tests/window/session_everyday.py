@@ -10,23 +10,23 @@ import numpy as np
 sys.path.append(str(Path(__file__).parent))
 import driver
 from artist import (
-    changed,
+    changed_fraction,
     click,
-    field,
-    hair_is_made,
+    find_field,
     hide_floor,
     look_from_front,
     new_head,
     open_our_sidebar,
-    picture,
     pixels,
-    pixels_at_rest,
     press,
+    redrawn_pixels,
     sidebar_button,
+    still_pixels,
     viewport,
+    wait_for_hair,
 )
 from dice import press as press_in_view
-from driver import of_hairloom, until
+from driver import hairloom_module, wait_until
 
 failures: list[str] = []
 drawn: set[str] = set()
@@ -52,7 +52,7 @@ def steps():
 def watch_panels():
     """Open all panels, and record every exception of their draw functions, which Blender only
     prints."""
-    panels = [each for each in of_hairloom("registration").CLASSES if "_PT_" in each.__name__]
+    panels = [each for each in hairloom_module("registration").CLASSES if "_PT_" in each.__name__]
     for each in reversed(panels):
         bpy.utils.unregister_class(each)
     for each in panels:
@@ -82,7 +82,7 @@ def nothing_selected():
     yield from click(*sidebar_button("hairloom.preview"))
     yield
     driver.screenshot("nothing-selected")
-    assert of_hairloom("previews").sessions() == ()
+    assert hairloom_module("previews").sessions() == ()
 
 
 def set_the_scene():
@@ -97,23 +97,25 @@ def set_the_scene():
 
 def the_panel_keeps_still():
     """A field below all messages about the hair stays under the mouse, whatever they are."""
-    live, hair, places = of_hairloom("previews"), bpy.data.objects["Hair"], {}
-    places["not previewed"] = yield from field(viewport(), "UI", "hide_original")
+    live, hair, places = hairloom_module("previews"), bpy.data.objects["Hair"], {}
+    places["not previewed"] = yield from find_field(viewport(), "UI", "hide_original")
     before = places["not previewed"]
     yield from click(*sidebar_button("hairloom.preview"))
-    yield from hair_is_made()
-    places["at rest"] = yield from field(viewport(), "UI", "hide_original", expected=before)
+    yield from wait_for_hair()
+    places["at rest"] = yield from find_field(viewport(), "UI", "hide_original", expected=before)
     yield from click(*sidebar_button("hairloom.play"))
-    yield from until(live.is_playing, "it does not play")
-    places["playing"] = yield from field(viewport(), "UI", "hide_original", expected=before)
+    yield from wait_until(live.is_playing, "it does not play")
+    places["playing"] = yield from find_field(viewport(), "UI", "hide_original", expected=before)
     yield from click(*sidebar_button("hairloom.play"))
     hair.scale.x = 1.4
     yield
-    places["with a problem"] = yield from field(viewport(), "UI", "hide_original", expected=before)
+    places["with a problem"] = yield from find_field(
+        viewport(), "UI", "hide_original", expected=before
+    )
     driver.screenshot("with-a-problem")
     hair.scale.x = 1.0
     yield from click(*sidebar_button("hairloom.preview"))
-    yield from until(lambda: not live.sessions(), "the preview goes on")
+    yield from wait_until(lambda: not live.sessions(), "the preview goes on")
     # the mouse moves in steps of half a row
     heights = [y for _, y in places.values()]
     assert max(heights) - min(heights) < 20, f"it moves: {places}"
@@ -126,11 +128,11 @@ def every_panel_draws():
     yield
     drawn.clear()
     yield from click(*sidebar_button("hairloom.preview"))
-    yield from hair_is_made()
+    yield from wait_for_hair()
     yield
     driver.screenshot("all-panels")
     hair, head = bpy.data.objects["Hair"], bpy.data.objects["Head"]
-    fin_modifier = of_hairloom("fin_modifier")
+    fin_modifier = hairloom_module("fin_modifier")
     fin_modifier.add_modifier(head)
     for obj, tab in ((head, "PHYSICS"), (hair, "DATA")):  # a mesh has panels of its own
         bpy.context.active_object.select_set(False)
@@ -143,10 +145,10 @@ def every_panel_draws():
     fin_modifier.remove_modifier(head)
     yield from panels_of_the_engine(properties)
     missing = {
-        each.__name__ for each in of_hairloom("registration").CLASSES if "_PT_" in each.__name__
+        each.__name__ for each in hairloom_module("registration").CLASSES if "_PT_" in each.__name__
     } - drawn
     assert not missing, f"never drawn: {missing}"
-    (session,) = of_hairloom("previews").sessions()
+    (session,) = hairloom_module("previews").sessions()
     assert session.source.dropped == {"fewer than two points": 3}
 
 
@@ -169,25 +171,25 @@ def panels_of_the_engine(properties):
 
 def hiding_and_local_view():
     hair, head = bpy.data.objects["Hair"], bpy.data.objects["Head"]
-    shown = yield from pixels_at_rest("shown")
+    shown = yield from still_pixels("shown")
     hair.hide_set(True)
-    hidden = yield from pixels_at_rest("hidden")
-    assert changed(shown, hidden) > 0.01, "hidden hair is drawn"
+    hidden = yield from still_pixels("hidden")
+    assert changed_fraction(shown, hidden) > 0.01, "hidden hair is drawn"
     hair.hide_set(False)
     hair.select_set(True)  # hiding deselects
-    again = yield from pixels_at_rest("shown-again")
-    assert changed(shown, again) < 0.003
+    again = yield from still_pixels("shown-again")
+    assert changed_fraction(shown, again) < 0.003
 
     hair.select_set(False)
     head.select_set(True)
     with bpy.context.temp_override(area=viewport(), region=viewport().regions[-1]):
         bpy.ops.view3d.localview(frame_selected=False)
-    local = yield from pixels_at_rest("local-view")
-    assert changed(hidden, local) < 0.003, "hair is drawn in a local view without it"
+    local = yield from still_pixels("local-view")
+    assert changed_fraction(hidden, local) < 0.003, "hair is drawn in a local view without it"
     with bpy.context.temp_override(area=viewport(), region=viewport().regions[-1]):
         bpy.ops.view3d.localview(frame_selected=False)
-    out = yield from picture("out-of-local-view")
-    assert changed(local, out) > 0.01
+    out = yield from redrawn_pixels("out-of-local-view")
+    assert changed_fraction(local, out) > 0.01
 
 
 def what_acts_on_it():
@@ -198,25 +200,27 @@ def what_acts_on_it():
     ball = bpy.data.objects.new("Ball", bpy.data.objects["Head"].data)
     bpy.context.collection.objects.link(ball)
     hair.hairloom.dynamics.wind_speed = 8.0
-    without = yield from pixels_at_rest("no-overlays")
+    without = yield from still_pixels("no-overlays")
     bpy.data.objects["Head"].vertex_groups.new(name="Shown")
     hair.hairloom.shown_map = "Shown"
     kinds = {"colliders", "wind", "lights", "stretch", "density", "paint"}
     for kind in sorted(kinds):
         hair.hairloom.shown_overlays = set()
-        yield from until(lambda: changed(without, pixels("no-overlays-again")) < 1e-4, "lines stay")
+        yield from wait_until(
+            lambda: changed_fraction(without, pixels("no-overlays-again")) < 1e-4, "lines stay"
+        )
         hair.hairloom.shown_overlays = {kind}
-        yield from until(
-            lambda kind=kind: 0.0002 < changed(without, pixels(kind)) < 0.1, f"no {kind}"
+        yield from wait_until(
+            lambda kind=kind: 0.0002 < changed_fraction(without, pixels(kind)) < 0.1, f"no {kind}"
         )
     hair.hairloom.shown_overlays = kinds
     yield
     driver.screenshot("all-overlays")
     overlay.show_overlays = False
-    bare = yield from pixels_at_rest("overlays-off")
+    bare = yield from still_pixels("overlays-off")
     hair.hairloom.shown_overlays = set()
-    without = yield from pixels_at_rest("no-overlays")
-    assert changed(bare, without) < 0.001, "lines without overlays"
+    without = yield from still_pixels("no-overlays")
+    assert changed_fraction(bare, without) < 0.001, "lines without overlays"
     overlay.show_overlays = True
     hair.hairloom.dynamics.wind_speed = 0.0
     yield
@@ -225,38 +229,40 @@ def what_acts_on_it():
 def duplicates_by_keys():
     """Shift-D and Alt-D while hair plays: it plays on, Blender shows the copy, Ctrl-Z removes
     it."""
-    live, hair = of_hairloom("previews"), bpy.data.objects["Hair"]
+    live, hair = hairloom_module("previews"), bpy.data.objects["Hair"]
     choose(hair)
     bpy.ops.ed.undo_push(message="the scene")
     yield from click(*sidebar_button("hairloom.play"))
-    yield from until(live.is_playing, "it does not play")
+    yield from wait_until(live.is_playing, "it does not play")
     names = set(bpy.data.objects.keys())
     for held in ({"shift": True}, {"alt": True}):
         yield from press_in_view("D", **held)
         yield from press("RET")  # the copy follows the mouse
-        yield from until(lambda: len(bpy.data.objects) > len(names), f"no copy by {held}")
+        yield from wait_until(lambda: len(bpy.data.objects) > len(names), f"no copy by {held}")
         (copy,) = set(bpy.data.objects.keys()) - names
         yield from still_plays(f"beside a copy by {held}")
         driver.screenshot(f"copy-by-{next(iter(held))}")
         shown = {name: shown_as(name) for name in (copy, "Hair")}
         assert shown == {copy: "TEXTURED", "Hair": "WIRE"}, shown
         yield from press_in_view("Z", ctrl=True)
-        yield from until(lambda: set(bpy.data.objects.keys()) == names, "Ctrl-Z leaves the copy")
+        yield from wait_until(
+            lambda: set(bpy.data.objects.keys()) == names, "Ctrl-Z leaves the copy"
+        )
         yield from still_plays("after Ctrl-Z")
     choose(bpy.data.objects["Hair"])
     yield from click(*sidebar_button("hairloom.play"))
-    yield from until(lambda: not live.is_playing(), "it plays on")
+    yield from wait_until(lambda: not live.is_playing(), "it plays on")
 
 
 def still_plays(where):
-    live = of_hairloom("previews")
+    live = hairloom_module("previews")
     assert len(live.sessions()) == 1 and live.notice() == "", f"{where}: {live.notice()}"
     before = live.sessions()[0].strands
 
     def has_moved():
         return not np.array_equal(live.sessions()[0].strands, before)
 
-    yield from until(has_moved, f"{where} it stands still")
+    yield from wait_until(has_moved, f"{where} it stands still")
 
 
 def shown_as(name):
@@ -274,7 +280,7 @@ def choose(obj):
 
 def blenders_own_animation():
     """Space bar: hair without simulation moves with the head and is drawn in every frame."""
-    live, head = of_hairloom("previews"), bpy.data.objects["Head"]
+    live, head = hairloom_module("previews"), bpy.data.objects["Head"]
     bpy.data.objects["Hair"].hairloom.bake.follows = False
     for frame, x in ((1, 0.0), (40, 0.2)):
         head.location.x = x
@@ -282,7 +288,7 @@ def blenders_own_animation():
     bpy.context.scene.frame_set(1)
     at_first = live.sessions()[0].strands
     bpy.ops.screen.animation_play()
-    yield from until(lambda: bpy.context.scene.frame_current > 1, "Blender does not play")
+    yield from wait_until(lambda: bpy.context.scene.frame_current > 1, "Blender does not play")
     bpy.ops.screen.animation_cancel(restore_frame=False)
     yield
     moved = live.sessions()[0].strands - at_first
@@ -294,7 +300,7 @@ def blenders_own_animation():
 
 def hair_without_a_surface():
     """Only a warning in the panel."""
-    live = of_hairloom("previews")
+    live = hairloom_module("previews")
     hair = bpy.data.objects["Hair"]
     live.stop_all()
     hair.data.surface, hair.parent = None, None
@@ -302,7 +308,7 @@ def hair_without_a_surface():
     bpy.context.view_layer.objects.active = hair
     yield
     yield from click(*sidebar_button("hairloom.preview"))
-    yield from hair_is_made()
+    yield from wait_for_hair()
     yield
     (session,) = live.sessions()
     assert "no surface" in session.source.warnings[0]
@@ -310,8 +316,8 @@ def hair_without_a_surface():
 
 
 def a_failing_shader_is_told_once():
-    overlay = of_hairloom("overlay")
-    strand_pass = of_hairloom("strand_pass").StrandPass
+    overlay = hairloom_module("overlay")
+    strand_pass = hairloom_module("strand_pass").StrandPass
     draw, calls = strand_pass.draw, []
 
     def fail(*_, **__):
@@ -326,13 +332,13 @@ def a_failing_shader_is_told_once():
     assert len(calls) == 1, f"it was tried {len(calls)} times"
     hair = bpy.data.objects["Hair"].evaluated_get(bpy.context.evaluated_depsgraph_get())
     assert hair.display_type == "TEXTURED", "neither our strands nor Blender's are to be seen"
-    assert "this GPU refuses" in of_hairloom("previews").notice()
+    assert "this GPU refuses" in hairloom_module("previews").notice()
     strand_pass.draw = draw
     for _ in range(2):  # off and on again
         yield from click(*sidebar_button("hairloom.preview"))
         yield
-    assert overlay.failure() == "" and of_hairloom("previews").notice() == ""
+    assert overlay.failure() == "" and hairloom_module("previews").notice() == ""
     driver.screenshot("drawn-again")
 
 
-driver.play(steps())
+driver.play_session(steps())

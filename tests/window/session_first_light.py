@@ -11,23 +11,23 @@ import numpy as np
 sys.path.append(str(Path(__file__).parent))
 import driver
 from artist import (
-    changed,
+    changed_fraction,
     click,
-    hair_is_made,
     hide_floor,
     look_from_front,
     new_head,
     open_our_sidebar,
-    picture,
     pixels,
-    pixels_at_rest,
     press,
+    redrawn_pixels,
     sidebar_button,
+    still_pixels,
     viewport,
     viewport_middle,
     viewport_pixels,
+    wait_for_hair,
 )
-from driver import of_hairloom, until
+from driver import hairloom_module, wait_until
 
 STRANDS = 1500
 RED = (0.8, 0.05, 0.05)
@@ -36,11 +36,11 @@ FILE = str(Path(bpy.app.tempdir) / "first_light.blend")
 
 
 def live():
-    return of_hairloom("previews")
+    return hairloom_module("previews")
 
 
 def overlay():
-    return of_hairloom("overlay")
+    return hairloom_module("overlay")
 
 
 def steps():
@@ -73,21 +73,21 @@ def preview(shading):
     """The sidebar's button draws the strands; a second click restores the view."""
     viewport().spaces.active.shading.type = shading
     yield from wait_for_the_head()
-    off = yield from pixels_at_rest(f"{shading.lower()}-off")
+    off = yield from still_pixels(f"{shading.lower()}-off")
     yield from click(*sidebar_button("hairloom.preview"))
-    yield from until(live().sessions, "the Preview button did nothing")
+    yield from wait_until(live().sessions, "the Preview button did nothing")
     name = f"{shading.lower()}-preview"
-    yield from until(
-        lambda: changed(off, pixels(name)) > 0.02, f"{shading}: the strands do not show"
+    yield from wait_until(
+        lambda: changed_fraction(off, pixels(name)) > 0.02, f"{shading}: the strands do not show"
     )
     on = pixels(name)
     assert overlay().failure() == ""
     yield from depth_is_tested(shading)
     if shading == "SOLID":
         yield from click(*sidebar_button("hairloom.preview"))
-        yield from until(lambda: not live().sessions(), "the Preview button does not end it")
-        again = yield from pixels_at_rest("solid-off-again")
-        left, shown = changed(off, again), changed(off, on)
+        yield from wait_until(lambda: not live().sessions(), "the Preview button does not end it")
+        again = yield from still_pixels("solid-off-again")
+        left, shown = changed_fraction(off, again), changed_fraction(off, on)
         assert left < 0.1 * shown, f"something stays after the preview: {left} of {shown}"
 
 
@@ -101,9 +101,9 @@ def wait_for_the_head():
         background = np.median(viewport_pixels(screen)[-20:, :20], axis=(0, 1))
         return np.abs(np.median(viewport_middle(screen), axis=(0, 1)) - background).max() > 0.1
 
-    yield from until(is_seen, "the head never shows")
-    yield from pixels_at_rest("waiting")
-    yield from until(is_seen, "the head does not stay")
+    yield from wait_until(is_seen, "the head never shows")
+    yield from still_pixels("waiting")
+    yield from wait_until(is_seen, "the head does not stay")
 
 
 def depth_is_tested(shading):
@@ -113,10 +113,10 @@ def depth_is_tested(shading):
     plate.scale.y = 0.01
     look_at_hair_from_above()
     before = f"{shading}: hair shines through a plate before it"
-    yield from until(lambda: roughness(f"{shading.lower()}-plate-before") < 0.02, before)
+    yield from wait_until(lambda: roughness(f"{shading.lower()}-plate-before") < 0.02, before)
     plate.location.y = 0.4
     behind = f"{shading}: a plate behind hides the hair"
-    yield from until(lambda: roughness(f"{shading.lower()}-plate-behind") > 0.05, behind)
+    yield from wait_until(lambda: roughness(f"{shading.lower()}-plate-behind") > 0.05, behind)
     bpy.data.objects.remove(plate)
     look_from_front(DISTANCE)
     select_hair()
@@ -144,8 +144,8 @@ def sliders_act_at_once():
     yield from wait_for_the_head()
     before = pixels("slider-before")
     bpy.data.objects["Hair"].data.hairloom.shading.base_color = RED
-    yield from until(
-        lambda: changed(before, pixels("slider-after")) > 0.02, "the hair does not change"
+    yield from wait_until(
+        lambda: changed_fraction(before, pixels("slider-after")) > 0.02, "the hair does not change"
     )
     after = pixels("slider-after")
     red = (after - before)[..., 0].mean()
@@ -156,9 +156,9 @@ def play_and_stop():
     """Play with the button, move the head meanwhile, stop with Esc."""
     head = bpy.data.objects["Head"]
     at_rest = live().sessions()[0].strands
-    before = yield from pixels_at_rest("play-before")
+    before = yield from still_pixels("play-before")
     yield from click(*sidebar_button("hairloom.play"))
-    yield from until(lambda: live().sessions()[0].is_playing, "the Play button did nothing")
+    yield from wait_until(lambda: live().sessions()[0].is_playing, "the Play button did nothing")
     lags = [0.0]
 
     def lag():
@@ -169,19 +169,19 @@ def play_and_stop():
         return lags[-1]
 
     head.location.x = 0.06
-    yield from until(lambda: lag() > 0.001, "the tips do not lag behind")
-    yield from until(lambda: lag() < 0.5 * max(lags), "the tips do not come after")
+    yield from wait_until(lambda: lag() > 0.001, "the tips do not lag behind")
+    yield from wait_until(lambda: lag() < 0.5 * max(lags), "the tips do not come after")
     head.location.x = 0.08
-    moving = yield from picture("play-moving")
+    moving = yield from redrawn_pixels("play-moving")
     head.location.x = 0.0
     yield
     yield from press("ESC")
-    yield from until(lambda: not live().is_playing(), "ESC does not end Play")
-    stopped = yield from pixels_at_rest("play-stopped")
+    yield from wait_until(lambda: not live().is_playing(), "ESC does not end Play")
+    stopped = yield from still_pixels("play-stopped")
     strands = live().sessions()[0].strands
     assert np.abs(strands - at_rest).max() < 1e-5, "ESC did not restore the style"
-    left = changed(before, stopped)
-    assert left < 0.1 * changed(before, moving), "the picture is not the one before"
+    left = changed_fraction(before, stopped)
+    assert left < 0.1 * changed_fraction(before, moving), "the picture is not the one before"
 
 
 def undo():
@@ -207,7 +207,7 @@ def undo():
 def save_and_reload():
     """Loading a file during Play: sessions end, settings stay, and Preview works again."""
     yield from click(*sidebar_button("hairloom.play"))
-    yield from until(live().is_playing, "the Play button did nothing")
+    yield from wait_until(live().is_playing, "the Play button did nothing")
     bpy.ops.wm.save_as_mainfile(filepath=FILE)
     yield
     assert live().is_playing(), "saving stopped it"
@@ -217,22 +217,22 @@ def save_and_reload():
     hair = bpy.data.objects["Hair"]
     assert np.allclose(hair.data.hairloom.shading.base_color, RED)
     assert hair.display_type == "TEXTURED"
-    off = yield from picture("reloaded-off")
+    off = yield from redrawn_pixels("reloaded-off")
     yield from click(*sidebar_button("hairloom.preview"))
-    yield from hair_is_made()
-    on = yield from picture("reloaded-preview")
-    assert changed(off, on) > 0.02
+    yield from wait_for_hair()
+    on = yield from redrawn_pixels("reloaded-preview")
+    assert changed_fraction(off, on) > 0.02
 
 
 def disable():
     """Disabling during Play leaves nothing that draws, ticks or raises."""
     yield from click(*sidebar_button("hairloom.play"))
-    yield from until(live().is_playing, "the Play button did nothing")
-    on = yield from picture("before-disabling")
+    yield from wait_until(live().is_playing, "the Play button did nothing")
+    on = yield from redrawn_pixels("before-disabling")
     addon_utils.disable(driver.EXTENSION, default_set=True)
-    off = yield from picture("disabled")
+    off = yield from redrawn_pixels("disabled")
     assert not hasattr(bpy.types.Curves, "hairloom")
-    assert changed(on, off) > 0.02
+    assert changed_fraction(on, off) > 0.02
     driver.enable_extension()
     yield
     addon_utils.disable(driver.EXTENSION, default_set=True)
@@ -240,4 +240,4 @@ def disable():
     os.remove(FILE)
 
 
-driver.play(steps(), anti_aliasing=True)
+driver.play_session(steps(), anti_aliasing=True)

@@ -13,23 +13,23 @@ import numpy as np
 sys.path.append(str(Path(__file__).parent))
 import driver
 from artist import (
-    changed,
-    hair_is_made,
+    changed_fraction,
     hide_floor,
     look_from_front,
     open_our_sidebar,
-    picture,
     pixels,
-    pixels_at_rest,
     press,
+    redrawn_pixels,
     region,
+    still_pixels,
     viewport,
+    wait_for_hair,
 )
-from driver import of_hairloom, until
+from driver import hairloom_module, wait_until
 
 
 def live():
-    return of_hairloom("previews")
+    return hairloom_module("previews")
 
 
 def in_view():
@@ -56,7 +56,7 @@ def steps():
     yield from a_warning_mends()
     yield from to_the_engine()
     yield from the_page_in_the_preferences()
-    assert of_hairloom("overlay").failure() == "" and live().notice() == ""
+    assert hairloom_module("overlay").failure() == "" and live().notice() == ""
 
 
 def nothing_selected():
@@ -76,16 +76,18 @@ def the_sample_scene_plays():
     """One click gives moving, shining hair in its own scene."""
     own = bpy.context.window.scene
     invoke("sample_scene")
-    yield from until(lambda: not of_hairloom("long_work").running(), "the scene does not come")
+    yield from wait_until(
+        lambda: not hairloom_module("long_work").running(), "the scene does not come"
+    )
     scene = bpy.context.window.scene
     assert scene != own and len(live().sessions()) == 1
-    yield from until(lambda: bpy.context.screen.is_animation_playing, "nothing plays")
-    yield from until(lambda: scene.frame_current > 2, "the playhead stands")
+    yield from wait_until(lambda: bpy.context.screen.is_animation_playing, "nothing plays")
+    yield from wait_until(lambda: scene.frame_current > 2, "the playhead stands")
     one = pixels("sample")
     frame = scene.frame_current
-    yield from until(lambda: abs(scene.frame_current - frame) > 3, "the playhead stands")
+    yield from wait_until(lambda: abs(scene.frame_current - frame) > 3, "the playhead stands")
     other = pixels("sample-later")
-    assert changed(one, other) > 0.02, "nothing has moved"
+    assert changed_fraction(one, other) > 0.02, "nothing has moved"
     with in_view():
         bpy.ops.screen.animation_cancel(restore_frame=False)
     yield
@@ -103,24 +105,26 @@ def hair_on_a_mesh_of_ones_own():
     bpy.context.object.name = "Ball"
     hide_floor()
     look_from_front(0.9)
-    bare = yield from pixels_at_rest("bare")
+    bare = yield from still_pixels("bare")
     bpy.ops.ed.undo_push(message="a head")
     invoke("add_groom", strand_count=1500)
-    yield from until(lambda: live().is_playing(), "it does not play")
+    yield from wait_until(lambda: live().is_playing(), "it does not play")
     (session,) = live().sessions()
-    yield from hair_is_made()
+    yield from wait_for_hair()
     at_first = session.strands
-    yield from until(lambda: np.abs(session.strands - at_first).max() > 1.0e-3, "nothing moves")
-    grown = yield from picture("own-mesh")
-    assert changed(bare, grown) > 0.02, "no hair is seen"
+    yield from wait_until(
+        lambda: np.abs(session.strands - at_first).max() > 1.0e-3, "nothing moves"
+    )
+    grown = yield from redrawn_pixels("own-mesh")
+    assert changed_fraction(bare, grown) > 0.02, "no hair is seen"
     parts = ("simulation", "drawing")
-    yield from until(lambda: all(part in session.times.text for part in parts), "no times")
+    yield from wait_until(lambda: all(part in session.times.text for part in parts), "no times")
 
 
 def undo_takes_it_away():
     with in_view():
         bpy.ops.ed.undo()
-    yield from until(lambda: not live().sessions(), "the preview outlives its hair")
+    yield from wait_until(lambda: not live().sessions(), "the preview outlives its hair")
     assert not live().is_playing() and live().notice() == ""
     yield
     with in_view():
@@ -131,20 +135,20 @@ def undo_takes_it_away():
     bpy.context.view_layer.objects.active = hair
     hair.select_set(True)
     assert bpy.ops.hairloom.preview() == {"FINISHED"}
-    yield from hair_is_made()
+    yield from wait_for_hair()
     yield
 
 
 def presets_have_pictures():
-    presets = of_hairloom("presets")
+    presets = hairloom_module("presets")
     bpy.context.window.cursor_warp(viewport().x + 300, viewport().y + viewport().height // 2)
     for section in ("shading", "dynamics", "volume", "cards"):
         entries = presets.shipped(section)
         assert entries and all(entry.icon for entry in entries), section
-    before = yield from picture("brown")
+    before = yield from redrawn_pixels("brown")
     bpy.context.window_manager.hairloom_presets.shading = "looks/blond"
-    blond = yield from picture("blond")
-    assert changed(before, blond) > 0.01, "the look is the same"
+    blond = yield from redrawn_pixels("blond")
+    assert changed_fraction(before, blond) > 0.01, "the look is the same"
 
 
 def a_menu_under_the_mouse():
@@ -153,7 +157,7 @@ def a_menu_under_the_mouse():
         before = driver.screenshot("no-menu")
         bpy.ops.wm.call_menu(name="HAIRLOOM_MT_object")
     yield
-    assert changed(before / 255.0, driver.screenshot("object-menu") / 255.0) > 0.01
+    assert changed_fraction(before / 255.0, driver.screenshot("object-menu") / 255.0) > 0.01
     yield from press("ESC")
     with in_view():
         bpy.ops.wm.call_menu(name="VIEW3D_MT_object_context_menu")
@@ -177,10 +181,10 @@ def a_key_of_ones_own():
     bpy.context.window.event_simulate("MOUSEMOVE", "NOTHING", x=x, y=y)
     yield
     yield from press("F19", x, y)
-    yield from until(lambda: len(live().sessions()) != count, "the key does nothing")
+    yield from wait_until(lambda: len(live().sessions()) != count, "the key does nothing")
     yield from press("F19", x, y)
-    yield from until(lambda: len(live().sessions()) == count, "the key works once")
-    yield from hair_is_made()
+    yield from wait_until(lambda: len(live().sessions()) == count, "the key works once")
+    yield from wait_for_hair()
     preview_key().type = "NONE"
 
 
@@ -205,10 +209,10 @@ def a_warning_mends():
     assert properties.spaces.active.context == "DATA"
     assert bpy.ops.hairloom.set_surface() == {"FINISHED"} and hair.data.surface == head
     assert bpy.ops.hairloom.apply_scale() == {"FINISHED"}
-    yield from until(
+    yield from wait_until(
         lambda: live().sessions() and live().sessions()[0].head is not None, "it has no head yet"
     )
-    issues = of_hairloom("diagnostics").issues_of(hair, live().sessions()[0])
+    issues = hairloom_module("diagnostics").issues_of(hair, live().sessions()[0])
     driver.screenshot("mended")
     assert [issue.operator for issue in issues] in ([], ["hairloom.snap_roots"])
 
@@ -218,7 +222,7 @@ def to_the_engine():
         path = os.path.join(folder, "cards.glb")
         bpy.ops.hairloom.apply_preset(name="cards/crowd")
         assert bpy.ops.hairloom.export_cards(filepath=path) & {"FINISHED", "RUNNING_MODAL"}
-        yield from until(lambda: os.path.isfile(path), "no cards were written")
+        yield from wait_until(lambda: os.path.isfile(path), "no cards were written")
     yield
 
 
@@ -230,18 +234,18 @@ def the_page_in_the_preferences():
     bpy.ops.preferences.addon_expand(module=driver.EXTENSION)
     yield
     assert bpy.ops.hairloom.self_test() == {"FINISHED"}
-    checks = of_hairloom("self_test").last_report()
+    checks = hairloom_module("self_test").last_report()
     failed = [check for check in checks if check.outcome == "failed"]
     assert not failed and sum(check.outcome == "passed" for check in checks) >= 5, checks
     bpy.ops.hairloom.copy_report()
     assert "Drawing, Marschner" in bpy.context.window_manager.clipboard
     yield
     driver.screenshot("preferences")
-    page = of_hairloom("preferences").preferences(bpy.context)
+    page = hairloom_module("preferences").preferences(bpy.context)
     assert page.bl_rna.identifier.startswith("HAIRLOOM"), "it is the defaults, not the page"
     page.look = "looks/red"
     area.type = "VIEW_3D"
     yield
 
 
-driver.play(steps())
+driver.play_session(steps())

@@ -14,18 +14,18 @@ sys.path.append(str(Path(__file__).parent))
 import driver
 import traces
 from artist import (
-    hair_is_made,
     hide_floor,
     look_from_front,
     new_head,
-    picture,
     press,
+    redrawn_pixels,
     region,
     viewport,
+    wait_for_hair,
 )
 from dice import press as press_in_view
 from dice import select
-from driver import of_hairloom
+from driver import hairloom_module
 
 log = traces.Log()
 STRANDS, LENGTH = 300, 0.1
@@ -43,7 +43,7 @@ def steps():
     yield from the_winds_speed()
     yield from a_balls_size()
     yield from not_under_a_brush()
-    assert "Traceback" not in log.added(), "something has raised"
+    assert "Traceback" not in log.new_output(), "something has raised"
 
 
 def groom():
@@ -57,7 +57,7 @@ def groom():
     hair.data.hairloom.children.method = "none"
     hair.hairloom.dynamics.wind_speed = SPEED
     bpy.ops.hairloom.preview()
-    yield from hair_is_made()
+    yield from wait_for_hair()
     hair.hairloom.shown_overlays = {"wind"}
     bpy.ops.ed.undo_push(message="hair")
     yield
@@ -75,7 +75,7 @@ def wind():
 
 def ball():
     """The middle of the hair, and its radius [m]."""
-    (session,) = of_hairloom("previews").sessions()
+    (session,) = hairloom_module("previews").sessions()
     return Vector(session.snapshot.root_center.tolist()), session.rig.radius
 
 
@@ -128,7 +128,7 @@ def the_winds_speed():
 def the_winds_direction():
     """Dragged by the ring around the hair, whose front follows the mouse."""
     center, _ = ball()
-    pixels = bpy.context.preferences.view.gizmo_size * of_hairloom("gizmos").RING
+    pixels = bpy.context.preferences.view.gizmo_size * hairloom_module("gizmos").RING
     aside = on_screen(center + Vector((0.01, 0.0, 0.0)))[0] - on_screen(center)[0]
     radius = 0.01 * pixels / aside
     angle = math.radians(-60.0)
@@ -172,13 +172,13 @@ def not_under_a_brush():
     yield
     center, radius = ball()
     tip = on_screen(center + Vector((0.2 * radius * SPEED, 0.0, 0.0)))
-    shown = yield from picture("shown")
+    shown = yield from redrawn_pixels("shown")
     bpy.ops.object.mode_set(mode="SCULPT_CURVES")
-    hidden = yield from picture("sculpting")
+    hidden = yield from redrawn_pixels("sculpting")
     yield from drag("combed", tip, (tip[0] + DRAGGED, tip[1]))
     assert wind().wind_speed == SPEED, "it is dragged in Sculpt Mode"
     blue = [is_blue(each).sum() for each in (shown, hidden)]
     assert blue[0] > 1.5 * blue[1] > 0, f"blue pixels with and without handles: {blue}"
 
 
-driver.play(steps())
+driver.play_session(steps())

@@ -12,21 +12,21 @@ sys.path.append(str(Path(__file__).parent))
 import driver
 import traces
 from artist import (
-    changed,
+    changed_fraction,
     click,
-    field,
-    hair_is_made,
+    find_field,
     hide_floor,
     look_from_front,
     new_head,
     open_our_sidebar,
-    pixels_at_rest,
     press,
+    still_pixels,
     viewport,
+    wait_for_hair,
 )
 from dice import press as press_in_view
-from driver import of_hairloom, until
-from open_panels import SIDEBAR, only_our_panels, show
+from driver import hairloom_module, wait_until
+from open_panels import SIDEBAR, only_our_panels, show_panels
 
 log = traces.Log()
 STRANDS, LENGTH = 600, 0.15
@@ -43,7 +43,7 @@ def steps():
     yield from undo()
     yield from combed_hair_stays()
     yield from a_group_from_a_list()
-    assert "Traceback" not in log.added(), "something has raised"
+    assert "Traceback" not in log.new_output(), "something has raised"
 
 
 def hair():
@@ -51,11 +51,11 @@ def hair():
 
 
 def points():
-    return of_hairloom("curves").curve_points(hair().data)
+    return hairloom_module("curves").curve_points(hair().data)
 
 
 def groom():
-    show([SIDEBAR + "_grow"])
+    show_panels([SIDEBAR + "_grow"])
     yield from open_our_sidebar()
     head = new_head()
     top = head.vertex_groups.new(name="Top")
@@ -64,16 +64,16 @@ def groom():
     look_from_front(0.9)
     bpy.ops.hairloom.add_groom(strand_count=STRANDS, length=LENGTH, plays=False)
     bpy.ops.ed.undo_push(message="hair")
-    yield from hair_is_made()
+    yield from wait_for_hair()
     yield
 
 
 def drag_a_slider():
     """The hair gets shorter while the button is down, as curves and in the preview."""
-    long = yield from pixels_at_rest("long")
-    (session,) = of_hairloom("previews").sessions()
+    long = yield from still_pixels("long")
+    (session,) = hairloom_module("previews").sessions()
     before = session.rig.strands
-    window, (x, y) = bpy.context.window, (yield from field(viewport(), "UI", "grow.length"))
+    window, (x, y) = bpy.context.window, (yield from find_field(viewport(), "UI", "grow.length"))
     window.event_simulate("LEFTMOUSE", "PRESS", x=x, y=y)
     yield 1
     seen = set()
@@ -86,52 +86,52 @@ def drag_a_slider():
     yield 1
     own = hair().data.hairloom.grow
     assert own.length < 0.8 * LENGTH, f"the slider was not dragged: {own.length}"
-    yield from until(lambda: session.rig.strands is not before, "the preview does not follow")
-    short = yield from pixels_at_rest("short")
-    assert changed(long, short) > 0.02, "the picture stands still"
+    yield from wait_until(lambda: session.rig.strands is not before, "the preview does not follow")
+    short = yield from still_pixels("short")
+    assert changed_fraction(long, short) > 0.02, "the picture stands still"
 
 
 def undo():
     shape = points()
     yield from press_in_view("Z", ctrl=True)
-    yield from until(lambda: hair().data.hairloom.grow.length > 0.95 * LENGTH, "no undo")
+    yield from wait_until(lambda: hair().data.hairloom.grow.length > 0.95 * LENGTH, "no undo")
     assert np.abs(points() - shape).max() > 0.01, "the hair is not undone"
-    growing = of_hairloom("growing")
+    growing = hairloom_module("growing")
     assert growing.losses(hair().data) == () and not growing.is_behind(hair().data)
     yield
 
 
 def combed_hair_stays():
-    growing = of_hairloom("growing")
+    growing = hairloom_module("growing")
     shape = points() * np.float32(1.02)
-    of_hairloom("curves").put_points(hair().data, shape)
+    hairloom_module("curves").put_points(hair().data, shape)
     bpy.ops.ed.undo_push(message="comb")
     hair().data.hairloom.grow.length = 0.5 * LENGTH
     yield
     driver.screenshot("combed")
     assert np.array_equal(points(), shape), "what was combed is lost"
     assert growing.losses(hair().data) == ("combed shape",)
-    x, y = yield from field(viewport(), "UI", "grow.method")
+    x, y = yield from find_field(viewport(), "UI", "grow.method")
     yield from click(x, y + ROW)  # Grow Again is above it
-    yield from until(lambda: growing.losses(hair().data) == (), "Grow Again does nothing")
+    yield from wait_until(lambda: growing.losses(hair().data) == (), "Grow Again does nothing")
     yield
     driver.screenshot("grown-again")
 
 
 def a_group_from_a_list():
     """A click opens the list; arrow key and Return choose its only entry."""
-    x, y = yield from field(viewport(), "UI", "grow.density_group")
+    x, y = yield from find_field(viewport(), "UI", "grow.density_group")
     yield from click(x, y)
     yield
     driver.screenshot("list")
     for key in ("DOWN_ARROW", "RET"):
         yield from press(key)
     own = hair().data.hairloom.grow
-    yield from until(lambda: own.density_group == "Top", f"'{own.density_group}' is chosen")
+    yield from wait_until(lambda: own.density_group == "Top", f"'{own.density_group}' is chosen")
     roots = points().reshape(STRANDS, -1, 3)[:, 0]
     assert roots[:, 2].min() > 0.03, "it does not grow by the group"
     yield
     driver.screenshot("by-group")
 
 
-driver.play(steps())
+driver.play_session(steps())

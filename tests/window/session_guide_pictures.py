@@ -13,20 +13,28 @@ from mathutils import Euler
 
 sys.path.append(str(Path(__file__).parent))
 import driver
-from artist import at_rest, file_browser, look_from_front, open_our_sidebar, press, region, viewport
-from cropping import changed_box, crop, keep, made
-from driver import until
-from guide_panels import OTHERS, PICTURES, TWINS
+from artist import (
+    file_browser,
+    look_from_front,
+    open_our_sidebar,
+    press,
+    region,
+    viewport,
+    wait_for_still_picture,
+)
+from cropping import changed_box, crop, save_pictures, saved_names
+from driver import wait_until
+from guide_panels import OTHER_PICTURES, PICTURES, SIDEBAR_TWINS
 from open_panels import (
-    OURS,
+    OUR_PREFIX,
     SIDEBAR,
     all_panels,
-    drawn,
-    of_hairloom,
+    drawn_panels,
+    hairloom_module,
     only_our_panels,
-    ours,
-    show,
-    there,
+    our_panels,
+    show_panels,
+    visible_panels,
 )
 
 EXPORTS = ("export_cards", "export_alembic", "export_usd", "export_tressfx", "export_hair")
@@ -50,7 +58,7 @@ def steps():
     bpy.context.preferences.view.filebrowser_display_type = "SCREEN"
     yield from nothing_yet()
     yield from the_sample_scene()
-    keep("window", [as_far_as_used((yield from whole_screen("window")))])
+    save_pictures("window", [as_far_as_used((yield from whole_screen("window")))])
     bpy.ops.wm.read_homefile()  # panels that were drawn before stay closed
     yield
     only_our_panels()
@@ -64,31 +72,35 @@ def steps():
     yield from of_the_engine()
     yield from options_of_files()
     yield from the_preferences()
-    missing = {each.__name__ for each in ours()} - drawn
+    missing = {each.__name__ for each in our_panels()} - drawn_panels
     assert not missing, f"never opened: {missing}"
-    assert made == {*PICTURES, *OTHERS}, f"not the pictures that are wanted: {made}"
+    assert saved_names == {*PICTURES, *OTHER_PICTURES}, (
+        f"not the pictures that are wanted: {saved_names}"
+    )
 
 
 def nothing_yet():
     yield from clear()
     yield from whole_screen("start")
-    keep("start", [crop("start", *sidebar())])
+    save_pictures("start", [crop("start", *sidebar())])
 
 
 def the_sample_scene():
     """The sample scene at rest in the default window, without the lines of its lights."""
-    show([SIDEBAR])
+    show_panels([SIDEBAR])
     viewport().spaces.active.overlay.show_extras = False
     with bpy.context.temp_override(area=viewport(), region=region("WINDOW")):
         bpy.ops.hairloom.sample_scene("EXEC_DEFAULT", plays=False)
-    yield from until(lambda: not of_hairloom("long_work").running(), "the scene does not come")
-    yield from until(lambda: is_drawn(bpy.context.object), "the hair is not drawn")
+    yield from wait_until(
+        lambda: not hairloom_module("long_work").running(), "the scene does not come"
+    )
+    yield from wait_until(lambda: is_drawn(bpy.context.object), "the hair is not drawn")
     yield from panels_beside_it()
 
 
 def set_the_scene(distance):
     """Hair on a ball, seen from this distance [m], in the default window."""
-    show([SIDEBAR])
+    show_panels([SIDEBAR])
     yield from clear()
     bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1)
     bpy.ops.object.shade_smooth()
@@ -102,7 +114,7 @@ def set_the_scene(distance):
     hair.data.hairloom.children.method = "multi"
     hair.data.hairloom.shafts.use_shafts = True
     bpy.ops.hairloom.preview()
-    yield from until(lambda: is_drawn(hair), "the hair is not drawn")
+    yield from wait_until(lambda: is_drawn(hair), "the hair is not drawn")
     yield from panels_beside_it()
 
 
@@ -125,7 +137,7 @@ def clear():
 
 def is_drawn(hair, at_least=50):
     """Whether hair is drawn with its children, after the placeholder of fewer strands."""
-    drawn = of_hairloom("overlay").statistics_of(hair.session_uid)
+    drawn = hairloom_module("overlay").statistics_of(hair.session_uid)
     return drawn.strands >= at_least
 
 
@@ -137,25 +149,27 @@ def as_far_as_used(screen):
 
 def whole_screen(label):
     """The screen once no panel slides any more."""
-    return (yield from at_rest(label, lambda: driver.screenshot(label), STILL))
+    return (yield from wait_for_still_picture(label, lambda: driver.screenshot(label), STILL))
 
 
 def picture(name, place):
     """Take the columns of a picture, each with its open panels."""
     columns = []
     for number, names in enumerate(PICTURES[name]):
-        full = [OURS + each for each in names]
-        show(full)
+        full = [OUR_PREFIX + each for each in names]
+        show_panels(full)
         place()
         yield
-        yield from until(lambda full=full: drawn.issuperset(full), f"not drawn for {name}: {full}")
+        yield from wait_until(
+            lambda full=full: drawn_panels.issuperset(full), f"not drawn for {name}: {full}"
+        )
 
         def column(label=f"{name}{number}", full=full):
-            show(full)
+            show_panels(full)
             return crop(label, *place())
 
-        columns.append((yield from at_rest(name, column, STILL)))
-    keep(name, columns)
+        columns.append((yield from wait_for_still_picture(name, column, STILL)))
+    save_pictures(name, columns)
 
 
 def handles():
@@ -178,7 +192,7 @@ def handles():
     choose(ball)
     yield
     pictures.append(around((0.06, -0.04, 0.0), (yield from whole_screen("ball"))))
-    keep("handles", pictures)
+    save_pictures("handles", pictures)
     bpy.data.objects.remove(ball)
     bpy.data.collections.remove(colliders)
     look_from_front(FAR)
@@ -201,22 +215,26 @@ def sidebar():
 
 def the_sidebar():
     yield from picture("preview", sidebar)
-    live = of_hairloom("previews")
+    live = hairloom_module("previews")
     hair, head = bpy.data.objects["Hair"], bpy.data.objects["Head"]
     live.stop_all()
     hair.data.surface, hair.parent = None, None
     hair.scale.x = 1.4
     bpy.ops.hairloom.preview()
-    yield from until(lambda: is_drawn(hair), "the guides are not drawn")
+    yield from wait_until(lambda: is_drawn(hair), "the guides are not drawn")
     yield from picture("warnings", sidebar)
     hair.scale.x = 1.0
     live.stop_all()
     hair.data.surface = head
     bpy.ops.hairloom.preview()
-    twins = [e.__name__ for e in ours() if e.__name__.removeprefix(OURS).startswith(TWINS)]
+    twins = [
+        e.__name__
+        for e in our_panels()
+        if e.__name__.removeprefix(OUR_PREFIX).startswith(SIDEBAR_TWINS)
+    ]
     for name in twins:  # their pictures are of Properties > Data
-        show([name])
-        yield from until(lambda name=name: name in drawn, f"{name} is not drawn")
+        show_panels([name])
+        yield from wait_until(lambda name=name: name in drawn_panels, f"{name} is not drawn")
         yield
         driver.screenshot(f"twin_{name}")
 
@@ -224,7 +242,7 @@ def the_sidebar():
 def of_meshes_in_the_sidebar():
     head = bpy.data.objects["Head"]
     choose(head)
-    of_hairloom("fin_modifier").add_modifier(head)
+    hairloom_module("fin_modifier").add_modifier(head)
     yield from picture("meshes", sidebar)
 
 
@@ -237,13 +255,13 @@ def choose(obj):
 
 def popups():
     """The check before an export, and the options of sorting cards."""
-    of_hairloom("previews").stop_all()
+    hairloom_module("previews").stop_all()
     yield from popup("sort", "sort_cards")
     choose(bpy.data.objects["Hair"])
     yield from popup("check", "check_export")
-    assert of_hairloom("export_check").count() == 0, "the check goes on unseen"
+    assert hairloom_module("export_check").count() == 0, "the check goes on unseen"
     bpy.ops.hairloom.preview()
-    yield from until(lambda: is_drawn(bpy.data.objects["Hair"]), "the hair is not drawn")
+    yield from wait_until(lambda: is_drawn(bpy.data.objects["Hair"]), "the hair is not drawn")
 
 
 def popup(name, operator, **settings):
@@ -254,10 +272,12 @@ def popup(name, operator, **settings):
     before = yield from whole_screen(f"before_{name}")
     with bpy.context.temp_override(area=viewport(), region=view):
         getattr(bpy.ops.hairloom, operator)("INVOKE_DEFAULT", **settings)
-    yield from until(lambda: not of_hairloom("long_work").running(), f"{operator} does not end")
+    yield from wait_until(
+        lambda: not hairloom_module("long_work").running(), f"{operator} does not end"
+    )
     yield
     screen = yield from whole_screen(f"part_{name}")
-    keep(name, [screen[changed_box(before, screen)]])
+    save_pictures(name, [screen[changed_box(before, screen)]])
     yield from press("ESC")
     yield
 
@@ -328,14 +348,16 @@ def of_the_engine():
 def at_the_tab():
     """The Properties editor at the tab of the shown panels of the engine."""
     area, window = column()
-    area.spaces.active.context = "VIEW_LAYER" if f"{OURS}engine_passes" in there else "RENDER"
+    area.spaces.active.context = (
+        "VIEW_LAYER" if f"{OUR_PREFIX}engine_passes" in visible_panels else "RENDER"
+    )
     return area, window
 
 
 def options_of_files():
     """The options at the right of the file browser for each format; those of strands side by
     side."""
-    of_hairloom("previews").stop_all()
+    hairloom_module("previews").stop_all()
     pictures = {}
     for name in (*EXPORTS, "import_strands"):
         settings = {"filepath": str(Path(bpy.app.tempdir) / "hair")} if name in EXPORTS else {}
@@ -343,7 +365,7 @@ def options_of_files():
             settings["motion"] = "joints"
         with bpy.context.temp_override(area=viewport(), region=region("WINDOW")):
             getattr(bpy.ops.hairloom, name)("INVOKE_DEFAULT", **settings)
-        yield from until(lambda: file_browser() is not None, f"no options for {name}")
+        yield from wait_until(lambda: file_browser() is not None, f"no options for {name}")
         yield from whole_screen(name)
         area = file_browser()
         pictures[name] = crop(name, area, next(r for r in area.regions if r.type == "TOOL_PROPS"))
@@ -353,10 +375,10 @@ def options_of_files():
         main = next(each for each in area.regions if each.type == "WINDOW")
         with bpy.context.temp_override(area=area, region=main):
             bpy.ops.file.cancel()
-        yield from until(lambda: file_browser() is None, "the file browser stays")
+        yield from wait_until(lambda: file_browser() is None, "the file browser stays")
         yield
-    keep("export_cards", [pictures["export_cards"], pictures["import_strands"]])
-    keep("export_strands", [pictures[name] for name in EXPORTS[1:]])
+    save_pictures("export_cards", [pictures["export_cards"], pictures["import_strands"]])
+    save_pictures("export_strands", [pictures[name] for name in EXPORTS[1:]])
 
 
 def the_preferences():
@@ -370,9 +392,9 @@ def the_preferences():
     bpy.context.window.event_simulate("MOUSEMOVE", "NOTHING", x=2, y=2)  # no tooltip
     yield from whole_screen("preferences")
     window = next(each for each in area.regions if each.type == "WINDOW")
-    keep("preferences", [crop("preferences", area, window)[BLENDERS:]])
+    save_pictures("preferences", [crop("preferences", area, window)[BLENDERS:]])
     area.type = "VIEW_3D"
     yield
 
 
-driver.play(steps())
+driver.play_session(steps())

@@ -9,7 +9,7 @@ import numpy as np
 sys.path.append(str(Path(__file__).parent))
 import driver
 from artist import new_head, press
-from driver import of_hairloom, until
+from driver import hairloom_module, wait_until
 
 SIZE = 160
 FOLDER = Path(bpy.app.tempdir)
@@ -50,7 +50,7 @@ def f12(name):
     path = FOLDER / f"{name}.exr"
     bpy.context.scene.render.filepath = str(path)
     bpy.ops.render.render("INVOKE_DEFAULT", write_still=True)
-    yield from until(
+    yield from wait_until(
         lambda: path.is_file() and not bpy.app.is_job_running("RENDER"), "F12 writes no picture"
     )
     yield
@@ -93,11 +93,11 @@ def undo_and_redo():
     assert bpy.context.scene.compositing_node_group is None
     bpy.ops.ed.undo()
     yield
-    hair_scene = of_hairloom("hair_scene")
+    hair_scene = hairloom_module("hair_scene")
     assert hair_scene.problem_of(bpy.context.scene) == ""
     bpy.ops.ed.redo()
     yield
     assert not bpy.context.scene.hairloom.use_hair_scene and len(bpy.data.scenes) == 1
 
 
-driver.play(steps())
+driver.play_session(steps())

@@ -9,8 +9,8 @@ import numpy as np
 
 sys.path.append(str(Path(__file__).parent))
 import driver
-from artist import click, confirm_file, look_from_front, new_head, press, viewport
-from driver import of_hairloom, until
+from artist import click, confirm_file_browser, look_from_front, new_head, press, viewport
+from driver import hairloom_module, wait_until
 
 FOLDER = Path(bpy.app.tempdir) / "grooms"
 
@@ -33,12 +33,12 @@ def set_the_scene():
     outward = np.random.default_rng(1).normal(size=(500, 3))
     outward /= np.linalg.norm(outward, axis=1, keepdims=True)
     points = outward[:, None] * np.linspace(0.1, 0.2, 8)[:, None]
-    strands = of_hairloom("strands").StrandSet(
+    strands = hairloom_module("strands").StrandSet(
         points.reshape(-1, 3), np.arange(501) * 8, np.full(4000, 1e-4), np.arange(500) % 3
     )
-    groom = of_hairloom("groom_file").Groom(strands)
-    of_hairloom("tressfx").write_tfx(FOLDER / "first.tfx", groom)
-    of_hairloom("hair_file").write_hair_file(FOLDER / "second.hair", groom)
+    groom = hairloom_module("groom_file").Groom(strands)
+    hairloom_module("tressfx").write_tfx(FOLDER / "first.tfx", groom)
+    hairloom_module("hair_file").write_hair_file(FOLDER / "second.hair", groom)
     with in_the_view():
         bpy.ops.ed.undo_push(message="the scene")  # a script's changes are no step by themselves
 
@@ -62,14 +62,14 @@ def browsers():
 def the_menu_opens_a_browser_for_its_format():
     with in_the_view():
         bpy.ops.hairloom.import_strands("INVOKE_DEFAULT", filter_glob="*.hair")
-    yield from until(lambda: bool(browsers()), "no file browser has come")
+    yield from wait_until(lambda: bool(browsers()), "no file browser has come")
     yield
     (browser,) = browsers()
     assert browser.spaces.active.params.filter_glob == "*.hair"
     driver.screenshot("browser")
     with bpy.context.temp_override(window=bpy.context.window_manager.windows[-1], area=browser):
         bpy.ops.file.cancel()
-    yield from until(lambda: not browsers(), "the file browser stays")
+    yield from wait_until(lambda: not browsers(), "the file browser stays")
     assert grooms() == {}
 
 
@@ -88,28 +88,28 @@ def drop_files():
 
 def esc_ends_the_process_that_reads():
     """While an endless process reads the second file; nothing of the first file stays either."""
-    module, number = of_hairloom("import_groom"), FOLDER / "number"
+    module, number = hairloom_module("import_groom"), FOLDER / "number"
     real = module.read_strands
     script = f"echo $$ > '{number}'; exec sleep 600"
 
     def read(path, **how):
         if path.suffix == ".hair":
-            of_hairloom("child_process").run_child(["/bin/sh", "-c", script], seconds=600)
+            hairloom_module("child_process").run_child(["/bin/sh", "-c", script], seconds=600)
         return real(path, **how)
 
     module.read_strands = read
     drop_files()
     yield
     yield from press("RET")
-    yield from until(lambda: number.is_file() and number.read_text(), "no process reads")
-    work = of_hairloom("long_work")
+    yield from wait_until(lambda: number.is_file() and number.read_text(), "no process reads")
+    work = hairloom_module("long_work")
     assert work.running() == "Import Hair Strands"
     assert not bpy.ops.hairloom.import_strands.poll(), "another import may begin"
     driver.screenshot("reading")
     yield from press("ESC")
-    yield from until(lambda: not work.running(), "Esc does not cancel")
+    yield from wait_until(lambda: not work.running(), "Esc does not cancel")
     child = Path("/proc", number.read_text().strip())
-    yield from until(lambda: not child.exists(), "the process goes on")
+    yield from wait_until(lambda: not child.exists(), "the process goes on")
     assert grooms() == {}
     module.read_strands = real
     number.unlink()
@@ -121,7 +121,7 @@ def dropped_files_come_in_after_the_popup():
     assert grooms() == {}, "it does not ask before"
     driver.screenshot("popup")
     yield from press("RET")
-    yield from until(lambda: len(grooms()) == 2, "the files do not come in")
+    yield from wait_until(lambda: len(grooms()) == 2, "the files do not come in")
     head = bpy.data.objects["Head"]
     assert all(each.data.surface == head for each in grooms().values())
     assert bpy.context.view_layer.objects.active == grooms()["first"]
@@ -148,14 +148,14 @@ def undo_after_a_click():
     bpy.context.preferences.view.filebrowser_display_type = "SCREEN"
     with in_the_view():
         bpy.ops.hairloom.import_strands("INVOKE_DEFAULT", True, filter_glob="*.tfx")
-    yield from until(lambda: bool(browsers()), "no file browser has come")
+    yield from wait_until(lambda: bool(browsers()), "no file browser has come")
     browsers()[0].spaces.active.params.filename = "first.tfx"
-    yield from confirm_file(FOLDER)
-    yield from until(lambda: sorted(grooms()) == ["first"], "the file does not come in")
+    yield from confirm_file_browser(FOLDER)
+    yield from wait_until(lambda: sorted(grooms()) == ["first"], "the file does not come in")
     yield
     assert bpy.context.selected_objects == [grooms()["first"]]
     yield from click(*beside_the_head())
-    yield from until(lambda: not bpy.context.selected_objects, "the click deselects nothing")
+    yield from wait_until(lambda: not bpy.context.selected_objects, "the click deselects nothing")
     yield from undo_by_keys()
     assert bpy.context.selected_objects == [grooms()["first"]]
     yield from undo_by_keys()
@@ -180,4 +180,4 @@ def undo_by_keys():
     yield
 
 
-driver.play(steps())
+driver.play_session(steps())

@@ -12,17 +12,17 @@ sys.path.append(str(Path(__file__).parent))
 import driver
 import traces
 from artist import (
-    hair_is_made,
+    height_in_view,
     look_from_front,
     open_our_sidebar,
     press,
     region,
-    share_of_view,
     viewport,
+    wait_for_hair,
 )
-from driver import of_hairloom, until
-from open_panels import SIDEBAR, only_our_panels, show
-from reading import box_of, read
+from driver import hairloom_module, wait_until
+from open_panels import SIDEBAR, only_our_panels, show_panels
+from reading import box_of, wait_for_words
 
 log = traces.Log()
 #: enough that growing takes a while
@@ -37,7 +37,7 @@ def steps():
     yield from press("ESC")
     driver.enable_extension()
     only_our_panels()
-    show([SIDEBAR, SIDEBAR + "_export", SIDEBAR + "_grow", SIDEBAR + "_fin"])
+    show_panels([SIDEBAR, SIDEBAR + "_export", SIDEBAR + "_grow", SIDEBAR + "_fin"])
     yield from open_our_sidebar()
     for obj in list(bpy.data.objects):
         bpy.data.objects.remove(obj)
@@ -46,15 +46,15 @@ def steps():
     yield from made_real()
     yield from grown_again()
     yield from cloth_is_played()
-    assert "Traceback" not in log.added(), "something has raised"
+    assert "Traceback" not in log.new_output(), "something has raised"
 
 
 def running():
-    return of_hairloom("long_work").running()
+    return hairloom_module("long_work").running()
 
 
 def stage():
-    work = of_hairloom("long_work")._running
+    work = hairloom_module("long_work")._running
     return "" if work is None else work.progress.text
 
 
@@ -71,17 +71,17 @@ def begin(name, **settings):
 
 def cancelled(at, label):
     """Cancel with Esc at a stage that the panel shows."""
-    yield from until(lambda: stage() == at, f"it is never {at}")
+    yield from wait_until(lambda: stage() == at, f"it is never {at}")
     yield 1
     if stage() == at:
         driver.screenshot(label)
     yield from press("ESC")
-    yield from until(lambda: not running(), "Esc does not cancel")
+    yield from wait_until(lambda: not running(), "Esc does not cancel")
 
 
 def done():
-    yield from until(lambda: not running(), "it does not end")
-    yield from hair_is_made()
+    yield from wait_until(lambda: not running(), "it does not end")
+    yield from wait_for_hair()
 
 
 def undone_and_done_again(before):
@@ -103,7 +103,7 @@ def a_hairstyle():
     begin("add_hairstyle", style="buzz_cut", plays=False)
     yield from done()
     assert len(objects()) == 3
-    yield from until(lambda: share_of_view(head()) > 0.3, "a head alone is a dot in the view")
+    yield from wait_until(lambda: height_in_view(head()) > 0.3, "a head alone is a dot in the view")
     yield
     driver.screenshot("near")
     look_from_front(FAR)
@@ -111,7 +111,7 @@ def a_hairstyle():
         bpy.ops.ed.undo_redo("EXEC_DEFAULT", True)
     assert not running() and len(objects()) == 3, "Adjust Last Operation gives something else"
     yield from done()
-    assert share_of_view(head()) < 0.1, "Adjust Last Operation moves the view"
+    assert height_in_view(head()) < 0.1, "Adjust Last Operation moves the view"
     yield from undone_and_done_again({})
     yield from beside_something_else()
 
@@ -126,7 +126,7 @@ def beside_something_else():
     begin("add_hairstyle", style="buzz_cut", plays=False)
     yield from done()
     yield
-    assert share_of_view(head()) < 0.1, "the view does not stay"
+    assert height_in_view(head()) < 0.1, "the view does not stay"
     bpy.data.objects.remove(bpy.data.objects["Cube"])
     look_from_front(0.9)
 
@@ -164,7 +164,7 @@ def grown_again():
     hair = bpy.context.object
     name = hair.name
     assert head == hair.parent
-    put, points = of_hairloom("curves").put_points, of_hairloom("curves").curve_points
+    put, points = hairloom_module("curves").put_points, hairloom_module("curves").curve_points
     put(hair.data, points(hair.data) * np.float32(1.05))
     hair.data.hairloom.grow.strand_count = STRANDS
     bpy.ops.ed.undo_push(message="combed")
@@ -187,15 +187,15 @@ def cloth_is_played():
     bpy.ops.mesh.primitive_grid_add(x_subdivisions=FACES, y_subdivisions=FACES, size=0.2)
     assert bpy.ops.hairloom.fin_add() == {"FINISHED"}
     yield
-    live = of_hairloom("previews")
+    live = hairloom_module("previews")
     play()
     assert live.waiting_names() == ("Grid",), "Play does not wait, or no window while it does"
-    yield from read("Making the cloth", box_of(region("UI")))
+    yield from wait_for_words("Making the cloth", box_of(region("UI")))
     driver.screenshot("cloth")
     yield from press("ESC")
     assert not live.is_playing(), "Esc does not cancel"
     play()
-    yield from until(lambda: live.is_playing() and not live.waiting_names(), "it never plays")
+    yield from wait_until(lambda: live.is_playing() and not live.waiting_names(), "it never plays")
     yield from press("ESC")
     assert not live.is_playing(), "Esc does not stop it"
 
@@ -205,4 +205,4 @@ def play():
         assert bpy.ops.hairloom.play("INVOKE_DEFAULT") == {"FINISHED"}
 
 
-driver.play(steps())
+driver.play_session(steps())

@@ -10,17 +10,17 @@ import numpy as np
 sys.path.append(str(Path(__file__).parent))
 import driver
 import traces
-from artist import changed, hair_is_made, press
-from driver import of_hairloom, until
+from artist import changed_fraction, press, wait_for_hair
+from driver import hairloom_module, wait_until
 from two_windows import (
-    SAME,
+    MAX_REDRAW_FRACTION,
+    assert_hair_drawn,
     hair,
-    live,
-    pictures,
+    previews,
     set_the_scene,
     two_windows,
+    view_pictures,
     windows,
-    with_and_without,
 )
 
 log = traces.Log()
@@ -32,7 +32,7 @@ def steps():
     yield from set_the_scene()
     yield from two_windows()
     yield from two_view_layers_with_the_hair()
-    assert "Traceback" not in log.added()
+    assert "Traceback" not in log.new_output()
 
 
 def two_view_layers_with_the_hair():
@@ -42,7 +42,7 @@ def two_view_layers_with_the_hair():
     mine, other = first.view_layer, scene.view_layers.new("Too")
     second.view_layer = other
     yield from ours_alone("both-layers-new", mine)
-    yield from with_and_without("both-layers", [True, True])
+    yield from assert_hair_drawn("both-layers", [True, True])
     yield from ours_alone("both-layers", mine)
     head, settings = bpy.data.objects["Head"], hair().data.hairloom
     settings.shading.base_color = (0.6, 0.1, 0.05)
@@ -50,9 +50,9 @@ def two_view_layers_with_the_hair():
     head.location.x = 0.03
     yield from ours_alone("both-layers-moved", mine)
     settings.guides.guide_count = 61
-    (session,) = live().sessions()
-    yield from until(lambda: session.is_pending, "no other hair is made")
-    yield from until(lambda: not session.is_pending, "it is never made")
+    (session,) = previews().sessions()
+    yield from wait_until(lambda: session.is_pending, "no other hair is made")
+    yield from wait_until(lambda: not session.is_pending, "it is never made")
     yield from ours_alone("both-layers-made", mine)
     yield from played_in_both(head)
     yield from ours_alone("both-layers-played", mine)
@@ -63,16 +63,16 @@ def two_view_layers_with_the_hair():
     scene.view_layers.remove(other)
     scene.frame_set(1)
     yield
-    yield from with_and_without("both-layers-back", [True, True])
+    yield from assert_hair_drawn("both-layers-back", [True, True])
 
 
 def ended_in_both(mine, other):
     """After the preview, both show Blender's own strands; then the preview starts again."""
-    live().stop_all()
+    previews().stop_all()
     yield
     assert not is_box(mine) and not is_box(other), "a box is left"
     bpy.ops.hairloom.preview()
-    yield from hair_is_made()
+    yield from wait_for_hair()
     yield from ours_alone("both-layers-again", mine)
 
 
@@ -80,16 +80,16 @@ def ours_alone(label, mine):
     """The second window shows the same with its own view layer and with the first one."""
     second = windows()[1]
     other = second.view_layer
-    yield from until(lambda: is_box(mine) and is_box(other), f"{label}: {is_box(mine)}")
-    _, shown = yield from pictures(label)
+    yield from wait_until(lambda: is_box(mine) and is_box(other), f"{label}: {is_box(mine)}")
+    _, shown = yield from view_pictures(label)
     second.view_layer = mine
     yield
-    _, wanted = yield from pictures(f"{label}-wanted")
+    _, wanted = yield from view_pictures(f"{label}-wanted")
     second.view_layer = other
     yield
-    share = changed(shown, wanted)
+    share = changed_fraction(shown, wanted)
     print(f"{label}: {share:.4f} of the second window is otherwise", flush=True)
-    assert share < SAME, f"{label}: Blender's own strands are seen"
+    assert share < MAX_REDRAW_FRACTION, f"{label}: Blender's own strands are seen"
 
 
 def is_box(layer):
@@ -106,9 +106,9 @@ def played_in_both(head):
         head.location.x = x
         head.keyframe_insert("location", frame=frame)
     scene.frame_set(1)
-    session = live().sessions()[0]
+    session = previews().sessions()[0]
     bpy.ops.screen.animation_play()
-    yield from until(lambda: session.is_playing, "Blender plays, the hair does not")
+    yield from wait_until(lambda: session.is_playing, "Blender plays, the hair does not")
     lags, frames = [], set()
 
     def has_swung():
@@ -116,7 +116,7 @@ def played_in_both(head):
         lags.append(lag(session))
         return len(frames) > 8
 
-    yield from until(has_swung, "Blender does not play")
+    yield from wait_until(has_swung, "Blender does not play")
     bpy.ops.screen.animation_cancel(restore_frame=False)
     yield
     print("lags [mm]", [round(1000.0 * each, 1) for each in lags], flush=True)
@@ -126,9 +126,9 @@ def played_in_both(head):
 
 def lag(session):
     """Largest distance of tips from their places in the carried style [m]."""
-    style = of_hairloom("motion_flow").carried(session.rig, session.solver.pose)
+    style = hairloom_module("motion_flow").carried(session.rig, session.solver.pose)
     tips = session.rig.strands.offsets[1:] - 1
     return float(np.abs(session.strands[tips] - style[tips]).max())
 
 
-driver.play(steps())
+driver.play_session(steps())

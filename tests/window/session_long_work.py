@@ -12,7 +12,7 @@ sys.path.append(str(Path(__file__).parent))
 import driver
 import traces
 from artist import (
-    confirm_file,
+    confirm_file_browser,
     look_from_front,
     new_head,
     open_our_sidebar,
@@ -20,7 +20,7 @@ from artist import (
     region,
     viewport,
 )
-from driver import of_hairloom, until
+from driver import hairloom_module, wait_until
 
 FOLDER = Path(bpy.app.tempdir) / "long"
 SMALL = {"size": 64, "samples": 1}
@@ -33,12 +33,12 @@ failures: list[str] = []
 
 
 def running():
-    return of_hairloom("long_work").running()
+    return hairloom_module("long_work").running()
 
 
 def told():
     """The work's text in the status bar."""
-    work = of_hairloom("long_work")._running
+    work = hairloom_module("long_work")._running
     return "" if work is None else work.progress.text
 
 
@@ -47,7 +47,7 @@ def steps():
     sys.excepthook = lambda kind, error, _: failures.append(f"{kind.__name__}: {error}")
     driver.enable_extension()
     yield from set_the_scene()
-    at_rest = traces.of_blender()["handlers"]
+    at_rest = traces.blender_traces()["handlers"]
     for work in (
         from_a_dialog,
         undone_in_mid_work,
@@ -57,7 +57,7 @@ def steps():
         another_file_in_mid_work,
     ):
         yield from work()
-        assert traces.of_blender()["handlers"] == at_rest, f"{work.__name__} leaves a handler"
+        assert traces.blender_traces()["handlers"] == at_rest, f"{work.__name__} leaves a handler"
     yield from disabled_in_mid_work()
     assert failures == [], failures
 
@@ -111,7 +111,7 @@ def sort_by_dialog(rays):
     assert asked == {"RUNNING_MODAL"}
     yield
     yield from press("RET")
-    yield from until(lambda: running() == "Sort Hair Cards", "the dialog starts nothing")
+    yield from wait_until(lambda: running() == "Sort Hair Cards", "the dialog starts nothing")
 
 
 def from_a_dialog():
@@ -122,10 +122,10 @@ def from_a_dialog():
     for operator in (bpy.ops.hairloom.sort_cards, bpy.ops.hairloom.turntable):
         assert not operator.poll(), "another long work may begin"
     yield from press("ESC")
-    yield from until(lambda: not running(), "Esc does not cancel")
+    yield from wait_until(lambda: not running(), "Esc does not cancel")
     assert np.array_equal(order(), before)
     yield from sort_by_dialog(FEW)
-    yield from until(lambda: not running(), "sorting does not end")
+    yield from wait_until(lambda: not running(), "sorting does not end")
     after = order()
     assert not np.array_equal(after, before)
     repeated_at_once(bpy.ops.ed.undo_redo)
@@ -167,18 +167,18 @@ def check():
 
 def into_a_popup():
     """Data that was read is freed by Esc while it is read, and by Esc in the popup."""
-    seen = of_hairloom("export_check").count
+    seen = hairloom_module("export_check").count
     check()
     yield from press("ESC")
-    yield from until(lambda: not running(), "Esc does not cancel the check")
+    yield from wait_until(lambda: not running(), "Esc does not cancel the check")
     assert seen() == 0, "a check that was cancelled goes on"
     check()
-    yield from until(lambda: not running(), "the check does not end")
+    yield from wait_until(lambda: not running(), "the check does not end")
     assert seen() == 1, "no popup shows what was read"
     yield
     driver.screenshot("checked")
     yield from press("ESC")
-    yield from until(lambda: seen() == 0, "the check goes on unseen")
+    yield from wait_until(lambda: seen() == 0, "the check goes on unseen")
     yield
 
 
@@ -186,8 +186,8 @@ def turntable(frames):
     choose(bpy.data.objects["Hair"])
     with bpy.context.temp_override(area=viewport(), region=region("WINDOW")):
         bpy.ops.hairloom.turntable("INVOKE_DEFAULT", frames=frames, **SMALL)
-    yield from confirm_file(FOLDER)
-    yield from until(lambda: running() == "Turntable", "the file browser starts nothing")
+    yield from confirm_file_browser(FOLDER)
+    yield from wait_until(lambda: running() == "Turntable", "the file browser starts nothing")
 
 
 def from_the_file_browser():
@@ -195,10 +195,10 @@ def from_the_file_browser():
     yield 1
     driver.screenshot("turning")
     yield from press("ESC")
-    yield from until(lambda: not running(), "Esc does not cancel the turntable")
+    yield from wait_until(lambda: not running(), "Esc does not cancel the turntable")
     assert list(FOLDER.iterdir()) == []
     yield from turntable(3)
-    yield from until(lambda: not running(), "the turntable does not end")
+    yield from wait_until(lambda: not running(), "the turntable does not end")
     assert len(list(FOLDER.glob("Hair_000*.png"))) == 3
     yield
 
@@ -222,12 +222,12 @@ def cards_in_motion():
     (cards / "Hair.glb").write_bytes(b"the cards of before")
     with bpy.context.temp_override(area=viewport(), region=region("WINDOW")):
         bpy.ops.hairloom.export_cards("INVOKE_DEFAULT", motion="joints")
-    yield from confirm_file(FOLDER)
-    yield from until(lambda: running() == "Export Hair Cards", "the browser starts no export")
-    yield from until(lambda: told() == "Fitting joints", "no joints are fitted")
+    yield from confirm_file_browser(FOLDER)
+    yield from wait_until(lambda: running() == "Export Hair Cards", "the browser starts no export")
+    yield from wait_until(lambda: told() == "Fitting joints", "no joints are fitted")
     driver.screenshot("fitting")
     yield from press("ESC")
-    yield from until(lambda: not running(), "Esc does not cancel the export of cards")
+    yield from wait_until(lambda: not running(), "Esc does not cancel the export of cards")
     assert [file.name for file in cards.iterdir()] == ["Hair.glb"]
     assert (cards / "Hair.glb").read_bytes() == b"the cards of before"
     head.animation_data_clear()
@@ -252,4 +252,4 @@ def disabled_in_mid_work():
     driver.screenshot("disabled")
 
 
-driver.play(steps())
+driver.play_session(steps())

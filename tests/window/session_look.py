@@ -15,15 +15,15 @@ import driver
 from artist import (
     _rectangle,
     click,
-    hair_is_made,
     look_from_front,
     open_our_sidebar,
     press,
     region,
     sidebar_button,
     viewport,
+    wait_for_hair,
 )
-from driver import of_hairloom, until
+from driver import hairloom_module, wait_until
 
 #: places of Blender's picture of a radiance, and of ours, for the hair's root and tip
 PLANES = ((-0.25, 0.0, -0.12), (-0.25, 0.0, 0.12))
@@ -53,7 +53,7 @@ PINK_PIXELS = 20
 
 
 def session():
-    (one,) = of_hairloom("previews").sessions()
+    (one,) = hairloom_module("previews").sessions()
     return one
 
 
@@ -93,13 +93,13 @@ def agree(label, tolerance=TOLERANCE):
         shown.append(theirs)
         return max(difference, np.abs(theirs - saved()).max()) <= tolerance
 
-    yield from until(is_so, f"{label}: the hair is of another colour than the planes")
+    yield from wait_until(is_so, f"{label}: the hair is of another colour than the planes")
     return shown[-1]
 
 
 def saved():
     """Code values of the planes' radiances in a picture saved by Blender, for this view's mode."""
-    transform = of_hairloom("view_transform")
+    transform = hairloom_module("view_transform")
     view, gain, gamma = transform.view_of(shading(), bpy.context.scene)
     nodes = [material.node_tree.nodes["Emission"] for material in bpy.data.materials]
     radiances = np.float32([node.inputs["Color"].default_value[:3] for node in nodes])
@@ -116,8 +116,8 @@ def steps():
     yield from a_slider_is_refined()
     yield from own_presets()
     yield from the_panels_of_both_models()
-    assert of_hairloom("overlay").failure() == ""
-    assert of_hairloom("view_transform").problem() == ""
+    assert hairloom_module("overlay").failure() == ""
+    assert hairloom_module("view_transform").problem() == ""
 
 
 def set_the_scene():
@@ -154,7 +154,7 @@ def set_the_scene():
     look_from_front(1.2)
     yield from open_our_sidebar()
     yield from click(*sidebar_button("hairloom.preview"))
-    yield from hair_is_made()
+    yield from wait_for_hair()
     yield
     hair.select_set(False)  # no outline
     assert session().snapshot.lights == ()
@@ -190,7 +190,7 @@ def radiance_by_view_transforms():
 
 def every_mode_has_its_transform():
     """The light on hair is fixed here, so that modes with other lights are comparable."""
-    overlay, view, scene = of_hairloom("overlay"), shading(), bpy.context.scene
+    overlay, view, scene = hairloom_module("overlay"), shading(), bpy.context.scene
     lit, settings, (world, color, _) = overlay.lit, scene.view_settings, LIT[0]
     overlay.lit = lambda snapshot, *_: replace(snapshot, lights=(), ambient=(world,) * 3)
     shine(world, color, color)
@@ -226,7 +226,7 @@ def a_scene_without_light():
         _, theirs, ours = apart("no-light")
         return theirs.max() < 5.0 and ours.max() > 40.0
 
-    yield from until(is_lit_by_a_studio, "hair is black")
+    yield from wait_until(is_lit_by_a_studio, "hair is black")
     assert any("no light" in warning for warning in session().warnings)
     bpy.ops.object.light_add(type="SUN", rotation=(np.pi / 2.0, 0.0, 0.0))
     bpy.context.object.data.energy = 1.0
@@ -238,7 +238,7 @@ def a_scene_without_light():
 
 
 def a_slider_is_refined():
-    tables = of_hairloom("tables")
+    tables = hairloom_module("tables")
     look = bpy.data.objects["Hair"].data.hairloom.shading
     bpy.ops.object.light_add(type="SUN", rotation=(np.pi / 2.0, 0.0, 0.0))
     bpy.context.object.data.energy = 10.0
@@ -257,7 +257,7 @@ def a_slider_is_refined():
 
 def own_presets():
     """Saved in the extension's user folder, shown with a picture, deleted."""
-    presets = of_hairloom("presets")
+    presets = hairloom_module("presets")
     folder = presets.own_folder()
     assert "extensions" in folder.parts and presets.own("shading") == ((), ())
     assert bpy.ops.hairloom.save_preset(title="Mine") == {"FINISHED"}
@@ -286,7 +286,7 @@ def the_panels_of_both_models():
     node = shader.nodes.new("ShaderNodeBsdfHairPrincipled")
     shader.links.new(node.outputs[0], shader.get_output_node("ALL").inputs["Surface"])
     hair.data.materials.append(bpy.data.materials["Hair"])
-    panels = [p for p in of_hairloom("registration").CLASSES if "_PT_data" in p.__name__]
+    panels = [p for p in hairloom_module("registration").CLASSES if "_PT_data" in p.__name__]
     for each in reversed(panels):
         bpy.utils.unregister_class(each)
     for each in panels:
@@ -317,15 +317,15 @@ def the_panels_of_both_models():
 def a_picture_is_a_button(hair):
     """A click on the picture of the hair's preset shows all pictures, a click on one applies it,
     and one undo restores the look."""
-    presets = of_hairloom("presets")
+    presets = hairloom_module("presets")
     bpy.ops.hairloom.apply_preset("EXEC_DEFAULT", True, name="looks/dyed")
-    yield from until(lambda: _pink(driver.screenshot("picture")), "no picture of the look")
+    yield from wait_until(lambda: _pink(driver.screenshot("picture")), "no picture of the look")
     before = driver.screenshot("picture")
     yield from click(*_pink(before))
     corner = yield from _steady(lambda: _changed_corner(before), "no pictures to choose from")
     yield from click(*corner)
     chosen = bpy.context.window_manager.hairloom_presets
-    yield from until(lambda: chosen.shading != "looks/dyed", "no picture was clicked")
+    yield from wait_until(lambda: chosen.shading != "looks/dyed", "no picture was clicked")
     name = chosen.shading
     assert name.startswith("looks/"), name
     entry = presets.preset_of(hair, presets.shipped("shading"))
@@ -344,7 +344,7 @@ def _steady(look, message):
         before, last = last, look()
         return last is not None and last == before
 
-    yield from until(is_steady, message)
+    yield from wait_until(is_steady, message)
     return last
 
 
@@ -371,4 +371,4 @@ def _changed_corner(before):
     return int(columns.min()) + IN_CORNER, len(now) - int(rows.max()) + IN_CORNER
 
 
-driver.play(steps())
+driver.play_session(steps())

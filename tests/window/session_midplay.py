@@ -14,18 +14,18 @@ sys.path.append(str(Path(__file__).parent))
 import driver
 import traces
 from artist import (
-    changed,
-    field,
+    changed_fraction,
+    find_field,
     look_from_front,
     open_our_sidebar,
     pixels,
     press,
     viewport,
 )
-from dice import in_view
 from dice import press as press_in_view
-from driver import of_hairloom, until
-from open_panels import open_from_the_start
+from dice import viewport_context
+from driver import hairloom_module, wait_until
+from open_panels import register_as_open
 
 log = traces.Log()
 STRANDS = 300
@@ -34,7 +34,7 @@ DRAGGED = 45
 
 
 def live():
-    return of_hairloom("previews")
+    return hairloom_module("previews")
 
 
 def steps():
@@ -42,7 +42,7 @@ def steps():
     driver.enable_extension()  # once before: Blender turns menus into lists the first time
     addon_utils.disable(driver.EXTENSION, default_set=True)
     yield
-    before = traces.of_blender()
+    before = traces.blender_traces()
     driver.enable_extension()
     with tempfile.TemporaryDirectory() as folder:
         yield from undo_and_redo_each_step()
@@ -55,7 +55,7 @@ def steps():
     yield from disabled_and_enabled()
     addon_utils.disable(driver.EXTENSION, default_set=True)
     # a thread that makes a collider has to end first
-    yield from until(lambda: traces.of_blender() == before, "something of ours is left")
+    yield from wait_until(lambda: traces.blender_traces() == before, "something of ours is left")
     nothing_raised("disabling")
 
 
@@ -77,13 +77,13 @@ def new_ball():
 
 
 def grow():
-    with in_view():
+    with viewport_context():
         bpy.ops.hairloom.add_groom("INVOKE_DEFAULT", True, strand_count=STRANDS)
     yield from plays()
 
 
 def plays():
-    yield from until(live().is_playing, "it does not play")
+    yield from wait_until(live().is_playing, "it does not play")
     yield from moves("it plays")
 
 
@@ -93,19 +93,21 @@ def moves(where):
     def has_moved():
         return not np.array_equal(live().sessions()[0].strands, before)
 
-    yield from until(has_moved, f"{where}, but nothing moves")
+    yield from wait_until(has_moved, f"{where}, but nothing moves")
 
 
 def ended(where):
     """Assert that nothing plays, ticks, draws, is on the GPU or has raised."""
-    yield from until(lambda: not any(traces.of_previews().values()), f"{where}: something goes on")
+    yield from wait_until(
+        lambda: not any(traces.preview_traces().values()), f"{where}: something goes on"
+    )
     pending = driver.timers.pending
-    yield from until(lambda: not pending(), lambda: f"{where}: {pending()}")
+    yield from wait_until(lambda: not pending(), lambda: f"{where}: {pending()}")
     nothing_raised(where)
 
 
 def nothing_raised(where):
-    assert "Traceback" not in log.added(), f"{where} raised"
+    assert "Traceback" not in log.new_output(), f"{where} raised"
 
 
 def undo_and_redo_each_step():
@@ -124,7 +126,7 @@ def undo_and_redo_each_step():
     yield from by_keys(states[-2::-1], shift=False)
     yield from by_keys(states[1:], shift=True)
     yield from by_keys(states[-2::-1], shift=False)
-    yield from until(lambda: not live().sessions(), "the preview outlives its hair")
+    yield from wait_until(lambda: not live().sessions(), "the preview outlives its hair")
     nothing_raised("undoing everything")
 
 
@@ -132,7 +134,7 @@ def by_keys(states, shift):
     for number, wanted in enumerate(states):
         yield from press_in_view("Z", ctrl=True, shift=shift)
         what = f"{'redo' if shift else 'undo'} {number} to {wanted}"
-        yield from until(lambda wanted=wanted: state() == wanted, what)
+        yield from wait_until(lambda wanted=wanted: state() == wanted, what)
         yield
         nothing_raised(what)
 
@@ -185,7 +187,7 @@ def move_the_ball():
 
 
 def delete_all():
-    with in_view():
+    with viewport_context():
         bpy.ops.object.select_all(action="SELECT")
         bpy.ops.object.delete("EXEC_DEFAULT", True)
     yield 1
@@ -193,14 +195,14 @@ def delete_all():
 
 def a_slider_is_dragged():
     """The mouse drags a field of our panel while hair swings on; Ctrl-Z restores the value."""
-    open_from_the_start("HAIRLOOM_PT_sidebar_dynamics")
+    register_as_open("HAIRLOOM_PT_sidebar_dynamics")
     yield from playing_hair()
     look_from_front(0.45)
     yield from open_our_sidebar()
     yield
     dynamics, window = hair().hairloom.dynamics, bpy.context.window
     # left of the mask beside it
-    x, y = yield from field(viewport(), "UI", "dynamics.gravity", across=0.5)
+    x, y = yield from find_field(viewport(), "UI", "dynamics.gravity", x_fraction=0.5)
     before, shot = dynamics.gravity, pixels("before-dragging")
     window.event_simulate("LEFTMOUSE", "PRESS", x=x, y=y)
     yield 1
@@ -218,10 +220,10 @@ def a_slider_is_dragged():
     assert after > before and len(set(values)) > 3, "the value did not follow the mouse"
     assert after == values[-1], "it goes on without the mouse"
     yield from moves("the mouse is off")
-    moved = changed(shot, pixels("dragged"))
+    moved = changed_fraction(shot, pixels("dragged"))
     assert moved > 0.01, f"the picture stands still: {moved:.4f} of it has changed"
     yield from press_in_view("Z", ctrl=True)
-    yield from until(lambda: hair().hairloom.dynamics.gravity == before, "Ctrl-Z does nothing")
+    yield from wait_until(lambda: hair().hairloom.dynamics.gravity == before, "Ctrl-Z does nothing")
     yield from moves("the slider is back")
     nothing_raised("dragging")
 
@@ -232,14 +234,14 @@ def another_file(folder):
     assert live().is_playing(), "saving stopped it"
     in_play, at_rest = [], []
     for _ in range(3):
-        in_play.append(traces.of_gpu())
+        in_play.append(traces.gpu_object_counts())
         bpy.ops.wm.open_mainfile(filepath=path)
         yield
         yield from ended("another file")
-        at_rest.append(traces.of_gpu())
+        at_rest.append(traces.gpu_object_counts())
         assert hair().display_type == "TEXTURED"
         assert live().notice() == "", "nobody needs to be told"
-        with in_view():
+        with viewport_context():
             bpy.ops.hairloom.play("INVOKE_DEFAULT")
         yield from plays()
     print(f"on the GPU in play {in_play}, at rest {at_rest}", flush=True)
@@ -251,7 +253,7 @@ def delete_hair():
     """A script deletes the hair: a notice says why it no longer plays."""
     name = hair().name
     bpy.data.objects.remove(hair())
-    yield from until(lambda: live().notice() != "", "no notice")
+    yield from wait_until(lambda: live().notice() != "", "no notice")
     assert live().notice().startswith(f"Preview of {name} ended."), live().notice()
     assert "gone" in live().notice(), live().notice()
 
@@ -266,17 +268,17 @@ def delete_head():
 
 
 def delete_by_key():
-    with in_view():
+    with viewport_context():
         bpy.ops.object.select_all(action="SELECT")
     yield from press_in_view("DEL")
-    yield from until(lambda: live().notice() != "", "no notice")
+    yield from wait_until(lambda: live().notice() != "", "no notice")
     assert "gone" in live().notice(), live().notice()
 
 
 def undo_its_making():
     """If Ctrl-Z removes the hair, there is no notice."""
     yield from press_in_view("Z", ctrl=True)
-    yield from until(lambda: not live().sessions(), "the preview outlives its hair")
+    yield from wait_until(lambda: not live().sessions(), "the preview outlives its hair")
     assert live().notice() == ""
     assert [obj.type for obj in bpy.context.scene.objects] == ["MESH"]
 
@@ -292,7 +294,7 @@ def disabled_and_enabled():
     driver.enable_extension()
     assert hair().hairloom.dynamics.gusts == 0.625, "disabling has lost a setting"
     assert not live().simulations()
-    with in_view():
+    with viewport_context():
         bpy.ops.hairloom.play("INVOKE_DEFAULT")
     yield from plays()
     addon_utils.disable(driver.EXTENSION, default_set=True)
@@ -301,4 +303,4 @@ def disabled_and_enabled():
     yield
 
 
-driver.play(steps())
+driver.play_session(steps())

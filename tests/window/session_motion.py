@@ -11,22 +11,22 @@ sys.path.append(str(Path(__file__).parent))
 import driver
 from artist import (
     click,
-    hair_is_made,
     look_from_front,
     new_head,
     open_our_sidebar,
     press,
     sidebar_button,
     viewport,
+    wait_for_hair,
 )
-from driver import of_hairloom, until
+from driver import hairloom_module, wait_until
 
 LAST = 40
 FOLDER = Path(bpy.app.tempdir) / "bake"
 
 
 def session():
-    (one,) = of_hairloom("previews").sessions()
+    (one,) = hairloom_module("previews").sessions()
     return one
 
 
@@ -50,7 +50,7 @@ def set_the_scene():
     look_from_front(0.9)
     yield from open_our_sidebar()
     yield from click(*sidebar_button("hairloom.preview"))
-    yield from hair_is_made()
+    yield from wait_for_hair()
     yield
     assert session().rig.strands.strand_count > 100
 
@@ -60,7 +60,7 @@ def play_keeps_the_scenes_rate():
     less."""
     rate, durations = 24.0, []
     yield from click(*sidebar_button("hairloom.play"))
-    yield from until(lambda: session().is_playing, "the Play button did nothing")
+    yield from wait_until(lambda: session().is_playing, "the Play button did nothing")
     advance = type(session()).advance
 
     def noted(self, depsgraph, duration):
@@ -69,7 +69,7 @@ def play_keeps_the_scenes_rate():
 
     type(session()).advance = noted
     begin = time.perf_counter()
-    yield from until(lambda: sum(durations) > 0.5, "it does not advance")
+    yield from wait_until(lambda: sum(durations) > 0.5, "it does not advance")
     passed = time.perf_counter() - begin
     type(session()).advance = advance
     frames = np.array(durations) * rate
@@ -80,17 +80,17 @@ def play_keeps_the_scenes_rate():
 
 
 def pause_resume_and_reset():
-    live, head = of_hairloom("previews"), bpy.data.objects["Head"]
+    live, head = hairloom_module("previews"), bpy.data.objects["Head"]
     yield from click(*sidebar_button("hairloom.pause"))
-    yield from until(live.is_paused, "it is not paused")
+    yield from wait_until(live.is_paused, "it is not paused")
     held = session().strands
     head.location.x = 0.05
     yield
     assert np.array_equal(session().strands, held), "paused hair moves"
     driver.screenshot("paused")
     yield from click(*sidebar_button("hairloom.pause"))
-    yield from until(lambda: not live.is_paused(), "it stays paused")
-    yield from until(lambda: not np.array_equal(session().strands, held), "it does not go on")
+    yield from wait_until(lambda: not live.is_paused(), "it stays paused")
+    yield from wait_until(lambda: not np.array_equal(session().strands, held), "it does not go on")
     head.location.x = 0.0
     yield from click(*sidebar_button("hairloom.reset"))
     yield
@@ -99,7 +99,7 @@ def pause_resume_and_reset():
 
 def playback_takes_over():
     """Space while hair plays: from then on each frame of Blender's animation moves it."""
-    live = of_hairloom("previews")
+    live = hairloom_module("previews")
     head, scene = bpy.data.objects["Head"], bpy.context.scene
     scene.frame_start, scene.frame_end = 1, LAST
     for frame, x in ((1, 0.0), (10, 0.1), (20, -0.1), (LAST, 0.0)):
@@ -113,7 +113,7 @@ def playback_takes_over():
     def has_taken_over():
         return not live.is_playing() and session().is_playing and scene.frame_current > 5
 
-    yield from until(has_taken_over, "Blender's playback does not take over")
+    yield from wait_until(has_taken_over, "Blender's playback does not take over")
     bpy.ops.screen.animation_cancel(restore_frame=False)
     yield
     carried = session().source.strands.grid[:, -1] - session().source.strands.grid[:, 0]
@@ -130,7 +130,7 @@ def run_bake():
 
 
 def is_baking():
-    return of_hairloom("long_work").running() == "Bake"
+    return hairloom_module("long_work").running() == "Bake"
 
 
 def bake_in_the_window():
@@ -139,19 +139,19 @@ def bake_in_the_window():
     run_bake()
     yield 1
     driver.screenshot("baking")
-    yield from until(lambda: not is_baking(), "the bake does not end")
+    yield from wait_until(lambda: not is_baking(), "the bake does not end")
     yield
     assert scene.frame_current == 7
-    cache = of_hairloom("playback").cache_of(bpy.data.objects["Hair"])
+    cache = hairloom_module("playback").cache_of(bpy.data.objects["Hair"])
     assert cache.facts.frame_count == LAST
-    preview = of_hairloom("previews").previews[session().uid]
+    preview = hairloom_module("previews").previews[session().uid]
     assert preview.phase.name == "BAKED" and preview.bake.changed == (), preview.bake
     driver.screenshot("baked")
     bpy.ops.screen.animation_play()
-    yield from until(lambda: scene.frame_current not in (7, LAST), "Blender does not play")
+    yield from wait_until(lambda: scene.frame_current not in (7, LAST), "Blender does not play")
     bpy.ops.screen.animation_cancel(restore_frame=False)
     yield
-    strands = of_hairloom("playback").strands_in(cache, scene.frame_current)
+    strands = hairloom_module("playback").strands_in(cache, scene.frame_current)
     assert np.abs(session().strands - strands).max() < 1e-5
 
 
@@ -162,8 +162,8 @@ def escape_cancels_a_bake():
     yield 1
     assert is_baking()
     yield from press("ESC")
-    yield from until(lambda: not is_baking(), "Esc does not cancel the bake")
-    assert not of_hairloom("suspension").is_suspended()
+    yield from wait_until(lambda: not is_baking(), "Esc does not cancel the bake")
+    assert not hairloom_module("suspension").is_suspended()
     assert (FOLDER / "cache.json").stat().st_mtime_ns == before
     assert len(list(FOLDER.glob("frames-*"))) == 1, "half a bake is left"
     bpy.context.scene.frame_end = LAST
@@ -183,16 +183,16 @@ def a_render_beside_the_window():
     finished = []
     bpy.app.handlers.render_complete.append(lambda *_: finished.append(1))
     bpy.ops.render.render("INVOKE_DEFAULT")
-    yield from until(lambda: finished, "the render never ends")
+    yield from wait_until(lambda: finished, "the render never ends")
     yield
     bpy.app.handlers.render_complete.pop()
     curves = hair.hairloom.bake.copy.data
     points = np.empty((len(curves.position_data), 3), np.float32)
     curves.position_data.foreach_get("vector", points.ravel())
-    cache = of_hairloom("playback").cache_of(hair)
-    strands = of_hairloom("playback").strands_in(cache, 15)
+    cache = hairloom_module("playback").cache_of(hair)
+    strands = hairloom_module("playback").strands_in(cache, 15)
     assert np.array_equal(points, strands.reshape(-1, 3))
-    assert len(of_hairloom("previews").sessions()) == 1
+    assert len(hairloom_module("previews").sessions()) == 1
     driver.screenshot("rendered")
 
 
@@ -203,10 +203,10 @@ def loading_in_the_middle_of_a_bake():
     assert is_baking()
     bpy.ops.wm.read_homefile(use_factory_startup=False)
     yield
-    assert not is_baking() and not of_hairloom("suspension").is_suspended()
-    assert of_hairloom("previews").sessions() == ()
+    assert not is_baking() and not hairloom_module("suspension").is_suspended()
+    assert hairloom_module("previews").sessions() == ()
     assert len(list(FOLDER.glob("frames-*"))) == 1, "half a bake is left"
     assert (FOLDER / "cache.json").is_file()
 
 
-driver.play(steps())
+driver.play_session(steps())

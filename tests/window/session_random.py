@@ -22,7 +22,7 @@ import random_hairloom
 import traces
 from artist import press
 from dice import Dice, actions_in
-from driver import until
+from driver import wait_until
 
 SEEDS = [int(seed) for seed in os.environ.get("HAIRLOOM_SEEDS", "1 2 3 4 5").split()]
 ACTIONS = actions_in(random_hairloom, random_blender)
@@ -41,20 +41,20 @@ def steps():
     driver.enable_extension()  # once before: Blender turns menus into lists the first time
     addon_utils.disable(driver.EXTENSION, default_set=True)
     yield
-    before = traces.of_blender()
+    before = traces.blender_traces()
     driver.enable_extension()
-    enabled = traces.of_blender()
+    enabled = traces.blender_traces()
     assert enabled != before, "the traces show nothing"
     with tempfile.TemporaryDirectory() as folder:
         for seed in SEEDS:
             yield from play(seed, Path(folder))
             bpy.ops.wm.read_homefile(use_factory_startup=False)
-            yield from until(lambda: is_at_rest(enabled), f"seed {seed}: something is left")
+            yield from wait_until(lambda: is_at_rest(enabled), f"seed {seed}: something is left")
     addon_utils.disable(driver.EXTENSION, default_set=True)
     # a thread that makes a collider has to end first
-    yield from until(lambda: traces.of_blender() == before, "something of ours is left")
+    yield from wait_until(lambda: traces.blender_traces() == before, "something of ours is left")
     assert driver.timers.pending() == []
-    assert "Traceback" not in log.added(), "disabling raised"
+    assert "Traceback" not in log.new_output(), "disabling raised"
 
 
 def play(seed, folder):
@@ -86,9 +86,9 @@ def act(dice, number):
     except RuntimeError as error:  # Blender raises it for an operator's report
         assert "Traceback" not in str(error), error
         is_refused = True
-    if dice.often(REDRAWN):
+    if dice.happens(REDRAWN):
         yield BRIEFLY
-    said = log.added()
+    said = log.new_output()
     assert not any(sign in said for sign in RAISED), f"{action.__name__} raised"
     return is_refused
 
@@ -108,8 +108,8 @@ def shrink_the_view():
 
 def is_at_rest(enabled):
     """Whether loading an empty file has ended all activity."""
-    is_idle = not any(traces.of_previews().values()) and driver.timers.pending() == []
-    return is_idle and traces.of_blender() == enabled
+    is_idle = not any(traces.preview_traces().values()) and driver.timers.pending() == []
+    return is_idle and traces.blender_traces() == enabled
 
 
-driver.play(steps())
+driver.play_session(steps())

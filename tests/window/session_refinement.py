@@ -9,32 +9,32 @@ import numpy as np
 sys.path.append(str(Path(__file__).parent))
 import driver
 from artist import (
-    changed,
+    changed_fraction,
     click,
-    hair_is_made,
     look_from_front,
     new_head,
     open_our_sidebar,
-    picture,
     pixels,
-    pixels_at_rest,
     press,
+    redrawn_pixels,
     sidebar_button,
+    still_pixels,
     viewport,
+    wait_for_hair,
 )
-from driver import of_hairloom, until
+from driver import hairloom_module, wait_until
 
 GUIDES, CHILDREN = 300, 2000
 
 
 def session():
-    (one,) = of_hairloom("previews").sessions()
+    (one,) = hairloom_module("previews").sessions()
     return one
 
 
 def statistics():
     """Statistics of the last draw in the viewport."""
-    return of_hairloom("overlay").statistics_of(session().uid)
+    return hairloom_module("overlay").statistics_of(session().uid)
 
 
 def has_drawn_some():
@@ -69,7 +69,7 @@ def steps():
     yield from far_and_near()
     yield from sliders_while_it_plays()
     yield from two_grooms()
-    assert of_hairloom("overlay").failure() == ""
+    assert hairloom_module("overlay").failure() == ""
 
 
 def set_the_scene():
@@ -83,48 +83,57 @@ def set_the_scene():
     look_from_front(0.7)
     yield from open_our_sidebar()
     yield from click(*sidebar_button("hairloom.preview"))
-    yield from until(has_drawn_some, "no hair is drawn")
+    yield from wait_until(has_drawn_some, "no hair is drawn")
 
 
 def children_appear():
-    before = yield from picture("guides")
+    before = yield from redrawn_pixels("guides")
     children = hair().data.hairloom.children
     children.method, children.strand_count = "multi", CHILDREN
     yield from strands_come(GUIDES + CHILDREN)
-    yield from until(lambda: changed(before, pixels("children")) > 0.05, "no children are seen")
+    yield from wait_until(
+        lambda: changed_fraction(before, pixels("children")) > 0.05, "no children are seen"
+    )
 
 
 def strands_come(count):
     """Wait for this number of strands after edits."""
-    yield from until(lambda: session().rig.strands.strand_count == count, f"not {count} strands")
+    yield from wait_until(
+        lambda: session().rig.strands.strand_count == count, f"not {count} strands"
+    )
 
 
 def debug_views_and_counts():
     hair().hairloom.debug_view = "none"
-    plain = yield from pixels_at_rest("plain")
+    plain = yield from still_pixels("plain")
     hair().hairloom.show_counts = True
-    yield from until(
-        lambda: changed(corner(plain), corner(pixels("counts"))) > 0.01, "no counts are to be seen"
+    yield from wait_until(
+        lambda: changed_fraction(corner(plain), corner(pixels("counts"))) > 0.01,
+        "no counts are to be seen",
     )
-    counted = yield from pixels_at_rest("counts")
-    assert changed(plain[:-60], counted[:-60]) < 0.003, "the counts lie over something"
+    counted = yield from still_pixels("counts")
+    assert changed_fraction(plain[:-60], counted[:-60]) < 0.003, "the counts lie over something"
     hair().hairloom.show_counts = False
     assert saturation(plain) < 0.01
     for view in ("detail", "guide", "group"):
         hair().hairloom.debug_view = view
         yield
-        yield from until(lambda view=view: saturation(pixels(view)) > 0.02, view)
+        yield from wait_until(lambda view=view: saturation(pixels(view)) > 0.02, view)
         shown = pixels(view)
-        assert changed(corner(plain), corner(shown)) > 0.01, "a debug view without its counts"
+        assert changed_fraction(corner(plain), corner(shown)) > 0.01, (
+            "a debug view without its counts"
+        )
     hair().hairloom.debug_view = "occlusion"  # in grey
     yield
-    yield from until(lambda: changed(shown, pixels("occlusion")) > 0.02, "no occlusion is shown")
-    grey = yield from picture("occlusion")
+    yield from wait_until(
+        lambda: changed_fraction(shown, pixels("occlusion")) > 0.02, "no occlusion is shown"
+    )
+    grey = yield from redrawn_pixels("occlusion")
     assert saturation(grey) < 0.01
     overlays = viewport().spaces.active.overlay
     overlays.show_overlays = False
-    yield from until(
-        lambda: changed(corner(plain), corner(pixels("without-overlays"))) < 0.003,
+    yield from wait_until(
+        lambda: changed_fraction(corner(plain), corner(pixels("without-overlays"))) < 0.003,
         "counts without overlays",
     )
     overlays.show_overlays = True
@@ -136,21 +145,21 @@ def what_the_head_hides():
     detail, shading = hair().data.hairloom.detail, viewport().spaces.active.shading
     detail.lod_size = 0.0
     detail.culling = "none"
-    yield from until(draws_all, "strands are missing")
-    everything = yield from pixels_at_rest("nothing-left-out")
+    yield from wait_until(draws_all, "strands are missing")
+    everything = yield from still_pixels("nothing-left-out")
     count = GUIDES + CHILDREN
     detail.culling = "hidden"
-    yield from until(
+    yield from wait_until(
         lambda: 0.3 * count < statistics().strands < 0.95 * count, "the head hides no strands"
     )
-    left = yield from pixels_at_rest("hidden-left-out")
-    assert changed(everything, left) < 0.0005, "what is seen was left out"
+    left = yield from still_pixels("hidden-left-out")
+    assert changed_fraction(everything, left) < 0.0005, "what is seen was left out"
     shading.show_xray = True
-    yield from until(draws_all, "the head hides hair in X-ray")
+    yield from wait_until(draws_all, "the head hides hair in X-ray")
     driver.screenshot("xray")
     shading.show_xray = False
     bpy.data.objects["Head"].hide_set(True)
-    yield from until(draws_all, "a hidden head hides hair")
+    yield from wait_until(draws_all, "a hidden head hides hair")
     driver.screenshot("hidden-head")
     bpy.data.objects["Head"].hide_set(False)
     yield
@@ -174,9 +183,9 @@ def far_and_near():
 
 
 def sliders_while_it_plays():
-    live, head = of_hairloom("previews"), bpy.data.objects["Head"]
+    live, head = hairloom_module("previews"), bpy.data.objects["Head"]
     yield from click(*sidebar_button("hairloom.play"))
-    yield from until(live.is_playing, "the Play button did nothing")
+    yield from wait_until(live.is_playing, "the Play button did nothing")
     children = hair().data.hairloom.children
     for count, x in ((500, 0.02), (3000, 0.04), (1000, 0.0)):
         children.strand_count = count
@@ -198,7 +207,7 @@ def sliders_while_it_plays():
     yield from strands_come(GUIDES + 1000)
     assert live.is_playing()
     yield from press("ESC")
-    yield from until(lambda: not live.is_playing(), "ESC does not end Play")
+    yield from wait_until(lambda: not live.is_playing(), "ESC does not end Play")
 
 
 def two_grooms():
@@ -206,16 +215,16 @@ def two_grooms():
     twin = bpy.data.objects.new("Twin", hair().data)
     bpy.context.collection.objects.link(twin)
     twin.hairloom.show_counts = True
-    live = of_hairloom("previews")
+    live = hairloom_module("previews")
     live.start(twin, bpy.context.evaluated_depsgraph_get())
     look_from_front(1.2)
-    yield from hair_is_made()
+    yield from wait_for_hair()
     yield
     driver.screenshot("two-grooms")
     assert len(live.sessions()) == 2
     live.stop_all()
     yield
-    assert of_hairloom("overlay")._overlay.handles == ()
+    assert hairloom_module("overlay")._overlay.handles == ()
 
 
-driver.play(steps())
+driver.play_session(steps())

@@ -12,16 +12,16 @@ sys.path.append(str(Path(__file__).parent))
 import driver
 import traces
 from artist import (
-    changed,
-    hair_is_made,
+    changed_fraction,
     hide_floor,
     look_from_front,
     new_head,
-    pixels_at_rest,
     press,
+    still_pixels,
     viewport,
+    wait_for_hair,
 )
-from driver import of_hairloom
+from driver import hairloom_module
 
 log = traces.Log()
 
@@ -32,7 +32,7 @@ def steps():
     yield from groom()
     yield from selection_is_shown()
     yield from nothing_is_left_without_selection()
-    assert "Traceback" not in log.added(), "something has raised"
+    assert "Traceback" not in log.new_output(), "something has raised"
 
 
 def groom():
@@ -44,7 +44,7 @@ def groom():
     hair.name = "Hair"
     hair.data.hairloom.children.method = "none"
     bpy.ops.hairloom.preview()
-    yield from hair_is_made()
+    yield from wait_for_hair()
     yield
 
 
@@ -57,9 +57,9 @@ def choose(is_chosen):
 def outline(label):
     """A mask of the orange outline of the selection."""
     choose(True)
-    selected = yield from pixels_at_rest(f"{label}-selected")
+    selected = yield from still_pixels(f"{label}-selected")
     choose(False)
-    alone = yield from pixels_at_rest(f"{label}-unselected")
+    alone = yield from still_pixels(f"{label}-unselected")
     return is_orange(selected) & ~is_orange(alone)
 
 
@@ -70,14 +70,14 @@ def is_orange(picture):
 
 def selection_is_shown():
     ours = yield from outline("ours")
-    of_hairloom("previews").stop_all()
+    hairloom_module("previews").stop_all()
     blenders = yield from outline("blenders")
     assert ours.sum() > 500, f"selection is not seen: {ours.sum()} pixels"
     beside = (ours & ~near(blenders)).sum()
     assert beside < 0.02 * ours.sum(), f"{beside} pixels are beside Blender's outline, as a box is"
     choose(True)
     bpy.ops.hairloom.preview()
-    yield from hair_is_made()
+    yield from wait_for_hair()
     yield
 
 
@@ -94,23 +94,23 @@ def nothing_is_left_without_selection():
     """Without our strands, the view equals that of hidden hair, without strands or lines of
     Blender's."""
     hair, space = bpy.data.objects["Hair"], viewport().spaces.active
-    drawn = of_hairloom("overlay")._overlay.drawn
+    drawn = hairloom_module("overlay")._overlay.drawn
     kept = dict(drawn)
     for kind, is_xray in (("SOLID", False), ("SOLID", True), ("WIREFRAME", True)):
         space.shading.type, label = kind, f"{kind.lower()}-{is_xray}"
         setattr(space.shading, "show_xray" if kind == "SOLID" else "show_xray_wireframe", is_xray)
         choose(False)
-        shown = yield from pixels_at_rest(f"{label}-shown")
+        shown = yield from still_pixels(f"{label}-shown")
         drawn.clear()
-        empty = yield from pixels_at_rest(f"{label}-empty")
+        empty = yield from still_pixels(f"{label}-empty")
         hair.hide_set(True)
-        hidden = yield from pixels_at_rest(f"{label}-hidden")
+        hidden = yield from still_pixels(f"{label}-hidden")
         hair.hide_set(False)
         drawn.update(kept)
         yield
-        assert changed(shown, empty) > 0.01, "our strands are not drawn"
-        left = changed(empty, hidden)
+        assert changed_fraction(shown, empty) > 0.01, "our strands are not drawn"
+        left = changed_fraction(empty, hidden)
         assert left < 1e-4, f"{kind}, X-Ray {is_xray}: Blender draws {left:.4f} of the view"
 
 
-driver.play(steps())
+driver.play_session(steps())

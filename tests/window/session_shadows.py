@@ -8,18 +8,18 @@ import bpy
 sys.path.append(str(Path(__file__).parent))
 import driver
 from artist import (
-    changed,
+    changed_fraction,
     click,
     hide_floor,
     look_from_front,
     new_head,
     open_our_sidebar,
     pixels,
-    pixels_at_rest,
     press,
     sidebar_button,
+    still_pixels,
 )
-from driver import of_hairloom, until
+from driver import hairloom_module, wait_until
 
 
 def volume():
@@ -32,7 +32,7 @@ def steps():
     yield from set_the_scene()
     yield from shadows_appear()
     yield from they_stay_while_hair_plays()
-    assert of_hairloom("overlay").failure() == ""
+    assert hairloom_module("overlay").failure() == ""
 
 
 def set_the_scene():
@@ -46,12 +46,12 @@ def set_the_scene():
     look_from_front(0.7)
     yield from open_our_sidebar()
     yield from click(*sidebar_button("hairloom.preview"))
-    yield from until(has_drawn, "no hair is drawn")
+    yield from wait_until(has_drawn, "no hair is drawn")
     yield
 
 
 def has_drawn():
-    overlay = of_hairloom("overlay")
+    overlay = hairloom_module("overlay")
     return any(overlay.statistics_of(uid).strands > 0 for uid in overlay.drawn())
 
 
@@ -60,15 +60,15 @@ def shadows_appear():
     an error.
     """
     assert volume().shadows == "deep"
-    shaded = yield from pixels_at_rest("shadows_at_first")
+    shaded = yield from still_pixels("shadows_at_first")
     volume().shadows = "none"
     yield from seen_to_differ(shaded, "without_shadows")
-    plain = yield from pixels_at_rest("without_shadows")
+    plain = yield from still_pixels("without_shadows")
     for form in ("slices", "deep"):
         volume().shadows = form
         yield from seen_to_differ(plain, f"shadows_{form}")
-        assert of_hairloom("overlay").failure() == ""
-    shaded = yield from pixels_at_rest("shadows_deep")
+        assert hairloom_module("overlay").failure() == ""
+    shaded = yield from still_pixels("shadows_deep")
     volume().scattering = False
     yield from seen_to_differ(shaded, "without_scattering")
     volume().scattering = True
@@ -76,11 +76,11 @@ def shadows_appear():
 
 
 def seen_to_differ(before, label):
-    yield from until(lambda: changed(before, pixels(label), 0.03) > 0.005, label)
+    yield from wait_until(lambda: changed_fraction(before, pixels(label), 0.03) > 0.005, label)
 
 
 def they_stay_while_hair_plays():
-    before = yield from pixels_at_rest("before_play")
+    before = yield from still_pixels("before_play")
     yield from click(*sidebar_button("hairloom.play"))
     yield
     bpy.data.objects["Head"].location.x = 0.05
@@ -91,4 +91,4 @@ def they_stay_while_hair_plays():
     yield
 
 
-driver.play(steps())
+driver.play_session(steps())

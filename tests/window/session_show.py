@@ -8,7 +8,7 @@ import bpy
 sys.path.append(str(Path(__file__).parent))
 import driver
 from artist import look_from_front, new_head, open_our_sidebar, press
-from driver import of_hairloom, until
+from driver import hairloom_module, wait_until
 
 STRANDS, FRAMES = 300, 5
 FOLDER = Path(bpy.app.tempdir) / "shown"
@@ -16,7 +16,7 @@ SMALL = {"size": 64, "samples": 1}
 
 
 def running():
-    return of_hairloom("long_work").running()
+    return hairloom_module("long_work").running()
 
 
 def steps():
@@ -43,7 +43,7 @@ def turntable(**options):
 def a_whole_turn():
     """Pictures and a video, while the window stays responsive."""
     turntable(frames=FRAMES)
-    yield from until(lambda: not running(), "the turntable does not end")
+    yield from wait_until(lambda: not running(), "the turntable does not end")
     names = sorted(path.name for path in FOLDER.iterdir())
     assert names == ["Hair.mp4", *(f"Hair_000{n}.png" for n in range(1, FRAMES + 1))], names
     clip = bpy.data.movieclips.load(str(FOLDER / "Hair.mp4"))
@@ -57,11 +57,11 @@ def a_cancelled_one():
     before = {path.name: path.stat().st_mtime_ns for path in FOLDER.iterdir()}
     turntable(frames=2000)
     third = ".Hair_0001.hl-*/*_0003.png"  # the folder until the last one is there
-    yield from until(lambda: any(FOLDER.glob(third)), "no picture is drawn")
+    yield from wait_until(lambda: any(FOLDER.glob(third)), "no picture is drawn")
     assert running() == "Turntable"
     driver.screenshot("turning")
     yield from press("ESC")
-    yield from until(lambda: not running(), "Esc does not cancel the turntable")
+    yield from wait_until(lambda: not running(), "Esc does not cancel the turntable")
     assert {path.name: path.stat().st_mtime_ns for path in FOLDER.iterdir()} == before
     assert bpy.ops.hairloom.turntable.poll()
 
@@ -73,4 +73,4 @@ def a_sheet():
     yield 1
 
 
-driver.play(steps())
+driver.play_session(steps())

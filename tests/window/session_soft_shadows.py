@@ -11,15 +11,15 @@ from mathutils import Euler
 sys.path.append(str(Path(__file__).parent))
 import driver
 from artist import (
-    changed,
+    changed_fraction,
     hide_floor,
     look_from_front,
     new_fringe,
-    pixels_at_rest,
     press,
+    still_pixels,
     viewport,
 )
-from driver import of_hairloom, until
+from driver import hairloom_module, wait_until
 
 SAMPLES = 12
 #: fraction of a view's pixels by which Blender's own redraws differ
@@ -39,11 +39,11 @@ def steps():
     yield from what_changes_is_hard_at_once(soft)
     yield from one_sample_tells_whether_all_is_right(soft)
     yield from without_samples_all_is_let_go_of(hard)
-    assert of_hairloom("overlay").failure() == ""
+    assert hairloom_module("overlay").failure() == ""
 
 
 def count_draws():
-    strands = of_hairloom("strand_pass").StrandPass
+    strands = hairloom_module("strand_pass").StrandPass
     draw = strands.draw
 
     def count(*values, **options):
@@ -64,7 +64,7 @@ def set_the_scene():
     hide_floor()
     look_from_front(0.6)
     bpy.ops.hairloom.preview()
-    yield from until(lambda: counted["drawn"], "no hair is drawn")
+    yield from wait_until(lambda: counted["drawn"], "no hair is drawn")
     yield
 
 
@@ -73,31 +73,31 @@ def picture():
 
 
 def views():
-    return of_hairloom("views").known_views()
+    return hairloom_module("views").known_views()
 
 
 def held():
-    of_hairloom("gpu_objects").free_unused()
-    return of_hairloom("gpu_objects").bytes_in_use()
+    hairloom_module("gpu_objects").free_unused()
+    return hairloom_module("gpu_objects").bytes_in_use()
 
 
 def hard_is_what_it_was():
     """Without a GPU, and with one sample on a GPU, the pixels are the same."""
     picture().viewport_samples = SAMPLES
-    before = yield from pixels_at_rest("no-gpu")
-    of_hairloom("softening").is_software = lambda: False
+    before = yield from still_pixels("no-gpu")
+    hairloom_module("softening").is_software = lambda: False
     picture().viewport_samples = 1
-    hard = yield from pixels_at_rest("hard")
-    assert changed(before, hard, 0.0) == 0.0 and not counted["samples"]
+    hard = yield from still_pixels("hard")
+    assert changed_fraction(before, hard, 0.0) == 0.0 and not counted["samples"]
     return hard
 
 
 def shadows_become_soft(hard):
     picture().viewport_samples = SAMPLES
-    yield from until(lambda: all(each.has_all for each in views()), "shadows stay hard")
-    soft = yield from pixels_at_rest("soft")
+    yield from wait_until(lambda: all(each.has_all for each in views()), "shadows stay hard")
+    soft = yield from still_pixels("soft")
     assert counted["samples"] >= SAMPLES
-    assert changed(hard, soft, 0.05) > 0.003, changed(hard, soft, 0.05)
+    assert changed_fraction(hard, soft, 0.05) > 0.003, changed_fraction(hard, soft, 0.05)
     # the same brightness
     assert abs(hard.mean() - soft.mean()) < 0.01
     return soft
@@ -108,8 +108,8 @@ def nothing_more_is_drawn(soft):
     redraws, which checks whether the picture is still right.
     """
     before = dict(counted)
-    again = yield from pixels_at_rest("soft-again")
-    assert changed(soft, again, 0.0) == 0.0
+    again = yield from still_pixels("soft-again")
+    assert changed_fraction(soft, again, 0.0) == 0.0
     # on a slow machine each of these redraws is its own series
     assert all(each.is_soft and each.has_all for each in views())
     shown = counted["samples"]
@@ -141,11 +141,18 @@ def what_changes_is_hard_at_once(soft):
         for name, act in ((change.__name__, change), (f"{change.__name__}-back", back)):
             drawn = counted["drawn"]
             act()
-            yield from until(lambda drawn=drawn: counted["drawn"] > drawn, f"{name}: not drawn")
+            yield from wait_until(
+                lambda drawn=drawn: counted["drawn"] > drawn, f"{name}: not drawn"
+            )
             assert not any(each.is_soft for each in views()), f"{name}: soft shadows that were"
-            yield from until(lambda: all(each.has_all for each in views()), f"{name}: stays hard")
-            found = yield from pixels_at_rest(name)
-        assert changed(soft, found, 0.02) < SAME, (name, changed(soft, found, 0.02))
+            yield from wait_until(
+                lambda: all(each.has_all for each in views()), f"{name}: stays hard"
+            )
+            found = yield from still_pixels(name)
+        assert changed_fraction(soft, found, 0.02) < SAME, (
+            name,
+            changed_fraction(soft, found, 0.02),
+        )
 
 
 def one_sample_tells_whether_all_is_right(soft):
@@ -157,8 +164,8 @@ def one_sample_tells_whether_all_is_right(soft):
         for view in views():
             view.is_again, view.fragments = True, fragments or view.fragments
         before = counted["samples"]
-        of_hairloom("views")._draw_afresh()
-        yield from until(
+        hairloom_module("views")._draw_afresh()
+        yield from wait_until(
             lambda before=before: (
                 counted["samples"] > before and not any(each.wants_more for each in views())
             ),
@@ -167,17 +174,17 @@ def one_sample_tells_whether_all_is_right(soft):
         assert least <= counted["samples"] - before < least + 2, (before, counted)
         assert all(each.is_soft for each in views())
     assert counted["drawn"] == drawn
-    found = yield from pixels_at_rest("looked-again")
-    assert changed(soft, found, 0.02) < SAME
+    found = yield from still_pixels("looked-again")
+    assert changed_fraction(soft, found, 0.02) < SAME
 
 
 def without_samples_all_is_let_go_of(hard):
-    assert of_hairloom("softening").sums().count == 0
+    assert hairloom_module("softening").sums().count == 0
     soft_held = held()
     picture().viewport_samples = 1
-    found = yield from pixels_at_rest("hard-again")
-    assert changed(hard, found, 0.02) < SAME
+    found = yield from still_pixels("hard-again")
+    assert changed_fraction(hard, found, 0.02) < SAME
     assert held() == soft_held, "samples leave something on the GPU"
 
 
-driver.play(steps())
+driver.play_session(steps())

@@ -9,7 +9,7 @@ sys.path.append(str(Path(__file__).parent))
 import driver
 from artist import (
     click,
-    confirm_file,
+    confirm_file_browser,
     file_browser,
     look_from_front,
     new_head,
@@ -18,8 +18,8 @@ from artist import (
     region,
     viewport,
 )
-from driver import of_hairloom, until
-from open_panels import open_from_the_start
+from driver import hairloom_module, wait_until
+from open_panels import register_as_open
 
 FOLDER = Path(bpy.app.tempdir) / "strands"
 
@@ -27,7 +27,7 @@ failures: list[str] = []
 
 
 def running():
-    return of_hairloom("long_work").running()
+    return hairloom_module("long_work").running()
 
 
 def steps():
@@ -55,7 +55,7 @@ def set_the_scene():
         head.keyframe_insert("location", frame=frame)
     bpy.context.scene.frame_set(1)
     look_from_front(0.9)
-    open_from_the_start("HAIRLOOM_PT_sidebar_export")
+    register_as_open("HAIRLOOM_PT_sidebar_export")
     yield from open_our_sidebar()
 
 
@@ -65,28 +65,28 @@ def export(**options):
     with bpy.context.temp_override(area=viewport(), region=region("WINDOW")):
         asked = bpy.ops.hairloom.export_alembic("INVOKE_DEFAULT", filepath=path, **options)
     assert asked == {"RUNNING_MODAL"}
-    yield from until(lambda: file_browser() is not None, "no file browser opens")
+    yield from wait_until(lambda: file_browser() is not None, "no file browser opens")
     yield
 
 
 def the_check_stands_beside_the_options():
     yield from export()
-    check = of_hairloom("export_check")
+    check = hairloom_module("export_check")
     assert check.count() == 1 and "guides" in check._check.lines[0], check._check
     driver.screenshot("options")
-    yield from confirm_file()
-    yield from until((FOLDER / "hair.abc").exists, "nothing is written")
+    yield from confirm_file_browser()
+    yield from wait_until((FOLDER / "hair.abc").exists, "nothing is written")
     assert check.count() == 0 and not running()
 
 
 def motion_comes_in_steps():
     (FOLDER / "hair.abc").unlink()
     yield from export(frames="own", first=1, last=20)
-    yield from confirm_file()
-    yield from until(lambda: bool(running()), "the export does not begin")
+    yield from confirm_file_browser()
+    yield from wait_until(lambda: bool(running()), "the export does not begin")
     yield
     driver.screenshot("writing")
-    yield from until(lambda: not running(), "the export does not end")
+    yield from wait_until(lambda: not running(), "the export does not end")
     assert (FOLDER / "hair.abc").exists()
     assert bpy.context.scene.frame_current == 1
 
@@ -94,12 +94,12 @@ def motion_comes_in_steps():
 def escape_leaves_the_old_file():
     (FOLDER / "hair.abc").write_bytes(b"old")
     yield from export(frames="own", first=1, last=4000)
-    yield from confirm_file()
-    yield from until(lambda: bool(running()), "the export does not begin")
+    yield from confirm_file_browser()
+    yield from wait_until(lambda: bool(running()), "the export does not begin")
     yield
     yield from press("ESC")
-    yield from until(lambda: not running(), "Esc does not cancel the export")
-    yield from until(
+    yield from wait_until(lambda: not running(), "Esc does not cancel the export")
+    yield from wait_until(
         lambda: [p.name for p in FOLDER.iterdir()] == ["hair.abc"], "a half-written file is left"
     )
     assert (FOLDER / "hair.abc").read_bytes() == b"old"
@@ -108,10 +108,10 @@ def escape_leaves_the_old_file():
 
 def the_check_alone():
     """Click the check's button, one of the lowest; buttons below it may open their own popups."""
-    check, sidebar = of_hairloom("export_check"), region("UI")
+    check, sidebar = hairloom_module("export_check"), region("UI")
     for y in range(sidebar.y + 6, sidebar.y + sidebar.height, 12):
         yield from click(sidebar.x + sidebar.width // 2, y)
-        yield from until(lambda: running() != "Check for Export", "the check does not end")
+        yield from wait_until(lambda: running() != "Check for Export", "the check does not end")
         if check.count():
             break
         yield from press("ESC")
@@ -121,7 +121,7 @@ def the_check_alone():
     driver.screenshot("check")
     yield from press("ESC")
     yield
-    assert of_hairloom("export_check").count() == 0
+    assert hairloom_module("export_check").count() == 0
 
 
-driver.play(steps())
+driver.play_session(steps())

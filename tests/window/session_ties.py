@@ -13,10 +13,9 @@ sys.path.append(str(Path(__file__).parent))
 import driver
 import traces
 from artist import (
-    changed,
+    changed_fraction,
     click,
-    field,
-    hair_is_made,
+    find_field,
     hide_floor,
     look_from_front,
     new_head,
@@ -25,11 +24,12 @@ from artist import (
     press,
     sidebar_button,
     viewport,
+    wait_for_hair,
 )
 from dice import press as press_in_view
 from dice import select
-from driver import of_hairloom, until
-from open_panels import OURS, SIDEBAR, only_our_panels, show
+from driver import hairloom_module, wait_until
+from open_panels import OUR_PREFIX, SIDEBAR, only_our_panels, show_panels
 
 log = traces.Log()
 STRANDS, LENGTH = 400, 0.15
@@ -51,11 +51,11 @@ def steps():
     yield from move(ring)
     yield from delete(ring)
     yield from undo()
-    assert "Traceback" not in log.added(), "something has raised"
+    assert "Traceback" not in log.new_output(), "something has raised"
 
 
 def groom():
-    show([SIDEBAR])
+    show_panels([SIDEBAR])
     yield from open_our_sidebar()
     new_head()
     hide_floor()
@@ -75,11 +75,13 @@ def add_a_tie(hair):
     cursor.location, along = thickest(hair)
     cursor.rotation_euler = Vector(along).to_track_quat("Y", "Z").to_euler()
     bpy.ops.ed.undo_push(message="cursor")
-    show([f"{OURS}sidebar_dynamics_ties"])
+    show_panels([f"{OUR_PREFIX}sidebar_dynamics_ties"])
     yield
-    x, y = yield from field(viewport(), "UI", "tie_collection")
+    x, y = yield from find_field(viewport(), "UI", "tie_collection")
     yield from click(x, int(y - BELOW * bpy.context.preferences.system.ui_scale))
-    yield from until(lambda: hair.hairloom.tie_collection is not None, "the button adds no tie")
+    yield from wait_until(
+        lambda: hair.hairloom.tie_collection is not None, "the button adds no tie"
+    )
     (ring,) = hair.hairloom.tie_collection.objects
     assert ring.parent == bpy.data.objects["Head"] and ring.empty_display_type == "CIRCLE"
     yield
@@ -99,7 +101,7 @@ def thickest(hair):
 
 
 def live():
-    return of_hairloom("previews")
+    return hairloom_module("previews")
 
 
 def session():
@@ -127,13 +129,13 @@ def farthest(ring):
 
 
 def play():
-    show([SIDEBAR])
+    show_panels([SIDEBAR])
     select(next(obj for obj in bpy.data.objects if obj.type == "CURVES"))
     yield
     for button in ("hairloom.preview", "hairloom.play"):
         yield from click(*sidebar_button(button))
-        yield from hair_is_made()
-    yield from until(live().is_playing, "it does not play")
+        yield from wait_for_hair()
+    yield from wait_until(live().is_playing, "it does not play")
     yield from moves()
     assert holds() is not None and len(holds().strand) > 5, "the ring holds nothing"
     tips = session().strands[session().rig.strands.offsets[1:] - 1]
@@ -142,7 +144,7 @@ def play():
 
 def moves():
     before = session().strands
-    yield from until(
+    yield from wait_until(
         lambda: np.abs(session().strands - before).max() > 1e-4, "nothing moves any more"
     )
 
@@ -162,9 +164,9 @@ def move(ring):
         yield 1
     way = (ring.matrix_world.translation - before).length
     assert way > 0.02, f"the mouse has moved the ring by {way:.3f} m"
-    yield from until(lambda: farthest(ring) < at_rest + SLACK, "the hair leaves the ring")
+    yield from wait_until(lambda: farthest(ring) < at_rest + SLACK, "the hair leaves the ring")
     assert live().is_playing(), "the drag has stopped it"
-    moved = changed(shot, pixels("ring_moved"))
+    moved = changed_fraction(shot, pixels("ring_moved"))
     assert moved > 0.005, f"the picture stands still: {moved:.4f} of it has changed"
 
 
@@ -174,25 +176,27 @@ def delete(ring):
     before = held_points()
     select(ring)
     yield from press_in_view("DEL")
-    yield from until(lambda: name not in bpy.context.scene.objects, "the key deletes nothing")
-    yield from until(lambda: holds() is None, "what is gone still holds")
+    yield from wait_until(lambda: name not in bpy.context.scene.objects, "the key deletes nothing")
+    yield from wait_until(lambda: holds() is None, "what is gone still holds")
     yield from moves()
     assert live().is_playing(), "the end of a tie has stopped it"
     assert any(name in text for text in session().warnings), session().warnings
     assert np.isfinite(session().strands).all() and len(before)
-    show([SIDEBAR])
+    show_panels([SIDEBAR])
     yield
     driver.screenshot("deleted")
 
 
 def undo():
     yield from press_in_view("Z", ctrl=True)
-    yield from until(lambda: "Hair Tie" in bpy.context.scene.objects, "Ctrl-Z brings no ring back")
-    yield from until(lambda: holds() is not None, "what is back holds nothing")
+    yield from wait_until(
+        lambda: "Hair Tie" in bpy.context.scene.objects, "Ctrl-Z brings no ring back"
+    )
+    yield from wait_until(lambda: holds() is not None, "what is back holds nothing")
     assert not any("Hair Tie" in text for text in session().warnings), session().warnings
     assert live().is_playing(), "undoing has stopped it"
     yield from moves()
     driver.screenshot("undone")
 
 
-driver.play(steps())
+driver.play_session(steps())

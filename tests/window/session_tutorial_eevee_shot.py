@@ -8,15 +8,15 @@ import bpy
 sys.path.append(str(Path(__file__).parent))
 import driver
 import traces
-from driver import of_hairloom, until
+from driver import hairloom_module, wait_until
 from tutorials import (
     Page,
-    below_name,
     click,
+    find_button_below_name,
     open_tab,
     properties,
     save_the_file,
-    still,
+    wait_until_idle,
 )
 
 log, page = traces.Log(), Page("eevee_shot")
@@ -32,7 +32,7 @@ def steps():
     yield from baked()
     yield from rendered()
     page.end()
-    assert "Traceback" not in log.added(), "something has raised"
+    assert "Traceback" not in log.new_output(), "something has raised"
 
 
 def scene():
@@ -50,7 +50,7 @@ def the_engine():
     scene().render.resolution_x = scene().render.resolution_y = SIDE
     scene().eevee.taa_render_samples = SAMPLES
     page.step(2)
-    page.says("Properties > Render")
+    page.quote("Properties > Render")
     yield from open_tab("RENDER")
     yield from page.choose("Render Engine", "EEVEE", "render.engine", properties())
     yield from page.tick("Hairloom Hair", properties())
@@ -61,16 +61,16 @@ def the_engine():
 
 def baked():
     page.step(3)
-    page.says("Save the file")
+    page.quote("Save the file")
     yield from save_the_file()
     yield from open_tab("DATA")
-    panel, below = page.says("Dynamics > Bake").split(" > ")
+    panel, below = page.quote("Dynamics > Bake").split(" > ")
     yield from page.open(panel, properties())
     yield from page.open(below, properties())
-    yield from click(*(yield from below_name("Bake", properties())))
-    cache = of_hairloom("playback").cache_of
-    yield from until(lambda: cache(hair()) is not None, "there is no bake")
-    yield from still()
+    yield from click(*(yield from find_button_below_name("Bake", properties())))
+    cache = hairloom_module("playback").cache_of
+    yield from wait_until(lambda: cache(hair()) is not None, "there is no bake")
+    yield from wait_until_idle()
 
 
 def rendered():
@@ -78,9 +78,9 @@ def rendered():
     yield from open_tab("RENDER")
     yield from page.tick("Motion Blur", properties())
     assert scene().render.use_motion_blur
-    page.says("F12")
+    page.quote("F12")
     yield from page.render()
     driver.screenshot("end")
 
 
-driver.play(steps())
+driver.play_session(steps())

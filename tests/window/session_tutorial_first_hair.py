@@ -9,16 +9,16 @@ sys.path.append(str(Path(__file__).parent))
 import driver
 import traces
 from artist import (
-    changed,
-    hair_is_made,
-    pixels_at_rest,
+    changed_fraction,
+    height_in_view,
     region,
-    share_of_view,
+    still_pixels,
     viewport,
+    wait_for_hair,
 )
-from driver import of_hairloom, until
+from driver import hairloom_module, wait_until
 from reading import box_of
-from tutorials import Page, click, in_view, key, middle, open_tab, properties
+from tutorials import Page, click, empty_place_in_view, middle, open_tab, press_key, properties
 
 log, page = traces.Log(), Page("first_hair")
 
@@ -30,11 +30,11 @@ def steps():
     yield from longer_and_wavy()
     yield from red()
     page.end()
-    assert "Traceback" not in log.added(), "something has raised"
+    assert "Traceback" not in log.new_output(), "something has raised"
 
 
 def live():
-    return of_hairloom("previews")
+    return hairloom_module("previews")
 
 
 def groom():
@@ -43,71 +43,73 @@ def groom():
 
 def a_head():
     page.step(1)
-    yield from key(page.says("A"), *in_view())
-    yield from key(page.says("X"), *in_view())
+    yield from press_key(page.quote("A"), *empty_place_in_view())
+    yield from press_key(page.quote("X"), *empty_place_in_view())
     yield from page.click("Delete")
-    yield from until(lambda: not bpy.context.scene.objects, "the scene is not empty")
+    yield from wait_until(lambda: not bpy.context.scene.objects, "the scene is not empty")
     path = "Add > Curve > Hairloom Hairstyle > Brows"
     yield from page.menu(path, box_of(region("HEADER")))
-    yield from until(lambda: live().is_playing(), "no brows play")
+    yield from wait_until(lambda: live().is_playing(), "no brows play")
     assert set(bpy.data.objects.keys()) == {"Head", "Head Brows"}
-    page.says("the view goes near it")
-    yield from until(lambda: share_of_view(bpy.data.objects["Head"]) > 0.3, "the head stays small")
+    page.quote("the view goes near it")
+    yield from wait_until(
+        lambda: height_in_view(bpy.data.objects["Head"]) > 0.3, "the head stays small"
+    )
     driver.screenshot("head")
 
 
 def hair_on_it():
     page.step(2)
     head = middle(box_of(region("WINDOW")))
-    page.says("Click the head")
+    page.quote("Click the head")
     yield from click(*head)
-    yield from until(lambda: bpy.context.object.name == "Head", "the head is not selected")
+    yield from wait_until(lambda: bpy.context.object.name == "Head", "the head is not selected")
     yield from page.right_click("Hairloom > Add Hair", *head)
-    yield from until(lambda: len(live().sessions()) == 2, "no hair grows")
-    page.says("Press Esc")
-    yield from key("ESC", *in_view())
-    yield from until(lambda: not live().is_playing(), "Esc does not stop it")
-    yield from hair_is_made()
+    yield from wait_until(lambda: len(live().sessions()) == 2, "no hair grows")
+    page.quote("Press Esc")
+    yield from press_key("ESC", *empty_place_in_view())
+    yield from wait_until(lambda: not live().is_playing(), "Esc does not stop it")
+    yield from wait_for_hair()
     yield from strands_between_guides()
 
 
 def strands_between_guides():
-    page.says("Properties > Data")
+    page.quote("Properties > Data")
     yield from open_tab("DATA")
     yield from page.open("Children", properties())
     yield from page.choose("Method", "Between Guides", "children.method", properties())
     yield from page.enter("Strands", "24000", "children.strand_count", properties())
-    page.says("24,000")
+    page.quote("24,000")
     assert groom().children.strand_count == 24_000 and groom().children.method == "multi"
-    yield from hair_is_made()
+    yield from wait_for_hair()
 
 
 def longer_and_wavy():
     page.step(3)
-    short = yield from pixels_at_rest("short")
+    short = yield from still_pixels("short")
     yield from page.open("Grow", properties())
     for label, value, path in (("Length", "0.3", "grow.length"), ("Wave", "0.014", "grow.wave")):
-        page.says(f"{label} to {value} m")
+        page.quote(f"{label} to {value} m")
         yield from page.enter(label, value, path, properties())
         own = getattr(groom().grow, label.lower())
         assert abs(own - float(value)) < 1e-6, f"{label} is {own}"
-    yield from hair_is_made()
-    long = yield from pixels_at_rest("long")
-    assert changed(short, long) > 0.1, "the hair does not follow"
+    yield from wait_for_hair()
+    long = yield from still_pixels("long")
+    assert changed_fraction(short, long) > 0.1, "the hair does not follow"
 
 
 def red():
     page.step(4)
-    brown = yield from pixels_at_rest("brown")
+    brown = yield from still_pixels("brown")
     yield from page.open("Look", viewport(), "UI")
     yield from page.picture("Look", "Red", viewport(), "UI")
-    red = yield from pixels_at_rest("red")
-    assert changed(brown, red) > 0.02, "the hair is not red"
-    page.says("Click beside the head")
-    yield from click(*in_view())
-    yield from until(lambda: not bpy.context.selected_objects, "the hair stays selected")
+    red = yield from still_pixels("red")
+    assert changed_fraction(brown, red) > 0.02, "the hair is not red"
+    page.quote("Click beside the head")
+    yield from click(*empty_place_in_view())
+    yield from wait_until(lambda: not bpy.context.selected_objects, "the hair stays selected")
     yield
     driver.screenshot("end")
 
 
-driver.play(steps(), anti_aliasing=True)
+driver.play_session(steps(), anti_aliasing=True)

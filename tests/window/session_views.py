@@ -10,20 +10,20 @@ import numpy as np
 sys.path.append(str(Path(__file__).parent))
 import driver
 import traces
-from artist import changed, press
-from driver import of_hairloom, until
+from artist import changed_fraction, press
+from driver import hairloom_module, wait_until
 from two_windows import (
-    HAIR,
-    SAME,
+    MAX_REDRAW_FRACTION,
+    MIN_HAIR_FRACTION,
+    assert_hair_drawn,
     hair,
-    live,
-    look,
-    pictures,
+    look_from_front_in_all,
+    previews,
     set_the_scene,
     two_windows,
     view_of,
+    view_pictures,
     windows,
-    with_and_without,
 )
 
 log = traces.Log()
@@ -39,7 +39,7 @@ def steps():
     yield from another_scene_in_one_window()
     yield from hidden_in_every_way()
     yield from instances_are_told()
-    assert "Traceback" not in log.added()
+    assert "Traceback" not in log.new_output()
 
 
 def local_view_in_one_window():
@@ -55,7 +55,7 @@ def local_view_in_one_window():
 
     switch()
     yield
-    yield from with_and_without("local-view", [True, False])
+    yield from assert_hair_drawn("local-view", [True, False])
     switch()
     yield
 
@@ -68,11 +68,11 @@ def another_view_layer_in_one_window():
     first = second.view_layer
     second.view_layer = layer
     yield
-    yield from with_and_without("view-layer", [True, False])
+    yield from assert_hair_drawn("view-layer", [True, False])
     second.view_layer = first
     scene.view_layers.remove(layer)
     yield
-    yield from with_and_without("view-layer-back", [True, True])
+    yield from assert_hair_drawn("view-layer-back", [True, True])
 
 
 def another_scene_in_one_window():
@@ -81,9 +81,9 @@ def another_scene_in_one_window():
     mine, other = first.scene, bpy.data.scenes.new("Other")
     second.scene = other
     yield
-    look()
-    yield from with_and_without("scene", [True, False])
-    (session,) = live().sessions()
+    look_from_front_in_all()
+    yield from assert_hair_drawn("scene", [True, False])
+    (session,) = previews().sessions()
     rig = session.rig
     ball = bpy.data.objects.new("Ball", bpy.data.objects["Head"].data)
     other.collection.objects.link(ball)
@@ -91,13 +91,13 @@ def another_scene_in_one_window():
         ball.location.x = x
         yield
     assert session.rig is rig, "work in another scene reads the hair again"
-    yield from with_and_without("scene-worked-on", [True, False])
+    yield from assert_hair_drawn("scene-worked-on", [True, False])
     second.scene = mine
     bpy.data.objects.remove(ball)
     bpy.data.scenes.remove(other)
     yield
-    look()
-    yield from with_and_without("scene-back", [True, True])
+    look_from_front_in_all()
+    yield from assert_hair_drawn("scene-back", [True, True])
     yield from closed_while_it_moves(second)
 
 
@@ -108,17 +108,17 @@ def closed_while_it_moves(second):
     bpy.ops.hairloom.reset()
     yield
     assert len(windows()) == 1
-    assert len(live().sessions()) == 1, live().notice()
-    yield from until(lambda: not live().sessions()[0].is_stale, "it is not read again")
+    assert len(previews().sessions()) == 1, previews().notice()
+    yield from wait_until(lambda: not previews().sessions()[0].is_stale, "it is not read again")
 
 
 def hidden_in_every_way():
     """Hiding by the eye icon, with the collection, or by the view layer hides hair; hiding it in
     renders does not."""
     layer = bpy.context.view_layer.layer_collection.children["Groom"]
-    (shown,) = yield from pictures("ways-shown")
+    (shown,) = yield from view_pictures("ways-shown")
     hair().hide_viewport = True
-    (without,) = yield from pictures("ways-without")
+    (without,) = yield from view_pictures("ways-without")
     hair().hide_viewport = False
     head = bpy.data.objects["Head"]
     for owner, name in (
@@ -127,17 +127,19 @@ def hidden_in_every_way():
         (layer, "exclude"),
     ):
         setattr(owner, name, True)
-        (found,) = yield from pictures(f"ways-{name}")
+        (found,) = yield from view_pictures(f"ways-{name}")
         setattr(owner, name, False)
         yield
-        assert not live().notice(), live().notice()
-        (back,) = yield from pictures(f"ways-{name}-back")
-        assert changed(found, without) > HAIR, "the head is hidden as well"
-        assert hair_pixels(found, shown, without) < SAME, f"{name} does not hide it"
-        assert changed(back, shown) < SAME, f"{name} does not show it again"
+        assert not previews().notice(), previews().notice()
+        (back,) = yield from view_pictures(f"ways-{name}-back")
+        assert changed_fraction(found, without) > MIN_HAIR_FRACTION, "the head is hidden as well"
+        assert hair_pixels(found, shown, without) < MAX_REDRAW_FRACTION, f"{name} does not hide it"
+        assert changed_fraction(back, shown) < MAX_REDRAW_FRACTION, f"{name} does not show it again"
     hair().hide_render = head.hide_render = True
-    (found,) = yield from pictures("ways-hide-render")
-    assert changed(found, shown) < SAME, "hidden in renders, it is gone from the view"
+    (found,) = yield from view_pictures("ways-hide-render")
+    assert changed_fraction(found, shown) < MAX_REDRAW_FRACTION, (
+        "hidden in renders, it is gone from the view"
+    )
     hair().hide_render = head.hide_render = False
 
 
@@ -150,18 +152,18 @@ def hair_pixels(found, shown, without):
 
 def instances_are_told():
     """An instance of the groom's collection shows only the head, and the panel reports it."""
-    scene, note = bpy.context.scene, of_hairloom("diagnostics").instances_note
+    scene, note = bpy.context.scene, hairloom_module("diagnostics").instances_note
     twin = bpy.data.objects.new("Twin", None)
     twin.instance_type, twin.instance_collection = "COLLECTION", bpy.data.collections["Groom"]
     twin.location.x = 0.25
-    (before,) = yield from pictures("instance-before")
+    (before,) = yield from view_pictures("instance-before")
     assert note(hair()) == ""
     scene.collection.objects.link(twin)
-    (after,) = yield from pictures("instance")
-    assert changed(before, after) > HAIR, "Blender does not draw the instance"
+    (after,) = yield from view_pictures("instance")
+    assert changed_fraction(before, after) > MIN_HAIR_FRACTION, "Blender does not draw the instance"
     assert "not in the preview" in note(hair())
     bpy.data.objects.remove(twin)
     assert note(hair()) == ""
 
 
-driver.play(steps())
+driver.play_session(steps())

@@ -11,7 +11,7 @@ from typing import Any
 
 import bpy
 import gpu
-from driver import of_hairloom
+from driver import hairloom_module
 
 MENUS = (
     "TOPBAR_MT_file_import",
@@ -20,7 +20,7 @@ MENUS = (
     "VIEW3D_MT_object",
     "VIEW3D_MT_object_context_menu",
 )
-OWNERS = ("Curves", "Object", "Scene", "WindowManager", "Mesh", "Material")
+PROPERTY_OWNERS = ("Curves", "Object", "Scene", "WindowManager", "Mesh", "Material")
 
 
 def shortcuts() -> list[Any]:
@@ -43,7 +43,7 @@ class Log:
         assert stat.S_ISREG(os.fstat(1).st_mode), "send the output into a file"
         self._path, self._offset = Path("/proc/self/fd/1"), 0
 
-    def added(self) -> str:
+    def new_output(self) -> str:
         """The output since the last call."""
         sys.stdout.flush()
         sys.stderr.flush()
@@ -54,7 +54,7 @@ class Log:
         return new.decode(errors="replace")
 
 
-def of_blender() -> dict[str, Any]:
+def blender_traces() -> dict[str, Any]:
     """Everything of ours that is registered in Blender."""
     return {
         "handlers": {
@@ -64,7 +64,8 @@ def of_blender() -> dict[str, Any]:
         },
         "menus": {name: len(getattr(bpy.types, name).draw._draw_funcs) for name in MENUS},
         "properties": {
-            name: sorted(getattr(bpy.types, name).bl_rna.properties.keys()) for name in OWNERS
+            name: sorted(getattr(bpy.types, name).bl_rna.properties.keys())
+            for name in PROPERTY_OWNERS
         },
         "classes": [name for name in dir(bpy.types) if "hairloom" in name.lower()],
         "operators": dir(bpy.ops.hairloom),
@@ -73,26 +74,26 @@ def of_blender() -> dict[str, Any]:
     }
 
 
-def of_gpu() -> Counter[str]:
+def gpu_object_counts() -> Counter[str]:
     """The number of GPU objects of each kind that Python still references."""
     kinds = tuple(each for each in vars(gpu.types).values() if isinstance(each, type))
     gc.collect()
-    found, waiting = {}, list(gc.get_objects())
-    while waiting:
-        for each in gc.get_referents(waiting.pop()):
+    found, to_visit = {}, list(gc.get_objects())
+    while to_visit:
+        for each in gc.get_referents(to_visit.pop()):
             if isinstance(each, kinds):
                 found[id(each)] = type(each).__name__
             elif isinstance(each, tuple | dict) and not gc.is_tracked(each):
-                waiting.append(each)  # objects without references of their own
+                to_visit.append(each)  # objects without references of their own
     return Counter(found.values())
 
 
-def of_previews() -> dict[str, Any]:
+def preview_traces() -> dict[str, Any]:
     """The state that only a preview, Play or long work has; all empty when none is active."""
     return {
-        "previews": [each.name for each in of_hairloom("previews").simulations()],
-        "draw handlers": of_hairloom("overlay")._overlay.handles,
-        "drawn": sorted(of_hairloom("overlay").drawn()),
-        "ticks": of_hairloom("latest_job").is_watched("play"),
-        "work": of_hairloom("long_work").running(),
+        "previews": [each.name for each in hairloom_module("previews").simulations()],
+        "draw handlers": hairloom_module("overlay")._overlay.handles,
+        "drawn": sorted(hairloom_module("overlay").drawn()),
+        "ticks": hairloom_module("latest_job").is_watched("play"),
+        "work": hairloom_module("long_work").running(),
     }

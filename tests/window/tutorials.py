@@ -12,26 +12,26 @@ import bpy
 import driver
 import numpy as np
 import screen
-from artist import file_browser, hair_is_made, press, redrawn, region
-from driver import of_hairloom, until
-from reading import Box, box_of, read, seen, whole_window, width_of
+from artist import file_browser, press, redraw, region, wait_for_hair
+from driver import hairloom_module, wait_until
+from reading import Box, box_of, find_words, wait_for_words, whole_window, width_of
 
 PAGES = Path(__file__).resolve().parents[2] / "docs" / "tutorials"
 #: [pixels] around words in which an opening menu has changed the screen
-AROUND = 20
+CHANGED_MARGIN = 20
 #: [pixels] by which the Properties editor is widened
-WIDER = 160
+PROPERTIES_EXTRA_WIDTH = 160
 #: places of fields, and of a preset's picture, as fractions of a panel's width
-FIELD, PICTURE = 0.7, 0.15
+FIELD_X, PICTURE_X = 0.7, 0.15
 #: [pixels] from *Save* up to the middle of that picture
 ABOVE_SAVE = 20
 #: Blender's names of keys
 _DIGITS = ("ZERO", "ONE", "TWO", "THREE", "FOUR", "FIVE", "SIX", "SEVEN", "EIGHT", "NINE")
 KEYS = {str(number): name for number, name in enumerate(_DIGITS)} | {".": "PERIOD", "_": "MINUS"}
 #: [pixels] from the checkbox of a panel to its name
-CHECKBOX = 11
+CHECKBOX_OFFSET = 11
 #: [levels of 255] redraws of the same differ by less
-SAME = 8
+MAX_REDRAW_DIFFERENCE = 8
 
 
 class Page:
@@ -52,9 +52,11 @@ class Page:
         preferences.filebrowser_display_type = "SCREEN"  # all in one window
         preferences.render_display_type = "AREA"
         view = middle(box_of(region("WINDOW")))
-        yield from key("N", *view)
-        yield from until(lambda: region("UI").width > 1, "N does not open the sidebar")
-        yield from click(*(yield from read("Hairloom", box_of(region("UI")), is_turned=True)))
+        yield from press_key("N", *view)
+        yield from wait_until(lambda: region("UI").width > 1, "N does not open the sidebar")
+        yield from click(
+            *(yield from wait_for_words("Hairloom", box_of(region("UI")), is_turned=True))
+        )
         yield from widen_properties()
 
     def step(self, number: int) -> None:
@@ -64,63 +66,65 @@ class Page:
     def end(self) -> None:
         assert self._number == len(self.steps), f"step {self._number + 1} is left out"
 
-    def says(self, words: str) -> str:
+    def quote(self, words: str) -> str:
         step = self.steps[self._number - 1]
         assert words in step, f"step {self._number} does not say '{words}'"
         return words
 
-    def click(self, words: str, box: Box | None = None, **how: Any) -> Iterator[int]:
+    def click(self, words: str, box: Box | None = None, **options: Any) -> Iterator[int]:
         """Click words of this step where they are shown."""
-        yield from click(*(yield from read(self.says(words), box, **how)))
+        yield from click(*(yield from wait_for_words(self.quote(words), box, **options)))
 
     def menu(self, words: str, box: Box) -> Iterator[int]:
         """Choose a menu path of this step, with > between its words; the first is in `box`."""
-        first, *others = self.says(words).split(" > ")
+        first, *others = self.quote(words).split(" > ")
         before = screen.pixels()
-        yield from click(*(yield from read(first, box)))
-        yield from chosen(others, before)
+        yield from click(*(yield from wait_for_words(first, box)))
+        yield from choose_entries(others, before)
 
     def right_click(self, words: str, x: int, y: int) -> Iterator[int]:
         """Right-click at a place, and choose a menu path there."""
         before = screen.pixels()
         yield from click(x, y, "RIGHTMOUSE")
-        yield from chosen(self.says(words).split(" > "), before)
+        yield from choose_entries(self.quote(words).split(" > "), before)
 
-    def mode(self, name: str, now: str) -> Iterator[int]:
+    def mode(self, name: str, current: str) -> Iterator[int]:
         """Switch to a mode that this step names, by the menu that shows the current mode."""
         before = screen.pixels()
-        yield from click(*(yield from read(now, box_of(region("HEADER")))))
-        yield from chosen([self.says(name)], before)
+        yield from click(*(yield from wait_for_words(current, box_of(region("HEADER")))))
+        yield from choose_entries([self.quote(name)], before)
         yield
 
     def sample_scene(self) -> Iterator[int]:
         """Add the sample scene by its menu entry; Esc stops its motion."""
-        own = bpy.context.window.scene
+        scene_before = bpy.context.window.scene
         path = "Add > Curve > Hairloom Sample Scene"
         yield from self.menu(path, box_of(region("HEADER")))
-        yield from until(lambda: bpy.context.window.scene != own, "no sample scene comes")
-        yield from until(lambda: bpy.context.screen.is_animation_playing, "nothing plays")
-        yield from until(lambda: bpy.context.scene.frame_current > 1, "the playhead stands")
-        self.says("Press Esc")
-        yield from key("ESC", *in_view())
-        yield from until(lambda: not bpy.context.screen.is_animation_playing, "it plays on")
-        yield from still()
+        yield from wait_until(
+            lambda: bpy.context.window.scene != scene_before, "no sample scene comes"
+        )
+        yield from wait_until(lambda: bpy.context.screen.is_animation_playing, "nothing plays")
+        yield from wait_until(lambda: bpy.context.scene.frame_current > 1, "the playhead stands")
+        self.quote("Press Esc")
+        yield from press_key("ESC", *empty_place_in_view())
+        yield from wait_until(lambda: not bpy.context.screen.is_animation_playing, "it plays on")
+        yield from wait_until_idle()
 
     def press(self, button: str, area: Any, kind: str = "WINDOW") -> Iterator[int]:
         """Press a button, to which the area is scrolled."""
-        yield from click(*(yield from scrolled(self.says(button), area, kind)))
+        yield from click(*(yield from scroll_to(self.quote(button), area, kind)))
 
     def open(self, panel: str, area: Any, kind: str = "WINDOW") -> Iterator[int]:
         """Open a closed panel by a click on its name."""
-        yield from click(*(yield from scrolled(self.says(panel), area, kind)))
+        yield from click(*(yield from scroll_to(self.quote(panel), area, kind)))
         yield
 
     def enter(
         self, label: str, value: str, path: str, area: Any, kind: str = "WINDOW"
     ) -> Iterator[int]:
         """Enter a value in the field beside a label; path: the end of its property's data path."""
-        x, y = yield from beside(self.says(label), path, area, kind)
-        yield from entered(value, x, y)
+        x, y = yield from find_field_beside(self.quote(label), path, area, kind)
+        yield from enter_value(value, x, y)
         yield
 
     def choose(
@@ -129,14 +133,14 @@ class Page:
         """Choose an entry of the list beside a label, which the step need not name; path as in
         `enter`."""
         before = screen.pixels()
-        yield from click(*(yield from beside(label, path, area, kind)))
-        yield from chosen([self.says(entry)], before)
+        yield from click(*(yield from find_field_beside(label, path, area, kind)))
+        yield from choose_entries([self.quote(entry)], before)
         yield
 
     def tick(self, panel: str, area: Any) -> Iterator[int]:
         """Click the checkbox before a panel's name."""
-        x, y = yield from scrolled(self.says(panel), area)
-        yield from click(x - width_of(panel) // 2 - CHECKBOX, y)
+        x, y = yield from scroll_to(self.quote(panel), area)
+        yield from click(x - width_of(panel) // 2 - CHECKBOX_OFFSET, y)
         yield
 
     def render(self) -> Iterator[int]:
@@ -144,23 +148,23 @@ class Page:
         done: list[bool] = []
         handlers = bpy.app.handlers.render_complete
         handlers.append(lambda *_: done.append(True))
-        self.says("F12")
-        yield from key("F12", *in_view())
-        yield from until(lambda: done, "nothing is rendered")
+        self.quote("F12")
+        yield from press_key("F12", *empty_place_in_view())
+        yield from wait_until(lambda: done, "nothing is rendered")
         handlers.pop()
         yield
 
     def picture(self, panel: str, entry: str, area: Any, kind: str = "WINDOW") -> Iterator[int]:
         """Choose a preset's picture in the popup that opens from a panel's picture, left of
         *Save*."""
-        self.says("picture")
-        yield from scrolled(self.says(panel), area, kind)
-        part = part_of(area, kind)
-        while not (save := below(panel, "Save", box_of(part))):
-            assert (yield from turned("WHEELDOWNMOUSE", part)), f"{panel} has no picture"
+        self.quote("picture")
+        yield from scroll_to(self.quote(panel), area, kind)
+        part = region_of(area, kind)
+        while not (save := heights_below(panel, "Save", box_of(part))):
+            assert (yield from turn_wheel("WHEELDOWNMOUSE", part)), f"{panel} has no picture"
         before = screen.pixels()
-        yield from click(part.x + int(PICTURE * part.width), max(save) + ABOVE_SAVE)
-        yield from chosen([self.says(entry)], before)
+        yield from click(part.x + int(PICTURE_X * part.width), max(save) + ABOVE_SAVE)
+        yield from choose_entries([self.quote(entry)], before)
         yield
 
 
@@ -176,11 +180,11 @@ def move(x: int, y: int, count: int = 2) -> Iterator[int]:
         yield 1
 
 
-def click(x: int, y: int, button: str = "LEFTMOUSE", **held: bool) -> Iterator[int]:
+def click(x: int, y: int, button: str = "LEFTMOUSE", **modifiers: bool) -> Iterator[int]:
     """Click a mouse button at a place."""
     yield from move(x, y)
     for value in ("PRESS", "RELEASE"):
-        bpy.context.window.event_simulate(button, value, x=x, y=y, **held)
+        bpy.context.window.event_simulate(button, value, x=x, y=y, **modifiers)
         yield 1
     yield 1
 
@@ -199,48 +203,52 @@ def drag(start: tuple[int, int], end: tuple[int, int], count: int = 8) -> Iterat
     yield 1
 
 
-def still() -> Iterator[int]:
+def wait_until_idle() -> Iterator[int]:
     """Wait until no long work runs and the hair is made."""
-    yield from until(lambda: not of_hairloom("long_work").running(), "the work does not end")
-    yield from hair_is_made()
+    yield from wait_until(
+        lambda: not hairloom_module("long_work").running(), "the work does not end"
+    )
+    yield from wait_for_hair()
     yield
 
 
-def key(name: str, x: int, y: int, **held: bool) -> Iterator[int]:
+def press_key(name: str, x: int, y: int, **modifiers: bool) -> Iterator[int]:
     """Press a key while the mouse is at a place."""
     yield from move(x, y)
     for value in ("PRESS", "RELEASE"):
-        bpy.context.window.event_simulate(name, value, x=x, y=y, **held)
+        bpy.context.window.event_simulate(name, value, x=x, y=y, **modifiers)
         yield 1
 
 
-def come_up(words: str, before: np.ndarray, box: Box | None = None) -> Iterator[int]:
+def wait_for_new_words(words: str, before: np.ndarray, box: Box | None = None) -> Iterator[int]:
     """Wait for words that were not shown before, as in an opening menu; returns their place."""
     found: list[tuple[int, int]] = []
 
-    def is_there() -> bool:
+    def has_come_up() -> bool:
         now, height = screen.pixels(), len(before)
-        differs = np.abs(now.astype(int) - before).max(axis=2) > SAME
-        for _, x, y in seen(words, box or whole_window()):
+        differs = np.abs(now.astype(int) - before).max(axis=2) > MAX_REDRAW_DIFFERENCE
+        for _, x, y in find_words(words, box or whole_window()):
             row = height - y
-            around = differs[max(row - 4, 0) : row + 4, max(x - AROUND, 0) : x + AROUND]
+            around = differs[
+                max(row - 4, 0) : row + 4, max(x - CHANGED_MARGIN, 0) : x + CHANGED_MARGIN
+            ]
             if around.mean() > 0.3:
                 found.append((x, y))
         return bool(found)
 
-    yield from until(is_there, f"'{words}' does not come up")
+    yield from wait_until(has_come_up, f"'{words}' does not come up")
     return found[0]
 
 
-def chosen(entries: list[str], before: np.ndarray) -> Iterator[int]:
+def choose_entries(entries: list[str], before: np.ndarray) -> Iterator[int]:
     """Choose entries of nested menus; before: the screen without menus."""
     for each in entries:
-        x, y = yield from come_up(each, before)
+        x, y = yield from wait_for_new_words(each, before)
         before = screen.pixels()
         yield from click(x, y)
 
 
-def typed(text: str, x: int, y: int) -> Iterator[int]:
+def type_text(text: str, x: int, y: int) -> Iterator[int]:
     """Type letters and digits."""
     for letter in text:
         window, name = bpy.context.window, KEYS.get(letter, letter.upper())
@@ -250,32 +258,32 @@ def typed(text: str, x: int, y: int) -> Iterator[int]:
         yield 1
 
 
-def entered(text: str, x: int, y: int) -> Iterator[int]:
+def enter_value(text: str, x: int, y: int) -> Iterator[int]:
     """Type a value into the field at a place; the click selects the old value."""
     yield from click(x, y)
-    yield from typed(text, x, y)
-    yield from key("RET", x, y)
+    yield from type_text(text, x, y)
+    yield from press_key("RET", x, y)
 
 
-def scrolled(words: str, area: Any, kind: str = "WINDOW") -> Iterator[int]:
+def scroll_to(words: str, area: Any, kind: str = "WINDOW") -> Iterator[int]:
     """Scroll an area, first down and then up, until words are shown; returns their place."""
-    part = part_of(area, kind)
+    part = region_of(area, kind)
     for wheel in (None, "WHEELDOWNMOUSE", "WHEELUPMOUSE"):
         for _ in range(1 if wheel is None else 100):
-            if found := seen(words, box_of(part)):
+            if found := find_words(words, box_of(part)):
                 return found[0][1:]
-            if wheel is not None and not (yield from turned(wheel, part)):
+            if wheel is not None and not (yield from turn_wheel(wheel, part)):
                 break
     raise AssertionError(f"'{words}' is nowhere in the {area.type} editor")
 
 
-def below(words: str, others: str, box: Box) -> list[int]:
-    """Heights of `others` in a part of the window, below `words`."""
-    heights = [y for _, _, y in seen(words, box)]
-    return [y for _, _, y in seen(others, box) if heights and y < max(heights)]
+def heights_below(words: str, searched: str, box: Box) -> list[int]:
+    """Heights of `searched` in a part of the window, below `words`."""
+    heights = [y for _, _, y in find_words(words, box)]
+    return [y for _, _, y in find_words(searched, box) if heights and y < max(heights)]
 
 
-def turned(wheel: str, part: Any) -> Iterator[int]:
+def turn_wheel(wheel: str, part: Any) -> Iterator[int]:
     """Turn the mouse wheel over a region; returns whether it has scrolled. This is not judged by
     its picture, which changes while hair plays."""
     before, (x, y) = part.view2d.region_to_view(0, 0), middle(box_of(part))
@@ -287,13 +295,13 @@ def turned(wheel: str, part: Any) -> Iterator[int]:
     return part.view2d.region_to_view(0, 0) != before
 
 
-def beside(label: str, path: str, area: Any, kind: str = "WINDOW") -> Iterator[int]:
+def find_field_beside(label: str, path: str, area: Any, kind: str = "WINDOW") -> Iterator[int]:
     """The place of the property's field that has this label."""
-    part = part_of(area, kind)
-    x = part.x + int(FIELD * part.width)
+    part = region_of(area, kind)
+    x = part.x + int(FIELD_X * part.width)
 
     def heights() -> list[int]:
-        return sorted((y for _, _, y in seen(label, box_of(part))), reverse=True)
+        return sorted((y for _, _, y in find_words(label, box_of(part))), reverse=True)
 
     tried = set()
     for wheel in (None, "WHEELDOWNMOUSE", "WHEELUPMOUSE"):
@@ -305,27 +313,27 @@ def beside(label: str, path: str, area: Any, kind: str = "WINDOW") -> Iterator[i
                 tried.add(found[1] if found else None)
                 if found is not None and found[1].endswith(path):
                     return x, y
-            if wheel is not None and not (yield from turned(wheel, part)):
+            if wheel is not None and not (yield from turn_wheel(wheel, part)):
                 break
     raise AssertionError(f"'{label}' stands beside {tried}, not {path}")
 
 
-def part_of(area: Any, kind: str) -> Any:
+def region_of(area: Any, kind: str) -> Any:
     return next(each for each in area.regions if each.type == kind)
 
 
-def in_view() -> tuple[int, int]:
+def empty_place_in_view() -> tuple[int, int]:
     """A place in the viewport without hair."""
     view = region("WINDOW")
     return view.x + view.width // 4, view.y + view.height // 6
 
 
-def below_name(words: str, area: Any) -> Iterator[int]:
+def find_button_below_name(words: str, area: Any) -> Iterator[int]:
     """The place of a button with the same name as its panel, next below the panel's name; the area
     is scrolled down to it."""
-    part = part_of(area, "WINDOW")
-    while len(places := seen(words, box_of(part))) < 2:
-        assert (yield from turned("WHEELDOWNMOUSE", part)), f"there is no button '{words}'"
+    part = region_of(area, "WINDOW")
+    while len(places := find_words(words, box_of(part))) < 2:
+        assert (yield from turn_wheel("WHEELDOWNMOUSE", part)), f"there is no button '{words}'"
     return sorted(((x, y) for _, x, y in places), key=lambda place: -place[1])[1]
 
 
@@ -339,11 +347,11 @@ def properties() -> Any:
 
 def save_the_file() -> Iterator[int]:
     """Save the file at the place and with the name that Blender proposes."""
-    yield from key("S", *in_view(), ctrl=True)
-    yield from until(lambda: file_browser() is not None, "no file browser opens")
-    yield from redrawn(file_browser())
-    yield from key("RET", *middle(box_of(file_browser())))
-    yield from until(lambda: file_browser() is None, "the file browser stays")
+    yield from press_key("S", *empty_place_in_view(), ctrl=True)
+    yield from wait_until(lambda: file_browser() is not None, "no file browser opens")
+    yield from redraw(file_browser())
+    yield from press_key("RET", *middle(box_of(file_browser())))
+    yield from wait_until(lambda: file_browser() is None, "the file browser stays")
     yield
     assert bpy.data.filepath, "the file is not saved"
 
@@ -352,7 +360,7 @@ def widen_properties() -> Iterator[int]:
     """Drag its edge into the viewport, so that no label is cut off and hair is drawn faster."""
     area = properties()
     before, y = area.width, area.y + area.height // 2
-    yield from drag((area.x - 1, y), (area.x - 1 - WIDER, y))
+    yield from drag((area.x - 1, y), (area.x - 1 - PROPERTIES_EXTRA_WIDTH, y))
     yield
     assert properties().width > before, "the edge does not follow the mouse"
 
@@ -360,7 +368,7 @@ def widen_properties() -> Iterator[int]:
 def open_tab(name: str) -> Iterator[int]:
     """Open a tab of the Properties editor; tabs have no words, so all are tried from the top."""
     area = properties()
-    bar = part_of(area, "NAVIGATION_BAR")
+    bar = region_of(area, "NAVIGATION_BAR")
     for y in range(bar.y + bar.height - 10, bar.y, -12):
         yield from click(bar.x + bar.width // 2, y)
         if area.spaces.active.context == name:
@@ -369,10 +377,10 @@ def open_tab(name: str) -> Iterator[int]:
     raise AssertionError(f"there is no tab {name}")
 
 
-def named_file(name: str) -> Iterator[int]:
+def enter_file_name(name: str) -> Iterator[int]:
     """Enter a file's name in a file browser, in the folder that it shows, and confirm."""
     browser = file_browser()
-    part = part_of(browser, "EXECUTE")
-    yield from entered(name, part.x + part.width // 4, part.y + part.height // 2)
-    yield from key("RET", *middle(box_of(browser)))
-    yield from until(lambda: file_browser() is None, "the file browser stays")
+    part = region_of(browser, "EXECUTE")
+    yield from enter_value(name, part.x + part.width // 4, part.y + part.height // 2)
+    yield from press_key("RET", *middle(box_of(browser)))
+    yield from wait_until(lambda: file_browser() is None, "the file browser stays")

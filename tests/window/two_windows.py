@@ -3,12 +3,12 @@
 import bpy
 import driver
 import numpy as np
-from artist import changed, new_head, picture_of, side_by_side
-from driver import of_hairloom, until
+from artist import area_pixels, arrange_side_by_side, changed_fraction, new_head
+from driver import hairloom_module, wait_until
 from mathutils import Euler
 
 #: fractions of a view's pixels: that hair covers, and by which Blender's own redraws differ
-HAIR, SAME = 0.02, 0.002
+MIN_HAIR_FRACTION, MAX_REDRAW_FRACTION = 0.02, 0.002
 
 
 def set_the_scene():
@@ -25,13 +25,13 @@ def set_the_scene():
     hair().select_set(True)
     bpy.context.view_layer.objects.active = hair()
     bpy.ops.hairloom.preview()
-    yield from until(live().sessions, "there is no preview")
-    look()
+    yield from wait_until(previews().sessions, "there is no preview")
+    look_from_front_in_all()
     yield
 
 
-def live():
-    return of_hairloom("previews")
+def previews():
+    return hairloom_module("previews")
 
 
 def hair():
@@ -47,7 +47,7 @@ def view_of(window):
     return max(areas, key=lambda area: area.width * area.height)
 
 
-def look():
+def look_from_front_in_all():
     """Look from the front in every window, without overlays."""
     for window in windows():
         space = view_of(window).spaces.active
@@ -58,32 +58,35 @@ def look():
         view.view_distance = 0.45
 
 
-def pictures(label):
+def view_pictures(label):
     """The current 3D view of each window."""
     yield
-    shot = driver.screenshot(label)
-    return [picture_of(window, view_of(window), shot) for window in windows()]
+    screenshot = driver.screenshot(label)
+    return [area_pixels(window, view_of(window), screenshot) for window in windows()]
 
 
 def two_windows():
     bpy.ops.wm.window_new_main()  # other kinds share scene and view layer with the first window
     yield
     assert len(windows()) == 2
-    side_by_side()
+    arrange_side_by_side()
     yield
-    look()
-    yield from with_and_without("two-windows", [True, True])
+    look_from_front_in_all()
+    yield from assert_hair_drawn("two-windows", [True, True])
 
 
-def with_and_without(label, drawn):
+def assert_hair_drawn(label, drawn):
     """Assert in which windows hair is drawn: there, hiding it changes the picture."""
-    shown = yield from pictures(f"{label}-shown")
+    shown = yield from view_pictures(f"{label}-shown")
     hair().hide_viewport = True
-    hidden = yield from pictures(f"{label}-hidden")
+    hidden = yield from view_pictures(f"{label}-hidden")
     hair().hide_viewport = False
     yield
-    shares = [changed(one, other) for one, other in zip(shown, hidden, strict=True)]
-    print(f"{label}: {[round(share, 4) for share in shares]}", flush=True)
-    for share, is_drawn in zip(shares, drawn, strict=True):
-        assert share > HAIR if is_drawn else share < SAME, (label, shares)
-    assert len(live().sessions()) == 1, f"{label}: {live().notice()}"
+    fractions = [changed_fraction(one, other) for one, other in zip(shown, hidden, strict=True)]
+    print(f"{label}: {[round(fraction, 4) for fraction in fractions]}", flush=True)
+    for fraction, is_drawn in zip(fractions, drawn, strict=True):
+        assert fraction > MIN_HAIR_FRACTION if is_drawn else fraction < MAX_REDRAW_FRACTION, (
+            label,
+            fractions,
+        )
+    assert len(previews().sessions()) == 1, f"{label}: {previews().notice()}"
