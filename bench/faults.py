@@ -26,7 +26,7 @@ from extension_loader import REPOSITORY
 from waits import endless_waits
 
 from hairloom.addon.blender.base.gpu_context import can_draw
-from hairloom.addon.blender.strands.child_python import found_python, python_command
+from hairloom.addon.blender.strands.child_python import find_python, python_command
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.usd.groom_usd_read import read_usd
 from hairloom.addon.exchange.usd.usd_library import usd_library
@@ -92,7 +92,7 @@ def planted() -> dict[str, int]:
         sys.path.insert(0, "")
         os.environ["PYTHONPATH"] = os.environ["PYTHONUSERBASE"] = name
         try:
-            for begin in (found_python, can_draw):
+            for begin in (find_python, can_draw):
                 begin.cache_clear()
                 begin()
                 ran += (folder / "it_ran").exists()

@@ -38,7 +38,7 @@ def end(of: ExportCheck | None = None) -> None:
 
 def made() -> tuple[MadeRig, ...]:
     """Rigs that were made by the open dialog and by previews."""
-    return (*(() if _check is None else _check.made), *made_rigs().values())
+    return (*(() if _check is None else _check.made_rigs), *made_rigs().values())
 
 
 def count() -> int:
@@ -129,7 +129,7 @@ class HAIRLOOM_OT_check_export(LongWork, bpy.types.Operator):
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         own = ExportCheck.of(writable(chosen_hair(context)), made_rigs())
-        reading = own.reading(context.evaluated_depsgraph_get(), *_choice(self.engine))
+        reading = own.read_steps(context.evaluated_depsgraph_get(), *_choice(self.engine))
         yield from in_parts(reading)
         begin(own)
         if not bpy.app.background and self.options.is_invoke:

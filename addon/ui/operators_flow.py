@@ -9,10 +9,10 @@ from ..blender.base.outcome import report
 from ..blender.base.parts import batched
 from ..blender.properties.groups import operator_properties
 from ..blender.properties.properties import settings_of
-from ..blender.scene.drawn_lines import chosen_or_new_lines
-from ..blender.scene.kept_shape import BEFORE_FLOW
-from ..blender.scene.own_collections import put_into, take_out
-from ..blender.scene.strokes import KIND, SETTING, strokes_of
+from ..blender.scene.drawn_lines import selected_or_new_lines
+from ..blender.scene.hair_collections import add_to_collection, remove_from_collection
+from ..blender.scene.shape_backup import BEFORE_FLOW
+from ..blender.scene.strokes import COLLECTION_LABEL, COLLECTION_PROPERTY, strokes_of
 from ..blender.sessions.flow import comb_flow
 from ..groom.flow_settings import FlowSettings
 from .drawing import draw_button
@@ -38,8 +38,8 @@ class HAIRLOOM_OT_add_stroke(bpy.types.Operator):
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
         hair = chosen_hair(context)[0]
-        strokes = chosen_or_new_lines(hair, "Stroke", context)
-        put_into(hair, SETTING, KIND, strokes, context.scene)
+        strokes = selected_or_new_lines(hair, "Stroke", context)
+        add_to_collection(hair, COLLECTION_PROPERTY, COLLECTION_LABEL, strokes, context.scene)
         names = ", ".join(stroke.name for stroke in strokes)
         report(self, "INFO", f"{hair.name} can be combed along {names}")
         return {"FINISHED"}
@@ -65,7 +65,13 @@ class HAIRLOOM_OT_remove_stroke(bpy.types.Operator):
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        take_out(chosen_hair(context)[0], SETTING, KIND, self.stroke, context.scene)
+        remove_from_collection(
+            chosen_hair(context)[0],
+            COLLECTION_PROPERTY,
+            COLLECTION_LABEL,
+            self.stroke,
+            context.scene,
+        )
         return {"FINISHED"}
 
 
@@ -111,7 +117,7 @@ class HAIRLOOM_OT_revert_flow(RevertsShape, bpy.types.Operator):
 def draw_flow(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     """Draw the strokes of the hair, and the buttons to comb along them."""
     column = layout.column()
-    draw_objects(column, hair, SETTING)
+    draw_objects(column, hair, COLLECTION_PROPERTY)
     draw_button(column, "hairloom.add_stroke", icon="CURVE_PATH")
     if draw_progress(column, HAIRLOOM_OT_comb_flow):
         return

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..blender.strands.growing import grow_again, grow_on, has_grown, is_behind, losses
+from ..blender.strands.growing import grow_again, grow_on, has_grown, is_outdated, lost_by_growing
 from .drawing import draw_button, draw_section
 from .grow_options import GROW_PROPERTIES, draw_where_settings_are
 from .long_work import LongWork, Steps, draw_progress, in_parts
@@ -69,7 +69,7 @@ class HAIRLOOM_OT_grow_again(LongWork, bpy.types.Operator):
 def draw_grow(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     """Draw whether hair follows its settings, what growing again would lose, and the settings."""
     curves = hair.data
-    lost = losses(curves)
+    lost = lost_by_growing(curves)
     lines = layout.column(align=True)
     lines.label(text=_state(curves, lost), icon="UNLOCKED" if not lost else "LOCKED")
     lines.label(text=f"Growing again loses: {_listed(lost)}", icon="BLANK1")
@@ -90,7 +90,7 @@ def _state(curves: bpy.types.Curves, lost: tuple[str, ...]) -> str:
         return "Follows these settings"
     if not has_grown(curves):
         return "Not grown from these"
-    return "Older than these settings" if is_behind(curves) else "Changed since it grew"
+    return "Older than these settings" if is_outdated(curves) else "Changed since it grew"
 
 
 def _listed(lost: tuple[str, ...]) -> str:

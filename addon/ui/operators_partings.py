@@ -10,7 +10,7 @@ from ..blender.base.parts import batched
 from ..blender.properties.groups import operator_properties
 from ..blender.properties.properties import settings_of
 from ..blender.scene import partings
-from ..blender.scene.drawn_lines import chosen_or_new_lines
+from ..blender.scene.drawn_lines import selected_or_new_lines
 from ..blender.sessions.parting import comb_parting
 from ..groom.parting_settings import PartingSettings
 from .drawing import draw_button
@@ -35,7 +35,7 @@ class HAIRLOOM_OT_add_parting(bpy.types.Operator):
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
         hair = chosen_hair(context)[0]
-        lines = chosen_or_new_lines(hair, "Parting", context)
+        lines = selected_or_new_lines(hair, "Parting", context)
         partings.add_partings(hair, lines, context.scene)
         names = ", ".join(line.name for line in lines)
         report(self, "INFO", f"{hair.name} is parted along {names}")

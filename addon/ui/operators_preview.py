@@ -20,7 +20,7 @@ from ..blender.base.outcome import Outcome, report
 from ..blender.base.redraw import show_status
 from ..blender.base.suspension import is_suspended
 from ..blender.preview import fins, previews
-from ..blender.scene.source import mute_own_dynamics, own_dynamics
+from ..blender.scene.source import hair_dynamics_modifiers, mute_hair_dynamics
 from ..blender.sessions.fins import any_enabled
 from .long_work import running
 from .reports import reporting, tell, waiting
@@ -181,13 +181,13 @@ class HAIRLOOM_OT_mute_hair_dynamics(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         if not needs_hair(cls, context):
             return False
-        if any(own_dynamics(hair) for hair in chosen_hair(context)):
+        if any(hair_dynamics_modifiers(hair) for hair in chosen_hair(context)):
             return True
         cls.poll_message_set("No modifier with Hair Dynamics simulates the selected hair")
         return False
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        count = sum(mute_own_dynamics(hair) for hair in chosen_hair(context))
+        count = sum(mute_hair_dynamics(hair) for hair in chosen_hair(context))
         modifiers = "1 modifier" if count == 1 else f"{count} modifiers"
         report(self, "INFO", f"Muted {modifiers} of Hair Dynamics")
         return {"FINISHED"}

@@ -6,7 +6,7 @@ import bpy
 
 from ..blender.properties.groups import operator_properties
 from ..blender.properties.properties import settings_of
-from ..blender.scene.kept_shape import COMBED
+from ..blender.scene.shape_backup import BEFORE_SETTLE
 from ..blender.sessions.settling import settle_hair
 from ..dynamics.settle_settings import SettleSettings
 from .drawing import draw_button
@@ -47,7 +47,7 @@ class HAIRLOOM_OT_revert_settle(RevertsShape, bpy.types.Operator):
     bl_idname = "hairloom.revert_settle"
     bl_label = "Revert Settle"
     bl_options = {"REGISTER", "UNDO"}
-    shape = COMBED
+    shape = BEFORE_SETTLE
     idle = "The selected hair has not settled: press Settle first"
     before = "settled"
 

@@ -25,9 +25,9 @@ from ..blender.strands.import_groom import (
     FileStrands,
     StrandImport,
     add_to_scene,
-    read_ground,
+    apply_head_scale,
+    read_import_surface,
     read_in_thread,
-    settle_ground,
 )
 from .drawing import draw_idle
 from .long_work import LongWork, Steps, threaded
@@ -110,7 +110,9 @@ class HAIRLOOM_OT_import_strands(LongWork, ImportHelper, bpy.types.Operator):
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         """Import the files; if one cannot be used, the others are still imported."""
         head = active_mesh(context) if self.onto_mesh else None
-        ground = head and read_ground(head, context.evaluated_depsgraph_get(), self.head_scale)
+        ground = head and read_import_surface(
+            head, context.evaluated_depsgraph_get(), self.head_scale
+        )
         choices = StrandImport(
             up=None if self.up == "FILE" else self.up,
             scale=self.scale,
@@ -118,7 +120,7 @@ class HAIRLOOM_OT_import_strands(LongWork, ImportHelper, bpy.types.Operator):
         )
         found = yield from threaded(read_in_thread(self._paths(), ground, choices))
         if ground is not None and any(isinstance(each, FileStrands) for each in found):
-            settle_ground(ground)
+            apply_head_scale(ground)
             for note in ground.notes:
                 report(self, "WARNING", note)
         imported: list[bpy.types.Object] = []

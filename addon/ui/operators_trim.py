@@ -6,9 +6,15 @@ import bpy
 from bpy.props import StringProperty
 
 from ..blender.base.parts import batched
-from ..blender.scene.kept_shape import BEFORE_TRIM
-from ..blender.scene.own_collections import put_into, take_out
-from ..blender.scene.trim_shapes import KIND, SETTING, may_trim, read_shape, trim_shapes_of
+from ..blender.scene.hair_collections import add_to_collection, remove_from_collection
+from ..blender.scene.shape_backup import BEFORE_TRIM
+from ..blender.scene.trim_shapes import (
+    COLLECTION_LABEL,
+    COLLECTION_PROPERTY,
+    may_trim,
+    read_shape,
+    trim_shapes_of,
+)
 from ..blender.sessions.trimming import trim_to_shapes
 from .drawing import draw_button
 from .long_work import LongWork, Steps, draw_progress, in_parts
@@ -44,7 +50,9 @@ class HAIRLOOM_OT_trim_to_shape(LongWork, bpy.types.Operator):
             for obj in chosen:
                 read_shape(obj, depsgraph)
             if chosen:
-                put_into(hair, SETTING, KIND, chosen, context.scene)
+                add_to_collection(
+                    hair, COLLECTION_PROPERTY, COLLECTION_LABEL, chosen, context.scene
+                )
             if trim_shapes_of(hair):
                 grooms.append(hair)
         works = (trim_to_shapes(hair, depsgraph) for hair in once_each(grooms))
@@ -72,7 +80,13 @@ class HAIRLOOM_OT_remove_trim_shape(bpy.types.Operator):
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        take_out(chosen_hair(context)[0], SETTING, KIND, self.shape, context.scene)
+        remove_from_collection(
+            chosen_hair(context)[0],
+            COLLECTION_PROPERTY,
+            COLLECTION_LABEL,
+            self.shape,
+            context.scene,
+        )
         return {"FINISHED"}
 
 
@@ -97,7 +111,7 @@ def _chosen(hair: bpy.types.Object, context: bpy.types.Context) -> list[bpy.type
 def draw_trim(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     """Draw the trim shapes of the hair, and the buttons."""
     column = layout.column()
-    draw_objects(column, hair, SETTING)
+    draw_objects(column, hair, COLLECTION_PROPERTY)
     if draw_progress(column, HAIRLOOM_OT_trim_to_shape):
         return
     row = column.row(align=True)

@@ -7,7 +7,7 @@ from typing import Any
 import bpy
 
 from ..blender.base.outcome import report
-from ..blender.scene.kept_shape import KeptShape
+from ..blender.scene.shape_backup import ShapeBackup
 from .reports import reporting
 from .selection import chosen_hair, in_object_mode, needs_hair
 
@@ -19,7 +19,7 @@ class RevertsShape:
     before: what the tool had done to the hair, for the report "as it was before it ...".
     """
 
-    shape: KeptShape
+    shape: ShapeBackup
     idle: str
     before: str
 
@@ -27,19 +27,19 @@ class RevertsShape:
     def poll(cls: Any, context: bpy.types.Context) -> bool:
         if not (in_object_mode(cls, context) and needs_hair(cls, context)):
             return False
-        if any(map(cls.shape.is_there, chosen_hair(context))):
+        if any(map(cls.shape.exists, chosen_hair(context))):
             return True
         cls.poll_message_set(cls.idle)
         return False
 
     @reporting
     def execute(self: Any, context: bpy.types.Context) -> set[str]:
-        for hair in filter(self.shape.is_there, chosen_hair(context)):
-            if self.shape.back(hair):
+        for hair in filter(self.shape.exists, chosen_hair(context)):
+            if self.shape.restore(hair):
                 text = (
                     "changes that other tools and brushes have made to its shape since then are "
                     "lost, too"
                 )
                 report(self, "WARNING", f"{hair.name}: {text}. Undo brings it back")
-            report(self, "INFO", f"{hair.name} is as it was before it {self.before}")
+            report(self, "INFO", f"{hair.name} is as it was before it {self.read_if_unchanged}")
         return {"FINISHED"}

@@ -225,12 +225,12 @@ def _in_motion(path: Path, plan: StrandExport) -> Steps[Outcome]:
     total = plan.frame_count
     yield Progress(f"0 of {total:,} frames", 0.0)
     with closing(plan.positions()) as positions:
-        work = plan.writing(path, positions)
+        work = plan.write_in_thread(path, positions)
         try:
             while not work.run_main_thread_steps():
                 yield Progress(
-                    f"{plan.done:,} of {total:,} frames",
-                    plan.done / total,
+                    f"{plan.frames_read:,} of {total:,} frames",
+                    plan.frames_read / total,
                     is_idle=not work.wants_main_thread,
                     is_committed=work.is_committed,
                 )

@@ -17,7 +17,7 @@ from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.preview.bake import Bake
 from hairloom.addon.blender.scene.curves import read_curves
-from hairloom.addon.blender.strands.import_groom import import_strands, read_ground
+from hairloom.addon.blender.strands.import_groom import import_strands, read_import_surface
 from hairloom.addon.exchange.alembic.groom_alembic import write_groom_alembic
 from hairloom.addon.exchange.groom import Groom, GroomMotion
 from hairloom.addon.strands.strand_set import StrandSet
@@ -159,7 +159,7 @@ def test_a_groom_that_moves_in_a_file_comes_with_all_its_frames(
     write_groom_alembic(path, first, motion=GroomMotion(shown, rate))
     bpy.context.scene.frame_set(1)
     (hair,), outcome = import_strands(
-        path, read_ground(moving.data.surface, get_depsgraph()), bpy.context.collection
+        path, read_import_surface(moving.data.surface, get_depsgraph()), bpy.context.collection
     )
     assert "moving in 8 frames" in outcome.result and hair.hairloom.dynamics.animated_style
     hair.hairloom.dynamics.device = moving.hairloom.dynamics.device

@@ -9,7 +9,7 @@ import pytest
 from hairloom.addon.blender.scene.built_in_head import built_in_head
 from hairloom.addon.blender.scene.bust import bust_object
 from hairloom.addon.blender.scene.bust_data import EYES, HAIR_GROUPS, SKIN, load_bust
-from hairloom.addon.blender.scene.bust_skin import RESOLUTION, TONES, painted
+from hairloom.addon.blender.scene.bust_skin import RESOLUTION, TONES, skin_picture
 from hairloom.addon.blender.scene.mesh_materials import material_notes, material_of
 from hairloom.addon.groom.face_hair import FaceHair, grow_brows, grow_lashes, grow_with_face
 from hairloom.addon.groom.scalp import find_cranium
@@ -69,7 +69,7 @@ def test_weights_fall_off_smoothly_and_lie_where_hair_grows() -> None:
     "tone", ["light", *(pytest.param(tone, marks=pytest.mark.slow) for tone in ("medium", "dark"))]
 )
 def test_skin_is_redder_where_blood_is_and_never_bright_as_paper(tone: str) -> None:
-    picture = painted(tone)
+    picture = skin_picture(tone)
     assert picture.shape == (RESOLUTION, RESOLUTION, 4) and (picture[..., 3] == 1.0).all()
     assert picture[..., :3].min() >= 0.0 and picture[..., :3].max() < 0.9
     head, bust = built_in_head(), load_bust()

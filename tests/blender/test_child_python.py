@@ -20,9 +20,9 @@ SCRIPT = "import os, sys, numpy\nopen(sys.argv[-1], 'w').write(numpy.__file__)\n
 @pytest.fixture
 def afresh():
     """`python_command` without its cache, which otherwise lasts for a session."""
-    child_python.found_python.cache_clear()
+    child_python.find_python.cache_clear()
     yield child_python.python_command
-    child_python.found_python.cache_clear()
+    child_python.find_python.cache_clear()
 
 
 def numpy_of(command, folder):

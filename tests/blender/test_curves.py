@@ -12,10 +12,10 @@ from node_modifiers import add_nodes_modifier
 from hairloom.addon.blender.base.attributes import set_attribute
 from hairloom.addon.blender.scene.curves import (
     read_curves,
-    read_own_curves,
-    unfit_curves,
+    read_original_curves,
+    unusable_curves,
     write_curves,
-    write_own_curves,
+    write_original_curves,
 )
 from hairloom.addon.blender.scene.curves_motion import store_motion
 from hairloom.addon.errors import HairloomError
@@ -307,7 +307,7 @@ def smoothed(strand):
 def test_curves_that_are_no_hair_are_named(get_depsgraph):
     closed = typed("BEZIER", cyclic=np.array([True, False]), **HANDLES)
     assert read_curves(closed, get_depsgraph()).dropped == {"no end (Toggle Cyclic opens them)": 1}
-    own = read_own_curves(closed, get_depsgraph())
+    own = read_original_curves(closed, get_depsgraph())
     assert own.kept.tolist() == [1] and own.strands.point_count == 6
 
 
@@ -318,10 +318,10 @@ def test_custom_knots_are_named(extension):
     curves.set_types(type="NURBS")
     knots = curves.attributes.new("knots_mode", "INT8", "CURVE")
     knots.data.foreach_set("value", [4, 0])
-    ((reason, which),) = unfit_curves(curves).items()
+    ((reason, which),) = unusable_curves(curves).items()
     assert reason.startswith("knots of their own") and which.tolist() == [True, False]
     curves.set_types(type="POLY")
-    assert unfit_curves(curves) == {}
+    assert unusable_curves(curves) == {}
 
 
 def test_curves_of_several_types_keep_their_order_and_points(get_depsgraph):
@@ -338,7 +338,7 @@ def test_handles_go_with_the_points_that_are_combed(get_depsgraph):
     """Combing, settling and trimming move points; handles follow, so curves keep their shape."""
     obj = typed("BEZIER", **HANDLES)
     before = read_curves(obj, get_depsgraph()).strands.points.copy()
-    own = read_own_curves(obj, get_depsgraph())
-    write_own_curves(obj, own, own.strands.points + np.float32([0, 0.2, 0]), get_depsgraph())
+    own = read_original_curves(obj, get_depsgraph())
+    write_original_curves(obj, own, own.strands.points + np.float32([0, 0.2, 0]), get_depsgraph())
     after = read_curves(obj, get_depsgraph()).strands.points
     np.testing.assert_allclose(after, before + [0, 0.2, 0], atol=1e-6)

@@ -21,9 +21,9 @@ from hairloom.addon.blender.command_line.command_line import run
 from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.properties.presets import named_preset
 from hairloom.addon.blender.scene import hair_nodes
-from hairloom.addon.blender.scene.carried_weight import carry_whole_weight
 from hairloom.addon.blender.scene.curves import curve_points, put_points, read_curves
-from hairloom.addon.blender.scene.kept_shape import COMBED
+from hairloom.addon.blender.scene.sag_correction import set_full_sag_correction
+from hairloom.addon.blender.scene.shape_backup import BEFORE_SETTLE
 from hairloom.addon.blender.scene.surfaces import read_surface
 from hairloom.addon.blender.setup import hairstyles
 from hairloom.addon.blender.setup.hairstyles import (
@@ -274,15 +274,15 @@ def test_hair_that_is_fitted_again_is_as_it_was_added(head: bpy.types.Object) ->
     hair.hairloom.dynamics.sag_compensation = 0.5
     head.matrix_world = Matrix.LocRotScale((0.3, 0.0, 0.1), Euler((0.0, 0.4, 0.0)), (2.0,) * 3)
     bpy.context.view_layer.update()
-    COMBED.keep(hair)
+    BEFORE_SETTLE.save(hair)
     put_points(hair.data, added_points * np.float32(1.05))
-    COMBED.seal(hair)
-    assert carry_whole_weight(hair.data) and COMBED.is_there(hair)
+    BEFORE_SETTLE.mark_result(hair)
+    assert set_full_sag_correction(hair.data) and BEFORE_SETTLE.exists(hair)
     bpy.context.view_layer.objects.active = hair
     assert bpy.ops.hairloom.fit_again() == {"FINISHED"}
     assert curve_points(hair.data) == pytest.approx(added_points, abs=1e-5)
     assert read_attribute(hair.data, "radius", "POINT") == pytest.approx(radius, rel=1e-3)
-    assert not COMBED.is_there(hair) and hair.hairloom.dynamics.sag_compensation == 0.5
+    assert not BEFORE_SETTLE.exists(hair) and hair.hairloom.dynamics.sag_compensation == 0.5
 
 
 def test_empty_masks_are_refused(head: bpy.types.Object) -> None:

@@ -240,7 +240,7 @@ def test_the_dialog_takes_strands_of_the_preview(
     previews.start(hair, get_depsgraph())
     made.clear()
     check = ExportCheck.of([hair], previews.made_rigs())
-    list(check.reading(get_depsgraph(), TRESSFX, StrandExportSettings()))
+    list(check.read_steps(get_depsgraph(), TRESSFX, StrandExportSettings()))
     check.refresh(get_depsgraph(), TRESSFX, StrandExportSettings())
     assert check.lines and not made
 

@@ -17,7 +17,7 @@ from hairloom.addon.blender.bakes.baked_rig import RestMatrices, baked_rig_of, r
 from hairloom.addon.blender.base.attributes import set_attribute
 from hairloom.addon.blender.colliders.rigs import MadeRig
 from hairloom.addon.blender.scene.curves import curve_points
-from hairloom.addon.blender.scene.masks import Canvas
+from hairloom.addon.blender.scene.masks import MaskReader
 from hairloom.addon.blender.scene.source import read_source
 from hairloom.addon.blender.sessions.groom_source import GroomSource
 from hairloom.addon.groom.masks import SELECTION
@@ -88,15 +88,15 @@ def test_it_moves_as_it_was_painted_on_the_curves(
     dynamics = hair.hairloom.dynamics
     dynamics.style_root_mask, dynamics.only_selected = "Stiff", True
     source = read_source(hair, get_depsgraph())
-    canvas = Canvas(hair, hair.parent, source.head, source.strands, source.kept)
-    was = {name: canvas.mask(name, get_depsgraph()).grid for name in ("Stiff", SELECTION)}
+    mask_reader = MaskReader(hair, hair.parent, source.head, source.strands, source.curve_indices)
+    was = {name: mask_reader.mask(name, get_depsgraph()).grid for name in ("Stiff", SELECTION)}
     real = made_real()
     assert not [each for each in GroomSource(real, get_depsgraph()).warnings if "Stiff" in each]
     made = read_source(real, get_depsgraph())
-    canvas = Canvas(real, real.parent, made.head, made.strands, made.kept)
+    mask_reader = MaskReader(real, real.parent, made.head, made.strands, made.curve_indices)
     roots = source.strands.roots
     for name, before in was.items():
-        now = canvas.mask(name, get_depsgraph()).grid
+        now = mask_reader.mask(name, get_depsgraph()).grid
         assert now[: len(roots)] == pytest.approx(before, abs=2e-3)
         assert now.min() >= 0.0 and now.max() <= before.max() + 1e-5
         # all guides of these children are on their side

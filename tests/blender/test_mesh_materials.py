@@ -12,8 +12,8 @@ import pytest
 from hairloom.addon.blender.scene import mesh_materials
 from hairloom.addon.blender.scene.mesh_materials import (
     MeshMaterial,
-    can_be_seen_through,
     material_of,
+    may_be_transparent,
 )
 from hairloom.addon.render.snapshot import MeshPictures
 from hairloom.addon.shading.lights import Light
@@ -341,9 +341,9 @@ def test_few_pictures_are_kept(material: bpy.types.Material) -> None:
     for number in range(40):
         texture.image = picture(f"Picture {number}", np.ones((2, 2, 4)))
         material_of(material)
-    assert len(mesh_materials._pictures) == mesh_materials._KEPT
-    mesh_materials.forget()
-    assert not mesh_materials._pictures
+    assert len(mesh_materials._picture_cache) == mesh_materials._CACHE_SIZE
+    mesh_materials.clear_cache()
+    assert not mesh_materials._picture_cache
 
 
 @pytest.mark.parametrize(
@@ -352,7 +352,7 @@ def test_few_pictures_are_kept(material: bpy.types.Material) -> None:
 def test_what_can_be_seen_through(material: bpy.types.Material, how: str) -> None:
     bpy.ops.mesh.primitive_plane_add()
     plane, node = bpy.context.object, material.node_tree.nodes["Principled BSDF"]
-    assert not can_be_seen_through(plane), "without a material it cannot"
+    assert not may_be_transparent(plane), "without a material it cannot"
     plane.data.materials.append(bpy.data.materials.new("Opaque"))
     plane.data.materials.append(material)
     if how == "object":
@@ -367,4 +367,4 @@ def test_what_can_be_seen_through(material: bpy.types.Material, how: str) -> Non
         give(material, None, "Alpha")
     elif how == "mixed":
         material.node_tree.nodes.new("ShaderNodeBsdfTransparent")
-    assert can_be_seen_through(plane) is (how != "nothing")
+    assert may_be_transparent(plane) is (how != "nothing")

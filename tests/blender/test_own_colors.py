@@ -15,7 +15,7 @@ bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy mod
 from hairloom.addon.blender.bakes.baked_rig import RestMatrices, baked_rig_of, rig_arrays  # noqa: E402
 from hairloom.addon.blender.cards.show import without_strands  # noqa: E402
 from hairloom.addon.blender.preview import previews, scene_events  # noqa: E402
-from hairloom.addon.blender.strands.read_hair import ExportRequest, still_hair  # noqa: E402
+from hairloom.addon.blender.strands.read_hair import ExportRequest, read_still_hair  # noqa: E402
 from hairloom.addon.blender.viewport import overlay  # noqa: E402
 from hairloom.addon.shading.settings import ShadingSettings  # noqa: E402
 from hairloom.addon.shading.wet_and_dusty import wet_and_dusty_color  # noqa: E402
@@ -124,14 +124,14 @@ def test_exports_have_the_colours_that_are_drawn(
 ) -> None:
     groom = hair.data.hairloom
     groom.shading.model, groom.shading.base_color = "kajiya_kay", (0.25, 0.5, 0.75)
-    own = still_hair(hair, get_depsgraph(), ExportRequest(guides=False)).groom.color
+    own = read_still_hair(hair, get_depsgraph(), ExportRequest(guides=False)).groom.color
     np.testing.assert_allclose(own, two_colored().color, atol=1e-6)
     groom.shading.color_source = "look"
     request = ExportRequest(guides=False)
     assert np.unique(
-        still_hair(hair, get_depsgraph(), request).groom.color, axis=0
+        read_still_hair(hair, get_depsgraph(), request).groom.color, axis=0
     ) == pytest.approx(np.array([[0.25, 0.5, 0.75]]))
-    assert still_hair(hair, get_depsgraph(), replace(request, color=False)).groom.color is None
+    assert read_still_hair(hair, get_depsgraph(), replace(request, color=False)).groom.color is None
 
 
 def test_strands_without_a_colour_are_exported_in_the_looks(
@@ -139,7 +139,7 @@ def test_strands_without_a_colour_are_exported_in_the_looks(
 ) -> None:
     hair = new_hair(sphere, two_colored((np.nan,) * 3))
     hair.data.hairloom.shading.base_color = (0.25, 0.5, 0.75)
-    out = still_hair(hair, get_depsgraph(), ExportRequest(guides=False, color=False))
+    out = read_still_hair(hair, get_depsgraph(), ExportRequest(guides=False, color=False))
     expected = two_colored((0.25, 0.5, 0.75)).color
     np.testing.assert_allclose(out.groom.color, expected, atol=1e-6)
     assert sum("have no usable colour" in note for note in out.notes) == 1
@@ -150,6 +150,6 @@ def test_children_are_exported_in_the_colours_of_their_guides(
 ) -> None:
     hair.data.hairloom.children.method = "single"
     hair.data.hairloom.children.strand_count = 100
-    color = still_hair(hair, get_depsgraph(), ExportRequest(guides=False)).groom.color
+    color = read_still_hair(hair, get_depsgraph(), ExportRequest(guides=False)).groom.color
     is_one = [np.isclose(color, one, atol=1e-5).all(axis=1) for one in (RED, BLUE)]
     assert (is_one[0] | is_one[1]).all() and is_one[0].any() and is_one[1].any()

@@ -15,8 +15,8 @@ from hairloom.addon.blender.engine.engine_hair import read_groom
 from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.properties.properties import colors_of_groom
 from hairloom.addon.blender.scene.curves import curve_points, put_points
-from hairloom.addon.blender.strands.growing import losses
-from hairloom.addon.blender.strands.read_hair import ExportRequest, still_hair
+from hairloom.addon.blender.strands.growing import lost_by_growing
+from hairloom.addon.blender.strands.read_hair import ExportRequest, read_still_hair
 from hairloom.addon.blender.viewport import overlay
 from hairloom.addon.exchange.hair_file import read_hair_file
 
@@ -273,7 +273,9 @@ def test_exports_have_what_is_painted(
     groom = hair.data.hairloom
     groom.children.method, groom.children.strand_count = children, 100
     for guides in (False, True):
-        found = still_hair(hair, get_depsgraph(), ExportRequest(guides=guides, color=False)).groom
+        found = read_still_hair(
+            hair, get_depsgraph(), ExportRequest(guides=guides, color=False)
+        ).groom
         starts = found.strands.offsets[:-1]
         assert_halves(found.color[starts], found.strands.points[starts])
 
@@ -340,7 +342,7 @@ def test_curves_that_are_replaced_have_what_is_painted_under_the_new_ones(
     node = next(each for each in nodes if each.type == "BSDF_HAIR_PRINCIPLED")
     if is_changed:
         node.inputs["Random Roughness"].default_value = 0.7
-    assert losses(hair.data) == ()
+    assert lost_by_growing(hair.data) == ()
 
     def assert_painted(count: int) -> None:
         values = np.empty((count, 4), np.float32)
@@ -460,7 +462,7 @@ def test_what_cannot_be_used_is_said_and_hair_keeps_its_colour(
     assert warning.endswith("Until then the look's colour is used")
     assert shown(session).color is None
     request = ExportRequest(guides=False, color=False)
-    assert still_hair(hair, get_depsgraph(), request).groom.color is None
+    assert read_still_hair(hair, get_depsgraph(), request).groom.color is None
 
 
 def test_hair_without_a_surface_says_so(new_hair: Any, get_depsgraph: Any) -> None:

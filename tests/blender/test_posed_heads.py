@@ -12,7 +12,7 @@ from hairloom.addon.blender.cards.build import read_inputs
 from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.preview.bake import Bake
 from hairloom.addon.blender.scene.curves import curve_points, fill_curves, read_curves
-from hairloom.addon.blender.scene.source import own_dynamics, read_source, shown_curves
+from hairloom.addon.blender.scene.source import hair_dynamics_modifiers, read_source, shown_curves
 from hairloom.addon.blender.sessions.groom_source import GroomSource
 from hairloom.addon.blender.strands.groom_motion import moving_hair
 from hairloom.addon.blender.strands.make_real import make_real
@@ -141,13 +141,15 @@ def test_muted_hair_dynamics_leave_hair_on_its_skin(hair, sphere):
     empty.data.surface_uv_map = sphere.data.uv_layers.active.name
     (modifier,) = empty.modifiers
     mode = hair_dynamics_mode(modifier)
-    assert not own_dynamics(empty), "as it is added it simulates nothing"
+    assert not hair_dynamics_modifiers(empty), "as it is added it simulates nothing"
     mode.value = "Physics (Experimental)"
     empty.update_tag()
-    assert own_dynamics(empty) == [modifier]
+    assert hair_dynamics_modifiers(empty) == [modifier]
     select(empty)
     assert bpy.ops.hairloom.mute_hair_dynamics() == {"FINISHED"}
-    assert not own_dynamics(empty) and modifier.show_viewport and mode.value == "Animation"
+    assert (
+        not hair_dynamics_modifiers(empty) and modifier.show_viewport and mode.value == "Animation"
+    )
     there, depsgraph = expected(hair), go_to(POSED)
     assert read_curves(empty, depsgraph).strands.points == pytest.approx(there, abs=1e-4)
     assert started(empty, POSED).source.strands.points == pytest.approx(there, abs=1e-4)

@@ -11,7 +11,7 @@ from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.scene.curves import curve_offsets, curve_points
 from hairloom.addon.blender.scene.hair_nodes import add_hair_nodes
-from hairloom.addon.blender.scene.kept_shape import BEFORE_TRIM, COMBED
+from hairloom.addon.blender.scene.shape_backup import BEFORE_SETTLE, BEFORE_TRIM
 from hairloom.addon.blender.sessions.settling import settle_hair
 from hairloom.addon.dynamics.settle_settings import SettleSettings
 from hairloom.addon.strands import StrandSet
@@ -155,7 +155,7 @@ def test_revert_settle_is_exact_and_settling_again_begins_there(new_hair, sphere
     assert bpy.ops.hairloom.revert_settle() == {"FINISHED"}
     assert (curve_points(hair.data) == combed).all()
     assert hair.hairloom.dynamics.sag_compensation == 0.5
-    assert not COMBED.is_there(hair)
+    assert not BEFORE_SETTLE.exists(hair)
     assert not bpy.ops.hairloom.revert_settle.poll()
 
 
@@ -220,7 +220,7 @@ def test_what_is_taken_back_takes_later_tools_along(order, new_hair, sphere):
     twin.select_set(False)
     getattr(bpy.ops.hairloom, first)()
     assert (curve_points(hair.data) == shapes[0]).all()
-    assert not COMBED.is_there(hair) and not BEFORE_TRIM.is_there(hair)
+    assert not BEFORE_SETTLE.exists(hair) and not BEFORE_TRIM.exists(hair)
     assert hair.hairloom.dynamics.sag_compensation == 0.5
     assert len([each for each in past_reports if "are lost, too" in each.text]) == 1
     hair.select_set(False)
@@ -228,7 +228,7 @@ def test_what_is_taken_back_takes_later_tools_along(order, new_hair, sphere):
     bpy.context.view_layer.objects.active = twin
     getattr(bpy.ops.hairloom, second)()
     assert (curve_points(twin.data) == shapes[1]).all()
-    assert COMBED.is_there(twin) is (second == "revert_trim")
+    assert BEFORE_SETTLE.exists(twin) is (second == "revert_trim")
     assert twin.hairloom.dynamics.sag_compensation == (0.5 if second == "revert_settle" else 1.0)
     assert len([each for each in past_reports if "are lost, too" in each.text]) == 1
 
@@ -280,7 +280,7 @@ def test_until_its_end_nothing_changes(new_hair, sphere, get_depsgraph):
     assert parts == sorted(parts)
     work.close()
     assert (curve_points(hair.data) == combed).all()
-    assert not COMBED.is_there(hair)
+    assert not BEFORE_SETTLE.exists(hair)
 
 
 def test_of_several_hairs_all_settle_or_none(new_hair, sphere):
@@ -293,7 +293,7 @@ def test_of_several_hairs_all_settle_or_none(new_hair, sphere):
         bpy.context.view_layer.objects.active = hair
     with pytest.raises(RuntimeError, match=r"roots lie .* m from the head"):
         bpy.ops.hairloom.settle(seconds=0.2)
-    assert (curve_points(first.data) == combed).all() and not COMBED.is_there(first)
+    assert (curve_points(first.data) == combed).all() and not BEFORE_SETTLE.exists(first)
 
 
 @pytest.mark.slow
@@ -357,4 +357,4 @@ def test_one_undo_takes_it_back(new_hair, sphere):
     bpy.ops.ed.undo()
     hair = bpy.data.objects[name]
     assert (curve_points(hair.data) == combed).all()
-    assert not COMBED.is_there(hair)
+    assert not BEFORE_SETTLE.exists(hair)

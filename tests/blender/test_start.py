@@ -11,7 +11,7 @@ from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.properties.presets import named_preset
 from hairloom.addon.blender.scene import particle_hair
 from hairloom.addon.blender.scene.curves import read_curves
-from hairloom.addon.blender.scene.source import own_dynamics
+from hairloom.addon.blender.scene.source import hair_dynamics_modifiers
 from hairloom.addon.blender.scene.surfaces import read_surface
 from hairloom.addon.blender.setup import starting
 from hairloom.addon.blender.viewport import overlay
@@ -185,7 +185,9 @@ def test_empty_hair_of_blenders_gets_hair_a_look_and_a_preview(sphere):
     assert bpy.ops.hairloom.use_groom() == {"FINISHED"}
     hair = bpy.data.objects[name]
     assert len(hair.data.curves) > 1000 and hair.data.surface == sphere
-    assert not own_dynamics(hair) and len(previews.sessions()) == 1, "it would move twice"
+    assert not hair_dynamics_modifiers(hair) and len(previews.sessions()) == 1, (
+        "it would move twice"
+    )
     blond = named_preset(chosen_presets(preferences(bpy.context))[0]).settings
     assert hair.data.hairloom.shading.base_color[:] == pytest.approx(blond.base_color)
     assert len(bpy.data.hair_curves) == 1, "the empty curves are left"

@@ -235,12 +235,12 @@ def test_a_cancelled_export_leaves_the_old_file(swinging: Any, tmp_path: Path) -
             [hair], depsgraph, kind, StrandExportSettings(), frames=range(1, LAST + 1)
         )
         positions = plan.positions()
-        work = plan.writing(path, positions)
-        wait_until(lambda w=work, p=plan: w.run_main_thread_steps() or p.done >= 3)
+        work = plan.write_in_thread(path, positions)
+        wait_until(lambda w=work, p=plan: w.run_main_thread_steps() or p.frames_read >= 3)
         work.give_up()
         positions.close()
         wait_until(work.run_main_thread_steps)
-        assert plan.done >= 3
+        assert plan.frames_read >= 3
         assert path.read_bytes() == b"old"
     assert {p.name for p in tmp_path.iterdir()} == {"bake", "hair.abc", "hair.usdc"}
 
@@ -256,7 +256,7 @@ def test_in_steps_the_same_file_is_written_as_at_once(swinging: Any, tmp_path: P
         if path.stem == "once":
             plan.write(path)
         else:
-            work = plan.writing(path, plan.positions())
+            work = plan.write_in_thread(path, plan.positions())
             wait_until(work.run_main_thread_steps)
             assert "frames 1 to 6" in work.result().result
     once, steps = (read_alembic_curves(tmp_path / name) for name in ("once.abc", "steps.abc"))

@@ -18,7 +18,7 @@ from tfxbone_reader import read_tfxbone
 from hairloom.addon.blender.base.outcome import Outcome
 from hairloom.addon.blender.scene.curves import write_curves
 from hairloom.addon.blender.scene.groom_attributes import store_groom
-from hairloom.addon.blender.strands.read_hair import ExportRequest, still_hair
+from hairloom.addon.blender.strands.read_hair import ExportRequest, read_still_hair
 from hairloom.addon.exchange.groom import Groom
 from hairloom.addon.exchange.hair_file import read_hair_file
 from hairloom.addon.exchange.tressfx import read_tfx
@@ -260,7 +260,7 @@ def test_what_is_written_comes_in_again(
 
     def groom_of(hair: bpy.types.Object) -> Groom:
         request = ExportRequest(guides=False)
-        return still_hair(hair, bpy.context.evaluated_depsgraph_get(), request).groom
+        return read_still_hair(hair, bpy.context.evaluated_depsgraph_get(), request).groom
 
     before = groom_of(hair)
     path = tmp_path / f"hair{suffix}"

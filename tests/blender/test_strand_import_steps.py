@@ -19,7 +19,7 @@ from waiting import wait_until
 
 from hairloom.addon.blender.base.outcome import collected_reports
 from hairloom.addon.blender.strands import import_groom
-from hairloom.addon.blender.strands.import_groom import import_strands, read_ground
+from hairloom.addon.blender.strands.import_groom import import_strands, read_import_surface
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.alembic.groom_alembic import write_groom_alembic
 from hairloom.addon.exchange.groom import Groom
@@ -120,7 +120,7 @@ def test_the_button_and_the_command_line_give_the_same(
     WRITERS[suffix](path, Groom(hedgehog()))
     with collected_reports() as reports:
         assert bpy.ops.hairloom.import_strands(filepath=str(path)) == {"FINISHED"}
-    ground = read_ground(sphere, bpy.context.evaluated_depsgraph_get())
+    ground = read_import_surface(sphere, bpy.context.evaluated_depsgraph_get())
     (other,), outcome = import_strands(path, ground, bpy.context.collection)
     button = bpy.context.view_layer.objects.active
     assert reports.messages == [outcome.result]

@@ -15,7 +15,7 @@ from overriding import library_overrides
 from hairloom.addon.blender.base.parts import Part, batched, run_parts
 from hairloom.addon.blender.colliders import ties
 from hairloom.addon.blender.scene.curves import curve_points, put_points
-from hairloom.addon.blender.scene.kept_shape import COMBED
+from hairloom.addon.blender.scene.shape_backup import BEFORE_SETTLE
 from hairloom.addon.ui import (
     operators_colliders,
     operators_export_check,
@@ -113,9 +113,9 @@ def trimmed(hair, tmp_path):
     """Hair that was trimmed and settled in another file, overridden with all its data."""
     with_plane(hair)
     bpy.ops.hairloom.trim_to_shape()
-    COMBED.keep(hair)
+    BEFORE_SETTLE.save(hair)
     put_points(hair.data, curve_points(hair.data) * np.float32(1.01))
-    COMBED.seal(hair)
+    BEFORE_SETTLE.mark_result(hair)
     return overridden_hair(tmp_path)
 
 

@@ -97,7 +97,7 @@ def undo():
     yield from wait_until(lambda: hair().data.hairloom.grow.length > 0.95 * LENGTH, "no undo")
     assert np.abs(points() - shape).max() > 0.01, "the hair is not undone"
     growing = hairloom_module("growing")
-    assert growing.losses(hair().data) == () and not growing.is_behind(hair().data)
+    assert growing.lost_by_growing(hair().data) == () and not growing.is_outdated(hair().data)
     yield
 
 
@@ -110,10 +110,12 @@ def combed_hair_stays():
     yield
     driver.screenshot("combed")
     assert np.array_equal(points(), shape), "what was combed is lost"
-    assert growing.losses(hair().data) == ("combed shape",)
+    assert growing.lost_by_growing(hair().data) == ("combed shape",)
     x, y = yield from find_field(viewport(), "UI", "grow.method")
     yield from click(x, y + ROW)  # Grow Again is above it
-    yield from wait_until(lambda: growing.losses(hair().data) == (), "Grow Again does nothing")
+    yield from wait_until(
+        lambda: growing.lost_by_growing(hair().data) == (), "Grow Again does nothing"
+    )
     yield
     driver.screenshot("grown-again")
 

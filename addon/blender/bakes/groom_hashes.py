@@ -238,7 +238,7 @@ def frame_rate(scene: bpy.types.Scene) -> float:
 def _paint(
     hair: bpy.types.Object, head: bpy.types.Object | None, *names: str
 ) -> tuple[Floats | str, ...]:
-    """The values of masks, see `masks.Canvas`; only the name of one that modifiers make."""
+    """The values of masks, see `masks.MaskReader`; only the name of one that modifiers make."""
 
     def values(name: str) -> Floats | str:
         if head is not None and head.type == "MESH" and name in weight_names(head):

@@ -60,7 +60,7 @@ from ..base.thread_work import ThreadWork
 from ..colliders.rigs import MadeRig
 from ..scene.bone_weights import head_bone_of
 from ..scene.built_in_head import HeadLook
-from ..scene.head_look import look_below
+from ..scene.head_look import look_of_head
 from .build import (
     CardInputs,
     CardMaps,
@@ -536,7 +536,7 @@ class CardExport:
         rig, stale = (None, ()) if motion is None else (motion.rig, motion.notes)
         inputs, notes, dropped = read_inputs(hair, depsgraph, rig, known=known)
         bone = head_bone_of(hair, depsgraph, inputs.rig.strands)
-        output = replace(output, head_bone=bone, head_look=look_below(hair, inputs.rig.head))
+        output = replace(output, head_bone=bone, head_look=look_of_head(hair, inputs.rig.head))
         if levels is not None:
             cards = replace(inputs.settings[CardSettings], levels=levels)
             inputs = replace(inputs, settings=inputs.settings.with_settings(cards))

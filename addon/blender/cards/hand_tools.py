@@ -18,7 +18,7 @@ from ...errors import HairloomError
 from ...strands.affine import moved
 from ..base.objects import check_shape_editable, head_of, matrix_of
 from ..properties.groom_settings import GroomSettings
-from ..scene.drawn_lines import lines_of
+from ..scene.drawn_lines import joined_lines
 from ..scene.surfaces import OCCLUSION_LAYER, read_surface
 from .edits import MADE_ATTRIBUTE, TILE_LAYER, read_record
 from .made_objects import card_objects
@@ -116,7 +116,7 @@ def add_along_curves(
     surface = None
     if head is not None:
         surface = read_surface(head, depsgraph, need_uv=False, place=head.name)
-    lines = [line for curve in curves for line in lines_of(curve, depsgraph)]
+    lines = [line for curve in curves for line in joined_lines(curve, depsgraph)]
     edited = bmesh.new()
     try:
         edited.from_mesh(obj.data)

@@ -16,7 +16,7 @@ from ...exchange.textures.srgb import srgb_encoded
 from ...strands import Surface
 from ..base.images import webp_of
 from ..scene.built_in_head import HeadLook
-from ..scene.head_look import PLAIN
+from ..scene.head_look import PLAIN_SKIN
 from ..scene.mesh_materials import MeshMaterial
 
 #: longest side [pixels] and file quality of pictures
@@ -44,7 +44,7 @@ class PageHead:
         path: of the mesh of cards; temporary pictures are written in its folder.
         look: None: plain skin.
         """
-        chosen = look or ((np.arange(len(head.triangles)), PLAIN),)
+        chosen = look or ((np.arange(len(head.triangles)), PLAIN_SKIN),)
         order = np.concatenate([triangles for triangles, _ in chosen])
         is_painted = any(_color_of(material) is not None for _, material in chosen)
         has_uv = head.corner_uv is not None and is_painted

@@ -30,7 +30,7 @@ from ..base.objects import (
     matrix_of,
 )
 from ..base.vertex_weights import read_weights
-from ..scene.own_collections import objects_in, put_into, take_out
+from ..scene.hair_collections import add_to_collection, objects_in, remove_from_collection
 from ..scene.source import shown_curves
 from ..scene.surfaces import read_positions, read_surface
 from .carriers import is_deforming, is_left_out
@@ -254,7 +254,7 @@ def new_ring(hair: bpy.types.Object, context: bpy.types.Context) -> bpy.types.Ob
 
 def add_ties(hair: bpy.types.Object, rings: list[bpy.types.Object], scene: bpy.types.Scene) -> None:
     """Put rings into the hair's collection of ties, which is made if there is none."""
-    put_into(hair, "tie_collection", "Ties", rings, scene)
+    add_to_collection(hair, "tie_collection", "Ties", rings, scene)
 
 
 def remove_tie(hair: bpy.types.Object, name: str, scene: bpy.types.Scene) -> None:
@@ -263,7 +263,7 @@ def remove_tie(hair: bpy.types.Object, name: str, scene: bpy.types.Scene) -> Non
     Raises:
         HairloomError: it is not directly in that collection.
     """
-    take_out(hair, "tie_collection", "Ties", name, scene)
+    remove_from_collection(hair, "tie_collection", "Ties", name, scene)
 
 
 def count_held_curves(

@@ -25,7 +25,7 @@ from ..base.objects import head_of
 from ..scene.source import check_density
 from ..scene.surfaces import read_surface
 from ..strands.groom_motion import BakedMotion
-from ..strands.read_hair import hair_of_rig
+from ..strands.read_hair import export_strands_of_rig
 from ..strands.strand_export import StrandExport, request_of
 from .idle_options import is_of_scene
 from .inputs import Inputs
@@ -115,7 +115,7 @@ def _of_objects(
             _check_baked(plan)
         for folder in filter(None, map(folder_of, hair if plan.moving else ())):
             job.report.add_input(folder)  # also an empty one, as a later bake may fill it
-        plan = plan.standing() if still else plan
+        plan = plan.as_still() if still else plan
     report_dropped_strands(job, plan.dropped, ", ".join(each.name for each in hair))
     return plan
 
@@ -148,7 +148,7 @@ def _of_rig(
             )
         rig, inputs = read_rig(job)
         own = _groom(rig, inputs)
-        groom = hair_of_rig(rig, own, needs, look, job_colors(job, rig)).groom
+        groom = export_strands_of_rig(rig, own, needs, look, job_colors(job, rig)).groom
         return StrandExport(groom, settings, kind, inputs.dropped)
     at = frames if job.options.frame is None else range(job.options.frame, job.options.frame + 1)
     motion = motion_of(job, at)
@@ -162,7 +162,7 @@ def _of_rig(
         _, points = motion.strands(motion.frames[0])
         groom = replace(groom, strands=rig.strands.with_points(points.reshape(-1, 3)))
     colors = job_colors(job, rig)
-    moving = BakedMotion(hair_of_rig(rig, groom, needs, look, colors), motion.cache)
+    moving = BakedMotion(export_strands_of_rig(rig, groom, needs, look, colors), motion.cache)
     plan = StrandExport(moving.out.groom, settings, kind, frames=frames)
     if frames is not None:
         plan.moving, plan.rate = (moving,), moving.rate
@@ -190,7 +190,7 @@ def _counted(job: Job, plan: StrandExport) -> Iterator[Floats]:
     progress = job.report.progress("writing frames", plan.frame_count)
     for points in plan.positions():
         yield points
-        progress.show(plan.done + 1)
+        progress.show(plan.frames_read + 1)
 
 
 def _tell_check(facts: dict[str, Any], form: str) -> None:

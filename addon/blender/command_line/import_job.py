@@ -12,7 +12,13 @@ from ...errors import HairloomError
 from ...exchange.strand_formats import SUFFIXES
 from ..base.outcome import dropped_phrase
 from ..scene.mesh_files import import_mesh_file, scale_object
-from ..strands.import_groom import GUIDES, Ground, StrandImport, import_strands, read_ground
+from ..strands.import_groom import (
+    GUIDE_TREATMENTS,
+    ImportSurface,
+    StrandImport,
+    import_strands,
+    read_import_surface,
+)
 from .job_options import add_head_scale_option
 from .job_steps import Job, report_notes
 from .object_settings import named_objects, put_settings
@@ -48,7 +54,7 @@ def import_grooms(job: Job) -> None:
     report.facts.update(head=ground and ground.head.name, objects=objects)
 
 
-def _ground(head: str | None, scale: float) -> tuple[Ground | None, tuple[str, ...]]:
+def _ground(head: str | None, scale: float) -> tuple[ImportSurface | None, tuple[str, ...]]:
     """The mesh of the scene, or of a file, that hair is bound to, and notes on it."""
     notes: tuple[str, ...] = ()
     if head is None:
@@ -64,7 +70,7 @@ def _ground(head: str | None, scale: float) -> tuple[Ground | None, tuple[str, .
         scale = 1.0
     if scale != 1.0:
         scale_object(mesh, scale)
-    return read_ground(mesh, bpy.context.evaluated_depsgraph_get()), notes
+    return read_import_surface(mesh, bpy.context.evaluated_depsgraph_get()), notes
 
 
 def _add_options(parser: argparse.ArgumentParser) -> None:
@@ -94,8 +100,8 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     )
     what.add_argument(
         "--guides",
-        choices=GUIDES,
-        default=GUIDES[0],
+        choices=GUIDE_TREATMENTS,
+        default=GUIDE_TREATMENTS[0],
         help="how to import guides: leave them out, apart as a separate hair object, or among the "
         "strands (default: leave)",
     )

@@ -33,7 +33,7 @@ from ..colliders.ties import TrackedHolders
 from ..pictures.studio import Studio
 from ..properties.groom_settings import GroomSettings
 from ..scene.curves import read_curves
-from ..scene.masks import Canvas
+from ..scene.masks import MaskReader
 from ..scene.painted_colors import painted_colors
 from ..scene.source import Source
 from ..sessions.prepared_groom import prepare_groom
@@ -150,9 +150,9 @@ def read_job_masks(
     hair = job.hair
     kept = np.zeros(0, np.int32) if hair is None else read_curves(hair, depsgraph).kept
     head = bpy.data.objects.get(inputs.head_object or "")
-    canvas = Canvas(hair, head, inputs.head, inputs.strands, kept)
-    found = {of: canvas.mask(name, depsgraph) for of, name in names.items()}
-    report_notes(list(canvas.masks(settings, depsgraph)[1]), job.report)
+    mask_reader = MaskReader(hair, head, inputs.head, inputs.strands, kept)
+    found = {of: mask_reader.mask(name, depsgraph) for of, name in names.items()}
+    report_notes(list(mask_reader.masks(settings, depsgraph)[1]), job.report)
     return found
 
 

@@ -17,7 +17,7 @@ from ..cards.edits import read_edits
 from ..cards.textures import chosen_pictures
 from ..preview import previews
 from ..properties.groom_settings import GroomSettings
-from ..scene.head_look import look_below
+from ..scene.head_look import look_of_head
 from ..sessions.groom_source import GroomSource
 from ..sessions.prepared_groom import PreparedGroom, prepare_groom, requested_rig
 from ..sessions.session import Session
@@ -72,4 +72,4 @@ def file_name(name: str) -> str:
 def _studio(hair: bpy.types.Object, groom: PreparedGroom, settings: GroomSettings) -> Studio:
     pictures, _ = chosen_pictures(hair.data.hairloom.card_images)
     edits, _ = read_edits(hair, bpy.context.evaluated_depsgraph_get())
-    return Studio(groom, settings, pictures, look_below(hair, groom.rig.head), edits)
+    return Studio(groom, settings, pictures, look_of_head(hair, groom.rig.head), edits)

@@ -11,8 +11,8 @@ import numpy as np
 from ...errors import HairloomError
 from ..bakes.baked_copy import is_copy_gone
 from ..base.objects import head_of, objects_in
-from ..scene.curves import attach, read_curves
-from ..scene.source import dynamics_warnings, own_dynamics
+from ..scene.curves import attach_to_surface, read_curves
+from ..scene.source import dynamics_warnings, hair_dynamics_modifiers
 from ..scene.surfaces import read_positions
 from ..sessions.session import Session
 from . import previews
@@ -49,7 +49,7 @@ def issues_of(hair: bpy.types.Object, session: Session | None) -> tuple[Issue, .
     head = head_of(hair)
     known = "" if session is None else session.source.head_warning
     found = []
-    if own_dynamics(hair):
+    if hair_dynamics_modifiers(hair):
         found.append(
             Issue(
                 "Blender's Hair Dynamics moves this hair as well",
@@ -154,5 +154,5 @@ def surface_for(
 def set_surface(hair: bpy.types.Object, mesh: bpy.types.Object) -> None:
     """Attach hair to a mesh as Blender's own tools do; the hair stays where it is."""
     place = hair.matrix_world.copy()
-    attach(hair, mesh)
+    attach_to_surface(hair, mesh)
     hair.matrix_world = place

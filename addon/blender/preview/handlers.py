@@ -24,7 +24,7 @@ from .previews import previews
 @persistent
 def on_load_pre(*_: Any) -> None:
     registry.forget_all()
-    mesh_materials.forget()
+    mesh_materials.clear_cache()
     unwatch_all()  # Blender drops the timer itself
     show_status(None)  # Play's ticks, which would have removed it, are unwatched too
 

@@ -62,7 +62,7 @@ def has_bones(hair: bpy.types.Object) -> bool:
     return skin is not None and bool(_bone_names(skin))
 
 
-def unmoved_by(hair: bpy.types.Object) -> list[str]:
+def unmoved_head_notes(hair: bpy.types.Object) -> list[str]:
     """A note if the head has an armature but no bone of it moves the head; else empty."""
     skin = head_of(hair)
     armature = None if skin is None else skin.find_armature()

@@ -14,7 +14,7 @@ from ...strands import Surface
 from ..base.vertex_weights import read_weights
 from .bust import bust_object
 from .bust_data import EYES, HAIR_GROUPS, SKIN
-from .bust_skin import EYE_IOR, EYE_ROUGHNESS, SKIN_IOR, SKIN_ROUGHNESS, TONES, painted
+from .bust_skin import EYE_IOR, EYE_ROUGHNESS, SKIN_IOR, SKIN_ROUGHNESS, TONES, skin_picture
 from .mesh_materials import MeshMaterial
 from .surfaces import read_material_slots, read_surface
 
@@ -36,7 +36,7 @@ class BuiltInHead:
 
     def look(self, tone: str) -> HeadLook:
         """Its materials, for a tone of bust_skin.TONES."""
-        pictures = MeshPictures(color=painted(tone))
+        pictures = MeshPictures(color=skin_picture(tone))
         parts = ((SKIN, SKIN_IOR, SKIN_ROUGHNESS), (EYES, EYE_IOR, EYE_ROUGHNESS))
         return tuple(
             (

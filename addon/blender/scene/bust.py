@@ -18,11 +18,11 @@ from .bust_skin import (
     SKIN_IOR,
     SKIN_ROUGHNESS,
     TONES,
-    painted,
+    skin_picture,
 )
 
 #: fraction of light that scatters below the skin, and how far [m], in Cycles and EEVEE
-_SCATTERED, _DEPTH = 0.15, 0.004
+_SUBSURFACE_WEIGHT, _SUBSURFACE_SCALE = 0.15, 0.004
 
 
 def bust_object(name: str, tone: str | None) -> bpy.types.Object:
@@ -43,7 +43,7 @@ def bust_object(name: str, tone: str | None) -> bpy.types.Object:
     if tone is not None:
         picture = _picture(tone)
         for kind in (
-            _material("Hairloom Skin", picture, tone, SKIN_ROUGHNESS, SKIN_IOR, _SCATTERED),
+            _material("Hairloom Skin", picture, tone, SKIN_ROUGHNESS, SKIN_IOR, _SUBSURFACE_WEIGHT),
             _material("Hairloom Eyes", picture, tone, EYE_ROUGHNESS, EYE_IOR, 0.0),
         ):
             mesh.materials.append(kind)
@@ -61,22 +61,27 @@ def _mesh(name: str, bust: Bust) -> bpy.types.Mesh:
 
 
 @lru_cache(maxsize=1)
-def encoded_skin(tone: str) -> Floats:
+def encoded_skin_picture(tone: str) -> Floats:
     """The picture of the skin, sRGB encoded; made from arrays alone, which takes some seconds."""
-    picture = painted(tone).copy()
+    picture = skin_picture(tone).copy()
     picture[..., :3] = srgb_encoded(picture[..., :3])
     return picture
 
 
 def _picture(tone: str) -> bpy.types.Image:
     image = bpy.data.images.new(f"Hairloom Skin {tone}", RESOLUTION, RESOLUTION)
-    image.pixels.foreach_set(encoded_skin(tone).ravel())
+    image.pixels.foreach_set(encoded_skin_picture(tone).ravel())
     image.pack()
     return image
 
 
 def _material(
-    name: str, image: bpy.types.Image, tone: str, roughness: float, ior: float, scattered: float
+    name: str,
+    image: bpy.types.Image,
+    tone: str,
+    roughness: float,
+    ior: float,
+    subsurface_weight: float,
 ) -> bpy.types.Material:
     material = bpy.data.materials.new(name)
     tree = material.node_tree
@@ -87,9 +92,9 @@ def _material(
     values = {
         "Roughness": roughness,
         "IOR": ior,
-        "Subsurface Weight": scattered,
+        "Subsurface Weight": subsurface_weight,
         "Subsurface Radius": (1.0, 0.36, 0.2),
-        "Subsurface Scale": _DEPTH,
+        "Subsurface Scale": _SUBSURFACE_SCALE,
     }
     for socket, value in values.items():
         shader.inputs[socket].default_value = value

@@ -14,7 +14,7 @@ from .bust_data import EYES, load_bust
 type Color = tuple[float, float, float]
 
 #: texels along each side of the picture, and the width of the rim around each island in texels
-RESOLUTION, _RIM = 1024, 4
+RESOLUTION, _ISLAND_MARGIN = 1024, 4
 #: roughness and IOR of the Principled BSDF
 SKIN_ROUGHNESS, EYE_ROUGHNESS = 0.45, 0.12
 SKIN_IOR, EYE_IOR = 1.4, 1.376
@@ -48,7 +48,7 @@ _FOLD: Color = (0.36, 0.17, 0.14)
 _BETWEEN_HAIRS: Color = (0.72, 0.68, 0.66)
 _BELOW_EYES: Color = (0.90, 0.83, 0.85)
 #: where more blood shows: place, on the left side or in the middle [m], reach [m], strength
-_FLUSHED = (
+_FLUSH_SPOTS = (
     ((0.041, -0.073, -0.040), 0.024, 0.5),
     ((0.0, -0.108, -0.043), 0.013, 0.6),
     ((0.083, 0.015, -0.025), 0.030, 0.8),
@@ -64,7 +64,7 @@ _MOTTLE = ((0.016, 0.05), (0.005, 0.04), (0.0016, 0.05))
 
 
 @lru_cache(maxsize=1)
-def painted(tone: str) -> Floats:
+def skin_picture(tone: str) -> Floats:
     """The picture, (RESOLUTION, RESOLUTION, 4) scene-linear; row 0 is at v = 0.
 
     Args:
@@ -92,11 +92,11 @@ def painted(tone: str) -> Floats:
     color[~is_eye] = _skin(points[~is_eye], chosen, colors)
     color[is_eye] = _eyes(points[is_eye], colors)
     folds = 1.0 - np.clip(weights["cavity"], 0.0, 1.0)
-    color *= _mixed(np.ones(3), _FOLD, np.clip(1.4 * folds, 0.0, 1.0))
+    color *= _mix(np.ones(3), _FOLD, np.clip(1.4 * folds, 0.0, 1.0))
     picture = np.zeros((RESOLUTION, RESOLUTION, 4), np.float32)
     picture[row, column, :3], picture[row, column, 3] = color, 1.0
-    for _ in range(_RIM):
-        _widen(picture)
+    for _ in range(_ISLAND_MARGIN):
+        _dilate(picture)
     mean = color[~is_eye].mean(axis=0)
     picture[picture[..., 3] == 0.0] = (*mean, 1.0)
     picture.flags.writeable = False
@@ -107,17 +107,17 @@ def _skin(points: Floats, weights: dict[str, Floats], colors: Tone) -> Floats:
     across = np.abs(points) * (1, 0, 0) + points * (0, 1, 1)
     color = np.broadcast_to(colors.skin, points.shape).copy()
     flush = np.zeros((len(points), 1))
-    for middle, reach, strength in _FLUSHED:
+    for middle, reach, strength in _FLUSH_SPOTS:
         away = np.linalg.norm(across - middle, axis=1, keepdims=True) / reach
         flush += strength * np.exp(-(away**2))
-    color *= _mixed(np.ones(3), colors.flush, np.minimum(flush, 1.0))
+    color *= _mix(np.ones(3), colors.flush, np.minimum(flush, 1.0))
     below = (across[:, [0, 2]] - _SHADE) / _SHADE_REACH
     is_front = points[:, 1] < -0.05
     shade = np.exp(-(below**2).sum(axis=1)) * is_front
-    color *= _mixed(np.ones(3), _BELOW_EYES, shade[:, None])
+    color *= _mix(np.ones(3), _BELOW_EYES, shade[:, None])
     for place in ("scalp", "brows"):
-        color *= _mixed(np.ones(3), _BETWEEN_HAIRS, weights[place])
-    color = _mixed(color, colors.lips, 0.85 * weights["lips"])
+        color *= _mix(np.ones(3), _BETWEEN_HAIRS, weights[place])
+    color = _mix(color, colors.lips, 0.85 * weights["lips"])
     for size, strength in _MOTTLE:
         light = strength * _noise(points, size)[:, None]
         # blotches are redder, not only darker
@@ -134,19 +134,19 @@ def _eyes(points: Floats, colors: Tone) -> Floats:
     fibre = sum(np.sin(count * turn + 2.0 * count) for count in (9, 17, 26, 41, 58))[:, None] / 5.0
     inward = (_IRIS_RIM - angle) / (_IRIS_RIM - _PUPIL_RIM)
     iris = np.array(colors.iris) * (0.75 + 0.9 * np.clip(inward, 0.0, 1.0) + 0.45 * fibre)
-    iris = _mixed(iris, np.array(colors.iris) * 0.25, _step((angle - _IRIS_RIM + 5.0) / 5.0))
-    redder = _step((side[:, None] - 0.008) / 0.007)
-    white = _mixed(np.array(_SCLERA), np.array(_SCLERA) * (0.95, 0.78, 0.76), redder)
-    color = _mixed(iris, white, _step((angle - _IRIS_RIM + 1.2) / 3.0))
-    return _mixed(np.array(_PUPIL), color, _step((angle - _PUPIL_RIM + 0.8) / 1.6))
+    iris = _mix(iris, np.array(colors.iris) * 0.25, _smoothstep((angle - _IRIS_RIM + 5.0) / 5.0))
+    redder = _smoothstep((side[:, None] - 0.008) / 0.007)
+    white = _mix(np.array(_SCLERA), np.array(_SCLERA) * (0.95, 0.78, 0.76), redder)
+    color = _mix(iris, white, _smoothstep((angle - _IRIS_RIM + 1.2) / 3.0))
+    return _mix(np.array(_PUPIL), color, _smoothstep((angle - _PUPIL_RIM + 0.8) / 1.6))
 
 
-def _mixed(one: Floats | Color, other: Floats | Color, fraction: Floats) -> Floats:
+def _mix(one: Floats | Color, other: Floats | Color, fraction: Floats) -> Floats:
     first, second = np.asarray(one), np.asarray(other)
     return first + (second - first) * fraction
 
 
-def _step(value: Floats) -> Floats:
+def _smoothstep(value: Floats) -> Floats:
     x = np.clip(value, 0.0, 1.0)
     return x * x * (3.0 - 2.0 * x)
 
@@ -160,7 +160,7 @@ def _noise(points: Floats, size: float) -> Floats:
     lattice = np.random.default_rng(7).uniform(-1.0, 1.0, 32**3).astype(np.float32)
     place = (points / size + 64.0).astype(np.float32)
     cell = place.astype(np.int32)
-    x, y, z = _step(place - cell).T
+    x, y, z = _smoothstep(place - cell).T
     at = [((cell + corner) & 31) @ np.array([1, 32, 1024]) for corner in np.ndindex(2, 2, 2)]
     values = [lattice[each] for each in at]
     along_z = [low + (high - low) * z for low, high in zip(values[::2], values[1::2], strict=True)]
@@ -169,7 +169,7 @@ def _noise(points: Floats, size: float) -> Floats:
     return noise
 
 
-def _widen(picture: Floats) -> None:
+def _dilate(picture: Floats) -> None:
     """Paint the texels next to painted ones with the mean of their painted neighbours."""
     is_painted = picture[..., 3] > 0.0
     total = np.zeros_like(picture)

@@ -61,7 +61,7 @@ def read_curves(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Cleane
     return _read(curves, np.array(evaluated.matrix_world), drawn=curves_as_drawn(curves))
 
 
-def read_own_curves(
+def read_original_curves(
     obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, points: Floats | None = None
 ) -> Cleaned:
     """The hair before all modifiers, as brushes comb it: the control points of curves of any type.
@@ -98,7 +98,7 @@ def _read(
     radius = read_attribute(curves, "radius", "POINT")
     color, offsets = _colors(curves), curve_offsets(curves)
     group = next(
-        filter(_is_there, (read_attribute(curves, n, "CURVE") for n in GROUP_ATTRIBUTES)), None
+        filter(_is_not_none, (read_attribute(curves, n, "CURVE") for n in GROUP_ATTRIBUTES)), None
     )
     if points is None:
         points = curve_points(curves) if drawn is None else drawn.points
@@ -114,7 +114,7 @@ def _read(
         root_uv=read_attribute(curves, "surface_uv_coordinate", "CURVE", 2),
         color=color,
         seed=_seeds(curves),
-        unfit=unfit_curves(curves),
+        unfit=unusable_curves(curves),
     )
 
 
@@ -148,7 +148,7 @@ def curves_as_drawn(curves: bpy.types.Curves) -> DrawnCurves | None:
     return drawn_curves(points, offsets, shapes)
 
 
-def unfit_curves(curves: bpy.types.Curves) -> dict[str, Bools]:
+def unusable_curves(curves: bpy.types.Curves) -> dict[str, Bools]:
     """Curves that are not hair, or cannot be read: reason -> mask (curve_count,)."""
     found = {}
     cyclic = read_attribute(curves, "cyclic", "CURVE")
@@ -162,10 +162,10 @@ def unfit_curves(curves: bpy.types.Curves) -> dict[str, Bools]:
     return found
 
 
-def write_own_curves(
+def write_original_curves(
     obj: bpy.types.Object, own: Cleaned, points: Floats, depsgraph: bpy.types.Depsgraph
 ) -> None:
-    """Move the curves that `read_own_curves` returned; those that it dropped stay.
+    """Move the curves that `read_original_curves` returned; those that it dropped stay.
 
     Args:
         points: (point_count, 3) [m] world space, of the strands of `own`.
@@ -211,7 +211,7 @@ def write_curves(
     surface: bpy.types.Object | None,
     collection: bpy.types.Collection,
     *,
-    are_found: bool = False,
+    are_widths_estimated: bool = False,
 ) -> bpy.types.Object:
     """A new hair curves object that holds these strands, attached to a surface if there is one.
 
@@ -219,16 +219,16 @@ def write_curves(
         strands: world space, which is also object space: the object is at the origin. Strands
             without widths get estimated ones.
         collection: where it goes; the scene's is used if this is linked or overridden.
-        are_found: whether the widths are estimates already; see `groom.widths.with_widths`.
+        are_widths_estimated: whether they are estimates already; see `groom.widths.with_widths`.
     """
     curves = bpy.data.hair_curves.new(name)
     fill_curves(curves, strands)
-    if are_found:
+    if are_widths_estimated:
         curves.hairloom.widths.method = "found"
     obj = bpy.data.objects.new(name, curves)
     link_into(obj, [collection], bpy.context.scene)
     if surface is not None:
-        attach(obj, surface)
+        attach_to_surface(obj, surface)
     return obj
 
 
@@ -259,7 +259,7 @@ def set_colors(curves: bpy.types.Curves, strands: StrandSet) -> None:
         set_attribute(curves, COLOR_ATTRIBUTE, "POINT", opaque)
 
 
-def attach(obj: bpy.types.Object, surface: bpy.types.Object) -> None:
+def attach_to_surface(obj: bpy.types.Object, surface: bpy.types.Object) -> None:
     """Set what Blender's own hair tools and nodes expect of hair on a surface."""
     obj.data.surface = surface
     if surface.data.uv_layers.active is not None:
@@ -301,5 +301,5 @@ def curve_offsets(curves: bpy.types.Curves) -> Ints:
     return offsets
 
 
-def _is_there(values: Any) -> bool:
+def _is_not_none(values: Any) -> bool:
     return values is not None

@@ -29,13 +29,13 @@ def store_motion(hair: bpy.types.Object, first: int, positions: Floats) -> None:
     for frame, points in enumerate(positions, first):
         set_attribute(hair.data, f"{PREFIX}{frame}", "POINT", points)
     modifier = hair.modifiers.new(NAME, "NODES")
-    modifier.node_group = nodes = own_node_group(NAME, _MARK, _VERSION, _fill)
+    modifier.node_group = nodes = own_node_group(NAME, _MARK, _VERSION, _fill_node_tree)
     for socket, value in ((_FIRST, first), (_LAST, first + len(positions) - 1)):
         identifier = nodes.interface.items_tree[socket].identifier
         getattr(modifier.properties.inputs, identifier).value = value
 
 
-def _fill(tree: bpy.types.NodeTree) -> None:
+def _fill_node_tree(tree: bpy.types.NodeTree) -> None:
     """Nodes that interpolate linearly between frames, and hold the first and the last frame."""
     new_socket, new, link = tree.interface.new_socket, tree.nodes.new, tree.links.new
     for name in (_FIRST, _LAST):
@@ -44,7 +44,7 @@ def _fill(tree: bpy.types.NodeTree) -> None:
         new(kind) for kind in ("NodeGroupInput", "NodeGroupOutput", "GeometryNodeInputSceneTime")
     )
     clamped, part, mix = new("ShaderNodeClamp"), new("ShaderNodeMath"), new("ShaderNodeMix")
-    whole, following = _whole(tree, "FLOOR"), _whole(tree, "CEILING")
+    whole, following = _rounding_node(tree, "FLOOR"), _rounding_node(tree, "CEILING")
     place = new("GeometryNodeSetPosition")
     part.operation = "FRACT"
     link(time.outputs["Frame"], clamped.inputs["Value"])
@@ -53,7 +53,7 @@ def _fill(tree: bpy.types.NodeTree) -> None:
     for each in (part, whole, following):
         link(clamped.outputs[0], each.inputs[0])
     mix.data_type = "VECTOR"
-    near, far = _of_frame(tree, whole), _of_frame(tree, following)
+    near, far = _frame_attribute_node(tree, whole), _frame_attribute_node(tree, following)
     link(part.outputs[0], mix.inputs["Factor"])
     for value, socket in ((near, "A"), (far, "B")):
         own = next(each for each in mix.inputs if each.name == socket and each.type == "VECTOR")
@@ -69,7 +69,7 @@ def _fill(tree: bpy.types.NodeTree) -> None:
             node.location = 220.0 * across, -220.0 * down
 
 
-def _whole(tree: bpy.types.NodeTree, mode: str) -> bpy.types.Node:
+def _rounding_node(tree: bpy.types.NodeTree, mode: str) -> bpy.types.Node:
     """A node that rounds to an integer: as floats, frames between -1 and 0 would be rounded up to
     -0, and "-0" names no attribute."""
     node = tree.nodes.new("FunctionNodeFloatToInt")
@@ -77,7 +77,7 @@ def _whole(tree: bpy.types.NodeTree, mode: str) -> bpy.types.Node:
     return node
 
 
-def _of_frame(tree: bpy.types.NodeTree, frame: bpy.types.Node) -> bpy.types.Node:
+def _frame_attribute_node(tree: bpy.types.NodeTree, frame: bpy.types.Node) -> bpy.types.Node:
     """The node that reads the attribute of an integer frame."""
     new, link = tree.nodes.new, tree.links.new
     text, name, attribute = (

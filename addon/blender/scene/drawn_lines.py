@@ -16,13 +16,13 @@ from .surfaces import read_surface
 #: types of objects that can be a line
 LINE_TYPES = ("CURVE", "MESH")
 #: Greatest median distance of a line on the surface, as a fraction of the surface's diagonal.
-_ON = 0.1
+_MAX_DISTANCE = 0.1
 #: A new line: its points, and where it starts and ends, as fractions of the head's depth from the
 #: front.
 _POINTS, _FRONT, _BACK = 9, 0.12, 0.62
 
 
-def chosen_lines(context: bpy.types.Context) -> list[bpy.types.Object]:
+def selected_lines(context: bpy.types.Context) -> list[bpy.types.Object]:
     """The lines that are selected."""
     chosen = context.selected_objects
     return [obj for obj in chosen if obj.type == "CURVE" or is_wire(obj)]
@@ -68,7 +68,7 @@ def pieces_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
     return pieces
 
 
-def lines_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> list[Floats]:
+def joined_lines(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> list[Floats]:
     """The pieces joined to lines (m, 3), where one begins at the end of the one before.
 
     Raises:
@@ -94,11 +94,11 @@ def check_on_surface(
     """
     pieces, head = pieces_of(line, depsgraph), head_of(hair)
     if head is None:
-        raise _no_surface(hair)
+        raise _no_surface_error(hair)
     surface = read_surface(head, depsgraph, need_uv=False, place=head.name)
     away = search_of(surface).closest(pieces.reshape(-1, 3)).distance
     low, high = surface.bounds()
-    if float(np.median(away)) > _ON * float(np.linalg.norm(high - low)):
+    if float(np.median(away)) > _MAX_DISTANCE * float(np.linalg.norm(high - low)):
         raise HairloomError(
             f"it is {100.0 * float(np.median(away)):.1f} cm away from {head.name}",
             place=line.name,
@@ -106,7 +106,7 @@ def check_on_surface(
         )
 
 
-def _no_surface(hair: bpy.types.Object) -> HairloomError:
+def _no_surface_error(hair: bpy.types.Object) -> HairloomError:
     return HairloomError(
         "it has no surface to draw a line on",
         place=hair.name,
@@ -122,12 +122,12 @@ def new_line(hair: bpy.types.Object, name: str, context: bpy.types.Context) -> b
     """
     head = head_of(hair)
     if head is None:
-        raise _no_surface(hair)
+        raise _no_surface_error(hair)
     depsgraph = context.evaluated_depsgraph_get()
     evaluated = head.evaluated_get(depsgraph)
     low, high = np.array(evaluated.bound_box)[[0, 6]]
     # heads look along -Y, or along Z if the object's Y axis is up, as from other programs
-    has_y_up = _points_up(matrix_of(head, depsgraph)).argmax() == 1
+    has_y_up = _world_z_of_axes(matrix_of(head, depsgraph)).argmax() == 1
     depth, up, front, back = (2, 1, high, low) if has_y_up else (1, 2, low, high)
     points, above, down = [], 0.5 * (low + high), np.zeros(3)
     above[up], down[up] = 2.0 * high[up] - low[up], -1.0
@@ -157,13 +157,13 @@ def new_line(hair: bpy.types.Object, name: str, context: bpy.types.Context) -> b
     return line
 
 
-def _points_up(matrix: Floats) -> Floats:
+def _world_z_of_axes(matrix: Floats) -> Floats:
     """World Z of each unit axis of an object, (3,), -1 to 1."""
     up: Floats = matrix[2, :3] / np.maximum(np.linalg.norm(matrix[:3, :3], axis=0), 1e-30)
     return up
 
 
-def chosen_or_new_lines(
+def selected_or_new_lines(
     hair: bpy.types.Object, name: str, context: bpy.types.Context
 ) -> list[bpy.types.Object]:
     """The selected lines on the hair's surface; without any, a new line of this name.
@@ -172,7 +172,7 @@ def chosen_or_new_lines(
         HairloomError: the hair has no surface, or a curve is not on it.
     """
     depsgraph = context.evaluated_depsgraph_get()
-    lines = chosen_lines(context)
+    lines = selected_lines(context)
     for line in lines:
         check_on_surface(line, hair, depsgraph)
     return lines or [new_line(hair, name, context)]

@@ -49,7 +49,7 @@ def add_modifier(obj: bpy.types.Object) -> bpy.types.Modifier:
     modifier = fin_modifier(obj)
     if modifier is None:
         modifier = obj.modifiers.new(NAME, "NODES")
-        modifier.node_group = own_node_group(NAME, _MARK, _VERSION, _fill)
+        modifier.node_group = own_node_group(NAME, _MARK, _VERSION, _fill_node_tree)
         modifier.show_in_editmode = False
     return modifier
 
@@ -115,14 +115,14 @@ def read_carried(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Float
     if order.max() + 1 != count:
         raise HairloomError(
             f"a modifier above {NAME} makes {order.max() + 1:,} vertices of {count:,}"
-            f"{_suspects(obj, above=True)}",
+            f"{_suspect_modifiers(obj, above=True)}",
             place=obj.name,
             remedy=f"Move it below {NAME}, or apply it",
         )
     if not np.array_equal(order[:count], np.arange(count)):
         raise HairloomError(
             f"a modifier below {NAME} changes the order of the "
-            f"vertices{_suspects(obj, above=False)}",
+            f"vertices{_suspect_modifiers(obj, above=False)}",
             place=obj.name,
             remedy="Turn it off while simulating, or apply it",
         )
@@ -160,7 +160,7 @@ _GENERATE = frozenset(
 )
 
 
-def _suspects(obj: bpy.types.Object, *, above: bool) -> str:
+def _suspect_modifiers(obj: bpy.types.Object, *, above: bool) -> str:
     """The modifiers that may be the cause, for a message."""
     own = fin_modifier(obj)
     place = len(obj.modifiers) if own is None else list(obj.modifiers).index(own)
@@ -169,7 +169,7 @@ def _suspects(obj: bpy.types.Object, *, above: bool) -> str:
     return f" ({', '.join(names)})" if names else ""
 
 
-def _fill(tree: bpy.types.NodeTree) -> None:
+def _fill_node_tree(tree: bpy.types.NodeTree) -> None:
     names = (
         "NodeGroupInput",
         "GeometryNodeStoreNamedAttribute",

@@ -42,7 +42,7 @@ _SHAPES = {"POINT": "point", "LINE": "line", "PLANE": "plane", "POINTS": "points
 #: Most vertices of a mesh with the shape Every Point.
 MAX_POINTS = 64
 #: Strengths are clamped to this, as numbers could overflow; hair cannot follow a thousandth of it.
-_STRONGEST = 1.0e6
+_MAX_STRENGTH = 1.0e6
 
 
 def gravity_of(scene: bpy.types.Scene) -> Floats:
@@ -71,12 +71,12 @@ def force_fields_of(
             continue
         if names is not None and obj.name_full not in names:
             continue
-        reason = _unusable(obj, field)
+        reason = _exclusion_reason(obj, field)
         if reason:
             notes.append(f"{obj.name}: its force field does not act on hair: {reason}")
         elif field.apply_to_location:
             found += _read(obj, field, depsgraph.scene.frame_current)
-            if abs(field.strength) > _STRONGEST:
+            if abs(field.strength) > _MAX_STRENGTH:
                 notes.append(f"{obj.name}: it is too strong for hair to follow. Lower Strength.")
     if not found:
         return NO_FIELDS, tuple(notes)
@@ -84,7 +84,7 @@ def force_fields_of(
     return ForceFields(tuple(found), permutation() if is_turbulent else None), tuple(notes)
 
 
-def _unusable(obj: bpy.types.Object, field: bpy.types.FieldSettings) -> str:
+def _exclusion_reason(obj: bpy.types.Object, field: bpy.types.FieldSettings) -> str:
     """Why a field does not act on hair; empty if it does."""
     if field.type in _EXCLUDED:
         return _EXCLUDED[field.type]
@@ -110,11 +110,11 @@ def _read(obj: bpy.types.Object, field: bpy.types.FieldSettings, frame: int) -> 
         kind=_KINDS[field.type],
         center=triple(matrix[:3, 3]),
         axis=triple(_unit(matrix[:3, 2])),
-        strength=_limited(field.strength + _noise_of(field, frame)),
+        strength=_clamped(field.strength + _noise_of(field, frame)),
         shape=_SHAPES[field.shape],
-        damping=_limited(field.harmonic_damping),
+        damping=_clamped(field.harmonic_damping),
         size=min(field.size, ENDLESS),
-        flow=0.0 if field.type in ("HARMONIC", "DRAG") else _limited(field.flow),
+        flow=0.0 if field.type in ("HARMONIC", "DRAG") else _clamped(field.flow),
         across=field.wind_factor,
         falloff=field.falloff_type.lower(),
         side={"BOTH": 0, "POSITIVE": 1, "NEGATIVE": -1}[field.z_direction],
@@ -152,8 +152,8 @@ def _noise_of(field: bpy.types.FieldSettings, frame: int) -> float:
     return float(sign * steps / weakened * field.noise / 128.0)
 
 
-def _limited(value: float) -> float:
-    return float(min(max(value, -_STRONGEST), _STRONGEST))
+def _clamped(value: float) -> float:
+    return float(min(max(value, -_MAX_STRENGTH), _MAX_STRENGTH))
 
 
 def _unit(vector: Floats) -> Floats:

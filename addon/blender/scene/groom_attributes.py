@@ -46,7 +46,7 @@ def store_group_names(curves: bpy.types.Curves, names: Mapping[int, str]) -> Non
 
 
 def stored_groom(
-    hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, kept: Ints
+    hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, curve_indices: Ints
 ) -> dict[str, Any]:
     """What the evaluated hair holds besides its strands: the other arguments of `Groom`.
 
@@ -54,7 +54,7 @@ def stored_groom(
     one of them no longer exists.
 
     Args:
-        kept: (strand_count,) indices of the curves that became strands, from `read_curves`.
+        curve_indices: (strand_count,) of the curves that became strands, from `read_curves`.
 
     Returns:
         group_names, and whichever of strand_id, is_guide, closest_guides and guide_weights the
@@ -64,17 +64,20 @@ def stored_groom(
     fields: dict[str, Any] = {"group_names": group_names(hair)}
     guide = read_attribute(curves, GUIDE, "CURVE")
     if guide is not None:
-        fields["is_guide"] = guide[kept] != 0
-    ids = _whole(curves, STRAND_ID, kept)
+        fields["is_guide"] = guide[curve_indices] != 0
+    ids = _integer_attribute(curves, STRAND_ID, curve_indices)
     if ids is None or len(np.unique(ids)) < len(ids):
         return fields
     fields["strand_id"] = ids
-    closest = [_whole(curves, name, kept) for name in CLOSEST_GUIDES]
+    closest = [_integer_attribute(curves, name, curve_indices) for name in CLOSEST_GUIDES]
     weights = read_attribute(curves, GUIDE_WEIGHTS, "CURVE", 3)
     if weights is not None and all(each is not None for each in closest):
         guides = np.stack(closest, axis=1)  # type: ignore[arg-type]
         if np.isin(guides, ids).all():
-            fields |= {"closest_guides": guides, "guide_weights": finite_or_zero(weights[kept])}
+            fields |= {
+                "closest_guides": guides,
+                "guide_weights": finite_or_zero(weights[curve_indices]),
+            }
     return fields
 
 
@@ -94,6 +97,6 @@ def _is_number(text: str) -> bool:
     return text.removeprefix("-").isdecimal() and abs(int(text)) < 1 << 31
 
 
-def _whole(curves: bpy.types.Curves, name: str, kept: Ints) -> Ints | None:
+def _integer_attribute(curves: bpy.types.Curves, name: str, curve_indices: Ints) -> Ints | None:
     values = read_attribute(curves, name, "CURVE")
-    return None if values is None or values.dtype.kind != "i" else values[kept]
+    return None if values is None or values.dtype.kind != "i" else values[curve_indices]

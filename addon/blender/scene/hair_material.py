@@ -28,8 +28,8 @@ MATERIAL_COLOR = "hair_color"
 #: property that marks a material of ours
 _MARK = "hairloom_look"
 #: properties with digests of its look and of the nodes that were made for it
-_LOOK, _NODES = "hairloom_look_settings", "hairloom_look_nodes"
-_ACROSS, _DOWN = 190.0, 180.0
+_LOOK_DIGEST, _NODES_DIGEST = "hairloom_look_settings", "hairloom_look_nodes"
+_COLUMN_WIDTH, _ROW_HEIGHT = 190.0, 180.0
 
 
 def has_look_material(curves: bpy.types.Curves) -> bool:
@@ -41,7 +41,7 @@ def put_look_material(
     curves: bpy.types.Curves,
     shading: ShadingSettings,
     *,
-    are_final: bool = False,
+    has_final_colors: bool = False,
     painted: Floats | None = None,
 ) -> tuple[bpy.types.Material, tuple[str, ...]]:
     """Give hair curves the material of a look; their material of an earlier look is overwritten.
@@ -49,7 +49,7 @@ def put_look_material(
     A material of the artist's own is not changed: ours replaces it in the first slot.
 
     Args:
-        are_final: whether the look's effects on colours are in the curves' own colours already.
+        has_final_colors: whether the curves' own colours include the look's effects on colour.
         painted: (curve_count, 4), see `painted_colors.colors_of_curves`, instead of their own.
 
     Returns:
@@ -64,10 +64,10 @@ def put_look_material(
             slots[0] = material
         else:
             slots.append(material)
-    notes = _write(material, shading, has_colors=has_colors, are_final=are_final)
-    if not are_final:
-        material[_LOOK] = digest(shading, size=8)
-        material[_NODES] = digest(_nodes(material), size=8)
+    notes = _write(material, shading, has_colors=has_colors, has_final_colors=has_final_colors)
+    if not has_final_colors:
+        material[_LOOK_DIGEST] = digest(shading, size=8)
+        material[_NODES_DIGEST] = digest(_nodes(material), size=8)
     return material, notes
 
 
@@ -85,16 +85,16 @@ def put_colors(curves: bpy.types.Curves, shading: ShadingSettings, painted: Floa
     return has_own
 
 
-def is_as_made(material: bpy.types.Material) -> bool:
+def has_unchanged_nodes(material: bpy.types.Material) -> bool:
     """Whether its nodes have not been changed since it was made from a look."""
-    return bool(material.get(_NODES) == digest(_nodes(material), size=8))
+    return bool(material.get(_NODES_DIGEST) == digest(_nodes(material), size=8))
 
 
-def is_behind(material: bpy.types.Material, look: ShadingSettings) -> bool:
+def is_outdated(material: bpy.types.Material, look: ShadingSettings) -> bool:
     """Whether it was made from another look and its nodes have not been changed since; with changed
     nodes it is the artist's own."""
-    known = material.get(_LOOK)
-    return known not in (None, digest(look, size=8)) and is_as_made(material)
+    known = material.get(_LOOK_DIGEST)
+    return known not in (None, digest(look, size=8)) and has_unchanged_nodes(material)
 
 
 def _nodes(material: bpy.types.Material) -> list[object]:
@@ -104,14 +104,14 @@ def _nodes(material: bpy.types.Material) -> list[object]:
         found.append((node.bl_idname, getattr(node, "parametrization", ""), node.mute))
         for socket in node.inputs:
             value = getattr(socket, "default_value", None)
-            found.append(value if isinstance(value, float | int | str) else repr(_plain(value)))
+            found.append(value if isinstance(value, float | int | str) else repr(_as_floats(value)))
     for link in material.node_tree.links:
         ends = (link.from_node.name, link.from_socket.identifier)
         found.append((*ends, link.to_node.name, link.to_socket.identifier))
     return found
 
 
-def _plain(value: Any) -> list[float]:
+def _as_floats(value: Any) -> list[float]:
     return [float(each) for each in value] if hasattr(value, "__len__") else []
 
 
@@ -151,7 +151,11 @@ def _copy_colors(curves: bpy.types.Curves) -> None:
 
 
 def _write(
-    material: bpy.types.Material, shading: ShadingSettings, *, has_colors: bool, are_final: bool
+    material: bpy.types.Material,
+    shading: ShadingSettings,
+    *,
+    has_colors: bool,
+    has_final_colors: bool,
 ) -> tuple[str, ...]:
     hair, notes = hair_from(shading)
     nodes = _Nodes(material.node_tree)
@@ -161,9 +165,11 @@ def _write(
     material.roughness = hair.roughness
     if has_colors:
         node.parametrization = "COLOR"
-        nodes.link(nodes.own_color(hair, shading, are_final=are_final), node.inputs["Color"])
+        nodes.link(
+            nodes.own_color(hair, shading, has_final_colors=has_final_colors), node.inputs["Color"]
+        )
         is_changed = shading.tip_tint > 0.0 or shading.grey_fraction > 0.0
-        if is_changed and not are_final:
+        if is_changed and not has_final_colors:
             notes += (
                 "Tip Tint and Grey Strands are left out for strands with colours of their own",
             )
@@ -191,14 +197,14 @@ class _Nodes:
 
     def add(self, kind: str, **values: Any) -> bpy.types.Node:
         node = self.tree.nodes.new(kind)
-        node.location = -_ACROSS * self.column, -_DOWN * (self.column % 2)
+        node.location = -_COLUMN_WIDTH * self.column, -_ROW_HEIGHT * (self.column % 2)
         self.column += 1
         for name, value in values.items():
             setattr(node, name, value)
         return node
 
-    def link(self, giver: bpy.types.NodeSocket, taker: bpy.types.NodeSocket) -> None:
-        self.tree.links.new(giver, taker)
+    def link(self, source: bpy.types.NodeSocket, target: bpy.types.NodeSocket) -> None:
+        self.tree.links.new(source, target)
 
     def put(self, socket: bpy.types.NodeSocket, value: Any) -> None:
         """Set an input to a number or a colour, or link it to an output."""
@@ -222,13 +228,13 @@ class _Nodes:
         return node
 
     def own_color(
-        self, hair: PrincipledHair, shading: ShadingSettings, *, are_final: bool
+        self, hair: PrincipledHair, shading: ShadingSettings, *, has_final_colors: bool
     ) -> bpy.types.NodeSocket:
         """The curves' colours for this node. Colour is exp(-c sqrt(absorption)), so that a factor
         on absorption becomes an exponent of colour."""
         color = self.add("ShaderNodeAttribute", attribute_name=MATERIAL_COLOR).outputs["Color"]
         exponent: Any = color_exponent(hair.around)
-        if not are_final:
+        if not has_final_colors:
             color = self._whole(color, tuple(look_color(shading).tolist()))
             if shading.color_variation > 0.0:
                 root = self._math("POWER", self._variation(shading), 0.5)
@@ -289,9 +295,9 @@ class _Nodes:
         high: float,
         to_low: float,
         to_high: float,
-        how: str = "LINEAR",
+        interpolation: str = "LINEAR",
     ) -> bpy.types.NodeSocket:
-        node = self.add("ShaderNodeMapRange", interpolation_type=how)
+        node = self.add("ShaderNodeMapRange", interpolation_type=interpolation)
         for name, number in (
             ("Value", value),
             ("From Min", low),

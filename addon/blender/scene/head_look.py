@@ -17,7 +17,7 @@ from .mesh_materials import MeshMaterial, material_of
 from .surfaces import read_material_slots
 
 #: for faces without a material
-PLAIN = MeshMaterial(SKIN, SKIN_SPECULAR, SKIN_ROUGHNESS)
+PLAIN_SKIN = MeshMaterial(SKIN, SKIN_SPECULAR, SKIN_ROUGHNESS)
 #: tone of our bust in a scene, if it has lost its materials
 _TONE = "light"
 
@@ -45,7 +45,7 @@ def is_our_bust(head: Surface) -> bool:
     return head.corner_uv is not None and np.array_equal(head.triangles, ours)
 
 
-def look_below(hair: bpy.types.Object, head: Surface | None) -> HeadLook | None:
+def look_of_head(hair: bpy.types.Object, head: Surface | None) -> HeadLook | None:
     """`head_look` of the head that this hair grows on."""
     found = head_of(hair)
     return head_look(None if found is None else found.name, head, _TONE)
@@ -76,7 +76,7 @@ def _look_of(meshes: list[bpy.types.Object]) -> HeadLook | None:
         slots = np.minimum(read_material_slots(mesh, depsgraph), len(materials) - 1)
         for slot in np.unique(slots).tolist():
             material = materials[slot]
-            known = PLAIN if material is None else material_of(material)
+            known = PLAIN_SKIN if material is None else material_of(material)
             parts.append((start + np.flatnonzero(slots == slot), known))
         start += len(slots)
     return tuple(parts)

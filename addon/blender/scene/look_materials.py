@@ -9,7 +9,13 @@ from ...shading.settings import ShadingSettings
 from ...shading.wet_and_dusty import wet_and_dusty_look
 from ..properties import changed
 from ..properties.properties import settings_of
-from .hair_material import is_as_made, is_behind, look_material, put_colors, put_look_material
+from .hair_material import (
+    has_unchanged_nodes,
+    is_outdated,
+    look_material,
+    put_colors,
+    put_look_material,
+)
 from .painted_colors import colors_of_curves
 
 #: time without edits before painted colours are looked up again [s]
@@ -31,11 +37,11 @@ def put_look(hair: bpy.types.Object) -> tuple[bpy.types.Material, tuple[str, ...
     return material, (*notes, *more)
 
 
-def follow_curves(hair: bpy.types.Object) -> None:
+def update_after_new_curves(hair: bpy.types.Object) -> None:
     """Update the material, or the colours that it reads, after the hair's curves were replaced."""
     look, material = _look_of(hair.data), look_material(hair.data)
     try:
-        if material is not None and is_as_made(material):
+        if material is not None and has_unchanged_nodes(material):
             put_look(hair)
         else:
             depsgraph = bpy.context.evaluated_depsgraph_get()
@@ -44,30 +50,30 @@ def follow_curves(hair: bpy.types.Object) -> None:
         return
 
 
-def follow(owner: bpy.types.ID) -> None:
+def update_after_edit(owner: bpy.types.ID) -> None:
     """After a setting was edited, update the material if the look has changed."""
     if not isinstance(owner, bpy.types.Curves) or not owner.is_editable:
         return
     material = look_material(owner)
     look = _look_of(owner)
-    if material is None or not is_behind(material, look):
+    if material is None or not is_outdated(material, look):
         return
     if look.color_map and not bpy.app.background:  # looking up a colour map is slow
         _deferred.add(owner.session_uid)
-        if not bpy.app.timers.is_registered(_follow_deferred):
-            bpy.app.timers.register(_follow_deferred, first_interval=_PAUSE)
+        if not bpy.app.timers.is_registered(_update_deferred):
+            bpy.app.timers.register(_update_deferred, first_interval=_PAUSE)
         return
-    _put_again(owner)
+    _update_material(owner)
 
 
-def _follow_deferred() -> None:
+def _update_deferred() -> None:
     """A timer for Blender: update the materials that were deferred."""
     for curves in [each for each in bpy.data.hair_curves if each.session_uid in _deferred]:
-        _put_again(curves)
+        _update_material(curves)
     _deferred.clear()
 
 
-def _put_again(owner: bpy.types.Curves) -> None:
+def _update_material(owner: bpy.types.Curves) -> None:
     hair = next((obj for obj in bpy.data.objects if obj.data == owner), None)
     try:
         if hair is not None:
@@ -80,7 +86,7 @@ def _look_of(curves: bpy.types.Curves) -> ShadingSettings:
     return wet_and_dusty_look(settings_of(curves.hairloom.shading, ShadingSettings))
 
 
-LISTENER = ("settings", follow)
+LISTENER = ("settings", update_after_edit)
 
 
 def register() -> None:
@@ -90,5 +96,5 @@ def register() -> None:
 def unregister() -> None:
     changed.unsubscribe(*LISTENER)
     _deferred.clear()
-    if bpy.app.timers.is_registered(_follow_deferred):
-        bpy.app.timers.unregister(_follow_deferred)
+    if bpy.app.timers.is_registered(_update_deferred):
+        bpy.app.timers.unregister(_update_deferred)

@@ -43,7 +43,7 @@ from .surfaces import evaluated_mesh, read_surface
 
 
 @dataclass(frozen=True)
-class _Groups:
+class _VertexGroups:
     """The vertex groups of a surface. corners: (triangle_count, 3) vertices of its triangles."""
 
     members: Memberships
@@ -61,13 +61,13 @@ class _Groups:
 
 
 @dataclass(frozen=True, eq=False)
-class Canvas:
+class MaskReader:
     """What masks of a groom are read from.
 
     hair: its curves; None: they are from a file. surface: the object that it grows on, or None.
-    head: the surface as it was read. strands: of the usable curves. kept: indices of these.
-    good: the last usable state of every mask, by name.
-    is_own: whether the strands are the hair's curves before their modifiers.
+    head: the surface as it was read. strands: of the usable curves. curve_indices: of these.
+    last_usable: the last usable state of every mask, by name.
+    is_before_modifiers: whether the strands are the hair's curves before their modifiers.
 
     Make a new one for each reading: vertex groups are read once, and not updated.
     """
@@ -76,10 +76,10 @@ class Canvas:
     surface: bpy.types.Object | None
     head: Surface | None
     strands: StrandSet
-    kept: Ints
-    good: dict[str, Mask] = field(default_factory=dict)
-    is_own: bool = False
-    _groups: list[_Groups] = field(default_factory=list, init=False)
+    curve_indices: Ints
+    last_usable: dict[str, Mask] = field(default_factory=dict)
+    is_before_modifiers: bool = False
+    _groups: list[_VertexGroups] = field(default_factory=list, init=False)
 
     def masks(
         self, settings: Settings, depsgraph: bpy.types.Depsgraph
@@ -94,7 +94,7 @@ class Canvas:
         if hasattr(settings, "only_selected") and self._has_selection(depsgraph):
             named["only_selected"] = SELECTION
         found, warnings = {}, []
-        read = {name: self.read(name, depsgraph) for name in sorted(set(named.values()))}
+        read = {name: self.read_or_last(name, depsgraph) for name in sorted(set(named.values()))}
         for of, name in named.items():
             mask, warning = read[name]
             if mask is not None:
@@ -115,16 +115,16 @@ class Canvas:
                 )
         return Masks(found), tuple(warnings)
 
-    def read(self, name: str, depsgraph: bpy.types.Depsgraph) -> tuple[Mask | None, str]:
+    def read_or_last(self, name: str, depsgraph: bpy.types.Depsgraph) -> tuple[Mask | None, str]:
         """A mask, and a warning; if it cannot be used now, the one that was usable last."""
         try:
             mask = self.mask(name, depsgraph)
         except HairloomError as error:
-            known = self.good.get(name)
+            known = self.last_usable.get(name)
             if known is None or not self._fits(known):
                 return None, str(error)
             return known, f"{error} Until then its last state is used"
-        self.good[name] = mask
+        self.last_usable[name] = mask
         return mask, ""
 
     def mask(self, name: str, depsgraph: bpy.types.Depsgraph) -> Mask:
@@ -135,11 +135,11 @@ class Canvas:
         """
         if name == SELECTION:
             return self._selection(depsgraph)
-        found = self._of_surface(name, depsgraph)
+        found = self._surface_mask(name, depsgraph)
         if found is None:
-            found = self._of_curves(name, depsgraph)
+            found = self._curves_mask(name, depsgraph)
         if found is None:
-            found = self._of_image(name)
+            found = self._image_mask(name)
         if found is None:
             raise self._missing(name)
         return found
@@ -153,7 +153,7 @@ class Canvas:
         triangles = None if self.head is None else len(self.head.triangles)
         return mask.fits(self.strands.strand_count, triangles)
 
-    def _of_surface(self, name: str, depsgraph: bpy.types.Depsgraph) -> Mask | None:
+    def _surface_mask(self, name: str, depsgraph: bpy.types.Depsgraph) -> Mask | None:
         surface, head = self.surface, self.head
         if surface is None or head is None or surface.type != "MESH":
             return None
@@ -161,7 +161,7 @@ class Canvas:
         group = surface.vertex_groups.get(name)
         if group is not None:
             if not self._groups:
-                self._groups.append(_Groups.of(surface, depsgraph))
+                self._groups.append(_VertexGroups.of(surface, depsgraph))
             corners = self._groups[0].at_corners(group.index)
         else:
             with evaluated_mesh(surface, depsgraph, surface.name) as mesh:
@@ -177,10 +177,10 @@ class Canvas:
             )
         if np.linalg.det(np.array(evaluated.matrix_world)) < 0.0:
             corners = corners[:, ::-1]  # as triangles are, see `Surface.transformed`
-        return SurfaceMask(usable(corners, name, surface.name))
+        return SurfaceMask(checked_values(corners, name, surface.name))
 
-    def _of_curves(self, name: str, depsgraph: bpy.types.Depsgraph) -> StrandMask | None:
-        found = self._on_curves(name, depsgraph)
+    def _curves_mask(self, name: str, depsgraph: bpy.types.Depsgraph) -> StrandMask | None:
+        found = self._curve_values(name, depsgraph)
         if found is None:
             return None
         values, domain = found
@@ -191,7 +191,7 @@ class Canvas:
     def _selection(self, depsgraph: bpy.types.Depsgraph) -> StrandMask:
         """The selection of each curve: the maximum over its points. Without the attribute, all are
         selected."""
-        found = self._on_curves(SELECTION, depsgraph)
+        found = self._curve_values(SELECTION, depsgraph)
         if found is None:
             return StrandMask(np.ones((self.strands.strand_count, 1), np.float32))
         values, domain = found
@@ -205,10 +205,12 @@ class Canvas:
         )
 
     def _curves(self, hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bpy.types.Curves:
-        curves: bpy.types.Curves = (hair if self.is_own else hair.evaluated_get(depsgraph)).data
+        curves: bpy.types.Curves = (
+            hair if self.is_before_modifiers else hair.evaluated_get(depsgraph)
+        ).data
         return curves
 
-    def _on_curves(self, name: str, depsgraph: bpy.types.Depsgraph) -> tuple[Floats, str] | None:
+    def _curve_values(self, name: str, depsgraph: bpy.types.Depsgraph) -> tuple[Floats, str] | None:
         """The values of an attribute on the usable curves or on their points, and its domain."""
         if self.hair is None:
             return None
@@ -217,27 +219,27 @@ class Canvas:
         if found is None:
             return None
         values, domain = found
-        values = usable(values, name, self.hair.name)
+        values = checked_values(values, name, self.hair.name)
         strands = self.strands
-        drawn = None if self.is_own else curves_as_drawn(curves)
+        drawn = None if self.is_before_modifiers else curves_as_drawn(curves)
         offsets = curve_offsets(curves) if drawn is None else drawn.offsets
         if drawn is not None and domain == "POINT":
             values = drawn.of(values)
         counts = np.diff(offsets)
-        is_known = self.kept.max(initial=-1) < len(counts)
-        if not (is_known and np.array_equal(counts[self.kept], strands.point_counts)):
+        is_known = self.curve_indices.max(initial=-1) < len(counts)
+        if not (is_known and np.array_equal(counts[self.curve_indices], strands.point_counts)):
             raise HairloomError(
                 f"the mask '{name}' belongs to other curves than those shown",
                 place=self.hair.name,
                 remedy="Wait until the hair is made again",
             )
         if domain == "CURVE":
-            return values[self.kept], domain
+            return values[self.curve_indices], domain
         is_kept = np.zeros(len(counts), bool)
-        is_kept[self.kept] = True
+        is_kept[self.curve_indices] = True
         return values[np.repeat(is_kept, counts)], domain
 
-    def _of_image(self, name: str) -> ImageMask | None:
+    def _image_mask(self, name: str) -> ImageMask | None:
         return image_mask(name, self.head, self._place) if name in image_names() else None
 
     def _missing(self, name: str) -> HairloomError:
@@ -282,12 +284,12 @@ def image_mask(name: str, head: Surface | None, place: str) -> ImageMask:
         HairloomError: there are no UVs, or no pixels that can be used.
     """
     corner_uv = None if head is None else head.corner_uv
-    image = usable_image(name, corner_uv, place, instead="a vertex group")
+    image = checked_image(name, corner_uv, place, instead="a vertex group")
     assert corner_uv is not None
-    return ImageMask(usable(image_values(image), name, place), corner_uv)
+    return ImageMask(checked_values(image_values(image), name, place), corner_uv)
 
 
-def usable_image(
+def checked_image(
     name: str, corner_uv: Floats | None, place: str, *, instead: str
 ) -> bpy.types.Image:
     """An image of one tile with pixels, for a surface with UVs.
@@ -333,7 +335,7 @@ def image_values(image: bpy.types.Image) -> Floats:
     return found
 
 
-def usable(values: Floats, name: str, place: str) -> Floats:
+def checked_values(values: Floats, name: str, place: str) -> Floats:
     """The values, with negative ones raised to 0.
 
     Raises:

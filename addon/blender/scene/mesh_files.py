@@ -41,7 +41,7 @@ def read_mesh_file(path: Path, *, need_uv: bool) -> tuple[Surface, tuple[str, ..
         depsgraph = bpy.context.evaluated_depsgraph_get()
         parts = [read_surface(mesh, depsgraph, need_uv=need_uv, place=str(path)) for mesh in meshes]
         notes = tuple(filter(None, map(uv_map_note, meshes)))
-    return merged(parts), notes
+    return merged_surfaces(parts), notes
 
 
 @contextmanager
@@ -127,7 +127,7 @@ def _imported(path: Path) -> list[bpy.types.Object]:
     return sorted(meshes, key=lambda obj: obj.name)
 
 
-def merged(parts: list[Surface]) -> Surface:
+def merged_surfaces(parts: list[Surface]) -> Surface:
     """Several surfaces as one; it has UVs only if every part has them."""
     starts = np.cumsum([0, *(len(part.positions) for part in parts[:-1])])
     has_uv = all(part.corner_uv is not None for part in parts)

@@ -25,9 +25,9 @@ _SPECULAR = 0.04
 _ROUGHNESS = 0.5
 
 #: (session number of the image, kind) -> its state and pixels; the most recently used last
-_pictures: dict[tuple[int, str], tuple[tuple[object, ...], Floats]] = {}
+_picture_cache: dict[tuple[int, str], tuple[tuple[object, ...], Floats]] = {}
 #: number of pictures that are cached, 16 MB each for images of 1,024 pixels
-_KEPT = 16
+_CACHE_SIZE = 16
 
 
 @dataclass(frozen=True)
@@ -87,14 +87,16 @@ def material_notes(obj: bpy.types.Object) -> tuple[str, ...]:
     return tuple(dict.fromkeys(note for notes in found for note in notes))
 
 
-def can_be_seen_through(obj: bpy.types.Object) -> bool:
+def may_be_transparent(obj: bpy.types.Object) -> bool:
     """Whether an object may be transparent in a view: by its colour, or by the colour, render
     method, shader or alpha of a material."""
     materials = (slot.material for slot in obj.material_slots)
-    return obj.color[3] < 1.0 or any(_lets_through(each) for each in materials if each is not None)
+    return obj.color[3] < 1.0 or any(
+        _is_transparent(each) for each in materials if each is not None
+    )
 
 
-def _lets_through(material: bpy.types.Material) -> bool:
+def _is_transparent(material: bpy.types.Material) -> bool:
     if material.diffuse_color[3] < 1.0 or material.surface_render_method == "BLENDED":
         return True
     nodes = () if material.node_tree is None else material.node_tree.nodes
@@ -102,7 +104,7 @@ def _lets_through(material: bpy.types.Material) -> bool:
         return True
     node = _shader(material)
     alpha = None if node is None else node.inputs.get("Alpha")
-    return alpha is not None and (_giver(alpha) is not None or alpha.default_value < 1.0)
+    return alpha is not None and (_linked_node(alpha) is not None or alpha.default_value < 1.0)
 
 
 class _Reader:
@@ -115,11 +117,11 @@ class _Reader:
 
     def alpha(self, socket: bpy.types.NodeSocket, color: bpy.types.NodeSocket) -> float:
         """Its value; 1 if the alpha comes from the colour's own image."""
-        giver = _giver(socket)
+        giver = _linked_node(socket)
         if giver is None:
             return float(socket.default_value)
         node, output = giver
-        base = _giver(color)
+        base = _linked_node(color)
         if node.type == "TEX_IMAGE" and output == "Alpha" and base is not None and base[0] == node:
             self.uses_alpha = True
         else:
@@ -128,7 +130,7 @@ class _Reader:
 
     def color(self, socket: bpy.types.NodeSocket) -> tuple[Floats | None, Color]:
         """The colour's image and its mean; without one, None and the value."""
-        giver = _giver(socket)
+        giver = _linked_node(socket)
         own = _color(socket.default_value)
         if giver is None:
             return None, own
@@ -151,11 +153,11 @@ class _Reader:
 
     def normal(self, socket: bpy.types.NodeSocket) -> tuple[Floats | None, float]:
         """The normal map and its strength; None if the surface's own normals are used."""
-        giver = _giver(socket)
+        giver = _linked_node(socket)
         if giver is None:
             return None, 1.0
         node, _ = giver
-        image = _giver(node.inputs["Color"]) if node.type == "NORMAL_MAP" else None
+        image = _linked_node(node.inputs["Color"]) if node.type == "NORMAL_MAP" else None
         if image is None or image[0].type != "TEX_IMAGE" or node.space != "TANGENT":
             self._leave_out("Normal", "a Normal Map in tangent space with an Image Texture")
             return None, 1.0
@@ -167,10 +169,10 @@ class _Reader:
         if image is None:
             return None
         kind = ("color" if self.uses_alpha else "opaque") if is_color else "normal"
-        key, state = (image.session_uid, kind), _state(image)
-        known = _pictures.pop(key, None)
+        key, state = (image.session_uid, kind), _image_state(image)
+        known = _picture_cache.pop(key, None)
         if known is not None and known[0] == state and not image.is_dirty:
-            _pictures[key] = known  # now the most recently used
+            _picture_cache[key] = known  # now the most recently used
             return known[1]
         try:
             picture = read_image(image, is_color=is_color, place=f"Image '{image.name}'")
@@ -179,9 +181,9 @@ class _Reader:
             return None
         if kind == "opaque":
             picture[..., 3] = 1.0
-        _pictures[key] = _state(image), picture
-        for oldest in list(_pictures)[:-_KEPT]:
-            del _pictures[oldest]
+        _picture_cache[key] = _image_state(image), picture
+        for oldest in list(_picture_cache)[:-_CACHE_SIZE]:
+            del _picture_cache[oldest]
         return picture
 
     def _leave_out(self, what: str, known: str) -> None:
@@ -191,12 +193,12 @@ class _Reader:
         )
 
 
-def forget() -> None:
+def clear_cache() -> None:
     """Drop all cached pictures."""
-    _pictures.clear()
+    _picture_cache.clear()
 
 
-def _state(image: bpy.types.Image) -> tuple[object, ...]:
+def _image_state(image: bpy.types.Image) -> tuple[object, ...]:
     """A state that changes with the pixels; includes the file's modification time."""
     file = Path(bpy.path.abspath(image.filepath, library=image.library))
     written = file.stat().st_mtime_ns if image.packed_file is None and file.is_file() else None
@@ -214,7 +216,7 @@ def _shader(material: bpy.types.Material) -> bpy.types.Node | None:
     return None
 
 
-def _giver(socket: bpy.types.NodeSocket) -> tuple[bpy.types.Node, str] | None:
+def _linked_node(socket: bpy.types.NodeSocket) -> tuple[bpy.types.Node, str] | None:
     """The node linked to an input, and the name of its output; None: the input's value is used."""
     while socket.links:
         link = socket.links[0]

@@ -23,8 +23,8 @@ from ..base.attributes import read_attribute
 from ..base.mesh_arrays import triangle_corners
 from ..base.objects import head_of
 from ..base.vertex_weights import at_corners, color_choices, image_names, is_color
-from .curves import read_own_curves
-from .masks import usable, usable_image
+from .curves import read_original_curves
+from .masks import checked_image, checked_values
 from .surfaces import evaluated_mesh, read_corner_uv, read_surface
 
 #: Colour spaces of images whose stored pixels are scene-linear Rec. 709 already.
@@ -109,7 +109,7 @@ def colors_of_curves(
     painted, notes = read_colors(hair, depsgraph, len(head.triangles))
     if painted is None:
         return None, notes
-    own = read_own_curves(hair, depsgraph)
+    own = read_original_curves(hair, depsgraph)
     strands = with_colors(bind_roots(own.strands, head, place=hair.name).strands, painted, look)
     found = np.full((len(hair.data.curves), 4), -1.0, np.float32)
     found[:, 3] = 1.0
@@ -122,50 +122,50 @@ def _of_attribute(mesh: bpy.types.Mesh, name: str, place: str) -> SurfaceColor |
     attribute = mesh.attributes.get(name)
     if attribute is None or not is_color(attribute):
         return None
-    values = usable(read_attribute(mesh, name, attribute.domain, 4), name, place)
-    return SurfaceColor(at_corners(mesh, _multiplied(values), attribute.domain))
+    values = checked_values(read_attribute(mesh, name, attribute.domain, 4), name, place)
+    return SurfaceColor(at_corners(mesh, _premultiplied(values), attribute.domain))
 
 
 def _of_image(mesh: bpy.types.Mesh, name: str, place: str) -> ImageColor | None:
     if name not in image_names():
         return None
     corner_uv = read_corner_uv(mesh, triangle_corners(mesh, "loops"))
-    image = usable_image(name, corner_uv, place, instead="a colour attribute")
+    image = checked_image(name, corner_uv, place, instead="a colour attribute")
     assert corner_uv is not None
     (width, height), channels = image.size, image.channels
-    meant = _meaning(image, place)
+    meant = _decoder(image, place)
     pixels = np.empty(width * height * channels, np.float32)
     image.pixels.foreach_get(pixels)
     if image.is_float:  # other images are stored as integers, which are always finite
-        pixels = usable(pixels, name, place)
+        pixels = checked_values(pixels, name, place)
     return ImageColor(pixels.reshape(height, width, channels), meant, corner_uv)
 
 
-def _meaning(image: bpy.types.Image, place: str) -> Callable[[Floats], Floats]:
+def _decoder(image: bpy.types.Image, place: str) -> Callable[[Floats], Floats]:
     """The function from stored pixels to scene-linear premultiplied colours.
 
     Pixels of float images are that already, whatever the colour space; others are as in the file.
     """
     space, has_opacity = image.colorspace_settings.name, image.alpha_mode in ("STRAIGHT", "PREMUL")
     if image.is_float:
-        return partial(_whole, has_opacity=has_opacity)
+        return partial(_with_opacity, has_opacity=has_opacity)
     if space != "sRGB" and space not in _LINEAR:
         raise HairloomError(
             f"the image '{image.name}' is in the colour space '{space}', which is not supported",
             place=place,
             remedy="Set its Color Space to sRGB (Image Editor > Sidebar > Image)",
         )
-    return partial(_decoded, is_coded=space == "sRGB", has_opacity=has_opacity)
+    return partial(_decode, is_coded=space == "sRGB", has_opacity=has_opacity)
 
 
-def _decoded(stored: Floats, *, is_coded: bool, has_opacity: bool) -> Floats:
-    whole = _whole(stored, has_opacity=has_opacity)
+def _decode(stored: Floats, *, is_coded: bool, has_opacity: bool) -> Floats:
+    whole = _with_opacity(stored, has_opacity=has_opacity)
     if is_coded:
         whole[:, :3] = srgb_decoded(whole[:, :3])
-    return _multiplied(whole)
+    return _premultiplied(whole)
 
 
-def _whole(stored: Floats, *, has_opacity: bool) -> Floats:
+def _with_opacity(stored: Floats, *, has_opacity: bool) -> Floats:
     """Pixels (n, channels) as colours with an opacity, (n, 4)."""
     whole = np.ones((len(stored), 4), np.float32)
     whole[:, :3] = stored[:, :3] if stored.shape[1] >= 3 else stored[:, :1]
@@ -174,7 +174,7 @@ def _whole(stored: Floats, *, has_opacity: bool) -> Floats:
     return whole
 
 
-def _multiplied(values: Floats) -> Floats:
+def _premultiplied(values: Floats) -> Floats:
     """Colours times their opacity, (n, 4)."""
     opacity = np.minimum(values[:, 3:], np.float32(1.0))
     return np.concatenate([values[:, :3] * opacity, opacity], axis=1)

@@ -12,7 +12,7 @@ from ...errors import HairloomError
 from ..base.mesh_arrays import edge_vertices, vertex_places
 from ..base.objects import head_of
 from .drawn_lines import pieces_of
-from .own_collections import objects_in, put_into, take_out
+from .hair_collections import add_to_collection, objects_in, remove_from_collection
 
 _NONE = np.zeros((0, 2, 3), np.float32)
 
@@ -28,12 +28,14 @@ def parting_state(hair: bpy.types.Object) -> tuple[Floats | str, ...]:
     state: list[Floats | str] = []
     for obj in partings_of(hair):
         state += [f"{obj.session_uid} {obj.type}", _line_points(obj)]
-        for each in (obj, *_placed_by(obj, head_of(hair))):
+        for each in (obj, *_positioning_parents(obj, head_of(hair))):
             state += [np.array(each.matrix_parent_inverse), np.array(each.matrix_basis)]
     return tuple(state)
 
 
-def _placed_by(line: bpy.types.Object, head: bpy.types.Object | None) -> Iterator[bpy.types.Object]:
+def _positioning_parents(
+    line: bpy.types.Object, head: bpy.types.Object | None
+) -> Iterator[bpy.types.Object]:
     """The parents by which an artist moves a line over a head: not the head, and not what carries
     both."""
     carriers = [] if head is None else [head, *_parents(head)]
@@ -95,7 +97,7 @@ def add_partings(
     hair: bpy.types.Object, lines: list[bpy.types.Object], scene: bpy.types.Scene
 ) -> None:
     """Put lines into the hair's collection of partings, which is made if there is none."""
-    put_into(hair, "parting_collection", "Partings", lines, scene)
+    add_to_collection(hair, "parting_collection", "Partings", lines, scene)
 
 
 def remove_parting(hair: bpy.types.Object, name: str, scene: bpy.types.Scene) -> None:
@@ -104,7 +106,7 @@ def remove_parting(hair: bpy.types.Object, name: str, scene: bpy.types.Scene) ->
     Raises:
         HairloomError: it is not in that collection itself.
     """
-    take_out(hair, "parting_collection", "Partings", name, scene)
+    remove_from_collection(hair, "parting_collection", "Partings", name, scene)
 
 
 def copy_partings(

@@ -92,10 +92,10 @@ def _node_of(material: bpy.types.Material) -> bpy.types.Node | None:
     if output is None:
         return None
     ends = [link.from_node for link in output.inputs["Surface"].links]
-    return next((each for each in _behind(ends, {tree}) if each.type == _NODE), None)
+    return next((each for each in _upstream_nodes(ends, {tree}) if each.type == _NODE), None)
 
 
-def _behind(
+def _upstream_nodes(
     ends: list[bpy.types.Node], entered: set[bpy.types.NodeTree]
 ) -> Iterator[bpy.types.Node]:
     """These nodes and all nodes that feed them, nearest first, also those inside groups."""
@@ -110,11 +110,13 @@ def _behind(
         if tree is not None and tree not in entered:
             entered.add(tree)
             outputs = (each for each in tree.nodes if each.type == "GROUP_OUTPUT")
-            yield from _behind([giver for each in outputs for giver in _givers(each)], entered)
-        waiting += _givers(found)
+            yield from _upstream_nodes(
+                [giver for each in outputs for giver in _linked_nodes(each)], entered
+            )
+        waiting += _linked_nodes(found)
 
 
-def _givers(node: bpy.types.Node) -> list[bpy.types.Node]:
+def _linked_nodes(node: bpy.types.Node) -> list[bpy.types.Node]:
     return [link.from_node for socket in node.inputs for link in socket.links]
 
 

@@ -21,15 +21,15 @@ from ...strands.colors import color_notes
 from ..base.objects import head_of
 from ..properties.properties import settings_of
 from .curves import read_curves
-from .masks import Canvas
+from .masks import MaskReader
 from .painted_colors import read_colors
 from .partings import read_partings
 from .surfaces import read_rest_surfaces, read_surface
 
 #: node group of the modifier that Blender 5.2 gives to new hair
-_OWN_DYNAMICS = "Hair Dynamics"
+_HAIR_DYNAMICS = "Hair Dynamics"
 #: Its input for the mode, and the mode in which it only puts hair onto its deformed surface.
-_MODE, _ATTACHES = "Mode", "Animation"
+_MODE_INPUT, _ATTACH_ONLY = "Mode", "Animation"
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Source:
     """Hair and head as Blender evaluates them, in world space.
 
     dropped: reason -> number of curves that cannot be used.
-    kept: (strand_count,) indices of the curves that became strands.
+    curve_indices: (strand_count,) of the curves that became strands.
     density: (vertex_count,) how densely children grow on the head, or None.
     masks: of the settings of children.
     head_warning, density_warning: a warning with its remedy, or empty.
@@ -52,7 +52,7 @@ class Source:
 
     strands: StrandSet
     dropped: dict[str, int]
-    kept: Ints
+    curve_indices: Ints
     head: Surface | None
     density: Floats | None = None
     masks: Masks = field(default_factory=Masks)
@@ -88,12 +88,12 @@ class Source:
 def read_source(
     hair: bpy.types.Object,
     depsgraph: bpy.types.Depsgraph,
-    good: dict[str, Mask] | None = None,
+    last_usable_masks: dict[str, Mask] | None = None,
 ) -> Source:
     """Read hair and head; without a usable head, the hair alone, with a warning.
 
     Args:
-        good: see `Canvas`; new masks are added to it.
+        last_usable_masks: see `MaskReader`; new masks are added to it.
 
     Raises:
         HairloomError: the object holds no hair curves, or none that can be used.
@@ -101,10 +101,17 @@ def read_source(
     read = usable_curves(hair, depsgraph)
     head, head_warning = _read_head(hair, depsgraph)
     strands, rest = _on_head(hair, read.strands, head, depsgraph)
-    canvas = Canvas(hair, head_of(hair), head, strands, read.kept, {} if good is None else good)
-    density, density_warning = read_density(hair, canvas, depsgraph)
+    mask_reader = MaskReader(
+        hair,
+        head_of(hair),
+        head,
+        strands,
+        read.kept,
+        {} if last_usable_masks is None else last_usable_masks,
+    )
+    density, density_warning = read_density(hair, mask_reader, depsgraph)
     settings = settings_of(hair.data.hairloom.children, ChildrenSettings)
-    masks, mask_warnings = canvas.masks(settings, depsgraph)
+    masks, mask_warnings = mask_reader.masks(settings, depsgraph)
     colors, color_warnings = read_source_colors(hair, strands, head, depsgraph)
     partings, parting_warnings = read_partings(hair, depsgraph)
     return Source(
@@ -143,8 +150,8 @@ def _on_head(
         return strands, None
     rests, is_deformed_only = read_rest_surfaces(head_of(hair), depsgraph, head)
     # subdivision moves the surface too, but that is not a pose
-    least = DEFORMED if is_deformed_only else LOOSE_DISTANCE
-    found = RestHair.found(strands, rests, head, least)
+    min_distance = DEFORMED if is_deformed_only else LOOSE_DISTANCE
+    found = RestHair.found(strands, rests, head, min_distance)
     return (strands, None) if found is None else (found.on(head), found)
 
 
@@ -160,17 +167,19 @@ def read_source_colors(
 
 
 def read_density(
-    hair: bpy.types.Object, canvas: Canvas, depsgraph: bpy.types.Depsgraph
+    hair: bpy.types.Object, mask_reader: MaskReader, depsgraph: bpy.types.Depsgraph
 ) -> tuple[Floats | None, str]:
     """The density of children at each vertex of the head; without usable weights children grow
     everywhere, with a warning."""
     name = _density_name(hair)
-    if canvas.head is None or not name:
+    if mask_reader.head is None or not name:
         return None, ""
-    mask, warning = canvas.read(name, depsgraph)
+    mask, warning = mask_reader.read_or_last(name, depsgraph)
     if mask is not None and mask.is_zero:
-        return None, str(_no_density(name, canvas.surface))
-    return None if mask is None else mask.at_vertices(canvas.head, canvas.strands), warning
+        return None, str(_no_density(name, mask_reader.surface))
+    return None if mask is None else mask.at_vertices(
+        mask_reader.head, mask_reader.strands
+    ), warning
 
 
 def check_density(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
@@ -183,9 +192,9 @@ def check_density(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Non
     if not name:
         return
     read, (head, _) = usable_curves(hair, depsgraph), _read_head(hair, depsgraph)
-    canvas = Canvas(hair, head_of(hair), head, read.strands, read.kept)
-    if head is not None and canvas.mask(name, depsgraph).is_zero:
-        raise _no_density(name, canvas.surface)
+    mask_reader = MaskReader(hair, head_of(hair), head, read.strands, read.kept)
+    if head is not None and mask_reader.mask(name, depsgraph).is_zero:
+        raise _no_density(name, mask_reader.surface)
 
 
 def _density_name(hair: bpy.types.Object) -> str:
@@ -202,7 +211,7 @@ def _no_density(name: str, head: bpy.types.Object | None) -> HairloomError:
     )
 
 
-def own_dynamics(hair: bpy.types.Object) -> list[bpy.types.Modifier]:
+def hair_dynamics_modifiers(hair: bpy.types.Object) -> list[bpy.types.Modifier]:
     """The object's modifiers with Blender's own hair dynamics that simulate in viewport or render.
 
     They would move the hair a second time. Those in mode *Animation*, as new hair has them, only
@@ -213,26 +222,26 @@ def own_dynamics(hair: bpy.types.Object) -> list[bpy.types.Modifier]:
         for modifier in hair.modifiers
         if modifier.type == "NODES"
         and modifier.node_group is not None
-        and modifier.node_group.name.startswith(_OWN_DYNAMICS)
+        and modifier.node_group.name.startswith(_HAIR_DYNAMICS)
         and (modifier.show_viewport or modifier.show_render)
-        and ((mode := _mode(modifier)) is None or mode.value != _ATTACHES)
+        and ((mode := _mode(modifier)) is None or mode.value != _ATTACH_ONLY)
     ]
 
 
 def _mode(modifier: bpy.types.Modifier) -> Any:
     """The input with the mode of Hair Dynamics; None in a group without one."""
     sockets = modifier.node_group.interface.items_tree
-    found = [each for each in sockets if each.item_type == "SOCKET" and each.name == _MODE]
+    found = [each for each in sockets if each.item_type == "SOCKET" and each.name == _MODE_INPUT]
     return getattr(modifier.properties.inputs, found[0].identifier, None) if found else None
 
 
-def refuse_own_dynamics(hair: bpy.types.Object) -> None:
+def check_no_hair_dynamics(hair: bpy.types.Object) -> None:
     """Refuse to simulate twice.
 
     Raises:
         HairloomError: Blender's own hair dynamics moves this hair already.
     """
-    for modifier in own_dynamics(hair):
+    for modifier in hair_dynamics_modifiers(hair):
         if modifier.show_viewport:
             raise HairloomError(
                 f"its modifier {modifier.name} simulates it already",
@@ -246,21 +255,21 @@ def dynamics_warnings(hair: bpy.types.Object) -> tuple[str, ...]:
     return tuple(
         f"{hair.name}: its modifier {modifier.name} simulates it too, so Hairloom does not. "
         "Press Mute Hair Dynamics."
-        for modifier in own_dynamics(hair)
+        for modifier in hair_dynamics_modifiers(hair)
         if modifier.show_viewport
     )
 
 
-def mute_own_dynamics(hair: bpy.types.Object) -> int:
+def mute_hair_dynamics(hair: bpy.types.Object) -> int:
     """Set Blender's own hair dynamics to only put hair onto its surface; modifiers without that
     mode are turned off. Returns how many were changed."""
-    modifiers = own_dynamics(hair)
+    modifiers = hair_dynamics_modifiers(hair)
     for modifier in modifiers:
         mode = _mode(modifier)
         if mode is None:
             modifier.show_viewport = modifier.show_render = False
         else:
-            mode.value = _ATTACHES
+            mode.value = _ATTACH_ONLY
     if modifiers:
         hair.update_tag()
     return len(modifiers)

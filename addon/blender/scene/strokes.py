@@ -6,16 +6,16 @@ import bpy
 
 from ...arrays import Floats
 from ...errors import HairloomError
-from .drawn_lines import lines_of
-from .own_collections import objects_in
+from .drawn_lines import joined_lines
+from .hair_collections import objects_in
 
 #: setting of the hair that names the collection, and the name for what it holds
-SETTING, KIND = "stroke_collection", "Strokes"
+COLLECTION_PROPERTY, COLLECTION_LABEL = "stroke_collection", "Strokes"
 
 
 def strokes_of(hair: bpy.types.Object) -> tuple[bpy.types.Object, ...]:
     """The objects that this hair is combed along, each once."""
-    return objects_in(hair, SETTING)
+    return objects_in(hair, COLLECTION_PROPERTY)
 
 
 def read_strokes(
@@ -27,7 +27,7 @@ def read_strokes(
     unusable: list[str] = []
     for obj in strokes_of(hair):
         try:
-            found += lines_of(obj, depsgraph)
+            found += joined_lines(obj, depsgraph)
         except HairloomError as error:
             unusable.append(str(error))
     return tuple(found), tuple(unusable)

@@ -29,14 +29,14 @@ CARD_ATTRIBUTES = ("occlusion", "along")
 
 
 @dataclass
-class _Read:
+class _SurfaceCache:
     """The surfaces that were read. in_use: those that may still be in use. last: the one that was
     read last, kept in case it is read again."""
 
     in_use: list[weakref.ref[Surface]] = field(default_factory=list)
     last: Surface | None = None
 
-    def kept(self, surface: Surface) -> Surface:
+    def shared(self, surface: Surface) -> Surface:
         """An equal surface that is in use already, or else this one."""
         there = [known for one in self.in_use if (known := one()) is not None]
         self.last = next((known for known in there if _is_same(surface, known)), surface)
@@ -46,7 +46,7 @@ class _Read:
         return self.last
 
 
-_read = _Read()
+_cache = _SurfaceCache()
 
 
 def read_surface(
@@ -77,7 +77,7 @@ def read_surface(
                 remedy="Unwrap it (Edit Mode, UV > Unwrap), or omit --strict",
             )
         surface = Surface(_positions(mesh), triangles, corner_uv)
-    return _read.kept(surface.transformed(np.array(obj.evaluated_get(depsgraph).matrix_world)))
+    return _cache.shared(surface.transformed(np.array(obj.evaluated_get(depsgraph).matrix_world)))
 
 
 def read_rest_surfaces(
@@ -95,7 +95,10 @@ def read_rest_surfaces(
     is_deformed_only = len(original.vertices) == len(posed.positions)
     found = [rest]
     if is_deformed_only:
-        found = [_positions(original) if rest is None else rest, _keyed(original, depsgraph)]
+        found = [
+            _positions(original) if rest is None else rest,
+            _shape_key_positions(original, depsgraph),
+        ]
     matrix = np.array(obj.evaluated_get(depsgraph).matrix_world)
     surfaces = [
         replace(posed, positions=moved(each, matrix))
@@ -105,7 +108,7 @@ def read_rest_surfaces(
     return surfaces, is_deformed_only
 
 
-def _keyed(mesh: bpy.types.Mesh, depsgraph: bpy.types.Depsgraph) -> Floats | None:
+def _shape_key_positions(mesh: bpy.types.Mesh, depsgraph: bpy.types.Depsgraph) -> Floats | None:
     """The vertices with the current relative shape keys alone; None without any."""
     if mesh.shape_keys is None or not mesh.shape_keys.use_relative:
         return None

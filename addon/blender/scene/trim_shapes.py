@@ -15,11 +15,11 @@ from ...strands import Surface
 from ...strands.crossings import first_crossings
 from ...strands.mesh_faults import edges_of
 from ..base.objects import head_of, matrix_of
-from .own_collections import objects_in
+from .hair_collections import objects_in
 from .surfaces import read_surface
 
 #: setting of the hair that names the collection, and the name for what it holds
-SETTING, KIND = "trim_collection", "Trim Shapes"
+COLLECTION_PROPERTY, COLLECTION_LABEL = "trim_collection", "Trim Shapes"
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ class Solid:
 
 def trim_shapes_of(hair: bpy.types.Object) -> tuple[bpy.types.Object, ...]:
     """The objects that trim this hair, each once."""
-    return objects_in(hair, SETTING)
+    return objects_in(hair, COLLECTION_PROPERTY)
 
 
 def may_trim(obj: bpy.types.Object, hair: bpy.types.Object) -> bool:

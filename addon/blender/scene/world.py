@@ -34,16 +34,16 @@ from ..base.latest_job import LatestJob
 
 _SCRIPT = Path(__file__).with_name("render_panorama.py")
 #: number of states of worlds that are cached, so that an animated one does not fill the memory
-_KEPT = 16
+_CACHE_SIZE = 16
 #: timeout [s] for another Blender to start and render a panorama, on a busy machine too
-_PATIENCE = 120.0
+_TIMEOUT = 120.0
 #: settings of nodes that do not affect light, and the depth to which groups are compared
-_UNSEEN = {each.identifier for each in bpy.types.Node.bl_rna.properties} - {"mute"}
-_DEPTH = 16
+_IGNORED_PROPERTIES = {each.identifier for each in bpy.types.Node.bl_rna.properties} - {"mute"}
+_MAX_GROUP_DEPTH = 16
 
 
 @dataclass(frozen=True, eq=False)
-class _Read:
+class _WorldLight:
     """A world as it was read. note: what could not be read, with its remedy; empty: all is well."""
 
     environment: Environment
@@ -51,7 +51,7 @@ class _Read:
 
 
 #: cache, the most recently used last
-_known: dict[Hashable, _Read] = {}
+_cache: dict[Hashable, _WorldLight] = {}
 
 
 def read_environment(scene: bpy.types.Scene, *, blocking: bool = True) -> Environment:
@@ -102,52 +102,52 @@ def _studio_panorama(path: str) -> Floats | None:
         return None
 
 
-def _read(world: bpy.types.World | None, *, blocking: bool) -> _Read:
+def _read(world: bpy.types.World | None, *, blocking: bool) -> _WorldLight:
     if world is None:
-        return _once(None, lambda: _Read(Environment()))
+        return _cached(None, lambda: _WorldLight(Environment()))
     surface = _surface(world)
     if surface is None:
-        return _plain(world)
+        return _plain_world(world)
     picture = _picture(surface)
     if picture is not None:
         return picture
     if _is_plain(surface):
-        return _plain(world)
+        return _plain_world(world)
     uid, key = world.original.session_uid, _key(world)
-    if key not in _known and not blocking:
+    if key not in _cache and not blocking:
         # while a sky is being edited, its last rendering is used until the new one is there
-        _want(uid, key, _colors(world))
-        return _rendered_last(uid) or _plain(world)
+        _request_render(uid, key, _colors(world))
+        return _last_rendering(uid) or _plain_world(world)
 
-    def render() -> _Read:
+    def render() -> _WorldLight:
         with tempfile.TemporaryDirectory(prefix="hairloom") as folder:
             _write(world, Path(folder))
-            return _rendered(Path(folder), world.name, _colors(world))
+            return _render_panorama(Path(folder), world.name, _colors(world))
 
-    return _once(key, render)
+    return _cached(key, render)
 
 
 def _key(world: bpy.types.World) -> Hashable:
     return "nodes", world.original.session_uid, _state(world.node_tree)
 
 
-def _rendered_last(uid: int) -> _Read | None:
+def _last_rendering(uid: int) -> _WorldLight | None:
     """The last rendering of the world with this session number; None: there is none."""
-    keys = (each for each in reversed(_known) if isinstance(each, tuple))
-    return next((_known[key] for key in keys if key[:2] == ("nodes", uid)), None)
+    keys = (each for each in reversed(_cache) if isinstance(each, tuple))
+    return next((_cache[key] for key in keys if key[:2] == ("nodes", uid)), None)
 
 
-def _want(uid: int, key: Hashable, plain: tuple[float, float, float]) -> None:
+def _request_render(uid: int, key: Hashable, plain: tuple[float, float, float]) -> None:
     """Have the world with this session number rendered in the background."""
 
-    def begin() -> Callable[[object], tuple[Hashable, _Read]]:
+    def begin() -> Callable[[object], tuple[Hashable, _WorldLight]]:
         found = (each for each in bpy.data.worlds if each.session_uid == uid)
         world = next(found, None)
         if world is None or world.node_tree is None:  # gone since, so the result is not used
-            return lambda _: (key, _Read(Environment(plain)))
+            return lambda _: (key, _WorldLight(Environment(plain)))
         folder = tempfile.TemporaryDirectory(prefix="hairloom")
         _write(world, Path(folder.name))
-        work = partial(_rendered_beside, folder, world.name, plain, _key(world))
+        work = partial(_render_in_thread, folder, world.name, plain, _key(world))
         return lambda _: work()
 
     if _job.wants(key) and not _job.is_pending:
@@ -155,18 +155,18 @@ def _want(uid: int, key: Hashable, plain: tuple[float, float, float]) -> None:
     _job.want(key, begin)
 
 
-def _once(key: Hashable, make: Callable[[], _Read]) -> _Read:
-    read = _known.pop(key, None) or make()
-    while len(_known) >= _KEPT:
-        del _known[next(iter(_known))]
-    _known[key] = read
+def _cached(key: Hashable, make: Callable[[], _WorldLight]) -> _WorldLight:
+    read = _cache.pop(key, None) or make()
+    while len(_cache) >= _CACHE_SIZE:
+        del _cache[next(iter(_cache))]
+    _cache[key] = read
     return read
 
 
-def _plain(world: bpy.types.World) -> _Read:
+def _plain_world(world: bpy.types.World) -> _WorldLight:
     """The colour of the Background, ignoring other nodes, or of a world without nodes."""
     color = _colors(world)
-    return _once(("plain", color), lambda: _Read(Environment(color)))
+    return _cached(("plain", color), lambda: _WorldLight(Environment(color)))
 
 
 def _colors(world: bpy.types.World) -> tuple[float, float, float]:
@@ -175,7 +175,7 @@ def _colors(world: bpy.types.World) -> tuple[float, float, float]:
     if node is None:
         red, green, blue = world.color
         return (red, green, blue)
-    color, giver = node.inputs["Color"].default_value, _giver(node.inputs["Color"])
+    color, giver = node.inputs["Color"].default_value, _linked_node(node.inputs["Color"])
     if giver is not None and giver.type == "RGB":
         color = giver.outputs[0].default_value
     strength = node.inputs["Strength"].default_value
@@ -188,25 +188,25 @@ def _surface(world: bpy.types.World) -> bpy.types.Node | None:
     if world.node_tree is None:
         return None
     output = world.node_tree.get_output_node("CYCLES") or world.node_tree.get_output_node("EEVEE")
-    return None if output is None else _giver(output.inputs["Surface"])
+    return None if output is None else _linked_node(output.inputs["Surface"])
 
 
 def _is_plain(surface: bpy.types.Node) -> bool:
     if surface.type != "BACKGROUND" or surface.mute or surface.inputs["Strength"].is_linked:
         return False
     color = surface.inputs["Color"]
-    giver = _giver(color)
+    giver = _linked_node(color)
     return not color.is_linked or (giver is not None and giver.type == "RGB" and not giver.mute)
 
 
-def _picture(surface: bpy.types.Node) -> _Read | None:
+def _picture(surface: bpy.types.Node) -> _WorldLight | None:
     """The world of an Environment Texture that is only turned and scaled in strength."""
     if surface.type != "BACKGROUND" or surface.mute or surface.inputs["Strength"].is_linked:
         return None
-    node = _giver(surface.inputs["Color"])
+    node = _linked_node(surface.inputs["Color"])
     if node is None or node.type != "TEX_ENVIRONMENT" or node.mute or node.image is None:
         return None
-    turn = _turn(node.inputs["Vector"])
+    turn = _rotation(node.inputs["Vector"])
     is_file = node.image.source in ("FILE", "GENERATED")
     if turn is None or node.projection != "EQUIRECTANGULAR" or not is_file:
         return None
@@ -215,13 +215,15 @@ def _picture(surface: bpy.types.Node) -> _Read | None:
         state = _image_state(image)
         key = ("picture", state, strength, turn.tobytes())
         uid = image.original.session_uid
-        return _once(key, lambda: _Read(environment_of(strength * _panorama(uid, state), turn)))
+        return _cached(
+            key, lambda: _WorldLight(environment_of(strength * _panorama(uid, state), turn))
+        )
     except HairloomError as error:
         note = f"World: {error} Until then it is black."
-        return _once(("missing", note), lambda: _Read(Environment(), note))
+        return _cached(("missing", note), lambda: _WorldLight(Environment(), note))
 
 
-def _turn(socket: bpy.types.NodeSocket) -> Floats | None:
+def _rotation(socket: bpy.types.NodeSocket) -> Floats | None:
     """The rotation from a panorama's directions to the world's, (3, 3); None: it is not one."""
     if not socket.is_linked:
         return np.eye(3)
@@ -233,14 +235,14 @@ def _turn(socket: bpy.types.NodeSocket) -> Floats | None:
     values = {each.name: each.default_value for each in node.inputs[1:]}
     moves = node.vector_type in ("POINT", "TEXTURE") and Vector(values["Location"]).length > 0.0
     is_scaled = any(abs(each - 1.0) > 1e-6 for each in values["Scale"])
-    before = _turn(node.inputs["Vector"])
+    before = _rotation(node.inputs["Vector"])
     if moves or is_scaled or before is None or node.vector_type == "NORMAL":
         return None
     own = np.array(Euler(values["Rotation"], "XYZ").to_matrix())
     return before @ (own if node.vector_type == "TEXTURE" else own.T)
 
 
-def _giver(socket: bpy.types.NodeSocket) -> bpy.types.Node | None:
+def _linked_node(socket: bpy.types.NodeSocket) -> bpy.types.Node | None:
     """The node that is linked to an input, past reroutes."""
     while socket.is_linked:
         node = socket.links[0].from_node
@@ -296,7 +298,11 @@ def _state(tree: bpy.types.NodeTree, depth: int = 0) -> Hashable:
 
 
 def _node_state(node: bpy.types.Node, depth: int) -> tuple[Hashable, ...]:
-    own = (each.identifier for each in node.bl_rna.properties if each.identifier not in _UNSEEN)
+    own = (
+        each.identifier
+        for each in node.bl_rna.properties
+        if each.identifier not in _IGNORED_PROPERTIES
+    )
     values = tuple((name, _value(getattr(node, name), depth)) for name in own)
     inputs = tuple(_value(getattr(each, "default_value", None), depth) for each in node.inputs)
     outputs = tuple(_value(getattr(each, "default_value", None), depth) for each in node.outputs)
@@ -307,7 +313,7 @@ def _value(value: Any, depth: int) -> Hashable:
     if isinstance(value, bpy.types.Image):
         return _image_state(value)
     if isinstance(value, bpy.types.NodeTree):
-        return _state(value, depth + 1) if depth < _DEPTH else value.name_full
+        return _state(value, depth + 1) if depth < _MAX_GROUP_DEPTH else value.name_full
     if isinstance(value, bpy.types.ID):
         return value.name_full
     if isinstance(value, bpy.types.ColorRamp):
@@ -332,7 +338,7 @@ def _write(world: bpy.types.World, folder: Path) -> None:
     )
 
 
-def _rendered(folder: Path, name: str, plain: tuple[float, float, float]) -> _Read:
+def _render_panorama(folder: Path, name: str, plain: tuple[float, float, float]) -> _WorldLight:
     """The world that was written into this folder, rendered by another Blender."""
     panorama = folder / "panorama.exr"
     program, settings = blender_command(), None
@@ -342,9 +348,9 @@ def _rendered(folder: Path, name: str, plain: tuple[float, float, float]) -> _Re
     files = str(folder / "world.blend"), str(panorama)
     try:
         command = [*program, str(_SCRIPT), "--", *files]
-        done = run_child(command, seconds=_PATIENCE, environment=settings)
+        done = run_child(command, seconds=_TIMEOUT, environment=settings)
         if done.returncode == 0:
-            return _Read(environment_of(_rgb(read_texture(panorama, is_color=True))))
+            return _WorldLight(environment_of(_rgb(read_texture(panorama, is_color=True))))
         lines = done.stderr.decode(errors="replace").strip().splitlines()
         why = lines[-1] if lines else f"it exited with code {done.returncode}"
     except (OSError, TimeoutExpired, HairloomError) as error:
@@ -353,28 +359,28 @@ def _rendered(folder: Path, name: str, plain: tuple[float, float, float]) -> _Re
         f"World '{name}': another Blender could not render its nodes ({why}), so its plain colour "
         "lights hair. Use only an Environment Texture, a Mapping and a Background."
     )
-    return _Read(Environment(plain), note)
+    return _WorldLight(Environment(plain), note)
 
 
-def _rendered_beside(
+def _render_in_thread(
     folder: tempfile.TemporaryDirectory[str],
     name: str,
     plain: tuple[float, float, float],
     key: Hashable,
-) -> tuple[Hashable, _Read]:
+) -> tuple[Hashable, _WorldLight]:
     with folder:
-        return key, _rendered(Path(folder.name), name, plain)
+        return key, _render_panorama(Path(folder.name), name, plain)
 
 
-def _take() -> None:
+def _take_result() -> None:
     """Take a world rendered in the background, and have worlds read again."""
     found = _job.take()
     if found is not None:
         key, read = found
-        _once(key, lambda: read)
+        _cached(key, lambda: read)
     for scene in bpy.data.scenes:
         if scene.world is not None:
             scene.world.update_tag()
 
 
-_job: LatestJob[Hashable, tuple[Hashable, _Read]] = LatestJob("hairloom world", _take)
+_job: LatestJob[Hashable, tuple[Hashable, _WorldLight]] = LatestJob("hairloom world", _take_result)

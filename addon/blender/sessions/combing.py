@@ -16,8 +16,8 @@ from ...strands import StrandSet, Surface
 from ..base.objects import check_curves_editable, head_of
 from ..base.parts import Part, Parts
 from ..colliders.fields import solid_of
-from ..scene.curves import read_own_curves, write_own_curves
-from ..scene.kept_shape import KeptShape
+from ..scene.curves import read_original_curves, write_original_curves
+from ..scene.shape_backup import ShapeBackup
 from ..scene.surfaces import read_surface
 
 
@@ -54,7 +54,7 @@ def comb(
     points_of: Callable[[StrandSet], Floats],
     begin: Floats | None = None,
     *,
-    kept_as: KeptShape | None = None,
+    kept_as: ShapeBackup | None = None,
 ) -> Parts[Combed]:
     """Move the points of the hair's curves; curves that change are led out of the surface.
 
@@ -66,7 +66,7 @@ def comb(
     Raises:
         HairloomError: no usable curves.
     """
-    own = read_own_curves(hair, depsgraph, begin)
+    own = read_original_curves(hair, depsgraph, begin)
     place, count = hair.name, own.strands.strand_count
 
     def work() -> tuple[Floats, int]:
@@ -84,8 +84,8 @@ def comb(
 
     points, changed = yield Part(f"Combing {count:,} curves", work)
     if kept_as is not None:
-        kept_as.keep(hair)
-    write_own_curves(hair, own, points, depsgraph)
+        kept_as.save(hair)
+    write_original_curves(hair, own, points, depsgraph)
     if kept_as is not None:
-        kept_as.seal(hair)
+        kept_as.mark_result(hair)
     return Combed(changed, count, own.dropped)

@@ -9,7 +9,7 @@ from ...groom.flow import combed_along
 from ...groom.flow_settings import FlowSettings
 from ..base.outcome import Outcome
 from ..base.parts import Parts
-from ..scene.kept_shape import BEFORE_FLOW
+from ..scene.shape_backup import BEFORE_FLOW
 from ..scene.strokes import read_strokes
 from .combing import comb, surface_to_comb_on
 
@@ -37,7 +37,7 @@ def comb_flow(
         surface,
         depsgraph,
         lambda bound: combed_along(bound, lines, surface, settings),
-        BEFORE_FLOW.before(hair),
+        BEFORE_FLOW.read_if_unchanged(hair),
         kept_as=BEFORE_FLOW,
     )
     result = f"{hair.name}: {done.changed:,} of {done.all:,} curves follow its strokes"

@@ -31,7 +31,7 @@ from ..base.objects import Body, head_of, matrix_of
 from ..colliders.ties import TrackedHolders
 from ..properties.groom_settings import GroomSettings
 from ..scene.curves import read_curves
-from ..scene.masks import Canvas
+from ..scene.masks import MaskReader
 from ..scene.partings import is_same_state, parting_state, read_partings
 from ..scene.poses import check_finite, read_pose
 from ..scene.source import (
@@ -69,7 +69,7 @@ class GroomSource:
         self._holders = TrackedHolders.of(hair, depsgraph)
         self._last_good_masks: dict[str, Mask] = {}
         self._shown_map: tuple[str, Mask | None] | None = None
-        self._overlay_canvas: Canvas | None = None
+        self._overlay_canvas: MaskReader | None = None
         self._motion_masks = NO_MASKS
         self._painted_guides: tuple[Ints, Masks, PaintedGuides | None] | None = None
         source = read_source(hair, depsgraph, self._last_good_masks)
@@ -82,7 +82,7 @@ class GroomSource:
         self._parting_state = parting_state(hair)
         self.settings = GroomSettings.of(hair, depsgraph)
         self._kept = Kept()
-        self._read_motion_masks(self._canvas(self.source), self.settings, depsgraph)
+        self._read_motion_masks(self._mask_reader(self.source), self.settings, depsgraph)
         self._style_warning = ""
         self._styled_rig: _StyledRig | None = None
         self.request = BuildRequest(
@@ -206,10 +206,10 @@ class GroomSource:
             strands = strands.with_points(before.strands.points)  # they differ in each frame
         if _is_same_hair(strands, before.strands, back):
             strands, rest = before.strands, before.rest
-        canvas = self._canvas(replace(before, strands=strands, kept=read.kept))
-        self._read_motion_masks(canvas, settings, depsgraph)
-        density, warning = read_density(hair, canvas, depsgraph)
-        masks, mask_warnings = canvas.masks(settings[ChildrenSettings], depsgraph)
+        mask_reader = self._mask_reader(replace(before, strands=strands, curve_indices=read.kept))
+        self._read_motion_masks(mask_reader, settings, depsgraph)
+        density, warning = read_density(hair, mask_reader, depsgraph)
+        masks, mask_warnings = mask_reader.masks(settings[ChildrenSettings], depsgraph)
         colors, color_warnings = read_source_colors(hair, strands, before.head, depsgraph)
         holding = TrackedHolders.of(hair, depsgraph, known.holders, back)
         partings, parting_warnings = before.partings, before.parting_warnings
@@ -224,7 +224,7 @@ class GroomSource:
             strands=strands,
             rest=rest,
             dropped=read.dropped,
-            kept=read.kept,
+            curve_indices=read.kept,
             density=density,
             density_warning=warning,
             masks=masks,
@@ -322,11 +322,11 @@ class GroomSource:
             HairloomError: the hair is gone.
         """
         hair, (density, masks) = self.hair.found(), self.painted
-        canvas, settings = self._canvas(self.source), self.settings[ChildrenSettings]
-        self._overlay_canvas = canvas  # the overlay reads it before anything else is painted
+        mask_reader, settings = self._mask_reader(self.source), self.settings[ChildrenSettings]
+        self._overlay_canvas = mask_reader  # the overlay reads it before anything else is painted
         self.painted = (
-            read_density(hair, canvas, depsgraph)[0],
-            canvas.masks(settings, depsgraph)[0],
+            read_density(hair, mask_reader, depsgraph)[0],
+            mask_reader.masks(settings, depsgraph)[0],
         )
         is_same = np.array_equal(density, self.painted[0])  # type: ignore[arg-type]
         return not (is_same and masks == self.painted[1])
@@ -401,8 +401,8 @@ class GroomSource:
         """The shown map at each guide, (cv_count or 1, guide_count); None: there is none."""
         name = shown_map_name(self.hair.found())
         if self._shown_map is None or self._shown_map[0] != name:
-            canvas = self._overlay_canvas or self._canvas(self.source)
-            mask = canvas.read(name, depsgraph)[0] if name else None
+            mask_reader = self._overlay_canvas or self._mask_reader(self.source)
+            mask = mask_reader.read_or_last(name, depsgraph)[0] if name else None
             self._shown_map = name, mask
         mask = self._shown_map[1]
         painted = None if mask is None else painted_guides(rig, Masks({name: mask}))
@@ -412,17 +412,22 @@ class GroomSource:
         """Read the shown map again when it is next needed."""
         self._shown_map = self._overlay_canvas = None
 
-    def _canvas(self, source: Source) -> Canvas:
-        """The canvas of this source."""
+    def _mask_reader(self, source: Source) -> MaskReader:
+        """The reader of masks of this source."""
         hair = self.hair.found()
-        return Canvas(
-            hair, head_of(hair), source.head, source.strands, source.kept, self._last_good_masks
+        return MaskReader(
+            hair,
+            head_of(hair),
+            source.head,
+            source.strands,
+            source.curve_indices,
+            self._last_good_masks,
         )
 
     def _read_motion_masks(
-        self, canvas: Canvas, settings: GroomSettings, depsgraph: bpy.types.Depsgraph
+        self, mask_reader: MaskReader, settings: GroomSettings, depsgraph: bpy.types.Depsgraph
     ) -> None:
-        masks, self._motion_warnings = canvas.masks(settings[DynamicsSettings], depsgraph)
+        masks, self._motion_warnings = mask_reader.masks(settings[DynamicsSettings], depsgraph)
         if masks != self._motion_masks:
             self._motion_masks = masks
 

@@ -20,16 +20,16 @@ from ..base.objects import head_of, matrix_of
 from ..base.outcome import Outcome
 from ..base.parts import Part, Parts
 from ..colliders.fields import solid_of
-from ..scene.curves import curve_offsets, curve_points, put_points, read_own_curves
+from ..scene.curves import curve_offsets, curve_points, put_points, read_original_curves
 from ..scene.groom_attributes import CLOSEST_GUIDES, GUIDE, STRAND_ID
-from ..scene.kept_shape import KEPT_SHAPES
+from ..scene.shape_backup import SHAPE_BACKUPS
 from .combing import surface_to_comb_on
 
 #: point attributes that hold positions in object space, beside the position itself
 _PLACES = (
     "handle_left",
     "handle_right",
-    *(shape.attribute for shape in KEPT_SHAPES),
+    *(shape.attribute for shape in SHAPE_BACKUPS),
 )
 
 
@@ -46,7 +46,7 @@ def mirror_hair(
     head = head_of(hair)
     assert head is not None, "there is a surface"
     frame = matrix_of(head, depsgraph)
-    own = read_own_curves(hair, depsgraph)
+    own = read_original_curves(hair, depsgraph)
     side = sides(own.strands.roots, surface, frame, settings)
     if not (side > 0).any():
         raise HairloomError(
@@ -61,7 +61,7 @@ def mirror_hair(
         lambda: _led_out(mirrored(own.strands.take(source), surface, across), surface),
     )
     replaced = own.kept[side < 0]
-    unchanged = [shape for shape in KEPT_SHAPES if shape.before(hair) is not None]
+    unchanged = [shape for shape in SHAPE_BACKUPS if shape.read_if_unchanged(hair) is not None]
     hair_frame = matrix_of(hair, depsgraph)
     to_own = np.linalg.inv(hair_frame)
     _replace(
@@ -73,7 +73,7 @@ def mirror_hair(
         to_own @ across @ hair_frame,
     )
     for shape in unchanged:  # kept shapes are mirrored too, so they can still be restored
-        shape.seal(hair)
+        shape.mark_result(hair)
     middle = int((side == 0).sum())
     result = f"{hair.name}: {len(source):,} curves mirrored, {len(replaced):,} replaced"
     if middle:

@@ -39,7 +39,7 @@ from ..colliders.obstacles import Obstacles
 from ..colliders.rigs import MadeRig
 from ..properties.groom_settings import GroomSettings
 from ..scene.forces import force_fields_of, gravity_of
-from ..scene.source import Source, dynamics_warnings, refuse_own_dynamics
+from ..scene.source import Source, check_no_hair_dynamics, dynamics_warnings
 from .compute_solver import texels_of
 from .first_contacts import FirstContacts, PlayStart
 from .groom_source import GroomSource
@@ -554,7 +554,7 @@ class Session:
                 the call does not block.
         """
         self.is_playing = False
-        refuse_own_dynamics(self.hair.found())
+        check_no_hair_dynamics(self.hair.found())
         self.take_settings()
         if blocking:
             self.finish(depsgraph)

@@ -28,11 +28,11 @@ from ..base.objects import check_curves_editable, head_of
 from ..base.outcome import Outcome
 from ..colliders.fields import solid_of
 from ..colliders.obstacles import Obstacles
-from ..scene.carried_weight import carry_whole_weight
-from ..scene.curves import read_own_curves, write_own_curves
+from ..scene.curves import read_original_curves, write_original_curves
 from ..scene.forces import gravity_of
-from ..scene.kept_shape import COMBED
-from ..scene.masks import Canvas
+from ..scene.masks import MaskReader
+from ..scene.sag_correction import set_full_sag_correction
+from ..scene.shape_backup import BEFORE_SETTLE
 from .groom_source import GroomSource
 from .prepared_groom import PreparedGroom
 
@@ -53,7 +53,7 @@ def settle_hair(
     """
     check_curves_editable(hair, depsgraph)
     source = GroomSource(hair, depsgraph)
-    own = read_own_curves(hair, depsgraph, COMBED.before(hair))
+    own = read_original_curves(hair, depsgraph, BEFORE_SETTLE.read_if_unchanged(hair))
     read = source.source
     strands = own.strands
     if read.rest is not None and read.head is not None:
@@ -70,8 +70,10 @@ def settle_hair(
     _check_roots(hair, rig)
     dynamics, pose = source.settings[DynamicsSettings], source.pose(rig, depsgraph)
     posed, warnings = _colliders(hair, source, rig, dynamics, depsgraph)
-    canvas = Canvas(hair, head_of(hair), read.head, strands, own.kept, is_own=True)
-    masks, notes = canvas.masks(dynamics, depsgraph)
+    mask_reader = MaskReader(
+        hair, head_of(hair), read.head, strands, own.kept, is_before_modifiers=True
+    )
+    masks, notes = mask_reader.masks(dynamics, depsgraph)
     warnings += tuple(note for note in notes if note not in warnings)
     gravity = gravity_of(depsgraph.scene)
     painted = painted_guides(rig, masks) if masks else None
@@ -97,10 +99,10 @@ def _stored(
     Args:
         is_out: (strand_count,) whether each strand is outside the surface.
     """
-    COMBED.keep(hair)
-    write_own_curves(hair, own, settled.points, depsgraph)
-    COMBED.seal(hair)
-    warnings += carry_whole_weight(hair.data)
+    BEFORE_SETTLE.save(hair)
+    write_original_curves(hair, own, settled.points, depsgraph)
+    BEFORE_SETTLE.mark_result(hair)
+    warnings += set_full_sag_correction(hair.data)
     lost = int((~is_out).sum())
     if lost:
         are = "1 curve is" if lost == 1 else f"{lost:,} curves are"

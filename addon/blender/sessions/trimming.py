@@ -11,8 +11,8 @@ from ...groom.trim import trimmed
 from ..base.objects import check_curves_editable
 from ..base.outcome import Outcome
 from ..base.parts import Part, Parts
-from ..scene.curves import read_own_curves, write_own_curves
-from ..scene.kept_shape import BEFORE_TRIM
+from ..scene.curves import read_original_curves, write_original_curves
+from ..scene.shape_backup import BEFORE_TRIM
 from ..scene.trim_shapes import read_shapes, trim_shapes_of
 
 
@@ -32,12 +32,12 @@ def trim_to_shapes(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Pa
             place=hair.name,
             remedy="Select a closed mesh, a flat one or an Empty together with the hair",
         )
-    own = read_own_curves(hair, depsgraph, BEFORE_TRIM.before(hair))
+    own = read_original_curves(hair, depsgraph, BEFORE_TRIM.read_if_unchanged(hair))
     title = f"Trimming {own.strands.strand_count:,} curves"
     cut = yield Part(title, partial(trimmed, own.strands, shapes))
-    BEFORE_TRIM.keep(hair)
-    write_own_curves(hair, own, cut.points, depsgraph)
-    BEFORE_TRIM.seal(hair)
+    BEFORE_TRIM.save(hair)
+    write_original_curves(hair, own, cut.points, depsgraph)
+    BEFORE_TRIM.mark_result(hair)
     trimmed_count = int(cut.is_trimmed.sum())
     left, outside = len(cut.is_trimmed) - trimmed_count, int(cut.is_outside.sum())
     result = f"{hair.name}: {trimmed_count:,} curves trimmed, {left:,} left unchanged"

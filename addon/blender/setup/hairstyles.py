@@ -33,7 +33,7 @@ from ..colliders.fields import solid_of
 from ..properties import previews
 from ..properties.presets import apply, named_preset
 from ..properties.properties import settings_of
-from ..scene.bust import bust_object, encoded_skin
+from ..scene.bust import bust_object, encoded_skin_picture
 from ..scene.bust_data import load_bust
 from ..scene.curves import read_curves, write_curves
 from ..scene.hair_material import put_look_material
@@ -120,7 +120,7 @@ def add_head(collection: bpy.types.Collection, skin: str) -> Parts[bpy.types.Obj
     Args:
         skin: one of bust_skin.TONES.
     """
-    yield Part("Painting the skin", partial(encoded_skin, skin))  # fills its cache
+    yield Part("Painting the skin", partial(encoded_skin_picture, skin))  # fills its cache
     head = bust_object(_HEAD, skin)
     collection.objects.link(head)
     return head
@@ -183,7 +183,11 @@ def add_hairstyle(
         check_shape_editable(head)
     with new_blocks_removed_on_error() as note:
         hair = write_curves(
-            f"{head.name} {style.title}", growth.strands, head, collection, are_found=True
+            f"{head.name} {style.title}",
+            growth.strands,
+            head,
+            collection,
+            are_widths_estimated=True,
         )
         note()
         for one in style.modifiers:
@@ -441,7 +445,7 @@ def add_face_hair(
     surface = read_surface(head, depsgraph, need_uv=True, place=head.name)
     strands = yield from face_hair(head, surface, depsgraph)
     name = f"{head.name} Brows and Lashes"
-    hair = write_curves(name, strands, head, collection, are_found=True)
+    hair = write_curves(name, strands, head, collection, are_widths_estimated=True)
     group = like.data.hairloom.shading
     apply(settings_of(group, group.settings), hair)
     hair.data.hairloom.children.method = "none"

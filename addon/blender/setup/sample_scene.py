@@ -13,7 +13,7 @@ from ...groom.settings import GrowSettings
 from ...groom.widths import with_widths
 from ..base.parts import Part, Parts, new_blocks_removed_on_error
 from ..base.vertex_weights import read_weights
-from ..scene.bust import bust_object, encoded_skin
+from ..scene.bust import bust_object, encoded_skin_picture
 from ..scene.bust_data import HAIR_GROUPS
 from ..scene.curves import write_curves
 from ..scene.surfaces import read_surface
@@ -48,7 +48,7 @@ def add_sample_scene(
         presets: of the groom, by name.
         skin: of the head, one of bust_skin.TONES.
     """
-    yield Part("Painting the skin", partial(encoded_skin, skin))  # fills its cache
+    yield Part("Painting the skin", partial(encoded_skin_picture, skin))  # fills its cache
     with new_blocks_removed_on_error() as note:
         scene, head = _scene_with_head(skin)
         note()
@@ -90,7 +90,7 @@ def _grown(
         f"Growing {_HAIR.strand_count:,} strands",
         lambda: with_widths(grow_with_face(surface, _HAIR, weights), "found")[0],
     )
-    return write_curves(f"{head.name} Hair", strands, head, collection, are_found=True)
+    return write_curves(f"{head.name} Hair", strands, head, collection, are_widths_estimated=True)
 
 
 def _animate(head: bpy.types.Object) -> None:

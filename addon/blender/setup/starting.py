@@ -19,7 +19,7 @@ from ..properties.properties import settings_of
 from ..scene.curves import read_curves
 from ..scene.hair_material import put_look_material
 from ..scene.principled import has_principled_hair, look_from_material
-from ..scene.source import mute_own_dynamics
+from ..scene.source import mute_hair_dynamics
 from ..scene.surfaces import read_positions
 from ..strands.growing import grow_on
 
@@ -146,7 +146,7 @@ def take_over(
         done.append("grew hair, since there was none")
     else:
         yield Part("Reading the hair", lambda: None)  # nothing has changed if it is cancelled here
-        if mute_own_dynamics(hair):
+        if mute_hair_dynamics(hair):
             done.append("muted Blender's Hair Dynamics")
     if is_untouched(hair):
         dress(hair, presets)

@@ -22,7 +22,7 @@ from ..base.blender_program import blender_command
 #: Packages that the other process needs, and the module of each that must load there.
 _PACKAGES = {"numpy": "numpy", "alembic3d": "alembic3d", "pxr": "pxr.Usd"}
 #: Timeout [s] for a Python to start and load them, also from a slow disk.
-_PATIENCE = 30.0
+_TIMEOUT = 30.0
 
 
 def python_command() -> tuple[str, ...] | None:
@@ -31,13 +31,13 @@ def python_command() -> tuple[str, ...] | None:
     None: there is neither a Python with these packages nor a Blender to start.
     """
     try:
-        return found_python() or blender_command()
+        return find_python() or blender_command()
     except TimeoutExpired:
         return blender_command()
 
 
 @cache
-def found_python() -> tuple[str, ...] | None:
+def find_python() -> tuple[str, ...] | None:
     """The first Python with these packages; the result is cached. None: there is none.
 
     Raises:
@@ -48,7 +48,7 @@ def found_python() -> tuple[str, ...] | None:
     too_slow: TimeoutExpired | None = None
     for program in _programs():
         try:
-            if _loads(python_program(program), loaded):
+            if _can_import(python_program(program), loaded):
                 return python_program(program)
         except TimeoutExpired as error:
             too_slow = error
@@ -91,9 +91,9 @@ def _in_search_path(name: str) -> Iterator[str]:
             return
 
 
-def _loads(command: tuple[str, ...], modules: list[str]) -> bool:
+def _can_import(command: tuple[str, ...], modules: list[str]) -> bool:
     code = ["-c", "import " + ", ".join(modules)]
     try:
-        return run_child([*command, *code], seconds=_PATIENCE).returncode == 0
+        return run_child([*command, *code], seconds=_TIMEOUT).returncode == 0
     except OSError:
         return False  # the next one is tried

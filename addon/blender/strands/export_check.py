@@ -22,7 +22,7 @@ from ..base.parts import Part, Parts
 from ..colliders.rigs import MadeRig, rig_from
 from ..properties.groom_settings import GroomSettings
 from ..scene.source import read_source
-from .read_hair import ExportRequest, needs_rig, still_hair
+from .read_hair import ExportRequest, needs_rig, read_still_hair
 from .strand_export import StrandExport, request_of
 
 
@@ -37,7 +37,7 @@ class ExportCheck:
     lines: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     _read: dict[ExportRequest, tuple[Groom, tuple[str, ...]]] = field(default_factory=dict)
-    _made: dict[int, MadeRig] = field(default_factory=dict)
+    _made_rigs: dict[int, MadeRig] = field(default_factory=dict)
     _stale: dict[int, tuple[str, ...]] = field(default_factory=dict)
     _checked: tuple[StrandFormat, StrandExportSettings] | None = None
 
@@ -52,15 +52,15 @@ class ExportCheck:
         """
         check = cls([Handle.of(each) for each in hair])
         uids = {each.uid for each in check.hair}
-        check._made = {uid: made for uid, made in (known or {}).items() if uid in uids}
+        check._made_rigs = {uid: made for uid, made in (known or {}).items() if uid in uids}
         return check
 
     @property
-    def made(self) -> tuple[MadeRig, ...]:
+    def made_rigs(self) -> tuple[MadeRig, ...]:
         """The rigs that were made, so that writing the file need not make them again."""
-        return tuple(self._made.values())
+        return tuple(self._made_rigs.values())
 
-    def reading(
+    def read_steps(
         self,
         depsgraph: bpy.types.Depsgraph,
         kind: StrandFormat,
@@ -75,11 +75,11 @@ class ExportCheck:
             groom = GroomSettings.of(hair)
             with suppress(HairloomError):  # `refresh` gets it too, and reports it
                 source = read_source(hair, depsgraph)
-                known = self._made.get(uid)
+                known = self._made_rigs.get(uid)
                 if known is None or not known.is_of(source, groom):
                     make = partial(rig_from, source, groom.sections, place=name)
                     rig = yield Part("Making strands", make)
-                    self._made[uid] = MadeRig(source, groom, rig)
+                    self._made_rigs[uid] = MadeRig(source, groom, rig)
 
     def refresh(
         self,
@@ -91,7 +91,7 @@ class ExportCheck:
         if self._checked == (kind, settings):
             return False
         if self._checked is None:
-            self._look_at_bakes(depsgraph)
+            self._find_stale_bakes(depsgraph)
         try:
             groom, notes = self._groom(depsgraph, request_of(kind, settings))
             facts = StrandExport(groom, settings, kind).check()
@@ -105,7 +105,7 @@ class ExportCheck:
     def motion_lines(self, *, use_bake: bool) -> list[str]:
         """The source of motion of each hair, when frames are written."""
         hair = filter(None, (each.find() for each in self.hair))
-        return [f"{each.name}: {self._moved_by(each, use_bake)}" for each in hair]
+        return [f"{each.name}: {self._motion_source(each, use_bake)}" for each in hair]
 
     def _groom(
         self, depsgraph: bpy.types.Depsgraph, request: ExportRequest
@@ -114,16 +114,16 @@ class ExportCheck:
             found = [hair for hair in (each.find() for each in self.hair) if hair is not None]
             if not found:
                 raise HairloomError("it is gone", place="hair", remedy="Export again")
-            outs = [still_hair(each, depsgraph, request, self.made) for each in found]
+            outs = [read_still_hair(each, depsgraph, request, self.made_rigs) for each in found]
             for each, out in zip(found, outs, strict=True):
                 if out.made is not None:
-                    self._made[each.session_uid] = out.made
+                    self._made_rigs[each.session_uid] = out.made
             groom, lost = join_grooms([out.groom for out in outs], found[0].name)
             notes = dict.fromkeys([note for out in outs for note in out.notes])
             self._read[request] = groom, (*notes, *lost)
         return self._read[request]
 
-    def _moved_by(self, hair: bpy.types.Object, use_bake: bool) -> str:
+    def _motion_source(self, hair: bpy.types.Object, use_bake: bool) -> str:
         try:
             cache = playback.cache_if_baked(hair) if use_bake else None
             if cache is None:
@@ -135,7 +135,7 @@ class ExportCheck:
         changed = self._stale.get(hair.session_uid, ())
         return f"{line}, out of date ({', '.join(changed)})" if changed else line
 
-    def _look_at_bakes(self, depsgraph: bpy.types.Depsgraph) -> None:
+    def _find_stale_bakes(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Find stale bakes, once: hashing all inputs of a bake is too slow for drawing."""
         for hair in filter(None, (each.find() for each in self.hair)):
             try:

@@ -25,10 +25,10 @@ from ..base.suspension import suspended
 from ..colliders.rigs import MadeRig
 from ..scene.source import shown_curves
 from ..scene.surfaces import read_positions
-from .read_hair import ExportRequest, ExportStrands, baked_hair, still_hair
+from .read_hair import ExportRequest, ExportStrands, read_baked_hair, read_still_hair
 
 
-class Moving(Protocol):
+class MovingHair(Protocol):
     """One hair in a file, at all frames.
 
     rate: frames per second.
@@ -116,15 +116,15 @@ def moving_hair(
     depsgraph: bpy.types.Depsgraph,
     frames: range,
     request: ExportRequest,
-    known: tuple[MadeRig, ...] = (),
+    known_rigs: tuple[MadeRig, ...] = (),
     *,
     use_bake: bool,
-) -> tuple[Moving, tuple[str, ...]]:
+) -> tuple[MovingHair, tuple[str, ...]]:
     """The hair in motion, and notes for the artist.
 
     Args:
         frames: scene frames.
-        known: see `still_hair`.
+        known_rigs: see `read_still_hair`.
         use_bake: whether its bake moves it, if it has one.
 
     Raises:
@@ -133,13 +133,13 @@ def moving_hair(
     cache = playback.cache_if_baked(hair) if use_bake else None
     if cache is not None:
         check_frames(hair.name, frames, cache)
-        motion = BakedMotion(baked_hair(hair, depsgraph, cache, request), cache)
+        motion = BakedMotion(read_baked_hair(hair, depsgraph, cache, request), cache)
         return motion, stale_notes(hair, cache, depsgraph)
     rate = frame_rate(depsgraph.scene)
-    with _scene_kept() as go_to:
+    with _scene_frame_restored() as go_to:
         depsgraph = go_to(frames[0])
-        out = still_hair(hair, depsgraph, request, known)
-        moving: Moving = ShownMotion(out, Handle.of(hair), rate)
+        out = read_still_hair(hair, depsgraph, request, known_rigs)
+        moving: MovingHair = ShownMotion(out, Handle.of(hair), rate)
         if out.has_children and out.made is not None:
             moving = _children_motion(hair, depsgraph, out, out.made, rate)
     notes: tuple[str, ...] = ()
@@ -151,7 +151,7 @@ def moving_hair(
     return moving, notes
 
 
-def common_rate(parts: Sequence[Moving]) -> float:
+def common_rate(parts: Sequence[MovingHair]) -> float:
     """Frames per second of all parts.
 
     Raises:
@@ -169,7 +169,7 @@ def common_rate(parts: Sequence[Moving]) -> float:
     return rates.pop()
 
 
-def positions_of(parts: Sequence[Moving], frames: range) -> Generator[Floats]:
+def frame_positions(parts: Sequence[MovingHair], frames: range) -> Generator[Floats]:
     """The points of all parts, one after the other, in each frame.
 
     Leaves the scene at the frame where it was, also if the generator is closed before its end.
@@ -178,14 +178,14 @@ def positions_of(parts: Sequence[Moving], frames: range) -> Generator[Floats]:
         HairloomError: hair is gone, or has other curves than in the first frame.
     """
     needs_scene = any(part.needs_scene for part in parts)
-    with _scene_kept() as go_to:
+    with _scene_frame_restored() as go_to:
         for frame in frames:
             depsgraph = go_to(frame) if needs_scene else bpy.context.evaluated_depsgraph_get()
             yield np.concatenate([part.out.points(part.at(frame, depsgraph)) for part in parts])
 
 
 @contextmanager
-def _scene_kept() -> Iterator[Callable[[int], bpy.types.Depsgraph]]:
+def _scene_frame_restored() -> Iterator[Callable[[int], bpy.types.Depsgraph]]:
     """A function that brings the scene to a frame; at the end, the scene returns to its frame."""
     scene = bpy.context.scene
     shown, subframe, has_gone = scene.frame_current, scene.frame_subframe, False

@@ -26,11 +26,11 @@ from ..base.objects import check_curves_editable, head_of, matrix_of, objects_wi
 from ..base.parts import Part, Parts, run_parts
 from ..properties import changed
 from ..properties.properties import settings_of
-from ..scene.carried_weight import carry_as_before
 from ..scene.curves import curve_offsets, curve_points, fill_curves, write_curves
 from ..scene.hair_material import MATERIAL_COLOR
-from ..scene.look_materials import follow_curves
+from ..scene.look_materials import update_after_new_curves
 from ..scene.masks import read_map
+from ..scene.sag_correction import restore_sag_correction
 from ..scene.surfaces import read_surface
 
 #: attributes of hair as it grows
@@ -58,13 +58,13 @@ def grow_on(
         HairloomError: the mesh has no faces, there is no group of this name, or it is 0 everywhere.
     """
     settings = settings_of(values, GrowSettings)
-    strands = yield from _grown(head, depsgraph, settings, density_group, length_group)
-    hair = write_curves(f"{head.name} Hair", strands, head, collection, are_found=True)
+    strands = yield from _grow_steps(head, depsgraph, settings, density_group, length_group)
+    hair = write_curves(f"{head.name} Hair", strands, head, collection, are_widths_estimated=True)
     own = hair.data.hairloom.grow
     for name, value in settings.as_dict().items():
         setattr(own, name, value)
     own.density_group, own.length_group = density_group, length_group
-    _seal(hair.data)
+    _store_digests(hair.data)
     return hair
 
 
@@ -77,14 +77,14 @@ def grow_again(grooms: Sequence[bpy.types.Object], depsgraph: bpy.types.Depsgrap
     """
     made = []
     for hair in grooms:
-        made.append((yield from _grown_again(hair, depsgraph)))
+        made.append((yield from _grow_again_steps(hair, depsgraph)))
     for hair, strands in zip(grooms, made, strict=True):
         replace_curves(hair, strands, depsgraph)
         hair.data.hairloom.grow.problem = ""
-        _seal(hair.data)
+        _store_digests(hair.data)
 
 
-def _grown_again(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Parts[StrandSet]:
+def _grow_again_steps(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Parts[StrandSet]:
     check_curves_editable(hair, depsgraph)
     head, own = head_of(hair), hair.data.hairloom.grow
     if head is None:
@@ -102,13 +102,13 @@ def _grown_again(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Part
                 remedy="Enable it in the Outliner, then press Grow Again",
             )
     return (
-        yield from _grown(
+        yield from _grow_steps(
             head,
             depsgraph,
             settings_of(own, GrowSettings),
             own.density_group,
             own.length_group,
-            before=hair,
+            replaced_hair=hair,
         )
     )
 
@@ -126,16 +126,16 @@ def replace_curves(
         curves.attributes.remove(curves.attributes[name])
     fill_curves(curves, strands.transformed(back))
     curves.update_tag()
-    carry_as_before(curves)
+    restore_sag_correction(curves)
     if has_colors:
-        follow_curves(hair)
+        update_after_new_curves(hair)
 
 
-def follow_settings(curves: bpy.types.ID) -> None:
+def grow_after_edit(curves: bpy.types.ID) -> None:
     """After a setting of growth was edited, grow hair again that is still as it grew."""
     assert isinstance(curves, bpy.types.Curves)
     own = curves.hairloom.grow
-    if not curves.is_editable or own.made_by == _settings_digest(own) or losses(curves):
+    if not curves.is_editable or own.made_by == _settings_digest(own) or lost_by_growing(curves):
         return
     users = [obj for obj in objects_with(curves) if head_of(obj) is not None]
     depsgraph = bpy.context.evaluated_depsgraph_get()
@@ -147,7 +147,7 @@ def follow_settings(curves: bpy.types.ID) -> None:
         own.problem = str(error)
 
 
-def losses(curves: bpy.types.Curves) -> tuple[str, ...]:
+def lost_by_growing(curves: bpy.types.Curves) -> tuple[str, ...]:
     """What growing again would lose, in a few words each; empty: curves follow their settings."""
     own = curves.hairloom.grow
     if not own.shape:
@@ -161,32 +161,35 @@ def has_grown(curves: bpy.types.Curves) -> bool:
     return bool(curves.hairloom.grow.shape)
 
 
-def is_behind(curves: bpy.types.Curves) -> bool:
+def is_outdated(curves: bpy.types.Curves) -> bool:
     """Whether the settings have changed since the curves grew."""
     own = curves.hairloom.grow
     return bool(own.made_by != _settings_digest(own))
 
 
-def _grown(
+def _grow_steps(
     head: bpy.types.Object,
     depsgraph: bpy.types.Depsgraph,
     settings: GrowSettings,
     density_group: str,
     length_group: str,
-    before: bpy.types.Object | None = None,
+    replaced_hair: bpy.types.Object | None = None,
 ) -> Parts[StrandSet]:
     """Strands grown in world space, on the head in its present pose.
 
     Args:
-        before: the hair whose curves they replace, and whose widths they keep.
+        replaced_hair: the hair whose curves they replace, and whose widths they keep.
     """
     surface = read_surface(head, depsgraph, need_uv=False, place=head.name)
     density = read_map(head, depsgraph, density_group) if density_group else None
     length = read_map(head, depsgraph, length_group) if length_group else None
     radius: Floats | None = None
     offsets: Ints = np.zeros(1, np.int32)
-    if before is not None:
-        radius, offsets = _radius_in_world(before, depsgraph), curve_offsets(before.data)
+    if replaced_hair is not None:
+        radius, offsets = (
+            _radius_in_world(replaced_hair, depsgraph),
+            curve_offsets(replaced_hair.data),
+        )
 
     def work() -> StrandSet:
         by_default = density is None and settings.method == "combed"
@@ -225,7 +228,7 @@ def _other_attributes(curves: bpy.types.Curves) -> tuple[str, ...]:
     return tuple(n for n in names if n not in own and not n.startswith("."))
 
 
-def _seal(curves: bpy.types.Curves) -> None:
+def _store_digests(curves: bpy.types.Curves) -> None:
     """Store digests of the curves and of the settings that they have just grown by."""
     own = curves.hairloom.grow
     own.shape, own.made_by = _shape_digest(curves), _settings_digest(own)
@@ -242,7 +245,7 @@ def _settings_digest(own: Any) -> str:
     return digest((settings, own.density_group, own.length_group))
 
 
-LISTENER = ("grow", follow_settings)
+LISTENER = ("grow", grow_after_edit)
 
 
 def register() -> None:

@@ -39,7 +39,7 @@ from .child_python import python_for
 #: title of each format, and the suffixes of its files
 FILE_KINDS = tuple((each.title, each.suffixes) for each in STRAND_FORMATS)
 #: treatment of guides beside strands: left out, as hair curves of their own, or among the strands
-GUIDES = ("leave", "apart", "among")
+GUIDE_TREATMENTS = ("leave", "apart", "among")
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class StrandImport:
 
 
 @dataclass(frozen=True)
-class Ground:
+class ImportSurface:
     """The mesh that imported hair is bound to, read once for all files.
 
     name: of the head, as a thread must not access the object.
@@ -81,9 +81,9 @@ class FileStrands:
     outcome: Outcome
 
 
-def read_ground(
+def read_import_surface(
     head: bpy.types.Object, depsgraph: bpy.types.Depsgraph, scale: float = 1.0
-) -> Ground:
+) -> ImportSurface:
     """The mesh as Blender shows it, scaled about the world's origin.
 
     Raises:
@@ -93,14 +93,14 @@ def read_ground(
     if scale != 1.0:
         surface = replace(surface, positions=surface.positions * np.float32(scale))
     notes = tuple(filter(None, [uv_map_note(head)]))
-    return Ground(head, head.name, surface, scale, notes)
+    return ImportSurface(head, head.name, surface, scale, notes)
 
 
 def import_strands(
     path: Path,
-    ground: Ground | None,
+    surface: ImportSurface | None,
     collection: bpy.types.Collection,
-    choices: StrandImport | None = None,
+    options: StrandImport | None = None,
 ) -> tuple[list[bpy.types.Object], Outcome]:
     """Read a file into hair curves, bound to a mesh if there is one.
 
@@ -110,11 +110,11 @@ def import_strands(
     Raises:
         HairloomError: the file cannot be read, or is of another scale or place than the mesh.
     """
-    read = read_file(path, ground, choices or StrandImport())
-    return add_to_scene(read, ground, collection)
+    read = read_file(path, surface, options or StrandImport())
+    return add_to_scene(read, surface, collection)
 
 
-def read_file(path: Path, ground: Ground | None, choices: StrandImport) -> FileStrands:
+def read_file(path: Path, surface: ImportSurface | None, options: StrandImport) -> FileStrands:
     """Read a file and bind it to the mesh; uses none of Blender's data.
 
     Raises:
@@ -122,19 +122,19 @@ def read_file(path: Path, ground: Ground | None, choices: StrandImport) -> FileS
     """
     read = read_strands(
         path,
-        up=choices.up,
-        scale=choices.scale,
-        parts="strands" if choices.guides == "leave" else "both",
-        python=choices.python or python_for(path),
+        up=options.up,
+        scale=options.scale,
+        parts="strands" if options.guides == "leave" else "both",
+        python=options.python or python_for(path),
     )
-    groom, warnings = _bound(read, ground, choices, path)
-    hair = tuple((each, path.stem + end) for each, end in _objects(groom, choices.guides))
-    result = f"{path.name}: {_counts(groom)}{_moving(groom)}, {_format(path, read)}"
+    groom, warnings = _bound_groom(read, surface, options, path)
+    hair = tuple((each, path.stem + end) for each, end in _separate_grooms(groom, options.guides))
+    result = f"{path.name}: {_counts_text(groom)}{_motion_text(groom)}, {_format_text(path, read)}"
     return FileStrands(hair, Outcome(result, read.dropped, (*read.notes, *warnings)))
 
 
 def read_in_thread(
-    paths: Sequence[Path], ground: Ground | None, choices: StrandImport
+    paths: Sequence[Path], surface: ImportSurface | None, options: StrandImport
 ) -> ThreadWork[list[FileStrands | HairloomError]]:
     """Read files in a thread; the result for each is its contents, or the error.
 
@@ -143,7 +143,7 @@ def read_in_thread(
 
     def read(path: Path) -> FileStrands | HairloomError:
         try:
-            return read_file(path, ground, choices)
+            return read_file(path, surface, options)
         except HairloomError as error:
             return error
 
@@ -159,22 +159,24 @@ def read_in_thread(
     return ThreadWork(work, "Hairloom import")
 
 
-def settle_ground(ground: Ground) -> None:
+def apply_head_scale(surface: ImportSurface) -> None:
     """Give the head its scale."""
-    if ground.scale != 1.0:
-        scale_object(ground.head, ground.scale)
+    if surface.scale != 1.0:
+        scale_object(surface.head, surface.scale)
 
 
 def add_to_scene(
-    read: FileStrands, ground: Ground | None, collection: bpy.types.Collection
+    read: FileStrands, surface: ImportSurface | None, collection: bpy.types.Collection
 ) -> tuple[list[bpy.types.Object], Outcome]:
     """Add hair to the scene; returns the new objects, separate guides last, and a report."""
-    hair = [_written(groom, name, ground, collection) for groom, name in read.hair]
-    cut = [f"{name}: {note}" for groom, name in read.hair for note in cut_notes(groom.motion)]
+    hair = [_add_groom(groom, name, surface, collection) for groom, name in read.hair]
+    cut = [
+        f"{name}: {note}" for groom, name in read.hair for note in cut_motion_notes(groom.motion)
+    ]
     return hair, replace(read.outcome, warnings=(*read.outcome.warnings, *cut))
 
 
-def _objects(groom: Groom, guides: str) -> list[tuple[Groom, str]]:
+def _separate_grooms(groom: Groom, guides: str) -> list[tuple[Groom, str]]:
     """The grooms that become separate objects, each with the suffix of its name."""
     is_guide = groom.is_guide
     if guides != "apart" or is_guide is None or is_guide.all() or not is_guide.any():
@@ -183,31 +185,31 @@ def _objects(groom: Groom, guides: str) -> list[tuple[Groom, str]]:
     return [(replace(untied.without_guides(), is_guide=None), ""), (untied.guides(), " Guides")]
 
 
-def _written(
-    groom: Groom, name: str, ground: Ground | None, collection: bpy.types.Collection
+def _add_groom(
+    groom: Groom, name: str, surface: ImportSurface | None, collection: bpy.types.Collection
 ) -> bpy.types.Object:
-    hair = write_curves(name, groom.strands, ground and ground.head, collection)
+    hair = write_curves(name, groom.strands, surface and surface.head, collection)
     store_groom(hair.data, groom)
     if groom.motion is not None:
-        let_move(hair, groom.motion)
+        animate_by_file(hair, groom.motion)
     return hair
 
 
-def cut_notes(motion: ReadMotion | None) -> tuple[str, ...]:
+def cut_motion_notes(motion: ReadMotion | None) -> tuple[str, ...]:
     """Notes on frames of a file that are left out of the scene."""
     note = "" if motion is None else motion.cut_note(frame_rate(bpy.context.scene))
     return (note,) if note else ()
 
 
-def let_move(hair: bpy.types.Object, motion: ReadMotion) -> None:
+def animate_by_file(hair: bpy.types.Object, motion: ReadMotion) -> None:
     """Let new curves, in world space, follow the motion of a file, as an animated style."""
     store_motion(hair, *motion.at_frames(frame_rate(bpy.context.scene)))
     hair.parent = None  # the file's motion is in world space: the surface must not carry them too
     hair.hairloom.dynamics.animated_style = True
 
 
-def _bound(
-    read: ReadGroom, ground: Ground | None, choices: StrandImport, path: Path
+def _bound_groom(
+    read: ReadGroom, ground: ImportSurface | None, options: StrandImport, path: Path
 ) -> tuple[Groom, tuple[str, ...]]:
     """Strands bound to the mesh, with its UVs at their roots, which Blender's hair tools need."""
     groom = read.groom
@@ -215,18 +217,18 @@ def _bound(
         note = size_note((path.name, groom.strands.points), None)
         return groom, (note,) if note else ()
     surface = ground.surface
-    loose = groom.strands if surface.corner_uv is None else replace(groom.strands, root_uv=None)
+    unbound = groom.strands if surface.corner_uv is None else replace(groom.strands, root_uv=None)
     try:
-        bound = bind_roots(loose, surface, place=path.name)
+        bound = bind_roots(unbound, surface, place=path.name)
     except HairloomError as error:
-        remedy = _remedy(loose, read.axes, surface, choices)
+        remedy = _remedy(unbound, read.axes, surface, options)
         if remedy is None:
             raise
         raise HairloomError(error.problem, place=path.name, remedy=remedy) from error
     head = ground.name, surface.positions
     warnings = list(filter(None, [size_note((path.name, groom.strands.points), head)]))
     if distance := bound.looseness(surface):
-        remedy = _remedy(loose, read.axes, surface, choices)
+        remedy = _remedy(unbound, read.axes, surface, options)
         remedy = remedy or "Check the axes and the place of both"
         warnings.append(
             f"{path.name}: its roots lie {distance * 1e3:.3g} mm from {ground.name} (median). "
@@ -241,7 +243,7 @@ def _bound(
 
 
 def _remedy(
-    strands: StrandSet, axes: FileSpace, surface: Surface, choices: StrandImport
+    strands: StrandSet, axes: FileSpace, surface: Surface, options: StrandImport
 ) -> str | None:
     """Which axes and scale would fit the file to the mesh; None: no combination does."""
     up = "Y" if axes.up == "Z" else "Z"
@@ -250,21 +252,21 @@ def _remedy(
     fit = better_fit(candidates, ClosestPointSearch(surface))
     if fit is None:
         return None
-    wanted, options = [], []
+    wanted, flags = [], []
     if fit.name:
         wanted.append(f"{fit.name} up")
-        options.append(f"--groom-up {fit.name}")
+        flags.append(f"--groom-up {fit.name}")
     if fit.factor != 1.0:
-        scale = f"{fit.factor * choices.scale:.4g}"
+        scale = f"{fit.factor * options.scale:.4g}"
         wanted.append(f"a scale of {scale}")
-        options.append(f"--groom-scale {scale}")
-    remedy = f"Import it with {' and '.join(wanted)} ({' '.join(options)})"
+        flags.append(f"--groom-scale {scale}")
+    remedy = f"Import it with {' and '.join(wanted)} ({' '.join(flags)})"
     if fit.factor == 1.0:
         return remedy
     return f"{remedy}, or scale the head by {1.0 / fit.factor:.4g}"
 
 
-def _counts(groom: Groom) -> str:
+def _counts_text(groom: Groom) -> str:
     """Such as "1,200 strands and 60 guides in 3 groups"."""
     guides = 0 if groom.is_guide is None else int(groom.is_guide.sum())
     strands = groom.strands.strand_count - guides
@@ -274,10 +276,10 @@ def _counts(groom: Groom) -> str:
     return " and ".join(counts) + (f" in {groups:,} groups" if groups > 1 else "")
 
 
-def _moving(groom: Groom) -> str:
+def _motion_text(groom: Groom) -> str:
     return "" if groom.motion is None else f", moving in {len(groom.motion.times):,} frames"
 
 
-def _format(path: Path, read: ReadGroom) -> str:
+def _format_text(path: Path, read: ReadGroom) -> str:
     title = strand_format(path).title
     return f"{title} {read.version}" if read.version else title

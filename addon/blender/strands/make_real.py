@@ -33,11 +33,11 @@ from ..properties.presets import apply
 from ..scene.curves import write_curves
 from ..scene.groom_attributes import group_names, store_group_names
 from ..scene.hair_material import put_look_material
-from ..scene.masks import Canvas
+from ..scene.masks import MaskReader
 from ..scene.source import Source, read_source
 
 #: properties of an object's group that refer to objects which act on its hair
-_POINTERS = (
+_OBJECT_PROPERTIES = (
     "collider",
     "collider_collection",
     "field_collection",
@@ -49,7 +49,7 @@ _POINTERS = (
 )
 
 
-class MadeReal(NamedTuple):
+class RealHair(NamedTuple):
     """New hair curves, and a report."""
 
     hair: bpy.types.Object
@@ -68,7 +68,7 @@ class _Drawn(NamedTuple):
 
 def make_real(
     grooms: Sequence[bpy.types.Object], depsgraph: bpy.types.Depsgraph
-) -> Parts[tuple[MadeReal, ...]]:
+) -> Parts[tuple[RealHair, ...]]:
     """New hair curves with every drawn strand of these grooms as combed, with children, curls,
     widths and colours, and a material equal to the look.
 
@@ -81,33 +81,33 @@ def make_real(
     """
     drawn = []
     for hair in grooms:
-        drawn.append((yield from _drawn(hair, depsgraph)))
-    return tuple(_written(hair, each) for hair, each in zip(grooms, drawn, strict=True))
+        drawn.append((yield from _drawn_hair(hair, depsgraph)))
+    return tuple(_add_real_hair(hair, each) for hair, each in zip(grooms, drawn, strict=True))
 
 
-def _drawn(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Parts[_Drawn]:
+def _drawn_hair(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Parts[_Drawn]:
     name, settings = hair.name, GroomSettings.of(hair)
     source = read_source(hair, depsgraph)
-    canvas = Canvas(hair, head_of(hair), source.head, source.strands, source.kept)
-    masks, _ = canvas.masks(settings[DynamicsSettings], depsgraph)
+    mask_reader = MaskReader(hair, head_of(hair), source.head, source.strands, source.curve_indices)
+    masks, _ = mask_reader.masks(settings[DynamicsSettings], depsgraph)
     rig = yield Part(
         "Making strands",
         lambda: rig_from(source, settings.sections, place=name),
     )
     strands = yield Part(
-        "Colouring strands", lambda: _stored(_coloured(rig, source, settings), source)
+        "Colouring strands", lambda: _in_rest_pose(_with_drawn_look(rig, source, settings), source)
     )
     return _Drawn(source, settings, rig, strands, masks)
 
 
-def _stored(strands: StrandSet, source: Source) -> StrandSet:
+def _in_rest_pose(strands: StrandSet, source: Source) -> StrandSet:
     """The strands in the pose in which the original hair is stored, the rest pose of its head."""
     if source.rest is None or source.head is None:
         return strands
     return carried(strands, source.head, source.rest.surface)
 
 
-def _coloured(rig: Rig, source: Source, settings: GroomSettings) -> StrandSet:
+def _with_drawn_look(rig: Rig, source: Source, settings: GroomSettings) -> StrandSet:
     """The strands of a rig with the widths, colours and noise that they are drawn with."""
     strands = with_colors(rig.strands, source.colors, settings[ShadingSettings])
     place, counts = along(strands.points, strands.offsets), strands.point_counts
@@ -128,17 +128,19 @@ def _coloured(rig: Rig, source: Source, settings: GroomSettings) -> StrandSet:
     )
 
 
-def _written(hair: bpy.types.Object, drawn: _Drawn) -> MadeReal:
+def _add_real_hair(hair: bpy.types.Object, drawn: _Drawn) -> RealHair:
     source, settings, rig, strands, masks = drawn
     real = write_curves(f"{hair.name} Real", strands, head_of(hair), hair.users_collection[0])
     store_group_names(real.data, group_names(hair))
     _keep_settings(real, hair, settings)
     _keep_masks(real.data, rig, masks, settings[DynamicsSettings])
-    _, notes = put_look_material(real.data, real_look(settings[ShadingSettings]), are_final=True)
+    _, notes = put_look_material(
+        real.data, real_look(settings[ShadingSettings]), has_final_colors=True
+    )
     _hide(hair)
     result = f"Made {strands.strand_count:,} strands real: {real.name}. {hair.name} is hidden"
     warnings = (*source.warnings, *notes_of(hair, rig), *(f"{real.name}: {each}" for each in notes))
-    return MadeReal(real, Outcome(result, dict(source.dropped), warnings))
+    return RealHair(real, Outcome(result, dict(source.dropped), warnings))
 
 
 def real_look(shading: ShadingSettings) -> ShadingSettings:
@@ -167,7 +169,7 @@ def _keep_settings(real: bpy.types.Object, hair: bpy.types.Object, settings: Gro
     )
     for name in (*sections_of("groom"), *sections_of("character")):
         apply(own[ALL_SETTINGS[name]], real)
-    for name in _POINTERS:
+    for name in _OBJECT_PROPERTIES:
         setattr(real.hairloom, name, getattr(hair.hairloom, name))
 
 

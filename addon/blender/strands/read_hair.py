@@ -31,7 +31,7 @@ from ..scene.groom_attributes import group_names, stored_groom
 from ..scene.painted_colors import read_colors
 from ..scene.source import Source, read_source, usable_curves
 
-_OF_GUIDES = ("is_guide", "closest_guides", "guide_weights")
+_GUIDE_FIELDS = ("is_guide", "closest_guides", "guide_weights")
 
 
 @dataclass(frozen=True)
@@ -75,15 +75,15 @@ class ExportStrands:
 
 
 def needs_rig(hair: bpy.types.Object, request: ExportRequest) -> bool:
-    """Whether `still_hair` may have to make a rig, which is slow."""
+    """Whether `read_still_hair` may have to make a rig, which is slow."""
     return hair.data.hairloom.children.method != "none" or request.guides
 
 
-def still_hair(
+def read_still_hair(
     hair: bpy.types.Object,
     depsgraph: bpy.types.Depsgraph,
     request: ExportRequest,
-    known: tuple[MadeRig, ...] = (),
+    known_rigs: tuple[MadeRig, ...] = (),
 ) -> ExportStrands:
     """All strands after the modifiers, with their own points; or guides and children, if any.
 
@@ -91,40 +91,42 @@ def still_hair(
     added.
 
     Args:
-        known: rigs that were made before, maybe of the same hair.
+        known_rigs: rigs that were made before, maybe of the same hair.
 
     Raises:
         HairloomError: no usable hair, or it is of another scale than its head.
     """
     source = read_source(hair, depsgraph)
     has_children = hair.data.hairloom.children.method != "none"
-    made = MadeRig.of(hair, source, known) if has_children else None
+    made = MadeRig.of(hair, source, known_rigs) if has_children else None
     if made is not None and made.rig.own_count is not None:
         rig = made.rig
         strands = with_colors(rig.strands, source.colors, _look(hair))
         groom = Groom(strands, hair.name, group_names=group_names(hair))
-        out = replace(_out(groom, rig, request, _look(hair)), made=made, has_children=True)
+        out = replace(
+            _export_strands(groom, rig, request, _look(hair)), made=made, has_children=True
+        )
         return _with_notes(hair, source, out, rig)
-    said = _without_empty_marks(stored_groom(hair, depsgraph, source.kept))
-    if request.guides and "is_guide" not in said:
-        made = made or MadeRig.of(hair, source, known)
+    attributes = _without_empty_marks(stored_groom(hair, depsgraph, source.curve_indices))
+    if request.guides and "is_guide" not in attributes:
+        made = made or MadeRig.of(hair, source, known_rigs)
         rig, strands = made.rig, _as_wide_as_drawn(hair, source.strands)
-        strands = with_colors(_bound_as(strands, rig.strands), source.colors, _look(hair))
-        groom = Groom(strands, hair.name, **said)
-        out = replace(_out(groom, rig, request, _look(hair)), made=made)
+        strands = with_colors(_with_roots_of(strands, rig.strands), source.colors, _look(hair))
+        groom = Groom(strands, hair.name, **attributes)
+        out = replace(_export_strands(groom, rig, request, _look(hair)), made=made)
         return _with_notes(hair, source, out, rig)
     strands = _as_wide_as_drawn(hair, source.strands)
     needs_roots = request.roots or strands.root_uv is None or source.colors is not None
     if source.head is not None and needs_roots:
         strands = bind_roots(strands, source.head, place=hair.name).strands
     strands = with_colors(strands, source.colors, _look(hair))
-    groom = Groom(strands, hair.name, **said)
+    groom = Groom(strands, hair.name, **attributes)
     if request.guides and groom.closest_guides is None:
-        groom = _weighed(groom, hair.data.hairloom.guides.cv_count)
-    return _with_notes(hair, source, _out(groom, None, request, _look(hair)))
+        groom = _with_guide_weights(groom, hair.data.hairloom.guides.cv_count)
+    return _with_notes(hair, source, _export_strands(groom, None, request, _look(hair)))
 
 
-def baked_hair(
+def read_baked_hair(
     hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, cache: Cache, request: ExportRequest
 ) -> ExportStrands:
     """The strands of a bake at rest, with the hair's attributes if they are its curves.
@@ -133,10 +135,10 @@ def baked_hair(
         HairloomError: the bake is damaged.
     """
     rig = playback.rig_in(cache).rig
-    read, said = usable_curves(hair, depsgraph), dict[str, Any]()
+    read, attributes = usable_curves(hair, depsgraph), dict[str, Any]()
     is_plain = hair.data.hairloom.children.method in ("none", "auto")
     if is_plain and rig.strands.strand_count == read.strands.strand_count:
-        said = _without_empty_marks(stored_groom(hair, depsgraph, read.kept))
+        attributes = _without_empty_marks(stored_groom(hair, depsgraph, read.kept))
     notes: tuple[str, ...] = ()
     if rig.strands.root_uv is None and rig.head is not None:
         notes = (f"{hair.name}: its bake has no root UVs. Bake again to have them in the file.",)
@@ -144,13 +146,13 @@ def baked_hair(
     colors, problems = read_colors(hair, depsgraph, triangle_count)
     notes += problems
     strands = with_colors(rig.strands, colors, _look(hair))
-    groom = Groom(strands, hair.name, **({"group_names": group_names(hair)} | said))
+    groom = Groom(strands, hair.name, **({"group_names": group_names(hair)} | attributes))
     has_marks = groom.is_guide is not None
-    out = _out(groom, None if has_marks else rig, request, _look(hair))
+    out = _export_strands(groom, None if has_marks else rig, request, _look(hair))
     return replace(out, notes=notes)
 
 
-def hair_of_rig(
+def export_strands_of_rig(
     rig: Rig,
     groom: Groom,
     request: ExportRequest,
@@ -163,18 +165,18 @@ def hair_of_rig(
         groom: the rig's strands, or the same with other points.
         colors: colours painted under them.
     """
-    strands = with_colors(_bound_as(groom.strands, rig.strands), colors, look)
+    strands = with_colors(_with_roots_of(groom.strands, rig.strands), colors, look)
     bound = replace(groom, strands=strands)
     if groom.is_guide is not None and not groom.is_guide.any():
         bound = replace(bound, is_guide=None, closest_guides=None, guide_weights=None)
-    return _out(bound, rig if bound.is_guide is None else None, request, look)
+    return _export_strands(bound, rig if bound.is_guide is None else None, request, look)
 
 
 def _look(hair: bpy.types.Object) -> ShadingSettings:
     return GroomSettings.of(hair)[ShadingSettings]
 
 
-def _out(
+def _export_strands(
     groom: Groom, rig: Rig | None, request: ExportRequest, look: ShadingSettings
 ) -> ExportStrands:
     """Hair for a file in its drawn colours, with copies of the rig's guides if requested."""
@@ -205,7 +207,7 @@ def _as_wide_as_drawn(hair: bpy.types.Object, strands: StrandSet) -> StrandSet:
     return as_wide(strands, drawn) if widths.is_found else strands
 
 
-def _bound_as(strands: StrandSet, bound: StrandSet) -> StrandSet:
+def _with_roots_of(strands: StrandSet, bound: StrandSet) -> StrandSet:
     """These strands, with the roots bound as those of the same strands with other points."""
     return replace(
         strands,
@@ -215,14 +217,14 @@ def _bound_as(strands: StrandSet, bound: StrandSet) -> StrandSet:
     )
 
 
-def _without_empty_marks(said: dict[str, Any]) -> dict[str, Any]:
+def _without_empty_marks(attributes: dict[str, Any]) -> dict[str, Any]:
     """The attributes without marks of guides, if no curve is marked."""
-    if "is_guide" in said and not said["is_guide"].any():
-        return {name: value for name, value in said.items() if name not in _OF_GUIDES}
-    return said
+    if "is_guide" in attributes and not attributes["is_guide"].any():
+        return {name: value for name, value in attributes.items() if name not in _GUIDE_FIELDS}
+    return attributes
 
 
-def _weighed(groom: Groom, cv_count: int) -> Groom:
+def _with_guide_weights(groom: Groom, cv_count: int) -> Groom:
     """The groom with closest guides and weights from its marked guides; unchanged if a group has no
     guide, as strands follow guides of their own group."""
     assert groom.is_guide is not None

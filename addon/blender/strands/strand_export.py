@@ -24,9 +24,9 @@ from ...exchange.tfxbone import BoneWeights
 from ..base.outcome import Outcome
 from ..base.thread_work import ThreadWork
 from ..colliders.rigs import MadeRig
-from ..scene.bone_weights import bones_of, has_bones, unmoved_by
-from .groom_motion import Moving, common_rate, moving_hair, positions_of
-from .read_hair import ExportRequest, ExportStrands, still_hair
+from ..scene.bone_weights import bones_of, has_bones, unmoved_head_notes
+from .groom_motion import MovingHair, common_rate, frame_positions, moving_hair
+from .read_hair import ExportRequest, ExportStrands, read_still_hair
 
 
 @dataclass
@@ -34,7 +34,7 @@ class StrandExport:
     """The contents of one file, read and ready to write.
 
     frames: of the motion; None for a still.
-    done: number of frames read so far. files: those that were written.
+    frames_read: number of frames read so far. files: those that were written.
     """
 
     groom: Groom
@@ -44,8 +44,8 @@ class StrandExport:
     notes: tuple[str, ...] = ()
     frames: range | None = None
     rate: float = 0.0
-    moving: tuple[Moving, ...] = ()
-    done: int = 0
+    moving: tuple[MovingHair, ...] = ()
+    frames_read: int = 0
     files: tuple[Path, ...] = ()
 
     def __post_init__(self) -> None:
@@ -69,7 +69,7 @@ class StrandExport:
 
         Args:
             frames: scene frames; None: a still of the present frame.
-            known: see `still_hair`.
+            known: see `read_still_hair`.
 
         Raises:
             HairloomError: no usable hair, frames that were not baked, or an engine or option that
@@ -79,9 +79,9 @@ class StrandExport:
         has_roots = with_bones and any(has_bones(each) for each in hair)
         request = replace(request_of(kind, settings), roots=has_roots)
         if frames is None:
-            outs, moving, notes = _still(hair, depsgraph, request, known)
+            outs, moving, notes = _read_still(hair, depsgraph, request, known)
         else:
-            outs, moving, notes = _moving(
+            outs, moving, notes = _read_moving(
                 hair, depsgraph, request, frames, known, use_bake=settings.use_bake
             )
         groom, lost = join_grooms([out.groom for out in outs], hair[0].name)
@@ -134,11 +134,11 @@ class StrandExport:
     def positions(self) -> Generator[Floats]:
         """All points of each frame; for the main thread only."""
         assert self.frames is not None
-        for points in positions_of(self.moving, self.frames):
+        for points in frame_positions(self.moving, self.frames):
             yield points
-            self.done += 1
+            self.frames_read += 1
 
-    def standing(self) -> StrandExport:
+    def as_still(self) -> StrandExport:
         """Its first frame as a still.
 
         Raises:
@@ -149,12 +149,12 @@ class StrandExport:
         groom = replace(self.groom, strands=self.groom.strands.with_points(points))
         return replace(self, groom=groom, frames=None, moving=())
 
-    def writing(self, path: Path, positions: Generator[Floats]) -> ThreadWork[Outcome]:
+    def write_in_thread(self, path: Path, positions: Generator[Floats]) -> ThreadWork[Outcome]:
         """`write` in a thread, which has the main thread produce each frame of `positions`."""
 
         def work(thread: ThreadWork[Outcome]) -> Outcome:
             commit_context.set(thread.committing)  # a context variable of this thread alone
-            return self.write(path, _asked(thread, positions))
+            return self.write(path, _positions_from_main_thread(thread, positions))
 
         return ThreadWork(work, "Hairloom strands")
 
@@ -183,30 +183,32 @@ def request_of(kind: StrandFormat, settings: StrandExportSettings) -> ExportRequ
     return ExportRequest(guides=guides, color=kind in (ALEMBIC, USD))
 
 
-def _still(
+def _read_still(
     hair: list[bpy.types.Object],
     depsgraph: bpy.types.Depsgraph,
     request: ExportRequest,
-    known: tuple[MadeRig, ...],
-) -> tuple[list[ExportStrands], tuple[Moving, ...], tuple[str, ...]]:
-    return [still_hair(each, depsgraph, request, known) for each in hair], (), ()
+    known_rigs: tuple[MadeRig, ...],
+) -> tuple[list[ExportStrands], tuple[MovingHair, ...], tuple[str, ...]]:
+    return [read_still_hair(each, depsgraph, request, known_rigs) for each in hair], (), ()
 
 
-def _moving(
+def _read_moving(
     hair: list[bpy.types.Object],
     depsgraph: bpy.types.Depsgraph,
     request: ExportRequest,
     frames: range,
-    known: tuple[MadeRig, ...],
+    known_rigs: tuple[MadeRig, ...],
     *,
     use_bake: bool,
-) -> tuple[list[ExportStrands], tuple[Moving, ...], tuple[str, ...]]:
-    moving: list[Moving] = []
+) -> tuple[list[ExportStrands], tuple[MovingHair, ...], tuple[str, ...]]:
+    moving: list[MovingHair] = []
     notes: list[str] = []
     for each in hair:
-        part, said = moving_hair(each, depsgraph, frames, request, known, use_bake=use_bake)
+        part, more_notes = moving_hair(
+            each, depsgraph, frames, request, known_rigs, use_bake=use_bake
+        )
         moving.append(part)
-        notes += said
+        notes += more_notes
     return [part.out for part in moving], tuple(moving), tuple(notes)
 
 
@@ -220,10 +222,10 @@ def _bones(
         own = bones_of(each, depsgraph, out.groom.strands)
         if own is None:
             without.append(each.name)
-            notes += unmoved_by(each)
+            notes += unmoved_head_notes(each)
         else:
             bones.append(own)
-            notes += _loose(each, own)
+            notes += _loose_root_notes(each, own)
     if without and bones:
         names = ", ".join(without)
         return None, (
@@ -233,7 +235,7 @@ def _bones(
     return (join_bones(bones) if bones else None), tuple(notes)
 
 
-def _loose(hair: bpy.types.Object, bones: BoneWeights) -> list[str]:
+def _loose_root_notes(hair: bpy.types.Object, bones: BoneWeights) -> list[str]:
     if not bones.loose_count:
         return []
     return [
@@ -242,11 +244,13 @@ def _loose(hair: bpy.types.Object, bones: BoneWeights) -> list[str]:
     ]
 
 
-def _asked(thread: ThreadWork[Outcome], positions: Generator[Floats]) -> Iterator[Floats]:
-    while (points := thread.on_main_thread(_next(positions))) is not None:
+def _positions_from_main_thread(
+    thread: ThreadWork[Outcome], positions: Generator[Floats]
+) -> Iterator[Floats]:
+    while (points := thread.on_main_thread(_next_positions(positions))) is not None:
         yield points
 
 
-def _next(positions: Generator[Floats]) -> Generator[None, None, Floats | None]:
+def _next_positions(positions: Generator[Floats]) -> Generator[None, None, Floats | None]:
     yield
     return next(positions, None)

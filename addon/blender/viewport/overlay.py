@@ -36,7 +36,7 @@ from ..base.objects import LayerKey, is_solid, layer_key, layers_with, spaces_wi
 from ..base.redraw import redraw_panels, redraw_views, show_status
 from ..cards.show import as_shown, without_strands
 from ..scene.lights import uses_scene_light
-from ..scene.mesh_materials import can_be_seen_through
+from ..scene.mesh_materials import may_be_transparent
 from ..scene.world import studio_environment
 from ..sessions.measures import FrameTimes
 from ..sessions.session import Session
@@ -135,7 +135,7 @@ def read_drawing(
     if session.head is not None:
         head = session.head.handle.find()
     is_drawn = head is not None and is_solid(head)
-    if head is None or not is_drawn or can_be_seen_through(head):
+    if head is None or not is_drawn or may_be_transparent(head):
         snapshot = with_all_strands(snapshot)
     if snapshot.debug_view == "stretch" and len(snapshot.points):
         snapshot = replace(snapshot, rest=session.rest_points())

@@ -11,10 +11,10 @@ import bpy
 from ..base.objects import objects_with
 
 #: custom property of the object: its Sag Correction before it was settled
-_BEFORE = "hairloom_combed_sag"
+_EARLIER_SAG_CORRECTION = "hairloom_combed_sag"
 
 
-def carry_whole_weight(curves: bpy.types.Curves) -> tuple[str, ...]:
+def set_full_sag_correction(curves: bpy.types.Curves) -> tuple[str, ...]:
     """Set Sag Correction to 1 on all objects with these settled curves; returns notes on it."""
     notes = []
     for hair in objects_with(curves):
@@ -22,8 +22,8 @@ def carry_whole_weight(curves: bpy.types.Curves) -> tuple[str, ...]:
         before = dynamics.sag_compensation
         if before == 1.0:
             continue
-        if _BEFORE not in hair:
-            hair[_BEFORE] = before
+        if _EARLIER_SAG_CORRECTION not in hair:
+            hair[_EARLIER_SAG_CORRECTION] = before
         dynamics.sag_compensation = 1.0
         notes.append(
             f"{hair.name}: Sag Correction was {before:.2g} and is 1 now, as settled hair hangs "
@@ -32,9 +32,9 @@ def carry_whole_weight(curves: bpy.types.Curves) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def carry_as_before(curves: bpy.types.Curves) -> None:
+def restore_sag_correction(curves: bpy.types.Curves) -> None:
     """Restore Sag Correction, once the settled shape is gone."""
     for hair in objects_with(curves):
-        before = hair.pop(_BEFORE, None)
+        before = hair.pop(_EARLIER_SAG_CORRECTION, None)
         if before is not None:
             hair.hairloom.dynamics.sag_compensation = before

@@ -12,54 +12,54 @@ from ...errors import HairloomError
 from ..base.attributes import read_attribute, set_attribute
 from ..base.digests import digest
 from ..base.objects import check_shape_editable
-from .carried_weight import carry_as_before
 from .curves import curve_offsets, curve_points, move_curves
+from .sag_correction import restore_sag_correction
 
 #: custom property of the curves: the attributes of their kept shapes, in the order of time
 _ORDER = "hairloom_kept"
 
 
 @dataclass(frozen=True)
-class KeptShape:
+class ShapeBackup:
     """The shape from before one tool.
 
     attribute: name of the point attribute with the positions before, object space [m].
-    done: custom property of the curves with a digest of the shape that the tool made.
-    tool: label of the tool's button.
+    result_digest: custom property of the curves with a digest of the shape that the tool made.
+    tool_label: label of the tool's button.
     """
 
     attribute: str
-    done: str
-    tool: str
+    result_digest: str
+    tool_label: str
 
-    def is_there(self, hair: bpy.types.Object) -> bool:
+    def exists(self, hair: bpy.types.Object) -> bool:
         """Whether there is a shape to go back to."""
         return self.attribute in hair.data.attributes
 
-    def before(self, hair: bpy.types.Object) -> Floats | None:
+    def read_if_unchanged(self, hair: bpy.types.Object) -> Floats | None:
         """The shape, (point_count, 3); None if anything has changed the curves since the tool."""
         curves = hair.data
-        if curves.get(self.done) != digest(curve_points(curves).tobytes()):
+        if curves.get(self.result_digest) != digest(curve_points(curves).tobytes()):
             return None
         kept: Floats | None = read_attribute(curves, self.attribute, "POINT", 3)
         return kept
 
-    def keep(self, hair: bpy.types.Object) -> None:
+    def save(self, hair: bpy.types.Object) -> None:
         """Store the shape, before the tool changes the curves.
 
         If only this tool has changed them since it was last used, the shape from before that use
         stays.
         """
-        if self.before(hair) is None:
+        if self.read_if_unchanged(hair) is None:
             set_attribute(hair.data, self.attribute, "POINT", curve_points(hair.data))
-            others = (each for each in _in_order(hair.data) if each != self.attribute)
+            others = (each for each in _backup_order(hair.data) if each != self.attribute)
             hair.data[_ORDER] = " ".join((*others, self.attribute))
 
-    def seal(self, hair: bpy.types.Object) -> None:
+    def mark_result(self, hair: bpy.types.Object) -> None:
         """Store the digest of the shape that the tool has made."""
-        hair.data[self.done] = digest(curve_points(hair.data).tobytes())
+        hair.data[self.result_digest] = digest(curve_points(hair.data).tobytes())
 
-    def back(self, hair: bpy.types.Object) -> bool:
+    def restore(self, hair: bpy.types.Object) -> bool:
         """Restore the kept shape; curves that were drawn since stay as they are. Shapes that other
         tools have kept since then are deleted, as they are later than the restored one.
 
@@ -69,35 +69,35 @@ class KeptShape:
             HairloomError: there is no such shape, or it is linked from another file.
         """
         check_shape_editable(hair)
-        curves, is_changed = hair.data, self.before(hair) is None
+        curves, is_changed = hair.data, self.read_if_unchanged(hair) is None
         kept = read_attribute(curves, self.attribute, "POINT", 3)
         if kept is None:
             raise HairloomError(
                 "there is no earlier shape to restore",
                 place=hair.name,
-                remedy=f"Press {self.tool} first",
+                remedy=f"Press {self.tool_label} first",
             )
         points, offsets = curve_points(curves), curve_offsets(curves)
         is_known = np.repeat(_have_extent(kept, offsets), np.diff(offsets))
         points[is_known] = kept[is_known]
         move_curves(curves, points)
-        order = _in_order(curves)
+        order = _backup_order(curves)
         place = order.index(self.attribute) if self.attribute in order else len(order)
         for name in {self.attribute, *order[place:]}.intersection(curves.attributes.keys()):
             curves.attributes.remove(curves.attributes[name])
         curves[_ORDER] = " ".join(order[:place])
-        if not COMBED.is_there(hair):
-            carry_as_before(curves)
+        if not BEFORE_SETTLE.exists(hair):
+            restore_sag_correction(curves)
         return is_changed
 
 
-COMBED = KeptShape("hairloom_combed", "hairloom_settled", "Settle")
-BEFORE_TRIM = KeptShape("hairloom_before_trim", "hairloom_trimmed", "Trim to Shape")
-BEFORE_FLOW = KeptShape("hairloom_before_flow", "hairloom_flowed", "Comb Along Flow")
-KEPT_SHAPES = (COMBED, BEFORE_TRIM, BEFORE_FLOW)
+BEFORE_SETTLE = ShapeBackup("hairloom_combed", "hairloom_settled", "Settle")
+BEFORE_TRIM = ShapeBackup("hairloom_before_trim", "hairloom_trimmed", "Trim to Shape")
+BEFORE_FLOW = ShapeBackup("hairloom_before_flow", "hairloom_flowed", "Comb Along Flow")
+SHAPE_BACKUPS = (BEFORE_SETTLE, BEFORE_TRIM, BEFORE_FLOW)
 
 
-def _in_order(curves: bpy.types.Curves) -> list[str]:
+def _backup_order(curves: bpy.types.Curves) -> list[str]:
     """The names of the attributes with kept shapes, the latest last."""
     return str(curves.get(_ORDER, "")).split()
 

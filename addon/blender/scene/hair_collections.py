@@ -15,7 +15,7 @@ def objects_in(hair: bpy.types.Object, setting: str) -> tuple[bpy.types.Object, 
     return tuple(obj for obj in dict.fromkeys(objects) if obj is not None and obj != hair)
 
 
-def put_into(
+def add_to_collection(
     hair: bpy.types.Object,
     setting: str,
     kind: str,
@@ -43,7 +43,7 @@ def put_into(
     setattr(hair.hairloom, setting, collection)
 
 
-def take_out(
+def remove_from_collection(
     hair: bpy.types.Object, setting: str, kind: str, name: str, scene: bpy.types.Scene
 ) -> None:
     """Take an object out of a collection of the hair, but not out of the scene.
