@@ -94,7 +94,7 @@ def test_faces_are_ordered_from_the_inside_to_the_outside(shells, sphere, get_de
     assert again.moved == 0 < done.moved
 
 
-def test_cards_know_their_way_though_u_runs_along_them(shells, sphere, get_depsgraph):
+def test_strand_direction_is_found_even_if_u_runs_along_cards(shells, sphere, get_depsgraph):
     cards = read_cards(shells, get_depsgraph(), SortOptions(head=sphere)).cards.mesh
     np.testing.assert_allclose(cards.along, (0.05 - cards.positions[:, 2]) / 0.1, atol=1e-5)
     np.testing.assert_allclose(cards.tangent[:, 2], -1.0, atol=1e-5)
@@ -102,9 +102,7 @@ def test_cards_know_their_way_though_u_runs_along_them(shells, sphere, get_depsg
     assert outward.min() > 0.0
 
 
-def test_occlusion_is_an_attribute_and_a_map_that_keep_to_their_vertices(
-    shells, sphere, get_depsgraph
-):
+def test_occlusion_attribute_and_map_agree_at_each_vertex(shells, sphere, get_depsgraph):
     sort_mesh(shells, get_depsgraph(), SortOptions(head=sphere, occlusion=QUICK))
     mesh = shells.data
     openness, along = values(mesh, "occlusion"), values(mesh, "along")
@@ -195,7 +193,7 @@ def everything(obj):
     return found
 
 
-def test_all_that_a_mesh_has_survives(shells, sphere, get_depsgraph):
+def test_all_mesh_data_survives_sorting(shells, sphere, get_depsgraph):
     decorated(shells)
     bpy.context.view_layer.update()
     before = everything(shells)
@@ -207,7 +205,7 @@ def test_all_that_a_mesh_has_survives(shells, sphere, get_depsgraph):
         assert after[name] == value, name
 
 
-def test_shape_keys_and_modifiers_that_bend_are_seen_and_those_that_add_are_told(
+def test_deforming_modifiers_are_applied_and_generating_ones_are_reported(
     shells, sphere, get_depsgraph
 ):
     shells.shape_key_add(name="Basis")
@@ -279,7 +277,7 @@ def test_alpha_comes_from_the_material(shells, sphere, get_depsgraph):
     assert "several alpha pictures" in note and "'Clear' was used" in note
 
 
-def test_the_order_goes_by_what_the_material_lets_see(shells, sphere, get_depsgraph):
+def test_order_accounts_for_the_alpha_of_the_material(shells, sphere, get_depsgraph):
     """Sorting by pieces uses the material's alpha: fully transparent cards hide nothing and keep
     the order of distance."""
 
@@ -316,7 +314,7 @@ def refused(**changed):
     return str(caught.value)
 
 
-def test_what_cannot_be_sorted_is_told(extension, shells, sphere):
+def test_meshes_that_cannot_be_sorted_are_reported(extension, shells, sphere):
     bpy.context.view_layer.objects.active = shells
     assert "no such object" in refused(head="Nobody")
     assert "can grow from" in refused(head="Cards")
@@ -379,7 +377,7 @@ def test_real_cards_leave_blender_in_their_order(
 
 
 @pytest.mark.parametrize("taken", ["Occlusion", "occlusion", "along"])
-def test_what_the_artist_has_called_like_ours_is_not_replaced(shells, sphere, get_depsgraph, taken):
+def test_data_of_the_artist_with_our_names_is_not_replaced(shells, sphere, get_depsgraph, taken):
     mesh = shells.data
     if taken == "Occlusion":
         mesh.uv_layers.new(name=taken)

@@ -83,7 +83,7 @@ def test_at_1_hair_lags_behind_its_style_and_has_the_lengths_of_that(
     assert np.ptp(now.lengths()) > 0.01, "some strands have become longer"
 
 
-def test_what_is_painted_0_goes_with_the_style_and_the_rest_is_simulated(
+def test_hair_painted_0_follows_the_style_and_other_hair_is_simulated(
     moving: Any, get_depsgraph: Any
 ) -> None:
     head = moving.data.surface
@@ -128,7 +128,7 @@ def test_a_bake_has_the_style_of_each_frame(moving: Any, get_depsgraph: Any) -> 
     np.testing.assert_allclose(fresh.strands, played[4], atol=2e-6)
 
 
-def test_curves_that_are_lost_in_mid_play_leave_the_last_style_that_fits(
+def test_the_last_style_that_fits_stays_when_curves_disappear_during_playback(
     moving: Any, get_depsgraph: Any
 ) -> None:
     lose_curves(moving, 5)
@@ -144,7 +144,7 @@ def test_curves_that_are_lost_in_mid_play_leave_the_last_style_that_fits(
     assert "frame 5" in warning and "57 usable curves" in warning and "not 60" in warning
 
 
-def test_a_groom_that_moves_in_a_file_comes_with_all_its_frames(
+def test_an_animated_groom_is_imported_with_all_its_frames(
     moving: Any, get_depsgraph: Any, tmp_path: Path
 ) -> None:
     """An imported animated file gives each frame's points and is the animated style at once."""
@@ -172,7 +172,7 @@ def test_a_groom_that_moves_in_a_file_comes_with_all_its_frames(
         assert apart(session.strands, session.rig.strands.offsets, expected) < 2e-6
 
 
-def test_both_forms_agree_halfway(moving: Any, get_depsgraph: Any) -> None:
+def test_numpy_and_compute_solver_agree_at_half_strength(moving: Any, get_depsgraph: Any) -> None:
     moving.hairloom.dynamics.influence = 0.5
     session, found = session_at_start(moving, get_depsgraph), []
     for form in ("numpy", "compute"):

@@ -51,7 +51,7 @@ def is_title(name):
     return bool(name) and all(not word[0].islower() for word in words)
 
 
-def test_titles_are_told_from_other_texts():
+def test_titles_are_distinguished_from_other_texts():
     assert is_title("Levels of Detail") and is_title("Fly-Aways") and not is_title("Tip width")
 
 
@@ -91,7 +91,7 @@ def test_every_panel_menu_and_operator_says_what_it_is(kind):
             assert (each.__doc__ or "").strip(), each.__name__
 
 
-def test_settings_open_closed_except_the_first():
+def test_settings_panels_start_closed_except_the_first():
     """Subpanels start closed: fourteen open ones would fill the screen."""
     below = [p for p in registration.CLASSES if getattr(p, "bl_parent_id", "").startswith("HAIR")]
     assert below and all("DEFAULT_CLOSED" in panel.bl_options for panel in below)

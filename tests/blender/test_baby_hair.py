@@ -19,7 +19,7 @@ from hairloom.addon.cards.settings import CardSettings  # noqa: E402
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings  # noqa: E402
 
 
-def test_a_bake_knows_its_baby_hair() -> None:
+def test_a_bake_stores_which_strands_are_baby_hair() -> None:
     rig = wig()
     found = baked_rig_of(rig_arrays(rig, RestMatrices(np.eye(4), np.eye(4))), "here").rig
     np.testing.assert_array_equal(found.baby_hair, np.flatnonzero(short_strands(rig)))

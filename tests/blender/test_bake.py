@@ -121,7 +121,7 @@ def test_a_bake_is_the_same_with_and_without_a_preview(
             np.testing.assert_array_equal(second.frame(number)[name], array)
 
 
-def test_a_preview_begun_elsewhere_shows_the_very_same_strands(swinging, get_depsgraph):
+def test_a_preview_started_on_a_moved_head_shows_the_same_strands(swinging, get_depsgraph):
     """A preview that starts after the head has moved uses the rig of the bake."""
     hair, _ = swinging
     bake(hair)
@@ -207,7 +207,7 @@ def test_hair_without_a_head_is_baked(new_hair, get_depsgraph, tmp_path):
     np.testing.assert_array_equal(played(hair, last=4), shown)
 
 
-def test_what_has_changed_since_is_said_and_the_bake_still_plays(swinging, get_depsgraph):
+def test_changes_since_the_bake_are_reported_and_the_bake_still_plays(swinging, get_depsgraph):
     hair, head = swinging
     previews.start(hair, get_depsgraph())
     bake(hair)
@@ -268,7 +268,7 @@ def test_a_head_that_is_posed_by_hand_takes_its_hair_along(swinging, get_depsgra
     np.testing.assert_array_equal(drawn(hair), baked)
 
 
-def test_the_bake_of_another_scene_is_not_replaced_without_a_word(swinging):
+def test_replacing_the_bake_of_another_scene_is_reported(swinging):
     hair, head = swinging
     bake(hair)
     assert not Bake.of([hair], bpy.context.scene).notes
@@ -281,7 +281,7 @@ def test_the_bake_of_another_scene_is_not_replaced_without_a_word(swinging):
     assert f"bake of frames 1 to {LAST} was replaced, as 2 scenes share" in note
 
 
-def test_a_bake_can_be_left_out_and_is_simulated_again(swinging, get_depsgraph):
+def test_hair_is_simulated_while_its_bake_is_not_used(swinging, get_depsgraph):
     hair, _ = swinging
     previews.start(hair, get_depsgraph())
     bake(hair)
@@ -294,7 +294,7 @@ def test_a_bake_can_be_left_out_and_is_simulated_again(swinging, get_depsgraph):
     np.testing.assert_array_equal(played(hair), baked)
 
 
-def test_cancelling_leaves_the_bake_before_untouched(swinging, get_depsgraph, tmp_path):
+def test_cancelling_keeps_the_previous_bake(swinging, get_depsgraph, tmp_path):
     hair, _ = swinging
     bake(hair)
     before = contents(tmp_path / "bake")
@@ -311,7 +311,7 @@ def test_cancelling_leaves_the_bake_before_untouched(swinging, get_depsgraph, tm
 
 
 @pytest.mark.parametrize("what", ["a second version of the file", "a duplicate"])
-def test_what_shows_the_bake_of_another_shows_it_after_cancelling_too(what, swinging, tmp_path):
+def test_after_cancelling_hair_still_shows_the_bake_of_another_groom(what, swinging, tmp_path):
     hair, _ = swinging
     hair.hairloom.bake.folder = ""
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot_v1.blend"))
@@ -359,7 +359,7 @@ def test_hair_that_blender_simulates_is_not_baked(swinging, tmp_path):
     assert bake(hair)[-1] == LAST
 
 
-def test_what_a_killed_bake_leaves_goes_with_the_next(swinging, tmp_path, monkeypatch):
+def test_files_of_a_killed_bake_are_removed_by_the_next(swinging, tmp_path, monkeypatch):
     hair, _ = swinging
     bake(hair)
     folder, shown = tmp_path / "bake", frames_in(tmp_path / "bake")
@@ -374,7 +374,7 @@ def test_what_a_killed_bake_leaves_goes_with_the_next(swinging, tmp_path, monkey
     assert frames_in(folder) not in (shown, left)
 
 
-def test_two_who_bake_into_one_folder_never_mix_their_frames(tmp_path):
+def test_two_writers_of_one_folder_never_mix_their_frames(tmp_path):
     """Two writers interleave their frames; each time, the last to finish is shown completely."""
     folder = tmp_path / "bake"
     writers = [CacheWriter(folder), CacheWriter(folder)]
@@ -392,7 +392,9 @@ def test_two_who_bake_into_one_folder_never_mix_their_frames(tmp_path):
         assert [int(each["value"]) for each in arrays] == [value] * 3
 
 
-def test_a_bake_that_cannot_take_its_place_is_kept(swinging, tmp_path, monkeypatch):
+def test_a_bake_that_cannot_replace_the_previous_one_is_kept_beside_it(
+    swinging, tmp_path, monkeypatch
+):
     """Under Windows' rule that open files cannot be replaced, the new frames are kept and named."""
     hair, _ = swinging
     bake(hair)
@@ -467,14 +469,14 @@ def test_frames_that_are_open_elsewhere_go_when_their_writer_is_gone(tmp_path):
     assert len(list(folder.glob("frames-*"))) == 1
 
 
-def test_a_folder_whose_path_is_too_long_is_said_to_be(tmp_path):
+def test_a_folder_whose_path_is_too_long_is_reported(tmp_path):
     folder = tmp_path / ("x" * 100) / ("y" * (150 - len(str(tmp_path)) % 50))
     with windows_rules(), pytest.raises(HairloomError, match="259 work here") as raised:
         CacheWriter(folder).add_constants({"value": np.zeros(3)})
     assert raised.value.remedy == "Choose a folder with a shorter path"
 
 
-def test_of_several_bakes_all_are_replaced_or_none(swinging, tmp_path, monkeypatch):
+def test_several_bakes_are_replaced_together_or_not_at_all(swinging, tmp_path, monkeypatch):
     hair, _ = swinging
     twin = hair.copy()
     bpy.context.collection.objects.link(twin)
@@ -506,7 +508,7 @@ def test_a_bake_through_a_link_stays_on_the_other_disk(swinging, tmp_path):
     assert Cache(tmp_path / "large_disk").frame(LAST)["guides"].shape == (60, 16, 3)
 
 
-def test_a_folder_beside_that_is_called_old_is_not_touched(swinging, get_depsgraph, tmp_path):
+def test_an_adjacent_folder_named_old_is_not_touched(swinging, get_depsgraph, tmp_path):
     hair, _ = swinging
     (tmp_path / "bake.old").mkdir()
     (tmp_path / "bake.old" / "project.txt").write_text("mine")
@@ -622,7 +624,9 @@ def test_a_duplicate_is_baked_into_a_folder_of_its_own(swinging, tmp_path):
     "damage",
     ["no frame", "cut off", "another shape", "pickled", "no json", "newer", "no constants"],
 )
-def test_a_damaged_bake_is_told_and_the_hair_simulated(damage, swinging, get_depsgraph, tmp_path):
+def test_a_damaged_bake_is_reported_and_hair_is_simulated(
+    damage, swinging, get_depsgraph, tmp_path
+):
     hair, _ = swinging
     bake(hair)
     folder = tmp_path / "bake"
@@ -691,7 +695,7 @@ def test_the_buttons_bake_and_delete(swinging, tmp_path):
     assert [curves.name for curves in bpy.data.hair_curves] == ["Hair"]
 
 
-def test_a_bake_knows_how_far_its_strands_stretch_and_how_deep_they_are(swinging):
+def test_a_bake_stores_stretch_and_depth_of_its_strands(swinging):
     """The stored figures equal those computed from the bake's frames, with the head as a sphere."""
     hair, head = swinging
     head.hairloom.collider_shape = "sphere"
@@ -708,7 +712,7 @@ def test_a_bake_knows_how_far_its_strands_stretch_and_how_deep_they_are(swinging
     assert found.strands_penetration_max_mm == pytest.approx(1000.0 * max(depth), abs=0.2)
 
 
-def test_figures_that_are_none_make_a_bake_damaged(swinging):
+def test_non_finite_figures_make_a_bake_damaged(swinging):
     hair, _ = swinging
     bake(hair)
     facts = Path(hair.hairloom.bake.folder) / "cache.json"
@@ -752,7 +756,7 @@ def test_a_render_has_the_rig_of_the_newest_bake(swinging, get_depsgraph):
     engine_hair.forget()
 
 
-def test_a_folder_that_is_asked_for_is_taken_though_another_object_names_it(swinging, tmp_path):
+def test_a_requested_folder_is_used_even_if_another_object_names_it(swinging, tmp_path):
     hair, _ = swinging
     twin = hair.copy()
     bpy.context.collection.objects.link(twin)
@@ -763,7 +767,7 @@ def test_a_folder_that_is_asked_for_is_taken_though_another_object_names_it(swin
         assert each.hairloom.bake.folder == str(asked)
 
 
-def test_two_names_of_one_folder_are_one_folder(swinging, tmp_path):
+def test_two_paths_of_one_folder_count_as_one_folder(swinging, tmp_path):
     """Two bakes of one run do not overwrite each other if two spellings name one folder."""
     hair, _ = swinging
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "wig.blend"))
@@ -794,7 +798,7 @@ def test_while_hair_is_baked_cloth_shows_its_bake_as_on_the_timeline(
     np.testing.assert_array_equal(during, there)
 
 
-def test_work_inside_suspended_work_leaves_it_suspended():
+def test_nested_suspension_keeps_work_suspended():
     with suspended():
         with suspended():
             pass

@@ -232,7 +232,7 @@ def test_a_picture_of_another_bake_is_not_skipped(file, tmp_path, capfd):
         ([], "it has no bake"),  # the only hair of the scene
     ],
 )
-def test_what_is_not_baked_is_not_drawn(arguments, message, file, tmp_path, capsys):
+def test_frames_without_a_bake_are_not_drawn(arguments, message, file, tmp_path, capsys):
     whole = ["render", "--scene", str(file), "--bake", "--output", str(tmp_path / "hair.png")]
     assert command_line.run([*whole, *arguments]) == 1
     assert message in capsys.readouterr().err

@@ -27,7 +27,7 @@ def bake(*hair):
     show_in_renders(list(hair), bpy.context.evaluated_depsgraph_get())
 
 
-def test_hair_whose_copy_is_deleted_is_offered_to_renders_again(hair, get_depsgraph):
+def test_hair_is_rendered_again_after_its_render_copy_is_deleted(hair, get_depsgraph):
     bake(hair)
     assert hair.hide_render
     for collection in hair.hairloom.bake.copy.users_collection:
@@ -69,7 +69,7 @@ def test_a_copy_shows_no_bake_of_other_strands(hair, new_hair, sphere, tmp_path,
     assert [tuple(point.vector) for point in copy.data.position_data] == shown
 
 
-def test_a_file_that_cannot_be_opened_leaves_hair_to_be_seen(hair, get_depsgraph, tmp_path):
+def test_hair_stays_visible_after_a_file_fails_to_open(hair, get_depsgraph, tmp_path):
     session = previews.start(hair, get_depsgraph())
     assert session is not None
     assert hair.evaluated_get(get_depsgraph()).display_type == "WIRE"
@@ -100,13 +100,13 @@ def test_a_file_that_cannot_be_opened_leaves_hair_to_be_seen(hair, get_depsgraph
         ("x" * 500, "x" * 41 + "_c38c2bf3"),
     ],
 )
-def test_a_name_chooses_no_folder_but_its_own(name, folder, tmp_path):
+def test_a_name_cannot_lead_out_of_its_bake_folder(name, folder, tmp_path):
     assert safe_folder_name(name) == folder
     inside = tmp_path / "cache" / safe_folder_name(name)
     assert inside.resolve().parent == (tmp_path / "cache").resolve()
 
 
-def test_names_that_are_one_on_some_system_get_two_folders():
+def test_names_that_are_equal_on_some_file_systems_get_two_folders():
     taken = {name_key(safe_folder_name("Hair"))}
     assert safe_folder_name("hair", taken) == "hair_2"
     assert safe_folder_name("Cafe\u0301") == safe_folder_name("Caf\u00e9")

@@ -68,7 +68,7 @@ def solids(mesh: Surface, bend: float) -> tuple[PosedCollider, ...]:
     )
 
 
-def test_solids_come_back_as_they_were(mesh):
+def test_solids_are_read_back_as_written(mesh):
     posed, points = solids(mesh, 0.5), np.random.default_rng(2).normal(0.0, 0.3, (2000, 3))
     start = MotionStart(Pose(None, np.eye(4)), solids(mesh, 0.0), 0.001)
     constants = solid_constants(start, (mesh,), SETTINGS)
@@ -82,7 +82,7 @@ def test_solids_come_back_as_they_were(mesh):
     assert BakedSolids.of({}) is None, "a bake of a version that did not keep them"
 
 
-def test_damaged_solids_say_so(mesh):
+def test_damaged_solids_are_reported(mesh):
     posed = solids(mesh, 0.5)
     start = MotionStart(Pose(None, np.eye(4)), posed, 0.001)
     baked = BakedSolids.of(solid_constants(start, (mesh,), SETTINGS))
@@ -92,7 +92,7 @@ def test_damaged_solids_say_so(mesh):
         _ = baked.at(arrays, blocking=True).colliders
 
 
-def test_between_two_frames_solids_go_straight(mesh):
+def test_solids_are_interpolated_linearly_between_frames(mesh):
     one, other = (solid_arrays(solids(mesh, bend), (mesh,)) for bend in (0.4, 0.6))
     other["solid_matrices"] = other["solid_matrices"] + 0.1
     half = solids_between(one, other, 0.5)

@@ -31,7 +31,7 @@ from _turns import in_turns
         ({"a": 1.0, "b": 1.0}, {"a": 0.0}, {"b": 2.0}, ["a", "b"]),
     ],
 )
-def test_limits(
+def test_missed_limits_set_the_exit_code(
     found: dict[str, Any],
     at_most: dict[str, float],
     at_least: dict[str, float],
@@ -74,14 +74,14 @@ def test_a_part_that_is_unknown_ends_a_benchmark() -> None:
     "name",
     few_in_commits(sorted(name for name, short in figures.BENCHES.items() if short.arguments)),
 )
-def test_each_benchmark_refuses_a_part_that_it_has_not(name: str) -> None:
+def test_each_benchmark_refuses_an_unknown_part(name: str) -> None:
     """A mistyped part is an error; the benchmark does not measure everything or nothing."""
     command = [sys.executable, str(figures.REPOSITORY / "tools" / "bench.py"), name, "mistyped"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300)
     assert done.returncode != 0, done.stdout
 
 
-def test_contestants_have_as_many_times_of_each_round() -> None:
+def test_contestants_are_timed_equally_often_in_each_round() -> None:
     played = []
 
     def plays(name: str) -> float:

@@ -50,7 +50,7 @@ def farthest_from(points: np.ndarray, line: np.ndarray) -> float:
 @pytest.mark.alike
 @pytest.mark.draws(light=False)
 @pytest.mark.parametrize("nodes", NODES)
-def test_what_blenders_nodes_make_is_drawn(
+def test_the_result_of_blenders_nodes_is_drawn(
     nodes: str, new_hair: Callable[..., Any], sphere: Any, get_depsgraph: Callable[[], Any]
 ) -> None:
     short = hedgehog(count=24, points=40)

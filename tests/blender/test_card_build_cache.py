@@ -87,7 +87,7 @@ def afresh(folder: Path) -> dict[str, bytes]:
     return written(folder)
 
 
-def test_what_was_made_is_written_without_building_it_again(
+def test_built_cards_are_written_without_building_them_again(
     hair: Any, tmp_path: Path, builds: list[str]
 ) -> None:
     own = afresh(tmp_path / "own")
@@ -199,7 +199,7 @@ def test_cards_are_not_taken_for_others(
     assert found == afresh(tmp_path / "own") and found != before
 
 
-def test_what_was_changed_and_changed_back_is_the_same(
+def test_a_setting_changed_back_needs_no_rebuild(
     hair: Any, tmp_path: Path, builds: list[str]
 ) -> None:
     """Such as by undo."""
@@ -265,7 +265,7 @@ def no_longer_previewed(hair: Any) -> None:
 @pytest.mark.parametrize(
     "end", [other_file, gone, ended, no_longer_previewed], ids=lambda end: end.__name__
 )
-def test_nothing_is_kept_for_ever(hair: Any, end: Any, last: list[Any]) -> None:
+def test_cached_cards_expire(hair: Any, end: Any, last: list[Any]) -> None:
     make()
     gc.collect()
     assert last[0]() is not None
@@ -274,9 +274,7 @@ def test_nothing_is_kept_for_ever(hair: Any, end: Any, last: list[Any]) -> None:
     assert last[0]() is None
 
 
-def test_what_is_built_next_takes_the_place_of_the_last_before_it_is_built(
-    hair: Any, last: list[Any]
-) -> None:
+def test_old_cards_are_released_before_new_ones_are_built(hair: Any, last: list[Any]) -> None:
     """The old cards are freed first, so that both are never in memory at once."""
     make()
     hair.data.hairloom.cards.card_count = 14

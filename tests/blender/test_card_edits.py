@@ -93,7 +93,7 @@ def edits(hair):
     return read_edits(hair, bpy.context.evaluated_depsgraph_get())[0]
 
 
-def test_cards_that_nobody_has_touched_are_made_anew(hair):
+def test_unedited_cards_are_rebuilt(hair):
     obj = make(hair)
     assert edits(hair) is None
     edit(obj, (), lambda: None)  # enters and leaves Edit Mode
@@ -168,7 +168,7 @@ def test_another_tile_is_kept(hair):
 
 @pytest.mark.alike
 @pytest.mark.parametrize("count", [6, 12, 24])
-def test_with_other_cards_nothing_vanishes(hair, count):
+def test_edited_cards_survive_another_card_count(hair, count):
     """Make Cards with fewer cards, as many from another seed, and more, keeps the moved card."""
     obj = make(hair)
     move(obj, 3)
@@ -234,7 +234,7 @@ def test_all_deleted_is_an_empty_mesh_and_a_note(hair, capfd):
     assert not len(make(hair).data.polygons)
 
 
-def test_discarding_makes_all_cards_anew_and_can_be_undone(hair):
+def test_discarding_edits_rebuilds_all_cards_and_can_be_undone(hair):
     obj = make(hair)
     before = {card: corners(obj, card) for card in range(12)}
     move(obj, 3)
@@ -252,7 +252,7 @@ def test_discarding_makes_all_cards_anew_and_can_be_undone(hair):
     assert (edits(again).edited_count, edits(again).deleted_count) == (1, 1)
 
 
-def test_an_edit_that_is_undone_is_none(hair):
+def test_an_undone_edit_does_not_count_as_edited(hair):
     obj = make(hair)
     bpy.ops.ed.undo_push(message="made")
     move(obj, 3)
@@ -281,7 +281,7 @@ def test_a_foreign_mesh_that_is_joined_stays_as_the_artists_own(hair):
     np.testing.assert_allclose(np.ptp(own, axis=0)[:2], 0.05, atol=1e-6)
 
 
-def test_without_the_numbers_cards_are_known_by_their_place(hair, capfd):
+def test_cards_without_numbers_are_identified_by_their_place(hair, capfd):
     obj = make(hair)
     before = corners(obj, 3)
     move(obj, 3, by=(0.005, 0.0, 0.0))
@@ -299,7 +299,7 @@ def test_without_the_numbers_cards_are_known_by_their_place(hair, capfd):
 
 
 @pytest.mark.parametrize("record", [None, 1, {"places": [1.0]}])
-def test_without_the_record_cards_are_made_anew_with_a_word(hair, capfd, record):
+def test_cards_without_a_record_are_rebuilt_with_a_message(hair, capfd, record):
     obj = make(hair)
     move(obj, 3)
     if record is None:
@@ -324,7 +324,7 @@ def test_cards_without_uvs_are_refused(hair, capfd):
     assert edits(hair) is None
 
 
-def test_a_card_away_from_the_head_is_kept_and_said(hair, capfd):
+def test_a_card_away_from_the_head_is_kept_and_reported(hair, capfd):
     obj = make(hair)
     before = corners(obj, 3)
     move(obj, 3, by=(0.0, 0.0, 1.0))

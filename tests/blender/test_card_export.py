@@ -116,7 +116,7 @@ def mirrored(levels: list[CardMesh]) -> list[CardMesh]:
 
 
 @pytest.mark.parametrize("is_mirrored", [False, True])
-def test_glb_says_which_way_strands_run(
+def test_glb_stores_the_direction_of_strands(
     levels: list[CardMesh], tmp_path: Path, is_mirrored: bool
 ) -> None:
     """The sidecar's formula gives the strands' direction, also for mirrored UVs."""
@@ -139,7 +139,7 @@ def test_glb_says_which_way_strands_run(
 
 @needs_ufbx
 @pytest.mark.parametrize("is_mirrored", [False, True])
-def test_fbx_says_which_way_strands_run(
+def test_fbx_stores_the_direction_of_strands(
     levels: list[CardMesh], tmp_path: Path, is_mirrored: bool
 ) -> None:
     assert "root to tip" in FBX.attributes["LayerElementBinormal 0"]
@@ -235,7 +235,7 @@ def test_usd_keeps_order_attributes_and_levels(
 
 
 @pytest.mark.parametrize("suffix", [".usda", ".usdc"])
-def test_a_disk_that_is_full_for_the_levels_of_usd_is_told(
+def test_a_full_disk_during_usd_levels_is_reported(
     levels: list[CardMesh], tmp_path: Path, suffix: str
 ) -> None:
     path = written(tmp_path, levels, USD, suffix=suffix)
@@ -276,7 +276,7 @@ def test_nothing_is_left_in_the_scene(
 
 
 @pytest.mark.parametrize("file_format", [FBX, USD, OBJ], ids=lambda each: each.name)
-def test_an_exporter_that_is_missing_is_told_and_nothing_is_written(
+def test_a_missing_exporter_is_reported_and_nothing_is_written(
     levels: list[CardMesh],
     tmp_path: Path,
     file_format: CardFormat,
@@ -293,7 +293,7 @@ def test_an_exporter_that_is_missing_is_told_and_nothing_is_written(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_file_goes_by_its_suffix_or_gets_that_of_its_format() -> None:
+def test_the_suffix_chooses_the_format_and_is_added_if_missing() -> None:
     assert format_of(Path("a/hair.v1.FBX")) == (Path("a/hair.v1.FBX"), FBX)
     assert format_of(Path("hair.usda"), "usd") == (Path("hair.usda"), USD)
     assert format_of(Path("hair.v1"), "obj") == (Path("hair.v1.obj"), OBJ)

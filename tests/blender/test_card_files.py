@@ -126,7 +126,7 @@ def test_only_a_picture_of_alpha_alone_is_linked_as_opacity(
     assert linked == [alpha] * bool(alpha)
 
 
-def test_a_viewer_that_knows_nothing_of_us_shows_one_level_in_the_hairs_colour(
+def test_a_generic_viewer_shows_one_level_in_the_hairs_colour(
     tmp_path: Path,
 ) -> None:
     path = tmp_path / "hair.glb"
@@ -385,7 +385,7 @@ def test_meshes_that_would_have_one_sidecar_are_not_written_into_one_folder(
     assert len(list(tmp_path.iterdir())) == 3
 
 
-def test_a_picture_is_not_replaced_by_what_is_made_of_it(tmp_path: Path, capfd: Any) -> None:
+def test_a_source_picture_is_not_replaced_by_its_export(tmp_path: Path, capfd: Any) -> None:
     assert export_cards(tmp_path / "hair.glb", "--levels", "1") == 0
     base = tmp_path / "hair_base.png"
     before = base.read_bytes()
@@ -407,7 +407,7 @@ def test_the_format_may_be_named_and_others_are_refused(
     assert "levels" in capfd.readouterr().err
 
 
-def test_a_name_that_is_too_long_for_what_lies_beside_is_refused_before_any_work(
+def test_a_name_too_long_for_its_textures_is_refused_before_any_work(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(files, "build_steps", lambda *_, **__: pytest.fail("it has begun"))
@@ -457,7 +457,7 @@ def test_no_folder_stays_of_an_export_that_fails(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_all_that_there_is_can_be_chosen() -> None:
+def test_all_formats_and_packings_can_be_chosen() -> None:
     properties = bpy.ops.hairloom.export_cards.get_rna_type().properties
     offered = {
         "format": [each.name for each in FORMATS],
@@ -504,7 +504,7 @@ def test_a_collections_exporter_writes_all_its_hair(sphere: Any, tmp_path: Path)
     assert found == ["hair_Front", "hair_Haar_Ä_001"]
 
 
-def test_a_collection_without_hair_is_told(sphere: Any, tmp_path: Path) -> None:
+def test_a_collection_without_hair_is_reported(sphere: Any, tmp_path: Path) -> None:
     grow_hair(sphere, "Hair")
     bpy.data.collections.new("Empty")
     for name in ("Empty", "Nowhere"):

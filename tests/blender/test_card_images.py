@@ -99,7 +99,7 @@ def test_an_artists_picture_is_written_in_place_of_the_generated_one(
 
 
 @pytest.mark.parametrize("kind", few_in_commits(["broken", "missing"]))
-def test_a_picture_that_is_gone_is_told_and_replaced(
+def test_a_missing_picture_is_reported_and_replaced(
     kind: str, write: Any, hair: Any, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     path = write("mine.png", values(3), is_color=True)

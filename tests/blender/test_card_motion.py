@@ -149,9 +149,7 @@ def test_skinned_cards_are_the_simulated_ones(
 
 
 @pytest.mark.slow
-def test_the_head_is_in_the_root_joint_where_it_is_asked_for(
-    motion: GuideMotion, tmp_path: Path
-) -> None:
+def test_the_root_joint_moves_with_the_head_on_request(motion: GuideMotion, tmp_path: Path) -> None:
     path = tmp_path / "hair.glb"
     written = write(path, motion, kind="joints", motion_space="world", chains=40)
     player = Player(path)
@@ -260,7 +258,7 @@ def test_a_motion_texture_holds_the_simulated_cards(
 
 @pytest.mark.slow(instead="test_a_motion_texture_holds_the_simulated_cards")
 @pytest.mark.parametrize("file_format", few_in_commits([USD, FBX]))
-def test_texels_are_in_other_formats_too(
+def test_motion_texture_is_written_in_all_formats(
     motion: GuideMotion, tmp_path: Path, file_format: Any
 ) -> None:
     path = tmp_path / f"hair{file_format.suffixes[0]}"
@@ -272,7 +270,9 @@ def test_texels_are_in_other_formats_too(
     assert (tmp_path / "hair_motion_position.exr").is_file()
 
 
-def test_what_cannot_be_is_told_before_the_work(motion: GuideMotion, tmp_path: Path) -> None:
+def test_impossible_motions_are_refused_before_the_work(
+    motion: GuideMotion, tmp_path: Path
+) -> None:
     with pytest.raises(HairloomError, match="joints are written to GLB"):
         write(tmp_path / "hair.fbx", motion, kind="joints")
     with pytest.raises(HairloomError, match="one frame"):

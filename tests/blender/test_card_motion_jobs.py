@@ -125,9 +125,7 @@ def test_a_button_writes_the_bake(sphere: Any, tmp_path: Path) -> None:
         ("texture", "Writing"),
     ],
 )
-def test_cancelled_in_its_midst_it_leaves_the_old_files(
-    kind: str, amid: str, sphere: Any, tmp_path: Path
-) -> None:
+def test_cancelling_keeps_the_old_files(kind: str, amid: str, sphere: Any, tmp_path: Path) -> None:
     """The steps are closed at this stage, as Esc in the window does."""
     bpy.context.view_layer.objects.active = sphere
     bpy.ops.hairloom.grow(strand_count=40, length=0.05)

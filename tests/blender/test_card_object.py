@@ -165,7 +165,7 @@ def test_a_copy_of_the_cards_is_left_alone(hair, name, reopened, tmp_path):
     assert card_objects(hair)[0].name == "Fringe"
 
 
-def test_where_the_cards_are_gone_their_copy_is_left_alone(hair):
+def test_a_copy_is_left_alone_after_the_cards_are_deleted(hair):
     press()
     obj = card_objects(hair)[0]
     copy = obj.copy()
@@ -205,7 +205,7 @@ def test_cards_lie_on_hair_that_was_moved_scaled_and_mirrored(hair, sphere, scal
     assert ((own * normals).sum(axis=1) > 0.0).mean() > 0.9
 
 
-def test_it_can_be_undone_and_the_groom_is_remembered_in_the_file(hair, tmp_path):
+def test_cards_can_be_undone_and_their_groom_is_saved(hair, tmp_path):
     press()
     path = str(tmp_path / "cards.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path, check_existing=False)
@@ -240,7 +240,7 @@ def test_cards_that_are_being_edited_are_refused(hair, capfd):
     assert len(obj.data.polygons) == count
 
 
-def test_the_panel_draws_what_there_is(hair):
+def test_the_panel_shows_the_counts_of_existing_cards(hair):
     from hairloom.addon.ui.operators_cards import draw_made_cards
 
     said: list[str] = []

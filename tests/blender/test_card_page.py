@@ -104,9 +104,7 @@ def test_a_page_is_part_of_the_set(tmp_path: Path) -> None:
 @pytest.mark.slow(
     instead="tests/blender/test_card_files.py::test_a_failure_in_the_middle_leaves_the_old_files"
 )
-def test_what_was_there_stays_where_a_page_fails(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_old_files_stay_if_a_page_fails(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(*_: Any) -> None:
         raise HairloomError("it broke", place="page", remedy="Wait")
 

@@ -34,13 +34,13 @@ def numpy_of(command, folder):
     return result.read_text()
 
 
-def test_it_has_the_packages_of_this_one(afresh, tmp_path):
+def test_child_python_has_the_packages_of_this_one(afresh, tmp_path):
     import numpy
 
     assert numpy_of(afresh(), tmp_path) == numpy.__file__
 
 
-def test_packages_that_this_one_has_load_there(afresh):
+def test_packages_of_this_python_load_in_the_child(afresh):
     command = afresh()
     environment = os.environ | same_packages()
     loaded = [
@@ -53,7 +53,7 @@ def test_packages_that_this_one_has_load_there(afresh):
         subprocess.run([*command, "-c", f"import {module}"], env=environment, check=True)
 
 
-def test_only_files_of_libraries_need_it(afresh):
+def test_only_formats_of_libraries_start_a_child(afresh):
     assert child_python.python_for(Path("a.tfx")) is None
     assert child_python.python_for(Path("a.hair")) is None
     assert child_python.python_for(Path("a.ABC")) == child_python.python_for(Path("a.usda"))
@@ -67,7 +67,7 @@ def test_blender_itself_runs_a_script(tmp_path):
     assert numpy_of(child_python.blender_command(), tmp_path) == numpy.__file__
 
 
-def test_a_python_without_the_packages_is_passed_over(afresh, monkeypatch, tmp_path):
+def test_a_python_without_the_packages_is_skipped(afresh, monkeypatch, tmp_path):
     """If no Python has the packages, it is Blender; if Blender is a Python module, it is none."""
     lacking = tmp_path / "python-lacking"
     lacking.write_text("#!/bin/sh\nexit 1\n")

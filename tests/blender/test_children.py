@@ -93,7 +93,7 @@ def test_guides_come_first_and_children_after_them(way, hair, get_depsgraph):
     assert overlay.drawing_of(session.uid).snapshot.strand_count == 260
 
 
-def test_none_is_the_artists_own_hair(new_hair, sphere, get_depsgraph):
+def test_method_none_keeps_the_artists_own_hair(new_hair, sphere, get_depsgraph):
     hair = new_hair(sphere)
     hair.data.hairloom.children.strand_count = 17
     session = previews.start(hair, get_depsgraph())
@@ -174,7 +174,7 @@ def test_painted_weights_are_followed(hair, sphere, get_depsgraph):
     assert session.rig.strands.roots[60:, 2].min() < -0.05
 
 
-def test_weights_that_cannot_be_used_are_said(hair, sphere, get_depsgraph):
+def test_unusable_weights_are_reported(hair, sphere, get_depsgraph):
     sphere.vertex_groups.new(name="Nowhere")
     hair.hairloom.children_density = "Nowhere"
     session = previews.start(hair, get_depsgraph())
@@ -237,7 +237,7 @@ def test_a_brush_on_a_mask_is_followed_with_the_update(hair, sphere, get_depsgra
     assert session.rig.strands.lengths()[own:] == pytest.approx(at_once, rel=1e-3)
 
 
-def test_masks_that_cannot_be_used_are_said_and_act_nowhere(hair, sphere, get_depsgraph):
+def test_unusable_masks_are_reported_and_have_no_effect(hair, sphere, get_depsgraph):
     children = hair.data.hairloom.children
     session = previews.start(hair, get_depsgraph())
     before = session.rig.strands.points
@@ -278,7 +278,7 @@ def test_a_bake_is_stale_once_a_mask_is_painted(hair, sphere):
     assert differences(hashes[1], hashes[2]) == ("children",)
 
 
-def test_an_unknown_density_is_said_and_a_bake_refuses_it(hair, sphere, get_depsgraph):
+def test_an_unknown_density_is_reported_and_a_bake_refuses_it(hair, sphere, get_depsgraph):
     upper_half(sphere, "Top")
     session = previews.start(hair, get_depsgraph())
     hair.hairloom.children_density = "Bottom"
@@ -309,7 +309,7 @@ def test_a_bake_of_children_plays_back_bit_for_bit(moving, get_depsgraph):
     assert previews.previews[again.uid].bake.changed == ()
 
 
-def test_a_bake_keeps_what_there_was_to_say(new_hair, get_depsgraph, tmp_path):
+def test_a_bake_keeps_its_warnings(new_hair, get_depsgraph, tmp_path):
     hair = new_hair()
     hair.data.hairloom.children.method = "multi"
     hair.hairloom.bake.folder = str(tmp_path / "bake")
@@ -436,7 +436,7 @@ def test_the_command_line_makes_children(sphere, tmp_path, capfd):
 
 
 @pytest.mark.slow(instead="test_guides_come_first_and_children_after_them")
-def test_a_picture_of_children_says_what_was_drawn(sphere, tmp_path, gpu_context):
+def test_the_report_of_a_picture_counts_drawn_children(sphere, tmp_path, gpu_context):
     report = tmp_path / "report.json"
     arguments = ["render", "--head", sphere.name, "--width", "96", "--height", "96"]
     arguments += ["--set", "grow.method=normals", "--set", "grow.strand_count=80"]
@@ -451,7 +451,7 @@ def test_a_picture_of_children_says_what_was_drawn(sphere, tmp_path, gpu_context
     assert drawn[300]["strands"] < 480 and drawn[300]["vertices"] < drawn[0]["vertices"]
 
 
-def test_the_command_line_says_what_is_missing(hair, sphere, tmp_path, capfd):
+def test_the_command_line_reports_missing_groups(hair, sphere, tmp_path, capfd):
     hair.data.surface = hair.parent = None
     report = tmp_path / "report.json"
     arguments = ["export", "--groom", "Hair", "--set", "children.method=multi"]

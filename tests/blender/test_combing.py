@@ -73,7 +73,7 @@ def test_strands_follow_with_the_update_and_nothing_else_moves(hair, session, ge
     assert session.is_stale, "the rest is to come"
 
 
-def test_at_the_end_it_is_bit_for_bit_what_a_rebuild_makes(hair, session, get_depsgraph):
+def test_combed_hair_ends_bit_for_bit_as_a_rebuild(hair, session, get_depsgraph):
     for number in range(3):
         stroke(hair, range(4 * number, 4 * number + 4))
     arrive(session, get_depsgraph)
@@ -196,7 +196,7 @@ def test_painting_amid_a_build_is_not_lost_when_that_arrives(hair, group, sessio
     np.testing.assert_array_equal(session.rig.strands.points, rebuilt(hair, get_depsgraph)[0])
 
 
-def test_hair_that_plays_waits_for_what_is_made_of_the_paint(hair, group, session, get_depsgraph):
+def test_playing_hair_waits_for_the_build_with_new_paint(hair, group, session, get_depsgraph):
     arrive(session, get_depsgraph)
     previews.play(get_depsgraph())
     previews.advance(get_depsgraph(), 1.0 / 60.0)
@@ -245,7 +245,7 @@ def test_a_combed_head_that_moved_since_takes_hair_along(hair, session, get_deps
     assert away[:own].max() > 1e-3 and (away > 1e-5).mean() < 0.6
 
 
-def test_combed_hair_comes_in_the_light_before_and_keeps_strokes_made_since(
+def test_rebuilt_hair_arrives_with_its_old_light_and_keeps_newer_strokes(
     hair, session, get_depsgraph, monkeypatch
 ):
     """Combed hair first has the old light. Its own arrives later, and keeps newer strokes."""

@@ -94,7 +94,7 @@ def test_hair_that_shares_its_curves_is_combed_and_coloured_together(playing, ge
         assert overlay.drawing_of(session.uid).snapshot.shading.ambient == 0.5
 
 
-def test_a_duplicate_that_is_undone(playing, get_depsgraph):
+def test_undoing_a_duplicate_keeps_the_original(playing, get_depsgraph):
     bpy.context.preferences.edit.use_global_undo = True
     bpy.ops.ed.undo_push(message="begin")
     duplicated(playing.hair, playing.head, linked=False)
@@ -123,7 +123,7 @@ def test_hair_of_the_same_name_from_a_file(link, playing, get_depsgraph, tmp_pat
     assert set(previews.sessions()) == {playing.session, second} and previews.notice() == ""
 
 
-def test_names_that_are_exchanged(playing, get_depsgraph):
+def test_grooms_keep_their_bakes_when_names_are_exchanged(playing, get_depsgraph):
     twin, head = duplicated(playing.hair, playing.head, linked=False)
     for one, other in ((playing.hair, twin), (playing.head, head)):
         name, one.name = one.name, "Between"

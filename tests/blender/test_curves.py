@@ -77,7 +77,7 @@ def test_world_space_follows_a_turned_scaled_and_mirrored_object(get_depsgraph):
     assert read.radius == pytest.approx(strands.radius * math.cbrt(3.0), rel=1e-5)
 
 
-def test_more_points_than_are_moved_at_once(get_depsgraph):
+def test_more_points_than_one_block_are_transformed(get_depsgraph):
     strands = ragged(counts=(4,) * 5000)
     obj = written(strands)
     obj.matrix_world = Matrix.Translation((10.0, 0.0, 0.0))
@@ -135,7 +135,7 @@ def test_unusable_curves_are_dropped_and_counted(get_depsgraph):
     assert read.strands.roots.tolist() == [[100, 0, 0], [105, 0, 0]]
 
 
-def test_the_short_way_for_sound_curves_gives_what_clean_gives(get_depsgraph):
+def test_the_fast_path_for_valid_curves_equals_cleaning(get_depsgraph):
     strands = ragged(counts=(2, 3, 16))
     read = read_curves(written(strands), get_depsgraph())
     cleaned = clean(
@@ -334,7 +334,7 @@ def test_curves_of_several_types_keep_their_order_and_points(get_depsgraph):
     np.testing.assert_array_equal(read.points[:6], ZIGZAG.astype(np.float32))
 
 
-def test_handles_go_with_the_points_that_are_combed(get_depsgraph):
+def test_handles_follow_combed_points(get_depsgraph):
     """Combing, settling and trimming move points; handles follow, so curves keep their shape."""
     obj = typed("BEZIER", **HANDLES)
     before = read_curves(obj, get_depsgraph()).strands.points.copy()

@@ -43,7 +43,7 @@ def bake(tmp_path):
         {"frames": None},
     ],
 )
-def test_facts_that_cannot_be_are_told(bake, change):
+def test_impossible_facts_are_reported(bake, change):
     facts = json.loads((bake / "cache.json").read_text())
     Cache(bake)
     (bake / "cache.json").write_text(json.dumps(facts | change))
@@ -62,7 +62,7 @@ def test_a_bake_of_another_version_is_not_called_damaged(bake, change, said):
     assert "damaged" not in str(raised.value)
 
 
-def test_facts_in_which_lists_never_end_are_told(bake):
+def test_endlessly_nested_facts_are_reported(bake):
     (bake / "cache.json").write_text('{"version": ' + "[" * 200_000)
     with pytest.raises(HairloomError, match=r"damaged .*Bake again"):
         Cache(bake)
@@ -74,7 +74,7 @@ def test_facts_of_any_size_are_refused_before_they_are_read(bake, monkeypatch):
         Cache(bake)
 
 
-def test_bytes_by_chance_in_a_bake_are_told_or_read(bake):
+def test_random_bytes_in_a_bake_are_reported_or_read(bake):
     random = np.random.default_rng(2)
     whole = {path: path.read_bytes() for path in bake.rglob("*") if path.is_file()}
     told = 0

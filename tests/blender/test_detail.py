@@ -50,7 +50,7 @@ def test_detail_acts_at_once(preview):
     assert snapshot.rank is before.rank and snapshot.guide is before.guide
 
 
-def test_the_snapshot_knows_guides_groups_and_ranks(preview):
+def test_the_snapshot_has_guides_groups_and_ranks(preview):
     _, _, session = preview
     snapshot, rig = drawing(session).snapshot, session.rig
     np.testing.assert_array_equal(snapshot.guide, rig.weights.guide[:, 0])
@@ -148,7 +148,7 @@ def test_hair_without_a_head_has_nothing_to_hide_it(new_hair, get_depsgraph):
         ("RENDERED", True, False),
     ],
 )
-def test_views_that_show_what_is_behind(kind, xray, expected):
+def test_views_that_show_hidden_strands_cull_nothing(kind, xray, expected):
     assert overlay.is_seen_through(SimpleNamespace(type=kind, show_xray=xray)) is expected
 
 
@@ -202,7 +202,7 @@ def test_statistics_begin_with_nothing():
     )
 
 
-def test_stretch_and_depth_know_the_style_and_the_colliders(preview, get_depsgraph):
+def test_stretch_and_depth_account_for_style_and_colliders(preview, get_depsgraph):
     """The snapshot has the strands at rest for "stretch", the moved head's collider for "depth"."""
     hair, head, session = preview
     hair.hairloom.debug_view = "stretch"

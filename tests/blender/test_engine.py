@@ -28,7 +28,7 @@ from hairloom.addon.render import gpu_objects  # noqa: E402
 pytestmark = [pytest.mark.draws(light=False), pytest.mark.usefixtures("gpu_context", "extension")]
 
 
-def test_radiance_arrives_as_it_is(engine_scene: Any, tmp_path: Path) -> None:
+def test_radiance_is_written_unchanged(engine_scene: Any, tmp_path: Path) -> None:
     """A white diffuse ball in a uniform world of radiance 0.5 has radiance 0.5."""
     add_ball()
     found = render_picture(tmp_path)
@@ -159,7 +159,7 @@ def test_the_region_of_a_view_is_that_of_the_picture(engine_scene: Any) -> None:
     assert view_rectangle(context, depsgraph, 400, 200) == (0, 50, 200, 0)
 
 
-def test_motion_blur_spreads_over_the_way(engine_scene: Any, tmp_path: Path) -> None:
+def test_motion_blur_spreads_along_the_motion(engine_scene: Any, tmp_path: Path) -> None:
     """The blurred alpha has the same sum, and is as much wider as the ball moves in a frame."""
     engine_scene.render.film_transparent = True
     engine_scene.hairloom.picture.samples = engine_scene.hairloom.picture.motion_steps = 16
@@ -212,7 +212,7 @@ def curves_of(obj: Any) -> Iterator[Any]:
                 yield from bag.fcurves
 
 
-def test_panels_serve_the_engine_and_let_go(empty_scene: None) -> None:
+def test_panels_support_the_engine_only_while_registered(empty_scene: None) -> None:
     import hairloom
 
     def serving() -> list[str]:
@@ -238,7 +238,7 @@ def test_panels_serve_the_engine_and_let_go(empty_scene: None) -> None:
         hairloom.register()
 
 
-def test_a_cancelled_render_keeps_what_there_is(
+def test_a_cancelled_render_keeps_its_samples(
     engine_scene: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Cancelled after two of 64 samples, the picture equals one of two samples."""
@@ -273,7 +273,7 @@ def test_both_eyes_of_a_stereo_camera(engine_scene: Any, tmp_path: Path) -> None
 @pytest.mark.parametrize(
     "aperture", few_in_commits(["circle", "three blades", "narrow", "orthographic"])
 )
-def test_what_is_out_of_focus_is_as_soft_as_in_cycles(
+def test_depth_of_field_blurs_as_in_cycles(
     engine_scene: Any, tmp_path: Path, aperture: str
 ) -> None:
     """A ball, focused on an object behind it, covers as much of each pixel as in Cycles."""
@@ -302,7 +302,7 @@ def test_what_is_out_of_focus_is_as_soft_as_in_cycles(
     assert difference.mean() < 0.001 and np.quantile(difference, 0.99) < 0.03
 
 
-def test_a_blurred_render_that_is_cancelled_goes_to_no_other_frame(
+def test_a_cancelled_motion_blur_render_changes_no_frame(
     engine_scene: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from hairloom.addon.blender.engine import engine
@@ -348,7 +348,7 @@ def test_a_render_leaves_nothing_unused_on_the_gpu(engine_scene: Any, tmp_path: 
     assert gpu_objects.bytes_in_use() == left
 
 
-def test_what_a_view_had_on_the_gpu_is_freed_as_it_leaves_rendered_mode(
+def test_gpu_memory_of_a_view_is_freed_when_it_leaves_rendered_mode(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     asked: list[bool] = []

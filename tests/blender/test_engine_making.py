@@ -126,7 +126,7 @@ def test_renders_wait(hair: Any, gate: Gate) -> None:
     assert shown.strand_count == COUNT
 
 
-def test_hair_that_cannot_be_made_is_told(
+def test_hair_that_cannot_be_built_is_reported(
     hair: Any, gate: Gate, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(*_: Any, **__: Any) -> None:
@@ -139,7 +139,7 @@ def test_hair_that_cannot_be_made_is_told(
     assert not view.reader.pending
 
 
-def test_hair_that_nobody_sees_any_more_is_not_waited_for(hair: Any, gate: Gate) -> None:
+def test_hair_that_became_invisible_is_not_waited_for(hair: Any, gate: Gate) -> None:
     view = View()
     view.read()
     uid = hair.session_uid
@@ -205,7 +205,7 @@ def test_hair_is_made_again_after_a_file_that_could_not_be_opened(
     assert shown.strand_count == COUNT
 
 
-def test_an_error_that_is_told_again_and_again_does_not_grow(
+def test_an_error_reported_repeatedly_does_not_grow(
     hair: Any, gate: Gate, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(*_: Any, **__: Any) -> None:
@@ -256,7 +256,7 @@ def test_the_picture_keeps_its_hair_until_the_preview_has_its_own(
     scene_events.clear()
 
 
-def test_hair_is_made_again_whatever_of_it_is_other_now(hair: Any, sphere: Any) -> None:
+def test_hair_is_rebuilt_after_any_change(hair: Any, sphere: Any) -> None:
     """Hair is built again for other seeds, root UVs, triangles of the head, or UVs of the head."""
 
     def made() -> Any:

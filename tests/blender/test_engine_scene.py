@@ -49,7 +49,7 @@ def test_view_layers_and_holdouts(engine_scene: Any, tmp_path: Path) -> None:
 
 @pytest.mark.alike
 @pytest.mark.parametrize("way", ["none", "hashed", "layers"])
-def test_hair_may_be_a_hole(
+def test_hair_can_be_a_holdout(
     engine_scene: Any, new_hair: Callable[..., Any], sphere: Any, tmp_path: Path, way: str
 ) -> None:
     """In front of a wall, a holdout removes the hair's alpha. Meshes in front of it stay."""
@@ -287,7 +287,7 @@ def test_a_bake_has_the_animated_settings_of_the_frame(
     assert sorted(set(widths)) == pytest.approx([1.0, 3.0, 5.0])
 
 
-def test_bad_input_is_told(
+def test_bad_input_is_reported(
     engine_scene: Any, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     engine_scene.world = None

@@ -76,7 +76,7 @@ def test_shadows_lie_where_cycles_has_them(
     assert (away > 0.2).mean() < 0.008
 
 
-def test_what_is_not_to_throw_a_shadow_throws_none(
+def test_objects_without_shadow_visibility_cast_none(
     engine_scene: Any, props: Any, tmp_path: Path
 ) -> None:
     """The picture gets brighter without shadows of one object, of all objects, of the light."""

@@ -59,7 +59,7 @@ def on_sphere(*, coloured: bool = True) -> Groom:
     return Groom(strands, strand_id=np.arange(40) + 100, group_names={3: "top"})
 
 
-def test_a_grooms_file_keeps_all_that_it_says(
+def test_all_attributes_of_a_groom_file_are_kept(
     extension: None, sphere: Any, tmp_path: Path, run: Callable[..., Any]
 ) -> None:
     pytest.importorskip("pxr")

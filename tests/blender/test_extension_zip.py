@@ -118,7 +118,7 @@ def tracked(folder):
     }
 
 
-@pytest.mark.slow(instead="test_what_the_validator_does_not_check_is_right")
+@pytest.mark.slow(instead="test_manifest_fields_that_the_validator_skips_are_valid")
 def test_blender_accepts_the_repository_and_the_zips(tight_zips):
     extension_tool("validate", REPOSITORY)
     for path in tight_zips.values():
@@ -195,7 +195,7 @@ def test_every_build_of_blender_gets_a_zip_with_one_wheel_of_each_package(zips, 
     assert python in tool.python_versions_from_wheels(own["wheels"])
 
 
-def test_a_wheel_that_cannot_be_had_is_named(tmp_path):
+def test_a_wheel_that_cannot_be_downloaded_is_named(tmp_path):
     """Without a network, or with a wrong checksum; no file is left."""
     import fetch_wheels
 
@@ -205,7 +205,7 @@ def test_a_wheel_that_cannot_be_had_is_named(tmp_path):
     assert list((tmp_path / "wheels").iterdir()) == []
 
 
-def test_what_the_validator_does_not_check_is_right(wheels, manifest):
+def test_manifest_fields_that_the_validator_skips_are_valid(wheels, manifest):
     """Blender's validator accepts unknown licences, schema versions, keys and websites."""
     assert manifest["schema_version"] == "1.0.0"
     assert manifest["id"] == "hairloom"
@@ -278,7 +278,7 @@ def test_the_zip_holds_all_that_runs_and_nothing_else(names):
     assert [n for n in names if n.endswith("/")] == [], "an empty folder"
 
 
-def test_no_module_edits_the_path_or_takes_its_name_for_granted():
+def test_no_module_edits_sys_path_or_hard_codes_its_package_name():
     """Blender renames the package, and reports entries in sys.path as a policy violation."""
     files = list((REPOSITORY / "addon").rglob("*.py"))
     assert len(files) > 200

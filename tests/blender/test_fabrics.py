@@ -71,7 +71,7 @@ def test_a_mesh_that_moves_is_waited_for_once(sheet, get_depsgraph):
     assert session.state.fabric.size == pytest.approx(0.25 * size, rel=1e-6)
 
 
-def test_another_mesh_is_made_anew_and_the_same_is_kept(sheet, get_depsgraph):
+def test_a_changed_mesh_is_rebuilt_and_an_unchanged_one_is_kept(sheet, get_depsgraph):
     session = fins.start(sheet, get_depsgraph())
     with pytest.raises(NotMadeYetError):
         session.play(get_depsgraph(), blocking=False)

@@ -103,7 +103,7 @@ def _content(file: Path) -> dict[str, Any]:
     return content
 
 
-def test_the_template_is_valid_and_names_verbs_and_options_that_there_are() -> None:
+def test_the_template_is_valid_and_names_existing_verbs_and_options() -> None:
     assert openjd("check", str(TEMPLATE)).returncode == 0
     from hairloom.addon.blender.command_line.command_line import parser
 

@@ -66,7 +66,7 @@ def test_a_field_is_the_same_whoever_makes_it_and_is_made_once(sphere, get_depsg
     assert fields.field_of(again, finer, place="Head") is not beside
 
 
-def test_what_cannot_be_made_is_told_each_time_it_is_asked_for():
+def test_a_failed_field_is_reported_at_each_request():
     flat = Surface(np.eye(3, dtype=np.float32), np.zeros((0, 3), np.int32))
     for name in ("Sheet", "Same sheet", "Sheet"):
         with pytest.raises(HairloomError, match="no faces") as caught:
@@ -75,7 +75,7 @@ def test_what_cannot_be_made_is_told_each_time_it_is_asked_for():
 
 
 @pytest.mark.slow(instead="test_a_field_is_the_same_whoever_makes_it_and_is_made_once")
-def test_only_the_youngest_fields_are_kept(sphere, get_depsgraph, extension):
+def test_only_the_latest_fields_are_cached(sphere, get_depsgraph, extension):
     surface = surface_of(sphere, get_depsgraph)
     first, *others = fields_wanted()
     oldest = fields.field_of(surface, first, place="Head")
@@ -103,7 +103,7 @@ def made_beside(surface):
 
 
 @pytest.mark.slow
-def test_previews_keep_the_youngest_fields_only(new_hair, sphere, get_depsgraph, extension):
+def test_previews_cache_only_the_latest_fields(new_hair, sphere, get_depsgraph, extension):
     oldest = made_beside(surface_of(sphere, get_depsgraph))
     previews.start(new_hair(sphere), get_depsgraph())
     assert oldest() is None
@@ -161,7 +161,7 @@ def test_stop_while_hair_waits_ends_the_waiting(new_hair, sphere, get_depsgraph,
     assert not previews.is_playing() and not session.is_playing
 
 
-def test_a_collider_that_cannot_be_made_is_left_out_with_a_warning_as_ever(
+def test_a_collider_that_cannot_be_built_is_left_out_with_a_warning(
     new_hair, sphere, get_depsgraph, extension
 ):
     hair = new_hair(sphere)

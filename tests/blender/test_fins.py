@@ -56,7 +56,7 @@ def test_removing_it_leaves_nothing(flag_object, get_depsgraph):
     assert np.array_equal(rest_vertices(flag_object), rest)
 
 
-def test_it_falls_from_its_pins_and_blender_shows_it(flag_object, get_depsgraph):
+def test_cloth_falls_from_its_pins_and_blender_shows_it(flag_object, get_depsgraph):
     rest = rest_vertices(flag_object)
     session = start_fin(flag_object, get_depsgraph)
     before = evaluated_vertices(flag_object, get_depsgraph)
@@ -162,7 +162,7 @@ def test_two_runs_are_alike(flag_object, get_depsgraph):
     assert np.array_equal(*ends)
 
 
-def test_hashes_tell_what_has_changed(flag_object, get_depsgraph):
+def test_hashes_show_which_frames_have_changed(flag_object, get_depsgraph):
     session = start_fin(flag_object, get_depsgraph)
     rig_hash, frame_hash = session.rig_hash(get_depsgraph()), session.frame_hash(get_depsgraph())
     assert session.rig_hash(get_depsgraph()) == rig_hash
@@ -211,7 +211,7 @@ def test_modifiers_below_go_on_from_the_cloth(flag_object, get_depsgraph):
 
 
 @pytest.mark.parametrize(("kind", "place"), [("SUBSURF", 0), ("MIRROR", 0)])
-def test_a_modifier_above_that_makes_vertices_is_said(flag_object, get_depsgraph, kind, place):
+def test_a_modifier_above_that_adds_vertices_is_reported(flag_object, get_depsgraph, kind, place):
     flag_object.modifiers.new("Culprit", kind)
     flag_object.modifiers.move(1, place)
     update_view_layer()
@@ -219,14 +219,14 @@ def test_a_modifier_above_that_makes_vertices_is_said(flag_object, get_depsgraph
         fins.start(flag_object, get_depsgraph())
 
 
-def test_a_modifier_below_that_reorders_vertices_is_said(flag_object, get_depsgraph):
+def test_a_modifier_below_that_reorders_vertices_is_reported(flag_object, get_depsgraph):
     flag_object.modifiers.new("Fewer", "DECIMATE").ratio = 0.5
     update_view_layer()
     with pytest.raises(HairloomError, match="Fewer"):
         fins.start(flag_object, get_depsgraph())
 
 
-def test_a_modifier_that_is_off_is_said(flag_object, get_depsgraph):
+def test_a_disabled_modifier_is_reported(flag_object, get_depsgraph):
     fin_modifier(flag_object).show_viewport = False
     update_view_layer()
     with pytest.raises(HairloomError, match="turned off"):
@@ -248,7 +248,9 @@ def change_topology(flag_object):
         (lambda flag_object: bpy.data.objects.remove(flag_object), "gone"),
     ],
 )
-def test_what_breaks_in_mid_play_ends_it_with_a_notice(flag_object, get_depsgraph, change, says):
+def test_changes_that_break_cloth_during_play_end_it_with_a_notice(
+    flag_object, get_depsgraph, change, says
+):
     session = start_fin(flag_object, get_depsgraph)
     previews.play(get_depsgraph())
     play_frames(session, get_depsgraph, 2)
@@ -262,7 +264,7 @@ def test_what_breaks_in_mid_play_ends_it_with_a_notice(flag_object, get_depsgrap
         bpy.ops.object.mode_set(mode="OBJECT")
 
 
-def test_a_missing_pin_group_is_said_and_none_falls(flag_object, get_depsgraph):
+def test_a_missing_pin_group_is_reported_and_no_vertex_falls(flag_object, get_depsgraph):
     flag_object.hairloom.fin.pin_group = "Nowhere"
     update_view_layer()
     with pytest.raises(HairloomError, match="Nowhere"):
@@ -275,7 +277,7 @@ def test_a_missing_pin_group_is_said_and_none_falls(flag_object, get_depsgraph):
     assert (evaluated_vertices(flag_object, get_depsgraph) - before)[:, 2].max() < -0.01
 
 
-def test_a_mesh_of_two_fins_is_said(flag_object, get_depsgraph):
+def test_a_mesh_shared_by_two_fins_is_reported(flag_object, get_depsgraph):
     twin = flag_object.copy()
     bpy.context.collection.objects.link(twin)
     update_view_layer()

@@ -94,7 +94,7 @@ def test_combed_again_it_begins_from_the_shape_before(hair):
     assert np.array_equal(curve_points(hair.data), again)
 
 
-def test_what_a_brush_has_combed_since_is_not_lost(hair):
+def test_later_brush_strokes_are_not_lost(hair):
     add(ring())
     comb()
     brushed = curve_points(hair.data) * np.float32(1.01)
@@ -119,7 +119,7 @@ def test_undo_takes_strokes_and_combing_back(hair):
 
 
 @pytest.mark.parametrize("wrong", ["faces", "away", "empty"])
-def test_what_is_no_stroke_on_the_head_is_refused(hair, wrong):
+def test_objects_that_are_no_strokes_on_the_head_are_refused(hair, wrong):
     stroke = ring(radius=0.3 if wrong == "away" else RADIUS)
     if wrong == "faces":
         stroke.data.bevel_depth = 0.01

@@ -76,7 +76,7 @@ def test_fields_that_are_hidden_or_elsewhere_do_not_act(owner):
     assert force_fields_of(owner, depsgraph())[0].fields == ()
 
 
-def test_its_own_field_does_not_move_an_object(owner):
+def test_an_object_ignores_its_own_force_field(owner):
     source = add("FORCE")
     assert len(force_fields_of(owner, depsgraph())[0].fields) == 1
     owner = source

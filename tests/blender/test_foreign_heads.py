@@ -253,7 +253,7 @@ def test_on_a_scan_roots_are_on_the_skin_and_no_strand_is_in_it(name: str) -> No
 
 
 @pytest.mark.slow
-def test_hair_is_led_out_of_what_other_heads_have() -> None:
+def test_hair_is_led_out_of_ears_and_noses_of_other_heads() -> None:
     """A ball beside the neck, where long hair falls on the built-in head."""
     head, middle, radius = scan(), stood(np.array([[0.10, 0.02, -0.16]]))[0], 0.03 * LARGER
     bpy.ops.mesh.primitive_uv_sphere_add(radius=radius, location=middle.tolist())
@@ -497,7 +497,7 @@ def test_the_command_line_takes_a_head_of_the_scene(tmp_path: Path) -> None:
     assert run(arguments[:-1] + ["Nobody", *options]) == 1
 
 
-def test_a_warp_brings_points_to_where_they_should_be_and_leaves_far_ones() -> None:
+def test_a_warp_moves_landmarks_to_their_targets_and_leaves_far_points() -> None:
     random = np.random.default_rng(2)
     source = random.uniform(-0.1, 0.1, (12, 3))
     wanted = source + random.normal(0.0, 0.004, source.shape)
@@ -508,7 +508,7 @@ def test_a_warp_brings_points_to_where_they_should_be_and_leaves_far_ones() -> N
     assert np.abs(bent(source) - source).max() < 1e-9
 
 
-def test_what_may_be_a_head() -> None:
+def test_which_objects_can_be_a_head() -> None:
     bpy.ops.mesh.primitive_cube_add()
     assert not foreign_heads.may_be_head(bpy.context.object)
     assert not has_makehuman_topology(scan().data)

@@ -123,7 +123,7 @@ def test_wind_has_handles_where_its_overlay_is_shown(hair: Any) -> None:
 
 
 @pytest.mark.parametrize("collection", ["tie_collection", "collider_collection"])
-def test_only_what_holds_or_stops_hair_has_a_size_to_drag(
+def test_only_ties_and_colliders_of_hair_have_a_size_to_drag(
     new_hair: Callable[..., Any], sphere: Any, collection: str
 ) -> None:
     kind, hair = gizmos.HAIRLOOM_GGT_empty_size, new_hair(sphere)
@@ -139,7 +139,7 @@ def test_only_what_holds_or_stops_hair_has_a_size_to_drag(
     assert not is_there(kind)
 
 
-def test_so_has_what_stops_cloth(sphere: Any) -> None:
+def test_colliders_of_cloth_have_a_size_to_drag(sphere: Any) -> None:
     empty, group = bpy.data.objects.new("Empty", None), bpy.data.collections.new("Group")
     bpy.context.scene.collection.children.link(group)
     group.objects.link(empty)

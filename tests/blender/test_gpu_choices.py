@@ -41,7 +41,7 @@ def test_the_preference_is_the_budget_and_is_never_too_little_to_draw() -> None:
     assert (asked.hard_min, asked.default) == (gpu_choices.MIN_MEMORY, gpu_choices.DEFAULT_MEMORY)
 
 
-def test_the_panel_says_what_to_do_where_more_is_taken(
+def test_the_panel_says_what_to_do_when_the_budget_is_exceeded(
     new_hair: Callable[..., Any], sphere: Any, get_depsgraph: Callable[[], Any]
 ) -> None:
     hair = new_hair(sphere)

@@ -64,12 +64,12 @@ def assert_same(read, groom):
     assert dict(read.group_names) == dict(groom.group_names)
 
 
-def test_all_is_read_back_bit_for_bit():
+def test_all_attributes_are_read_back_bit_for_bit():
     groom = full_groom()
     assert_same(read_back(written(groom)), groom)
 
 
-def test_a_groom_that_says_nothing_more_leaves_no_attributes():
+def test_a_groom_of_points_alone_writes_no_attributes():
     groom = Groom(replace(full_groom().strands, color=None))
     hair = written(groom)
     assert {each.name for each in hair.data.attributes} <= {
@@ -87,7 +87,7 @@ def test_it_outlives_saving_and_opening(tmp_path):
     assert_same(read_back(bpy.data.objects["Hair"]), groom)
 
 
-def test_what_is_of_dropped_curves_is_dropped_with_them():
+def test_attributes_of_dropped_curves_are_dropped():
     groom = full_groom()
     hair = written(groom)
     points = groom.strands.points.copy()
@@ -133,7 +133,7 @@ def test_a_strand_with_a_colour_that_cannot_be_used_has_none(faulty):
     assert sum("1 of 4 strands have no usable colour" in warning for warning in warnings) == 1
 
 
-def test_ids_that_are_not_unique_are_none():
+def test_ids_that_are_not_unique_are_ignored():
     groom = full_groom()
     hair = written(groom)
     hair.data.attributes["groom_id"].data[1].value = int(groom.strand_id[0])
@@ -143,7 +143,7 @@ def test_ids_that_are_not_unique_are_none():
     np.testing.assert_array_equal(read.is_guide, groom.is_guide)
 
 
-def test_closest_guides_that_are_gone_are_none():
+def test_missing_closest_guides_are_ignored():
     groom = full_groom()
     hair = written(groom)
     hair.data.attributes["groom_closest_guide_2"].data[1].value = 7

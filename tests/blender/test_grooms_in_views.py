@@ -131,7 +131,7 @@ def test_hair_has_the_colours_of_a_render(view: SmallView, form: str) -> None:
 
 
 @pytest.mark.parametrize("shadows", ["deep", "slices"])
-def test_light_after_a_groom_is_what_beers_law_says(view: SmallView, shadows: str) -> None:
+def test_light_behind_a_groom_follows_beers_law(view: SmallView, shadows: str) -> None:
     """A sheet that covers half of the light's cross-section, above strands of another groom:
     exp(-1/2) of the sunlight arrives."""
     volume = replace(VOLUME, shadows=shadows, layers=16, resolution=64)
@@ -152,7 +152,7 @@ def test_light_after_a_groom_is_what_beers_law_says(view: SmallView, shadows: st
     assert left.mean() == pytest.approx(np.exp(-0.5), abs=0.02)
 
 
-def test_what_happens_to_one_groom_is_seen_on_the_others(view: SmallView) -> None:
+def test_changes_of_one_groom_are_seen_on_the_others(view: SmallView) -> None:
     """A view keeps its picture until another groom moves, is hidden or removed."""
     layered = replace(OPAQUE, transparency="layers")
     low = sheet(0.0, 400, strand_settings=layered)
@@ -217,7 +217,7 @@ def test_cards_of_one_groom_shade_strands_of_another_and_are_drawn_last(view: Sm
     assert [each.uid for each in shown_in(view)] == [2, 1], "cards blend over strands"
 
 
-def test_grooms_far_apart_know_the_same_lights() -> None:
+def test_grooms_far_apart_get_the_same_lights() -> None:
     """Grooms in one view share the eight lamps, of ten, that are brightest at the first groom."""
     lamps = [Light.point((float(x), 0.0, 0.5), (1.0, 1.0, 1.0), 10.0) for x in range(10)]
     ends = [sheet(0.0, 4, lights=brightest(lamps, np.array([x, 0.0, 0.0]))) for x in (0.0, 9.0)]

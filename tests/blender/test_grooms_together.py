@@ -74,7 +74,7 @@ def alone(two):
     return found
 
 
-def test_they_feel_each_other(two):
+def test_grooms_push_each_other(two):
     by_themselves = alone(two)
     previewed(*two)
     for one, other in zip(played(*two), by_themselves, strict=True):

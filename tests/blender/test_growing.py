@@ -98,7 +98,7 @@ def test_hair_that_was_changed_is_not_lost_to_a_slider(grown, change):
     assert lengths(grown).max() > 0.09, "it does not follow again"
 
 
-def test_hair_that_has_not_grown_here_stays_until_it_is_asked_to(new_hair, sphere):
+def test_imported_hair_stays_until_grow_again_is_pressed(new_hair, sphere):
     hair = new_hair(sphere)
     points = curve_points(hair.data)
     hair.data.hairloom.grow.strand_count = 40
@@ -115,7 +115,7 @@ def test_hair_without_a_surface_says_that_it_cannot_grow(new_hair):
         bpy.ops.hairloom.grow_again()
 
 
-def test_weights_come_from_a_group_and_a_problem_is_told_and_goes(grown, sphere):
+def test_weights_come_from_a_group_and_a_problem_is_reported_until_fixed(grown, sphere):
     group = sphere.vertex_groups.new(name="Top")
     positions = np.array([vertex.co for vertex in sphere.data.vertices])
     group.add(np.flatnonzero(positions[:, 2] > 0.05).tolist(), 1.0, "REPLACE")
@@ -131,7 +131,7 @@ def test_weights_come_from_a_group_and_a_problem_is_told_and_goes(grown, sphere)
     assert own.problem == "" and curve_points(grown.data)[:, 2].min() < 0.03
 
 
-def test_an_image_says_where_and_how_long_hair_grows(grown, sphere):
+def test_images_control_where_and_how_long_hair_grows(grown, sphere):
     """The image is black below and 0.5 above. A vertex group of the same name takes precedence."""
     layer, vertices = sphere.data.uv_layers.active, sphere.data.vertices
     for loop in sphere.data.loops:

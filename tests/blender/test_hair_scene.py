@@ -116,7 +116,7 @@ def links_of(tree: Any) -> set[tuple[str, str, str, str]]:
     }
 
 
-def test_hair_covers_what_it_covers_in_cycles_and_nothing_else_changes(
+def test_hair_covers_the_same_pixels_as_in_cycles_and_nothing_else_changes(
     cycles: Any, hairy: Any, tmp_path: Path
 ) -> None:
     """Blocks agree with Cycles' alpha to 0.05; without shadows, other pixels are Cycles' own."""
@@ -135,7 +135,7 @@ def test_hair_covers_what_it_covers_in_cycles_and_nothing_else_changes(
     np.testing.assert_array_equal(ours[free], without[free])
 
 
-@pytest.mark.slow(instead="test_hair_covers_what_it_covers_in_cycles_and_nothing_else_changes")
+@pytest.mark.slow(instead="test_hair_covers_the_same_pixels_as_in_cycles_and_nothing_else_changes")
 def test_hair_behind_a_mesh_is_hidden_at_its_very_edge(
     cycles: Any, hairy: Any, tmp_path: Path
 ) -> None:
@@ -261,7 +261,7 @@ def test_hairlooms_own_engine_draws_hair_once(
 
 @pytest.mark.slow(instead="test_an_artists_compositor_is_extended_and_given_back")
 @pytest.mark.parametrize("wrong", few_in_commits(["compositing", "muted", "unlinked", "gone"], 2))
-def test_where_the_hair_cannot_be_laid_over_blender_draws_it(
+def test_blender_draws_hair_that_cannot_be_composited(
     cycles: Any, hairy: Any, tmp_path: Path, wrong: str, capsys: Any
 ) -> None:
     native = rendered(tmp_path)
@@ -341,7 +341,7 @@ def test_a_hair_scene_goes_with_the_scene_whose_hair_it_draws(cycles: Any, tmp_p
     assert hair not in bpy.data.scenes
 
 
-@pytest.mark.slow(instead="test_hair_covers_what_it_covers_in_cycles_and_nothing_else_changes")
+@pytest.mark.slow(instead="test_hair_covers_the_same_pixels_as_in_cycles_and_nothing_else_changes")
 @pytest.mark.parametrize("is_baked", few_in_commits([True, False]))
 def test_moving_hair_is_blurred_and_baked_as_by_our_own_engine(
     cycles: Any, hairy: Any, sphere: Any, tmp_path: Path, is_baked: bool

@@ -184,7 +184,7 @@ def test_brows_and_lashes_from_nothing_come_once(style: str) -> None:
 
 
 @pytest.mark.usefixtures("few")
-def test_what_modifiers_make_is_what_is_simulated_and_muting_takes_it_away(
+def test_the_result_of_modifiers_is_simulated_unless_they_are_muted(
     head: bpy.types.Object,
 ) -> None:
     bpy.context.view_layer.objects.active = head
@@ -295,7 +295,7 @@ def test_empty_masks_are_refused(head: bpy.types.Object) -> None:
     refused(style, head, "neither a vertex group nor an attribute")
 
 
-@pytest.mark.slow(instead="test_what_modifiers_make_is_what_is_simulated_and_muting_takes_it_away")
+@pytest.mark.slow(instead="test_the_result_of_modifiers_is_simulated_unless_they_are_muted")
 def test_nodes_that_are_replaced_renamed_or_not_there(
     head: bpy.types.Object, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

@@ -78,7 +78,7 @@ def found(name: str) -> str | None:
     return address
 
 
-@pytest.mark.slow(instead="test_f1_finds_a_page_for_all_that_we_have")
+@pytest.mark.slow(instead="test_f1_finds_a_page_for_each_operator_and_property")
 def test_every_page_and_heading_is_in_the_zip(pages: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ours, "HELP", pages)
     _, entries = ours.manual_map()
@@ -87,7 +87,7 @@ def test_every_page_and_heading_is_in_the_zip(pages: Path, monkeypatch: pytest.M
     assert not is_there(ours.address("dynamics#nowhere")), "the check finds everything"
 
 
-@pytest.mark.slow(instead="test_f1_finds_a_page_for_all_that_we_have")
+@pytest.mark.slow(instead="test_f1_finds_a_page_for_each_operator_and_property")
 def test_the_pages_need_nothing_that_was_left_out(pages: Path) -> None:
     found = list(pages.rglob("*.html"))
     assert len(found) > 20
@@ -99,7 +99,7 @@ def test_the_pages_need_nothing_that_was_left_out(pages: Path) -> None:
             assert is_of_site or (page.parent / source).exists(), f"{page.name} loads {source}"
 
 
-def test_f1_finds_a_page_for_all_that_we_have() -> None:
+def test_f1_finds_a_page_for_each_operator_and_property() -> None:
     for each in registration.CLASSES:
         if issubclass(each, bpy.types.PropertyGroup):
             for prop in each.bl_rna.properties:

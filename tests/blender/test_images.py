@@ -49,7 +49,7 @@ def test_other_formats_are_refused(tmp_path):
 
 
 @pytest.mark.parametrize("most_bytes", [0, 3000])
-def test_a_full_disk_is_told_and_keeps_what_was_there(most_bytes, tmp_path):
+def test_a_full_disk_is_reported_and_keeps_the_old_file(most_bytes, tmp_path):
     """Blender's PNG writer does not report a full disk."""
     path = tmp_path / "a.png"
     path.write_bytes(b"old")

@@ -129,7 +129,7 @@ def test_guides_can_be_apart_on_a_head_of_the_scene(tmp_path: Path, sphere: Any)
         ("none.obj", "none.obj: there is no such file"),
     ],
 )
-def test_a_head_that_is_none_is_named(
+def test_a_file_without_a_head_is_named(
     tmp_path: Path, head: str, problem: str, capfd: pytest.CaptureFixture[str]
 ) -> None:
     bpy.context.collection.objects.link(
@@ -223,7 +223,9 @@ def test_axes_and_scale_of_a_groom_are_passed_on(tmp_path: Path, head: Path) -> 
     np.testing.assert_allclose(points, np.stack([x, z, -y], axis=1) * 2.0, atol=1e-6)
 
 
-def test_files_in_centimetres_are_told_and_both_can_be_scaled(tmp_path: Path, head: Path) -> None:
+def test_files_in_centimetres_are_reported_and_both_can_be_scaled(
+    tmp_path: Path, head: Path
+) -> None:
     """A box of 24 m with hair. The collider is scaled as the head is."""
     large = np.array([line.split()[1:] for line in HEAD_OBJ.splitlines() if line[:2] == "v "])
     vertices = [f"v {' '.join(map(str, row))}" for row in large.astype(float) * 120.0]
@@ -252,7 +254,7 @@ def test_only_heads_of_files_can_be_scaled() -> None:
             read_inputs(Sources(None, name, head_scale=0.01), GrowSettings())
 
 
-def test_hair_beside_its_head_is_told(tmp_path: Path, head: Path) -> None:
+def test_hair_beside_its_head_is_reported(tmp_path: Path, head: Path) -> None:
     """Hair 2 cm above a box of 20 cm is near enough to be bound to it: a note, not an error."""
     moved = np.eye(4)
     moved[2, 3] = 0.02
@@ -265,7 +267,7 @@ def test_hair_beside_its_head_is_told(tmp_path: Path, head: Path) -> None:
         assert any("its roots lie 20 mm from" in note for note in rig.notes) == is_told
 
 
-def test_a_name_that_is_neither_an_object_nor_a_file_is_told(
+def test_a_name_that_is_neither_an_object_nor_a_file_is_reported(
     tmp_path: Path, head: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     arguments = ["render", "--groom", "Hair.017", "--head", str(head)]

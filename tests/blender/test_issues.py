@@ -29,7 +29,7 @@ def preview(hair):
     return previews.start(hair, bpy.context.evaluated_depsgraph_get())
 
 
-def test_good_hair_has_none(new_hair, sphere):
+def test_good_hair_has_no_issues(new_hair, sphere):
     hair = new_hair(sphere)
     assert told(hair) == []
     preview(hair)
@@ -52,7 +52,7 @@ def test_a_surface_is_set_and_the_hair_stays_where_it_is(new_hair, sphere):
     assert told(hair) == []
 
 
-def test_of_many_curves_some_are_asked(new_hair, sphere):
+def test_of_many_curves_a_sample_is_checked(new_hair, sphere):
     from hairloom.addon.blender.scene import curves
 
     hair = new_hair()
@@ -145,9 +145,7 @@ def test_a_scale_of_shared_curves_or_of_a_parent_is_refused_with_a_reason(new_ha
 
 
 @pytest.mark.parametrize("name", ["snap_roots", "apply_scale"])
-def test_what_blender_does_to_selected_hair_waits_for_hidden_hair_to_be_shown(
-    name, new_hair, sphere
-):
+def test_fixes_of_selected_hair_wait_until_hidden_hair_is_shown(name, new_hair, sphere):
     hair = new_hair(sphere)
     hair.scale = (1.0, 1.0, 1.5)
     bpy.context.view_layer.objects.active = sphere
@@ -172,7 +170,7 @@ def test_blenders_dynamics_are_muted(sphere, extension):
     assert told(hair) == []
 
 
-def test_instances_that_the_preview_leaves_out_are_told(new_hair, sphere):
+def test_instances_that_the_preview_leaves_out_are_reported(new_hair, sphere):
     hair = new_hair(sphere)
     assert diagnostics.instances_note(hair) == ""
     outer, inner = bpy.data.collections.new("Outer"), bpy.data.collections.new("Inner")
@@ -192,7 +190,7 @@ def test_instances_that_the_preview_leaves_out_are_told(new_hair, sphere):
 
 
 @pytest.mark.parametrize("what", ["object", "collection"])
-def test_instances_by_geometry_nodes_are_told_too(what, new_hair, sphere):
+def test_instances_by_geometry_nodes_are_reported_too(what, new_hair, sphere):
     hair = new_hair(sphere)
     collection = bpy.data.collections.new("Groom")
     points = bpy.data.meshes.new("Points")

@@ -73,7 +73,7 @@ def shop() -> Iterator[Workshop]:
     latest_job.unwatch_all()
 
 
-def test_it_arrives_by_blenders_timer_and_is_not_made_twice(shop: Workshop) -> None:
+def test_a_result_arrives_by_blenders_timer_and_is_not_computed_twice(shop: Workshop) -> None:
     shop.want("a")
     assert bpy.app.timers.is_registered(latest_job.take_steps)
     assert shop.job.is_pending and not shop.job.has_arrived
@@ -86,7 +86,7 @@ def test_it_arrives_by_blenders_timer_and_is_not_made_twice(shop: Workshop) -> N
     assert latest_job.take_steps() is None, "the timer ends with the last work"
 
 
-def test_what_runs_is_finished_and_then_the_last_one_wanted_begins(shop: Workshop) -> None:
+def test_a_running_job_finishes_and_the_latest_request_follows(shop: Workshop) -> None:
     for key in "abcd":
         shop.want(key)
     assert shop.begun == ["a"]
@@ -95,7 +95,7 @@ def test_what_runs_is_finished_and_then_the_last_one_wanted_begins(shop: Worksho
     assert shop.begun == ["a", "d"], "what is in between is left out"
 
 
-def test_who_wants_again_what_runs_gets_it_alone(shop: Workshop) -> None:
+def test_requesting_the_running_job_again_drops_later_requests(shop: Workshop) -> None:
     for key in "aba":
         shop.want(key)
     shop.open("a", "b")
@@ -103,7 +103,7 @@ def test_who_wants_again_what_runs_gets_it_alone(shop: Workshop) -> None:
     assert shop.begun == ["a"] and not shop.job.is_pending
 
 
-def test_a_failure_counts_only_of_what_is_still_wanted(shop: Workshop) -> None:
+def test_a_failure_is_reported_only_if_still_requested(shop: Workshop) -> None:
     shop.want("a", fails=True)
     shop.want("b", fails=True)
     shop.open("a", "b")
@@ -116,7 +116,7 @@ def test_a_failure_counts_only_of_what_is_still_wanted(shop: Workshop) -> None:
     take_steps_until(lambda: shop.taken == [None, "C"])
 
 
-def test_any_failure_counts_only_of_what_is_still_wanted(
+def test_any_exception_is_reported_only_if_still_requested(
     shop: Workshop, capsys: pytest.CaptureFixture[str]
 ) -> None:
     shop.want("a", error=MemoryError("far too much"))
@@ -148,13 +148,13 @@ def test_cancelled_work_ends_by_itself_and_is_not_wanted_any_more(shop: Workshop
     take_steps_until(lambda: shop.taken == ["A"])
 
 
-def test_who_takes_too_early_waits(shop: Workshop) -> None:
+def test_taking_a_result_early_waits_for_it(shop: Workshop) -> None:
     shop.want("a")
     threading.Timer(0.05, lambda: shop.open("a")).start()
     assert shop.job.take() == "A"
 
 
-def test_it_is_offered_until_it_is_taken(shop: Workshop) -> None:
+def test_a_result_stays_available_until_it_is_taken(shop: Workshop) -> None:
     offers: list[bool] = []
     job = LatestJob[str, str]("test", lambda: offers.append(job.has_arrived))
     job.want("a", lambda: lambda _: "A")
@@ -163,14 +163,14 @@ def test_it_is_offered_until_it_is_taken(shop: Workshop) -> None:
     assert latest_job.take_steps() is None
 
 
-def test_keys_may_be_compared_by_another_measure(shop: Workshop) -> None:
+def test_keys_can_be_compared_by_a_custom_function(shop: Workshop) -> None:
     job = LatestJob[str, str]("test", lambda: None, lambda one, other: one[0] == other[0])
     job.want("apple", lambda: lambda _: "A")
     assert job.wants("almond") and not job.wants("birch")
     job.cancel()
 
 
-def test_work_that_needs_this_thread_is_served_by_the_timer(shop: Workshop) -> None:
+def test_main_thread_steps_are_run_by_the_timer(shop: Workshop) -> None:
     seen: list[Any] = []
 
     def steps() -> Generator[None, None, str]:
@@ -224,7 +224,7 @@ def test_a_step_may_end_others_and_begin_new_ones(shop: Workshop) -> None:
     assert latest_job.take_steps() is None and taken == ["first", "last"]
 
 
-def test_what_could_not_begin_can_be_wanted_again(shop: Workshop) -> None:
+def test_a_job_that_failed_to_start_can_be_requested_again(shop: Workshop) -> None:
     def begin() -> Work[str]:
         raise HairloomError("it cannot be read", place="a", remedy="Undo")
 

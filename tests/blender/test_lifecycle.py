@@ -111,7 +111,7 @@ def test_disabling_ends_previews_and_timers(new_hair, sphere, get_depsgraph):
 
 
 @pytest.mark.parametrize("failing", [0, 5, len(registration.CLASSES) - 1])
-def test_what_was_registered_is_rolled_back_when_a_class_fails(failing, monkeypatch, commands):
+def test_registered_classes_are_rolled_back_when_a_class_fails(failing, monkeypatch, commands):
     before = traces()
     register_class = bpy.utils.register_class
 
@@ -193,7 +193,7 @@ def test_shortcuts_are_offered_without_keys(extension):
     assert hasattr(bpy.types, pie.properties.name)
 
 
-def test_what_the_status_bar_says_goes_in_all_workspaces(preview, get_depsgraph, monkeypatch):
+def test_the_status_text_is_cleared_in_all_workspaces(preview, get_depsgraph, monkeypatch):
     """Blender writes the text into the context's workspace, whatever workspace is addressed."""
     said = {}
 

@@ -43,7 +43,7 @@ def warnings(*suns: Light) -> tuple[str, ...]:
     return light_warnings(bpy.context.evaluated_depsgraph_get(), suns)
 
 
-def test_eight_that_are_brightest_at_the_hair_are_kept_and_the_artist_is_told():
+def test_the_eight_lights_brightest_at_the_hair_are_kept_and_others_are_reported():
     """Irradiance at the hair counts: a weak lamp nearby precedes a powerful one far away."""
     for place in range(LIGHT_CAPACITY):
         add("POINT", (0.0, 0.0, 1.0 + place), energy=10.0)
@@ -108,7 +108,7 @@ def test_parents_carry_and_scale_a_panel():
 
 @pytest.mark.parametrize("scale", [(0, 0, 0), (0, 1, 1), (1, 0, 1), (1, 1, 0), (-1, 1, 1)])
 @pytest.mark.parametrize("kind", ["POINT", "SUN", "SPOT", "AREA"])
-def test_scales_of_nought_and_mirrored_ones_are_read(kind, scale):
+def test_lights_with_zero_and_mirrored_scales_are_read(kind, scale):
     add(kind, energy=10.0).scale = scale
     found = lights()
     # an area light without width and a lamp without direction give no light
@@ -120,7 +120,7 @@ def test_scales_of_nought_and_mirrored_ones_are_read(kind, scale):
         assert light_irradiance(lights()[0], np.zeros(3)).min() > 0.0
 
 
-def test_a_preview_tells_of_lights_that_it_leaves_out(new_hair: Any, sphere: Any) -> None:
+def test_a_preview_reports_lights_that_it_leaves_out(new_hair: Any, sphere: Any) -> None:
     hair = new_hair(sphere)
     for place in range(LIGHT_CAPACITY):
         add("POINT", (0.0, 0.0, 1.0 + place), energy=10.0)
@@ -134,7 +134,7 @@ def test_a_preview_tells_of_lights_that_it_leaves_out(new_hair: Any, sphere: Any
 
 
 @pytest.mark.parametrize("world", [None, (0.0, 0.0, 0.0), (0.2, 0.1, 0.3)])
-def test_a_scene_without_light_is_told_where_a_view_goes_by_it(
+def test_a_scene_without_light_is_reported_if_a_view_uses_scene_lights(
     new_hair: Any, sphere: Any, world: Any
 ) -> None:
     hair = new_hair(sphere)
@@ -178,7 +178,7 @@ def bare(**values: Any) -> Snapshot:
     return Snapshot(np.zeros((0, 2, 3), np.float32), np.ones((0, 2), np.float32), **values)
 
 
-def test_hair_is_lit_as_blender_lights_the_rest_and_never_black() -> None:
+def test_hair_is_lit_like_blenders_meshes_and_never_black() -> None:
     """The view's HDRI is used where Blender uses it, studio lights if there is no light at all."""
     studio, lamp, world = three_point_lights(np.eye(4)), Light.sun((0, 0, -1), (1, 1, 1), 1.0), 0.3
     sun = Light("sun", (1.0, 0.0, 0.0), (2.0, 2.0, 2.0), is_from_world=True)

@@ -76,19 +76,19 @@ def test_bad_input_is_an_error_of_the_operator() -> None:
     assert seen == []
 
 
-def test_what_is_told_is_how_many_of_how_many() -> None:
+def test_progress_counts_done_of_total() -> None:
     told = list(counted(counting(2), 2000, "frames"))
     assert told == [Progress("1 of 2,000 frames", 0.0005), Progress("2 of 2,000 frames", 0.001)]
 
 
-def test_closing_what_is_told_closes_the_work() -> None:
+def test_closing_the_progress_closes_the_work() -> None:
     steps = counted(counting(3), 3, "frames")
     next(steps)
     steps.close()
     assert seen == [1, "closed"]
 
 
-def test_shares_are_told_and_the_result_is_kept() -> None:
+def test_fractions_are_reported_and_the_result_is_kept() -> None:
     def work() -> Generator[float, None, str]:
         yield 0.25
         return "sorted"
@@ -97,7 +97,7 @@ def test_shares_are_told_and_the_result_is_kept() -> None:
     assert result_of(as_progress(work())) == "sorted"
 
 
-def test_a_thread_is_waited_for_and_its_stages_are_told() -> None:
+def test_a_thread_is_waited_for_and_its_stages_are_reported() -> None:
     may_end = threading.Event()
 
     def work(thread: ThreadWork[str]) -> str:
@@ -113,7 +113,7 @@ def test_a_thread_is_waited_for_and_its_stages_are_told() -> None:
     assert result_of(steps) == "sorted"
 
 
-def test_closing_gives_the_thread_up() -> None:
+def test_closing_cancels_the_thread() -> None:
     begun, may_go_on = threading.Event(), threading.Event()
 
     def work(thread: ThreadWork[None]) -> None:
@@ -163,7 +163,7 @@ def test_a_bake_is_not_deleted_while_other_work_goes_on(monkeypatch: pytest.Monk
         bpy.ops.hairloom.bake_free()
 
 
-def test_play_says_again_what_it_does_after_other_work(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_play_restores_its_status_text_after_other_work(monkeypatch: pytest.MonkeyPatch) -> None:
     shown: list[str | None] = []
     monkeypatch.setattr(operators_preview, "show_status", shown.append)
     ticks = operators_preview._Ticks()

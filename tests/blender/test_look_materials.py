@@ -83,7 +83,7 @@ def test_a_preset_writes_the_material_once(hair, monkeypatch):
     assert written == [hair]
 
 
-def test_what_is_set_together_is_one_change(hair):
+def test_settings_set_together_are_one_change(hair):
     told = []
     listener = ("settings", told.append)
     changed.subscribe(*listener)

@@ -45,7 +45,7 @@ def made_real() -> Any:
     return bpy.context.active_object
 
 
-def test_every_strand_is_there_at_its_place(hair: Any) -> None:
+def test_every_strand_is_kept_at_its_place(hair: Any) -> None:
     depsgraph = bpy.context.evaluated_depsgraph_get()
     rig = MadeRig.of(hair, read_source(hair, depsgraph)).rig
     assert rig.child_count > 100
@@ -139,7 +139,7 @@ def test_the_hair_stays_and_undo_is_there(hair: Any) -> None:
     assert "UNDO" in bpy.types.HAIRLOOM_OT_make_real.bl_options
 
 
-def test_what_cannot_be_read_changes_nothing(new_hair: Callable[..., Any]) -> None:
+def test_unreadable_hair_changes_nothing(new_hair: Callable[..., Any]) -> None:
     hair = new_hair()
     hair.data.remove_curves()
     before = set(bpy.data.objects)

@@ -112,7 +112,7 @@ def test_cancel_ends_the_preview_of_hair_that_is_being_made(hair, get_depsgraph,
     assert previews.session_of(hair) is None
 
 
-def test_what_a_thread_makes_is_the_same_to_the_bit(hair, get_depsgraph, in_window):
+def test_a_build_in_a_thread_is_bit_for_bit_the_same(hair, get_depsgraph, in_window):
     hair.data.hairloom.children.method = "multi"
     hair.data.hairloom.children.strand_count = 500
     session = previews.start(hair, get_depsgraph())
@@ -125,7 +125,7 @@ def test_what_a_thread_makes_is_the_same_to_the_bit(hair, get_depsgraph, in_wind
 
 
 @pytest.mark.usefixtures("gpu_context")
-def test_what_the_gpu_gets_of_strands_is_laid_out_in_the_thread(
+def test_gpu_buffers_of_strands_are_laid_out_in_the_thread(
     hair, get_depsgraph, in_window, monkeypatch
 ):
     laid_out, lay_out = [], RideTexels.of
@@ -193,9 +193,7 @@ def test_a_picture_waits_for_the_light(hair, get_depsgraph, in_window):
     assert has_light(snapshot_of(picture.studio._groom), whole)
 
 
-def test_other_hair_is_made_while_light_is_found_which_nobody_wants_then(
-    hair, get_depsgraph, light_gate
-):
+def test_a_new_build_starts_while_light_of_the_old_one_is_computed(hair, get_depsgraph, light_gate):
     session = previews.start(hair, get_depsgraph())
     take_steps_until(lambda: session.is_made)
     first = session.groom
@@ -428,7 +426,9 @@ def test_of_many_settings_the_last_one_counts(playing, hair, get_depsgraph, monk
     assert playing.settings[GuideSettings].guide_count == 12 and not playing.is_stale
 
 
-def test_what_acts_at_once_meanwhile_is_kept(playing, hair, get_depsgraph, monkeypatch):
+def test_immediate_settings_changed_during_a_build_are_kept(
+    playing, hair, get_depsgraph, monkeypatch
+):
     opened = hold(monkeypatch)
     hair.data.hairloom.guides.guide_count = 9
     scene_events.catch_up(get_depsgraph())
@@ -511,7 +511,7 @@ def test_hair_that_cannot_be_made_ends_the_preview_with_a_notice(playing, hair, 
     assert previews.sessions() == () and "it cannot be" in previews.notice()
 
 
-def test_a_failure_of_what_nobody_wants_any_more_is_no_matter(
+def test_a_failed_build_that_is_no_longer_requested_is_ignored(
     playing, hair, get_depsgraph, monkeypatch
 ):
     opened, prepare = threading.Event(), rig_flow.prepare
@@ -536,7 +536,7 @@ def test_pictures_are_of_whole_hair(hair, get_depsgraph, in_window):
     assert len(shown_groom(hair, get_depsgraph()).points) == 16 * COUNT
 
 
-def test_orders_tell_whether_they_give_the_same_rig(hair, get_depsgraph, extension):
+def test_build_requests_compare_equal_if_they_give_the_same_rig(hair, get_depsgraph, extension):
     reading = GroomSource(hair, get_depsgraph())
     order = reading.request
     assert order.gives_same_rig_as(order) and reading.read_again(get_depsgraph()) is None
@@ -640,7 +640,9 @@ def test_a_step_of_a_frame_waits_to_be_exact(hair, moving, get_depsgraph, gate):
     assert session.is_made and session.is_playing
 
 
-def test_what_stands_in_on_a_dense_head_searches_a_part_of_it(new_hair, get_depsgraph, monkeypatch):
+def test_the_placeholder_on_a_dense_head_searches_a_part_of_it(
+    new_hair, get_depsgraph, monkeypatch
+):
     bpy.ops.mesh.primitive_ico_sphere_add(radius=0.1, subdivisions=5)
     hair = new_hair(bpy.context.object)
     order = GroomSource(hair, get_depsgraph()).request
@@ -661,7 +663,7 @@ def test_what_stands_in_on_a_dense_head_searches_a_part_of_it(new_hair, get_deps
     assert np.array_equal(carried, made.rig.strands.points)
 
 
-def test_hair_of_another_scale_is_told_of_a_dense_head_as_of_any(new_hair, get_depsgraph):
+def test_hair_of_another_scale_is_reported_on_dense_heads_too(new_hair, get_depsgraph):
     bpy.ops.mesh.primitive_ico_sphere_add(radius=0.1, subdivisions=5)
     order = GroomSource(new_hair(bpy.context.object), get_depsgraph()).request
     large = order.source.strands.transformed(np.diag([1000.0, 1000.0, 1000.0, 1.0]))

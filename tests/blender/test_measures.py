@@ -11,7 +11,7 @@ from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.sessions import measures
 
 
-def test_the_median_of_the_last_frames_is_told(monkeypatch):
+def test_the_median_of_the_last_frames_is_shown(monkeypatch):
     now, times = [0.0], measures.FrameTimes()
     monkeypatch.setattr(measures.time, "perf_counter", lambda: now[0])
     for spent in (0.004, 0.004, 0.9):  # the median ignores one slow frame

@@ -124,7 +124,7 @@ def test_emission_is_read_and_is_none_by_default(material: bpy.types.Material) -
     assert found.emission == pytest.approx((1.0, 1.0, 2.0)) and found.color == (0.0, 0.0, 0.0)
 
 
-def test_nodes_that_are_not_read_are_told(material: bpy.types.Material) -> None:
+def test_nodes_that_are_not_read_are_reported(material: bpy.types.Material) -> None:
     tree = material.node_tree
     noise = tree.nodes.new("ShaderNodeTexNoise")
     for socket in ("Base Color", "Alpha", "Normal"):
@@ -297,7 +297,7 @@ def test_blended_meshes_are_drawn_from_far_to_near() -> None:
         assert seen[8, 8] == pytest.approx((0.5, 0.0, 0.25, 0.75), abs=1e-3)
 
 
-def test_the_engine_tells_what_is_missing(sphere: Any, new_hair: Any, material: Any) -> None:
+def test_the_engine_reports_what_is_missing(sphere: Any, new_hair: Any, material: Any) -> None:
     """Warnings name a missing file, and a head without UVs once its shadows are soft."""
     from hairloom.addon.blender.engine.engine_scene import SceneReader
 
@@ -349,7 +349,7 @@ def test_few_pictures_are_kept(material: bpy.types.Material) -> None:
 @pytest.mark.parametrize(
     "how", ["object", "colour", "method", "alpha", "picture", "mixed", "nothing"]
 )
-def test_what_can_be_seen_through(material: bpy.types.Material, how: str) -> None:
+def test_which_materials_are_transparent(material: bpy.types.Material, how: str) -> None:
     bpy.ops.mesh.primitive_plane_add()
     plane, node = bpy.context.object, material.node_tree.nodes["Principled BSDF"]
     assert not may_be_transparent(plane), "without a material it cannot"

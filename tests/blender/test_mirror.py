@@ -83,7 +83,7 @@ def test_on_a_symmetric_head_only_signs_change(new_hair, egg):
     assert again == {(each + 0.0).tobytes() for each in after}
 
 
-def test_curves_keep_what_they_carry(new_hair, egg):
+def test_mirrored_curves_keep_their_attributes(new_hair, egg):
     strands = on_surface(egg)
     hair = new_hair(egg, strands)
     curves, count = hair.data, strands.strand_count
@@ -220,7 +220,7 @@ def test_all_hair_on_one_side_grows_on_both_with_its_texts(new_hair, egg):
     assert texts[:count] == texts[count:] == [f"{number}".encode() for number in range(count)]
 
 
-def test_what_cannot_be_mirrored_is_refused(new_hair, egg):
+def test_objects_that_cannot_be_mirrored_are_refused(new_hair, egg):
     strands = on_surface(egg)
     hair = new_hair(egg, strands.take(np.flatnonzero(strands.roots[:, 0] < 0.0)))
     before = curve_points(hair.data)

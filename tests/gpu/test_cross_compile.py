@@ -40,7 +40,7 @@ FEW = (
 ALL = (
     *FEW,
     "tests/gpu/test_no_atomics.py::test_atomics_that_do_nothing_are_noticed",
-    "tests/blender/test_engine_scene.py::test_hair_may_be_a_hole",
+    "tests/blender/test_engine_scene.py::test_hair_can_be_a_holdout",
     "tests/blender/test_engine_scene.py::test_the_camera_may_be_inside_of_hair_and_head",
     "tests/blender/test_engine_scene.py::test_view_layers_and_holdouts",
     "tests/blender/test_hair_scene.py::test_shadow_on_a_mesh_is_as_dark_as_in_cycles",

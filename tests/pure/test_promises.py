@@ -38,7 +38,7 @@ PROMISES = {
     "::test_a_killed_writer_leaves_the_old_file_or_the_new_one",
     "saves automatically while hair plays": "window/session_autosave.py::steps",
     "Two Blenders never mix frames": "blender/test_bake.py"
-    "::test_two_who_bake_into_one_folder_never_mix_their_frames",
+    "::test_two_writers_of_one_folder_never_mix_their_frames",
     "never fills a copy of the cards": "blender/test_card_object.py"
     "::test_a_copy_of_the_cards_is_left_alone",
     "A file that is in use keeps its content": "pure/exchange/test_windows_rules.py"
@@ -71,11 +71,11 @@ PROMISES = {
     "if the job was killed": "blender/test_tasks.py"
     "::test_the_report_of_a_task_that_is_killed_says_so",
     "It is there whole or not at all": "blender/test_bake.py"
-    "::test_cancelling_leaves_the_bake_before_untouched",
+    "::test_cancelling_keeps_the_previous_bake",
     "leaves the one before as it was": "blender/test_bake.py"
     "::test_a_bake_that_fails_says_in_which_frame_and_leaves_nothing",
     "never mix their frames": "blender/test_bake.py"
-    "::test_two_who_bake_into_one_folder_never_mix_their_frames",
+    "::test_two_writers_of_one_folder_never_mix_their_frames",
     "which can crash their library": CRASHES,
     "damaged ones can crash their libraries": CRASHES,
     "the status bar shows the progress, and Esc cancels": LONG_WORK,

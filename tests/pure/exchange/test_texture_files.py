@@ -178,7 +178,7 @@ def test_a_failed_write_keeps_what_was_there(
 
 @pytest.mark.parametrize(("suffix", "depth"), FORMATS)
 @pytest.mark.parametrize("most_bytes", [0, 2000, 12000])
-def test_a_full_disk_is_told_and_keeps_what_was_there(
+def test_a_full_disk_is_reported_and_keeps_the_old_file(
     suffix: str, depth: str, most_bytes: int, tmp_path: Path
 ) -> None:
     """Not all of OpenImageIO's writers report it."""
