@@ -89,7 +89,7 @@ def studio_of(rig: Any, hair: bpy.types.Object) -> Any:
     """A studio that draws this hair in its own look."""
     parameters, of = of_addon("parameters").ALL_SETTINGS, of_addon
     is_bust = of("blender.setup.hairstyles").is_bust(hair.parent)
-    own = of("blender.command_line.object_settings").own_settings(hair)
+    own = of("blender.command_line.object_settings").settings_of_object(hair)
     settings = {section: kind() for section, kind in parameters.items()} | own
     return of("blender.pictures.studio").Studio(
         of("blender.sessions.prepared_groom").prepare_groom(rig, settings["ambient"]),

@@ -12,7 +12,7 @@ import pytest
 pytest.importorskip("bpy", reason="the command line runs inside Blender")
 
 from hairloom.addon.blender.command_line import command_line
-from hairloom.addon.blender.command_line.job_options import chosen_settings
+from hairloom.addon.blender.command_line.job_options import settings_from_options
 
 ALL = [picture for section in gallery.SECTIONS for picture in section.pictures]
 #: size limits of a picture and of all pictures, so that the page loads fast
@@ -38,7 +38,7 @@ def test_a_command_is_valid(picture: gallery.Picture) -> None:
     options = command_line.parser().parse_args(arguments)
     assert tool == gallery.HEADLESS
     assert Path(options.output).stem == picture.name
-    chosen_settings(options)
+    settings_from_options(options)
 
 
 def test_every_preset_that_gives_a_look_is_shown() -> None:

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from hairloom.addon.blender.command_line.command_line import parser
-from hairloom.addon.blender.command_line.job_options import chosen_settings
+from hairloom.addon.blender.command_line.job_options import settings_from_options
 from hairloom.addon.blender.command_line.overrides import overrides
 from hairloom.addon.blender.properties import presets
 from hairloom.addon.dynamics.settings import DynamicsSettings
@@ -82,6 +82,6 @@ def test_a_preset_that_is_not_there_is_answered_with_near_ones(name, meant, tmp_
 def test_a_stage_that_is_not_there_is_answered_with_stages():
     whole = ["render", "--stage", "daylite", "--output", "a.png"]
     with pytest.raises(HairloomError) as caught:
-        chosen_settings(parser().parse_args(whole))
+        settings_from_options(parser().parse_args(whole))
     assert caught.value.remedy.startswith("Did you mean stage/daylight? ")
     assert "looks/" not in caught.value.remedy

@@ -124,7 +124,7 @@ def test_the_command_line_takes_presets_and_single_values_over_them(tmp_path: Pa
         ["cards", "--output", "x.glb", "--preset", "looks/blond"]
         + ["--set", "shading.primary_strength=3"]
     )
-    shading = job_options.chosen_settings(options)[ShadingSettings].as_dict()
+    shading = job_options.settings_from_options(options)[ShadingSettings].as_dict()
     assert shading["primary_strength"] == 3.0
     blond = presets.named_preset("looks/blond").settings.as_dict()
     assert shading["base_color"] == blond["base_color"]
@@ -343,7 +343,7 @@ def test_the_look_under_water_brings_its_shafts_of_light_with_it(hair: bpy.types
     options = command_line.parser().parse_args(
         ["render", "--output", "x.png", "--preset", "looks/under_water"]
     )
-    assert job_options.chosen_settings(options)[ShaftSettings] == wanted[0]
+    assert job_options.settings_from_options(options)[ShaftSettings] == wanted[0]
 
 
 def test_a_title_stands_for_one_preset(hair: bpy.types.Object, own_folder: Path) -> None:

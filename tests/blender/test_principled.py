@@ -147,7 +147,7 @@ def test_a_node_that_is_muted_or_not_linked_does_not_count(hair: Any) -> None:
 def settings_by(*arguments: str) -> Any:
     parser = command_line.parser()
     options = parser.parse_args(["render", "--output", "x.png", *arguments])
-    return job_options.chosen_settings(options)[ShadingSettings]
+    return job_options.settings_from_options(options)[ShadingSettings]
 
 
 def test_the_command_line_starts_from_the_material_and_single_values_go_over_it(

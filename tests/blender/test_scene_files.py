@@ -9,7 +9,11 @@ import bpy
 import pytest
 from full_disk import full_disk
 
-from hairloom.addon.blender.command_line.scene_files import is_whole, open_scene, save_scene
+from hairloom.addon.blender.command_line.scene_files import (
+    is_complete_blend,
+    open_scene,
+    save_scene,
+)
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.files import file_moves
 
@@ -22,15 +26,15 @@ def test_a_file_that_is_cut_short_anywhere_is_not_whole(
 ) -> None:
     path, cut = tmp_path / "whole.blend", tmp_path / "cut.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True, compress=is_compressed)
-    assert is_whole(path)
+    assert is_complete_blend(path)
     content = path.read_bytes()
     size = len(content)
     for length in (0, 3, 10, 1000, size // 2, *range(size - 100, size)):
         cut.write_bytes(content[:length])
-        assert not is_whole(cut), f"{length} of {size}"
+        assert not is_complete_blend(cut), f"{length} of {size}"
     if is_compressed:  # space became free again before the end was written
         cut.write_bytes(content[: size // 2] + content[size // 2 + 100 :])
-        assert not is_whole(cut)
+        assert not is_complete_blend(cut)
 
 
 @pytest.mark.parametrize("part", [0.0, 0.3, 0.9, 0.999])
@@ -94,4 +98,4 @@ def test_a_scene_that_is_open_elsewhere_stays_and_the_new_one_is_kept(
     with pytest.raises(HairloomError, match="as it was") as raised:
         save_scene()
     assert "wig new.blend" in raised.value.remedy
-    assert path.read_bytes() == before and is_whole(tmp_path / "wig new.blend")
+    assert path.read_bytes() == before and is_complete_blend(tmp_path / "wig new.blend")

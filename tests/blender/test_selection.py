@@ -48,8 +48,8 @@ def test_nor_for_cards_beside_it(hair):
 
 
 def test_nor_for_a_job(hair):
-    assert object_settings.named_grooms([]) == ([hair], ())
-    assert bake_job._objects([]) == ([hair], ())
+    assert object_settings.grooms_to_export([]) == ([hair], ())
+    assert bake_job._objects_to_bake([]) == ([hair], ())
 
 
 def test_nor_for_the_mesh_that_hair_grows_from(hair, sphere):

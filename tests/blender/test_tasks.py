@@ -231,9 +231,9 @@ def test_what_a_heads_file_names_is_an_input(extension: None, tmp_path: Path) ->
     output.write_bytes(b"strands")
     report.add_output(output)
     stamp.write(report)
-    assert Stamp(options).why_not_done() == ""
+    assert Stamp(options).reason_to_run() == ""
     (tmp_path / "skin.mtl").write_text("newmtl other\n")
-    assert Stamp(options).why_not_done() == "skin.mtl has changed"
+    assert Stamp(options).reason_to_run() == "skin.mtl has changed"
 
 
 def test_files_that_blender_brings_along_are_no_inputs(
@@ -304,7 +304,7 @@ def test_the_report_of_a_task_that_is_killed_says_so(
         found.append(json.loads((tmp_path / "report.json").read_text())["status"])
         return 0
 
-    monkeypatch.setattr(command_line, "_code", look)
+    monkeypatch.setattr(command_line, "_run_and_report", look)
     task()
     assert found == ["begun"]
 

@@ -72,7 +72,7 @@ def test_the_help_of_a_verb_is_whole(verb: str, capsys: pytest.CaptureFixture[st
         assert action.help, f"{action.dest} has no help"
         for name in action.option_strings:
             assert name in text
-    (about,) = (each.about for each in VERBS if each.name == verb)
+    (about,) = (each.summary for each in VERBS if each.name == verb)
     assert about.endswith(".") and " ".join(text.split()).count(about) == 1
 
 

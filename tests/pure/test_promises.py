@@ -45,9 +45,9 @@ PROMISES = {
     "::test_a_file_that_is_open_stays_and_the_new_ones_are_kept",
     "Exports keep files of yours": "blender/test_card_files.py"
     "::test_files_of_an_artist_are_kept_and_own_ones_replaced",
-    "Verbs never write over a file that they read": "blender/test_places.py"
+    "Verbs never write over a file that they read": "blender/test_output_checks.py"
     "::test_what_would_be_lost_is_refused_before_any_work",
-    "named before the work begins": "blender/test_places.py"
+    "named before the work begins": "blender/test_output_checks.py"
     "::test_what_would_be_lost_is_refused_before_any_work",
     "Hair whose baked copy was deleted": "blender/test_bake_kept.py"
     "::test_a_file_is_never_left_without_hair_in_renders",

@@ -15,7 +15,7 @@ from ..base.report import Report
 from ..preview.bake import Bake, bakeable, free, show_in_renders
 from .job_options import add_frames_option, add_object_option, frames_of_option
 from .job_steps import Job, report_notes
-from .object_settings import all_of_scene, named_objects, put_settings
+from .object_settings import change_settings, named_objects, usable_objects
 from .scene_files import save_scene
 from .verb import Verb
 
@@ -23,7 +23,7 @@ from .verb import Verb
 def bake(job: Job) -> None:
     """Simulate hair and cloth of a scene frame by frame and keep the motion on disk."""
     report, options = job.report, job.options
-    objects, notes = _objects(options.object)
+    objects, notes = _objects_to_bake(options.object)
     report_notes(list(notes), report)
     if options.delete:
         _delete(objects, report)
@@ -34,7 +34,7 @@ def bake(job: Job) -> None:
             report.add_output(save_scene(options.save_as))
 
 
-def _check_saved_with(objects: list[bpy.types.Object]) -> None:
+def _check_not_linked(objects: list[bpy.types.Object]) -> None:
     """Refuse linked objects, whose bakes a saved scene would not play: Blender does not save them.
 
     Raises:
@@ -52,9 +52,9 @@ def _check_saved_with(objects: list[bpy.types.Object]) -> None:
 def _bake(objects: list[bpy.types.Object], job: Job) -> None:
     report, options = job.report, job.options
     if options.save or options.save_as:
-        _check_saved_with(objects)
+        _check_not_linked(objects)
     for obj in objects:
-        put_settings(obj, options.preset, options.set)
+        change_settings(obj, options.preset, options.set)
     folder = None if options.output is None else options.output.resolve()
     plan = Bake.of(
         objects, bpy.context.scene, frames=frames_of_option(options.frames), folder=folder
@@ -62,7 +62,7 @@ def _bake(objects: list[bpy.types.Object], job: Job) -> None:
     write_bake(plan, report, "baking", "bake frame")
     show_in_renders(objects, bpy.context.evaluated_depsgraph_get())
     report_notes(plan.notes, report)
-    _tell(objects, report)
+    _report_bakes(objects, report)
 
 
 def write_bake(plan: Bake, report: Report, label: str, stage: str) -> None:
@@ -85,7 +85,7 @@ def _delete(objects: list[bpy.types.Object], report: Report) -> None:
     report.facts["deleted"] = [obj.name for obj in objects]
 
 
-def _objects(names: list[str]) -> tuple[list[bpy.types.Object], tuple[str, ...]]:
+def _objects_to_bake(names: list[str]) -> tuple[list[bpy.types.Object], tuple[str, ...]]:
     """The named objects, else all hair and cloth of the view layer to be simulated; and notes on
     objects that are left out.
 
@@ -94,7 +94,7 @@ def _objects(names: list[str]) -> tuple[list[bpy.types.Object], tuple[str, ...]]
     """
     if names:
         return named_objects(names, bakeable, "hair curves or cloth"), ()
-    found, notes = all_of_scene(lambda obj: bakeable(obj) and _is_wanted(obj))
+    found, notes = usable_objects(lambda obj: bakeable(obj) and _is_wanted(obj))
     if not found:
         raise HairloomError(
             "there is nothing to bake",
@@ -108,7 +108,7 @@ def _is_wanted(obj: bpy.types.Object) -> bool:
     return bool(obj.type == "CURVES" or obj.hairloom.fin.enabled)
 
 
-def _tell(objects: list[bpy.types.Object], report: Report) -> None:
+def _report_bakes(objects: list[bpy.types.Object], report: Report) -> None:
     baked = []
     for obj in objects:
         folder, cache = folder_of(obj), playback.cache_of(obj)

@@ -22,36 +22,36 @@ from ..cards.files import CardOutput, WrittenCards, check_no_input, write_cards
 from ..cards.occluders import read_occluders
 from ..cards.textures import chosen_pictures, named_pictures
 from ..scene.bone_weights import head_bone_of
-from .inputs import look_of_head
+from .inputs import read_head_look
 from .job_options import (
     add_bake_option,
     add_frames_option,
     add_parameter_options,
     add_texture_option,
     frames_of_option,
-    parameters_of,
+    section_from_options,
 )
-from .job_steps import Job, card_edits, finish, motion_of, read_rig, report_notes
-from .places import check_not_read
+from .job_steps import Job, card_edits, finish, read_baked_motion, read_rig, report_notes
+from .output_checks import check_not_an_input
 from .verb import Verb
 
 
 def cards(job: Job) -> None:
     """Turn hair into cards, sorted from inside to outside: GLB, FBX, USD or OBJ, and textures."""
     options = job.options
-    pictures = _own_pictures(job) | named_pictures(options.texture)
+    pictures = _pictures_of_hair(job) | named_pictures(options.texture)
     path, _ = format_of(job.output, options.format)
-    check_not_read(path, options)
-    settings = parameters_of(options, job.settings[CardExportSettings])
+    check_not_an_input(path, options)
+    settings = section_from_options(options, job.settings[CardExportSettings])
     check_no_input(path, [Path(argument.partition("=")[2]) for argument in options.texture])
-    rig, motion = _moving(job, settings)
-    look = look_of_head(job.sources, rig.head)
+    rig, motion = _read_rig_and_motion(job, settings)
+    look = read_head_look(job.sources, rig.head)
     output = CardOutput(options.format, settings=settings, head_look=look)
-    written_cards(job, path, rig, pictures, output, motion)
+    build_and_write_cards(job, path, rig, pictures, output, motion)
     finish(job, path)
 
 
-def _own_pictures(job: Job) -> dict[str, Floats]:
+def _pictures_of_hair(job: Job) -> dict[str, Floats]:
     """The pictures that the artist has chosen for the hair object of --groom."""
     hair = job.hair
     if hair is None:
@@ -61,7 +61,7 @@ def _own_pictures(job: Job) -> dict[str, Floats]:
     return pictures
 
 
-def written_cards(
+def build_and_write_cards(
     job: Job,
     path: Path,
     rig: Rig,
@@ -108,13 +108,13 @@ def written_cards(
     return written
 
 
-def _moving(job: Job, settings: CardExportSettings) -> tuple[Rig, GuideMotion | None]:
+def _read_rig_and_motion(job: Job, settings: CardExportSettings) -> tuple[Rig, GuideMotion | None]:
     """The hair, and its motion if requested: the bake in a folder or of an object."""
     options = job.options
     frames = frames_of_option(options.frames)
     _check_idle_options(job, settings)
     if settings.motion != "none":
-        motion = motion_of(job, frames)
+        motion = read_baked_motion(job, frames)
         return motion.rig, motion
     if options.bake is not None or frames is not None:
         raise HairloomError(

@@ -28,13 +28,13 @@ from .grow_job import GROW
 from .idle_options import check_idle_options
 from .import_job import IMPORT
 from .inputs import Sources
-from .job_options import check_numbers, chosen_settings
+from .job_options import check_numbers, settings_from_options
 from .job_steps import Job, report_notes
-from .object_settings import all_of_scene, hair_named, is_groom, named_objects
-from .places import check_outputs, check_report
+from .object_settings import find_hair, is_groom, named_objects, usable_objects
+from .output_checks import check_outputs, check_report
 from .render_job import RENDER
 from .run_job import RUN
-from .scene_files import check_saving, open_scene, save_scene
+from .scene_files import check_scene_output, open_scene, save_scene
 from .self_test_job import SELF_TEST
 from .show_jobs import SHEET, TURNTABLE
 from .simulate_job import SIMULATE
@@ -70,15 +70,15 @@ def run(arguments: list[str]) -> int:
     except HairloomError as error:
         print(f"hairloom: {error}", file=sys.stderr)
         return 1
-    if not _reported(report, options.report):
+    if not _write_report(report, options.report):
         return 1
     try:
-        code = _code(verb, options, report)
+        code = _run_and_report(verb, options, report)
     except Exception as fault:
-        report.fail(_our_fault(fault))
-        _reported(report, options.report)
+        report.fail(_internal_error(fault))
+        _write_report(report, options.report)
         raise  # so that Blender prints the traceback and exits with 1
-    return code if _reported(report, options.report) else code or 1
+    return code if _write_report(report, options.report) else code or 1
 
 
 def parser() -> argparse.ArgumentParser:
@@ -91,15 +91,17 @@ def parser() -> argparse.ArgumentParser:
     )
     verbs = top.add_subparsers(dest="verb", required=True, metavar="VERB")
     for verb in VERBS:
-        verb.add_all_options(verbs.add_parser(verb.name, help=verb.about, description=verb.about))
+        verb.add_all_options(
+            verbs.add_parser(verb.name, help=verb.summary, description=verb.summary)
+        )
     return top
 
 
-def _code(verb: Verb, options: argparse.Namespace, report: Report) -> int:
+def _run_and_report(verb: Verb, options: argparse.Namespace, report: Report) -> int:
     """Run a verb, and report errors; returns the exit code."""
     try:
         with interruptible(), gpu_refusals():
-            _run(verb, options, report)
+            _run_unless_done(verb, options, report)
     except HairloomError as error:
         print(f"hairloom: {error}", file=sys.stderr)
         report.fail(error)
@@ -111,7 +113,7 @@ def _code(verb: Verb, options: argparse.Namespace, report: Report) -> int:
     return 0
 
 
-def _reported(report: Report, path: str | None) -> bool:
+def _write_report(report: Report, path: str | None) -> bool:
     """Write the report if requested, also before the work, so that an older one cannot be mistaken
     for this run's; returns whether that worked."""
     if path is None:
@@ -124,7 +126,7 @@ def _reported(report: Report, path: str | None) -> bool:
     return True
 
 
-def _our_fault(fault: Exception) -> HairloomError:
+def _internal_error(fault: Exception) -> HairloomError:
     return HairloomError(
         f"{type(fault).__name__}: {fault}",
         place="Hairloom itself",
@@ -132,20 +134,20 @@ def _our_fault(fault: Exception) -> HairloomError:
     )
 
 
-def _run(verb: Verb, options: argparse.Namespace, report: Report) -> None:
+def _run_unless_done(verb: Verb, options: argparse.Namespace, report: Report) -> None:
     """Run a verb, unless --skip-existing finds that it is done already."""
     check_numbers(options)
     check_outputs(verb, options)
     stamp = Stamp(options) if getattr(options, "skip_existing", False) else None
     if stamp is not None:
-        reason = stamp.why_not_done()
+        reason = stamp.reason_to_run()
         if not reason:
             report.facts |= stamp.reported
             report.end("skipped")
             print(f"Nothing to do: {options.output} exists, made from the same inputs and options")
             return
         print(f"to be done: {reason}", flush=True)
-    verb.flow(_job(verb, options, report))
+    verb.run(_job(verb, options, report))
     if verb.saves_scene:
         with report.stage("save scene"):
             saved = save_scene(options.output)
@@ -166,14 +168,14 @@ def _job(verb: Verb, options: argparse.Namespace, report: Report) -> Job:
         options.groom = _only_groom(options, report)
     if verb.takes_hair and options.style:
         with report.stage("add hairstyle"):
-            options.groom = _styled(options, report)
+            options.groom = _add_hairstyle(options, report)
     output = getattr(options, "output", None)
     if verb.saves_scene:
-        check_saving(output, over=options.save)
+        check_scene_output(output, overwrites=options.save)
     return Job(
         verb=verb.name,
         sources=_sources(verb, options) if verb.takes_hair else Sources(),
-        chosen=chosen_settings(options) if verb.takes_settings else SettingsMap(),
+        stored_settings=settings_from_options(options) if verb.takes_settings else SettingsMap(),
         output=Path() if output is None else output,
         options=options,
         report=report,
@@ -192,13 +194,13 @@ def _sources(verb: Verb, options: argparse.Namespace) -> Sources:
         need_uv=options.strict,
         density_group=options.density_group,
         length_group=options.length_group,
-        children_density=options.children_density or _own_density(options.groom),
+        children_density=options.children_density or _children_density(options.groom),
         skin=options.skin,
         with_face=bool(options.style),
     )
 
 
-def _styled(options: argparse.Namespace, report: Report) -> str:
+def _add_hairstyle(options: argparse.Namespace, report: Report) -> str:
     """Add the hair of --style to the open scene, as the artist's button does; returns its name.
 
     Raises:
@@ -232,7 +234,7 @@ def _only_groom(options: argparse.Namespace, report: Report) -> str | None:
     """
     if not options.scene or options.head or getattr(options, "bake", None):
         return None
-    found, notes = all_of_scene(is_groom, "--groom")
+    found, notes = usable_objects(is_groom, "--groom")
     report_notes(list(notes), report)
     grooms = [obj.name for obj in found]
     if len(grooms) > 1:
@@ -244,7 +246,7 @@ def _only_groom(options: argparse.Namespace, report: Report) -> str | None:
     return grooms[0] if grooms else None
 
 
-def _own_density(groom: str | None) -> str:
+def _children_density(groom: str | None) -> str:
     """The density of children that is set on the hair object of this name, if it is one."""
-    hair = hair_named(groom)
+    hair = find_hair(groom)
     return str(hair.hairloom.children_density) if hair is not None else ""

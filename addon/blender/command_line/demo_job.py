@@ -14,11 +14,11 @@ from ..cards.build import BuiltCards, MappedCards
 from ..cards.files import WrittenCards
 from ..cards.textures import named_pictures
 from ..pictures.studio import Studio
-from .cards_job import written_cards
+from .cards_job import build_and_write_cards
 from .job_options import add_motion_options, add_picture_options, add_texture_option
 from .job_steps import Job, PosedHair, open_studio, read_rig, report_notes
 from .render_job import write_sheet, write_still
-from .simulate_job import at_rest, simulated
+from .simulate_job import scene_at_first_frame, simulate_hair
 from .verb import Verb
 
 
@@ -27,15 +27,15 @@ def demo(job: Job) -> None:
     report, folder = job.report, job.output
     pictures = named_pictures(job.options.texture)
     with TemporaryDirectory() as bake:
-        with at_rest(job):
+        with scene_at_first_frame(job):
             rig, inputs = read_rig(job)
-            motion = simulated(job, inputs, Path(bake) / "bake")
+            motion = simulate_hair(job, inputs, Path(bake) / "bake")
         studio = open_studio(job, rig)
         still = write_still(job, folder / "still.png", studio, PosedHair.of_rest(rig))
         _write_close_up(job, folder / "close_up.png", studio, rig)
         write_sheet(job, folder / "motion.png", studio, motion)
     report_notes(list(studio.notes), report)
-    written = written_cards(job, folder / "cards.glb", rig, pictures)
+    written = build_and_write_cards(job, folder / "cards.glb", rig, pictures)
     _write_card_still(job, folder / "cards.png", studio, rig, written, still)
     with report.stage("write strands"):
         write_tfx(folder / "strands.tfx", rig.strands)

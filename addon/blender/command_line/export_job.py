@@ -27,28 +27,28 @@ from ..scene.surfaces import read_surface
 from ..strands.groom_motion import BakedMotion
 from ..strands.read_hair import export_strands_of_rig
 from ..strands.strand_export import StrandExport, request_of
-from .idle_options import is_of_scene
+from .idle_options import exports_scene_hair
 from .inputs import Inputs
 from .job_options import (
+    add_bake_frame_options,
     add_frames_option,
     add_max_frames_option,
-    add_moment_options,
     add_object_option,
     add_parameter_options,
     frames_of_option,
-    parameters_of,
+    section_from_options,
 )
 from .job_steps import (
     Job,
     job_colors,
-    motion_of,
+    read_baked_motion,
     read_hair,
     read_rig,
     report_dropped_strands,
     report_notes,
 )
-from .object_settings import named_grooms, put_settings
-from .places import check_not_read
+from .object_settings import change_settings, grooms_to_export
+from .output_checks import check_not_an_input
 from .verb import Verb
 
 
@@ -57,22 +57,22 @@ def export(job: Job) -> None:
     options, report = job.options, job.report
     path, kind = format_of(job.output, options.format)
     if not options.preflight:
-        check_not_read(path, options)
-    settings = parameters_of(options, job.settings[StrandExportSettings])
+        check_not_an_input(path, options)
+    settings = section_from_options(options, job.settings[StrandExportSettings])
     _check_layout(kind, settings)
     frames = frames_of_option(options.frames, options.max_frames)
-    if is_of_scene(options):
-        plan = _of_objects(job, kind, settings, frames)
+    if exports_scene_hair(options):
+        plan = _plan_of_objects(job, kind, settings, frames)
     else:
-        plan = _of_rig(job, kind, settings, frames)
+        plan = _plan_of_rig(job, kind, settings, frames)
     facts = plan.check()
     report.facts.update(preflight=facts, dropped=plan.dropped)
     if options.preflight:
         report_notes(list(plan.notes), report)
-        _tell_check(facts, options.preflight)
+        _print_check(facts, options.preflight)
         return
     with report.stage("write strands"):
-        outcome = plan.write(path, None if frames is None else _counted(job, plan))
+        outcome = plan.write(path, None if frames is None else _with_progress(job, plan))
     report_notes(list(outcome.warnings), report)
     for file in plan.files:
         report.add_output(file)
@@ -92,15 +92,15 @@ def _check_layout(kind: StrandFormat, settings: StrandExportSettings) -> None:
         raise HairloomError(problem, place=option, remedy=error.remedy) from error
 
 
-def _of_objects(
+def _plan_of_objects(
     job: Job, kind: StrandFormat, settings: StrandExportSettings, frames: range | None
 ) -> StrandExport:
     """Hair of the scene, as the artist's operators write it."""
     options, depsgraph = job.options, bpy.context.evaluated_depsgraph_get()
-    hair, notes = named_grooms(options.object)
+    hair, notes = grooms_to_export(options.object)
     report_notes(list(notes), job.report)
     for each in hair:
-        put_settings(each, options.preset, options.set)
+        change_settings(each, options.preset, options.set)
         if options.children_density:
             each.hairloom.children_density = options.children_density
             check_density(each, depsgraph)
@@ -133,7 +133,7 @@ def _check_baked(plan: StrandExport) -> None:
             )
 
 
-def _of_rig(
+def _plan_of_rig(
     job: Job, kind: StrandFormat, settings: StrandExportSettings, frames: range | None
 ) -> StrandExport:
     """The hair of --groom or --bake, or hair that is grown here."""
@@ -151,13 +151,13 @@ def _of_rig(
         groom = export_strands_of_rig(rig, own, needs, look, job_colors(job, rig)).groom
         return StrandExport(groom, settings, kind, inputs.dropped)
     at = frames if job.options.frame is None else range(job.options.frame, job.options.frame + 1)
-    motion = motion_of(job, at)
+    motion = read_baked_motion(job, at)
     rig, read = motion.rig, read_hair(job) if job.sources.groom else None
     groom = Groom(rig.strands, Path(motion.cache.facts.owner).stem)
     if read is not None:
         groom = replace(groom, name=Path(read.groom_name).stem)
         if read.groom is not None and read.strands.strand_count == rig.strands.strand_count:
-            groom = replace(groom, **_of_strands(read.groom))
+            groom = replace(groom, **_values_of_strands(read.groom))
     if frames is None:
         _, points = motion.strands(motion.frames[0])
         groom = replace(groom, strands=rig.strands.with_points(points.reshape(-1, 3)))
@@ -180,20 +180,20 @@ def _groom(rig: Rig, inputs: Inputs) -> Groom:
     return replace(inputs.groom, name=name, strands=own)
 
 
-def _of_strands(groom: Groom) -> dict[str, Any]:
+def _values_of_strands(groom: Groom) -> dict[str, Any]:
     """The values of a groom that belong to whole strands."""
     names = ("strand_id", "is_guide", "closest_guides", "guide_weights", "group_names")
     return {name: getattr(groom, name) for name in names}
 
 
-def _counted(job: Job, plan: StrandExport) -> Iterator[Floats]:
+def _with_progress(job: Job, plan: StrandExport) -> Iterator[Floats]:
     progress = job.report.progress("writing frames", plan.frame_count)
     for points in plan.positions():
         yield points
         progress.show(plan.frames_read + 1)
 
 
-def _tell_check(facts: dict[str, Any], form: str) -> None:
+def _print_check(facts: dict[str, Any], form: str) -> None:
     if form == "json":
         print(json.dumps(facts, indent=2))
         return
@@ -205,7 +205,7 @@ def _tell_check(facts: dict[str, Any], form: str) -> None:
 
 def add_export_options(parser: argparse.ArgumentParser) -> None:
     """Add the artist's export settings, and options for frames."""
-    add_moment_options(parser, "; for --object, or all hair of --scene, a frame of the scene")
+    add_bake_frame_options(parser, "; for --object, or all hair of --scene, a frame of the scene")
     hair = parser.add_argument_group("hair of the scene")
     add_object_option(
         hair,

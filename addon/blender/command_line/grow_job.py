@@ -10,7 +10,7 @@ from ...groom.settings import GrowSettings
 from ..base.parts import run_parts
 from ..setup.starting import new_groom
 from .job_steps import Job
-from .object_settings import named_objects, put_settings
+from .object_settings import change_settings, named_objects
 from .verb import Verb
 
 
@@ -34,7 +34,7 @@ def grow(job: Job) -> None:
     hair.name = options.name or hair.name
     # settings of growth have been used already, to grow and fit the hair
     others = [each for each in options.set if not each.startswith("grow.")]
-    put_settings(hair, options.preset, others)
+    change_settings(hair, options.preset, others)
     if options.children_density:
         hair.hairloom.children_density = options.children_density
     count = len(hair.data.curves)

@@ -14,23 +14,23 @@ from .verb import Verb
 
 
 @dataclass(frozen=True)
-class _Idle:
+class _IdleOptions:
     """Options, when they have no effect, and the message then."""
 
     names: tuple[str, ...]
-    when: Callable[[argparse.Namespace], bool]
+    has_no_effect: Callable[[argparse.Namespace], bool]
     why: str
     remedy: str
 
 
-def is_of_scene(options: argparse.Namespace) -> bool:
+def exports_scene_hair(options: argparse.Namespace) -> bool:
     """Whether an export writes hair objects of the scene, with their own settings, head and bake:
     those of --object, or all of --scene if no other source of strands is named.
     """
     if not hasattr(options, "object") or not hasattr(options, "groom"):
         return False
-    others = options.groom or options.head or options.style or options.bake is not None
-    return bool(options.object or (options.scene and not others))
+    has_other_source = options.groom or options.head or options.style or options.bake is not None
+    return bool(options.object or (options.scene and not has_other_source))
 
 
 def _is_in_file(options: argparse.Namespace) -> bool:
@@ -42,74 +42,76 @@ def _is_grown(options: argparse.Namespace) -> bool:
     return not (options.groom or options.style or getattr(options, "bake", None) is not None)
 
 
-_OF_GROOM_FILES = ("groom_scale", "groom_up")
-_OF_GROWTH = ("density_group", "length_group")
+_GROOM_FILE_OPTIONS = ("groom_scale", "groom_up")
+_GROWTH_OPTIONS = ("density_group", "length_group")
 #: verbs that simulate hair of their own
-_SIMULATE = ("simulate", "demo")
-_OF_ONE_GROOM = ("groom", "style", "head", "head_scale", "collider", "skin", "bake")
+_SIMULATING_VERBS = ("simulate", "demo")
+_ONE_GROOM_OPTIONS = ("groom", "style", "head", "head_scale", "collider", "skin", "bake")
 
-_IDLE = (
-    _Idle(
-        (*_OF_ONE_GROOM, *_OF_GROOM_FILES, *_OF_GROWTH),
-        is_of_scene,
+_IDLE_OPTIONS = (
+    _IdleOptions(
+        (*_ONE_GROOM_OPTIONS, *_GROOM_FILE_OPTIONS, *_GROWTH_OPTIONS),
+        exports_scene_hair,
         "hair of the scene has its own groom, head and bake",
         "Omit it, or name one hair object with --groom instead of --object",
     ),
-    _Idle(
+    _IdleOptions(
         ("collider",),
-        lambda options: options.verb not in _SIMULATE,
+        lambda options: options.verb not in _SIMULATING_VERBS,
         "only simulated hair collides",
-        f"Omit it, or use it with {' or '.join(_SIMULATE)}",
+        f"Omit it, or use it with {' or '.join(_SIMULATING_VERBS)}",
     ),
-    _Idle(
+    _IdleOptions(
         ("skip_existing",),
         lambda options: bool(getattr(options, "preflight", None)),
         "--preflight writes no output",
         "Omit one of the two options",
     ),
-    _Idle(
+    _IdleOptions(
         ("frame",),
         lambda options: getattr(options, "frames", None) is not None and hasattr(options, "object"),
         "--frames already says what is written",
         "Omit one of the two options",
     ),
-    _Idle(
+    _IdleOptions(
         ("frame",),
-        lambda options: options.bake is None and not is_of_scene(options),
+        lambda options: options.bake is None and not exports_scene_hair(options),
         "it selects a frame of a bake, and no bake is given",
         "Add --bake, or omit it",
     ),
-    _Idle(
+    _IdleOptions(
         ("use_bake",),
-        lambda options: not is_of_scene(options) or (options.frames is options.frame is None),
+        lambda options: (
+            not exports_scene_hair(options) or (options.frames is options.frame is None)
+        ),
         "it applies to hair of the scene over several frames",
         "Omit it, or name the hair with --object and give --frames",
     ),
-    _Idle(
-        _OF_GROOM_FILES,
+    _IdleOptions(
+        _GROOM_FILE_OPTIONS,
         lambda options: hasattr(options, "style") and not _is_in_file(options),
         "it applies only to a groom read from a file",
         "Omit it, or name the file with --groom",
     ),
-    _Idle(
-        _OF_GROWTH,
+    _IdleOptions(
+        _GROWTH_OPTIONS,
         lambda options: hasattr(options, "style") and not _is_grown(options),
         "it applies only to hair that is grown by this job",
         "Omit it, or omit --groom, --style and --bake",
     ),
-    _Idle(
+    _IdleOptions(
         ("seconds", "frame_rate"),
         lambda options: getattr(options, "animated", False),
         "--animated uses the frames and frame rate of the scene",
         "Omit one of the two options",
     ),
-    _Idle(
+    _IdleOptions(
         ("frame_rate",),
         lambda options: getattr(options, "no_video", False),
         "it applies to the video, and --no-video makes none",
         "Omit one of the two options",
     ),
-    _Idle(
+    _IdleOptions(
         ("frames", "output", "preset", "set"),
         lambda options: getattr(options, "delete", False),
         "--delete does not use it",
@@ -124,12 +126,16 @@ def check_idle_options(verb: Verb, options: argparse.Namespace) -> None:
     Raises:
         HairloomError: naming the first option without effect, and why.
     """
-    usual = argparse.ArgumentParser(add_help=False)
-    verb.add_all_options(usual)
-    for idle in _IDLE:
+    defaults = argparse.ArgumentParser(add_help=False)
+    verb.add_all_options(defaults)
+    for idle in _IDLE_OPTIONS:
         for name in idle.names:
             value = getattr(options, name, None)
-            if value is not None and value != usual.get_default(name) and idle.when(options):
+            if (
+                value is not None
+                and value != defaults.get_default(name)
+                and idle.has_no_effect(options)
+            ):
                 raise HairloomError(
                     f"it has no effect here: {idle.why}",
                     place="--" + name.replace("_", "-"),

@@ -21,20 +21,20 @@ from ..strands.import_groom import (
 )
 from .job_options import add_head_scale_option
 from .job_steps import Job, report_notes
-from .object_settings import named_objects, put_settings
+from .object_settings import change_settings, named_objects
 from .verb import Verb
 
 
 def import_grooms(job: Job) -> None:
     """Import grooms from files into a scene: hair curves, bound to a head if one is named."""
     options, report = job.options, job.report
-    choices = StrandImport(options.groom_up, options.groom_scale, options.guides)
-    ground, notes = _ground(options.head, options.head_scale)
-    report_notes([*notes, *(ground.notes if ground else ())], report)
+    import_options = StrandImport(options.groom_up, options.groom_scale, options.guides)
+    surface, notes = _read_surface(options.head, options.head_scale)
+    report_notes([*notes, *(surface.notes if surface else ())], report)
     objects: list[dict[str, Any]] = []
     for path in options.files:
         with report.stage("import"):
-            hair, outcome = import_strands(path, ground, bpy.context.collection, choices)
+            hair, outcome = import_strands(path, surface, bpy.context.collection, import_options)
         if outcome.dropped and options.strict:
             raise HairloomError(
                 f"strands would be {dropped_phrase(outcome.dropped)}",
@@ -46,15 +46,15 @@ def import_grooms(job: Job) -> None:
             "; ".join(filter(None, (outcome.result, dropped_phrase(outcome.dropped)))), flush=True
         )
         for each in hair:
-            put_settings(each, options.preset, options.set)
+            change_settings(each, options.preset, options.set)
             count = len(each.data.curves)
             objects.append({"object": each.name, "file": path.name, "strands": count})
         for reason, count in outcome.dropped.items():
             report.facts["dropped"][reason] = report.facts["dropped"].get(reason, 0) + count
-    report.facts.update(head=ground and ground.head.name, objects=objects)
+    report.facts.update(head=surface and surface.head.name, objects=objects)
 
 
-def _ground(head: str | None, scale: float) -> tuple[ImportSurface | None, tuple[str, ...]]:
+def _read_surface(head: str | None, scale: float) -> tuple[ImportSurface | None, tuple[str, ...]]:
     """The mesh of the scene, or of a file, that hair is bound to, and notes on it."""
     notes: tuple[str, ...] = ()
     if head is None:

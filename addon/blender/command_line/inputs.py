@@ -32,7 +32,7 @@ from ..scene.partings import read_partings
 from ..scene.surfaces import read_surface, uv_map_note
 from ..setup.hairstyles import face_hair, is_bust
 from ..strands.child_python import python_for
-from .object_settings import hair_named
+from .object_settings import find_hair
 
 BUILT_IN = "built-in"
 _SKIN = "light"
@@ -86,7 +86,7 @@ class Inputs:
     notes: tuple[str, ...]
     groom_name: str
     head: Surface | None
-    head_object: str | None
+    head_object_name: str | None
     collider: Surface | None
     density: Floats | None
     partings: Floats | None = None
@@ -98,8 +98,8 @@ def read_inputs(sources: Sources, grow_settings: GrowSettings) -> Inputs:
     Raises:
         HairloomError: naming the file or object that cannot be used, and what to do.
     """
-    head_name = named_head(sources)
-    head, said = _read_head(head_name, sources)
+    head_name = find_head_name(sources)
+    head, head_notes = _read_head(head_name, sources)
     if sources.groom is not None:
         strands, dropped, groom, notes = _read_groom(sources.groom, sources)
         notes = (*notes, *_size_notes(sources, strands, head))
@@ -110,8 +110,8 @@ def read_inputs(sources: Sources, grow_settings: GrowSettings) -> Inputs:
     else:
         assert head is not None, "the built-in one is always there"
         dropped, groom, notes = {}, None, _size_notes(sources, None, head)
-        strands = _grown(head, head_name, sources, grow_settings)
-    notes, collider = (*notes, *said), head
+        strands = _grow_hair(head, head_name, sources, grow_settings)
+    notes, collider = (*notes, *head_notes), head
     if sources.collider is not None:
         collider, _ = _read_mesh(sources.collider, replace(sources, need_uv=False))
     head_object = bpy.data.objects.get(head_name or "")
@@ -123,13 +123,15 @@ def read_inputs(sources: Sources, grow_settings: GrowSettings) -> Inputs:
             " Unwrap).",
         )
     children = _weights(sources.children_density, head_name)
-    found = head_object and head_object.name
-    partings, unusable = _partings(sources.groom)
-    notes = (*notes, *unusable)
-    return Inputs(strands, dropped, groom, notes, name, head, found, collider, children, partings)
+    head_object_name = head_object and head_object.name
+    partings, parting_notes = _partings(sources.groom)
+    notes = (*notes, *parting_notes)
+    return Inputs(
+        strands, dropped, groom, notes, name, head, head_object_name, collider, children, partings
+    )
 
 
-def _grown(
+def _grow_hair(
     head: Surface, head_name: str | None, sources: Sources, settings: GrowSettings
 ) -> StrandSet:
     """Hair grown on this head. Combed hair comes with brows and lashes if the head is the built-in
@@ -150,9 +152,9 @@ def _grown(
     return grow_with_face(head, settings, weights, length)
 
 
-def look_of_head(sources: Sources, head: Surface | None) -> HeadLook | None:
+def read_head_look(sources: Sources, head: Surface | None) -> HeadLook | None:
     """The look of this head, or of a bake's head; see `head_look`."""
-    return head_look(named_head(sources), head, sources.skin)
+    return head_look(find_head_name(sources), head, sources.skin)
 
 
 def _read_head(name: str | None, sources: Sources) -> tuple[Surface | None, tuple[str, ...]]:
@@ -164,14 +166,14 @@ def _read_head(name: str | None, sources: Sources) -> tuple[Surface | None, tupl
             remedy="Name the file with --head, or scale the object in the scene",
         )
     if name is not None:
-        head, said = _read_mesh(name, sources)
+        head, head_notes = _read_mesh(name, sources)
         if sources.skin != _SKIN and not is_our_bust(head):
             raise HairloomError(
                 "only the built-in head has skin tones",
                 place="--skin",
                 remedy=f"Omit it: {name} is drawn with its own materials",
             )
-        return head, said
+        return head, head_notes
     if sources.groom is None:
         return built_in_head().surface, ()
     if sources.need_head:
@@ -183,27 +185,27 @@ def _read_head(name: str | None, sources: Sources) -> tuple[Surface | None, tupl
     return None, ()
 
 
-def head_of_sources(sources: Sources) -> Surface | None:
+def read_head(sources: Sources) -> Surface | None:
     """The mesh of the named head, or of the surface of hair curves; the built-in head if neither
     hair nor head is named; None if hair has no head."""
-    name = named_head(sources)
+    name = find_head_name(sources)
     if name is None and sources.groom is None:
         return built_in_head().surface
     return None if name is None else _read_mesh(name, sources)[0]
 
 
-def named_head(sources: Sources) -> str | None:
+def find_head_name(sources: Sources) -> str | None:
     """The name of --head, or of the surface of the scene's hair curves."""
     return sources.head or _surface_name(sources.groom)
 
 
 def _partings(groom: str | None) -> tuple[Floats | None, tuple[str, ...]]:
     """The partings of hair curves of the scene, and notes on those that cannot be used."""
-    hair = hair_named(groom)
+    hair = find_hair(groom)
     if hair is None:
         return None, ()
-    lines, unusable = read_partings(hair, bpy.context.evaluated_depsgraph_get())
-    return (lines if len(lines) else None), unusable
+    lines, notes = read_partings(hair, bpy.context.evaluated_depsgraph_get())
+    return (lines if len(lines) else None), notes
 
 
 def _weights(group: str, head_name: str | None) -> Floats | None:
@@ -222,7 +224,7 @@ def _weights(group: str, head_name: str | None) -> Floats | None:
 
 def _surface_name(groom: str | None) -> str | None:
     """The name of the mesh that a hair curves object of the scene grows on."""
-    hair = hair_named(groom)
+    hair = find_hair(groom)
     surface = None if hair is None else head_of(hair)
     return None if surface is None else surface.name
 
@@ -268,12 +270,12 @@ def _size_notes(
     sources: Sources, strands: StrandSet | None, head: Surface | None
 ) -> tuple[str, ...]:
     """Notes on files that seem to be in another unit than metres."""
-    hair = at = None
+    hair = head_file = None
     if sources.groom and strands is not None and bpy.data.objects.get(sources.groom) is None:
         hair = Path(sources.groom).name, strands.points
     if head is not None and sources.head and _is_mesh_file(sources.head):
-        at = Path(sources.head).name, head.positions
-    return tuple(filter(None, [size_note(hair, at)]))
+        head_file = Path(sources.head).name, head.positions
+    return tuple(filter(None, [size_note(hair, head_file)]))
 
 
 def _unknown(source: str, kind: str, example: str) -> HairloomError:

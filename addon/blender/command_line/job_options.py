@@ -19,7 +19,7 @@ from ..properties.presets import named_preset, shipped
 from ..scene.bust_skin import TONES
 from ..scene.principled import look_from_named
 from ..setup.hairstyles import shipped as hairstyles
-from .object_settings import hair_named, own_settings
+from .object_settings import find_hair, settings_of_object
 from .overrides import overrides
 
 
@@ -88,8 +88,8 @@ def add_hair_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_head_scale_option(parser: Any, about: str) -> None:
-    parser.add_argument("--head-scale", type=float, default=1.0, metavar="FACTOR", help=about)
+def add_head_scale_option(parser: Any, help_text: str) -> None:
+    parser.add_argument("--head-scale", type=float, default=1.0, metavar="FACTOR", help=help_text)
 
 
 def add_scene_option(parser: argparse.ArgumentParser) -> None:
@@ -99,10 +99,10 @@ def add_scene_option(parser: argparse.ArgumentParser) -> None:
 
 
 def add_output_option(
-    parser: argparse.ArgumentParser, about: str, default: Path | None, *, needed: bool
+    parser: argparse.ArgumentParser, help_text: str, default: Path | None, *, needed: bool
 ) -> None:
     parser.add_argument(
-        "--output", type=Path, required=needed, default=default, metavar="PATH", help=about
+        "--output", type=Path, required=needed, default=default, metavar="PATH", help=help_text
     )
 
 
@@ -112,13 +112,13 @@ def add_save_option(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_object_option(parser: Any, about: str) -> None:
+def add_object_option(parser: Any, help_text: str) -> None:
     """Add --object, which can be given once for each object."""
-    parser.add_argument("--object", action="append", default=[], metavar="NAME", help=about)
+    parser.add_argument("--object", action="append", default=[], metavar="NAME", help=help_text)
 
 
-def add_frames_option(parser: Any, about: str) -> None:
-    parser.add_argument("--frames", nargs=2, type=int, metavar=("FIRST", "LAST"), help=about)
+def add_frames_option(parser: Any, help_text: str) -> None:
+    parser.add_argument("--frames", nargs=2, type=int, metavar=("FIRST", "LAST"), help=help_text)
 
 
 def add_max_frames_option(parser: Any) -> None:
@@ -150,7 +150,7 @@ def frames_of_option(given: list[int] | None, max_frames: int | None = None) -> 
 
 
 def add_bake_option(parser: Any) -> None:
-    """Add --bake, alone or with a folder; see job_steps.motion_of."""
+    """Add --bake, alone or with a folder; see job_steps.read_baked_motion."""
     parser.add_argument(
         "--bake",
         nargs="?",
@@ -161,11 +161,11 @@ def add_bake_option(parser: Any) -> None:
     )
 
 
-def add_moment_options(parser: argparse.ArgumentParser, beside: str = "") -> None:
+def add_bake_frame_options(parser: argparse.ArgumentParser, help_suffix: str = "") -> None:
     """Add options for a frame of a bake, see job_steps.posed_hair.
 
     Args:
-        beside: text for the help on other hair that --frame applies to.
+        help_suffix: text for the help on other hair that --frame applies to.
     """
     moment = parser.add_argument_group("when")
     add_bake_option(moment)
@@ -173,7 +173,7 @@ def add_moment_options(parser: argparse.ArgumentParser, beside: str = "") -> Non
         "--frame",
         type=int,
         metavar="NUMBER",
-        help=f"frame of the bake (default: its first){beside}",
+        help=f"frame of the bake (default: its first){help_suffix}",
     )
 
 
@@ -186,8 +186,8 @@ def add_picture_options(parser: argparse.ArgumentParser, width: int, height: int
         ("--height", height, "height in pixels"),
         ("--samples", 2, samples),
     ):
-        about = f"{what} (default: {default})"
-        picture.add_argument(name, type=int, default=default, metavar="COUNT", help=about)
+        help_text = f"{what} (default: {default})"
+        picture.add_argument(name, type=int, default=default, metavar="COUNT", help=help_text)
     picture.add_argument(
         "--stage",
         metavar="NAME",
@@ -257,13 +257,14 @@ def add_settings_options(parser: argparse.ArgumentParser) -> None:
 
 
 def add_parameter_options(parser: Any, kind: type[Settings]) -> None:
-    """Add an option for each parameter of a section, which overrides --set; see `parameters_of`."""
+    """Add an option for each parameter of a section, which overrides --set; see
+    `section_from_options`."""
     for parameter in kind.parameters():
         name = "--" + parameter.name.replace("_", "-")
-        about = parameter.description.replace("%", "%%")
+        help_text = parameter.description.replace("%", "%%")
         if parameter.kind == "toggle":
             action = argparse.BooleanOptionalAction if parameter.default else "store_true"
-            parser.add_argument(name, action=action, default=None, help=about)
+            parser.add_argument(name, action=action, default=None, help=help_text)
             continue
         choices = [identifier for identifier, *_ in parameter.choices] or None
         parser.add_argument(
@@ -271,11 +272,11 @@ def add_parameter_options(parser: Any, kind: type[Settings]) -> None:
             type=str if choices else float if parameter.kind == "number" else int,
             choices=choices,
             metavar=None if choices else {"percent": "PERCENT"}.get(parameter.unit, "N"),
-            help=f"{about} (default: {parameter.default})",
+            help=f"{help_text} (default: {parameter.default})",
         )
 
 
-def parameters_of[S: Settings](options: argparse.Namespace, settings: S) -> S:
+def section_from_options[S: Settings](options: argparse.Namespace, settings: S) -> S:
     """A section changed by its own options, see `add_parameter_options`."""
     given = {
         parameter.name: value
@@ -311,13 +312,13 @@ def add_farm_options(parser: argparse.ArgumentParser, *, can_skip: bool) -> None
 
 def check_numbers(options: argparse.Namespace) -> None:
     """Refuse numbers out of range, such as sizes that cannot be drawn, before any work is done."""
-    for name, least, most in _LIMITS:
+    for name, minimum, maximum in _LIMITS:
         value = getattr(options, name, None)
-        if value is not None and not least <= value <= most:
+        if value is not None and not minimum <= value <= maximum:
             raise HairloomError(
                 f"{value} cannot be used",
                 place="--" + name.replace("_", "-"),
-                remedy=f"Use a number from {least:g} to {most:g}",
+                remedy=f"Use a number from {minimum:g} to {maximum:g}",
             )
 
 
@@ -361,14 +362,14 @@ def _stage_preset(stage: str) -> Preset[Any]:
     return preset
 
 
-def chosen_settings(options: argparse.Namespace) -> SettingsMap:
+def settings_from_options(options: argparse.Namespace) -> SettingsMap:
     """All settings; later sources override earlier ones: defaults, the hair object of --groom,
     --preset, the material, --set."""
     chosen: dict[str, Settings] = {section: made() for section, made in ALL_SETTINGS.items()}
     name = getattr(options, "groom", None)
-    groom = hair_named(name)
+    groom = find_hair(name)
     if groom is not None:
-        chosen |= own_settings(groom)
+        chosen |= settings_of_object(groom)
     for preset in _presets(options):
         chosen |= {settings.section: settings for settings in preset.all}
     if hasattr(options, "groom") and getattr(options, "look_from_material", False):

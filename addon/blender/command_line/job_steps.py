@@ -37,32 +37,32 @@ from ..scene.masks import MaskReader
 from ..scene.painted_colors import painted_colors
 from ..scene.source import Source
 from ..sessions.prepared_groom import prepare_groom
-from .inputs import Inputs, Sources, head_of_sources, look_of_head, named_head, read_inputs
-from .object_settings import hair_named
+from .inputs import Inputs, Sources, find_head_name, read_head, read_head_look, read_inputs
+from .object_settings import find_hair
 
 
 @dataclass(frozen=True)
 class Job:
     """One call of a verb: its inputs, settings, output and report.
 
-    chosen: the settings as they are stored; `settings`: as they act where hair is wet or dusty.
+    stored_settings: as the artist chose them; `settings`: as they act where hair is wet or dusty.
     """
 
     verb: str
     sources: Sources
-    chosen: SettingsMap
+    stored_settings: SettingsMap
     output: Path
     options: argparse.Namespace
     report: Report
 
     @cached_property
     def settings(self) -> SettingsMap:
-        return effective_settings(self.chosen)
+        return effective_settings(self.stored_settings)
 
     @property
     def hair(self) -> bpy.types.Object | None:
         """The hair object of the open scene that --groom names; None if it names none."""
-        return hair_named(self.sources.groom)
+        return find_hair(self.sources.groom)
 
 
 def read_hair(job: Job) -> Inputs:
@@ -129,7 +129,7 @@ def job_colors(job: Job, rig: Rig) -> PaintedColor | None:
     name, place = job.settings[ShadingSettings].color_map, job.sources.groom or "hair"
     if not name:
         return None
-    surface = bpy.data.objects.get(named_head(job.sources) or "")
+    surface = bpy.data.objects.get(find_head_name(job.sources) or "")
     depsgraph = bpy.context.evaluated_depsgraph_get()
     count = None if rig.head is None else len(rig.head.triangles)
     return painted_colors(surface, name, depsgraph, count, place=place)
@@ -148,10 +148,10 @@ def read_job_masks(
     if not names:
         return {}
     hair = job.hair
-    kept = np.zeros(0, np.int32) if hair is None else read_curves(hair, depsgraph).kept
-    head = bpy.data.objects.get(inputs.head_object or "")
-    mask_reader = MaskReader(hair, head, inputs.head, inputs.strands, kept)
-    found = {of: mask_reader.mask(name, depsgraph) for of, name in names.items()}
+    kept_strands = np.zeros(0, np.int32) if hair is None else read_curves(hair, depsgraph).kept
+    head = bpy.data.objects.get(inputs.head_object_name or "")
+    mask_reader = MaskReader(hair, head, inputs.head, inputs.strands, kept_strands)
+    found = {parameter: mask_reader.mask(name, depsgraph) for parameter, name in names.items()}
     report_notes(list(mask_reader.masks(settings, depsgraph)[1]), job.report)
     return found
 
@@ -214,7 +214,7 @@ class PosedHair:
         return cls(rig, pose, points, motion.at(frame)[1])
 
 
-def motion_of(job: Job, frames: range | None = None) -> BakedGuides:
+def read_baked_motion(job: Job, frames: range | None = None) -> BakedGuides:
     """The motion of --bake: from a folder, or of the hair object that --groom names.
 
     Raises:
@@ -243,17 +243,17 @@ def posed_hair(job: Job) -> PosedHair:
     if job.options.bake is None:
         return PosedHair.of_rest(read_rig(job)[0])
     frame = job.options.frame
-    motion = motion_of(job, None if frame is None else range(frame, frame + 1))
+    motion = read_baked_motion(job, None if frame is None else range(frame, frame + 1))
     return PosedHair.of_motion(motion, with_uvs(motion.rig, job.sources), motion.frames[0])
 
 
 def with_uvs(rig: Rig, sources: Sources) -> Rig:
     """A bake's rig with the UVs of the head, which bakes do not hold and which the shadow on the
     head needs. Unchanged if no head is named, or if its triangles have changed."""
-    now = head_of_sources(replace(sources, need_uv=False, need_head=False))
-    if rig.head is None or now is None or not np.array_equal(now.triangles, rig.head.triangles):
+    head = read_head(replace(sources, need_uv=False, need_head=False))
+    if rig.head is None or head is None or not np.array_equal(head.triangles, rig.head.triangles):
         return rig
-    return replace(rig, head=replace(rig.head, corner_uv=now.corner_uv))
+    return replace(rig, head=replace(rig.head, corner_uv=head.corner_uv))
 
 
 def card_edits(job: Job) -> CardEdits | None:
@@ -271,7 +271,7 @@ def open_studio(job: Job, rig: Rig) -> Studio:
     with job.report.stage("ambient occlusion"):
         groom = prepare_groom(rig, job.settings[AmbientSettings])
     edits = card_edits(job)
-    look = look_of_head(job.sources, rig.head)
+    look = read_head_look(job.sources, rig.head)
     studio = Studio(groom, GroomSettings(job.settings), look=look, edits=edits)
     report_notes(list(studio.warnings), job.report)
     return studio

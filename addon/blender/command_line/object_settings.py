@@ -49,13 +49,13 @@ def is_groom(obj: bpy.types.Object) -> bool:
     return bool(obj.type == "CURVES" and not obj.data.hairloom.baked_in)
 
 
-def hair_named(name: str | None) -> bpy.types.Object | None:
+def find_hair(name: str | None) -> bpy.types.Object | None:
     """The hair of this name in the open file; None where there is none."""
     named = bpy.data.objects.get(name or "")
     return named if named is not None and is_groom(named) else None
 
 
-def named_grooms(names: list[str]) -> tuple[list[bpy.types.Object], tuple[str, ...]]:
+def grooms_to_export(names: list[str]) -> tuple[list[bpy.types.Object], tuple[str, ...]]:
     """The named grooms, else all of the view layer; and notes on grooms that are left out.
 
     Raises:
@@ -63,7 +63,7 @@ def named_grooms(names: list[str]) -> tuple[list[bpy.types.Object], tuple[str, .
     """
     if names:
         return named_objects(names, is_groom, "hair curves"), ()
-    grooms, notes = all_of_scene(is_groom)
+    grooms, notes = usable_objects(is_groom)
     if not grooms:
         raise HairloomError(
             "there is no hair in the open scene",
@@ -73,7 +73,7 @@ def named_grooms(names: list[str]) -> tuple[list[bpy.types.Object], tuple[str, .
     return grooms, notes
 
 
-def all_of_scene(
+def usable_objects(
     is_wanted: Callable[[bpy.types.Object], bool], option: str = "--object"
 ) -> tuple[list[bpy.types.Object], tuple[str, ...]]:
     """The wanted objects of the view layer, without hidden or only instanced ones and hair without
@@ -124,7 +124,7 @@ def _only_instanced(instances: list[bpy.types.Object]) -> HairloomError:
     )
 
 
-def own_settings(obj: bpy.types.Object) -> dict[str, Settings]:
+def settings_of_object(obj: bpy.types.Object) -> dict[str, Settings]:
     """The artist's settings of an object, by section."""
     groups = {section: _group(obj, section) for section in ALL_SETTINGS}
     return {
@@ -134,7 +134,7 @@ def own_settings(obj: bpy.types.Object) -> dict[str, Settings]:
     }
 
 
-def put_settings(
+def change_settings(
     obj: bpy.types.Object, presets: list[str], assignments: list[str], *, grows_again: bool = False
 ) -> None:
     """Change an object's own settings by --preset and --set, as the artist would.
@@ -158,7 +158,7 @@ def put_settings(
         if settings is not None:
             own = settings.with_masks_of(own)
         changed = type(own).from_dict(own.as_dict() | values, "--set")
-        _write(group, changed)
+        _write_section(group, changed)
         if section == "grow" and not grows_again:
             _check_growth(obj)
 
@@ -212,15 +212,15 @@ def _is_simulated(obj: bpy.types.Object) -> bool:
     return obj.type == "CURVES" or fin_modifier(obj) is not None
 
 
-def put_map(obj: bpy.types.Object, chosen: SettingsMap) -> None:
+def write_settings(obj: bpy.types.Object, chosen: SettingsMap) -> None:
     """Set all of an object's own settings."""
     for section, kind in ALL_SETTINGS.items():
         group = _group(obj, section)
         if group is not None:
-            _write(group, chosen[kind])
+            _write_section(group, chosen[kind])
 
 
-def _write(group: Any, settings: Settings) -> None:
+def _write_section(group: Any, settings: Settings) -> None:
     for name, value in settings.as_dict().items():
         setattr(group, name, value)
 

@@ -14,8 +14,16 @@ from ...shading.volume.settings import VolumeSettings
 from ..bakes.guide_motion import BakedGuides
 from ..base.images import contact_sheet, write_png
 from ..pictures.studio import Studio
-from .job_options import add_moment_options, add_picture_options
-from .job_steps import Job, PosedHair, finish, motion_of, open_studio, posed_hair, report_notes
+from .job_options import add_bake_frame_options, add_picture_options
+from .job_steps import (
+    Job,
+    PosedHair,
+    finish,
+    open_studio,
+    posed_hair,
+    read_baked_motion,
+    report_notes,
+)
 from .verb import Verb
 
 SHEET_COLUMNS, SHEET_ROWS = 4, 3
@@ -30,7 +38,7 @@ def render(job: Job) -> None:
     hair = posed_hair(job)
     studio = open_studio(job, hair.rig)
     if options.sheet:
-        write_sheet(job, Path(options.sheet), studio, motion_of(job))
+        write_sheet(job, Path(options.sheet), studio, read_baked_motion(job))
     write_still(job, job.output, studio, hair)
     if options.slices:
         _write_slices(job, Path(options.slices), studio, hair)
@@ -122,7 +130,7 @@ def _write_skin_shadow(job: Job, path: Path, studio: Studio, hair: PosedHair) ->
 
 
 def _add_options(parser: argparse.ArgumentParser) -> None:
-    add_moment_options(parser)
+    add_bake_frame_options(parser)
     add_picture_options(parser, 960, 720)
     more = parser.add_argument_group("more pictures")
     more.add_argument(

@@ -14,13 +14,13 @@ from ..base.objects import check_editable
 from ..base.outcome import Reports, collected_reports
 from .job_options import add_object_option, add_save_option
 from .job_steps import Job, report_notes
-from .object_settings import check_sections, named_objects, put_settings
+from .object_settings import change_settings, check_sections, named_objects
 from .overrides import plain_value
-from .scene_files import check_saving, save_scene
+from .scene_files import check_scene_output, save_scene
 from .verb import SCENE_OUTPUT, Verb
 
 #: operators that change a scene
-_OF_SCENES = (
+_SCENE_OPERATORS = (
     "use_groom",
     "convert_particles",
     "set_surface",
@@ -64,8 +64,8 @@ _OF_SCENES = (
     "sample_scene",
 )
 #: operators that change the artist's own presets instead
-_OF_PRESETS = ("save_preset", "delete_preset")
-OPERATORS = (*_OF_SCENES, *_OF_PRESETS)
+_PRESET_OPERATORS = ("save_preset", "delete_preset")
+OPERATORS = (*_SCENE_OPERATORS, *_PRESET_OPERATORS)
 
 
 def run_operator(job: Job) -> None:
@@ -76,12 +76,12 @@ def run_operator(job: Job) -> None:
     """
     options = job.options
     if not (options.operator or options.set or options.preset):
-        _check_nothing_asked(options)
+        _check_nothing_requested(options)
         _list_operators()
         return
-    is_of_scene = options.operator not in _OF_PRESETS
-    if is_of_scene:
-        check_saving(options.output, over=options.save)
+    changes_scene = options.operator not in _PRESET_OPERATORS
+    if changes_scene:
+        check_scene_output(options.output, overwrites=options.save)
     operator = _Operator.named(options.operator) if options.operator else None
     own = [each for each in options.set if "." not in each.partition("=")[0]]
     values = operator.values(own) if operator is not None else _refuse_properties(own)
@@ -97,14 +97,14 @@ def run_operator(job: Job) -> None:
         for message in reports.messages:
             print(message, flush=True)
         report_notes(reports.warnings, job.report)
-    if is_of_scene:
+    if changes_scene:
         with job.report.stage("save scene"):
             saved = save_scene(options.output)
         job.report.add_output(saved)
         print(f"Wrote {saved}")
 
 
-def _check_nothing_asked(options: argparse.Namespace) -> None:
+def _check_nothing_requested(options: argparse.Namespace) -> None:
     """Raises:
     HairloomError: an option for a changed scene is given, so the operator was forgotten.
     """
@@ -161,7 +161,7 @@ class _Operator:
         Raises:
             HairloomError: its button would be grey, or it has failed.
         """
-        reason = self._why_grey()
+        reason = self._disabled_reason()
         if reason:
             raise HairloomError(
                 reason.rstrip("."), place=self.name, remedy="Name what it needs with --object"
@@ -173,50 +173,52 @@ class _Operator:
         assert result == {"FINISHED"}, f"{self.name} has not finished and does not say why"
         return reports
 
-    def _why_grey(self) -> str:
+    def _disabled_reason(self) -> str:
         """Why the button would be grey, as its tooltip says; empty if it would not be."""
-        said: list[str] = []
+        messages: list[str] = []
 
-        class Asked(self.kind):  # type: ignore[name-defined]
-            poll_message_set = classmethod(lambda _cls, message: said.append(message))
+        class PollProbe(self.kind):  # type: ignore[name-defined]
+            poll_message_set = classmethod(lambda _cls, message: messages.append(message))
 
-        if not hasattr(Asked, "poll") or Asked.poll(bpy.context):
+        if not hasattr(PollProbe, "poll") or PollProbe.poll(bpy.context):
             return ""
-        return said[-1] if said else "it cannot run here"
+        return messages[-1] if messages else "it cannot run here"
 
 
-def _value(known: Any, text: str) -> Any:
+def _value(rna_property: Any, text: str) -> Any:
     """The value of a text for this property.
 
     Raises:
         HairloomError: it has another type, or is out of range.
     """
-    if known.type == "STRING":
+    if rna_property.type == "STRING":
         return text
-    if known.type == "ENUM":
-        choices = [item.identifier for item in known.enum_items]
+    if rna_property.type == "ENUM":
+        choices = [item.identifier for item in rna_property.enum_items]
         if text not in choices:
-            raise _unknown(f"{known.identifier} cannot be '{text}'", "--set", choices)
+            raise _unknown(f"{rna_property.identifier} cannot be '{text}'", "--set", choices)
         return text
     value = plain_value(text)
     values = value if isinstance(value, list) else [value]
-    kinds: tuple[type, ...] = {"BOOLEAN": (bool,), "INT": (int,)}.get(known.type, (int, float))
+    kinds: tuple[type, ...] = {"BOOLEAN": (bool,), "INT": (int,)}.get(
+        rna_property.type, (int, float)
+    )
     is_number = all(
         isinstance(each, kinds) and (bool in kinds or not isinstance(each, bool)) for each in values
     )
-    if not is_number or len(values) != max(known.array_length, 1):
+    if not is_number or len(values) != max(rna_property.array_length, 1):
         raise HairloomError(
-            f"{known.identifier} cannot be '{text}'",
+            f"{rna_property.identifier} cannot be '{text}'",
             place="--set",
-            remedy=f"Use {_KINDS[known.type]}",
+            remedy=f"Use {_KINDS[rna_property.type]}",
         )
-    if known.type != "BOOLEAN" and not all(
-        known.hard_min <= each <= known.hard_max for each in values
+    if rna_property.type != "BOOLEAN" and not all(
+        rna_property.hard_min <= each <= rna_property.hard_max for each in values
     ):
         raise HairloomError(
-            f"{known.identifier} cannot be {text}",
+            f"{rna_property.identifier} cannot be {text}",
             place="--set",
-            remedy=f"Use a value from {known.hard_min:g} to {known.hard_max:g}",
+            remedy=f"Use a value from {rna_property.hard_min:g} to {rna_property.hard_max:g}",
         )
     return value
 
@@ -260,15 +262,15 @@ def _change_settings(job: Job, assignments: list[str]) -> None:
     for obj in chosen:
         check_editable(obj)
         grows_again = job.options.operator == "grow_again"
-        put_settings(obj, job.options.preset, assignments, grows_again=grows_again)
+        change_settings(obj, job.options.preset, assignments, grows_again=grows_again)
     job.report.facts["objects"] = [obj.name for obj in chosen]
 
 
 def _unknown(problem: str, place: str, known: Any) -> HairloomError:
     """An error whose remedy lists similar names, or all known ones."""
     wrong = problem.split("'")[1]
-    meant = get_close_matches(wrong, known) or list(known)
-    remedy = "Use one of " + ", ".join(meant) if meant else "Leave it out"
+    suggestions = get_close_matches(wrong, known) or list(known)
+    remedy = "Use one of " + ", ".join(suggestions) if suggestions else "Leave it out"
     return HairloomError(problem, place=place, remedy=remedy)
 
 

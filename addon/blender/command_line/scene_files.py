@@ -52,18 +52,18 @@ def open_scene(path: Path) -> None:
         ) from error
 
 
-def check_saving(output: Path | None, *, over: bool) -> None:
+def check_scene_output(output: Path | None, *, overwrites: bool) -> None:
     """Check, before any work, that there is exactly one path for the changed scene.
 
     Args:
-        over: whether to save over the scene's own file.
+        overwrites: whether to save over the scene's own file.
 
     Raises:
         HairloomError: there is none or two, or no scene can be written there.
     """
-    if over == (output is not None):
+    if overwrites == (output is not None):
         raise HairloomError(
-            "both --output and --save are given" if over else "no output is given",
+            "both --output and --save are given" if overwrites else "no output is given",
             place="the changed scene",
             remedy="Give --output FILE.blend, or --save to save over the scene",
         )
@@ -87,29 +87,29 @@ def save_scene(path: Path | None = None) -> Path:
     Raises:
         HairloomError: the scene has no file of its own, or the file cannot be written.
     """
-    check_saving(path, over=path is None)
+    check_scene_output(path, overwrites=path is None)
     own = Path(bpy.data.filepath) if bpy.data.filepath else None
-    target = own if path is None or _is_same(path, own) else path
-    assert target is not None, "check_saving refuses it"
-    _keep_bakes(target.resolve().parent)
+    target = own if path is None or _is_same_file(path, own) else path
+    assert target is not None, "check_scene_output refuses it"
+    _make_bake_paths_relative(target.resolve().parent)
     with atomic_write(target) as temporary:
         try:
             bpy.ops.wm.save_as_mainfile(filepath=str(temporary), copy=True)
         except RuntimeError as error:
             why = write_failure_reason(target, str(error).removeprefix("Error:").strip())
             raise write_error(target, why) from error
-        if not is_whole(temporary):
+        if not is_complete_blend(temporary):
             raise write_error(target, DISK_FULL)
         if target is own:
-            _keep_versions(target.resolve())
+            _keep_older_versions(target.resolve())
     return target
 
 
-def _is_same(path: Path, other: Path | None) -> bool:
+def _is_same_file(path: Path, other: Path | None) -> bool:
     return other is not None and os.path.realpath(path) == os.path.realpath(other)
 
 
-def is_whole(path: Path) -> bool:
+def is_complete_blend(path: Path) -> bool:
     """Whether a .blend file has been written to its end.
 
     A compressed file consists of frames and a table of their sizes (Zstandard's seekable format);
@@ -133,7 +133,7 @@ def is_whole(path: Path) -> bool:
     return int(sizes.sum(dtype=np.int64)) + table == size
 
 
-def _keep_versions(path: Path) -> None:
+def _keep_older_versions(path: Path) -> None:
     """Keep the previous file as PATH1, the one before as PATH2 and so on, as Blender does, up to
     the number in the preferences."""
     count = bpy.context.preferences.filepaths.save_version
@@ -142,28 +142,28 @@ def _keep_versions(path: Path) -> None:
         if newer.exists():
             os.replace(newer, older)
     if count:
-        beside = temporary_path(path)
+        temporary = temporary_path(path)
         try:
-            shutil.copy2(path, beside)
-            os.replace(beside, names[1])
+            shutil.copy2(path, temporary)
+            os.replace(temporary, names[1])
         finally:
-            beside.unlink(missing_ok=True)
+            temporary.unlink(missing_ok=True)
 
 
-def _keep_bakes(folder: Path) -> None:
+def _make_bake_paths_relative(folder: Path) -> None:
     """Make the paths of bakes relative to this folder, which Blender does not do for properties of
     extensions."""
     for obj in bpy.data.objects:
         bake = folder_of(obj)
         if obj.library is None and bake is not None:
-            _rename(obj.hairloom.bake, "folder", bake, folder)
+            _set_relative_path(obj.hairloom.bake, "folder", bake, folder)
     for curves in bpy.data.hair_curves:
         bake = shown_folder_of(curves)
         if curves.library is None and bake is not None:
-            _rename(curves.hairloom, "baked_in", bake, folder)
+            _set_relative_path(curves.hairloom, "baked_in", bake, folder)
 
 
-def _rename(owner: Any, name: str, bake: Path, folder: Path) -> None:
+def _set_relative_path(owner: Any, name: str, bake: Path, folder: Path) -> None:
     try:
         seen = "//" + Path(os.path.relpath(bake, folder)).as_posix()
     except ValueError:  # on another drive

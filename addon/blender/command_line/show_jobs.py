@@ -6,7 +6,7 @@ import argparse
 
 from ..pictures.sheet import Sheet
 from ..pictures.turntable import LIGHTS, Turntable, TurntableSettings
-from .job_options import add_moment_options, add_picture_options
+from .job_options import add_bake_frame_options, add_picture_options
 from .job_steps import Job, finish, open_studio, posed_hair, report_notes
 from .verb import Verb
 
@@ -43,7 +43,7 @@ def sheet(job: Job) -> None:
     hair = posed_hair(job)
     studio = open_studio(job, hair.rig)
     size, samples = (options.width, options.height), options.samples
-    drawn = Sheet(
+    contact_sheet = Sheet(
         studio,
         hair.pose,
         hair.points,
@@ -52,17 +52,17 @@ def sheet(job: Job) -> None:
         by_looks=options.looks,
         guides=hair.guides,
     )
-    progress = report.progress("drawing the contact sheet", drawn.count)
+    progress = report.progress("drawing the contact sheet", contact_sheet.count)
     with report.stage("draw contact sheet"):
-        for done in drawn.steps():
+        for done in contact_sheet.steps():
             progress.show(done)
-    studio.write(job.output, drawn.picture)
+    studio.write(job.output, contact_sheet.picture)
     report_notes(list(studio.notes), report)
     finish(job, job.output)
 
 
 def _add_turntable_options(parser: argparse.ArgumentParser) -> None:
-    add_moment_options(parser)
+    add_bake_frame_options(parser)
     add_picture_options(parser, 720, 720)
     turn = parser.add_argument_group("the turn")
     turn.add_argument(
@@ -90,7 +90,7 @@ def _add_turntable_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_sheet_options(parser: argparse.ArgumentParser) -> None:
-    add_moment_options(parser)
+    add_bake_frame_options(parser)
     add_picture_options(parser, 480, 480)
     parser.add_argument(
         "--looks", action="store_true", help="show all shipped looks instead of all sides"

@@ -30,7 +30,7 @@ from .bake_job import write_bake
 from .inputs import Inputs
 from .job_options import add_motion_options
 from .job_steps import Job, finish, read_hair, read_job_masks, report_notes
-from .object_settings import put_map
+from .object_settings import write_settings
 from .verb import Verb
 
 #: amplitudes and rate of the head's shake
@@ -42,22 +42,22 @@ _DENSITY = "children_density"
 
 def simulate(job: Job) -> None:
     """Simulate the hair and write its motion as a bake."""
-    with at_rest(job):
-        simulated(job, read_hair(job), job.output)
+    with scene_at_first_frame(job):
+        simulate_hair(job, read_hair(job), job.output)
     finish(job, job.output)
 
 
-def simulated(job: Job, inputs: Inputs, folder: Path) -> BakedGuides:
+def simulate_hair(job: Job, inputs: Inputs, folder: Path) -> BakedGuides:
     """Bake the hair under the scene's animation or the shake; call it inside `at_rest`."""
-    with _scene_of(job, inputs) as hair:
-        put_map(hair, job.chosen)
+    with _hair_to_simulate(job, inputs) as hair:
+        write_settings(hair, job.stored_settings)
         widths = hair.data.hairloom.widths
         if widths.method == "auto" and not inputs.strands.has_widths:
             # `write_curves` has stored found widths, which "auto" would take for the groom's own
             widths.method = "found"
-        own = bpy.context.scene
-        frames = range(own.frame_start, own.frame_end + 1)
-        plan = Bake.of([hair], own, frames=frames, folder=folder.resolve())
+        scene = bpy.context.scene
+        frames = range(scene.frame_start, scene.frame_end + 1)
+        plan = Bake.of([hair], scene, frames=frames, folder=folder.resolve())
         try:
             write_bake(plan, job.report, "simulating", "simulate frame")
         except HairloomError as error:
@@ -73,36 +73,38 @@ def simulated(job: Job, inputs: Inputs, folder: Path) -> BakedGuides:
 
 
 @contextmanager
-def at_rest(job: Job) -> Iterator[None]:
+def scene_at_first_frame(job: Job) -> Iterator[None]:
     """With --animated, set the scene to its first frame, which is rest, inside the block."""
-    scene, shown = bpy.context.scene, bpy.context.scene.frame_current
+    scene, frame_before = bpy.context.scene, bpy.context.scene.frame_current
     try:
         if job.options.animated:
             scene.frame_set(scene.frame_start)
         yield
     finally:
-        scene.frame_set(shown)
+        scene.frame_set(frame_before)
 
 
 @contextmanager
-def _scene_of(job: Job, inputs: Inputs) -> Iterator[bpy.types.Object]:
+def _hair_to_simulate(job: Job, inputs: Inputs) -> Iterator[bpy.types.Object]:
     """The hair object, in the open scene or in a temporary scene whose head is shaken."""
     if job.options.animated:
         yield _hair_of_open_scene(job, inputs)
         return
-    named, depsgraph = job.hair, bpy.context.evaluated_depsgraph_get()
+    scene_hair, depsgraph = job.hair, bpy.context.evaluated_depsgraph_get()
     window = bpy.context.window_manager.windows[0]
-    before, scene = window.scene, bpy.data.scenes.new("Hairloom Simulation")
+    scene_before, scene = window.scene, bpy.data.scenes.new("Hairloom Simulation")
     window.scene = scene
     try:
         assert inputs.head is not None, "simulate and demo refuse hair without a head"
         head = mesh_object("Head", inputs.head, scene)
         hair = write_curves("Hair", inputs.strands, head, scene.collection)
-        if named is not None:
+        if scene_hair is not None:
             copies = StillCopies(head, scene, depsgraph)
-            copy_holders(named, hair, copies)
-            copy_colliders(named, bpy.data.objects.get(inputs.head_object or ""), hair, copies)
-            copy_partings(named, hair, head, scene, depsgraph)
+            copy_holders(scene_hair, hair, copies)
+            copy_colliders(
+                scene_hair, bpy.data.objects.get(inputs.head_object_name or ""), hair, copies
+            )
+            copy_partings(scene_hair, hair, head, scene, depsgraph)
         if job.sources.collider is not None and inputs.collider is not None:
             collider = mesh_object("Collider", inputs.collider, scene)
             collider.parent = head
@@ -112,14 +114,14 @@ def _scene_of(job: Job, inputs: Inputs) -> Iterator[bpy.types.Object]:
             hair.hairloom.children_density = _DENSITY
         for kind in (ChildrenSettings, DynamicsSettings):
             names = mask_names(job.settings[kind])
-            for of, mask in read_job_masks(job, inputs, kind).items():
-                _put_mask(mask, names[of], hair, inputs.strands)
+            for parameter, mask in read_job_masks(job, inputs, kind).items():
+                _put_mask(mask, names[parameter], hair, inputs.strands)
         low, high = inputs.head.bounds()
         rate = float(job.options.frame_rate)
         shake(head, (low + high) / 2.0, round(job.options.seconds * rate), rate)
         yield hair
     finally:
-        window.scene = before
+        window.scene = scene_before
         for obj in list(scene.collection.objects):
             bpy.data.objects.remove(obj)
         bpy.data.scenes.remove(scene)
@@ -138,13 +140,13 @@ def _put_mask(mask: Mask, name: str, hair: bpy.types.Object, strands: StrandSet)
 
 def _hair_of_open_scene(job: Job, inputs: Inputs) -> bpy.types.Object:
     """The hair object that --groom names; else a new one on the head, with the strands."""
-    if inputs.head_object is None:
+    if inputs.head_object_name is None:
         raise HairloomError(
             "only an object of the scene can be animated",
             place="--animated",
             remedy="Name the head's object with --head, or omit --animated",
         )
-    head, scene = bpy.data.objects[inputs.head_object], bpy.context.scene
+    head, scene = bpy.data.objects[inputs.head_object_name], bpy.context.scene
     hair = job.hair
     if hair is None:
         hair = write_curves("Hair", inputs.strands, head, scene.collection)

@@ -29,11 +29,11 @@ from ..base.digests import digest
 from ..base.report import Report, hairloom_version
 from ..properties.presets import named_preset
 from ..setup.hairstyles import files_of_hairstyle
-from .places import named_inputs
+from .output_checks import input_paths
 
 SUFFIX = ".done.json"
 #: options without effect on the result
-_NOT_ASKED = frozenset(("report", "progress", "skip_existing"))
+_WITHOUT_EFFECT = frozenset(("report", "progress", "skip_existing"))
 #: facts about the result, which reports of skipped runs repeat
 _REPORTED = ("outputs", "dropped", "notes")
 
@@ -41,7 +41,7 @@ _REPORTED = ("outputs", "dropped", "notes")
 class Stamp:
     """The stamp of one job, beside its output.
 
-    reported: facts of the report when the job was done; empty before `why_not_done` is called.
+    reported: facts of the report when the job was done; empty before `reason_to_run` is called.
 
     Raises:
         HairloomError: the job has no output, or saves over its own input; or the folder of the
@@ -67,23 +67,27 @@ class Stamp:
         check_writable(self.path)
         self.reported: dict[str, Any] = {}
         self._folder = self.path.parent
-        self._asked = _asked(options, self._folder)
-        self._begun = time.time_ns()
+        self._option_values = _option_values(options, self._folder)
+        self._start_time = time.time_ns()
         self._inputs = {path: file_digest(Path(path)) for path in _files_read(options)}
 
-    def why_not_done(self) -> str:
+    def reason_to_run(self) -> str:
         """Why the job has to run; empty where it need not."""
         try:
             known = json.loads(self.path.read_text(encoding="utf-8"))
-            asked, inputs, outputs = known["asked"], known["inputs"], known["outputs"]
+            values, inputs, outputs = known["asked"], known["inputs"], known["outputs"]
             self.reported = dict(known["reported"])
-            pairs = _pairs(inputs, outputs)
-            changed = [path for path, was in pairs if file_digest(self._folder / path) != was]
+            pairs = _all_items(inputs, outputs)
+            changed = [
+                path
+                for path, digest_before in pairs
+                if file_digest(self._folder / path) != digest_before
+            ]
         except FileNotFoundError:
             return "it was never done"
         except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
             return f"{self.path.name} cannot be read"
-        if asked != self._asked:
+        if values != self._option_values:
             return "the options have changed"
         return f"{changed[0]} has changed" if changed else ""
 
@@ -96,20 +100,20 @@ class Stamp:
         outputs = [os.path.abspath(path) for path in report.outputs]
         read = [
             *report.inputs,
-            *(named for path in self._inputs for named in referenced_files(Path(path))),
+            *(file for path in self._inputs for file in referenced_files(Path(path))),
         ]
         found = [os.path.abspath(path) for path in read] + _files_of_scene()
         inputs = {path: self._digest_as_read(Path(path)) for path in found} | self._inputs
         content = {
-            "asked": self._asked,
+            "asked": self._option_values,
             "reported": {name: report.facts[name] for name in _REPORTED if name in report.facts},
             "inputs": {
-                _seen_from(self._folder, path): was
-                for path, was in inputs.items()
+                _relative_path(self._folder, path): digest_before
+                for path, digest_before in inputs.items()
                 if path not in outputs
             },
             "outputs": {
-                _seen_from(self._folder, path): file_digest(Path(path)) for path in outputs
+                _relative_path(self._folder, path): file_digest(Path(path)) for path in outputs
             },
         }
         write_text_atomic(self.path, json.dumps(content, indent=2) + "\n")
@@ -117,7 +121,7 @@ class Stamp:
     def _digest_as_read(self, path: Path) -> str:
         """The digest of an input; "" if it has changed since the job began: it will run again."""
         files = path.rglob("*") if os.path.isdir(path) else (path,) if os.path.exists(path) else ()
-        is_newer = any(file.stat().st_mtime_ns > self._begun for file in files)
+        is_newer = any(file.stat().st_mtime_ns > self._start_time for file in files)
         return "" if is_newer else file_digest(path)
 
 
@@ -136,11 +140,11 @@ def file_digest(path: Path) -> str:
         return hashlib.file_digest(file, lambda: hashlib.blake2b(digest_size=16)).hexdigest()
 
 
-def _pairs(*tables: dict[str, str]) -> Iterable[tuple[str, str]]:
+def _all_items(*tables: dict[str, str]) -> Iterable[tuple[str, str]]:
     return (pair for table in tables for pair in table.items())
 
 
-def _seen_from(folder: Path, path: str) -> str:
+def _relative_path(folder: Path, path: str) -> str:
     """An absolute path made relative to a folder; unchanged if it is on another drive."""
     try:
         return Path(os.path.relpath(path, folder)).as_posix()
@@ -148,40 +152,40 @@ def _seen_from(folder: Path, path: str) -> str:
         return path
 
 
-def _asked(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
+def _option_values(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
     """All options as JSON values, with absolute paths made relative to a folder; the content of
     presets and of the hairstyle; and the versions of Hairloom and Blender."""
-    asked = {
-        name: _moved_with(folder, value)
+    values = {
+        name: _with_relative_paths(folder, value)
         for name, value in vars(options).items()
-        if name not in _NOT_ASKED
+        if name not in _WITHOUT_EFFECT
     }
     presets = [preset_as_dict(named_preset(name)) for name in getattr(options, "preset", ())]
-    asked |= {"presets": presets, "made_by": [hairloom_version(), bpy.app.version_string]}
+    values |= {"presets": presets, "made_by": [hairloom_version(), bpy.app.version_string]}
     if getattr(options, "style", None):
-        asked["style_files"] = [file_digest(path) for path in files_of_hairstyle(options.style)]
-    plain: dict[str, Any] = json.loads(json.dumps(asked, default=str))
+        values["style_files"] = [file_digest(path) for path in files_of_hairstyle(options.style)]
+    plain: dict[str, Any] = json.loads(json.dumps(values, default=str))
     return plain
 
 
-def _moved_with(folder: Path, value: Any) -> Any:
+def _with_relative_paths(folder: Path, value: Any) -> Any:
     """An option's value with absolute paths, also in NAME=FILE, made relative to the folder."""
     if isinstance(value, list):
-        return [_moved_with(folder, each) for each in value]
+        return [_with_relative_paths(folder, each) for each in value]
     if isinstance(value, Path):
-        return _seen_from(folder, os.path.abspath(value))
+        return _relative_path(folder, os.path.abspath(value))
     if not isinstance(value, str):
         return value
     name, sign, path = value.rpartition("=")
-    return f"{name}{sign}{_seen_from(folder, path)}" if os.path.isabs(path) else value
+    return f"{name}{sign}{_relative_path(folder, path)}" if os.path.isabs(path) else value
 
 
 def _files_read(options: argparse.Namespace) -> set[str]:
     """The files that options name; and the file of the open scene without --scene."""
-    named = named_inputs(options)
+    paths = input_paths(options)
     if not getattr(options, "scene", None) and bpy.data.filepath:
-        named.add(os.path.abspath(bpy.data.filepath))
-    return {path for path in named if os.path.isfile(path)}
+        paths.add(os.path.abspath(bpy.data.filepath))
+    return {path for path in paths if os.path.isfile(path)}
 
 
 def _files_of_scene() -> list[str]:

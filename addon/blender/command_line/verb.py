@@ -1,4 +1,4 @@
-"""Verbs of the command line: their flow, options and outputs."""
+"""Verbs of the command line: their functions, options and outputs."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ def no_options(_: argparse.ArgumentParser) -> None:
 
 @dataclass(frozen=True)
 class Verb:
-    """A verb; it is defined at the end of the file with its flow.
+    """A verb; it is defined at the end of the file with its function.
 
-    flow: does the work; the first line of its docstring is the help.
+    run: does the work; the first line of its docstring is the help.
     add_options: adds the options that only this verb has.
     output: the help of --output; "" for a verb without one.
-    suffix: of the file of --output; "" if the flow checks it.
+    suffix: of the file of --output; "" if the verb checks it.
     writes_folder: whether --output is a folder.
     default_output: where it writes without --output.
     needs_output: whether --output must be given.
@@ -45,7 +45,7 @@ class Verb:
     """
 
     name: str
-    flow: Callable[[Job], None]
+    run: Callable[[Job], None]
     add_options: Callable[[argparse.ArgumentParser], None] = no_options
     output: str = ""
     suffix: str = ""
@@ -60,8 +60,8 @@ class Verb:
     operators: tuple[str, ...] = ()
 
     @property
-    def about(self) -> str:
-        return (self.flow.__doc__ or "").strip().splitlines()[0]
+    def summary(self) -> str:
+        return (self.run.__doc__ or "").strip().splitlines()[0]
 
     def add_all_options(self, parser: argparse.ArgumentParser) -> None:
         """Add all options in the order of --help: inputs, output, its own, settings, farms."""

@@ -42,7 +42,7 @@ def _groups(verb: Verb) -> Groups:
 
 
 def _verb_lines(verb: Verb, groups: Groups) -> Iterator[str]:
-    yield from (f"## `{verb.name}`", "", verb.about, "")
+    yield from (f"## `{verb.name}`", "", verb.summary, "")
     actions = [action for group in groups.values() for action in group]
     yield from _table(actions)
     also = ["What to work on"] * verb.takes_hair + ["Settings"] * verb.takes_settings + ["The job"]
@@ -55,11 +55,11 @@ def _table(actions: list[argparse.Action]) -> Iterator[str]:
     for action in actions:
         needed = " Needed." if action.required and action.option_strings else ""
         meaning = (action.help or "").replace("|", "\\|")
-        yield f"| `{_form(action)}` | {meaning}{'.' if needed else ''}{needed} |"
+        yield f"| `{_usage(action)}` | {meaning}{'.' if needed else ''}{needed} |"
     yield ""
 
 
-def _form(action: argparse.Action) -> str:
+def _usage(action: argparse.Action) -> str:
     """The form of an option, such as --frames FIRST LAST."""
     name = action.option_strings[0] if action.option_strings else ""
     if action.nargs == 0:

@@ -12,14 +12,14 @@ from ...exchange.files.atomic import check_folder_writable, check_writable
 from .verb import Verb
 
 #: options for files to write beside --output, and their suffix
-_ALSO = {
+_EXTRA_OUTPUTS = {
     "save_as": ".blend",
     "slices": ".png",
     "skin_shadow": ".png",
     "sheet": ".png",
     "report": ".json",
 }
-_OUTPUTS = ("output", *_ALSO)
+_OUTPUTS = ("output", *_EXTRA_OUTPUTS)
 
 
 def check_report(options: argparse.Namespace) -> None:
@@ -29,7 +29,7 @@ def check_report(options: argparse.Namespace) -> None:
         HairloomError: it would replace another kind of file, or one that the job reads.
     """
     if options.report is not None:
-        _check_file(Path(options.report), "report", _ALSO["report"], options)
+        _check_file(Path(options.report), "report", _EXTRA_OUTPUTS["report"], options)
 
 
 def check_outputs(verb: Verb, options: argparse.Namespace) -> None:
@@ -40,7 +40,7 @@ def check_outputs(verb: Verb, options: argparse.Namespace) -> None:
     """
     if getattr(options, "preflight", None):
         return  # nothing is written
-    for name, suffix in _ALSO.items():
+    for name, suffix in _EXTRA_OUTPUTS.items():
         path = getattr(options, name, None)
         if path is not None:
             _check_file(Path(path), name, suffix, options)
@@ -49,19 +49,19 @@ def check_outputs(verb: Verb, options: argparse.Namespace) -> None:
         return
     if verb.writes_folder:
         check_folder_writable(output)
-        check_not_read(output, options)
+        check_not_an_input(output, options)
     else:
         _check_file(output, "output", verb.suffix, options)
 
 
-def check_not_read(path: Path, options: argparse.Namespace) -> None:
+def check_not_an_input(path: Path, options: argparse.Namespace) -> None:
     """Refuse to write over an input of the job; a scene may be saved over itself.
 
     Raises:
         HairloomError: the job reads this file or folder.
     """
-    is_scene = path.suffix == ".blend" and _is_same(path, getattr(options, "scene", None))
-    if not is_scene and any(_is_same(path, each) for each in named_inputs(options)):
+    is_scene = path.suffix == ".blend" and _is_same_file(path, getattr(options, "scene", None))
+    if not is_scene and any(_is_same_file(path, each) for each in input_paths(options)):
         raise HairloomError(
             "the job reads this file and would overwrite it",
             place=str(path),
@@ -69,7 +69,7 @@ def check_not_read(path: Path, options: argparse.Namespace) -> None:
         )
 
 
-def named_inputs(options: argparse.Namespace) -> set[str]:
+def input_paths(options: argparse.Namespace) -> set[str]:
     """Existing files that options name, also as NAME=FILE, and the folder of --bake; without
     outputs."""
     words = []
@@ -92,15 +92,15 @@ def _check_file(path: Path, name: str, suffix: str, options: argparse.Namespace)
             remedy=f"Choose a name that ends in {suffix}",
         )
     check_writable(path)
-    check_not_read(path, options)
+    check_not_an_input(path, options)
     others = [each for each in _OUTPUTS if each != name and getattr(options, each, None)]
-    if any(_is_same(path, getattr(options, each)) for each in others):
+    if any(_is_same_file(path, getattr(options, each)) for each in others):
         raise HairloomError(
             "two results would be written to this file", place=str(path), remedy=f"Change {option}"
         )
 
 
-def _is_same(path: Path, other: str | Path | None) -> bool:
+def _is_same_file(path: Path, other: str | Path | None) -> bool:
     """Whether both paths are one file, also through a link or in another case."""
     if other is None:
         return False

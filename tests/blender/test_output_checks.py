@@ -12,7 +12,7 @@ import pytest
 from hedgehogs import hedgehog
 
 from hairloom.addon.blender.command_line import command_line, job_steps
-from hairloom.addon.blender.command_line.places import check_outputs
+from hairloom.addon.blender.command_line.output_checks import check_outputs
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.groom import Groom
 from hairloom.addon.exchange.tressfx import write_tfx
