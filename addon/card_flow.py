@@ -35,7 +35,7 @@ from .shading.ambient import occlusion_from_sky
 from .shading.ambient_settings import AmbientSettings
 from .shading.drawn_strands import drawn_radius, own_colors
 from .shading.settings import ShadingSettings, StrandSettings
-from .strands.arc_length import lengths
+from .strands.arc_length import strand_lengths
 
 _DEFAULT_STRANDS = StrandSettings()
 
@@ -146,7 +146,7 @@ class CardMeasure:
 
     def __init__(self, rig: Rig, cards: CardBinding) -> None:
         self._rig, self._cards = rig, cards
-        self._lengths = lengths(cards.lines(cards.mesh.positions), cards.offsets)
+        self._lengths = strand_lengths(cards.lines(cards.mesh.positions), cards.offsets)
         owner = cards.row_card[cards.row]
         self._by_card = np.argsort(owner, kind="stable")
         self._offsets = np.searchsorted(owner[self._by_card], np.arange(len(cards.guide) + 1))

@@ -29,9 +29,9 @@ from .shading.drawn_strands import drawn_radius
 from .shading.settings import StrandSettings
 from .shading.skin_seen import skin_field, skin_seen_from
 from .strands import StrandSet
-from .strands.arc_length import even
+from .strands.arc_length import even_fractions
 from .strands.frames import strand_tangents, tangents_at, volume_normal_rows
-from .strands.kept import same_rows
+from .strands.result_cache import find_rows
 from .strands.vectors import cross_rows, dot_rows
 
 #: Points whose directions are computed at once, so that they stay in the cache.
@@ -158,7 +158,7 @@ def quick_light(
         return _interpolated_light(rig, settings, fields, strands)
     if (fields.skin is None) != (rig.head is None):
         return rest_light(rig, settings)
-    number = same_rows(strands.roots, before.strands.roots)
+    number = find_rows(strands.roots, before.strands.roots)
     number[before.strands.point_counts[number] != strands.point_counts] = -1
     others = np.flatnonzero(number < 0)
     there = before.strands.offsets[:-1][number] - strands.offsets[:-1]
@@ -328,7 +328,7 @@ def rest_skin_field(
         return None
     # a part of the strands is enough: cells are coarser than the gaps between strands
     some, step = subsampled_strands(rig.strands, max_strands)
-    radius = drawn_radius(some.radius, StrandSettings(), even(some.offsets))
+    radius = drawn_radius(some.radius, StrandSettings(), even_fractions(some.offsets))
     some = replace(some, radius=radius.astype(np.float32))
     return skin_field(some, rig.head, step * rig.widths.extinction, cell_count)
 

@@ -24,13 +24,13 @@ from .dynamics.state import DynamicsState, rows_of, start
 from .dynamics.step import Drive, grid_at_frame_end
 from .dynamics.step import advance_in_steps as dynamics_steps
 from .groom.holds import Holds
-from .groom.roots import RootFrames, follow, root_frames, root_motions
-from .refine.hold import hold
+from .groom.roots import RootFrames, carry_with_roots, root_frames, root_motions
+from .refine.hold import hold_strands
 from .refine.lead_out import (
-    NO_LEANS,
-    NOT_LED,
+    NO_DEFLECTIONS,
+    NO_LED_OUT,
     Clearance,
-    Leans,
+    Deflections,
     LedOut,
     clearance_at,
     lead_out,
@@ -96,7 +96,7 @@ class Motion:
     colliders: tuple[PosedCollider, ...] = ()
     clearance: Clearance | None = None
     guide_clearance: GuideClearance | None = None
-    leans: Leans = NO_LEANS
+    leans: Deflections = NO_DEFLECTIONS
     start_pose: Pose | None = None
 
     def drive(self, frame: FrameInput, target: Floats, held: HeldCvs | None) -> Drive:
@@ -119,7 +119,7 @@ class Motion:
 def carried_strands(rig: Rig, pose: Pose) -> Floats:
     """Rest shapes of all strands, each carried rigidly by its own root, (point_count, 3)."""
     strands = rig.strands
-    return follow(strands.points, strands.offsets, motions_of(rig, pose))
+    return carry_with_roots(strands.points, strands.offsets, motions_of(rig, pose))
 
 
 def carried_guides(rig: Rig, pose: Pose, precision: type = np.float32) -> Floats:
@@ -130,7 +130,7 @@ def carried_guides(rig: Rig, pose: Pose, precision: type = np.float32) -> Floats
 def _carried_guides(rig: Rig, motions: RootMotions, precision: type) -> Floats:
     grid: Floats = rig.guide_grid.astype(precision)
     offsets = np.arange(len(grid) + 1) * grid.shape[1]
-    return follow(grid.reshape(-1, 3), offsets, motions).reshape(grid.shape)
+    return carry_with_roots(grid.reshape(-1, 3), offsets, motions).reshape(grid.shape)
 
 
 def motions_of(rig: Rig, pose: Pose, chosen: Ints | slice = slice(None)) -> RootMotions:
@@ -191,7 +191,7 @@ def with_style(rig: Rig, motion: Motion) -> Motion:
     return replace(motion, dynamics=replace(state, rest=rest))
 
 
-def advance(rig: Rig, motion: Motion, frame: FrameInput, led: LedOut = NOT_LED) -> Motion:
+def advance(rig: Rig, motion: Motion, frame: FrameInput, led: LedOut = NO_LED_OUT) -> Motion:
     """One frame of motion without other grooms: roots follow the head, the dynamics moves the rest.
 
     Args:
@@ -200,7 +200,9 @@ def advance(rig: Rig, motion: Motion, frame: FrameInput, led: LedOut = NOT_LED) 
     return run_alone(steps(rig, motion, frame, led))
 
 
-def steps(rig: Rig, motion: Motion, frame: FrameInput, led: LedOut = NOT_LED) -> FrameSteps[Motion]:
+def steps(
+    rig: Rig, motion: Motion, frame: FrameInput, led: LedOut = NO_LED_OUT
+) -> FrameSteps[Motion]:
     """`advance` with other grooms, see `dynamics.neighbours`.
 
     Args:
@@ -244,7 +246,7 @@ def has_jumped(
     roots = rig.guide_grid[chosen, :PINNED]
     offsets = np.arange(len(chosen) + 1) * roots.shape[1]
     motions = motions_of(rig, pose, rig.guides[chosen])
-    now = follow(roots.reshape(-1, 3), offsets, motions).reshape(-1, 3).astype(np.float64)
+    now = carry_with_roots(roots.reshape(-1, 3), offsets, motions).reshape(-1, 3).astype(np.float64)
     before = motion.carried_guides[chosen, :PINNED].reshape(-1, 3).astype(np.float64)
     here = before.mean(axis=0)
     displacement = now.mean(axis=0) - here
@@ -320,7 +322,7 @@ def bounding_sphere(rig: Rig, pose: Pose) -> tuple[Floats, float]:
     offsets = np.arange(len(chosen) + 1) * PINNED
     motions = motions_of(rig, pose, rig.guides[chosen])
     at_rest = rig.guide_grid[chosen, :PINNED]
-    now = follow(at_rest.reshape(-1, 3), offsets, motions).reshape(at_rest.shape)
+    now = carry_with_roots(at_rest.reshape(-1, 3), offsets, motions).reshape(at_rest.shape)
     first, last = (float(np.linalg.norm(np.diff(grid, axis=1))) for grid in (at_rest, now))
     middle, radius = rig.rest_sphere
     moved = (now[:, 0].astype(np.float64) - at_rest[:, 0]).mean(axis=0)
@@ -376,7 +378,7 @@ def strands_and_led(rig: Rig, motion: Motion) -> tuple[Floats, LedOut]:
     pose, offsets = motion.pose, rig.strands.offsets
     points, motions = _ridden_strands(rig, pose, motion.guides)
     if motion.clearance is None:
-        return held_strands(rig, pose, points), NOT_LED
+        return held_strands(rig, pose, points), NO_LED_OUT
     carry = partial(motions.carried, rig.strands.points)
     leans = motion.leans.after(motion.hair_time, offsets)
     led, leans = lead_out(points, carry, offsets, motion.colliders, motion.clearance, leans)
@@ -384,7 +386,7 @@ def strands_and_led(rig: Rig, motion: Motion) -> tuple[Floats, LedOut]:
     return points, LedOut.of(led, points, offsets, leans)
 
 
-def strands_at(rig: Rig, pose: Pose, guides_now: Floats, led: LedOut = NOT_LED) -> Floats:
+def strands_at(rig: Rig, pose: Pose, guides_now: Floats, led: LedOut = NO_LED_OUT) -> Floats:
     """All strands riding on guides, (point_count, 3) [m], world space.
 
     Args:
@@ -426,7 +428,7 @@ def held_strands(rig: Rig, pose: Pose, points: Floats) -> Floats:
     holds = None if rig.holds is None else rig.holds.where(pose.anchors)
     if holds is None or pose.anchors is None or not len(holds.strand):
         return points
-    hold(points, rig.strands.points, rig.strands.offsets, holds, pose.anchors)
+    hold_strands(points, rig.strands.points, rig.strands.offsets, holds, pose.anchors)
     return points
 
 

@@ -28,8 +28,8 @@ from .shading.drawn_strands import look_color, natural_strands
 from .shading.settings import ShadingSettings
 from .shading.wet_and_dusty import wet_and_dusty_color
 from .strands import StrandSet, Surface
-from .strands.arc_length import along
-from .strands.kept import same_rows
+from .strands.arc_length import length_fractions
+from .strands.result_cache import find_rows
 
 #: The lowest opacity that premultiplied paint is divided by.
 _MIN_OPACITY = 1.0e-6
@@ -121,7 +121,7 @@ def _with_grown_roots(
 ) -> tuple[Ints, GrownChildren]:
     """The index of each root's child in the growth, (n,), and the growth with new ones added."""
     growth = grown.growth
-    number = same_rows(roots.point, growth.root)
+    number = find_rows(roots.point, growth.root)
     new = np.flatnonzero(number < 0)
     number[new] = len(growth.root) + np.arange(len(new))
     if not len(new):
@@ -159,7 +159,7 @@ def painted_strands(rig: Rig, mask: StrandMask) -> Floats:
     if count == 1:
         return values[0].astype(np.float32)
     strand = np.repeat(np.arange(strands.strand_count), strands.point_counts)
-    place = along(strands.points, strands.offsets) * (count - 1)
+    place = length_fractions(strands.points, strands.offsets) * (count - 1)
     left = np.minimum(place.astype(np.int32), count - 2)
     low, high = values[left, strand], values[left + 1, strand]
     found: Floats = (low + (place - left) * (high - low)).astype(np.float32)

@@ -15,7 +15,7 @@ from .dynamics.colliders import DistanceField, PosedCollider
 from .dynamics.held import HeldCvs
 from .dynamics.neighbours import hair_length_of_guides
 from .errors import HairloomError
-from .groom.automatic_children import are_few, automatic
+from .groom.automatic_children import automatic_settings, is_too_sparse
 from .groom.children import (
     CHILD_POINTS,
     FEWEST_CHILD_POINTS,
@@ -24,28 +24,28 @@ from .groom.children import (
     make_children,
 )
 from .groom.children_settings import ChildrenSettings
-from .groom.counter_random import named, uniform
-from .groom.guides import choose_guides, grouped
+from .groom.counter_random import key_of, uniform
+from .groom.guides import choose_guides, split_by_kind
 from .groom.holds import Holds
 from .groom.masks import Masks
 from .groom.partings import Partings
 from .groom.roots import RootFrames, RootHolds, bind_roots, root_frames
 from .groom.settings import GuideSettings
-from .groom.ties import NO_HOLDERS, Holders, find_holds, idle
+from .groom.ties import NO_HOLDERS, Holders, find_holds, unused_holder_notes
 from .groom.weights import GuideWeights, guide_weights
 from .groom.widths import Widths, with_widths
-from .refine.lead_out_at_rest import led_out_at_rest
+from .refine.lead_out_at_rest import lead_out_at_rest
 from .refine.ride import Riders
 from .refine.thinning import even_ranks
 from .shading.strand_noise import SEED_LIMIT
 from .strands import StrandSet, Surface
-from .strands.arc_length import typical
+from .strands.arc_length import typical_length
 from .strands.center_lines import center_lines, curl_slack
 from .strands.face import is_face_hair
-from .strands.join import joined
-from .strands.kept import NOTHING_KEPT, Kept
-from .strands.needed_points import LOST, MAX_POINTS, with_needed_points, with_own_points
+from .strands.join import join_strands
+from .strands.needed_points import MAX_LENGTH_LOSS, MAX_POINTS, with_all_points, with_needed_points
 from .strands.resample import resample
+from .strands.result_cache import NO_CACHE, ResultCache
 from .strands.vectors import unit_or
 
 #: A note is given if more than this fraction of children cannot be led out of the head.
@@ -293,7 +293,7 @@ def prepare(
     placement: ChildPlacement = DEFAULT_PLACEMENT,
     widths: str = "own",
     holders: Holders = NO_HOLDERS,
-    kept: Kept = NOTHING_KEPT,
+    kept: ResultCache = NO_CACHE,
     is_animated: bool = False,
 ) -> Rig:
     """Bind strands to the head, choose the guides, weigh them for every strand, find all widths,
@@ -323,7 +323,7 @@ def prepare(
         held = bind_roots(strands, head, place=place)
         bound, root_distance = held.strands, held.looseness(head)
     if is_animated:
-        own = with_own_points(bound, settings.cv_count)
+        own = with_all_points(bound, settings.cv_count)
     else:
         own = with_needed_points(bound, settings.cv_count)
     lines = center_lines(bound, settings.cv_count)
@@ -346,7 +346,7 @@ def prepare(
         if children is not None and children.method != "none":
             rig = _with_children(rig, children, growing, place)
         strands, found = with_widths(
-            rig.strands, widths, number=_grown_numbers(rig), fineness=_fineness(rig), kept=kept
+            rig.strands, widths, number=_grown_numbers(rig), fineness=_fineness(rig), cache=kept
         )
         rig = replace(rig, strands=strands, widths=found)
     if holds is None:
@@ -354,7 +354,7 @@ def prepare(
     if rig.child_count:
         holds = find_holds(rig.strands, holders, reach)
     assert holds is not None
-    return replace(rig, holds=holds, notes=(*rig.notes, *idle(holds, holders)))
+    return replace(rig, holds=holds, notes=(*rig.notes, *unused_holder_notes(holds, holders)))
 
 
 def _loose_root_notes(distance: float) -> tuple[str, ...]:
@@ -373,7 +373,7 @@ class _ChildContext:
 
     ground: ChildPlacement
     partings: Partings | None
-    kept: Kept
+    kept: ResultCache
     is_animated: bool
 
 
@@ -398,7 +398,7 @@ def _fineness(rig: Rig) -> Floats | None:
 def _lost_length_notes(strands: StrandSet, own: StrandSet) -> tuple[str, ...]:
     """A note on strands that need more points than they may have."""
     kept = own.lengths() / np.maximum(strands.lengths(), np.float32(1.0e-30))
-    lost = 1.0 - kept[kept < 1.0 - LOST]
+    lost = 1.0 - kept[kept < 1.0 - MAX_LENGTH_LOSS]
     if not len(lost):
         return ()
     note = (
@@ -410,7 +410,7 @@ def _lost_length_notes(strands: StrandSet, own: StrandSet) -> tuple[str, ...]:
 
 
 def _hair_length(strands: StrandSet) -> float:
-    return typical(strands.lengths())
+    return typical_length(strands.lengths())
 
 
 def _with_automatic_children(
@@ -425,16 +425,16 @@ def _with_automatic_children(
     Each is as wide as the strands around it, all of which then represent fewer hairs.
     """
     hair = rig.strands.take(_parents(rig.strands))
-    settings, parts = automatic(hair, settings)
+    settings, parts = automatic_settings(hair, settings)
     count, line = hair.strand_count, ""
-    if are_few(hair):
+    if is_too_sparse(hair):
         line = (
             f"Children: none, since {count:,} curves may be guides or a part of the hair. Set "
             "Method to Between Guides to fill the space between them"
         )
     if parts > 1.0 and rig.head is None:
         parts, line = 1.0, "Children: none, since the hair has no surface to grow them on"
-    own, found = with_widths(rig.strands, widths, parts, kept=growing.kept)
+    own, found = with_widths(rig.strands, widths, parts, cache=growing.kept)
     rig = replace(rig, strands=own, widths=found)
     if parts > 1.0:
         with_children = _with_children(rig, settings, growing, place)
@@ -456,7 +456,7 @@ def _weights(
     """Guide weights; held strands follow guides of the same kind, see `Holds.kinds`."""
     group, guide_group = strands.group, guides.group
     if kind is not None and guide_kind is not None:
-        both = grouped(np.append(group, guide_group), np.append(kind, guide_kind))
+        both = split_by_kind(np.append(group, guide_group), np.append(kind, guide_kind))
         group, guide_group = both[: len(kind)], both[len(kind) :]
     return guide_weights(
         strands.roots,
@@ -494,14 +494,14 @@ def _with_children(
         growing.partings,
         ground.masks.of(parents),
         place=place,
-        kept=kept,
+        cache=kept,
     )
     made, chosen = _led_out_of_head(made, ground.head_field(), _hair_length(shapes), kept)
     if growing.is_animated:
-        children = with_own_points(made.strands, cv_count)
+        children = with_all_points(made.strands, cv_count)
     else:
-        children = with_needed_points(made.strands, cv_count, kept=kept)
-    strands = joined(own, children)
+        children = with_needed_points(made.strands, cv_count, cache=kept)
+    strands = join_strands(own, children)
     if len(rig.guides) < own.strand_count:
         # their shapes come from neighbours among all strands, their motion from guides alone
         lines = center_lines(own.take(rig.guides), cv_count)
@@ -526,7 +526,7 @@ def _with_children(
     )
 
 
-def _child_center_lines(children: StrandSet, cv_count: int, kept: Kept) -> StrandSet:
+def _child_center_lines(children: StrandSet, cv_count: int, kept: ResultCache) -> StrandSet:
     """The centre lines of children, which have one point count; widths are dummies."""
 
     def of(some: Ints) -> tuple[Floats]:
@@ -542,7 +542,7 @@ def _child_center_lines(children: StrandSet, cv_count: int, kept: Kept) -> Stran
 
 
 def _led_out_of_head(
-    made: Children, head: DistanceField | None, length: float, kept: Kept
+    made: Children, head: DistanceField | None, length: float, kept: ResultCache
 ) -> tuple[Children, Ints]:
     """Children led out of the head, without those that cannot be, and their indices among all.
 
@@ -553,7 +553,7 @@ def _led_out_of_head(
         return made, np.arange(made.strands.strand_count)
 
     def led_out(some: Ints) -> tuple[Floats, Bools]:
-        led, is_out = led_out_at_rest(made.strands.take(some), head, length)
+        led, is_out = lead_out_at_rest(made.strands.take(some), head, length)
         return led.grid, is_out
 
     grid, is_out = kept.rows("led out", (head, length), (made.strands.grid,), led_out)
@@ -633,7 +633,7 @@ def strand_seeds(rig: Rig) -> Ints:
     if rig.child_count:
         assert strands.root_triangle is not None and strands.root_barycentric is not None
         place = strands.root_barycentric[own:].view(np.uint32)
-        key = named(strands.root_triangle[own:], place[:, 0], place[:, 1])
+        key = key_of(strands.root_triangle[own:], place[:, 0], place[:, 1])
         seeds[own:] = uniform(key, 0) * SEED_LIMIT
     return seeds % SEED_LIMIT
 

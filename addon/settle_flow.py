@@ -18,10 +18,10 @@ from .dynamics.settings import DynamicsSettings
 from .dynamics.settle_settings import SettleSettings
 from .groom.settings import GuideSettings
 from .motion_flow import FrameInput
-from .refine.lead_out_at_rest import led_out_at_rest
+from .refine.lead_out_at_rest import lead_out_at_rest
 from .rig_flow import Pose, Rig
 from .strands import StrandSet
-from .strands.arc_length import along, steps
+from .strands.arc_length import length_fractions, segment_lengths
 from .strands.vectors import unit
 
 #: At most this many curves are simulated; the others ride on them.
@@ -87,9 +87,9 @@ def settled_curves(
         curves: as combed, bound to the head if there is one.
         fallen: (point_count, 3) [m], the rig's strands.
     """
-    length = steps(curves.points, curves.offsets)
-    place = along(curves.points, curves.offsets)
-    known = along(rig.strands.points, rig.strands.offsets)
+    length = segment_lengths(curves.points, curves.offsets)
+    place = length_fractions(curves.points, curves.offsets)
+    known = length_fractions(rig.strands.points, rig.strands.offsets)
     # strand n takes 2 n to 2 n + 1, so that one interpolation serves all strands
     wanted = place + 2.0 * np.repeat(np.arange(curves.strand_count), curves.point_counts)
     there = known + 2.0 * np.repeat(np.arange(curves.strand_count), rig.strands.point_counts)
@@ -103,4 +103,4 @@ def settled_curves(
     settled = replace(curves, points=points.astype(np.float32))
     if head is None:
         return settled, np.ones(curves.strand_count, bool)
-    return led_out_at_rest(settled, head, float(np.median(curves.lengths())))
+    return lead_out_at_rest(settled, head, float(np.median(curves.lengths())))

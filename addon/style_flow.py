@@ -62,7 +62,8 @@ def _with_children_riding(rig: Rig, now: Rig) -> Rig:
 
 
 def carried_to_rest(strands: StrandSet, motions: RootMotions) -> StrandSet:
-    """Strands that follow their roots, brought back to rest; inverse of `groom.roots.follow`."""
+    """Strands that follow their roots, brought back to rest; inverse of
+    `groom.roots.carry_with_roots`."""
     strand = np.repeat(np.arange(strands.strand_count), strands.point_counts)
     turn = motions.turn.transpose(2, 0, 1).astype(np.float64) + np.eye(3)
     shift, origin = (each.T.astype(np.float64) for each in (motions.shift, motions.origin))

@@ -26,7 +26,7 @@ from hairloom.addon.render.snapshot import SKIN
 from hairloom.addon.rig_flow import Rig
 from hairloom.addon.shading.drawn_strands import drawn_radius
 from hairloom.addon.shading.settings import StrandSettings
-from hairloom.addon.strands.arc_length import along
+from hairloom.addon.strands.arc_length import length_fractions
 
 SHEET = Path(__file__).resolve().parents[1] / "out" / "environment_sheet.png"
 SIZE, SAMPLES = 160, 3
@@ -87,7 +87,9 @@ WORLDS: dict[str, Callable[[], np.ndarray]] = {
 def truths(rig: Rig, camera: Any) -> Iterator[tuple[str, str, Any, np.ndarray]]:
     """The name of a world, that of a colour, Blender's world, and Cycles' picture."""
     room, strands = CyclesRoom(), rig.strands
-    drawn = drawn_radius(strands.radius, StrandSettings(), along(strands.points, strands.offsets))
+    drawn = drawn_radius(
+        strands.radius, StrandSettings(), length_fractions(strands.points, strands.offsets)
+    )
     room.strands(strands.points, drawn, counts=strands.point_counts)
     room.body(rig.head.positions, rig.head.triangles, SKIN, casts_shadow=True)
     room.look(camera)

@@ -47,7 +47,7 @@ from hairloom.addon.shading.lights import Light
 from hairloom.addon.shading.marschner.principled import PrincipledHair, settings_from
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
 from hairloom.addon.shading.stage_settings import StageSettings
-from hairloom.addon.strands.arc_length import along
+from hairloom.addon.strands.arc_length import length_fractions
 
 SIZE, SAMPLES = 320, 3
 #: Cycles' pictures of a colour, each with its own seed and denoised; paths per pixel; bounces
@@ -135,7 +135,9 @@ def cycles_figures() -> dict[str, float]:
     rig = rig_of((grown, head.surface), "built-in")
     room, camera = CyclesRoom(), _studio(rig)._camera(1.0)
     strands = rig.strands
-    drawn = drawn_radius(strands.radius, StrandSettings(), along(strands.points, strands.offsets))
+    drawn = drawn_radius(
+        strands.radius, StrandSettings(), length_fractions(strands.points, strands.offsets)
+    )
     room.strands(strands.points, drawn, counts=strands.point_counts)
     room.body(head.surface.positions, head.surface.triangles, SKIN, casts_shadow=True)
     room.look(camera)

@@ -52,10 +52,10 @@ from hairloom.addon.dynamics.measure import length_changes
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.motion_flow import Motion
 from hairloom.addon.params import SettingsMap
-from hairloom.addon.refine.lead_out import NOT_LED, LedOut
+from hairloom.addon.refine.lead_out import NO_LED_OUT, LedOut
 from hairloom.addon.rig_flow import MotionStart, Pose, Rig, SimulatedSolids
 from hairloom.addon.strands import StrandSet, Surface
-from hairloom.addon.strands.arc_length import lengths, steps
+from hairloom.addon.strands.arc_length import segment_lengths, strand_lengths
 from hairloom.addon.strands.closest_point import ClosestPointSearch
 
 REFERENCE = "strands at rest, and the triangles of the head"
@@ -128,7 +128,7 @@ def played(
     assert rig.head is not None
     centre = rig.head.positions.mean(axis=0).astype(np.float64)
     motion = motion_flow.begin(rig, rig.rest_pose)
-    earlier, before, led = None, np.eye(4), NOT_LED
+    earlier, before, led = None, np.eye(4), NO_LED_OUT
     for frame in range(1, round(SECONDS * fps) + 1):
         matrix = shake(frame / fps, centre)
         posed = (PosedCollider(collider, before, matrix, earlier),)
@@ -159,15 +159,15 @@ def shaken(rig: Rig, shake: Any, fps: float) -> dict[str, float]:
     offsets, rest = rig.strands.offsets, rig.strands.points
     were_inside = np.zeros(len(rest), bool)
     were_inside[_inside(rest, np.eye(4), collider, rig.head)[0]] = True
-    segments, rest_lengths = steps(rest, offsets), lengths(rest, offsets)
+    segments, rest_lengths = segment_lengths(rest, offsets), strand_lengths(rest, offsets)
     change, depth, worst = (np.zeros(rig.strands.strand_count) for _ in range(3))
     scale = MEDIAN_LENGTH / np.median(rest_lengths)
     correction, jumped, flips = np.zeros_like(rest), [], np.zeros(3)
-    motion_before, led_before = None, NOT_LED
+    motion_before, led_before = None, NO_LED_OUT
     for motion, matrix, points, led in played(rig, collider, shake, fps):
         assert np.isfinite(points).all()
         np.maximum(change, length_changes(points, offsets, rest_lengths), out=change)
-        off = np.abs(steps(points, offsets) - segments) / np.maximum(segments, 1.0e-5)
+        off = np.abs(segment_lengths(points, offsets) - segments) / np.maximum(segments, 1.0e-5)
         np.maximum(worst, np.maximum.reduceat(off, offsets[:-1]), out=worst)
         deep = np.zeros(len(points))
         index, local = _inside(points, matrix, collider, rig.head)
@@ -277,7 +277,7 @@ def still_and_turned(rig: Rig) -> dict[str, float]:
     guides = rig.guide_grid.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
     now = motion_flow.strands_at(rig, Pose(turned, matrix), guides)
     expected = rig.strands.points @ matrix[:3, :3].T + matrix[:3, 3]
-    length = lengths(rig.strands.points, rig.strands.offsets)
+    length = strand_lengths(rig.strands.points, rig.strands.offsets)
     return {
         "rest_error": float(np.abs(rest - rig.strands.points).max()),
         "rigid_turn_error": float(np.abs(now - expected).max() / np.median(length)),
@@ -289,7 +289,7 @@ def coil_figures(rig: Rig, made_of: StrandSet) -> dict[str, float]:
     assert rig.head is not None
     collider = field_of(rig.head, DynamicsSettings(), place="head")
     points, offsets = list(played(rig, collider, shake_at, FPS))[-1][2], rig.strands.offsets
-    kept = lengths(points, offsets) / lengths(made_of.points, made_of.offsets)
+    kept = strand_lengths(points, offsets) / strand_lengths(made_of.points, made_of.offsets)
     grid = points.reshape(rig.strands.strand_count, -1, 3).astype(np.float64)
     a_turn = grid.shape[1] // TURNS
     middle = slice(4 * a_turn, -4 * a_turn)
@@ -316,10 +316,13 @@ def card_figures(rig: Rig) -> dict[str, float]:
     at_rest = np.zeros(len(mesh.positions))
     at_rest[inside] = search.closest(local).distance
     lines, rows = _middle_lines(mesh, cards), _row_edges(mesh, cards)
-    length, width = lengths(mesh.positions[lines], cards.offsets), _sizes(mesh.positions, rows)
+    length, width = (
+        strand_lengths(mesh.positions[lines], cards.offsets),
+        _sizes(mesh.positions, rows),
+    )
     longer, wider, folded = (np.zeros(len(each)) for each in (length, width, length))
     straight = _folds(mesh.positions, rows, lines)
-    scale = MEDIAN_LENGTH / np.median(lengths(rig.strands.points, rig.strands.offsets))
+    scale = MEDIAN_LENGTH / np.median(strand_lengths(rig.strands.points, rig.strands.offsets))
     owner, motion_start, costs, jumped = card_of_vertex(mesh), None, [], []
     correction = np.zeros_like(mesh.positions)
     for motion, matrix, _, _ in played(rig, collider, shake_at, FPS):

@@ -27,7 +27,7 @@ from hairloom.addon.dynamics.colliders import PosedCollider
 from hairloom.addon.dynamics.neighbours import run_alone
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.motion_flow import FrameInput
-from hairloom.addon.strands.arc_length import lengths
+from hairloom.addon.strands.arc_length import strand_lengths
 
 REFERENCE = "the ring, and lengths at rest"
 AT_MOST = {"tie_escape_mm": 1.0}
@@ -76,7 +76,7 @@ def played(tail: Ponytail, shake, collider, *, compute: bool):
     rig, settings = tail.rig, DynamicsSettings()
     solver = (ComputeSolver if compute else NumpySolver)(rig)
     offsets = rig.strands.offsets
-    rest = lengths(rig.strands.points, offsets)
+    rest = strand_lengths(rig.strands.points, offsets)
     escapes, changes, shown, before = [], [], [], np.eye(4)
     for frame in range(1, round(SECONDS * FPS) + 1):
         matrix = shake(frame / FPS)
@@ -85,7 +85,7 @@ def played(tail: Ponytail, shake, collider, *, compute: bool):
         before, strands = matrix, solver.strands()
         assert np.isfinite(strands).all()
         escapes.append(escape(tail, solver.pose, strands))
-        changes.append(np.abs(lengths(strands, offsets) / rest - 1.0))
+        changes.append(np.abs(strand_lengths(strands, offsets) / rest - 1.0))
         if frame % 4 == 0:
             shown.append((solver.pose, strands))
     gap, change = np.array(escapes), np.array(changes)

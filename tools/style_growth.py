@@ -286,7 +286,7 @@ class Head:
 
     def strands(self, roots: Roots, locks: np.ndarray, group: np.ndarray | None = None) -> Any:
         """Locks as a StrandSet that is bound to the head."""
-        strands = of_addon("groom.grown").bound_strands(
+        strands = of_addon("groom.bound_strands").bound_strands(
             locks, roots.triangle, roots.barycentric, self.surface
         )
         if group is None:

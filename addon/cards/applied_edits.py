@@ -17,7 +17,7 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints, means_by
 from ..strands import Surface
-from ..strands.affine import moved
+from ..strands.affine import transform_points
 from ..strands.closest_point import closest_point
 from ..strands.frames import tangents, volume_normals
 from ..strands.vectors import unit, unit_or
@@ -264,7 +264,7 @@ def _transform_each(points: Floats, moves: Floats) -> Floats:
 def _carried_vertices(edits: CardEdits, before: CardRecord, moves: Floats) -> Floats:
     """The vertices of the kept pieces, (n, 3) float32 [m, world], carried by the skin under the
     roots of their cards; own cards by the skin under the nearest card."""
-    places = moved(edits.surface.positions, edits.matrix)
+    places = transform_points(edits.surface.positions, edits.matrix)
     count = len(edits.card_of_piece)
     if not count:
         return places

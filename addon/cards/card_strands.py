@@ -20,7 +20,7 @@ def card_strands(strands: StrandSet) -> StrandSet:
     """The same strands with one point count, evenly spaced; unchanged if they are so already."""
     if not strands.is_uniform:
         return resample(strands, row_count(strands.point_counts))
-    if strands.uneven_along is None:
+    if strands.uneven_length_fractions is None:
         return strands
     return evenly_spaced(strands, int(strands.point_counts[0]))
 

@@ -20,7 +20,7 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints, means_by
 from ..strands import Surface
-from ..strands.affine import moved
+from ..strands.affine import transform_points
 from ..strands.closest_point import search_of
 from .atlas_grid import AtlasGrid
 from .sort import connected_components
@@ -107,7 +107,7 @@ class CardRecord:
     def moved(self, matrix: Floats) -> CardRecord:
         """The same in another space, by an affine (4, 4) matrix."""
         places, corners = (
-            moved(each.reshape(-1, 3), matrix).reshape(each.shape).astype(np.float32)
+            transform_points(each.reshape(-1, 3), matrix).reshape(each.shape).astype(np.float32)
             for each in (self.places, self.corners)
         )
         return replace(self, places=places, corners=corners)

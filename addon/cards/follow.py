@@ -21,7 +21,7 @@ import numpy as np
 from ..arrays import Floats, Ints, piece_starts
 from ..refine.ride import Riders, ride, turns_along
 from ..strands import StrandSet
-from ..strands.affine import moved
+from ..strands.affine import transform_points
 from ..strands.vectors import dot_rows, unit_rows
 from .card_mesh import CardMesh
 from .contacts import CardClearance, CardContacts
@@ -199,10 +199,10 @@ def moved_mesh(mesh: CardMesh, matrix: Floats) -> CardMesh:
     is_mirrored = np.linalg.det(turn) < 0.0
     linear = np.eye(4)
     linear[:3, :3] = turn
-    normal, tangent = (moved(each, linear).T for each in (mesh.normal, mesh.tangent))
+    normal, tangent = (transform_points(each, linear).T for each in (mesh.normal, mesh.tangent))
     return replace(
         mesh,
-        positions=moved(mesh.positions, matrix),
+        positions=transform_points(mesh.positions, matrix),
         normal=unit_rows(normal).T,
         tangent=unit_rows(tangent).T,
         triangles=mesh.triangles[:, ::-1] if is_mirrored else mesh.triangles,

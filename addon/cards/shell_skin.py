@@ -19,7 +19,7 @@ from ..strands.morton import morton_code
 from ..strands.nearest import nearest_points
 from ..strands.triangles import area_vectors, areas_of, quartered
 from ..strands.vectors import unit
-from ..strands.weld import same_places
+from ..strands.weld import unique_position_indices
 
 #: Distance from a root up to which skin has hair, in distances between roots.
 _REACH = 2.5
@@ -127,7 +127,7 @@ def fine_skin(head: Surface, roots: Floats, spacing: float, triangle_count: int)
         if np.quantile(longest, 0.9) <= edge / _FINER:
             break
         corners, normals = quartered(corners), quartered(normals)
-    number = same_places(corners.reshape(-1, 3).astype(np.float32))
+    number = unique_position_indices(corners.reshape(-1, 3).astype(np.float32))
     _, first = np.unique(number, return_index=True)
     positions, triangles = corners.reshape(-1, 3)[first], number.reshape(-1, 3)
     has_hair = nearest_points(positions, roots, 1)[1][:, 0] <= reach

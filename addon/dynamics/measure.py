@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
-from ..strands.arc_length import lengths
+from ..strands.arc_length import strand_lengths
 from ..strands.vectors import dot_rows
 from .colliders import PosedCollider, transform_points
 from .colliders.signed_distance import signed_distance
@@ -65,7 +65,7 @@ def length_changes(points: Floats, offsets: Ints, rest_lengths: Floats) -> Float
         offsets: (strand_count + 1,), strand s is points[offsets[s]:offsets[s + 1]].
         rest_lengths: (strand_count,) [m]; see SHORTEST.
     """
-    change = np.abs(lengths(points, offsets) - rest_lengths)
+    change = np.abs(strand_lengths(points, offsets) - rest_lengths)
     shortest = SHORTEST * float(np.median(rest_lengths)) if len(rest_lengths) else 0.0
     return np.asarray(change / np.maximum(rest_lengths, max(shortest, float(TINY))))
 

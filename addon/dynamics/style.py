@@ -37,7 +37,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from ..arrays import Floats, Ints
-from ..params.curve import along as curve_along
+from ..params.curve import sample_curve as curve_along
 from ..strands.vectors import cross_rows, dot_rows
 from .banded import SharedBand
 from .constraints import PINNED, TINY, less_next, unit

@@ -25,12 +25,14 @@ _SHORTER, _STRAY, _WAVE = 0.06, 0.01, 0.4
 _SCATTER = 1.0
 
 
-def are_few(own: StrandSet) -> bool:
+def is_too_sparse(own: StrandSet) -> bool:
     """Whether the strands are too few to tell what they are, and to cover the body."""
     return own.strand_count < _MIN_STRANDS and strands_for_cover(own) > 1.0
 
 
-def automatic(own: StrandSet, settings: ChildrenSettings) -> tuple[ChildrenSettings, float]:
+def automatic_settings(
+    own: StrandSet, settings: ChildrenSettings
+) -> tuple[ChildrenSettings, float]:
     """Settings with the number and shape of children found from the artist's own strands; and how
     many strands are drawn for each of these: 1 where they are enough, or too few to tell.
     """

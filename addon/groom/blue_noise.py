@@ -23,9 +23,9 @@ import numpy as np
 
 from ..arrays import Floats, Ints, number_in_piece
 from ..errors import HairloomError
-from ..strands.side_by_side import even_parts, side_by_side
-from .counter_random import named, uniform
-from .dart_throwing import SampleCells, Samples, first_come
+from ..strands.parallel import even_slices, parallel_map
+from .counter_random import key_of, uniform
+from .dart_throwing import SampleCells, Samples, accepted_samples
 from .triangle_subdivision import Pieces
 
 #: Roots of the first level, and the factor by which each level has more than the one before.
@@ -65,7 +65,7 @@ def spread_roots(pieces: Pieces, count: int, seed: int, whole: Pieces | None = N
         level += 1
     batch = 0
     while len(roots) < count:
-        plain = target.samples(_PLAIN / target.part, named(seed, 1, 0, batch))
+        plain = target.samples(_PLAIN / target.part, key_of(seed, 1, 0, batch))
         roots = roots.and_also(_shuffled(plain))
         batch += 1
     return roots.take(np.arange(count))
@@ -120,18 +120,18 @@ class _Target:
         1).
         """
         least = int(_OF_THREAD * len(self.mass) / max(count * self.part, 1.0)) + 1
-        parts = even_parts(len(self.mass), least)
-        found = side_by_side(lambda some: self._samples(count, stream, some), parts)
+        parts = even_slices(len(self.mass), least)
+        found = parallel_map(lambda some: self._samples(count, stream, some), parts)
         return functools.reduce(Samples.and_also, found)
 
     def _samples(self, count: float, stream: Ints, some: slice) -> Samples:
         """`samples` on some of the pieces."""
-        piece_key = named(self.key[some], stream)
+        piece_key = key_of(self.key[some], stream)
         wanted = self.mass[some] * (count / self.whole_mass)
         counts = np.floor(wanted + uniform(piece_key, 0)).astype(np.int64)
         piece = np.repeat(np.arange(len(counts)), counts)
         number = number_in_piece(counts)
-        key = named(piece_key[piece], 1 + number)
+        key = key_of(piece_key[piece], 1 + number)
         piece += some.start
         density = self.density.take(piece, axis=0)
         reached = np.cumsum(density, axis=1)
@@ -166,10 +166,10 @@ def _filled(
         if len(roots) >= count:
             return roots, False
         dart_count = _SAMPLES * wanted / _BATCHES
-        samples = target.samples(dart_count, named(seed, 0, level, batch))
+        samples = target.samples(dart_count, key_of(seed, 0, level, batch))
         samples = samples.take(~old.covers(samples))
         new = SampleCells(roots.take(np.arange(before, len(roots))), radius)
         samples = _shuffled(samples.take(~new.covers(samples)))
-        roots = roots.and_also(samples.take(first_come(samples, radius)))
+        roots = roots.and_also(samples.take(accepted_samples(samples, radius)))
     here = wanted * target.part
     return roots, here >= _FIRST_SURE and len(roots) - before < _FULL * here

@@ -15,11 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
-from ..params.curve import along
-from ..strands.kept import NOTHING_KEPT, Kept
+from ..params.curve import sample_curve
+from ..strands.result_cache import NO_CACHE, ResultCache
 from .children_settings import ChildrenSettings
 from .partings import Partings
-from .weights import by_group, directions, likeness, nearest_before
+from .weights import by_group, directions, likeness, nearest_on_same_side
 
 #: Children of the first level.
 _FIRST_LEVEL = 4096
@@ -83,7 +83,9 @@ class Clumps:
         for own, others in by_group(group, near_group):
             if not len(others):
                 continue
-            found, _, crossed = nearest_before(partings, root[own], near_root[others], 1, root[own])
+            found, _, crossed = nearest_on_same_side(
+                partings, root[own], near_root[others], 1, root[own]
+            )
             beside = near[others[found[:, 0]]]
             joins = np.ones(len(own), bool) if crossed is None else ~crossed[:, 0]
             middle[own[joins]] = self.middle[beside[joins]]
@@ -93,13 +95,13 @@ class Clumps:
         )
 
 
-def clump(
+def clump_children(
     grid: Floats,
     group: Ints,
     settings: ChildrenSettings,
     painted: Floats,
     partings: Partings | None = None,
-    kept: Kept = NOTHING_KEPT,
+    cache: ResultCache = NO_CACHE,
 ) -> Clumps:
     """Draw the children of each clump towards its middle, in place; roots stay.
 
@@ -108,7 +110,7 @@ def clump(
         group: (child_count,).
         painted: (child_count,) factor on the setting.
         partings: no clump has strands on both sides of these.
-        kept: results of the last call.
+        cache: results of the last call.
     """
     clumps = Clumps(np.arange(len(grid)), np.zeros(len(grid)))
     if not settings.clump or settings.clump_size == 1:
@@ -125,7 +127,7 @@ def clump(
                 middle_count,
                 settings.parting,
                 partings,
-                kept,
+                cache,
                 f"middles from {first}",
             )
             clumps.middle[member], clumps.strength[member] = middle, strength
@@ -133,10 +135,10 @@ def clump(
     return clumps
 
 
-def clump_again(
+def clump_as_before(
     grid: Floats, number: Ints, clumps: Clumps, settings: ChildrenSettings, painted: Floats
 ) -> None:
-    """`clump` for some of the children, in place, with the middles that they had.
+    """`clump_children` for some of the children, in place, with the middles that they had.
 
     Args:
         grid: (n, cv_count, 3) float32 [m]. number: (n,) ascending, the indices of these children,
@@ -162,7 +164,7 @@ def _levels(count: int) -> Iterator[tuple[int, int]]:
 
 def _fraction(settings: ChildrenSettings, cv_count: int) -> Floats:
     """How far CVs are drawn, (cv_count,)."""
-    fraction = settings.clump * along(settings.clump_along, np.linspace(0.0, 1.0, cv_count))
+    fraction = settings.clump * sample_curve(settings.clump_along, np.linspace(0.0, 1.0, cv_count))
     fraction[0] = 0.0
     return fraction
 
@@ -183,19 +185,19 @@ def _middles(
     middle_count: int,
     parting: float,
     partings: Partings | None,
-    kept: Kept,
+    cache: ResultCache,
     level: str,
 ) -> tuple[Ints, Floats]:
     """The middle of each member's clump (n,), and how far it draws the member, 0 to 1."""
     root = grid[:, 0]
-    reach = _REACH * _apart(root[:middle_count], kept, f"{level}, apart")
+    reach = _REACH * _apart(root[:middle_count], cache, f"{level}, apart")
     near = np.zeros((len(member), _CANDIDATES), np.int64)
     gap = np.full(near.shape, np.inf)  # where there are fewer
     for of_group, middles in by_group(group[member], group[:middle_count]):
         if not len(middles):
             continue
         name = f"{level}, group {group[middles[0]]}"
-        found, away = kept.nearest(name, root[member[of_group]], root[middles], _CANDIDATES)
+        found, away = cache.nearest(name, root[member[of_group]], root[middles], _CANDIDATES)
         near[of_group, : found.shape[1]], gap[of_group, : found.shape[1]] = middles[found], away
     member_direction = directions(grid[member], root[member])
     middle_direction = directions(grid[:middle_count], root[:middle_count])
@@ -208,9 +210,9 @@ def _middles(
     return middle, np.take_along_axis(alike, best, axis=1)[:, 0]
 
 
-def _apart(root: Floats, kept: Kept, name: str) -> float:
+def _apart(root: Floats, cache: ResultCache, name: str) -> float:
     """Typical distance from one root to the next [m]; infinite for a single one."""
     if len(root) < 2:
         return np.inf
-    _, gap = kept.nearest(name, root, root, 2)
+    _, gap = cache.nearest(name, root, root, 2)
     return float(np.median(gap[:, 1]))

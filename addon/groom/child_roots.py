@@ -11,9 +11,9 @@ from ..arrays import Bools, Floats, Ints
 from ..strands import StrandSet, Surface
 from ..strands.nearest import nearest_points
 from .blue_noise import require_area, spread_roots
-from .counter_random import named
+from .bound_strands import checked_weights
+from .counter_random import key_of
 from .dart_throwing import Samples
-from .grown import checked_weights
 from .triangle_subdivision import Pieces
 
 #: Maximum distance of a root from its nearest guide where guides surround it, in guide spacings.
@@ -85,7 +85,7 @@ def child_roots(
     density = checked_weights(density, surface, "density")
     guided = _Guided.by(guides, surface, is_painted=density is not None)
     where = guided.place, guided.normal, guided.spacing
-    return surface.latest(_roots_among, *where, density, count, seed)
+    return surface.compute_if_changed(_roots_among, *where, density, count, seed)
 
 
 def _roots_among(
@@ -102,7 +102,7 @@ def _roots_among(
     mass = Pieces.of(surface, density).mass
     require_area(mass)
     is_wanted = _where_wanted(surface, density, place)
-    pieces, is_near = surface.latest(_near_guides, *guided.arguments, is_wanted)
+    pieces, is_near = surface.compute_if_changed(_near_guides, *guided.arguments, is_wanted)
     mass_near = float(pieces.with_density(surface, density).mass[is_near].sum())
     # evenly spread roots that it takes for each one that is kept
     even = _peak(density) * float(pieces.area.sum()) / max(mass_near, 1e-300)
@@ -129,7 +129,7 @@ def _where_wanted(surface: Surface, density: Floats | None, place: Floats) -> Bo
     grows = (density[surface.triangles] > 0.0).any(axis=1)
     size = max(float(np.linalg.norm(np.ptp(place, axis=0))) / _CELLS, 1e-6)
     cell = np.floor(surface.corners.mean(axis=1) / size).astype(np.int64)
-    _, number = np.unique(named(cell[:, 0], cell[:, 1], cell[:, 2]), return_inverse=True)
+    _, number = np.unique(key_of(cell[:, 0], cell[:, 1], cell[:, 2]), return_inverse=True)
     is_wanted: Bools = np.bincount(number, grows)[number] > 0.0
     return is_wanted
 
@@ -155,7 +155,7 @@ class _Guided:
         assert triangle is not None and barycentric is not None
         root = np.einsum("nk,nkj->nj", barycentric, surface.corners[triangle].astype(np.float64))
         place, first = np.unique(root, axis=0, return_index=True)
-        normal = surface.once(Surface.triangle_normals)[triangle[first]]
+        normal = surface.compute_once(Surface.triangle_normals)[triangle[first]]
         if len(place) == 1:
             tuft = _TUFT * float(guides.lengths().mean())
             return cls(place, normal, np.array([max(tuft, 1e-6)]), is_painted)
@@ -242,7 +242,9 @@ def _spread(
     """
     most = _TRIES * max(count, 1000)
     while True:
-        roots, number = surface.latest(_even_roots, *guided.arguments, is_wanted, tried, seed)
+        roots, number = surface.compute_if_changed(
+            _even_roots, *guided.arguments, is_wanted, tried, seed
+        )
         if density is not None:
             weights = density[surface.triangles[roots.triangle]] / _peak(density)
             of_root = np.einsum("nk,nk->n", roots.barycentric, weights)
@@ -272,7 +274,7 @@ def _even_roots(
     triangles of the whole surface; and their numbers among those tried, (n,).
     """
     guided = _Guided(place, normal, spacing, is_painted)
-    pieces, _ = surface.latest(_near_guides, *guided.arguments, is_wanted)
+    pieces, _ = surface.compute_if_changed(_near_guides, *guided.arguments, is_wanted)
     if not len(pieces):
         return Samples.none(), np.zeros(0, np.int64)
     roots = spread_roots(pieces, tried, seed, Pieces.of(surface, None))

@@ -7,13 +7,13 @@ import math
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
-from ..params.curve import along
-from ..strands.arc_length import first_as_far
-from ..strands.catmull_rom import even_places, evenly_on_curve, on_curve
+from ..params.curve import sample_curve
+from ..strands.arc_length import first_point_at_arc_length
+from ..strands.catmull_rom import even_parameters, even_points_on_curve, points_on_curve
 from ..strands.frames import tangents, transported_normals
 from ..strands.vectors import dot, unit
 from .children_settings import ChildrenSettings
-from .counter_random import named, uniform
+from .counter_random import key_of, uniform
 from .weights import GuideWeights
 
 _TURN = 2.0 * np.pi
@@ -36,7 +36,7 @@ _CALM, _WILD, _STRAY_TURNS = 0.2, 0.55, 0.8
 _POINTS_PER_TURN, _FEWEST_PER_TURN = 24, 6
 
 
-def mixed(root: Floats, guide_grid: Floats, weights: GuideWeights) -> Floats:
+def mix_guides(root: Floats, guide_grid: Floats, weights: GuideWeights) -> Floats:
     """root + sum over k of w_k (guide_k - root of guide_k), (child_count, cv_count, 3) float32.
 
     Three-guide interpolation of rest shapes (Nguyen and Donnelly 2005, GPU Gems 2, chapter 23),
@@ -57,7 +57,7 @@ def mixed(root: Floats, guide_grid: Floats, weights: GuideWeights) -> Floats:
     return grid.reshape(len(grid), cv_count, 3)
 
 
-def babies(key: Ints, settings: ChildrenSettings, border: Floats) -> Bools:
+def are_baby_hair(key: Ints, settings: ChildrenSettings, border: Floats) -> Bools:
     """Which children are baby hair, (child_count,); raising the setting only adds to them.
 
     Args:
@@ -76,7 +76,7 @@ def shorten(
         grid: (child_count, cv_count, 3) float32 [m].
         key: (child_count,) of their random numbers.
         painted: (child_count,) factor on lengths.
-        is_baby: (child_count,) see `babies`.
+        is_baby: (child_count,) see `are_baby_hair`.
     """
     whole = settings.length * painted
     if not settings.length_variation and (whole >= 1.0).all() and not is_baby.any():
@@ -91,19 +91,19 @@ def shorten(
 
 def _cut(grid: Floats, kept: Floats) -> Floats:
     """Strands (n, cv_count, 3) cut to this fraction of their length, (n,)."""
-    reached = arc_length(grid)
+    reached = grid_arc_lengths(grid)
     wanted = reached * kept[:, None]
     offsets = np.arange(len(grid) + 1) * grid.shape[1]
-    right = first_as_far(reached.ravel(), offsets, wanted)
+    right = first_point_at_arc_length(reached.ravel(), offsets, wanted)
     left = np.maximum(right - 1, offsets[:-1, None])
     before = reached.take(left)
     span = reached.take(left + 1) - before
     inside = np.divide(wanted - before, span, out=np.zeros_like(span), where=span > 0.0)
     left -= offsets[:-1, None]
-    return on_curve(grid, left, np.clip(inside, 0.0, 1.0).astype(np.float32))
+    return points_on_curve(grid, left, np.clip(inside, 0.0, 1.0).astype(np.float32))
 
 
-def frizz(
+def add_frizz(
     grid: Floats, key: Ints, settings: ChildrenSettings, size: float, painted: Floats
 ) -> None:
     """Let each strand stray from its path in waves, in place; roots stay.
@@ -119,13 +119,15 @@ def frizz(
     """
     if not settings.frizz:
         return
-    own = uniform(named(key[:, None], np.arange(8)), _WAVES).reshape(-1, 2, 4)
-    strayed = settings.frizz * along(settings.frizz_along, np.linspace(0.0, 1.0, grid.shape[1]))
+    own = uniform(key_of(key[:, None], np.arange(8)), _WAVES).reshape(-1, 2, 4)
+    strayed = settings.frizz * sample_curve(
+        settings.frizz_along, np.linspace(0.0, 1.0, grid.shape[1])
+    )
     strayed *= size
     strayed[0] = 0.0
     for start in range(0, len(grid), _CHUNK):
         chunk = slice(start, start + _CHUNK)
-        reached = arc_length(grid[chunk])
+        reached = grid_arc_lengths(grid[chunk])
         shortest = _SEGMENTS_PER_WAVE / (grid.shape[1] - 1) * reached[:, -1:]
         wave_length = np.maximum(settings.frizz_length * size, shortest)
         turns = np.divide(reached, wave_length, out=np.zeros_like(reached), where=wave_length > 0.0)
@@ -137,7 +139,7 @@ def frizz(
                 grid[chunk, :, axis] += swing * part[:, None]
 
 
-def stray(
+def add_fly_aways(
     grid: Floats, key: Ints, settings: ChildrenSettings, painted: Floats, is_baby: Bools
 ) -> None:
     """Let fly-aways wander off their path, in place, and all baby hair like the calmest of them;
@@ -150,7 +152,7 @@ def stray(
         grid: (child_count, cv_count, 3) float32 [m].
         key: (child_count,) of their random numbers.
         painted: (child_count,) factor on the fraction of fly-aways.
-        is_baby: (child_count,) see `babies`.
+        is_baby: (child_count,) see `are_baby_hair`.
     """
     if not settings.fly_aways and not is_baby.any():
         return
@@ -158,7 +160,7 @@ def stray(
     along = np.linspace(0.0, 1.0, grid.shape[1])[1:, None]
     for start in range(0, len(strayed), _CHUNK):
         chunk = strayed[start : start + _CHUNK]
-        own = uniform(named(key[chunk, None], np.arange(6)), _STRAY_WAVES)
+        own = uniform(key_of(key[chunk, None], np.arange(6)), _STRAY_WAVES)
         step = np.diff(grid[chunk].astype(np.float64), axis=1)
         size = np.linalg.norm(step, axis=2, keepdims=True)
         swing = np.sin(_TURN * (_STRAY_TURNS * along + own[:, None, 5:6]))
@@ -184,7 +186,7 @@ def curl_points(longest: float, settings: ChildrenSettings, size: float) -> int:
     return _POINTS_PER_TURN * math.ceil(turns) + 1
 
 
-def curled(
+def curl_strands(
     grid: Floats, lock: Ints, settings: ChildrenSettings, size: float, count: int, painted: Floats
 ) -> Floats:
     """Strands that wind around their paths as helices, of `count` points each; roots stay.
@@ -201,20 +203,20 @@ def curled(
         painted: (child_count,) factor on the radius.
     """
     result = np.empty((len(grid), count, 3), np.float32)
-    radius = settings.curl * size * along(settings.curl_along, np.linspace(0.0, 1.0, count))
+    radius = settings.curl * size * sample_curve(settings.curl_along, np.linspace(0.0, 1.0, count))
     radius[0] = 0.0
-    left, part = even_places(grid.shape[1], count)
-    random = uniform(named(lock[:, None], np.arange(2)), _CURLS)
+    left, part = even_parameters(grid.shape[1], count)
+    random = uniform(key_of(lock[:, None], np.arange(2)), _CURLS)
     for start in range(0, len(grid), _CHUNK):
         chunk = slice(start, start + _CHUNK)
         coarse = transported_normals(
             tangents(grid[chunk]), _on_sphere(*random[chunk].T).astype(np.float32)
         )
-        path = evenly_on_curve(grid[chunk], count)
+        path = even_points_on_curve(grid[chunk], count)
         normal = coarse[:, left] + part[:, None] * (coarse[:, left + 1] - coarse[:, left])
         tangent = tangents(path)
         across: Floats = unit(normal - tangent * dot(normal, tangent)[..., None])
-        reached = arc_length(path)
+        reached = grid_arc_lengths(path)
         shortest = _FEWEST_PER_TURN / (count - 1) * reached[:, -1:]
         turn = np.maximum(settings.curl_length * size, shortest)
         angle = _TURN * np.divide(reached, turn, out=np.zeros_like(reached), where=turn > 0.0)
@@ -226,7 +228,7 @@ def curled(
     return result
 
 
-def arc_length(grid: Floats) -> Floats:
+def grid_arc_lengths(grid: Floats) -> Floats:
     """Arc length from the root to each CV, (n, cv_count) [m]."""
     reached = np.zeros(grid.shape[:2])
     step = np.diff(grid, axis=1)

@@ -17,20 +17,28 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints
 from ..errors import HairloomError
 from ..strands import StrandSet, Surface
-from ..strands.arc_length import typical
-from ..strands.catmull_rom import even_places
-from ..strands.kept import NOTHING_KEPT, Kept
+from ..strands.arc_length import typical_length
+from ..strands.catmull_rom import even_parameters
 from ..strands.nearest import nearest_points
 from ..strands.needed_points import MAX_POINTS
-from .child_clumps import Clumps, clump, clump_again
+from ..strands.result_cache import NO_CACHE, ResultCache
+from .child_clumps import Clumps, clump_as_before, clump_children
 from .child_roots import ChildRoots, child_roots
-from .child_shape import babies, curl_points, curled, frizz, mixed, shorten, stray
+from .child_shape import (
+    add_fly_aways,
+    add_frizz,
+    are_baby_hair,
+    curl_points,
+    curl_strands,
+    mix_guides,
+    shorten,
+)
 from .children_settings import ChildrenSettings
-from .counter_random import named, normal
+from .counter_random import key_of, normal
 from .hairline import nearness_to_border
 from .masks import NO_MASKS, Factors, Masks, Places
 from .partings import Partings
-from .weights import GUIDES_PER_STRAND, GuideWeights, child_weights, nearest_before
+from .weights import GUIDES_PER_STRAND, GuideWeights, child_weights, nearest_on_same_side
 
 #: Maximum points of all children together, and minimum points of each.
 CHILD_POINTS, FEWEST_CHILD_POINTS = 12_000_000, 16
@@ -91,13 +99,13 @@ class Growth:
             grid: (n, guides' cv_count, 3) float32 [m], clumped, which is changed. chosen: (n,).
         """
         key, settings, factors = self.key[chosen], self.settings, self.factors.take(chosen)
-        is_baby = babies(key, settings, self.border[chosen])
+        is_baby = are_baby_hair(key, settings, self.border[chosen])
         shorten(grid, key, settings, factors["length"], is_baby)
-        stray(grid, key, settings, factors["fly_aways"], is_baby)
+        add_fly_aways(grid, key, settings, factors["fly_aways"], is_baby)
         if settings.curl:
             lock = self.key[self.clumps.outermost()[chosen]]
-            grid = curled(grid, lock, settings, self.size, self.cv_count, factors["curl"])
-        frizz(grid, key, settings, self.size, factors["frizz"])
+            grid = curl_strands(grid, lock, settings, self.size, self.cv_count, factors["curl"])
+        add_frizz(grid, key, settings, self.size, factors["frizz"])
         return grid
 
     @property
@@ -109,7 +117,7 @@ class Growth:
     @property
     def is_baby(self) -> Bools:
         """Which children are baby hair, (child_count,)."""
-        return babies(self.key, self.settings, self.border)
+        return are_baby_hair(self.key, self.settings, self.border)
 
     def touched(self, guides: Bools) -> Bools:
         """Children (child_count,) whose shapes depend on these guides (guide_count,)."""
@@ -126,8 +134,8 @@ class Growth:
         """
         number = self.clumps.with_middles(chosen)
         weights = GuideWeights(self.weights.guide[number], self.weights.weight[number])
-        grid = mixed(self.root[number], guide_grid, weights)
-        clump_again(grid, number, self.clumps, self.settings, self.factors["clump"][number])
+        grid = mix_guides(self.root[number], guide_grid, weights)
+        clump_as_before(grid, number, self.clumps, self.settings, self.factors["clump"][number])
         return self.varied(grid[np.searchsorted(number, chosen)], chosen)
 
     def with_more(
@@ -140,7 +148,7 @@ class Growth:
             guides: the ones that the children grow between.
             beside: indices of the children that may be their neighbours in clumps.
         """
-        weights = _weights(roots, guides, self.settings, self.partings, self.masks, NOTHING_KEPT)
+        weights = _weights(roots, guides, self.settings, self.partings, self.masks, NO_CACHE)
         more = self.clumps.joined(
             roots.point,
             guides.group[weights.guide[:, 0]],
@@ -172,7 +180,7 @@ def make_children(
     masks: Masks = NO_MASKS,
     *,
     place: str,
-    kept: Kept = NOTHING_KEPT,
+    cache: ResultCache = NO_CACHE,
 ) -> Children:
     """Strands between guides or around them, at rest; none mixes guides of two groups, or across a
     parting.
@@ -184,7 +192,7 @@ def make_children(
         partings: lines that the artist has drawn; None: there are none.
         masks: what the artist has painted; masks of strands are those of the guides.
         place: names the groom in error messages.
-        kept: results of the last call.
+        cache: results of the last call.
 
     Raises:
         HairloomError: there are no guides, the surface has no area on which hair may grow, or the
@@ -195,15 +203,15 @@ def make_children(
             "it has no guides to grow children from", place=place, remedy="Draw some strands"
         )
     roots = child_roots(guides, surface, settings.strand_count, density, settings.seed)
-    weights = _weights(roots, guides, settings, partings, masks, kept)
+    weights = _weights(roots, guides, settings, partings, masks, cache)
     group = guides.group[weights.guide[:, 0]]
-    grid = mixed(roots.point, guides.grid, weights)
+    grid = mix_guides(roots.point, guides.grid, weights)
     factors = masks.at(_places(roots, weights))
-    clumps = clump(grid, group, settings, factors["clump"], partings, kept)
-    size = typical(guides.lengths())
+    clumps = clump_children(grid, group, settings, factors["clump"], partings, cache)
+    size = typical_length(guides.lengths())
     needed = max(curl_points(float(guides.lengths().max()), settings, size), grid.shape[1])
     cv_count = max(min(needed, _room(settings)), grid.shape[1])
-    guide_border = nearness_to_border(guides.roots, guides.roots, kept, "border")
+    guide_border = nearness_to_border(guides.roots, guides.roots, cache, "border")
     growth = Growth(
         roots.point,
         roots.key,
@@ -224,7 +232,7 @@ def make_children(
 
     fixed = replace(settings, strand_count=ChildrenSettings().strand_count), size, cv_count
     lock = roots.key[clumps.outermost()] if settings.curl else roots.key
-    (shaped,) = kept.rows(
+    (shaped,) = cache.rows(
         "varied", fixed, (grid, roots.key, lock, growth.border, *factors.rows(_SHAPING)), varied
     )
     strands = StrandSet(
@@ -252,7 +260,7 @@ def _by_points(values: Floats, count: int) -> Floats:
     """Values of CVs (n, cv_count, ...) at `count` points, spaced evenly from first to last CV."""
     if values.shape[1] == count:
         return values
-    left, part = even_places(values.shape[1], count)
+    left, part = even_parameters(values.shape[1], count)
     part = part.reshape(-1, *(1 for _ in values.shape[2:]))
     found: Floats = values[:, left] * (1.0 - part) + values[:, left + 1] * part
     return found
@@ -264,7 +272,7 @@ def _weights(
     settings: ChildrenSettings,
     partings: Partings | None,
     masks: Masks,
-    kept: Kept,
+    cache: ResultCache,
 ) -> GuideWeights:
     if settings.method != "single":
         place = _scattered(roots, guides.roots, settings, masks)
@@ -276,9 +284,9 @@ def _weights(
             settings.parting,
             partings,
             roots.point,
-            kept,
+            cache,
         )
-    nearest, _, _ = nearest_before(partings, roots.point, guides.roots, 1, roots.point)
+    nearest, _, _ = nearest_on_same_side(partings, roots.point, guides.roots, 1, roots.point)
     weight = np.zeros((len(nearest), GUIDES_PER_STRAND), np.float32)
     weight[:, 0] = 1.0
     return GuideWeights(np.repeat(nearest, GUIDES_PER_STRAND, axis=1).astype(np.int32), weight)
@@ -296,7 +304,7 @@ def _scattered(
         return roots.point
     _, gap = nearest_points(guide_root, guide_root, min(_NEIGHBOUR + 1, len(guide_root)))
     reach = np.float32(settings.scatter * float(np.median(gap[:, -1])))
-    away = reach * normal(named(roots.key[:, None], np.arange(3)), _PLACE)
+    away = reach * normal(key_of(roots.key[:, None], np.arange(3)), _PLACE)
     mask = masks.masks.get("scatter")
     if mask is not None:
         nearest, _ = nearest_points(roots.point, guide_root, 1)

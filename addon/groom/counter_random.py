@@ -16,10 +16,10 @@ _STEP = np.uint64(0x9E3779B97F4A7C15)
 _FIRST, _SECOND = np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)
 
 
-def named(*parts: Ints | int) -> Ints:
+def key_of(*parts: Ints | int) -> Ints:
     """A uint64 key (...) for these whole numbers together, which are broadcast.
 
-    `named(named(a, b), c)` is `named(a, b, c)`.
+    `key_of(key_of(a, b), c)` is `key_of(a, b, c)`.
     """
     key: Ints = np.asarray(parts[0]).astype(np.uint64)
     for part in parts[1:]:
@@ -29,7 +29,7 @@ def named(*parts: Ints | int) -> Ints:
 
 def uniform(key: Ints, stream: int) -> Floats:
     """A uniform number in [0, 1) for each key (...); streams give independent numbers."""
-    found: Floats = (_mixed(_mixed(named(key, stream))) >> np.uint64(11)) * 2.0**-53
+    found: Floats = (_mixed(_mixed(key_of(key, stream))) >> np.uint64(11)) * 2.0**-53
     return found
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
-from ..strands.side_by_side import even_parts, side_by_side
+from ..strands.parallel import even_slices, parallel_map
 from ..strands.vectors import dot_rows
 
 #: A thread gets at least this many darts.
@@ -88,11 +88,11 @@ class SampleCells:
 
     def covers(self, samples: Samples) -> Bools:
         """Whether any of the points lies too near to each of these darts, (n,)."""
-        parts = even_parts(len(samples), _OF_THREAD)
+        parts = even_slices(len(samples), _OF_THREAD)
         if len(parts) == 1:
             return self._covers(samples)
         rows = np.arange(len(samples))
-        found = side_by_side(lambda some: self._covers(samples.take(rows[some])), parts)
+        found = parallel_map(lambda some: self._covers(samples.take(rows[some])), parts)
         return np.concatenate(found)
 
     def _covers(self, samples: Samples) -> Bools:
@@ -151,7 +151,7 @@ class SampleCells:
         return (mixed ^ (mixed >> 17)) & self._mask
 
 
-def first_come(samples: Samples, radius: float) -> Bools:
+def accepted_samples(samples: Samples, radius: float) -> Bools:
     """Which darts stay, (n,): those that are not too near to an earlier one that stays."""
     later, earlier = SampleCells(samples, radius).pairs()
     stays = np.zeros(len(samples), bool)

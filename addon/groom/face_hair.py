@@ -14,10 +14,10 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..strands import StrandSet, Surface
 from ..strands.face import BROWS, LASHES
-from ..strands.join import joined
+from ..strands.join import join_strands
 from ..strands.vectors import unit
+from .bound_strands import bound_strands
 from .grow import grow
-from .grown import bound_strands
 from .scalp import sample_roots
 from .settings import GrowSettings
 
@@ -64,7 +64,7 @@ def grow_with_face(
         lash_count=min(full.lash_count, count // 10),
         seed=settings.seed,
     )
-    return joined(hair, grow_face_hair(surface, weights["brows"], weights["lashes"], face))
+    return join_strands(hair, grow_face_hair(surface, weights["brows"], weights["lashes"], face))
 
 
 def grow_face_hair(
@@ -75,7 +75,7 @@ def grow_face_hair(
     See `grow_brows` and `grow_lashes`.
     """
     hair = hair or FaceHair()
-    return joined(grow_brows(surface, brows, hair), grow_lashes(surface, lashes, hair))
+    return join_strands(grow_brows(surface, brows, hair), grow_lashes(surface, lashes, hair))
 
 
 def grow_brows(surface: Surface, density: Floats, hair: FaceHair) -> StrandSet:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..strands import StrandSet, Surface
-from ..strands.arc_length import steps
+from ..strands.arc_length import segment_lengths
 from ..strands.closest_point import ClosestPoints, ClosestPointSearch
 from ..strands.vectors import unit
 
@@ -29,11 +29,11 @@ class FittedHair:
     away: Floats
 
 
-def fitted_hair(
+def fit_hair(
     strands: StrandSet,
     roots: Floats,
     warp: Callable[[Floats], Floats],
-    outside: OuterSearch,
+    outside: OuterSkinSearch,
     scale: float,
 ) -> FittedHair:
     """Hair with its roots on the other head, which follows the smooth warp beyond them.
@@ -48,7 +48,7 @@ def fitted_hair(
     found = outside.closest(roots)
     offsets, counts = strands.offsets, strands.point_counts
     points = warp(strands.points)
-    reached = np.cumsum(steps(strands.points, offsets), dtype=np.float64)
+    reached = np.cumsum(segment_lengths(strands.points, offsets), dtype=np.float64)
     reached -= np.repeat(reached[offsets[:-1]], counts)
     moved = np.repeat(found.point - points[offsets[:-1]], counts, axis=0)
     points += moved * np.exp(-((reached / _FADE) ** 2))[:, None]
@@ -67,7 +67,7 @@ def fitted_hair(
     return FittedHair(fitted, found.distance)
 
 
-class OuterSearch:
+class OuterSkinSearch:
     """Finds closest points on the outer skin of a head, without inner parts: sockets, the mouth,
     the inner side of a shell."""
 

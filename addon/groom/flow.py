@@ -13,7 +13,7 @@ import numpy as np
 
 from ..arrays import Bools, Floats
 from ..strands import StrandSet, Surface
-from ..strands.arc_length import steps
+from ..strands.arc_length import segment_lengths
 from ..strands.closest_point import search_of
 from ..strands.nearest import nearest_points
 from ..strands.vectors import dot, unit, unit_or
@@ -97,7 +97,7 @@ class Flow:
         return fading
 
 
-def combed_along(
+def comb_along_strokes(
     strands: StrandSet, lines: tuple[Floats, ...], surface: Surface, settings: FlowSettings
 ) -> Floats:
     """Points of strands that follow strokes, (point_count, 3) float32 [m]; strands out of reach
@@ -110,7 +110,7 @@ def combed_along(
     strokes = tuple(_Stroke.of(line, surface, _STEP * reach) for line in lines)
     flow = Flow(strokes, surface, reach, settings)
     points, first = strands.points.astype(np.float64), strands.offsets[:-1]
-    size = steps(strands.points, strands.offsets)
+    size = segment_lengths(strands.points, strands.offsets)
     own = unit(np.diff(points, axis=0, prepend=points[:1]))
     _, pull, length = flow.at(points[first])
     was = np.maximum(strands.lengths().astype(np.float64), 1e-30)

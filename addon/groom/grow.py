@@ -19,12 +19,12 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..strands import StrandSet, Surface
 from ..strands.vectors import unit
+from .bound_strands import bound_strands, checked_weights, interpolate_weights, segment_fractions
 from .clumps import assign_clumps, style_clumps
-from .grown import at_roots, bound_strands, checked_weights, segment_fractions
-from .normal_growth import grow_along_normals, somewhere
+from .growth_surface import GrowthSurface
+from .normal_growth import density_with_length, grow_along_normals
 from .scalp import Cranium, find_cranium, sample_roots, scalp_density, smooth_step
 from .settings import GrowSettings
-from .surface_points import GrowthSurface
 
 __all__ = ["grow", "scalp_density"]
 
@@ -92,13 +92,13 @@ def _grow_combed(
 ) -> StrandSet:
     """`grow` on a head, with weights that have been checked."""
     random = np.random.default_rng(settings.seed)
-    where = somewhere(density, length)
+    where = density_with_length(density, length)
     triangle, barycentric = sample_roots(surface, settings.strand_count, where, random)
     corners = surface.corners[triangle].astype(np.float64)
     root = np.einsum("sk,skj->sj", barycentric, corners)
     cranium = find_cranium(surface.positions)
     clump = assign_clumps(root, settings, random, np.where(root[:, 0] < cranium.center[0], -1, 1))
-    factor = None if length is None else at_roots(length, surface, triangle, barycentric)
+    factor = None if length is None else interpolate_weights(length, surface, triangle, barycentric)
     plan = _plan(surface, cranium, clump, factor, settings, random)
 
     normal = plan.skin.normal(triangle, barycentric)

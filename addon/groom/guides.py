@@ -27,13 +27,13 @@ def choose_guides(strands: StrandSet, settings: GuideSettings, kind: Ints | None
         kind: (strand_count,) what the strands are held by, see `Holds.kinds`; None: all alike.
     """
     random = np.random.default_rng(settings.seed)
-    group = grouped(strands.group, kind)
+    group = split_by_kind(strands.group, kind)
     _, first, group = np.unique(group, return_index=True, return_inverse=True)
     names = strands.group[first]
     by_group = np.argsort(group, kind="stable")
     sizes = np.bincount(group)
     moving = np.where(is_face_hair(names), -(-sizes // _FACE_HAIR_PER_STRAND), sizes)
-    fractions = group_fractions(moving, settings.guide_count)
+    fractions = guide_counts(moving, settings.guide_count)
     members = np.split(by_group, np.cumsum(sizes)[:-1]) if len(sizes) else []
     chosen = [
         _spread(strands.roots, member, int(fraction), random)
@@ -42,7 +42,7 @@ def choose_guides(strands: StrandSet, settings: GuideSettings, kind: Ints | None
     return np.sort(np.concatenate([np.zeros(0, np.int64), *chosen]))
 
 
-def grouped(group: Ints, kind: Ints | None) -> Ints:
+def split_by_kind(group: Ints, kind: Ints | None) -> Ints:
     """Groups split by kind, (strand_count,); only strands of one such group share guides."""
     if kind is None or not kind.any():
         return group
@@ -50,7 +50,7 @@ def grouped(group: Ints, kind: Ints | None) -> Ints:
     return both.ravel()
 
 
-def group_fractions(sizes: Ints, guide_count: int) -> Ints:
+def guide_counts(sizes: Ints, guide_count: int) -> Ints:
     """How many guides each group gets, (group_count,): one each, then by largest remainder.
 
     Never more than the group's size; in total guide_count, but at most the number of strands and at

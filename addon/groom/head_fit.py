@@ -168,7 +168,7 @@ def fit_head(
     matrix = _landmark_similarity(names, source, wanted, place)
     back = np.linalg.inv(matrix)
     warp = Warp(matrix).bending(source, _moved(wanted, back), _LANDMARK_REACH, _EXACT)
-    seen = _Seen.of(target, matrix)
+    seen = _PlacedTarget.of(target, matrix)
     warp, away = _skin_bent(warp, model, seen, source)
     return HeadFit(warp, {name: np.asarray(landmarks[name]) for name in names}, away)
 
@@ -181,7 +181,7 @@ def fit_by_vertices(source: Floats, target: Floats, is_head: Bools) -> Warp:
         is_head: (n,) which vertices decide position, rotation and scale; others may be posed.
     """
     matrix = _similarity(source[is_head], target[is_head])
-    kept = thinned(source, _COARSE)
+    kept = first_per_cell(source, _COARSE)
     wanted = _moved(target[kept], np.linalg.inv(matrix))
     return Warp(matrix).bending(source[kept], wanted, _LANDMARK_REACH, _EXACT)
 
@@ -191,7 +191,7 @@ def guess_landmarks(model: FitModel, target: Surface) -> tuple[dict[str, Floats]
     matrix, away = _guessed_similarity(model, target)
     own = np.array(list(_own_landmarks(model).values()))
     if away < _UNLIKE:
-        seen = _Seen.of(target, matrix)
+        seen = _PlacedTarget.of(target, matrix)
         warp, _ = _skin_bent(Warp(matrix), model, seen, np.zeros((0, 3)))
         guess = dict(zip(LANDMARKS, seen.closest(warp.bent(own)), strict=True))
         for name, along in _TIPS.items():
@@ -203,7 +203,7 @@ def guess_landmarks(model: FitModel, target: Surface) -> tuple[dict[str, Floats]
 
 
 @dataclass(frozen=True, eq=False)
-class _Seen:
+class _PlacedTarget:
     """A mesh in the built-in head's space, without parts that are far from a head.
 
     facing: (triangle_count, 3) normals.
@@ -214,7 +214,7 @@ class _Seen:
     facing: Floats
 
     @classmethod
-    def of(cls, target: Surface, matrix: Floats) -> _Seen:
+    def of(cls, target: Surface, matrix: Floats) -> _PlacedTarget:
         placed = Surface(_moved(target.positions, np.linalg.inv(matrix)), target.triangles)
         surface = _around(placed, np.zeros(3), 2.0 * _AROUND)
         return cls(surface, ClosestPointSearch(surface), surface.triangle_normals())
@@ -235,11 +235,13 @@ class _Seen:
         return near[(near @ along).argmax()].astype(np.float64) if len(near) else point
 
 
-def _skin_bent(warp: Warp, model: FitModel, seen: _Seen, held: Floats) -> tuple[Warp, float]:
+def _skin_bent(
+    warp: Warp, model: FitModel, seen: _PlacedTarget, held: Floats
+) -> tuple[Warp, float]:
     """A warp that brings the skin to the mesh as well, but leaves points (n, 3) of the built-in
     head where they are; and how far the skin is from the mesh then, on average [m]."""
     skin, chosen = model.skin, np.flatnonzero(model.is_open)
-    chosen = chosen[thinned(skin.positions[chosen], _FINE)]
+    chosen = chosen[first_per_cell(skin.positions[chosen], _FINE)]
     away = np.inf
     for reach in _SKIN_REACHES:
         bent = warp.bent(skin.positions)
@@ -299,11 +301,11 @@ class _Matching:
     def of(cls, model: FitModel, target: Surface) -> _Matching:
         skin = model.skin
         chosen = np.flatnonzero(model.is_open & (skin.positions[:, 2] > _CHIN))
-        chosen = chosen[thinned(skin.positions[chosen], _COARSE)]
+        chosen = chosen[first_per_cell(skin.positions[chosen], _COARSE)]
         points, normals = skin.positions[chosen], skin.vertex_normals()[chosen]
         centers = target.corners.mean(axis=1).astype(np.float64)
         extent = float(np.ptp(target.positions, axis=0).max())
-        centers = centers[thinned(centers, _CENTERS * extent)]
+        centers = centers[first_per_cell(centers, _CENTERS * extent)]
         own = search_of(skin), skin.triangle_normals()
         other = ClosestPointSearch(target), target.triangle_normals()
         return cls(points, normals, *own, *other, centers)
@@ -426,7 +428,7 @@ def _step(source: Floats, target: Floats, normals: Floats) -> Floats:
     return matrix
 
 
-def thinned(points: Floats, apart: float) -> Ints:
+def first_per_cell(points: Floats, apart: float) -> Ints:
     """The index of the first point in each cube of this size."""
     cell = np.floor(points / apart).astype(np.int64)
     return np.sort(np.unique(cell, axis=0, return_index=True)[1])
@@ -458,7 +460,7 @@ def _turned(part: float) -> Floats:
 
 
 def _moved(points: Floats, matrix: Floats) -> Floats:
-    """Points transformed in double precision, unlike `affine.moved`."""
+    """Points transformed in double precision, unlike `affine.transform_points`."""
     return np.asarray(points @ matrix[:3, :3].T + matrix[:3, 3])
 
 

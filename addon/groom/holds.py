@@ -12,7 +12,7 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..strands import StrandSet, Surface
-from ..strands.arc_length import along
+from ..strands.arc_length import length_fractions
 from ..strands.strand_set import ROOT_POINTS
 from .roots import root_frames
 
@@ -50,7 +50,10 @@ class Holds:
 
     def on_lines(self, strands: StrandSet, cv_count: int) -> Holds:
         """The same places on centre lines of `cv_count` CVs, see `strands.center_lines`."""
-        fraction, first = along(strands.points, strands.offsets), self.place.astype(np.int64)
+        fraction, first = (
+            length_fractions(strands.points, strands.offsets),
+            self.place.astype(np.int64),
+        )
         before = strands.offsets[self.strand] + first
         after = np.minimum(before + 1, strands.offsets[self.strand + 1] - 1)
         here = fraction[before] + (self.place - first) * (fraction[after] - fraction[before])

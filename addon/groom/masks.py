@@ -17,8 +17,8 @@ import numpy as np
 from ..arrays import Floats, Ints, means_by
 from ..params import Settings
 from ..strands import StrandSet, Surface
-from ..strands.arc_length import reached
-from ..strands.catmull_rom import even_places
+from ..strands.arc_length import arc_lengths
+from ..strands.catmull_rom import even_parameters
 from ..strands.nearest import nearest_points
 from ..strands.resample import arc_length_positions
 
@@ -29,7 +29,7 @@ SELECTION = ".selection"
 _ALONG = 17
 
 
-def masks_of(settings: type[Settings]) -> dict[str, str]:
+def mask_parameters(settings: type[Settings]) -> dict[str, str]:
     """Parameter that may be painted -> parameter that names its mask."""
     return {each.of: each.name for each in settings.parameters() if each.kind == "mask"}
 
@@ -37,7 +37,9 @@ def masks_of(settings: type[Settings]) -> dict[str, str]:
 def mask_names(settings: Settings) -> dict[str, str]:
     """The name of the mask of each parameter that has one and takes effect."""
     sections = SimpleNamespace(**{settings.section: settings})
-    named = {of: str(getattr(settings, name)) for of, name in masks_of(type(settings)).items()}
+    named = {
+        of: str(getattr(settings, name)) for of, name in mask_parameters(type(settings)).items()
+    }
     acts = {p.name for p in settings.parameters() if not p.shown_when or p.shown_when(sections)}
     found = {of: name for of, name in named.items() if name and of in acts}
     if getattr(settings, "only_selected", False):
@@ -151,7 +153,7 @@ class ImageMask(Mask):
         return self._at(np.einsum("nk,nkj->nj", barycentric, self.corner_uv[triangle]))
 
     def _at(self, uv: Floats) -> Floats:
-        return between_pixels(self.pixels, uv)
+        return sample_bilinear(self.pixels, uv)
 
     def fits(self, strand_count: int, triangle_count: int | None) -> bool:
         return len(self.corner_uv) == triangle_count
@@ -189,7 +191,7 @@ class StrandMask(Mask):
     def along(self, places: Places, cv_count: int) -> Floats:
         grid = self.grid.astype(np.float64)
         if grid.shape[1] > 1:
-            left, part = even_places(_ALONG, cv_count)
+            left, part = even_parameters(_ALONG, cv_count)
             grid = grid[:, left] + part * (grid[:, left + 1] - grid[:, left])
         return self._mixed(places, grid)
 
@@ -215,7 +217,7 @@ class StrandMask(Mask):
         """The values at the points of the strands, (point_count,)."""
         if self.grid.shape[1] == 1:
             return np.repeat(self.grid[:, 0], strands.point_counts)
-        along = reached(strands.points, strands.offsets)
+        along = arc_lengths(strands.points, strands.offsets)
         whole = np.repeat(along[strands.offsets[1:] - 1], strands.point_counts)
         place = along / np.maximum(whole, 1.0e-30) * (_ALONG - 1)
         left = np.minimum(place.astype(np.int64), _ALONG - 2)
@@ -225,7 +227,7 @@ class StrandMask(Mask):
         return found
 
 
-def between_pixels(
+def sample_bilinear(
     pixels: Floats, uv: Floats, meant: Callable[[Floats], Floats] = lambda stored: stored
 ) -> Floats:
     """Values between the middles of the four nearest pixels, (n, ...); the image repeats beyond its

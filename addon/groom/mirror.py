@@ -8,7 +8,7 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..strands import StrandSet, Surface
-from ..strands.affine import moved
+from ..strands.affine import transform_points
 from ..strands.closest_point import search_of
 from .mirror_settings import MirrorSettings
 
@@ -32,7 +32,7 @@ def reflection(matrix: Floats, axis: str) -> Floats:
     return result
 
 
-def sides(roots: Floats, surface: Surface, matrix: Floats, settings: MirrorSettings) -> Ints:
+def mirror_sides(roots: Floats, surface: Surface, matrix: Floats, settings: MirrorSettings) -> Ints:
     """1 for roots (n, 3) on the side that is mirrored, -1 on the other, 0 in the middle, (n,).
 
     Args:
@@ -59,7 +59,7 @@ class Mirrored:
         return np.asarray((self.shift != 0.0).any(axis=1))
 
 
-def mirrored(strands: StrandSet, surface: Surface, across: Floats) -> Mirrored:
+def mirror_strands(strands: StrandSet, surface: Surface, across: Floats) -> Mirrored:
     """Strands on the other side of a plane, as far from the surface as they are on their own.
 
     The point that a root grows on is mirrored and moved to the closest point of the surface; the
@@ -77,7 +77,9 @@ def mirrored(strands: StrandSet, surface: Surface, across: Floats) -> Mirrored:
     root_uv = None
     if surface.corner_uv is not None:
         root_uv = np.einsum("sk,skj->sj", held.barycentric, surface.corner_uv[held.triangle])
-    points = moved(strands.points, across) + np.repeat(shift, strands.point_counts, axis=0)
+    points = transform_points(strands.points, across) + np.repeat(
+        shift, strands.point_counts, axis=0
+    )
     found = replace(
         strands,
         points=points,

@@ -18,8 +18,8 @@ from ..arrays import Bools, Floats, Ints
 from ..errors import HairloomError
 from ..strands import StrandSet, Surface
 from ..strands.vectors import unit
+from .bound_strands import bound_strands, checked_weights, interpolate_weights, segment_fractions
 from .clumps import assign_clumps
-from .grown import at_roots, bound_strands, checked_weights, segment_fractions
 from .scalp import sample_roots
 from .settings import GrowSettings
 
@@ -61,14 +61,14 @@ def grow_along_normals(
     if settings.per_vertex:
         triangle, barycentric = _vertex_roots(surface, _grows(surface, settings, density, length))
     else:
-        where = somewhere(density, length)
+        where = density_with_length(density, length)
         triangle, barycentric = sample_roots(surface, settings.strand_count, where, random)
     root = np.einsum("nk,nkj->nj", barycentric, surface.corners[triangle].astype(np.float64))
     strand_length = settings.length * (
         1.0 - settings.length_variation * random.random(len(triangle))
     )
     if length is not None:
-        strand_length *= at_roots(length, surface, triangle, barycentric)
+        strand_length *= interpolate_weights(length, surface, triangle, barycentric)
     normal = _normals(surface, triangle, barycentric)
     direction = _directions(root, normal, settings, random)
     segment = strand_length[:, None] * segment_fractions(settings.cv_count, settings.segment_ratio)
@@ -99,7 +99,7 @@ def _directions(
     return np.sin(angle)[..., None] * normal[:, None] + np.cos(angle)[..., None] * aside[:, None]
 
 
-def somewhere(density: Floats | None, length: Floats | None) -> Floats | None:
+def density_with_length(density: Floats | None, length: Floats | None) -> Floats | None:
     """The density, set to 0 where hair would have no length."""
     if length is None:
         return density

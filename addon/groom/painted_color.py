@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import Floats, Ints
-from .masks import between_pixels
+from .masks import sample_bilinear
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +67,7 @@ class ImageColor(PaintedColor):
 
     def at(self, triangle: Ints, barycentric: Floats) -> Floats:
         uv = np.einsum("nk,nkj->nj", barycentric, self.corner_uv[triangle])
-        return between_pixels(self.pixels, uv, self.meant)
+        return sample_bilinear(self.pixels, uv, self.meant)
 
     @property
     def triangle_count(self) -> int:

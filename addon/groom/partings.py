@@ -16,7 +16,7 @@ import numpy as np
 
 from ..arrays import Bools, Floats
 from ..strands import StrandSet, Surface
-from ..strands.arc_length import along
+from ..strands.arc_length import length_fractions
 from ..strands.closest_point import search_of
 from ..strands.nearest import nearest_points
 from ..strands.vectors import dot, unit, unit_or
@@ -123,7 +123,7 @@ def _apart(points: Floats, begin: Floats, across: Floats) -> Floats:
     return found
 
 
-def combed_away(
+def comb_from_partings(
     strands: StrandSet, partings: Partings, surface: Surface, settings: PartingSettings
 ) -> Floats:
     """Points of strands whose roots lean away from partings, (point_count, 3) float32 [m].
@@ -146,7 +146,7 @@ def combed_away(
     pull = settings.amount * _fading(away / width)
     # a root on the parting itself has no side
     pull[~beside.any(axis=1)] = 0.0
-    fade = _fading(along(strands.points, offsets) / settings.along)
+    fade = _fading(length_fractions(strands.points, offsets) / settings.along)
     weight = (np.repeat(pull, counts) * fade)[:, None]
     step = np.diff(strands.points.astype(np.float64), axis=0, prepend=strands.points[:1])
     size = np.linalg.norm(step, axis=1, keepdims=True)

@@ -16,7 +16,7 @@ import numpy as np
 from ..arrays import Floats
 from ..strands import StrandSet, Surface
 from ..strands.closest_point import search_of
-from .roots import follow, root_frames, root_motions
+from .roots import carry_with_roots, root_frames, root_motions
 
 #: A surface is deformed where a vertex has moved by more than this fraction of its diagonal.
 DEFORMED = 1.0e-4
@@ -76,10 +76,10 @@ class RestHair:
 
     def on(self, posed: Surface) -> StrandSet:
         """The strands on the posed surface."""
-        return carried(self.strands, self.surface, posed)
+        return carry_with_surface(self.strands, self.surface, posed)
 
 
-def carried(strands: StrandSet, start: Surface, end: Surface) -> StrandSet:
+def carry_with_surface(strands: StrandSet, start: Surface, end: Surface) -> StrandSet:
     """Strands moved from one pose of a surface to another: each moves and turns with its root.
 
     Args:
@@ -92,7 +92,9 @@ def carried(strands: StrandSet, start: Surface, end: Surface) -> StrandSet:
     was, now = (
         root_frames(each.positions, each.triangles, triangle, barycentric) for each in (start, end)
     )
-    return strands.with_points(follow(strands.points, strands.offsets, root_motions(was, now)))
+    return strands.with_points(
+        carry_with_roots(strands.points, strands.offsets, root_motions(was, now))
+    )
 
 
 @dataclass(frozen=True)

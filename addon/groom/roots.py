@@ -170,7 +170,7 @@ def root_motions(rest: RootFrames, now: RootFrames) -> RootMotions:
     return RootMotions(*(np.ascontiguousarray(rows, np.float32) for rows in (turn, shift, origin)))
 
 
-def follow(points: Floats, offsets: Ints, motions: RootMotions) -> Floats:
+def carry_with_roots(points: Floats, offsets: Ints, motions: RootMotions) -> Floats:
     """Each strand carried with its root, (point_count, 3) [m], as precise as `points`.
 
     Adds only the change, so that a root that did not move returns its strand bit for bit.

@@ -10,7 +10,7 @@ from ..arrays import Floats, Ints
 from ..errors import HairloomError
 from ..strands import Surface
 from ..strands.morton import morton_code
-from ..strands.triangles import areas_of, evenly_within
+from ..strands.triangles import areas_of, uniform_barycentrics
 
 #: The hairline in the cranium's own units (half its depth; y to the back, z up, from its middle):
 #: hair grows above the line from the forehead down to the nape, and between the ears.
@@ -94,7 +94,7 @@ def sample_roots(
     last = np.flatnonzero(area[order])[-1]  # rounding must not lead to a triangle without area
     place = np.minimum(np.searchsorted(along, stratum, side="right"), last)
     triangle = order[place]
-    barycentric = evenly_within(random.random(count), random.random(count))
+    barycentric = uniform_barycentrics(random.random(count), random.random(count))
     if density is None:
         return triangle, barycentric
     fraction = np.clip((along[place] - stratum) / area[triangle], 0.0, 1.0)  # left of the triangle

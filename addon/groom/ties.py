@@ -8,13 +8,13 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..strands import StrandSet, Surface
-from ..strands.affine import moved
+from ..strands.affine import transform_points
 from ..strands.closest_point import ClosestPointSearch
 from ..strands.strand_set import ROOT_POINTS
 from .holds import Holds
 
 #: A surface holds tips where its weight is at least this.
-HOLDING = 0.5
+MIN_HOLDING_WEIGHT = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +95,7 @@ def find_holds(strands: StrandSet, holders: Holders, tip_distance: float = 0.0) 
     )
 
 
-def idle(holds: Holds, holders: Holders) -> tuple[str, ...]:
+def unused_holder_notes(holds: Holds, holders: Holders) -> tuple[str, ...]:
     """Notes on ties and surfaces that hold no hair, each with a remedy."""
     busy = set(np.unique(np.minimum(holds.anchor, holds.tie_count)).tolist())
     notes = [
@@ -115,7 +115,7 @@ def idle(holds: Holds, holders: Holders) -> tuple[str, ...]:
 
 def _passing(strands: StrandSet, tie: Tie) -> tuple[Ints, Floats]:
     """The strands that pass through a tie, ascending, and where along each."""
-    local = moved(strands.points, np.linalg.inv(tie.shape)).astype(np.float64)
+    local = transform_points(strands.points, np.linalg.inv(tie.shape)).astype(np.float64)
     begin, step = local[:-1], np.diff(local, axis=0)
     is_segment = _are_segments(strands)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -159,7 +159,7 @@ def _tips_near(strands: StrandSet, tips: TipSurface, distance: float) -> tuple[I
     kept = closest.distance <= distance
     if tips.weight is not None:
         of_corners = tips.weight[tips.surface.triangles[closest.triangle]]
-        kept &= (of_corners * closest.barycentric).sum(axis=1) >= HOLDING
+        kept &= (of_corners * closest.barycentric).sum(axis=1) >= MIN_HOLDING_WEIGHT
     barycentric: Floats = closest.barycentric[kept].astype(np.float32)
     return near[kept], closest.triangle[kept], barycentric
 

@@ -10,7 +10,7 @@ from ..arrays import Bools, Floats, Ints
 from ..strands import Surface
 from ..strands.triangles import area_vectors, areas_of, quartered
 from ..strands.vectors import unit
-from .counter_random import named
+from .counter_random import key_of
 
 
 @dataclass(frozen=True)
@@ -92,5 +92,5 @@ class Pieces:
     def split(self) -> Pieces:
         """Each piece split in four."""
         corner, point, density = map(quartered, (self.corner, self.point, self.density))
-        key = named(self.key[:, None], 1 + np.arange(4)).ravel()
+        key = key_of(self.key[:, None], 1 + np.arange(4)).ravel()
         return Pieces(np.repeat(self.parent, 4), corner, point, density, key)

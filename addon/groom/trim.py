@@ -14,8 +14,8 @@ import numpy as np
 
 from ..arrays import Bools, Floats
 from ..strands import StrandSet, Surface
-from ..strands.arc_length import first_as_far
-from ..strands.catmull_rom import evenly_on_curve
+from ..strands.arc_length import first_point_at_arc_length
+from ..strands.catmull_rom import even_points_on_curve
 from ..strands.crossings import first_crossings
 
 #: Number of pieces that each segment is divided into to find where it leaves a shape.
@@ -70,7 +70,7 @@ class Plane:
         return np.asarray((points.astype(np.float64) - self.origin) @ self.normal)
 
 
-def flat(surface: Surface) -> Plane | None:
+def plane_of_flat_mesh(surface: Surface) -> Plane | None:
     """The plane that a mesh lies in, as far as it reaches; None where it is not flat."""
     places = surface.positions[np.unique(surface.triangles)].astype(np.float64)
     origin = places.mean(axis=0)
@@ -89,7 +89,7 @@ class Trimmed:
     is_outside: Bools
 
 
-def trimmed(strands: StrandSet, shapes: Sequence[Shape]) -> Trimmed:
+def trim_strands(strands: StrandSet, shapes: Sequence[Shape]) -> Trimmed:
     """Strands cut where they first leave a shape that their root is in; they keep their point
     counts, in the same proportions along the rest of their curve."""
     points = strands.points.copy()
@@ -101,7 +101,7 @@ def trimmed(strands: StrandSet, shapes: Sequence[Shape]) -> Trimmed:
         for start in range(0, len(of_count), _CHUNK):
             some = of_count[start : start + _CHUNK]
             places = strands.offsets[some, None] + np.arange(count)
-            fine = evenly_on_curve(strands.points[places], (count - 1) * _PIECES + 1)
+            fine = even_points_on_curve(strands.points[places], (count - 1) * _PIECES + 1)
             left = np.full(len(some), np.inf)
             for shape, of_shape in zip(shapes, inside[:, some], strict=True):
                 within = np.flatnonzero(of_shape)
@@ -121,7 +121,7 @@ def _up_to(fine: Floats, left: Floats) -> Floats:
     end = _at(reached, left[:, None])[:, 0]
     wanted = own * (end / np.maximum(own[:, -1], 1.0e-30))[:, None]
     offsets = np.arange(len(fine) + 1) * fine.shape[1]
-    far = first_as_far(reached.ravel(), offsets, wanted) - offsets[:-1, None]
+    far = first_point_at_arc_length(reached.ravel(), offsets, wanted) - offsets[:-1, None]
     segment = np.clip(far - 1, 0, fine.shape[1] - 2)
     before, after = (np.take_along_axis(reached, segment + k, axis=1) for k in (0, 1))
     span = after - before

@@ -19,8 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
-from ..strands.kept import NOTHING_KEPT, Kept
 from ..strands.nearest import nearest_points
+from ..strands.result_cache import NO_CACHE, ResultCache
 from ..strands.vectors import unit
 from .partings import Partings
 
@@ -130,7 +130,7 @@ def child_weights(
     parting: float,
     partings: Partings | None = None,
     grown: Floats | None = None,
-    kept: Kept = NOTHING_KEPT,
+    cache: ResultCache = NO_CACHE,
 ) -> GuideWeights:
     """The three guides that a child at each root mixes: all of one group, all on one side.
 
@@ -146,22 +146,22 @@ def child_weights(
             mixes guides with one between them.
         grown: (child_count, 3) [m], where they grow, if `root` is where they take shapes from; this
             is the place that partings are seen from.
-        kept: results of the last call.
+        cache: results of the last call.
     """
     grown = root if grown is None else grown
     guide = np.zeros((len(root), GUIDES_PER_STRAND), np.int32)
     weight = np.zeros((len(root), GUIDES_PER_STRAND), np.float32)
     guide_direction = directions(guide_grid, guide_root)
-    of_child = _nearest_group(root, guide_root, guide_group, partings, grown, kept)
+    of_child = _nearest_group(root, guide_root, guide_group, partings, grown, cache)
     for children, guides in by_group(of_child, guide_group):
         name = f"guides, group {guide_group[guides[0]]}"
-        near, gap, crossed = nearest_before(
+        near, gap, crossed = nearest_on_same_side(
             partings,
             root[children],
             guide_root[guides],
             _CHILD_CANDIDATES,
             grown[children],
-            kept,
+            cache,
             name,
         )
         near = guides[near]
@@ -183,31 +183,31 @@ def _nearest_group(
     guide_group: Ints,
     partings: Partings | None,
     grown: Floats,
-    kept: Kept,
+    cache: ResultCache,
 ) -> Ints:
     """Group of the guide that is nearest to each root on its side of partings, (n,)."""
     if (guide_group == guide_group[0]).all():
         return np.full(len(root), guide_group[0])
-    nearest, _, _ = nearest_before(partings, root, guide_root, 1, grown, kept, "guides, all")
+    nearest, _, _ = nearest_on_same_side(partings, root, guide_root, 1, grown, cache, "guides, all")
     return guide_group[nearest[:, 0]]
 
 
-def nearest_before(
+def nearest_on_same_side(
     partings: Partings | None,
     root: Floats,
     among: Floats,
     count: int,
     grown: Floats,
-    kept: Kept = NOTHING_KEPT,
+    cache: ResultCache = NO_CACHE,
     name: str = "",
 ) -> tuple[Ints, Floats, Bools | None]:
     """`nearest_points`, and which of them are behind a parting, seen from `grown`; None without
     partings. If any is, they are the points nearest to `grown`, those behind partings last.
 
     Args:
-        kept: results of the last call with this name.
+        cache: results of the last call with this name.
     """
-    near, gap = kept.nearest(name, root, among, count)
+    near, gap = cache.nearest(name, root, among, count)
     if partings is None:
         return near, gap, None
     crossed = partings.crossed(grown, among[near])

@@ -20,9 +20,9 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..strands import StrandSet
 from ..strands.face import is_face_hair
-from ..strands.kept import NOTHING_KEPT, Kept
 from ..strands.nearest import nearest_points
-from .hairline import AROUND, nearness_by
+from ..strands.result_cache import NO_CACHE, ResultCache
+from .hairline import NEIGHBOURS, nearness_from_neighbours
 
 #: Number of hairs on a head, and the width of one over the square root of the area they grow on.
 _HAIRS, _HAIR = 120_000, 0.08 / 245.0
@@ -118,7 +118,7 @@ def with_widths(
     *,
     number: Ints | None = None,
     fineness: Floats | None = None,
-    kept: Kept = NOTHING_KEPT,
+    cache: ResultCache = NO_CACHE,
 ) -> tuple[StrandSet, Widths]:
     """The strands with widths by one of `METHODS`, in their own space.
 
@@ -127,7 +127,7 @@ def with_widths(
         number: (strand_count,) ascending, their numbers before any were left out, by which the
             measured ones are chosen, so that leaving one out hardly changes these. None: all.
         fineness: (strand_count,) factor on found widths; None: 1.
-        kept: results of the last call.
+        cache: results of the last call.
     """
     if not strands.strand_count:
         return strands, Widths()
@@ -136,7 +136,7 @@ def with_widths(
     if method == "own":
         return strands, Widths(False, median)
     number = np.arange(strands.strand_count) if number is None else number
-    found = _found(strands, parts, number, kept)
+    found = _found(strands, parts, number, cache)
     reason = "" if method == "found" else _why_not(strands, median, found)
     if method == "auto" and not reason:
         return strands, Widths(False, median)
@@ -149,7 +149,7 @@ def with_widths(
     return replace(strands, radius=radius, has_widths=True), widths
 
 
-def as_wide(strands: StrandSet, drawn: StrandSet) -> StrandSet:
+def with_widths_of(strands: StrandSet, drawn: StrandSet) -> StrandSet:
     """The strands as wide at their roots as they are drawn.
 
     Args:
@@ -219,16 +219,16 @@ class _Hair:
         cls,
         strands: StrandSet,
         number: Ints | None = None,
-        kept: Kept = NOTHING_KEPT,
+        cache: ResultCache = NO_CACHE,
         name: str = "",
     ) -> Self:
         """Args:
-        number: see `with_widths`. kept: results of the last call with this name.
+        number: see `with_widths`. cache: results of the last call with this name.
         """
         chosen = _some(np.arange(strands.strand_count) if number is None else number)
 
         def measured(at: Ints, where: str) -> _Measured:
-            return _Measured(strands.points[at], chosen, kept, f"{name}, {where}")
+            return _Measured(strands.points[at], chosen, cache, f"{name}, {where}")
 
         first, last = strands.offsets[:-1], strands.offsets[1:] - 1
         roots = measured(first, "roots")
@@ -273,7 +273,7 @@ class _Hair:
         return np.minimum(_OF_SPACING * self.apart, _OF_LENGTH * self.typical)
 
 
-def _found(strands: StrandSet, parts: float, number: Ints, kept: Kept) -> _Found:
+def _found(strands: StrandSet, parts: float, number: Ints, cache: ResultCache) -> _Found:
     """Found widths of hair. Those of brows and lashes are found separately, since they are short
     and grow close together however much hair is on the head.
 
@@ -282,14 +282,14 @@ def _found(strands: StrandSet, parts: float, number: Ints, kept: Kept) -> _Found
     """
     is_face = is_face_hair(strands.group)
     if not is_face.any():
-        return _found_of(_Hair.of(strands, number, kept, "hair"), parts)
-    face = _Hair.of(strands.take(np.flatnonzero(is_face)), None, kept, "face")
+        return _found_of(_Hair.of(strands, number, cache, "hair"), parts)
+    face = _Hair.of(strands.take(np.flatnonzero(is_face)), None, cache, "face")
     of_face = _found_of(face)
     of_face = replace(of_face, width=np.minimum(of_face.width, _OF_FACE * face.typical))
     if is_face.all():
         return of_face
     other = np.flatnonzero(~is_face)
-    hair = _Hair.of(strands.take(other), number[other], kept, "hair")
+    hair = _Hair.of(strands.take(other), number[other], cache, "hair")
     found = _found_of(hair, parts)
     width = np.empty(strands.strand_count)
     width[~is_face], width[is_face] = found.width, of_face.width
@@ -346,16 +346,16 @@ class _Measured:
 
     Args:
         chosen: indices of the sample; all others get the values of the nearest strand in it.
-        kept, name: see `Kept.nearest`.
+        kept, name: see `ResultCache.nearest`.
     """
 
-    def __init__(self, places: Floats, chosen: Ints, kept: Kept, name: str) -> None:
-        self._places, self._chosen, self._kept, self._name = places, chosen, kept, name
+    def __init__(self, places: Floats, chosen: Ints, cache: ResultCache, name: str) -> None:
+        self._places, self._chosen, self._cache, self._name = places, chosen, cache, name
         self._measured = places[chosen]
 
     def border(self) -> Floats:
         """How near the sample is to where the hair ends, see `nearness_to_border`."""
-        return nearness_by(self._measured, self._measured, *self._around)
+        return nearness_from_neighbours(self._measured, self._measured, *self._around)
 
     def spacing(self) -> Floats:
         """How far strands are from their neighbours here, (strand_count,) [m].
@@ -380,13 +380,13 @@ class _Measured:
     @cached_property
     def _around(self) -> tuple[Ints, Floats]:
         """The nearest neighbours of the sample within it, each itself first."""
-        name, count = f"{self._name}, around", max(AROUND, _NEIGHBOURS + 1)
-        return self._kept.nearest(name, self._measured, self._measured, count)
+        name, count = f"{self._name}, around", max(NEIGHBOURS, _NEIGHBOURS + 1)
+        return self._cache.nearest(name, self._measured, self._measured, count)
 
     @cached_property
     def _nearest(self) -> Ints:
         """The nearest of the sample for each place."""
-        near, _ = self._kept.nearest(f"{self._name}, all", self._places, self._measured, 1)
+        near, _ = self._cache.nearest(f"{self._name}, all", self._places, self._measured, 1)
         return near[:, 0]
 
 

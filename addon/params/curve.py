@@ -11,14 +11,14 @@ import numpy as np
 from ..arrays import Floats
 
 #: Where the values lie, from 0 at the root to 1 at the tip.
-PLACES = (0.0, 0.25, 0.5, 0.75, 1.0)
+KNOT_POSITIONS = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 type Curve = tuple[float, ...]
 
 
-def along(curve: Curve, place: Floats) -> Floats:
+def sample_curve(curve: Curve, place: Floats) -> Floats:
     """The curve's values at these places (n,), 0 at the root and 1 at the tip, (n,) float64."""
-    knots, values = np.array(PLACES), np.asarray(curve, np.float64)
+    knots, values = np.array(KNOT_POSITIONS), np.asarray(curve, np.float64)
     step = np.diff(knots)
     secant = np.diff(values) / step
     slope = _slopes(secant)

@@ -20,7 +20,7 @@ _UNIT_SYMBOLS = {
 }
 
 
-def table(settings: type[Settings]) -> str:
+def parameter_table(settings: type[Settings]) -> str:
     """A Markdown section: a heading, and a table with a row for each parameter."""
     rows = [
         f"## {settings.title} (`{settings.section}`)",

@@ -15,11 +15,11 @@ import numpy as np
 
 from ..arrays import Floats
 from ..errors import HairloomError
-from .curve import PLACES, Curve
+from .curve import KNOT_POSITIONS, Curve
 
 Kind = Literal["number", "integer", "toggle", "color", "choice", "curve", "mask", "map"]
 #: Kinds whose value is the name of painted data.
-NAMING: tuple[Kind, ...] = ("mask", "map")
+NAME_KINDS: tuple[Kind, ...] = ("mask", "map")
 #: length [m], angle [rad], time [s], rate [1/s], speed [m/s], factor [0..1], acceleration [m/s^2]
 Unit = Literal[
     "none",
@@ -112,14 +112,14 @@ class Parameter:
             if value not in [identifier for identifier, _, _ in self.choices]:
                 raise ValueError("that is not one of its choices")
             return str(value)
-        if self.kind in NAMING:
+        if self.kind in NAME_KINDS:
             if not isinstance(value, str):
                 raise TypeError("it must be a name")
             return value
         if self.kind == "color":
             return self._several(value, 3, "red, green and blue")
         if self.kind == "curve":
-            return self._several(value, len(PLACES), "from root to tip")
+            return self._several(value, len(KNOT_POSITIONS), "from root to tip")
         if self.kind == "integer":
             if isinstance(value, bool) or int(_finite(value)) != value:
                 raise TypeError("it must be a whole number")
@@ -198,8 +198,8 @@ class Settings:
             field = vars(cls).get(name)
             parameter = getattr(field, "metadata", {}).get(_METADATA_KEY)
             if parameter is not None and parameter.is_painted:
-                declared[mask_of(name)] = "str"
-                setattr(cls, mask_of(name), _mask(name, parameter))
+                declared[mask_parameter(name)] = "str"
+                setattr(cls, mask_parameter(name), _mask(name, parameter))
         cls.__annotations__ = declared
 
     def __post_init__(self) -> None:
@@ -244,7 +244,7 @@ class Settings:
 
         What is painted on a particular head is not part of a preset.
         """
-        names = [each.name for each in self.parameters() if each.kind in NAMING]
+        names = [each.name for each in self.parameters() if each.kind in NAME_KINDS]
         return dataclasses.replace(
             self, **{name: getattr(self, name) or getattr(other, name) for name in names}
         )
@@ -407,7 +407,7 @@ def curve(
     source: str = "Hairloom",
     **drawn: Unpack[_Drawn],
 ) -> Any:
-    """Declare values along the strand, see `curve.along`."""
+    """Declare values along the strand, see `curve.sample_curve`."""
     return _declare(
         Parameter(
             "", "curve", tuple(default), label, description, source, "none", hard, hard, **drawn
@@ -422,7 +422,7 @@ def color_map(
     return _declare(Parameter("", "map", "", label, description, source, **drawn))
 
 
-def mask_of(name: str) -> str:
+def mask_parameter(name: str) -> str:
     """The parameter that names the mask of another one."""
     return f"{name}_mask"
 

@@ -93,7 +93,7 @@ def _checked[S: Settings](data: Any, settings: type[S], place: str) -> Preset[S]
         raise HairloomError(
             "this is not a Hairloom preset", place=place, remedy="Choose a preset saved by Hairloom"
         )
-    data = migrated(data, place)
+    data = migrate(data, place)
     values = settings.from_dict(data["values"], place)
     return Preset(str(data.get("title", "")), str(data.get("source", "")), values)
 
@@ -111,7 +111,7 @@ def preset_as_dict(preset: Preset[Any]) -> dict[str, Any]:
     }
 
 
-def migrated(data: dict[str, Any], place: str) -> dict[str, Any]:
+def migrate(data: dict[str, Any], place: str) -> dict[str, Any]:
     """The same preset in the current version.
 
     Raises:

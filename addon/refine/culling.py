@@ -45,7 +45,7 @@ INNER_PART = 0.95
 
 
 @dataclass(frozen=True)
-class Shades:
+class HiddenRegions:
     """The regions hidden by some balls. A point p, with s = (p - origin) . axis, is in one if
 
         s >= nearest  and  |p - origin - s axis|^2 <= width + slope s^2
@@ -62,7 +62,9 @@ class Shades:
     slope: Floats
 
 
-def shades_of(spheres: Floats, view: PictureView, half_width: float, radius: float) -> Shades:
+def hidden_regions(
+    spheres: Floats, view: PictureView, half_width: float, radius: float
+) -> HiddenRegions:
     """The regions that occluder spheres hide in one view, without spheres that hide nothing.
 
     Args:
@@ -83,19 +85,19 @@ def shades_of(spheres: Floats, view: PictureView, half_width: float, radius: flo
         axis = away / distance[:, None]
         squared = distance * distance - size * size
         origin = np.tile(eye[:3, 3], (len(balls), 1))
-        shades = Shades(origin, axis, squared / distance, 0.0 * size, size * size / squared)
+        shades = HiddenRegions(origin, axis, squared / distance, 0.0 * size, size * size / squared)
     else:
         size = balls[:, 3] - radius - half_width / scale.min()
         balls, size = balls[size > 0.0], size[size > 0.0]
         axis = np.tile(-eye[:3, 2], (len(balls), 1))
-        shades = Shades(balls[:, :3], axis, 0.0 * size, size * size, 0.0 * size)
+        shades = HiddenRegions(balls[:, :3], axis, 0.0 * size, size * size, 0.0 * size)
     front = balls[:, :3] - shades.axis * balls[:, 3:]
     clip = np.column_stack([front, np.ones(len(front))]) @ view.view_projection.T
     is_drawn = clip[:, 2] >= -clip[:, 3]
-    return Shades(*(part[is_drawn] for part in _parts(shades)))
+    return HiddenRegions(*(part[is_drawn] for part in _parts(shades)))
 
 
-def hidden(points: Floats, shades: Shades) -> Bools:
+def are_hidden(points: Floats, shades: HiddenRegions) -> Bools:
     """Which strands lie entirely within one of the regions, (strand_count,).
 
     Args:
@@ -114,7 +116,7 @@ def hidden(points: Floats, shades: Shades) -> Bools:
     return result
 
 
-def faces_away(root: Floats, center: Floats, eye: Floats) -> Bools:
+def are_facing_away(root: Floats, center: Floats, eye: Floats) -> Bools:
     """Which strands grow on the far side of the head, (strand_count,).
 
     Seen from the middle of all roots, their roots lie in a direction away from the eye.
@@ -139,7 +141,7 @@ def occluder_spheres_of(surface: Surface, count: int = 8, roots: Floats | None =
         roots: (n, 3), same space; only the region around them is searched, so that there are no
             balls in feet and hands.
     """
-    surface = surface.once(_capped)
+    surface = surface.compute_once(_capped)
     if not len(surface.triangles):
         return np.zeros((0, 4), np.float32)
     low, high = _box(surface, roots)
@@ -150,7 +152,7 @@ def occluder_spheres_of(surface: Surface, count: int = 8, roots: Floats | None =
     return _different(balls, count).astype(np.float32)
 
 
-def moved_spheres(spheres: Floats, matrix: Floats) -> Floats:
+def transform_spheres(spheres: Floats, matrix: Floats) -> Floats:
     """Spheres (k, 4) moved by an affine (4, 4) matrix, shrunk to fit into the ellipsoids that the
     matrix makes of them."""
     matrix = np.asarray(matrix, np.float64)
@@ -264,5 +266,5 @@ def _different(balls: Floats, count: int) -> Floats:
     return balls[chosen]
 
 
-def _parts(shades: Shades) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+def _parts(shades: HiddenRegions) -> tuple[Floats, Floats, Floats, Floats, Floats]:
     return shades.origin, shades.axis, shades.nearest, shades.width, shades.slope

@@ -20,7 +20,7 @@ from ..strands.strand_set import ROOT_POINTS
 #: Number of sweeps back and forth that restore a strand's lengths.
 SWEEPS = 4
 #: A strand that is off its hold by less than this fraction of its length is not moved.
-NEAR = 1.0e-5
+MIN_HOLD_ERROR = 1.0e-5
 _TINY = 1.0e-12
 
 
@@ -37,7 +37,9 @@ class Holds(Protocol):
     def anchor(self) -> Ints: ...
 
 
-def hold(points: Floats, rest: Floats, offsets: Ints, holds: Holds, anchors: Floats) -> None:
+def hold_strands(
+    points: Floats, rest: Floats, offsets: Ints, holds: Holds, anchors: Floats
+) -> None:
     """Move strands (point_count, 3) world [m] to where they are held, in place.
 
     Args:
@@ -72,7 +74,7 @@ def _held(some: Floats, rest: Floats, before: Ints, first: Ints, matrix: Floats)
     error = np.maximum(
         np.linalg.norm(target - here, axis=1), np.linalg.norm(beyond - there, axis=1)
     )
-    is_off = error > NEAR * length.sum(axis=1)
+    is_off = error > MIN_HOLD_ERROR * length.sum(axis=1)
 
     is_between = (cv[:-1] >= before[:, None]) & (cv[:-1] < first[:, None])
     reach, start = np.where(is_between, length, 0.0).sum(axis=1), _point(some, before)

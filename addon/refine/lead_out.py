@@ -15,7 +15,7 @@ strand that nothing leads out is placed as its root carries it.
 
 If a strand rides straight into a collider, all directions out are equally near, and the choice
 would change from frame to frame. So it starts from how it was bent in the frame before, see
-`Leans`, and turns back to where it rides within a fraction of a second.
+`Deflections`, and turns back to where it rides within a fraction of a second.
 
 Twin of gpu_shaders/lead_out.comp.glsl.
 """
@@ -91,7 +91,7 @@ class HeldParts:
         """
         strands = held.nonzero()[0]
         counts, last = np.diff(offsets)[strands], held[strands]
-        every = points_of(strands, offsets)
+        every = point_indices(strands, offsets)
         is_held = number_in_piece(counts) <= np.repeat(last, counts)
         along = np.maximum.accumulate(np.where(is_held, np.cumsum(is_held) - 1, 0))
         return cls(strands, every[is_held], np.repeat(strands, last + 1), every, along)
@@ -135,7 +135,7 @@ class Clearance:
 
 
 @dataclass(frozen=True, eq=False)
-class Leans:
+class Deflections:
     """How leading out has bent strands in one frame, for the next one.
 
     strands: (n,) ascending, those that are not where they ride.
@@ -147,7 +147,7 @@ class Leans:
     values: Floats
 
     @classmethod
-    def between(cls, strands: Ints, ridden: Floats, led: Floats, offsets: Ints) -> Leans:
+    def between(cls, strands: Ints, ridden: Floats, led: Floats, offsets: Ints) -> Deflections:
         """Args:
         strands: (n,). ridden, led: (m, 3) their points where they ride, and where they were led to.
         """
@@ -157,15 +157,15 @@ class Leans:
         values /= np.maximum(_size(_steps(ridden, begins)), np.float32(_TINY))[:, None]
         return cls(strands, values)._where(_size(values) > UPRIGHT, counts)
 
-    def after(self, duration: float, offsets: Ints) -> Leans:
+    def after(self, duration: float, offsets: Ints) -> Deflections:
         """The leans that are left after some time [s]."""
         size, turned = _size(self.values), np.float32(TURNING_BACK * duration)
         left = self._where(size > turned, np.diff(offsets)[self.strands])
         size = np.maximum(_size(left.values), np.float32(_TINY))
         kept = np.maximum(np.float32(1.0) - turned / size, np.float32(0.0))
-        return Leans(left.strands, left.values * kept[:, None])
+        return Deflections(left.strands, left.values * kept[:, None])
 
-    def _where(self, is_bent: Bools, counts: Ints) -> Leans:
+    def _where(self, is_bent: Bools, counts: Ints) -> Deflections:
         """The leans of strands that have a bent segment.
 
         Args:
@@ -174,13 +174,13 @@ class Leans:
         if not len(self.strands):
             return self
         chosen = np.logical_or.reduceat(is_bent, piece_starts(counts))
-        return Leans(self.strands[chosen], self.values[np.repeat(chosen, counts)])
+        return Deflections(self.strands[chosen], self.values[np.repeat(chosen, counts)])
 
     def bend(self, points: Floats, offsets: Ints) -> None:
         """Bend strands, in place; segments keep their lengths. points: (point_count, 3), of all."""
         if not len(self.strands):
             return
-        counts, index = np.diff(offsets)[self.strands], points_of(self.strands, offsets)
+        counts, index = np.diff(offsets)[self.strands], point_indices(self.strands, offsets)
         begins = piece_starts(counts)
         ridden = points[index].astype(np.float64)
         steps = _steps(ridden, begins)
@@ -191,7 +191,7 @@ class Leans:
         points[index] = ridden + shift
 
 
-NO_LEANS = Leans(np.zeros(0, np.int64), np.zeros((0, 3), np.float32))
+NO_DEFLECTIONS = Deflections(np.zeros(0, np.int64), np.zeros((0, 3), np.float32))
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,12 +205,14 @@ class LedOut:
 
     strands: Ints
     points: Floats
-    leans: Leans = NO_LEANS
+    leans: Deflections = NO_DEFLECTIONS
 
     @classmethod
-    def of(cls, strands: Ints, points: Floats, offsets: Ints, leans: Leans = NO_LEANS) -> LedOut:
+    def of(
+        cls, strands: Ints, points: Floats, offsets: Ints, leans: Deflections = NO_DEFLECTIONS
+    ) -> LedOut:
         """Take these strands from the points of all, (point_count, 3)."""
-        return cls(strands.astype(np.int32), points[points_of(strands, offsets)], leans)
+        return cls(strands.astype(np.int32), points[point_indices(strands, offsets)], leans)
 
     def fits(self, offsets: Ints) -> bool:
         """Whether strands and point counts match these offsets."""
@@ -221,10 +223,10 @@ class LedOut:
 
     def put(self, points: Floats, offsets: Ints) -> None:
         """Write into the points of all strands, (point_count, 3), in place."""
-        points[points_of(self.strands, offsets)] = self.points
+        points[point_indices(self.strands, offsets)] = self.points
 
 
-NOT_LED = LedOut(np.zeros(0, np.int32), np.zeros((0, 3), np.float32))
+NO_LED_OUT = LedOut(np.zeros(0, np.int32), np.zeros((0, 3), np.float32))
 
 
 def clearance_at(
@@ -241,7 +243,7 @@ def clearance_at(
     distance, _ = signed_distance(points, colliders, kept)
     distance[offsets[:-1]] = np.inf
     none = Clearance(kept, distance, np.zeros(len(offsets) - 1, np.int32))
-    return none.holding(beside_meshes(points, distance, colliders, kept), offsets)
+    return none.holding(points_outside_meshes(points, distance, colliders, kept), offsets)
 
 
 def _free_up_to(held: Ints, distance: Floats, offsets: Ints) -> Floats:
@@ -251,7 +253,7 @@ def _free_up_to(held: Ints, distance: Floats, offsets: Ints) -> Floats:
     return np.where(is_held, np.float32(-np.inf), distance)
 
 
-def beside_meshes(
+def points_outside_meshes(
     points: Floats, distance: Floats, colliders: Sequence[PosedCollider], kept: float
 ) -> Ints:
     """Which points (n, 3), at these distances (n,), lie deep inside a distance field but outside
@@ -267,8 +269,8 @@ def lead_out(
     offsets: Ints,
     colliders: Sequence[PosedCollider],
     clearance: Clearance,
-    leans: Leans = NO_LEANS,
-) -> tuple[Ints, Leans]:
+    leans: Deflections = NO_DEFLECTIONS,
+) -> tuple[Ints, Deflections]:
     """Lead strands out of colliders, in place.
 
     Args:
@@ -282,7 +284,7 @@ def lead_out(
     """
     poses, kept = poses_now(colliders), clearance.kept
     held = _hold(points, carry, offsets, clearance)
-    leaning = points_of(leans.strands, offsets)
+    leaning = point_indices(leans.strands, offsets)
     upright = points[leaning]
     leans.bend(points, offsets)
     index, distance, outward = nearer_than(points, poses, clearance.reach)
@@ -292,7 +294,7 @@ def lead_out(
     is_near = distance < wanted - np.float32(SLACK * kept)
     strands, first = np.unique(owner[is_near], return_index=True)
     bent = np.union1d(leans.strands, strands)
-    every = points_of(bent, offsets)
+    every = point_indices(bent, offsets)
     ridden = points.take(every, axis=0)
     ridden[np.searchsorted(every, leaning)] = upright
     if len(strands):
@@ -302,7 +304,9 @@ def lead_out(
         points[near.index], is_lost = _led(near, kept, poses)
         lost = np.searchsorted(every, near.index[is_lost])
         ridden[lost] = points[every[lost]]  # so that they have no lean
-    return np.union1d(held, bent), Leans.between(bent, ridden, points.take(every, axis=0), offsets)
+    return np.union1d(held, bent), Deflections.between(
+        bent, ridden, points.take(every, axis=0), offsets
+    )
 
 
 def _owners(index: Ints, offsets: Ints) -> Ints:
@@ -326,7 +330,7 @@ def _steps(points: Floats, begins: Ints) -> Floats:
     return steps
 
 
-def points_of(strands: Ints, offsets: Ints) -> Ints:
+def point_indices(strands: Ints, offsets: Ints) -> Ints:
     """The indices of all points of some strands, strand by strand."""
     counts = np.diff(offsets)[strands]
     begins = piece_starts(counts)
@@ -335,7 +339,7 @@ def points_of(strands: Ints, offsets: Ints) -> Ints:
 
 
 @cache
-def directions() -> Floats:
+def tried_directions() -> Floats:
     """The directions that are tried, unit vectors (TRIES, 3)."""
     return even_directions(TRIES)
 
@@ -377,7 +381,7 @@ class _Near:
             found: the first point of each that is too near, its distance and its way out.
         """
         counts = np.diff(offsets)[strands]
-        ends, index = np.cumsum(counts), points_of(strands, offsets)
+        ends, index = np.cumsum(counts), point_indices(strands, offsets)
         some, carried = points.take(index, axis=0), carry(index, np.repeat(strands, counts))
         wanted = clearance.points.take(index) + _size(some - carried)
         return cls(
@@ -394,7 +398,7 @@ class _Near:
     def part(self, chosen: Ints) -> _Near:
         """Some of the strands, to be led from their roots on."""
         offsets = np.append(self.begins, self.ends[-1:])
-        index, counts = points_of(chosen, offsets), np.diff(offsets)[chosen]
+        index, counts = point_indices(chosen, offsets), np.diff(offsets)[chosen]
         ends = np.cumsum(counts)
         begins = ends - counts
         return _Near(
@@ -433,8 +437,8 @@ def _led(near: _Near, kept: float, poses: Sequence[Pose]) -> tuple[Floats, Bools
         is_out[-1] = True
         chosen = is_out.argmax(axis=0) * len(stuck) + np.arange(len(stuck))
         lack[stuck] = left_over[chosen]
-        from_ = points_of(chosen, np.append(again.begins, again.ends[-1:]))
-        led[points_of(stuck, np.append(near.begins, near.ends[-1:]))] = found[from_]
+        from_ = point_indices(chosen, np.append(again.begins, again.ends[-1:]))
+        led[point_indices(stuck, np.append(near.begins, near.ends[-1:]))] = found[from_]
     is_lost = np.repeat(lack > kept, near.ends - near.begins)
     return np.where(is_lost[:, None], near.carried, led), is_lost
 
@@ -640,7 +644,7 @@ def _turned_out(
             do not jump from frame to frame.
     """
     rows = np.arange(len(arm))
-    tried = np.concatenate([toward[None], np.repeat(directions()[:, None], len(arm), axis=1)])
+    tried = np.concatenate([toward[None], np.repeat(tried_directions()[:, None], len(arm), axis=1)])
     distance, _ = distance_of_few((start + length[:, None] * tried).reshape(-1, 3), poses)
     lack = np.maximum(wanted - distance.reshape(len(tried), -1), 0.0)
     arm = arm / np.maximum(length, _TINY)[:, None]

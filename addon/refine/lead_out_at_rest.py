@@ -17,9 +17,9 @@ from ..dynamics.colliders.distance_field import UNCOVERED
 from ..dynamics.colliders.winding import winding_number
 from ..dynamics.settings import DynamicsSettings
 from ..strands import StrandSet
-from ..strands.arc_length import reached
+from ..strands.arc_length import arc_lengths
 from ..strands.closest_point import search_of
-from .lead_out import Clearance, beside_meshes, lead_out
+from .lead_out import Clearance, lead_out, points_outside_meshes
 
 #: Maximum distance that a point keeps from the head, as a fraction of its distance from the root
 #: along the strand.
@@ -29,7 +29,7 @@ LIFT = 0.3
 DEEP = 0.5
 
 
-def led_out_at_rest(
+def lead_out_at_rest(
     strands: StrandSet, head: DistanceField, length: float
 ) -> tuple[StrandSet, Bools]:
     """Strands led out of the head that they grow on, and which are outside, (strand_count,).
@@ -45,10 +45,10 @@ def led_out_at_rest(
     posed = (PosedCollider(head, np.eye(4), np.eye(4)),)
     offsets, points = strands.offsets, strands.points.copy()
     distance, _ = signed_distance(points, posed, kept)
-    along = reached(strands.points, offsets)
+    along = arc_lengths(strands.points, offsets)
     wanted = np.minimum(kept, LIFT * along).astype(np.float32)
     wanted[offsets[:-1]] = -np.inf
-    beside = beside_meshes(points, distance, posed, kept)
+    beside = points_outside_meshes(points, distance, posed, kept)
     wanted[beside] = -np.inf
     clearance = Clearance(kept, wanted, np.zeros(strands.strand_count, np.int32))
     carry = partial(_as_they_are, strands.points)

@@ -23,7 +23,7 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..strands import StrandSet
-from ..strands.arc_length import steps
+from ..strands.arc_length import segment_lengths
 from ..strands.blocks import Block, blocks_of
 from ..strands.center_lines import center_lines
 from ..strands.root_motions import RootMotions
@@ -69,7 +69,7 @@ class Riders:
 
     offsets: Ints
     weights: Weights
-    blocks: tuple[tuple[Block, Seats], ...]
+    blocks: tuple[tuple[Block, RidePositions], ...]
     reach: Floats
     segments_per_meter: Floats
     gives: Bools | None = None
@@ -96,14 +96,14 @@ class Riders:
         gives = None if room is None else room > 0.0
         per_meter = per_meter.astype(np.float32)
         blocks = tuple(
-            (block, Seats.of(block, stations, per_meter, weights, guides.shape[1] - 1))
+            (block, RidePositions.of(block, stations, per_meter, weights, guides.shape[1] - 1))
             for block in blocks_of(strands.offsets)
         )
         return cls(strands.offsets, weights, blocks, reach, per_meter, gives)
 
 
 @dataclass(frozen=True, eq=False)
-class Seats:
+class RidePositions:
     """Where the segments of a block's strands ride on their guides.
 
     guide, weight: (3, n), the guides of each strand, and their weights.
@@ -120,7 +120,7 @@ class Seats:
     @classmethod
     def of(
         cls, block: Block, stations: Floats, per_meter: Floats, weights: Weights, segments: int
-    ) -> Seats:
+    ) -> RidePositions:
         """Args:
         stations: (point_count,) float32 [m], how far along its guides each segment rides.
         per_meter: see `Riders.segments_per_meter`. segments: of a guide.
@@ -145,7 +145,7 @@ def _middles(points: Floats, offsets: Ints) -> Floats:
     """Distance from the root along the strand [m] of the middle of the segment that begins at each
     point, (point_count,) float32; values of tips are meaningless.
     """
-    ends = steps(points, offsets)
+    ends = segment_lengths(points, offsets)
     reached = np.cumsum(ends)
     reached -= np.repeat(reached[offsets[:-1]], np.diff(offsets))
     begins = np.append(ends[1:], 0.0)[: len(ends)]
@@ -181,7 +181,7 @@ def ride(
     have_left = bool(shifts.any())
     for block, seats in riders.blocks:
         rest = block.planes(points)
-        if motions is not None:  # the same, bit for bit, as `groom.roots.follow`
+        if motions is not None:  # the same, bit for bit, as `groom.roots.carry_with_roots`
             rest += motions.change(rest, block.strands)
         change, edge = np.empty_like(rest), rest[:, 1:] - rest[:, :-1]
         change[:, 0] = 0.0
@@ -289,7 +289,7 @@ def _with_steps(values: Floats) -> Floats:
 def _turned(
     edge: Floats,
     are_lines: bool,
-    seats: Seats,
+    seats: RidePositions,
     table: Floats,
     wide: Ints,
     axes: Floats | None,

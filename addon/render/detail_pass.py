@@ -26,11 +26,11 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..params.glsl import struct_values
-from ..refine.culling import shades_of
+from ..refine.culling import hidden_regions
 from ..refine.detail import NEAREST, PictureView
 from ..refine.settings import DetailSettings
 from ..refine.thinning import Thinning, thinning, width_factor
-from ..strands.arc_length import steps
+from ..strands.arc_length import segment_lengths
 from . import gpu_objects
 from .camera import Camera
 from .detail_classes import DetailClass, detail_classes
@@ -280,7 +280,7 @@ class GroomExtent:
     def of(cls, snapshot: Snapshot) -> GroomExtent:
         assert snapshot.rank is not None
         points, roots = snapshot.points, snapshot.roots.mean(axis=0, dtype=np.float64)
-        length = float(steps(points, snapshot.layout.offsets).sum())
+        length = float(segment_lengths(points, snapshot.layout.offsets).sum())
         low, high = points.min(axis=0) - roots, points.max(axis=0) - roots
         radius = float(snapshot.radius.mean())
         return cls(snapshot.rank, snapshot.radius, low, high, length, radius)
@@ -339,7 +339,7 @@ def _shades(snapshot: Snapshot, view: PictureView, widening: float) -> Floats:
     settings = snapshot.strand_settings
     radius = float(snapshot.radius.max()) * settings.fullness * widening
     half_width = max(settings.minimum_width / 2.0, EDGE) * widening
-    shades = shades_of(snapshot.occluder_spheres[:SHADE_CAPACITY], view, half_width, radius)
+    shades = hidden_regions(snapshot.occluder_spheres[:SHADE_CAPACITY], view, half_width, radius)
     packed = np.zeros((len(shades.nearest), 12), np.float32)
     packed[:, 0:3], packed[:, 3] = shades.origin, shades.nearest
     packed[:, 4:7], packed[:, 7] = shades.axis, shades.width

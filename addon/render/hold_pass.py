@@ -1,4 +1,4 @@
-"""Moves strands to where ties and surfaces hold them, on the GPU: `refine.hold.hold` after
+"""Moves strands to where ties and surfaces hold them, on the GPU: `refine.hold.hold_strands` after
 RidePass, on textures in the layouts of `strand_layout`.
 
     rest_points   RGBA32F: xyz position at rest [m, world]

@@ -16,7 +16,7 @@ import numpy as np
 from ..arrays import Floats
 from ..shading.area_lights import Panel
 from ..shading.lights import Light
-from ..strands.vectors import both_across, triple
+from ..strands.vectors import perpendicular_axes, triple
 
 #: steps of a sequence that fills a square evenly, used by no other sequence of a picture
 _STEPS = np.sqrt([2.0, 3.0]) - 1.0
@@ -43,7 +43,7 @@ def _at(light: Light, place: Floats, center: Floats) -> Light:
 
 def _of_sun(light: Light, aside: Floats) -> Light:
     """A point of the disk that fills a sun's angle, as in Cycles."""
-    right, up = both_across(np.array(light.vector))
+    right, up = perpendicular_axes(np.array(light.vector))
     x, y = np.tan(0.5 * min(light.angle, 0.99 * np.pi)) * aside
     towards = np.array(light.vector) + x * right + y * up
     return replace(light, vector=triple(towards / np.linalg.norm(towards)))
@@ -56,7 +56,7 @@ def _of_lamp(light: Light, aside: Floats, center: Floats) -> Light:
     distance = float(np.linalg.norm(away))
     if distance <= light.radius:  # the middle of the hair is inside the lamp
         return light
-    right, up = both_across(away / distance)
+    right, up = perpendicular_axes(away / distance)
     x, y = light.radius * aside
     at = triple(np.array(light.vector) + x * right + y * up)
     farther = float(x * x + y * y)

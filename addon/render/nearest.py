@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import Floats, Ints
-from ..strands.catmull_rom import between, slope_between
+from ..strands.catmull_rom import catmull_rom, catmull_rom_derivative
 from ..strands.vectors import unit
 from .camera import Camera
 from .camera_window import view_depth
@@ -78,7 +78,7 @@ class Nearest:
         for index, groom in enumerate(grooms):
             here = (self.groom == index) & (self.strand >= 0)
             if here.any():
-                curve = slope_between if slope else between
+                curve = catmull_rom_derivative if slope else catmull_rom
                 found[here] = curve(*_around(groom, self.strand[here], self.place[here]))
         return found
 

@@ -40,7 +40,7 @@ from ..arrays import Floats, Ints
 from ..dynamics.colliders import PosedCollider
 from ..groom.holds import Holds
 from ..groom.roots import RootHolds
-from ..refine.lead_out import NOT_LED, LedOut
+from ..refine.lead_out import NO_LED_OUT, LedOut
 from ..refine.ride import Riders
 from ..strands import StrandSet
 from . import gpu_objects
@@ -227,7 +227,7 @@ class RidePass:
         guides_now: Any,
         anchors: Floats | None = None,
         colliders: tuple[PosedCollider, ...] = (),
-        led: LedOut = NOT_LED,
+        led: LedOut = NO_LED_OUT,
         since: float = np.inf,
     ) -> None:
         """Set every strand to where its root carries it and its guides move it.
@@ -264,7 +264,7 @@ class RidePass:
         """The strands that were led out of colliders, read back."""
         led = self.lead_out.led_strands()
         if not len(led):
-            return NOT_LED
+            return NO_LED_OUT
         return LedOut.of(led, self.read(), self._strands.offsets)
 
     def release(self) -> None:
@@ -373,7 +373,7 @@ class RidePass:
         turns: str,
         anchors: Floats | None,
         colliders: tuple[PosedCollider, ...] = (),
-        led: LedOut = NOT_LED,
+        led: LedOut = NO_LED_OUT,
         since: float = np.inf,
     ) -> None:
         textures, count = self._textures, self._strands.strand_count

@@ -36,7 +36,7 @@ from ..dynamics.contacts import (
 from ..dynamics.force_fields import KINDS, SHAPES
 from ..dynamics.wind import MODES
 from ..refine import curls, detail, lead_out, ride
-from ..refine.hold import NEAR, SWEEPS
+from ..refine.hold import MIN_HOLD_ERROR, SWEEPS
 from ..refine.settings import DetailSettings
 from ..shading.card_look import DARKEST, MEAN_FACING
 from ..shading.card_texture import LEVELS, SLACK
@@ -134,7 +134,7 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
         "blend_opposite": repr(float(blend.MIN_DIRECTION)),
         "held_sweeps": str(HELD_SWEEPS),
         "hold_sweeps": str(SWEEPS),
-        "hold_near": repr(NEAR),
+        "hold_near": repr(MIN_HOLD_ERROR),
         "flattest": repr(FLATTEST),
         "lead_sweeps": str(lead_out.SWEEPS),
         "lead_slack": repr(lead_out.SLACK),

@@ -53,7 +53,7 @@ class HairCells:
         if body is None:
             return cls(grid, hair, None)
         whole = grid.aligned_to_blocks()
-        of_body = body.latest(_body_depth, whole.low, whole.cell, whole.shape)
+        of_body = body.compute_if_changed(_body_depth, whole.low, whole.cell, whole.shape)
         return cls(grid, hair, grid.crop(of_body, whole))
 
     def depth(self, extinction: float) -> Floats:
@@ -110,8 +110,8 @@ def openness_field(cells: HairCells, extinction: float) -> Field:
 
 
 def _body_depth(body: Surface, low: Floats, cell: float, shape: tuple[int, int, int]) -> Floats:
-    """`body_depth` by the numbers of a grid, a key for `Surface.latest`: combed hair keeps its
-    blocks."""
+    """`body_depth` by the numbers of a grid, a key for `Surface.compute_if_changed`: combed hair
+    keeps its blocks."""
     return body_depth(body, Grid(low, cell, shape))
 
 

@@ -85,7 +85,7 @@ def skin_field(
     """
     grid = _grid_with_margin(strands, cell_count or _CELLS)
     hair = np.float32(extinction) * hair_depth(strands, grid)
-    cells_of_skin = skin.latest(_SkinCells.of, grid.low, grid.cell, grid.shape)
+    cells_of_skin = skin.compute_if_changed(_SkinCells.of, grid.low, grid.cell, grid.shape)
     reflected = _reflected_light(hair, cells_of_skin)
     cells = np.concatenate(
         _propagated(hair, reflected, cells_of_skin.normal, cells_of_skin.is_skin)

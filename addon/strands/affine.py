@@ -9,7 +9,7 @@ from ..arrays import Floats
 _BLOCK = 8192  # points moved at once, so that they stay in the cache
 
 
-def moved(points: Floats, matrix: Floats) -> Floats:
+def transform_points(points: Floats, matrix: Floats) -> Floats:
     """Points (n, 3) moved by an affine (4, 4) matrix, float32; the same array for the identity.
 
     Does not use `@`: BLAS splits such a thin product over threads that wait for each other, and
@@ -36,7 +36,7 @@ def mean_scale(matrix: Floats) -> float:
     return float(abs(np.linalg.det(np.asarray(matrix, np.float64)[:3, :3])) ** (1.0 / 3.0))
 
 
-def turned_about(middle: Floats, angle: float) -> Floats:
+def rotation_about(middle: Floats, angle: float) -> Floats:
     """The (4, 4) rotation by an angle [rad] about the vertical axis through a point (3,)."""
     cosine, sine = np.cos(angle), np.sin(angle)
     turn = np.eye(4)

@@ -7,14 +7,14 @@ import numpy as np
 from ..arrays import Floats, Ints
 
 #: Points off by less than this fraction of the strand's length count as evenly spaced.
-_EVEN = 0.02
+_EVEN_TOLERANCE = 0.02
 #: Points processed at once, so that they stay in the cache.
-_AT_ONCE = 16_384
-#: `typical` rounds the mantissa of the median to multiples of 1 / _TYPICAL.
-_TYPICAL = 512
+_CHUNK = 16_384
+#: `typical_length` rounds the mantissa of the median to multiples of 1 / _MANTISSA_STEPS.
+_MANTISSA_STEPS = 512
 
 
-def steps(points: Floats, offsets: Ints) -> Floats:
+def segment_lengths(points: Floats, offsets: Ints) -> Floats:
     """The length of the segment that ends at each point, (point_count,) float64 [m]; 0 at roots.
 
     Args:
@@ -22,9 +22,9 @@ def steps(points: Floats, offsets: Ints) -> Floats:
         offsets: (strand_count + 1,), strand s is points[offsets[s]:offsets[s + 1]].
     """
     length = np.zeros(len(points))
-    for first in range(0, len(points) - 1, _AT_ONCE):
+    for first in range(0, len(points) - 1, _CHUNK):
         # one row per axis: numpy is slow on rows of three
-        rows = np.ascontiguousarray(points[first : first + _AT_ONCE + 1].T, np.float64)
+        rows = np.ascontiguousarray(points[first : first + _CHUNK + 1].T, np.float64)
         step = rows[:, 1:] - rows[:, :-1]
         step *= step
         x, y, z = step
@@ -35,30 +35,31 @@ def steps(points: Floats, offsets: Ints) -> Floats:
     return length
 
 
-def lengths(points: Floats, offsets: Ints) -> Floats:
-    """Arc length of each strand, (strand_count,) float32 [m]; arguments as for `steps`."""
+def strand_lengths(points: Floats, offsets: Ints) -> Floats:
+    """Arc length of each strand, (strand_count,) float32 [m]; arguments as for
+    `segment_lengths`."""
     if len(offsets) < 2:
         return np.zeros(0, np.float32)
-    total: Floats = np.add.reduceat(steps(points, offsets), offsets[:-1])
+    total: Floats = np.add.reduceat(segment_lengths(points, offsets), offsets[:-1])
     return total.astype(np.float32)
 
 
-def typical(length: Floats) -> float:
+def typical_length(length: Floats) -> float:
     """The median of lengths (n,), rounded to its first binary digits.
 
     Rounded so that combing a few strands does not change the unit that all others are measured in.
     """
     mantissa, exponent = np.frexp(np.median(length))
-    return float(np.ldexp(np.round(mantissa * _TYPICAL), exponent)) / _TYPICAL
+    return float(np.ldexp(np.round(mantissa * _MANTISSA_STEPS), exponent)) / _MANTISSA_STEPS
 
 
-def reached(points: Floats, offsets: Ints) -> Floats:
+def arc_lengths(points: Floats, offsets: Ints) -> Floats:
     """The distance of each point from its root, along the strand, (point_count,) float64 [m].
 
     The values of a strand do not depend on other strands, not even by rounding. Arguments as for
-    `steps`.
+    `segment_lengths`.
     """
-    length, counts = steps(points, offsets), np.diff(offsets)
+    length, counts = segment_lengths(points, offsets), np.diff(offsets)
     if len(counts) and (counts == counts[0]).all():
         return np.cumsum(length.reshape(len(counts), -1), axis=1).ravel()
     for count in np.unique(counts).tolist():
@@ -67,42 +68,43 @@ def reached(points: Floats, offsets: Ints) -> Floats:
     return length
 
 
-def along(points: Floats, offsets: Ints) -> Floats:
+def length_fractions(points: Floats, offsets: Ints) -> Floats:
     """The fraction of its strand's length at which each point lies, (point_count,) float64.
 
-    Where a strand has no length, its points are spaced evenly. Arguments as for `steps`.
+    Where a strand has no length, its points are spaced evenly. Arguments as for `segment_lengths`.
     """
-    return along_of(reached(points, offsets), offsets)
+    return length_fractions_from(arc_lengths(points, offsets), offsets)
 
 
-def along_of(length: Floats, offsets: Ints) -> Floats:
-    """`along`, computed from the result of `reached`."""
+def length_fractions_from(length: Floats, offsets: Ints) -> Floats:
+    """`length_fractions`, computed from the result of `arc_lengths`."""
     whole = np.repeat(length[offsets[1:] - 1], np.diff(offsets))
-    fraction = np.divide(length, whole, out=even(offsets), where=whole > 0.0)
+    fraction = np.divide(length, whole, out=even_fractions(offsets), where=whole > 0.0)
     fraction[offsets[1:] - 1] = 1.0
     return np.minimum(fraction, 1.0)
 
 
-def uneven_along(points: Floats, offsets: Ints) -> Floats | None:
-    """`along` as float32; None if all points are about evenly spaced, as after resampling."""
-    fraction = along(points, offsets)
-    if np.abs(fraction - even(offsets)).max(initial=0.0) < _EVEN:
+def uneven_length_fractions(points: Floats, offsets: Ints) -> Floats | None:
+    """`length_fractions` as float32; None if all points are about evenly spaced, as after
+    resampling."""
+    fraction = length_fractions(points, offsets)
+    if np.abs(fraction - even_fractions(offsets)).max(initial=0.0) < _EVEN_TOLERANCE:
         return None
     return fraction.astype(np.float32)
 
 
-def even(offsets: Ints) -> Floats:
-    """`along` for evenly spaced points, (point_count,) float64."""
+def even_fractions(offsets: Ints) -> Floats:
+    """`length_fractions` for evenly spaced points, (point_count,) float64."""
     counts = np.diff(offsets)
     number = np.arange(offsets[-1]) - np.repeat(offsets[:-1], counts)
     return number / np.repeat(np.maximum(counts - 1, 1), counts)
 
 
-def first_as_far(along: Floats, offsets: Ints, wanted: Floats) -> Ints:
+def first_point_at_arc_length(along: Floats, offsets: Ints, wanted: Floats) -> Ints:
     """The first point of each strand at or past each wanted arc length, (strand_count, n).
 
     Args:
-        along: see `reached`. wanted: (strand_count, n) [m], no farther than the tip.
+        along: see `arc_lengths`. wanted: (strand_count, n) [m], no farther than the tip.
     """
     number = np.arange(len(wanted))
     length = np.maximum(along[offsets[1:] - 1], np.finfo(np.float64).tiny)

@@ -9,7 +9,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 
 
-def on_curve(grid: Floats, left: Ints, t: Floats) -> Floats:
+def points_on_curve(grid: Floats, left: Ints, t: Floats) -> Floats:
     """Points of the curves through these CVs, (n, k, 3).
 
     The neighbours that the end segments lack are extrapolated straight.
@@ -23,11 +23,11 @@ def on_curve(grid: Floats, left: Ints, t: Floats) -> Floats:
     result = np.empty((*number.shape, 3), grid.dtype)
     for axis in range(3):  # one by one: numpy is slow on rows of three
         along = np.ascontiguousarray(extended[..., axis])
-        result[..., axis] = between([along.take(number + step) for step in range(4)], t)
+        result[..., axis] = catmull_rom([along.take(number + step) for step in range(4)], t)
     return result
 
 
-def between(points: Sequence[Floats], t: Floats) -> Floats:
+def catmull_rom(points: Sequence[Floats], t: Floats) -> Floats:
     """The curve between the second of four points, at t = 0, and the third, at t = 1."""
     p0, p1, p2, p3 = points
     m1, m2 = 0.5 * (p2 - p0), 0.5 * (p3 - p1)  # the tangents
@@ -36,8 +36,8 @@ def between(points: Sequence[Floats], t: Floats) -> Floats:
     return found
 
 
-def slope_between(points: Sequence[Floats], t: Floats) -> Floats:
-    """The derivative of `between` by t."""
+def catmull_rom_derivative(points: Sequence[Floats], t: Floats) -> Floats:
+    """The derivative of `catmull_rom` by t."""
     p0, p1, p2, p3 = points
     m1, m2 = 0.5 * (p2 - p0), 0.5 * (p3 - p1)
     chord = p2 - p1
@@ -47,14 +47,14 @@ def slope_between(points: Sequence[Floats], t: Floats) -> Floats:
     return found
 
 
-def evenly_on_curve(grid: Floats, count: int) -> Floats:
+def even_points_on_curve(grid: Floats, count: int) -> Floats:
     """The curves sampled at `count` even parameters each, (n, count, 3); both ends stay."""
-    left, t = even_places(grid.shape[1], count)
+    left, t = even_parameters(grid.shape[1], count)
     shape = len(grid), count
-    return on_curve(grid, np.broadcast_to(left, shape), np.broadcast_to(t, shape))
+    return points_on_curve(grid, np.broadcast_to(left, shape), np.broadcast_to(t, shape))
 
 
-def even_places(cv_count: int, count: int) -> tuple[Ints, Floats]:
+def even_parameters(cv_count: int, count: int) -> tuple[Ints, Floats]:
     """The even parameters: segment (count,), and t in it (count,) float32 from 0 to 1."""
     place = np.linspace(0.0, cv_count - 1.0, count)
     left = np.minimum(place.astype(np.int64), cv_count - 2)

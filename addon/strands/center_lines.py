@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays import Floats
-from .arc_length import first_as_far
+from .arc_length import first_point_at_arc_length
 from .resample import evenly_spaced
 from .strand_set import StrandSet
 
@@ -76,7 +76,7 @@ def _means(grid: Floats, cv_count: int) -> Floats:
     reached = _summed(length)
     wanted = reached[:, -1:] * np.linspace(0.0, 1.0, cv_count)
     offsets = np.arange(len(grid) + 1) * grid.shape[1]
-    left = first_as_far(reached.ravel(), offsets, wanted) - 1
+    left = first_point_at_arc_length(reached.ravel(), offsets, wanted) - 1
     left = np.maximum(left, offsets[:-1, None])
     inside = wanted - reached.take(left)
     # the segment in which each CV lies

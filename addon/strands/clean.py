@@ -49,8 +49,8 @@ def clean(
         points: (point_count, 3) [m].
         offsets: (curve_count + 1,), ascending from 0 to point_count.
         radius: (point_count,) [m]; 0 at a pointed tip becomes a very small radius. Values that are
-            no radii, see `are_widths`, become the median of the others, or 0.04 mm if there are
-            none.
+            no radii, see `are_valid_widths`, become the median of the others, or 0.04 mm if there
+            are none.
         group: (curve_count,); absent: one group, 0.
         root_uv: (curve_count, 2); values that are not finite become 0.
         color: (point_count, 3) scene-linear; see `usable_colors`.
@@ -92,7 +92,7 @@ def clean(
         radius=_usable_radius(radius, offsets)[point_kept],
         group=np.zeros(len(kept), np.int32) if group is None else np.asarray(group)[kept],
         root_uv=None if root_uv is None else np.nan_to_num(root_uv, posinf=0, neginf=0)[kept],
-        has_widths=radius is not None and bool(are_widths(np.asarray(radius), offsets).any()),
+        has_widths=radius is not None and bool(are_valid_widths(np.asarray(radius), offsets).any()),
         color=None if color is None else color[point_kept],
         seed=None if seed is None else np.asarray(seed)[kept],
     )
@@ -137,13 +137,13 @@ def _usable_radius(radius: Floats | None, offsets: Ints) -> Floats:
     if radius is None:
         return np.full(offsets[-1], DEFAULT_RADIUS, np.float32)
     radius = np.asarray(radius, np.float32)
-    is_width = are_widths(radius, offsets)
+    is_width = are_valid_widths(radius, offsets)
     is_positive = is_width & (radius > 0.0)
     known = _middle(radius[is_positive]) if is_positive.any() else np.float32(DEFAULT_RADIUS)
     return np.where(is_positive, radius, np.where(is_width, known * np.float32(_POINTED), known))
 
 
-def are_widths(radius: Floats, offsets: Ints) -> Bools:
+def are_valid_widths(radius: Floats, offsets: Ints) -> Bools:
     """Which values can be radii or widths of one groom, (point_count,).
 
     They are finite, positive and not far larger than the others. 0 is a width as well if the strand

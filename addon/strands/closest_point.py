@@ -16,8 +16,8 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints, piece_starts
 from ..errors import HairloomError
+from .parallel import parallel_map
 from .point_clusters import PointClusters, clustered
-from .side_by_side import side_by_side
 from .surface import Surface
 from .triangle_distance import TriangleForms
 from .triangle_tree import TriangleTree, build_tree
@@ -149,7 +149,7 @@ class ClosestPointSearch:
     def _search_all(self, points: Floats, reach: float) -> Ints:
         """The nearest triangle of each point, without clusters, in several threads."""
         chunks = (points[i : i + _CHUNK] for i in range(0, len(points), _CHUNK))
-        found = side_by_side(lambda chunk: self._search(chunk, reach), chunks)
+        found = parallel_map(lambda chunk: self._search(chunk, reach), chunks)
         return np.concatenate([np.zeros(0, np.int64), *found])
 
     def _search(self, points: Floats, reach: float) -> Ints:
@@ -265,7 +265,7 @@ def search_of(surface: Surface) -> ClosestPointSearch:
     Raises:
         HairloomError: the surface has no triangles.
     """
-    return surface.once(ClosestPointSearch)
+    return surface.compute_once(ClosestPointSearch)
 
 
 def closest_point(points: Floats, surface: Surface) -> ClosestPoints:

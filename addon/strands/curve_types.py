@@ -25,7 +25,7 @@ class CurveType(IntEnum):
     NURBS = 3
 
 
-class Knots(IntEnum):
+class KnotMode(IntEnum):
     """Where the knots of a NURBS curve lie; numbered as in Blender."""
 
     NORMAL = 0
@@ -52,7 +52,7 @@ class CurveShapes:
     kind: (curve_count,) of `CurveType`.
     resolution: (curve_count,) pieces of each segment of a Bezier or NURBS curve.
     order: (curve_count,), NURBS only, one more than the degree.
-    knots: (curve_count,) of `Knots`.
+    knots: (curve_count,) of `KnotMode`.
     weight: (point_count,), NURBS only.
     left, right: (point_count, 3) Bezier handles, in the space of the points.
     """
@@ -90,7 +90,7 @@ class _Alike:
 
 
 @dataclass(frozen=True, eq=False)
-class DrawnCurves:
+class EvaluatedCurves:
     """Evaluated curves.
 
     points: (point_count, 3) on the curves. offsets: (curve_count + 1,), where each curve begins.
@@ -109,7 +109,7 @@ class DrawnCurves:
         return found.reshape(-1, *values.shape[1:])
 
 
-def drawn_curves(points: Floats, offsets: Ints, shapes: CurveShapes) -> DrawnCurves:
+def evaluate_curves(points: Floats, offsets: Ints, shapes: CurveShapes) -> EvaluatedCurves:
     """Open curves as Blender draws them.
 
     Args:
@@ -142,13 +142,13 @@ def drawn_curves(points: Floats, offsets: Ints, shapes: CurveShapes) -> DrawnCur
             found[outer_rows] = _bezier(points, shapes, inner_rows, row[2])
         else:
             found[outer_rows] = part.of(points)
-    return DrawnCurves(found, outer, tuple(parts))
+    return EvaluatedCurves(found, outer, tuple(parts))
 
 
 def _have_knots(counts: Ints, shapes: CurveShapes) -> Bools:
     """Which NURBS curves have enough points; Blender draws the others as polygons."""
     order = shapes.order
-    needs_more = shapes.knots == Knots.BEZIER
+    needs_more = shapes.knots == KnotMode.BEZIER
     return (order >= 2) & (counts >= order + needs_more)
 
 
@@ -223,8 +223,8 @@ def _nurbs(count: int, pieces: int, order: int, mode: int) -> Floats:
 
 def _knot_places(count: int, order: int, mode: int) -> Floats:
     """The knots of an open curve, (count + order,), in one of Blender's modes."""
-    is_bezier = mode in (Knots.BEZIER, Knots.ENDPOINT_BEZIER)
-    reaches_ends = mode in (Knots.ENDPOINT, Knots.ENDPOINT_BEZIER)
+    is_bezier = mode in (KnotMode.BEZIER, KnotMode.ENDPOINT_BEZIER)
+    reaches_ends = mode in (KnotMode.ENDPOINT, KnotMode.ENDPOINT_BEZIER)
     repeated = order - 1 if is_bezier else 1
     left = order if reaches_ends else min(2, repeated) if is_bezier else 1
     knots, current = np.empty(count + order), 0.0

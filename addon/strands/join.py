@@ -11,7 +11,7 @@ from .colors import joined_colors
 from .strand_set import StrandSet
 
 
-def joined(one: StrandSet, other: StrandSet) -> StrandSet:
+def join_strands(one: StrandSet, other: StrandSet) -> StrandSet:
     """Both, concatenated; root data that only one of them has is dropped."""
     both: dict[str, Any] = {}
     for name in ("points", "radius", "group", "root_uv", "root_triangle", "root_barycentric"):

@@ -45,7 +45,7 @@ class Edges:
 
 
 def edges_of(surface: Surface) -> Edges:
-    return surface.once(_edges_of)
+    return surface.compute_once(_edges_of)
 
 
 def _edges_of(surface: Surface) -> Edges:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Floats, Ints
-from .side_by_side import THREADS, side_by_side
+from .parallel import THREADS, parallel_map
 
 #: Distances measured at once: few enough for the cache, many enough for numpy.
 _TABLE = 65_536
@@ -41,7 +41,7 @@ def nearest_points(places: Floats, among: Floats, count: int) -> tuple[Ints, Flo
     begin: list[Ints] = [np.arange(len(places))] if len(places) else []
     while len(begin) < THREADS and len(places) > _MANY:
         begin = [half for own in begin for half in _halves(own, place.take(own, axis=1))]
-    side_by_side(lambda own: _search(own, place, point, index, distance), begin)
+    parallel_map(lambda own: _search(own, place, point, index, distance), begin)
     return index, distance
 
 

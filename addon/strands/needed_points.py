@@ -7,55 +7,57 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
-from .arc_length import along_of, reached, typical
-from .kept import NOTHING_KEPT, Kept
+from .arc_length import arc_lengths, length_fractions_from, typical_length
 from .resample import positions_at, resample
+from .result_cache import NO_CACHE, ResultCache
 from .strand_set import StrandSet
 
 #: Maximum number of points of a strand: with 410, 20 turns of a coil lose LOST.
 MAX_POINTS = 512
 #: Fraction of its length that a strand may lose.
-LOST = 0.005
+MAX_LENGTH_LOSS = 0.005
 #: Fraction of the hair's median length that a strand may stray by: 0.2 mm for 25 cm.
-STRAY = 8.0e-4
+MAX_DEVIATION = 8.0e-4
 #: Approximate ratio between successive counts to try.
 _STEP = 1.25
 #: Points tested at once, so that they stay in the cache.
 _CHUNK = 100_000
 
 
-def with_own_points(strands: StrandSet, least: int) -> StrandSet:
+def with_all_points(strands: StrandSet, min_points: int) -> StrandSet:
     """The same strands with all of their points, which they may need once they move.
 
-    A strand of fewer than `least` points gets more in between; one of more than MAX_POINTS is
+    A strand of fewer than `min_points` points gets more in between; one of more than MAX_POINTS is
     resampled to that many.
     """
     own = strands.point_counts
-    return with_points(strands, np.clip(own, least, MAX_POINTS), own > MAX_POINTS)
+    return with_points(strands, np.clip(own, min_points, MAX_POINTS), own > MAX_POINTS)
 
 
-def with_needed_points(strands: StrandSet, least: int, kept: Kept = NOTHING_KEPT) -> StrandSet:
-    """The same strands with no more points than their shapes need, and at least `least` each.
+def with_needed_points(
+    strands: StrandSet, min_points: int, cache: ResultCache = NO_CACHE
+) -> StrandSet:
+    """The same strands with no more points than their shapes need, and at least `min_points` each.
 
     A strand is resampled evenly to as few points as it takes to lose at most LOST of its length and
     to stray by at most STRAY of the median length of all. If that is no fewer than it has, it keeps
-    its own points; with fewer than `least` of them it gets more in between.
+    its own points; with fewer than `min_points` of them it gets more in between.
 
     Args:
-        kept: results of the last call, used if all strands have the same point count.
+        cache: results of the last call, used if all strands have the same point count.
     """
     own = strands.point_counts
-    if not strands.strand_count or (own == least).all():
+    if not strands.strand_count or (own == min_points).all():
         return strands
-    stray = STRAY * typical(strands.lengths())
+    stray = MAX_DEVIATION * typical_length(strands.lengths())
 
     def of(some: Ints) -> tuple[Ints, Bools]:
-        return _needed(strands.take(some), least, stray)
+        return _needed(strands.take(some), min_points, stray)
 
     if strands.is_uniform:
-        needed, is_even = kept.rows("points", (least, stray), (strands.grid,), of)
+        needed, is_even = cache.rows("points", (min_points, stray), (strands.grid,), of)
     else:
-        needed, is_even = _needed(strands, least, stray)
+        needed, is_even = _needed(strands, min_points, stray)
     return with_points(strands, needed, is_even)
 
 
@@ -81,18 +83,18 @@ def with_points(strands: StrandSet, counts: Ints, is_even: Bools) -> StrandSet:
     return replace(strands, points=points, offsets=offsets, radius=radius, color=color)
 
 
-def _needed(strands: StrandSet, least: int, stray: float) -> tuple[Ints, Bools]:
+def _needed(strands: StrandSet, min_points: int, stray: float) -> tuple[Ints, Bools]:
     """How many points each strand gets, and whether evenly, (strand_count,) each.
 
     A strand tries the lowest count first, which is enough for most; then the next one below its
     own; then it bisects between what was too few and what was enough.
     """
     own = strands.point_counts
-    along = reached(strands.points, strands.offsets)
-    counts = np.array(_counts(least))
+    along = arc_lengths(strands.points, strands.offsets)
+    counts = np.array(_counts(min_points))
     # range of the counts that each strand has left to try; `last` stands for its own points
     low = np.zeros(len(own), np.int64)
-    last = np.where(own == least, 0, np.maximum(counts.searchsorted(own), 1))
+    last = np.where(own == min_points, 0, np.maximum(counts.searchsorted(own), 1))
     high = last.copy()
     tried = np.zeros(len(own), np.int64)
     while (left := np.flatnonzero(low < high)).size:
@@ -105,7 +107,7 @@ def _needed(strands: StrandSet, least: int, stray: float) -> tuple[Ints, Bools]:
         is_first = (low == 1) & (high == last) & (tried == 0)
         tried = np.where(is_first, high - 1, (low + high) // 2)
     is_even = low < last
-    kept = np.clip(own, least, MAX_POINTS)
+    kept = np.clip(own, min_points, MAX_POINTS)
     needed = np.where(is_even, counts[np.minimum(low, len(counts) - 1)], kept)
     return needed, is_even | (own > MAX_POINTS)
 
@@ -118,8 +120,8 @@ def _suffice(strands: StrandSet, along: Floats, some: Ints, count: int, stray: f
     return np.concatenate(found)
 
 
-def _counts(least: int) -> list[int]:
-    counts, count = [], float(least)
+def _counts(min_points: int) -> list[int]:
+    counts, count = [], float(min_points)
     while count < MAX_POINTS:
         counts.append(round(count))
         count *= _STEP
@@ -130,7 +132,7 @@ def _counts(least: int) -> list[int]:
 class _Lines:
     """Some strands.
 
-    axes: (3, point_count) [m], the points. along: (point_count,) [m], see `arc_length.reached`.
+    axes: (3, point_count) [m], the points. along: (point_count,) [m], see `arc_length.arc_lengths`.
     offsets: (strand_count + 1,).
     """
 
@@ -157,7 +159,7 @@ class _Lines:
         even = [axis.take(left) * before + axis.take(left + 1) * weight for axis in self.axes]
         steps = (np.diff(axis.astype(np.float64), axis=1) for axis in even)
         total = np.sqrt(sum(step * step for step in steps)).sum(axis=1)
-        suffices = np.asarray(total >= (1.0 - LOST) * length)
+        suffices = np.asarray(total >= (1.0 - MAX_LENGTH_LOSS) * length)
         long = np.flatnonzero(suffices)  # the others fail anyway
         if len(long):
             lines = self if len(long) == len(length) else self.take(long)
@@ -173,7 +175,7 @@ class _Lines:
         """
         count = even[0].shape[1]
         # measured to the place at the same fraction, which is no nearer than the closest place
-        place = along_of(self.along, self.offsets)
+        place = length_fractions_from(self.along, self.offsets)
         place *= count - 1
         before = np.minimum(place.astype(np.int64), count - 2)
         part = place

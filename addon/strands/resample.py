@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Floats, Ints
-from .arc_length import first_as_far, reached
+from .arc_length import arc_lengths, first_point_at_arc_length
 from .strand_set import StrandSet
 
 
@@ -49,14 +49,14 @@ def arc_length_positions(strands: StrandSet, cv_count: int) -> tuple[Ints, Float
         left: (strand_count, cv_count) indices into points.
         weight: (strand_count, cv_count) in [0, 1].
     """
-    return positions_at(reached(strands.points, strands.offsets), strands.offsets, cv_count)
+    return positions_at(arc_lengths(strands.points, strands.offsets), strands.offsets, cv_count)
 
 
 def positions_at(along: Floats, offsets: Ints, cv_count: int) -> tuple[Ints, Floats]:
-    """`arc_length_positions` from the arc length `along` at each point, see `reached`."""
+    """`arc_length_positions` from the arc length `along` at each point, see `arc_lengths`."""
     first, last = offsets[:-1], offsets[1:] - 1
     wanted = along[last, None] * np.linspace(0.0, 1.0, cv_count)
-    right = first_as_far(along, offsets, wanted)
+    right = first_point_at_arc_length(along, offsets, wanted)
     right = np.clip(right, first[:, None] + 1, last[:, None])
     left = right - 1
     span = along[right] - along[left]

@@ -82,7 +82,7 @@ def _at(uv: Floats, surface: Surface) -> tuple[Ints, Floats]:
         )
     places = np.zeros((len(uv), 3), np.float32)
     places[:, :2] = uv
-    found = surface.once(_search_of_map).closest(places)
+    found = surface.compute_once(_search_of_map).closest(places)
     if len(uv) and found.distance.max() > _OFF_THE_MAP:
         raise HairloomError(
             "its UV map has no face where hair is to grow",

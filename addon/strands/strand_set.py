@@ -11,8 +11,8 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..errors import HairloomError
-from .affine import mean_scale, moved
-from .arc_length import lengths, uneven_along
+from .affine import mean_scale, transform_points
+from .arc_length import strand_lengths, uneven_length_fractions
 
 #: Radius of hair without widths of its own, until `groom.widths` finds one.
 DEFAULT_RADIUS = 4.0e-5  # [m], half of 0.08 mm, a typical human hair
@@ -137,13 +137,13 @@ class StrandSet:
 
     def lengths(self) -> Floats:
         """Arc length of each strand, (strand_count,) [m]."""
-        return lengths(self.points, self.offsets)
+        return strand_lengths(self.points, self.offsets)
 
     @cached_property
-    def uneven_along(self) -> Floats | None:
+    def uneven_length_fractions(self) -> Floats | None:
         """The fraction of its strand's length at each point, (point_count,); None if points are
-        evenly spaced, see `arc_length.uneven_along`."""
-        return uneven_along(self.points, self.offsets)
+        evenly spaced, see `arc_length.uneven_length_fractions`."""
+        return uneven_length_fractions(self.points, self.offsets)
 
     def take(self, strands: Ints) -> StrandSet:
         """The strands with these indices, in this order."""
@@ -172,9 +172,9 @@ class StrandSet:
     def transformed(self, matrix: Floats) -> StrandSet:
         """Moved by an affine (4, 4) matrix; radii scale by the cube root of its volume change."""
         radius = self.radius * np.float32(mean_scale(matrix))
-        return replace(self, points=moved(self.points, matrix), radius=radius)
+        return replace(self, points=transform_points(self.points, matrix), radius=radius)
 
-    def strands(self) -> Iterator[Floats]:
+    def iter_strands(self) -> Iterator[Floats]:
         """The points of each strand, for slow reference implementations and tests."""
         for start, end in zip(self.offsets[:-1], self.offsets[1:], strict=True):
             yield self.points[start:end]

@@ -10,10 +10,10 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..errors import HairloomError
-from .affine import moved
+from .affine import transform_points
 from .triangles import area_vectors
 from .vectors import unit
-from .weld import same_places
+from .weld import unique_position_indices
 
 #: Coincident vertices share a normal if their own is within 41 degrees of it (cosine). Normals of a
 #: box that is split at its edges are at least 45 degrees away, so its edges stay hard.
@@ -63,7 +63,7 @@ class Surface:
 
     def welded_triangles(self) -> Ints:
         """The triangles with coincident vertices merged, as numbers of places, like `triangles`."""
-        triangles: Ints = self.once(_places)[self.triangles]
+        triangles: Ints = self.compute_once(_places)[self.triangles]
         return triangles
 
     def vertex_normals(self) -> Floats:
@@ -72,14 +72,14 @@ class Surface:
         Coincident vertices share theirs, so that UV seams do not show, except where they face
         different ways, as at hard edges and on two-sided sheets.
         """
-        return self.once(_vertex_normals)
+        return self.compute_once(_vertex_normals)
 
     def bounds(self) -> tuple[Floats, Floats]:
         """Lowest and highest corner, each (3,) [m]."""
         rows = np.ascontiguousarray(self.positions.T)  # numpy is slow on rows of three
         return rows.min(axis=1), rows.max(axis=1)
 
-    def once[T](self, make: Callable[[Surface], T]) -> T:
+    def compute_once[T](self, make: Callable[[Surface], T]) -> T:
         """The result of `make` for this surface, computed once and cached as long as it lives.
 
         Many callers search the same head.
@@ -90,7 +90,7 @@ class Surface:
         found: T = kept[make]
         return found
 
-    def latest[**Rest, T](
+    def compute_if_changed[**Rest, T](
         self,
         make: Callable[Concatenate[Surface, Rest], T],
         *arguments: Rest.args,
@@ -110,7 +110,7 @@ class Surface:
 
     def transformed(self, matrix: Floats) -> Surface:
         """Moved by an affine (4, 4) matrix; a mirroring one reverses the triangles' winding."""
-        positions = moved(self.positions, matrix)
+        positions = transform_points(self.positions, matrix)
         if np.linalg.det(np.asarray(matrix, np.float64)[:3, :3]) >= 0.0:
             return replace(self, positions=positions)
         uv = None if self.corner_uv is None else self.corner_uv[:, ::-1]
@@ -134,7 +134,7 @@ def _vertex_normals(surface: Surface) -> Floats:
 def _shared(surface: Surface, total: Floats) -> Floats:
     """Unit normals, (vertex_count, 3), from the sums of normals around each vertex, shared between
     coincident vertices where smooth."""
-    own, place = unit(total), surface.once(_places)
+    own, place = unit(total), surface.compute_once(_places)
     count = int(place.max(initial=-1)) + 1
     if count == len(own):
         return own
@@ -147,7 +147,7 @@ def _shared(surface: Surface, total: Floats) -> Floats:
 
 def _places(surface: Surface) -> Ints:
     """A number for each vertex, the same for coincident ones, (vertex_count,)."""
-    return same_places(surface.positions)
+    return unique_position_indices(surface.positions)
 
 
 def _are_equal(some: tuple[Any, ...], others: tuple[Any, ...]) -> bool:

@@ -36,7 +36,7 @@ def quartered(values: Floats) -> Floats:
     return quarters.reshape(-1, 3, *values.shape[2:])
 
 
-def evenly_within(one: Floats, other: Floats) -> Floats:
+def uniform_barycentrics(one: Floats, other: Floats) -> Floats:
     """Barycentric coordinates (n, 3), uniform over a triangle if the two numbers (n,) are uniform
     in [0, 1] (Turk 1990, Graphics Gems)."""
     root = np.sqrt(one)

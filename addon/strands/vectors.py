@@ -44,7 +44,7 @@ def even_directions(count: int) -> Floats:
     return np.stack([across * np.cos(angle), across * np.sin(angle), height], axis=1)
 
 
-def both_across(along: Floats) -> tuple[Floats, Floats]:
+def perpendicular_axes(along: Floats) -> tuple[Floats, Floats]:
     """Two unit vectors (3,) perpendicular to a unit vector and to each other."""
     side = np.cross(along, np.eye(3)[np.abs(along).argmin()])
     side /= np.linalg.norm(side)

@@ -10,7 +10,7 @@ from ..arrays import Floats, Ints
 _MIX = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np.uint64)
 
 
-def same_places(positions: Floats) -> Ints:
+def unique_position_indices(positions: Floats) -> Ints:
     """A number from 0 for each of the positions (n, 3) float32, the same for equal ones, (n,)."""
     bits = (positions + np.float32(0.0)).view(np.uint32).astype(np.uint64)  # -0 becomes 0
     key = (bits * _MIX).sum(axis=1, dtype=np.uint64)

@@ -38,7 +38,7 @@ from hairloom.addon.params import SettingsMap  # noqa: E402
 from hairloom.addon.rig_flow import Pose, Rig  # noqa: E402
 from hairloom.addon.shading.texture_settings import TextureSettings  # noqa: E402
 from hairloom.addon.strands import Surface  # noqa: E402
-from hairloom.addon.strands.arc_length import typical  # noqa: E402
+from hairloom.addon.strands.arc_length import typical_length  # noqa: E402
 
 FRAMES, RATE = 31, 30.0
 PANDA_MOTION = Path(__file__).parent / "panda_motion.py"
@@ -141,7 +141,7 @@ def test_skinned_cards_are_the_simulated_ones(
     rms = np.sqrt(np.mean(np.square(wrong)))
     length = told["error"]["hair_length"]
     steps = np.diff(motion.rig.guide_grid, axis=1)
-    assert length == typical(np.linalg.norm(steps, axis=2).sum(axis=1))
+    assert length == typical_length(np.linalg.norm(steps, axis=2).sum(axis=1))
     assert rms < 0.01 * length
     # within 20 %, because vertices count once for each corner here
     assert rms == pytest.approx(told["error"]["root_mean_square"], rel=0.2)

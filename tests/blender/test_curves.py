@@ -282,7 +282,7 @@ def test_curves_of_every_type_are_where_blender_draws_them(kind, attributes, get
     bpy.ops.object.convert(target="MESH")
     mesh = bpy.context.object.data
     vertex = np.array([each.co for each in mesh.vertices])
-    for number, strand in enumerate(read.strands.strands()):
+    for number, strand in enumerate(read.strands.iter_strands()):
         drawn = smoothed(strand)
         own = vertex[vertex[:, 0] > 0.7] if number else vertex[vertex[:, 0] <= 0.7]
         count = max(1600 // len(own), 8)

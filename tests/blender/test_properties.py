@@ -19,8 +19,8 @@ from hairloom.addon.blender.scene import look_materials
 from hairloom.addon.blender.strands import growing
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.parameters import ALL_SETTINGS
-from hairloom.addon.params.curve import PLACES
-from hairloom.addon.params.field import NAMING
+from hairloom.addon.params.curve import KNOT_POSITIONS
+from hairloom.addon.params.field import NAME_KINDS
 
 pytestmark = pytest.mark.portable
 
@@ -89,7 +89,7 @@ def test_every_value_that_blender_takes_is_one_that_settings_take(section, group
         if parameter.hard_range is None:
             return
         is_whole = parameter.kind == "integer"
-        values = {"color": 3, "curve": len(PLACES)}.get(parameter.kind)
+        values = {"color": 3, "curve": len(KNOT_POSITIONS)}.get(parameter.kind)
         for wanted in (-math.inf, *parameter.hard_range, math.inf):
             limited = max(-(2**31), min(wanted, 2**31 - 1)) if is_whole else wanted
             setattr(group, parameter.name, (limited,) * values if values else limited)
@@ -194,7 +194,7 @@ def test_keyframes_change_nothing_that_needs_other_hair(new_hair):
         for section, kind in ALL_SETTINGS.items():
             group = getattr(owner.hairloom, section, None)
             for parameter in kind.parameters() if group is not None else ():
-                if parameter.kind in NAMING or parameter.name in known:
+                if parameter.kind in NAME_KINDS or parameter.name in known:
                     continue
                 before, value = GroomSettings.of(hair), getattr(group, parameter.name)
                 value = tuple(value) if parameter.kind in ("color", "curve") else value

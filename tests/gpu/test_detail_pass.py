@@ -12,7 +12,7 @@ import pytest
 from refinement_probes import adaptive_points, point_textures, read_factors
 from tiers import few_in_commits
 
-from hairloom.addon.refine.culling import faces_away, hidden, shades_of
+from hairloom.addon.refine.culling import are_facing_away, are_hidden, hidden_regions
 from hairloom.addon.refine.detail import PictureView, detail_factors
 from hairloom.addon.refine.detail import stations as stations_of
 from hairloom.addon.refine.settings import DetailSettings
@@ -101,7 +101,7 @@ def test_factors_and_culling_are_those_of_numpy(
     assert apart.max() <= 1 and (apart[~is_near] > 0).mean() < 0.001 and is_near.mean() < 0.5
     if cv_count > 2 and mode != "fixed":
         assert len(np.unique(found)) > 10, "the grooms have all kinds of segments"
-    is_hidden = hidden(strands, shades_of(OCCLUDER_SPHERES, view, 0.75, 5e-4))
+    is_hidden = are_hidden(strands, hidden_regions(OCCLUDER_SPHERES, view, 0.75, 5e-4))
     assert is_hidden.any(), "some are behind the balls"
     drawn = drawn_of(order)
     assert len(np.setxor1d(drawn, np.flatnonzero(~is_hidden))) <= 1
@@ -114,7 +114,7 @@ def test_strands_that_face_away_are_those_of_numpy(frame: Any, seen: str) -> Non
     detail = dataclasses.replace(BARE, culling="away")
     _, order = computed(strands, camera, detail)
     roots = strands[:, 0]
-    expected = ~faces_away(roots, roots.mean(axis=0, dtype=np.float64), camera.eye)
+    expected = ~are_facing_away(roots, roots.mean(axis=0, dtype=np.float64), camera.eye)
     assert 200 < expected.sum() < 1800
     assert len(np.setxor1d(drawn_of(order), np.flatnonzero(expected))) <= 2
 

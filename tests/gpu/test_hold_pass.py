@@ -81,7 +81,7 @@ def test_equals_numpy(rig: Rig) -> None:
 def test_strands_of_any_point_counts(rig: Rig) -> None:
     """The pass alone, on strands of 4 to 40 points that are packed into rows."""
     from hairloom.addon.groom.ties import find_holds
-    from hairloom.addon.refine.hold import hold
+    from hairloom.addon.refine.hold import hold_strands
     from hairloom.addon.render.hold_pass import HoldPass
     from hairloom.addon.render.strand_layout import StrandLayout
     from hairloom.addon.render.textures import texture_from, texture_to_array
@@ -102,7 +102,7 @@ def test_strands_of_any_point_counts(rig: Rig) -> None:
     matrices[:, :3, 3] = random.normal(0.0, 0.01, (2, 3))
     anchors = anchors_of(holds, matrices, None)
     expected = points.copy()
-    hold(expected, points, strands.offsets, holds, anchors)
+    hold_strands(expected, points, strands.offsets, holds, anchors)
     layout = StrandLayout(strands.offsets)
     texels = layout.pixels(np.column_stack([points, radius]))
     rest, now = (texture_from(texels, "RGBA32F") for _ in range(2))

@@ -16,7 +16,7 @@ from hairloom.addon.dynamics.colliders import (
     signed_distance,
 )
 from hairloom.addon.refine.lead_out import Clearance, LedOut, clearance_at, lead_out
-from hairloom.addon.strands.arc_length import steps
+from hairloom.addon.strands.arc_length import segment_lengths
 
 pytestmark = pytest.mark.usefixtures("gpu_context")
 
@@ -136,7 +136,9 @@ def test_equals_numpy(
 
     assert abs(stuck(found()[:, :3]) - stuck(expected)) < 0.01
     assert stuck(points) > 0.2
-    np.testing.assert_allclose(steps(found()[:, :3], offsets), steps(points, offsets), atol=2e-6)
+    np.testing.assert_allclose(
+        segment_lengths(found()[:, :3], offsets), segment_lengths(points, offsets), atol=2e-6
+    )
 
     # it continues after a release
     before, led_before, again = found(), leading.led_strands(), texture_from(texels, "RGBA32F")

@@ -13,7 +13,7 @@ from hairloom.addon.dynamics.colliders import PosedCollider, SphereCollider
 from hairloom.addon.groom.roots import root_frames
 from hairloom.addon.groom.settings import GuideSettings
 from hairloom.addon.groom.weights import GuideWeights
-from hairloom.addon.refine.lead_out import NO_LEANS, Clearance, clearance_at
+from hairloom.addon.refine.lead_out import NO_DEFLECTIONS, Clearance, clearance_at
 from hairloom.addon.rig_flow import Pose, Rig
 from hairloom.addon.strands import StrandSet, Surface
 
@@ -342,7 +342,7 @@ def test_strands_that_ride_are_led_out(monkeypatch: pytest.MonkeyPatch, rounds: 
         assert len(np.setxor1d(found.strands, led.strands)) <= 3, "rounding decides few"
         off = np.abs(ride.read() - expected).max(axis=1)
         assert (np.maximum.reduceat(off, offsets[:-1]) > TOLERANCE).mean() < 0.05
-    forgotten = motion_flow.strands_and_led(rig, replace(after, leans=NO_LEANS))[0]
+    forgotten = motion_flow.strands_and_led(rig, replace(after, leans=NO_DEFLECTIONS))[0]
     is_other = np.abs(expected - forgotten).max(axis=1) > 10.0 * TOLERANCE
     assert np.maximum.reduceat(is_other, offsets[:-1]).mean() > 0.1
     # after a jump to this frame there is no memory

@@ -12,7 +12,7 @@ from gpu_rounding import is_same
 from tiers import few_in_commits
 
 from hairloom.addon.params import Settings
-from hairloom.addon.params.field import NAMING
+from hairloom.addon.params.field import NAME_KINDS
 from hairloom.addon.shading.kajiya_kay_settings import KajiyaKaySettings
 from hairloom.addon.shading.lights import Light
 from hairloom.addon.shading.marschner.settings import MarschnerSettings
@@ -58,7 +58,7 @@ OWN = {
 def ends(settings: Settings) -> Iterator[tuple[str, Any]]:
     """Each parameter's name with each of its extreme values, except names of attributes."""
     for parameter in settings.parameters():
-        if parameter.kind in NAMING:
+        if parameter.kind in NAME_KINDS:
             continue
         if parameter.kind == "choice":
             values: list[Any] = [identifier for identifier, _, _ in parameter.choices]

@@ -18,7 +18,7 @@ from hairloom.addon.shading.lights import Light
 from hairloom.addon.shading.marschner.tables import PREVIEW_SIZE
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
 from hairloom.addon.shading.volume.settings import VolumeSettings
-from hairloom.addon.strands.arc_length import uneven_along
+from hairloom.addon.strands.arc_length import uneven_length_fractions
 
 pytestmark = pytest.mark.usefixtures("gpu_context")
 
@@ -151,7 +151,7 @@ def test_tint_and_taper_go_by_length_however_points_are_spaced(
     expected = drawn(frame, _uncolored(even), **look)
     parts = _uncolored(uneven)
     assert apart(drawn(frame, parts, **look), expected).max() > 0.05, "by numbers it is another"
-    along = uneven_along(parts["points"], parts["layout"].offsets)
+    along = uneven_length_fractions(parts["points"], parts["layout"].offsets)
     assert along is not None
     found = drawn(frame, parts | {"along": along}, **look)
     assert (apart(found, expected) > 0.02).mean() < 0.01

@@ -15,7 +15,7 @@ from ...cards.edits import CardRecord
 from ...cards.settings import CardSettings
 from ...cards.shaping import CardVertices, card_along, from_root, tile_shift
 from ...errors import HairloomError
-from ...strands.affine import moved
+from ...strands.affine import transform_points
 from ..base.objects import check_shape_editable, head_of, matrix_of
 from ..properties.groom_settings import GroomSettings
 from ..scene.drawn_lines import joined_lines
@@ -189,7 +189,7 @@ def _selected_pieces(edited: bmesh.types.BMesh) -> list[list[bmesh.types.BMVert]
 
 def _append(edited: bmesh.types.BMesh, card: CardMesh, matrix: Floats) -> None:
     """Add a card, world space, to a mesh in the space of an object, as one of the artist's own."""
-    places = moved(card.positions, np.linalg.inv(matrix))
+    places = transform_points(card.positions, np.linalg.inv(matrix))
     normal = card.normal @ matrix[:3, :3]
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1.0e-12)
     is_mirrored = np.linalg.det(matrix[:3, :3]) < 0.0

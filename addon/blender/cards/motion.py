@@ -35,7 +35,7 @@ from ...exchange.cards.glb_skin import Skeleton, with_skeleton
 from ...exchange.cards.glb_springs import HeadBone, SpringSkeleton, with_springs
 from ...exchange.cards.sidecar_motion import joint_motion, spring_motion, texture_motion
 from ...strands import Surface
-from ...strands.arc_length import typical
+from ...strands.arc_length import typical_length
 from ..bakes.guide_motion import GuideMotion
 from ..base.images import write_texture
 
@@ -124,7 +124,7 @@ def moved_cards(
                 arrays[name][level][:, number] = (getattr(mesh, name) - offset) @ back[:3, :3]
         yield (number + 1) / count
     grid = rig.guide_grid
-    length = typical(np.linalg.norm(np.diff(grid, axis=1), axis=2).sum(axis=1))
+    length = typical_length(np.linalg.norm(np.diff(grid, axis=1), axis=2).sum(axis=1))
     tracks = CardTracks(
         tuple(levels),
         arrays["positions"],

@@ -17,7 +17,7 @@ from ...arrays import Floats, Ints
 from ...dynamics.fitting.similarity import fit_similarity
 from ...errors import HairloomError
 from ...strands import Surface
-from ...strands.affine import moved
+from ...strands.affine import transform_points
 from ..base.objects import Body
 from ..scene.surfaces import read_positions
 
@@ -83,7 +83,7 @@ class Carrier:
         positions = read_positions(obj, depsgraph, place=obj.name)
         self._check(len(positions))
         self.shape = positions
-        fit = fit_similarity(moved(self.rest, matrix), positions[self.index])
+        fit = fit_similarity(transform_points(self.rest, matrix), positions[self.index])
         if fit is None:
             return matrix
         result: Floats = fit.matrix @ matrix

@@ -11,7 +11,7 @@ from ...arrays import Floats
 from ...dynamics.colliders import Collider, SphereSetCollider
 from ...dynamics.fitting.similarity import fit_similarity
 from ...errors import HairloomError
-from ...strands.affine import mean_scale, moved
+from ...strands.affine import mean_scale, transform_points
 from ..base.objects import Body, matrix_of
 from .carriers import is_left_out
 from .obstacle_parts import Track, is_solid_scale
@@ -74,7 +74,7 @@ class BallsPart:
         fit = fit_similarity(_markers(center, radius, self.rest[chosen]), now)
         matrix = np.eye(4) if fit is None else fit.matrix
         size = np.cbrt(np.abs(np.linalg.det(here[:, :3, :3])))
-        centers = moved(now[::4].astype(np.float32), np.linalg.inv(matrix))
+        centers = transform_points(now[::4].astype(np.float32), np.linalg.inv(matrix))
         radii = radius * size / mean_scale(matrix)
         return self._set_of(centers, radii, tuple(chosen)), matrix
 

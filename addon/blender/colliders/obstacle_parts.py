@@ -21,7 +21,7 @@ from ...dynamics.colliders.bent_field import BentField
 from ...dynamics.settings import DynamicsSettings
 from ...errors import HairloomError
 from ...strands import Surface
-from ...strands.affine import mean_scale, moved
+from ...strands.affine import mean_scale, transform_points
 from .carriers import Carrier, scales_of
 from .fields import field_of
 
@@ -139,7 +139,7 @@ class FieldPart:
         if shape is None:
             self._seen = None
             return self.distance, matrix
-        local = moved(shape, np.linalg.inv(matrix)).astype(np.float32)
+        local = transform_points(shape, np.linalg.inv(matrix)).astype(np.float32)
         self._seen = _Seen(local, mean_scale(matrix))
         if self._bent is None:
             self._bent = BentField(self.distance, self.surface)
@@ -179,7 +179,7 @@ class FieldPart:
             or self.surface.triangles.shape != surface.triangles.shape
         ):
             return False
-        here = moved(self.surface.positions, matrix)
+        here = transform_points(self.surface.positions, matrix)
         extent = float(np.linalg.norm(np.ptp(here, axis=0)))
         tolerance = _SAME_SHAPE * extent + 1.0e-6 * float(np.abs(here).max(initial=0.0))
         return np.allclose(here, surface.positions, rtol=0.0, atol=tolerance)

@@ -12,7 +12,7 @@ from ...dynamics.colliders import SphereCollider
 from ...dynamics.settings import DynamicsSettings
 from ...errors import HairloomError
 from ...strands import Surface
-from ...strands.affine import moved
+from ...strands.affine import transform_points
 from ..base.objects import Body
 from ..scene.surfaces import read_surface
 from .carriers import Carrier, is_deforming, is_left_out
@@ -99,7 +99,9 @@ class Reader:
     def _boxed(self, carrier: Carrier, surface: Surface, shape: str) -> Part | Ball:
         rest = carrier.body.rest
         inverse = np.linalg.inv(rest)
-        low, high = used_box(Surface(moved(surface.positions, inverse), surface.triangles))
+        low, high = used_box(
+            Surface(transform_points(surface.positions, inverse), surface.triangles)
+        )
         if shape == "capsule":
             return ShapePart(carrier, *capsule_of(low, high, rest))
         ball = Ball(carrier.body, (low + high) / 2.0, float((high - low).max()) / 2.0)

@@ -14,7 +14,7 @@ from ...groom.settings import GuideSettings
 from ...groom.width_settings import WidthSettings
 from ...params import SettingsMap
 from ...rig_flow import ChildPlacement, Rig
-from ...strands.kept import NOTHING_KEPT, Kept
+from ...strands.result_cache import NO_CACHE, ResultCache
 from ..properties.groom_settings import GroomSettings
 from ..scene.source import Source
 from .fields import solid_of
@@ -24,7 +24,7 @@ _OF_RIG = ("strands", "head", "density", "masks", "partings", "holders")
 
 
 def rig_from(
-    source: Source, settings: SettingsMap, *, place: str, kept: Kept = NOTHING_KEPT
+    source: Source, settings: SettingsMap, *, place: str, kept: ResultCache = NO_CACHE
 ) -> Rig:
     """The rig of hair, at rest as it was read; from arrays alone.
 

@@ -18,7 +18,7 @@ from ...dynamics.fitting.similarity import fit_similarity
 from ...errors import HairloomError
 from ...groom.holds import Holds, anchors_of
 from ...groom.ties import Holders, Tie, TipSurface, find_holds
-from ...strands.affine import moved
+from ...strands.affine import transform_points
 from ..base.mesh_arrays import vertex_places
 from ..base.objects import (
     Body,
@@ -79,7 +79,7 @@ class _TrackedTie:
         positions = read_positions(obj, depsgraph, place=obj.name)
         if len(positions) != len(self.points):
             return matrix
-        fit = fit_similarity(moved(self.points, matrix), positions)
+        fit = fit_similarity(transform_points(self.points, matrix), positions)
         return matrix if fit is None else np.asarray(fit.matrix @ matrix)
 
 
@@ -160,7 +160,9 @@ class TrackedHolders:
         for one, rest in zip(self._ties, rests, strict=True):
             back = rest @ np.linalg.pinv(one.body.rest)
             tie = Tie(one.tie.name, back @ one.tie.shape, one.tie.is_ball)
-            ties.append(_TrackedTie(Body(one.body.handle, rest), tie, moved(one.points, back)))
+            ties.append(
+                _TrackedTie(Body(one.body.handle, rest), tie, transform_points(one.points, back))
+            )
         holders = Holders(tuple(one.tie for one in ties), self.holders.tip_surface)
         return TrackedHolders(
             holders, tuple(ties), self._tips, self._unusable_warnings, self._display_keys
@@ -307,8 +309,8 @@ def _read_tie(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, back: Float
         shape, is_ball = _empty_tie_shape(obj)
         return _TrackedTie(body, Tie(obj.name, rest @ shape, is_ball))
     local = _points_of(obj, depsgraph)
-    shape, is_ball = _fit_tie_shape(moved(local, rest).astype(np.float64), obj.name)
-    points = moved(local, rest) if obj.type == "MESH" else np.zeros((0, 3))
+    shape, is_ball = _fit_tie_shape(transform_points(local, rest).astype(np.float64), obj.name)
+    points = transform_points(local, rest) if obj.type == "MESH" else np.zeros((0, 3))
     return _TrackedTie(body, Tie(obj.name, shape, is_ball), points)
 
 
@@ -383,7 +385,7 @@ def _reused_tie(read: _TrackedTie, known: TrackedHolders | None) -> _TrackedTie:
             return one
         to_rest = one.body.rest @ np.linalg.pinv(read.body.rest)
         tie = Tie(read.tie.name, to_rest @ read.tie.shape, read.tie.is_ball)
-        return _TrackedTie(one.body, tie, moved(read.points, to_rest))
+        return _TrackedTie(one.body, tie, transform_points(read.points, to_rest))
     return read
 
 

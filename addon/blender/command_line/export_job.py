@@ -17,7 +17,7 @@ from ...exchange.groom import Groom
 from ...exchange.strand_check import check_lines
 from ...exchange.strand_export_settings import StrandExportSettings, layout_of
 from ...exchange.strand_formats import STRAND_FORMATS, StrandFormat, format_of
-from ...groom.widths import as_wide
+from ...groom.widths import with_widths_of
 from ...rig_flow import Rig
 from ...shading.settings import ShadingSettings
 from ..bakes.bake_settings import folder_of
@@ -174,7 +174,7 @@ def _groom(rig: Rig, inputs: Inputs) -> Groom:
     name = Path(inputs.groom_name).stem
     if inputs.strands.strand_count != rig.strands.strand_count:
         return Groom(rig.strands, name)
-    own = as_wide(inputs.strands, rig.strands) if rig.widths.is_found else inputs.strands
+    own = with_widths_of(inputs.strands, rig.strands) if rig.widths.is_found else inputs.strands
     if inputs.groom is None:
         return Groom(own, name)
     return replace(inputs.groom, name=name, strands=own)

@@ -19,7 +19,7 @@ from ...groom.settings import GrowSettings
 from ...groom.size_notes import size_note
 from ...strands import StrandSet, Surface
 from ...strands.colors import color_notes
-from ...strands.join import joined
+from ...strands.join import join_strands
 from ..base.objects import head_of
 from ..base.parts import run_parts
 from ..base.vertex_weights import read_weights
@@ -106,7 +106,7 @@ def read_inputs(sources: Sources, grow_settings: GrowSettings) -> Inputs:
         mesh = bpy.data.objects.get(head_name or "")
         if sources.with_face and head is not None and mesh is not None and is_bust(mesh):
             face = run_parts(face_hair(mesh, head, bpy.context.evaluated_depsgraph_get()))
-            strands = joined(strands, face)
+            strands = join_strands(strands, face)
     else:
         assert head is not None, "the built-in one is always there"
         dropped, groom, notes = {}, None, _size_notes(sources, None, head)

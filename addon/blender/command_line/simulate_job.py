@@ -18,7 +18,7 @@ from ...errors import HairloomError
 from ...groom.children_settings import ChildrenSettings
 from ...groom.masks import Mask, StrandMask, SurfaceMask, mask_names
 from ...strands import StrandSet, Surface
-from ...strands.affine import turned_about
+from ...strands.affine import rotation_about
 from ..bakes.guide_motion import BakedGuides
 from ..base.attributes import set_attribute
 from ..colliders.copies import StillCopies, copy_colliders, copy_holders
@@ -200,7 +200,7 @@ def shake_matrix(centre: Floats, seconds: float) -> Floats:
     """The head's transform at a time of the shake, (4, 4)."""
     phase = 2.0 * np.pi * SHAKE_RATE * seconds
     ease = min(seconds / 0.25, 1.0)
-    matrix = turned_about(centre, ease * SHAKE_ANGLE * np.sin(phase))
+    matrix = rotation_about(centre, ease * SHAKE_ANGLE * np.sin(phase))
     matrix[0, 3] += ease * SHAKE_SWAY * np.sin(phase)
     return matrix
 

@@ -27,7 +27,7 @@ from ...rig_flow import Rig
 from ...shading.ambient_settings import AmbientSettings
 from ...shading.settings import ShadingSettings
 from ...strands import StrandSet, Surface
-from ...strands.affine import mean_scale, moved
+from ...strands.affine import mean_scale, transform_points
 from ..bakes import playback
 from ..bakes.baked_rig import BakedRig
 from ..bakes.cache import Cache
@@ -254,10 +254,10 @@ def placed(snapshot: Snapshot, motion: Floats) -> Snapshot:
             depth=None if depth is None else depth * np.float32(scale),
         )
     if center is not None:
-        center = moved(center[None], motion)[0]
+        center = transform_points(center[None], motion)[0]
     return replace(
         snapshot,
-        points=moved(snapshot.points, motion),
+        points=transform_points(snapshot.points, motion),
         radius=snapshot.radius * np.float32(scale),
         spacing=snapshot.spacing * scale,
         openness=_placed_light(snapshot.openness, is_mirrored),

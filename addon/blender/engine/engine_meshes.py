@@ -10,7 +10,7 @@ import numpy as np
 from ...arrays import Floats, Ints
 from ...render.snapshot import MeshPictures, MeshSnapshot, Skin
 from ...strands import Surface
-from ...strands.affine import moved
+from ...strands.affine import transform_points
 from ...strands.vectors import unit
 from ..base.mesh_arrays import corner_vertices, of_triangles, triangle_corners, vertex_places
 from ..scene.mesh_materials import MeshMaterial, material_of
@@ -47,7 +47,7 @@ def _split(
     triangles, positions, normals = _corners(mesh)
     # multiplied from the right, as normals transform by the inverse transpose
     from_world = np.linalg.pinv(matrix[:3, :3])
-    positions = moved(positions, matrix)
+    positions = transform_points(positions, matrix)
     if not np.isfinite(positions).all():
         return ()
     normals = unit(normals @ from_world.astype(np.float32))

@@ -22,7 +22,7 @@ from ...exchange.files.file_set import atomic_file_set
 from ...render.camera import Camera
 from ...rig_flow import Pose
 from ...shading.lights import Light
-from ...strands.affine import turned_about
+from ...strands.affine import rotation_about
 from .studio import Studio
 from .video import write_video
 
@@ -135,7 +135,7 @@ class Turntable:
         """The camera of a frame, on a circle around the groom, from its front to its right."""
         first, middle = self._first
         turns = frame / self.settings.frames % 1.0  # exactly 0 after full turns
-        return replace(first, view=first.view @ turned_about(middle, 2.0 * np.pi * turns))
+        return replace(first, view=first.view @ rotation_about(middle, 2.0 * np.pi * turns))
 
     @cached_property
     def _first(self) -> tuple[Camera, Floats]:

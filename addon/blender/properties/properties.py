@@ -17,7 +17,7 @@ from bpy.props import (
 )
 
 from ...params import Parameter, Settings
-from ...params.curve import PLACES
+from ...params.curve import KNOT_POSITIONS
 from ..base.objects import head_of
 from ..base.vertex_weights import color_choices, mask_choices, weight_names
 
@@ -145,7 +145,7 @@ def _property(parameter: Parameter, changed: Changed | None) -> Any:
     if parameter.kind == "color":
         return FloatVectorProperty(size=3, subtype="COLOR", **common)
     if parameter.kind == "curve":
-        return FloatVectorProperty(size=len(PLACES), precision=2, **common)
+        return FloatVectorProperty(size=len(KNOT_POSITIONS), precision=2, **common)
     return FloatProperty(precision=_digits(parameter), **_SHOWN_AS[parameter.unit], **common)
 
 

@@ -11,9 +11,15 @@ from ...arrays import Bools, Floats, Ints, number_in_piece
 from ...errors import HairloomError
 from ...groom.widths import with_widths
 from ...strands import StrandSet
-from ...strands.affine import mean_scale, moved
+from ...strands.affine import mean_scale, transform_points
 from ...strands.clean import Cleaned, clean
-from ...strands.curve_types import CurveShapes, CurveType, DrawnCurves, Knots, drawn_curves
+from ...strands.curve_types import (
+    CurveShapes,
+    CurveType,
+    EvaluatedCurves,
+    KnotMode,
+    evaluate_curves,
+)
 from ..base.attributes import read_attribute, set_attribute
 from ..base.objects import link_into
 
@@ -92,7 +98,7 @@ def _read(
     curves: bpy.types.Curves,
     matrix: Floats,
     points: Floats | None = None,
-    drawn: DrawnCurves | None = None,
+    drawn: EvaluatedCurves | None = None,
 ) -> Cleaned:
     """The curves in world space. Args: drawn: points on the curves, instead of control points."""
     radius = read_attribute(curves, "radius", "POINT")
@@ -107,7 +113,7 @@ def _read(
         radius = None if radius is None else drawn.of(radius)
         color = None if color is None else drawn.of(color)
     return clean(
-        moved(points, matrix),
+        transform_points(points, matrix),
         offsets,
         radius=None if radius is None else radius * np.float32(mean_scale(matrix)),
         group=group,
@@ -118,7 +124,7 @@ def _read(
     )
 
 
-def curves_as_drawn(curves: bpy.types.Curves) -> DrawnCurves | None:
+def curves_as_drawn(curves: bpy.types.Curves) -> EvaluatedCurves | None:
     """Points on the curves, object space; None if all are Catmull-Rom curves, which pass through
     their own points."""
     kind = read_attribute(curves, "curve_type", "CURVE")
@@ -140,12 +146,12 @@ def curves_as_drawn(curves: bpy.types.Curves) -> DrawnCurves | None:
         # Blender's defaults where there is no attribute
         of_curves("resolution", 12),
         of_curves("nurbs_order", 4),
-        of_curves("knots_mode", Knots.NORMAL),
+        of_curves("knots_mode", KnotMode.NORMAL),
         np.ones(len(points), np.float32) if weight is None else weight,
         points if left is None else left,
         points if right is None else right,
     )
-    return drawn_curves(points, offsets, shapes)
+    return evaluate_curves(points, offsets, shapes)
 
 
 def unusable_curves(curves: bpy.types.Curves) -> dict[str, Bools]:
@@ -156,7 +162,7 @@ def unusable_curves(curves: bpy.types.Curves) -> dict[str, Bools]:
         found["no end (Toggle Cyclic opens them)"] = cyclic
     kind, knots = (read_attribute(curves, name, "CURVE") for name in ("curve_type", "knots_mode"))
     if kind is not None and knots is not None:
-        is_custom = (kind == CurveType.NURBS) & (knots == Knots.CUSTOM)
+        is_custom = (kind == CurveType.NURBS) & (knots == KnotMode.CUSTOM)
         if is_custom.any():
             found["knots of their own (set another Knot Mode)"] = is_custom
     return found
@@ -175,7 +181,7 @@ def write_original_curves(
     counts = np.diff(offsets)[own.kept]
     number = number_in_piece(counts)
     back = np.linalg.inv(np.array(obj.evaluated_get(depsgraph).matrix_world, np.float64))
-    moved_points[np.repeat(offsets[own.kept], counts) + number] = moved(points, back)
+    moved_points[np.repeat(offsets[own.kept], counts) + number] = transform_points(points, back)
     move_curves(curves, moved_points)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...arrays import Floats, Ints
 from ...errors import HairloomError
-from ...strands.affine import moved
+from ...strands.affine import transform_points
 from ...strands.closest_point import search_of
 from ..base.mesh_arrays import edge_vertices, vertex_places
 from ..base.objects import as_mesh, head_of, link_into, matrix_of
@@ -53,7 +53,7 @@ def pieces_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
         ends: Ints = np.empty(0, np.int32)
         if mesh is not None and len(mesh.edges):
             points, ends = vertex_places(mesh), edge_vertices(mesh).ravel()
-    pieces = moved(points, matrix)[ends].reshape(-1, 2, 3)
+    pieces = transform_points(points, matrix)[ends].reshape(-1, 2, 3)
     if not np.isfinite(pieces).all():
         raise HairloomError(
             "its points are not finite numbers", place=obj.name, remedy="Correct its transforms"

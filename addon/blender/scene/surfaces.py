@@ -17,7 +17,7 @@ import numpy as np
 from ...arrays import Floats, Ints
 from ...errors import HairloomError
 from ...strands import Surface
-from ...strands.affine import moved
+from ...strands.affine import transform_points
 from ..base.attributes import read_attribute
 from ..base.mesh_arrays import of_triangles, triangle_corners
 from ..base.objects import as_mesh
@@ -101,7 +101,7 @@ def read_rest_surfaces(
         ]
     matrix = np.array(obj.evaluated_get(depsgraph).matrix_world)
     surfaces = [
-        replace(posed, positions=moved(each, matrix))
+        replace(posed, positions=transform_points(each, matrix))
         for each in found
         if each is not None and each.shape == posed.positions.shape and np.isfinite(each).all()
     ]

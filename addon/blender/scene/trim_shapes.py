@@ -10,7 +10,7 @@ import numpy as np
 from ...arrays import Bools, Floats
 from ...dynamics.colliders.winding import winding_number
 from ...errors import HairloomError
-from ...groom.trim import Plane, Shape, flat
+from ...groom.trim import Plane, Shape, plane_of_flat_mesh
 from ...strands import Surface
 from ...strands.crossings import first_crossings
 from ...strands.mesh_faults import edges_of
@@ -68,7 +68,7 @@ def read_shape(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Shape:
     if obj.type == "EMPTY":
         return _plane_of(obj, depsgraph)
     surface = read_surface(obj, depsgraph, need_uv=False, place=obj.name)
-    shape = flat(surface)
+    shape = plane_of_flat_mesh(surface)
     if shape is not None:
         return shape
     if not edges_of(surface).are_closed:

@@ -12,7 +12,7 @@ from ...dynamics.settings import DynamicsSettings
 from ...dynamics.state import rows_of
 from ...errors import HairloomError
 from ...motion_flow import FrameInput, Motion
-from ...refine.lead_out import NOT_LED, LedOut
+from ...refine.lead_out import NO_LED_OUT, LedOut
 from ...rig_flow import Pose, Rig
 
 
@@ -22,7 +22,7 @@ class BaseSolver:
     def __init__(self, rig: Rig, motion: Motion | None) -> None:
         self._rig = rig
         self._motion = motion or motion_flow.begin(rig, rig.rest_pose)
-        self._led_out = NOT_LED
+        self._led_out = NO_LED_OUT
         self._is_baked = False
 
     @property
@@ -43,7 +43,7 @@ class BaseSolver:
     def advance_rigidly(self, frame: FrameInput) -> None:
         self._take(motion_flow.advance_rigidly(self._rig, self.motion, frame))
 
-    def show_baked(self, pose: Pose, guides: Floats, led: LedOut = NOT_LED) -> None:
+    def show_baked(self, pose: Pose, guides: Floats, led: LedOut = NO_LED_OUT) -> None:
         self._take(carried_motion(self._rig, self._motion, pose, guides))
         self._led_out, self._is_baked = led, True
 

@@ -11,7 +11,7 @@ import numpy as np
 from ...arrays import Floats
 from ...errors import HairloomError
 from ...groom.roots import bind_roots
-from ...refine.lead_out_at_rest import led_out_at_rest
+from ...refine.lead_out_at_rest import lead_out_at_rest
 from ...strands import StrandSet, Surface
 from ..base.objects import check_curves_editable, head_of
 from ..base.parts import Part, Parts
@@ -78,7 +78,7 @@ def comb(
         changed, solid = np.flatnonzero(is_changed), solid_of(surface)
         if solid is not None and len(changed):
             some = replace(bound, points=points.copy()).take(changed)
-            led, _ = led_out_at_rest(some, solid, float(np.median(bound.lengths())))
+            led, _ = lead_out_at_rest(some, solid, float(np.median(bound.lengths())))
             points[np.repeat(is_changed, bound.point_counts)] = led.points
         return points, len(changed)
 

@@ -14,7 +14,7 @@ from ...dynamics.neighbours import FrameSteps
 from ...dynamics.painted import PaintedGuides
 from ...dynamics.settings import DynamicsSettings
 from ...motion_flow import FrameInput, Motion
-from ...refine.lead_out import NOT_LED, LedOut
+from ...refine.lead_out import NO_LED_OUT, LedOut
 from ...render.collider_textures import UploadedColliders
 from ...render.dynamics_pass import DynamicsPass
 from ...render.ride_pass import RidePass, RideTexels
@@ -153,7 +153,7 @@ class ComputeSolver(BaseSolver):
         if self._dynamics is not None:
             self._dynamics.release()
             self._dynamics = None
-        self._motion, self._led_out, self._time_since_led = motion, NOT_LED, np.inf
+        self._motion, self._led_out, self._time_since_led = motion, NO_LED_OUT, np.inf
         self._ride.lead_out.set_clearance(motion.clearance)
         self._is_baked = self._is_resting = self._are_strands_current = False
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ...errors import HairloomError
-from ...groom.flow import combed_along
+from ...groom.flow import comb_along_strokes
 from ...groom.flow_settings import FlowSettings
 from ..base.outcome import Outcome
 from ..base.parts import Parts
@@ -36,7 +36,7 @@ def comb_flow(
         hair,
         surface,
         depsgraph,
-        lambda bound: combed_along(bound, lines, surface, settings),
+        lambda bound: comb_along_strokes(bound, lines, surface, settings),
         BEFORE_FLOW.read_if_unchanged(hair),
         kept_as=BEFORE_FLOW,
     )

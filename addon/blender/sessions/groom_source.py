@@ -21,9 +21,9 @@ from ...rig_flow import Pose, Rig
 from ...shading.ambient_settings import AmbientSettings
 from ...shading.settings import ShadingSettings
 from ...strands import StrandSet, Surface
-from ...strands.affine import moved
+from ...strands.affine import transform_points
 from ...strands.clean import Cleaned
-from ...strands.kept import Kept
+from ...strands.result_cache import ResultCache
 from ...style_flow import curves_at_rest, rig_with_style
 from ..bakes.baked_rig import BakedRig, RestMatrices
 from ..bakes.groom_hashes import groom_frame_hash, groom_rig_hash
@@ -81,7 +81,7 @@ class GroomSource:
         self._head_uid = head and head.session_uid
         self._parting_state = parting_state(hair)
         self.settings = GroomSettings.of(hair, depsgraph)
-        self._kept = Kept()
+        self._kept = ResultCache()
         self._read_motion_masks(self._mask_reader(self.source), self.settings, depsgraph)
         self._style_warning = ""
         self._styled_rig: _StyledRig | None = None
@@ -153,7 +153,7 @@ class GroomSource:
         back = baked.rest_matrices.hair @ np.linalg.pinv(self.hair.rest)
         lines = self.source.partings
         if lines is not None:
-            lines = moved(lines.reshape(-1, 3), back).reshape(-1, 2, 3)
+            lines = transform_points(lines.reshape(-1, 3), back).reshape(-1, 2, 3)
         rig = _with_uv(baked.rig, self.source.head)
         strands, rest = self._strands_in_pose_of(baked, back)
         self.source = replace(
@@ -216,7 +216,7 @@ class GroomSource:
         if self.has_changed_partings():
             self._parting_state = parting_state(hair)
             lines, parting_warnings = read_partings(hair, depsgraph)
-            there = moved(lines.reshape(-1, 3), back).reshape(-1, 2, 3)
+            there = transform_points(lines.reshape(-1, 3), back).reshape(-1, 2, 3)
             partings = there if len(lines) else None
         source = replace(
             before,
@@ -287,7 +287,7 @@ class GroomSource:
             return None
         positions = read_positions(head, depsgraph, place=head.name)
         back = self.head.rest @ np.linalg.pinv(matrix_of(head, depsgraph))
-        positions = moved(positions, back)
+        positions = transform_points(positions, back)
         if positions.shape != rest.positions.shape or not np.isfinite(positions).all():
             return None
         return replace(rest, positions=positions)

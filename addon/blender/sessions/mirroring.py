@@ -9,11 +9,11 @@ import numpy as np
 
 from ...arrays import Bools, Floats, Ints, number_in_piece
 from ...errors import HairloomError
-from ...groom.mirror import Mirrored, mirrored, reflection, sides
+from ...groom.mirror import Mirrored, mirror_sides, mirror_strands, reflection
 from ...groom.mirror_settings import MirrorSettings
-from ...refine.lead_out_at_rest import led_out_at_rest
+from ...refine.lead_out_at_rest import lead_out_at_rest
 from ...strands import Surface
-from ...strands.affine import moved
+from ...strands.affine import transform_points
 from ...strands.nearest import nearest_points
 from ..base.attributes import copy_elements, read_attribute, set_attribute
 from ..base.objects import head_of, matrix_of
@@ -47,7 +47,7 @@ def mirror_hair(
     assert head is not None, "there is a surface"
     frame = matrix_of(head, depsgraph)
     own = read_original_curves(hair, depsgraph)
-    side = sides(own.strands.roots, surface, frame, settings)
+    side = mirror_sides(own.strands.roots, surface, frame, settings)
     if not (side > 0).any():
         raise HairloomError(
             f"it has no curves on the {settings.side} side of {settings.axis.upper()}",
@@ -58,7 +58,7 @@ def mirror_hair(
     across = reflection(frame, settings.axis)
     made = yield Part(
         f"Mirroring {len(source):,} curves",
-        lambda: _led_out(mirrored(own.strands.take(source), surface, across), surface),
+        lambda: _led_out(mirror_strands(own.strands.take(source), surface, across), surface),
     )
     replaced = own.kept[side < 0]
     unchanged = [shape for shape in SHAPE_BACKUPS if shape.read_if_unchanged(hair) is not None]
@@ -88,7 +88,7 @@ def _led_out(made: Mirrored, surface: Surface) -> Mirrored:
     if solid is None:
         return made
     strands = made.strands
-    led, _ = led_out_at_rest(strands.take(shifted), solid, float(np.median(strands.lengths())))
+    led, _ = lead_out_at_rest(strands.take(shifted), solid, float(np.median(strands.lengths())))
     points = strands.points.copy()
     points[np.repeat(made.is_shifted, strands.point_counts)] = led.points
     return Mirrored(strands.with_points(points), made.shift)
@@ -125,12 +125,12 @@ def _replace(
         pair = (old, new) if attribute.domain == "POINT" else (source, new_curves)
         copy_elements(attribute, *pair)
     points = curve_points(curves)
-    points[new] = moved(made.strands.points, to_own)
+    points[new] = transform_points(made.strands.points, to_own)
     shift = np.repeat(made.shift @ to_own[:3, :3].T.astype(np.float32), counts, axis=0)
     for name in _PLACES:
         places = read_attribute(curves, name, "POINT", 3)
         if places is not None:
-            places[new] = moved(places[old], across) + shift
+            places[new] = transform_points(places[old], across) + shift
             set_attribute(curves, name, "POINT", places)
     if made.strands.root_uv is not None:
         uv = read_attribute(curves, "surface_uv_coordinate", "CURVE", 2)

@@ -12,7 +12,7 @@ from ...dynamics.neighbours import FrameSteps
 from ...dynamics.painted import PaintedGuides
 from ...dynamics.settings import DynamicsSettings
 from ...motion_flow import FrameInput, Motion
-from ...refine.lead_out import NOT_LED, LedOut
+from ...refine.lead_out import NO_LED_OUT, LedOut
 from ...render.snapshot import Snapshot
 from ...rig_flow import Pose, Rig
 from .base_solver import BaseSolver
@@ -50,7 +50,7 @@ class NumpySolver(BaseSolver):
 
     def steps(self, frame: FrameInput) -> FrameSteps[None]:
         # so that motion does not depend on which frames are shown
-        led = NOT_LED if self._motion.clearance is None else self.led_out_strands()
+        led = NO_LED_OUT if self._motion.clearance is None else self.led_out_strands()
         motion = yield from motion_flow.steps(self._rig, self.motion, frame, led)
         self._take(motion)
 
@@ -81,4 +81,4 @@ class NumpySolver(BaseSolver):
 
     def _take(self, motion: Motion) -> None:
         self._motion, self._is_baked, self._strands = motion, False, None
-        self._led_out = NOT_LED
+        self._led_out = NO_LED_OUT

@@ -11,10 +11,10 @@ import numpy as np
 
 from ...arrays import Floats, Ints
 from ...dynamics.fitting.similarity import fit_similarity
-from ...refine.culling import moved_spheres, occluder_spheres_of
+from ...refine.culling import occluder_spheres_of, transform_spheres
 from ...rig_flow import Pose
 from ...strands import Surface
-from ...strands.affine import moved
+from ...strands.affine import transform_points
 
 #: The mesh around a sphere: triangles within this many radii of its middle.
 _SEARCH_RADII = 2.0
@@ -42,9 +42,9 @@ class OccluderSpheres:
         """Centers and radii in this pose, (k, 4) [m] world space; None: there are none."""
         if pose.head_positions is None or not len(self._balls):
             return None
-        bent = np.abs(moved(self._rest, pose.matrix) - pose.head_positions).max()
+        bent = np.abs(transform_points(self._rest, pose.matrix) - pose.head_positions).max()
         if bent <= _RIGID_TOLERANCE * self._balls[:, 3].min():
-            return moved_spheres(self._balls, pose.matrix)
+            return transform_spheres(self._balls, pose.matrix)
         now = [
             _moved_sphere(ball, self._rest[around], pose.head_positions[around])
             for ball, around in zip(self._balls, self._around, strict=True)
@@ -67,6 +67,6 @@ def _moved_sphere(ball: Floats, rest: Floats, now: Floats) -> Floats | None:
     fit = fit_similarity(rest[some], now[some])
     if fit is None:
         return None
-    (gone,) = moved_spheres(ball[None], fit.matrix)
-    gone[3] -= np.linalg.norm(now - moved(rest, fit.matrix), axis=1).max()
+    (gone,) = transform_spheres(ball[None], fit.matrix)
+    gone[3] -= np.linalg.norm(now - transform_points(rest, fit.matrix), axis=1).max()
     return gone

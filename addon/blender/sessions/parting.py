@@ -6,7 +6,7 @@ import bpy
 
 from ...errors import HairloomError
 from ...groom.parting_settings import PartingSettings
-from ...groom.partings import Partings, combed_away
+from ...groom.partings import Partings, comb_from_partings
 from ..base.outcome import Outcome
 from ..base.parts import Parts
 from ..scene.partings import read_partings
@@ -32,7 +32,10 @@ def comb_parting(
         )
     partings = Partings.of(lines, surface)
     done = yield from comb(
-        hair, surface, depsgraph, lambda bound: combed_away(bound, partings, surface, settings)
+        hair,
+        surface,
+        depsgraph,
+        lambda bound: comb_from_partings(bound, partings, surface, settings),
     )
     result = f"{hair.name}: {done.changed:,} of {done.all:,} curves lean away from its partings"
     return Outcome(result, done.dropped, unusable)

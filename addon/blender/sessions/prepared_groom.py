@@ -23,7 +23,7 @@ from ...light_flow import HairLight, quick_light, rest_light
 from ...rig_flow import Rig
 from ...shading.ambient_settings import AmbientSettings
 from ...strands import StrandSet, Surface
-from ...strands.kept import NOTHING_KEPT, Kept
+from ...strands.result_cache import NO_CACHE, ResultCache
 from ..colliders.rigs import rig_from
 from ..colliders.ties import TrackedHolders
 from ..properties.groom_settings import GroomSettings
@@ -55,7 +55,7 @@ class BuildRequest:
     settings: GroomSettings
     rig: Rig | None = None
     holders: TrackedHolders = field(default_factory=TrackedHolders)
-    kept: Kept = NOTHING_KEPT
+    kept: ResultCache = NO_CACHE
 
     def gives_same_rig_as(self, other: BuildRequest) -> bool:
         """Whether both surely give the same rig; does not build it."""
@@ -167,7 +167,9 @@ def prepare_groom(
     report("ambient occlusion")
     with ThreadPoolExecutor(1) as beside:
         # cached properties that the window's first frame needs; numpy lets both threads run at once
-        moving = beside.submit(lambda: (rig.riders, rig.root_holds, rig.strands.uneven_along))
+        moving = beside.submit(
+            lambda: (rig.riders, rig.root_holds, rig.strands.uneven_length_fractions)
+        )
         groom = _prepare_drawing(rig, ambient, known, with_occluders, is_quick, report)
         moving.result()
     return groom
@@ -199,7 +201,7 @@ def _prepare_drawing(
     if occluders is None and rig.head is not None and with_occluders:
         roots = rig.strands.roots
         corners = np.stack([roots.min(axis=0), roots.max(axis=0)])
-        occluders = rig.head.latest(OccluderSpheres, corners)
+        occluders = rig.head.compute_if_changed(OccluderSpheres, corners)
     rank = rig_flow.strand_ranks(rig)
     return PreparedGroom(rig, ambient, light, rank, occluders)
 

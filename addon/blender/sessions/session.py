@@ -26,7 +26,7 @@ from ...render.ride_pass import RideTexels
 from ...render.snapshot import Snapshot
 from ...rig_flow import MotionStart, Pose, Rig, SimulatedSolids, Solids
 from ...strands import Surface
-from ...strands.arc_length import lengths
+from ...strands.arc_length import strand_lengths
 from ..bakes.baked_rig import BakedRig, RestMatrices, frame_arrays, led_out_in, rig_arrays
 from ..bakes.baked_solids import solid_arrays, solid_constants
 from ..bakes.groom_hashes import frame_rate
@@ -699,7 +699,7 @@ class Session:
         rig = self.rig
         if rig.head is not None:
             return rig.rest_lengths
-        return lengths(self.rest_points(), rig.strands.offsets)
+        return strand_lengths(self.rest_points(), rig.strands.offsets)
 
     def rest_points(self) -> Floats:
         """All strands at the lengths of their style, (point_count, 3) [m]; hair without a head is

@@ -17,7 +17,7 @@ from ...dynamics.colliders import PosedCollider
 from ...dynamics.settings import DynamicsSettings
 from ...dynamics.settle_settings import SettleSettings
 from ...errors import HairloomError
-from ...groom.rest_hair import carried
+from ...groom.rest_hair import carry_with_surface
 from ...groom.settings import GuideSettings
 from ...paint_flow import painted_guides
 from ...rig_flow import Rig
@@ -57,7 +57,7 @@ def settle_hair(
     read = source.source
     strands = own.strands
     if read.rest is not None and read.head is not None:
-        strands = carried(strands, read.rest.surface, read.head)
+        strands = carry_with_surface(strands, read.rest.surface, read.head)
     guides = settle_flow.settle_guide_settings(strands, source.settings[GuideSettings])
     rig = rig_flow.prepare(
         strands,
@@ -81,7 +81,7 @@ def settle_hair(
     head = solid_of(rig.head)
     settled, is_out = settle_flow.settled_curves(strands, rig, fallen, head)
     if read.rest is not None and read.head is not None:
-        settled = carried(settled, read.head, read.rest.surface)
+        settled = carry_with_surface(settled, read.head, read.rest.surface)
     return lambda: _stored(hair, own, settled, is_out, warnings, depsgraph)
 
 

@@ -46,7 +46,7 @@ def snapshot_of(groom: PreparedGroom) -> Snapshot:
         points=strands.points,
         radius=strands.radius,
         layout=StrandLayout(strands.offsets),
-        along=strands.uneven_along,
+        along=strands.uneven_length_fractions,
         guide=np.ascontiguousarray(groom.rig.weights.guide[:, 0]),
         group=strands.group,
         rank=groom.rank,

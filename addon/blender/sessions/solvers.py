@@ -21,7 +21,7 @@ from ...dynamics.settings import DynamicsSettings
 from ...errors import HairloomError
 from ...groom.settings import GuideSettings
 from ...motion_flow import FrameInput, Motion
-from ...refine.lead_out import NOT_LED, LedOut
+from ...refine.lead_out import NO_LED_OUT, LedOut
 from ...render.ride_pass import RideTexels
 from ...render.snapshot import Snapshot
 from ...rig_flow import Pose, Rig
@@ -85,7 +85,7 @@ class Solver(Protocol):
     def advance_rigidly(self, frame: FrameInput) -> None:
         """A frame in which hair moves rigidly with its roots, see `motion_flow.advance_rigidly`."""
 
-    def show_baked(self, pose: Pose, guides: Floats, led: LedOut = NOT_LED) -> None:
+    def show_baked(self, pose: Pose, guides: Floats, led: LedOut = NO_LED_OUT) -> None:
         """Show guides of a bake, (guide_count, cv_count, 3) [m, world], and its strands that were
         led out of colliders.
 

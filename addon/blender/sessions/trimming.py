@@ -7,7 +7,7 @@ from functools import partial
 import bpy
 
 from ...errors import HairloomError
-from ...groom.trim import trimmed
+from ...groom.trim import trim_strands
 from ..base.objects import check_curves_editable
 from ..base.outcome import Outcome
 from ..base.parts import Part, Parts
@@ -34,7 +34,7 @@ def trim_to_shapes(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Pa
         )
     own = read_original_curves(hair, depsgraph, BEFORE_TRIM.read_if_unchanged(hair))
     title = f"Trimming {own.strands.strand_count:,} curves"
-    cut = yield Part(title, partial(trimmed, own.strands, shapes))
+    cut = yield Part(title, partial(trim_strands, own.strands, shapes))
     BEFORE_TRIM.save(hair)
     write_original_curves(hair, own, cut.points, depsgraph)
     BEFORE_TRIM.mark_result(hair)

@@ -13,7 +13,7 @@ from mathutils import Vector
 
 from ...arrays import Floats, Ints
 from ...errors import HairloomError
-from ...groom.fitted_hair import OuterSearch, fitted_hair, warped_weights
+from ...groom.fitted_hair import OuterSkinSearch, fit_hair, warped_weights
 from ...groom.head_fit import (
     LANDMARKS,
     FitModel,
@@ -23,7 +23,7 @@ from ...groom.head_fit import (
     guess_landmarks,
 )
 from ...strands import StrandSet, Surface
-from ...strands.affine import moved
+from ...strands.affine import transform_points
 from ...strands.rooted_shapes import RootedShapes
 from ..base.mesh_arrays import edge_vertices
 from ..base.objects import link_into, matrix_of
@@ -89,9 +89,9 @@ class ForeignHead:
         Raises:
             HairloomError: too many roots are off the mesh.
         """
-        outside = OuterSearch(self.surface, self.skin, self.scale)
+        outside = OuterSkinSearch(self.surface, self.skin, self.scale)
         made, roots = guides.on(self.built_in), guides.on(self.skin).roots
-        fitted = fitted_hair(made, roots, self.warp, outside, self.scale)
+        fitted = fit_hair(made, roots, self.warp, outside, self.scale)
         missing, loose = (fitted.away > limit * self.scale for limit in (_MISSING, _LOOSE_ROOT))
         if missing.mean() > _MAX_MISSING:
             raise HairloomError(
@@ -148,9 +148,11 @@ class ReadHead:
         dragged = {name: at for name, at in self.landmarks.items() if name not in self.guessed}
         if len(dragged) == len(LANDMARKS):
             return dragged
-        stood = replace(self.surface, positions=moved(self.surface.positions, self.upright))
+        stood = replace(
+            self.surface, positions=transform_points(self.surface.positions, self.upright)
+        )
         guess, is_sure = guess_landmarks(fit_model(), stood)
-        back = moved(np.array(list(guess.values())), np.linalg.inv(self.upright))
+        back = transform_points(np.array(list(guess.values())), np.linalg.inv(self.upright))
         places = dict(zip(guess, back.astype(np.float64), strict=True))
         return {**places, **(dragged if is_sure else self.landmarks)}
 

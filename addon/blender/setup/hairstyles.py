@@ -19,7 +19,7 @@ from ...groom.grow import grow
 from ...groom.settings import GrowSettings
 from ...groom.widths import with_widths
 from ...parameters import ALL_SETTINGS
-from ...refine.lead_out_at_rest import are_inside, led_out_at_rest
+from ...refine.lead_out_at_rest import are_inside, lead_out_at_rest
 from ...shading.settings import ShadingSettings
 from ...shading.wet_and_dusty import wet_and_dusty_look
 from ...strands import StrandSet, Surface
@@ -417,7 +417,7 @@ def _outside(strands: StrandSet, solid: DistanceField | None) -> StrandSet:
     parts, are dropped."""
     if solid is None:
         return strands
-    led, is_out = led_out_at_rest(strands, solid, float(np.median(strands.lengths())))
+    led, is_out = lead_out_at_rest(strands, solid, float(np.median(strands.lengths())))
     return led.take(np.flatnonzero(is_out)) if is_out.any() else strands
 
 

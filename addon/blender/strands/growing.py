@@ -193,7 +193,7 @@ def _grow_steps(
 
     def work() -> StrandSet:
         by_default = density is None and settings.method == "combed"
-        dense = surface.once(scalp_density) if by_default else density
+        dense = surface.compute_once(scalp_density) if by_default else density
         return _with_widths(grow(surface, settings, dense, length), radius, offsets)
 
     return (yield Part(f"Growing {settings.strand_count:,} strands", work))

@@ -13,7 +13,7 @@ from ...cards.drawing_settings import CardDrawingSettings
 from ...dynamics.settings import DynamicsSettings
 from ...groom.children_settings import ChildrenSettings
 from ...groom.masks import Masks, StrandMask, mask_names
-from ...groom.rest_hair import carried
+from ...groom.rest_hair import carry_with_surface
 from ...groom.width_settings import WidthSettings
 from ...paint_flow import painted_strands, with_colors
 from ...parameters import ALL_SETTINGS, sections_of
@@ -22,7 +22,7 @@ from ...shading.drawn_strands import drawn_radius, strand_colors
 from ...shading.settings import ShadingSettings, StrandSettings
 from ...shading.strand_noise import SEED_LIMIT
 from ...strands import StrandSet
-from ...strands.arc_length import along
+from ...strands.arc_length import length_fractions
 from ..base.attributes import set_attribute
 from ..base.objects import head_of
 from ..base.outcome import Outcome, notes_of
@@ -104,13 +104,13 @@ def _in_rest_pose(strands: StrandSet, source: Source) -> StrandSet:
     """The strands in the pose in which the original hair is stored, the rest pose of its head."""
     if source.rest is None or source.head is None:
         return strands
-    return carried(strands, source.head, source.rest.surface)
+    return carry_with_surface(strands, source.head, source.rest.surface)
 
 
 def _with_drawn_look(rig: Rig, source: Source, settings: GroomSettings) -> StrandSet:
     """The strands of a rig with the widths, colours and noise that they are drawn with."""
     strands = with_colors(rig.strands, source.colors, settings[ShadingSettings])
-    place, counts = along(strands.points, strands.offsets), strands.point_counts
+    place, counts = length_fractions(strands.points, strands.offsets), strands.point_counts
     seed = strand_seeds(rig)
     color = strand_colors(
         np.repeat(seed, counts),

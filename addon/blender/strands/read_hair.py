@@ -14,7 +14,7 @@ from ...exchange.groom import Groom, point_indices_of, with_guide_copies
 from ...groom.painted_color import PaintedColor
 from ...groom.roots import bind_roots
 from ...groom.weights import guide_weights
-from ...groom.widths import as_wide, with_widths
+from ...groom.widths import with_widths, with_widths_of
 from ...paint_flow import with_colors
 from ...rig_flow import Rig
 from ...shading.drawn_strands import look_color, own_colors
@@ -204,7 +204,7 @@ def _as_wide_as_drawn(hair: bpy.types.Object, strands: StrandSet) -> StrandSet:
     settings = hair.data.hairloom
     drawn = with_needed_points(strands, settings.guides.cv_count)
     drawn, widths = with_widths(drawn, settings.widths.method)
-    return as_wide(strands, drawn) if widths.is_found else strands
+    return with_widths_of(strands, drawn) if widths.is_found else strands
 
 
 def _with_roots_of(strands: StrandSet, bound: StrandSet) -> StrandSet:

@@ -25,8 +25,8 @@ from ...motion_flow import carried_guides, root_turns
 from ...render import gpu_objects
 from ...rig_flow import root_normals
 from ...shading.lights import Light
-from ...strands.affine import moved
-from ...strands.vectors import both_across
+from ...strands.affine import transform_points
+from ...strands.vectors import perpendicular_axes
 from ..scene.forces import force_fields_of
 from ..sessions.session import Session
 from .motion_lines import contact_lines, density_lines, painted_lines, stretch_lines
@@ -132,7 +132,7 @@ def guide_lines(session: Session) -> Lines:
 def collider_lines(session: Session, depsgraph: bpy.types.Depsgraph) -> Floats:
     """Lines of the groom's colliders at this moment, (2n, 3); none until they are made."""
     solids = session.solids(depsgraph)
-    lines = [moved(shape_lines(solid.collider), solid.matrix_now) for solid in solids]
+    lines = [transform_points(shape_lines(solid.collider), solid.matrix_now) for solid in solids]
     return np.concatenate([np.zeros((0, 3)), *lines])
 
 
@@ -167,7 +167,7 @@ def wind_lines(air: Air | None, center: Floats, radius: float) -> Floats:
     length = wind_length(radius) * speed
     tip = center + length * along
     lines = [center, tip]
-    for side in both_across(along):
+    for side in perpendicular_axes(along):
         for sign in (1.0, -1.0):
             lines += [tip, tip + _HEAD * length * (0.5 * sign * side - along)]
     return np.array(lines)
@@ -198,7 +198,7 @@ def light_lines(lights: tuple[Light, ...], center: Floats, radius: float) -> Flo
         along = to_light / distance
         reach = _AWAY * radius * (1.0 if light.kind == "sun" else min(distance / radius / _AWAY, 1))
         end = center + reach * along
-        star = 0.1 * radius * np.array([along, *both_across(along)])
+        star = 0.1 * radius * np.array([along, *perpendicular_axes(along)])
         ends = np.stack([end - star, end + star], axis=1).reshape(-1, 3)
         lines += [np.array([center, end]), ends]
     return np.concatenate(lines)
@@ -216,7 +216,7 @@ def _capsule(capsule: CapsuleCollider) -> Floats:
     axis = capsule.end - capsule.start
     length = float(np.linalg.norm(axis))
     along = axis / length if length else np.array([0.0, 0.0, 1.0])
-    sides = [capsule.radius * side for side in both_across(along)]
+    sides = [capsule.radius * side for side in perpendicular_axes(along)]
     lines = []
     for end, out in ((capsule.start, -1.0), (capsule.end, 1.0)):
         lines.append(_circle(end, sides[0], sides[1]))

@@ -100,7 +100,7 @@ def winding_number(points: Floats, surface: Surface) -> Floats:
     Args:
         points: (n, 3) [m], space of the surface, which has at least one triangle.
     """
-    prepared = surface.once(_Prepared.of)
+    prepared = surface.compute_once(_Prepared.of)
     place = np.ascontiguousarray((points - prepared.center).T, np.float64)
     total = np.zeros(place.shape[1])
     if not len(total):

@@ -9,7 +9,7 @@ import numpy as np
 from ...arrays import Bools, Floats
 from ...errors import HairloomError
 from ...strands import Surface
-from ...strands.triangles import area_vectors, evenly_within
+from ...strands.triangles import area_vectors, uniform_barycentrics
 from ..colliders.winding import winding_number
 from .holes import close_holes
 
@@ -83,7 +83,7 @@ def samples_of(surface: Surface, count: int) -> SurfaceSamples:
     place = (np.arange(count) + 0.5) / count * along[-1]
     triangle = np.minimum(np.searchsorted(along, place, side="right"), len(area) - 1)
     one, other = (np.mod(0.5 + step * np.arange(1, count + 1), 1.0) for step in _R2)
-    point = np.einsum("nk,nkj->nj", evenly_within(one, other), corners[triangle])
+    point = np.einsum("nk,nkj->nj", uniform_barycentrics(one, other), corners[triangle])
     normal = cross[triangle] / np.maximum(area[triangle, None], 1.0e-300)
     return SurfaceSamples(point, normal)
 

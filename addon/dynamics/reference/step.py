@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from ...arrays import Floats
-from ...params.curve import along as curve_along
+from ...params.curve import sample_curve as curve_along
 from ..constraints import CONTACT_WEIGHT, HELD, HELD_SWEEPS, PINNED, ROUNDING
 from ..contacts import BETWEEN, MORE_ROUNDS, PART_PASSES, PARTS
 from ..frame import Frame, inherits_motion, root_places_after

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Bools, Floats, Ints
-from ...strands.affine import mean_scale, moved
-from ...strands.clean import are_widths
+from ...strands.affine import mean_scale, transform_points
+from ...strands.clean import are_valid_widths
 from ..curve_basis import CurveSampling, invalid_curves, points_on_curves, usable_basis
 from ..read_motion import motion_end_note
 from .usd_reader import Arrays
@@ -95,7 +95,7 @@ def read_prim(prim: Arrays, space: Floats) -> Curves:
     ids = values.strand_values("groom_id", np.int32)
     guide = values.strand_values("groom_guide", np.int32)
     uvs = (values.strand_values(name, np.float32, 2) for name in _ROOT_UVS)
-    placed = moved(values.at_points(points), matrix)
+    placed = transform_points(values.at_points(points), matrix)
     times, positions = _motion(prim, values, space)
     return Curves(
         name=str(prim["name"]),
@@ -122,7 +122,7 @@ def _motion(prim: Arrays, values: _Values, space: Floats) -> tuple[Floats | None
     if len(prim.get("times", ())) < 2:
         return None, np.zeros((0, 0, 3), np.float32)
     positions = [
-        moved(values.at_points(points), space @ matrix.T)  # USD has row vectors
+        transform_points(values.at_points(points), space @ matrix.T)  # USD has row vectors
         for points, matrix in zip(prim["motion"], prim["matrices"], strict=True)
     ]
     return prim["times"], np.array(positions, np.float32)
@@ -140,7 +140,7 @@ def _radius(
         return None, ()
     with np.errstate(over="ignore", invalid="ignore"):
         radius = radius * np.float32(0.5 * scale)
-    wrong = int((~are_widths(radius, values.sampling.offsets)).sum())
+    wrong = int((~are_valid_widths(radius, values.sampling.offsets)).sum())
     notes = (f"{wrong:,} widths are not plausible for hair and were replaced",) if wrong else ()
     return radius, notes
 

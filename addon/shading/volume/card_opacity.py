@@ -22,7 +22,7 @@ import numpy as np
 
 from ...arrays import Floats, Ints
 from ...strands import StrandSet
-from ...strands.arc_length import along, steps
+from ...strands.arc_length import length_fractions, segment_lengths
 from ...strands.triangles import areas_of
 from ..settings import StrandSettings
 
@@ -168,8 +168,8 @@ class StrandArea:
     def of(cls, strands: StrandSet) -> StrandArea:
         points, offsets, radius = strands.points, strands.offsets, strands.radius
         # of the segment that ends at each point but the first
-        area = steps(points, offsets)[1:] * (radius[1:] + radius[:-1])
-        ends = along(points, offsets)
+        area = segment_lengths(points, offsets)[1:] * (radius[1:] + radius[:-1])
+        ends = length_fractions(points, offsets)
         middle = 0.5 * (ends[1:] + ends[:-1])
         return cls(float(area.sum()), float((area * middle).sum()))
 

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...arrays import Bools, Floats, Ints
-from ...strands.arc_length import lengths
+from ...strands.arc_length import strand_lengths
 from ..lights import Light
 
 #: the sphere is a little larger than the hair, so that nothing lies on a map's edge
@@ -128,7 +128,7 @@ def reach_of(points: Floats, offsets: Ints) -> float:
     """
     roots = points[offsets[:-1]].astype(np.float64)
     away = np.linalg.norm(roots - roots.mean(axis=0), axis=1)
-    return float(np.max(away + lengths(points, offsets)))
+    return float(np.max(away + strand_lengths(points, offsets)))
 
 
 def stepped_ball(center: Floats, radius: float) -> Ball:

@@ -11,12 +11,12 @@ from tiers import few_in_commits
 
 from hairloom.addon import rig_flow
 from hairloom.addon.arrays import Floats
-from hairloom.addon.groom.automatic_children import automatic
+from hairloom.addon.groom.automatic_children import automatic_settings
 from hairloom.addon.groom.children_settings import ChildrenSettings
 from hairloom.addon.groom.settings import GuideSettings
 from hairloom.addon.strands import StrandSet, Surface
 from hairloom.addon.strands.face import BROWS, is_face_hair
-from hairloom.addon.strands.join import joined
+from hairloom.addon.strands.join import join_strands
 
 GUIDES = GuideSettings(guide_count=30, cv_count=5)
 SIDE = 0.2  # [m]
@@ -126,7 +126,7 @@ def test_brows_and_lashes_get_none_and_keep_their_widths() -> None:
     brows, widths = fur(12, 0.004, 0.2), []
     face = replace(brows, group=np.full(brows.strand_count, BROWS))
     for across in (40, 80):
-        rig = rig_of(joined(fur(across, 0.2), face), sheet())
+        rig = rig_of(join_strands(fur(across, 0.2), face), sheet())
         is_face = is_face_hair(rig.strands.group)
         assert rig.child_count > 0 and is_face.sum() == brows.strand_count
         assert not is_face[across**2 + brows.strand_count :].any()
@@ -193,7 +193,7 @@ def test_one_or_two_curves_are_drawn_alone(count: int) -> None:
 @pytest.mark.parametrize(("across", "spacings"), [(32, 2.0), (40, 6.0), (150, 6.0)])
 def test_there_is_an_end_to_them(across: int, spacings: float) -> None:
     strands = fur(across, spacings * SIDE / across)
-    settings, parts = automatic(strands, ChildrenSettings())
+    settings, parts = automatic_settings(strands, ChildrenSettings())
     assert settings.strand_count + across**2 <= 300_001
     assert 1.0 < parts <= 300_000 / across**2
 

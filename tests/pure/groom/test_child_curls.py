@@ -12,9 +12,9 @@ from hairloom.addon.groom import children
 from hairloom.addon.groom.children import make_children
 from hairloom.addon.groom.children_settings import ChildrenSettings
 from hairloom.addon.groom.settings import GuideSettings
-from hairloom.addon.params.curve import along
+from hairloom.addon.params.curve import sample_curve
 from hairloom.addon.strands import StrandSet
-from hairloom.addon.strands.arc_length import typical
+from hairloom.addon.strands.arc_length import typical_length
 
 SURFACE = sheet()
 LENGTH = 0.2
@@ -36,8 +36,8 @@ def grown(wanted: ChildrenSettings, cv_count: int = 9) -> Floats:
 
 def helix_length(wanted: ChildrenSettings) -> float:
     """The length of the helix around a straight guide, by 100,000 chords."""
-    part, size = np.linspace(0.0, 1.0, 100_001), typical(standing().lengths())
-    radius = wanted.curl * size * along(wanted.curl_along, part)
+    part, size = np.linspace(0.0, 1.0, 100_001), typical_length(standing().lengths())
+    radius = wanted.curl * size * sample_curve(wanted.curl_along, part)
     angle = 2.0 * np.pi * part * LENGTH / (wanted.curl_length * size)
     places = np.stack([radius * np.cos(angle), radius * np.sin(angle), LENGTH * part])
     return float(np.linalg.norm(np.diff(places), axis=0).sum())
@@ -46,7 +46,7 @@ def helix_length(wanted: ChildrenSettings) -> float:
 @pytest.mark.parametrize(("curl", "turn"), [(0.03, 0.2), (0.1, 0.11)])
 def test_curls_are_helices_around_the_path(curl: float, turn: float) -> None:
     grid = grown(children_settings(curl=curl, curl_length=turn, curl_along=EVEN))[:, 1:]
-    part, size = np.linspace(0.0, 1.0, grid.shape[1] + 1)[1:], typical(standing().lengths())
+    part, size = np.linspace(0.0, 1.0, grid.shape[1] + 1)[1:], typical_length(standing().lengths())
     step = 2.0 * np.pi * part[0] * LENGTH / (turn * size)
     away = np.hypot(grid[..., 0], grid[..., 1])
     expected = curl * size * (step / 2.0) / np.sin(step / 2.0)

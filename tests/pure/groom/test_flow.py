@@ -9,7 +9,7 @@ import pytest
 from flat_ground import guides_at, sheet
 
 from hairloom.addon.arrays import Floats
-from hairloom.addon.groom.flow import combed_along
+from hairloom.addon.groom.flow import comb_along_strokes
 from hairloom.addon.groom.flow_settings import FlowSettings
 from hairloom.addon.groom.roots import bind_roots
 from hairloom.addon.strands import StrandSet, Surface
@@ -21,7 +21,9 @@ WHOLE: dict[str, Any] = {"amount": 1.0, "reach": 1.0, "falloff": 0.0, "lift": 0.
 
 def comb(strands: StrandSet, *lines: Any, surface: Surface = SURFACE, **values: Any) -> Floats:
     settings = FlowSettings(**(WHOLE | values))
-    found = combed_along(strands, tuple(np.array(each, float) for each in lines), surface, settings)
+    found = comb_along_strokes(
+        strands, tuple(np.array(each, float) for each in lines), surface, settings
+    )
     return found.reshape(strands.strand_count, -1, 3)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hairloom.addon.arrays import Floats, Ints
-from hairloom.addon.groom.guides import choose_guides, group_fractions
+from hairloom.addon.groom.guides import choose_guides, guide_counts
 from hairloom.addon.groom.settings import GuideSettings
 from hairloom.addon.strands import StrandSet
 from hairloom.addon.strands.face import BROWS, LASHES
@@ -36,7 +36,7 @@ def square(count: int, seed: int = 1) -> Floats:
     ],
 )
 def test_shares(sizes: list[int], guide_count: int, shares: list[int]) -> None:
-    assert group_fractions(np.array(sizes, np.int64), guide_count).tolist() == shares
+    assert guide_counts(np.array(sizes, np.int64), guide_count).tolist() == shares
 
 
 def test_shares_of_random_groups_are_fair() -> None:
@@ -44,7 +44,7 @@ def test_shares_of_random_groups_are_fair() -> None:
     for _ in range(300):
         sizes = random.integers(1, 200, random.integers(1, 20))
         guide_count = int(random.integers(1, 400))
-        shares = group_fractions(sizes, guide_count)
+        shares = guide_counts(sizes, guide_count)
         assert shares.sum() == max(min(guide_count, sizes.sum()), len(sizes))
         assert (shares >= 1).all()
         assert (shares <= sizes).all()

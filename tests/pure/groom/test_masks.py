@@ -21,12 +21,12 @@ from hairloom.addon.groom.masks import (
     StrandMask,
     SurfaceMask,
     mask_names,
-    masks_of,
+    mask_parameters,
 )
 from hairloom.addon.paint_flow import painted_guides, painted_rig
 from hairloom.addon.strands import StrandSet
 from hairloom.addon.strands.face import BROWS
-from hairloom.addon.strands.kept import NOTHING_KEPT, Kept
+from hairloom.addon.strands.result_cache import NO_CACHE, ResultCache
 
 HEAD = sheet()
 ONES = np.ones(len(HEAD.positions))
@@ -51,7 +51,7 @@ WITHOUT = {"clump": 0.0, "frizz": 0.0, "fly_aways": 0.0}
 def rig_of(
     settings: ChildrenSettings,
     masks: Masks = NO_MASKS,
-    kept: Kept = NOTHING_KEPT,
+    kept: ResultCache = NO_CACHE,
     own: StrandSet | None = None,
 ) -> rig_flow.Rig:
     placement = rig_flow.ChildPlacement(masks=masks)
@@ -76,9 +76,9 @@ def children(rig: rig_flow.Rig) -> Floats:
 
 def test_all_that_may_be_painted_is_declared() -> None:
     of_children = ("scatter", "length", "clump", "frizz", "fly_aways", "curl", "width")
-    assert masks_of(ChildrenSettings) == {name: f"{name}_mask" for name in of_children}
+    assert mask_parameters(ChildrenSettings) == {name: f"{name}_mask" for name in of_children}
     of_motion = {"gravity", "damping", "style_root", "style_tip", "style_damping", "bend", "volume"}
-    assert masks_of(DynamicsSettings).keys() == of_motion | {"influence"}
+    assert mask_parameters(DynamicsSettings).keys() == of_motion | {"influence"}
     named = {"clump_mask": "Crown", "frizz_mask": "", "width_mask": "Front"}
     for method, found in (
         ("multi", {"clump": "Crown", "width": "Front"}),
@@ -89,7 +89,7 @@ def test_all_that_may_be_painted_is_declared() -> None:
         assert mask_names(settings) == found
 
 
-@pytest.mark.parametrize("name", masks_of(ChildrenSettings))
+@pytest.mark.parametrize("name", mask_parameters(ChildrenSettings))
 def test_a_mask_of_one_changes_not_a_bit(name: str) -> None:
     np.testing.assert_array_equal(
         children(rig_of(BOLD, on_head(name, ONES))), children(rig_of(BOLD))
@@ -177,7 +177,7 @@ def test_a_brush_gives_what_a_rebuild_makes_and_shapes_no_others(name: str) -> N
 def test_only_rows_that_are_painted_are_made_again() -> None:
     made: list[int] = []
 
-    class Counted(Kept):
+    class Counted(ResultCache):
         def rows(self, name, fixed, rows, make):  # type: ignore[no-untyped-def]
             def counted(some):  # type: ignore[no-untyped-def]
                 if name == "varied":

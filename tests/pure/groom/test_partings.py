@@ -11,7 +11,7 @@ from flat_ground import children_settings, guides_at, sheet
 from hairloom.addon.arrays import Bools, Floats
 from hairloom.addon.groom.children import make_children
 from hairloom.addon.groom.parting_settings import PartingSettings
-from hairloom.addon.groom.partings import Partings, combed_away
+from hairloom.addon.groom.partings import Partings, comb_from_partings
 from hairloom.addon.groom.weights import guide_weights
 from hairloom.addon.strands import StrandSet, Surface
 
@@ -155,7 +155,7 @@ def test_a_line_on_the_other_side_of_a_head_parts_nothing(egg: Surface) -> None:
 def test_combed_hair_leans_away_and_keeps_its_lengths() -> None:
     strands, partings = upright(400), Partings.of(line(), SURFACE)
     chosen = PartingSettings(amount=1.0, width=0.5, lift=0.0)
-    points = combed_away(strands, partings, SURFACE, chosen).reshape(strands.grid.shape)
+    points = comb_from_partings(strands, partings, SURFACE, chosen).reshape(strands.grid.shape)
     before = np.linalg.norm(np.diff(strands.grid, axis=1), axis=2)
     assert np.abs(np.linalg.norm(np.diff(points, axis=1), axis=2) - before).max() < 1e-6
     assert (points[:, 0] == strands.grid[:, 0]).all()
@@ -165,5 +165,5 @@ def test_combed_hair_leans_away_and_keeps_its_lengths() -> None:
     lean = right * (points[:, -1, 0] - points[:, 0, 0])
     assert lean[beside].min() > 0.05
     assert (points[far] == strands.grid[far]).all()
-    none = combed_away(strands, partings, SURFACE, PartingSettings(amount=0.0))
+    none = comb_from_partings(strands, partings, SURFACE, PartingSettings(amount=0.0))
     assert (none == strands.points).all()

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hairloom.addon.groom.rest_hair import RestHair, carried
+from hairloom.addon.groom.rest_hair import RestHair, carry_with_surface
 from hairloom.addon.groom.roots import bind_roots
 from hairloom.addon.strands import StrandSet, Surface
 
@@ -105,7 +105,7 @@ def test_of_several_that_one_counts_on_which_the_roots_stand(ball, hair):
     """A face that is deformed by a shape key and turned by an armature."""
     formed = replace(ball, positions=ball.positions * np.float32([1.3, 1.0, 0.9]))
     posed = replace(ball, positions=turned(formed.positions))
-    there = carried(hair, ball, formed)
+    there = carry_with_surface(hair, ball, formed)
     for strands in (there, replace(there, root_uv=None)):
         found = RestHair.found(strands, [ball, formed], posed)
         assert found is not None and found.surface is formed
@@ -115,5 +115,5 @@ def test_of_several_that_one_counts_on_which_the_roots_stand(ball, hair):
 def test_there_and_back_is_the_same(ball, hair):
     """Bound strands follow their triangles there and back."""
     posed = replace(ball, positions=turned(ball.positions, 1.9, (0.3, 0.0, 0.0)))
-    bound = bind_roots(carried(hair, ball, posed), posed, place="").strands
-    assert carried(bound, posed, ball).points == pytest.approx(hair.points, abs=1e-5)
+    bound = bind_roots(carry_with_surface(hair, ball, posed), posed, place="").strands
+    assert carry_with_surface(bound, posed, ball).points == pytest.approx(hair.points, abs=1e-5)

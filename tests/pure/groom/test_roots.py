@@ -10,7 +10,13 @@ import pytest
 
 from hairloom.addon.arrays import Floats
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.groom.roots import RootFrames, bind_roots, follow, root_frames, root_motions
+from hairloom.addon.groom.roots import (
+    RootFrames,
+    bind_roots,
+    carry_with_roots,
+    root_frames,
+    root_motions,
+)
 from hairloom.addon.strands import StrandSet, Surface
 from hairloom.addon.strands.closest_point import closest_point
 
@@ -72,7 +78,7 @@ def test_missing_root_uvs_come_from_the_surface_and_own_ones_stay(egg: Surface) 
 
 
 def followed(strands: StrandSet, rest: RootFrames, now: RootFrames) -> Floats:
-    points = follow(strands.points, strands.offsets, root_motions(rest, now))
+    points = carry_with_roots(strands.points, strands.offsets, root_motions(rest, now))
     return points.reshape(strands.grid.shape)
 
 
@@ -83,7 +89,7 @@ def test_strands_of_any_point_counts_go_each_with_its_own_root(egg: Surface) -> 
     parts = [points[:count] for points, count in zip(even.grid, counts, strict=True)]
     expected = [points[:count] for points, count in zip(whole, counts, strict=True)]
     offsets = np.concatenate([[0], np.cumsum(counts)])
-    found = follow(np.concatenate(parts), offsets, root_motions(rest, now))
+    found = carry_with_roots(np.concatenate(parts), offsets, root_motions(rest, now))
     assert np.array_equal(found, np.concatenate(expected))
 
 
@@ -97,7 +103,7 @@ def test_rigid_motion_passes_through(egg: Surface) -> None:
     strands = bind_roots(hair_on(egg, 300, offset=0.003), egg, place="test").strands
     turn, shift = rotation((1.0, 2.0, -0.5), 2.2), np.array([0.3, -0.1, 0.2])
     rest = frames_of(strands, egg.positions, egg)
-    # in float64, to see the errors of `follow` alone
+    # in float64, to see the errors of `carry_with_roots` alone
     now = frames_of(strands, egg.positions.astype(np.float64) @ turn.T + shift, egg)
     expected = strands.grid.astype(np.float64) @ turn.T + shift
     assert np.abs(followed(strands, rest, now) - expected).max() < 1e-7

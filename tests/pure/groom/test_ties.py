@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hairloom.addon.groom.holds import anchors_of
-from hairloom.addon.groom.ties import Holders, Tie, TipSurface, find_holds, idle
+from hairloom.addon.groom.ties import Holders, Tie, TipSurface, find_holds, unused_holder_notes
 from hairloom.addon.strands import StrandSet, Surface
 
 
@@ -93,7 +93,7 @@ def test_what_holds_nothing_is_named() -> None:
     holders = Holders((ring(0.5), ring(5.0)), TipSurface("Bun", ground(z=-9.0)))
     holds = find_holds(hair, holders, 0.05)
     assert holds is not None
-    notes = idle(holds, holders)
+    notes = unused_holder_notes(holds, holders)
     assert len(notes) == 2
     assert "No hair passes through the tie Ring" in notes[0]
     assert "Bun" in notes[1] and "Tip Distance" in notes[1]

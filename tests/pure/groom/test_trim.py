@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hairloom.addon.arrays import Floats
-from hairloom.addon.groom.trim import Plane, flat, trimmed
+from hairloom.addon.groom.trim import Plane, plane_of_flat_mesh, trim_strands
 from hairloom.addon.strands import StrandSet, Surface
 from hairloom.addon.strands.crossings import first_crossings
 
@@ -39,7 +39,7 @@ def test_straight_hair_ends_on_the_plane_and_keeps_its_points() -> None:
     strands = straight(roots, way, counts)
     normal = np.array([0.1, -0.2, 1.0]) / np.linalg.norm([0.1, -0.2, 1.0])
     plane = Plane(np.array([0.0, 0.0, 0.12]), normal)
-    cut = trimmed(strands, [plane])
+    cut = trim_strands(strands, [plane])
     part = ((plane.origin - roots) @ normal) / (way @ normal)
     is_cut = part < 1.0
     assert (cut.is_trimmed == is_cut).all()
@@ -62,7 +62,7 @@ def test_a_curve_keeps_its_shape_up_to_the_cut() -> None:
     circle = 0.2 * np.stack([1.0 - np.cos(angle), 0.0 * angle, np.sin(angle)], axis=1)
     strands = StrandSet(circle, np.array([0, 25]), np.full(25, 1e-4), np.zeros(1))
     at = 0.2 * (1.0 - np.cos(np.pi / 3.0))
-    cut = trimmed(strands, [Plane(np.array([at, 0.0, 0.0]), np.array([1.0, 0.0, 0.0]))])
+    cut = trim_strands(strands, [Plane(np.array([at, 0.0, 0.0]), np.array([1.0, 0.0, 0.0]))])
     away = np.linalg.norm(cut.points - [0.2, 0.0, 0.0], axis=1) - 0.2
     # polylines through its points are off by 4e-4, as is the first segment of drawn curves
     assert np.abs(away).max() < 3e-4
@@ -76,7 +76,7 @@ def test_the_side_of_a_plane_with_most_roots_is_its_inside() -> None:
     roots = np.array([[0.0, 0.0, 0.2], [0.1, 0.0, 0.2], [0.0, 0.0, 0.05]])
     way = np.array([[0.0, 0.0, -0.2], [0.0, 0.0, -0.05], [0.0, 0.0, 0.2]])
     for normal in (DOWN, -DOWN):
-        cut = trimmed(straight(roots, way), [Plane(np.array([0.0, 0.0, 0.1]), normal)])
+        cut = trim_strands(straight(roots, way), [Plane(np.array([0.0, 0.0, 0.1]), normal)])
         assert cut.is_trimmed.tolist() == [True, False, False]
         assert cut.is_outside.tolist() == [False, False, True]
 
@@ -85,21 +85,21 @@ def test_of_two_shapes_the_first_that_is_left_cuts() -> None:
     roots, way = np.array([[0.0, 0.0, 0.2]]), np.array([[0.0, 0.0, -0.2]])
     planes = [Plane(np.array([0.0, 0.0, z]), -DOWN) for z in (0.05, 0.1)]
     for order in (planes, planes[::-1]):
-        tip = trimmed(straight(roots, way), order).points[-1]
+        tip = trim_strands(straight(roots, way), order).points[-1]
         assert np.abs(tip - [0.0, 0.0, 0.1]).max() < 1e-7
 
 
 def test_a_flat_mesh_cuts_as_far_as_it_reaches() -> None:
     corners = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
     sheet = Surface(corners * 0.1, np.array([[0, 1, 2], [0, 2, 3]]))
-    plane = flat(sheet)
+    plane = plane_of_flat_mesh(sheet)
     assert plane is not None
     # one passes along the diagonal that both triangles have, and one beside the sheet
     roots = np.array([[0.02, 0.02, 0.1], [0.3, 0.0, 0.1], [-0.05, 0.09, 0.1]])
-    cut = trimmed(straight(roots, np.tile([0.0, 0.0, -0.2], (3, 1))), [plane])
+    cut = trim_strands(straight(roots, np.tile([0.0, 0.0, -0.2], (3, 1))), [plane])
     assert cut.is_trimmed.tolist() == [True, False, True]
     assert np.abs(cut.points.reshape(3, 9, 3)[[0, 2], -1, 2]).max() < 1e-7
-    assert flat(box(0.1)) is None
+    assert plane_of_flat_mesh(box(0.1)) is None
 
 
 def test_first_crossings_are_those_of_brute_force() -> None:

@@ -12,7 +12,7 @@ import pytest
 
 from hairloom.addon.parameters import ALL_SETTINGS
 from hairloom.addon.params import Settings, number
-from hairloom.addon.params.docs import table
+from hairloom.addon.params.docs import parameter_table
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,7 +32,7 @@ class Tilt(Settings):
 
 
 def test_angles_are_shown_in_degrees() -> None:
-    assert table(Tilt).splitlines()[-1] == (
+    assert parameter_table(Tilt).splitlines()[-1] == (
         "| **Angle** `angle` | 45 | 0 to 90 | -180 to 180 | ° | How far it tilts | Euclid |"
     )
 
@@ -41,7 +41,7 @@ def test_angles_are_shown_in_degrees() -> None:
 def test_what_the_table_allows_as_code_is_taken(kind: type[Settings]) -> None:
     """A setting accepts all values that its row shows as code, the default among them; a choice
     shows all."""
-    rows = [line for line in table(kind).splitlines() if line.startswith("| **")]
+    rows = [line for line in parameter_table(kind).splitlines() if line.startswith("| **")]
     for row, parameter in zip(rows, kind.parameters(), strict=True):
         default, allowed = (re.findall("`(.+?)`", row.split("|")[cell]) for cell in (2, 4))
         if parameter.kind in ("choice", "toggle"):
@@ -66,7 +66,7 @@ def test_a_factor_without_those_limits_is_not_called_one_from_0_to_1() -> None:
             0.5, label="Stretch", description="Any", unit="factor", soft=(0.0, 1.0), hard=(0.0, 9.0)
         )
 
-    one, other = table(Fractions).splitlines()[-2:]
+    one, other = parameter_table(Fractions).splitlines()[-2:]
     assert "| 0 to 1 | A part |" in one and "|  | Any |" in other
 
 
@@ -85,7 +85,7 @@ def test_what_an_artist_reads_stands_alone_and_is_in_round_degrees(kind: type[Se
 
 @pytest.mark.parametrize("kind", ALL_SETTINGS.values(), ids=ALL_SETTINGS)
 def test_each_parameter_has_a_row_of_seven_cells(kind: type[Settings]) -> None:
-    lines = table(kind).splitlines()
+    lines = parameter_table(kind).splitlines()
     assert lines[0] == f"## {kind.title} (`{kind.section}`)"
     rows = [line for line in lines if line.startswith("| **")]
     assert len(rows) == len(kind.parameters())

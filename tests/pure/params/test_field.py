@@ -12,7 +12,7 @@ import pytest
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.parameters import ALL_SETTINGS
 from hairloom.addon.params import Parameter, Settings, choice, color, curve, integer, number, toggle
-from hairloom.addon.params.curve import PLACES
+from hairloom.addon.params.curve import KNOT_POSITIONS
 
 pytestmark = pytest.mark.portable
 
@@ -151,7 +151,7 @@ def test_each_parameter_is_declared_in_full(kind: type[Settings], parameter: Par
         assert low <= soft_low < soft_high <= high
         assert soft_low <= parameter.default <= soft_high
     if parameter.kind == "curve":
-        assert len(parameter.default) == len(PLACES)
+        assert len(parameter.default) == len(KNOT_POSITIONS)
         assert parameter.hard_range is not None
     if parameter.kind == "choice":
         assert all(label and text for _, label, text in parameter.choices)

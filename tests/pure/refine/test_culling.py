@@ -13,11 +13,11 @@ from hairloom.addon.arrays import Floats
 from hairloom.addon.dynamics.colliders.winding import winding_number
 from hairloom.addon.exchange.tressfx import read_tfx
 from hairloom.addon.refine.culling import (
-    faces_away,
-    hidden,
-    moved_spheres,
+    are_facing_away,
+    are_hidden,
+    hidden_regions,
     occluder_spheres_of,
-    shades_of,
+    transform_spheres,
 )
 from hairloom.addon.refine.detail import PictureView
 from hairloom.addon.render.camera import Camera, look_at, orthographic, perspective
@@ -59,11 +59,13 @@ def test_nothing_of_a_hidden_strand_is_seen(
     start = behind * random.uniform(-1.0, 2.0, (4000, 1)) + random.normal(0.0, 0.4, (4000, 3))
     step = random.normal(size=(4000, 4, 3)) * random.uniform(0.01, 0.2, (4000, 1, 1))
     points = (start[:, None] + np.cumsum(step, axis=1)).astype(np.float32)
-    shades = shades_of(BALLS, picture, HALF_WIDTH, RADIUS)
-    is_hidden = hidden(points, shades)
+    shades = hidden_regions(BALLS, picture, HALF_WIDTH, RADIUS)
+    is_hidden = are_hidden(points, shades)
     assert 40 < is_hidden.sum() < 3500
     # those that slightly smaller balls would not hide
-    is_close = is_hidden & ~hidden(points, shades_of(BALLS, picture, 5.0 * HALF_WIDTH, RADIUS))
+    is_close = is_hidden & ~are_hidden(
+        points, hidden_regions(BALLS, picture, 5.0 * HALF_WIDTH, RADIUS)
+    )
     assert is_close.sum() > 20
     homogeneous = Camera(view, picture.projection).eye
     pixel = np.linalg.inv(view)[:3, :2] / np.diag(picture.projection)[:2] / picture.half_size
@@ -85,14 +87,14 @@ def test_what_is_behind_a_ball_is_found(name: str) -> None:
     """Short strands just inside the hidden region are hidden, those just outside or before it are
     not."""
     picture = PictureView(look_at((0, -3, 0), (0, 0, 0)), PROJECTIONS[name], WIDTH, HEIGHT)
-    shades = shades_of(BALLS[:1], picture, 0.5, 0.0)
+    shades = hidden_regions(BALLS[:1], picture, 0.5, 0.0)
     places = np.array([[0, 0.6, 0], [0.4, 0.5, 0], [0, -0.6, 0], [0.9, 0.6, 0], [0, -4.0, 0]])
     points = places[:, None] + np.linspace(0.0, 0.02, 4)[:, None] * [0.0, 1.0, 0.0]
-    assert hidden(points, shades).tolist() == [True, True, False, False, False]
+    assert are_hidden(points, shades).tolist() == [True, True, False, False, False]
     # one visible CV is enough for a strand to be drawn
     out = points[:1].copy()
     out[0, 3] = [1.5, 0.7, 0.0]
-    assert not hidden(out, shades).any()
+    assert not are_hidden(out, shades).any()
 
 
 def test_no_ball_hides_that_is_too_small_too_near_or_clipped() -> None:
@@ -101,8 +103,8 @@ def test_no_ball_hides_that_is_too_small_too_near_or_clipped() -> None:
 
     def count(eye: tuple[float, float, float], half_width: float = 1.0) -> int:
         picture = PictureView(look_at(eye, (0, 9, 0)), lens, WIDTH, HEIGHT)
-        shades = shades_of(BALLS[:1], picture, half_width, 1e-4)
-        assert hidden(points, shades).any() == (len(shades.axis) > 0)
+        shades = hidden_regions(BALLS[:1], picture, half_width, 1e-4)
+        assert are_hidden(points, shades).any() == (len(shades.axis) > 0)
         return len(shades.axis)
 
     assert count((0, -3, 0)) == 1
@@ -110,16 +112,16 @@ def test_no_ball_hides_that_is_too_small_too_near_or_clipped() -> None:
     assert count((0, -0.4, 0)) == 0  # within the ball
     assert count((0, -0.53, 0)) == 0  # before the near plane
     none = PictureView(look_at((0, -3, 0), (0, 0, 0)), lens, WIDTH, HEIGHT)
-    assert not hidden(points, shades_of(np.zeros((0, 4)), none, 1.0, 1e-4)).any()
-    assert hidden(points[:0], shades_of(BALLS, none, 1.0, 1e-4)).shape == (0,)
+    assert not are_hidden(points, hidden_regions(np.zeros((0, 4)), none, 1.0, 1e-4)).any()
+    assert are_hidden(points[:0], hidden_regions(BALLS, none, 1.0, 1e-4)).shape == (0,)
 
 
 def test_roots_on_the_far_side_face_away() -> None:
     roots = np.array([[0, -1, 0], [0, 1, 0], [1, 0.1, 0], [1, -0.4, 0]], float)
     center = np.zeros(3)
-    assert faces_away(roots, center, np.array([0, -1.0, 0, 0])).tolist() == [0, 1, 1, 0]
+    assert are_facing_away(roots, center, np.array([0, -1.0, 0, 0])).tolist() == [0, 1, 1, 0]
     # from near, less of a ball is visible
-    assert faces_away(roots, center, np.array([0, -2.0, 0, 1])).tolist() == [0, 1, 1, 1]
+    assert are_facing_away(roots, center, np.array([0, -2.0, 0, 1])).tolist() == [0, 1, 1, 1]
 
 
 @pytest.fixture(scope="module")
@@ -191,5 +193,5 @@ def test_balls_move_with_the_head_and_never_get_too_large() -> None:
     matrix = np.eye(4)
     matrix[:3, :3] = [[0.0, -2.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 3.0]]
     matrix[:3, 3] = [1.0, 2.0, 3.0]
-    moved = moved_spheres(np.array([[1.0, 0.0, 1.0, 0.5]], np.float32), matrix)
+    moved = transform_spheres(np.array([[1.0, 0.0, 1.0, 0.5]], np.float32), matrix)
     assert moved == pytest.approx(np.array([[1.0, 3.0, 6.0, 0.5]]))

@@ -18,7 +18,7 @@ from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.groom.weights import GuideWeights
 from hairloom.addon.motion_flow import FrameInput
 from hairloom.addon.refine.lead_out import (
-    NO_LEANS,
+    NO_DEFLECTIONS,
     SLACK,
     TURNING_BACK,
     Carry,
@@ -28,7 +28,7 @@ from hairloom.addon.refine.lead_out import (
 )
 from hairloom.addon.rig_flow import Pose, Rig
 from hairloom.addon.strands import StrandSet, Surface
-from hairloom.addon.strands.arc_length import steps
+from hairloom.addon.strands.arc_length import segment_lengths
 
 KEPT = 0.001
 BALL = SphereCollider((0.0, 0.0, 0.0), 0.1)
@@ -78,7 +78,9 @@ def test_strands_go_around_a_ball_and_keep_their_segments(across) -> None:
     np.testing.assert_array_equal(led, np.flatnonzero(were_near))
     assert 100 < len(led) < 350
     assert np.linalg.norm(now, axis=1).min() > 0.1 + KEPT * (1.0 - SLACK) - 1.0e-7
-    np.testing.assert_allclose(steps(now, offsets), steps(points, offsets), atol=1e-7)
+    np.testing.assert_allclose(
+        segment_lengths(now, offsets), segment_lengths(points, offsets), atol=1e-7
+    )
     counts = np.diff(offsets)
     kept = np.repeat(~were_near, counts)
     np.testing.assert_array_equal(now[kept], points[kept])
@@ -147,7 +149,9 @@ def test_a_fold_from_which_no_segment_leads_out() -> None:
     assert len(led) > 40
     distance = signed_distance(now, colliders, KEPT)[0]
     assert distance.min() > KEPT * (1.0 - 2.0 * SLACK)
-    np.testing.assert_allclose(steps(now, offsets), steps(points, offsets), atol=1e-7)
+    np.testing.assert_allclose(
+        segment_lengths(now, offsets), segment_lengths(points, offsets), atol=1e-7
+    )
 
 
 def test_strands_without_length_and_of_two_points_stay_finite() -> None:
@@ -158,7 +162,9 @@ def test_strands_without_length_and_of_two_points_stay_finite() -> None:
     clearance = clearance_at(points + 1.0, offsets, still(BALL), KEPT)
     lead_out(now, at(points), offsets, still(BALL), clearance)
     assert np.isfinite(now).all()
-    np.testing.assert_allclose(steps(now, offsets), steps(points, offsets), atol=1e-7)
+    np.testing.assert_allclose(
+        segment_lengths(now, offsets), segment_lengths(points, offsets), atol=1e-7
+    )
     none = np.zeros((0, 3), np.float32)
     clearance = clearance_at(none, np.array([0]), still(BALL), KEPT)
     assert not len(lead_out(none, at(none), np.array([0]), still(BALL), clearance)[0])
@@ -207,7 +213,9 @@ def test_a_strand_between_guides_that_part_goes_around() -> None:
         depth = 0.1 - np.linalg.norm(points - now[:3, 3], axis=1)
         assert depth.max() < 1e-6
         np.testing.assert_allclose(
-            steps(points, strands.offsets), steps(strands.points, strands.offsets), atol=1e-6
+            segment_lengths(points, strands.offsets),
+            segment_lengths(strands.points, strands.offsets),
+            atol=1e-6,
         )
     led = motion_flow.strands_and_led(rig, motion)[1]
     unled = motion_flow.strands_at(rig, motion.pose, motion.guides)
@@ -241,12 +249,12 @@ def test_hair_beside_a_sheet_that_its_grid_makes_thicker_stays_on_its_side() -> 
     assert (ridden @ turn)[:, 1].min() < -0.003
     assert (now @ turn)[:, 1].min() > half[1]
     assert len(led) == 8
-    expected = steps(ridden, offsets)
+    expected = segment_lengths(ridden, offsets)
     for strand, last in enumerate(clearance.held):
         held = slice(offsets[strand], offsets[strand] + last + 1)
         np.testing.assert_allclose(now[held], carried[held], atol=KEPT * SLACK)
-        expected[held] = steps(carried, offsets)[held]
-    np.testing.assert_allclose(steps(now, offsets), expected, atol=1e-7)
+        expected[held] = segment_lengths(carried, offsets)[held]
+    np.testing.assert_allclose(segment_lengths(now, offsets), expected, atol=1e-7)
 
 
 def test_a_strand_that_nothing_leads_out_is_as_its_root_carries_it() -> None:
@@ -275,13 +283,15 @@ def test_a_strand_that_could_go_either_way_goes_where_it_went_before() -> None:
 
     def led(tilts: list[float], *, remembers: bool) -> np.ndarray:
         """The tip in each frame."""
-        tips, leans = [], NO_LEANS
+        tips, leans = [], NO_DEFLECTIONS
         for tilt in tilts:
             now = dives(tilt)
-            left = leans.after(1.0 / 60.0, offsets) if remembers else NO_LEANS
+            left = leans.after(1.0 / 60.0, offsets) if remembers else NO_DEFLECTIONS
             _, leans = lead_out(now, at(rest), offsets, colliders, clearance, left)
             assert np.linalg.norm(now, axis=1).min() > 0.1 + KEPT * (1.0 - 2.0 * SLACK)
-            np.testing.assert_allclose(steps(now, offsets), steps(dives(tilt), offsets), atol=1e-7)
+            np.testing.assert_allclose(
+                segment_lengths(now, offsets), segment_lengths(dives(tilt), offsets), atol=1e-7
+            )
             tips.append(now[-1])
         return np.array(tips)
 
@@ -305,9 +315,14 @@ def test_what_nothing_leads_out_any_more_turns_back_steadily() -> None:
     while len(leans.strands):
         now = rest.copy()
         _, leans = lead_out(now, at(rest), offsets, gone, clearance, leans.after(frame, offsets))
-        turned = np.linalg.norm(np.diff(now - before, axis=0), axis=1) / steps(rest, offsets)[1:]
+        turned = (
+            np.linalg.norm(np.diff(now - before, axis=0), axis=1)
+            / segment_lengths(rest, offsets)[1:]
+        )
         assert turned.max() < 1.3 * TURNING_BACK * frame
-        np.testing.assert_allclose(steps(now, offsets), steps(rest, offsets), atol=1e-7)
+        np.testing.assert_allclose(
+            segment_lengths(now, offsets), segment_lengths(rest, offsets), atol=1e-7
+        )
         before, frames = now, frames + 1
     assert 2 <= frames <= np.ceil(2.0 / (TURNING_BACK * frame)) + 1
     np.testing.assert_allclose(now, rest, atol=1e-6)

@@ -10,10 +10,10 @@ from hairloom.addon.dynamics.colliders import DistanceField
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.groom.children_settings import ChildrenSettings
 from hairloom.addon.groom.settings import GuideSettings
-from hairloom.addon.refine.lead_out_at_rest import DEEP, led_out_at_rest
+from hairloom.addon.refine.lead_out_at_rest import DEEP, lead_out_at_rest
 from hairloom.addon.rig_flow import Rig
 from hairloom.addon.strands import StrandSet, Surface
-from hairloom.addon.strands.arc_length import steps
+from hairloom.addon.strands.arc_length import segment_lengths
 
 RADIUS = 0.1
 
@@ -106,11 +106,13 @@ def test_lengths_and_roots_stay_and_strands_outside_are_not_touched(field: Dista
     inward = root[:15, None] * (1.0 - np.linspace(0.0, 0.5, count)[None, :, None]) + through
     outward = root[15:, None] * (1.0 + np.linspace(0.0, 1.0, count)[None, :, None])
     strands = strand_set(np.concatenate([inward, outward]))
-    led, is_out = led_out_at_rest(strands, field, 0.25)
+    led, is_out = lead_out_at_rest(strands, field, 0.25)
     assert is_out.all()
     np.testing.assert_array_equal(led.roots, strands.roots)
     np.testing.assert_allclose(
-        steps(led.points, led.offsets), steps(strands.points, strands.offsets), atol=1e-6
+        segment_lengths(led.points, led.offsets),
+        segment_lengths(strands.points, strands.offsets),
+        atol=1e-6,
     )
     np.testing.assert_array_equal(led.points[15 * count :], strands.points[15 * count :])
     assert depth(strands)[:15].min() > 0.004 and depth(led).max() < 0.0006

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from hairloom.addon.parameters import ALL_SETTINGS
-from hairloom.addon.params.field import NAMING
+from hairloom.addon.params.field import NAME_KINDS
 from hairloom.addon.params.preset import read_any_preset
 from hairloom.addon.shading.settings import ShadingSettings
 
@@ -32,7 +32,9 @@ def test_a_look_names_every_value(path: Path) -> None:
     no names of painted attributes, which it leaves alone.
     """
     named = set(json.loads(path.read_text(encoding="utf-8"))["values"])
-    assert named == {each.name for each in ShadingSettings.parameters() if each.kind not in NAMING}
+    assert named == {
+        each.name for each in ShadingSettings.parameters() if each.kind not in NAME_KINDS
+    }
 
 
 @every_look

@@ -8,7 +8,7 @@ import pytest
 from hairloom.addon.arrays import Floats
 from hairloom.addon.strands import StrandSet
 from hairloom.addon.strands.center_lines import center_lines
-from hairloom.addon.strands.join import joined
+from hairloom.addon.strands.join import join_strands
 from hairloom.addon.strands.resample import resample
 
 
@@ -80,6 +80,6 @@ def test_the_mean_is_that_of_the_strand_around_each_cv() -> None:
 def test_a_line_does_not_depend_on_other_strands() -> None:
     """Bit for bit, whatever points others have, since cached lines are compared bit by bit."""
     coil, other = coils((9,)), coils((5, 7), cv_count=120)
-    both = center_lines(joined(other, coil), 10)
+    both = center_lines(join_strands(other, coil), 10)
     assert np.array_equal(both.grid[2], center_lines(coil, 10).grid[0])
     assert np.array_equal(both.grid[:2], center_lines(other, 10).grid)

@@ -35,7 +35,7 @@ def test_each_fault_is_counted_once_and_named() -> None:
         "no length": 1,
     }
     assert cleaned.kept.tolist() == [0, 6]
-    assert [points.tolist() for points in cleaned.strands.strands()] == [CURVES[0], CURVES[6]]
+    assert [points.tolist() for points in cleaned.strands.iter_strands()] == [CURVES[0], CURVES[6]]
 
 
 @pytest.mark.parametrize("factor", [1e-6, 1e-3, 1e3])

@@ -11,14 +11,14 @@ from hairloom.addon.arrays import Floats
 from hairloom.addon.strands.curve_types import (
     CurveShapes,
     CurveType,
-    DrawnCurves,
-    Knots,
-    drawn_curves,
+    EvaluatedCurves,
+    KnotMode,
+    evaluate_curves,
 )
 
 
 def shapes_of(
-    points: Floats, kind: CurveType, order: int = 4, knots: Knots = Knots.ENDPOINT
+    points: Floats, kind: CurveType, order: int = 4, knots: KnotMode = KnotMode.ENDPOINT
 ) -> CurveShapes:
     """The shape of a single curve with these control points."""
     one = np.ones(1, np.int32)
@@ -26,8 +26,8 @@ def shapes_of(
     return CurveShapes(kind * one, 12 * one, order * one, knots * one, weight, points, points)
 
 
-def drawn(points: Floats, shapes: CurveShapes) -> DrawnCurves:
-    return drawn_curves(np.float32(points), np.array([0, len(points)]), shapes)
+def drawn(points: Floats, shapes: CurveShapes) -> EvaluatedCurves:
+    return evaluate_curves(np.float32(points), np.array([0, len(points)]), shapes)
 
 
 def test_a_quarter_of_a_circle_is_a_quarter_of_a_circle() -> None:
@@ -41,7 +41,7 @@ def test_a_quarter_of_a_circle_is_a_quarter_of_a_circle() -> None:
 
 def test_nurbs_with_knots_of_bezier_curves_are_bezier_curves() -> None:
     points = np.random.default_rng(1).normal(size=(7, 3)).astype(np.float32)
-    nurbs = drawn(points, shapes_of(points, CurveType.NURBS, 4, Knots.ENDPOINT_BEZIER))
+    nurbs = drawn(points, shapes_of(points, CurveType.NURBS, 4, KnotMode.ENDPOINT_BEZIER))
     ends = points[::3]
     left, right = ends.copy(), ends.copy()
     right[:-1], left[1:] = points[1::3], points[2::3]
@@ -71,5 +71,5 @@ def test_curves_without_points_stay_without() -> None:
     one = np.array([1, 2, 3], np.int32)
     points = np.zeros((1, 3), np.float32)
     shapes = CurveShapes(one, one, 4 + one, 0 * one, np.ones(1), points, points)
-    found = drawn_curves(points, np.array([0, 0, 1, 1]), shapes)
+    found = evaluate_curves(points, np.array([0, 0, 1, 1]), shapes)
     assert found.offsets.tolist() == [0, 0, 1, 1]

@@ -6,7 +6,7 @@ import numpy as np
 
 from hairloom.addon.strands import Surface
 from hairloom.addon.strands.mesh_faults import edges_of
-from hairloom.addon.strands.weld import same_places
+from hairloom.addon.strands.weld import unique_position_indices
 
 CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
 QUADS = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
@@ -41,8 +41,8 @@ def test_places_are_those_of_sorting() -> None:
     random = np.random.default_rng(3)
     positions = random.integers(-3, 3, (4000, 3)).astype(np.float32) * np.float32(0.1)
     positions[positions == 0.0] *= np.sign(random.normal(size=(positions == 0.0).sum()))
-    number = same_places(positions)
+    number = unique_position_indices(positions)
     _, expected = np.unique(positions, axis=0, return_inverse=True)
     pairs = np.unique(np.stack([number, expected.reshape(-1)], axis=1), axis=0)
     assert len(pairs) == number.max() + 1 == expected.max() + 1
-    assert len(same_places(np.zeros((0, 3), np.float32))) == 0
+    assert len(unique_position_indices(np.zeros((0, 3), np.float32))) == 0

@@ -9,7 +9,12 @@ import pytest
 
 from hairloom.addon.arrays import Floats
 from hairloom.addon.strands import StrandSet
-from hairloom.addon.strands.needed_points import LOST, MAX_POINTS, STRAY, with_needed_points
+from hairloom.addon.strands.needed_points import (
+    MAX_DEVIATION,
+    MAX_LENGTH_LOSS,
+    MAX_POINTS,
+    with_needed_points,
+)
 
 
 def coil(turns: float, count: int) -> Floats:
@@ -42,9 +47,9 @@ def away_from(points: Floats, line: Floats) -> Floats:
 def test_no_strand_loses_length_or_strays() -> None:
     strands = ragged(*(coil(turns, 2000) for turns in (0, 0.3, 1, 2, 4, 6, 8)))
     found = with_needed_points(strands, 16)
-    stray = STRAY * float(np.median(strands.lengths()))
-    assert (found.lengths() >= (1.0 - LOST) * strands.lengths()).all()
-    for before, after in zip(strands.strands(), found.strands(), strict=True):
+    stray = MAX_DEVIATION * float(np.median(strands.lengths()))
+    assert (found.lengths() >= (1.0 - MAX_LENGTH_LOSS) * strands.lengths()).all()
+    for before, after in zip(strands.iter_strands(), found.iter_strands(), strict=True):
         assert away_from(before[::10].astype(np.float64), after.astype(np.float64)).max() <= stray
         assert np.array_equal(before[[0, -1]], after[[0, -1]])
     counts = found.point_counts
@@ -59,7 +64,9 @@ def test_points_are_hardly_more_than_a_circle_needs() -> None:
     (count,) = with_needed_points(strand, 16).point_counts.tolist()
     length = float(strand.lengths()[0])
     radius = (length / (2.0 * np.pi * 6.0)) ** 2 / 0.008
-    turned = min(2.0 * np.arccos(1.0 - STRAY * length / radius), np.sqrt(24.0 * LOST))
+    turned = min(
+        2.0 * np.arccos(1.0 - MAX_DEVIATION * length / radius), np.sqrt(24.0 * MAX_LENGTH_LOSS)
+    )
     wanted = length / radius / turned
     assert wanted < count < 1.3 * wanted + 1
 
@@ -71,7 +78,7 @@ def test_few_points_stay_and_get_more_between_them() -> None:
     found = with_needed_points(strands, 16)
     assert (found.point_counts == 16).all()
     assert found.lengths() == pytest.approx(strands.lengths(), rel=1e-5)
-    for before, after in zip(strands.strands(), found.strands(), strict=True):
+    for before, after in zip(strands.iter_strands(), found.iter_strands(), strict=True):
         gap = np.linalg.norm(before[:, None] - after[None], axis=2).min(axis=1)
         assert (gap == 0.0).all()
     assert found.color is not None and found.color.shape == (80, 3)
@@ -93,7 +100,7 @@ def test_a_coil_of_twenty_turns_keeps_its_length() -> None:
     for count in (400, 1000, 5000):
         strands = ragged(coil(20, count))
         kept = with_needed_points(strands, 16).lengths() / strands.lengths()
-        assert kept.min() >= 1.0 - LOST
+        assert kept.min() >= 1.0 - MAX_LENGTH_LOSS
 
 
 def test_no_strand_has_more_than_the_most() -> None:

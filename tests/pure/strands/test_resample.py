@@ -31,7 +31,7 @@ def test_agrees_with_interpolation_strand_by_strand(cv_count: int) -> None:
     strands = strand_set(curves)
     result = resample(strands, cv_count)
     radii = np.split(strands.radius, strands.offsets[1:-1])
-    for index, curve in enumerate(strands.strands()):
+    for index, curve in enumerate(strands.iter_strands()):
         assert result.grid[index] == pytest.approx(walked(curve, curve, cv_count), abs=1e-5)
         expected = walked(curve, radii[index][:, None], cv_count)[:, 0]
         assert result.radius.reshape(-1, cv_count)[index] == pytest.approx(expected, rel=1e-4)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.groom.grown import bound_strands
+from hairloom.addon.groom.bound_strands import bound_strands
 from hairloom.addon.strands import StrandSet, Surface
 from hairloom.addon.strands.rooted_shapes import RootedShapes
 

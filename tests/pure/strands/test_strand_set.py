@@ -49,17 +49,22 @@ def test_what_does_not_fit_is_refused(changes: dict[str, Any], problem: str) -> 
 def test_lengths_agree_with_loops() -> None:
     strands = ragged()
     lengths = [
-        np.linalg.norm(np.diff(points, axis=0), axis=1).sum() for points in strands.strands()
+        np.linalg.norm(np.diff(points, axis=0), axis=1).sum() for points in strands.iter_strands()
     ]
     assert strands.lengths() == pytest.approx(lengths, rel=1e-6)
-    assert strands.roots == pytest.approx(np.array([points[0] for points in strands.strands()]))
+    assert strands.roots == pytest.approx(
+        np.array([points[0] for points in strands.iter_strands()])
+    )
 
 
 def test_take_keeps_everything_that_belongs_to_a_strand() -> None:
     strands, chosen = ragged(), np.array([3, 0, 3])
     taken = strands.take(chosen)
-    all_points, all_radii = list(strands.strands()), np.split(strands.radius, strands.offsets[1:-1])
-    for points, strand in zip(taken.strands(), chosen, strict=True):
+    all_points, all_radii = (
+        list(strands.iter_strands()),
+        np.split(strands.radius, strands.offsets[1:-1]),
+    )
+    for points, strand in zip(taken.iter_strands(), chosen, strict=True):
         assert (points == all_points[strand]).all()
     assert (taken.radius == np.concatenate([all_radii[strand] for strand in chosen])).all()
     for name in ("group", "root_uv", "root_triangle", "root_barycentric"):
@@ -84,7 +89,7 @@ def test_only_uniform_strands_have_a_grid() -> None:
         _ = ragged().grid
     pair = ragged().take(np.array([0, 4]))
     assert pair.grid.shape == (2, 2, 3)
-    assert (pair.grid[1] == list(ragged().strands())[4]).all()
+    assert (pair.grid[1] == list(ragged().iter_strands())[4]).all()
 
 
 def test_no_strands_at_all() -> None:

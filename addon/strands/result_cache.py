@@ -15,7 +15,7 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from .nearest import nearest_points
-from .side_by_side import even_parts, side_by_side
+from .parallel import even_slices, parallel_map
 
 #: Factors of the hash of a row: odd, so that rows that differ in a single number have different
 #: hashes.
@@ -27,15 +27,15 @@ _OF_THREAD = 2048
 type Rows = tuple[Any, ...]
 
 
-class Kept:
+class ResultCache:
     """The last result of each named computation.
 
     Args:
         forgets: whether every result is computed from scratch and none is kept.
     """
 
-    def __init__(self, *, forgets: bool = False) -> None:
-        self._forgets = forgets
+    def __init__(self, *, is_disabled: bool = False) -> None:
+        self._is_disabled = is_disabled
         self._rows: dict[str, _MadeRows] = {}
         self._nearest: dict[str, _Nearest] = {}
 
@@ -53,7 +53,7 @@ class Kept:
             make: returns arrays (k, ...) for row indices (k,); called from several threads. Its
                 result must not be changed afterwards.
         """
-        if self._forgets:
+        if self._is_disabled:
             return _made(make, np.arange(len(rows[0])))
         bits = np.concatenate([_bits(each) for each in rows], axis=1)
         last = self._rows.get(name)
@@ -66,7 +66,7 @@ class Kept:
 
     def nearest(self, name: str, places: Floats, among: Floats, count: int) -> tuple[Ints, Floats]:
         """`nearest_points`, searched only for the places whose nearest points may have changed."""
-        if self._forgets:
+        if self._is_disabled:
             return nearest_points(places, among, count)
         last = self._nearest.get(name)
         if last is not None and count == last.count <= min(len(among), len(last.among)):
@@ -77,12 +77,12 @@ class Kept:
         return index.copy(), distance.copy()
 
 
-NOTHING_KEPT = Kept(forgets=True)
+NO_CACHE = ResultCache(is_disabled=True)
 
 
 @dataclass(frozen=True, eq=False)
 class _MadeRows:
-    """The last call of `Kept.rows`.
+    """The last call of `ResultCache.rows`.
 
     fixed: see there. bits: (n, width) uint32, the input rows. made: the result, arrays (n, ...).
     """
@@ -106,7 +106,7 @@ class _MadeRows:
 
 @dataclass(frozen=True, eq=False)
 class _Nearest:
-    """The last call of `Kept.nearest`, and its result."""
+    """The last call of `ResultCache.nearest`, and its result."""
 
     places: Floats
     among: Floats
@@ -137,13 +137,13 @@ class _Nearest:
 
 def _made(make: Callable[[Ints], Rows], rows: Ints) -> Rows:
     """The result of `make` for these rows, computed in several threads."""
-    parts = side_by_side(lambda some: make(rows[some]), even_parts(len(rows), _OF_THREAD))
+    parts = parallel_map(lambda some: make(rows[some]), even_slices(len(rows), _OF_THREAD))
     if len(parts) == 1:
         return parts[0]
     return tuple(np.concatenate(each) for each in zip(*parts, strict=True))
 
 
-def same_rows(rows: Any, among: Any) -> Ints:
+def find_rows(rows: Any, among: Any) -> Ints:
     """The index of each row (n, ...) among others (m, ...), compared bit by bit, (n,); -1: none."""
     return _found(_bits(rows), _bits(among))
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hairloom.addon.strands.kept import NOTHING_KEPT, Kept
 from hairloom.addon.strands.nearest import nearest_points
+from hairloom.addon.strands.result_cache import NO_CACHE, ResultCache
 
 
 def cloud(count: int, seed: int, rounded: int | None = None) -> np.ndarray:
@@ -40,7 +40,7 @@ CHANGES = ("nothing", "moved", "fewer", "more", "shuffled")
 def test_nearest_points_are_those_that_are_found_from_nothing(
     of_places: str, of_points: str, rounded: int | None
 ) -> None:
-    places, among, kept = cloud(300, 1, rounded), cloud(200, 2, rounded), Kept()
+    places, among, kept = cloud(300, 1, rounded), cloud(200, 2, rounded), ResultCache()
     for step in range(4):
         found = kept.nearest("here", places, among, 5)
         wanted = nearest_points(places, among, 5)
@@ -53,7 +53,7 @@ def test_nearest_points_are_those_that_are_found_from_nothing(
 
 
 def test_few_places_are_asked_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    from hairloom.addon.strands import kept as module
+    from hairloom.addon.strands import result_cache as module
 
     asked: list[int] = []
 
@@ -63,7 +63,7 @@ def test_few_places_are_asked_again(monkeypatch: pytest.MonkeyPatch) -> None:
         return nearest_points(places, among, count)
 
     monkeypatch.setattr(module, "nearest_points", counted)
-    places, among, kept = cloud(2000, 1), cloud(2000, 2), Kept()
+    places, among, kept = cloud(2000, 1), cloud(2000, 2), ResultCache()
     kept.nearest("here", places, among, 5)
     among = among.copy()
     among[7] += np.float32(0.01)
@@ -73,11 +73,11 @@ def test_few_places_are_asked_again(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_only_new_rows_are_made() -> None:
     """Rows are found wherever they were before; values of any type are compared bit by bit."""
-    kept, asked = Kept(), []
+    kept, asked = ResultCache(), []
     rows = np.random.default_rng(3).normal(size=(50, 4, 3)).astype(np.float32)
     key = np.arange(50, dtype=np.uint64)
 
-    def made(rows: np.ndarray, key: np.ndarray, kept: Kept, factor: int = 2) -> np.ndarray:
+    def made(rows: np.ndarray, key: np.ndarray, kept: ResultCache, factor: int = 2) -> np.ndarray:
         def make(some: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             asked.append(some)
             return rows[some].sum(axis=1) * factor, key[some] + 1
@@ -101,13 +101,13 @@ def test_only_new_rows_are_made() -> None:
     np.testing.assert_array_equal(made(rows, key, kept), [3])
     assert len(made(rows, key, kept, factor=3)) == 50
     assert len(made(rows[:0], key[:0], kept, factor=4)) == 0
-    assert len(made(rows, key, NOTHING_KEPT, factor=3)) == 50
-    assert len(made(rows, key, NOTHING_KEPT, factor=3)) == 50
+    assert len(made(rows, key, NO_CACHE, factor=3)) == 50
+    assert len(made(rows, key, NO_CACHE, factor=3)) == 50
 
 
 def test_rows_that_swap_two_numbers_are_told_apart() -> None:
     rows = np.array([[1.0, 2.0], [2.0, 1.0], [1.0, 2.0]], np.float32)
-    kept = Kept()
+    kept = ResultCache()
 
     def first(rows: np.ndarray) -> list[float]:
         return kept.rows("first", (), (rows,), lambda some: (rows[some, 0],))[0].tolist()

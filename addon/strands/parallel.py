@@ -10,7 +10,7 @@ from itertools import pairwise
 THREADS = min(4, os.cpu_count() or 1)
 
 
-def side_by_side[T, R](make: Callable[[T], R], parts: Iterable[T]) -> list[R]:
+def parallel_map[T, R](make: Callable[[T], R], parts: Iterable[T]) -> list[R]:
     """The results of `make` for each part, in order, computed in parallel; calls must be
     independent."""
     waiting = list(parts)
@@ -20,9 +20,9 @@ def side_by_side[T, R](make: Callable[[T], R], parts: Iterable[T]) -> list[R]:
         return list(threads.map(make, waiting))
 
 
-def even_parts(count: int, least: int) -> list[slice]:
-    """`count` rows split into at most one slice per thread, of at least `least` rows each if there
-    are several."""
-    number = max(min(THREADS, count // least), 1)
-    bounds = [count * i // number for i in range(number + 1)]
+def even_slices(count: int, min_size: int) -> list[slice]:
+    """`count` rows split into at most one slice per thread, of at least `min_size` rows each if
+    there are several."""
+    slice_count = max(min(THREADS, count // min_size), 1)
+    bounds = [count * i // slice_count for i in range(slice_count + 1)]
     return [slice(*ends) for ends in pairwise(bounds)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hairloom.addon.groom.surface_points import GrowthSurface
+from hairloom.addon.groom.growth_surface import GrowthSurface
 from hairloom.addon.strands import Surface
 from hairloom.addon.strands.closest_point import ClosestPointSearch, search_of
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hairloom.addon.strands import nearest, side_by_side
-from hairloom.addon.strands.kept import Kept
+from hairloom.addon.strands import nearest, parallel
+from hairloom.addon.strands.result_cache import ResultCache
 
 
 @pytest.mark.parametrize("count", [0, 1, 9, 10, 11, 1000])
 def test_parts_are_all_rows_in_order(count: int) -> None:
-    parts = side_by_side.even_parts(count, least=10)
-    assert 1 <= len(parts) <= side_by_side.THREADS
+    parts = parallel.even_slices(count, min_size=10)
+    assert 1 <= len(parts) <= parallel.THREADS
     np.testing.assert_array_equal(
         np.concatenate([np.arange(count)[p] for p in parts]), range(count)
     )
@@ -21,10 +21,10 @@ def test_parts_are_all_rows_in_order(count: int) -> None:
 
 
 def test_answers_come_in_order_and_errors_come_through(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(side_by_side, "THREADS", 3)
-    assert side_by_side.side_by_side(lambda x: x * x, range(50)) == [x * x for x in range(50)]
+    monkeypatch.setattr(parallel, "THREADS", 3)
+    assert parallel.parallel_map(lambda x: x * x, range(50)) == [x * x for x in range(50)]
     with pytest.raises(ZeroDivisionError):
-        side_by_side.side_by_side(lambda x: 1 / x, range(3))
+        parallel.parallel_map(lambda x: 1 / x, range(3))
 
 
 @pytest.mark.parametrize("threads", [1, 2, 3])
@@ -45,7 +45,7 @@ def test_nearest_points_are_the_same_in_several_threads(
 @pytest.mark.parametrize("forgets", [True, False])
 def test_rows_are_made_in_order(forgets: bool) -> None:
     rows = np.random.default_rng(2).random((9000, 2)).astype(np.float32)
-    sums, places = Kept(forgets=forgets).rows(
+    sums, places = ResultCache(is_disabled=forgets).rows(
         "sums", (), (rows,), lambda some: (rows[some].sum(axis=1), some)
     )
     np.testing.assert_array_equal(sums, rows.sum(axis=1))

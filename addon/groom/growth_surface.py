@@ -37,11 +37,11 @@ class GrowthSurface:
     def __init__(self, surface: Surface, reach: float, cell: float) -> None:
         self._search = search_of(surface)
         self._triangles = surface.triangles
-        self._normals = surface.once(_normals)
+        self._normals = surface.compute_once(_normals)
         self._reach = reach
         # rounded up to a power of two, so that most edits find what is known
         searched = 2.0 ** np.ceil(np.log2(max(reach, _FAR * cell) + cell))
-        self._nearest = surface.latest(_NearestTriangles, float(searched), cell)
+        self._nearest = surface.compute_if_changed(_NearestTriangles, float(searched), cell)
 
     def normal(self, triangle: Ints, barycentric: Floats) -> Floats:
         """Smooth unit normals at points of the surface, (n, 3)."""

@@ -55,7 +55,9 @@ def checked_weights(weights: Floats | None, surface: Surface, name: str) -> Floa
     return np.maximum(values, 0.0)
 
 
-def at_roots(weights: Floats, surface: Surface, triangle: Ints, barycentric: Floats) -> Floats:
+def interpolate_weights(
+    weights: Floats, surface: Surface, triangle: Ints, barycentric: Floats
+) -> Floats:
     """Weights of the vertices (vertex_count,) at points of the surface, (n,)."""
     result: Floats = np.einsum("nk,nk->n", barycentric, weights[surface.triangles[triangle]])
     return result

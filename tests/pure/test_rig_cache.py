@@ -17,7 +17,7 @@ from hairloom.addon.groom.children_settings import ChildrenSettings
 from hairloom.addon.groom.masks import Masks, SurfaceMask
 from hairloom.addon.groom.settings import GuideSettings
 from hairloom.addon.strands import StrandSet, Surface
-from hairloom.addon.strands.kept import Kept
+from hairloom.addon.strands.result_cache import ResultCache
 
 STROKES = 3
 HEAD = sheet()
@@ -82,10 +82,10 @@ PAINTED = ("frizz", "length", "clump", "width", "scatter", "fly_aways")
 def test_it_is_what_is_made_from_nothing(
     settings: ChildrenSettings, guides: int, does: Callable[..., Any]
 ) -> None:
-    kept, field = Kept(), block()
+    kept, field = ResultCache(), block()
     strands, density = wig_strands(), np.ones(len(HEAD.positions), np.float32)
 
-    def made(kept: dict[str, Kept]) -> rig_flow.Rig:
+    def made(kept: dict[str, ResultCache]) -> rig_flow.Rig:
         return rig_flow.prepare(
             strands,
             HEAD,
