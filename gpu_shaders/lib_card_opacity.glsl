@@ -23,7 +23,7 @@ float layer_facing(vec3 across, vec3 tangent, vec3 direction)
 {
   vec3 front = across / max(length(across), 1.0e-30);
   float upright = dot(tangent, front), along = dot(tangent, direction);
-  float baked = sqrt(1.0 - (1.0 - {{upright_shown}}) * upright * upright);
+  float baked = sqrt(1.0 - (1.0 - {{visible_upright}}) * upright * upright);
   return abs(dot(front, direction)) * baked / sqrt(max(1.0 - along * along, 1.0e-4));
 }
 
@@ -44,40 +44,43 @@ float view_compensated_depth(vec3 across, vec3 tangent, vec3 direction)
 }
 
 // Mean depth of the visible strand behind the front of a card's strands, as a fraction of their depth.
-// seen: tau of the card along the eye's ray.
-float seen_depth(float seen)
+// eye_tau: tau of the card along the eye's ray.
+float visible_depth(float eye_tau)
 {
-  float few = clamp(seen, {{min_seen}}, {{max_seen}});
-  return 1.0 / few - 1.0 / (exp(few) - 1.0);
+  float clamped = clamp(eye_tau, {{min_eye_tau}}, {{max_eye_tau}});
+  return 1.0 / clamped - 1.0 / (exp(clamped) - 1.0);
 }
 
-// tau of a card's other strands: x between the light and the visible strand, y beyond it. seen, own: tau of
-// the card along the eye's and the light's ray. near: distance from the visible strand within which they do
-// not count, as a fraction of their depth. front: 1 for light from the eye's side of the card, 0 from behind.
-vec2 own_strands(float seen, float own, float near, float front)
+// tau of a card's other strands: x between the light and the visible strand, y beyond it. eye_tau, light_tau:
+// tau of the card along the eye's and the light's ray. near: distance from the visible strand within which
+// they do not count, as a fraction of their depth. front: 1 for light from the eye's side of the card, 0 from
+// behind.
+vec2 tau_within_card(float eye_tau, float light_tau, float near, float front)
 {
-  float a = clamp(seen, {{min_seen}}, {{max_seen}}), b = clamp(own, 0.0, {{max_seen}});
-  b = abs(b - a) < {{apart}} * a ? (1.0 + {{apart}}) * a : b;
+  float a = clamp(eye_tau, {{min_eye_tau}}, {{max_eye_tau}}), b = clamp(light_tau, 0.0, {{max_eye_tau}});
+  b = abs(b - a) < {{min_tau_difference}} * a ? (1.0 + {{min_tau_difference}}) * a : b;
   near = min(near, 1.0);
-  float left = 1.0 - near;
-  float before = exp(-a * near), behind = exp(-a * left), end = exp(-a);
-  float ahead = 1.0 - before + a / (a + b) * (before - end * exp(-b * left));
-  float back = a / (a - b) * (exp(-b * left) - behind) + behind - end;
-  float met = max(-log(mix(back, ahead, front) / (1.0 - end)), 0.0);
-  return vec2(met, max(own - met, 0.0));
+  float remaining = 1.0 - near;
+  float before = exp(-a * near), behind = exp(-a * remaining), end = exp(-a);
+  float ahead = 1.0 - before + a / (a + b) * (before - end * exp(-b * remaining));
+  float back = a / (a - b) * (exp(-b * remaining) - behind) + behind - end;
+  float tau_before = max(-log(mix(back, ahead, front) / (1.0 - end)), 0.0);
+  return vec2(tau_before, max(light_tau - tau_before, 0.0));
 }
 
-// own_strands for a strand that lies deeper than visible strands on average, by this fraction of their depth.
-vec2 own_strands_deeper(vec2 strands, float deeper, float front)
+// tau_within_card for a strand that lies deeper than visible strands on average, by this fraction of their
+// depth.
+vec2 tau_within_card_at_depth(vec2 strands, float deeper, float front)
 {
-  float own = strands.x + strands.y;
-  float met = clamp(strands.x + own * deeper * (2.0 * front - 1.0), 0.0, own);
-  return vec2(met, own - met);
+  float light_tau = strands.x + strands.y;
+  float tau_before = clamp(strands.x + light_tau * deeper * (2.0 * front - 1.0), 0.0, light_tau);
+  return vec2(tau_before, light_tau - tau_before);
 }
 
-// As own_strands for short hair, where one sees a tip beside others. tau: of the card; own: what light meets of it.
-vec2 own_tips(float own, float tau, float front)
+// As tau_within_card for short hair, where one sees a tip beside others. card_tau: of the card; light_tau:
+// what light meets of it.
+vec2 tau_within_short_hair(float light_tau, float card_tau, float front)
 {
-  float few = max(tau, {{min_seen}});
-  return own * (1.0 / (1.0 - exp(-few)) - 1.0 / few) * vec2(1.0 - front, front);
+  float clamped = max(card_tau, {{min_eye_tau}});
+  return light_tau * (1.0 / (1.0 - exp(-clamped)) - 1.0 / clamped) * vec2(1.0 - front, front);
 }

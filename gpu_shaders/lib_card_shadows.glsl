@@ -21,27 +21,30 @@ vec3 shadow_path_to_card(int index,
 #if !SHADOWS
   return shadow_path(index, point);
 #else
-  float tau = card_optical_depth(alpha), own = opacity.extinction * card_thickness * tau;
+  float tau = card_optical_depth(alpha), light_tau = opacity.extinction * card_thickness * tau;
   vec3 strand = point;
 #  if VIEW_COMPENSATED
-  float seen = own * view_compensated_depth(across, tangent, to_eye);
-  own *= view_compensated_depth(across, tangent, to_light);
+  float eye_tau = light_tau * view_compensated_depth(across, tangent, to_eye);
+  light_tau *= view_compensated_depth(across, tangent, to_light);
   vec3 front = across / max(length(across), 1.0e-30) * (dot(across, to_eye) < 0.0 ? -1.0 : 1.0);
-  strand += depth * (0.5 - seen_depth(seen)) * front;
+  strand += depth * (0.5 - visible_depth(eye_tau)) * front;
 #  endif
   vec3 path = shadow_path(index, strand);
   if (path.x >= 0.0) {
-    float fraction = own_fraction(index, point, strand);
+    float fraction = self_fraction(index, point, strand);
 #  if VIEW_COMPENSATED
     float facing = dot(front, to_light);
     float bias = opacity.bias / length(opacity.map_depth[index].xyz);
     float near = bias * max(abs(facing), {{min_facing}}) / max(depth, {{min_depth}});
     float ahead = clamp(0.5 + {{sidedness}} * facing, 0.0, 1.0);
-    vec2 others = depth > 0.0 ? own_strands_deeper(own_strands(seen, own, near, ahead), deeper, ahead) :
-                                own_tips(own, tau, ahead);
-    path.xy = others + max(path.xy - own * vec2(fraction, 1.0 - fraction), 0.0);
+    vec2 others = tau_within_short_hair(light_tau, tau, ahead);
+    if (depth > 0.0) {
+      others = tau_within_card_at_depth(
+          tau_within_card(eye_tau, light_tau, near, ahead), deeper, ahead);
+    }
+    path.xy = others + max(path.xy - light_tau * vec2(fraction, 1.0 - fraction), 0.0);
 #  else
-    path.x = max(path.x - fraction * own, 0.0);
+    path.x = max(path.x - fraction * light_tau, 0.0);
 #  endif
   }
   return path;

@@ -9,7 +9,7 @@
 #include "lib_skin_seen.glsl"
 
 const float DUAL_SMALLEST = 1.0e-6;
-const float DUAL_MAX = 0.999, DUAL_MAX_KEPT = 0.9999;
+const float DUAL_MAX = 0.999, DUAL_MAX_SCATTERED = 0.9999;
 const float DUAL_MIN_LIGHT = 1.0e-3, DUAL_DIFFUSIVITY = 1.66;
 
 // Fraction of light that a fibre scatters forward, or backward, at cos theta_d, by colour and lobe.
@@ -28,25 +28,25 @@ vec3 sum_of_lobes(mat3x4 lobes)
 }
 
 // Fraction of light that a stack of `count` strands returns.
-vec3 returned(vec3 a_forward, vec3 a_backward, float count)
+vec3 backscattered(vec3 a_forward, vec3 a_backward, float count)
 {
-  a_forward = clamp(a_forward, vec3(0.0), max(DUAL_MAX_KEPT - a_backward, 0.0));
+  a_forward = clamp(a_forward, vec3(0.0), max(DUAL_MAX_SCATTERED - a_backward, 0.0));
   vec3 middle = 1.0 + a_backward * a_backward - a_forward * a_forward;
   vec3 root = sqrt(max(middle * middle - 4.0 * a_backward * a_backward, 0.0));
   vec3 deep = 2.0 * a_backward / max(middle + root, DUAL_SMALLEST);
-  vec3 kept = a_forward / max(1.0 - a_backward * deep, DUAL_SMALLEST);
-  vec3 lost = pow(clamp(kept, DUAL_SMALLEST, 1.0), vec3(2.0 * count));
-  return deep * (1.0 - lost) / max(1.0 - deep * deep * lost, DUAL_SMALLEST);
+  vec3 layer_transmittance = a_forward / max(1.0 - a_backward * deep, DUAL_SMALLEST);
+  vec3 stack_factor = pow(clamp(layer_transmittance, DUAL_SMALLEST, 1.0), vec3(2.0 * count));
+  return deep * (1.0 - stack_factor) / max(1.0 - deep * deep * stack_factor, DUAL_SMALLEST);
 }
 
-// x width and y shift of theta_h in returned light, z width that each forward scattering adds.
-vec3 returned_shape(vec4 forward, vec4 backward, Fibre fibre)
+// x width and y shift of theta_h in backscattered light, z width that each forward scattering adds.
+vec3 backscatter_shape(vec4 forward, vec4 backward, Fibre fibre)
 {
   float a_f = min(dot(forward, vec4(1.0)), DUAL_MAX), a_b = dot(backward, vec4(1.0));
-  float on = max(a_f, DUAL_SMALLEST), back = max(a_b, DUAL_SMALLEST);
-  float wide_f = sqrt(dot(forward, fibre.widths * fibre.widths) / on);
+  float forward_sum = max(a_f, DUAL_SMALLEST), back = max(a_b, DUAL_SMALLEST);
+  float wide_f = sqrt(dot(forward, fibre.widths * fibre.widths) / forward_sum);
   float wide_b = sqrt(dot(backward, fibre.widths * fibre.widths) / back);
-  float shift_f = dot(forward, fibre.shifts) / on, shift_b = dot(backward, fibre.shifts) / back;
+  float shift_f = dot(forward, fibre.shifts) / forward_sum, shift_b = dot(backward, fibre.shifts) / back;
   float rest = 1.0 - a_f * a_f;
   float shift = shift_b * (1.0 - 2.0 * a_b * a_b / (rest * rest)) +
                 shift_f * ((2.0 * rest * rest + 4.0 * a_f * a_f * a_b * a_b) / (rest * rest * rest));
@@ -91,10 +91,10 @@ vec3 dual_scattering(vec3 single,
   vec3 straight = vec3(exp(-tau));
   vec3 scattered = exp(-tau * (1.0 - a_f)) - straight;
   // widths are the same for all colours: those of green
-  vec3 shape = returned_shape(forward[1], backward[1], fibre);
+  vec3 shape = backscatter_shape(forward[1], backward[1], fibre);
   float added = max(tau, 1.0) * shape.z * shape.z;
   // `single` already has what the strand itself returns
-  vec3 stack = returned(a_f, a_b, 1.0 + beyond) - returned(a_f, a_b, 1.0);
+  vec3 stack = backscattered(a_f, a_b, 1.0 + beyond) - backscattered(a_f, a_b, 1.0);
   vec3 back = max(stack, 0.0) / (PI * squared);
   vec3 back_straight = back * half_gaussian(theta_h, shape.y, shape.x * shape.x);
   vec3 back_scattered = back * half_gaussian(theta_h, shape.y, shape.x * shape.x + added);
@@ -102,16 +102,16 @@ vec3 dual_scattering(vec3 single,
                     half_gaussian(theta_h, fibre.shifts.y, fibre.widths.y * fibre.widths.y + added),
                     half_gaussian(theta_h, fibre.shifts.z, fibre.widths.z * fibre.widths.z + added),
                     half_gaussian(theta_h, fibre.shifts.w, fibre.widths.w * fibre.widths.w + added));
-  vec3 on = vec3(dot(along, spread_around(forward[0], backward[0], angles.z)),
+  vec3 forward_part = vec3(dot(along, spread_around(forward[0], backward[0], angles.z)),
                  dot(along, spread_around(forward[1], backward[1], angles.z)),
                  dot(along, spread_around(forward[2], backward[2], angles.z))) / squared;
   return straight * (single + density * back_straight) +
-         scattered * density * (on + density * back_scattered);
+         scattered * density * (forward_part + density * back_scattered);
 }
 
 // Light that the skin beneath reflects and a strand scatters to the eye. facing: cosine between the
 // light and the skin's normal. skin: its albedo.
-vec3 off_the_skin(float phi,
+vec3 reflected_by_skin(float phi,
                   mat3x4 forward,
                   mat3x4 backward,
                   float tau,
@@ -122,8 +122,8 @@ vec3 off_the_skin(float phi,
   facing = max(facing, 0.0);
   vec3 a_f = sum_of_lobes(forward), a_b = sum_of_lobes(backward);
   float strands = tau + beyond * (1.0 + DUAL_DIFFUSIVITY * facing);
-  vec3 kept = max(1.0 - skin * returned(a_f, a_b, beyond), 1.0 - DUAL_MAX);
-  vec3 lit = skin * facing / (PI * kept);
+  vec3 lost = max(1.0 - skin * backscattered(a_f, a_b, beyond), 1.0 - DUAL_MAX);
+  vec3 lit = skin * facing / (PI * lost);
   float cosine = cos(phi);
   vec3 onward = 0.5 * (a_f * (1.0 + cosine) + a_b * (1.0 - cosine));
   return lit * exp(-strands * (1.0 - a_f)) * onward;
@@ -131,7 +131,7 @@ vec3 off_the_skin(float phi,
 
 // Light that skin farther away reflects and a strand scatters to the eye. outward: cosine between the
 // direction to the eye and the normal of the hair's volume.
-vec3 off_far_skin(
+vec3 reflected_by_far_skin(
     float outward, mat3x4 forward, mat3x4 backward, vec3 to_light, SkinSeen seen, vec3 skin)
 {
   vec3 a_f = sum_of_lobes(forward), a_b = sum_of_lobes(backward);
@@ -170,12 +170,12 @@ vec3 scattering_light(sampler3D longitudinal,
   float cos_d = cos(0.5 * (angles.y - angles.x));
   mat3x4 forward = fractions_at(fractions_forward, cos_d, absorption);
   mat3x4 backward = fractions_at(fractions_backward, cos_d, absorption);
-  float straight = straight_light(normal, to_light, tau, shading);
+  float straight = unscattered_fraction(normal, to_light, tau, shading);
   float passed = tau < 0.0 ? -log(max(straight, DUAL_MIN_LIGHT)) : tau;
   vec3 scattered = dual_scattering(
       single, angles, forward, backward, passed, beyond, fibre, density);
   float facing = dot(seen.beneath, to_light);
   return scattered * cos(angles.x) +
-         off_the_skin(angles.z, forward, backward, passed, beyond, facing, skin) +
-         off_far_skin(dot(normal, to_eye), forward, backward, to_light, seen, skin);
+         reflected_by_skin(angles.z, forward, backward, passed, beyond, facing, skin) +
+         reflected_by_far_skin(dot(normal, to_eye), forward, backward, to_light, seen, skin);
 }

@@ -44,7 +44,7 @@ float table_level(float angle, sampler3D longitudinal)
 
 // Fraction of light that absorption leaves of R, TT, TRT and the rest, a column each. Beyond the minimum of
 // the fitted parabola, its minimum is used.
-mat4x3 kept_light(vec4 paths, vec3 absorption)
+mat4x3 lobe_transmittance(vec4 paths, vec3 absorption)
 {
   vec3 reached = min(absorption, vec3(paths.y / max(paths.z, MIN_VARIANCE)));
   return mat4x3(vec3(1.0),
@@ -68,10 +68,10 @@ vec3 look_up(sampler3D longitudinal,
   vec4 along = textureLod(longitudinal, vec3(place, (level + 0.5) / size.z), 0.0);
   place = table_place(vec2(along.w, angles.z / PI), vec2(textureSize(azimuthal, 0)));
   vec4 clear = textureLod(azimuthal, place, 0.0);
-  mat4x3 kept = kept_light(textureLod(paths, place, 0.0), absorption);
+  mat4x3 transmittance = lobe_transmittance(textureLod(paths, place, 0.0), absorption);
   vec4 factors = strengths * along.xyzz * clear;
   float cos_d = max(along.w, MIN_COSINE);
-  return kept * factors / (cos_d * cos_d);
+  return transmittance * factors / (cos_d * cos_d);
 }
 
 // Absorption that gives a mass of hair this colour. Twin of addon/shading/marschner/pigment.py.
@@ -133,7 +133,7 @@ float pixel_level(sampler3D longitudinal,
 
 // The fraction of light that no strand blocks: exp(-tau), or, where tau is unknown, which is when it is
 // negative, by how much the hair's volume faces the light.
-float straight_light(vec3 normal, vec3 to_light, float tau, ShadingSettings shading)
+float unscattered_fraction(vec3 normal, vec3 to_light, float tau, ShadingSettings shading)
 {
   return tau < 0.0 ? mix(1.0, diffuse_bias(normal, to_light), shading.volume_shadow) : exp(-tau);
 }
@@ -175,6 +175,6 @@ vec3 marschner_light(sampler3D longitudinal,
   vec3 scattered = single_scattering(
       longitudinal, azimuthal, paths, angles, sparkle_noise, absorption, fibre, shading, level);
   float bias = diffuse_bias(normal, to_light) * (tau < 0.0 ? 1.0 : exp(-tau));
-  return scattered * cos(angles.x) * straight_light(normal, to_light, tau, shading) +
+  return scattered * cos(angles.x) * unscattered_fraction(normal, to_light, tau, shading) +
          strand_color(fibre, absorption) * (shading.fake_scattering * bias / PI);
 }

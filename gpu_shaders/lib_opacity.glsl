@@ -12,7 +12,7 @@
 // Depth is measured from the start of a texel's layers, as a fraction of their total thickness.
 
 // Which of four layers' sums a strand at this depth behind their start adds to, 1 or 0 each.
-vec4 adds_to(float depth, vec4 ends)
+vec4 layers_including(float depth, vec4 ends)
 {
   return vec4(lessThanEqual(vec4(depth), ends));
 }
@@ -37,7 +37,7 @@ vec3 map_place(Opacity opacity, int light, vec3 point)
 
 // Weight of the map's mesh shadows on meshes, which may extend beyond the map: 1 in its middle, 0 at its
 // border.
-float within_map(vec2 place)
+float mesh_shadow_weight(vec2 place)
 {
   vec2 away = abs(place - 0.5);
   return clamp((0.5 - max(away.x, away.y)) / {{map_border}}, 0.0, 1.0);
@@ -61,15 +61,15 @@ float strand_breadth(Opacity opacity, int light, vec3 xyw, vec2 across)
 }
 
 // The strand's own part of the tau that a map holds at its middle line. half_width: in texels.
-float own_depth(float half_width)
+float self_tau(float half_width)
 {
-  float drawn = max(half_width, 0.5);
-  float met = min(drawn, 1.0);
-  return half_width / drawn * met * (2.0 - met);
+  float drawn_half_width = max(half_width, 0.5);
+  float blocked = min(drawn_half_width, 1.0);
+  return half_width / drawn_half_width * blocked * (2.0 - blocked);
 }
 
 // The same for a strand of this radius [m].
-float own_depth_at(Opacity opacity, int light, vec3 point, vec3 tangent, float radius)
+float self_tau_at(Opacity opacity, int light, vec3 point, vec3 tangent, float radius)
 {
   vec4 at = vec4(point, 1.0);
   vec3 xyw = vec3(
@@ -80,13 +80,13 @@ float own_depth_at(Opacity opacity, int light, vec3 point, vec3 tangent, float r
   vec2 along = change.xy * xyw.z - xyw.xy * change.z;
   float size = length(along);
   vec2 across = size > 1.0e-20 ? vec2(-along.y, along.x) / size : vec2(1.0, 0.0);
-  return own_depth(radius * strand_breadth(opacity, light, xyw, across));
+  return self_tau(radius * strand_breadth(opacity, light, xyw, across));
 }
 
 // Depth of the first hair from a texel of `starts`; 1 where there is none.
-float start_depth(uint kept)
+float start_depth(uint stored)
 {
-  return min(float(kept) / {{start_scale}}, 1.0);
+  return min(float(stored) / {{start_scale}}, 1.0);
 }
 
 // Start and total thickness of deep layers, as planes over a block of texels: x the value in its middle,

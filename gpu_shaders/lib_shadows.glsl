@@ -16,7 +16,7 @@ vec3 shadow_path(int index, vec3 point)
     return light_path(index, point) * vec3(opacity.extinction, opacity.extinction, 1.0);
   }
 #endif
-  return vec3(-1.0, {{unknown_beyond}}, 1.0);
+  return vec3(-1.0, {{default_tau_beyond}}, 1.0);
 }
 
 #if SHADOWS && defined(MESH_SHADOWS)
@@ -43,10 +43,10 @@ float light_past_meshes(int index, vec3 point, vec3 normal, vec3 path)
 #if SHADOWS
   if (path.x >= 0.0) {
     vec3 place = map_place(opacity, index, point);
-    within = within_map(place.xy);
+    within = mesh_shadow_weight(place.xy);
 #  ifdef MESH_SHADOWS
     // the hair's map clamps depths before and behind all hair
-    within = min(within, within_map(vec2(0.5, depth_before_meshes(opacity, place.z))));
+    within = min(within, mesh_shadow_weight(vec2(0.5, depth_before_meshes(opacity, place.z))));
     within = map_is_finer(index, point) ? within : 0.0;
 #  endif
   }
@@ -76,8 +76,8 @@ vec3 light_left(vec3 path, vec3 forward)
 
 #if SHADOWS
 // Fraction of a strand or card at a point that counts towards tau at another point, since tau grows linearly
-// through the layer in which it lies. Twin of own_fraction in addon/shading/volume/opacity.py.
-float own_fraction(int light, vec3 point, vec3 there)
+// through the layer in which it lies. Twin of self_fraction in addon/shading/volume/opacity.py.
+float self_fraction(int light, vec3 point, vec3 there)
 {
   vec3 place = map_place(opacity, light, point);
   float depth = min(place.z, 1.0);
@@ -111,8 +111,8 @@ vec3 shadow_path_to_strand(int index, vec3 point, vec3 tangent, float radius, fl
   vec3 path = shadow_path(index, point);
 #if SHADOWS
   if (path.x >= 0.0) {
-    float own = opacity.extinction * hides * own_depth_at(opacity, index, point, tangent, radius);
-    float fraction = own_fraction(index, point, point);
+    float own = opacity.extinction * hides * self_tau_at(opacity, index, point, tangent, radius);
+    float fraction = self_fraction(index, point, point);
     path.xy = max(path.xy - own * vec2(fraction, 1.0 - fraction), 0.0);
   }
 #endif

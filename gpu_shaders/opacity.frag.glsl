@@ -31,20 +31,20 @@ void main()
   // hair behind the last sample point in `starts` belongs to the last layer
   behind = min(layer_fraction(span, gl_FragCoord.xy, behind), 1.0);
 #endif
-  layers_0 = strand_weight * adds_to(behind, opacity.ends[first_texel]);
+  layers_0 = strand_weight * layers_including(behind, opacity.ends[first_texel]);
 #if TARGETS > 1
-  layers_1 = strand_weight * adds_to(behind, opacity.ends[first_texel + 1]);
+  layers_1 = strand_weight * layers_including(behind, opacity.ends[first_texel + 1]);
 #endif
 #if TARGETS > 2
-  layers_2 = strand_weight * adds_to(behind, opacity.ends[first_texel + 2]);
+  layers_2 = strand_weight * layers_including(behind, opacity.ends[first_texel + 2]);
 #endif
 #if TARGETS > 3
-  layers_3 = strand_weight * adds_to(behind, opacity.ends[first_texel + 3]);
+  layers_3 = strand_weight * layers_including(behind, opacity.ends[first_texel + 3]);
 #endif
 #if TARGETS > 4
-  layers_4 = strand_weight * adds_to(behind, opacity.ends[first_texel + 4]);
+  layers_4 = strand_weight * layers_including(behind, opacity.ends[first_texel + 4]);
 #endif
 #if TARGETS > 5
-  layers_5 = strand_weight * adds_to(behind, opacity.ends[first_texel + 5]);
+  layers_5 = strand_weight * layers_including(behind, opacity.ends[first_texel + 5]);
 #endif
 }

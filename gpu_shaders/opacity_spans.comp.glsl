@@ -1,30 +1,30 @@
 // Deep opacity maps: planes through the start and the thickness of the layers in each block of texels, one
 // invocation per block, from the first and the last hair of the block and its four neighbours in `starts`.
 //
-// Twin of LayerSpans.between in addon/shading/volume/opacity.py. `spans` has the layout of `starts`: the
-// start of the layers on the left, their total thickness on the right.
+// Twin of LayerSpans.from_first_and_last in addon/shading/volume/opacity.py. `spans` has the layout of
+// `starts`: the start of the layers on the left, their total thickness on the right.
 #include "lib_opacity.glsl"
 
 // Depth of the first or the last hair of a block, if it has any.
-struct Kept {
+struct StoredDepth {
   float depth;
   bool is_there;
 };
 
-Kept kept_at(ivec2 block, bool is_last)
+StoredDepth stored_depth_at(ivec2 block, bool is_last)
 {
   if (any(lessThan(block, ivec2(0))) || any(greaterThanEqual(block, ivec2(side)))) {
-    return Kept(0.0, false);
+    return StoredDepth(0.0, false);
   }
   ivec2 at = block + ivec2(is_last ? side : 0, map_index * side);
-  uint kept = texelFetch(starts, at, 0).x;
-  float depth = start_depth(kept);
-  return Kept(is_last ? 1.0 - depth : depth, kept <= uint({{start_scale}}));
+  uint stored = texelFetch(starts, at, 0).x;
+  float depth = start_depth(stored);
+  return StoredDepth(is_last ? 1.0 - depth : depth, stored <= uint({{start_scale}}));
 }
 
 // Slope of the depth across a block: the smaller of the slopes to both neighbours (minmod); 0 where their
 // signs differ or a neighbour has no hair.
-float slope(Kept before, Kept here, Kept after)
+float slope(StoredDepth before, StoredDepth here, StoredDepth after)
 {
   float down = here.depth - before.depth, up = after.depth - here.depth;
   bool is_slope = before.is_there && after.is_there && down * up > 0.0;
@@ -33,9 +33,11 @@ float slope(Kept before, Kept here, Kept after)
 
 vec3 plane_over(ivec2 block, bool is_last)
 {
-  Kept here = kept_at(block, is_last);
-  Kept left = kept_at(block - ivec2(1, 0), is_last), right = kept_at(block + ivec2(1, 0), is_last);
-  Kept below = kept_at(block - ivec2(0, 1), is_last), above = kept_at(block + ivec2(0, 1), is_last);
+  StoredDepth here = stored_depth_at(block, is_last);
+  StoredDepth left = stored_depth_at(block - ivec2(1, 0), is_last);
+  StoredDepth right = stored_depth_at(block + ivec2(1, 0), is_last);
+  StoredDepth below = stored_depth_at(block - ivec2(0, 1), is_last);
+  StoredDepth above = stored_depth_at(block + ivec2(0, 1), is_last);
   return vec3(here.depth, slope(left, here, right), slope(below, here, above));
 }
 
@@ -46,7 +48,7 @@ void main()
     return;
   }
   vec3 start = vec3(1.0, 0.0, 0.0), thickness = vec3(1.0, 0.0, 0.0);
-  if (kept_at(block, false).is_there) {
+  if (stored_depth_at(block, false).is_there) {
     start = plane_over(block, false);
     thickness = plane_over(block, true) - start;
   }

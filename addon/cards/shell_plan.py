@@ -401,13 +401,13 @@ def shell_strands(
     plan: ShellPlan,
     grid: Floats,
     radius: Floats,
-    upright_shown: float,
+    visible_upright: float,
     base: Floats | None = None,
 ) -> FlatStrands:
     """The pieces of the strands of the plan in its tiles, tile after tile.
 
     Args:
-        upright_shown: squared fraction of an upright piece's length that shows.
+        visible_upright: squared fraction of an upright piece's length that shows.
         grid, radius, base: as of `bake_strands.flat_strands`.
     """
     layers, pattern = plan.layers, plan.pattern
@@ -430,7 +430,7 @@ def shell_strands(
     away[..., :2] += plan.shift[strand][:, None]
     step = away[:, 1] - away[:, 0]
     flat, whole = np.linalg.norm(step[:, :2], axis=1), np.linalg.norm(step, axis=1)
-    shown = np.sqrt(flat**2 + upright_shown * np.maximum(whole**2 - flat**2, 0.0))
+    shown = np.sqrt(flat**2 + visible_upright * np.maximum(whole**2 - flat**2, 0.0))
     heading = unit_or(np.pad(step[:, :2], ((0, 0), (0, 1))), (0.0, 1.0, 0.0), 1e-9)[:, :2]
     middle = away[..., :2].mean(axis=1)
     thick = between(radius[plan.strands][..., None].astype(np.float64)[strand], along)[..., 0]

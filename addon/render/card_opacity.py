@@ -15,7 +15,7 @@ import numpy as np
 
 from ..cards.card_mesh import CardMesh
 from ..exchange.cards.sidecar import MIN_ALPHA
-from ..shading.lights import kept_lights
+from ..shading.lights import packed_lights
 from ..shading.volume.light_frame import Ball, ball_around
 from .card_snapshot import CardSnapshot
 from .card_textures import tiles_of
@@ -138,7 +138,7 @@ class CardOpacity:
             cards.is_layered,
             cards.lit_level,
         )
-        lights = kept_lights(snapshot.lights)
+        lights = packed_lights(snapshot.lights)
         return self._drawing.maps(
             hair, self._extent[1], lights, snapshot.volume, snapshot.all_casters
         )

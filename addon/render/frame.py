@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Floats
-from ..shading.lights import kept_lights
+from ..shading.lights import packed_lights
 from ..shading.mesh_shadow_settings import MeshShadowSettings
 from . import gpu_objects
 from .camera import Camera, frame_camera, look_at, orthographic, perspective
@@ -87,7 +87,7 @@ def render_image(
     shadows = None
     if opacity is not None:
         shadows = mesh_pass.mesh_shadows.maps(
-            snapshot.all_casters, kept_lights(snapshot.lights), MeshShadowSettings()
+            snapshot.all_casters, packed_lights(snapshot.lights), MeshShadowSettings()
         )
     with drawing_into(target):
         # shafts use alpha to find what stands before a light

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..arrays import Floats
-from ..shading.volume.light_frame import Ball, ball_around, reach_of, stepped_ball
+from ..shading.volume.light_frame import Ball, ball_around, max_reach, quantized_ball
 from .snapshot import Snapshot
 
 
@@ -20,6 +20,6 @@ class HairBall:
         kept, found = self._extent
         if kept is not snapshot.points or isinstance(found, float) != (device is not None):
             points, offsets = snapshot.points, snapshot.layout.offsets
-            found = ball_around(points) if device is None else reach_of(points, offsets)
+            found = ball_around(points) if device is None else max_reach(points, offsets)
             self._extent = points, found
-        return stepped_ball(snapshot.root_center, found) if isinstance(found, float) else found
+        return quantized_ball(snapshot.root_center, found) if isinstance(found, float) else found

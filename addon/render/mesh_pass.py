@@ -7,7 +7,7 @@ from contextlib import AbstractContextManager
 from dataclasses import replace
 from typing import Any
 
-from ..shading.lights import kept_lights
+from ..shading.lights import packed_lights
 from ..shading.skin.layout import SkinLayout
 from .camera import Camera
 from .caster_batch import alpha_picture
@@ -144,7 +144,7 @@ class MeshPass:
             meshes,
             opacity,
             snapshot.skin,
-            len(kept_lights(snapshot.lights)),
+            len(packed_lights(snapshot.lights)),
             (0.0, 0.0, 0.0) if opacity is None else hair_forward(snapshot),
             shadows,
             of_hair_alone=of_hair_alone,

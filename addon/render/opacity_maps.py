@@ -28,7 +28,13 @@ import numpy as np
 from ..arrays import Floats
 from ..shading.lights import LIGHT_CAPACITY, Light
 from ..shading.volume.light_frame import Ball, LightFrame
-from ..shading.volume.map_size import START_TEXELS, MapSize, even_size, fitted_size, size_note
+from ..shading.volume.map_size import (
+    START_TEXELS,
+    MapSize,
+    fitted_size,
+    size_for_spacing,
+    size_note,
+)
 from ..shading.volume.opacity import layer_ends
 from ..shading.volume.settings import VolumeSettings
 from ..shading.volume.shadow_lights import shadow_frames
@@ -207,7 +213,7 @@ class OpacityDrawing:
         room = gpu_memory.maps_room()
         size = fitted_size(settings, len(wanted), room, largest)
         note = size_note(settings, len(wanted), room, size)
-        size = even_size(size, spacing, ball.radius)
+        size = size_for_spacing(size, spacing, ball.radius)
         place = ball.center.tobytes(), ball.radius
         drawn_of = (
             hair.state,

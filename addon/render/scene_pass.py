@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Floats
-from ..shading.lights import kept_lights
+from ..shading.lights import packed_lights
 from ..shading.shafts_settings import ShaftSettings
 from . import gpu_memory
 from .accumulation import Target
@@ -290,13 +290,13 @@ class ScenePass:
         shading = [groom for groom in scene.grooms if maps[groom.key] is not None]
         centers = np.array([scene.lit(groom).center for groom in shading]).reshape(-1, 3)
         shadows = self._mesh_shadows.maps(
-            scene.casters, kept_lights(scene.lights), scene.mesh_shadows
+            scene.casters, packed_lights(scene.lights), scene.mesh_shadows
         )
         groups: dict[int, list[MeshSnapshot]] = {}
         for mesh, index in zip(scene.meshes, shaded_by(scene.meshes, centers), strict=True):
             groups.setdefault(index, []).append(mesh)
         found = [each for groom in shading if (each := maps[groom.key]) is not None]
-        light_count = len(kept_lights(scene.lights))
+        light_count = len(packed_lights(scene.lights))
         other_tau = self._hair_on_meshes.other_tau(groups, found, light_count, camera, size)
         for index, meshes in groups.items():
             groom = None if index < 0 else shading[index]

@@ -46,17 +46,17 @@ from ..shading.skin.diffusion import KERNEL_REACH, KERNEL_TAPS, SKIN_LIGHTS
 from ..shading.skin.layout import CLOSING
 from ..shading.skin_seen import ABSORBED_FRACTION, CLUMPING
 from ..shading.volume.card_opacity import (
-    APART,
     MAX_ALPHA,
-    MAX_SEEN,
+    MAX_EYE_TAU,
     MEAN_TURN,
     MIN_DEPTH,
+    MIN_EYE_TAU,
     MIN_FACING,
-    MIN_SEEN,
+    MIN_TAU_DIFFERENCE,
     SIDEDNESS,
-    UPRIGHT_SHOWN,
+    VISIBLE_UPRIGHT,
 )
-from ..shading.volume.dual import MIDPOINT, UNKNOWN_BEYOND
+from ..shading.volume.dual import DEFAULT_TAU_BEYOND, MIDPOINT
 from ..shading.volume.map_size import START_TEXELS
 from ..shading.volume.mesh_frames import MESH_FRAME_CAPACITY
 from ..shading.volume.mesh_light import (
@@ -188,7 +188,7 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
         "clumping": repr(CLUMPING),
         "absorbed_fraction": repr(ABSORBED_FRACTION),
         "max_alpha": repr(MAX_ALPHA),
-        "unknown_beyond": repr(UNKNOWN_BEYOND),
+        "default_tau_beyond": repr(DEFAULT_TAU_BEYOND),
         "start_scale": repr(START_SCALE),
         "min_thickness": repr(MIN_THICKNESS),
         "layer_row": str(LAYER_ROW),
@@ -208,12 +208,12 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
         "darkest": repr(DARKEST),
         "min_facing": repr(MIN_FACING),
         "mean_turn": repr(MEAN_TURN),
-        "min_seen": repr(MIN_SEEN),
-        "max_seen": repr(MAX_SEEN),
-        "apart": repr(APART),
+        "min_eye_tau": repr(MIN_EYE_TAU),
+        "max_eye_tau": repr(MAX_EYE_TAU),
+        "min_tau_difference": repr(MIN_TAU_DIFFERENCE),
         "min_depth": repr(MIN_DEPTH),
         "sidedness": repr(SIDEDNESS),
-        "upright_shown": repr(UPRIGHT_SHOWN),
+        "visible_upright": repr(VISIBLE_UPRIGHT),
         "card_texture_levels": str(LEVELS),
         "card_texture_slack": str(SLACK),
         "sparse_mask": str(SPARSE_RANGE - 1),

@@ -28,7 +28,7 @@ import numpy as np
 from ..arrays import Floats
 from ..params.glsl import struct_values
 from ..shading.drawn_strands import drawn_color, natural_strands, own_colors
-from ..shading.lights import Light, kept_lights
+from ..shading.lights import Light, packed_lights
 from ..shading.settings import StrandSettings
 from ..shading.strand_noise import SEED_LIMIT
 from ..shading.volume.light_frame import Ball
@@ -295,7 +295,7 @@ class StrandPass:
             self._points_serial,
             snapshot.layout,
             self._ball.of(snapshot),
-            kept_lights(snapshot.lights),
+            packed_lights(snapshot.lights),
             snapshot.volume,
             snapshot.strand_settings,
             snapshot.all_casters,

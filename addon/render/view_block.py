@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Floats
-from ..shading.lights import kept_lights, kinds_needed, pack_lights
+from ..shading.lights import kinds_needed, pack_lights, packed_lights
 from .camera import Camera
 from .shader_feature import ShaderFeature
 from .snapshot import Snapshot
@@ -19,7 +19,7 @@ def view_feature(camera: Camera, width: int, height: int) -> ShaderFeature:
 def lights_feature(snapshot: Snapshot) -> ShaderFeature:
     """The feature with the block `Lights`, and the defines for the kinds of lights that a program
     supports; WORLD: light from all around."""
-    kinds, has_world = kinds_needed(kept_lights(snapshot.lights)), snapshot.has_world
+    kinds, has_world = kinds_needed(packed_lights(snapshot.lights)), snapshot.has_world
     block = pack_lights(snapshot.lights, snapshot.ambient, snapshot.harmonics)
     return ShaderFeature(
         name=f"{kinds}{has_world:d}",

@@ -28,7 +28,7 @@ type Vector = tuple[float, float, float]
 
 #: squared half diagonal over squared distance below which a panel is computed as four points (less
 #: for a narrow spread); in lib_lights
-FAR = 2.5e-3
+FAR_RATIO = 2.5e-3
 #: points nearer to a panel's plane than this count as behind it [m]; in lib_lights
 MIN_HEIGHT = 1.0e-9
 #: minimum length of a side [m], and as a fraction of the other side
@@ -36,7 +36,7 @@ MIN_SIDE, MIN_ASPECT = 1.0e-7, 1.0e-3
 #: minimum spread [rad]
 MIN_SPREAD = float(np.radians(1.0))
 #: tangent for a spread of a half turn
-OPEN = 1.0e8
+MAX_SPREAD_TANGENT = 1.0e8
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(6)
 
@@ -61,18 +61,18 @@ class Panel:
     @property
     def half_sides(self) -> tuple[float, float]:
         """Half width and half height [m], both above 0."""
-        least = max(MIN_SIDE, MIN_ASPECT * max(self.half_width, self.half_height))
-        return max(self.half_width, least), max(self.half_height, least)
+        min_side = max(MIN_SIDE, MIN_ASPECT * max(self.half_width, self.half_height))
+        return max(self.half_width, min_side), max(self.half_height, min_side)
 
     @property
-    def is_open(self) -> bool:
+    def has_full_spread(self) -> bool:
         return self.spread > np.pi - 1e-4
 
     @property
     def tangent(self) -> float:
         """Tangent of half of the spread."""
-        if self.is_open:
-            return OPEN
+        if self.has_full_spread:
+            return MAX_SPREAD_TANGENT
         return float(np.tan(0.5 * max(self.spread, MIN_SPREAD)))
 
     @property
@@ -81,7 +81,7 @@ class Panel:
         return 1.0 / (self.tangent - float(np.arctan(self.tangent)))
 
     @property
-    def quarter_place(self) -> float:
+    def quarter_position(self) -> float:
         """Where the four points that replace a far panel lie, as a fraction of its half sides."""
         return 0.5 if self.is_round else float(np.sqrt(1.0 / 3.0))
 
@@ -89,7 +89,7 @@ class Panel:
     def form(self) -> str:
         """How it is computed: "rectangle" or "disk" in closed form, else "grid"."""
         width, height = self.half_sides
-        if not self.is_open or (self.is_round and abs(width - height) > 1e-6 * width):
+        if not self.has_full_spread or (self.is_round and abs(width - height) > 1e-6 * width):
             return "grid"
         return "disk" if self.is_round else "rectangle"
 
@@ -107,7 +107,7 @@ def vector_irradiance(panel: Panel, offsets: Floats) -> Floats:
     found = {"rectangle": _rectangle, "disk": _disk, "grid": _grid}[panel.form](panel, x, y, height)
     squared = x * x + y * y + height * height
     width, depth = panel.half_sides
-    far = FAR * min(1.0, panel.tangent * panel.tangent)
+    far = FAR_RATIO * min(1.0, panel.tangent * panel.tangent)
     is_far = width * width + depth * depth < far * squared
     if panel.form != "disk":
         found = np.where(is_far[..., None], _four_points(panel, x, y, height), found)
@@ -121,10 +121,10 @@ def _four_points(panel: Panel, x: Floats, y: Floats, height: Floats) -> Floats:
     along each axis is the panel's.
     """
     total = np.zeros((*x.shape, 3))
-    a, b = np.array(panel.half_sides) * panel.quarter_place
+    a, b = np.array(panel.half_sides) * panel.quarter_position
     for u, v in ((-a - x, -b - y), (a - x, -b - y), (-a - x, b - y), (a - x, b - y)):
         squared = u * u + v * v + height * height
-        shade = _shade(panel, np.hypot(u, v) / height)
+        shade = _slat_transmittance(panel, np.hypot(u, v) / height)
         strength = height * shade / (4.0 * np.pi * squared * squared)
         total += strength[..., None] * np.stack([u, v, -height], axis=-1)
     return total
@@ -201,12 +201,12 @@ def _row(
         sine = 0.5 * (first + last) + half * node
         cosine = np.sqrt(np.maximum(1.0 - sine * sine, 1e-12))
         u = distance * sine / cosine
-        fraction = weight * half * _shade(panel, np.hypot(u, v) / height)
+        fraction = weight * half * _slat_transmittance(panel, np.hypot(u, v) / height)
         direction = np.stack([sine, v / distance * cosine, -height / distance * cosine], axis=-1)
         total += fraction[..., None] * direction
     return total
 
 
-def _shade(panel: Panel, tangent: Floats) -> Floats:
+def _slat_transmittance(panel: Panel, tangent: Floats) -> Floats:
     """What the slats let through, normalised, by the tangent of the angle to the panel's axis."""
     return np.maximum(panel.tangent - tangent, 0.0) * panel.normalizer

@@ -53,7 +53,7 @@ class Cone:
     blend: float
 
     @property
-    def widest(self) -> float:
+    def max_angle(self) -> float:
         """The largest angle to its axis, in world space, at which it lets light through [rad]."""
         right, up, back = np.linalg.norm(np.array(self.axes, np.float64), axis=1)
         squeezed = back / max(min(right, up), 1e-30)
@@ -254,7 +254,7 @@ _STUDIO = (
 )
 
 
-def brightest(lights: Iterable[Light], place: Floats) -> tuple[Light, ...]:
+def brightest_lights(lights: Iterable[Light], place: Floats) -> tuple[Light, ...]:
     """The lights that are brightest at a place, (3,) [m], brightest first; LIGHT_CAPACITY at
     most."""
     at = np.asarray(place, np.float64)
@@ -263,9 +263,9 @@ def brightest(lights: Iterable[Light], place: Floats) -> tuple[Light, ...]:
     return tuple(light for light, _ in in_order[:LIGHT_CAPACITY])
 
 
-def kept_lights(lights: Sequence[Light]) -> list[Light]:
+def packed_lights(lights: Sequence[Light]) -> list[Light]:
     """The lights that fit into the shaders' block: the first ones, so their order is
-    `brightest`'s."""
+    `brightest_lights`'s."""
     return list(lights[:LIGHT_CAPACITY])
 
 
@@ -273,18 +273,18 @@ def pack_lights(
     lights: Sequence[Light], ambient: Sequence[float], harmonics: Floats | None = None
 ) -> Floats:
     """The block `Lights` of gpu_shaders/struct_lights.glsl in std140, (196,) float32."""
-    kept = kept_lights(lights)
+    kept = packed_lights(lights)
     block = np.zeros((1 + 5 * LIGHT_CAPACITY + HARMONIC_COUNT, 4), np.float32)
     block[0] = (*ambient, len(kept))
     of_lights = block[1:-HARMONIC_COUNT]
     for index, light in enumerate(kept):
-        of_lights[index::LIGHT_CAPACITY] = _lanes(light)
+        of_lights[index::LIGHT_CAPACITY] = _light_vectors(light)
     if harmonics is not None:
         block[-HARMONIC_COUNT:, :3] = harmonics
     return block.ravel()
 
 
-def _lanes(light: Light) -> Floats:
+def _light_vectors(light: Light) -> Floats:
     """One light's five vec4, see struct_lights.glsl."""
     lanes = np.zeros((5, 4))
     lanes[0, :3], lanes[1, :3] = light.vector, light.power

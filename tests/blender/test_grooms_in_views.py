@@ -23,7 +23,7 @@ from hairloom.addon.render.scene_pass import ScenePass  # noqa: E402
 from hairloom.addon.render.scene_snapshot import DrawnGroom, SceneSnapshot  # noqa: E402
 from hairloom.addon.render.snapshot import Snapshot  # noqa: E402
 from hairloom.addon.render.textures import texture_to_array  # noqa: E402
-from hairloom.addon.shading.lights import Light, brightest  # noqa: E402
+from hairloom.addon.shading.lights import Light, brightest_lights  # noqa: E402
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings  # noqa: E402
 from hairloom.addon.shading.volume.settings import VolumeSettings  # noqa: E402
 from hairloom.addon.strands import Surface  # noqa: E402
@@ -220,10 +220,12 @@ def test_cards_of_one_groom_shade_strands_of_another_and_are_drawn_last(view: Sm
 def test_grooms_far_apart_get_the_same_lights() -> None:
     """Grooms in one view share the eight lamps, of ten, that are brightest at the first groom."""
     lamps = [Light.point((float(x), 0.0, 0.5), (1.0, 1.0, 1.0), 10.0) for x in range(10)]
-    ends = [sheet(0.0, 4, lights=brightest(lamps, np.array([x, 0.0, 0.0]))) for x in (0.0, 9.0)]
+    ends = [
+        sheet(0.0, 4, lights=brightest_lights(lamps, np.array([x, 0.0, 0.0]))) for x in (0.0, 9.0)
+    ]
     assert ends[0].lights != ends[1].lights
     lit = overlay._in_one_light(ends)
-    assert lit[0].lights == lit[1].lights == brightest(lamps, ends[0].center)
+    assert lit[0].lights == lit[1].lights == brightest_lights(lamps, ends[0].center)
     assert overlay._in_one_light(ends[:1]) == ends[:1]
 
 

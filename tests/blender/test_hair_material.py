@@ -16,7 +16,11 @@ from hairloom.addon.blender.properties.presets import apply
 from hairloom.addon.blender.scene.curves import set_colors
 from hairloom.addon.blender.scene.hair_material import put_look_material
 from hairloom.addon.blender.scene.principled import look_from_material
-from hairloom.addon.shading.marschner.look import GREY_LEFT, root_absorption, strand_absorption
+from hairloom.addon.shading.marschner.look import (
+    GREY_ABSORPTION,
+    root_absorption,
+    strand_absorption,
+)
 from hairloom.addon.shading.marschner.pigment import absorption_color, color_absorption
 from hairloom.addon.shading.settings import ShadingSettings
 from hairloom.addon.strands import StrandSet
@@ -84,7 +88,7 @@ def test_cycles_finds_as_many_grey_strands_and_as_much_variation(hair: Any, tmp_
     amount = found[~is_grey] / root
     np.testing.assert_allclose(amount, amount[:, :1].repeat(3, axis=1), rtol=1e-3)
     assert 0.6 <= amount.min() < 0.75 and 1.25 < amount.max() <= 1.4
-    grey = found[is_grey] / (GREY_LEFT * root.mean())
+    grey = found[is_grey] / (GREY_ABSORPTION * root.mean())
     np.testing.assert_allclose(grey, grey[:, :1].repeat(3, axis=1), rtol=1e-3)
 
 

@@ -17,8 +17,12 @@ from hairloom.addon.shading.marschner.tables import PREVIEW_SIZE, marschner_tabl
 from hairloom.addon.shading.settings import ShadingSettings
 from hairloom.addon.shading.skin_seen import SkinSeen
 from hairloom.addon.shading.textures import HairTextures
-from hairloom.addon.shading.volume.card_opacity import MAX_ALPHA, own_strands, own_strands_deeper
-from hairloom.addon.shading.volume.dual import fractions, fractions_at, off_far_skin
+from hairloom.addon.shading.volume.card_opacity import (
+    MAX_ALPHA,
+    tau_within_card,
+    tau_within_card_at_depth,
+)
+from hairloom.addon.shading.volume.dual import fractions, fractions_at, reflected_by_far_skin
 from hairloom.addon.shading.volume.settings import VolumeSettings
 from hairloom.addon.strands import Surface
 
@@ -165,7 +169,7 @@ def test_other_strands_of_a_deep_card_are_before_the_one_that_is_seen(
         for each in (volume, dataclasses.replace(volume, extinction=1.0e-6))
     )
     own = -np.log(1.0 - alpha) * 2.0 / np.pi
-    before, _ = own_strands(own, own, 0.0, 1.0)
+    before, _ = tau_within_card(own, own, 0.0, 1.0)
     expected = np.exp(-before) if depth else 1.0
     assert shown / bare == pytest.approx(expected, rel=0.03)
 
@@ -185,8 +189,8 @@ def test_a_map_stores_how_deep_the_visible_strand_of_a_card_lies(
     options: dict[str, Any] = {"lights": (SUN,), "ambient": (0.0, 0.0, 0.0), "shading": PLAIN}
     even = {"is_view_compensated": True, "depth": np.full(4, 0.5, np.float32)}
     own = -np.log(1.0 - alpha) * 2.0 / np.pi
-    unknown = own_strands(own, own, 0.0, 1.0)
-    known = own_strands_deeper(unknown, 2.0 * place - 1.0, 1.0)
+    unknown = tau_within_card(own, own, 0.0, 1.0)
+    known = tau_within_card_at_depth(unknown, 2.0 * place - 1.0, 1.0)
     for each, (before, _) in ((facing, known), (turned, unknown)):
         shown, bare = (
             frame.render_image(
@@ -326,7 +330,9 @@ def test_cards_gain_the_light_off_far_skin_of_the_reference(frame: Any) -> None:
         fractions_at(side, np.cos(0.5 * (theta_r - theta_i)), root_absorption(look))
         for side in (sides.forward, sides.backward)
     )
-    expected = 3.0 * off_far_skin(np.array(normal @ eye), *lobes, toward, world, np.array(SKIN))
+    expected = 3.0 * reflected_by_far_skin(
+        np.array(normal @ eye), *lobes, toward, world, np.array(SKIN)
+    )
     found = (lit - unlit)[SIZE // 2, SIZE // 2, :3]
     assert expected.max() > 0.01
     np.testing.assert_allclose(found, expected, rtol=0.01)

@@ -16,11 +16,11 @@ from hairloom.addon.shading.settings import ShadingSettings
 from hairloom.addon.shading.volume.card_opacity import (
     card_optical_depth,
     layer_facing,
-    own_strands,
-    own_strands_deeper,
-    own_tips,
-    seen_depth,
+    tau_within_card,
+    tau_within_card_at_depth,
+    tau_within_short_hair,
     view_compensated_depth,
+    visible_depth,
 )
 
 SHAPE = (40, 96)
@@ -90,9 +90,9 @@ def test_level_and_slant(compute: Callable[..., np.ndarray]) -> None:
     assert (level > 1.0).mean() > 0.2
     first, second, parts = steps[..., 0], steps[..., 1], np.minimum(steps[..., 2:], 1.0)
     own = card_optical_depth(alpha) * view_compensated_depth(normals, tangents, eyes)
-    strands = own_strands(first, own, second, parts[..., 0])
-    strands = own_strands_deeper(strands, 2.0 * parts[..., 1] - 1.0, parts[..., 0])
-    tips = own_tips(own, card_optical_depth(alpha), parts[..., 1])
-    among = np.stack(strands, axis=-1) + np.stack(tips, axis=-1) + seen_depth(first)[..., None]
+    strands = tau_within_card(first, own, second, parts[..., 0])
+    strands = tau_within_card_at_depth(strands, 2.0 * parts[..., 1] - 1.0, parts[..., 0])
+    tips = tau_within_short_hair(own, card_optical_depth(alpha), parts[..., 1])
+    among = np.stack(strands, axis=-1) + np.stack(tips, axis=-1) + visible_depth(first)[..., None]
     assert found[..., 2:] == pytest.approx(among, rel=1e-3, abs=1e-3)
     assert np.ptp(among) > 1.0

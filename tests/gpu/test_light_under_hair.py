@@ -15,7 +15,7 @@ from hairloom.addon.shading.marschner.tables import PREVIEW_SIZE, marschner_tabl
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
 from hairloom.addon.shading.skin.settings import SkinSettings
 from hairloom.addon.shading.volume.dual import fractions, mean_forward
-from hairloom.addon.shading.volume.opacity import transmittance, within_map
+from hairloom.addon.shading.volume.opacity import mesh_shadow_weight, transmittance
 from hairloom.addon.shading.volume.settings import VolumeSettings
 from hairloom.addon.strands import Surface
 
@@ -107,12 +107,12 @@ def test_what_counts_near_a_border_is_what_the_reference_says(
 ) -> None:
     places = np.random.default_rng(1).uniform(-0.2, 1.2, (500, 2))
     found = compute(
-        "within_map.glsl",
+        "mesh_shadow_weight.glsl",
         (500, 1),
         textures={"places": np.pad(places, ((0, 0), (0, 2)))[None].astype(np.float32)},
         structs=("struct_opacity.glsl",),
     )[0, :, 0]
-    expected = within_map(places)
+    expected = mesh_shadow_weight(places)
     assert 0.1 < expected.mean() < 0.9
     assert found == pytest.approx(expected, abs=1e-5)
 

@@ -36,7 +36,7 @@ from hairloom.addon.shading.marschner.tables import (
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
 from hairloom.addon.shading.skin_seen import SkinSeen
 from hairloom.addon.shading.strand_noise import strand_noise
-from hairloom.addon.shading.volume.dual import fractions, fractions_at, off_far_skin
+from hairloom.addon.shading.volume.dual import fractions, fractions_at, reflected_by_far_skin
 from hairloom.addon.shading.volume.settings import VolumeSettings
 from hairloom.addon.strands import Surface
 
@@ -180,7 +180,7 @@ def test_strands_gain_the_light_of_the_reference(frame: Any, transparency: str) 
             for side in (sides.forward, sides.backward)
         )
         skin = np.array(with_skin.skin_color)
-        expected += irradiance * off_far_skin(outward, *lobes, towards, seen, skin)
+        expected += irradiance * reflected_by_far_skin(outward, *lobes, towards, seen, skin)
     found = (pictures[0] - pictures[1])[row, column, :3]
     assert expected.max() > 0.05
     assert np.abs(found / expected - 1.0).max() < tolerance(5e-3, 1e-2)

@@ -26,7 +26,7 @@ from hairloom.addon.shading.volume.opacity import (
     coverage,
     layer_ends,
     look_up,
-    own_depth,
+    self_tau,
 )
 from hairloom.addon.shading.volume.settings import VolumeSettings
 from hairloom.addon.strands import Surface
@@ -257,7 +257,7 @@ def spans_of(maps: Any) -> LayerSpans:
     first, last = np.split(kept, 2, axis=1)
     from hairloom.addon.render.textures import texture_to_array
 
-    spans = LayerSpans.between(
+    spans = LayerSpans.from_first_and_last(
         np.where(first > 1.0, np.inf, first), np.where(last > 1.0, -np.inf, 1.0 - last), 4
     )
     drawn = texture_to_array(maps.spans)[: side // 4, :, :3]
@@ -305,8 +305,8 @@ def test_a_strand_finds_itself_in_the_map_as_often_as_is_taken_off(
                 half_width = radius * frame.strand_breadth(points, along) * 256
                 path = path_at(compute, maps, points)
                 found.append(path[:, 0] + path[:, 1])
-                expected.append(own_depth(half_width))
-                twin = of_strands(compute, "own_depth.glsl", maps, points, along, radius)
+                expected.append(self_tau(half_width))
+                twin = of_strands(compute, "self_tau.glsl", maps, points, along, radius)
                 assert np.abs(twin[:, 0] - expected[-1]).max() < 1e-4
                 left.append(of_strands(compute, "strand_path.glsl", maps, points, along, radius))
         assert np.mean(found) == pytest.approx(np.mean(expected), rel=0.06)

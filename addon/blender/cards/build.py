@@ -53,7 +53,7 @@ from ...shading.drawn_strands import (
 from ...shading.settings import ShadingSettings, StrandSettings
 from ...shading.texture_settings import TextureSettings
 from ...shading.textures import TEXTURES, HairTextures, hair_textures
-from ...shading.volume.card_opacity import UPRIGHT_SHOWN, StrandArea, card_shadow_area
+from ...shading.volume.card_opacity import VISIBLE_UPRIGHT, StrandArea, card_shadow_area
 from ..base.gpu_context import ensure_gpu
 from ..base.objects import head_of
 from ..base.outcome import notes_of
@@ -329,7 +329,7 @@ def baked_atlas(
         groom.number, grid.shape[1], shading, strands.color_grid, strands.group
     )
     if isinstance(plan, ShellPlan):
-        flat = shell_strands(plan, grid, groom.radius, UPRIGHT_SHOWN, colors)
+        flat = shell_strands(plan, grid, groom.radius, VISIBLE_UPRIGHT, colors)
         return dilated(draw(flat, plan.size), plan.grid)
     flat = flat_strands(plan, grid, groom.radius, colors)
     maps = dilated(draw(flat, plan.size), plan.grid)

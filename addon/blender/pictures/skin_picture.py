@@ -14,7 +14,7 @@ from ...render.skin_pass import SkinPass, SkinShadow
 from ...render.snapshot import MeshSnapshot, Snapshot
 from ...render.strand_pass import StrandPass
 from ...rig_flow import Pose, Rig
-from ...shading.lights import kept_lights
+from ...shading.lights import packed_lights
 from ...shading.skin.diffusion import SKIN_LIGHTS
 from ...strands import Surface
 from .slices import lit_as_in
@@ -50,7 +50,7 @@ def shown_skin_shadow(snapshot: Snapshot, strand_pass: StrandPass, *, place: str
             place=place,
             remedy="Add a light outside of the hair, and raise Max Lights in Shadows if it is 0",
         )
-    lights, skin_pass = len(kept_lights(snapshot.lights)), SkinPass()
+    lights, skin_pass = len(packed_lights(snapshot.lights)), SkinPass()
     skin_pass.shadows(snapshot.meshes, maps, snapshot.skin, lights, hair_forward(snapshot))
     if not skin_pass.drawn:
         raise HairloomError(

@@ -13,7 +13,7 @@ import bpy
 
 from ...arrays import Floats
 from ...shading.drawn_strands import look_color
-from ...shading.marschner.look import GREY_LEFT, root_absorption, tip_absorption
+from ...shading.marschner.look import GREY_ABSORPTION, root_absorption, tip_absorption
 from ...shading.marschner.pigment import color_exponent
 from ...shading.marschner.principled import PrincipledHair, hair_from
 from ...shading.settings import ShadingSettings
@@ -255,7 +255,7 @@ class _Nodes:
         if shading.grey_fraction > 0.0:
             third = (1.0 / 3.0,) * 3
             mean = self._vector("DOT_PRODUCT", value, third).outputs["Value"]
-            even = self._vector("SCALE", (GREY_LEFT,) * 3, mean).outputs["Vector"]
+            even = self._vector("SCALE", (GREY_ABSORPTION,) * 3, mean).outputs["Vector"]
             value = self._mix(self._is_grey(shading), value, even)
         amount = self._variation(shading)
         return self._vector("SCALE", value, amount).outputs["Vector"]

@@ -11,7 +11,7 @@ from mathutils import Matrix
 
 from ...arrays import Floats
 from ...shading.area_lights import Panel
-from ...shading.lights import LIGHT_CAPACITY, Cone, Light, brightest
+from ...shading.lights import LIGHT_CAPACITY, Cone, Light, brightest_lights
 
 type Color = tuple[float, float, float]
 
@@ -28,7 +28,7 @@ def read_lights(
         center: (3,) [m], world space.
         suns: the suns in the world's environment.
     """
-    return brightest([*_lights(depsgraph), *suns], center)
+    return brightest_lights([*_lights(depsgraph), *suns], center)
 
 
 def light_warnings(depsgraph: bpy.types.Depsgraph, suns: Sequence[Light] = ()) -> tuple[str, ...]:

@@ -30,7 +30,7 @@ from ...render.scene_snapshot import SceneSnapshot
 from ...render.snapshot import Snapshot
 from ...render.strand_pass import InView, Statistics, drawn_transparency
 from ...shading.environment import Environment, world_suns
-from ...shading.lights import Light, brightest, three_point_lights
+from ...shading.lights import Light, brightest_lights, three_point_lights
 from ...strands import Surface
 from ..base.objects import LayerKey, is_solid, layer_key, layers_with, spaces_without
 from ..base.redraw import redraw_panels, redraw_views, show_status
@@ -463,7 +463,7 @@ def _in_one_light(snapshots: Sequence[Snapshot]) -> list[Snapshot]:
     if all(each.lights == snapshots[0].lights for each in snapshots):
         return list(snapshots)
     known = dict.fromkeys(chain.from_iterable(each.lights for each in snapshots))
-    lights = brightest(known, np.mean([each.center for each in snapshots], axis=0))
+    lights = brightest_lights(known, np.mean([each.center for each in snapshots], axis=0))
     return [replace(each, lights=lights) for each in snapshots]
 
 

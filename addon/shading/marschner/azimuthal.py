@@ -31,10 +31,10 @@ from .interface import (
     attenuation,
     bravais_index,
     fresnel,
+    higher_lobes_energy,
     lobe_energy,
-    quarter_turn,
+    quarter_turn_quadrature,
     refracted,
-    rest_energy,
 )
 
 #: values of cos 2 phi_h that average over a full turn (Gauss-Chebyshev, to degree 7)
@@ -89,13 +89,13 @@ def azimuthal_trt(
     return np.mean(lobes, axis=0) * _round_fraction(np.asarray(cos_d), fibre)
 
 
-def azimuthal_rest(cos_d: Floats, fibre: Fibre) -> Floats:
+def azimuthal_higher(cos_d: Floats, fibre: Fibre) -> Floats:
     """N_rest, (..., 3): all lobes after TRT, spread evenly over the circle.
 
     Each is weaker than the one before by Fresnel's reflectance, and all look alike (d'Eon et al.
     2011, section 4; Chiang et al. 2016 combine them too).
     """
-    return rest_energy(cos_d, fibre.index_of_refraction, fibre.absorption) / (2.0 * np.pi)
+    return higher_lobes_energy(cos_d, fibre.index_of_refraction, fibre.absorption) / (2.0 * np.pi)
 
 
 def elliptic_index(index: float, ratio: float, cos_double: float) -> Floats:
@@ -149,7 +149,7 @@ def _removed_energy(
     cos_d: Floats, caustic: Floats, blur: Floats, fibre: Fibre, index: Floats
 ) -> Floats:
     """Energy that the fade takes out of N_TRT, (..., 3), summed over h."""
-    gamma, weight = quarter_turn()
+    gamma, weight = quarter_turn_quadrature()
     cone = cos_d[..., None]
     turn = trt_turn(gamma, bravais_index(index, cone))
     near, far = _bells(turn, caustic[..., None], fibre.glint_width)

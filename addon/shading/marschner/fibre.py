@@ -92,8 +92,8 @@ class Fibre:
             "azimuthal_width": 0.0,
             **dict.fromkeys(("cuticle_tilt", "offset_r", "offset_tt", "offset_trt"), _MAX_TURNED),
         }
-        for name, least in limits.items():
-            _require(name, getattr(self, name), least)
+        for name, minimum in limits.items():
+            _require(name, getattr(self, name), minimum)
         if len(self.absorption) != 3:
             raise HairloomError(
                 f"absorption has {len(self.absorption)} values",
@@ -106,8 +106,12 @@ class Fibre:
     @property
     def widths(self) -> tuple[float, float, float]:
         """Standard deviations of theta_h of R, TT and TRT, at least MIN_WIDTH."""
-        least = float(MIN_WIDTH)
-        return (max(self.width_r, least), max(self.width_tt, least), max(self.width_trt, least))
+        minimum = float(MIN_WIDTH)
+        return (
+            max(self.width_r, minimum),
+            max(self.width_tt, minimum),
+            max(self.width_trt, minimum),
+        )
 
     @property
     def highlight_shifts(self) -> tuple[float, float, float]:
@@ -152,8 +156,8 @@ def directions_to_angles(
     return np.arcsin(sin_i), np.arcsin(sin_r), np.arctan2(sine, cosine)
 
 
-def _require(name: str, value: float, least: float) -> None:
-    if not (np.isfinite(value) and value >= least):
+def _require(name: str, value: float, minimum: float) -> None:
+    if not (np.isfinite(value) and value >= minimum):
         raise HairloomError(
-            f"{name} is {value}", place="hair fibre", remedy=f"Give a number from {least:.3g} up"
+            f"{name} is {value}", place="hair fibre", remedy=f"Give a number from {minimum:.3g} up"
         )

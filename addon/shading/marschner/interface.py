@@ -64,8 +64,10 @@ def attenuation(
     mirrored = fresnel(gamma, index, bravais)[..., None]
     if order == 0:
         return np.broadcast_to(mirrored, (*mirrored.shape[:-1], 3))
-    kept = np.exp(-chord(gamma, cos_d, index)[..., None] * (order * np.asarray(absorption)))
-    return (1.0 - mirrored) ** 2 * mirrored ** (order - 1) * kept
+    transmittance = np.exp(
+        -chord(gamma, cos_d, index)[..., None] * (order * np.asarray(absorption))
+    )
+    return (1.0 - mirrored) ** 2 * mirrored ** (order - 1) * transmittance
 
 
 def chord(gamma: Floats, cos_d: Floats, index: Floats | float) -> Floats:
@@ -83,17 +85,19 @@ def lobe_energy(
     order: int, cos_d: Floats, index: Floats | float, absorption: tuple[float, float, float]
 ) -> Floats:
     """Fraction of the fibre's light that leaves in lobe p: the mean of A over h, (..., 3)."""
-    gamma, weight = quarter_turn()
-    kept = attenuation(order, gamma, np.asarray(cos_d)[..., None], index, absorption)
-    return np.sum(kept * (weight * np.cos(gamma))[:, None], axis=-2)
+    gamma, weight = quarter_turn_quadrature()
+    transmittance = attenuation(order, gamma, np.asarray(cos_d)[..., None], index, absorption)
+    return np.sum(transmittance * (weight * np.cos(gamma))[:, None], axis=-2)
 
 
-def rest_energy(cos_d: Floats, index: float, absorption: tuple[float, float, float]) -> Floats:
+def higher_lobes_energy(
+    cos_d: Floats, index: float, absorption: tuple[float, float, float]
+) -> Floats:
     """Fraction of the light that leaves after two or more reflections inside, (..., 3).
 
     The lobes p = 3, 4, ... are a geometric series: each passage keeps F T of the one before.
     """
-    gamma, weight = quarter_turn()
+    gamma, weight = quarter_turn_quadrature()
     cone = np.asarray(cos_d)[..., None]
     mirrored = fresnel(gamma, index, bravais_index(index, cone))[..., None]
     passage = np.exp(-chord(gamma, cone, index)[..., None] * np.asarray(absorption))
@@ -103,7 +107,7 @@ def rest_energy(cos_d: Floats, index: float, absorption: tuple[float, float, flo
 
 
 @functools.cache
-def quarter_turn() -> tuple[Floats, Floats]:
+def quarter_turn_quadrature() -> tuple[Floats, Floats]:
     """64 Gauss-Legendre angles in [0, pi/2] and their weights."""
     place, weight = np.polynomial.legendre.leggauss(64)
     return 0.25 * np.pi * (place + 1.0), 0.25 * np.pi * weight

@@ -17,7 +17,7 @@ from .tables import MarschnerTables, look_up
 
 #: Fraction of the pigment, averaged over the colours, that a grey strand keeps: it is white, not
 #: glass.
-GREY_LEFT = 0.04
+GREY_ABSORPTION = 0.04
 
 
 def fibre_of(settings: ShadingSettings) -> Fibre:
@@ -47,7 +47,7 @@ def fibre_of(settings: ShadingSettings) -> Fibre:
 def pack_fibre(settings: ShadingSettings) -> Floats:
     """`Fibre` of gpu_shaders/struct_fibre.glsl in std140, (20,) float32."""
     root = [*root_absorption(settings), COLOR_FACTOR]
-    tip = [*tip_absorption(settings), GREY_LEFT]
+    tip = [*tip_absorption(settings), GREY_ABSORPTION]
     fibre = fibre_of(settings)
     lobes = [*fibre.strengths, *fibre.lobe_widths, *fibre.lobe_shifts]
     return np.array([*root, *tip, *lobes], np.float32)
@@ -88,7 +88,7 @@ def strand_absorption(
     mixed = root + (tip - root) * tip_fraction(along, settings)[..., None]
     amount = 1.0 + settings.color_variation * (1.0 - 2.0 * np.asarray(color_noise))
     is_grey = (np.asarray(grey_noise) < settings.grey_fraction)[..., None]
-    grey = GREY_LEFT * mixed.mean(axis=-1, keepdims=True)
+    grey = GREY_ABSORPTION * mixed.mean(axis=-1, keepdims=True)
     return np.where(is_grey, grey, mixed) * amount[..., None]
 
 
@@ -97,7 +97,7 @@ def strand_color(absorption: Floats) -> Floats:
     return absorption_color(absorption)
 
 
-def straight_light(
+def unscattered_fraction(
     normal: Floats, to_light: Floats, tau: Floats | float, shading: ShadingSettings
 ) -> Floats:
     """The fraction of light that no strand blocks, (...): exp(-tau) past tau strands.
@@ -167,6 +167,6 @@ def marschner_light(
     angles = strand_angles(tangent, normal, to_light, to_eye, shift_noise, shading)
     scattered = single_scattering(tables, angles, sparkle_noise, absorption, shading, level)
     bias = diffuse_bias(normal, to_light) * np.exp(-np.maximum(tau, 0.0))
-    shade = straight_light(normal, to_light, tau, shading)
+    shade = unscattered_fraction(normal, to_light, tau, shading)
     direct = scattered * (np.cos(angles[0]) * shade)[..., None]
     return direct + strand_color(absorption) * (shading.fake_scattering * bias / np.pi)[..., None]

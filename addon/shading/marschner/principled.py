@@ -31,7 +31,7 @@ _GLINT_WIDTH = float(np.radians(2.0))
 _UNEVEN = 1.5
 #: Strength of a highlight up to which Huang's model is chosen: in Cycles it is darker than ours by
 #: a third, so it is better only where Chiang's would be more wrong than that.
-_WEAK = 0.5
+_MIN_STRENGTH = 0.5
 #: Limits of the reflectance at normal incidence that is converted to an index of refraction
 _REFLECTANCES = 0.01, 0.25
 
@@ -65,10 +65,10 @@ class PrincipledHair:
     secondary_reflection: float = 1.0
 
     @property
-    def around(self) -> float:
+    def azimuthal_roughness(self) -> float:
         """Azimuthal roughness; Huang's model has only one roughness."""
         roughness = self.radial_roughness if self.model == "CHIANG" else self.roughness
-        return _between(roughness, 0.001, 1.0)
+        return _clamped(roughness, 0.001, 1.0)
 
 
 def settings_from(
@@ -99,7 +99,7 @@ def hair_from(settings: ShadingSettings) -> tuple[PrincipledHair, tuple[str, ...
     shape = _node_of_fibre(settings, notes) if is_fibre else _node_of_highlights(settings, notes)
     hair = PrincipledHair(**shape)
     absorption = root_absorption(settings if is_fibre else replace(settings, pigment="color"))
-    color = tuple(absorption_color(absorption, hair.around).tolist())
+    color = tuple(absorption_color(absorption, hair.azimuthal_roughness).tolist())
     inputs: dict[str, Any] = {
         "color": color,
         "absorption_coefficient": tuple(absorption.tolist()),
@@ -126,7 +126,7 @@ def _node_of_fibre(settings: ShadingSettings, notes: list[str]) -> dict[str, Any
     values: dict[str, Any] = {
         "roughness": roughness,
         "radial_roughness": _inverse(azimuthal_width, around),
-        "coat": _between(1.0 - outer / roughness, 0.0, 1.0) if roughness > 0.0 else 0.0,
+        "coat": _clamped(1.0 - outer / roughness, 0.0, 1.0) if roughness > 0.0 else 0.0,
         "ior": settings.index_of_refraction,
         "offset": settings.cuticle_tilt,
     }
@@ -135,26 +135,26 @@ def _node_of_fibre(settings: ShadingSettings, notes: list[str]) -> dict[str, Any
         "transmission": settings.strength_tt,
         "secondary_reflection": settings.strength_trt,
     }
-    if settings.eccentricity == 1.0 and min(strengths.values()) > _WEAK:
+    if settings.eccentricity == 1.0 and min(strengths.values()) > _MIN_STRENGTH:
         if settings.strength_tt != 1.0 or settings.strength_trt != 1.0:
             notes.append("Rim Strength and Second Strength were set to 1: the node has none")
-        values["ior"] = _stronger(settings.index_of_refraction, settings.strength_r)
+        values["ior"] = _index_for_strength(settings.index_of_refraction, settings.strength_r)
         return values
     notes.append("the node uses Huang's model, which has strengths but a single Roughness")
     if max(strengths.values()) > 1.0 or settings.eccentricity > 1.0:
         notes.append("strengths and Eccentricity above 1 were lowered to 1")
-    within = {name: _between(value, 0.0, 1.0) for name, value in strengths.items()}
+    within = {name: _clamped(value, 0.0, 1.0) for name, value in strengths.items()}
     return values | within | {"model": "HUANG", "aspect_ratio": min(settings.eccentricity, 1.0)}
 
 
-def _stronger(index: float, strength: float) -> float:
+def _index_for_strength(index: float, strength: float) -> float:
     """The index of refraction that reflects `strength` times as much light at normal incidence.
 
     Fresnel's reflectance there is ((n - 1) / (n + 1))^2.
     """
     if strength == 1.0:
         return index
-    reflectance = _between(strength * ((index - 1.0) / (index + 1.0)) ** 2, *_REFLECTANCES)
+    reflectance = _clamped(strength * ((index - 1.0) / (index + 1.0)) ** 2, *_REFLECTANCES)
     root = float(np.sqrt(reflectance))
     return (1.0 + root) / (1.0 - root)
 
@@ -170,7 +170,7 @@ def _node_of_highlights(settings: ShadingSettings, notes: list[str]) -> dict[str
     roughness, outer = _roughness_of(0.5 * second), _roughness_of(first)
     return {
         "roughness": roughness,
-        "coat": _between(1.0 - outer / roughness, 0.0, 1.0),
+        "coat": _clamped(1.0 - outer / roughness, 0.0, 1.0),
         "offset": float(np.arctan(settings.primary_shift)),
     }
 
@@ -205,15 +205,15 @@ def azimuthal_width(roughness: float) -> float:
 
 def _pigment(hair: PrincipledHair, notes: list[str]) -> dict[str, Any]:
     """The settings of colour; melanin and tint together become one absorption."""
-    radial = hair.around
+    radial = hair.azimuthal_roughness
     variation = 0.0
     if hair.parametrization == "MELANIN":
         melanin, redness = (
-            _between(value, 0.0, 1.0) for value in (hair.melanin, hair.melanin_redness)
+            _clamped(value, 0.0, 1.0) for value in (hair.melanin, hair.melanin_redness)
         )
         absorption = melanin_absorption(melanin, redness)
         pigment, values = "melanin", {"melanin": melanin, "redness": redness}
-        variation = _between(hair.random_color, 0.0, 1.0)
+        variation = _clamped(hair.random_color, 0.0, 1.0)
         if hair.tint != WHITE:
             absorption = absorption + color_absorption(np.array(hair.tint), radial)
             pigment = "absorption"
@@ -236,8 +236,8 @@ def _pigment(hair: PrincipledHair, notes: list[str]) -> dict[str, Any]:
 
 def _shape(hair: PrincipledHair, notes: list[str]) -> dict[str, Any]:
     """The settings of the fibre and its highlights."""
-    roughness = _between(hair.roughness, 0.001, 1.0)
-    coat = _between(hair.coat, 0.0, 1.0) if hair.model == "CHIANG" else 0.0
+    roughness = _clamped(hair.roughness, 0.001, 1.0)
+    coat = _clamped(hair.coat, 0.0, 1.0) if hair.model == "CHIANG" else 0.0
     width_r, width_tt, width_trt = roughness_widths(roughness)
     values = {
         "index_of_refraction": hair.ior,
@@ -248,7 +248,7 @@ def _shape(hair: PrincipledHair, notes: list[str]) -> dict[str, Any]:
         "width_r": width_r if coat == 0.0 else roughness_widths(roughness * (1.0 - coat))[0],
         "width_tt": width_tt,
         "width_trt": width_trt,
-        "azimuthal_width": azimuthal_width(hair.around),
+        "azimuthal_width": azimuthal_width(hair.azimuthal_roughness),
         "glint_width": _GLINT_WIDTH,
         "eccentricity": 1.0,
         "strength_r": 1.0,
@@ -276,14 +276,14 @@ def _in_range(values: dict[str, Any], notes: list[str]) -> dict[str, Any]:
         low, high = parameter.hard_range
         value = values[parameter.name]
         if parameter.kind == "color":
-            within: Any = tuple(_between(channel, low, high) for channel in value)
+            within: Any = tuple(_clamped(channel, low, high) for channel in value)
         else:
-            within = _between(value, low, high)
+            within = _clamped(value, low, high)
         if within != value:
             notes.append(f"{parameter.label} was clamped to its range, {low:g} to {high:g}")
         kept[parameter.name] = within
     return kept
 
 
-def _between(value: float, low: float, high: float) -> float:
+def _clamped(value: float, low: float, high: float) -> float:
     return float(min(max(value, low), high))

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...arrays import Floats
-from .azimuthal import azimuthal_r, azimuthal_rest, azimuthal_trt, azimuthal_tt
+from .azimuthal import azimuthal_higher, azimuthal_r, azimuthal_trt, azimuthal_tt
 from .fibre import Fibre
 from .interface import MIN_COSINE
 from .longitudinal import longitudinal_lobes
@@ -58,5 +58,5 @@ def _smooth_lobes(cos_d: Floats, phi: Floats, fibre: Fibre) -> Floats:
     lobes[..., 0, :] = azimuthal_r(cos_d, phi, fibre)[..., None]
     lobes[..., 1, :] = azimuthal_tt(cos_d, phi, fibre)
     lobes[..., 2, :] = azimuthal_trt(cos_d, phi, fibre)
-    lobes[..., 3, :] = azimuthal_rest(cos_d, fibre)
+    lobes[..., 3, :] = azimuthal_higher(cos_d, fibre)
     return lobes

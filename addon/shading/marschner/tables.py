@@ -32,7 +32,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...arrays import Floats, Ints
-from .azimuthal import azimuthal_r, azimuthal_rest, azimuthal_trt, azimuthal_tt
+from .azimuthal import azimuthal_higher, azimuthal_r, azimuthal_trt, azimuthal_tt
 from .fibre import Fibre
 from .interface import MIN_COSINE
 from .longitudinal import longitudinal_lobes
@@ -92,7 +92,7 @@ def longitudinal_table(fibre: Fibre, size: int) -> Floats:
         table[0, ..., lane] = lobe(theta_i, theta_r)
     table[..., 3] = np.cos(0.5 * (theta_r - theta_i))
     for level in range(1, LEVELS):
-        table[level, ..., :3] = _twice_as_blurred(table[level - 1, ..., :3], level - 1)
+        table[level, ..., :3] = _next_level(table[level - 1, ..., :3], level - 1)
     return table
 
 
@@ -101,17 +101,17 @@ def azimuthal_tables(fibre: Fibre, size: int) -> tuple[Floats, Floats]:
     axis = np.linspace(0.0, 1.0, size)
     cos_d, phi = axis[None, :], np.pi * axis[:, None]
     fibre, width = replace(fibre, absorption=_FITTED), fibre.azimuthal_width
-    through = _spread(azimuthal_tt(cos_d, phi, fibre), width)
-    back = _spread(azimuthal_trt(cos_d, phi, fibre), width)
-    rest = azimuthal_rest(cos_d, fibre)
+    through = _blurred_azimuthally(azimuthal_tt(cos_d, phi, fibre), width)
+    back = _blurred_azimuthally(azimuthal_trt(cos_d, phi, fibre), width)
+    rest = azimuthal_higher(cos_d, fibre)
     azimuthal, paths = np.empty((2, size, size, 4), np.float32)
-    azimuthal[..., 0] = _spread(azimuthal_r(cos_d, phi, fibre), width)
+    azimuthal[..., 0] = _blurred_azimuthally(azimuthal_r(cos_d, phi, fibre), width)
     for lane, lobe in enumerate((through, back, rest), start=1):
         azimuthal[..., lane] = lobe[..., 0]
-    paths[..., 0] = _evenly_on(_mean_path(through, 2), through)
+    paths[..., 0] = _extrapolated(_mean_path(through, 2), through)
     length, variance = _path_and_variance(back)
-    paths[..., 1] = _evenly_on(length, back)
-    paths[..., 2] = _evenly_on(variance, back)
+    paths[..., 1] = _extrapolated(length, back)
+    paths[..., 2] = _extrapolated(variance, back)
     paths[..., 3] = _mean_path(rest, 1)
     return azimuthal, paths
 
@@ -137,10 +137,10 @@ def look_up(
     along = trilinear(tables.longitudinal, theta_i / np.pi + 0.5, theta_r / np.pi + 0.5, level)
     cos_d, turn = along[..., 3], np.abs(phi) / np.pi
     clear = bilinear(tables.azimuthal, cos_d, turn)
-    kept = kept_light(bilinear(tables.paths, cos_d, turn), absorption)
+    transmittance = lobe_transmittance(bilinear(tables.paths, cos_d, turn), absorption)
     factors = strengths * along[..., [0, 1, 2, 2]] * clear
     squared = np.maximum(cos_d, MIN_COSINE)[..., None] ** 2
-    return np.sum(factors[..., None] * kept, axis=-2) / squared
+    return np.sum(factors[..., None] * transmittance, axis=-2) / squared
 
 
 def table_level(angle: float, size: int) -> float:
@@ -148,7 +148,7 @@ def table_level(angle: float, size: int) -> float:
     return float(np.log2(max(angle * (size - 1) / np.pi, 1.0)))
 
 
-def kept_light(paths: Floats, absorption: Floats) -> Floats:
+def lobe_transmittance(paths: Floats, absorption: Floats) -> Floats:
     """The fractions of R, TT, TRT and the rest that absorption leaves, (..., 4, 3).
 
     Where the fitted parabola would rise again, it stays at its minimum.
@@ -166,7 +166,7 @@ def kept_light(paths: Floats, absorption: Floats) -> Floats:
     )
 
 
-def _spread(lobes: Floats, width: float) -> Floats:
+def _blurred_azimuthally(lobes: Floats, width: float) -> Floats:
     """Lobes (size of phi, ...) convolved with a Gaussian of phi over the circle.
 
     The kernel sums to 1 over the circle's texels, of which the lobes, being even, hold one half.
@@ -197,7 +197,7 @@ def _path_and_variance(lobe: Floats) -> tuple[Floats, Floats]:
     return near + 0.5 * _FITTED[1] * variance, variance
 
 
-def _evenly_on(path: Floats, lobe: Floats) -> Floats:
+def _extrapolated(path: Floats, lobe: Floats) -> Floats:
     """Paths (size of phi, size of cos theta_d), continued to where their lobe has no light.
 
     The texture is interpolated, so a path must not jump at the border of its lobe.
@@ -207,7 +207,7 @@ def _evenly_on(path: Floats, lobe: Floats) -> Floats:
     return np.take_along_axis(path, np.where(last < 0, is_lit.argmax(axis=0), last), 0)
 
 
-def _twice_as_blurred(table: Floats, level: int) -> Floats:
+def _next_level(table: Floats, level: int) -> Floats:
     """Means over twice as many texels along theta_h, the ends repeated.
 
     Along theta_h both indices increase together. Each mean joins two boxes of 2^level texels, side
@@ -234,15 +234,15 @@ def bilinear(table: Floats, x: Floats, y: Floats, *level: Ints) -> Floats:
     `level` selects one of a texture of levels.
     """
     rows, columns = table.shape[-3:-1]
-    column, right = _between(x, columns)
-    row, up = _between(y, rows)
+    column, right = _texels_around(x, columns)
+    row, up = _texels_around(y, rows)
     lower = table[*level, row, column] * (1.0 - right) + table[*level, row, column + 1] * right
     row = row + 1
     upper = table[*level, row, column] * (1.0 - right) + table[*level, row, column + 1] * right
     return lower * (1.0 - up) + upper * up
 
 
-def _between(place: Floats, count: int) -> tuple[Ints, Floats]:
+def _texels_around(place: Floats, count: int) -> tuple[Ints, Floats]:
     scaled = np.clip(place, 0.0, 1.0) * (count - 1)
     index = np.minimum(scaled.astype(np.int64), count - 2)
     return index, (scaled - index)[..., None]

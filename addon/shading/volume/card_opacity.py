@@ -33,15 +33,15 @@ MEAN_TURN = 2.0 / np.pi
 #: minimum |cos| of the turn of a card, when it is nearly on edge to the eye or to the light
 MIN_FACING = 0.1
 #: fraction of an upright piece's length that a layer of shells shows, squared
-UPRIGHT_SHOWN = 0.5
+VISIBLE_UPRIGHT = 0.5
 #: range to which the number of strands on a ray of the eye is clamped [1]
-MIN_SEEN, MAX_SEEN = 0.05, 60.0
+MIN_EYE_TAU, MAX_EYE_TAU = 0.05, 60.0
 #: depth of strands below which they lie in a plane [m]
 MIN_DEPTH = 1.0e-5
 #: slope, over |cos|, of the blend between light from the front and from behind
 SIDEDNESS = 2.0
 #: minimum relative difference between counts of strands, whose difference is a divisor
-APART = 1.0e-3
+MIN_TAU_DIFFERENCE = 1.0e-3
 
 
 def card_optical_depth(alpha: Floats) -> Floats:
@@ -72,7 +72,7 @@ def layer_facing(across: Floats, tangent: Floats, direction: Floats) -> Floats:
     front = across / np.maximum(np.linalg.norm(across, axis=-1, keepdims=True), 1.0e-30)
     upright = np.sum(tangent * front, axis=-1)
     along = np.sum(tangent * direction, axis=-1)
-    baked = np.sqrt(1.0 - (1.0 - UPRIGHT_SHOWN) * upright**2)
+    baked = np.sqrt(1.0 - (1.0 - VISIBLE_UPRIGHT) * upright**2)
     sine = np.sqrt(np.maximum(1.0 - along**2, 1.0e-4))
     facing: Floats = np.abs(np.sum(front * direction, axis=-1)) * baked / sine
     return facing
@@ -85,71 +85,75 @@ def view_compensated_depth(across: Floats, tangent: Floats, direction: Floats) -
     return factor
 
 
-def seen_depth(seen: Floats) -> Floats:
+def visible_depth(eye_tau: Floats) -> Floats:
     """Mean depth of the visible strand behind the front of a card's strands, (...), as a fraction
     of their depth: the eye meets the first of strands that lie at random.
 
     Args:
-        seen: number of the card's strands on a ray of the eye, tau.
+        eye_tau: number of the card's strands on a ray of the eye, tau.
     """
-    few = np.clip(seen, MIN_SEEN, MAX_SEEN)
-    depth: Floats = 1.0 / few - 1.0 / np.expm1(few)
+    clamped = np.clip(eye_tau, MIN_EYE_TAU, MAX_EYE_TAU)
+    depth: Floats = 1.0 / clamped - 1.0 / np.expm1(clamped)
     return depth
 
 
-def own_strands(seen: Floats, own: Floats, near: Floats, front: Floats) -> tuple[Floats, Floats]:
+def tau_within_card(
+    eye_tau: Floats, light_tau: Floats, near: Floats, front: Floats
+) -> tuple[Floats, Floats]:
     """tau of a card's other strands between the light and the visible one, and beyond it, (...)
     each.
 
     Eye and light look along different rays, so what is clear for the eye is as full as the rest for
     the light. The visible strand lies at a depth s with the density
-    p(s) = seen exp(-seen s) / (1 - exp(-seen)). The light that reaches it is the integral of
-    p(s) exp(-own max(s - near, 0)) from the front, and of p(s) exp(-own max(1 - s - near, 0)) from
-    behind.
+    p(s) = a exp(-a s) / (1 - exp(-a)), a = eye_tau. The light that reaches it is the integral of
+    p(s) exp(-b max(s - near, 0)), b = light_tau, from the front, and of
+    p(s) exp(-b max(1 - s - near, 0)) from behind.
 
     Args:
-        seen, own: number of the card's strands on a ray of the eye, and of the light, tau.
+        eye_tau, light_tau: number of the card's strands on a ray of the eye, and of the light, tau.
         near: distance from the visible strand within which others do not count, as a fraction of
             their depth.
         front: 1 for light from the eye's side of the card, 0 for light from behind.
     """
-    a, b = np.clip(seen, MIN_SEEN, MAX_SEEN), np.clip(own, 0.0, MAX_SEEN)
-    b = np.where(np.abs(b - a) < APART * a, (1.0 + APART) * a, b)
+    a, b = np.clip(eye_tau, MIN_EYE_TAU, MAX_EYE_TAU), np.clip(light_tau, 0.0, MAX_EYE_TAU)
+    b = np.where(np.abs(b - a) < MIN_TAU_DIFFERENCE * a, (1.0 + MIN_TAU_DIFFERENCE) * a, b)
     near = np.minimum(near, 1.0)
-    left = 1.0 - near
-    before, behind, end = np.exp(-a * near), np.exp(-a * left), np.exp(-a)
-    ahead = 1.0 - before + a / (a + b) * (before - end * np.exp(-b * left))
-    back = a / (a - b) * (np.exp(-b * left) - behind) + behind - end
-    met = np.maximum(-np.log((back + (ahead - back) * front) / (1.0 - end)), 0.0)
-    return met, np.maximum(own - met, 0.0)
+    remaining = 1.0 - near
+    before, behind, end = np.exp(-a * near), np.exp(-a * remaining), np.exp(-a)
+    ahead = 1.0 - before + a / (a + b) * (before - end * np.exp(-b * remaining))
+    back = a / (a - b) * (np.exp(-b * remaining) - behind) + behind - end
+    tau_before = np.maximum(-np.log((back + (ahead - back) * front) / (1.0 - end)), 0.0)
+    return tau_before, np.maximum(light_tau - tau_before, 0.0)
 
 
-def own_strands_deeper(
+def tau_within_card_at_depth(
     strands: tuple[Floats, Floats], deeper: Floats, front: Floats
 ) -> tuple[Floats, Floats]:
-    """`own_strands` of a visible strand whose depth is known: tau grows evenly with the depth.
+    """`tau_within_card` of a visible strand whose depth is known: tau grows evenly with the depth.
 
     Args:
-        strands: result of `own_strands`.
+        strands: result of `tau_within_card`.
         deeper: than visible strands lie on average, as a fraction of the strands' depth.
     """
-    own = strands[0] + strands[1]
-    met = np.clip(strands[0] + own * deeper * (2.0 * front - 1.0), 0.0, own)
-    return met, own - met
+    light_tau = strands[0] + strands[1]
+    tau_before = np.clip(strands[0] + light_tau * deeper * (2.0 * front - 1.0), 0.0, light_tau)
+    return tau_before, light_tau - tau_before
 
 
-def own_tips(own: Floats, tau: Floats, front: Floats) -> tuple[Floats, Floats]:
-    """As `own_strands`, for short hair, whose visible tip has the others beside it.
+def tau_within_short_hair(
+    light_tau: Floats, card_tau: Floats, front: Floats
+) -> tuple[Floats, Floats]:
+    """As `tau_within_card`, for short hair, whose visible tip has the others beside it.
 
     Among strands that lie at random, tau on average and at least one, a strand has
     tau / (1 - exp(-tau)) - 1 others beside it.
 
     Args:
-        own: tau of the card for the light. tau: of the card.
+        light_tau: tau of the card for the light. card_tau: of the card.
         front: fraction of its other strands that the light meets later.
     """
-    few = np.maximum(tau, MIN_SEEN)
-    others = own * (1.0 / -np.expm1(-few) - 1.0 / few)
+    clamped = np.maximum(card_tau, MIN_EYE_TAU)
+    others = light_tau * (1.0 / -np.expm1(-clamped) - 1.0 / clamped)
     return others * (1.0 - front), others * front
 
 
@@ -188,7 +192,7 @@ _PLACES = (np.array([[4, 1, 1], [1, 4, 1], [1, 1, 4], [2, 2, 2]]) / 6.0).astype(
 #: coat).
 SHELL_LIT_LEVEL = 2
 #: Levels by which a light's map is coarser than an atlas, roughly; minimum of texels across a tile.
-_COARSER, _ACROSS = 3, 8
+_MAX_LIT_LEVEL, _ACROSS = 3, 8
 
 
 def lit_level(shape: tuple[int, ...], columns: int, rows: int) -> int:
@@ -200,7 +204,7 @@ def lit_level(shape: tuple[int, ...], columns: int, rows: int) -> int:
         shape: of the alpha, (height, width). columns, rows: of its tiles.
     """
     across = min(shape[0] // max(rows, 1), shape[1] // max(columns, 1))
-    return min(max((across // _ACROSS).bit_length() - 1, 0), _COARSER)
+    return min(max((across // _ACROSS).bit_length() - 1, 0), _MAX_LIT_LEVEL)
 
 
 def card_shadow_area(
@@ -215,14 +219,14 @@ def card_shadow_area(
     """
     area = areas_of(positions[triangles])
     at = np.einsum("pk,tkj->ptj", _PLACES, uv[triangles])
-    alpha = _coarser(_coarser(alpha, 0, level), 1, level)
+    alpha = _downsampled(_downsampled(alpha, 0, level), 1, level)
     size = np.array(alpha.shape)
     column, row = np.clip((at * size[::-1]).astype(np.int64), 0, size[::-1] - 1).transpose(2, 0, 1)
     tau = card_optical_depth(alpha[row, column]).mean(axis=0)
     return 0.5 * float((area * tau).sum(dtype=np.float64))
 
 
-def _coarser(alpha: Floats, axis: int, level: int) -> Floats:
+def _downsampled(alpha: Floats, axis: int, level: int) -> Floats:
     """A mip level along one axis."""
     starts = np.arange(0, alpha.shape[axis], 1 << level)
     texels = np.diff(np.append(starts, alpha.shape[axis]))

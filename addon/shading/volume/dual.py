@@ -13,9 +13,10 @@ Differences:
         actual number of strands: deep white hair returns all light, a thin layer less.
     Each azimuthal lobe is stored as two numbers, the light that it sends on and back, instead of
         tables of every azimuth: light from half a circle blurs the rest away.
-    Skin behind the hair reflects light that passes all strands, see off_the_skin. In blond hair of
+    Skin behind the hair reflects light that passes all strands, see reflected_by_skin. In blond
+    hair of
         a groom's density that is nearly half of the light. Skin farther away lights hair too, see
-        off_far_skin.
+        reflected_by_far_skin.
 
 Colours are given as absorption, so that they may vary along a strand: see `fractions`.
 """
@@ -32,23 +33,23 @@ from ..marschner.interface import MIN_COSINE
 from ..marschner.look import (
     fibre_of,
     single_scattering,
-    straight_light,
     strand_absorption,
     strand_angles,
+    unscattered_fraction,
 )
-from ..marschner.tables import MarschnerTables, bilinear, kept_light
+from ..marschner.tables import MarschnerTables, bilinear, lobe_transmittance
 from ..settings import ShadingSettings
 from ..skin_seen import SkinSeen, far_skin_light, plane_beneath, through_hair
 
 #: number of strands behind a place where it is unknown
-UNKNOWN_BEYOND = 4.0
+DEFAULT_TAU_BEYOND = 4.0
 #: Texels of the table of fractions: cos theta_d from 0 to 1, and absorption from 0 to infinity.
 FRACTIONS_SIZE = 32
 #: Absorption in the middle of that axis.
 MIDPOINT = 0.5
 #: maximum fraction of light that hair sends on, so that sums converge
 _MAX = 0.999
-_MAX_KEPT = 0.9999
+_MAX_SCATTERED = 0.9999
 _SMALLEST = 1e-6
 #: even light is attenuated as on a path this many times as long as straight up (Elsasser 1942)
 _DIFFUSIVITY = 1.66
@@ -61,7 +62,7 @@ class Fractions:
     """Light that a fibre sends on and back, by lobe: R, TT, TRT and the rest.
 
     forward, backward: (FRACTIONS_SIZE, FRACTIONS_SIZE, 4) float32; row by absorption, see
-        absorption_place; column by cos theta_d; fractions of the light on the fibre.
+        table_coordinate; column by cos theta_d; fractions of the light on the fibre.
     """
 
     forward: Floats
@@ -82,22 +83,24 @@ def fractions(tables: MarschnerTables, size: int = FRACTIONS_SIZE) -> Fractions:
     weight = np.gradient(turn[:, 0, 0])[:, None, None] * 2.0 * np.pi
     weight[[0, -1]] *= 0.5
     forward, backward = np.empty((2, size, size, 4), np.float32)
-    for row, place in enumerate(np.linspace(0.0, 1.0, size)):
-        kept = kept_light(paths, np.full(1, place_absorption(place)))[..., 0]
-        lit = clear * kept * weight
-        forward[row] = (lit * turn).sum(axis=0)
-        backward[row] = (lit * (1.0 - turn)).sum(axis=0)
+    for row, coordinate in enumerate(np.linspace(0.0, 1.0, size)):
+        transmittance = lobe_transmittance(paths, np.full(1, absorption_at_coordinate(coordinate)))[
+            ..., 0
+        ]
+        weighted = clear * transmittance * weight
+        forward[row] = (weighted * turn).sum(axis=0)
+        backward[row] = (weighted * (1.0 - turn)).sum(axis=0)
     return Fractions(forward, backward)
 
 
-def absorption_place(absorption: Floats) -> Floats:
+def table_coordinate(absorption: Floats) -> Floats:
     """Where an absorption lies in the table, 0 to 1."""
     return absorption / (absorption + MIDPOINT)
 
 
-def place_absorption(place: Floats | float) -> Floats:
-    """The absorption at a place of the table; its end is that of black hair."""
-    inside = np.minimum(place, 1.0 - 1e-3)
+def absorption_at_coordinate(coordinate: Floats | float) -> Floats:
+    """The absorption at a coordinate of the table; its end is that of black hair."""
+    inside = np.minimum(coordinate, 1.0 - 1e-3)
     return np.asarray(MIDPOINT * inside / (1.0 - inside))
 
 
@@ -107,7 +110,7 @@ def fractions_at(table: Floats, cos_d: Floats, absorption: Floats) -> Floats:
     Args:
         cos_d: (...). absorption: (..., 3).
     """
-    return bilinear(table, cos_d[..., None], absorption_place(absorption))
+    return bilinear(table, cos_d[..., None], table_coordinate(absorption))
 
 
 def mean_forward(table: Floats, shading: ShadingSettings) -> Floats:
@@ -127,12 +130,14 @@ def mean_forward(table: Floats, shading: ShadingSettings) -> Floats:
         noises = np.full(count, 0.5), np.full(count, grey_noise)
         absorption = strand_absorption(shading, along, *noises)
         # light that goes on leaves at the inclination at which it came
-        sent = fractions_at(table, np.cos(theta)[:, None], absorption).sum(axis=-1).mean(axis=1)
-        found += fraction * np.average(sent, axis=0, weights=np.cos(theta) ** 2)
+        forwarded = (
+            fractions_at(table, np.cos(theta)[:, None], absorption).sum(axis=-1).mean(axis=1)
+        )
+        found += fraction * np.average(forwarded, axis=0, weights=np.cos(theta) ** 2)
     return np.minimum(found, _MAX)
 
 
-def passed(tau: Floats, a_forward: Floats) -> tuple[Floats, Floats]:
+def straight_and_scattered(tau: Floats, a_forward: Floats) -> tuple[Floats, Floats]:
     """Light that passes tau strands on average: straight, and sent on by one of them or more.
 
     Poisson: the chance to meet none is exp(-tau), the mean of a_f^n is exp(-tau (1 - a_f)).
@@ -141,27 +146,28 @@ def passed(tau: Floats, a_forward: Floats) -> tuple[Floats, Floats]:
     return straight, np.exp(-tau * (1.0 - a_forward)) - straight
 
 
-def returned(a_forward: Floats, a_backward: Floats, count: Floats | float = np.inf) -> Floats:
+def backscattered(a_forward: Floats, a_backward: Floats, count: Floats | float = np.inf) -> Floats:
     """The fraction of light that `count` strands, one behind the other, return.
 
     Endlessly deep hair returns R, with one more layer on top too: R = a_b + a_f^2 R / (1 - a_b R),
     for any number of turns between the two. From one layer to the next the light keeps
     g = a_f / (1 - a_b R), so that a stack of n returns R (1 - g^2n) / (1 - R^2 g^2n) (Stokes 1862).
     """
-    a_forward = np.clip(a_forward, 0.0, np.maximum(_MAX_KEPT - a_backward, 0.0))
+    a_forward = np.clip(a_forward, 0.0, np.maximum(_MAX_SCATTERED - a_backward, 0.0))
     middle = 1.0 + a_backward**2 - a_forward**2
     root = np.sqrt(np.maximum(middle**2 - 4.0 * a_backward**2, 0.0))
     # the smaller root, without a difference of near equals
     deep = 2.0 * a_backward / np.maximum(middle + root, _SMALLEST)
-    kept = a_forward / np.maximum(1.0 - a_backward * deep, _SMALLEST)
-    lost = np.clip(kept, _SMALLEST, 1.0) ** (2.0 * count)
-    return deep * (1.0 - lost) / np.maximum(1.0 - deep**2 * lost, _SMALLEST)
+    layer_transmittance = a_forward / np.maximum(1.0 - a_backward * deep, _SMALLEST)
+    stack_factor = np.clip(layer_transmittance, _SMALLEST, 1.0) ** (2.0 * count)
+    return deep * (1.0 - stack_factor) / np.maximum(1.0 - deep**2 * stack_factor, _SMALLEST)
 
 
-def returned_shape(
+def backscatter_shape(
     forward: Floats, backward: Floats, fibre: Fibre
 ) -> tuple[Floats, Floats, Floats]:
-    """Width and shift in theta_h of returned light, and the width that one passage on adds.
+    """Width and shift in theta_h of backscattered light, and the width that one passage forward
+    adds.
 
     Args:
         forward, backward: by lobe, (..., 4).
@@ -172,11 +178,11 @@ def returned_shape(
     shifts = np.array(fibre.lobe_shifts)
     a_f = np.minimum(forward.sum(axis=-1), _MAX)
     a_b = backward.sum(axis=-1)
-    on, back = np.maximum(a_f, _SMALLEST), np.maximum(a_b, _SMALLEST)
-    wide_f = np.sqrt((forward * widths**2).sum(axis=-1) / on)
-    wide_b = np.sqrt((backward * widths**2).sum(axis=-1) / back)
-    shift_f = (forward * shifts).sum(axis=-1) / on
-    shift_b = (backward * shifts).sum(axis=-1) / back
+    forward_sum, backward_sum = np.maximum(a_f, _SMALLEST), np.maximum(a_b, _SMALLEST)
+    wide_f = np.sqrt((forward * widths**2).sum(axis=-1) / forward_sum)
+    wide_b = np.sqrt((backward * widths**2).sum(axis=-1) / backward_sum)
+    shift_f = (forward * shifts).sum(axis=-1) / forward_sum
+    shift_b = (backward * shifts).sum(axis=-1) / backward_sum
     rest = 1.0 - a_f**2
     shift = shift_b * (1.0 - 2.0 * a_b**2 / rest**2) + shift_f * (
         (2.0 * rest**2 + 4.0 * a_f**2 * a_b**2) / rest**3
@@ -234,12 +240,12 @@ def dual_scattering(
     theta_h, theta_d = 0.5 * (theta_i + theta_r), 0.5 * (theta_r - theta_i)
     squared = np.maximum(np.cos(theta_d), MIN_COSINE)[..., None] ** 2
     a_f, a_b = forward.sum(axis=-1), backward.sum(axis=-1)
-    straight, scattered = passed(tau[..., None], a_f)
+    straight, scattered = straight_and_scattered(tau[..., None], a_f)
     # widths are the same for all colours: those of green
-    width, shift, wide_f = returned_shape(forward[..., 1, :], backward[..., 1, :], fibre)
+    width, shift, wide_f = backscatter_shape(forward[..., 1, :], backward[..., 1, :], fibre)
     added = np.maximum(tau, 1.0) * wide_f**2
     # what the strand itself sends back is in `single`
-    stack = returned(a_f, a_b, 1.0 + beyond[..., None]) - returned(a_f, a_b, 1.0)
+    stack = backscattered(a_f, a_b, 1.0 + beyond[..., None]) - backscattered(a_f, a_b, 1.0)
     back = np.maximum(stack, 0.0) / (np.pi * squared)
     back_straight = back * half_gaussian(theta_h, shift, width**2)[..., None]
     back_scattered = back * half_gaussian(theta_h, shift, width**2 + added)[..., None]
@@ -247,13 +253,13 @@ def dual_scattering(
     widths = np.array(fibre.lobe_widths)
     shifts = np.array(fibre.lobe_shifts)
     along = half_gaussian(theta_h[..., None], shifts, widths**2 + added[..., None])
-    on = np.sum(along[..., None, :] * around, axis=-1) / squared
+    forward_part = np.sum(along[..., None, :] * around, axis=-1) / squared
     return straight * (single + density * back_straight) + scattered * density * (
-        on + density * back_scattered
+        forward_part + density * back_scattered
     )
 
 
-def off_the_skin(
+def reflected_by_skin(
     phi: Floats,
     forward: Floats,
     backward: Floats,
@@ -281,14 +287,14 @@ def off_the_skin(
     a_f, a_b = forward.sum(axis=-1), backward.sum(axis=-1)
     behind = np.asarray(beyond)[..., None]
     strands = np.asarray(tau)[..., None] + behind * (1.0 + _DIFFUSIVITY * facing)
-    kept = np.maximum(1.0 - skin * returned(a_f, a_b, behind), 1.0 - _MAX)
-    lit = skin * facing / (np.pi * kept)
+    lost = np.maximum(1.0 - skin * backscattered(a_f, a_b, behind), 1.0 - _MAX)
+    lit = skin * facing / (np.pi * lost)
     cosine = np.cos(phi)[..., None]
     onward = 0.5 * (a_f * (1.0 + cosine) + a_b * (1.0 - cosine))
     return lit * np.exp(-strands * (1.0 - a_f)) * onward
 
 
-def off_far_skin(
+def reflected_by_far_skin(
     outward: Floats,
     forward: Floats,
     backward: Floats,
@@ -299,7 +305,7 @@ def off_far_skin(
     """Light off skin farther away that a strand sends to the eye, (..., 3): times irradiance, it is
     radiance.
 
-    As `off_the_skin`, from the part of half of all directions that is skin. On the way strands
+    As `reflected_by_skin`, from the part of half of all directions that is skin. On the way strands
     scatter light back and forth, so that each attenuates it by sqrt((1 - a_f)^2 - a_b^2) (Kubelka
     and Munk 1931).
 
@@ -330,7 +336,7 @@ def scattering_light(
     skin: Floats,
     level: Floats | float = 0.0,
     tau: Floats | float = -1.0,
-    beyond: Floats | float = UNKNOWN_BEYOND,
+    beyond: Floats | float = DEFAULT_TAU_BEYOND,
     seen: SkinSeen | None = None,
 ) -> Floats:
     """Light of one lamp that a strand among others sends to the eye, (..., 3).
@@ -347,7 +353,7 @@ def scattering_light(
     single = single_scattering(tables, angles, sparkle_noise, absorption, shading, level)
     theta_i, theta_r, phi = angles
     cos_d = np.cos(0.5 * (theta_r - theta_i))
-    straight = straight_light(normal, to_light, tau, shading)
+    straight = unscattered_fraction(normal, to_light, tau, shading)
     passed_by = np.where(
         np.asarray(tau) < 0.0, -np.log(np.maximum(straight, _MIN_LIGHT)), np.asarray(tau)
     )
@@ -370,6 +376,6 @@ def scattering_light(
     outward = np.sum(normal * to_eye, axis=-1)
     return (
         scattered * np.cos(theta_i)[..., None]
-        + off_the_skin(phi, forward, backward, passed_by, np.asarray(beyond), facing, skin)
-        + off_far_skin(outward, forward, backward, to_light, seen, skin)
+        + reflected_by_skin(phi, forward, backward, passed_by, np.asarray(beyond), facing, skin)
+        + reflected_by_far_skin(outward, forward, backward, to_light, seen, skin)
     )

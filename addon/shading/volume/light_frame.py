@@ -26,13 +26,13 @@ from ..lights import Light
 #: the sphere is a little larger than the hair, so that nothing lies on a map's edge
 _ROOM = 1.02
 #: a tangent that is shorter in a map than this, in fractions of its side, points along the light
-SEEN_FROM_ITS_END = 1e-20
+MIN_PROJECTED_LENGTH = 1e-20
 #: [m] minimum radius of the sphere, for hair without extent
 MIN_RADIUS = 1e-9
 #: maximum half angle of a map [rad]: beyond it, few texels would hold most of the picture
-WIDEST = float(np.radians(75.0))
+MAX_HALF_ANGLE = float(np.radians(75.0))
 #: a point light nearer to the middle of the hair than this, in radii, has hair all around it
-_AMIDST = 0.25
+_MAX_CENTER_DISTANCE = 0.25
 #: a light within the sphere with less of it ahead than this, in radii, shines away from it
 _MIN_AHEAD = 0.05
 #: Factor between sizes of the sphere, and steps of its centre as a fraction of its radius. Ten is a
@@ -107,7 +107,7 @@ class LightFrame:
         projected = np.einsum("...ij,...j->...i", turn, along)
         length = np.linalg.norm(projected, axis=-1, keepdims=True)
         # a strand along the ray is equally wide in all directions of the map
-        is_seen = length > SEEN_FROM_ITS_END
+        is_seen = length > MIN_PROJECTED_LENGTH
         unit = np.where(is_seen, projected, [1.0, 0.0]) / np.where(is_seen, length, 1.0)
         across = np.stack([-unit[..., 1], unit[..., 0]], axis=-1)
         return projected, np.linalg.norm(np.einsum("...i,...ij->...j", across, turn), axis=-1)
@@ -117,10 +117,10 @@ def ball_around(points: Floats) -> Ball:
     """A sphere around points (..., 3) [m], in steps that hide small motion."""
     flat = points.reshape(-1, 3)
     middle = 0.5 * (flat.min(axis=0).astype(np.float64) + flat.max(axis=0))
-    return stepped_ball(middle, float(np.sqrt(np.max(np.sum((flat - middle) ** 2, axis=1)))))
+    return quantized_ball(middle, float(np.sqrt(np.max(np.sum((flat - middle) ** 2, axis=1)))))
 
 
-def reach_of(points: Floats, offsets: Ints) -> float:
+def max_reach(points: Floats, offsets: Ints) -> float:
     """Maximum distance of hair from the middle of all roots, as long as it keeps its length, [m].
 
     Args:
@@ -131,7 +131,7 @@ def reach_of(points: Floats, offsets: Ints) -> float:
     return float(np.max(away + strand_lengths(points, offsets)))
 
 
-def stepped_ball(center: Floats, radius: float) -> Ball:
+def quantized_ball(center: Floats, radius: float) -> Ball:
     """A sphere that holds this one; its centre and size move in steps."""
     radius = max(radius, MIN_RADIUS) * _ROOM
     # larger, to hold all though rounding moves the centre by up to half a step along each axis
@@ -144,33 +144,33 @@ def stepped_ball(center: Floats, radius: float) -> Ball:
 def light_frame(light: Light, ball: Ball) -> LightFrame | None:
     """The frame of a light's map; None where a light within the ball can have none."""
     if light.kind == "sun":
-        return frame_of_sun(np.asarray(light.vector, np.float64), ball)
+        return sun_frame(np.asarray(light.vector, np.float64), ball)
     eye = np.asarray(light.vector, np.float64)
     away = eye - ball.center
     distance = float(np.linalg.norm(away))
-    if not is_within(light, ball):
+    if not is_too_near(light, ball):
         # the cone that touches the ball
         tangent = ball.radius / np.sqrt(distance**2 - ball.radius**2)
         ends = distance - ball.radius, distance + ball.radius
-        return frame_at(away / distance, eye, float(tangent), ends)
+        return perspective_frame(away / distance, eye, float(tangent), ends)
     axis = shines_along(light)
     if axis is None:
-        if distance < _AMIDST * ball.radius:
+        if distance < _MAX_CENTER_DISTANCE * ball.radius:
             return None
         axis = -away / distance
     ahead = float(-away @ axis)
     if ahead + ball.radius < _MIN_AHEAD * ball.radius:
         return None
     near = max(ahead - ball.radius, 0.0)
-    return frame_at(-axis, eye, float(np.tan(WIDEST)), (near, ahead + ball.radius))
+    return perspective_frame(-axis, eye, float(np.tan(MAX_HALF_ANGLE)), (near, ahead + ball.radius))
 
 
-def is_within(light: Light, ball: Ball) -> bool:
+def is_too_near(light: Light, ball: Ball) -> bool:
     """Whether a light sees the ball under a wider angle than a map can have."""
     if light.kind == "sun":
         return False
     distance = float(np.linalg.norm(np.asarray(light.vector, np.float64) - ball.center))
-    return distance * np.sin(WIDEST) <= ball.radius
+    return distance * np.sin(MAX_HALF_ANGLE) <= ball.radius
 
 
 def shines_along(light: Light) -> Floats | None:
@@ -185,7 +185,7 @@ def shines_along(light: Light) -> Floats | None:
     return along if along.any() else None
 
 
-def frame_of_sun(towards: Floats, ball: Ball) -> LightFrame:
+def sun_frame(towards: Floats, ball: Ball) -> LightFrame:
     """The frame of a sun, towards which `towards` (3,) points."""
     right, up, towards = _axes(towards)
     to_map = np.eye(4)
@@ -196,7 +196,9 @@ def frame_of_sun(towards: Floats, ball: Ball) -> LightFrame:
     return LightFrame(to_map, to_map[2].copy(), 2.0 * ball.radius)
 
 
-def frame_at(towards: Floats, eye: Floats, tangent: float, ends: tuple[float, float]) -> LightFrame:
+def perspective_frame(
+    towards: Floats, eye: Floats, tangent: float, ends: tuple[float, float]
+) -> LightFrame:
     """The frame of a light at the place `eye` that looks against `towards`, each (3,).
 
     Args:

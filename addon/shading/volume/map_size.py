@@ -66,7 +66,7 @@ class MapSize:
         return int(self.side**2 * (arrays + spans) + self.mesh_side**2 * meshes)
 
 
-def asked_size(settings: VolumeSettings, map_count: int) -> MapSize:
+def requested_size(settings: VolumeSettings, map_count: int) -> MapSize:
     """The size that the settings ask for."""
     layers = len(layer_ends(settings))
     slots = min(-(-layers // 4), MAX_SLOTS)
@@ -76,26 +76,26 @@ def asked_size(settings: VolumeSettings, map_count: int) -> MapSize:
 
 
 def fitted_size(
-    settings: VolumeSettings, map_count: int, room: int, largest_side: int = _LARGEST_SIDE
+    settings: VolumeSettings, map_count: int, max_bytes: int, largest_side: int = _LARGEST_SIDE
 ) -> MapSize:
     """The size that is drawn: fewer texels per side if the size that is asked for does not fit.
 
     Args:
         map_count: lights that throw shadows.
-        room: for all maps [bytes].
+        max_bytes: for all maps [bytes].
         largest_side: of a texture on this GPU.
     """
-    size = asked_size(settings, map_count)
+    size = requested_size(settings, map_count)
     per_texel = size.bytes / size.side**2
     # the texture `starts` holds the maps above one another
-    side = min(size.side, largest_side, int(np.sqrt(room / per_texel)))
+    side = min(size.side, largest_side, int(np.sqrt(max_bytes / per_texel)))
     if size.is_deep:
         side = min(side, largest_side * START_TEXELS // size.map_count)
     side = max(side // START_TEXELS, 1) * START_TEXELS
     return replace(size, side=side, mesh_side=side)
 
 
-def even_size(size: MapSize, spacing: float, radius: float) -> MapSize:
+def size_for_spacing(size: MapSize, spacing: float, radius: float) -> MapSize:
     """The size with texels coarse enough that hair looks as even as it is.
 
     Args:
@@ -109,24 +109,24 @@ def even_size(size: MapSize, spacing: float, radius: float) -> MapSize:
     return replace(size, side=min(side, size.side))
 
 
-def size_note(settings: VolumeSettings, map_count: int, room: int, drawn: MapSize) -> str:
+def size_note(settings: VolumeSettings, map_count: int, max_bytes: int, drawn: MapSize) -> str:
     """A note for the artist if maps are smaller than the settings say, else empty.
 
     Args:
-        map_count, room: as of `fitted_size`, which gave `drawn`.
+        map_count, max_bytes: as of `fitted_size`, which gave `drawn`.
     """
-    asked = asked_size(settings, map_count)
-    if drawn == asked:
+    requested = requested_size(settings, map_count)
+    if drawn == requested:
         return ""
-    megabytes = asked.bytes / 2**20, room / 2**20
-    lights = "1 light" if asked.map_count == 1 else f"{asked.map_count} lights"
-    if asked.bytes <= room:
+    megabytes = requested.bytes / 2**20, max_bytes / 2**20
+    lights = "1 light" if requested.map_count == 1 else f"{requested.map_count} lights"
+    if requested.bytes <= max_bytes:
         reason, memory = "are larger than this GPU's textures", ""
     else:
         reason = f"would take {megabytes[0]:,.0f} MB and may take {megabytes[1]:,.0f}"
         memory = ", or raise GPU Memory in the preferences"
     return (
-        f"Shadows: maps of {asked.side} x {asked.side} texels for {lights} "
+        f"Shadows: maps of {requested.side} x {requested.side} texels for {lights} "
         f"{reason}, so they have {drawn.side} x {drawn.side}. Lower Resolution, the number of "
         f"layers, or Max Lights in Shadows{memory}."
     )

@@ -20,7 +20,14 @@ import numpy as np
 from ...arrays import Floats
 from ...strands import Surface
 from ..lights import LIGHT_CAPACITY, Light
-from .light_frame import Ball, LightFrame, frame_at, frame_of_sun, shines_along, stepped_ball
+from .light_frame import (
+    Ball,
+    LightFrame,
+    perspective_frame,
+    quantized_ball,
+    shines_along,
+    sun_frame,
+)
 
 #: maximum number of frames of all lights: each light amidst meshes sees them in the sides of a cube
 MESH_FRAME_CAPACITY = 6 * LIGHT_CAPACITY
@@ -68,7 +75,7 @@ def ball_of_casters(extents: Sequence[Extent]) -> Ball | None:
         return None
     low = np.min([each.low for each in counted], axis=0)
     high = np.max([each.high for each in counted], axis=0)
-    return stepped_ball(0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low)))
+    return quantized_ball(0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low)))
 
 
 def mesh_frames(light: Light, ball: Ball) -> tuple[LightFrame, ...]:
@@ -81,7 +88,7 @@ def mesh_frames(light: Light, ball: Ball) -> tuple[LightFrame, ...]:
     if not light.casts_shadow:
         return ()
     if light.kind == "sun":
-        return (frame_of_sun(np.asarray(light.vector, np.float64), ball),)
+        return (sun_frame(np.asarray(light.vector, np.float64), ball),)
     eye = np.asarray(light.vector, np.float64)
     away = eye - ball.center
     distance = float(np.linalg.norm(away))
@@ -90,12 +97,14 @@ def mesh_frames(light: Light, ball: Ball) -> tuple[LightFrame, ...]:
     is_around = distance * np.sin(_WIDEST) <= ball.radius
     reach = np.inf if is_around else ball.radius / np.sqrt(distance**2 - ball.radius**2)
     if axis is not None and tangent < min(reach, float(np.tan(_WIDEST))):
-        return (frame_at(-axis, eye, tangent, (0.0, ends[1])),)
+        return (perspective_frame(-axis, eye, tangent, (0.0, ends[1])),)
     if not is_around:
-        return (frame_at(away / distance, eye, float(reach), ends),)
+        return (perspective_frame(away / distance, eye, float(reach), ends),)
     sides = _sides(axis)
     return tuple(
-        frame_at(-side, eye, _SIDE, (0.0, ends[1])) for side in sides if _sees(side, -away, ball)
+        perspective_frame(-side, eye, _SIDE, (0.0, ends[1]))
+        for side in sides
+        if _sees(side, -away, ball)
     )
 
 
@@ -114,7 +123,7 @@ def _is_flat(positions: Floats, size: float) -> bool:
 
 def _cone_tangent(light: Light) -> float:
     """Tangent of half the angle of a spot's cone; infinite for all else."""
-    return np.inf if light.cone is None else max(float(np.tan(light.cone.widest)), 1e-3)
+    return np.inf if light.cone is None else max(float(np.tan(light.cone.max_angle)), 1e-3)
 
 
 def _sides(axis: Floats | None) -> Iterator[Floats]:

@@ -53,7 +53,7 @@ def layer_ends(settings: VolumeSettings) -> Floats:
     return ends
 
 
-def adds_to(depth: Floats, ends: Floats) -> Bools:
+def layers_including(depth: Floats, ends: Floats) -> Bools:
     """The layers whose sums include a strand at this fraction of their depth, (..., n)."""
     return depth[..., None] <= ends
 
@@ -99,7 +99,7 @@ class LayerSpans:
     block: int
 
     @classmethod
-    def between(cls, first: Floats, last: Floats, block: int) -> LayerSpans:
+    def from_first_and_last(cls, first: Floats, last: Floats, block: int) -> LayerSpans:
         """Spans from the first hair to the last.
 
         Args:
@@ -211,7 +211,7 @@ def _corners(places: Floats, side: int) -> Iterator[tuple[Ints, Ints, Floats]]:
         yield row, column, np.abs(1 - right - fraction[:, 0]) * np.abs(1 - up - fraction[:, 1])
 
 
-def within_map(places: Floats) -> Floats:
+def mesh_shadow_weight(places: Floats) -> Floats:
     """Weight of the shadows of meshes on meshes, which reach beyond a map, (...).
 
     1 inside, 0 at the map's border, so that shadows do not end at a line.
@@ -223,7 +223,7 @@ def within_map(places: Floats) -> Floats:
     return np.clip((0.5 - away) / MAP_BORDER, 0.0, 1.0)
 
 
-def own_depth(half_width: Floats) -> Floats:
+def self_tau(half_width: Floats) -> Floats:
     """The part of the map's tau at a strand's middle line that is the strand itself, (...).
 
     A strand does not shade itself. Maps draw it at least a texel wide, and a look-up blends over a
@@ -232,12 +232,12 @@ def own_depth(half_width: Floats) -> Floats:
     Args:
         half_width: in texels.
     """
-    drawn = np.maximum(half_width, 0.5)
-    met = np.minimum(drawn, 1.0)
-    return half_width / drawn * met * (2.0 - met)
+    drawn_half_width = np.maximum(half_width, 0.5)
+    blocked = np.minimum(drawn_half_width, 1.0)
+    return half_width / drawn_half_width * blocked * (2.0 - blocked)
 
 
-def own_fraction(depth: Floats, bias: float, ends: Floats) -> Floats:
+def self_fraction(depth: Floats, bias: float, ends: Floats) -> Floats:
     """The fraction of a strand or a card that counts in tau at its own place, (...).
 
     It is in the sum of its layer, and tau grows linearly through that.
@@ -286,7 +286,9 @@ class Coverage:
         first, last = np.full((2, side**2), np.inf) * [[1.0], [-1.0]]
         np.minimum.at(first, of_piece, self.depth)
         np.maximum.at(last, of_piece, self.depth)
-        return LayerSpans.between(first.reshape(side, side), last.reshape(side, side), block)
+        return LayerSpans.from_first_and_last(
+            first.reshape(side, side), last.reshape(side, side), block
+        )
 
     def layers(self, ends: Floats, spans: LayerSpans) -> Floats:
         """The sums that a map holds, (resolution^2, layer_count)."""

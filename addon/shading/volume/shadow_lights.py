@@ -8,7 +8,15 @@ import numpy as np
 
 from ...arrays import Floats
 from ..lights import Light, light_irradiance
-from .light_frame import MIN_RADIUS, WIDEST, Ball, LightFrame, is_within, light_frame, shines_along
+from .light_frame import (
+    MAX_HALF_ANGLE,
+    MIN_RADIUS,
+    Ball,
+    LightFrame,
+    is_too_near,
+    light_frame,
+    shines_along,
+)
 from .settings import VolumeSettings
 
 #: lights without a shadow are reported if they are more than this fraction of all light
@@ -24,7 +32,7 @@ def shadow_frames(
     frames: list[LightFrame | None] = [None] * len(lights)
     if settings.shadows != "none":
         casting = [index for index, light in enumerate(lights) if light.casts_shadow]
-        for index, frame in _asked([lights[each] for each in casting], ball, settings):
+        for index, frame in _lights_with_maps([lights[each] for each in casting], ball, settings):
             frames[casting[index]] = frame
     return frames
 
@@ -40,12 +48,12 @@ def shadow_warnings(
     if settings.shadows == "none":
         return ()
     lights = [light for light in lights if light.casts_shadow]
-    asked = [index for index, _ in _asked(lights, ball, settings)]
+    with_maps = [index for index, _ in _lights_with_maps(lights, ball, settings)]
     found = list(_setting_warnings(ball, settings))
-    found += [note for index in asked for note in _light_warnings(lights[index], ball)]
+    found += [note for index in with_maps for note in _light_warnings(lights[index], ball)]
     strengths = _strengths(lights, ball)
-    left_out = 1.0 - float(strengths[asked].sum()) / max(float(strengths.sum()), 1e-30)
-    if settings.max_lights and len(lights) > len(asked) and left_out > _MUCH_LIGHT:
+    left_out = 1.0 - float(strengths[with_maps].sum()) / max(float(strengths.sum()), 1e-30)
+    if settings.max_lights and len(lights) > len(with_maps) and left_out > _MUCH_LIGHT:
         found.append(
             f"Shadows: only the {settings.max_lights} strongest of {len(lights)} lights cast "
             f"shadows of hair; {left_out:.0%} of the light comes from the others. Raise Max "
@@ -84,7 +92,7 @@ def _light_warnings(light: Light, ball: Ball) -> Iterator[str]:
             f"{name}: it shines past the hair, so it neither lights it nor casts its shadow. Turn "
             "it to the hair, or hide it."
         )
-    elif is_within(light, ball) and _is_wide(light):
+    elif is_too_near(light, ball) and _is_wide(light):
         clear = f"Move it farther than {1.05 * ball.radius:.2g} m from the middle of the hair"
         if light_frame(light, ball) is None:
             yield f"{name}: it stands inside the hair, which casts no shadow of its light. {clear}."
@@ -99,7 +107,7 @@ def _is_wide(light: Light) -> bool:
     """Whether it lights more than a map can hold."""
     if light.panel is not None:
         return False  # what lies flat beside it has hardly any light
-    return light.cone is None or light.cone.widest > WIDEST
+    return light.cone is None or light.cone.max_angle > MAX_HALF_ANGLE
 
 
 def _misses(light: Light, ball: Ball) -> bool:
@@ -112,7 +120,7 @@ def _misses(light: Light, ball: Ball) -> bool:
     if distance <= ball.radius:
         return light_frame(light, ball) is None
     angle = float(np.arccos(np.clip(along @ towards / distance, -1.0, 1.0)))
-    half = light.cone.widest if light.cone is not None else 0.5 * np.pi
+    half = light.cone.max_angle if light.cone is not None else 0.5 * np.pi
     return angle - float(np.arcsin(ball.radius / distance)) > half
 
 
@@ -121,7 +129,7 @@ def _strengths(lights: Sequence[Light], ball: Ball) -> Floats:
     return np.array([float(light_irradiance(light, ball.center).sum()) for light in lights])
 
 
-def _asked(
+def _lights_with_maps(
     lights: Sequence[Light], ball: Ball, settings: VolumeSettings
 ) -> Iterator[tuple[int, LightFrame | None]]:
     """The strongest lights, with their frames, until `max_lights` of them have a map."""

@@ -9,11 +9,12 @@ void main()
       across.w, across.xyz, texelFetch(tangents, pixel, 0).xyz, texelFetch(eyes, pixel, 0).xyz);
   vec4 steps = texelFetch(steps_of, pixel, 0);
   ivec2 size = ivec2(96, 40);
-  float own = card_optical_depth(across.w) *
+  float light_tau = card_optical_depth(across.w) *
               view_compensated_depth(
                   across.xyz, texelFetch(tangents, pixel, 0).xyz, texelFetch(eyes, pixel, 0).xyz);
-  vec2 among = own_strands(steps.x, own, steps.y, min(steps.z, 1.0));
-  among = own_strands_deeper(among, 2.0 * min(steps.w, 1.0) - 1.0, min(steps.z, 1.0));
-  among += seen_depth(steps.x) + own_tips(own, card_optical_depth(across.w), min(steps.w, 1.0));
-  imageStore(result, pixel, vec4(even, wanted_level(steps.xy, steps.zw, size), among));
+  vec2 tau_within = tau_within_card(steps.x, light_tau, steps.y, min(steps.z, 1.0));
+  tau_within = tau_within_card_at_depth(tau_within, 2.0 * min(steps.w, 1.0) - 1.0, min(steps.z, 1.0));
+  tau_within += visible_depth(steps.x) +
+           tau_within_short_hair(light_tau, card_optical_depth(across.w), min(steps.w, 1.0));
+  imageStore(result, pixel, vec4(even, wanted_level(steps.xy, steps.zw, size), tau_within));
 }

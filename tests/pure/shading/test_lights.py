@@ -12,7 +12,7 @@ from hairloom.addon.shading.lights import (
     LIGHT_CAPACITY,
     Cone,
     Light,
-    brightest,
+    brightest_lights,
     light_at,
     light_irradiance,
     pack_lights,
@@ -163,7 +163,9 @@ def test_the_brightest_lights_come_first_and_the_weakest_are_left_out() -> None:
     away."""
     lamps = [Light.point((5.0 + n, 0.0, 0.0), WHITE, 100.0) for n in range(9)]
     sun = Light.sun((0.0, 0.0, -1.0), WHITE, 3.0)
-    block = pack_lights(brightest((*lamps, sun), np.zeros(3)), (0.0, 0.0, 0.0)).reshape(-1, 4)
+    block = pack_lights(brightest_lights((*lamps, sun), np.zeros(3)), (0.0, 0.0, 0.0)).reshape(
+        -1, 4
+    )
     assert block[0, 3] == LIGHT_CAPACITY
     places = block[1 : 1 + LIGHT_CAPACITY]
     assert places[0].tolist() == [0.0, 0.0, 1.0, 0.0]

@@ -21,8 +21,8 @@ from hairloom.addon.shading.marschner.fibre import Fibre
 from hairloom.addon.shading.marschner.interface import (
     bravais_index,
     fresnel,
+    higher_lobes_energy,
     lobe_energy,
-    rest_energy,
 )
 from hairloom.addon.shading.marschner.scattering import azimuthal_lobes
 
@@ -55,7 +55,7 @@ def test_energies_agree_with_the_rays(theta: float) -> None:
     for order in range(5):
         energy = lobe_energy(order, cos_d, 1.55, ABSORPTION)
         assert energy == pytest.approx(traced[order], rel=2e-3, abs=2e-5)
-    rest = rest_energy(cos_d, 1.55, ABSORPTION)
+    rest = higher_lobes_energy(cos_d, 1.55, ABSORPTION)
     assert rest == pytest.approx(traced[3:].sum(axis=0), rel=2e-3, abs=2e-5)
 
 

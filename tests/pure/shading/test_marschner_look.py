@@ -10,7 +10,7 @@ import pytest
 from hairloom.addon.arrays import Floats
 from hairloom.addon.shading.marschner.fibre import Fibre
 from hairloom.addon.shading.marschner.look import (
-    GREY_LEFT,
+    GREY_ABSORPTION,
     fibre_of,
     marschner_light,
     pack_fibre,
@@ -93,7 +93,7 @@ def test_strands_differ_in_pigment_and_the_grey_ones_have_hardly_any() -> None:
     root = np.array(fibre_of(settings).absorption)
     assert found[[0, 5, 10]] == pytest.approx(np.outer([1.5, 1.0, 0.5], root))
     grey = strand_absorption(settings, np.zeros(11), np.full(11, 0.5), noise)
-    neutral = np.full(3, GREY_LEFT * root.mean())
+    neutral = np.full(3, GREY_ABSORPTION * root.mean())
     assert grey == pytest.approx(np.where((noise < 0.25)[:, None], neutral, root))
     assert strand_color(grey[0]).min() > 0.4
     none, everyone = replace(settings, grey_fraction=0.0), replace(settings, grey_fraction=1.0)
@@ -159,7 +159,7 @@ def test_the_packed_fibre_is_what_the_struct_says() -> None:
     assert packed[:3] == pytest.approx(fibre_of(settings).absorption)
     assert np.exp(-np.sqrt(packed[:3]) * packed[3]) == pytest.approx(settings.base_color, rel=1e-5)
     assert packed[4:7] == pytest.approx(color_absorption(np.array(settings.tip_color)))
-    assert packed[7] == pytest.approx(GREY_LEFT)
+    assert packed[7] == pytest.approx(GREY_ABSORPTION)
     assert packed[8:12] == pytest.approx([1.0, 0.5, 1.0, 2.0])
     assert packed[12:16] == pytest.approx(fibre_of(settings).lobe_widths)
     assert packed[16:] == pytest.approx(fibre_of(settings).lobe_shifts)

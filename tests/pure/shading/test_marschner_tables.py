@@ -23,7 +23,7 @@ from hairloom.addon.shading.marschner.tables import (
     LEVELS,
     azimuthal_tables,
     bilinear,
-    kept_light,
+    lobe_transmittance,
     longitudinal_table,
     look_up,
     marschner_tables,
@@ -64,7 +64,7 @@ def test_lobes_from_the_tables_are_within_half_a_percent_of_their_clear_peak(sha
     for absorption in ((0.0, 0.05, 0.1), (0.2, 0.3, 0.5), (0.75, 1.0, 1.5), (2.0, 3.0, 4.0)):
         fibre = replace(shape, absorption=absorption)
         expected = azimuthal_lobes(cos_d, np.pi * turn, fibre)
-        kept = kept_light(bilinear(tables.paths, cos_d, turn), np.array(absorption))
+        kept = lobe_transmittance(bilinear(tables.paths, cos_d, turn), np.array(absorption))
         found = bilinear(tables.azimuthal, cos_d, turn)[..., None] * kept
         error = np.abs(found - expected)
         assert (error[:, :3].max(axis=(0, 2)) < 0.005 * peaks[:3]).all()

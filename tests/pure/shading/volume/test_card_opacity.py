@@ -14,17 +14,17 @@ from hairloom.addon.shading.volume.card_opacity import (
     card_shadow_area,
     layer_facing,
     lit_level,
-    own_strands,
-    own_strands_deeper,
-    own_tips,
-    seen_depth,
+    tau_within_card,
+    tau_within_card_at_depth,
+    tau_within_short_hair,
     view_compensated_depth,
+    visible_depth,
 )
 from hairloom.addon.shading.volume.opacity import (
-    adds_to,
     layer_ends,
     layer_weights,
-    own_fraction,
+    layers_including,
+    self_fraction,
 )
 from hairloom.addon.shading.volume.settings import VolumeSettings
 from hairloom.addon.strands import StrandSet
@@ -47,9 +47,9 @@ def test_depth_of_a_card_is_that_of_strands_at_random() -> None:
 def test_own_share_is_what_a_look_up_finds_of_a_single_card(shadows: str, bias: float) -> None:
     ends = layer_ends(VolumeSettings(shadows=shadows))
     for depth in np.random.default_rng(2).uniform(0.0, 1.0, 200):
-        sums = 0.7 * adds_to(np.array(depth), ends)
+        sums = 0.7 * layers_including(np.array(depth), ends)
         found = sums @ layer_weights(np.array(depth - bias), ends)
-        assert 0.7 * own_fraction(np.array(depth), bias, ends) == pytest.approx(found, abs=1e-9)
+        assert 0.7 * self_fraction(np.array(depth), bias, ends) == pytest.approx(found, abs=1e-9)
 
 
 def directions(count: int = 4000) -> np.ndarray:
@@ -147,12 +147,12 @@ def test_light_that_comes_to_the_strand_of_a_card_that_is_seen(
     count = random.poisson(seen, 2_000_000)
     first = 1.0 - random.random(len(count)) ** (1.0 / np.maximum(count, 1))
     first = first[count > 0]
-    assert seen_depth(seen) == pytest.approx(first.mean(), abs=2e-3)
+    assert visible_depth(seen) == pytest.approx(first.mean(), abs=2e-3)
     front, behind = (
         np.exp(-lit * np.maximum(each - near, 0.0)).mean() for each in (first, 1.0 - first)
     )
     for side, light in ((1.0, front), (0.0, behind), (0.5, 0.5 * (front + behind))):
-        assert np.exp(-own_strands(seen, lit, near, side)[0]) == pytest.approx(light, abs=2e-3)
+        assert np.exp(-tau_within_card(seen, lit, near, side)[0]) == pytest.approx(light, abs=2e-3)
 
 
 @pytest.mark.parametrize("lit", [0.3, 1.5])
@@ -164,19 +164,19 @@ def test_light_that_comes_to_a_strand_of_a_known_depth(lit: float) -> None:
     place = 1.0 - random.random(len(count)) ** (1.0 / np.maximum(count, 1))
     place = place[count > 0]
     deeper = place - place.mean()
-    mean = own_strands(seen, lit, 0.0, 1.0)
-    before, beyond = own_strands_deeper(mean, deeper, 1.0)
+    mean = tau_within_card(seen, lit, 0.0, 1.0)
+    before, beyond = tau_within_card_at_depth(mean, deeper, 1.0)
     assert before + beyond == pytest.approx(lit) and before.min() >= 0.0 <= beyond.min()
     assert np.abs(np.exp(-before) - np.exp(-lit * place)).max() < 0.1 * lit
     assert np.exp(-before).mean() == pytest.approx(np.exp(-mean[0]), rel=0.1)
-    behind, _ = own_strands_deeper(own_strands(seen, lit, 0.0, 0.0), deeper, 0.0)
+    behind, _ = tau_within_card_at_depth(tau_within_card(seen, lit, 0.0, 0.0), deeper, 0.0)
     assert np.abs(np.exp(-behind) - np.exp(-lit * (1.0 - place))).max() < 0.1 * lit
 
 
 def test_counts_that_are_out_of_the_ordinary() -> None:
     """No strands, equal counts for eye and light, and counts beyond float resolution."""
     counts = np.array([0.0, 2.0, 1e9])
-    before, beyond = own_strands(counts, counts, 0.0, 1.0)
+    before, beyond = tau_within_card(counts, counts, 0.0, 1.0)
     expected = np.array([0.0, -np.log(0.5 * (1.0 + np.exp(-2.0))), np.log(2.0)])
     assert before == pytest.approx(expected, abs=2e-3)
     assert before + beyond == pytest.approx(counts)
@@ -189,6 +189,6 @@ def test_the_tips_beside_one_that_is_seen(tau: float) -> None:
     count = np.random.default_rng(0).poisson(tau, 400_000)
     others = 0.8 * (count[count > 0] - 1.0).mean()
     for front in (1.0, 0.0, 0.5):
-        found = own_tips(0.8 * tau, tau, front)
+        found = tau_within_short_hair(0.8 * tau, tau, front)
         assert found == pytest.approx((others * (1.0 - front), others * front), abs=0.01)
-    assert own_tips(0.0, 0.0, 0.5) == (0.0, 0.0)
+    assert tau_within_short_hair(0.0, 0.0, 0.5) == (0.0, 0.0)

@@ -15,18 +15,18 @@ from hairloom.addon.shading.settings import ShadingSettings
 from hairloom.addon.shading.volume.dual import (
     FRACTIONS_SIZE,
     Fractions,
-    absorption_place,
+    absorption_at_coordinate,
+    backscatter_shape,
+    backscattered,
     dual_scattering,
     fractions,
     fractions_at,
     half_gaussian,
     mean_forward,
-    off_the_skin,
-    passed,
-    place_absorption,
-    returned,
-    returned_shape,
+    reflected_by_skin,
     spread_around,
+    straight_and_scattered,
+    table_coordinate,
 )
 
 FIBRE = Fibre()
@@ -39,7 +39,7 @@ def table() -> Fractions:
 
 def at(table: Fractions, absorption: float, cos_d: float) -> tuple[np.ndarray, np.ndarray]:
     """Forward and backward fractions of the nearest texel, by lobe."""
-    row = round(float(absorption_place(np.array(absorption))) * (FRACTIONS_SIZE - 1))
+    row = round(float(table_coordinate(np.array(absorption))) * (FRACTIONS_SIZE - 1))
     column = round(cos_d * (FRACTIONS_SIZE - 1))
     return table.forward[row, column], table.backward[row, column]
 
@@ -48,7 +48,7 @@ def test_passing_is_the_mean_over_strands_met_at_random() -> None:
     random = np.random.default_rng(1)
     for tau, a_f in ((0.3, 0.8), (2.0, 0.5), (5.0, 0.95)):
         met = random.poisson(tau, 400_000)
-        straight, on = passed(np.array(tau), np.array(a_f))
+        straight, on = straight_and_scattered(np.array(tau), np.array(a_f))
         assert straight == pytest.approx((met == 0).mean(), abs=3e-3)
         assert on == pytest.approx(np.where(met > 0, a_f**met, 0.0).mean(), abs=3e-3)
 
@@ -59,7 +59,7 @@ def test_what_returns_is_that_of_a_deep_stack(a_f: float, a_b: float) -> None:
     back = 0.0
     for _ in range(4000):
         back = a_b + a_f**2 * back / (1.0 - a_b * back)
-    assert returned(np.array(a_f), np.array(a_b)) == pytest.approx(back, rel=1e-6)
+    assert backscattered(np.array(a_f), np.array(a_b)) == pytest.approx(back, rel=1e-6)
 
 
 @pytest.mark.parametrize(("a_f", "a_b"), [(0.8, 0.15), (0.3, 0.3), (0.79, 0.209)])
@@ -69,15 +69,15 @@ def test_what_a_few_strands_return_is_that_of_as_many_layers(a_f: float, a_b: fl
         # one more layer in front of the stack
         between = 1.0 / (1.0 - a_b * back)
         back, on = a_b + a_f**2 * back * between, a_f * on * between
-        found = returned(np.array(a_f), np.array(a_b), count)
+        found = backscattered(np.array(a_f), np.array(a_b), count)
         assert found == pytest.approx(back, rel=1e-6)
 
 
 def test_white_hair_gives_all_light_back_and_no_hair_more() -> None:
     a_f = np.linspace(0.0, 1.0, 41)
-    assert (returned(a_f, 1.0 - a_f) <= 1.0 + 1e-9).all()
-    assert returned(np.array(0.8), np.array(0.2)) > 0.95
-    assert returned(np.array(0.8), np.array(0.19)) < 1.0
+    assert (backscattered(a_f, 1.0 - a_f) <= 1.0 + 1e-9).all()
+    assert backscattered(np.array(0.8), np.array(0.2)) > 0.95
+    assert backscattered(np.array(0.8), np.array(0.19)) < 1.0
 
 
 def test_shares_are_those_of_the_lobes(table: Fractions) -> None:
@@ -117,8 +117,8 @@ def test_more_pigment_sends_less_on_and_back(table: Fractions) -> None:
 
 def test_the_axis_of_absorption_turns_round() -> None:
     values = np.array([0.0, 0.01, 0.5, 3.0, 100.0])
-    assert np.allclose(place_absorption(absorption_place(values)), values)
-    assert np.isfinite(place_absorption(1.0))
+    assert np.allclose(absorption_at_coordinate(table_coordinate(values)), values)
+    assert np.isfinite(absorption_at_coordinate(1.0))
 
 
 def test_spreading_keeps_the_energy() -> None:
@@ -161,7 +161,7 @@ def skin_light(a_f: float, a_b: float, skin: float, **more: float) -> float:
     values = {"phi": 0.0, "tau": 0.0, "beyond": 0.0, "facing": 1.0} | more
     lobes = [np.tile([0.0, share, 0.0, 0.0], (3, 1)) for share in (a_f, a_b)]
     phi, tau, beyond, facing = (np.array(values[name]) for name in values)
-    return float(off_the_skin(phi, *lobes, tau, beyond, facing, np.full(3, skin))[1])
+    return float(reflected_by_skin(phi, *lobes, tau, beyond, facing, np.full(3, skin))[1])
 
 
 def test_skin_behind_a_strand_that_hides_nothing_is_lambert() -> None:
@@ -204,5 +204,5 @@ def test_no_end_of_a_range_gives_anything_but_numbers(
         white = skin_light(1.0 - density, density, skin, tau=tau, beyond=tau)
         assert np.isfinite(white) and white >= 0.0
     forward, backward = at(table, absorption, 0.0)
-    for shape in returned_shape(forward, backward, FIBRE):
+    for shape in backscatter_shape(forward, backward, FIBRE):
         assert np.isfinite(shape).all()

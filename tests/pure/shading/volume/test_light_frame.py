@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hairloom.addon.shading.lights import Cone, Light
-from hairloom.addon.shading.volume.light_frame import WIDEST, Ball, ball_around, light_frame
+from hairloom.addon.shading.volume.light_frame import MAX_HALF_ANGLE, Ball, ball_around, light_frame
 
 LIGHTS = {
     "sun": Light.sun((0.3, -1.0, -0.5), (1, 1, 1), 3.0),
@@ -95,7 +95,7 @@ def test_a_map_of_a_light_within_the_ball_opens_the_way_it_shines(
         ahead = (points - place) @ axis / np.linalg.norm(points - place, axis=1)
         found, depth = frame.places(points)
         is_in = (np.abs(found - 0.5) <= 0.5).all(axis=1)
-        assert is_in[ahead > np.cos(WIDEST)].all()
+        assert is_in[ahead > np.cos(MAX_HALF_ANGLE)].all()
         assert not is_in[ahead < 0.0].any()
         assert (depth[is_in] >= 0.0).all() and (depth[is_in] <= 1.0).all()
 
@@ -108,7 +108,7 @@ def test_a_spot_at_the_rim_that_shines_away_has_no_map() -> None:
 
 def test_a_light_that_nears_the_ball_changes_its_map_without_a_jump() -> None:
     """Where the cone around the ball would get too wide, the widest cone replaces it."""
-    rim = BALL.radius / np.sin(WIDEST)
+    rim = BALL.radius / np.sin(MAX_HALF_ANGLE)
     frames = [
         light_frame(Light.point(BALL.center + [0.0, 0.0, rim + step], (1, 1, 1), 3.0), BALL)
         for step in (-1e-7, 1e-7)

@@ -6,9 +6,9 @@ import pytest
 
 from hairloom.addon.shading.volume.map_size import (
     START_TEXELS,
-    asked_size,
-    even_size,
     fitted_size,
+    requested_size,
+    size_for_spacing,
     size_note,
 )
 from hairloom.addon.shading.volume.settings import VolumeSettings
@@ -19,8 +19,8 @@ ROOM = 512 * 2**20
 def test_what_fits_is_drawn_as_asked() -> None:
     for shadows in ("slices", "deep"):
         settings = VolumeSettings(shadows=shadows)
-        assert fitted_size(settings, 2, ROOM) == asked_size(settings, 2)
-        assert asked_size(settings, 2).side == 512
+        assert fitted_size(settings, 2, ROOM) == requested_size(settings, 2)
+        assert requested_size(settings, 2).side == 512
         assert size_note(settings, 2, ROOM, fitted_size(settings, 2, ROOM)) == ""
 
 
@@ -29,7 +29,7 @@ def test_what_fits_is_drawn_as_asked() -> None:
 def test_too_large_maps_get_fewer_texels_and_a_note(shadows: str, map_count: int) -> None:
     """The most that fit, with all lights and layers."""
     settings = VolumeSettings(shadows=shadows, slices=64, layers=64, resolution=2048)
-    asked, drawn = asked_size(settings, map_count), fitted_size(settings, map_count, ROOM)
+    asked, drawn = requested_size(settings, map_count), fitted_size(settings, map_count, ROOM)
     assert asked.bytes > ROOM >= drawn.bytes
     assert (drawn.slots, drawn.passes, drawn.map_count) == (6, 3, map_count)
     assert drawn.side % START_TEXELS == 0
@@ -51,16 +51,16 @@ def test_a_small_gpu_sets_the_side() -> None:
 
 
 def test_bytes_are_those_of_the_textures() -> None:
-    size = asked_size(VolumeSettings(shadows="deep", layers=8, resolution=512), 2)
+    size = requested_size(VolumeSettings(shadows="deep", layers=8, resolution=512), 2)
     starts, spans = 256 * 256 * 4, 256 * 256 * 16
     assert size.bytes == 512**2 * 2 * (2 * 16 + 4) + starts + spans
 
 
 def test_strands_that_stand_for_many_get_texels_of_half_their_spacing() -> None:
-    full = asked_size(VolumeSettings(), 1)
-    assert even_size(full, 0.0, 0.3) == full  # each strand represents only itself
-    assert even_size(full, 0.6 / 1024, 0.3) == full
-    sparse = even_size(full, 0.6 / 100, 0.3)
+    full = requested_size(VolumeSettings(), 1)
+    assert size_for_spacing(full, 0.0, 0.3) == full  # each strand represents only itself
+    assert size_for_spacing(full, 0.6 / 1024, 0.3) == full
+    sparse = size_for_spacing(full, 0.6 / 100, 0.3)
     assert (sparse.side, sparse.mesh_side) == (200, 512)
-    assert even_size(full, 0.6 / 100 * 1e3, 0.3 * 1e3) == sparse
-    assert even_size(full, 1e3, 0.3).side == 16
+    assert size_for_spacing(full, 0.6 / 100 * 1e3, 0.3 * 1e3) == sparse
+    assert size_for_spacing(full, 1e3, 0.3).side == 16

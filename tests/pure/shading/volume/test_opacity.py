@@ -12,15 +12,15 @@ from tiers import few_in_commits
 
 from hairloom.addon.shading.lights import Light
 from hairloom.addon.shading.volume.light_frame import ball_around, light_frame
-from hairloom.addon.shading.volume.map_size import asked_size, even_size
+from hairloom.addon.shading.volume.map_size import requested_size, size_for_spacing
 from hairloom.addon.shading.volume.opacity import (
     MIN_THICKNESS,
     Coverage,
     LayerSpans,
-    adds_to,
     coverage,
     layer_ends,
     layer_weights,
+    layers_including,
     look_up,
     transmittance,
 )
@@ -44,7 +44,7 @@ def test_layers_end_one_behind_the_other_and_the_last_behind_all(settings: Volum
     ends = layer_ends(settings)
     assert (np.diff(ends) > 0.0).all() and ends[0] > 0.0 and ends[-1] == 1.0
     depth = np.linspace(-0.5, 1.0, 301)
-    assert adds_to(depth, ends)[:, -1].all()
+    assert layers_including(depth, ends)[:, -1].all()
 
 
 def test_weights_give_back_what_grows_evenly() -> None:
@@ -131,7 +131,7 @@ def test_layers_hold_what_adds_to_them() -> None:
     expected = np.zeros((SIZE * SIZE, len(ends)))
     row, column = np.divmod(found.texel, SIZE)
     behind = np.minimum(own.fraction(row, column, found.place, found.depth), 1.0)
-    np.add.at(expected, found.texel, adds_to(behind, ends) * found.covered[:, None])
+    np.add.at(expected, found.texel, layers_including(behind, ends) * found.covered[:, None])
     assert np.allclose(found.layers(ends, own), expected)
 
 
@@ -170,17 +170,17 @@ def test_layers_go_on_from_block_to_block_as_planes_but_not_over_edges() -> None
     """Exact on a slope; planes do not interpolate between a lock and the hair behind it."""
     row, column = np.mgrid[:8, :8]
     slope = 0.2 + 0.03 * column + 0.01 * row
-    planes = LayerSpans.between(slope, slope + 0.1, 4)
+    planes = LayerSpans.from_first_and_last(slope, slope + 0.1, 4)
     inner = np.argwhere((row % 7 > 0) & (column % 7 > 0)).T * 4
     place = inner[::-1].T + np.array([0.7, 3.1])
     expected = 0.2 + 0.03 * (place[:, 0] / 4 - 0.5) + 0.01 * (place[:, 1] / 4 - 0.5)
     start, thickness = planes.at(*inner, place)
     assert np.allclose(start, expected) and np.allclose(thickness, 0.1)
     lock = np.where(column < 4, 0.1, 0.6)
-    ahead = LayerSpans.between(lock, lock + 0.1, 4)
+    ahead = LayerSpans.from_first_and_last(lock, lock + 0.1, 4)
     assert not ahead.start[..., 1:].any() and not ahead.thickness[..., 1:].any()
     bare = np.where(column == 3, np.inf, 0.5)
-    assert not LayerSpans.between(bare, -bare + 1.0, 4).start[..., 1:].any()
+    assert not LayerSpans.from_first_and_last(bare, -bare + 1.0, 4).start[..., 1:].any()
 
 
 def test_hair_that_light_grazes_is_evenly_lit() -> None:
@@ -379,8 +379,8 @@ def light_through_slab(count: int, *, is_even: bool) -> float:
     frame = light_frame(SUN, ball)
     assert frame is not None
     # four strands overlap at any place
-    spacing, asked = 4.0 * 2.0 / count, asked_size(VolumeSettings(resolution=256), 1)
-    size = even_size(asked, spacing if is_even else 0.0, ball.radius)
+    spacing, asked = 4.0 * 2.0 / count, requested_size(VolumeSettings(resolution=256), 1)
+    size = size_for_spacing(asked, spacing if is_even else 0.0, ball.radius)
     found = coverage(strands.astype(np.float32), radius, frame, size.side)
     sums = np.bincount(found.texel, found.covered, size.side**2).reshape(size.side, size.side, 1)
     behind = random.uniform((-0.8, -0.8, -0.3), (0.8, 0.8, -0.3), (4000, 3))

@@ -9,6 +9,6 @@ void main()
   }
   vec4 point_and_radius = texelFetch(points, at, 0);
   vec3 tangent = texelFetch(tangents, at, 0).xyz;
-  float own = own_depth_at(opacity, 0, point_and_radius.xyz, tangent, point_and_radius.w);
+  float own = self_tau_at(opacity, 0, point_and_radius.xyz, tangent, point_and_radius.w);
   imageStore(result, at, vec4(own, 0.0, 0.0, 0.0));
 }
