@@ -12,7 +12,7 @@ from shadow_errors import slice_spans
 from tiers import few_in_commits
 
 from hairloom.addon.render.strand_layout import StrandLayout
-from hairloom.addon.shading.lights import Light, brightest
+from hairloom.addon.shading.lights import Light, brightest_lights
 from hairloom.addon.shading.settings import StrandSettings
 from hairloom.addon.shading.volume.light_frame import (
     Ball,
@@ -551,7 +551,7 @@ def test_of_twenty_lights_the_strongest_throw_shadows(gpu_context: Any) -> None:
     strength = np.random.default_rng(4).permutation(np.arange(1.0, 21.0))
     given = [Light.sun((0.1 * n, 1.0, -1.0), (1, 1, 1), e) for n, e in enumerate(strength)]
     settings = VolumeSettings(shadows="slices", resolution=32, max_lights=3)
-    kept = brightest(given, np.zeros(3))
+    kept = brightest_lights(given, np.zeros(3))
     maps = OpacityPass().maps(points, 1, layout_of(strands), ball, kept, settings, PLAIN)
     map_of = maps.values[128:160].reshape(8, 4)[:, 0]
     casting = {kept[light].power[0] for light in np.flatnonzero(map_of >= 0.0)}
