@@ -47,7 +47,7 @@ from hairloom.addon.render.accumulation import Target
 from hairloom.addon.render.camera import frame_camera
 from hairloom.addon.render.dynamics_pass import DynamicsPass
 from hairloom.addon.render.strand_layers import is_software
-from hairloom.addon.render.strand_pass import InView, StrandPass
+from hairloom.addon.render.strand_pass import StrandPass, ViewState
 from hairloom.addon.shading.ambient_settings import AmbientSettings
 from hairloom.addon.shading.lights import three_point_lights
 
@@ -133,7 +133,7 @@ def _picture() -> Callable[[], None]:
         lit = replace(snapshot, lights=three_point_lights(camera.view))
         target.sized(WIDTH, HEIGHT).clear((0.0, 0.0, 0.0, 0.0))
         with target.drawing():
-            strands.draw(lit, camera, WIDTH, HEIGHT, view=InView("compile"))
+            strands.draw(lit, camera, WIDTH, HEIGHT, view=ViewState("compile"))
         target.color.read()
 
     return draw

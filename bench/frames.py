@@ -25,13 +25,13 @@ from gpu_calls import gpu_calls
 
 from hairloom.addon.groom.grow import grow, scalp_density
 from hairloom.addon.groom.settings import GrowSettings
+from hairloom.addon.render.cached_picture import CachedPicture
 from hairloom.addon.render.camera import Camera, frame_camera
 from hairloom.addon.render.groom_pass import GroomPass
-from hairloom.addon.render.kept_picture import KeptPicture
 from hairloom.addon.render.opacity_maps import OpacityMaps
 from hairloom.addon.render.snapshot import Snapshot
 from hairloom.addon.render.strand_layers import is_software
-from hairloom.addon.render.strand_pass import InView, StrandPass
+from hairloom.addon.render.strand_pass import StrandPass, ViewState
 from hairloom.addon.render.textures import drawing_into
 from hairloom.addon.shading.lights import three_point_lights
 from hairloom.addon.strands import StrandSet
@@ -102,7 +102,7 @@ class Stage:
         others: Sequence[OpacityMaps] = (),
         **options: Any,
     ) -> None:
-        camera, view = self.camera(angle), InView(**{"name": 0} | options)
+        camera, view = self.camera(angle), ViewState(**{"name": 0} | options)
         lit = replace(hair, lights=three_point_lights(camera.view))
         shown = {"output": "viewport", "others": others, "view": view}
         self.put(lambda: own.draw(lit, camera, WIDTH, HEIGHT, **shown))
@@ -146,11 +146,11 @@ class Stage:
 
     def still_figures(self) -> dict[str, float]:
         """An unchanged view shown from its kept picture, relative to drawing it again."""
-        own, hair, kept = StrandPass(), self.hair(), KeptPicture()
+        own, hair, kept = StrandPass(), self.hair(), CachedPicture()
 
         def keep() -> None:
             kept.begin()
-            own.draw(lit, camera, WIDTH, HEIGHT, output="viewport", view=InView(picture=kept))
+            own.draw(lit, camera, WIDTH, HEIGHT, output="viewport", view=ViewState(picture=kept))
 
         camera = self.camera(0.0)
         lit = replace(hair, lights=three_point_lights(camera.view))

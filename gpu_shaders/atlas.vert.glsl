@@ -11,7 +11,7 @@ void main()
   ivec2 texel = strand_texel(strand, station, cv_count);
   vec4 where = texelFetch(cv_places, texel, 0);  // xy place, zw half
   vec4 tangent = texelFetch(cv_tangents, texel, 0);      // xyz tangent, w depth
-  vec4 look = texelFetch(cv_looks, texel, 0);    // xyz base, w occlusion
+  vec4 look = texelFetch(cv_attributes, texel, 0);    // xyz base, w occlusion
   vec4 rest = texelFetch(cv_rest, texel, 0);     // x fraction, y strand_id, z along
 
   vec2 place = leaning(where.xy + side * where.zw, atlas_size, block_start) / block_samples;

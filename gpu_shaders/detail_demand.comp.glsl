@@ -13,8 +13,8 @@ void main()
   if (pieces == 0 || texelFetch(strand_widths, texel, 0).x <= 0.0) {
     return;
   }
-  float most = 4.0e9 / float(strand_count);  // so that sums do not overflow
-  vec3 fragments = min(texelFetch(asked, texel, 0).yzw, vec3(most));
+  float max_fragments = 4.0e9 / float(strand_count);  // so that sums do not overflow
+  vec3 fragments = min(texelFetch(strand_demand, texel, 0).yzw, vec3(max_fragments));
   imageAtomicAdd(demand, ivec2(DEMAND_SLOTS, 0), uint(slots_wanted(pieces, slot_pieces)));
   imageAtomicAdd(demand, ivec2(DEMAND_STRANDS, 0), 1u);
   imageAtomicAdd(demand, ivec2(DEMAND_FRAGMENTS, 0), uint(fragments.x));

@@ -6,7 +6,7 @@
 // Needs the struct DetailSettings. Holds no resources.
 
 const float NEAREST = {{detail_nearest}};        // [m] in clip space's w
-const float SIDE_ROOM = 1.0 + {{detail_margin}};
+const float SIDE_MARGIN = 1.0 + {{detail_margin}};
 const float FULL_ANGLE = 0.78539816339744831;
 
 // A segment's Bezier control points.
@@ -39,13 +39,13 @@ float bend_size(Control control, vec4 bend_from, vec4 bend_to, vec2 half_size)
                       bend_size_from(control.b3, bend_from, bend_to, half_size))));
 }
 
-// The smallest number of pieces by Wang's bound, not clamped; `most` for a segment that comes nearer to
+// The smallest number of pieces by Wang's bound, not clamped; `max_pieces` for a segment that comes nearer to
 // the eye than NEAREST, where there is no bound. `control` in clip space, half_size and error in pixels.
-float wang_pieces(Control control, vec2 half_size, float error, float most)
+float wang_pieces(Control control, vec2 half_size, float error, float max_pieces)
 {
   float nearest = min(min(control.b0.w, control.b1.w), min(control.b2.w, control.b3.w));
   if (nearest < NEAREST) {
-    return most;
+    return max_pieces;
   }
   vec4 bend_from = control.b0 - 2.0 * control.b1 + control.b2;
   vec4 bend_to = control.b1 - 2.0 * control.b2 + control.b3;
@@ -75,11 +75,11 @@ float heuristic_pieces(vec4 from, vec4 to, float angle, vec2 half_size, float pi
 // Whether all control points, in clip space, lie beyond one plane of the frustum.
 bool is_outside(Control control)
 {
-  vec3 room = vec3(SIDE_ROOM, SIDE_ROOM, 1.0);
+  vec3 margin = vec3(SIDE_MARGIN, SIDE_MARGIN, 1.0);
   bvec3 below = bvec3(true), above = bvec3(true);
   vec4 points[4] = vec4[4](control.b0, control.b1, control.b2, control.b3);
   for (int j = 0; j < 4; j++) {
-    vec3 edge = room * points[j].w;
+    vec3 edge = margin * points[j].w;
     below = bvec3(uvec3(below) & uvec3(lessThan(points[j].xyz, -edge)));
     above = bvec3(uvec3(above) & uvec3(greaterThan(points[j].xyz, edge)));
   }

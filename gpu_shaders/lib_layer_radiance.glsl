@@ -40,17 +40,17 @@ vec3 layer_radiance(int strand, float place)
 #ifdef TANGENTS
   return tangent;
 #else
-  vec2 from_look = texelFetch(cv_looks, root_side, 0).xy;
-  vec2 to_look = texelFetch(cv_looks, tip_side, 0).xy;
+  vec2 from_attributes = texelFetch(cv_attributes, root_side, 0).xy;
+  vec2 to_attributes = texelFetch(cv_attributes, tip_side, 0).xy;
   vec3 point = catmull_rom_point(before, from, to, after, u);
   vec3 bend = vec3(0.0);
 #if MARSCHNER
   bend = tangent_bend(before, from, to, after, u, tangent);
 #endif
-  float occlusion = mix(from_look.x, to_look.x, u);
+  float occlusion = mix(from_attributes.x, to_attributes.x, u);
   float along = place;
 #if UNEVEN
-  along = mix(from_look.y, to_look.y, u);
+  along = mix(from_attributes.y, to_attributes.y, u);
 #endif
   float radius = mix(from_cv.w, to_cv.w, u) * strands.fullness *
                  mix(1.0, strands.tip_width, along);

@@ -29,7 +29,7 @@ void main()
   vec3 ahead = texelFetch(cv_points, span_texel(span, min(station + 1, last)), 0).xyz;
   vec3 behind = texelFetch(cv_points, span_texel(span, max(station - 1, 0)), 0).xyz;
 #if UNEVEN
-  float along = texelFetch(cv_looks, span_texel(span, station), 0).y;
+  float along = texelFetch(cv_attributes, span_texel(span, station), 0).y;
 #else
   float along = float(station) / float(last);
 #endif

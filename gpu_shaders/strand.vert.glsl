@@ -61,8 +61,8 @@ void main()
 
 #if UNEVEN || !GATHERED
   // x occlusion, y fraction of the length
-  vec2 from_look = texelFetch(cv_looks, root_side, 0).xy;
-  vec2 to_look = texelFetch(cv_looks, tip_side, 0).xy;
+  vec2 from_attributes = texelFetch(cv_attributes, root_side, 0).xy;
+  vec2 to_attributes = texelFetch(cv_attributes, tip_side, 0).xy;
 #endif
 
   vec3 point = catmull_rom_point(before, from.xyz, to.xyz, after, u);
@@ -72,7 +72,7 @@ void main()
   strand_place = along;
 #endif
 #if UNEVEN
-  along = mix(from_look.y, to_look.y, u);
+  along = mix(from_attributes.y, to_attributes.y, u);
 #endif
   float radius = mix(from.w, to.w, u) * strands.fullness;
   float taper = mix(1.0, strands.tip_width, along);
@@ -80,7 +80,7 @@ void main()
 #if !GATHERED
   strand_point = point;
   strand_tangent = tangent;
-  strand_along_and_occlusion = vec2(along, mix(from_look.x, to_look.x, u));
+  strand_along_and_occlusion = vec2(along, mix(from_attributes.x, to_attributes.x, u));
   strand_radius = radius * taper;
   strand_seed = int(texelFetch(strand_seeds, counted_texel(strand), 0).x);
 #  ifdef OTHER_TAU

@@ -7,14 +7,14 @@
 //
 // Lists longer than `longest` are counted and left unchanged.
 //
-// NODES_A_ROUND: nodes per loop iteration: 1, or more for software drivers, which end a shader after 65,535
+// NODES_PER_ROUND: nodes per loop iteration: 1, or more for software drivers, which end a shader after 65,535
 // iterations of all its loops.
 //
 // Twin of layer_fractions in addon/shading/volume/transparency.py.
 #include "lib_layer_packing.glsl"
 
 // Loop over a list; the body sets `node` to the next one.
-#define EACH_FROM(node) while (node != 0u) for (int i = 0; i < NODES_A_ROUND; i++) if (node != 0u)
+#define EACH_FROM(node) while (node != 0u) for (int i = 0; i < NODES_PER_ROUND; i++) if (node != 0u)
 
 const uvec4 NO_LAYER = uvec4(0u, 0xFFFFFFFFu, 0xFFFFFFFFu, 0xFFFFFFFFu);
 

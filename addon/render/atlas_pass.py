@@ -5,7 +5,7 @@ compute shader that filters them to texels. Reference: cards/bake.py. The textur
 
     cv_places    RGBA32F: xy place, zw half width            for each CV
     cv_tangents  RGBA32F: xyz tangent, w depth
-    cv_looks     RGBA32F: xyz base, w occlusion
+    cv_attributes     RGBA32F: xyz base, w occlusion
     cv_rest      RGBA32F: x fraction of samples that count, y strand_id, z along
 
     sample_place    RGBA16F: x along, y strand_id, z depth, w occlusion
@@ -35,7 +35,7 @@ from .textures import drawing_into, drawing_state, texture_from, texture_to_arra
 _GROUP = 8
 _SAMPLES_OF = ("sample_place", "sample_tangent", "sample_base")
 _TEXELS_OF = ("texel_place", "texel_base", "texel_tangent", "texel_normal")
-_CVS = ("cv_places", "cv_tangents", "cv_looks", "cv_rest")
+_CVS = ("cv_places", "cv_tangents", "cv_attributes", "cv_rest")
 
 
 def atlas_recipe(*, is_sparse: bool) -> ShaderRecipe:

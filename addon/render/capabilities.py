@@ -39,7 +39,7 @@ FORMATS = (
 #: textures made by scripts lack the flag that atomics need there
 _METAL = "Blender gives scripts no textures for them on Metal"
 #: samples per pixel of a still whose strands are hashed as a fallback for layers
-CALM_SAMPLES = 16
+NOISE_FREE_SAMPLES = 16
 _SIDE = 16
 _DISPATCH_RECIPE = ShaderRecipe(
     name="probe_dispatch", compute="probe_dispatch.comp.glsl", images=(("RGBA32F", "probed"),)
@@ -89,7 +89,7 @@ def choose_image_atomics(choice: str) -> None:
 
 def capabilities() -> Capabilities:
     """Capabilities of the GPU, probed by the first call, which needs a context that can draw."""
-    return _probed(_forbidden())
+    return _probe(_reason_atomics_are_off())
 
 
 def pair_format() -> str:
@@ -112,7 +112,7 @@ def fails_in_idle_branches() -> bool:
     return is_vulkan and "llvmpipe" in gpu.platform.renderer_get()
 
 
-def _forbidden() -> str | None:
+def _reason_atomics_are_off() -> str | None:
     """Why the user has turned image atomics off; None where they are on."""
     if os.environ.get(ATOMICS_VARIABLE, "").lower() == "never":
         return f"turned off by {ATOMICS_VARIABLE}"
@@ -120,13 +120,13 @@ def _forbidden() -> str | None:
 
 
 @cache
-def _probed(forbidden: str | None) -> Capabilities:
+def _probe(off_reason: str | None) -> Capabilities:
     begin = time.perf_counter()
     backend = str(gpu.platform.backend_type_get())
     # where atomics are off, their program is never made, in case a driver refuses it
-    problem = forbidden or (_METAL if backend == "METAL" else _atomics_problem())
+    problem = off_reason or (_METAL if backend == "METAL" else _atomics_problem())
     dispatch_ms = _dispatch_ms()
-    missing = tuple(each for each in FORMATS if not _is_format_there(each))
+    missing = tuple(each for each in FORMATS if not _has_format(each))
     size, count = (
         gpu.capabilities.max_work_group_size_get,
         gpu.capabilities.max_work_group_count_get,
@@ -149,7 +149,7 @@ def _probed(forbidden: str | None) -> Capabilities:
 def _atomics_problem() -> str:
     """What is wrong with image atomics, by the results of a small draw; empty if nothing."""
     try:
-        found = _counted_by_atomics()
+        found = _atomic_counts()
     except Exception as error:  # a driver may fail at any point, each with an error of its own
         return f"{type(error).__name__}: {error}"
     count = _SIDE * _SIDE
@@ -159,7 +159,7 @@ def _atomics_problem() -> str:
     return "" if read == expected else f"they give {read}, not {expected}"
 
 
-def _counted_by_atomics() -> list[int]:
+def _atomic_counts() -> list[int]:
     """Results of atomics over all fragments: their count, the minimum and maximum of their numbers,
     the number that the last exchange left, and the sum of those that exchanges returned.
     """
@@ -197,7 +197,7 @@ def _timed_dispatch() -> float | None:
     return took if np.array_equal(numbers, np.arange(_SIDE * _SIDE)) else None
 
 
-def _is_format_there(name: str) -> bool:
+def _has_format(name: str) -> bool:
     try:
         made: Any = gpu_objects.texture((4, 4), format=name)
     except (RuntimeError, ValueError):

@@ -35,7 +35,7 @@ from . import gpu_objects
 from .camera import Camera
 from .detail_classes import DetailClass, detail_classes
 from .detail_slots import DetailSlots
-from .known_detail import KnownDetail, best_slot_pieces
+from .rest_counts import RestCounts, best_slot_pieces
 from .shader_program import ShaderRecipe, program
 from .shader_source import DETAIL_CHOICES, SHADE_CAPACITY
 from .snapshot import Snapshot
@@ -44,7 +44,7 @@ from .textures import UniformBlock, texture_from, texture_to_array
 
 #: How far strands are drawn beyond their edge, to reach partly covered pixels [pixels].
 EDGE = 0.75
-_BLOCKS = (("DetailView", "seen"), ("DetailSettings", "detail"))
+_BLOCKS = (("DetailView", "detail_view"), ("DetailSettings", "detail"))
 
 
 def detail_recipe(mode: str, culling: str, *, counted: bool = False) -> ShaderRecipe:
@@ -75,7 +75,7 @@ def detail_recipe(mode: str, culling: str, *, counted: bool = False) -> ShaderRe
         recipe,
         name=f"{recipe.name}_counted",
         textures=(*recipe.textures, ("FLOAT_2D", "strand_widths")),
-        images=(*recipe.images, ("RGBA32F", "asked")),
+        images=(*recipe.images, ("RGBA32F", "strand_demand")),
     )
 
 
@@ -103,9 +103,9 @@ class DetailPass:
     """The detail of one groom in its last view. Creating one does not touch the GPU."""
 
     def __init__(self) -> None:
-        self._asked: tuple[Any, ...]
+        self._inputs: tuple[Any, ...]
         self._order: DetailOrder | None
-        self._known: KnownDetail | None
+        self._rest_counts: RestCounts | None
         self._extent: GroomExtent | None = None
         self.release()
 
@@ -119,7 +119,7 @@ class DetailPass:
         *,
         by_depth: bool = True,
         counted: bool = False,
-        room: Callable[[int], int] | None = None,
+        reserve_fragments: Callable[[int], int] | None = None,
     ) -> DetailOrder:
         """The strands to draw; computed only when something changed since the last call.
 
@@ -129,50 +129,64 @@ class DetailPass:
             size: width and height of the final picture [pixels].
             by_depth: near strands come first; else the order does not matter.
             counted: also sum the demand of strands, so that the next frames can move.
-            room: for moving hair, see `may_move`: a function that makes room for this many
-                fragments and returns how many fit. The GPU is not waited for.
+            reserve_fragments: for moving hair, see `has_rest_counts`: a function that makes room
+                for this many fragments and returns how many fit. The GPU is not waited for.
 
         Raises:
             ShaderError: the shader does not compile here.
         """
         view = PictureView(camera.view, camera.projection, *size)
         thinned = self._thinned(snapshot, view)
-        shades = _shades(snapshot, view, thinned.widening)
+        shades = _hidden_regions(snapshot, view, thinned.widening)
         culling = "none" if snapshot.detail.culling == "hidden" else snapshot.detail.culling
         culling = "hidden" if len(shades) else culling
-        is_even = snapshot.detail.mode == "fixed" and bool(snapshot.layout.cv_count)
-        if is_even and culling == "none" and thinned == Thinning() and not counted:
-            return _even_order(snapshot)
-        known = None if room is None else self._known
+        is_uniform = snapshot.detail.mode == "fixed" and bool(snapshot.layout.cv_count)
+        if is_uniform and culling == "none" and thinned == Thinning() and not counted:
+            return _uniform_order(snapshot)
+        rest_counts = None if reserve_fragments is None else self._rest_counts
         scale = _pixels_per_metre(view, snapshot.root_center)
-        needs: tuple[Any, ...] = by_depth, counted
-        if known is not None and room is not None:
-            needs = known.slots_at(scale), room(known.fragments_at(scale))
-        seen = _view_values(view, camera, snapshot, shades)
-        asked = (serial, seen.tobytes(), snapshot.detail, thinned, self._extent, *needs)
-        if self._order is not None and self._asked == asked:
+        requirements: tuple[Any, ...] = by_depth, counted
+        if rest_counts is not None and reserve_fragments is not None:
+            requirements = (
+                rest_counts.slots_at(scale),
+                reserve_fragments(rest_counts.fragments_at(scale)),
+            )
+        detail_view = _view_values(view, camera, snapshot, shades)
+        inputs = (
+            serial,
+            detail_view.tobytes(),
+            snapshot.detail,
+            thinned,
+            self._extent,
+            *requirements,
+        )
+        if self._order is not None and self._inputs == inputs:
             return self._order
         recipe = detail_recipe(snapshot.detail.mode, culling, counted=counted)
-        slot_pieces = 1 if known is None else known.slot_pieces
-        self._compute(recipe, snapshot, points, seen, thinned, slot_pieces)
-        if known is not None:
-            order = self._moving(known, *needs)
+        slot_pieces = 1 if rest_counts is None else rest_counts.slot_pieces
+        self._compute(recipe, snapshot, points, detail_view, thinned, slot_pieces)
+        if rest_counts is not None:
+            order = self._moving_order(rest_counts, *requirements)
         else:
             totals = self._read_totals(snapshot.strand_count)
-            widths = _widths(snapshot, thinned)
+            widths = _width_factors(snapshot, thinned)
             order = _ordered(self._factors, totals, widths, by_depth)
-            self._known = self._counted(snapshot, totals, widths, scale) if counted else None
-        self._order, self._asked = order, asked
+            self._rest_counts = (
+                self._count_at_rest(snapshot, totals, widths, scale) if counted else None
+            )
+        self._order, self._inputs = order, inputs
         return order
 
-    def may_move(self, snapshot: Snapshot) -> bool:
+    def has_rest_counts(self, snapshot: Snapshot) -> bool:
         """Whether the counts that drawing in motion needs are there for these strands."""
-        return self._known is not None and self._known.is_of(snapshot.layout, snapshot.detail)
+        return self._rest_counts is not None and self._rest_counts.matches(
+            snapshot.layout, snapshot.detail
+        )
 
     def release(self) -> None:
         """Release everything on the GPU; the next call computes the order again."""
         self._blocks = {name: UniformBlock() for _, name in _BLOCKS}
-        self._asked, self._order, self._known = (), None, None
+        self._inputs, self._order, self._rest_counts = (), None, None
         self._factors: Any = None
         self._totals: Any = None
         self._slots = DetailSlots()
@@ -190,7 +204,7 @@ class DetailPass:
         recipe: ShaderRecipe,
         snapshot: Snapshot,
         points: Mapping[str, Any],
-        seen: Floats,
+        detail_view: Floats,
         thinned: Thinning,
         slot_pieces: int,
     ) -> None:
@@ -199,14 +213,14 @@ class DetailPass:
         self._fit(snapshot.layout)
         textures = {name: points[name] for name in ("cv_points", "strand_spans")}
         images = {"factors": self._factors, "totals": self._totals}
-        is_counted = recipe.images[-1][1] == "asked"
+        is_counted = recipe.images[-1][1] == "strand_demand"
         if is_counted:
             textures["strand_widths"] = self._widths_texture(snapshot, thinned)
-            images["asked"] = self._slots.asked(count)
+            images["strand_demand"] = self._slots.strand_demand(count)
         shader = program(recipe)
         shader.bind(
             blocks={
-                "seen": self._blocks["seen"].holding(seen),
+                "detail_view": self._blocks["detail_view"].holding(detail_view),
                 "detail": self._blocks["detail"].holding(struct_values(snapshot.detail)),
             },
             textures=textures,
@@ -215,30 +229,30 @@ class DetailPass:
         )
         shader.dispatch(count)
         if is_counted:
-            self._slots.count(self._totals, textures["strand_widths"], count, slot_pieces)
+            self._slots.sum_demand(self._totals, textures["strand_widths"], count, slot_pieces)
 
     def _read_totals(self, count: int) -> Floats:
         """Pieces and depth of each strand, (strand_count, 2). Waits for the GPU."""
         return from_strand_rows(texture_to_array(self._totals), count, 1).reshape(count, 2)
 
-    def _counted(
+    def _count_at_rest(
         self, snapshot: Snapshot, totals: Floats, widths: Floats, scale: float
-    ) -> KnownDetail:
+    ) -> RestCounts:
         """The counts at rest, for the next frames."""
         pieces = _drawn_pieces(totals, widths)
         slot_pieces, slots = best_slot_pieces(pieces)
-        fragments = self._slots.demanded()[2]
+        fragments = self._slots.demand_sums()[2]
         strands = int(np.count_nonzero(pieces))
-        return KnownDetail(
+        return RestCounts(
             *(snapshot.layout, snapshot.detail, scale, slot_pieces, slots, fragments),
             *(strands, int(pieces.sum(dtype=np.int64))),
         )
 
-    def _moving(self, known: KnownDetail, slot_count: int, capacity: int) -> DetailOrder:
+    def _moving_order(self, rest_counts: RestCounts, slot_count: int, capacity: int) -> DetailOrder:
         """The order of moving hair: this many slots, filled by the GPU."""
-        slots = self._slots.filled(slot_count, capacity)
-        drawn = DetailClass(known.slot_pieces, 0, slot_count)
-        counts = known.strands, known.pieces
+        slots = self._slots.filled_slots(slot_count, capacity)
+        drawn = DetailClass(rest_counts.slot_pieces, 0, slot_count)
+        counts = rest_counts.strands, rest_counts.pieces
         return DetailOrder(self._factors, None, (drawn,), *counts, slots=slots)
 
     def _widths_texture(self, snapshot: Snapshot, thinned: Thinning) -> Any:
@@ -246,7 +260,7 @@ class DetailPass:
         made_of = snapshot.rank, thinned, snapshot.strand_count
         kept = self._strand_widths
         if not kept or kept[0] is not made_of[0] or kept[1:3] != made_of[1:]:
-            widths = _widths(snapshot, thinned)[:, None, None]
+            widths = _width_factors(snapshot, thinned)[:, None, None]
             self._strand_widths = (*made_of, texture_from(strand_rows(widths), "R32F"))
         return self._strand_widths[-1]
 
@@ -301,7 +315,7 @@ class GroomExtent:
         )
 
 
-def _even_order(snapshot: Snapshot) -> DetailOrder:
+def _uniform_order(snapshot: Snapshot) -> DetailOrder:
     """The order of all strands in the fixed mode, which needs no pass on the GPU."""
     subdivisions = snapshot.detail.subdivisions
     pieces = (snapshot.layout.cv_count - 1) * subdivisions
@@ -310,7 +324,7 @@ def _even_order(snapshot: Snapshot) -> DetailOrder:
     return DetailOrder(None, None, (drawn,), *counts, subdivisions)
 
 
-def _widths(snapshot: Snapshot, thinned: Thinning) -> Floats:
+def _width_factors(snapshot: Snapshot, thinned: Thinning) -> Floats:
     """Factor on each strand's width, (strand_count,); 0 where it is not drawn."""
     if snapshot.rank is None or thinned == Thinning():
         return np.ones(snapshot.strand_count, np.float32)
@@ -332,7 +346,7 @@ def _drawn_pieces(totals: Floats, widths: Floats) -> Ints:
     return np.where(widths > 0.0, totals[:, 0], 0.0).astype(np.int32)
 
 
-def _shades(snapshot: Snapshot, view: PictureView, widening: float) -> Floats:
+def _hidden_regions(snapshot: Snapshot, view: PictureView, widening: float) -> Floats:
     """The regions that the occluder spheres hide, (k, 12) as in lib_culling.glsl."""
     if snapshot.detail.culling != "hidden" or snapshot.occluder_spheres is None:
         return np.zeros((0, 12), np.float32)

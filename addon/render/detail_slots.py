@@ -4,13 +4,13 @@ The gpu module has no indirect draw, and reading back how many strands are drawn
 would wait for the GPU. So moving hair is drawn as one draw whose number of slots is estimated from
 the last count of its view:
 
-    detail ----> factors, totals, asked      one invocation per strand, as in the next two steps
-    asked -----> demand                      sums
-    demand ----> slots                       the slots of each strand
+    detail --------> factors, totals, strand_demand  one invocation per strand, as in the next two
+    strand_demand -> demand                          sums
+    demand --------> slots                           the slots of each strand
 
-    asked  RGBA32F:       the demand of each strand, see detail.comp.glsl
-    demand R32UI 6 x 1:   the sums, see lib_detail_slots.glsl
-    slots  RGBA32UI:      see lib_detail_slots.glsl; unused slots have no pieces
+    strand_demand RGBA32F: the demand of each strand, see detail.comp.glsl
+    demand R32UI 6 x 1:    the sums, see lib_detail_slots.glsl
+    slots RGBA32UI:        see lib_detail_slots.glsl; unused slots have no pieces
 
 If strands want more slots than there are, they are drawn in fewer pieces, still from root to tip.
 If more fragments are expected than fit into the lists of pixels, only a part of the strands is
@@ -34,7 +34,7 @@ DEMANDS = 6
 #: factor on the slots that are needed now, since a view that comes nearer soon needs more
 _SPARE = 1.5
 
-_TEXTURES = (("FLOAT_2D", "totals"), ("FLOAT_2D", "strand_widths"), ("FLOAT_2D", "asked"))
+_TEXTURES = (("FLOAT_2D", "totals"), ("FLOAT_2D", "strand_widths"), ("FLOAT_2D", "strand_demand"))
 _DEMAND_RECIPE = ShaderRecipe(
     name="detail_demand",
     compute="detail_demand.comp.glsl",
@@ -60,20 +60,25 @@ class DetailSlots:
 
     def release(self) -> None:
         """Release everything on the GPU."""
-        self._asked: Any = None
+        self._strand_demand: Any = None
         self._demand: Any = None
         self._slots: Any = None
         self._textures: dict[str, Any] = {}
         self._integers: dict[str, int] = {}
 
-    def asked(self, strand_count: int) -> Any:
+    def strand_demand(self, strand_count: int) -> Any:
         """The texture into which the detail pass writes the demand of strands."""
         size = strand_rows_size(strand_count, 1)
-        if self._asked is None or (self._asked.width, self._asked.height) != size:
-            self._asked = gpu_objects.texture(size, format="RGBA32F")
-        return self._asked
+        if (
+            self._strand_demand is None
+            or (self._strand_demand.width, self._strand_demand.height) != size
+        ):
+            self._strand_demand = gpu_objects.texture(size, format="RGBA32F")
+        return self._strand_demand
 
-    def count(self, totals: Any, strand_widths: Any, strand_count: int, slot_pieces: int) -> None:
+    def sum_demand(
+        self, totals: Any, strand_widths: Any, strand_count: int, slot_pieces: int
+    ) -> None:
         """Sum the demand on the GPU.
 
         Args:
@@ -83,15 +88,19 @@ class DetailSlots:
         if self._demand is None:
             self._demand = gpu_objects.texture((DEMANDS, 1), format="R32UI")
         self._demand.clear(format="UINT", value=(0,))
-        self._textures = {"totals": totals, "strand_widths": strand_widths, "asked": self._asked}
+        self._textures = {
+            "totals": totals,
+            "strand_widths": strand_widths,
+            "strand_demand": self._strand_demand,
+        }
         self._integers = {"strand_count": strand_count, "slot_pieces": slot_pieces}
         self._dispatch(_DEMAND_RECIPE, {"demand": self._demand}, self._integers)
 
-    def demanded(self) -> list[int]:
+    def demand_sums(self) -> list[int]:
         """The sums. Waits for the GPU."""
         return [int(each) for each in np.asarray(self._demand.read()).ravel()]
 
-    def filled(self, slot_count: int, capacity: int) -> Any:
+    def filled_slots(self, slot_count: int, capacity: int) -> Any:
         """The texture of slots, filled with all counted strands.
 
         Args:

@@ -23,7 +23,7 @@ from .mesh_pass import MeshPass
 from .shader_program import ShaderRecipe, program
 from .shafts_pass import finish_with_shafts
 from .snapshot import MeshSnapshot, Snapshot
-from .strand_pass import StrandPass, calm_samples
+from .strand_pass import StrandPass, noise_free_samples
 from .textures import drawing_into, texture_to_array
 
 __all__ = [
@@ -124,7 +124,7 @@ def render_still(
         ValueError, ShaderError: as `render_image`.
     """
     total = np.zeros((height, width, 4), np.float64)
-    count = max(samples**2, calm_samples(snapshot.strand_settings))
+    count = max(samples**2, noise_free_samples(snapshot.strand_settings))
     for sample in range(count):
         place = (np.array(divmod(sample % samples**2, samples)) + 0.5) / samples - 0.5
         total += render_image(

@@ -88,7 +88,9 @@ class MeshShadowPass:
             return None
         layers = max(sum(map(len, frames)), 2)  # an array needs at least two layers
         most = gpu.capabilities.max_texture_size_get()
-        side = mesh_map_side(settings.mesh_resolution, layers, most, gpu_memory.mesh_maps_room())
+        side = mesh_map_side(
+            settings.mesh_resolution, layers, most, gpu_memory.mesh_shadow_map_budget()
+        )
         values = pack_mesh_shadows(frames, side)
         wanted = (tuple(map(id, casters)), values.tobytes())
         if self._maps is None or self._drawn != wanted:

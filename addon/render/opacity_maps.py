@@ -175,7 +175,7 @@ class HairInMaps(Protocol):
 class OpacityDrawing:
     """The maps of one groom, kept from draw to draw. Creating one does not touch the GPU.
 
-    is_behind: some maps are of earlier positions of their lights, see `maps`.
+    has_stale_maps: some maps are of earlier positions of their lights, see `maps`.
     """
 
     def __init__(self) -> None:
@@ -184,7 +184,7 @@ class OpacityDrawing:
         self._frames: dict[int, LightFrame] = {}
         self._meshes_drawn: dict[int, tuple[Any, ...]] = {}
         self._casters = MeshDepths()
-        self.is_behind = False
+        self.has_stale_maps = False
 
     def maps(
         self,
@@ -210,7 +210,7 @@ class OpacityDrawing:
         frames = dict(enumerate(shadow_frames(lights, ball, settings)))
         wanted = {light: frame for light, frame in frames.items() if frame is not None}
         largest = gpu.capabilities.max_texture_size_get()
-        room = gpu_memory.maps_room()
+        room = gpu_memory.shadow_map_budget()
         size = fitted_size(settings, len(wanted), room, largest)
         note = size_note(settings, len(wanted), room, size)
         size = size_for_spacing(size, spacing, ball.radius)
@@ -240,7 +240,7 @@ class OpacityDrawing:
             for number, light in places:
                 _draw_map(maps, number, light, hair)
             self._drawn_of = drawn_of
-        self.is_behind = bool(due_maps(self._frames, wanted))
+        self.has_stale_maps = bool(due_maps(self._frames, wanted))
         return self._maps
 
     def _maps_of(self, values: Floats, size: MapSize) -> OpacityMaps:

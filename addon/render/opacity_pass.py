@@ -176,9 +176,9 @@ class OpacityPass:
         self._casting: _Casting | None = None
 
     @property
-    def is_behind(self) -> bool:
+    def has_stale_maps(self) -> bool:
         """Whether some maps are of earlier positions of their lights, see OpacityDrawing.maps."""
-        return self._drawing.is_behind
+        return self._drawing.has_stale_maps
 
     def maps(
         self,
@@ -191,7 +191,7 @@ class OpacityPass:
         strands: StrandSettings,
         casters: tuple[Caster, ...] = (),
         spacing: float = 0.0,
-        looks: Any = None,
+        attributes: Any = None,
         rank: Floats | None = None,
         *,
         is_turning: bool = False,
@@ -202,14 +202,14 @@ class OpacityPass:
             points: texture of CVs, xyz [m, world] and w radius, in this layout.
             serial: changes whenever the points change.
             rank: see Snapshot.
-            looks: texture cv_looks, if points are unevenly spaced, see strand_pass.py.
+            attributes: texture cv_attributes, if points are unevenly spaced, see strand_pass.py.
             ball, lights, casters, spacing, is_turning: as in OpacityDrawing.maps.
         """
         count = max(round(layout.strand_count * settings.strand_fraction), 1)
         casting = self._casting
         if casting is None or not casting.is_of(layout, rank, count):
             casting = self._casting = _Casting.of(layout, rank, count)
-        curves = curves_feature(points, casting.spans, looks)
+        curves = curves_feature(points, casting.spans, attributes)
         look = ShaderFeature(
             blocks={"strands": ("StrandSettings", struct_values(strands.as_drawn))}
         )

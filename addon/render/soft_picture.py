@@ -8,7 +8,7 @@ hair. So samples in which a light shines brighter count more.
     hair_sum, shadow_sum RGBA32F: of all samples
     sample RGBA32F with a depth DEPTH32F: the current sample
 
-That is 52 bytes per pixel while samples are being summed. The result is drawn into a KeptPicture.
+That is 52 bytes per pixel while samples are being summed. The result is drawn into a CachedPicture.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ import gpu
 
 from . import gpu_objects
 from .accumulation import Accumulation
+from .cached_picture import CachedPicture
 from .display import Display
 from .feature_programs import UniformBlocks, bound
-from .kept_picture import KeptPicture
 from .shader_program import ShaderRecipe, released_with_shaders
 from .textures import drawing_state
 
@@ -42,7 +42,7 @@ class SoftPicture:
 
     def __init__(self) -> None:
         self._hair, self._shadow = Accumulation(), Accumulation()
-        self._sample = KeptPicture("RGBA32F")
+        self._sample = CachedPicture("RGBA32F")
         self._triangle: Any = None
         released_with_shaders(self)
 
@@ -57,7 +57,7 @@ class SoftPicture:
         return 0 if self.count else _PIXEL_BYTES * (left + width) * (bottom + height)
 
     def add(
-        self, draw_shadows: Callable[[Any], None], draw_hair: Callable[[KeptPicture], None]
+        self, draw_shadows: Callable[[Any], None], draw_hair: Callable[[CachedPicture], None]
     ) -> None:
         """Add a sample for the bound viewport; the first one after a release, or in a viewport of
         another size, begins a new sum.
@@ -77,7 +77,7 @@ class SoftPicture:
         draw_hair(self._sample)
         self._hair.add(self._sample.color)
 
-    def show_in(self, picture: KeptPicture, display: Display | None) -> None:
+    def show_in(self, picture: CachedPicture, display: Display | None) -> None:
         """Draw the mean of the samples so far into the kept picture of this viewport.
 
         Args:

@@ -9,17 +9,17 @@ from .strand_layout import StrandLayout, strand_rows
 from .textures import texture_from
 
 
-def curves_feature(cv_points: Any, strand_spans: Any, cv_looks: Any = None) -> ShaderFeature:
+def curves_feature(cv_points: Any, strand_spans: Any, cv_attributes: Any = None) -> ShaderFeature:
     """The feature of all programs that draw curves.
 
     Args:
-        cv_points, strand_spans, cv_looks: textures, see strand_pass.py. cv_looks only if points are
-            unevenly spaced, since it stores their positions along the strand.
+        cv_points, strand_spans, cv_attributes: textures, see strand_pass.py. cv_attributes only if
+            points are unevenly spaced, since it stores their positions along the strand.
     """
     textures = {"cv_points": ("FLOAT_2D", cv_points), "strand_spans": ("FLOAT_2D", strand_spans)}
-    if cv_looks is None:
+    if cv_attributes is None:
         return ShaderFeature(textures=textures)
-    textures["cv_looks"] = ("FLOAT_2D", cv_looks)
+    textures["cv_attributes"] = ("FLOAT_2D", cv_attributes)
     return ShaderFeature(name="uneven", textures=textures, defines={"UNEVEN": 1})
 
 

@@ -37,8 +37,8 @@ import numpy as np
 from ..arrays import Ints
 from ..shading.volume.transparency import LAYERS, TURNING_LAYERS
 from . import gpu_memory, gpu_objects
+from .cached_picture import CachedPicture
 from .image_stores import finish_stores
-from .kept_picture import KeptPicture
 from .pixel_parts import PixelPart, pixel_parts
 from .shader_program import ShaderProgram, ShaderRecipe, program, released_with_shaders
 from .shader_source import LAYER_ROW, ShaderError
@@ -46,21 +46,21 @@ from .strand_drawing import StrandDrawing
 from .textures import drawing_rows, drawing_state
 
 #: initial rows of nodes, 20 MiB
-FIRST_ROWS = 256
+INITIAL_ROWS = 256
 #: bytes of a node and of its number in `seen`
 FRAGMENT_BYTES = 20
 #: lists are made smaller if they exceed the available memory by this factor
-_TOO_LARGE = 1.25
+_MAX_OVERSIZE = 1.25
 #: margin on a count when lists turned out too small
 _SPARE = 1.25
 #: pixels per shading invocation while hair moves
-_SHADED_IN_TURN = 16
+_SHADED_PER_INVOCATION = 16
 #: nodes per loop iteration with software drivers, whose iterations are limited
-_NODES_A_ROUND = 8
+_NODES_PER_ROUND = 8
 #: most fragments of a pixel that a software driver can order: each takes about five iterations
-LONGEST_IN_SOFTWARE = 12288
+MAX_LIST_LENGTH_IN_SOFTWARE = 12288
 #: larger than the length of any list
-_ANY_LENGTH = (1 << 31) - 1
+_UNLIMITED = (1 << 31) - 1
 
 _ORDER_RECIPE = ShaderRecipe(
     name="strand_layers_order",
@@ -75,18 +75,18 @@ _ORDER_RECIPE = ShaderRecipe(
     ),
     integers=("longest",),
     group_size=(64, 1),
-    defines=(("LAYERS", LAYERS), ("NODES_A_ROUND", 1)),
+    defines=(("LAYERS", LAYERS), ("NODES_PER_ROUND", 1)),
 )
 #: shades fewer layers
 _TURNING_ORDER_RECIPE = replace(
     _ORDER_RECIPE,
     name="strand_layers_order_turning",
-    defines=(("LAYERS", TURNING_LAYERS), ("NODES_A_ROUND", 1)),
+    defines=(("LAYERS", TURNING_LAYERS), ("NODES_PER_ROUND", 1)),
 )
 
 
 @dataclass(frozen=True)
-class LayersDrawn:
+class LayerStatistics:
     """In how many parts layers were drawn, and how many fragments did not fit into any.
 
     fragments: number of fragments that nothing hides; 0 if the GPU was not waited for.
@@ -123,7 +123,7 @@ class StrandLayers:
         self._seen: Any = None
         self._fronts: Any = None
         self._triangle: Any = None
-        self._picture: KeptPicture | None = None
+        self._picture: CachedPicture | None = None
         self._is_sample = False
 
     def draw(
@@ -134,15 +134,15 @@ class StrandLayers:
         in_parts: bool = False,
         is_moving: bool = False,
         is_turning: bool = False,
-        picture: KeptPicture | None = None,
+        picture: CachedPicture | None = None,
         is_sample: bool = False,
-    ) -> LayersDrawn:
+    ) -> LayerStatistics:
         """Gather, order and shade fragments, and blend the result over the bound framebuffer.
 
         Args:
             is_own_target: no other code has set a scissor for that framebuffer.
             in_parts: fragments probably do not fit at once, so that this is not even tried.
-            is_moving: the GPU is not waited for, see `room_for`.
+            is_moving: the GPU is not waited for, see `reserve`.
             is_turning: the whole view moves, so that fewer layers suffice.
             picture: also gets the result.
             is_sample: only the picture gets colours; the framebuffer gets depths.
@@ -156,15 +156,15 @@ class StrandLayers:
             self._store(lambda: drawing.gather(self._images, self._capacity))
             *_, width, height = gpu.state.viewport_get()
             self._order(width * height, _TURNING_ORDER_RECIPE if is_turning else _ORDER_RECIPE)
-            self._shade(drawing, -(-width * height // _SHADED_IN_TURN))
-            return LayersDrawn(1)
-        if not in_parts and self._is_gathered(drawing) and self._is_finished(drawing):
-            return LayersDrawn(1, fragments=self._found)
-        counts, drawn, missing = self._counted(drawing), 0, 0
+            self._shade(drawing, -(-width * height // _SHADED_PER_INVOCATION))
+            return LayerStatistics(1)
+        if not in_parts and self._gather_all(drawing) and self._finish(drawing):
+            return LayerStatistics(1, fragments=self._found)
+        counts, drawn, missing = self._fragment_counts(drawing), 0, 0
         fragments = int(counts.sum(dtype=np.int64))
-        self._make_room(fragments)
+        self._grow(fragments)
         expected = drawing.expected_depths()
-        waiting = pixel_parts(counts, self._capacity, _longest(), expected)[::-1]
+        waiting = pixel_parts(counts, self._capacity, _max_list_length(), expected)[::-1]
         while waiting:
             part = waiting.pop()
             rows = part.rows(self._heads.width) if is_own_target else None
@@ -172,13 +172,13 @@ class StrandLayers:
             if beyond > 0 and part.halves:
                 waiting += part.halves[::-1]
                 continue
-            if not self._is_finished(drawing, even_if_too_long=not part.slabs):
+            if not self._finish(drawing, even_if_too_long=not part.slabs):
                 waiting += part.slabs[::-1]
                 continue
             drawn, missing = drawn + 1, missing + max(beyond, 0) + self._too_long
-        return LayersDrawn(drawn, missing, fragments)
+        return LayerStatistics(drawn, missing, fragments)
 
-    def room_for(self, count: int) -> int:
+    def reserve(self, count: int) -> int:
         """Make room for this many fragments in the bound viewport, and return how many fit.
 
         Raises:
@@ -186,13 +186,13 @@ class StrandLayers:
         """
         self._fit(_viewport_end())
         if count > self._capacity:
-            self._make_room(int(max(count, _SPARE * self._capacity)))
+            self._grow(int(max(count, _SPARE * self._capacity)))
         return self._capacity
 
-    def _is_gathered(self, drawing: StrandDrawing) -> bool:
+    def _gather_all(self, drawing: StrandDrawing) -> bool:
         """Gather all fragments at once, making room if needed; False if they cannot fit."""
         while (found := self._gather(drawing)) > self._capacity:
-            if found > self._max_rows * LAYER_ROW or not self._make_room(int(found * _SPARE)):
+            if found > self._max_rows * LAYER_ROW or not self._grow(int(found * _SPARE)):
                 return False
         return True
 
@@ -204,7 +204,7 @@ class StrandLayers:
         self._found, self._pixel_count, *_ = self._counts()
         return self._found
 
-    def _counted(self, drawing: StrandDrawing) -> Ints:
+    def _fragment_counts(self, drawing: StrandDrawing) -> Ints:
         """The number of fragments of each pixel, row by row."""
         self._store(lambda: drawing.count(self._images))
         return np.asarray(self._heads.read()).ravel()
@@ -221,31 +221,31 @@ class StrandLayers:
             draw()
         finish_stores()
 
-    def _is_finished(self, drawing: StrandDrawing, *, even_if_too_long: bool = False) -> bool:
+    def _finish(self, drawing: StrandDrawing, *, even_if_too_long: bool = False) -> bool:
         """Order, shade and show the gathered fragments; False if a list is too long for that."""
         self._too_long = 0
         pixel_count = self._pixel_count
         if not pixel_count:
             return True
-        self._order(pixel_count, longest=None if even_if_too_long else _longest())
-        _, _, seen_count, longest = self._counts()
-        self._too_long = max(longest - (_longest() or longest), 0)
+        self._order(pixel_count, max_length=None if even_if_too_long else _max_list_length())
+        _, _, seen_count, max_length = self._counts()
+        self._too_long = max(max_length - (_max_list_length() or max_length), 0)
         if self._too_long and not even_if_too_long:
             return False
         self._shade(drawing, seen_count)
         return True
 
     def _order(
-        self, count: int, recipe: ShaderRecipe = _ORDER_RECIPE, *, longest: int | None = None
+        self, count: int, recipe: ShaderRecipe = _ORDER_RECIPE, *, max_length: int | None = None
     ) -> None:
         """Order all lists, except those that are too long, with this many invocations."""
         if is_software():
-            defines = dict(recipe.defines) | {"NODES_A_ROUND": _NODES_A_ROUND}
+            defines = dict(recipe.defines) | {"NODES_PER_ROUND": _NODES_PER_ROUND}
             recipe = replace(recipe, defines=tuple(defines.items()))
         order = program(recipe)
         order.bind(
             images={name: self._images[name] for _, name, *_ in recipe.images},
-            integers={"longest": _ANY_LENGTH if longest is None else longest},
+            integers={"longest": _UNLIMITED if max_length is None else max_length},
         )
         _dispatch(order, count)
 
@@ -270,8 +270,8 @@ class StrandLayers:
     def _counts(self) -> tuple[int, int, int, int]:
         """The numbers of fragments, of pixels with fragments and of visible fragments, and the
         length of the longest list."""
-        found, pixels, seen, longest = np.asarray(self._count.read()).ravel().tolist()
-        return int(found), int(pixels), int(seen), int(longest)
+        found, pixels, seen, max_length = np.asarray(self._count.read()).ravel().tolist()
+        return int(found), int(pixels), int(seen), int(max_length)
 
     @property
     def _images(self) -> dict[str, Any]:
@@ -289,7 +289,7 @@ class StrandLayers:
         """The number of fragments that fit."""
         return int(self._nodes.height) * LAYER_ROW
 
-    def _make_room(self, count: int) -> bool:
+    def _grow(self, count: int) -> bool:
         """Make room for this many fragments, within the limit; whether room has grown."""
         before = self._capacity
         rows = min(-(-count // LAYER_ROW), self._max_rows)
@@ -297,13 +297,13 @@ class StrandLayers:
             self._make_nodes(rows)
         return self._capacity > before
 
-    def _limit(self) -> None:
+    def _update_row_limit(self) -> None:
         """Update the limit of rows, and shrink the lists if they are far beyond it."""
         held = 0 if self._nodes is None else self._capacity * FRAGMENT_BYTES
-        rows = gpu_memory.lists_room(held) // (FRAGMENT_BYTES * LAYER_ROW)
+        rows = gpu_memory.fragment_list_budget(held) // (FRAGMENT_BYTES * LAYER_ROW)
         limits = (max(rows, 1), self._wanted_rows, self._refused_rows)
         self._max_rows = min(limit for limit in limits if limit is not None)
-        if self._nodes is not None and self._nodes.height > _TOO_LARGE * self._max_rows:
+        if self._nodes is not None and self._nodes.height > _MAX_OVERSIZE * self._max_rows:
             self._make_nodes(self._max_rows)
 
     def _make_nodes(self, rows: int) -> None:
@@ -323,7 +323,7 @@ class StrandLayers:
         """Make textures for this many pixels, or keep the old ones if they are not far too large.
         They grow to cover all views, so that views drawn alternately share them.
         """
-        self._limit()
+        self._update_row_limit()
         kept, wanted = self._size, size
         is_held = kept[0] >= wanted[0] and kept[1] >= wanted[1]
         is_far_too_large = kept[0] * kept[1] > 4 * max(wanted[0] * wanted[1], 1)
@@ -336,7 +336,7 @@ class StrandLayers:
         self._heads = gpu_objects.texture(size, format="R32UI")
         self._pixels = gpu_objects.texture(size, format="R32UI")
         if self._nodes is None or is_far_too_large:
-            self._make_nodes(min(FIRST_ROWS, self._max_rows))
+            self._make_nodes(min(INITIAL_ROWS, self._max_rows))
         self._fronts = gpu_objects.texture(size, format="RG32F")
         if self._triangle is None:
             self._triangle = gpu_objects.triangle()
@@ -347,9 +347,9 @@ def is_software() -> bool:
     return str(gpu.platform.device_type_get()) == "SOFTWARE"
 
 
-def _longest() -> int | None:
+def _max_list_length() -> int | None:
     """The most fragments of a pixel that can be ordered; None: any number."""
-    return LONGEST_IN_SOFTWARE if is_software() else None
+    return MAX_LIST_LENGTH_IN_SOFTWARE if is_software() else None
 
 
 def _dispatch(shader: ShaderProgram, count: int) -> None:

@@ -3,7 +3,7 @@
 Textures with a texel per point, in the layout of strand_layout.StrandLayout:
     cv_points RGBA32F: xyz position [m, world], w radius [m]     uploaded with every new pose,
                                                                  unless it is on the GPU already
-    cv_looks  RG32F:   x ambient occlusion, y fraction of the    constant
+    cv_attributes  RG32F:   x ambient occlusion, y fraction of the    constant
                        strand's length, where UNEVEN
     cv_colors RGBA16F: xyz own colour, w 0 where there is none   constant; only of coloured hair
     rest_lengths R32F: length at rest of the segment that begins at the point [m]
@@ -32,8 +32,9 @@ from ..shading.lights import Light, packed_lights
 from ..shading.settings import StrandSettings
 from ..shading.strand_noise import SEED_LIMIT
 from ..shading.volume.light_frame import Ball
+from .cached_picture import CachedPicture
 from .camera import Camera
-from .capabilities import CALM_SAMPLES, capabilities
+from .capabilities import NOISE_FREE_SAMPLES, capabilities
 from .collider_textures import UploadedColliders
 from .detail_pass import DetailPass
 from .display import Display
@@ -41,7 +42,6 @@ from .feature_programs import UniformBlocks
 from .hair_ball import HairBall
 from .hashed_strands import HASHED_STRANDS
 from .inter_groom_shadow import NO_GROOM, InterGroomShadow
-from .kept_picture import KeptPicture
 from .marschner_textures import marschner_feature, scattering_feature
 from .opacity_maps import OpacityMaps
 from .opacity_pass import OpacityPass
@@ -53,15 +53,15 @@ from .shader_source import DEBUG_VIEWS, SHOWN_DEPTH, ShaderError, output_index
 from .snapshot import Snapshot
 from .strand_curves import curves_feature, spans_texture
 from .strand_drawing import StrandDrawing
-from .strand_layers import LAYERS_OF_PIXELS, LayersDrawn
+from .strand_layers import LAYERS_OF_PIXELS, LayerStatistics
 from .strand_layout import StrandLayout, strand_rows
 from .textures import drawing_state, texture_from
 from .view_block import lights_feature, view_feature
 
 #: little below the largest half float
-_BRIGHTEST = 6.0e4
+_MAX_HALF_FLOAT = 6.0e4
 #: smallest depth shown in full colour, for hair without size [m]
-_THIN = 1.0e-9
+_MIN_RADIUS = 1.0e-9
 #: what a draw writes: radiance; unit tangents from root to tip, in world space; or, for opaque
 #: strands only, the number of the nearest strand and the place along its points
 CONTENTS = ("light", "tangents", "places")
@@ -70,13 +70,13 @@ NUMBERED_VIEWS = ("guide", "group")
 
 
 @dataclass(frozen=True, eq=False)
-class InView:
+class ViewState:
     """The state of a view that is drawn repeatedly.
 
     name: identifies the view; data that depends on a view is kept by name.
     is_turning: the lights are attached to the view, which moves, see OpacityDrawing.maps.
     is_moving: the content changes from draw to draw. Results for which the GPU would have to be
-        waited for are taken from earlier draws, see StrandPass.is_behind.
+        waited for are taken from earlier draws, see StrandPass.needs_redraw.
     picture: also gets what is drawn, so that it can be shown again.
     is_sample: only the picture gets colours, scene-linear, as one of many samples to be summed; the
         bound framebuffer gets depths.
@@ -85,12 +85,12 @@ class InView:
     name: Hashable = None
     is_turning: bool = False
     is_moving: bool = False
-    picture: KeptPicture | None = None
+    picture: CachedPicture | None = None
     is_sample: bool = False
 
 
 #: For draws into a single picture.
-NO_VIEW = InView()
+UNNAMED_VIEW = ViewState()
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ class Statistics:
     strands: int = 0
     pieces: int = 0
     vertices: int = 0
-    layers: LayersDrawn = field(default_factory=LayersDrawn)
+    layers: LayerStatistics = field(default_factory=LayerStatistics)
     maps_note: str = ""
 
     @property
@@ -120,13 +120,13 @@ class Statistics:
 
 
 @dataclass(eq=False)
-class _Lit:
-    """The shadows for one set of lights. light: these lights; None before the first draw.
+class _Shadows:
+    """The shadows for one set of lights. lights: these; None before the first draw.
 
     inter_groom_shadow: the optical depth of other grooms for them.
     """
 
-    light: tuple[Light, ...] | None = None
+    lights: tuple[Light, ...] | None = None
     opacity: OpacityPass = field(default_factory=OpacityPass)
     inter_groom_shadow: InterGroomShadow = field(default_factory=InterGroomShadow)
 
@@ -135,15 +135,15 @@ class _Lit:
 class _View:
     """The data kept for one view.
 
-    lit: shadows for its lights, possibly shared with other views. asked: lights of its last draw.
-    parts: number of parts in which its strands were last drawn at rest. is_moving: the last draw
-        was not at rest.
+    shadows: for its lights, possibly shared with other views. last_lights: lights of its last draw.
+    part_count: number of parts in which its strands were last drawn at rest. is_moving: the last
+        draw was not at rest.
     """
 
     detail: DetailPass = field(default_factory=DetailPass)
-    lit: _Lit = field(default_factory=_Lit)
-    asked: tuple[Light, ...] | None = None
-    parts: int = 0
+    shadows: _Shadows = field(default_factory=_Shadows)
+    last_lights: tuple[Light, ...] | None = None
+    part_count: int = 0
     is_moving: bool = False
 
 
@@ -178,7 +178,7 @@ class StrandPass:
         display: Display | None = None,
         samples: int = 1,
         others: Sequence[OpacityMaps] = (),
-        view: InView = NO_VIEW,
+        view: ViewState = UNNAMED_VIEW,
     ) -> None:
         """Draw all strands into the bound framebuffer, depth-tested against what is in it.
 
@@ -198,8 +198,8 @@ class StrandPass:
         """
         if content not in CONTENTS:
             raise ValueError(f"content {content!r} is none of {', '.join(CONTENTS)}")
-        own = self._views.setdefault(view.name, _View())
-        own.is_moving = False
+        view_data = self._views.setdefault(view.name, _View())
+        view_data.is_moving = False
         self.statistics = Statistics()
         if not snapshot.strand_count:
             return
@@ -212,12 +212,14 @@ class StrandPass:
         is_debug = content == "light" and snapshot.debug_view != "none"
         transparency = "none" if is_debug else drawn_transparency(snapshot.strand_settings)
         is_layered = transparency == "layers"
-        own.is_moving = view.is_moving and is_layered and own.detail.may_move(snapshot)
-        order = own.detail.order(
+        view_data.is_moving = (
+            view.is_moving and is_layered and view_data.detail.has_rest_counts(snapshot)
+        )
+        order = view_data.detail.order(
             *(snapshot, self._textures, serial, camera, size),
             by_depth=not is_layered,
             counted=is_layered and view.name is not None,
-            room=LAYERS_OF_PIXELS.room_for if own.is_moving else None,
+            reserve_fragments=LAYERS_OF_PIXELS.reserve if view_data.is_moving else None,
         )
         if not order.classes:
             return
@@ -225,7 +227,8 @@ class StrandPass:
         if content == "light" and not is_debug:
             maps = self.opacity(snapshot, view=view.name, is_turning=view.is_turning)
         if content == "light" and not others:
-            own.lit.inter_groom_shadow.release()  # else it keeps maps of grooms that are gone
+            # else it keeps maps of grooms that are gone
+            view_data.shadows.inter_groom_shadow.release()
         drawing = StrandDrawing(
             order=order,
             ribbon=self._ribbons.of,
@@ -236,7 +239,7 @@ class StrandPass:
                 self._curves(snapshot),
             ),
             shading=(
-                tuple(self._shading(snapshot, maps, own.lit.inter_groom_shadow, others))
+                tuple(self._shading(snapshot, maps, view_data.shadows.inter_groom_shadow, others))
                 if content == "light"
                 else (self._tangents(snapshot),)
             ),
@@ -248,18 +251,18 @@ class StrandPass:
             samples_across=samples,
             expected_depths=lambda: expected_depths(self._ball.of(snapshot), camera),
         )
-        layers = LayersDrawn()
+        layers = LayerStatistics()
         if is_layered:
             layers = LAYERS_OF_PIXELS.draw(
                 drawing,
                 is_own_target=output == "scene_linear",
-                in_parts=own.parts > 1,
-                is_moving=own.is_moving,
+                in_parts=view_data.part_count > 1,
+                is_moving=view_data.is_moving,
                 is_turning=view.is_turning,
                 picture=view.picture,
                 is_sample=view.is_sample,
             )
-            own.parts = own.parts if own.is_moving else layers.parts
+            view_data.part_count = view_data.part_count if view_data.is_moving else layers.parts
         elif transparency == "hashed":
             HASHED_STRANDS.draw(drawing)
         else:
@@ -282,7 +285,7 @@ class StrandPass:
         share them.
 
         Args:
-            view: name of the view; is_turning: see InView.
+            view: name of the view; is_turning: see ViewState.
 
         Raises:
             ShaderError: as `draw`.
@@ -290,7 +293,7 @@ class StrandPass:
         if snapshot.volume.shadows == "none" or not snapshot.strand_count:
             return None
         self._upload(snapshot)
-        return self._lit_by(snapshot, view).maps(
+        return self._opacity_pass(snapshot, view).maps(
             self._textures["cv_points"],
             self._points_serial,
             snapshot.layout,
@@ -300,32 +303,37 @@ class StrandPass:
             snapshot.strand_settings,
             snapshot.all_casters,
             snapshot.spacing,
-            None if snapshot.along is None else self._textures["cv_looks"],
+            None if snapshot.along is None else self._textures["cv_attributes"],
             snapshot.rank,
             is_turning=is_turning,
         )
 
-    def _lit_by(self, snapshot: Snapshot, view: Hashable) -> OpacityPass:
+    def _opacity_pass(self, snapshot: Snapshot, view: Hashable) -> OpacityPass:
         """The pass for the maps of these lights: that of any view with these lights, or the
         view's own."""
-        light, own = snapshot.lights, self._views.setdefault(view, _View())
-        lit = next((each.lit for each in self._views.values() if each.lit.light == light), own.lit)
-        if lit.light not in (light, None) and own.asked == light:
-            lit = _Lit()  # another view, which shared these lights, has turned
-        lit.light = own.asked = light
-        own.lit = lit
-        return lit.opacity
+        lights, view_data = snapshot.lights, self._views.setdefault(view, _View())
+        shadows = next(
+            (each.shadows for each in self._views.values() if each.shadows.lights == lights),
+            view_data.shadows,
+        )
+        if shadows.lights not in (lights, None) and view_data.last_lights == lights:
+            shadows = _Shadows()  # another view, which shared these lights, has turned
+        shadows.lights = view_data.last_lights = lights
+        view_data.shadows = shadows
+        return shadows.opacity
 
-    def is_behind(self, view: Hashable) -> bool:
+    def needs_redraw(self, view: Hashable) -> bool:
         """Whether a view must be drawn again once it is at rest, because its shadows lag behind its
         lights, or because it was drawn without waiting for the GPU.
         """
-        own = self._views.get(view)
-        return own is not None and (own.is_moving or own.lit.opacity.is_behind)
+        view_data = self._views.get(view)
+        return view_data is not None and (
+            view_data.is_moving or view_data.shadows.opacity.has_stale_maps
+        )
 
     def forget_views(self, shown: Set[Hashable]) -> None:
         """Release the data of all views except these."""
-        self._views = {view: own for view, own in self._views.items() if view in shown}
+        self._views = {view: view_data for view, view_data in self._views.items() if view in shown}
 
     def forget_view(self, view: Hashable) -> None:
         """Release the data of this view."""
@@ -353,18 +361,19 @@ class StrandPass:
     def _curves(self, snapshot: Snapshot) -> ShaderFeature:
         """The feature of programs that need the points of strands."""
         textures = self._textures
-        looks = None if snapshot.along is None else textures["cv_looks"]
-        return curves_feature(textures["cv_points"], textures["strand_spans"], looks)
+        attributes = None if snapshot.along is None else textures["cv_attributes"]
+        return curves_feature(textures["cv_points"], textures["strand_spans"], attributes)
 
     def _tangents(self, snapshot: Snapshot) -> ShaderFeature:
         """The feature of programs that write tangents, instead of those for shading."""
         return ShaderFeature(
-            name="tangents", textures=self._looks(snapshot), defines={"TANGENTS": 1}
+            name="tangents", textures=self._attributes(snapshot), defines={"TANGENTS": 1}
         )
 
-    def _looks(self, snapshot: Snapshot) -> dict[str, tuple[str, Any]]:
-        """Textures for shading; cv_looks only for evenly spaced points, else it is in `_curves`."""
-        names = ("strand_seeds", *(("cv_looks",) if snapshot.along is None else ()))
+    def _attributes(self, snapshot: Snapshot) -> dict[str, tuple[str, Any]]:
+        """Textures for shading; cv_attributes only for evenly spaced points, else it is in
+        `_curves`."""
+        names = ("strand_seeds", *(("cv_attributes",) if snapshot.along is None else ()))
         return {name: ("FLOAT_2D", self._textures[name]) for name in names}
 
     def _shading(
@@ -379,7 +388,7 @@ class StrandPass:
         Debug views do not depend on the shading model.
         """
         yield ShaderFeature(
-            textures=self._looks(snapshot),
+            textures=self._attributes(snapshot),
             blocks={"shading": ("ShadingSettings", struct_values(snapshot.shading))},
             numbers={"volume_center": ("VEC3", snapshot.center.tolist())},
         )
@@ -459,7 +468,7 @@ class StrandPass:
             names, defines = kinds.textures, defines | dict(kinds.defines) | {"HAS_SOLIDS": 1}
             integers = dict.fromkeys(kinds.integers, len(snapshot.solids))
             shown = SHOWN_DEPTH * self._ball.of(snapshot).radius
-            numbers = {"shown_depth": ("FLOAT", max(shown, _THIN))}
+            numbers = {"shown_depth": ("FLOAT", max(shown, _MIN_RADIUS))}
         return ShaderFeature(
             name=snapshot.debug_view,
             textures={name: ("FLOAT_2D", self._textures[name]) for name in names},
@@ -477,26 +486,28 @@ class StrandPass:
                 raise ShaderError("strand: what the GPU has computed was released")
             points = (device, (device.serial,))
         points = (*points, layout, snapshot.along)
-        if self._take("cv_points", points, lambda: _points_texture(snapshot)):
+        if self._update_texture("cv_points", points, lambda: _points_texture(snapshot)):
             self._points_serial += 1
-        self._take("strand_spans", (layout,), lambda: spans_texture(layout))
-        looks = (snapshot.occlusion, snapshot.along, layout)
-        self._take("cv_looks", looks, lambda: _looks_texture(snapshot))
-        self._take("strand_seeds", (snapshot.seed, layout), lambda: _seeds_texture(snapshot))
+        self._update_texture("strand_spans", (layout,), lambda: spans_texture(layout))
+        attributes = (snapshot.occlusion, snapshot.along, layout)
+        self._update_texture("cv_attributes", attributes, lambda: _attributes_texture(snapshot))
+        self._update_texture(
+            "strand_seeds", (snapshot.seed, layout), lambda: _seeds_texture(snapshot)
+        )
         look = snapshot.shading
         if not _has_own_colors(snapshot):
-            self._drop("cv_colors")
+            self._release_texture("cv_colors")
         else:
             chosen = (look.color_source, look.brow_source, look.brow_color)
             sources = (snapshot.color, snapshot.group, layout, chosen)
-            self._take("cv_colors", sources, partial(_colors_texture, snapshot))
+            self._update_texture("cv_colors", sources, partial(_colors_texture, snapshot))
         openness = snapshot.openness
         # Kajiya-Kay's model shadows the world's light by ambient occlusion alone
         if not snapshot.has_world or look.model != "marschner" or openness is None:
-            self._drop("cv_openness")
+            self._release_texture("cv_openness")
         else:
             make = partial(_half_texture, layout, openness)
-            self._take("cv_openness", (openness, layout), make)
+            self._update_texture("cv_openness", (openness, layout), make)
         self._upload_skin(snapshot)
         self._upload_debug(snapshot)
 
@@ -504,15 +515,19 @@ class StrandPass:
         layout = snapshot.layout
         if snapshot.debug_view in NUMBERED_VIEWS:
             numbers = getattr(snapshot, snapshot.debug_view)
-            self._take("debug_numbers", (numbers, layout), lambda: _numbers_texture(snapshot))
+            self._update_texture(
+                "debug_numbers", (numbers, layout), lambda: _numbers_texture(snapshot)
+            )
         elif snapshot.debug_view == "stretch":
             make = partial(_lengths_texture, snapshot)
-            self._take("rest_lengths", (snapshot.rest, layout), make)
+            self._update_texture("rest_lengths", (snapshot.rest, layout), make)
         elif snapshot.debug_view == "depth" and snapshot.solids:
             solids = self._colliders.of(snapshot.solids)
-            self._take("rounds", (solids,), lambda: solids.rounds)
-            self._take("fields", (solids,), lambda: solids.fields)
-            self._take("solids", (snapshot.solids,), lambda: solids.solids(snapshot.solids))
+            self._update_texture("rounds", (solids,), lambda: solids.rounds)
+            self._update_texture("fields", (solids,), lambda: solids.fields)
+            self._update_texture(
+                "solids", (snapshot.solids,), lambda: solids.solids(snapshot.solids)
+            )
 
     def _upload_skin(self, snapshot: Snapshot) -> None:
         """Upload the skin that strands see, which only light from strand to strand needs."""
@@ -520,12 +535,12 @@ class StrandPass:
         is_wanted = snapshot.shading.model == "marschner" and snapshot.volume.scattering
         for name, part in (("cv_received", slice(4)), ("cv_beneath", slice(4, 8))):
             if seen is None or not is_wanted:
-                self._drop(name)
+                self._release_texture(name)
             else:
                 make = partial(_half_texture, layout, seen[:, part])
-                self._take(name, (seen, layout), make)
+                self._update_texture(name, (seen, layout), make)
 
-    def _take(self, name: str, sources: tuple[Any, ...], make: Callable[[], Any]) -> bool:
+    def _update_texture(self, name: str, sources: tuple[Any, ...], make: Callable[[], Any]) -> bool:
         """Make a texture again if a source is a new object; tuples are compared by value."""
         before = self._uploaded.get(name, ())
         if len(before) == len(sources) and all(
@@ -537,7 +552,7 @@ class StrandPass:
         self._uploaded[name] = sources
         return True
 
-    def _drop(self, name: str) -> None:
+    def _release_texture(self, name: str) -> None:
         """Release a texture that is no longer needed."""
         self._textures.pop(name, None)
         self._uploaded.pop(name, None)
@@ -549,11 +564,11 @@ def drawn_transparency(settings: StrandSettings) -> str:
     return "hashed" if wanted == "layers" and not capabilities().image_atomics else wanted
 
 
-def calm_samples(settings: StrandSettings) -> int:
+def noise_free_samples(settings: StrandSettings) -> int:
     """Samples per pixel that make a still free of noise where strands are hashed as a fallback for
     layers; else 1.
     """
-    return CALM_SAMPLES if drawn_transparency(settings) != settings.transparency else 1
+    return NOISE_FREE_SAMPLES if drawn_transparency(settings) != settings.transparency else 1
 
 
 def _half_texture(layout: StrandLayout, values: Floats) -> Any:
@@ -585,7 +600,7 @@ def _colors_texture(snapshot: Snapshot) -> Any:
     if every_cv is not None:
         known += natural_strands(every_cv, look)[..., None]
     packed = np.concatenate([np.where(is_known, color, 0.0), known], axis=-1)
-    return texture_from(snapshot.layout.pixels(np.minimum(packed, _BRIGHTEST)), "RGBA16F")
+    return texture_from(snapshot.layout.pixels(np.minimum(packed, _MAX_HALF_FLOAT)), "RGBA16F")
 
 
 def _numbers_texture(snapshot: Snapshot) -> Any:
@@ -605,12 +620,12 @@ def _lengths_texture(snapshot: Snapshot) -> Any:
     return texture_from(snapshot.layout.pixels(length), "R32F")
 
 
-def _looks_texture(snapshot: Snapshot) -> Any:
-    looks = np.ones((snapshot.layout.point_count, 2), np.float32)
+def _attributes_texture(snapshot: Snapshot) -> Any:
+    attributes = np.ones((snapshot.layout.point_count, 2), np.float32)
     for channel, values in enumerate((snapshot.occlusion, snapshot.along)):
         if values is not None:
-            looks[:, channel] = values
-    return texture_from(snapshot.layout.pixels(looks), "RG32F")
+            attributes[:, channel] = values
+    return texture_from(snapshot.layout.pixels(attributes), "RG32F")
 
 
 def _seeds_texture(snapshot: Snapshot) -> Any:

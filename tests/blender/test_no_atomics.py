@@ -24,7 +24,7 @@ from hairloom.addon.render.camera import Camera, look_at, perspective  # noqa: E
 from hairloom.addon.render.frame import render_image  # noqa: E402
 from hairloom.addon.render.hashed_strands import HASHED_STRANDS  # noqa: E402
 from hairloom.addon.render.snapshot import Snapshot  # noqa: E402
-from hairloom.addon.render.strand_pass import calm_samples  # noqa: E402
+from hairloom.addon.render.strand_pass import noise_free_samples  # noqa: E402
 from hairloom.addon.render.textures import texture_to_array  # noqa: E402
 from hairloom.addon.shading.lights import three_point_lights  # noqa: E402
 from hairloom.addon.shading.settings import StrandSettings  # noqa: E402
@@ -79,10 +79,10 @@ def test_a_render_shares_what_was_drawn_elsewhere(
 
 def test_stills_take_more_samples_without_atomics() -> None:
     layers, hashed = StrandSettings(), StrandSettings(transparency="hashed")
-    assert calm_samples(layers) == 1
+    assert noise_free_samples(layers) == 1
     capabilities.choose_image_atomics("never")
-    assert calm_samples(layers) == 16
-    assert calm_samples(hashed) == 1, "what an artist has chosen is drawn as it is"
+    assert noise_free_samples(layers) == 16
+    assert noise_free_samples(hashed) == 1, "what an artist has chosen is drawn as it is"
 
 
 def test_the_preferences_forbid_them_and_the_self_test_says_so(monkeypatch: Any) -> None:

@@ -65,7 +65,7 @@ ALL = (
     "tests/gpu/test_inter_groom_shadow.py::test_hair_has_the_shadow_of_other_grooms",
     "tests/gpu/test_lead_out_pass.py::test_equals_numpy",
     "tests/gpu/test_lead_out_pass.py::test_puts_what_was_led_earlier",
-    "tests/gpu/test_kept_picture.py::test_what_is_shown_again_is_what_was_drawn",
+    "tests/gpu/test_cached_picture.py::test_what_is_shown_again_is_what_was_drawn",
     "tests/gpu/test_light_kinds.py::test_kinds_that_are_left_out_would_add_nothing",
     "tests/gpu/test_moving_strands.py::test_what_moves_waits_for_nothing_and_is_what_is_drawn_at_rest",
     "tests/gpu/test_opacity_tiles.py::test_maps_of_several_lights_lie_below_one_another",

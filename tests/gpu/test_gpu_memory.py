@@ -27,7 +27,7 @@ SUN = Light.sun((0.3, 1.0, -0.5), (1.0, 1.0, 1.0), 3.0)
 def no_choice(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     monkeypatch.delenv(gpu_memory.MEMORY_VARIABLE, raising=False)
     yield
-    gpu_memory.choose_budget(gpu_memory.DEFAULT)
+    gpu_memory.choose_budget(gpu_memory.DEFAULT_MEGABYTES)
 
 
 @pytest.fixture
@@ -82,16 +82,18 @@ def test_the_environment_is_stronger_than_the_preferences(monkeypatch: pytest.Mo
 def test_lists_take_what_is_left_and_never_nothing() -> None:
     gpu_objects.free_unused()
     taken = gpu_objects.bytes_in_use()
-    before = gpu_memory.lists_room(0)
+    before = gpu_memory.fragment_list_budget(0)
     budget = -(-taken // MEGABYTE) + 32
     gpu_memory.choose_budget(budget)
-    assert not gpu_memory.is_short()
+    assert not gpu_memory.exceeds_budget()
     large = gpu_objects.texture((2048, 2048), format="RGBA32F")  # 64 MB
-    assert gpu_memory.is_short()
-    assert gpu_memory.lists_room(0) == budget * MEGABYTE // 32
-    assert gpu_memory.lists_room(64 * MEGABYTE) > gpu_memory.lists_room(0), "these are the lists"
+    assert gpu_memory.exceeds_budget()
+    assert gpu_memory.fragment_list_budget(0) == budget * MEGABYTE // 32
+    assert gpu_memory.fragment_list_budget(64 * MEGABYTE) > gpu_memory.fragment_list_budget(0), (
+        "these are the lists"
+    )
     del large
-    assert not gpu_memory.is_short()
+    assert not gpu_memory.exceeds_budget()
     assert before == 256 * MEGABYTE, "a quarter where nothing is in the way"
 
 
@@ -113,7 +115,7 @@ def test_lists_shrink_when_the_budget_does() -> None:
     with Target().sized(SIZE, SIZE).drawing():
         for budget in (1024, 1, 1024):
             gpu_memory.choose_budget(budget)
-            rooms.append(lists.room_for(10))
+            rooms.append(lists.reserve(10))
     assert rooms[1] < rooms[0]
     assert rooms[1] * 20 <= MEGABYTE // 4
     assert rooms[2] >= rooms[1]
@@ -132,7 +134,7 @@ def test_shadow_maps_of_many_grooms_share_half_of_it(hair: Any) -> None:
             assert maps.size.bytes <= 4 * MEGABYTE // count
             sizes.append(maps.size.side)
     assert 256 > sizes[0] > sizes[1] > sizes[2] > 16
-    assert gpu_memory.maps_room() == 4 * MEGABYTE, "alone again"
+    assert gpu_memory.shadow_map_budget() == 4 * MEGABYTE, "alone again"
 
 
 def test_a_draw_says_once_that_its_maps_have_fewer_texels(frame: Any, hair: Any) -> None:
@@ -150,7 +152,7 @@ def test_a_draw_says_once_that_its_maps_have_fewer_texels(frame: Any, hair: Any)
     gpu_memory.choose_budget(8)
     (one,), (many,) = notes(1), notes(8)
     assert one != many and "may take 4," in one and "1 light " in one
-    gpu_memory.choose_budget(gpu_memory.DEFAULT)
+    gpu_memory.choose_budget(gpu_memory.DEFAULT_MEGABYTES)
     assert notes(1) == ()
 
 
@@ -171,8 +173,9 @@ def test_each_thread_has_its_own_number_of_grooms() -> None:
     found = []
     with gpu_memory.shared_by(4):
         thread = threading.Thread(
-            target=contextvars.Context().run, args=(lambda: found.append(gpu_memory.maps_room()),)
+            target=contextvars.Context().run,
+            args=(lambda: found.append(gpu_memory.shadow_map_budget()),),
         )
         thread.start()
         thread.join()
-        assert gpu_memory.maps_room() * 4 == found[0]
+        assert gpu_memory.shadow_map_budget() * 4 == found[0]

@@ -215,7 +215,7 @@ def test_views_in_other_light_keep_what_lies_between(gpu_context: Any) -> None:
     """Two views that are drawn in turn keep their look-ups until the other hair moves."""
     from hairloom.addon.render.accumulation import Target
     from hairloom.addon.render.groom_pass import GroomPass
-    from hairloom.addon.render.strand_pass import InView
+    from hairloom.addon.render.strand_pass import ViewState
 
     light = {"a": (SUN,), "b": (Light.sun((0.3, 0.0, -1.0), (1.0, 1.0, 1.0), 3.0),)}
     low, high = groom("low", sheet(0.1)).snapshot, groom("high", sheet(0.3, seed=2)).snapshot
@@ -228,7 +228,7 @@ def test_views_in_other_light_keep_what_lies_between(gpu_context: Any) -> None:
         assert others == [maps["high"]]
 
         def draw() -> None:
-            shown = InView(view)
+            shown = ViewState(view)
             passes["low"].strands.draw(lit["low"], CAMERA, SIZE, SIZE, others=others, view=shown)
 
         target.sized(SIZE, SIZE).clear((0.0, 0.0, 0.0, 0.0))

@@ -57,7 +57,7 @@ def drawn(frame: Any, own: Any, groom: Any, camera: Any, **options: Any) -> Any:
     import gpu
 
     from hairloom.addon.render.mesh_pass import MeshPass
-    from hairloom.addon.render.strand_pass import InView
+    from hairloom.addon.render.strand_pass import ViewState
     from hairloom.addon.render.textures import drawing_into
 
     color = gpu.types.GPUTexture((SIZE, SIZE), format="RGBA32F")
@@ -65,7 +65,7 @@ def drawn(frame: Any, own: Any, groom: Any, camera: Any, **options: Any) -> Any:
     target = gpu.types.GPUFrameBuffer(depth_slot=depth, color_slots=(color,))
 
     def draw_hair() -> None:
-        own.draw(groom, camera, SIZE, SIZE, output="viewport", view=InView(VIEW, **options))
+        own.draw(groom, camera, SIZE, SIZE, output="viewport", view=ViewState(VIEW, **options))
 
     with drawing_into(target):
         target.clear(color=(0.0, 0.0, 0.0, 0.0), depth=1.0)
@@ -84,16 +84,16 @@ def test_what_moves_waits_for_nothing_and_is_what_is_drawn_at_rest(frame: Any) -
     for groom in (curls(frame), lit):
         own = frame.StrandPass()
         assert drawn(frame, own, groom, seen_from(frame), is_moving=True)[1]["reads"] > 0
-        assert not own.is_behind(VIEW), "nothing is known of a view before its first draw"
+        assert not own.needs_redraw(VIEW), "nothing is known of a view before its first draw"
         for number in range(1, 4):
             now, camera = moved(groom, number), seen_from(frame, degrees=5.0 * number)
             found, calls = drawn(frame, own, now, camera, is_moving=True)
-            assert calls["reads"] == 0 and calls["draws"] > 0 and own.is_behind(VIEW)
+            assert calls["reads"] == 0 and calls["draws"] > 0 and own.needs_redraw(VIEW)
             expected, _ = drawn(frame, frame.StrandPass(), now, camera)
             assert np.abs(found - expected).max() < 1e-5 and expected[..., 3].mean() > 0.1
         found, calls = drawn(frame, own, now, camera)
         assert np.abs(found - expected).max() < 1e-5 and calls["reads"] > 0
-        assert not own.is_behind(VIEW)
+        assert not own.needs_redraw(VIEW)
     away = frame.Camera(frame.look_at((0, -1, 0), (0, -2, 0)), seen_from(frame).projection)
     assert not drawn(frame, own, groom, away, is_moving=True)[0].any(), "and behind the eye"
 
@@ -127,7 +127,7 @@ def test_other_strands_are_counted_first(frame: Any) -> None:
 
 def test_a_jump_coarsens_strands_and_loses_none(frame: Any, monkeypatch: Any) -> None:
     """All were hidden by the head, and the view jumps to their side and much nearer."""
-    from hairloom.addon.render.known_detail import KnownDetail
+    from hairloom.addon.render.rest_counts import RestCounts
 
     spheres = np.array([[0.0, 0.0, 0.0, 0.098]], np.float32)
     detail = DetailSettings(lod_size=0.0, culling="hidden")
@@ -137,7 +137,7 @@ def test_a_jump_coarsens_strands_and_loses_none(frame: Any, monkeypatch: Any) ->
     before = own.statistics
     camera = seen_from(frame, degrees=180.0, distance=0.7)
     # the number of slots does not adapt to the distance either
-    monkeypatch.setattr(KnownDetail, "slots_at", lambda self, _: len(groom.roots))
+    monkeypatch.setattr(RestCounts, "slots_at", lambda self, _: len(groom.roots))
     found, calls = drawn(frame, own, groom, camera, is_moving=True)
     still = frame.StrandPass()
     expected, _ = drawn(frame, still, groom, camera)

@@ -18,7 +18,7 @@ from hairloom.addon.shading.volume.light_frame import (
     Ball,
     LightFrame,
     ball_around,
-    is_within,
+    is_too_near,
     light_frame,
 )
 from hairloom.addon.shading.volume.opacity import (
@@ -122,7 +122,7 @@ def test_sums_are_those_of_the_strands(gpu_context: Any, light: Light, shadows: 
         assert np.abs(blocks[0] - blocks[1]).max() < 0.05 * blocks[1].max()
     found, expected = np.mean(sums, axis=0)
     # in wide maps, the width of bent strands differs between CVs
-    is_wide = is_within(light, ball_around(strands))
+    is_wide = is_too_near(light, ball_around(strands))
     assert found == pytest.approx(expected, rel=2e-2 if is_wide else 4e-3)
 
 
@@ -532,7 +532,9 @@ def test_maps_too_large_for_memory_are_drawn_smaller_and_still_right(
     )
     points, ball, opacity = points_of(strands, radius), ball_around(strands), OpacityPass()
     maps = opacity.maps(points, 1, layout_of(strands), ball, lights, settings, PLAIN)
-    assert maps.size.bytes <= gpu_memory.maps_room() and f"have {maps.size.side}" in maps.note
+    assert (
+        maps.size.bytes <= gpu_memory.shadow_map_budget() and f"have {maps.size.side}" in maps.note
+    )
     frame = light_frame(lights[0], ball)
     assert frame is not None
     exact = coverage(strands, radius, frame, 64)

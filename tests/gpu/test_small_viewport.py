@@ -37,8 +37,8 @@ def test_hair_stays_in_its_viewport(frame: Any, transparency: str, keeps: bool) 
     """
     import gpu
 
-    from hairloom.addon.render.kept_picture import KeptPicture
-    from hairloom.addon.render.strand_pass import InView
+    from hairloom.addon.render.cached_picture import CachedPicture
+    from hairloom.addon.render.strand_pass import ViewState
     from hairloom.addon.render.textures import drawing_into
 
     left, bottom, width, height = VIEWPORT
@@ -58,7 +58,7 @@ def test_hair_stays_in_its_viewport(frame: Any, transparency: str, keeps: bool) 
     color = gpu.types.GPUTexture(SIZE, format="RGBA32F")
     depth = gpu.types.GPUTexture(SIZE, format="DEPTH_COMPONENT32F")
     target = gpu.types.GPUFrameBuffer(depth_slot=depth, color_slots=(color,))
-    own, kept = frame.StrandPass(), KeptPicture()
+    own, kept = frame.StrandPass(), CachedPicture()
     inside = np.zeros((SIZE[1], SIZE[0]), bool)
     inside[bottom : bottom + height, left : left + width] = True
 
@@ -66,7 +66,7 @@ def test_hair_stays_in_its_viewport(frame: Any, transparency: str, keeps: bool) 
         picture = kept if keeps else None
         if picture is not None:
             picture.begin()
-        view = InView(1, is_moving=is_moving, picture=picture)
+        view = ViewState(1, is_moving=is_moving, picture=picture)
         own.draw(groom, camera, width, height, output="viewport", view=view)
 
     for step in ("rests", "moves", "shown again"):

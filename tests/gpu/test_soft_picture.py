@@ -68,15 +68,15 @@ class View:
 
     def __init__(self, grooms: Sequence[Snapshot], camera: Camera) -> None:
         from hairloom.addon.render.body_shadow import BodyShadow
+        from hairloom.addon.render.cached_picture import CachedPicture
         from hairloom.addon.render.groom_pass import GroomPass
-        from hairloom.addon.render.kept_picture import KeptPicture
         from hairloom.addon.render.mesh_pass import MeshPass
         from hairloom.addon.render.soft_picture import SoftPicture
 
         self.grooms, self.camera = grooms, camera
         self.hair = [GroomPass() for _ in grooms]
         self.shadows = [BodyShadow() for _ in grooms]
-        self.kept, self.soft, self.meshes = KeptPicture(), SoftPicture(), MeshPass()
+        self.kept, self.soft, self.meshes = CachedPicture(), SoftPicture(), MeshPass()
 
     def redraw(self, draw: Any, background: float, depth: float = 1.0) -> np.ndarray:
         """The view's colours over this grey, with the floor's depths or with `depth` before it,
@@ -135,7 +135,7 @@ class View:
     def draw_hair(
         self, grooms: Sequence[Snapshot], picture: Any, view: str = HARD, **options: Any
     ) -> None:
-        from hairloom.addon.render.strand_pass import InView
+        from hairloom.addon.render.strand_pass import ViewState
 
         pairs = list(zip(self.hair, grooms, strict=True))
         maps = {key: hair.maps(each, view=view) for key, (hair, each) in enumerate(pairs)}
@@ -144,7 +144,7 @@ class View:
                 *(each, self.camera, SIZE, SIZE),
                 output="viewport",
                 others=hair.others(key, each, maps),
-                view=InView(view, picture=picture, **options),
+                view=ViewState(view, picture=picture, **options),
             )
 
 

@@ -205,10 +205,10 @@ def test_nearest_strands_hide_all_others_wherever_a_pixel_has_no_room(
 def test_what_cannot_be_drawn_is_told(frame: Any, front: Any, with_rows: Any) -> None:
     """More fragments at one depth of one pixel than there is memory for, or than a driver can
     order."""
-    from hairloom.addon.render.strand_layers import LONGEST_IN_SOFTWARE, is_software
+    from hairloom.addon.render.strand_layers import MAX_LIST_LENGTH_IN_SOFTWARE, is_software
 
     opacity = 4.0 / 4095.0
-    for rows, room in ((1, 4096), (MANY, LONGEST_IN_SOFTWARE)):
+    for rows, room in ((1, 4096), (MANY, MAX_LIST_LENGTH_IN_SOFTWARE)):
         own, shown = with_rows(rows), sheets(frame, np.zeros(room + 904), opacity)
         picture = frame.render_image(shown, front, 1, 1, 1, passes=(frame.MeshPass(), own))
         assert picture[0, 0, 3] == pytest.approx(1.0 - (1.0 - opacity) ** room, abs=1e-3)

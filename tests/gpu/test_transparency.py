@@ -373,7 +373,7 @@ def test_lists_grow_until_all_fragments_have_room(
     strands, _ = crossing(3000, np.random.default_rng(12))
     shown = snapshot_of(frame, strands, 0.4)
     first = frame.render_image(shown, front, SIZE, SIZE, 1)
-    monkeypatch.setattr(strand_layers, "FIRST_ROWS", 1)
+    monkeypatch.setattr(strand_layers, "INITIAL_ROWS", 1)
     strand_layers.LAYERS_OF_PIXELS.release()
     assert is_same(frame.render_image(shown, front, SIZE, SIZE, 1), first)
 

@@ -47,7 +47,7 @@ MODULES = {
     "hair_file": "exchange.hair_file",
     "hair_scene": "blender.engine.hair_scene",
     "import_groom": "blender.strands.import_groom",
-    "kept_picture": "render.kept_picture",
+    "cached_picture": "render.cached_picture",
     "latest_job": "blender.base.latest_job",
     "long_work": "ui.long_work",
     "motion_flow": "motion_flow",

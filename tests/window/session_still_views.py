@@ -38,7 +38,7 @@ def steps():
 
 def count_draws():
     kept, strands = (
-        hairloom_module("kept_picture").KeptPicture,
+        hairloom_module("cached_picture").CachedPicture,
         hairloom_module("strand_pass").StrandPass,
     )
     for owner, name, key in ((kept, "show", "again"), (strands, "draw", "drawn")):

@@ -15,7 +15,7 @@ ATOMICS = (
     ),
 )
 #: [MB] the lowest limit that can be set, and the default
-MIN_MEMORY, DEFAULT_MEMORY = 128, gpu_memory.DEFAULT
+MIN_MEMORY, DEFAULT_MEMORY = 128, gpu_memory.DEFAULT_MEGABYTES
 
 
 def choose(*, image_atomics: str = "automatic", memory: int = DEFAULT_MEMORY) -> None:

@@ -14,7 +14,7 @@ from ...render import gpu_objects
 from ...render.accumulation import Accumulation, Target
 from ...render.camera import Camera
 from ...render.camera_window import Window, jittered
-from ...render.capabilities import CALM_SAMPLES, capabilities
+from ...render.capabilities import NOISE_FREE_SAMPLES, capabilities
 from ...render.lens import through
 from ...render.nearest import Moment, Nearest, background, motion, projected, unprojected
 from ...render.pixel_filter import jitters
@@ -293,7 +293,7 @@ def _calm(settings: PictureSettings) -> PictureSettings:
     """The settings, with enough samples for hashed strands where the GPU cannot draw layers."""
     if capabilities().image_atomics:
         return settings
-    return replace(settings, samples=max(settings.samples, CALM_SAMPLES))
+    return replace(settings, samples=max(settings.samples, NOISE_FREE_SAMPLES))
 
 
 def sky_of(scene: SceneSnapshot, render: bpy.types.RenderSettings) -> Rgba:

@@ -20,7 +20,7 @@ from ...render.good_side import GoodSide, good_side
 from ...render.hair_ball import HairBall
 from ...render.mesh_pass import MeshPass
 from ...render.snapshot import MeshSnapshot, Snapshot
-from ...render.strand_pass import Statistics, StrandPass, calm_samples
+from ...render.strand_pass import Statistics, StrandPass, noise_free_samples
 from ...rig_flow import Pose
 from ...shading.lights import Light
 from ...shading.skin.notes import skin_notes
@@ -129,7 +129,7 @@ class Studio:
         is_soft: bool = True,
     ) -> Floats:
         draw: Callable[..., Floats] = partial(render_still, center=self._ball.center)
-        if not is_soft and calm_samples(snapshot.strand_settings) == 1:
+        if not is_soft and noise_free_samples(snapshot.strand_settings) == 1:
             draw = render_image
         picture = draw(
             *(snapshot, camera, width, height, samples),

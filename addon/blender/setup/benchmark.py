@@ -28,7 +28,7 @@ from ...render.accumulation import Target
 from ...render.camera import Camera, frame_camera
 from ...render.snapshot import Snapshot
 from ...render.strand_layers import is_software
-from ...render.strand_pass import InView, StrandPass, drawn_transparency
+from ...render.strand_pass import StrandPass, ViewState, drawn_transparency
 from ...rig_flow import Pose, Rig
 from ...shading.ambient_settings import AmbientSettings
 from ...shading.lights import three_point_lights
@@ -129,7 +129,7 @@ class _Bench:
         def draw(*, is_moving: bool) -> None:
             self.target.sized(width, height).clear((0.0, 0.0, 0.0, 0.0))
             with self.target.drawing():
-                view = InView("benchmark", is_moving=is_moving)
+                view = ViewState("benchmark", is_moving=is_moving)
                 self.strands.draw(self.shown(), camera, width, height, view=view)
 
         def play() -> None:

@@ -18,17 +18,17 @@ import numpy as np
 
 from ...render import gpu_memory
 from ...render.body_shadow import BodyShadow
+from ...render.cached_picture import CachedPicture
 from ...render.camera import Camera
 from ...render.capabilities import capabilities
 from ...render.display import Display
 from ...render.groom_pass import GroomPass
-from ...render.kept_picture import KeptPicture
 from ...render.opacity_maps import OpacityMaps
 from ...render.own_depth import OwnDepth
 from ...render.scene_pass import ONE_AT_A_TIME
 from ...render.scene_snapshot import SceneSnapshot
 from ...render.snapshot import Snapshot
-from ...render.strand_pass import InView, Statistics, drawn_transparency
+from ...render.strand_pass import Statistics, ViewState, drawn_transparency
 from ...shading.environment import Environment, world_suns
 from ...shading.lights import Light, brightest_lights, three_point_lights
 from ...strands import Surface
@@ -242,7 +242,7 @@ def _draw_strands(context: Any) -> None:
     with ONE_AT_A_TIME, gpu_memory.shared_by(len(shown)):
         if has_no_depths(context):
             _draw_depth(context.space_data.as_pointer(), camera, shown)
-        if not view.picture.is_of(marks):
+        if not view.picture.matches(marks):
             softening.harden(view)
             _draw_body_shadows(camera, shown)
             _draw_afresh(view, camera, shown, marks)
@@ -285,7 +285,7 @@ def _add_sample(view: View, camera: Camera, shown: Sequence[_Shown], samples: in
     if not view.is_soft and not is_shown:
         _draw_body_shadows(camera, shown)
 
-    def draw_hair(picture: KeptPicture) -> None:
+    def draw_hair(picture: CachedPicture) -> None:
         maps: dict[Hashable, OpacityMaps | None] = {}
         if len(lit) > 1:
             maps = {each.uid: each.maps() for each in lit}
@@ -312,7 +312,7 @@ def _draw_depth(address: int, camera: Camera, shown: Sequence[_Shown]) -> None:
 def _draw_afresh(view: View, camera: Camera, shown: list[_Shown], marks: tuple[Any, ...]) -> None:
     """Draw all grooms into the current view, and into its picture if that can be kept."""
     forget_closed_views(each.hair.strands for each in _overlay.drawn.values())
-    can_be_kept = all(each.can_be_kept for each in shown) and not gpu_memory.is_short()
+    can_be_kept = all(each.can_be_kept for each in shown) and not gpu_memory.exceeds_budget()
     picture = view.picture if can_be_kept else None
     if picture is None:
         view.picture.release()
@@ -327,7 +327,7 @@ def _draw_afresh(view: View, camera: Camera, shown: list[_Shown], marks: tuple[A
     for each in shown:
         with each.drawing.times.measured("drawing", goes_on=bool(maps)):
             each.draw(camera, maps, picture, is_moving=is_moving)
-    view.is_behind = any(each.drawn.hair.strands.is_behind(view.address) for each in shown)
+    view.is_behind = any(each.drawn.hair.strands.needs_redraw(view.address) for each in shown)
     view.counted = {each.uid: each.drawn.hair.strands.statistics for each in shown}
     if picture is not None and not view.is_behind:
         picture.marks = marks
@@ -393,7 +393,7 @@ class _Shown:
         self,
         camera: Camera,
         maps: Mapping[Hashable, OpacityMaps | None],
-        picture: KeptPicture | None,
+        picture: CachedPicture | None,
         *,
         is_moving: bool,
         is_sample: bool = False,
@@ -402,7 +402,7 @@ class _Shown:
 
         Args:
             maps: of all hair in the view, by session number.
-            picture, is_moving, is_sample: see InView.
+            picture, is_moving, is_sample: see ViewState.
         """
         _, _, width, height = gpu.state.viewport_get()
         snapshot, display, hair = self.snapshot, self.display, self.drawn.hair
@@ -414,7 +414,7 @@ class _Shown:
             output="viewport",
             display=display,
             others=hair.others(self.uid, snapshot, maps),
-            view=InView(self.view, self.is_turning, is_moving, picture, is_sample),
+            view=ViewState(self.view, self.is_turning, is_moving, picture, is_sample),
         )
         if is_sample:
             return

@@ -87,7 +87,7 @@ def takes_sample(view: View) -> bool:
     if not _softening.is_due or _softening.view is not view:
         return False
     _softening.is_due = False
-    if gpu_memory.is_short(_softening.picture.missing_bytes()):
+    if gpu_memory.exceeds_budget(_softening.picture.missing_bytes()):
         view.wants_more = False
         _stop()
         soon(_ask, 0.0)

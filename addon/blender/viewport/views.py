@@ -16,8 +16,8 @@ from typing import Any
 import bpy
 import gpu
 
+from ...render.cached_picture import CachedPicture, are_same_marks
 from ...render.camera import Camera
-from ...render.kept_picture import KeptPicture, are_same_marks
 from ...render.strand_pass import Statistics, StrandPass
 from ..base.redraw import redraw_views, soon
 
@@ -33,7 +33,7 @@ _ROW, _LONG = 3, 5.0
 class View:
     """What is kept for a 3D view.
 
-    address: of its region's data. marks: of what was last drawn into it, see KeptPicture.
+    address: of its region's data. marks: of what was last drawn into it, see CachedPicture.
     counted: counts of what its picture shows, by session number of the hair.
     is_behind: whether its shadows lag behind its lights, or it was drawn without waiting for the
         GPU.
@@ -47,7 +47,7 @@ class View:
     """
 
     address: int
-    picture: KeptPicture = field(default_factory=KeptPicture)
+    picture: CachedPicture = field(default_factory=CachedPicture)
     marks: tuple[Any, ...] = ()
     counted: dict[int, Statistics] = field(default_factory=dict)
     is_behind: bool = False

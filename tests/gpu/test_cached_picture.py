@@ -1,4 +1,4 @@
-"""A view's kept picture is shown again without other work for the GPU."""
+"""A view's cached picture is shown again without other work for the GPU."""
 
 from __future__ import annotations
 
@@ -52,24 +52,24 @@ def drawn(grooms: Any, camera: Any, draw_hair: Any) -> np.ndarray:
 
 def test_what_is_shown_again_is_what_was_drawn(frame: Any, scene: Any) -> None:
     """For two grooms with a mesh that hides some of their hair."""
-    from hairloom.addon.render.kept_picture import KeptPicture
-    from hairloom.addon.render.strand_pass import InView
+    from hairloom.addon.render.cached_picture import CachedPicture
+    from hairloom.addon.render.strand_pass import ViewState
 
-    (grooms, camera), kept = scene, KeptPicture()
+    (grooms, camera), cached = scene, CachedPicture()
     passes = [frame.StrandPass() for _ in grooms]
 
     def draw_hair(picture: Any) -> None:
         for own, groom in zip(passes, grooms, strict=True):
-            own.draw(groom, camera, SIZE, SIZE, output="viewport", view=InView(picture=picture))
+            own.draw(groom, camera, SIZE, SIZE, output="viewport", view=ViewState(picture=picture))
 
     plain = drawn(grooms, camera, lambda: draw_hair(None))
 
     def draw_and_keep() -> None:
-        kept.begin()
-        draw_hair(kept)
+        cached.begin()
+        draw_hair(cached)
 
     assert is_same(drawn(grooms, camera, draw_and_keep), plain), "keeping changes nothing"
-    again = drawn(grooms, camera, kept.show)
+    again = drawn(grooms, camera, cached.show)
     assert (again[..., 4] == plain[..., 4]).all()
     assert np.abs(again - plain).max() < 1.0 / 510.0
     empty = drawn(grooms, camera, lambda: None)
@@ -80,40 +80,40 @@ def test_what_is_shown_again_is_what_was_drawn(frame: Any, scene: Any) -> None:
 
 
 def test_showing_again_reads_nothing_and_draws_two_triangles(frame: Any, scene: Any) -> None:
-    from hairloom.addon.render.kept_picture import KeptPicture
-    from hairloom.addon.render.strand_pass import InView
+    from hairloom.addon.render.cached_picture import CachedPicture
+    from hairloom.addon.render.strand_pass import ViewState
 
-    (grooms, camera), kept = scene, KeptPicture()
+    (grooms, camera), cached = scene, CachedPicture()
 
     def keep() -> None:
-        kept.begin()
-        shown = InView(picture=kept)
+        cached.begin()
+        shown = ViewState(picture=cached)
         frame.StrandPass().draw(grooms[0], camera, SIZE, SIZE, output="viewport", view=shown)
 
     drawn(grooms, camera, keep)
     calls: list[Any] = []
-    drawn(grooms, camera, lambda: calls.append(gpu_calls(kept.show)))
+    drawn(grooms, camera, lambda: calls.append(gpu_calls(cached.show)))
     assert calls == [{"draws": 2}]
 
 
-def test_a_picture_is_of_its_marks_alone() -> None:
-    from hairloom.addon.render.kept_picture import KeptPicture
+def test_a_picture_matches_only_its_own_marks() -> None:
+    from hairloom.addon.render.cached_picture import CachedPicture
 
-    kept, thing = KeptPicture(), object()
-    assert not kept.is_of(()), "nothing is kept yet"
-    kept.marks = (thing, 1, (2.0, "a"))
-    assert kept.is_of((thing, 1, (2.0, "a")))
+    cached, thing = CachedPicture(), object()
+    assert not cached.matches(()), "nothing is kept yet"
+    cached.marks = (thing, 1, (2.0, "a"))
+    assert cached.matches((thing, 1, (2.0, "a")))
     for other in ((object(), 1, (2.0, "a")), (thing, 2, (2.0, "a")), (thing, 1)):
-        assert not kept.is_of(other)
-    kept.forget()
-    assert not kept.is_of((thing, 1, (2.0, "a")))
+        assert not cached.matches(other)
+    cached.forget()
+    assert not cached.matches((thing, 1, (2.0, "a")))
 
 
 def test_a_groom_in_many_lengths_takes_few_draws(frame: Any, scene: Any) -> None:
     """With three lights' maps, strands of 1 to 60 segments take at most 40 draws."""
-    from hairloom.addon.render.kept_picture import KeptPicture
+    from hairloom.addon.render.cached_picture import CachedPicture
     from hairloom.addon.render.strand_layout import StrandLayout
-    from hairloom.addon.render.strand_pass import InView
+    from hairloom.addon.render.strand_pass import ViewState
 
     grooms, camera = scene
     random = np.random.default_rng(1)
@@ -129,11 +129,11 @@ def test_a_groom_in_many_lengths_takes_few_draws(frame: Any, scene: Any) -> None
         occlusion=None,
         lights=studio(camera),
     )
-    own, kept, calls = frame.StrandPass(), KeptPicture(), []
+    own, cached, calls = frame.StrandPass(), CachedPicture(), []
 
     def draw() -> None:
-        kept.begin()
-        own.draw(groom, camera, SIZE, SIZE, output="viewport", view=InView(picture=kept))
+        cached.begin()
+        own.draw(groom, camera, SIZE, SIZE, output="viewport", view=ViewState(picture=cached))
 
     drawn([groom], camera, lambda: calls.append(gpu_calls(draw)))
     assert own.statistics.strands == 300 and 10 < calls[0]["draws"] <= 40
@@ -163,18 +163,18 @@ def test_shadows_lag_while_a_view_turns_and_are_exact_once_it_rests(frame: Any, 
 
     assert dispatches(0.0, is_turning=True)[0] == 3, "all maps at first"
     for degrees, count in ((1.0, 0), (5.0, 0), (12.0, 1), (13.0, 1), (13.5, 1)):
-        assert dispatches(degrees, is_turning=True)[0] == count and own.is_behind(1)
+        assert dispatches(degrees, is_turning=True)[0] == count and own.needs_redraw(1)
     assert dispatches(40.0, is_turning=True) == (3, 0.0), "nor does any lag far behind"
-    assert not own.is_behind(1)
-    assert dispatches(41.0, is_turning=True)[0] == 0 and own.is_behind(1)
+    assert not own.needs_redraw(1)
+    assert dispatches(41.0, is_turning=True)[0] == 0 and own.needs_redraw(1)
     assert dispatches(41.0, is_turning=False) == (3, 0.0)
-    assert not own.is_behind(1)
+    assert not own.needs_redraw(1)
     assert dispatches(41.0, is_turning=False)[0] == 0
 
 
 def test_views_beside_each_other_keep_what_is_theirs(frame: Any, scene: Any) -> None:
     """Two views in turn do not compute detail or draw maps again, and look as each does alone."""
-    from hairloom.addon.render.strand_pass import InView
+    from hairloom.addon.render.strand_pass import ViewState
 
     grooms, _ = scene
     cameras = {name: turned(frame, degrees) for name, degrees in (("a", 0.0), ("b", 120.0))}
@@ -185,7 +185,7 @@ def test_views_beside_each_other_keep_what_is_theirs(frame: Any, scene: Any) -> 
         groom = replace(grooms[0], lights=studio(camera))
 
         def draw() -> None:
-            by.draw(groom, camera, SIZE, SIZE, output="viewport", view=InView(name))
+            by.draw(groom, camera, SIZE, SIZE, output="viewport", view=ViewState(name))
 
         found = drawn([groom], camera, lambda: calls.append(gpu_calls(draw)))
         return found, calls[0]
@@ -211,6 +211,6 @@ def test_views_in_the_same_light_share_its_maps(frame: Any, scene: Any) -> None:
     assert own.opacity(groom, view="b") is first
     other = replace(groom, lights=studio(turned(frame, 90.0)))
     in_turn = [(own.opacity(other, view="b"), own.opacity(groom, view="a")) for _ in range(3)]
-    assert all(maps is in_turn[0][0] and kept is in_turn[0][1] for maps, kept in in_turn)
+    assert all(maps is in_turn[0][0] and cached is in_turn[0][1] for maps, cached in in_turn)
     assert (in_turn[0][1].values == first.values).all()
     assert (in_turn[0][0].values != first.values).any()

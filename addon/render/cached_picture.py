@@ -1,4 +1,4 @@
-"""The picture of one view's strands, kept to be shown again while nothing changes.
+"""The picture of one view's strands, cached to be shown again while nothing changes.
 
     color RGBA16F: premultiplied, encoded for the view; for sums RGBA32F, see soft_picture.py
     depth DEPTH32F: of the nearest hair that hides more than half of what lies behind it; 1 for none
@@ -22,19 +22,19 @@ from .textures import drawing_into, drawing_state
 
 _NOTHING = (0.0, 0.0, 0.0, 0.0)
 _SHOWN_RECIPE = ShaderRecipe(
-    name="kept_picture",
+    name="cached_picture",
     vertex="whole_target.vert.glsl",
-    fragment="kept_picture.frag.glsl",
-    textures=(("FLOAT_2D", "kept_color"), ("DEPTH_2D", "kept_depth")),
+    fragment="cached_picture.frag.glsl",
+    textures=(("FLOAT_2D", "cached_color"), ("DEPTH_2D", "cached_depth")),
     integers=("writes_depth",),
     outputs=(("VEC4", "color"),),
 )
 
 
-class KeptPicture:
+class CachedPicture:
     """A picture of strands with depth. Creating one does not touch the GPU.
 
-    marks: the data from which it was drawn, see `is_of`; empty: it must not be shown again.
+    marks: the data from which it was drawn, see `matches`; empty: it must not be shown again.
     color, depth: the textures above, after `begin`.
 
     Args:
@@ -58,7 +58,7 @@ class KeptPicture:
         """Clear the marks, so that it is not shown again; its textures stay."""
         self.marks = ()
 
-    def is_of(self, marks: tuple[Any, ...]) -> bool:
+    def matches(self, marks: tuple[Any, ...]) -> bool:
         """Whether it was drawn from the same objects and equal numbers."""
         return are_same_marks(self.marks, marks)
 
@@ -95,7 +95,7 @@ class KeptPicture:
     def _draw(self, *, writes_depth: bool) -> None:
         shader = program(_SHOWN_RECIPE)
         shader.bind(
-            textures={"kept_color": self.color, "kept_depth": self.depth},
+            textures={"cached_color": self.color, "cached_depth": self.depth},
             integers={"writes_depth": int(writes_depth)},
         )
         self._triangle.draw(shader.shader)

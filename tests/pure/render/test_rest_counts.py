@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hairloom.addon.refine.settings import DetailSettings
-from hairloom.addon.render.known_detail import KnownDetail, best_slot_pieces
+from hairloom.addon.render.rest_counts import RestCounts, best_slot_pieces
 from hairloom.addon.render.strand_layout import StrandLayout
 
 
@@ -20,12 +20,12 @@ def test_slots_are_as_large_as_costs_least() -> None:
 
 def test_what_comes_nearer_gets_more_and_each_strand_has_a_slot() -> None:
     layout = StrandLayout.uniform(50, 4)
-    known = KnownDetail(layout, DetailSettings(), 100.0, 8, 80, 3000, 50, 500)
-    assert 80 <= known.slots_at(100.0) < 90 and known.slots_at(1.0) == known.slots_at(100.0)
-    assert 160 <= known.slots_at(400.0) < 180, "pieces grow as the root of the size does"
-    assert known.fragments_at(400.0) >= 4 * 3000
-    few = KnownDetail(layout, DetailSettings(), 100.0, 8, 10, 300, 5, 50)
+    counts = RestCounts(layout, DetailSettings(), 100.0, 8, 80, 3000, 50, 500)
+    assert 80 <= counts.slots_at(100.0) < 90 and counts.slots_at(1.0) == counts.slots_at(100.0)
+    assert 160 <= counts.slots_at(400.0) < 180, "pieces grow as the root of the size does"
+    assert counts.fragments_at(400.0) >= 4 * 3000
+    few = RestCounts(layout, DetailSettings(), 100.0, 8, 10, 300, 5, 50)
     assert few.slots_at(100.0) == 50, "those that were hidden may be seen"
-    assert known.is_of(StrandLayout.uniform(50, 4), DetailSettings())
-    assert not known.is_of(StrandLayout.uniform(51, 4), DetailSettings())
-    assert not known.is_of(layout, DetailSettings(error=2.0))
+    assert counts.matches(StrandLayout.uniform(50, 4), DetailSettings())
+    assert not counts.matches(StrandLayout.uniform(51, 4), DetailSettings())
+    assert not counts.matches(layout, DetailSettings(error=2.0))

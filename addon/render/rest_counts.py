@@ -20,7 +20,7 @@ _SPARE_SLOTS, _SPARE_FRAGMENTS = 1.03, 1.25
 
 
 @dataclass(frozen=True, eq=False)
-class KnownDetail:
+class RestCounts:
     """The counts of a groom in a view when it was last at rest.
 
     layout, settings: of its strands. scale: pixels per metre at its middle.
@@ -37,15 +37,15 @@ class KnownDetail:
     strands: int
     pieces: int
 
-    def is_of(self, layout: StrandLayout, settings: DetailSettings) -> bool:
+    def matches(self, layout: StrandLayout, settings: DetailSettings) -> bool:
         """Whether these counts are for such strands."""
         return self.layout.is_as(layout) and self.settings == settings
 
     def slots_at(self, scale: float) -> int:
         """Slots needed at this scale [pixels per metre], at least one for each strand."""
-        nearer = max(scale / self.scale, 1.0)
-        grown = 1.0 if self.settings.mode == "fixed" else nearer**0.5  # as in Wang's bound
-        return max(int(self.slots * grown * _SPARE_SLOTS), self.layout.strand_count)
+        zoom = max(scale / self.scale, 1.0)
+        growth = 1.0 if self.settings.mode == "fixed" else zoom**0.5  # as in Wang's bound
+        return max(int(self.slots * growth * _SPARE_SLOTS), self.layout.strand_count)
 
     def fragments_at(self, scale: float) -> int:
         """Fragments needed at this scale [pixels per metre]."""
