@@ -45,7 +45,7 @@ def glsl_relative_error() -> float:
     textures = {
         "angles": texture_from(angles, "RGBA32F"),
         "absorptions": texture_from(absorptions, "RGBA32F"),
-        **MARSCHNER.of(shading, DEFAULT_SIZE),
+        **MARSCHNER.textures(shading, DEFAULT_SIZE),
     }
     fibre_block = UniformBlock().holding(pack_fibre(shading))
     shader.bind(textures=textures, images={"result": result}, blocks={"fibre": fibre_block})

@@ -5,6 +5,6 @@
 void main()
 {
   vec3 facet = cross(dFdx(mesh_point), dFdy(mesh_point));
-  vec2 on_screen = all_and_left(mesh_point, normalize(mesh_normal), facet);
-  color = vec4(vec3(0.0), 1.0 - on_screen.y / on_screen.x);
+  vec2 brightness = unshadowed_and_shadowed(mesh_point, normalize(mesh_normal), facet);
+  color = vec4(vec3(0.0), 1.0 - brightness.y / brightness.x);
 }

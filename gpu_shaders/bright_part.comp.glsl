@@ -10,8 +10,8 @@ void main()
   if (any(greaterThanEqual(pixel, imageSize(bright)))) {
     return;
   }
-  vec4 over = texelFetch(seen, pixel, 0);
-  vec4 under = texelFetch(behind, min(pixel, textureSize(behind, 0) - 1), 0);
+  vec4 over = texelFetch(picture_color, pixel, 0);
+  vec4 under = texelFetch(background, min(pixel, textureSize(background, 0) - 1), 0);
   vec3 color = over.rgb + (1.0 - over.a) * under.rgb;
   // comparisons with NaN are false
   color = vec3(color.r >= 0.0 ? min(color.r, largest) : 0.0,
@@ -19,7 +19,7 @@ void main()
                color.b >= 0.0 ? min(color.b, largest) : 0.0);
   float luminance = luminance_of(color);
   float above = max(luminance - threshold, 0.0);
-  float surely = above > 0.0 ? above / (above + knee) : 0.0;
-  float factor = above > 0.0 ? min(above * surely, brightest) / luminance : 0.0;
-  imageStore(bright, pixel, vec4(color * factor, min(2.0 * surely, 1.0)));
+  float certainty = above > 0.0 ? above / (above + knee) : 0.0;
+  float factor = above > 0.0 ? min(above * certainty, brightest) / luminance : 0.0;
+  imageStore(bright, pixel, vec4(color * factor, min(2.0 * certainty, 1.0)));
 }

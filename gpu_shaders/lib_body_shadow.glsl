@@ -13,27 +13,27 @@
 const float NO_LIGHT = {{no_light}};
 
 // Brightness on the screen of a matt body in this light.
-float shown(vec3 radiance)
+float screen_brightness(vec3 radiance)
 {
-  vec3 written = output_encoded(body_color * radiance, {{output_viewport}});
-  return luminance_of(written);
+  vec3 encoded = output_encoded(body_color * radiance, {{output_viewport}});
+  return luminance_of(encoded);
 }
 
 // Brightness on the screen at a place of a mesh: x without hair, y in the shadow of hair. NO_LIGHT is added
 // to both, so that their ratio is 1 where there is no light.
 //   facet: see facing_normal.
-vec2 all_and_left(vec3 point, vec3 normal, vec3 facet)
+vec2 unshadowed_and_shadowed(vec3 point, vec3 normal, vec3 facet)
 {
   normal = facing_normal(normal, normal, facet, normalize(view.eye.xyz - view.eye.w * point));
   vec3 all_light = diffuse_light(lights, normal);
-  vec3 left = all_light;
+  vec3 shadowed_light = all_light;
   for (int index = 0; index < int(lights.ambient_and_count.w); index++) {
     vec3 to_light, irradiance;
     light_at(lights, index, point, to_light, irradiance);
     vec3 path = shadow_path_to_mesh(index, point, normal);
     vec3 arriving = irradiance * max(0.0, dot(normal, to_light)) / PI;
     all_light += arriving * path.z;
-    left += arriving * light_left(path, hair_forward);
+    shadowed_light += arriving * light_left(path, hair_forward);
   }
-  return vec2(shown(all_light), shown(left)) + NO_LIGHT;
+  return vec2(screen_brightness(all_light), screen_brightness(shadowed_light)) + NO_LIGHT;
 }

@@ -27,11 +27,11 @@ vec3 index_color(int index)
 }
 
 // Colour of a segment's relative change of length: grey at its length in the style, red where it is longer
-// by {{shown_stretch}} or more, blue where it is shorter by as much.
+// by {{full_color_stretch}} or more, blue where it is shorter by as much.
 vec3 stretch_color(float change)
 {
   vec3 full = change < 0.0 ? vec3(0.05, 0.25, 1.0) : vec3(1.0, 0.1, 0.05);
-  return mix(vec3(0.5), full, min(abs(change) / {{shown_stretch}}, 1.0));
+  return mix(vec3(0.5), full, min(abs(change) / {{full_color_stretch}}, 1.0));
 }
 
 // Colour of a signed distance from a collider, as a multiple of the depth shown in red: blue at 10, green at

@@ -12,8 +12,8 @@ void main()
   alpha *= texture(mesh_color_map, mesh_uv).w;
 #  endif
   // front and back faces, and different meshes, have their holes at different texels
-  vec2 texel = floor(gl_FragCoord.xy) * vec2(1.0, mesh_chance.x);
-  if (alpha <= fract(place_noise(gl_FrontFacing ? texel : texel.yx) + mesh_chance.y)) {
+  vec2 texel = floor(gl_FragCoord.xy) * vec2(1.0, mesh_hash_shift.x);
+  if (alpha <= fract(place_noise(gl_FrontFacing ? texel : texel.yx) + mesh_hash_shift.y)) {
     discard;
   }
 #endif

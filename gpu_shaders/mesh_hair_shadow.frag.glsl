@@ -24,8 +24,8 @@ void main()
 #  endif
 #endif
 #ifdef HASHED
-  float chance = gl_FrontFacing ? mesh_chance.x : mesh_chance.y;
-  if (alpha <= fract(place_noise(floor(gl_FragCoord.xy)) + chance)) {
+  float hash_shift = gl_FrontFacing ? mesh_hash_shift.x : mesh_hash_shift.y;
+  if (alpha <= fract(place_noise(floor(gl_FragCoord.xy)) + hash_shift)) {
     discard;
   }
 #endif

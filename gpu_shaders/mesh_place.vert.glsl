@@ -1,9 +1,9 @@
-// Places of meshes, vertex stage: world-space positions. CARRIED: other vertex attributes instead.
+// Places of meshes, vertex stage: world-space positions. VERTEX_VALUES: other vertex attributes instead.
 
 void main()
 {
-#ifdef CARRIED
-  mesh_point = carried;
+#ifdef VERTEX_VALUES
+  mesh_point = vertex_values;
 #else
   mesh_point = position;
 #endif

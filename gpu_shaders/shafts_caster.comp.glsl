@@ -1,6 +1,6 @@
 // Occluders of a light: the fraction of each pixel that is covered by surfaces nearer than the light, or by
 // hair too thin to have a depth.
-// is_apart: meshes are holes in the picture, so every pixel with a depth counts as covered.
+// is_separate: meshes are holes in the picture, so every pixel with a depth counts as covered.
 // Colour and depth may have several samples for each pixel of the picture.
 
 void main()
@@ -16,7 +16,7 @@ void main()
       float depth = texelFetch(depth_of, place, 0).r;
       bool is_before = depth < shafts.radiance.w || depth >= 1.0;
       float covered = clamp(texelFetch(samples_of, place, 0).a, 0.0, 1.0);
-      covered = is_apart != 0 && depth < 1.0 ? 1.0 : covered;
+      covered = is_separate != 0 && depth < 1.0 ? 1.0 : covered;
       total += is_before ? covered : 0.0;
     }
   }

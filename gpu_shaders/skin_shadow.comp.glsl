@@ -1,5 +1,5 @@
 // Soft shadows on skin, first step: the fraction of each light that reaches the skin at each texel of the
-// head's UV map. A channel per light, by the index of its opacity map. HAIR_ALONE: meshes cast no shadows.
+// head's UV map. A channel per light, by the index of its opacity map. ONLY_HAIR: meshes cast no shadows.
 #include "lib_shadows.glsl"
 #include "lib_skin.glsl"
 
@@ -27,7 +27,7 @@ void main()
     for (int index = 0; index < light_count; index++) {
       int map = int(opacity.light[index].x);
       if (map >= 0 && map < {{skin_lights}}) {
-#ifdef HAIR_ALONE
+#ifdef ONLY_HAIR
         vec3 path = vec3(shadow_path(index, point).xy, 1.0);
 #else
         vec3 path = shadow_path_to_mesh(index, point, facet);

@@ -35,8 +35,8 @@ vec3 debug_color()
   return stretch_color(rest > 0.0 ? distance(begin, end) / rest - 1.0 : 0.0);
 #  elif DEBUG == {{debug_depth}}
 #    ifdef HAS_SOLIDS
-  float reach = 10.0 * shown_depth;
-  return depth_color(signed_distance(solid_at(0), strand_point, reach).w / shown_depth);
+  float reach = 10.0 * full_color_depth;
+  return depth_color(signed_distance(solid_at(0), strand_point, reach).w / full_color_depth);
 #    else
   return vec3(0.5);
 #    endif

@@ -44,7 +44,7 @@ _SAMPLED_RECIPE = replace(
     _RECIPE,
     name="body_shadow_sample",
     fragment="body_shadow_sample.frag.glsl",
-    images=(("RGBA32F", "taken_and_all", "READ_WRITE"),),
+    images=(("RGBA32F", "blocked_and_all", "READ_WRITE"),),
 )
 
 
@@ -85,7 +85,7 @@ class BodyShadow:
             *([] if display is None else [display.feature]),
         ]
         recipe = _RECIPE if sample is None else _SAMPLED_RECIPE
-        images = {} if sample is None else {"taken_and_all": sample}
+        images = {} if sample is None else {"blocked_and_all": sample}
         for _, batch in self._batches:
             with drawing_state(depth_write=False, blend="ALPHA_PREMULT"):
                 batch.draw(bound(recipe, features, self._blocks, images=images).shader)

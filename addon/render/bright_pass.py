@@ -28,7 +28,7 @@ from .textures import texture_from, texture_to_array
 _PART = ShaderRecipe(
     name="bright_part",
     compute="bright_part.comp.glsl",
-    textures=(("FLOAT_2D", "seen"), ("FLOAT_2D", "behind")),
+    textures=(("FLOAT_2D", "picture_color"), ("FLOAT_2D", "background")),
     images=(("RGBA32F", "bright"),),
     numbers=tuple(("FLOAT", name) for name in ("threshold", "knee", "brightest", "largest")),
 )
@@ -59,37 +59,39 @@ _ADD = ShaderRecipe(
 )
 
 
-class BrightThings:
+class BrightShafts:
     """The bright parts of a picture at construction, to be added as shafts later.
 
     Args:
-        seen: RGBA32F texture, scene-linear and premultiplied.
-        behind: its background, an RGBA32F texture of its size or of one texel.
+        picture_color: RGBA32F texture, scene-linear and premultiplied.
+        background: its background, an RGBA32F texture of its size or of one texel.
     """
 
-    def __init__(self, seen: Any, behind: Any, camera: Camera, settings: ShaftSettings) -> None:
+    def __init__(
+        self, picture_color: Any, background: Any, camera: Camera, settings: ShaftSettings
+    ) -> None:
         self._settings = settings
-        self._size = seen.width, seen.height
-        self._length = shaft_length(camera.projection, seen.height, settings.length)
+        self._size = picture_color.width, picture_color.height
+        self._length = shaft_length(camera.projection, picture_color.height, settings.length)
         self._bright: Any = None
-        self.found = BrightRegions((), 0.0)
+        self.regions = BrightRegions((), 0.0)
         if wants_bright(settings) and has_length(self._length):
-            self._take(seen, behind)
+            self._find_bright_parts(picture_color, background)
 
     def add_to(self, picture: Any) -> None:
         """Add the shafts to an RGBA32F texture of the same size; without any it stays
         bit-identical.
         """
-        for region in self.found.regions:
+        for region in self.regions.regions:
             self._add_region(picture, region)
 
-    def _take(self, seen: Any, behind: Any) -> None:
+    def _find_bright_parts(self, picture_color: Any, background: Any) -> None:
         width, height = self._size
         threshold = self._settings.bright_threshold
         self._bright = gpu_objects.texture(self._size, format="RGBA32F")
         part = program(_PART)
         part.bind(
-            textures={"seen": seen, "behind": behind},
+            textures={"picture_color": picture_color, "background": background},
             images={"bright": self._bright},
             numbers={
                 "threshold": threshold,
@@ -108,12 +110,12 @@ class BrightThings:
             integers={"cell_side": side},
         )
         counting.dispatch(cells.width, cells.height)
-        self.found = bright_regions(texture_to_array(cells), width, height)
+        self.regions = bright_regions(texture_to_array(cells), width, height)
 
     def _add_region(self, picture: Any, region: BrightRegion) -> None:
         width, height = self._size
         grid = PolarGrid.over(region.center, width, height, self._settings.samples)
-        factor = self._settings.bright_strength * self.found.scale
+        factor = self._settings.bright_strength * self.regions.scale
         red, green, blue = (float(factor * each) for each in self._settings.tint)
         light = LightOnScreen(region.center, (red, green, blue), 1.0, self._length)
         block = gpu_objects.uniform_buffer(pack_shafts(light, grid))
@@ -131,6 +133,6 @@ class BrightThings:
         add.dispatch(width, height)
 
 
-def plain(color: tuple[float, float, float, float]) -> Any:
+def one_texel(color: tuple[float, float, float, float]) -> Any:
     """A texture of one texel: a premultiplied background colour."""
     return texture_from(np.array([[color]], np.float32), "RGBA32F")

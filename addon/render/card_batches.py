@@ -55,7 +55,7 @@ class CardBatches:
         self._upload(cards)
         return self._batch("static", cards.mesh.triangles)
 
-    def of(self, cards: CardSnapshot, eye: Floats) -> dict[str, Any]:
+    def sorted_batches(self, cards: CardSnapshot, eye: Floats) -> dict[str, Any]:
         """The batches of front faces and of back faces, by "front" and "back".
 
         Args:

@@ -114,7 +114,7 @@ class CardOpacity:
         self._serial = 0
         self._extent: tuple[CardMesh | None, Ball] = (None, Ball(np.zeros(3), 1.0))
 
-    def of(self, cards: CardSnapshot, batch: Any, alpha: Any, snapshot: Snapshot) -> OpacityMaps:
+    def maps(self, cards: CardSnapshot, batch: Any, alpha: Any, snapshot: Snapshot) -> OpacityMaps:
         """The maps of these cards in the lights of a snapshot, drawn only when something changed.
 
         Args:

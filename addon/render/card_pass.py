@@ -125,8 +125,8 @@ class CardPass:
         if cards is None or snapshot.volume.shadows == "none":
             return None
         self._take_textures(cards)
-        batch, alpha = self._batches.static(cards), self._textures.of("alpha")
-        maps = self._opacity.of(cards, batch, alpha, snapshot)
+        batch, alpha = self._batches.static(cards), self._textures.texture("alpha")
+        maps = self._opacity.maps(cards, batch, alpha, snapshot)
         self.notes = (maps.note,) if maps.note else ()
         return maps
 
@@ -158,7 +158,7 @@ class CardPass:
         if cards.base_color is not None:
             shading = in_color(cards.base_color, snapshot.shading)
             snapshot = replace(snapshot, shading=shading)
-        batches = self._batches.of(cards, camera.eye)
+        batches = self._batches.sorted_batches(cards, camera.eye)
         view = view_feature(camera, width, height)
         features = (view, *self._shading(snapshot, cards, opacity))
         if display is not None:
@@ -239,7 +239,9 @@ class CardPass:
         names += ["normal"] * has_normal + ["place"] * has_place
         return ShaderFeature(
             name="_".join(names[3:]),
-            textures={f"{name}_texture": ("FLOAT_2D", self._textures.of(name)) for name in names},
+            textures={
+                f"{name}_texture": ("FLOAT_2D", self._textures.texture(name)) for name in names
+            },
             numbers={"atlas_tiles": ("VEC2", tiles_of(cards.mesh.atlas))},
             defines={
                 "TANGENT_MAP": int(has_tangent),
@@ -272,7 +274,7 @@ class CardPass:
             _PRIME_RECIPE,
             [view],
             self._blocks,
-            textures={"alpha_texture": self._textures.of("alpha")},
+            textures={"alpha_texture": self._textures.texture("alpha")},
             numbers={
                 "opaque_alpha": min_alpha,
                 "sharpness": sharpness,

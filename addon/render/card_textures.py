@@ -35,7 +35,7 @@ class CardTextures:
         """Columns and rows of the atlas, as shaders take them."""
         return tiles_of(self._grid)
 
-    def of(self, name: str) -> Any:
+    def texture(self, name: str) -> Any:
         """The texture of that name, of HairTextures."""
         return self._textures[name]
 

@@ -18,17 +18,17 @@ def alpha_picture(caster: Caster) -> Floats | None:
     return None if pictures is None else pictures.color
 
 
-def caster_batch(caster: Caster, carried: Floats | None = None) -> Any:
+def caster_batch(caster: Caster, vertex_values: Floats | None = None) -> Any:
     """A batch of the triangles with positions; with an alpha picture also UVs, with a vertex for
     each corner.
 
     Args:
-        carried: (vertex_count, 3), an additional attribute of this name; None for none.
+        vertex_values: (vertex_count, 3), an additional attribute of this name; None for none.
     """
     surface = surface_of(caster)
     values, has_corners = {"position": surface.positions}, alpha_picture(caster) is not None
-    if carried is not None:
-        values["carried"] = carried
+    if vertex_values is not None:
+        values["vertex_values"] = vertex_values
     if has_corners and surface.corner_uv is not None:
         corners = surface.triangles.ravel()
         values = {name: array[corners] for name, array in values.items()}

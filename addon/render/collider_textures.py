@@ -31,32 +31,36 @@ from .shader_source import COLLIDER_TEXELS, FIELD_ROW, ROUNDS_ACROSS, STRAND_ROW
 from .textures import texture_from
 
 #: Squared length up to which paths need not be followed, where none need to be.
-NOT_FOLLOWED = 1.0e30
+UNLIMITED_PATH = 1.0e30
 
 
 @dataclass(frozen=True)
 class SolidKinds:
     """The kinds of colliders that a program with lib_signed_distance.glsl supports.
 
-    rounds, fields: whether there are round solids, and fields. several: whether there may be more
-    than one collider.
+    has_rounds, has_fields: whether there are round solids, and fields. has_several: whether there
+    may be more than one collider.
     """
 
-    rounds: bool
-    fields: bool
-    several: bool
+    has_rounds: bool
+    has_fields: bool
+    has_several: bool
 
     @property
     def textures(self) -> tuple[str, ...]:
-        return ("solids", *("rounds",) * self.rounds, *("fields",) * self.fields)
+        return ("solids", *("rounds",) * self.has_rounds, *("fields",) * self.has_fields)
 
     @property
     def integers(self) -> tuple[str, ...]:
-        return ("solid_count",) * self.several
+        return ("solid_count",) * self.has_several
 
     @property
     def defines(self) -> tuple[tuple[str, int], ...]:
-        flags = {"HAS_ROUNDS": self.rounds, "HAS_FIELDS": self.fields, "HAS_SEVERAL": self.several}
+        flags = {
+            "HAS_ROUNDS": self.has_rounds,
+            "HAS_FIELDS": self.has_fields,
+            "HAS_SEVERAL": self.has_several,
+        }
         return tuple((name, 1) for name, is_set in flags.items() if is_set)
 
 
@@ -65,15 +69,15 @@ class ColliderTextures:
     """The solids of some colliders in textures.
 
     colliders: those in the textures, in order.
-    own: (collider_count, 2, 4) two texels of each in the table of moments. For a field: nodes along
-        x, y and z, and its first row; low and cell. For others: first round solid, number of
-        solids, 0, -1; zeros.
+    shape_texels: (collider_count, 2, 4) two texels of each in the table of moments. For a field:
+        nodes along x, y and z, and its first row; low and cell. For others: first round solid,
+        number of solids, 0, -1; zeros.
     bounds: center and radius [m] of a sphere around each.
     rounds, fields: see above; None where there are none.
     """
 
     colliders: tuple[Collider, ...]
-    own: Floats
+    shape_texels: Floats
     bounds: tuple[tuple[Floats, float], ...]
     rounds: Any
     fields: Any
@@ -87,22 +91,22 @@ class ColliderTextures:
         """
         rounds: list[Floats] = []
         fields: list[Floats] = []
-        own = np.zeros((len(colliders), 2, 4), np.float32)
+        shape_texels = np.zeros((len(colliders), 2, 4), np.float32)
         row = 0
         for place, collider in enumerate(colliders):
             if isinstance(collider, DistanceField):
-                own[place] = (*collider.values.shape, row), (*collider.low, collider.cell)
+                shape_texels[place] = (*collider.values.shape, row), (*collider.low, collider.cell)
                 fields.append(field_texels(collider.values))
                 row += len(fields[-1]) // FIELD_ROW
             else:
                 solids = round_texels(collider)
-                own[place, 0] = sum(map(len, rounds)), len(solids), 0.0, -1.0
+                shape_texels[place, 0] = sum(map(len, rounds)), len(solids), 0.0, -1.0
                 rounds.append(solids)
         bounds = tuple(collider.bounds for collider in colliders)
         textures = _texture(rounds, ROUNDS_ACROSS), _texture(fields, FIELD_ROW)
-        return cls(colliders, own, bounds, *textures)
+        return cls(colliders, shape_texels, bounds, *textures)
 
-    def are_of(self, posed: tuple[PosedCollider, ...]) -> bool:
+    def match(self, posed: tuple[PosedCollider, ...]) -> bool:
         """Whether these are the colliders in the textures."""
         return len(posed) == len(self.colliders) and all(
             one.collider is other for one, other in zip(posed, self.colliders, strict=True)
@@ -111,10 +115,10 @@ class ColliderTextures:
     @cached_property
     def distance_iterations(self) -> int:
         """Loop iterations for the distance of one point to all colliders."""
-        is_round = self.own[:, 0, 3] < 0.0
-        if len(self.own) == 1 and not is_round.any():
+        is_round = self.shape_texels[:, 0, 3] < 0.0
+        if len(self.shape_texels) == 1 and not is_round.any():
             return 0  # a single field is looked up without a loop
-        return len(self.own) + int(self.own[is_round, 0, 1].sum())
+        return len(self.shape_texels) + int(self.shape_texels[is_round, 0, 1].sum())
 
     @property
     def kinds(self) -> SolidKinds:
@@ -128,7 +132,7 @@ class ColliderTextures:
         """
         table = np.zeros((1, len(posed), COLLIDER_TEXELS, 4), np.float32)
         for place, one in enumerate(posed):
-            self._stand(table, place, one.matrix_now[None])
+            self._write_pose(table, place, one.matrix_now[None])
         return texture_from(table.reshape(1, -1, 4), "RGBA32F")
 
     def moments(
@@ -142,10 +146,10 @@ class ColliderTextures:
         """Rows of the table of moments, (substep_count, collider_count * COLLIDER_TEXELS, 4).
 
         A collider's texels: three rows of its inverse matrix at the substep's end; three rows of
-        the change of its matrix in the substep; those of `own`; a sphere around all points within
-        `reach` of it during the substep; three rows of its inverse matrix at the substep's begin; x
-        the squared length up to which paths need not be followed (see `contacts.short_squared`), y
-        1 where segments collide, z its smallest scale, w its swelling.
+        the change of its matrix in the substep; those of `shape_texels`; a sphere around all points
+        within `reach` of it during the substep; three rows of its inverse matrix at the substep's
+        begin; x the squared length up to which paths need not be followed (see
+        `contacts.short_squared`), y 1 where segments collide, z its smallest scale, w its swelling.
 
         Args:
             spans: (substep_count, 2) begin and end of each substep as fractions of the frame.
@@ -156,7 +160,7 @@ class ColliderTextures:
         moments: Any = spans.T[..., None, None]  # in matrix_at an array does for a number
         for place, one in enumerate(posed):
             before, now = one.matrix_at(moments)
-            self._stand(table, place, now)
+            self._write_pose(table, place, now)
             table[:, place, 3:6] = (now - before)[:, :3]
             travel = travels(now - before, *self.bounds[place])
             table[:, place, 8, 3] += reach + travel
@@ -167,18 +171,18 @@ class ColliderTextures:
             limit = scales[:, -1] * short_squared(one.collider.curve_radius, size)
             sharp = spacing_of(size, cv_count) ** 2 > limit
             table[:, place, 12, 0] = np.where(
-                sharp | (travel * travel > limit), limit, NOT_FOLLOWED
+                sharp | (travel * travel > limit), limit, UNLIMITED_PATH
             )
             table[:, place, 12, 1] = sharp
             table[:, place, 12, 2] = scales[:, -1]
             table[:, place, 12, 3] = one.swelling
         return table.reshape(len(spans), -1, 4)
 
-    def _stand(self, table: Floats, place: int, now: Floats) -> None:
+    def _write_pose(self, table: Floats, place: int, now: Floats) -> None:
         """Write the pose of a collider, (n, 4, 4) object to world, its shape and its bounding
         sphere into rows of a table of moments."""
         table[:, place, 0:3] = np.linalg.inv(now)[:, :3]
-        table[:, place, 6:8] = self.own[place]
+        table[:, place, 6:8] = self.shape_texels[place]
         turned, (center, radius) = now[:, :3, :3], self.bounds[place]
         stretch = np.sqrt(np.einsum("nij,nij->n", turned, turned))  # an upper bound of the scale
         table[:, place, 8, :3] = turned @ center + now[:, :3, 3]
@@ -191,13 +195,13 @@ class UploadedColliders:
     def __init__(self) -> None:
         self._textures: ColliderTextures | None = None
 
-    def of(self, posed: tuple[PosedCollider, ...]) -> ColliderTextures:
+    def textures_of(self, posed: tuple[PosedCollider, ...]) -> ColliderTextures:
         """The textures of these colliders, uploaded if they are not the last ones.
 
         Raises:
             HairloomError: more of them than a texture holds.
         """
-        if self._textures is None or not self._textures.are_of(posed):
+        if self._textures is None or not self._textures.match(posed):
             self._textures = ColliderTextures.of(tuple(one.collider for one in posed))
         return self._textures
 

@@ -28,10 +28,10 @@ def murmur3(key: bytes, seed: int = 0) -> int:
     for start in range(0, len(key), 4):
         part = key[start : start + 4]
         mixed = int.from_bytes(part, "little") * 0xCC9E2D51 & _WORD
-        mixed = _turned(mixed, 15) * 0x1B873593 & _WORD
+        mixed = _rotated_left(mixed, 15) * 0x1B873593 & _WORD
         found ^= mixed
         if len(part) == 4:
-            found = (_turned(found, 13) * 5 + 0xE6546B64) & _WORD
+            found = (_rotated_left(found, 13) * 5 + 0xE6546B64) & _WORD
     found ^= len(key)
     for shift, factor in ((16, 0x85EBCA6B), (13, 0xC2B2AE35)):
         found = (found ^ found >> shift) * factor & _WORD
@@ -111,5 +111,5 @@ class Coverages:
         ]
 
 
-def _turned(word: int, bits: int) -> int:
+def _rotated_left(word: int, bits: int) -> int:
     return (word << bits | word >> 32 - bits) & _WORD

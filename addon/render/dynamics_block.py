@@ -167,7 +167,7 @@ def bends_of(matrix: StyleBand, cv_count: int, guide_count: int) -> Floats:
     return bends
 
 
-def own_of(frame: Frame, painted: PaintedFrame, cv_count: int) -> Floats:
+def painted_texels(frame: Frame, painted: PaintedFrame, cv_count: int) -> Floats:
     """`painted_numbers` of dynamics_pass, (guide_count, cv_count, 4) float32."""
     guide_count = len(painted.gravity)
     own = np.zeros((guide_count, cv_count, 4), np.float32)

@@ -60,8 +60,8 @@ from ..dynamics.settings import DynamicsSettings
 from ..dynamics.state import DynamicsState, Rest, as_rows
 from ..dynamics.step import remaining_displacement, remaining_rotation
 from .capabilities import pair_format
-from .collider_textures import NOT_FOLLOWED, UploadedColliders
-from .dynamics_block import bands_of, block_of, carriers_of, moments_of, own_of, spans_of
+from .collider_textures import UNLIMITED_PATH, UploadedColliders
+from .dynamics_block import bands_of, block_of, carriers_of, moments_of, painted_texels, spans_of
 from .hair_grid_pass import HairGridPass
 from .shader_program import ShaderRecipe, program, released_with_shaders
 from .strand_layout import from_strand_rows, strand_rows
@@ -267,7 +267,7 @@ class DynamicsPass:
         now, before, *earlier = (texture for _, texture in self._styles)
         textures |= {"styles_now": now, "styles_before": before}
         textures["styles_earlier"] = earlier[0] if earlier else before  # then has no effect
-        self._colliders.of(drive.colliders)
+        self._colliders.textures_of(drive.colliders)
         if drive.held is not None and drive.held is not self._held:
             held = drive.held.rows.T[..., None]
             textures["held_cvs"] = texture_from(strand_rows(held), "R32F")
@@ -280,17 +280,19 @@ class DynamicsPass:
     def _upload_rest(self, rest: Rest) -> None:
         textures = self._textures
         textures["rest_shapes"] = texture_from(strand_rows(rest_shapes(rest)), "RGBA32F")
-        lengths = of_segments(rest.length)
+        lengths = segments_at_cvs(rest.length)
         textures["rest_lengths"] = texture_from(strand_rows(lengths), "R32F")
         if rest.curl_slack is not None:
-            textures["curl_rooms"] = texture_from(strand_rows(of_segments(rest.curl_slack)), "R32F")
+            textures["curl_rooms"] = texture_from(
+                strand_rows(segments_at_cvs(rest.curl_slack)), "R32F"
+            )
 
     def _upload_painted(self, frame: Frame) -> None:
         painted, (cv_count, guide_count) = frame.painted, self._state.position.shape[1:]
         if painted is not None:
             bands = bands_of(painted.style_system, cv_count, guide_count)
             self._textures["painted_bands"] = texture_from(strand_rows(bands), "RGBA32F")
-            numbers = strand_rows(own_of(frame, painted, cv_count))
+            numbers = strand_rows(painted_texels(frame, painted, cv_count))
             self._textures["painted_numbers"] = texture_from(numbers, "RGBA32F")
         self._painted = painted
 
@@ -321,14 +323,14 @@ class DynamicsPass:
 
     def _dispatch(self, frame: Frame, first: int, count: int, speed_ratio: float) -> None:
         settings, state, posed = frame.settings, self._state, frame.drive.colliders
-        colliders = self._colliders.of(posed)
+        colliders = self._colliders.textures_of(posed)
         spans, is_followed, is_sharp = spans_of(frame, first, count), False, False
         table = moments_of(frame, first, spans)
         if posed:
             reach = REACH * frame.size + max_clearance(settings, frame.size)
             poses = colliders.moments(posed, spans, reach, frame.size, state.cv_count)
             limit, sharp = poses.reshape(len(spans), len(posed), -1, 4)[:, :, 12, :2].T
-            is_followed, is_sharp = bool((limit < NOT_FOLLOWED).any()), bool(sharp.any())
+            is_followed, is_sharp = bool((limit < UNLIMITED_PATH).any()), bool(sharp.any())
             table = np.concatenate([table, poses], axis=1)
         textures = {**self._textures, "moments": texture_from(table, "RGBA32F")}
         textures |= {"rounds": colliders.rounds, "fields": colliders.fields}
@@ -421,7 +423,7 @@ def rest_shapes(rest: Rest) -> Floats:
     return shapes
 
 
-def of_segments(values: Floats) -> Floats:
+def segments_at_cvs(values: Floats) -> Floats:
     """Values of segments (cv_count - 1, guide_count), each stored at its first CV,
     (guide_count, cv_count, 1)."""
     at_cvs = np.zeros((values.shape[1], values.shape[0] + 1, 1), np.float32)

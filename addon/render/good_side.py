@@ -40,11 +40,11 @@ _WITHOUT_FACE = 0.35
 #: smallest visible area of a face, as a fraction of that of the hair
 _MIN_FACE = 0.02
 #: there is a front if the ratings of the directions lean to one side by this fraction
-_MIN_LEAN = 0.06
+_MIN_LENGTH = 0.06
 #: and if the directions from which the face is visible lean by this
-_MIN_FACE_LEAN = 0.2
-#: smallest length of `_Seen.lie` for a coat to have a lie; and the smallest visible area against
-#: the lie, as a fraction of that from the opposite side
+_MIN_FACE_LENGTH = 0.2
+#: smallest length of `_PointCloud.lie` for a coat to have a lie; and the smallest visible area
+#: against the lie, as a fraction of that from the opposite side
 _MIN_LIE, _MIN_AGAINST = 0.2, 0.5
 #: preference for Blender's front, towards -Y, over the back, and for one three-quarter view over
 #: the other, where all else is equal
@@ -81,24 +81,24 @@ class GoodSide:
 
 def good_side(strands: StrandSet, body: Surface | None) -> GoodSide:
     """The best directions for hair at rest on its body, world space."""
-    seen = _Seen.of(strands, body)
+    cloud = _PointCloud.of(strands, body)
     angles = 2.0 * np.pi * np.arange(_AROUND) / _AROUND
     level = np.stack([np.sin(angles), -np.cos(angles), np.zeros(_AROUND)], axis=1)
-    areas = np.array([seen.areas(_raised(each, _HEIGHTS[0][0])) for each in level])
+    areas = np.array([cloud.areas(_raised(each, _HEIGHTS[0][0])) for each in level])
     whole = areas.max(axis=0)
     is_face = whole[1] > _MIN_FACE * whole[0]
-    good = _goodness(areas, whole) * (1.0 - 0.5 * _PREFERENCE * level[:, 1])
-    front = None if is_face else seen.against_lie()
+    ratings = _ratings(areas, whole) * (1.0 - 0.5 * _PREFERENCE * level[:, 1])
+    front = None if is_face else cloud.against_lie()
     # from nearly beside a coat the ends of its strands are visible again
     turns = ((_THREE_QUARTER, 1.0),) if front is not None else _TURNS
     # short hair is visible from behind too, but a face only from the front
     if front is None:
-        front = _leaning(good, level, _MIN_LEAN)
-    face = _leaning(areas[:, 1], level, _MIN_FACE_LEAN) if is_face else None
+        front = _mean_direction(ratings, level, _MIN_LENGTH)
+    face = _mean_direction(areas[:, 1], level, _MIN_FACE_LENGTH) if is_face else None
     if face is not None and (front is None or front @ face < 0.0):
         front = face
     if front is None:  # the best is the three-quarter view
-        front = _turned(level[good.argmax()], _THREE_QUARTER)
+        front = _turned(level[ratings.argmax()], _THREE_QUARTER)
     # in this order, so that of equals the first wins
     candidates = [
         (_raised(_turned(front, turn), height), factor * preferred * aside)
@@ -106,23 +106,23 @@ def good_side(strands: StrandSet, body: Surface | None) -> GoodSide:
         for away, aside in turns
         for turn, preferred in ((-away, 1.0 + _PREFERENCE), (away, 1.0))
     ]
-    asked = np.array([seen.areas(direction) for direction, _ in candidates])
-    if is_face and asked[:2, 1].max() > _LEVEL_FACE * whole[1]:
+    tried = np.array([cloud.areas(direction) for direction, _ in candidates])
+    if is_face and tried[:2, 1].max() > _LEVEL_FACE * whole[1]:
         low = 2 * len(turns) * _LOW_HEIGHTS  # to both sides
-        candidates, asked = candidates[:low], asked[:low]
+        candidates, tried = candidates[:low], tried[:low]
     factors = np.array([factor for _, factor in candidates])
-    best = (_goodness(asked, np.maximum(whole, asked.max(axis=0))) * factors).argmax()
+    best = (_ratings(tried, np.maximum(whole, tried.max(axis=0))) * factors).argmax()
     return GoodSide(front, candidates[best][0])
 
 
-def _leaning(good: Floats, level: Floats, least: float) -> Floats | None:
-    """The unit direction to which the ratings `good` of directions lean; None if by too little."""
-    lean: Floats = (good[:, None] * level).sum(axis=0)
+def _mean_direction(ratings: Floats, level: Floats, min_length: float) -> Floats | None:
+    """The unit direction to which the ratings of directions lean; None if by too little."""
+    lean: Floats = (ratings[:, None] * level).sum(axis=0)
     length = np.linalg.norm(lean)
-    return lean / length if length > least * good.sum() else None
+    return lean / length if length > min_length * ratings.sum() else None
 
 
-def _goodness(areas: Floats, whole: Floats) -> Floats:
+def _ratings(areas: Floats, whole: Floats) -> Floats:
     """Ratings (n,) of visible areas (n, 2) of hair and face, of which `whole` are the largest."""
     hair, face = areas[:, 0] / max(whole[0], 1.0), areas[:, 1] / max(whole[1], 1.0)
     return hair * (_WITHOUT_FACE + face) if whole[1] > _MIN_FACE * whole[0] else hair
@@ -139,7 +139,7 @@ def _turned(direction: Floats, angle: float) -> Floats:
 
 
 @dataclass(frozen=True)
-class _Seen:
+class _PointCloud:
     """Points that represent hair and body, for pictures of few cells.
 
     points: (n, 3) [m] from the middle. kind: (n,) 0 body, 1 hair, 2 face. cell: side of a cell [m].
@@ -152,10 +152,10 @@ class _Seen:
     lie: Floats
 
     @classmethod
-    def of(cls, strands: StrandSet, body: Surface | None) -> _Seen:
+    def of(cls, strands: StrandSet, body: Surface | None) -> _PointCloud:
         # without roots, which are visible from both sides of a sheet
         grid = _evenly_spaced(strands).grid
-        hair: Floats = _some(grid[:, 1:].reshape(-1, 3), _HAIR).astype(np.float64)
+        hair: Floats = _subset(grid[:, 1:].reshape(-1, 3), _HAIR).astype(np.float64)
         middle = 0.5 * (hair.min(axis=0) + hair.max(axis=0))
         radius = max(float(np.linalg.norm(hair - middle, axis=1).max()), 1e-30)
         points: list[Floats] = [hair]
@@ -194,18 +194,18 @@ def _evenly_spaced(strands: StrandSet) -> StrandSet:
     """The hair with evenly spaced points; a sample of strands where it is resampled."""
     if strands.is_uniform:
         return strands
-    few = strands.take(_some(np.arange(strands.strand_count), -(-_HAIR // _CVS)))
+    few = strands.take(_subset(np.arange(strands.strand_count), -(-_HAIR // _CVS)))
     return resample(few, _CVS)
 
 
 def _lie(grid: Floats) -> Floats:
-    """`_Seen.lie` of strands (n, cv_count, 3)."""
+    """`_PointCloud.lie` of strands (n, cv_count, 3)."""
     chord = grid[:, -1].astype(np.float64) - grid[:, 0]
     whole = float(np.linalg.norm(chord, axis=1).sum())
     return chord.sum(axis=0) * (1.0, 1.0, 0.0) / max(whole, 1e-30)
 
 
-def _some[Array: (Floats, Ints)](points: Array, count: int) -> Array:
+def _subset[Array: (Floats, Ints)](points: Array, count: int) -> Array:
     """An even subset of at most `count` points."""
     return points[:: -(-len(points) // count)]
 
@@ -225,7 +225,7 @@ def _places_on(body: Surface, middle: Floats, reach: float) -> Floats:
 
 def _is_face(places: Floats, roots: Floats) -> Bools:
     """Which of the places are bare skin amidst the hair."""
-    roots = _some(roots, _ROOTS)
+    roots = _subset(roots, _ROOTS)
     middle = roots.mean(axis=0)
     extent = float(np.linalg.norm(roots - middle, axis=1).max())
     spacing = float(np.median(nearest_points(roots, roots, 2)[1][:, -1]))

@@ -49,7 +49,7 @@ class _Owned:
     sizes: list[int] = field(default_factory=list)
     lock: threading.Lock = field(default_factory=threading.Lock)
 
-    def keep(self, made: Any, size: int) -> None:
+    def add(self, made: Any, size: int) -> None:
         with self.lock:
             self.objects.append(made)
             self.sizes.append(size)
@@ -65,7 +65,7 @@ class _Owned:
                         each for each, is_used in zip(values, used, strict=True) if is_used
                     ]
 
-    def take(self, other: _Owned) -> None:
+    def merge(self, other: _Owned) -> None:
         with self.lock:
             self.objects += other.objects
             self.sizes += other.sizes
@@ -80,7 +80,7 @@ _UNUSED = _counts([object()])[0]
 
 
 @dataclass
-class _Kept:
+class _Objects:
     """All objects, by thread, and the peak number of bytes."""
 
     owned: dict[int, _Owned] = field(default_factory=dict)
@@ -91,12 +91,12 @@ class _Kept:
         return sum(sum(each.sizes) for each in list(self.owned.values()))
 
 
-_KEPT = _Kept()
+_OBJECTS = _Objects()
 
 
 def free_unused() -> None:
     """Free this thread's unused objects. In a thread that draws."""
-    owned = _KEPT.owned.get(threading.get_ident())
+    owned = _OBJECTS.owned.get(threading.get_ident())
     if owned is not None:
         owned.free_unused()
 
@@ -112,23 +112,23 @@ def hand_over() -> None:
     # reading waits until this thread's context has run all its commands
     texture((1, 1), format="R32F").read()
     free_unused()
-    mine = _KEPT.owned.pop(threading.get_ident(), _Owned())
-    _KEPT.owned.setdefault(main, _Owned()).take(mine)
+    mine = _OBJECTS.owned.pop(threading.get_ident(), _Owned())
+    _OBJECTS.owned.setdefault(main, _Owned()).merge(mine)
 
 
 def forget() -> None:
     """At exit: drop all references held here, which frees unused objects."""
-    _KEPT.owned.clear()
+    _OBJECTS.owned.clear()
 
 
 def bytes_in_use() -> int:
     """Bytes of all textures and buffers that have not been freed; drivers may round them up."""
-    return _KEPT.size
+    return _OBJECTS.size
 
 
 def peak_bytes() -> int:
     """The most bytes in use at once since Blender started."""
-    return _KEPT.peak
+    return _OBJECTS.peak
 
 
 def texture(size: tuple[int, ...], *, format: str, layers: int = 0, data: Any = None) -> Any:
@@ -194,6 +194,6 @@ def _bytes_of(array: Floats) -> int:
 def _made(kind: str, size: int, *values: Any, **options: Any) -> Any:
     free_unused()
     made = getattr(gpu.types, kind)(*values, **options)
-    _KEPT.owned.setdefault(threading.get_ident(), _Owned()).keep(made, size)
-    _KEPT.peak = max(_KEPT.peak, _KEPT.size)
+    _OBJECTS.owned.setdefault(threading.get_ident(), _Owned()).add(made, size)
+    _OBJECTS.peak = max(_OBJECTS.peak, _OBJECTS.size)
     return made

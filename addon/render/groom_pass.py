@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Hashable, Mapping
 
 from .card_pass import CardPass
-from .inter_groom_shadow import may_shade
+from .inter_groom_shadow import may_cast_shadow_on
 from .opacity_maps import OpacityMaps
 from .snapshot import Snapshot
 from .strand_pass import StrandPass
@@ -41,7 +41,7 @@ class GroomPass:
         if not others or not snapshot.strand_count:
             return []
         ball = self.strands.ball(snapshot)
-        return [each for each in others if may_shade(each, ball)]
+        return [each for each in others if may_cast_shadow_on(each, ball)]
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ class HairBall:
     def __init__(self) -> None:
         self._extent: tuple[Floats | None, Ball | float] = (None, 0.0)
 
-    def of(self, snapshot: Snapshot) -> Ball:
+    def ball(self, snapshot: Snapshot) -> Ball:
         """The sphere around all strands; for strands on the GPU, around all places that they can
         reach."""
         device = snapshot.device_points

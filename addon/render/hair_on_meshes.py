@@ -9,7 +9,7 @@ from .accumulation import Target
 from .camera import Camera
 from .hashed_alpha import shifts
 from .inter_groom_shadow import InterGroomShadow
-from .mesh_places import MeshPlaces, Placed
+from .mesh_places import MeshPlaces, PlacedMesh
 from .opacity_maps import OpacityMaps
 from .shader_program import released_with_shaders
 from .snapshot import MeshSnapshot
@@ -56,13 +56,14 @@ class HairOnMeshes:
         )
 
 
-def _placed(groups: Mapping[int, Sequence[MeshSnapshot]], sample: int) -> list[Placed]:
+def _placed(groups: Mapping[int, Sequence[MeshSnapshot]], sample: int) -> list[PlacedMesh]:
     """The meshes that are not blended, with the same holes as when they are drawn."""
     found = []
     for index, meshes in groups.items():
         solid = [each for each in meshes if len(each.surface.triangles)]
         solid = [each for each in solid if each.transparency != "blended"]
         found += [
-            Placed(mesh, float(index), shifts(number, sample)) for number, mesh in enumerate(solid)
+            PlacedMesh(mesh, float(index), shifts(number, sample))
+            for number, mesh in enumerate(solid)
         ]
     return found

@@ -22,7 +22,7 @@ from .shader_program import ShaderRecipe, program, released_with_shaders
 from .strand_drawing import StrandDrawing
 from .textures import drawing_into, drawing_state
 
-_NOBODY = (0.0, 0.0, 0.0, 0.0)
+_NO_STRAND = (0.0, 0.0, 0.0, 0.0)
 #: beyond all depths
 _DARK = (0.0, 0.0, 0.0, 2.0)
 _SHOWN_RECIPE = ShaderRecipe(
@@ -65,8 +65,8 @@ class HashedStrands:
             target = gpu_objects.framebuffer(depth_slot=self._depth, color_slots=(hair,))
             with drawing_into(target), drawing_state():
                 gpu.state.viewport_set(0, 0, width, height)
-                target.clear(color=_NOBODY, depth=1.0)
-                drawing.hash(turn)
+                target.clear(color=_NO_STRAND, depth=1.0)
+                drawing.draw_hashed(turn)
         shaded = gpu_objects.framebuffer(color_slots=self._light)
         with drawing_into(shaded), drawing_state(depth_test="NONE", depth_write=False):
             gpu.state.viewport_set(0, 0, width, height)

@@ -90,7 +90,7 @@ class InterGroomShadow:
         return self._other_tau
 
 
-def may_shade(maps: OpacityMaps, ball: Ball) -> bool:
+def may_cast_shadow_on(maps: OpacityMaps, ball: Ball) -> bool:
     """Whether hair with these maps may cast a shadow on anything in a ball, for any of the first
     lights.
 

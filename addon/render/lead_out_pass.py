@@ -188,14 +188,16 @@ class LeadOutPass:
             self._textures.pop("states", None)
             return None
         self._upload(self._clearance)
-        solids = self._solids = self._colliders.of(posed)
+        solids = self._solids = self._colliders.textures_of(posed)
         names = ("strand_spans", "clearances")
         textures = {name: self._textures[name] for name in names}
         textures["solids"] = solids.solids(posed)
         for name, texture in (("rounds", solids.rounds), ("fields", solids.fields)):
             if texture is not None:
                 textures[name] = texture
-        iterations = self._layout.longest * (iterations_per_point + solids.distance_iterations)
+        iterations = self._layout.max_point_count * (
+            iterations_per_point + solids.distance_iterations
+        )
         kinds = solids.kinds
         return LeadOutInputs(
             textures,
@@ -231,7 +233,7 @@ class LeadOutPass:
         steps = () if inputs.finds_near_while_riding else ("CARRY_ROOTS", "FIND_NEAR")
         for step in (*steps, "COUNT_NEAR", "LIST_NEAR"):
             self._run((step,), textures, integers, numbers)
-        fits_one_dispatch = self._points_per_dispatch() >= ATTEMPTS * self._layout.longest
+        fits_one_dispatch = self._points_per_dispatch() >= ATTEMPTS * self._layout.max_point_count
         # each further dispatch costs as much as leading some strands
         if fits_one_dispatch and can_read_own_writes():
             all_attempts = {**integers, "first_attempt": 0, "attempt_end": ATTEMPTS}
@@ -313,7 +315,7 @@ class LeadOutPass:
         invocations = -(-count // _STRANDS_PER_INVOCATION.get(steps[0], 1))
         all_integers = integers | {"strand_count": count, "lane_count": invocations}
         points_per_dispatch = self._points_per_dispatch() if reads_colliders else _MAX_ITERATIONS
-        end = self._layout.longest if "first_point" in recipe.integers else 1
+        end = self._layout.max_point_count if "first_point" in recipe.integers else 1
         for first in range(0, end, points_per_dispatch):
             all_integers |= {"first_point": first, "point_end": first + points_per_dispatch}
             shader.bind(

@@ -44,10 +44,10 @@ class Lens:
             angle = 2.0 * np.pi * turn
             unit = out[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
         else:
-            unit = self._in_corners(turn, out)
+            unit = self._polygon_points(turn, out)
         return np.asarray(self.radius * unit * [1.0 / self.ratio, 1.0])
 
-    def _in_corners(self, turn: Floats, out: Floats) -> Floats:
+    def _polygon_points(self, turn: Floats, out: Floats) -> Floats:
         """Points of a regular polygon, one triangle for each side, (n, 2)."""
         corner, along = np.divmod(turn * self.blades, 1.0)
         step = 2.0 * np.pi / self.blades

@@ -30,26 +30,26 @@ def lights_at(lights: Sequence[Light], sample: int, center: Floats) -> tuple[Lig
         center: (3,) [m] the point that a lamp's disk faces.
     """
     place = (0.5 + sample * _STEPS) % 1.0
-    return tuple(_at(light, place, np.asarray(center, np.float64)) for light in lights)
+    return tuple(_light_sample(light, place, np.asarray(center, np.float64)) for light in lights)
 
 
-def _at(light: Light, place: Floats, center: Floats) -> Light:
+def _light_sample(light: Light, place: Floats, center: Floats) -> Light:
     if light.kind == "sun":
-        return light if light.angle <= 0.0 else _of_sun(light, disk_place(place))
+        return light if light.angle <= 0.0 else _sun_sample(light, disk_place(place))
     if light.panel is not None:
-        return _of_panel(light, light.panel, place)
-    return light if light.radius <= 0.0 else _of_lamp(light, disk_place(place), center)
+        return _panel_sample(light, light.panel, place)
+    return light if light.radius <= 0.0 else _lamp_sample(light, disk_place(place), center)
 
 
-def _of_sun(light: Light, aside: Floats) -> Light:
+def _sun_sample(light: Light, offset: Floats) -> Light:
     """A point of the disk that fills a sun's angle, as in Cycles."""
     right, up = perpendicular_axes(np.array(light.vector))
-    x, y = np.tan(0.5 * min(light.angle, 0.99 * np.pi)) * aside
+    x, y = np.tan(0.5 * min(light.angle, 0.99 * np.pi)) * offset
     towards = np.array(light.vector) + x * right + y * up
     return replace(light, vector=triple(towards / np.linalg.norm(towards)))
 
 
-def _of_lamp(light: Light, aside: Floats, center: Floats) -> Light:
+def _lamp_sample(light: Light, offset: Floats, center: Floats) -> Light:
     """A point of the disk that faces the hair, with a power that gives the same irradiance at the
     hair's middle as the whole lamp, for a disk without a cone all along its axis."""
     away = center - np.array(light.vector)
@@ -57,7 +57,7 @@ def _of_lamp(light: Light, aside: Floats, center: Floats) -> Light:
     if distance <= light.radius:  # the middle of the hair is inside the lamp
         return light
     right, up = perpendicular_axes(away / distance)
-    x, y = light.radius * aside
+    x, y = light.radius * offset
     at = triple(np.array(light.vector) + x * right + y * up)
     farther = float(x * x + y * y)
     if light.cone is None and not light.is_ball:
@@ -69,10 +69,10 @@ def _of_lamp(light: Light, aside: Floats, center: Floats) -> Light:
     return replace(light, vector=at, power=power, radius=0.0)
 
 
-def _of_panel(light: Light, panel: Panel, place: Floats) -> Light:
+def _panel_sample(light: Light, panel: Panel, place: Floats) -> Light:
     """A panel of zero size that has the power of the whole one."""
-    aside = disk_place(place) if panel.is_round else 2.0 * place - 1.0
-    x, y = np.array([panel.half_width, panel.half_height]) * aside
+    offset = disk_place(place) if panel.is_round else 2.0 * place - 1.0
+    x, y = np.array([panel.half_width, panel.half_height]) * offset
     at = np.array(light.vector) + x * np.array(panel.right) + y * np.array(panel.up)
     point = replace(panel, half_width=0.0, half_height=0.0, is_round=False)
     return replace(light, vector=triple(at), panel=point)

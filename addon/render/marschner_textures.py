@@ -46,21 +46,21 @@ class MarschnerTextures:
         self._kept: OrderedDict[Any, _Tables] = OrderedDict()
         released_with_shaders(self)
 
-    def of(self, shading: ShadingSettings, size: int) -> dict[str, Any]:
+    def textures(self, shading: ShadingSettings, size: int) -> dict[str, Any]:
         """Textures by the names of MARSCHNER_TEXTURES, `size` texels across."""
-        kept = self._of(shading, size).textures
+        kept = self._tables(shading, size).textures
         return {name: kept[name] for _, name in MARSCHNER_TEXTURES}
 
     def fractions(self, shading: ShadingSettings, size: int) -> dict[str, Any]:
         """Textures by the names of FRACTIONS_TEXTURES, made of tables `size` texels across."""
-        kept = self._of(shading, size).textures
+        kept = self._tables(shading, size).textures
         return {name: kept[name] for _, name in FRACTIONS_TEXTURES}
 
     def forward(self, shading: ShadingSettings, size: int) -> Floats:
         """The fraction of light that a strand scatters forward, by colour, (3,)."""
-        return mean_forward(self._of(shading, size).fractions.forward, shading)
+        return mean_forward(self._tables(shading, size).fractions.forward, shading)
 
-    def _of(self, shading: ShadingSettings, size: int) -> _Tables:
+    def _tables(self, shading: ShadingSettings, size: int) -> _Tables:
         shape = shape_of(fibre_of(shading))
         key = (shape, size)
         if key not in self._kept:
@@ -84,7 +84,7 @@ MARSCHNER = MarschnerTextures()
 def marschner_feature(snapshot: Snapshot) -> ShaderFeature:
     """The feature of programs that shade by Marschner's model."""
     shading = snapshot.shading
-    textures = MARSCHNER.of(shading, snapshot.table_size)
+    textures = MARSCHNER.textures(shading, snapshot.table_size)
     return ShaderFeature(
         name="marschner",
         blocks={"fibre": ("Fibre", pack_fibre(shading))},

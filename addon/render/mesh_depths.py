@@ -31,7 +31,7 @@ def depth_recipe(*, has_alpha: bool, has_pictures: bool) -> ShaderRecipe:
         textures=(("FLOAT_2D", "mesh_color_map"),) if has_pictures else (),
         numbers=(
             *(("VEC4", row) for row in _ROWS),
-            *((("FLOAT", "mesh_alpha"), ("VEC2", "mesh_chance")) if has_alpha else ()),
+            *((("FLOAT", "mesh_alpha"), ("VEC2", "mesh_hash_shift")) if has_alpha else ()),
         ),
         inputs=(("VEC3", "position"), *((("VEC2", "picture_place"),) if has_pictures else ())),
         varyings=(
@@ -84,8 +84,8 @@ class MeshDepths:
         textures = {} if picture is None else {"mesh_color_map": self._pictures.color(picture)}
         if isinstance(caster, MeshSnapshot) and caster.transparency != "opaque":
             has_alpha = True
-            chance = 1.0 - 2.0 * (number % 2), number // 2 * _NEXT_PATTERN % 1.0
-            numbers |= {"mesh_alpha": caster.alpha, "mesh_chance": chance}
+            hash_shifts = 1.0 - 2.0 * (number % 2), number // 2 * _NEXT_PATTERN % 1.0
+            numbers |= {"mesh_alpha": caster.alpha, "mesh_hash_shift": hash_shifts}
         shader = program(depth_recipe(has_alpha=has_alpha, has_pictures=picture is not None))
         shader.bind(textures=textures, numbers=numbers)
         return shader.shader

@@ -90,7 +90,7 @@ class MeshPass:
         integers = {"output_encoding": output_index(output)}
         for number, (mesh, _, batch) in enumerate(_far_to_near(self._batches, camera)):
             features = [*shared, *self._mesh_features(mesh, skins.get(id(mesh)))]
-            features += _moment_features(mesh, number, camera.sample, opacity and other_tau)
+            features += _sample_features(mesh, number, camera.sample, opacity and other_tau)
             with _state_for(mesh):
                 batch.draw(bound(_RECIPE, features, self._blocks, integers=integers).shader)
         self._pictures.forget_but(snapshot.meshes)
@@ -112,12 +112,12 @@ class MeshPass:
         Args:
             all as of `draw`.
         """
-        skins = self._skins(snapshot.meshes, snapshot, opacity, shadows, of_hair_alone=True)
+        skins = self._skins(snapshot.meshes, snapshot, opacity, shadows, only_hair=True)
         self._upload(snapshot.meshes, skins)
         shared = _shared(snapshot, camera, (width, height), opacity, shadows)
         for number, (mesh, _, batch) in enumerate(_far_to_near(self._batches, camera)):
-            features = [*shared, *self._cover_features(mesh, skins.get(id(mesh)))]
-            features += _moment_features(mesh, number, camera.sample, opacity and other_tau)
+            features = [*shared, *self._coverage_features(mesh, skins.get(id(mesh)))]
+            features += _sample_features(mesh, number, camera.sample, opacity and other_tau)
             with _state_for(mesh):
                 batch.draw(bound(_SHADOW_RECIPE, features, self._blocks).shader)
         self._pictures.forget_but(snapshot.meshes)
@@ -137,7 +137,7 @@ class MeshPass:
         opacity: OpacityMaps | None,
         shadows: MeshShadows | None,
         *,
-        of_hair_alone: bool = False,
+        only_hair: bool = False,
     ) -> dict[int, SkinShadow]:
         """The soft shadows on meshes that are skin, see SkinPass.shadows."""
         return self.skin.shadows(
@@ -147,7 +147,7 @@ class MeshPass:
             len(packed_lights(snapshot.lights)),
             (0.0, 0.0, 0.0) if opacity is None else hair_forward(snapshot),
             shadows,
-            of_hair_alone=of_hair_alone,
+            only_hair=only_hair,
         )
 
     def _mesh_features(
@@ -177,7 +177,7 @@ class MeshPass:
                 defines={"EMISSION": 1},
             )
 
-    def _cover_features(
+    def _coverage_features(
         self, mesh: MeshSnapshot, skin: SkinShadow | None
     ) -> Iterator[ShaderFeature]:
         """The features of one mesh in programs that need its coverage but not its surface."""
@@ -218,7 +218,7 @@ def _shared(
     return found
 
 
-def _moment_features(
+def _sample_features(
     mesh: MeshSnapshot, number: int, sample: int, other_tau: Any
 ) -> Iterable[ShaderFeature]:
     """The features of one mesh that depend on the sample."""
@@ -254,7 +254,7 @@ def _inter_groom_feature(other_tau: Any) -> ShaderFeature:
 
 def _hashed_feature(number: int, sample: int) -> ShaderFeature:
     """The feature with the shift of a hashed mesh's pattern, see hashed_alpha.py."""
-    return ShaderFeature(numbers={"mesh_chance": ("VEC2", shifts(number, sample))})
+    return ShaderFeature(numbers={"mesh_hash_shift": ("VEC2", shifts(number, sample))})
 
 
 def _far_to_near(batches: list[_Batch], camera: Camera) -> list[_Batch]:

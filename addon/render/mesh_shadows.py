@@ -123,10 +123,10 @@ class MeshShadowPass:
         return gpu_objects.texture((side, side), layers=layers, format="DEPTH_COMPONENT32F")
 
 
-def mesh_map_side(asked: int, layers: int, most: int, room: int) -> int:
-    """Texels along a side of each map: as asked, if memory (`room`, bytes) and the GPU (`most`)
-    allow."""
-    return max(min(asked, most, int(np.sqrt(room / (_TEXEL_BYTES * layers)))), 1)
+def mesh_map_side(requested: int, layers: int, max_side: int, max_bytes: int) -> int:
+    """Texels along a side of each map: as requested, if memory (`max_bytes`) and the GPU
+    (`max_side`) allow."""
+    return max(min(requested, max_side, int(np.sqrt(max_bytes / (_TEXEL_BYTES * layers)))), 1)
 
 
 def pack_mesh_shadows(frames: Sequence[Sequence[LightFrame]], side: int) -> Floats:

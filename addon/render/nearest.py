@@ -102,7 +102,7 @@ class Nearest:
 
 
 @dataclass(frozen=True, eq=False)
-class Moment:
+class SceneAtTime:
     """The objects of the current scene at another time.
 
     meshes: (vertex_count, 3) of each mesh at that time [m, world]. grooms: at that time.
@@ -113,14 +113,18 @@ class Moment:
     grooms: tuple[Snapshot, ...]
 
     @classmethod
-    def of(cls, scene: SceneSnapshot, then: SceneSnapshot, camera: Camera) -> Moment:
-        """Objects that do not exist then, or have other points, stay where they are now."""
-        meshes = {mesh.key: mesh.surface.positions for mesh in then.meshes}
-        grooms = {groom.key: groom.snapshot for groom in then.grooms}
+    def of(cls, scene: SceneSnapshot, other_scene: SceneSnapshot, camera: Camera) -> SceneAtTime:
+        """Objects that do not exist in `other_scene`, or have other points, stay where they are
+        now."""
+        meshes = {mesh.key: mesh.surface.positions for mesh in other_scene.meshes}
+        grooms = {groom.key: groom.snapshot for groom in other_scene.grooms}
         return cls(
             camera,
-            tuple(_if_like(meshes.get(mesh.key), mesh.surface.positions) for mesh in scene.meshes),
-            tuple(_as_then(groom.snapshot, grooms.get(groom.key)) for groom in scene.grooms),
+            tuple(
+                _if_same_shape(meshes.get(mesh.key), mesh.surface.positions)
+                for mesh in scene.meshes
+            ),
+            tuple(_at_other_time(groom.snapshot, grooms.get(groom.key)) for groom in scene.grooms),
         )
 
 
@@ -180,9 +184,9 @@ def _around(groom: Snapshot, strand: Ints, place: Floats) -> tuple[list[Floats],
     return [before, start, end, after], (along - segment)[:, None]
 
 
-def _if_like(then: Floats | None, now: Floats) -> Floats:
+def _if_same_shape(then: Floats | None, now: Floats) -> Floats:
     return now if then is None or then.shape != now.shape else then
 
 
-def _as_then(now: Snapshot, then: Snapshot | None) -> Snapshot:
-    return now if then is None or not then.layout.is_as(now.layout) else then
+def _at_other_time(now: Snapshot, then: Snapshot | None) -> Snapshot:
+    return now if then is None or not then.layout.has_same_counts(now.layout) else then

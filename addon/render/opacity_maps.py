@@ -118,7 +118,7 @@ class OpacityMaps:
             name="deep", textures={"opacity_spans": ("FLOAT_2D", self.spans)}, defines={"DEEP": 1}
         )
 
-    def find_spans(self, number: int) -> None:
+    def compute_spans(self, number: int) -> None:
         """Compute the spans of one map from its first and last depths."""
         side = self.size.side // START_TEXELS
         shader = program(_SPANS_RECIPE)
@@ -129,7 +129,7 @@ class OpacityMaps:
         )
         shader.dispatch(side, side)
 
-    def forget_starts(self, number: int) -> None:
+    def clear_starts(self, number: int) -> None:
         """Clear the first and last depths of one map to those without hair."""
         side = self.size.side // START_TEXELS
         shader = program(_NO_STARTS_RECIPE)
@@ -227,7 +227,7 @@ class OpacityDrawing:
         is_other = self._maps is None or self._drawn_of != drawn_of
         if is_other:
             self._frames = {}
-        due = due_maps(self._frames, wanted, is_turning=is_turning)
+        due = lights_to_redraw(self._frames, wanted, is_turning=is_turning)
         if self._maps is None or is_other or due:
             self._frames |= {light: wanted[light] for light in due}
             values = pack_opacity([self._frames.get(light) for light in frames], settings, size)
@@ -240,7 +240,7 @@ class OpacityDrawing:
             for number, light in places:
                 _draw_map(maps, number, light, hair)
             self._drawn_of = drawn_of
-        self.has_stale_maps = bool(due_maps(self._frames, wanted))
+        self.has_stale_maps = bool(lights_to_redraw(self._frames, wanted))
         return self._maps
 
     def _maps_of(self, values: Floats, size: MapSize) -> OpacityMaps:
@@ -261,7 +261,7 @@ class OpacityDrawing:
             self._meshes_drawn[number] = seen
 
 
-def due_maps(
+def lights_to_redraw(
     drawn: Mapping[int, LightFrame], wanted: Mapping[int, LightFrame], *, is_turning: bool = False
 ) -> tuple[int, ...]:
     """The lights whose maps are to be drawn, or drawn again.
@@ -272,7 +272,7 @@ def due_maps(
     """
     if not drawn:
         return tuple(wanted)
-    lags = {light: _turn(drawn[light], frame) for light, frame in wanted.items()}
+    lags = {light: _angle_between(drawn[light], frame) for light, frame in wanted.items()}
     behind = tuple(
         light for light, frame in wanted.items() if (drawn[light].to_map != frame.to_map).any()
     )
@@ -282,7 +282,7 @@ def due_maps(
     return (last,) if lags[last] > _LAG else ()
 
 
-def _turn(one: LightFrame, other: LightFrame) -> float:
+def _angle_between(one: LightFrame, other: LightFrame) -> float:
     """The angle between the directions of two frames [rad]."""
     along = one.to_depth[:3], other.to_depth[:3]
     lengths = np.linalg.norm(along[0]) * np.linalg.norm(along[1])
@@ -296,9 +296,9 @@ def _draw_map(maps: OpacityMaps, number: int, light: int, hair: HairInMaps) -> N
     )
     features = [place, maps.mesh_feature]
     if maps.starts is not None:
-        maps.forget_starts(number)
+        maps.clear_starts(number)
         hair.draw_starts(maps, number, place)
-        maps.find_spans(number)
+        maps.compute_spans(number)
         features += [maps.span_feature, ShaderFeature(integers={"map_index": number})]
     slots = len(maps.slots)
     for turn in range(maps.passes):

@@ -65,7 +65,7 @@ _FEWEST_POINTS = 8
 
 
 @dataclass(frozen=True, eq=False)
-class _Casting:
+class _ShadowStrands:
     """The strands that cast the shadow of all strands: those of the lowest ranks. If a strand is
     added or removed, the others stay the same; choosing every nth strand would change them.
 
@@ -80,7 +80,7 @@ class _Casting:
     classes: tuple[DetailClass, ...]
 
     @classmethod
-    def of(cls, layout: StrandLayout, rank: Floats | None, count: int) -> _Casting:
+    def of(cls, layout: StrandLayout, rank: Floats | None, count: int) -> _ShadowStrands:
         if rank is None:
             evenly = (np.arange(count) + 0.5) * (layout.strand_count / count)
             chosen = np.minimum(evenly.astype(np.int64), layout.strand_count - 1)
@@ -94,19 +94,19 @@ class _Casting:
         spans = texture_from(strand_rows(layout.spans[chosen][:, None]), "RGBA32F")
         return cls(layout, rank, count, spans, classes)
 
-    def is_of(self, layout: StrandLayout, rank: Floats | None, count: int) -> bool:
+    def matches(self, layout: StrandLayout, rank: Floats | None, count: int) -> bool:
         return self.layout is layout and self.rank is rank and self.count == count
 
 
 @dataclass(frozen=True, eq=False)
 class _Strands:
-    """Strands on the GPU. curves: their points. casting: the strands that are drawn."""
+    """Strands on the GPU. curves: their points. shadow_strands: the strands that are drawn."""
 
     state: Hashable
     curves: ShaderFeature
     settings: ShaderFeature
     blocks: UniformBlocks
-    casting: _Casting
+    shadow_strands: _ShadowStrands
     ribbons: Ribbons
 
     def draw_starts(self, maps: OpacityMaps, number: int, place: ShaderFeature) -> None:
@@ -124,7 +124,7 @@ class _Strands:
         shader = bound(
             _DEPTH_RECIPE, [place, maps.mesh_feature, self.curves], self.blocks, integers=integers
         ).shader
-        for drawn in self.casting.classes:
+        for drawn in self.shadow_strands.classes:
             across = max(-(-2 * side // drawn.capacity), _FEWEST_POINTS)
             shader.uniform_int("first_instance", drawn.first)
             shader.uniform_int("points_across", across)
@@ -141,24 +141,24 @@ class _Strands:
             images={"starts": maps.starts},
             integers=integers,
         )
-        for drawn in self.casting.classes:
+        for drawn in self.shadow_strands.classes:
             shader.shader.uniform_int("drawn_count", drawn.count)
             shader.shader.uniform_int("first_instance", drawn.first)
             shader.run(drawn.capacity + 1, drawn.count)
         gpu.shader.unbind()
 
     def draw_layers(self, features: Sequence[ShaderFeature]) -> None:
-        casting = self.casting
+        shadow_strands = self.shadow_strands
         shader = bound(
             _LAYERS_RECIPE,
             [*features, self.curves, self.settings],
             self.blocks,
             integers={"first_instance": 0},
-            numbers={"strand_step": casting.layout.strand_count / casting.count},
+            numbers={"strand_step": shadow_strands.layout.strand_count / shadow_strands.count},
         )
-        for drawn in casting.classes:
+        for drawn in shadow_strands.classes:
             shader.shader.uniform_int("first_instance", drawn.first)
-            self.ribbons.of(drawn.capacity).draw_instanced(
+            self.ribbons.strip(drawn.capacity).draw_instanced(
                 shader.shader, instance_start=0, instance_count=drawn.count
             )
 
@@ -173,7 +173,7 @@ class OpacityPass:
         """Release everything on the GPU; the next draw makes it again."""
         self._drawing, self._blocks = OpacityDrawing(), UniformBlocks()
         self._ribbons = Ribbons()
-        self._casting: _Casting | None = None
+        self._shadow_strands: _ShadowStrands | None = None
 
     @property
     def has_stale_maps(self) -> bool:
@@ -206,15 +206,15 @@ class OpacityPass:
             ball, lights, casters, spacing, is_turning: as in OpacityDrawing.maps.
         """
         count = max(round(layout.strand_count * settings.strand_fraction), 1)
-        casting = self._casting
-        if casting is None or not casting.is_of(layout, rank, count):
-            casting = self._casting = _Casting.of(layout, rank, count)
-        curves = curves_feature(points, casting.spans, attributes)
+        shadow_strands = self._shadow_strands
+        if shadow_strands is None or not shadow_strands.matches(layout, rank, count):
+            shadow_strands = self._shadow_strands = _ShadowStrands.of(layout, rank, count)
+        curves = curves_feature(points, shadow_strands.spans, attributes)
         look = ShaderFeature(
             blocks={"strands": ("StrandSettings", struct_values(strands.as_drawn))}
         )
-        state = serial, casting, strands, capabilities().image_atomics
-        hair = _Strands(state, curves, look, self._blocks, casting, self._ribbons)
+        state = serial, shadow_strands, strands, capabilities().image_atomics
+        hair = _Strands(state, curves, look, self._blocks, shadow_strands, self._ribbons)
         return self._drawing.maps(
             hair, ball, lights, settings, casters, spacing, is_turning=is_turning
         )

@@ -41,7 +41,7 @@ class OwnDepth:
             if len(mesh.triangles)
         ]
         gpu.state.active_framebuffer_get().clear(depth=1.0)
-        shader = program(place_recipe(has_alpha=False, has_pictures=False, is_carrying=False))
+        shader = program(place_recipe(has_alpha=False, has_pictures=False, has_vertex_values=False))
         view = self._view.holding(view_values(camera, width, height))
         with drawing_state():
             gpu.state.color_mask_set(False, False, False, False)

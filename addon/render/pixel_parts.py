@@ -75,16 +75,16 @@ def pixel_parts(
         longest: most fragments of a pixel that can be drawn at once; None: any number.
         expected: see PixelPart.
     """
-    passed = np.cumsum(counts, dtype=np.int64)
+    cumulative = np.cumsum(counts, dtype=np.int64)
     parts: list[PixelPart] = []
     before = 0
-    while len(passed) and before < passed[-1]:
-        first = int(np.searchsorted(passed, before, side="right"))
-        end = max(int(np.searchsorted(passed, before + capacity, side="right")), first + 1)
+    while len(cumulative) and before < cumulative[-1]:
+        first = int(np.searchsorted(cumulative, before, side="right"))
+        end = max(int(np.searchsorted(cumulative, before + capacity, side="right")), first + 1)
         part = PixelPart(first, end, expected=expected)
         is_too_long = longest is not None and counts[first:end].max() > longest
         parts += part.slabs if is_too_long else (part,)
-        before = int(passed[end - 1])
+        before = int(cumulative[end - 1])
     return parts
 
 

@@ -39,7 +39,7 @@ class RestCounts:
 
     def matches(self, layout: StrandLayout, settings: DetailSettings) -> bool:
         """Whether these counts are for such strands."""
-        return self.layout.is_as(layout) and self.settings == settings
+        return self.layout.has_same_counts(layout) and self.settings == settings
 
     def slots_at(self, scale: float) -> int:
         """Slots needed at this scale [pixels per metre], at least one for each strand."""

@@ -13,7 +13,7 @@ class Ribbons:
     def __init__(self) -> None:
         self._batches: dict[tuple[str, int], Any] = {}
 
-    def of(self, capacity: int) -> Any:
+    def strip(self, capacity: int) -> Any:
         """A strip with two vertices per station, and one station more than pieces."""
         return self._batch("TRI_STRIP", 2 * (capacity + 1))
 

@@ -15,43 +15,44 @@ from ..shading.lights import packed_lights
 from ..shading.shafts_settings import ShaftSettings
 from . import gpu_memory
 from .accumulation import Target
-from .bright_pass import plain
+from .bright_pass import one_texel
 from .camera import Camera
 from .groom_pass import GroomPass
 from .hair_on_meshes import HairOnMeshes
 from .hashed_alpha import shifts
 from .holdout import Holdout
 from .mesh_pass import MeshPass
-from .mesh_places import MeshPlaces, Placed
+from .mesh_places import MeshPlaces, PlacedMesh
 from .mesh_shadows import MeshShadowPass
 from .nearest import Nearest
 from .opacity_maps import OpacityMaps
 from .scene_snapshot import SceneSnapshot, shaded_by
-from .shafts_pass import finish_with_shafts, shafts_apart
+from .shafts_pass import draw_separate_shafts, finish_with_shafts
 from .snapshot import MeshSnapshot, Snapshot
 from .textures import texture_to_array
 
 type Rgba = tuple[float, float, float, float]
 
 #: For renders in the window, which draw in a separate thread, since passes share textures.
-ONE_AT_A_TIME = threading.Lock()
+DRAW_LOCK = threading.Lock()
 _NOTHING: Rgba = (0.0, 0.0, 0.0, 0.0)
 _ALL: Rgba = (1.0, 1.0, 1.0, 1.0)
 _NOWHERE: Rgba = (0.0, 0.0, 0.0, -1.0)
 
 
 @dataclass(frozen=True, eq=False)
-class ShaftsApart:
+class SeparateShafts:
     """Shafts of light in a texture of their own, for a picture in which meshes are holes.
 
     light: RGBA32F texture of the picture's size into which they are drawn.
-    behind: the picture that is visible through the holes, see BrightThings; None: the sky alone.
+    background: the picture that is visible through the holes, see BrightShafts; None: the sky
+    alone.
     shows_world: the world is in that picture, so that its bright places make shafts as bright parts
         and not also as lights.
     """
 
     light: Any
-    behind: Any = None
+    background: Any = None
     shows_world: bool = False
 
 
@@ -78,20 +79,20 @@ class ScenePass:
         target: Target,
         size: tuple[int, int],
         sky: Rgba,
-        apart: ShaftsApart | None = None,
+        separate_shafts: SeparateShafts | None = None,
     ) -> None:
         """Draw one moment, scene-linear, premultiplied.
 
         Args:
             size: width and height [pixels].
             sky: background colour.
-            apart: the separate texture for shafts of light; None: they are drawn into the picture.
+            separate_shafts: the texture for shafts of light; None: they are drawn into the picture.
 
         Raises:
             ShaderError: a shader does not compile here, or points on the GPU were released.
         """
-        with ONE_AT_A_TIME, gpu_memory.shared_by(len(scene.grooms)):
-            self._draw(scene, camera, target, size, sky, apart)
+        with DRAW_LOCK, gpu_memory.shared_by(len(scene.grooms)):
+            self._draw(scene, camera, target, size, sky, separate_shafts)
 
     def _draw(
         self,
@@ -100,30 +101,39 @@ class ScenePass:
         target: Target,
         size: tuple[int, int],
         sky: Rgba,
-        apart: ShaftsApart | None,
+        separate_shafts: SeparateShafts | None,
     ) -> None:
-        lit = {groom.key: scene.lit(groom) for groom in scene.grooms}
+        lit_grooms = {groom.key: scene.lit(groom) for groom in scene.grooms}
         maps = self._maps(scene)
         shafts = shafts_of(scene)
-        holes = {groom.key for groom in scene.grooms if groom.is_holdout}
-        seen = lit.keys() - holes
+        holdouts = {groom.key for groom in scene.grooms if groom.is_holdout}
+        visible = lit_grooms.keys() - holdouts
         # shafts use alpha to find what stands before a light
-        goes_under = shafts is not None and apart is None
-        target.sized(*size).clear(_NOTHING if goes_under else sky)
+        adds_sky_last = shafts is not None and separate_shafts is None
+        target.sized(*size).clear(_NOTHING if adds_sky_last else sky)
         with target.drawing():
             self._draw_meshes(scene, camera, size, maps)
-            self._draw_hair(lit, seen, camera, size, maps)
-        if holes:
-            self._holdout.cut(target, lambda: self._draw_hair(lit, holes, camera, size, maps))
+            self._draw_hair(lit_grooms, visible, camera, size, maps)
+        if holdouts:
+            self._holdout.cut(
+                target, lambda: self._draw_hair(lit_grooms, holdouts, camera, size, maps)
+            )
         color, depth = target.color, target.depth
-        if apart is not None:
-            apart.light.clear(format="FLOAT", value=_NOTHING)
+        if separate_shafts is not None:
+            separate_shafts.light.clear(format="FLOAT", value=_NOTHING)
             if shafts is not None:
-                into, behind = apart.light, apart.behind or plain(sky)
+                shaft_texture, background = (
+                    separate_shafts.light,
+                    separate_shafts.background or one_texel(sky),
+                )
                 lights = [
-                    each for each in scene.lights if not (apart.shows_world and each.is_from_world)
+                    each
+                    for each in scene.lights
+                    if not (separate_shafts.shows_world and each.is_from_world)
                 ]
-                shafts_apart(into, color, depth, behind, camera, lights, shafts)
+                draw_separate_shafts(
+                    shaft_texture, color, depth, background, camera, lights, shafts
+                )
         elif shafts is not None:
             finish_with_shafts(color, color, depth, camera, scene.lights, shafts, sky)
 
@@ -135,7 +145,7 @@ class ScenePass:
 
         Arguments and errors as of `draw`.
         """
-        with ONE_AT_A_TIME, gpu_memory.shared_by(len(scene.grooms)):
+        with DRAW_LOCK, gpu_memory.shared_by(len(scene.grooms)):
             maps = self._maps(scene)
             target.sized(*size).clear(_ALL)
             with target.drawing():
@@ -159,10 +169,10 @@ class ScenePass:
         transparency, and no thinner than *Min Width*; cards and meshes count where they cover at
         least a half.
         """
-        with ONE_AT_A_TIME, gpu_memory.shared_by(len(scene.grooms)):
+        with DRAW_LOCK, gpu_memory.shared_by(len(scene.grooms)):
             target.sized(*size).clear(_NOWHERE)
             with target.drawing():
-                meshes = [Placed(mesh, float(index)) for index, mesh in enumerate(scene.meshes)]
+                meshes = [PlacedMesh(mesh, float(index)) for index, mesh in enumerate(scene.meshes)]
                 self._placed.draw(meshes, camera, *size)
             mesh = texture_to_array(target.color)[..., 3].astype(np.int32)
             groom, strand = np.full_like(mesh, -1), np.full_like(mesh, -1)
@@ -196,10 +206,10 @@ class ScenePass:
             values: (vertex_count, 3) of each mesh.
         """
         pairs = zip(scene.meshes, values, strict=True)
-        with ONE_AT_A_TIME:
+        with DRAW_LOCK:
             target.sized(*size).clear(_NOTHING)
             with target.drawing():
-                carrying = [Placed(mesh, 0.0, carried=each) for mesh, each in pairs]
+                carrying = [PlacedMesh(mesh, 0.0, vertex_values=each) for mesh, each in pairs]
                 self._placed.draw(carrying, camera, *size)
             return texture_to_array(target.color)[..., :3].copy()
 
@@ -209,7 +219,7 @@ class ScenePass:
         """Sums of the unit tangents of all visible strands, weighted by their coverage of the
         pixel, (height, width, 3), world space, root to tip. Cards have none.
         """
-        with ONE_AT_A_TIME, gpu_memory.shared_by(len(scene.grooms)):
+        with DRAW_LOCK, gpu_memory.shared_by(len(scene.grooms)):
             target.sized(*size).clear(_NOTHING)
             with target.drawing():
                 self._placed.draw(_places(scene, camera.sample), camera, *size)
@@ -231,7 +241,7 @@ class ScenePass:
             scene.grooms, key=lambda each: (each.is_holdout, each.snapshot.cards is not None)
         )
         alphas = []
-        with ONE_AT_A_TIME, gpu_memory.shared_by(len(scene.grooms)):
+        with DRAW_LOCK, gpu_memory.shared_by(len(scene.grooms)):
             target.sized(*size).clear(_NOWHERE)
             with target.drawing():
                 self._placed.draw(_places(scene, camera.sample), camera, *size)
@@ -328,11 +338,11 @@ def _opaque(snapshot: Snapshot) -> Snapshot:
     return replace(snapshot, strand_settings=opaque)
 
 
-def _places(scene: SceneSnapshot, sample: int) -> list[Placed]:
+def _places(scene: SceneSnapshot, sample: int) -> list[PlacedMesh]:
     """The meshes that are not blended, by index, with the same holes as when they are drawn. Others
     are visible through blended ones, which are skipped."""
     return [
-        Placed(mesh, float(index), shifts(index, sample))
+        PlacedMesh(mesh, float(index), shifts(index, sample))
         for index, mesh in enumerate(scene.meshes)
         if mesh.transparency != "blended"
     ]

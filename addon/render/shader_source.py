@@ -98,7 +98,7 @@ SKIN_TRIANGLES_ACROSS, SKIN_SEAMS_ACROSS, SKIN_COPIES_ACROSS = 1024, 1024, 4096
 #: Pixels between the tiles that show the layers of a map.
 TILE_GAP = 2
 #: masks hold objects that cover more of a pixel than this, as in Cycles
-COVERS = 0.5
+MIN_COVERING_ALPHA = 0.5
 #: added to brightness on the screen before dividing by it
 NO_LIGHT = 1.0e-4
 #: number of lights, the strongest, for which grooms shade each other: a texture channel each
@@ -108,7 +108,7 @@ OUTPUTS = ("scene_linear", "viewport")
 #: colours of strands instead of their shading, see lib_debug_color.glsl
 DEBUG_VIEWS = ("none", "detail", "guide", "group", "occlusion", "stretch", "depth")
 #: a relative change of length, and a depth as a fraction of the hair's radius, shown in full colour
-SHOWN_STRETCH, SHOWN_DEPTH = 0.01, 0.02
+FULL_COLOR_STRETCH, FULL_COLOR_DEPTH = 0.01, 0.02
 #: the choices of DetailSettings; shaders use their indices
 DETAIL_CHOICES = {
     parameter.name: tuple(name for name, _, _ in parameter.choices)
@@ -173,7 +173,7 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
         "map_border": repr(MAP_BORDER),
         "min_mesh_bias": repr(MIN_MESH_BIAS),
         "mesh_frame_capacity": str(MESH_FRAME_CAPACITY),
-        "covers": repr(COVERS),
+        "min_covering_alpha": repr(MIN_COVERING_ALPHA),
         "no_light": repr(NO_LIGHT),
         "other_tau_lights": str(OTHER_TAU_LIGHTS),
         "mesh_bias": repr(MESH_BIAS),
@@ -225,7 +225,7 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
             for choice, names in DETAIL_CHOICES.items()
             for index, name in enumerate(names)
         },
-        "shown_stretch": repr(SHOWN_STRETCH),
+        "full_color_stretch": repr(FULL_COLOR_STRETCH),
         **{f"debug_{name}": str(index) for index, name in enumerate(DEBUG_VIEWS)},
         **{f"output_{name}": str(index) for index, name in enumerate(OUTPUTS)},
     }
@@ -290,7 +290,7 @@ def compose(name: str, folders: Sequence[Path] = (SHADER_FOLDER,)) -> ShaderText
 
 def _append(
     name: str,
-    asked_by: str,
+    included_from: str,
     folders: tuple[Path, ...],
     done: set[str],
     lines: list[str],
@@ -300,7 +300,7 @@ def _append(
     if name in done:
         return
     done.add(name)
-    for number, (line, included) in enumerate(_read(name, asked_by, folders), start=1):
+    for number, (line, included) in enumerate(_read(name, included_from, folders), start=1):
         if included:
             _append(included, f"{name}:{number}", folders, done, lines, origins)
             continue
@@ -308,13 +308,13 @@ def _append(
         origins.append((name, number))
 
 
-def _read(name: str, asked_by: str, folders: tuple[Path, ...]) -> tuple[tuple[str, str], ...]:
+def _read(name: str, included_from: str, folders: tuple[Path, ...]) -> tuple[tuple[str, str], ...]:
     """The lines of a file, each with the name of the file that it includes, "" for none."""
     for folder in folders:
         file = folder / name
         if file.is_file():
             return _lines(file, file.stat().st_mtime_ns)
-    raise ShaderError(f"{asked_by}: there is no shader file '{name}'")
+    raise ShaderError(f"{included_from}: there is no shader file '{name}'")
 
 
 @cache
@@ -323,12 +323,12 @@ def _lines(file: Path, _written: int) -> tuple[tuple[str, str], ...]:
     lines = []
     for number, line in enumerate(file.read_text(encoding="utf-8").splitlines(), start=1):
         include = _INCLUDE.match(line)
-        own = "" if include else _named(line, f"{file.name}:{number}")
+        own = "" if include else _with_constants(line, f"{file.name}:{number}")
         lines.append((own, include.group(1) if include else ""))
     return tuple(lines)
 
 
-def _named(line: str, place: str) -> str:
+def _with_constants(line: str, place: str) -> str:
     def value(found: re.Match[str]) -> str:
         if found.group(1) not in CONSTANTS:
             known = ", ".join(sorted(CONSTANTS))

@@ -10,7 +10,7 @@ from ..shading.lights import Light
 from ..shading.shafts import LightOnScreen, PolarGrid, lights_on_screen
 from ..shading.shafts_settings import ShaftSettings
 from . import gpu_objects
-from .bright_pass import BrightThings, plain
+from .bright_pass import BrightShafts, one_texel
 from .camera import Camera
 from .shader_program import ShaderRecipe, program
 from .shafts_block import BLOCKS, STRUCTS, pack_shafts
@@ -22,7 +22,7 @@ _CASTER = ShaderRecipe(
     blocks=BLOCKS,
     textures=(("FLOAT_2D", "samples_of"), ("FLOAT_2D", "depth_of")),
     images=(("R32F", "caster"),),
-    integers=("samples_across", "is_apart"),
+    integers=("samples_across", "is_separate"),
 )
 _BLUR = ShaderRecipe(
     name="shafts_blur",
@@ -63,18 +63,18 @@ def finish_with_shafts(
     Args: as of `add_shafts` and `put_under`.
     """
     # before `add_shafts`, since shafts from lights must not count as bright parts
-    behind = plain(background) if wants_bright(settings) else None
-    bright = BrightThings(picture, behind, camera, settings)
+    behind = one_texel(background) if wants_bright(settings) else None
+    bright = BrightShafts(picture, behind, camera, settings)
     add_shafts(picture, drawn, depth, camera, lights, settings)
     put_under(picture, background)
     bright.add_to(picture)
 
 
-def shafts_apart(
-    into: Any,
+def draw_separate_shafts(
+    target: Any,
     drawn: Any,
     depth: Any,
-    behind: Any,
+    background: Any,
     camera: Camera,
     lights: Sequence[Light],
     settings: ShaftSettings,
@@ -82,14 +82,14 @@ def shafts_apart(
     """Add all shafts to a texture of their own.
 
     Args:
-        into: RGBA32F, black at first.
+        target: RGBA32F, black at first.
         drawn, depth: hair with holes for meshes, and the depth of both.
-        behind: the background of the hair, which is another engine's picture, as of `BrightThings`.
+        background: of the hair, which is another engine's picture, as of `BrightShafts`.
             Others as of `add_shafts`.
     """
-    bright = BrightThings(drawn, behind, camera, settings)
-    add_shafts(into, drawn, depth, camera, lights, settings, is_apart=True)
-    bright.add_to(into)
+    bright = BrightShafts(drawn, background, camera, settings)
+    add_shafts(target, drawn, depth, camera, lights, settings, is_separate=True)
+    bright.add_to(target)
 
 
 def add_shafts(
@@ -100,7 +100,7 @@ def add_shafts(
     lights: Sequence[Light],
     settings: ShaftSettings,
     *,
-    is_apart: bool = False,
+    is_separate: bool = False,
 ) -> None:
     """Add the haze of the lights in view, and the shafts in it, to a picture on the GPU.
 
@@ -111,12 +111,12 @@ def add_shafts(
             a background, since its alpha determines what stands before a light; see `put_under`.
         drawn, depth: the colour and depth from which it was averaged, with a whole number of texels
             along each side of a pixel; `drawn` may be the picture itself.
-        is_apart: meshes are holes in `drawn`, so that only their depth shows them.
+        is_separate: meshes are holes in `drawn`, so that only their depth shows them.
     """
     width, height = picture.width, picture.height
     seen = lights_on_screen(lights, camera.view, camera.projection, width, height, settings)
     for light in seen:
-        _add_light(picture, drawn, depth, light, settings.samples, is_apart)
+        _add_light(picture, drawn, depth, light, settings.samples, is_separate)
 
 
 def put_under(picture: Any, background: tuple[float, float, float, float]) -> None:
@@ -127,14 +127,14 @@ def put_under(picture: Any, background: tuple[float, float, float, float]) -> No
 
 
 def _add_light(
-    picture: Any, drawn: Any, depth: Any, light: LightOnScreen, samples: int, is_apart: bool
+    picture: Any, drawn: Any, depth: Any, light: LightOnScreen, samples: int, is_separate: bool
 ) -> None:
     width, height = picture.width, picture.height
     grid = PolarGrid.over(light.center, width, height, samples)
     block = gpu_objects.uniform_buffer(pack_shafts(light, grid))
     caster = gpu_objects.texture((width, height), format="R32F")
     rays = gpu_objects.texture((grid.radii, grid.angles), format="R32F")
-    integers = {"samples_across": drawn.width // width, "is_apart": int(is_apart)}
+    integers = {"samples_across": drawn.width // width, "is_separate": int(is_separate)}
     steps: tuple[tuple[ShaderRecipe, dict[str, Any], dict[str, Any], tuple[int, int]], ...] = (
         (_CASTER, {"samples_of": drawn, "depth_of": depth}, {"caster": caster}, (width, height)),
         (_BLUR, {"caster": caster}, {"rays": rays}, (grid.angles, 1)),

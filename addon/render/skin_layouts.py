@@ -28,7 +28,7 @@ class _Kept:
     resolution: int
     layout: SkinLayout
 
-    def serves(self, surface: Surface, edges: Floats, resolution: int) -> bool:
+    def fits(self, surface: Surface, edges: Floats, resolution: int) -> bool:
         return (
             self.resolution == resolution
             and np.array_equal(self.triangles, surface.triangles)
@@ -45,7 +45,7 @@ def layout_of(surface: Surface, resolution: int) -> SkinLayout:
     """`skin_layout`, or an earlier result that also fits this surface."""
     edges = np.linalg.norm(surface.corners - np.roll(surface.corners, 1, axis=1), axis=2)
     for kept in _kept:
-        if kept.serves(surface, edges, resolution):
+        if kept.fits(surface, edges, resolution):
             return kept.layout
     layout = skin_layout(surface, resolution)
     if surface.corner_uv is not None:

@@ -39,7 +39,7 @@ SKIN_TEXTURES = tuple(
     ("FLOAT_2D", f"skin_{name}") for name in ("shadow", "texels", "stretches", "seams", "shifts")
 )
 
-_OF_HAIR_ALONE = ShaderFeature(name="hair_alone", defines={"HAIR_ALONE": 1})
+_ONLY_HAIR = ShaderFeature(name="only_hair", defines={"ONLY_HAIR": 1})
 _SHADOW_RECIPE = ShaderRecipe(
     name="skin_shadow",
     compute="skin_shadow.comp.glsl",
@@ -96,7 +96,7 @@ class SkinShadow:
 
 
 @dataclass(frozen=True, eq=False)
-class _Drawn:
+class _ShadowInputs:
     """The inputs of a shadow."""
 
     positions: Floats
@@ -105,16 +105,16 @@ class _Drawn:
     light_count: int
     forward: Color
     shadows: MeshShadows | None
-    is_of_hair_alone: bool
+    is_only_hair: bool
 
-    def is_like(self, other: _Drawn) -> bool:
+    def is_like(self, other: _ShadowInputs) -> bool:
         return (
             self.positions is other.positions
             and self.opacity is other.opacity
             and self.shadows is other.shadows
             and (self.softness, self.light_count) == (other.softness, other.light_count)
             and self.forward == other.forward
-            and self.is_of_hair_alone == other.is_of_hair_alone
+            and self.is_only_hair == other.is_only_hair
         )
 
 
@@ -132,7 +132,7 @@ class _Head:
     size: float
     layout: SkinLayout
     textures: dict[str, Any]
-    drawn: _Drawn | None = None
+    drawn: _ShadowInputs | None = None
     shadow: SkinShadow | None = None
 
     def is_of(self, surface: Surface, resolution: int) -> bool:
@@ -163,7 +163,7 @@ class SkinPass:
         forward: Color = (0.0, 0.0, 0.0),
         shadows: MeshShadows | None = None,
         *,
-        of_hair_alone: bool = False,
+        only_hair: bool = False,
     ) -> dict[int, SkinShadow]:
         """The soft shadow on each mesh that is skin, by the mesh's id(). Meshes with unusable UVs
         have none; without opacity maps or softness there are none.
@@ -173,7 +173,7 @@ class SkinPass:
             forward: the fraction of light that hair scatters forward, by colour; the shadow uses
                 its mean.
             shadows: of all meshes, beyond the opacity maps.
-            of_hair_alone: without the shadows of meshes.
+            only_hair: without the shadows of meshes.
         """
         if opacity is None or not settings.soft_shadow or not settings.softness:
             return {}
@@ -184,8 +184,8 @@ class SkinPass:
             head = self._head(mesh.skin.surface, settings.skin_resolution)
             used.append(head)
             if not head.layout.is_empty:
-                light = settings.softness * head.size, light_count, forward, shadows, of_hair_alone
-                wanted = _Drawn(mesh.skin.surface.positions, opacity, *light)
+                light = settings.softness * head.size, light_count, forward, shadows, only_hair
+                wanted = _ShadowInputs(mesh.skin.surface.positions, opacity, *light)
                 found[id(mesh)] = self._drawn(head, mesh.skin.surface, wanted)
         self._heads = [head for head in self._heads if head in used]
         return found
@@ -214,34 +214,34 @@ class SkinPass:
         )
         return self._heads[-1]
 
-    def _drawn(self, head: _Head, surface: Surface, wanted: _Drawn) -> SkinShadow:
-        if head.shadow is None or head.drawn is None or not head.drawn.is_like(wanted):
-            shadow = self._reaching(head, surface, wanted)
+    def _drawn(self, head: _Head, surface: Surface, inputs: _ShadowInputs) -> SkinShadow:
+        if head.shadow is None or head.drawn is None or not head.drawn.is_like(inputs):
+            shadow = self._unblurred_shadow(head, surface, inputs)
             for axis in range(2):
-                shadow = spread(shadow, head.textures, wanted.softness, axis)
+                shadow = spread(shadow, head.textures, inputs.softness, axis)
             shifts = closing_shifts(shadow, head.textures)
             kept = {name: head.textures[name] for _, name in SKIN_TEXTURES[1:4]}
             textures = {"skin_shadow": shadow, "skin_shifts": shifts, **kept}
-            head.shadow, head.drawn = SkinShadow(head.layout, textures), wanted
+            head.shadow, head.drawn = SkinShadow(head.layout, textures), inputs
         return head.shadow
 
-    def _reaching(self, head: _Head, surface: Surface, wanted: _Drawn) -> Any:
+    def _unblurred_shadow(self, head: _Head, surface: Surface, inputs: _ShadowInputs) -> Any:
         """The fraction of each light that reaches the skin, before the blur."""
         corners = texture_from(
             _in_rows(surface.corners.reshape(-1, 3), 3 * SKIN_TRIANGLES_ACROSS), "RGBA32F"
         )
-        texels, shadows = head.textures["skin_texels"], wanted.shadows
+        texels, shadows = head.textures["skin_texels"], inputs.shadows
         found = _like(texels)
         depths = [] if shadows is None else [shadows.feature(sample=0)]
-        kind = [_OF_HAIR_ALONE] if wanted.is_of_hair_alone else []
+        kind = [_ONLY_HAIR] if inputs.is_only_hair else []
         shader = bound(
             _SHADOW_RECIPE,
-            [wanted.opacity.feature, *depths, *kind],
+            [inputs.opacity.feature, *depths, *kind],
             self._blocks,
             textures={"skin_texels": texels, "skin_corners": corners},
             images={"reaching": found},
-            integers={"light_count": wanted.light_count},
-            numbers={"hair_forward": wanted.forward},
+            integers={"light_count": inputs.light_count},
+            numbers={"hair_forward": inputs.forward},
         )
         shader.dispatch(found.width, found.height)
         return found

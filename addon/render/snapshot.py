@@ -273,7 +273,9 @@ class Snapshot:
             value = getattr(self, name)
             if value is not None and np.shape(value) != shape:
                 raise ValueError(f"{name} has shape {np.shape(value)}, not {shape}")
-        if self.device_points is not None and not self.device_points.layout.is_as(self.layout):
+        if self.device_points is not None and not self.device_points.layout.has_same_counts(
+            self.layout
+        ):
             raise ValueError("device_points are of other strands")
         if self.debug_view not in DEBUG_VIEWS:
             raise ValueError(f"debug_view {self.debug_view!r} is none of {', '.join(DEBUG_VIEWS)}")
@@ -285,7 +287,7 @@ class Snapshot:
         if grid[1] < 2:
             raise ValueError(f"strands have shape {grid}, not (S, C >= 2, 3)")
         layout = StrandLayout.uniform(grid[0], grid[1])
-        if not self.layout.is_as(layout):
+        if not self.layout.has_same_counts(layout):
             object.__setattr__(self, "layout", layout)
         for name, channels in _OF_POINTS.items():
             values = getattr(self, name)

@@ -161,14 +161,14 @@ class StrandDrawing:
         features = [*self.points, self._detail, *self.shading, *self.shown]
         self._draw(bound(_OPAQUE_RECIPE, features, self.blocks, integers=integers))
 
-    def place(self) -> None:
+    def draw_places(self) -> None:
         """Draw the number of the nearest strand and the place along its points, with the width of
         opaque strands."""
         integers = {"samples_across": self.samples_across}
         features = [*self.points, self._detail]
         self._draw(bound(_PLACE_RECIPE, features, self.blocks, integers=integers))
 
-    def hash(self, turn: int) -> None:
+    def draw_hashed(self, turn: int) -> None:
         """Draw the visible fragments of one of two turns, see hashed_strands.py."""
         features = [*self.points, self._detail]
         self._draw(bound(_HASHED_RECIPE, features, self.blocks, integers={"turn": turn}))
@@ -192,7 +192,7 @@ class StrandDrawing:
         integers = {"capacity": capacity}
         self._draw(self._bound(_GATHER_RECIPE, features, images, integers))
 
-    def count(self, images: Mapping[str, Any]) -> None:
+    def count_fragments(self, images: Mapping[str, Any]) -> None:
         """Count the fragments of each pixel in the head of its list."""
         self._draw(self._bound(_COUNT_RECIPE, [*self.points, self._detail], images, {}))
 

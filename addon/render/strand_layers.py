@@ -206,7 +206,7 @@ class StrandLayers:
 
     def _fragment_counts(self, drawing: StrandDrawing) -> Ints:
         """The number of fragments of each pixel, row by row."""
-        self._store(lambda: drawing.count(self._images))
+        self._store(lambda: drawing.count_fragments(self._images))
         return np.asarray(self._heads.read()).ravel()
 
     def _store(self, draw: Callable[[], None], rows: range | None = None) -> None:

@@ -95,7 +95,7 @@ class StrandLayout:
         """The layout of strands with the same number of points."""
         return cls(np.arange(strand_count + 1, dtype=np.int32) * np.int32(cv_count))
 
-    def is_as(self, other: StrandLayout) -> bool:
+    def has_same_counts(self, other: StrandLayout) -> bool:
         """Whether both are of strands with the same point counts."""
         return self is other or np.array_equal(self.offsets, other.offsets)
 
@@ -113,7 +113,7 @@ class StrandLayout:
         return np.diff(self.offsets)
 
     @cached_property
-    def longest(self) -> int:
+    def max_point_count(self) -> int:
         """The largest point count of a strand, 0 if there are no strands."""
         return int(self.counts.max(initial=0))
 

@@ -49,7 +49,7 @@ from .pixel_parts import expected_depths
 from .ribbons import Ribbons
 from .shader_feature import ShaderFeature
 from .shader_program import released_with_shaders
-from .shader_source import DEBUG_VIEWS, SHOWN_DEPTH, ShaderError, output_index
+from .shader_source import DEBUG_VIEWS, FULL_COLOR_DEPTH, ShaderError, output_index
 from .snapshot import Snapshot
 from .strand_curves import curves_feature, spans_texture
 from .strand_drawing import StrandDrawing
@@ -231,7 +231,7 @@ class StrandPass:
             view_data.shadows.inter_groom_shadow.release()
         drawing = StrandDrawing(
             order=order,
-            ribbon=self._ribbons.of,
+            ribbon=self._ribbons.strip,
             blocks=self._blocks,
             points=(
                 view_feature(camera, width, height),
@@ -249,7 +249,7 @@ class StrandPass:
             ),
             output_encoding=output_encoding,
             samples_across=samples,
-            expected_depths=lambda: expected_depths(self._ball.of(snapshot), camera),
+            expected_depths=lambda: expected_depths(self._ball.ball(snapshot), camera),
         )
         layers = LayerStatistics()
         if is_layered:
@@ -267,7 +267,7 @@ class StrandPass:
             HASHED_STRANDS.draw(drawing)
         else:
             with drawing_state():
-                (drawing.place if content == "places" else drawing.draw)()
+                (drawing.draw_places if content == "places" else drawing.draw)()
         self.statistics = Statistics(
             strands=order.strands,
             pieces=order.pieces,
@@ -297,7 +297,7 @@ class StrandPass:
             self._textures["cv_points"],
             self._points_serial,
             snapshot.layout,
-            self._ball.of(snapshot),
+            self._ball.ball(snapshot),
             packed_lights(snapshot.lights),
             snapshot.volume,
             snapshot.strand_settings,
@@ -341,7 +341,7 @@ class StrandPass:
 
     def ball(self, snapshot: Snapshot) -> Ball:
         """A sphere around all its strands."""
-        return self._ball.of(snapshot)
+        return self._ball.ball(snapshot)
 
     def release(self) -> None:
         """Release everything on the GPU; the next draw uploads again."""
@@ -464,11 +464,11 @@ class StrandPass:
         elif snapshot.debug_view == "stretch":
             names = ("rest_lengths",)
         elif snapshot.debug_view == "depth" and snapshot.solids:
-            kinds = self._colliders.of(snapshot.solids).kinds
+            kinds = self._colliders.textures_of(snapshot.solids).kinds
             names, defines = kinds.textures, defines | dict(kinds.defines) | {"HAS_SOLIDS": 1}
             integers = dict.fromkeys(kinds.integers, len(snapshot.solids))
-            shown = SHOWN_DEPTH * self._ball.of(snapshot).radius
-            numbers = {"shown_depth": ("FLOAT", max(shown, _MIN_RADIUS))}
+            shown = FULL_COLOR_DEPTH * self._ball.ball(snapshot).radius
+            numbers = {"full_color_depth": ("FLOAT", max(shown, _MIN_RADIUS))}
         return ShaderFeature(
             name=snapshot.debug_view,
             textures={name: ("FLOAT_2D", self._textures[name]) for name in names},
@@ -522,7 +522,7 @@ class StrandPass:
             make = partial(_lengths_texture, snapshot)
             self._update_texture("rest_lengths", (snapshot.rest, layout), make)
         elif snapshot.debug_view == "depth" and snapshot.solids:
-            solids = self._colliders.of(snapshot.solids)
+            solids = self._colliders.textures_of(snapshot.solids)
             self._update_texture("rounds", (solids,), lambda: solids.rounds)
             self._update_texture("fields", (solids,), lambda: solids.fields)
             self._update_texture(

@@ -86,11 +86,13 @@ def bright_part(colors: Floats, threshold: float) -> Floats:
     luminance = colors @ LUMINANCE
     above = np.maximum(luminance - threshold, 0.0)
     is_bright = above > 0.0
-    surely = np.divide(above, above + KNEE * threshold, out=np.zeros_like(above), where=is_bright)
-    kept = np.minimum(above * surely, BRIGHTEST)
-    factor = np.divide(kept, luminance, out=np.zeros_like(above), where=is_bright)
-    surely = np.minimum(2.0 * surely, 1.0)
-    return np.concatenate([colors * factor[..., None], surely[..., None]], axis=-1)
+    certainty = np.divide(
+        above, above + KNEE * threshold, out=np.zeros_like(above), where=is_bright
+    )
+    finite = np.minimum(above * certainty, BRIGHTEST)
+    factor = np.divide(finite, luminance, out=np.zeros_like(above), where=is_bright)
+    certainty = np.minimum(2.0 * certainty, 1.0)
+    return np.concatenate([colors * factor[..., None], certainty[..., None]], axis=-1)
 
 
 def cell_side(width: int, height: int) -> int:

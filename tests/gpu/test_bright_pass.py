@@ -53,7 +53,7 @@ def window() -> np.ndarray:
 @pytest.fixture
 def shafts(gpu_context: Any) -> Callable[..., np.ndarray]:
     """The picture after the pass."""
-    from hairloom.addon.render.bright_pass import BrightThings, plain
+    from hairloom.addon.render.bright_pass import BrightShafts, one_texel
     from hairloom.addon.render.textures import texture_from, texture_to_array
 
     def run(
@@ -63,8 +63,8 @@ def shafts(gpu_context: Any) -> Callable[..., np.ndarray]:
         behind: Any = BLACK,
     ) -> np.ndarray:
         texture = texture_from(picture, "RGBA32F")
-        under = plain(behind) if isinstance(behind, tuple) else texture_from(behind, "RGBA32F")
-        BrightThings(texture, under, camera, settings).add_to(texture)
+        under = one_texel(behind) if isinstance(behind, tuple) else texture_from(behind, "RGBA32F")
+        BrightShafts(texture, under, camera, settings).add_to(texture)
         return texture_to_array(texture)
 
     return run

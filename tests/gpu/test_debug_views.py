@@ -215,7 +215,7 @@ def test_depth_is_the_distance_from_colliders(
         solids=tuple(PosedCollider(solid, posed, posed) for solid in solids),
     )
     picture = frame.render_image(snapshot, front, 200, 200, 1)
-    size = 0.02 * HairBall().of(snapshot).radius
+    size = 0.02 * HairBall().ball(snapshot).radius
     found, expected = [], []
     for place in range(20):
         for row in range(30, 170, 7):

@@ -45,7 +45,7 @@ def _collected_there(box: list[Any]) -> None:
 
 def mine() -> list[Any]:
     """The kept objects that this thread has made."""
-    return gpu_objects._KEPT.owned[threading.get_ident()].objects
+    return gpu_objects._OBJECTS.owned[threading.get_ident()].objects
 
 
 @pytest.mark.parametrize(
@@ -102,7 +102,7 @@ def test_a_render_thread_leaves_what_it_made_to_the_main_thread(
     with monkeypatch.context() as context:
         context.setattr(gpu.types, "GPUTexture", Made)
         _in_thread(render)
-    assert set(gpu_objects._KEPT.owned) == {threading.get_ident()}
+    assert set(gpu_objects._OBJECTS.owned) == {threading.get_ident()}
     assert [each is made[0] for each in mine() if isinstance(each, Made)] == [True]
     assert reads == [1], "nothing has waited for the thread's commands"
     gpu_objects.hand_over()  # the main thread keeps its own objects

@@ -113,16 +113,16 @@ def test_hair_has_the_shadow_of_other_grooms(
 
 
 def test_what_lies_beside_or_before_a_groom_is_not_asked(gpu_context: Any) -> None:
-    from hairloom.addon.render.inter_groom_shadow import may_shade
+    from hairloom.addon.render.inter_groom_shadow import may_cast_shadow_on
     from hairloom.addon.render.strand_pass import StrandPass
 
     for light in (SUN, Light.point((0.0, 0.0, 1.2), (1.0, 1.0, 1.0), 10.0)):
         maps = StrandPass().opacity(replace(groom("a", sheet(0.3)).snapshot, lights=(light,)))
         assert maps is not None
-        assert may_shade(maps, Ball(np.array([0.0, 0.0, 0.0]), 0.1))
-        assert may_shade(maps, Ball(np.array([0.3, 0.0, 0.3]), 0.1))
-        assert not may_shade(maps, Ball(np.array([1.5, 0.0, 0.0]), 0.1))
-        assert not may_shade(maps, Ball(np.array([0.0, 0.0, 1.0]), 0.1))
+        assert may_cast_shadow_on(maps, Ball(np.array([0.0, 0.0, 0.0]), 0.1))
+        assert may_cast_shadow_on(maps, Ball(np.array([0.3, 0.0, 0.3]), 0.1))
+        assert not may_cast_shadow_on(maps, Ball(np.array([1.5, 0.0, 0.0]), 0.1))
+        assert not may_cast_shadow_on(maps, Ball(np.array([0.0, 0.0, 1.0]), 0.1))
 
 
 def test_places_without_a_serial_are_asked_anew_and_nothing_adds_up(gpu_context: Any) -> None:
@@ -187,7 +187,7 @@ def test_a_place_has_what_all_but_its_own_groom_have_in_the_way(gpu_context: Any
 
 
 def test_light_from_each_side_may_shade_and_none_without_light(gpu_context: Any) -> None:
-    from hairloom.addon.render.inter_groom_shadow import may_shade
+    from hairloom.addon.render.inter_groom_shadow import may_cast_shadow_on
     from hairloom.addon.render.strand_pass import StrandPass
 
     def maps(*lights: Light) -> Any:
@@ -208,7 +208,7 @@ def test_light_from_each_side_may_shade_and_none_without_light(gpu_context: Any)
         (Ball(np.array([0.0, 0.45, 0.0]), 0.3), (SUN,), True),
         (Ball(np.array([0.0, 0.0, 1.0]), 0.8), (SUN,), True),
     ):
-        assert may_shade(maps(*lights), ball) == is_reached, (ball, lights)
+        assert may_cast_shadow_on(maps(*lights), ball) == is_reached, (ball, lights)
 
 
 def test_views_in_other_light_keep_what_lies_between(gpu_context: Any) -> None:

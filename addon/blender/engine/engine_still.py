@@ -16,9 +16,9 @@ from ...render.camera import Camera
 from ...render.camera_window import Window, jittered
 from ...render.capabilities import NOISE_FREE_SAMPLES, capabilities
 from ...render.lens import through
-from ...render.nearest import Moment, Nearest, background, motion, projected, unprojected
+from ...render.nearest import Nearest, SceneAtTime, background, motion, projected, unprojected
 from ...render.pixel_filter import jitters
-from ...render.scene_pass import Rgba, ScenePass, ShaftsApart, shafts_of
+from ...render.scene_pass import Rgba, ScenePass, SeparateShafts, shafts_of
 from ...render.scene_snapshot import SceneSnapshot
 from ...render.textures import texture_from
 from ...shading.bright_shafts import wants_bright
@@ -108,7 +108,7 @@ class Still:
         self._behind = behind
         self._shadow: tuple[Target, Accumulation] | None = None
         self._shafts = Accumulation()
-        self._apart: ShaftsApart | None = None
+        self._apart: SeparateShafts | None = None
         self._is_needed = behind is None or hair_scene.is_needed(behind)
         self._layer = depsgraph.view_layer
         self._mattes: Mattes | None = None
@@ -177,7 +177,7 @@ class Still:
         if self._mattes is not None:
             self._mattes.write(wanted)
 
-    def _beside(self, behind: bpy.types.Scene, scene: SceneSnapshot) -> ShaftsApart | None:
+    def _beside(self, behind: bpy.types.Scene, scene: SceneSnapshot) -> SeparateShafts | None:
         """The target for shafts of light; None without any. Shafts from bright things also need the
         picture of Blender's own engine."""
         settings = shafts_of(scene)
@@ -185,16 +185,16 @@ class Still:
             return None
         light = gpu_objects.texture(self._size, format="RGBA32F")
         if not wants_bright(settings):
-            return ShaftsApart(light)
+            return SeparateShafts(light)
         left, bottom = (
             round(start * side) for start, side in zip(self._window[:2], self._whole, strict=True)
         )
         seen = engine_picture(behind.original, self._whole, (left, bottom), self._size)
         if seen is None:
             self.warnings = (*self.warnings, _UNSEEN)
-            return ShaftsApart(light)
+            return SeparateShafts(light)
         shows_world = not behind.render.film_transparent
-        return ShaftsApart(light, texture_from(seen, "RGBA32F"), shows_world)
+        return SeparateShafts(light, texture_from(seen, "RGBA32F"), shows_world)
 
     def _moment(self) -> tuple[SceneSnapshot, Camera]:
         """Scene and camera as evaluated now."""
@@ -260,9 +260,9 @@ class Still:
         moments = {}
         for step in (-1, 1):
             self._go_to(frame + step)
-            moments[step] = Moment.of(scene, *self._moment())
+            moments[step] = SceneAtTime.of(scene, *self._moment())
         self._go_to(frame)
-        moments[0] = Moment.of(scene, scene, camera)
+        moments[0] = SceneAtTime.of(scene, scene, camera)
         # cards and the background only have the motion of the camera
         is_there, is_mesh = (nearest.depth < 1.0)[..., None], (nearest.mesh >= 0)[..., None]
         seen, behind = unprojected(camera, nearest.depth), background(camera, nearest.depth)

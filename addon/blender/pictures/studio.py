@@ -245,7 +245,7 @@ class Studio:
         lights = self.lights(self._camera(1.0))
         snapshot = self._at_rest
         return (
-            *shadow_warnings(lights, HairBall().of(snapshot), snapshot.volume),
+            *shadow_warnings(lights, HairBall().ball(snapshot), snapshot.volume),
             *skin_notes(self._rig.head, snapshot.skin, snapshot.volume),
             *dict.fromkeys(note for _, material in self._look or () for note in material.notes),
         )

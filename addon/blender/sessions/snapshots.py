@@ -128,7 +128,7 @@ class GroomPicture:
         if snapshot.volume.shadows == "none" or not snapshot.strand_count:
             return ()
         lights = snapshot.lights if scene_lights_are_shown() else ()
-        return shadow_warnings(lights, self._ball.of(snapshot), snapshot.volume)
+        return shadow_warnings(lights, self._ball.ball(snapshot), snapshot.volume)
 
     def take_groom(
         self, groom: PreparedGroom, settings: GroomSettings, colors: PaintedColor | None

@@ -25,7 +25,7 @@ from ...render.display import Display
 from ...render.groom_pass import GroomPass
 from ...render.opacity_maps import OpacityMaps
 from ...render.own_depth import OwnDepth
-from ...render.scene_pass import ONE_AT_A_TIME
+from ...render.scene_pass import DRAW_LOCK
 from ...render.scene_snapshot import SceneSnapshot
 from ...render.snapshot import Snapshot
 from ...render.strand_pass import Statistics, ViewState, drawn_transparency
@@ -239,7 +239,7 @@ def _draw_strands(context: Any) -> None:
         samples,
         *(mark for each in shown for mark in each.marks),
     )
-    with ONE_AT_A_TIME, gpu_memory.shared_by(len(shown)):
+    with DRAW_LOCK, gpu_memory.shared_by(len(shown)):
         if has_no_depths(context):
             _draw_depth(context.space_data.as_pointer(), camera, shown)
         if not view.picture.matches(marks):

@@ -8,8 +8,8 @@ import pytest
 from hairloom.addon.render.camera import Camera, look_at, orthographic, perspective
 from hairloom.addon.render.nearest import (
     FAR_AWAY,
-    Moment,
     Nearest,
+    SceneAtTime,
     background,
     motion,
     projected,
@@ -128,9 +128,9 @@ def test_what_is_not_there_then_stays_where_it_is() -> None:
         ),
         grooms=(groom(np.ones((5, 2, 3))),),
     )
-    found = Moment.of(now, then, CAMERAS["perspective"])
+    found = SceneAtTime.of(now, then, CAMERAS["perspective"])
     assert found.meshes[0] is moved.positions
     assert found.meshes[1] is surface.positions and found.meshes[2] is surface.positions
     assert found.grooms == (hair.snapshot,)
     fewer = SceneSnapshot(grooms=(groom(np.ones((4, 2, 3))),))
-    assert Moment.of(now, fewer, CAMERAS["perspective"]).grooms[0] is fewer.grooms[0].snapshot
+    assert SceneAtTime.of(now, fewer, CAMERAS["perspective"]).grooms[0] is fewer.grooms[0].snapshot
