@@ -144,7 +144,7 @@ def test_a_jump_coarsens_strands_and_loses_none(frame: Any, monkeypatch: Any) ->
     assert calls["reads"] == 0
     assert still.statistics.strands > 1.3 * before.strands
     assert still.statistics.pieces > 2 * before.pieces
-    assert still.statistics.pieces > len(groom.roots) * own._views[VIEW].detail._known.slot_pieces
+    assert still.statistics.pieces > len(groom.roots) * own._views[VIEW].detail._rest_counts.slot_pieces
     assert np.abs(found - expected).max() > 0.01, "it is coarser"
     assert found[..., 3].sum() == pytest.approx(expected[..., 3].sum(), rel=0.05)
     assert np.abs(blurred(found - expected)).max() < 0.1
@@ -193,5 +193,5 @@ def test_no_more_fragments_come_than_were_expected(frame: Any, fullness: float) 
         own = frame.StrandPass()
         drawn(frame, own, groom, seen_from(frame, distance=distance))
         found = int(np.asarray(LAYERS_OF_PIXELS._count.read()).ravel()[0])
-        expected = own._views[VIEW].detail._known.fragments
+        expected = own._views[VIEW].detail._rest_counts.fragments
         assert found <= expected <= most * found, (distance, found, expected)

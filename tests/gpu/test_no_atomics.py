@@ -135,7 +135,7 @@ def probe_anew(monkeypatch: pytest.MonkeyPatch) -> None:
     """Forget the result of the probe, as if Blender had just started."""
     from hairloom.addon.render import capabilities
 
-    monkeypatch.setattr(capabilities, "_probed", cache(capabilities._probed.__wrapped__))
+    monkeypatch.setattr(capabilities, "_probe", cache(capabilities._probe.__wrapped__))
 
 
 @pytest.mark.parametrize("change", ["nothing", "no add", "no program"])
