@@ -10,9 +10,9 @@ void main()
   if (any(greaterThanEqual(pixel, imageSize(bright)))) {
     return;
   }
-  vec4 over = texelFetch(picture_color, pixel, 0);
-  vec4 under = texelFetch(background, min(pixel, textureSize(background, 0) - 1), 0);
-  vec3 color = over.rgb + (1.0 - over.a) * under.rgb;
+  vec4 foreground = texelFetch(picture_color, pixel, 0);
+  vec4 backdrop = texelFetch(background, min(pixel, textureSize(background, 0) - 1), 0);
+  vec3 color = foreground.rgb + (1.0 - foreground.a) * backdrop.rgb;
   // comparisons with NaN are false
   color = vec3(color.r >= 0.0 ? min(color.r, largest) : 0.0,
                color.g >= 0.0 ? min(color.g, largest) : 0.0,

@@ -54,12 +54,12 @@ vec3 layer_radiance(int strand, float place)
 #endif
   float radius = mix(from_cv.w, to_cv.w, u) * strands.fullness *
                  mix(1.0, strands.tip_width, along);
-  vec4 other_tau = vec4(0.0), own = vec4(0.0), openness = vec4(0.0);
+  vec4 other_tau = vec4(0.0), own_color = vec4(0.0), openness = vec4(0.0);
 #ifdef OTHER_TAU
   other_tau = mix(texelFetch(cv_other_tau, root_side, 0), texelFetch(cv_other_tau, tip_side, 0), u);
 #endif
 #ifdef OWN_COLOR
-  own = mix(texelFetch(cv_colors, root_side, 0), texelFetch(cv_colors, tip_side, 0), u);
+  own_color = mix(texelFetch(cv_colors, root_side, 0), texelFetch(cv_colors, tip_side, 0), u);
 #endif
 #ifdef OPENNESS
   openness = mix(texelFetch(cv_openness, root_side, 0), texelFetch(cv_openness, tip_side, 0), u);
@@ -73,6 +73,6 @@ vec3 layer_radiance(int strand, float place)
 #endif
   uint seed = uint(texelFetch(strand_seeds, counted_texel(strand), 0).x);
   return strand_radiance(
-      point, tangent, bend, radius, along, occlusion, openness, other_tau, own, seen, seed);
+      point, tangent, bend, radius, along, occlusion, openness, other_tau, own_color, seen, seed);
 #endif
 }

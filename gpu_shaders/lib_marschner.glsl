@@ -46,10 +46,10 @@ float table_level(float angle, sampler3D longitudinal)
 // the fitted parabola, its minimum is used.
 mat4x3 lobe_transmittance(vec4 paths, vec3 absorption)
 {
-  vec3 reached = min(absorption, vec3(paths.y / max(paths.z, MIN_VARIANCE)));
+  vec3 path_length = min(absorption, vec3(paths.y / max(paths.z, MIN_VARIANCE)));
   return mat4x3(vec3(1.0),
                 exp(-absorption * paths.x),
-                exp(-reached * (paths.y - 0.5 * reached * paths.z)),
+                exp(-path_length * (paths.y - 0.5 * path_length * paths.z)),
                 exp(-absorption * paths.w));
 }
 

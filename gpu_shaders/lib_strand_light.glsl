@@ -1,7 +1,7 @@
 // Radiance of a strand towards the eye, from all lights and the world. SHADOWS of strands on strands come
 // from opacity maps; for a light without one, from the occlusion and how much the hair's volume faces it.
 // With SCATTERING light goes from strand to strand. OTHER_TAU: `other_tau` is the optical depth of hair that
-// is not in the maps, for the first lights. OWN_COLOR: strands have their own colours, `own`, instead of the
+// is not in the maps, for the first lights. OWN_COLOR: strands have their own colours, `own_color`, instead of the
 // look's; w is 0 where a strand has none.
 //
 // Reads the blocks `view`, `lights`, `strands`, `shading`, `fibre`, and the textures of their features.
@@ -38,7 +38,7 @@ vec3 strand_radiance(vec3 point,
                      float occlusion,
                      vec4 openness,
                      vec4 other_tau,
-                     vec4 own,
+                     vec4 own_color,
                      SkinSeen seen,
                      uint seed)
 {
@@ -50,24 +50,24 @@ vec3 strand_radiance(vec3 point,
   float color_noise = strand_noise(seed, 2u, 0.0);
   float grey_noise = strand_noise(seed, 3u, 0.0);
   // a brow in its natural colour (w = 2) has no tip colour either
-  float tinted = along;
+  float tint_along = along;
 #ifdef OWN_COLOR
-  tinted = own.w > 1.5 ? 0.0 : along;
+  tint_along = own_color.w > 1.5 ? 0.0 : along;
 #endif
   vec3 absorption = vec3(0.0);
 #if MARSCHNER
   vec3 root = fibre.root.xyz;
 #  ifdef OWN_COLOR
-  root = own.w > 0.5 ? color_absorption(fibre, own.xyz) : root;
+  root = own_color.w > 0.5 ? color_absorption(fibre, own_color.xyz) : root;
 #  endif
-  absorption = strand_absorption(fibre, tinted, color_noise, grey_noise, shading, root);
-  vec3 hair = strand_color(fibre, absorption);
+  absorption = strand_absorption(fibre, tint_along, color_noise, grey_noise, shading, root);
+  vec3 hair_color = strand_color(fibre, absorption);
 #else
   vec3 root = shading.base_color;
 #  ifdef OWN_COLOR
-  root = own.w > 0.5 ? own.xyz : root;
+  root = own_color.w > 0.5 ? own_color.xyz : root;
 #  endif
-  vec3 hair = strand_base(tinted, color_noise, grey_noise, shading, root);
+  vec3 hair_color = strand_base(tint_along, color_noise, grey_noise, shading, root);
 #endif
 
 #ifdef SKIN_SEEN
@@ -91,7 +91,7 @@ vec3 strand_radiance(vec3 point,
                                             to_eye,
                                             shift_noise,
                                             sparkle_noise,
-                                            hair,
+                                            hair_color,
                                             absorption,
                                             seen);
 #endif
@@ -113,7 +113,7 @@ vec3 strand_radiance(vec3 point,
                                         to_eye,
                                         shift_noise,
                                         sparkle_noise,
-                                        hair,
+                                        hair_color,
                                         absorption,
                                         level,
                                         path,

@@ -75,9 +75,9 @@ void main()
                                known);
 #endif
   float reflected = reflected_fraction(dot(normal, to_eye), mesh_specular, mesh_roughness);
-  vec3 matt = base * (1.0 - reflected);
-  vec3 mirrored = radiance_from(lights, reflect(-to_eye, normal), vec2(1.0));
-  vec3 radiance = (matt * diffuse_light(lights, normal) + reflected * mirrored) * mesh_occlusion;
+  vec3 diffuse = base * (1.0 - reflected);
+  vec3 reflected_light = radiance_from(lights, reflect(-to_eye, normal), vec2(1.0));
+  vec3 radiance = (diffuse * diffuse_light(lights, normal) + reflected * reflected_light) * mesh_occlusion;
 #ifdef OTHER_TAU
   vec4 other_tau = texelFetch(inter_groom_shadow, ivec2(gl_FragCoord.xy), 0);
 #endif
@@ -89,30 +89,30 @@ void main()
       continue;
     }
     vec3 path = shadow_path(index, mesh_point);
-    vec3 colored = vec3(0.0);
-    float is_spread = 0.0;
+    vec3 blurred = vec3(0.0);
+    float blur_weight = 0.0;
 #ifdef SKIN
     // where the blurred shadow is unknown, because the head's UVs overlap, the plain shadow is used
     int map = int(opacity.light[index].x);
     if (map >= 0 && map < {{skin_lights}}) {
-      colored = skin_colored(soft[map], path.x, hair_forward);
-      is_spread = min(4.0 * known, 1.0);
+      blurred = skin_colored(soft[map], path.x, hair_forward);
+      blur_weight = min(4.0 * known, 1.0);
     }
 #endif
-    vec3 reaching = vec3(mesh_occlusion);
-    if (is_spread < 1.0) {
+    vec3 visibility = vec3(mesh_occlusion);
+    if (blur_weight < 1.0) {
       path.z = light_past_meshes(index, mesh_point, facet, path);
-      reaching *= path.z;
+      visibility *= path.z;
 #if SHADOWS
-      reaching = path.x < 0.0 ? reaching : light_left(path, hair_forward);
+      visibility = path.x < 0.0 ? visibility : light_left(path, hair_forward);
 #endif
     }
-    reaching = mix(reaching, colored, is_spread);
+    visibility = mix(visibility, blurred, blur_weight);
 #ifdef OTHER_TAU
-    reaching *= exp((index < {{other_tau_lights}} ? -other_tau[index] : 0.0) * (1.0 - hair_forward));
+    visibility *= exp((index < {{other_tau_lights}} ? -other_tau[index] : 0.0) * (1.0 - hair_forward));
 #endif
-    float shine = ggx_reflection(normal, to_light, to_eye, mesh_specular, mesh_roughness);
-    radiance += irradiance * reaching * facing * (matt / PI + shine);
+    float specular = ggx_reflection(normal, to_light, to_eye, mesh_specular, mesh_roughness);
+    radiance += irradiance * visibility * facing * (diffuse / PI + specular);
   }
 #ifdef EMISSION
   radiance += mesh_emission;

@@ -48,7 +48,7 @@ void main()
   vec4 other_tau = texelFetch(inter_groom_shadow, ivec2(gl_FragCoord.xy), 0);
 #endif
   vec3 all_light = diffuse_light(lights, normal) * mesh_occlusion;
-  vec3 left = all_light;
+  vec3 shadowed_light = all_light;
   for (int index = 0; index < int(lights.ambient_and_count.w); index++) {
     vec3 to_light, irradiance;
     light_at(lights, index, mesh_point, to_light, irradiance);
@@ -57,29 +57,31 @@ void main()
       continue;
     }
     vec3 path = shadow_path(index, mesh_point);
-    float past_meshes = light_past_meshes(index, mesh_point, facet, path);
-    vec3 by_hair = vec3(1.0);
+    float mesh_visibility = light_past_meshes(index, mesh_point, facet, path);
+    vec3 hair_transmittance = vec3(1.0);
 #if SHADOWS
-    by_hair = light_left(vec3(path.xy, 1.0), hair_forward);
+    hair_transmittance = light_left(vec3(path.xy, 1.0), hair_forward);
 #endif
 #ifdef SKIN
     int map = int(opacity.light[index].x);
     if (map >= 0 && map < {{skin_lights}}) {
-      by_hair = mix(by_hair, skin_colored(soft[map], path.x, hair_forward), min(4.0 * known, 1.0));
+      vec3 blurred = skin_colored(soft[map], path.x, hair_forward);
+      hair_transmittance = mix(hair_transmittance, blurred, min(4.0 * known, 1.0));
     }
 #endif
 #ifdef OTHER_TAU
-    by_hair *= exp((index < {{other_tau_lights}} ? -other_tau[index] : 0.0) * (1.0 - hair_forward));
+    float tau = index < {{other_tau_lights}} ? other_tau[index] : 0.0;
+    hair_transmittance *= exp(-tau * (1.0 - hair_forward));
 #endif
-    vec3 arriving = past_meshes * facing / PI * irradiance;
+    vec3 arriving = mesh_visibility * facing / PI * irradiance;
     all_light += arriving;
-    left += arriving * by_hair;
+    shadowed_light += arriving * hair_transmittance;
   }
-  vec3 fraction = left / max(all_light, vec3(NO_LIGHT));
+  vec3 fraction = shadowed_light / max(all_light, vec3(NO_LIGHT));
   // exactly 1 without a shadow, so that pictures stay unchanged there
-  bvec3 is_full = greaterThan(fraction, vec3(1.0 - NO_SHADOW));
+  bvec3 is_unshadowed = greaterThan(fraction, vec3(1.0 - NO_SHADOW));
   bvec3 is_dark = lessThan(all_light, vec3(NO_LIGHT));
-  color = vec4(mix(fraction, vec3(1.0), max(vec3(is_full), vec3(is_dark))), 1.0);
+  color = vec4(mix(fraction, vec3(1.0), max(vec3(is_unshadowed), vec3(is_dark))), 1.0);
 #ifdef BLENDED
   color *= alpha;
 #endif

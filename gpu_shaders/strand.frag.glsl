@@ -69,12 +69,12 @@ void main()
   vec3 radiance = tangent;
 #else
   vec2 place = strand_along_and_occlusion;
-  vec4 other_tau = vec4(0.0), own = vec4(0.0), openness = vec4(0.0);
+  vec4 other_tau = vec4(0.0), own_color = vec4(0.0), openness = vec4(0.0);
 #  ifdef OTHER_TAU
   other_tau = strand_other_tau;
 #  endif
 #  ifdef OWN_COLOR
-  own = strand_own_color;
+  own_color = strand_own_color;
 #  endif
 #  ifdef OPENNESS
   openness = strand_openness;
@@ -91,7 +91,7 @@ void main()
                                   place.y,
                                   openness,
                                   other_tau,
-                                  own,
+                                  own_color,
                                   seen,
                                   seed);
 #endif

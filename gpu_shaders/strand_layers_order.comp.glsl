@@ -14,7 +14,7 @@
 #include "lib_layer_packing.glsl"
 
 // Loop over a list; the body sets `node` to the next one.
-#define EACH_FROM(node) while (node != 0u) for (int i = 0; i < NODES_PER_ROUND; i++) if (node != 0u)
+#define FOR_EACH_NODE(node) while (node != 0u) for (int i = 0; i < NODES_PER_ROUND; i++) if (node != 0u)
 
 const uvec4 NO_LAYER = uvec4(0u, 0xFFFFFFFFu, 0xFFFFFFFFu, 0xFFFFFFFFu);
 
@@ -32,14 +32,14 @@ uint merged_layers(uint one, uint other)
   uvec4 other_node = imageLoad(layer_nodes, layer_texel(other));
   uint first = 0u, last = 0u;
   uvec4 last_node = uvec4(0u);
-  EACH_FROM (one) {
+  FOR_EACH_NODE (one) {
     if (is_before(other_node, node)) {
       uint number = one;
-      uvec4 kept = node;
+      uvec4 swapped = node;
       one = other;
       node = other_node;
       other = number;
-      other_node = kept;
+      other_node = swapped;
     }
     if (first == 0u) {
       first = one;
@@ -59,13 +59,13 @@ uint merged_layers(uint one, uint other)
 }
 
 // Insert a layer into the sorted nearest ones, dropping the farthest. Their x is their own number.
-void put_layer(inout uvec4 nearest[LAYERS], uvec4 found)
+void insert_layer(inout uvec4 nearest[LAYERS], uvec4 found)
 {
   for (int i = 0; i < LAYERS; i++) {
-    uvec4 kept = nearest[i];
-    bool is_nearer = is_before(found, kept);
-    nearest[i] = is_nearer ? found : kept;
-    found = is_nearer ? kept : found;
+    uvec4 current = nearest[i];
+    bool is_nearer = is_before(found, current);
+    nearest[i] = is_nearer ? found : current;
+    found = is_nearer ? current : found;
   }
 }
 
@@ -79,7 +79,7 @@ uint sorted_run(inout uint number)
   for (int i = 0; i < LAYERS; i++) {
     if (number != 0u) {
       uvec4 node = imageLoad(layer_nodes, layer_texel(number));
-      put_layer(nearest, uvec4(number, node.yzw));
+      insert_layer(nearest, uvec4(number, node.yzw));
       number = node.x;
     }
   }
@@ -100,98 +100,98 @@ uint sorted_layers(uint number)
   uint lists[{{list_digits}}];
   int used = 0;
   while (number != 0u) {
-    uint own = sorted_run(number);
+    uint run = sorted_run(number);
     int digit = 0;
     while (digit < used && lists[digit] != 0u) {
-      own = merged_layers(own, lists[digit]);
+      run = merged_layers(run, lists[digit]);
       lists[digit] = 0u;
       digit++;
     }
-    lists[digit] = own;
+    lists[digit] = run;
     used = max(used, digit + 1);
   }
-  uint whole = lists[0];
+  uint merged = lists[0];
   for (int digit = 1; digit < used; digit++) {
     uint list = lists[digit];
-    whole = whole == 0u ? list : list == 0u ? whole : merged_layers(whole, list);
+    merged = merged == 0u ? list : list == 0u ? merged : merged_layers(merged, list);
   }
-  return whole;
+  return merged;
 }
 
 // The reduced list; its last node is written once the next one is known.
-uint kept[LAYERS];
-int kept_count = 0;
+uint selected[LAYERS];
+int selected_count = 0;
 uvec4 last_node;
 
-void keep_layer(uint number, uvec4 node, float fraction)
+void select_layer(uint number, uvec4 node, float fraction)
 {
-  if (kept_count == LAYERS) {
+  if (selected_count == LAYERS) {
     return;
   }
-  if (kept_count > 0) {
-    imageStore(layer_nodes, layer_texel(kept[kept_count - 1]), uvec4(number, last_node.yzw));
+  if (selected_count > 0) {
+    imageStore(layer_nodes, layer_texel(selected[selected_count - 1]), uvec4(number, last_node.yzw));
   }
-  kept[kept_count] = number;
+  selected[selected_count] = number;
   last_node = uvec4(0u, floatBitsToUint(fraction), node.zw);
-  kept_count++;
+  selected_count++;
 }
 
 // x transmittance of all layers, y depth at which it has fallen to a half, 2 where it does not.
-vec2 hidden_by(uint sorted)
+vec2 total_transmittance(uint sorted)
 {
-  float through = 1.0, front = 2.0;
+  float transmittance = 1.0, front = 2.0;
   uint number = sorted;
-  EACH_FROM (number) {
+  FOR_EACH_NODE (number) {
     uvec4 node = imageLoad(layer_nodes, layer_texel(number));
-    through *= 1.0 - layer_alpha(node.w);
-    front = front > 1.0 && through <= 0.5 ? uintBitsToFloat(node.y) : front;
+    transmittance *= 1.0 - layer_alpha(node.w);
+    front = front > 1.0 && transmittance <= 0.5 ? uintBitsToFloat(node.y) : front;
     number = node.x;
   }
-  return vec2(through, front);
+  return vec2(transmittance, front);
 }
 
-// The light that each of LAYERS kept layers represents: layers with more light than that keep their own, and
+// The light that each of LAYERS selected layers represents: layers with more light than that keep their own, and
 // the others share the rest evenly.
-float fraction_of_one(uint sorted, float covered)
+float sample_weight(uint sorted, float covered)
 {
   float threshold = covered / float(LAYERS);
   int large = 0, before = 0;
   do {
     before = large;
     large = 0;
-    float left = covered, through = 1.0;
+    float remaining = covered, transmittance = 1.0;
     uint number = sorted;
-    EACH_FROM (number) {
+    FOR_EACH_NODE (number) {
       uvec4 node = imageLoad(layer_nodes, layer_texel(number));
-      float weight = through * layer_alpha(node.w);
-      through *= 1.0 - layer_alpha(node.w);
+      float weight = transmittance * layer_alpha(node.w);
+      transmittance *= 1.0 - layer_alpha(node.w);
       bool is_large = weight > threshold;
-      left -= is_large ? weight : 0.0;
+      remaining -= is_large ? weight : 0.0;
       large += is_large ? 1 : 0;
       number = node.x;
     }
-    float next = left / float(max(LAYERS - large, 1));
+    float next = remaining / float(max(LAYERS - large, 1));
     threshold = clamp(next, 1.0e-6, threshold);
   } while (large > before);
   return threshold;
 }
 
 // Keep a sample of many layers: systematic sampling by light, summed from the nearest layer on. Each time the
-// sum passes the middle of another threshold, the layer there is kept.
-void keep_some(uint sorted, float covered)
+// sum passes the middle of another threshold, the layer there is selected.
+void select_sample(uint sorted, float covered)
 {
-  float threshold = fraction_of_one(sorted, covered);
-  float through = 1.0, passed = 0.5;
+  float threshold = sample_weight(sorted, covered);
+  float transmittance = 1.0, cumulative = 0.5;
   uint number = sorted;
-  EACH_FROM (number) {
+  FOR_EACH_NODE (number) {
     uvec4 node = imageLoad(layer_nodes, layer_texel(number));
-    float weight = through * layer_alpha(node.w);
-    through *= 1.0 - layer_alpha(node.w);
+    float weight = transmittance * layer_alpha(node.w);
+    transmittance *= 1.0 - layer_alpha(node.w);
     bool is_large = weight > threshold;
-    passed += is_large ? 0.0 : weight / threshold;
-    if (is_large || passed >= 1.0) {
-      keep_layer(number, node, max(weight, threshold) / covered);
-      passed -= is_large ? 0.0 : 1.0;
+    cumulative += is_large ? 0.0 : weight / threshold;
+    if (is_large || cumulative >= 1.0) {
+      select_layer(number, node, max(weight, threshold) / covered);
+      cumulative -= is_large ? 0.0 : 1.0;
     }
     number = node.x;
   }
@@ -211,13 +211,13 @@ void main()
   for (int i = 0; i < LAYERS; i++) {
     nearest[i] = NO_LAYER;
   }
-  float behind_all = 1.0;
+  float final_transmittance = 1.0;
   int count = 0;
   uint number = head;
   while (number != 0u) {
     uvec4 node = imageLoad(layer_nodes, layer_texel(number));
-    behind_all *= 1.0 - layer_alpha(node.w);
-    put_layer(nearest, uvec4(number, node.yzw));
+    final_transmittance *= 1.0 - layer_alpha(node.w);
+    insert_layer(nearest, uvec4(number, node.yzw));
     count++;
     number = node.x;
   }
@@ -227,40 +227,41 @@ void main()
   }
 
   float fractions[LAYERS];
-  float through = 1.0, front = 2.0;
+  float transmittance = 1.0, front = 2.0;
   int seen = 0;
   for (int i = 0; i < LAYERS; i++) {
-    bool is_seen = nearest[i].x != 0u && (i == 0 || through - behind_all >= {{unseen_fraction}});
+    bool is_near = i == 0 || transmittance - final_transmittance >= {{unseen_fraction}};
+    bool is_seen = nearest[i].x != 0u && is_near;
     float alpha = is_seen ? layer_alpha(nearest[i].w) : 0.0;
-    fractions[i] = through * alpha;
-    through *= 1.0 - alpha;
-    bool is_front = is_seen && front > 1.0 && through <= 0.5;
+    fractions[i] = transmittance * alpha;
+    transmittance *= 1.0 - alpha;
+    bool is_front = is_seen && front > 1.0 && transmittance <= 0.5;
     front = is_front ? uintBitsToFloat(nearest[i].y) : front;
     seen = is_seen ? i + 1 : seen;
   }
-  if (count > LAYERS && through - behind_all >= {{unseen_fraction}}) {
+  if (count > LAYERS && transmittance - final_transmittance >= {{unseen_fraction}}) {
     uint sorted = sorted_layers(head);
-    vec2 hidden = hidden_by(sorted);
-    keep_some(sorted, 1.0 - hidden.x);
-    behind_all = kept_count > 0 ? hidden.x : behind_all;
-    front = kept_count > 0 ? hidden.y : front;
+    vec2 hidden = total_transmittance(sorted);
+    select_sample(sorted, 1.0 - hidden.x);
+    final_transmittance = selected_count > 0 ? hidden.x : final_transmittance;
+    front = selected_count > 0 ? hidden.y : front;
   }
   // also if a software driver has ended the loops above early, after 65,535 iterations of all of them
-  if (kept_count == 0) {
+  if (selected_count == 0) {
     for (int i = 0; i < LAYERS; i++) {
       if (i < seen) {
-        keep_layer(nearest[i].x, nearest[i], fractions[i] / max(1.0 - through, 1.0e-6));
+        select_layer(nearest[i].x, nearest[i], fractions[i] / max(1.0 - transmittance, 1.0e-6));
       }
     }
   }
-  imageStore(layer_nodes, layer_texel(kept[kept_count - 1]), last_node);
-  imageStore(layer_fronts, pixel, vec4(front, 1.0 - behind_all, 0.0, 0.0));
-  imageStore(layer_heads, pixel, uvec4(kept[0]));
+  imageStore(layer_nodes, layer_texel(selected[selected_count - 1]), last_node);
+  imageStore(layer_fronts, pixel, vec4(front, 1.0 - final_transmittance, 0.0, 0.0));
+  imageStore(layer_heads, pixel, uvec4(selected[0]));
   // from the array: a loop over the list might end early, and nodes missing here would never get a colour
-  uint first_seen = imageAtomicAdd(layer_count, ivec2(2, 0), uint(kept_count)) + 1u;
+  uint first_seen = imageAtomicAdd(layer_count, ivec2(2, 0), uint(selected_count)) + 1u;
   for (int i = 0; i < LAYERS; i++) {
-    if (i < kept_count) {
-      imageStore(layer_seen, layer_texel(first_seen + uint(i)), uvec4(kept[i]));
+    if (i < selected_count) {
+      imageStore(layer_seen, layer_texel(first_seen + uint(i)), uvec4(selected[i]));
     }
   }
 }

@@ -44,34 +44,36 @@ def ggx_reflection(
     normal: Floats, to_light: Floats, to_eye: Floats, specular: float, roughness: float
 ) -> Floats:
     """The BRDF of the boundary [1/sr], (...,), for unit vectors (..., 3)."""
-    lit = np.sum(normal * to_light, axis=-1)
-    seen = np.sum(normal * to_eye, axis=-1)
-    between = to_light + to_eye
-    length = np.linalg.norm(between, axis=-1)
-    middle = between / np.maximum(length, 1e-20)[..., None]
+    cos_light = np.sum(normal * to_light, axis=-1)
+    cos_eye = np.sum(normal * to_eye, axis=-1)
+    half_sum = to_light + to_eye
+    length = np.linalg.norm(half_sum, axis=-1)
+    half_vector = half_sum / np.maximum(length, 1e-20)[..., None]
     alpha_squared = max(roughness, MIN_ROUGHNESS) ** 4
-    aside = np.cross(normal, middle)
-    across = np.sum(normal * middle, axis=-1)
-    spread = np.sum(aside * aside, axis=-1) + alpha_squared * across * across
+    sine_vector = np.cross(normal, half_vector)
+    cos_half = np.sum(normal * half_vector, axis=-1)
+    spread = np.sum(sine_vector * sine_vector, axis=-1) + alpha_squared * cos_half * cos_half
     facets = alpha_squared / (np.pi * spread * spread)
-    is_met = (np.minimum(lit, seen) > 0.0) & (length > 0.0)
-    heights = lit * smith_height(seen, alpha_squared) + seen * smith_height(lit, alpha_squared)
-    visible = 0.5 / np.where(is_met, heights, 1.0)
-    cosine = np.clip(np.sum(middle * to_eye, axis=-1), 0.0, 1.0)
-    return np.where(is_met, facets * visible * dielectric_fresnel(cosine, specular), 0.0)
+    is_visible = (np.minimum(cos_light, cos_eye) > 0.0) & (length > 0.0)
+    heights = cos_light * smith_height(cos_eye, alpha_squared) + cos_eye * smith_height(
+        cos_light, alpha_squared
+    )
+    visible = 0.5 / np.where(is_visible, heights, 1.0)
+    cosine = np.clip(np.sum(half_vector * to_eye, axis=-1), 0.0, 1.0)
+    return np.where(is_visible, facets * visible * dielectric_fresnel(cosine, specular), 0.0)
 
 
-def reflected_fraction(seen: Floats, specular: float, roughness: float) -> Floats:
+def reflected_fraction(cos_eye: Floats, specular: float, roughness: float) -> Floats:
     """Approximate fraction of light from all around that the boundary reflects to the eye.
 
     Args:
-        seen: cosine of the angle between eye and normal.
+        cos_eye: cosine of the angle between eye and normal.
     """
     if specular <= 0.0:
-        return np.zeros_like(seen)
+        return np.zeros_like(cos_eye)
     first = 1.0 - roughness
     second = 0.0425 - 0.0275 * roughness
     scale = 1.04 - 0.572 * roughness
     bias = 0.022 * roughness - 0.04
-    grazing = np.minimum(first * first, np.exp2(-9.28 * np.maximum(seen, 0.0))) * first + second
+    grazing = np.minimum(first * first, np.exp2(-9.28 * np.maximum(cos_eye, 0.0))) * first + second
     return np.clip(specular * (scale - 1.04 * grazing) + bias + 1.04 * grazing, 0.0, 1.0)

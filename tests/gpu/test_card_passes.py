@@ -122,7 +122,9 @@ def test_states_are_those_of_the_paper(
         return shader
 
     monkeypatch.setattr(card_pass, "bound", bound)
-    monkeypatch.setattr(card_pass.CardBatches, "sorted_batches", lambda *_: {"front": Batch(), "back": Batch()})
+    monkeypatch.setattr(
+        card_pass.CardBatches, "sorted_batches", lambda *_: {"front": Batch(), "back": Batch()}
+    )
     shading = dataclasses.replace(LOOK["shading"], model=model)
     drawing = CardDrawingSettings(passes=scheme, skip_clear=False)
     frame.render_image(

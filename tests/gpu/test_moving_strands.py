@@ -144,7 +144,8 @@ def test_a_jump_coarsens_strands_and_loses_none(frame: Any, monkeypatch: Any) ->
     assert calls["reads"] == 0
     assert still.statistics.strands > 1.3 * before.strands
     assert still.statistics.pieces > 2 * before.pieces
-    assert still.statistics.pieces > len(groom.roots) * own._views[VIEW].detail._rest_counts.slot_pieces
+    counts = own._views[VIEW].detail._rest_counts
+    assert still.statistics.pieces > len(groom.roots) * counts.slot_pieces
     assert np.abs(found - expected).max() > 0.01, "it is coarser"
     assert found[..., 3].sum() == pytest.approx(expected[..., 3].sum(), rel=0.05)
     assert np.abs(blurred(found - expected)).max() < 0.1
@@ -174,7 +175,7 @@ def test_fragments_without_room_are_made_up_for(
     counted = int(np.asarray(layers._count.read()).ravel()[0])
     assert calls["reads"] == 0 and 0.5 * room < counted <= room
     expected, _ = drawn(frame, own, groom, near)
-    assert own._views[VIEW].parts > 1, "at rest it is drawn in parts"
+    assert own._views[VIEW].part_count > 1, "at rest it is drawn in parts"
     assert found[..., 3].mean() == pytest.approx(expected[..., 3].mean(), rel=0.05)
     found, expected = blurred(found)[..., 3], blurred(expected)[..., 3]
     assert np.abs(found - expected).mean() < 0.1

@@ -75,21 +75,21 @@ def layer_fractions(
     """
     order = np.lexsort((alphas, depths, alphas == 0.0), axis=-1)
     alphas = np.take_along_axis(alphas, order, axis=-1)
-    through = np.cumprod(1.0 - alphas, axis=-1)
-    before = np.column_stack([np.ones(len(alphas)), through[:, :-1]])
-    weights, covered = before * alphas, 1.0 - through[:, -1:]
-    is_seen = (alphas > 0.0) & (before - through[:, -1:] >= unseen_fraction)
+    transmittance = np.cumprod(1.0 - alphas, axis=-1)
+    before = np.column_stack([np.ones(len(alphas)), transmittance[:, :-1]])
+    weights, covered = before * alphas, 1.0 - transmittance[:, -1:]
+    is_seen = (alphas > 0.0) & (before - transmittance[:, -1:] >= unseen_fraction)
     is_seen[:, 0] = alphas[:, 0] > 0.0
     nearest = np.where(is_seen, weights, 0.0)
     nearest *= covered / np.maximum(nearest.sum(axis=-1, keepdims=True), 1e-6)
     is_many = is_seen.sum(axis=-1, keepdims=True) > layers
-    chosen = np.where(is_many, _chosen(weights, covered, layers), nearest)
+    chosen = np.where(is_many, _sample_weights(weights, covered, layers), nearest)
     fractions: Floats = np.zeros_like(chosen)
     np.put_along_axis(fractions, order, chosen, axis=-1)
     return fractions
 
 
-def _chosen(weights: Floats, covered: Floats, layers: int) -> Floats:
+def _sample_weights(weights: Floats, covered: Floats, layers: int) -> Floats:
     """Weights of a sample of all layers, (pixel_count, n); 0 for layers that are not in it.
 
     Args:
@@ -98,10 +98,10 @@ def _chosen(weights: Floats, covered: Floats, layers: int) -> Floats:
     threshold = np.maximum(covered / layers, 1e-6)
     for _ in range(layers):
         is_large = weights > threshold
-        left = covered - np.where(is_large, weights, 0.0).sum(axis=-1, keepdims=True)
+        remaining = covered - np.where(is_large, weights, 0.0).sum(axis=-1, keepdims=True)
         slots = np.maximum(layers - is_large.sum(axis=-1, keepdims=True), 1)
-        threshold = np.clip(left / slots, 1e-6, threshold)
+        threshold = np.clip(remaining / slots, 1e-6, threshold)
     is_large = weights > threshold
-    passed = 0.5 + np.cumsum(np.where(is_large, 0.0, weights / threshold), axis=-1)
-    is_next = np.diff(np.floor(passed), axis=-1, prepend=0.0) > 0.0
+    cumulative = 0.5 + np.cumsum(np.where(is_large, 0.0, weights / threshold), axis=-1)
+    is_next = np.diff(np.floor(cumulative), axis=-1, prepend=0.0) > 0.0
     return np.where(is_large, weights, np.where(is_next, threshold, 0.0))
