@@ -46,7 +46,7 @@ def test_a_broken_sample_does_not_break_the_pixel(rooms: Any) -> None:
     np.testing.assert_allclose(mean[0, 0], 0.5)
 
 
-def test_it_is_shown_where_it_begins_over_what_is_there(rooms: Any) -> None:
+def test_the_mean_is_drawn_over_the_picture_at_its_corner(rooms: Any) -> None:
     accumulation, textures = rooms
     one = np.zeros((2, 3, 4), np.float32)
     one[..., 0], one[..., 3] = np.arange(6).reshape(2, 3) / 10.0, 0.5

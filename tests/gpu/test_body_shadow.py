@@ -118,7 +118,7 @@ def test_other_light_fills_the_shadow() -> None:
     assert shadow(SUN, aside)[30:34, 30:34].mean() >= middle[0] - 1e-3
 
 
-def test_from_below_and_behind_other_things_there_is_none() -> None:
+def test_no_shadow_shows_from_below_or_behind_other_objects() -> None:
     assert shadow(SUN, depth=0.0).min() == 1.0
     assert shadow(SUN, eye=(0.0, -2.0, -0.6)).min() > 0.99
 

@@ -100,7 +100,7 @@ def test_broken_pixels_are_the_reference_too(
     assert np.abs(found[is_whole] - expected[is_whole]).max() < 1.0 / 255.0
 
 
-def test_what_lies_behind_a_picture_throws_shafts_through_it(
+def test_a_background_throws_shafts_through_the_picture(
     shafts: Callable[..., np.ndarray], window: np.ndarray
 ) -> None:
     """For hair over another engine's picture, and over one colour."""

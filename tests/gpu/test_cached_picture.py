@@ -50,7 +50,7 @@ def drawn(grooms: Any, camera: Any, draw_hair: Any) -> np.ndarray:
     return np.dstack([pixels, np.array(depth.read()).reshape(SIZE, SIZE, 1)])
 
 
-def test_what_is_shown_again_is_what_was_drawn(frame: Any, scene: Any) -> None:
+def test_a_cached_picture_is_shown_as_it_was_drawn(frame: Any, scene: Any) -> None:
     """For two grooms with a mesh that hides some of their hair."""
     from hairloom.addon.render.cached_picture import CachedPicture
     from hairloom.addon.render.strand_pass import ViewState
@@ -79,7 +79,9 @@ def test_what_is_shown_again_is_what_was_drawn(frame: Any, scene: Any) -> None:
     assert (plain[..., 4] < empty[..., 4]).any(), "hair has depths"
 
 
-def test_showing_again_reads_nothing_and_draws_two_triangles(frame: Any, scene: Any) -> None:
+def test_showing_a_cached_picture_reads_nothing_and_draws_two_triangles(
+    frame: Any, scene: Any
+) -> None:
     from hairloom.addon.render.cached_picture import CachedPicture
     from hairloom.addon.render.strand_pass import ViewState
 
@@ -172,7 +174,7 @@ def test_shadows_lag_while_a_view_turns_and_are_exact_once_it_rests(frame: Any, 
     assert dispatches(41.0, is_turning=False)[0] == 0
 
 
-def test_views_beside_each_other_keep_what_is_theirs(frame: Any, scene: Any) -> None:
+def test_views_side_by_side_keep_their_own_data(frame: Any, scene: Any) -> None:
     """Two views in turn do not compute detail or draw maps again, and look as each does alone."""
     from hairloom.addon.render.strand_pass import ViewState
 

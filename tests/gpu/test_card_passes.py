@@ -289,7 +289,7 @@ def test_a_normal_map_bends_the_normal(frame: Any) -> None:
     assert np.abs(mapped / flat - 1.0).max() > 0.1
 
 
-def test_what_the_viewport_is_given(frame: Any) -> None:
+def test_viewport_colors_are_encoded_before_they_are_premultiplied(frame: Any) -> None:
     """Colours as viewport handlers must write them: encoded unpremultiplied, then times alpha."""
     import gpu
 

@@ -117,7 +117,7 @@ def test_thin_cards_take_less_of_the_light(frame: Any, form: str) -> None:
 
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("turn", [0.0, 1.1])
-def test_even_cards_shade_as_much_from_all_sides_of_their_strands(
+def test_view_compensated_cards_shade_equally_from_all_sides_of_their_strands(
     frame: Any, form: str, turn: float
 ) -> None:
     """A card turned about its strands before a wall of hair without self-shadowing."""
@@ -148,7 +148,7 @@ def test_even_cards_shade_as_much_from_all_sides_of_their_strands(
 
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("depth", [0.0, 0.5])
-def test_other_strands_of_a_deep_card_are_before_the_one_that_is_seen(
+def test_strands_of_a_deep_card_lie_in_front_of_the_visible_one(
     frame: Any, form: str, depth: float
 ) -> None:
     """On a card that faces eye and light: with long hair some strands are before the seen one, with
@@ -205,7 +205,7 @@ def test_a_map_stores_how_deep_the_visible_strand_of_a_card_lies(
         assert shown / bare == pytest.approx(np.exp(-before), rel=0.03)
 
 
-def test_light_is_looked_up_at_the_strand_that_is_seen(frame: Any) -> None:
+def test_light_is_looked_up_at_the_visible_strand(frame: Any) -> None:
     """Light from the side is blocked by a small card before the plane of another card. On a deep
     card, the foremost strands lie before the small card and are lit."""
     mesh = mesh_of(card(0.0, 1.0, 1.0), card(0.0, 0.3, 0.8))
@@ -229,7 +229,7 @@ def test_light_is_looked_up_at_the_strand_that_is_seen(frame: Any) -> None:
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_locks_that_a_light_does_not_tell_apart_take_what_they_are(frame: Any, form: str) -> None:
+def test_clumps_finer_than_a_texel_block_their_mean_tau(frame: Any, form: str) -> None:
     """Sixteen locks across a card, finer than the map's texels: the wall behind gets their mean
     tau, not the tau of their mean alpha."""
     stripes = np.tile(np.repeat([0.1, 0.9], 32), 8)

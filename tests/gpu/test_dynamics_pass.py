@@ -555,7 +555,7 @@ def test_hair_among_hair_is_the_same_to_the_last_bit_every_time(make_pass: Any) 
         assert np.array_equal(found[0].push, other.push)
 
 
-def test_what_hair_feels_goes_on_where_the_form_is_switched(make_pass: Any) -> None:
+def test_hair_forces_continue_when_the_device_is_switched(make_pass: Any) -> None:
     """In frames of 7 and 8 substeps, with interaction in every third substep."""
     scene = Bundle(FALLING, fps=24.0)
     state = mixed = scene.start()
@@ -571,7 +571,7 @@ def test_what_hair_feels_goes_on_where_the_form_is_switched(make_pass: Any) -> N
         assert np.abs(mixed.position - state.position).max() < TOUCHING
 
 
-def test_one_may_switch_the_form_in_mid_motion(make_pass: Any) -> None:
+def test_the_device_can_be_switched_in_mid_motion(make_pass: Any) -> None:
     """Numpy and GPU in turn: the state is handed over bit for bit."""
     scene = Scene(on_head=(BALL,), fps=50.0)
     state = mixed = scene.start()

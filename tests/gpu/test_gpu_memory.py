@@ -79,7 +79,7 @@ def test_the_environment_is_stronger_than_the_preferences(monkeypatch: pytest.Mo
         assert gpu_memory.budget() == 300 * MEGABYTE
 
 
-def test_lists_take_what_is_left_and_never_nothing() -> None:
+def test_lists_get_the_remaining_budget_and_never_nothing() -> None:
     gpu_objects.free_unused()
     taken = gpu_objects.bytes_in_use()
     before = gpu_memory.fragment_list_budget(0)

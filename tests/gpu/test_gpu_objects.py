@@ -55,7 +55,9 @@ def mine() -> list[Any]:
         pytest.param(_collected_there, id="collector", marks=pytest.mark.slow),
     ],
 )
-def test_what_another_thread_drops_waits_for_its_own(drop: Callable[[list[Any]], None]) -> None:
+def test_objects_dropped_by_another_thread_wait_for_their_own(
+    drop: Callable[[list[Any]], None],
+) -> None:
     """On Vulkan, Blender crashes if another thread frees a texture before its upload has run."""
     kept = _filled(1.0)
     for value in range(20):
@@ -68,7 +70,7 @@ def test_what_another_thread_drops_waits_for_its_own(drop: Callable[[list[Any]],
     assert texture not in map(id, mine())
 
 
-def test_making_another_frees_what_nothing_uses() -> None:
+def test_making_an_object_frees_unused_ones() -> None:
     kept, dropped = _filled(1.0), _filled(2.0)
     before = len(mine())
     del dropped

@@ -112,7 +112,7 @@ def test_hair_has_the_shadow_of_other_grooms(
     assert light["two"] == pytest.approx(light["one"], rel=0.06)
 
 
-def test_what_lies_beside_or_before_a_groom_is_not_asked(gpu_context: Any) -> None:
+def test_balls_beside_or_before_a_groom_get_no_shadow(gpu_context: Any) -> None:
     from hairloom.addon.render.inter_groom_shadow import may_cast_shadow_on
     from hairloom.addon.render.strand_pass import StrandPass
 
@@ -125,7 +125,7 @@ def test_what_lies_beside_or_before_a_groom_is_not_asked(gpu_context: Any) -> No
         assert not may_cast_shadow_on(maps, Ball(np.array([0.0, 0.0, 1.0]), 0.1))
 
 
-def test_places_without_a_serial_are_asked_anew_and_nothing_adds_up(gpu_context: Any) -> None:
+def test_places_without_a_serial_are_computed_again_without_accumulating(gpu_context: Any) -> None:
     from hairloom.addon.render.inter_groom_shadow import NO_GROOM, InterGroomShadow
     from hairloom.addon.render.strand_pass import StrandPass
     from hairloom.addon.render.textures import texture_from, texture_to_array
@@ -148,7 +148,7 @@ def test_places_without_a_serial_are_asked_anew_and_nothing_adds_up(gpu_context:
     assert found(1.5, 2).max() == 0.0
 
 
-def test_a_place_has_what_all_but_its_own_groom_have_in_the_way(gpu_context: Any) -> None:
+def test_a_place_sums_the_optical_depth_of_all_other_grooms(gpu_context: Any) -> None:
     from hairloom.addon.render.inter_groom_shadow import InterGroomShadow
     from hairloom.addon.render.strand_pass import StrandPass
     from hairloom.addon.render.textures import texture_from, texture_to_array
@@ -186,7 +186,7 @@ def test_a_place_has_what_all_but_its_own_groom_have_in_the_way(gpu_context: Any
         assert way[0] == 0.0 and (way[1] > 0.0) == (count == 2)
 
 
-def test_light_from_each_side_may_shade_and_none_without_light(gpu_context: Any) -> None:
+def test_grooms_may_cast_shadows_from_each_side_but_not_without_light(gpu_context: Any) -> None:
     from hairloom.addon.render.inter_groom_shadow import may_cast_shadow_on
     from hairloom.addon.render.strand_pass import StrandPass
 
@@ -211,7 +211,7 @@ def test_light_from_each_side_may_shade_and_none_without_light(gpu_context: Any)
         assert may_cast_shadow_on(maps(*lights), ball) == is_reached, (ball, lights)
 
 
-def test_views_in_other_light_keep_what_lies_between(gpu_context: Any) -> None:
+def test_views_in_other_light_keep_their_inter_groom_shadow(gpu_context: Any) -> None:
     """Two views that are drawn in turn keep their look-ups until the other hair moves."""
     from hairloom.addon.render.accumulation import Target
     from hairloom.addon.render.groom_pass import GroomPass

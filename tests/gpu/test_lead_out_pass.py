@@ -150,7 +150,7 @@ def test_equals_numpy(
     assert not len(leading.led_strands())
 
 
-def test_puts_what_was_led_earlier() -> None:
+def test_points_that_were_led_out_earlier_are_stored() -> None:
     from hairloom.addon.render.collider_textures import UploadedColliders
     from hairloom.addon.render.lead_out_pass import LeadOutPass
     from hairloom.addon.render.strand_layout import StrandLayout

@@ -36,7 +36,7 @@ AREA = Light.area((0.0, -4.0, 0.5), WHITE, 300.0, Panel(SIDE, UP, AHEAD, 1.0, 0.
         ((POINT, AREA), 2),
     ],
 )
-def test_kinds_that_are_left_out_would_add_nothing(
+def test_light_kinds_that_are_left_out_would_add_nothing(
     lights: tuple[Light, ...], needed: int, transparency: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from hairloom.addon.render import frame, view_block

@@ -66,7 +66,7 @@ def left_on_the_floor(snapshot: Any) -> np.ndarray:
 
 
 @pytest.mark.parametrize("is_skin", [False, True], ids=["mesh", "skin"])
-def test_skin_under_hair_has_what_hair_sends_on(*, is_skin: bool) -> None:
+def test_skin_under_hair_gets_the_light_that_hair_scatters_forward(*, is_skin: bool) -> None:
     """Against the reference's transmittance with forward scattering, for the tau that is measured
     without it."""
     straight = left_on_the_floor(snapshot_of(BLOND, scattering=False, is_skin=is_skin))
@@ -93,7 +93,7 @@ def test_the_soft_edge_of_a_meshs_shadow_has_no_colour_of_hair() -> None:
     assert np.ptp(found, axis=1).max() < 5e-3
 
 
-def test_hair_that_sends_nothing_on_shades_as_before() -> None:
+def test_hair_without_forward_scattering_casts_a_plain_shadow() -> None:
     kajiya_kay = replace(BLOND, model="kajiya_kay")
     alike = [
         left_on_the_floor(snapshot_of(each, scattering=scatters, is_skin=False))
@@ -102,7 +102,7 @@ def test_hair_that_sends_nothing_on_shades_as_before() -> None:
     assert np.array_equal(*alike)
 
 
-def test_what_counts_near_a_border_is_what_the_reference_says(
+def test_weights_near_the_map_border_are_those_of_the_reference(
     compute: Callable[..., np.ndarray],
 ) -> None:
     places = np.random.default_rng(1).uniform(-0.2, 1.2, (500, 2))

@@ -195,7 +195,7 @@ def test_an_edge_is_as_soft_at_any_resolution(
     assert widths[1] > 8
 
 
-def test_samples_of_a_picture_ask_places_all_around(gpu_context: Any) -> None:
+def test_samples_of_a_picture_look_up_places_all_around(gpu_context: Any) -> None:
     """Shifts up to a texel, evenly in all directions, give smooth edges in the mean of samples."""
     maps = maps_of((ground(), box((0.0, 0.0, 0.5), 1.0)), (LIGHTS["sun"],))
     shifts = np.array(

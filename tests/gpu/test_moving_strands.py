@@ -78,7 +78,7 @@ def moved(groom: Any, number: int) -> Any:
     return replace(groom, points=groom.points + np.float32(0.002 * number))
 
 
-def test_what_moves_waits_for_nothing_and_is_what_is_drawn_at_rest(frame: Any) -> None:
+def test_moving_hair_does_not_wait_for_the_gpu_and_looks_as_at_rest(frame: Any) -> None:
     """While hair plays and the view turns, with or without its lights; then both rest."""
     lit = curls(frame, lights=three_point_lights(seen_from(frame).view), volume=VolumeSettings())
     for groom in (curls(frame), lit):
@@ -157,7 +157,7 @@ def blurred(picture: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("radius, rows", [(1e-4, 14), (2e-3, 25)])
-def test_fragments_without_room_are_made_up_for(
+def test_fragments_that_do_not_fit_are_compensated_by_width(
     frame: Any, monkeypatch: Any, radius: float, rows: int
 ) -> None:
     """With memory for two thirds of the expected fragments, fewer but wider strands are drawn."""

@@ -116,7 +116,7 @@ def accumulated(frame: Any, snapshot: Any) -> np.ndarray:
     return np.mean(samples, axis=0)
 
 
-def test_what_the_gpu_can_do_is_found_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_capabilities_are_probed_once(monkeypatch: pytest.MonkeyPatch) -> None:
     import gpu
 
     from hairloom.addon.render import capabilities as module
@@ -165,7 +165,7 @@ def test_atomics_that_do_nothing_are_noticed(
     assert ("nonsense" if change == "no program" else "they give [") in found.atomics_problem
 
 
-def test_metal_is_not_even_tried(monkeypatch: pytest.MonkeyPatch, made: list[Any]) -> None:
+def test_atomics_are_not_probed_on_metal(monkeypatch: pytest.MonkeyPatch, made: list[Any]) -> None:
     from hairloom.addon.render import capabilities as module
 
     class Platform:
@@ -196,7 +196,7 @@ def test_both_preferences_and_environment_forbid_them(
     assert ATOMICS_VARIABLE in capabilities().atomics_problem
 
 
-def test_a_choice_counts_from_the_next_draw_on(
+def test_a_choice_takes_effect_from_the_next_draw_on(
     choose: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from hairloom.addon.render.capabilities import capabilities
@@ -305,7 +305,7 @@ def test_deep_maps_are_the_same(frame: Any, choose: Any) -> None:
     assert lit.max() > 0.2 and off.max() < lit.max() / 255.0
 
 
-def test_the_choice_counts_for_maps_that_are_there(frame: Any, choose: Any) -> None:
+def test_existing_maps_follow_the_choice(frame: Any, choose: Any) -> None:
     """Existing maps are drawn again with the other program."""
     from hairloom.addon.render.strand_pass import StrandPass
 

@@ -281,7 +281,7 @@ def path_at(compute: Callable[..., np.ndarray], maps: Any, points: np.ndarray) -
 
 @pytest.mark.alike
 @pytest.mark.parametrize("light", LIGHTS.values(), ids=LIGHTS)
-def test_a_strand_finds_itself_in_the_map_as_often_as_is_taken_off(
+def test_the_map_holds_as_much_of_a_strand_itself_as_is_subtracted(
     gpu_context: Any, compute: Callable[..., np.ndarray], light: Light
 ) -> None:
     """With a single strand, a chord of the ball, a light path meets only the strand itself; the
@@ -341,7 +341,7 @@ def of_strands(
 
 @pytest.mark.parametrize("transparency", ["none", "hashed", "layers"])
 @pytest.mark.parametrize("opacity", [0.0, 0.5, 1.0])
-def test_strands_that_hide_less_shade_less(
+def test_less_opaque_strands_cast_less_shadow(
     gpu_context: Any, transparency: str, opacity: float
 ) -> None:
     """Half of tau at an opacity of 0.5; without transparency all of it."""

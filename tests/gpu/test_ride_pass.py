@@ -129,7 +129,7 @@ def test_strands_ride_as_in_numpy_on_a_deformed_head() -> None:
     assert np.abs(ride.read() - motion_flow.carried_strands(rig, pose)).max() < TOLERANCE
 
 
-def test_what_a_thread_has_laid_out_shows_the_same() -> None:
+def test_texels_made_in_a_thread_give_the_same_strands() -> None:
     from hairloom.addon.render.ride_pass import RidePass, RideTexels
 
     rig, taller = rig_on(ball(), 300), rig_on(ball(), 300, above=(0.002, 0.001, 0.003))

@@ -115,7 +115,7 @@ def test_the_nearest_strand_is_that_of_brute_force(frame: Any, kind: str) -> Non
     assert away.max() < WIDE * camera.projection[1, 1] * 0.5 * SIZE + 0.1
 
 
-def test_meshes_carry_what_their_vertices_have_to_pixels(frame: Any) -> None:
+def test_vertex_values_are_interpolated_to_pixels(frame: Any) -> None:
     from hairloom.addon.render.accumulation import Target
     from hairloom.addon.render.scene_pass import ScenePass
 

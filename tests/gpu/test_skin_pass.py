@@ -237,7 +237,7 @@ def test_no_seam_is_seen_in_the_map(frame: Any) -> None:
     assert np.abs(sides[0] - sides[1]).max() < 2.0 / 255.0
 
 
-def test_a_head_in_parts_is_as_the_whole(frame: Any) -> None:
+def test_a_head_in_parts_has_the_shadow_of_the_whole(frame: Any) -> None:
     """The render engine passes one part per material; the shadow continues across parts."""
     from hairloom.addon.render.snapshot import Skin
 

@@ -251,7 +251,7 @@ def test_the_mean_is_that_of_a_still(case: str) -> None:
 
 
 @pytest.mark.parametrize("background", [0.0, 0.5])
-def test_one_sample_is_what_is_hard(background: float) -> None:
+def test_one_sample_equals_the_hard_shadow(background: float) -> None:
     """The first sample is at the centre of all lights."""
     view = View([groom(0.0, 0.12, SUN)], PERSPECTIVE)
     off = np.abs(view.softened(1, background) - view.hard(background))
@@ -292,7 +292,7 @@ def test_samples_say_how_much_of_the_hair_is_hidden() -> None:
     assert statistics[0] == statistics[1] > 1000 and statistics[2] == 0
 
 
-def test_what_lies_on_the_gpu_is_let_go_of() -> None:
+def test_a_release_frees_the_gpu_memory() -> None:
     from hairloom.addon.render import gpu_objects
 
     grooms = [groom(0.0, 0.12, SUN)]

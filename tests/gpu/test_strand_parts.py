@@ -119,7 +119,7 @@ def test_grooms_and_a_mesh_in_parts_are_the_same_picture(
 
 
 @pytest.mark.parametrize("output", ["scene_linear", "viewport"])
-def test_each_draw_is_whole_and_tries_first_what_the_last_one_needed(
+def test_each_draw_is_complete_and_starts_with_the_part_count_of_the_last_one(
     frame: Any, front: Any, with_rows: Any, output: str
 ) -> None:
     import gpu
@@ -172,9 +172,7 @@ def test_no_pixel_is_without_hair_that_hashed_strands_cover(
     assert layers[is_covered, 3].min() > 0.1
 
 
-def test_pixels_that_have_no_room_are_drawn_by_depth(
-    frame: Any, front: Any, with_rows: Any
-) -> None:
+def test_pixels_that_do_not_fit_are_drawn_by_depth(frame: Any, front: Any, with_rows: Any) -> None:
     """Against the theoretical composite of thousands of sheets, nearest first."""
     random = np.random.default_rng(5)
     depths, opacity = random.uniform(-40.0, 40.0, 5000), 4.0 / 4095.0
@@ -189,7 +187,7 @@ def test_pixels_that_have_no_room_are_drawn_by_depth(
     assert picture[..., 0] == pytest.approx(np.full((1, 2), exact), abs=0.02)
 
 
-def test_nearest_strands_hide_all_others_wherever_a_pixel_has_no_room(
+def test_nearest_strands_hide_all_others_wherever_a_pixel_does_not_fit(
     frame: Any, front: Any, with_rows: Any
 ) -> None:
     depths = np.random.default_rng(6).permutation(np.linspace(-40.0, 40.0, 5000))
@@ -202,7 +200,7 @@ def test_nearest_strands_hide_all_others_wherever_a_pixel_has_no_room(
     assert pictures[0][..., 0] == pytest.approx(np.full((1, 2), 0.9), abs=2e-3)
 
 
-def test_what_cannot_be_drawn_is_told(frame: Any, front: Any, with_rows: Any) -> None:
+def test_missing_fragments_are_reported(frame: Any, front: Any, with_rows: Any) -> None:
     """More fragments at one depth of one pixel than there is memory for, or than a driver can
     order."""
     from hairloom.addon.render.strand_layers import MAX_LIST_LENGTH_IN_SOFTWARE, is_software

@@ -220,7 +220,7 @@ def test_hair_is_as_bright_in_small_pictures(frame: Any, front: Any, opacity: fl
     assert np.abs(pictures[24] - large).mean() < 0.03
 
 
-def test_layers_that_are_shaded_stand_for_all_of_them() -> None:
+def test_shaded_layers_represent_all_layers() -> None:
     """At most LAYERS of them are shaded, with weights that sum to all light; layers with much light
     keep their own weight."""
     random = np.random.default_rng(15)
@@ -289,7 +289,7 @@ def test_a_mesh_hides_layers_behind_it(frame: Any, front: Any) -> None:
     assert picture[:, :48, 3] == pytest.approx(1.0), "a mesh stays opaque under hair"
 
 
-def test_what_comes_later_is_hidden_by_hair_that_hides(frame: Any, front: Any) -> None:
+def test_opaque_hair_hides_later_draws(frame: Any, front: Any) -> None:
     """Depth is written only where hair covers more than half."""
     import gpu
 
@@ -317,7 +317,7 @@ def test_what_comes_later_is_hidden_by_hair_that_hides(frame: Any, front: Any) -
 @pytest.mark.parametrize(
     "change", [{"opacity": 0.0}, {"fullness": 0.0}], ids=["no opacity", "no width"]
 )
-def test_what_is_not_there_draws_nothing(
+def test_strands_without_width_or_opacity_draw_nothing(
     frame: Any, front: Any, transparency: str, change: dict[str, float]
 ) -> None:
     strands, _ = crossing(50, np.random.default_rng(9))

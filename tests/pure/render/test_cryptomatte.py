@@ -42,7 +42,7 @@ def test_ids_are_those_of_the_specification(name: str, found: float) -> None:
     assert matte_id(name) == np.float32(found)
 
 
-def test_no_id_is_other_than_a_plain_number() -> None:
+def test_all_ids_are_normal_floats() -> None:
     names = [f"Object.{number:03}" for number in range(20000)]
     ids = np.array([matte_id(name) for name in names])
     exponents = np.array([matte_bits(name) >> 23 & 255 for name in names])
@@ -74,7 +74,7 @@ def test_a_pixel_has_room_for_as_many_objects_as_levels() -> None:
     assert picture[0, 0, 1::2] == pytest.approx([0.3, 0.3])
 
 
-def test_files_say_which_names_there_are() -> None:
+def test_metadata_lists_all_names() -> None:
     said = metadata("ViewLayer.CryptoObject", ["Hair", "Head", 'a "quoted", name', "Hair"])
     place = "cryptomatte/542cafa"
     assert set(said) == {f"{place}/{key}" for key in ("name", "hash", "conversion", "manifest")}

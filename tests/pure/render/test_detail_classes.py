@@ -41,7 +41,7 @@ def test_each_strand_is_in_the_class_that_just_holds_it(most: int, by_depth: boo
         assert (np.diff(depths[order]) > -slab).all(), "from near to far"
 
 
-def test_what_is_much_alike_is_finely_sorted_by_depth() -> None:
+def test_strands_of_one_class_are_finely_sorted_by_depth() -> None:
     depths = np.random.default_rng(2).random(3000)
     order, classes = detail_classes(np.full(3000, 7), depths)
     assert len(classes) == 16 and (np.diff(depths[order]) > -1.0 / 16.0).all()
@@ -75,7 +75,7 @@ def test_depths_that_are_all_the_same_or_none(depth: float) -> None:
     assert sum(c.count for c in classes) == 3
 
 
-def test_none_and_none_drawn() -> None:
+def test_no_strands_have_no_classes() -> None:
     for totals in (np.zeros(0, np.int64), np.zeros(5, np.int64)):
         order, classes = detail_classes(totals, np.ones(len(totals)))
         assert not len(order) and classes == ()

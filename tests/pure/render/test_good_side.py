@@ -208,7 +208,7 @@ def test_points_touch_the_frame_and_stay_within(aspect: float) -> None:
     assert low[fills] == pytest.approx(-1.0) and high[fills] == pytest.approx(1.0)
 
 
-def test_strands_of_few_points_say_as_much_as_of_many() -> None:
+def test_few_points_per_strand_give_the_same_side() -> None:
     strands, body = head()
     count, cv_count = strands.shape[:2]
     counts = np.where(np.arange(count) % 2, 2, cv_count)

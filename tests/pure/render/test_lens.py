@@ -23,7 +23,7 @@ def shown(camera: Camera, point: Floats) -> Floats:
 
 
 @pytest.mark.parametrize("camera", CAMERAS)
-def test_what_is_in_focus_stays_where_it_is_and_what_is_not_spreads(camera: Camera) -> None:
+def test_points_in_focus_stay_and_others_spread(camera: Camera) -> None:
     """Against similar triangles: a place p on the lens moves a point by p (1 - depth / focus)."""
     lens = Lens(radius=0.03, focus=1.7)
     right, up = camera.view[0, :3], camera.view[1, :3]

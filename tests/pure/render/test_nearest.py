@@ -47,7 +47,7 @@ def groom(points: np.ndarray) -> DrawnGroom:
 
 
 @pytest.mark.parametrize("kind", CAMERAS)
-def test_what_a_depth_buffer_sees_is_in_the_middle_of_its_pixel(kind: str) -> None:
+def test_unprojected_depths_lie_at_pixel_centers(kind: str) -> None:
     camera = CAMERAS[kind]
     depth = np.random.default_rng(1).uniform(0.1, 0.99, SIZE[::-1])
     places = projected(camera, unprojected(camera, depth), SIZE)
@@ -114,7 +114,7 @@ def test_normals_face_the_eye_and_are_across_the_strand(kind: str) -> None:
     assert not seen(depth=1.0).normals(scene, camera, nothing + 1.0).any()
 
 
-def test_what_is_not_there_then_stays_where_it_is() -> None:
+def test_objects_missing_at_the_other_time_stay_where_they_are() -> None:
     surface = Surface(np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32))
     more = Surface(np.ones((4, 3), np.float32), np.array([[0, 1, 2]], np.int32))
     moved = Surface(surface.positions + 1.0, surface.triangles)

@@ -9,7 +9,7 @@ from hairloom.addon.render.rest_counts import RestCounts, best_slot_pieces
 from hairloom.addon.render.strand_layout import StrandLayout
 
 
-def test_slots_are_as_large_as_costs_least() -> None:
+def test_the_slot_size_minimises_the_cost() -> None:
     assert best_slot_pieces(np.full(100, 12)) == (12, 100)
     assert best_slot_pieces(np.zeros(5, int)) == (2, 0)
     mixed = np.array([3] * 900 + [60] * 100)
@@ -18,7 +18,7 @@ def test_slots_are_as_large_as_costs_least() -> None:
     assert slots * (pieces + 2) < 1000 * 62, "not as large as the largest"
 
 
-def test_what_comes_nearer_gets_more_and_each_strand_has_a_slot() -> None:
+def test_nearer_views_get_more_slots_and_each_strand_has_one() -> None:
     layout = StrandLayout.uniform(50, 4)
     counts = RestCounts(layout, DetailSettings(), 100.0, 8, 80, 3000, 50, 500)
     assert 80 <= counts.slots_at(100.0) < 90 and counts.slots_at(1.0) == counts.slots_at(100.0)

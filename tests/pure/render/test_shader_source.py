@@ -41,7 +41,7 @@ def test_every_line_knows_its_place(folder: Path) -> None:
     assert text.place(99) == "composed line 99"
 
 
-def test_unknown_include_says_who_asks(folder: Path) -> None:
+def test_an_unknown_include_names_the_including_file(folder: Path) -> None:
     (folder / "lib_three.glsl").write_text('int c;\n#include "lib_nowhere.glsl"\n')
     name = write(folder, '#include "lib_three.glsl"\n')
     with pytest.raises(ShaderError, match=r"lib_three\.glsl:2: .*'lib_nowhere\.glsl'"):

@@ -60,7 +60,7 @@ def test_detail_factors_of_strands_do_not_overlap() -> None:
     assert layout.spans[:, 3].tolist() == [0, 1, 2, 4, 20, 22]
 
 
-def test_what_no_texture_can_hold_is_refused() -> None:
+def test_layouts_larger_than_a_texture_are_refused() -> None:
     with pytest.raises(ValueError, match="fewer than two"):
         layout_of([4, 1])
     with pytest.raises(ValueError, match="more than 16384"):

@@ -162,7 +162,7 @@ def test_cells_are_fine_only_where_hair_is_short_and_never_too_many() -> None:
     assert shortest.cell < short.cell and np.prod(shortest.shape) < 1_400_000
 
 
-def test_many_directions_say_the_same_as_twenty_six() -> None:
+def test_many_directions_agree_with_twenty_six() -> None:
     """The quadrature against 600 directions spread over the sphere (Fibonacci)."""
     strands = straight_hair(400)
     grid = grid_around(strands, 24)
@@ -224,7 +224,7 @@ def openness(
     return found.T
 
 
-def test_openness_knows_from_where_light_comes() -> None:
+def test_openness_depends_on_the_direction_of_light() -> None:
     """Over a ball without hair, light comes from everywhere except a cone: mean and outward vector
     are integrals over that, and the vector has no part along the ball."""
     strands = hair_on_ball()

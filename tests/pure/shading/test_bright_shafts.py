@@ -49,7 +49,7 @@ def regions_of(seen: np.ndarray) -> BrightRegions:
     return bright_regions(bright_cells(bright_part(seen, 1.0)), width, height)
 
 
-def test_what_is_bright_is_its_formula() -> None:
+def test_the_bright_part_is_that_of_the_formula() -> None:
     """Nothing up to the threshold, half of the excess one knee above it, nearly all far above."""
     grey = np.array([0.0, 0.999, 1.0, 1.5, 11.0])[:, None] * np.ones(3)
     kept = bright_part(grey, 1.0)
@@ -167,7 +167,7 @@ def test_small_and_narrow_pictures_have_shafts(size: tuple[int, int]) -> None:
     assert size == (1, 1) or found.max() > 0.5
 
 
-def test_strength_tint_and_source_are_what_they_say() -> None:
+def test_strength_tint_threshold_and_source_change_shafts() -> None:
     full = added(window())
     assert added(window(), replace(ON, bright_strength=0.25)) == pytest.approx(0.5 * full)
     tinted = added(window(), replace(ON, tint=(1.0, 0.5, 0.0)))

@@ -62,7 +62,7 @@ def test_tiles_do_not_run_into_each_other() -> None:
     assert np.abs(found[:, 0] - expected).max() < 1e-6
 
 
-def test_what_repeats_goes_on_with_its_other_side() -> None:
+def test_repeated_textures_wrap_around() -> None:
     picture = np.random.default_rng(4).random((64, 64, 1))
     whole = packed(picture, is_repeated=True)
     place = np.random.default_rng(5).random((500, 2))

@@ -167,7 +167,7 @@ def test_pictures_take_the_place_of_textures(channels: int) -> None:
     assert changed.base is made.base
 
 
-def test_an_alpha_that_says_nothing_is_passed_over() -> None:
+def test_a_constant_alpha_is_ignored() -> None:
     found = picture(4)
     found[..., 3] = 1.0
     np.testing.assert_array_equal(picture_as("shift", found, place="x"), found[..., 0])

@@ -113,7 +113,7 @@ def test_a_card_has_the_own_colours_of_its_strands(model: str) -> None:
     assert mean == pytest.approx(expected.mean(axis=(0, 1)))
 
 
-def test_the_look_alone_leaves_own_colours_out() -> None:
+def test_color_source_look_ignores_own_colors() -> None:
     shading = ShadingSettings(base_color=BROWN, color_source="look")
     color = np.broadcast_to(RED, (9, 6, 3))
     plain = strand_variation(np.arange(9), 6, shading)

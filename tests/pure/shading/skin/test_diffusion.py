@@ -34,7 +34,7 @@ def both_sides(values: np.ndarray, layout: SkinLayout) -> tuple[np.ndarray, np.n
     return one[0], two[0]
 
 
-def test_what_is_the_same_everywhere_stays(two_islands: Surface) -> None:
+def test_a_uniform_map_stays_unchanged(two_islands: Surface) -> None:
     layout = skin_layout(two_islands, 256)
     found = spread(np.full((*layout.island.shape, 2), 0.3), layout, 0.01)
     assert found[layout.island >= 0] == pytest.approx(0.3, abs=1e-12)

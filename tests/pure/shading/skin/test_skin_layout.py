@@ -73,7 +73,7 @@ def test_vertices_that_a_file_has_split_are_one(two_islands: Surface) -> None:
 
 
 @pytest.mark.parametrize("way", ["moved", "mirrored", "larger"])
-def test_where_a_map_lies_says_nothing(two_islands: Surface, way: str) -> None:
+def test_the_position_of_a_map_in_uv_space_does_not_matter(two_islands: Surface, way: str) -> None:
     uv = two_islands.corner_uv
     assert uv is not None
     changed = {"moved": uv + (7.0, -3.0), "mirrored": uv * (-1.0, 1.0), "larger": uv * 20.0}[way]
@@ -104,7 +104,7 @@ def test_where_triangles_overlap_nothing_is_shown(square: Callable[..., Surface]
 
 
 @pytest.mark.parametrize("uv", [None, 0.0, np.nan, np.inf])
-def test_maps_of_no_use_have_an_empty_layout_and_a_message(
+def test_unusable_maps_have_an_empty_layout_and_a_message(
     square: Callable[..., Surface], uv: float | None
 ) -> None:
     surface = square()
