@@ -98,7 +98,7 @@ def drawn(snapshot: Snapshot) -> tuple[np.ndarray, tuple[SkinShadow, ...]]:
         background=(0.05, 0.05, 0.06, 1.0),
         passes=passes,
     )
-    return picture, passes[0].skin.drawn
+    return picture, passes[0].skin.drawn_shadows
 
 
 def seam_differences(shadow: SkinShadow) -> np.ndarray:

@@ -170,8 +170,8 @@ def _on_gpu(rig: Rig, rest: RootFrames, motions: Sequence[Motion]) -> tuple[floa
     def shown(form: RidePass, frames: Sequence[Motion]) -> Floats:
         for motion in frames:
             pose, colliders = motion.pose, motion.colliders
-            guides, since = motion.guides, motion.duration  # as if frames were consecutive
-            form.ride(pose.head_positions, pose.matrix, guides, None, colliders, since=since)
+            guides, elapsed = motion.guides, motion.duration  # as if frames were consecutive
+            form.ride(pose.head_positions, pose.matrix, guides, None, colliders, elapsed=elapsed)
         return form.read()
 
     off = shown(peer, motions[-1:]) - _summed(rig, rest, motions[-1]).reshape(-1, 3)

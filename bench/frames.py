@@ -228,7 +228,7 @@ class Stage:
             if is_shared
         }
         for index, (own, each) in enumerate(zip(passes, hair, strict=True)):
-            others = own.others(index, each, maps)
+            others = own.other_maps(index, each, maps)
             self.draw(own.strands, each, 0.0, others=others, is_moving=True)
 
     def least(self, *works: Callable[[], None]) -> list[float]:

@@ -9,15 +9,15 @@ void main()
     return;
   }
   int radii = imageSize(rays).x;
-  float gained = 1.0 - shafts.kept;
+  float gained = 1.0 - shafts.step_decay;
   vec3 total = vec3(0.0);
-  float weight = shafts.before;
+  float weight = shafts.start_weight;
   for (int texel = 0; texel < radii; texel++) {
     vec2 place = screen_place(shafts, ray, texel);
     float owned = bilinear_red(weights, place / node_spacing, false);
     vec3 shining = owned * bilinear_texel(bright, place - 0.5, false).rgb;
-    total = shining * gained + total * shafts.kept;
-    weight = gained + weight * shafts.kept;
+    total = shining * gained + total * shafts.step_decay;
+    weight = gained + weight * shafts.step_decay;
     imageStore(rays, ivec2(texel, ray), vec4(total / weight, 0.0));
   }
 }

@@ -3,8 +3,8 @@
 // PRIME 1: only the depth of opaque pixels. CLIPPED 1: only pixels in alpha_range; without it no pixel is
 // dropped, so that the early depth test works. TANGENT_MAP 1: a map of strand directions replaces the shift
 // texture. LAYERED 1: shells, see addon/cards/shells.py. NORMAL_MAP 1: a map bends the normal. PLACE_MAP 1:
-// a map stores how much deeper the visible strand lies than on average. SHADOWS of hair on hair, and SCATTERING
-// from strand to strand, as for strands; for a light without a map, the occlusion is used.
+// a map stores how much deeper the visible strand lies than on average. SHADOWS of hair on hair, and
+// SCATTERING from strand to strand, as for strands; for a light without a map, the occlusion is used.
 #include "lib_card_texture.glsl"
 #if PRIME
 void main()
@@ -60,7 +60,7 @@ void main()
   vec3 hair = card_base(along, shading) * base;
 #  endif
 
-  SkinSeen seen = SkinSeen(card_received, card_beneath.xyz, card_beneath.w);
+  SkinSeen skin_seen = SkinSeen(card_received, card_beneath.xyz, card_beneath.w);
   float deeper = 0.0;
 #  if PLACE_MAP
   // the map holds the outermost strands; from behind, others are visible
@@ -83,7 +83,7 @@ void main()
                                             sparkle_noise,
                                             hair,
                                             absorption,
-                                            seen);
+                                            skin_seen);
 #  endif
   for (int index = 0; index < int(lights.ambient_and_count.w); index++) {
     vec3 to_light, irradiance;
@@ -113,7 +113,7 @@ void main()
                                         absorption,
                                         level,
                                         path,
-                                        seen);
+                                        skin_seen);
   }
   float covered = is_opaque == 1 ? 1.0 : alpha;
 #  if CLIPPED

@@ -132,13 +132,13 @@ vec3 reflected_by_skin(float phi,
 // Light that skin farther away reflects and a strand scatters to the eye. outward: cosine between the
 // direction to the eye and the normal of the hair's volume.
 vec3 reflected_by_far_skin(
-    float outward, mat3x4 forward, mat3x4 backward, vec3 to_light, SkinSeen seen, vec3 skin)
+    float outward, mat3x4 forward, mat3x4 backward, vec3 to_light, SkinSeen skin_seen, vec3 skin)
 {
   vec3 a_f = sum_of_lobes(forward), a_b = sum_of_lobes(backward);
   vec3 absorbed = sqrt(max((1.0 - a_f) * (1.0 - a_f) - a_b * a_b, 0.0));
   vec3 onward = 0.5 * (a_f * (1.0 + outward) + a_b * (1.0 - outward));
-  vec3 lit = 2.0 / PI * skin * far_skin_light(seen.received, to_light);
-  return lit * through_hair(seen.depth, absorbed) * onward;
+  vec3 lit = 2.0 / PI * skin * far_skin_light(skin_seen.received, to_light);
+  return lit * through_hair(skin_seen.depth, absorbed) * onward;
 }
 
 // Light that a strand among others scatters to the eye from one light. As marschner_light, but without its
@@ -162,7 +162,7 @@ vec3 scattering_light(sampler3D longitudinal,
                       float beyond,
                       float density,
                       vec3 skin,
-                      SkinSeen seen)
+                      SkinSeen skin_seen)
 {
   vec3 angles = strand_angles(tangent, normal, to_light, to_eye, shift_noise, shading);
   vec3 single = single_scattering(
@@ -174,8 +174,8 @@ vec3 scattering_light(sampler3D longitudinal,
   float passed = tau < 0.0 ? -log(max(straight, DUAL_MIN_LIGHT)) : tau;
   vec3 scattered = dual_scattering(
       single, angles, forward, backward, passed, beyond, fibre, density);
-  float facing = dot(seen.beneath, to_light);
+  float facing = dot(skin_seen.beneath, to_light);
   return scattered * cos(angles.x) +
          reflected_by_skin(angles.z, forward, backward, passed, beyond, facing, skin) +
-         reflected_by_far_skin(dot(normal, to_eye), forward, backward, to_light, seen, skin);
+         reflected_by_far_skin(dot(normal, to_eye), forward, backward, to_light, skin_seen, skin);
 }

@@ -25,7 +25,7 @@ vec3 hair_light(vec3 tangent,
                 vec3 absorption,
                 float level,
                 vec3 path,
-                SkinSeen seen)
+                SkinSeen skin_seen)
 {
 #if SCATTERING
   return scattering_light(longitudinal,
@@ -47,7 +47,7 @@ vec3 hair_light(vec3 tangent,
                           path.y,
                           scatter_density,
                           skin_color,
-                          seen);
+                          skin_seen);
 #elif MARSCHNER
   return marschner_light(longitudinal,
                          azimuthal,
@@ -83,7 +83,7 @@ vec3 hair_ambient(float occlusion,
                   float sparkle_noise,
                   vec3 hair,
                   vec3 absorption,
-                  SkinSeen seen)
+                  SkinSeen skin_seen)
 {
 #  if !MARSCHNER
   return occlusion * hair * diffuse_light(lights, normal);
@@ -103,7 +103,7 @@ vec3 hair_ambient(float occlusion,
                                                           absorption,
                                                           level,
                                                           path,
-                                                          seen);
+                                                          skin_seen);
   }
   return radiance;
 #  endif

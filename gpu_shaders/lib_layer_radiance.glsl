@@ -64,15 +64,15 @@ vec3 layer_radiance(int strand, float place)
 #ifdef OPENNESS
   openness = mix(texelFetch(cv_openness, root_side, 0), texelFetch(cv_openness, tip_side, 0), u);
 #endif
-  SkinSeen seen = plane_beneath(vec3(0.0));
+  SkinSeen skin_seen = plane_beneath(vec3(0.0));
 #ifdef SKIN_SEEN
   vec4 beneath = mix(texelFetch(cv_beneath, root_side, 0), texelFetch(cv_beneath, tip_side, 0), u);
-  seen.received = mix(texelFetch(cv_received, root_side, 0), texelFetch(cv_received, tip_side, 0), u);
-  seen.beneath = beneath.xyz;
-  seen.depth = beneath.w;
+  skin_seen.received = mix(texelFetch(cv_received, root_side, 0), texelFetch(cv_received, tip_side, 0), u);
+  skin_seen.beneath = beneath.xyz;
+  skin_seen.depth = beneath.w;
 #endif
   uint seed = uint(texelFetch(strand_seeds, counted_texel(strand), 0).x);
   return strand_radiance(
-      point, tangent, bend, radius, along, occlusion, openness, other_tau, own_color, seen, seed);
+      point, tangent, bend, radius, along, occlusion, openness, other_tau, own_color, skin_seen, seed);
 #endif
 }

@@ -1,8 +1,8 @@
 // Radiance of a strand towards the eye, from all lights and the world. SHADOWS of strands on strands come
 // from opacity maps; for a light without one, from the occlusion and how much the hair's volume faces it.
 // With SCATTERING light goes from strand to strand. OTHER_TAU: `other_tau` is the optical depth of hair that
-// is not in the maps, for the first lights. OWN_COLOR: strands have their own colours, `own_color`, instead of the
-// look's; w is 0 where a strand has none.
+// is not in the maps, for the first lights. OWN_COLOR: strands have their own colours, `own_color`, instead
+// of the look's; w is 0 where a strand has none.
 //
 // Reads the blocks `view`, `lights`, `strands`, `shading`, `fibre`, and the textures of their features.
 #include "lib_lights.glsl"
@@ -29,7 +29,7 @@ float strand_level(
 }
 #endif
 
-// openness, seen: their vectors are in the strand's axes.
+// openness, skin_seen: their vectors are in the strand's axes.
 vec3 strand_radiance(vec3 point,
                      vec3 tangent,
                      vec3 bend,
@@ -39,7 +39,7 @@ vec3 strand_radiance(vec3 point,
                      vec4 openness,
                      vec4 other_tau,
                      vec4 own_color,
-                     SkinSeen seen,
+                     SkinSeen skin_seen,
                      uint seed)
 {
   vec3 normal = strand_normal(point, tangent, volume_center);
@@ -71,10 +71,10 @@ vec3 strand_radiance(vec3 point,
 #endif
 
 #ifdef SKIN_SEEN
-  seen.received.yzw = from_axes(seen.received.yzw, tangent, normal);
-  seen.beneath = from_axes(seen.beneath, tangent, normal);
+  skin_seen.received.yzw = from_axes(skin_seen.received.yzw, tangent, normal);
+  skin_seen.beneath = from_axes(skin_seen.beneath, tangent, normal);
 #else
-  seen = plane_beneath(normal);
+  skin_seen = plane_beneath(normal);
 #endif
 
   vec3 radiance = vec3(0.0);
@@ -93,7 +93,7 @@ vec3 strand_radiance(vec3 point,
                                             sparkle_noise,
                                             hair_color,
                                             absorption,
-                                            seen);
+                                            skin_seen);
 #endif
   for (int index = 0; index < int(lights.ambient_and_count.w); index++) {
     vec3 to_light, irradiance;
@@ -117,7 +117,7 @@ vec3 strand_radiance(vec3 point,
                                         absorption,
                                         level,
                                         path,
-                                        seen);
+                                        skin_seen);
   }
   return radiance;
 }

@@ -10,7 +10,7 @@ void main()
   }
   vec2 away = vec2(pixel) + 0.5 - shafts.center;
   float blurred = bilinear_red(rays, polar_place(shafts, away), shafts.is_round != 0);
-  float haze = exp(-length(away) * shafts.fall);
+  float haze = exp(-length(away) * shafts.haze_decay);
   vec4 before = imageLoad(picture, pixel);
   imageStore(picture, pixel, before + vec4(shafts.radiance.rgb * (haze * blurred), 0.0));
 }

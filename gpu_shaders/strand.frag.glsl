@@ -79,9 +79,9 @@ void main()
 #  ifdef OPENNESS
   openness = strand_openness;
 #  endif
-  SkinSeen seen = plane_beneath(vec3(0.0));
+  SkinSeen skin_seen = plane_beneath(vec3(0.0));
 #  ifdef SKIN_SEEN
-  seen = SkinSeen(strand_received, strand_beneath.xyz, strand_beneath.w);
+  skin_seen = SkinSeen(strand_received, strand_beneath.xyz, strand_beneath.w);
 #  endif
   vec3 radiance = strand_radiance(strand_point,
                                   tangent,
@@ -92,7 +92,7 @@ void main()
                                   openness,
                                   other_tau,
                                   own_color,
-                                  seen,
+                                  skin_seen,
                                   seed);
 #endif
   color = vec4(output_encoded(radiance, output_encoding), 1.0);

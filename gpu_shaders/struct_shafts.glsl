@@ -7,9 +7,9 @@ struct Shafts {
   float span;           // between the first and the last ray [rad]
   float nearest;        // where rays begin [pixels]
   float radial_step;    // between texels of a ray [pixels]
-  float kept;           // fraction of a shaft that is left after a step
-  float before;         // weight of the path from the light to the begin of the rays
-  float fall;           // decay of the haze [1 / pixels]
+  float step_decay;           // fraction of a shaft that is left after a step
+  float start_weight;         // weight of the path from the light to the begin of the rays
+  float haze_decay;           // decay of the haze [1 / pixels]
   int angles;           // rays
   int is_round;         // whether the last ray is next to the first
 };

@@ -101,10 +101,10 @@ class CachedPicture:
         self._triangle.draw(shader.shader)
 
 
-def are_same_marks(marks: tuple[Any, ...], others: tuple[Any, ...]) -> bool:
+def are_same_marks(marks: tuple[Any, ...], other_marks: tuple[Any, ...]) -> bool:
     """Whether both hold the same objects and equal numbers; False if there are no marks."""
     return (
         bool(marks)
-        and len(marks) == len(others)
-        and all(a is b or a == b for a, b in zip(marks, others, strict=True))
+        and len(marks) == len(other_marks)
+        and all(a is b or a == b for a, b in zip(marks, other_marks, strict=True))
     )

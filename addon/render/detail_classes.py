@@ -46,7 +46,7 @@ class DetailClass:
 
 
 def detail_classes(
-    totals: Ints, depths: Floats | None = None, held: Ints | None = None
+    totals: Ints, depths: Floats | None = None, fixed_capacities: Ints | None = None
 ) -> tuple[Ints, tuple[DetailClass, ...]]:
     """The indices of the strands that are drawn, ordered by class, and the classes.
 
@@ -57,12 +57,13 @@ def detail_classes(
     Args:
         totals: (strand_count,) pieces of each strand, 0 for those that are not drawn.
         depths: (strand_count,) depth of each strand, in any unit; None: the order does not matter.
-        held: capacities up to the largest total, rising from 0; None: chosen for MAX_CLASSES.
+        fixed_capacities: capacities up to the largest total, rising from 0; None: chosen for
+            MAX_CLASSES.
     """
     if not len(totals):
         return np.zeros(0, np.intp), ()
     found = _series(totals, MAX_CLASSES if depths is None else MAX_CLASSES // _SLABS)
-    series, used = found if held is None else (held, len(held))
+    series, used = found if fixed_capacities is None else (fixed_capacities, len(fixed_capacities))
     slabs = 1 if depths is None else min(max(MAX_CLASSES // max(used, 1), 1), _MAX_SLABS)
     place = np.searchsorted(series, totals)
     if depths is not None:
@@ -77,14 +78,14 @@ def detail_classes(
     return order[:first], tuple(classes)
 
 
-def _series(totals: Ints, most: int) -> tuple[Ints, int]:
-    """The finest series of capacities of which these strands use at most `most`, and how many they
-    use."""
+def _series(totals: Ints, max_pieces: int) -> tuple[Ints, int]:
+    """The finest series of capacities of which these strands use at most `max_pieces`, and how many
+    they use."""
     present = np.flatnonzero(np.bincount(totals)[1:]) + 1
     for step in _STEPS:
         series = capacities(int(totals.max()), step)
         used = len(np.unique(np.searchsorted(series, present)))
-        if used <= most:
+        if used <= max_pieces:
             break
     return series, used
 
@@ -107,9 +108,9 @@ def _slabs(depths: Floats, count: int) -> Ints:
 
 
 @lru_cache(maxsize=64)
-def capacities(most: int, step: int) -> Ints:
-    """0, and all capacities up to the first of at least `most` pieces, rising."""
+def capacities(max_pieces: int, step: int) -> Ints:
+    """0, and all capacities up to the first of at least `max_pieces` pieces, rising."""
     series = [0]
-    while series[-1] < most:
+    while series[-1] < max_pieces:
         series.append(series[-1] + max(series[-1] // step, 1))
     return np.array(series)

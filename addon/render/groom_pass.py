@@ -29,7 +29,7 @@ class GroomPass:
         strands = self.strands.opacity(snapshot, view=view, is_turning=is_turning)
         return strands or self.cards.opacity(snapshot)
 
-    def others(
+    def other_maps(
         self, key: Hashable, snapshot: Snapshot, maps: Mapping[Hashable, OpacityMaps | None]
     ) -> list[OpacityMaps]:
         """The maps of all other grooms that may cast shadows on these strands.
@@ -37,11 +37,11 @@ class GroomPass:
         Args:
             key: of this groom in `maps`; all maps are of the same lights in the same order.
         """
-        others = [each for other, each in maps.items() if other != key and each is not None]
-        if not others or not snapshot.strand_count:
+        other_maps = [each for other, each in maps.items() if other != key and each is not None]
+        if not other_maps or not snapshot.strand_count:
             return []
         ball = self.strands.ball(snapshot)
-        return [each for each in others if may_cast_shadow_on(each, ball)]
+        return [each for each in other_maps if may_cast_shadow_on(each, ball)]
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -172,14 +172,15 @@ class LeadOutPass:
             self._clearance = clearance
 
     def begin_frame(
-        self, posed: tuple[PosedCollider, ...], iterations_per_point: int, since: float = np.inf
+        self, posed: tuple[PosedCollider, ...], iterations_per_point: int, elapsed: float = np.inf
     ) -> LeadOutInputs | None:
         """The inputs of a frame in which strands are led out of these; None if they are not.
 
         Args:
             iterations_per_point: loop iterations per point in the pass that moves strands, see
                 `LeadOutInputs.finds_near_while_riding`.
-            since: time since the frame that this one continues [s]; infinite if it continues none.
+            elapsed: time since the frame that this one continues [s]; infinite if it continues
+                none.
 
         Raises:
             HairloomError: a collider that the GPU does not support.
@@ -205,7 +206,7 @@ class LeadOutPass:
             kinds,
             {name: len(posed) for name in kinds.integers},
             self._clearance.kept,
-            min(TURNING_BACK * since, _MAX_TURN_BACK),
+            min(TURNING_BACK * elapsed, _MAX_TURN_BACK),
             iterations <= _MAX_ITERATIONS,
         )
 

@@ -57,7 +57,7 @@ class Lens:
         return np.asarray(out[:, None] * side)
 
 
-def through(camera: Camera, lens: Lens, place: Floats) -> Camera:
+def camera_through_lens(camera: Camera, lens: Lens, place: Floats) -> Camera:
     """The camera that looks through this point (2,) [m] of a lens centred at its eye."""
     right, up = float(place[0]), float(place[1])
     moved, sheared = np.eye(4), np.eye(4)

@@ -168,7 +168,7 @@ def unprojected(camera: Camera, depth: Floats) -> Floats:
     return np.asarray(found[..., :3] / found[..., 3:])
 
 
-def _around(groom: Snapshot, strand: Ints, place: Floats) -> tuple[list[Floats], Floats]:
+def _points_around(groom: Snapshot, strand: Ints, place: Floats) -> tuple[list[Floats], Floats]:
     """The four points around places on strands, (n, 3) each, and the fraction between the middle
     two, (n, 1); strands are extended straight beyond their ends."""
     first = groom.layout.offsets[strand].astype(np.int64)
@@ -184,9 +184,9 @@ def _around(groom: Snapshot, strand: Ints, place: Floats) -> tuple[list[Floats],
     return [before, start, end, after], (along - segment)[:, None]
 
 
-def _if_same_shape(then: Floats | None, now: Floats) -> Floats:
-    return now if then is None or then.shape != now.shape else then
+def _if_same_shape(other: Floats | None, current: Floats) -> Floats:
+    return current if other is None or other.shape != current.shape else other
 
 
-def _at_other_time(now: Snapshot, then: Snapshot | None) -> Snapshot:
-    return now if then is None or not then.layout.has_same_counts(now.layout) else then
+def _at_other_time(current: Snapshot, other: Snapshot | None) -> Snapshot:
+    return current if other is None or not other.layout.has_same_counts(current.layout) else other

@@ -262,19 +262,26 @@ class OpacityDrawing:
 
 
 def lights_to_redraw(
-    drawn: Mapping[int, LightFrame], wanted: Mapping[int, LightFrame], *, is_turning: bool = False
+    drawn_frames: Mapping[int, LightFrame],
+    wanted_frames: Mapping[int, LightFrame],
+    *,
+    is_turning: bool = False,
 ) -> tuple[int, ...]:
     """The lights whose maps are to be drawn, or drawn again.
 
     Args:
-        drawn, wanted: frames by light; either none or all are drawn.
+        drawn_frames, wanted_frames: frames by light; either none or all are drawn.
         is_turning: as for `OpacityDrawing.maps`.
     """
-    if not drawn:
-        return tuple(wanted)
-    lags = {light: _angle_between(drawn[light], frame) for light, frame in wanted.items()}
+    if not drawn_frames:
+        return tuple(wanted_frames)
+    lags = {
+        light: _angle_between(drawn_frames[light], frame) for light, frame in wanted_frames.items()
+    }
     behind = tuple(
-        light for light, frame in wanted.items() if (drawn[light].to_map != frame.to_map).any()
+        light
+        for light, frame in wanted_frames.items()
+        if (drawn_frames[light].to_map != frame.to_map).any()
     )
     if not is_turning or not behind or max(lags.values()) > _MAX_LAG:
         return behind

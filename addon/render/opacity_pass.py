@@ -89,7 +89,7 @@ class _ShadowStrands:
         classes: tuple[DetailClass, ...] = (DetailClass(layout.cv_count - 1, 0, count),)
         if not layout.cv_count:
             pieces = layout.counts[chosen] - 1
-            order, classes = detail_classes(pieces, held=spread_capacities(pieces))
+            order, classes = detail_classes(pieces, fixed_capacities=spread_capacities(pieces))
             chosen = chosen[order]
         spans = texture_from(strand_rows(layout.spans[chosen][:, None]), "RGBA32F")
         return cls(layout, rank, count, spans, classes)

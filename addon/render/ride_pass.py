@@ -238,7 +238,7 @@ class RidePass:
                 holds them in the layout of strand_layout.strand_rows.
             colliders: out of which strands are led, once `lead_out` has their clearance.
             led: strands that were led out of colliders earlier.
-            since: time since the last frame [s], if this one continues it; else infinite.
+            elapsed: time since the last frame [s], if this one continues it; else infinite.
 
         Raises:
             HairloomError: a collider that the GPU does not support.
@@ -252,7 +252,7 @@ class RidePass:
                 raise ValueError(f"guides have shape {guides_now.shape}, not {wanted}")
             guides_now = texture_from(strand_rows(_padded(guides_now)), "RGBA32F")
         self._run_guides(guides_now)
-        self._run_ride("guide_turns", anchors, colliders, led, since)
+        self._run_ride("guide_turns", anchors, colliders, led, elapsed)
 
     def read(self) -> Floats:
         """The current points of the strands, (point_count, 3) float32 [m], world space."""
@@ -378,7 +378,7 @@ class RidePass:
     ) -> None:
         textures, count = self._textures, self._strands.strand_count
         is_curled = self._riders.gives is not None and turns == "guide_turns"
-        inputs = self.lead_out.begin_frame(colliders, _ITERATIONS_PER_POINT, since)
+        inputs = self.lead_out.begin_frame(colliders, _ITERATIONS_PER_POINT, elapsed)
         ride_textures = _named(textures, "root_motions", "guide_weights", "strand_spans")
         images = {"cv_points": self.points.texture, **_named(textures, "rest_points")}
         images |= {"guide_turns": textures[turns]}

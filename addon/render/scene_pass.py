@@ -103,7 +103,7 @@ class ScenePass:
         sky: Rgba,
         separate_shafts: SeparateShafts | None,
     ) -> None:
-        lit_grooms = {groom.key: scene.lit(groom) for groom in scene.grooms}
+        lit_grooms = {groom.key: scene.lit_snapshot(groom) for groom in scene.grooms}
         maps = self._maps(scene)
         shafts = shafts_of(scene)
         holdouts = {groom.key for groom in scene.grooms if groom.is_holdout}
@@ -154,7 +154,7 @@ class ScenePass:
     def _maps(self, scene: SceneSnapshot) -> dict[Hashable, OpacityMaps | None]:
         """The opacity maps of each groom. Also releases grooms that are no longer in the scene."""
         self._forget_but(scene)
-        lit = {groom.key: scene.lit(groom) for groom in scene.grooms}
+        lit = {groom.key: scene.lit_snapshot(groom) for groom in scene.grooms}
         return {key: self._groom(key).maps(groom) for key, groom in lit.items()}
 
     @property
@@ -180,7 +180,7 @@ class ScenePass:
             for index, drawn in enumerate(scene.grooms):
                 target.clear_color(_NOTHING)
                 with target.drawing():
-                    opaque = _opaque(scene.lit(drawn))
+                    opaque = _opaque(scene.lit_snapshot(drawn))
                     self._groom(drawn.key).strands.draw(opaque, camera, *size, content="places")
                     self._groom(drawn.key).cards.draw_depth(drawn.snapshot, camera, *size)
                 before, depth = depth, target.depths()
@@ -226,7 +226,7 @@ class ScenePass:
             target.clear_color(_NOTHING)
             with target.drawing():
                 for drawn in (each for each in scene.grooms if not each.is_holdout):
-                    snapshot = scene.lit(drawn)
+                    snapshot = scene.lit_snapshot(drawn)
                     self._groom(drawn.key).strands.draw(snapshot, camera, *size, content="tangents")
             return texture_to_array(target.color)[..., :3].copy()
 
@@ -249,7 +249,7 @@ class ScenePass:
             for drawn in grooms:
                 target.clear_color(_NOTHING)
                 with target.drawing():
-                    snapshot = scene.lit(drawn)
+                    snapshot = scene.lit_snapshot(drawn)
                     self._groom(drawn.key).strands.draw(snapshot, camera, *size, content="tangents")
                     self._groom(drawn.key).cards.draw(snapshot, camera, *size)
                 alphas.append(texture_to_array(target.color)[..., 3].copy())
@@ -268,17 +268,17 @@ class ScenePass:
 
     def _draw_hair(
         self,
-        lit: dict[Hashable, Snapshot],
+        lit_grooms: dict[Hashable, Snapshot],
         keys: Set[Hashable],
         camera: Camera,
         size: tuple[int, int],
         maps: dict[Hashable, OpacityMaps | None],
     ) -> None:
         """Draw only these grooms, in the order of the scene."""
-        grooms = [(key, groom) for key, groom in lit.items() if key in keys]
+        grooms = [(key, groom) for key, groom in lit_grooms.items() if key in keys]
         for key, groom in grooms:
             own = self._groom(key)
-            own.strands.draw(groom, camera, *size, others=own.others(key, groom, maps))
+            own.strands.draw(groom, camera, *size, other_maps=own.other_maps(key, groom, maps))
         for key, groom in grooms:
             self._groom(key).cards.draw(groom, camera, *size, opacity=maps[key])
 
@@ -298,7 +298,7 @@ class ScenePass:
         grooms.
         """
         shading = [groom for groom in scene.grooms if maps[groom.key] is not None]
-        centers = np.array([scene.lit(groom).center for groom in shading]).reshape(-1, 3)
+        centers = np.array([scene.lit_snapshot(groom).center for groom in shading]).reshape(-1, 3)
         shadows = self._mesh_shadows.maps(
             scene.casters, packed_lights(scene.lights), scene.mesh_shadows
         )
@@ -310,7 +310,7 @@ class ScenePass:
         other_tau = self._hair_on_meshes.other_tau(groups, found, light_count, camera, size)
         for index, meshes in groups.items():
             groom = None if index < 0 else shading[index]
-            light = scene.unlit_by_hair() if groom is None else scene.lit(groom)
+            light = scene.without_hair() if groom is None else scene.lit_snapshot(groom)
             key = None if groom is None else groom.key
             mesh_pass = self._mesh_passes.setdefault(key, MeshPass())
             opacity = None if key is None else maps[key]

@@ -50,16 +50,16 @@ class SceneSnapshot:
     ambient: Color = (0.0, 0.0, 0.0)
     harmonics: Floats | None = None
     mesh_shadows: MeshShadowSettings = field(default_factory=MeshShadowSettings)
-    _lit: dict[Hashable, Snapshot] = field(default_factory=dict, init=False, repr=False)
+    _lit_snapshots: dict[Hashable, Snapshot] = field(default_factory=dict, init=False, repr=False)
 
-    def lit(self, groom: DrawnGroom) -> Snapshot:
+    def lit_snapshot(self, groom: DrawnGroom) -> Snapshot:
         """The groom in the scene's light, on its nearest mesh, with all meshes that cast shadows;
         the same object for each call.
         """
-        if groom.key not in self._lit:
+        if groom.key not in self._lit_snapshots:
             near = _nearest(self.casters, groom.snapshot.center)
             others = tuple(mesh for mesh in self.casters if mesh is not near)
-            self._lit[groom.key] = replace(
+            self._lit_snapshots[groom.key] = replace(
                 groom.snapshot,
                 meshes=() if near is None else (near,),
                 casters=others,
@@ -67,16 +67,16 @@ class SceneSnapshot:
                 ambient=self.ambient,
                 harmonics=self.harmonics,
             )
-        return self._lit[groom.key]
+        return self._lit_snapshots[groom.key]
 
     def at_sample(self, sample: int) -> SceneSnapshot:
         """The same moment with one point of each light, see light_samples.py."""
-        centers = [self.lit(groom).center for groom in self.grooms]
+        centers = [self.lit_snapshot(groom).center for groom in self.grooms]
         center = np.mean(centers, axis=0) if centers else np.zeros(3)
         lights = lights_at(self.lights, sample, center)
         return self if lights == self.lights else replace(self, lights=lights)
 
-    def unlit_by_hair(self) -> Snapshot:
+    def without_hair(self) -> Snapshot:
         """A snapshot with only the lights, for meshes that no hair shades."""
         none = np.zeros((0, 3), np.float32)
         return Snapshot(

@@ -51,7 +51,7 @@ _UNDER = ShaderRecipe(
 
 def finish_with_shafts(
     picture: Any,
-    drawn: Any,
+    hair_picture: Any,
     depth: Any,
     camera: Camera,
     lights: Sequence[Light],
@@ -65,14 +65,14 @@ def finish_with_shafts(
     # before `add_shafts`, since shafts from lights must not count as bright parts
     behind = one_texel(background) if wants_bright(settings) else None
     bright = BrightShafts(picture, behind, camera, settings)
-    add_shafts(picture, drawn, depth, camera, lights, settings)
+    add_shafts(picture, hair_picture, depth, camera, lights, settings)
     put_under(picture, background)
     bright.add_to(picture)
 
 
 def draw_separate_shafts(
     target: Any,
-    drawn: Any,
+    hair_picture: Any,
     depth: Any,
     background: Any,
     camera: Camera,
@@ -83,18 +83,18 @@ def draw_separate_shafts(
 
     Args:
         target: RGBA32F, black at first.
-        drawn, depth: hair with holes for meshes, and the depth of both.
+        hair_picture, depth: hair with holes for meshes, and the depth of both.
         background: of the hair, which is another engine's picture, as of `BrightShafts`.
             Others as of `add_shafts`.
     """
-    bright = BrightShafts(drawn, background, camera, settings)
-    add_shafts(target, drawn, depth, camera, lights, settings, is_separate=True)
+    bright = BrightShafts(hair_picture, background, camera, settings)
+    add_shafts(target, hair_picture, depth, camera, lights, settings, is_separate=True)
     bright.add_to(target)
 
 
 def add_shafts(
     picture: Any,
-    drawn: Any,
+    hair_picture: Any,
     depth: Any,
     camera: Camera,
     lights: Sequence[Light],
@@ -109,14 +109,14 @@ def add_shafts(
     Args:
         picture: RGBA32F texture, scene-linear and premultiplied, changed in place. It must not have
             a background, since its alpha determines what stands before a light; see `put_under`.
-        drawn, depth: the colour and depth from which it was averaged, with a whole number of texels
-            along each side of a pixel; `drawn` may be the picture itself.
-        is_separate: meshes are holes in `drawn`, so that only their depth shows them.
+        hair_picture, depth: the colour and depth from which it was averaged, with a whole number of
+            texels along each side of a pixel; `hair_picture` may be the picture itself.
+        is_separate: meshes are holes in `hair_picture`, so that only their depth shows them.
     """
     width, height = picture.width, picture.height
     seen = lights_on_screen(lights, camera.view, camera.projection, width, height, settings)
     for light in seen:
-        _add_light(picture, drawn, depth, light, settings.samples, is_separate)
+        _add_light(picture, hair_picture, depth, light, settings.samples, is_separate)
 
 
 def put_under(picture: Any, background: tuple[float, float, float, float]) -> None:
@@ -127,16 +127,26 @@ def put_under(picture: Any, background: tuple[float, float, float, float]) -> No
 
 
 def _add_light(
-    picture: Any, drawn: Any, depth: Any, light: LightOnScreen, samples: int, is_separate: bool
+    picture: Any,
+    hair_picture: Any,
+    depth: Any,
+    light: LightOnScreen,
+    samples: int,
+    is_separate: bool,
 ) -> None:
     width, height = picture.width, picture.height
     grid = PolarGrid.over(light.center, width, height, samples)
     block = gpu_objects.uniform_buffer(pack_shafts(light, grid))
     caster = gpu_objects.texture((width, height), format="R32F")
     rays = gpu_objects.texture((grid.radii, grid.angles), format="R32F")
-    integers = {"samples_across": drawn.width // width, "is_separate": int(is_separate)}
+    integers = {"samples_across": hair_picture.width // width, "is_separate": int(is_separate)}
     steps: tuple[tuple[ShaderRecipe, dict[str, Any], dict[str, Any], tuple[int, int]], ...] = (
-        (_CASTER, {"samples_of": drawn, "depth_of": depth}, {"caster": caster}, (width, height)),
+        (
+            _CASTER,
+            {"samples_of": hair_picture, "depth_of": depth},
+            {"caster": caster},
+            (width, height),
+        ),
         (_BLUR, {"caster": caster}, {"rays": rays}, (grid.angles, 1)),
         (_ADD, {"rays": rays}, {"picture": picture}, (width, height)),
     )

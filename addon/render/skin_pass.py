@@ -123,7 +123,7 @@ class _Head:
     """A head on the GPU.
 
     size: square root of its area when its layout was made [m].
-    drawn: inputs from which its shadow was drawn.
+    drawn_inputs: inputs from which its shadow was drawn.
     """
 
     triangles: Ints
@@ -132,7 +132,7 @@ class _Head:
     size: float
     layout: SkinLayout
     textures: dict[str, Any]
-    drawn: _ShadowInputs | None = None
+    drawn_inputs: _ShadowInputs | None = None
     shadow: SkinShadow | None = None
 
     def is_of(self, surface: Surface, resolution: int) -> bool:
@@ -186,12 +186,12 @@ class SkinPass:
             if not head.layout.is_empty:
                 light = settings.softness * head.size, light_count, forward, shadows, only_hair
                 wanted = _ShadowInputs(mesh.skin.surface.positions, opacity, *light)
-                found[id(mesh)] = self._drawn(head, mesh.skin.surface, wanted)
+                found[id(mesh)] = self._draw_shadow(head, mesh.skin.surface, wanted)
         self._heads = [head for head in self._heads if head in used]
         return found
 
     @property
-    def drawn(self) -> tuple[SkinShadow, ...]:
+    def drawn_shadows(self) -> tuple[SkinShadow, ...]:
         """The shadows of the heads that were drawn last."""
         return tuple(head.shadow for head in self._heads if head.shadow is not None)
 
@@ -214,15 +214,19 @@ class SkinPass:
         )
         return self._heads[-1]
 
-    def _drawn(self, head: _Head, surface: Surface, inputs: _ShadowInputs) -> SkinShadow:
-        if head.shadow is None or head.drawn is None or not head.drawn.is_like(inputs):
+    def _draw_shadow(self, head: _Head, surface: Surface, inputs: _ShadowInputs) -> SkinShadow:
+        if (
+            head.shadow is None
+            or head.drawn_inputs is None
+            or not head.drawn_inputs.is_like(inputs)
+        ):
             shadow = self._unblurred_shadow(head, surface, inputs)
             for axis in range(2):
                 shadow = spread(shadow, head.textures, inputs.softness, axis)
             shifts = closing_shifts(shadow, head.textures)
             kept = {name: head.textures[name] for _, name in SKIN_TEXTURES[1:4]}
             textures = {"skin_shadow": shadow, "skin_shifts": shifts, **kept}
-            head.shadow, head.drawn = SkinShadow(head.layout, textures), inputs
+            head.shadow, head.drawn_inputs = SkinShadow(head.layout, textures), inputs
         return head.shadow
 
     def _unblurred_shadow(self, head: _Head, surface: Surface, inputs: _ShadowInputs) -> Any:

@@ -141,7 +141,7 @@ class StrandDrawing:
     order: the strands to draw, with their numbers of pieces.
     ribbon: makes the batch of a strand with this many pieces.
     points: features of strands and eye. shading: features of all programs that shade.
-    shown: additional features of programs that write colours.
+    display_features: additional features of programs that write colours.
     expected_depths: see PixelPart; called only if needed.
     """
 
@@ -150,7 +150,7 @@ class StrandDrawing:
     blocks: UniformBlocks
     points: Sequence[ShaderFeature]
     shading: Sequence[ShaderFeature]
-    shown: Sequence[ShaderFeature]
+    display_features: Sequence[ShaderFeature]
     output_encoding: int
     samples_across: int
     expected_depths: Callable[[], range]
@@ -158,7 +158,7 @@ class StrandDrawing:
     def draw(self) -> None:
         """Draw all strands, opaque, each pixel shaded as it is drawn."""
         integers = {"output_encoding": self.output_encoding, "samples_across": self.samples_across}
-        features = [*self.points, self._detail, *self.shading, *self.shown]
+        features = [*self.points, self._detail, *self.shading, *self.display_features]
         self._draw(bound(_OPAQUE_RECIPE, features, self.blocks, integers=integers))
 
     def draw_places(self) -> None:
@@ -173,14 +173,14 @@ class StrandDrawing:
         features = [*self.points, self._detail]
         self._draw(bound(_HASHED_RECIPE, features, self.blocks, integers={"turn": turn}))
 
-    def shade_hashed(self, found: Sequence[Any]) -> ShaderProgram:
+    def shade_hashed(self, hair_textures: Sequence[Any]) -> ShaderProgram:
         """Bind the program that shades the fragments of two turns."""
         driver = ShaderFeature(defines={"SHADES_ALL": int(fails_in_idle_branches())})
         return bound(
             _HASHED_SHADE_RECIPE,
-            [*self.points, *self.shading, *self.shown, driver],
+            [*self.points, *self.shading, *self.display_features, driver],
             self.blocks,
-            textures=dict(zip(("first_hair", "second_hair"), found, strict=True)),
+            textures=dict(zip(("first_hair", "second_hair"), hair_textures, strict=True)),
             integers={"output_encoding": self.output_encoding},
         )
 
@@ -206,7 +206,7 @@ class StrandDrawing:
             "output_encoding": self.output_encoding,
             "writes_depth": int(writes_depth),
         }
-        return self._bound(_SHOWN_RECIPE, self.shown, images, integers)
+        return self._bound(_SHOWN_RECIPE, self.display_features, images, integers)
 
     @property
     def _detail(self) -> ShaderFeature:

@@ -177,7 +177,7 @@ class StrandPass:
         output: str = "scene_linear",
         display: Display | None = None,
         samples: int = 1,
-        others: Sequence[OpacityMaps] = (),
+        other_maps: Sequence[OpacityMaps] = (),
         view: ViewState = UNNAMED_VIEW,
     ) -> None:
         """Draw all strands into the bound framebuffer, depth-tested against what is in it.
@@ -190,8 +190,8 @@ class StrandPass:
             display: for "viewport", the view transform; None: the plain "Standard".
             samples: pixels of the target across one pixel of the final picture; the minimum width
                 and the settings of detail are in pixels of the latter.
-            others: maps of other hair that may cast shadows. Only used if this hair has maps too,
-                see `opacity`.
+            other_maps: maps of other hair that may cast shadows. Only used if this hair has maps
+                too, see `opacity`.
 
         Raises:
             ShaderError: the shader does not compile here, or points on the GPU were released.
@@ -226,7 +226,7 @@ class StrandPass:
         maps = None
         if content == "light" and not is_debug:
             maps = self.opacity(snapshot, view=view.name, is_turning=view.is_turning)
-        if content == "light" and not others:
+        if content == "light" and not other_maps:
             # else it keeps maps of grooms that are gone
             view_data.shadows.inter_groom_shadow.release()
         drawing = StrandDrawing(
@@ -239,11 +239,13 @@ class StrandPass:
                 self._curves(snapshot),
             ),
             shading=(
-                tuple(self._shading(snapshot, maps, view_data.shadows.inter_groom_shadow, others))
+                tuple(
+                    self._shading(snapshot, maps, view_data.shadows.inter_groom_shadow, other_maps)
+                )
                 if content == "light"
                 else (self._tangents(snapshot),)
             ),
-            shown=(
+            display_features=(
                 *(() if display is None else (display.feature,)),
                 *((self._debug_feature(snapshot),) if is_debug else ()),
             ),
@@ -331,9 +333,11 @@ class StrandPass:
             view_data.is_moving or view_data.shadows.opacity.has_stale_maps
         )
 
-    def forget_views(self, shown: Set[Hashable]) -> None:
+    def forget_views(self, visible_names: Set[Hashable]) -> None:
         """Release the data of all views except these."""
-        self._views = {view: view_data for view, view_data in self._views.items() if view in shown}
+        self._views = {
+            view: view_data for view, view_data in self._views.items() if view in visible_names
+        }
 
     def forget_view(self, view: Hashable) -> None:
         """Release the data of this view."""
@@ -381,7 +385,7 @@ class StrandPass:
         snapshot: Snapshot,
         maps: OpacityMaps | None,
         inter_groom_shadow: InterGroomShadow,
-        others: Sequence[OpacityMaps],
+        other_maps: Sequence[OpacityMaps],
     ) -> Iterator[ShaderFeature]:
         """The features of all programs that shade these strands.
 
@@ -409,14 +413,17 @@ class StrandPass:
             yield scattering_feature(snapshot)
             if "cv_received" in self._textures:
                 yield self._skin_feature()
-        if others:
-            yield self._inter_groom_feature(inter_groom_shadow, others, len(snapshot.lights))
+        if other_maps:
+            yield self._inter_groom_feature(inter_groom_shadow, other_maps, len(snapshot.lights))
 
     def _inter_groom_feature(
-        self, inter_groom_shadow: InterGroomShadow, others: Sequence[OpacityMaps], light_count: int
+        self,
+        inter_groom_shadow: InterGroomShadow,
+        other_maps: Sequence[OpacityMaps],
+        light_count: int,
     ) -> ShaderFeature:
         """The feature of programs that read the optical depth of other hair per CV."""
-        points, grooms = self._textures["cv_points"], [(NO_GROOM, other) for other in others]
+        points, grooms = self._textures["cv_points"], [(NO_GROOM, other) for other in other_maps]
         found = inter_groom_shadow.other_tau(points, self._points_serial, grooms, light_count)
         return ShaderFeature(
             name="others",

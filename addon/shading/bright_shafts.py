@@ -189,7 +189,7 @@ def bright_shafts(
     for region in found.regions:
         grid = PolarGrid.over(region.center, width, height, settings.samples)
         rays = to_polar(bright[..., :3], grid) * weights_on(grid, region, width, height)
-        blurred = radial_blur(rays, grid, length, before=0.0)
+        blurred = radial_blur(rays, grid, length, start_weight=0.0)
         result[..., :3] += from_polar(blurred, grid, width, height) * factor
     return result.astype(np.float32), found
 

@@ -94,7 +94,7 @@ def mean_look(color: Floats | None, shading: ShadingSettings) -> ShadingSettings
     few = own.reshape(-1, 3)
     if len(few) > _FEW:  # at random, since every nth may be the same point of every strand
         few = few[np.random.default_rng(0).integers(0, len(few), _FEW)]
-    return in_color(_whole(few, shading).mean(axis=0), shading)
+    return in_color(_with_look_where_missing(few, shading).mean(axis=0), shading)
 
 
 def brightest_look(color: Floats | None, shading: ShadingSettings) -> ShadingSettings:
@@ -104,7 +104,7 @@ def brightest_look(color: Floats | None, shading: ShadingSettings) -> ShadingSet
     own = drawn_color(color, shading)
     if own is None or not len(own):
         return shading
-    return in_color(_whole(own.reshape(-1, 3), shading).max(axis=0), shading)
+    return in_color(_with_look_where_missing(own.reshape(-1, 3), shading).max(axis=0), shading)
 
 
 def strand_variation(
@@ -158,7 +158,7 @@ def strand_colors(
         group: (...) of the strand.
     """
     root = own_colors(color, group, shading)
-    root = None if root is None else _whole(root, shading)
+    root = None if root is None else _with_look_where_missing(root, shading)
     is_natural = natural_strands(group, shading)
     tinted = np.where(is_natural, 0.0, along) if is_natural.any() else along
     color_noise = strand_noise(seed, _COLOR, np.zeros(1))
@@ -169,6 +169,6 @@ def strand_colors(
     return strand_base(tinted, color_noise, grey_noise, shading, root)
 
 
-def _whole(color: Floats, shading: ShadingSettings) -> Floats:
+def _with_look_where_missing(color: Floats, shading: ShadingSettings) -> Floats:
     """Colours with the look's where strands have none."""
     return np.where(np.isnan(color), look_color(shading), color)

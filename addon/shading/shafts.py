@@ -228,22 +228,22 @@ def to_polar(picture: Floats, grid: PolarGrid, outside: float | None = None) -> 
     return values
 
 
-def radial_blur(rays: Floats, grid: PolarGrid, length: float, before: float = 1.0) -> Floats:
+def radial_blur(rays: Floats, grid: PolarGrid, length: float, start_weight: float = 1.0) -> Floats:
     """Rays (angles, radii, n) blurred outwards.
 
     Exact at the end of each texel, for values that are constant over texels.
 
     Args:
         length: over which a value fades by 1/e [pixels].
-        before: the value before the first texel.
+        start_weight: the value before the first texel.
     """
     blurred = np.empty(rays.shape, np.float64)
-    kept = np.exp(-grid.step / length)
+    step_decay = np.exp(-grid.step / length)
     weight = -np.expm1(-grid.nearest / length)
-    total = before * weight
+    total = start_weight * weight
     for index in range(grid.radii):
-        total = rays[:, index] * (1.0 - kept) + total * kept
-        weight = 1.0 - kept + weight * kept
+        total = rays[:, index] * (1.0 - step_decay) + total * step_decay
+        weight = 1.0 - step_decay + weight * step_decay
         blurred[:, index] = total / weight
     return blurred
 

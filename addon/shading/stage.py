@@ -78,8 +78,8 @@ def backdrop(stage: StageSettings, width: int, height: int) -> Floats:
     return (edge + nearness * (np.array(stage.backdrop_center) - edge)).astype(np.float32)
 
 
-def over(picture: Floats, behind: Floats) -> Floats:
-    """A premultiplied picture (..., 4) over what is behind it, (..., 3): opaque."""
+def over_backdrop(picture: Floats, backdrop_color: Floats) -> Floats:
+    """A premultiplied picture (..., 4) over a backdrop, (..., 3): opaque."""
     alpha = picture[..., 3:]
-    color = picture[..., :3] + (1.0 - alpha) * behind
+    color = picture[..., :3] + (1.0 - alpha) * backdrop_color
     return np.concatenate([color, np.ones_like(alpha)], axis=-1)

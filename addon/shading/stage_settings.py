@@ -27,9 +27,9 @@ def _strength(default: float, label: str, description: str) -> Any:
     )
 
 
-def _angle(default: float, label: str, description: str, most: float) -> Any:
-    """A setting from -most to most; default and most in degrees."""
-    span = float(np.radians(-most)), float(np.radians(most))
+def _angle(default: float, label: str, description: str, max_degrees: float) -> Any:
+    """A setting from -max_degrees to max_degrees; default too in degrees."""
+    span = float(np.radians(-max_degrees)), float(np.radians(max_degrees))
     return number(
         float(np.radians(default)),
         label=label,

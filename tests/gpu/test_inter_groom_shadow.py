@@ -224,12 +224,14 @@ def test_views_in_other_light_keep_their_inter_groom_shadow(gpu_context: Any) ->
     def dispatches(view: str, above: Snapshot) -> int:
         lit = {"low": replace(low, lights=light[view]), "high": replace(above, lights=light[view])}
         maps = {key: passes[key].maps(each, view=view) for key, each in lit.items()}
-        others = passes["low"].others("low", lit["low"], maps)
+        others = passes["low"].other_maps("low", lit["low"], maps)
         assert others == [maps["high"]]
 
         def draw() -> None:
             shown = ViewState(view)
-            passes["low"].strands.draw(lit["low"], CAMERA, SIZE, SIZE, others=others, view=shown)
+            passes["low"].strands.draw(
+                lit["low"], CAMERA, SIZE, SIZE, other_maps=others, view=shown
+            )
 
         target.sized(SIZE, SIZE).clear((0.0, 0.0, 0.0, 0.0))
         with target.drawing():

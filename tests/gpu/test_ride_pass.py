@@ -337,7 +337,7 @@ def test_strands_that_ride_are_led_out(monkeypatch: pytest.MonkeyPatch, rounds: 
         moved = guides + frame * np.float32([0.0, 0.004, 0.0]) * along
         after = replace(motion, guides=moved, hair_time=1.0 / 60.0, leans=led.leans)
         expected, led = motion_flow.strands_and_led(rig, after)
-        ride.ride(pose.head_positions, pose.matrix, moved, None, posed, since=1.0 / 60.0)
+        ride.ride(pose.head_positions, pose.matrix, moved, None, posed, elapsed=1.0 / 60.0)
         found = ride.read_led()
         assert len(np.setxor1d(found.strands, led.strands)) <= 3, "rounding decides few"
         off = np.abs(ride.read() - expected).max(axis=1)
@@ -358,7 +358,7 @@ def test_strands_that_ride_are_led_out(monkeypatch: pytest.MonkeyPatch, rounds: 
     ride.ride(pose.head_positions, pose.matrix, guides, None, posed)
     beyond = turned(0.0, (9.0, 0.0, 0.0))
     far = (PosedCollider(head, beyond, beyond),)
-    ride.ride(pose.head_positions, pose.matrix, moved, None, far, since=1.0)
+    ride.ride(pose.head_positions, pose.matrix, moved, None, far, elapsed=1.0)
     found = ride.read()
     ride.ride(pose.head_positions, pose.matrix, moved, None, far)
     np.testing.assert_allclose(found, ride.read(), atol=TOLERANCE)

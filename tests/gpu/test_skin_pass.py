@@ -182,7 +182,7 @@ def test_the_map_holds_what_is_in_the_way_of_the_light(frame: Any) -> None:
     """With almost no softness, the map is the shadow of the hair above and of the ball itself."""
     surface = ball()
     _, mesh_pass = drawn(frame, snapshot_of(frame, surface, is_skin=True, softness=1e-6))
-    (shadow,) = mesh_pass.skin.drawn
+    (shadow,) = mesh_pass.skin.drawn_shadows
     layout, found = shadow.layout, shadow.picture()[..., 0]
     weights = np.dstack([1.0 - layout.weights.sum(axis=-1), layout.weights])
     place = np.einsum("hwi,hwij->hwj", weights, surface.corners[layout.triangle])
@@ -226,7 +226,7 @@ def test_soft_shadows_have_soft_edges_and_keep_their_light(frame: Any) -> None:
 def test_no_seam_is_seen_in_the_map(frame: Any) -> None:
     """Both sides of seams agree where the edge of the hair's shadow crosses them."""
     _, mesh_pass = drawn(frame, snapshot_of(frame, ball(), is_skin=True, softness=0.003))
-    (shadow,) = mesh_pass.skin.drawn
+    (shadow,) = mesh_pass.skin.drawn_shadows
     values, layout = shadow.picture(), shadow.layout
     middle = layout.seams.mean(axis=1)
     sides = [
@@ -255,7 +255,7 @@ def test_a_head_in_parts_has_the_shadow_of_the_whole(frame: Any) -> None:
     )
     expected, _ = drawn(frame, snapshot)
     found, mesh_pass = drawn(frame, replace(snapshot, meshes=parts))
-    assert len(mesh_pass.skin.drawn) == 1
+    assert len(mesh_pass.skin.drawn_shadows) == 1
     assert np.abs(found - expected).max() < 1e-5
 
 

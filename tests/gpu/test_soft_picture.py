@@ -143,7 +143,7 @@ class View:
             hair.strands.draw(
                 *(each, self.camera, SIZE, SIZE),
                 output="viewport",
-                others=hair.others(key, each, maps),
+                other_maps=hair.other_maps(key, each, maps),
                 view=ViewState(view, picture=picture, **options),
             )
 

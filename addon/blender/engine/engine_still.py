@@ -15,7 +15,7 @@ from ...render.accumulation import Accumulation, Target
 from ...render.camera import Camera
 from ...render.camera_window import Window, jittered
 from ...render.capabilities import NOISE_FREE_SAMPLES, capabilities
-from ...render.lens import through
+from ...render.lens import camera_through_lens
 from ...render.nearest import Nearest, SceneAtTime, background, motion, projected, unprojected
 from ...render.pixel_filter import jitters
 from ...render.scene_pass import Rgba, ScenePass, SeparateShafts, shafts_of
@@ -165,7 +165,7 @@ class Still:
                     break
                 seen = camera
                 if lens is not None and through_lens is not None:
-                    seen = through(camera, lens, through_lens[self._picture.count])
+                    seen = camera_through_lens(camera, lens, through_lens[self._picture.count])
                 self._add_sample(scene, seen, place)
                 if time.monotonic() - shown > _SHOWN_EVERY:
                     self._show(result)

@@ -52,13 +52,13 @@ def shown_skin_shadow(snapshot: Snapshot, strand_pass: StrandPass, *, place: str
         )
     lights, skin_pass = len(packed_lights(snapshot.lights)), SkinPass()
     skin_pass.shadows(snapshot.meshes, maps, snapshot.skin, lights, hair_forward(snapshot))
-    if not skin_pass.drawn:
+    if not skin_pass.drawn_shadows:
         raise HairloomError(
             "there is no head with UVs",
             place=place,
             remedy="Choose a head, and unwrap it (UV > Unwrap in Edit Mode)",
         )
-    return _side_by_side(skin_pass.drawn[0], min(maps.size.map_count, SKIN_LIGHTS))
+    return _side_by_side(skin_pass.drawn_shadows[0], min(maps.size.map_count, SKIN_LIGHTS))
 
 
 def skin_shadow_of_view(

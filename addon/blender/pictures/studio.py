@@ -24,7 +24,7 @@ from ...render.strand_pass import Statistics, StrandPass, noise_free_samples
 from ...rig_flow import Pose
 from ...shading.lights import Light
 from ...shading.skin.notes import skin_notes
-from ...shading.stage import backdrop, over, stage_lights
+from ...shading.stage import backdrop, over_backdrop, stage_lights
 from ...shading.stage_settings import StageSettings
 from ...shading.volume.light_frame import Ball
 from ...shading.volume.shadow_lights import shadow_warnings
@@ -117,7 +117,11 @@ class Studio:
             cards=self._cards_at(pose, guides),
         )
         picture = self._drawn(as_shown(snapshot), camera, width, height, samples, is_soft)
-        return picture if is_transparent else over(picture, backdrop(self.stage, width, height))
+        return (
+            picture
+            if is_transparent
+            else over_backdrop(picture, backdrop(self.stage, width, height))
+        )
 
     def _drawn(
         self,
@@ -237,7 +241,7 @@ class Studio:
             cards=cards,
         )
         picture = self._drawn(snapshot, camera, width, height, samples)
-        return over(picture, backdrop(self.stage, width, height))
+        return over_backdrop(picture, backdrop(self.stage, width, height))
 
     @property
     def warnings(self) -> tuple[str, ...]:

@@ -413,7 +413,7 @@ class _Shown:
             height,
             output="viewport",
             display=display,
-            others=hair.others(self.uid, snapshot, maps),
+            other_maps=hair.other_maps(self.uid, snapshot, maps),
             view=ViewState(self.view, self.is_turning, is_moving, picture, is_sample),
         )
         if is_sample:

@@ -72,19 +72,19 @@ class PrincipledHair:
 
 
 def settings_from(
-    hair: PrincipledHair, before: ShadingSettings | None = None
+    hair: PrincipledHair, base_settings: ShadingSettings | None = None
 ) -> tuple[ShadingSettings, tuple[str, ...]]:
     """Settings of the model Marschner, and notes on what could not be converted exactly.
 
     Args:
-        before: supplies what the node does not have: noise, sparkle, scattered light.
+        base_settings: supplies what the node does not have: noise, sparkle, scattered light.
     """
     notes: list[str] = []
     values = _pigment(hair, notes) | _shape(hair, notes)
     if hair.random_roughness > 0.0:
         notes.append("Random Roughness is left out: all strands are equally rough")
     values |= {"model": "marschner", "tip_tint": 0.0, "grey_fraction": 0.0}
-    return replace(before or ShadingSettings(), **_in_range(values, notes)), tuple(notes)
+    return replace(base_settings or ShadingSettings(), **_in_range(values, notes)), tuple(notes)
 
 
 def hair_from(settings: ShadingSettings) -> tuple[PrincipledHair, tuple[str, ...]]:

@@ -161,12 +161,12 @@ def tau_within_short_hair(
 class StrandArea:
     """Areas of all strands [m^2], the sums of their lengths times widths.
 
-    whole: with their own widths. weighted: each place weighted by its position from the root, 0 to
-        1.
+    total: with their own widths. weighted_by_position: each place weighted by its position from the
+        root, 0 to 1.
     """
 
-    whole: float
-    weighted: float
+    total: float
+    weighted_by_position: float
 
     @classmethod
     def of(cls, strands: StrandSet) -> StrandArea:
@@ -180,7 +180,7 @@ class StrandArea:
     def shadow_area(self, strands: StrandSettings) -> float:
         """Area that blocks light from everywhere [m^2]: pi / 4 of the strands' area, as
         cylinders."""
-        tapered = self.whole + (strands.tip_width - 1.0) * self.weighted
+        tapered = self.total + (strands.tip_width - 1.0) * self.weighted_by_position
         return 0.25 * np.pi * strands.fullness * strands.as_drawn.opacity * tapered
 
 

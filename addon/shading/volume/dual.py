@@ -299,7 +299,7 @@ def reflected_by_far_skin(
     forward: Floats,
     backward: Floats,
     to_light: Floats,
-    seen: SkinSeen,
+    skin_seen: SkinSeen,
     skin: Floats,
 ) -> Floats:
     """Light off skin farther away that a strand sends to the eye, (..., 3): times irradiance, it is
@@ -317,8 +317,8 @@ def reflected_by_far_skin(
     absorbed = np.sqrt(np.maximum((1.0 - a_f) ** 2 - a_b**2, 0.0))
     cosine = outward[..., None]
     onward = 0.5 * (a_f * (1.0 + cosine) + a_b * (1.0 - cosine))
-    lit = 2.0 / np.pi * skin * far_skin_light(seen.received, to_light)[..., None]
-    return lit * through_hair(seen.depth[..., None], absorbed) * onward
+    lit = 2.0 / np.pi * skin * far_skin_light(skin_seen.received, to_light)[..., None]
+    return lit * through_hair(skin_seen.depth[..., None], absorbed) * onward
 
 
 def scattering_light(
@@ -337,7 +337,7 @@ def scattering_light(
     level: Floats | float = 0.0,
     tau: Floats | float = -1.0,
     beyond: Floats | float = DEFAULT_TAU_BEYOND,
-    seen: SkinSeen | None = None,
+    skin_seen: SkinSeen | None = None,
 ) -> Floats:
     """Light of one lamp that a strand among others sends to the eye, (..., 3).
 
@@ -346,7 +346,7 @@ def scattering_light(
     Args:
         density: d_f and d_b of Zinke et al. 2008.
         skin: (3,), albedo of what lies behind the hair.
-        seen: skin seen from the strand; None: skin directly beneath alone, with the volume's
+        skin_seen: skin seen from the strand; None: skin directly beneath alone, with the volume's
             normal.
     """
     angles = strand_angles(tangent, normal, to_light, to_eye, shift_noise, shading)
@@ -371,11 +371,11 @@ def scattering_light(
         fibre_of(shading),
         density,
     )
-    seen = seen or plane_beneath(normal)
-    facing = np.sum(seen.beneath * to_light, axis=-1)
+    skin_seen = skin_seen or plane_beneath(normal)
+    facing = np.sum(skin_seen.beneath * to_light, axis=-1)
     outward = np.sum(normal * to_eye, axis=-1)
     return (
         scattered * np.cos(theta_i)[..., None]
         + reflected_by_skin(phi, forward, backward, passed_by, np.asarray(beyond), facing, skin)
-        + reflected_by_far_skin(outward, forward, backward, to_light, seen, skin)
+        + reflected_by_far_skin(outward, forward, backward, to_light, skin_seen, skin)
     )

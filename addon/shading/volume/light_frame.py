@@ -83,7 +83,7 @@ class LightFrame:
         Args:
             points: (..., 3) its middle [m]. along: (..., 3) from one end to the other [m].
         """
-        projected, breadth = self._seen(points, along)
+        projected, breadth = self._projected_tangent(points, along)
         return np.linalg.norm(projected, axis=-1) * breadth
 
     def strand_breadth(self, points: Floats, along: Floats) -> Floats:
@@ -95,9 +95,9 @@ class LightFrame:
         Args:
             points: (..., 3) [m], ahead of the light. along: (..., 3) its tangent.
         """
-        return self._seen(points, along)[1]
+        return self._projected_tangent(points, along)[1]
 
-    def _seen(self, points: Floats, along: Floats) -> tuple[Floats, Floats]:
+    def _projected_tangent(self, points: Floats, along: Floats) -> tuple[Floats, Floats]:
         """A strand's tangent projected to the map, (..., 2), and its width there, (...)."""
         homogeneous = np.concatenate([points, np.ones_like(points[..., :1])], axis=-1)
         clip = homogeneous @ self.to_map.T

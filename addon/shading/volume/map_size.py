@@ -109,14 +109,14 @@ def size_for_spacing(size: MapSize, spacing: float, radius: float) -> MapSize:
     return replace(size, side=min(side, size.side))
 
 
-def size_note(settings: VolumeSettings, map_count: int, max_bytes: int, drawn: MapSize) -> str:
+def size_note(settings: VolumeSettings, map_count: int, max_bytes: int, drawn_size: MapSize) -> str:
     """A note for the artist if maps are smaller than the settings say, else empty.
 
     Args:
-        map_count, max_bytes: as of `fitted_size`, which gave `drawn`.
+        map_count, max_bytes: as of `fitted_size`, which gave `drawn_size`.
     """
     requested = requested_size(settings, map_count)
-    if drawn == requested:
+    if drawn_size == requested:
         return ""
     megabytes = requested.bytes / 2**20, max_bytes / 2**20
     lights = "1 light" if requested.map_count == 1 else f"{requested.map_count} lights"
@@ -127,6 +127,6 @@ def size_note(settings: VolumeSettings, map_count: int, max_bytes: int, drawn: M
         memory = ", or raise GPU Memory in the preferences"
     return (
         f"Shadows: maps of {requested.side} x {requested.side} texels for {lights} "
-        f"{reason}, so they have {drawn.side} x {drawn.side}. Lower Resolution, the number of "
-        f"layers, or Max Lights in Shadows{memory}."
+        f"{reason}, so they have {drawn_size.side} x {drawn_size.side}. Lower Resolution, the "
+        f"number of layers, or Max Lights in Shadows{memory}."
     )

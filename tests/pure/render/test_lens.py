@@ -7,7 +7,7 @@ import pytest
 
 from hairloom.addon.arrays import Floats
 from hairloom.addon.render.camera import Camera, look_at, orthographic, perspective
-from hairloom.addon.render.lens import Lens, through
+from hairloom.addon.render.lens import Lens, camera_through_lens
 
 EYE, TARGET = np.array([0.3, -2.0, 0.5]), np.array([0.0, 0.0, 0.2])
 FORWARD = (TARGET - EYE) / np.linalg.norm(TARGET - EYE)
@@ -30,14 +30,14 @@ def test_points_in_focus_stay_and_others_spread(camera: Camera) -> None:
     for depth in (1.0, 1.7, 4.0):
         point = EYE + depth * FORWARD + 0.1 * right - 0.2 * up
         for place in lens.places(20):
-            seen = shown(through(camera, lens, place), point)
+            seen = shown(camera_through_lens(camera, lens, place), point)
             moved = point - (1.0 - depth / lens.focus) * (place[0] * right + place[1] * up)
             np.testing.assert_allclose(seen, shown(camera, moved), atol=1e-9)
 
 
 def test_the_eye_goes_to_its_place_of_the_lens() -> None:
     camera, place = CAMERAS[0], np.array([0.02, -0.01])
-    moved = through(camera, Lens(0.03, 1.0), place)
+    moved = camera_through_lens(camera, Lens(0.03, 1.0), place)
     right, up = camera.view[0, :3], camera.view[1, :3]
     np.testing.assert_allclose(moved.eye[:3], EYE + place[0] * right + place[1] * up, atol=1e-12)
     turn = moved.view[:3, :3]

@@ -29,11 +29,11 @@ def test_light_comes_back_to_each_groom_off_its_own_head() -> None:
     grooms = tuple(DrawnGroom(x, hair_at(x)) for x in colors)
     scene = SceneSnapshot(casters=heads, grooms=grooms)
     for groom, own in zip(grooms, heads, strict=True):
-        lit = scene.lit(groom)
+        lit = scene.lit_snapshot(groom)
         assert lit.skin_color == pytest.approx(own.color)
         assert set(map(id, lit.all_casters)) == set(map(id, heads))
     cap = MeshSnapshot.of(Surface(0.5 * CORNERS, TRIANGLES), (0.9, 0.0, 0.0))
     worn = MeshSnapshot.of(Surface(CORNERS, TRIANGLES), colors[0.0], is_skin=True)
-    lit = SceneSnapshot(casters=(cap, worn), grooms=grooms).lit(grooms[0])
+    lit = SceneSnapshot(casters=(cap, worn), grooms=grooms).lit_snapshot(grooms[0])
     assert lit.skin_color == pytest.approx(colors[0.0]), "not in that of a cap"
-    assert SceneSnapshot(grooms=grooms).lit(grooms[0]).skin_color == (0.0, 0.0, 0.0)
+    assert SceneSnapshot(grooms=grooms).lit_snapshot(grooms[0]).skin_color == (0.0, 0.0, 0.0)

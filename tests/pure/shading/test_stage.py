@@ -7,7 +7,7 @@ import pytest
 
 from hairloom.addon.render.camera import look_at
 from hairloom.addon.shading.lights import light_at
-from hairloom.addon.shading.stage import backdrop, over, stage_lights
+from hairloom.addon.shading.stage import backdrop, over_backdrop, stage_lights
 from hairloom.addon.shading.stage_settings import StageSettings
 from hairloom.addon.shading.volume.light_frame import Ball
 
@@ -60,6 +60,6 @@ def test_the_backdrop_fades_evenly_from_its_centre() -> None:
 def test_a_picture_lies_over_the_backdrop() -> None:
     picture = np.array([[[0.2, 0.0, 0.0, 0.5], [0.0, 0.0, 0.0, 0.0], [0.7, 0.7, 0.7, 1.0]]])
     behind = np.full((1, 3, 3), 0.4)
-    found = over(picture, behind)
+    found = over_backdrop(picture, behind)
     np.testing.assert_allclose(found[0, :, 0], [0.4, 0.4, 0.7])
     assert (found[..., 3] == 1.0).all()
