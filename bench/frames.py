@@ -104,7 +104,7 @@ class Stage:
     ) -> None:
         camera, view = self.camera(angle), ViewState(**{"name": 0} | options)
         lit = replace(hair, lights=three_point_lights(camera.view))
-        shown = {"output": "viewport", "others": others, "view": view}
+        shown = {"output": "viewport", "other_maps": others, "view": view}
         self.put(lambda: own.draw(lit, camera, WIDTH, HEIGHT, **shown))
 
     def put(self, draw: Callable[[], None]) -> None:

@@ -6,10 +6,10 @@ void main()
   if (any(greaterThanEqual(pixel, imageSize(sum_of_samples)))) {
     return;
   }
-  vec4 found = texelFetch(one_sample, pixel, 0);
+  vec4 new_sample = texelFetch(one_sample, pixel, 0);
   // one NaN or infinity would spoil the pixel for good
-  if (any(isnan(found)) || any(isinf(found))) {
-    found = vec4(0.0, 0.0, 0.0, found.w == found.w ? clamp(found.w, 0.0, 1.0) : 0.0);
+  if (any(isnan(new_sample)) || any(isinf(new_sample))) {
+    new_sample = vec4(0.0, 0.0, 0.0, new_sample.w == new_sample.w ? clamp(new_sample.w, 0.0, 1.0) : 0.0);
   }
-  imageStore(sum_of_samples, pixel, imageLoad(sum_of_samples, pixel) + found);
+  imageStore(sum_of_samples, pixel, imageLoad(sum_of_samples, pixel) + new_sample);
 }

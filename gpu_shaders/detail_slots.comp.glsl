@@ -44,10 +44,10 @@ void main()
   }
   width = min(width / kept_fraction, max_width);
 
-  int wanted = slots_wanted(pieces, slot_pieces);
+  int slots_needed = slots_wanted(pieces, slot_pieces);
   float strands = demand_sum(DEMAND_STRANDS), extra_slots = demand_sum(DEMAND_SLOTS) - strands;
   float fraction = (float(slot_count) - strands) / max(extra_slots, 1.0);
-  int count = fraction < 1.0 ? 1 + int(float(wanted - 1) * fraction * NEARLY) : wanted;
+  int count = fraction < 1.0 ? 1 + int(float(slots_needed - 1) * fraction * NEARLY) : slots_needed;
   count = min(count, 65535);
   int first_slot = int(imageAtomicAdd(demand, ivec2(DEMAND_USED, 0), uint(count)));
   for (int number = 0; number < count; number++) {

@@ -33,7 +33,7 @@ vec2 unshadowed_and_shadowed(vec3 point, vec3 normal, vec3 facet)
     vec3 path = shadow_path_to_mesh(index, point, normal);
     vec3 arriving = irradiance * max(0.0, dot(normal, to_light)) / PI;
     all_light += arriving * path.z;
-    shadowed_light += arriving * light_left(path, hair_forward);
+    shadowed_light += arriving * transmitted_light(path, hair_forward);
   }
   return vec2(screen_brightness(all_light), screen_brightness(shadowed_light)) + NO_LIGHT;
 }

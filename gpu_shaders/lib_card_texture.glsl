@@ -3,9 +3,9 @@
 // Twin of addon/shading/card_texture.py: same names. Holds no resources.
 
 // Width and height of level 0.
-ivec2 picture_size(ivec2 whole)
+ivec2 picture_size(ivec2 packed_size)
 {
-  return ivec2((2 * (whole.x - 4) + 1) / 3, whole.y - {{card_texture_slack}});
+  return ivec2((2 * (packed_size.x - 4) + 1) / 3, packed_size.y - {{card_texture_slack}});
 }
 
 ivec2 level_corner(ivec2 size, int level)
@@ -31,25 +31,25 @@ vec2 within_tile(vec2 place, ivec2 texels, vec2 tiles)
 }
 
 // tiles: columns and rows; 0 for a texture that repeats.
-vec4 texel_in_level(sampler2D packed_levels, ivec2 whole, vec2 place, int level, vec2 tiles)
+vec4 texel_in_level(sampler2D packed_levels, ivec2 packed_size, vec2 place, int level, vec2 tiles)
 {
-  ivec2 size = picture_size(whole);
+  ivec2 size = picture_size(packed_size);
   ivec2 texels = max(size >> level, ivec2(1));
   vec2 moved = tiles.x > 0.0 ? within_tile(place, texels, tiles) : fract(place);
-  vec2 at = vec2(level_corner(size, level)) + moved * vec2(texels);
-  return textureLod(packed_levels, at / vec2(whole), 0.0);
+  vec2 packed_place = vec2(level_corner(size, level)) + moved * vec2(texels);
+  return textureLod(packed_levels, packed_place / vec2(packed_size), 0.0);
 }
 
 vec4 card_texel_at(sampler2D packed_levels, vec2 place, float level, vec2 tiles)
 {
-  ivec2 whole = textureSize(packed_levels, 0);
+  ivec2 packed_size = textureSize(packed_levels, 0);
   int lower = int(level);
-  vec4 near_texel = texel_in_level(packed_levels, whole, place, lower, tiles);
+  vec4 near_texel = texel_in_level(packed_levels, packed_size, place, lower, tiles);
   if (level == float(lower)) {
     return near_texel;
   }
   return mix(near_texel,
-             texel_in_level(packed_levels, whole, place, lower + 1, tiles),
+             texel_in_level(packed_levels, packed_size, place, lower + 1, tiles),
              level - float(lower));
 }
 

@@ -47,9 +47,10 @@ vec3 backscatter_shape(vec4 forward, vec4 backward, Fibre fibre)
   float wide_f = sqrt(dot(forward, fibre.widths * fibre.widths) / forward_sum);
   float wide_b = sqrt(dot(backward, fibre.widths * fibre.widths) / back);
   float shift_f = dot(forward, fibre.shifts) / forward_sum, shift_b = dot(backward, fibre.shifts) / back;
-  float rest = 1.0 - a_f * a_f;
-  float shift = shift_b * (1.0 - 2.0 * a_b * a_b / (rest * rest)) +
-                shift_f * ((2.0 * rest * rest + 4.0 * a_f * a_f * a_b * a_b) / (rest * rest * rest));
+  float remainder = 1.0 - a_f * a_f;
+  float shift = shift_b * (1.0 - 2.0 * a_b * a_b / (remainder * remainder)) +
+                shift_f * ((2.0 * remainder * remainder + 4.0 * a_f * a_f * a_b * a_b) /
+                           (remainder * remainder * remainder));
   float wider = 2.0 * wide_f * wide_f;
   float numerator = a_b * sqrt(wider + wide_b * wide_b) +
                     a_b * a_b * a_b * sqrt(wider + 3.0 * wide_b * wide_b);
@@ -69,8 +70,8 @@ vec4 spread_around(vec4 forward, vec4 backward, float phi)
 float half_gaussian(float theta_h, float shift, float variance)
 {
   variance = max(variance, DUAL_SMALLEST);
-  float off = theta_h + shift;
-  return exp(-0.5 * off * off / variance) / (2.0 * sqrt(2.0 * PI * variance));
+  float offset = theta_h + shift;
+  return exp(-0.5 * offset * offset / variance) / (2.0 * sqrt(2.0 * PI * variance));
 }
 
 // S of a strand among others. single: S of the strand alone; tau: number of strands between it and the
@@ -171,11 +172,11 @@ vec3 scattering_light(sampler3D longitudinal,
   mat3x4 forward = fractions_at(fractions_forward, cos_d, absorption);
   mat3x4 backward = fractions_at(fractions_backward, cos_d, absorption);
   float straight = unscattered_fraction(normal, to_light, tau, shading);
-  float passed = tau < 0.0 ? -log(max(straight, DUAL_MIN_LIGHT)) : tau;
+  float passed_tau = tau < 0.0 ? -log(max(straight, DUAL_MIN_LIGHT)) : tau;
   vec3 scattered = dual_scattering(
-      single, angles, forward, backward, passed, beyond, fibre, density);
+      single, angles, forward, backward, passed_tau, beyond, fibre, density);
   float facing = dot(skin_seen.beneath, to_light);
   return scattered * cos(angles.x) +
-         reflected_by_skin(angles.z, forward, backward, passed, beyond, facing, skin) +
+         reflected_by_skin(angles.z, forward, backward, passed_tau, beyond, facing, skin) +
          reflected_by_far_skin(dot(normal, to_eye), forward, backward, to_light, skin_seen, skin);
 }

@@ -6,10 +6,10 @@
 // Place in a map before the division by w, and w, which is not positive behind the light.
 vec3 mesh_map_place(int map, vec3 point)
 {
-  vec4 at = vec4(point, 1.0);
-  return vec3(dot(mesh_shadows.map_x[map], at),
-              dot(mesh_shadows.map_y[map], at),
-              dot(mesh_shadows.map_w[map], at));
+  vec4 world = vec4(point, 1.0);
+  return vec3(dot(mesh_shadows.map_x[map], world),
+              dot(mesh_shadows.map_y[map], world),
+              dot(mesh_shadows.map_w[map], world));
 }
 
 // The map of a light in which a point lies; -1 for none.
@@ -53,7 +53,7 @@ float mesh_light(int light, vec3 point, vec3 normal)
   vec3 unit_normal = normal * inversesqrt(max(dot(normal, normal), 1.0e-36));
   vec3 slope = mesh_slope(map, place, unit_normal);
   float depth = dot(mesh_shadows.map_depth[map], vec4(point, 1.0));
-  vec2 own = (0.5 * place.xy + 0.5) * mesh_shadows.resolution - 0.5;
+  vec2 center = (0.5 * place.xy + 0.5) * mesh_shadows.resolution - 0.5;
   float radius = max({{mesh_blur}} * mesh_shadows.resolution, 1.0);
   float bias = {{mesh_bias}} * (radius + 1.0) * slope.z;
   mat2 turn = mat2(cos({{golden_angle}}),
@@ -61,20 +61,20 @@ float mesh_light(int light, vec3 point, vec3 normal)
                    -sin({{golden_angle}}),
                    cos({{golden_angle}}));
   vec2 direction = vec2(radius, 0.0);
-  float lit = 0.0;
+  float lit_fraction = 0.0;
   for (int tap = 0; tap < {{mesh_taps}}; tap++) {
-    vec2 scaled = own + mesh_shadows.shift + direction * sqrt((float(tap) + 0.5) / {{mesh_taps}}.0);
+    vec2 scaled = center + mesh_shadows.shift + direction * sqrt((float(tap) + 0.5) / {{mesh_taps}}.0);
     vec2 low = floor(scaled), fraction = scaled - low;
     for (int corner = 0; corner < 4; corner++) {
       vec2 step_of = vec2(corner & 1, corner >> 1);
       vec2 texel = low + step_of;
       vec2 weights = mix(1.0 - fraction, fraction, step_of);
-      float there = min(depth + dot(slope.xy, texel - own), 1.0) - bias;
-      ivec2 at = clamp(ivec2(texel), ivec2(0), ivec2(mesh_shadows.resolution) - 1);
-      float first = texelFetch(mesh_depths, ivec3(at, map), 0).x;
-      lit += there <= first ? weights.x * weights.y : 0.0;
+      float plane_depth = min(depth + dot(slope.xy, texel - center), 1.0) - bias;
+      ivec2 clamped_texel = clamp(ivec2(texel), ivec2(0), ivec2(mesh_shadows.resolution) - 1);
+      float first = texelFetch(mesh_depths, ivec3(clamped_texel, map), 0).x;
+      lit_fraction += plane_depth <= first ? weights.x * weights.y : 0.0;
     }
     direction = turn * direction;
   }
-  return lit / {{mesh_taps}}.0;
+  return lit_fraction / {{mesh_taps}}.0;
 }

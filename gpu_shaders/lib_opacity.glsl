@@ -28,11 +28,11 @@ vec4 layers_passed(float depth, vec4 ends, float before)
 // Place in a light's map: xy in 0..1, outside of the map behind the light; z depth.
 vec3 map_place(Opacity opacity, int light, vec3 point)
 {
-  vec4 at = vec4(point, 1.0);
-  float w = dot(opacity.map_w[light], at);
-  vec2 flat_place = vec2(dot(opacity.map_x[light], at), dot(opacity.map_y[light], at));
+  vec4 world = vec4(point, 1.0);
+  float w = dot(opacity.map_w[light], world);
+  vec2 flat_place = vec2(dot(opacity.map_x[light], world), dot(opacity.map_y[light], world));
   vec2 place = w > 0.0 ? 0.5 * flat_place / w + 0.5 : vec2(-1.0);
-  return vec3(place, dot(opacity.map_depth[light], at));
+  return vec3(place, dot(opacity.map_depth[light], world));
 }
 
 // Weight of the map's mesh shadows on meshes, which may extend beyond the map: 1 in its middle, 0 at its
@@ -71,9 +71,9 @@ float self_tau(float half_width)
 // The same for a strand of this radius [m].
 float self_tau_at(Opacity opacity, int light, vec3 point, vec3 tangent, float radius)
 {
-  vec4 at = vec4(point, 1.0);
+  vec4 world = vec4(point, 1.0);
   vec3 xyw = vec3(
-      dot(opacity.map_x[light], at), dot(opacity.map_y[light], at), dot(opacity.map_w[light], at));
+      dot(opacity.map_x[light], world), dot(opacity.map_y[light], world), dot(opacity.map_w[light], world));
   vec3 change = vec3(dot(opacity.map_x[light].xyz, tangent),
                      dot(opacity.map_y[light].xyz, tangent),
                      dot(opacity.map_w[light].xyz, tangent));
@@ -100,10 +100,10 @@ struct LayerSpan {
 LayerSpan layer_span(sampler2D spans, ivec2 texel, int map, int resolution)
 {
   int side = resolution / {{start_texels}};
-  ivec2 block = texel / {{start_texels}}, at = block + ivec2(0, map * side);
+  ivec2 block = texel / {{start_texels}}, stored_texel = block + ivec2(0, map * side);
   return LayerSpan((vec2(block) + 0.5) * float({{start_texels}}),
-                   texelFetch(spans, at, 0).xyz,
-                   texelFetch(spans, at + ivec2(side, 0), 0).xyz);
+                   texelFetch(spans, stored_texel, 0).xyz,
+                   texelFetch(spans, stored_texel + ivec2(side, 0), 0).xyz);
 }
 
 // x start of the layers at a place [texels], y one over their total thickness.

@@ -69,7 +69,7 @@ vec3 shadow_path_to_mesh(int index, vec3 point, vec3 normal)
 
 // The fraction of a light that hair and meshes let through, by colour. forward: fraction of the light on a
 // strand that it scatters forward.
-vec3 light_left(vec3 path, vec3 forward)
+vec3 transmitted_light(vec3 path, vec3 forward)
 {
   return path.z * exp(-max(path.x, 0.0) * (1.0 - forward));
 }
@@ -77,11 +77,11 @@ vec3 light_left(vec3 path, vec3 forward)
 #if SHADOWS
 // Fraction of a strand or card at a point that counts towards tau at another point, since tau grows linearly
 // through the layer in which it lies. Twin of self_fraction in addon/shading/volume/opacity.py.
-float self_fraction(int light, vec3 point, vec3 there)
+float self_fraction(int light, vec3 point, vec3 target)
 {
   vec3 place = map_place(opacity, light, point);
   float depth = min(place.z, 1.0);
-  float bias = opacity.bias + place.z - map_place(opacity, light, there).z;
+  float bias = opacity.bias + place.z - map_place(opacity, light, target).z;
 #  if DEEP
   ivec2 texel_at = clamp(ivec2(place.xy * float(opacity.resolution)), 0, opacity.resolution - 1);
   LayerSpan span = layer_span(
@@ -106,14 +106,15 @@ float self_fraction(int light, vec3 point, vec3 there)
 
 // As shadow_path, for a place of a strand of this radius [m] and opacity. The maps contain the strand
 // itself, whose part is subtracted on both sides of the place.
-vec3 shadow_path_to_strand(int index, vec3 point, vec3 tangent, float radius, float hides)
+vec3 shadow_path_to_strand(int index, vec3 point, vec3 tangent, float radius, float strand_opacity)
 {
   vec3 path = shadow_path(index, point);
 #if SHADOWS
   if (path.x >= 0.0) {
-    float own = opacity.extinction * hides * self_tau_at(opacity, index, point, tangent, radius);
+    float strand_tau = opacity.extinction * strand_opacity *
+                       self_tau_at(opacity, index, point, tangent, radius);
     float fraction = self_fraction(index, point, point);
-    path.xy = max(path.xy - own * vec2(fraction, 1.0 - fraction), 0.0);
+    path.xy = max(path.xy - strand_tau * vec2(fraction, 1.0 - fraction), 0.0);
   }
 #endif
   return path;

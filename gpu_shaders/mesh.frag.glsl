@@ -104,7 +104,7 @@ void main()
       path.z = light_past_meshes(index, mesh_point, facet, path);
       visibility *= path.z;
 #if SHADOWS
-      visibility = path.x < 0.0 ? visibility : light_left(path, hair_forward);
+      visibility = path.x < 0.0 ? visibility : transmitted_light(path, hair_forward);
 #endif
     }
     visibility = mix(visibility, blurred, blur_weight);

@@ -60,7 +60,7 @@ void main()
     float mesh_visibility = light_past_meshes(index, mesh_point, facet, path);
     vec3 hair_transmittance = vec3(1.0);
 #if SHADOWS
-    hair_transmittance = light_left(vec3(path.xy, 1.0), hair_forward);
+    hair_transmittance = transmitted_light(vec3(path.xy, 1.0), hair_forward);
 #endif
 #ifdef SKIN
     int map = int(opacity.light[index].x);

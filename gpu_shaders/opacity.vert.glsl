@@ -7,10 +7,10 @@
 
 vec4 map_position(vec3 point)
 {
-  vec4 at = vec4(point, 1.0);
-  float w = dot(opacity.map_w[light_index], at);
-  float depth = clamp(dot(opacity.map_depth[light_index], at), 0.0, 1.0);
-  return vec4(dot(opacity.map_x[light_index], at), dot(opacity.map_y[light_index], at),
+  vec4 world = vec4(point, 1.0);
+  float w = dot(opacity.map_w[light_index], world);
+  float depth = clamp(dot(opacity.map_depth[light_index], world), 0.0, 1.0);
+  return vec4(dot(opacity.map_x[light_index], world), dot(opacity.map_y[light_index], world),
               (2.0 * depth - 1.0) * w, w);
 }
 

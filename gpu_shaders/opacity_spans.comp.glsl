@@ -16,8 +16,8 @@ StoredDepth stored_depth_at(ivec2 block, bool is_last)
   if (any(lessThan(block, ivec2(0))) || any(greaterThanEqual(block, ivec2(side)))) {
     return StoredDepth(0.0, false);
   }
-  ivec2 at = block + ivec2(is_last ? side : 0, map_index * side);
-  uint stored = texelFetch(starts, at, 0).x;
+  ivec2 texel = block + ivec2(is_last ? side : 0, map_index * side);
+  uint stored = texelFetch(starts, texel, 0).x;
   float depth = start_depth(stored);
   return StoredDepth(is_last ? 1.0 - depth : depth, stored <= uint({{start_scale}}));
 }
@@ -52,7 +52,7 @@ void main()
     start = plane_over(block, false);
     thickness = plane_over(block, true) - start;
   }
-  ivec2 at = block + ivec2(0, map_index * side);
-  imageStore(spans, at, vec4(start, 0.0));
-  imageStore(spans, at + ivec2(side, 0), vec4(thickness, 0.0));
+  ivec2 texel = block + ivec2(0, map_index * side);
+  imageStore(spans, texel, vec4(start, 0.0));
+  imageStore(spans, texel + ivec2(side, 0), vec4(thickness, 0.0));
 }

@@ -20,13 +20,13 @@ void keep_first_and_last(vec3 place)
 
 void main()
 {
-  ivec2 at = ivec2(gl_GlobalInvocationID.xy);
-  StrandSpan span = strand_span(strand_spans, first_instance + min(at.y, drawn_count - 1));
-  if (at.x >= span.count || at.y >= drawn_count) {
+  ivec2 point_of_strand = ivec2(gl_GlobalInvocationID.xy);
+  StrandSpan span = strand_span(strand_spans, first_instance + min(point_of_strand.y, drawn_count - 1));
+  if (point_of_strand.x >= span.count || point_of_strand.y >= drawn_count) {
     return;
   }
-  vec3 root_side = texelFetch(cv_points, span_texel(span, max(at.x - 1, 0)), 0).xyz;
-  vec3 tip_side = texelFetch(cv_points, span_texel(span, at.x), 0).xyz;
+  vec3 root_side = texelFetch(cv_points, span_texel(span, max(point_of_strand.x - 1, 0)), 0).xyz;
+  vec3 tip_side = texelFetch(cv_points, span_texel(span, point_of_strand.x), 0).xyz;
   StartSegment segment = start_segment(root_side, tip_side);
   for (int i = 1; i <= segment.count; i++) {
     vec3 place = mix(segment.from, segment.to, float(i) / float(segment.count));

@@ -7,37 +7,37 @@
 vec4 sums_of(int texel_of_map, ivec2 texel)
 {
   int layer = map_index * PASSES + texel_of_map / SLOTS;
-  ivec3 at = ivec3(texel, layer);
+  ivec3 array_texel = ivec3(texel, layer);
   int slot = texel_of_map % SLOTS;
 #if SLOTS > 5
   if (slot == 5) {
-    return texelFetch(opacity_5, at, 0);
+    return texelFetch(opacity_5, array_texel, 0);
   }
 #endif
 #if SLOTS > 4
   if (slot == 4) {
-    return texelFetch(opacity_4, at, 0);
+    return texelFetch(opacity_4, array_texel, 0);
   }
 #endif
 #if SLOTS > 3
   if (slot == 3) {
-    return texelFetch(opacity_3, at, 0);
+    return texelFetch(opacity_3, array_texel, 0);
   }
 #endif
 #if SLOTS > 2
   if (slot == 2) {
-    return texelFetch(opacity_2, at, 0);
+    return texelFetch(opacity_2, array_texel, 0);
   }
 #endif
 #if SLOTS > 1
   if (slot == 1) {
-    return texelFetch(opacity_1, at, 0);
+    return texelFetch(opacity_1, array_texel, 0);
   }
 #endif
-  return texelFetch(opacity_0, at, 0);
+  return texelFetch(opacity_0, array_texel, 0);
 }
 
-float shown(int tile, ivec2 texel)
+float layer_transmittance(int tile, ivec2 texel)
 {
 #if DEEP
   if (tile == 0) {
@@ -51,20 +51,20 @@ float shown(int tile, ivec2 texel)
 
 void main()
 {
-  ivec2 at = ivec2(gl_GlobalInvocationID.xy), size = imageSize(tiles);
-  if (any(greaterThanEqual(at, size))) {
+  ivec2 pixel = ivec2(gl_GlobalInvocationID.xy), size = imageSize(tiles);
+  if (any(greaterThanEqual(pixel, size))) {
     return;
   }
   int side = opacity.resolution / texels_across, pitch = side + {{tile_gap}};
-  ivec2 place = ivec2(at.x, size.y - 1 - at.y);
+  ivec2 place = ivec2(pixel.x, size.y - 1 - pixel.y);
   int tile = place.x / pitch + place.y / pitch * tile_columns;
-  ivec2 inside = ivec2(place.x % pitch, side - 1 - place.y % pitch);
+  ivec2 texel = ivec2(place.x % pitch, side - 1 - place.y % pitch);
   float grey = 0.0, count = float(texels_across * texels_across);
-  if (tile < tile_count && all(lessThan(inside, ivec2(side))) && inside.y >= 0) {
+  if (tile < tile_count && all(lessThan(texel, ivec2(side))) && texel.y >= 0) {
     for (int i = 0; i < texels_across * texels_across; i++) {
       ivec2 step_of = ivec2(i % texels_across, i / texels_across);
-      grey += shown(tile, inside * texels_across + step_of) / count;
+      grey += layer_transmittance(tile, texel * texels_across + step_of) / count;
     }
   }
-  imageStore(tiles, at, vec4(vec3(grey), 1.0));
+  imageStore(tiles, pixel, vec4(vec3(grey), 1.0));
 }

@@ -13,15 +13,15 @@ vec3 corner_of(int triangle, int corner)
 void main()
 {
   ivec2 texel = ivec2(gl_GlobalInvocationID.xy);
-  if (any(greaterThanEqual(texel, imageSize(reaching)))) {
+  if (any(greaterThanEqual(texel, imageSize(unblurred)))) {
     return;
   }
-  vec4 shown = texelFetch(skin_texels, texel, 0);
-  vec4 lit = vec4(1.0);
-  if (shown.w >= 0.0) {
-    int triangle = int(shown.x);
-    vec3 point = (1.0 - shown.y - shown.z) * corner_of(triangle, 0) +
-                 shown.y * corner_of(triangle, 1) + shown.z * corner_of(triangle, 2);
+  vec4 skin_texel = texelFetch(skin_texels, texel, 0);
+  vec4 light_fractions = vec4(1.0);
+  if (skin_texel.w >= 0.0) {
+    int triangle = int(skin_texel.x);
+    vec3 point = (1.0 - skin_texel.y - skin_texel.z) * corner_of(triangle, 0) +
+                 skin_texel.y * corner_of(triangle, 1) + skin_texel.z * corner_of(triangle, 2);
     vec3 facet = cross(corner_of(triangle, 1) - corner_of(triangle, 0),
                        corner_of(triangle, 2) - corner_of(triangle, 0));
     for (int index = 0; index < light_count; index++) {
@@ -32,9 +32,9 @@ void main()
 #else
         vec3 path = shadow_path_to_mesh(index, point, facet);
 #endif
-        lit[map] = light_left(path, vec3(skin_forward(hair_forward))).x;
+        light_fractions[map] = transmitted_light(path, vec3(skin_forward(hair_forward))).x;
       }
     }
   }
-  imageStore(reaching, texel, lit);
+  imageStore(unblurred, texel, light_fractions);
 }

@@ -26,12 +26,12 @@ vec4 shaded(vec4 hair)
 void main()
 {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
-  vec4 one = texelFetch(first_hair, pixel, 0), other = texelFetch(second_hair, pixel, 0);
+  vec4 first = texelFetch(first_hair, pixel, 0), second = texelFetch(second_hair, pixel, 0);
 #if !SHADES_ALL
-  if (is_bare(one) && is_bare(other)) {
+  if (is_bare(first) && is_bare(second)) {
     discard;
   }
 #endif
-  first_light = shaded(one);
-  second_light = shaded(other);
+  first_light = shaded(first);
+  second_light = shaded(second);
 }

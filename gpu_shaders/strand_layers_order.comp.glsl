@@ -150,8 +150,8 @@ vec2 total_transmittance(uint sorted)
   return vec2(transmittance, front);
 }
 
-// The light that each of LAYERS selected layers represents: layers with more light than that keep their own, and
-// the others share the rest evenly.
+// The light that each of LAYERS selected layers represents: layers with more light than that keep their own,
+// and the others share the rest evenly.
 float sample_weight(uint sorted, float covered)
 {
   float threshold = covered / float(LAYERS);

@@ -10,18 +10,18 @@
 void main()
 {
   int across = int(gl_NumWorkGroups.x * gl_WorkGroupSize.x);
-  int all = across * int(gl_NumWorkGroups.y);
-  int own = int(gl_GlobalInvocationID.x) + int(gl_GlobalInvocationID.y) * across;
+  int stride = across * int(gl_NumWorkGroups.y);
+  int invocation = int(gl_GlobalInvocationID.x) + int(gl_GlobalInvocationID.y) * across;
   int seen_count = int(imageLoad(layer_count, ivec2(2, 0)).x);
   int begin = 0;
   do {
-    bool is_seen = begin + own < seen_count;
-    ivec2 texel = layer_texel(imageLoad(layer_seen, layer_texel(uint(begin + own + 1))).x);
+    bool is_seen = begin + invocation < seen_count;
+    ivec2 texel = layer_texel(imageLoad(layer_seen, layer_texel(uint(begin + invocation + 1))).x);
     uvec4 node = is_seen ? imageLoad(layer_nodes, texel) : uvec4(0u);
     vec3 light = uintBitsToFloat(node.y) * layer_radiance(int(node.z), layer_place(node.w));
     if (is_seen) {
       imageStore(layer_nodes, texel, uvec4(node.x, floatBitsToUint(light)));
     }
-    begin += all;
+    begin += stride;
   } while (begin < seen_count);
 }

@@ -45,7 +45,7 @@ _SHADOW_RECIPE = ShaderRecipe(
     compute="skin_shadow.comp.glsl",
     structs=("struct_opacity.glsl", "struct_mesh_shadows.glsl"),
     textures=(("FLOAT_2D", "skin_texels"), ("FLOAT_2D", "skin_corners")),
-    images=(("RGBA32F", "reaching"),),
+    images=(("RGBA32F", "unblurred"),),
     integers=("light_count",),
     numbers=(("VEC3", "hair_forward"),),
 )
@@ -243,7 +243,7 @@ class SkinPass:
             [inputs.opacity.feature, *depths, *kind],
             self._blocks,
             textures={"skin_texels": texels, "skin_corners": corners},
-            images={"reaching": found},
+            images={"unblurred": found},
             integers={"light_count": inputs.light_count},
             numbers={"hair_forward": inputs.forward},
         )

@@ -183,9 +183,9 @@ def backscatter_shape(
     wide_b = np.sqrt((backward * widths**2).sum(axis=-1) / backward_sum)
     shift_f = (forward * shifts).sum(axis=-1) / forward_sum
     shift_b = (backward * shifts).sum(axis=-1) / backward_sum
-    rest = 1.0 - a_f**2
-    shift = shift_b * (1.0 - 2.0 * a_b**2 / rest**2) + shift_f * (
-        (2.0 * rest**2 + 4.0 * a_f**2 * a_b**2) / rest**3
+    remainder = 1.0 - a_f**2
+    shift = shift_b * (1.0 - 2.0 * a_b**2 / remainder**2) + shift_f * (
+        (2.0 * remainder**2 + 4.0 * a_f**2 * a_b**2) / remainder**3
     )
     limit = 0.25 * np.pi
     numerator = a_b * np.sqrt(2.0 * wide_f**2 + wide_b**2) + a_b**3 * np.sqrt(
@@ -354,7 +354,7 @@ def scattering_light(
     theta_i, theta_r, phi = angles
     cos_d = np.cos(0.5 * (theta_r - theta_i))
     straight = unscattered_fraction(normal, to_light, tau, shading)
-    passed_by = np.where(
+    passed_tau = np.where(
         np.asarray(tau) < 0.0, -np.log(np.maximum(straight, _MIN_LIGHT)), np.asarray(tau)
     )
     forward = fractions_at(sides.forward, cos_d, absorption)
@@ -366,7 +366,7 @@ def scattering_light(
         phi,
         forward,
         backward,
-        passed_by,
+        passed_tau,
         np.asarray(beyond),
         fibre_of(shading),
         density,
@@ -376,6 +376,6 @@ def scattering_light(
     outward = np.sum(normal * to_eye, axis=-1)
     return (
         scattered * np.cos(theta_i)[..., None]
-        + reflected_by_skin(phi, forward, backward, passed_by, np.asarray(beyond), facing, skin)
+        + reflected_by_skin(phi, forward, backward, passed_tau, np.asarray(beyond), facing, skin)
         + reflected_by_far_skin(outward, forward, backward, to_light, skin_seen, skin)
     )
