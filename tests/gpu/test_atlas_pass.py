@@ -33,14 +33,14 @@ def wavy(count: int, half: float, seed: int = 0) -> FlatStrands:
     start, phase = random.uniform(0.2, 0.8, count), random.uniform(0.0, 6.0, count)
     across = start[:, None] + 0.12 * np.sin(7.0 * along + phase[:, None])
     place = np.stack(np.broadcast_arrays(across, along), axis=-1)
-    way = np.gradient(place, axis=1)
-    way /= np.linalg.norm(way, axis=-1, keepdims=True)
+    direction = np.gradient(place, axis=1)
+    direction /= np.linalg.norm(direction, axis=-1, keepdims=True)
     taper = np.linspace(1.0, 0.5, STATIONS)[:, None]
     depth = random.random((count, 1)) + 0.1 * np.sin(9.0 * along)
-    tangent = np.concatenate([way, random.uniform(-0.3, 0.3, (count, STATIONS, 1))], axis=-1)
+    tangent = np.concatenate([direction, random.uniform(-0.3, 0.3, (count, STATIONS, 1))], axis=-1)
     parts = (
         place,
-        half * taper * np.stack([way[..., 1], -way[..., 0]], axis=-1),
+        half * taper * np.stack([direction[..., 1], -direction[..., 0]], axis=-1),
         random.random((count, STATIONS)),
         np.clip(depth, 0.0, 1.0),
         tangent / np.linalg.norm(tangent, axis=-1, keepdims=True),
@@ -103,17 +103,17 @@ def test_no_strands_are_an_empty_atlas(baked_maps: Any) -> None:
 
 def test_functions_agree_with_their_twins(compute: Any) -> None:
     random = np.random.default_rng(3)
-    way = random.normal(size=(16, 16, 3))
-    way /= np.linalg.norm(way, axis=-1, keepdims=True)
-    way[0, 0] = (0.0, 0.0, 1.0)
+    direction = random.normal(size=(16, 16, 3))
+    direction /= np.linalg.norm(direction, axis=-1, keepdims=True)
+    direction[0, 0] = (0.0, 0.0, 1.0)
     side = random.uniform(-1.0, 1.0, (16, 16))
-    ways = np.concatenate([way, side[..., None]], axis=-1).astype(np.float32)
+    directions = np.concatenate([direction, side[..., None]], axis=-1).astype(np.float32)
     numbers = np.floor(random.random((16, 16, 4)) * (16384, 16384, 50_000, 1.0))
     numbers[..., 3] = random.random((16, 16))
     numbers = numbers.astype(np.float32)
 
-    normals = compute("atlas_normal.glsl", (16, 16), textures={"ways": ways})
-    reference = fibre_normal(ways[..., :3].astype(float), ways[..., 3].astype(float))
+    normals = compute("atlas_normal.glsl", (16, 16), textures={"directions": directions})
+    reference = fibre_normal(directions[..., :3].astype(float), directions[..., 3].astype(float))
     np.testing.assert_allclose(normals[..., :3], reference, atol=1e-5)
 
     found = compute("atlas_place.glsl", (16, 16), textures={"numbers": numbers})

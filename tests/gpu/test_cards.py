@@ -229,8 +229,10 @@ def test_four_passes_match_sorting(frame: Any, front: Any) -> None:
         layers.append((alone, alone[..., 3] > 0.0))
     expected = over(layers, background)
     assert np.abs(drawn - expected).max() < 1.0e-5
-    shares = [float(((layer[..., 3] > 0.0) & (layer[..., 3] < 1.0)).mean()) for layer, _ in layers]
-    assert min(shares) > 0.02, "every card must be partly transparent"
+    fractions = [
+        float(((layer[..., 3] > 0.0) & (layer[..., 3] < 1.0)).mean()) for layer, _ in layers
+    ]
+    assert min(fractions) > 0.02, "every card must be partly transparent"
 
 
 def test_opaque_parts_hide_what_is_drawn_later_behind_them(frame: Any, front: Any) -> None:

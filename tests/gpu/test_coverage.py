@@ -47,11 +47,11 @@ def covered(snapshot, camera, width: int, height: int, samples: int = 1) -> np.n
     along /= np.linalg.norm(along, axis=-1, keepdims=True)
     across = np.stack([-along[..., 1], along[..., 0]], axis=-1)
 
-    share = np.linspace(0.0, 1.0, pixels.shape[1])
-    cv_share = np.linspace(0.0, 1.0, points.shape[1])
+    fraction = np.linspace(0.0, 1.0, pixels.shape[1])
+    cv_fraction = np.linspace(0.0, 1.0, points.shape[1])
     radii = snapshot.radius.reshape(snapshot.strand_count, -1)
-    radius = np.stack([np.interp(share, cv_share, own) for own in radii])
-    taper = 1.0 + share * (settings.tip_width - 1.0)
+    radius = np.stack([np.interp(fraction, cv_fraction, own) for own in radii])
+    taper = 1.0 + fraction * (settings.tip_width - 1.0)
     focal = camera.projection[1, 1] * height / 2.0
     minimum = settings.minimum_width * samples
     half = np.maximum(radius * settings.fullness * focal / depth, minimum / 2.0) * taper

@@ -36,11 +36,15 @@ def curly(strand_count: int, cv_count: int) -> np.ndarray:
     random = np.random.default_rng(cv_count)
     out = random.normal(size=(strand_count, 1, 3))
     out /= np.linalg.norm(out, axis=2, keepdims=True)
-    share = np.linspace(0.0, 1.0, cv_count)[None, :, None]
+    fraction = np.linspace(0.0, 1.0, cv_count)[None, :, None]
     curl = random.random((strand_count, 1, 1)) * 0.04
     phase = random.random((strand_count, 1, 3)) * 7.0
-    waves = share * curl * np.sin(share * cv_count * random.uniform(0.3, 2.0, phase.shape) + phase)
-    return (out * (0.1 + 0.2 * share) + waves).astype(np.float32)
+    waves = (
+        fraction
+        * curl
+        * np.sin(fraction * cv_count * random.uniform(0.3, 2.0, phase.shape) + phase)
+    )
+    return (out * (0.1 + 0.2 * fraction) + waves).astype(np.float32)
 
 
 def snapshot_of(frame: Any, strands: np.ndarray, detail: DetailSettings, **more: Any) -> Any:
@@ -364,14 +368,16 @@ def test_thinned_strands_are_those_of_low_rank_and_fade(frame: Any) -> None:
     """As the groom gets smaller, each strand gets thinner before it disappears."""
     strands = curly(400, 5)
     rank = np.random.default_rng(7).permutation(400) / 400.0
-    camera, shares = cameras(frame)["whole"], []
+    camera, fractions = cameras(frame)["whole"], []
     for lod_size in (100.0, 250.0, 400.0, 1000.0):
         detail = dataclasses.replace(BARE, lod_size=lod_size)
         _, order = computed(strands, camera, detail, rank=rank)
         drawn = drawn_of(order)
         assert rank[drawn].max() < np.delete(rank, drawn).min(initial=1.0)
-        shares.append(len(drawn) / len(strands))
-    assert shares[0] == 1.0 and (np.diff(shares) <= 0.0).all() and 0.125 <= shares[-1] < 0.5
+        fractions.append(len(drawn) / len(strands))
+    assert (
+        fractions[0] == 1.0 and (np.diff(fractions) <= 0.0).all() and 0.125 <= fractions[-1] < 0.5
+    )
 
 
 def test_an_instance_that_is_scaled_is_thinned_as_large_as_it_is(frame: Any) -> None:

@@ -125,7 +125,7 @@ def test_scattering_light(compute: Callable[..., np.ndarray], settings: ShadingS
         np.array([0.6, 0.4, 0.3]),
         tau=exact[3, ..., 3],
         beyond=exact[2, ..., 3],
-        seen=SkinSeen(received, beneath[..., 3], beneath[..., :3]),
+        skin_seen=SkinSeen(received, beneath[..., 3], beneath[..., :3]),
     )
     assert (np.abs(found - expected) <= 0.01 * expected + 1e-4).mean() > 0.99
     assert np.abs(found - expected).max() <= 0.02 * expected.max()

@@ -21,8 +21,8 @@ pytestmark = pytest.mark.usefixtures("gpu_context")
 def rig() -> Rig:
     """120 strands of 0.2 m; two balls hold some of them, a sheet holds some tips."""
     random = np.random.default_rng(3)
-    way = random.normal([0.0, 0.0, 0.4], 0.4, (120, 12, 3)) * 0.02
-    points = random.normal(0.0, 0.02, (120, 1, 3)) + way.cumsum(axis=1)
+    direction = random.normal([0.0, 0.0, 0.4], 0.4, (120, 12, 3)) * 0.02
+    points = random.normal(0.0, 0.02, (120, 1, 3)) + direction.cumsum(axis=1)
     strands = StrandSet(
         points.reshape(-1, 3),
         np.arange(121) * 12,

@@ -182,8 +182,8 @@ def test_a_place_sums_the_optical_depth_of_all_other_grooms(gpu_context: Any) ->
         texture = InterGroomShadow().other_tau(
             texture_from(aside, "RGBA32F"), None, [(0, of_both)], count
         )
-        way = texture_to_array(texture)[0, 0]
-        assert way[0] == 0.0 and (way[1] > 0.0) == (count == 2)
+        direction = texture_to_array(texture)[0, 0]
+        assert direction[0] == 0.0 and (direction[1] > 0.0) == (count == 2)
 
 
 def test_grooms_may_cast_shadows_from_each_side_but_not_without_light(gpu_context: Any) -> None:

@@ -20,7 +20,7 @@ from hairloom.addon.strands.arc_length import segment_lengths
 
 pytestmark = pytest.mark.usefixtures("gpu_context")
 
-KEPT, MOVED = 0.001, 2.0e-4  # [m]
+CLEARANCE, MOVED = 0.001, 2.0e-4  # [m]
 
 
 def posed(*, moved: float) -> tuple[PosedCollider, ...]:
@@ -42,18 +42,18 @@ def posed(*, moved: float) -> tuple[PosedCollider, ...]:
     return tuple(PosedCollider(solid, matrix, matrix) for solid in solids)
 
 
-def strands(count: int, fewest: int, most: int) -> tuple[np.ndarray, np.ndarray]:
+def strands(count: int, min_points: int, max_points: int) -> tuple[np.ndarray, np.ndarray]:
     """Wavy strands from all sides through the solids."""
     random = np.random.default_rng(2)
-    counts = random.integers(fewest, most + 1, count)
+    counts = random.integers(min_points, max_points + 1, count)
     points = []
     for number in counts:
-        begin, way = random.normal(size=3), random.normal(size=3)
+        begin, direction = random.normal(size=3), random.normal(size=3)
         begin *= 0.2 / np.linalg.norm(begin)
-        way = way - 12.0 * begin
+        direction = direction - 12.0 * begin
         along = np.linspace(0.0, 0.35, number)[:, None]
         wave = 0.004 * np.sin(40.0 * along) * random.normal(size=3)
-        points.append(begin + along * way / np.linalg.norm(way) + wave)
+        points.append(begin + along * direction / np.linalg.norm(direction) + wave)
     offsets = np.concatenate([[0], np.cumsum(counts)])
     return np.concatenate(points).astype(np.float32), offsets
 
@@ -70,12 +70,12 @@ def with_held(clearance: Clearance, offsets: np.ndarray) -> Clearance:
 
 
 @pytest.mark.parametrize(
-    ("fewest", "most", "can_read_own_writes"),
+    ("min_points", "max_points", "can_read_own_writes"),
     [(9, 9, True), (9, 9, False), (2, 60, True)],
     ids=["at once", "as on Metal", "in parts"],
 )
 def test_equals_numpy(
-    monkeypatch: pytest.MonkeyPatch, fewest: int, most: int, can_read_own_writes: bool
+    monkeypatch: pytest.MonkeyPatch, min_points: int, max_points: int, can_read_own_writes: bool
 ) -> None:
     from hairloom.addon.render import lead_out_pass
     from hairloom.addon.render.collider_textures import UploadedColliders
@@ -85,7 +85,7 @@ def test_equals_numpy(
     from hairloom.addon.render.textures import texture_from, texture_to_array
 
     monkeypatch.setattr(lead_out_pass, "can_read_own_writes", lambda: can_read_own_writes)
-    points, offsets = strands(600, fewest, most)
+    points, offsets = strands(600, min_points, max_points)
     layout = StrandLayout(offsets)
     texels = layout.pixels(np.column_stack([points, np.full(len(points), 1e-4)]))
     now = texture_from(texels, "RGBA32F")
@@ -113,7 +113,7 @@ def test_equals_numpy(
     lead(now, posed(moved=0.0))
     np.testing.assert_array_equal(found()[:, :3], points, "no motion has begun")
 
-    clearance = with_held(clearance_at(points, offsets, posed(moved=-0.05), KEPT), offsets)
+    clearance = with_held(clearance_at(points, offsets, posed(moved=-0.05), CLEARANCE), offsets)
     leading.set_clearance(clearance)
     expected = points.copy()
     led, _ = lead_out(
@@ -128,11 +128,11 @@ def test_equals_numpy(
     np.testing.assert_array_equal(found()[:, 3], np.float32(1e-4), "radii stay")
 
     away = np.linalg.norm(points - carried, axis=1)
-    wanted = np.minimum(clearance.points + away, np.float32(KEPT))
+    wanted = np.minimum(clearance.points + away, np.float32(CLEARANCE))
 
     def stuck(places: np.ndarray) -> float:
-        lack = wanted - signed_distance(places, posed(moved=0.0), KEPT)[0]
-        return float((np.maximum.reduceat(lack, offsets[:-1]) > 0.1 * KEPT).mean())
+        shortfall = wanted - signed_distance(places, posed(moved=0.0), CLEARANCE)[0]
+        return float((np.maximum.reduceat(shortfall, offsets[:-1]) > 0.1 * CLEARANCE).mean())
 
     assert abs(stuck(found()[:, :3]) - stuck(expected)) < 0.01
     assert stuck(points) > 0.2
@@ -156,8 +156,8 @@ def test_points_that_were_led_out_earlier_are_stored() -> None:
     from hairloom.addon.render.strand_layout import StrandLayout
     from hairloom.addon.render.textures import texture_from, texture_to_array
 
-    for fewest, most in ((16, 16), (2, 60)):
-        points, offsets = strands(600, fewest, most)
+    for min_points, max_points in ((16, 16), (2, 60)):
+        points, offsets = strands(600, min_points, max_points)
         layout = StrandLayout(offsets)
         now = texture_from(layout.pixels(np.pad(points, ((0, 0), (0, 1)))), "RGBA32F")
         led = LedOut.of(np.array([0, 7, 599]), points + np.float32(0.5), offsets)

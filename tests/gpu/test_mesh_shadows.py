@@ -59,13 +59,13 @@ SCENE = (ground(), *(box(*each) for each in BOXES))
 
 def is_lit(light: Light, points: np.ndarray) -> np.ndarray:
     """Whether no box blocks the light, by ray tests against the slabs of its faces."""
-    way = np.asarray(light.vector) - (0.0 if light.kind == "sun" else points)
-    way = np.broadcast_to(way, points.shape)
+    direction = np.asarray(light.vector) - (0.0 if light.kind == "sun" else points)
+    direction = np.broadcast_to(direction, points.shape)
     farthest = np.inf if light.kind == "sun" else 1.0
     lit = np.ones(len(points), bool)
     for center, side in BOXES:
         with np.errstate(divide="ignore"):
-            ends = [(np.array(center) + sign * 0.5 * side - points) / way for sign in (-1, 1)]
+            ends = [(np.array(center) + sign * 0.5 * side - points) / direction for sign in (-1, 1)]
         enters, leaves = np.minimum(*ends).max(axis=1), np.maximum(*ends).min(axis=1)
         lit &= ~((enters < leaves) & (leaves > 1e-9) & (enters < farthest))
     return lit
@@ -122,7 +122,7 @@ def test_shadows_on_the_ground_are_those_of_rays(
     aside = texels * texel_at(light, points)[:, None]
     ways = [aside * np.array([np.cos(a), np.sin(a), 0.0]) for a in np.arange(0.0, 6.2, 0.7854)]
     expected = is_lit(light, points)
-    is_clear = np.all([is_lit(light, points + way) == expected for way in ways], axis=0)
+    is_clear = np.all([is_lit(light, points + direction) == expected for direction in ways], axis=0)
     under = [np.abs(points - center)[:, :2].max(axis=1) < 0.5 * side for center, side in BOXES]
     is_clear &= ~np.any(under, axis=0)
     is_clear &= light_irradiance(light, points).sum(axis=1) > 0.0

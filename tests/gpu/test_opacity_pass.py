@@ -295,13 +295,13 @@ def test_the_map_holds_as_much_of_a_strand_itself_as_is_subtracted(
             ends *= 0.1 / np.linalg.norm(ends, axis=1, keepdims=True)
             strand = (ends[0] + np.linspace(0, 1, 33)[:, None] * (ends[1] - ends[0]))[None]
             strand, widths = strand.astype(np.float32), np.full((1, 33), radius, np.float32)
-            way = ends[1] - ends[0]
-            along = np.broadcast_to(way / np.linalg.norm(way), (17, 3))
+            direction = ends[1] - ends[0]
+            along = np.broadcast_to(direction / np.linalg.norm(direction), (17, 3))
             for ball in balls(strand):
                 maps, _ = drawn(strand, widths, light, settings, ball=ball)
                 frame = light_frame(light, ball)
                 assert frame is not None
-                points = strand[0, 8:-8] + random.uniform(-0.5, 0.5, (17, 1)) * way / 32
+                points = strand[0, 8:-8] + random.uniform(-0.5, 0.5, (17, 1)) * direction / 32
                 half_width = radius * frame.strand_breadth(points, along) * 256
                 path = path_at(compute, maps, points)
                 found.append(path[:, 0] + path[:, 1])
@@ -351,10 +351,10 @@ def test_less_opaque_strands_cast_less_shadow(
     maps, ball = drawn(strands, radius, LIGHTS["sun"], settings, look)
     frame = light_frame(LIGHTS["sun"], ball)
     assert frame is not None
-    share = 1.0 if transparency == "none" else opacity
-    expected = coverage(strands, radius, frame, 64, share).covered.sum()
+    fraction = 1.0 if transparency == "none" else opacity
+    expected = coverage(strands, radius, frame, 64, fraction).covered.sum()
     assert layers_of(maps)[..., 7].sum() == pytest.approx(expected, rel=2e-2, abs=1e-6)
-    assert expected == pytest.approx(share * coverage(strands, radius, frame, 64).covered.sum())
+    assert expected == pytest.approx(fraction * coverage(strands, radius, frame, 64).covered.sum())
 
 
 @pytest.mark.parametrize("light", LIGHTS.values(), ids=LIGHTS)

@@ -58,10 +58,10 @@ def rig_on(
         triangle = np.arange(count) % len(head.triangles)
         barycentric = random.dirichlet((1.0, 1.0, 1.0), count).astype(np.float32)
         root = np.einsum("sk,skj->sj", barycentric, head.corners[triangle])
-    way = random.normal(size=(count, cv_count, 3)) * 0.2 / cv_count
-    way[:, 0] = above
+    direction = random.normal(size=(count, cv_count, 3)) * 0.2 / cv_count
+    direction[:, 0] = above
     strands = StrandSet(
-        points=(root[:, None] + way.cumsum(axis=1)).reshape(-1, 3),
+        points=(root[:, None] + direction.cumsum(axis=1)).reshape(-1, 3),
         offsets=np.arange(count + 1) * cv_count,
         radius=random.random(count * cv_count) * 1.0e-4,
         group=np.zeros(count, np.int32),
@@ -286,9 +286,9 @@ def test_curls_are_drawn_out_as_in_numpy() -> None:
     ride, matrix = pass_of(rig), turned(0.7, (0.1, 0.0, 0.0))
     pose = Pose(None, matrix)
     guides = motion_flow.carried_guides(rig, pose).astype(np.float64)
-    way = np.diff(guides, axis=1) * np.random.default_rng(6).uniform(0.7, 1.9, (30, 1, 1))
-    way += np.random.default_rng(7).normal(scale=0.002, size=way.shape)
-    now = np.concatenate([guides[:, :1], guides[:, :1] + way.cumsum(axis=1)], axis=1)
+    direction = np.diff(guides, axis=1) * np.random.default_rng(6).uniform(0.7, 1.9, (30, 1, 1))
+    direction += np.random.default_rng(7).normal(scale=0.002, size=direction.shape)
+    now = np.concatenate([guides[:, :1], guides[:, :1] + direction.cumsum(axis=1)], axis=1)
     expected = motion_flow.strands_at(rig, pose, now.astype(np.float32))
     found = shown(ride, pose, now.astype(np.float32))
     assert np.abs(found - expected).max() < 2.0 * TOLERANCE

@@ -281,10 +281,10 @@ def test_more_layers_in_a_pixel_than_a_software_driver_can_count(
     picture = frame.render_image(sheets(frame, depths, opacity), front, 1, 1, 1, passes=passes)[
         0, 0
     ]
-    share = alpha * (1.0 - alpha) ** np.arange(count)
+    fraction = alpha * (1.0 - alpha) ** np.arange(count)
     assert picture[3] == pytest.approx(1.0, abs=1e-3)
     # each of the eight shaded layers can represent an eighth of the light
-    assert picture[:3] == pytest.approx(float(share @ brightness_of(depths)), abs=0.125 * 0.8)
+    assert picture[:3] == pytest.approx(float(fraction @ brightness_of(depths)), abs=0.125 * 0.8)
     assert passes[1].statistics.layers.missing == 0
 
 

@@ -117,16 +117,16 @@ def layers_of(
     run = seen[:, 1] - seen[:, 0]
     length = np.linalg.norm(run, axis=-1)
     away = pixel[:, None] - seen[None, :, 0]
-    share = (away * run).sum(-1) / length**2
+    fraction = (away * run).sum(-1) / length**2
     distance = (away[..., 0] * -run[:, 1] + away[..., 1] * run[:, 0]) / length
     normal = np.abs(np.stack([-run[:, 1], run[:, 0]], axis=-1) / length[:, None])
     focal = camera.projection[1, 1] * SIZE / 2.0
     half = width / 2.0 * focal / w
-    half = half[:, 0] + share * (half[:, 1] - half[:, 0])
+    half = half[:, 0] + fraction * (half[:, 1] - half[:, 0])
     alpha = opacity * strip_coverage(distance, half, np.broadcast_to(normal, away.shape))
-    alpha[(share < 0.0) | (share > 1.0)] = 0.0
-    depth = clip[:, 0, 2] / w[:, 0] * (1.0 - share) + clip[:, 1, 2] / w[:, 1] * share
-    along = share / w[:, 1] / ((1.0 - share) / w[:, 0] + share / w[:, 1])
+    alpha[(fraction < 0.0) | (fraction > 1.0)] = 0.0
+    depth = clip[:, 0, 2] / w[:, 0] * (1.0 - fraction) + clip[:, 1, 2] / w[:, 1] * fraction
+    along = fraction / w[:, 1] / ((1.0 - fraction) / w[:, 0] + fraction / w[:, 1])
     return depth, np.round(alpha * 4095.0) / 4095.0, along
 
 
@@ -184,10 +184,10 @@ def seen_at_points(strands: np.ndarray, width: float, brightness: np.ndarray) ->
     run = ends[:, 1] - ends[:, 0]
     length = np.linalg.norm(run, axis=-1)
     away = places[:, None] - ends[None, :, 0]
-    share = (away * run).sum(-1) / length**2
+    fraction = (away * run).sum(-1) / length**2
     distance = (away[..., 0] * -run[:, 1] + away[..., 1] * run[:, 0]) / length
-    is_there = (np.abs(distance) < width / 2.0) & (share >= 0.0) & (share <= 1.0)
-    depth = strands[:, 0, 1] + share * (strands[:, 1, 1] - strands[:, 0, 1])
+    is_there = (np.abs(distance) < width / 2.0) & (fraction >= 0.0) & (fraction <= 1.0)
+    depth = strands[:, 0, 1] + fraction * (strands[:, 1, 1] - strands[:, 0, 1])
     nearest = np.where(is_there, depth, np.inf).argmin(axis=1)
     return float(brightness[nearest[is_there.any(axis=1)]].mean())
 
@@ -227,14 +227,14 @@ def test_shaded_layers_represent_all_layers() -> None:
     depths, alphas = random.random((500, 60)), 0.3 * random.random((500, 60)) ** 2
     alphas[:, 7] = 0.6
     exact = layer_fractions(depths, alphas, layers=60, unseen_fraction=0.0)
-    shares = layer_fractions(depths, alphas)
+    fractions = layer_fractions(depths, alphas)
     covered = 1.0 - np.prod(1.0 - alphas, axis=1)
-    assert ((shares > 0.0).sum(axis=1) <= LAYERS).all()
-    assert shares.sum(axis=1) == pytest.approx(covered)
+    assert ((fractions > 0.0).sum(axis=1) <= LAYERS).all()
+    assert fractions.sum(axis=1) == pytest.approx(covered)
     assert exact.sum(axis=1) == pytest.approx(covered)
     is_large = exact > covered[:, None] / LAYERS
-    assert is_large.any() and shares[is_large] == pytest.approx(exact[is_large])
-    of_depth = (shares * depths).sum(axis=1) - (exact * depths).sum(axis=1)
+    assert is_large.any() and fractions[is_large] == pytest.approx(exact[is_large])
+    of_depth = (fractions * depths).sum(axis=1) - (exact * depths).sum(axis=1)
     assert abs(of_depth.mean()) < 0.01 and np.abs(of_depth).max() < 0.05
 
 

@@ -4,6 +4,6 @@
 void main()
 {
   ivec2 texel = ivec2(gl_GlobalInvocationID.xy);
-  vec4 way = texelFetch(ways, texel, 0);
-  imageStore(result, texel, vec4(fibre_normal(way.xyz, way.w), 0.0));
+  vec4 direction = texelFetch(directions, texel, 0);
+  imageStore(result, texel, vec4(fibre_normal(direction.xyz, direction.w), 0.0));
 }

@@ -38,9 +38,9 @@ def straight_hair(count: int, radius: float = 1e-3) -> StrandSet:
 
 def test_the_sky_is_whole_and_its_directions_integrate_polynomials() -> None:
     """Lebedev's 26 points are exact up to degree 7: means of x^2, x^4, x^2 y^2 and z^6."""
-    steps, shares = zip(*sky_directions(0.0), strict=True)
+    steps, fractions = zip(*sky_directions(0.0), strict=True)
     unit = np.array(steps) / np.linalg.norm(steps, axis=1, keepdims=True)
-    weight = np.array(shares)
+    weight = np.array(fractions)
     x, y, z = unit.T
     assert weight.sum() == pytest.approx(1.0)
     assert weight @ unit == pytest.approx([0.0] * 3, abs=1e-15)
@@ -48,8 +48,8 @@ def test_the_sky_is_whole_and_its_directions_integrate_polynomials() -> None:
     for mean, values in exact.items():
         assert weight @ values == pytest.approx(mean)
     for upper_fraction in (0.3, 1.0):
-        some = [(step, share) for step, share in sky_directions(upper_fraction)]
-        assert sum(share for _, share in some) == pytest.approx(1.0)
+        some = [(step, fraction) for step, fraction in sky_directions(upper_fraction)]
+        assert sum(fraction for _, fraction in some) == pytest.approx(1.0)
     assert all(step[2] > 0 for step, _ in sky_directions(1.0))
 
 
@@ -73,12 +73,12 @@ def test_uniform_slab_in_closed_form() -> None:
     for cell in range(2, 22):
         above, below = (21.5 - cell) * 0.11, (cell - 1.5) * 0.11
         expected = 0.0
-        for (x, y, z), share in sky_directions(0.0):
+        for (x, y, z), fraction in sky_directions(0.0):
             if z:
                 slant = np.linalg.norm((x, y, z))
-                expected += share * np.exp(-(above if z > 0 else below) * slant)
+                expected += fraction * np.exp(-(above if z > 0 else below) * slant)
             else:
-                expected += share * np.exp(-75.5 * 0.11 * np.linalg.norm((x, y)))
+                expected += fraction * np.exp(-75.5 * 0.11 * np.linalg.norm((x, y)))
         assert found[cell] == pytest.approx(expected, rel=1e-4)
     assert found[0] > 0.5
 
@@ -122,8 +122,8 @@ def test_agrees_with_rays_marched_one_by_one() -> None:
     expected = []
     for start in grid.coordinates(points):
         rays = [
-            share * np.exp(-marched(depth, start, np.array(step) / np.linalg.norm(step)))
-            for step, share in sky_directions(0.0)
+            fraction * np.exp(-marched(depth, start, np.array(step) / np.linalg.norm(step)))
+            for step, fraction in sky_directions(0.0)
         ]
         expected.append(sum(rays))
     assert np.ptp(expected) > 0.3

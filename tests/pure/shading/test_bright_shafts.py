@@ -105,9 +105,9 @@ def test_two_windows_far_apart_each_throw_their_own() -> None:
 def test_all_that_is_bright_belongs_to_regions_in_full() -> None:
     random = np.random.default_rng(4)
     seen = np.where(random.random((HEIGHT, WIDTH, 1)) < 0.1, 9.0 * random.random(3), 0.0)
-    shares = [each.weights for each in regions_of(seen).regions]
-    assert len(shares) <= 6
-    assert (np.sum(shares, axis=0) == 1.0).all()
+    fractions = [each.weights for each in regions_of(seen).regions]
+    assert len(fractions) <= 6
+    assert (np.sum(fractions, axis=0) == 1.0).all()
 
 
 def test_light_that_moves_moves_its_shafts_without_a_jump() -> None:
@@ -134,9 +134,11 @@ def test_beside_a_window_its_light_falls_by_the_formula() -> None:
 def test_a_strand_before_a_window_cuts_a_shaft_behind_itself_alone() -> None:
     seen = window()
     seen[58:62, 85:100, :3] = 0.0
-    share = added(seen)[..., 0] / added(window())[..., 0]
-    assert share[60, 104] < 0.6 and share[60, 104] == pytest.approx(share[60, 130], abs=0.1)
-    assert share[60, 56] > 0.99 and share[100, 80] > 0.98 and share[75, 120] > 0.98
+    fraction = added(seen)[..., 0] / added(window())[..., 0]
+    assert fraction[60, 104] < 0.6 and fraction[60, 104] == pytest.approx(
+        fraction[60, 130], abs=0.1
+    )
+    assert fraction[60, 56] > 0.99 and fraction[100, 80] > 0.98 and fraction[75, 120] > 0.98
 
 
 def test_half_a_cover_cuts_half_of_it() -> None:

@@ -72,8 +72,8 @@ def test_spot_is_a_point_light_inside_of_its_cone() -> None:
     middle = np.arccos(1.0 - 0.75 * (1.0 - np.cos(np.radians(30.0))))
     angles = np.array([0.0, np.radians(20.0), middle, np.radians(30.01), np.pi / 2.0, np.pi])
     points = 2.0 * np.stack([np.sin(angles), 0.0 * angles, 1.0 - np.cos(angles)], axis=1)
-    share = light_irradiance(spot, points)[:, 0] / light_irradiance(point, points)[:, 0]
-    assert share == pytest.approx([1.0, 1.0, 0.5, 0.0, 0.0, 0.0], abs=1e-5)
+    fraction = light_irradiance(spot, points)[:, 0] / light_irradiance(point, points)[:, 0]
+    assert fraction == pytest.approx([1.0, 1.0, 0.5, 0.0, 0.0, 0.0], abs=1e-5)
 
 
 def panel_light(*sides: float, is_round: bool = False, spread: float = np.pi) -> Light:

@@ -59,26 +59,26 @@ def traced_tilt(tilt: float, index: float) -> tuple[float, float, float]:
     The scales' outer normals lean towards the root; x points to the tip, y to the light.
     """
 
-    def mirror(way: Floats, normal: Floats) -> Floats:
-        return way - 2.0 * (way @ normal) * normal
+    def mirror(direction: Floats, normal: Floats) -> Floats:
+        return direction - 2.0 * (direction @ normal) * normal
 
-    def pass_through(way: Floats, normal: Floats, ratio: float) -> Floats:
-        normal = normal if way @ normal < 0.0 else -normal
-        cosine = -(way @ normal)
+    def pass_through(direction: Floats, normal: Floats, ratio: float) -> Floats:
+        normal = normal if direction @ normal < 0.0 else -normal
+        cosine = -(direction @ normal)
         behind = np.sqrt(1.0 - ratio**2 * (1.0 - cosine**2))
-        return ratio * way + (ratio * cosine - behind) * normal
+        return ratio * direction + (ratio * cosine - behind) * normal
 
     top = np.array([-np.sin(tilt), np.cos(tilt)])
     bottom = np.array([-np.sin(tilt), -np.cos(tilt)])
     light = np.array([0.0, -1.0])
     inside = pass_through(light, top, 1.0 / index)
-    ways = (
+    directions = (
         mirror(light, top),
         pass_through(inside, bottom, index),
         pass_through(mirror(inside, bottom), top, index),
     )
-    leans = [float(np.arcsin(way[0])) for way in ways]
-    return (leans[0], leans[1], leans[2])
+    inclinations = [float(np.arcsin(direction[0])) for direction in directions]
+    return (inclinations[0], inclinations[1], inclinations[2])
 
 
 def test_r_leaves_towards_the_root_and_trt_towards_the_tip() -> None:

@@ -94,11 +94,11 @@ def test_a_bar_throws_its_shaft_away_from_the_light_and_only_there() -> None:
     alpha[50:70, 60:64], depth[50:70, 60:64] = 1.0, 0.5
     black = np.zeros((HEIGHT, WIDTH, 4))
     open_picture = light_shafts(black, *NOTHING, [light], ON.samples)[..., 0]
-    share = light_shafts(black, alpha, depth, [light], ON.samples)[..., 0] / open_picture
-    assert share[60, 66] < 0.92 and share[60, 66] < share[60, 90] < share[60, 130] < 1.0
-    assert share[60, :58].min() > 0.999 and share[90, 66:108].min() > 0.999
+    fraction = light_shafts(black, alpha, depth, [light], ON.samples)[..., 0] / open_picture
+    assert fraction[60, 66] < 0.92 and fraction[60, 66] < fraction[60, 90] < fraction[60, 130] < 1.0
+    assert fraction[60, :58].min() > 0.999 and fraction[90, 66:108].min() > 0.999
     # at twice the bar's distance from the light, the shaft is twice as wide
-    assert share[60 + 16, 90] < 0.999 and share[60 + 24, 90] > 0.999
+    assert fraction[60 + 16, 90] < 0.999 and fraction[60 + 24, 90] > 0.999
 
 
 def test_only_what_is_nearer_than_the_light_throws_a_shaft() -> None:

@@ -21,8 +21,8 @@ def spread(values: np.ndarray, layout: SkinLayout, softness: float) -> np.ndarra
 
 def both_sides(values: np.ndarray, layout: SkinLayout) -> tuple[np.ndarray, np.ndarray]:
     """Values at places along all seams, read from one side and from the other."""
-    share = np.linspace(0.0, 1.0, 9)[None, :, None]
-    place = layout.seams[:, :1] * (1.0 - share) + layout.seams[:, 1:] * share
+    fraction = np.linspace(0.0, 1.0, 9)[None, :, None]
+    place = layout.seams[:, :1] * (1.0 - fraction) + layout.seams[:, 1:] * fraction
     islands = np.repeat(layout.seam_islands, 9, axis=0)
     one, two = (
         soft_shadow(

@@ -72,14 +72,16 @@ def test_vertices_that_a_file_has_split_are_one(two_islands: Surface) -> None:
     assert len(one.seams) == len(other.seams) > 0
 
 
-@pytest.mark.parametrize("way", ["moved", "mirrored", "larger"])
-def test_the_position_of_a_map_in_uv_space_does_not_matter(two_islands: Surface, way: str) -> None:
+@pytest.mark.parametrize("change", ["moved", "mirrored", "larger"])
+def test_the_position_of_a_map_in_uv_space_does_not_matter(
+    two_islands: Surface, change: str
+) -> None:
     uv = two_islands.corner_uv
     assert uv is not None
-    changed = {"moved": uv + (7.0, -3.0), "mirrored": uv * (-1.0, 1.0), "larger": uv * 20.0}[way]
+    changed = {"moved": uv + (7.0, -3.0), "mirrored": uv * (-1.0, 1.0), "larger": uv * 20.0}[change]
     surface = replace(two_islands, corner_uv=changed)
     before, layout = skin_layout(two_islands, 128), skin_layout(surface, 128)
-    island = before.island[:, ::-1] if way == "mirrored" else before.island
+    island = before.island[:, ::-1] if change == "mirrored" else before.island
     # float32 rounding changes single texels on borders
     assert ((island >= 0) != (layout.island >= 0)).mean() < 0.002
     assert uv_notes(surface) == ()

@@ -113,9 +113,9 @@ def test_even_cards_count_the_same_from_all_sides_of_their_strands() -> None:
     average as much as an uncompensated one."""
     turns = np.linspace(0.0, 2.0 * np.pi, 3000, endpoint=False)
     across = 3.0 * np.stack([np.cos(turns), np.sin(turns), 0.0 * turns], axis=-1)
-    tangent, way = np.array([0.0, 0.0, 1.0]), np.array([0.8, 0.0, 0.6])
+    tangent, direction = np.array([0.0, 0.0, 1.0]), np.array([0.8, 0.0, 0.6])
     width = np.abs(np.cos(turns))
-    counted = view_compensated_depth(across, tangent, way) * width
+    counted = view_compensated_depth(across, tangent, direction) * width
     assert counted[width > MIN_FACING] == pytest.approx(2.0 / np.pi)
     assert counted.mean() == pytest.approx(width.mean(), rel=0.04)
     assert view_compensated_depth(across[:1], tangent, tangent) == pytest.approx(2.0 / np.pi)

@@ -159,7 +159,7 @@ def test_light_hair_is_brighter_and_carries_light_farther(table: Fractions) -> N
 def skin_light(a_f: float, a_b: float, skin: float, **more: float) -> float:
     """Light that the skin reflects; by default lit head on, with the eye beside the light."""
     values = {"phi": 0.0, "tau": 0.0, "beyond": 0.0, "facing": 1.0} | more
-    lobes = [np.tile([0.0, share, 0.0, 0.0], (3, 1)) for share in (a_f, a_b)]
+    lobes = [np.tile([0.0, fraction, 0.0, 0.0], (3, 1)) for fraction in (a_f, a_b)]
     phi, tau, beyond, facing = (np.array(values[name]) for name in values)
     return float(reflected_by_skin(phi, *lobes, tau, beyond, facing, np.full(3, skin))[1])
 

@@ -19,9 +19,9 @@ PANEL = Panel((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0), 0.1, 0.1)
 
 def in_ball(count: int = 3000) -> np.ndarray:
     random = np.random.default_rng(1)
-    ways = random.normal(size=(count, 3))
-    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
-    return BALL.center + BALL.radius * ways * random.random((count, 1)) ** (1.0 / 3.0)
+    directions = random.normal(size=(count, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    return BALL.center + BALL.radius * directions * random.random((count, 1)) ** (1.0 / 3.0)
 
 
 @pytest.mark.parametrize(

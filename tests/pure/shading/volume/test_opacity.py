@@ -59,8 +59,8 @@ def test_weights_give_back_what_grows_evenly() -> None:
 def hair(count: int = 2000) -> tuple[np.ndarray, np.ndarray]:
     random = np.random.default_rng(4)
     roots = random.uniform(-0.1, 0.1, size=(count, 3))
-    way = random.normal(size=(count, 3)) * 0.02
-    strands = roots[:, None] + way[:, None] * np.linspace(0, 1, 5)[:, None]
+    direction = random.normal(size=(count, 3)) * 0.02
+    strands = roots[:, None] + direction[:, None] * np.linspace(0, 1, 5)[:, None]
     return strands, np.full((count, 5), 1e-4)
 
 
@@ -325,13 +325,13 @@ def test_transmittance_stays_a_share(extinction: float) -> None:
 def crossed(strands: np.ndarray, radius: float, lamp: np.ndarray, place: np.ndarray) -> int:
     """The number of segments that a ray from a lamp to a place meets."""
     start, along = strands[:, :-1].reshape(-1, 3), np.diff(strands, axis=1).reshape(-1, 3)
-    way = place - lamp
+    direction = place - lamp
     off = start - lamp
-    a, b, c = (along**2).sum(axis=1), along @ way, way @ way
-    d, e = (along * off).sum(axis=1), off @ way
+    a, b, c = (along**2).sum(axis=1), along @ direction, direction @ direction
+    d, e = (along * off).sum(axis=1), off @ direction
     rest = a * c - b * b
     on_segment, on_way = (b * e - c * d) / rest, (a * e - b * d) / rest
-    gap = np.linalg.norm(off + on_segment[:, None] * along - on_way[:, None] * way, axis=1)
+    gap = np.linalg.norm(off + on_segment[:, None] * along - on_way[:, None] * direction, axis=1)
     meets = (on_segment >= 0.0) & (on_segment <= 1.0) & (on_way > 0.0) & (on_way < 1.0)
     return int((meets & (gap < radius)).sum())
 
@@ -345,9 +345,9 @@ def test_a_lamp_within_the_ball_counts_as_many_strands_as_its_rays_meet() -> Non
         np.linalg.norm(middles - lamp, axis=1) > 0.03
     )
     middles = middles[is_hair]
-    way = random.normal(size=middles.shape)
-    way *= 0.01 / np.linalg.norm(way, axis=1, keepdims=True)
-    strands = middles[:, None] + way[:, None] * np.array([-1.0, 0.0, 1.0])[:, None]
+    direction = random.normal(size=middles.shape)
+    direction *= 0.01 / np.linalg.norm(direction, axis=1, keepdims=True)
+    strands = middles[:, None] + direction[:, None] * np.array([-1.0, 0.0, 1.0])[:, None]
     ball = ball_around(strands)
     frame = light_frame(Light.point(tuple(lamp), (1, 1, 1), 3.0), ball)
     assert frame is not None
