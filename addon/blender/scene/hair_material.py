@@ -233,7 +233,7 @@ class _Nodes:
         """The curves' colours for this node. Colour is exp(-c sqrt(absorption)), so that a factor
         on absorption becomes an exponent of colour."""
         color = self.add("ShaderNodeAttribute", attribute_name=MATERIAL_COLOR).outputs["Color"]
-        exponent: Any = color_exponent(hair.around)
+        exponent: Any = color_exponent(hair.azimuthal_roughness)
         if not has_final_colors:
             color = self._whole(color, tuple(look_color(shading).tolist()))
             if shading.color_variation > 0.0:
