@@ -17,7 +17,7 @@ vec3 display_shaped(vec3 radiance, vec4 shaper)
 }
 
 // Code values of Blender's view transform, from the recipe's texture display_table.
-// Twin of `Display.shown`, which applies the gamma too.
+// Twin of `Display.display_code`, which applies the gamma too.
 vec3 display_code(vec3 radiance, vec4 shaper)
 {
   vec3 place = (display_shaped(radiance, shaper) * (shaper.z - 1.0) + 0.5) / shaper.z;

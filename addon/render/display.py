@@ -95,7 +95,7 @@ class Display:
             defines={"DISPLAY": 1},
         )
 
-    def code_values(self, radiance: Floats) -> Floats:
+    def display_code(self, radiance: Floats) -> Floats:
         """Code values of radiances (..., 3), in [0, 1].
 
         Twin of `display_code` in gpu_shaders/lib_output.glsl, except that a GPU may round filter

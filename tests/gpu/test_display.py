@@ -37,9 +37,9 @@ def test_the_axes_reach_from_nought_past_white_with_white_on_a_texel(gpu_context
 def test_what_lies_on_a_texel_is_shown_exactly(table: Any) -> None:
     from hairloom.addon.render.display import Display, table_radiances
 
-    shown = Display(table).shown(table_radiances())
+    shown = Display(table).display_code(table_radiances())
     np.testing.assert_allclose(shown, table.codes, atol=1e-4)
-    halved = Display(table, gain=2.0, gamma=2.0).shown(0.5 * table_radiances())
+    halved = Display(table, gain=2.0, gamma=2.0).display_code(0.5 * table_radiances())
     np.testing.assert_allclose(halved, np.sqrt(table.codes), atol=1e-4)
 
 
@@ -69,7 +69,7 @@ def test_the_shader_shows_what_the_reference_shows(
 
     display = Display(table, gain, gamma)
     shown = drawn(gpu_context, radiance, display) ** (1.0 / 2.2)
-    assert shown == pytest.approx(display.shown(np.array(radiance)), abs=FILTER_ERROR)
+    assert shown == pytest.approx(display.display_code(np.array(radiance)), abs=FILTER_ERROR)
 
 
 def test_without_a_display_it_is_plain_standard(gpu_context: Any) -> None:
