@@ -265,7 +265,7 @@ def no_longer_previewed(hair: Any) -> None:
 @pytest.mark.parametrize(
     "end", [other_file, gone, ended, no_longer_previewed], ids=lambda end: end.__name__
 )
-def test_cached_cards_expire(hair: Any, end: Any, last: list[Any]) -> None:
+def test_cached_cards_are_freed_when_unused(hair: Any, end: Any, last: list[Any]) -> None:
     make()
     gc.collect()
     assert last[0]() is not None

@@ -253,7 +253,7 @@ def test_on_a_scan_roots_are_on_the_skin_and_no_strand_is_in_it(name: str) -> No
 
 
 @pytest.mark.slow
-def test_hair_is_led_out_of_ears_and_noses_of_other_heads() -> None:
+def test_hair_is_led_out_of_parts_of_other_heads() -> None:
     """A ball beside the neck, where long hair falls on the built-in head."""
     head, middle, radius = scan(), stood(np.array([[0.10, 0.02, -0.16]]))[0], 0.03 * LARGER
     bpy.ops.mesh.primitive_uv_sphere_add(radius=radius, location=middle.tolist())

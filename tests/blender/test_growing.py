@@ -98,7 +98,7 @@ def test_hair_that_was_changed_is_not_lost_to_a_slider(grown, change):
     assert lengths(grown).max() > 0.09, "it does not follow again"
 
 
-def test_imported_hair_stays_until_grow_again_is_pressed(new_hair, sphere):
+def test_hair_that_was_not_grown_stays_until_grow_again_is_pressed(new_hair, sphere):
     hair = new_hair(sphere)
     points = curve_points(hair.data)
     hair.data.hairloom.grow.strand_count = 40

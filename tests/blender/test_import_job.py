@@ -129,7 +129,7 @@ def test_guides_can_be_apart_on_a_head_of_the_scene(tmp_path: Path, sphere: Any)
         ("none.obj", "none.obj: there is no such file"),
     ],
 )
-def test_a_file_without_a_head_is_named(
+def test_an_unusable_head_is_named(
     tmp_path: Path, head: str, problem: str, capfd: pytest.CaptureFixture[str]
 ) -> None:
     bpy.context.collection.objects.link(

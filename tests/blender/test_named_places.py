@@ -55,7 +55,7 @@ def buttons() -> dict[str, set[str]]:
     return {name: texts for name, texts in found.items() if name not in unknown}
 
 
-def test_pages_name_a_button_by_what_stands_on_it() -> None:
+def test_pages_name_buttons_by_their_labels() -> None:
     """Pages do not use an operator's name if its button shows another text."""
     texts = set().union(*buttons().values())
     unseen = {
@@ -94,7 +94,7 @@ def test_each_button_is_named_on_a_page() -> None:
     assert unnamed == []
 
 
-def test_what_pages_place_in_the_menu_of_objects_is_there(sphere: bpy.types.Object) -> None:
+def test_object_menu_has_the_entries_that_pages_name(sphere: bpy.types.Object) -> None:
     texts: list[tuple[str, float]] = []
     bpy.context.view_layer.objects.active = sphere
     HAIRLOOM_MT_object.draw(SimpleNamespace(layout=Layout(texts)), bpy.context)

@@ -40,7 +40,7 @@ def automatic() -> Iterator[None]:
 
 
 @pytest.mark.slow(instead="test_the_preview_is_drawn_without_atomics")
-def test_a_render_is_calm_without_atomics(
+def test_a_render_without_atomics_has_little_noise(
     engine_scene: Any, new_hair: Callable[..., Any], sphere: Any, tmp_path: Path
 ) -> None:
     """Hashed strands take 16 samples although one is set, and agree with layers to 1 %."""
@@ -60,7 +60,7 @@ def test_a_render_is_calm_without_atomics(
 
 
 @pytest.mark.slow(instead="test_the_preview_is_drawn_without_atomics")
-def test_a_render_shares_what_was_drawn_elsewhere(
+def test_a_render_works_after_drawing_in_another_gpu_context(
     engine_scene: Any, new_hair: Callable[..., Any], sphere: Any, tmp_path: Path
 ) -> None:
     """A render's own GPU context cannot bind framebuffers of another context."""

@@ -61,8 +61,8 @@ def without_gpu(work: str, *arguments: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-@pytest.mark.slow(instead="test_verbs_that_draw_say_so_and_write_nothing")
-def test_the_engine_says_so() -> None:
+@pytest.mark.slow(instead="test_verbs_that_draw_report_a_missing_gpu_and_write_nothing")
+def test_the_engine_reports_that_there_is_no_gpu() -> None:
     done = without_gpu(ENGINE)
     assert done.returncode == 0, done.stderr
     assert REFUSAL in done.stdout
@@ -75,7 +75,9 @@ def test_the_engine_says_so() -> None:
     ),
     ids=lambda arguments: arguments[0],
 )
-def test_verbs_that_draw_say_so_and_write_nothing(arguments: list[str], tmp_path: Path) -> None:
+def test_verbs_that_draw_report_a_missing_gpu_and_write_nothing(
+    arguments: list[str], tmp_path: Path
+) -> None:
     output = tmp_path / "still.png"
     if arguments[0] != "self-test":
         arguments = [*arguments, "--output", str(output)]
@@ -86,7 +88,7 @@ def test_verbs_that_draw_say_so_and_write_nothing(arguments: list[str], tmp_path
 
 
 @pytest.mark.slow
-def test_cards_are_made_all_the_same(tmp_path: Path) -> None:
+def test_cards_are_made_without_a_gpu(tmp_path: Path) -> None:
     """numpy draws the atlas instead."""
     output = tmp_path / "cards.glb"
     done = without_gpu(VERB, "cards", "--output", str(output), *FEW)

@@ -53,7 +53,7 @@ def test_a_panel_is_as_high_for_thirty_as_for_one(setting, hair):
 
 
 @pytest.mark.parametrize("setting", PANELS)
-def test_the_cross_of_a_row_takes_its_object_out(setting, hair):
+def test_the_cross_of_a_row_removes_its_object(setting, hair):
     collection = filled(hair, setting, 2)
     first = collection.all_objects[0]
     pressed: list[tuple[str, Any]] = []

@@ -143,7 +143,7 @@ def test_a_mesh_that_is_mirrored_or_scaled(scene, scale):
 # --- motion
 
 
-def test_things_go_the_way_from_frame_to_frame_with_a_bow(scene):
+def test_colliders_follow_a_curved_trajectory_between_frames(scene):
     ball, cube = scene.ball(), scene.cube()
     found = scene.obstacles()
     for posed in move_obstacles(found):
@@ -161,7 +161,7 @@ def test_things_go_the_way_from_frame_to_frame_with_a_bow(scene):
         )
 
 
-def test_after_rest_there_is_no_speed_and_no_bow(scene):
+def test_after_rest_colliders_have_no_speed_and_no_curvature(scene):
     ball = scene.ball()
     found = scene.obstacles()
     ball.location.x = 0.5
@@ -188,7 +188,7 @@ def test_balls_that_move_apart_become_another_set(scene):
     assert distance_now(posed, (-0.3, 0, 0)) == pytest.approx(0.1, abs=1e-5)
 
 
-def test_balls_that_go_together_stay_one_set(scene):
+def test_balls_that_move_together_stay_one_set(scene):
     parent = bpy.data.objects.new("Parent", None)
     bpy.context.collection.objects.link(parent)
     for number in range(5):
@@ -304,7 +304,7 @@ def test_a_look_at_colliders_between_two_frames_changes_no_motion(scene):
 # --- reuse
 
 
-def test_a_head_that_is_bent_as_before_has_the_same_field(scene):
+def test_a_head_bent_back_reuses_its_field(scene):
     body, pose = long_body()
     at_rest = read_surface(body, depsgraph(), need_uv=False, place="Body")
     head = Body.at_rest(body, depsgraph())
@@ -341,7 +341,7 @@ def test_fields_are_made_once_and_again_when_the_mesh_or_resolution_differs(scen
     assert move_obstacles(finer)[0].collider is not move_obstacles(other)[0].collider
 
 
-def test_a_mesh_of_other_vertices_is_made_anew_when_play_begins_again(scene):
+def test_a_mesh_with_another_vertex_count_is_rebuilt_when_play_restarts(scene):
     cube = scene.cube()
     found = scene.obstacles()
     cube.modifiers.new("Subdivision", "SUBSURF").levels = 2

@@ -53,7 +53,7 @@ def not_finite(scene):
 
 
 @pytest.mark.parametrize("make", [plane, flat, curve, empty_as_mesh, disabled, not_finite])
-def test_what_cannot_be_used_is_told_by_name_and_the_others_go_on(scene, make):
+def test_unusable_colliders_are_named_and_others_still_act(scene, make):
     bad = make(scene)
     scene.ball()
     found = scene.obstacles()
@@ -62,7 +62,7 @@ def test_what_cannot_be_used_is_told_by_name_and_the_others_go_on(scene, make):
     assert warning.startswith(bad.name + ":") and warning.count(".") >= 2
 
 
-def test_a_mesh_that_is_not_closed_collides_and_is_told(scene):
+def test_an_open_mesh_collides_and_is_reported(scene):
     """A box without its first face, with a face that is turned inwards, and with a wall inside."""
     cube = scene.cube()
     assert scene.obstacles().warnings == ()
@@ -85,7 +85,7 @@ def test_a_mesh_that_is_not_closed_collides_and_is_told(scene):
         assert warning.startswith("Cube: ")
 
 
-def test_excluded_from_the_view_layer(scene):
+def test_a_collider_excluded_from_the_view_layer_does_not_collide(scene):
     away = bpy.data.collections.new("Away")
     scene.colliders.children.link(away)
     cube = scene.cube(name="Away")
@@ -104,7 +104,7 @@ def test_excluded_from_the_view_layer(scene):
     np.testing.assert_allclose(posed.matrix_before, posed.matrix_now)  # it returns without a jump
 
 
-def test_hidden_with_the_eye_it_still_collides(scene):
+def test_a_collider_hidden_in_the_viewport_still_collides(scene):
     ball = scene.ball()
     ball.hide_set(True)
     found = scene.obstacles()
@@ -151,7 +151,7 @@ def test_another_mesh_in_mid_play(scene):
     assert len(move_obstacles(found)) == 1 and found.warnings == ()
 
 
-def test_the_head_that_is_gone_is_an_error(scene, sphere):
+def test_a_deleted_head_is_an_error(scene, sphere):
     head = Body.at_rest(sphere, depsgraph())
     at_rest = read_surface(sphere, depsgraph(), need_uv=False, place="Head")
     scene.ball()
@@ -162,7 +162,7 @@ def test_the_head_that_is_gone_is_an_error(scene, sphere):
         move_obstacles(found)
 
 
-def test_a_head_without_volume_is_told_and_the_others_go_on(scene):
+def test_a_head_without_volume_is_reported_and_others_still_act(scene):
     bpy.ops.mesh.primitive_grid_add(size=0.2)
     cap = bpy.context.object
     at_rest = read_surface(cap, depsgraph(), need_uv=False, place="Cap")
@@ -173,7 +173,7 @@ def test_a_head_without_volume_is_told_and_the_others_go_on(scene):
     assert "Grid" in found.warnings[0]
 
 
-def test_a_chosen_collider_stands_in_for_the_head(scene, sphere):
+def test_a_chosen_collider_replaces_the_head(scene, sphere):
     at_rest = read_surface(sphere, depsgraph(), need_uv=False, place="Head")
     head = Body.at_rest(sphere, depsgraph())
     scene.owner.hairloom.collider_collection = None

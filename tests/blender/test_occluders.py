@@ -60,7 +60,7 @@ def openness(obj):
     return values
 
 
-def test_they_shade_what_is_made_and_only_while_they_are_seen(hair, other):
+def test_occluders_shade_new_cards_only_while_visible(hair, other):
     alone = openness(card_objects(hair)[0])
     hair.data.hairloom.card_occlusion.others = True
     press()
@@ -71,7 +71,7 @@ def test_they_shade_what_is_made_and_only_while_they_are_seen(hair, other):
     np.testing.assert_array_equal(openness(card_objects(hair)[0]), alone)
 
 
-def test_what_is_written_has_the_same_shade(hair, other):
+def test_inputs_of_exported_cards_have_the_same_occluders(hair, other):
     settings = hair.data.hairloom.card_occlusion
     assert read_inputs(hair, bpy.context.evaluated_depsgraph_get())[0].occluders.cards() == ((), ())
     settings.others = True
@@ -85,7 +85,7 @@ def test_what_is_written_has_the_same_shade(hair, other):
     np.testing.assert_allclose(found, middle, atol=1e-6)
 
 
-@pytest.mark.slow(instead="test_they_shade_what_is_made_and_only_while_they_are_seen")
+@pytest.mark.slow(instead="test_occluders_shade_new_cards_only_while_visible")
 def test_grooms_without_cards_shade_by_their_strands(hair, new_hair, sphere):
     alone = openness(card_objects(hair)[0])
     strands = new_hair(sphere)
@@ -155,7 +155,9 @@ def test_the_preview_follows_other_hair(shaded, get_depsgraph):
 @pytest.mark.parametrize(
     "way", few_in_commits(["deleted", "hidden", "left out of renders and views"])
 )
-def test_the_preview_follows_other_hair_that_goes_and_comes(shaded, get_depsgraph, way):
+def test_the_preview_follows_other_hair_that_is_hidden_deleted_and_restored(
+    shaded, get_depsgraph, way
+):
     session, strands = shaded
     near, before = shown(session), session.cards.shaded_by
     if way == "hidden":
@@ -197,7 +199,7 @@ def test_undo_has_cards_shaded_again(shaded, get_depsgraph):
     assert shown(session).mean() > near.mean() + 0.02
 
 
-def test_hair_that_moves_with_other_hair_keeps_its_shade(shaded, sphere, get_depsgraph):
+def test_hair_that_moves_with_other_hair_keeps_its_occlusion(shaded, sphere, get_depsgraph):
     session, strands = shaded
     near, before = shown(session), strands.matrix_world.copy()
     sphere.location.x, sphere.rotation_euler.z = 0.25, 1.0
@@ -238,7 +240,7 @@ def test_other_hair_is_made_into_cards_in_the_thread(shaded, get_depsgraph, monk
     assert threads and threading.main_thread() not in threads
 
 
-def test_a_render_has_the_shade_of_other_hair_as_it_is(shaded, get_depsgraph):
+def test_a_render_has_the_current_occlusion_by_other_hair(shaded, get_depsgraph):
     session, strands = shaded
     hair = session.hair.found()
 
@@ -257,7 +259,7 @@ def test_a_render_has_the_shade_of_other_hair_as_it_is(shaded, get_depsgraph):
     assert rendered().mean() > near.mean() + 0.02
 
 
-def test_hair_that_cannot_be_made_ready_is_told_of_by_the_cards(shaded, hair, get_depsgraph):
+def test_cards_report_occluders_that_cannot_be_built(shaded, hair, get_depsgraph):
     """Its roots are far from its head, which is detected only in the thread."""
     session, strands = shaded
     strands.data.attributes["position"].data[0].vector.x = np.inf
@@ -278,7 +280,7 @@ def test_own_cards_and_coarser_levels_and_other_meshes_are_left_out(hair, sphere
     assert len(shade.mesh.triangles) == len(card_objects(hair)[0].data.polygons)
 
 
-def test_they_shade_what_is_sorted(hair, other, get_depsgraph):
+def test_occluders_shade_sorted_meshes(hair, other, get_depsgraph):
     def sorted_by(others):
         choices = SortOptions(occlusion=CardOcclusionSettings(rays=64, others=others))
         sort_mesh(other, get_depsgraph(), choices)

@@ -85,7 +85,7 @@ def test_spheres_are_empties_in_a_collection_of_their_own(monkey):
     assert monkey.hairloom.collider_shape == "none"
 
 
-def test_they_cover_suzanne_within_the_stated_error(monkey):
+def test_fitted_spheres_cover_suzanne_within_the_stated_error(monkey):
     """Measured at her vertices, after Blender has placed the empties."""
     fit(60)
     centers, radii = balls(monkey)
@@ -111,7 +111,7 @@ def test_radii_are_metres_whatever_the_scale_of_the_mesh(monkey, scale):
 
 
 @pytest.mark.parametrize("modifier", few_in_commits(["SUBSURF", None, "TRIANGULATE"]))
-def test_they_follow_what_an_armature_does(monkey, modifier):
+def test_fitted_spheres_follow_an_armature(monkey, modifier):
     """The object stands still. Spheres, fitted in a pose, follow to 0.1 mm."""
     pose = rig(monkey)
     if modifier:
@@ -126,7 +126,7 @@ def test_they_follow_what_an_armature_does(monkey, modifier):
     assert {empty.parent_type for empty in empties(monkey)} == {"VERTEX_3"}
 
 
-def test_they_follow_the_object(monkey):
+def test_fitted_spheres_follow_the_object(monkey):
     fit(10)
     centers, radii = balls(monkey)
     monkey.matrix_world = TURN @ Matrix.Scale(2.0, 4)
@@ -135,8 +135,8 @@ def test_they_follow_the_object(monkey):
     np.testing.assert_allclose(sizes, radii * 2.0, rtol=1e-4)
 
 
-@pytest.mark.slow(instead="test_they_follow_the_object")
-def test_where_vertices_cannot_carry_them_they_follow_the_object_with_a_warning(monkey, capfd):
+@pytest.mark.slow(instead="test_fitted_spheres_follow_the_object")
+def test_spheres_that_vertices_cannot_carry_follow_the_object_with_a_warning(monkey, capfd):
     monkey.modifiers.new("Mirror", "MIRROR").use_axis[1] = True
     fit(10)
     assert {empty.parent_type for empty in empties(monkey)} == {"OBJECT"}
@@ -146,7 +146,7 @@ def test_where_vertices_cannot_carry_them_they_follow_the_object_with_a_warning(
     assert "10 of 10 spheres" in capfd.readouterr().out
 
 
-def test_the_numbers_are_told(monkey, capfd):
+def test_the_report_has_count_and_error_of_the_spheres(monkey, capfd):
     fit(10)
     told = capfd.readouterr().out
     assert "10 spheres in Suzanne Spheres" in told and told.count("mm") == 4
@@ -195,7 +195,7 @@ def test_colliders_that_the_artist_has_chosen_stay(new_hair, sphere):
 
 
 @pytest.mark.slow(instead="test_removing_and_deleting")
-def test_fitting_again_takes_the_place_of_the_last_and_leaves_other_objects(monkey):
+def test_fitting_again_replaces_the_last_spheres_and_leaves_other_objects(monkey):
     fit(10)
     (collection,) = spheres.fitted_collections(monkey)
     mine = bpy.data.objects.new("Mine", None)
@@ -256,7 +256,7 @@ def test_saved_and_loaded_again(monkey, tmp_path):
     np.testing.assert_allclose(balls(bpy.data.objects["Suzanne"])[0], centers, atol=1e-6)
 
 
-def test_nothing_to_fit_is_said(extension):
+def test_a_mesh_without_volume_is_reported(extension):
     assert not bpy.ops.hairloom.fit_spheres.poll()
     bpy.ops.mesh.primitive_plane_add()
     with pytest.raises(RuntimeError, match="Plane: it encloses no volume"):

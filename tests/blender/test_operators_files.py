@@ -147,7 +147,7 @@ def test_the_weights_of_a_mesh_are_offered_by_name(sphere):
     assert weight_names(sphere) == ["Scalp", "long", "on_faces"]
 
 
-def test_growing_on_a_mesh_without_faces_is_told(sphere, told):
+def test_growing_on_a_mesh_without_faces_is_reported(sphere, told):
     sphere.data.clear_geometry()
     for way in ("combed", "normals"):
         with pytest.raises(RuntimeError, match="no faces"):
@@ -170,7 +170,7 @@ def test_a_head_without_uvs_is_a_warning_with_the_remedy(sphere, groom_file, tol
     assert "Unwrap" in told() and out.is_file()
 
 
-def test_strands_leave_as_they_came(sphere, groom_file, told):
+def test_exported_strands_equal_the_imported_ones(sphere, groom_file, told):
     bpy.ops.hairloom.import_strands(filepath=str(groom_file))
     out = groom_file.with_name("out.tfx")
     assert bpy.ops.hairloom.export_tressfx(filepath=str(out)) == {"FINISHED"}
@@ -179,7 +179,7 @@ def test_strands_leave_as_they_came(sphere, groom_file, told):
     assert after.points == pytest.approx(before.points, abs=1e-6)
 
 
-def test_axes_and_scale_are_undone_by_their_own_inverse(groom_file):
+def test_export_axes_and_scale_invert_those_of_import(groom_file):
     bpy.ops.hairloom.import_strands(filepath=str(groom_file), up="Z", scale=0.01)
     out = groom_file.with_name("out.tfx")
     bpy.ops.hairloom.export_tressfx(filepath=str(out), up="Z", scale=0.01)

@@ -125,7 +125,7 @@ def test_groups_that_the_library_has_not_got_are_kept_on_overrides(override, tmp
     assert settings(hair) == (2.0, 0.5), "the library's"
 
 
-def test_pictures_of_cards_and_whose_they_are_can_be_overridden(override, tmp_path):
+def test_pictures_and_owner_of_cards_can_be_overridden(override, tmp_path):
     image = bpy.data.images.new("Strands", 4, 4)
     image.pack()
     head = override.parent
@@ -212,7 +212,7 @@ def test_a_scene_that_would_not_play_the_bake_of_linked_hair_is_not_saved(shot, 
 
 
 @pytest.mark.parametrize("is_alone", [True, False])
-def test_hair_of_an_instance_is_said_to_be_left_out(library, new_hair, tmp_path, capfd, is_alone):
+def test_hair_of_an_instance_is_reported_as_left_out(library, new_hair, tmp_path, capfd, is_alone):
     """The usual layout of shots: instances of characters, whose hair the render engine draws."""
     if not is_alone:
         new_hair()
@@ -234,7 +234,7 @@ def test_saving_leaves_the_file_of_the_library_as_it_is(override, library, tmp_p
     assert Path(library).read_bytes() == before
 
 
-def test_a_file_of_an_old_version_has_what_was_set_and_defaults_for_the_rest(extension):
+def test_a_file_of_an_old_version_keeps_its_settings_and_gets_defaults_for_new_ones(extension):
     bpy.ops.wm.open_mainfile(filepath=str(OLD))
     hair = bpy.data.objects["Hair"]
     found = GroomSettings.of(hair)

@@ -73,7 +73,7 @@ def contents(folder: Path) -> dict[Path, bytes]:
 
 
 @pytest.mark.parametrize(("arguments", "said"), REFUSED, ids=lambda each: " ".join(each)[-40:])
-def test_what_would_be_lost_is_refused_before_any_work(
+def test_outputs_that_would_overwrite_inputs_are_refused_before_any_work(
     arguments: list[str],
     said: str,
     folder: Path,
@@ -87,7 +87,7 @@ def test_what_would_be_lost_is_refused_before_any_work(
     assert contents(folder) == before
 
 
-def test_a_report_tells_that_the_output_is_refused(folder: Path) -> None:
+def test_the_report_says_that_the_output_is_refused(folder: Path) -> None:
     assert command_line.run([*EXPORT, "--output", "hair.tfx", "--report", "r.json"]) == 1
     error = json.loads((folder / "r.json").read_text())["error"]
     assert error["place"] == "hair.tfx" and "another name" in error["remedy"]
@@ -124,7 +124,7 @@ def test_a_scene_that_is_saved_over_itself_is_kept_as_the_version_before(folder:
     ("content", "said"),
     [(b"hair", "this is not a Blender file"), (None, "Blender cannot open this")],
 )
-def test_what_is_no_scene_is_said_in_a_few_words(
+def test_files_that_are_no_scenes_are_named_briefly(
     content: bytes | None, said: str, folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     cut = content or (folder / "wig.blend").read_bytes()[:-5000]

@@ -79,7 +79,7 @@ def test_the_lines_of_a_shape_lie_on_its_surface(collider):
     assert len(points) >= 96 and np.abs(distance).max() < 1e-5
 
 
-def test_nothing_is_drawn_until_it_is_wanted(preview):
+def test_overlays_are_off_by_default(preview):
     hair, _, session = preview
     assert overlays(session) == ()
     hair.hairloom.shown_overlays = {kind for kind, _, _ in OVERLAYS}
@@ -162,7 +162,7 @@ def test_stretch_shows_each_segment_of_the_guides_once_and_none_at_rest_as_stret
     np.testing.assert_allclose(worst, longer[3, -2:], atol=1e-6)
 
 
-def test_contacts_show_what_touches_and_how_deep_the_rest_is(preview, get_depsgraph, monkeypatch):
+def test_contacts_show_touching_points_and_depths_of_others(preview, get_depsgraph, monkeypatch):
     """A ball around a tip."""
     session, _ = played(preview, get_depsgraph, "contacts")
     tip = session.solver.guides()[0, -1]

@@ -39,7 +39,7 @@ def test_a_number_is_read_as_people_write_it(text, value):
     assert found == (value if isinstance(value, str) else pytest.approx(value))
 
 
-def test_what_no_angle_may_be_is_said_in_degrees_too():
+def test_messages_about_angles_are_in_degrees_too():
     with pytest.raises(HairloomError, match="-180 to 180 degrees"):
         StageSettings.from_dict(overrides(["stage.rim_side=-148"], "stage"), "--set")
 
@@ -55,7 +55,7 @@ def test_what_no_angle_may_be_is_said_in_degrees_too():
         (GuideSettings, "guides.guide_count=many", "it must be a number"),
     ],
 )
-def test_what_a_value_must_be_is_said_in_our_own_words(kind, setting, why):
+def test_messages_about_values_are_in_plain_words(kind, setting, why):
     with pytest.raises(HairloomError, match=why):
         kind.from_dict(overrides([setting], kind.section), "--set")
 
@@ -70,7 +70,7 @@ def test_what_a_value_must_be_is_said_in_our_own_words(kind, setting, why):
         ("what is not there", "Use a file"),
     ],
 )
-def test_a_preset_that_is_not_there_is_answered_with_near_ones(name, meant, tmp_path, monkeypatch):
+def test_an_unknown_preset_is_answered_with_similar_names(name, meant, tmp_path, monkeypatch):
     monkeypatch.setattr(presets, "own_folder", lambda: tmp_path)
     presets.save_own("Mine", ShadingSettings())
     with pytest.raises(HairloomError) as caught:
@@ -79,7 +79,7 @@ def test_a_preset_that_is_not_there_is_answered_with_near_ones(name, meant, tmp_
     assert caught.value.problem.startswith("there is no such" if name else "no preset is named")
 
 
-def test_a_stage_that_is_not_there_is_answered_with_stages():
+def test_an_unknown_stage_is_answered_with_the_stages():
     whole = ["render", "--stage", "daylite", "--output", "a.png"]
     with pytest.raises(HairloomError) as caught:
         settings_from_options(parser().parse_args(whole))

@@ -77,7 +77,7 @@ def test_a_bake_keeps_the_colours(hair: Any, get_depsgraph: Callable[[], Any]) -
     np.testing.assert_array_equal(found.strands.color, rig.strands.color)
 
 
-def test_a_bake_keeps_points_by_need(hair: Any, get_depsgraph: Callable[[], Any]) -> None:
+def test_a_bake_keeps_uneven_point_counts(hair: Any, get_depsgraph: Callable[[], Any]) -> None:
     rig = previews.start(hair, get_depsgraph()).rig
     strands = rig.strands
     kept = np.arange(strands.point_count) % 16 % 5 == 0

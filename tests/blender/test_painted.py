@@ -100,7 +100,7 @@ KINDS = ("group", "face", "corner colour", "image", "curve", "point")
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_each_kind_of_map_is_what_guides_are_painted_with(
+def test_guides_read_each_kind_of_map(
     hair: Any, sphere: Any, get_depsgraph: Any, kind: str
 ) -> None:
     paint(kind, hair, sphere)
@@ -140,7 +140,7 @@ def test_points_of_nurbs_are_painted_where_they_are_drawn(
     assert found[:, height > FAR].mean() > 0.99 and found[:, height < -FAR].mean() < 0.01
 
 
-def test_what_is_painted_moves_otherwise(hair: Any, sphere: Any, get_depsgraph: Any) -> None:
+def test_painted_hair_moves_differently(hair: Any, sphere: Any, get_depsgraph: Any) -> None:
     """Stiff above and limp below, on a head that moves sideways."""
     scene, dynamics = bpy.context.scene, hair.hairloom.dynamics
     scene.frame_start, scene.frame_end = 1, 8
@@ -165,7 +165,9 @@ def test_what_is_painted_moves_otherwise(hair: Any, sphere: Any, get_depsgraph: 
     assert np.median(apart[height < -FAR]) > 1e-3
 
 
-def test_a_map_that_breaks_stays_as_it_was_last(hair: Any, sphere: Any, get_depsgraph: Any) -> None:
+def test_a_map_that_becomes_unusable_keeps_its_last_values(
+    hair: Any, sphere: Any, get_depsgraph: Any
+) -> None:
     paint("face", hair, sphere)
     dynamics = hair.hairloom.dynamics
     session = started(hair, get_depsgraph)
@@ -192,7 +194,7 @@ def test_a_map_that_breaks_stays_as_it_was_last(hair: Any, sphere: Any, get_deps
     assert session.warnings == () and session._source.painted_guides(session.rig) is None
 
 
-def test_a_map_of_zeros_is_said_with_what_is_to_be_done(
+def test_a_map_of_zeros_is_reported_with_a_remedy(
     hair: Any, sphere: Any, get_depsgraph: Any
 ) -> None:
     sphere.vertex_groups.new(name="Nothing")
@@ -252,7 +254,7 @@ def test_an_image_is_read_again_by_a_preview_that_has_the_hair_of_its_bake(
     np.testing.assert_allclose(factors(session)["volume"], 0.25, atol=2e-3)
 
 
-def test_the_overlay_shows_what_is_painted_as_it_is_painted(
+def test_the_overlay_shows_a_map_while_it_is_painted(
     hair: Any, sphere: Any, get_depsgraph: Any
 ) -> None:
     paint("group", hair, sphere)
@@ -306,7 +308,7 @@ def test_a_bake_is_stale_once_a_map_of_its_motion_is_painted(
     assert differences(before, now()) == ("paint",)
 
 
-def test_a_preset_keeps_what_is_painted_and_may_bring_names_of_its_own(hair: Any) -> None:
+def test_a_preset_keeps_painted_maps_unless_it_names_its_own(hair: Any) -> None:
     dynamics = hair.hairloom.dynamics
     dynamics.gravity_mask = "Top"
     shipped = presets.named_preset("dynamics/big")
@@ -347,7 +349,7 @@ def test_a_dab_reads_the_vertex_groups_once_for_children_and_overlay(
         assert name != "Long" or (session.rig.strands.lengths() != length).any()
 
 
-def test_weights_are_those_that_each_vertex_has(sphere: Any, get_depsgraph: Any) -> None:
+def test_weights_are_read_at_each_vertex(sphere: Any, get_depsgraph: Any) -> None:
     random, count = np.random.default_rng(2), len(sphere.data.vertices)
     wanted = {}
     for name in ("One", "Two", "Three"):

@@ -136,7 +136,7 @@ KINDS = (
 @pytest.mark.alike
 @pytest.mark.parametrize("children", ["none", "multi"])
 @pytest.mark.parametrize("kind", KINDS)
-def test_each_strand_has_what_blender_samples_at_its_root(
+def test_each_strand_has_the_colour_that_blender_samples_at_its_root(
     hair: Any, sphere: Any, get_depsgraph: Any, tmp_path: Path, kind: str, children: str
 ) -> None:
     sphere.location, sphere.scale = (0.3, -0.1, 0.2), (1.0, 0.8, 1.2)
@@ -210,7 +210,7 @@ def test_an_image_is_seen_once_it_is_painted(hair: Any, sphere: Any, get_depsgra
     np.testing.assert_allclose(shown(session).color, 1.0, atol=1e-6)
 
 
-def test_what_is_transparent_has_the_curves_own_colour_or_the_looks(
+def test_transparent_texels_leave_the_colour_of_curves_or_look(
     hair: Any, sphere: Any, get_depsgraph: Any
 ) -> None:
     look = hair.data.hairloom.shading
@@ -266,7 +266,7 @@ def test_a_head_that_is_mirrored_is_painted_as_it_is(
 
 
 @pytest.mark.parametrize("children", ["none", "multi"])
-def test_exports_have_what_is_painted(
+def test_exports_have_painted_colours(
     hair: Any, sphere: Any, get_depsgraph: Any, children: str
 ) -> None:
     paint_halves(sphere)
@@ -280,7 +280,7 @@ def test_exports_have_what_is_painted(
         assert_halves(found.color[starts], found.strands.points[starts])
 
 
-def test_a_render_has_what_is_painted_and_keeps_its_hair(
+def test_a_render_has_painted_colours_and_keeps_its_hair(
     hair: Any, sphere: Any, get_depsgraph: Any
 ) -> None:
     attribute = paint_halves(sphere)
@@ -297,7 +297,7 @@ def test_a_render_has_what_is_painted_and_keeps_its_hair(
     assert read_groom(hair, get_depsgraph()).color is second.color, "nor its colours"
 
 
-def test_real_hair_and_materials_have_what_is_painted(
+def test_real_hair_and_materials_have_painted_colours(
     hair: Any, sphere: Any, get_depsgraph: Any
 ) -> None:
     paint_halves(sphere)
@@ -329,7 +329,7 @@ def test_real_hair_and_materials_have_what_is_painted(
 
 
 @pytest.mark.parametrize("is_changed", [False, True])
-def test_curves_that_are_replaced_have_what_is_painted_under_the_new_ones(
+def test_replaced_curves_get_the_colours_painted_under_their_roots(
     sphere: Any, extension: None, is_changed: bool
 ) -> None:
     """Also if an artist has changed the material's nodes, which are kept."""
@@ -360,7 +360,7 @@ def test_curves_that_are_replaced_have_what_is_painted_under_the_new_ones(
         assert node.inputs["Random Roughness"].default_value == pytest.approx(0.7)
 
 
-def test_a_verb_writes_what_is_painted(
+def test_a_verb_writes_painted_colours(
     hair: Any, sphere: Any, get_depsgraph: Any, tmp_path: Path
 ) -> None:
     paint_halves(sphere)
@@ -374,7 +374,7 @@ def test_a_verb_writes_what_is_painted(
 
 
 @pytest.mark.draws
-def test_cards_have_what_is_painted(hair: Any, sphere: Any, get_depsgraph: Any) -> None:
+def test_cards_have_painted_colours(hair: Any, sphere: Any, get_depsgraph: Any) -> None:
     attribute = paint_halves(sphere)
     groom = hair.data.hairloom
     groom.atlas.size, groom.cards.order_by, groom.card_occlusion.rays = "512", "distance", 1
@@ -393,7 +393,7 @@ def test_cards_have_what_is_painted(hair: Any, sphere: Any, get_depsgraph: Any) 
     assert shown(session).cards.base_color == pytest.approx(BLUE[:3], abs=1e-6)
 
 
-def test_a_bake_shows_what_is_painted_since(
+def test_a_bake_shows_colours_painted_later(
     hair: Any, sphere: Any, get_depsgraph: Any, tmp_path: Path
 ) -> None:
     attribute = paint_halves(sphere)
@@ -452,7 +452,7 @@ def a_number(sphere: Any) -> None:
         (unknown_space, "colour space 'ACEScg'", "sRGB"),
     ],
 )
-def test_what_cannot_be_used_is_said_and_hair_keeps_its_colour(
+def test_unusable_maps_are_reported_and_hair_keeps_its_colour(
     hair: Any, sphere: Any, get_depsgraph: Any, spoil: Any, says: str, remedy: str
 ) -> None:
     spoil(sphere)

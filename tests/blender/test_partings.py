@@ -111,7 +111,7 @@ def wire():
 
 
 @pytest.mark.parametrize("edit", ["cyclic", "edge", "parent"])
-def test_all_that_changes_a_line_is_seen_and_what_carries_it_is_not(edit, hair, sphere):
+def test_changes_of_a_parting_are_noticed_and_motion_with_its_head_is_not(edit, hair, sphere):
     line = wire() if edit == "edge" else arch()
     handle, body = bpy.data.objects.new("Handle", None), bpy.data.objects.new("Body", None)
     for each in (handle, body):
@@ -220,7 +220,7 @@ def test_a_bake_is_stale_once_a_parting_is_moved(hair, sphere):
 
 
 @pytest.mark.parametrize("wrong", ["faces", "away", "empty"])
-def test_what_is_no_line_on_the_head_is_refused(hair, wrong):
+def test_objects_that_are_no_lines_on_the_head_are_refused(hair, wrong):
     line = arch(radius=0.3 if wrong == "away" else RADIUS)
     if wrong == "faces":
         line.data.bevel_depth = 0.01
@@ -274,7 +274,7 @@ def test_a_render_after_a_parting_has_moved_has_other_children(hair, get_depsgra
 
 
 @pytest.mark.parametrize("data", ["Y up", "Z up"])
-def test_a_new_line_goes_with_its_head(data, new_hair):
+def test_a_new_line_moves_with_its_head(data, new_hair):
     """The line is the same with Y up and centimetres in the head's data, and turns with a head."""
     turn = Matrix.Rotation(0.5 * np.pi, 4, "X") @ Matrix.Scale(0.01, 4)
     if data == "Z up":

@@ -47,19 +47,19 @@ def quadrupled(value: int) -> Parts[int]:
 
 
 @pytest.mark.parametrize(("value", "wanted"), [(3, 12), (9, -1)])
-def test_both_ways_have_the_same_result(value: int, wanted: int) -> None:
+def test_blocking_and_threaded_parts_have_the_same_result(value: int, wanted: int) -> None:
     """An error of a part is raised at its `yield`, where the work may catch it."""
     assert run_parts(quadrupled(value)) == wanted
     assert result_of(in_parts(quadrupled(value))) == wanted
 
 
 @pytest.mark.parametrize("way", [run_parts, lambda parts: result_of(in_parts(parts))])
-def test_an_error_that_nobody_takes_comes_out(way: Any) -> None:
+def test_an_unhandled_error_is_raised(way: Any) -> None:
     with pytest.raises(HairloomError, match="too much"):
         way(quadrupled(11))
 
 
-def test_in_the_window_parts_are_beside_it_and_say_what_they_are() -> None:
+def test_in_the_window_parts_run_in_threads_and_report_what_they_do() -> None:
     may_go_on.clear()
     told = in_parts(quadrupled(2))
     while next(told).text != "Doubling":
@@ -125,7 +125,7 @@ def test_hair_that_does_not_grow_again_after_all_is_as_it_was_combed(sphere: Any
         assert np.array_equal(curve_points(hair.data), points)
 
 
-def test_what_was_added_goes_where_work_fails_and_stays_where_it_ends() -> None:
+def test_added_objects_are_removed_if_work_fails_and_kept_if_it_succeeds() -> None:
     before = everything()
     with pytest.raises(HairloomError), new_blocks_removed_on_error() as note:
         bpy.data.meshes.new("Gone")
@@ -138,7 +138,7 @@ def test_what_was_added_goes_where_work_fails_and_stays_where_it_ends() -> None:
     assert "Kept" in bpy.data.meshes
 
 
-def test_what_was_there_stays_though_another_file_was_loaded() -> None:
+def test_existing_data_stays_after_another_file_was_loaded() -> None:
     """Cancelling removes nothing from a file that was loaded meanwhile."""
 
     def work() -> Parts[None]:

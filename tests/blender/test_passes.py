@@ -314,7 +314,7 @@ def test_one_pixel_and_both_eyes(
         assert (one != other).any() and one.any()
 
 
-def test_the_shadow_of_hair_is_what_it_takes_of_the_picture(
+def test_the_shadow_pass_is_the_light_that_hair_removes(
     engine_scene: Any, thick: Any, tmp_path: Path
 ) -> None:
     """With a single sun, the pass times the picture without hair shadow gives the picture."""

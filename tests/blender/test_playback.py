@@ -180,7 +180,7 @@ def test_motion_blur_smears_the_hair_between_two_frames(scene, tmp_path):
     assert blurred.max() < 0.99 * sharp.max() or blurred[ends[0]].mean() < sharp[ends[0]].mean()
 
 
-def test_between_two_frames_strands_go_straight_for_motion_blur(scene):
+def test_strands_are_interpolated_linearly_between_frames_for_motion_blur(scene):
     bpy.ops.hairloom.bake()
     hair = bpy.data.objects["Hair"]
     cache = playback.cache_of(hair)
@@ -230,7 +230,7 @@ def test_hair_without_show_in_renders_is_rendered_as_it_stands(scene):
     assert hair.hairloom.bake.copy is None and not hair.hide_render
 
 
-def test_a_copy_whose_bake_is_gone_is_told_once_and_stays(scene, tmp_path, capfd):
+def test_a_copy_with_a_missing_bake_is_reported_once_and_stays(scene, tmp_path, capfd):
     bpy.ops.hairloom.bake()
     curves = bpy.data.objects["Hair"].hairloom.bake.copy.data
     scene.frame_set(2)

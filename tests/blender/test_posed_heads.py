@@ -93,7 +93,7 @@ def test_a_preview_that_starts_in_a_pose_shows_the_hair_there(hair):
     assert away.max() < SAME and followed.shape == session.strands.shape
 
 
-def test_what_blender_has_put_there_stays(hair):
+def test_hair_that_blender_deforms_stays_in_place(hair):
     attached(hair)
     depsgraph = go_to(POSED)
     source = read_source(hair, depsgraph)
@@ -179,7 +179,7 @@ def test_a_shape_key_is_a_pose_too(new_hair, sphere):
     assert shown == pytest.approx(rest + [0.0, 0.3, 0.0], abs=SAME)
 
 
-def test_hair_of_a_head_that_shape_keys_have_formed_is_told_from_its_basis(hair, sphere):
+def test_hair_on_a_shape_key_is_distinguished_from_hair_on_the_basis(hair, sphere):
     """As in MPFB: hair has grown on the formed face, before an armature poses it."""
     sphere.shape_key_add(name="Basis")
     for name, factor in (("Wide", 1.3), ("Muted", 5.0)):
@@ -250,7 +250,7 @@ def test_files_hold_the_hair_as_it_is_shown(hair):
     assert np.array_equal(moving.at(REST, go_to(REST)), stored)
 
 
-def test_cards_are_those_of_the_rest_pose_and_say_so(hair):
+def test_cards_are_made_in_the_rest_pose_with_a_note(hair):
     inputs, notes, _ = read_inputs(hair, go_to(REST))
     posed, said, _ = read_inputs(hair, go_to(POSED))
     for name in ("strands", "head"):

@@ -152,7 +152,7 @@ def test_a_preset_file_is_applied_and_kept(
         ((presets.PRESET_FOLDER / "stage" / "plain.json").read_text(), "has no 'stage'"),
     ],
 )
-def test_what_is_no_preset_of_hair_is_refused_and_not_kept(
+def test_files_that_are_no_presets_are_refused_and_not_stored(
     hair: bpy.types.Object, own_folder: Path, tmp_path: Path, content: str, why: str
 ) -> None:
     (tmp_path / "theirs.json").write_text(content)
@@ -244,7 +244,7 @@ def test_every_preset_that_ships_goes_onto_a_groom_and_has_a_picture(
         assert picture.is_file() and picture.stat().st_size < 60_000, "run make pictures"
 
 
-def test_the_same_title_replaces_and_another_never_does(
+def test_only_a_preset_of_the_same_title_is_replaced(
     hair: bpy.types.Object, own_folder: Path
 ) -> None:
     shading = hair.data.hairloom.shading
@@ -283,7 +283,7 @@ def test_a_preset_without_a_name_is_refused(hair: bpy.types.Object, own_folder: 
     ],
     ids=range(10),
 )
-def test_garbage_in_the_folder_is_told_and_breaks_nothing(
+def test_garbage_in_the_preset_folder_is_reported_and_harmless(
     hair: bpy.types.Object, own_folder: Path, content: bytes
 ) -> None:
     bpy.ops.hairloom.save_preset(title="Good")

@@ -80,7 +80,7 @@ def test_huangs_model_is_read_with_its_own_inputs(hair: Any) -> None:
     assert any("Huang" in note for note in notes)
 
 
-def test_constants_of_other_nodes_are_read_and_what_varies_is_told(hair: Any) -> None:
+def test_constants_of_other_nodes_are_read_and_varying_inputs_are_reported(hair: Any) -> None:
     node = material(hair)
     tree = node.id_data
     constant = tree.nodes.new("ShaderNodeRGB")
@@ -93,7 +93,7 @@ def test_constants_of_other_nodes_are_read_and_what_varies_is_told(hair: Any) ->
     assert note.startswith("Roughness comes from other nodes")
 
 
-def test_of_several_materials_the_active_one_counts_and_that_is_said(hair: Any) -> None:
+def test_the_active_material_is_used_and_named(hair: Any) -> None:
     material(hair, Color=(1.0, 0.0, 0.0, 1.0))
     assert look(hair)[1] == ()
     material(hair, Color=(0.0, 1.0, 0.0, 1.0))
@@ -104,7 +104,7 @@ def test_of_several_materials_the_active_one_counts_and_that_is_said(hair: Any) 
 
 
 @pytest.mark.parametrize("way", ["mixed", "in a group"])
-def test_it_is_found_behind_other_nodes(hair: Any, way: str) -> None:
+def test_the_hair_node_is_found_behind_other_nodes(hair: Any, way: str) -> None:
     node = material(hair, IOR=1.3)
     tree = node.id_data
     output = tree.get_output_node("ALL")

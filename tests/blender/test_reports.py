@@ -31,14 +31,14 @@ def test_a_report_names_its_operator_and_its_kind(new_hair):
     assert past_reports[-1].kind == "ERROR" and "plaid" in past_reports[-1].text
 
 
-def test_what_a_job_collects_is_the_jobs(new_hair):
+def test_reports_collected_by_a_job_belong_to_it(new_hair):
     new_hair()
     with collected_reports() as reports:
         bpy.ops.hairloom.look_to_material()
     assert reports.messages and not past_reports
 
 
-def test_old_reports_make_room(new_hair):
+def test_old_reports_are_dropped(new_hair):
     new_hair()
     for _ in range(past_reports.maxlen + 5):
         bpy.ops.hairloom.look_to_material()

@@ -38,9 +38,7 @@ def test_a_file_that_is_cut_short_anywhere_is_not_whole(
 
 
 @pytest.mark.parametrize("part", [0.0, 0.3, 0.9, 0.999])
-def test_a_disk_that_is_full_leaves_the_scene_before(
-    tmp_path: Path, sphere: Any, part: float
-) -> None:
+def test_a_full_disk_leaves_the_previous_scene(tmp_path: Path, sphere: Any, part: float) -> None:
     """Blender itself takes a truncated file as finished, and replaces the old one with it."""
     path = tmp_path / "wig.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))

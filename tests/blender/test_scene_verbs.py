@@ -81,7 +81,7 @@ def test_hair_grows_on_a_mesh(scene: Path) -> None:
     assert hair.data.hairloom.shading.primary_strength == 3.0
 
 
-def test_the_verb_grows_hair_as_the_button_does_but_for_what_its_row_names(scene: Path) -> None:
+def test_the_verb_grows_hair_as_the_button_does_once_its_options_are_set(scene: Path) -> None:
     page = (Path(__file__).parents[2] / "docs" / "command-line.md").read_text(encoding="utf-8")
     (row,) = re.findall(r"^\| `grow` \| (.+) \| scene \|$", page, flags=re.M)
     options = " ".join(re.findall("`([^`]+)`", row)).split()
@@ -136,7 +136,7 @@ def test_settings_go_onto_the_hair_that_is_named(scene: Path) -> None:
     assert hair.data.hairloom.cards.levels == 2
 
 
-def test_the_look_of_a_material_is_taken_over(scene: Path) -> None:
+def test_the_look_of_a_material_is_copied(scene: Path) -> None:
     bpy.ops.wm.open_mainfile(filepath=str(scene))
     material = bpy.data.materials.new("Red")
     material.node_tree.nodes.clear()
@@ -150,7 +150,7 @@ def test_the_look_of_a_material_is_taken_over(scene: Path) -> None:
     assert bpy.data.objects["Hair"].data.hairloom.shading.index_of_refraction == pytest.approx(1.3)
 
 
-def test_a_preset_of_a_file_is_taken_over(scene: Path) -> None:
+def test_a_preset_is_applied_to_hair_of_a_file(scene: Path) -> None:
     facts = run(scene, "run", "apply_preset", "--object", "Hair", "--set", "name=looks/blond")
     assert facts["operator"] == "apply_preset"
     blond = presets.named_preset("looks/blond").settings.as_dict()
@@ -181,7 +181,7 @@ def test_operators_are_listed_with_their_properties(
     assert any(line.startswith("    sphere_count: ") for line in lines)
 
 
-def test_a_scene_is_wanted_and_nothing_said_that_is_to_be_done(
+def test_a_scene_without_an_action_is_an_error(
     scene: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     for wanted in (["--output", str(scene.with_name("out.blend"))], ["--save"]):
@@ -363,7 +363,7 @@ def test_a_sample_scene_is_shown_when_its_file_is_opened(extension: None, tmp_pa
     assert any(obj.type == "CURVES" for obj in bpy.context.scene.objects)
 
 
-def test_the_self_test_tells_what_this_machine_can_do(
+def test_the_self_test_lists_what_this_machine_can_do(
     extension: None, tmp_path: Path, gpu_context: object
 ) -> None:
     report = tmp_path / "report.json"
@@ -517,7 +517,7 @@ def test_jobs_on_all_hair_of_a_scene_leave_out_what_is_hidden_or_empty(
     assert [note for note in json.loads(report.read_text())["notes"] if said in note]
 
 
-def test_what_is_hidden_is_taken_where_it_is_named(scene: Path) -> None:
+def test_hidden_hair_is_used_if_it_is_named(scene: Path) -> None:
     plain = ["--set", "children.method=none"]
     alone = exported(scene, *plain)["preflight"]["strands"]
     beside(scene, hidden_copy)
@@ -581,7 +581,7 @@ def test_strands_of_a_scene_that_are_left_out_are_named_or_refused(
         ("export --preflight --skip-existing", "--skip-existing", "writes no output"),
     ],
 )
-def test_options_that_mean_nothing_are_refused(
+def test_options_without_effect_are_refused(
     scene: Path, capsys: pytest.CaptureFixture[str], arguments: str, option: str, why: str
 ) -> None:
     """The error names the option, and nothing is written."""
@@ -614,7 +614,7 @@ def test_hair_of_a_scene_leaves_as_it_is_at_a_frame(scene: Path) -> None:
     )
 
 
-def test_hair_of_a_scene_is_held_to_what_jobs_ask_of_files(scene: Path) -> None:
+def test_hair_of_a_scene_is_checked_like_hair_of_files(scene: Path) -> None:
     """UVs with --strict, and the vertex group that children grow by."""
     children = ["--set", "children.method=multi", "--set", "children.strand_count=200"]
     fraction = {}

@@ -41,18 +41,18 @@ def test_an_object_that_was_just_removed_is_no_obstacle(hair, sphere):
     assert grown_on(sphere, layer) == [hair]
 
 
-def test_nor_for_cards_beside_it(hair):
+def test_a_removed_object_is_no_obstacle_for_cards(hair):
     """Displayed cards are built with the depsgraph as it is."""
     depsgraph = bpy.context.view_layer.depsgraph
     assert read_occluders(CardOcclusionSettings(others=True), hair, depsgraph).cards() == ((), ())
 
 
-def test_nor_for_a_job(hair):
+def test_a_removed_object_is_no_obstacle_for_a_job(hair):
     assert object_settings.grooms_to_export([]) == ([hair], ())
     assert bake_job._objects_to_bake([]) == ([hair], ())
 
 
-def test_nor_for_the_mesh_that_hair_grows_from(hair, sphere):
+def test_a_removed_object_is_no_obstacle_for_growing(hair, sphere):
     depsgraph = bpy.context.evaluated_depsgraph_get()
     assert surface_for(hair, objects_in(bpy.context.view_layer), depsgraph) == sphere
 
@@ -90,7 +90,7 @@ def test_a_pinned_properties_editor_is_about_the_hair_that_it_shows(hair, new_ha
         space.pin_id, space.use_pin_id = None, False
 
 
-def test_hair_of_another_view_layer_is_not_selected_but_told(hair, sphere):
+def test_hair_of_another_view_layer_is_reported_instead_of_selected(hair, sphere):
     """Such as hair that is previewed in a scene that is not shown."""
     bpy.ops.hairloom.preview()
     bpy.context.window.scene = bpy.data.scenes.new("Other")
@@ -102,7 +102,7 @@ def test_hair_of_another_view_layer_is_not_selected_but_told(hair, sphere):
 @pytest.mark.parametrize(
     "name", ["grow", "add_groom", "import_strands", "mirror_hair", "make_real"]
 )
-def test_what_adds_or_shapes_hair_waits_for_object_mode(name, hair, sphere):
+def test_tools_that_add_or_shape_hair_need_object_mode(name, hair, sphere):
     button = getattr(bpy.ops.hairloom, name)
     assert button.poll()
     bpy.ops.object.mode_set(mode="EDIT")

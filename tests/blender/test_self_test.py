@@ -23,7 +23,7 @@ def test_all_is_well_here_and_can_be_copied(monkeypatch):
     assert "passed  Drawing, shadows: hair covers" in text and "backend: " in text
 
 
-def test_what_is_wrong_is_told_and_the_rest_goes_on(monkeypatch, capfd):
+def test_failures_are_reported_and_other_tests_continue(monkeypatch, capfd):
     def broken(*_, **__):
         raise RuntimeError("this GPU refuses")
 

@@ -148,7 +148,7 @@ def test_rounding_far_from_the_origin_is_no_edit(preview, get_depsgraph):
     assert session.rig is not rig
 
 
-def test_another_surface_begins_the_preview_anew(preview, get_depsgraph):
+def test_another_surface_restarts_the_preview(preview, get_depsgraph):
     hair, head, _ = preview
     other = head.copy()
     other.data, other.name = head.data.copy(), "Other"
@@ -274,7 +274,7 @@ def test_scene_lights_are_followed(preview):
     assert overlay.drawing_of(session.uid).snapshot.lights[0].power == (2.0, 2.0, 2.0)
 
 
-def test_two_grooms_on_one_head_go_separate_ways(new_hair, sphere, get_depsgraph):
+def test_two_grooms_on_one_head_move_independently(new_hair, sphere, get_depsgraph):
     one, two = new_hair(sphere), new_hair(sphere)
     first, second = previews.start(one, get_depsgraph()), previews.start(two, get_depsgraph())
     two.data.hairloom.shading.ambient = 0.5
@@ -356,7 +356,7 @@ def test_hair_that_plays_keeps_its_size_until_it_is_at_rest(preview, get_depsgra
     assert not previews.is_playing()
 
 
-def test_hair_of_no_size_is_not_made_again(new_hair, get_depsgraph):
+def test_hair_scaled_to_zero_is_not_rebuilt(new_hair, get_depsgraph):
     hair = new_hair()
     session = previews.start(hair, get_depsgraph())
     update()

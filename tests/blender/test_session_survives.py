@@ -14,7 +14,7 @@ def update():
     bpy.context.view_layer.update()
 
 
-def test_a_defect_ends_the_preview_and_is_told_once(preview, monkeypatch, capfd):
+def test_an_exception_ends_the_preview_and_is_reported_once(preview, monkeypatch, capfd):
     _, head, session = preview
 
     def fail(*_):
@@ -43,7 +43,7 @@ def test_curves_may_become_fewer_and_none(preview, get_depsgraph):
     assert overlay.drawing_of(session.uid) is None
 
 
-def test_renaming_is_no_matter(preview):
+def test_renaming_objects_changes_nothing(preview):
     hair, head, session = preview
     before = strand_grid(session)
     hair.name, head.name = "Wig", "Bust"
@@ -103,7 +103,7 @@ def test_loading_a_file_drops_all_previews_and_keeps_the_settings(preview, tmp_p
     assert bpy.data.objects["Hair"].data.hairloom.shading.ambient == 0.125
 
 
-def test_a_new_file_knows_nothing_of_the_one_before(preview, get_depsgraph):
+def test_a_new_file_keeps_no_state_of_the_previous_one(preview, get_depsgraph):
     _, head, _ = preview
     previews.play(get_depsgraph())
     previews.pause(True)
@@ -191,7 +191,7 @@ def test_a_head_without_faces_or_uvs_is_a_warning(new_hair, sphere, get_depsgrap
     assert session.rig.head is None
 
 
-def test_a_moment_without_a_gpu_is_waited_for(preview, get_depsgraph, monkeypatch):
+def test_a_temporarily_missing_gpu_is_waited_for(preview, get_depsgraph, monkeypatch):
     """Blender has no GPU context between a window's closing and the next redraw."""
     _, _, session = preview
     done = []

@@ -202,7 +202,7 @@ def trim(hair):
 
 
 @pytest.mark.parametrize("order", ["settle, trim", "trim, settle"])
-def test_what_is_taken_back_takes_later_tools_along(order, new_hair, sphere):
+def test_reverting_settle_also_reverts_later_tools(order, new_hair, sphere):
     """Undoing a tool undoes later ones too, but no earlier ones, such as a settle before a trim."""
     past_reports.clear()
     hair = new_hair(sphere)
@@ -272,7 +272,7 @@ def test_hair_falls_as_painted_where_a_modifier_adds_curves(domain, new_hair, sp
     assert np.abs(np.delete(tips, moving)).max() < 1e-4
 
 
-def test_until_its_end_nothing_changes(new_hair, sphere, get_depsgraph):
+def test_settling_changes_nothing_until_it_ends(new_hair, sphere, get_depsgraph):
     hair = new_hair(sphere)
     combed = curve_points(hair.data)
     work = settle_hair(hair, get_depsgraph(), SettleSettings())
@@ -283,7 +283,7 @@ def test_until_its_end_nothing_changes(new_hair, sphere, get_depsgraph):
     assert not BEFORE_SETTLE.exists(hair)
 
 
-def test_of_several_hairs_all_settle_or_none(new_hair, sphere):
+def test_several_grooms_settle_together_or_not_at_all(new_hair, sphere):
     first, second = new_hair(sphere), new_hair(sphere)
     combed = curve_points(first.data)
     second.data.position_data.foreach_set("vector", (combed + np.float32(1.0)).ravel())

@@ -85,7 +85,7 @@ def test_strands_have_the_light_of_the_reference(frame: Any, melanin: float) -> 
     assert picture[row, column, :3] == pytest.approx(expected, rel=tolerance(1e-3, 4e-3))
 
 
-def test_tables_are_made_once_a_shape_and_shared(
+def test_tables_are_computed_once_per_fibre_shape_and_shared(
     frame: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Colours and strengths need no new table; new shapes do, old ones after CAPACITY others."""

@@ -75,7 +75,7 @@ def of_form(form: str, **more: Any) -> VolumeSettings:
 @pytest.mark.alike
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("extinction", [1.0, 3.0])
-def test_hair_behind_hair_has_the_light_that_is_left(
+def test_hair_behind_hair_gets_the_transmitted_light(
     frame: Any, form: str, extinction: float
 ) -> None:
     """A strand below strands that cover a third of the area gets exp(-K / 3) of the light."""

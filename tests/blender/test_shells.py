@@ -137,7 +137,7 @@ def test_long_hair_as_shells_is_refused(tmp_path: Path, capfd: pytest.CaptureFix
     assert not list(tmp_path.iterdir())
 
 
-def test_shells_take_the_place_of_cards_and_cards_that_of_shells(
+def test_shells_replace_cards_and_cards_replace_shells(
     new_hair: Callable[..., Any], sphere: Any
 ) -> None:
     hair = new_hair(sphere, fur_on_ball(300, 0.03)[0])

@@ -68,7 +68,7 @@ def test_hair_goes_along_at_a_cut_and_has_no_speed_after_it(playing, get_depsgra
     assert 0.0 < speed(session) < 2.0, "it falls on, and does not whip"
 
 
-def test_without_it_hair_whips(playing, get_depsgraph):
+def test_hair_whips_at_a_cut_without_cut_detection(playing, get_depsgraph):
     settings, head, session = playing
     settings.jump_distance = settings.jump_turn = 0.0
     advance(get_depsgraph, 2)
@@ -78,7 +78,7 @@ def test_without_it_hair_whips(playing, get_depsgraph):
 
 
 @pytest.mark.parametrize("limit", ["jump_distance", "jump_turn"])
-def test_either_limit_finds_its_jump(playing, get_depsgraph, limit):
+def test_distance_and_angle_limits_each_detect_a_jump(playing, get_depsgraph, limit):
     settings, head, session = playing
     setattr(settings, {"jump_distance": "jump_turn", "jump_turn": "jump_distance"}[limit], 0.0)
     advance(get_depsgraph, 2)
@@ -182,7 +182,7 @@ def test_pre_roll_is_what_frames_at_the_start_would_be(playing, get_depsgraph):
     assert np.abs(on_head(session, head) - expected).max() > 1e-3, "at rest there is none"
 
 
-def test_a_bake_has_all_of_them(new_hair, sphere, tmp_path):
+def test_a_bake_applies_all_shot_settings(new_hair, sphere, tmp_path):
     """Pre-roll, a cut in frame 4, and hair that is frozen by keyframes from frame 6 on."""
     hair = new_hair(sphere)
     scene, settings = bpy.context.scene, hair.hairloom.dynamics
@@ -225,7 +225,7 @@ def test_hair_that_inherits_all_motion_stays_in_its_style(playing, get_depsgraph
     np.testing.assert_allclose(on_head(session, head), before, atol=1e-4)
 
 
-def test_without_inheriting_it_lags(playing, get_depsgraph):
+def test_hair_without_inherited_motion_lags(playing, get_depsgraph):
     _, head, session = playing
     before = on_head(session, head)
     advance(get_depsgraph, 4, lambda frame: setattr(head.location, "x", 0.1 * frame**2))
@@ -295,7 +295,7 @@ def test_keyframes_turn_only_selected_on_and_off(new_hair, sphere, tmp_path, get
     assert changed_since(hair, cache, get_depsgraph()) == ("selection",)
 
 
-def test_where_no_selection_is_known_all_is_simulated(playing, get_depsgraph):
+def test_without_a_selection_attribute_all_hair_is_simulated(playing, get_depsgraph):
     settings, head, session = playing
     settings.only_selected = True
     session.read_again(get_depsgraph())

@@ -47,7 +47,7 @@ def served(session):
     return drawn(session).cards
 
 
-def test_cards_are_drawn_in_place_of_strands(preview):
+def test_cards_are_drawn_instead_of_strands(preview):
     hair, _, session = preview
     snapshot = drawn(session)
     assert snapshot.strand_count == 0 and snapshot.cards.mesh.card_count > 0

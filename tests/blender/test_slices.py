@@ -56,7 +56,7 @@ def test_render_writes_the_layers_side_by_side(
 
 
 @pytest.mark.slow
-def test_extremes_are_told_on_the_command_line(
+def test_extreme_values_are_reported_on_the_command_line(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     arguments = ["render", *SMALL, "--output", str(tmp_path / "a.png")]
@@ -134,7 +134,9 @@ def test_the_skin_shadow_of_previewed_hair(new_hair: Any, sphere: Any) -> None:
     assert previews.session_of(hair) is None
 
 
-def test_a_lamp_amidst_the_hair_is_told_where_a_view_goes_by_it(new_hair: Any, sphere: Any) -> None:
+def test_a_lamp_inside_the_hair_is_reported_if_a_view_uses_scene_lights(
+    new_hair: Any, sphere: Any
+) -> None:
     hair = new_hair(sphere)
     hair.data.hairloom.volume.shadows = "deep"
     lamp = bpy.data.objects.new("Candle", bpy.data.lights.new("Candle", "POINT"))

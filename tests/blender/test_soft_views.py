@@ -116,7 +116,7 @@ def test_a_view_at_rest_becomes_soft(view: SmallView, names: tuple[str, ...]) ->
     assert (softened(view)[0] == soft).all()
 
 
-def test_what_changes_is_hard_at_once(view: SmallView) -> None:
+def test_changed_shadows_are_hard_at_once(view: SmallView) -> None:
     """A changed picture equals one with hard shadows bit for bit, and no earlier samples count."""
     hard = hardened(view, GROOMS)
     turned = {
@@ -136,7 +136,7 @@ def test_what_changes_is_hard_at_once(view: SmallView) -> None:
     assert (hardened(view, GROOMS) == hard).all()
 
 
-def test_the_last_sample_lets_go_of_all(view: SmallView) -> None:
+def test_the_last_sample_frees_all_textures(view: SmallView) -> None:
     def held() -> int:
         gpu_objects.free_unused()
         return gpu_objects.bytes_in_use()

@@ -104,7 +104,7 @@ def test_a_view_that_is_drawn_afresh_begins_again(two_views: tuple[views.View, .
     assert softening.sums().count == 1 and not view.is_soft
 
 
-def test_what_is_to_be_drawn_afresh_gets_no_sample_before(
+def test_a_view_that_must_be_redrawn_gets_no_sample_first(
     two_views: tuple[views.View, ...],
 ) -> None:
     view, other = two_views
@@ -138,7 +138,7 @@ def test_a_sample_tells_whether_a_soft_view_is_still_right(
     assert not view.wants_more
 
 
-def test_what_is_shown_among_samples_is_checked_after_them(
+def test_a_view_shown_between_samples_is_checked_after_them(
     two_views: tuple[views.View, ...],
 ) -> None:
     """Slow series of samples do not start again with each redraw."""
@@ -186,7 +186,7 @@ def test_a_view_that_others_draw_keeps_none_waiting(two_views: tuple[views.View,
     assert softening.takes_sample(other) and not view.wants_more
 
 
-def test_what_moves_slowly_is_not_at_rest_between_its_frames(
+def test_slow_motion_is_not_at_rest_between_its_frames(
     two_views: tuple[views.View, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pauses: list[float] = []

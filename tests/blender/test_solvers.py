@@ -65,7 +65,7 @@ def agree(found: np.ndarray, expected: np.ndarray, share: float = 1.0) -> bool:
     return bool(np.median(apart) < 5.0e-6 and np.quantile(apart, share) < 5.0e-4)
 
 
-def test_numpy_is_the_pipeline(rig: Rig, poses: list[Pose]) -> None:
+def test_the_numpy_solver_equals_the_pipeline(rig: Rig, poses: list[Pose]) -> None:
     solver = solvers.make_solver(rig, "numpy")
     assert solver.device == "numpy"
     assert np.array_equal(solver.strands(), rig.strands.points)
@@ -175,7 +175,7 @@ def test_strands_that_are_led_out_do_not_depend_on_who_looks(rig: Rig, poses: li
 
 @pytest.mark.usefixtures("gpu_context")
 @pytest.mark.parametrize("forms", [("numpy", "compute"), ("compute", "numpy")])
-def test_another_form_goes_on_with_the_motion(
+def test_switching_the_solver_continues_the_motion(
     rig: Rig, poses: list[Pose], forms: tuple[str, str]
 ) -> None:
     whole = NumpySolver(rig)
@@ -227,7 +227,7 @@ def test_snapshots_hold_an_array_or_what_lies_on_the_gpu(rig: Rig, poses: list[P
 
 
 @pytest.mark.usefixtures("gpu_context")
-def test_what_was_released_comes_back(rig: Rig, poses: list[Pose]) -> None:
+def test_released_buffers_are_restored(rig: Rig, poses: list[Pose]) -> None:
     from hairloom.addon.render import shader_program
 
     solver, expected = ComputeSolver(rig), NumpySolver(rig)
@@ -256,7 +256,7 @@ def test_automatic_takes_the_gpu(rig: Rig) -> None:
 
 
 @pytest.mark.skipif(not bpy.app.module, reason="it needs Blender as a module, to start another")
-def test_without_a_gpu_numpy_it_is() -> None:
+def test_automatic_takes_numpy_without_a_gpu() -> None:
     """In a separate Blender, since a GPU that is once initialised stays."""
     script = (
         "import sys, bpy, numpy\n"

@@ -65,7 +65,7 @@ def test_khronos_validator_finds_no_fault(springs: tuple[Path, WrittenCards]) ->
     assert report["info"]["animationCount"] == 0
 
 
-def test_three_vrm_moves_it_as_our_own_springs_do(
+def test_three_vrm_moves_hair_as_our_own_springs_do(
     springs: tuple[Path, WrittenCards], moved: MovedByThree
 ) -> None:
     """Our own springs, with the sidecar's values, agree to 0.1 % of the hair's length."""
@@ -93,7 +93,7 @@ def sprung_as_told(told: dict[str, Any], path: Path, carrier: np.ndarray) -> np.
     return sprung(SpringChains(rest, balls, hits), SpringValues(*values), carrier)
 
 
-def test_what_three_vrm_moves_is_near_the_bake(
+def test_motion_by_three_vrm_is_close_to_the_bake(
     motion: GuideMotion,  # noqa: F811
     springs: tuple[Path, WrittenCards],
     moved: MovedByThree,
@@ -198,7 +198,7 @@ def test_springs_are_for_glb(motion: GuideMotion, tmp_path: Path) -> None:  # no
         write(tmp_path / "hair.fbx", motion, kind="springs")
 
 
-def test_the_sidecar_says_what_the_file_does(springs: tuple[Path, WrittenCards]) -> None:
+def test_the_sidecar_describes_the_springs_of_the_file(springs: tuple[Path, WrittenCards]) -> None:
     schema = pytest.importorskip("jsonschema")
     path, written = springs
     sidecar = json.loads(path.with_name("hair.hairloom.json").read_text("utf-8"))

@@ -136,7 +136,7 @@ def test_a_stage_is_chosen_by_its_name_and_changed_by_set(tmp_path: Path) -> Non
 
 
 @pytest.mark.usefixtures("extension")
-def test_an_unknown_stage_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_unknown_stage_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["render", "--stage", "moon", "--output", str(tmp_path / "still.png")]
     assert command_line.run(arguments) == 1
     told = capsys.readouterr().err
@@ -192,7 +192,7 @@ def test_transparent_pixels_stay_transparent(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("extension")
-def test_a_film_that_this_blender_does_not_have_is_told(
+def test_a_view_transform_that_blender_lacks_is_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from hairloom.addon.blender.pictures import film

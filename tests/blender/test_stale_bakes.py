@@ -60,13 +60,13 @@ def test_a_new_bake_is_up_to_date_in_any_frame(frame: int, changed: Any) -> None
 
 
 @pytest.mark.parametrize("frame", [0, 2])
-def test_settings_are_told_in_any_frame(frame: int, baked: Any, changed: Any) -> None:
+def test_changed_settings_are_reported_in_any_frame(frame: int, baked: Any, changed: Any) -> None:
     bpy.context.scene.frame_set(frame)
     baked[0].hairloom.dynamics.damping = 7.0
     assert changed() == ("settings",)
 
 
-def test_another_form_of_the_solver_is_no_change(baked: Any, changed: Any) -> None:
+def test_another_device_of_the_solver_keeps_the_bake_valid(baked: Any, changed: Any) -> None:
     baked[0].hairloom.dynamics.device = "automatic"
     assert changed() == ()
 
@@ -83,7 +83,7 @@ def test_animated_settings_are_those_of_their_frame(baked: Any, changed: Any) ->
         assert changed() == ()
 
 
-def test_what_drives_and_what_makes_the_hair_is_told_by_name(baked: Any, changed: Any) -> None:
+def test_changed_drivers_and_inputs_are_named(baked: Any, changed: Any) -> None:
     hair, head = baked
     scene = bpy.context.scene
     head.location.z = 0.2
@@ -105,7 +105,7 @@ def test_what_drives_and_what_makes_the_hair_is_told_by_name(baked: Any, changed
     assert "hair" in changed()
 
 
-def test_a_collider_that_is_disabled_or_thickened_is_told(baked: Any, changed: Any) -> None:
+def test_a_disabled_or_thickened_collider_is_reported(baked: Any, changed: Any) -> None:
     hair, head = baked
     colliders = bpy.data.collections.new("Colliders")
     bpy.context.scene.collection.children.link(colliders)
@@ -124,13 +124,15 @@ def test_a_collider_that_is_disabled_or_thickened_is_told(baked: Any, changed: A
     assert changed() == ("colliders",)
 
 
-def test_a_head_of_other_vertices_is_told_and_stops_nothing(baked: Any, changed: Any) -> None:
+def test_a_head_with_another_vertex_count_is_reported_and_stops_nothing(
+    baked: Any, changed: Any
+) -> None:
     baked[1].modifiers.new("Subdivision", "SUBSURF").levels = 1
     bpy.context.view_layer.update()
     assert "pose" in changed()
 
 
-def test_motion_of_strands_and_of_cards_says_so(
+def test_motion_exports_report_stale_bakes(
     baked: Any, tmp_path: Path, get_depsgraph: Any, capfd: pytest.CaptureFixture[str]
 ) -> None:
     hair, frames = baked[0], range(1, LAST + 1)

@@ -51,7 +51,7 @@ def test_a_strand_of_a_metre_stands_where_unreal_looks_for_it(
     ],
 )
 @needs_usd
-def test_usd_says_its_unit_and_axes(
+def test_usd_stores_its_unit_and_axes(
     new_hair: Any, tmp_path: Path, engine: str, up: str, unit: float, root: Any
 ) -> None:
     new_hair(strands=straight_strands())
@@ -66,7 +66,7 @@ def test_usd_says_its_unit_and_axes(
 
 
 @needs_usd
-def test_own_axes_and_unit_go_over_those_of_the_program(new_hair: Any, tmp_path: Path) -> None:
+def test_chosen_axes_and_unit_override_those_of_the_program(new_hair: Any, tmp_path: Path) -> None:
     new_hair(strands=straight_strands())
     path = tmp_path / "hair.usda"
     bpy.ops.hairloom.export_usd(
@@ -124,7 +124,7 @@ def test_modifiers_are_in_the_file_and_the_scene_is_untouched(
     assert [modifier.name for modifier in hair.modifiers] == ["Push"]
 
 
-def test_point_counts_of_their_own_stay(new_hair: Any, tmp_path: Path) -> None:
+def test_uneven_point_counts_are_kept(new_hair: Any, tmp_path: Path) -> None:
     counts = np.array([4, 9, 2, 30])
     points = np.concatenate([np.linspace([i, 0, 0], [i, 0, 0.1], n) for i, n in enumerate(counts)])
     offsets = np.concatenate([[0], np.cumsum(counts)])
@@ -146,7 +146,7 @@ def test_curves_that_are_all_guides_are_strands_for_the_check_as_for_the_file(
     assert check.lines[0].startswith("60 strands, 0 guides")
 
 
-def test_what_the_hair_says_of_itself_is_in_the_file(new_hair: Any, tmp_path: Path) -> None:
+def test_attributes_of_the_groom_are_in_the_file(new_hair: Any, tmp_path: Path) -> None:
     strands = replace(hedgehog(), color=np.random.default_rng(3).random((480, 3)))
     hair = new_hair(strands=strands)
     is_guide = np.arange(60) % 20 < 2  # two in each group
@@ -201,7 +201,7 @@ def test_several_hairs_are_groups_of_one_groom(new_hair: Any, sphere: Any, tmp_p
     assert scalp.name == "Hair"
 
 
-def test_hairs_whose_names_are_one_as_files_get_two(
+def test_grooms_with_equal_file_names_get_two_files(
     new_hair: Any, sphere: Any, tmp_path: Path
 ) -> None:
     """On Windows, hair_001 would overwrite the file of Hair.001."""

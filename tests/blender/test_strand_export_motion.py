@@ -96,7 +96,7 @@ def test_guides_of_a_bake_move_as_their_strands_do(swinging: Any, tmp_path: Path
         np.testing.assert_allclose(curves["points"][place], to_unreal(expected), rtol=1e-6)
 
 
-def test_a_bake_keeps_what_its_curves_say(swinging: Any, tmp_path: Path) -> None:
+def test_a_bake_keeps_attributes_of_its_curves(swinging: Any, tmp_path: Path) -> None:
     hair, _ = swinging
     hair.data.hairloom.guides.cv_count = 15
     color = np.random.default_rng(6).random((480, 3)).astype(np.float32)
@@ -207,7 +207,9 @@ def test_children_follow_guides_that_modifiers_move(
 
 
 @needs_usd
-def test_curves_that_come_and_go_are_told_and_leave_nothing(new_hair: Any, tmp_path: Path) -> None:
+def test_changing_curve_counts_are_reported_and_leave_no_file(
+    new_hair: Any, tmp_path: Path
+) -> None:
     hair = new_hair(strands=straight_strands())
     plan = StrandExport.of(
         [hair],

@@ -92,7 +92,7 @@ def test_bones_are_left_out_where_they_are_not_wanted_or_not_there(
     ],
     ids=["head", "all"],
 )
-def test_bones_that_were_renamed_are_told(
+def test_renamed_bones_are_reported(
     new_hair: Any,
     sphere: Any,
     tmp_path: Path,
@@ -246,7 +246,7 @@ def test_hair_of_guides_alone_is_written_as_strands(new_hair: Any, tmp_path: Pat
         ("export_hair", ".hair", {}),
     ],
 )
-def test_what_is_written_comes_in_again(
+def test_exported_grooms_can_be_imported_again(
     new_hair: Any, sphere: Any, tmp_path: Path, operator: str, suffix: str, options: Any
 ) -> None:
     strands = replace(hedgehog(), color=np.random.default_rng(8).random((480, 3)))

@@ -251,7 +251,7 @@ def test_a_file_that_cannot_be_used_is_named_and_leaves_nothing(
         (".hair", {"up": "Y"}, "Y up (--groom-up Y)", {"up": "Y"}),
     ],
 )
-def test_a_file_of_another_unit_or_with_other_axes_is_told_how_it_fits(
+def test_a_file_of_another_unit_or_axes_is_reported_with_fitting_options(
     tmp_path, head, told, suffix, written, wish, options
 ):
     path = tmp_path / f"hair{suffix}"
@@ -267,7 +267,7 @@ def test_a_file_of_another_unit_or_with_other_axes_is_told_how_it_fits(
     told()
 
 
-def test_a_factor_that_was_too_small_is_told_as_what_to_set(tmp_path, head, told):
+def test_the_message_about_a_small_factor_names_the_right_one(tmp_path, head, told):
     write_tfx(tmp_path / "hair.tfx", hairdo(), scale=0.01)
     with pytest.raises(RuntimeError, match=r"a scale of 0\.01 "):
         imported(tmp_path / "hair.tfx", scale=0.1)
@@ -302,7 +302,7 @@ def test_hair_of_an_odd_size_without_a_head_is_a_warning(tmp_path, told, scale, 
     assert words in told()
 
 
-def test_hair_and_head_in_centimetres_are_told_and_scaled_together(tmp_path, head, told):
+def test_hair_and_head_in_centimetres_are_reported_and_scaled_together(tmp_path, head, told):
     """A head of 24 m at the origin, whose object has its own scale, and hair on it."""
     head.scale *= 100.0
     head.location *= 100.0
@@ -333,7 +333,7 @@ def test_of_several_uv_maps_the_one_that_counts_is_named(tmp_path, head, told):
     assert hair.data.surface_uv_map == "Lightmap"
 
 
-def test_a_head_that_has_no_uvs_keeps_the_files_own_and_is_told(tmp_path, head, told):
+def test_a_head_without_uvs_keeps_those_of_the_file_and_is_reported(tmp_path, head, told):
     head.data.uv_layers.remove(head.data.uv_layers[0])
     head.data.update()
     groom = hairdo()

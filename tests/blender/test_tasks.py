@@ -221,7 +221,7 @@ def test_hair_that_was_never_baked_is_exported_again_once_it_is(
     assert "bake has changed" in capfd.readouterr().out
 
 
-def test_what_a_heads_file_names_is_an_input(extension: None, tmp_path: Path) -> None:
+def test_files_that_a_head_refers_to_are_inputs(extension: None, tmp_path: Path) -> None:
     head, output = tmp_path / "head.obj", tmp_path / "a.tfx"
     head.write_text("mtllib skin.mtl\nv 0 0 0\n")
     (tmp_path / "skin.mtl").write_text("newmtl skin\n")
@@ -264,7 +264,7 @@ def test_what_cannot_be_skipped_is_said(
     assert message in capfd.readouterr().err
 
 
-def test_a_failed_task_says_why_in_its_report(
+def test_a_failed_task_reports_why(
     task: Callable[..., dict[str, Any]], tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     facts = task("--object", "Nobody", "--progress", "openjd", code=1)

@@ -164,7 +164,7 @@ def test_a_tie_that_is_deleted_in_mid_play_lets_go(swinging, get_depsgraph):
 
 @pytest.mark.alike
 @pytest.mark.parametrize("how", ["disabled", "scaled to zero", "taken out", "head at zero"])
-def test_what_cannot_hold_is_said_and_holds_nothing(swinging, get_depsgraph, how):
+def test_unusable_ties_are_reported_and_hold_nothing(swinging, get_depsgraph, how):
     hair, head = swinging
     one = ring()
     collection = tie(hair, one)
@@ -299,7 +299,7 @@ def test_a_bake_keeps_what_ties_hold(swinging, get_depsgraph):
     assert "ties" in changed_since(hair, cache, get_depsgraph())
 
 
-def test_a_tie_that_is_added_while_previewing_is_taken_over(swinging, get_depsgraph):
+def test_a_tie_added_during_a_preview_takes_effect(swinging, get_depsgraph):
     from hairloom.addon.blender.preview import scene_events
 
     hair, _ = swinging
@@ -331,7 +331,7 @@ def test_the_button_adds_the_selected_ring_or_a_new_one(swinging):
     assert made.matrix_world.translation.z == pytest.approx(0.14)
 
 
-def test_what_cannot_hold_hair_becomes_no_tie(swinging):
+def test_objects_that_cannot_hold_hair_become_no_tie(swinging):
     hair, _ = swinging
     one, flat = ring(), ring()
     flat.scale = (0.0, 0.0, 0.0)

@@ -166,7 +166,7 @@ def test_paused_hair_holds_and_goes_on(swinging, get_depsgraph):
     assert not previews.is_playing() and not bpy.ops.hairloom.pause.poll()
 
 
-def test_another_form_in_the_middle_goes_on_from_where_the_hair_is(swinging):
+def test_switching_the_device_during_play_continues_the_motion(swinging):
     hair, _, session = swinging
     hair.hairloom.dynamics.device = "automatic"
     go(1, 2, 3, 4)
@@ -204,7 +204,7 @@ def test_a_head_of_no_size_or_turned_inside_out_gives_no_nonsense(scale, swingin
 
 @pytest.mark.parametrize("what", ["a vertex", "the object"])
 @pytest.mark.parametrize("when", ["in playback", "while it plays freely"])
-def test_what_is_not_a_number_ends_the_preview_with_a_reason(what, when, swinging, get_depsgraph):
+def test_non_finite_input_ends_the_preview_with_a_reason(what, when, swinging, get_depsgraph):
     hair, head, _ = swinging
     go(1, 2)
     if when == "while it plays freely":
@@ -223,7 +223,7 @@ def test_what_is_not_a_number_ends_the_preview_with_a_reason(what, when, swingin
     np.testing.assert_array_equal(curves, [point.position for point in hair.data.points])
 
 
-def test_a_driver_that_gives_no_number_is_no_matter(swinging):
+def test_a_driver_without_a_number_is_ignored(swinging):
     """Blender itself ignores the value."""
     _, head, session = swinging
     head.driver_add("location", 1).driver.expression = "float('nan')"

@@ -173,7 +173,7 @@ def test_undo_and_a_shape_that_is_removed(hair):
 
 
 @pytest.mark.parametrize("wrong", ["open", "no size", "no faces"])
-def test_what_cannot_cut_is_refused(hair, wrong):
+def test_objects_that_cannot_cut_are_refused(hair, wrong):
     before = curve_points(hair.data)
     if wrong == "no size":
         shape = empty(0.0)

@@ -170,7 +170,7 @@ def test_pictures_and_a_video_of_a_longer_turn_go(table: Turntable) -> None:
 
 
 @pytest.mark.parametrize("is_there", few_in_commits([True, False]))
-def test_what_is_cancelled_leaves_nothing(table: Turntable, is_there: bool) -> None:
+def test_a_cancelled_turntable_leaves_no_files(table: Turntable, is_there: bool) -> None:
     kept = table.folder / "turntable_0001.png"
     if is_there:
         table.folder.mkdir(parents=True)
@@ -201,7 +201,9 @@ def test_the_next_turn_removes_what_a_killed_one_left(
     steps.close()
 
 
-def test_what_fails_leaves_nothing(table: Turntable, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_failed_turntable_leaves_no_files(
+    table: Turntable, monkeypatch: pytest.MonkeyPatch
+) -> None:
     drawn = table.picture
 
     def picture(frame: int) -> Any:
@@ -234,7 +236,7 @@ def test_a_video_on_a_full_disk_is_none(tmp_path: Path, part: float) -> None:
         assert not video.is_whole(cut)
 
 
-@pytest.mark.slow(instead="test_what_fails_leaves_nothing")
+@pytest.mark.slow(instead="test_a_failed_turntable_leaves_no_files")
 def test_without_a_writer_of_videos_the_pictures_stay(
     table: Turntable, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -252,7 +254,7 @@ def test_without_a_writer_of_videos_the_pictures_stay(
     [{"frames": 0}, {"frames": -3}, {"width": 0}, {"height": 100_000}, {"samples": 9}],
     ids=str,
 )
-def test_what_nobody_can_draw_is_refused(wrong: dict[str, int]) -> None:
+def test_impossible_sizes_are_refused(wrong: dict[str, int]) -> None:
     with pytest.raises(HairloomError, match=f"{next(iter(wrong))} cannot be"):
         TurntableSettings(**wrong)
 

@@ -37,13 +37,13 @@ def test_the_user_guide_shows_all_of_these_pictures():
 
 
 @pytest.mark.slow
-def test_the_pictures_show_what_stands_on_the_panels():
+def test_the_pictures_show_the_current_texts_of_panels():
     kept, now = panel_texts.kept(), panel_texts.texts()
     stale = [name for name in now if now[name] != kept.get(name)]
     assert stale == [], "make test-ui SESSIONS=session_guide_pictures; tools/guide_pictures.py"
 
 
-def test_what_is_kept_of_panels_has_labels_defaults_buttons_and_keyframes():
+def test_stored_panel_texts_have_labels_defaults_buttons_and_keyframes():
     """Shows that the test above can fail."""
     now = panel_texts.texts()
     assert {"Guides: 762, no keyframes", "Add Modifier", "Detail: adaptive"} <= set(now["strands"])
@@ -51,5 +51,5 @@ def test_what_is_kept_of_panels_has_labels_defaults_buttons_and_keyframes():
     assert set(now) == {*PICTURES, "preferences"}
 
 
-def test_a_panel_that_is_in_none_is_found():
+def test_a_panel_without_a_picture_is_found():
     assert not is_pictured("HAIRLOOM_PT_data_braids") and is_pictured("HAIRLOOM_PT_sidebar_look")

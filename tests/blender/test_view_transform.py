@@ -92,7 +92,7 @@ def test_exposure_and_gamma_need_no_other_table() -> None:
     assert error.mean() < 0.5 and error.max() < 3.0
 
 
-def test_rgb_curves_are_taken_over() -> None:
+def test_rgb_curves_are_applied() -> None:
     scene, colours = bpy.context.scene, hair_colours(500)
     settings = scene.view_settings
     settings.view_transform, settings.exposure = "AgX", 0.5
@@ -176,7 +176,7 @@ def test_nothing_is_left_in_the_file_and_it_is_as_saved_as_before() -> None:
     assert (settings.view_transform, settings.exposure) == kept
 
 
-def test_a_transform_that_cannot_be_read_is_told_and_not_tried_again(
+def test_an_unreadable_view_transform_is_reported_and_not_retried(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def refuse(*_: Any) -> Any:
@@ -195,9 +195,7 @@ def test_a_transform_that_cannot_be_read_is_told_and_not_tried_again(
 
 
 @pytest.mark.parametrize("most_bytes", few_in_commits([0, 3000]))
-def test_a_full_disk_is_no_other_colours_and_nothing_that_python_must_not_see(
-    most_bytes: int, tmp_path: Path
-) -> None:
+def test_a_full_disk_is_an_error_and_not_wrong_colours(most_bytes: int, tmp_path: Path) -> None:
     """A truncated picture is an error. It must not refer to data that Blender has freed: garbage
     collection would then crash Blender."""
     held = []

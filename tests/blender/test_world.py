@@ -205,7 +205,7 @@ def test_nodes_that_cannot_be_rendered_leave_the_plain_color(
     assert "World" in note and "no such program" in note and "Environment Texture" in note
 
 
-def test_a_missing_file_is_said_and_black(scene: Any) -> None:
+def test_a_missing_file_is_reported_and_black(scene: Any) -> None:
     tree = scene.world.node_tree
     node = tree.nodes.new("ShaderNodeTexEnvironment")
     node.image = bpy.data.images.new("Gone", 4, 2)

@@ -105,7 +105,7 @@ def rigged(glb: Path) -> None:
 
 
 @pytest.mark.parametrize("is_rigged", [False, True])
-def test_our_module_hands_springs_to_three_vrm(
+def test_our_module_passes_springs_to_three_vrm(
     told: dict[str, Any], sandbox: str, is_rigged: bool
 ) -> None:
     if not MODULE.is_dir():

@@ -270,7 +270,7 @@ def test_three_js_draws_hair_in_scenes_of_many_kinds(baked: Asset, sandbox: str)
     assert clipped[..., 2].max() == 0.0, "the planes cut all meshes"
 
 
-def test_three_js_shows_what_can_be_shown_and_says_what_is_wrong(
+def test_three_js_shows_damaged_files_as_far_as_possible_and_reports_them(
     baked: Asset, sandbox: str
 ) -> None:
     if not THREE.is_dir():
@@ -319,7 +319,9 @@ def test_three_js_shows_what_can_be_shown_and_says_what_is_wrong(
     assert not seen
 
 
-def test_godot_shows_what_can_be_shown_and_says_what_is_wrong(baked: Asset, sandbox: str) -> None:
+def test_godot_shows_damaged_files_as_far_as_possible_and_reports_them(
+    baked: Asset, sandbox: str
+) -> None:
     project = baked.folder / "godot_damaged"
     shutil.copytree(HERE / "godot_damaged", project)
     shutil.copytree(ENGINES / "godot", project / "addons" / "hairloom")

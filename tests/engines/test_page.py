@@ -167,7 +167,7 @@ def test_without_webgl_a_page_says_so(asset: Asset, sandbox: str) -> None:
     assert report["complaints"] == []
 
 
-def test_motion_plays_unless_less_of_it_is_wanted(asset: Asset, sandbox: str) -> None:
+def test_motion_plays_unless_the_reader_prefers_reduced_motion(asset: Asset, sandbox: str) -> None:
     """Without an animation the camera moves around the hair, unless reduced motion is preferred."""
     angle = "hairloom.controls.getAzimuthalAngle()"
     pressed = {"evaluate": "document.querySelector('#play').getAttribute('aria-pressed')"}

@@ -146,7 +146,7 @@ def test_back_faces_have_the_order_of_the_index_buffer(asset: Asset, hair: dict[
         assert (back != front).any()
 
 
-def test_a_mirror_leaves_fronts_in_front(asset: Asset, hair: dict[str, Any]) -> None:
+def test_a_mirrored_object_keeps_front_faces_in_front(asset: Asset, hair: dict[str, Any]) -> None:
     """Unity's front faces are clockwise and its axes left-handed, so the same cross product
     identifies front faces."""
     node = sidecar_of(asset.folder)["levels"][0]["node"]
@@ -176,7 +176,7 @@ def test_strands_run_from_root_to_tip(asset: Asset, hair: dict[str, Any]) -> Non
     np.testing.assert_allclose(np.einsum("ij,ij->i", normal, along), 0.0, atol=2e-3)
 
 
-def test_levels_take_over_where_the_file_says(asset: Asset, hair: dict[str, Any]) -> None:
+def test_levels_switch_at_the_sizes_of_the_file(asset: Asset, hair: dict[str, Any]) -> None:
     content = GlbFile.of(glb_of(asset.folder).read_bytes(), "").content
     coverage = content["nodes"][0]["extras"]["MSFT_screencoverage"]
     np.testing.assert_allclose(hair["heights"], np.sqrt(coverage), rtol=1e-6)
@@ -310,7 +310,9 @@ def test_textures_keep_their_values(asset: Asset, hair: dict[str, Any]) -> None:
     assert any(how["sRGB"] for how in hair["textures"].values())
 
 
-def test_what_comes_after_the_glb_is_noticed(asset: Asset, hair: dict[str, Any]) -> None:
+def test_textures_are_imported_again_once_their_sidecar_exists(
+    asset: Asset, hair: dict[str, Any]
+) -> None:
     """Textures that were imported before their sidecar existed are imported again, once."""
     sidecar = sidecar_of(asset.folder)
     sidecar_file = next(asset.folder.glob("*.hairloom.json")).name

@@ -44,7 +44,7 @@ ALL = (
     "tests/blender/test_engine_scene.py::test_the_camera_may_be_inside_of_hair_and_head",
     "tests/blender/test_engine_scene.py::test_view_layers_and_holdouts",
     "tests/blender/test_hair_scene.py::test_shadow_on_a_mesh_is_as_dark_as_in_cycles",
-    "tests/blender/test_solvers.py::test_another_form_goes_on_with_the_motion",
+    "tests/blender/test_solvers.py::test_switching_the_solver_continues_the_motion",
     "tests/blender/test_solvers.py::test_both_agree_on_a_shaken_head",
     "tests/gpu/test_accumulation.py::test_the_mean_is_drawn_over_the_picture_at_its_corner",
     "tests/gpu/test_atlas_pass.py::test_the_pass_agrees_with_the_reference",

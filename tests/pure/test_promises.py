@@ -23,8 +23,8 @@ SAFETY = re.compile(
 )
 LONG_WORK = "window/session_long_work.py::from_a_dialog"
 CRASHES = "pure/exchange/test_subprocess_reader.py::test_every_bad_end_is_a_message"
-GPU = "blender/test_no_gpu.py::test_verbs_that_draw_say_so_and_write_nothing"
-CANCELLED_TURN = "blender/test_turntable.py::test_what_is_cancelled_leaves_nothing"
+GPU = "blender/test_no_gpu.py::test_verbs_that_draw_report_a_missing_gpu_and_write_nothing"
+CANCELLED_TURN = "blender/test_turntable.py::test_a_cancelled_turntable_leaves_no_files"
 CANCELLED_CARDS = (
     "blender/test_card_object.py::test_cards_that_are_cancelled_leave_the_scene_as_it_was"
 )
@@ -46,23 +46,24 @@ PROMISES = {
     "Exports keep files of yours": "blender/test_card_files.py"
     "::test_files_of_an_artist_are_kept_and_own_ones_replaced",
     "Verbs never write over a file that they read": "blender/test_output_checks.py"
-    "::test_what_would_be_lost_is_refused_before_any_work",
+    "::test_outputs_that_would_overwrite_inputs_are_refused_before_any_work",
     "named before the work begins": "blender/test_output_checks.py"
-    "::test_what_would_be_lost_is_refused_before_any_work",
+    "::test_outputs_that_would_overwrite_inputs_are_refused_before_any_work",
     "Hair whose baked copy was deleted": "blender/test_bake_kept.py"
     "::test_a_file_is_never_left_without_hair_in_renders",
     "run no code of the current folder": "pure/exchange/test_subprocess_reader.py"
     "::test_no_code_of_the_current_folder_or_the_environment_is_run",
     "Foreign USD files are never opened": "pure/test_promises.py::test_one_module_opens_usd_files",
     "on a full disk stays as it was": "blender/test_scene_files.py"
-    "::test_a_disk_that_is_full_leaves_the_scene_before",
+    "::test_a_full_disk_leaves_the_previous_scene",
     "Turntables are replaced as a whole": "blender/test_turntable.py"
     "::test_a_picture_that_another_program_holds_keeps_all_and_the_new_ones",
     "verbs that draw say so instead of crashing": GPU,
-    "before Blender itself would crash": "blender/test_no_gpu.py::test_the_engine_says_so",
+    "before Blender itself would crash": "blender/test_no_gpu.py"
+    "::test_the_engine_reports_that_there_is_no_gpu",
     "Esc cancels and leaves everything unchanged": CANCELLED_CARDS,
     "Esc cancels it and leaves the hair as it was": "blender/test_settle.py"
-    "::test_until_its_end_nothing_changes",
+    "::test_settling_changes_nothing_until_it_ends",
     "say what goes on, and Esc cancels it": "window/session_jobs.py::cloth_is_played",
     "Cancelling with Esc or Ctrl-C": "window/session_long_work.py::cards_in_motion",
     "Esc cancels a turntable": CANCELLED_TURN,
