@@ -79,7 +79,7 @@ class Nearest:
             here = (self.groom == index) & (self.strand >= 0)
             if here.any():
                 curve = catmull_rom_derivative if slope else catmull_rom
-                found[here] = curve(*_around(groom, self.strand[here], self.place[here]))
+                found[here] = curve(*_points_around(groom, self.strand[here], self.place[here]))
         return found
 
     def normals(self, scene: SceneSnapshot, camera: Camera, meshes: Floats) -> Floats:

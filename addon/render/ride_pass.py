@@ -228,7 +228,7 @@ class RidePass:
         anchors: Floats | None = None,
         colliders: tuple[PosedCollider, ...] = (),
         led: LedOut = NO_LED_OUT,
-        since: float = np.inf,
+        elapsed: float = np.inf,
     ) -> None:
         """Set every strand to where its root carries it and its guides move it.
 
@@ -374,7 +374,7 @@ class RidePass:
         anchors: Floats | None,
         colliders: tuple[PosedCollider, ...] = (),
         led: LedOut = NO_LED_OUT,
-        since: float = np.inf,
+        elapsed: float = np.inf,
     ) -> None:
         textures, count = self._textures, self._strands.strand_count
         is_curled = self._riders.gives is not None and turns == "guide_turns"
