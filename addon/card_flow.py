@@ -142,7 +142,8 @@ def card_clearance(rig: Rig, cards: CardBinding, start: MotionStart) -> CardClea
 
 
 class CardMeasure:
-    """Gathers figures of cards frame by frame, as `dynamics.figures.Measure` does of strands."""
+    """Gathers figures of cards frame by frame, as `dynamics.figures.FiguresCollector` does of
+    strands."""
 
     def __init__(self, rig: Rig, cards: CardBinding) -> None:
         self._rig, self._cards = rig, cards

@@ -12,7 +12,7 @@ from .arrays import Floats, Ints
 from .dynamics.blend import visible_guides
 from .dynamics.clearance import GuideClearance, guide_clearance, max_clearance
 from .dynamics.colliders import PosedCollider
-from .dynamics.constraints import PINNED
+from .dynamics.constraints import PINNED_COUNT
 from .dynamics.force_fields import NO_FIELDS, ForceFields
 from .dynamics.groom_rotation import fit_rotation, sample_roots
 from .dynamics.held import HeldCvs
@@ -243,15 +243,15 @@ def has_jumped(
     if (motion.previous_carried_guides is None and not is_first) or not len(rig.guides):
         return False
     chosen = np.arange(0, len(rig.guides), max(len(rig.guides) // JUMP_GUIDES, 1))
-    roots = rig.guide_grid[chosen, :PINNED]
+    roots = rig.guide_grid[chosen, :PINNED_COUNT]
     offsets = np.arange(len(chosen) + 1) * roots.shape[1]
     motions = motions_of(rig, pose, rig.guides[chosen])
     now = carry_with_roots(roots.reshape(-1, 3), offsets, motions).reshape(-1, 3).astype(np.float64)
-    before = motion.carried_guides[chosen, :PINNED].reshape(-1, 3).astype(np.float64)
+    before = motion.carried_guides[chosen, :PINNED_COUNT].reshape(-1, 3).astype(np.float64)
     here = before.mean(axis=0)
     displacement = now.mean(axis=0) - here
     if motion.previous_carried_guides is not None:
-        previous = motion.previous_carried_guides[chosen, :PINNED].reshape(-1, 3).mean(axis=0)
+        previous = motion.previous_carried_guides[chosen, :PINNED_COUNT].reshape(-1, 3).mean(axis=0)
         displacement = displacement - (here - previous) * (duration / motion.duration)
     extent = float(np.linalg.norm(np.ptp(rig.guide_grid.reshape(-1, 3), axis=0)))
     if 0.0 < settings.jump_distance * extent < float(np.linalg.norm(displacement)):
@@ -319,9 +319,9 @@ def bounding_sphere(rig: Rig, pose: Pose) -> tuple[Floats, float]:
     if not len(rig.guides):
         return np.zeros(3), 0.0
     chosen = np.arange(0, len(rig.guides), max(len(rig.guides) // JUMP_GUIDES, 1))
-    offsets = np.arange(len(chosen) + 1) * PINNED
+    offsets = np.arange(len(chosen) + 1) * PINNED_COUNT
     motions = motions_of(rig, pose, rig.guides[chosen])
-    at_rest = rig.guide_grid[chosen, :PINNED]
+    at_rest = rig.guide_grid[chosen, :PINNED_COUNT]
     now = carry_with_roots(at_rest.reshape(-1, 3), offsets, motions).reshape(at_rest.shape)
     first, last = (float(np.linalg.norm(np.diff(grid, axis=1))) for grid in (at_rest, now))
     middle, radius = rig.rest_sphere

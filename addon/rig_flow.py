@@ -70,7 +70,7 @@ class MotionStart:
             self.max_clearance == other.max_clearance
             and self.pose.is_same_as(other.pose)
             and len(self.colliders) == len(other.colliders)
-            and all(map(PosedCollider.stands_as, self.colliders, other.colliders))
+            and all(map(PosedCollider.is_same_at_end, self.colliders, other.colliders))
         )
 
 

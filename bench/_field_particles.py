@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 
 from hairloom.addon.blender.scene.forces import force_fields_of
-from hairloom.addon.dynamics.force_fields import felt
+from hairloom.addon.dynamics.force_fields import field_effect
 
 VELOCITY = np.array([0.7, -0.4, 0.9])
 PLACE, TURN = (0.3, -0.2, 0.1), (0.5, 0.3, -0.4)
@@ -91,7 +91,7 @@ def error_of(kind: str, values: dict[str, object], points: np.ndarray) -> float:
         assert not notes, notes
         rows = np.ascontiguousarray(points.T, np.float32)
         velocity = np.repeat(VELOCITY.astype(np.float32)[:, None], rows.shape[1], axis=1)
-        ours = felt(fields, rows, velocity).acceleration(velocity).T
+        ours = field_effect(fields, rows, velocity).acceleration(velocity).T
     finally:
         for obj in (source, particles):
             bpy.data.objects.remove(obj)

@@ -32,7 +32,7 @@ from hairloom.addon.dynamics.force_fields import (
 )
 from hairloom.addon.dynamics.held import HeldCvs
 from hairloom.addon.dynamics.settings import DynamicsSettings
-from hairloom.addon.dynamics.springs import give
+from hairloom.addon.dynamics.springs import max_extension_fraction
 from hairloom.addon.dynamics.state import DynamicsState, start
 from hairloom.addon.dynamics.step import Drive
 from hairloom.addon.params import Parameter
@@ -138,7 +138,7 @@ def reach_of(state: DynamicsState, settings: DynamicsSettings | None = None) -> 
         return Reach(np.inf, np.inf, False)
     longest = state.rest.length.astype(np.float64)
     if state.rest.curl_slack is not None and settings is not None:
-        longest *= 1.0 + give(settings) * state.rest.curl_slack
+        longest *= 1.0 + max_extension_fraction(settings) * state.rest.curl_slack
     rest = np.cumsum(longest, axis=0)
     straight = np.linalg.norm(position[:, 1:] - position[:, :1], axis=0)
     along = np.cumsum(np.linalg.norm(np.diff(position, axis=1), axis=0), axis=0)
@@ -207,7 +207,7 @@ def _fields(random: np.random.Generator) -> ForceFields:
                 damping=float(random.choice([0.0, 1.0, 1.0e6])),
                 size=float(random.choice([0.0, 0.1])),
                 flow=float(random.choice([0.0, 1.0, -10.0])),
-                across=float(random.choice([0.0, 1.0])),
+                across_fraction=float(random.choice([0.0, 1.0])),
                 falloff=str(random.choice(FALLOFFS)),
                 side=int(random.integers(-1, 2)),
                 distance=Falloff(float(random.choice([0.0, 2.0, 10.0])), 0.0),

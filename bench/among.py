@@ -67,7 +67,9 @@ SWING = 1.0
 SIZES, ROUNDS = {"762": 762, "10k": 10_000}, {"762": 7, "10k": 3}
 #: Four common kinds, around the head.
 FIELDS = (
-    ForceField("wind", axis=(1.0, 0.0, 0.0), strength=5.0, shape="plane", flow=1.0, across=1.0),
+    ForceField(
+        "wind", axis=(1.0, 0.0, 0.0), strength=5.0, shape="plane", flow=1.0, across_fraction=1.0
+    ),
     ForceField("force", center=(0.3, 0.3, 0.2), strength=-2.0, distance=Falloff(2.0)),
     ForceField("vortex", strength=2.0, shape="plane", distance=Falloff(1.0)),
     ForceField("turbulence", strength=4.0, size=0.2),

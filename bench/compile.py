@@ -60,7 +60,7 @@ LIMITS = {"head": 2.0, "plate": 3.5, "fields": 1.6}
 _ONE = "--one"
 _ABOVE = {"center": (0.05, -0.1, 0.35), "axis": (0.48, 0.6, 0.64)}
 _FIELDS = (
-    ForceField("wind", **_ABOVE, strength=12.0, shape="plane", flow=1.0, across=1.0),
+    ForceField("wind", **_ABOVE, strength=12.0, shape="plane", flow=1.0, across_fraction=1.0),
     ForceField("wind", strength=-6.0, falloff="tube", radial=Falloff(0.5, 0.02, 0.3)),
     ForceField("force", **_ABOVE, strength=8.0, distance=Falloff(1.7, 0.1, 0.5), side=-1),
     ForceField("force", strength=5.0, falloff="cone", radial=Falloff(0.4, 10.0, 60.0)),

@@ -111,7 +111,7 @@ bool is_far(vec3 path)
   return dot(path, path) > far * far;
 }
 
-// Twin of hurried_guides, for one collider.
+// Twin of fast_guides, for one collider.
 bool is_root_far(Posed posed)
 {
   vec4 local = vec4(moved(posed.inverse, vec4(position[1], 1.0)), 1.0);

@@ -1,6 +1,6 @@
 // Return to the style: global and local shape in one direct solve.
 //
-// Twin of addon/dynamics/style.py and of banded.SharedBand.solve, over the globals of
+// Twin of addon/dynamics/style.py and of banded.PentadiagonalSystem.solve, over the globals of
 // lib_guide.glsl. References: Han and Harada 2012; Bishop 1975. Holds no
 // resources.
 #include "lib_guide.glsl"

@@ -18,7 +18,7 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..dynamics.colliders import PosedCollider, signed_distance
-from ..dynamics.colliders.signed_distance import mesh_distance, nearer_than, poses_now
+from ..dynamics.colliders.signed_distance import mesh_distance, nearer_than, poses_at_end
 from ..refine.lead_out import DEEP, Clearance, clearance_at, lead_out
 from ..refine.ride import minimal_rotation, turn_change
 from ..strands.vectors import dot_rows
@@ -103,7 +103,7 @@ class CardContacts:
             away: (vertex_count,) [m] distance of the middles from where roots carry them.
         """
         vertices = self.clearance.vertices
-        near = nearer_than(positions, poses_now(self.colliders), vertices.reach)[0]
+        near = nearer_than(positions, poses_at_end(self.colliders), vertices.reach)[0]
         long, arm = _SHORTEST_ARM * vertices.kept, arms[near].T
         near = near[dot_rows(arm, arm) > long * long]
         if not len(near):

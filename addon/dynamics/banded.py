@@ -14,23 +14,23 @@ from numpy import divide, multiply, subtract
 from ..arrays import Floats
 
 
-def solve_tridiagonal(diagonal: Floats, beside: Floats, right: Floats) -> None:
+def solve_tridiagonal(diagonal: Floats, off_diagonal: Floats, right: Floats) -> None:
     """Solve symmetric tridiagonal systems in place: `right` becomes the solution.
 
     Thomas's algorithm without pivoting, as the systems are positive definite.
 
     Args:
         diagonal: (n, guide_count), overwritten.
-        beside: (n - 1, guide_count), entry i couples rows i and i + 1.
+        off_diagonal: (n - 1, guide_count), entry i couples rows i and i + 1.
         right: (n, guide_count).
     """
     if not len(right):
         return
-    pivots, answers, ratios = list(diagonal), list(right), list(np.empty_like(beside))
+    pivots, answers, ratios = list(diagonal), list(right), list(np.empty_like(off_diagonal))
     scratch = np.empty_like(right[0])
     pivot, answer = pivots[0], answers[0]
     for ratio, upper, below, answer_below in zip(
-        ratios, beside, pivots[1:], answers[1:], strict=True
+        ratios, off_diagonal, pivots[1:], answers[1:], strict=True
     ):
         divide(upper, pivot, ratio)
         subtract(below, multiply(ratio, upper, scratch), below)
@@ -42,7 +42,7 @@ def solve_tridiagonal(diagonal: Floats, beside: Floats, right: Floats) -> None:
         answer = above
 
 
-class SharedBand:
+class PentadiagonalSystem:
     """Symmetric positive definite pentadiagonal matrices, factored as L D L^T for many right sides:
     one for all guides, or one for each.
 
@@ -51,33 +51,40 @@ class SharedBand:
             others couples rows i and i + 1, and i and i + 2. Entries beyond the matrix are not
             read.
 
-    near, far: float32 of the same shape, L[i, i - 1] and L[i, i - 2]. inverse_pivot: 1 / D.
+    lower_1, lower_2: float32 of the same shape, L[i, i - 1] and L[i, i - 2]. inverse_pivot: 1 / D.
     """
 
-    def __init__(self, main: Floats, beside: Floats, beyond: Floats) -> None:
-        near, far, pivot = np.zeros_like(main), np.zeros_like(main), np.zeros_like(main)
-        for i in range(len(main)):
+    def __init__(self, diagonal: Floats, off_diagonal_1: Floats, off_diagonal_2: Floats) -> None:
+        lower_1, lower_2, pivot = (
+            np.zeros_like(diagonal),
+            np.zeros_like(diagonal),
+            np.zeros_like(diagonal),
+        )
+        for i in range(len(diagonal)):
             if i >= 2:
-                far[i] = beyond[i - 2] / pivot[i - 2]
+                lower_2[i] = off_diagonal_2[i - 2] / pivot[i - 2]
             if i >= 1:
-                above = far[i] * pivot[i - 2] * near[i - 1] if i >= 2 else 0.0
-                near[i] = (beside[i - 1] - above) / pivot[i - 1]
-            pivot[i] = main[i]
-            pivot[i] -= near[i] ** 2 * pivot[i - 1] if i >= 1 else 0.0
-            pivot[i] -= far[i] ** 2 * pivot[i - 2] if i >= 2 else 0.0
-        self._take(*(each.astype(np.float32) for each in (near, far, 1.0 / pivot)))
+                above = lower_2[i] * pivot[i - 2] * lower_1[i - 1] if i >= 2 else 0.0
+                lower_1[i] = (off_diagonal_1[i - 1] - above) / pivot[i - 1]
+            pivot[i] = diagonal[i]
+            pivot[i] -= lower_1[i] ** 2 * pivot[i - 1] if i >= 1 else 0.0
+            pivot[i] -= lower_2[i] ** 2 * pivot[i - 2] if i >= 2 else 0.0
+        self._set_factors(*(each.astype(np.float32) for each in (lower_1, lower_2, 1.0 / pivot)))
 
-    def _take(self, near: Floats, far: Floats, inverse_pivot: Floats) -> None:
-        self.near, self.far, self.inverse_pivot = near, far, inverse_pivot
+    def _set_factors(self, lower_1: Floats, lower_2: Floats, inverse_pivot: Floats) -> None:
+        self.lower_1, self.lower_2, self.inverse_pivot = lower_1, lower_2, inverse_pivot
         # arrays without axes, which numpy handles in half the time of plain numbers
-        self._near, self._far = (
-            [np.array(row[0]) if len(row) == 1 else row for row in rows] for rows in (near, far)
+        self._lower_1, self._lower_2 = (
+            [np.array(row[0]) if len(row) == 1 else row for row in rows]
+            for rows in (lower_1, lower_2)
         )
 
-    def part(self, guides: slice) -> SharedBand:
+    def part(self, guides: slice) -> PentadiagonalSystem:
         """The matrices of these guides, if each guide has its own."""
-        some = SharedBand.__new__(SharedBand)
-        some._take(*(each[:, guides] for each in (self.near, self.far, self.inverse_pivot)))
+        some = PentadiagonalSystem.__new__(PentadiagonalSystem)
+        some._set_factors(
+            *(each[:, guides] for each in (self.lower_1, self.lower_2, self.inverse_pivot))
+        )
         return some
 
     def solve(self, right: Floats) -> None:
@@ -87,12 +94,12 @@ class SharedBand:
         band = np.ascontiguousarray(right.transpose(1, 0, 2))  # x, y and z of a row at once
         rows, scratch = list(band), np.empty_like(band[0])
         for i, row in enumerate(rows[1:], 1):
-            subtract(row, multiply(rows[i - 1], self._near[i], scratch), row)
+            subtract(row, multiply(rows[i - 1], self._lower_1[i], scratch), row)
             if i >= 2:
-                subtract(row, multiply(rows[i - 2], self._far[i], scratch), row)
+                subtract(row, multiply(rows[i - 2], self._lower_2[i], scratch), row)
         band *= self.inverse_pivot[:, None]
         for i, row in reversed(list(enumerate(rows[:-1], 1))):
-            subtract(row, multiply(rows[i], self._near[i], scratch), row)
+            subtract(row, multiply(rows[i], self._lower_1[i], scratch), row)
             if i + 1 < len(rows):
-                subtract(row, multiply(rows[i + 1], self._far[i + 1], scratch), row)
+                subtract(row, multiply(rows[i + 1], self._lower_2[i + 1], scratch), row)
         right[:] = band.transpose(1, 0, 2)

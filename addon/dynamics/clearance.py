@@ -14,7 +14,7 @@ import numpy as np
 
 from ..arrays import Floats
 from .colliders import PosedCollider, signed_distance
-from .contacts import BETWEEN
+from .contacts import SEGMENT_POINTS
 from .settings import DynamicsSettings
 
 
@@ -23,8 +23,9 @@ class GuideClearance:
     """Distances from colliders when a motion began.
 
     max_distance: [m], upper limit of the distances.
-    distances: (guide_count, cv_count, 1 + len(BETWEEN)) float32 [m], of each CV, and of the points
-        of the segment that ends there; 0 for points inside, which are moved out to the surface.
+    distances: (guide_count, cv_count, 1 + len(SEGMENT_POINTS)) float32 [m], of each CV, and of the
+        points of the segment that ends there; 0 for points inside, which are moved out to the
+        surface.
     """
 
     max_distance: float
@@ -32,7 +33,7 @@ class GuideClearance:
 
     @cached_property
     def rows(self) -> Floats:
-        """The same as (1 + len(BETWEEN), cv_count, guide_count)."""
+        """The same as (1 + len(SEGMENT_POINTS), cv_count, guide_count)."""
         return np.ascontiguousarray(self.distances.transpose(2, 1, 0))
 
 
@@ -52,7 +53,7 @@ def guide_clearance(
         max_distance: [m], see `max_clearance`.
     """
     before = grid[:, np.maximum(np.arange(grid.shape[1]) - 1, 0)]
-    points = [grid, *(before + (grid - before) * np.float32(along) for along in BETWEEN)]
+    points = [grid, *(before + (grid - before) * np.float32(along) for along in SEGMENT_POINTS)]
     distance, _ = signed_distance(np.stack(points, axis=2).reshape(-1, 3), colliders, max_distance)
     shape = (*grid.shape[:2], len(points))
     return GuideClearance(max_distance, np.maximum(distance, np.float32(0.0)).reshape(shape))

@@ -28,13 +28,13 @@ from ..strands.vectors import dot_rows
 from .banded import solve_tridiagonal
 
 #: CVs of each guide that the head carries: the second gives the root's direction (TressFX).
-PINNED = ROOT_POINTS
+PINNED_COUNT = ROOT_POINTS
 #: b above. At 1 a segment perpendicular to a collider could not change its length at all; at 0.98
 #: hair with its root deep inside a collider trembled, at 0.9 it does not.
 CONTACT_WEIGHT = np.float32(0.9)
 #: 1 - W of a held CV. Not quite 1, as the lengths of a straight guide between two fixed ends have
 #: no solution; after the solve the CV is put back to its place.
-HELD = np.float32(0.99)
+HELD_WEIGHT = np.float32(0.99)
 #: Number of sweeps back and forth that shorten guides with held CVs.
 HELD_SWEEPS = 4
 #: Lengths below this count as zero [m].
@@ -46,7 +46,7 @@ ROUNDING = 4.0e-6
 
 
 @dataclass(frozen=True)
-class Touched:
+class TouchingCvs:
     """Free CVs that touch a collider; they are few, so lists are faster here than whole grids.
 
     index: (m,) ascending, into (cv_count, guide_count) in C order.
@@ -56,13 +56,13 @@ class Touched:
     index: Ints
     normal: Floats
 
-    def part(self, guides: Ints, guide_count: int) -> Touched:
+    def part(self, guides: Ints, guide_count: int) -> TouchingCvs:
         """The part for some guides (n,), ascending, reindexed to these."""
-        index, kept = part_of(self.index, guides, guide_count)
-        return Touched(index, self.normal[:, kept])
+        index, positions = select_guides(self.index, guides, guide_count)
+        return TouchingCvs(index, self.normal[:, positions])
 
 
-def part_of(index: Ints, guides: Ints, guide_count: int) -> tuple[Ints, Ints]:
+def select_guides(index: Ints, guides: Ints, guide_count: int) -> tuple[Ints, Ints]:
     """Select indices of some guides (n,), ascending, from indices (m,) into (cv_count, guide_count)
     in C order.
 
@@ -71,11 +71,11 @@ def part_of(index: Ints, guides: Ints, guide_count: int) -> tuple[Ints, Ints]:
     """
     cv, guide = np.divmod(index, guide_count)
     place = np.searchsorted(guides, guide)
-    kept = np.flatnonzero(guides.take(place, mode="clip") == guide)
-    return cv[kept] * len(guides) + place[kept], kept
+    selected = np.flatnonzero(guides.take(place, mode="clip") == guide)
+    return cv[selected] * len(guides) + place[selected], selected
 
 
-def pin(position: Floats, carried: Floats, length: Floats, held: Floats | None) -> None:
+def pin(position: Floats, targets: Floats, length: Floats, held: Floats | None) -> None:
     """Put the pinned CVs where the head carries them, and held ones where their ties do, as if they
     had infinite mass.
 
@@ -83,30 +83,30 @@ def pin(position: Floats, carried: Floats, length: Floats, held: Floats | None) 
     Two that are neighbours keep exactly that length.
 
     Args:
-        position, carried: (3, cv_count, guide_count) world [m].
+        position, targets: (3, cv_count, guide_count) world [m].
         length: (cv_count - 1, guide_count) [m].
         held: see `held.HeldCvs.rows`; None if no CV is held.
     """
-    position[:, :PINNED] = carried[:, :PINNED]
+    position[:, :PINNED_COUNT] = targets[:, :PINNED_COUNT]
     if held is None:
         return
-    start, reach = carried[:, PINNED - 1], np.zeros_like(length[0])
-    for cv in range(PINNED, position.shape[1]):
+    anchor, reach = targets[:, PINNED_COUNT - 1], np.zeros_like(length[0])
+    for cv in range(PINNED_COUNT, position.shape[1]):
         reach = reach + length[cv - 1]
         is_held = held[cv] > 0.0
         if not is_held.any():
             continue
-        displacement = carried[:, cv] - start
+        displacement = targets[:, cv] - anchor
         ratio = reach / np.maximum(np.sqrt(dot_rows(displacement, displacement)), TINY)
-        if cv > PINNED:  # else the pinned CV is its neighbour
+        if cv > PINNED_COUNT:  # else the pinned CV is its neighbour
             ratio = np.where(held[cv - 1] > 0.0, ratio, np.minimum(ratio, np.float32(1.0)))
-        start = np.where(is_held, start + displacement * ratio, start)
-        np.copyto(position[:, cv], start, where=is_held)
+        anchor = np.where(is_held, anchor + displacement * ratio, anchor)
+        np.copyto(position[:, cv], anchor, where=is_held)
         reach[is_held] = 0.0
 
 
 def keep_lengths(
-    position: Floats, length: Floats, touched: Touched | None, held: Floats | None
+    position: Floats, length: Floats, touching: TouchingCvs | None, held: Floats | None
 ) -> None:
     """Bring all segments of `position` towards their lengths, in place.
 
@@ -115,11 +115,11 @@ def keep_lengths(
     Args:
         position: (3, cv_count, guide_count) world [m], in C order.
         length: (cv_count - 1, guide_count) [m].
-        touched: None if nothing touches.
+        touching: None if nothing touches.
         held: see `pin`.
     """
-    if position.shape[1] > PINNED:
-        _newton_step(position, length[1:], touched, held)
+    if position.shape[1] > PINNED_COUNT:
+        _newton_step(position, length[1:], touching, held)
 
 
 def spring_step(position: Floats, target: Floats, compliance: Floats, held: Floats | None) -> None:
@@ -127,7 +127,8 @@ def spring_step(position: Floats, target: Floats, compliance: Floats, held: Floa
 
     Args:
         position: (3, cv_count, guide_count) world [m], in C order.
-        target: (cv_count - PINNED, guide_count) [m], the length that each segment is drawn to.
+        target: (cv_count - PINNED_COUNT, guide_count) [m], the length that each segment is drawn
+            to.
         compliance: in the shape of `target`, over dt^2, for CVs of mass 1; 0 is rigid.
     """
     _newton_step(position, target, None, held, compliance)
@@ -141,14 +142,14 @@ def relax_lengths(position: Floats, length: Floats, held: Floats | None, sweeps:
     """
     last = position.shape[1] - 1
     for _ in range(sweeps):
-        for cv in range(PINNED, last + 1):
+        for cv in range(PINNED_COUNT, last + 1):
             segment = position[:, cv] - position[:, cv - 1]
             now = np.sqrt(dot_rows(segment, segment))
             segment *= (now - length[cv - 1]) / np.maximum(now, TINY)
-            lower: Floats | np.float32 = np.float32(0.0 if cv == PINNED else 0.5)
+            lower: Floats | np.float32 = np.float32(0.0 if cv == PINNED_COUNT else 0.5)
             upper: Floats | np.float32 = np.float32(1.0) - lower
             if held is not None:
-                free_lower = np.float32(cv > PINNED) * (np.float32(1.0) - held[cv - 1])
+                free_lower = np.float32(cv > PINNED_COUNT) * (np.float32(1.0) - held[cv - 1])
                 free_upper = np.float32(1.0) - held[cv]
                 free = np.maximum(free_lower + free_upper, np.float32(1.0))
                 lower, upper = free_lower / free, free_upper / free
@@ -162,18 +163,18 @@ def hold_within_reach(position: Floats, length: Floats, held: Floats | None) -> 
     Neither its straight distance nor that along the strand exceeds the strand's length there (Kim,
     Chentanez and Mueller 2012, "Long Range Attachments").
     """
-    root = position[:, PINNED - 1 : PINNED]
-    displacement = position[:, PINNED:] - root
-    reach = np.cumsum(length[PINNED - 1 :], axis=0)
+    root = position[:, PINNED_COUNT - 1 : PINNED_COUNT]
+    displacement = position[:, PINNED_COUNT:] - root
+    reach = np.cumsum(length[PINNED_COUNT - 1 :], axis=0)
     displacement *= np.minimum(
         reach / np.maximum(np.sqrt(dot_rows(displacement, displacement)), TINY), np.float32(1.0)
     )
     displacement += root
-    position[:, PINNED:] = displacement
-    shorten(position, length, held)
+    position[:, PINNED_COUNT:] = displacement
+    shorten_segments(position, length, held)
 
 
-def shorten(position: Floats, length: Floats, held: Floats | None) -> None:
+def shorten_segments(position: Floats, length: Floats, held: Floats | None) -> None:
     """Shorten segments that are too long, in place, from root to tip.
 
     That shortens zigzags, which long-range attachments alone allow.
@@ -182,20 +183,20 @@ def shorten(position: Floats, length: Floats, held: Floats | None) -> None:
     constraints conflict, lengths take precedence over the places of held CVs.
     """
     before = None if held is None else position.copy()
-    is_swept = np.ones(position.shape[2], bool)
+    is_due = np.ones(position.shape[2], bool)
     for _ in range(1 if held is None else HELD_SWEEPS):
         if held is not None and before is not None:
             np.copyto(position, before, where=held > 0.0)
             for cv, is_moved in _towards_root(held):
-                near = _brought_near(position[:, cv], position[:, cv + 1], length[cv])
+                near = _within_distance(position[:, cv], position[:, cv + 1], length[cv])
                 np.copyto(position[:, cv], near, where=is_moved)
-        for cv in range(PINNED, position.shape[1]):
-            near = _brought_near(position[:, cv], position[:, cv - 1], length[cv - 1])
-            np.copyto(position[:, cv], near, where=is_swept)
-        is_swept = np.zeros(0, bool) if held is None else held.any(axis=0)
+        for cv in range(PINNED_COUNT, position.shape[1]):
+            near = _within_distance(position[:, cv], position[:, cv - 1], length[cv - 1])
+            np.copyto(position[:, cv], near, where=is_due)
+        is_due = np.zeros(0, bool) if held is None else held.any(axis=0)
 
 
-def _brought_near(point: Floats, other: Floats, farthest: Floats) -> Floats:
+def _within_distance(point: Floats, other: Floats, farthest: Floats) -> Floats:
     """Points (3, n) pulled to no more than a distance (n,) [m] from others (3, n)."""
     offset = point - other
     offset *= np.minimum(
@@ -209,7 +210,7 @@ def _towards_root(held: Floats) -> Iterator[tuple[int, Bools]]:
     """CVs from the second last towards the root, each with the guides (guide_count,) that are held
     somewhere beyond it but not there."""
     is_beyond = np.zeros(held.shape[1], bool)
-    for cv in range(len(held) - 2, PINNED - 1, -1):
+    for cv in range(len(held) - 2, PINNED_COUNT - 1, -1):
         is_beyond |= held[cv + 1] > 0.0
         yield cv, is_beyond & (held[cv] == 0.0)
 
@@ -217,7 +218,7 @@ def _towards_root(held: Floats) -> Iterator[tuple[int, Bools]]:
 def finish_lengths(
     position: Floats,
     length: Floats,
-    touched: Touched | None,
+    touching: TouchingCvs | None,
     held: Floats | None,
     tolerance: float,
     iterations: int,
@@ -227,29 +228,29 @@ def finish_lengths(
     `tolerance`.
 
     Few guides do, and only when they are jerked around. One that is still off after `iterations`
-    steps is rebuilt from its directions, see `_laid_out`.
+    steps is rebuilt from its directions, see `_rebuilt`.
 
     Args:
         size: of the hair [m], see `state.Rest`.
     """
-    if position.shape[1] <= PINNED:
+    if position.shape[1] <= PINNED_COUNT:
         return
-    guide = _off_length(position, length, tolerance, size)
+    guide = _guides_off_length(position, length, tolerance, size)
     for _ in range(iterations if guide.size else 0):
         some, some_length = position.take(guide, axis=2), length.take(guide, axis=1)
-        touching = None if touched is None else touched.part(guide, length.shape[1])
+        touching_part = None if touching is None else touching.part(guide, length.shape[1])
         some_held = None if held is None else held[:, guide]
-        _newton_step(some, some_length[1:], touching, some_held)
+        _newton_step(some, some_length[1:], touching_part, some_held)
         position[:, :, guide] = some
-        guide = guide[_off_length(some, some_length, tolerance, size)]
+        guide = guide[_guides_off_length(some, some_length, tolerance, size)]
         if not guide.size:
             return
     if guide.size:
         some_held = None if held is None else held[:, guide]
-        position[:, :, guide] = _laid_out(position[:, :, guide], length[:, guide], some_held)
+        position[:, :, guide] = _rebuilt(position[:, :, guide], length[:, guide], some_held)
 
 
-def _laid_out(position: Floats, length: Floats, held: Floats | None) -> Floats:
+def _rebuilt(position: Floats, length: Floats, held: Floats | None) -> Floats:
     """Guides rebuilt from the root on with the directions of their segments and exact lengths
     (follow the leader).
 
@@ -261,20 +262,20 @@ def _laid_out(position: Floats, length: Floats, held: Floats | None) -> Floats:
         for cv, is_moved in _towards_root(held):
             place = position[:, cv + 1] - direction[:, cv] * length[cv]
             np.copyto(position[:, cv], place, where=is_moved)
-    direction, _ = directions(position[:, PINNED - 1 :])
-    displacement = np.cumsum(direction * length[PINNED - 1 :], axis=1)
-    position[:, PINNED:] = position[:, PINNED - 1 : PINNED] + displacement
+    direction, _ = directions(position[:, PINNED_COUNT - 1 :])
+    displacement = np.cumsum(direction * length[PINNED_COUNT - 1 :], axis=1)
+    position[:, PINNED_COUNT:] = position[:, PINNED_COUNT - 1 : PINNED_COUNT] + displacement
     return position
 
 
-def _off_length(position: Floats, length: Floats, tolerance: float, size: float) -> Ints:
+def _guides_off_length(position: Floats, length: Floats, tolerance: float, size: float) -> Ints:
     """Guides with a segment that is off by more than this fraction of its length, and ROUNDING."""
-    segment = position[:, PINNED:] - position[:, PINNED - 1 : -1]
+    segment = position[:, PINNED_COUNT:] - position[:, PINNED_COUNT - 1 : -1]
     error = dot_rows(segment, segment)
     np.sqrt(error, out=error)
-    error -= length[PINNED - 1 :]
+    error -= length[PINNED_COUNT - 1 :]
     np.abs(error, out=error)
-    allowed = length[PINNED - 1 :] * np.float32(tolerance)
+    allowed = length[PINNED_COUNT - 1 :] * np.float32(tolerance)
     allowed += np.float32(ROUNDING * size)
     off: Ints = (error > allowed).any(axis=0).nonzero()[0]
     return off
@@ -283,56 +284,56 @@ def _off_length(position: Floats, length: Floats, tolerance: float, size: float)
 def _newton_step(
     position: Floats,
     length: Floats,
-    touched: Touched | None,
+    touching: TouchingCvs | None,
     held: Floats | None,
     compliance: Floats | None = None,
 ) -> None:
     segment, squared = segments(position[:, 1:])
-    diagonal, beside = chain_matrix(segment, squared)
+    diagonal, off_diagonal = chain_matrix(segment, squared)
     right = np.sqrt(squared)
     right *= length
     np.subtract(squared, right, out=right)
     if held is not None:
-        before, heavy = position[:, PINNED:].copy(), HELD * held[PINNED:]
-        diagonal -= heavy * squared
-        diagonal[1:] -= heavy[:-1] * squared[1:]
-        beside *= np.float32(1.0) - heavy[:-1]
+        before, held_weight = position[:, PINNED_COUNT:].copy(), HELD_WEIGHT * held[PINNED_COUNT:]
+        diagonal -= held_weight * squared
+        diagonal[1:] -= held_weight[:-1] * squared[1:]
+        off_diagonal *= np.float32(1.0) - held_weight[:-1]
     if compliance is not None:
         diagonal += compliance * squared
-    if touched is None:
-        solve_tridiagonal(diagonal, beside, right)
+    if touching is None:
+        solve_tridiagonal(diagonal, off_diagonal, right)
     else:
-        _solve_and_slide(position, segment, (diagonal, beside, right), touched)
+        _solve_and_slide(position, segment, (diagonal, off_diagonal, right), touching)
     segment *= right
-    position[:, PINNED:] -= less_next(segment)
+    position[:, PINNED_COUNT:] -= minus_next(segment)
     if held is not None:
-        np.copyto(position[:, PINNED:], before, where=held[PINNED:] > 0.0)
+        np.copyto(position[:, PINNED_COUNT:], before, where=held[PINNED_COUNT:] > 0.0)
 
 
 def _solve_and_slide(
-    position: Floats, segment: Floats, system: tuple[Floats, Floats, Floats], touched: Touched
+    position: Floats, segment: Floats, system: tuple[Floats, Floats, Floats], touching: TouchingCvs
 ) -> None:
     """Solve with the weight of contacts, and undo the part of the motion that goes into them.
 
     Args:
         system: diagonal, off-diagonal and right side; the last becomes the solution.
     """
-    diagonal, beside, right = (part.reshape(-1) for part in system)
-    rows, normal, guide_count = segment.reshape(3, -1), touched.normal, segment.shape[2]
-    upper = touched.index - PINNED * guide_count  # the segment that ends at the CV
-    count = upper.searchsorted(beside.size)  # without tips, where no segment begins
+    diagonal, off_diagonal, right = (part.reshape(-1) for part in system)
+    rows, normal, guide_count = segment.reshape(3, -1), touching.normal, segment.shape[2]
+    upper = touching.index - PINNED_COUNT * guide_count  # the segment that ends at the CV
+    count = upper.searchsorted(off_diagonal.size)  # without tips, where no segment begins
     inner, lower = upper[:count], upper[:count] + guide_count  # the segment that begins there
-    along_upper = dot_rows(normal, chosen(rows, upper))
-    along_lower = dot_rows(normal[:, :count], chosen(rows, lower))
+    along_upper = dot_rows(normal, take_columns(rows, upper))
+    along_lower = dot_rows(normal[:, :count], take_columns(rows, lower))
     heavy_upper, heavy_lower = CONTACT_WEIGHT * along_upper, CONTACT_WEIGHT * along_lower
     diagonal[upper] -= heavy_upper * along_upper
     diagonal[lower] -= heavy_lower * along_lower
-    beside[inner] += heavy_upper[:count] * along_lower
+    off_diagonal[inner] += heavy_upper[:count] * along_lower
     solve_tridiagonal(*system)
     heavy_upper *= right.take(upper)
     heavy_upper[:count] -= heavy_lower * right.take(lower)
     for row, value in zip(position.reshape(3, -1), normal * heavy_upper, strict=True):
-        row[touched.index] += value
+        row[touching.index] += value
 
 
 def segments(position: Floats) -> tuple[Floats, Floats]:
@@ -351,11 +352,11 @@ def chain_matrix(segment: Floats, squared: Floats) -> tuple[Floats, Floats]:
     """
     diagonal = squared + squared
     diagonal[0] = squared[0]  # the last pinned CV does not move
-    beside = dot_rows(segment[:, 1:], segment[:, :-1])
-    return diagonal, np.negative(beside, out=beside)
+    off_diagonal = dot_rows(segment[:, 1:], segment[:, :-1])
+    return diagonal, np.negative(off_diagonal, out=off_diagonal)
 
 
-def less_next(rows: Floats) -> Floats:
+def minus_next(rows: Floats) -> Floats:
     """Each of (3, n, guide_count) minus the next one, the last as it is: J^T."""
     result = np.empty_like(rows)
     np.subtract(rows[:, :-1], rows[:, 1:], out=result[:, :-1])
@@ -385,6 +386,6 @@ def unit(vector: Floats) -> Floats:
     return result
 
 
-def chosen(rows: Floats, index: Ints) -> Floats:
+def take_columns(rows: Floats, index: Ints) -> Floats:
     """The chosen columns (3, m) of rows (3, n); fastest if these are contiguous."""
     return rows.take(index, axis=1, mode="clip")

@@ -22,7 +22,7 @@ from .state import DynamicsState
 type Colliders = tuple[PosedCollider, ...]
 
 #: Limits above which strands count as stretched, a fraction, and as inside a collider [m].
-STRETCHED, INSIDE = 0.01, 0.001
+STRETCH_LIMIT, DEPTH_LIMIT = 0.01, 0.001
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ class CardFigures:
     @classmethod
     def of_frames(cls, change: Floats, depth: Floats) -> Self:
         """The figures from each card's worst `length_changes` and `strand_depths`, (n,) each."""
-        return cls(*map(_rounded, _spread(change, depth)))
+        return cls(*map(_rounded, _statistics(change, depth)))
 
     def as_dict(self) -> dict[str, float]:
         return asdict(self)
@@ -117,7 +117,7 @@ def blank_table(kind: type[Figures] | type[CardFigures]) -> tuple[tuple[str, ...
 
 
 def _table(name: str, spread: tuple[float, ...]) -> tuple[tuple[str, str, str, str], ...]:
-    """The rows of a table for the result of `_spread`."""
+    """The rows of a table for the result of `_statistics`."""
     stretch, depth = spread[:3], spread[3:]
     return (
         (name, "Worst", "99 %", "Over 1"),
@@ -126,7 +126,7 @@ def _table(name: str, spread: tuple[float, ...]) -> tuple[tuple[str, str, str, s
     )
 
 
-def _spread(change: Floats, depth: Floats) -> tuple[float, ...]:
+def _statistics(change: Floats, depth: Floats) -> tuple[float, ...]:
     """The worst, the 99th percentile, and the percentage above the limit: of changes of length, as
     fractions, in percent, and of depths [m], in millimetres; all 0 without values."""
     if not len(change):
@@ -134,10 +134,10 @@ def _spread(change: Floats, depth: Floats) -> tuple[float, ...]:
     return (
         100.0 * float(change.max()),
         100.0 * float(np.quantile(change, 0.99)),
-        100.0 * float((change > STRETCHED).mean()),
+        100.0 * float((change > STRETCH_LIMIT).mean()),
         1000.0 * float(depth.max()),
         1000.0 * float(np.quantile(depth, 0.99)),
-        100.0 * float((depth > INSIDE).mean()),
+        100.0 * float((depth > DEPTH_LIMIT).mean()),
     )
 
 
@@ -155,7 +155,7 @@ def _length(value: float) -> str:
     return f"{value:,.1f} mm" if value < 1000.0 else f"{value / 1000.0:,.2f} m"
 
 
-class Measure:
+class FiguresCollector:
     """Collects figures frame by frame.
 
     Args:
@@ -173,11 +173,11 @@ class Measure:
         self._stretch = self._penetration = 0.0
         self._change, self._depth = (np.zeros(len(offsets) - 1) for _ in range(2))
 
-    def take_style(self, rest: DynamicsState) -> None:
+    def set_style(self, rest: DynamicsState) -> None:
         """Use the lengths of another style from the next frame on."""
         self._rest = rest
 
-    def add(
+    def add_frame(
         self, points: Floats, rest_lengths: Floats, guides: Floats, colliders: Colliders
     ) -> None:
         """Add a frame.
@@ -200,4 +200,4 @@ class Measure:
     def figures(self) -> Figures:
         """The figures of all frames so far."""
         found = 100.0 * self._stretch, 1000.0 * self._penetration
-        return Figures(*map(_rounded, (*found, *_spread(self._change, self._depth))))
+        return Figures(*map(_rounded, (*found, *_statistics(self._change, self._depth))))

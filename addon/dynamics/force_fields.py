@@ -27,15 +27,15 @@ FALLOFFS = ("sphere", "tube", "cone")
 #: the permutation in each texel.
 FIELD_TEXELS, TABLE_WIDTH = 7, 64
 #: Maximum displacement of a CV by fields in a substep, as a fraction of the hair's length.
-FARTHEST = 0.1
+MAX_DISPLACEMENT = 0.1
 #: Farther than any distance. Its square overflows in float32, but is not needed.
-ENDLESS = 3.0e38
+NO_LIMIT = 3.0e38
 #: Vectors shorter than this have no direction.
 _TINY = np.float32(1.0e-12)
 #: Maximum acceleration along each axis [m/s^2], to avoid overflow.
-_STRONGEST = np.float32(1.0e9)
+_MAX_ACCELERATION = np.float32(1.0e9)
 #: Number of binary digits of the fraction of a power.
-_HALVES = 16
+_POWER_BITS = 16
 #: Octaves of turbulence.
 _OCTAVES = 3
 _NOWHERE = (0.0, 0.0, 0.0)
@@ -73,7 +73,7 @@ class Falloff:
 
     power: float = 0.0
     near: float = 0.0
-    far: float = ENDLESS
+    far: float = NO_LIMIT
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class ForceField:
     damping: of harmonic fields; the linear part of drag, whose quadratic part is its strength.
     size: of turbulence; for harmonic fields the rest length.
     flow: rate at which it slows down motion [1/s], scaled by its falloff.
-    across: fraction of the field that acts across strands only.
+    across_fraction: fraction of the field that acts across strands only.
     side: 1 or -1: the side along `normal` that it acts on; 0: both sides.
     distance: falloff by distance, along the axis for tubes and cones. radial: across the axis, in
         metres for tubes and in degrees for cones.
@@ -105,7 +105,7 @@ class ForceField:
     damping: float = 0.0
     size: float = 0.0
     flow: float = 0.0
-    across: float = 0.0
+    across_fraction: float = 0.0
     falloff: str = "sphere"
     side: int = 0
     distance: Falloff = field(default_factory=Falloff)
@@ -114,7 +114,7 @@ class ForceField:
     is_global: bool = False
 
     @property
-    def numbers(self) -> Floats:
+    def texels(self) -> Floats:
         """(FIELD_TEXELS, 4) float32, see lib_force_fields.glsl."""
         return np.array(
             [
@@ -122,7 +122,7 @@ class ForceField:
                 [*(self.normal or self.axis), SHAPES.index(self.shape)],
                 [*self.center, self.strength],
                 [*self.axis, self.damping],
-                [self.size, self.flow, self.across, FALLOFFS.index(self.falloff)],
+                [self.size, self.flow, self.across_fraction, FALLOFFS.index(self.falloff)],
                 [self.distance.power, self.distance.near, self.distance.far, self.side],
                 [
                     self.radial.power,
@@ -147,7 +147,7 @@ class ForceFields:
     permutation: Ints | None = None
     factor: float = 1.0
 
-    def by(self, factor: float) -> ForceFields | None:
+    def scaled(self, factor: float) -> ForceFields | None:
         """The fields with this factor; None if nothing acts."""
         if not self.fields or factor <= 0.0:
             return None
@@ -160,30 +160,30 @@ class ForceFields:
         if self.permutation is not None:
             table[0] = self.permutation.reshape(TABLE_WIDTH, 4)
         for row, one in zip(table[1:], self.fields, strict=True):
-            row[:FIELD_TEXELS] = one.numbers
+            row[:FIELD_TEXELS] = one.texels
         return table
 
     @cached_property
-    def is_across(self) -> bool:
+    def acts_across(self) -> bool:
         """Whether any field acts partly across strands only."""
-        return any(one.across > 0.0 for one in self.fields)
+        return any(one.across_fraction > 0.0 for one in self.fields)
 
 
 NO_FIELDS = ForceFields()
 
 
 @dataclass(frozen=True)
-class Felt:
+class FieldEffect:
     """The effect of all fields together at n points.
 
     push: (3, n) [m/s^2], acceleration.
-    slowing: (n,) [1/s], rate at which the velocity decays.
+    slowing_rate: (n,) [1/s], rate at which the velocity decays.
     across_push, across_slowing: the parts of these that act across strands only.
     spin: (3, n) [1/s], turns the velocity: the acceleration is velocity x spin.
     """
 
     push: Floats
-    slowing: Floats
+    slowing_rate: Floats
     across_push: Floats
     across_slowing: Floats
     spin: Floats
@@ -191,11 +191,11 @@ class Felt:
     def acceleration(self, velocity: Floats) -> Floats:
         """The acceleration (3, n) [m/s^2] of points at this velocity that are not on a strand."""
         turned = cross_rows(velocity, self.spin)
-        result: Floats = self.push - velocity * self.slowing + turned
+        result: Floats = self.push - velocity * self.slowing_rate + turned
         return result
 
 
-def felt(fields: ForceFields, points: Floats, velocity: Floats) -> Felt:
+def field_effect(fields: ForceFields, points: Floats, velocity: Floats) -> FieldEffect:
     """The effect of all fields at points.
 
     Args:
@@ -204,100 +204,105 @@ def felt(fields: ForceFields, points: Floats, velocity: Floats) -> Felt:
     push, spin, across_push = (np.zeros_like(points) for _ in range(3))
     slowing, across_slowing = np.zeros_like(points[0]), np.zeros_like(points[0])
     for one in fields.fields:
-        own, slows, turns = _felt_of(one, fields, points, velocity)
-        push += own
-        slowing += slows
-        if one.across > 0.0:
-            across_push += own * np.float32(one.across)
-            across_slowing += slows * np.float32(one.across)
-        if turns is not None:
-            spin += turns
+        own_push, own_slowing, own_spin = _effect_of_field(one, fields, points, velocity)
+        push += own_push
+        slowing += own_slowing
+        if one.across_fraction > 0.0:
+            across_push += own_push * np.float32(one.across_fraction)
+            across_slowing += own_slowing * np.float32(one.across_fraction)
+        if own_spin is not None:
+            spin += own_spin
     for total in (push, across_push):
-        np.clip(total, -_STRONGEST, _STRONGEST, out=total)
-    return Felt(push, slowing, across_push, across_slowing, spin)
+        np.clip(total, -_MAX_ACCELERATION, _MAX_ACCELERATION, out=total)
+    return FieldEffect(push, slowing, across_push, across_slowing, spin)
 
 
-def _felt_of(
-    one: ForceField, fields: ForceFields, points: Floats, velocity: Floats
+def _effect_of_field(
+    field: ForceField, fields: ForceFields, points: Floats, velocity: Floats
 ) -> tuple[Floats, Floats, Floats | None]:
-    """Push, slowing and spin of one field, see `Felt`."""
+    """Push, slowing and spin of one field, see `FieldEffect`."""
     place, normal, center, axis = (
         np.broadcast_to(np.array(vector, np.float32)[:, None], points.shape)
-        for vector in (one.place or one.center, one.normal or one.axis, one.center, one.axis)
+        for vector in (
+            field.place or field.center,
+            field.normal or field.axis,
+            field.center,
+            field.axis,
+        )
     )
     from_center = points - center
-    away = _away(one, points - place, from_center, normal)
+    away = _from_shape(field, points - place, from_center, normal)
     distance = np.sqrt(dot_rows(away, away))
-    part = _falloff(one, distance, from_center, normal) * np.float32(fields.factor)
-    acts = part > 0.0
-    strong, slows, turns = part * np.float32(one.strength), np.zeros_like(part), None
-    if one.kind == "wind":
-        push = normal * strong
-    elif one.kind == "force":
-        if one.is_inverse_square:
-            strong = np.where(distance > _TINY, strong / (distance * distance + _TINY), 0.0)
-        push = _direction(away) * strong
-    elif one.kind == "vortex" and one.shape == "point":
-        push = _direction(cross_rows(normal, away)) * (strong * distance)
-    elif one.kind == "vortex":
-        around = cross_rows(axis, from_center) * strong
-        push = cross_rows(axis, around) * strong + around
-        slows = acts.astype(np.float32)
-    elif one.kind == "magnet":
-        lines = cross_rows(normal, away) if one.shape in ("point", "line") else normal
-        push, turns = np.zeros_like(points), _direction(lines) * strong
-    elif one.kind == "harmonic":
-        if one.size:
-            away = away * ((distance - np.float32(one.size)) / np.maximum(distance, _TINY))
-        push = away * -strong
-        slows = acts * np.float32(one.damping * 2.0 * abs(one.strength) ** 0.5)
-    elif one.kind == "turbulence":
+    falloff = _falloff(field, distance, from_center, normal) * np.float32(fields.factor)
+    acts = falloff > 0.0
+    strength, slowing, spin = falloff * np.float32(field.strength), np.zeros_like(falloff), None
+    if field.kind == "wind":
+        push = normal * strength
+    elif field.kind == "force":
+        if field.is_inverse_square:
+            strength = np.where(distance > _TINY, strength / (distance * distance + _TINY), 0.0)
+        push = _direction(away) * strength
+    elif field.kind == "vortex" and field.shape == "point":
+        push = _direction(cross_rows(normal, away)) * (strength * distance)
+    elif field.kind == "vortex":
+        around = cross_rows(axis, from_center) * strength
+        push = cross_rows(axis, around) * strength + around
+        slowing = acts.astype(np.float32)
+    elif field.kind == "magnet":
+        lines = cross_rows(normal, away) if field.shape in ("point", "line") else normal
+        push, spin = np.zeros_like(points), _direction(lines) * strength
+    elif field.kind == "harmonic":
+        if field.size:
+            away = away * ((distance - np.float32(field.size)) / np.maximum(distance, _TINY))
+        push = away * -strength
+        slowing = acts * np.float32(field.damping * 2.0 * abs(field.strength) ** 0.5)
+    elif field.kind == "turbulence":
         assert fields.permutation is not None, "it comes with turbulence"
-        seen = points if one.is_global else from_center + axis
-        push = turbulence(fields.permutation, seen, one.size) * strong
+        noise_points = points if field.is_global else from_center + axis
+        push = turbulence(fields.permutation, noise_points, field.size) * strength
     else:  # drag
         push = np.zeros_like(points)
         speed = np.sqrt(dot_rows(velocity, velocity))
-        slows = part * (
-            speed * np.float32(min(one.strength, 2.0)) + np.float32(min(one.damping, 2.0))
+        slowing = falloff * (
+            speed * np.float32(min(field.strength, 2.0)) + np.float32(min(field.damping, 2.0))
         )
-    if one.kind not in ("harmonic", "drag"):
-        slows = slows + part * np.float32(one.flow)
-    return push, slows, turns
+    if field.kind not in ("harmonic", "drag"):
+        slowing = slowing + falloff * np.float32(field.flow)
+    return push, slowing, spin
 
 
-def _away(one: ForceField, away: Floats, from_center: Floats, normal: Floats) -> Floats:
+def _from_shape(field: ForceField, away: Floats, from_center: Floats, normal: Floats) -> Floats:
     """The vectors from the nearest point of the field's shape, (3, n) [m].
 
     Args:
         away: (3, n), from the field's place.
     """
-    if one.shape not in ("line", "plane"):
+    if field.shape not in ("line", "plane"):
         return away
     along = normal * dot_rows(normal, from_center)
-    is_beside = one.shape == "line" or one.kind == "vortex"
+    is_beside = field.shape == "line" or field.kind == "vortex"
     return from_center - along if is_beside else along
 
 
-def _falloff(one: ForceField, distance: Floats, from_center: Floats, normal: Floats) -> Floats:
+def _falloff(field: ForceField, distance: Floats, from_center: Floats, normal: Floats) -> Floats:
     """The fraction of its strength that a field has at each point, (n,)."""
     along = dot_rows(normal, from_center)
-    if one.falloff == "sphere":
-        part = _fallen(one.distance, distance)
+    if field.falloff == "sphere":
+        part = _power_falloff(field.distance, distance)
     else:
         beside = from_center - normal * along
-        part = _fallen(one.distance, np.abs(along))
+        part = _power_falloff(field.distance, np.abs(along))
         wide = np.sqrt(dot_rows(beside, beside))
-        if one.falloff == "cone":
+        if field.falloff == "cone":
             length = np.maximum(np.sqrt(dot_rows(from_center, from_center)), _TINY)
             wide = _degrees(wide / length, along / length)
-        part = part * _fallen(one.radial, wide)
-    if one.side:
-        part = part * (along * np.float32(one.side) >= 0.0)
+        part = part * _power_falloff(field.radial, wide)
+    if field.side:
+        part = part * (along * np.float32(field.side) >= 0.0)
     return part
 
 
-def _fallen(falloff: Falloff, distance: Floats) -> Floats:
+def _power_falloff(falloff: Falloff, distance: Floats) -> Floats:
     beyond = np.maximum(distance + np.float32(1.0 - falloff.near), np.float32(1.0))
     return (distance <= np.float32(falloff.far)) / _power(beyond, falloff.power)
 
@@ -307,13 +312,13 @@ def _power(base: Floats, power: float) -> Floats:
     result = np.ones_like(base)
     for _ in range(int(power)):
         result = result * base
-    left, root = power - int(power), base
-    for _ in range(_HALVES):
-        if not left:
+    remainder, root = power - int(power), base
+    for _ in range(_POWER_BITS):
+        if not remainder:
             break
-        root, left = np.sqrt(root), 2.0 * left
-        if left >= 1.0:
-            result, left = result * root, left - 1.0
+        root, remainder = np.sqrt(root), 2.0 * remainder
+        if remainder >= 1.0:
+            result, remainder = result * root, remainder - 1.0
     return result
 
 
@@ -375,13 +380,13 @@ def perlin(permutation: Ints, points: Floats) -> Floats:
     return blended[0]
 
 
-def blow(
+def apply_force_fields(
     position: Floats,
     previous: Floats,
     fields: ForceFields,
     dt: float,
     size: float,
-    along: Floats | None = None,
+    directions: Floats | None = None,
 ) -> None:
     """Apply a substep of the fields to the velocity, which `previous` holds, in place.
 
@@ -390,38 +395,42 @@ def blow(
 
     Args:
         position: (3, n) float32 world [m]; previous: a step of `dt` [s] earlier.
-        size: of the hair [m]; a CV is moved by at most FARTHEST times this.
-        along: (3, n), the direction of the strand at each CV; None: no strands.
+        size: of the hair [m]; a CV is moved by at most MAX_DISPLACEMENT times this.
+        directions: (3, n), the direction of the strand at each CV; None: no strands.
     """
     step = np.float32(dt)
     velocity = (position - previous) / step
-    all_of = felt(fields, position, velocity)
-    blown = velocity + all_of.push * step
-    if along is None or not fields.is_across:
-        blown = blown * _left(all_of.slowing * step)
+    effect = field_effect(fields, position, velocity)
+    new_velocity = velocity + effect.push * step
+    if directions is None or not fields.acts_across:
+        new_velocity = new_velocity * _slowing_factor(effect.slowing_rate * step)
     else:
-        straight = dot_rows(blown, along)
-        beside = (blown - along * straight) * _left(all_of.slowing * step)
-        straight = straight - dot_rows(all_of.across_push, along) * step
-        kept = _left((all_of.slowing - all_of.across_slowing) * step)
-        blown = beside + along * (straight * kept)
+        along_strand = dot_rows(new_velocity, directions)
+        across_strand = (new_velocity - directions * along_strand) * _slowing_factor(
+            effect.slowing_rate * step
+        )
+        along_strand = along_strand - dot_rows(effect.across_push, directions) * step
+        slowing_factor = _slowing_factor((effect.slowing_rate - effect.across_slowing) * step)
+        new_velocity = across_strand + directions * (along_strand * slowing_factor)
     if any(one.kind == "magnet" for one in fields.fields):
-        turn = np.clip(all_of.spin * step, np.float32(-1.0e6), np.float32(1.0e6))
-        blown = blown + cross_rows(blown, turn) + turn * dot_rows(blown, turn)
-        blown = blown / (dot_rows(turn, turn) + np.float32(1.0))
-    displacement = (blown - velocity) * step
-    far = np.sqrt(dot_rows(displacement, displacement))
-    limit = np.float32(FARTHEST * size)
-    displacement = displacement * (limit / np.maximum(far, limit + _TINY))
+        turn = np.clip(effect.spin * step, np.float32(-1.0e6), np.float32(1.0e6))
+        new_velocity = (
+            new_velocity + cross_rows(new_velocity, turn) + turn * dot_rows(new_velocity, turn)
+        )
+        new_velocity = new_velocity / (dot_rows(turn, turn) + np.float32(1.0))
+    displacement = (new_velocity - velocity) * step
+    length = np.sqrt(dot_rows(displacement, displacement))
+    limit = np.float32(MAX_DISPLACEMENT * size)
+    displacement = displacement * (limit / np.maximum(length, limit + _TINY))
     previous -= displacement
 
 
-def _left(slowing: Floats) -> Floats:
+def _slowing_factor(slowing: Floats) -> Floats:
     """The factor of the velocity; fields with negative slowing increase it."""
     return np.where(slowing > 0.0, 1.0 / (1.0 + np.abs(slowing)), 1.0 - slowing).astype(np.float32)
 
 
-def along_strands(position: Floats) -> Floats:
+def strand_directions(position: Floats) -> Floats:
     """Unit directions of strands at their CVs, (3, cv_count, n), from rows of the same shape: from
     the previous to the next CV."""
     before = np.concatenate([position[:, :1], position[:, :-1]], axis=1)

@@ -10,7 +10,7 @@ import numpy as np
 from ..arrays import Floats
 from ..strands.vectors import dot_rows
 from .banded import solve_tridiagonal
-from .constraints import PINNED, chain_matrix, less_next, segments
+from .constraints import PINNED_COUNT, chain_matrix, minus_next, segments
 from .settings import DynamicsSettings
 
 
@@ -99,14 +99,14 @@ def effective_gravity(
     """
     full = _scaled_gravity(gravity, settings)
     without_buoyancy = full * np.float32(1.0 - settings.buoyancy)
-    if not settings.sag_compensation or not style.shape[1] > PINNED or not style.shape[2]:
+    if not settings.sag_compensation or not style.shape[1] > PINNED_COUNT or not style.shape[2]:
         return without_buoyancy[:, None, None]
     combed = _rotated(full, rotation)
     effective = np.empty_like(style)
     effective[:] = without_buoyancy[:, None, None]
     compensated = weight_across_style(combed, style)
     compensated *= np.float32(settings.sag_compensation)
-    effective[:, PINNED:] -= compensated
+    effective[:, PINNED_COUNT:] -= compensated
     return effective
 
 
@@ -134,14 +134,14 @@ def weight_across_style(gravity: Floats, style: Floats) -> Floats:
     """
     segment, tension = style_tension(gravity, style)
     segment *= tension
-    return gravity[:, None, None] - less_next(segment)
+    return gravity[:, None, None] - minus_next(segment)
 
 
 def style_tension(gravity: Floats, style: Floats) -> tuple[Floats, Floats]:
     """Segments (3, n, guide_count) [m] beyond the pinned ones, and the tension in each that holds
     gravity (3,), over the segment's length, (n, guide_count) [1/s^2].
     """
-    segment, squared = segments(style[:, PINNED - 1 :])
+    segment, squared = segments(style[:, PINNED_COUNT - 1 :])
     diagonal, off_diagonal = chain_matrix(segment, squared)
     tension = np.zeros_like(diagonal)  # J g: differs from 0 only at the segment of the pinned CV
     tension[0] = dot_rows(segment[:, 0], gravity[:, None])

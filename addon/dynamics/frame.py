@@ -12,8 +12,8 @@ from ..arrays import Floats
 from ..errors import HairloomError
 from .clearance import GuideClearance
 from .colliders import PosedCollider
-from .constraints import PINNED
-from .contacts import BETWEEN, BETWEEN_RADIUS, radius_of_all
+from .constraints import PINNED_COUNT
+from .contacts import SEGMENT_POINTS, SEGMENT_RADIUS, all_cv_radii
 from .force_fields import NO_FIELDS, ForceFields
 from .forces import DampingFactors, compensated_gravity, effective_gravity
 from .groom_rotation import fit_rotation, sample_guides, sample_roots
@@ -25,8 +25,8 @@ from .rigid_path import CarriedPath, Carrier, KnownSubstep, LastSubstep, RigidMo
 from .settings import DynamicsSettings
 from .springs import Springs
 from .state import DynamicsState, Rest, StyleRows, as_rows, checked_grid
-from .style import StyleBand, style_band
-from .wind import Air, air_of
+from .style import StyleSystem, style_system
+from .wind import Air, air_from_settings
 
 
 @dataclass(frozen=True)
@@ -206,7 +206,7 @@ class Frame:
     time: float  # [s] of the first substep, on the clock of the gusts
     time_left: float
     rotation: Floats
-    style_system: StyleBand
+    style_system: StyleSystem
     damping_factors: DampingFactors
     air: Air | None
     force_fields: ForceFields | None  # None where none acts
@@ -234,8 +234,8 @@ class Frame:
             rotation = fit_rotation(state.rest.sample_points, (before + now) / 2.0)
             volume = None if painted is None else painted.volume
             interaction = _hair_interaction(state, drive, settings, rotation, dt, volume)
-        style_system = style_band(settings, state.cv_count, dt)
-        air, fields = air_of(settings), drive.force_fields.by(settings.force_fields)
+        system = style_system(settings, state.cv_count, dt)
+        air, fields = air_from_settings(settings), drive.force_fields.scaled(settings.force_fields)
         time, time_left, size = state.time, state.time_left, state.rest.size
         return cls(
             drive,
@@ -245,7 +245,7 @@ class Frame:
             time,
             time_left,
             rotation,
-            style_system,
+            system,
             DampingFactors.of(settings, dt),
             air,
             fields,
@@ -331,7 +331,7 @@ def _hair_interaction(
         volume: see `HairInteraction`.
     """
     strength = InteractionStrength.of(settings, dt)
-    if strength is None or state.cv_count <= PINNED:
+    if strength is None or state.cv_count <= PINNED_COUNT:
         return None
     grid = state.rest.hair_grid
     ends = [target[:, 0].mean(axis=0, dtype=np.float64) for target in drive.targets[:2]]
@@ -348,8 +348,8 @@ class Block:
         substep, and its change as the path of the style bends. If the style moves on an arc,
         gravity alone.
     radius: (cv_count * n,) [m], the distance that each CV keeps from colliders; read-only.
-    segment_radius: (len(BETWEEN), cv_count * n) [m], the same for points of the segment that ends
-        there.
+    segment_radius: (len(SEGMENT_POINTS), cv_count * n) [m], the same for points of the segment that
+        ends there.
     held: (cv_count, n), see `held.HeldCvs.rows`; None if none of these guides is held.
     springs: of the curled guides; None if none of these can stretch.
     style_system, damping_factors: those of the frame, or individual ones of each guide.
@@ -363,7 +363,7 @@ class Block:
     segment_radius: Floats
     held: Floats | None
     springs: Springs | None
-    style_system: StyleBand
+    style_system: StyleSystem
     damping_factors: DampingFactors
 
     @classmethod
@@ -400,10 +400,10 @@ class Block:
             impulse_curvature = (
                 None if style.curvature is None else style.curvature * style_fraction
             )
-        radius = radius_of_all(settings, state.cv_count, before.shape[2], state.rest.size)
-        segment_radius = np.tile(radius * BETWEEN_RADIUS, (len(BETWEEN), 1))
+        radius = all_cv_radii(settings, state.cv_count, before.shape[2], state.rest.size)
+        segment_radius = np.tile(radius * SEGMENT_RADIUS, (len(SEGMENT_POINTS), 1))
         if drive.clearance is not None:
-            clearances = drive.clearance.rows[:, :, guides].reshape(1 + len(BETWEEN), -1)
+            clearances = drive.clearance.rows[:, :, guides].reshape(1 + len(SEGMENT_POINTS), -1)
             radius, segment_radius = (
                 np.minimum(radius, clearances[0]),
                 np.minimum(segment_radius, clearances[1:]),

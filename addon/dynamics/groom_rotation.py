@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Floats
-from .constraints import PINNED
+from .constraints import PINNED_COUNT
 
 #: Maximum number of guides that the rotation is computed from.
 SAMPLED_GUIDES = 256
@@ -26,7 +26,7 @@ def best_rotation(rest: Floats, carried: Floats) -> Floats:
 def sample_guides(grid: Floats) -> Floats:
     """The pinned CVs and the tips of evenly chosen guides, rows (3, n) float64, of a grid
     (guide_count, cv_count, 3)."""
-    cvs = [*range(min(PINNED, grid.shape[1])), grid.shape[1] - 1]
+    cvs = [*range(min(PINNED_COUNT, grid.shape[1])), grid.shape[1] - 1]
     stride = max(-(-len(grid) // SAMPLED_GUIDES), 1)
     places = np.asarray(grid)[::stride, cvs]
     return np.ascontiguousarray(places.transpose(2, 1, 0), np.float64).reshape(3, -1)
@@ -39,7 +39,7 @@ def sample_roots(grid: Floats) -> Floats:
     All CVs if there are fewer than three guides, since two roots do not determine a rotation.
     """
     stride = max(-(-len(grid) // SAMPLED_GUIDES), 1)
-    places = np.asarray(grid)[::stride, : PINNED if len(grid) > PINNED else None]
+    places = np.asarray(grid)[::stride, : PINNED_COUNT if len(grid) > PINNED_COUNT else None]
     return np.ascontiguousarray(places.transpose(2, 1, 0), np.float64).reshape(3, -1)
 
 

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
-from .constraints import PINNED
+from .constraints import PINNED_COUNT
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +25,7 @@ class HeldCvs:
     def rows(self) -> Floats:
         """`is_held` as (cv_count, guide_count) float32, 1 or 0; 0 for the pinned CVs."""
         rows = np.ascontiguousarray(self.is_held.T, np.float32)
-        rows[:PINNED] = 0.0
+        rows[:PINNED_COUNT] = 0.0
         rows.flags.writeable = False
         return rows
 
@@ -41,7 +41,7 @@ class HeldCvs:
     def _interpolation(self) -> tuple[Ints, Ints, Floats]:
         """The pinned or held CVs before and after each CV, and the latter's weight."""
         known = self.is_held.copy()
-        known[:, :PINNED] = True
+        known[:, :PINNED_COUNT] = True
         cv = np.arange(known.shape[1])
         lower = np.maximum.accumulate(np.where(known, cv, 0), axis=1)
         upper = np.where(known, cv, len(cv))[:, ::-1]

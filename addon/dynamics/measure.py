@@ -9,35 +9,35 @@ from ..strands.arc_length import strand_lengths
 from ..strands.vectors import dot_rows
 from .colliders import PosedCollider, transform_points
 from .colliders.signed_distance import signed_distance
-from .constraints import PINNED, TINY, directions
+from .constraints import PINNED_COUNT, TINY, directions
 from .state import DynamicsState
 
 #: Minimum length that changes are related to, as a fraction of the median: hair of a thousandth of
 #: a millimetre gets many times longer by the rounding of float32 alone.
-SHORTEST = 0.01
+MIN_LENGTH = 0.01
 
 
 def max_stretch(state: DynamicsState) -> float:
     """Largest change of a simulated segment's length, as a fraction of its rest length.
 
     Segments between pinned CVs, without length, or of curls, which may stretch, do not count. See
-    SHORTEST.
+    MIN_LENGTH.
     """
-    rest = state.rest.length[PINNED - 1 :]
+    rest = state.rest.length[PINNED_COUNT - 1 :]
     if not rest.size:
         return 0.0
-    _, length = directions(state.position[:, PINNED - 1 :])
+    _, length = directions(state.position[:, PINNED_COUNT - 1 :])
     is_fixed = rest > TINY
     if state.rest.curl_slack is not None:
-        is_fixed &= state.rest.curl_slack[PINNED - 1 :] == 0.0
-    long = np.maximum(rest, np.float32(SHORTEST * state.rest.size / len(state.rest.length)))
+        is_fixed &= state.rest.curl_slack[PINNED_COUNT - 1 :] == 0.0
+    long = np.maximum(rest, np.float32(MIN_LENGTH * state.rest.size / len(state.rest.length)))
     change = np.divide(np.abs(length - rest), long, out=np.zeros_like(rest), where=is_fixed)
     return float(change.max())
 
 
 def deepest_penetration(state: DynamicsState, colliders: tuple[PosedCollider, ...]) -> float:
     """How deep [m] the center of any free CV lies in a collider at the frame's end; 0 if none."""
-    points = state.position[:, PINNED:].reshape(3, -1)
+    points = state.position[:, PINNED_COUNT:].reshape(3, -1)
     return float(_depths(points, colliders).max(initial=0.0))
 
 
@@ -63,10 +63,10 @@ def length_changes(points: Floats, offsets: Ints, rest_lengths: Floats) -> Float
     Args:
         points: (point_count, 3) [m], strand by strand.
         offsets: (strand_count + 1,), strand s is points[offsets[s]:offsets[s + 1]].
-        rest_lengths: (strand_count,) [m]; see SHORTEST.
+        rest_lengths: (strand_count,) [m]; see MIN_LENGTH.
     """
     change = np.abs(strand_lengths(points, offsets) - rest_lengths)
-    shortest = SHORTEST * float(np.median(rest_lengths)) if len(rest_lengths) else 0.0
+    shortest = MIN_LENGTH * float(np.median(rest_lengths)) if len(rest_lengths) else 0.0
     return np.asarray(change / np.maximum(rest_lengths, max(shortest, float(TINY))))
 
 

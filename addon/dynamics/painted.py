@@ -15,7 +15,7 @@ import numpy as np
 from ..arrays import Floats
 from .forces import DampingFactors
 from .settings import DynamicsSettings
-from .style import StyleBand, painted_band
+from .style import StyleSystem, painted_style_system
 
 #: Factors of these only blend the visible motion; they do not affect the simulation.
 _DISPLAY_ONLY = frozenset({"influence", "only_selected"})
@@ -80,13 +80,13 @@ class PaintedFrame:
 
     gravity, volume: (guide_count,), factors of the groom's.
     damping_factors: with values for each guide.
-    style_system: see `style.StyleBand`.
+    style_system: see `style.StyleSystem`.
     """
 
     gravity: Floats
     volume: Floats
     damping_factors: DampingFactors
-    style_system: StyleBand
+    style_system: StyleSystem
 
     def part(self, guides: slice) -> PaintedFrame:
         damped = self.damping_factors
@@ -122,5 +122,5 @@ def painted_frame(
         DampingFactors(
             rows(damping_factors.velocity), rows(damping_factors.style), rows(damping_factors.air)
         ),
-        painted_band(settings, root, tip, bend, cv_count, dt),
+        painted_style_system(settings, root, tip, bend, cv_count, dt),
     )

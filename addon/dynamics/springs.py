@@ -25,14 +25,14 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..strands.vectors import dot_rows
-from .constraints import PINNED, TINY, segments, spring_step
+from .constraints import PINNED_COUNT, TINY, segments, spring_step
 from .forces import style_tension
 from .settings import DynamicsSettings
 
 #: E at Curl Stretch 1, as a fraction of the extension at which the curl is straight.
-GIVEN = 0.8
+MAX_STRETCH = 0.8
 #: A spring is linearised at |e| / E up to this.
-STEEPEST = np.float32(0.9)
+MAX_LINEARISED = np.float32(0.9)
 
 
 def stiffness(settings: DynamicsSettings, cv_count: int) -> float:
@@ -41,13 +41,13 @@ def stiffness(settings: DynamicsSettings, cv_count: int) -> float:
     The first mode of n equal masses on n springs, one end held: omega = 2 sqrt(kappa)
     sin(pi / (4 n + 2)).
     """
-    free = max(cv_count - PINNED, 1)
+    free = max(cv_count - PINNED_COUNT, 1)
     return (math.pi * settings.curl_bounce / math.sin(math.pi / (4 * free + 2))) ** 2
 
 
-def give(settings: DynamicsSettings) -> float:
+def max_extension_fraction(settings: DynamicsSettings) -> float:
     """E as a fraction of a curl's room."""
-    return GIVEN * settings.curl_stretch
+    return MAX_STRETCH * settings.curl_stretch
 
 
 @dataclass(frozen=True)
@@ -57,26 +57,26 @@ class Springs:
 
     guides: (n,) their indices in the block, ascending.
     length: [m] at rest.
-    most: E [m], 0 where a segment cannot stretch.
+    max_extension: E [m], 0 where a segment cannot stretch.
     load: T_0 / kappa [m].
-    softness: 1 / (kappa dt^2).
+    compliance: 1 / (kappa dt^2).
     held: see `held.HeldCvs.rows`, of these guides; None if no guide of the block is held.
     """
 
     guides: Ints
     length: Floats
-    most: Floats
+    max_extension: Floats
     load: Floats
-    softness: float
+    compliance: float
     held: Floats | None
 
     @classmethod
     def of(
         cls,
-        room: Floats | None,
+        curl_slack: Floats | None,
         length: Floats,
         style: Floats,
-        combed: Floats,
+        compensated: Floats,
         held: Floats | None,
         settings: DynamicsSettings,
         dt: float,
@@ -84,23 +84,27 @@ class Springs:
         """The springs of a block; None if no guide can stretch.
 
         Args:
-            room, length: (cv_count - 1, guide_count), see `state.Rest`.
+            curl_slack, length: (cv_count - 1, guide_count), see `state.Rest`.
             style: (3, cv_count, guide_count) world [m].
-            combed: (3,) [m/s^2], the gravity that the style carries.
+            compensated: (3,) [m/s^2], the gravity that the style carries.
             held: (cv_count, guide_count), see `held.HeldCvs.rows`; None if no CV is held.
         """
-        if room is None or not settings.curl_stretch or style.shape[1] <= PINNED:
+        if curl_slack is None or not settings.curl_stretch or style.shape[1] <= PINNED_COUNT:
             return None
-        guides = room[PINNED - 1 :].any(axis=0).nonzero()[0]
+        guides = curl_slack[PINNED_COUNT - 1 :].any(axis=0).nonzero()[0]
         if not guides.size:
             return None
         kappa = stiffness(settings, style.shape[1])
-        at_rest = length[PINNED - 1 :, guides]
-        most = room[PINNED - 1 :, guides] * at_rest * np.float32(give(settings))
-        segment, tension = style_tension(combed, style[:, :, guides])
+        at_rest = length[PINNED_COUNT - 1 :, guides]
+        max_extension = (
+            curl_slack[PINNED_COUNT - 1 :, guides]
+            * at_rest
+            * np.float32(max_extension_fraction(settings))
+        )
+        segment, tension = style_tension(compensated, style[:, :, guides])
         load = tension * np.sqrt(dot_rows(segment, segment)) / np.float32(kappa)
         own = None if held is None else held[:, guides]
-        return cls(guides, at_rest, most, load, 1.0 / (kappa * dt * dt), own)
+        return cls(guides, at_rest, max_extension, load, 1.0 / (kappa * dt * dt), own)
 
     def step(self, position: Floats, previous: Floats, length: Floats) -> Floats:
         """Move curled guides by the pull of their springs in a substep, in place.
@@ -113,24 +117,28 @@ class Springs:
             The lengths of all segments for the rest of the substep, in the shape of `length`.
         """
         some = position.take(self.guides, axis=2)
-        _, squared = segments(previous[:, PINNED - 1 :].take(self.guides, axis=2))
-        steepest = STEEPEST * self.most
-        extended = np.clip(np.sqrt(squared) - self.length, -steepest, steepest)
-        used = extended / np.maximum(self.most, TINY)
-        used *= used
-        softer = np.square(1.0 - used) / (1.0 + used)
-        softer *= self.most > 0.0
-        target = self.length + extended - softer * (extended / (1.0 - used) + self.load)
-        spring_step(some, target, softer * np.float32(self.softness), self.held)
+        _, squared = segments(previous[:, PINNED_COUNT - 1 :].take(self.guides, axis=2))
+        limit = MAX_LINEARISED * self.max_extension
+        extension = np.clip(np.sqrt(squared) - self.length, -limit, limit)
+        squared_ratio = extension / np.maximum(self.max_extension, TINY)
+        squared_ratio *= squared_ratio
+        relative_compliance = np.square(1.0 - squared_ratio) / (1.0 + squared_ratio)
+        relative_compliance *= self.max_extension > 0.0
+        target = (
+            self.length
+            + extension
+            - relative_compliance * (extension / (1.0 - squared_ratio) + self.load)
+        )
+        spring_step(some, target, relative_compliance * np.float32(self.compliance), self.held)
         position[:, :, self.guides] = some
-        _, squared = segments(some[:, PINNED - 1 :])
+        _, squared = segments(some[:, PINNED_COUNT - 1 :])
         lengths = length.copy()
-        longest, shortest = limits(self.length, self.most)
-        lengths[PINNED - 1 :, self.guides] = np.clip(np.sqrt(squared), shortest, longest)
+        longest, shortest = length_limits(self.length, self.max_extension)
+        lengths[PINNED_COUNT - 1 :, self.guides] = np.clip(np.sqrt(squared), shortest, longest)
         return lengths
 
 
-def limits(length: Floats, most: Floats) -> tuple[Floats, Floats]:
+def length_limits(length: Floats, max_extension: Floats) -> tuple[Floats, Floats]:
     """The longest and shortest lengths of segments [m], by the same factor."""
-    longest = length + most
+    longest = length + max_extension
     return longest, length * (length / np.maximum(longest, TINY))

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..errors import HairloomError
-from .constraints import PINNED
+from .constraints import PINNED_COUNT
 from .groom_rotation import sample_around_mean
 from .hair_grid import HairGrid
 from .rigid_path import AT_REST, KnownSubstep, LastSubstep
@@ -132,7 +132,7 @@ def start(
         HairloomError: another shape, or a CV that is not finite.
     """
     position = rows_of(guide_grid, "guides")
-    if position.shape[1] < PINNED:
+    if position.shape[1] < PINNED_COUNT:
         raise HairloomError(
             "a guide needs at least two CVs", place="guides", remedy="Raise the CV count"
         )
@@ -146,7 +146,12 @@ def start(
         curl_slack=None if curl_slack is None else np.ascontiguousarray(curl_slack.T, np.float32),
         strands=strands,
     )
-    for array in (rest.length, rest.shape.curvature, rest.shape.hold, rest.shape.twist_cv):
+    for array in (
+        rest.length,
+        rest.shape.curvature,
+        rest.shape.turning_fraction,
+        rest.shape.twist_cv,
+    ):
         array.flags.writeable = False
     return DynamicsState(position, position, rest)
 

@@ -35,9 +35,9 @@ import numpy as np
 from ..arrays import Floats
 from .blend import visible_guides
 from .colliders import Pose, poses_through
-from .constraints import PINNED, pin
-from .contact_solver import Chain, Outside
-from .force_fields import along_strands, blow
+from .constraints import PINNED_COUNT, pin
+from .contact_solver import ContactSolver, LengthConstraints
+from .force_fields import apply_force_fields, strand_directions
 from .forces import apply_drag, predict
 from .frame import Block, Drive, Frame, check_drive, convert_styles, root_places_after
 from .neighbours import FrameSteps, run_alone
@@ -141,7 +141,7 @@ def _advance_block(
     """Position and previous position after these substeps; overwrites the arrays passed."""
     settings, rest, damping_factors = frame.settings, block.rest, block.damping_factors
     scratch = np.empty_like(position)
-    constraints = Chain(rest.length, block.held, rest.size, settings)
+    constraints = LengthConstraints(rest.length, block.held, rest.size, settings)
     max_exit = settings.depenetration_speed * rest.size * frame.dt
     passes = settings.contact_passes if frame.drive.colliders else 0
     moves_on_arc, style_before = block.style.carrier is not None, None
@@ -179,10 +179,10 @@ def _advance_block(
         restore_style(position, style, rest.shape, block.style_system)
         pin(position, style, rest.length, block.held)
         constraints.keep_lengths(position, None)
-        contact_solver = Outside(
+        contact_solver = ContactSolver(
             constraints, block.radius, block.segment_radius, poses[number], max_exit, passes
         )
-        contact_solver.keep(position, previous)
+        contact_solver.solve(position, previous)
     return position, previous
 
 
@@ -190,11 +190,13 @@ def _apply_force_fields(position: Floats, previous: Floats, frame: Frame) -> Non
     """Apply the force fields to each free CV; changes `previous`, which holds the speed."""
     fields = frame.force_fields
     assert fields is not None, "it is asked where there are any"
-    here, before = (np.ascontiguousarray(rows[:, PINNED:]) for rows in (position, previous))
-    directions = along_strands(position)[:, PINNED:].reshape(3, -1) if fields.is_across else None
+    here, before = (np.ascontiguousarray(rows[:, PINNED_COUNT:]) for rows in (position, previous))
+    directions = (
+        strand_directions(position)[:, PINNED_COUNT:].reshape(3, -1) if fields.acts_across else None
+    )
     flat = before.reshape(3, -1)
-    blow(here.reshape(3, -1), flat, fields, frame.dt, frame.size, directions)
-    previous[:, PINNED:] = before
+    apply_force_fields(here.reshape(3, -1), flat, fields, frame.dt, frame.size, directions)
+    previous[:, PINNED_COUNT:] = before
 
 
 def grid_at_frame_end(

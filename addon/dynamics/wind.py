@@ -31,33 +31,39 @@ class Air:
     """Moving air, or water.
 
     velocity: (3,) float32 mean [m/s], world.
-    swing: (modes, 3) float32 [m/s], amplitude of each mode across its wave vector.
-    wave: (modes, 3) float32 [1/m], wave vectors.
-    rate: (modes,) float64 [1/s], wave . velocity.
+    amplitude: (modes, 3) float32 [m/s], amplitude of each mode across its wave vector.
+    wave_vector: (modes, 3) float32 [1/m], wave vectors.
+    angular_frequency: (modes,) float64 [1/s], wave . velocity.
     phase: (modes,) float64 [rad].
     """
 
     velocity: Floats
-    swing: Floats
-    wave: Floats
-    rate: Floats
+    amplitude: Floats
+    wave_vector: Floats
+    angular_frequency: Floats
     phase: Floats
 
     def at(self, roots: Floats, time: float) -> Floats:
         """Velocity (3, n) float32 [m/s] at points (3, n) world [m], at a time [s]."""
         result = np.repeat(self.velocity[:, None], roots.shape[1], axis=1)
-        turns = np.mod(self.phase - self.rate * time, 2.0 * np.pi).astype(np.float32)
-        for swing, wave, turn in zip(self.swing, self.wave, turns, strict=True):
+        turns = np.mod(self.phase - self.angular_frequency * time, 2.0 * np.pi).astype(np.float32)
+        for swing, wave, turn in zip(self.amplitude, self.wave_vector, turns, strict=True):
             along = wave[0] * roots[0] + wave[1] * roots[1] + wave[2] * roots[2]
             result += swing[:, None] * sine(along + turn)
         return result
 
 
-def air_of(settings: MotionSettings) -> Air | None:
+def air_from_settings(settings: MotionSettings) -> Air | None:
     """The air of these settings; None if it stands still."""
-    rise, turn = settings.wind_elevation, settings.wind_direction
-    own = np.array([np.cos(rise) * np.cos(turn), np.cos(rise) * np.sin(turn), np.sin(rise)])
-    velocity = own * settings.wind_speed
+    elevation, azimuth = settings.wind_elevation, settings.wind_direction
+    direction = np.array(
+        [
+            np.cos(elevation) * np.cos(azimuth),
+            np.cos(elevation) * np.sin(azimuth),
+            np.sin(elevation),
+        ]
+    )
+    velocity = direction * settings.wind_speed
     speed = float(np.linalg.norm(velocity))
     if speed == 0.0:
         return None

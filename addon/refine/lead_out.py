@@ -34,7 +34,7 @@ from ..dynamics.colliders.signed_distance import (
     are_outside_meshes,
     distance_of_few,
     nearer_than,
-    poses_now,
+    poses_at_end,
 )
 from ..strands.vectors import even_directions, unit
 
@@ -282,7 +282,7 @@ def lead_out(
     Returns:
         The strands (n,) that are not where they ride, ascending; and how strands are bent.
     """
-    poses, kept = poses_now(colliders), clearance.kept
+    poses, kept = poses_at_end(colliders), clearance.kept
     held = _hold(points, carry, offsets, clearance)
     leaning = point_indices(leans.strands, offsets)
     upright = points[leaning]

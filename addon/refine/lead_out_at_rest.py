@@ -13,7 +13,7 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..dynamics.colliders import DistanceField, PosedCollider, signed_distance
-from ..dynamics.colliders.distance_field import UNCOVERED
+from ..dynamics.colliders.distance_field import MAX_UNCOVERED
 from ..dynamics.colliders.winding import winding_number
 from ..dynamics.settings import DynamicsSettings
 from ..strands import StrandSet
@@ -83,7 +83,7 @@ def _as_they_are(points: Floats, index: Ints, _: Ints) -> Floats:
 
 def _inside(points: Floats, head: DistanceField, distance: Floats, deep: float) -> Ints:
     """The points (n,) that are deeper than `deep` in the head's mesh, not only in its field."""
-    near = np.flatnonzero(distance < min(UNCOVERED * head.cell - deep, 0.0))
+    near = np.flatnonzero(distance < min(MAX_UNCOVERED * head.cell - deep, 0.0))
     if head.surface is None or not len(near):
         return near
     near = near[np.abs(winding_number(points[near], head.surface)) > 0.5]

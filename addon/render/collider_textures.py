@@ -24,8 +24,8 @@ from ..dynamics.colliders import (
     SphereCollider,
     SphereSetCollider,
 )
-from ..dynamics.colliders.posed import inverse_or, travels
-from ..dynamics.contacts import short_squared, spacing_of
+from ..dynamics.colliders.posed import inverse_or_fallback, travels
+from ..dynamics.contacts import max_untraced_squared, spacing_of
 from ..errors import HairloomError
 from .shader_source import COLLIDER_TEXELS, FIELD_ROW, ROUNDS_ACROSS, STRAND_ROWS
 from .textures import texture_from
@@ -149,7 +149,8 @@ class ColliderTextures:
         the change of its matrix in the substep; those of `shape_texels`; a sphere around all points
         within `reach` of it during the substep; three rows of its inverse matrix at the substep's
         begin; x the squared length up to which paths need not be followed (see
-        `contacts.short_squared`), y 1 where segments collide, z its smallest scale, w its swelling.
+        `contacts.max_untraced_squared`), y 1 where segments collide, z its smallest scale, w its
+        deformation.
 
         Args:
             spans: (substep_count, 2) begin and end of each substep as fractions of the frame.
@@ -166,16 +167,16 @@ class ColliderTextures:
             table[:, place, 8, 3] += reach + travel
             scales = np.linalg.svd(now[:, :3, :3], compute_uv=False)
             table[:, place, 9:12] = [
-                inverse_or(*pair)[:3] for pair in zip(before, now, strict=True)
+                inverse_or_fallback(*pair)[:3] for pair in zip(before, now, strict=True)
             ]
-            limit = scales[:, -1] * short_squared(one.collider.curve_radius, size)
+            limit = scales[:, -1] * max_untraced_squared(one.collider.curve_radius, size)
             sharp = spacing_of(size, cv_count) ** 2 > limit
             table[:, place, 12, 0] = np.where(
                 sharp | (travel * travel > limit), limit, UNLIMITED_PATH
             )
             table[:, place, 12, 1] = sharp
             table[:, place, 12, 2] = scales[:, -1]
-            table[:, place, 12, 3] = one.swelling
+            table[:, place, 12, 3] = one.deformation
         return table.reshape(len(spans), -1, 4)
 
     def _write_pose(self, table: Floats, place: int, now: Floats) -> None:

@@ -17,15 +17,15 @@ from functools import lru_cache
 import numpy as np
 
 from ..arrays import Floats
-from ..dynamics.constraints import PINNED, ROUNDING
-from ..dynamics.contacts import REACH, cv_radius
-from ..dynamics.force_fields import FARTHEST
+from ..dynamics.constraints import PINNED_COUNT, ROUNDING
+from ..dynamics.contacts import CONTACT_MARGIN, cv_radius
+from ..dynamics.force_fields import MAX_DISPLACEMENT
 from ..dynamics.frame import Frame
 from ..dynamics.painted import PaintedFrame
 from ..dynamics.rigid_path import NO_MOTION
 from ..dynamics.settings import DynamicsSettings
-from ..dynamics.springs import give, stiffness
-from ..dynamics.style import StyleBand, style_band
+from ..dynamics.springs import max_extension_fraction, stiffness
+from ..dynamics.style import StyleSystem, style_system
 from ..dynamics.trajectory import clamped_ratio
 from ..dynamics.wind import MODES
 from .shader_source import MOMENT_TEXELS
@@ -53,7 +53,7 @@ def moments_of(frame: Frame, first: int, spans: Floats) -> Floats:
         table[:, 0, 2:] = 0.0
     if frame.air is not None and len(frame.air.phase):
         time = frame.time + np.arange(first, first + len(spans)) * frame.dt
-        turns = np.mod(frame.air.phase - frame.air.rate * time[:, None], 2.0 * np.pi)
+        turns = np.mod(frame.air.phase - frame.air.angular_frequency * time[:, None], 2.0 * np.pi)
         table[:, 1:] = turns.reshape(len(spans), MOMENT_TEXELS - 1, 4)
     return table
 
@@ -114,12 +114,17 @@ def block_of(
         settings.friction,
         settings.depenetration_speed * frame.size * dt,
         speed_ratio,
-        REACH * frame.size,
+        CONTACT_MARGIN * frame.size,
     )
     vectors = values[_NUMBERS:].reshape(-1, 4)
     _fill_forces(vectors, frame)
     bounce = 1.0 / (stiffness(settings, cv_count) * dt * dt)
-    vectors[3] = give(settings), bounce, ROUNDING * frame.size, FARTHEST * frame.size
+    vectors[3] = (
+        max_extension_fraction(settings),
+        bounce,
+        ROUNDING * frame.size,
+        MAX_DISPLACEMENT * frame.size,
+    )
     values[_NUMBERS + 4 * _VECTORS :] = _cv_values(settings, cv_count, dt, frame.size)
     return values
 
@@ -136,34 +141,36 @@ def _fill_forces(vectors: Floats, frame: Frame) -> None:
         vectors[2, 3] = frame.force_fields.factor
     if air is not None:
         vectors[2, :3] = air.velocity
-        vectors[4 : 4 + len(air.swing), :3] = air.swing
-        vectors[4 + MODES : 4 + MODES + len(air.wave), :3] = air.wave
+        vectors[4 : 4 + len(air.amplitude), :3] = air.amplitude
+        vectors[4 + MODES : 4 + MODES + len(air.wave_vector), :3] = air.wave_vector
 
 
 @lru_cache(maxsize=8)
 def _cv_values(settings: DynamicsSettings, cv_count: int, dt: float, size: float) -> Floats:
     """`band` and `own` of the block, flat."""
     band, own = values = np.zeros((2, cv_count, 4), np.float32)
-    if cv_count > PINNED:
-        matrix = style_band(settings, cv_count, dt)
+    if cv_count > PINNED_COUNT:
+        matrix = style_system(settings, cv_count, dt)
         band[:], own[:, 0] = bands_of(matrix, cv_count, 1)[0], bends_of(matrix, cv_count, 1)[0]
-        own[PINNED:, 1] = cv_radius(settings, cv_count, size)
+        own[PINNED_COUNT:, 1] = cv_radius(settings, cv_count, size)
     return values.ravel()
 
 
-def bands_of(matrix: StyleBand, cv_count: int, guide_count: int) -> Floats:
+def bands_of(matrix: StyleSystem, cv_count: int, guide_count: int) -> Floats:
     """`band` of guides, (guide_count, cv_count, 4) float32."""
     bands = np.zeros((guide_count, cv_count, 4), np.float32)
     band = matrix.band
-    for lane, rows in enumerate((band.near, band.far, band.inverse_pivot, matrix.pull)):
-        bands[:, PINNED:, lane] = rows.T
+    for lane, rows in enumerate(
+        (band.lower_1, band.lower_2, band.inverse_pivot, matrix.global_stiffness)
+    ):
+        bands[:, PINNED_COUNT:, lane] = rows.T
     return bands
 
 
-def bends_of(matrix: StyleBand, cv_count: int, guide_count: int) -> Floats:
+def bends_of(matrix: StyleSystem, cv_count: int, guide_count: int) -> Floats:
     """`own.x` of guides, (guide_count, cv_count) float32."""
     bends = np.zeros((guide_count, cv_count), np.float32)
-    bends[:, 1:-1] = matrix.bend.T
+    bends[:, 1:-1] = matrix.local_stiffness.T
     return bends
 
 

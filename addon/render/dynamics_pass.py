@@ -18,7 +18,7 @@ strand_layout.strand_rows:
     clearances     RGBA32F: for each CV, see clearance.GuideClearance; only with colliders
     beside_root    RGBA32F: xyz [m], see step.remaining_displacement; this and held_cvs only where
                    CVs are held
-    painted_bands  RGBA32F: for each CV near and far factor, inverse pivot, pull (style.StyleBand)
+    painted_bands  RGBA32F: for each CV near and far factor, inverse pivot, pull (style.StyleSystem)
     painted_numbers   RGBA32F: for a guide's first CV x fraction of the speed that damping leaves, y
                    fraction of the air's speed, z and w factors on the style's motion and gravity;
                    for all others x bend; this and painted_bands only where something is painted
@@ -49,8 +49,8 @@ import numpy as np
 
 from ..arrays import Floats
 from ..dynamics.clearance import GuideClearance, max_clearance
-from ..dynamics.constraints import PINNED
-from ..dynamics.contacts import REACH
+from ..dynamics.constraints import PINNED_COUNT
+from ..dynamics.contacts import CONTACT_MARGIN
 from ..dynamics.frame import Drive, Frame, check_drive, root_places_after
 from ..dynamics.held import HeldCvs
 from ..dynamics.neighbours import FrameSteps, run_alone
@@ -127,18 +127,18 @@ def dynamics_recipe(
         "HAS_SPRINGS": springs,
         "HAS_PUSHES": pushed,
         "HAS_AIR": air,
-        "HAS_FORCE_FIELDS": force_fields and cv_count > PINNED,
+        "HAS_FORCE_FIELDS": force_fields and cv_count > PINNED_COUNT,
         "HAS_ROUNDS": rounds,
         "HAS_FIELDS": fields,
-        "HAS_FOLLOWED": followed and cv_count > PINNED,
-        "HAS_SHARP": sharp and cv_count > PINNED,
+        "HAS_FOLLOWED": followed and cv_count > PINNED_COUNT,
+        "HAS_SHARP": sharp and cv_count > PINNED_COUNT,
         "HAS_CLEARANCE": clearance,
         "IS_PAINTED": painted,
         "INHERITS": inherits,
     }
     textures = ["styles_earlier", "styles_before", "styles_now", "rest_shapes", "rest_lengths"]
     textures += ["moments", "carriers"] + ["held_cvs"] * held + ["curl_rooms"] * springs
-    textures += ["pushes"] * pushed + ["force_fields"] * (force_fields and cv_count > PINNED)
+    textures += ["pushes"] * pushed + ["force_fields"] * (force_fields and cv_count > PINNED_COUNT)
     textures += ["painted_bands", "painted_numbers"] * painted
     textures += ["rounds"] * rounds + ["fields"] * fields + ["clearances"] * clearance
     return ShaderRecipe(
@@ -154,7 +154,7 @@ def dynamics_recipe(
         group_size=(GROUP_SIZE,),
         defines=(
             ("CV_COUNT", cv_count),
-            ("CONTACT_SLOTS", min(collider_count, CONTACT_SLOTS) if cv_count > PINNED else 0),
+            ("CONTACT_SLOTS", min(collider_count, CONTACT_SLOTS) if cv_count > PINNED_COUNT else 0),
             *((name, 1) for name, is_set in flags.items() if is_set),
         ),
     )
@@ -327,7 +327,7 @@ class DynamicsPass:
         spans, is_followed, is_sharp = spans_of(frame, first, count), False, False
         table = moments_of(frame, first, spans)
         if posed:
-            reach = REACH * frame.size + max_clearance(settings, frame.size)
+            reach = CONTACT_MARGIN * frame.size + max_clearance(settings, frame.size)
             poses = colliders.moments(posed, spans, reach, frame.size, state.cv_count)
             limit, sharp = poses.reshape(len(spans), len(posed), -1, 4)[:, :, 12, :2].T
             is_followed, is_sharp = bool((limit < UNLIMITED_PATH).any()), bool(sharp.any())
@@ -418,7 +418,7 @@ def rest_shapes(rest: Rest) -> Floats:
     """`rest_shapes`, (guide_count, cv_count, 4)."""
     shapes = np.zeros((*rest.position.shape[:0:-1], 4), np.float32)
     shapes[:, 1:-1, :3] = rest.shape.curvature.transpose(2, 1, 0)
-    shapes[:, 1:-1, 3] = rest.shape.hold.T
+    shapes[:, 1:-1, 3] = rest.shape.turning_fraction.T
     shapes[:, 0, 0] = rest.shape.twist_cv
     return shapes
 

@@ -34,7 +34,7 @@ from hairloom.addon.dynamics.colliders import (  # noqa: E402
     SphereSetCollider,
     signed_distance,
 )
-from hairloom.addon.dynamics.colliders.bent_field import BentField  # noqa: E402
+from hairloom.addon.dynamics.colliders.deformed_field import DeformedField  # noqa: E402
 from hairloom.addon.dynamics.settings import DynamicsSettings  # noqa: E402
 from hairloom.addon.errors import HairloomError  # noqa: E402
 from hairloom.addon.rig_flow import MotionStart, Pose  # noqa: E402
@@ -61,7 +61,7 @@ def solids(mesh: Surface, bend: float) -> tuple[PosedCollider, ...]:
         field,
         SphereSetCollider(np.array([[-0.3, 0.0, 0.0], [-0.35, 0.0, 0.0]]), np.array([0.05, 0.06])),
     )
-    bent = BentField(field, mesh).at(shape.astype(np.float32))
+    bent = DeformedField(field, mesh).at(shape.astype(np.float32))
     return (
         *(PosedCollider(kind, np.eye(4), np.eye(4)) for kind in kinds),
         PosedCollider(bent, matrix, matrix),

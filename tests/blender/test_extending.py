@@ -22,7 +22,7 @@ USES = {
 import numpy as np
 from hairloom.addon.dynamics.colliders import PosedCollider
 from hairloom.addon.dynamics.colliders.box import BoxCollider
-from hairloom.addon.dynamics.reference.step import advance_slowly
+from hairloom.addon.dynamics.reference.step import advance_reference
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import start
 from hairloom.addon.dynamics.step import Drive, advance
@@ -37,7 +37,7 @@ drive = Drive(guides, guides, gravity=np.array([0.0, 0.0, -9.81]), colliders=col
 fast = slow = start(guides)
 for _ in range(10):
     fast = advance(fast, drive, settings, 1.0 / 24.0)
-    slow = advance_slowly(slow, drive, settings, 1.0 / 24.0)
+    slow = advance_reference(slow, drive, settings, 1.0 / 24.0)
 points = fast.grid.reshape(-1, 3).T
 facts["fell"] = float(guides[:, -1, 2].mean() - fast.grid[:, -1, 2].mean())
 facts["depth"] = float(-box.distance(points)[0].min())

@@ -11,7 +11,7 @@ from collider_scene import depsgraph
 from mathutils import noise
 
 from hairloom.addon.blender.scene.forces import force_fields_of, permutation
-from hairloom.addon.dynamics.force_fields import felt, perlin
+from hairloom.addon.dynamics.force_fields import field_effect, perlin
 
 sys.path.append(str(Path(__file__).parents[2] / "bench"))
 from _field_particles import CASES, error_of
@@ -40,7 +40,7 @@ def add(kind, **values):
 def push_at(owner, place=(0.0, 0.0, 0.5)):
     fields, _ = force_fields_of(owner, depsgraph())
     point = np.array(place, np.float32)[:, None]
-    return felt(fields, point, np.zeros_like(point)).push[:, 0]
+    return field_effect(fields, point, np.zeros_like(point)).push[:, 0]
 
 
 @pytest.mark.parametrize("case", CASES)

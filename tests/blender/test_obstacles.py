@@ -279,10 +279,10 @@ def test_the_head_is_followed_at_its_roots_where_the_body_bends(scene):
 
     by_roots = place(roots)
     np.testing.assert_allclose(by_roots.matrix_now, turn, atol=1e-5)
-    assert by_roots.swelling < 1e-5, "what is near the roots has kept its shape"
+    assert by_roots.deformation < 1e-5, "what is near the roots has kept its shape"
     by_all = place(None)
     assert np.abs(by_all.matrix_now - np.array(turn)).max() > 0.05
-    assert by_all.swelling > 0.05
+    assert by_all.deformation > 0.05
 
 
 def test_a_look_at_colliders_between_two_frames_changes_no_motion(scene):
@@ -290,15 +290,15 @@ def test_a_look_at_colliders_between_two_frames_changes_no_motion(scene):
     body, pose = long_body()
     scene.add(body)
     found = [scene.obstacles(), scene.obstacles()]
-    swellings = []
+    deformations = []
     for angle in (0.2, 0.4, 0.4):
         pose(Matrix.Rotation(angle, 4, "X"))
         found[0].standing(depsgraph())
         (looked,), (alone,) = map(move_obstacles, found)
         np.testing.assert_array_equal(looked.matrix_now, alone.matrix_now)
-        assert looked.swelling == alone.swelling
-        swellings.append(alone.swelling)
-    assert min(swellings[:2]) > 0.01 and swellings[2] == 0.0
+        assert looked.deformation == alone.deformation
+        deformations.append(alone.deformation)
+    assert min(deformations[:2]) > 0.01 and deformations[2] == 0.0
 
 
 # --- reuse

@@ -227,10 +227,10 @@ PERMUTATION = np.random.default_rng(3).permutation(256)
 _ABOVE = {"center": (0.05, -0.1, 0.35), "axis": (0.48, 0.6, 0.64)}
 #: Every kind, shape and falloff, each with a visible effect.
 FIELDS = (
-    ForceField("wind", **_ABOVE, strength=12.0, shape="plane", flow=1.0, across=1.0),
+    ForceField("wind", **_ABOVE, strength=12.0, shape="plane", flow=1.0, across_fraction=1.0),
     ForceField("wind", strength=-6.0, falloff="tube", radial=Falloff(0.5, 0.02, 0.3)),
     ForceField("force", **_ABOVE, strength=8.0, distance=Falloff(1.7, 0.1, 0.5), side=-1),
-    ForceField("force", **_ABOVE, strength=-0.3, is_inverse_square=True, across=0.5),
+    ForceField("force", **_ABOVE, strength=-0.3, is_inverse_square=True, across_fraction=0.5),
     ForceField(
         "force", strength=6.0, shape="points", place=(0.1, 0.1, 0.1), normal=(0.0, 0.6, 0.8)
     ),

@@ -28,7 +28,7 @@ from ...dynamics.colliders import (
     SphereCollider,
     SphereSetCollider,
 )
-from ...dynamics.colliders.bent_field import BentField
+from ...dynamics.colliders.deformed_field import DeformedField
 from ...dynamics.settings import DynamicsSettings
 from ...errors import HairloomError
 from ...rig_flow import MotionStart, Pose, Solids
@@ -190,7 +190,7 @@ class BakedSolids:
             return CapsuleCollider(rows[0, :3], rows[1, :3], float(rows[0, 3]))
         return SphereSetCollider(rows[:, :3], rows[:, 3])
 
-    def _bent(self, number: int, blocking: bool) -> BentField:
+    def _bent(self, number: int, blocking: bool) -> DeformedField:
         """The field of a mesh that may deform."""
         if number not in self._fields:
             named = (self.constants[f"mesh_{number}_{name}"] for name in ("positions", "triangles"))
@@ -199,11 +199,11 @@ class BakedSolids:
                 collider_resolution=int(self.constants["collider_resolution"])
             )
             field = field_of(surface, settings, place="bake", blocking=blocking)
-            self._fields[number] = BentField(field, surface)
+            self._fields[number] = DeformedField(field, surface)
         return self._fields[number]
 
     @cached_property
-    def _fields(self) -> dict[int, BentField]:
+    def _fields(self) -> dict[int, DeformedField]:
         return {}
 
 

@@ -17,7 +17,7 @@ from ...dynamics.colliders import (
     PosedCollider,
     SphereCollider,
 )
-from ...dynamics.colliders.bent_field import BentField
+from ...dynamics.colliders.deformed_field import DeformedField
 from ...dynamics.settings import DynamicsSettings
 from ...errors import HairloomError
 from ...strands import Surface
@@ -115,7 +115,7 @@ class FieldPart:
     warnings: dict[str, str] = field(default_factory=dict)
     _seen: _Seen | None = None
     _before: Floats | None = None
-    _bent: BentField | None = None
+    _bent: DeformedField | None = None
     _at: tuple[Floats, DistanceField] | None = None
 
     @classmethod
@@ -142,7 +142,7 @@ class FieldPart:
         local = transform_points(shape, np.linalg.inv(matrix)).astype(np.float32)
         self._seen = _Seen(local, mean_scale(matrix))
         if self._bent is None:
-            self._bent = BentField(self.distance, self.surface)
+            self._bent = DeformedField(self.distance, self.surface)
         if self._at is None or not np.array_equal(self._at[0], local):
             self._at = local, self._bent.at(local)
         return self._at[1], matrix

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import bpy
 
-from ...dynamics.figures import Measure
+from ...dynamics.figures import FiguresCollector
 from ...errors import HairloomError
 from ..bakes import baked_copy, playback
 from ..bakes.bake_settings import (
@@ -58,7 +58,7 @@ class _Part:
     writer: CacheWriter | None = None
     rig_hash: str = ""
     notes: tuple[str, ...] = ()
-    measure: Measure | None = None
+    measure: FiguresCollector | None = None
 
     def groom_in(self, frame: int) -> Session | None:
         """Its session, if it is a groom that has begun and this is one of its frames."""

@@ -11,9 +11,9 @@ from mathutils import noise
 
 from ...arrays import Floats, Ints
 from ...dynamics.force_fields import (
-    ENDLESS,
     GRADIENTS,
     NO_FIELDS,
+    NO_LIMIT,
     Falloff,
     ForceField,
     ForceFields,
@@ -113,20 +113,20 @@ def _read(obj: bpy.types.Object, field: bpy.types.FieldSettings, frame: int) -> 
         strength=_clamped(field.strength + _noise_of(field, frame)),
         shape=_SHAPES[field.shape],
         damping=_clamped(field.harmonic_damping),
-        size=min(field.size, ENDLESS),
+        size=min(field.size, NO_LIMIT),
         flow=0.0 if field.type in ("HARMONIC", "DRAG") else _clamped(field.flow),
-        across=field.wind_factor,
+        across_fraction=field.wind_factor,
         falloff=field.falloff_type.lower(),
         side={"BOTH": 0, "POSITIVE": 1, "NEGATIVE": -1}[field.z_direction],
         distance=Falloff(
             field.falloff_power,
             field.distance_min if field.use_min_distance else 0.0,
-            min(field.distance_max, ENDLESS) if field.use_max_distance else ENDLESS,
+            min(field.distance_max, NO_LIMIT) if field.use_max_distance else NO_LIMIT,
         ),
         radial=Falloff(
             field.radial_falloff,
             field.radial_min if field.use_radial_min else 0.0,
-            field.radial_max if field.use_radial_max else ENDLESS,
+            field.radial_max if field.use_radial_max else NO_LIMIT,
         ),
         is_inverse_square=field.use_gravity_falloff,
         is_global=field.use_global_coords,

@@ -35,7 +35,7 @@ class PlayStart:
             self.rig is other.rig
             and self.pose.is_same_as(other.pose)
             and len(self.colliders) == len(other.colliders)
-            and all(map(PosedCollider.stands_as, self.colliders, other.colliders))
+            and all(map(PosedCollider.is_same_at_end, self.colliders, other.colliders))
         )
 
     def motion(self) -> Motion:

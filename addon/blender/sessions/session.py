@@ -14,7 +14,7 @@ from ... import motion_flow
 from ...arrays import Floats
 from ...comb_flow import combed_rig
 from ...dynamics.colliders import PosedCollider
-from ...dynamics.figures import CardFigures, Figures, Measure
+from ...dynamics.figures import CardFigures, Figures, FiguresCollector
 from ...dynamics.neighbours import FrameSteps, KnownNeighbours, NeighbourStyle, run_alone
 from ...dynamics.settings import DynamicsSettings
 from ...dynamics.state import start
@@ -679,20 +679,24 @@ class Session:
         self.figures, self.are_figures_current = measure.figures, True
         self.card_figures = self.cards.figures(self._solids)
 
-    def new_measure(self) -> Measure:
+    def new_measure(self) -> FiguresCollector:
         """A measure for the frames since rest; the hair must be simulated."""
         assert self._motion_start is not None, "it is simulated"
         pose, posed, rig = self._motion_start.pose, self._motion_start.colliders, self.rig
         guides = start(motion_flow.carried_guides(rig, pose), rig.curl_slack)
-        return Measure(guides, motion_flow.carried_strands(rig, pose), rig.strands.offsets, posed)
+        return FiguresCollector(
+            guides, motion_flow.carried_strands(rig, pose), rig.strands.offsets, posed
+        )
 
-    def measure_into(self, measure: Measure) -> None:
+    def measure_into(self, measure: FiguresCollector) -> None:
         """Add the present frame to a measure; reads strands back from a GPU."""
         guides, rig = self.solver.guides(), self.rig
         if self._styled_rig is not None:
             style = motion_flow.carried_guides(rig, self.solver.pose)
-            measure.take_style(start(style, rig.curl_slack))
-        measure.add(self.solver.strands(), self._rest_lengths(), guides, self._posed_colliders)
+            measure.set_style(start(style, rig.curl_slack))
+        measure.add_frame(
+            self.solver.strands(), self._rest_lengths(), guides, self._posed_colliders
+        )
 
     def _rest_lengths(self) -> Floats:
         """Lengths of all strands in their style."""

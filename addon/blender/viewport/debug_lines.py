@@ -18,9 +18,9 @@ from ...dynamics.colliders import (
     SphereCollider,
     SphereSetCollider,
 )
-from ...dynamics.force_fields import ForceFields, felt
+from ...dynamics.force_fields import ForceFields, field_effect
 from ...dynamics.settings import DynamicsSettings
-from ...dynamics.wind import Air, air_of
+from ...dynamics.wind import Air, air_from_settings
 from ...motion_flow import carried_guides, root_turns
 from ...render import gpu_objects
 from ...rig_flow import root_normals
@@ -94,7 +94,7 @@ def debug_lines_of(
         "colliders": lambda: collider_lines(session, depsgraph),
         "wind": lambda: np.concatenate(
             [
-                wind_lines(air_of(session.settings[DynamicsSettings]), *points),
+                wind_lines(air_from_settings(session.settings[DynamicsSettings]), *points),
                 field_lines(session, force_fields_of(hair, depsgraph)[0], points[1]),
             ]
         ),
@@ -175,13 +175,13 @@ def wind_lines(air: Air | None, center: Floats, radius: float) -> Floats:
 
 def field_lines(session: Session, fields: ForceFields, radius: float) -> Floats:
     """Lines from points of some guides in the direction of the force fields there, (2n, 3)."""
-    acting = fields.by(session.settings[DynamicsSettings].force_fields)
+    acting = fields.scaled(session.settings[DynamicsSettings].force_fields)
     if acting is None:
         return np.zeros((0, 3))
     grid = carried_guides(session.rig, session.solver.pose)
     every = max(len(grid) // _FIELD_GUIDES, 1)
     points = grid[::every, :: max(grid.shape[1] // 3, 1)].reshape(-1, 3).astype(np.float32)
-    push = felt(acting, np.ascontiguousarray(points.T), np.zeros_like(points.T)).push.T
+    push = field_effect(acting, np.ascontiguousarray(points.T), np.zeros_like(points.T)).push.T
     strength = np.linalg.norm(push, axis=1, keepdims=True)
     scale = 2.0 * radius / np.maximum(strength, _BRISK)  # limits the length of strong ones
     return np.stack([points, points + push * scale], axis=1).reshape(-1, 3)

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...arrays import Bools, Floats, Ints
 from ...dynamics.colliders import signed_distance
-from ...dynamics.contacts import radius_of_all
+from ...dynamics.contacts import all_cv_radii
 from ...dynamics.groom_rotation import fit_rotation, sample_guides
 from ...dynamics.hair_grid import GRID_OFFSET
 from ...dynamics.settings import DynamicsSettings
@@ -69,7 +69,7 @@ def contact_lines(session: Session) -> Colored:
     settings, guides = session.settings[DynamicsSettings], session.solver.guides()
     count, cv_count, _ = guides.shape
     size = session.solver.motion.dynamics.rest.size
-    radius = radius_of_all(settings, cv_count, count, size).reshape(cv_count, count).T
+    radius = all_cv_radii(settings, cv_count, count, size).reshape(cv_count, count).T
     reach = max(float(radius.max(initial=0.0)) * _NEAR, 1.0e-6)
     found = signed_distance(guides.reshape(-1, 3), session.posed_colliders, reach)
     distance, outward = found[0].reshape(count, cv_count), found[1].reshape(guides.shape)

@@ -10,7 +10,7 @@ from ..rigid_path import CarriedPath, Carrier
 from .state import Fabric, vertex_rows
 
 #: Approximate number of pinned vertices from which the cloth's rotation is computed.
-TURNED_BY = 256
+MAX_ROTATION_VERTICES = 256
 
 
 def pinned_path(fabric: Fabric, drive: Drive, origin: Floats) -> CarriedPath:
@@ -23,7 +23,7 @@ def pinned_path(fabric: Fabric, drive: Drive, origin: Floats) -> CarriedPath:
         for target in (drive.target_before, drive.target_now, drive.target_earlier)
     ]
     pinned = np.flatnonzero(fabric.pinned)
-    pinned = pinned[:: max(len(pinned) // TURNED_BY, 1)]
+    pinned = pinned[:: max(len(pinned) // MAX_ROTATION_VERTICES, 1)]
     before, now, earlier = (None if one is None else one[:, pinned] for one in rows)
     assert before is not None and now is not None
     carrier = Carrier.through(before, now, earlier, drive.earlier_ratio)

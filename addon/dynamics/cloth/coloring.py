@@ -13,15 +13,15 @@ import numpy as np
 from ...arrays import Floats, Ints
 
 
-def unique_edges(triangles: Ints, more: Ints | None = None) -> Ints:
+def unique_edges(triangles: Ints, extra_edges: Ints | None = None) -> Ints:
     """Each edge once, (edge_count, 2) int64 with the lower vertex first, in ascending order.
 
     Args:
         triangles: (triangle_count, 3).
-        more: (n, 2) edges that belong to no triangle.
+        extra_edges: (n, 2) edges that belong to no triangle.
     """
     sides = [triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]
-    return _unique_pairs(np.concatenate(sides if more is None else [*sides, more]))
+    return _unique_pairs(np.concatenate(sides if extra_edges is None else [*sides, extra_edges]))
 
 
 def opposite_pairs(triangles: Ints) -> Ints:
@@ -45,13 +45,13 @@ def opposite_pairs(triangles: Ints) -> Ints:
 
 def greedy_colors(pairs: Ints) -> Ints:
     """A colour for each pair (n, 2), the lowest that is free at both vertices, (n,)."""
-    taken: dict[int, int] = {}  # vertex -> its colours as bits
+    used_colors: dict[int, int] = {}  # vertex -> its colours as bits
     colors = np.empty(len(pairs), np.int64)
     for number, (one, other) in enumerate(pairs.tolist()):
-        used = taken.get(one, 0) | taken.get(other, 0)
+        used = used_colors.get(one, 0) | used_colors.get(other, 0)
         free = ~used & (used + 1)
-        taken[one] = taken.get(one, 0) | free
-        taken[other] = taken.get(other, 0) | free
+        used_colors[one] = used_colors.get(one, 0) | free
+        used_colors[other] = used_colors.get(other, 0) | free
         colors[number] = free.bit_length() - 1
     return colors
 

@@ -16,7 +16,7 @@ from .settings import FinSettings
 from .state import Color, Fabric
 
 #: Gravity [m/s^2] times height [m] of the hanging sheet that defines the `stretch` parameter.
-_HANGING = 9.81 * 1.0
+_GRAVITY_TIMES_HEIGHT = 9.81 * 1.0
 
 
 def keep_distances(position: Floats, color: Color, fraction: Floats) -> None:
@@ -58,7 +58,7 @@ def hold_in_reach(position: Floats, fabric: Fabric) -> None:
     np.add(anchor, displacement, out=position)
 
 
-def pull_of(fabric: Fabric, settings: FinSettings, small: float) -> Floats:
+def animation_springs(fabric: Fabric, settings: FinSettings, small_step: float) -> Floats:
     """Springs to where the animation carries the vertices, (n,), k / m times the step squared.
 
     The sum of the shape's spring and the pin's. The frequency of the latter is that of a pin weight
@@ -67,12 +67,12 @@ def pull_of(fabric: Fabric, settings: FinSettings, small: float) -> Floats:
     loose = np.where(fabric.pinned, 0.0, fabric.pin.astype(np.float64))
     swings = settings.pin_pull * loose / (1.0 - loose)
     spring = (2.0 * math.pi) ** 2 * (swings**2 + settings.shape**2)
-    pull: Floats = np.where(fabric.pinned, 0.0, spring * small**2).astype(np.float32)
+    pull: Floats = np.where(fabric.pinned, 0.0, spring * small_step**2).astype(np.float32)
     return pull
 
 
 def edge_fractions(
-    fabric: Fabric, mobility: Floats, settings: FinSettings, small: float
+    fabric: Fabric, mobility: Floats, settings: FinSettings, small_step: float
 ) -> tuple[Floats, ...]:
     """The fractions of edges for `keep_distances` in a small step [s].
 
@@ -82,7 +82,7 @@ def edge_fractions(
     Args:
         mobility: (n,) inverse masses.
     """
-    softness = settings.stretch / _HANGING / small**2
+    softness = settings.stretch / _GRAVITY_TIMES_HEIGHT / small_step**2
     return tuple(_fractions(edge, mobility, edge.length**2 * softness) for edge in fabric.edges)
 
 

@@ -23,13 +23,13 @@ class MovingPlanes:
     """Planes of one collider that move through a substep, m of them.
 
     contacts: the planes at the substep's end.
-    begin: (m,) [m], their offsets at its begin: where the collider was or, for a vertex inside it,
-        where the vertex was.
+    begin_offset: (m,) [m], their offsets at its begin_offset: where the collider was or, for a
+        vertex inside it, where the vertex was.
     displacement: (3, m) [m], of the collider at each vertex.
     """
 
     contacts: Contacts
-    begin: Floats
+    begin_offset: Floats
     displacement: Floats
 
     @classmethod
@@ -42,7 +42,7 @@ class MovingPlanes:
         begin = contacts.offset - dot_rows(contacts.normal, displacement)
         return cls(contacts, np.minimum(begin, dot_rows(contacts.normal, here)), displacement)
 
-    def press(
+    def push_out(
         self, position: Floats, previous: Floats, number: int, steps: int, friction: float
     ) -> None:
         """Push vertices out in small step `number` of `steps`, in place, without bouncing."""
@@ -52,35 +52,35 @@ class MovingPlanes:
         origin += self.displacement * np.float32(1.0 / steps)
         now = replace(
             known,
-            offset=self.begin + (known.offset - self.begin) * fraction,
+            offset=self.begin_offset + (known.offset - self.begin_offset) * fraction,
             origin=origin,
-            push=np.zeros_like(self.begin),
+            push=np.zeros_like(self.begin_offset),
         )
         now.push_out(position, friction)
         now.absorb(position, previous)
 
 
-def planes_ahead(
+def find_moving_planes(
     position: Floats,
     previous: Floats,
-    fall: Floats,
+    gravity_step: Floats,
     steps: int,
     radius: Floats,
     poses: list[Pose],
-    led_out: float,
+    max_exit: float,
     size: float,
 ) -> list[MovingPlanes]:
     """Planes near where the substep of `steps` small ones would lead.
 
     Args:
         position, previous: (3, n) world [m], one small step apart.
-        fall: (3, 1) [m], displacement by gravity in a small step.
-        radius, poses, led_out, size: see `find_contacts`.
+        gravity_step: (3, 1) [m], displacement by gravity in a small step.
+        radius, poses, max_exit, size: see `find_contacts`.
     """
     ahead = (position - previous) * np.float32(steps)
     ahead += position
-    ahead += fall * np.float32(steps * (steps + 1) / 2)
-    found = find_contacts(ahead, position, radius, poses, led_out, size)
+    ahead += gravity_step * np.float32(steps * (steps + 1) / 2)
+    found = find_contacts(ahead, position, radius, poses, max_exit, size)
     return [MovingPlanes.of(one, position) for one in found]
 
 
@@ -111,7 +111,7 @@ def push_out_at_end(
     previous += unbounced * np.float32(fraction)
 
 
-def seen_from(origin: Floats, posed: PosedCollider) -> PosedCollider:
+def relative_to_origin(origin: Floats, posed: PosedCollider) -> PosedCollider:
     """A collider moved so that `origin` (3, 1) world [m] becomes the origin."""
     back = np.eye(4)
     back[:3, 3:] = -origin

@@ -12,18 +12,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...arrays import Floats, Ints
-from ..contacts import REACH
+from ..contacts import CONTACT_MARGIN
 from ..force_fields import ForceFields
-from ..reference.force_fields import blown_slowly
+from ..reference.force_fields import previous_after_fields
 from ..step import Drive
-from ..wind import air_of
+from ..wind import air_from_settings
 from .carried import pinned_path
 from .coloring import greedy_colors, opposite_pairs
 from .settings import FinSettings
-from .state import PINNED_FROM, ClothState
+from .state import PINNED_WEIGHT, ClothState
 
 
-def advance_cloth_slowly(
+def advance_cloth_reference(
     state: ClothState, drive: Drive, settings: FinSettings, duration: float
 ) -> ClothState:
     """Reference of `cloth.step.advance_cloth`; see there."""
@@ -67,19 +67,19 @@ class _Cloth:
             self.previous = [
                 x - (x - p) * ratio for x, p in zip(self.x, self.previous, strict=True)
             ]
-        self.pinned = [bool(weight >= PINNED_FROM) for weight in fabric.pin]
+        self.pinned = [bool(weight >= PINNED_WEIGHT) for weight in fabric.pin]
         folds = opposite_pairs(fabric.triangles)
         folds = folds[[not (self.pinned[a] and self.pinned[b]) for a, b in folds]]
         self.edges, self.folds = _in_order(fabric.pairs), _in_order(folds)
         weight = settings.gravity * (1.0 - settings.buoyancy)
         self.gravity = np.asarray(drive.gravity, np.float64) * weight
-        self.air = air_of(settings)
+        self.air = air_from_settings(settings)
 
     def substep(self, begin: float, end: float, time: float) -> None:
         settings = self.settings
         if settings.damping or settings.drag:
             self._feel_air(time)
-        fields = self.drive.force_fields.by(settings.force_fields)
+        fields = self.drive.force_fields.scaled(settings.force_fields)
         if fields is not None:
             self._feel_force_fields(fields)
         if settings.bend:
@@ -123,7 +123,7 @@ class _Cloth:
     def _feel_force_fields(self, fields: ForceFields) -> None:
         ratio, x = self.dt / self.small, np.array(self.x)
         before = x - (x - np.array(self.previous)) * ratio
-        blown = blown_slowly(x, before, fields, self.dt, self.fabric.size, is_strand=False)
+        blown = previous_after_fields(x, before, fields, self.dt, self.fabric.size, is_strand=False)
         change = (blown - before) / ratio
         self.previous = [p + one for p, one in zip(self.previous, change, strict=True)]
 
@@ -189,7 +189,7 @@ class _Cloth:
                 outward = inverse[:3, :3].T @ gradient[:, 0]
                 steepness = float(np.linalg.norm(outward))
                 normal, distance = outward / steepness, float(found[0]) / steepness
-                if self.pinned[v] or distance >= radius + REACH * size:
+                if self.pinned[v] or distance >= radius + CONTACT_MARGIN * size:
                     continue
                 displacement = ((new - old) @ local)[:3]
                 reached = distance - normal @ (x[v] - before[v] - displacement)

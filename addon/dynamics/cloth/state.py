@@ -22,7 +22,7 @@ from ...strands.vectors import cross_rows, unit_rows
 from .coloring import distances_along_edges, greedy_colors, opposite_pairs, unique_edges
 
 #: From this pin weight on a vertex has infinite mass; not 1, as Blender's weights are rounded.
-PINNED_FROM = 0.9999
+PINNED_WEIGHT = 0.9999
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class Fabric:
     @property
     def pinned(self) -> Bools:
         """(vertex_count,) which vertices have infinite mass."""
-        return self.pin >= PINNED_FROM
+        return self.pin >= PINNED_WEIGHT
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ def start_cloth(
     pairs = unique_edges(triangles, None if edges is None else _indices(edges, 2, count))
     pin = _pin_weights(pin, count).copy()
     pin[np.setdiff1d(np.arange(count), pairs)] = 1.0
-    pinned = pin >= PINNED_FROM
+    pinned = pin >= PINNED_WEIGHT
 
     length = distances(position, pairs)
     distance, nearest = distances_along_edges(pairs, length, np.flatnonzero(pinned), count)
@@ -183,17 +183,17 @@ def vertex_normals(position: Floats, triangles: Ints) -> Floats:
     cosine = -np.einsum("ijk,ijk->jk", side, side[:, [2, 0, 1]])
     angle = np.arccos(np.clip(cosine, -1.0, 1.0))
     face = unit_rows(cross_rows(side[:, 0], side[:, 1]))
-    return unit_rows(_gathered(face[:, None] * angle, triangles, position))
+    return unit_rows(_summed_at_vertices(face[:, None] * angle, triangles, position))
 
 
-def broadside_normals(position: Floats, triangles: Ints) -> Floats:
+def area_weighted_normals(position: Floats, triangles: Ints) -> Floats:
     """Unit normals (3, vertex_count) float32, weighted by the area of faces, for drag."""
     corner = position[:, triangles.T]
     area = cross_rows(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    return unit_rows(_gathered(np.repeat(area[:, None], 3, axis=1), triangles, position))
+    return unit_rows(_summed_at_vertices(np.repeat(area[:, None], 3, axis=1), triangles, position))
 
 
-def _gathered(corners: Floats, triangles: Ints, position: Floats) -> Floats:
+def _summed_at_vertices(corners: Floats, triangles: Ints, position: Floats) -> Floats:
     """The sum of corner values (3, corner, triangle) at each vertex."""
     index, total = triangles.T.reshape(-1), np.empty_like(position)
     for row, out in zip(corners.reshape(3, -1), total, strict=True):

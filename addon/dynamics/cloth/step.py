@@ -35,16 +35,22 @@ from ...errors import HairloomError
 from ...strands.vectors import dot_rows
 from ..colliders import PosedCollider, poses_through
 from ..contacts import find_contacts
-from ..force_fields import ForceFields, blow
+from ..force_fields import ForceFields, apply_force_fields
 from ..rigid_path import CarriedPath
 from ..schedule import due_substeps
 from ..step import Drive
-from ..wind import Air, air_of
+from ..wind import Air, air_from_settings
 from .carried import pinned_path
-from .constraints import edge_fractions, fold_fractions, hold_in_reach, keep_distances, pull_of
-from .contacts import MovingPlanes, planes_ahead, push_out_at_end, seen_from
+from .constraints import (
+    animation_springs,
+    edge_fractions,
+    fold_fractions,
+    hold_in_reach,
+    keep_distances,
+)
+from .contacts import MovingPlanes, find_moving_planes, push_out_at_end, relative_to_origin
 from .settings import FinSettings
-from .state import ClothState, Fabric, broadside_normals, vertex_rows
+from .state import ClothState, Fabric, area_weighted_normals, vertex_rows
 
 
 @dataclass(frozen=True)
@@ -62,14 +68,16 @@ class _Frame:
     air: Air | None
     force_fields: ForceFields | None  # None if none acts
     dt: float
-    small: float  # [s] of a small step
-    pull: Floats  # (n,) of the spring to where a vertex is carried, times small^2; 0 for the pinned
+    small_step: float  # [s] of a small step
+    animation_springs: (
+        Floats  # (n,) of the spring to where a vertex is carried, times small^2; 0 for the pinned
+    )
     mobility: Floats  # (n,) inverse mass with that spring, 0 for the pinned
     edge_fractions: tuple[Floats, ...]
     fold_fractions: tuple[Floats, ...]
     radius: Floats  # (n,) [m]
 
-    def carried(self, moment: float, chosen: Ints | slice) -> Floats:
+    def carried_vertices(self, moment: float, chosen: Ints | slice) -> Floats:
         return self.path.part(chosen).at(moment)
 
 
@@ -91,8 +99,10 @@ def advance_cloth(
     frame = _prepare(state, drive, settings, dt)
     position = (state.position - frame.origin).astype(np.float32)
     previous = (state.previous - frame.origin).astype(np.float32)
-    if state.small_step and state.small_step != frame.small:
-        previous = position - (position - previous) * np.float32(frame.small / state.small_step)
+    if state.small_step and state.small_step != frame.small_step:
+        previous = position - (position - previous) * np.float32(
+            frame.small_step / state.small_step
+        )
     for number in range(count):
         begin = (number * dt - state.time_left) / duration
         span = (begin, begin + dt / duration)
@@ -104,7 +114,7 @@ def advance_cloth(
         position + frame.origin,
         previous + frame.origin,
         state.fabric,
-        frame.small,
+        frame.small_step,
         left,
         state.time + count * dt,
     )
@@ -145,13 +155,13 @@ def _feel_air(
     if frame.air is not None:
         air_displacement = frame.air.at(
             position + frame.origin.astype(np.float32), time
-        ) * np.float32(frame.small)
+        ) * np.float32(frame.small_step)
         displacement -= air_displacement
-    normal = broadside_normals(position, fabric.triangles)
+    normal = area_weighted_normals(position, fabric.triangles)
     across = dot_rows(normal, displacement)
     broadside = normal * across
     displacement -= broadside
-    per_step = np.float32(settings.drag * frame.dt / frame.small)
+    per_step = np.float32(settings.drag * frame.dt / frame.small_step)
     along = np.sqrt(dot_rows(displacement, displacement))
     broadside *= math.exp(-settings.damping * frame.dt) / (1.0 + per_step * np.abs(across))
     slip = np.float32(settings.edgewise)
@@ -168,11 +178,11 @@ def _feel_force_fields(position: Floats, previous: Floats, frame: _Frame, size: 
     """Apply the scene's force fields in a substep; changes `previous`."""
     if frame.force_fields is None:
         return
-    ratio, origin = np.float32(frame.dt / frame.small), frame.origin.astype(np.float32)
+    ratio, origin = np.float32(frame.dt / frame.small_step), frame.origin.astype(np.float32)
     here = position + origin
     before = here - (position - previous) * ratio
     felt = before.copy()
-    blow(here, felt, frame.force_fields, frame.dt, size)
+    apply_force_fields(here, felt, frame.force_fields, frame.dt, size)
     felt -= before
     felt /= ratio
     previous += felt
@@ -184,12 +194,12 @@ def _hold_folds(
     """Bending, solved for where the substep would lead; changes `previous`."""
     if not settings.bend:
         return
-    ahead = position + (position - previous) * np.float32(frame.dt / frame.small)
+    ahead = position + (position - previous) * np.float32(frame.dt / frame.small_step)
     held = ahead.copy()
     for fold, fraction in zip(fabric.folds, frame.fold_fractions, strict=True):
         keep_distances(held, fold, fraction)
     held -= ahead
-    held *= np.float32(frame.small / frame.dt)
+    held *= np.float32(frame.small_step / frame.dt)
     previous -= held
 
 
@@ -203,30 +213,36 @@ def _substep(
 ) -> tuple[Floats, Floats]:
     """Motion with edges and contacts; the new position and that one small step earlier."""
     steps, size = settings.small_steps, fabric.size
-    led_out = settings.depenetration_speed * size * frame.dt
-    fall, radius = frame.gravity * np.float32(frame.small**2), frame.radius
+    max_exit = settings.depenetration_speed * size * frame.dt
+    gravity_step, radius = frame.gravity * np.float32(frame.small_step**2), frame.radius
     poses = poses_through(frame.colliders, [span])[0] if fabric.pairs.size else []
     planes: list[MovingPlanes] = []
     if poses:
-        planes = planes_ahead(position, previous, fall, steps, radius, poses, led_out, size)
-    before, spare, displacement = position.copy(), np.empty_like(position), np.empty_like(position)
-    pinned, is_pulled = np.flatnonzero(fabric.pinned), bool(frame.pull.any())
+        planes = find_moving_planes(
+            position, previous, gravity_step, steps, radius, poses, max_exit, size
+        )
+    before, scratch, displacement = (
+        position.copy(),
+        np.empty_like(position),
+        np.empty_like(position),
+    )
+    pinned, is_pulled = np.flatnonzero(fabric.pinned), bool(frame.animation_springs.any())
     for number in range(steps):
         moment = span[0] + (span[1] - span[0]) * (number + 1) / steps
-        np.subtract(position, previous, out=spare)
-        spare += position
-        spare += fall
-        previous, position, spare = position, spare, previous
-        position[:, pinned] = frame.carried(moment, pinned)
+        np.subtract(position, previous, out=scratch)
+        scratch += position
+        scratch += gravity_step
+        previous, position, scratch = position, scratch, previous
+        position[:, pinned] = frame.carried_vertices(moment, pinned)
         if is_pulled:
-            np.subtract(frame.carried(moment, slice(None)), position, out=displacement)
-            displacement *= frame.pull * frame.mobility
+            np.subtract(frame.carried_vertices(moment, slice(None)), position, out=displacement)
+            displacement *= frame.animation_springs * frame.mobility
             position += displacement
         _keep_edges(position, fabric, frame, settings)
         for one in planes:
-            one.press(position, previous, number, steps, settings.friction)
+            one.push_out(position, previous, number, steps, settings.friction)
     if poses:
-        contacts = find_contacts(position, before, radius, poses, led_out, size)
+        contacts = find_contacts(position, before, radius, poses, max_exit, size)
         if contacts:
             push_out_at_end(position, previous, before, contacts, settings.friction, 1.0 / steps)
     return position, previous
@@ -253,22 +269,22 @@ def _prepare(state: ClothState, drive: Drive, settings: FinSettings, dt: float) 
         raise HairloomError(
             "gravity is not three finite numbers", place="fin", remedy="Check the scene's gravity"
         )
-    fabric, small = state.fabric, dt / settings.small_steps
-    pull = pull_of(fabric, settings, small)
-    mobility = np.where(fabric.pinned, 0.0, 1.0 / (1.0 + pull)).astype(np.float32)
+    fabric, small_step = state.fabric, dt / settings.small_steps
+    springs = animation_springs(fabric, settings, small_step)
+    mobility = np.where(fabric.pinned, 0.0, 1.0 / (1.0 + springs)).astype(np.float32)
     origin = state.position.mean(axis=1, keepdims=True)
     return _Frame(
         origin=origin,
         path=pinned_path(fabric, drive, origin),
-        colliders=tuple(seen_from(origin, posed) for posed in drive.colliders),
+        colliders=tuple(relative_to_origin(origin, posed) for posed in drive.colliders),
         gravity=(gravity * np.float32(settings.gravity * (1.0 - settings.buoyancy)))[:, None],
-        air=air_of(settings),
-        force_fields=drive.force_fields.by(settings.force_fields),
+        air=air_from_settings(settings),
+        force_fields=drive.force_fields.scaled(settings.force_fields),
         dt=dt,
-        small=small,
-        pull=pull,
+        small_step=small_step,
+        animation_springs=springs,
         mobility=mobility,
-        edge_fractions=edge_fractions(fabric, mobility, settings, small),
+        edge_fractions=edge_fractions(fabric, mobility, settings, small_step),
         fold_fractions=fold_fractions(fabric, settings, dt),
         radius=np.where(fabric.pinned, -np.inf, settings.radius * fabric.size).astype(np.float32),
     )

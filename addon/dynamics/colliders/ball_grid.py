@@ -30,18 +30,18 @@ class BallGrid:
     """The balls that may be nearest to a point of each cell.
 
     low: (3,) float32 [m], corner of cell (0, 0, 0). cell: edge [m]. shape: (3,) cells.
-    nearest: (cell_count,) float32 [m], lower limit of the distance of the cell's points.
-    row, begin: (cell_count,) and (cell_count + 1,); the balls of cell c are
+    min_distance: (cell_count,) float32 [m], lower limit of the distance of the cell's points.
+    cell_row, row_begin: (cell_count,) and (cell_count + 1,); the balls of cell c are
         ball[begin[row[c]]:begin[row[c] + 1]].
     """
 
     low: Floats
     cell: float
     shape: Ints
-    nearest: Floats
-    row: Ints
-    begin: Ints
-    ball: Ints
+    min_distance: Floats
+    cell_row: Ints
+    row_begin: Ints
+    ball_index: Ints
 
 
 def ball_grid(centers: Floats, radii: Floats) -> BallGrid:
@@ -64,12 +64,12 @@ def ball_grid(centers: Floats, radii: Floats) -> BallGrid:
         which, ball = _may_be_nearest(corner + np.float32(cell * BLOCK / 2), centers, radii, half)
         distance = _pair_distances(corner[:, which], offset, centers[ball], radii[ball])
         first = np.flatnonzero(np.diff(which, prepend=-1))
-        least = np.minimum.reduceat(distance, first, axis=1)
-        is_near = distance <= (least + 2.0 * half)[:, which]
+        min_distance = np.minimum.reduceat(distance, first, axis=1)
+        is_near = distance <= (min_distance + 2.0 * half)[:, which]
         counts.append(np.add.reduceat(is_near, first, axis=1, dtype=np.int64).ravel())
         balls.append(ball[np.nonzero(is_near)[1]])
         cells = (steps @ inside)[:, None] + steps @ part
-        nearest[cells] = least - half
+        nearest[cells] = min_distance - half
         row[cells] = done + np.arange(cells.size).reshape(cells.shape)
         done += cells.size
     begin = np.concatenate([[0], np.cumsum(np.concatenate(counts))])

@@ -9,7 +9,7 @@ than one cell, and at one of each STRIDE^3 others, whose neighbours are on the s
 nodes take the sign of their predecessor along the rows.
 
 No part of the surface lies outside of the interpolated one by more than a twentieth of a cell, see
-`covering`: hair that stays out of the field stays out of the mesh.
+`cover_points`: hair that stays out of the field stays out of the mesh.
 
 Error of the interpolation: zero where the distance is linear; near edges and corners, and where the
 medial axis crosses the cell, below half a cell's diagonal, in practice a tenth of a cell.
@@ -32,13 +32,13 @@ from .winding import winding_number
 #: Cells around the mesh's box, so that the surroundings of the surface are sampled too.
 MARGIN = 2
 #: Distances of up to this many cells are exact; hair touches the surface within one.
-EXACT = 6.0
+EXACT_CELLS = 6.0
 #: Farther away, one node in this many along each axis is exact, and the others are interpolated.
 STRIDE = 3
 #: If the winding number at a block's middle is this close to one half, other nodes are evaluated.
-UNSURE = 0.35
+AMBIGUOUS_WINDING = 0.35
 #: How far a part of the surface may lie outside of the interpolated one, in cells.
-UNCOVERED = 0.05
+MAX_UNCOVERED = 0.05
 #: Number of nodes around the closure of an opening whose distances take it into account.
 CLOSURE_REACH = 16
 #: Spacing of the nodes that measure the surface's curvature, in cells.
@@ -101,7 +101,7 @@ class DistanceField:
                 "Close its holes, or raise the collider resolution",
             )
         values = with_closures(np.where(inside, -distance, distance), cell)
-        values = covering(values, low, cell, points_on(surface, cell / 2.0))
+        values = cover_points(values, low, cell, sample_surface(surface, cell / 2.0))
         return cls(values, low, cell, surface)
 
     @cached_property
@@ -119,20 +119,20 @@ class DistanceField:
     @cached_property
     def curve_radius(self) -> float:
         """See `Collider`; from how far the surface bulges between nodes 2 STEP cells apart."""
-        values, most = self.values, 0.0
+        values, max_bulge = self.values, 0.0
         for axis in range(3):
             along = np.moveaxis(values, axis, 0)
             middle = along[STEP:-STEP]
             bulge = (along[2 * STEP :] + along[: -2 * STEP]) / 2.0 - middle
             at_surface = np.abs(middle) < 0.6 * self.cell
-            most = max(most, float(bulge[at_surface].max(initial=0.0)))
-        return (STEP * self.cell) ** 2 / (2.0 * max(most, 1.0e-3 * self.cell))
+            max_bulge = max(max_bulge, float(bulge[at_surface].max(initial=0.0)))
+        return (STEP * self.cell) ** 2 / (2.0 * max(max_bulge, 1.0e-3 * self.cell))
 
     def near(self, points: Floats, reach: Floats | float) -> Ints:
         """Points in half cells with interpolated distances within `reach`, times sqrt(3): the
         largest length of the gradient, by which `world_distance` divides."""
         limit = np.broadcast_to(np.float32(1.7321) * reach, points.shape[1:])
-        halves, least = np.float32(2.0 / self.cell), self._least
+        halves, least = np.float32(2.0 / self.cell), self._min_values
         held = points * halves
         held -= self.low[:, None] * halves
         np.maximum(held, np.float32(0.0), out=held)
@@ -195,12 +195,12 @@ class DistanceField:
     def _split(self, place: Floats) -> tuple[Floats, Floats]:
         """Places (3, n) in cells, clamped to the grid, and their offset from it, which overwrites
         `place`."""
-        held = self._held(place)
+        held = self._clamped(place)
         place -= held
         return np.minimum(held, self._below_top, out=held), place
 
     @cached_property
-    def _least(self) -> Floats:
+    def _min_values(self) -> Floats:
         """The smallest interpolated value in each half cell along x, y and z, that is, in each
         eighth of a cell."""
         result = self.values
@@ -212,7 +212,7 @@ class DistanceField:
             result = np.moveaxis(halves, 0, axis)
         return np.ascontiguousarray(result)
 
-    def _held(self, place: Floats) -> Floats:
+    def _clamped(self, place: Floats) -> Floats:
         """Places (3, n) in cells, clamped to the grid; faster than np.clip."""
         held: Floats = np.maximum(place, np.float32(0.0))
         return np.minimum(held, self._top, out=held)
@@ -226,13 +226,13 @@ class DistanceField:
 def _distances(nodes: Floats, surface: Surface, cell: float) -> Floats:
     """Distance of each node (nx, ny, nz) to the surface [m]."""
     search, shape = search_of(surface), nodes.shape[:3]
-    exact = search.closest(nodes.reshape(-1, 3), EXACT * cell).distance.reshape(shape)
+    exact = search.closest(nodes.reshape(-1, 3), EXACT_CELLS * cell).distance.reshape(shape)
     chosen = [np.union1d(np.arange(0, count, STRIDE), count - 1) for count in shape]
     sparse = nodes[np.ix_(*chosen)]
     distance = search.closest(sparse.reshape(-1, 3)).distance.reshape(sparse.shape[:3])
     for axis in range(3):
         distance = _filled_in(distance, chosen[axis], axis)
-    least = EXACT * cell
+    least = EXACT_CELLS * cell
     # Linear interpolation at a distance d overestimates by no more than (STRIDE cell)^2 / 8 d per
     # axis; subtract that, as `near` relies on distances that are not too long.
     distance -= 3.0 * (STRIDE * cell) ** 2 / (8.0 * np.maximum(distance, least))
@@ -246,32 +246,32 @@ def with_closures(values: Floats, cell: float) -> Floats:
     at most half a cell, and with each node from there it may grow by 1 / sqrt(3) cells, so that no
     value exceeds the straight distance.
     """
-    size, most = np.abs(values), np.full(values.shape, np.inf)
+    size, limits = np.abs(values), np.full(values.shape, np.inf)
     for axis in range(3):
         here, there, limit, other = (
             np.moveaxis(rows, axis, 0)[part]
-            for rows in (values, most)
+            for rows in (values, limits)
             for part in (slice(None, -1), slice(1, None))
         )
         is_closure = (here * there < 0.0) & (np.abs(here) + np.abs(there) > 1.01 * cell)
         limit[is_closure] = other[is_closure] = cell / 2.0
-    if not np.isfinite(most).any():
+    if not np.isfinite(limits).any():
         return values
     for _ in range(CLOSURE_REACH):
         for axis in range(3):
-            rows = np.moveaxis(most, axis, 0)
+            rows = np.moveaxis(limits, axis, 0)
             rows[1:] = np.minimum(rows[1:], rows[:-1] + cell / 3.0**0.5)
             rows[:-1] = np.minimum(rows[:-1], rows[1:] + cell / 3.0**0.5)
-    return np.copysign(np.minimum(size, most), values)
+    return np.copysign(np.minimum(size, limits), values)
 
 
-def covering(values: Floats, low: Floats, cell: float, points: Floats) -> Floats:
+def cover_points(values: Floats, low: Floats, cell: float, points: Floats) -> Floats:
     """Values (nx, ny, nz), lowered where the surface would lie outside of the interpolated one.
 
     Interpolation cuts off edges and corners, and a sheet thinner than a cell vanishes. Each point
-    of the surface that would be outside by e, more than UNCOVERED, lowers the nodes of its cell by
-    w e / sum of w^2, with its interpolation weights w: the smallest change, in least squares, that
-    lowers the value at the point by e.
+    of the surface that would be outside by e, more than MAX_UNCOVERED, lowers the nodes of its cell
+    by w e / sum of w^2, with its interpolation weights w: the smallest change, in least squares,
+    that lowers the value at the point by e.
 
     Args:
         points: (n, 3) on the surface; those outside of the grid are ignored.
@@ -287,13 +287,13 @@ def covering(values: Floats, low: Floats, cell: float, points: Floats) -> Floats
             weight[corner] *= fraction[:, axis] if side else 1.0 - fraction[:, axis]
         index[corner] = np.ravel_multi_index((node + offset).T, values.shape)
     flat = values.ravel()
-    outside = np.maximum((weight * flat[index]).sum(axis=0) - UNCOVERED * cell, 0.0)
+    outside = np.maximum((weight * flat[index]).sum(axis=0) - MAX_UNCOVERED * cell, 0.0)
     lowered = np.zeros_like(flat)
     np.maximum.at(lowered, index, weight * (outside / (weight * weight).sum(axis=0)))
     return (flat - lowered).reshape(values.shape)
 
 
-def points_on(surface: Surface, spacing: float) -> Floats:
+def sample_surface(surface: Surface, spacing: float) -> Floats:
     """Points (n, 3) spread over all triangles, at most `spacing` [m] apart along edges."""
     corners = surface.corners.astype(np.float64)
     edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
@@ -331,14 +331,14 @@ def _inside(nodes: Floats, distance: Floats, surface: Surface, cell: float) -> B
     )
     winding = winding[middles]
     of_middle = is_middle[middles] & ~is_near
-    is_asked = is_near | (of_middle & (np.abs(winding - 0.5) < UNSURE))
+    is_asked = is_near | (of_middle & (np.abs(winding - 0.5) < AMBIGUOUS_WINDING))
     winding[is_asked] = np.abs(winding_number(nodes[is_asked], surface))
     # each row starts outside because of the margin; remaining nodes take the number of the last one
     # before them, unless that one is beside an opening
     along = np.broadcast_to(np.arange(distance.shape[2]), distance.shape)
     last = np.maximum.accumulate(np.where(is_asked | of_middle, along, 0), axis=2)
     winding = np.take_along_axis(winding, last, axis=2)
-    is_left = (last < along) & (np.abs(winding - 0.5) < UNSURE)
+    is_left = (last < along) & (np.abs(winding - 0.5) < AMBIGUOUS_WINDING)
     winding[is_left] = np.abs(winding_number(nodes[is_left], surface))
     return winding > 0.5
 

@@ -16,7 +16,7 @@ from ..trajectory import curvature, value_at
 
 #: A collider whose smallest scale is below this fraction of the largest is flat, as when it is
 #: mirrored within a frame. Then it does not collide.
-FLAT = 1.0e-3
+MIN_SCALE_RATIO = 1.0e-3
 #: Lengths below this count as zero [m].
 TINY = np.float32(1.0e-12)
 
@@ -49,7 +49,7 @@ class PosedCollider:
     matrix_earlier: (4, 4), the same one frame earlier, which bends its path, see
         `trajectory.curvature`; None: straight.
     earlier_ratio: duration of the frame before, over that of this one.
-    swelling: maximum distance [m] that its surface has moved in the frame by a change of shape;
+    deformation: maximum distance [m] that its surface has moved in the frame by a change of shape;
         points that this has swallowed are moved out at once.
 
     Raises:
@@ -61,7 +61,7 @@ class PosedCollider:
     matrix_now: Floats
     matrix_earlier: Floats | None = None
     earlier_ratio: float = 1.0
-    swelling: float = 0.0
+    deformation: float = 0.0
 
     def __post_init__(self) -> None:
         for name in ("matrix_before", "matrix_now", "matrix_earlier"):
@@ -82,14 +82,14 @@ class PosedCollider:
         """The collider at rest in its place at the frame's end."""
         return PosedCollider(self.collider, self.matrix_now, self.matrix_now)
 
-    def stands_as(self, other: PosedCollider) -> bool:
+    def is_same_at_end(self, other: PosedCollider) -> bool:
         """Whether both are the same collider, at the same place at the frame's end."""
         is_same = self.collider is other.collider
         return is_same and np.array_equal(self.matrix_now, other.matrix_now)
 
     def matrix_at(self, moment: float) -> Floats:
         """Object to world (4, 4) float64 at `moment`, 0 the frame's begin and 1 its end."""
-        before, displacement, bent = self._seen
+        before, displacement, bent = self._relative_matrices
         matrix = value_at(before, displacement, bent, moment)
         if self._arc is None:
             return matrix
@@ -114,7 +114,7 @@ class PosedCollider:
         return path if path.is_arc else None
 
     @cached_property
-    def _seen(self) -> tuple[Floats, Floats, Floats | None]:
+    def _relative_matrices(self) -> tuple[Floats, Floats, Floats | None]:
         """Its matrix at the begin, the change to the end, and its curvature, relative to `_arc`."""
         before, now, earlier = self.matrix_before, self.matrix_now, self.matrix_earlier
         if self._arc is not None:
@@ -135,7 +135,7 @@ class PosedCollider:
         center, radius = self.collider.bounds
         centers = (now[:, :3, :3] @ center + now[:, :3, 3]).astype(np.float32)
         scales = np.linalg.svd(now[:, :3, :3], compute_uv=False)
-        is_flat = scales[:, -1] <= FLAT * scales[:, 0]
+        is_flat = scales[:, -1] <= MIN_SCALE_RATIO * scales[:, 0]
         displacements = (now - before).astype(np.float32)
         now[is_flat] = np.eye(4)
         inverses = np.linalg.inv(now).astype(np.float32)
@@ -153,7 +153,7 @@ class PosedCollider:
                 float(travel[i]),
                 now[i],
                 before[i],
-                self.swelling,
+                self.deformation,
             )
             for i, (largest, _, smallest) in enumerate(scales.tolist())
         ]
@@ -189,7 +189,7 @@ class Pose:
     scale: the smallest scale of the matrix in any direction.
     travel: [m], upper limit of the distance that any of its points moves in the substep.
     matrix, matrix_before: (4, 4) float64, object to world at the substep's end and begin.
-    swelling: see `PosedCollider`.
+    deformation: see `PosedCollider`.
     is_part: whether it is at the end of a part of the substep, see `part`.
     """
 
@@ -202,13 +202,13 @@ class Pose:
     travel: float
     matrix: Floats
     matrix_before: Floats
-    swelling: float = 0.0
+    deformation: float = 0.0
     is_part: bool = False
 
     @cached_property
     def inverse_before(self) -> Floats:
-        """(4, 4) float32, world to object at the substep's begin; see `inverse_or`."""
-        return inverse_or(self.matrix_before, self.matrix).astype(np.float32)
+        """(4, 4) float32, world to object at the substep's begin; see `inverse_or_fallback`."""
+        return inverse_or_fallback(self.matrix_before, self.matrix).astype(np.float32)
 
     def part(self, number: int, count: int) -> Pose:
         """The pose at the end of one of `count` equal parts of the substep.
@@ -224,12 +224,15 @@ class Pose:
             radius=self.radius + self.travel,
             matrix=matrix,
             matrix_before=before,
-            swelling=self.swelling / count,
+            deformation=self.deformation / count,
             is_part=True,
         )
 
     def _inverse_at(self, fraction: float) -> Floats:
-        begin, end = inverse_or(self.matrix_before, self.matrix), np.linalg.inv(self.matrix)
+        begin, end = (
+            inverse_or_fallback(self.matrix_before, self.matrix),
+            np.linalg.inv(self.matrix),
+        )
         result: Floats = begin * (1.0 - fraction) + end * fraction
         return result
 
@@ -244,12 +247,12 @@ def travels(displacement: Floats, center: Floats, radius: float) -> Floats:
     return result
 
 
-def inverse_or(matrix: Floats, other: Floats) -> Floats:
+def inverse_or_fallback(matrix: Floats, other: Floats) -> Floats:
     """The inverse of a matrix (4, 4), or of the other one, which is not flat, if the first is flat
     or turned relative to it by a right angle or more: interpolating both inverses could then give a
     flat one."""
     turn = np.linalg.eigvals(np.linalg.inv(other)[:3, :3] @ matrix[:3, :3])
-    is_near = turn.real.min() > FLAT * np.abs(turn).max()
+    is_near = turn.real.min() > MIN_SCALE_RATIO * np.abs(turn).max()
     result: Floats = np.linalg.inv(matrix if is_near else other)
     return result
 
@@ -266,9 +269,9 @@ def poses_through(
 
 
 def near_points(
-    pose: Pose, position: Floats, reach: Floats, beyond: Floats | float = 0.0
+    pose: Pose, position: Floats, reach: Floats, margin: Floats | float = 0.0
 ) -> tuple[Ints, Floats, Floats]:
-    """Points (3, n) world that may be within `reach` (n,) plus `beyond`, one or (n,), [m].
+    """Points (3, n) world that may be within `reach` (n,) plus `margin`, one or (n,), [m].
 
     Tests a bounding sphere first, then `Collider.near`.
 
@@ -276,16 +279,16 @@ def near_points(
         Their indices (m,), their places in object space (3, m), and reach plus beyond (m,) [m].
     """
     offset = position - pose.center[:, None]
-    farthest = pose.radius + float(reach.max()) + float(np.max(beyond))
+    farthest = pose.radius + float(reach.max()) + float(np.max(margin))
     index = (dot_rows(offset, offset) < np.float32(farthest * farthest)).nonzero()[0]
     reach = reach.take(index)
-    reach += np.float32(beyond) if np.ndim(beyond) == 0 else np.take(beyond, index)
+    reach += np.float32(margin) if np.ndim(margin) == 0 else np.take(margin, index)
     local = transform_points(pose.inverse, position.take(index, axis=1, mode="clip"))
     kept = pose.collider.near(local, reach / np.float32(pose.scale))
     return index.take(kept), local.take(kept, axis=1, mode="clip"), reach.take(kept)
 
 
-def world_distance(pose: Pose, local: Floats, flattest: float = 0.0) -> tuple[Floats, Floats]:
+def world_distance(pose: Pose, local: Floats, min_gradient: float = 0.0) -> tuple[Floats, Floats]:
     """Signed distance (n,) [m] and unit normal outwards (3, n), in world space, at points (3, n) in
     object space.
 
@@ -293,16 +296,16 @@ def world_distance(pose: Pose, local: Floats, flattest: float = 0.0) -> tuple[Fl
     distance along it.
 
     Args:
-        flattest: minimum length of the gradient in object space: a sampled one is short where two
-            sides of the collider are equally near, and distances would have no bound there.
+        min_gradient: minimum length of the gradient in object space: a sampled one is short where
+            two sides of the collider are equally near, and distances would have no bound there.
     """
     distance, gradient = pose.collider.distance(local)
     normal = np.einsum("ji,jn->in", pose.inverse[:3, :3], gradient)
     scale = np.maximum(np.sqrt(dot_rows(normal, normal)), TINY)
     normal /= scale
-    if flattest:
+    if min_gradient:
         length = np.sqrt(dot_rows(gradient, gradient))
-        scale *= np.maximum(np.float32(flattest) / np.maximum(length, TINY), np.float32(1.0))
+        scale *= np.maximum(np.float32(min_gradient) / np.maximum(length, TINY), np.float32(1.0))
     distance /= scale
     return distance, normal
 

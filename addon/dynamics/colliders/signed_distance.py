@@ -21,7 +21,7 @@ from .posed import (
 )
 
 #: Minimum length of the gradient of a sampled distance, see `world_distance`.
-FLATTEST = 0.5
+MIN_GRADIENT = 0.5
 #: Points tested at once, so that they stay in the processor's cache.
 _CHUNK = 32768
 
@@ -39,17 +39,17 @@ def signed_distance(
         The distance (n,) float32 [m], negative inside, `reach` where nothing is nearer; and the
         unit direction outwards (n, 3) float32, in which it grows, zero where nothing is nearer.
     """
-    return distance_to(points, poses_now(colliders), reach)
+    return distance_to(points, poses_at_end(colliders), reach)
 
 
-def poses_now(colliders: Sequence[PosedCollider]) -> list[Pose]:
+def poses_at_end(colliders: Sequence[PosedCollider]) -> list[Pose]:
     """The poses of all colliders at the frame's end, without those that are flat then."""
     (poses,) = poses_through(tuple(colliders), [(0.0, 1.0)])
     return poses
 
 
 def distance_to(points: Floats, poses: Sequence[Pose], reach: float) -> tuple[Floats, Floats]:
-    """`signed_distance` with `poses_now` computed once for several queries."""
+    """`signed_distance` with `poses_at_end` computed once for several queries."""
     distance = np.full(len(points), reach, np.float32)
     outward = np.zeros((len(points), 3), np.float32)
     index, found, normal = nearer_than(points, poses, reach)
@@ -81,12 +81,14 @@ def distance_of_few(points: Floats, poses: Sequence[Pose]) -> tuple[Floats, Floa
     """`distance_to` with infinite reach; faster if points are few or mostly near."""
     rows = np.ascontiguousarray(points.T, np.float32)
     if len(poses) == 1:
-        found, normal = world_distance(poses[0], transform_points(poses[0].inverse, rows), FLATTEST)
+        found, normal = world_distance(
+            poses[0], transform_points(poses[0].inverse, rows), MIN_GRADIENT
+        )
         return found, normal.T
     distance = np.full(rows.shape[1], np.inf, np.float32)
     outward = np.zeros_like(rows)
     for pose in poses:
-        found, normal = world_distance(pose, transform_points(pose.inverse, rows), FLATTEST)
+        found, normal = world_distance(pose, transform_points(pose.inverse, rows), MIN_GRADIENT)
         is_nearer = found < distance
         np.copyto(distance, found, where=is_nearer)
         np.copyto(outward, normal, where=is_nearer)
@@ -103,7 +105,7 @@ def _near(pose: Pose, points: Floats, reach: Floats) -> tuple[Ints, Floats, Floa
         maybe.append(near + first)
     index = np.concatenate(maybe)
     local = _local(pose, points.take(index, axis=0))
-    distance, normal = world_distance(pose, local, FLATTEST)
+    distance, normal = world_distance(pose, local, MIN_GRADIENT)
     nearer = (distance < reach.take(index)).nonzero()[0]
     return index.take(nearer), distance.take(nearer), normal.take(nearer, axis=1)
 
@@ -121,7 +123,7 @@ def are_outside_meshes(points: Floats, colliders: Sequence[PosedCollider]) -> Bo
     """
     rows = np.ascontiguousarray(np.asarray(points, np.float32).T)
     result = np.ones(rows.shape[1], bool)
-    for pose in poses_now(colliders) if rows.size else ():
+    for pose in poses_at_end(colliders) if rows.size else ():
         local = transform_points(pose.inverse, rows)
         if isinstance(pose.collider, DistanceField):
             result &= pose.collider.are_outside(local)
@@ -134,9 +136,9 @@ def mesh_distance(points: Floats, colliders: Sequence[PosedCollider]) -> Floats:
     """Signed distances (n,) of points (n, 3) world from meshes themselves. Slow, for few points."""
     rows = np.ascontiguousarray(np.asarray(points, np.float32).T)
     nearest = np.full(rows.shape[1], np.inf, np.float32)
-    for pose in poses_now(colliders) if rows.size else ():
+    for pose in poses_at_end(colliders) if rows.size else ():
         local = transform_points(pose.inverse, rows)
-        distance, _ = world_distance(pose, local, FLATTEST)
+        distance, _ = world_distance(pose, local, MIN_GRADIENT)
         if isinstance(pose.collider, DistanceField) and pose.collider.surface is not None:
             found = search_of(pose.collider.surface).closest(local.T).distance
             found = found.astype(np.float32) * np.float32(pose.scale)

@@ -65,7 +65,7 @@ class SphereSetCollider:
         """
         index, outside = self._cells(points)
         kept: Ints = np.flatnonzero(
-            (self._grid.nearest.take(index) < reach) & (outside < reach * reach)
+            (self._grid.min_distance.take(index) < reach) & (outside < reach * reach)
         )
         return kept
 
@@ -100,11 +100,13 @@ class SphereSetCollider:
 
     def _nearest_in_cells(self, points: Floats, cells: Ints) -> Ints:
         """The nearest ball (n,) among those of the points' cells."""
-        row, begin = self._grid.row.take(cells), self._grid.begin
+        row, begin = self._grid.cell_row.take(cells), self._grid.row_begin
         first = begin.take(row)
         count = begin.take(row + 1) - first
         start = piece_starts(count)  # of each point's pairs
-        ball = self._grid.ball.take(np.arange(int(count.sum())) + np.repeat(first - start, count))
+        ball = self._grid.ball_index.take(
+            np.arange(int(count.sum())) + np.repeat(first - start, count)
+        )
         squared = np.zeros(len(ball), np.float32)
         for axis, row in enumerate(points):
             displacement = np.repeat(row, count)

@@ -25,7 +25,7 @@ from ...strands.triangles import area_vectors
 from ...strands.vectors import cross_rows, dot_rows
 
 #: A group of triangles is far beyond this many of its own radii from its centre.
-FAR = 2.5
+FAR_RADII = 2.5
 #: Cells that traverse the tree together, so that their data stay in the cache.
 _CHUNK = 512
 #: Side of a cell, in units of the square root of the mean area of triangles.
@@ -49,21 +49,21 @@ class _Dipoles:
 
     @classmethod
     def of_triangles(cls, corners: Floats) -> _Dipoles:
-        """The dipole of each triangle; see `_Prepared` for the corners."""
+        """The dipole of each triangle; see `_PreparedSurface` for the corners."""
         center = corners.mean(axis=0)
         away = corners - center
         radius = np.sqrt((away * away).sum(axis=1).max(axis=0))
         moment = cross_rows(corners[1] - corners[0], corners[2] - corners[0]) / 2.0
-        return cls(center, moment, FAR * radius)
+        return cls(center, moment, FAR_RADII * radius)
 
 
 @dataclass(frozen=True)
-class _Prepared:
+class _PreparedSurface:
     """A surface prepared for winding numbers.
 
     center: (3,) [m], of its box; everything else is relative to it.
     levels: dipoles from the root to the leaves.
-    every: those of all levels, concatenated, followed by those of single triangles.
+    all_dipoles: those of all levels, concatenated, followed by those of single triangles.
     leaves: (leaf_count, k) triangles, -1 for none.
     corners: (3, 3, triangle_count) by corner and axis [m].
     cell: side of a cell [m].
@@ -71,13 +71,13 @@ class _Prepared:
 
     center: Floats
     levels: list[_Dipoles]
-    every: _Dipoles
+    all_dipoles: _Dipoles
     leaves: Ints
     corners: Floats
     cell: float
 
     @classmethod
-    def of(cls, surface: Surface) -> _Prepared:
+    def of(cls, surface: Surface) -> _PreparedSurface:
         search = search_of(surface)  # callers need it for distances, too
         corners, tree = search.corners, search.tree
         leaves = _without_repeats(tree.leaf_triangles)
@@ -100,7 +100,7 @@ def winding_number(points: Floats, surface: Surface) -> Floats:
     Args:
         points: (n, 3) [m], space of the surface, which has at least one triangle.
     """
-    prepared = surface.compute_once(_Prepared.of)
+    prepared = surface.compute_once(_PreparedSurface.of)
     place = np.ascontiguousarray((points - prepared.center).T, np.float64)
     total = np.zeros(place.shape[1])
     if not len(total):
@@ -125,7 +125,7 @@ def winding_number(points: Floats, surface: Surface) -> Floats:
     return total / (4.0 * np.pi)
 
 
-def _groups(middle: Floats, prepared: _Prepared) -> list[tuple[Ints, Ints]]:
+def _groups(middle: Floats, prepared: _PreparedSurface) -> list[tuple[Ints, Ints]]:
     """For each cell with its middle at (3, n), the groups that are far from the whole cell, indexed
     as in `every`, and the triangles that are in none of them."""
     margin = 0.5 * 3.0**0.5 * prepared.cell
@@ -157,7 +157,7 @@ def _split(cell: Ints, values: Ints, count: int) -> list[Ints]:
 
 
 def _from_afar(
-    points: Floats, begin: Floats, far: Ints, triangles: Ints, prepared: _Prepared
+    points: Floats, begin: Floats, far: Ints, triangles: Ints, prepared: _PreparedSurface
 ) -> tuple[Floats, Ints, Ints]:
     """The sum over everything that is far from each point of one cell, (n,); and pairs of points
     and triangles that are near each other.
@@ -166,7 +166,7 @@ def _from_afar(
         points: (3, n) [m] relative to `begin`, (3, 1), so that float32 is enough.
         far, triangles: of the cell, see `_groups`.
     """
-    every, total = prepared.every, np.zeros(points.shape[1])
+    every, total = prepared.all_dipoles, np.zeros(points.shape[1])
     group = np.append(far, triangles + (len(every.reach) - prepared.corners.shape[2]))
     points = points.astype(np.float32)
     center = (every.center.take(group, axis=1) - begin).astype(np.float32)
@@ -199,7 +199,7 @@ def _from_afar(
     return total, np.concatenate(near_points), np.concatenate(near_triangles)
 
 
-def _near_by(place: Floats, point: Ints, triangle: Ints, prepared: _Prepared) -> Floats:
+def _near_by(place: Floats, point: Ints, triangle: Ints, prepared: _PreparedSurface) -> Floats:
     """The sum of exact solid angles of triangles, seen from the points (3, n) that they are paired
     with, (n,)."""
     total = np.zeros(place.shape[1])
@@ -247,5 +247,5 @@ def _dipoles(tree: TriangleTree, leaves: Ints, corners: Floats) -> list[_Dipoles
         radius = np.linalg.norm(reach, axis=1)
         total = moment[members].sum(axis=1)
         center_rows, moment_rows = (np.ascontiguousarray(each.T) for each in (middle, total))
-        levels.append(_Dipoles(center_rows, moment_rows, FAR * radius))
+        levels.append(_Dipoles(center_rows, moment_rows, FAR_RADII * radius))
     return levels

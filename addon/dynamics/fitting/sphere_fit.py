@@ -32,7 +32,7 @@ from .settings import SphereFitSettings
 from .surface_samples import Boundary, SurfaceSamples, boundary_of, samples_of
 
 #: Number of places on the mesh where the error is measured; on the balls up to twice as many.
-_PLACES = 6000
+_SAMPLE_COUNT = 6000
 
 
 @dataclass(frozen=True)
@@ -59,9 +59,9 @@ def measured_error(
         search: of the boundary's closed surface.
     """
     balls = SphereSetCollider(centers, radii)
-    samples = samples_of(boundary.mesh, _PLACES).point.T.astype(np.float32)
+    samples = samples_of(boundary.mesh, _SAMPLE_COUNT).point.T.astype(np.float32)
     gap = np.maximum(balls.distance(samples)[0], 0.0)
-    places = union_places(balls)
+    places = points_on_union(balls)
     outside = search.closest(places).distance
     outside[winding_number(places, boundary.surface) > 0.5] = 0.0
     return SphereError(
@@ -69,7 +69,7 @@ def measured_error(
     )
 
 
-def union_places(balls: SphereSetCollider) -> Floats:
+def points_on_union(balls: SphereSetCollider) -> Floats:
     """Points (n, 3) spread evenly over the outer surface of a set of balls.
 
     Each ball gets points on a Fibonacci spiral in proportion to its area; points within another
@@ -78,7 +78,7 @@ def union_places(balls: SphereSetCollider) -> Floats:
     area = balls.radii.astype(np.float64) ** 2
     places = []
     for center, radius, fraction in zip(balls.centers, balls.radii, area / area.sum(), strict=True):
-        count = max(int(2 * _PLACES * fraction), 16)
+        count = max(int(2 * _SAMPLE_COUNT * fraction), 16)
         places.append(center + float(radius) * even_directions(count))
     every = np.concatenate(places)
     distance, _ = balls.distance(every.T.astype(np.float32))
@@ -91,9 +91,9 @@ _SAMPLES, _MIN, _MAX = 40, 1200, 3000
 #: Maximum number of shrinking steps.
 _SHRINKS = 40
 #: A ball that would shrink by less than this fraction has converged.
-_SETTLED = 5.0e-3
+_MIN_SHRINK = 5.0e-3
 #: Balls that differ by less than this fraction of the mesh's longest side are one candidate.
-_ALIKE = 0.006
+_MIN_DIFFERENCE = 0.006
 
 
 @dataclass(frozen=True)
@@ -121,8 +121,10 @@ def fit_spheres(surface: Surface, settings: SphereFitSettings, *, place: str = "
     samples = samples_of(boundary.mesh, count)
     search = ClosestPointSearch(boundary.surface)
     size = float(np.ptp(samples.point, axis=0).max())
-    widest = float(np.ptp(boundary.surface.corners.reshape(-1, 3), axis=0).min()) / 2.0
-    centers, radii = _distinct(*medial_balls(samples, boundary, search, widest), _ALIKE * size)
+    max_radius = float(np.ptp(boundary.surface.corners.reshape(-1, 3), axis=0).min()) / 2.0
+    centers, radii = _distinct(
+        *medial_balls(samples, boundary, search, max_radius), _MIN_DIFFERENCE * size
+    )
     if not len(radii):
         raise HairloomError(
             "it is too thin to hold a ball", place=place, remedy="Choose a mesh with volume"
@@ -135,67 +137,69 @@ def fit_spheres(surface: Surface, settings: SphereFitSettings, *, place: str = "
 
 
 def medial_balls(
-    samples: SurfaceSamples, boundary: Boundary, search: ClosestPointSearch, widest: float
+    samples: SurfaceSamples, boundary: Boundary, search: ClosestPointSearch, max_radius: float
 ) -> tuple[Floats, Floats]:
     """Centers (n, 3) and radii (n,) of the largest ball inside that touches each sample.
 
     Args:
         search: of the boundary's surface.
-        widest: [m], upper limit of the radii.
+        max_radius: [m], upper limit of the radii.
     """
-    radius = _first_radii(samples, widest)
+    radius = _first_radii(samples, max_radius)
     point, inward = samples.point, -samples.normal
-    going = np.arange(len(point))
+    active = np.arange(len(point))
     for _ in range(_SHRINKS):
-        center = point[going] + inward[going] * radius[going, None]
+        center = point[active] + inward[active] * radius[active, None]
         found = search.closest(center)
-        displacement = found.point - point[going]
-        smaller = _tangent_radius(displacement, inward[going], radius[going])
-        shrinks = (found.distance < radius[going] * (1.0 - _SETTLED)) & (smaller < radius[going])
-        radius[going[shrinks]] = smaller[shrinks]
-        going = going[shrinks]
-        if not len(going):
+        displacement = found.point - point[active]
+        smaller = _tangent_radius(displacement, inward[active], radius[active])
+        shrinks = (found.distance < radius[active] * (1.0 - _MIN_SHRINK)) & (
+            smaller < radius[active]
+        )
+        radius[active[shrinks]] = smaller[shrinks]
+        active = active[shrinks]
+        if not len(active):
             break
     center = point + inward * radius[:, None]
     radius = search.closest(center).distance  # not beyond the surface, even without convergence
-    kept = (radius > 1.0e-6 * widest) & (winding_number(center, boundary.surface) > 0.5)
+    kept = (radius > 1.0e-6 * max_radius) & (winding_number(center, boundary.surface) > 0.5)
     return center[kept], radius[kept]
 
 
-def _first_radii(samples: SurfaceSamples, widest: float) -> Floats:
+def _first_radii(samples: SurfaceSamples, max_radius: float) -> Floats:
     """Radii (n,) of tangent balls that contain no other sample: close to the final ones, and much
     faster than closest points."""
-    most = np.full(len(samples.point), widest)
-    radius = most.copy()
+    max_radii = np.full(len(samples.point), max_radius)
+    radius = max_radii.copy()
     for one, (point, normal) in enumerate(zip(samples.point, samples.normal, strict=True)):
-        radius[one] = _tangent_radius(samples.point - point, -normal, most).min()
+        radius[one] = _tangent_radius(samples.point - point, -normal, max_radii).min()
     return radius
 
 
-def _tangent_radius(displacement: Floats, inward: Floats, widest: Floats) -> Floats:
+def _tangent_radius(displacement: Floats, inward: Floats, max_radius: Floats) -> Floats:
     """Radius (n,) of the ball that is tangent at a point, with its center in direction `inward`,
-    (3,) or (n, 3), and passes through the point at `displacement` (n, 3) from there; `widest` (n,)
-    if there is none."""
+    (3,) or (n, 3), and passes through the point at `displacement` (n, 3) from there; `max_radius`
+    (n,) if there is none."""
     along = (displacement * inward).sum(axis=1)
     squared = np.einsum("ij,ij->i", displacement, displacement)
-    return np.divide(squared, 2.0 * along, out=widest.copy(), where=along > 0.0)
+    return np.divide(squared, 2.0 * along, out=max_radius.copy(), where=along > 0.0)
 
 
-def _distinct(centers: Floats, radii: Floats, alike: float) -> tuple[Floats, Floats]:
+def _distinct(centers: Floats, radii: Floats, min_difference: float) -> tuple[Floats, Floats]:
     """Balls sorted by size, largest first, without those whose surface differs from an earlier
-    one's by no more than `alike` [m] everywhere."""
+    one's by no more than `min_difference` [m] everywhere."""
     order = np.argsort(-radii, kind="stable")
     centers, radii = centers[order], radii[order]
     kept = np.ones(len(radii), bool)
     for one in range(len(radii)):
         if kept[one]:
             displacement = centers[one + 1 :] - centers[one]
-            apart = (
+            difference = (
                 np.sqrt(np.einsum("ij,ij->i", displacement, displacement))
                 + radii[one]
                 - radii[one + 1 :]
             )
-            kept[one + 1 :] &= apart > alike
+            kept[one + 1 :] &= difference > min_difference
     return centers[kept], radii[kept]
 
 

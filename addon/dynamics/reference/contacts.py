@@ -8,24 +8,24 @@ import numpy as np
 
 from ...arrays import Floats
 from ..colliders import PosedCollider
-from ..colliders.posed import FLAT, inverse_or
-from ..constraints import PINNED
+from ..colliders.posed import MIN_SCALE_RATIO, inverse_or_fallback
+from ..constraints import PINNED_COUNT
 from ..contacts import (
-    BETWEEN,
-    BETWEEN_RADIUS,
-    FAST,
-    MAX_WEIGHT,
-    MAY_MISS,
-    REACH,
-    SKIN,
-    TRACE_STEPS,
-    short_squared,
+    ALLOWED_DEPTH,
+    CONTACT_MARGIN,
+    FAST_SEGMENTS,
+    MAX_SEGMENT_WEIGHT,
+    MAX_TRACE_STEPS,
+    SEGMENT_POINTS,
+    SEGMENT_RADIUS,
+    TOUCH_DISTANCE,
+    max_untraced_squared,
 )
 from ..settings import DynamicsSettings
 
 
 @dataclass(frozen=True)
-class Moment:
+class Substep:
     """A substep: begin and end as fractions of the frame; its time and length [s]."""
 
     begin: float
@@ -47,9 +47,9 @@ class Plane:
     normal: Floats
     offset: float
     origin: Floats
-    is_out: bool
-    skin: float  # [m]
-    slack: float  # [m]
+    leads_out: bool
+    touch_distance: float  # [m]
+    allowed_depth: float  # [m]
     path: float  # [m] that its point has moved, relative to the collider
     along: float = 1.0
     weights: tuple[float, float] = (0.0, 1.0)
@@ -72,7 +72,7 @@ class Plane:
         slip = slip - self.normal * (self.normal @ slip)
         length = max(float(np.linalg.norm(slip)), 1.0e-9)
         there = there - slip * min(friction * push / length, 1.0)
-        return there - here, bool(missing > -self.skin) and self.is_out
+        return there - here, bool(missing > -self.touch_distance) and self.leads_out
 
     def move(self, x: Floats, push: Floats) -> None:
         x[self.cv - 1] += push * self.weights[0]
@@ -113,11 +113,11 @@ def push_out(planes: list[list[Plane]], x: Floats, friction: float) -> dict[int,
 
 def is_deep(planes: list[list[Plane]], x: Floats) -> bool:
     """Whether any point is farther below its plane than allowed."""
-    return any(plane.gap(x) > plane.slack for group in planes for plane in group)
+    return any(plane.gap(x) > plane.allowed_depth for group in planes for plane in group)
 
 
 @dataclass(frozen=True)
-class Solid:
+class SubstepCollider:
     """A collider in one substep."""
 
     posed: PosedCollider
@@ -126,26 +126,26 @@ class Solid:
     inverse: Floats
     inverse_before: Floats
     scale: float  # the smallest
-    seen: float  # [m^2], squared length of paths that need not be followed
+    max_untraced_squared: float  # [m^2], squared length of paths that need not be followed
     travel: float  # [m], upper limit of the motion of its points
-    swelling: float  # [m]
+    deformation: float  # [m]
     is_part: bool = False
 
     @classmethod
-    def of(cls, posed: PosedCollider, moment: Moment, size: float) -> Solid | None:
+    def of(cls, posed: PosedCollider, moment: Substep, size: float) -> SubstepCollider | None:
         """The collider in a substep; None if it is flat."""
         before, now = posed.matrix_at(moment.begin), posed.matrix_at(moment.end)
-        if np.linalg.cond(now[:3, :3]) >= 1.0 / FLAT:
+        if np.linalg.cond(now[:3, :3]) >= 1.0 / MIN_SCALE_RATIO:
             return None
         scale = float(np.linalg.svd(now[:3, :3], compute_uv=False)[-1])
-        seen = short_squared(posed.collider.curve_radius * scale, size)
+        seen = max_untraced_squared(posed.collider.curve_radius * scale, size)
         change, (center, reach) = now - before, posed.collider.bounds
         travel = float(np.linalg.norm(change[:3, :3] @ center + change[:3, 3]))
         travel += reach * float(np.linalg.norm(change[:3, :3]))
-        inverses = np.linalg.inv(now), inverse_or(before, now)
-        return cls(posed, change, now, *inverses, scale, seen, travel, posed.swelling)
+        inverses = np.linalg.inv(now), inverse_or_fallback(before, now)
+        return cls(posed, change, now, *inverses, scale, seen, travel, posed.deformation)
 
-    def part(self, number: int, count: int) -> Solid:
+    def part(self, number: int, count: int) -> SubstepCollider:
         """The collider in one of `count` parts of the substep."""
         begin, end = (
             self.inverse_before * (1.0 - fraction) + self.inverse * fraction
@@ -157,13 +157,13 @@ class Solid:
             now=np.linalg.inv(end),
             inverse=end,
             inverse_before=begin,
-            swelling=self.swelling / count,
+            deformation=self.deformation / count,
             is_part=True,
         )
 
     def is_sharp(self, spacing: float) -> bool:
         """Whether segments of this length [m] need planes, see `contacts.is_sharp`."""
-        return spacing**2 > self.seen
+        return spacing**2 > self.max_untraced_squared
 
     def local(self, x: Floats) -> Floats:
         result: Floats = (self.inverse @ np.append(x, 1.0))[:3]
@@ -174,31 +174,37 @@ class Solid:
         result: Floats = previous + (self.change @ np.append(self.local(x), 1.0))[:3]
         return result
 
-    def at(self, local: Floats) -> tuple[float, Floats]:
+    def distance_and_normal(self, local: Floats) -> tuple[float, Floats]:
         """Signed distance [m] and unit normal, world space."""
         found, gradient = self.posed.collider.distance(local[:, None])
         outward = self.inverse[:3, :3].T @ gradient[:, 0]
         steepness = float(np.linalg.norm(outward))
         return float(found[0]) / steepness, outward / steepness
 
-    def followed(self, x: Floats, previous: Floats, radius: float) -> tuple[Floats, float, float]:
-        """See `contacts._followed`: normal and normal . x where the point's path meets the surface,
-        and the point's distance before."""
+    def traced(self, x: Floats, previous: Floats, radius: float) -> tuple[Floats, float, float]:
+        """See `contacts._trace_paths`: normal and normal . x where the point's path meets the
+        surface, and the point's distance before."""
         begin = (self.inverse_before @ np.append(previous, 1.0))[:3]
         path = self.local(x) - begin
-        first, _ = self.at(begin)
-        place = self._met(begin, path, first, min(radius, first)) if first > 0.0 else 0.0
+        first, _ = self.distance_and_normal(begin)
+        place = (
+            self._fraction_at_surface(begin, path, first, min(radius, first))
+            if first > 0.0
+            else 0.0
+        )
         local = begin + path * place
-        distance, normal = self.at(local)
+        distance, normal = self.distance_and_normal(local)
         there = (self.now @ np.append(local, 1.0))[:3]
         return normal, float(normal @ there) - distance, first
 
-    def _met(self, begin: Floats, path: Floats, first: float, target: float) -> float:
+    def _fraction_at_surface(
+        self, begin: Floats, path: Floats, first: float, target: float
+    ) -> float:
         """The fraction of the path at which the distance falls to `target`; 1 if it does not."""
         length = float(np.linalg.norm(path)) * self.scale
         gone, distance = 0.0, first
-        for _ in range(TRACE_STEPS):
-            step = max(distance - target, length / TRACE_STEPS)
+        for _ in range(MAX_TRACE_STEPS):
+            step = max(distance - target, length / MAX_TRACE_STEPS)
             if gone + step >= length:
                 return 1.0
             local = begin + path * ((gone + step) / length)
@@ -209,18 +215,18 @@ class Solid:
         return 1.0
 
 
-def is_hurried(
-    solid: Solid, planes: list[Plane], x: Floats, previous: Floats, spacing: float
+def is_fast(
+    solid: SubstepCollider, planes: list[Plane], x: Floats, previous: Floats, spacing: float
 ) -> bool:
     """Whether a guide with these planes is advanced in parts of the substep; see
-    `contacts.hurried_guides`."""
-    root, farthest = PINNED - 1, FAST * spacing
+    `contacts.fast_guides`."""
+    root, farthest = PINNED_COUNT - 1, FAST_SEGMENTS * spacing
     is_far = float(np.linalg.norm(x[root] - solid.origin(x[root], previous[root]))) > farthest
     return solid.is_sharp(spacing) and is_far and any(plane.path > farthest for plane in planes)
 
 
 def planes_of(
-    solid: Solid,
+    solid: SubstepCollider,
     x: Floats,
     previous: Floats,
     held: list[bool],
@@ -233,87 +239,93 @@ def planes_of(
 
     Args:
         dt: [s], of the substep or its part. size: the hair's [m].
-        clearance: (cv_count, 1 + len(BETWEEN)) [m], upper limit of the distances to keep.
+        clearance: (cv_count, 1 + len(SEGMENT_POINTS)) [m], upper limit of the distances to keep.
     """
-    free = [cv for cv in range(PINNED, len(x)) if not held[cv]]
-    led_out = settings.depenetration_speed * size * dt + solid.swelling
+    free = [cv for cv in range(PINNED_COUNT, len(x)) if not held[cv]]
+    max_exit = settings.depenetration_speed * size * dt + solid.deformation
     is_sharp = solid.is_sharp(size / (len(x) - 1))
     of_cvs, of_segments = [], []
     for cv in free:
         along = cv / (len(x) - 1)
         radius = size * (settings.radius_root * (1.0 - along) + settings.radius_tip * along)
         own = min(radius, float(clearance[cv, 0]))
-        plane = _plane_of_cv(solid, cv, x, previous, own, led_out, size, is_sharp)
+        plane = _plane_of_cv(solid, cv, x, previous, own, max_exit, size, is_sharp)
         if plane is not None:
             of_cvs.append(plane)
         if is_sharp:
-            is_loose = cv > PINNED and not held[cv - 1]
-            wanted = np.minimum(radius * float(BETWEEN_RADIUS), clearance[cv, 1:]).tolist()
-            plane = _plane_between(solid, cv, x, previous, own, wanted, led_out, size, is_loose)
+            is_loose = cv > PINNED_COUNT and not held[cv - 1]
+            wanted = np.minimum(radius * float(SEGMENT_RADIUS), clearance[cv, 1:]).tolist()
+            plane = _plane_between(solid, cv, x, previous, own, wanted, max_exit, size, is_loose)
             if plane is not None:
                 of_segments.append(plane)
     return of_cvs, of_segments
 
 
 def _plane_of_cv(
-    solid: Solid,
+    solid: SubstepCollider,
     cv: int,
     x: Floats,
     previous: Floats,
     radius: float,
-    led_out: float,
+    max_exit: float,
     size: float,
     is_sharp: bool,
 ) -> Plane | None:
-    distance, normal = solid.at(solid.local(x[cv]))
+    distance, normal = solid.distance_and_normal(solid.local(x[cv]))
     origin = solid.origin(x[cv], previous[cv])
     path = x[cv] - origin
     beyond = float(np.linalg.norm(path)) if is_sharp else 0.0
-    if distance >= radius + REACH * size + beyond:
+    if distance >= radius + CONTACT_MARGIN * size + beyond:
         return None
     surface, was = float(normal @ x[cv]) - distance, distance - float(normal @ path)
-    if (is_sharp or solid.travel**2 > solid.seen) and path @ path > solid.seen:
-        normal, surface, was = solid.followed(x[cv], previous[cv], radius)
-    reached = was + led_out
+    if (
+        is_sharp or solid.travel**2 > solid.max_untraced_squared
+    ) and path @ path > solid.max_untraced_squared:
+        normal, surface, was = solid.traced(x[cv], previous[cv], radius)
+    reached = was + max_exit
     offset = surface + min(radius, reached)
-    if is_sharp and offset - normal @ x[cv] <= -REACH * size:
+    if is_sharp and offset - normal @ x[cv] <= -CONTACT_MARGIN * size:
         return None
     is_out = reached >= (0.0 if solid.is_part else radius)
-    slack = max(radius * float(MAY_MISS), 2.0 * SKIN * size) if is_out else np.inf
+    slack = max(radius * float(ALLOWED_DEPTH), 2.0 * TOUCH_DISTANCE * size) if is_out else np.inf
     gone = float(np.linalg.norm(path))
-    return Plane(cv, normal, offset, origin, is_out, SKIN * size, slack, gone)
+    return Plane(cv, normal, offset, origin, is_out, TOUCH_DISTANCE * size, slack, gone)
 
 
 def _plane_between(
-    solid: Solid,
+    solid: SubstepCollider,
     cv: int,
     x: Floats,
     previous: Floats,
     radius: float,
-    kept: list[float],
-    led_out: float,
+    distances: list[float],
+    max_exit: float,
     size: float,
     is_loose: bool,
 ) -> Plane | None:
     """The plane of the deepest of the points of the segment that ends at a CV.
 
     Args:
-        radius: of that CV [m]. kept: distances that the points keep [m].
+        radius: of that CV [m]. distances: distances that the points keep [m].
         is_loose: whether the previous CV is free too.
     """
     deepest: Plane | None = None
-    for along, wanted in zip(BETWEEN, kept, strict=True):
+    for along, wanted in zip(SEGMENT_POINTS, distances, strict=True):
         here, before = (rows[cv - 1] + (rows[cv] - rows[cv - 1]) * along for rows in (x, previous))
-        normal, surface, was = solid.followed(here, before, radius)
-        offset = surface + min(wanted, was + led_out)
+        normal, surface, was = solid.traced(here, before, radius)
+        offset = surface + min(wanted, was + max_exit)
         lower = (1.0 - along) * is_loose
         scale = lower * lower + along * along
-        weights = lower / scale, min(along / scale, float(MAX_WEIGHT))
-        is_out = was + led_out >= (0.0 if solid.is_part else wanted)
-        slack = max(wanted * float(MAY_MISS), 2.0 * SKIN * size) if is_out else np.inf
+        weights = lower / scale, min(along / scale, float(MAX_SEGMENT_WEIGHT))
+        is_out = was + max_exit >= (0.0 if solid.is_part else wanted)
+        slack = (
+            max(wanted * float(ALLOWED_DEPTH), 2.0 * TOUCH_DISTANCE * size) if is_out else np.inf
+        )
         origin = solid.origin(here, before)
         gone = float(np.linalg.norm(here - origin))
-        plane = Plane(cv, normal, offset, origin, is_out, SKIN * size, slack, gone, along, weights)
+        plane = Plane(
+            cv, normal, offset, origin, is_out, TOUCH_DISTANCE * size, slack, gone, along, weights
+        )
         if deepest is None or plane.gap(x) > deepest.gap(x):
             deepest = plane
-    return deepest if deepest is not None and deepest.gap(x) > -REACH * size else None
+    return deepest if deepest is not None and deepest.gap(x) > -CONTACT_MARGIN * size else None

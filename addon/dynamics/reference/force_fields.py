@@ -11,10 +11,10 @@ from itertools import product
 import numpy as np
 
 from ...arrays import Floats, Ints
-from ..force_fields import FARTHEST, Falloff, ForceField, ForceFields
+from ..force_fields import MAX_DISPLACEMENT, Falloff, ForceField, ForceFields
 
 
-def blown_slowly(
+def previous_after_fields(
     x: Floats,
     previous: Floats,
     fields: ForceFields,
@@ -33,7 +33,7 @@ def blown_slowly(
             along = _unit(x[min(cv + 1, len(x) - 1)] - x[max(cv - 1, 0)])
         change = _change(place, velocity, along, fields, dt) * dt
         far = float(np.linalg.norm(change))
-        result[cv] = previous[cv] - change * min(1.0, FARTHEST * size / max(far, 1e-12))
+        result[cv] = previous[cv] - change * min(1.0, MAX_DISPLACEMENT * size / max(far, 1e-12))
     return result
 
 
@@ -55,9 +55,9 @@ def _change(
     slows, slows_along = 0.0, 0.0
     for field in fields.fields:
         one, slowing, turns = _felt(field, place, velocity, fields)
-        push = push + one * (1.0 - field.across) + beside @ one * field.across
+        push = push + one * (1.0 - field.across_fraction) + beside @ one * field.across_fraction
         slows += slowing
-        slows_along += slowing * (1.0 - field.across)
+        slows_along += slowing * (1.0 - field.across_fraction)
         spin = spin + turns
     moved = velocity + push * dt
     straight = along * float(along @ moved)
@@ -75,7 +75,7 @@ def _left(slowing: float) -> float:
 def _felt(
     field: ForceField, place: Floats, velocity: Floats, fields: ForceFields
 ) -> tuple[Floats, float, Floats]:
-    """Push, slowing and spin of one field, see `force_fields.Felt`."""
+    """Push, slowing and spin of one field, see `force_fields.FieldEffect`."""
     center, axis = np.array(field.center), np.array(field.axis)
     normal = axis if field.normal is None else np.array(field.normal)
     r = place - center

@@ -10,22 +10,22 @@ from itertools import pairwise
 import numpy as np
 
 from ...arrays import Floats
-from ..constraints import PINNED
-from ..style import GENTLE, SHARP
+from ..constraints import PINNED_COUNT
+from ..style import GENTLE_BEND, SHARP_KINK
 
 
-def hold(rest_second: Floats, length: float) -> float:
+def turning_fraction(rest_second: Floats, length: float) -> float:
     """1 for gentle bends, 0 for sharp kinks, linear in between."""
     sharpness = float(np.linalg.norm(rest_second)) / length if length else 2.0
-    return min(max((SHARP - sharpness) / (SHARP - GENTLE), 0.0), 1.0)
+    return min(max((SHARP_KINK - sharpness) / (SHARP_KINK - GENTLE_BEND), 0.0), 1.0)
 
 
 def jacobian_of(x: Floats) -> Floats:
     """The Jacobian of the lengths of segments beyond the pinned ones by the free CVs, (n, 3 n)."""
-    free = len(x) - PINNED
+    free = len(x) - PINNED_COUNT
     jacobian = np.zeros((free, 3 * free))
     for row in range(free):
-        displacement = x[row + PINNED] - x[row + PINNED - 1]
+        displacement = x[row + PINNED_COUNT] - x[row + PINNED_COUNT - 1]
         unit = displacement / np.linalg.norm(displacement)
         jacobian[row, 3 * row : 3 * row + 3] = unit
         if row:
@@ -33,7 +33,7 @@ def jacobian_of(x: Floats) -> Floats:
     return jacobian
 
 
-def frames(x: Floats, style: Floats, twist_cv: int) -> list[Floats]:
+def segment_rotations(x: Floats, style: Floats, twist_cv: int) -> list[Floats]:
     """The rotation of each segment, with tangent, normal and binormal as columns, carried without
     twist."""
     tangents = [(b - a) / np.linalg.norm(b - a) for a, b in pairwise(x)]

@@ -14,36 +14,36 @@ import numpy as np
 
 from ...arrays import Floats
 from ...params.curve import sample_curve as curve_along
-from ..constraints import CONTACT_WEIGHT, HELD, HELD_SWEEPS, PINNED, ROUNDING
-from ..contacts import BETWEEN, MORE_ROUNDS, PART_PASSES, PARTS
+from ..constraints import CONTACT_WEIGHT, HELD_SWEEPS, HELD_WEIGHT, PINNED_COUNT, ROUNDING
+from ..contacts import MAX_EXTRA_ROUNDS, PART_COUNT, PART_PASS_FACTOR, SEGMENT_POINTS
 from ..frame import Frame, inherits_motion, root_places_after
 from ..groom_rotation import best_rotation
 from ..hair_grid import UPDATES_PER_SECOND
 from ..rigid_path import RigidMotion, RigidTransform
 from ..settings import DynamicsSettings
-from ..springs import STEEPEST, give, stiffness
+from ..springs import MAX_LINEARISED, max_extension_fraction, stiffness
 from ..state import DynamicsState
 from ..step import Drive
 from ..trajectory import curvature
-from ..wind import air_of
+from ..wind import air_from_settings
 from .contacts import (
-    Moment,
     Plane,
-    Solid,
+    Substep,
+    SubstepCollider,
     is_deep,
-    is_hurried,
+    is_fast,
     planes_of,
     push_out,
 )
-from .force_fields import blown_slowly
+from .force_fields import previous_after_fields
 from .hair_grid import GroomPoints, friction_and_push_reference
-from .shape import frames, hold, jacobian_of
+from .shape import jacobian_of, segment_rotations, turning_fraction
 
 #: Painted settings with a single value per guide.
 _PAINTED = ("gravity", "damping", "style_damping", "volume")
 
 
-def advance_slowly(
+def advance_reference(
     state: DynamicsState, drive: Drive, settings: DynamicsSettings, duration: float
 ) -> DynamicsState:
     """Reference of `step.advance`; see there."""
@@ -67,7 +67,7 @@ def advance_slowly(
         )
         placed = frame.root_place(number - 1) if frame.inherits_motion else None
         begin = (number * dt - state.time_left) / duration
-        moment = Moment(begin, begin + dt / duration, state.time + number * dt, dt)
+        moment = Substep(begin, begin + dt / duration, state.time + number * dt, dt)
         for guide in guides:
             guide.substep(drive, moment, carries, placed)
     if not guides:
@@ -95,7 +95,7 @@ class _Push:
         self, state: DynamicsState, drive: Drive, settings: DynamicsSettings, dt: float
     ) -> None:
         self.state, self.settings, self.dt = state, settings, dt
-        self.is_felt = settings.volume > 0.0 and state.cv_count > PINNED
+        self.is_felt = settings.volume > 0.0 and state.cv_count > PINNED_COUNT
         self.substeps = max(round(1.0 / (UPDATES_PER_SECOND * dt)), 1)
         self.first = round(state.time / dt)
         self.rows = state.push if self.is_felt else None
@@ -158,8 +158,8 @@ class _Guide:
         self.size = state.rest.size
         self.held = [False] * len(self.x)
         if drive.held is not None:
-            self.held[PINNED:] = drive.held.is_held[guide, PINNED:].tolist()
-        self.clearance = np.full((len(self.x), 1 + len(BETWEEN)), np.inf)
+            self.held[PINNED_COUNT:] = drive.held.is_held[guide, PINNED_COUNT:].tolist()
+        self.clearance = np.full((len(self.x), 1 + len(SEGMENT_POINTS)), np.inf)
         if drive.clearance is not None:
             self.clearance = drive.clearance.distances[guide].astype(np.float64)
         self.carrier = drive.carrier if inherits_motion(settings) else drive.style_carrier
@@ -187,7 +187,7 @@ class _Guide:
     def substep(
         self,
         drive: Drive,
-        moment: Moment,
+        moment: Substep,
         carries: list[RigidTransform],
         placed: RigidMotion | None,
     ) -> None:
@@ -204,9 +204,11 @@ class _Guide:
         if carries:
             self.x, style_begun = (_carried(carries[1], each) for each in (self.x, style_begun))
         self._brake(settings.drag, air, moment.dt)
-        fields = drive.force_fields.by(settings.force_fields)
+        fields = drive.force_fields.scaled(settings.force_fields)
         if fields is not None:
-            self.previous = blown_slowly(self.x, self.previous, fields, moment.dt, self.size)
+            self.previous = previous_after_fields(
+                self.x, self.previous, fields, moment.dt, self.size
+            )
         self._predict(settings, air, moment, style_begun)
         self.previous = begun
         style = self._style_at(moment.end)
@@ -215,14 +217,14 @@ class _Guide:
         self._restore_style(style, settings, moment.dt)
         self._pin(style)
         self._keep_lengths({}, settings)
-        found = [Solid.of(posed, moment, self.size) for posed in drive.colliders]
+        found = [SubstepCollider.of(posed, moment, self.size) for posed in drive.colliders]
         solids = [solid for solid in found if solid is not None]
         passes = settings.contact_passes if drive.colliders else 0
         if not self._keep_outside(solids, settings, moment.dt, passes):
             self._keep_outside_in_parts(solids, settings, moment.dt, passes)
 
     def _keep_outside(
-        self, solids: list[Solid], settings: DynamicsSettings, dt: float, passes: int
+        self, solids: list[SubstepCollider], settings: DynamicsSettings, dt: float, passes: int
     ) -> bool:
         """Solve contacts and lengths; False, without doing so, if the guide needs to be advanced in
         parts."""
@@ -235,11 +237,11 @@ class _Guide:
         spacing = self.size / (len(self.x) - 1)
         for solid, (of_cvs, of_segments) in zip(solids, found, strict=True):
             own = of_cvs + of_segments
-            if not solid.is_part and is_hurried(solid, own, self.x, self.previous, spacing):
+            if not solid.is_part and is_fast(solid, own, self.x, self.previous, spacing):
                 return False
         planes = [of_cvs for of_cvs, _ in found] + [of_segments for _, of_segments in found]
         self._solve_in_turn(planes, settings, passes)
-        for _ in range(MORE_ROUNDS):
+        for _ in range(MAX_EXTRA_ROUNDS):
             if not is_deep(planes, self.x):
                 break
             self._solve_in_turn(planes, settings, 1)
@@ -250,23 +252,23 @@ class _Guide:
 
     def _keep_outside_in_parts(
         self,
-        solids: list[Solid],
+        solids: list[SubstepCollider],
         settings: DynamicsSettings,
         dt: float,
         passes: int,
     ) -> None:
-        end, path = self.x.copy(), (self.x - self.previous) / PARTS
+        end, path = self.x.copy(), (self.x - self.previous) / PART_COUNT
         went = np.zeros_like(path)
         self.x = self.previous.copy()
-        for number in range(PARTS):
+        for number in range(PART_COUNT):
             self.previous = self.x.copy()
             self.x = self.x + path
-            if number == PARTS - 1:
-                carried = [*range(PINNED), *self._held_cvs()]
+            if number == PART_COUNT - 1:
+                carried = [*range(PINNED_COUNT), *self._held_cvs()]
                 self.x[carried] = end[carried]
             self._keep_lengths({}, settings)
-            solids_now = [solid.part(number, PARTS) for solid in solids]
-            self._keep_outside(solids_now, settings, dt / PARTS, passes * PART_PASSES)
+            solids_now = [solid.part(number, PART_COUNT) for solid in solids]
+            self._keep_outside(solids_now, settings, dt / PART_COUNT, passes * PART_PASS_FACTOR)
             path = self.x - self.previous
             went += path
         self.previous = self.x - went
@@ -297,9 +299,9 @@ class _Guide:
         pivot = self.carrier.pivot
         return (points - pivot - place.shift) @ place.rotation + pivot
 
-    def _air(self, settings: DynamicsSettings, moment: Moment) -> Floats:
+    def _air(self, settings: DynamicsSettings, moment: Substep) -> Floats:
         """Velocity of the air at the root, (3,)."""
-        air = air_of(settings)
+        air = air_from_settings(settings)
         if air is None:
             return np.zeros(3)
         return air.at(self.x[0][:, None].astype(np.float32), moment.time)[:, 0].astype(np.float64)
@@ -311,7 +313,7 @@ class _Guide:
             self.previous[cv] = self.x[cv] - (through + air) * dt
 
     def _predict(
-        self, settings: DynamicsSettings, air: Floats, moment: Moment, style_begun: Floats
+        self, settings: DynamicsSettings, air: Floats, moment: Substep, style_begun: Floats
     ) -> None:
         both = settings.damping + settings.style_damping
         kept = math.exp(-both * moment.dt)
@@ -325,8 +327,8 @@ class _Guide:
             self.x[cv] = self.x[cv] + moved
 
     def _pin(self, style: Floats) -> None:
-        self.x[:PINNED] = style[:PINNED]
-        before = PINNED - 1
+        self.x[:PINNED_COUNT] = style[:PINNED_COUNT]
+        before = PINNED_COUNT - 1
         for cv in self._held_cvs():
             displacement = style[cv] - self.x[before]
             ratio = sum(self.rest_length[before:cv]) / float(np.linalg.norm(displacement))
@@ -340,19 +342,19 @@ class _Guide:
     def _towards_root(self) -> list[int]:
         """Free CVs with a held one beyond them, the last first."""
         last = max(self._held_cvs(), default=0)
-        return [cv for cv in range(last - 1, PINNED - 1, -1) if not self.held[cv]]
+        return [cv for cv in range(last - 1, PINNED_COUNT - 1, -1) if not self.held[cv]]
 
     def _felt_gravity(self, drive: Drive, settings: DynamicsSettings, turn: Floats) -> Floats:
         pull = np.asarray(drive.gravity, np.float64) * settings.gravity
         felt = np.tile(pull * (1.0 - settings.buoyancy), (len(self.x), 1))
-        free = len(self.x) - PINNED
+        free = len(self.x) - PINNED_COUNT
         if free < 1:
             return felt
         # the part of the combed weight orthogonal to all length constraints, by projection
         combed = np.tile(turn @ pull, free)
         jacobian = jacobian_of(self.middle)
         tension = self._tension_on_style(turn @ pull)
-        felt[PINNED:] -= settings.sag_compensation * (combed - jacobian.T @ tension).reshape(
+        felt[PINNED_COUNT:] -= settings.sag_compensation * (combed - jacobian.T @ tension).reshape(
             free, 3
         )
         return felt
@@ -360,7 +362,7 @@ class _Guide:
     def _tension_on_style(self, combed: Floats) -> Floats:
         """The tension of each segment beyond the pinned ones that holds the style's gravity
         [m/s^2]."""
-        free = len(self.x) - PINNED
+        free = len(self.x) - PINNED_COUNT
         if free < 1:
             return np.zeros(0)
         jacobian = jacobian_of(self.middle)
@@ -369,17 +371,17 @@ class _Guide:
 
     def _give(self, settings: DynamicsSettings, dt: float) -> None:
         """One step of the springs along a curl, by their tension; sets `length` to the result."""
-        room = self.room[PINNED - 1 :] * give(settings)
+        room = self.room[PINNED_COUNT - 1 :] * max_extension_fraction(settings)
         if not room.any():
             return
-        free, kappa = len(self.x) - PINNED, stiffness(settings, len(self.x))
-        rest = np.array(self.rest_length[PINNED - 1 :])
-        previous = np.linalg.norm(np.diff(self.previous[PINNED - 1 :], axis=0), axis=1)
+        free, kappa = len(self.x) - PINNED_COUNT, stiffness(settings, len(self.x))
+        rest = np.array(self.rest_length[PINNED_COUNT - 1 :])
+        previous = np.linalg.norm(np.diff(self.previous[PINNED_COUNT - 1 :], axis=0), axis=1)
         right = self._lengths() - rest
         compliance = np.zeros(free)
         for one in np.flatnonzero(room):
             most = room[one] * rest[one]
-            ratio = np.clip((previous[one] - rest[one]) / most, -STEEPEST, STEEPEST)
+            ratio = np.clip((previous[one] - rest[one]) / most, -MAX_LINEARISED, MAX_LINEARISED)
             slope = kappa * (1.0 + ratio**2) / (1.0 - ratio**2) ** 2
             tension = kappa * most * ratio / (1.0 - ratio**2) + self.load[one]
             compliance[one] = 1.0 / (slope * dt * dt)
@@ -387,49 +389,51 @@ class _Guide:
         jacobian, mobility = jacobian_of(self.x), self._mobility({})
         before = self.x.copy()
         tension = np.linalg.solve(jacobian @ mobility @ jacobian.T + np.diag(compliance), right)
-        self.x[PINNED:] -= (mobility @ jacobian.T @ tension).reshape(free, 3)
+        self.x[PINNED_COUNT:] -= (mobility @ jacobian.T @ tension).reshape(free, 3)
         held = self._held_cvs()
         self.x[held] = before[held]
         longest = rest * (1.0 + room)
         left = np.clip(self._lengths(), rest**2 / longest, longest)
-        self.length = [*self.rest_length[: PINNED - 1], *left]
+        self.length = [*self.rest_length[: PINNED_COUNT - 1], *left]
 
     def _restore_style(self, style: Floats, settings: DynamicsSettings, dt: float) -> None:
         count = len(self.x)
-        free = count - PINNED
+        free = count - PINNED_COUNT
         if free < 1:
             return
         bend_frequency = 2.0 * math.pi * (count - 1) ** 2 / 3.5160
         at_root, at_tip, bends = (
             getattr(settings, name) * factor for name, factor in self.stiffness.items()
         )
-        turns = frames(self.x, style, self.twist_cv)
-        rest_turns = frames(self.rest, self.rest, self.twist_cv)
-        matrix, right = np.eye(free), self.x[PINNED:].copy()
-        for cv in range(PINNED, count):
+        turns = segment_rotations(self.x, style, self.twist_cv)
+        rest_turns = segment_rotations(self.rest, self.rest, self.twist_cv)
+        matrix, right = np.eye(free), self.x[PINNED_COUNT:].copy()
+        for cv in range(PINNED_COUNT, count):
             along = float(curve_along(settings.style_along, np.array([cv / (count - 1)]))[0])
             swings = at_root[cv] * along + at_tip[cv] * (1.0 - along)
             pull = (2.0 * math.pi * swings * dt) ** 2
-            matrix[cv - PINNED, cv - PINNED] += pull
-            right[cv - PINNED] += pull * style[cv]
+            matrix[cv - PINNED_COUNT, cv - PINNED_COUNT] += pull
+            right[cv - PINNED_COUNT] += pull * style[cv]
         for i in range(1, count - 1):
             rest_second = self.rest[i + 1] - 2.0 * self.rest[i] + self.rest[i - 1]
             style_second = style[i + 1] - 2.0 * style[i] + style[i - 1]
-            held = hold(rest_second, (self.rest_length[i] + self.rest_length[i - 1]) / 2.0)
+            held = turning_fraction(
+                rest_second, (self.rest_length[i] + self.rest_length[i - 1]) / 2.0
+            )
             wanted = held * (turns[i - 1] @ rest_turns[i - 1].T @ rest_second)
             wanted = wanted + (1.0 - held) * style_second
             weights = {i - 1: 1.0, i: -2.0, i + 1: 1.0}
             for one, weight in weights.items():
-                if one < PINNED:
+                if one < PINNED_COUNT:
                     wanted = wanted - weight * self.x[one]
-            inner = {one - PINNED: w for one, w in weights.items() if one >= PINNED}
+            inner = {one - PINNED_COUNT: w for one, w in weights.items() if one >= PINNED_COUNT}
             along = float(curve_along(settings.bend_along, np.array([i / (count - 1)]))[0])
             stiffness = (bend_frequency * bends[i] * along * dt) ** 2
             for one, weight in inner.items():
                 right[one] += stiffness * weight * wanted
                 for other, other_weight in inner.items():
                     matrix[one, other] += stiffness * weight * other_weight
-        self.x[PINNED:] = np.linalg.solve(matrix, right)
+        self.x[PINNED_COUNT:] = np.linalg.solve(matrix, right)
 
     def _keep_lengths(self, normals: dict[int, Floats], settings: DynamicsSettings) -> None:
         if settings.length_solver == "direct":
@@ -442,17 +446,17 @@ class _Guide:
 
     def _relax(self) -> None:
         last = len(self.x) - 1
-        for cv in range(PINNED, last + 1):
+        for cv in range(PINNED_COUNT, last + 1):
             displacement = self.x[cv] - self.x[cv - 1]
             excess = displacement * (1.0 - self.length[cv - 1] / np.linalg.norm(displacement))
-            free = [cv > PINNED and not self.held[cv - 1], not self.held[cv]]
+            free = [cv > PINNED_COUNT and not self.held[cv - 1], not self.held[cv]]
             lower, upper = (one / max(sum(free), 1) for one in free)
             self.x[cv - 1] += excess * lower
             self.x[cv] -= excess * upper
 
     def _hold_within_reach(self) -> None:
-        root, reach = self.x[PINNED - 1], 0.0
-        for cv in range(PINNED, len(self.x)):
+        root, reach = self.x[PINNED_COUNT - 1], 0.0
+        for cv in range(PINNED_COUNT, len(self.x)):
             reach += self.length[cv - 1]
             displacement = self.x[cv] - root
             self.x[cv] = root + displacement * min(reach / float(np.linalg.norm(displacement)), 1.0)
@@ -462,7 +466,7 @@ class _Guide:
             self.x[held] = before
             for cv in self._towards_root():
                 self._bring_near(cv, cv + 1, self.length[cv])
-            for cv in range(PINNED, len(self.x)):
+            for cv in range(PINNED_COUNT, len(self.x)):
                 self._bring_near(cv, cv - 1, self.length[cv - 1])
 
     def _bring_near(self, cv: int, other: int, farthest: float) -> None:
@@ -472,25 +476,25 @@ class _Guide:
             self.x[cv] = self.x[other] + offset * (farthest / away)
 
     def _newton_step(self, normals: dict[int, Floats]) -> None:
-        free = len(self.x) - PINNED
+        free = len(self.x) - PINNED_COUNT
         if free < 1:
             return
         jacobian, mobility, held = jacobian_of(self.x), self._mobility(normals), self._held_cvs()
         before = self.x[held].copy()
-        error = self._lengths() - self.length[PINNED - 1 :]
+        error = self._lengths() - self.length[PINNED_COUNT - 1 :]
         tension = np.linalg.solve(jacobian @ mobility @ jacobian.T, error)
-        self.x[PINNED:] -= (mobility @ jacobian.T @ tension).reshape(free, 3)
+        self.x[PINNED_COUNT:] -= (mobility @ jacobian.T @ tension).reshape(free, 3)
         self.x[held] = before
 
     def _mobility(self, normals: dict[int, Floats]) -> Floats:
-        free = len(self.x) - PINNED
+        free = len(self.x) - PINNED_COUNT
         mobility = np.eye(3 * free)
         for cv, normal in normals.items():
-            at = slice(3 * (cv - PINNED), 3 * (cv - PINNED) + 3)
+            at = slice(3 * (cv - PINNED_COUNT), 3 * (cv - PINNED_COUNT) + 3)
             mobility[at, at] -= float(CONTACT_WEIGHT) * np.outer(normal, normal)
         for cv in self._held_cvs():
-            at = slice(3 * (cv - PINNED), 3 * (cv - PINNED) + 3)
-            mobility[at, at] = (1.0 - float(HELD)) * np.eye(3)
+            at = slice(3 * (cv - PINNED_COUNT), 3 * (cv - PINNED_COUNT) + 3)
+            mobility[at, at] = (1.0 - float(HELD_WEIGHT)) * np.eye(3)
         return mobility
 
     def _finish_lengths(self, normals: dict[int, Floats], settings: DynamicsSettings) -> None:
@@ -502,7 +506,7 @@ class _Guide:
             self._lay_out()
 
     def _is_off(self, tolerance: float) -> bool:
-        wanted = np.array(self.length[PINNED - 1 :])
+        wanted = np.array(self.length[PINNED_COUNT - 1 :])
         allowed = wanted * tolerance + ROUNDING * self.size
         return bool((np.abs(self._lengths() - wanted) > allowed).any())
 
@@ -511,7 +515,7 @@ class _Guide:
         for cv in self._towards_root():
             self.x[cv] = self.x[cv + 1] - segment[cv]
         segment = self._segments()
-        for cv in range(PINNED, len(self.x)):
+        for cv in range(PINNED_COUNT, len(self.x)):
             self.x[cv] = self.x[cv - 1] + segment[cv - 1]
 
     def _segments(self) -> Floats:
@@ -526,4 +530,4 @@ class _Guide:
         )
 
     def _lengths(self) -> Floats:
-        return np.array([np.linalg.norm(b - a) for a, b in pairwise(self.x[PINNED - 1 :])])
+        return np.array([np.linalg.norm(b - a) for a, b in pairwise(self.x[PINNED_COUNT - 1 :])])

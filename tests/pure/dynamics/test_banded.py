@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hairloom.addon.dynamics.banded import SharedBand, solve_tridiagonal
+from hairloom.addon.dynamics.banded import PentadiagonalSystem, solve_tridiagonal
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 14, 62])
@@ -26,7 +26,7 @@ def test_shared_band_equals_dense(count):
     matrix = np.diag(np.linspace(1.0, 3.0, count)) + 11.0 * second.T @ second
     right = np.random.default_rng(count).normal(size=(3, count, 5)).astype(np.float32)
     expected = np.linalg.solve(matrix, right.astype(np.float64))
-    SharedBand(*diagonals(matrix)).solve(right)
+    PentadiagonalSystem(*diagonals(matrix)).solve(right)
     np.testing.assert_allclose(right, expected, atol=1e-5)
 
 
@@ -37,7 +37,7 @@ def test_each_guide_may_have_a_matrix_of_its_own(count):
     right = np.random.default_rng(count).normal(size=(3, count, 5)).astype(np.float32)
     expected = [np.linalg.solve(one, right[:, :, g].T).T for g, one in enumerate(matrices)]
     each = [diagonals(one) for one in matrices]
-    band = SharedBand(*(np.concatenate(rows, axis=1) for rows in zip(*each, strict=True)))
+    band = PentadiagonalSystem(*(np.concatenate(rows, axis=1) for rows in zip(*each, strict=True)))
     part = right[:, :, 2:4].copy()
     band.solve(right)
     np.testing.assert_allclose(right.transpose(2, 0, 1), expected, atol=1e-5)
@@ -54,5 +54,5 @@ def diagonals(matrix):
 
 
 def test_nothing_to_solve():
-    SharedBand(*np.zeros((3, 0, 1))).solve(np.zeros((3, 0, 4), np.float32))
+    PentadiagonalSystem(*np.zeros((3, 0, 1))).solve(np.zeros((3, 0, 4), np.float32))
     solve_tridiagonal(np.zeros((0, 4)), np.zeros((0, 4)), np.zeros((0, 4)))

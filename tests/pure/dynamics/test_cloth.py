@@ -12,7 +12,7 @@ from hairloom.addon.dynamics.cloth.coloring import (
     opposite_pairs,
     unique_edges,
 )
-from hairloom.addon.dynamics.cloth.reference import advance_cloth_slowly
+from hairloom.addon.dynamics.cloth.reference import advance_cloth_reference
 from hairloom.addon.dynamics.cloth.settings import FinSettings
 from hairloom.addon.dynamics.cloth.state import distances, start_cloth, vertex_normals
 from hairloom.addon.dynamics.cloth.step import advance_cloth, cloth_at_frame_end
@@ -295,7 +295,7 @@ def test_the_slow_form_agrees(values, tolerance):
     drive = {"colliders": (PosedCollider(ball, np.eye(4), moved),)} if "radius" in values else {}
     ends = [
         play(state, 8 / 60, FinSettings(**values), shaken, advance=form, **drive)[-1]
-        for form in (advance_cloth, advance_cloth_slowly)
+        for form in (advance_cloth, advance_cloth_reference)
     ]
     assert np.abs(ends[0].position - state.position).max() > 1e-3
     assert ends[0].position == pytest.approx(ends[1].position, abs=tolerance)

@@ -5,8 +5,8 @@ import pytest
 
 from hairloom.addon.dynamics.constraints import (
     CONTACT_WEIGHT,
-    PINNED,
-    Touched,
+    PINNED_COUNT,
+    TouchingCvs,
     directions,
     finish_lengths,
     hold_within_reach,
@@ -22,7 +22,7 @@ def disturbed(kit):
     rows = np.ascontiguousarray(kit.curly(40, 16).transpose(2, 1, 0))
     length = np.linalg.norm(np.diff(rows, axis=1), axis=0)
     noise = np.random.default_rng(1).uniform(-0.003, 0.003, rows.shape).astype(np.float32)
-    noise[:, :PINNED] = 0.0
+    noise[:, :PINNED_COUNT] = 0.0
     return rows + noise, length
 
 
@@ -53,7 +53,7 @@ def test_pinned_cvs_stay(disturbed):
     position, length = disturbed
     before = position.copy()
     keep_lengths(position, length, None, None)
-    np.testing.assert_array_equal(position[:, :PINNED], before[:, :PINNED])
+    np.testing.assert_array_equal(position[:, :PINNED_COUNT], before[:, :PINNED_COUNT])
 
 
 def test_momentum_comes_only_through_the_root(disturbed):
@@ -63,7 +63,7 @@ def test_momentum_comes_only_through_the_root(disturbed):
     direction, _ = directions(position)
     keep_lengths(position, length, None, None)
     total = (position - before).astype(np.float64).sum(axis=1)
-    across = np.cross(total, direction[:, PINNED - 1], axis=0)
+    across = np.cross(total, direction[:, PINNED_COUNT - 1], axis=0)
     assert np.linalg.norm(total, axis=0).max() > 1e-3
     assert np.linalg.norm(across, axis=0).max() < 1e-6
 
@@ -71,8 +71,8 @@ def test_momentum_comes_only_through_the_root(disturbed):
 def test_contact_slides(disturbed):
     """A CV in contact moves ten times more easily along the surface than along its normal."""
     position, length = disturbed
-    cv, guides = 5 + PINNED, np.arange(40)
-    touched = Touched(cv * 40 + guides, np.float32([[0.0], [0.0], [1.0]]) + 0.0 * guides)
+    cv, guides = 5 + PINNED_COUNT, np.arange(40)
+    touched = TouchingCvs(cv * 40 + guides, np.float32([[0.0], [0.0], [1.0]]) + 0.0 * guides)
     free, held = position.copy(), position.copy()
     keep_lengths(free, length, None, None)
     keep_lengths(held, length, touched, None)
@@ -89,9 +89,9 @@ def touching(position, seed=5):
     normal = random.normal(size=position.shape).astype(np.float32)
     normal /= np.linalg.norm(normal, axis=0)
     normal *= random.random(position.shape[1:]) < 1.0 / 3.0
-    normal[:, :PINNED] = 0.0
+    normal[:, :PINNED_COUNT] = 0.0
     index = np.flatnonzero(normal.any(axis=0))
-    return Touched(index, normal.reshape(3, -1)[:, index]), normal
+    return TouchingCvs(index, normal.reshape(3, -1)[:, index]), normal
 
 
 def test_a_step_with_contacts_is_newtons(disturbed):
@@ -102,16 +102,16 @@ def test_a_step_with_contacts_is_newtons(disturbed):
     keep_lengths(position, length, touched, None)
     for guide in range(40):
         x, n = before[:, :, guide].T, normal[:, :, guide].T.astype(np.float64)
-        way = np.diff(x, axis=0)[PINNED - 1 :]
+        way = np.diff(x, axis=0)[PINNED_COUNT - 1 :]
         now = np.linalg.norm(way, axis=1)
         jacobian = np.zeros((len(way), len(x), 3))
         for j, direction in enumerate(way / now[:, None]):
-            jacobian[j, j + PINNED - 1], jacobian[j, j + PINNED] = -direction, direction
+            jacobian[j, j + PINNED_COUNT - 1], jacobian[j, j + PINNED_COUNT] = -direction, direction
         mobility = np.eye(3) - float(CONTACT_WEIGHT) * n[:, :, None] * n[:, None]
-        mobility[:PINNED] = 0.0
+        mobility[:PINNED_COUNT] = 0.0
         moved = np.einsum("cab,jcb->jca", mobility, jacobian)
         matrix = np.einsum("jca,kca->jk", jacobian, moved)
-        pull = np.linalg.solve(matrix, now - length[PINNED - 1 :, guide])
+        pull = np.linalg.solve(matrix, now - length[PINNED_COUNT - 1 :, guide])
         expected = x - np.einsum("jca,j->ca", moved, pull)
         np.testing.assert_allclose(position[:, :, guide].T, expected, atol=2e-6)
 
@@ -140,7 +140,9 @@ def test_finish_reaches_the_tolerance_only_where_needed(disturbed):
 def test_finish_never_gives_up_on_lengths(disturbed):
     """Where one Newton step is not enough, guides are laid out again, so that lengths hold."""
     position, length = disturbed
-    position[:, PINNED:] *= np.random.default_rng(2).uniform(-30, 30, position[:, PINNED:].shape)
+    position[:, PINNED_COUNT:] *= np.random.default_rng(2).uniform(
+        -30, 30, position[:, PINNED_COUNT:].shape
+    )
     finish_lengths(position, length, None, None, 0.002, 1, 0.2)
     assert error(position, length) <= 0.002 * 1.001
 
@@ -165,10 +167,12 @@ def test_relaxation_leaves_held_tips_where_they_are(disturbed):
 
 def test_long_range_attachment_bounds_the_way_from_the_root(disturbed):
     position, length = disturbed
-    position[:, PINNED:] *= 3.0
+    position[:, PINNED_COUNT:] *= 3.0
     hold_within_reach(position, length, None)
-    away = np.linalg.norm(position[:, PINNED:] - position[:, PINNED - 1 : PINNED], axis=0)
-    reach = np.cumsum(length[PINNED - 1 :], axis=0)
+    away = np.linalg.norm(
+        position[:, PINNED_COUNT:] - position[:, PINNED_COUNT - 1 : PINNED_COUNT], axis=0
+    )
+    reach = np.cumsum(length[PINNED_COUNT - 1 :], axis=0)
     assert (away <= reach * 1.00001).all()
     assert (away > 0.99 * reach).any()
 
@@ -178,8 +182,8 @@ def test_long_range_attachment_leaves_no_zigzag(disturbed, held):
     """A zigzag near the root is within reach of the attachment, and yet too long."""
     position, length = disturbed
     to_and_fro = (np.arange(position.shape[1]) % 2 * 0.05).astype(np.float32)
-    position[0, PINNED:] = position[0, PINNED - 1] + to_and_fro[PINNED:, None]
-    position[1:, PINNED:] = position[1:, PINNED - 1 : PINNED]
+    position[0, PINNED_COUNT:] = position[0, PINNED_COUNT - 1] + to_and_fro[PINNED_COUNT:, None]
+    position[1:, PINNED_COUNT:] = position[1:, PINNED_COUNT - 1 : PINNED_COUNT]
     assert (directions(position)[1][1:].sum(axis=0) > 2.0 * length[1:].sum(axis=0)).any()
     hold_within_reach(position, length, tips() if held else None)
     assert (directions(position)[1][1:] <= length[1:] * 1.00001).all()
@@ -187,8 +191,8 @@ def test_long_range_attachment_leaves_no_zigzag(disturbed, held):
 
 def test_long_range_attachment_leaves_what_is_near(disturbed):
     position, length = disturbed
-    position[:, PINNED:] = position[:, PINNED - 1 : PINNED] + 0.2 * (
-        position[:, PINNED:] - position[:, PINNED - 1 : PINNED]
+    position[:, PINNED_COUNT:] = position[:, PINNED_COUNT - 1 : PINNED_COUNT] + 0.2 * (
+        position[:, PINNED_COUNT:] - position[:, PINNED_COUNT - 1 : PINNED_COUNT]
     )
     before = position.copy()
     hold_within_reach(position, length, None)
@@ -199,9 +203,9 @@ def test_long_range_attachment_leaves_what_is_near(disturbed):
 def test_a_held_tip_is_held_as_far_as_the_strand_reaches(disturbed, far):
     position, length = disturbed
     carried = position.copy()
-    root = carried[:, PINNED - 1]
+    root = carried[:, PINNED_COUNT - 1]
     direction = np.array([0.0, 0.6, 0.8], np.float32)[:, None]
-    reach = length[PINNED - 1 :].sum(axis=0)
+    reach = length[PINNED_COUNT - 1 :].sum(axis=0)
     carried[:, -1] = root + direction * reach * np.float32(0.5 * far)
     pin(position, carried, length, tips())
     expected = root + direction * reach * min(0.5 * far, 1.0)
@@ -223,7 +227,7 @@ def test_finish_lays_guides_with_held_tips_out_towards_them(disturbed):
     position, length = disturbed
     tip = position[:, -1].copy()
     noise = np.random.default_rng(2).normal(0.0, 0.02, position[:, 3:].shape).astype(np.float32)
-    position[:, PINNED:-1] += noise
+    position[:, PINNED_COUNT:-1] += noise
     away = {}
     for held in (None, tips()):
         laid_out = position.copy()

@@ -10,7 +10,7 @@ from hairloom.addon.dynamics.colliders import (
     SphereCollider,
     SphereSetCollider,
 )
-from hairloom.addon.dynamics.contacts import Contacts, cv_radius, touched_by
+from hairloom.addon.dynamics.contacts import Contacts, cv_radius, touching_cvs
 from hairloom.addon.dynamics.measure import deepest_penetration, max_stretch
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import start
@@ -369,7 +369,7 @@ def test_of_two_colliders_that_touch_a_cv_the_last_one_counts():
         )
 
     both = [contacts([2, 5, 7], (1, 0, 0)), contacts([1, 5, 7, 9], (0, 1, 0))]
-    found = touched_by(both, [np.array([1, 1, 0], bool), np.array([0, 1, 1, 1], bool)])
+    found = touching_cvs(both, [np.array([1, 1, 0], bool), np.array([0, 1, 1, 1], bool)])
     np.testing.assert_array_equal(found.index, [2, 5, 7, 9])
     np.testing.assert_array_equal(found.normal.T[:, :2], [[1, 0], [0, 1], [0, 1], [0, 1]])
-    assert touched_by(both, [np.zeros(3, bool), np.zeros(4, bool)]) is None
+    assert touching_cvs(both, [np.zeros(3, bool), np.zeros(4, bool)]) is None

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hairloom.addon.dynamics.colliders import DistanceField, PosedCollider, SphereCollider
-from hairloom.addon.dynamics.figures import CardFigures, Figures, Measure, blank_table
+from hairloom.addon.dynamics.figures import CardFigures, Figures, FiguresCollector, blank_table
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import start
 from hairloom.addon.strands import Surface
@@ -29,11 +29,13 @@ def ball(z):
 
 
 def measure_of(grid, colliders=()):
-    return Measure(start(grid[:4]), grid.reshape(-1, 3), np.arange(COUNT + 1) * POINTS, colliders)
+    return FiguresCollector(
+        start(grid[:4]), grid.reshape(-1, 3), np.arange(COUNT + 1) * POINTS, colliders
+    )
 
 
 def add(measure, grid, colliders=()):
-    measure.add(grid.reshape(-1, 3), LENGTHS, grid[:4], colliders)
+    measure.add_frame(grid.reshape(-1, 3), LENGTHS, grid[:4], colliders)
 
 
 def test_each_strand_counts_by_its_worst_frame():
@@ -62,16 +64,16 @@ def test_what_is_too_short_to_be_measured_does_not_decide():
     grid[0] = 1.0
     grid[0, :, 2] += np.linspace(0.0, 2.0e-6, POINTS)
     points, offsets = grid.reshape(-1, 3), np.arange(COUNT + 1) * POINTS
-    measure = Measure(start(grid[:4]), points, offsets, ())
+    measure = FiguresCollector(start(grid[:4]), points, offsets, ())
     now = grid.copy()
     now[0, -1, 2] += 6.0e-6
     lengths = np.where(np.arange(COUNT) == 0, 2.0e-6, LENGTHS)
-    measure.add(now.reshape(-1, 3), lengths, now[:4], ())
+    measure.add_frame(now.reshape(-1, 3), lengths, now[:4], ())
     assert 0.2 < measure.figures.strands_stretch_max_percent < 0.5
     assert 1.0 < measure.figures.stretch_max_percent < 3.0  # of a hundredth of 29 mm
     now = grid.copy()
     now[3, -1, 2] += 0.1 * 0.2 / (POINTS - 1)
-    measure.add(now.reshape(-1, 3), lengths, now[:4], ())
+    measure.add_frame(now.reshape(-1, 3), lengths, now[:4], ())
     assert measure.figures.stretch_max_percent == pytest.approx(10.0, abs=0.1)
 
 

@@ -9,24 +9,24 @@ import numpy as np
 import pytest
 from tiers import few_in_commits
 
-from hairloom.addon.dynamics.cloth.reference import advance_cloth_slowly
+from hairloom.addon.dynamics.cloth.reference import advance_cloth_reference
 from hairloom.addon.dynamics.cloth.settings import FinSettings
 from hairloom.addon.dynamics.cloth.state import start_cloth
 from hairloom.addon.dynamics.cloth.step import advance_cloth
 from hairloom.addon.dynamics.force_fields import (
-    FARTHEST,
     KINDS,
+    MAX_DISPLACEMENT,
     SHAPES,
     Falloff,
     ForceField,
     ForceFields,
-    along_strands,
-    blow,
-    felt,
+    apply_force_fields,
+    field_effect,
+    strand_directions,
 )
 from hairloom.addon.dynamics.measure import max_stretch
-from hairloom.addon.dynamics.reference.force_fields import acceleration, blown_slowly
-from hairloom.addon.dynamics.reference.step import advance_slowly
+from hairloom.addon.dynamics.reference.force_fields import acceleration, previous_after_fields
+from hairloom.addon.dynamics.reference.step import advance_reference
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.step import Drive
 
@@ -54,7 +54,7 @@ def variants():
                     damping=float(random.uniform(0.0, 2.0)),
                     size=float(random.choice([0.0, 0.3])),
                     flow=float(random.choice([0.0, 1.0, -0.5])),
-                    across=float(random.choice([0.0, 0.3, 1.0])),
+                    across_fraction=float(random.choice([0.0, 0.3, 1.0])),
                     falloff=falloff,
                     side=int(random.integers(-1, 2)),
                     distance=Falloff(float(random.choice([0.0, 2.0, 1.37])), 0.2, 1.2),
@@ -83,7 +83,7 @@ def test_the_slow_form_agrees_at_any_point():
     points, speeds = points_and_speeds()
     for one in variants():
         fields = ForceFields((one,), PERMUTATION, 0.7)
-        ours = felt(fields, points, speeds).acceleration(speeds)
+        ours = field_effect(fields, points, speeds).acceleration(speeds)
         theirs = [
             acceleration(*(vector.astype(np.float64) for vector in pair), fields)
             for pair in zip(points.T, speeds.T, strict=True)
@@ -98,17 +98,17 @@ def test_the_slow_form_agrees_on_strands(kit):
     for one in variants():
         fields = ForceFields((one,), PERMUTATION, 1.3)
         fast = previous.copy()
-        blow(
+        apply_force_fields(
             position.reshape(3, -1),
             fast.reshape(3, -1),
             fields,
             DT,
             0.2,
-            along_strands(position).reshape(3, -1),
+            strand_directions(position).reshape(3, -1),
         )
         for guide in range(3):
             x, before = (rows[:, :, guide].T.astype(np.float64) for rows in (position, previous))
-            slow = blown_slowly(x, before, fields, DT, 0.2)
+            slow = previous_after_fields(x, before, fields, DT, 0.2)
             np.testing.assert_allclose(fast[:, :, guide].T, slow, atol=2e-6, err_msg=str(one))
 
 
@@ -123,7 +123,7 @@ def test_the_slow_step_agrees(kit, shake, kind):
         force_fields=ForceFields(fields, PERMUTATION),
     )
     plain = kit.Scene(kit.curly(4, 10), DynamicsSettings(length_tolerance=0.0001), shake)
-    slow = kit.Scene(**scene.__dict__ | {"advance": advance_slowly})
+    slow = kit.Scene(**scene.__dict__ | {"advance": advance_reference})
     states = [one.play(0.2, 50.0)[-1].position for one in (scene, slow, plain)]
     np.testing.assert_allclose(states[0], states[1], atol=2e-4)
     assert np.abs(states[0] - states[2]).max() > 1e-4, "they act"
@@ -137,7 +137,7 @@ def test_the_slow_cloth_agrees():
     drive = Drive(points, points, (), np.zeros(3), force_fields=fields)
     ends = [
         form(state, drive, FinSettings(), 0.04).position
-        for form in (advance_cloth, advance_cloth_slowly)
+        for form in (advance_cloth, advance_cloth_reference)
     ]
     np.testing.assert_allclose(*ends, atol=2e-5)
     assert np.abs(ends[0] - state.position).max() > 1e-3
@@ -165,7 +165,7 @@ def test_free_hair_in_even_wind_goes_as_fast_as_it_blows(kit):
     wind = ForceFields((ForceField("wind", axis=(1.0, 0.0, 0.0), strength=3.0, flow=2.0),))
     position, steps = previous.copy(), 90
     for _ in range(steps):
-        blow(position, previous, wind, DT, 0.2)
+        apply_force_fields(position, previous, wind, DT, 0.2)
         position, previous = 2.0 * position - previous, position
     speed = (position - previous)[0] / DT
     expected = 1.5 * (1.0 - np.exp(-2.0 * steps * DT))
@@ -180,7 +180,7 @@ def test_a_magnet_turns_speed_and_adds_none():
     turned = 0.0
     for _ in range(40):
         before = position - previous
-        blow(position, previous, magnet, DT, 10.0)
+        apply_force_fields(position, previous, magnet, DT, 10.0)
         after = position - previous
         lengths = [float(np.linalg.norm(one)) for one in (before, after)]
         assert 0.999 * lengths[0] < lengths[1] <= lengths[0]
@@ -218,8 +218,10 @@ def test_hair_stays_whole_in_any_field(kit, kind, strength):
 def test_a_field_moves_no_cv_farther_than_a_part_of_its_hair():
     position = np.zeros((3, 5), np.float32)
     previous = position.copy()
-    blow(position, previous, ForceFields((ForceField("wind", strength=1e6),)), DT, 0.3)
-    np.testing.assert_allclose(position[2] - previous[2], FARTHEST * 0.3, rtol=1e-5)
+    apply_force_fields(
+        position, previous, ForceFields((ForceField("wind", strength=1e6),)), DT, 0.3
+    )
+    np.testing.assert_allclose(position[2] - previous[2], MAX_DISPLACEMENT * 0.3, rtol=1e-5)
 
 
 def test_the_frame_rate_does_not_matter(kit):

@@ -15,7 +15,7 @@ from hairloom.addon.dynamics.hair_grid import (
     friction_and_push,
 )
 from hairloom.addon.dynamics.reference.hair_grid import GroomPoints, friction_and_push_reference
-from hairloom.addon.dynamics.reference.step import advance_slowly
+from hairloom.addon.dynamics.reference.step import advance_reference
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import start
 from hairloom.addon.dynamics.step import Drive, advance
@@ -56,7 +56,7 @@ def test_a_frame_as_without_a_grid():
         target = grid + np.float32([0.01 * frame, 0.0, 0.0])
         drive = Drive(target - np.float32([0.01, 0.0, 0.0]), target, (), EARTH)
         fast = advance(fast, drive, settings, 1.0 / 24.0)
-        slow = advance_slowly(slow, drive, settings, 1.0 / 24.0)
+        slow = advance_reference(slow, drive, settings, 1.0 / 24.0)
         np.testing.assert_allclose(fast.position, slow.position, atol=2e-5)
     alone = played(grid, replace(settings, volume=0.0), 4 / 24.0)
     assert np.abs(fast.push).max() > 1e-7

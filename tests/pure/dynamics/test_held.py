@@ -2,15 +2,15 @@
 
 import numpy as np
 
-from hairloom.addon.dynamics.constraints import PINNED, directions, pin
+from hairloom.addon.dynamics.constraints import PINNED_COUNT, directions, pin
 from hairloom.addon.dynamics.held import HeldCvs
 from hairloom.addon.dynamics.settings import DynamicsSettings
 
 
 def test_pinned_cvs_count_for_nothing():
     rows = HeldCvs(np.ones((2, 6), bool)).rows
-    assert (rows[:PINNED] == 0.0).all()
-    assert (rows[PINNED:] == 1.0).all()
+    assert (rows[:PINNED_COUNT] == 0.0).all()
+    assert (rows[PINNED_COUNT:] == 1.0).all()
 
 
 def test_values_change_evenly_between_held_cvs(kit):

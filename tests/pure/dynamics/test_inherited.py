@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from tiers import few_in_commits
 
-from hairloom.addon.dynamics.reference.step import advance_slowly
+from hairloom.addon.dynamics.reference.step import advance_reference
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import start
 from hairloom.addon.dynamics.step import Drive, advance, grid_at_frame_end
@@ -112,7 +112,7 @@ def test_equals_the_reference(kit, values):
 
     ends = [
         played(kit, settings, motion, form, 0.15, gravity=kit.EARTH)[0]
-        for form in (advance, advance_slowly)
+        for form in (advance, advance_reference)
     ]
     plain, _ = played(kit, DynamicsSettings(**SOFT), motion, seconds=0.15, gravity=kit.EARTH)
     assert np.abs(plain.position - ends[0].position).max() > 0.01

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hairloom.addon.dynamics.painted import PaintedGuides, painted_frame, simulated_fraction
-from hairloom.addon.dynamics.reference.step import advance_slowly
+from hairloom.addon.dynamics.reference.step import advance_reference
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.step import MAX_BLOCK_GUIDES, advance
 from hairloom.addon.errors import HairloomError
@@ -45,7 +45,7 @@ def test_as_the_slow_form_where_all_is_painted(kit, shake):
     )
     scene = scene_of(kit, shake, painted)
     fast = scene.play(0.08, 50.0)
-    slow = kit.Scene(**scene.__dict__ | {"advance": advance_slowly}).play(0.08, 50.0)
+    slow = kit.Scene(**scene.__dict__ | {"advance": advance_reference}).play(0.08, 50.0)
     plain = kit.Scene(**scene.__dict__ | {"painted": None}).play(0.08, 50.0)
     assert np.abs(fast[-1].position - plain[-1].position).max() > 1e-3, "paint acts"
     for one, other in zip(fast, slow, strict=True):

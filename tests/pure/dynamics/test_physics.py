@@ -7,7 +7,7 @@ from tiers import few_by_name, few_in_commits
 from hairloom.addon.dynamics.forces import predict
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.step import advance
-from hairloom.addon.dynamics.style import style_band
+from hairloom.addon.dynamics.style import style_system
 
 
 def period_of(signal, interval):
@@ -130,8 +130,11 @@ def energies(states, settings, style, gravity=9.81):
     has no bend energy, since its rest curvature turns with the strand.
     """
     dt = 1.0 / settings.substep_rate
-    band = style_band(settings, style.shape[1], dt)
-    pull, bend = (values.astype(np.float64) / dt**2 for values in (band.pull, band.bend))
+    band = style_system(settings, style.shape[1], dt)
+    pull, bend = (
+        values.astype(np.float64) / dt**2
+        for values in (band.global_stiffness, band.local_stiffness)
+    )
 
     def stored(position):
         away = (position - style)[:, 2:]

@@ -15,7 +15,7 @@ from hairloom.addon.dynamics.colliders import (
     SphereSetCollider,
 )
 from hairloom.addon.dynamics.measure import deepest_penetration
-from hairloom.addon.dynamics.reference.step import advance_slowly
+from hairloom.addon.dynamics.reference.step import advance_reference
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import start
 from hairloom.addon.dynamics.step import Drive, advance
@@ -28,7 +28,7 @@ TIGHT = {"length_tolerance": 0.0001}
 
 
 def both(kit, scene, seconds=0.4, fps=50.0):
-    slow = kit.Scene(**scene.__dict__ | {"advance": advance_slowly})
+    slow = kit.Scene(**scene.__dict__ | {"advance": advance_reference})
     return scene.play(seconds, fps), slow.play(seconds, fps)
 
 
@@ -99,7 +99,7 @@ def test_another_style_in_mid_play(kit, shake):
     first = kit.curly(6, 10)
     second = first * np.linspace(1.0, 1.3, 10)[:, None] + [0.0, 0.01, 0.0]
     settings, found = DynamicsSettings(**TIGHT), []
-    for form in (advance, advance_slowly):
+    for form in (advance, advance_reference):
         state, before = start(first), first
         for frame in range(1, 11):
             style = first if frame < 4 else second
@@ -154,7 +154,7 @@ def test_a_changed_substep(kit, shake):
     scene = kit.Scene(kit.curly(4, 8), one, shake)
     state = scene.play(0.2, 50.0)[-1]
     drive = scene.drive(0.2, 0.22)
-    fast, slow = (step(state, drive, other, 0.02) for step in (advance, advance_slowly))
+    fast, slow = (step(state, drive, other, 0.02) for step in (advance, advance_reference))
     np.testing.assert_allclose(fast.position, slow.position, atol=FREE)
 
 
@@ -228,7 +228,7 @@ def test_segments_at_what_is_thin_and_fast(kit, is_mesh, is_combed, speed):
 
     moving = [
         kit.Scene(grid, settings, motion, on_head=(thin,), advance=how)
-        for how in (advance, advance_slowly)
+        for how in (advance, advance_reference)
     ]
     states = [start(grid) for _ in moving]
     still, clearance = kit.Scene(grid, settings), None

@@ -14,7 +14,7 @@ from hairloom.addon.dynamics.fitting.sphere_fit import (
     fit_spheres,
     measured_error,
     medial_balls,
-    union_places,
+    points_on_union,
 )
 from hairloom.addon.dynamics.fitting.surface_samples import boundary_of, samples_of
 from hairloom.addon.errors import HairloomError
@@ -150,7 +150,7 @@ def test_the_error_is_what_geometry_says(kit):
 
 def test_the_outside_of_a_set_has_no_place_within_a_ball():
     balls = SphereSetCollider(np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]]), np.array([0.1, 0.08]))
-    places = union_places(balls)
+    places = points_on_union(balls)
     gap = np.linalg.norm(places[:, None] - balls.centers, axis=2) - balls.radii
     assert np.abs(gap.min(axis=1)).max() < 1e-5
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from tiers import few_in_commits
 
-from hairloom.addon.dynamics.constraints import PINNED
+from hairloom.addon.dynamics.constraints import PINNED_COUNT
 from hairloom.addon.dynamics.measure import max_stretch
 from hairloom.addon.dynamics.settings import DynamicsSettings
-from hairloom.addon.dynamics.springs import GIVEN
+from hairloom.addon.dynamics.springs import MAX_STRETCH
 
 LENGTH = 0.2
 
@@ -40,7 +40,7 @@ def test_a_curl_bobs_as_often_as_the_setting_says(kit, frequency, cv_count):
     gravity = -0.02 * frequency**2
     settings = settings_of(kit, curl_bounce=frequency, substep_rate=240.0)
     states = hanging(kit, settings, cv_count, gravity).play(4.0 / frequency, 60.0 * frequency)
-    free = cv_count - PINNED
+    free = cv_count - PINNED_COUNT
     kappa = (np.pi * frequency / np.sin(np.pi / (4.0 * free + 2.0))) ** 2
     expected = -gravity * free * (free + 1) / (2.0 * kappa)
     swing = longer(states) - expected
@@ -58,8 +58,8 @@ def test_weight_draws_a_curl_to_where_its_tension_balances(kit):
     rest = LENGTH / 9.0
     free = 8
     kappa = (np.pi * 1.5 / np.sin(np.pi / (4.0 * free + 2.0))) ** 2
-    most = 0.5 * GIVEN * rest
-    extension = -np.diff(state.position[2, PINNED - 1 :, 0].astype(float)) - rest
+    most = 0.5 * MAX_STRETCH * rest
+    extension = -np.diff(state.position[2, PINNED_COUNT - 1 :, 0].astype(float)) - rest
     weight = 9.81 * np.arange(free, 0, -1)
     tension = kappa * extension / (1.0 - (extension / most) ** 2)
     np.testing.assert_allclose(tension, weight, rtol=0.02)
@@ -143,18 +143,18 @@ def test_any_settings_stay_finite_and_within_what_is_given(kit, seed):
     grid = kit.curly(count, cv_count)
     grid[0] = grid[0, :1]  # without any length
     room = random.uniform(-1.0, 3.0, (count, cv_count - 1)).clip(0.0, None)
-    held = kit.tips(np.arange(count) % 4 == 1, cv_count) if cv_count > PINNED else None
+    held = kit.tips(np.arange(count) % 4 == 1, cv_count) if cv_count > PINNED_COUNT else None
 
     def jerk(time):
         return kit.translation(0.3 * np.sin(40.0 * time), 0.0, 0.2 * np.cos(31.0 * time) - 0.2)
 
     scene = kit.Scene(grid, settings, jerk, held=held, room=room)
-    rest = np.linalg.norm(np.diff(grid, axis=1), axis=2)[:, PINNED - 1 :].astype(float)
-    given = 1.0 + GIVEN * settings.curl_stretch * room[:, PINNED - 1 :]
+    rest = np.linalg.norm(np.diff(grid, axis=1), axis=2)[:, PINNED_COUNT - 1 :].astype(float)
+    given = 1.0 + MAX_STRETCH * settings.curl_stretch * room[:, PINNED_COUNT - 1 :]
     rounding = 1e-5 * LENGTH
     for state in scene.play(0.4):
         assert np.isfinite(state.position).all()
-        length = np.linalg.norm(np.diff(state.grid, axis=1), axis=2)[:, PINNED - 1 :]
+        length = np.linalg.norm(np.diff(state.grid, axis=1), axis=2)[:, PINNED_COUNT - 1 :]
         off = settings.length_tolerance + 2e-4
         assert (length <= rest * given * (1.0 + off) + rounding).all()
         assert (length >= rest / given * (1.0 - off) - rounding).all()

@@ -6,7 +6,7 @@ from tiers import few_in_commits
 
 from hairloom.addon.dynamics import step
 from hairloom.addon.dynamics.colliders import PosedCollider, SphereCollider
-from hairloom.addon.dynamics.constraints import PINNED, TINY, directions
+from hairloom.addon.dynamics.constraints import PINNED_COUNT, TINY, directions
 from hairloom.addon.dynamics.force_fields import ForceField, ForceFields
 from hairloom.addon.dynamics.forces import weight_across_style
 from hairloom.addon.dynamics.groom_rotation import best_rotation
@@ -114,7 +114,7 @@ def farthest_reach(state):
     At rest 1. The segment of the pinned CVs counts with the length that the head gives it.
     """
     length = state.rest.length.copy()
-    length[: PINNED - 1] = directions(state.position[:, :PINNED])[1]
+    length[: PINNED_COUNT - 1] = directions(state.position[:, :PINNED_COUNT])[1]
     along = np.cumsum(np.linalg.norm(np.diff(state.position, axis=1), axis=0), axis=0)
     return float((along / np.maximum(np.cumsum(length, axis=0), TINY)).max())
 
@@ -310,7 +310,7 @@ def test_any_settings_stay_finite_and_short(kit, seed, held):
         force_fields=ForceFields(
             (
                 ForceField("wind", axis=tuple(way[3] / np.linalg.norm(way[3])), strength=30.0),
-                ForceField("vortex", strength=200.0, shape="plane", across=1.0),
+                ForceField("vortex", strength=200.0, shape="plane", across_fraction=1.0),
             )
         ),
     )

@@ -6,7 +6,7 @@ import pytest
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import rows_of, start
 from hairloom.addon.dynamics.step import Drive, advance
-from hairloom.addon.dynamics.style import frames, restore_style, style_band
+from hairloom.addon.dynamics.style import restore_style, segment_frames, style_system
 from hairloom.addon.strands.frames import transported_normals
 
 
@@ -14,7 +14,7 @@ def frames_of(state):
     """Tangents and normals (3, cv_count - 1, guide_count) of guides in their style."""
     position, guide = state.position, np.arange(state.guide_count)
     twist = position[:, state.rest.shape.twist_cv, guide] - position[:, 0]
-    return frames(np.diff(position, axis=1), twist)
+    return segment_frames(np.diff(position, axis=1), twist)
 
 
 def test_frames_are_the_transported_normals(kit):
@@ -33,7 +33,7 @@ def test_curvature_turns_with_the_root(kit):
     carried = rows_of(kit.moved(turn, grid), "test")
     position = carried.copy()
     settings = DynamicsSettings(bend=20.0)
-    band = style_band(settings, 16, 1 / 240)
+    band = style_system(settings, 16, 1 / 240)
     restore_style(position, carried, state.rest.shape, band)
     np.testing.assert_allclose(position, carried, atol=2e-6)
 
@@ -45,7 +45,7 @@ def test_bend_alone_brings_curls_back_without_place(kit):
     straightened = grid[:, :1] + (grid[:, 1:2] - grid[:, :1]) * np.arange(16)[:, None]
     position = rows_of(straightened.astype(np.float32), "test")
     carried = rows_of(grid, "test")
-    band = style_band(DynamicsSettings(style_root=0, style_tip=0, bend=10), 16, 1 / 240)
+    band = style_system(DynamicsSettings(style_root=0, style_tip=0, bend=10), 16, 1 / 240)
 
     def shape_error():
         second = np.diff(position, n=2, axis=1) - np.diff(carried, n=2, axis=1)
@@ -66,7 +66,7 @@ def test_solve_is_the_minimum(kit):
     position = state.position + np.float32(0.01)
     restore_style(
         position, state.position, state.rest.shape,
-        style_band(settings, 8, dt),
+        style_system(settings, 8, dt),
     )  # fmt: skip
     frequency = 3.0 - 2.0 * np.arange(2, 8) / 7
     pull = (2 * np.pi * frequency * dt) ** 2

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from hairloom.addon.dynamics.settings import DynamicsSettings
-from hairloom.addon.dynamics.wind import air_of, sine
+from hairloom.addon.dynamics.wind import air_from_settings, sine
 
 GUSTY = DynamicsSettings(wind_speed=8.0, gusts=0.5, gust_size=0.4, wind_direction=0.7)
 
@@ -23,7 +23,7 @@ def test_the_sine_is_a_sine():
 
 
 def test_still_air_is_none():
-    assert air_of(DynamicsSettings()) is None
+    assert air_from_settings(DynamicsSettings()) is None
 
 
 @pytest.mark.parametrize(
@@ -32,13 +32,13 @@ def test_still_air_is_none():
 )
 def test_direction(turn, rise, expected):
     settings = DynamicsSettings(wind_speed=3.0, wind_direction=turn, wind_elevation=rise, gusts=0.0)
-    air = air_of(settings)
+    air = air_from_settings(settings)
     np.testing.assert_allclose(air.at(anywhere(4), 1.3).T, np.tile(expected, (4, 1)), atol=1e-6)
 
 
 def test_gusts_are_as_strong_as_they_say():
     """Mean and standard deviation over space equal the settings."""
-    air = air_of(GUSTY)
+    air = air_from_settings(GUSTY)
     speed = air.at(anywhere(200_000), 0.0).astype(np.float64)
     mean = speed.mean(axis=1)
     np.testing.assert_allclose(mean, air.velocity, atol=0.05)
@@ -48,7 +48,7 @@ def test_gusts_are_as_strong_as_they_say():
 
 @pytest.mark.parametrize("seed", [1, 7])
 def test_gusts_are_free_of_divergence(seed):
-    air = air_of(DynamicsSettings(**GUSTY.as_dict() | {"gust_seed": seed}))
+    air = air_from_settings(DynamicsSettings(**GUSTY.as_dict() | {"gust_seed": seed}))
     points, step = anywhere(500, 1.0), 2e-3
     slope = np.empty((3, 3, 500))  # of component i along axis j
     for axis in range(3):
@@ -61,24 +61,24 @@ def test_gusts_are_free_of_divergence(seed):
 
 def test_gusts_drift_with_the_wind():
     """Taylor's frozen turbulence: a second later, the same gusts are found downwind."""
-    air = air_of(GUSTY)
+    air = air_from_settings(GUSTY)
     points = anywhere(100, 1.0)
     later = air.at(points + air.velocity[:, None], 1.0)
     np.testing.assert_allclose(later, air.at(points, 0.0), atol=2e-3)
 
 
 def test_another_seed_gives_other_gusts():
-    other = air_of(DynamicsSettings(**GUSTY.as_dict() | {"gust_seed": 2}))
-    away = air_of(GUSTY).at(anywhere(10), 0.0) - other.at(anywhere(10), 0.0)
+    other = air_from_settings(DynamicsSettings(**GUSTY.as_dict() | {"gust_seed": 2}))
+    away = air_from_settings(GUSTY).at(anywhere(10), 0.0) - other.at(anywhere(10), 0.0)
     assert np.abs(away).max() > 0.5
 
 
 def test_a_long_time_keeps_its_gusts():
     """After a day the phase is as exact as at the start."""
-    air = air_of(GUSTY)
+    air = air_from_settings(GUSTY)
     points, day = anywhere(50, 1.0), 86_400.0
-    swing, wave = air.swing.astype(np.float64), air.wave.astype(np.float64)
-    turns = wave @ points + (air.phase - air.rate * day)[:, None]
+    swing, wave = air.amplitude.astype(np.float64), air.wave_vector.astype(np.float64)
+    turns = wave @ points + (air.phase - air.angular_frequency * day)[:, None]
     exact = air.velocity[:, None] + swing.T @ np.sin(turns)
     np.testing.assert_allclose(air.at(points, day), exact, atol=1e-4)
 

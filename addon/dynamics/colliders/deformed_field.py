@@ -3,9 +3,9 @@
 Each node near a triangle that has moved gets its distance from the nearest triangle, and its sign
 from the side of that triangle on which it lies. Triangles are rasterised into the nodes around
 them, without a search, so the cost grows with the number of triangles that have moved and their
-neighbours. All other nodes keep the values of the mesh at rest. Nodes farther than BAND from every
-triangle only get the sign, and a distance that grows by 1 / sqrt(3) of the path along the axes: too
-short, never too long.
+neighbours. All other nodes keep the values of the mesh at rest. Nodes farther than BAND_CELLS from
+every triangle only get the sign, and a distance that grows by 1 / sqrt(3) of the path along the
+axes: too short, never too long.
 
 Error: that of `DistanceField` near the surface, if the mesh's faces point outwards. Where faces
 point both ways, as on a sheet, the sign is a guess.
@@ -21,24 +21,24 @@ from ...arrays import Bools, Floats, Ints, number_in_piece
 from ...strands import Surface
 from ...strands.triangles import area_vectors
 from ...strands.vectors import cross_rows, dot_rows
-from .distance_field import MARGIN, DistanceField, covering, points_on
+from .distance_field import MARGIN, DistanceField, cover_points, sample_surface
 
 #: Distance from a triangle up to which nodes get its distance, in cells.
-BAND = 1.5
+BAND_CELLS = 1.5
 #: A vertex counts as moved if it is farther from its place at rest than this, in cells.
-MOVED = 0.05
+MIN_MOVE = 0.05
 #: How far the grid may be extended at each side, in units of its longest side at rest.
-LARGEST = 1
+MAX_GROWTH = 1
 #: A triangle is a sliver if its height is less than this fraction of its longest edge.
 SLIVER = 1.0e-3
 #: Pairs of triangles and nodes measured at once.
 _PAIRS = 1 << 18
 #: Of two triangles equally near, a node takes the one whose plane is farther from it, which it
 #: faces more: cost of the angle, as a fraction of the distance.
-_EDGE = 1.0e-3
+_ANGLE_COST = 1.0e-3
 
 
-class BentField:
+class DeformedField:
     """Makes the distance field of a mesh in any deformed shape.
 
     Args:
@@ -60,7 +60,7 @@ class BentField:
         cell = self.field.cell
         now = np.asarray(positions, np.float32)
         path = now - self._rest
-        has_moved = np.einsum("ij,ij->i", path, path) > (MOVED * cell) ** 2
+        has_moved = np.einsum("ij,ij->i", path, path) > (MIN_MOVE * cell) ** 2
         is_moved = has_moved[self._triangles].any(axis=1)
         if not is_moved.any():
             return self.field
@@ -69,14 +69,14 @@ class BentField:
         boxes = self._boxes(corners, low, values.shape)
         affected = np.append(is_moved, True)[nearest]  # -1, the last one, for nodes without any
         _mark(affected, *(side[is_moved] for side in boxes))
-        beside = (is_moved | _meets(affected, *boxes)).nonzero()[0]
+        beside = (is_moved | _contain_any(affected, *boxes)).nonzero()[0]
         first, last = (side[beside] for side in boxes)
-        distance, _ = self._written(corners[beside], first, last, low, affected)
+        distance, _ = self._rasterised(corners[beside], first, last, low, affected)
         values = np.where(affected, distance, values)
         values, _ = _filled(values, cell)
-        samples = points_on(Surface(now, self._triangles[beside]), cell / 2.0)
+        samples = sample_surface(Surface(now, self._triangles[beside]), cell / 2.0)
         surface = Surface(now, self._triangles)
-        return DistanceField(covering(values, low, cell, samples), low, cell, surface)
+        return DistanceField(cover_points(values, low, cell, samples), low, cell, surface)
 
     @cached_property
     def _nearest(self) -> Ints:
@@ -84,7 +84,7 @@ class BentField:
         field, corners = self.field, self._rest[self._triangles]
         boxes = self._boxes(corners, field.low, field.values.shape)
         every = np.ones(field.values.shape, bool)
-        distance, triangle = self._written(corners, *boxes, field.low, every)
+        distance, triangle = self._rasterised(corners, *boxes, field.low, every)
         _, source = _filled(distance, field.cell)
         return triangle.ravel()[source]
 
@@ -94,20 +94,21 @@ class BentField:
         field, shape = self.field, np.array(self.field.values.shape)
         place = (points - field.low) / field.cell
         more = np.stack([MARGIN - place.min(axis=0), place.max(axis=0) + MARGIN + 1 - shape])
-        more = np.clip(np.ceil(more), 0, LARGEST * shape.max()).astype(np.int64)
+        more = np.clip(np.ceil(more), 0, MAX_GROWTH * shape.max()).astype(np.int64)
         low = field.low - more[0].astype(np.float32) * np.float32(field.cell)
         values = np.pad(field.values, more.T, constant_values=np.inf)
         return low, values, np.pad(self._nearest, more.T, constant_values=-1)
 
     def _boxes(self, corners: Floats, begin: Floats, shape: tuple[int, ...]) -> tuple[Ints, Ints]:
-        """The first and last node (n, 3) within BAND of each triangle (n, 3, 3), in the grid."""
+        """The first and last node (n, 3) within BAND_CELLS of each triangle (n, 3, 3), in the
+        grid."""
         top = np.array(shape) - 1
         place = (corners - begin) / np.float32(self.field.cell)
-        low = np.ceil(place.min(axis=1) - BAND).astype(np.int64)
-        high = np.floor(place.max(axis=1) + BAND).astype(np.int64)
+        low = np.ceil(place.min(axis=1) - BAND_CELLS).astype(np.int64)
+        high = np.floor(place.max(axis=1) + BAND_CELLS).astype(np.int64)
         return np.clip(low, 0, top + 1), np.clip(high, -1, top)
 
-    def _written(
+    def _rasterised(
         self, corners: Floats, low: Ints, high: Ints, begin: Floats, wanted: Bools
     ) -> tuple[Floats, Ints]:
         """Signed distance [m] and nearest triangle of each wanted node; infinite and -1 where none
@@ -120,7 +121,7 @@ class BentField:
         key = np.full(wanted.size, np.inf, np.float32)
         signed = np.full(wanted.size, np.inf, np.float32)
         nearest = np.full(wanted.size, -1, np.int64)
-        solids, reach = _Triangles(corners), np.float32(BAND * field.cell)
+        solids, reach = _Triangles(corners), np.float32(BAND_CELLS * field.cell)
         flat, counts = wanted.ravel(), np.maximum(high - low + 1, 0)
         pairs = counts.prod(axis=1)
         ends = np.cumsum(pairs)
@@ -142,16 +143,18 @@ class BentField:
             )
             node += low[triangle]
             index = np.ravel_multi_index(tuple(node.T), shape)
-            kept = flat[index]
-            index, triangle = index[kept], triangle[kept]
-            points = np.ascontiguousarray(node[kept].T, np.float32)
+            is_kept = flat[index]
+            index, triangle = index[is_kept], triangle[is_kept]
+            points = np.ascontiguousarray(node[is_kept].T, np.float32)
             points *= np.float32(field.cell)
             points += begin[:, None]
             facing = solids.heights(points, triangle)
-            kept = (np.abs(facing) <= reach).nonzero()[0]
-            index, triangle, facing = index[kept], triangle[kept], facing[kept]
-            distance = solids.distances(chosen(points, kept), triangle, facing)
-            cost = distance * np.float32(1.0 + _EDGE) - np.abs(facing) * np.float32(_EDGE)
+            is_kept = (np.abs(facing) <= reach).nonzero()[0]
+            index, triangle, facing = index[is_kept], triangle[is_kept], facing[is_kept]
+            distance = solids.distances(take_columns(points, is_kept), triangle, facing)
+            cost = distance * np.float32(1.0 + _ANGLE_COST) - np.abs(facing) * np.float32(
+                _ANGLE_COST
+            )
             np.minimum.at(key, index, cost)
             best = cost <= key[index]
             signed[index[best]] = np.copysign(distance[best], facing[best] * self._outwards)
@@ -181,27 +184,27 @@ class _Triangles:
 
     def heights(self, points: Floats, triangle: Ints) -> Floats:
         """Signed distance [m] of points (3, n) from the plane of a triangle each, (n,)."""
-        offset = points - chosen(self._corner[0], triangle)
-        return dot_rows(offset, chosen(self._normal, triangle))
+        offset = points - take_columns(self._corner[0], triangle)
+        return dot_rows(offset, take_columns(self._normal, triangle))
 
     def distances(self, points: Floats, triangle: Ints, height: Floats) -> Floats:
         """Distance [m] of points (3, n) from a triangle each, given their `heights`, (n,)."""
         within = self._has_area.take(triangle)
         squared = np.full(len(triangle), np.inf, np.float32)
         for side in range(3):
-            offset = points - chosen(self._corner[side], triangle)
-            edge = chosen(self._edge[side], triangle)
+            offset = points - take_columns(self._corner[side], triangle)
+            edge = take_columns(self._edge[side], triangle)
             along = dot_rows(offset, edge)
             along *= self._over_length[side].take(triangle)
             np.clip(along, np.float32(0.0), np.float32(1.0), out=along)
-            within &= dot_rows(offset, chosen(self._across[side], triangle)) >= 0.0
+            within &= dot_rows(offset, take_columns(self._across[side], triangle)) >= 0.0
             edge *= along
             offset -= edge
             np.minimum(squared, dot_rows(offset, offset), out=squared)
         return np.where(within, np.abs(height), np.sqrt(squared))
 
 
-def chosen(rows: Floats, index: Ints) -> Floats:
+def take_columns(rows: Floats, index: Ints) -> Floats:
     """Columns (3, m) of rows (3, n)."""
     return rows.take(index, axis=1, mode="clip")
 
@@ -216,7 +219,7 @@ def _mark(nodes: Bools, low: Ints, high: Ints) -> None:
     nodes |= ends.cumsum(0).cumsum(1).cumsum(2)[:-1, :-1, :-1] > 0
 
 
-def _meets(nodes: Bools, low: Ints, high: Ints) -> Bools:
+def _contain_any(nodes: Bools, low: Ints, high: Ints) -> Bools:
     """Which boxes (n, 3) contain any of the nodes, (n,), by sums up to their corners."""
     sums = np.zeros(np.array(nodes.shape) + 1, np.int64)
     sums[1:, 1:, 1:] = nodes.cumsum(0).cumsum(1).cumsum(2)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hairloom.addon.dynamics.colliders import DistanceField
-from hairloom.addon.dynamics.colliders.bent_field import BentField
+from hairloom.addon.dynamics.colliders.deformed_field import DeformedField
 from hairloom.addon.dynamics.colliders.winding import winding_number
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.strands import Surface
@@ -43,7 +43,7 @@ def test_an_arm_that_bends(kit, is_turned):
         surface = Surface(surface.positions, surface.triangles[:, ::-1])
     field = DistanceField.from_surface(surface, SETTINGS)
     now = Surface(bent(surface.positions), surface.triangles)
-    found = BentField(field, surface).at(now.positions)
+    found = DeformedField(field, surface).at(now.positions)
     random = np.random.default_rng(5)
     low, high = now.positions.min(axis=0), now.positions.max(axis=0)
     points = random.uniform(low, high, (3000, 3)).astype(np.float32)
@@ -63,7 +63,7 @@ def test_an_arm_that_bends(kit, is_turned):
 def test_only_what_moves_is_made_anew(kit):
     surface = rod(kit)
     field = DistanceField.from_surface(surface, SETTINGS)
-    mesh = BentField(field, surface)
+    mesh = DeformedField(field, surface)
     assert mesh.at(surface.positions + np.float32(1e-5)) is field
     now = surface.positions.copy()
     tip = now[:, 0] > 0.15
