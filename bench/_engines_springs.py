@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from _cards_groom import SETTINGS, sintel_rig
 from _exchange_motion import RATE, shaken
-from three_springs import moved_by_three
+from three_springs import play_in_three
 
 from hairloom.addon.blender.cards.build import CardInputs
 from hairloom.addon.blender.cards.files import CardOutput, write_cards
@@ -37,7 +37,7 @@ def spring_figures() -> dict[str, Any]:
         written = write_cards(path, CardInputs(rig, settings), output, motion=motion)
         told = written.motion
         head = np.stack([motion.at(frame)[0].matrix for frame in motion.frames])
-        moved = moved_by_three(path, head, RATE, told["chains"])
+        moved = play_in_three(path, head, RATE, told["chains"])
         levels = moved.levels(frames, RATE)
     wrong, rigid = [], []
     for mesh, played in zip(written.levels, levels, strict=True):

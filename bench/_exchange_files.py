@@ -84,7 +84,8 @@ def _fuzzed(kind: str, count: int) -> dict[str, Any]:
 
 def kill_figures(trials: int) -> dict[str, float]:
     """Numbers of kills, of files that were neither old nor new, of kills amid a write, of sets of
-    old and new files, and of files that were left after one more write (see `kill_writes.killed`).
+    old and new files, and of files that were left after one more write (see
+    `kill_writes.kill_and_check`).
 
     Args:
         trials: kills of the writer of each format.

@@ -16,7 +16,7 @@ from extension_loader import load_package
 load_package()
 
 from _cards_groom import SETTINGS, sintel_rig  # noqa: E402
-from shaken import GRAVITY, MadeMotion, shaken_poses  # noqa: E402
+from shaken import GRAVITY, ComputedMotion, shaken_poses  # noqa: E402
 
 from hairloom.addon import motion_flow  # noqa: E402
 from hairloom.addon.blender.base.images import read_texture  # noqa: E402
@@ -82,7 +82,7 @@ def motion_figures(seconds: float) -> dict[str, float]:
     return figures
 
 
-def shaken(rig: Rig, seconds: float) -> MadeMotion:
+def shaken(rig: Rig, seconds: float) -> ComputedMotion:
     """The shake, simulated by numpy; cards are led out of the head, as in a bake."""
     assert rig.head is not None
     settings = DynamicsSettings()
@@ -104,7 +104,7 @@ def shaken(rig: Rig, seconds: float) -> MadeMotion:
         replace(pose, solids=SimulatedSolids(start, colliders))
         for pose, colliders in zip((first, *later), posed, strict=True)
     ]
-    return MadeMotion(rig, range(len(poses)), RATE, lambda frame: (poses[frame], guides[frame]))
+    return ComputedMotion(rig, range(len(poses)), RATE, lambda frame: (poses[frame], guides[frame]))
 
 
 if __name__ == "__main__":

@@ -46,7 +46,7 @@ def _write(recipe: Any, shader_program: Any) -> None:
         "name": recipe.name,
         "stages": [each for each in (recipe.vertex, recipe.fragment, recipe.compute) if each],
         "files": sorted(files.values()),
-        "demands": cross_compile.demands(recipe),
+        "demands": cross_compile.resource_counts(recipe),
     }
     with (_FOLDER / "programs.jsonl").open("a", encoding="utf-8") as lines:
         lines.write(json.dumps(record) + "\n")

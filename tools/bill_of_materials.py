@@ -22,7 +22,7 @@ from cyclonedx.model import HashAlgorithm, HashType
 from cyclonedx.model.bom import Bom
 from cyclonedx.model.component import Component, ComponentType
 from cyclonedx.output.json import JsonV1Dot6
-from fetch_wheels import FOLDER, REPOSITORY, wanted
+from fetch_wheels import FOLDER, REPOSITORY, pinned_wheels
 from packageurl import PackageURL
 
 #: Third-party parts of the zip beside wheels: name, license, description.
@@ -53,7 +53,7 @@ def bill_of_materials() -> Bom:
         licenses=[licenses.make_from_string(spdx)],
         bom_ref=manifest["id"],
     )
-    digests = wanted()
+    digests = pinned_wheels()
     bill = Bom(serial_number=uuid5(_NAMESPACE, "".join(sorted(digests.values()))))
     bill.metadata.component = whole
     parts = [_wheel(name, digest, licenses) for name, digest in sorted(digests.items())]

@@ -19,7 +19,7 @@ WIDTH, HEIGHT, SAMPLES = 420, 480, 2
 UP = np.array([0.0, 0.0, 1.0])
 
 
-def of_addon(module: str) -> Any:
+def addon_module(module: str) -> Any:
     return importlib.import_module(f"{PACKAGE}.addon.{module}")
 
 
@@ -27,23 +27,23 @@ class Shots:
     """A groom on the built-in head, and pictures of it as strands and as cards."""
 
     def __init__(self) -> None:
-        settings = of_addon("parameters").ALL_SETTINGS
-        bust = of_addon("blender.scene.built_in_head").built_in_head()
+        settings = addon_module("parameters").ALL_SETTINGS
+        bust = addon_module("blender.scene.built_in_head").built_in_head()
         head = bust.surface
-        grow, studio = of_addon("groom.grow"), of_addon("blender.pictures.studio")
+        grow, studio = addon_module("groom.grow"), addon_module("blender.pictures.studio")
         grown = settings["grow"](strand_count=STRANDS, clump=0.4)
         strands = grow.grow(head, grown, bust.weights["scalp"])
         self.settings = settings
-        self.rig = of_addon("rig_flow").prepare(
+        self.rig = addon_module("rig_flow").prepare(
             strands,
             head,
             settings["guides"](guide_count=CARDS),
             place="the built-in groom",
             widths="auto",
         )
-        groom = of_addon("blender.properties.groom_settings").GroomSettings()
+        groom = addon_module("blender.properties.groom_settings").GroomSettings()
         ambient = settings["ambient"]()
-        prepared = of_addon("blender.sessions.prepared_groom").prepare_groom(self.rig, ambient)
+        prepared = addon_module("blender.sessions.prepared_groom").prepare_groom(self.rig, ambient)
         self._studio = studio.Studio(prepared, groom, look=bust.look("light"))
 
     def strands(self) -> Any:
@@ -51,16 +51,16 @@ class Shots:
         return self._studio.picture(rig.rest_pose, rig.strands.points, WIDTH, HEIGHT, SAMPLES)
 
     def built(
-        self, way: str, levels: int = 1, count: int = CARDS, edits: Any = None
+        self, method: str, levels: int = 1, count: int = CARDS, edits: Any = None
     ) -> tuple[Any, Any]:
         """Cards built by this method, and how they are drawn."""
-        settings, builds = self.settings, of_addon("blender.cards.build")
-        chosen = of_addon("params").SettingsMap(
-            settings["cards"](source=way, card_count=count, levels=levels),
+        settings, builds = self.settings, addon_module("blender.cards.build")
+        chosen = addon_module("params").SettingsMap(
+            settings["cards"](source=method, card_count=count, levels=levels),
             settings["card_occlusion"](rays=64),
         )
         steps = builds.build_steps(builds.CardInputs(self.rig, chosen, edits=edits))
-        made = of_addon("cards.steps").result_of(steps)
+        made = addon_module("cards.steps").result_of(steps)
         tied = builds.BuiltCards.of(self.rig, made)
         return made.build, tied.drawn(tied.rest, chosen)
 
@@ -71,7 +71,7 @@ class Shots:
         return self._studio.card_picture(shown, WIDTH, HEIGHT, SAMPLES)
 
 
-def of_layer(mesh: Any, layer: int) -> Any:
+def cards_of_layer(mesh: Any, layer: int) -> Any:
     """The cards of one layer alone."""
     kept = mesh.layer[mesh.card] == layer
     return replace(mesh, triangles=mesh.triangles[kept], card=mesh.card[kept])
@@ -80,21 +80,23 @@ def of_layer(mesh: Any, layer: int) -> Any:
 def edited(build: Any) -> Any:
     """Edits like an artist's: on one side the tips of long cards are flicked out and wider, on the
     other side outer ones are deleted."""
-    edits, mesh = of_addon("cards.edits"), build.finest
-    surface = of_addon("strands").Surface(mesh.positions, mesh.triangles, mesh.uv[mesh.triangles])
+    edits, mesh = addon_module("cards.edits"), build.finest
+    surface = addon_module("strands").Surface(
+        mesh.positions, mesh.triangles, mesh.uv[mesh.triangles]
+    )
     record = replace(build.record, prints=edits.piece_prints(surface, mesh.card))
     root, tip = build.record.places[:, 0], build.record.places[:, 3]
     is_long = tip[:, 2] < np.quantile(tip[:, 2], 0.6)
     is_right = root[:, 0] > np.median(root[:, 0])
     is_flicked, is_deleted = is_long & is_right, is_long & ~is_right & (mesh.layer > 0)
-    card = of_addon("cards.sort").card_of_vertex(mesh)
+    card = addon_module("cards.sort").card_of_vertex(mesh)
     part = np.clip((mesh.along - 0.6) / 0.4, 0.0, 1.0) * is_flicked[card]
     outwards = mesh.positions - root.mean(axis=0)
     outwards[:, 2] = 0.0
     outwards /= np.maximum(np.linalg.norm(outwards, axis=1, keepdims=True), 1e-6)
     bend = 0.05 * part**1.5, 0.05 * part**2
     moved = mesh.positions + bend[0][:, None] * outwards + bend[1][:, None] * UP
-    wider = of_addon("cards.shaping").CardVertices(moved, mesh.uv, card).widened(1.0, 1.3)
+    wider = addon_module("cards.shaping").CardVertices(moved, mesh.uv, card).widened(1.0, 1.3)
     moved[is_flicked[card]] = wider[is_flicked[card]]
     left = ~is_deleted[mesh.card]
     surface = replace(
@@ -109,7 +111,7 @@ def edited(build: Any) -> Any:
 def main(folder: Path) -> None:
     gpu.init()
     load_package().register()
-    images, shots = of_addon("blender.base.images"), Shots()
+    images, shots = addon_module("blender.base.images"), Shots()
 
     def sheet(name: str, pictures: list[Any]) -> None:
         images.write_png(folder / name, images.contact_sheet(pictures, len(pictures)))
@@ -125,7 +127,7 @@ def main(folder: Path) -> None:
         ],
     )
     layers = np.unique(build.finest.layer)
-    sheet("card_layers.png", [shots.cards(of_layer(build.finest, n), baked) for n in layers])
+    sheet("card_layers.png", [shots.cards(cards_of_layer(build.finest, n), baked) for n in layers])
     sheet(
         "card_levels.png",
         [shots.cards(build.levels[n], baked, build.back_triangles[n]) for n in (0, 2, 4)],

@@ -141,23 +141,23 @@ def _declarations(recipe: Any, structs: str, stage: str) -> list[str]:
         x, y = (*recipe.group_size, 1)[:2]
         return [*lines, f"layout(local_size_x={x}, local_size_y={y}) in;"]
     if stage == "vertex":
-        lines += _located("in", ((kind, name) for kind, name in recipe.inputs))
+        lines += _with_locations("in", ((kind, name) for kind, name in recipe.inputs))
     else:
-        lines += _located("out", ((kind, name) for kind, name in recipe.outputs))
-    way = "out" if stage == "vertex" else "in"
+        lines += _with_locations("out", ((kind, name) for kind, name in recipe.outputs))
+    qualifier = "out" if stage == "vertex" else "in"
     for place, (interpolation, kind, name) in enumerate(recipe.varyings):
-        lines.append(f"layout(location={place}) {interpolation} {way} {_TYPES[kind]} {name};")
+        lines.append(f"layout(location={place}) {interpolation} {qualifier} {_TYPES[kind]} {name};")
     return lines
 
 
-def _located(way: str, members: Any) -> list[str]:
+def _with_locations(qualifier: str, members: Any) -> list[str]:
     return [
-        f"layout(location={place}) {way} {_TYPES[kind]} {name};"
+        f"layout(location={place}) {qualifier} {_TYPES[kind]} {name};"
         for place, (kind, name) in enumerate(members)
     ]
 
 
-def demands(recipe: Any) -> dict[str, int]:
+def resource_counts(recipe: Any) -> dict[str, int]:
     """What a program needs, by the names of METAL_LIMITS."""
     source = "\n".join(text.source for text in recipe.texts.values())
     pushed = ["int"] * len(recipe.integers) + [_TYPES[kind] for kind, _ in recipe.numbers]
@@ -188,6 +188,8 @@ def _components(kind: str) -> int:
     return _COMPONENTS.get(kind) or int(kind[-1])
 
 
-def beyond_metal(found: Mapping[str, int]) -> list[str]:
+def exceeded_metal_limits(found: Mapping[str, int]) -> list[str]:
     """The demands that exceed Metal's limits."""
-    return [f"{name} {found[name]}" for name, most in METAL_LIMITS.items() if found[name] > most]
+    return [
+        f"{name} {found[name]}" for name, maximum in METAL_LIMITS.items() if found[name] > maximum
+    ]

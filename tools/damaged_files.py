@@ -1,6 +1,7 @@
 """Valid files of every format of strands, and presets, and methods to damage them.
 
-Every file follows from a seed and a number, so that `mutated(FORMAT, SEED, number)` makes it again.
+Every file follows from a seed and a number, so that `damaged_content(FORMAT, SEED, number)` makes
+it again.
 """
 
 from __future__ import annotations
@@ -41,15 +42,15 @@ TOKENS = (
 )
 
 
-def mutated(kind: str, seed: int, number: int) -> bytes:
+def damaged_content(kind: str, seed: int, number: int) -> bytes:
     """The damaged file of this number."""
     random = np.random.default_rng([seed, number])
     small, large = originals(kind)
     originals_here = large if number % 20 == 0 and large else small
     content = bytearray(originals_here[int(random.integers(len(originals_here)))])
-    ways = TEXT_WAYS if kind == "preset" else WAYS
+    mutations = TEXT_MUTATIONS if kind == "preset" else MUTATIONS
     for _ in range(int(random.integers(1, 4))):
-        content = ways[int(random.integers(len(ways)))](content, random)
+        content = mutations[int(random.integers(len(mutations)))](content, random)
     return bytes(content)
 
 
@@ -61,7 +62,7 @@ def originals(kind: str) -> tuple[tuple[bytes, ...], tuple[bytes, ...]]:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"sound.{kind}"
         makers = MAKERS[kind]
-        large = () if kind in OF_LIBRARIES else tuple(makers(path, 6000))
+        large = () if kind in LIBRARY_FORMATS else tuple(makers(path, 6000))
         return tuple(makers(path, 5)), large
 
 
@@ -152,7 +153,7 @@ MAKERS: dict[str, Callable[[Path, int], Iterator[bytes]]] = {
     "usda": _usd_files,
 }
 #: formats that libraries parse
-OF_LIBRARIES = ("abc", "usdc", "usda")
+LIBRARY_FORMATS = ("abc", "usdc", "usda")
 
 
 def _flip_bits(content: bytearray, random: np.random.Generator) -> bytearray:
@@ -162,7 +163,7 @@ def _flip_bits(content: bytearray, random: np.random.Generator) -> bytearray:
     return content
 
 
-def _damage_head(content: bytearray, random: np.random.Generator) -> bytearray:
+def _damage_header(content: bytearray, random: np.random.Generator) -> bytearray:
     for _ in range(int(random.integers(1, 5))):
         end = min(len(content), 300)
         if end:
@@ -199,7 +200,7 @@ def _extend(content: bytearray, random: np.random.Generator) -> bytearray:
     return content + random.bytes(int(random.integers(1, 200)))
 
 
-def _lose_some(content: bytearray, random: np.random.Generator) -> bytearray:
+def _remove_some(content: bytearray, random: np.random.Generator) -> bytearray:
     begin = int(random.integers(len(content) + 1))
     del content[begin : begin + int(random.integers(1, 64))]
     return content
@@ -246,20 +247,20 @@ def _put(content: bytearray, random: np.random.Generator, end: int, value: bytes
     return content
 
 
-WAYS = (
+MUTATIONS = (
     _flip_bits,
-    _damage_head,
+    _damage_header,
     _extreme_count,
     _extreme_number,
     _swap_words,
     _cut,
     _extend,
-    _lose_some,
+    _remove_some,
     _repeat_some,
     _clear_some,
 )
-TEXT_WAYS = (
-    *(_flip_bits, _cut, _extend, _lose_some, _repeat_some, _clear_some),
+TEXT_MUTATIONS = (
+    *(_flip_bits, _cut, _extend, _remove_some, _repeat_some, _clear_some),
     *[_other_token] * 4,
     *[_near_number] * 4,
 )

@@ -15,7 +15,7 @@ import threading
 from pathlib import Path
 
 FOLDER = Path(__file__).parent
-LONGEST = 120.0
+TIMEOUT_SECONDS = 120.0
 # SwiftShader: WebGL on the processor
 BROWSER = ("chromium", "--headless=new", "--no-sandbox", "--use-angle=swiftshader")
 BROWSER += ("--enable-unsafe-swiftshader", "--disable-dev-shm-usage")
@@ -42,7 +42,7 @@ class Handler(http.server.SimpleHTTPRequestHandler):
         """Silent: the page posts failures."""
 
 
-def main(seconds: float = LONGEST) -> int:
+def main(seconds: float = TIMEOUT_SECONDS) -> int:
     handler = functools.partial(Handler, directory=str(FOLDER))
     server = http.server.ThreadingHTTPServer(("localhost", 0), handler)
     threading.Thread(target=server.serve_forever, daemon=True).start()

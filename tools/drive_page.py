@@ -25,7 +25,7 @@ from typing import Any
 
 from draw_page import BROWSER
 
-LONGEST = 180.0
+TIMEOUT_SECONDS = 180.0
 NO_WEBGL = """HTMLCanvasElement.prototype.getContext = new Proxy(
   HTMLCanvasElement.prototype.getContext,
   { apply: (real, self, [kind, ...rest]) => kind.startsWith('webgl') ? null
@@ -91,7 +91,7 @@ class Browser:
         return answer["result"].get("value")
 
     def wait(self, script: str) -> None:
-        end = time.monotonic() + LONGEST
+        end = time.monotonic() + TIMEOUT_SECONDS
         while not self.value(script):
             if time.monotonic() > end:
                 raise RuntimeError(f"never came: {script}; {self.complaints}")

@@ -21,7 +21,7 @@ from extension_loader import PACKAGE, load_package
 from mathutils import Vector
 from small_pictures import write_small
 
-SIZE, SAMPLES, STRANDS, THICKER = 340, 16, 12000, 1.5
+SIZE, SAMPLES, STRANDS, WIDTH_FACTOR = 340, 16, 12000, 1.5
 #: of pictures of hair over Blender's own engines
 OVER_SIZE, OVER_SAMPLES = 480, 64
 #: of pictures of light shafts
@@ -39,7 +39,7 @@ CAMERA, TARGET = Vector((-0.42, -0.85, 0.12)), Vector((0.0, 0.0, 0.02))
 MASK = {0: (0.02, 0.02, 0.02), 1: (0.7, 0.25, 0.12), 2: (0.1, 0.3, 0.75), 3: (0.15, 0.4, 0.15)}
 
 
-def of_addon(module: str) -> Any:
+def addon_module(module: str) -> Any:
     return importlib.import_module(f"{PACKAGE}.addon.{module}")
 
 
@@ -53,7 +53,7 @@ def material(name: str, color: tuple[float, float, float], roughness: float) -> 
 
 def head() -> Any:
     """The built-in head as an object."""
-    surface = of_addon("blender.scene.built_in_head").built_in_head().surface
+    surface = addon_module("blender.scene.built_in_head").built_in_head().surface
     mesh = bpy.data.meshes.new("Head")
     mesh.from_pydata(surface.positions, [], surface.triangles)
     mesh.uv_layers.new().data.foreach_set("uv", surface.corner_uv.ravel())
@@ -74,7 +74,7 @@ def scene_of_head() -> Any:
     hair = bpy.context.object
     hair.pass_index = 2
     bpy.ops.hairloom.apply_preset(name="looks/brown")
-    hair.data.hairloom.strands.fullness = THICKER
+    hair.data.hairloom.strands.fullness = WIDTH_FACTOR
     bpy.ops.mesh.primitive_plane_add(size=2.0, location=(0.2, 0.5, 0.0), rotation=(1.57, 0.0, -0.4))
     wall = bpy.context.object
     wall.scale, wall.pass_index = (0.25, 0.2, 1.0), 3
@@ -114,7 +114,7 @@ def passes_of(scene: Any, path: Path) -> dict[str, Any]:
     return found
 
 
-def by_each_engine(work: Path) -> list[Path]:
+def render_with_each_engine(work: Path) -> list[Path]:
     """The sample scene as EEVEE and Cycles show it with our hair, and as our engine does."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     bpy.ops.hairloom.sample_scene(look="looks/brown", plays=False)
@@ -132,7 +132,7 @@ def by_each_engine(work: Path) -> list[Path]:
     return pictures
 
 
-def put_behind(toward: Any, size: tuple[float, float], material: Any) -> Any:
+def add_pane_behind(toward: Any, size: tuple[float, float], material: Any) -> Any:
     """A pane that faces the camera, at this offset from the target."""
     bpy.ops.mesh.primitive_plane_add(size=1.0, location=TARGET + toward)
     pane = bpy.context.object
@@ -142,7 +142,7 @@ def put_behind(toward: Any, size: tuple[float, float], material: Any) -> Any:
     return pane
 
 
-def with_shafts(work: Path) -> list[Path]:
+def render_shafts(work: Path) -> list[Path]:
     """A window without its shafts and with them, and a sun under water."""
     scene = scene_of_head()
     bpy.data.objects.remove(bpy.data.objects["Plane"])
@@ -155,9 +155,9 @@ def with_shafts(work: Path) -> list[Path]:
     principled.inputs["Emission Color"].default_value = (1.0, 0.85, 0.6, 1.0)
     principled.inputs["Emission Strength"].default_value = 6.0
     dark = material("Bar", (0.05, 0.04, 0.03), 0.9)
-    panes = [put_behind(behind * 0.3, (0.3, 0.3), shining)]
+    panes = [add_pane_behind(behind * 0.3, (0.3, 0.3), shining)]
     for place, size in BARS:
-        bar = put_behind(behind * 0.29, size, dark)
+        bar = add_pane_behind(behind * 0.29, size, dark)
         bar.location += bar.rotation_euler.to_matrix() @ Vector((*place, 0.0))
         panes.append(bar)
     scene.render.resolution_x = scene.render.resolution_y = SIZE
@@ -208,8 +208,8 @@ def distances(depth: Any) -> Any:
     """A picture of depth: white near, grey far, black where nothing is."""
     is_there = depth < 1.0e9
     near, far = depth[is_there].min(), np.percentile(depth[is_there], 98.0)
-    share = np.clip((depth - near) / (far - near), 0.0, 1.0)
-    return opaque(np.where(is_there, 0.9 - 0.85 * share, 0.0) * np.ones(3))
+    fraction = np.clip((depth - near) / (far - near), 0.0, 1.0)
+    return opaque(np.where(is_there, 0.9 - 0.85 * fraction, 0.0) * np.ones(3))
 
 
 def main() -> int:
@@ -219,15 +219,15 @@ def main() -> int:
     try:
         with tempfile.TemporaryDirectory() as work:
             found = passes_of(scene_of_head(), Path(work) / "picture.exr")
-            side_by_side(by_each_engine(Path(work)), folder / "over_engines.jpg")
-            side_by_side(with_shafts(Path(work)), folder / "light_shafts.jpg")
+            side_by_side(render_with_each_engine(Path(work)), folder / "over_engines.jpg")
+            side_by_side(render_shafts(Path(work)), folder / "light_shafts.jpg")
     finally:
         extension.unregister()
     mask = np.zeros((SIZE, SIZE, 3), np.float32)
     for number, color in MASK.items():
         mask[found["Object Index"][..., 0] == number] = color
     pictures = [opaque(found["Combined"][..., :3]), distances(found["Depth"]), opaque(mask)]
-    images = of_addon("blender.base.images")
+    images = addon_module("blender.base.images")
     images.write_png(folder / "engine.png", images.contact_sheet(pictures, len(pictures)))
     return 0
 

@@ -24,20 +24,20 @@ TABLE = REPOSITORY / "tools" / "wheels.sha256"
 FOLDER = REPOSITORY / "wheels"
 #: of Blender 5.2, for packages that accept any Python 3
 PYTHON = "3.13"
-AT_A_TIME = 4
+PARALLEL_DOWNLOADS = 4
 
 
 class FetchError(Exception):
     """A wheel could not be fetched; the message names a remedy."""
 
 
-def wanted(table: Path = TABLE) -> dict[str, str]:
+def pinned_wheels(table: Path = TABLE) -> dict[str, str]:
     """File name -> its SHA-256."""
     lines = [line.split() for line in table.read_text(encoding="utf-8").splitlines() if line]
     return {name: digest for digest, name in lines}
 
 
-def is_there(path: Path, digest: str) -> bool:
+def is_downloaded(path: Path, digest: str) -> bool:
     return path.is_file() and hashlib.sha256(path.read_bytes()).hexdigest() == digest
 
 
@@ -66,7 +66,7 @@ def fetch(name: str, digest: str, folder: Path = FOLDER) -> None:
             text=True,
         )
         fetched = Path(temporary) / name
-        if done.returncode or not is_there(fetched, digest):
+        if done.returncode or not is_downloaded(fetched, digest):
             reasons = (done.stderr or done.stdout).strip().splitlines() or ["no reason given"]
             raise FetchError(
                 f"{name} cannot be fetched ({reasons[-1]}): check the network, or name your "
@@ -76,7 +76,7 @@ def fetch(name: str, digest: str, folder: Path = FOLDER) -> None:
 
 
 def main() -> int:
-    missing = {n: d for n, d in wanted().items() if not is_there(FOLDER / n, d)}
+    missing = {n: d for n, d in pinned_wheels().items() if not is_downloaded(FOLDER / n, d)}
 
     def fetched(name: str) -> bool:
         print(f"fetch_wheels: {name}", flush=True)
@@ -88,7 +88,7 @@ def main() -> int:
         return True
 
     # threads, as the network takes the time
-    with ThreadPoolExecutor(AT_A_TIME) as pool:
+    with ThreadPoolExecutor(PARALLEL_DOWNLOADS) as pool:
         return 0 if all(list(pool.map(fetched, missing))) else 1
 
 

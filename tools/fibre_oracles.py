@@ -50,10 +50,10 @@ def traced_lobes(
     point = np.stack([np.sqrt(1.0 - h * h), h, np.zeros_like(h)], axis=1)
     cosine = -(point @ light)
     mirrored, cos_in = _glass(cosine, 1.0 / index)
-    ways = light + 2.0 * cosine[:, None] * point
+    directions = light + 2.0 * cosine[:, None] * point
     inside = light / index + (cosine / index - cos_in)[:, None] * point
     energy = np.repeat((1.0 - mirrored)[:, None], 3, axis=1)
-    lobes = [(ways, np.repeat(mirrored[:, None], 3, axis=1))]
+    lobes = [(directions, np.repeat(mirrored[:, None], 3, axis=1))]
     for _ in range(1, order_count):
         flat = inside * [1.0, 1.0, 0.0]
         length = -2.0 * _dot(point, flat) / _dot(flat, flat)
@@ -61,11 +61,11 @@ def traced_lobes(
         energy = energy * np.exp(-length[:, None] * np.array(fibre.absorption))
         cosine = np.maximum(_dot(inside, point), 0.0)
         mirrored, cos_out = _glass(cosine, index)
-        ways = inside * index + (cos_out - index * cosine)[:, None] * point
-        lobes.append((ways, energy * (1.0 - mirrored)[:, None]))
+        directions = inside * index + (cos_out - index * cosine)[:, None] * point
+        lobes.append((directions, energy * (1.0 - mirrored)[:, None]))
         inside = inside - 2.0 * cosine[:, None] * point
         energy = energy * mirrored[:, None]
-    histograms = np.stack([_histogram(ways, weight) for ways, weight in lobes])
+    histograms = np.stack([_histogram(directions, weight) for directions, weight in lobes])
     return histograms, np.array([weight.mean(axis=0) for _, weight in lobes])
 
 
@@ -120,11 +120,11 @@ def _bin_means(
     return function(cos_d, phi, fibre).reshape(BIN_COUNT, 32, -1).mean(axis=1)
 
 
-def _histogram(ways: Floats, weight: Floats) -> Floats:
-    azimuth = (np.arctan2(ways[:, 1], ways[:, 0]) + np.pi) * (BIN_COUNT / (2.0 * np.pi))
+def _histogram(directions: Floats, weight: Floats) -> Floats:
+    azimuth = (np.arctan2(directions[:, 1], directions[:, 0]) + np.pi) * (BIN_COUNT / (2.0 * np.pi))
     place = np.minimum(azimuth.astype(np.int64), BIN_COUNT - 1)
     counts = [np.bincount(place, channel, BIN_COUNT) for channel in weight.T]
-    return np.stack(counts, axis=1) * (BIN_COUNT / (2.0 * np.pi) / len(ways))
+    return np.stack(counts, axis=1) * (BIN_COUNT / (2.0 * np.pi) / len(directions))
 
 
 def _glass(cos_in: Floats, ratio: float) -> tuple[Floats, Floats]:

@@ -29,19 +29,19 @@ FIGURES, PAGE = BENCHMARKS / "figures.json", REPOSITORY / "docs" / "figures.md"
 #: [min] for all of them
 MAX_MINUTES = 30.0
 #: [s] for one of them
-LONGEST = 600.0
+TIMEOUT_SECONDS = 600.0
 #: processors that may be busy before a benchmark begins, and for how long they are watched [s]
-MAX_BUSY, WATCHED = 0.3, 1.0
+MAX_BUSY, WATCH_SECONDS = 0.3, 1.0
 #: keys of a benchmark's JSON that describe the run, and are no figures
-ABOUT = ("reference", "limits", "missed")
-ABOUT += ("backend", "renderer", "is_software", "blender", "python", "numpy")
+METADATA_KEYS = ("reference", "limits", "missed")
+METADATA_KEYS += ("backend", "renderer", "is_software", "blender", "python", "numpy")
 _QUOTE = re.compile(
     r'\[(?P<shown>[^\]]+)\]\((?P<page>(?:\.\./)*(?:\w+/)*figures\.md) "(?P<name>[\w.]+)"\)'
 )
 
 
 @dataclass(frozen=True)
-class Short:
+class ShortRun:
     """The arguments of a benchmark's short run, and what it leaves out to save time."""
 
     arguments: str = ""
@@ -49,61 +49,63 @@ class Short:
 
 
 #: in the order of the data flow
-BENCHES: dict[str, Short] = {
-    "curves_read": Short(),
-    "styles": Short("bob edit", "22 styles, and other heads"),
-    "seat": Short("comb", "growing, long jobs and *Make Real*"),
-    "dynamics": Short("--rounds 2", "five of seven rounds"),
-    "strands": Short("sintel", "other grooms"),
-    "contacts": Short("thin", "heads of hair"),
-    "ties": Short(),
-    "among": Short("--skip-cost", "what a frame costs"),
-    "endurance": Short("--runs 20 --minutes 0.2", "98 % of the runs, and most of the long shake"),
-    "refinement": Short(),
-    "shading": Short("cost reference glsl", "Cycles"),
-    "volume": Short("cost transparency", "shadows, and Cycles"),
-    "no_atomics": Short(),
-    "sight": Short("lost", "crowds, covers, scales, counts of strands, and Cycles"),
-    "frames": Short(),
-    "freeze": Short(),
-    "preview_frame": Short(),
-    "compile": Short("head", "other scenes"),
-    "memory": Short("small", "500,000 strands at 3840 x 2160"),
-    "engine": Short("shafts", "stills, skin, and animations"),
-    "picture": Short("soft_shadows", "hair over EEVEE and Cycles, blur and environments"),
-    "cards": Short("order", "building, atlases, occlusion, passes, and strands"),
-    "engines": Short("page springs", "other programs, levels and atlases"),
-    "exchange": Short("usd", "Alembic, motion, kills and damaged files"),
-    "faults": Short("runs 40", "most of the faults"),
-    "house": Short(),
+BENCHES: dict[str, ShortRun] = {
+    "curves_read": ShortRun(),
+    "styles": ShortRun("bob edit", "22 styles, and other heads"),
+    "seat": ShortRun("comb", "growing, long jobs and *Make Real*"),
+    "dynamics": ShortRun("--rounds 2", "five of seven rounds"),
+    "strands": ShortRun("sintel", "other grooms"),
+    "contacts": ShortRun("thin", "heads of hair"),
+    "ties": ShortRun(),
+    "among": ShortRun("--skip-cost", "what a frame costs"),
+    "endurance": ShortRun(
+        "--runs 20 --minutes 0.2", "98 % of the runs, and most of the long shake"
+    ),
+    "refinement": ShortRun(),
+    "shading": ShortRun("cost reference glsl", "Cycles"),
+    "volume": ShortRun("cost transparency", "shadows, and Cycles"),
+    "no_atomics": ShortRun(),
+    "sight": ShortRun("lost", "crowds, covers, scales, counts of strands, and Cycles"),
+    "frames": ShortRun(),
+    "freeze": ShortRun(),
+    "preview_frame": ShortRun(),
+    "compile": ShortRun("head", "other scenes"),
+    "memory": ShortRun("small", "500,000 strands at 3840 x 2160"),
+    "engine": ShortRun("shafts", "stills, skin, and animations"),
+    "picture": ShortRun("soft_shadows", "hair over EEVEE and Cycles, blur and environments"),
+    "cards": ShortRun("order", "building, atlases, occlusion, passes, and strands"),
+    "engines": ShortRun("page springs", "other programs, levels and atlases"),
+    "exchange": ShortRun("usd", "Alembic, motion, kills and damaged files"),
+    "faults": ShortRun("runs 40", "most of the faults"),
+    "house": ShortRun(),
 }
 
 
 def measure(names: list[str]) -> int:
     """Run benchmarks one after another, and write the figures of each as soon as it ends."""
-    kept = known()
+    results = stored_results()
     begin, is_all = time.monotonic(), len(names) == len(BENCHES)
     for number, name in enumerate(names, 1):
         print(f"[{number}/{len(names)}] {name} {BENCHES[name].arguments}", flush=True)
-        found = kept["benches"][name] = run(name)
+        found = results["benches"][name] = run(name)
         missed = ", ".join(found.get("missed", [])) or "none"
-        said = f"missed: {missed}" if found["ended"] else "did not end"
-        print(f"    {found['seconds']:.0f} s, {said}", flush=True)
-        measured = kept["benches"]
-        kept["benches"] = {each: measured[each] for each in BENCHES if each in measured}
-        write(kept)
+        verdict = f"missed: {missed}" if found["ended"] else "did not end"
+        print(f"    {found['seconds']:.0f} s, {verdict}", flush=True)
+        measured = results["benches"]
+        results["benches"] = {each: measured[each] for each in BENCHES if each in measured}
+        write(results)
     minutes = (time.monotonic() - begin) / 60.0
     if is_all:
-        write(kept | {"minutes": round(minutes, 1)})
+        write(results | {"minutes": round(minutes, 1)})
     print(f"{minutes:.1f} minutes; see docs/figures.md")
-    asked = [kept["benches"][name] for name in names]
-    is_missed = any(not each["ended"] or each["missed"] for each in asked)
+    measured_results = [results["benches"][name] for name in names]
+    is_missed = any(not each["ended"] or each["missed"] for each in measured_results)
     return int(is_missed or (is_all and minutes > MAX_MINUTES))
 
 
-def write(kept: Mapping[str, Any]) -> None:
-    FIGURES.write_text(json.dumps(kept, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-    PAGE.write_text(page(kept), encoding="utf-8")
+def write(results: Mapping[str, Any]) -> None:
+    FIGURES.write_text(json.dumps(results, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    PAGE.write_text(page(results), encoding="utf-8")
 
 
 def run(name: str) -> dict[str, Any]:
@@ -111,7 +113,7 @@ def run(name: str) -> dict[str, Any]:
     figures."""
     command = [sys.executable, str(REPOSITORY / "tools" / "bench.py"), name]
     command += BENCHES[name].arguments.split()
-    ran = {
+    conditions = {
         "date": datetime.now(UTC).date().isoformat(),
         "machine": machine(),
         "arguments": BENCHES[name].arguments,
@@ -121,32 +123,37 @@ def run(name: str) -> dict[str, Any]:
     begin = time.monotonic()
     try:
         done = subprocess.run(
-            command, cwd=REPOSITORY, capture_output=True, text=True, timeout=LONGEST, check=False
+            command,
+            cwd=REPOSITORY,
+            capture_output=True,
+            text=True,
+            timeout=TIMEOUT_SECONDS,
+            check=False,
         )
         found = json.loads(done.stdout.splitlines()[-1])
     except (subprocess.TimeoutExpired, json.JSONDecodeError, IndexError) as error:
         print(
             f"    {type(error).__name__}: {getattr(error, 'stderr', None) or done.stderr[-2000:]}"
         )
-        return {**ran, "ended": False, "seconds": round(time.monotonic() - begin, 1)}
-    about = {key: found.pop(key) for key in ABOUT if key in found}
+        return {**conditions, "ended": False, "seconds": round(time.monotonic() - begin, 1)}
+    metadata = {key: found.pop(key) for key in METADATA_KEYS if key in found}
     seconds = round(time.monotonic() - begin, 1)
-    return {**ran, "ended": True, "seconds": seconds, **about, "figures": found}
+    return {**conditions, "ended": True, "seconds": seconds, **metadata, "figures": found}
 
 
 def busy_processors() -> float:
     """How many processors other work takes; 0 if the system does not report it."""
-    told = Path("/proc/stat")
-    if not told.is_file():
+    stat_file = Path("/proc/stat")
+    if not stat_file.is_file():
         return 0.0
 
     def working() -> int:
-        user, nice, system, *_ = map(int, told.read_text().splitlines()[0].split()[1:])
+        user, nice, system, *_ = map(int, stat_file.read_text().splitlines()[0].split()[1:])
         return user + nice + system
 
     before = working()
-    time.sleep(WATCHED)
-    return round((working() - before) / os.sysconf("SC_CLK_TCK") / WATCHED, 2)
+    time.sleep(WATCH_SECONDS)
+    return round((working() - before) / os.sysconf("SC_CLK_TCK") / WATCH_SECONDS, 2)
 
 
 def machine() -> dict[str, str]:
@@ -158,7 +165,7 @@ def machine() -> dict[str, str]:
     return {"processor": model[1] if model else "unknown", "cores": str(cores)}
 
 
-def known() -> dict[str, Any]:
+def stored_results() -> dict[str, Any]:
     """What has been measured so far."""
     if not FIGURES.is_file():
         return {"benches": {}}
@@ -166,9 +173,9 @@ def known() -> dict[str, Any]:
     return found
 
 
-def page(kept: Mapping[str, Any]) -> str:
+def page(results: Mapping[str, Any]) -> str:
     """The text of docs/figures.md."""
-    benches: dict[str, Any] = kept["benches"]
+    benches: dict[str, Any] = results["benches"]
     ended = {name: found for name, found in benches.items() if found["ended"]}
     limits = sum(len(found["limits"]) for found in ended.values())
     missed = [f"`{name}.{key}`" for name, found in ended.items() for key in found["missed"]]
@@ -204,7 +211,7 @@ def section(name: str, found: Mapping[str, Any]) -> list[str]:
     lines = [
         f"## {name}",
         "",
-        about(name),
+        summary(name),
         "",
         f"`{command}`, {found['seconds']:.0f} s. Beside: {found['reference']}.{left_out}",
         "",
@@ -214,8 +221,8 @@ def section(name: str, found: Mapping[str, Any]) -> list[str]:
         "| --- | ---: | --- |",
     ]
     for key, value in found["figures"].items():
-        told = found["limits"].get(key, "")
-        mark = f"**{told}, missed**" if key in found["missed"] else told
+        limit = found["limits"].get(key, "")
+        mark = f"**{limit}, missed**" if key in found["missed"] else limit
         lines.append(f"| `{key}` | {number(value)} | {mark} |")
     return lines
 
@@ -230,11 +237,11 @@ def measured_on(found: Mapping[str, Any]) -> str:
     )
 
 
-def about(name: str) -> str:
+def summary(name: str) -> str:
     """The first paragraph of a benchmark's docstring."""
     source = (BENCHMARKS / f"{name}.py").read_text(encoding="utf-8")
-    told = (ast.get_docstring(ast.parse(source)) or "").split("\n\n")[0]
-    return " ".join(told.split())
+    docstring = (ast.get_docstring(ast.parse(source)) or "").split("\n\n")[0]
+    return " ".join(docstring.split())
 
 
 def number(value: Any) -> str:
@@ -248,7 +255,7 @@ def number(value: Any) -> str:
     return f"{value:.3g}"
 
 
-def quoted(text: str, kept: Mapping[str, Any]) -> str:
+def with_current_values(text: str, results: Mapping[str, Any]) -> str:
     """The text of a page with the latest value of each figure that it quotes.
 
     Text after the number stays: `[41 times](figures.md "refinement.node_ratio")`. A figure that is
@@ -260,7 +267,7 @@ def quoted(text: str, kept: Mapping[str, Any]) -> str:
 
     def shown(match: re.Match[str]) -> str:
         bench, key = match["name"].split(".")
-        value = kept["benches"][bench]["figures"][key]
+        value = results["benches"][bench]["figures"][key]
         number_there = re.match(r"[\d.,e+-]*\d", match["shown"])
         unit = match["shown"][number_there.end() :] if number_there else ""
         if unit.strip() == "%" and "percent" not in key:
@@ -277,11 +284,11 @@ def pages_that_quote() -> list[Path]:
 
 def write_quotes() -> None:
     """Bring the quotes of all pages up to date, and the page of the figures."""
-    kept = known()
-    PAGE.write_text(page(kept), encoding="utf-8")
+    results = stored_results()
+    PAGE.write_text(page(results), encoding="utf-8")
     for path in pages_that_quote():
         text = path.read_text(encoding="utf-8")
-        path.write_text(quoted(text, kept), encoding="utf-8")
+        path.write_text(with_current_values(text, results), encoding="utf-8")
 
 
 def main(names: list[str]) -> int:

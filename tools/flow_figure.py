@@ -66,7 +66,7 @@ blender/preview/handlers.py register
             render/dynamics_pass.py DynamicsPass
           blender/sessions/numpy_solver.py NumpySolver
             motion_flow.py steps
-              dynamics/step.py steps
+              dynamics/step.py advance_in_steps
     blender/preview/previews.py attempt
       blender/viewport/overlay.py show
         render/groom_pass.py GroomPass
@@ -125,7 +125,7 @@ def figure() -> str:
     """The three flows, one below the other, as SVG."""
     panels, top = [], 0
     flows = {title: steps_of(flow) for title, flow in FLOWS.items()}
-    columns = max(_place(tops, 0) for tops in flows.values())
+    columns = max(_place_columns(tops, 0) for tops in flows.values())
     width = _LEFT + columns * (_BOX[0] + _GAP)
     for title, tops in flows.items():
         panel, height = _panel(title, tops, top, width)
@@ -142,24 +142,24 @@ def figure() -> str:
     )
 
 
-def _every(steps: list[Step]) -> list[Step]:
-    return [each for step in steps for each in (step, *_every(step.calls))]
+def _all_steps(steps: list[Step]) -> list[Step]:
+    return [each for step in steps for each in (step, *_all_steps(step.calls))]
 
 
-def _place(steps: list[Step], column: int) -> int:
+def _place_columns(steps: list[Step], column: int) -> int:
     """Place a leaf in each column, a caller above its first call; calls within a floor go down a
     row."""
     for step in steps:
         for called in step.calls:
             called.row = step.row + 1 if called.floor == step.floor else 0
-        after = _place(step.calls, column) if step.calls else column + 1
+        after = _place_columns(step.calls, column) if step.calls else column + 1
         step.column, column = column, after
     return column
 
 
 def _panel(title: str, tops: list[Step], top: int, right: int) -> tuple[str, int]:
     """One flow from `top` on, and its height."""
-    steps = _every(tops)
+    steps = _all_steps(tops)
     parts = [f'<text x="8" y="{top + 26}" font-size="16" font-weight="bold">{title}</text>']
     y, starts = top + _TITLE, {}
     for floor in FLOORS:

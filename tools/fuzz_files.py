@@ -3,9 +3,9 @@
 python tools/in_package.py fuzz_files FORMAT COUNT [SEED]    a line of JSON
 
 The files are those of `damaged_files`. A failure is an exception other than HairloomError, one
-without a place or a remedy, an invalid groom, more than SLOWEST seconds, or more memory than
-MOST_TIMES the file and MOST_BESIDE. For Alembic and USD, which libraries parse in another process,
-memory does not count, and the limit is SLOWEST_APART seconds.
+without a place or a remedy, an invalid groom, more than MAX_SECONDS seconds, or more memory than
+MAX_MEMORY_FACTOR the file and MAX_EXTRA_MEMORY. For Alembic and USD, which libraries parse in
+another process, memory does not count, and the limit is MAX_SECONDS_IN_SUBPROCESS seconds.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from damaged_files import OF_LIBRARIES, mutated
+from damaged_files import LIBRARY_FORMATS, damaged_content
 
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.alembic.groom_alembic_read import read_groom_alembic
@@ -33,11 +33,11 @@ from hairloom.addon.exchange.usd.groom_usd_read import read_usd
 from hairloom.addon.parameters import ALL_SETTINGS
 from hairloom.addon.params.preset import Preset, read_any_preset
 
-SLOWEST = 2.0
+MAX_SECONDS = 2.0
 #: with another process to be started, on a busy machine
-SLOWEST_APART = 20.0
-MOST_TIMES, MOST_BESIDE = 10, 1_000_000
-LONGEST_MESSAGE = 2000
+MAX_SECONDS_IN_SUBPROCESS = 20.0
+MAX_MEMORY_FACTOR, MAX_EXTRA_MEMORY = 10, 1_000_000
+MAX_MESSAGE_LENGTH = 2000
 #: address space of the child beyond what it has at the start [bytes]
 ADDRESSES = 1 << 29
 
@@ -58,34 +58,34 @@ READERS: dict[str, Callable[[Path], Any]] = {
 
 def main(arguments: list[str]) -> int:
     kind, count, seed = arguments[0], int(arguments[1]), int((arguments[2:] or ["0"])[0])
-    if kind not in OF_LIBRARIES:
+    if kind not in LIBRARY_FORMATS:
         pages = int(Path("/proc/self/statm").read_text().split()[0])
         limit = pages * resource.getpagesize() + ADDRESSES
         resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
-    found = fuzzed(kind, count, seed)
+    found = fuzz(kind, count, seed)
     print(json.dumps(found))
     return 0
 
 
-def fuzzed(kind: str, count: int, seed: int = 0) -> dict[str, Any]:
+def fuzz(kind: str, count: int, seed: int = 0) -> dict[str, Any]:
     """Read `count` damaged files of a format; failures are named with their numbers."""
     outcomes = {"read": 0, "refused": 0}
     failures: list[str] = []
     slowest, hungriest = 0.0, 0.0
-    most_seconds = SLOWEST_APART if kind in OF_LIBRARIES else SLOWEST
-    most_times = np.inf if kind in OF_LIBRARIES else MOST_TIMES
+    max_seconds = MAX_SECONDS_IN_SUBPROCESS if kind in LIBRARY_FORMATS else MAX_SECONDS
+    max_factor = np.inf if kind in LIBRARY_FORMATS else MAX_MEMORY_FACTOR
     tracemalloc.start()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"damaged.{kind}"
         for number in range(count):
-            content = mutated(kind, seed, number)
+            content = damaged_content(kind, seed, number)
             path.write_bytes(content)
-            outcome, seconds, peak = judged(READERS[kind], path, most_seconds)
+            outcome, seconds, peak = read_and_judge(READERS[kind], path, max_seconds)
             slowest = max(slowest, seconds)
-            hungriest = max(hungriest, (peak - MOST_BESIDE) / max(len(content), 1))
-            if peak > most_times * len(content) + MOST_BESIDE:
+            hungriest = max(hungriest, (peak - MAX_EXTRA_MEMORY) / max(len(content), 1))
+            if peak > max_factor * len(content) + MAX_EXTRA_MEMORY:
                 outcome = f"{peak:,} bytes of memory for a file of {len(content):,}"
-            if seconds > most_seconds:
+            if seconds > max_seconds:
                 outcome = f"{seconds:.1f} s"
             if outcome in outcomes:
                 outcomes[outcome] += 1
@@ -101,19 +101,19 @@ def fuzzed(kind: str, count: int, seed: int = 0) -> dict[str, Any]:
     }
 
 
-def judged(
-    read: Callable[[Path], Any], path: Path, most_seconds: float = SLOWEST
+def read_and_judge(
+    read: Callable[[Path], Any], path: Path, max_seconds: float = MAX_SECONDS
 ) -> tuple[str, float, int]:
     """The outcome of reading a file: "read", "refused" or the problem; seconds; peak bytes."""
     tracemalloc.reset_peak()
     before = tracemalloc.get_traced_memory()[0]
     started = time.perf_counter()
     try:
-        with _interrupted_after(3.0 * most_seconds):
-            outcome = unsound(read(path)) or "read"
+        with _interrupted_after(3.0 * max_seconds):
+            outcome = fault_of(read(path)) or "read"
     except HairloomError as error:
         is_told = bool(error.problem and error.remedy and path.name in error.place)
-        is_clear = is_told and len(str(error)) < LONGEST_MESSAGE
+        is_clear = is_told and len(str(error)) < MAX_MESSAGE_LENGTH
         outcome = "refused" if is_clear else f"an unclear message: {error}"
     except (Exception, _Hang) as error:
         outcome = f"{type(error).__name__}: {error}"
@@ -121,7 +121,7 @@ def judged(
     return outcome, seconds, tracemalloc.get_traced_memory()[1] - before
 
 
-def _are_whole(color: Any, offsets: Any) -> bool:
+def _are_valid(color: Any, offsets: Any) -> bool:
     """Whether each strand has colours all along or none at all."""
     is_none = np.isnan(color).all(axis=1)
     of_strand = np.repeat(is_none[offsets[:-1]], np.diff(offsets))
@@ -129,7 +129,7 @@ def _are_whole(color: Any, offsets: Any) -> bool:
     return bool((is_none == of_strand).all() and (known >= 0.0).all() and np.isfinite(known).all())
 
 
-def unsound(found: Any) -> str:
+def fault_of(found: Any) -> str:
     """What is wrong with a reader's result; empty if nothing is."""
     if isinstance(found, ReadGroom):
         strands, color = found.strands, found.groom.color
@@ -138,7 +138,7 @@ def unsound(found: Any) -> str:
             np.isfinite(strands.points).all(),
             np.isfinite(strands.radius).all() and (strands.radius > 0.0).all(),
             strands.root_uv is None or np.isfinite(strands.root_uv).all(),
-            color is None or _are_whole(color, strands.offsets),
+            color is None or _are_valid(color, strands.offsets),
         ]
         return "" if all(sound) else f"a groom that is not sound: {sound}"
     return "" if isinstance(found, Preset) else f"a {type(found).__name__}"

@@ -66,7 +66,7 @@ class Section:
     first: tuple[str, ...] = ()
 
 
-def of_presets(folder: str, options: str) -> tuple[Picture, ...]:
+def preset_pictures(folder: str, options: str) -> tuple[Picture, ...]:
     """A picture for each preset of a folder, whose name replaces {} in the options."""
     return tuple(
         Picture(
@@ -78,7 +78,7 @@ def of_presets(folder: str, options: str) -> tuple[Picture, ...]:
     )
 
 
-def of_styles(names: Iterable[str]) -> tuple[Picture, ...]:
+def style_pictures(names: Iterable[str]) -> tuple[Picture, ...]:
     """A picture of each of these hairstyles on the built-in head."""
     return tuple(
         Picture(
@@ -117,12 +117,12 @@ SECTIONS = (
     Section(
         "Hairstyles",
         "The [hairstyles](hairstyles.md) that ship, on the built-in head.",
-        of_styles(hairstyles()),
+        style_pictures(hairstyles()),
     ),
     Section(
         "Looks",
         "The [looks](shading.md) that ship, on the same hair in the same light.",
-        of_presets("looks", "--preset looks/{}"),
+        preset_pictures("looks", "--preset looks/{}"),
     ),
     Section(
         "Water and dust",
@@ -141,7 +141,7 @@ SECTIONS = (
     Section(
         "Stages",
         "The same hair on each [stage](command-line.md#the-stage).",
-        of_presets("stage", "--preset looks/blond --stage {}"),
+        preset_pictures("stage", "--preset looks/blond --stage {}"),
     ),
     Section(
         "Skins",
@@ -191,7 +191,7 @@ SECTIONS = (
         "are for hair far away.",
         (
             Picture("strands", "Strands", "--preset looks/brown"),
-            *of_presets(
+            *preset_pictures(
                 "cards",
                 "--preset looks/brown --preset cards/{} --set card_drawing.shown_as=cards",
             ),
@@ -271,12 +271,12 @@ def grow_once(inputs: Any) -> None:
     """Keep the hair of the built-in head: growing it takes longer than drawing it."""
     grow, kept = inputs.grow_with_face, {}
 
-    def kept_or_grown(surface: Any, settings: Any, weights: Any, length: Any = None) -> Any:
+    def cached_grow(surface: Any, settings: Any, weights: Any, length: Any = None) -> Any:
         if settings not in kept:
             kept[settings] = grow(surface, settings, weights, length)
         return kept[settings]
 
-    inputs.grow_with_face = kept_or_grown
+    inputs.grow_with_face = cached_grow
 
 
 #: centre and half axes [m] of each part of a sitting bear that looks to -Y; its right limbs are

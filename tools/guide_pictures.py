@@ -25,7 +25,7 @@ def main(folder: Path) -> int:
         made = folder / path.name.removeprefix(SESSION)
         shutil.copyfile(path, made)
         print(f"{made.name}: {made.stat().st_size:,} bytes")
-    panel_texts.keep()
+    panel_texts.store_texts()
     return 0
 
 

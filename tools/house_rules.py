@@ -113,7 +113,7 @@ def room_of(name: str) -> str:
     return f"blender.{rest[0]}" if first == "blender" and rest and rest[0] else first
 
 
-def arrow_back(room: str, target: str) -> str:
+def reversed_import(room: str, target: str) -> str:
     """Why a room of blender/ may not import another; empty if it may, or if one is no such room."""
     one, other = (name.removeprefix("blender.") for name in (room, target))
     if not (room.startswith("blender.") and target.startswith("blender.")):
@@ -153,7 +153,7 @@ def violations(addon: Path) -> list[str]:
         allowed = MAY_IMPORT[room] | GROUND | {room}
         for line, name in imports_of(file, addon):
             target = room_of(name)
-            if why := arrow_back(room, target):
+            if why := reversed_import(room, target):
                 found.append(f"{file.relative_to(addon)}:{line} imports {name}: {why}")
                 continue
             if target.startswith("blender.") and room.startswith("blender."):
@@ -167,7 +167,7 @@ def violations(addon: Path) -> list[str]:
     return found
 
 
-def arrows_up(addon: Path = ADDON) -> list[str]:
+def upward_imports(addon: Path = ADDON) -> list[str]:
     """Imports within blender/ from a room that comes later."""
     return [each for each in violations(addon) if "in the order of the rooms" in each]
 
@@ -203,12 +203,29 @@ def _nodes(file: Path) -> list[ast.AST]:
 
 
 #: methods that change a list, a dict or a set
-_CHANGING = {"append", "add", "update", "pop", "popitem", "clear", "discard", "remove", "extend"}
-_CHANGING |= {"setdefault", "insert", "difference_update", "appendleft", "popleft", "subtract"}
+_MUTATING_METHODS = {
+    "append",
+    "add",
+    "update",
+    "pop",
+    "popitem",
+    "clear",
+    "discard",
+    "remove",
+    "extend",
+}
+_MUTATING_METHODS |= {
+    "setdefault",
+    "insert",
+    "difference_update",
+    "appendleft",
+    "popleft",
+    "subtract",
+}
 
 
 #: Upper limit of `mutable_names`.
-MOST_MUTABLE = 20
+MAX_MUTABLE = 20
 
 
 def mutable_names(addon: Path = ADDON) -> list[str]:
@@ -220,19 +237,19 @@ def mutable_names(addon: Path = ADDON) -> list[str]:
             if isinstance(node, ast.Global):
                 changed.update(node.names)
             elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
-                if node.func.attr in _CHANGING and isinstance(node.func.value, ast.Name):
+                if node.func.attr in _MUTATING_METHODS and isinstance(node.func.value, ast.Name):
                     changed.add(node.func.value.id)
             elif isinstance(node, ast.Subscript) and not isinstance(node.ctx, ast.Load):
                 if isinstance(node.value, ast.Name):
                     changed.add(node.value.id)
             elif isinstance(node, ast.AugAssign) and isinstance(node.target, ast.Name):
                 changed.add(node.target.id)
-        changed &= _bound(file) if changed else set()
+        changed &= _module_names(file) if changed else set()
         found += [f"{file.relative_to(addon)}: {name}" for name in sorted(changed)]
     return found
 
 
-def _bound(file: Path) -> set[str]:
+def _module_names(file: Path) -> set[str]:
     """Names that the module itself binds and that no function binds locally."""
     bound: set[str] = set()
     own: set[str] = set()

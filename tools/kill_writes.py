@@ -1,6 +1,6 @@
 """Kills a process while it writes, many times: afterwards the old or the new files must be there.
 
-python tools/in_package.py kill_writes FORMAT TRIALS [SEED]    a JSON line, see `killed`
+python tools/in_package.py kill_writes FORMAT TRIALS [SEED]    a JSON line, see `kill_and_check`
 
 A child writes two versions in turn, as fast as it can, and is killed by SIGKILL at a random moment.
 """
@@ -75,11 +75,13 @@ def main(arguments: list[str]) -> int:
     for library in LIBRARIES.get(kind, ()):
         importlib.import_module(library)
     with tempfile.TemporaryDirectory() as folder:
-        print(json.dumps(killed(WRITERS[kind], Path(folder) / f"hair.{kind}", trials, seed)))
+        print(
+            json.dumps(kill_and_check(WRITERS[kind], Path(folder) / f"hair.{kind}", trials, seed))
+        )
     return 0
 
 
-def killed(
+def kill_and_check(
     write: Callable[[Path, int], object], target: Path, trials: int, seed: int
 ) -> dict[str, int]:
     """Kill a writer this many times, and check the files that it left.
@@ -94,24 +96,24 @@ def killed(
     folder, versions, seconds = target.parent, [], 0.0
     for version in (0, 1):
         begun = time.perf_counter()
-        _write_apart(write, target, version)
+        _write_in_child(write, target, version)
         seconds = max(seconds, time.perf_counter() - begun)
         versions.append(_content(folder))
     found = {"trials": trials, "failures": 0, "amid": 0, "mixed": 0, "leftovers": 0}
-    known: set[str] = set()
+    stale_names: set[str] = set()
     for _ in range(trials):
         _kill_one(write, target, float(random.uniform(0.0, WRITES * seconds)))
-        beside = {name for name in os.listdir(folder) if name.startswith(".")}
-        found["amid"] += bool(beside - known)
+        temporary_names = {name for name in os.listdir(folder) if name.startswith(".")}
+        found["amid"] += bool(temporary_names - stale_names)
         remove_stale_files(folder)  # as the next writer does
-        known = {name for name in os.listdir(folder) if name.startswith(".")}
+        stale_names = {name for name in os.listdir(folder) if name.startswith(".")}
         content = _content(folder)
         is_whole = all(content.get(n) in [v[n] for v in versions] for n in versions[0])
         found["failures"] += not is_whole
         found["mixed"] += is_whole and content not in versions
         if not is_whole:
-            _write_apart(write, target, 0)
-    _write_apart(write, target, 0)
+            _write_in_child(write, target, 0)
+    _write_in_child(write, target, 0)
     found["leftovers"] = len(set(os.listdir(folder)) - set(versions[0]))
     return found
 
@@ -127,7 +129,7 @@ def _content(folder: Path) -> dict[str, bytes]:
     }
 
 
-def _write_apart(write: Callable[[Path, int], object], target: Path, version: int) -> None:
+def _write_in_child(write: Callable[[Path, int], object], target: Path, version: int) -> None:
     """Write in a child too: threads that libraries start here would be lost in the next fork."""
     child = os.fork()
     if child == 0:
@@ -141,22 +143,22 @@ def _write_apart(write: Callable[[Path, int], object], target: Path, version: in
 
 
 def _kill_one(write: Callable[[Path, int], object], target: Path, delay: float) -> None:
-    ready, told = os.pipe()
+    ready_reader, ready_writer = os.pipe()
     child = os.fork()
     if child == 0:
-        _write_for_ever(write, target, told)
-    os.read(ready, 1)
+        _write_forever(write, target, ready_writer)
+    os.read(ready_reader, 1)
     time.sleep(delay)
     os.kill(child, signal.SIGKILL)
     _, status = os.waitpid(child, 0)
     assert os.WIFSIGNALED(status), "the writer ended by itself"
-    os.close(ready)
-    os.close(told)
+    os.close(ready_reader)
+    os.close(ready_writer)
 
 
-def _write_for_ever(write: Callable[[Path, int], object], target: Path, told: int) -> None:
+def _write_forever(write: Callable[[Path, int], object], target: Path, ready_writer: int) -> None:
     try:
-        os.write(told, b"x")
+        os.write(ready_writer, b"x")
         version = 0
         while True:
             write(target, version)

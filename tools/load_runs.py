@@ -29,7 +29,7 @@ class Run(TypedDict):
     code: int
 
 
-def kept() -> list[Run]:
+def recorded_runs() -> list[Run]:
     """All runs so far, the last at the end."""
     found: list[Run] = json.loads(FILE.read_text()) if FILE.is_file() else []
     return found
@@ -41,14 +41,14 @@ def passed_in_a_row(runs: list[Run]) -> int:
     return len(runs) - max(failed, default=0)
 
 
-def keep(run: Run) -> None:
-    rows = ",\n".join(json.dumps(each) for each in [*kept(), run])
+def add_run(run: Run) -> None:
+    rows = ",\n".join(json.dumps(each) for each in [*recorded_runs(), run])
     FILE.write_text(f"[\n{rows}\n]\n")
 
 
 def commit() -> str:
-    asked = ["git", "rev-parse", "--short=8", "HEAD"]
-    return subprocess.check_output(asked, cwd=REPOSITORY, text=True).strip()
+    result = ["git", "rev-parse", "--short=8", "HEAD"]
+    return subprocess.check_output(result, cwd=REPOSITORY, text=True).strip()
 
 
 def main(arguments: list[str]) -> int:
@@ -63,13 +63,13 @@ def main(arguments: list[str]) -> int:
                 ended = subprocess.run([".ci/run"], cwd=REPOSITORY, stdout=stream, stderr=stream)
             minutes = round((time.monotonic() - begin) / 60.0, 1)
             date = datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d %H:%M")
-            keep(Run(commit=of, date=date, minutes=minutes, code=ended.returncode))
+            add_run(Run(commit=of, date=date, minutes=minutes, code=ended.returncode))
             codes.append(ended.returncode)
             print(f"run {number}: exit code {ended.returncode}, {minutes} minutes", flush=True)
     finally:
         for other in others:
             other.kill()
-    print(f"{codes.count(0)} of {runs} passed, {passed_in_a_row(kept())} in a row")
+    print(f"{codes.count(0)} of {runs} passed, {passed_in_a_row(recorded_runs())} in a row")
     return int(any(codes))
 
 

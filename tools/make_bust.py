@@ -30,7 +30,7 @@ CUT_HEIGHT, CUT_HALF, CUT_POWER = -0.10, (0.158, 0.158), 2.4
 #: corners this near to the cut are moved onto it, so that no slivers are left [m]
 SNAP = 0.004
 #: island -> y behind which the mouth and the eye sockets are left out [m]
-DEEPEST = {1: -0.07, 2: -0.062, 3: -0.062}
+MAX_DEPTH = {1: -0.07, 2: -0.062, 3: -0.062}
 
 EYE, EYE_RADIUS = np.array([0.0307767, -0.064535, -0.0065861]), 0.01495
 #: angles from the eye's axis [degrees] of its rings, and how many corners each has
@@ -236,7 +236,7 @@ def shallow(mesh: Mesh) -> Mesh:
     first = np.concatenate([[0], np.cumsum(mesh.sizes)[:-1]])
     depth = np.minimum.reduceat(mesh.positions[mesh.corner_vertex, 1], first)
     island = island_of(mesh.uv)[mesh.corner_uv[first]]
-    limit = np.array([DEEPEST.get(number, np.inf) for number in range(len(ISLANDS))])
+    limit = np.array([MAX_DEPTH.get(number, np.inf) for number in range(len(ISLANDS))])
     return chosen(mesh, depth <= limit[island])
 
 

@@ -20,7 +20,7 @@ import gpu
 import numpy as np
 from extension_loader import REPOSITORY, load_package
 from preset_pictures import THUMBNAIL, write_thumbnail
-from style_growth import Head, of_addon
+from style_growth import Head, addon_module
 from style_recipes import RECIPES
 
 STYLES = REPOSITORY / "hairstyles"
@@ -38,8 +38,8 @@ THUMBNAIL_VIEWS = dict.fromkeys(("ponytail", "bun", "braid"), (-0.85, 0.6, 0.2))
 def make(names: list[str]) -> None:
     """Write the styles of these names."""
     head = Head()
-    of_addon("blender.setup.hairstyles").shipped.cache_clear()
-    hairstyles = of_addon("exchange.hairstyles")
+    addon_module("blender.setup.hairstyles").shipped.cache_clear()
+    hairstyles = addon_module("exchange.hairstyles")
     STYLES.mkdir(parents=True, exist_ok=True)
     for name in names:
         begun = time.perf_counter()
@@ -50,30 +50,30 @@ def make(names: list[str]) -> None:
         print(f"{name}: {count:,} guides, {time.perf_counter() - begun:.1f} s", flush=True)
 
 
-def rig_of(name: str, most: int = 1_000_000) -> tuple[Any, bpy.types.Object]:
+def rig_of(name: str, max_strands: int = 1_000_000) -> tuple[Any, bpy.types.Object]:
     """The rig and the hair object of a style, added to a new scene as by an artist.
 
     Args:
         most: limit of the number of children.
     """
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    setup = of_addon("blender.setup.hairstyles")
+    setup = addon_module("blender.setup.hairstyles")
     collection = bpy.context.collection
     style = setup.named_hairstyle(name)
-    run_parts = of_addon("blender.base.parts").run_parts
+    run_parts = addon_module("blender.base.parts").run_parts
     is_fur = setup.grows_anywhere(style)
     head = animal() if is_fur else run_parts(setup.add_head(collection, "light"))
     bpy.context.view_layer.update()
     depsgraph = bpy.context.evaluated_depsgraph_get()
     hair = run_parts(setup.add_hairstyle(style, head, depsgraph, collection)).hair
     children = hair.data.hairloom.children
-    children.strand_count = min(children.strand_count, most)
+    children.strand_count = min(children.strand_count, max_strands)
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    source = of_addon("blender.scene.source").read_source(hair, depsgraph)
+    source = addon_module("blender.scene.source").read_source(hair, depsgraph)
     if setup.is_bust(head) and not setup.is_of_face(style):
         face = run_parts(setup.face_hair(head, source.head, depsgraph))
-        source = replace(source, strands=of_addon("strands.join").joined(source.strands, face))
-    rig = of_addon("blender.colliders.rigs").MadeRig.of(hair, source).rig
+        source = replace(source, strands=addon_module("strands.join").joined(source.strands, face))
+    rig = addon_module("blender.colliders.rigs").MadeRig.of(hair, source).rig
     return rig, hair
 
 
@@ -87,7 +87,7 @@ def animal() -> bpy.types.Object:
 
 def studio_of(rig: Any, hair: bpy.types.Object) -> Any:
     """A studio that draws this hair in its own look."""
-    parameters, of = of_addon("parameters").ALL_SETTINGS, of_addon
+    parameters, of = addon_module("parameters").ALL_SETTINGS, addon_module
     is_bust = of("blender.setup.hairstyles").is_bust(hair.parent)
     own = of("blender.command_line.object_settings").settings_of_object(hair)
     settings = {section: kind() for section, kind in parameters.items()} | own
@@ -104,11 +104,11 @@ def camera_at(rig: Any, direction: tuple[float, float, float], aspect: float) ->
     """A camera that frames the hair and the head down to the shoulders; for brows and lashes, the
     face."""
     low, high = rig.strands.bounds()
-    if of_addon("strands.face").is_face_hair(rig.strands.group).all():
+    if addon_module("strands.face").is_face_hair(rig.strands.group).all():
         low, high = low - 0.02, high + 0.02
     else:
         low, high = np.minimum(low, (-0.11, -0.11, -0.2)), np.maximum(high, (0.11, 0.12, 0.12))
-    return of_addon("render.camera").frame_camera(
+    return addon_module("render.camera").frame_camera(
         (low, high), direction, np.radians(24.0), aspect, margin=0.95
     )
 
@@ -141,7 +141,7 @@ def draw(name: str, folder: Path) -> None:
         for direction in VIEWS
     ]
     folder.mkdir(parents=True, exist_ok=True)
-    sheet = of_addon("blender.base.images").contact_sheet(pictures, len(VIEWS))
+    sheet = addon_module("blender.base.images").contact_sheet(pictures, len(VIEWS))
     studio.write(folder / f"{name}.png", sheet)
     count, notes = rig.strands.strand_count, [*rig.notes, *studio.notes]
     print(f"{name}: {count:,} strands; {rig.widths.line}. {notes}", flush=True)

@@ -61,13 +61,13 @@ def wheels_for(wheels: list[str], system: str, python: tuple[int, int]) -> list[
     """The wheels, by file name, that a build of Blender can use."""
     tool = packager()
 
-    def suits(name: str) -> bool:
+    def is_compatible(name: str) -> bool:
         tags = name.removesuffix(".whl").split("-")[-3:]
         versions = tool.python_versions_from_wheel_python_tag(tags[0])
         stable = tool.python_versions_from_wheel_abi_tag(tags[1], stable_only=True)
         return python in versions or (python[0],) in versions | stable
 
-    return [n for n in tool.paths_filter_wheels_by_platform(wheels, system) if suits(n)]
+    return [n for n in tool.paths_filter_wheels_by_platform(wheels, system) if is_compatible(n)]
 
 
 def manifest_for(manifest: str, system: str, wheels: list[str]) -> str:
@@ -79,7 +79,7 @@ def manifest_for(manifest: str, system: str, wheels: list[str]) -> str:
     return changed
 
 
-def packed_tighter(wheel: bytes) -> bytes:
+def recompressed(wheel: bytes) -> bytes:
     """A wheel of the same files, packed by LZMA.
 
     alembic3d's largest library for Linux holds the table of its symbols three times, too far apart
@@ -117,7 +117,7 @@ def write_zip(
                 new.writestr(entry, content, zipfile.ZIP_STORED)
                 continue
             if is_wheel and system == LZMA_SYSTEM and len(content) > LZMA_BYTES:
-                content = packed_tighter(content)
+                content = recompressed(content)
             if entry.filename == MANIFEST:
                 content = manifest_for(content.decode(), system, kept).encode()
             # wheels, which Blender's packager only stores, still shrink by a fiftieth

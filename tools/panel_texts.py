@@ -20,9 +20,9 @@ from extension_loader import PACKAGE, REPOSITORY, load_package
 sys.path.append(str(REPOSITORY / "tests" / "window"))
 from guide_panels import PICTURES
 
-KEPT = REPOSITORY / "docs" / "images" / "panels.json"
+STORED_TEXTS = REPOSITORY / "docs" / "images" / "panels.json"
 #: beginnings of the names of panels that are drawn for a mesh
-OF_MESHES = ("collider", "fin", "sidebar_mesh_cards", "sidebar_fin")
+MESH_PICTURES = ("collider", "fin", "sidebar_mesh_cards", "sidebar_fin")
 
 
 class Recorder:
@@ -72,7 +72,7 @@ def _field(known: Any, text: str | None) -> str:
 
 
 @contextmanager
-def _lines_unbroken() -> Iterator[None]:
+def _without_line_breaks() -> Iterator[None]:
     """Draw texts without line breaks, which depend on a panel's region: without a window there is
     none."""
 
@@ -96,8 +96,8 @@ def texts() -> dict[str, list[str]]:
     bpy.ops.hairloom.fin_add()
     bpy.ops.hairloom.grow(strand_count=60, length=0.1, cv_count=8)
     hair = bpy.context.object
-    with _lines_unbroken():
-        found = {name: list(_of_picture(name, hair, mesh)) for name in PICTURES}
+    with _without_line_breaks():
+        found = {name: list(_texts_of_picture(name, hair, mesh)) for name in PICTURES}
     preferences = importlib.import_module(f"{PACKAGE}.addon.ui.preferences").HAIRLOOM_AP_preferences
     declared = [each.keywords for each in preferences.__annotations__.values()]
     return found | {
@@ -105,22 +105,22 @@ def texts() -> dict[str, list[str]]:
     }
 
 
-def _of_picture(name: str, hair: bpy.types.Object, mesh: bpy.types.Object) -> Iterator[str]:
+def _texts_of_picture(name: str, hair: bpy.types.Object, mesh: bpy.types.Object) -> Iterator[str]:
     for panel in (each for column in PICTURES[name] for each in column):
-        active = mesh if panel.startswith(OF_MESHES) else hair
+        active = mesh if panel.startswith(MESH_PICTURES) else hair
         recorder, kind = Recorder(), getattr(bpy.types, f"HAIRLOOM_PT_{panel}")
         with bpy.context.temp_override(active_object=active, object=active):
             kind.draw(SimpleNamespace(layout=recorder), bpy.context)
         yield from (f"# {kind.bl_label}", *recorder.noted)
 
 
-def kept() -> dict[str, list[str]]:
-    found: dict[str, list[str]] = json.loads(KEPT.read_text(encoding="utf-8"))
+def stored_texts() -> dict[str, list[str]]:
+    found: dict[str, list[str]] = json.loads(STORED_TEXTS.read_text(encoding="utf-8"))
     return found
 
 
-def keep() -> None:
+def store_texts() -> None:
     """Store the present contents of the panels."""
     load_package().register()
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    KEPT.write_text(json.dumps(texts(), indent=1) + "\n", encoding="utf-8")
+    STORED_TEXTS.write_text(json.dumps(texts(), indent=1) + "\n", encoding="utf-8")

@@ -27,36 +27,38 @@ BACKDROP = (0.045, 0.05, 0.058)
 SHADES = 64
 
 
-def of_addon(module: str) -> Any:
+def addon_module(module: str) -> Any:
     return importlib.import_module(f"{PACKAGE}.addon.{module}")
 
 
 def wig(strand_count: int = STRANDS) -> Any:
     """The rig of shoulder-long hair on the built-in head, with its brows and lashes."""
-    settings = of_addon("parameters").ALL_SETTINGS
+    settings = addon_module("parameters").ALL_SETTINGS
     grown = settings["grow"](strand_count=strand_count)
-    bust = of_addon("blender.scene.built_in_head").built_in_head()
-    strands = of_addon("groom.face_hair").grow_with_face(bust.surface, grown, bust.weights)
-    return of_addon("rig_flow").prepare(
+    bust = addon_module("blender.scene.built_in_head").built_in_head()
+    strands = addon_module("groom.face_hair").grow_with_face(bust.surface, grown, bust.weights)
+    return addon_module("rig_flow").prepare(
         strands, bust.surface, settings["guides"](), place="the built-in groom", widths="auto"
     )
 
 
 def studio_of(rig: Any, *settings: Any) -> Any:
     """A studio for this hair, whose head has light skin."""
-    all_settings = of_addon("parameters").ALL_SETTINGS
-    return of_addon("blender.pictures.studio").Studio(
-        of_addon("blender.sessions.prepared_groom").prepare_groom(rig, all_settings["ambient"]()),
-        of_addon("blender.properties.groom_settings").GroomSettings(
-            of_addon("params").SettingsMap(*settings, all_settings["detail"](lod_size=0.0))
+    all_settings = addon_module("parameters").ALL_SETTINGS
+    return addon_module("blender.pictures.studio").Studio(
+        addon_module("blender.sessions.prepared_groom").prepare_groom(
+            rig, all_settings["ambient"]()
         ),
-        look=of_addon("blender.scene.built_in_head").built_in_head().look("light"),
+        addon_module("blender.properties.groom_settings").GroomSettings(
+            addon_module("params").SettingsMap(*settings, all_settings["detail"](lod_size=0.0))
+        ),
+        look=addon_module("blender.scene.built_in_head").built_in_head().look("light"),
     )
 
 
 def against(view: np.ndarray) -> tuple[Any, ...]:
     """A sun behind the hair and a weak one in front of it, fixed to the camera."""
-    sun = of_addon("shading.lights").Light.sun
+    sun = addon_module("shading.lights").Light.sun
     to_world = np.linalg.inv(view)[:3, :3]
     suns = (((0.35, 0.5, -1.0), (1.0, 0.97, 0.93), 3.0), ((-0.6, 0.3, 0.6), (0.8, 0.9, 1.0), 0.6))
     return tuple(sun(-to_world @ np.array(towards), *light) for towards, *light in suns)
@@ -64,16 +66,16 @@ def against(view: np.ndarray) -> tuple[Any, ...]:
 
 def coarse(picture: Any) -> Any:
     """The picture with SHADES levels per displayed channel."""
-    shown = of_addon("blender.base.images").display_encoded(picture)
+    shown = addon_module("blender.base.images").display_encoded(picture)
     shown = np.round(shown * (SHADES - 1)) / (SHADES - 1)
     alpha = shown[..., 3:]
-    colors = of_addon("exchange.textures.srgb").srgb_decoded(shown[..., :3])
+    colors = addon_module("exchange.textures.srgb").srgb_decoded(shown[..., :3])
     return np.concatenate([colors * alpha, alpha], axis=-1).astype(np.float32)
 
 
 def write_thumbnail(path: Path, picture: Any) -> None:
     """Write a picture as a small file, since all go into the zip."""
-    of_addon("blender.base.images").write_png(path, coarse(picture))
+    addon_module("blender.base.images").write_png(path, coarse(picture))
     with Image.open(path) as written:
         written.load()
         written.save(path, optimize=True)
@@ -82,9 +84,9 @@ def write_thumbnail(path: Path, picture: Any) -> None:
 def main(folder: Path) -> None:
     gpu.init()
     load_package().register()
-    frame, images = of_addon("render.frame"), of_addon("blender.base.images")
-    view = of_addon("blender.pictures.studio").FIELD_OF_VIEW
-    presets, rig = of_addon("blender.properties.presets"), wig()
+    frame, images = addon_module("render.frame"), addon_module("blender.base.images")
+    view = addon_module("blender.pictures.studio").FIELD_OF_VIEW
+    presets, rig = addon_module("blender.properties.presets"), wig()
     studio, points = studio_of(rig), rig.strands.points
     box = points.min(axis=0), points.max(axis=0)
 
@@ -102,7 +104,7 @@ def main(folder: Path) -> None:
     )
     sheet, stages = [], ((studio_stage, None), (dark, against))
     for path in sorted(LOOKS.glob("*.json")):
-        look = of_addon("shading.wet_and_dusty").wet_and_dusty_look(
+        look = addon_module("shading.wet_and_dusty").wet_and_dusty_look(
             presets.named_preset(f"looks/{path.stem}").settings
         )
         for stage, lights in stages:

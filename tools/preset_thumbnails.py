@@ -12,7 +12,7 @@ import bpy  # noqa: F401  it must come before gpu, which lives inside it
 import gpu
 import numpy as np
 from extension_loader import REPOSITORY, load_package
-from preset_pictures import THUMBNAIL, of_addon, studio_of, wig, write_thumbnail
+from preset_pictures import THUMBNAIL, addon_module, studio_of, wig, write_thumbnail
 
 PRESETS, SAMPLES = REPOSITORY / "presets", 2
 #: all hair is blond here: it shows shadows best
@@ -30,12 +30,12 @@ def turned(rig: Any, angle: float) -> Any:
     sine, cosine = np.sin(angle), np.cos(angle)
     matrix[:2, :2] = ((cosine, -sine), (sine, cosine))
     positions = rig.head.positions @ matrix[:3, :3].T
-    return of_addon("rig_flow").Pose(positions.astype(np.float32), matrix)
+    return addon_module("rig_flow").Pose(positions.astype(np.float32), matrix)
 
 
 def moved(rig: Any, dynamics: Any) -> tuple[Any, Any]:
     """Pose and strands a moment after the head has turned to the front."""
-    motion_flow = of_addon("motion_flow")
+    motion_flow = addon_module("motion_flow")
     angles = [-TURN * (1.0 - min(frame / TURNING, 1.0)) for frame in range(FRAMES)]
     motion = motion_flow.begin(rig, turned(rig, angles[0]))
     for angle in angles[1:]:
@@ -49,8 +49,8 @@ def moved(rig: Any, dynamics: Any) -> tuple[Any, Any]:
 def main() -> None:
     gpu.init()
     load_package().register()
-    presets = of_addon("blender.properties.presets")
-    settings, rig = of_addon("parameters").ALL_SETTINGS, wig(STRANDS)
+    presets = addon_module("blender.properties.presets")
+    settings, rig = addon_module("parameters").ALL_SETTINGS, wig(STRANDS)
     studio = studio_of(rig, presets.named_preset(LOOK).settings)
     plain = studio.settings
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 #: Most actions of one Blender. On Vulkan, Mesa's software driver limits how much it can draw, see
 #: docs/troubleshooting.md: 250 actions use up to 40,000 of 65,530 memory maps.
-MOST_ACTIONS = {"opengl": 500, "vulkan": 250}
+MAX_ACTIONS = {"opengl": 500, "vulkan": 250}
 #: difference of a seed from that of its next part
-NEXT_PART = 1000
+SEED_STEP = 1000
 
 
 def random_parts(seeds: list[str], actions: int, backend: str) -> list[dict[str, str]]:
@@ -17,8 +17,8 @@ def random_parts(seeds: list[str], actions: int, backend: str) -> list[dict[str,
     """
     parts = []
     for seed in seeds:
-        for number, begun in enumerate(range(0, actions, MOST_ACTIONS[backend])):
-            count = min(MOST_ACTIONS[backend], actions - begun)
-            name = str(int(seed) + number * NEXT_PART)
+        for number, begun in enumerate(range(0, actions, MAX_ACTIONS[backend])):
+            count = min(MAX_ACTIONS[backend], actions - begun)
+            name = str(int(seed) + number * SEED_STEP)
             parts.append({"HAIRLOOM_SEEDS": name, "HAIRLOOM_ACTIONS": str(count)})
     return parts

@@ -23,19 +23,19 @@ WIDTH, HEIGHT, SAMPLES = 640, 720, 3
 TEMPLE = np.array([-0.12, -0.01, 0.075])
 
 
-def of_addon(module: str) -> Any:
+def addon_module(module: str) -> Any:
     return importlib.import_module(f"{PACKAGE}.addon.{module}")
 
 
 def wig(children: str, count: int = CHILDREN, widths: str = "auto") -> Any:
     """A rig of wavy guides on the built-in head, with or without children; each side is a group."""
-    settings = of_addon("parameters").ALL_SETTINGS
+    settings = addon_module("parameters").ALL_SETTINGS
     grown = settings["grow"](strand_count=GUIDES, wave=0.018, wave_length=0.06, clump=0.3)
-    bust = of_addon("blender.scene.built_in_head").built_in_head()
+    bust = addon_module("blender.scene.built_in_head").built_in_head()
     head = bust.surface
-    grow = of_addon("groom.grow")
+    grow = addon_module("groom.grow")
     strands = grow.grow(head, grown, bust.weights["scalp"])
-    return of_addon("rig_flow").prepare(
+    return addon_module("rig_flow").prepare(
         replace(strands, group=strands.roots[:, 0] > 0.0),
         head,
         settings["guides"](guide_count=GUIDES, cv_count=9),
@@ -52,25 +52,25 @@ def picture(rig: Any, look: dict[str, Any], camera: Any = None, samples: int = S
         look: detail settings, and debug_view.
     """
     settings, studio = (
-        of_addon("parameters").ALL_SETTINGS,
-        of_addon("blender.pictures.studio"),
+        addon_module("parameters").ALL_SETTINGS,
+        addon_module("blender.pictures.studio"),
     )
     ambient = settings["ambient"]()
     view = look.pop("debug_view", "none")
-    sections = of_addon("params").SettingsMap(settings["detail"](**look))
-    groom_settings = of_addon("blender.properties.groom_settings")
+    sections = addon_module("params").SettingsMap(settings["detail"](**look))
+    groom_settings = addon_module("blender.properties.groom_settings")
     chosen = groom_settings.GroomSettings(sections, debug_view=view)
     made = studio.Studio(
-        of_addon("blender.sessions.prepared_groom").prepare_groom(rig, ambient),
+        addon_module("blender.sessions.prepared_groom").prepare_groom(rig, ambient),
         chosen,
-        look=of_addon("blender.scene.built_in_head").built_in_head().look("light"),
+        look=addon_module("blender.scene.built_in_head").built_in_head().look("light"),
     )
     return made.picture(rig.rest_pose, rig.strands.points, WIDTH, HEIGHT, samples, camera)
 
 
 def close_camera(rig: Any, reach: float) -> Any:
     """A camera in front of the hair over the temple, showing `reach` [m] from bottom to top."""
-    camera = of_addon("render.camera")
+    camera = addon_module("render.camera")
     points = rig.strands.points.astype(np.float64)
     target = points[np.linalg.norm(points - TEMPLE, axis=1).argmin()]
     eye = target + np.array([-0.3, -0.3, 0.05])
@@ -82,7 +82,7 @@ def close_camera(rig: Any, reach: float) -> Any:
 def main(folder: Path) -> None:
     gpu.init()
     load_package().register()
-    images = of_addon("blender.base.images")
+    images = addon_module("blender.base.images")
 
     def write(name: str, pictures: list[Any]) -> None:
         images.write_png(folder / f"{name}.png", images.contact_sheet(pictures, len(pictures)))

@@ -28,7 +28,7 @@ FORWARD, AGAINST = (0.1, -0.25, -1.0), (-0.45, -0.35, 0.8)
 STRENGTH = 3.0
 
 
-def of_addon(module: str) -> Any:
+def addon_module(module: str) -> Any:
     return importlib.import_module(f"{PACKAGE}.addon.{module}")
 
 
@@ -41,16 +41,19 @@ def alone(blond: Any, lobe: str) -> Any:
 def main(folder: Path) -> None:
     gpu.init()
     load_package().register()
-    frame, images = of_addon("render.frame"), of_addon("blender.base.images")
-    shading, lights = of_addon("parameters").ALL_SETTINGS["shading"], of_addon("shading.lights")
+    frame, images = addon_module("render.frame"), addon_module("blender.base.images")
+    shading, lights = (
+        addon_module("parameters").ALL_SETTINGS["shading"],
+        addon_module("shading.lights"),
+    )
     blond = replace(
-        of_addon("params.preset").read_any_preset(BLOND, {shading.section: shading}).settings,
+        addon_module("params.preset").read_any_preset(BLOND, {shading.section: shading}).settings,
         shift_noise=0.0,
         color_variation=0.2,
     )
-    volume = of_addon("parameters").ALL_SETTINGS["volume"]
+    volume = addon_module("parameters").ALL_SETTINGS["volume"]
     strands = combed_strands(STRANDS)
-    skin = of_addon("strands").Surface(*ball_mesh())
+    skin = addon_module("strands").Surface(*ball_mesh())
     ball = replace(frame.MeshSnapshot.of(skin, color=(0.0, 0.0, 0.0)), specular=0.0)
     camera = frame.Camera(
         frame.look_at((0.0, 0.0, 5.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0)),

@@ -26,14 +26,14 @@ def shaken_poses(rig: Rig, frame_count: int, rate: float) -> list[Pose]:
 
 
 @dataclass(frozen=True, eq=False)
-class MadeMotion:
-    """A `GuideMotion` that is computed: moment gives the pose and the guides at a frame."""
+class ComputedMotion:
+    """A `GuideMotion` that is computed: frame_state gives the pose and the guides at a frame."""
 
     rig: Rig
     frames: range
     frame_rate: float
-    moment: Callable[[int], tuple[Pose, np.ndarray]]
+    frame_state: Callable[[int], tuple[Pose, np.ndarray]]
     notes: tuple[str, ...] = ()
 
     def at(self, frame: int) -> tuple[Pose, np.ndarray]:
-        return self.moment(frame)
+        return self.frame_state(frame)

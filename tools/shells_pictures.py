@@ -10,7 +10,7 @@ from typing import Any
 
 import bpy
 import gpu
-from cards_pictures import HEIGHT, SAMPLES, WIDTH, of_addon
+from cards_pictures import HEIGHT, SAMPLES, WIDTH, addon_module
 from extension_loader import load_package
 from make_styles import animal
 
@@ -26,16 +26,19 @@ def pictures_of(style: str) -> list[Any]:
         animal()
     bpy.ops.hairloom.add_hairstyle(style=style, plays=False)
     hair = bpy.context.object
-    builds, cards = of_addon("blender.cards.build"), of_addon("cards.settings").CardSettings
+    builds, cards = addon_module("blender.cards.build"), addon_module("cards.settings").CardSettings
     inputs, _, _ = builds.read_inputs(hair, bpy.context.evaluated_depsgraph_get())
     shells = replace(inputs.settings[cards], kind="shells", levels=1)
     inputs = replace(inputs, settings=inputs.settings.with_settings(shells))
-    rig, groom = inputs.rig, of_addon("blender.properties.groom_settings").GroomSettings.of(hair)
-    ambient = inputs.settings[of_addon("shading.ambient_settings").AmbientSettings]
-    prepared = of_addon("blender.sessions.prepared_groom").prepare_groom(rig, ambient)
-    head = of_addon("blender.scene.built_in_head").built_in_head()
-    is_bust = of_addon("blender.setup.hairstyles").is_bust(hair.parent)
-    studio = of_addon("blender.pictures.studio").Studio(
+    rig, groom = (
+        inputs.rig,
+        addon_module("blender.properties.groom_settings").GroomSettings.of(hair),
+    )
+    ambient = inputs.settings[addon_module("shading.ambient_settings").AmbientSettings]
+    prepared = addon_module("blender.sessions.prepared_groom").prepare_groom(rig, ambient)
+    head = addon_module("blender.scene.built_in_head").built_in_head()
+    is_bust = addon_module("blender.setup.hairstyles").is_bust(hair.parent)
+    studio = addon_module("blender.pictures.studio").Studio(
         prepared, groom, look=head.look("light") if is_bust else None
     )
     size = WIDTH, HEIGHT, SAMPLES
@@ -48,7 +51,7 @@ def main(folder: Path) -> None:
     gpu.init()
     pairs = [pictures_of(style) for style in STYLES]
     rows = [picture for pair in zip(*pairs, strict=True) for picture in pair]
-    images = of_addon("blender.base.images")
+    images = addon_module("blender.base.images")
     images.write_png(folder / "shells.png", images.contact_sheet(rows, len(STYLES)))
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 QUALITY = 92
 
 
-def write_small(drawn: Path, kept: Path) -> None:
+def write_small(source: Path, path: Path) -> None:
     """Write a picture, without its alpha, as a JPEG.
 
     Raises:
@@ -15,7 +15,7 @@ def write_small(drawn: Path, kept: Path) -> None:
     import bpy  # noqa: F401  OpenImageIO lives inside it
     import OpenImageIO as oiio
 
-    picture = oiio.ImageBufAlgo.channels(oiio.ImageBuf(str(drawn)), (0, 1, 2))
+    picture = oiio.ImageBufAlgo.channels(oiio.ImageBuf(str(source)), (0, 1, 2))
     picture.specmod().attribute("Compression", f"jpeg:{QUALITY}")
-    if picture.has_error or not picture.write(str(kept), "uint8"):
-        raise OSError(f"{drawn} cannot be kept as {kept}: {picture.geterror()}")
+    if picture.has_error or not picture.write(str(path), "uint8"):
+        raise OSError(f"{source} cannot be kept as {path}: {picture.geterror()}")

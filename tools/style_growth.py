@@ -25,7 +25,7 @@ GRAVITY, FRAME = np.array([0.0, 0.0, -9.81]), 1.0 / 24.0
 type Flow = Callable[[np.ndarray, "Roots", np.ndarray], np.ndarray]
 
 
-def of_addon(module: str) -> Any:
+def addon_module(module: str) -> Any:
     return importlib.import_module(f"{PACKAGE}.addon.{module}")
 
 
@@ -80,19 +80,21 @@ class Head:
     """The built-in head: where hair grows, and what it stays out of."""
 
     def __init__(self) -> None:
-        bust = of_addon("blender.scene.built_in_head").built_in_head()
+        bust = addon_module("blender.scene.built_in_head").built_in_head()
         self.surface, self.weights = bust.surface, bust.weights
 
     @cached_property
     def collider(self) -> Any:
-        settings = of_addon("dynamics.settings").DynamicsSettings()
-        field = of_addon("blender.colliders.fields").field_of(self.surface, settings, place="head")
-        return of_addon("dynamics.colliders").PosedCollider(field, np.eye(4), np.eye(4))
+        settings = addon_module("dynamics.settings").DynamicsSettings()
+        field = addon_module("blender.colliders.fields").field_of(
+            self.surface, settings, place="head"
+        )
+        return addon_module("dynamics.colliders").PosedCollider(field, np.eye(4), np.eye(4))
 
     @cached_property
     def with_ears_covered(self) -> tuple[Any, ...]:
         """The head, and balls that make it round where its ears are."""
-        colliders = of_addon("dynamics.colliders")
+        colliders = addon_module("dynamics.colliders")
         balls = [
             colliders.SphereCollider((side * x, y, z), radius)
             for side in (-1.0, 1.0)
@@ -103,7 +105,7 @@ class Head:
     def away(self, points: np.ndarray, over_ears: bool = False) -> tuple[np.ndarray, np.ndarray]:
         """Distances of points (n, 3) from the skin, negative inside, and directions away from
         it."""
-        found = of_addon("dynamics.colliders.signed_distance").signed_distance
+        found = addon_module("dynamics.colliders.signed_distance").signed_distance
         solid = self.with_ears_covered if over_ears else (self.collider,)
         distance, outward = found(points, solid, 0.08)
         return distance.astype(float), outward.astype(float)
@@ -116,8 +118,8 @@ class Head:
             weight = self.weights[density]
         else:
             weight = density(self.surface.positions)
-        pieces = of_addon("groom.triangle_subdivision").Pieces.of(self.surface, weight)
-        found = of_addon("groom.blue_noise").spread_roots(pieces, count, seed)
+        pieces = addon_module("groom.triangle_subdivision").Pieces.of(self.surface, weight)
+        found = addon_module("groom.blue_noise").spread_roots(pieces, count, seed)
         corners = self.surface.triangles[found.triangle]
         place = np.einsum("nk,nkj->nj", found.barycentric, self.surface.positions[corners])
         normal = self.surface.vertex_normals()[corners].astype(float)
@@ -127,7 +129,7 @@ class Head:
 
     def roots_near(self, points: np.ndarray, seed: int = 1) -> Roots:
         """Roots on the skin where it is nearest to points (n, 3)."""
-        search = of_addon("strands.closest_point").search_of(self.surface)
+        search = addon_module("strands.closest_point").search_of(self.surface)
         found = search.closest(points)
         corners = self.surface.triangles[found.triangle]
         normal = self.surface.vertex_normals()[corners].astype(float)
@@ -219,8 +221,8 @@ class Head:
         Args:
             settings: of dynamics, instead of those of hair that hardly keeps its style.
         """
-        rig_flow, motion_flow = of_addon("rig_flow"), of_addon("motion_flow")
-        all_settings = of_addon("parameters").ALL_SETTINGS
+        rig_flow, motion_flow = addon_module("rig_flow"), addon_module("motion_flow")
+        all_settings = addon_module("parameters").ALL_SETTINGS
         loose = {
             "style_root": 2.0,
             "style_tip": 0.0,
@@ -244,7 +246,7 @@ class Head:
             )
         fallen = locks.copy()
         fallen[rig.guides] = motion.guides
-        return self.kept_out(fallen)
+        return self.pushed_out(fallen)
 
     def gathered(
         self, roots: Roots, knot: np.ndarray, cv_count: int = 20, clearance: float = 0.004
@@ -273,7 +275,7 @@ class Head:
             locks[:, 1:-1] = inner
         return locks
 
-    def kept_out(self, locks: np.ndarray, clearance: float = 0.0015) -> np.ndarray:
+    def pushed_out(self, locks: np.ndarray, clearance: float = 0.0015) -> np.ndarray:
         """Locks whose points are at least this far from the skin, except near roots."""
         kept = locks.copy()
         for cv in range(1, locks.shape[1]):
@@ -286,7 +288,7 @@ class Head:
 
     def strands(self, roots: Roots, locks: np.ndarray, group: np.ndarray | None = None) -> Any:
         """Locks as a StrandSet that is bound to the head."""
-        strands = of_addon("groom.bound_strands").bound_strands(
+        strands = addon_module("groom.bound_strands").bound_strands(
             locks, roots.triangle, roots.barycentric, self.surface
         )
         if group is None:
@@ -295,7 +297,7 @@ class Head:
 
     def shapes(self, roots: Roots, locks: np.ndarray, group: np.ndarray | None = None) -> Any:
         """Locks as a style stores them."""
-        rooted = of_addon("strands.rooted_shapes").RootedShapes
+        rooted = addon_module("strands.rooted_shapes").RootedShapes
         return rooted.of(self.strands(roots, locks, group), self.surface)
 
 

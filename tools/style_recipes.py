@@ -13,10 +13,10 @@ from style_growth import (
     CROWN,
     Head,
     Roots,
+    addon_module,
     along_skin,
     cut,
     evenly,
-    of_addon,
     ramp,
     shortened,
     unit,
@@ -37,7 +37,7 @@ def recipe(make: Callable[[Head], Any]) -> Callable[[Head], Any]:
 def style(title: str, order: int, shapes: Any, look: str, **parts: Any) -> Any:
     """A Hairstyle; `parts`: mask, modifiers, presets, and settings by section. Without shapes it is
     fur, which grows by the section `grow`."""
-    hairstyles = of_addon("exchange.hairstyles")
+    hairstyles = addon_module("exchange.hairstyles")
     modifiers = tuple(
         hairstyles.NodeModifier(nodes, inputs) for nodes, inputs in parts.pop("modifiers", ())
     )
@@ -157,7 +157,7 @@ def crop_fade(head: Head) -> Any:
     return style(
         "Crop with Fade",
         20,
-        head.shapes(roots, head.kept_out(locks, 0.0008)),
+        head.shapes(roots, head.pushed_out(locks, 0.0008)),
         "brown",
         children=children(
             50000, length_variation=0.3, clump=0.25, clump_size=8, frizz=0.015, scatter=0.2
@@ -247,7 +247,7 @@ def side_part(head: Head) -> Any:
     return style(
         "Side Part",
         30,
-        head.shapes(roots, head.kept_out(locks, 0.001), is_over.astype(np.int32)),
+        head.shapes(roots, head.pushed_out(locks, 0.001), is_over.astype(np.int32)),
         "brown",
         children=children(
             36000, length_variation=0.2, clump=0.35, clump_size=16, frizz=0.006, parting=0.9
@@ -398,7 +398,7 @@ def bob(head: Head) -> Any:
     return style(
         "Bob",
         50,
-        head.shapes(roots, head.kept_out(locks, 0.003), group),
+        head.shapes(roots, head.pushed_out(locks, 0.003), group),
         "brown",
         children=children(
             28000, length_variation=0.1, clump=0.5, clump_size=30, frizz=0.004, parting=1.0
@@ -476,7 +476,7 @@ def long_straight(head: Head) -> Any:
     return style(
         "Long and Straight",
         60,
-        head.shapes(roots, head.kept_out(locks, 0.003), group),
+        head.shapes(roots, head.pushed_out(locks, 0.003), group),
         "brown",
         children=children(
             30000,
@@ -515,7 +515,7 @@ def long_wavy(head: Head) -> Any:
     return style(
         "Long and Wavy",
         70,
-        head.shapes(roots, head.kept_out(locks, 0.003), group),
+        head.shapes(roots, head.pushed_out(locks, 0.003), group),
         "brown",
         children=children(
             30000,
@@ -567,7 +567,7 @@ def layered_fringe(head: Head) -> Any:
     return style(
         "Layered with Fringe",
         80,
-        head.shapes(roots, head.kept_out(locks, 0.003), group),
+        head.shapes(roots, head.pushed_out(locks, 0.003), group),
         "red",
         children=children(
             30000,
@@ -595,7 +595,7 @@ def curls(head: Head) -> Any:
     return style(
         "Curls",
         90,
-        head.shapes(roots, head.kept_out(locks, 0.0125), parts(roots, -0.03, in_front)),
+        head.shapes(roots, head.pushed_out(locks, 0.0125), parts(roots, -0.03, in_front)),
         "brown",
         modifiers=(clumped(0.8, 0.015), curled(0.0075, 8.0, 0.2, 1.0, 2, apart=0.015)),
         children=children(
@@ -624,7 +624,7 @@ def coils(head: Head) -> Any:
     return style(
         "Coils",
         100,
-        head.shapes(roots, head.kept_out(locks, 0.005), np.arange(len(locks), dtype=np.int32)),
+        head.shapes(roots, head.pushed_out(locks, 0.005), np.arange(len(locks), dtype=np.int32)),
         "black",
         modifiers=(curled(0.0040, 13.0, 0.02, 1.0, 3),),
         children=children(
@@ -671,7 +671,7 @@ def afro(head: Head) -> Any:
         return np.linalg.norm((p - middle) / axes, axis=1)
 
     reach = np.repeat(np.maximum(1.0 + tuft, far(roots.place) + 0.12), 16)
-    locks = head.kept_out(cut(locks, lambda p: reach - far(p)), 0.005)
+    locks = head.pushed_out(cut(locks, lambda p: reach - far(p)), 0.005)
     return style(
         "Afro",
         110,
@@ -767,7 +767,7 @@ def ponytail(head: Head) -> Any:
     return style(
         "Ponytail",
         120,
-        head.shapes(roots, head.kept_out(locks), group),
+        head.shapes(roots, head.pushed_out(locks), group),
         "blond",
         children=children(
             28000, length_variation=0.2, clump=0.4, clump_size=30, frizz=0.0015, parting=3.0
@@ -803,7 +803,7 @@ def bun(head: Head) -> Any:
     return style(
         "Bun",
         130,
-        head.shapes(roots, head.kept_out(locks)),
+        head.shapes(roots, head.pushed_out(locks)),
         "brown",
         children=children(
             26000, length_variation=0.03, clump=0.3, clump_size=40, frizz=0.0012, parting=3.0
@@ -841,7 +841,7 @@ def braid(head: Head) -> Any:
     return style(
         "Braid",
         140,
-        head.shapes(roots, head.kept_out(locks), group.astype(np.int32)),
+        head.shapes(roots, head.pushed_out(locks), group.astype(np.int32)),
         "brown",
         children=children(
             24000, length_variation=0.06, clump=0.2, clump_size=40, frizz=0.0012, parting=3.0
@@ -930,7 +930,7 @@ def box_braids(head: Head) -> Any:
         "Box Braids",
         145,
         head.shapes(
-            roots, head.kept_out(locks, 0.001), (3 * cells.cell + cells.section).astype(np.int32)
+            roots, head.pushed_out(locks, 0.001), (3 * cells.cell + cells.section).astype(np.int32)
         ),
         "black",
         children=children(
@@ -1002,11 +1002,11 @@ def beard_flow(points: np.ndarray, roots: Roots, _reached: np.ndarray) -> np.nda
 
 def face_hair(head: Head, kind: str, **values: Any) -> Any:
     """Brows or lashes, as the built-in head has them, with other values of `FaceHair`."""
-    growth = of_addon("groom.face_hair")
+    growth = addon_module("groom.face_hair")
     strands = getattr(growth, f"grow_{kind}")(
         head.surface, head.weights[kind], growth.FaceHair(**values)
     )
-    return of_addon("strands.rooted_shapes").RootedShapes.of(strands, head.surface)
+    return addon_module("strands.rooted_shapes").RootedShapes.of(strands, head.surface)
 
 
 @recipe

@@ -22,7 +22,7 @@ CURVES, CHILDREN = 1200, 24_000
 SHAKEN = 8
 
 
-def of_addon(module: str) -> Any:
+def addon_module(module: str) -> Any:
     return importlib.import_module(f"{PACKAGE}.addon.{module}")
 
 
@@ -48,16 +48,16 @@ def grown(**values: Any) -> Any:
 def picture(hair: Any) -> np.ndarray:
     """A picture of the hair as it is now."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    for session in list(of_addon("blender.preview.previews").sessions()):
-        of_addon("blender.preview.previews").stop(session)
-    shown = of_addon("blender.pictures.showing").shown_groom(hair, depsgraph)
+    for session in list(addon_module("blender.preview.previews").sessions()):
+        addon_module("blender.preview.previews").stop(session)
+    shown = addon_module("blender.pictures.showing").shown_groom(hair, depsgraph)
     image = shown.studio.picture(shown.pose, shown.points, WIDTH, HEIGHT, SAMPLES)
     return np.asarray(image)
 
 
 def sheet(folder: Path, name: str, pictures: list[np.ndarray]) -> None:
     """Write pictures side by side, as a small file."""
-    images = of_addon("blender.base.images")
+    images = addon_module("blender.base.images")
     with tempfile.TemporaryDirectory() as drawn:
         images.write_png(Path(drawn) / "sheet.png", images.contact_sheet(pictures, len(pictures)))
         write_small(Path(drawn) / "sheet.png", folder / name)
@@ -139,11 +139,11 @@ def shaken(hair: Any) -> np.ndarray:
         head.keyframe_insert("rotation_euler", frame=frame)
         head.keyframe_insert("location", frame=frame)
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    session = of_addon("blender.preview.previews").start(hair, depsgraph)
+    session = addon_module("blender.preview.previews").start(hair, depsgraph)
     hair.hairloom.bake.follows = True
     for frame in range(1, SHAKEN + 1):
         scene.frame_set(frame)
-    shown = of_addon("blender.pictures.showing").shown_groom(hair, depsgraph)
+    shown = addon_module("blender.pictures.showing").shown_groom(hair, depsgraph)
     image = shown.studio.picture(shown.pose, session.strands, WIDTH, HEIGHT, SAMPLES)
     return np.asarray(image)
 

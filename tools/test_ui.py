@@ -102,14 +102,14 @@ PROBLEM_LINES = 30
 #: beginning of the first line of Python's traceback when Blender crashes
 CRASH_LINE = "Fatal Python error"
 #: limit of the mean FLIP of the same picture on both backends
-MOST_DIFFERENT = 0.02
+MAX_DIFFERENT = 0.02
 
 _running: set[subprocess.Popen[bytes]] = set()
 _interrupted = threading.Event()
 
 
 #: jobs at a time
-BESIDE = 2
+PARALLEL_JOBS = 2
 
 
 @dataclass
@@ -257,7 +257,7 @@ def compare_backends(tally: Tally) -> None:
     one, other = (np.load(file) for file in files)
     found = {name: flip_evaluator.evaluate(one[name], other[name], "LDR")[1] for name in one}
     log.write_text("".join(f"{name} {flip:.5f}\n" for name, flip in found.items()))
-    passed = max(found.values()) <= MOST_DIFFERENT
+    passed = max(found.values()) <= MAX_DIFFERENT
     detail = f"FLIP of {len(found)} pictures at most {max(found.values()):.4f}"
     announce("comparing", "both", passed, detail, log)
     tally.add(passed, not passed)
@@ -350,7 +350,7 @@ def main(arguments: list[str]) -> int:
     chosen = [s for s in sessions if installed and (not wanted or s.stem in wanted)]
     jobs = jobs_of(chosen, is_commit=is_commit, with_tests=not wanted)
     # Side by side: a Blender that waits or computes leaves most of the machine to the other.
-    with ThreadPoolExecutor(BESIDE) as pool:
+    with ThreadPoolExecutor(PARALLEL_JOBS) as pool:
         try:
             for each in pool.map(run, jobs):
                 tally.add(each.passed, each.failed)

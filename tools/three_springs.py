@@ -30,7 +30,7 @@ _AXES[:3, :3] = GLB.to_file_space(np.eye(3)).T
 
 
 @dataclass(frozen=True, eq=False)
-class MovedByThree:
+class ThreePlayback:
     """carrier: (step_count, 4, 4) of the head. places: (step_count, chains, joints, 3) in the space
     of the head, Z up. rest: (chains, joints, 4, 4). spring_count: bones that springs turn.
     """
@@ -62,7 +62,7 @@ class MovedByThree:
         return levels
 
 
-def moved_by_three(path: Path, head: np.ndarray, rate: float, chains: int) -> MovedByThree:
+def play_in_three(path: Path, head: np.ndarray, rate: float, chains: int) -> ThreePlayback:
     """The joints of a GLB with springs, while its head moves.
 
     Args:
@@ -73,17 +73,19 @@ def moved_by_three(path: Path, head: np.ndarray, rate: float, chains: int) -> Mo
         poses = Path(folder) / "poses.json"
         poses.write_text(json.dumps({"step": 1.0 / STEP_RATE, "matrices": head_matrices(carrier)}))
         command = [node_program(), HERE / "three_springs.mjs", HERE / "node", path, poses]
-        result = subprocess.run(
+        finished = subprocess.run(
             [str(each) for each in command], capture_output=True, text=True, timeout=300
         )
-    assert result.returncode == 0, result.stderr
-    told = json.loads(result.stdout)
-    world = to_z_up(np.array(told["frames"]))
+    assert finished.returncode == 0, finished.stderr
+    playback = json.loads(finished.stdout)
+    world = to_z_up(np.array(playback["frames"]))
     local = np.einsum("fab,fja->fjb", carrier[:, :3, :3], world - carrier[:, None, :3, 3])
-    rest = rest_of(path)
-    of_chains = [number for number, name in enumerate(told["names"]) if name.startswith("chain")]
+    rest = rest_matrices(path)
+    of_chains = [
+        number for number, name in enumerate(playback["names"]) if name.startswith("chain")
+    ]
     places = local[:, of_chains].reshape(len(local), chains, -1, 3)
-    return MovedByThree(path, carrier, places, rest.reshape(chains, -1, 4, 4), told["springs"])
+    return ThreePlayback(path, carrier, places, rest.reshape(chains, -1, 4, 4), playback["springs"])
 
 
 def head_matrices(carrier: np.ndarray) -> list[list[float]]:
@@ -92,7 +94,7 @@ def head_matrices(carrier: np.ndarray) -> list[list[float]]:
     return numbers
 
 
-def rest_of(path: Path) -> np.ndarray:
+def rest_matrices(path: Path) -> np.ndarray:
     """(n, 4, 4) Z up of all joints of chains, by the file's inverse bind matrices."""
     file: Any = GlbFile.of(path.read_bytes(), str(path))
     (skin,) = file.content["skins"]

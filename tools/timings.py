@@ -22,7 +22,7 @@ def timings() -> dict[str, float]:
     return found
 
 
-def keep(name: str, value: float) -> None:
+def record_timing(name: str, value: float) -> None:
     FILE.parent.mkdir(exist_ok=True)
     FILE.write_text(json.dumps(timings() | {name: value}, indent=1) + "\n")
 
@@ -31,14 +31,14 @@ def main(arguments: list[str]) -> int:
     name, *command = arguments
     if not command:
         name, _, value = name.partition("=")
-        keep(name, float(value))
+        record_timing(name, float(value))
         return 0
     begin = time.monotonic()
     code = subprocess.run(command, cwd=REPOSITORY, check=False).returncode
     minutes = (time.monotonic() - begin) / 60.0
     print(f"{name}: {minutes:.1f}", flush=True)
     if code == 0:
-        keep(name, round(minutes, 2))
+        record_timing(name, round(minutes, 2))
     return code
 
 

@@ -14,7 +14,7 @@ import gpu
 import numpy as np
 from extension_loader import load_package
 from guide_steps import tutorial
-from styling_pictures import of_addon, sheet
+from styling_pictures import addon_module, sheet
 
 SIDE, SAMPLES, CYCLES_SAMPLES = 420, 12, 48
 
@@ -46,7 +46,7 @@ def rendered() -> np.ndarray:
         image = bpy.data.images.load(scene.render.filepath, check_existing=False)
         image.pixels.foreach_get(pixels.ravel())
         bpy.data.images.remove(image)
-    return np.asarray(of_addon("exchange.textures.srgb").srgb_decoded(pixels))
+    return np.asarray(addon_module("exchange.textures.srgb").srgb_decoded(pixels))
 
 
 if __name__ == "__main__":

@@ -30,7 +30,7 @@ LINES = {"slices": (0.7, 0.12, 0.05), "deep": (0.03, 0.2, 0.6)}
 NAMES = {"slices": "slices", "deep": "deep layers"}
 
 
-def of_addon(module: str) -> Any:
+def addon_module(module: str) -> Any:
     return importlib.import_module(f"{PACKAGE}.addon.{module}")
 
 
@@ -46,9 +46,11 @@ class Chart:
         """A line between two places [pixels], its edge a pixel soft."""
         y, x = np.mgrid[:HIGH, :WIDE] + 0.5
         along = np.subtract(end, start)
-        share = ((x - start[0]) * along[0] + (y - start[1]) * along[1]) / max(along @ along, 1e-9)
-        share = np.clip(share, 0.0, 1.0)
-        away = np.hypot(x - start[0] - share * along[0], y - start[1] - share * along[1])
+        fraction = ((x - start[0]) * along[0] + (y - start[1]) * along[1]) / max(
+            along @ along, 1e-9
+        )
+        fraction = np.clip(fraction, 0.0, 1.0)
+        away = np.hypot(x - start[0] - fraction * along[0], y - start[1] - fraction * along[1])
         cover = np.clip(0.5 * width + 0.5 - away, 0.0, 1.0)[..., None]
         self.pixels[..., :3] += cover * (np.array(color) - self.pixels[..., :3])
 
@@ -85,29 +87,29 @@ def error_chart(errors: dict[str, float]) -> Any:
         chart.word((place(count, least)[0], LOW - 18), str(count), INK)
     chart.line(place(4, errors["none"]), place(256, errors["none"]), INK, 2.0)
     chart.word((WIDE - 52, place(4, errors["none"])[1]), "no shadows", INK)
-    for way, color in LINES.items():
-        counts = sorted(int(key[len(way) :]) for key in errors if key.startswith(way))
-        places = [place(count, errors[f"{way}{count}"]) for count in counts]
+    for method, color in LINES.items():
+        counts = sorted(int(key[len(method) :]) for key in errors if key.startswith(method))
+        places = [place(count, errors[f"{method}{count}"]) for count in counts]
         for start, end in pairwise(places):
             chart.line(start, end, color, 2.5)
         for spot in places:
             chart.line(spot, spot, color, 9.0)
-        chart.word((places[-1][0] + 60, places[-1][1]), NAMES[way], color)
+        chart.word((places[-1][0] + 60, places[-1][1]), NAMES[method], color)
     return chart.pixels
 
 
 def shadow_pictures(strands: Any) -> list[Any]:
     """The ball without shadows, with few and many slices, and with deep layers."""
-    settings = of_addon("parameters").ALL_SETTINGS
-    frame, lights = of_addon("render.frame"), of_addon("shading.lights")
-    skin = of_addon("strands").Surface(*ball_mesh())
+    settings = addon_module("parameters").ALL_SETTINGS
+    frame, lights = addon_module("render.frame"), addon_module("shading.lights")
+    skin = addon_module("strands").Surface(*ball_mesh())
     ball = replace(frame.MeshSnapshot.of(skin, color=(0.0, 0.0, 0.0)), specular=0.0)
     camera = frame.Camera(
         frame.look_at((0.0, 0.0, 5.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0)),
         frame.orthographic(HEIGHT, 1.0, 1.0, 9.0),
     )
     volume = settings["volume"](shadows="slices", strand_fraction=1.0)
-    ways = (
+    methods = (
         replace(volume, extinction=0.0),
         replace(volume, slices=15),
         replace(volume, slices=64),
@@ -124,7 +126,7 @@ def shadow_pictures(strands: Any) -> list[Any]:
                 lights=(sun,),
                 ambient=(0.02, 0.02, 0.02),
                 shading=settings["shading"](model="kajiya_kay", volume_shadow=0.0),
-                volume=way,
+                volume=method,
                 volume_center=np.zeros(3, np.float32),
             ),
             camera,
@@ -133,14 +135,14 @@ def shadow_pictures(strands: Any) -> list[Any]:
             SAMPLES,
             background=BACKDROP,
         )
-        for way in ways
+        for method in methods
     ]
 
 
 def main(folder: Path) -> None:
     gpu.init()
     load_package().register()
-    images, light = of_addon("blender.base.images"), of_addon("shading.lights").Light
+    images, light = addon_module("blender.base.images"), addon_module("shading.lights").Light
     strands = combed_strands(STRANDS)
     shown = shadow_pictures(strands)
     images.write_png(folder / "opacity_slices.png", images.contact_sheet(shown, len(shown)))

@@ -11,7 +11,7 @@ ADDON = REPOSITORY / "addon"
 #: A call of one of these in a `while` loop makes it wait.
 WAITING = {"wait", "sleep", "join", "result", "take_made", "attempt", "run_main_thread_steps"}
 #: function -> why it ends
-ENDS = {
+ENDING_WAITS = {
     "cards/order_pairs.py:pairs_by_view": "each turn takes one view",
     "exchange/files/file_moves.py:move_file": "after MAX_WAIT seconds",
     "blender/preview/previews.py:finish": "each turn takes one result; another scene is refused",
@@ -36,7 +36,7 @@ def waits(folder: Path = ADDON) -> list[str]:
 
 def endless_waits() -> list[str]:
     """Waits without a reason in ENDS."""
-    return [each for each in waits() if each not in ENDS]
+    return [each for each in waits() if each not in ENDING_WAITS]
 
 
 def _own_loops(function: ast.FunctionDef) -> list[ast.While]:

@@ -91,7 +91,7 @@ class Use:
         return f"{self.place}:{self.line} {self.name}".rstrip()
 
 
-def amount(found: list[Use]) -> int:
+def count_uses(found: list[Use]) -> int:
     """Uses in prose; different names in code, so that code can be moved without changing it."""
     names = {use.name for use in found if use.name}
     return len(names) + sum(not use.name for use in found)
@@ -170,7 +170,7 @@ def _said(text: str, line: int) -> Found:
 
 
 #: what may stand between the parts of one text
-_BETWEEN = (tokenize.NL, tokenize.FSTRING_START, tokenize.FSTRING_END)
+_TOKENS_BETWEEN_STRINGS = (tokenize.NL, tokenize.FSTRING_START, tokenize.FSTRING_END)
 
 
 def _python(text: str) -> Found:
@@ -184,7 +184,7 @@ def _python(text: str) -> Found:
             said += [(value, line)] * isinstance(value, str)
         elif token.type == tokenize.FSTRING_MIDDLE:
             said.append((token.string, line))
-        elif said and token.type not in (*_BETWEEN, tokenize.COMMENT):
+        elif said and token.type not in (*_TOKENS_BETWEEN_STRINGS, tokenize.COMMENT):
             yield from _said("".join(part for part, _ in said), said[0][1])
             said = []
         if token.type == tokenize.NAME:

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from glb_files import Glb, validator_report
 from glb_player import Player
-from shaken import MadeMotion, shaken_poses
+from shaken import ComputedMotion, shaken_poses
 from test_card_page import asset_of
 from tiers import few_in_commits
 
@@ -59,13 +59,13 @@ def motion() -> GuideMotion:
     carried = [motion_flow.carried_guides(rig, pose) for pose in poses]
     along = np.linspace(0.0, 1.0, carried[0].shape[1])[:, None] ** 2
 
-    def moment(frame: int) -> tuple[Pose, np.ndarray]:
+    def frame_state(frame: int) -> tuple[Pose, np.ndarray]:
         before = carried[max(frame - 3, 0)]
         phase = np.arange(len(rig.guides))[:, None, None] * 0.1 + frame * 0.3
         wave = 0.006 * np.sin(phase) * along * min(frame / 5.0, 1.0)
         return poses[frame], (carried[frame] * (1 - along) + before * along + wave).astype("f4")
 
-    return MadeMotion(rig, range(FRAMES), RATE, moment)
+    return ComputedMotion(rig, range(FRAMES), RATE, frame_state)
 
 
 def write(path: Path, motion: GuideMotion, kind: str, **more: Any) -> WrittenCards:

@@ -145,7 +145,7 @@ def test_a_wheel_that_is_packed_tighter_has_the_same_files(tmp_path, monkeypatch
             entry.external_attr = 0o100755 << 16
             archive.writestr(entry, content, zipfile.ZIP_DEFLATED)
     for _ in range(2):  # packed, then from the cache
-        packed = make_zips.packed_tighter(wheel.getvalue())
+        packed = make_zips.recompressed(wheel.getvalue())
         assert content_of(io.BytesIO(packed)) == content_of(wheel)
         assert len(packed) < 0.3 * len(wheel.getvalue())
 
@@ -161,7 +161,7 @@ def check_wheels(zips, wheels, manifest):
             assert archive.testzip() is None
             for name in filter(lambda each: each.endswith(".whl"), archive.namelist()):
                 found[name.removeprefix("wheels/")] = content_of(io.BytesIO(archive.read(name)))
-    table = fetch_wheels.wanted()
+    table = fetch_wheels.pinned_wheels()
     assert found == {name: content_of(REPOSITORY / "wheels" / name) for name in table}
     for name, digest in table.items():
         fetched = REPOSITORY / "wheels" / name
@@ -199,7 +199,7 @@ def test_a_wheel_that_cannot_be_downloaded_is_named(tmp_path):
     """Without a network, or with a wrong checksum; no file is left."""
     import fetch_wheels
 
-    name, digest = next(iter(fetch_wheels.wanted().items()))
+    name, digest = next(iter(fetch_wheels.pinned_wheels().items()))
     with pytest.raises(fetch_wheels.FetchError, match=rf"{re.escape(name)} cannot be fetched"):
         fetch_wheels.fetch(name, "0" * len(digest), tmp_path / "wheels")
     assert list((tmp_path / "wheels").iterdir()) == []

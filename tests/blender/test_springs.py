@@ -11,7 +11,7 @@ import pytest
 from glb_files import to_blender, validator_report
 from glb_player import Player
 from test_card_motion import FRAMES, RATE, head_matrix, motion, off, simulated, write  # noqa: F401
-from three_springs import MODULE, MovedByThree, moved_by_three, rest_of
+from three_springs import MODULE, ThreePlayback, play_in_three, rest_matrices
 
 bpy = pytest.importorskip("bpy", reason="writing cards needs Blender or the bpy module")
 
@@ -49,12 +49,12 @@ def springs(
 def moved(
     motion: GuideMotion,  # noqa: F811
     springs: tuple[Path, WrittenCards],
-) -> MovedByThree:
+) -> ThreePlayback:
     """The file, moved by three-vrm through the head's shake."""
     if not MODULE.is_dir():
         pytest.skip("three-vrm-springbone is missing: `make setup` installs it")
     head = np.stack([head_matrix(motion, frame) for frame in range(FRAMES)])
-    return moved_by_three(springs[0], head, RATE, springs[1].motion["chains"])
+    return play_in_three(springs[0], head, RATE, springs[1].motion["chains"])
 
 
 def test_khronos_validator_finds_no_fault(springs: tuple[Path, WrittenCards]) -> None:
@@ -66,7 +66,7 @@ def test_khronos_validator_finds_no_fault(springs: tuple[Path, WrittenCards]) ->
 
 
 def test_three_vrm_moves_hair_as_our_own_springs_do(
-    springs: tuple[Path, WrittenCards], moved: MovedByThree
+    springs: tuple[Path, WrittenCards], moved: ThreePlayback
 ) -> None:
     """Our own springs, with the sidecar's values, agree to 0.1 % of the hair's length."""
     told = springs[1].motion
@@ -80,7 +80,7 @@ def test_three_vrm_moves_hair_as_our_own_springs_do(
 
 def sprung_as_told(told: dict[str, Any], path: Path, carrier: np.ndarray) -> np.ndarray:
     """Our own springs, moved with the values in the sidecar."""
-    rest = rest_of(path).reshape(told["chains"], -1, 4, 4)
+    rest = rest_matrices(path).reshape(told["chains"], -1, 4, 4)
     shapes = [each["sphere"] for each in told["colliders"]]
     root = to_blender(np.array(told["root_place"]))
     centers = to_blender(np.array([each["offset"] for each in shapes])) + root
@@ -96,7 +96,7 @@ def sprung_as_told(told: dict[str, Any], path: Path, carrier: np.ndarray) -> np.
 def test_motion_by_three_vrm_is_close_to_the_bake(
     motion: GuideMotion,  # noqa: F811
     springs: tuple[Path, WrittenCards],
-    moved: MovedByThree,
+    moved: ThreePlayback,
 ) -> None:
     """With the file's weights in all levels, errors are below 10 % of the hair's length (99th
     percentile), and agree with the sidecar."""
@@ -135,10 +135,10 @@ def carried(
 def test_below_a_bone_springs_move_as_before(
     motion: GuideMotion,  # noqa: F811
     carried: tuple[Path, HeadBone],
-    moved: MovedByThree,
+    moved: ThreePlayback,
 ) -> None:
     head = np.stack([head_matrix(motion, frame) for frame in range(FRAMES)])
-    found = moved_by_three(carried[0], head, RATE, len(moved.rest))
+    found = play_in_three(carried[0], head, RATE, len(moved.rest))
     np.testing.assert_allclose(found.places, moved.places, atol=1e-6)
     report = validator_report(carried[0])
     assert report["issues"]["numErrors"] == 0, report

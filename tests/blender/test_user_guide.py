@@ -38,7 +38,7 @@ def test_the_user_guide_shows_all_of_these_pictures():
 
 @pytest.mark.slow
 def test_the_pictures_show_the_current_texts_of_panels():
-    kept, now = panel_texts.kept(), panel_texts.texts()
+    kept, now = panel_texts.stored_texts(), panel_texts.texts()
     stale = [name for name in now if now[name] != kept.get(name)]
     assert stale == [], "make test-ui SESSIONS=session_guide_pictures; tools/guide_pictures.py"
 

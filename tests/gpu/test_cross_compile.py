@@ -159,7 +159,8 @@ def test_no_program_needs_what_metal_has_not(programs: list[dict[str, Any]]) -> 
     beyond = {
         program["name"]: missing
         for program in programs
-        if is_on_metal(program) and (missing := cross_compile.beyond_metal(program["demands"]))
+        if is_on_metal(program)
+        and (missing := cross_compile.exceeded_metal_limits(program["demands"]))
     }
     assert beyond == {}
 
@@ -209,4 +210,6 @@ def test_what_is_beyond_metal_is_found(tmp_path: Path) -> None:
         (replace(plain, textures=(("FLOAT_2D", "x"),) * 65), "samplers 65"),
     )
     for recipe, complaint in cases:
-        assert complaint in cross_compile.beyond_metal(cross_compile.demands(recipe))
+        assert complaint in cross_compile.exceeded_metal_limits(
+            cross_compile.resource_counts(recipe)
+        )

@@ -26,13 +26,13 @@ def test_all_benchmarks_are_run() -> None:
 
 
 def test_the_page_is_current() -> None:
-    assert figures.PAGE.read_text(encoding="utf-8") == figures.page(figures.known()), (
+    assert figures.PAGE.read_text(encoding="utf-8") == figures.page(figures.stored_results()), (
         "run make docs"
     )
 
 
 def test_what_was_measured_is_what_would_be_measured_today() -> None:
-    found = figures.known()["benches"]
+    found = figures.stored_results()["benches"]
     assert found
     for name, each in found.items():
         assert each["arguments"] == figures.BENCHES[name].arguments, f"run tools/figures.py {name}"
@@ -40,7 +40,7 @@ def test_what_was_measured_is_what_would_be_measured_today() -> None:
 
 def test_each_benchmark_has_a_limit() -> None:
     """Without a limit, `make bench` would pass whatever a benchmark measures."""
-    found = figures.known()["benches"]
+    found = figures.stored_results()["benches"]
     assert [name for name, each in found.items() if each["ended"] and not each["limits"]] == []
 
 
@@ -49,7 +49,9 @@ def test_quotes_are_as_they_were_found() -> None:
     assert pages
     for path in pages:
         text = path.read_text(encoding="utf-8")
-        assert figures.quoted(text, figures.known()) == text, f"{path.name}: run make docs"
+        assert figures.with_current_values(text, figures.stored_results()) == text, (
+            f"{path.name}: run make docs"
+        )
 
 
 @pytest.mark.parametrize(
@@ -63,12 +65,12 @@ def test_quotes_are_as_they_were_found() -> None:
     ],
 )
 def test_a_quote_takes_the_figure_and_keeps_its_unit(text: str, is_to_be: str) -> None:
-    assert figures.quoted(text, KEPT) == is_to_be
+    assert figures.with_current_values(text, KEPT) == is_to_be
 
 
 def test_a_quote_of_what_nobody_measured_is_an_error() -> None:
     with pytest.raises(KeyError):
-        figures.quoted('[1](figures.md "ties.color")', KEPT)
+        figures.with_current_values('[1](figures.md "ties.color")', KEPT)
 
 
 def test_what_is_missed_is_said_first_and_in_its_row() -> None:
@@ -149,7 +151,7 @@ def typed(text: str, names: list[str]) -> list[str]:
 
 def test_a_number_beside_the_name_of_a_figure_is_a_quote() -> None:
     """A typed number would stay when the figure is measured again."""
-    found = figures.known()["benches"].values()
+    found = figures.stored_results()["benches"].values()
     names = [name for each in found for name in each.get("figures", {}) if "_" in name]
     for path in sorted((figures.REPOSITORY / "docs").rglob("*.md")):
         if path != figures.PAGE and path.name != "decisions.md":  # dated: keeps its numbers

@@ -67,4 +67,4 @@ def test_each_kind_of_use_is_seen(tmp_path: Path) -> None:
         "stand_in": ["addon/late.py:6 stand_in"],
         "most_": ["presets/x.json:1 MOST_ROWS"],
     }
-    assert [words.amount(places) for places in uses.values()] == [2, 4, 1, 3, 1, 1]
+    assert [words.count_uses(places) for places in uses.values()] == [2, 4, 1, 3, 1, 1]

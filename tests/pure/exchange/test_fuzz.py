@@ -93,8 +93,8 @@ def test_kills_come_in_the_midst_of_writing() -> None:
 def test_readers_that_fail_are_seen(monkeypatch: pytest.MonkeyPatch, read: Any, seen: str) -> None:
     """Bad readers make the fuzzing above fail."""
     monkeypatch.setitem(fuzz_files.READERS, "tfx", read)
-    monkeypatch.setattr(fuzz_files, "SLOWEST", 0.5)
-    (failure,) = fuzz_files.fuzzed("tfx", 1)["failures"]
+    monkeypatch.setattr(fuzz_files, "MAX_SECONDS", 0.5)
+    (failure,) = fuzz_files.fuzz("tfx", 1)["failures"]
     assert seen in failure
 
 
@@ -108,8 +108,10 @@ def _wait() -> None:
 
 
 def test_damage_is_the_same_for_the_same_number() -> None:
-    assert damaged_files.mutated("hair", 3, 7) == damaged_files.mutated("hair", 3, 7)
-    assert len({damaged_files.mutated("hair", 3, number) for number in range(50)}) > 45
+    assert damaged_files.damaged_content("hair", 3, 7) == damaged_files.damaged_content(
+        "hair", 3, 7
+    )
+    assert len({damaged_files.damaged_content("hair", 3, number) for number in range(50)}) > 45
 
 
 @pytest.mark.parametrize("kind", (*FORMATS, *APART))
@@ -118,7 +120,7 @@ def test_the_files_to_be_damaged_are_sound(kind: str, tmp_path: Path) -> None:
     path = tmp_path / f"sound.{kind}"
     for content in (*small, *large):
         path.write_bytes(content)
-        assert fuzz_files.unsound(fuzz_files.READERS[kind](path)) == ""
+        assert fuzz_files.fault_of(fuzz_files.READERS[kind](path)) == ""
 
 
 def test_a_large_preset_is_refused_before_it_is_read(tmp_path: Path) -> None:
@@ -126,7 +128,7 @@ def test_a_large_preset_is_refused_before_it_is_read(tmp_path: Path) -> None:
     path = tmp_path / "damaged.tfx"
     path.write_text("[" + "[]," * 400_000 + "[]]")
     fuzz_files.tracemalloc.start()
-    outcome, _, peak = fuzz_files.judged(fuzz_files.read_preset_file, path)
+    outcome, _, peak = fuzz_files.read_and_judge(fuzz_files.read_preset_file, path)
     fuzz_files.tracemalloc.stop()
     assert outcome == "refused" and peak < 100_000
 
