@@ -51,7 +51,11 @@ from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.scene.built_in_head import built_in_head
 from hairloom.addon.blender.scene.curves import read_curves
 from hairloom.addon.blender.scene.surfaces import read_surface
-from hairloom.addon.blender.setup.hairstyles import grows_anywhere, named_hairstyle, shipped
+from hairloom.addon.blender.setup.hairstyles import (
+    grows_anywhere,
+    named_hairstyle,
+    shipped_hairstyles,
+)
 from hairloom.addon.dynamics.colliders import PosedCollider
 from hairloom.addon.dynamics.colliders.signed_distance import signed_distance
 from hairloom.addon.dynamics.colliders.winding import winding_number
@@ -304,7 +308,7 @@ def main(names: list[str]) -> int:
     start()
     hairloom.register()
     field_of(built_in_head().surface, DynamicsSettings(), place="head")
-    styles = [entry.name for entry in shipped()]
+    styles = [entry.name for entry in shipped_hairstyles()]
     found: dict[str, Any] = {"styles": len(styles)}
     masks = [named_hairstyle(name).masks.get("children", "") for name in styles]
     heads = masks.count("scalp")

@@ -38,7 +38,7 @@ THUMBNAIL_VIEWS = dict.fromkeys(("ponytail", "bun", "braid"), (-0.85, 0.6, 0.2))
 def make(names: list[str]) -> None:
     """Write the styles of these names."""
     head = Head()
-    addon_module("blender.setup.hairstyles").shipped.cache_clear()
+    addon_module("blender.setup.hairstyles").shipped_hairstyles.cache_clear()
     hairstyles = addon_module("exchange.hairstyles")
     STYLES.mkdir(parents=True, exist_ok=True)
     for name in names:
@@ -70,7 +70,7 @@ def rig_of(name: str, max_strands: int = 1_000_000) -> tuple[Any, bpy.types.Obje
     children.strand_count = min(children.strand_count, max_strands)
     depsgraph = bpy.context.evaluated_depsgraph_get()
     source = addon_module("blender.scene.source").read_source(hair, depsgraph)
-    if setup.is_bust(head) and not setup.is_of_face(style):
+    if setup.is_bust(head) and not setup.is_face_hairstyle(style):
         face = run_parts(setup.face_hair(head, source.head, depsgraph))
         source = replace(source, strands=addon_module("strands.join").joined(source.strands, face))
     rig = addon_module("blender.colliders.rigs").MadeRig.of(hair, source).rig

@@ -19,9 +19,9 @@ from ..blender.setup.hairstyles import (
     fit_again,
     grows_anywhere,
     is_bust,
-    is_of_face,
+    is_face_hairstyle,
     named_hairstyle,
-    shipped,
+    shipped_hairstyles,
 )
 from .grow_options import names_of_weights
 from .long_work import LongWork, Progress, Steps, in_parts
@@ -47,7 +47,7 @@ class HAIRLOOM_OT_add_hairstyle(LongWork, bpy.types.Operator):
     style: EnumProperty(
         name="Hairstyle",
         description="Hairstyle to add",
-        items=[(entry.name, entry.title, "") for entry in shipped()],
+        items=[(entry.name, entry.title, "") for entry in shipped_hairstyles()],
     )
     skin: EnumProperty(
         name="Skin",
@@ -89,7 +89,7 @@ class HAIRLOOM_OT_add_hairstyle(LongWork, bpy.types.Operator):
             )
             note()
             grooms = [added.hair]
-            if is_new and not is_of_face(style):
+            if is_new and not is_face_hairstyle(style):
                 depsgraph = context.evaluated_depsgraph_get()
                 of_face = add_face_hair(head, depsgraph, collection, added.hair)
                 grooms.insert(0, (yield from in_parts(of_face)))
@@ -214,12 +214,12 @@ class HAIRLOOM_OT_choose_hairstyle(bpy.types.Operator):
     def draw(self, _context: bpy.types.Context) -> None:
         self.layout.label(text="Hairstyles")
         grid = self.layout.grid_flow(row_major=True, columns=_ACROSS, even_columns=True)
-        for entry in shipped():
+        for entry in shipped_hairstyles():
             cell = grid.column(align=True)
             if entry.icon:
                 cell.template_icon(icon_value=entry.icon, scale=_PICTURE_SCALE)
             cell.operator("hairloom.add_hairstyle", text=entry.title).style = entry.name
-        for _ in range(-len(shipped()) % _ACROSS):
+        for _ in range(-len(shipped_hairstyles()) % _ACROSS):
             grid.label(text="")
 
 
@@ -230,7 +230,7 @@ class HAIRLOOM_MT_hairstyles(bpy.types.Menu):
     bl_label = "Hairloom Hairstyle"
 
     def draw(self, _context: bpy.types.Context) -> None:
-        for entry in shipped():
+        for entry in shipped_hairstyles():
             operator = self.layout.operator(
                 "hairloom.add_hairstyle", text=entry.title, icon_value=entry.icon
             )

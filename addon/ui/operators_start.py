@@ -16,7 +16,7 @@ from ..blender.preview import previews
 from ..blender.scene.bust_skin import TONES
 from ..blender.scene.particle_hair import convert_particle_hair, hair_systems
 from ..blender.setup.sample_scene import add_sample_scene
-from ..blender.setup.starting import new_groom, take_over
+from ..blender.setup.starting import new_groom, prepare_existing_hair
 from ..errors import HairloomError
 from .grow_options import GROW_PROPERTIES, draw_where_settings_are
 from .long_work import LongWork, Progress, Steps, in_parts
@@ -143,7 +143,7 @@ class HAIRLOOM_OT_use_groom(LongWork, bpy.types.Operator):
         chosen = preferences(context)
         taken, problems = list[bpy.types.Object](), list[HairloomError]()
         grooms, depsgraph = chosen_hair(context), context.evaluated_depsgraph_get()
-        works = (take_over(hair, depsgraph, chosen_presets(chosen)) for hair in grooms)
+        works = (prepare_existing_hair(hair, depsgraph, chosen_presets(chosen)) for hair in grooms)
         for hair, done in (yield from in_parts(batched(works, problems.append))):
             for one in done:
                 report(self, "INFO", f"{hair.name}: {one}")
@@ -182,7 +182,7 @@ class HAIRLOOM_OT_convert_particles(LongWork, bpy.types.Operator):
         made, dropped = yield from in_parts(convert_particle_hair(context, mesh))
         for hair in made:
             depsgraph = context.evaluated_depsgraph_get()
-            _, done = run_parts(take_over(hair, depsgraph, chosen_presets(chosen)))
+            _, done = run_parts(prepare_existing_hair(hair, depsgraph, chosen_presets(chosen)))
             for one in done:
                 report(self, "INFO", f"{hair.name}: {one}")
         result = f"{mesh.name}: its particle hair was hidden and replaced by curves"

@@ -55,14 +55,14 @@ class SmallView:
         """The picture of these grooms, (SIZE, SIZE, 4). None hides a groom."""
         numbers = {name: number for number, name in enumerate(sorted(grooms), start=1)}
         for uid in set(overlay._overlay.drawn) - set(numbers.values()):
-            overlay.drop(uid)
+            overlay.stop_drawing(uid)
         for name, groom in grooms.items():
             if groom is None:
                 overlay.hide(numbers[name])
             else:
                 known = overlay.drawing_of(numbers[name])
                 if known is None or known.snapshot is not groom or not known.is_visible:
-                    overlay.show(numbers[name], overlay.Drawing(groom))
+                    overlay.show(numbers[name], overlay.GroomDrawing(groom))
         return self.drawn()
 
     def drawn(self) -> np.ndarray:

@@ -19,9 +19,9 @@ pytestmark = pytest.mark.usefixtures("gpu_context")
 
 
 def test_the_file_has_the_machine_and_all_times(tmp_path: Path, monkeypatch: Any) -> None:
-    sizes, whole = ((64, 48), (96, 64), (128, 96)), benchmark.measured
-    monkeypatch.setattr(benchmark, "_SECONDS", 0.0)
-    monkeypatch.setattr(benchmark, "measured", lambda: whole(sizes, 200))
+    sizes, whole = ((64, 48), (96, 64), (128, 96)), benchmark.run_benchmark
+    monkeypatch.setattr(benchmark, "_MAX_SECONDS", 0.0)
+    monkeypatch.setattr(benchmark, "run_benchmark", lambda: whole(sizes, 200))
     monkeypatch.setattr(self_test_job.tests, "run", lambda: ())
     path, report = tmp_path / "frames.json", Report("self-test")
     job = SimpleNamespace(report=report, options=Namespace(benchmark=str(path)))
@@ -39,7 +39,7 @@ def test_the_file_has_the_machine_and_all_times(tmp_path: Path, monkeypatch: Any
 
 
 def test_without_the_option_nothing_is_measured(monkeypatch: Any) -> None:
-    monkeypatch.setattr(benchmark, "measured", lambda: pytest.fail("it measures"))
+    monkeypatch.setattr(benchmark, "run_benchmark", lambda: pytest.fail("it measures"))
     monkeypatch.setattr(self_test_job.tests, "run", lambda: ())
     job = SimpleNamespace(report=Report("self-test"), options=Namespace(benchmark=None))
     self_test_job.self_test(job)

@@ -72,12 +72,12 @@ def test_of_children_the_last_to_grow_are_the_first_to_go(new_hair, sphere, get_
 @pytest.mark.parametrize("view", DEBUG_VIEWS)
 def test_a_debug_view_reaches_the_snapshot_and_brings_its_counts(view, preview):
     hair, _, session = preview
-    assert drawing(session).counts_of == ""
+    assert drawing(session).counts_name == ""
     hair.hairloom.debug_view = view
     assert drawing(session).snapshot.debug_view == view
-    assert drawing(session).counts_of == ("" if view == "none" else "Hair")
+    assert drawing(session).counts_name == ("" if view == "none" else "Hair")
     hair.hairloom.show_counts = True
-    assert drawing(session).counts_of == "Hair" and drawing(session).guide_count == 60
+    assert drawing(session).counts_name == "Hair" and drawing(session).guide_count == 60
 
 
 def test_balls_inside_the_head_follow_it(preview):
@@ -149,7 +149,7 @@ def test_hair_without_a_head_has_nothing_to_hide_it(new_hair, get_depsgraph):
     ],
 )
 def test_views_that_show_hidden_strands_cull_nothing(kind, xray, expected):
-    assert overlay.is_seen_through(SimpleNamespace(type=kind, show_xray=xray)) is expected
+    assert overlay.is_x_ray(SimpleNamespace(type=kind, show_xray=xray)) is expected
 
 
 def test_the_counts_are_what_was_drawn(preview, gpu_context):

@@ -238,10 +238,10 @@ def test_the_picture_keeps_its_hair_until_the_preview_has_its_own(
     monkeypatch.setattr(latest_job, "is_blocking", lambda: False)
     gate.opened.clear()
     session = previews.start(hair, bpy.context.evaluated_depsgraph_get())
-    assert overlay.expected() == {hair.session_uid} and not overlay.drawn()
+    assert overlay.pending_uids() == {hair.session_uid} and not overlay.drawn_uids()
 
     def read() -> tuple[Any, ...]:
-        drawn, expected = overlay.drawn(), overlay.expected()
+        drawn, expected = overlay.drawn_uids(), overlay.pending_uids()
         return view.read(
             {hair.session_uid},
             is_previewed=drawn.__contains__,
@@ -251,7 +251,7 @@ def test_the_picture_keeps_its_hair_until_the_preview_has_its_own(
     assert read() == (before,)
     gate.opened.set()
     take_steps_until(lambda: not session.is_pending)
-    assert overlay.drawn() == {hair.session_uid} and not overlay.expected()
+    assert overlay.drawn_uids() == {hair.session_uid} and not overlay.pending_uids()
     assert read() == (), "the preview draws it from now on"
     scene_events.clear()
 

@@ -23,7 +23,7 @@ from hairloom.addon.blender.setup.foreign_heads import (
     add_landmarks,
     has_makehuman_topology,
     landmarks_of,
-    own_positions,
+    original_positions,
     placed_landmarks,
 )
 from hairloom.addon.blender.setup.hairstyles import (
@@ -206,7 +206,7 @@ def test_modifiers_that_add_and_take_vertices_do_not_hide_the_topology() -> None
     human.modifiers.new("Hide", "MASK").vertex_group = "body"
     human.modifiers.new("Smooth", "SUBSURF").levels = 2
     objects = set(bpy.data.objects.keys())
-    positions = own_positions(human, depsgraph())
+    positions = original_positions(human, depsgraph())
     assert set(bpy.data.objects.keys()) == objects
     assert np.abs(positions - [vertex.co[:] for vertex in human.data.vertices]).max() < 1e-6
     after = roots_of(added("buzz_cut", human).hair)

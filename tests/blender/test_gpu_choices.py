@@ -79,6 +79,6 @@ def test_a_view_keeps_no_picture_where_memory_is_short(
     )
     view = SimpleNamespace(picture=picture, moves_to=lambda _: False, address=0)
     monkeypatch.setattr(gpu_memory, "exceeds_budget", lambda: is_short)
-    overlay._draw_afresh(view, None, [], ("drawn",))  # type: ignore[arg-type]
+    overlay._draw_hair(view, None, [], ("drawn",))  # type: ignore[arg-type]
     assert calls == (["release"] if is_short else ["begin"])
     assert picture.marks == (() if is_short else ("drawn",))

@@ -80,7 +80,7 @@ def row_of(height: float, y: float) -> int:
 
 
 def shown_in(view: SmallView) -> list[Any]:
-    return list(overlay._shown_now(view.context, CAMERA, has_turned=False))
+    return list(overlay._shown_grooms(view.context, CAMERA, has_turned=False))
 
 
 def of_render(*grooms: Snapshot) -> np.ndarray:
@@ -224,14 +224,14 @@ def test_grooms_far_apart_get_the_same_lights() -> None:
         sheet(0.0, 4, lights=brightest_lights(lamps, np.array([x, 0.0, 0.0]))) for x in (0.0, 9.0)
     ]
     assert ends[0].lights != ends[1].lights
-    lit = overlay._in_one_light(ends)
+    lit = overlay._with_shared_lights(ends)
     assert lit[0].lights == lit[1].lights == brightest_lights(lamps, ends[0].center)
-    assert overlay._in_one_light(ends[:1]) == ends[:1]
+    assert overlay._with_shared_lights(ends[:1]) == ends[:1]
 
 
 def test_a_clipping_region_may_cut_the_head_away_that_hides_hair(view: SmallView) -> None:
     hidden = sheet(0.0, 4, occluder_spheres=np.float32([[0.0, 0.0, -0.2, 0.1]]))
-    overlay.show(1, overlay.Drawing(hidden))
+    overlay.show(1, overlay.GroomDrawing(hidden))
     marks = []
     for is_clipped in (False, True):
         view.context.region_data.use_clip_planes = is_clipped
@@ -255,13 +255,16 @@ def test_without_overlays_hair_is_there_and_its_head_hides_it(
     view.context.scene.render.engine = engine
     view.space.shading.type = "RENDERED"
     view.space.overlay.show_overlays, view.depth = False, left
-    overlay.show(1, overlay.Drawing(hair, head=wall))
+    overlay.show(1, overlay.GroomDrawing(hair, head=wall))
     found = view.drawn()[..., 3]
     middle, before = SIZE // 2, row_of(0.0, -0.05)
     assert (found[:, middle + 1 :] == all_hair[:, middle + 1 :]).all()
     assert found[: before - 1, : middle - 1].mean() > 0.5, "before the wall"
     assert (found[before + 2 :, : middle - 1] == 0.0).all() and all_hair[before + 2 :].max() > 0.0
-    overlay.show(1, overlay.Drawing(hair, head=wall, bare_in=frozenset({view.space.as_pointer()})))
+    overlay.show(
+        1,
+        overlay.GroomDrawing(hair, head=wall, headless_views=frozenset({view.space.as_pointer()})),
+    )
     assert (view.drawn()[..., 3] == all_hair).all(), "a head that is not shown hides nothing"
     view.space.overlay.show_overlays, view.depth = True, 0.0
     assert view.drawn()[..., 3].max() == 0.0, "Blender's own depths count"

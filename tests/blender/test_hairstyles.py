@@ -31,7 +31,7 @@ from hairloom.addon.blender.setup.hairstyles import (
     add_head,
     is_bust,
     named_hairstyle,
-    shipped,
+    shipped_hairstyles,
 )
 from hairloom.addon.dynamics.colliders.winding import winding_number
 from hairloom.addon.errors import HairloomError
@@ -40,7 +40,7 @@ from hairloom.addon.strands.closest_point import search_of
 from hairloom.addon.ui import operators_hairstyles
 
 pytestmark = [pytest.mark.usefixtures("extension")]
-NAMES = [entry.name for entry in shipped()]
+NAMES = [entry.name for entry in shipped_hairstyles()]
 #: styles for any mesh
 FUR = ["short_coat", "shaggy_coat"]
 ON_HEADS = [name for name in NAMES if name not in FUR]
@@ -361,7 +361,7 @@ def test_the_files_are_what_the_recipes_make() -> None:
 
 
 def test_every_style_has_a_picture_and_is_a_small_file() -> None:
-    for entry in shipped():
+    for entry in shipped_hairstyles():
         picture = entry.path.with_suffix(".png")
         assert picture.is_file() and picture.stat().st_size < 60_000, "run make styles"
         guides = entry.path.with_suffix(".npz")

@@ -29,38 +29,38 @@ def is_waiting(timer: object) -> bool:
 
 
 def test_a_row_of_samples_is_followed_by_a_fresh_draw(view: views.View) -> None:
-    views.was_drawn(view)
+    views.record_drawn(view)
     for _ in range(9):
-        views.was_shown_again(view, SOLID)
-    assert not is_waiting(views._draw_afresh), "in Solid what is in the way is known"
-    views.was_drawn(view)
+        views.record_reshown(view, SOLID)
+    assert not is_waiting(views._redraw_strands), "in Solid what is in the way is known"
+    views.record_drawn(view)
     for count in range(1, 5):
-        views.was_shown_again(view, MATERIAL)
-        assert is_waiting(views._draw_afresh) == (count >= 3)
-    views._draw_afresh()
+        views.record_reshown(view, MATERIAL)
+        assert is_waiting(views._redraw_strands) == (count >= 3)
+    views._redraw_strands()
     assert view.picture.marks == ()
 
 
 def test_a_redraw_long_after_is_a_row_by_itself(view: views.View) -> None:
-    views.was_drawn(view)
+    views.record_drawn(view)
     view.drawn_at -= 6.0
-    views.was_shown_again(view, MATERIAL)
-    assert is_waiting(views._draw_afresh)
+    views.record_reshown(view, MATERIAL)
+    assert is_waiting(views._redraw_strands)
     views.forget_views()
-    assert not is_waiting(views._draw_afresh)
+    assert not is_waiting(views._redraw_strands)
 
 
 def test_shadows_that_lag_are_caught_up_with(view: views.View) -> None:
-    views.was_drawn(view)
+    views.record_drawn(view)
     assert not is_waiting(views._catch_up)
-    view.is_behind = True
-    views.was_drawn(view)
+    view.is_outdated = True
+    views.record_drawn(view)
     assert is_waiting(views._catch_up)
 
 
 def test_a_view_turns_from_its_second_draw_on(view: views.View) -> None:
     one, other = Camera(np.eye(4), np.eye(4)), Camera(2.0 * np.eye(4), np.eye(4))
-    assert [view.turns_to(each) for each in (one, one, other, other, one)] == [
+    assert [view.has_new_camera(each) for each in (one, one, other, other, one)] == [
         *(False, False, True, False, True)
     ]
 
@@ -92,6 +92,6 @@ def test_each_switch_and_each_evaluation_is_a_mark() -> None:
 
 def test_a_view_moves_until_it_is_drawn_of_the_same_again(view: views.View) -> None:
     one, other = (object(), 1, b"a"), (object(), 1, b"a")
-    assert [view.moves_to(marks) for marks in (one, one, other, other, one)] == [
+    assert [view.has_new_marks(marks) for marks in (one, one, other, other, one)] == [
         *(True, False, True, False, True)
     ]

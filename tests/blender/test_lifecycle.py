@@ -218,8 +218,8 @@ def test_a_failure_to_draw_is_forgotten_with_the_last_preview(preview, monkeypat
     said = []
     monkeypatch.setattr(overlay, "show_status", said.append)
     overlay._fail(ValueError("a defect"))
-    bpy.app.timers.unregister(overlay._tell_failure)
-    overlay._tell_failure()
+    bpy.app.timers.unregister(overlay._report_failure)
+    overlay._report_failure()
     assert "a defect" in previews.notice() and "a defect" in said[-1]
     previews.stop_all()
     assert previews.notice() == "" and said[-1] is None

@@ -15,7 +15,7 @@ from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.scene.lights import light_warnings, read_lights
 from hairloom.addon.blender.scene.world import studio_environment
 from hairloom.addon.blender.sessions.session import Session
-from hairloom.addon.blender.viewport.overlay import lit
+from hairloom.addon.blender.viewport.overlay import with_view_lights
 from hairloom.addon.render.snapshot import Snapshot
 from hairloom.addon.shading.environment import radiance_from
 from hairloom.addon.shading.lights import (
@@ -184,7 +184,7 @@ def test_hair_is_lit_like_blenders_meshes_and_never_black() -> None:
     sun = Light("sun", (1.0, 0.0, 0.0), (2.0, 2.0, 2.0), is_from_world=True)
 
     def shown(shading: Any, lamps: Any, grey: float) -> Any:
-        snapshot = lit(bare(lights=lamps, ambient=(grey, grey, grey)), shading, studio)
+        snapshot = with_view_lights(bare(lights=lamps, ambient=(grey, grey, grey)), shading, studio)
         return snapshot.lights, snapshot.ambient[0]
 
     plain = Snapshot.ambient[0]

@@ -86,7 +86,7 @@ def test_stills_take_more_samples_without_atomics() -> None:
 
 
 def test_the_preferences_forbid_them_and_the_self_test_says_so(monkeypatch: Any) -> None:
-    monkeypatch.setattr(self_test, "_last", ())
+    monkeypatch.setattr(self_test, "_last_results", ())
     page = SimpleNamespace(image_atomics="never", gpu_memory=1024)
     preferences._choose_gpu(page, bpy.context)
     self_test.run()
@@ -117,13 +117,13 @@ def test_the_preview_is_drawn_without_atomics(
     camera = Camera(look_at((0.4, -0.5, 0.3), (0.0, 0.0, 0.0)), perspective(0.4, 1.0, 0.05, 5.0))
     for choice in ("automatic", "never"):
         capabilities.choose_image_atomics(choice)
-        drawn = overlay.Drawn(overlay.Drawing(session.snapshot))
+        drawn = overlay.DrawnGroom(overlay.GroomDrawing(session.snapshot))
         lit = replace(session.snapshot, lights=three_point_lights(camera.view))
-        shown = overlay._Shown(
+        shown = overlay._ShownGroom(
             *(0, drawn, drawn.drawing, lit, None, 0),
             shades_body=True,
             is_turning=False,
-            sees_all=False,
+            shows_all_strands=False,
         )
         target.sized(96, 96).clear((0.0, 0.0, 0.0, 0.0))
         with target.drawing():

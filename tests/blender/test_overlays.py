@@ -153,12 +153,12 @@ def test_stretch_shows_each_segment_of_the_guides_once_and_none_at_rest_as_stret
     session, found = played(preview, get_depsgraph, "stretch")
     guides = session.solver.guides()
     (lines,) = found
-    assert lines.color == motion_lines.STRETCHES[0][1]
+    assert lines.color == motion_lines.STRETCH_COLORS[0][1]
     np.testing.assert_array_equal(lines.points[::2], guides[:, :-1].reshape(-1, 3))
     longer = guides.copy()
     longer[3, -1] = guides[3, -2] + 1.1 * (guides[3, -1] - guides[3, -2])
     session.solver.show_baked(session.solver.pose, longer)
-    worst = dict(motion_lines.stretch_lines(session))[motion_lines.STRETCHES[2][1]]
+    worst = dict(motion_lines.stretch_lines(session))[motion_lines.STRETCH_COLORS[2][1]]
     np.testing.assert_allclose(worst, longer[3, -2:], atol=1e-6)
 
 
@@ -169,7 +169,7 @@ def test_contacts_show_touching_points_and_depths_of_others(preview, get_depsgra
     center = (tip + [0.004, 0.0, 0.0]).astype(np.float32)
     ball = PosedCollider(SphereCollider(center, 0.01), np.eye(4), np.eye(4))
     monkeypatch.setattr(session, "_posed_colliders", (ball,))
-    inside = dict(motion_lines.contact_lines(session))[motion_lines.INSIDE].reshape(-1, 2, 3)
+    inside = dict(motion_lines.contact_lines(session))[motion_lines.INSIDE_COLOR].reshape(-1, 2, 3)
     assert (np.abs(inside[:, 0] - tip).max(axis=1) < 1e-6).any()
     away = np.linalg.norm(inside - center, axis=2)
     assert away[:, 0].max() < 0.01

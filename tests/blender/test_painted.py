@@ -266,7 +266,7 @@ def test_the_overlay_shows_a_map_while_it_is_painted(
     def shown() -> dict[Any, Any]:
         return {one.color: one.points for one in overlay.drawing_of(session.uid).lines}
 
-    blue, red = motion_lines.PAINTED[0][1], motion_lines.PAINTED[-1][1]
+    blue, red = motion_lines.MASK_COLORS[0][1], motion_lines.MASK_COLORS[-1][1]
     root = session.solver.guides()[:, 0]
     above, below = root[root[:, 2] > FAR], root[root[:, 2] < -FAR]
     for roots, color in ((above, red), (below, blue)):
@@ -276,7 +276,7 @@ def test_the_overlay_shows_a_map_while_it_is_painted(
     group.add([vertex.index for vertex in sphere.data.vertices], 0.3, "REPLACE")
     sphere.data.update_tag()
     bpy.context.view_layer.update()
-    assert shown().keys() == {motion_lines.PAINTED[2][1]}, "with the stroke itself"
+    assert shown().keys() == {motion_lines.MASK_COLORS[2][1]}, "with the stroke itself"
     segments = session.solver.guides().shape
     assert sum(map(len, shown().values())) == 2 * segments[0] * (segments[1] - 1)
 

@@ -16,7 +16,7 @@ import bpy
 from hairloom.addon.blender.command_line import command_line, job_options
 from hairloom.addon.blender.properties import presets
 from hairloom.addon.blender.properties.properties import settings_of
-from hairloom.addon.blender.setup.starting import dress
+from hairloom.addon.blender.setup.starting import apply_presets
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.parameters import ALL_SETTINGS
 from hairloom.addon.params.preset import PRESET_VERSION
@@ -69,7 +69,7 @@ def test_hair_with_a_setting_of_its_own_has_no_preset(hair: bpy.types.Object) ->
 def test_a_new_groom_has_the_look_that_it_was_given(hair: bpy.types.Object) -> None:
     """Its colour source is "own", which only counts once its curves have colours."""
     choices = bpy.context.window_manager.hairloom_presets
-    dress(hair, ("looks/brown",))
+    apply_presets(hair, ("looks/brown",))
     assert hair.data.hairloom.shading.color_source == "own"
     assert choices.shading == "looks/brown"
     hair.data.attributes.new("color", "FLOAT_COLOR", "CURVE")

@@ -11,7 +11,7 @@ pytestmark = [pytest.mark.portable, pytest.mark.usefixtures("extension")]
 
 
 def test_all_is_well_here_and_can_be_copied(monkeypatch):
-    monkeypatch.setattr(self_test, "_last", ())
+    monkeypatch.setattr(self_test, "_last_results", ())
     with pytest.raises(RuntimeError, match="Press Self-Test first"):
         bpy.ops.hairloom.copy_report()
     assert bpy.ops.hairloom.self_test() == {"FINISHED"}
@@ -27,7 +27,7 @@ def test_failures_are_reported_and_other_tests_continue(monkeypatch, capfd):
     def broken(*_, **__):
         raise RuntimeError("this GPU refuses")
 
-    monkeypatch.setattr(self_test, "_last", ())
+    monkeypatch.setattr(self_test, "_last_results", ())
     monkeypatch.setattr(self_test, "render_image", broken)
     monkeypatch.setattr(solvers, "_test_frame_error", lambda: "it is 1 m off after one frame")
     monkeypatch.setattr(self_test, "find_spec", lambda name: None)
@@ -54,6 +54,6 @@ def test_failures_are_reported_and_other_tests_continue(monkeypatch, capfd):
 def test_pictures_that_show_no_hair_fail(change, told):
     good = np.zeros((8, 8, 4), np.float32)
     good[2:6, 2:6] = 1.0
-    assert "25%" in self_test._judged(good)
+    assert "25%" in self_test._check_picture(good)
     with pytest.raises(RuntimeError, match=told):
-        self_test._judged(change(good))
+        self_test._check_picture(change(good))

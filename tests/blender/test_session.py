@@ -234,11 +234,11 @@ def test_each_view_layer_draws_what_it_shows(preview):
     first, other = bpy.context.view_layer, scene.view_layers.new("Other")
     update()
     keys = {layer_key(scene, layer) for layer in (first, other)}
-    assert overlay.drawing_of(session.uid).seen_in == keys
+    assert overlay.drawing_of(session.uid).visible_layers == keys
     assert is_drawn_in(session, scene, first) and is_drawn_in(session, scene, other)
     hair.hide_set(True, view_layer=other)
     update()
-    assert overlay.drawing_of(session.uid).seen_in == {layer_key(scene, first)}
+    assert overlay.drawing_of(session.uid).visible_layers == {layer_key(scene, first)}
     assert overlay.drawing_of(session.uid).is_visible
     assert is_drawn_in(session, scene, first) and not is_drawn_in(session, scene, other)
 

@@ -68,7 +68,7 @@ def view(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Ite
     overlay._overlay.drawn.clear()
     yield SmallView(Camera(LOOK_AT, projection))
     overlay._overlay.drawn.clear()
-    softening.forget()
+    softening.stop()
     views.forget_views()
     picture.viewport_samples = before
 
@@ -85,7 +85,7 @@ def hardened(view: SmallView, grooms: dict[str, Snapshot]) -> np.ndarray:
 def softened(view: SmallView) -> tuple[np.ndarray, int]:
     """The view once it requests no more samples, and the number of redraws until then."""
     for redraws in range(3 * SAMPLES):
-        softening._ask()
+        softening._request_sample()
         if not softening._softening.is_due:
             return view.drawn(), redraws
         view.drawn()
@@ -127,10 +127,10 @@ def test_changed_shadows_are_hard_at_once(view: SmallView) -> None:
     assert (hard != other_hard).any()
     hardened(view, GROOMS)
     for _ in range(4):
-        softening._ask()
+        softening._request_sample()
         view.drawn()
     assert (hardened(view, turned) == other_hard).all()
-    assert not softening.sums().count
+    assert not softening.sample_picture().count
     soft, redraws = softened(view)
     assert redraws == SAMPLES and (soft != other_hard).any()
     assert (hardened(view, GROOMS) == hard).all()
@@ -143,7 +143,7 @@ def test_the_last_sample_frees_all_textures(view: SmallView) -> None:
 
     hardened(view, GROOMS)
     before = held()
-    softening._ask()
+    softening._request_sample()
     view.drawn()
     assert held() > before + 50 * SIZE * SIZE
     softened(view)

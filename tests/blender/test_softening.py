@@ -45,7 +45,7 @@ def two_views(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[views.View, vie
     monkeypatch.setattr(softening, "redraw_view", lambda address: address != 9)
     one, other = (views.view_of(SimpleNamespace(as_pointer=lambda at=at: at)) for at in (7, 8))
     yield one, other
-    softening.forget()
+    softening.stop()
     views.forget_views()
 
 
@@ -54,7 +54,7 @@ def sampled(view: views.View, samples: int, fragments: int = 100) -> Pass:
     assert softening.takes_sample(view) and not softening.takes_sample(view)
     hair = Pass()
     is_shown = softening.is_next_shown(view, samples)
-    softening.sums().count += 1
+    softening.sample_picture().count += 1
     view.is_soft |= is_shown
     softening.was_sampled(view, samples, [hair], (fragments,))
     return hair
@@ -62,21 +62,21 @@ def sampled(view: views.View, samples: int, fragments: int = 100) -> Pass:
 
 def test_only_lights_with_a_size_are_worth_samples(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(softening, "is_software", lambda: False)
-    assert softening.is_worth_it((NARROW, SUN), 2)
-    assert not softening.is_worth_it((NARROW, SUN), 1), "switched off"
-    assert not softening.is_worth_it((NARROW, NARROW), 32) and not softening.is_worth_it((), 32)
+    assert softening.can_soften((NARROW, SUN), 2)
+    assert not softening.can_soften((NARROW, SUN), 1), "switched off"
+    assert not softening.can_soften((NARROW, NARROW), 32) and not softening.can_soften((), 32)
     monkeypatch.setattr(softening, "is_software", lambda: True)
-    assert not softening.is_worth_it((SUN,), 32)
+    assert not softening.can_soften((SUN,), 32)
 
 
 def test_views_get_their_samples_in_turn_and_then_no_more(
     two_views: tuple[views.View, ...],
 ) -> None:
     for view in two_views:
-        softening.soften(view)
+        softening.schedule_samples(view)
     order = []
     for _ in range(30):
-        softening._ask()
+        softening._request_sample()
         due = [view for view in two_views if softening._softening.view is view]
         if not due:
             break
@@ -84,32 +84,35 @@ def test_views_get_their_samples_in_turn_and_then_no_more(
         hair = sampled(due[0], 10)
         assert due[0].is_soft == (order.count(order[-1]) >= 8), "few samples are not shown"
     assert order == [0] * 10 + [1] * 10
-    assert all(view.has_all and not view.wants_more for view in two_views)
-    assert hair.forgotten == [softening.name_of(two_views[1])] and not softening.sums().count
+    assert all(view.has_all_samples and not view.wants_samples for view in two_views)
+    assert (
+        hair.forgotten == [softening.sample_key(two_views[1])]
+        and not softening.sample_picture().count
+    )
 
 
 def test_a_view_that_is_drawn_afresh_begins_again(two_views: tuple[views.View, ...]) -> None:
     view, _ = two_views
-    softening.soften(view)
+    softening.schedule_samples(view)
     for _ in range(3):
-        softening._ask()
+        softening._request_sample()
         hair = sampled(view, 10)
-    softening._ask()
-    softening.harden(view)
-    assert not softening.takes_sample(view) and not softening.sums().count
-    assert hair.forgotten == [softening.name_of(view)]
-    softening.soften(view)
-    softening._ask()
+    softening._request_sample()
+    softening.discard_samples(view)
+    assert not softening.takes_sample(view) and not softening.sample_picture().count
+    assert hair.forgotten == [softening.sample_key(view)]
+    softening.schedule_samples(view)
+    softening._request_sample()
     sampled(view, 10)
-    assert softening.sums().count == 1 and not view.is_soft
+    assert softening.sample_picture().count == 1 and not view.is_soft
 
 
 def test_a_view_that_must_be_redrawn_gets_no_sample_first(
     two_views: tuple[views.View, ...],
 ) -> None:
     view, other = two_views
-    view.wants_more, view.is_again, other.wants_more = True, True, True
-    softening._ask()
+    view.wants_samples, view.needs_redraw, other.wants_samples = True, True, True
+    softening._request_sample()
     assert not softening.takes_sample(view) and softening.takes_sample(other)
 
 
@@ -120,22 +123,22 @@ def test_a_sample_tells_whether_a_soft_view_is_still_right(
     """It is right if it shows as much hair as before. If not, all samples are taken again;
     meanwhile the view stays soft."""
     view, _ = two_views
-    softening.soften(view)
+    softening.schedule_samples(view)
     for _ in range(10):
-        softening._ask()
+        softening._request_sample()
         sampled(view, 10)
-    view.picture.marks, view.is_again = ("kept",), True
-    views._draw_afresh()
-    assert view.picture.marks == ("kept",) and view.wants_more and not view.is_again
-    softening.go_on(view)
-    softening._ask()
+    view.picture.marks, view.needs_redraw = ("kept",), True
+    views._redraw_strands()
+    assert view.picture.marks == ("kept",) and view.wants_samples and not view.needs_redraw
+    softening.resume_timer(view)
+    softening._request_sample()
     sampled(view, 10, fragments)
-    assert view.is_soft and view.wants_more == (fragments != 100)
-    for count in range(2, 11) if view.wants_more else ():
+    assert view.is_soft and view.wants_samples == (fragments != 100)
+    for count in range(2, 11) if view.wants_samples else ():
         assert softening.is_next_shown(view, 10) == (count == 10)
-        softening._ask()
+        softening._request_sample()
         sampled(view, 10, fragments)
-    assert not view.wants_more
+    assert not view.wants_samples
 
 
 def test_a_view_shown_between_samples_is_checked_after_them(
@@ -144,25 +147,25 @@ def test_a_view_shown_between_samples_is_checked_after_them(
     """Slow series of samples do not start again with each redraw."""
     view, _ = two_views
     view.picture.marks = ("kept",)
-    softening.soften(view)
+    softening.schedule_samples(view)
     for count in range(10):
-        softening._ask()
+        softening._request_sample()
         sampled(view, 10)
         if count == 5:
-            view.is_again = True
-            views._draw_afresh()
-    assert view.picture.marks and view.has_all and view.wants_more
-    softening._ask()
+            view.needs_redraw = True
+            views._redraw_strands()
+    assert view.picture.marks and view.has_all_samples and view.wants_samples
+    softening._request_sample()
     sampled(view, 10)
-    assert not view.wants_more
+    assert not view.wants_samples
 
 
 def test_a_view_that_no_window_shows_waits_for_nothing(two_views: tuple[views.View, ...]) -> None:
     view = views.view_of(SimpleNamespace(as_pointer=lambda: 9))
     view.picture.marks = ("kept",)
-    softening.soften(view)
-    softening._ask()
-    assert not view.wants_more and not softening.takes_sample(view) and not view.picture.marks
+    softening.schedule_samples(view)
+    softening._request_sample()
+    assert not view.wants_samples and not softening.takes_sample(view) and not view.picture.marks
 
 
 def test_without_memory_a_view_stays_hard(
@@ -170,20 +173,20 @@ def test_without_memory_a_view_stays_hard(
 ) -> None:
     monkeypatch.setattr(gpu_memory, "budget", lambda: gpu_objects.bytes_in_use() + (1 << 19))
     view, _ = two_views
-    softening.soften(view)
-    softening._ask()
-    assert not softening.takes_sample(view) and not view.wants_more
-    softening._ask()
+    softening.schedule_samples(view)
+    softening._request_sample()
+    assert not softening.takes_sample(view) and not view.wants_samples
+    softening._request_sample()
     assert not softening.takes_sample(view)
 
 
 def test_a_view_that_others_draw_keeps_none_waiting(two_views: tuple[views.View, ...]) -> None:
     """Such as a view that got no sample after it requested one."""
     view, other = two_views
-    view.wants_more = other.wants_more = True
-    softening._ask()
-    softening._ask()
-    assert softening.takes_sample(other) and not view.wants_more
+    view.wants_samples = other.wants_samples = True
+    softening._request_sample()
+    softening._request_sample()
+    assert softening.takes_sample(other) and not view.wants_samples
 
 
 def test_slow_motion_is_not_at_rest_between_its_frames(
@@ -193,14 +196,14 @@ def test_slow_motion_is_not_at_rest_between_its_frames(
     monkeypatch.setattr(softening, "soon", lambda _, pause: pauses.append(pause))
     for now in (100.0, 100.05, 100.1, 100.6, 101.1, 130.0):
         monkeypatch.setattr(softening.time, "monotonic", lambda now=now: now)
-        softening.soften(two_views[0])
+        softening.schedule_samples(two_views[0])
     assert pauses == pytest.approx([0.3, 0.3, 0.3, 1.0, 1.0, 0.3])
 
 
 def test_one_point_of_a_lamp_lights_all_grooms(two_views: tuple[views.View, ...]) -> None:
     """The lamp's disk faces the middle of all grooms."""
     lamp = Light.point((0.0, 0.0, 2.0), (1.0, 1.0, 1.0), 1.0, 0.1)
-    softening.sums().count = 3
+    softening.sample_picture().count = 3
 
     def lights(*x: float) -> tuple[Light, ...]:
         return softening.lights_of_sample((lamp,), [np.array([each, 0.0, 0.0]) for each in x])

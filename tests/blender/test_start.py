@@ -85,7 +85,7 @@ def test_only_meshes_that_are_no_head_or_body_change_the_lengths(size, factor):
     depsgraph = bpy.context.evaluated_depsgraph_get()
     found = starting.fitting_factor(bpy.context.object, depsgraph)
     assert found == pytest.approx(factor)
-    fitted = starting.fitted(GrowSettings(), found)
+    fitted = starting.scaled_settings(GrowSettings(), found)
     assert fitted.length == pytest.approx(GrowSettings().length * factor)
     assert fitted.volume == pytest.approx(GrowSettings().volume * factor)
     assert fitted.strand_count == GrowSettings().strand_count
@@ -102,7 +102,7 @@ def test_hair_fitted_to_a_doll_and_to_a_giant_falls_as_on_a_head(length):
         surface = read_surface(
             head, bpy.context.evaluated_depsgraph_get(), need_uv=False, place="Head"
         )
-        found.append(grow(surface, starting.fitted(mine, factor)).points / factor)
+        found.append(grow(surface, starting.scaled_settings(mine, factor)).points / factor)
     for other in found[1:]:
         away = np.linalg.norm(other - found[0], axis=1)
         assert np.quantile(away, 0.95) < 0.01 * length
@@ -219,11 +219,13 @@ def test_all_selected_hair_is_taken_and_counted(new_hair, sphere):
 
 def test_cancelling_takes_none_of_several_hairs(new_hair, sphere, get_depsgraph):
     grooms = [new_hair(sphere) for _ in range(2)]
-    work = batched(starting.take_over(hair, get_depsgraph(), ("looks/blond",)) for hair in grooms)
+    work = batched(
+        starting.prepare_existing_hair(hair, get_depsgraph(), ("looks/blond",)) for hair in grooms
+    )
     next(work)
     work.send(None)  # the part of the second groom is running
     work.close()
-    assert all(map(starting.is_untouched, grooms))
+    assert all(map(starting.has_untouched_look, grooms))
 
 
 def test_hair_without_curves_and_surface_says_what_to_do():
@@ -354,7 +356,9 @@ def test_hair_that_nobody_dressed_has_the_look_of_its_material(new_hair, sphere,
     hair = new_hair(sphere)
     with_principled_hair(hair)
     _, done = run_parts(
-        starting.take_over(hair, get_depsgraph(), chosen_presets(preferences(bpy.context)))
+        starting.prepare_existing_hair(
+            hair, get_depsgraph(), chosen_presets(preferences(bpy.context))
+        )
     )
     assert done == ("took its look from the material 'Auburn'",)
     shading = hair.data.hairloom.shading
@@ -367,7 +371,9 @@ def test_a_look_that_was_set_stays_whatever_the_material(new_hair, sphere, get_d
     with_principled_hair(hair)
     hair.data.hairloom.shading.tip_tint = 0.5
     _, done = run_parts(
-        starting.take_over(hair, get_depsgraph(), chosen_presets(preferences(bpy.context)))
+        starting.prepare_existing_hair(
+            hair, get_depsgraph(), chosen_presets(preferences(bpy.context))
+        )
     )
     shading = hair.data.hairloom.shading
     assert done == () and shading.base_color[:] == pytest.approx(ShadingSettings().base_color)
@@ -375,7 +381,11 @@ def test_a_look_that_was_set_stays_whatever_the_material(new_hair, sphere, get_d
 
 def test_hair_with_colours_of_its_own_keeps_them_as_it_is_dressed(new_hair, sphere, get_depsgraph):
     hair = new_hair(sphere)
-    run_parts(starting.take_over(hair, get_depsgraph(), chosen_presets(preferences(bpy.context))))
+    run_parts(
+        starting.prepare_existing_hair(
+            hair, get_depsgraph(), chosen_presets(preferences(bpy.context))
+        )
+    )
     assert hair.data.hairloom.shading.color_source == "own"
     bpy.ops.hairloom.apply_preset(name="looks/blond")
     assert hair.data.hairloom.shading.color_source == "look", "a look that was chosen is seen"

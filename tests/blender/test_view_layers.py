@@ -36,16 +36,16 @@ def test_blenders_strands_go_and_come_in_every_view_layer(layers):
 
 
 def test_a_layer_that_a_window_changes_to_is_evaluated(layers):
-    timer, window = overlay._evaluate, bpy.context.window_manager.windows[0]
-    overlay.forget_layers()
-    overlay.look_at_layers()
+    timer, window = overlay._evaluate_scenes, bpy.context.window_manager.windows[0]
+    overlay.stop_watching_view_layers()
+    overlay.watch_view_layers()
     assert bpy.app.timers.is_registered(timer)
     bpy.app.timers.unregister(timer)
-    overlay.look_at_layers()
+    overlay.watch_view_layers()
     assert not bpy.app.timers.is_registered(timer), "nothing is new"
     for layer in (layers[1], layers[0]):
         window.view_layer = layer
-        overlay.look_at_layers()
+        overlay.watch_view_layers()
         assert bpy.app.timers.is_registered(timer)
         bpy.app.timers.unregister(timer)
     previews.start(bpy.data.objects["Hair"], layers[0].depsgraph)
@@ -56,8 +56,8 @@ def test_a_layer_that_a_window_changes_to_is_evaluated(layers):
     update(layers)
     assert displays(layers) == ["WIRE", "WIRE"]
     window.view_layer = layers[1]
-    overlay.look_at_layers()
-    overlay.forget_layers()
+    overlay.watch_view_layers()
+    overlay.stop_watching_view_layers()
     assert not bpy.app.timers.is_registered(timer), "a timer is left"
 
 
@@ -78,4 +78,4 @@ def test_a_local_view_in_a_workspace_that_no_window_shows_has_no_hair(
     with bpy.context.temp_override(window=window, screen=screen, area=area, region=region):
         assert bpy.ops.view3d.localview(frame_selected=False) == {"FINISHED"}
     session = previews.start(hair, get_depsgraph())
-    assert area.spaces.active.as_pointer() in overlay.drawing_of(session.uid).hidden_in
+    assert area.spaces.active.as_pointer() in overlay.drawing_of(session.uid).hiding_views

@@ -20,8 +20,8 @@ from hairloom.addon.blender.pictures.film import write_picture
 from hairloom.addon.blender.viewport import view_transform
 from hairloom.addon.blender.viewport.view_transform import (
     ColorView,
+    apply_view_transform,
     display_of,
-    shown_by_blender,
     view_of,
 )
 from hairloom.addon.errors import HairloomError
@@ -33,9 +33,9 @@ pytestmark = pytest.mark.draws(light=False)
 
 @pytest.fixture(autouse=True)
 def nothing_kept() -> Any:
-    view_transform.forget()
+    view_transform.clear_tables()
     yield
-    view_transform.forget()
+    view_transform.clear_tables()
 
 
 def shading(kind: str = "RENDERED", *, lights: bool = True, world: bool = True) -> Any:
@@ -74,9 +74,9 @@ LOOKS = {
 def test_the_table_shows_what_blender_saves(view: ColorView) -> None:
     """With a white balance, colours are off the axes along which the table is exact."""
     hair_worst = 3.0 if view.white_balance is None else 5.0
-    display = Display(DisplayTable(shown_by_blender(view, table_radiances())))
+    display = Display(DisplayTable(apply_view_transform(view, table_radiances())))
     for colours, worst in ((hair_colours(), hair_worst), (all_colours(), 6.0)):
-        error = 255.0 * np.abs(display.shown(colours) - shown_by_blender(view, colours))
+        error = 255.0 * np.abs(display.display_code(colours) - apply_view_transform(view, colours))
         assert error.mean() < 0.5
         assert np.percentile(error, 99.0) < 3.0
         assert error.max() < worst
@@ -84,10 +84,10 @@ def test_the_table_shows_what_blender_saves(view: ColorView) -> None:
 
 def test_exposure_and_gamma_need_no_other_table() -> None:
     """They act before and after the transform, as in Blender itself."""
-    table = DisplayTable(shown_by_blender(ColorView(transform="AgX"), table_radiances()))
+    table = DisplayTable(apply_view_transform(ColorView(transform="AgX"), table_radiances()))
     scene, colours = bpy.context.scene, hair_colours(500)
     scene.view_settings.exposure, scene.view_settings.gamma = 1.5, 1.3
-    shown = Display(table, 2.0**1.5, 1.3).shown(colours)
+    shown = Display(table, 2.0**1.5, 1.3).display_code(colours)
     error = 255.0 * np.abs(shown - saved_by_scene(colours))
     assert error.mean() < 0.5 and error.max() < 3.0
 
@@ -103,7 +103,7 @@ def test_rgb_curves_are_applied() -> None:
     settings.curve_mapping.update()
     view, gain, _ = view_of(shading(), scene)
     assert (view.exposure, gain) == (0.5, 1.0)
-    error = 255.0 * np.abs(shown_by_blender(view, colours) - saved_by_scene(colours))
+    error = 255.0 * np.abs(apply_view_transform(view, colours) - saved_by_scene(colours))
     assert error.max() < 0.1
 
 
@@ -146,11 +146,11 @@ def test_each_mode_has_what_blender_applies_in_it() -> None:
 def test_plain_standard_needs_no_table_and_others_are_made_once() -> None:
     scene = bpy.context.scene
     assert display_of(shading("SOLID"), scene) is None
-    assert not bpy.app.timers.is_registered(view_transform._make_wanted)
+    assert not bpy.app.timers.is_registered(view_transform._make_requested)
     scene.view_settings.view_transform = "AgX"
     assert display_of(shading(), scene) is None, "it is made while drawing"
-    assert bpy.app.timers.is_registered(view_transform._make_wanted)
-    view_transform._make_wanted()
+    assert bpy.app.timers.is_registered(view_transform._make_requested)
+    view_transform._make_requested()
     first = display_of(shading(), scene)
     assert first is not None
     scene.view_settings.exposure = 1.0
@@ -159,7 +159,7 @@ def test_plain_standard_needs_no_table_and_others_are_made_once() -> None:
     scene.view_settings.look = "AgX - Punchy"
     third = display_of(shading(), scene)
     assert third is not None and third.table is first.table, "until its own is there"
-    view_transform._make_wanted()
+    view_transform._make_requested()
     fourth = display_of(shading(), scene)
     assert fourth is not None and fourth.table is not first.table
 
@@ -171,7 +171,7 @@ def test_nothing_is_left_in_the_file_and_it_is_as_saved_as_before() -> None:
 
     before, settings = state(), bpy.context.scene.view_settings
     kept = settings.view_transform, settings.exposure
-    shown_by_blender(ColorView(transform="Filmic", exposure=1.0), hair_colours(10))
+    apply_view_transform(ColorView(transform="Filmic", exposure=1.0), hair_colours(10))
     assert state() == before
     assert (settings.view_transform, settings.exposure) == kept
 
@@ -182,14 +182,14 @@ def test_an_unreadable_view_transform_is_reported_and_not_retried(
     def refuse(*_: Any) -> Any:
         raise OSError("no space left")
 
-    monkeypatch.setattr(view_transform, "shown_by_blender", refuse)
+    monkeypatch.setattr(view_transform, "apply_view_transform", refuse)
     scene = bpy.context.scene
     scene.view_settings.view_transform = "AgX"
     assert display_of(shading(), scene) is None
-    view_transform._make_wanted()
+    view_transform._make_requested()
     assert "no space left" in view_transform.problem()
     assert display_of(shading(), scene) is None
-    assert not view_transform._known.wanted
+    assert not view_transform._tables.requested
     view_transform.prepare()
     assert view_transform.problem() == ""
 
@@ -200,7 +200,7 @@ def test_a_full_disk_is_an_error_and_not_wrong_colours(most_bytes: int, tmp_path
     collection would then crash Blender."""
     held = []
     with full_disk(most_bytes), pytest.raises((OSError, RuntimeError)) as raised:
-        shown_by_blender(LOOKS["AgX"], hair_colours())
+        apply_view_transform(LOOKS["AgX"], hair_colours())
     held.append(raised.value)
     frame = raised.value.__traceback__
     while frame is not None:
@@ -216,4 +216,4 @@ def test_a_full_disk_is_an_error_and_not_wrong_colours(most_bytes: int, tmp_path
 
 def test_a_look_that_this_blender_lacks_is_named(tmp_path: Path) -> None:
     with pytest.raises(TypeError, match="Nowhere"):
-        shown_by_blender(ColorView(transform="Nowhere"), hair_colours(4))
+        apply_view_transform(ColorView(transform="Nowhere"), hair_colours(4))

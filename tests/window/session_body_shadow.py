@@ -62,7 +62,7 @@ def set_the_scene():
 
 def has_drawn():
     overlay = hairloom_module("overlay")
-    return any(overlay.statistics_of(uid).strands > 0 for uid in overlay.drawn())
+    return any(overlay.statistics_of(uid).strands > 0 for uid in overlay.drawn_uids())
 
 
 def hair_shades_the_head():

@@ -172,14 +172,14 @@ def it_begins_anew_at_a_change():
 def hair_plays_in_it():
     yield from click(*sidebar_button("hairloom.preview"))
     overlay = hairloom_module("overlay")
-    yield from wait_until(lambda: bool(overlay.drawn()), "the preview does not start")
+    yield from wait_until(lambda: bool(overlay.drawn_uids()), "the preview does not start")
     yield from settled()
     at_rest = pixels("previewed")
     yield from click(*sidebar_button("hairloom.play"))
     yield from wait_until(
         lambda: np.abs(pixels("played") - at_rest).max() > 0.1, "the hair does not move"
     )
-    drawn = [overlay.statistics_of(uid).strands for uid in overlay.drawn()]
+    drawn = [overlay.statistics_of(uid).strands for uid in overlay.drawn_uids()]
     assert drawn == [0], "the overlay draws the hair a second time"
     yield from click(*sidebar_button("hairloom.pause"))
     yield from wait_until(is_finished, "paused hair does not come to rest")

@@ -126,7 +126,7 @@ def played_in_both(head):
 
 def lag(session):
     """Largest distance of tips from their places in the carried style [m]."""
-    style = hairloom_module("motion_flow").carried(session.rig, session.solver.pose)
+    style = hairloom_module("motion_flow").carried_strands(session.rig, session.solver.pose)
     tips = session.rig.strands.offsets[1:] - 1
     return float(np.abs(session.strands[tips] - style[tips]).max())
 

@@ -103,7 +103,7 @@ def saved():
     view, gain, gamma = transform.view_of(shading(), bpy.context.scene)
     nodes = [material.node_tree.nodes["Emission"] for material in bpy.data.materials]
     radiances = np.float32([node.inputs["Color"].default_value[:3] for node in nodes])
-    return 255.0 * transform.shown_by_blender(view, gain * radiances) ** (1.0 / gamma)
+    return 255.0 * transform.apply_view_transform(view, gain * radiances) ** (1.0 / gamma)
 
 
 def steps():
@@ -191,8 +191,10 @@ def radiance_by_view_transforms():
 def every_mode_has_its_transform():
     """The light on hair is fixed here, so that modes with other lights are comparable."""
     overlay, view, scene = hairloom_module("overlay"), shading(), bpy.context.scene
-    lit, settings, (world, color, _) = overlay.lit, scene.view_settings, LIT[0]
-    overlay.lit = lambda snapshot, *_: replace(snapshot, lights=(), ambient=(world,) * 3)
+    lit, settings, (world, color, _) = overlay.with_view_lights, scene.view_settings, LIT[0]
+    overlay.with_view_lights = lambda snapshot, *_: replace(
+        snapshot, lights=(), ambient=(world,) * 3
+    )
     shine(world, color, color)
     for each in (view, scene.display.shading):
         each.light, each.color_type = "FLAT", "SINGLE"
@@ -213,7 +215,7 @@ def every_mode_has_its_transform():
     scene.render.engine = engine
     view.use_scene_lights_render = view.use_scene_world_render = True
     settings.look, settings.exposure, settings.gamma = "None", 0.0, 1.0
-    overlay.lit = lit
+    overlay.with_view_lights = lit
 
 
 def a_scene_without_light():

@@ -52,7 +52,7 @@ def set_the_scene():
 
 def has_drawn():
     overlay = hairloom_module("overlay")
-    return any(overlay.statistics_of(uid).strands > 0 for uid in overlay.drawn())
+    return any(overlay.statistics_of(uid).strands > 0 for uid in overlay.drawn_uids())
 
 
 def shadows_appear():

@@ -94,7 +94,9 @@ def hard_is_what_it_was():
 
 def shadows_become_soft(hard):
     picture().viewport_samples = SAMPLES
-    yield from wait_until(lambda: all(each.has_all for each in views()), "shadows stay hard")
+    yield from wait_until(
+        lambda: all(each.has_all_samples for each in views()), "shadows stay hard"
+    )
     soft = yield from still_pixels("soft")
     assert counted["samples"] >= SAMPLES
     assert changed_fraction(hard, soft, 0.05) > 0.003, changed_fraction(hard, soft, 0.05)
@@ -111,7 +113,7 @@ def nothing_more_is_drawn(soft):
     again = yield from still_pixels("soft-again")
     assert changed_fraction(soft, again, 0.0) == 0.0
     # on a slow machine each of these redraws is its own series
-    assert all(each.is_soft and each.has_all for each in views())
+    assert all(each.is_soft and each.has_all_samples for each in views())
     shown = counted["samples"]
     for _ in range(60):
         yield 1
@@ -146,7 +148,7 @@ def what_changes_is_hard_at_once(soft):
             )
             assert not any(each.is_soft for each in views()), f"{name}: soft shadows that were"
             yield from wait_until(
-                lambda: all(each.has_all for each in views()), f"{name}: stays hard"
+                lambda: all(each.has_all_samples for each in views()), f"{name}: stays hard"
             )
             found = yield from still_pixels(name)
         assert changed_fraction(soft, found, 0.02) < SAME, (
@@ -162,12 +164,12 @@ def one_sample_tells_whether_all_is_right(soft):
     drawn = counted["drawn"]
     for fragments, least in ((None, 1), ((1 << 30,), SAMPLES)):
         for view in views():
-            view.is_again, view.fragments = True, fragments or view.fragments
+            view.needs_redraw, view.fragment_counts = True, fragments or view.fragment_counts
         before = counted["samples"]
-        hairloom_module("views")._draw_afresh()
+        hairloom_module("views")._redraw_strands()
         yield from wait_until(
             lambda before=before: (
-                counted["samples"] > before and not any(each.wants_more for each in views())
+                counted["samples"] > before and not any(each.wants_samples for each in views())
             ),
             "no sample is taken",
         )
@@ -179,7 +181,7 @@ def one_sample_tells_whether_all_is_right(soft):
 
 
 def without_samples_all_is_let_go_of(hard):
-    assert hairloom_module("softening").sums().count == 0
+    assert hairloom_module("softening").sample_picture().count == 0
     soft_held = held()
     picture().viewport_samples = 1
     found = yield from still_pixels("hard-again")

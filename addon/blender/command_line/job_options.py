@@ -18,7 +18,7 @@ from ..base.report import STYLES
 from ..properties.presets import named_preset, shipped
 from ..scene.bust_skin import TONES
 from ..scene.principled import look_from_named
-from ..setup.hairstyles import shipped as hairstyles
+from ..setup.hairstyles import shipped_hairstyles as hairstyles
 from .object_settings import find_hair, settings_of_object
 from .overrides import overrides
 

@@ -110,7 +110,7 @@ class EngineView:
     @property
     def is_waiting(self) -> bool:
         """Whether hair is being built that the picture does not show yet."""
-        return bool(self._reader.pending or overlay.expected())
+        return bool(self._reader.pending or overlay.pending_uids())
 
     @property
     def _has_arrived(self) -> bool:
@@ -161,7 +161,7 @@ class EngineView:
         scene = replace(self._scene, grooms=grooms, mesh_shadows=shadows)
         used = uses_scene_light(space.shading)
         if not all(used):
-            scene = overlay.lit(scene, space.shading, three_point_lights(camera.view))
+            scene = overlay.with_view_lights(scene, space.shading, three_point_lights(camera.view))
         marks = (
             *(self._scene, shadows),
             *(drawing.snapshot for _, drawing in overlay.shown_in(context)),
@@ -178,7 +178,7 @@ class EngineView:
 
 def _previewed() -> tuple[frozenset[int], ...]:
     """Session numbers of grooms that are previewed, and of those that are about to be."""
-    return overlay.drawn(), overlay.expected()
+    return overlay.drawn_uids(), overlay.pending_uids()
 
 
 def _serial(snapshot: Snapshot) -> int:

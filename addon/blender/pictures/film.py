@@ -11,7 +11,7 @@ from ...arrays import Floats
 from ...errors import HairloomError
 from ...shading.stage_settings import StageSettings
 from ..base.images import save_coded_png, straight_alpha
-from ..viewport.view_transform import ColorView, shown_by_blender
+from ..viewport.view_transform import ColorView, apply_view_transform
 
 #: choice of `StageSettings.view` -> Blender's names of view transform and look
 _TRANSFORMS = {
@@ -41,7 +41,7 @@ def _developed(colors: Floats, stage: StageSettings) -> Floats:
     transform, look = _TRANSFORMS[stage.view]
     view = ColorView(transform=transform, look=look, exposure=stage.exposure)
     try:
-        return shown_by_blender(view, colors)
+        return apply_view_transform(view, colors)
     except TypeError as error:  # this Blender has another OpenColorIO configuration
         raise HairloomError(
             f"this Blender has no view transform '{transform}' with the look '{look}'",

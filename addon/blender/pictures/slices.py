@@ -12,7 +12,7 @@ from ...render.snapshot import Snapshot
 from ...render.strand_pass import StrandPass
 from ...shading.lights import three_point_lights
 from ...shading.volume.opacity import layer_ends
-from ..viewport.overlay import lit
+from ..viewport.overlay import with_view_lights
 
 #: name of the image that shows them, reused each time
 IMAGE = "Hair Slices"
@@ -49,7 +49,7 @@ def lit_as_in(context: bpy.types.Context, snapshot: Snapshot) -> Snapshot:
     if not isinstance(space, bpy.types.SpaceView3D):
         return snapshot
     studio = three_point_lights(np.array(context.region_data.view_matrix))
-    return lit(snapshot, space.shading, studio)
+    return with_view_lights(snapshot, space.shading, studio)
 
 
 def shown_image(name: str, picture: Floats) -> bpy.types.Image:

@@ -61,14 +61,14 @@ def on_undo_post(*_: Any) -> None:
 
 @persistent
 def on_depsgraph_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    views.scene_changed()
+    views.invalidate_pictures()
     previews.built_cards.forget_gone()
     _react(scene_events.updated, depsgraph)
 
 
 @persistent
 def on_frame_change(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    views.scene_changed()
+    views.invalidate_pictures()
     _react(scene_events.frame_changed, depsgraph)
 
 

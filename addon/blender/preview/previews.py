@@ -34,7 +34,7 @@ from ..scene.fin_modifier import clear, is_shown
 from ..sessions.coupled_frame import CoupledFrame
 from ..sessions.session import Session
 from ..viewport import overlay
-from ..viewport.debug_lines import is_combed
+from ..viewport.debug_lines import is_in_sculpt_mode
 from .phases import Event, Phase
 from .preview import KnownBake, Preview, rig_for
 
@@ -168,7 +168,7 @@ def _forget(uid: int) -> None:
     unwatch((uid, "lines"))
     if preview is not None:
         preview.session.forget()
-    overlay.drop(uid)
+    overlay.stop_drawing(uid)
     free_soon()
 
 
@@ -413,7 +413,7 @@ def publish(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
     refresh_panels()
     # our strands replace Blender's once they are made, in object mode and under a combing brush;
     # an overlay that has failed shows nothing
-    is_replaced = (hair.mode == "OBJECT" or is_combed(hair)) and not overlay.failure()
+    is_replaced = (hair.mode == "OBJECT" or is_in_sculpt_mode(hair)) and not overlay.failure()
     hides = is_replaced and hair.hairloom.hide_original and session.is_made
     # without a head our shadow has nothing to fall on; there are casters only if shadows are on
     has_own_shadow = session.settings[VolumeSettings].on_body and bool(session.snapshot.casters)

@@ -236,7 +236,7 @@ def _read(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
 def clear() -> None:
     """Leave nothing behind: no preview, no timer, no notice."""
     registry.end()
-    view_transform.forget()
+    view_transform.clear_tables()
     latest_job.unwatch_all()
     for timer in (_read_again, _refine, follow_undo):
         if bpy.app.timers.is_registered(timer):

@@ -51,7 +51,7 @@ def no_light_warnings(lights: Sequence[Light], ambient: Color) -> tuple[str, ...
     """A warning if a view uses the scene's lights but there are none.
 
     Such a view lights hair by the world alone, or, if that is black, by studio lights; see
-    `overlay.lit`.
+    `overlay.with_view_lights`.
     """
     if lights or not scene_lights_are_shown():
         return ()

@@ -45,14 +45,14 @@ VERSION = 2
 SIZES = ((960, 540), (1920, 1080), (3840, 2160))
 STRANDS, POINTS = 11_400, 16
 #: most rounds, and the time [s] after which no further round begins
-_ROUNDS, _SECONDS = 9, 3.0
+_MAX_ROUNDS, _MAX_SECONDS = 9, 3.0
 #: time [s] that a GPU works before it is timed
-_WAKING = 0.5
+_WARM_UP_SECONDS = 0.5
 _DIRECTION, _FIELD_OF_VIEW = (0.0, -1.0, 0.2), 0.5
 _GRAVITY, _FRAME = np.array([0.0, 0.0, -9.81]), 1.0 / 60.0
 
 
-def measured(
+def run_benchmark(
     sizes: tuple[tuple[int, int], ...] = SIZES, strand_count: int = STRANDS
 ) -> dict[str, Any]:
     """All figures, as written to the JSON; takes seconds on a GPU, and minutes in software.
@@ -95,7 +95,7 @@ class _Bench:
     strands: StrandPass
     target: Target
     plain: Snapshot
-    moments: int = 0
+    frame_number: int = 0
 
     def __post_init__(self) -> None:
         points = self.rig.strands.points
@@ -105,9 +105,9 @@ class _Bench:
 
     def simulate(self) -> None:
         """Simulate a frame, with the strands that ride on the guides."""
-        self.moments += 1
+        self.frame_number += 1
         moved = np.eye(4)
-        moved[0, 3] = 0.02 * np.sin(0.3 * self.moments)
+        moved[0, 3] = 0.02 * np.sin(0.3 * self.frame_number)
         frame = FrameInput(Pose(None, moved), (), DynamicsSettings(), _GRAVITY, _FRAME)
         run_alone(self.solver.steps(frame))
         self.shown()
@@ -124,7 +124,7 @@ class _Bench:
     def frame(self, width: int, height: int) -> dict[str, float]:
         """Times of one size: drawing alone, with hair at rest; and a playing frame in full."""
         camera = self.camera(width / height)
-        asked: list[float] = []
+        main_thread_times: list[float] = []
 
         def draw(*, is_moving: bool) -> None:
             self.target.sized(width, height).clear((0.0, 0.0, 0.0, 0.0))
@@ -136,7 +136,7 @@ class _Bench:
             start = time.thread_time()
             self.simulate()
             draw(is_moving=True)
-            asked.append(1000.0 * (time.thread_time() - start))
+            main_thread_times.append(1000.0 * (time.thread_time() - start))
 
         at_rest = self.time(lambda: draw(is_moving=False))
         return {
@@ -144,14 +144,16 @@ class _Bench:
             "height": height,
             "at_rest_ms": at_rest,
             "frame_ms": self.time(play),
-            "main_thread_ms": round(statistics.median(asked), 3),
+            "main_thread_ms": round(statistics.median(main_thread_times), 3),
         }
 
     def time(self, work: Callable[[], None], before: Callable[[], None] | None = None) -> float:
         """Median milliseconds until the GPU has finished `work`; `before` is not timed."""
         times: list[float] = []
         is_awake, begin = False, time.perf_counter()
-        while not times or (len(times) < _ROUNDS and time.perf_counter() - begin < _SECONDS):
+        while not times or (
+            len(times) < _MAX_ROUNDS and time.perf_counter() - begin < _MAX_SECONDS
+        ):
             if before is not None:
                 before()
             _finish()
@@ -160,7 +162,7 @@ class _Bench:
             _finish()
             if is_awake:
                 times.append(1000.0 * (time.perf_counter() - start))
-            is_awake = is_awake or is_software() or time.perf_counter() - begin > _WAKING
+            is_awake = is_awake or is_software() or time.perf_counter() - begin > _WARM_UP_SECONDS
         return round(statistics.median(times), 3)
 
 

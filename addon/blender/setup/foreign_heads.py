@@ -39,24 +39,24 @@ _DEFORMING = {
     "SURFACE_DEFORM", "WARP", "WAVE",
 }  # fmt: skip
 #: fraction of the built-in head's edges that a mesh must have to be MakeHuman's
-_SAME_EDGES = 0.9
+_MIN_SAME_EDGES = 0.9
 #: a mesh with fewer vertices is not a head
 _MIN_VERTICES = 150
 #: height [m] on the built-in head that separates head vertices from neck and shoulders
 _CHIN = -0.115
 #: distance from the mesh [m on the built-in head] beyond which a root is missing; fraction of
 #: missing roots beyond which there is an error
-_MISSING, _MAX_MISSING = 0.012, 0.25
+_MISSING_DISTANCE, _MAX_MISSING_FRACTION = 0.012, 0.25
 #: mean distance of the skin from the mesh [m on the built-in head] beyond which there is a warning
-_LOOSE = 0.002
+_LOOSE_DISTANCE = 0.002
 #: distance beyond which a root is loose, likewise; fraction of loose roots for a warning
-_LOOSE_ROOT, _MAX_LOOSE = 0.004, 0.05
+_LOOSE_ROOT_DISTANCE, _MAX_LOOSE_FRACTION = 0.004, 0.05
 #: vertices farther than this from the fitted skin [m on the built-in head] get no weight in groups
 _GROUP_REACH = 0.02
 #: custom property of landmarks: the location at which each was guessed
-_GUESSED = "hairloom_guessed"
+_GUESSED_PROPERTY = "hairloom_guessed"
 #: display size [m] of landmarks that span 0.3 m; scales with their extent
-_SHOWN = 0.006
+_DISPLAY_SIZE = 0.006
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,8 +92,10 @@ class ForeignHead:
         outside = OuterSkinSearch(self.surface, self.skin, self.scale)
         made, roots = guides.on(self.built_in), guides.on(self.skin).roots
         fitted = fit_hair(made, roots, self.warp, outside, self.scale)
-        missing, loose = (fitted.away > limit * self.scale for limit in (_MISSING, _LOOSE_ROOT))
-        if missing.mean() > _MAX_MISSING:
+        missing, loose = (
+            fitted.away > limit * self.scale for limit in (_MISSING_DISTANCE, _LOOSE_ROOT_DISTANCE)
+        )
+        if missing.mean() > _MAX_MISSING_FRACTION:
             raise HairloomError(
                 f"it has no faces where {100.0 * missing.mean():.0f} % of this hair grows",
                 place=self.name,
@@ -101,16 +103,16 @@ class ForeignHead:
                 "add the hairstyle again",
             )
         warnings = []
-        if self.away > _LOOSE:
+        if self.away > _LOOSE_DISTANCE:
             warnings.append(
                 f"{self.name}: it is unlike the built-in head. Drag its landmarks to their places, "
                 "and press Fit Again"
             )
-        elif loose.mean() > _MAX_LOOSE:
+        elif loose.mean() > _MAX_LOOSE_FRACTION:
             warnings.append(
                 f"{self.name}: {100.0 * loose.mean():.0f} % of the roots had to move by more than "
-                f"{1000.0 * _LOOSE_ROOT * self.scale:.0f} mm to be on it. Close its holes, or drag "
-                "its landmarks to their places and press Fit Again"
+                f"{1000.0 * _LOOSE_ROOT_DISTANCE * self.scale:.0f} mm to be on it. Close its "
+                "holes, or drag its landmarks to their places and press Fit Again"
             )
         return fitted.strands.take(np.flatnonzero(~missing)), warnings
 
@@ -121,10 +123,10 @@ class ForeignHead:
 
 
 @dataclass(frozen=True, eq=False)
-class ReadHead:
+class HeadToFit:
     """What is read of a mesh on which hair of the built-in head is to grow.
 
-    own: positions of its vertices, see `own_positions`, if it is MakeHuman's; else None.
+    makehuman_positions: of its vertices, see `original_positions`, if it is MakeHuman's; else None.
     landmarks: those that it has. guessed: the names of those that have not been moved since.
     upright: (4, 4), from the mesh's present place to that when they were guessed.
     """
@@ -132,7 +134,7 @@ class ReadHead:
     name: str
     surface: Surface
     built_in: Surface
-    own: Floats | None
+    makehuman_positions: Floats | None
     landmarks: Mapping[str, Floats]
     guessed: frozenset[str] = frozenset()
     upright: Floats = field(default_factory=lambda: np.eye(4))
@@ -148,16 +150,16 @@ class ReadHead:
         dragged = {name: at for name, at in self.landmarks.items() if name not in self.guessed}
         if len(dragged) == len(LANDMARKS):
             return dragged
-        stood = replace(
+        upright_surface = replace(
             self.surface, positions=transform_points(self.surface.positions, self.upright)
         )
-        guess, is_sure = guess_landmarks(fit_model(), stood)
+        guess, is_sure = guess_landmarks(fit_model(), upright_surface)
         back = transform_points(np.array(list(guess.values())), np.linalg.inv(self.upright))
         places = dict(zip(guess, back.astype(np.float64), strict=True))
         return {**places, **(dragged if is_sure else self.landmarks)}
 
 
-def read_foreign_head(head: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> ReadHead:
+def read_foreign_head(head: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> HeadToFit:
     """Read a mesh to fit the built-in head to; the scene is not changed.
 
     Raises:
@@ -166,7 +168,7 @@ def read_foreign_head(head: bpy.types.Object, depsgraph: bpy.types.Depsgraph) ->
     surface = read_surface(head, depsgraph, need_uv=False, place=head.name)
     built_in = built_in_head().surface
     if has_makehuman_topology(head.data):
-        return ReadHead(head.name, surface, built_in, own_positions(head, depsgraph), {})
+        return HeadToFit(head.name, surface, built_in, original_positions(head, depsgraph), {})
     if not may_be_head(head):
         raise HairloomError(
             f"a mesh of {len(head.data.vertices)} vertices is not a head",
@@ -180,17 +182,17 @@ def read_foreign_head(head: bpy.types.Object, depsgraph: bpy.types.Depsgraph) ->
         was = np.linalg.inv(np.array(there[guessed[0]].matrix_parent_inverse, np.float64))
         upright = was @ np.linalg.pinv(matrix_of(head, depsgraph))
     landmarks = placed_landmarks(head, depsgraph)
-    return ReadHead(head.name, surface, built_in, None, landmarks, frozenset(guessed), upright)
+    return HeadToFit(head.name, surface, built_in, None, landmarks, frozenset(guessed), upright)
 
 
-def fitted_to(read: ReadHead) -> ForeignHead:
+def fit_built_in_head(read: HeadToFit) -> ForeignHead:
     """The built-in head fitted to a mesh, from arrays alone.
 
     Raises:
         HairloomError: the mesh is too unlike a head, or its landmarks are wrong.
     """
-    if read.own is not None:
-        warp, positions = _by_topology(read.own)
+    if read.makehuman_positions is not None:
+        warp, positions = _by_topology(read.makehuman_positions)
         skin = _skin(positions)
         return ForeignHead(read.name, read.surface, read.built_in, skin, warp, {}, 0.0)
     fit = fit_head(fit_model(), read.surface, read.points(), read.name)
@@ -229,7 +231,7 @@ def has_makehuman_topology(mesh: bpy.types.Mesh) -> bool:
     own = _makehuman_edges()
     if len(mesh.vertices) <= own.max():
         return False
-    return bool(np.isin(_keys(own), _keys(edge_vertices(mesh))).mean() > _SAME_EDGES)
+    return bool(np.isin(_keys(own), _keys(edge_vertices(mesh))).mean() > _MIN_SAME_EDGES)
 
 
 @cache
@@ -261,7 +263,7 @@ def _by_topology(positions: Floats) -> tuple[Warp, Floats]:
     return warp, places
 
 
-def own_positions(head: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
+def original_positions(head: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
     """The vertices of a mesh, posed and shaped, but before modifiers that change their number:
     (vertex_count, 3) world space."""
     positions = read_positions(head, depsgraph, place=head.name)
@@ -331,8 +333,8 @@ def put_landmarks(
         empty.empty_display_type, empty.show_in_front = "SPHERE", True
         empty.parent = head
         empty.matrix_parent_inverse = head.matrix_world.inverted_safe()
-        _put_guess(empty, Vector(place))
-        empty.empty_display_size = _SHOWN * extent / 0.3
+        _place_as_guessed(empty, Vector(place))
+        empty.empty_display_size = _DISPLAY_SIZE * extent / 0.3
         link_into(empty, [collection], bpy.context.scene)
         made.append(empty)
     return made
@@ -343,16 +345,16 @@ def move_landmarks(head: bpy.types.Object, places: Mapping[str, Floats]) -> None
     for name, empty in landmarks_of(head).items():
         if name in places and _is_as_guessed(empty):
             to_world = head.matrix_world @ empty.matrix_parent_inverse
-            _put_guess(empty, to_world.inverted_safe() @ Vector(places[name]))
+            _place_as_guessed(empty, to_world.inverted_safe() @ Vector(places[name]))
 
 
-def _put_guess(empty: bpy.types.Object, location: Vector) -> None:
+def _place_as_guessed(empty: bpy.types.Object, location: Vector) -> None:
     empty.location = location
-    empty[_GUESSED] = empty.location[:]
+    empty[_GUESSED_PROPERTY] = empty.location[:]
 
 
 def _is_as_guessed(empty: bpy.types.Object) -> bool:
     """Whether a landmark is still where it was guessed, relative to its head."""
-    guessed = empty.get(_GUESSED)
+    guessed = empty.get(_GUESSED_PROPERTY)
     is_of_object = empty.parent_type == "OBJECT"
     return guessed is not None and is_of_object and tuple(guessed) == empty.location[:]

@@ -41,24 +41,24 @@ from ..scene.hair_nodes import add_hair_nodes
 from ..scene.surfaces import read_surface
 from ..strands.growing import replace_curves
 from .foreign_heads import (
-    fitted_to,
+    fit_built_in_head,
     move_landmarks,
-    own_positions,
+    original_positions,
     put_landmarks,
     read_foreign_head,
 )
-from .starting import REAL, fit_motion, fitted, fitting_factor
+from .starting import REAL_SIZE_FACTOR, fit_motion, fitting_factor, scaled_settings
 
 HAIRSTYLE_FOLDER = Path(__file__).resolve().parents[3] / "hairstyles"
 _HEAD = "Head"
 #: fraction of guides left out beyond which there is a warning
-_NOTED_LOSS = 0.02
+_NOTED_LOST_FRACTION = 0.02
 #: depth to which modifiers may bring hair into a head [m on the built-in head]
-_DEEP = 0.0008
+_MAX_DEPTH = 0.0008
 
 
 @dataclass(frozen=True)
-class Entry:
+class HairstyleEntry:
     """One hairstyle in a menu. name: the name that `named_hairstyle` takes."""
 
     name: str
@@ -72,12 +72,12 @@ class Entry:
 
 
 @cache
-def shipped() -> tuple[Entry, ...]:
+def shipped_hairstyles() -> tuple[HairstyleEntry, ...]:
     """The hairstyles that come with Hairloom, in their order."""
     found = []
     for path in HAIRSTYLE_FOLDER.glob("*.json"):
         order, title = read_title(path)
-        found.append((order, Entry(path.stem, title, path)))
+        found.append((order, HairstyleEntry(path.stem, title, path)))
     return tuple(entry for _, entry in sorted(found, key=lambda one: (one[0], one[1].name)))
 
 
@@ -93,7 +93,7 @@ def named_hairstyle(name: str) -> Hairstyle:
     Raises:
         HairloomError: there is no such hairstyle, or it is damaged.
     """
-    by_name = {entry.name: entry.path for entry in shipped()}
+    by_name = {entry.name: entry.path for entry in shipped_hairstyles()}
     path = by_name.get(name) or Path(name)
     if not path.is_file():
         known = ", ".join(by_name)
@@ -178,7 +178,7 @@ def add_hairstyle(
     """
     masks = {**style.masks, **({"children": hairline} if hairline and style.masks else {})}
     _check_masks(style, head, depsgraph, masks.values(), needed=hairline)
-    growth = yield from _growth(style, head, depsgraph, masks)
+    growth = yield from _growth_steps(style, head, depsgraph, masks)
     if growth.groups:
         check_shape_editable(head)
     with new_blocks_removed_on_error() as note:
@@ -197,17 +197,17 @@ def add_hairstyle(
                 apply(settings, hair)
         _put_settings(style, hair)
         fit_motion(hair, growth.factor)
-        warnings = (*growth.warnings, *_leave_out_inside(hair, growth))
+        warnings = (*growth.warnings, *_remove_curves_inside(hair, growth))
     hair.hairloom.children_density = masks.get("children", "")
     hair.hairloom.hairstyle = style.name
     put_look_material(
         hair.data, wet_and_dusty_look(settings_of(hair.data.hairloom.shading, ShadingSettings))
     )
-    done = _put(growth, head, collection)
+    done = _add_groups_and_landmarks(growth, head, collection)
     return AddedHair(hair, done, warnings)
 
 
-def _put(
+def _add_groups_and_landmarks(
     growth: _Growth, head: bpy.types.Object, collection: bpy.types.Collection
 ) -> tuple[str, ...]:
     """Give a head the vertex groups and landmarks that it lacks; returns what was done."""
@@ -236,18 +236,18 @@ def fit_again(
     """
     grown = []
     for hair in grooms:
-        grown.append((yield from _grown_again(hair, depsgraph)))
+        grown.append((yield from _growth_again_steps(hair, depsgraph)))
     warnings: list[str] = []
     for hair, growth in zip(grooms, grown, strict=True):
         replace_curves(hair, growth.strands, depsgraph)
-        warnings += (*growth.warnings, *_leave_out_inside(hair, growth))
+        warnings += (*growth.warnings, *_remove_curves_inside(hair, growth))
         head = head_of(hair)
         assert head is not None, "it has grown on it"
         move_landmarks(head, growth.landmarks)
     return tuple(warnings)
 
 
-def _grown_again(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Parts[_Growth]:
+def _growth_again_steps(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Parts[_Growth]:
     check_curves_editable(hair, depsgraph)
     head = head_of(hair)
     if not hair.hairloom.hairstyle or head is None:
@@ -260,7 +260,7 @@ def _grown_again(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Part
     mask = hair.hairloom.children_density
     masks = {**style.masks, **({"children": mask} if mask else {})}
     _check_masks(style, head, depsgraph, masks.values(), needed="")
-    return (yield from _growth(style, head, depsgraph, masks))
+    return (yield from _growth_steps(style, head, depsgraph, masks))
 
 
 def _check_masks(
@@ -288,7 +288,7 @@ def _check_masks(
             )
 
 
-def _growth(
+def _growth_steps(
     style: Hairstyle,
     head: bpy.types.Object,
     depsgraph: bpy.types.Depsgraph,
@@ -314,9 +314,11 @@ def _fur(
     style: Hairstyle, head: bpy.types.Object, depsgraph: bpy.types.Depsgraph
 ) -> Callable[[], _Growth]:
     factor = fitting_factor(head, depsgraph)
-    settings = fitted(GrowSettings.from_dict(style.settings[GROW_SECTION], style.title), factor)
+    settings = scaled_settings(
+        GrowSettings.from_dict(style.settings[GROW_SECTION], style.title), factor
+    )
     surface = read_surface(head, depsgraph, need_uv=False, place=head.name)
-    return lambda: _Growth(_outside(grow(surface, settings), solid_of(surface)), factor, factor)
+    return lambda: _Growth(_led_out(grow(surface, settings), solid_of(surface)), factor, factor)
 
 
 def _on_bust(
@@ -332,7 +334,7 @@ def _on_bust(
     def work() -> _Growth:
         strands = guides.on(surface, size)
         if weights is not None:
-            strands = _within(strands, weights, surface, name, mask)
+            strands = _with_weighted_roots(strands, weights, surface, name, mask)
         return _Growth(strands, size, 1.0)
 
     return work
@@ -348,33 +350,33 @@ def _on_foreign(
     read, name = read_foreign_head(head, depsgraph), head.name
     mask = masks.get("children", "")
     weights = read_weights(head, depsgraph, mask) if mask in weight_names(head) else None
-    positions = own_positions(head, depsgraph) if mask and weights is None else None
+    positions = original_positions(head, depsgraph) if mask and weights is None else None
 
     def work() -> _Growth:
-        foreign = fitted_to(read)
+        foreign = fit_built_in_head(read)
         strands, warnings = foreign.hair(guides)
         groups = {}
         if weights is not None:
-            strands = _within(strands, weights, foreign.surface, name, mask)
+            strands = _with_weighted_roots(strands, weights, foreign.surface, name, mask)
         if positions is not None:
             groups[mask] = foreign.weights(mask, positions)
         solid = solid_of(foreign.surface)
-        strands = _outside(strands, solid)
+        strands = _led_out(strands, solid)
         lost = len(guides.group) - strands.strand_count
-        if lost > _NOTED_LOSS * len(guides.group):
+        if lost > _NOTED_LOST_FRACTION * len(guides.group):
             warnings.append(
                 f"{name}: {lost:,} of {len(guides.group):,} guides were left out, since they have "
                 "no place on the mesh or its vertex group"
             )
         size = foreign.scale
-        factor = size if not 1.0 / REAL <= size <= REAL else 1.0
+        factor = size if not 1.0 / REAL_SIZE_FACTOR <= size <= REAL_SIZE_FACTOR else 1.0
         landmarks = foreign.landmarks
         return _Growth(strands, size, factor, tuple(warnings), groups, landmarks, solid)
 
     return work
 
 
-def _within(
+def _with_weighted_roots(
     strands: StrandSet, weights: Floats, surface: Surface, place: str, mask: str
 ) -> StrandSet:
     """The strands whose roots have a weight above 0.
@@ -395,7 +397,7 @@ def _within(
     return strands.take(kept)
 
 
-def _leave_out_inside(hair: bpy.types.Object, growth: _Growth) -> tuple[str, ...]:
+def _remove_curves_inside(hair: bpy.types.Object, growth: _Growth) -> tuple[str, ...]:
     """Remove curves that modifiers, such as curls, bring into the head; returns warnings."""
     if growth.solid is None or not hair.modifiers:
         return ()
@@ -406,13 +408,13 @@ def _leave_out_inside(hair: bpy.types.Object, growth: _Growth) -> tuple[str, ...
             f"{hair.name}: its modifiers change the number of curves, so curves that they push "
             "into the head could not be left out. Turn those modifiers off and press Fit Again",
         )
-    inside = np.flatnonzero(are_inside(made.strands, growth.solid, _DEEP * growth.size))
+    inside = np.flatnonzero(are_inside(made.strands, growth.solid, _MAX_DEPTH * growth.size))
     if 0 < len(inside) < made.strands.strand_count:
         hair.data.remove_curves(indices=inside.tolist())
     return ()
 
 
-def _outside(strands: StrandSet, solid: DistanceField | None) -> StrandSet:
+def _led_out(strands: StrandSet, solid: DistanceField | None) -> StrandSet:
     """Strands led out of the mesh that they grow on; those that stay inside, such as fur on inner
     parts, are dropped."""
     if solid is None:
@@ -426,7 +428,7 @@ def grows_anywhere(style: Hairstyle) -> bool:
     return style.guides is None
 
 
-def is_of_face(style: Hairstyle) -> bool:
+def is_face_hairstyle(style: Hairstyle) -> bool:
     """Whether it is brows or lashes."""
     return style.guides is not None and bool(is_face_hair(style.guides.group).all())
 

@@ -18,7 +18,7 @@ from ..scene.bust_data import HAIR_GROUPS
 from ..scene.curves import write_curves
 from ..scene.surfaces import read_surface
 from ..viewport.overlay import ENGINE
-from .starting import dress
+from .starting import apply_presets
 
 NAME = "Hairloom Sample"
 _FRAMES = 96
@@ -30,9 +30,9 @@ _LIGHTS = {
     "Fill": ((0.9, -0.7, 0.2), 8.0, 0.9, (0.85, 0.92, 1.0)),
     "Rim": ((-0.8, 0.8, 0.3), 6.0, 0.4, (1.0, 1.0, 1.0)),
 }
-_CAMERA_AT, _LENS = (-0.34, -0.68, 0.02), 58.0
+_CAMERA_PLACE, _LENS = (-0.34, -0.68, 0.02), 58.0
 #: target of camera and lights; below the middle of the head, for hanging hair and shoulders
-_LOOKED_AT = Vector((0.0, 0.0, -0.07))
+_TARGET = Vector((0.0, 0.0, -0.07))
 _WORLD = (0.05, 0.058, 0.07, 1.0)
 _FILM_LOOK = "AgX - Medium High Contrast"
 #: long enough to swing
@@ -55,7 +55,7 @@ def add_sample_scene(
         layer = scene.view_layers[0]
         layer.update()
         hair = yield from _grown(head, layer.depsgraph, scene.collection)
-    dress(hair, presets)
+    apply_presets(hair, presets)
     hair.hairloom.bake.follows = True
     return scene, hair
 
@@ -110,21 +110,19 @@ def _light(
 ) -> bpy.types.Object:
     data = bpy.data.lights.new(name, "AREA")
     data.energy, data.size, data.color = power, side, color
-    return _looking_at_the_head(name, data, place)
+    return _aimed_at_target(name, data, place)
 
 
 def _camera() -> bpy.types.Object:
     data = bpy.data.cameras.new("Camera")
     data.lens, data.clip_start = _LENS, 0.01
-    return _looking_at_the_head("Camera", data, _CAMERA_AT)
+    return _aimed_at_target("Camera", data, _CAMERA_PLACE)
 
 
-def _looking_at_the_head(
-    name: str, data: bpy.types.ID, place: tuple[float, ...]
-) -> bpy.types.Object:
+def _aimed_at_target(name: str, data: bpy.types.ID, place: tuple[float, ...]) -> bpy.types.Object:
     obj = bpy.data.objects.new(name, data)
     obj.location = place
-    obj.rotation_euler = (_LOOKED_AT - Vector(place)).to_track_quat("-Z", "Y").to_euler()
+    obj.rotation_euler = (_TARGET - Vector(place)).to_track_quat("-Z", "Y").to_euler()
     return obj
 
 

@@ -35,7 +35,7 @@ from ..sessions.solvers import compute_problem
 
 type Outcome = Literal["passed", "absent", "failed"]
 
-_SIDE = 96
+_PICTURE_SIZE = 96
 _DIRECTION, _FIELD_OF_VIEW = (0.0, -1.0, 0.0), 0.5
 #: package -> what it is needed for
 _PACKAGES = {
@@ -58,40 +58,40 @@ class Check:
     text: str
 
 
-_last: tuple[Check, ...] = ()
+_last_results: tuple[Check, ...] = ()
 
 
 def last_report() -> tuple[Check, ...]:
     """The results of the last self-test; empty before the first."""
-    return _last
+    return _last_results
 
 
 def report_text() -> str:
     """The machine and the results of the last self-test as plain text."""
     lines = [f"{name}: {value or 'none'}" for name, value in environment().items()]
-    return "\n".join([*lines, *(f"{c.outcome}  {c.name}: {c.text}" for c in _last)]) + "\n"
+    return "\n".join([*lines, *(f"{c.outcome}  {c.name}: {c.text}" for c in _last_results)]) + "\n"
 
 
 def run() -> tuple[Check, ...]:
     """Run all checks one after the other; takes a few seconds."""
-    global _last
+    global _last_results
     ensure_gpu()
-    _last = tuple(_checks())
-    return _last
+    _last_results = tuple(_checks())
+    return _last_results
 
 
 def _checks() -> Iterator[Check]:
-    yield _compute()
-    yield _checked("GPU", _limits)
-    yield _atomics()
+    yield _check_compute()
+    yield _run_check("GPU", _check_limits)
+    yield _check_atomics()
     for name, settings in _looks().items():
-        yield _checked(f"Drawing, {name}", partial(_drawn, *settings))
-    yield _checked("Files", _files)
+        yield _run_check(f"Drawing, {name}", partial(_check_drawing, *settings))
+    yield _run_check("Files", _check_files)
     for package, use in _PACKAGES.items():
-        yield _package(package, use)
+        yield _check_package(package, use)
 
 
-def _checked(name: str, check: Callable[[], str]) -> Check:
+def _run_check(name: str, check: Callable[[], str]) -> Check:
     """Run a check; an exception of any kind is its failure."""
     try:
         return Check(name, "passed", check())
@@ -99,7 +99,7 @@ def _checked(name: str, check: Callable[[], str]) -> Check:
         return Check(name, "failed", f"{type(error).__name__}: {error}")
 
 
-def _compute() -> Check:
+def _check_compute() -> Check:
     """Whether motion on the GPU equals numpy's, see `solvers`; otherwise the CPU is used."""
     problem = compute_problem()
     name = "Simulation on the GPU"
@@ -108,7 +108,7 @@ def _compute() -> Check:
     return Check(name, "passed", "the same motion as by numpy")
 
 
-def _limits() -> str:
+def _check_limits() -> str:
     """The capabilities of the GPU that passes need; a missing texture format is a failure."""
     found = capabilities()
     if found.missing_formats:
@@ -125,7 +125,7 @@ def _limits() -> str:
     )
 
 
-def _atomics() -> Check:
+def _check_atomics() -> Check:
     """Whether image atomics work, for lists of strands per pixel; else they are drawn hashed."""
     name, problem = "Image atomics", capabilities().atomics_problem
     if problem:
@@ -143,7 +143,7 @@ def _looks() -> dict[str, tuple[ShadingSettings, VolumeSettings]]:
     }
 
 
-def _drawn(shading: ShadingSettings, volume: VolumeSettings) -> str:
+def _check_drawing(shading: ShadingSettings, volume: VolumeSettings) -> str:
     """Draw a brush of hair: it must be visible and finite, and leave the corners clear."""
     rig = _brush()
     snapshot = replace(
@@ -156,10 +156,12 @@ def _drawn(shading: ShadingSettings, volume: VolumeSettings) -> str:
     box = points.min(axis=0), points.max(axis=0)
     camera = frame_camera(box, _DIRECTION, _FIELD_OF_VIEW, 1.0)
     lit = replace(snapshot, lights=three_point_lights(camera.view))
-    return _judged(render_image(lit, camera, _SIDE, _SIDE, 1, background=(0.0, 0.0, 0.0, 0.0)))
+    return _check_picture(
+        render_image(lit, camera, _PICTURE_SIZE, _PICTURE_SIZE, 1, background=(0.0, 0.0, 0.0, 0.0))
+    )
 
 
-def _judged(picture: Floats) -> str:
+def _check_picture(picture: Floats) -> str:
     alpha = picture[..., 3]
     covered = float((alpha > 0.5).mean())
     if not np.isfinite(picture).all():
@@ -185,7 +187,7 @@ def _brush() -> Rig:
     return rig_flow.prepare(strands, None, GuideSettings(), place="the self-test")
 
 
-def _files() -> str:
+def _check_files() -> str:
     """Write a groom and a picture to the folder for temporary files, and read the groom again."""
     strands = _brush().strands
     with tempfile.TemporaryDirectory() as folder:
@@ -201,7 +203,7 @@ def _files() -> str:
     return "a groom and a picture written, the groom read again"
 
 
-def _package(name: str, use: str) -> Check:
+def _check_package(name: str, use: str) -> Check:
     """Look for a package, but do not load it: a second build of a library may crash the process."""
     if find_spec(name) is None:
         return Check(name, "absent", f"not here: no {use}")

@@ -26,11 +26,11 @@ from ..strands.growing import grow_on
 #: Smallest extent [m] of a human head, for which default lengths are declared.
 _HEAD_SIZE = 0.19
 #: Meshes within this factor of that size are heads or bodies of real size: hair is not scaled.
-REAL = 2.5
+REAL_SIZE_FACTOR = 2.5
 #: lengths that belong to the whole head, not to single hairs
 _LENGTHS = ("length", "wave", "wave_length", "frizz", "clearance", "volume")
 #: settings of dynamics -> the power of the size that they scale with; frequencies do not scale
-_MOTION = {
+_MOTION_POWERS = {
     "gravity": 1,
     "wind_speed": 1,
     "gust_size": 1,
@@ -46,12 +46,12 @@ def fitting_factor(head: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> fl
     positions = read_positions(head, depsgraph, place=head.name)
     if not len(positions):
         return 1.0
-    least = float(np.ptp(positions, axis=0).min())
-    factor = least / _HEAD_SIZE
-    return factor if factor > REAL or 0.0 < factor < 1.0 / REAL else 1.0
+    min_extent = float(np.ptp(positions, axis=0).min())
+    factor = min_extent / _HEAD_SIZE
+    return factor if factor > REAL_SIZE_FACTOR or 0.0 < factor < 1.0 / REAL_SIZE_FACTOR else 1.0
 
 
-def fitted(settings: GrowSettings, factor: float) -> GrowSettings:
+def scaled_settings(settings: GrowSettings, factor: float) -> GrowSettings:
     """Settings for the same hair on a head that is larger by a factor, within their limits."""
     if factor == 1.0:
         return settings
@@ -68,7 +68,7 @@ def fit_motion(hair: bpy.types.Object, factor: float) -> None:
     if factor == 1.0:
         return
     group = hair.hairloom.dynamics
-    factors = {name: factor**power for name, power in _MOTION.items()}
+    factors = {name: factor**power for name, power in _MOTION_POWERS.items()}
     fitted_motion = settings_of(group, DynamicsSettings).multiplied(**factors)
     for name in factors:
         setattr(group, name, getattr(fitted_motion, name))
@@ -97,7 +97,7 @@ def new_groom(
     """
     settings = settings_of(values, GrowSettings)
     factor = fitting_factor(head, depsgraph) if fits else 1.0
-    settings = fitted(settings, factor)
+    settings = scaled_settings(settings, factor)
     hair = yield from grow_on(
         head,
         depsgraph,
@@ -106,7 +106,7 @@ def new_groom(
         density_group=density_group,
         length_group=length_group,
     )
-    dress(hair, presets)
+    apply_presets(hair, presets)
     fit_motion(hair, factor)
     put_look_material(
         hair.data, wet_and_dusty_look(settings_of(hair.data.hairloom.shading, ShadingSettings))
@@ -114,7 +114,7 @@ def new_groom(
     return hair
 
 
-def dress(hair: bpy.types.Object, presets: tuple[str, ...]) -> None:
+def apply_presets(hair: bpy.types.Object, presets: tuple[str, ...]) -> None:
     """Apply presets to a groom, by name.
 
     Raises:
@@ -127,7 +127,7 @@ def dress(hair: bpy.types.Object, presets: tuple[str, ...]) -> None:
         hair.data.hairloom.shading.color_source = "own"
 
 
-def take_over(
+def prepare_existing_hair(
     hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, presets: tuple[str, ...]
 ) -> Parts[tuple[bpy.types.Object, tuple[str, ...]]]:
     """Prepare Blender's hair curves for Hairloom; returns the groom, and what was done.
@@ -142,20 +142,20 @@ def take_over(
     """
     done, factor = [], 1.0
     if not len(hair.data.curves) and not read_curves(hair, depsgraph).strands.strand_count:
-        hair, factor = yield from _grown_in_place(hair, depsgraph)
+        hair, factor = yield from _replace_empty_hair(hair, depsgraph)
         done.append("grew hair, since there was none")
     else:
         yield Part("Reading the hair", lambda: None)  # nothing has changed if it is cancelled here
         if mute_hair_dynamics(hair):
             done.append("muted Blender's Hair Dynamics")
-    if is_untouched(hair):
-        dress(hair, presets)
+    if has_untouched_look(hair):
+        apply_presets(hair, presets)
         fit_motion(hair, factor)
-        done += _material_look(hair, depsgraph)
+        done += _take_look_of_material(hair, depsgraph)
     return hair, tuple(done)
 
 
-def _material_look(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> list[str]:
+def _take_look_of_material(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> list[str]:
     """Take the look from its material's Principled Hair BSDF, if any; returns what was done."""
     if not has_principled_hair(hair):
         return []
@@ -164,13 +164,13 @@ def _material_look(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> li
     return [f"took its look from the material '{hair.active_material.name}'", *notes]
 
 
-def is_untouched(hair: bpy.types.Object) -> bool:
+def has_untouched_look(hair: bpy.types.Object) -> bool:
     """Whether its look has never been changed."""
     group = hair.data.hairloom.shading
     return not any(group.is_property_set(p.name) for p in group.settings.parameters())
 
 
-def _grown_in_place(
+def _replace_empty_hair(
     hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph
 ) -> Parts[tuple[bpy.types.Object, float]]:
     """Replace empty hair by a groom with its name and collections; also returns the factor by which
@@ -184,7 +184,7 @@ def _grown_in_place(
             remedy="Comb some in Sculpt Mode, or select a mesh and press Add Hair",
         )
     factor = fitting_factor(head, depsgraph)
-    settings = fitted(GrowSettings(), factor)
+    settings = scaled_settings(GrowSettings(), factor)
     name, collections = hair.name, list(hair.users_collection)
     grown = yield from grow_on(head, depsgraph, collections[0], settings)
     link_into(grown, collections, bpy.context.scene)

@@ -39,17 +39,17 @@ COLORS = {
 }
 MOTION_LINES = {"stretch": stretch_lines, "contacts": contact_lines, "density": density_lines}
 #: Colour of guides under a brush.
-GUIDES = (0.9, 0.9, 0.9, 0.35)
+GUIDE_COLOR = (0.9, 0.9, 0.9, 0.35)
 #: Corners of a circle.
 _CORNERS = 32
 #: Number of spheres of a set that are drawn; more would clutter the view.
 _MAX_SPHERES = 200
 #: Wind speed [m/s] whose arrow is as long as the hair is wide; head of an arrow, as a fraction.
-_BRISK, _HEAD = 10.0, 0.2
+_ARROW_SPEED, _ARROW_HEAD = 10.0, 0.2
 #: Number of guides, roughly, at whose points force fields are shown.
 _FIELD_GUIDES = 40
 #: Length of a line to a distant light, in radii of the hair.
-_AWAY = 1.6
+_LIGHT_LINE_LENGTH = 1.6
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +85,7 @@ def debug_lines_of(
     """The lines of this groom's enabled overlays."""
     wanted = hair.hairloom.shown_overlays
     combed: tuple[Lines, ...] = ()
-    if is_combed(hair) and hair.hairloom.hide_original and session.is_made:
+    if is_in_sculpt_mode(hair) and hair.hairloom.hide_original and session.is_made:
         combed = (guide_lines(session),)
     if not wanted:
         return combed
@@ -111,7 +111,7 @@ def debug_lines_of(
     )
 
 
-def is_combed(hair: bpy.types.Object) -> bool:
+def is_in_sculpt_mode(hair: bpy.types.Object) -> bool:
     """Whether it is in the mode of Blender's brushes for curves."""
     return bool(hair.mode == "SCULPT_CURVES")
 
@@ -125,7 +125,7 @@ def guide_lines(session: Session) -> Lines:
     points = np.stack([grid[:, :-1], grid[:, 1:]], axis=2).reshape(-1, 3)
     each = grid.shape[1] - 1
     return Lines(
-        GUIDES, points, np.repeat(grid[:, 0], each, axis=0), np.repeat(normals, each, axis=0)
+        GUIDE_COLOR, points, np.repeat(grid[:, 0], each, axis=0), np.repeat(normals, each, axis=0)
     )
 
 
@@ -155,7 +155,7 @@ def shape_lines(collider: Collider) -> Floats:
 
 def wind_length(radius: float) -> float:
     """Length [m] of the arrow for a wind of 1 m/s, for hair of this radius [m]."""
-    return 2.0 * radius / _BRISK
+    return 2.0 * radius / _ARROW_SPEED
 
 
 def wind_lines(air: Air | None, center: Floats, radius: float) -> Floats:
@@ -169,7 +169,7 @@ def wind_lines(air: Air | None, center: Floats, radius: float) -> Floats:
     lines = [center, tip]
     for side in perpendicular_axes(along):
         for sign in (1.0, -1.0):
-            lines += [tip, tip + _HEAD * length * (0.5 * sign * side - along)]
+            lines += [tip, tip + _ARROW_HEAD * length * (0.5 * sign * side - along)]
     return np.array(lines)
 
 
@@ -183,7 +183,7 @@ def field_lines(session: Session, fields: ForceFields, radius: float) -> Floats:
     points = grid[::every, :: max(grid.shape[1] // 3, 1)].reshape(-1, 3).astype(np.float32)
     push = field_effect(acting, np.ascontiguousarray(points.T), np.zeros_like(points.T)).push.T
     strength = np.linalg.norm(push, axis=1, keepdims=True)
-    scale = 2.0 * radius / np.maximum(strength, _BRISK)  # limits the length of strong ones
+    scale = 2.0 * radius / np.maximum(strength, _ARROW_SPEED)  # limits the length of strong ones
     return np.stack([points, points + push * scale], axis=1).reshape(-1, 3)
 
 
@@ -196,7 +196,11 @@ def light_lines(lights: tuple[Light, ...], center: Floats, radius: float) -> Flo
         if distance <= 0.0:
             continue
         along = to_light / distance
-        reach = _AWAY * radius * (1.0 if light.kind == "sun" else min(distance / radius / _AWAY, 1))
+        reach = (
+            _LIGHT_LINE_LENGTH
+            * radius
+            * (1.0 if light.kind == "sun" else min(distance / radius / _LIGHT_LINE_LENGTH, 1))
+        )
         end = center + reach * along
         star = 0.1 * radius * np.array([along, *perpendicular_axes(along)])
         ends = np.stack([end - star, end + star], axis=1).reshape(-1, 3)

@@ -18,26 +18,26 @@ from ..sessions.session import Session
 
 type Color = tuple[float, float, float, float]
 #: relative changes of length, each with the colour of segments from that value on
-STRETCHES: tuple[tuple[float, Color], ...] = (
+STRETCH_COLORS: tuple[tuple[float, Color], ...] = (
     (0.0, (0.25, 0.6, 0.3, 0.25)),
     (0.01, (1.0, 0.75, 0.1, 0.9)),
     (0.05, (1.0, 0.15, 0.1, 1.0)),
 )
 #: colours of points that touch a collider, and of those inside one
-TOUCHING: Color = (0.2, 0.9, 0.6, 0.9)
-INSIDE: Color = (1.0, 0.15, 0.1, 1.0)
+TOUCHING_COLOR: Color = (0.2, 0.9, 0.6, 0.9)
+INSIDE_COLOR: Color = (1.0, 0.15, 0.1, 1.0)
 #: distance at which a point touches a collider, relative to the distance that it keeps; length of
 #: its line, relative to the hair's length
-_NEAR, _TICK = 1.05, 0.03
+_TOUCH_FACTOR, _TICK_LENGTH = 1.05, 0.03
 #: density of hair in a cell, relative to the mean of all cells with hair at rest
-DENSITIES: tuple[tuple[float, Color], ...] = (
+DENSITY_COLORS: tuple[tuple[float, Color], ...] = (
     (0.0, (0.2, 0.4, 1.0, 0.35)),
     (0.5, (0.2, 0.9, 0.5, 0.6)),
     (1.5, (1.0, 0.75, 0.1, 0.8)),
     (3.0, (1.0, 0.15, 0.1, 1.0)),
 )
 #: mask values, in the colours of Blender's Weight Paint
-PAINTED: tuple[tuple[float, Color], ...] = (
+MASK_COLORS: tuple[tuple[float, Color], ...] = (
     (0.0, (0.0, 0.0, 1.0, 0.8)),
     (0.125, (0.0, 0.5, 1.0, 0.8)),
     (0.25, (0.0, 1.0, 0.9, 0.8)),
@@ -59,7 +59,7 @@ def stretch_lines(session: Session) -> Colored:
     segments = np.stack([now[:, :-1], now[:, 1:]], axis=2)
     length = np.linalg.norm(segments[:, :, 1] - segments[:, :, 0], axis=2)
     change = np.abs(length / np.maximum(rest, 1.0e-12) - 1.0)
-    for color, chosen in _classes(change, STRETCHES):
+    for color, chosen in _by_color(change, STRETCH_COLORS):
         yield color, segments[chosen].reshape(-1, 3)
 
 
@@ -70,13 +70,18 @@ def contact_lines(session: Session) -> Colored:
     count, cv_count, _ = guides.shape
     size = session.solver.motion.dynamics.rest.size
     radius = all_cv_radii(settings, cv_count, count, size).reshape(cv_count, count).T
-    reach = max(float(radius.max(initial=0.0)) * _NEAR, 1.0e-6)
+    reach = max(float(radius.max(initial=0.0)) * _TOUCH_FACTOR, 1.0e-6)
     found = signed_distance(guides.reshape(-1, 3), session.posed_colliders, reach)
     distance, outward = found[0].reshape(count, cv_count), found[1].reshape(guides.shape)
     is_inside = (distance < 0.0) & np.isfinite(radius)
-    touches = (distance <= radius * _NEAR) & (distance < reach) & ~is_inside & np.isfinite(radius)
-    tick = np.full(distance.shape, _TICK * size, np.float32)
-    for color, chosen, long in ((TOUCHING, touches, tick), (INSIDE, is_inside, -distance)):
+    touches = (
+        (distance <= radius * _TOUCH_FACTOR) & (distance < reach) & ~is_inside & np.isfinite(radius)
+    )
+    tick = np.full(distance.shape, _TICK_LENGTH * size, np.float32)
+    for color, chosen, long in (
+        (TOUCHING_COLOR, touches, tick),
+        (INSIDE_COLOR, is_inside, -distance),
+    ):
         ends = guides[chosen] + outward[chosen] * long[chosen][:, None]
         yield color, np.stack([guides[chosen], ends], axis=1).reshape(-1, 3)
 
@@ -92,12 +97,12 @@ def density_lines(session: Session) -> Colored:
     middle = guides[:, 0].mean(axis=0, dtype=np.float64)
     place = grid.placement(turn, middle)
     at_rest, _ = _cells(grid.placement(np.eye(3), grid.middle).to_cells(rest.position), grid.mass)
-    usual = float(at_rest.mean())
+    mean_density = float(at_rest.mean())
     mass, cell = _cells(place.to_cells(np.ascontiguousarray(guides.transpose(2, 1, 0))), grid.mass)
     for across in (0, 1):
         is_cut = cell[:, across] == np.floor(GRID_OFFSET[across])
         squares = _squares(cell[is_cut], across)
-        for color, chosen in _classes(mass[is_cut] / usual, DENSITIES):
+        for color, chosen in _by_color(mass[is_cut] / mean_density, DENSITY_COLORS):
             corners = (squares[chosen].reshape(-1, 3) - GRID_OFFSET) * grid.cell
             yield color, corners @ turn.T + middle
 
@@ -112,7 +117,7 @@ def painted_lines(guides: Floats, painted: Floats | None) -> Colored:
         return
     segments = np.stack([guides[:, :-1], guides[:, 1:]], axis=2)
     here = np.broadcast_to(painted.T, guides.shape[:2])
-    for color, chosen in _classes((here[:, :-1] + here[:, 1:]) / 2.0, PAINTED):
+    for color, chosen in _by_color((here[:, :-1] + here[:, 1:]) / 2.0, MASK_COLORS):
         yield color, segments[chosen].reshape(-1, 3)
 
 
@@ -140,7 +145,7 @@ def _squares(cells: Ints, across: int) -> Floats:
     return squares
 
 
-def _classes(
+def _by_color(
     values: Floats, colors: tuple[tuple[float, Color], ...]
 ) -> Iterator[tuple[Color, Bools]]:
     """Each colour, with a mask of the values from its threshold up to the next one."""

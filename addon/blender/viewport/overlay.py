@@ -45,28 +45,28 @@ from . import softening, view_transform
 from .debug_lines import Lines, debug_lines_of, draw_lines
 from .overlay_text import card_counts_line, counts_line, draw_graphs, write_lines
 from .views import (
-    STEADY,
+    STEADY_VIEW_TYPES,
     View,
     forget_closed_views,
     forget_views,
+    record_drawn,
+    record_reshown,
     view_marks,
     view_of,
-    was_drawn,
-    was_shown_again,
 )
 
 
 @dataclass(frozen=True)
-class Drawing:
+class GroomDrawing:
     """One groom as it is to be drawn.
 
     is_made: whether its hair is made.
-    seen_in: the view layers that show it; None: all.
-    hidden_in: addresses of the 3D views that do not show it.
+    visible_layers: the view layers that show it; None: all.
+    hiding_views: addresses of the 3D views that do not show it.
     head: world space; None if it is not drawn as a solid.
-    bare_in: addresses of the 3D views that do not show its head, so that it hides nothing there.
+    headless_views: of the 3D views that do not show its head, so that it hides nothing there.
     card_counts: cards, triangles and vertices, if it is shown as cards.
-    counts_of: the name under which its counts are written; empty: they are not.
+    counts_name: the name under which its counts are written; empty: they are not.
     note: text that is written even without overlays.
     lines: its overlays.
     times: of its frames.
@@ -75,13 +75,13 @@ class Drawing:
     snapshot: Snapshot
     is_visible: bool = True
     is_made: bool = True
-    seen_in: frozenset[LayerKey] | None = None
-    hidden_in: frozenset[int] = frozenset()
+    visible_layers: frozenset[LayerKey] | None = None
+    hiding_views: frozenset[int] = frozenset()
     head: Surface | None = None
-    bare_in: frozenset[int] = frozenset()
+    headless_views: frozenset[int] = frozenset()
     guide_count: int = 0
     card_counts: tuple[int, ...] = ()
-    counts_of: str = ""
+    counts_name: str = ""
     note: str = ""
     lines: tuple[Lines, ...] = ()
     times: FrameTimes = field(default_factory=FrameTimes)
@@ -92,10 +92,10 @@ ENGINE = "HAIRLOOM"
 
 
 @dataclass(eq=False)
-class Drawn:
+class DrawnGroom:
     """One groom that is drawn, with its passes; uses the GPU from the first draw on."""
 
-    drawing: Drawing
+    drawing: GroomDrawing
     hair: GroomPass = field(default_factory=GroomPass)
     shadow: BodyShadow = field(default_factory=BodyShadow)
 
@@ -111,7 +111,7 @@ class _Overlay:
     """
 
     def __init__(self) -> None:
-        self.drawn: dict[int, Drawn] = {}
+        self.drawn: dict[int, DrawnGroom] = {}
         self.depth = OwnDepth()
         self.handles: tuple[Any, ...] = ()
         self.failure = ""
@@ -123,7 +123,7 @@ _overlay = _Overlay()
 
 def read_drawing(
     session: Session, hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, note: str = ""
-) -> Drawing:
+) -> GroomDrawing:
     """The drawing of this groom at the moment.
 
     Args:
@@ -142,28 +142,28 @@ def read_drawing(
     elif snapshot.debug_view == "depth":
         snapshot = replace(snapshot, solids=session.solids(depsgraph))
     seen_in = layers_with(hair)
-    return Drawing(
+    return GroomDrawing(
         snapshot,
         is_visible=bool(seen_in),
         is_made=session.is_made,
-        seen_in=seen_in,
-        hidden_in=spaces_without(hair),
+        visible_layers=seen_in,
+        hiding_views=spaces_without(hair),
         head=session.posed_head if is_drawn else None,
-        bare_in=frozenset() if head is None else spaces_without(head),
+        headless_views=frozenset() if head is None else spaces_without(head),
         guide_count=len(session.rig.guides),
         card_counts=session.cards.counts if snapshot.cards is not None else (),
-        counts_of=hair.name if hair.hairloom.show_counts or snapshot.debug_view != "none" else "",
+        counts_name=hair.name if hair.hairloom.show_counts or snapshot.debug_view != "none" else "",
         note=note,
         lines=debug_lines_of(session, hair, depsgraph),
         times=session.times,
     )
 
 
-def show(uid: int, drawing: Drawing) -> None:
+def show(uid: int, drawing: GroomDrawing) -> None:
     """Draw this groom from now on; replaces its earlier drawing."""
     known = _overlay.drawn.get(uid)
     if known is None:
-        _overlay.drawn[uid] = Drawn(drawing)
+        _overlay.drawn[uid] = DrawnGroom(drawing)
     else:
         known.drawing = drawing
     if not _overlay.handles and not _overlay.failure and not bpy.app.background:
@@ -187,7 +187,7 @@ def hide(uid: int) -> None:
         show(uid, replace(drawing, is_visible=False))
 
 
-def drop(uid: int) -> None:
+def stop_drawing(uid: int) -> None:
     """No longer draw this groom; with the last one, the draw handlers and the report of a failure
     are removed."""
     _overlay.drawn.pop(uid, None)
@@ -197,7 +197,7 @@ def drop(uid: int) -> None:
     redraw_views()
 
 
-def drawing_of(uid: int) -> Drawing | None:
+def drawing_of(uid: int) -> GroomDrawing | None:
     """The drawing of a groom, if it is drawn."""
     drawn = _overlay.drawn.get(uid)
     return None if drawn is None else drawn.drawing
@@ -226,12 +226,12 @@ def _draw(what: Callable[[Any], None]) -> None:
 
 
 def _draw_strands(context: Any) -> None:
-    look_at_layers()
+    watch_view_layers()
     view, camera = view_of(context.region_data), _camera(context.region_data)
-    shown = list(_shown_now(context, camera, has_turned=view.turns_to(camera)))
+    shown = list(_shown_grooms(context, camera, has_turned=view.has_new_camera(camera)))
     if not shown:
         view.picture.release()
-        softening.harden(view)
+        softening.discard_samples(view)
         return
     samples = context.scene.hairloom.picture.viewport_samples
     marks = (
@@ -240,15 +240,15 @@ def _draw_strands(context: Any) -> None:
         *(mark for each in shown for mark in each.marks),
     )
     with DRAW_LOCK, gpu_memory.shared_by(len(shown)):
-        if has_no_depths(context):
+        if has_no_scene_depth(context):
             _draw_depth(context.space_data.as_pointer(), camera, shown)
         if not view.picture.matches(marks):
-            softening.harden(view)
+            softening.discard_samples(view)
             _draw_body_shadows(camera, shown)
-            _draw_afresh(view, camera, shown, marks)
-            was_drawn(view)
-            if view.picture.marks and softening.is_worth_it(shown[0].snapshot.lights, samples):
-                softening.soften(view)
+            _draw_hair(view, camera, shown, marks)
+            record_drawn(view)
+            if view.picture.marks and softening.can_soften(shown[0].snapshot.lights, samples):
+                softening.schedule_samples(view)
             return
         is_sampled = softening.takes_sample(view)
         if is_sampled:
@@ -256,14 +256,14 @@ def _draw_strands(context: Any) -> None:
         elif not view.is_soft:
             _draw_body_shadows(camera, shown)
         view.picture.show()
-        for uid, counted in view.counted.items():
+        for uid, counted in view.statistics_by_uid.items():
             _overlay.drawn[uid].hair.strands.statistics = counted
         if not is_sampled:
-            was_shown_again(view, context.space_data.shading)
-            softening.go_on(view)
+            record_reshown(view, context.space_data.shading)
+            softening.resume_timer(view)
 
 
-def _draw_body_shadows(camera: Camera, shown: Sequence[_Shown], sample: Any = None) -> None:
+def _draw_body_shadows(camera: Camera, shown: Sequence[_ShownGroom], sample: Any = None) -> None:
     """Draw the shadows on heads, before all hair, onto what Blender has drawn.
 
     Args:
@@ -273,15 +273,15 @@ def _draw_body_shadows(camera: Camera, shown: Sequence[_Shown], sample: Any = No
         each.draw_body_shadow(camera, sample)
 
 
-def _add_sample(view: View, camera: Camera, shown: Sequence[_Shown], samples: int) -> None:
+def _add_sample(view: View, camera: Camera, shown: Sequence[_ShownGroom], samples: int) -> None:
     """Add a sample of soft shadows, before the view shows its picture."""
     centers = [each.snapshot.center for each in shown]
     lights = softening.lights_of_sample(shown[0].snapshot.lights, centers)
-    name = softening.name_of(view)
+    name = softening.sample_key(view)
     lit = [
         replace(each, snapshot=replace(each.snapshot, lights=lights), view=name) for each in shown
     ]
-    is_shown, sums = softening.is_next_shown(view, samples), softening.sums()
+    is_shown, sums = softening.is_next_shown(view, samples), softening.sample_picture()
     if not view.is_soft and not is_shown:
         _draw_body_shadows(camera, shown)
 
@@ -301,15 +301,17 @@ def _add_sample(view: View, camera: Camera, shown: Sequence[_Shown], samples: in
     softening.was_sampled(view, samples, passes, fragments)
 
 
-def _draw_depth(address: int, camera: Camera, shown: Sequence[_Shown]) -> None:
+def _draw_depth(address: int, camera: Camera, shown: Sequence[_ShownGroom]) -> None:
     """Draw the depth of what hides hair: the heads that it grows on, if they are shown."""
     _, _, width, height = gpu.state.viewport_get()
-    drawings = [each.drawing for each in shown if address not in each.drawing.bare_in]
+    drawings = [each.drawing for each in shown if address not in each.drawing.headless_views]
     heads = [each.head for each in drawings if each.head is not None]
     _overlay.depth.draw(heads, camera, width, height)
 
 
-def _draw_afresh(view: View, camera: Camera, shown: list[_Shown], marks: tuple[Any, ...]) -> None:
+def _draw_hair(
+    view: View, camera: Camera, shown: list[_ShownGroom], marks: tuple[Any, ...]
+) -> None:
     """Draw all grooms into the current view, and into its picture if that can be kept."""
     forget_closed_views(each.hair.strands for each in _overlay.drawn.values())
     can_be_kept = all(each.can_be_kept for each in shown) and not gpu_memory.exceeds_budget()
@@ -318,7 +320,7 @@ def _draw_afresh(view: View, camera: Camera, shown: list[_Shown], marks: tuple[A
         view.picture.release()
     else:
         picture.begin()
-    is_moving = view.moves_to(marks)
+    is_moving = view.has_new_marks(marks)
     maps: dict[Hashable, OpacityMaps | None] = {}
     if len(shown) > 1:  # a single groom makes its maps when it is drawn
         for each in shown:
@@ -327,31 +329,31 @@ def _draw_afresh(view: View, camera: Camera, shown: list[_Shown], marks: tuple[A
     for each in shown:
         with each.drawing.times.measured("drawing", goes_on=bool(maps)):
             each.draw(camera, maps, picture, is_moving=is_moving)
-    view.is_behind = any(each.drawn.hair.strands.needs_redraw(view.address) for each in shown)
-    view.counted = {each.uid: each.drawn.hair.strands.statistics for each in shown}
-    if picture is not None and not view.is_behind:
+    view.is_outdated = any(each.drawn.hair.strands.needs_redraw(view.address) for each in shown)
+    view.statistics_by_uid = {each.uid: each.drawn.hair.strands.statistics for each in shown}
+    if picture is not None and not view.is_outdated:
         picture.marks = marks
 
 
 @dataclass(frozen=True, eq=False)
-class _Shown:
+class _ShownGroom:
     """One groom in the current view.
 
     snapshot: as it is seen and lit there. view: the name under which passes keep its data.
     shades_body: whether its shadow is drawn on the head.
     is_turning: whether its lights are attached to the view, and the view moves.
-    sees_all: whether strands behind heads are drawn too.
+    shows_all_strands: whether strands behind heads are drawn too.
     """
 
     uid: int
-    drawn: Drawn
-    drawing: Drawing
+    drawn: DrawnGroom
+    drawing: GroomDrawing
     snapshot: Snapshot
     display: Display | None
     view: Hashable
     shades_body: bool
     is_turning: bool
-    sees_all: bool
+    shows_all_strands: bool
 
     @property
     def marks(self) -> tuple[Any, ...]:
@@ -362,7 +364,7 @@ class _Shown:
             *(self.uid, self.drawing.snapshot, 0 if points is None else points.serial),
             *(snapshot.lights, snapshot.ambient, b"" if harmonics is None else harmonics.tobytes()),
             *(() if display is None else (display.table, display.gain, display.gamma)),
-            *(self.sees_all, capabilities().image_atomics),
+            *(self.shows_all_strands, capabilities().image_atomics),
         )
 
     @property
@@ -429,20 +431,22 @@ class _Shown:
         )
 
 
-def _shown_now(context: Any, camera: Camera, *, has_turned: bool) -> Iterator[_Shown]:
+def _shown_grooms(context: Any, camera: Camera, *, has_turned: bool) -> Iterator[_ShownGroom]:
     """All grooms in the current view; cards last, as they are blended."""
     space = context.space_data
     address, studio = space.as_pointer(), three_point_lights(camera.view)
     display = view_transform.display_of(space.shading, context.scene)
     found = sorted(shown_in(context), key=lambda each: each[1].snapshot.cards is not None)
-    snapshots = _in_one_light([lit(each.snapshot, space.shading, studio) for _, each in found])
+    snapshots = _with_shared_lights(
+        [with_view_lights(each.snapshot, space.shading, studio) for _, each in found]
+    )
     for (uid, drawing), snapshot in zip(found, snapshots, strict=True):
         # a clipping region may have cut away the part of the head that hides hair
-        is_open = is_seen_through(space.shading) or context.region_data.use_clip_planes
-        sees_all = is_open or address in drawing.bare_in
+        is_open = is_x_ray(space.shading) or context.region_data.use_clip_planes
+        sees_all = is_open or address in drawing.headless_views
         if sees_all:
             snapshot = with_all_strands(snapshot)
-        yield _Shown(
+        yield _ShownGroom(
             uid,
             _overlay.drawn[uid],
             drawing,
@@ -450,13 +454,13 @@ def _shown_now(context: Any, camera: Camera, *, has_turned: bool) -> Iterator[_S
             # colours of debug views stand for numbers, so no view transform applies to them
             display if snapshot.debug_view == "none" else None,
             context.region_data.as_pointer(),
-            shades_body=_shades_body(snapshot, space) and address not in drawing.bare_in,
+            shades_body=_shades_body(snapshot, space) and address not in drawing.headless_views,
             is_turning=has_turned and snapshot.lights is studio,
-            sees_all=sees_all,
+            shows_all_strands=sees_all,
         )
 
 
-def _in_one_light(snapshots: Sequence[Snapshot]) -> list[Snapshot]:
+def _with_shared_lights(snapshots: Sequence[Snapshot]) -> list[Snapshot]:
     """Snapshots with the same lights in the same order, since grooms look up each other's maps by
     the number of a light. Before, each groom may have other lights, the brightest at its own hair.
     """
@@ -489,19 +493,19 @@ def _draw_counts(context: Any) -> None:
     lines = [
         "   ".join(filter(None, (_counts_of(_overlay.drawn[uid]), drawing.times.text)))
         for uid, drawing in shown_in(context)
-        if drawing.counts_of
+        if drawing.counts_name
     ]
     write_lines(context, lines + notes)
-    graphs = [drawing.times for _, drawing in shown_in(context) if drawing.counts_of]
+    graphs = [drawing.times for _, drawing in shown_in(context) if drawing.counts_name]
     draw_graphs(context, graphs, len(lines + notes))
 
 
-def _counts_of(drawn: Drawn) -> str:
+def _counts_of(drawn: DrawnGroom) -> str:
     drawing = drawn.drawing
     if drawing.card_counts:
-        return card_counts_line(drawing.counts_of, drawing.guide_count, drawing.card_counts)
+        return card_counts_line(drawing.counts_name, drawing.guide_count, drawing.card_counts)
     strand_count, drawn_now = drawing.snapshot.strand_count, drawn.hair.strands.statistics
-    return counts_line(drawing.counts_of, drawing.guide_count, strand_count, drawn_now)
+    return counts_line(drawing.counts_name, drawing.guide_count, strand_count, drawn_now)
 
 
 def statistics_of(uid: int) -> Statistics:
@@ -516,14 +520,14 @@ def notes_of(uid: int) -> tuple[str, ...]:
     return () if drawn is None else drawn.hair.notes
 
 
-def drawn() -> frozenset[int]:
+def drawn_uids() -> frozenset[int]:
     """Session numbers of the grooms that are drawn here instead of by Blender."""
     return frozenset(uid for uid, each in _overlay.drawn.items() if each.drawing.is_made)
 
 
-def expected() -> frozenset[int]:
+def pending_uids() -> frozenset[int]:
     """Session numbers of the grooms that will be drawn here once they are made."""
-    return frozenset(_overlay.drawn) - drawn()
+    return frozenset(_overlay.drawn) - drawn_uids()
 
 
 def is_rendered_by_us(context: Any) -> bool:
@@ -532,7 +536,7 @@ def is_rendered_by_us(context: Any) -> bool:
     return is_ours and context.space_data.shading.type == "RENDERED"
 
 
-def shown_in(context: Any) -> list[tuple[int, Drawing]]:
+def shown_in(context: Any) -> list[tuple[int, GroomDrawing]]:
     """The grooms that the 3D view of this context shows."""
     address = context.space_data.as_pointer()
     layer = layer_key(context.scene, context.view_layer)
@@ -540,22 +544,22 @@ def shown_in(context: Any) -> list[tuple[int, Drawing]]:
         (uid, drawing)
         for uid, drawing in ((uid, each.drawing) for uid, each in _overlay.drawn.items())
         if drawing.is_visible
-        and address not in drawing.hidden_in
-        and (drawing.seen_in is None or layer in drawing.seen_in)
+        and address not in drawing.hiding_views
+        and (drawing.visible_layers is None or layer in drawing.visible_layers)
     ]
 
 
-def has_no_depths(context: Any) -> bool:
+def has_no_scene_depth(context: Any) -> bool:
     """Whether Blender draws no depth in a view. Except in Solid and similar views, it draws depth
     for overlays alone; without these the depth is 0 or 1 everywhere, or that of an earlier draw.
     """
     shading, is_bare = context.space_data.shading, not context.space_data.overlay.show_overlays
     kind = shading.type
     is_plain = kind == "RENDERED" and context.scene.render.engine == "BLENDER_WORKBENCH"
-    return is_bare and kind not in STEADY and not is_plain
+    return is_bare and kind not in STEADY_VIEW_TYPES and not is_plain
 
 
-def is_seen_through(shading: Any) -> bool:
+def is_x_ray(shading: Any) -> bool:
     """Whether a view shows objects behind heads."""
     return shading.type == "WIREFRAME" or (shading.type == "SOLID" and shading.show_xray)
 
@@ -563,11 +567,11 @@ def is_seen_through(shading: Any) -> bool:
 def _shades_body(snapshot: Snapshot, space: Any) -> bool:
     """Whether to draw hair's shadow on the head: Blender must have drawn that in the same light."""
     uses_lights, _ = uses_scene_light(space.shading)
-    is_shown = bool(snapshot.casters) and not is_seen_through(space.shading)
+    is_shown = bool(snapshot.casters) and not is_x_ray(space.shading)
     return snapshot.volume.on_body and uses_lights and bool(snapshot.lights) and is_shown
 
 
-def lit[Shown: (Snapshot, SceneSnapshot)](
+def with_view_lights[Shown: (Snapshot, SceneSnapshot)](
     shown: Shown, shading: Any, studio: tuple[Light, ...]
 ) -> Shown:
     """The snapshot in the light that Blender uses in this view: the scene's lights, and the scene's
@@ -590,10 +594,10 @@ def _fail(error: Exception) -> None:
     _overlay.failure = f"Hairloom cannot draw here: {error}"
     print(_overlay.failure)
     traceback.print_exc()
-    bpy.app.timers.register(_tell_failure, first_interval=0.0)
+    bpy.app.timers.register(_report_failure, first_interval=0.0)
 
 
-def _tell_failure() -> None:
+def _report_failure() -> None:
     """A timer for Blender: outside of drawing, handlers may be removed and the status text set."""
     _remove_handlers()
     if _overlay.failure:
@@ -607,19 +611,19 @@ def _remove_handlers() -> None:
         bpy.types.SpaceView3D.draw_handler_remove(handle, "WINDOW")
     _overlay.handles = ()
     _overlay.depth.release()
-    forget_layers()
-    softening.forget()
+    stop_watching_view_layers()
+    softening.stop()
     forget_views()
 
 
-def forget_layers() -> None:
+def stop_watching_view_layers() -> None:
     """Forget the view layers of windows, when views are no longer drawn."""
     _overlay.layers = frozenset()
-    if bpy.app.timers.is_registered(_evaluate):
-        bpy.app.timers.unregister(_evaluate)
+    if bpy.app.timers.is_registered(_evaluate_scenes):
+        bpy.app.timers.unregister(_evaluate_scenes)
 
 
-def look_at_layers() -> None:
+def watch_view_layers() -> None:
     """Called while a view is drawn: have a view layer that is new in any window evaluated soon.
 
     Each view layer has its own evaluated copies, and Blender has no event for a window that begins
@@ -628,11 +632,11 @@ def look_at_layers() -> None:
     """
     windows = bpy.context.window_manager.windows
     now = frozenset(layer_key(each.scene, each.view_layer) for each in windows)
-    if now - _overlay.layers and not bpy.app.timers.is_registered(_evaluate):
-        bpy.app.timers.register(_evaluate, first_interval=0.0)
+    if now - _overlay.layers and not bpy.app.timers.is_registered(_evaluate_scenes):
+        bpy.app.timers.register(_evaluate_scenes, first_interval=0.0)
     _overlay.layers = now
 
 
-def _evaluate() -> None:
+def _evaluate_scenes() -> None:
     for scene in {window.scene for window in bpy.context.window_manager.windows}:
         scene.update_tag()

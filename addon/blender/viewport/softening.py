@@ -26,9 +26,9 @@ from .views import View, known_views
 
 #: time [s] without a change before a view gets samples; and the longest time between draws of a
 #: view that moves slowly, which is at rest after twice the last interval
-_REST, _SLOW = 0.3, 1.0
+_REST_SECONDS, _SLOW_SECONDS = 0.3, 1.0
 #: from this many samples on, their mean is shown; in fewer, single samples of lights are visible
-_FEW = 8
+_MIN_SHOWN_SAMPLES = 8
 
 
 class _Softening:
@@ -47,39 +47,41 @@ class _Softening:
 _softening = _Softening()
 
 
-def is_worth_it(lights: Sequence[Light], samples: int) -> bool:
+def can_soften(lights: Sequence[Light], samples: int) -> bool:
     """Whether shadows can become soft: a light has a size, and the GPU is not software."""
     has_size = samples > 1 and lights_at(lights, 1, np.zeros(3)) != tuple(lights)
     return has_size and not is_software()
 
 
-def soften(view: View) -> None:
+def schedule_samples(view: View) -> None:
     """Schedule samples for a view that was drawn, once it rests."""
     now = time.monotonic()
     pause, view.changed_at = now - view.changed_at, now
-    view.wants_more = True
-    soon(_ask, max(_REST, 2.0 * pause) if pause < _SLOW else _REST)
+    view.wants_samples = True
+    soon(
+        _request_sample, max(_REST_SECONDS, 2.0 * pause) if pause < _SLOW_SECONDS else _REST_SECONDS
+    )
 
 
-def harden(view: View) -> None:
+def discard_samples(view: View) -> None:
     """Discard the samples of a view whose picture is no longer valid."""
-    view.wants_more = view.is_soft = view.has_all = view.is_doubted = False
-    view.fragments = ()
+    view.wants_samples = view.is_soft = view.has_all_samples = view.may_be_outdated = False
+    view.fragment_counts = ()
     if _softening.view is view:
         _stop()
 
 
-def go_on(view: View) -> None:
+def resume_timer(view: View) -> None:
     """After a view has shown its kept picture, start the timer if it waits for samples."""
-    if view.wants_more and not bpy.app.timers.is_registered(_ask):
-        soon(_ask, 0.0)
+    if view.wants_samples and not bpy.app.timers.is_registered(_request_sample):
+        soon(_request_sample, 0.0)
 
 
-def forget() -> None:
+def stop() -> None:
     """Stop sampling, when views are no longer drawn."""
     _stop()
-    if bpy.app.timers.is_registered(_ask):
-        bpy.app.timers.unregister(_ask)
+    if bpy.app.timers.is_registered(_request_sample):
+        bpy.app.timers.unregister(_request_sample)
 
 
 def takes_sample(view: View) -> bool:
@@ -88,18 +90,18 @@ def takes_sample(view: View) -> bool:
         return False
     _softening.is_due = False
     if gpu_memory.exceeds_budget(_softening.picture.missing_bytes()):
-        view.wants_more = False
+        view.wants_samples = False
         _stop()
-        soon(_ask, 0.0)
-    return view.wants_more
+        soon(_request_sample, 0.0)
+    return view.wants_samples
 
 
-def sums() -> SoftPicture:
+def sample_picture() -> SoftPicture:
     """The picture to which the sample of this redraw is added."""
     return _softening.picture
 
 
-def name_of(view: View) -> Hashable:
+def sample_key(view: View) -> Hashable:
     """The name under which passes keep data of the view in the light of a sample."""
     return "sample", view.address
 
@@ -118,7 +120,7 @@ def is_next_shown(view: View, samples: int) -> bool:
     samples before keeps its picture until all new ones are added.
     """
     count = _softening.picture.count + 1
-    return count >= samples or (count >= _FEW and not view.has_all)
+    return count >= samples or (count >= _MIN_SHOWN_SAMPLES and not view.has_all_samples)
 
 
 def was_sampled(
@@ -133,41 +135,41 @@ def was_sampled(
     _softening.passes = tuple(passes)
     count = _softening.picture.count
     if count == 1:
-        view.is_doubted = False
-    is_as_shown = view.has_all and count == 1 and view.fragments == fragments
-    view.fragments = fragments
+        view.may_be_outdated = False
+    is_as_shown = view.has_all_samples and count == 1 and view.fragment_counts == fragments
+    view.fragment_counts = fragments
     if is_as_shown or count >= samples:
-        view.wants_more, view.has_all = view.is_doubted, True
+        view.wants_samples, view.has_all_samples = view.may_be_outdated, True
         _stop()
-    soon(_ask, 0.0)
+    soon(_request_sample, 0.0)
 
 
 def _stop() -> None:
     if _softening.view is not None:
         for each in _softening.passes:
-            each.forget_view(name_of(_softening.view))
+            each.forget_view(sample_key(_softening.view))
     _softening.picture.release()
     _softening.view, _softening.is_due, _softening.passes = None, False, ()
 
 
-def _ask() -> None:
+def _request_sample() -> None:
     """A timer for Blender: request a sample for the current view, or else for one that waits. Views
     that must be drawn again first are skipped; they request samples afterwards.
     """
     view = _softening.view
     if view is not None and _softening.is_due:
-        _leave(view)  # the requested redraw did not come: something else draws the view now
-    waiting = (each for each in known_views() if each.wants_more and not each.is_again)
+        _give_up(view)  # the requested redraw did not come: something else draws the view now
+    waiting = (each for each in known_views() if each.wants_samples and not each.needs_redraw)
     view = _softening.view or next(waiting, None)
     if view is None:
         return
     _softening.view, _softening.is_due = view, True
     if not redraw_view(view.address):
-        _leave(view)  # no window shows it
-        soon(_ask, 0.0)
+        _give_up(view)  # no window shows it
+        soon(_request_sample, 0.0)
 
 
-def _leave(view: View) -> None:
+def _give_up(view: View) -> None:
     """Stop sampling a view; it begins again when it is next drawn."""
     view.picture.forget()
-    harden(view)
+    discard_samples(view)

@@ -55,17 +55,17 @@ class ColorView:
     exposure: float = 0.0
 
 
-class _Known:
-    """tables: made so far, the last used at the end. wanted: views that wait for their table, in
-    order. failed: why a view cannot have one."""
+class _Tables:
+    """tables: made so far, the last used at the end. requested: views that wait for their table, in
+    order. problems: why a view cannot have one."""
 
     def __init__(self) -> None:
         self.tables: OrderedDict[ColorView, DisplayTable] = OrderedDict()
-        self.wanted: dict[ColorView, None] = {}
-        self.failed: dict[ColorView, str] = {}
+        self.requested: dict[ColorView, None] = {}
+        self.problems: dict[ColorView, str] = {}
 
 
-_known = _Known()
+_tables = _Tables()
 
 
 def display_of(shading: bpy.types.View3DShading, scene: bpy.types.Scene) -> Display | None:
@@ -78,15 +78,15 @@ def display_of(shading: bpy.types.View3DShading, scene: bpy.types.Scene) -> Disp
     view, gain, gamma = view_of(shading, scene)
     if (view, gain, gamma) == (ColorView(), 1.0, 1.0):
         return None
-    if view in _known.failed:
+    if view in _tables.problems:
         return None
-    if view in _known.tables:
-        _known.tables.move_to_end(view)
+    if view in _tables.tables:
+        _tables.tables.move_to_end(view)
     else:
-        _want(view)
+        _request_table(view)
     return (
-        Display(_known.tables[next(reversed(_known.tables))], gain, gamma)
-        if _known.tables
+        Display(_tables.tables[next(reversed(_tables.tables))], gain, gamma)
+        if _tables.tables
         else None
     )
 
@@ -116,54 +116,54 @@ def view_of(
 
 def prepare() -> None:
     """Make the tables of all open 3D views, before the first draw."""
-    _known.failed.clear()
+    _tables.problems.clear()
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
             if area.type == "VIEW_3D":
                 display_of(area.spaces.active.shading, window.scene)
-    _make_wanted()
+    _make_requested()
 
 
 def problem() -> str:
     """Why colours are shown by the plain "Standard" although another is set; usually empty."""
-    return next(iter(_known.failed.values()), "")
+    return next(iter(_tables.problems.values()), "")
 
 
-def forget() -> None:
+def clear_tables() -> None:
     """Drop all tables, and stop the timer."""
-    _known.tables.clear()
-    _known.wanted.clear()
-    _known.failed.clear()
-    if bpy.app.timers.is_registered(_make_wanted):
-        bpy.app.timers.unregister(_make_wanted)
+    _tables.tables.clear()
+    _tables.requested.clear()
+    _tables.problems.clear()
+    if bpy.app.timers.is_registered(_make_requested):
+        bpy.app.timers.unregister(_make_requested)
 
 
-def _want(view: ColorView) -> None:
-    _known.wanted[view] = None
-    if not bpy.app.timers.is_registered(_make_wanted):
-        bpy.app.timers.register(_make_wanted, first_interval=0.0)
+def _request_table(view: ColorView) -> None:
+    _tables.requested[view] = None
+    if not bpy.app.timers.is_registered(_make_requested):
+        bpy.app.timers.register(_make_requested, first_interval=0.0)
 
 
-def _make_wanted() -> None:
+def _make_requested() -> None:
     """A timer for Blender: make tables outside of drawing, where data may be created."""
-    if not _known.wanted:
+    if not _tables.requested:
         return
-    for view in tuple(_known.wanted):
+    for view in tuple(_tables.requested):
         try:
-            _known.tables[view] = DisplayTable(shown_by_blender(view, table_radiances()))
+            _tables.tables[view] = DisplayTable(apply_view_transform(view, table_radiances()))
         except Exception as error:
             traceback.print_exc()
-            _known.failed[view] = (
+            _tables.problems[view] = (
                 f"View transform {view.transform} cannot be read ({error}), so hair is shown with "
                 "Standard. Stop the preview and start it again."
             )
-        del _known.wanted[view]
-    while len(_known.tables) > CAPACITY:
-        _known.tables.popitem(last=False)
+        del _tables.requested[view]
+    while len(_tables.tables) > CAPACITY:
+        _tables.tables.popitem(last=False)
     redraw_views()
 
 
-def shown_by_blender(view: ColorView, radiances: Floats) -> Floats:
+def apply_view_transform(view: ColorView, radiances: Floats) -> Floats:
     """Code values in [0, 1] of scene-linear colours (..., 3), as Blender saves them; float32.
 
     Raises:
@@ -172,13 +172,13 @@ def shown_by_blender(view: ColorView, radiances: Floats) -> Floats:
     """
     pixels = np.ones((radiances.size // 3, 4), np.float32)
     pixels[:, :3] = radiances.reshape(-1, 3)
-    problem = _show(view, pixels)
+    problem = _apply_in_blender(view, pixels)
     if problem is not None:
         raise problem
     return pixels[:, :3].reshape(radiances.shape)
 
 
-def _show(view: ColorView, pixels: Floats) -> Exception | None:
+def _apply_in_blender(view: ColorView, pixels: Floats) -> Exception | None:
     """Replace these scene-linear colours, (count, 4), by their code values.
 
     Returns:
@@ -219,7 +219,7 @@ def _scene_with(view: ColorView, data: bpy.types.BlendData) -> bpy.types.Scene:
         settings.white_balance_temperature, settings.white_balance_tint = view.white_balance
     if view.curves:
         settings.use_curve_mapping = True
-        _put_curves(view.curves, settings.curve_mapping)
+        _set_curves(view.curves, settings.curve_mapping)
     picture = scene.render.image_settings
     picture.file_format, picture.color_mode, picture.color_depth = "PNG", "RGB", "16"
     picture.compression = 0
@@ -237,7 +237,7 @@ def _curves_of(mapping: bpy.types.CurveMapping) -> tuple[Any, ...]:
     return (*levels, mapping.tone, mapping.extend, mapping.use_clip, corners, *curves)
 
 
-def _put_curves(curves: tuple[Any, ...], mapping: bpy.types.CurveMapping) -> None:
+def _set_curves(curves: tuple[Any, ...], mapping: bpy.types.CurveMapping) -> None:
     """Set RGB curves to the result of `_curves_of`; new curves have two points."""
     mapping.black_level, mapping.white_level, mapping.tone, mapping.extend = curves[:4]
     mapping.use_clip = False

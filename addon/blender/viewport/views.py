@@ -22,11 +22,11 @@ from ...render.strand_pass import Statistics, StrandPass
 from ..base.redraw import redraw_views, soon
 
 #: types of views whose picture changes only with the scene, the view and its settings
-STEADY = ("SOLID", "WIREFRAME")
+STEADY_VIEW_TYPES = ("SOLID", "WIREFRAME")
 #: time [s] without a redraw until strands are drawn again, and until lagging shadows are
-_REST, _LAG = 0.5, 0.1
+_REDRAW_PAUSE, _CATCH_UP_PAUSE = 0.5, 0.1
 #: redraws that make a series; time [s] since the last draw of strands after which a single one does
-_ROW, _LONG = 3, 5.0
+_SERIES_LENGTH, _SERIES_SECONDS = 3, 5.0
 
 
 @dataclass(eq=False)
@@ -34,46 +34,46 @@ class View:
     """What is kept for a 3D view.
 
     address: of its region's data. marks: of what was last drawn into it, see CachedPicture.
-    counted: counts of what its picture shows, by session number of the hair.
-    is_behind: whether its shadows lag behind its lights, or it was drawn without waiting for the
+    statistics_by_uid: counts of what its picture shows, by session number of the hair.
+    is_outdated: whether its shadows lag behind its lights, or it was drawn without waiting for the
         GPU.
-    drawn_at: when its strands were last drawn [s]. shown_again: how often its picture was shown
-        since then. is_again: whether its strands must be drawn again for that reason.
-    wants_more: whether it waits for samples of soft shadows, see softening.py. is_soft: whether its
-        picture shows their mean, with the shadow on heads. has_all: whether of all samples.
-    fragments: number in the last sample of each groom; none before the first.
-    is_doubted: whether something else may hide hair than when its samples began.
+    drawn_at: when its strands were last drawn [s]. reshown_count: how often its picture was shown
+        since then. needs_redraw: whether its strands must be drawn again for that reason.
+    wants_samples: whether it waits for samples of soft shadows, see softening.py. is_soft: whether
+        its picture shows their mean, with the shadow on heads. has_all_samples: whether of all.
+    fragment_counts: number in the last sample of each groom; none before the first.
+    may_be_outdated: whether something else may hide hair than when its samples began.
     changed_at: when new contents were drawn that are to become soft [s].
     """
 
     address: int
     picture: CachedPicture = field(default_factory=CachedPicture)
     marks: tuple[Any, ...] = ()
-    counted: dict[int, Statistics] = field(default_factory=dict)
-    is_behind: bool = False
+    statistics_by_uid: dict[int, Statistics] = field(default_factory=dict)
+    is_outdated: bool = False
     drawn_at: float = 0.0
-    shown_again: int = 0
-    is_again: bool = False
+    reshown_count: int = 0
+    needs_redraw: bool = False
     seen_from: bytes = b""
-    wants_more: bool = False
+    wants_samples: bool = False
     is_soft: bool = False
-    has_all: bool = False
-    fragments: tuple[int, ...] = ()
-    is_doubted: bool = False
+    has_all_samples: bool = False
+    fragment_counts: tuple[int, ...] = ()
+    may_be_outdated: bool = False
     changed_at: float = 0.0
 
-    def turns_to(self, camera: Camera) -> bool:
+    def has_new_camera(self, camera: Camera) -> bool:
         """Whether it was last drawn from another camera; stores this one."""
         before, self.seen_from = self.seen_from, camera.view.tobytes()
         return before not in (b"", self.seen_from)
 
-    def moves_to(self, marks: tuple[Any, ...]) -> bool:
+    def has_new_marks(self, marks: tuple[Any, ...]) -> bool:
         """Whether something else was last drawn; stores these marks."""
         before, self.marks = self.marks, marks
         return not are_same_marks(before, marks)
 
 
-class _Known:
+class _KnownViews:
     """views: by address. switches: names of settings, by type of their owner. changes: number of
     changes of any scene."""
 
@@ -83,7 +83,7 @@ class _Known:
         self.changes = 0
 
 
-_known = _Known()
+_known = _KnownViews()
 
 
 def view_of(region_data: Any) -> View:
@@ -97,7 +97,7 @@ def known_views() -> tuple[View, ...]:
     return tuple(_known.views.values())
 
 
-def scene_changed() -> None:
+def invalidate_pictures() -> None:
     """Invalidate all pictures, as what hides strands may have changed."""
     _known.changes += 1
 
@@ -132,7 +132,7 @@ def _plain(value: Any) -> Any:
 def forget_views() -> None:
     """Forget all views, when they are no longer drawn."""
     _known.views.clear()
-    for timer in (_draw_afresh, _catch_up):
+    for timer in (_redraw_strands, _catch_up):
         if bpy.app.timers.is_registered(timer):
             bpy.app.timers.unregister(timer)
 
@@ -154,28 +154,30 @@ def _addresses() -> Iterator[int]:
                 yield from (each.data.as_pointer() for each in regions if each.data is not None)
 
 
-def was_shown_again(view: View, shading: Any) -> None:
+def record_reshown(view: View, shading: Any) -> None:
     """Record that a view has shown its kept picture."""
-    view.shown_again += 1
-    is_row = view.shown_again >= _ROW or time.monotonic() - view.drawn_at > _LONG
-    if shading.type not in STEADY and is_row:
-        view.is_again = True
-        soon(_draw_afresh, _REST)
+    view.reshown_count += 1
+    is_row = (
+        view.reshown_count >= _SERIES_LENGTH or time.monotonic() - view.drawn_at > _SERIES_SECONDS
+    )
+    if shading.type not in STEADY_VIEW_TYPES and is_row:
+        view.needs_redraw = True
+        soon(_redraw_strands, _REDRAW_PAUSE)
 
 
-def was_drawn(view: View) -> None:
+def record_drawn(view: View) -> None:
     """Record that the strands of a view were drawn."""
-    view.is_again, view.shown_again, view.drawn_at = False, 0, time.monotonic()
-    if view.is_behind:
-        soon(_catch_up, _LAG)
+    view.needs_redraw, view.reshown_count, view.drawn_at = False, 0, time.monotonic()
+    if view.is_outdated:
+        soon(_catch_up, _CATCH_UP_PAUSE)
 
 
-def _draw_afresh() -> None:
+def _redraw_strands() -> None:
     for view in _known.views.values():
-        if view.is_again and view.fragments:
-            was_drawn(view)
-            view.is_doubted, view.wants_more = True, True
-        elif view.is_again:
+        if view.needs_redraw and view.fragment_counts:
+            record_drawn(view)
+            view.may_be_outdated, view.wants_samples = True, True
+        elif view.needs_redraw:
             view.picture.forget()
     redraw_views()
 
