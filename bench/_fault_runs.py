@@ -82,7 +82,7 @@ def _write_bake(path: Path, version: int) -> None:
             writer.add(frame, {"value": np.full(1000, version)}, "hair=00")
         writer.finish(Facts("Hair", 1, 3, 24.0, "numpy", "hair=00", "0.1.0"))
         writer.publish()
-        writer.clean()
+        writer.remove_previous()
     finally:
         writer.abandon()
 
@@ -228,7 +228,7 @@ def _is_untrue(
         return named[1] not in {part for name in kept for part in name.split(os.sep)}
     chosen = re.search(r"Choose (/.+?) as the folder", error.remedy)
     if chosen is not None:
-        return Cache.found(Path(chosen[1])) is None
+        return Cache.find(Path(chosen[1])) is None
     is_placed = any(str(each) in text for each in places)
     return bool(kept) or is_new or not error.remedy or not is_placed
 

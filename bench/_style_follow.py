@@ -83,12 +83,12 @@ def _error(session: Any, frame: int) -> float:
     bpy.context.scene.frame_set(frame)
     depsgraph = bpy.context.evaluated_depsgraph_get()
     shown, rest = session.strands, session.groom.rig.strands
-    curves = read_curves(session.hair.found(), depsgraph).strands
+    curves = read_curves(session.hair.resolve(), depsgraph).strands
     first = rest.offsets[CURVES]
     grid = rest.points[first:].reshape(rest.strand_count - CURVES, -1, 3)
     along = np.linspace(0.0, 1.0, grid.shape[1])[:, None]
     bowed = grid + along**2 * (frame - 1.0) * np.array([SIDE, 0.0, LONGER])
-    matrix = np.array(session.head.found().evaluated_get(depsgraph).matrix_world)
+    matrix = np.array(session.head.resolve().evaluated_get(depsgraph).matrix_world)
     children = bowed.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3]
     of_children = float(np.linalg.norm(shown[first:] - children, axis=1).max())
     return max(apart(shown, rest.offsets[: CURVES + 1], curves), of_children)

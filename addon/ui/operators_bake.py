@@ -9,7 +9,7 @@ import bpy
 from ..blender.bakes import playback
 from ..blender.base.outcome import report
 from ..blender.preview import previews
-from ..blender.preview.bake import Bake, bakeable, free, show_in_renders
+from ..blender.preview.bake import Bake, free, is_bakeable, show_in_renders
 from ..blender.scene.fin_modifier import fin_modifier
 from ..blender.sessions.measures import table_of
 from ..errors import HairloomError
@@ -51,8 +51,8 @@ class HAIRLOOM_OT_bake(LongWork, bpy.types.Operator):
             else ""
         )
         count = "1 frame" if bake.frame_count == 1 else f"{bake.frame_count:,} frames"
-        if bake.unfelt:
-            report(self, "WARNING", " ".join(bake.unfelt))
+        if bake.unfelt_notes:
+            report(self, "WARNING", " ".join(bake.unfelt_notes))
         report(self, "INFO", f"Baked {count} of {names}{also}")
 
 
@@ -84,7 +84,9 @@ class HAIRLOOM_OT_bake_free(bpy.types.Operator):
 
 def chosen(context: bpy.types.Context) -> list[bpy.types.Object]:
     """The objects that the buttons apply to: hair, as for other buttons, and selected fins."""
-    return list(dict.fromkeys(filter(bakeable, (*chosen_hair(context), *context.selected_objects))))
+    return list(
+        dict.fromkeys(filter(is_bakeable, (*chosen_hair(context), *context.selected_objects)))
+    )
 
 
 def has_bake(obj: bpy.types.Object) -> bool:
@@ -139,7 +141,7 @@ def _draw_state(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
         figures = None if facts is None else facts.figures
         draw_figures(layout.column(align=True), table_of(figures))
     known = previews.bake_of(obj)
-    changed = () if facts is None or known is None else known.changed
+    changed = () if facts is None or known is None else known.changed_inputs
     text = "Out of date: " + ", ".join(changed) if changed else ""
     layout.label(text=text, icon="ERROR" if changed else "BLANK1")
 

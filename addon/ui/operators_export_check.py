@@ -9,7 +9,7 @@ from bpy.props import EnumProperty
 
 from ..blender.base.outcome import Outcome
 from ..blender.colliders.rigs import MadeRig
-from ..blender.preview.bake import bakeable
+from ..blender.preview.bake import is_bakeable
 from ..blender.preview.previews import made_rigs
 from ..blender.strands.export_check import ExportCheck
 from ..exchange.strand_export_settings import StrandExportSettings
@@ -64,7 +64,7 @@ def draw_motion(layout: bpy.types.UILayout, context: bpy.types.Context, *, use_b
 
 def writable(objects: Any) -> list[bpy.types.Object]:
     """The hair among these objects, except copies that show a bake in renders."""
-    return [obj for obj in objects if obj.type == "CURVES" and bakeable(obj)]
+    return [obj for obj in objects if obj.type == "CURVES" and is_bakeable(obj)]
 
 
 def draw(layout: bpy.types.UILayout, context: bpy.types.Context, panel: str) -> None:

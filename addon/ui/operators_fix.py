@@ -8,10 +8,10 @@ from typing import Any
 
 import bpy
 
-from ..blender.bakes.baked_copy import is_copy_gone, remove
+from ..blender.bakes.baked_copy import is_copy_gone, remove_copy
 from ..blender.base.objects import head_of, is_shape_editable, objects_in
 from ..blender.base.outcome import report
-from ..blender.preview.diagnostics import is_unevenly_scaled, set_surface, surface_for
+from ..blender.preview.diagnostics import is_unevenly_scaled, nearest_surface, set_surface
 from ..errors import HairloomError
 from .reports import reporting, waiting
 from .selection import chosen_hair, in_object_mode, needs_hair
@@ -36,7 +36,7 @@ class HAIRLOOM_OT_set_surface(bpy.types.Operator):
         hair, depsgraph = chosen_hair(context)[0], context.evaluated_depsgraph_get()
         selected = [obj for obj in context.selected_objects if obj.type == "MESH"]
         visible = [obj for obj in objects_in(context.view_layer) if obj.visible_get()]
-        mesh = surface_for(hair, selected or visible, depsgraph)
+        mesh = nearest_surface(hair, selected or visible, depsgraph)
         set_surface(hair, mesh)
         report(self, "INFO", f"{hair.name} now grows from {mesh.name}")
         return {"FINISHED"}
@@ -120,7 +120,7 @@ class HAIRLOOM_OT_show_in_renders(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         for hair in chosen_hair(context):
             if is_copy_gone(hair):
-                remove(hair)
+                remove_copy(hair)
         return {"FINISHED"}
 
 

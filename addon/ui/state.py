@@ -61,7 +61,7 @@ def _state(session: Session | None) -> str:
         return _being_made(session.stage)
     preview = previews[session.uid]
     if preview.phase is Phase.BAKED and preview.bake is not None:
-        return "baked, out of date" if preview.bake.changed else "baked"
+        return "baked, out of date" if preview.bake.changed_inputs else "baked"
     if session.is_pending:
         return _being_made(session.stage)
     if preview.phase is Phase.WAITING or preview.is_deferred:

@@ -48,7 +48,7 @@ def tips_lag(session: Any) -> bool:
     from hairloom.addon.blender.preview import previews
 
     previews.rest(bpy.context.evaluated_depsgraph_get(), keep_playing=True)
-    head, before = session.head.found(), strand_grid(session)
+    head, before = session.head.resolve(), strand_grid(session)
     for _ in range(FRAMES):
         head.location.x += STEP
         previews.advance(bpy.context.evaluated_depsgraph_get(), FRAME_S)

@@ -129,7 +129,7 @@ def test_a_preview_started_on_a_moved_head_shows_the_same_strands(swinging, get_
     bpy.context.scene.frame_set(5)
     previews.start(hair, get_depsgraph())
     np.testing.assert_array_equal(drawn(hair), baked_grid(cache, 5))
-    assert previews.previews[hair.session_uid].bake.changed == ()
+    assert previews.previews[hair.session_uid].bake.changed_inputs == ()
     bpy.context.scene.frame_set(2)
     np.testing.assert_array_equal(drawn(hair), baked_grid(cache, 2))
 
@@ -213,14 +213,14 @@ def test_changes_since_the_bake_are_reported_and_the_bake_still_plays(swinging, 
     bake(hair)
     scene, uid = bpy.context.scene, hair.session_uid
     shown = played(hair)
-    assert previews.previews[uid].bake.changed == ()
+    assert previews.previews[uid].bake.changed_inputs == ()
 
     def changed_at(frame):
         scene.frame_set(frame)
-        return previews.previews[uid].bake.changed
+        return previews.previews[uid].bake.changed_inputs
 
     hair.hairloom.dynamics.damping = 3.0
-    assert previews.previews[uid].bake.changed == ("settings",), "told at once"
+    assert previews.previews[uid].bake.changed_inputs == ("settings",), "told at once"
     assert changed_at(3) == ("settings",)
     np.testing.assert_array_equal(drawn(hair), shown[2])
     hair.hairloom.dynamics.damping = 0.5
@@ -247,11 +247,11 @@ def test_a_bake_of_another_solver_is_out_of_date(swinging, get_depsgraph, monkey
     hair, _ = swinging
     bake(hair)
     previews.start(hair, get_depsgraph())
-    assert previews.previews[hair.session_uid].bake.changed == ()
+    assert previews.previews[hair.session_uid].bake.changed_inputs == ()
     previews.stop_all()
     monkeypatch.setattr(groom_hashes, "SOLVER_VERSION", SOLVER_VERSION + 1)
     previews.start(hair, get_depsgraph())
-    assert previews.previews[hair.session_uid].bake.changed == ("solver",)
+    assert previews.previews[hair.session_uid].bake.changed_inputs == ("solver",)
 
 
 def test_a_head_that_is_posed_by_hand_takes_its_hair_along(swinging, get_depsgraph):
@@ -263,7 +263,7 @@ def test_a_head_that_is_posed_by_hand_takes_its_hair_along(swinging, get_depsgra
     head.location.y = 0.5
     bpy.context.view_layer.update()
     assert drawn(hair)[:, 0, 1].mean() == pytest.approx(0.5, abs=0.02)
-    assert previews.previews[session.uid].bake.changed == ("pose",)
+    assert previews.previews[session.uid].bake.changed_inputs == ("pose",)
     bpy.context.scene.frame_set(4)
     np.testing.assert_array_equal(drawn(hair), baked)
 
@@ -386,7 +386,7 @@ def test_two_writers_of_one_folder_never_mix_their_frames(tmp_path):
     for value, writer in enumerate(writers):
         writer.finish(Facts("Hair", 1, 2, 24.0, "numpy", "hair=00", "0.1.0"))
         writer.publish()
-        writer.clean()
+        writer.remove_previous()
         shown = Cache(folder)
         arrays = [shown.constants(), shown.frame(1), shown.frame(2)]
         assert [int(each["value"]) for each in arrays] == [value] * 3
@@ -454,7 +454,7 @@ def test_frames_that_are_open_elsewhere_go_when_their_writer_is_gone(tmp_path):
         writer.add(1, {"value": np.full(3, value)}, "hash")
         writer.finish(Facts("Hair", 1, 1, 24.0, "numpy", "hash", "0.1.0"))
         writer.publish()
-        writer.clean()
+        writer.remove_previous()
 
     bake(1)
     (held,) = folder.glob("frames-*/frame_000001.npz")

@@ -50,7 +50,7 @@ def test_hair_that_was_hidden_stays_hidden_when_its_copy_goes(hair):
     hair.hide_render = True
     bake(hair)
     bpy.data.objects.remove(hair.hairloom.bake.copy)
-    assert baked_copy.heal() == ["Hair"] and hair.hide_render
+    assert baked_copy.restore_hair_without_copy() == ["Hair"] and hair.hide_render
 
 
 def test_a_copy_shows_no_bake_of_other_strands(hair, new_hair, sphere, tmp_path, capsys):

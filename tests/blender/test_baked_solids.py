@@ -14,9 +14,9 @@ bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy mod
 from hairloom.addon.blender.bakes import playback  # noqa: E402
 from hairloom.addon.blender.bakes.baked_solids import (  # noqa: E402
     BakedSolids,
+    interpolated_solids,
     solid_arrays,
     solid_constants,
-    solids_between,
 )
 from hairloom.addon.blender.bakes.guide_motion import BakedGuides  # noqa: E402
 from hairloom.addon.blender.cards.motion import moved_cards  # noqa: E402
@@ -95,11 +95,11 @@ def test_damaged_solids_are_reported(mesh):
 def test_solids_are_interpolated_linearly_between_frames(mesh):
     one, other = (solid_arrays(solids(mesh, bend), (mesh,)) for bend in (0.4, 0.6))
     other["solid_matrices"] = other["solid_matrices"] + 0.1
-    half = solids_between(one, other, 0.5)
+    half = interpolated_solids(one, other, 0.5)
     for name in ("solid_matrices", "solid_shapes", "solid_balls"):
         np.testing.assert_allclose(half[name], 0.5 * (one[name] + other[name]), atol=1e-6)
     gone = {**other, "solids": other["solids"][1:]}
-    assert solids_between(one, gone, 0.5) is one
+    assert interpolated_solids(one, gone, 0.5) is one
 
 
 @pytest.fixture(params=few_in_commits(["sphere", "mesh"]))

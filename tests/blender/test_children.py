@@ -306,7 +306,7 @@ def test_a_bake_of_children_plays_back_bit_for_bit(moving, get_depsgraph):
     bpy.context.scene.frame_set(4)
     again = previews.start(moving, get_depsgraph())
     np.testing.assert_array_equal(strand_grid(again), shown[3])
-    assert previews.previews[again.uid].bake.changed == ()
+    assert previews.previews[again.uid].bake.changed_inputs == ()
 
 
 def test_a_bake_keeps_its_warnings(new_hair, get_depsgraph, tmp_path):
@@ -330,7 +330,7 @@ def test_a_bake_says_when_children_have_changed(moving, sphere, get_depsgraph):
 
     def changed():
         catch_up(get_depsgraph)
-        return previews.previews[session.uid].bake.changed
+        return previews.previews[session.uid].bake.changed_inputs
 
     children = moving.data.hairloom.children
     assert changed() == ()

@@ -69,7 +69,7 @@ def test_endlessly_nested_facts_are_reported(bake):
 
 
 def test_facts_of_any_size_are_refused_before_they_are_read(bake, monkeypatch):
-    monkeypatch.setattr(cache, "_LARGEST_FACTS", 100)
+    monkeypatch.setattr(cache, "_MAX_FACTS_BYTES", 100)
     with pytest.raises(HairloomError, match="more than 100 bytes"):
         Cache(bake)
 

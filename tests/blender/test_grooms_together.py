@@ -9,7 +9,7 @@ from bake_files import contents, frames_in
 from hedgehogs import hedgehog
 
 from hairloom.addon.blender.bakes import playback
-from hairloom.addon.blender.bakes.stale_bakes import changed_since
+from hairloom.addon.blender.bakes.stale_bakes import changed_inputs
 from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.preview.bake import Bake
 from hairloom.addon.blender.preview.diagnostics import unfelt_note
@@ -214,15 +214,15 @@ def test_a_bake_is_out_of_date_once_other_hair_has_changed(two):
     one, other = two
     baked(*two)
     previewed(*two)
-    assert previews.bake_of(one).changed == ()
+    assert previews.bake_of(one).changed_inputs == ()
     other.data.position_data[7].vector.x += 0.02
     previewed(*two)
-    assert previews.bake_of(one).changed == ("other grooms",)
+    assert previews.bake_of(one).changed_inputs == ("other grooms",)
     one.hairloom.dynamics.volume = 0.0
     baked(one)
     other.data.position_data[7].vector.x += 0.02
     previewed(*two)
-    assert previews.bake_of(one).changed == ()
+    assert previews.bake_of(one).changed_inputs == ()
 
 
 def test_a_bake_is_out_of_date_by_what_moves_other_hair_in_its_frame(two):
@@ -241,7 +241,7 @@ def test_a_bake_is_out_of_date_by_what_moves_other_hair_in_its_frame(two):
 
     def changed(frame):
         scene.frame_set(frame)
-        return changed_since(one, cache, bpy.context.evaluated_depsgraph_get())
+        return changed_inputs(one, cache, bpy.context.evaluated_depsgraph_get())
 
     assert [changed(frame) for frame in (1, 2, 3)] == [()] * 3
     other.name = "A beard"

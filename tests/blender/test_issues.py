@@ -58,7 +58,7 @@ def test_of_many_curves_a_sample_is_checked(new_hair, sphere):
     hair = new_hair()
     hair.data.add_curves([3] * 500)
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    assert diagnostics.surface_for(hair, [sphere], depsgraph) == sphere
+    assert diagnostics.nearest_surface(hair, [sphere], depsgraph) == sphere
     assert curves.read_curves(hair, depsgraph).strands.strand_count == 60, "the rest has no length"
 
 

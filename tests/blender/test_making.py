@@ -572,7 +572,7 @@ def test_playback_goes_on_before_the_hair_is_made(hair, moving, get_depsgraph, g
     hair.hairloom.dynamics.device = "numpy"
     session = previews.start(hair, get_depsgraph())
     fields.field_of(session.source.head, session.settings[DynamicsSettings], place="Head")
-    monkeypatch.setattr(playback, "is_played", lambda: True)
+    monkeypatch.setattr(playback, "is_animation_playing", lambda: True)
     before = rounds(session, 1, 2, 3, 4)  # would wait for the gate forever if it blocked
     assert (
         not session.is_made
@@ -608,7 +608,7 @@ def test_playback_goes_on_before_a_collider_is_made(hair, moving, get_depsgraph,
     monkeypatch.setattr(DistanceField, "from_surface", wait_and_make)
     session = previews.start(hair, get_depsgraph())
     monkeypatch.setattr(latest_job, "is_blocking", lambda: False)
-    monkeypatch.setattr(playback, "is_played", lambda: True)
+    monkeypatch.setattr(playback, "is_animation_playing", lambda: True)
     rounds(session, 1, 2, 3)
     assert session.is_made and not session.is_playing and previews.previews[session.uid].is_deferred
     opened.set()
@@ -619,7 +619,7 @@ def test_playback_goes_on_before_a_collider_is_made(hair, moving, get_depsgraph,
 
 def test_old_hair_goes_on_in_playback_too(playing, hair, moving, get_depsgraph, monkeypatch):
     opened = hold(monkeypatch)
-    monkeypatch.setattr(playback, "is_played", lambda: True)
+    monkeypatch.setattr(playback, "is_animation_playing", lambda: True)
     rounds(playing, 1, 2)
     hair.data.hairloom.guides.guide_count = 7
     scene_events.catch_up(get_depsgraph())

@@ -242,7 +242,7 @@ def test_other_hair_is_made_into_cards_in_the_thread(shaded, get_depsgraph, monk
 
 def test_a_render_has_the_current_occlusion_by_other_hair(shaded, get_depsgraph):
     session, strands = shaded
-    hair = session.hair.found()
+    hair = session.hair.resolve()
 
     def rendered():
         return read_groom(hair, get_depsgraph()).cards.mesh.occlusion

@@ -13,7 +13,7 @@ from hairloom.addon.blender.bakes.simulation import differences
 from hairloom.addon.blender.base.vertex_weights import Memberships, read_weights
 from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.preview.bake import Bake
-from hairloom.addon.blender.preview.preview import rig_for
+from hairloom.addon.blender.preview.preview import baked_rig_for
 from hairloom.addon.blender.properties import presets
 from hairloom.addon.blender.properties.groom_settings import GroomSettings
 from hairloom.addon.blender.properties.properties import masks_of_groom
@@ -245,7 +245,7 @@ def test_an_image_is_read_again_by_a_preview_that_has_the_hair_of_its_bake(
     hair.hairloom.dynamics.volume_mask = "Top"
     hair.hairloom.bake.folder, bpy.context.scene.frame_end = str(tmp_path / "bake"), 1
     list(Bake.of([hair], bpy.context.scene).steps())
-    baked = rig_for(hair, bpy.context.scene)
+    baked = baked_rig_for(hair, bpy.context.scene)
     session = Session(hair, get_depsgraph(), baked=baked)
     assert baked is not None and session.warnings == ()
     bpy.data.images["Top"].pixels.foreach_set(np.full(64 * 4 * 4, 0.25, np.float32))

@@ -12,7 +12,7 @@ from tiers import few_in_commits
 
 from hairloom.addon.blender.bakes import playback
 from hairloom.addon.blender.preview import previews
-from hairloom.addon.blender.preview.bake import Bake, bakeable, simulation_for
+from hairloom.addon.blender.preview.bake import Bake, is_bakeable, simulation_for
 from hairloom.addon.blender.scene.fin_modifier import POSITION, add_modifier
 
 LAST = 6
@@ -156,7 +156,7 @@ def test_a_render_changes_nothing_of_what_the_viewport_shows(scene, get_depsgrap
     bpy.ops.render.render()
     np.testing.assert_array_equal(strand_grid(session), before)
     assert previews.sessions() == (session,) and scene.frame_current == 4
-    assert not playback._known.is_rendering
+    assert not playback._loaded.is_rendering
 
 
 def test_motion_blur_smears_the_hair_between_two_frames(scene, tmp_path):
@@ -271,7 +271,7 @@ def shown(flag_object):
 
 
 def test_a_baked_fin_equals_playback_and_plays_without_a_preview(fin, get_depsgraph):
-    assert bakeable(fin)
+    assert is_bakeable(fin)
     previews.add(simulation_for(fin, get_depsgraph()), get_depsgraph())
     frames = range(1, LAST + 1)
     played = []

@@ -10,7 +10,7 @@ from hairloom.addon.blender.base.objects import objects_in
 from hairloom.addon.blender.cards.occluders import read_occluders
 from hairloom.addon.blender.colliders.spheres import grown_on
 from hairloom.addon.blender.command_line import bake_job, object_settings
-from hairloom.addon.blender.preview.diagnostics import surface_for
+from hairloom.addon.blender.preview.diagnostics import nearest_surface
 from hairloom.addon.blender.sessions.fins import fins_in
 from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
 from hairloom.addon.ui import menus
@@ -54,7 +54,7 @@ def test_a_removed_object_is_no_obstacle_for_a_job(hair):
 
 def test_a_removed_object_is_no_obstacle_for_growing(hair, sphere):
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    assert surface_for(hair, objects_in(bpy.context.view_layer), depsgraph) == sphere
+    assert nearest_surface(hair, objects_in(bpy.context.view_layer), depsgraph) == sphere
 
 
 def test_hair_on_a_selected_mesh_is_not_that_which_is_hidden(hair, sphere):

@@ -9,7 +9,7 @@ from tiers import few_in_commits
 from hairloom.addon import motion_flow
 from hairloom.addon.blender.bakes import playback
 from hairloom.addon.blender.bakes.cache import Cache
-from hairloom.addon.blender.bakes.stale_bakes import changed_since
+from hairloom.addon.blender.bakes.stale_bakes import changed_inputs
 from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.preview.bake import Bake
@@ -123,8 +123,8 @@ def test_frozen_hair_goes_along_and_then_goes_on(playing, get_depsgraph):
 def test_hair_goes_along_as_far_as_it_is_simulated(playing, get_depsgraph, is_cut):
     """At a cut and when frozen, unselected or unsimulated hair is exactly in its style."""
     settings, head, session = playing
-    chosen = np.arange(0, len(session.hair.found().data.curves), 2)
-    select(session.hair.found(), "CURVE", chosen)
+    chosen = np.arange(0, len(session.hair.resolve().data.curves), 2)
+    select(session.hair.resolve(), "CURVE", chosen)
     settings.only_selected = True
     session.read_again(get_depsgraph())
     session.play(get_depsgraph())
@@ -249,7 +249,7 @@ def select(hair, domain, chosen):
 def test_only_selected_curves_are_simulated(playing, get_depsgraph, domain):
     """Unselected guides are exactly in their style."""
     settings, head, session = playing
-    hair = session.hair.found()
+    hair = session.hair.resolve()
     chosen = np.arange(0, len(hair.data.curves), 2)
     select(hair, domain, chosen)
     settings.only_selected = True
@@ -284,15 +284,15 @@ def test_keyframes_turn_only_selected_on_and_off(new_hair, sphere, tmp_path, get
     rig = playback.rig_in(cache)
     for frame in (2, 3, 4):
         scene.frame_set(frame)
-        assert changed_since(hair, cache, get_depsgraph()) == ()
+        assert changed_inputs(hair, cache, get_depsgraph()) == ()
         arrays = cache.frame(frame)
         style = motion_flow.style_of_guides(rig.rig, rig.pose(arrays))
         is_away = (arrays["guides"] != style).any(axis=(1, 2))
         np.testing.assert_array_equal(is_away, np.isin(rig.rig.guides, chosen) | (frame != 3))
     select(hair, "CURVE", chosen[:4])
-    assert changed_since(hair, cache, get_depsgraph()) == ()
+    assert changed_inputs(hair, cache, get_depsgraph()) == ()
     scene.frame_set(3)
-    assert changed_since(hair, cache, get_depsgraph()) == ("selection",)
+    assert changed_inputs(hair, cache, get_depsgraph()) == ("selection",)
 
 
 def test_without_a_selection_attribute_all_hair_is_simulated(playing, get_depsgraph):
@@ -308,7 +308,7 @@ def test_without_a_selection_attribute_all_hair_is_simulated(playing, get_depsgr
 
 def test_a_selection_of_nothing_is_named(playing, get_depsgraph):
     settings, head, session = playing
-    select(session.hair.found(), "CURVE", [])
+    select(session.hair.resolve(), "CURVE", [])
     settings.only_selected = True
     session.read_again(get_depsgraph())
     session.play(get_depsgraph())

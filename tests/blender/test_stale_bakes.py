@@ -13,7 +13,7 @@ from grids import baked_grid
 
 from hairloom.addon.blender.bakes import playback
 from hairloom.addon.blender.bakes.guide_motion import BakedGuides
-from hairloom.addon.blender.bakes.stale_bakes import changed_since
+from hairloom.addon.blender.bakes.stale_bakes import changed_inputs
 from hairloom.addon.blender.preview.bake import Bake
 from hairloom.addon.blender.strands.export_check import ExportCheck
 from hairloom.addon.blender.strands.strand_export import StrandExport
@@ -47,7 +47,7 @@ def changed(
     def look() -> tuple[str, ...]:
         cache = playback.cache_of(baked[0])
         assert cache is not None
-        return changed_since(baked[0], cache, get_depsgraph())
+        return changed_inputs(baked[0], cache, get_depsgraph())
 
     return look
 

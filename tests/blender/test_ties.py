@@ -12,7 +12,7 @@ from tiers import few_in_commits
 
 from hairloom.addon.blender.bakes import playback
 from hairloom.addon.blender.bakes.cache import Cache
-from hairloom.addon.blender.bakes.stale_bakes import changed_since
+from hairloom.addon.blender.bakes.stale_bakes import changed_inputs
 from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.preview.bake import Bake
@@ -258,9 +258,9 @@ def test_tips_are_held_where_a_vertex_group_says(swinging, get_depsgraph):
     cache = playback.cache_of(hair)
     on_right = [vertex.index for vertex in bun.data.vertices if vertex.co.x > 0.01]
     bun.vertex_groups.new(name="Right").add(on_right, 1.0, "REPLACE")
-    assert changed_since(hair, cache, get_depsgraph()) == ()
+    assert changed_inputs(hair, cache, get_depsgraph()) == ()
     hair.hairloom.tip_group = "Right"
-    assert changed_since(hair, cache, get_depsgraph()) == ("ties",)
+    assert changed_inputs(hair, cache, get_depsgraph()) == ("ties",)
     session = previews.start(hair, get_depsgraph())
     held = set(session.rig.holds.strand)
     spacing = 0.18 * 2.0 * np.pi / 24
@@ -288,15 +288,15 @@ def test_a_bake_keeps_what_ties_hold(swinging, get_depsgraph):
     np.testing.assert_array_equal(played(hair), live)
     cache = playback.cache_of(hair)
     bpy.context.scene.frame_set(3)
-    assert changed_since(hair, cache, get_depsgraph()) == ()
+    assert changed_inputs(hair, cache, get_depsgraph()) == ()
     np.testing.assert_array_equal(baked_grid(cache, 3), live[2])
     assert playback.pose_in(cache, 3, 0.5).anchors.shape == (1, 4, 4)
     one.location.z += 0.01
     bpy.context.view_layer.update()
-    assert changed_since(hair, cache, get_depsgraph()) == ("ties",)
+    assert changed_inputs(hair, cache, get_depsgraph()) == ("ties",)
     one.location.z -= 0.01
     hair.hairloom.tie_collection = None
-    assert "ties" in changed_since(hair, cache, get_depsgraph())
+    assert "ties" in changed_inputs(hair, cache, get_depsgraph())
 
 
 def test_a_tie_added_during_a_preview_takes_effect(swinging, get_depsgraph):

@@ -100,7 +100,7 @@ def test_frames_that_playback_drops_are_made_up_for(swinging, monkeypatch):
         advance(session, depsgraph, duration)
 
     monkeypatch.setattr(type(session), "advance", noted)
-    monkeypatch.setattr(playback, "is_played", lambda: True)
+    monkeypatch.setattr(playback, "is_animation_playing", lambda: True)
     go(1, 2, 5, 6)
     assert durations == pytest.approx([1 / 24, 3 / 24, 1 / 24])
     go(1, 2)
@@ -136,7 +136,7 @@ def test_free_play_is_shaken_by_dragging_and_handed_over_to_playback(
     go(4)
     previews.advance(get_depsgraph(), 1 / 24)
     assert previews.is_playing() and lag(session) > 0.005
-    monkeypatch.setattr(playback, "is_played", lambda: True)
+    monkeypatch.setattr(playback, "is_animation_playing", lambda: True)
     go(5)
     assert not previews.is_playing() and session.is_playing
     assert lag(session) > 0.005, "it goes on from where it was"

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from hairloom.addon.blender.bakes import playback
-from hairloom.addon.blender.bakes.groom_hashes import settings_part
-from hairloom.addon.blender.bakes.stale_bakes import changed_since
+from hairloom.addon.blender.bakes.groom_hashes import settings_hash
+from hairloom.addon.blender.bakes.stale_bakes import changed_inputs
 from hairloom.addon.blender.colliders.rigs import MadeRig
 from hairloom.addon.blender.preview.bake import Bake
-from hairloom.addon.blender.preview.preview import rig_for
+from hairloom.addon.blender.preview.preview import baked_rig_for
 from hairloom.addon.blender.properties.groom_settings import GroomSettings
 from hairloom.addon.blender.scene.source import read_source
 from hairloom.addon.dynamics.settings import DynamicsSettings
@@ -47,12 +47,12 @@ def test_water_acts_on_look_children_and_motion_and_leaves_what_is_stored(hair: 
 
 
 def test_a_bake_of_dry_hair_is_out_of_date_once_it_is_wet(hair: Any) -> None:
-    before = settings_part(hair)
+    before = settings_hash(hair)
     hair.data.hairloom.shading.wetness = 0.5
-    assert settings_part(hair) != before
+    assert settings_hash(hair) != before
     hair.data.hairloom.shading.wetness = 0.0
     hair.data.hairloom.shading.dust = 0.5  # dust has no weight
-    assert settings_part(hair) == before
+    assert settings_hash(hair) == before
 
 
 def test_hair_that_becomes_wet_is_baked_with_the_children_of_its_first_frame(
@@ -70,8 +70,8 @@ def test_hair_that_becomes_wet_is_baked_with_the_children_of_its_first_frame(
     assert cache is not None
     for frame in (1, 2, 3):
         scene.frame_set(frame)
-        assert changed_since(hair, cache, bpy.context.evaluated_depsgraph_get()) == ()
-        assert rig_for(hair, scene) is not None
+        assert changed_inputs(hair, cache, bpy.context.evaluated_depsgraph_get()) == ()
+        assert baked_rig_for(hair, scene) is not None
 
 
 def test_hair_made_real_has_its_water_within_it(hair: Any) -> None:

@@ -103,5 +103,5 @@ def test_what_fails_is_at_rest() -> None:
 def test_what_a_frame_change_means(
     before: int | None, now: int, is_played: bool, event: str, ahead: int
 ) -> None:
-    found = phases.frame_event(before, now, 1, is_played=is_played, longest=24.0)
+    found = phases.frame_event(before, now, 1, is_played=is_played, max_dropped=24.0)
     assert found == (Event[event], ahead)

@@ -44,7 +44,7 @@ def steps():
     yield from sculpt(hair)
     yield from comb(hair)
     yield from undo(hair)
-    yield from paint(session().hair.found())  # which Ctrl-Z has replaced
+    yield from paint(session().hair.resolve())  # which Ctrl-Z has replaced
     assert "Traceback" not in log.new_output(), "something has raised"
 
 

@@ -145,7 +145,7 @@ def bake_in_the_window():
     cache = hairloom_module("playback").cache_of(bpy.data.objects["Hair"])
     assert cache.facts.frame_count == LAST
     preview = hairloom_module("previews").previews[session().uid]
-    assert preview.phase.name == "BAKED" and preview.bake.changed == (), preview.bake
+    assert preview.phase.name == "BAKED" and preview.bake.changed_inputs == (), preview.bake
     driver.screenshot("baked")
     bpy.ops.screen.animation_play()
     yield from wait_until(lambda: scene.frame_current not in (7, LAST), "Blender does not play")

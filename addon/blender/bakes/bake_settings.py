@@ -13,7 +13,7 @@ from ...exchange.files.file_names import name_key, safe_folder_name
 from .cache import owner_and_file
 
 #: Folder beside Blender files; it holds one folder of bakes for each file.
-_BESIDE = "//hairloom_cache"
+_CACHE_FOLDER = "//hairloom_cache"
 
 #: remedy for a linked object
 OVERRIDE = "Make a library override of it (Object > Library Override > Make)"
@@ -48,27 +48,27 @@ def frame_range(first: int, last: int, place: str) -> range:
 
 def folder_of(obj: bpy.types.Object) -> Path | None:
     """The folder of the object's bake; None where none is set."""
-    return _named(obj, lambda owner: owner.hairloom.bake.folder)
+    return _absolute_path(obj, lambda owner: owner.hairloom.bake.folder)
 
 
 def shown_folder_of(curves: bpy.types.Curves) -> Path | None:
     """The folder of the bake that curves show in renders; None where they show none."""
-    return _named(curves, lambda owner: owner.hairloom.baked_in)
+    return _absolute_path(curves, lambda owner: owner.hairloom.baked_in)
 
 
-def _named(owner: Any, read: Callable[[Any], str]) -> Path | None:
+def _absolute_path(owner: Any, read: Callable[[Any], str]) -> Path | None:
     """The absolute path of a folder property of a data-block; None where it is empty, or relative
     (//) in a file that has not been saved. An override that has not changed the property resolves
     it against the library's file."""
     folder, library, override = read(owner), owner.library, owner.override_library
     if override is not None and override.reference and read(override.reference) == folder:
-        return _named(override.reference, read)
+        return _absolute_path(override.reference, read)
     if not folder or (folder.startswith("//") and not bpy.data.filepath and library is None):
         return None
     return Path(bpy.path.abspath(folder, library=library))
 
 
-def choose_folder(obj: bpy.types.Object) -> Path:
+def assign_folder(obj: bpy.types.Object) -> Path:
     """The folder to bake into; an object without a folder of its own is assigned one.
 
     A bake belongs to one object of one file. A duplicated object still has the folder of its
@@ -79,11 +79,11 @@ def choose_folder(obj: bpy.types.Object) -> Path:
     """
     check_not_linked(obj)
     bake = obj.hairloom.bake
-    beside = _beside(obj)
-    is_of_another_file = bake.folder.startswith(f"{_BESIDE}/") and not bake.folder.startswith(
+    beside = _default_folder(obj)
+    is_of_another_file = bake.folder.startswith(f"{_CACHE_FOLDER}/") and not bake.folder.startswith(
         f"{beside}/"
     )
-    if not bake.folder or is_of_another_file or _is_shared(obj):
+    if not bake.folder or is_of_another_file or _is_folder_shared(obj):
         bake.folder = _own_folder(obj, beside)
     folder = folder_of(obj)
     if folder is None:
@@ -125,9 +125,9 @@ def check_owner(obj: bpy.types.Object, folder: Path) -> None:
         )
 
 
-def is_own(obj: bpy.types.Object, folder: Path) -> bool:
+def owns_bake(obj: bpy.types.Object, folder: Path) -> bool:
     """Whether the bake in an object's folder belongs to no other object or file."""
-    return not (_is_shared(obj) or _other_owner(obj, folder))
+    return not (_is_folder_shared(obj) or _other_owner(obj, folder))
 
 
 def _other_owner(obj: bpy.types.Object, folder: Path) -> str:
@@ -155,29 +155,29 @@ def folder_names(objects: Sequence[bpy.types.Object]) -> list[str]:
     return names
 
 
-def _beside(obj: bpy.types.Object) -> str:
+def _default_folder(obj: bpy.types.Object) -> str:
     stem = Path(file_name(obj)).stem
-    return f"{_BESIDE}/{safe_folder_name(stem, fallback='file')}"
+    return f"{_CACHE_FOLDER}/{safe_folder_name(stem, fallback='file')}"
 
 
 def _own_folder(obj: bpy.types.Object, beside: str) -> str:
-    named = (other.hairloom.bake.folder for other in _others(obj))
+    named = (other.hairloom.bake.folder for other in _other_objects(obj))
     taken = {name_key(Path(folder).name) for folder in named if folder}
     return f"{beside}/{safe_folder_name(obj.name, taken)}"
 
 
-def _is_shared(obj: bpy.types.Object) -> bool:
+def _is_folder_shared(obj: bpy.types.Object) -> bool:
     """Whether another object has the same folder, as a duplicate and its original do."""
-    own = _place_of(obj)
-    return bool(own) and own in map(_place_of, _others(obj))
+    own = _folder_key(obj)
+    return bool(own) and own in map(_folder_key, _other_objects(obj))
 
 
-def _place_of(obj: bpy.types.Object) -> str:
+def _folder_key(obj: bpy.types.Object) -> str:
     """A key of the object's folder, equal for paths that are one folder on some file system; empty
     where none is set."""
     folder = folder_of(obj)
     return "" if folder is None else name_key(str(folder.resolve()))
 
 
-def _others(obj: bpy.types.Object) -> list[bpy.types.Object]:
+def _other_objects(obj: bpy.types.Object) -> list[bpy.types.Object]:
     return [other for other in bpy.data.objects if other != obj]

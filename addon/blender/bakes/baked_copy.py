@@ -41,7 +41,7 @@ def show_in_renders(
         curves = bpy.data.hair_curves.new(f"{hair.name} Baked")
         copy = bpy.data.objects.new(curves.name, curves)
     link_into(copy, hair.users_collection, depsgraph.scene)
-    _fill(copy.data, hair, rig, depsgraph)
+    _write_strands(copy.data, hair, rig, depsgraph)
     bake.copy = copy
     if not bake.hides:
         bake.hides, bake.was_hidden = True, hair.hide_render
@@ -58,7 +58,7 @@ def show_in_renders(
     return copy
 
 
-def remove(hair: bpy.types.Object) -> None:
+def remove_copy(hair: bpy.types.Object) -> None:
     """Remove the copy, so that renders show the hair itself again."""
     bake = hair.hairloom.bake
     copy = bake.copy
@@ -75,7 +75,7 @@ def remove(hair: bpy.types.Object) -> None:
     remove_hair(copy)
 
 
-def heal() -> list[str]:
+def restore_hair_without_copy() -> list[str]:
     """Let renders show hair again if its copy was deleted, or unlinked from all scenes.
 
     Returns:
@@ -84,7 +84,7 @@ def heal() -> list[str]:
     healed = []
     for hair in bpy.data.objects:
         if is_copy_gone(hair) and hair.library is None:
-            remove(hair)
+            remove_copy(hair)
             healed.append(hair.name)
     return healed
 
@@ -95,7 +95,7 @@ def is_copy_gone(hair: bpy.types.Object) -> bool:
     return bool(bake.hides and not (bake.copy and bake.copy.users_scene))
 
 
-def _fill(
+def _write_strands(
     curves: bpy.types.Curves,
     hair: bpy.types.Object,
     rig: BakedRig,
@@ -117,7 +117,7 @@ def _fill(
     set_attribute(curves, "radius", "POINT", strands.radius)
     shown = hair.evaluated_get(depsgraph).data
     if len(shown.curves) == strands.strand_count:  # else curves and strands do not correspond
-        _take_attributes(curves, shown)
+        _copy_attributes(curves, shown)
     set_colors(curves, strands)
     curves.materials.clear()
     for material in hair.data.materials:
@@ -131,7 +131,7 @@ def _are_poly(curves: bpy.types.Curves) -> bool:
     return types is not None and len(types) > 0 and bool((types == _POLY).all())
 
 
-def _take_attributes(curves: bpy.types.Curves, shown: bpy.types.Curves) -> None:
+def _copy_attributes(curves: bpy.types.Curves, shown: bpy.types.Curves) -> None:
     """Copy the attributes that materials may read from a strand: root UVs, groups, colours."""
     for attribute in shown.attributes:
         # Blender's own are INT8, such as curve types, or have names that begin with a dot

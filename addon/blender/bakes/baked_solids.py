@@ -73,7 +73,7 @@ def solid_arrays(colliders: Sequence[PosedCollider], meshes: Sequence[Surface]) 
     for posed in colliders:
         collider = posed.collider
         if isinstance(collider, DistanceField):
-            number, shape = _shape_of(collider, meshes)
+            number, shape = _mesh_and_shape(collider, meshes)
             solids.append((_MESH, number, sum(map(len, shapes)), len(shape)))
             shapes.append(shape)
             continue
@@ -100,7 +100,7 @@ def _rows(centers: Sequence[Floats] | Floats, radii: Sequence[float] | Floats) -
     return np.concatenate([np.asarray(centers), np.asarray(radii)[:, None]], axis=1)
 
 
-def solids_between(frame: Arrays, there: Arrays, fraction: float) -> Arrays:
+def interpolated_solids(frame: Arrays, there: Arrays, fraction: float) -> Arrays:
     """The arrays of `solid_arrays`, linearly interpolated between two frames; those of the first
     one where a collider was added or removed."""
     if "solids" not in frame or not np.array_equal(frame["solids"], there["solids"]):
@@ -109,7 +109,7 @@ def solids_between(frame: Arrays, there: Arrays, fraction: float) -> Arrays:
     return frame | {name: frame[name] + (there[name] - frame[name]) * fraction for name in moving}
 
 
-def _shape_of(field: DistanceField, meshes: Sequence[Surface]) -> tuple[int, Floats]:
+def _mesh_and_shape(field: DistanceField, meshes: Sequence[Surface]) -> tuple[int, Floats]:
     """The number of the mesh that a field was made from, and its vertices, none if at rest."""
     assert field.surface is not None, "fields of scenes know their meshes"
     shape = field.surface.positions
@@ -181,7 +181,7 @@ class BakedSolids:
         kind, mesh, first, count = row
         if kind == _MESH:
             shape = frame["solid_shapes"][first : first + count]
-            bent = self._bent(mesh, blocking)
+            bent = self._deformable_field(mesh, blocking)
             return bent.at(shape) if count else bent.field
         rows = frame["solid_balls"][first : first + count]
         if kind == _BALL:
@@ -190,7 +190,7 @@ class BakedSolids:
             return CapsuleCollider(rows[0, :3], rows[1, :3], float(rows[0, 3]))
         return SphereSetCollider(rows[:, :3], rows[:, 3])
 
-    def _bent(self, number: int, blocking: bool) -> DeformedField:
+    def _deformable_field(self, number: int, blocking: bool) -> DeformedField:
         """The field of a mesh that may deform."""
         if number not in self._fields:
             named = (self.constants[f"mesh_{number}_{name}"] for name in ("positions", "triangles"))

@@ -44,12 +44,12 @@ VERSION = 3
 #: Arrays whose length may differ between frames.
 _VARIABLE_LENGTH = frozenset({"led_strands", "led_points"}) | VARIABLE_LENGTH
 FACTS, CONSTANTS = "cache.json", "constants.npz"
-_OURS = re.compile(r"cache\.json|constants\.npz|frame_-?\d{5,7}\.npz")
-_FRAMES = re.compile(rf"frames-{WRITER_TAG}")
+_BAKE_FILES = re.compile(r"cache\.json|constants\.npz|frame_-?\d{5,7}\.npz")
+_FRAMES_FOLDER = re.compile(rf"frames-{WRITER_TAG}")
 #: [bytes]: a frame takes some hundred, and JSON may take twenty times its size in memory.
-_LARGEST_FACTS = 1 << 25
+_MAX_FACTS_BYTES = 1 << 25
 #: Frames kept in memory: the one that is shown, and its neighbours for motion blur.
-_KEPT = 3
+_MAX_FRAMES_IN_MEMORY = 3
 
 
 @dataclass(frozen=True)
@@ -96,11 +96,11 @@ class CacheWriter:
         self._frame_hashes: list[str] = []
         self._layout: dict[str, list[Any]] = {}
         self._content: dict[str, Any] = {}
-        self._before: bytes | None = None
-        self._is_whole = self._is_published = False
+        self._previous_facts: bytes | None = None
+        self._is_complete = self._is_published = False
         try:
             if folder.exists():
-                _check_ours(folder)
+                _check_no_foreign_files(folder)
                 _remove_stale(folder)
             self._frames.mkdir(parents=True)
         except OSError as error:
@@ -127,9 +127,9 @@ class CacheWriter:
         assert len(self._frame_hashes) == facts.frame_count, "all frames are there"
         self._content = {"version": VERSION, **asdict(facts), "layout": self._layout}
         self._content["frame_hashes"] = self._frame_hashes
-        write_bytes_atomic(self._frames / FACTS, _text(self._content, "."))
+        write_bytes_atomic(self._frames / FACTS, _facts_text(self._content, "."))
         flush_folder(self.folder)
-        self._is_whole = True
+        self._is_complete = True
 
     def publish(self) -> None:
         """Replace the earlier bake by this one, in one step.
@@ -139,8 +139,8 @@ class CacheWriter:
         """
         current = self.folder / FACTS
         try:
-            self._before = current.read_bytes() if current.is_file() else None
-            write_bytes_atomic(current, _text(self._content, self._frames.name))
+            self._previous_facts = current.read_bytes() if current.is_file() else None
+            write_bytes_atomic(current, _facts_text(self._content, self._frames.name))
         except (OSError, HairloomError) as error:
             raise HairloomError(
                 "the bake is done, but cannot replace the previous one",
@@ -150,25 +150,25 @@ class CacheWriter:
             ) from error
         self._is_published = True
 
-    def take_back(self) -> None:
+    def unpublish(self) -> None:
         """Undo `publish`, since the bake of another object could not be published."""
-        if self._is_published and self._before is not None:
-            write_bytes_atomic(self.folder / FACTS, self._before)
+        if self._is_published and self._previous_facts is not None:
+            write_bytes_atomic(self.folder / FACTS, self._previous_facts)
         elif self._is_published:
             (self.folder / FACTS).unlink(missing_ok=True)
         self._is_published = False
 
-    def clean(self) -> None:
+    def remove_previous(self) -> None:
         """Remove the frames of the bake before this one.
 
         Frames that another program holds open stay until a later Blender process bakes here.
         """
-        if self._before is not None:
-            _remove_frames(self.folder, _frames_named(self._before))
+        if self._previous_facts is not None:
+            _remove_frames(self.folder, _frames_folder_in(self._previous_facts))
 
     def abandon(self) -> None:
         """Leave the folder as it was; but a complete bake may be hours of work, and stays."""
-        if not self._is_whole:
+        if not self._is_complete:
             shutil.rmtree(self._frames, ignore_errors=True)
             _remove_if_empty(self.folder)
 
@@ -190,7 +190,7 @@ def check_bake_folder(folder: Path) -> None:
     check_folder_writable(folder)
     try:
         if folder.exists():
-            _check_ours(folder)
+            _check_no_foreign_files(folder)
     except OSError as error:
         raise _unwritable(folder, error) from error
 
@@ -214,14 +214,14 @@ class Cache:
                 frame_hashes=tuple(content["frame_hashes"]),
                 figures=Figures.of(content.get("figures")),
             )
-            _check(self.facts)
+            _check_facts(self.facts)
         except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
             raise _damaged(folder / FACTS, str(error)) from error
         self._lock = threading.Lock()  # renders read in their own thread
         self._frames: OrderedDict[int, Arrays] = OrderedDict()
         self._constants: Arrays | None = None
 
-    def holds(self, frame: int) -> bool:
+    def has_frame(self, frame: int) -> bool:
         return self.facts.first <= frame <= self.facts.last
 
     def frame_hash(self, frame: int) -> str:
@@ -241,7 +241,7 @@ class Cache:
         with self._lock:
             if frame not in self._frames:
                 self._frames[frame] = self._read(_frame_name(frame))
-                while len(self._frames) > _KEPT:
+                while len(self._frames) > _MAX_FRAMES_IN_MEMORY:
                     self._frames.popitem(last=False)
             self._frames.move_to_end(frame)
             return self._frames[frame]
@@ -254,7 +254,7 @@ class Cache:
         return arrays
 
     @classmethod
-    def found(cls, folder: Path) -> Self | None:
+    def find(cls, folder: Path) -> Self | None:
         """The bake in this folder; None where there is none."""
         return cls(folder) if (folder / FACTS).is_file() else None
 
@@ -271,7 +271,7 @@ def facts_in(folder: Path) -> Facts | None:
     """The facts of the bake in a folder; None where there is none, or a damaged one, which any
     bake may replace."""
     try:
-        cache = Cache.found(folder)
+        cache = Cache.find(folder)
     except HairloomError:
         return None
     return None if cache is None else cache.facts
@@ -293,7 +293,7 @@ def delete(folder: Path) -> None:
         content = (folder / FACTS).read_bytes() if (folder / FACTS).is_file() else b""
         # the facts go first: without them, the files that are left are no bake
         (folder / FACTS).unlink(missing_ok=True)
-        _remove(folder / _frames_named(content))
+        _remove(folder / _frames_folder_in(content))
         if folder.is_dir():
             _remove_stale(folder)
             _remove_if_empty(folder)
@@ -301,7 +301,7 @@ def delete(folder: Path) -> None:
         raise _unwritable(folder, error) from error
 
 
-def _text(content: dict[str, Any], frames: str) -> bytes:
+def _facts_text(content: dict[str, Any], frames: str) -> bytes:
     return json.dumps(content | {"frames": frames}, indent=1).encode()
 
 
@@ -311,12 +311,12 @@ def _checked_name(frames: object) -> str:
     Raises:
         ValueError: it is none.
     """
-    if not isinstance(frames, str) or not (frames == "." or _FRAMES.fullmatch(frames)):
+    if not isinstance(frames, str) or not (frames == "." or _FRAMES_FOLDER.fullmatch(frames)):
         raise ValueError("its frames are in no folder of its own")
     return frames
 
 
-def _frames_named(facts: bytes) -> str:
+def _frames_folder_in(facts: bytes) -> str:
     """The frames folder that this content of cache.json names; "." where it names none."""
     try:
         return _checked_name(json.loads(facts)["frames"])
@@ -331,7 +331,7 @@ def _remove(folder: Path) -> None:
         OSError: a file cannot be removed.
     """
     for path in sorted(folder.iterdir()) if folder.is_dir() else ():
-        if _OURS.fullmatch(path.name):
+        if _BAKE_FILES.fullmatch(path.name):
             path.unlink()
     _remove_if_empty(folder)
 
@@ -347,7 +347,7 @@ def _remove_frames(folder: Path, name: str) -> None:
         shutil.rmtree(folder / name, ignore_errors=True)
         return
     for path in folder.iterdir():
-        if path.name != FACTS and _OURS.fullmatch(path.name):
+        if path.name != FACTS and _BAKE_FILES.fullmatch(path.name):
             with contextlib.suppress(OSError):
                 path.unlink()
 
@@ -355,19 +355,19 @@ def _remove_frames(folder: Path, name: str) -> None:
 def _remove_stale(folder: Path) -> None:
     """Remove frames that cache.json does not name and whose writers are gone."""
     facts = folder / FACTS
-    current = _frames_named(facts.read_bytes()) if facts.is_file() else ""
+    current = _frames_folder_in(facts.read_bytes()) if facts.is_file() else ""
     for path in folder.iterdir():
-        name = _FRAMES.fullmatch(path.name)
+        name = _FRAMES_FOLDER.fullmatch(path.name)
         if name is not None and path.name != current and is_stale(path, name):
             shutil.rmtree(path, ignore_errors=True)
 
 
-def _check_ours(folder: Path) -> None:
+def _check_no_foreign_files(folder: Path) -> None:
     """Raise HairloomError if a folder holds other files than those of a bake."""
     foreign = [
         path.name
         for path in folder.iterdir()
-        if not (_OURS.fullmatch(path.name) or _FRAMES.fullmatch(path.name))
+        if not (_BAKE_FILES.fullmatch(path.name) or _FRAMES_FOLDER.fullmatch(path.name))
         and not is_temporary(path.name)
     ]
     if foreign:
@@ -384,8 +384,8 @@ def _frame_name(frame: int) -> str:
 
 def _read_facts(path: Path) -> dict[str, Any]:
     try:
-        if path.stat().st_size > _LARGEST_FACTS:
-            raise ValueError(f"it has more than {_LARGEST_FACTS:,} bytes")
+        if path.stat().st_size > _MAX_FACTS_BYTES:
+            raise ValueError(f"it has more than {_MAX_FACTS_BYTES:,} bytes")
         content = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError as error:
         raise HairloomError(
@@ -415,7 +415,7 @@ def _read_facts(path: Path) -> dict[str, Any]:
     return content
 
 
-def _check(facts: Facts) -> None:
+def _check_facts(facts: Facts) -> None:
     """Raise ValueError or TypeError for facts that no bake can have."""
     if not (isinstance(facts.first, int) and isinstance(facts.last, int)):
         raise TypeError("its frames are not whole numbers")

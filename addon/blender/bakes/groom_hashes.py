@@ -160,7 +160,7 @@ def _style(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[Floa
     return strands.points, strands.offsets
 
 
-def settings_part(hair: bpy.types.Object) -> str:
+def settings_hash(hair: bpy.types.Object) -> str:
     """The part of a frame hash that comes from the settings."""
     return hashes(settings=_dynamics(hair))
 

@@ -62,7 +62,7 @@ class BakedGuides:
                 remedy="Bake it (Dynamics > Bake), or write it without motion",
             )
         notes = stale_notes(hair, cache, bpy.context.evaluated_depsgraph_get())
-        return cls._in(cache, hair.name, frames, notes)
+        return cls._of_cache(cache, hair.name, frames, notes)
 
     @classmethod
     def in_folder(cls, folder: Path, frames: range | None = None) -> Self:
@@ -71,10 +71,10 @@ class BakedGuides:
         Raises:
             HairloomError: as `of`.
         """
-        return cls._in(Cache(folder), str(folder), frames)
+        return cls._of_cache(Cache(folder), str(folder), frames)
 
     @classmethod
-    def _in(
+    def _of_cache(
         cls, cache: Cache, place: str, frames: range | None, notes: tuple[str, ...] = ()
     ) -> Self:
         chosen = range(cache.facts.first, cache.facts.last + 1) if frames is None else frames

@@ -22,12 +22,12 @@ from ..scene.curves import put_points
 from ..scene.fin_modifier import clear, fin_modifier, has_fins, show
 from .bake_settings import folder_of, shown_folder_of
 from .baked_rig import BakedRig, baked_rig_of
-from .baked_solids import BakedSolids, solids_between
+from .baked_solids import BakedSolids, interpolated_solids
 from .cache import FACTS, Cache
 from .simulation import Arrays
 
 
-class _Known:
+class _LoadedBakes:
     """Bakes that are kept in memory, by folder.
 
     caches: time and inode of cache.json, and the bake. rigs: the bake, and its rig. solids: the
@@ -47,7 +47,7 @@ class _Known:
         self.is_rendering = False
 
 
-_known = _Known()
+_loaded = _LoadedBakes()
 
 
 def cache_in(folder: Path) -> Cache | None:
@@ -56,19 +56,19 @@ def cache_in(folder: Path) -> Cache | None:
     Raises:
         HairloomError: it is damaged.
     """
-    with _known.lock:
+    with _loaded.lock:
         try:
             facts = (folder / FACTS).stat()
         except OSError:
-            _known.caches.pop(folder, None)
-            _known.rigs.pop(folder, None)
-            _known.solids.pop(folder, None)
+            _loaded.caches.pop(folder, None)
+            _loaded.rigs.pop(folder, None)
+            _loaded.solids.pop(folder, None)
             return None
         written = facts.st_mtime_ns, facts.st_ino
-        if folder not in _known.caches or _known.caches[folder][0] != written:
-            _known.caches[folder] = written, Cache(folder)
-            _known.problems.pop(folder, None)
-        return _known.caches[folder][1]
+        if folder not in _loaded.caches or _loaded.caches[folder][0] != written:
+            _loaded.caches[folder] = written, Cache(folder)
+            _loaded.problems.pop(folder, None)
+        return _loaded.caches[folder][1]
 
 
 def cache_of(obj: bpy.types.Object) -> Cache | None:
@@ -105,10 +105,10 @@ def rig_in(cache: Cache) -> BakedRig:
     Raises:
         HairloomError: it is damaged.
     """
-    with _known.lock:
-        known = _known.rigs.get(cache.folder)
+    with _loaded.lock:
+        known = _loaded.rigs.get(cache.folder)
         if known is None or known[0] is not cache:
-            known = _known.rigs[cache.folder] = (
+            known = _loaded.rigs[cache.folder] = (
                 cache,
                 baked_rig_of(cache.constants(), str(cache.folder)),
             )
@@ -127,16 +127,16 @@ def solids_in(
     Raises:
         HairloomError: the bake is damaged.
     """
-    with _known.lock:
-        known = _known.solids.get(cache.folder)
+    with _loaded.lock:
+        known = _loaded.solids.get(cache.folder)
         if known is None or known[0] is not cache:
-            known = _known.solids[cache.folder] = cache, BakedSolids.of(cache.constants())
+            known = _loaded.solids[cache.folder] = cache, BakedSolids.of(cache.constants())
     if known[1] is None:
         return None
-    here, there = _frames_beside(cache, frame, subframe)
+    here, there = _surrounding_frames(cache, frame, subframe)
     arrays = cache.frame(here)
     if here != there:
-        arrays = solids_between(arrays, cache.frame(there), subframe)
+        arrays = interpolated_solids(arrays, cache.frame(there), subframe)
     return known[1].at(arrays, blocking=blocking)
 
 
@@ -149,7 +149,7 @@ def strands_in(cache: Cache, frame: int, subframe: float = 0.0) -> Floats:
     Raises:
         HairloomError: the bake is damaged.
     """
-    return _between(cache, frame, subframe, rig_in(cache).strands)
+    return _interpolated(cache, frame, subframe, rig_in(cache).strands)
 
 
 def guides_in(cache: Cache, frame: int, subframe: float = 0.0) -> Floats:
@@ -158,13 +158,13 @@ def guides_in(cache: Cache, frame: int, subframe: float = 0.0) -> Floats:
     Raises:
         HairloomError: the bake is damaged.
     """
-    return _between(cache, frame, subframe, lambda arrays: arrays["guides"])
+    return _interpolated(cache, frame, subframe, lambda arrays: arrays["guides"])
 
 
-def _between(
+def _interpolated(
     cache: Cache, frame: int, subframe: float, points_of: Callable[[Arrays], Floats]
 ) -> Floats:
-    first, last = _frames_beside(cache, frame, subframe)
+    first, last = _surrounding_frames(cache, frame, subframe)
     here = points_of(cache.frame(first))
     if first == last:
         return here
@@ -172,7 +172,7 @@ def _between(
     return between
 
 
-def _frames_beside(cache: Cache, frame: int, subframe: float) -> tuple[int, int]:
+def _surrounding_frames(cache: Cache, frame: int, subframe: float) -> tuple[int, int]:
     """The baked frames before and after a time; twice the same frame where it is exactly in one."""
     facts = cache.facts
     here = min(max(frame, facts.first), facts.last)
@@ -185,7 +185,7 @@ def pose_in(cache: Cache, frame: int, subframe: float = 0.0) -> Pose:
     Raises:
         HairloomError: the bake is damaged.
     """
-    rig, (first, last) = rig_in(cache), _frames_beside(cache, frame, subframe)
+    rig, (first, last) = rig_in(cache), _surrounding_frames(cache, frame, subframe)
     here, solids = rig.pose(cache.frame(first)), solids_in(cache, frame, subframe)
     if first == last:
         return replace(here, solids=solids)
@@ -207,20 +207,20 @@ def show_fins(scene: bpy.types.Scene) -> None:
     Beyond the baked frames, a fin only follows the animation.
     """
     for obj in bpy.data.objects if has_fins() else ():
-        is_shown = is_baked_fin(obj) and obj.session_uid not in _known.unshown
+        is_shown = is_baked_fin(obj) and obj.session_uid not in _loaded.unshown
         folder = folder_of(obj) if is_shown else None
         if folder is not None:
-            _attempt(folder, partial(_show_fin, obj, folder, scene.frame_current))
+            _report_errors(folder, partial(_show_fin, obj, folder, scene.frame_current))
 
 
 @contextmanager
-def without_fins(objects: Sequence[bpy.types.Object]) -> Iterator[None]:
+def fins_not_shown(objects: Sequence[bpy.types.Object]) -> Iterator[None]:
     """Do not show the bakes of these fins inside the block, where they are baked again."""
-    _known.unshown = {obj.session_uid for obj in objects}
+    _loaded.unshown = {obj.session_uid for obj in objects}
     try:
         yield
     finally:
-        _known.unshown = set()
+        _loaded.unshown = set()
 
 
 def is_baked_fin(obj: bpy.types.Object) -> bool:
@@ -235,7 +235,7 @@ def is_baked_fin(obj: bpy.types.Object) -> bool:
 
 def _show_fin(obj: bpy.types.Object, folder: Path, frame: int) -> None:
     cache = cache_in(folder)
-    if cache is not None and cache.holds(frame):
+    if cache is not None and cache.has_frame(frame):
         show(obj.data, cache.frame(frame)["position"])
     else:
         clear(obj.data)
@@ -246,10 +246,10 @@ def show_in_copies(scene: bpy.types.Scene) -> None:
     for curves in bpy.data.hair_curves:
         folder = shown_folder_of(curves)
         if folder is not None:
-            _attempt(folder, partial(_write, curves, folder, scene))
+            _report_errors(folder, partial(_write_copy, curves, folder, scene))
 
 
-def _write(curves: bpy.types.Curves, folder: Path, scene: bpy.types.Scene) -> None:
+def _write_copy(curves: bpy.types.Curves, folder: Path, scene: bpy.types.Scene) -> None:
     cache = cache_in(folder)
     if cache is None:
         raise HairloomError("there is no bake here", place=str(folder), remedy="Bake again")
@@ -262,7 +262,7 @@ def _write(curves: bpy.types.Curves, folder: Path, scene: bpy.types.Scene) -> No
     put_points(curves, points)
 
 
-def _attempt(folder: Path, show: Callable[[], object]) -> None:
+def _report_errors(folder: Path, show: Callable[[], object]) -> None:
     """Show a bake, which may come from anywhere and be broken in any way; report an error once.
 
     If it went up to Blender, Blender would print it at every frame, and the bakes after this one
@@ -271,53 +271,57 @@ def _attempt(folder: Path, show: Callable[[], object]) -> None:
     try:
         show()
     except HairloomError as error:
-        _tell(folder, str(error))
+        _report(folder, str(error))
     except Exception as error:
-        _tell(folder, f"{folder}: this bake is damaged ({type(error).__name__}: {error})")
+        _report(folder, f"{folder}: this bake is damaged ({type(error).__name__}: {error})")
 
 
-def _tell(folder: Path, problem: str) -> None:
-    if _known.problems.get(folder) != problem:
-        _known.problems[folder] = problem
+def _report(folder: Path, problem: str) -> None:
+    if _loaded.problems.get(folder) != problem:
+        _loaded.problems[folder] = problem
         print(f"Hairloom: {problem}")
 
 
-def is_played() -> bool:
+def is_animation_playing() -> bool:
     """Whether Blender plays its animation in a window, or its playhead is being dragged."""
     screens = [window.screen for window in bpy.context.window_manager.windows]
     return any(screen.is_animation_playing for screen in screens)
 
 
-def is_dragged() -> bool:
+def is_playhead_dragged() -> bool:
     """Whether the playhead is being dragged."""
     screens = [window.screen for window in bpy.context.window_manager.windows]
     return any(screen.is_scrubbing for screen in screens)
 
 
-def rendering(begins: bool) -> None:
+def set_rendering(begins: bool) -> None:
     """A render begins or has ended."""
-    _known.is_rendering = begins
+    _loaded.is_rendering = begins
 
 
-def needs_copies() -> bool:
+def must_update_copies() -> bool:
     """Whether to update the copies that renders and exporters read. Not while an animation plays
     or the playhead is dragged in the viewport, which hides them."""
-    return _known.is_rendering or bpy.app.background or not (is_played() or is_dragged())
+    return (
+        _loaded.is_rendering
+        or bpy.app.background
+        or not (is_animation_playing() or is_playhead_dragged())
+    )
 
 
-def drop(folder: Path) -> None:
+def forget_bake(folder: Path) -> None:
     """Forget a folder whose bake is gone or was replaced."""
-    with _known.lock:
-        for known in (_known.caches, _known.rigs, _known.solids, _known.problems):
+    with _loaded.lock:
+        for known in (_loaded.caches, _loaded.rigs, _loaded.solids, _loaded.problems):
             known.pop(folder, None)
 
 
 def forget() -> None:
     """Keep no bake in memory."""
-    with _known.lock:
-        for known in (_known.caches, _known.rigs, _known.solids, _known.problems):
+    with _loaded.lock:
+        for known in (_loaded.caches, _loaded.rigs, _loaded.solids, _loaded.problems):
             known.clear()
-    _known.is_rendering = False
+    _loaded.is_rendering = False
 
 
 def check_frames(name: str, frames: range, cache: Cache) -> None:
@@ -327,7 +331,7 @@ def check_frames(name: str, frames: range, cache: Cache) -> None:
         HairloomError: naming those that are missing.
     """
     first, last = cache.facts.first, cache.facts.last
-    missing = [frame for frame in (frames[0], frames[-1]) if not cache.holds(frame)]
+    missing = [frame for frame in (frames[0], frames[-1]) if not cache.has_frame(frame)]
     if missing:
         wanted = f"all of {frames[0]} to {frames[-1]}" if len(frames) > 1 else str(frames[0])
         raise HairloomError(

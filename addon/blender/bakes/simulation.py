@@ -110,13 +110,13 @@ def hashes(**parts: Hashed | tuple[Hashed, ...]) -> str:
 
 def differences(known: str, now: str) -> tuple[str, ...]:
     """The names of the parts that differ, in words."""
-    before, after = (_parts(one) for one in (known, now))
+    before, after = (_hashes_by_name(one) for one in (known, now))
     names = [name for name in after if before.get(name) != after[name]]
     names += [name for name in before if name not in after]
     return tuple(name.replace("_", " ") for name in names)
 
 
-def _parts(named: str) -> dict[str, str]:
+def _hashes_by_name(named: str) -> dict[str, str]:
     """Hashes by name; a plain hash counts as one part."""
     pairs = (part.rpartition("=") for part in named.split())
     return {name or "what it was made from": value for name, _, value in pairs}

@@ -10,11 +10,11 @@ from ..properties.groom_settings import GroomSettings
 from ..scene.poses import read_pose
 from . import playback
 from .cache import Cache
-from .groom_hashes import groom_frame_hash, groom_rig_hash, settings_part
+from .groom_hashes import groom_frame_hash, groom_rig_hash, settings_hash
 from .simulation import differences
 
 
-def changed_since(
+def changed_inputs(
     hair: bpy.types.Object, cache: Cache, depsgraph: bpy.types.Depsgraph
 ) -> tuple[str, ...]:
     """The names of the inputs that have changed since the bake; empty where it is up to date.
@@ -28,9 +28,9 @@ def changed_since(
     now = groom_rig_hash(hair, head, settings, depsgraph.scene)
     changed = differences(facts.rig_hash, now)
     scene = depsgraph.scene
-    if cache.holds(scene.frame_current) and not scene.frame_subframe:
-        changed += _moved_otherwise(hair, head, cache, depsgraph)
-    elif not any(settings_part(hair) in frame_hash.split() for frame_hash in facts.frame_hashes):
+    if cache.has_frame(scene.frame_current) and not scene.frame_subframe:
+        changed += _changed_frame_inputs(hair, head, cache, depsgraph)
+    elif not any(settings_hash(hair) in frame_hash.split() for frame_hash in facts.frame_hashes):
         changed += ("settings",)
     return tuple(dict.fromkeys(changed))
 
@@ -43,7 +43,7 @@ def stale_notes(
     Raises:
         HairloomError: the bake is damaged.
     """
-    changed = changed_since(hair, cache, depsgraph)
+    changed = changed_inputs(hair, cache, depsgraph)
     if not changed:
         return ()
     return (
@@ -52,7 +52,7 @@ def stale_notes(
     )
 
 
-def _moved_otherwise(
+def _changed_frame_inputs(
     hair: bpy.types.Object,
     head: bpy.types.Object | None,
     cache: Cache,

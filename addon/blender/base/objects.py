@@ -47,7 +47,7 @@ class Handle:
             self.name = obj.name
         return obj
 
-    def found(self, remedy: str = "Press Preview again") -> bpy.types.Object:
+    def resolve(self, remedy: str = "Press Preview again") -> bpy.types.Object:
         """The object.
 
         Raises:
@@ -73,21 +73,21 @@ class Body:
     def at_rest(cls, obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Body:
         return cls(Handle.of(obj), matrix_of(obj, depsgraph))
 
-    def found(self) -> bpy.types.Object:
+    def resolve(self) -> bpy.types.Object:
         """The object.
 
         Raises:
             ObjectGoneError: it no longer exists.
         """
-        return self.handle.found()
+        return self.handle.resolve()
 
-    def moved(self, depsgraph: bpy.types.Depsgraph) -> Floats:
+    def motion_from_rest(self, depsgraph: bpy.types.Depsgraph) -> Floats:
         """(4, 4), from where it was at rest to where it is now.
 
         Raises:
             ObjectGoneError: it no longer exists.
         """
-        return matrix_of(self.found(), depsgraph) @ np.linalg.pinv(self.rest)
+        return matrix_of(self.resolve(), depsgraph) @ np.linalg.pinv(self.rest)
 
 
 def objects_in(layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
@@ -198,7 +198,7 @@ def head_of(hair: bpy.types.Object) -> bpy.types.Object | None:
     return carrier if carrier is not None and carrier.data == surface.data else surface
 
 
-def objects_with(data: bpy.types.ID) -> list[bpy.types.Object]:
+def objects_using(data: bpy.types.ID) -> list[bpy.types.Object]:
     """The objects that share this data, such as linked duplicates."""
     return [obj for obj in bpy.data.objects if obj.data == data]
 
@@ -235,7 +235,7 @@ def without_hidden(
     return taken, tuple(left_out)
 
 
-def layers_with(obj: bpy.types.Object) -> frozenset[LayerKey]:
+def layers_showing(obj: bpy.types.Object) -> frozenset[LayerKey]:
     """The view layers of all scenes that show an object; local view is not considered."""
     with _without_area():
         return frozenset(
@@ -251,7 +251,7 @@ def layer_key(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> LayerKey:
     return scene.session_uid, layer.name
 
 
-def spaces_without(obj: bpy.types.Object) -> frozenset[int]:
+def spaces_hiding(obj: bpy.types.Object) -> frozenset[int]:
     """The addresses of 3D views in which an object is invisible, by local view or collections.
     Views of workspaces that no window shows count too, since nothing reports when one is shown."""
     return frozenset(

@@ -76,7 +76,7 @@ class CardObjectJob:
         Raises:
             HairloomError: the hair is gone, or its cards cannot be changed any more.
         """
-        hair, build = self._hair.found("Choose other hair"), made.build
+        hair, build = self._hair.resolve("Choose other hair"), made.build
         self._kept.keep(self._hair, self._inputs, made)
         for obj in card_objects(hair):
             _check_replaceable(obj)

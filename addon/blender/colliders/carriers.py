@@ -65,14 +65,14 @@ class Carrier:
         used = used[:: max(len(used) // _ENOUGH, 1)]
         return cls(body, used, surface.positions[used], len(surface.positions))
 
-    def moved(self, depsgraph: bpy.types.Depsgraph) -> Floats:
+    def motion_from_rest(self, depsgraph: bpy.types.Depsgraph) -> Floats:
         """(4, 4), world space, from its rest to where it is now.
 
         Raises:
             HairloomError: it is gone, or it has another mesh.
         """
-        obj = self.body.found()
-        matrix: Floats = self.body.moved(depsgraph)
+        obj = self.body.resolve()
+        matrix: Floats = self.body.motion_from_rest(depsgraph)
         if not self.vertex_count:
             return matrix
         if not is_deforming(obj):

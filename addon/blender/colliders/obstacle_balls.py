@@ -49,7 +49,7 @@ class BallsPart:
 
     @classmethod
     def new(cls, balls: list[Ball], depsgraph: bpy.types.Depsgraph) -> BallsPart:
-        return cls(balls, np.array([matrix_of(ball.body.found(), depsgraph) for ball in balls]))
+        return cls(balls, np.array([matrix_of(ball.body.resolve(), depsgraph) for ball in balls]))
 
     @property
     def name(self) -> str:

@@ -135,7 +135,10 @@ class FieldPart:
         return self.carrier.body.handle.uid
 
     def now(self, depsgraph: bpy.types.Depsgraph) -> tuple[Collider, Floats]:
-        matrix, shape = _solid(self.carrier.moved(depsgraph), self.name), self.carrier.shape
+        matrix, shape = (
+            _solid(self.carrier.motion_from_rest(depsgraph), self.name),
+            self.carrier.shape,
+        )
         if shape is None:
             self._seen = None
             return self.distance, matrix
@@ -204,7 +207,7 @@ class ShapePart:
         return self.carrier.body.handle.uid
 
     def now(self, depsgraph: bpy.types.Depsgraph) -> tuple[Collider, Floats]:
-        return self.shape, _solid(self.carrier.moved(depsgraph), self.name) @ self.base
+        return self.shape, _solid(self.carrier.motion_from_rest(depsgraph), self.name) @ self.base
 
     def swollen(self) -> float:
         return 0.0

@@ -72,7 +72,7 @@ class Reader:
         if shape != "mesh":
             return self._boxed(carrier, surface, shape)
         if self.known is not None and self.known.carrier.vertex_count == carrier.vertex_count:
-            matrix = self.known.carrier.moved(self.depsgraph)
+            matrix = self.known.carrier.motion_from_rest(self.depsgraph)
             if self.known.is_of(surface, matrix, self.settings):
                 return self._again(self.known.carrier)
         return FieldPart.new(carrier, surface, self.settings, blocking=self.blocking)

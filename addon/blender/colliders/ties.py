@@ -60,20 +60,20 @@ class _TrackedTie:
     tie: Tie
     points: Floats = field(default_factory=lambda: np.zeros((0, 3)))
 
-    def moved(self, depsgraph: bpy.types.Depsgraph) -> Floats:
+    def motion_from_rest(self, depsgraph: bpy.types.Depsgraph) -> Floats:
         """(4, 4), world space, from its rest to where it is now.
 
         Raises:
             HairloomError: it is gone, disabled or scaled to zero.
         """
-        obj = self.body.found()
+        obj = self.body.resolve()
         if is_left_out(obj, depsgraph):
             raise _disabled_error(obj.name)
         if not is_solid_scale(matrix_of(obj, depsgraph)):
             raise HairloomError(
                 "its scale is zero, so it holds no hair", place=obj.name, remedy="Correct its scale"
             )
-        matrix: Floats = self.body.moved(depsgraph)
+        matrix: Floats = self.body.motion_from_rest(depsgraph)
         if not len(self.points) or not is_deforming(obj):
             return matrix
         positions = read_positions(obj, depsgraph, place=obj.name)
@@ -177,7 +177,7 @@ class TrackedHolders:
         current = {obj.session_uid for obj in ties_of(hair)}
         for number, one in enumerate(self._ties[: holds.tie_count]):
             try:
-                matrix = one.moved(depsgraph)
+                matrix = one.motion_from_rest(depsgraph)
                 if one.body.handle.uid in current and np.isfinite(matrix).all():
                     matrices[number] = matrix
             except HairloomError as error:

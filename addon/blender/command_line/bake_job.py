@@ -12,7 +12,7 @@ from ...errors import HairloomError
 from ..bakes import playback
 from ..bakes.bake_settings import OVERRIDE, folder_of
 from ..base.report import Report
-from ..preview.bake import Bake, bakeable, free, show_in_renders
+from ..preview.bake import Bake, free, is_bakeable, show_in_renders
 from .job_options import add_frames_option, add_object_option, frames_of_option
 from .job_steps import Job, report_notes
 from .object_settings import change_settings, named_objects, usable_objects
@@ -93,8 +93,8 @@ def _objects_to_bake(names: list[str]) -> tuple[list[bpy.types.Object], tuple[st
         HairloomError: there are none, or a name is wrong.
     """
     if names:
-        return named_objects(names, bakeable, "hair curves or cloth"), ()
-    found, notes = usable_objects(lambda obj: bakeable(obj) and _is_wanted(obj))
+        return named_objects(names, is_bakeable, "hair curves or cloth"), ()
+    found, notes = usable_objects(lambda obj: is_bakeable(obj) and _is_wanted(obj))
     if not found:
         raise HairloomError(
             "there is nothing to bake",

@@ -298,7 +298,7 @@ def _keep_only(uids: set[int]) -> None:
 
 
 def _shows_bake(hair: bpy.types.Object, cache: Cache, frame: int) -> bool:
-    return bool(hair.hairloom.bake.is_shown and cache.holds(frame))
+    return bool(hair.hairloom.bake.is_shown and cache.has_frame(frame))
 
 
 def _of_bake(

@@ -17,14 +17,14 @@ from ...dynamics.figures import FiguresCollector
 from ...errors import HairloomError
 from ..bakes import baked_copy, playback
 from ..bakes.bake_settings import (
+    assign_folder,
     check_not_linked,
     check_owner,
-    choose_folder,
     file_name,
     folder_names,
     folder_of,
     frames_of,
-    is_own,
+    owns_bake,
 )
 from ..bakes.cache import CacheWriter, Facts, check_bake_folder, delete, facts_in
 from ..bakes.groom_hashes import frame_rate
@@ -42,18 +42,19 @@ from .bystanders import Bystanders
 
 
 @dataclass
-class _Part:
+class _BakedObject:
     """One groom or fin of a bake.
 
-    folder: where the bake is written. named: the object's folder setting once it is published.
-    replaced: note that another scene's bake was replaced; "": none was.
+    folder: where the bake is written. folder_setting: the object's folder setting once it is
+        published.
+    replaced_note: note that another scene's bake was replaced; "": none was.
     """
 
     handle: Handle
     frames: range
     folder: Path
-    named: str
-    replaced: str = ""
+    folder_setting: str
+    replaced_note: str = ""
     session: Simulation | None = None
     writer: CacheWriter | None = None
     rig_hash: str = ""
@@ -65,12 +66,12 @@ class _Part:
         session = self.session
         return session if frame in self.frames and isinstance(session, Session) else None
 
-    def go(self, frame: int, depsgraph: bpy.types.Depsgraph) -> None:
+    def simulate(self, frame: int, depsgraph: bpy.types.Depsgraph) -> None:
         """Simulate this frame, if it is one of its frames."""
         if frame not in self.frames:
             return
         if self.writer is None or self.session is None:
-            session = self.session = simulation_for(self.found(), depsgraph)
+            session = self.session = simulation_for(self.resolve(), depsgraph)
             session.play(depsgraph)
             self.rig_hash = session.rig_hash(depsgraph)
             if isinstance(session, Session):
@@ -108,7 +109,7 @@ class _Part:
                 form=device_of_session(self.session),
                 rig_hash=self.rig_hash,
                 hairloom=environment()["hairloom"],
-                file=file_name(self.found()),
+                file=file_name(self.resolve()),
                 figures=None if self.measure is None else self.measure.figures,
             )
         )
@@ -118,11 +119,11 @@ class _Part:
         if self.writer is not None:
             self.writer.abandon()
 
-    def found(self) -> bpy.types.Object:
-        return self.handle.found("Bake again")
+    def resolve(self) -> bpy.types.Object:
+        return self.handle.resolve("Bake again")
 
 
-def _replaced(obj: bpy.types.Object, folder: Path, frames: range) -> str:
+def _replaced_note(obj: bpy.types.Object, folder: Path, frames: range) -> str:
     """A note if a bake of other frames is replaced because scenes share this hair; else ""."""
     before, scenes = facts_in(folder), len(obj.users_scene)
     if before is None or scenes < 2 or (before.first in frames and before.last in frames):
@@ -137,7 +138,7 @@ def _replaced(obj: bpy.types.Object, folder: Path, frames: range) -> str:
 class Bake:
     """A bake of some grooms and fins of the open scene, each over its own frames."""
 
-    parts: list[_Part] = field(default_factory=list)
+    baked_objects: list[_BakedObject] = field(default_factory=list)
     _bystanders: Bystanders = field(default_factory=Bystanders)
 
     @classmethod
@@ -165,22 +166,24 @@ class Bake:
             raise HairloomError(
                 "there is nothing to bake", place=scene.name, remedy="Select hair curves or cloth"
             )
-        parts: list[_Part] = []
-        with _folders_kept(objects):
+        parts: list[_BakedObject] = []
+        with _folders_restored(objects):
             for obj, name in zip(objects, folder_names(objects), strict=True):
                 if obj.type == "CURVES":
                     check_density(obj, bpy.context.evaluated_depsgraph_get())
                 own = frames_of(obj, scene) if frames is None else frames
                 if folder is None:
-                    chosen = choose_folder(obj)
+                    chosen = assign_folder(obj)
                     check_owner(obj, chosen)
                     named = obj.hairloom.bake.folder
                 else:
                     chosen = folder / name if len(objects) > 1 else folder
                     named = str(chosen)
                 check_bake_folder(chosen)
-                replaced = _replaced(obj, chosen, own)
-                parts.append(_Part(Handle.of(obj), own, chosen, named, replaced=replaced))
+                replaced = _replaced_note(obj, chosen, own)
+                parts.append(
+                    _BakedObject(Handle.of(obj), own, chosen, named, replaced_note=replaced)
+                )
         return cls(parts)
 
     @property
@@ -189,25 +192,25 @@ class Bake:
 
     @property
     def _first(self) -> int:
-        return min(part.frames.start for part in self.parts)
+        return min(part.frames.start for part in self.baked_objects)
 
     @property
     def _last(self) -> int:
-        return max(part.frames.stop - 1 for part in self.parts)
+        return max(part.frames.stop - 1 for part in self.baked_objects)
 
     @property
     def notes(self) -> list[str]:
         """Notes for the artist about what was baked so far."""
-        found = (note for part in self.parts for note in (part.replaced, *part.notes))
-        return [*dict.fromkeys(filter(None, found)), *self.unfelt]
+        found = (note for part in self.baked_objects for note in (part.replaced_note, *part.notes))
+        return [*dict.fromkeys(filter(None, found)), *self.unfelt_notes]
 
     @property
-    def unfelt(self) -> list[str]:
+    def unfelt_notes(self) -> list[str]:
         """Notes on hair nearby that the baked hair did not feel, and why."""
         return list(self._bystanders.notes.values())
 
     def objects(self) -> list[bpy.types.Object]:
-        return [part.found() for part in self.parts]
+        return [part.resolve() for part in self.baked_objects]
 
     def steps(self) -> Generator[int]:
         """Bake one frame at a time; yields how many are done. Closing the generator cancels.
@@ -220,13 +223,13 @@ class Bake:
         scene = bpy.context.scene
         shown, subframe = scene.frame_current, scene.frame_subframe
         try:
-            with suspended(), playback.without_fins(self.objects()):
+            with suspended(), playback.fins_not_shown(self.objects()):
                 yield from self._frames(scene)
-                for part in self.parts:
+                for part in self.baked_objects:
                     part.finish(frame_rate(scene))
                 self._publish()
         finally:
-            for part in self.parts:
+            for part in self.baked_objects:
                 part.abandon()
             with suspended():
                 scene.frame_set(shown, subframe=subframe)
@@ -237,49 +240,49 @@ class Bake:
         for done, frame in enumerate(range(self._first, self._last + 1), start=1):
             scene.frame_set(frame)
             depsgraph = bpy.context.evaluated_depsgraph_get()
-            with _named(frame):
+            with _frame_named_in_errors(frame):
                 with CoupledFrame([*self._grooms_in(frame), *bystanders.values()]) as coupled_frame:
-                    for part in self.parts:
-                        part.go(frame, depsgraph)
+                    for part in self.baked_objects:
+                        part.simulate(frame, depsgraph)
                     bystanders.move(depsgraph)
                     coupled_frame.simulate_coupled()
-                for part in self.parts:
+                for part in self.baked_objects:
                     part.write(frame, depsgraph)
                 bystanders.join(self._grooms_in(frame), depsgraph)
             yield done
 
     def _grooms_in(self, frame: int) -> list[Session]:
-        found = (part.groom_in(frame) for part in self.parts)
+        found = (part.groom_in(frame) for part in self.baked_objects)
         return [groom for groom in found if groom is not None]
 
     def _publish(self) -> None:
         """Replace all earlier bakes by the new ones, or none."""
-        writers = [part.writer for part in self.parts if part.writer is not None]
+        writers = [part.writer for part in self.baked_objects if part.writer is not None]
         try:
             for writer in writers:
                 writer.publish()
         except HairloomError:
             for writer in writers:
-                writer.take_back()
+                writer.unpublish()
             raise
-        for part in self.parts:
-            part.found().hairloom.bake.folder = part.named
+        for part in self.baked_objects:
+            part.resolve().hairloom.bake.folder = part.folder_setting
         for writer in writers:
-            writer.clean()
-        for part in self.parts:
-            part.found().hairloom.bake.owner = part.handle.name
+            writer.remove_previous()
+        for part in self.baked_objects:
+            part.resolve().hairloom.bake.owner = part.handle.name
 
     def _show(self) -> None:
         """Let previewed grooms show the new bake, or what they showed before."""
         depsgraph = bpy.context.evaluated_depsgraph_get()
-        for part in self.parts:
+        for part in self.baked_objects:
             obj = part.handle.find()
             if obj is not None:
                 previews.bake_changed(obj, depsgraph)
 
 
 @contextmanager
-def _folders_kept(objects: list[bpy.types.Object]) -> Iterator[None]:
+def _folders_restored(objects: list[bpy.types.Object]) -> Iterator[None]:
     """Restore the objects' folders afterwards, so that they show their old bakes for now."""
     before = [obj.hairloom.bake.folder for obj in objects]
     try:
@@ -290,7 +293,7 @@ def _folders_kept(objects: list[bpy.types.Object]) -> Iterator[None]:
 
 
 @contextmanager
-def _named(frame: int) -> Iterator[None]:
+def _frame_named_in_errors(frame: int) -> Iterator[None]:
     """Add the frame to errors raised inside."""
     try:
         yield
@@ -325,7 +328,7 @@ def device_of_session(session: Simulation) -> str:
     return session.solver.device if isinstance(session, Session) else "numpy"
 
 
-def bakeable(obj: bpy.types.Object) -> bool:
+def is_bakeable(obj: bpy.types.Object) -> bool:
     """Whether it is a fin, or hair that is not itself the copy that shows a bake."""
     if obj.type == "CURVES":
         return not obj.data.hairloom.baked_in
@@ -345,7 +348,7 @@ def show_in_renders(objects: list[bpy.types.Object], depsgraph: bpy.types.Depsgr
         if cache is not None and obj.hairloom.bake.in_renders:
             baked_copy.show_in_renders(obj, cache, depsgraph)
         else:
-            baked_copy.remove(obj)
+            baked_copy.remove_copy(obj)
     return bool(depsgraph.scene.render.use_lock_interface and not was_locked)
 
 
@@ -359,13 +362,13 @@ def free(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
     """
     check_not_linked(obj)
     folder = folder_of(obj)
-    if folder is not None and is_own(obj, folder):
+    if folder is not None and owns_bake(obj, folder):
         delete(folder)
         obj.hairloom.bake.owner = ""
     else:
         obj.hairloom.bake.folder = ""
     if obj.type == "CURVES":
-        baked_copy.remove(obj)
+        baked_copy.remove_copy(obj)
     elif fin_modifier(obj) is not None:
         clear(obj.data)
     previews.bake_changed(obj, depsgraph)

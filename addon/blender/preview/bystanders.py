@@ -16,7 +16,7 @@ from ..base.objects import head_of, matrix_of, objects_in
 from ..sessions.groom_source import GroomSource
 from ..sessions.prepared_groom import build_groom
 from ..sessions.session import Session
-from .preview import rig_for
+from .preview import baked_rig_for
 
 
 class Bystander:
@@ -28,7 +28,7 @@ class Bystander:
 
     def __init__(self, hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
         self._source = GroomSource(hair, depsgraph)
-        self._source.use_bake(rig_for(hair, depsgraph.scene))
+        self._source.use_bake(baked_rig_for(hair, depsgraph.scene))
         self._rest_rig = build_groom(self._source.request, is_drawn=False).rig
         self.uid = int(hair.session_uid)
         self.move(depsgraph)
@@ -45,9 +45,9 @@ class Bystander:
         Raises:
             HairloomError: it, its head or its bake is gone or broken.
         """
-        hair, frame = self._source.hair.found(), depsgraph.scene.frame_current
+        hair, frame = self._source.hair.resolve(), depsgraph.scene.frame_current
         cache = playback.cache_of(hair) if hair.hairloom.bake.is_shown else None
-        if cache is not None and cache.holds(frame):
+        if cache is not None and cache.has_frame(frame):
             baked, arrays = BakedRig(self._rest_rig, self._source.rest_matrices), cache.frame(frame)
             if baked.fits(arrays):
                 self.rig: Rig = baked.styled_rig(arrays)
@@ -80,7 +80,7 @@ class Bystanders(dict[int, Bystander]):
         """Add grooms that these sessions may feel; those that cannot be used get a note instead."""
         for session in sessions:
             self.pop(session.uid, None)
-        for obj in near_to(sessions, depsgraph):
+        for obj in grooms_near(sessions, depsgraph):
             if obj.session_uid in self.keys() | self.notes.keys():
                 continue
             try:
@@ -98,21 +98,21 @@ class Bystanders(dict[int, Bystander]):
             each.move(depsgraph)
 
 
-def near_to(sessions: list[Session], depsgraph: bpy.types.Depsgraph) -> list[bpy.types.Object]:
+def grooms_near(sessions: list[Session], depsgraph: bpy.types.Depsgraph) -> list[bpy.types.Object]:
     """Other grooms of the view layer that these may feel; fast enough for every redraw."""
-    feeling = [session.hair.found() for session in sessions if session.feels_hair]
-    balls = [_ball(hair, depsgraph) for hair in feeling]
+    feeling = [session.hair.resolve() for session in sessions if session.feels_hair]
+    balls = [_reach_ball(hair, depsgraph) for hair in feeling]
     found, uids = [], {session.uid for session in sessions}
     for obj in objects_in(depsgraph.view_layer) if balls else ():
         is_groom = obj.type == "CURVES" and not obj.data.hairloom.baked_in
         if is_groom and not obj.hide_render and obj.session_uid not in uids:
-            middle, radius = _ball(obj, depsgraph)
+            middle, radius = _reach_ball(obj, depsgraph)
             if any(np.linalg.norm(place - middle) <= radius + reach for place, reach in balls):
                 found.append(obj)
     return found
 
 
-def _ball(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[Floats, float]:
+def _reach_ball(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[Floats, float]:
     """A ball that its hair cannot leave, however it swings: middle (3,) and radius [m]."""
     corners = _corners(hair, depsgraph)
     reach = float(np.linalg.norm(np.ptp(corners, axis=0)))

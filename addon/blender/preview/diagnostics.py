@@ -16,12 +16,12 @@ from ..scene.source import dynamics_warnings, hair_dynamics_modifiers
 from ..scene.surfaces import read_positions
 from ..sessions.session import Session
 from . import previews
-from .bystanders import near_to
+from .bystanders import grooms_near
 
 #: Scales whose ratio is smaller differ by rounding alone.
-_UNEVEN = 1.01
+_MAX_SCALE_RATIO = 1.01
 #: Number of roots, evenly chosen, that decide which mesh they are on.
-_ASKED = 100
+_MAX_TESTED_ROOTS = 100
 #: Number of instances in a scene that are searched for those of a groom, 1 us each.
 _MAX_INSTANCES = 10_000
 
@@ -80,8 +80,8 @@ def issues_of(hair: bpy.types.Object, session: Session | None) -> tuple[Issue, .
         text = "Renders hide it: the copy that showed its bake was deleted"
         found.append(Issue(text, "hairloom.show_in_renders", "Show in Renders"))
     baked = previews.bake_of(hair)
-    if baked is not None and baked.changed:
-        text = f"Its bake is out of date ({', '.join(baked.changed)})"
+    if baked is not None and baked.changed_inputs:
+        text = f"Its bake is out of date ({', '.join(baked.changed_inputs)})"
         found.append(Issue(text, "hairloom.bake", "Bake"))
     return tuple(found)
 
@@ -101,7 +101,7 @@ def instances_note(hair: bpy.types.Object) -> str:
 def unfelt_note(session: Session) -> str:
     """A note on hair that is not previewed, but that a bake would feel; "" if there is none. Fast
     enough for every redraw."""
-    near = near_to([session], bpy.context.view_layer.depsgraph)
+    near = grooms_near([session], bpy.context.view_layer.depsgraph)
     names = [obj.name for obj in near if previews.session_of(obj) is None]
     if not names:
         return ""
@@ -115,10 +115,10 @@ def _may_instance(obj: bpy.types.Object) -> bool:
 def is_unevenly_scaled(obj: bpy.types.Object) -> bool:
     """Whether its axes are scaled by different factors."""
     scales = [abs(scale) for scale in obj.matrix_world.to_scale()]
-    return max(scales) > _UNEVEN * min(scales)
+    return max(scales) > _MAX_SCALE_RATIO * min(scales)
 
 
-def surface_for(
+def nearest_surface(
     hair: bpy.types.Object, candidates: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph
 ) -> bpy.types.Object:
     """The mesh whose vertices are closest to the roots of the hair, to grow it from. Cards do not
@@ -128,7 +128,7 @@ def surface_for(
         HairloomError: there is no mesh with faces, or no hair.
     """
     roots = read_curves(hair, depsgraph).strands.roots
-    roots = roots[:: max(len(roots) // _ASKED, 1)]
+    roots = roots[:: max(len(roots) // _MAX_TESTED_ROOTS, 1)]
     meshes = [
         mesh
         for mesh in candidates

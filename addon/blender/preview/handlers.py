@@ -50,7 +50,7 @@ def on_save_pre(*_: Any) -> None:
 
 
 def _heal() -> None:
-    for name in baked_copy.heal():
+    for name in baked_copy.restore_hair_without_copy():
         print(f"Hairloom: {name} is in renders again, since the copy that showed its bake is gone")
 
 
@@ -78,18 +78,18 @@ def on_frame_change_begin(scene: bpy.types.Scene, *_: Any) -> None:
     playback.show_fins(scene)  # also while suspended: baked and exported hair collides with them
     if suspension.is_suspended():
         return
-    if playback.needs_copies():
+    if playback.must_update_copies():
         playback.show_in_copies(scene)
 
 
 @persistent
 def on_render_begin(*_: Any) -> None:
-    playback.rendering(True)
+    playback.set_rendering(True)
 
 
 @persistent
 def on_render_end(*_: Any) -> None:
-    playback.rendering(False)
+    playback.set_rendering(False)
 
 
 def _react(reaction: Callable[[bpy.types.Depsgraph], None], depsgraph: bpy.types.Depsgraph) -> None:

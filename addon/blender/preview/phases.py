@@ -72,18 +72,18 @@ def next_phase(phase: Phase, event: Event) -> tuple[Phase, Action]:
 
 
 def frame_event(
-    before: int | None, now: int, first: int, *, is_played: bool, longest: float
+    before: int | None, now: int, first: int, *, is_played: bool, max_dropped: float
 ) -> tuple[Event, int]:
     """The event that a scene frame causes in a preview, and the number of frames to advance.
 
     Args:
         before: the frame at which the hair is; None: at none.
         first: the frame at which playback begins.
-        longest: the most frames ahead that count as dropped by playback.
+        max_dropped: the most frames ahead that count as dropped by playback.
     """
     if now == first:
         return Event.FIRST, 0
     ahead = 0 if before is None else now - before
-    if before is None or not (ahead in (0, 1) or (is_played and 0 < ahead <= longest)):
+    if before is None or not (ahead in (0, 1) or (is_played and 0 < ahead <= max_dropped)):
         return Event.JUMP, 0
     return (Event.NEXT, ahead) if ahead else (Event.SAME, 0)

@@ -33,19 +33,19 @@ from ..sessions.session import Session
 from .phases import SIMULATED, Action, Event, Phase, frame_event, next_phase
 
 #: A step ahead of more time [s] than this is a jump, not dropped frames.
-_LONGEST_DROP = 1.0
+_MAX_DROPPED_TIME = 1.0
 
 
 @dataclass(frozen=True)
 class KnownBake:
     """The bake of a groom or fin, compared with the scene.
 
-    changed: what has changed since it was made, in words; empty: it is up to date.
+    changed_inputs: what has changed since it was made, in words; empty: it is up to date.
     frame_hash: frame hash of the scene in the frame that is shown.
     """
 
     facts: Facts
-    changed: tuple[str, ...] = ()
+    changed_inputs: tuple[str, ...] = ()
     frame_hash: str = ""
 
 
@@ -57,7 +57,7 @@ class Preview:
         computed yet.
     problem, bake_problem: why it is not simulated, or its bake not shown.
     cards_are_stale: whether its cards need to be shaded again once edits have settled.
-    is_to_rest: whether it was stopped while it was left out, and must rest once it is read again.
+    must_rest: whether it was stopped while it was left out, and must rest once it is read again.
 
     Methods raise HairloomError when an object that it is made of is gone or broken.
     """
@@ -69,7 +69,7 @@ class Preview:
         self.bake: KnownBake | None = None
         self.rig_hash = ""
         self.problem = self.bake_problem = ""
-        self.cards_are_stale = self.is_to_rest = False
+        self.cards_are_stale = self.must_rest = False
 
     @property
     def uid(self) -> int:
@@ -86,7 +86,7 @@ class Preview:
         return self.groom is None or self.groom.is_made
 
     @property
-    def may_begin(self) -> bool:
+    def can_begin(self) -> bool:
         """Whether everything that it needs to be simulated is made."""
         return self.session.is_made and fields.are_made()
 
@@ -119,21 +119,21 @@ class Preview:
 
     def stop(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Stop playing it: it rests, or shows the scene's frame from its bake."""
-        self.act(Event.STOP, depsgraph)
+        self.handle_or_raise(Event.STOP, depsgraph)
         self.show_frame(depsgraph)
 
-    def halt(self, depsgraph: bpy.types.Depsgraph) -> None:
+    def stop_left_out(self, depsgraph: bpy.types.Depsgraph) -> None:
         """`stop` for a preview that is left out: cloth rests now, hair once it is read again."""
         self.phase, self.session.is_playing = Phase.REST, False
-        self.session.is_stale = self.is_to_rest = True
+        self.session.is_stale = self.must_rest = True
         if self.groom is None:
             self.session.stop(depsgraph)
 
-    def found(self) -> bpy.types.Object:
+    def resolve(self) -> bpy.types.Object:
         """Its object."""
-        return Handle(self.uid, self.session.name).found()
+        return Handle(self.uid, self.session.name).resolve()
 
-    def go(
+    def handle(
         self,
         event: Event,
         depsgraph: bpy.types.Depsgraph,
@@ -148,12 +148,12 @@ class Preview:
             blocking: False: do not wait for what is being made.
         """
         try:
-            self.act(event, depsgraph, duration, blocking=blocking)
+            self.handle_or_raise(event, depsgraph, duration, blocking=blocking)
         except HairloomError as error:
-            self.act(Event.FAILED, depsgraph)
+            self.handle_or_raise(Event.FAILED, depsgraph)
             self.problem = str(error)
 
-    def act(
+    def handle_or_raise(
         self,
         event: Event,
         depsgraph: bpy.types.Depsgraph,
@@ -161,19 +161,19 @@ class Preview:
         *,
         blocking: bool = True,
     ) -> None:
-        """As `go`, but raise errors of the simulation; the preview is at rest then."""
+        """As `handle`, but raise errors of the simulation; the preview is at rest then."""
         self.phase, action = next_phase(self.phase, event)
         session = self.session
         if self.phase not in SIMULATED:
             session.is_playing = False
         if action is not Action.NONE:
-            self.problem, self.is_to_rest = "", False
+            self.problem, self.must_rest = "", False
         try:
             match action:
                 case Action.BEGIN:
                     # saves reading the scene in each frame of playback just to find it unmade
                     is_frame = self.phase is Phase.TIMELINE
-                    if is_frame and not blocking and not self.may_begin:
+                    if is_frame and not blocking and not self.can_begin:
                         raise NotMadeYetError
                     session.play(depsgraph, blocking=blocking, is_frame=is_frame)
                 case Action.ADVANCE:
@@ -183,7 +183,7 @@ class Preview:
                 case Action.STOP:
                     session.stop(depsgraph)
         except NotMadeYetError:
-            self.act(Event.UNMADE, depsgraph)
+            self.handle_or_raise(Event.UNMADE, depsgraph)
         except HairloomError:
             self.phase, session.is_playing = Phase.REST, False
             raise
@@ -194,32 +194,36 @@ class Preview:
         try:
             self.groom.finish_frame()
         except HairloomError as error:
-            self.act(Event.FAILED, depsgraph)
+            self.handle_or_raise(Event.FAILED, depsgraph)
             self.problem = str(error)
 
-    def release(self) -> None:
+    def detach_from_timeline(self) -> None:
         """Detach it from the timeline, until `follow`."""
         self.frame = None
 
     def follow(self, depsgraph: bpy.types.Depsgraph) -> None:
         """React to a change of the scene's frame."""
-        obj, scene = self.found(), depsgraph.scene
+        obj, scene = self.resolve(), depsgraph.scene
         now, before = scene.frame_current, self.frame
         if before is None and self.phase is Phase.FREE:
             before = now - 1  # it was played freely until now
         self.frame = now
         if not self.is_made and not _is_exact():
-            self.go(Event.UNMADE, depsgraph)
+            self.handle(Event.UNMADE, depsgraph)
             return
         rate, first = frame_rate(scene), _first_frame(scene)
         if now == first:
-            self.check(depsgraph)
+            self.check_bake(depsgraph)
         if self._show_baked(obj, depsgraph):
             return
         event, frames = frame_event(
-            before, now, first, is_played=playback.is_played(), longest=rate * _LONGEST_DROP
+            before,
+            now,
+            first,
+            is_played=playback.is_animation_playing(),
+            max_dropped=rate * _MAX_DROPPED_TIME,
         )
-        self.go(event, depsgraph, frames / rate, blocking=_is_exact())
+        self.handle(event, depsgraph, frames / rate, blocking=_is_exact())
 
     def keep_or_rest(self, depsgraph: bpy.types.Depsgraph) -> bool:
         """React to a new evaluation of the body within a frame: hair rests if its body has moved.
@@ -231,15 +235,15 @@ class Preview:
             if self.session.frame_hash(depsgraph) == self.bake.frame_hash:
                 return False
             facts = self.bake.facts
-            self.bake = KnownBake(facts, self._changed(facts, depsgraph))
+            self.bake = KnownBake(facts, self._changes_since_bake(facts, depsgraph))
         elif not self.groom.has_moved(depsgraph):
             return self.phase is Phase.REST
-        self.go(Event.RESET, depsgraph)
+        self.handle(Event.RESET, depsgraph)
         return True
 
     def take_bake(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Find its bake, and show the scene's frame from it."""
-        self.check(depsgraph)
+        self.check_bake(depsgraph)
         self.show_frame(depsgraph)
 
     def is_resized(self, depsgraph: bpy.types.Depsgraph) -> bool:
@@ -247,25 +251,25 @@ class Preview:
 
         Playing hair keeps its size until it rests, and baked hair that of its bake.
         """
-        if self.groom is None or self.bake is not None or playback.is_played():
+        if self.groom is None or self.bake is not None or playback.is_animation_playing():
             return False
         return self.phase not in (Phase.FREE, Phase.WAITING) and self.groom.is_resized(depsgraph)
 
-    def check(self, depsgraph: bpy.types.Depsgraph) -> None:
+    def check_bake(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Find out again whether there is a bake, and whether it is up to date."""
-        obj = self.found()
+        obj = self.resolve()
         self.rig_hash = self.session.rig_hash(depsgraph)
         cache = self._cache_of(obj)
-        self.bake = None if cache is None else self._state(cache.facts, depsgraph)
+        self.bake = None if cache is None else self._known_bake(cache.facts, depsgraph)
 
-    def look_again(self, depsgraph: bpy.types.Depsgraph) -> None:
+    def compare_bake(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Compare the bake with the scene again after a setting was changed."""
         if self.bake is not None:
-            self.bake = self._state(self.bake.facts, depsgraph)
+            self.bake = self._known_bake(self.bake.facts, depsgraph)
 
     def show_frame(self, depsgraph: bpy.types.Depsgraph) -> bool:
         """Show the scene's frame from the bake; returns whether the bake has it."""
-        return self._show_baked(self.found(), depsgraph)
+        return self._show_baked(self.resolve(), depsgraph)
 
     def forget_bake(self) -> None:
         """Forget a bake that was deleted or replaced."""
@@ -276,9 +280,9 @@ class Preview:
         frame = depsgraph.scene.frame_current
         self.bake_problem = ""
         cache = self._cache_of(obj) if obj.hairloom.bake.is_shown else None
-        if cache is None or not cache.holds(frame):
+        if cache is None or not cache.has_frame(frame):
             if self.phase is Phase.BAKED:
-                self.act(Event.SAME, depsgraph)
+                self.handle_or_raise(Event.SAME, depsgraph)
             return False
         try:
             solids = playback.solids_in(cache, frame, blocking=latest_job.is_blocking())
@@ -286,16 +290,16 @@ class Preview:
         except HairloomError as error:
             self.bake_problem = str(error)
             return False
-        self.act(Event.IS_BAKED, depsgraph)
+        self.handle_or_raise(Event.IS_BAKED, depsgraph)
         self.rig_hash = self.rig_hash or self.session.rig_hash(depsgraph)
-        self.bake = self._state(cache.facts, depsgraph)
+        self.bake = self._known_bake(cache.facts, depsgraph)
         return True
 
-    def _state(self, facts: Facts, depsgraph: bpy.types.Depsgraph) -> KnownBake:
+    def _known_bake(self, facts: Facts, depsgraph: bpy.types.Depsgraph) -> KnownBake:
         frame_hash = self.session.frame_hash(depsgraph)
-        return KnownBake(facts, self._changed(facts, depsgraph, frame_hash), frame_hash)
+        return KnownBake(facts, self._changes_since_bake(facts, depsgraph, frame_hash), frame_hash)
 
-    def _changed(
+    def _changes_since_bake(
         self, facts: Facts, depsgraph: bpy.types.Depsgraph, frame_hash: str = ""
     ) -> tuple[str, ...]:
         changed = differences(facts.rig_hash, self.rig_hash or facts.rig_hash)
@@ -313,7 +317,7 @@ class Preview:
             return None
 
 
-def rig_for(hair: bpy.types.Object, scene: bpy.types.Scene) -> BakedRig | None:
+def baked_rig_for(hair: bpy.types.Object, scene: bpy.types.Scene) -> BakedRig | None:
     """The rig of the groom's bake, if it was made from the curves and the head as they are now."""
     try:
         cache = playback.cache_of(hair)
@@ -333,4 +337,4 @@ def _first_frame(scene: bpy.types.Scene) -> int:
 
 def _is_exact() -> bool:
     """Whether each frame waits until all of its hair is made."""
-    return latest_job.is_blocking() or not playback.is_played()
+    return latest_job.is_blocking() or not playback.is_animation_playing()

@@ -36,7 +36,7 @@ from ..sessions.session import Session
 from ..viewport import overlay
 from ..viewport.debug_lines import is_in_sculpt_mode
 from .phases import Event, Phase
-from .preview import KnownBake, Preview, rig_for
+from .preview import KnownBake, Preview, baked_rig_for
 
 #: Notes on hair that is about to play, and on hair that is not made yet.
 WAITING, BUILDING = "plays as soon as its collider is ready", "is being made"
@@ -70,9 +70,9 @@ def start(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Session:
     Raises:
         HairloomError: it cannot be previewed.
     """
-    baked = rig_for(hair, depsgraph.scene)
+    baked = baked_rig_for(hair, depsgraph.scene)
     session = Session(
-        hair, depsgraph, baked=baked, blocking=latest_job.is_blocking(), arrived=_take_arrivals
+        hair, depsgraph, baked=baked, blocking=latest_job.is_blocking(), arrived=_take_finished_work
     )
     overlay.retry()
     add(session, depsgraph)
@@ -90,7 +90,7 @@ def restart(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
     Raises:
         HairloomError: as `start`.
     """
-    session = start(preview.found(), depsgraph)
+    session = start(preview.resolve(), depsgraph)
     previews[session.uid].frame = preview.frame
 
 
@@ -271,8 +271,8 @@ def begin(session: Simulation, depsgraph: bpy.types.Depsgraph, *, blocking: bool
         HairloomError: as `Simulation.play`.
     """
     preview = previews[session.uid]
-    preview.release()
-    preview.act(Event.PLAY, depsgraph, blocking=blocking)
+    preview.detach_from_timeline()
+    preview.handle_or_raise(Event.PLAY, depsgraph, blocking=blocking)
     if preview.phase is Phase.WAITING:
         publish(preview, depsgraph)
 
@@ -281,11 +281,13 @@ def advance(depsgraph: bpy.types.Depsgraph, duration: float) -> None:
     """Simulate the time [s] that has passed since the last call."""
     with coupled_frame(depsgraph):
         for preview in tuple(previews.values()):
-            if preview.phase is Phase.WAITING and preview.may_begin:
+            if preview.phase is Phase.WAITING and preview.can_begin:
                 # its first frame waits for the next tick, so that neither blocks the window long
                 attempt(preview, depsgraph, partial(_begin, preview, depsgraph))
             elif preview.phase is Phase.FREE and not previews.is_paused:
-                attempt(preview, depsgraph, partial(preview.go, Event.TICK, depsgraph, duration))
+                attempt(
+                    preview, depsgraph, partial(preview.handle, Event.TICK, depsgraph, duration)
+                )
 
 
 @contextmanager
@@ -301,14 +303,14 @@ def coupled_frame(depsgraph: bpy.types.Depsgraph) -> Iterator[None]:
 
 
 def _begin(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
-    preview.go(Event.PLAY, depsgraph, blocking=False)
+    preview.handle(Event.PLAY, depsgraph, blocking=False)
 
 
 def rest(depsgraph: bpy.types.Depsgraph, *, keep_playing: bool) -> None:
     """Put all hair back into its style; or, unless it keeps playing, into its baked frame."""
     for preview in tuple(previews.values()):
         if preview.is_playing and not keep_playing and preview.is_left_out(depsgraph):
-            preview.halt(depsgraph)
+            preview.stop_left_out(depsgraph)
             for each in shown_depsgraphs():
                 each.scene.update_tag()  # has it read again in another window that shows it
             continue
@@ -318,7 +320,7 @@ def rest(depsgraph: bpy.types.Depsgraph, *, keep_playing: bool) -> None:
 
 def _put_back(preview: Preview, depsgraph: bpy.types.Depsgraph, keep_playing: bool) -> None:
     if keep_playing:
-        preview.act(Event.RESET, depsgraph)
+        preview.handle_or_raise(Event.RESET, depsgraph)
     else:
         preview.stop(depsgraph)
         if preview.is_resized(depsgraph):
@@ -329,20 +331,20 @@ def bake_changed(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
     """React to a bake that was made, deleted, shown or hidden."""
     folder = folder_of(obj)
     if folder is not None:
-        playback.drop(folder)
+        playback.forget_bake(folder)
     preview = previews.get(obj.session_uid)
     if preview is None:
         return
-    attempt(preview, depsgraph, partial(_take_other_bake, preview, depsgraph))
+    attempt(preview, depsgraph, partial(_take_changed_bake, preview, depsgraph))
     redraw_panels()
 
 
-def _take_other_bake(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
+def _take_changed_bake(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
     preview.forget_bake()
-    preview.release()
-    preview.act(Event.STOP, depsgraph)
+    preview.detach_from_timeline()
+    preview.handle_or_raise(Event.STOP, depsgraph)
     groom = preview.groom
-    baked = None if groom is None else rig_for(preview.found(), depsgraph.scene)
+    baked = None if groom is None else baked_rig_for(preview.resolve(), depsgraph.scene)
     is_other = (
         groom is not None
         and baked is not None
@@ -400,7 +402,7 @@ def publish(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
     session = preview.groom
     if session is None:
         return
-    hair = session.hair.found()
+    hair = session.hair.resolve()
     note = "" if session.is_made else BUILDING
     if preview.phase is Phase.WAITING and not note:
         note = WAITING
@@ -429,7 +431,7 @@ def _show_lines(preview: Preview) -> float | None:
     return None
 
 
-def _take_arrivals(session: Session) -> None:
+def _take_finished_work(session: Session) -> None:
     """Show hair and cards that were made in the background."""
     preview = previews.get(session.uid)
     if preview is None or preview.session is not session:
@@ -438,7 +440,7 @@ def _take_arrivals(session: Session) -> None:
     if depsgraph is None:
         return  # called again until some window shows it
     if session.has_arrived:
-        attempt(preview, depsgraph, partial(_take_made, preview, session, depsgraph))
+        attempt(preview, depsgraph, partial(_take_built, preview, session, depsgraph))
         refresh_views()  # to hide Blender's own strands, shown until now
     elif session.cards.has_arrived:
         attempt(preview, depsgraph, session.take_cards)
@@ -469,16 +471,16 @@ def finish(session: Session, depsgraph: bpy.types.Depsgraph) -> None:
             remedy="Show it, or select other hair",
         )
     while session.is_pending and previews.get(session.uid) is preview:
-        take = partial(_take_made, preview, session, depsgraph)
+        take = partial(_take_built, preview, session, depsgraph)
         attempt(preview, depsgraph, take, needs_gpu=False)
 
 
-def _take_made(preview: Preview, session: Session, depsgraph: bpy.types.Depsgraph) -> None:
+def _take_built(preview: Preview, session: Session, depsgraph: bpy.types.Depsgraph) -> None:
     was_made, is_lit = session.is_made, session.is_lighting
     session.take_made(depsgraph)
     if is_lit:
         return
     if was_made:
-        preview.check(depsgraph)
+        preview.check_bake(depsgraph)
     else:
         preview.take_bake(depsgraph)

@@ -54,7 +54,7 @@ def settings_changed(owner: bpy.types.ID) -> None:
             if session.is_stale:
                 _read_again_soon()
         elif occluders_changed(session, {owner.session_uid}, depsgraph.view_layer):
-            _look_at_cards_soon(preview)
+            _refresh_cards_soon(preview)
 
 
 def _grooms() -> list[tuple[Preview, Session]]:
@@ -62,7 +62,7 @@ def _grooms() -> list[tuple[Preview, Session]]:
     return [(each, each.groom) for each in previews.values() if each.groom is not None]
 
 
-def _look_at_cards_soon(preview: Preview) -> None:
+def _refresh_cards_soon(preview: Preview) -> None:
     preview.cards_are_stale = True
     _read_again_soon()
 
@@ -70,7 +70,7 @@ def _look_at_cards_soon(preview: Preview) -> None:
 def _take_settings(preview: Preview, session: Session, depsgraph: bpy.types.Depsgraph) -> None:
     session.take_settings()
     _refine_soon(session)
-    preview.look_again(depsgraph)
+    preview.compare_bake(depsgraph)
 
 
 def display_changed(owner: bpy.types.ID) -> None:
@@ -81,7 +81,7 @@ def display_changed(owner: bpy.types.ID) -> None:
 
 def updated(depsgraph: bpy.types.Depsgraph) -> None:
     """After an evaluation of the scene, follow what moved and read again what was edited."""
-    moved, edited, light_changed = changes(depsgraph)
+    moved, edited, light_changed = changes_in(depsgraph)
     for preview, session in _grooms():
         is_combed, is_painted = is_edited(session, edited), weights_changed(session, edited)
         if (
@@ -96,8 +96,8 @@ def updated(depsgraph: bpy.types.Depsgraph) -> None:
         elif session.is_stale and not bpy.app.timers.is_registered(_read_again):
             _read_again_soon()  # it was left out and is shown again
         if occluders_changed(session, moved, depsgraph.view_layer) or cards_edited(session, edited):
-            _look_at_cards_soon(preview)
-        follows = preview.phase is not Phase.FREE and is_among(session, moved)
+            _refresh_cards_soon(preview)
+        follows = preview.phase is not Phase.FREE and has_moved(session, moved)
         brushes = [session.follow_combing] * is_combed + [session.follow_painted_masks] * is_painted
         colors = [session.follow_painted_colors] * is_painted
         update = partial(
@@ -131,13 +131,13 @@ def frame_changed(depsgraph: bpy.types.Depsgraph) -> None:
     Animated settings and lights apply. Curves that are animated themselves are not read again in
     every frame.
     """
-    _, _, light_changed = changes(depsgraph)
+    _, _, light_changed = changes_in(depsgraph)
     with registry.coupled_frame(depsgraph):
         for preview in tuple(previews.values()):
-            attempt(preview, depsgraph, partial(_go, preview, depsgraph, light_changed))
+            attempt(preview, depsgraph, partial(_follow_frame, preview, depsgraph, light_changed))
 
 
-def _go(preview: Preview, depsgraph: bpy.types.Depsgraph, light_changed: bool) -> None:
+def _follow_frame(preview: Preview, depsgraph: bpy.types.Depsgraph, light_changed: bool) -> None:
     session = preview.groom
     if session is not None:
         session.take_settings()
@@ -145,12 +145,12 @@ def _go(preview: Preview, depsgraph: bpy.types.Depsgraph, light_changed: bool) -
         if light_changed:
             session.take_lights(depsgraph)
     is_free = preview.phase is Phase.FREE
-    if preview.found().hairloom.bake.follows:
+    if preview.resolve().hairloom.bake.follows:
         # freely playing hair goes on swinging while the playhead is dragged; playback takes it over
-        if not is_free or playback.is_played():
+        if not is_free or playback.is_animation_playing():
             preview.follow(depsgraph)
     elif preview.phase is Phase.WAITING or not (is_free or preview.show_frame(depsgraph)):
-        preview.act(Event.RESET, depsgraph)
+        preview.handle_or_raise(Event.RESET, depsgraph)
 
 
 def _refine_soon(session: Session) -> None:
@@ -212,7 +212,7 @@ def catch_up(depsgraph: bpy.types.Depsgraph) -> None:
     """Read what was edited; hair in another size or on another head is previewed again."""
     for preview in tuple(previews.values()):
         if preview.session.is_stale:
-            attempt(preview, depsgraph, partial(_read, preview, depsgraph))
+            attempt(preview, depsgraph, partial(_read_preview, preview, depsgraph))
     for preview, session in _grooms():
         if preview.cards_are_stale:
             preview.cards_are_stale = False
@@ -220,17 +220,17 @@ def catch_up(depsgraph: bpy.types.Depsgraph) -> None:
     redraw_panels()
 
 
-def _read(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
+def _read_preview(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
     session = preview.groom
     if session is None:
-        preview.act(Event.RESET, depsgraph)
+        preview.handle_or_raise(Event.RESET, depsgraph)
     elif session.has_changed_head() or preview.is_resized(depsgraph):
         registry.restart(preview, depsgraph)
     else:
         session.read_again(depsgraph, blocking=latest_job.is_blocking())
-        if preview.is_to_rest:
+        if preview.must_rest:
             preview.stop(depsgraph)
-        preview.check(depsgraph)
+        preview.check_bake(depsgraph)
 
 
 def clear() -> None:
@@ -243,7 +243,7 @@ def clear() -> None:
             bpy.app.timers.unregister(timer)
 
 
-def changes(depsgraph: bpy.types.Depsgraph) -> tuple[set[int], set[int], bool]:
+def changes_in(depsgraph: bpy.types.Depsgraph) -> tuple[set[int], set[int], bool]:
     """Session numbers of what moved or changed shape, and of what changed shape or is an image; and
     whether lights changed."""
     moved, edited, light_changed = set(), set(), False
@@ -305,7 +305,7 @@ def cards_edited(session: Session, edited: set[int]) -> bool:
     return not edited.isdisjoint(cards)
 
 
-def is_among(session: Session, moved: set[int]) -> bool:
+def has_moved(session: Session, moved: set[int]) -> bool:
     """Whether the groom, its head, or what holds its hair has moved."""
     uids = {body.handle.uid for body in session.bodies}
     return not moved.isdisjoint(uids | session.holder_uids)

@@ -24,12 +24,12 @@ def read_pose(
         HairloomError: hair or head is gone, a position is not finite, or the number of vertices
             has changed.
     """
-    hair.found()
+    hair.resolve()
     if head is None:
-        matrix = hair.moved(depsgraph)
+        matrix = hair.motion_from_rest(depsgraph)
         check_finite(hair.handle.name, matrix)
         return Pose(None, matrix)
-    obj = head.found()
+    obj = head.resolve()
     positions = read_positions(obj, depsgraph, place=obj.name)
     if len(positions) != vertex_count:
         raise HairloomError(
@@ -39,7 +39,7 @@ def read_pose(
             remedy="Press Preview again",
         )
     check_finite(obj.name, positions)
-    return Pose(positions, head.moved(depsgraph))
+    return Pose(positions, head.motion_from_rest(depsgraph))
 
 
 def check_finite(place: str, values: Floats) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..base.objects import objects_with
+from ..base.objects import objects_using
 
 #: custom property of the object: its Sag Correction before it was settled
 _EARLIER_SAG_CORRECTION = "hairloom_combed_sag"
@@ -17,7 +17,7 @@ _EARLIER_SAG_CORRECTION = "hairloom_combed_sag"
 def set_full_sag_correction(curves: bpy.types.Curves) -> tuple[str, ...]:
     """Set Sag Correction to 1 on all objects with these settled curves; returns notes on it."""
     notes = []
-    for hair in objects_with(curves):
+    for hair in objects_using(curves):
         dynamics = hair.hairloom.dynamics
         before = dynamics.sag_compensation
         if before == 1.0:
@@ -34,7 +34,7 @@ def set_full_sag_correction(curves: bpy.types.Curves) -> tuple[str, ...]:
 
 def restore_sag_correction(curves: bpy.types.Curves) -> None:
     """Restore Sag Correction, once the settled shape is gone."""
-    for hair in objects_with(curves):
+    for hair in objects_using(curves):
         before = hair.pop(_EARLIER_SAG_CORRECTION, None)
         if before is not None:
             hair.hairloom.dynamics.sag_compensation = before

@@ -69,7 +69,7 @@ class FinSession:
 
     @property
     def settings(self) -> FinSettings:
-        return settings_of(self.body.found().hairloom.fin, FinSettings)
+        return settings_of(self.body.resolve().hairloom.fin, FinSettings)
 
     def rest(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Show the mesh where the animation carries it, without velocity."""
@@ -214,7 +214,7 @@ class FinSession:
         Raises:
             HairloomError: it is gone, in another mode, or has another mesh.
         """
-        obj = self.body.found()
+        obj = self.body.resolve()
         self._check_mesh(obj)
         return obj
 

@@ -69,7 +69,7 @@ class GroomSource:
         self._holders = TrackedHolders.of(hair, depsgraph)
         self._last_good_masks: dict[str, Mask] = {}
         self._shown_map: tuple[str, Mask | None] | None = None
-        self._overlay_canvas: MaskReader | None = None
+        self._overlay_mask_reader: MaskReader | None = None
         self._motion_masks = NO_MASKS
         self._painted_guides: tuple[Ints, Masks, PaintedGuides | None] | None = None
         source = read_source(hair, depsgraph, self._last_good_masks)
@@ -106,8 +106,8 @@ class GroomSource:
         Raises:
             ObjectGoneError: one of them no longer exists.
         """
-        head = None if self.head is None else matrix_of(self.head.found(), depsgraph)
-        now = RestMatrices(matrix_of(self.hair.found(), depsgraph), head)
+        head = None if self.head is None else matrix_of(self.head.resolve(), depsgraph)
+        now = RestMatrices(matrix_of(self.hair.resolve(), depsgraph), head)
         return now.is_invertible and not now.has_same_size(self.rest_matrices)
 
     @property
@@ -183,7 +183,7 @@ class GroomSource:
 
     def has_changed_head(self) -> bool:
         """Whether the artist has set another surface since."""
-        head = head_of(self.hair.found())
+        head = head_of(self.hair.resolve())
         return (head and head.session_uid) != self._head_uid
 
     def read_again(self, depsgraph: bpy.types.Depsgraph) -> BuildRequest | None:
@@ -195,7 +195,7 @@ class GroomSource:
         Raises:
             HairloomError: the hair is gone, or no usable hair is left.
         """
-        hair, known = self.hair.found(), self.request
+        hair, known = self.hair.resolve(), self.request
         before = known.source
         settings = GroomSettings.of(hair)
         read, stored, back = self._read_curves(hair, depsgraph)
@@ -268,7 +268,7 @@ class GroomSource:
         Hair that no modifier attaches is stored on the undeformed head; other hair is on the head
         as it is deformed now.
         """
-        source, hair = self.request.source, self.hair.found()
+        source, hair = self.request.source, self.hair.resolve()
         if source.head is None or hair.hairloom.dynamics.animated_style:
             return read
         if source.rest is not None:
@@ -300,7 +300,7 @@ class GroomSource:
             HairloomError: the hair is gone, or no usable hair is left.
         """
         before = self._last_curves
-        _, stored, back = self._read_curves(self.hair.found(), depsgraph)
+        _, stored, back = self._read_curves(self.hair.resolve(), depsgraph)
         strands = self._on_head(stored, depsgraph)
         if not np.array_equal(strands.offsets, before.offsets):
             return None
@@ -321,9 +321,9 @@ class GroomSource:
         Raises:
             HairloomError: the hair is gone.
         """
-        hair, (density, masks) = self.hair.found(), self.painted
+        hair, (density, masks) = self.hair.resolve(), self.painted
         mask_reader, settings = self._mask_reader(self.source), self.settings[ChildrenSettings]
-        self._overlay_canvas = mask_reader  # the overlay reads it before anything else is painted
+        self._overlay_mask_reader = mask_reader  # the overlay reads it before other paint
         self.painted = (
             read_density(hair, mask_reader, depsgraph)[0],
             mask_reader.masks(settings, depsgraph)[0],
@@ -337,7 +337,7 @@ class GroomSource:
         Raises:
             HairloomError: the hair is gone.
         """
-        hair, shown = self.hair.found(), self.source
+        hair, shown = self.hair.resolve(), self.source
         if not self.settings[ShadingSettings].color_map:
             return False
         colors, warnings = read_source_colors(hair, shown.strands, shown.head, depsgraph)
@@ -348,14 +348,14 @@ class GroomSource:
         """Show the hair of this request from now on, with the present values of settings that act
         at once."""
         self.source, self._holders = request.source, request.holders
-        self._overlay_canvas = self._shown_map = None
+        self._overlay_mask_reader = self._shown_map = None
         self._last_curves = self.source.strands
         self.painted = self.source.density, self.source.masks
-        self.settings = GroomSettings.of(self.hair.found()).with_built_values_of(request.settings)
+        self.settings = GroomSettings.of(self.hair.resolve()).with_built_values_of(request.settings)
 
     def take_settings(self) -> bool:
         """Take over settings that act at once; returns whether others need new hair."""
-        settings = GroomSettings.of(self.hair.found())
+        settings = GroomSettings.of(self.hair.resolve())
         self.settings = settings.with_built_values_of(self.settings)
         return not settings.needs_no_rebuild(self.request.settings)
 
@@ -365,7 +365,9 @@ class GroomSource:
         pose = read_pose(self.hair, self.head, vertex_count, depsgraph)
         if rig.holds is None:
             return pose
-        return replace(pose, anchors=self._holders.anchors(self.hair.found(), rig.holds, depsgraph))
+        return replace(
+            pose, anchors=self._holders.anchors(self.hair.resolve(), rig.holds, depsgraph)
+        )
 
     def styled_rig(self, rig: Rig, depsgraph: bpy.types.Depsgraph) -> Rig:
         """The rig in the style of this frame's curves; if their number has changed, in that of the
@@ -374,7 +376,7 @@ class GroomSource:
         Raises:
             HairloomError: the hair is gone.
         """
-        hair, known = self.hair.found(), self._styled_rig
+        hair, known = self.hair.resolve(), self._styled_rig
         if known is None or known.base is not rig:
             known = _StyledRig(rig, self.source.strands, rig)
         curves = read_curves(hair, depsgraph).strands
@@ -399,9 +401,9 @@ class GroomSource:
 
     def shown_map(self, rig: Rig, depsgraph: bpy.types.Depsgraph) -> Floats | None:
         """The shown map at each guide, (cv_count or 1, guide_count); None: there is none."""
-        name = shown_map_name(self.hair.found())
+        name = shown_map_name(self.hair.resolve())
         if self._shown_map is None or self._shown_map[0] != name:
-            mask_reader = self._overlay_canvas or self._mask_reader(self.source)
+            mask_reader = self._overlay_mask_reader or self._mask_reader(self.source)
             mask = mask_reader.read_or_last(name, depsgraph)[0] if name else None
             self._shown_map = name, mask
         mask = self._shown_map[1]
@@ -410,11 +412,11 @@ class GroomSource:
 
     def forget_shown_map(self) -> None:
         """Read the shown map again when it is next needed."""
-        self._shown_map = self._overlay_canvas = None
+        self._shown_map = self._overlay_mask_reader = None
 
     def _mask_reader(self, source: Source) -> MaskReader:
         """The reader of masks of this source."""
-        hair = self.hair.found()
+        hair = self.hair.resolve()
         return MaskReader(
             hair,
             head_of(hair),
@@ -433,14 +435,14 @@ class GroomSource:
 
     def rig_hash(self, depsgraph: bpy.types.Depsgraph) -> str:
         """See `simulation.Simulation`."""
-        hair = self.hair.found()
-        head = None if self.head is None else self.head.found()
+        hair = self.hair.resolve()
+        head = None if self.head is None else self.head.resolve()
         return groom_rig_hash(hair, head, self.settings, depsgraph.scene)
 
     def frame_hash(self, pose: Pose, depsgraph: bpy.types.Depsgraph) -> str:
         """See `simulation.Simulation`."""
-        hair = self.hair.found()
-        head = None if self.head is None else self.head.found()
+        hair = self.hair.resolve()
+        head = None if self.head is None else self.head.resolve()
         return groom_frame_hash(hair, head, pose, depsgraph)
 
 

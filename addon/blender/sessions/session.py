@@ -118,7 +118,7 @@ class Session:
         self.card_figures: CardFigures | None = None
         self.are_figures_current = False
         self.picture = GroomPicture(
-            self.hair.found, is_drawn=is_drawn, arrived=partial(arrived, self)
+            self.hair.resolve, is_drawn=is_drawn, arrived=partial(arrived, self)
         )
         self.cards = self.picture.cards
         request = self._source.request
@@ -502,7 +502,7 @@ class Session:
         self._take_style(depsgraph)
         pose, self.figures, self.card_figures = self._pose(depsgraph), None, None
         self._motion_start, self._is_recorded, self.known_hair = None, False, KnownNeighbours()
-        _, self._field_notes = force_fields_of(self.hair.found(), depsgraph)
+        _, self._field_notes = force_fields_of(self.hair.resolve(), depsgraph)
         if not self.is_playing or self.obstacles is None:
             self.solver.rest(pose)
         else:
@@ -554,7 +554,7 @@ class Session:
                 the call does not block.
         """
         self.is_playing = False
-        check_no_hair_dynamics(self.hair.found())
+        check_no_hair_dynamics(self.hair.resolve())
         self.take_settings()
         if blocking:
             self.finish(depsgraph)
@@ -580,7 +580,7 @@ class Session:
 
     def _read_obstacles(self, depsgraph: bpy.types.Depsgraph, *, blocking: bool) -> None:
         self.obstacles = Obstacles.of(
-            self.hair.found(),
+            self.hair.resolve(),
             self.head,
             self.rig.head,
             self.settings[DynamicsSettings],
@@ -662,7 +662,7 @@ class Session:
             self._posed_colliders = self.obstacles.move(depsgraph, duration)
         else:
             self._posed_colliders = ()
-        fields, self._field_notes = force_fields_of(self.hair.found(), depsgraph)
+        fields, self._field_notes = force_fields_of(self.hair.resolve(), depsgraph)
         gravity, painted = gravity_of(depsgraph.scene), self._source.painted_guides(self.rig)
         frame = FrameInput(
             pose, self._posed_colliders, settings, gravity, duration, fields, painted, time_scale

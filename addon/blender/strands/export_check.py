@@ -16,7 +16,7 @@ from ...exchange.strand_check import check_lines
 from ...exchange.strand_export_settings import StrandExportSettings
 from ...exchange.strand_formats import StrandFormat
 from ..bakes import playback
-from ..bakes.stale_bakes import changed_since
+from ..bakes.stale_bakes import changed_inputs
 from ..base.objects import Handle
 from ..base.parts import Part, Parts
 from ..colliders.rigs import MadeRig, rig_from
@@ -140,7 +140,7 @@ class ExportCheck:
         for hair in filter(None, (each.find() for each in self.hair)):
             try:
                 cache = playback.cache_of(hair)
-                changed = () if cache is None else changed_since(hair, cache, depsgraph)
+                changed = () if cache is None else changed_inputs(hair, cache, depsgraph)
             except HairloomError:  # reported by `motion_lines`, and when the file is written
                 changed = ()
             self._stale[hair.session_uid] = changed

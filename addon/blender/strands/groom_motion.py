@@ -74,7 +74,7 @@ class ShownMotion:
     needs_scene: bool = True
 
     def at(self, frame: int, depsgraph: bpy.types.Depsgraph) -> Floats:
-        read = shown_curves(self.hair.found("Export again"), depsgraph).strands
+        read = shown_curves(self.hair.resolve("Export again"), depsgraph).strands
         if not np.array_equal(read.offsets, self.out.seen.offsets):
             raise _other_curves(self.hair, frame)
         return read.points
@@ -99,15 +99,15 @@ class ChildrenMotion:
     needs_scene: bool = True
 
     def at(self, frame: int, depsgraph: bpy.types.Depsgraph) -> Floats:
-        read = shown_curves(self.hair.found("Export again"), depsgraph).strands
+        read = shown_curves(self.hair.resolve("Export again"), depsgraph).strands
         if read.strand_count != self.count:
             raise _other_curves(self.hair, frame)
         now = center_lines(read.take(self.guides), self.rig.guide_grid.shape[1]).grid
         positions = None
         if self.rig.head is not None:
             name = self.body.handle.name
-            positions = read_positions(self.body.found(), depsgraph, place=name)
-        pose = Pose(positions, self.body.moved(depsgraph))
+            positions = read_positions(self.body.resolve(), depsgraph, place=name)
+        pose = Pose(positions, self.body.motion_from_rest(depsgraph))
         return motion_flow.strands_at(self.rig, pose, now)
 
 

@@ -22,7 +22,7 @@ from ...strands import StrandSet
 from ...strands.affine import mean_scale
 from ..base.attributes import read_attribute
 from ..base.digests import digest
-from ..base.objects import check_curves_editable, head_of, matrix_of, objects_with
+from ..base.objects import check_curves_editable, head_of, matrix_of, objects_using
 from ..base.parts import Part, Parts, run_parts
 from ..properties import changed
 from ..properties.properties import settings_of
@@ -137,7 +137,7 @@ def grow_after_edit(curves: bpy.types.ID) -> None:
     own = curves.hairloom.grow
     if not curves.is_editable or own.made_by == _settings_digest(own) or lost_by_growing(curves):
         return
-    users = [obj for obj in objects_with(curves) if head_of(obj) is not None]
+    users = [obj for obj in objects_using(curves) if head_of(obj) is not None]
     depsgraph = bpy.context.evaluated_depsgraph_get()
     users.sort(key=lambda obj: not _is_evaluated(obj, depsgraph))
     try:

@@ -32,7 +32,7 @@ from ...render.strand_pass import Statistics, ViewState, drawn_transparency
 from ...shading.environment import Environment, world_suns
 from ...shading.lights import Light, brightest_lights, three_point_lights
 from ...strands import Surface
-from ..base.objects import LayerKey, is_solid, layer_key, layers_with, spaces_without
+from ..base.objects import LayerKey, is_solid, layer_key, layers_showing, spaces_hiding
 from ..base.redraw import redraw_panels, redraw_views, show_status
 from ..cards.show import as_shown, without_strands
 from ..scene.lights import uses_scene_light
@@ -141,15 +141,15 @@ def read_drawing(
         snapshot = replace(snapshot, rest=session.rest_points())
     elif snapshot.debug_view == "depth":
         snapshot = replace(snapshot, solids=session.solids(depsgraph))
-    seen_in = layers_with(hair)
+    seen_in = layers_showing(hair)
     return GroomDrawing(
         snapshot,
         is_visible=bool(seen_in),
         is_made=session.is_made,
         visible_layers=seen_in,
-        hiding_views=spaces_without(hair),
+        hiding_views=spaces_hiding(hair),
         head=session.posed_head if is_drawn else None,
-        headless_views=frozenset() if head is None else spaces_without(head),
+        headless_views=frozenset() if head is None else spaces_hiding(head),
         guide_count=len(session.rig.guides),
         card_counts=session.cards.counts if snapshot.cards is not None else (),
         counts_name=hair.name if hair.hairloom.show_counts or snapshot.debug_view != "none" else "",
