@@ -20,12 +20,12 @@ from ..blender.base.outcome import report
 from ..blender.base.parts import Part, Parts
 from ..blender.base.redraw import redraw_panels, show_status
 from ..blender.base.thread_work import ThreadWork
-from .reports import reporting, waiting
+from .reports import reporting, wait_cursor
 
 #: Length [s] of a slice of work between two checks of the keyboard.
-_SPELL = 0.1
+_SLICE_SECONDS = 0.1
 #: Time [s] between two slices, and between two checks of a thread if there is no window.
-_PAUSE = 0.01
+_PAUSE_SECONDS = 0.01
 
 
 class Progress(NamedTuple):
@@ -86,17 +86,17 @@ class LongWork:
         global _running
         steps = self.steps(context)
         if not self.is_pressed():
-            with waiting(context):
-                _at_once(steps)
+            with wait_cursor(context):
+                _run_at_once(steps)
             return {"FINISHED"}
-        with waiting(context):
+        with wait_cursor(context):
             try:
                 first = next(steps)
             except StopIteration:
                 self.follow(context)
                 return {"FINISHED"}
         _running = _Running(self, steps, context.window)
-        _running.tell(first)
+        _running.show_progress(first)
         return {"RUNNING_MODAL"}
 
     def modal(self: Any, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
@@ -121,7 +121,7 @@ class LongWork:
 
     @reporting
     def _spell(self, _context: bpy.types.Context) -> set[str]:
-        running, end = _running, time.perf_counter() + _SPELL
+        running, end = _running, time.perf_counter() + _SLICE_SECONDS
         assert running is not None
         try:
             step = next(running.steps)
@@ -129,7 +129,7 @@ class LongWork:
                 step = next(running.steps)
         except StopIteration:
             return {"FINISHED"}
-        running.tell(step)
+        running.show_progress(step)
         return {"RUNNING_MODAL"}
 
     def cancel(self, _context: bpy.types.Context) -> None:
@@ -149,11 +149,11 @@ class _Running:
         self.operator, self.label, self.steps = type(operator), operator.bl_label, steps
         self.progress, self._has_cursor = Progress(""), False
         manager = bpy.context.window_manager
-        self._timer = manager.event_timer_add(_PAUSE, window=window)
+        self._timer = manager.event_timer_add(_PAUSE_SECONDS, window=window)
         manager.modal_handler_add(operator)
         event_handlers.append(_HANDLERS)
 
-    def tell(self, progress: Progress) -> None:
+    def show_progress(self, progress: Progress) -> None:
         """Show the progress in the status bar, at the mouse pointer and in panels."""
         if progress == self.progress:
             return
@@ -265,7 +265,7 @@ def threaded[Result](work: ThreadWork[Result]) -> Steps[Result]:
         work.give_up()
 
 
-def in_parts[Result](parts: Parts[Result]) -> Steps[Result]:
+def steps_of_parts[Result](parts: Parts[Result]) -> Steps[Result]:
     """Work whose parts run in threads; closing the generator closes the work and abandons the
     running part."""
     with closing(parts):
@@ -278,14 +278,14 @@ def in_parts[Result](parts: Parts[Result]) -> Steps[Result]:
                 return result
             yield Progress(part.title)  # at least once, even for a short part
             try:
-                made = yield from threaded(_beside(part))
+                made = yield from threaded(_thread_work_of(part))
             except Exception as error:  # raised where the work waits for the part
                 step = partial(parts.throw, error)
             else:
                 step = partial(parts.send, made)
 
 
-def _beside(part: Part) -> ThreadWork[Any]:
+def _thread_work_of(part: Part) -> ThreadWork[Any]:
     work = ThreadWork(lambda _: part.work(), "Hairloom part")
     work.stage = part.title
     return work
@@ -303,7 +303,7 @@ def stop() -> None:
         ended.end()
 
 
-def _at_once(steps: Steps[None]) -> None:
+def _run_at_once(steps: Steps[None]) -> None:
     for step in steps:
         if step.is_idle:
-            time.sleep(_PAUSE)
+            time.sleep(_PAUSE_SECONDS)

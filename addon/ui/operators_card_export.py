@@ -26,7 +26,7 @@ from ..exchange.cards.card_formats import FORMATS, GLB, SUFFIXES
 from .drawing import draw_idle
 from .long_work import LongWork, Progress, Steps, threaded
 from .messages import draw_lines
-from .reports import tell
+from .reports import report_outcome
 from .selection import chosen_hair, needs_hair
 
 _FORMATS = [(each.name, each.entry, each.about) for each in FORMATS]
@@ -111,7 +111,7 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
             made = yield from threaded(plan.building())
             outcomes.append((yield from _shown(plan.writing(made))))
         for outcome in outcomes:
-            tell(self, outcome)
+            report_outcome(self, outcome)
 
     def _plan(self, context: bpy.types.Context, hair: bpy.types.Object, path: Path) -> CardExport:
         return CardExport.of(

@@ -17,7 +17,7 @@ from ..cards.settings import CardSettings
 from ..errors import HairloomError
 from .drawing import draw_button
 from .long_work import LongWork, Progress, Steps, draw_progress, threaded
-from .reports import tell
+from .reports import report_outcome
 from .selection import chosen_hair, in_object_mode, needs_hair
 
 #: number of levels of detail in a panel: the most that there may be
@@ -103,7 +103,7 @@ def _built(
     finest, levels = job.objects[0], len(job.objects)
     detail = f"{levels} levels of detail" if levels > 1 else "one level of detail"
     lines = f"{finest.name}: {_counts(finest)}, {detail}", job.order, job.edits.report_line
-    tell(operator, Outcome(". ".join(filter(None, lines)), job.dropped, job.notes))
+    report_outcome(operator, Outcome(". ".join(filter(None, lines)), job.dropped, job.notes))
 
 
 def draw_made_cards(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:

@@ -13,7 +13,7 @@ from ..blender.properties.groups import operator_properties
 from ..blender.properties.properties import settings_of
 from .drawing import draw_button
 from .help import WithHelp
-from .long_work import LongWork, Steps, draw_progress, in_parts
+from .long_work import LongWork, Steps, draw_progress, steps_of_parts
 from .selection import active_mesh, chosen_hair, in_object_mode
 
 _MILLIMETRES = 1000.0
@@ -45,7 +45,7 @@ class HAIRLOOM_OT_fit_spheres(LongWork, bpy.types.Operator):
         mesh = _mesh(context)
         assert mesh is not None
         fitting = spheres.fit_spheres_to(mesh, context, settings_of(self, SphereFitSettings))
-        fitted = yield from in_parts(fitting)
+        fitted = yield from steps_of_parts(fitting)
         for hair in spheres.grown_on(mesh, context.view_layer):
             spheres.use_spheres(hair, fitted.collection, context.scene)
         if self.replace_mesh:

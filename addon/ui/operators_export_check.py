@@ -14,9 +14,9 @@ from ..blender.preview.previews import made_rigs
 from ..blender.strands.export_check import ExportCheck
 from ..exchange.strand_export_settings import StrandExportSettings
 from ..exchange.strand_formats import STRAND_FORMATS, StrandFormat
-from .long_work import LongWork, Steps, in_parts
+from .long_work import LongWork, Steps, steps_of_parts
 from .messages import draw_lines
-from .reports import tell, waiting
+from .reports import report_outcome, wait_cursor
 from .selection import chosen_hair, needs_hair
 
 #: the check of the file browser or popup that is open
@@ -50,7 +50,7 @@ def refresh(context: bpy.types.Context, kind: StrandFormat, settings: StrandExpo
     """Check for a format and settings; returns whether the result may have changed."""
     if _check is None:
         return False
-    with waiting(context):
+    with wait_cursor(context):
         return _check.refresh(context.evaluated_depsgraph_get(), kind, settings)
 
 
@@ -130,12 +130,12 @@ class HAIRLOOM_OT_check_export(LongWork, bpy.types.Operator):
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         own = ExportCheck.of(writable(chosen_hair(context)), made_rigs())
         reading = own.read_steps(context.evaluated_depsgraph_get(), *_choice(self.engine))
-        yield from in_parts(reading)
+        yield from steps_of_parts(reading)
         begin(own)
         if not bpy.app.background and self.options.is_invoke:
             return
         _look(self, context)
-        tell(self, Outcome("; ".join(own.lines), {}, tuple(own.warnings)))
+        report_outcome(self, Outcome("; ".join(own.lines), {}, tuple(own.warnings)))
         end(own)
 
     def follow(self, _context: bpy.types.Context) -> None:

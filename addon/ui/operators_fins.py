@@ -19,7 +19,7 @@ from ..blender.scene.fin_modifier import (
 from .drawing import draw_button, draw_section
 from .help import WithHelp
 from .messages import draw_message
-from .reports import reporting, waiting
+from .reports import reporting, wait_cursor
 from .selection import active_mesh
 
 
@@ -88,7 +88,7 @@ class HAIRLOOM_OT_fin_preview(bpy.types.Operator):
         if session is not None:
             previews.stop(session)
             return {"FINISHED"}
-        with waiting(context):
+        with wait_cursor(context):
             fins.start(obj, depsgraph)
         return {"FINISHED"}
 

@@ -13,7 +13,7 @@ from ..blender.base.objects import head_of, is_shape_editable, objects_in
 from ..blender.base.outcome import report
 from ..blender.preview.diagnostics import is_unevenly_scaled, nearest_surface, set_surface
 from ..errors import HairloomError
-from .reports import reporting, waiting
+from .reports import reporting, wait_cursor
 from .selection import chosen_hair, in_object_mode, needs_hair
 
 #: for Smart UV Project: the largest angle within an island [rad], the margin between islands
@@ -62,7 +62,7 @@ class HAIRLOOM_OT_snap_roots(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         hair = chosen_hair(context)[0]
         set_surface(hair, _surface_of(context))
-        with waiting(context), _alone(context, hair):
+        with wait_cursor(context), _alone(context, hair):
             bpy.ops.curves.snap_curves_to_surface(attach_mode="NEAREST")
         return {"FINISHED"}
 
@@ -90,7 +90,7 @@ class HAIRLOOM_OT_unwrap_surface(bpy.types.Operator):
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
         hair, head = chosen_hair(context)[0], _surface_of(context)
-        with waiting(context), _alone(context, head):
+        with wait_cursor(context), _alone(context, head):
             bpy.ops.object.mode_set(mode="EDIT")
             try:
                 bpy.ops.mesh.select_all(action="SELECT")

@@ -16,11 +16,11 @@ from ..blender.scene.strokes import COLLECTION_LABEL, COLLECTION_PROPERTY, strok
 from ..blender.sessions.flow import comb_flow
 from ..groom.flow_settings import FlowSettings
 from .drawing import draw_button
-from .long_work import LongWork, Steps, draw_progress, in_parts
+from .long_work import LongWork, Steps, draw_progress, steps_of_parts
 from .object_lists import draw_objects
-from .reports import reporting, tell
+from .reports import report_outcome, reporting
 from .revert_shape import RevertsShape
-from .selection import chosen_hair, in_object_mode, needs_hair, once_each
+from .selection import chosen_hair, in_object_mode, needs_hair, without_linked_duplicates
 
 
 class HAIRLOOM_OT_add_stroke(bpy.types.Operator):
@@ -96,10 +96,10 @@ class HAIRLOOM_OT_comb_flow(LongWork, bpy.types.Operator):
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         settings, depsgraph = settings_of(self, FlowSettings), context.evaluated_depsgraph_get()
-        grooms = once_each(filter(strokes_of, chosen_hair(context)))
+        grooms = without_linked_duplicates(filter(strokes_of, chosen_hair(context)))
         works = (comb_flow(hair, depsgraph, settings) for hair in grooms)
-        for outcome in (yield from in_parts(batched(works))):
-            tell(self, outcome)
+        for outcome in (yield from steps_of_parts(batched(works))):
+            report_outcome(self, outcome)
 
 
 class HAIRLOOM_OT_revert_flow(RevertsShape, bpy.types.Operator):

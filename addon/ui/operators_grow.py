@@ -7,9 +7,16 @@ import bpy
 from ..blender.strands.growing import grow_again, grow_on, has_grown, is_outdated, lost_by_growing
 from .drawing import draw_button, draw_section
 from .grow_options import GROW_PROPERTIES, draw_where_settings_are
-from .long_work import LongWork, Steps, draw_progress, in_parts
+from .long_work import LongWork, Steps, draw_progress, steps_of_parts
 from .messages import draw_message
-from .selection import chosen_hair, ground_mesh, in_object_mode, make_active, needs_hair, once_each
+from .selection import (
+    chosen_hair,
+    ground_mesh,
+    in_object_mode,
+    make_active,
+    needs_hair,
+    without_linked_duplicates,
+)
 
 #: Most names that are listed; more are only counted.
 _NAMED = 2
@@ -43,7 +50,7 @@ class HAIRLOOM_OT_grow(LongWork, bpy.types.Operator):
             density_group=self.density_group,
             length_group=self.length_group,
         )
-        make_active(context, [(yield from in_parts(growing))])
+        make_active(context, [(yield from steps_of_parts(growing))])
 
     def draw(self, _context: bpy.types.Context) -> None:
         draw_where_settings_are(self.layout)
@@ -62,8 +69,8 @@ class HAIRLOOM_OT_grow_again(LongWork, bpy.types.Operator):
         return cls.is_free() and in_object_mode(cls, context) and needs_hair(cls, context)
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
-        grooms = once_each(chosen_hair(context))
-        yield from in_parts(grow_again(grooms, context.evaluated_depsgraph_get()))
+        grooms = without_linked_duplicates(chosen_hair(context))
+        yield from steps_of_parts(grow_again(grooms, context.evaluated_depsgraph_get()))
 
 
 def draw_grow(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:

@@ -24,10 +24,16 @@ from ..blender.setup.hairstyles import (
     shipped_hairstyles,
 )
 from .grow_options import names_of_weights
-from .long_work import LongWork, Progress, Steps, in_parts
+from .long_work import LongWork, Progress, Steps, steps_of_parts
 from .operators_start import beginning
 from .preferences import preferences
-from .selection import chosen_hair, ground_mesh, in_object_mode, make_active, once_each
+from .selection import (
+    chosen_hair,
+    ground_mesh,
+    in_object_mode,
+    make_active,
+    without_linked_duplicates,
+)
 
 #: pictures per row, their scale, and the width of the page at UI scale 1
 _ACROSS, _PICTURE_SCALE, _WIDTH = 4, 5.0, 440
@@ -80,11 +86,11 @@ class HAIRLOOM_OT_add_hairstyle(LongWork, bpy.types.Operator):
         is_new, is_alone = head is None, _is_empty(context)
         with new_blocks_removed_on_error() as note:
             if head is None:
-                head = yield from in_parts(add_head(collection, self.skin))
+                head = yield from steps_of_parts(add_head(collection, self.skin))
                 note()
                 yield Progress(f"Placing {style.title}")
             depsgraph = context.evaluated_depsgraph_get()
-            added = yield from in_parts(
+            added = yield from steps_of_parts(
                 add_hairstyle(style, head, depsgraph, collection, hairline=self.hairline)
             )
             note()
@@ -92,7 +98,7 @@ class HAIRLOOM_OT_add_hairstyle(LongWork, bpy.types.Operator):
             if is_new and not is_face_hairstyle(style):
                 depsgraph = context.evaluated_depsgraph_get()
                 of_face = add_face_hair(head, depsgraph, collection, added.hair)
-                grooms.insert(0, (yield from in_parts(of_face)))
+                grooms.insert(0, (yield from steps_of_parts(of_face)))
         for kind, lines in (("WARNING", added.warnings), ("INFO", added.done)):
             for line in lines:
                 report(self, kind, line)
@@ -153,7 +159,7 @@ class HAIRLOOM_OT_place_landmarks(LongWork, bpy.types.Operator):
         head = ground_mesh(context)
         assert head is not None, "poll has looked"
         adding = add_landmarks(head, context.evaluated_depsgraph_get(), context.collection)
-        made, is_sure = yield from in_parts(adding)
+        made, is_sure = yield from steps_of_parts(adding)
         if is_sure:
             report(self, "INFO", f"{head.name}: {_placed(len(made))}")
         else:
@@ -188,9 +194,11 @@ class HAIRLOOM_OT_fit_again(LongWork, bpy.types.Operator):
         return False
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
-        grooms = once_each(hair for hair in chosen_hair(context) if hair.hairloom.hairstyle)
+        grooms = without_linked_duplicates(
+            hair for hair in chosen_hair(context) if hair.hairloom.hairstyle
+        )
         fitting = fit_again(grooms, context.evaluated_depsgraph_get())
-        for warning in (yield from in_parts(fitting)):
+        for warning in (yield from steps_of_parts(fitting)):
             report(self, "WARNING", warning)
 
 

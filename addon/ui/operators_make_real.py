@@ -5,8 +5,8 @@ from __future__ import annotations
 import bpy
 
 from ..blender.strands.make_real import make_real
-from .long_work import LongWork, Steps, in_parts
-from .reports import tell
+from .long_work import LongWork, Steps, steps_of_parts
+from .reports import report_outcome
 from .selection import chosen_hair, in_object_mode, make_active, needs_hair
 
 
@@ -25,9 +25,9 @@ class HAIRLOOM_OT_make_real(LongWork, bpy.types.Operator):
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         parts = make_real(chosen_hair(context), context.evaluated_depsgraph_get())
-        made = yield from in_parts(parts)
+        made = yield from steps_of_parts(parts)
         for each in made:
-            tell(self, each.outcome)
+            report_outcome(self, each.outcome)
         make_active(context, [each.hair for each in made])
 
 

@@ -10,9 +10,9 @@ from ..blender.properties.properties import settings_of
 from ..blender.sessions.mirroring import mirror_hair
 from ..groom.mirror_settings import MirrorSettings
 from .drawing import draw_button
-from .long_work import LongWork, Steps, draw_progress, in_parts
-from .reports import tell
-from .selection import chosen_hair, in_object_mode, needs_hair, once_each
+from .long_work import LongWork, Steps, draw_progress, steps_of_parts
+from .reports import report_outcome
+from .selection import chosen_hair, in_object_mode, needs_hair, without_linked_duplicates
 
 
 class HAIRLOOM_OT_mirror_hair(LongWork, bpy.types.Operator):
@@ -31,9 +31,12 @@ class HAIRLOOM_OT_mirror_hair(LongWork, bpy.types.Operator):
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         settings, depsgraph = settings_of(self, MirrorSettings), context.evaluated_depsgraph_get()
-        works = (mirror_hair(hair, depsgraph, settings) for hair in once_each(chosen_hair(context)))
-        for outcome in (yield from in_parts(batched(works))):
-            tell(self, outcome)
+        works = (
+            mirror_hair(hair, depsgraph, settings)
+            for hair in without_linked_duplicates(chosen_hair(context))
+        )
+        for outcome in (yield from steps_of_parts(batched(works))):
+            report_outcome(self, outcome)
 
 
 def draw_mirror(layout: bpy.types.UILayout) -> None:

@@ -14,10 +14,10 @@ from ..blender.scene.drawn_lines import selected_or_new_lines
 from ..blender.sessions.parting import comb_parting
 from ..groom.parting_settings import PartingSettings
 from .drawing import draw_button
-from .long_work import LongWork, Steps, draw_progress, in_parts
+from .long_work import LongWork, Steps, draw_progress, steps_of_parts
 from .object_lists import draw_objects
-from .reports import reporting, tell
-from .selection import chosen_hair, in_object_mode, needs_hair, once_each
+from .reports import report_outcome, reporting
+from .selection import chosen_hair, in_object_mode, needs_hair, without_linked_duplicates
 
 
 class HAIRLOOM_OT_add_parting(bpy.types.Operator):
@@ -83,10 +83,10 @@ class HAIRLOOM_OT_comb_parting(LongWork, bpy.types.Operator):
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         settings, depsgraph = settings_of(self, PartingSettings), context.evaluated_depsgraph_get()
-        grooms = once_each(filter(partings.partings_of, chosen_hair(context)))
+        grooms = without_linked_duplicates(filter(partings.partings_of, chosen_hair(context)))
         works = (comb_parting(hair, depsgraph, settings) for hair in grooms)
-        for outcome in (yield from in_parts(batched(works))):
-            tell(self, outcome)
+        for outcome in (yield from steps_of_parts(batched(works))):
+            report_outcome(self, outcome)
 
 
 def draw_partings(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:

@@ -23,7 +23,7 @@ from ..blender.preview import fins, previews
 from ..blender.scene.source import hair_dynamics_modifiers, mute_hair_dynamics
 from ..blender.sessions.fins import any_enabled
 from .long_work import running
-from .reports import reporting, tell, waiting
+from .reports import report_outcome, reporting, wait_cursor
 from .selection import chosen_hair, needs_hair
 
 #: Rate of ticks [1/s]; high, so that a frame is delayed only by a fraction of its length.
@@ -52,7 +52,7 @@ class HAIRLOOM_OT_preview(bpy.types.Operator):
         if all(previews.session_of(each) for each in hair):
             stop_preview(hair)
             return {"FINISHED"}
-        with waiting(context):
+        with wait_cursor(context):
             start_preview(self, context, hair)
         return {"FINISHED"}
 
@@ -119,7 +119,7 @@ class HAIRLOOM_OT_play(bpy.types.Operator):
             previews.rest(context.evaluated_depsgraph_get(), keep_playing=False)
             stop_ticking()
             return {"FINISHED"}
-        with waiting(context):
+        with wait_cursor(context):
             if not previews.simulations_in(context.evaluated_depsgraph_get()):
                 start_preview(self, context, chosen_hair(context))
             depsgraph = context.evaluated_depsgraph_get()
@@ -275,7 +275,7 @@ def start_preview(
             counts = f"{rig.strands.strand_count:,} strands, {len(rig.guides):,} guides"
             if not session.is_made:
                 counts = f"{session.source.strands.strand_count:,} strands"
-            tell(operator, Outcome(counts, session.source.dropped, session.warnings))
+            report_outcome(operator, Outcome(counts, session.source.dropped, session.warnings))
 
 
 def stop_preview(hair: list[bpy.types.Object]) -> None:

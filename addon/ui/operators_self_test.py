@@ -8,7 +8,7 @@ import bpy
 
 from ..blender.base.outcome import report
 from ..blender.setup import self_test
-from .reports import waiting
+from .reports import wait_cursor
 
 
 class HAIRLOOM_OT_self_test(bpy.types.Operator):
@@ -19,7 +19,7 @@ class HAIRLOOM_OT_self_test(bpy.types.Operator):
     bl_label = "Self-Test"
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        with waiting(context):
+        with wait_cursor(context):
             checks = self_test.run()
         failed = [check for check in checks if check.outcome == "failed"]
         for check in failed:

@@ -11,9 +11,9 @@ from ..blender.sessions.settling import settle_hair
 from ..dynamics.settle_settings import SettleSettings
 from .drawing import draw_button
 from .long_work import LongWork, Progress, Steps, as_progress, draw_progress
-from .reports import tell
+from .reports import report_outcome
 from .revert_shape import RevertsShape
-from .selection import chosen_hair, in_object_mode, needs_hair, once_each
+from .selection import chosen_hair, in_object_mode, needs_hair, without_linked_duplicates
 
 
 class HAIRLOOM_OT_settle(LongWork, bpy.types.Operator):
@@ -33,11 +33,11 @@ class HAIRLOOM_OT_settle(LongWork, bpy.types.Operator):
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         settings, depsgraph = settings_of(self, SettleSettings), context.evaluated_depsgraph_get()
         writes = []
-        for hair in once_each(chosen_hair(context)):
+        for hair in without_linked_duplicates(chosen_hair(context)):
             yield Progress("Reading the hair")
             writes.append((yield from as_progress(settle_hair(hair, depsgraph, settings))))
         for write in writes:
-            tell(self, write())
+            report_outcome(self, write())
 
 
 class HAIRLOOM_OT_revert_settle(RevertsShape, bpy.types.Operator):

@@ -15,7 +15,7 @@ from ..blender.pictures.showing import ShownGroom, file_name, shown_groom
 from ..blender.pictures.turntable import FRAMES, LIGHTS, SIDES, Turntable, TurntableSettings
 from ..errors import HairloomError
 from .long_work import LongWork, Steps, counted, draw_progress
-from .reports import reporting, waiting
+from .reports import reporting, wait_cursor
 from .selection import chosen_hair, needs_hair
 
 _SAMPLES = IntProperty(
@@ -148,7 +148,7 @@ class HAIRLOOM_OT_contact_sheet(bpy.types.Operator, ExportHelper):
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
         manager = context.window_manager
-        with waiting(context):
+        with wait_cursor(context):
             shown = _shown(self, context)
             sheet = Sheet(
                 shown.studio,

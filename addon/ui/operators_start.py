@@ -19,10 +19,10 @@ from ..blender.setup.sample_scene import add_sample_scene
 from ..blender.setup.starting import new_groom, prepare_existing_hair
 from ..errors import HairloomError
 from .grow_options import GROW_PROPERTIES, draw_where_settings_are
-from .long_work import LongWork, Progress, Steps, in_parts
+from .long_work import LongWork, Progress, Steps, steps_of_parts
 from .operators_preview import start_preview
 from .preferences import NEW_GROOM, chosen_presets, preferences
-from .reports import reporting, tell
+from .reports import report_outcome, reporting
 from .selection import (
     active_mesh,
     chosen_hair,
@@ -72,7 +72,7 @@ class HAIRLOOM_OT_add_groom(LongWork, bpy.types.Operator):
             density_group=self.density_group,
             length_group=self.length_group,
         )
-        hair = yield from in_parts(growing)
+        hair = yield from steps_of_parts(growing)
         yield from beginning(self, context, [hair], plays=self.plays)
 
     def draw(self, _context: bpy.types.Context) -> None:
@@ -110,7 +110,7 @@ class HAIRLOOM_OT_sample_scene(LongWork, bpy.types.Operator):
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         adding = add_sample_scene(chosen_presets(self), self.skin)
-        scene, hair = yield from in_parts(adding)
+        scene, hair = yield from steps_of_parts(adding)
         if context.window is not None:
             context.window.scene = scene
         with context.temp_override(scene=scene, view_layer=scene.view_layers[0]):
@@ -144,7 +144,7 @@ class HAIRLOOM_OT_use_groom(LongWork, bpy.types.Operator):
         taken, problems = list[bpy.types.Object](), list[HairloomError]()
         grooms, depsgraph = chosen_hair(context), context.evaluated_depsgraph_get()
         works = (prepare_existing_hair(hair, depsgraph, chosen_presets(chosen)) for hair in grooms)
-        for hair, done in (yield from in_parts(batched(works, problems.append))):
+        for hair, done in (yield from steps_of_parts(batched(works, problems.append))):
             for one in done:
                 report(self, "INFO", f"{hair.name}: {one}")
             taken.append(hair)
@@ -179,14 +179,14 @@ class HAIRLOOM_OT_convert_particles(LongWork, bpy.types.Operator):
         chosen, mesh = preferences(context), active_mesh(context)
         assert mesh is not None, "poll has looked"
         yield Progress("Reading the particles")
-        made, dropped = yield from in_parts(convert_particle_hair(context, mesh))
+        made, dropped = yield from steps_of_parts(convert_particle_hair(context, mesh))
         for hair in made:
             depsgraph = context.evaluated_depsgraph_get()
             _, done = run_parts(prepare_existing_hair(hair, depsgraph, chosen_presets(chosen)))
             for one in done:
                 report(self, "INFO", f"{hair.name}: {one}")
         result = f"{mesh.name}: its particle hair was hidden and replaced by curves"
-        tell(self, Outcome(result, dropped))
+        report_outcome(self, Outcome(result, dropped))
         yield from beginning(self, context, made, plays=chosen.plays)
 
 

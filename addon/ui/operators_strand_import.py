@@ -31,7 +31,7 @@ from ..blender.strands.import_groom import (
 )
 from .drawing import draw_idle
 from .long_work import LongWork, Steps, threaded
-from .reports import tell
+from .reports import report_outcome
 from .selection import active_mesh, ground_mesh, in_object_mode, make_active
 
 SUFFIXES = tuple(suffix for _, suffixes in FILE_KINDS for suffix in suffixes)
@@ -128,7 +128,7 @@ class HAIRLOOM_OT_import_strands(LongWork, ImportHelper, bpy.types.Operator):
             if isinstance(each, FileStrands):
                 hair, outcome = add_to_scene(each, ground, context.collection)
                 imported += hair
-                tell(self, outcome)
+                report_outcome(self, outcome)
             elif each is found[-1] and not imported:
                 raise each  # nothing was imported, so there is nothing to undo
             else:

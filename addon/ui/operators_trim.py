@@ -17,11 +17,11 @@ from ..blender.scene.trim_shapes import (
 )
 from ..blender.sessions.trimming import trim_to_shapes
 from .drawing import draw_button
-from .long_work import LongWork, Steps, draw_progress, in_parts
+from .long_work import LongWork, Steps, draw_progress, steps_of_parts
 from .object_lists import draw_objects
-from .reports import reporting, tell
+from .reports import report_outcome, reporting
 from .revert_shape import RevertsShape
-from .selection import chosen_hair, in_object_mode, needs_hair, once_each
+from .selection import chosen_hair, in_object_mode, needs_hair, without_linked_duplicates
 
 
 class HAIRLOOM_OT_trim_to_shape(LongWork, bpy.types.Operator):
@@ -55,9 +55,9 @@ class HAIRLOOM_OT_trim_to_shape(LongWork, bpy.types.Operator):
                 )
             if trim_shapes_of(hair):
                 grooms.append(hair)
-        works = (trim_to_shapes(hair, depsgraph) for hair in once_each(grooms))
-        for outcome in (yield from in_parts(batched(works))):
-            tell(self, outcome)
+        works = (trim_to_shapes(hair, depsgraph) for hair in without_linked_duplicates(grooms))
+        for outcome in (yield from steps_of_parts(batched(works))):
+            report_outcome(self, outcome)
 
 
 class HAIRLOOM_OT_remove_trim_shape(bpy.types.Operator):

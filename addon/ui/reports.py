@@ -29,7 +29,7 @@ def reporting(execute: Callable[..., set[str]]) -> Callable[..., set[str]]:
     return reported
 
 
-def tell(operator: bpy.types.Operator, outcome: Outcome) -> None:
+def report_outcome(operator: bpy.types.Operator, outcome: Outcome) -> None:
     """Report the warnings, then the result with what was dropped."""
     for warning in outcome.warnings:
         report(operator, "WARNING", warning)
@@ -38,7 +38,7 @@ def tell(operator: bpy.types.Operator, outcome: Outcome) -> None:
 
 
 @contextmanager
-def waiting(context: bpy.types.Context) -> Iterator[None]:
+def wait_cursor(context: bpy.types.Context) -> Iterator[None]:
     """Show the wait cursor, for work that takes a second or more."""
     window = context.window
     if window is None or bpy.app.background:

@@ -25,7 +25,7 @@ def chosen_hair(context: bpy.types.Context) -> list[bpy.types.Object]:
     candidates = [context.active_object, *context.selected_objects]
     selected = list(dict.fromkeys(obj for obj in candidates if obj is not None))
     hair = [obj for obj in selected if obj.type == "CURVES"]
-    return hair or _made_into(selected) or _grown_on(selected, context) or _previewed()
+    return hair or _hair_of_cards(selected) or _hair_on_meshes(selected, context) or _previewed()
 
 
 def pinned_hair(context: bpy.types.Context) -> bpy.types.Object | None:
@@ -40,7 +40,7 @@ def pinned_hair(context: bpy.types.Context) -> bpy.types.Object | None:
     return next((obj for obj in users if obj.type == "CURVES"), None)
 
 
-def once_each(grooms: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
+def without_linked_duplicates(grooms: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
     """The first of each set of linked duplicates: a tool must change shared curves only once."""
     firsts: dict[bpy.types.ID, bpy.types.Object] = {}
     for hair in grooms:
@@ -48,13 +48,15 @@ def once_each(grooms: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
     return list(firsts.values())
 
 
-def _made_into(objects: list[bpy.types.Object]) -> list[bpy.types.Object]:
+def _hair_of_cards(objects: list[bpy.types.Object]) -> list[bpy.types.Object]:
     """The hair that these cards were made from."""
     hair = [obj.hairloom.card_object.groom for obj in objects if obj.type == "MESH"]
     return list(dict.fromkeys(obj for obj in hair if obj is not None))
 
 
-def _grown_on(meshes: list[bpy.types.Object], context: bpy.types.Context) -> list[bpy.types.Object]:
+def _hair_on_meshes(
+    meshes: list[bpy.types.Object], context: bpy.types.Context
+) -> list[bpy.types.Object]:
     everything = objects_in(context.view_layer)
     hair = [obj for obj in everything if obj.type == "CURVES" and head_of(obj) in meshes]
     # hidden hair, such as the original after Make Real, only counts if there is no other

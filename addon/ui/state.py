@@ -58,19 +58,19 @@ def _state(session: Session | None) -> str:
     if session is None:
         return "not previewed"
     if not session.is_made:
-        return _being_made(session.stage)
+        return _build_text(session.stage)
     preview = previews[session.uid]
     if preview.phase is Phase.BAKED and preview.bake is not None:
         return "baked, out of date" if preview.bake.changed_inputs else "baked"
     if session.is_pending:
-        return _being_made(session.stage)
+        return _build_text(session.stage)
     if preview.phase is Phase.WAITING or preview.is_deferred:
         return "waits for collider"
     device = session.device_name.partition(" ")[0]
     return f"{'simulated' if session.is_playing else 'at rest'}, {device}"
 
 
-def _being_made(stage: str) -> str:
+def _build_text(stage: str) -> str:
     return f"makes {stage[:1].lower()}{stage[1:] or 'hair'}"
 
 

@@ -27,7 +27,7 @@ from ..params import Parameter
 from . import operators_export_check as export_check
 from .long_work import LongWork, Progress, Steps
 from .operators_export_check import writable
-from .reports import tell
+from .reports import report_outcome
 from .selection import chosen_hair, needs_hair
 
 _SEVERAL = (
@@ -122,9 +122,9 @@ class StrandExportOperator(LongWork, ExportHelper):
             if done:
                 self.unharmed = f"{done:,} of {len(plans):,} files are written"
             if plan.frames is None:
-                tell(self, plan.write(path))
+                report_outcome(self, plan.write(path))
             else:
-                tell(self, (yield from _in_motion(path, plan)))
+                report_outcome(self, (yield from _in_motion(path, plan)))
 
     def cancel(self, context: bpy.types.Context) -> None:
         export_check.end()

@@ -14,7 +14,7 @@ from hairloom.addon.blender.base.parts import Part, Parts, new_blocks_removed_on
 from hairloom.addon.blender.scene.curves import curve_points, put_points
 from hairloom.addon.cards.steps import result_of
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.ui.long_work import in_parts
+from hairloom.addon.ui.long_work import steps_of_parts
 from hairloom.addon.ui.operators_grow import HAIRLOOM_OT_grow_again
 from hairloom.addon.ui.operators_hairstyles import HAIRLOOM_OT_add_hairstyle
 from hairloom.addon.ui.operators_make_real import HAIRLOOM_OT_make_real
@@ -50,10 +50,10 @@ def quadrupled(value: int) -> Parts[int]:
 def test_blocking_and_threaded_parts_have_the_same_result(value: int, wanted: int) -> None:
     """An error of a part is raised at its `yield`, where the work may catch it."""
     assert run_parts(quadrupled(value)) == wanted
-    assert result_of(in_parts(quadrupled(value))) == wanted
+    assert result_of(steps_of_parts(quadrupled(value))) == wanted
 
 
-@pytest.mark.parametrize("way", [run_parts, lambda parts: result_of(in_parts(parts))])
+@pytest.mark.parametrize("way", [run_parts, lambda parts: result_of(steps_of_parts(parts))])
 def test_an_unhandled_error_is_raised(way: Any) -> None:
     with pytest.raises(HairloomError, match="too much"):
         way(quadrupled(11))
@@ -61,7 +61,7 @@ def test_an_unhandled_error_is_raised(way: Any) -> None:
 
 def test_in_the_window_parts_run_in_threads_and_report_what_they_do() -> None:
     may_go_on.clear()
-    told = in_parts(quadrupled(2))
+    told = steps_of_parts(quadrupled(2))
     while next(told).text != "Doubling":
         pass
     assert next(told).is_idle and threads != [threading.main_thread().name]

@@ -3,8 +3,8 @@
 Such a function is a generator. It reads from the scene, yields a part, is sent the part's result,
 and writes it into the scene. The caller decides where the parts run:
 
-    run_parts                in the calling thread: scripts, and jobs without a window
-    ui.long_work.in_parts    in a thread, while the window shows progress and may cancel
+    run_parts                      in the calling thread: scripts, and jobs without a window
+    ui.long_work.steps_of_parts    in a thread, while the window shows progress and may cancel
 """
 
 from __future__ import annotations
