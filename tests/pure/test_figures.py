@@ -55,7 +55,7 @@ def test_quotes_are_as_they_were_found() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "is_to_be"),
+    ("text", "expected"),
     [
         ('[7 times](figures.md "ties.ratio")', '[41.3 times](figures.md "ties.ratio")'),
         ('[9](../dev/figures.md "ties.ratio")', '[41.3](../dev/figures.md "ties.ratio")'),
@@ -64,8 +64,8 @@ def test_quotes_are_as_they_were_found() -> None:
         ("[9](figures.md#ties)", "[9](figures.md#ties)"),
     ],
 )
-def test_a_quote_takes_the_figure_and_keeps_its_unit(text: str, is_to_be: str) -> None:
-    assert figures.with_current_values(text, KEPT) == is_to_be
+def test_a_quote_takes_the_figure_and_keeps_its_unit(text: str, expected: str) -> None:
+    assert figures.with_current_values(text, KEPT) == expected
 
 
 def test_a_quote_of_what_nobody_measured_is_an_error() -> None:

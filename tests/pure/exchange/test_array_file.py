@@ -64,7 +64,7 @@ def described(text: bytes) -> bytes:
         b"",
     ],
 )
-def test_a_description_that_lies_is_refused_and_takes_no_memory(
+def test_a_false_array_header_is_refused_without_allocating_memory(
     tmp_path: Path, text: bytes
 ) -> None:
     path = tmp_path / "a.npz"

@@ -69,7 +69,7 @@ def test_missing_folders_are_made(tmp_path: Path) -> None:
     assert target.read_bytes() == "héllo\n".encode()
 
 
-def test_impossible_places_are_named_before_anything_is_written(tmp_path: Path) -> None:
+def test_unwritable_paths_are_refused_before_anything_is_written(tmp_path: Path) -> None:
     in_the_way = tmp_path / "file"
     in_the_way.write_text("")
     (tmp_path / "folder").mkdir()
@@ -196,16 +196,16 @@ def write_set(target: Path) -> None:
         (folder / target.name).write_bytes(b"new")
 
 
-def test_what_is_given_up_when_it_is_whole_replaces_nothing(tmp_path: Path) -> None:
+def test_a_complete_file_of_a_cancelled_write_replaces_nothing(tmp_path: Path) -> None:
     target = tmp_path / "groom.tfx"
     target.write_bytes(b"old")
 
     @contextmanager
-    def given_up() -> Iterator[None]:
+    def cancelled() -> Iterator[None]:
         raise KeyboardInterrupt
         yield
 
-    token = file_moves.commit_context.set(given_up)
+    token = file_moves.commit_context.set(cancelled)
     try:
         for write in (write_alone, write_set):
             with pytest.raises(KeyboardInterrupt):

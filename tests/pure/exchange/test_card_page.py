@@ -82,7 +82,7 @@ def test_a_page_has_the_same_elements_whatever_the_hair_is_called(name: str) -> 
     assert base64.b64decode(asset["files"]["base.png"]["data"]) == b"picture"
 
 
-def test_a_page_names_nothing_that_lies_elsewhere() -> None:
+def test_a_page_refers_to_nothing_outside_of_it() -> None:
     """No address in an element, and a policy that allows neither a network nor eval."""
     reader = read(page_text(page()))
     addresses = [

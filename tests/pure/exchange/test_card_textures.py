@@ -48,7 +48,9 @@ def smooth_maps() -> dict[str, np.ndarray]:
 
 @pytest.mark.parametrize("file_format", EACH_FORMAT)
 @pytest.mark.parametrize("preset", PRESETS)
-def test_files_hold_what_was_packed(preset: str, file_format: str, tmp_path: Path) -> None:
+def test_texture_files_hold_the_packed_channels(
+    preset: str, file_format: str, tmp_path: Path
+) -> None:
     maps = smooth_maps()
     written = write_card_textures(
         tmp_path / "Ünder.lock v1.2", maps, preset, file_format=file_format, grid=AtlasGrid(2, 1)
@@ -104,7 +106,7 @@ def test_dds_files_have_every_level_with_its_coverage(tmp_path: Path) -> None:
     source.close()
 
 
-def test_what_lies_beside_the_hair_never_shows_in_smaller_levels(tmp_path: Path) -> None:
+def test_the_background_never_shows_in_smaller_mip_levels(tmp_path: Path) -> None:
     """Also in files without an alpha channel."""
     alpha = np.zeros((32, 32), np.float32)
     alpha[:, 5::8] = 1.0
@@ -122,19 +124,19 @@ def test_what_lies_beside_the_hair_never_shows_in_smaller_levels(tmp_path: Path)
 
 def test_the_writer_can_be_another(tmp_path: Path) -> None:
     """Blender writes the textures where there is no OpenImageIO."""
-    told = []
+    writes = []
 
     def write(path: Path, pixels: np.ndarray, **how: object) -> None:
-        told.append((path.name, pixels.shape[2], how))
+        writes.append((path.name, pixels.shape[2], how))
 
     write_card_textures(tmp_path / "a", smooth_maps(), "unreal_compact", write=write)
-    assert told[0] == (
+    assert writes[0] == (
         "a_TangentCoordU.png", 4, {"is_color": False, "depth": "uint8", "is_packed": True},
     )  # fmt: skip
-    assert [each[2]["is_color"] for each in told] == [False, False, True, True]
+    assert [each[2]["is_color"] for each in writes] == [False, False, True, True]
 
 
-def test_other_formats_are_named(tmp_path: Path) -> None:
+def test_unknown_texture_formats_are_refused_by_name(tmp_path: Path) -> None:
     with pytest.raises(HairloomError, match=r"'ktx2'.*png, exr, dds"):
         write_card_textures(tmp_path / "a", smooth_maps(), "gltf", file_format="ktx2")
 
@@ -168,7 +170,7 @@ def test_a_full_disk_leaves_the_old_files(file_format: str, tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("file_format", EACH_FORMAT)
-def test_a_folder_that_may_not_be_written_to(file_format: str, tmp_path: Path) -> None:
+def test_a_folder_without_write_permission_is_refused(file_format: str, tmp_path: Path) -> None:
     folder = tmp_path / "closed"
     folder.mkdir()
     (folder / "a_baseColor.png").write_bytes(b"old")

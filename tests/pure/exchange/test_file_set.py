@@ -49,7 +49,7 @@ def test_a_failing_writer_leaves_what_was_there(
 
 
 @pytest.mark.parametrize("failure", [ValueError, KeyboardInterrupt])
-def test_folders_that_were_made_go_where_nothing_comes_into_them(
+def test_new_folders_are_removed_if_the_write_fails(
     tmp_path: Path, failure: type[BaseException]
 ) -> None:
     (tmp_path / "mine").mkdir()
@@ -60,7 +60,7 @@ def test_folders_that_were_made_go_where_nothing_comes_into_them(
     assert list((tmp_path / "mine").iterdir()) == []
 
 
-def test_what_went_wrong_names_the_files_own_folder(tmp_path: Path) -> None:
+def test_errors_name_the_target_folder_instead_of_the_staging_folder(tmp_path: Path) -> None:
     with (
         pytest.raises(HairloomError) as caught,
         atomic_file_set(tmp_path / "hair.glb") as folder,
@@ -94,7 +94,7 @@ def test_a_disk_that_fills_up_while_files_are_replaced_leaves_what_was_there(
     assert contents(tmp_path) == dict.fromkeys(FILES[:2], "old")
 
 
-def test_a_name_that_a_folder_has_replaces_nothing(tmp_path: Path) -> None:
+def test_a_folder_of_the_same_name_is_not_replaced(tmp_path: Path) -> None:
     (tmp_path / "hair_base.png").mkdir()
     with (
         pytest.raises(HairloomError, match="a folder has this name") as caught,
@@ -105,7 +105,7 @@ def test_a_name_that_a_folder_has_replaces_nothing(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["hair_base.png"]
 
 
-def test_impossible_places_are_named_before_anything_is_written(tmp_path: Path) -> None:
+def test_unwritable_paths_are_refused_before_anything_is_written(tmp_path: Path) -> None:
     in_the_way = tmp_path / "file"
     in_the_way.write_text("")
     for target in (in_the_way / "hair.glb", tmp_path / ("x" * 300)):

@@ -30,12 +30,12 @@ def with_library(kind: str, package: str) -> Any:
 
 FORMATS = ("tfx", "hair", "preset")
 #: formats that libraries parse, slowly, in another process
-APART = tuple(
+SUBPROCESS_FORMATS = tuple(
     with_library(kind, package)
     for kind, package in (("abc", "alembic3d"), ("usdc", "pxr"), ("usda", "pxr"))
 )
-WRITTEN = (*FORMATS, "tfxbone", "glb", *APART[:2])
-FILES, FILES_APART, KILLS = 150, 6, 6
+WRITTEN = (*FORMATS, "tfxbone", "glb", *SUBPROCESS_FORMATS[:2])
+FILES, SUBPROCESS_FILES, KILLS = 150, 6, 6
 
 
 def report(tool: str, *arguments: str) -> dict[str, Any]:
@@ -55,11 +55,11 @@ def test_no_damage_ends_in_anything_but_a_groom_or_a_message(kind: str) -> None:
     assert min(found["read"], found["refused"]) > FILES // 20, found
 
 
-@pytest.mark.parametrize("kind", few_in_commits(APART))
-def test_damage_to_what_libraries_parse_is_told_too(kind: str) -> None:
-    found = report("fuzz_files", kind, str(FILES_APART))
+@pytest.mark.parametrize("kind", few_in_commits(SUBPROCESS_FORMATS))
+def test_damage_to_files_that_libraries_parse_is_reported(kind: str) -> None:
+    found = report("fuzz_files", kind, str(SUBPROCESS_FILES))
     assert found["failures"] == []
-    assert found["read"] + found["refused"] == FILES_APART
+    assert found["read"] + found["refused"] == SUBPROCESS_FILES
 
 
 @pytest.mark.parametrize("kind", few_in_commits(WRITTEN))
@@ -114,7 +114,7 @@ def test_damage_is_the_same_for_the_same_number() -> None:
     assert len({damaged_files.damaged_content("hair", 3, number) for number in range(50)}) > 45
 
 
-@pytest.mark.parametrize("kind", (*FORMATS, *APART))
+@pytest.mark.parametrize("kind", (*FORMATS, *SUBPROCESS_FORMATS))
 def test_the_files_to_be_damaged_are_sound(kind: str, tmp_path: Path) -> None:
     small, large = damaged_files.originals(kind)
     path = tmp_path / f"sound.{kind}"
@@ -134,7 +134,7 @@ def test_a_large_preset_is_refused_before_it_is_read(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("value", ["9" * 400, "Infinity", "-1e999", "9" * 5000, "[" * 100_000])
-def test_values_beyond_reason_are_no_value_of_a_preset(tmp_path: Path, value: str) -> None:
+def test_implausible_preset_values_are_refused(tmp_path: Path, value: str) -> None:
     """Each of these raises another error in Python; all become messages."""
     path = tmp_path / "preset.json"
     values = f'{{"cv_count": {value}}}'

@@ -26,7 +26,7 @@ def written(content: dict[str, object], binary: bytes) -> bytes:
 EMPTY = written({"asset": {"version": "2.0"}, "buffers": [{"byteLength": 4}]}, b"abcd")
 
 
-def test_what_is_put_in_is_found() -> None:
+def test_arrays_that_are_added_can_be_read_again() -> None:
     file = GlbFile.of(EMPTY, "x")
     arrays = {
         "VEC4": np.arange(12, dtype=np.uint8).reshape(3, 4),
@@ -57,6 +57,6 @@ def test_nodes_of_meshes_are_known_by_name() -> None:
     "data",
     [b"", EMPTY[:30], EMPTY[:-1], b"glTX" + EMPTY[4:], EMPTY.replace(b'"asset"', b'"asset}')],
 )
-def test_damage_is_told(data: bytes) -> None:
+def test_damaged_glb_files_are_refused_with_a_message(data: bytes) -> None:
     with pytest.raises(HairloomError, match="not a complete GLB"):
         GlbFile.of(data, "x")

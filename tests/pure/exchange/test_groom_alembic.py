@@ -183,9 +183,9 @@ def test_groups_are_in_memory_one_at_a_time(tmp_path: Path) -> None:
     write_groom_alembic(tmp_path / "first.abc", groom, UNITY)  # loads the library
     tracemalloc.start()
     write_groom_alembic(tmp_path / "second.abc", groom, UNITY)
-    most = tracemalloc.get_traced_memory()[1]
+    max_strands = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert most < 0.5 * points.nbytes
+    assert max_strands < 0.5 * points.nbytes
 
 
 def test_all_comes_back_to_the_bit(tmp_path: Path) -> None:
@@ -264,7 +264,7 @@ def test_ids_that_strands_of_several_objects_share_are_left_out(tmp_path: Path) 
     assert "a.abc: IDs were left out, because strands share them." in read.notes
 
 
-def test_closed_curves_are_left_out_and_told(tmp_path: Path) -> None:
+def test_closed_curves_are_left_out_with_a_note(tmp_path: Path) -> None:
     for file, names in (("some.abc", ("hair", "loop")), ("none.abc", ("loop",))):
         archive = Abc.CreateArchiveWithInfo(str(tmp_path / file), "Blender", "")
         for name in names:
@@ -433,7 +433,7 @@ def test_files_of_other_programs_are_read(tmp_path: Path) -> None:
     assert read_groom_alembic(tmp_path / "a.abc", with_guides=False).strands.strand_count == 2
 
 
-def test_the_space_of_a_foreign_file_can_be_told(tmp_path: Path) -> None:
+def test_the_space_of_a_foreign_file_can_be_given(tmp_path: Path) -> None:
     foreign(tmp_path / "a.abc")
     read = read_groom_alembic(tmp_path / "a.abc", space=FileSpace("Z", 1000.0))
     np.testing.assert_allclose(read.strands.points[0], (0, 0.010, 0.005), atol=1e-7)
@@ -442,7 +442,7 @@ def test_the_space_of_a_foreign_file_can_be_told(tmp_path: Path) -> None:
     np.testing.assert_allclose(strands.points[0], (0, -5, 10))
 
 
-def test_what_cannot_be_used_is_dropped_and_counted(tmp_path: Path) -> None:
+def test_unusable_strands_are_dropped_and_counted(tmp_path: Path) -> None:
     path, hair = tmp_path / "a.abc", groom()
     write_groom_alembic(path, hair, replace(BLENDER, max_points=10))
     content = path.read_bytes()
@@ -458,7 +458,7 @@ def test_what_cannot_be_used_is_dropped_and_counted(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read.groom.strand_id, kept.strand_id)
 
 
-def test_counts_that_lie_are_told(tmp_path: Path) -> None:
+def test_counts_that_do_not_fit_are_reported(tmp_path: Path) -> None:
     path = tmp_path / "a.abc"
     write_groom_alembic(path, groom(), BLENDER)
     counts = COUNTS.astype("<i4")
@@ -470,7 +470,7 @@ def test_counts_that_lie_are_told(tmp_path: Path) -> None:
             read_groom_alembic(path)
 
 
-def test_widths_of_nothing_are_hair_and_tips_stay_thin(tmp_path: Path) -> None:
+def test_zero_widths_are_replaced_and_thin_tips_stay(tmp_path: Path) -> None:
     path, hair = tmp_path / "a.abc", straight(3)
     for width, expected in (
         ([0.0, 0.0, 0.0], [DEFAULT_RADIUS] * 3),
@@ -489,7 +489,7 @@ def test_widths_of_nothing_are_hair_and_tips_stay_thin(tmp_path: Path) -> None:
         np.testing.assert_allclose(read_groom_alembic(path).strands.radius, expected, rtol=1e-5)
 
 
-def test_an_archive_without_curves_is_told(tmp_path: Path) -> None:
+def test_an_archive_without_curves_is_refused(tmp_path: Path) -> None:
     archive = Abc.OArchive(str(tmp_path / "a.abc"))
     AbcGeom.OXform(archive.getTop(), "empty")
     del archive
@@ -506,13 +506,13 @@ def test_an_archive_without_curves_is_told(tmp_path: Path) -> None:
         (b"Ogawa\0" + bytes(100), "not written to its end"),
     ],
 )
-def test_other_files_are_told(tmp_path: Path, content: bytes, message: str) -> None:
+def test_files_of_other_formats_are_refused(tmp_path: Path, content: bytes, message: str) -> None:
     (tmp_path / "a.abc").write_bytes(content)
     with pytest.raises(HairloomError, match=message):
         read_groom_alembic(tmp_path / "a.abc")
 
 
-def test_missing_files_and_folders_are_told(tmp_path: Path) -> None:
+def test_missing_files_and_folders_are_refused(tmp_path: Path) -> None:
     with pytest.raises(HairloomError, match="a folder"):
         read_groom_alembic(tmp_path)
     with pytest.raises(HairloomError, match="cannot be read"):
@@ -520,9 +520,9 @@ def test_missing_files_and_folders_are_told(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow(
-    instead="tests/pure/exchange/test_fuzz.py::test_damage_to_what_libraries_parse_is_told_too"
+    instead="tests/pure/exchange/test_fuzz.py::test_damage_to_files_that_libraries_parse_is_reported"
 )
-def test_damaged_files_are_told_or_read(tmp_path: Path) -> None:
+def test_damaged_files_are_read_or_refused(tmp_path: Path) -> None:
     """A sample of thousands of trials: cut files, and random bytes near the end."""
     path = tmp_path / "a.abc"
     write_groom_alembic(path, groom())
@@ -568,7 +568,7 @@ def test_without_the_library_usd_is_offered(
     assert not (tmp_path / "b.abc").exists()
 
 
-def test_what_cannot_be_written_leaves_the_old_file(tmp_path: Path) -> None:
+def test_a_failed_write_leaves_the_old_file(tmp_path: Path) -> None:
     path, hair = tmp_path / "a.abc", straight()
     path.write_bytes(b"old")
     bad = [hair.strands.points, np.full((2, 3), np.nan)]
@@ -585,7 +585,7 @@ def test_what_cannot_be_written_leaves_the_old_file(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_a_full_disk_is_told(tmp_path: Path) -> None:
+def test_a_full_disk_is_reported(tmp_path: Path) -> None:
     """Simulated with a limit on the size of files."""
     path = tmp_path / "a.abc"
     path.write_bytes(b"old")
@@ -638,7 +638,7 @@ def test_preflight_warns(change: Any, preset: Any, warning: str) -> None:
     assert any(warning in each for each in found["warnings"]), found["warnings"]
 
 
-def test_preflight_of_nothing_says_so() -> None:
+def test_preflight_without_strands_warns() -> None:
     none = groom().take(np.array([], int))
     assert preflight(none, UNREAL)["warnings"] == ["The engine will see no strands"]
     no_guides = replace(groom(), is_guide=np.zeros(6, bool))

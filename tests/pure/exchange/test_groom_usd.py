@@ -130,7 +130,7 @@ def test_a_strand_of_a_metre_is_where_it_belongs(tmp_path: Path, layout: Any) ->
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
 @pytest.mark.parametrize("by_group", [False, True])
-def test_validators_of_usd_find_nothing(tmp_path: Path, suffix: str, by_group: bool) -> None:
+def test_usd_validators_find_no_faults(tmp_path: Path, suffix: str, by_group: bool) -> None:
     path = tmp_path / f"hair{suffix}"
     groom = full_groom()
     write_usd(path, groom, by_group=by_group, motion=motion_of(groom, 3))
@@ -171,7 +171,7 @@ def assert_equal(one: Groom, other: Groom) -> None:
         assert np.array_equal(getattr(one, name), getattr(other, name)), name
 
 
-def test_what_is_not_known_is_not_written(tmp_path: Path) -> None:
+def test_unknown_attributes_are_not_written(tmp_path: Path) -> None:
     strands = StrandSet(np.eye(3), [0, 3], [1e-4] * 3, [0])
     write_usd(tmp_path / "hair.usda", Groom(strands), is_linear=True)
     stage = stage_of(tmp_path / "hair.usda")
@@ -209,9 +209,7 @@ def test_motion_becomes_time_samples(tmp_path: Path, by_group: bool) -> None:
     assert np.allclose(read.points, groom.strands.take(order).points)
 
 
-def test_long_motion_goes_to_the_file_as_it_comes(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_long_motion_is_saved_in_parts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A file that is saved after each frame equals one that is saved once."""
     monkeypatch.setattr("hairloom.addon.exchange.usd.groom_usd._MAX_UNSAVED_BYTES", 0)
     groom, path, sizes = full_groom(), tmp_path / "a.usdc", []
@@ -400,7 +398,7 @@ def test_an_unnamed_unit_is_a_centimetre_and_can_be_overruled(tmp_path: Path) ->
     assert "centimetres" not in " ".join(told.notes)
 
 
-def test_other_prims_are_left_out_and_told(tmp_path: Path) -> None:
+def test_other_prims_are_left_out_with_a_note(tmp_path: Path) -> None:
     stage = new_stage(tmp_path / "a.usda")
     straight = [[0, 0, 0], [0, 0, 0.1]]
     add_curves(stage, "/good", straight, [2])

@@ -69,7 +69,7 @@ def test_all_arrays_are_read_as_packed(path: Path) -> None:
     assert (read.info, read.dropped, read.source) == ("made by hand", {}, path)
 
 
-def test_what_has_no_array_comes_from_the_header(path: Path) -> None:
+def test_values_without_an_array_come_from_the_header(path: Path) -> None:
     content = packed(
         2, floats(POINTS), segments=2, thickness=6e-5, transparency=0.5, color=(0.5, 0.25, 0.125)
     )
@@ -156,13 +156,13 @@ def test_written_file_is_what_the_specification_says(path: Path) -> None:
     np.testing.assert_allclose(struct.unpack_from("<27f", content, 128), POINTS.ravel() * 100)
 
 
-def test_what_is_lost_is_said(path: Path) -> None:
+def test_lost_attributes_are_reported(path: Path) -> None:
     strands = StrandSet(
         POINTS, np.arange(0, 10, 3), np.full(9, 4e-5), np.arange(3), np.zeros((3, 2))
     )
-    told = " ".join(write_hair_file(path, Groom(strands, strand_id=np.arange(3))))
+    notes = " ".join(write_hair_file(path, Groom(strands, strand_id=np.arange(3))))
     for lost in ("no groups", "no root UVs", "no strand IDs"):
-        assert lost in told
+        assert lost in notes
 
 
 @pytest.mark.parametrize("parts", ["strands", "guides", "both"])

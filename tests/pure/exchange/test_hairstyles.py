@@ -65,7 +65,7 @@ def test_the_same_style_gives_the_same_bytes(tmp_path: Path) -> None:
     assert contents[0] == contents[1]
 
 
-def test_what_does_not_fit_into_the_file_is_refused_and_nothing_written(tmp_path: Path) -> None:
+def test_guides_too_long_for_the_file_are_refused_and_nothing_is_written(tmp_path: Path) -> None:
     with pytest.raises(HairloomError, match="longer than 65 cm"):
         write_hairstyle(tmp_path / "long.json", style(3.0))
     assert not list(tmp_path.iterdir())
@@ -88,7 +88,7 @@ def test_what_does_not_fit_into_the_file_is_refused_and_nothing_written(tmp_path
         ({"order": "first"}, "order"),
     ],
 )
-def test_what_the_text_must_not_say(path: Path, change: dict, problem: str) -> None:
+def test_invalid_style_texts_are_refused(path: Path, change: dict, problem: str) -> None:
     path.write_text(json.dumps(json.loads(path.read_text()) | change))
     with pytest.raises(HairloomError, match=problem):
         read_hairstyle(path, ALL_SETTINGS)

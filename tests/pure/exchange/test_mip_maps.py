@@ -182,7 +182,7 @@ def test_strand_ids_are_those_of_strands() -> None:
 @pytest.mark.parametrize(
     ("width", "columns"), [(256, 4), (256, 8), (200, 5), (256, 3), (300, 7), (1000, 6)]
 )
-def test_tiles_stay_apart(width: int, columns: int) -> None:
+def test_tiles_do_not_run_into_each_other(width: int, columns: int) -> None:
     """Each tile has its own colour, which no level mixes while a tile has four texels."""
     grid = AtlasGrid(columns, 2)
     tile = np.floor((np.arange(width) + 0.5) * columns / width).astype(int)

@@ -65,7 +65,7 @@ def test_the_schema_is_one_and_can_refuse() -> None:
             jsonschema.validate(sidecar_content(card_file()) | damage, SCHEMA)
 
 
-def test_it_tells_what_the_mesh_is() -> None:
+def test_the_sidecar_describes_the_mesh() -> None:
     content = read(card_file())
     assert content["file"] == "hair.v1.glb"
     assert content["counts"] == {"cards": 1, "triangles": 1, "vertices": 3}

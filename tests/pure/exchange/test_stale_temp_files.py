@@ -35,7 +35,7 @@ def write_set(path: Path) -> None:
 
 
 @pytest.mark.parametrize("write", [lambda path: write_bytes_atomic(path, b"new"), write_set])
-def test_the_next_write_removes_what_the_dead_left(
+def test_the_next_write_removes_files_of_killed_writers(
     write, tmp_path: Path, ended: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "cards.v2.glb"
@@ -50,7 +50,7 @@ def test_the_next_write_removes_what_the_dead_left(
     assert path.read_bytes() == b"new"
 
 
-def test_what_others_write_or_own_stays(
+def test_files_of_other_writers_and_users_stay(
     tmp_path: Path, ended: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "groom.abc"

@@ -70,7 +70,7 @@ def test_what_was_written_in_any_format_is_read_by_its_suffix(tmp_path: Path, su
 @pytest.mark.parametrize("suffix", [".abc", ".usdc", ".tfx", ".hair"])
 @pytest.mark.parametrize("scale", few_in_commits([2.54, 0.01, 1.0]))
 @pytest.mark.parametrize("up", ["Y", "Z"])
-def test_axes_and_scale_of_every_format_can_be_told(
+def test_axes_and_scale_of_every_format_can_be_given(
     tmp_path: Path, suffix: str, scale: float, up: str
 ) -> None:
     """All but .usdc and .hair are written with Y up; read with Z up, their coordinates stay
@@ -121,7 +121,7 @@ def test_a_file_of_guides_alone_gives_those(tmp_path: Path) -> None:
     assert any("only guides" in note for note in read.notes)
 
 
-def test_several_grooms_in_a_file_become_one_and_that_is_told(tmp_path: Path) -> None:
+def test_several_grooms_in_a_file_are_joined_with_a_note(tmp_path: Path) -> None:
     stage = Usd.Stage.CreateNew(str(tmp_path / "two.usda"))
     UsdGeom.SetStageMetersPerUnit(stage, 1.0)
     for name in ("front", "back"):
@@ -264,7 +264,7 @@ def groom_of_groups() -> Groom:
         ("hair.abc", b"", "empty"),
     ],
 )
-def test_files_that_are_none_of_theirs_are_named(
+def test_files_of_other_formats_are_refused_by_name(
     tmp_path: Path, name: str, content: bytes, problem: str
 ) -> None:
     path = tmp_path / name
@@ -276,15 +276,15 @@ def test_files_that_are_none_of_theirs_are_named(
 
 
 @pytest.mark.parametrize(
-    ("wishes", "place"),
+    ("options", "place"),
     [({"parts": "cards"}, "parts"), ({"scale": 0.0}, "scale"), ({"scale": np.nan}, "scale")],
 )
-def test_wishes_that_make_no_sense_are_refused(
-    tmp_path: Path, wishes: dict[str, Any], place: str
+def test_invalid_reading_options_are_refused(
+    tmp_path: Path, options: dict[str, Any], place: str
 ) -> None:
     write(tmp_path / "hair.tfx", groom())
     with pytest.raises(HairloomError) as raised:
-        read_strands(tmp_path / "hair.tfx", **wishes)
+        read_strands(tmp_path / "hair.tfx", **options)
     assert raised.value.place == place
 
 
@@ -294,7 +294,7 @@ def test_guides_of_a_file_without_any_are_refused(tmp_path: Path) -> None:
         read_strands(tmp_path / "hair.tfx", parts="guides")
 
 
-def test_frames_beyond_the_most_that_are_read_are_counted() -> None:
+def test_frames_beyond_the_maximum_are_counted() -> None:
     motion = ReadMotion(np.array([0.0, 1000.0]), np.zeros((2, 3, 3), np.float32))
     first, positions = motion.at_frames(24.0)
     assert (first, len(positions)) == (0, 10_000)

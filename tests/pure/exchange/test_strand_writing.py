@@ -62,7 +62,7 @@ def test_copies_of_guides_lie_behind_and_ride_on_themselves() -> None:
     assert set(hair.closest_guides.ravel()) <= set(hair.strand_id[COUNT:])
 
 
-def test_ids_that_leave_no_room_for_guides_are_numbered_anew() -> None:
+def test_ids_too_large_for_guides_are_numbered_again() -> None:
     ids = np.arange(COUNT) + np.iinfo(np.int32).max - COUNT + 1
     assert guided(strand_id=ids).strand_id.tolist() == list(range(COUNT + 2))
     kept = guided(strand_id=np.arange(COUNT) * 7).strand_id
@@ -147,7 +147,7 @@ def test_groups_go_into_files_with_the_bones_of_their_strands(tmp_path: Path) ->
 
 
 @pytest.mark.parametrize("suffix", [".usda", ".abc", ".tfx"])
-def test_groups_whose_names_become_one_stay_apart(tmp_path: Path, suffix: str) -> None:
+def test_groups_whose_names_become_equal_get_different_files(tmp_path: Path, suffix: str) -> None:
     pytest.importorskip("alembic3d")
     names = {0: "front hair", 1: "front_hair_2", 2: "front-hair", 3: "Front Hair"}
     counts = [5, 7, 3, 2]
@@ -203,7 +203,7 @@ def test_an_export_again_replaces_its_own_files_and_keeps_those_of_others(tmp_pa
     assert (tmp_path / "hair_crown old.tfx").read_bytes() == b"somebody else's"
 
 
-def test_a_file_that_fails_takes_the_others_with_it(tmp_path: Path) -> None:
+def test_if_one_file_fails_none_is_written(tmp_path: Path) -> None:
     (tmp_path / "hair_crown.tfx").write_bytes(b"old")
     (tmp_path / "hair_group4.tfx").mkdir()
     with pytest.raises(HairloomError, match="a folder has this name"):
@@ -211,7 +211,7 @@ def test_a_file_that_fails_takes_the_others_with_it(tmp_path: Path) -> None:
     assert (tmp_path / "hair_crown.tfx").read_bytes() == b"old"
 
 
-def test_what_is_cut_is_told(tmp_path: Path) -> None:
+def test_resampled_strands_are_reported(tmp_path: Path) -> None:
     pytest.importorskip("alembic3d")
     points = np.linspace([0, 0, 0], [0, 0, 0.1], 300)
     long = Groom(StrandSet(points, [0, 300], np.full(300, 4e-5), [0]))
@@ -226,7 +226,7 @@ def test_closest_guides_that_not_all_grooms_have_are_lost_with_a_note() -> None:
     assert len(notes) == 1 and "brows: no closest guides" in notes[0]
 
 
-def test_joined_grooms_keep_their_groups_guides_and_ids_apart() -> None:
+def test_joined_grooms_keep_distinct_groups_guides_and_ids() -> None:
     one, other = guided(), replace(guided(), name="brows", group_names={})
     both, notes = join_grooms([one, other], "all")
     assert notes == () and both.strands.strand_count == 24
@@ -243,7 +243,7 @@ def test_joined_grooms_keep_their_groups_guides_and_ids_apart() -> None:
         np.testing.assert_array_equal(both.strands.grid[own], part.strands.grid)
 
 
-def test_joined_grooms_lose_what_one_of_them_lacks_and_say_so() -> None:
+def test_joined_grooms_lose_attributes_that_one_lacks_with_a_note() -> None:
     bald, painted = groom("bald", has_uv=False), guided()
     painted = replace(painted, strands=replace(painted.strands, color=np.ones((60, 3))))
     both, notes = join_grooms([painted, bald], "all")

@@ -38,7 +38,7 @@ def run(path: Path, script: str, **options: object) -> None:
 
 
 @contextmanager
-def begun_processes() -> Iterator[list[subprocess.Popen[bytes]]]:
+def started_processes() -> Iterator[list[subprocess.Popen[bytes]]]:
     """The processes that are started within this context."""
     before, begun = subprocess.Popen, []
 
@@ -80,14 +80,14 @@ def test_a_script_without_an_end_is_ended(path: Path, monkeypatch: pytest.Monkey
     """Also if it starts slowly."""
     monkeypatch.setattr(subprocess_reader, "_MIN_SECONDS", 1.0)
     with (
-        begun_processes() as begun,
+        started_processes() as begun,
         pytest.raises(HairloomError, match="could not read it within 1 s"),
     ):
         run(path, "while True: pass")
     assert [each.returncode for each in begun] == [-signal.SIGKILL]
 
 
-def test_a_child_whose_work_is_given_up_is_ended(path: Path) -> None:
+def test_a_child_of_cancelled_work_is_killed(path: Path) -> None:
     """Whoever no longer waits for it ends it, amid its work or right after its start."""
     number = path.with_name("number")
     endless = f"import os\nopen({str(number)!r}, 'w').write(str(os.getpid()))\nwhile True: pass"
@@ -119,12 +119,12 @@ def test_a_child_whose_work_is_given_up_is_ended(path: Path) -> None:
         child_process.kill_context.set(at_once)
         child_process.run_child(command, seconds=60.0)
 
-    with begun_processes() as begun, pytest.raises(InterruptedError):
+    with started_processes() as begun, pytest.raises(InterruptedError):
         contextvars.Context().run(begin_it)
     assert [each.returncode for each in begun] == [-signal.SIGKILL]
 
 
-def test_where_no_python_is_known_that_is_said(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_python_is_reported(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(HairloomError, match=r"no Python can be started .*Use another format"):
         run(path, "", python=[str(path.with_name("none"))])
     monkeypatch.setattr(sys, "executable", "/opt/blender/blender")

@@ -112,16 +112,16 @@ BAD = {
 
 @pytest.mark.parametrize("suffix", [".png", ".exr", ".tif", ".jpg", ".unknown"])
 @pytest.mark.parametrize("kind", BAD)
-def test_what_is_no_picture_is_named(kind: str, suffix: str, tmp_path: Path) -> None:
+def test_files_that_are_no_pictures_are_refused(kind: str, suffix: str, tmp_path: Path) -> None:
     path = tmp_path / f"bad{suffix}"
     path.write_bytes(BAD[kind])
-    with pytest.raises(HairloomError) as told:
+    with pytest.raises(HairloomError) as error:
         read_texture(path, is_color=True)
-    assert told.value.place == str(path) and told.value.remedy
-    assert "\n" not in str(told.value)
+    assert error.value.place == str(path) and error.value.remedy
+    assert "\n" not in str(error.value)
 
 
-def test_missing_files_and_folders_are_named(tmp_path: Path) -> None:
+def test_missing_pictures_and_folders_are_refused(tmp_path: Path) -> None:
     for path, problem in ((tmp_path / "none.png", "no such file"), (tmp_path, "folder")):
         with pytest.raises(HairloomError, match=problem):
             read_texture(path, is_color=True)
@@ -151,7 +151,7 @@ def test_damaged_files_read_as_pictures_or_say_why(suffix: str, depth: str, tmp_
     assert errors > 5, "the damage must be seen"
 
 
-def test_what_cannot_be_written_is_named_and_leaves_nothing(tmp_path: Path) -> None:
+def test_a_failed_write_is_reported_and_leaves_no_file(tmp_path: Path) -> None:
     image = random_picture(3)
     (tmp_path / "file").write_text("a file")
     for path, depth, problem in (

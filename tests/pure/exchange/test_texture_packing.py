@@ -152,7 +152,7 @@ def test_all_maps_of_an_atlas_can_be_packed() -> None:
     assert held == set(MAP_MEANINGS) - {"roughness"}
 
 
-def test_missing_maps_are_taken_as_nothing_out_of_the_ordinary() -> None:
+def test_missing_maps_are_replaced_by_neutral_values() -> None:
     maps = {name: values for name, values in random_maps().items() if name in ("alpha", "color")}
     assert [each.suffix for each in texture_layouts("unreal", maps)] == ["_Coverage", "_Material"]
     (tangent,) = texture_layouts("unreal_compact", maps | {"along": maps["alpha"]})[:1]
@@ -163,7 +163,7 @@ def test_missing_maps_are_taken_as_nothing_out_of_the_ordinary() -> None:
     np.testing.assert_allclose(normal.pack(maps)[0, 0], [0.5, 0.5, 1.0])
 
 
-def test_what_cannot_be_packed_is_named() -> None:
+def test_invalid_maps_and_presets_are_refused() -> None:
     maps = random_maps()
     for wrong, problem in (
         ({}, "no maps"),

@@ -263,13 +263,13 @@ def test_guides_or_strands_or_both(tmp_path: Path, parts: str) -> None:
     np.testing.assert_array_equal(read_tfx(path).strands.points, expected.strands.points)
 
 
-def test_what_is_lost_is_said(tmp_path: Path) -> None:
+def test_lost_attributes_are_reported(tmp_path: Path) -> None:
     strands = grown(3, 90)
     radius = np.linspace(1e-4, 1e-5, strands.point_count)
     strands = StrandSet(strands.points, strands.offsets, radius, np.arange(3))
-    told = " ".join(write_tfx(tmp_path / "x.tfx", Groom(strands, strand_id=np.arange(3))))
+    notes = " ".join(write_tfx(tmp_path / "x.tfx", Groom(strands, strand_id=np.arange(3))))
     for lost in ("90 points were resampled to 64", "no groups", "tapers", "no strand IDs"):
-        assert lost in told
+        assert lost in notes
 
 
 def test_a_file_for_each_group(tmp_path: Path) -> None:

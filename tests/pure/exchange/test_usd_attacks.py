@@ -86,7 +86,7 @@ def test_a_few_instances_are_hair(tmp_path: Path) -> None:
     assert time.perf_counter() - begun < 60.0
 
 
-def test_many_prims_are_told_of_together(tmp_path: Path) -> None:
+def test_notes_on_many_prims_are_combined(tmp_path: Path) -> None:
     """A line for each would make thousands."""
     path = tmp_path / "groom.usda"
     path.write_text(laughs(4, CURVE))
@@ -95,7 +95,7 @@ def test_many_prims_are_told_of_together(tmp_path: Path) -> None:
     assert any("16 prims, such as /" in note and "it has no widths" in note for note in notes)
 
 
-def test_what_is_packed_comes_back() -> None:
+def test_packed_prims_can_be_unpacked() -> None:
     """Arrays of one layout are concatenated in the file, for prims with different attributes."""
     random = np.random.default_rng(0)
     prims: list[Arrays] = [

@@ -38,7 +38,7 @@ def deep(folder: Path, length: int) -> Path:
 
 
 @pytest.mark.parametrize("write", [write_alone, write_set])
-def test_a_path_that_is_too_long_is_said_to_be(
+def test_a_path_that_is_too_long_is_reported_as_such(
     tmp_path: Path, write: Callable[[Path], None]
 ) -> None:
     """The file's own path is short enough, but that of its temporary file is not."""
