@@ -128,7 +128,7 @@ def test_a_preview_reports_lights_that_it_leaves_out(new_hair: Any, sphere: Any)
     session = Session(hair, depsgraph)
     assert not any("Lights" in warning for warning in session.warnings)
     add("POINT", energy=10.0)
-    session.light(bpy.context.evaluated_depsgraph_get())
+    session.take_lights(bpy.context.evaluated_depsgraph_get())
     assert any("Lights: 9 shine" in warning for warning in session.warnings)
     assert len(session.snapshot.lights) == LIGHT_CAPACITY
 
@@ -152,7 +152,7 @@ def test_a_scene_without_light_is_reported_if_a_view_uses_scene_lights(
     assert ("studio" in warning) is (world is None or not any(world))
     assert "Add a light" in warning and warning.endswith(".")
     add("POINT", energy=10.0)
-    session.light(bpy.context.evaluated_depsgraph_get())
+    session.take_lights(bpy.context.evaluated_depsgraph_get())
     assert not any("no light" in warning for warning in session.warnings)
 
 

@@ -153,5 +153,5 @@ def test_a_lamp_inside_the_hair_is_reported_if_a_view_uses_scene_lights(
     assert "inside the hair" in warning
     lamp.location.x += 5.0
     bpy.context.view_layer.update()
-    session.light(bpy.context.evaluated_depsgraph_get())
+    session.take_lights(bpy.context.evaluated_depsgraph_get())
     assert not any("Candle" in each for each in session.warnings)
