@@ -183,9 +183,9 @@ def test_groups_are_in_memory_one_at_a_time(tmp_path: Path) -> None:
     write_groom_alembic(tmp_path / "first.abc", groom, UNITY)  # loads the library
     tracemalloc.start()
     write_groom_alembic(tmp_path / "second.abc", groom, UNITY)
-    max_strands = tracemalloc.get_traced_memory()[1]
+    peak_bytes = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert max_strands < 0.5 * points.nbytes
+    assert peak_bytes < 0.5 * points.nbytes
 
 
 def test_all_comes_back_to_the_bit(tmp_path: Path) -> None:
