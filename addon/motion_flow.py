@@ -82,7 +82,7 @@ class Motion:
     colliders: as they stand at the last frame's end.
     clearance: how far strands stay from colliders; None before there are any.
     guide_clearance: the same for guides.
-    leans: how leading out bent strands in the frame before.
+    deflections: how leading out bent strands in the frame before.
     start_pose: the pose in which the motion began; the dynamics stores the style in that pose.
     """
 
@@ -96,7 +96,7 @@ class Motion:
     colliders: tuple[PosedCollider, ...] = ()
     clearance: Clearance | None = None
     guide_clearance: GuideClearance | None = None
-    leans: Deflections = NO_DEFLECTIONS
+    deflections: Deflections = NO_DEFLECTIONS
     start_pose: Pose | None = None
 
     def drive(self, frame: FrameInput, target: Floats, held: HeldCvs | None) -> Drive:
@@ -226,7 +226,7 @@ def steps(
         frame.colliders,
         motion.clearance,
         motion.guide_clearance,
-        led.leans,
+        led.deflections,
         motion.start_pose,
     )
 
@@ -352,7 +352,7 @@ def with_clearance(
     strands, guides = motion.clearance, motion.guide_clearance
     if simulated is not None and not simulated.any():
         strands = None
-    elif colliders and (strands is None or strands.kept != max_distance):
+    elif colliders and (strands is None or strands.max_distance != max_distance):
         strands = strand_clearance(rig, motion.pose, before, max_distance)
     if colliders and (guides is None or guides.max_distance != reach):
         guides = guide_clearance(motion.carried_guides, before, reach)
@@ -380,10 +380,12 @@ def strands_and_led(rig: Rig, motion: Motion) -> tuple[Floats, LedOut]:
     if motion.clearance is None:
         return held_strands(rig, pose, points), NO_LED_OUT
     carry = partial(motions.carried, rig.strands.points)
-    leans = motion.leans.after(motion.hair_time, offsets)
-    led, leans = lead_out(points, carry, offsets, motion.colliders, motion.clearance, leans)
+    deflections = motion.deflections.decayed(motion.hair_time, offsets)
+    led, deflections = lead_out(
+        points, carry, offsets, motion.colliders, motion.clearance, deflections
+    )
     points = held_strands(rig, pose, points)
-    return points, LedOut.of(led, points, offsets, leans)
+    return points, LedOut.of(led, points, offsets, deflections)
 
 
 def strands_at(rig: Rig, pose: Pose, guides_now: Floats, led: LedOut = NO_LED_OUT) -> Floats:
@@ -403,7 +405,7 @@ def _ridden_strands(rig: Rig, pose: Pose, guides_now: Floats) -> tuple[Floats, R
     """All strands riding on guides, and how their roots have moved."""
     motions = motions_of(rig, pose)
     # in the guides' own precision, so that guides that only their roots move turn by exactly 0
-    by_roots = _carried_guides(rig, motions.of(rig.guides), guides_now.dtype.type)
+    by_roots = _carried_guides(rig, motions.take(rig.guides), guides_now.dtype.type)
     return ride(rig.strands.points, rig.riders, by_roots, guides_now, motions), motions
 
 

@@ -154,7 +154,7 @@ def painted_strands(rig: Rig, mask: StrandMask) -> Floats:
     if rig.grown_children is not None:
         weights, kept = rig.grown_children.growth.weights, rig.grown_children.rig_children
         between = Places(None, None, weights.guide[kept], weights.weight[kept])
-        of_children = mask.of(rig.grown_children.parents).along(between, count)
+        of_children = mask.for_strands(rig.grown_children.parents).along(between, count)
         values = np.concatenate([values, of_children], axis=1)
     if count == 1:
         return values[0].astype(np.float32)
@@ -171,7 +171,7 @@ def _with_masks(rig: Rig, masks: Masks) -> Rig:
     grown, own, strands, head = rig.grown_children, rig.own_count, rig.strands, rig.head
     assert grown is not None and own is not None and head is not None
     growth, kept = grown.growth, grown.rig_children
-    masks = masks.of(grown.parents)
+    masks = masks.for_strands(grown.parents)
     if masks == growth.masks:
         return rig
     assert strands.root_triangle is not None and strands.root_barycentric is not None

@@ -192,7 +192,7 @@ class Rig:
         """`holds` of the guides alone, by guide index, along their centre lines."""
         if self.holds is None:
             return None
-        own, cv_count = self.holds.of(self.guides), self.guide_grid.shape[1]
+        own, cv_count = self.holds.for_strands(self.guides), self.guide_grid.shape[1]
         return own.on_lines(self.strands.take(self.guides), cv_count)
 
     @cached_property
@@ -492,7 +492,7 @@ def _with_children(
         settings,
         ground.density,
         growing.partings,
-        ground.masks.of(parents),
+        ground.masks.for_strands(parents),
         place=place,
         cache=kept,
     )

@@ -99,7 +99,7 @@ def shaken(rig: Rig, seconds: float) -> ComputedMotion:
         guides.append(motion.guides)
         earlier, before = before.matrix, now
     assert motion.clearance is not None
-    start = MotionStart(first, posed[0], motion.clearance.kept)
+    start = MotionStart(first, posed[0], motion.clearance.max_distance)
     poses = [
         replace(pose, solids=SimulatedSolids(start, colliders))
         for pose, colliders in zip((first, *later), posed, strict=True)

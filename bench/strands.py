@@ -233,7 +233,7 @@ def _farthest_in_parts(
             guides=guides,
             colliders=posed,
             duration=now.duration / PARTS,
-            leans=led.leans,
+            deflections=led.deflections,
         )
         last, ridden_before = correction, ridden
         correction, led = motion_flow.strands_and_led(rig, there)
@@ -329,7 +329,7 @@ def card_figures(rig: Rig) -> dict[str, float]:
         if motion_start is None:
             assert motion.clearance is not None
             standing = (PosedCollider(collider, np.eye(4), np.eye(4)),)
-            motion_start = MotionStart(rig.rest_pose, standing, motion.clearance.kept)
+            motion_start = MotionStart(rig.rest_pose, standing, motion.clearance.max_distance)
         pose = replace(motion.pose, solids=SimulatedSolids(motion_start, motion.colliders))
         (riding, now), cost = _timed(rig, cards, (motion.pose, pose), motion.guides)
         costs.append(cost)

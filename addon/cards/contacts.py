@@ -104,7 +104,7 @@ class CardContacts:
         """
         vertices = self.clearance.vertices
         near = nearer_than(positions, poses_at_end(self.colliders), vertices.reach)[0]
-        long, arm = _SHORTEST_ARM * vertices.kept, arms[near].T
+        long, arm = _SHORTEST_ARM * vertices.max_distance, arms[near].T
         near = near[dot_rows(arm, arm) > long * long]
         if not len(near):
             return
@@ -117,7 +117,9 @@ class CardContacts:
         distance = np.full((len(near), 2), -np.inf, np.float32)
         # the motion of the row as a whole counts too
         distance[:, 1] = vertices.points[near] + away[near]
-        clearance = Clearance(vertices.kept, distance.ravel(), np.zeros(len(near), np.int32))
+        clearance = Clearance(
+            vertices.max_distance, distance.ravel(), np.zeros(len(near), np.int32)
+        )
         led = self._lead(points, carried, offsets, clearance)
         chosen, tips = near[led], points[2 * led + 1]
         was, now = _unit(positions[chosen] - roots[led]), _unit(tips - roots[led])

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from ..params import Settings, choice, toggle, when
 
-_ARE_DRAWN = when("card_drawing.shown_as", "cards", lack="no cards drawn")
+_ARE_DRAWN = when("card_drawing.shown_as", "cards", unmet_reason="no cards drawn")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -250,7 +250,7 @@ def _riders(
 ) -> Riders:
     count = len(offsets) - 1
     strands = StrandSet(spine, offsets, np.zeros(len(spine)), np.zeros(count, int))
-    return replace(Riders.of(strands, guides, weights, room), are_lines=True)
+    return replace(Riders.of(strands, guides, weights, room), are_center_lines=True)
 
 
 def _carried_spine(binding: CardBinding, guides: Floats, first: Floats) -> Floats:

@@ -19,7 +19,7 @@ from .widths import is_long, strands_for_cover
 #: number get no children.
 _MAX_STRANDS, _MIN_STRANDS = 300_000, 1_000
 #: Length variation, frizz and frizz length of automatic children.
-_SHORTER, _STRAY, _WAVE = 0.06, 0.01, 0.4
+_LENGTH_VARIATION, _FRIZZ, _FRIZZ_LENGTH = 0.06, 0.01, 0.4
 #: Scatter of short hair. Without it strands would be shaped like their nearest curve, and lie in
 #: patches that each reflect light in their own way.
 _SCATTER = 1.0
@@ -47,11 +47,11 @@ def automatic_settings(
         settings,
         method="multi",
         strand_count=children,
-        length_variation=_SHORTER,
+        length_variation=_LENGTH_VARIATION,
         scatter=0.0 if is_long(own) else _SCATTER,
         clump=0.0,
-        frizz=_STRAY,
-        frizz_length=_WAVE,
+        frizz=_FRIZZ,
+        frizz_length=_FRIZZ_LENGTH,
         fly_aways=0.0,
         curl=0.0,
     ), parts

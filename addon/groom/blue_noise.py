@@ -39,9 +39,9 @@ _SAMPLES, _BATCHES = 3.0, 3
 #: this many, so that it is not chance.
 _FULL, _FIRST_SURE = 0.02, 500.0
 #: Densities below this fraction of the highest one count as this, which limits distances.
-_THINNEST = 2.0**-12
+_MIN_DENSITY = 2.0**-12
 #: A thread gets at least about this many darts.
-_OF_THREAD = 4096
+_MIN_SAMPLES_PER_THREAD = 4096
 #: Plain random roots drawn at once when the surface is full.
 _PLAIN = 65_536
 
@@ -66,7 +66,7 @@ def spread_roots(pieces: Pieces, count: int, seed: int, whole: Pieces | None = N
     batch = 0
     while len(roots) < count:
         plain = target.samples(_PLAIN / target.part, key_of(seed, 1, 0, batch))
-        roots = roots.and_also(_shuffled(plain))
+        roots = roots.concatenated(_shuffled(plain))
         batch += 1
     return roots.take(np.arange(count))
 
@@ -119,10 +119,10 @@ class _Target:
         of three random cuts, two spacings joined (Devroye 1986, chapter V.2: Dirichlet with 2, 1,
         1).
         """
-        least = int(_OF_THREAD * len(self.mass) / max(count * self.part, 1.0)) + 1
+        least = int(_MIN_SAMPLES_PER_THREAD * len(self.mass) / max(count * self.part, 1.0)) + 1
         parts = even_slices(len(self.mass), least)
         found = parallel_map(lambda some: self._samples(count, stream, some), parts)
-        return functools.reduce(Samples.and_also, found)
+        return functools.reduce(Samples.concatenated, found)
 
     def _samples(self, count: float, stream: Ints, some: slice) -> Samples:
         """`samples` on some of the pieces."""
@@ -144,7 +144,7 @@ class _Target:
         barycentric[rows, (corner + 1) % 3] = last_cut - middle
         barycentric[rows, (corner + 2) % 3] = 1.0 - last_cut
         point = np.einsum("nk,nkj->nj", barycentric, self.corners.take(piece, axis=0))
-        reach = np.maximum(np.einsum("nk,nk->n", barycentric, density), _THINNEST) ** -0.5
+        reach = np.maximum(np.einsum("nk,nk->n", barycentric, density), _MIN_DENSITY) ** -0.5
         return Samples(piece, barycentric, point, reach, key)
 
 
@@ -170,6 +170,6 @@ def _filled(
         samples = samples.take(~old.covers(samples))
         new = SampleCells(roots.take(np.arange(before, len(roots))), radius)
         samples = _shuffled(samples.take(~new.covers(samples)))
-        roots = roots.and_also(samples.take(accepted_samples(samples, radius)))
+        roots = roots.concatenated(samples.take(accepted_samples(samples, radius)))
     here = wanted * target.part
     return roots, here >= _FIRST_SURE and len(roots) - before < _FULL * here

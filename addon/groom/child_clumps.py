@@ -190,7 +190,7 @@ def _middles(
 ) -> tuple[Ints, Floats]:
     """The middle of each member's clump (n,), and how far it draws the member, 0 to 1."""
     root = grid[:, 0]
-    reach = _REACH * _apart(root[:middle_count], cache, f"{level}, apart")
+    reach = _REACH * _typical_spacing(root[:middle_count], cache, f"{level}, apart")
     near = np.zeros((len(member), _CANDIDATES), np.int64)
     gap = np.full(near.shape, np.inf)  # where there are fewer
     for of_group, middles in by_group(group[member], group[:middle_count]):
@@ -210,7 +210,7 @@ def _middles(
     return middle, np.take_along_axis(alike, best, axis=1)[:, 0]
 
 
-def _apart(root: Floats, cache: ResultCache, name: str) -> float:
+def _typical_spacing(root: Floats, cache: ResultCache, name: str) -> float:
     """Typical distance from one root to the next [m]; infinite for a single one."""
     if len(root) < 2:
         return np.inf

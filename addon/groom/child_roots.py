@@ -203,7 +203,7 @@ def _near_guides(
     """
     guided = _Guided(place, normal, spacing, is_painted)
     pieces = Pieces.of(surface, None).take(is_wanted)
-    done, most = [], len(pieces) + _MAX_PIECES
+    done, max_pieces = [], len(pieces) + _MAX_PIECES
     pieces = pieces.take(pieces.mass > 0.0)
     for split in range(_SPLITS + 1):
         center = pieces.point.mean(axis=1)
@@ -214,10 +214,10 @@ def _near_guides(
         is_fine = (extent <= _FINE * reach) | (gap + extent <= reach)
         done.append(pieces.take(is_possible & is_fine))
         pieces = pieces.take(is_possible & ~is_fine)
-        if split == _SPLITS or 4 * len(pieces) > most:
+        if split == _SPLITS or 4 * len(pieces) > max_pieces:
             break
         pieces = pieces.split()
-    near = functools.reduce(Pieces.and_also, [*done, pieces])
+    near = functools.reduce(Pieces.concatenated, [*done, pieces])
     return near, guided.holds(near.point.mean(axis=1), near.normal)
 
 
@@ -240,7 +240,7 @@ def _spread(
         is_wanted: (triangle_count,), at least all triangles on which hair grows.
         tried: how many roots to try first; this is doubled while they are not enough.
     """
-    most = _TRIES * max(count, 1000)
+    max_tried = _TRIES * max(count, 1000)
     while True:
         roots, number = surface.compute_if_changed(
             _even_roots, *guided.arguments, is_wanted, tried, seed
@@ -255,9 +255,9 @@ def _spread(
         chosen = np.argsort(order, kind="stable")
         chosen = chosen[order[chosen] < np.inf][:count]
         is_sure = len(chosen) == count and order[chosen].max(initial=0.0) <= tried
-        if is_sure or not len(roots) or tried >= most:
+        if is_sure or not len(roots) or tried >= max_tried:
             return roots.take(chosen)
-        tried = min(most, 2 * tried)
+        tried = min(max_tried, 2 * tried)
 
 
 def _even_roots(

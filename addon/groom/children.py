@@ -166,7 +166,7 @@ class Growth:
                 np.concatenate([self.weights.weight, weights.weight]),
             ),
             clumps=more,
-            factors=self.factors.and_also(self.masks.at(_places(roots, weights))),
+            factors=self.factors.concatenated(self.masks.at(_places(roots, weights))),
             border=np.concatenate([self.border, _border(self.guide_border, weights)]),
         )
 

@@ -9,9 +9,9 @@ from ..params import Settings, choice, curve, either, integer, number, when
 
 _NALU = "Nguyen and Donnelly 2005, GPU Gems 2, chapter 23"
 _TARIQ = "Tariq 2008, Real-time hair rendering on the GPU"
-_HAS_CLUMPS = when("children.clump", lack="needs Clump")
-_HAS_FRIZZ = when("children.frizz", lack="needs Frizz")
-_HAS_CURL = when("children.curl", lack="needs Curl")
+_HAS_CLUMPS = when("children.clump", unmet_reason="needs Clump")
+_HAS_FRIZZ = when("children.frizz", unmet_reason="needs Frizz")
+_HAS_CURL = when("children.curl", unmet_reason="needs Curl")
 _PARTS = either(_HAS_CLUMPS, when("children.method", "multi", "auto"))
 
 

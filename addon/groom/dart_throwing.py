@@ -11,7 +11,7 @@ from ..strands.parallel import even_slices, parallel_map
 from ..strands.vectors import dot_rows
 
 #: A thread gets at least this many darts.
-_OF_THREAD = 4096
+_MIN_SAMPLES_PER_THREAD = 4096
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Samples:
             self.key.take(index),
         )
 
-    def and_also(self, other: Samples) -> Samples:
+    def concatenated(self, other: Samples) -> Samples:
         return Samples(
             np.concatenate([self.triangle, other.triangle]),
             np.concatenate([self.barycentric, other.barycentric]),
@@ -88,7 +88,7 @@ class SampleCells:
 
     def covers(self, samples: Samples) -> Bools:
         """Whether any of the points lies too near to each of these darts, (n,)."""
-        parts = even_slices(len(samples), _OF_THREAD)
+        parts = even_slices(len(samples), _MIN_SAMPLES_PER_THREAD)
         if len(parts) == 1:
             return self._covers(samples)
         rows = np.arange(len(samples))

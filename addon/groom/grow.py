@@ -102,14 +102,16 @@ def _grow_combed(
     plan = _plan(surface, cranium, clump, factor, settings, random)
 
     normal = plan.skin.normal(triangle, barycentric)
-    uncombed = settings.whorl * _uncombed(plan.length, cranium)
-    grown = _grown(cranium, root, normal, clump, random)
-    comb = _combed(cranium, root, normal, settings)
+    uncombed = settings.whorl * _uncombed_fraction(plan.length, cranium)
+    grown = _natural_directions(cranium, root, normal, clump, random)
+    comb = _comb_directions(cranium, root, normal, settings)
     comb = unit(comb + uncombed[:, None] * (grown - comb))
     lift = settings.lift * (1.0 + uncombed * random.normal(0.0, _LIFT_VARIES, len(root)))
     stiff = _STIFF * cranium.half_depth
-    grid = _fallen(root, normal, comb, np.clip(lift, 0.0, 1.0), plan, stiff, settings)
-    grid = _laid(_taut(style_clumps(grid, clump, settings, random), plan), plan)
+    grid = _grow_segments(root, normal, comb, np.clip(lift, 0.0, 1.0), plan, stiff, settings)
+    grid = _with_restored_lengths(
+        _stretched_over_hollows(style_clumps(grid, clump, settings, random), plan), plan
+    )
     return bound_strands(grid, triangle, barycentric, surface)
 
 
@@ -175,13 +177,13 @@ def _heights(
     return clearance[:, None] * np.minimum(5.0 * fraction, 1.0) + pile[:, None] * rise
 
 
-def _uncombed(length: Floats, cranium: Cranium) -> Floats:
+def _uncombed_fraction(length: Floats, cranium: Cranium) -> Floats:
     """How far hair is too short to be combed, (strand_count,) from 0 to 1."""
     short = (_COMBED - length / cranium.half_depth) / (_COMBED - _UNCOMBED)
     return smooth_step(short)
 
 
-def _grown(
+def _natural_directions(
     cranium: Cranium, root: Floats, normal: Floats, clump: Ints, random: np.random.Generator
 ) -> Floats:
     """Unit directions in which hair grows by itself, along the skin, (strand_count, 3)."""
@@ -198,7 +200,9 @@ def _along_skin(direction: Floats, normal: Floats) -> Floats:
     return direction - normal * np.einsum("ij,ij->i", direction, normal)[:, None]
 
 
-def _combed(cranium: Cranium, root: Floats, normal: Floats, settings: GrowSettings) -> Floats:
+def _comb_directions(
+    cranium: Cranium, root: Floats, normal: Floats, settings: GrowSettings
+) -> Floats:
     """Unit directions in which the hair is combed, along the skin, (strand_count, 3)."""
     side = np.clip((root[:, 0] - cranium.center[0]) / (0.5 * cranium.half_depth), -1.0, 1.0)
     # away from the parting from the root on, or hair at the forehead would fall over the face
@@ -214,7 +218,7 @@ def _combed(cranium: Cranium, root: Floats, normal: Floats, settings: GrowSettin
     return unit(_along_skin(comb, normal))
 
 
-def _fallen(
+def _grow_segments(
     root: Floats,
     normal: Floats,
     comb: Floats,
@@ -243,7 +247,7 @@ def _fallen(
     return grid
 
 
-def _taut(grid: Floats, plan: _Plan) -> Floats:
+def _stretched_over_hollows(grid: Floats, plan: _Plan) -> Floats:
     """The strands stretched over hollows of the skin, which hair bridges, as around an ear.
 
     Points only move away from the skin; `_laid` restores the lengths.
@@ -261,7 +265,7 @@ def _taut(grid: Floats, plan: _Plan) -> Floats:
     return grid
 
 
-def _laid(styled: Floats, plan: _Plan) -> Floats:
+def _with_restored_lengths(styled: Floats, plan: _Plan) -> Floats:
     """The styled strands with their own segment lengths again, unfolded, and outside of the skin.
 
     A strand that its clump draws to the other side of the head would otherwise turn back on itself.

@@ -113,7 +113,7 @@ class Warp:
     def scale(self) -> float:
         return mean_scale(self.matrix)
 
-    def bending(self, source: Floats, target: Floats, reach: float, smooth: float) -> Warp:
+    def with_bend(self, source: Floats, target: Floats, reach: float, smooth: float) -> Warp:
         """The warp with one more bend, which moves points (n, 3) to others, both in the built-in
         head's space after the bends so far."""
         table = _wendland(source, source, reach)
@@ -167,7 +167,7 @@ def fit_head(
     wanted = np.array([landmarks[name] for name in names], np.float64)
     matrix = _landmark_similarity(names, source, wanted, place)
     back = np.linalg.inv(matrix)
-    warp = Warp(matrix).bending(source, _moved(wanted, back), _LANDMARK_REACH, _EXACT)
+    warp = Warp(matrix).with_bend(source, _moved(wanted, back), _LANDMARK_REACH, _EXACT)
     seen = _PlacedTarget.of(target, matrix)
     warp, away = _skin_bent(warp, model, seen, source)
     return HeadFit(warp, {name: np.asarray(landmarks[name]) for name in names}, away)
@@ -183,7 +183,7 @@ def fit_by_vertices(source: Floats, target: Floats, is_head: Bools) -> Warp:
     matrix = _similarity(source[is_head], target[is_head])
     kept = first_per_cell(source, _COARSE)
     wanted = _moved(target[kept], np.linalg.inv(matrix))
-    return Warp(matrix).bending(source[kept], wanted, _LANDMARK_REACH, _EXACT)
+    return Warp(matrix).with_bend(source[kept], wanted, _LANDMARK_REACH, _EXACT)
 
 
 def guess_landmarks(model: FitModel, target: Surface) -> tuple[dict[str, Floats], bool]:
@@ -254,7 +254,7 @@ def _skin_bent(
             break
         source = np.concatenate([fixed, here[free]])
         wanted = np.concatenate([fixed, point[free]])
-        warp = warp.bending(source, wanted, reach, _SMOOTH)
+        warp = warp.with_bend(source, wanted, reach, _SMOOTH)
         away = float(np.linalg.norm(point[free] - here[free], axis=1).mean())
     return warp, away
 
@@ -434,10 +434,10 @@ def first_per_cell(points: Floats, apart: float) -> Ints:
     return np.sort(np.unique(cell, axis=0, return_index=True)[1])
 
 
-def _far_from(points: Floats, others: Floats, least: float) -> Bools:
+def _far_from(points: Floats, others: Floats, min_distance: float) -> Bools:
     if not len(others):
         return np.ones(len(points), bool)
-    return np.asarray(nearest_points(points, others, 1)[1][:, 0] > least)
+    return np.asarray(nearest_points(points, others, 1)[1][:, 0] > min_distance)
 
 
 def _wendland(points: Floats, centers: Floats, reach: float) -> Floats:

@@ -42,7 +42,7 @@ class Holds:
     def anchor_count(self) -> int:
         return self.tie_count + (0 if self.tip_triangle is None else len(self.tip_triangle))
 
-    def of(self, chosen: Ints) -> Holds:
+    def for_strands(self, chosen: Ints) -> Holds:
         """The holds of some strands, ascending, renumbered among these strands."""
         place = np.searchsorted(chosen, self.strand)
         kept = np.flatnonzero(np.take(chosen, place, mode="clip") == self.strand)

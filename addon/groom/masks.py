@@ -103,7 +103,7 @@ class Mask:
         of this many triangles; None: without a surface."""
         raise NotImplementedError
 
-    def of(self, strands: Ints) -> Mask:
+    def for_strands(self, strands: Ints) -> Mask:
         """The mask of some of the artist's strands, renumbered among these."""
         return self
 
@@ -210,7 +210,7 @@ class StrandMask(Mask):
     def fits(self, strand_count: int, triangle_count: int | None) -> bool:
         return len(self.grid) == strand_count
 
-    def of(self, strands: Ints) -> StrandMask:
+    def for_strands(self, strands: Ints) -> StrandMask:
         return StrandMask(self.grid[strands])
 
     def at_points(self, strands: StrandSet) -> Floats:
@@ -228,22 +228,22 @@ class StrandMask(Mask):
 
 
 def sample_bilinear(
-    pixels: Floats, uv: Floats, meant: Callable[[Floats], Floats] = lambda stored: stored
+    pixels: Floats, uv: Floats, decode: Callable[[Floats], Floats] = lambda stored: stored
 ) -> Floats:
     """Values between the middles of the four nearest pixels, (n, ...); the image repeats beyond its
     edges.
 
     Args:
         pixels: (height, width, ...). uv: (n, 2).
-        meant: decodes stored pixels, to (n, ...).
+        decode: decodes stored pixels, to (n, ...).
     """
     height, width = pixels.shape[:2]
     place = uv.astype(np.float64) * (width, height) - 0.5
     corner = np.floor(place).astype(np.int64)
     x, y = (place - corner).T.reshape(2, -1, *(1,) * (pixels.ndim - 2))
     (left, low), (right, high) = (corner % (width, height)).T, ((corner + 1) % (width, height)).T
-    below = meant(pixels[low, left]) * (1.0 - x) + meant(pixels[low, right]) * x
-    above = meant(pixels[high, left]) * (1.0 - x) + meant(pixels[high, right]) * x
+    below = decode(pixels[low, left]) * (1.0 - x) + decode(pixels[low, right]) * x
+    above = decode(pixels[high, left]) * (1.0 - x) + decode(pixels[high, right]) * x
     found: Floats = below + y * (above - below)
     return found
 
@@ -269,9 +269,9 @@ class Masks:
         """The factors of what grows at these places."""
         return Factors(len(places.strand), {n: each.at(places) for n, each in self.masks.items()})
 
-    def of(self, strands: Ints) -> Masks:
-        """See `Mask.of`."""
-        return Masks({name: each.of(strands) for name, each in self.masks.items()})
+    def for_strands(self, strands: Ints) -> Masks:
+        """See `Mask.for_strands`."""
+        return Masks({name: each.for_strands(strands) for name, each in self.masks.items()})
 
 
 NO_MASKS = Masks()
@@ -294,7 +294,7 @@ class Factors:
     def take(self, chosen: Ints) -> Factors:
         return Factors(len(chosen), {name: each[chosen] for name, each in self.painted.items()})
 
-    def and_also(self, more: Factors) -> Factors:
+    def concatenated(self, more: Factors) -> Factors:
         both = {n: np.concatenate([each, more[n]]) for n, each in self.painted.items()}
         return Factors(self.count + more.count, both)
 

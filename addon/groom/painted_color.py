@@ -56,18 +56,18 @@ class SurfaceColor(PaintedColor):
 @dataclass(frozen=True, eq=False)
 class ImageColor(PaintedColor):
     """pixels: (height, width, k) float32 as they are stored, the lowest row first.
-    meant: decodes such pixels (n, k) to colours (n, 4). corner_uv: (triangle_count, 3, 2).
+    decode: decodes such pixels (n, k) to colours (n, 4). corner_uv: (triangle_count, 3, 2).
 
     Only pixels under roots are decoded, so that hair can follow a brush on a large image.
     """
 
     pixels: Floats
-    meant: Callable[[Floats], Floats]
+    decode: Callable[[Floats], Floats]
     corner_uv: Floats
 
     def at(self, triangle: Ints, barycentric: Floats) -> Floats:
         uv = np.einsum("nk,nkj->nj", barycentric, self.corner_uv[triangle])
-        return sample_bilinear(self.pixels, uv, self.meant)
+        return sample_bilinear(self.pixels, uv, self.decode)
 
     @property
     def triangle_count(self) -> int:

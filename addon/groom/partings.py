@@ -79,8 +79,8 @@ class Partings:
         """`crossed`, tested with every piece."""
         along = self.end - self.begin
         across = np.cross(self.normal, along)
-        from_root = _apart(root, self.begin, across)[:, None]  # (n, 1, m)
-        from_other = _apart(other, self.begin, across)  # (n, k, m)
+        from_root = _offsets_across(root, self.begin, across)[:, None]  # (n, 1, m)
+        from_other = _offsets_across(other, self.begin, across)  # (n, k, m)
         row, column, piece = np.nonzero(from_root * from_other < 0.0)
         one, two = from_root[row, 0, piece], from_other[row, column, piece]
         part = one / (one - two)
@@ -114,7 +114,7 @@ class Partings:
         return best, place
 
 
-def _apart(points: Floats, begin: Floats, across: Floats) -> Floats:
+def _offsets_across(points: Floats, begin: Floats, across: Floats) -> Floats:
     """(points - begin) . across of points (..., 3) and pieces (m, 3), (..., m)."""
     middle = begin.mean(axis=0)
     found: Floats = np.zeros((*points.shape[:-1], 1)) - dot(begin - middle, across)

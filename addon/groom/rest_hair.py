@@ -24,7 +24,7 @@ DEFORMED = 1.0e-4
 _SAME_UV = 1.0e-4
 _SAMPLED_ROOTS = 500
 #: One surface must fit this many times better than the other.
-_CLEARLY = 2.0
+_MIN_ADVANTAGE = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,8 +35,12 @@ class RestHair:
     surface: Surface
 
     @classmethod
-    def found(
-        cls, strands: StrandSet, rests: Sequence[Surface], posed: Surface, least: float = DEFORMED
+    def find(
+        cls,
+        strands: StrandSet,
+        rests: Sequence[Surface],
+        posed: Surface,
+        min_deformation: float = DEFORMED,
     ) -> RestHair | None:
         """The hair on the one of the undeformed surfaces that its strands stand on; None where the
         strands are to stay, since they stand on the posed surface, or it is not deformed.
@@ -46,12 +50,12 @@ class RestHair:
 
         Args:
             rests: the same mesh without some or all of its deformations, or in any other pose.
-            least: minimum deformation at the roots, as a fraction of the diagonal.
+            min_deformation: minimum deformation at the roots, as a fraction of the diagonal.
         """
         if not strands.strand_count:
             return None
         low, high = posed.bounds()
-        far = least * float(np.linalg.norm(high - low))
+        far = min_deformation * float(np.linalg.norm(high - low))
         rests = [
             each
             for each in rests
@@ -67,10 +71,10 @@ class RestHair:
         before = [_Standing.of(roots, uv, each, posed) for each in rests]
         if max(each.uv_error for each in (*before, there)) > _SAME_UV:
             number = int(np.argmin([each.uv_error for each in before]))
-            is_before = _CLEARLY * before[number].uv_error < there.uv_error
+            is_before = _MIN_ADVANTAGE * before[number].uv_error < there.uv_error
         else:
             number = int(np.argmin([each.distance for each in before]))
-            is_before = _CLEARLY * before[number].distance < there.distance > far
+            is_before = _MIN_ADVANTAGE * before[number].distance < there.distance > far
         is_posed = before[number].moved > far
         return cls(strands, rests[number]) if is_before and is_posed else None
 

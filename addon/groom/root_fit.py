@@ -19,7 +19,7 @@ LOOSE_DISTANCE = 0.01
 _UNIT_FACTORS = (*(10.0**n for n in range(-4, 5)), 0.0254, 0.3048, 1 / 0.0254, 1 / 0.3048)
 _SAMPLED_ROOTS = 500
 #: Another way to read roots must bring them this many times nearer than the way they were read.
-_CLEARLY = 4.0
+_MIN_ADVANTAGE = 4.0
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ def better_fit(readings: Mapping[str, Floats], search: ClosestPointSearch) -> Ro
     as_read = _best_fit(name, roots, search, (1.0,))
     fits = [_best_fit(name, roots, search, _UNIT_FACTORS) for name, roots in readings.items()]
     best = min(fits, key=lambda fit: fit.distance)
-    if best.distance > IMPLAUSIBLE_DISTANCE or best.distance * _CLEARLY >= as_read.distance:
+    if best.distance > IMPLAUSIBLE_DISTANCE or best.distance * _MIN_ADVANTAGE >= as_read.distance:
         return None
     return best
 

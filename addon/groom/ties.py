@@ -73,7 +73,7 @@ def find_holds(strands: StrandSet, holders: Holders, tip_distance: float = 0.0) 
     tie_count = len(holders.ties)
     found: list[tuple[Ints, Floats, Ints]] = []
     for number, tie in enumerate(holders.ties):
-        passing, places = _passing(strands, tie)
+        passing, places = _strands_passing(strands, tie)
         found.append((passing, places, np.full(len(passing), number)))
     if holders.tip_surface is not None:
         tips, triangle, barycentric = _tips_near(strands, holders.tip_surface, tip_distance)
@@ -83,7 +83,7 @@ def find_holds(strands: StrandSet, holders: Holders, tip_distance: float = 0.0) 
     anchor = np.concatenate([one[2] for one in found]).astype(np.int32)
     order = np.lexsort((place, strand))
     strand, place, anchor = strand[order], place[order], anchor[order]
-    kept = _apart(strand, place)
+    kept = _without_shared_points(strand, place)
     holds = Holds(strand[kept], place[kept], anchor[kept], tie_count)
     if holders.tip_surface is None:
         return holds
@@ -113,7 +113,7 @@ def unused_holder_notes(holds: Holds, holders: Holders) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def _passing(strands: StrandSet, tie: Tie) -> tuple[Ints, Floats]:
+def _strands_passing(strands: StrandSet, tie: Tie) -> tuple[Ints, Floats]:
     """The strands that pass through a tie, ascending, and where along each."""
     local = transform_points(strands.points, np.linalg.inv(tie.shape)).astype(np.float64)
     begin, step = local[:-1], np.diff(local, axis=0)
@@ -164,7 +164,7 @@ def _tips_near(strands: StrandSet, tips: TipSurface, distance: float) -> tuple[I
     return near[kept], closest.triangle[kept], barycentric
 
 
-def _apart(strand: Ints, place: Floats) -> Ints:
+def _without_shared_points(strand: Ints, place: Floats) -> Ints:
     """Indices of places that share no point with an earlier one, in order along each strand."""
     first, kept, last = np.floor(place), [], (-1, -1.0)
     shared = np.flatnonzero((np.diff(strand) == 0) & (np.diff(first) < 2.0))

@@ -80,7 +80,7 @@ class Pieces:
             self.key[chosen],
         )
 
-    def and_also(self, other: Pieces) -> Pieces:
+    def concatenated(self, other: Pieces) -> Pieces:
         return Pieces(
             np.concatenate([self.parent, other.parent]),
             np.concatenate([self.corner, other.corner]),

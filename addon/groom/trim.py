@@ -34,7 +34,7 @@ class Shape(Protocol):
         inside is where most of them are."""
         ...
 
-    def left_at(self, lines: Floats) -> Floats:
+    def exit_positions(self, lines: Floats) -> Floats:
         """Where lines (n, count, 3) that start inside first leave it, (n,) in segments from their
         start; infinite where they do not."""
         ...
@@ -52,7 +52,7 @@ class Plane:
         is_before = self._height(roots) >= 0.0
         return is_before if 2 * is_before.sum() >= len(roots) else ~is_before
 
-    def left_at(self, lines: Floats) -> Floats:
+    def exit_positions(self, lines: Floats) -> Floats:
         if self.faces is not None:
             return first_crossings(lines, self.faces)
         height = self._height(lines)
@@ -105,14 +105,14 @@ def trim_strands(strands: StrandSet, shapes: Sequence[Shape]) -> Trimmed:
             left = np.full(len(some), np.inf)
             for shape, of_shape in zip(shapes, inside[:, some], strict=True):
                 within = np.flatnonzero(of_shape)
-                left[within] = np.minimum(left[within], shape.left_at(fine[within]))
+                left[within] = np.minimum(left[within], shape.exit_positions(fine[within]))
             is_cut = np.isfinite(left)
             is_trimmed[some] = is_cut
-            points[places[is_cut]] = _up_to(fine[is_cut], left[is_cut])
+            points[places[is_cut]] = _cut_at(fine[is_cut], left[is_cut])
     return Trimmed(points, is_trimmed, ~inside.any(axis=0))
 
 
-def _up_to(fine: Floats, left: Floats) -> Floats:
+def _cut_at(fine: Floats, left: Floats) -> Floats:
     """Every _PIECES-th of the points (n, count, 3), moved along their lines: the last one to `left`
     segments from the start, the others by arc length in proportion."""
     step = np.linalg.norm(np.diff(fine.astype(np.float64), axis=1), axis=2)

@@ -45,7 +45,7 @@ _ENOUGH, _SLENDER, _LACKING = 4.0, 40.0, 1.1
 _LONG, _MAX_HAIRS = 5.0, 3.5
 #: Minimum number of strands that count as hair; and the ratio of the distances to the eighth and
 #: the second neighbour above which roots are in a row: there it is 4, on an area 2.
-_FEWEST, _IN_ROW = 3, 3.0
+_FEWEST, _MIN_ROW_RATIO = 3, 3.0
 #: Width of a strand over its length where there is no spacing.
 _ALONE = 1.0 / 500.0
 #: A groom's own widths are kept from this fraction of the found widths on, up to this multiple of
@@ -56,7 +56,7 @@ _SAMPLES, _NEIGHBOURS = 3000, 8
 #: Fraction by which hair is finer at its border.
 _FINER = 0.4
 #: Limits of the spacing at a strand over the median spacing.
-_LEAST, _MOST = 0.5, 2.0
+_MIN_SPACING_RATIO, _MAX_SPACING_RATIO = 0.5, 2.0
 
 METHODS = (
     (
@@ -114,7 +114,7 @@ class Widths:
 def with_widths(
     strands: StrandSet,
     method: str = "auto",
-    parts: float = 1.0,
+    drawn_per_strand: float = 1.0,
     *,
     number: Ints | None = None,
     fineness: Floats | None = None,
@@ -123,7 +123,7 @@ def with_widths(
     """The strands with widths by one of `METHODS`, in their own space.
 
     Args:
-        parts: how many strands are drawn for each of these, itself included.
+        drawn_per_strand: how many strands are drawn for each of these, itself included.
         number: (strand_count,) ascending, their numbers before any were left out, by which the
             measured ones are chosen, so that leaving one out hardly changes these. None: all.
         fineness: (strand_count,) factor on found widths; None: 1.
@@ -136,8 +136,8 @@ def with_widths(
     if method == "own":
         return strands, Widths(False, median)
     number = np.arange(strands.strand_count) if number is None else number
-    found = _found(strands, parts, number, cache)
-    reason = "" if method == "found" else _why_not(strands, median, found)
+    found = _find_hair_and_face_widths(strands, drawn_per_strand, number, cache)
+    reason = "" if method == "found" else _implausible_reason(strands, median, found)
     if method == "auto" and not reason:
         return strands, Widths(False, median)
     if not found.spacing:
@@ -179,7 +179,7 @@ def strands_for_cover(strands: StrandSet) -> float:
     if not hair.middle:
         return 1.0
     length = np.maximum(hair.length, np.finfo(np.float32).tiny)
-    finer = _found_of(hair).hairs / _MAX_HAIRS if hair.is_long else 1.0
+    finer = _find_widths(hair).hairs / _MAX_HAIRS if hair.is_long else 1.0
     layers = float(np.median(hair.widest * length / hair.apart**2))
     slender = float(np.median(length / hair.widest))
     lacking = max(_ENOUGH / max(layers, 1e-6), _SLENDER / slender)
@@ -187,7 +187,7 @@ def strands_for_cover(strands: StrandSet) -> float:
 
 
 @dataclass(frozen=True)
-class _Found:
+class _FoundWidths:
     """width: (strand_count,) [m]. spacing: the median distance of neighbours [m]; 0 without any."""
 
     width: Floats
@@ -225,7 +225,7 @@ class _Hair:
         """Args:
         number: see `with_widths`. cache: results of the last call with this name.
         """
-        chosen = _some(np.arange(strands.strand_count) if number is None else number)
+        chosen = _sample_indices(np.arange(strands.strand_count) if number is None else number)
 
         def measured(at: Ints, where: str) -> _Measured:
             return _Measured(strands.points[at], chosen, cache, f"{name}, {where}")
@@ -273,40 +273,43 @@ class _Hair:
         return np.minimum(_OF_SPACING * self.apart, _OF_LENGTH * self.typical)
 
 
-def _found(strands: StrandSet, parts: float, number: Ints, cache: ResultCache) -> _Found:
+def _find_hair_and_face_widths(
+    strands: StrandSet, drawn_per_strand: float, number: Ints, cache: ResultCache
+) -> _FoundWidths:
     """Found widths of hair. Those of brows and lashes are found separately, since they are short
     and grow close together however much hair is on the head.
 
     Args:
-        parts: how many strands are drawn for each of these but brows and lashes.
+        drawn_per_strand: how many strands are drawn for each of these but brows and lashes.
     """
     is_face = is_face_hair(strands.group)
     if not is_face.any():
-        return _found_of(_Hair.of(strands, number, cache, "hair"), parts)
+        return _find_widths(_Hair.of(strands, number, cache, "hair"), drawn_per_strand)
     face = _Hair.of(strands.take(np.flatnonzero(is_face)), None, cache, "face")
-    of_face = _found_of(face)
+    of_face = _find_widths(face)
     of_face = replace(of_face, width=np.minimum(of_face.width, _OF_FACE * face.typical))
     if is_face.all():
         return of_face
     other = np.flatnonzero(~is_face)
     hair = _Hair.of(strands.take(other), number[other], cache, "hair")
-    found = _found_of(hair, parts)
+    found = _find_widths(hair, drawn_per_strand)
     width = np.empty(strands.strand_count)
     width[~is_face], width[is_face] = found.width, of_face.width
     return replace(found, width=width)
 
 
-def _found_of(hair: _Hair, parts: float = 1.0) -> _Found:
+def _find_widths(hair: _Hair, drawn_per_strand: float = 1.0) -> _FoundWidths:
     """Widths that give the cover of a head, and in short or spread hair a few layers of it.
 
     Args:
-        parts: how many strands are drawn for each of these, evenly spread between them. The width
-            that layers need is limited by the spacing of these, not of all that are drawn.
+        drawn_per_strand: how many strands are drawn for each of these, evenly spread between them.
+            The width that layers need is limited by the spacing of these, not of all that are
+            drawn.
     """
     if hair.middle <= 0.0:
-        return _Found(hair.length * _ALONE, 0.0, 1.0, 1.0)
-    closer = parts**0.5
-    of_head, of_layers = hair.of_head / parts, hair.of_layers / parts
+        return _FoundWidths(hair.length * _ALONE, 0.0, 1.0, 1.0)
+    closer = drawn_per_strand**0.5
+    of_head, of_layers = hair.of_head / drawn_per_strand, hair.of_layers / drawn_per_strand
     width = np.maximum(
         np.minimum(of_head, _OF_SPACING * hair.at_roots / closer),
         np.minimum(of_layers, _OF_SPACING * hair.apart),
@@ -316,17 +319,17 @@ def _found_of(hair: _Hair, parts: float = 1.0) -> _Found:
     length = hair.length
     extinction = min(float((wanted * length).sum() / (width * length).sum()), _MAX_EXTINCTION)
     hairs = float(np.median(wanted)) / (_HAIR * hair.extent)
-    return _Found(width, hair.middle / closer, hairs, extinction)
+    return _FoundWidths(width, hair.middle / closer, hairs, extinction)
 
 
 def _evened(spacing: Floats) -> Floats:
     """The spacing without the extremes of borders and strays."""
     middle = np.median(spacing)
-    evened: Floats = np.clip(spacing, _LEAST * middle, _MOST * middle)
+    evened: Floats = np.clip(spacing, _MIN_SPACING_RATIO * middle, _MAX_SPACING_RATIO * middle)
     return evened
 
 
-def _some(number: Ints) -> Ints:
+def _sample_indices(number: Ints) -> Ints:
     """Indices of the strands that are measured, among strands of these numbers: all, or a random
     one in each of equally many steps, since hair may stand in rows.
     """
@@ -397,10 +400,10 @@ def _is_row(roots: Floats) -> bool:
     some = roots[:: max(len(roots) // _SAMPLES, 1)]
     gap = nearest_points(some, roots, _NEIGHBOURS + 1)[1][:, [2, _NEIGHBOURS]]
     gap = gap[gap[:, 0] > 0.0]
-    return bool(len(gap)) and float(np.median(gap[:, 1] / gap[:, 0])) > _IN_ROW
+    return bool(len(gap)) and float(np.median(gap[:, 1] / gap[:, 0])) > _MIN_ROW_RATIO
 
 
-def _why_not(strands: StrandSet, own: float, found: _Found) -> str:
+def _implausible_reason(strands: StrandSet, own: float, found: _FoundWidths) -> str:
     """Why the groom's own widths cannot be hair; empty where they can."""
     if not strands.has_widths:
         return "it has none"

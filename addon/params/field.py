@@ -42,18 +42,19 @@ Sections = Any
 
 _METADATA_KEY = "parameter"
 #: Similarity to a mistyped name, from 0 to 1, from which on a name is suggested instead.
-_NEAR = 0.5
+_MIN_NAME_SIMILARITY = 0.5
 
 
 @dataclass(frozen=True)
 class Condition:
     """A condition on settings.
 
-    `lack` is the text that a field shows while its condition does not hold, such as "needs Clump".
+    `unmet_reason` is the text that a field shows while its condition does not hold, such as "needs
+    Clump".
     """
 
     holds: Callable[[Sections], bool]
-    lack: Callable[[Sections], str]
+    unmet_reason: Callable[[Sections], str]
 
     def __call__(self, sections: Sections) -> bool:
         return self.holds(sections)
@@ -183,7 +184,7 @@ class Settings:
     #: the panel that its own follows, if that shows nothing but what is declared here
     panel_after: ClassVar[str] = ""
     #: the text that its panel shows above all settings
-    said_above: ClassVar[str] = ""
+    panel_note: ClassVar[str] = ""
     #: the toggle in the header of its panel
     header_toggle: ClassVar[str] = ""
     #: whether keyframes and drivers may change any of its parameters
@@ -263,7 +264,7 @@ class Settings:
         declared = {parameter.name: parameter for parameter in cls.parameters()}
         unknown = sorted(set(values) - set(declared))
         if unknown:
-            near = get_close_matches(unknown[0], declared, 3, _NEAR)
+            near = get_close_matches(unknown[0], declared, 3, _MIN_NAME_SIMILARITY)
             meant = f"Did you mean {' or '.join(near)}? " if near else ""
             raise HairloomError(
                 f"unknown {cls.section} parameter '{unknown[0]}'",
@@ -273,7 +274,7 @@ class Settings:
         return cls(**{name: declared[name].checked(v, place) for name, v in values.items()})
 
 
-def when(parameter: str, *values: Any, lack: str = "") -> Condition:
+def when(parameter: str, *values: Any, unmet_reason: str = "") -> Condition:
     """The condition that a parameter, as "section.name", has one of these values; without values:
     that it is not 0, empty or false."""
     section, _, name = parameter.partition(".")
@@ -282,22 +283,23 @@ def when(parameter: str, *values: Any, lack: str = "") -> Condition:
         value = getattr(getattr(sections, section), name)
         return value in values if values else bool(value)
 
-    return Condition(holds, lambda _: lack)
+    return Condition(holds, lambda _: unmet_reason)
 
 
 def both(one: Condition, other: Condition) -> Condition:
     return Condition(
         lambda sections: one(sections) and other(sections),
-        lambda sections: (other if one(sections) else one).lack(sections),
+        lambda sections: (other if one(sections) else one).unmet_reason(sections),
     )
 
 
 def either(one: Condition, other: Condition) -> Condition:
-    """The condition that one of two holds; if neither does, the first one's `lack` is shown."""
-    return Condition(lambda sections: one(sections) or other(sections), one.lack)
+    """The condition that one of two holds; if neither does, the first one's `unmet_reason` is
+    shown."""
+    return Condition(lambda sections: one(sections) or other(sections), one.unmet_reason)
 
 
-class _Drawn(TypedDict, total=False):
+class _DrawOptions(TypedDict, total=False):
     """Where and when a parameter is drawn, and what may change it; see `Parameter`."""
 
     panel: str
@@ -316,7 +318,7 @@ def number(
     hard: Range,
     unit: Unit = "none",
     source: str = "Hairloom",
-    **drawn: Unpack[_Drawn],
+    **drawn: Unpack[_DrawOptions],
 ) -> Any:
     """Declare a real number."""
     return _declare(
@@ -334,7 +336,7 @@ def integer(
     soft: Range,
     hard: Range,
     source: str = "Hairloom",
-    **drawn: Unpack[_Drawn],
+    **drawn: Unpack[_DrawOptions],
 ) -> Any:
     """Declare a whole number."""
     return _declare(
@@ -351,7 +353,7 @@ def color(
     description: str,
     source: str = "Hairloom",
     maximum: float = 1.0,
-    **drawn: Unpack[_Drawn],
+    **drawn: Unpack[_DrawOptions],
 ) -> Any:
     """Declare a scene-linear Rec.709 colour."""
     span = (0.0, maximum)
@@ -368,7 +370,7 @@ def toggle(
     label: str,
     description: str,
     source: str = "Hairloom",
-    **drawn: Unpack[_Drawn],
+    **drawn: Unpack[_DrawOptions],
 ) -> Any:
     """Declare an on/off switch."""
     return _declare(Parameter("", "toggle", default, label, description, source, **drawn))
@@ -381,7 +383,7 @@ def choice(
     label: str,
     description: str,
     source: str = "Hairloom",
-    **drawn: Unpack[_Drawn],
+    **drawn: Unpack[_DrawOptions],
 ) -> Any:
     """Declare one of several named options, each (identifier, label, description)."""
     return _declare(
@@ -405,7 +407,7 @@ def curve(
     description: str,
     hard: Range,
     source: str = "Hairloom",
-    **drawn: Unpack[_Drawn],
+    **drawn: Unpack[_DrawOptions],
 ) -> Any:
     """Declare values along the strand, see `curve.sample_curve`."""
     return _declare(
@@ -416,7 +418,7 @@ def curve(
 
 
 def color_map(
-    *, label: str, description: str, source: str = "Hairloom", **drawn: Unpack[_Drawn]
+    *, label: str, description: str, source: str = "Hairloom", **drawn: Unpack[_DrawOptions]
 ) -> Any:
     """Declare the name of painted colours, which replace a colour as a mask multiplies a number."""
     return _declare(Parameter("", "map", "", label, description, source, **drawn))

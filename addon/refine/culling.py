@@ -39,7 +39,7 @@ _SAMPLES = 512
 #: Number of steps by which a ball moves away from the surface, and the factor of each next step.
 _STEPS, _SHORTER = 8, 0.65
 #: A ball must protrude from the others by this fraction of the largest one's radius.
-_MIN_NEWS = 0.2
+_MIN_PROTRUSION = 0.2
 #: Balls are shrunk by this factor, so that they are well inside the mesh.
 INNER_PART = 0.95
 
@@ -149,7 +149,7 @@ def occluder_spheres_of(surface: Surface, count: int = 8, roots: Floats | None =
     centers, distance = _grown(first, surface, float(np.max(high - low)) / _PLACES)
     is_inside = _winding(centers, surface) > 0.5
     balls = np.column_stack([centers, INNER_PART * distance])[is_inside]
-    return _different(balls, count).astype(np.float32)
+    return _select_distinct(balls, count).astype(np.float32)
 
 
 def transform_spheres(spheres: Floats, matrix: Floats) -> Floats:
@@ -184,7 +184,7 @@ def _first_places(surface: Surface, low: Floats, high: Floats, count: int) -> Fl
     away = places - points[nearest]
     is_inside = np.einsum("ij,ij->i", away, normals[nearest]) < 0.0
     balls = np.column_stack([places, np.linalg.norm(away, axis=1)])[is_inside]
-    return _different(balls, count)[:, :3]
+    return _select_distinct(balls, count)[:, :3]
 
 
 def _samples(surface: Surface) -> tuple[Floats, Floats]:
@@ -243,26 +243,26 @@ def _connected(edges: Ints, vertex_count: int) -> Ints:
     """The lowest vertex that each vertex is connected to by edges (n, 2), (vertex_count,)."""
     label = np.arange(vertex_count)
     while True:
-        least = label.copy()
+        lowest = label.copy()
         for one, two in (edges.T, edges.T[::-1]):
-            np.minimum.at(least, one, label[two])
-        least = least[least]
-        if (least == label).all():
+            np.minimum.at(lowest, one, label[two])
+        lowest = lowest[lowest]
+        if (lowest == label).all():
             return label
-        label = least
+        label = lowest
 
 
-def _different(balls: Floats, count: int) -> Floats:
+def _select_distinct(balls: Floats, count: int) -> Floats:
     """The largest ball, then repeatedly the one that protrudes most from those, (n <= count, 4)."""
     chosen: list[int] = []
-    news = balls[:, 3].copy()
+    protrusion = balls[:, 3].copy()
     while len(chosen) < min(count, len(balls)):
-        best = int(news.argmax())
-        if not news[best] > _MIN_NEWS * balls[:, 3].max():
+        best = int(protrusion.argmax())
+        if not protrusion[best] > _MIN_PROTRUSION * balls[:, 3].max():
             break
         chosen.append(best)
         apart = np.linalg.norm(balls[:, :3] - balls[best, :3], axis=1)
-        news = np.minimum(news, apart + balls[:, 3] - balls[best, 3])
+        protrusion = np.minimum(protrusion, apart + balls[:, 3] - balls[best, 3])
     return balls[chosen]
 
 

@@ -24,18 +24,18 @@ WIDEST = 1.25
 SHORTEST = 1.0e-6
 
 
-def guide_axes(rest: Floats, now: Floats, gives: Bools) -> Floats | None:
+def guide_axes(rest: Floats, now: Floats, can_extend: Bools) -> Floats | None:
     """The direction at rest of each segment of each guide, xyz, and the fraction by which it is
     shown longer, w, (guide_count, cv_count - 1, 4) float32; None if none is longer or shorter.
 
     Args:
         rest, now: (guide_count, cv_count, 3) [m].
-        gives: (guide_count, cv_count - 1), whether the segment is a part of a curl.
+        can_extend: (guide_count, cv_count - 1), whether the segment is a part of a curl.
     """
     before, after = np.diff(rest, axis=1), np.diff(now, axis=1)
     length, later = (np.sqrt(np.einsum("gcx,gcx->gc", one, one)) for one in (before, after))
     has_length = length > 0.0
-    ratio = np.divide(later, length, out=np.ones_like(length), where=gives & has_length)
+    ratio = np.divide(later, length, out=np.ones_like(length), where=can_extend & has_length)
     extension = seen(ratio - np.float32(1.0))
     if not extension.any():
         return None

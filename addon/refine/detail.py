@@ -115,8 +115,8 @@ def _factors(cvs: Floats, view: PictureView, settings: DetailSettings) -> Ints:
         wanted = wang_pieces(control, half_size, np.float32(settings.error))
     else:
         wanted = heuristic_pieces(cvs, clip, half_size, np.float32(settings.piece_length))
-    most = np.float32(settings.max_subdivisions)
-    pieces = np.where(wanted > 1.0, np.minimum(wanted, most), np.float32(1.0))
+    max_pieces = np.float32(settings.max_subdivisions)
+    pieces = np.where(wanted > 1.0, np.minimum(wanted, max_pieces), np.float32(1.0))
     return np.where(is_outside(control), 1, pieces).astype(np.int32)
 
 

@@ -43,7 +43,7 @@ SWEEPS = 2
 #: Lower limit of the squared sine of the angle between a segment and the way out in that move.
 STEEPEST = 0.5
 #: How much nearer than it should be a point may come before its strand is led out, as a fraction
-#: of `Clearance.kept`.
+#: of `Clearance.max_distance`.
 SLACK = 0.05
 #: A point that has to move by more than this fraction of its segment is not moved straight out:
 #: deep inside of a collider the way out may switch to another side.
@@ -51,8 +51,8 @@ DEEPEST = 0.5
 #: Number of directions tried for a segment that moving straight out does not lead out, and how
 #: often the turn towards the chosen one is bisected.
 TRIES, HALVINGS = 64, 5
-#: A point deeper than this in a distance field, as a fraction of `Clearance.kept`, is tested with
-#: the mesh itself.
+#: A point deeper than this in a distance field, as a fraction of `Clearance.max_distance`, is
+#: tested with the mesh itself.
 DEEP = 0.5
 #: A strand that is still stuck, as in a fold, is led again from its root, farther out by this
 #: fraction of its mean segment; maximum number of attempts.
@@ -101,14 +101,15 @@ class HeldParts:
 class Clearance:
     """The distance that strands keep from colliders while they are where their roots carry them.
 
-    kept: [m], the distance of points that were at least this far away when the motion began.
-    points: (point_count,) float32 [m], the distance of each point: `kept`, or less if it was nearer
-        when the motion began; -inf where it moves with its root.
+    max_distance: [m], the distance of points that were at least this far away when the motion
+        began.
+    points: (point_count,) float32 [m], the distance of each point: `max_distance`, or less if it
+        was nearer when the motion began; -inf where it moves with its root.
     held: (strand_count,) int32, the last point of each strand that moves with its root, because it
         is inside a distance field but outside the mesh; 0: only the root.
     """
 
-    kept: float
+    max_distance: float
     points: Floats
     held: Ints
     _held_parts: HeldParts | None = None
@@ -117,7 +118,7 @@ class Clearance:
         """The same, with strands moving with their roots at least up to these points (n,)."""
         held, owner = self.held.copy(), _owners(points, offsets)
         np.maximum.at(held, owner, (points - offsets[owner]).astype(np.int32))
-        return Clearance(self.kept, _free_up_to(held, self.points, offsets), held)
+        return Clearance(self.max_distance, _free_up_to(held, self.points, offsets), held)
 
     def held_parts(self, offsets: Ints) -> HeldParts:
         """The held parts of all strands; computed once, for the first `offsets`."""
@@ -130,7 +131,7 @@ class Clearance:
     def reach(self) -> Floats:
         """The distance below which each point may be too near, (point_count,) float32 [m]; -inf
         where it moves with its root."""
-        most = np.float32((1.0 - SLACK) * self.kept)
+        most = np.float32((1.0 - SLACK) * self.max_distance)
         return np.where(self.points == -np.inf, np.float32(-np.inf), most)
 
 
@@ -147,7 +148,7 @@ class Deflections:
     values: Floats
 
     @classmethod
-    def between(cls, strands: Ints, ridden: Floats, led: Floats, offsets: Ints) -> Deflections:
+    def from_points(cls, strands: Ints, ridden: Floats, led: Floats, offsets: Ints) -> Deflections:
         """Args:
         strands: (n,). ridden, led: (m, 3) their points where they ride, and where they were led to.
         """
@@ -157,16 +158,16 @@ class Deflections:
         values /= np.maximum(_size(_steps(ridden, begins)), np.float32(_TINY))[:, None]
         return cls(strands, values)._where(_size(values) > UPRIGHT, counts)
 
-    def after(self, duration: float, offsets: Ints) -> Deflections:
-        """The leans that are left after some time [s]."""
+    def decayed(self, duration: float, offsets: Ints) -> Deflections:
+        """The deflections that are left after some time [s]."""
         size, turned = _size(self.values), np.float32(TURNING_BACK * duration)
         left = self._where(size > turned, np.diff(offsets)[self.strands])
         size = np.maximum(_size(left.values), np.float32(_TINY))
-        kept = np.maximum(np.float32(1.0) - turned / size, np.float32(0.0))
-        return Deflections(left.strands, left.values * kept[:, None])
+        scale = np.maximum(np.float32(1.0) - turned / size, np.float32(0.0))
+        return Deflections(left.strands, left.values * scale[:, None])
 
     def _where(self, is_bent: Bools, counts: Ints) -> Deflections:
-        """The leans of strands that have a bent segment.
+        """The deflections of strands that have a bent segment.
 
         Args:
             is_bent: (m,). counts: (n,) point counts of the strands.
@@ -176,7 +177,7 @@ class Deflections:
         chosen = np.logical_or.reduceat(is_bent, piece_starts(counts))
         return Deflections(self.strands[chosen], self.values[np.repeat(chosen, counts)])
 
-    def bend(self, points: Floats, offsets: Ints) -> None:
+    def apply_to(self, points: Floats, offsets: Ints) -> None:
         """Bend strands, in place; segments keep their lengths. points: (point_count, 3), of all."""
         if not len(self.strands):
             return
@@ -200,19 +201,19 @@ class LedOut:
 
     strands: (n,) int32, ascending.
     points: (m, 3) float32 world [m], all of their points, strand by strand.
-    leans: how they were bent, where that is known.
+    deflections: how they were bent, where that is known.
     """
 
     strands: Ints
     points: Floats
-    leans: Deflections = NO_DEFLECTIONS
+    deflections: Deflections = NO_DEFLECTIONS
 
     @classmethod
     def of(
-        cls, strands: Ints, points: Floats, offsets: Ints, leans: Deflections = NO_DEFLECTIONS
+        cls, strands: Ints, points: Floats, offsets: Ints, deflections: Deflections = NO_DEFLECTIONS
     ) -> LedOut:
         """Take these strands from the points of all, (point_count, 3)."""
-        return cls(strands.astype(np.int32), points[point_indices(strands, offsets)], leans)
+        return cls(strands.astype(np.int32), points[point_indices(strands, offsets)], deflections)
 
     def fits(self, offsets: Ints) -> bool:
         """Whether strands and point counts match these offsets."""
@@ -230,7 +231,7 @@ NO_LED_OUT = LedOut(np.zeros(0, np.int32), np.zeros((0, 3), np.float32))
 
 
 def clearance_at(
-    points: Floats, offsets: Ints, colliders: Sequence[PosedCollider], kept: float
+    points: Floats, offsets: Ints, colliders: Sequence[PosedCollider], max_distance: float
 ) -> Clearance:
     """The clearance of a motion that begins now.
 
@@ -238,12 +239,12 @@ def clearance_at(
         points: (point_count, 3) world [m], strand by strand, where their roots carry them.
         offsets: (strand_count + 1,), strand s is points[offsets[s]:offsets[s + 1]].
         colliders: used in their poses at the frame's end.
-        kept: [m].
+        max_distance: [m].
     """
-    distance, _ = signed_distance(points, colliders, kept)
+    distance, _ = signed_distance(points, colliders, max_distance)
     distance[offsets[:-1]] = np.inf
-    none = Clearance(kept, distance, np.zeros(len(offsets) - 1, np.int32))
-    return none.holding(points_outside_meshes(points, distance, colliders, kept), offsets)
+    none = Clearance(max_distance, distance, np.zeros(len(offsets) - 1, np.int32))
+    return none.holding(points_outside_meshes(points, distance, colliders, max_distance), offsets)
 
 
 def _free_up_to(held: Ints, distance: Floats, offsets: Ints) -> Floats:
@@ -254,11 +255,11 @@ def _free_up_to(held: Ints, distance: Floats, offsets: Ints) -> Floats:
 
 
 def points_outside_meshes(
-    points: Floats, distance: Floats, colliders: Sequence[PosedCollider], kept: float
+    points: Floats, distance: Floats, colliders: Sequence[PosedCollider], max_distance: float
 ) -> Ints:
     """Which points (n, 3), at these distances (n,), lie deep inside a distance field but outside
     its mesh, (m,)."""
-    deep = (distance < -DEEP * kept).nonzero()[0]
+    deep = (distance < -DEEP * max_distance).nonzero()[0]
     chosen: Ints = deep[are_outside_meshes(points[deep], colliders)]
     return chosen
 
@@ -269,7 +270,7 @@ def lead_out(
     offsets: Ints,
     colliders: Sequence[PosedCollider],
     clearance: Clearance,
-    leans: Deflections = NO_DEFLECTIONS,
+    deflections: Deflections = NO_DEFLECTIONS,
 ) -> tuple[Ints, Deflections]:
     """Lead strands out of colliders, in place.
 
@@ -277,23 +278,23 @@ def lead_out(
         points: (point_count, 3) world [m], where strands ride.
         carry: where roots carry points.
         offsets, colliders: see `clearance_at`.
-        leans: those of the frame before, after `Leans.after`.
+        deflections: those of the frame before, after `Deflections.decayed`.
 
     Returns:
         The strands (n,) that are not where they ride, ascending; and how strands are bent.
     """
-    poses, kept = poses_at_end(colliders), clearance.kept
+    poses, max_distance = poses_at_end(colliders), clearance.max_distance
     held = _hold(points, carry, offsets, clearance)
-    leaning = point_indices(leans.strands, offsets)
+    leaning = point_indices(deflections.strands, offsets)
     upright = points[leaning]
-    leans.bend(points, offsets)
+    deflections.apply_to(points, offsets)
     index, distance, outward = nearer_than(points, poses, clearance.reach)
     owner = _owners(index, offsets)
     away = _size(points.take(index, axis=0) - carry(index, owner))
-    wanted = np.minimum(clearance.points.take(index) + away, np.float32(kept))
-    is_near = distance < wanted - np.float32(SLACK * kept)
+    wanted = np.minimum(clearance.points.take(index) + away, np.float32(max_distance))
+    is_near = distance < wanted - np.float32(SLACK * max_distance)
     strands, first = np.unique(owner[is_near], return_index=True)
-    bent = np.union1d(leans.strands, strands)
+    bent = np.union1d(deflections.strands, strands)
     every = point_indices(bent, offsets)
     ridden = points.take(every, axis=0)
     ridden[np.searchsorted(every, leaning)] = upright
@@ -301,10 +302,10 @@ def lead_out(
         first = is_near.nonzero()[0][first]
         found = index[first], distance[first], outward.T[first]
         near = _Near.of(strands, found, points, carry, offsets, clearance)
-        points[near.index], is_lost = _led(near, kept, poses)
+        points[near.index], is_lost = _led(near, max_distance, poses)
         lost = np.searchsorted(every, near.index[is_lost])
         ridden[lost] = points[every[lost]]  # so that they have no lean
-    return np.union1d(held, bent), Deflections.between(
+    return np.union1d(held, bent), Deflections.from_points(
         bent, ridden, points.take(every, axis=0), offsets
     )
 
@@ -392,7 +393,7 @@ class _Near:
             index,
             some.astype(np.float64),
             carried.astype(np.float64),
-            np.minimum(wanted, np.float32(clearance.kept)),
+            np.minimum(wanted, np.float32(clearance.max_distance)),
         )
 
     def part(self, chosen: Ints) -> _Near:
@@ -419,53 +420,55 @@ class _Near:
         return np.add.reduceat(length, self.begins) / (self.ends - self.begins - 1)
 
 
-def _led(near: _Near, kept: float, poses: Sequence[Pose]) -> tuple[Floats, Bools]:
+def _led(near: _Near, max_distance: float, poses: Sequence[Pose]) -> tuple[Floats, Bools]:
     """Where the points are led to, (m, 3), and which belong to strands that nothing leads out,
     (m,)."""
     count = len(near.begins)
-    led, lack = _led_by(near, np.zeros(count), np.full(count, SLACK * kept), kept, poses)
-    stuck = np.flatnonzero(lack > SLACK * kept)
+    led, lack = _led_by(
+        near, np.zeros(count), np.full(count, SLACK * max_distance), max_distance, poses
+    )
+    stuck = np.flatnonzero(lack > SLACK * max_distance)
     if len(stuck):
         # all further attempts at once: use the first that succeeds, or the last
         tries = np.tile(stuck, ATTEMPTS - 1)
         number = np.repeat(np.arange(1, ATTEMPTS), len(stuck))
         again = near.part(tries)
         farther = MARGIN * number * again.mean_segments
-        given_up = np.where(number == ATTEMPTS - 1, kept, SLACK * kept)
-        found, left_over = _led_by(again, farther, given_up, kept, poses)
-        is_out = (left_over <= SLACK * kept).reshape(ATTEMPTS - 1, -1)
+        max_lack = np.where(number == ATTEMPTS - 1, max_distance, SLACK * max_distance)
+        found, left_over = _led_by(again, farther, max_lack, max_distance, poses)
+        is_out = (left_over <= SLACK * max_distance).reshape(ATTEMPTS - 1, -1)
         is_out[-1] = True
         chosen = is_out.argmax(axis=0) * len(stuck) + np.arange(len(stuck))
         lack[stuck] = left_over[chosen]
         from_ = point_indices(chosen, np.append(again.begins, again.ends[-1:]))
         led[point_indices(stuck, np.append(near.begins, near.ends[-1:]))] = found[from_]
-    is_lost = np.repeat(lack > kept, near.ends - near.begins)
+    is_lost = np.repeat(lack > max_distance, near.ends - near.begins)
     return np.where(is_lost[:, None], near.carried, led), is_lost
 
 
 def _led_by(
-    near: _Near, farther: Floats, given_up: Floats, kept: float, poses: Sequence[Pose]
+    near: _Near, farther: Floats, max_lack: Floats, max_distance: float, poses: Sequence[Pose]
 ) -> tuple[Floats, Floats]:
     """One attempt: where the points are led to, (m, 3), and the largest remaining lack of distance
     of each strand, (n,) [m].
 
     Args:
         farther: (n,) [m] beyond the wanted distance that strands are led out.
-        given_up: (n,) [m], a strand that lacks more than this is led no further.
+        max_lack: (n,) [m], a strand that lacks more than this is led no further.
     """
-    walk = _Walk.of(near, farther, SLACK * kept, poses)
+    walk = _Walk.of(near, farther, SLACK * max_distance, poses)
     every = np.arange(len(farther))
     waiting: Ints = every[:0]
     if near.found is not None:
         waiting = walk.push(every, walk.goal[near.firsts] - near.found[0], near.found[1])
-    going = walk.underway(every, given_up)
+    going = walk.underway(every, max_lack)
     while len(going) + len(waiting):
         if len(waiting) > len(going):  # turns are expensive: many strands at once
             walk.turn(waiting)
-            going, waiting = np.append(going, walk.underway(waiting, given_up)), waiting[:0]
+            going, waiting = np.append(going, walk.underway(waiting, max_lack)), waiting[:0]
         else:
             stuck = walk.step(going)
-            going, waiting = walk.underway(going, given_up), np.append(waiting, stuck)
+            going, waiting = walk.underway(going, max_lack), np.append(waiting, stuck)
     return walk.led(), walk.worst
 
 
@@ -521,10 +524,10 @@ class _Walk:
             np.zeros(count),
         )
 
-    def underway(self, some: Ints, given_up: Floats) -> Ints:
+    def underway(self, some: Ints, max_lack: Floats) -> Ints:
         """Those of some strands that are neither finished, nor given up, nor waiting."""
         is_going = self.at[some] < self.near.ends[some]
-        is_going &= (self.worst[some] <= given_up[some]) & ~self.is_waiting[some]
+        is_going &= (self.worst[some] <= max_lack[some]) & ~self.is_waiting[some]
         return some[is_going]
 
     def step(self, going: Ints) -> Ints:

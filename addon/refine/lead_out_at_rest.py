@@ -41,21 +41,21 @@ def lead_out_at_rest(
         length: the hair's length [m]. Strands keep the distance from the head that moving hair of
             this length keeps by default.
     """
-    kept = DynamicsSettings().radius_root * length
+    max_distance = DynamicsSettings().radius_root * length
     posed = (PosedCollider(head, np.eye(4), np.eye(4)),)
     offsets, points = strands.offsets, strands.points.copy()
-    distance, _ = signed_distance(points, posed, kept)
+    distance, _ = signed_distance(points, posed, max_distance)
     along = arc_lengths(strands.points, offsets)
-    wanted = np.minimum(kept, LIFT * along).astype(np.float32)
+    wanted = np.minimum(max_distance, LIFT * along).astype(np.float32)
     wanted[offsets[:-1]] = -np.inf
-    beside = points_outside_meshes(points, distance, posed, kept)
+    beside = points_outside_meshes(points, distance, posed, max_distance)
     wanted[beside] = -np.inf
-    clearance = Clearance(kept, wanted, np.zeros(strands.strand_count, np.int32))
+    clearance = Clearance(max_distance, wanted, np.zeros(strands.strand_count, np.int32))
     carry = partial(_as_they_are, strands.points)
     lead_out(points, carry, offsets, posed, clearance)
     led = replace(strands, points=points)
     outside = beside[(points[beside] == strands.points[beside]).all(axis=1)]
-    return led, ~are_inside(led, head, DEEP * kept, outside)
+    return led, ~are_inside(led, head, DEEP * max_distance, outside)
 
 
 def are_inside(

@@ -62,9 +62,11 @@ class Riders:
     blocks: all strands, grouped by similar point counts, and where they ride.
     reach: (strand_count,) float32, the length of each centre line as a fraction of its strand's.
     segments_per_meter: (guide_count,) float32 [1/m], of each guide.
-    gives: (guide_count, cv_count - 1), which segments of guides are curls that may be drawn out;
+    can_extend: (guide_count, cv_count - 1), which segments of guides are curls that may be drawn
+        out;
         None: none.
-    are_lines: whether these strands are centre lines themselves, which stretch as their guides do.
+    are_center_lines: whether these strands are centre lines themselves, which stretch as their
+        guides do.
     """
 
     offsets: Ints
@@ -72,8 +74,8 @@ class Riders:
     blocks: tuple[tuple[Block, RidePositions], ...]
     reach: Floats
     segments_per_meter: Floats
-    gives: Bools | None = None
-    are_lines: bool = False
+    can_extend: Bools | None = None
+    are_center_lines: bool = False
 
     @classmethod
     def of(
@@ -93,13 +95,13 @@ class Riders:
         reach /= np.maximum(strands.lengths(), np.float32(SHORTEST))
         stations = _middles(strands.points, strands.offsets)
         stations *= np.repeat(reach, strands.point_counts)
-        gives = None if room is None else room > 0.0
+        can_extend = None if room is None else room > 0.0
         per_meter = per_meter.astype(np.float32)
         blocks = tuple(
             (block, RidePositions.of(block, stations, per_meter, weights, guides.shape[1] - 1))
             for block in blocks_of(strands.offsets)
         )
-        return cls(strands.offsets, weights, blocks, reach, per_meter, gives)
+        return cls(strands.offsets, weights, blocks, reach, per_meter, can_extend)
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,7 +177,9 @@ def ride(
         return moved
     turns = guide_turns(guide_rest, guide_now)
     table, is_small = _with_steps(turns.transpose(2, 1, 0)), (turns[3] > SMALL).all(axis=0)
-    axes = None if riders.gives is None else guide_axes(guide_rest, guide_now, riders.gives)
+    axes = (
+        None if riders.can_extend is None else guide_axes(guide_rest, guide_now, riders.can_extend)
+    )
     axes = None if axes is None else _with_steps(axes)
     shifts = np.asarray(guide_now[:, 0] - guide_rest[:, 0], np.float32)
     have_left = bool(shifts.any())
@@ -189,7 +193,7 @@ def ride(
             for guide, weight in zip(seats.guide, seats.weight, strict=True):
                 change[:, 0] += weight * shifts[guide].T
         wide = (~is_small[seats.guide].all(axis=0)).nonzero()[0]
-        change[:, 1:] = _turned(edge, riders.are_lines, seats, table, wide, axes)
+        change[:, 1:] = _turned(edge, riders.are_center_lines, seats, table, wide, axes)
         _sum(change)
         change += rest
         block.put(moved, change)
@@ -288,7 +292,7 @@ def _with_steps(values: Floats) -> Floats:
 
 def _turned(
     edge: Floats,
-    are_lines: bool,
+    are_center_lines: bool,
     seats: RidePositions,
     table: Floats,
     wide: Ints,
@@ -321,7 +325,7 @@ def _turned(
         blend[3][:, wide] += _dot(some, some) < REVERSED
     if axis is None or not axis[3].any():
         return turn_change(blend, edge)
-    drawn = edge * axis[3] if are_lines else drawn_out(edge, axis)
+    drawn = edge * axis[3] if are_center_lines else drawn_out(edge, axis)
     edge += drawn
     drawn += turn_change(blend, edge)
     return drawn

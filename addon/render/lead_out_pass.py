@@ -205,7 +205,7 @@ class LeadOutPass:
             self._textures["states"],
             kinds,
             {name: len(posed) for name in kinds.integers},
-            self._clearance.kept,
+            self._clearance.max_distance,
             min(TURNING_BACK * elapsed, _MAX_TURN_BACK),
             iterations <= _MAX_ITERATIONS,
         )

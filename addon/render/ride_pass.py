@@ -331,8 +331,8 @@ class RidePass:
         textures = self._textures
         textures["rest_points"] = texture_from(rest_points, "RGBA32F")
         points = _padded(self._guide_grid)
-        if self._riders.gives is not None:
-            points[:, :-1, 3] = self._riders.gives
+        if self._riders.can_extend is not None:
+            points[:, :-1, 3] = self._riders.can_extend
             textures["guide_axes"] = _empty(*self._guide_grid.shape[:2])
         textures["guide_points"] = texture_from(strand_rows(points), "RGBA32F")
         textures["guide_weights"] = texture_from(guide_weights, "RGBA32F")
@@ -352,7 +352,7 @@ class RidePass:
 
     def _run_guides(self, guides_now: Any) -> None:
         textures, count = self._textures, len(self._guides)
-        recipe = GUIDES_RECIPE if self._riders.gives is None else CURLED_GUIDES_RECIPE
+        recipe = GUIDES_RECIPE if self._riders.can_extend is None else CURLED_GUIDES_RECIPE
         shader = program(recipe)
         shader.bind(
             textures={
@@ -377,7 +377,7 @@ class RidePass:
         elapsed: float = np.inf,
     ) -> None:
         textures, count = self._textures, self._strands.strand_count
-        is_curled = self._riders.gives is not None and turns == "guide_turns"
+        is_curled = self._riders.can_extend is not None and turns == "guide_turns"
         inputs = self.lead_out.begin_frame(colliders, _ITERATIONS_PER_POINT, elapsed)
         ride_textures = _named(textures, "root_motions", "guide_weights", "strand_spans")
         images = {"cv_points": self.points.texture, **_named(textures, "rest_points")}

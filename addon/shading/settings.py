@@ -40,8 +40,8 @@ TRANSPARENCIES = (
     ("hashed", "Hashed", "Stochastic coverage: needs little memory, but is noisy"),
     ("none", "None", "Opaque strands with hard edges, never thinner than Minimum Width"),
 )
-_HAS_TIPS = when("shading.tip_tint", lack="needs Tip Tint")
-_HAS_DUST = when("shading.dust", lack="needs Dust")
+_HAS_TIPS = when("shading.tip_tint", unmet_reason="needs Tip Tint")
+_HAS_DUST = when("shading.dust", unmet_reason="needs Dust")
 _IS_MARSCHNER = when("shading.model", "marschner")
 _HAS_MELANIN = both(_IS_MARSCHNER, when("shading.pigment", "melanin"))
 _HAS_ABSORPTION = both(_IS_MARSCHNER, when("shading.pigment", "absorption"))
@@ -160,7 +160,7 @@ class SharedSettings(Settings):
         label="Brow Colour",
         description="Colour of natural brows and lashes without a colour of their own",
         panel="Tips & Brows",
-        active_when=when("shading.brow_source", "natural", lack="as the hair"),
+        active_when=when("shading.brow_source", "natural", unmet_reason="as the hair"),
     )
     wetness: float = number(
         0.0,

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 from ..params import Settings, both, choice, color, integer, number, toggle, when
 
-_IS_ON = when("shafts.use_shafts", lack="switched off")
+_IS_ON = when("shafts.use_shafts", unmet_reason="switched off")
 _NGUYEN = "Nguyen and Donnelly 2005, hair of Nalu"
-_FROM_LIGHTS = both(_IS_ON, when("shafts.source", "lights", "both", lack="bright alone"))
-_FROM_BRIGHT = both(_IS_ON, when("shafts.source", "bright", "both", lack="lights alone"))
+_FROM_LIGHTS = both(_IS_ON, when("shafts.source", "lights", "both", unmet_reason="bright alone"))
+_FROM_BRIGHT = both(_IS_ON, when("shafts.source", "bright", "both", unmet_reason="lights alone"))
 
 #: what throws shafts
 SOURCES = (
@@ -34,7 +34,7 @@ class ShaftSettings(Settings):
     help_page = "light_shafts"
     owner = "groom"
     panel_after = "shadows"
-    said_above = "In renders by Hairloom, and by EEVEE and Cycles with Hairloom Hair."
+    panel_note = "In renders by Hairloom, and by EEVEE and Cycles with Hairloom Hair."
     header_toggle = "use_shafts"
 
     use_shafts: bool = toggle(

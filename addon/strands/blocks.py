@@ -61,7 +61,7 @@ def blocks_of(offsets: Ints) -> Iterator[Block]:
     order = np.argsort(counts, kind="stable")
     sizes, first = counts[order], 0
     while first < len(order):
-        most = np.searchsorted(sizes, sizes[first] * _PADDING, side="right")
-        last = min(int(most), first + max(_POINTS // int(sizes[first]), 1))
+        similar_end = np.searchsorted(sizes, sizes[first] * _PADDING, side="right")
+        last = min(int(similar_end), first + max(_POINTS // int(sizes[first]), 1))
         yield Block.of(order[first:last], offsets)
         first = last

@@ -14,13 +14,13 @@ from .strand_set import DEFAULT_RADIUS, StrandSet
 
 #: Shortest usable strand as a fraction of its distance from the origin: below it float32 resolves
 #: no direction.
-SHORTEST_STRAND = 1.0e-6
+MIN_RELATIVE_LENGTH = 1.0e-6
 #: A radius larger than the median by this factor is a broken number.
-_STRAY = 100.0
+_MAX_RADIUS_RATIO = 100.0
 #: Radius given to pointed tips, as a fraction of the median: a fibre needs some width.
-_POINTED = 1.0e-3
+_POINTED_RADIUS = 1.0e-3
 #: A coordinate beyond this is a broken number, whatever the size of the hair [m].
-FARTHEST_POINT = 1.0e6
+MAX_COORDINATE = 1.0e6
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ def clean(
     counts = np.diff(offsets)
     curve_count = len(counts)
     color = None if color is None else usable_colors(color, offsets)
-    if not unfit and radius is not None and _are_sound(points, offsets, radius, root_uv):
+    if not unfit and radius is not None and _are_clean(points, offsets, radius, root_uv):
         group = np.zeros(curve_count, np.int32) if group is None else group
         strands = StrandSet(points, offsets, radius, group, root_uv, color=color, seed=seed)
         return Cleaned(strands, {}, np.arange(curve_count))
@@ -72,7 +72,7 @@ def clean(
         "fewer than two points": counts < 2,
         "a point that is not finite": _any_per_curve(~np.isfinite(points).all(axis=1), offsets),
         "a point farther than 1,000 km away": _any_per_curve(
-            (np.abs(points) > FARTHEST_POINT).any(axis=1), offsets
+            (np.abs(points) > MAX_COORDINATE).any(axis=1), offsets
         ),
         "no length": _no_length(points, offsets),
     }
@@ -99,20 +99,20 @@ def clean(
     return Cleaned(strands, dropped, kept)
 
 
-def _are_sound(points: Floats, offsets: Ints, radius: Floats, root_uv: Floats | None) -> bool:
+def _are_clean(points: Floats, offsets: Ints, radius: Floats, root_uv: Floats | None) -> bool:
     """Whether nothing needs to be dropped or replaced, as is usual; False may be a false alarm."""
     if len(offsets) < 2 or np.diff(offsets).min() < 2:
         return False
     # a sum of squares is finite, or below a limit, only if each of the squares is
-    if not np.vdot(points, points) < FARTHEST_POINT**2 or np.min(radius) <= 0.0:
+    if not np.vdot(points, points) < MAX_COORDINATE**2 or np.min(radius) <= 0.0:
         return False
-    if np.max(radius) > _STRAY * np.min(radius):
+    if np.max(radius) > _MAX_RADIUS_RATIO * np.min(radius):
         return False
     others = [radius] if root_uv is None else [radius, root_uv]
     if not all(np.isfinite(np.vdot(each, each)) for each in others):
         return False
     reach = points[offsets[1:] - 1] - points[offsets[:-1]]
-    shortest = SHORTEST_STRAND * float(np.abs(points).max())
+    shortest = MIN_RELATIVE_LENGTH * float(np.abs(points).max())
     return bool((np.einsum("ij,ij->i", reach, reach) >= 3.0 * shortest**2).all())
 
 
@@ -130,7 +130,7 @@ def _no_length(points: Floats, offsets: Ints) -> Bools:
         finite = np.nan_to_num(points, nan=0.0, posinf=0.0, neginf=0.0)
         box[filled] = np.maximum.reduceat(finite, starts) - np.minimum.reduceat(finite, starts)
         away[filled] = np.maximum.reduceat(np.abs(finite), starts)
-    return (box <= SHORTEST_STRAND * away.max(axis=1, keepdims=True)).all(axis=1)
+    return (box <= MIN_RELATIVE_LENGTH * away.max(axis=1, keepdims=True)).all(axis=1)
 
 
 def _usable_radius(radius: Floats | None, offsets: Ints) -> Floats:
@@ -139,8 +139,10 @@ def _usable_radius(radius: Floats | None, offsets: Ints) -> Floats:
     radius = np.asarray(radius, np.float32)
     is_width = are_valid_widths(radius, offsets)
     is_positive = is_width & (radius > 0.0)
-    known = _middle(radius[is_positive]) if is_positive.any() else np.float32(DEFAULT_RADIUS)
-    return np.where(is_positive, radius, np.where(is_width, known * np.float32(_POINTED), known))
+    known = _upper_median(radius[is_positive]) if is_positive.any() else np.float32(DEFAULT_RADIUS)
+    return np.where(
+        is_positive, radius, np.where(is_width, known * np.float32(_POINTED_RADIUS), known)
+    )
 
 
 def are_valid_widths(radius: Floats, offsets: Ints) -> Bools:
@@ -154,12 +156,12 @@ def are_valid_widths(radius: Floats, offsets: Ints) -> Bools:
     """
     is_width: Bools = np.isfinite(radius) & (radius > 0.0)
     if is_width.any():
-        is_width &= radius <= _STRAY * _middle(radius[is_width])
+        is_width &= radius <= _MAX_RADIUS_RATIO * _upper_median(radius[is_width])
     has_others = np.repeat(_any_per_curve(is_width, offsets), np.diff(offsets))
     return is_width | (has_others & (radius == 0.0))
 
 
-def _middle(values: Floats) -> Floats:
+def _upper_median(values: Floats) -> Floats:
     """The median; the larger of the two middle values if their number is even."""
     half = len(values) // 2
     middle: Floats = np.partition(values, half)[half]

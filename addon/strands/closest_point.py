@@ -29,9 +29,9 @@ _PAIR_LIMIT = 2_000_000
 #: Pairs of points and their cluster's triangles measured at once.
 _PAIRS = 1 << 16
 #: Clusters pay off from this many points each on average, and up to this many candidate triangles.
-_WORTHWHILE, _CROWDED = 3, 512
+_MIN_POINTS_PER_CLUSTER, _MAX_CANDIDATES = 3, 512
 #: Factor of distances that makes up for rounding, so that no triangle is missed.
-_HAIR = 1.0 + 1.0e-9
+_ROUNDING_FACTOR = 1.0 + 1.0e-9
 
 
 @dataclass(frozen=True)
@@ -130,14 +130,14 @@ class ClosestPointSearch:
 
     def _nearest(self, points: Floats, reach: float) -> Ints:
         """The nearest triangle of each point, using clusters if that saves work."""
-        if len(points) < _WORTHWHILE:
+        if len(points) < _MIN_POINTS_PER_CLUSTER:
             return self._search_all(points, reach)
         clusters = clustered(points, self._size)
-        if len(points) < _WORTHWHILE * len(clusters.middle):
+        if len(points) < _MIN_POINTS_PER_CLUSTER * len(clusters.middle):
             return self._search_all(points, reach)
         nearest = self._search_all(clusters.middle, reach + float(clusters.radius.max()))
         candidates = self._candidates(clusters, nearest, reach)
-        is_crowded = (candidates.count > _CROWDED)[clusters.cluster]
+        is_crowded = (candidates.count > _MAX_CANDIDATES)[clusters.cluster]
         found = np.empty(len(points), np.int64)
         alone, together = np.flatnonzero(is_crowded), np.flatnonzero(~is_crowded)
         found[clusters.order[together]] = self._of_clusters(
@@ -157,16 +157,20 @@ class ClosestPointSearch:
         triangles = self.tree.leaf_triangles
         leaf = triangles[self.tree.nearest_leaf(points)]
         best = _Best(np.full(len(points), np.inf), leaf[:, 0].astype(np.int64))
-        self._improve(best, points, *_each(np.arange(len(points)), leaf))
+        self._improve(best, points, *_point_triangle_pairs(np.arange(len(points)), leaf))
         # slightly more than the reach, so that rounding loses no point at its edge
-        within = np.minimum(best.distance, reach * reach * _HAIR)
+        within = np.minimum(best.distance, reach * reach * _ROUNDING_FACTOR)
         for point, leaf, gap in self._near_leaves(points, within):
             # the nearest box first: its triangles rule out most of the others
-            nearest = _first_least(point, gap)
-            self._improve(best, points, *_each(point[nearest], triangles[leaf[nearest]]))
+            nearest = _first_minimum_rows(point, gap)
+            self._improve(
+                best, points, *_point_triangle_pairs(point[nearest], triangles[leaf[nearest]])
+            )
             is_near = gap < best.distance[point]
             is_near[nearest] = False
-            self._improve(best, points, *_each(point[is_near], triangles[leaf[is_near]]))
+            self._improve(
+                best, points, *_point_triangle_pairs(point[is_near], triangles[leaf[is_near]])
+            )
         return best.triangle
 
     def _near_leaves(
@@ -188,12 +192,12 @@ class ClosestPointSearch:
         """The candidates of each cluster, without the triangle that is nearest to its middle."""
         middle, radius = clusters.middle, clusters.radius
         away = np.sqrt(self._forms.squared_distance(middle, nearest))
-        within = np.minimum(away + 2.0 * radius, reach + radius) * _HAIR
+        within = np.minimum(away + 2.0 * radius, reach + radius) * _ROUNDING_FACTOR
         found = []
         for start in range(0, len(middle), _CHUNK):
             part = slice(start, start + _CHUNK)
             for near, leaf, _ in self._near_leaves(middle[part], within[part] ** 2):
-                near, triangle = _each(near, self.tree.leaf_triangles[leaf])
+                near, triangle = _point_triangle_pairs(near, self.tree.leaf_triangles[leaf])
                 cluster = near + start
                 far = np.sqrt(self._forms.squared_distance(middle.take(cluster, axis=0), triangle))
                 is_near = (far <= within[cluster]) & (triangle != nearest[cluster])
@@ -227,7 +231,7 @@ class ClosestPointSearch:
             point = np.repeat(np.arange(len(here)), count)
             pair = np.arange(len(point)) + np.repeat(first - piece_starts(count), count)
             so_far = np.minimum(np.sqrt(best.distance), reach) + clusters.away[part]
-            is_near = candidates.away[pair] <= (so_far * _HAIR)[point]
+            is_near = candidates.away[pair] <= (so_far * _ROUNDING_FACTOR)[point]
             self._improve(best, here, point[is_near], candidates.triangle[pair[is_near]])
             found.append(best.triangle)
         return np.concatenate(found)
@@ -277,7 +281,7 @@ def closest_point(points: Floats, surface: Surface) -> ClosestPoints:
     return search_of(surface).closest(points)
 
 
-def _first_least(point: Ints, value: Floats) -> Ints:
+def _first_minimum_rows(point: Ints, value: Floats) -> Ints:
     """The row of the first minimum value of each point; rows ascend by point."""
     first = np.flatnonzero(np.diff(point, prepend=-1))
     if not len(first):
@@ -287,7 +291,7 @@ def _first_least(point: Ints, value: Floats) -> Ints:
     return is_least[np.flatnonzero(np.diff(point[is_least], prepend=-1))]
 
 
-def _each(point: Ints, triangles: Ints) -> tuple[Ints, Ints]:
+def _point_triangle_pairs(point: Ints, triangles: Ints) -> tuple[Ints, Ints]:
     """Pairs of point (n,) and each of its triangles (n, width)."""
     return np.repeat(point, triangles.shape[1]), triangles.ravel()
 

@@ -14,7 +14,7 @@ from .triangles import area_vectors
 #: Segments processed at once, and the maximum number of their pairs with boxes.
 _CHUNK, _PAIR_LIMIT = 1 << 14, 100_000
 #: Factor of the squared reach that makes up for rounding, so that no triangle is missed.
-_HAIR = 1.0 + 1.0e-6
+_ROUNDING_FACTOR = 1.0 + 1.0e-6
 #: A crossing within this fraction of a line's first segment means that it begins on the surface.
 _AT_START = 1.0e-4
 
@@ -49,7 +49,7 @@ def _near(
 ) -> Iterator[tuple[Ints, Ints]]:
     """Chunks of the pairs of segment and triangle that may meet."""
     middle, half = 0.5 * (start[some] + end[some]), 0.5 * (end[some] - start[some])
-    within = np.einsum("ij,ij->i", half, half) * _HAIR + 1.0e-30
+    within = np.einsum("ij,ij->i", half, half) * _ROUNDING_FACTOR + 1.0e-30
     found = tree.leaves_within(middle, within, _PAIR_LIMIT)
     if found is None:
         for part in np.array_split(some, 2):

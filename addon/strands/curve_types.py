@@ -40,7 +40,7 @@ class KnotMode(IntEnum):
 _ROUNDING = 2.0 / 27.0
 #: A polygon may be rounded by this fraction of its length. So hair keeps its points after Blender's
 #: Resample Curve, which makes polygons of all curves.
-_ROUNDED = 2.0e-3
+_MAX_ROUNDING = 2.0e-3
 #: Maximum number of pieces that a segment of a polygon is cut into.
 _MAX_PIECES = 64
 
@@ -67,7 +67,7 @@ class CurveShapes:
 
 
 @dataclass(frozen=True, eq=False)
-class _Alike:
+class _CurveBatch:
     """Curves that are evaluated by the same matrix.
 
     inner: (n, count) indices of control points. outer: (n, samples) indices of evaluated points.
@@ -98,7 +98,7 @@ class EvaluatedCurves:
 
     points: Floats
     offsets: Ints
-    _parts: tuple[_Alike, ...]
+    _parts: tuple[_CurveBatch, ...]
 
     def of(self, values: Floats) -> Floats:
         """Values at these points, (point_count, ...) float32, from those at control points."""
@@ -136,7 +136,7 @@ def evaluate_curves(points: Floats, offsets: Ints, shapes: CurveShapes) -> Evalu
         inner_rows = offsets[chosen, None] + np.arange(row[1])
         outer_rows = outer[chosen, None] + np.arange(len(mix))
         weight = shapes.weight[inner_rows] if row[0] == CurveType.NURBS else None
-        part = _Alike(inner_rows, outer_rows, mix, weight)
+        part = _CurveBatch(inner_rows, outer_rows, mix, weight)
         parts.append(part)
         if row[0] == CurveType.BEZIER and row[1] > 1:
             found[outer_rows] = _bezier(points, shapes, inner_rows, row[2])
@@ -163,7 +163,7 @@ def _pieces(points: Floats, offsets: Ints) -> Ints:
         edge /= np.maximum(length, 1.0e-30)[..., None]
         corner = np.linalg.norm(np.diff(edge, axis=1), axis=2)
         beside = np.maximum(length[:, 1:], length[:, :-1])
-        allowed = _ROUNDED * np.maximum(length.sum(axis=1), 1.0e-30)
+        allowed = _MAX_ROUNDING * np.maximum(length.sum(axis=1), 1.0e-30)
         needed = _ROUNDING * (corner * beside).max(axis=1) / allowed
         found[chosen] = np.ceil(np.nan_to_num(needed, posinf=1.0)).clip(1, _MAX_PIECES)
     return found

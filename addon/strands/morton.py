@@ -17,8 +17,8 @@ def morton_code(points: Floats) -> Ints:
     if not len(points):
         return code
     low, high = points.min(axis=0), points.max(axis=0)
-    most = (1 << _BITS) - 1
-    cells = ((points - low) / max(float((high - low).max()), 1e-30) * most).astype(np.int64)
+    max_cell = (1 << _BITS) - 1
+    cells = ((points - low) / max(float((high - low).max()), 1e-30) * max_cell).astype(np.int64)
     for bit in range(_BITS):
         for axis in range(3):
             code |= ((cells[:, axis] >> bit) & 1) << (3 * bit + axis)

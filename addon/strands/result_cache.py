@@ -22,7 +22,7 @@ from .parallel import even_slices, parallel_map
 _FACTORS = np.random.default_rng(7).integers(0, 1 << 63, 1 << 13, np.uint64) * 2 + 1
 
 #: Minimum number of rows per thread.
-_OF_THREAD = 2048
+_MIN_ROWS_PER_THREAD = 2048
 
 type Rows = tuple[Any, ...]
 
@@ -36,8 +36,8 @@ class ResultCache:
 
     def __init__(self, *, is_disabled: bool = False) -> None:
         self._is_disabled = is_disabled
-        self._rows: dict[str, _MadeRows] = {}
-        self._nearest: dict[str, _Nearest] = {}
+        self._rows: dict[str, _LastRows] = {}
+        self._nearest: dict[str, _LastNearest] = {}
 
     def rows(
         self, name: str, fixed: tuple[Any, ...], rows: Rows, make: Callable[[Ints], Rows]
@@ -54,14 +54,14 @@ class ResultCache:
                 result must not be changed afterwards.
         """
         if self._is_disabled:
-            return _made(make, np.arange(len(rows[0])))
+            return _compute(make, np.arange(len(rows[0])))
         bits = np.concatenate([_bits(each) for each in rows], axis=1)
         last = self._rows.get(name)
         if last is None or last.fixed != fixed or last.bits.shape[1] != bits.shape[1]:
-            made = _made(make, np.arange(len(bits)))
+            made = _compute(make, np.arange(len(bits)))
         else:
-            made = last.made_of(bits, make)
-        self._rows[name] = _MadeRows(fixed, bits, made)
+            made = last.rows_for(bits, make)
+        self._rows[name] = _LastRows(fixed, bits, made)
         return made
 
     def nearest(self, name: str, places: Floats, among: Floats, count: int) -> tuple[Ints, Floats]:
@@ -70,10 +70,10 @@ class ResultCache:
             return nearest_points(places, among, count)
         last = self._nearest.get(name)
         if last is not None and count == last.count <= min(len(among), len(last.among)):
-            index, distance = last.again(places, among)
+            index, distance = last.updated(places, among)
         else:
             index, distance = nearest_points(places, among, count)
-        self._nearest[name] = _Nearest(places, among, count, index, distance)
+        self._nearest[name] = _LastNearest(places, among, count, index, distance)
         return index.copy(), distance.copy()
 
 
@@ -81,7 +81,7 @@ NO_CACHE = ResultCache(is_disabled=True)
 
 
 @dataclass(frozen=True, eq=False)
-class _MadeRows:
+class _LastRows:
     """The last call of `ResultCache.rows`.
 
     fixed: see there. bits: (n, width) uint32, the input rows. made: the result, arrays (n, ...).
@@ -91,21 +91,21 @@ class _MadeRows:
     bits: Ints
     made: Rows
 
-    def made_of(self, bits: Ints, make: Callable[[Ints], Rows]) -> Rows:
+    def rows_for(self, bits: Ints, make: Callable[[Ints], Rows]) -> Rows:
         """The result for these rows: the kept one for known rows, computed for new ones."""
-        found = _found(bits, self.bits)
+        found = _row_indices(bits, self.bits)
         missing = np.flatnonzero(found < 0)
         if not len(missing) and np.array_equal(found, np.arange(len(self.bits))):
             return self.made
         result = tuple(each[found] for each in self.made)
         if len(missing):
-            for whole, part in zip(result, _made(make, missing), strict=True):
+            for whole, part in zip(result, _compute(make, missing), strict=True):
                 whole[missing] = part
         return result
 
 
 @dataclass(frozen=True, eq=False)
-class _Nearest:
+class _LastNearest:
     """The last call of `ResultCache.nearest`, and its result."""
 
     places: Floats
@@ -114,10 +114,13 @@ class _Nearest:
     index: Ints
     distance: Floats
 
-    def again(self, places: Floats, among: Floats) -> tuple[Ints, Floats]:
+    def updated(self, places: Floats, among: Floats) -> tuple[Ints, Floats]:
         """The result for these, searched again where the place is new, where one of its nearest
         points is gone, and where a new point is at least as near as the last of them."""
-        place, point = _found(_bits(places), _bits(self.places)), _back(among, self.among)
+        place, point = (
+            _row_indices(_bits(places), _bits(self.places)),
+            _indices_of_earlier(among, self.among),
+        )
         if point is None:
             return nearest_points(places, among, self.count)
         index, distance = point[self.index[place]], self.distance[place]
@@ -135,9 +138,11 @@ class _Nearest:
         return index, distance
 
 
-def _made(make: Callable[[Ints], Rows], rows: Ints) -> Rows:
+def _compute(make: Callable[[Ints], Rows], rows: Ints) -> Rows:
     """The result of `make` for these rows, computed in several threads."""
-    parts = parallel_map(lambda some: make(rows[some]), even_slices(len(rows), _OF_THREAD))
+    parts = parallel_map(
+        lambda some: make(rows[some]), even_slices(len(rows), _MIN_ROWS_PER_THREAD)
+    )
     if len(parts) == 1:
         return parts[0]
     return tuple(np.concatenate(each) for each in zip(*parts, strict=True))
@@ -145,16 +150,16 @@ def _made(make: Callable[[Ints], Rows], rows: Ints) -> Rows:
 
 def find_rows(rows: Any, among: Any) -> Ints:
     """The index of each row (n, ...) among others (m, ...), compared bit by bit, (n,); -1: none."""
-    return _found(_bits(rows), _bits(among))
+    return _row_indices(_bits(rows), _bits(among))
 
 
-def _back(among: Floats, before: Floats) -> Ints | None:
+def _indices_of_earlier(among: Floats, before: Floats) -> Ints | None:
     """The index among the points (n, 3) of each earlier point (m, 3), (m,); -1: none.
 
     None if points coincide or have changed their order: then ties between equally near points may
     be resolved differently.
     """
-    found = _found(_bits(among), _bits(before))
+    found = _row_indices(_bits(among), _bits(before))
     known = np.flatnonzero(found >= 0)
     if (np.diff(found[known]) <= 0).any():
         return None
@@ -163,7 +168,7 @@ def _back(among: Floats, before: Floats) -> Ints | None:
     return back
 
 
-def _found(bits: Ints, among: Ints) -> Ints:
+def _row_indices(bits: Ints, among: Ints) -> Ints:
     """The index of each row (n, width) among others (m, width), (n,); -1: none."""
     found = np.full(len(bits), -1)
     if bits.shape == among.shape:

@@ -38,12 +38,12 @@ class RootMotions:
             rows: (3, n) one point of each strand, or (3, m, n) m points of each.
             strands: (n,) the strand of each column.
         """
-        of = self.of(strands, rows.ndim)
-        local = rows - of.origin
-        result = of.turn[:, 0] * local[0]
-        result += of.shift
+        motions = self.take(strands, rows.ndim)
+        local = rows - motions.origin
+        result = motions.turn[:, 0] * local[0]
+        result += motions.shift
         for axis in (1, 2):
-            result += of.turn[:, axis] * local[axis]
+            result += motions.turn[:, axis] * local[axis]
         return result
 
     def carried(self, points: Floats, index: Ints, strands: Ints) -> Floats:
@@ -56,7 +56,7 @@ class RootMotions:
         rest = points.take(index, axis=0)
         return rest + self.change(np.ascontiguousarray(rest.T), strands).T
 
-    def of(self, strands: Ints | slice, dimensions: int = 2) -> RootMotions:
+    def take(self, strands: Ints | slice, dimensions: int = 2) -> RootMotions:
         """The motions of some strands, shaped to broadcast over arrays of 2 or 3 dimensions."""
         found = []
         for values in (self.turn, self.shift, self.origin):

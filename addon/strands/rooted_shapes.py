@@ -17,7 +17,7 @@ from .surface import Surface
 from .vectors import unit, unit_or
 
 #: A root farther than this from every triangle of the UV map, in UV, lies on none of them.
-_OFF_THE_MAP = 0.01
+_MAX_UV_DISTANCE = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +83,7 @@ def _at(uv: Floats, surface: Surface) -> tuple[Ints, Floats]:
     places = np.zeros((len(uv), 3), np.float32)
     places[:, :2] = uv
     found = surface.compute_once(_search_of_map).closest(places)
-    if len(uv) and found.distance.max() > _OFF_THE_MAP:
+    if len(uv) and found.distance.max() > _MAX_UV_DISTANCE:
         raise HairloomError(
             "its UV map has no face where hair is to grow",
             place="head",

@@ -42,7 +42,7 @@ def draw_section(
         if parameter.panel != panel or is_elsewhere or not is_shown:
             continue
         own, condition = column.column(), parameter.active_when
-        lack = "" if condition is None or condition(sections) else condition.lack(sections)
+        lack = "" if condition is None or condition(sections) else condition.unmet_reason(sections)
         own.active = not lack
         if parameter.kind == "curve":
             _draw_curve(own, group, parameter, lack)

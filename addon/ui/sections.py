@@ -56,8 +56,8 @@ def _panel(section: str, panel: str = "") -> Draw:
     owner, switch = _OWNERS[settings.owner], {settings.header_toggle}
 
     def draw(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
-        if settings.said_above and not panel:
-            draw_lines(layout.column(align=True), bpy.context, settings.said_above)
+        if settings.panel_note and not panel:
+            draw_lines(layout.column(align=True), bpy.context, settings.panel_note)
         draw_section(layout, owner(hair), section, panel, leave_out=switch)
 
     return draw

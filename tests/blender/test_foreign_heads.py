@@ -501,10 +501,10 @@ def test_a_warp_moves_landmarks_to_their_targets_and_leaves_far_points() -> None
     random = np.random.default_rng(2)
     source = random.uniform(-0.1, 0.1, (12, 3))
     wanted = source + random.normal(0.0, 0.004, source.shape)
-    warp = Warp(np.eye(4)).bending(source, wanted, 0.3, 0.0)
+    warp = Warp(np.eye(4)).with_bend(source, wanted, 0.3, 0.0)
     assert np.abs(warp(source) - wanted).max() < 1e-9
     assert np.abs(warp(source + 5.0) - source - 5.0).max() == 0.0
-    bent = warp.bending(wanted, source, 0.3, 0.0)  # the inverse warp
+    bent = warp.with_bend(wanted, source, 0.3, 0.0)  # the inverse warp
     assert np.abs(bent(source) - source).max() < 1e-9
 
 

@@ -130,7 +130,7 @@ def test_no_reason_is_cut(extension):
     for settings in ALL_SETTINGS.values():
         for parameter in settings.parameters():
             condition = parameter.active_when
-            lack = "" if condition is None else condition.lack(defaults)
+            lack = "" if condition is None else condition.unmet_reason(defaults)
             wide = blf.dimensions(0, lack)[0]
             is_beside = parameter.kind in {"color", "choice"}
             if wide > (IN_FIELD * 0.75 if is_beside else IN_FIELD):

@@ -66,7 +66,7 @@ def with_held(clearance: Clearance, offsets: np.ndarray) -> Clearance:
     held = held.astype(np.int32)
     number = np.arange(len(clearance.points)) - np.repeat(offsets[:-1], counts)
     is_held = number <= np.repeat(held, counts)
-    return Clearance(clearance.kept, np.where(is_held, -np.inf, clearance.points), held)
+    return Clearance(clearance.max_distance, np.where(is_held, -np.inf, clearance.points), held)
 
 
 @pytest.mark.parametrize(

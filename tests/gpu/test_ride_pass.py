@@ -292,7 +292,7 @@ def test_curls_are_drawn_out_as_in_numpy() -> None:
     expected = motion_flow.strands_at(rig, pose, now.astype(np.float32))
     found = shown(ride, pose, now.astype(np.float32))
     assert np.abs(found - expected).max() < 2.0 * TOLERANCE
-    plain = replace(rig.riders, gives=None)
+    plain = replace(rig.riders, can_extend=None)
     other = type(ride)(rig.strands, None, rig.guides, rig.guide_grid, plain)
     assert np.abs(shown(other, pose, now.astype(np.float32)) - found).max() > 0.02
     ride.carry(None, matrix)
@@ -331,18 +331,18 @@ def test_strands_that_ride_are_led_out(monkeypatch: pytest.MonkeyPatch, rounds: 
     shift = motion_flow.carried_strands(rig, pose) - motion_flow.strands_at(rig, pose, guides)
     assert np.abs(shift[is_held]).max() > 0.01
 
-    # each frame starts from the leans of the one before
+    # each frame starts from the deflections of the one before
     along = np.linspace(0.0, 1.0, guides.shape[1])[:, None]
     for frame in (1.0, 2.0, 3.0):
         moved = guides + frame * np.float32([0.0, 0.004, 0.0]) * along
-        after = replace(motion, guides=moved, hair_time=1.0 / 60.0, leans=led.leans)
+        after = replace(motion, guides=moved, hair_time=1.0 / 60.0, deflections=led.deflections)
         expected, led = motion_flow.strands_and_led(rig, after)
         ride.ride(pose.head_positions, pose.matrix, moved, None, posed, elapsed=1.0 / 60.0)
         found = ride.read_led()
         assert len(np.setxor1d(found.strands, led.strands)) <= 3, "rounding decides few"
         off = np.abs(ride.read() - expected).max(axis=1)
         assert (np.maximum.reduceat(off, offsets[:-1]) > TOLERANCE).mean() < 0.05
-    forgotten = motion_flow.strands_and_led(rig, replace(after, leans=NO_DEFLECTIONS))[0]
+    forgotten = motion_flow.strands_and_led(rig, replace(after, deflections=NO_DEFLECTIONS))[0]
     is_other = np.abs(expected - forgotten).max(axis=1) > 10.0 * TOLERANCE
     assert np.maximum.reduceat(is_other, offsets[:-1]).mean() > 0.1
     # after a jump to this frame there is no memory

@@ -151,7 +151,7 @@ def _on_head(
     rests, is_deformed_only = read_rest_surfaces(head_of(hair), depsgraph, head)
     # subdivision moves the surface too, but that is not a pose
     min_distance = DEFORMED if is_deformed_only else LOOSE_DISTANCE
-    found = RestHair.found(strands, rests, head, min_distance)
+    found = RestHair.find(strands, rests, head, min_distance)
     return (strands, None) if found is None else (found.on(head), found)
 
 

@@ -31,7 +31,7 @@ class Solid:
     def has_inside(self, roots: Floats) -> Bools:
         return np.asarray(np.abs(winding_number(roots, self.surface)) > 0.5)
 
-    def left_at(self, lines: Floats) -> Floats:
+    def exit_positions(self, lines: Floats) -> Floats:
         return first_crossings(lines, self.surface)
 
 

@@ -178,7 +178,7 @@ class GroomSource:
         if start is None or head is None or self.head is None or baked.rest_matrices.head is None:
             return strands, None
         start = start.transformed(baked.rest_matrices.head @ np.linalg.pinv(self.head.rest))
-        rest = RestHair.found(strands, [start], head)
+        rest = RestHair.find(strands, [start], head)
         return (strands, None) if rest is None else (rest.on(head), rest)
 
     def has_changed_head(self) -> bool:
@@ -274,7 +274,7 @@ class GroomSource:
         if source.rest is not None:
             return replace(source.rest, strands=read).on(source.head)
         now = self._head_now(source.head, depsgraph)
-        found = None if now is None else RestHair.found(read, [now], source.head)
+        found = None if now is None else RestHair.find(read, [now], source.head)
         return read if found is None else found.on(source.head)
 
     def _head_now(self, rest: Surface, depsgraph: bpy.types.Depsgraph) -> Surface | None:

@@ -11,7 +11,8 @@ from ...params import Settings, either, number, when
 _MARSCHNER = "Marschner et al. 2003"
 _WIDEST = float(np.radians(60.0))
 _HAS_NO_SCATTERING = either(
-    when("volume.shadows", "none", lack="Scattering is on"), when("volume.scattering", False)
+    when("volume.shadows", "none", unmet_reason="Scattering is on"),
+    when("volume.scattering", False),
 )
 
 
@@ -210,5 +211,5 @@ class MarschnerSettings(Settings):
         source="Scheuermann 2004, highlights attenuated by the diffuse bias",
         shown_when=when("shading.model", "marschner"),
         panel="Light",
-        active_when=when("volume.shadows", "none", lack="Shadows are on"),
+        active_when=when("volume.shadows", "none", unmet_reason="Shadows are on"),
     )

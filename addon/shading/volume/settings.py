@@ -15,8 +15,8 @@ SHADOWS = (
     ("slices", "Opacity Slices", "Evenly spaced slices through the hair"),
     ("none", "None", "No shadows; ambient occlusion replaces them"),
 )
-_CAN_SCATTER = when("shading.model", "marschner", lack="needs Marschner")
-_SCATTERS = both(_CAN_SCATTER, when("volume.scattering", lack="needs Scattering"))
+_CAN_SCATTER = when("shading.model", "marschner", unmet_reason="needs Marschner")
+_SCATTERS = both(_CAN_SCATTER, when("volume.scattering", unmet_reason="needs Scattering"))
 
 
 @dataclass(frozen=True, kw_only=True)

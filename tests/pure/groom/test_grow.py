@@ -241,7 +241,7 @@ def test_hair_bridges_hollows_and_lies_over_bumps() -> None:
     grid = np.stack([np.stack([along, np.zeros(16), each], axis=1) for each in height])
     nothing = np.zeros((2, 15))
     plan = grow_module._Plan(nothing, nothing, GrowthSurface(plane, reach=0.05, cell=0.004))
-    hollow, bump = grow_module._taut(grid, plan)[..., 2]
+    hollow, bump = grow_module._stretched_over_hollows(grid, plan)[..., 2]
     # the first segment keeps its direction from the skin
     assert np.diff(hollow[1:], 2).max() < 0.5 * np.diff(height[0], 2).max()
     assert (hollow >= height[0]).all() and hollow[8] > height[0, 8] + 0.001

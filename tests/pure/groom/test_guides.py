@@ -23,7 +23,7 @@ def square(count: int, seed: int = 1) -> Floats:
 
 
 @pytest.mark.parametrize(
-    ("sizes", "guide_count", "shares"),
+    ("sizes", "guide_count", "expected"),
     [
         ([100], 10, [10]),
         ([60, 30, 10], 10, [5, 3, 2]),
@@ -35,21 +35,23 @@ def square(count: int, seed: int = 1) -> Floats:
         ([], 10, []),
     ],
 )
-def test_shares(sizes: list[int], guide_count: int, shares: list[int]) -> None:
-    assert guide_counts(np.array(sizes, np.int64), guide_count).tolist() == shares
+def test_each_group_gets_the_expected_number_of_guides(
+    sizes: list[int], guide_count: int, expected: list[int]
+) -> None:
+    assert guide_counts(np.array(sizes, np.int64), guide_count).tolist() == expected
 
 
-def test_shares_of_random_groups_are_fair() -> None:
+def test_guide_counts_of_random_groups_are_proportional() -> None:
     random = np.random.default_rng(1)
     for _ in range(300):
         sizes = random.integers(1, 200, random.integers(1, 20))
         guide_count = int(random.integers(1, 400))
-        shares = guide_counts(sizes, guide_count)
-        assert shares.sum() == max(min(guide_count, sizes.sum()), len(sizes))
-        assert (shares >= 1).all()
-        assert (shares <= sizes).all()
+        expected = guide_counts(sizes, guide_count)
+        assert expected.sum() == max(min(guide_count, sizes.sum()), len(sizes))
+        assert (expected >= 1).all()
+        assert (expected <= sizes).all()
         order = np.argsort(sizes, kind="stable")
-        assert (np.diff(shares[order])[np.diff(sizes[order]) > 0] >= 0).all()
+        assert (np.diff(expected[order])[np.diff(sizes[order]) > 0] >= 0).all()
 
 
 def test_guides_spread_over_each_group() -> None:

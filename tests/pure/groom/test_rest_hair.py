@@ -49,7 +49,7 @@ def hair(ball):
 def test_a_turn_in_place_turns_the_hair(ball, hair):
     """All roots lie on the turned ball as well, so that only UVs show the turn."""
     posed = replace(ball, positions=turned(ball.positions))
-    found = RestHair.found(hair, [ball], posed)
+    found = RestHair.find(hair, [ball], posed)
     assert found is not None and found.surface is ball and found.strands is hair
     assert found.on(posed).points == pytest.approx(turned(hair.points), abs=1e-5)
 
@@ -57,7 +57,7 @@ def test_a_turn_in_place_turns_the_hair(ball, hair):
 def test_far_away_it_is_told_without_uvs(ball, hair):
     shift = (5.0, 0.0, 1.0)
     posed = replace(ball, positions=turned(ball.positions, 0.7, shift))
-    found = RestHair.found(replace(hair, root_uv=None), [ball], posed)
+    found = RestHair.find(replace(hair, root_uv=None), [ball], posed)
     assert found is not None
     assert found.on(posed).points == pytest.approx(turned(hair.points, 0.7, shift), abs=1e-5)
 
@@ -66,23 +66,23 @@ def test_hair_that_stands_on_the_posed_surface_stays(ball, hair):
     """A modifier of Blender has moved it there, or it has grown there."""
     posed = replace(ball, positions=turned(ball.positions))
     there = hair.with_points(turned(hair.points))
-    assert RestHair.found(there, [ball], posed) is None
-    assert RestHair.found(replace(there, root_uv=None), [ball], posed) is None
+    assert RestHair.find(there, [ball], posed) is None
+    assert RestHair.find(replace(there, root_uv=None), [ball], posed) is None
 
 
 def test_what_is_not_posed_is_left_alone(ball, hair):
-    assert RestHair.found(hair, [ball], ball) is None
+    assert RestHair.find(hair, [ball], ball) is None
     bit = replace(ball, positions=ball.positions * np.float32(1.00001))
-    assert RestHair.found(hair, [ball], bit) is None
+    assert RestHair.find(hair, [ball], bit) is None
     large = replace(ball, positions=ball.positions * np.float32(1.01))
-    assert RestHair.found(hair, [ball], large) is not None
-    assert RestHair.found(hair, [ball], large, least=0.1) is None
+    assert RestHair.find(hair, [ball], large) is not None
+    assert RestHair.find(hair, [ball], large, min_deformation=0.1) is None
 
 
 def test_a_surface_that_swells_lifts_its_hair(ball, hair):
     """The UVs of the nearest points stay the same, so that only the distance shows it."""
     posed = replace(ball, positions=ball.positions * np.float32(1.1))
-    found = RestHair.found(hair, [ball], posed)
+    found = RestHair.find(hair, [ball], posed)
     assert found is not None
     assert bind_roots(found.on(posed), posed, place="").distance.max() < 1e-5
 
@@ -91,14 +91,14 @@ def test_a_part_that_is_posed_elsewhere_moves_no_hair(ball, hair):
     below = ball.positions[:, 2] < -0.5
     posed = replace(ball, positions=ball.positions - np.float32(0.5) * below[:, None])
     on_top = hair.take(np.flatnonzero(hair.roots[:, 2] > 0.0))
-    assert RestHair.found(on_top, [ball], posed) is None
+    assert RestHair.find(on_top, [ball], posed) is None
 
 
 def test_other_triangles_and_no_strands_are_none(ball, hair):
     posed = replace(ball, positions=turned(ball.positions))
     fewer = replace(posed, triangles=posed.triangles[1:], corner_uv=posed.corner_uv[1:])
-    assert RestHair.found(hair, [ball], fewer) is None
-    assert RestHair.found(hair.take(np.zeros(0, int)), [ball], posed) is None
+    assert RestHair.find(hair, [ball], fewer) is None
+    assert RestHair.find(hair.take(np.zeros(0, int)), [ball], posed) is None
 
 
 def test_of_several_that_one_counts_on_which_the_roots_stand(ball, hair):
@@ -107,9 +107,9 @@ def test_of_several_that_one_counts_on_which_the_roots_stand(ball, hair):
     posed = replace(ball, positions=turned(formed.positions))
     there = carry_with_surface(hair, ball, formed)
     for strands in (there, replace(there, root_uv=None)):
-        found = RestHair.found(strands, [ball, formed], posed)
+        found = RestHair.find(strands, [ball, formed], posed)
         assert found is not None and found.surface is formed
-    assert RestHair.found(there, [ball, formed], formed) is None
+    assert RestHair.find(there, [ball, formed], formed) is None
 
 
 def test_there_and_back_is_the_same(ball, hair):

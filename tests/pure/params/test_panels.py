@@ -56,15 +56,18 @@ def test_what_does_not_act_says_why() -> None:
             condition = parameter.active_when
             for each in sections:
                 if condition is not None and not condition(each):
-                    assert condition.lack(each), f"{section}.{parameter.name}"
+                    assert condition.unmet_reason(each), f"{section}.{parameter.name}"
                     idle.add((section, parameter.name))
     assert ("children", "clump_size") in idle and ("skin", "softness") in idle and len(idle) > 20
 
 
 def test_what_lacks_is_the_first_that_does() -> None:
     sections = SimpleNamespace(tilt=SimpleNamespace(mode="free", angle=0.0))
-    fixed, tilted = when("tilt.mode", "fixed", lack="free"), when("tilt.angle", lack="level")
-    assert both(fixed, tilted).lack(sections) == "free"
-    assert either(tilted, fixed).lack(sections) == "level"
+    fixed, tilted = (
+        when("tilt.mode", "fixed", unmet_reason="free"),
+        when("tilt.angle", unmet_reason="level"),
+    )
+    assert both(fixed, tilted).unmet_reason(sections) == "free"
+    assert either(tilted, fixed).unmet_reason(sections) == "level"
     sections.tilt.mode = "fixed"
-    assert both(fixed, tilted).lack(sections) == "level"
+    assert both(fixed, tilted).unmet_reason(sections) == "level"

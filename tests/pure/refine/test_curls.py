@@ -114,7 +114,7 @@ def test_straight_hair_beside_curls_never_stretches() -> None:
 
 def test_straight_hair_alone_has_no_room() -> None:
     rig = coils(2, straight=2)
-    assert rig.curl_slack is None and rig.riders.gives is None
+    assert rig.curl_slack is None and rig.riders.can_extend is None
 
 
 def test_what_is_seen_is_continuous_and_then_all() -> None:

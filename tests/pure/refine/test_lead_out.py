@@ -283,11 +283,11 @@ def test_a_strand_that_could_go_either_way_goes_where_it_went_before() -> None:
 
     def led(tilts: list[float], *, remembers: bool) -> np.ndarray:
         """The tip in each frame."""
-        tips, leans = [], NO_DEFLECTIONS
+        tips, deflections = [], NO_DEFLECTIONS
         for tilt in tilts:
             now = dives(tilt)
-            left = leans.after(1.0 / 60.0, offsets) if remembers else NO_DEFLECTIONS
-            _, leans = lead_out(now, at(rest), offsets, colliders, clearance, left)
+            left = deflections.decayed(1.0 / 60.0, offsets) if remembers else NO_DEFLECTIONS
+            _, deflections = lead_out(now, at(rest), offsets, colliders, clearance, left)
             assert np.linalg.norm(now, axis=1).min() > 0.1 + KEPT * (1.0 - 2.0 * SLACK)
             np.testing.assert_allclose(
                 segment_lengths(now, offsets), segment_lengths(dives(tilt), offsets), atol=1e-7
@@ -309,12 +309,14 @@ def test_what_nothing_leads_out_any_more_turns_back_steadily() -> None:
     offsets, rest = np.array([0, 12]), dives(0.02)
     clearance = clearance_at(rest + 1.0, offsets, still(BALL), KEPT)
     now, frame, gone = rest.copy(), 1.0 / 60.0, still(BALL, 9.0, 0.0, 0.0)
-    strands, leans = lead_out(now, at(rest), offsets, still(BALL), clearance)
-    assert strands.tolist() == leans.strands.tolist() == [0]
+    strands, deflections = lead_out(now, at(rest), offsets, still(BALL), clearance)
+    assert strands.tolist() == deflections.strands.tolist() == [0]
     before, frames = now, 0
-    while len(leans.strands):
+    while len(deflections.strands):
         now = rest.copy()
-        _, leans = lead_out(now, at(rest), offsets, gone, clearance, leans.after(frame, offsets))
+        _, deflections = lead_out(
+            now, at(rest), offsets, gone, clearance, deflections.decayed(frame, offsets)
+        )
         turned = (
             np.linalg.norm(np.diff(now - before, axis=0), axis=1)
             / segment_lengths(rest, offsets)[1:]
