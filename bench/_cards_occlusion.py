@@ -111,16 +111,16 @@ class _Scene:
     def light(self, start: np.ndarray, direction: np.ndarray, own: int) -> float:
         """The fraction of light that arrives along one ray."""
         light, travelled = 1.0, 1.0e-4
-        origin, way = Vector(start), Vector(direction)
+        origin, ray = Vector(start), Vector(direction)
         while light > DARK:
-            place, normal, index, gap = self._tree.ray_cast(origin + way * travelled, way)
+            place, normal, index, gap = self._tree.ray_cast(origin + ray * travelled, ray)
             if index is None:
                 return light
             travelled += gap
             if travelled > self._settings.reach * self._extent:
                 return light
             if index >= len(self._mesh.triangles):
-                if normal.dot(way) < 0.0:
+                if normal.dot(ray) < 0.0:
                     return 0.0
             elif (
                 self._mesh.card[index] != own

@@ -66,28 +66,28 @@ def order_figures() -> dict[str, float]:
     head = rig.head
     assert head is not None
     found = {"sort_ms": sort_milliseconds()}
-    for way, source, name in (
+    for card_source, atlas_source, name in (
         ("clusters", "made", ""),
         ("clusters", "baked", "baked_"),
         ("guides", "made", "guides_"),
     ):
-        mesh, alpha = cards_and_alpha(rig, way, source)
+        mesh, alpha = cards_and_alpha(rig, card_source, atlas_source)
         begin = time.process_time()
         learnt = card_orders(mesh, head, alpha=alpha)
         found[f"order_{name}seconds"] = time.process_time() - begin
         unsorted = np.arange(len(mesh.triangles))
         orders: dict[str, OrderOf] = {"unsorted": always(unsorted), "sorted": both(learnt)}
-        if way == "clusters":
+        if card_source == "clusters":
             orders |= others(mesh, head, learnt, alpha)
-        view_count = VIEW_COUNT if way == "clusters" else FEWER_VIEWS
-        shares = wrong_shares(mesh, head, orders, view_count, alpha)
-        found |= {f"order_wrong_{name}{key}": share for key, share in shares.items()}
-        if source == "made" and way == "clusters":
+        view_count = VIEW_COUNT if card_source == "clusters" else FEWER_VIEWS
+        fractions = wrong_shares(mesh, head, orders, view_count, alpha)
+        found |= {f"order_wrong_{name}{key}": fraction for key, fraction in fractions.items()}
+        if atlas_source == "made" and card_source == "clusters":
             found["order_from_ms"] = eye_milliseconds(mesh)
     return found
 
 
-def cards_and_alpha(rig: Rig, way: str, source: str) -> tuple[CardMesh, np.ndarray]:
+def cards_and_alpha(rig: Rig, card_source: str, atlas_source: str) -> tuple[CardMesh, np.ndarray]:
     """The cards as they are built, and their texture's alpha."""
     alphas: list[np.ndarray] = []
 
@@ -99,7 +99,7 @@ def cards_and_alpha(rig: Rig, way: str, source: str) -> tuple[CardMesh, np.ndarr
         return alphas[0]
 
     settings = SettingsMap(
-        CardSettings(source=way, levels=1), AtlasSettings(source=source), STRANDS
+        CardSettings(source=card_source, levels=1), AtlasSettings(source=atlas_source), STRANDS
     )
     build = result_of(card_build_steps(rig, settings, alpha_of))
     return as_built(build.finest), alphas[0]

@@ -179,7 +179,7 @@ def cost(stages: list[Stage]) -> dict[str, float]:
     color = gpu.types.GPUTexture((COST_SIZE, COST_SIZE), format="RGBA16F")
     depth = gpu.types.GPUTexture((COST_SIZE, COST_SIZE), format="DEPTH_COMPONENT32F")
     target = gpu.types.GPUFrameBuffer(depth_slot=depth, color_slots=(color,))
-    least = {name: np.full(len(stages), np.inf) for name in WAYS}
+    min_ms = {name: np.full(len(stages), np.inf) for name in WAYS}
     for _ in range(ROUNDS):
         for place, each in enumerate(stages):
             for name, drawing in WAYS.items():
@@ -191,6 +191,6 @@ def cost(stages: list[Stage]) -> dict[str, float]:
                     begin = time.perf_counter()
                     each.passes.draw(snapshot, each.camera, COST_SIZE, COST_SIZE, opacity=each.maps)
                     target.read_color(0, 0, 1, 1, 4, 0, "FLOAT")
-                    spent = (time.perf_counter() - begin) * 1000.0
-                least[name][place] = min(least[name][place], spent)
-    return {name: float(found.mean()) for name, found in least.items()}
+                    milliseconds = (time.perf_counter() - begin) * 1000.0
+                min_ms[name][place] = min(min_ms[name][place], milliseconds)
+    return {name: float(found.mean()) for name, found in min_ms.items()}

@@ -43,12 +43,12 @@ def frame_figures() -> dict[str, float]:
         bpy.app.handlers.render_post.remove(after_frame)
     took = [1000.0 * (b - a) for a, b in itertools.pairwise(times)][SETTLED:]
     quarter = len(took) // 4
-    begun, ended = statistics.median(took[:quarter]), statistics.median(took[-quarter:])
+    first_ms, last_ms = statistics.median(took[:quarter]), statistics.median(took[-quarter:])
     return {
         "memory_growth_percent": 100.0 * (memory[-1] / memory[SETTLED - 1] - 1.0),
         "memory_mib": memory[-1] / 1024.0,
         "frame_ms": statistics.median(took),
-        "frame_growth_percent": 100.0 * (ended / begun - 1.0),
+        "frame_growth_percent": 100.0 * (last_ms / first_ms - 1.0),
         "frames": float(len(memory)),
     }
 

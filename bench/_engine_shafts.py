@@ -28,6 +28,6 @@ def _picture() -> np.ndarray:
     y, x = np.mgrid[:HEIGHT, :WIDTH]
     for _ in range(40):
         away = np.hypot(x - random.uniform(0, WIDTH), y - random.uniform(0, HEIGHT))
-        share = np.clip(random.uniform(5.0, 60.0) - away + 0.5, 0.0, 1.0)[..., None]
-        picture = picture * (1.0 - share) + random.random(3) * share
+        coverage = np.clip(random.uniform(5.0, 60.0) - away + 0.5, 0.0, 1.0)[..., None]
+        picture = picture * (1.0 - coverage) + random.random(3) * coverage
     return picture

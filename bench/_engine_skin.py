@@ -45,9 +45,9 @@ def skin_figures() -> dict[str, float]:
     snapshot = sintel()
     hard = replace(snapshot, skin=replace(snapshot.skin, softness=HARD))
     plain = replace(snapshot, skin=replace(snapshot.skin, soft_shadow=False))
-    begun = time.perf_counter()
+    start = time.perf_counter()
     pictures, shadows = zip(*(drawn(one) for one in (hard, plain, snapshot)), strict=True)
-    seconds = time.perf_counter() - begun
+    seconds = time.perf_counter() - start
     off = seam_differences(shadows[2][0])
     SHEET.parent.mkdir(exist_ok=True)
     maps = [padded(shadows[which][0].picture()) for which in (0, 2)]
@@ -104,8 +104,10 @@ def drawn(snapshot: Snapshot) -> tuple[np.ndarray, tuple[SkinShadow, ...]]:
 def seam_differences(shadow: SkinShadow) -> np.ndarray:
     """Differences between the two sides at places along all seams, (n,) in 1/255."""
     layout, values = shadow.layout, shadow.picture()
-    share = np.linspace(0.0, 1.0, PLACES)[None, :, None]
-    places = (layout.seams[:, :1] * (1.0 - share) + layout.seams[:, 1:] * share).reshape(-1, 4)
+    fraction = np.linspace(0.0, 1.0, PLACES)[None, :, None]
+    places = (layout.seams[:, :1] * (1.0 - fraction) + layout.seams[:, 1:] * fraction).reshape(
+        -1, 4
+    )
     islands = np.repeat(layout.seam_islands, PLACES, axis=0)
     one, two = (
         soft_shadow(values, layout, places[:, 2 * side : 2 * side + 2], islands[:, side])[0]
@@ -122,15 +124,15 @@ def milliseconds(snapshot: Snapshot) -> dict[str, float]:
     found = {}
     size = head_size(mesh.surface)
     for name, metres in (("3mm", 0.003), ("10mm", 0.01)):
-        softness, taken = metres / size, []
+        softness, times = metres / size, []
         for number in range(ROUNDS):
             # another softness each time, so that the shadow is drawn each time
             settings = replace(snapshot.skin, softness=softness * (1.0 + 1e-4 * number))
-            begun = time.perf_counter()
+            start = time.perf_counter()
             shadows = skin_pass.shadows((mesh,), opacity, settings, len(snapshot.lights))
             shadows[id(mesh)].picture()  # waits until it is drawn
-            taken.append(1000.0 * (time.perf_counter() - begun))
-        found[f"skin_shadow_ms_{name}"] = min(taken)
+            times.append(1000.0 * (time.perf_counter() - start))
+        found[f"skin_shadow_ms_{name}"] = min(times)
     return found
 
 

@@ -97,7 +97,7 @@ GROOMS_OF_LEVELS = {"sample": _sample, "sintel": _sintel}
 
 def _of(name: str, site: Path) -> dict[str, float]:
     drawn = _drawn(site)
-    worst: dict[str, float] = {}
+    max_figures: dict[str, float] = {}
     for number, switch in enumerate(drawn):
         rows = []
         for without, fine, coarse, moved, before, after in switch:
@@ -110,12 +110,14 @@ def _of(name: str, site: Path) -> dict[str, float]:
                 "light_percent": 100.0 * abs(coarse[is_hair].sum() / fine[is_hair].sum() - 1.0),
                 "area_percent": 100.0 * abs(covered[1].sum() / covered[0].sum() - 1.0),
             }
-            worst = {key: max(float(value), worst.get(key, 0.0)) for key, value in figures.items()}
+            max_figures = {
+                key: max(float(value), max_figures.get(key, 0.0)) for key, value in figures.items()
+            }
             rows.append(np.hstack([fine, coarse, after, np.abs(fine - coarse)]))
         sheet = np.vstack(rows)[::-1]
         opaque = np.dstack([sheet, np.ones_like(sheet[..., :1])])
         write_png(OUTPUT / f"{name}_{number}.png", opaque)
-    return worst
+    return max_figures
 
 
 def _drawn(site: Path) -> list[np.ndarray]:
@@ -140,7 +142,7 @@ def _drawn(site: Path) -> list[np.ndarray]:
         "ways": [[math.sin(each), 0.2, math.cos(each)] for each in angles],
         "factors": FACTORS,
         "step": 1.0 + STEP,
-        "suns": [{"way": way, "irradiance": irradiance} for way, irradiance in SUNS],
+        "suns": [{"way": direction, "irradiance": irradiance} for direction, irradiance in SUNS],
         "ambient": AMBIENT,
     }
     (site / "view.json").write_text(json.dumps(view), encoding="utf-8")

@@ -51,8 +51,8 @@ def plain_figures() -> dict[str, Any]:
         np.savez(OUTPUT / f"{name}.npz", ours=ours, theirs=theirs)
         light = theirs.reshape(-1, 3).sum(axis=0) / ours.reshape(-1, 3).sum(axis=0)
         found |= {f"plain_light_{name}_{'rgb'[n]}": float(light[n]) for n in range(3)}
-        worst = float(100.0 * np.abs(light - 1.0).max())
-        found["plain_color_percent"] = max(found["plain_color_percent"], worst)
+        max_percent = float(100.0 * np.abs(light - 1.0).max())
+        found["plain_color_percent"] = max(found["plain_color_percent"], max_percent)
         found["plain_levels_visible"] = max(found["plain_levels_visible"], shown)
     return found
 
@@ -77,11 +77,11 @@ def _stage() -> tuple[Any, Any, list[dict[str, Any]]]:
                 slot.material = black
     scene.world = bpy.data.worlds.new("Dark")
     scene.world.color = (0.0, 0.0, 0.0)
-    for way, irradiance in SUNS:
+    for direction, irradiance in SUNS:
         light = bpy.data.lights.new("Sun", "SUN")
         light.energy = irradiance
         sun = bpy.data.objects.new("Sun", light)
-        sun.rotation_euler = Vector(way).to_track_quat("Z", "Y").to_euler()
+        sun.rotation_euler = Vector(direction).to_track_quat("Z", "Y").to_euler()
         scene.collection.objects.link(sun)
     center = sum((Vector(corner) for corner in hair.bound_box), Vector()) / 8.0
     radius = max((Vector(corner) - center).length for corner in hair.bound_box)
@@ -100,8 +100,11 @@ def _drawn(scene: Any, view: dict[str, Any]) -> np.ndarray:
     camera = bpy.data.objects.new("Side", bpy.data.cameras.new("Side"))
     camera.data.angle = math.radians(FIELD_OF_VIEW)
     camera.data.clip_start, camera.data.clip_end = view["near"], view["far"]
-    way = Vector(view["target"]) - Vector(view["eye"])
-    camera.location, camera.rotation_euler = view["eye"], way.to_track_quat("-Z", "Y").to_euler()
+    direction = Vector(view["target"]) - Vector(view["eye"])
+    camera.location, camera.rotation_euler = (
+        view["eye"],
+        direction.to_track_quat("-Z", "Y").to_euler(),
+    )
     scene.collection.objects.link(camera)
     render, scene.camera = scene.render, camera
     render.engine = "HAIRLOOM"
@@ -126,7 +129,9 @@ def _drawn_by_three(hair: Any, views: list[dict[str, Any]], name: str) -> tuple[
         "views": [
             view | {"eye": _y_up(view["eye"]), "target": _y_up(view["target"])} for view in views
         ],
-        "suns": [{"way": _y_up(way), "irradiance": irradiance} for way, irradiance in SUNS],
+        "suns": [
+            {"way": _y_up(direction), "irradiance": irradiance} for direction, irradiance in SUNS
+        ],
     }
     (site / "view.json").write_text(json.dumps(content), encoding="utf-8")
     shutil.copy2(REPOSITORY / "tools" / "draw_page.py", site)

@@ -35,9 +35,9 @@ def spring_figures() -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "hair.glb"
         written = write_cards(path, CardInputs(rig, settings), output, motion=motion)
-        told = written.motion
+        springs = written.motion
         head = np.stack([motion.at(frame)[0].matrix for frame in motion.frames])
-        moved = play_in_three(path, head, RATE, told["chains"])
+        moved = play_in_three(path, head, RATE, springs["chains"])
         levels = moved.levels(frames, RATE)
     wrong, rigid = [], []
     for mesh, played in zip(written.levels, levels, strict=True):
@@ -48,14 +48,14 @@ def spring_figures() -> dict[str, Any]:
             now = (now - head[frame, :3, 3]) @ head[frame, :3, :3]
             wrong.append(np.linalg.norm(played[..., frame, :] - now, axis=-1).ravel())
             rigid.append(np.linalg.norm(rest - now, axis=-1).ravel())
-    percent = 100.0 / told["error"]["hair_length"]
+    percent = 100.0 / springs["error"]["hair_length"]
     every = np.concatenate(wrong)
     return {
         "spring_error_percent": percent * float(np.quantile(every, 0.99)),
         "spring_error_percent_rms": percent * float(np.sqrt(np.mean(every * every))),
         "spring_error_percent_worst": percent * float(every.max()),
-        "spring_told_percent": percent * told["error"]["percentile_99"],
+        "spring_told_percent": percent * springs["error"]["percentile_99"],
         "spring_rigid_percent": percent * float(np.quantile(np.concatenate(rigid), 0.99)),
-        "spring_joints": told["joints"],
-        "spring_chains": told["chains"],
+        "spring_joints": springs["joints"],
+        "spring_chains": springs["chains"],
     }

@@ -54,14 +54,14 @@ def motion_figures(seconds: float) -> dict[str, float]:
     ridden = time.perf_counter()
     joints = result_of(joint_motion_steps(moved.tracks, CardExportSettings(motion="joints")))
     fitted = time.perf_counter()
-    length, told = moved.tracks.hair_length, joints.facts
+    length, facts = moved.tracks.hair_length, joints.facts
     figures = {
         "joint_error_percent": 100.0 * joints.relative_error,
         "joint_error_percent_99": 100.0 * joints.error.most / length,
         "joint_error_percent_worst": 100.0 * joints.error.worst / length,
-        "chains": told["chains"],
-        "joints": told["joints_in_chain"],
-        "keys": told["keys"],
+        "chains": facts["chains"],
+        "joints": facts["joints_in_chain"],
+        "keys": facts["keys"],
         "motion_ride_seconds": ridden - begin,
         "joint_seconds": fitted - ridden,
     }
@@ -89,8 +89,8 @@ def shaken(rig: Rig, seconds: float) -> ComputedMotion:
     collider = DistanceField.from_surface(rig.head, settings, place="Sintel")
     first, *later = shaken_poses(rig, round(seconds * RATE) + 1, RATE)
     motion = motion_flow.begin(rig, first)
-    standing = PosedCollider(collider, first.matrix, first.matrix)
-    guides, posed, before, earlier = [motion.guides], [(standing,)], first, None
+    collider_at_rest = PosedCollider(collider, first.matrix, first.matrix)
+    guides, posed, before, earlier = [motion.guides], [(collider_at_rest,)], first, None
     for now in later:
         posed.append((PosedCollider(collider, before.matrix, now.matrix, earlier),))
         motion = motion_flow.advance(

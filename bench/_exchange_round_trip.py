@@ -35,21 +35,25 @@ def round_trip_figures() -> dict[str, float]:
     errors = dict.fromkeys(_WAYS, 0.0)
     with tempfile.TemporaryDirectory() as folder:
         for groom in (sample(STRANDS, point_count=POINTS), *real):
-            for way, there_and_back in _WAYS.items():
-                path = Path(folder) / f"groom.{way.split('_')[0]}"
-                expected = _in_order(groom, way)
-                error = np.abs(there_and_back(path, groom) - expected).max()
-                errors[way] = max(errors[way], float(error / np.abs(expected).max()))
+            for format_name, round_trip in _WAYS.items():
+                path = Path(folder) / f"groom.{format_name.split('_')[0]}"
+                expected = _in_order(groom, format_name)
+                error = np.abs(round_trip(path, groom) - expected).max()
+                errors[format_name] = max(
+                    errors[format_name], float(error / np.abs(expected).max())
+                )
     return {
         "roundtrip_max_error": max(errors.values()),
-        **{f"{way}_roundtrip_error": error for way, error in errors.items()},
+        **{f"{format_name}_roundtrip_error": error for format_name, error in errors.items()},
         "roundtrip_real_files": float(len(real)),
     }
 
 
-def _in_order(groom: Groom, way: str) -> Floats:
+def _in_order(groom: Groom, format_name: str) -> Floats:
     """The points in the file's order: Unity's Alembic has a curves object for each group."""
-    group = groom.strands.group if way == "abc_unity" else np.zeros(groom.strands.strand_count)
+    group = (
+        groom.strands.group if format_name == "abc_unity" else np.zeros(groom.strands.strand_count)
+    )
     return groom.take(np.argsort(group, kind="stable")).strands.points
 
 

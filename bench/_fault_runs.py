@@ -186,7 +186,7 @@ def judged(
     places: tuple[Path, ...],
     old: Contents,
     new: Contents,
-    there: Contents,
+    contents_after: Contents,
     error: BaseException | None,
     *,
     is_second: bool,
@@ -199,38 +199,42 @@ def judged(
         error: the exception that the run has raised, if any.
         is_second: whether another writer may have written last, so that its result is there.
     """
-    kept = {
+    kept_beside = {
         name: content
-        for name, content in there.items()
+        for name, content in contents_after.items()
         if any(part.partition(".")[0].endswith(" new") for part in name.split(os.sep))
     }
-    there = {name: content for name, content in there.items() if name not in kept}
-    if there not in (old, new):
-        kind = "mixed" if set(there) == set(old) else "losses"
-        return f"{kind}: {sorted(there)} after {error!r}", True
+    contents_after = {
+        name: content for name, content in contents_after.items() if name not in kept_beside
+    }
+    if contents_after not in (old, new):
+        kind = "mixed" if set(contents_after) == set(old) else "losses"
+        return f"{kind}: {sorted(contents_after)} after {error!r}", True
     if error is None:
-        is_fine = there == new or is_second
+        is_fine = contents_after == new or is_second
         return ("" if is_fine else "losses: no error, and the old result"), False
     if isinstance(error, EndedError):
         return "", True
     if not isinstance(error, HairloomError):
         return f"untrue: {error!r} is no message", True
-    return (f"untrue: {error}" if _is_untrue(error, there == new, kept, places) else ""), True
+    return (
+        f"untrue: {error}" if _is_untrue(error, contents_after == new, kept_beside, places) else ""
+    ), True
 
 
 def _is_untrue(
-    error: HairloomError, is_new: bool, kept: Contents, places: tuple[Path, ...]
+    error: HairloomError, is_new: bool, kept_beside: Contents, places: tuple[Path, ...]
 ) -> bool:
     """Whether a message is false, or has no remedy."""
     text = str(error)
     named = re.search(r"beside it (?:as|in) (.+?)\.?$", error.remedy)
     if named is not None:
-        return named[1] not in {part for name in kept for part in name.split(os.sep)}
+        return named[1] not in {part for name in kept_beside for part in name.split(os.sep)}
     chosen = re.search(r"Choose (/.+?) as the folder", error.remedy)
     if chosen is not None:
         return Cache.find(Path(chosen[1])) is None
     is_placed = any(str(each) in text for each in places)
-    return bool(kept) or is_new or not error.remedy or not is_placed
+    return bool(kept_beside) or is_new or not error.remedy or not is_placed
 
 
 def _write_with(verb: Verb, path: Path, fault: str, random: Any) -> BaseException | None:

@@ -15,8 +15,8 @@ def move_by_nodes(hair: Any) -> Any:
     """Add a modifier that moves tips to +X and up, farther in each frame; at frame 1 curves are
     unchanged."""
     group = bpy.data.node_groups.new("Moving", "GeometryNodeTree")
-    for name, way in (("Geometry", "INPUT"), ("Geometry", "OUTPUT")):
-        group.interface.new_socket(name, in_out=way, socket_type="NodeSocketGeometry")
+    for name, in_out in (("Geometry", "INPUT"), ("Geometry", "OUTPUT")):
+        group.interface.new_socket(name, in_out=in_out, socket_type="NodeSocketGeometry")
     new, link = group.nodes.new, group.links.new
     ends = new("NodeGroupInput"), new("NodeGroupOutput")
     place, time, along = (
@@ -58,18 +58,18 @@ def apart(points: Any, offsets: Any, curves: Any) -> float:
 
 def _away(points: Any, line: Any) -> float:
     """The distance of the point that is farthest from a polyline."""
-    begin, way = line[:-1], np.diff(line, axis=0)
+    begin, direction = line[:-1], np.diff(line, axis=0)
     beside = points[:, None] - begin
-    part = (beside * way).sum(axis=2) / np.maximum((way * way).sum(axis=1), 1e-30)
-    nearest = np.linalg.norm(beside - np.clip(part, 0.0, 1.0)[..., None] * way, axis=2)
+    part = (beside * direction).sum(axis=2) / np.maximum((direction * direction).sum(axis=1), 1e-30)
+    nearest = np.linalg.norm(beside - np.clip(part, 0.0, 1.0)[..., None] * direction, axis=2)
     return float(nearest.min(axis=1).max())
 
 
 def lose_curves(hair: Any, frame: int) -> None:
     """Add a modifier that deletes three curves from this frame on."""
     group = bpy.data.node_groups.new("Losing", "GeometryNodeTree")
-    for name, way in (("Geometry", "INPUT"), ("Geometry", "OUTPUT")):
-        group.interface.new_socket(name, in_out=way, socket_type="NodeSocketGeometry")
+    for name, in_out in (("Geometry", "INPUT"), ("Geometry", "OUTPUT")):
+        group.interface.new_socket(name, in_out=in_out, socket_type="NodeSocketGeometry")
     new, link = group.nodes.new, group.links.new
     ends = new("NodeGroupInput"), new("NodeGroupOutput")
     gone, time, index = (

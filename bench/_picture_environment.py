@@ -135,9 +135,9 @@ def environment() -> dict[str, Any]:
     SHEET.parent.mkdir(exist_ok=True)
     write_png(SHEET, contact_sheet(pictures, 2 * len(COLORS)))
     off = [abs(value - 1.0) for name, value in found.items() if "_light_" in name]
-    worst = max(value for name, value in found.items() if name.endswith("_flip"))
+    max_flip = max(value for name, value in found.items() if name.endswith("_flip"))
     return {
-        "environment_flip_hair": worst,
+        "environment_flip_hair": max_flip,
         "environment_light_percent": 100.0 * max(off),
         **found,
     }

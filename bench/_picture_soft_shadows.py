@@ -33,11 +33,11 @@ def soft_shadows(rendered: Callable[[Any], tuple[dict[str, np.ndarray], float]])
         for kind, picture in (("soft", ours), ("hard", hard)):
             off = (picture - theirs)[is_floor] / brightest
             found[f"soft_shadow_{name}_{kind}_rms"] = float(np.sqrt(np.mean(off**2)))
-    worst = {
+    max_rms = {
         kind: max(found[f"soft_shadow_{name}_{kind}_rms"] for name in ("sun", "area"))
         for kind in ("soft", "hard")
     }
-    return {"soft_shadow_rms": worst["soft"], "soft_shadow_hard_rms": worst["hard"], **found}
+    return {"soft_shadow_rms": max_rms["soft"], "soft_shadow_hard_rms": max_rms["hard"], **found}
 
 
 def _sun() -> Any:
@@ -135,10 +135,10 @@ def _floor(scene: Any, engine: str, rendered: Callable[..., Any]) -> np.ndarray:
     """Light on the floor, (SIZE, SIZE); NaN where something is in front of it."""
     scene.render.engine = "CYCLES" if engine == "CYCLES" else "HAIRLOOM"
     light = scene.objects[next(each.name for each in scene.objects if each.type == "LIGHT")].data
-    kept = light.angle if light.type == "SUN" else light.size
+    old_size = light.angle if light.type == "SUN" else light.size
     if engine == "hard":
         setattr(light, "angle" if light.type == "SUN" else "size", 1e-4)
     passes, _ = rendered(scene)
-    setattr(light, "angle" if light.type == "SUN" else "size", kept)
+    setattr(light, "angle" if light.type == "SUN" else "size", old_size)
     depth = passes["Depth"][..., 0]
     return np.where(np.abs(depth - ABOVE) < 1e-2, passes["Combined"][..., 1], np.nan)

@@ -78,16 +78,16 @@ def _combed(grown: StrandSet, bust: BuiltInHead, middle: np.ndarray, axis: np.nd
     along = np.linspace(0.0, 1.0, 24)[None, :, None]
     one, other = (p / np.linalg.norm(p, axis=1, keepdims=True) for p in (roots, through))
     turn = np.arccos(np.clip((one * other).sum(axis=1), -1.0, 1.0))[:, None, None]
-    way = np.sin((1.0 - along) * turn) * one[:, None] + np.sin(along * turn) * other[:, None]
-    way /= np.maximum(np.linalg.norm(way, axis=2, keepdims=True), 1e-9)
+    direction = np.sin((1.0 - along) * turn) * one[:, None] + np.sin(along * turn) * other[:, None]
+    direction /= np.maximum(np.linalg.norm(direction, axis=2, keepdims=True), 1e-9)
     begin, end = (np.linalg.norm(p, axis=1)[:, None] for p in (roots, through))
-    share = along[..., 0]
+    fraction = along[..., 0]
     height = np.maximum(
-        begin * (1.0 - share) + end * share, _on_skin(bust, way) + LIFT * share**0.3
+        begin * (1.0 - fraction) + end * fraction, _on_skin(bust, direction) + LIFT * fraction**0.3
     )
-    blend = np.clip((share - 0.8) / 0.2, 0.0, 1.0)
+    blend = np.clip((fraction - 0.8) / 0.2, 0.0, 1.0)
     height = height * (1.0 - blend) + end * blend
-    to_ring = way * height[..., None]
+    to_ring = direction * height[..., None]
     to_ring[:, 0] = roots
     fall = np.linspace(0.0, 1.0, 24)[None, 1:, None]
     length = TAIL * random.uniform(0.8, 1.1, (count, 1, 1))
@@ -121,5 +121,5 @@ def _skin(bust: BuiltInHead, direction: np.ndarray) -> np.ndarray:
     return found
 
 
-def _on_skin(bust: BuiltInHead, way: np.ndarray) -> np.ndarray:
-    return _skin(bust, way.reshape(-1, 3)).reshape(way.shape[:2])
+def _on_skin(bust: BuiltInHead, direction: np.ndarray) -> np.ndarray:
+    return _skin(bust, direction.reshape(-1, 3)).reshape(direction.shape[:2])

@@ -143,8 +143,8 @@ def reach_of(state: DynamicsState, settings: DynamicsSettings | None = None) -> 
     straight = np.linalg.norm(position[:, 1:] - position[:, :1], axis=0)
     along = np.cumsum(np.linalg.norm(np.diff(position, axis=1), axis=0), axis=0)
     allowed = np.maximum(rest, _NO_LENGTH)
-    worst = [float((way / allowed).max(initial=0.0)) for way in (straight, along)]
-    return Reach(worst[0], worst[1], True)
+    max_ratios = [float((distance / allowed).max(initial=0.0)) for distance in (straight, along)]
+    return Reach(max_ratios[0], max_ratios[1], True)
 
 
 def promises_length(settings: DynamicsSettings) -> bool:
@@ -294,9 +294,9 @@ def _curls(
     """Guides outwards from a ball of 0.1 m, waved by a fraction of length (count, 1, 1) [m]."""
     outward = random.normal(size=(len(length), 1, 3))
     outward /= np.linalg.norm(outward, axis=2, keepdims=True)
-    share = np.linspace(0.0, 1.0, cv_count)[:, None] ** random.choice([1.0, 1.5])
-    waves = share * np.sin(share * random.uniform(2.0, 12.0, (len(length), 1, 3)))
-    return (outward * (0.1 + length * share) + waves * wave * length).astype(np.float32)
+    fraction = np.linspace(0.0, 1.0, cv_count)[:, None] ** random.choice([1.0, 1.5])
+    waves = fraction * np.sin(fraction * random.uniform(2.0, 12.0, (len(length), 1, 3)))
+    return (outward * (0.1 + length * fraction) + waves * wave * length).astype(np.float32)
 
 
 def _way(random: np.random.Generator, *, is_head: bool) -> Way:

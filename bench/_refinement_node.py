@@ -87,8 +87,8 @@ def summed_in_chunks(rest: np.ndarray, motion: np.ndarray, weights: GuideWeights
     result = rest.reshape(len(rest), -1).copy()
     for start in range(0, len(result), CHUNK):
         part = slice(start, start + CHUNK)
-        taken = flat[weights.guide[part]]
-        result[part] += np.einsum("nk,nkj->nj", weights.weight[part], taken)
+        guide_values = flat[weights.guide[part]]
+        result[part] += np.einsum("nk,nkj->nj", weights.weight[part], guide_values)
     return result.reshape(rest.shape)
 
 

@@ -159,9 +159,9 @@ def frame_times(shown: Groom) -> dict[str, float]:
 
     Medians over rounds in which the variants take turns, at full size and at half.
     """
-    ways = {"undivided": UNDIVIDED, "adaptive": BARE}
-    snapshots = {name: shown.snapshot(way) for name, way in ways.items()}
-    passes = {(name, part): StrandPass() for name in ways for part in (1, 2)}
+    settings_by_name = {"undivided": UNDIVIDED, "adaptive": BARE}
+    snapshots = {name: shown.snapshot(settings) for name, settings in settings_by_name.items()}
+    passes = {(name, part): StrandPass() for name in settings_by_name for part in (1, 2)}
     targets = {part: Target(WIDTH // part, HEIGHT // part) for part in (1, 2)}
     times: dict[tuple[str, int], list[float]] = {key: [] for key in passes}
     for turn in range(ROUNDS + 2):
@@ -178,8 +178,8 @@ def frame_times(shown: Groom) -> dict[str, float]:
             times[name, part].append(targets[part].timed(draw))
     found = {}
     for part, suffix in ((1, ""), (2, "_half")):
-        medians = {name: statistics.median(times[name, part][2:]) for name in ways}
-        found |= {f"frame_ms_{name}{suffix}": medians[name] for name in ways}
+        medians = {name: statistics.median(times[name, part][2:]) for name in settings_by_name}
+        found |= {f"frame_ms_{name}{suffix}": medians[name] for name in settings_by_name}
         ratios = [
             adaptive / undivided
             for undivided, adaptive in zip(
@@ -194,7 +194,7 @@ def gpu_cpu_difference(shown: Groom) -> float:
     """The largest distance of the GPU's stations from the CPU's, as a fraction of the strand's
     length."""
     factors = _factors(shown, shown.close_up())
-    most = int(stations(factors)[:, -1].max())
+    max_pieces = int(stations(factors)[:, -1].max())
     shader = program(
         ShaderRecipe(
             name="station_points",
@@ -205,7 +205,7 @@ def gpu_cpu_difference(shown: Groom) -> float:
             folders=(REPOSITORY / "tests" / "gpu" / "shaders", SHADER_FOLDER),
         )
     )
-    worst = 0.0
+    max_difference = 0.0
     for start in range(0, len(factors), CHUNK):
         own, strands = factors[start : start + CHUNK], shown.strands[start : start + CHUNK]
         packed = np.ones((len(own), -(-own.shape[1] // 16) * 16), np.uint8)
@@ -216,10 +216,10 @@ def gpu_cpu_difference(shown: Groom) -> float:
             "factors": packed.view(np.float32).reshape(len(own), -1, 4),
             "totals": np.repeat(totals[:, None, None], 4, axis=2),
         }
-        result = gpu.types.GPUTexture((most + 1, len(own)), format="RGBA32F")
+        result = gpu.types.GPUTexture((max_pieces + 1, len(own)), format="RGBA32F")
         uploaded = {name: texture_from(pixels, "RGBA32F") for name, pixels in textures.items()}
         shader.bind(textures=uploaded, images={"result": result})
-        gpu.compute.dispatch(shader.shader, -(-(most + 1) // 8), -(-len(own) // 8), 1)
+        gpu.compute.dispatch(shader.shader, -(-(max_pieces + 1) // 8), -(-len(own) // 8), 1)
         pixels = texture_to_array(result)
         gpu.shader.unbind()
         corners, offsets = adaptive_points(strands, own)
@@ -227,8 +227,8 @@ def gpu_cpu_difference(shown: Groom) -> float:
         place = np.arange(len(corners)) - offsets[strand]
         length = np.linalg.norm(np.diff(strands, axis=1), axis=2).sum(axis=1)
         apart = np.linalg.norm(pixels[strand, place, :3] - corners, axis=1)
-        worst = max(worst, float((apart / length[strand]).max()))
-    return worst
+        max_difference = max(max_difference, float((apart / length[strand]).max()))
+    return max_difference
 
 
 def coverage_eighth_difference(shown: Groom) -> float:
@@ -237,7 +237,7 @@ def coverage_eighth_difference(shown: Groom) -> float:
     The groom is 135 and 68 pixels high; strands are ranked by `even_ranks`.
     """
     rank = even_ranks(shown.strands[:, 0])
-    worst = 0.0
+    max_difference = 0.0
     for size in ((192, 144), (96, 72)):
         covered = {}
         for name, detail in (
@@ -246,8 +246,8 @@ def coverage_eighth_difference(shown: Groom) -> float:
         ):
             snapshot = shown.snapshot(detail, rank=rank)
             covered[name] = float(render_image(snapshot, shown.camera(), *size, 4)[..., 3].mean())
-        worst = max(worst, abs(covered["eighth"] / covered["all"] - 1.0))
-    return worst
+        max_difference = max(max_difference, abs(covered["eighth"] / covered["all"] - 1.0))
+    return max_difference
 
 
 def _factors(shown: Groom, camera: Camera) -> np.ndarray:

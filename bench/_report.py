@@ -45,24 +45,24 @@ def report(
     found: Mapping[str, Any],
     reference: str,
     *,
-    at_most: Mapping[str, float] | None = None,
-    at_least: Mapping[str, float] | None = None,
+    max_limits: Mapping[str, float] | None = None,
+    min_limits: Mapping[str, float] | None = None,
 ) -> int:
     """Print the figures and the missed limits; the exit status: 1 if a figure misses its limit, or
     if there is no figure.
 
     found: figures by name; None: not measured. reference: what ratios and errors are relative to.
-    at_most, at_least: limits by name, or by a pattern of names such as `*_seconds`; one that
+    max_limits, min_limits: limits by name, or by a pattern of names such as `*_seconds`; one that
     matches no figure is ignored. NaN misses every limit.
     """
-    limits = _limits(found, at_most or {}, operator.le) | _limits(
-        found, at_least or {}, operator.ge
+    limits = _limits(found, max_limits or {}, operator.le) | _limits(
+        found, min_limits or {}, operator.ge
     )
     missed = [name for name, limit in limits.items() if not limit.holds(found[name])]
     for name, value in found.items():
         shown = f"{value:14.{DIGITS}f}" if isinstance(value, float) else f"{value!s:>14}"
-        told = f"   {limits[name]}" if name in limits else ""
-        print(f"{name:40} {shown}{told}{', missed' if name in missed else ''}")
+        limit_text = f"   {limits[name]}" if name in limits else ""
+        print(f"{name:40} {shown}{limit_text}{', missed' if name in missed else ''}")
     about = {"limits": {name: str(limit) for name, limit in limits.items()}, "missed": missed}
     print(json.dumps({**_rounded(found), "reference": reference, **about, **machine()}), flush=True)
     return int(bool(missed) or not found)

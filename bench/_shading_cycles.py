@@ -126,8 +126,8 @@ def cycles_profile(room: CyclesRoom, scan: Scan, hair: Hair) -> np.ndarray:
             Radial_Roughness=hair.around,
             Offset=hair.offset,
         )
-        ways = zip(scan.theta_i, scan.theta_r, scan.phi, strict=True)
-        return np.array([strand_radiance(room, *way) for way in ways])
+        directions = zip(scan.theta_i, scan.theta_r, scan.phi, strict=True)
+        return np.array([strand_radiance(room, *angles) for angles in directions])
 
     black = shown(BLACK)
     return black if scan.lobe == "r" else shown(BLOND) - black

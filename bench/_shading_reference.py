@@ -80,8 +80,8 @@ def color_errors() -> dict[str, float]:
         exact = marschner(theta_i, theta_r, phi, fibre)
         strengths = np.array(fibre.strengths)
         found = look_up(tables, theta_i, theta_r, phi, absorption, strengths)
-        worst = np.abs(found - exact).max(axis=0) / exact.max(axis=0)
-        errors[name] = float(worst.max())
+        relative_errors = np.abs(found - exact).max(axis=0) / exact.max(axis=0)
+        errors[name] = float(relative_errors.max())
     return errors
 
 

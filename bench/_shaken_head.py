@@ -83,8 +83,8 @@ class Shake:
 def depth_in(surface: Surface) -> Callable[[np.ndarray], float]:
     """A function for the exact depth [m] of the deepest of points (n, 3) in this convex mesh."""
     normals = surface.triangle_normals().astype(np.float64)
-    kept = np.linalg.norm(normals, axis=1) > 0.5
-    normals, corner = normals[kept], surface.corners[kept, 0].astype(np.float64)
+    is_valid = np.linalg.norm(normals, axis=1) > 0.5
+    normals, corner = normals[is_valid], surface.corners[is_valid, 0].astype(np.float64)
     offset = np.einsum("ij,ij->i", normals, corner)
 
     def deepest(points: np.ndarray) -> float:

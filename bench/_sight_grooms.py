@@ -82,15 +82,15 @@ GROOMS: dict[str, Callable[[], Pair]] = {
 def lost_curves() -> int:
     """How many of an artist's curves are not drawn, with and without children."""
     strands, head = sintel()
-    lost = 0
+    lost_count = 0
     for method in ("none", "multi"):
         children = ChildrenSettings(method=method, strand_count=5000)
         rig = rig_flow.prepare(strands, head, GuideSettings(), place="hair", children=children)
         own = rig.strands.take(np.arange(rig.strands.strand_count - rig.child_count))
         tips = strands.points[strands.offsets[1:] - 1]
-        kept = {tip.tobytes() for tip in own.points[own.offsets[1:] - 1]}
-        lost += sum(tip.tobytes() not in kept for tip in tips)
-    return lost
+        kept_tips = {tip.tobytes() for tip in own.points[own.offsets[1:] - 1]}
+        lost_count += sum(tip.tobytes() not in kept_tips for tip in tips)
+    return lost_count
 
 
 def _hull(points: np.ndarray) -> Surface:

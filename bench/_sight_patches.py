@@ -61,8 +61,8 @@ def patch_figures() -> dict[str, float]:
         for channel, name in ((0, "red"), (2, "blue")):
             found[f"patch_{kind}_{eye}_{name}"] = float(ratio[channel])
             for bounces in BOUNCES[:-1]:
-                share = theirs[bounces][channel] / whole[channel]
-                found[f"patch_{kind}_{eye}_{name}_{bounces}_bounces"] = float(share)
+                fraction = theirs[bounces][channel] / whole[channel]
+                found[f"patch_{kind}_{eye}_{name}_{bounces}_bounces"] = float(fraction)
     return found
 
 
@@ -93,12 +93,14 @@ def _patch(lean: float) -> np.ndarray:
         root = chance.uniform(-1.0, 1.0, (count, 3))
         root[:, 0], root[:, 2] = -0.5 * length, 0.5 * HEIGHT * (root[:, 2] + 1.0)
         spread = DISORDER * np.array([1.0, 1.0, 0.3])
-    way = np.array([np.sin(lean), 0.0, np.cos(lean)]) + spread * chance.normal(size=(count, 3))
-    way /= np.linalg.norm(way, axis=1, keepdims=True)
+    direction = np.array([np.sin(lean), 0.0, np.cos(lean)]) + spread * chance.normal(
+        size=(count, 3)
+    )
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     if lean >= 1.5:
-        root[:, 1:] -= 0.5 * length * way[:, 1:]
+        root[:, 1:] -= 0.5 * length * direction[:, 1:]
     along = np.linspace(0.0, length, 4)[None, :, None]
-    return (root[:, None] + along * way[:, None]).astype(np.float32)
+    return (root[:, None] + along * direction[:, None]).astype(np.float32)
 
 
 def _direction(lean: float, around: float) -> np.ndarray:

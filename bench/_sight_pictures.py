@@ -117,11 +117,11 @@ def _count_figures(children: str) -> dict[str, float]:
         pixels.append(_flip(truth, picture, hair))
         light.append(float(picture[hair, :3].mean()) / float(truth[hair, :3].mean()))
     excess = np.subtract(found, floors)
-    worst = int(excess.argmax())
+    worst_index = int(excess.argmax())
     return {
-        "count_flip": found[worst],
-        "count_flip_floor": floors[worst],
-        "count_flip_excess": float(excess[worst]),
+        "count_flip": found[worst_index],
+        "count_flip_floor": floors[worst_index],
+        "count_flip_excess": float(excess[worst_index]),
         "count_flip_pixel": max(pixels),
         "count_light_percent": 100.0 * max(abs(each - 1.0) for each in light),
         "count_pixels_to_one": float(size),
@@ -159,10 +159,10 @@ def cycles_figures() -> dict[str, float]:
         truth = np.mean([room.picture(SIZE, seed=seed) for seed in range(SEEDS)], axis=0)
         exposure = SHOWN / np.percentile(truth[hair, :3].max(axis=-1), 90.0)
         pairs[name] = truth, ours, float(exposure)
-    least = min(exposure for _, _, exposure in pairs.values())
+    min_exposure = min(exposure for _, _, exposure in pairs.values())
     found = {}
     for name, (truth, ours, exposure) in pairs.items():
-        found[f"cycles_flip_{name}"] = _flip(truth * least, ours * least, hair)
+        found[f"cycles_flip_{name}"] = _flip(truth * min_exposure, ours * min_exposure, hair)
         found[f"cycles_flip_shown_{name}"] = _flip(truth * exposure, ours * exposure, hair)
         light = ours[hair, :3].mean(axis=0) / truth[hair, :3].mean(axis=0)
         found |= {

@@ -30,7 +30,7 @@ def style_follow() -> dict[str, object]:
     settings.influence = 0.0
     session = previews.start(hair, bpy.context.evaluated_depsgraph_get())
     hair.hairloom.bake.follows = True
-    worst = max(_error(session, frame) for frame in range(1, FRAMES + 1))
+    max_error = max(_error(session, frame) for frame in range(1, FRAMES + 1))
     count, device = session.rig.strands.strand_count, session.solver.device
     settings.influence = 1.0
     for kind in ("animated", "read once"):
@@ -43,7 +43,7 @@ def style_follow() -> dict[str, object]:
         times[kind] = float(np.median(took[2:]))
     previews.end()
     return {
-        "style_follow_mm": round(1e3 * worst, 5),
+        "style_follow_mm": round(1e3 * max_error, 5),
         "style_strands": count,
         "style_device": device,
         "style_frame_ms": round(times["animated"], 2),

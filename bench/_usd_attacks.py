@@ -36,7 +36,7 @@ def usd_attacks(count: int, seed: int) -> dict[str, float]:
             attack = _ATTACKS[number % len(_ATTACKS)]
             path = Path(folder) / f"attack.{('usda', 'usd')[number % 2]}"
             path.write_text("#usda 1.0\n" + _damaged(attack(random), random), encoding="utf-8")
-            begun, processed = time.perf_counter(), _processor_seconds()
+            start, processed = time.perf_counter(), _processor_seconds()
             try:
                 read_usd(path)
             except HairloomError as error:
@@ -45,7 +45,7 @@ def usd_attacks(count: int, seed: int) -> dict[str, float]:
             except Exception as error:
                 print(f"attack {number}, {attack.__name__}: {error!r}", flush=True)
                 found["usda_crashes"] += 1
-            wall, processor = time.perf_counter() - begun, _processor_seconds() - processed
+            wall, processor = time.perf_counter() - start, _processor_seconds() - processed
             found["longest_seconds"] = max(found["longest_seconds"], wall)
             found["longest_processor_seconds"] = max(found["longest_processor_seconds"], processor)
     # of the largest child [kB]

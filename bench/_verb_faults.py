@@ -124,15 +124,15 @@ def _quiet() -> Iterator[None]:
     """Discard what Blender prints: written to a file, it could hit the size limit that acts as a
     full disk, which ends Blender."""
     sys.stdout.flush()
-    kept, nowhere = os.dup(1), os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, 1)
+    old_stdout, null_file = os.dup(1), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null_file, 1)
     try:
         with contextlib.redirect_stdout(io.StringIO()):
             yield
     finally:
-        os.dup2(kept, 1)
-        os.close(kept)
-        os.close(nowhere)
+        os.dup2(old_stdout, 1)
+        os.close(old_stdout)
+        os.close(null_file)
 
 
 def _groom(version: int, suffix: str = ".tfx") -> str:
@@ -316,12 +316,12 @@ def _run(name: str, fault: str, random: Any) -> tuple[str, bool]:
         for each in (folder, path):
             if each.is_dir():
                 remove_stale_files(each)  # as the next writer does
-        there = contents(folder)
+        contents_after = contents(folder)
         places = folder, SOURCES, Path(tempfile.gettempdir())
         if fault in GPU:
             places = (Path("render"),)  # no file is at fault
         results = contents(old), contents(new)
-        return judged(places, *results, there, error, is_second=fault == "another")
+        return judged(places, *results, contents_after, error, is_second=fault == "another")
 
 
 @functools.cache

@@ -57,30 +57,31 @@ def cost_figures() -> dict[str, float]:
     eevee = EeveeFrame(strands)
     ours: dict[str, list[float]] = {name: [] for name in frames}
     maps: dict[str, list[float]] = {name: [] for name in frames if name != "none"}
-    theirs: list[float] = []
-    spent: dict[str, list[float]] = {"ours": [], "theirs": []}
+    eevee_times: list[float] = []
+    processor_seconds: dict[str, list[float]] = {"ours": [], "theirs": []}
     for turn in range(ROUNDS):
         points = moved(turn)
         for name, frame in frames.items():
             begin = time.process_time()
             ours[name].append(milliseconds(lambda f=frame, p=points: f.draw(p)))
             if name == "slices":
-                spent["ours"].append(time.process_time() - begin)
+                processor_seconds["ours"].append(time.process_time() - begin)
         for name in maps:
             points = moved(turn + 0.5)
             maps[name].append(milliseconds(lambda f=frames[name], p=points: f.draw_maps(p)))
         if turn % (ROUNDS // EEVEE_ROUNDS) == 0:
             begin = time.process_time()
-            theirs.append(milliseconds(lambda p=points: eevee.draw(p)))
-            spent["theirs"].append(time.process_time() - begin)
+            eevee_times.append(milliseconds(lambda p=points: eevee.draw(p)))
+            processor_seconds["theirs"].append(time.process_time() - begin)
     eevee.remove()
     frame_ms = {name: statistics.median(times[2:]) for name, times in ours.items()}
     map_ms = {name: statistics.median(times[2:]) for name, times in maps.items()}
-    eevee_ms = statistics.median(theirs[1:])
+    eevee_ms = statistics.median(eevee_times[1:])
     return {
         "frame_ratio_eevee": eevee_ms / frame_ms["slices"],
         "frame_ratio_eevee_cpu": (
-            statistics.median(spent["theirs"][1:]) / statistics.median(spent["ours"][2:])
+            statistics.median(processor_seconds["theirs"][1:])
+            / statistics.median(processor_seconds["ours"][2:])
         ),
         "deep_ratio_slices": frame_ms["deep"] / frame_ms["slices"],
         "deep_ratio_slices_map": map_ms["deep"] / map_ms["slices"],

@@ -21,15 +21,15 @@ HEAD_RADII = {"thin": 4.0e-5, "middle": 1.0e-4, "thick": 2.0e-4}
 
 
 def shadow_figures() -> dict[str, float]:
-    """t_error_<way>: on the ball; t_error_<groom>_<width>_<way>: on the head. Ways to place layers
-    are slicesN and deepN; none is light without shadow.
+    """t_error_<method>: on the ball; t_error_<groom>_<width>_<method>: on the head.
+    Methods of layers are slicesN and deepN; none is light without shadow.
     """
     ball = combed_strands(STRANDS).astype(np.float64)
-    found = {f"t_error_{way}": error for way, error in errors(ball, RADIUS, SUN).items()}
+    found = {f"t_error_{method}": error for method, error in errors(ball, RADIUS, SUN).items()}
     head = groom()
     strands = head.strands.astype(np.float64)
     for width, radius in HEAD_RADII.items():
         of_head = errors(strands, radius, HEAD_SUN, slices=(16,), layers=(4, 8, 16))
         name = f"t_error_{head.name.lower()}_{width}"
-        found |= {f"{name}_{way}": error for way, error in of_head.items()}
+        found |= {f"{name}_{method}": error for method, error in of_head.items()}
     return found

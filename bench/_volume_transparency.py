@@ -94,20 +94,20 @@ def sorted_picture(strands: np.ndarray, brightness: np.ndarray, camera: Camera) 
     run = seen[:, 1] - seen[:, 0]
     length = np.linalg.norm(run, axis=-1)
     normal = np.stack([-run[:, 1], run[:, 0]], axis=-1) / length[:, None]
-    share = (away * run).sum(axis=-1) / length**2
+    along = (away * run).sum(axis=-1) / length**2
 
     def between(ends: np.ndarray) -> np.ndarray:
-        mixed: np.ndarray = ends[:, 0] + share * (ends[:, 1] - ends[:, 0])
+        mixed: np.ndarray = ends[:, 0] + along * (ends[:, 1] - ends[:, 0])
         return mixed
 
     half = between(WIDTH_OF / 2.0 * camera.projection[1, 1] * SIZE / 2.0 / clip[..., 3])
     normals = np.broadcast_to(np.abs(normal), away.shape)
     alphas = OPACITY * strip_coverage((away * normal).sum(axis=-1), half, normals)
-    alphas[(share < 0.0) | (share > 1.0)] = 0.0
+    alphas[(along < 0.0) | (along > 1.0)] = 0.0
     colors = np.broadcast_to(brightness[:, None], (*alphas.shape, 3))
     depths = between(clip[..., 2] / clip[..., 3])
-    shares = layer_fractions(depths, alphas, layers=RIBBONS, unseen_fraction=0.0)
-    light = np.einsum("pn,pnc->pc", shares, colors)
+    layer_weights = layer_fractions(depths, alphas, layers=RIBBONS, unseen_fraction=0.0)
+    light = np.einsum("pn,pnc->pc", layer_weights, colors)
     exact = np.column_stack([light, 1.0 - np.prod(1.0 - alphas, axis=-1)])
     return exact.reshape(SIZE, SIZE, 4)
 
@@ -115,18 +115,18 @@ def sorted_picture(strands: np.ndarray, brightness: np.ndarray, camera: Camera) 
 def cost_ratios() -> dict[str, float]:
     """All methods take turns, so that load on the machine affects them alike."""
     camera, shown = _ball(WIDTH, HEIGHT)
-    ways = {way: _with(shown, way) for way in ("none", "hashed", "layers")}
+    snapshots = {method: _with(shown, method) for method in ("none", "hashed", "layers")}
     target, color = _target(WIDTH, HEIGHT)
-    passes = {way: StrandPass() for way in ways}
-    times: dict[str, list[float]] = {way: [] for way in ways}
+    passes = {method: StrandPass() for method in snapshots}
+    times: dict[str, list[float]] = {method: [] for method in snapshots}
     for _ in range(ROUNDS + 1):
-        for way, own in ways.items():
+        for method, own in snapshots.items():
             begin = time.perf_counter()
             with drawing_into(target):
                 target.clear(color=(0.0, 0.0, 0.0, 0.0), depth=1.0)
-                passes[way].draw(own, camera, WIDTH, HEIGHT)
+                passes[method].draw(own, camera, WIDTH, HEIGHT)
             color.read()
-            times[way].append(time.perf_counter() - begin)
+            times[method].append(time.perf_counter() - begin)
     opaque, *others = (statistics.median(own[1:]) for own in times.values())
     names = ("transparency_cost_hashed", "transparency_cost_layers")
     return {name: took / opaque for name, took in zip(names, others, strict=True)}
@@ -138,12 +138,12 @@ def noise_figures() -> dict[str, float]:
     bare = replace(shown, strand_settings=StrandSettings(transparency="none", minimum_width=0.0))
     exact = render_image(bare, camera, width, height, 8)
     return {
-        f"transparency_noise_{way}": float(
-            np.abs(render_image(_with(shown, way), camera, width, height, 1) - exact)[
+        f"transparency_noise_{method}": float(
+            np.abs(render_image(_with(shown, method), camera, width, height, 1) - exact)[
                 ..., :3
             ].mean()
         )
-        for way in ("none", "hashed", "layers")
+        for method in ("none", "hashed", "layers")
     }
 
 
@@ -160,8 +160,8 @@ def _ball(width: int, height: int) -> tuple[Camera, Snapshot]:
     return Camera(eye, perspective(np.radians(30.0), width / height, 0.1, 20.0)), shown
 
 
-def _with(shown: Snapshot, way: str) -> Snapshot:
-    return replace(shown, strand_settings=StrandSettings(transparency=way))
+def _with(shown: Snapshot, method: str) -> Snapshot:
+    return replace(shown, strand_settings=StrandSettings(transparency=method))
 
 
 def _target(width: int, height: int) -> tuple[Any, Any]:

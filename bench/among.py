@@ -74,8 +74,8 @@ FIELDS = (
     ForceField("vortex", strength=2.0, shape="plane", distance=Falloff(1.0)),
     ForceField("turbulence", strength=4.0, size=0.2),
 )
-AT_LEAST = {"volume_kept": 0.8, "volume_kept_bent": 0.8}
-AT_MOST = {
+MIN_LIMITS = {"volume_kept": 0.8, "volume_kept_bent": 0.8}
+MAX_LIMITS = {
     "rest_motion_mm": 0.01,
     "crossing_percent": 5.0,
     "crossing_across_percent": 5.0,
@@ -91,17 +91,17 @@ def main() -> int:
     options = argparse.ArgumentParser()
     options.add_argument("--pictures", type=Path, help="folder of pictures of a ponytail")
     options.add_argument("--skip-cost", action="store_true", help="all but the slow part")
-    asked = options.parse_args()
+    arguments = options.parse_args()
     start_bench()
     found: dict[str, object] = {"guides": GUIDES}
     found |= in_blender()
     found |= volumes() | {"rest_motion_mm": rest_motion()} | crossings() | halves()
-    if not asked.skip_cost:
+    if not arguments.skip_cost:
         for name, count in SIZES.items():
             found |= costs(name, count)
-    if asked.pictures is not None:
-        draw(asked.pictures)
-    return report(found, REFERENCE, at_most=AT_MOST, at_least=AT_LEAST)
+    if arguments.pictures is not None:
+        draw(arguments.pictures)
+    return report(found, REFERENCE, max_limits=MAX_LIMITS, min_limits=MIN_LIMITS)
 
 
 def tail(count: int, narrow: float = 0.012, wide: float = 0.04, length: float = 0.3) -> np.ndarray:
@@ -128,8 +128,8 @@ def volumes() -> dict[str, object]:
                 drive = Drive(grid, grid, moving(frame), GRAVITY)
                 settings = DynamicsSettings(volume=volume, **SOFT)
                 state = advance(state, drive, settings, 1.0 / FPS)
-            kept = cells_of(state.grid, apart) / cells_of(grid, apart)
-            found[name + end] = round(kept, 3)
+            volume_ratio = cells_of(state.grid, apart) / cells_of(grid, apart)
+            found[name + end] = round(volume_ratio, 3)
     return found
 
 
@@ -179,8 +179,12 @@ def in_blender() -> dict[str, object]:
         followed = style_follow()
     finally:
         unregister()
-    worst = max(errors, key=errors.__getitem__)
-    found = {"field_error": errors[worst], "field_worst": worst, "field_cases": len(errors)}
+    worst_case = max(errors, key=errors.__getitem__)
+    found = {
+        "field_error": errors[worst_case],
+        "field_worst": worst_case,
+        "field_cases": len(errors),
+    }
     return found | followed
 
 
@@ -197,13 +201,13 @@ def crossings() -> dict[str, object]:
                 Groom(grid[part], settings, state=swinging(grid[part], side[part]))
                 for part in parts
             ]
-            worst = 0.0
+            max_fraction = 0.0
             for _ in range(round(SECONDS * FPS)):
                 play_frame(grooms, [grid[part] for part in parts], 1.0 / FPS)
                 ends = np.concatenate([groom.state.grid for groom in grooms])
                 beyond = ends[:, CVS // 2 :, 0].mean(axis=1) * side
-                worst = max(worst, float((beyond < -0.002).mean()))
-            found[f"{name}_percent{end}"] = round(100.0 * worst, 1)
+                max_fraction = max(max_fraction, float((beyond < -0.002).mean()))
+            found[f"{name}_percent{end}"] = round(100.0 * max_fraction, 1)
     return found
 
 

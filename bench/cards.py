@@ -25,7 +25,7 @@ REFERENCE = (
     "themselves; the three-pass scheme"
 )
 #: fractions of pixels that blend in the wrong order, with the orders of the files
-AT_MOST = {
+MAX_LIMITS = {
     "order_wrong_sorted": 0.038,
     "order_wrong_baked_sorted": 0.088,
     "order_wrong_guides_sorted": 0.035,
@@ -43,7 +43,7 @@ PARTS = {
 def main(names: list[str]) -> int:
     start()
     found = measured(PARTS, names)
-    return report(found, REFERENCE, at_most=AT_MOST)
+    return report(found, REFERENCE, max_limits=MAX_LIMITS)
 
 
 sys.exit(main(sys.argv[1:]))

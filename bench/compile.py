@@ -91,8 +91,10 @@ def main(arguments: list[str]) -> int:
             f"{name}_reference_seconds": reference,
             f"{name}_ratio": seconds / reference,
         }
-    limits = {f"{name}_ratio": most for name, most in LIMITS.items()} if is_software() else {}
-    return report(found, REFERENCE, at_most=limits)
+    limits = (
+        {f"{name}_ratio": max_ratio for name, max_ratio in LIMITS.items()} if is_software() else {}
+    )
+    return report(found, REFERENCE, max_limits=limits)
 
 
 def in_own_process(name: str) -> tuple[float, float]:
@@ -112,12 +114,12 @@ def compiled(scene: Scene) -> tuple[float, float]:
 
 def first_of(work: Callable[[], None]) -> float:
     """The seconds by which the first run takes longer than the second."""
-    taken = []
+    times = []
     for _ in range(2):
         began = time.process_time()
         work()
-        taken.append(time.process_time() - began)
-    return taken[0] - taken[1]
+        times.append(time.process_time() - began)
+    return times[0] - times[1]
 
 
 def _picture() -> Callable[[], None]:

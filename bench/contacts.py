@@ -45,7 +45,7 @@ from hairloom.addon.strands.closest_point import closest_point
 REFERENCE = "the triangles of the colliders"
 FPS, SAMPLES = 60.0, 6
 #: guides that pass through thin solids; depth in a head [mm]
-AT_MOST = {"*_passed": 0, "*_demo_depth_worst_mm": 0.5, "*_fast_depth_worst_mm": 1.0}
+MAX_LIMITS = {"*_passed": 0, "*_demo_depth_worst_mm": 0.5, "*_fast_depth_worst_mm": 1.0}
 #: Speeds of thin solids [m/s].
 SPEEDS = (1.0, 2.0, 2.8, 4.0, 5.6)
 #: A head at 5 Hz and 5.6 m/s.
@@ -88,8 +88,8 @@ class Depths:
 def dense(grid: np.ndarray) -> np.ndarray:
     """Points evenly along the free segments, (n, m, 3); every SAMPLES-th is a CV."""
     free = grid[:, 1:]
-    share = np.linspace(0.0, 1.0, SAMPLES, endpoint=False)[:, None]
-    between = free[:, :-1, None] * (1.0 - share) + free[:, 1:, None] * share
+    fraction = np.linspace(0.0, 1.0, SAMPLES, endpoint=False)[:, None]
+    between = free[:, :-1, None] * (1.0 - fraction) + free[:, 1:, None] * fraction
     return np.concatenate([between.reshape(len(grid), -1, 3), free[:, -1:]], axis=1)
 
 
@@ -241,16 +241,16 @@ def place(y: float) -> np.ndarray:
 
 def crosses(begin: np.ndarray, end: np.ndarray, core: np.ndarray) -> np.ndarray:
     """Whether the line from each begin to its end (..., 3) crosses any triangle."""
-    way = end - begin
+    segment = end - begin
     found = np.zeros(begin.shape[:-1], bool)
     for a, b, c in core:
         one, two = b - a, c - a
-        side = np.cross(way, two)
+        side = np.cross(segment, two)
         scale = side @ one
         with np.errstate(divide="ignore", invalid="ignore"):
             u = ((begin - a) * side).sum(axis=-1) / scale
             turned = np.cross(begin - a, one)
-            v = (way * turned).sum(axis=-1) / scale
+            v = (segment * turned).sum(axis=-1) / scale
             t = turned @ two / scale
         found |= (u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0) & (t <= 1)
     return found
@@ -303,11 +303,11 @@ def eared_ball() -> tuple[Surface, np.ndarray]:
         np.array([(-0.1 * np.cos(a), 0.1 * np.sin(a)) for a in np.linspace(0.0, np.pi, 32)]), 48
     )
     ball = Surface(ball.positions + np.array([0.0, 0.0, -0.11], np.float32), ball.triangles)
-    share = np.linspace(0.0, 1.0, 12)
-    half = 0.002 * np.sqrt(1.0 - share**2)
-    bowl = 0.006 * share**2
-    profile = [(b - h, r) for b, h, r in zip(bowl, half, share, strict=True)]
-    profile += [(b + h, r) for b, h, r in zip(bowl, half, share, strict=True)][-2::-1]
+    fraction = np.linspace(0.0, 1.0, 12)
+    half = 0.002 * np.sqrt(1.0 - fraction**2)
+    bowl = 0.006 * fraction**2
+    profile = [(b - h, r) for b, h, r in zip(bowl, half, fraction, strict=True)]
+    profile += [(b + h, r) for b, h, r in zip(bowl, half, fraction, strict=True)][-2::-1]
     shell = revolved(np.array(profile), 40)
     p = shell.positions
     placed = np.stack([p[:, 1] * 0.0175, p[:, 0], p[:, 2] * 0.03 + 0.01], axis=1)
@@ -324,7 +324,7 @@ def eared_ball() -> tuple[Surface, np.ndarray]:
 HEADS: dict[str, Callable[[], Rig]] = {"sintel": sintel_rig, "built_in": built_in_rig}
 
 
-def figures(make: Callable[..., Form], asked: Sequence[str]) -> dict[str, dict[str, float]]:
+def figures(make: Callable[..., Form], case_names: Sequence[str]) -> dict[str, dict[str, float]]:
     found: dict[str, dict[str, float]] = {}
     settings = DynamicsSettings()
     for name, solid in (
@@ -333,12 +333,12 @@ def figures(make: Callable[..., Form], asked: Sequence[str]) -> dict[str, dict[s
         ("finger_mesh", finger_mesh),
         ("ear", ear),
     ):
-        if "thin" in asked:
+        if "thin" in case_names:
             for speed in SPEEDS:
                 found[f"{name}_{speed}"] = swung(solid(settings), make, settings, speed)
                 print(name, speed, found[f"{name}_{speed}"], flush=True)
     for name in HEADS:
-        if name not in asked:
+        if name not in case_names:
             continue
         rig = HEADS[name]()
         low, high = rig.head.bounds()
@@ -361,7 +361,7 @@ def main(arguments: list[str]) -> int:
     found = figures(ComputeForm if use_compute else NumpyForm, parts)
     flat = {f"{name}_{key}": value for name, part in found.items() for key, value in part.items()}
     form = {"form": "compute shaders" if use_compute else "numpy"}
-    return report(form | flat, REFERENCE, at_most=AT_MOST)
+    return report(form | flat, REFERENCE, max_limits=MAX_LIMITS)
 
 
 sys.exit(main(sys.argv[1:]))

@@ -18,7 +18,7 @@ from hairloom.addon.blender.scene.curves import read_curves, write_curves
 from hairloom.addon.strands import StrandSet
 
 REFERENCE = "points.foreach_get('position')"
-AT_MOST = {"read_ms": 50.0}
+MAX_LIMITS = {"read_ms": 50.0}
 CURVES, POINTS, ROUNDS = 100_000, 16, 9
 
 
@@ -58,7 +58,7 @@ def main() -> int:
         "reference_ms": reference_ms,
         "ratio": reference_ms / read_ms,
     }
-    return report(found, REFERENCE, at_most=AT_MOST)
+    return report(found, REFERENCE, max_limits=MAX_LIMITS)
 
 
 sys.exit(main())

@@ -35,9 +35,13 @@ from hairloom.addon.dynamics.step import Drive
 from hairloom.addon.strands import StrandSet, Surface
 
 REFERENCE = "Hair Dynamics, Physics, surface collision, 10 x 15 (as shipped)"
-AT_MOST = {"stretch_max_percent": 1.0, "penetration_sphere_mm": 0.001, "penetration_mesh_mm": 0.1}
+MAX_LIMITS = {
+    "stretch_max_percent": 1.0,
+    "penetration_sphere_mm": 0.001,
+    "penetration_mesh_mm": 0.1,
+}
 #: times faster than the peer
-AT_LEAST = {"ratio_numpy": 1.0, "ratio_compute": 1.0}
+MIN_LIMITS = {"ratio_numpy": 1.0, "ratio_compute": 1.0}
 GUIDES, FPS, WARM_UP, SWING = 762, 60.0, 10, 60
 #: Enough that a busy minute of the machine does not affect all rounds.
 ROUNDS, SCALING_ROUNDS = 7, 3
@@ -52,7 +56,7 @@ def main() -> int:
     options = argparse.ArgumentParser()
     options.add_argument("--peer-10k", action="store_true", help="the peer with 10,000 guides too")
     options.add_argument("--rounds", type=int, default=ROUNDS, help="in which all take turns")
-    asked = options.parse_args()
+    arguments = options.parse_args()
     forms: Forms = {"numpy": NumpyForm}
     if has_compute():
         forms["compute"] = ComputeForm
@@ -62,7 +66,7 @@ def main() -> int:
     guides = guides_on(surface, GUIDES)
 
     found: dict[str, Any] = dict.fromkeys(("compute_ms", "ratio_compute"))
-    found |= race(forms, head, guides, field, asked.rounds)
+    found |= race(forms, head, guides, field, arguments.rounds)
     for name in forms:
         found[f"ratio_{name}"] = found["hair_dynamics_ms"] / found[f"{name}_ms"]
     found |= accuracy(forms, guides, surface, field)
@@ -71,9 +75,9 @@ def main() -> int:
         found["framerate_tip_percent" if name == "numpy" else f"{name}_framerate_tip_percent"] = (
             frame_rates(make, guides, field)
         )
-    if asked.peer_10k:
+    if arguments.peer_10k:
         found["hair_dynamics_10k_ms"] = peer_10k(head, surface)
-    return report(found, REFERENCE, at_most=AT_MOST, at_least=AT_LEAST)
+    return report(found, REFERENCE, max_limits=MAX_LIMITS, min_limits=MIN_LIMITS)
 
 
 def race(
@@ -132,10 +136,14 @@ def accuracy(
     field; depth is measured at the triangles themselves.
     """
     depth = depth_in(surface)
-    worst = {"stretch_max_percent": 0.0, "penetration_sphere_mm": 0.0, "penetration_mesh_mm": 0.0}
+    max_values = {
+        "stretch_max_percent": 0.0,
+        "penetration_sphere_mm": 0.0,
+        "penetration_mesh_mm": 0.0,
+    }
 
     def note(key: str, value: float) -> None:
-        worst[key] = max(worst[key], value)
+        max_values[key] = max(max_values[key], value)
 
     def watch_sphere(state: DynamicsState, drive: Drive) -> None:
         note("stretch_max_percent", max_stretch(state) * 100.0)
@@ -152,15 +160,15 @@ def accuracy(
             form = make(start(guides.grid))
             play(form, Shake(guides.grid, (collider,)).drives(FPS, 2.0), SETTINGS, FPS, watch)
             form.release()
-    return worst
+    return max_values
 
 
 def scaling(forms: Forms, surface: Surface, field: DistanceField) -> dict[str, float]:
     """Milliseconds per frame for growing numbers of guides, and the exponent that fits them
     best."""
-    most = guides_on(surface, SIZES[-1]).grid
+    all_guides = guides_on(surface, SIZES[-1]).grid
     chosen = np.random.default_rng(1).permutation(SIZES[-1])
-    shakes = {size: Shake(most[np.sort(chosen[:size])], (field,)) for size in SIZES}
+    shakes = {size: Shake(all_guides[np.sort(chosen[:size])], (field,)) for size in SIZES}
     medians: dict[str, list[float]] = {}
     for _ in range(SCALING_ROUNDS):
         for name, make in forms.items():

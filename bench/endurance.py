@@ -27,7 +27,7 @@ from hairloom.addon.dynamics.step import Drive
 
 SECONDS, LIMIT = 2.0, 1.02
 REFERENCE = "lengths at rest, with what curls give"
-AT_MOST = {"failures": 0, "reach_along_strand": LIMIT, "shake_failed": 0}
+MAX_LIMITS = {"failures": 0, "reach_along_strand": LIMIT, "shake_failed": 0}
 
 
 @dataclass
@@ -47,12 +47,12 @@ def main() -> int:
     options.add_argument("--guides", type=int, default=12, help="guides in each run")
     options.add_argument("--minutes", type=float, default=10.0, help="of the shake; 0: none")
     options.add_argument("--compute", action="store_true", help="on the GPU instead of in numpy")
-    asked = options.parse_args()
+    arguments = options.parse_args()
     start()
-    found: dict[str, object] = {"form": "compute" if asked.compute else "numpy"}
+    found: dict[str, object] = {"form": "compute" if arguments.compute else "numpy"}
     tally, begin = Tally(), time.perf_counter()
-    for seed in range(asked.first, asked.first + asked.runs):
-        note(tally, seed, random_run(seed, asked.guides), compute=asked.compute)
+    for seed in range(arguments.first, arguments.first + arguments.runs):
+        note(tally, seed, random_run(seed, arguments.guides), compute=arguments.compute)
         if tally.runs % 50 == 0:
             print(f"{tally.runs} runs, {len(tally.failures)} failed", flush=True)
     found |= {
@@ -62,10 +62,10 @@ def main() -> int:
         "reach_along_strand": round(tally.worst_ratio, 5),
         "worst_seed": tally.worst_seed,
     }
-    if asked.minutes:
-        found |= shake(ComputeForm if asked.compute else NumpyForm, asked.minutes)
+    if arguments.minutes:
+        found |= shake(ComputeForm if arguments.compute else NumpyForm, arguments.minutes)
     found["seconds"] = time.perf_counter() - begin
-    return report(found, REFERENCE, at_most=AT_MOST)
+    return report(found, REFERENCE, max_limits=MAX_LIMITS)
 
 
 def note(tally: Tally, seed: int, run: RandomRun, *, compute: bool) -> None:
@@ -81,8 +81,8 @@ def note(tally: Tally, seed: int, run: RandomRun, *, compute: bool) -> None:
         if not reach.is_finite:
             problem = "not finite"
 
-    begun = run.begin()
-    form: Form = ComputeForm(begun) if compute else NumpyForm(begun)
+    state = run.begin()
+    form: Form = ComputeForm(state) if compute else NumpyForm(state)
     try:
         play(form, run.drives(SECONDS), run.settings, run.fps, watch)
     except Exception:  # any exception is a failure of this seed, and the others go on
@@ -101,13 +101,15 @@ def shake(make: type[NumpyForm] | type[ComputeForm], minutes: float) -> dict[str
     """Shake a head in gusts for minutes: hair must keep its length, and its top speed may grow by
     less than half from the first quarter of the time to the last."""
     run = shaken(guide_count=60)
-    worst, speeds = 0.0, []
+    max_ratio, speeds = 0.0, []
 
     def watch(state: DynamicsState, _drive: Drive) -> None:
-        nonlocal worst
-        worst = max(worst, reach_of(state).along)
-        way = state.position - state.previous
-        speeds.append(float(np.sqrt((way * way).sum(axis=0)).max()) / state.substep)
+        nonlocal max_ratio
+        max_ratio = max(max_ratio, reach_of(state).along)
+        displacement = state.position - state.previous
+        speeds.append(
+            float(np.sqrt((displacement * displacement).sum(axis=0)).max()) / state.substep
+        )
 
     form = make(run.begin())
     play(form, run.drives(60.0 * minutes), run.settings, run.fps, watch)
@@ -116,10 +118,10 @@ def shake(make: type[NumpyForm] | type[ComputeForm], minutes: float) -> dict[str
     begin, end = max(speeds[:quarter]), max(speeds[-quarter:])
     return {
         "shake_minutes": minutes,
-        "shake_worst_ratio": round(worst, 5),
+        "shake_worst_ratio": round(max_ratio, 5),
         "shake_fastest_begin": round(begin, 3),
         "shake_fastest_end": round(end, 3),
-        "shake_failed": int(not (worst <= LIMIT and np.isfinite(end) and end < 1.5 * begin)),
+        "shake_failed": int(not (max_ratio <= LIMIT and np.isfinite(end) and end < 1.5 * begin)),
     }
 
 

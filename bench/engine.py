@@ -20,7 +20,7 @@ from _report import measured, report, start
 
 REFERENCE = "the same scene at 1,024 samples; another process; the tenth frame"
 #: wrong coordinates show other parts of the picture, with a difference near 1
-AT_MOST = {"polar_difference": 0.006}
+MAX_LIMITS = {"polar_difference": 0.006}
 PARTS = {
     "picture": picture_figures,
     "skin": skin_figures,
@@ -32,7 +32,7 @@ PARTS = {
 def main(names: list[str]) -> int:
     start()
     found = measured(PARTS, names)
-    return report(found, REFERENCE, at_most=AT_MOST)
+    return report(found, REFERENCE, max_limits=MAX_LIMITS)
 
 
 sys.exit(main(sys.argv[1:]))

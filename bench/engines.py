@@ -32,7 +32,7 @@ PARTS = {
     "shells": shell_figures,
 }
 #: figure -> upper limit, and lower limit
-AT_MOST = {
+MAX_LIMITS = {
     "*plain_levels_visible": 1,
     "*plain_color_percent": 10.0,
     "*page_bytes": 6e6,
@@ -48,7 +48,7 @@ AT_MOST = {
     "*spring_joints": 120,
     "levels_pop_flip": 0.05,
 }
-AT_LEAST = {"*opaque_percent": 25.0, "*strand_texels": 1.5}
+MIN_LIMITS = {"*opaque_percent": 25.0, "*strand_texels": 1.5}
 
 
 def main(arguments: list[str]) -> int:
@@ -63,7 +63,7 @@ def main(arguments: list[str]) -> int:
         found |= level_figures(names)
     if "atlas" in parts:
         found |= atlas_figures(names)
-    return report(found, REFERENCE, at_most=AT_MOST, at_least=AT_LEAST)
+    return report(found, REFERENCE, max_limits=MAX_LIMITS, min_limits=MIN_LIMITS)
 
 
 sys.exit(main(sys.argv[1:]))

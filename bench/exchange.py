@@ -32,10 +32,10 @@ from _report import report, start
 FEW, WHOLE = (1_000, 30, 5, 0.5), (10_000, 1_000, 100, 2.0)
 REFERENCE = "Blender's own Alembic and USD of the same strands, positions and widths only"
 #: counts that must be 0, and limits of sizes [MB]
-AT_MOST: dict[str, float] = dict.fromkeys(
+MAX_LIMITS: dict[str, float] = dict.fromkeys(
     ("fuzz_failures", "kill_failures", "kill_mixed", "kill_leftovers"), 0
 )
-AT_MOST |= {"usd_file_mb": 81.0, "usd_write_memory_mb": 165.0, "usd_read_memory_mb": 240.0}
+MAX_LIMITS |= {"usd_file_mb": 81.0, "usd_write_memory_mb": 165.0, "usd_read_memory_mb": 240.0}
 
 
 def main(chosen: list[str], *, is_whole: bool) -> int:
@@ -54,12 +54,12 @@ def main(chosen: list[str], *, is_whole: bool) -> int:
     found: dict[str, Any] = {}
     for name in chosen or parts:
         measure = parts[name]
-        begun, processed = time.perf_counter(), processor_seconds()
+        wall_start, processed = time.perf_counter(), processor_seconds()
         figures = measure()
-        wall, processor = time.perf_counter() - begun, processor_seconds() - processed
+        wall, processor = time.perf_counter() - wall_start, processor_seconds() - processed
         print(f"{name}, {wall:.0f} s, processor {processor:.0f} s", flush=True)
         found |= figures
-    return report({**({} if chosen else summary(found)), **found}, REFERENCE, at_most=AT_MOST)
+    return report({**({} if chosen else summary(found)), **found}, REFERENCE, max_limits=MAX_LIMITS)
 
 
 def summary(found: dict[str, float]) -> dict[str, float]:

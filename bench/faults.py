@@ -34,7 +34,7 @@ from hairloom.addon.exchange.usd.usd_library import usd_library
 REFERENCE = "the result before, or the new one; a limit of the system on what a file may take"
 SEED = 22
 #: figure -> upper limit, and lower limit
-AT_MOST = {
+MAX_LIMITS = {
     "fault_losses": 0,
     "fault_mixed": 0,
     "fault_untrue_messages": 0,
@@ -48,7 +48,7 @@ AT_MOST = {
     "planted_code_runs": 0,
     "endless_waits": 0,
 }
-AT_LEAST = {"autosaves_while_playing": 1}
+MIN_LIMITS = {"autosaves_while_playing": 1}
 _PLANTED = "import pathlib; pathlib.Path(__file__).with_name('it_ran').touch()"
 
 
@@ -81,7 +81,7 @@ def verbs(count: int = 255) -> dict[str, Any]:
 
 def planted() -> dict[str, int]:
     """Whether modules planted in the current folder or the environment run in any child process."""
-    before, ran = os.getcwd(), 0
+    before, run_count = os.getcwd(), 0
     usd_library(Path())  # otherwise this process, which is no Blender, would find the planted one
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -95,17 +95,17 @@ def planted() -> dict[str, int]:
             for begin in (find_python, can_draw):
                 begin.cache_clear()
                 begin()
-                ran += (folder / "it_ran").exists()
+                run_count += (folder / "it_ran").exists()
             try:
                 read_usd(folder / "hair.usda", python=python_command())
             except HairloomError as error:
                 print(error)  # it has no curves
-            ran += (folder / "it_ran").exists()
+            run_count += (folder / "it_ran").exists()
         finally:
             os.chdir(before)
             sys.path.remove("")
             del os.environ["PYTHONPATH"], os.environ["PYTHONUSERBASE"]
-    return {"planted_code_runs": ran}
+    return {"planted_code_runs": run_count}
 
 
 def autosave() -> dict[str, int]:
@@ -133,7 +133,7 @@ def main(arguments: list[str]) -> int:
     found: dict[str, Any] = {}
     for part in chosen.values():
         found |= part(*map(int, arguments[1:]))
-    return report(found, REFERENCE, at_most=AT_MOST, at_least=AT_LEAST)
+    return report(found, REFERENCE, max_limits=MAX_LIMITS, min_limits=MIN_LIMITS)
 
 
 sys.exit(main(sys.argv[1:]))

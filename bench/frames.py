@@ -41,7 +41,7 @@ STRANDS, WIDTH, HEIGHT, ROUNDS = 3000, 320, 240, 7
 #: turn of a view from frame to frame [rad]
 TURN = float(np.radians(1.5))
 #: figure -> upper limit
-AT_MOST = {
+MAX_LIMITS = {
     "readbacks_per_frame": 0,
     "playing_ratio": 1.2,
     "still_readbacks": 0,
@@ -65,7 +65,7 @@ def main() -> int:
         **stage.two_view_figures(),
         **stage.groom_figures(),
     }
-    return report(found, REFERENCE, at_most=AT_MOST)
+    return report(found, REFERENCE, max_limits=MAX_LIMITS)
 
 
 @dataclass(eq=False)
@@ -146,17 +146,21 @@ class Stage:
 
     def still_figures(self) -> dict[str, float]:
         """An unchanged view shown from its kept picture, relative to drawing it again."""
-        own, hair, kept = StrandPass(), self.hair(), CachedPicture()
+        own, hair, kept_picture = StrandPass(), self.hair(), CachedPicture()
 
         def keep() -> None:
-            kept.begin()
-            own.draw(lit, camera, WIDTH, HEIGHT, output="viewport", view=ViewState(picture=kept))
+            kept_picture.begin()
+            own.draw(
+                lit, camera, WIDTH, HEIGHT, output="viewport", view=ViewState(picture=kept_picture)
+            )
 
         camera = self.camera(0.0)
         lit = replace(hair, lights=three_point_lights(camera.view))
         self.put(keep)
-        calls = gpu_calls(lambda: self.put(kept.show))
-        afresh, again = self.least(lambda: self.draw(own, hair, 0.0), lambda: self.put(kept.show))
+        calls = gpu_calls(lambda: self.put(kept_picture.show))
+        afresh, again = self.least(
+            lambda: self.draw(own, hair, 0.0), lambda: self.put(kept_picture.show)
+        )
         return {
             "still_readbacks": calls["reads"],
             "still_draws": calls["draws"],
@@ -173,8 +177,11 @@ class Stage:
             self.draw(own, hair, 0.0)
         times: tuple[list[float], list[float]] = [], []
         for angle in angles[1:].tolist():
-            for own, is_turning, taken in ((all_maps, False, times[0]), (few_maps, True, times[1])):
-                taken.append(
+            for own, is_turning, frame_times in (
+                (all_maps, False, times[0]),
+                (few_maps, True, times[1]),
+            ):
+                frame_times.append(
                     self.took(
                         lambda o=own, a=angle, t=is_turning: self.draw(
                             o, hair, a, is_turning=t, is_moving=t

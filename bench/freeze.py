@@ -38,7 +38,7 @@ from hairloom.addon.blender.setup.sample_scene import add_sample_scene
 REFERENCE = "a heartbeat without a thread, and what Blender itself takes"
 #: longest block of the main thread [ms of processor time]: with default settings, while 100,000
 #: children arrive, and while these are combed
-AT_MOST = {"default_ms": 40.0, "arrival_100k_ms": 100.0, "combing_100k_ms": 100.0}
+MAX_LIMITS = {"default_ms": 40.0, "arrival_100k_ms": 100.0, "combing_100k_ms": 100.0}
 RATE, FRAMES, MOVES, BEATS = 24.0, 24, 8, 2000
 #: section and name of a slider -> the value that it is dragged to
 SLIDERS = {
@@ -173,7 +173,7 @@ def main() -> int:
     }
     previews.stop_all()
     hairloom.unregister()
-    return report(figures, REFERENCE, at_most=AT_MOST)
+    return report(figures, REFERENCE, max_limits=MAX_LIMITS)
 
 
 def compile_programs(form: str) -> None:
@@ -200,8 +200,8 @@ def _slug(kind: str) -> str:
 def queued_time() -> float:
     """How long this thread has waited for a processor so far [s]; 0 if the system does not report
     it."""
-    told = Path("/proc/thread-self/schedstat")
-    return int(told.read_text().split()[1]) / 1e9 if told.exists() else 0.0
+    schedstat = Path("/proc/thread-self/schedstat")
+    return int(schedstat.read_text().split()[1]) / 1e9 if schedstat.exists() else 0.0
 
 
 def comb(hair: bpy.types.Object, scene: bpy.types.Scene) -> None:

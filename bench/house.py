@@ -26,7 +26,7 @@ from hairloom.addon.parameters import ALL_SETTINGS
 REFERENCE = "the tree, and the last runs of make test and of all that a commit has to pass"
 SECTIONS = {section: each.__name__ for section, each in ALL_SETTINGS.items()}
 #: figure -> upper limit
-AT_MOST = {
+MAX_LIMITS = {
     "arrows_up": 0,
     "import_circles": 0,
     "module_mutable_names": house.MAX_MUTABLE,
@@ -36,11 +36,11 @@ AT_MOST = {
     "ci_minutes": 25,
     "test_minutes": 8,
 }
-AT_LEAST = {"load_runs_passed": 10}
+MIN_LIMITS = {"load_runs_passed": 10}
 
 
 def figures() -> dict[str, float | None]:
-    taken = timings()
+    minutes = timings()
     return {
         "arrows_up": len(house.upward_imports()),
         "import_circles": int(bool(house.import_circle())),
@@ -49,8 +49,8 @@ def figures() -> dict[str, float | None]:
         "sections_to_touch_for_a_setting": 1 + len(house.files_that_list_sections(SECTIONS)),
         "addon_lines": house.addon_lines(),
         "retired_terms": sum(words.count_uses(found) for found in words.uses().values()),
-        "ci_minutes": taken.get("ci_minutes"),
-        "test_minutes": taken.get("test_minutes"),
+        "ci_minutes": minutes.get("ci_minutes"),
+        "test_minutes": minutes.get("test_minutes"),
         "load_runs_passed": passed_in_a_row(recorded_runs()),
     }
 
@@ -66,7 +66,7 @@ def main() -> int:
     if parser.parse_args().run:
         run()
     start()
-    return report(figures(), REFERENCE, at_most=AT_MOST, at_least=AT_LEAST)
+    return report(figures(), REFERENCE, max_limits=MAX_LIMITS, min_limits=MIN_LIMITS)
 
 
 sys.exit(main())

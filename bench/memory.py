@@ -32,7 +32,7 @@ from hairloom.addon.shading.lights import three_point_lights
 from hairloom.addon.shading.volume.settings import VolumeSettings
 
 REFERENCE = "the budget, and the same picture with more memory"
-AT_MOST = {"bytes_500k_4k": 1.5e9, "missing": 0, "small_missing": 0, "small_difference": 0.0}
+MAX_LIMITS = {"bytes_500k_4k": 1.5e9, "missing": 0, "small_missing": 0, "small_difference": 0.0}
 LITTLE = 128  # [MB]
 
 
@@ -64,7 +64,7 @@ PARTS = {"large": large, "small": small}
 
 def main(names: list[str]) -> int:
     start()
-    return report(measured(PARTS, names), REFERENCE, at_most=AT_MOST)
+    return report(measured(PARTS, names), REFERENCE, max_limits=MAX_LIMITS)
 
 
 def drawn(strand_count: int, width: int, height: int, shadows: str) -> tuple[np.ndarray, Any]:

@@ -45,7 +45,7 @@ LIGHTS = (
     Light.sun((0.7, -0.2, 0.5), (1.0, 0.9, 0.8), 1.0),
 )
 #: figure -> upper limit
-AT_MOST = {"no_atomics_flip": 0.02, "hashed_cost": 1.0, "deep_difference": 1.0}
+MAX_LIMITS = {"no_atomics_flip": 0.02, "hashed_cost": 1.0, "deep_difference": 1.0}
 
 
 def main() -> int:
@@ -58,7 +58,7 @@ def main() -> int:
         **map_figures(sitter),
         **cost_figures(),
     }
-    return report(found, REFERENCE, at_most=AT_MOST)
+    return report(found, REFERENCE, max_limits=MAX_LIMITS)
 
 
 def shown(sitter: Sitter, transparency: str) -> Snapshot:
@@ -137,20 +137,23 @@ def cost_figures() -> dict[str, float]:
     """hashed_cost: minimum time of a frame over that with layers; they take turns."""
     width, height = 800, 600
     camera, ball = _ball(width, height)
-    ways = {
-        way: replace(ball, strand_settings=StrandSettings(transparency=way))
-        for way in ("layers", "hashed")
+    snapshots = {
+        method: replace(ball, strand_settings=StrandSettings(transparency=method))
+        for method in ("layers", "hashed")
     }
     target, color = _target(width, height)
-    passes, times = {way: StrandPass() for way in ways}, {way: [] for way in ways}
+    passes, times = (
+        {method: StrandPass() for method in snapshots},
+        {method: [] for method in snapshots},
+    )
     for _ in range(ROUNDS + 1):
-        for way, own in ways.items():
+        for method, own in snapshots.items():
             begin = time.perf_counter()
             with drawing_into(target):
                 target.clear(color=(0.0, 0.0, 0.0, 0.0), depth=1.0)
-                passes[way].draw(own, camera, width, height)
+                passes[method].draw(own, camera, width, height)
             color.read()
-            times[way].append(time.perf_counter() - begin)
+            times[method].append(time.perf_counter() - begin)
     layers, hashed = (min(own[1:]) for own in times.values())
     return {"hashed_cost": hashed / layers}
 

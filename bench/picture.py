@@ -44,7 +44,7 @@ DEPTH_TOLERANCE, BLUR_SIZE = 0.01, 320
 #: size of a picture that is not timed [percent]
 WARMING_UP = 10
 #: figure -> upper limit
-AT_MOST = {
+MAX_LIMITS = {
     **{f"over_{engine}_depth_mismatch_percent": 0.1 for engine in ENGINES},
     **{f"over_{engine}_outside_difference": 0.0 for engine in ENGINES},
     "over_eevee_seconds_ratio": 1.0,
@@ -187,7 +187,7 @@ def main() -> int:
     start()
     parts = {name: partial(over, name) for name in ENGINES}
     parts |= {"blur": blur, "environment": environment, "soft_shadows": _soft_shadows}
-    return report(measured(parts, sys.argv[1:]), REFERENCE, at_most=AT_MOST)
+    return report(measured(parts, sys.argv[1:]), REFERENCE, max_limits=MAX_LIMITS)
 
 
 def _soft_shadows() -> dict[str, Any]:

@@ -37,7 +37,7 @@ from hairloom.addon.render.strand_pass import StrandPass
 from hairloom.addon.shading.lights import three_point_lights
 
 STRANDS, WIDTH, HEIGHT, FRAMES = 11_400, 960, 720, 30
-AT_LEAST = {"draw_ratio": 0.024}
+MIN_LIMITS = {"draw_ratio": 0.024}
 WAYS = {
     "cpu": ("simulate_ms", "interpolate_ms", "draw_ms"),
     "gpu": ("gpu_simulate_ms", "gpu_ride_ms", "gpu_draw_ms"),
@@ -145,11 +145,11 @@ def main() -> int:
             lambda s=snapshot: drawn(lambda: riding.draw(s, camera, WIDTH, HEIGHT)),
         )
     medians = watch.medians()
-    for way, stages in WAYS.items():
-        medians[f"{way}_frame_ms"] = round(sum(medians[stage] for stage in stages), 3)
+    for method, stages in WAYS.items():
+        medians[f"{method}_frame_ms"] = round(sum(medians[stage] for stage in stages), 3)
     medians |= {"strands": STRANDS, "draw_ratio": medians["lines_ms"] / medians["draw_ms"]}
     reference = "LINES, builtin UNIFORM_COLOR, batch_for_shader each frame"
-    return report(medians, reference, at_least=AT_LEAST)
+    return report(medians, reference, min_limits=MIN_LIMITS)
 
 
 sys.exit(main())

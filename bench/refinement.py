@@ -17,14 +17,14 @@ from _report import measured, report, start
 
 REFERENCE = "Blender's Interpolate Hair Curves node; one piece a segment; the exact curve"
 #: figure -> upper limit, and lower limit
-AT_MOST = {
+MAX_LIMITS = {
     "error_px_max": 0.5,
     "vertices_undivided_ratio": 1.5,
     "frame_ratio_undivided": 1.43,
     "gpu_cpu_difference": 1e-5,
     "coverage_eighth_difference": 0.03,
 }
-AT_LEAST = {"vertices_fixed64_ratio": 42.0}
+MIN_LIMITS = {"vertices_fixed64_ratio": 42.0}
 PARTS = {
     "views": view_figures,
     "node": node_figures,
@@ -34,7 +34,7 @@ PARTS = {
 def main(names: list[str]) -> int:
     start()
     found = measured(PARTS, names)
-    return report(found, REFERENCE, at_most=AT_MOST, at_least=AT_LEAST)
+    return report(found, REFERENCE, max_limits=MAX_LIMITS, min_limits=MIN_LIMITS)
 
 
 sys.exit(main(sys.argv[1:]))

@@ -43,7 +43,7 @@ from hairloom.addon.blender.setup.sample_scene import add_sample_scene
 from hairloom.addon.blender.strands.make_real import make_real
 
 REFERENCE = "the same scene before Make Real; Cycles"
-AT_MOST = {
+MAX_LIMITS = {
     "make_real_flip": 0.05,
     "real_light_percent": 25.0,
     "comb_ms": 100.0,
@@ -65,7 +65,7 @@ LOOKS = "black", "brown", "blond"
 def main(parts: list[str]) -> int:
     start()
     hairloom.register()
-    return report(measured(PARTS, parts), REFERENCE, at_most=AT_MOST)
+    return report(measured(PARTS, parts), REFERENCE, max_limits=MAX_LIMITS)
 
 
 def _made_real_figures() -> dict[str, float]:

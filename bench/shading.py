@@ -20,7 +20,7 @@ from _shading_reference import reference_figures
 
 REFERENCE = "rays through a dielectric cylinder; Cycles' Principled Hair (Chiang); numpy in float64"
 #: figure -> upper limit, and lower limit
-AT_MOST = {
+MAX_LIMITS = {
     "lobe_error_*": 0.01,
     "furnace_worst": 1.01,
     "lut_error": 0.005,
@@ -29,7 +29,7 @@ AT_MOST = {
     "slider_*_ms": 50.0,
     "frame_ratio_models": 1.6,
 }
-AT_LEAST = {"furnace_energy": 0.98}
+MIN_LIMITS = {"furnace_energy": 0.98}
 PARTS = {
     "cost": cost_figures,
     "reference": reference_figures,
@@ -42,7 +42,7 @@ PARTS = {
 def main(names: list[str]) -> int:
     start()
     found = measured(PARTS, names)
-    return report(found, REFERENCE, at_most=AT_MOST, at_least=AT_LEAST)
+    return report(found, REFERENCE, max_limits=MAX_LIMITS, min_limits=MIN_LIMITS)
 
 
 sys.exit(main(sys.argv[1:]))

@@ -23,7 +23,7 @@ from _sight_pictures import count_figures, cycles_figures, scale_flip
 
 REFERENCE = "hashed strands, which keep no lists; strands as wide as they are apart; Cycles"
 #: figure -> upper limit, and lower limit
-AT_MOST = {
+MAX_LIMITS = {
     "missing_percent": 0.0,
     "lost_curves": 0,
     "scale_flip": 0.02,
@@ -31,7 +31,7 @@ AT_MOST = {
     "count_light_percent": 5.0,
     "cycles_flip_hair": 0.15,
 }
-AT_LEAST = dict.fromkeys((f"cover_{name}" for name in GROOMS), 0.9)
+MIN_LIMITS = dict.fromkeys((f"cover_{name}" for name in GROOMS), 0.9)
 #: strands, width and height of the picture, factor on the widths with which strands grow
 CROWDED = (
     (100_000, 1920, 1440, 1.0),
@@ -68,7 +68,7 @@ PARTS: dict[str, Callable[[], dict[str, Any]]] = {
 def main(names: list[str]) -> int:
     start()
     found = measured(PARTS, names)
-    return report(found, REFERENCE, at_most=AT_MOST, at_least=AT_LEAST)
+    return report(found, REFERENCE, max_limits=MAX_LIMITS, min_limits=MIN_LIMITS)
 
 
 sys.exit(main(sys.argv[1:]))

@@ -68,7 +68,7 @@ GRAVITY = np.array([0.0, 0.0, -9.81])
 #: number, turns, radius and length [m] of coils; points of each before preparation
 COILS, TURNS, COIL_RADIUS, COIL_LENGTH, COIL_POINTS = 8000, 20, 0.004, 0.15, 400
 #: figure -> upper limit, and lower limit
-AT_MOST = {
+MAX_LIMITS = {
     "length_p99_percent": 0.2,
     "length_worst_percent": 1.0,
     "segments_worst_percent": 2.0,
@@ -87,7 +87,7 @@ AT_MOST = {
     "numpy_cost_ratio": 3.0,
     "compute_cost_ratio": 2.0,
 }
-AT_LEAST = {"coil_length_kept": 0.995}
+MIN_LIMITS = {"coil_length_kept": 0.995}
 
 
 def coils() -> Pair:
@@ -160,7 +160,7 @@ def shaken(rig: Rig, shake: Any, fps: float) -> dict[str, float]:
     were_inside = np.zeros(len(rest), bool)
     were_inside[_inside(rest, np.eye(4), collider, rig.head)[0]] = True
     segments, rest_lengths = segment_lengths(rest, offsets), strand_lengths(rest, offsets)
-    change, depth, worst = (np.zeros(rig.strands.strand_count) for _ in range(3))
+    change, depth, max_offset = (np.zeros(rig.strands.strand_count) for _ in range(3))
     scale = MEDIAN_LENGTH / np.median(rest_lengths)
     correction, jumped, flips = np.zeros_like(rest), [], np.zeros(3)
     motion_before, led_before = None, NO_LED_OUT
@@ -168,7 +168,7 @@ def shaken(rig: Rig, shake: Any, fps: float) -> dict[str, float]:
         assert np.isfinite(points).all()
         np.maximum(change, length_changes(points, offsets, rest_lengths), out=change)
         off = np.abs(segment_lengths(points, offsets) - segments) / np.maximum(segments, 1.0e-5)
-        np.maximum(worst, np.maximum.reduceat(off, offsets[:-1]), out=worst)
+        np.maximum(max_offset, np.maximum.reduceat(off, offsets[:-1]), out=max_offset)
         deep = np.zeros(len(points))
         index, local = _inside(points, matrix, collider, rig.head)
         if len(index):
@@ -187,7 +187,7 @@ def shaken(rig: Rig, shake: Any, fps: float) -> dict[str, float]:
     return {
         "length_p99_percent": float(np.quantile(change, 0.99)) * 100.0,
         "length_worst_percent": float(change.max()) * 100.0,
-        "segments_worst_percent": float(worst.max()) * 100.0,
+        "segments_worst_percent": float(max_offset.max()) * 100.0,
         "depth_p99_mm": float(np.quantile(depth, 0.99)) * 1000.0,
         "depth_worst_mm": float(depth.max()) * 1000.0,
         "strands_inside_percent": 100.0 * float((depth > 0.001).mean()),
@@ -227,7 +227,7 @@ def _farthest_in_parts(
         matrix = before.pose.matrix + part * (now.pose.matrix - before.pose.matrix)
         guides = before.guides + np.float32(part) * (now.guides - before.guides)
         posed = (PosedCollider(collider, matrix, matrix),)
-        there = replace(
+        next_rig = replace(
             now,
             pose=pose_of(rig, matrix),
             guides=guides,
@@ -236,13 +236,13 @@ def _farthest_in_parts(
             deflections=led.deflections,
         )
         last, ridden_before = correction, ridden
-        correction, led = motion_flow.strands_and_led(rig, there)
-        rides = motion_flow.strands_at(rig, there.pose, guides)
+        correction, led = motion_flow.strands_and_led(rig, next_rig)
+        rides = motion_flow.strands_at(rig, next_rig.pose, guides)
         correction -= rides
         ridden = _as_head(rides, matrix)
-        way = _farthest(correction - last, offsets)
+        distance = _farthest(correction - last, offsets)
         is_steady = _farthest(ridden - ridden_before, offsets) <= jump
-        np.maximum(farthest, [way, way * is_steady], out=farthest)
+        np.maximum(farthest, [distance, distance * is_steady], out=farthest)
     return farthest
 
 
@@ -289,7 +289,9 @@ def coil_figures(rig: Rig, made_of: StrandSet) -> dict[str, float]:
     assert rig.head is not None
     collider = field_of(rig.head, DynamicsSettings(), place="head")
     points, offsets = list(played(rig, collider, shake_at, FPS))[-1][2], rig.strands.offsets
-    kept = strand_lengths(points, offsets) / strand_lengths(made_of.points, made_of.offsets)
+    length_ratios = strand_lengths(points, offsets) / strand_lengths(
+        made_of.points, made_of.offsets
+    )
     grid = points.reshape(rig.strands.strand_count, -1, 3).astype(np.float64)
     a_turn = grid.shape[1] // TURNS
     middle = slice(4 * a_turn, -4 * a_turn)
@@ -300,7 +302,7 @@ def coil_figures(rig: Rig, made_of: StrandSet) -> dict[str, float]:
     axis = np.apply_along_axis(lambda row: np.convolve(row, window, "same"), 1, at_rest)
     before = np.linalg.norm(at_rest - axis, axis=2)[:, middle].mean()
     return {
-        "coil_length_kept": float(kept.min()),
+        "coil_length_kept": float(length_ratios.min()),
         "coil_radius_error_percent": abs(float(radius / before) - 1.0) * 100.0,
     }
 
@@ -328,8 +330,8 @@ def card_figures(rig: Rig) -> dict[str, float]:
     for motion, matrix, _, _ in played(rig, collider, shake_at, FPS):
         if motion_start is None:
             assert motion.clearance is not None
-            standing = (PosedCollider(collider, np.eye(4), np.eye(4)),)
-            motion_start = MotionStart(rig.rest_pose, standing, motion.clearance.max_distance)
+            colliders = (PosedCollider(collider, np.eye(4), np.eye(4)),)
+            motion_start = MotionStart(rig.rest_pose, colliders, motion.clearance.max_distance)
         pose = replace(motion.pose, solids=SimulatedSolids(motion_start, motion.colliders))
         (riding, now), cost = _timed(rig, cards, (motion.pose, pose), motion.guides)
         costs.append(cost)
@@ -410,16 +412,16 @@ def _folds(points: Floats, edges: Ints, lines: Ints) -> Floats:
     row[lines] = np.arange(len(lines))
     other, middle = edges[:, 0], edges[:, 1]
     other, middle = np.where(row[other] >= 0, (middle, other), (other, middle))
-    ways = (points[other] - points[middle]).astype(np.float64)
-    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
-    pairs = ways[np.argsort(row[middle], kind="stable")].reshape(len(lines), 2, 3)
+    directions = (points[other] - points[middle]).astype(np.float64)
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    pairs = directions[np.argsort(row[middle], kind="stable")].reshape(len(lines), 2, 3)
     cosine = -(pairs[:, 0] * pairs[:, 1]).sum(axis=1)
     return np.asarray(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
 
 
 def _sizes(points: Floats, edges: Ints) -> Floats:
-    ways = (points[edges[:, 1]] - points[edges[:, 0]]).astype(np.float64)
-    return np.linalg.norm(ways, axis=1)
+    edge_vectors = (points[edges[:, 1]] - points[edges[:, 0]]).astype(np.float64)
+    return np.linalg.norm(edge_vectors, axis=1)
 
 
 def cost_of(rig: Rig) -> dict[str, float]:
@@ -449,13 +451,18 @@ def main(names: list[str]) -> int:
             figures |= coil_figures(rig, pair[0])
         found |= {f"{name}_{key}": value for key, value in figures.items()}
         print(name, {key: round(value, 6) for key, value in figures.items()}, flush=True)
-    worst = {
+    max_figures = {
         key: max(value for name, value in found.items() if name.endswith(f"_{key}"))
-        for key in AT_MOST
+        for key in MAX_LIMITS
         if any(name.endswith(f"_{key}") for name in found)
     }
-    kept = {key: found[f"coil_{key}"] for key in AT_LEAST if f"coil_{key}" in found}
-    return report({**found, **worst, **kept}, REFERENCE, at_most=AT_MOST, at_least=AT_LEAST)
+    coil_figures_found = {key: found[f"coil_{key}"] for key in MIN_LIMITS if f"coil_{key}" in found}
+    return report(
+        {**found, **max_figures, **coil_figures_found},
+        REFERENCE,
+        max_limits=MAX_LIMITS,
+        min_limits=MIN_LIMITS,
+    )
 
 
 sys.exit(main(sys.argv[1:]))

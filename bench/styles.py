@@ -66,8 +66,8 @@ from hairloom.addon.strands.closest_point import ClosestPointSearch
 
 REFERENCE = "the curves that Blender evaluates, and the triangles of the built-in head"
 #: least numbers of hairstyles: heads of hair; and brows, lashes, beards and fur
-AT_LEAST = {"heads": 16, "extras": 7}
-AT_MOST = {
+MIN_LIMITS = {"heads": 16, "extras": 7}
+MAX_LIMITS = {
     "*_inside_percent": 0.0,
     "*_length_error_percent": 0.5,
     "*_seconds": 3.0,
@@ -165,15 +165,15 @@ def hair_samples(strands: StrandSet) -> tuple[Floats, Floats]:
     return points.astype(np.float32), (width * length / count)[segment]
 
 
-def inside_percent(strands: StrandSet, head: Surface, least: float = DEEP) -> float:
-    """The percentage of strands with a point in the mesh that is deeper than `least` [m]."""
+def inside_percent(strands: StrandSet, head: Surface, min_depth: float = DEEP) -> float:
+    """The percentage of strands with a point in the mesh that is deeper than `min_depth` [m]."""
     field = field_of(head, DynamicsSettings(), place="head")
     posed = (PosedCollider(field, np.eye(4), np.eye(4)),)
-    index = np.flatnonzero(signed_distance(strands.points, posed, 10.0 * least)[0] < 0.0)
+    index = np.flatnonzero(signed_distance(strands.points, posed, 10.0 * min_depth)[0] < 0.0)
     index = index[np.abs(winding_number(strands.points[index], head)) > 0.5]
     if not len(index):
         return 0.0
-    deep = index[ClosestPointSearch(head).closest(strands.points[index]).distance > least]
+    deep = index[ClosestPointSearch(head).closest(strands.points[index]).distance > min_depth]
     of_strand = np.searchsorted(strands.offsets, deep, side="right") - 1
     return 100.0 * len(np.unique(of_strand)) / strands.strand_count
 
@@ -191,11 +191,11 @@ def added(name: str) -> tuple[Rig, float, float, float]:
         bpy.ops.hairloom.preview()
         head = next(obj for obj in bpy.data.objects if obj.type == "MESH")
         bpy.context.view_layer.objects.active = head
-    begun = time.process_time(), time.perf_counter()
+    start = time.process_time(), time.perf_counter()
 
     def passed() -> float:
         """The smaller of two times: other load must not count, nor several cores more than once."""
-        return min(time.process_time() - begun[0], time.perf_counter() - begun[1])
+        return min(time.process_time() - start[0], time.perf_counter() - start[1])
 
     with patch.object(latest_job, "is_blocking", lambda: False):
         bpy.ops.hairloom.add_hairstyle(style=name, plays=False)
@@ -204,13 +204,13 @@ def added(name: str) -> tuple[Rig, float, float, float]:
     assert session is not None
     while session.is_pending and not session.is_lighting:
         session.take_made(depsgraph)
-    stood = passed()
+    seconds = passed()
     session.finish(depsgraph)
     lit = passed()
     drawn = session.rig.strands
     made = read_curves(hair, bpy.context.evaluated_depsgraph_get()).strands
     ratio = drawn.lengths()[: made.strand_count] / made.lengths()
-    return session.rig, stood, lit, 100.0 * float(np.abs(ratio - 1.0).max())
+    return session.rig, seconds, lit, 100.0 * float(np.abs(ratio - 1.0).max())
 
 
 def other_heads() -> Iterator[tuple[str, Any]]:
@@ -262,9 +262,9 @@ def _scan() -> Any:
     bpy.data.objects.remove(whole)
     random = np.random.default_rng(1)
     noisy = 100.0 * (few.positions + random.normal(0.0, 0.0006, few.positions.shape))
-    kept = few.triangles[random.random(len(few.triangles)) > 0.01]
+    triangles = few.triangles[random.random(len(few.triangles)) > 0.01]
     mesh = bpy.data.meshes.new("Scan")
-    mesh.from_pydata(noisy.tolist(), [], kept.tolist())
+    mesh.from_pydata(noisy.tolist(), [], triangles.tolist())
     head = bpy.data.objects.new("Scan", mesh)
     head.rotation_euler.z = np.radians(25.0)
     bpy.context.collection.objects.link(head)
@@ -278,9 +278,9 @@ def fit_figures() -> dict[str, float]:
     found: dict[str, float] = {}
     for style in FITTED:
         for name, head in other_heads():
-            begun = time.process_time()
+            start = time.process_time()
             bpy.ops.hairloom.add_hairstyle(style=style, plays=False)
-            took, hair = time.process_time() - begun, bpy.context.object
+            took, hair = time.process_time() - start, bpy.context.object
             session = previews.session_of(hair)
             assert session is not None and session.rig.head is not None
             larger = 100.0 if name == "scan" else 1.0
@@ -313,7 +313,7 @@ def main(names: list[str]) -> int:
     masks = [named_hairstyle(name).masks.get("children", "") for name in styles]
     heads = masks.count("scalp")
     found |= {"heads": heads, "extras": len(styles) - heads}
-    at_most = dict(AT_MOST)
+    max_limits = dict(MAX_LIMITS)
     if not names or "fit" in names:
         found |= fit_figures()
     if not names or "edit" in names:
@@ -327,25 +327,25 @@ def main(names: list[str]) -> int:
             figures = card_figures(name)
             print(name, {key: round(value, 3) for key, value in figures.items()}, flush=True)
             found |= {f"{name}_{key}": value for key, value in figures.items()}
-        return report(found, REFERENCE, at_most=at_most, at_least=AT_LEAST)
+        return report(found, REFERENCE, max_limits=max_limits, min_limits=MIN_LIMITS)
     for name in chosen or (styles if not names else []):
-        rig, stood, lit, length_error = added(name)
+        rig, seconds, lit, length_error = added(name)
         head, group = rig.head, named_hairstyle(name).masks.get("children", "")
         assert head is not None
         figures = {
             "strands": rig.strands.strand_count,
             "inside_percent": inside_percent(rig.strands, head),
             "length_error_percent": length_error,
-            "seconds": stood,
+            "seconds": seconds,
             "seconds_until_lit": lit,
         }
         bare = BARE.get(name, BALD)
         if bare is not None:
             figures["bald_percent"] = bald(rig.strands, head, group)
-            at_most[f"{name}_bald_percent"] = bare
+            max_limits[f"{name}_bald_percent"] = bare
         found |= {f"{name}_{key}": value for key, value in figures.items()}
         print(name, {key: round(value, 3) for key, value in figures.items()}, flush=True)
-    return report(found, REFERENCE, at_most=at_most, at_least=AT_LEAST)
+    return report(found, REFERENCE, max_limits=max_limits, min_limits=MIN_LIMITS)
 
 
 sys.exit(main(sys.argv[1:]))

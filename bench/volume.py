@@ -24,7 +24,7 @@ REFERENCE = (
     "strands counted one by one; Cycles' Principled Hair, path traced; ribbons "
     "sorted; EEVEE at 1 sample"
 )
-AT_MOST = {"transparency_error": 0.19, "permutation_difference": 1.0e-6}
+MAX_LIMITS = {"transparency_error": 0.19, "permutation_difference": 1.0e-6}
 PARTS = {
     "cost": cost_figures,
     "shadows": shadow_figures,
@@ -37,7 +37,7 @@ PARTS = {
 def main(names: list[str]) -> int:
     start()
     found = measured(PARTS, names)
-    return report(found, REFERENCE, at_most=AT_MOST)
+    return report(found, REFERENCE, max_limits=MAX_LIMITS)
 
 
 sys.exit(main(sys.argv[1:]))

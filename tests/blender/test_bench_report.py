@@ -18,7 +18,7 @@ from _turns import in_turns
 
 
 @pytest.mark.parametrize(
-    ("found", "at_most", "at_least", "missed"),
+    ("found", "max_limits", "min_limits", "missed"),
     [
         ({"a": 1.0}, {"a": 1.0}, {}, []),
         ({"a": 1.1}, {"a": 1.0}, {}, ["a"]),
@@ -33,28 +33,28 @@ from _turns import in_turns
 )
 def test_missed_limits_set_the_exit_code(
     found: dict[str, Any],
-    at_most: dict[str, float],
-    at_least: dict[str, float],
+    max_limits: dict[str, float],
+    min_limits: dict[str, float],
     missed: list[str],
     capsys: pytest.CaptureFixture[str],
     gpu_context: object,
 ) -> None:
-    status = report(found, "one", at_most=at_most, at_least=at_least)
+    status = report(found, "one", max_limits=max_limits, min_limits=min_limits)
     *lines, last = capsys.readouterr().out.splitlines()
-    told = json.loads(last)
+    content = json.loads(last)
     assert status == int(bool(missed))
-    assert told["missed"] == missed
+    assert content["missed"] == missed
     assert [line.split()[0] for line in lines if line.endswith("missed")] == missed
-    assert told["reference"] == "one"
-    assert {"backend", "renderer", "blender", "python", "numpy"} <= set(told)
+    assert content["reference"] == "one"
+    assert {"backend", "renderer", "blender", "python", "numpy"} <= set(content)
 
 
 def test_the_json_has_the_limits_in_words(
     capsys: pytest.CaptureFixture[str], gpu_context: object
 ) -> None:
-    report({"bytes": 5, "kept": 0.9}, "", at_most={"bytes": 6e6}, at_least={"kept": 0.8})
-    told = json.loads(capsys.readouterr().out.splitlines()[-1])
-    assert told["limits"] == {"bytes": "at most 6,000,000", "kept": "at least 0.8"}
+    report({"bytes": 5, "kept": 0.9}, "", max_limits={"bytes": 6e6}, min_limits={"kept": 0.8})
+    content = json.loads(capsys.readouterr().out.splitlines()[-1])
+    assert content["limits"] == {"bytes": "at most 6,000,000", "kept": "at least 0.8"}
 
 
 def test_a_benchmark_that_measured_nothing_has_failed(
