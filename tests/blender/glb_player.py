@@ -88,13 +88,15 @@ class Player:
         if len(times) == 1:
             return values[0]
         one, two = values[after - 1], values[after]
-        share = np.clip((seconds - times[after - 1]) / (times[after] - times[after - 1]), 0.0, 1.0)
+        fraction = np.clip(
+            (seconds - times[after - 1]) / (times[after] - times[after - 1]), 0.0, 1.0
+        )
         if path == "translation":
-            return one + (two - one) * share
+            return one + (two - one) * fraction
         cosine = abs(one @ two)
         angle = np.arccos(min(cosine, 1.0))
         two = two * np.sign(one @ two)
         if angle < 1e-6:
             return one
-        mixed = np.sin((1.0 - share) * angle) * one + np.sin(share * angle) * two
+        mixed = np.sin((1.0 - fraction) * angle) * one + np.sin(fraction * angle) * two
         return mixed / np.sin(angle)

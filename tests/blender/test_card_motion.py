@@ -129,8 +129,8 @@ def test_skinned_cards_are_the_simulated_ones(
     """Skinned corners, with the head's motion added, are within 1 % of the hair's length (RMS) of
     the simulated ones in all levels; the motion itself is over five times larger."""
     path, written = joints
-    player, told = Player(path), written.motion
-    assert told["joints_in_chain"] <= 16
+    player, entry = Player(path), written.motion
+    assert entry["joints_in_chain"] <= 16
     wrong, moved = [], []
     for frame in range(FRAMES):
         back = head_matrix(motion, frame)
@@ -139,12 +139,12 @@ def test_skinned_cards_are_the_simulated_ones(
         moved.append(off(player.corners(frame / RATE), player.corners(0.0)))
     assert off(player.corners(0.0), simulated(motion, written, 0)).max() < 1e-3
     rms = np.sqrt(np.mean(np.square(wrong)))
-    length = told["error"]["hair_length"]
+    length = entry["error"]["hair_length"]
     steps = np.diff(motion.rig.guide_grid, axis=1)
     assert length == typical_length(np.linalg.norm(steps, axis=2).sum(axis=1))
     assert rms < 0.01 * length
     # within 20 %, because vertices count once for each corner here
-    assert rms == pytest.approx(told["error"]["root_mean_square"], rel=0.2)
+    assert rms == pytest.approx(entry["error"]["root_mean_square"], rel=0.2)
     assert np.sqrt(np.mean(np.square(moved))) > 5.0 * rms
 
 
@@ -216,13 +216,13 @@ def test_a_motion_texture_holds_the_simulated_cards(
     library = pytest.importorskip("OpenImageIO")
     path = tmp_path / "hair.glb"
     written = write(path, motion, kind="texture", motion_space="world", motion_depth=depth)
-    told = json.loads((tmp_path / "hair.hairloom.json").read_text("utf-8"))["motion"]
+    entry = json.loads((tmp_path / "hair.hairloom.json").read_text("utf-8"))["motion"]
     pictures = {}
-    for name, texture in told["textures"].items():
+    for name, texture in entry["textures"].items():
         image = library.ImageBuf(str(tmp_path / texture["file"]))
         assert str(image.spec().format) == depth
         pictures[name] = image.get_pixels(library.FLOAT)[..., :3]
-        assert pictures[name].shape[:2] == (told["height"], told["width"])
+        assert pictures[name].shape[:2] == (entry["height"], entry["width"])
     file = Glb(path)
     worst = 0.0
     for level, mesh in enumerate(file.json["meshes"]):
@@ -231,10 +231,10 @@ def test_a_motion_texture_holds_the_simulated_cards(
         rest = file.accessor(primitive["attributes"]["POSITION"])[index]
         texel = file.accessor(primitive["attributes"]["TEXCOORD_2"])[index].astype(np.float64)
         for frame in (0, 7, FRAMES - 1):
-            v = texel[:, 1] + frame * told["frame_step"]
+            v = texel[:, 1] + frame * entry["frame_step"]
             row, column = (
-                (v * told["height"]).astype(int),
-                (texel[:, 0] * told["width"]).astype(int),
+                (v * entry["height"]).astype(int),
+                (texel[:, 0] * entry["width"]).astype(int),
             )
             moved = rest + pictures["position"][row, column]
             mesh_now = cards_at(
@@ -250,7 +250,7 @@ def test_a_motion_texture_holds_the_simulated_cards(
                 np.testing.assert_allclose(pictures[name][row, column], expected, atol=6e-4)
     # half floats have 11 significant bits; offsets here are below 12.5 cm
     assert worst < (0.125 * 2.0**-11 + 1e-6 if depth == "half" else 1e-6)
-    error = told["error"]
+    error = entry["error"]
     assert error["root_mean_square"] <= error["percentile_99"] <= error["worst"]
     # the stored error is in 3D, over all frames; `worst` is along one axis, over three frames
     assert worst - 1e-6 <= error["worst"] <= 2.0 * worst if depth == "half" else not error["worst"]

@@ -48,17 +48,17 @@ def test_the_command_line_writes_a_bake(tmp_path: Path, capfd: Any) -> None:
     assert 0.0 <= facts["cards_stretch_max_percent"] < 0.1
     assert 0.0 <= facts["cards_penetration_p99_mm"] <= facts["cards_penetration_max_mm"] < 0.5
     assert facts["cards_inside_percent"] == facts["cards_stretched_percent"] == 0.0
-    told = json.loads((tmp_path / "hair.hairloom.json").read_text("utf-8"))["motion"]
-    assert told["frames"] == {"first": 2, "count": 8, "rate": 60.0}
-    assert told["chains"] <= 4
+    entry = json.loads((tmp_path / "hair.hairloom.json").read_text("utf-8"))["motion"]
+    assert entry["frames"] == {"first": 2, "count": 8, "rate": 60.0}
+    assert entry["chains"] <= 4
     springs = ["--motion", "springs", "--spring-joints", "9", "--bake", bake]
     assert command_line.run([*arguments, *springs, "--motion-space", "world"]) == 1
     refused = capfd.readouterr().err
     assert "--motion-space" in refused and "--motion joints or texture" in refused
     assert command_line.run([*arguments, *springs]) == 0
-    told = json.loads((tmp_path / "hair.hairloom.json").read_text("utf-8"))["motion"]
-    assert (told["kind"], told["joints"] <= 9) == ("springs", True)
-    assert "head_bone" not in told
+    entry = json.loads((tmp_path / "hair.hairloom.json").read_text("utf-8"))["motion"]
+    assert (entry["kind"], entry["joints"] <= 9) == ("springs", True)
+    assert "head_bone" not in entry
 
 
 @pytest.mark.slow
@@ -94,8 +94,8 @@ def test_a_button_writes_the_bake(sphere: Any, tmp_path: Path) -> None:
         ({"own_frames": True, "first_frame": 4, "last_frame": 6}, 4, 3),
     ):
         assert bpy.ops.hairloom.export_cards(**options, **chosen) == {"FINISHED"}
-        told = json.loads((path.parent / "hair.hairloom.json").read_text("utf-8"))["motion"]
-        assert (told["frames"]["first"], told["frames"]["count"]) == (first, count)
+        entry = json.loads((path.parent / "hair.hairloom.json").read_text("utf-8"))["motion"]
+        assert (entry["frames"]["first"], entry["frames"]["count"]) == (first, count)
     sphere.vertex_groups.new(name="Bone").add(range(len(sphere.data.vertices)), 1.0, "REPLACE")
     armature = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
     scene.collection.objects.link(armature)
@@ -108,8 +108,8 @@ def test_a_button_writes_the_bake(sphere: Any, tmp_path: Path) -> None:
     bpy.context.view_layer.objects.active = hair
     sprung = options | {"motion": "springs", "spring_joints": 9}
     assert bpy.ops.hairloom.export_cards(**sprung) == {"FINISHED"}
-    told = json.loads((path.parent / "hair.hairloom.json").read_text("utf-8"))["motion"]
-    assert (told["kind"], told["head_bone"]) == ("springs", "Bone")
+    entry = json.loads((path.parent / "hair.hairloom.json").read_text("utf-8"))["motion"]
+    assert (entry["kind"], entry["head_bone"]) == ("springs", "Bone")
     with pytest.raises(RuntimeError, match="holds frames 3 to 9"):
         bpy.ops.hairloom.export_cards(**options, own_frames=True, first_frame=4, last_frame=20)
 

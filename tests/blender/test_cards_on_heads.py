@@ -32,10 +32,10 @@ def depths(points: np.ndarray, head: Surface) -> np.ndarray:
     return found
 
 
-def crossings(tree: BVHTree, start: Vector, way: Vector) -> int:
-    count, place = 0, tree.ray_cast(start, way)[0]
+def crossings(tree: BVHTree, start: Vector, direction: Vector) -> int:
+    count, place = 0, tree.ray_cast(start, direction)[0]
     while place is not None:
-        count, place = count + 1, tree.ray_cast(place + way * 1e-5, way)[0]
+        count, place = count + 1, tree.ray_cast(place + direction * 1e-5, direction)[0]
     return count
 
 

@@ -77,9 +77,9 @@ def upper_half(head, name):
     return group
 
 
-@pytest.mark.parametrize("way", ["multi", "single"])
-def test_guides_come_first_and_children_after_them(way, hair, get_depsgraph):
-    hair.data.hairloom.children.method = way
+@pytest.mark.parametrize("method", ["multi", "single"])
+def test_guides_come_first_and_children_after_them(method, hair, get_depsgraph):
+    hair.data.hairloom.children.method = method
     session = previews.start(hair, get_depsgraph())
     rig = session.rig
     assert (len(rig.guides), rig.strands.strand_count) == (60, 260)

@@ -48,16 +48,16 @@ def test_view_layers_and_holdouts(engine_scene: Any, tmp_path: Path) -> None:
 
 
 @pytest.mark.alike
-@pytest.mark.parametrize("way", ["none", "hashed", "layers"])
+@pytest.mark.parametrize("transparency", ["none", "hashed", "layers"])
 def test_hair_can_be_a_holdout(
-    engine_scene: Any, new_hair: Callable[..., Any], sphere: Any, tmp_path: Path, way: str
+    engine_scene: Any, new_hair: Callable[..., Any], sphere: Any, tmp_path: Path, transparency: str
 ) -> None:
     """In front of a wall, a holdout removes the hair's alpha. Meshes in front of it stay."""
     engine_scene.render.film_transparent = True
     engine_scene.hairloom.picture.samples = 16
     hair = new_hair(sphere)
     hair.data.hairloom.strands.fullness = 60.0
-    hair.data.hairloom.strands.transparency = way
+    hair.data.hairloom.strands.transparency = transparency
     hair.data.hairloom.strands.opacity = 0.7
     bpy.data.objects.remove(sphere)
     alone = render_picture(tmp_path)[..., 3]

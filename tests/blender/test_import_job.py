@@ -93,12 +93,12 @@ def test_files_of_all_formats_come_into_a_scene_on_a_head_from_a_file(
 
     assert command_line.run(arguments) == 0
 
-    told = json.loads(report.read_text())
-    assert told["head"] == "head" and told["status"] == "done" and told["dropped"] == {}
-    assert [each["file"] for each in told["objects"]] == [file.name for file in files]
-    assert [each["strands"] for each in told["objects"]] == [40] * len(WRITERS)
-    assert any("10 guides were left out" in note for note in told["notes"])
-    assert told["outputs"] == ["scene.blend"] and "import" in told["stages_ms"]
+    facts = json.loads(report.read_text())
+    assert facts["head"] == "head" and facts["status"] == "done" and facts["dropped"] == {}
+    assert [each["file"] for each in facts["objects"]] == [file.name for file in files]
+    assert [each["strands"] for each in facts["objects"]] == [40] * len(WRITERS)
+    assert any("10 guides were left out" in note for note in facts["notes"])
+    assert facts["outputs"] == ["scene.blend"] and "import" in facts["stages_ms"]
     grooms = grooms_of(scene)
     assert sorted(grooms) == sorted(file.stem for file in files)
     expected = hairdo().without_guides().strands.points
@@ -160,12 +160,12 @@ def test_a_head_of_several_meshes_is_one(tmp_path: Path) -> None:
     arguments = ["import", str(tmp_path / "hair.abc"), "--head", str(head)]
     arguments += ["--output", str(scene), "--report", str(report)]
     assert command_line.run(arguments) == 0
-    told = json.loads(report.read_text())
-    assert told["head"] == "head"
-    assert "head.fbx: its 2 meshes (eye, head) were joined into head" in told["notes"]
+    facts = json.loads(report.read_text())
+    assert facts["head"] == "head"
+    assert "head.fbx: its 2 meshes (eye, head) were joined into head" in facts["notes"]
     (hair,) = grooms_of(scene).values()
     joined = hair.data.surface
-    assert joined.name == told["head"] and len(joined.data.uv_layers) == 1
+    assert joined.name == facts["head"] and len(joined.data.uv_layers) == 1
     y, z = np.array([(joined.matrix_world @ each.co)[1:] for each in joined.data.vertices]).T
     assert (y.min(), y.max()) == pytest.approx((-0.11, 0.1), abs=1e-6)
     assert (z.min(), z.max()) == pytest.approx((0.0, 0.2), abs=1e-6)
@@ -210,8 +210,8 @@ def test_other_verbs_take_grooms_of_all_formats(tmp_path: Path, head: Path, suff
     expected = hairdo().without_guides().strands.points
     np.testing.assert_allclose(inputs.strands.points, expected, atol=1e-6)
     assert inputs.dropped == {}
-    told = any("10 guides were left out" in note for note in inputs.notes)
-    assert told == (suffix in (".abc", ".usdc"))
+    facts = any("10 guides were left out" in note for note in inputs.notes)
+    assert facts == (suffix in (".abc", ".usdc"))
 
 
 def test_axes_and_scale_of_a_groom_are_passed_on(tmp_path: Path, head: Path) -> None:

@@ -9,7 +9,7 @@ from hairloom.addon.blender.preview import diagnostics, previews
 from hairloom.addon.blender.scene.curves import read_curves
 
 
-def told(hair):
+def issue_operators(hair):
     return [each.operator for each in diagnostics.issues_of(hair, previews.session_of(hair))]
 
 
@@ -31,9 +31,9 @@ def preview(hair):
 
 def test_good_hair_has_no_issues(new_hair, sphere):
     hair = new_hair(sphere)
-    assert told(hair) == []
+    assert issue_operators(hair) == []
     preview(hair)
-    assert told(hair) == []
+    assert issue_operators(hair) == []
 
 
 def test_a_surface_is_set_and_the_hair_stays_where_it_is(new_hair, sphere):
@@ -49,7 +49,7 @@ def test_a_surface_is_set_and_the_hair_stays_where_it_is(new_hair, sphere):
     assert hair.data.surface == sphere and hair.parent == sphere, "the cube is far away"
     assert hair.data.surface_uv_map == "UVMap"
     assert read(hair).points == pytest.approx(before, abs=1e-6)
-    assert told(hair) == []
+    assert issue_operators(hair) == []
 
 
 def test_of_many_curves_a_sample_is_checked(new_hair, sphere):
@@ -101,17 +101,19 @@ def test_roots_in_the_air_are_counted_and_snapped(new_hair, sphere):
     roots = np.linalg.norm(read(hair).roots, axis=1)
     assert roots == pytest.approx(np.full(60, 0.1), rel=0.02)
     preview(hair)
-    assert told(hair) == []
+    assert issue_operators(hair) == []
 
 
 def test_a_surface_without_uvs_is_unwrapped_without_overlap(new_hair, sphere):
     sphere.data.uv_layers.remove(sphere.data.uv_layers[0])
     hair = new_hair(sphere)
-    assert told(hair) == ["hairloom.unwrap_surface"]
+    assert issue_operators(hair) == ["hairloom.unwrap_surface"]
     with pytest.raises(RuntimeError, match="no UVs: press Unwrap"):
         bpy.ops.hairloom.snap_roots()
     fix(hair)
-    assert told(hair) == [] and bpy.context.mode == "OBJECT" and bpy.context.object == hair
+    assert (
+        issue_operators(hair) == [] and bpy.context.mode == "OBJECT" and bpy.context.object == hair
+    )
     corners = np.empty((len(sphere.data.loops), 2), np.float32)
     sphere.data.uv_layers.active.uv.foreach_get("vector", corners.ravel())
     assert np.ptp(corners, axis=0).min() > 0.5 and (corners >= 0.0).all() and (corners <= 1.0).all()
@@ -122,7 +124,7 @@ def test_an_uneven_scale_goes_into_the_curves(new_hair, sphere):
     hair.scale = (1.0, 1.0, 1.5)
     bpy.context.view_layer.update()
     before = read(hair).points
-    assert told(hair) == ["hairloom.apply_scale"]
+    assert issue_operators(hair) == ["hairloom.apply_scale"]
     fix(hair)
     bpy.context.view_layer.update()
     assert hair.scale[:] == (1.0, 1.0, 1.0)
@@ -139,7 +141,7 @@ def test_a_scale_of_shared_curves_or_of_a_parent_is_refused_with_a_reason(new_ha
     bpy.data.objects.remove(other)
     hair.scale, sphere.scale = (1.0, 1.0, 1.0), (1.0, 1.0, 2.0)
     bpy.context.view_layer.update()
-    assert told(hair) == ["hairloom.apply_scale"]
+    assert issue_operators(hair) == ["hairloom.apply_scale"]
     with pytest.raises(RuntimeError, match="its parent, Head, is scaled unevenly"):
         bpy.ops.hairloom.apply_scale()
 
@@ -162,12 +164,12 @@ def test_fixes_of_selected_hair_wait_until_hidden_hair_is_shown(name, new_hair, 
 def test_blenders_dynamics_are_muted(sphere, extension):
     bpy.ops.object.curves_empty_hair_add()
     hair = bpy.context.object
-    assert told(hair) == [], "as it is added it only puts hair onto its surface"
+    assert issue_operators(hair) == [], "as it is added it only puts hair onto its surface"
     hair_dynamics_mode(hair.modifiers[0]).value = "Physics (Experimental)"
     hair.update_tag()
-    assert told(hair) == ["hairloom.mute_hair_dynamics"]
+    assert issue_operators(hair) == ["hairloom.mute_hair_dynamics"]
     fix(hair)
-    assert told(hair) == []
+    assert issue_operators(hair) == []
 
 
 def test_instances_that_the_preview_leaves_out_are_reported(new_hair, sphere):

@@ -153,22 +153,22 @@ def test_the_preview_follows_other_hair(shaded, get_depsgraph):
 
 
 @pytest.mark.parametrize(
-    "way", few_in_commits(["deleted", "hidden", "left out of renders and views"])
+    "change", few_in_commits(["deleted", "hidden", "left out of renders and views"])
 )
 def test_the_preview_follows_other_hair_that_is_hidden_deleted_and_restored(
-    shaded, get_depsgraph, way
+    shaded, get_depsgraph, change
 ):
     session, strands = shaded
     near, before = shown(session), session.cards.shaded_by
-    if way == "hidden":
+    if change == "hidden":
         strands.hide_set(True)
-    elif way == "deleted":
+    elif change == "deleted":
         bpy.data.objects.remove(strands)
     else:
         strands.hide_viewport = True
     follow(get_depsgraph)
     assert shown(session).mean() > near.mean() + 0.02 and session.cards.shaded_by == frozenset()
-    if way == "deleted":
+    if change == "deleted":
         return
     strands.hide_set(False)
     strands.hide_viewport = False

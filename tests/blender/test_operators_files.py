@@ -20,7 +20,7 @@ def grown(head, **settings):
 
 
 @pytest.fixture
-def told(capfd):
+def read_reports(capfd):
     """A function that returns reports since its last call, and refuses tracebacks."""
 
     def read():
@@ -110,7 +110,7 @@ def test_combed_hair_takes_groups_too(sphere):
 
 
 @pytest.mark.parametrize("option", ["density_group", "length_group"])
-def test_a_group_that_cannot_be_used_is_named_and_grows_nothing(option, sphere, told):
+def test_a_group_that_cannot_be_used_is_named_and_grows_nothing(option, sphere, read_reports):
     paint_upper_half(sphere, "Scalp")
     sphere.vertex_groups.new(name="Empty")
     sphere.data.attributes.new("on_edges", "FLOAT", "EDGE")
@@ -124,7 +124,7 @@ def test_a_group_that_cannot_be_used_is_named_and_grows_nothing(option, sphere, 
     ):
         with pytest.raises(RuntimeError, match=message):
             grown(sphere, method="normals", **{option: name})
-        told()
+        read_reports()
     assert [obj.name for obj in bpy.data.objects] == ["Head"]
     assert len(bpy.data.hair_curves) == 0
 
@@ -147,34 +147,34 @@ def test_the_weights_of_a_mesh_are_offered_by_name(sphere):
     assert weight_names(sphere) == ["Scalp", "long", "on_faces"]
 
 
-def test_growing_on_a_mesh_without_faces_is_reported(sphere, told):
+def test_growing_on_a_mesh_without_faces_is_reported(sphere, read_reports):
     sphere.data.clear_geometry()
     for way in ("combed", "normals"):
         with pytest.raises(RuntimeError, match="no faces"):
             grown(sphere, method=way)
-    told()
+    read_reports()
 
 
-def test_growing_needs_a_mesh(told):
+def test_growing_needs_a_mesh(read_reports):
     with pytest.raises(RuntimeError, match="Select the mesh to grow hair on"):
         bpy.ops.hairloom.grow()
 
 
-def test_a_head_without_uvs_is_a_warning_with_the_remedy(sphere, groom_file, told):
+def test_a_head_without_uvs_is_a_warning_with_the_remedy(sphere, groom_file, read_reports):
     sphere.data.uv_layers.remove(sphere.data.uv_layers[0])
     sphere.data.update()
     assert bpy.ops.hairloom.import_strands(filepath=str(groom_file)) == {"FINISHED"}
-    assert "Unwrap" in told()
+    assert "Unwrap" in read_reports()
     out = groom_file.with_name("out.tfx")
     assert bpy.ops.hairloom.export_tressfx(filepath=str(out)) == {"FINISHED"}
-    assert "Unwrap" in told() and out.is_file()
+    assert "Unwrap" in read_reports() and out.is_file()
 
 
-def test_exported_strands_equal_the_imported_ones(sphere, groom_file, told):
+def test_exported_strands_equal_the_imported_ones(sphere, groom_file, read_reports):
     bpy.ops.hairloom.import_strands(filepath=str(groom_file))
     out = groom_file.with_name("out.tfx")
     assert bpy.ops.hairloom.export_tressfx(filepath=str(out)) == {"FINISHED"}
-    assert "40 strands" in told()
+    assert "40 strands" in read_reports()
     before, after = read_tfx(groom_file).strands, read_tfx(out).strands
     assert after.points == pytest.approx(before.points, abs=1e-6)
 
@@ -188,7 +188,7 @@ def test_export_axes_and_scale_invert_those_of_import(groom_file):
 
 
 @pytest.mark.slow
-def test_cards_are_written_with_their_sidecar(sphere, tmp_path, told):
+def test_cards_are_written_with_their_sidecar(sphere, tmp_path, read_reports):
     hair = grown(sphere, strand_count=300, length=0.05)
     hair.data.hairloom.guides.guide_count = 20
     hair.data.hairloom.cards.source, hair.data.hairloom.atlas.source = "guides", "made"
@@ -207,28 +207,28 @@ def test_cards_are_written_with_their_sidecar(sphere, tmp_path, told):
             + [f"cards_{name}.exr" for name in ("azimuthal", "longitudinal", "paths")]
         ),
     ]
-    assert "20 cards" in told()
+    assert "20 cards" in read_reports()
     assert {data.name_full for data in bpy.data.user_map()} == data_blocks
 
 
 @pytest.mark.parametrize("operator", ["export_cards", "export_tressfx"])
-def test_hair_without_curves_is_not_exported(operator, sphere, tmp_path, told):
+def test_hair_without_curves_is_not_exported(operator, sphere, tmp_path, read_reports):
     hair = grown(sphere, strand_count=10)
     hair.data.remove_curves()
     with pytest.raises(RuntimeError, match="no curves"):
         getattr(bpy.ops.hairloom, operator)(filepath=str(tmp_path / "out.glb"))
-    told()
+    read_reports()
     assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(
     ("operator", "name"), [("export_cards", "x.glb"), ("export_tressfx", "x.tfx")]
 )
-def test_a_place_that_cannot_be_written_to_is_named(operator, name, sphere, tmp_path, told):
+def test_a_place_that_cannot_be_written_to_is_named(operator, name, sphere, tmp_path, read_reports):
     grown(sphere, strand_count=50)
     (tmp_path / "no folder").write_text("a file")
     path = tmp_path / "no folder" / name
     with pytest.raises(RuntimeError, match="no folder"):
         getattr(bpy.ops.hairloom, operator)(filepath=str(path))
-    told()
+    read_reports()
     assert [path.name for path in tmp_path.iterdir()] == ["no folder"]

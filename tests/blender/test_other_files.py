@@ -315,9 +315,9 @@ def test_a_rendered_animation_has_the_settings_of_each_frame(
     assert found[3] == (3.0, 1.0, "guide")
 
 
-@pytest.mark.parametrize("way", ["keyframe", "driver"])
+@pytest.mark.parametrize("animated_by", ["keyframe", "driver"])
 def test_an_animated_wind_blows_hair_in_playback_and_in_a_bake(
-    way, new_hair, sphere, get_depsgraph, tmp_path
+    animated_by, new_hair, sphere, get_depsgraph, tmp_path
 ):
     hair, scene = new_hair(sphere), bpy.context.scene
     scene.frame_start, scene.frame_end = 1, 6
@@ -330,7 +330,7 @@ def test_an_animated_wind_blows_hair_in_playback_and_in_a_bake(
     frames(scene, 6)
     still = strand_grid(session)
     path = "hairloom.dynamics.wind_speed"
-    if way == "keyframe":
+    if animated_by == "keyframe":
         keyed(hair, path, {1: 0.0, 3: 40.0})
     else:
         source = bpy.data.objects.new("Source", None)

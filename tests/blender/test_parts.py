@@ -53,10 +53,10 @@ def test_blocking_and_threaded_parts_have_the_same_result(value: int, wanted: in
     assert result_of(steps_of_parts(quadrupled(value))) == wanted
 
 
-@pytest.mark.parametrize("way", [run_parts, lambda parts: result_of(steps_of_parts(parts))])
-def test_an_unhandled_error_is_raised(way: Any) -> None:
+@pytest.mark.parametrize("run", [run_parts, lambda parts: result_of(steps_of_parts(parts))])
+def test_an_unhandled_error_is_raised(run: Any) -> None:
     with pytest.raises(HairloomError, match="too much"):
-        way(quadrupled(11))
+        run(quadrupled(11))
 
 
 def test_in_the_window_parts_run_in_threads_and_report_what_they_do() -> None:

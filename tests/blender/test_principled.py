@@ -103,12 +103,12 @@ def test_the_active_material_is_used_and_named(hair: Any) -> None:
     assert note == "it has several materials; the look was taken from the active one, Hair"
 
 
-@pytest.mark.parametrize("way", ["mixed", "in a group"])
-def test_the_hair_node_is_found_behind_other_nodes(hair: Any, way: str) -> None:
+@pytest.mark.parametrize("link_kind", ["mixed", "in a group"])
+def test_the_hair_node_is_found_behind_other_nodes(hair: Any, link_kind: str) -> None:
     node = material(hair, IOR=1.3)
     tree = node.id_data
     output = tree.get_output_node("ALL")
-    if way == "mixed":
+    if link_kind == "mixed":
         mix = tree.nodes.new("ShaderNodeMixShader")
         tree.links.new(node.outputs[0], mix.inputs[2])
         tree.links.new(mix.outputs[0], output.inputs["Surface"])

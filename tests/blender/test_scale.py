@@ -36,7 +36,7 @@ def curled(scale: float) -> StrandSet:
     )
 
 
-def told(
+def frames_and_messages(
     sphere: Any, new_hair: Callable[..., Any], get_depsgraph: Callable[[], Any], scale: float
 ) -> tuple[np.ndarray, dict[str, Any]]:
     """Strands in frames of a moving head, divided by the scale, and all messages about them."""
@@ -85,8 +85,8 @@ def told(
 def test_a_scene_of_another_size_moves_and_warns_the_same(
     sphere: Any, new_hair: Callable[..., Any], get_depsgraph: Callable[[], Any], scale: float
 ) -> None:
-    one, said = told(sphere, new_hair, get_depsgraph, 1.0)
-    other, said_again = told(sphere, new_hair, get_depsgraph, scale)
+    one, said = frames_and_messages(sphere, new_hair, get_depsgraph, 1.0)
+    other, said_again = frames_and_messages(sphere, new_hair, get_depsgraph, scale)
     assert said_again == said
     assert said["children"] == 100
     assert np.abs(one[-1] - one[0] - [0.02 * (FRAMES - 1), 0.0, 0.0]).max() > 0.005
@@ -99,8 +99,8 @@ def test_the_unit_scale_only_changes_how_numbers_are_shown(
     sphere: Any, new_hair: Callable[..., Any], get_depsgraph: Callable[[], Any], unit: float
 ) -> None:
     """As in Blender's own physics, which takes gravity in scene units."""
-    one, said = told(sphere, new_hair, get_depsgraph, 1.0)
+    one, said = frames_and_messages(sphere, new_hair, get_depsgraph, 1.0)
     bpy.context.scene.unit_settings.scale_length = unit
-    other, said_again = told(sphere, new_hair, get_depsgraph, 1.0)
+    other, said_again = frames_and_messages(sphere, new_hair, get_depsgraph, 1.0)
     np.testing.assert_array_equal(other, one)
     assert said_again == said

@@ -190,7 +190,7 @@ def test_a_curtain_of_strands_in_any_order_throws_the_same_shadow(frame: Any) ->
     seeds = np.arange(len(strands))
     order = np.random.default_rng(3).permutation(len(strands))
     pictures = [
-        seen(frame, snapshot_of(frame, strands[way], seed=seeds[way], volume=of_form("deep")))
-        for way in (seeds, order)
+        seen(frame, snapshot_of(frame, strands[rows], seed=seeds[rows], volume=of_form("deep")))
+        for rows in (seeds, order)
     ]
     assert np.abs(pictures[0] - pictures[1]).max() < 1.0 / 255.0

@@ -58,11 +58,11 @@ def advance(solver: Any, poses: list[Pose], settings: DynamicsSettings = SETTING
         run_alone(solver.steps(FrameInput(pose, (), settings, GRAVITY, 1.0 / RATE)))
 
 
-def agree(found: np.ndarray, expected: np.ndarray, share: float = 1.0) -> bool:
+def agree(found: np.ndarray, expected: np.ndarray, quantile: float = 1.0) -> bool:
     """Whether the median difference of strands is below 5 micrometres, and that of this fraction of
     them below half a millimetre."""
     apart = np.abs(found - expected).reshape(-1, 16 * 3).max(axis=1)
-    return bool(np.median(apart) < 5.0e-6 and np.quantile(apart, share) < 5.0e-4)
+    return bool(np.median(apart) < 5.0e-6 and np.quantile(apart, quantile) < 5.0e-4)
 
 
 def test_the_numpy_solver_equals_the_pipeline(rig: Rig, poses: list[Pose]) -> None:

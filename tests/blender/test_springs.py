@@ -69,27 +69,31 @@ def test_three_vrm_moves_hair_as_our_own_springs_do(
     springs: tuple[Path, WrittenCards], moved: ThreePlayback
 ) -> None:
     """Our own springs, with the sidecar's values, agree to 0.1 % of the hair's length."""
-    told = springs[1].motion
-    assert told["joints"] == 1 + told["chains"] * told["joints_in_chain"] <= JOINTS
-    assert moved.spring_count == told["chains"] * (told["joints_in_chain"] - 1)
-    ours = sprung_as_told(told, springs[0], moved.carrier)
-    length = told["error"]["hair_length"]
+    springs_entry = springs[1].motion
+    assert (
+        springs_entry["joints"]
+        == 1 + springs_entry["chains"] * springs_entry["joints_in_chain"]
+        <= JOINTS
+    )
+    assert moved.spring_count == springs_entry["chains"] * (springs_entry["joints_in_chain"] - 1)
+    ours = sprung_as_told(springs_entry, springs[0], moved.carrier)
+    length = springs_entry["error"]["hair_length"]
     assert np.abs(moved.places - ours).max() < 1e-3 * length
     assert np.linalg.norm(ours - ours[0], axis=-1).max() > 0.1 * length
 
 
-def sprung_as_told(told: dict[str, Any], path: Path, carrier: np.ndarray) -> np.ndarray:
+def sprung_as_told(springs_entry: dict[str, Any], path: Path, carrier: np.ndarray) -> np.ndarray:
     """Our own springs, moved with the values in the sidecar."""
-    rest = rest_matrices(path).reshape(told["chains"], -1, 4, 4)
-    shapes = [each["sphere"] for each in told["colliders"]]
-    root = to_blender(np.array(told["root_place"]))
+    rest = rest_matrices(path).reshape(springs_entry["chains"], -1, 4, 4)
+    shapes = [each["sphere"] for each in springs_entry["colliders"]]
+    root = to_blender(np.array(springs_entry["root_place"]))
     centers = to_blender(np.array([each["offset"] for each in shapes])) + root
     balls = Balls.of(centers, np.array([each["radius"] for each in shapes]))
     hits = np.zeros((len(rest), len(shapes)), bool)
-    for number, spring in enumerate(told["springs"]):
+    for number, spring in enumerate(springs_entry["springs"]):
         hits[number, spring["colliders"]] = True
     names = ("stiffness", "drag", "gravity", "hit_radius")
-    values = [np.array([each[name] for each in told["springs"]]) for name in names]
+    values = [np.array([each[name] for each in springs_entry["springs"]]) for name in names]
     return sprung(SpringChains(rest, balls, hits), SpringValues(*values), carrier)
 
 
@@ -109,12 +113,12 @@ def test_motion_by_three_vrm_is_close_to_the_bake(
         ]
         wrong.append(off([each[..., frame, :] for each in levels], expected))
         rigid.append(off([each.positions[each.triangles] for each in written.levels], expected))
-    told = written.motion["error"]
+    error = written.motion["error"]
     p99 = np.quantile(wrong, 0.99)
-    assert p99 < 0.1 * told["hair_length"]
+    assert p99 < 0.1 * error["hair_length"]
     assert p99 < 0.5 * np.quantile(rigid, 0.99)
     # within 20 %, because vertices count once for each corner here
-    assert p99 == pytest.approx(told["percentile_99"], rel=0.2)
+    assert p99 == pytest.approx(error["percentile_99"], rel=0.2)
 
 
 @pytest.fixture(scope="module")
@@ -206,9 +210,9 @@ def test_the_sidecar_describes_the_springs_of_the_file(springs: tuple[Path, Writ
     extension = Player(path).json["extensions"]["VRMC_springBone"]
     nodes = Player(path).json["nodes"]
     assert extension["specVersion"] == "1.0"
-    for told, spring in zip(sidecar["motion"]["springs"], extension["springs"], strict=True):
-        assert told["joints"] == [nodes[each["node"]]["name"] for each in spring["joints"]]
-        assert told["stiffness"] == [each["stiffness"] for each in spring["joints"][:-1]]
+    for entry, spring in zip(sidecar["motion"]["springs"], extension["springs"], strict=True):
+        assert entry["joints"] == [nodes[each["node"]]["name"] for each in spring["joints"]]
+        assert entry["stiffness"] == [each["stiffness"] for each in spring["joints"][:-1]]
     shapes = [each["shape"] for each in extension["colliders"]]
     assert shapes == sidecar["motion"]["colliders"]
     assert written.motion["step_rate"] == 60.0

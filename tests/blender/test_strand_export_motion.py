@@ -39,7 +39,7 @@ LAST = 6
 
 
 @pytest.fixture
-def told(capfd: pytest.CaptureFixture[str]) -> Callable[[], str]:
+def read_output(capfd: pytest.CaptureFixture[str]) -> Callable[[], str]:
     return lambda: "".join(capfd.readouterr())
 
 
@@ -119,7 +119,7 @@ def test_a_bake_keeps_attributes_of_its_curves(swinging: Any, tmp_path: Path) ->
 
 
 def test_frames_that_were_not_baked_are_named_and_nothing_is_written(
-    swinging: Any, tmp_path: Path, told: Callable[[], str]
+    swinging: Any, tmp_path: Path, read_output: Callable[[], str]
 ) -> None:
     hair, _ = swinging
     bake(hair, frames=range(2, 5))
@@ -131,21 +131,21 @@ def test_frames_that_were_not_baked_are_named_and_nothing_is_written(
     playback.forget()
     with pytest.raises(RuntimeError, match=r"frame_000003\.npz.*Bake again"):
         bpy.ops.hairloom.export_alembic(filepath=str(path), frames="own", first=2, last=4)
-    told()
+    read_output()
     assert path.read_bytes() == b"old"
     assert {p.name for p in tmp_path.iterdir()} == {"bake", "hair.abc"}
 
 
 @needs_usd
 def test_hair_without_a_bake_moves_as_its_modifiers_move_it(
-    new_hair: Any, tmp_path: Path, told: Callable[[], str]
+    new_hair: Any, tmp_path: Path, read_output: Callable[[], str]
 ) -> None:
     hair = new_hair(strands=straight_strands())
     push_up(hair, 0.1, frame_driven=True)
     bpy.context.scene.frame_set(2)
     path = tmp_path / "hair.usdc"
     bpy.ops.hairloom.export_usd(filepath=str(path), frames="own", first=1, last=4)
-    assert "no bake" in told()
+    assert "no bake" in read_output()
     assert bpy.context.scene.frame_current == 2
     _, curves = read_usd_curves(path)
     for frame in range(1, 5):
@@ -153,7 +153,7 @@ def test_hair_without_a_bake_moves_as_its_modifiers_move_it(
         np.testing.assert_allclose(curves.GetPointsAttr().Get(frame), expected, rtol=1e-5)
     bake_too = {"use_bake": False, "frames": "own", "first": 1, "last": 4}
     bpy.ops.hairloom.export_usd(filepath=str(path), **bake_too)
-    assert "no bake" not in told()
+    assert "no bake" not in read_output()
 
 
 @needs_usd

@@ -26,7 +26,7 @@ from hairloom.addon.ui.strand_export import StrandExportOperator
 
 
 @pytest.fixture
-def told(capfd: pytest.CaptureFixture[str]) -> Callable[[], str]:
+def read_output(capfd: pytest.CaptureFixture[str]) -> Callable[[], str]:
     return lambda: "".join(capfd.readouterr())
 
 
@@ -96,7 +96,7 @@ def test_renamed_bones_are_reported(
     new_hair: Any,
     sphere: Any,
     tmp_path: Path,
-    told: Callable[[], str],
+    read_output: Callable[[], str],
     renamed: tuple[str, ...],
     sentence: str,
 ) -> None:
@@ -107,7 +107,7 @@ def test_renamed_bones_are_reported(
         armature.data.bones[name].name = f"Kopf_{name}"
         sphere.vertex_groups[f"Kopf_{name}"].name = name
     bpy.ops.hairloom.export_tressfx(filepath=str(tmp_path / "hair.tfx"))
-    assert sentence in told()
+    assert sentence in read_output()
     assert (tmp_path / "hair.tfxbone").exists() == (renamed == ("skull",))
 
 
@@ -136,17 +136,17 @@ def test_an_armature_that_is_scaled_by_100_changes_nothing(
 
 
 def test_the_check_says_what_the_engine_will_see(
-    new_hair: Any, sphere: Any, told: Callable[[], str]
+    new_hair: Any, sphere: Any, read_output: Callable[[], str]
 ) -> None:
     hair = new_hair(sphere)
     hair.data.hairloom.guides.guide_count = 10
     assert bpy.ops.hairloom.check_export(engine="alembic unreal") == {"FINISHED"}
-    text = told()
+    text = read_output()
     assert "60 strands, 10 guides, 560 points" in text
     assert "Width: 0.01 cm" in text and "Z up, left-handed" in text
     hair.data.remove_curves()
     bpy.ops.hairloom.check_export(engine="usd maya")
-    assert "no curves" in told()
+    assert "no curves" in read_output()
 
 
 @needs_usd
@@ -174,7 +174,7 @@ def test_a_collection_writes_its_own_hair(new_hair: Any, sphere: Any, tmp_path: 
 
 
 def test_a_collection_leaves_out_what_is_hidden_or_empty(
-    new_hair: Any, sphere: Any, tmp_path: Path, told: Callable[[], str]
+    new_hair: Any, sphere: Any, tmp_path: Path, read_output: Callable[[], str]
 ) -> None:
     other = bpy.data.collections.new("Other")
     bpy.context.scene.collection.children.link(other)
@@ -185,7 +185,7 @@ def test_a_collection_leaves_out_what_is_hidden_or_empty(
     path = tmp_path / "a.tfx"
     bpy.ops.hairloom.export_tressfx(filepath=str(path), collection="Other")
     assert read_tfx(path).strands.strand_count == 20
-    said = told()
+    said = read_output()
     assert "Combed: it is hidden in viewport and renders, and is left out" in said
     assert "Nothing: it has no curves, and is left out" in said
 

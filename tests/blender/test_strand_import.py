@@ -75,7 +75,7 @@ def head(sphere):
 
 
 @pytest.fixture
-def told(capfd):
+def read_reports(capfd):
     """A function that returns the operator's reports, and refuses tracebacks."""
 
     def read():
@@ -113,10 +113,10 @@ def test_a_groom_comes_in_whole_without_a_head(tmp_path, suffix):
 
 
 @pytest.mark.parametrize("suffix", [".abc", ".usdc", ".tfx", ".hair"])
-def test_hair_is_bound_to_the_active_mesh(tmp_path, head, told, suffix):
+def test_hair_is_bound_to_the_active_mesh(tmp_path, head, read_reports, suffix):
     groom = hairdo()
     (hair,) = imported(write(tmp_path / f"hair{suffix}", groom))
-    assert f"hair{suffix}: 54 strands" in told()
+    assert f"hair{suffix}: 54 strands" in read_reports()
     assert hair.data.surface == head and hair.parent == head
     assert hair.data.surface_uv_map == "UVMap" and head.add_rest_position_attribute
     strands = groom_of(hair).strands
@@ -141,12 +141,12 @@ def test_the_active_mesh_can_be_left_alone(tmp_path, head):
     assert hair.data.surface is None and hair.parent is None
 
 
-def test_guides_can_be_an_object_of_their_own(tmp_path, head, told):
+def test_guides_can_be_an_object_of_their_own(tmp_path, head, read_reports):
     groom = hairdo()
     hair, guides = imported(write(tmp_path / "hair.usdc", groom), guides="APART")
     assert (hair.name, guides.name) == ("hair", "hair Guides")
     assert (len(hair.data.curves), len(guides.data.curves)) == (54, 6)
-    assert "54 strands and 6 guides in 3 groups" in told()
+    assert "54 strands and 6 guides in 3 groups" in read_reports()
     assert "groom_guide" not in hair.data.attributes
     assert groom_of(guides).is_guide.all()
     np.testing.assert_array_equal(groom_of(guides).strand_id, groom.guides().strand_id)
@@ -186,7 +186,9 @@ def test_undo_takes_everything_back_and_redo_brings_it(tmp_path, head):
     assert len(curves.curves) == 54 and curves.surface == bpy.data.objects["Head"]
 
 
-def test_files_of_all_formats_come_in_at_once_and_bad_ones_are_reported(tmp_path, head, told):
+def test_files_of_all_formats_come_in_at_once_and_bad_ones_are_reported(
+    tmp_path, head, read_reports
+):
     groom, names = hairdo(), ["a.abc", "b.usda", "c.tfx", "d.hair", "e.abc", "f.usdc"]
     for name in names[:4]:
         write(tmp_path / name, groom)
@@ -200,7 +202,7 @@ def test_files_of_all_formats_come_in_at_once_and_bad_ones_are_reported(tmp_path
         )
     assert "e.abc" in str(raised.value) and "f.usdc" in str(raised.value)
     assert "Traceback" not in str(raised.value)
-    told()
+    read_reports()
     made = [each for each in bpy.data.objects if each.type == "CURVES"]
     assert sorted(each.name for each in made) == ["a", "b", "c", "d"]
     assert all(each.data.surface == head for each in made)
@@ -209,7 +211,7 @@ def test_files_of_all_formats_come_in_at_once_and_bad_ones_are_reported(tmp_path
 @pytest.mark.parametrize("damage", ["truncated", "garbage", "empty", "missing", "not a number"])
 @pytest.mark.parametrize("suffix", [".abc", ".usdc", ".tfx", ".hair"])
 def test_a_file_that_cannot_be_used_is_named_and_leaves_nothing(
-    tmp_path, head, told, suffix, damage
+    tmp_path, head, read_reports, suffix, damage
 ):
     groom = replace(hairdo(30), is_guide=None)
     path = write(tmp_path / f"groom{suffix}", groom)
@@ -232,7 +234,7 @@ def test_a_file_that_cannot_be_used_is_named_and_leaves_nothing(
     with pytest.raises(RuntimeError, match=rf"groom\{suffix}") as raised:
         imported(path)
     assert "Traceback" not in str(raised.value)
-    told()
+    read_reports()
     assert [obj.name for obj in bpy.data.objects] == ["Head"]
     assert len(bpy.data.hair_curves) == 0
 
@@ -252,7 +254,7 @@ def test_a_file_that_cannot_be_used_is_named_and_leaves_nothing(
     ],
 )
 def test_a_file_of_another_unit_or_axes_is_reported_with_fitting_options(
-    tmp_path, head, told, suffix, written, wish, options
+    tmp_path, head, read_reports, suffix, written, wish, options
 ):
     path = tmp_path / f"hair{suffix}"
     (write_tfx if suffix == ".tfx" else write_hair_file)(path, hairdo(), **written)
@@ -264,18 +266,18 @@ def test_a_file_of_another_unit_or_axes_is_reported_with_fitting_options(
     np.testing.assert_allclose(
         groom_of(hair).strands.points, hairdo().without_guides().strands.points, atol=1e-5
     )
-    told()
+    read_reports()
 
 
-def test_the_message_about_a_small_factor_names_the_right_one(tmp_path, head, told):
+def test_the_message_about_a_small_factor_names_the_right_one(tmp_path, head, read_reports):
     write_tfx(tmp_path / "hair.tfx", hairdo(), scale=0.01)
     with pytest.raises(RuntimeError, match=r"a scale of 0\.01 "):
         imported(tmp_path / "hair.tfx", scale=0.1)
-    told()
+    read_reports()
 
 
 def test_hair_with_other_axes_that_is_near_by_chance_comes_in_with_a_warning(
-    tmp_path, sphere, told
+    tmp_path, sphere, read_reports
 ):
     """With the head at the origin, turned hair of its upper half is still near it."""
     groom = hairdo(place=np.zeros(3, np.float32))
@@ -286,23 +288,25 @@ def test_hair_with_other_axes_that_is_near_by_chance_comes_in_with_a_warning(
     groom = replace(groom, strands=replace(groom.strands, points=points.astype(np.float32)))
     write_tfx(tmp_path / "hair.tfx", groom, up="Z")
     (hair,) = imported(tmp_path / "hair.tfx")
-    assert "mm from Head (median). Import it with Z up" in told()
+    assert "mm from Head (median). Import it with Z up" in read_reports()
     assert len(hair.data.curves) == 54
     imported(tmp_path / "hair.tfx", up="Z")
-    assert "median" not in told()
+    assert "median" not in read_reports()
 
 
 @pytest.mark.parametrize(
     ("scale", "words"),
     [(0.001, "Scale hair.tfx by 0.01 (--groom-scale 0.01)"), (100.0, "mm large")],
 )
-def test_hair_of_an_odd_size_without_a_head_is_a_warning(tmp_path, told, scale, words):
+def test_hair_of_an_odd_size_without_a_head_is_a_warning(tmp_path, read_reports, scale, words):
     write_tfx(tmp_path / "hair.tfx", hairdo(), scale=scale)
     imported(tmp_path / "hair.tfx")
-    assert words in told()
+    assert words in read_reports()
 
 
-def test_hair_and_head_in_centimetres_are_reported_and_scaled_together(tmp_path, head, told):
+def test_hair_and_head_in_centimetres_are_reported_and_scaled_together(
+    tmp_path, head, read_reports
+):
     """A head of 24 m at the origin, whose object has its own scale, and hair on it."""
     head.scale *= 100.0
     head.location *= 100.0
@@ -312,41 +316,41 @@ def test_hair_and_head_in_centimetres_are_reported_and_scaled_together(tmp_path,
     imported(tmp_path / "hair.tfx")
     bpy.context.view_layer.objects.active = head
     head.select_set(True)
-    assert "Scale both by 0.01 (--groom-scale 0.01 --head-scale 0.01)" in told()
+    assert "Scale both by 0.01 (--groom-scale 0.01 --head-scale 0.01)" in read_reports()
     (hair,) = imported(tmp_path / "hair.tfx", scale=0.01, head_scale=0.01)
-    assert "centimetres" not in told()
+    assert "centimetres" not in read_reports()
     expected = np.diag([0.01, 0.01, 0.01, 1.0]) @ large
     np.testing.assert_allclose(np.array(head.matrix_world), expected, atol=1e-6)
     points = read_curves(hair, bpy.context.evaluated_depsgraph_get()).strands.points
     np.testing.assert_allclose(points, hairdo().without_guides().strands.points, atol=1e-5)
 
 
-def test_of_several_uv_maps_the_one_that_counts_is_named(tmp_path, head, told):
+def test_of_several_uv_maps_the_one_that_counts_is_named(tmp_path, head, read_reports):
     imported(write(tmp_path / "hair.abc", hairdo()))
-    assert "UV maps" not in told()
+    assert "UV maps" not in read_reports()
     other = head.data.uv_layers.new(name="Lightmap")
     head.data.uv_layers.active = other
     bpy.context.view_layer.objects.active = head
     head.select_set(True)
     (hair,) = imported(write(tmp_path / "hair.abc", hairdo()))
-    assert "2 UV maps, and hair and its shadow use the active one, 'Lightmap'" in told()
+    assert "2 UV maps, and hair and its shadow use the active one, 'Lightmap'" in read_reports()
     assert hair.data.surface_uv_map == "Lightmap"
 
 
-def test_a_head_without_uvs_keeps_those_of_the_file_and_is_reported(tmp_path, head, told):
+def test_a_head_without_uvs_keeps_those_of_the_file_and_is_reported(tmp_path, head, read_reports):
     head.data.uv_layers.remove(head.data.uv_layers[0])
     head.data.update()
     groom = hairdo()
     (hair,) = imported(write(tmp_path / "hair.abc", groom), guides="AMONG")
-    assert "Unwrap" in told()
+    assert "Unwrap" in read_reports()
     np.testing.assert_array_equal(groom_of(hair).strands.root_uv, groom.strands.root_uv)
 
 
-def test_a_head_without_faces_is_refused(tmp_path, head, told):
+def test_a_head_without_faces_is_refused(tmp_path, head, read_reports):
     head.data.clear_geometry()
     with pytest.raises(RuntimeError, match="Head: this mesh has no faces"):
         imported(write(tmp_path / "hair.abc", hairdo()))
-    told()
+    read_reports()
     assert len(bpy.data.hair_curves) == 0
 
 
@@ -358,7 +362,7 @@ def test_what_the_button_makes_is_what_other_functions_of_ours_read(tmp_path, he
     assert [each.name for each in bpy.context.selected_objects] == ["hair"]
 
 
-def test_blenders_own_exports_of_hair_come_in(tmp_path, head, told):
+def test_blenders_own_exports_of_hair_come_in(tmp_path, head, read_reports):
     """Blender's Alembic and USD exporters write hair curves without our attributes."""
     needs_usd()
     groom = hairdo()
@@ -374,10 +378,10 @@ def test_blenders_own_exports_of_hair_come_in(tmp_path, head, told):
         np.testing.assert_allclose(strands.points, expected.points, atol=1e-6)
         np.testing.assert_allclose(strands.radius, expected.radius, rtol=1e-4)
         assert again.data.surface == head
-    told()
+    read_reports()
 
 
-def test_the_ponytail_of_four_files_comes_in_at_once(shared_data, told):
+def test_the_ponytail_of_four_files_comes_in_at_once(shared_data, read_reports):
     folder = Path(shared_data) / "tressfx_ponytail"
     files = [{"name": path.name} for path in sorted(folder.glob("*.tfx"))]
     assert bpy.ops.hairloom.import_strands(
@@ -385,11 +389,13 @@ def test_the_ponytail_of_four_files_comes_in_at_once(shared_data, told):
     ) == {"FINISHED"}
     assert len([obj for obj in bpy.data.objects if obj.type == "CURVES"]) == len(files) == 4
     assert len(bpy.context.selected_objects) == 4
-    told()
+    read_reports()
 
 
 @pytest.mark.parametrize("suffix", [".abc", ".usdc", ".hair"])
-def test_sintel_goes_through_every_format_onto_her_head(shared_data, tmp_path, suffix, told):
+def test_sintel_goes_through_every_format_onto_her_head(
+    shared_data, tmp_path, suffix, read_reports
+):
     folder = Path(shared_data) / "sintel"
     bpy.ops.wm.obj_import(filepath=str(folder / "sintel.obj"))
     (head,) = bpy.context.selected_objects
@@ -399,7 +405,7 @@ def test_sintel_goes_through_every_format_onto_her_head(shared_data, tmp_path, s
     strands = groom_of(hair).strands
     np.testing.assert_array_equal(strands.points, original.strands.points)
     assert hair.data.surface == head and strands.root_uv.min() >= 0.0
-    assert "11,400 strands" in told()
+    assert "11,400 strands" in read_reports()
 
 
 def test_dropping_and_the_menu_know_all_formats():

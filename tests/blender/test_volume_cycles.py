@@ -81,11 +81,11 @@ def drawn(
 def test_blond_hair_has_the_light_of_path_tracing(case: tuple[int, int, float], skin: Any) -> None:
     """Coverage is within 2 %, and each channel's light within the case's tolerance on skin that
     shines through the hair, and within 13 % on black skin."""
-    count, resolution, most = case
+    count, resolution, tolerance = case
     strands, ball = combed_strands(count), Surface(*ball_mesh(24))
     ours, theirs = drawn(strands, ball, skin, resolution), path_traced(strands, ball, skin)
     assert np.abs(ours[..., 3] - theirs[..., 3]).mean() < 0.03
     assert ours[..., 3].mean() == pytest.approx(theirs[..., 3].mean(), rel=0.02)
     light = [picture[..., :3].mean(axis=(0, 1)) for picture in (ours, theirs)]
     # on black skin, light comes from hair only
-    assert light[0] == pytest.approx(light[1], rel=most if any(skin) else 0.13)
+    assert light[0] == pytest.approx(light[1], rel=tolerance if any(skin) else 0.13)

@@ -30,11 +30,11 @@ ENGINES = REPOSITORY / "docs" / "engines"
 OUTPUT = REPOSITORY / "out" / "engines" / "springs"
 PROJECT = OUTPUT / "godot"
 #: tolerance as a fraction of the hair's length: Godot computes in single precision
-MOST_OFF = 1.0e-3
+MAX_ERROR = 1.0e-3
 
 
 @pytest.fixture(scope="module")
-def told(motion: GuideMotion) -> dict[str, Any]:  # noqa: F811
+def springs(motion: GuideMotion) -> dict[str, Any]:  # noqa: F811
     """Writes an asset and the head's motion; the sidecar's entry on the springs, with our positions
     of all joints in each step, in world space."""
     shutil.rmtree(OUTPUT, ignore_errors=True)
@@ -56,15 +56,15 @@ def copied(kind: str, folder: Path) -> None:
     shutil.copy2(OUTPUT / "poses.json", folder)
 
 
-def check(told: dict[str, Any], frames: list[dict[str, list[float]]]) -> None:
-    names = [name for spring in told["springs"] for name in spring["joints"]]
+def check(springs: dict[str, Any], frames: list[dict[str, list[float]]]) -> None:
+    names = [name for spring in springs["springs"] for name in spring["joints"]]
     world = np.array([[frame[name] for name in names] for frame in frames])
-    off = np.linalg.norm(to_z_up(world) - told["world"], axis=-1)
-    assert off.max() < MOST_OFF * told["error"]["hair_length"]
+    off = np.linalg.norm(to_z_up(world) - springs["world"], axis=-1)
+    assert off.max() < MAX_ERROR * springs["error"]["hair_length"]
 
 
 @pytest.fixture(scope="module")
-def project(told: dict[str, Any], sandbox: str) -> Path:
+def project(springs: dict[str, Any], sandbox: str) -> Path:
     copied("godot_springs", PROJECT)
     shutil.copytree(ENGINES / "godot", PROJECT / "addons" / "hairloom")
     return PROJECT
@@ -72,7 +72,7 @@ def project(told: dict[str, Any], sandbox: str) -> Path:
 
 @pytest.mark.parametrize("is_imported", [False, True])
 def test_godot_moves_springs_as_we_do(
-    told: dict[str, Any], project: Path, sandbox: str, is_imported: bool
+    springs: dict[str, Any], project: Path, sandbox: str, is_imported: bool
 ) -> None:
     """With a file that no editor has imported, and with one that the add-on has imported as a
     scene."""
@@ -82,9 +82,9 @@ def test_godot_moves_springs_as_we_do(
     rate, written = str(int(STEP_RATE)), project / f"imported_{is_imported}.json"
     run_godot(sandbox, "--fixed-fps", rate, "--path", str(project), "--", str(written))
     found = json.loads(written.read_text(encoding="utf-8"))
-    assert found["springs"] == told["chains"]
-    assert found["collisions"] == len(told["colliders"]) > 0
-    check(told, found["frames"])
+    assert found["springs"] == springs["chains"]
+    assert found["collisions"] == len(springs["colliders"]) > 0
+    check(springs, found["frames"])
 
 
 def run_godot(sandbox: str, *options: str) -> None:
@@ -106,7 +106,7 @@ def rigged(glb: Path) -> None:
 
 @pytest.mark.parametrize("is_rigged", [False, True])
 def test_our_module_passes_springs_to_three_vrm(
-    told: dict[str, Any], sandbox: str, is_rigged: bool
+    springs: dict[str, Any], sandbox: str, is_rigged: bool
 ) -> None:
     if not MODULE.is_dir():
         pytest.skip("three-vrm-springbone is missing: `make setup` installs it")
@@ -125,4 +125,4 @@ def test_our_module_passes_springs_to_three_vrm(
     assert found["said"] == []
     assert found["isWhole"]  # a copy is bound to its own joints
     assert not found["hasSprings"]  # which the original's springs do not move
-    check(told, found["frames"])
+    check(springs, found["frames"])

@@ -36,7 +36,7 @@ def running():
     return hairloom_module("long_work").running()
 
 
-def told():
+def progress_text():
     """The work's text in the status bar."""
     work = hairloom_module("long_work")._running
     return "" if work is None else work.progress.text
@@ -162,7 +162,7 @@ def check():
     with bpy.context.temp_override(area=viewport(), region=region("WINDOW")):
         asked = bpy.ops.hairloom.check_export("INVOKE_DEFAULT", engine="alembic unreal")
     assert asked == {"RUNNING_MODAL"} and running() == "Check for Export"
-    assert told() == "Making strands"
+    assert progress_text() == "Making strands"
 
 
 def into_a_popup():
@@ -224,7 +224,7 @@ def cards_in_motion():
         bpy.ops.hairloom.export_cards("INVOKE_DEFAULT", motion="joints")
     yield from confirm_file_browser(FOLDER)
     yield from wait_until(lambda: running() == "Export Hair Cards", "the browser starts no export")
-    yield from wait_until(lambda: told() == "Fitting joints", "no joints are fitted")
+    yield from wait_until(lambda: progress_text() == "Fitting joints", "no joints are fitted")
     driver.screenshot("fitting")
     yield from press("ESC")
     yield from wait_until(lambda: not running(), "Esc does not cancel the export of cards")
