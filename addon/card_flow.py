@@ -123,11 +123,11 @@ def _contacts(rig: Rig, cards: CardBinding, solids: Solids) -> CardContacts | No
     colliders = solids.colliders
     if not colliders or not solids.motion_start.colliders:
         return None
-    for known, clearance in cards.met:
+    for known, clearance in cards.clearance_cache:
         if known is solids.motion_start or known.is_same_as(solids.motion_start):
             return CardContacts(colliders, clearance)
     clearance = card_clearance(rig, cards, solids.motion_start)
-    cards.met[:] = [(solids.motion_start, clearance)]
+    cards.clearance_cache[:] = [(solids.motion_start, clearance)]
     return CardContacts(colliders, clearance)
 
 
@@ -136,8 +136,8 @@ def card_clearance(rig: Rig, cards: CardBinding, start: MotionStart) -> CardClea
     guides = carried_guides(rig, start.pose)
     spines, vertices = carried_cards(cards, guides, root_turns(rig, start.pose))
     standing = tuple(each.at_end() for each in start.colliders)
-    return CardClearance.at(
-        spines, vertices, cards.row, cards.offsets, standing, start.max_clearance
+    return CardClearance.measure(
+        spines, vertices, cards.row_of_vertex, cards.offsets, standing, start.max_clearance
     )
 
 
@@ -147,8 +147,8 @@ class CardMeasure:
 
     def __init__(self, rig: Rig, cards: CardBinding) -> None:
         self._rig, self._cards = rig, cards
-        self._lengths = strand_lengths(cards.lines(cards.mesh.positions), cards.offsets)
-        owner = cards.row_card[cards.row]
+        self._lengths = strand_lengths(cards.row_middles(cards.mesh.positions), cards.offsets)
+        owner = cards.card_of_row[cards.row_of_vertex]
         self._by_card = np.argsort(owner, kind="stable")
         self._offsets = np.searchsorted(owner[self._by_card], np.arange(len(cards.guide) + 1))
         self._were_outside: Bools | None = None
@@ -162,7 +162,7 @@ class CardMeasure:
         """
         if not len(self._cards.guide):
             return
-        lines = self._cards.lines(mesh.positions)
+        lines = self._cards.row_middles(mesh.positions)
         change = length_changes(lines, self._cards.offsets, self._lengths)
         np.maximum(self._change, change, out=self._change)
         if solids is None:

@@ -75,7 +75,7 @@ def motion_figures(seconds: float) -> dict[str, float]:
     layout = texture.layout
     texels = stored[::-1].reshape(layout.frame_count, -1, 3)[:, : layout.vertex_count]
     found = texels.transpose(1, 0, 2)
-    pairs = zip(moved.tracks.moved, levels, strict=True)
+    pairs = zip(moved.tracks.moved_positions, levels, strict=True)
     offsets = np.concatenate([now - mesh.positions[:, None] for now, mesh in pairs])
     miss = np.linalg.norm(found - GLB.to_file_space(offsets), axis=-1)
     figures["vat_error_mm"] = 1000.0 * float(miss.max())

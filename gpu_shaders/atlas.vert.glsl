@@ -14,7 +14,7 @@ void main()
   vec4 attributes = texelFetch(cv_attributes, texel, 0);    // xyz base, w occlusion
   vec4 strand_values = texelFetch(cv_rest, texel, 0);     // x fraction, y strand_id, z along
 
-  vec2 place = leaning(position.xy + side * position.zw, atlas_size, block_start) / block_samples;
+  vec2 place = sheared(position.xy + side * position.zw, atlas_size, block_start) / block_samples;
   strand_number = strand;
   strand_id = strand_values.y;
   along_and_side = vec2(strand_values.z, side);

@@ -19,8 +19,8 @@ bool is_counted(uint column, uint row, uint strand, float fraction)
   return float(place & {{sparse_mask}}u) < fraction * float({{sparse_mask}}u + 1u);
 }
 
-// A place of the atlas, in 0..1, in the slanted sample grid of one of its blocks; twin of Block.leaning.
-vec2 leaning(vec2 place, float size, vec2 start)
+// A place of the atlas, in 0..1, in the slanted sample grid of one of its blocks; twin of Block.sheared.
+vec2 sheared(vec2 place, float size, vec2 start)
 {
   vec2 upright = (place * size - start) * float({{atlas_samples}});
   return vec2(upright.x + upright.y / float({{atlas_samples}}) - 0.5, upright.y);

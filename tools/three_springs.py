@@ -17,8 +17,13 @@ from typing import Any
 import numpy as np
 
 from hairloom.addon.cards.joint_solve import Skin, skinned
-from hairloom.addon.cards.joints import joint_moves
-from hairloom.addon.cards.spring_bones import STEP_RATE, at_frames, stepped, turns_to
+from hairloom.addon.cards.joints import joint_transforms
+from hairloom.addon.cards.spring_bones import (
+    STEP_RATE,
+    resampled_to_frames,
+    resampled_to_steps,
+    rotations_towards,
+)
 from hairloom.addon.exchange.cards.card_formats import GLB
 from hairloom.addon.exchange.cards.glb_file import GlbFile
 
@@ -45,9 +50,9 @@ class ThreePlayback:
         """The corners of all triangles of each level, (triangle_count, 3, frame_count, 3), in the
         space of the head, by the weights of the file.
         """
-        places = at_frames(self.places, frame_count, rate)
-        turns = turns_to(self.rest, places).transpose(1, 2, 0, 3, 4)
-        turn, shift = joint_moves(self.rest, turns, places.transpose(1, 2, 0, 3))
+        places = resampled_to_frames(self.places, frame_count, rate)
+        turns = rotations_towards(self.rest, places).transpose(1, 2, 0, 3, 4)
+        turn, shift = joint_transforms(self.rest, turns, places.transpose(1, 2, 0, 3))
         still = np.tile(np.eye(3), (1, frame_count, 1, 1))
         turn = np.concatenate([still, turn])
         shift = np.concatenate([np.zeros_like(shift[:1]), shift])
@@ -68,7 +73,7 @@ def play_in_three(path: Path, head: np.ndarray, rate: float, chains: int) -> Thr
     Args:
         head: (frame_count, 4, 4) rigid, Z up.
     """
-    carrier = stepped(head, rate)
+    carrier = resampled_to_steps(head, rate)
     with tempfile.TemporaryDirectory() as folder:
         poses = Path(folder) / "poses.json"
         poses.write_text(json.dumps({"step": 1.0 / STEP_RATE, "matrices": head_matrices(carrier)}))

@@ -26,25 +26,25 @@ from .sort import connected_components
 from .uv_directions import UvAxes, UvDirection, coordinate_gradients, island_bounds, uv_axes
 
 #: A triangle whose area is below this fraction of its squared longest edge counts as without area.
-_FLAT = 1.0e-7
+_MIN_AREA = 1.0e-7
 #: Minimum mean cosine of a card that faces away from the head, or towards it.
 _MIN_FACING = 0.25
 #: The normal where no other is known, and the length below which vectors have no direction.
-_DOWN, _SHORTEST = (0.0, 0.0, -1.0), 1.0e-20
+_DOWN, _MIN_LENGTH = (0.0, 0.0, -1.0), 1.0e-20
 
 
 @dataclass(frozen=True)
 class AdoptedCards:
     """mesh: its triangles are those of the source, in their order; occlusion is 1.
-    vertex: (vertex_count,) which vertex of the source each vertex is.
-    corner: (triangle_count, 3) the vertex at each corner of the source's triangles, some of which
-        are flipped in the mesh.
+    source_vertex: (vertex_count,) which vertex of the source each vertex is.
+    corner_vertex: (triangle_count, 3) the vertex at each corner of the source's triangles, some of
+        which are flipped in the mesh.
     notes: doubts for the artist, a sentence each.
     """
 
     mesh: CardMesh
-    vertex: Ints
-    corner: Ints
+    source_vertex: Ints
+    corner_vertex: Ints
     notes: tuple[str, ...]
 
 
@@ -69,20 +69,20 @@ def adopt_cards(
     Raises:
         HairloomError: the mesh has no triangles, or no UVs.
     """
-    _check(source, place)
+    _check_source(source, place)
     assert source.corner_uv is not None
     vertex, uv, triangles = _split_at_seams(source.triangles, source.corner_uv)
     card = connected_components(source.triangles)
     island = connected_components(triangles)
-    toward = _away_from(source.positions, head)
+    outwards = _outwards_from(source.positions, head)
     corners = source.corners.astype(np.float64)
-    distance = toward.distance[source.triangles]
+    distance = outwards.distance[source.triangles]
     axes = uv_axes(corners, uv[triangles], distance, island, direction)
-    normal, is_turned, is_mixed = _facing(source, card, toward.direction)
+    normal, is_flipped, is_mixed = _facing_normals(source, card, outwards.direction)
     along = _along(uv[triangles], island, axes)
     mesh = CardMesh(
         positions=source.positions[vertex],
-        triangles=np.where(is_turned[:, None], triangles[:, ::-1], triangles),
+        triangles=np.where(is_flipped[:, None], triangles[:, ::-1], triangles),
         uv=uv,
         along=_at_vertices(triangles, along, len(vertex)),
         normal=normal[vertex],
@@ -99,7 +99,7 @@ def adopt_cards(
     return AdoptedCards(mesh, vertex, triangles, notes)
 
 
-def _check(source: Surface, place: str) -> None:
+def _check_source(source: Surface, place: str) -> None:
     if not len(source.triangles):
         raise HairloomError("this mesh has no faces", place=place, remedy="Choose a mesh of cards")
     if source.corner_uv is None:
@@ -119,24 +119,24 @@ def _split_at_seams(triangles: Ints, corner_uv: Floats) -> tuple[Ints, Floats, I
 
 
 @dataclass(frozen=True)
-class _Away:
+class _Outwards:
     """direction: (vertex_count, 3) out of the head; distance: (vertex_count,) from it [m]."""
 
     direction: Floats
     distance: Floats
 
 
-def _away_from(positions: Floats, head: Surface | None) -> _Away:
+def _outwards_from(positions: Floats, head: Surface | None) -> _Outwards:
     """Without a head, directions are from the middle of all vertices, and distances are 0."""
     if head is None or not len(head.triangles):
         middle = 0.5 * (positions.min(axis=0) + positions.max(axis=0))
         outward = positions - middle
-        return _Away(unit_or(outward, _DOWN, _SHORTEST), np.zeros(len(positions)))
+        return _Outwards(unit_or(outward, _DOWN, _MIN_LENGTH), np.zeros(len(positions)))
     nearest = closest_point(positions, head)
-    return _Away(head.triangle_normals()[nearest.triangle], nearest.distance)
+    return _Outwards(head.triangle_normals()[nearest.triangle], nearest.distance)
 
 
-def _facing(source: Surface, card: Ints, away: Floats) -> tuple[Floats, Bools, Bools]:
+def _facing_normals(source: Surface, card: Ints, away: Floats) -> tuple[Floats, Bools, Bools]:
     """Normals away from the head, and which triangles must be flipped for that.
 
     A card is flipped as a whole; if its own triangles disagree, each is flipped by itself.
@@ -147,17 +147,17 @@ def _facing(source: Surface, card: Ints, away: Floats) -> tuple[Floats, Bools, B
     a, b, c = np.moveaxis(source.corners.astype(np.float64), 1, 0)
     outward = np.cross(b - a, c - a)
     ahead = np.einsum("ti,tci->t", outward, away[source.triangles]) / 3.0
-    is_mixed = _disagreeing(source.triangles, card)
-    is_inward = _looks_inwards((a + b + c) / 3.0, outward, ahead, card)
-    is_turned = np.where(is_mixed[card], ahead < 0.0, is_inward[card])
-    outward[is_turned] *= -1.0
+    is_mixed = _has_mixed_winding(source.triangles, card)
+    is_inward = _is_facing_inwards((a + b + c) / 3.0, outward, ahead, card)
+    is_flipped = np.where(is_mixed[card], ahead < 0.0, is_inward[card])
+    outward[is_flipped] *= -1.0
     total = np.zeros((len(source.positions), 3))
     for corner in range(3):
         np.add.at(total, source.triangles[:, corner], outward)
-    return unit_or(total, unit_or(away, _DOWN, _SHORTEST), _SHORTEST), is_turned, is_mixed
+    return unit_or(total, unit_or(away, _DOWN, _MIN_LENGTH), _MIN_LENGTH), is_flipped, is_mixed
 
 
-def _looks_inwards(centers: Floats, outward: Floats, ahead: Floats, card: Ints) -> Bools:
+def _is_facing_inwards(centers: Floats, outward: Floats, ahead: Floats, card: Ints) -> Bools:
     """Cards that face the head, (card_count,). Of cards that face all sides, such as closed tubes,
     those that face their own middle: their volume is negative.
     """
@@ -171,7 +171,7 @@ def _looks_inwards(centers: Floats, outward: Floats, ahead: Floats, card: Ints) 
     return is_inward
 
 
-def _disagreeing(triangles: Ints, card: Ints) -> Bools:
+def _has_mixed_winding(triangles: Ints, card: Ints) -> Bools:
     """Cards in which two triangles run along an edge in the same direction, (card_count,)."""
     edges = np.concatenate([triangles[:, (0, 1)], triangles[:, (1, 2)], triangles[:, (2, 0)]])
     key = edges[:, 0].astype(np.int64) * (int(triangles.max()) + 1) + edges[:, 1]
@@ -189,7 +189,7 @@ def _along(uv: Floats, island: Ints, axes: UvAxes) -> Floats:
     low, high = (bound[island, None] for bound in island_bounds(coordinate, island))
     size = high - low
     fraction = np.divide(coordinate - low, size, out=np.zeros_like(coordinate), where=size > 0.0)
-    return np.where(axes.is_down[island, None], 1.0 - fraction, fraction)
+    return np.where(axes.is_reversed[island, None], 1.0 - fraction, fraction)
 
 
 def _tangents(
@@ -199,10 +199,10 @@ def _tangents(
     where UVs give no direction."""
     gradients = coordinate_gradients(corners, uv[triangles])
     chosen = np.take_along_axis(gradients, axes.axis[island][:, None, None], axis=1)[:, 0]
-    chosen *= np.where(axes.is_down[island], -1.0, 1.0)[:, None]
-    one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    area = np.linalg.norm(np.cross(one, two), axis=1)
-    chosen = unit_or(chosen, _DOWN, _SHORTEST) * area[:, None]
+    chosen *= np.where(axes.is_reversed[island], -1.0, 1.0)[:, None]
+    edge_1, edge_2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    area = np.linalg.norm(np.cross(edge_1, edge_2), axis=1)
+    chosen = unit_or(chosen, _DOWN, _MIN_LENGTH) * area[:, None]
     total = np.zeros((len(uv), 3))
     for corner in range(3):
         np.add.at(total, triangles[:, corner], chosen)
@@ -210,7 +210,7 @@ def _tangents(
     whole = sums_by(island, from_root)
     fallback = np.zeros_like(total)
     fallback[triangles] = whole[island][:, None]
-    return unit_or(total, unit_or(fallback, _DOWN, _SHORTEST), _SHORTEST)
+    return unit_or(total, unit_or(fallback, _DOWN, _MIN_LENGTH), _MIN_LENGTH)
 
 
 def _at_vertices(triangles: Ints, values: Floats, vertex_count: int) -> Floats:
@@ -234,18 +234,18 @@ def _direction_notes(axes: UvAxes, island: Ints, card: Ints, head: Surface | Non
     if head is None:
         yield "There is no head, so the higher end of the cards was taken for their roots"
     count = int(card.max()) + 1
-    against, unsaid = (
-        len(np.unique(card[flags[island]])) for flags in (axes.is_against, axes.is_unsaid)
+    deviating, undecided = (
+        len(np.unique(card[flags[island]])) for flags in (axes.is_deviating, axes.is_undecided)
     )
-    if against:
+    if deviating:
         yield (
-            f"The UVs of {against} of {_cards(count)} run in another direction than those of the "
+            f"The UVs of {deviating} of {_cards(count)} run in another direction than those of the "
             "others"
         )
-    if unsaid:
+    if undecided:
         yield (
-            f"The UVs of {unsaid} of {_cards(count)} do not tell which end is the root. Choose it "
-            "under Root to Tip"
+            f"The UVs of {undecided} of {_cards(count)} do not tell which end is the root. Choose "
+            "it under Root to Tip"
         )
 
 
@@ -258,18 +258,18 @@ def _shape_notes(source: Surface, card: Ints, is_mixed: Bools) -> Iterator[str]:
     a, b, c = np.moveaxis(source.corners.astype(np.float64), 1, 0)
     area = 2.0 * areas_of(source.corners.astype(np.float64))
     longest = np.max([((x - y) ** 2).sum(axis=1) for x, y in ((a, b), (b, c), (c, a))], axis=0)
-    is_flat = np.bincount(card, area > _FLAT * longest, minlength=count) == 0
+    is_flat = np.bincount(card, area > _MIN_AREA * longest, minlength=count) == 0
     if is_flat.any():
         yield f"No face of {_cards(int(is_flat.sum()))} has any area"
-    shared = _crowded(source.triangles, card)
+    shared = _count_with_crowded_edges(source.triangles, card)
     if shared:
         yield f"In {_cards(shared)} more than two faces share an edge"
-    doubled = _doubled(source, card)
+    doubled = _count_duplicates(source, card)
     if doubled:
         yield f"{_cards(doubled)} {'lies' if doubled == 1 else 'lie'} exactly on another"
 
 
-def _crowded(triangles: Ints, card: Ints) -> int:
+def _count_with_crowded_edges(triangles: Ints, card: Ints) -> int:
     """Number of cards with an edge of more than two triangles."""
     edges = np.concatenate([triangles[:, (0, 1)], triangles[:, (1, 2)], triangles[:, (2, 0)]])
     _, number, uses = np.unique(
@@ -278,7 +278,7 @@ def _crowded(triangles: Ints, card: Ints) -> int:
     return len(np.unique(np.tile(card, 3)[uses[number.ravel()] > 2]))
 
 
-def _doubled(source: Surface, card: Ints) -> int:
+def _count_duplicates(source: Surface, card: Ints) -> int:
     """Number of cards whose corners all lie where those of an earlier card lie."""
     seen, found = set(), 0
     order = np.argsort(card, kind="stable")

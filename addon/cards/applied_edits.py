@@ -359,7 +359,7 @@ def _adopted(
         triangles, uv = triangles[:, ::-1], uv[:, ::-1]
     surface = Surface(placed.positions, triangles, uv)
     found = adopt_cards(surface, head, direction="up", place="the edited cards")
-    adopted = _with_original_facing(found.mesh, found.corner)
+    adopted = _with_original_facing(found.mesh, found.corner_vertex)
     # pieces share no vertices, so each is a card of its own
     of_card = np.zeros(len(edits.card_of_piece), np.int32)
     of_card[adopted.card] = edits.piece_of_triangle

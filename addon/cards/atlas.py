@@ -24,16 +24,16 @@ from .strip import CardFrames, Strips
 #: repetition is visible.
 _FACE_TILES = 6
 #: Maximum number of strands in a tile, as a factor of its width in pixels.
-_MAX_STRANDS = 2
+_MAX_STRANDS_PER_PIXEL = 2
 #: Range of the factor by which a card is widened to cover as much as its own strands.
 _WIDTH_RANGE = (0.5, 2.0)
 #: Sine of the angle between strands and card that counts as much as a factor of two in width.
-_WAVE = 0.2
+_WAVE_SCALE = 0.2
 #: Slope of the line through a card's roots that counts as much; its sign differs between the two
 #: sides of a parting.
-_SKEW = 0.5
+_SLOPE_SCALE = 0.5
 #: Difference of perceived colour that counts as much: of square roots of linear colours.
-_HUE = 0.15
+_COLOR_SCALE = 0.15
 #: Value beyond all colours, for strands without one of their own.
 _NO_COLOR = 4.0
 #: Tiles of an automatic atlas: texels across the median strand; length of a texel over its width,
@@ -100,17 +100,17 @@ def plan_atlas(
     settings = settings.fitted(len(strips), *_wanted_texels(strips, radius, cluster, settings))
     atlas = settings.grid
     shapes = _card_shapes(strips, grid, radius, cluster)
-    kind = _kinds(cluster, group, shapes.strand_count, atlas.tile_count)
-    is_face = _is_face(cluster, group)
+    kind = _tile_kinds(cluster, group, shapes.strand_count, atlas.tile_count)
+    is_face = _is_face_card(cluster, group)
     random = np.random.default_rng(settings.seed)
     features = shapes.features
     if color is not None:
         features = np.concatenate([features, _card_colors(color, cluster, len(strips))], axis=1)
-    tile, medoid = _shared_tiles(features, kind, is_face, atlas.tile_count, random)
+    tile, medoid = _assign_tiles(features, kind, is_face, atlas.tile_count, random)
     chosen = _of_cards(strips, medoid)
-    strands, offsets, crowding = _baked_strands(cluster, medoid, settings, random)
+    strands, offsets, crowding = _choose_strands(cluster, medoid, settings, random)
     notes = (
-        *_cap_note(crowding),
+        *_overflow_note(crowding),
         *_size_notes(chosen, grid[strands], radius[strands], offsets, settings),
     )
     return AtlasPlan(
@@ -178,20 +178,20 @@ def _card_shapes(strips: Strips, grid: Floats, radius: Floats, cluster: Ints) ->
     spacing = np.linalg.norm(spacing, axis=-1)
     scales = (width.mean(axis=1), spacing.sum(axis=1), fill.mean(axis=1), count)
     octaves = [np.log2(np.maximum(scale / np.median(scale), _TINY)) for scale in scales]
-    wave = np.bincount(cluster, _asides(strips.frames, grid, cluster), card_count) / count
-    skew = _skews(strips.frames, grid, cluster)
-    features = np.stack([*octaves, wave / _WAVE, skew / _SKEW], axis=1)
+    wave = np.bincount(cluster, _sines_to_card(strips.frames, grid, cluster), card_count) / count
+    slope = _root_slopes(strips.frames, grid, cluster)
+    features = np.stack([*octaves, wave / _WAVE_SCALE, slope / _SLOPE_SCALE], axis=1)
     return _CardShapes(count, covered, spacing, features)
 
 
 def _card_colors(color: Floats, cluster: Ints, card_count: int) -> Floats:
     """Colour features of cards, (card_count, 9): the means at root, middle and tip."""
     stations = color[:, [0, color.shape[1] // 2, -1]].reshape(len(color), -1)
-    seen = np.sqrt(np.nan_to_num(stations, nan=_NO_COLOR))
-    return means_by(cluster, seen, card_count) / _HUE
+    perceived = np.sqrt(np.nan_to_num(stations, nan=_NO_COLOR))
+    return means_by(cluster, perceived, card_count) / _COLOR_SCALE
 
 
-def _asides(frames: CardFrames, grid: Floats, cluster: Ints) -> Floats:
+def _sines_to_card(frames: CardFrames, grid: Floats, cluster: Ints) -> Floats:
     """Mean sine of the angle between each strand and its strip, (strand_count,)."""
     step = np.diff(grid, axis=1)
     ahead = np.einsum("sri,sri->sr", step, frames.tangent[cluster, :-1])
@@ -201,7 +201,7 @@ def _asides(frames: CardFrames, grid: Floats, cluster: Ints) -> Floats:
     return mean
 
 
-def _skews(frames: CardFrames, grid: Floats, cluster: Ints) -> Floats:
+def _root_slopes(frames: CardFrames, grid: Floats, cluster: Ints) -> Floats:
     """Slope of the line through each card's roots, along over across the card, (card_count,) in
     [-1, 1].
     """
@@ -215,7 +215,7 @@ def _skews(frames: CardFrames, grid: Floats, cluster: Ints) -> Floats:
     return np.clip(slope, -1.0, 1.0)
 
 
-def _kinds(cluster: Ints, group: Ints, strand_count: Ints, tile_count: int) -> Ints:
+def _tile_kinds(cluster: Ints, group: Ints, strand_count: Ints, tile_count: int) -> Ints:
     """Cards of different kinds share no tile, (card_count,): groups, and single strands in each."""
     _, first = np.unique(cluster, return_index=True)
     _, groups = np.unique(group[first], return_inverse=True)
@@ -223,12 +223,12 @@ def _kinds(cluster: Ints, group: Ints, strand_count: Ints, tile_count: int) -> I
     return kind if len(pairs) <= tile_count else np.zeros_like(kind)
 
 
-def _is_face(cluster: Ints, group: Ints) -> Bools:
+def _is_face_card(cluster: Ints, group: Ints) -> Bools:
     """Which cards are of brows or lashes, (card_count,)."""
     return is_face_hair(group[np.unique(cluster, return_index=True)[1]])
 
 
-def _shared_tiles(
+def _assign_tiles(
     features: Floats,
     kind: Ints,
     is_face: Bools,
@@ -237,40 +237,40 @@ def _shared_tiles(
 ) -> tuple[Ints, Ints]:
     """The tile of each card, (card_count,), and the card that each tile shows, (used tiles,)."""
     sizes = np.bincount(kind)
-    parts = proportional_parts(min(tile_count, len(kind)), sizes)
+    tile_counts = proportional_parts(min(tile_count, len(kind)), sizes)
     faces = np.bincount(kind, is_face) > 0.0
-    parts = np.maximum(parts, np.where(faces, np.minimum(_FACE_TILES, sizes), 1))
-    while parts.sum() > tile_count:  # each kind keeps at least one
-        parts[parts.argmax()] -= 1
+    tile_counts = np.maximum(tile_counts, np.where(faces, np.minimum(_FACE_TILES, sizes), 1))
+    while tile_counts.sum() > tile_count:  # each kind keeps at least one
+        tile_counts[tile_counts.argmax()] -= 1
     tile = np.zeros(len(kind), np.int32)
     shown = np.zeros(0, np.int64)
-    for number, wanted in enumerate(parts):
-        own = np.flatnonzero(kind == number)
-        label, medoid = medoids(features[own], int(wanted), random)
-        tile[own] = len(shown) + label
-        shown = np.concatenate([shown, own[medoid]])
+    for number, wanted in enumerate(tile_counts):
+        cards = np.flatnonzero(kind == number)
+        label, medoid = k_medoids(features[cards], int(wanted), random)
+        tile[cards] = len(shown) + label
+        shown = np.concatenate([shown, cards[medoid]])
     return tile, shown
 
 
-def medoids(features: Floats, count: int, random: np.random.Generator) -> tuple[Ints, Ints]:
+def k_medoids(features: Floats, count: int, random: np.random.Generator) -> tuple[Ints, Ints]:
     """The group of each, (n,), and the member that represents each group, (count,)."""
     if count >= len(features):
         return np.arange(len(features)), np.arange(len(features))
-    medoid = _far_apart(features, count, random)
+    medoid = _initial_medoids(features, count, random)
     for _ in range(_ROUNDS):
-        label = _gaps(features, features[medoid]).argmin(axis=1)
+        label = _squared_distances(features, features[medoid]).argmin(axis=1)
         label[medoid] = np.arange(count)
         size = np.bincount(label, minlength=count)
         mean = sums_by(label, features, count) / size[:, None]
         gap = ((features - mean[label]) ** 2).sum(axis=1)
         order = np.lexsort((gap, label))
         medoid = order[piece_starts(size)]
-    label = _gaps(features, features[medoid]).argmin(axis=1)
+    label = _squared_distances(features, features[medoid]).argmin(axis=1)
     label[medoid] = np.arange(count)
     return label, medoid
 
 
-def _far_apart(features: Floats, count: int, random: np.random.Generator) -> Ints:
+def _initial_medoids(features: Floats, count: int, random: np.random.Generator) -> Ints:
     """k-means++: `count` different ones at random, far from each other."""
     chosen = [int(random.integers(len(features)))]
     gap = np.full(len(features), np.inf)
@@ -282,7 +282,7 @@ def _far_apart(features: Floats, count: int, random: np.random.Generator) -> Int
     return np.array(chosen)
 
 
-def _gaps(features: Floats, medoids: Floats) -> Floats:
+def _squared_distances(features: Floats, medoids: Floats) -> Floats:
     """Squared distances, (n, count)."""
     gaps = np.zeros((len(features), len(medoids)))
     for one, other in zip(features.T, medoids.T, strict=True):
@@ -290,20 +290,24 @@ def _gaps(features: Floats, medoids: Floats) -> Floats:
     return gaps
 
 
-def _baked_strands(
+def _choose_strands(
     cluster: Ints, medoid: Ints, settings: AtlasSettings, random: np.random.Generator
 ) -> tuple[Ints, Ints, Floats]:
     """Strands, tile after tile; where each tile begins; and how many strands each baked one
     represents."""
     order = np.argsort(cluster, kind="stable")
     ends = np.cumsum(np.bincount(cluster))
-    most = max(int(_MAX_STRANDS * settings.side / settings.columns), 1)
+    max_strands = max(int(_MAX_STRANDS_PER_PIXEL * settings.side / settings.columns), 1)
     tiles, crowding = [], []
     for card in medoid:
-        own = order[ends[card - 1] if card else 0 : ends[card]]
-        kept = own if len(own) <= most else np.sort(random.choice(own, most, replace=False))
-        crowding.append(len(own) / len(kept))
-        tiles.append(kept)
+        strands = order[ends[card - 1] if card else 0 : ends[card]]
+        chosen = (
+            strands
+            if len(strands) <= max_strands
+            else np.sort(random.choice(strands, max_strands, replace=False))
+        )
+        crowding.append(len(strands) / len(chosen))
+        tiles.append(chosen)
     offsets = np.cumsum([0, *map(len, tiles)])
     return np.concatenate(tiles), offsets, np.array(crowding)
 
@@ -311,12 +315,14 @@ def _baked_strands(
 def _width_factors(shapes: _CardShapes, width: Floats, tile: Ints, medoid: Ints) -> Floats:
     """How much wider each card must be to cover as much as with its own strands, (card_count,)."""
     area = width * shapes.spacing
-    own = (shapes.covered * area).sum(axis=1)
-    shown = (shapes.covered[medoid[tile]] * area).sum(axis=1)
-    return np.clip(np.where(shown > 0.0, own / np.maximum(shown, _TINY**2), 1.0), *_WIDTH_RANGE)
+    own_area = (shapes.covered * area).sum(axis=1)
+    shown_area = (shapes.covered[medoid[tile]] * area).sum(axis=1)
+    return np.clip(
+        np.where(shown_area > 0.0, own_area / np.maximum(shown_area, _TINY**2), 1.0), *_WIDTH_RANGE
+    )
 
 
-def _cap_note(crowding: Floats) -> tuple[str, ...]:
+def _overflow_note(crowding: Floats) -> tuple[str, ...]:
     full = int((crowding > 1.0).sum())
     if not full:
         return ()

@@ -34,7 +34,7 @@ class AtlasMaps:
     along: (h, w) from 0 at the strand's root to 1 at its tip.
     strand_id: (h, w) a random number for each strand, that of the outermost one in the texel.
     occlusion: (h, w) 1 open, 0 occluded, by the strands of the tile.
-    place: see `atlas_depth.places_in_depth`; not a map that is written.
+    relative_depth: see `atlas_depth.relative_depths`; not a map that is written.
     """
 
     alpha: Floats
@@ -46,16 +46,18 @@ class AtlasMaps:
     strand_id: Floats
     occlusion: Floats
     base_gain: float = 1.0
-    place: Floats | None = None
+    relative_depth: Floats | None = None
 
     @property
     def by_name(self) -> dict[str, Floats]:
         """All maps by their names."""
-        return {name: getattr(self, name) for name in MAPS}
+        return {name: getattr(self, name) for name in MAP_NAMES}
 
 
 #: The maps by name.
-MAPS = tuple(field.name for field in fields(AtlasMaps) if field.name not in ("base_gain", "place"))
+MAP_NAMES = tuple(
+    field.name for field in fields(AtlasMaps) if field.name not in ("base_gain", "relative_depth")
+)
 #: Values in tiles without hair.
 _EMPTY: dict[str, float | tuple[float, ...]] = {
     "base": 1.0,
@@ -70,21 +72,21 @@ _EMPTY: dict[str, float | tuple[float, ...]] = {
 
 def dilated(maps: AtlasMaps, grid: AtlasGrid) -> AtlasMaps:
     """The maps with values continued where alpha is 0; alpha stays as it is."""
-    left, right, fraction = hair_beside(maps.alpha > 0.0, grid)
+    left, right, fraction = neighbouring_hair(maps.alpha > 0.0, grid)
     is_free = maps.alpha == 0.0
     left, right, fraction = left[is_free], right[is_free], fraction[is_free]
-    done: dict[str, Any] = {}
-    for name in MAPS:
+    filled: dict[str, Any] = {}
+    for name in MAP_NAMES:
         if name != "alpha":
             image = getattr(maps, name).copy()
-            values = _between(name, image.reshape(-1, *image.shape[2:]), left, right, fraction)
+            values = _mixed_texels(name, image.reshape(-1, *image.shape[2:]), left, right, fraction)
             values[left < 0] = _EMPTY[name]
             image[is_free] = values
-            done[name] = image
-    return replace(maps, **done)
+            filled[name] = image
+    return replace(maps, **filled)
 
 
-def _between(name: str, texels: Floats, left: Ints, right: Ints, fraction: Floats) -> Floats:
+def _mixed_texels(name: str, texels: Floats, left: Ints, right: Ints, fraction: Floats) -> Floats:
     """Values between two texels, (n, ...)."""
     if name == "strand_id":  # a mean of two IDs would be a third strand's
         return texels[np.where(fraction < 0.5, left, right)]
@@ -103,7 +105,7 @@ def tile_edges(size: int, count: int) -> Ints:
     return np.ceil(np.arange(count + 1) * (size / count) - 0.5).astype(np.int64)
 
 
-def hair_beside(is_hair: Bools, grid: AtlasGrid) -> tuple[Ints, Ints, Floats]:
+def neighbouring_hair(is_hair: Bools, grid: AtlasGrid) -> tuple[Ints, Ints, Floats]:
     """The two texels of hair that each texel lies between, as row * width + column, and the weight
     of the second.
 
@@ -117,15 +119,15 @@ def hair_beside(is_hair: Bools, grid: AtlasGrid) -> tuple[Ints, Ints, Floats]:
             tile = is_hair[low:high, first:last]
             with_hair = np.flatnonzero(tile.any(axis=1))
             if len(with_hair):
-                columns, fractions = _beside_in_rows(tile[with_hair])
+                columns, fractions = _neighbours_in_rows(tile[with_hair])
                 texels = (low + with_hair)[:, None] * width + first + columns
-                nearest = _nearest_of(with_hair, high - low)
+                nearest = _nearest_index(with_hair, high - low)
                 beside[:, low:high, first:last] = texels[:, nearest]
                 fraction[low:high, first:last] = fractions[nearest]
     return beside[0], beside[1], fraction
 
 
-def _beside_in_rows(is_hair: Bools) -> tuple[Ints, Floats]:
+def _neighbours_in_rows(is_hair: Bools) -> tuple[Ints, Floats]:
     """The columns of the hair on both sides, (2, rows, columns), and the weight of the second."""
     count = is_hair.shape[1]
     column = np.arange(count)
@@ -137,7 +139,7 @@ def _beside_in_rows(is_hair: Bools) -> tuple[Ints, Floats]:
     return np.stack([left, right]), np.clip(fraction, 0.0, 1.0).astype(np.float32)
 
 
-def _nearest_of(places: Ints, count: int) -> Ints:
+def _nearest_index(places: Ints, count: int) -> Ints:
     """Which of the ascending places is nearest to each of 0 .. count - 1, (count,)."""
     middles = (places[:-1] + places[1:]) / 2.0
     return np.searchsorted(middles, np.arange(count))

@@ -136,7 +136,7 @@ class AtlasSettings(Settings):
             HairloomError: the padding leaves too little of a tile; the message gives the size that
                 the atlas needs.
         """
-        if any(there < least for there, least in zip(self.inner_tile, MIN_TILE, strict=True)):
+        if any(size < minimum for size, minimum in zip(self.inner_tile, MIN_TILE, strict=True)):
             raise self._too_small()
         fraction = self.padding / self.side
         return AtlasGrid(self.columns, self.rows, (fraction * self.columns, fraction * self.rows))
@@ -144,7 +144,7 @@ class AtlasSettings(Settings):
     def _too_small(self) -> HairloomError:
         across, along = (self.side / count for count in (self.columns, self.rows))
         parts = zip((self.columns, self.rows), MIN_TILE, strict=True)
-        needed = max(count * (least + 2 * self.padding) for count, least in parts)
+        needed = max(count * (minimum + 2 * self.padding) for count, minimum in parts)
         return HairloomError(
             f"{self.columns} x {self.rows} tiles of {across:g} x {along:g} pixels with "
             f"{self.padding} pixels of padding do not fit in {self.side} pixels; they need "

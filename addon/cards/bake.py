@@ -32,12 +32,12 @@ SPARSE_RANGE = 1 << 24
 #: Maximum number of samples in memory at a time.
 _MAX_SAMPLES = 1 << 20
 #: Maximum texels across a block, so that sheared samples fit into a texture.
-_MAX_ACROSS = 2048
-_EDGES = np.array([[-1.0], [1.0]])
+_MAX_BLOCK_WIDTH = 2048
+_EDGE_SIGNS = np.array([[-1.0], [1.0]])
 _TINY = 1e-12
 
 
-def min_one_sample(flat: FlatStrands, size: int) -> tuple[Floats, Floats]:
+def with_min_width(flat: FlatStrands, size: int) -> tuple[Floats, Floats]:
     """Half widths of ribbons at least a sample wide, and the fraction of their samples that counts.
 
     A strand thinner than a sample thus still covers as much as its width, see `is_counted`.
@@ -51,15 +51,15 @@ def min_one_sample(flat: FlatStrands, size: int) -> tuple[Floats, Floats]:
     side = size * SAMPLES
     direction = np.gradient(flat.place, axis=1) * side
     length = np.linalg.norm(direction, axis=-1)
-    half = flat.half * side
-    across = np.abs(half[..., 0] * direction[..., 1] - half[..., 1] * direction[..., 0])
+    half_width = flat.half_width * side
+    across = np.abs(half_width[..., 0] * direction[..., 1] - half_width[..., 1] * direction[..., 0])
     across = np.where(length > _TINY, across / np.maximum(length, _TINY), 0.0)
     fraction = np.clip(across / 0.5, 0.0, 1.0)
     is_thin = fraction < 1.0
     # a ribbon without width is widened across its direction
     turned = np.stack([direction[..., 1], -direction[..., 0]], axis=-1)
     turned = 0.5 * turned / np.maximum(length, _TINY)[..., None]
-    wide = np.where(is_thin[..., None], turned, half) / side
+    wide = np.where(is_thin[..., None], turned, half_width) / side
     return wide.astype(np.float32), fraction.astype(np.float32)
 
 
@@ -91,7 +91,7 @@ class Block:
     """A part of the atlas that is made at once: its lower left texel and its size [pixels]."""
 
     left: int
-    low: int
+    bottom: int
     width: int
     height: int
 
@@ -101,73 +101,75 @@ class Block:
         height."""
         return SAMPLES * self.width + self.height
 
-    def leaning(self, place: Floats, size: int) -> Floats:
+    def sheared(self, place: Floats, size: int) -> Floats:
         """Places of the atlas, (..., 2) in 0 to 1, in sheared samples, (..., 2)."""
-        x, y = np.moveaxis((place * size - (self.left, self.low)) * SAMPLES, -1, 0)
+        x, y = np.moveaxis((place * size - (self.left, self.bottom)) * SAMPLES, -1, 0)
         return np.stack([x + y / SAMPLES - 0.5, y], axis=-1)
 
-    def reached(self, flat: FlatStrands, half: Floats, size: int) -> Ints:
+    def overlapping(self, flat: FlatStrands, half_width: Floats, size: int) -> Ints:
         """The strands that may lie in the block."""
-        reach = np.abs(half)
+        reach = np.abs(half_width)
         low = (flat.place - reach).min(axis=1) * size
         high = (flat.place + reach).max(axis=1) * size
-        corner = np.array([self.left, self.low])
+        corner = np.array([self.left, self.bottom])
         inside = (low < corner + (self.width, self.height)) & (high > corner)
         return np.flatnonzero(inside.all(axis=1))
 
 
-def blocks_of(size: int) -> list[Block]:
+def atlas_blocks(size: int) -> list[Block]:
     """The blocks of an atlas, all of one size except those at the top."""
-    width = min(size, _MAX_ACROSS)
+    width = min(size, _MAX_BLOCK_WIDTH)
     height = max(min(_MAX_SAMPLES // (width * SAMPLES**2), size), 1)
     starts = range(0, size, height), range(0, size, width)
     return [Block(x, y, width, min(height, size - y)) for y in starts[0] for x in starts[1]]
 
 
-def sampled_maps(flat: FlatStrands, size: int) -> AtlasMaps:
+def sample_maps(flat: FlatStrands, size: int) -> AtlasMaps:
     """The maps of an atlas, with zeros where no strand is."""
-    half, fraction = min_one_sample(flat, size)
+    half_width, fraction = with_min_width(flat, size)
     maps: dict[str, Any] = {}
-    for block in blocks_of(size):
-        for name, part in _sampled_block(flat, half, fraction, size, block).items():
+    for block in atlas_blocks(size):
+        for name, part in _sample_block(flat, half_width, fraction, size, block).items():
             whole = maps.setdefault(name, np.zeros((size, size, *part.shape[2:]), np.float32))
-            rows = slice(block.low, block.low + block.height)
+            rows = slice(block.bottom, block.bottom + block.height)
             whole[rows, block.left : block.left + block.width] = part
     return AtlasMaps(**maps, base_gain=flat.base_gain)
 
 
-def _sampled_block(
-    flat: FlatStrands, half: Floats, fraction: Floats, size: int, block: Block
+def _sample_block(
+    flat: FlatStrands, half_width: Floats, fraction: Floats, size: int, block: Block
 ) -> dict[str, Any]:
     """The maps of a block's texels."""
     shape = block.height * SAMPLES, block.samples_across
     nearest = np.full(shape, -np.inf, np.float32)
     values = np.zeros((*shape, 10), np.float32)  # along, id, depth, occlusion, tangent, base
     normal = np.zeros((*shape, 3), np.float32)
-    for strand in block.reached(flat, half, size):
-        edges = flat.place[strand, :, None] + half[strand, :, None] * _EDGES
-        corners = block.leaning(edges, size).reshape(-1, 2)
-        for row, column, vertices, weights in _samples(corners, shape):
-            seen = weights @ _vertex_values(flat, fraction, strand, vertices)
-            place = column + block.left * SAMPLES, row + block.low * SAMPLES
-            counts = is_counted(*place, int(strand), seen[:, 0])
+    for strand in block.overlapping(flat, half_width, size):
+        edges = flat.place[strand, :, None] + half_width[strand, :, None] * _EDGE_SIGNS
+        corners = block.sheared(edges, size).reshape(-1, 2)
+        for row, column, vertices, weights in _triangle_samples(corners, shape):
+            sample = weights @ _vertex_values(flat, fraction, strand, vertices)
+            place = column + block.left * SAMPLES, row + block.bottom * SAMPLES
+            counts = is_counted(*place, int(strand), sample[:, 0])
             # of two that lie equally far outside, the later one shows
-            counts &= seen[:, 4] >= nearest[row, column]
-            row, column, seen = row[counts], column[counts], seen[counts]
-            nearest[row, column] = seen[:, 4]
-            tangent = unit_or(seen[:, 6:9], (0.0, 1.0, 0.0))
-            values[row, column] = np.concatenate([seen[:, 2:6], tangent, seen[:, 9:]], axis=1)
-            normal[row, column] = fibre_normal(tangent, seen[:, 1])
-    return _filtered(*(_upright(image, block) for image in (nearest, values, normal)))
+            counts &= sample[:, 4] >= nearest[row, column]
+            row, column, sample = row[counts], column[counts], sample[counts]
+            nearest[row, column] = sample[:, 4]
+            tangent = unit_or(sample[:, 6:9], (0.0, 1.0, 0.0))
+            values[row, column] = np.concatenate([sample[:, 2:6], tangent, sample[:, 9:]], axis=1)
+            normal[row, column] = fibre_normal(tangent, sample[:, 1])
+    return _downsampled(*(_unsheared(image, block) for image in (nearest, values, normal)))
 
 
-def _upright(image: Floats, block: Block) -> Floats:
+def _unsheared(image: Floats, block: Block) -> Floats:
     """Sheared samples, (rows, samples across, ...), moved back to the block's width."""
     row = np.arange(block.height * SAMPLES)[:, None]
     return image[row, row // SAMPLES + np.arange(block.width * SAMPLES)]
 
 
-def _samples(corners: Floats, shape: tuple[int, int]) -> Iterator[tuple[Ints, Ints, Ints, Floats]]:
+def _triangle_samples(
+    corners: Floats, shape: tuple[int, int]
+) -> Iterator[tuple[Ints, Ints, Ints, Floats]]:
     """Triangle after triangle of a ribbon: rows and columns of its samples, its three vertices as
     numbers 2 station + (1 on the right), and their weights (n, 3).
 
@@ -205,13 +207,13 @@ def _vertex_values(flat: FlatStrands, fraction: Floats, strand: int, vertices: I
     return np.concatenate([single, flat.tangent[strand, cv], flat.base[strand, cv]], axis=1)
 
 
-def _filtered(nearest: Floats, values: Floats, normal: Floats) -> dict[str, Any]:
+def _downsampled(nearest: Floats, values: Floats, normal: Floats) -> dict[str, Any]:
     """Texels from their samples, by the names of the maps."""
     rows, columns = nearest.shape[0] // SAMPLES, nearest.shape[1] // SAMPLES
     shape = (rows, SAMPLES, columns, SAMPLES)
     count = np.isfinite(nearest).reshape(shape).sum(axis=(1, 3))
-    most = np.maximum(count, 1)[..., None]
-    means = values.reshape(*shape, -1).sum(axis=(1, 3)) / most
+    divisor = np.maximum(count, 1)[..., None]
+    means = values.reshape(*shape, -1).sum(axis=(1, 3)) / divisor
     normals = normal.reshape(*shape, -1).sum(axis=(1, 3))
     depths = np.moveaxis(nearest.reshape(shape), 2, 1).reshape(rows, columns, -1)
     numbers = np.moveaxis(values[..., 1].reshape(shape), 2, 1).reshape(rows, columns, -1)
@@ -220,8 +222,8 @@ def _filtered(nearest: Floats, values: Floats, normal: Floats) -> dict[str, Any]
     maps = {
         "alpha": count / SAMPLES**2,
         "base": means[..., 7:],
-        "normal": _encoded(normals, (0.0, 0.0, 1.0), is_hair),
-        "tangent": _encoded(means[..., 4:7], (0.0, 1.0, 0.0), is_hair),
+        "normal": _encoded_directions(normals, (0.0, 0.0, 1.0), is_hair),
+        "tangent": _encoded_directions(means[..., 4:7], (0.0, 1.0, 0.0), is_hair),
         "depth": means[..., 2],
         "along": means[..., 0],
         "strand_id": np.take_along_axis(numbers, outermost, axis=-1)[..., 0] * is_hair,
@@ -230,5 +232,7 @@ def _filtered(nearest: Floats, values: Floats, normal: Floats) -> dict[str, Any]
     return {name: value.astype(np.float32) for name, value in maps.items()}
 
 
-def _encoded(vectors: Floats, fallback: tuple[float, float, float], is_hair: Bools) -> Floats:
+def _encoded_directions(
+    vectors: Floats, fallback: tuple[float, float, float], is_hair: Bools
+) -> Floats:
     return (0.5 * unit_or(vectors, fallback) + 0.5) * is_hair[..., None]

@@ -16,15 +16,15 @@ from ..strands.vectors import unit_or
 from .atlas import AtlasPlan
 
 #: Part of a card's width within which strands occlude those behind them.
-_NEAR = 0.25
+_OCCLUSION_WIDTH = 0.25
 #: Part of a card's width, from its middle, in which strands are never moved.
-_KEPT = 0.35
+_UNMOVED_WIDTH = 0.35
 #: Strands that begin behind their card's begin, by up to this fraction of its length, are extended
 #: to begin sooner, by this part of the gap: along a parting, where no other card covers the roots,
 #: skin would show.
-_BEHIND, _SOONER = 0.06, 0.7
+_MAX_ROOT_GAP, _CLOSED_GAP = 0.06, 0.7
 #: Stations that replace each segment, so that bends are smooth.
-PIECES = 4
+PIECES_PER_SEGMENT = 4
 _TINY = 1e-12
 
 
@@ -33,7 +33,7 @@ class FlatStrands:
     """Ribbons on the atlas, straight from station to station, all float32; tile after tile.
 
     place: (n, station_count, 2) in the atlas, 0 to 1.
-    half: (n, station_count, 2) from `place` to the right edge.
+    half_width: (n, station_count, 2) from `place` to the right edge.
     along: (n, station_count) from 0 at the strand's root to 1 at its tip.
     depth: (n, station_count) 0 to 1 as in AtlasMaps.
     tangent: (n, station_count, 3) unit vectors in the card's frame.
@@ -44,7 +44,7 @@ class FlatStrands:
     """
 
     place: Floats
-    half: Floats
+    half_width: Floats
     along: Floats
     depth: Floats
     tangent: Floats
@@ -84,30 +84,32 @@ def flat_strands(
     spacing = np.linalg.norm(np.gradient(frames.center, axis=1), axis=-1)[tile] * (row_count - 1)
     spacing = np.maximum(spacing, _TINY)
     radii = radius[plan.strands] * plan.thickness[tile, None] / width
-    shade, gain = _shades(plan, base, points.shape)
-    at_cvs = (
+    color, gain = _normalized_colors(plan, base, points.shape)
+    cv_values = (
         aside / width,
-        _sooner(_within(np.linspace(0.0, 1.0, row_count) + ahead / spacing)),
+        _with_extended_roots(
+            _scaled_into_strip(np.linspace(0.0, 1.0, row_count) + ahead / spacing)
+        ),
         np.clip(0.5 + outside / np.maximum(strips.width.mean(axis=1), _TINY)[tile, None], 0.0, 1.0),
         radii,
         width / spacing,
         _occlusion(plan, aside / width, radii, outside),
     )
-    fine = [_finer(value[..., None])[..., 0] for value in at_cvs]
-    across, along, depth, thick, shape, occlusion = fine
+    subdivided = [_subdivided(value[..., None])[..., 0] for value in cv_values]
+    across, along, depth, thickness, aspect, occlusion = subdivided
 
-    half = _half_width(across, along, np.maximum(thick, 0.0), shape)
-    across = 0.5 + _squeezed(across, np.abs(half[..., 0]), plan)
+    half = _half_width(across, along, np.maximum(thickness, 0.0), aspect)
+    across = 0.5 + _compressed(across, np.abs(half[..., 0]), plan)
     along = np.clip(along, np.abs(half[..., 1]), 1.0 - np.abs(half[..., 1]))
     place = plan.grid.uv(tile[:, None], across, along)
     edge = plan.grid.uv(tile[:, None], across + half[..., 0], along + half[..., 1])
     parts = {
         "place": place,
-        "half": edge - place,
+        "half_width": edge - place,
         "along": np.broadcast_to(np.linspace(0.0, 1.0, place.shape[1]), place.shape[:2]),
         "depth": np.clip(depth, 0.0, 1.0),
         "tangent": _tangents(points, *(axis[tile] for axis in axes)),
-        "base": np.clip(_finer(shade), 0.0, 1.0),
+        "base": np.clip(_subdivided(color), 0.0, 1.0),
         "occlusion": np.clip(occlusion, 0.0, 1.0),
         "strand_id": strand_ids(len(points)),
     }
@@ -115,49 +117,49 @@ def flat_strands(
     return FlatStrands(**single, base_gain=gain)
 
 
-def _half_width(across: Floats, along: Floats, thick: Floats, shape: Floats) -> Floats:
+def _half_width(across: Floats, along: Floats, thickness: Floats, aspect: Floats) -> Floats:
     """From a ribbon's middle to its edge, perpendicular to the strand on the card,
     (n, stations, 2).
 
     Args:
-        across, along: place in the tile. thick: radius in widths of the card.
-        shape: width of the card in its lengths.
+        across, along: place in the tile. thickness: radius in widths of the card.
+        aspect: width of the card in its lengths.
     """
-    slope = np.gradient(np.stack([across * shape, along], axis=-1), axis=1)
+    slope = np.gradient(np.stack([across * aspect, along], axis=-1), axis=1)
     slope /= np.maximum(np.linalg.norm(slope, axis=-1, keepdims=True), _TINY)
-    half = np.stack([slope[..., 1], -slope[..., 0] * shape], axis=-1) * thick[..., None]
+    half = np.stack([slope[..., 1], -slope[..., 0] * aspect], axis=-1) * thickness[..., None]
     clipped: Floats = np.clip(half, -0.5, 0.5)
     return clipped
 
 
-def _finer(values: Floats) -> Floats:
+def _subdivided(values: Floats) -> Floats:
     """PIECES stations per segment, (n, stations, channels), by Catmull and Rom 1974."""
     ends = 2.0 * values[:, [0, -1]] - values[:, [1, -2]]
     wide = np.concatenate([ends[:, :1], values, ends[:, 1:]], axis=1)
     p0, p1, p2, p3 = (wide[:, i : wide.shape[1] - 3 + i, None] for i in range(4))
-    u = (np.arange(PIECES) / PIECES)[:, None]
+    u = (np.arange(PIECES_PER_SEGMENT) / PIECES_PER_SEGMENT)[:, None]
     a, b, c = p0 - p1, p2 - p1, p3 - p1
     fine = p1 + 0.5 * u * (b - a + u * (2.0 * a + 4.0 * b - c + u * (c - a - 3.0 * b)))
     inner = fine.reshape(len(values), -1, values.shape[-1])
     return np.concatenate([inner, values[:, -1:]], axis=1)
 
 
-def _within(along: Floats) -> Floats:
+def _scaled_into_strip(along: Floats) -> Floats:
     """Strands that begin before the strip or end behind it, scaled into it, each as a whole."""
     low = np.minimum(along.min(axis=1, keepdims=True), 0.0)
     high = np.maximum(along.max(axis=1, keepdims=True), 1.0)
     return (along - low) / (high - low)
 
 
-def _sooner(along: Floats) -> Floats:
+def _with_extended_roots(along: Floats) -> Floats:
     """Strands that begin a little behind their card's begin, extended towards it."""
     root = along[:, :1]
-    start = root - _SOONER * np.minimum(root, _BEHIND)
+    start = root - _CLOSED_GAP * np.minimum(root, _MAX_ROOT_GAP)
     stretched: Floats = start + (along - root) * (1.0 - start) / np.maximum(1.0 - root, _TINY)
     return np.minimum(stretched, 1.0)
 
 
-def _squeezed(across: Floats, half: Floats, plan: AtlasPlan) -> Floats:
+def _compressed(across: Floats, half: Floats, plan: AtlasPlan) -> Floats:
     """Places across in -0.5 to 0.5: where strands reach further out, those beyond _KEPT are
     compressed.
 
@@ -165,18 +167,22 @@ def _squeezed(across: Floats, half: Floats, plan: AtlasPlan) -> Floats:
     """
     far = np.maximum.reduceat(np.abs(across) + half, plan.offsets[:-1], axis=0)
     far = np.maximum(far, 0.5)[plan.tile_of_strand]
-    beyond = (np.abs(across) - _KEPT) * (0.5 - _KEPT) / (far - _KEPT)
-    place = np.where(np.abs(across) <= _KEPT, across, np.sign(across) * (_KEPT + beyond))
+    beyond = (np.abs(across) - _UNMOVED_WIDTH) * (0.5 - _UNMOVED_WIDTH) / (far - _UNMOVED_WIDTH)
+    place = np.where(
+        np.abs(across) <= _UNMOVED_WIDTH, across, np.sign(across) * (_UNMOVED_WIDTH + beyond)
+    )
     return np.clip(place, half - 0.5, 0.5 - half)
 
 
 def _tangents(points: Floats, side: Floats, tangent: Floats, normal: Floats) -> Floats:
     slope = np.gradient(points, axis=1)
     parts = [np.einsum("sri,sri->sr", slope, axis) for axis in (side, tangent, normal)]
-    return unit_or(_finer(np.stack(parts, axis=-1)), (0.0, 1.0, 0.0), _TINY)
+    return unit_or(_subdivided(np.stack(parts, axis=-1)), (0.0, 1.0, 0.0), _TINY)
 
 
-def _shades(plan: AtlasPlan, base: Floats | None, shape: tuple[int, ...]) -> tuple[Floats, float]:
+def _normalized_colors(
+    plan: AtlasPlan, base: Floats | None, shape: tuple[int, ...]
+) -> tuple[Floats, float]:
     """Colours no brighter than 1, and what they were divided by."""
     if base is None:
         return np.ones(shape), 1.0
@@ -201,7 +207,7 @@ def _occlusion(plan: AtlasPlan, across: Floats, radius: Floats, outside: Floats)
         for row in range(across.shape[1]):
             place, thick, depth = across[own, row], radius[own, row], outside[own, row]
             is_before = depth > depth[:, None]
-            is_near = np.abs(place - place[:, None]) < 0.5 * _NEAR
-            tau = (is_before & is_near) @ (2.0 * thick / _NEAR)
+            is_near = np.abs(place - place[:, None]) < 0.5 * _OCCLUSION_WIDTH
+            tau = (is_before & is_near) @ (2.0 * thick / _OCCLUSION_WIDTH)
             occlusion[own, row] = np.exp(-tau)
     return occlusion

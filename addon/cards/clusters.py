@@ -27,19 +27,19 @@ _ROOT_WEIGHT = 2.0
 _FACE_STRANDS, _MAX_FACE_CARDS = 8, 100
 #: Cards at a rim have this many times fewer strands than others, but at most this fraction of all
 #: cards, and of all strands, lies there.
-_RIM_FINER, _MAX_AT_RIM = 4.0, 0.4
+_RIM_REFINEMENT, _MAX_AT_RIM = 4.0, 0.4
 #: How far behind a root the search for hair is centred, in sides of the square that an average
 #: card's roots fill; and within which fraction of that distance hair must lie.
-_RIM_DEPTH, _RIM_FREE = 0.5, 0.7
+_RIM_DEPTH, _RIM_FREE_PART = 0.5, 0.7
 #: The part of a strand, from its root, that gives the direction in which it lies.
-_BEGIN = 0.2
+_ROOT_PART = 0.2
 #: Hair that leans away from the upright by less than this sine covers no roots.
-_LEANING = 1.0 / 3.0
+_MIN_LEANING = 1.0 / 3.0
 #: Maximum number of strands that the means are found from; others only join the nearest.
-_MAX_LEARNT = 20_000
+_MAX_SAMPLES = 20_000
 _ROUNDS = 12
 #: Strands in one batch that is compared with all means.
-_CHUNK = 2048
+_BATCH = 2048
 
 
 def cluster_strands(
@@ -64,37 +64,37 @@ def cluster_strands(
     label = np.zeros(len(grid), np.int32)
     groups, sizes = np.unique(group, return_counts=True)
     first = 0
-    face = np.minimum(-(-sizes // _FACE_STRANDS), _MAX_FACE_CARDS)
-    least = np.where(is_face_hair(groups), face, 1)
+    face_counts = np.minimum(-(-sizes // _FACE_STRANDS), _MAX_FACE_CARDS)
+    min_counts = np.where(is_face_hair(groups), face_counts, 1)
     for name, wanted in zip(
-        groups, np.maximum(proportional_parts(count, sizes), least), strict=True
+        groups, np.maximum(proportional_parts(count, sizes), min_counts), strict=True
     ):
-        own = np.flatnonzero(group == name)
-        normal = None if root_normal is None or is_face_hair(name) else root_normal[own]
-        for part, parts_wanted in _parts(grid[own], normal, int(wanted)):
-            found = _k_means(features[own[part]], parts_wanted, random)
-            label[own[part]] = first + found
-            first += int(found.max()) + 1
+        members = np.flatnonzero(group == name)
+        normal = None if root_normal is None or is_face_hair(name) else root_normal[members]
+        for part, parts_wanted in _rim_and_rest(grid[members], normal, int(wanted)):
+            part_labels = _k_means(features[members[part]], parts_wanted, random)
+            label[members[part]] = first + part_labels
+            first += int(part_labels.max()) + 1
     return label
 
 
-def _parts(grid: Floats, root_normal: Floats | None, wanted: int) -> list[tuple[Ints, int]]:
+def _rim_and_rest(grid: Floats, root_normal: Floats | None, wanted: int) -> list[tuple[Ints, int]]:
     """Strands of one group, at its rim and elsewhere, each part with its number of clusters."""
     everywhere: list[tuple[Ints, int]] = [(np.arange(len(grid)), wanted)]
     if root_normal is None or wanted < 2:
         return everywhere
-    is_rim = at_rim(grid, root_normal, len(grid) / wanted)
+    is_rim = is_at_rim(grid, root_normal, len(grid) / wanted)
     rim, rest = np.flatnonzero(is_rim), np.flatnonzero(~is_rim)
     if len(rim) > _MAX_AT_RIM * len(grid):  # a fringe is all rim
         return everywhere
-    finer = min(_RIM_FINER * len(rim) / len(grid), _MAX_AT_RIM)
-    at_rim_wanted = min(round(wanted * finer), len(rim))
-    if not at_rim_wanted:
+    rim_fraction = min(_RIM_REFINEMENT * len(rim) / len(grid), _MAX_AT_RIM)
+    rim_wanted = min(round(wanted * rim_fraction), len(rim))
+    if not rim_wanted:
         return everywhere
-    return [(rest, min(wanted - at_rim_wanted, len(rest))), (rim, at_rim_wanted)]
+    return [(rest, min(wanted - rim_wanted, len(rest))), (rim, rim_wanted)]
 
 
-def at_rim(grid: Floats, root_normal: Floats, strands_per_card: float) -> Bools:
+def is_at_rim(grid: Floats, root_normal: Floats, strands_per_card: float) -> Bools:
     """Which strands have roots that no other hair covers, (strand_count,): along partings and
     hairlines.
 
@@ -107,15 +107,15 @@ def at_rim(grid: Floats, root_normal: Floats, strands_per_card: float) -> Bools:
         strands_per_card: on average.
     """
     root = grid[:, 0].astype(np.float64)
-    direction = grid[:, max(round(_BEGIN * (grid.shape[1] - 1)), 1)] - root
+    direction = grid[:, max(round(_ROOT_PART * (grid.shape[1] - 1)), 1)] - root
     flat = direction - root_normal * np.einsum("si,si->s", direction, root_normal)[:, None]
-    lies = np.linalg.norm(flat, axis=1) > _LEANING * np.linalg.norm(direction, axis=1)
+    is_lying = np.linalg.norm(flat, axis=1) > _MIN_LEANING * np.linalg.norm(direction, axis=1)
     flat = unit(flat)
     # the nearest of random points is half as far as the spacing of a square grid
     behind = _RIM_DEPTH * strands_per_card**0.5 * 2.0 * mean_spacing(root)
     nearest, away = (found[:, 0] for found in nearest_points(root - behind * flat, root, 1))
-    is_over = (away < _RIM_FREE * behind) & (np.einsum("si,si->s", flat, flat[nearest]) > 0.0)
-    rim: Bools = lies & ~is_over
+    is_over = (away < _RIM_FREE_PART * behind) & (np.einsum("si,si->s", flat, flat[nearest]) > 0.0)
+    rim: Bools = is_lying & ~is_over
     return rim
 
 
@@ -131,12 +131,12 @@ def cluster_of_guides(grid: Floats, group: Ints, guides: Ints) -> Ints:
         guides: (guide_count,) indices of strands.
     """
     features = _features(grid)
-    found = _nearest(features, features[guides])[0]
+    nearest_guide = _nearest_means(features, features[guides])[0]
     for name in np.unique(group[guides]):
         own, theirs = np.flatnonzero(group == name), np.flatnonzero(group[guides] == name)
-        found[own] = theirs[_nearest(features[own], features[guides[theirs]])[0]]
-    found[guides] = np.arange(len(guides))
-    return found.astype(np.int32)
+        nearest_guide[own] = theirs[_nearest_means(features[own], features[guides[theirs]])[0]]
+    nearest_guide[guides] = np.arange(len(guides))
+    return nearest_guide.astype(np.int32)
 
 
 def proportional_parts(count: int, sizes: Ints) -> Ints:
@@ -158,26 +158,26 @@ def _features(grid: Floats) -> Floats:
 
 
 def _k_means(features: Floats, count: int, random: np.random.Generator) -> Ints:
-    learnt = features
-    if len(features) > _MAX_LEARNT:
-        chosen = random.choice(len(features), max(_MAX_LEARNT, count), replace=False)
-        learnt = features[np.sort(chosen)]
-    means = _far_apart(learnt, count, random)
+    samples = features
+    if len(features) > _MAX_SAMPLES:
+        chosen = random.choice(len(features), max(_MAX_SAMPLES, count), replace=False)
+        samples = features[np.sort(chosen)]
+    means = _initial_means(samples, count, random)
     for _ in range(_ROUNDS):
-        label, gap = _nearest(learnt, means)
+        label, gap = _nearest_means(samples, means)
         sizes = np.bincount(label, minlength=count)
         # a mean that has lost all its strands moves to the strand farthest from its mean
-        lost = np.flatnonzero(sizes == 0)
-        worst = np.argsort(-gap, kind="stable")[: len(lost)]
-        means = means_by(label, learnt, count).astype(np.float32)
-        means[lost] = learnt[worst]
-    label, _ = _nearest(features, means)
+        empty = np.flatnonzero(sizes == 0)
+        farthest = np.argsort(-gap, kind="stable")[: len(empty)]
+        means = means_by(label, samples, count).astype(np.float32)
+        means[empty] = samples[farthest]
+    label, _ = _nearest_means(features, means)
     # where means coincide, rounding of distances could put equal strands into different clusters
     _, first, same = np.unique(features, axis=0, return_index=True, return_inverse=True)
     return np.unique(label[first][same], return_inverse=True)[1].astype(np.int32)
 
 
-def _far_apart(features: Floats, count: int, random: np.random.Generator) -> Floats:
+def _initial_means(features: Floats, count: int, random: np.random.Generator) -> Floats:
     """k-means++: each next one chosen with a chance that grows with the squared distance."""
     chosen = np.empty(count, np.int64)
     chosen[0] = random.integers(len(features))
@@ -191,16 +191,16 @@ def _far_apart(features: Floats, count: int, random: np.random.Generator) -> Flo
     return features[chosen]
 
 
-def _nearest(features: Floats, means: Floats) -> tuple[Ints, Floats]:
+def _nearest_means(features: Floats, means: Floats) -> tuple[Ints, Floats]:
     """The nearest mean of each, (n,), and the squared distance [m^2]."""
     label = np.empty(len(features), np.int64)
     gap = np.empty(len(features), np.float32)
     size, turned = np.einsum("ij,ij->i", means, means), np.ascontiguousarray(-2.0 * means.T)
-    for start in range(0, len(features), _CHUNK):
-        part = features[start : start + _CHUNK]
+    for start in range(0, len(features), _BATCH):
+        part = features[start : start + _BATCH]
         table = part @ turned
         table += size
         nearest = table.argmin(axis=1)
-        label[start : start + _CHUNK] = nearest
-        gap[start : start + _CHUNK] = table[np.arange(len(part)), nearest]
+        label[start : start + _BATCH] = nearest
+        gap[start : start + _BATCH] = table[np.arange(len(part)), nearest]
     return label, gap + np.einsum("ij,ij->i", features, features)

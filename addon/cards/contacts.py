@@ -39,14 +39,14 @@ class CardClearance:
     vertices: Clearance
 
     @classmethod
-    def at(
+    def measure(
         cls,
         spines: Floats,
         vertices: Floats,
         row: Ints,
         offsets: Ints,
         colliders: tuple[PosedCollider, ...],
-        kept: float,
+        min_distance: float,
     ) -> CardClearance:
         """The clearance of a motion that begins now.
 
@@ -55,18 +55,22 @@ class CardClearance:
                 them.
             row: (vertex_count,) the row of each vertex.
             offsets: (n + 1,), the spine of card c is spines[offsets[c]:offsets[c + 1]].
-            kept: [m].
+            min_distance: [m].
         """
-        distance, _ = signed_distance(vertices, colliders, kept)
-        deep = (distance < -DEEP * kept).nonzero()[0]
+        distance, _ = signed_distance(vertices, colliders, min_distance)
+        inside = (distance < -DEEP * min_distance).nonzero()[0]
         # the collider's grid is thicker there than its mesh, and gives no direction out of it
-        is_thicker = mesh_distance(vertices[deep], colliders) > distance[deep] + DEEP * kept
-        beside = deep[is_thicker]
-        distance[beside] = -np.inf
-        of_spines = clearance_at(spines, offsets, colliders, kept)
+        is_thicker = (
+            mesh_distance(vertices[inside], colliders) > distance[inside] + DEEP * min_distance
+        )
+        unmeasured = inside[is_thicker]
+        distance[unmeasured] = -np.inf
+        of_spines = clearance_at(spines, offsets, colliders, min_distance)
         # a row turns with the segments to both rows beside it
-        rows = np.minimum(row[beside] + 1, offsets[1:][_owners(row[beside], offsets)] - 1)
-        of_vertices = Clearance(kept, distance, np.zeros(len(vertices), np.int32))
+        rows = np.minimum(
+            row[unmeasured] + 1, offsets[1:][_cards_of_rows(row[unmeasured], offsets)] - 1
+        )
+        of_vertices = Clearance(min_distance, distance, np.zeros(len(vertices), np.int32))
         return cls(of_spines.holding(rows, offsets), of_vertices)
 
 
@@ -104,8 +108,8 @@ class CardContacts:
         """
         vertices = self.clearance.vertices
         near = nearer_than(positions, poses_at_end(self.colliders), vertices.reach)[0]
-        long, arm = _SHORTEST_ARM * vertices.max_distance, arms[near].T
-        near = near[dot_rows(arm, arm) > long * long]
+        min_length, arm = _SHORTEST_ARM * vertices.max_distance, arms[near].T
+        near = near[dot_rows(arm, arm) > min_length * min_length]
         if not len(near):
             return
         # roots and tips by turns
@@ -122,21 +126,21 @@ class CardContacts:
         )
         led = self._lead(points, carried, offsets, clearance)
         chosen, tips = near[led], points[2 * led + 1]
-        was, now = _unit(positions[chosen] - roots[led]), _unit(tips - roots[led])
-        turn = minimal_rotation(was, now, np.zeros(len(led), bool))
+        before, after = _unit(positions[chosen] - roots[led]), _unit(tips - roots[led])
+        turn = minimal_rotation(before, after, np.zeros(len(led), bool))
         for vectors in directions:
             vectors[chosen] += turn_change(turn, vectors[chosen].T).T
         positions[chosen] = tips
 
     def _lead(self, points: Floats, carried: Floats, offsets: Ints, clearance: Clearance) -> Ints:
-        def carry(index: Ints, _owners: Ints) -> Floats:
+        def carry(index: Ints, _cards_of_rows: Ints) -> Floats:
             places: Floats = carried[index]
             return places
 
         return lead_out(points, carry, offsets, self.colliders, clearance)[0]
 
 
-def _owners(rows: Ints, offsets: Ints) -> Ints:
+def _cards_of_rows(rows: Ints, offsets: Ints) -> Ints:
     """Which cards rows belong to."""
     return np.searchsorted(offsets, rows, side="right") - 1
 

@@ -18,10 +18,10 @@ from .settings import CardSettings
 from .strip import CardFrames, Strips
 
 #: Half a card's width in standard deviations of its strands: sqrt(3) covers evenly spread strands.
-_COVERING = 1.8
+_COVERED_DEVIATIONS = 1.8
 #: Weight of facing away from the head, relative to lying along the strands' spread.
 _FACING_WEIGHT = 0.35
-_TURNS = 72
+_TURN_STEPS = 72
 #: Minimum width of a row, as a fraction of the median; a single strand's card has it throughout.
 _MIN_WIDTH = 0.25
 #: How far a card reaches beyond the mean tip, in standard deviations of where its strands end.
@@ -29,7 +29,7 @@ _TIP_REACH = 1.3
 #: And before the mean root: sqrt(3) covers evenly spread roots, so that no parting is bald.
 _ROOT_REACH = 1.7
 #: Cards of hair that leans away from the upright by more than this sine reach back in full.
-_LEANING = 1.0 / 3.0
+_MIN_LEANING = 1.0 / 3.0
 
 
 def cluster_of_strands(
@@ -42,10 +42,10 @@ def cluster_of_strands(
         group: (strand_count,); no card holds strands of two.
         root_normal: (strand_count, 3), see `cluster_strands`.
     """
-    single = round(settings.card_count * settings.fly_aways)
-    wanted = max(settings.card_count - single, 1)
+    fly_away_count = round(settings.card_count * settings.fly_aways)
+    wanted = max(settings.card_count - fly_away_count, 1)
     cluster = cluster_strands(grid, group, wanted, settings.seed, root_normal)
-    return with_fly_aways(grid, cluster, single)
+    return with_fly_aways(grid, cluster, fly_away_count)
 
 
 def with_fly_aways(grid: Floats, cluster: Ints, count: int) -> Ints:
@@ -53,13 +53,13 @@ def with_fly_aways(grid: Floats, cluster: Ints, count: int) -> Ints:
 
     The last strand of a cluster stays in it.
     """
-    away = grid - _Mean(cluster).of(grid)[cluster]
+    away = grid - _ClusterMeans(cluster).of(grid)[cluster]
     gap = np.einsum("sri,sri->s", away, away)
     nearest = np.argsort(gap, kind="stable")
-    stays = np.zeros(len(cluster), bool)
-    stays[nearest[np.unique(cluster[nearest], return_index=True)[1]]] = True
+    is_staying = np.zeros(len(cluster), bool)
+    is_staying[nearest[np.unique(cluster[nearest], return_index=True)[1]]] = True
     farthest = nearest[::-1]
-    leaving = farthest[~stays[farthest]][:count]
+    leaving = farthest[~is_staying[farthest]][:count]
     label = cluster.copy()
     label[leaving] = cluster.max() + 1 + np.arange(len(leaving), dtype=np.int32)
     return label
@@ -77,33 +77,33 @@ def fit_strips(
         cluster: (strand_count,), from 0 without gaps.
         root_normal: (strand_count, 3) unit normals of the head under the roots.
     """
-    mean = _Mean(cluster)
-    center = mean.of(grid)
+    means = _ClusterMeans(cluster)
+    center = means.of(grid)
     tangent = tangents(center)
-    outwards = mean.of(root_normal)
+    outwards = means.of(root_normal)
     normal = transported_normals(tangent, outwards)
     side = np.cross(tangent, normal)
 
     away = grid - center[cluster]
     ahead = np.einsum("sri,sri->sr", away, normal[cluster])
     aside = np.einsum("sri,sri->sr", away, side[cluster])
-    spread = mean.of(np.stack([ahead * ahead, aside * aside, ahead * aside], axis=-1))
+    spread = means.of(np.stack([ahead * ahead, aside * aside, ahead * aside], axis=-1))
     turn = _best_turn(spread, normal, side, outwards)
-    thickness = mean.of(radius)
-    center[:, 0] -= _before_root(away[:, 0], tangent[:, 0], outwards, mean, cluster)
-    center[:, -1] += tangent[:, -1] * _beyond_tip(away[:, -1], tangent[:, -1], mean, cluster)
+    thickness = means.of(radius)
+    center[:, 0] -= _root_extensions(away[:, 0], tangent[:, 0], outwards, means, cluster)
+    center[:, -1] += tangent[:, -1] * _tip_extensions(away[:, -1], tangent[:, -1], means, cluster)
     strips: list[tuple[CardFrames, Floats]] = []
     for further in (0.0, np.pi / 2.0)[: 1 + settings.crossed]:
         cosine, sine = np.cos(turn + further)[:, None], np.sin(turn + further)[:, None]
         turned = normal * cosine[..., None] + side * sine[..., None]
-        variance = _smoothed(np.maximum(_along(spread, cosine, sine), 0.0))
-        half = settings.cluster_width * _COVERING * np.sqrt(variance) + thickness
+        variance = _smoothed(np.maximum(_variance_along(spread, cosine, sine), 0.0))
+        half = settings.cluster_width * _COVERED_DEVIATIONS * np.sqrt(variance) + thickness
         frames = CardFrames(center, tangent, turned, np.cross(tangent, turned))
         strips.append((frames, 2.0 * half))
-    return _stacked(strips)
+    return _concatenated(strips)
 
 
-def _beyond_tip(away: Floats, tangent: Floats, mean: _Mean, cluster: Ints) -> Floats:
+def _tip_extensions(away: Floats, tangent: Floats, mean: _ClusterMeans, cluster: Ints) -> Floats:
     """Distance that a card reaches beyond the mean tip to cover its longer strands, (n, 1) [m].
 
     Args:
@@ -113,8 +113,8 @@ def _beyond_tip(away: Floats, tangent: Floats, mean: _Mean, cluster: Ints) -> Fl
     return _TIP_REACH * np.sqrt(mean.of(ahead * ahead))[:, None]
 
 
-def _before_root(
-    away: Floats, tangent: Floats, outwards: Floats, mean: _Mean, cluster: Ints
+def _root_extensions(
+    away: Floats, tangent: Floats, outwards: Floats, mean: _ClusterMeans, cluster: Ints
 ) -> Floats:
     """From where a card begins to the mean root, so that it covers its rearmost roots, (n, 3) [m].
 
@@ -131,11 +131,11 @@ def _before_root(
     forward = flat / np.maximum(lying, 1e-12)
     ahead = np.einsum("si,si->s", away, forward[cluster])
     deviation = np.sqrt(mean.of(ahead * ahead))[:, None]
-    reach: Floats = forward * np.minimum(lying / _LEANING, 1.0) * _ROOT_REACH * deviation
+    reach: Floats = forward * np.minimum(lying / _MIN_LEANING, 1.0) * _ROOT_REACH * deviation
     return reach
 
 
-def _stacked(strips: Sequence[tuple[CardFrames, Floats]]) -> Strips:
+def _concatenated(strips: Sequence[tuple[CardFrames, Floats]]) -> Strips:
     """All strips in one, with rows no narrower than _MIN_WIDTH of the median."""
     width = np.concatenate([each for _, each in strips])
     width = np.maximum(width, _MIN_WIDTH * np.median(width))
@@ -144,7 +144,7 @@ def _stacked(strips: Sequence[tuple[CardFrames, Floats]]) -> Strips:
     return Strips(CardFrames(*(part.astype(np.float32) for part in parts)), width)
 
 
-class _Mean:
+class _ClusterMeans:
     """Means over the strands of each cluster."""
 
     def __init__(self, cluster: Ints) -> None:
@@ -167,10 +167,10 @@ def _best_turn(spread: Floats, normal: Floats, side: Floats, outwards: Floats) -
     variance that lies along the width, and _FACING_WEIGHT times the mean cosine between normal and
     outwards.
     """
-    turns = np.linspace(-np.pi, np.pi, _TURNS, endpoint=False)
+    turns = np.linspace(-np.pi, np.pi, _TURN_STEPS, endpoint=False)
     cosine, sine = np.cos(turns)[:, None, None], np.sin(turns)[:, None, None]
     total = np.maximum(spread[..., :2].sum(axis=(1, 2)), 1e-20)
-    score = _along(spread[None], cosine, sine).sum(axis=2) / total
+    score = _variance_along(spread[None], cosine, sine).sum(axis=2) / total
     length = np.maximum(np.linalg.norm(outwards, axis=1), 1e-12)
     ahead = np.einsum("cri,ci->c", normal, outwards) / length / normal.shape[1]
     aside = np.einsum("cri,ci->c", side, outwards) / length / normal.shape[1]
@@ -179,7 +179,7 @@ def _best_turn(spread: Floats, normal: Floats, side: Floats, outwards: Floats) -
     return best
 
 
-def _along(spread: Floats, cosine: Floats, sine: Floats) -> Floats:
+def _variance_along(spread: Floats, cosine: Floats, sine: Floats) -> Floats:
     """Variance along side cos - normal sin, from (..., 3): variances ahead and aside, and
     covariance."""
     ahead, aside, both = np.moveaxis(spread, -1, 0)

@@ -16,43 +16,43 @@ from ..strands.vectors import unit_or
 from .joint_solve import Skin
 
 #: Weight of cards' positions relative to their motion.
-_PLACE = 0.75
+_PLACE_WEIGHT = 0.75
 _ROUNDS = 20
-_SMALLEST = 1.0e-12
+_MIN_LENGTH = 1.0e-12
 
 
 @dataclass(frozen=True, eq=False)
 class Chains:
     """The chain of each card, and another one that may move it too; (n,) each."""
 
-    own: Ints
-    other: Ints
+    first: Ints
+    second: Ints
     count: int
 
 
-def card_chains(places: Floats, moved: Floats, most: int) -> Chains:
-    """Put cards into `most` chains or fewer.
+def card_chains(places: Floats, moved_places: Floats, max_chains: int) -> Chains:
+    """Put cards into `max_chains` chains or fewer.
 
     Args:
         places: (n, row_count, 3) along each card at rest [m].
-        moved: (n, row_count, frame_count, 3) the same in motion.
+        moved_places: (n, row_count, frame_count, 3) the same in motion.
     """
-    motions = (moved - places[:, :, None]).reshape(len(places), -1)
+    motions = (moved_places - places[:, :, None]).reshape(len(places), -1)
     middle = places - places.mean(axis=(0, 1))
     size = np.sqrt((middle * middle).mean())
-    fraction = _PLACE * np.sqrt((motions * motions).mean()) / max(float(size), _SMALLEST)
+    fraction = _PLACE_WEIGHT * np.sqrt((motions * motions).mean()) / max(float(size), _MIN_LENGTH)
     vectors = np.concatenate([motions, middle.reshape(len(places), -1) * fraction], axis=1)
-    own, centres = _k_means(vectors, min(most, len(places)))
+    own, centres = _k_means(vectors, min(max_chains, len(places)))
     used, own = np.unique(own, return_inverse=True)
-    return Chains(own, _partners(vectors, own, centres[used]), len(used))
+    return Chains(own, _second_centres(vectors, own, centres[used]), len(used))
 
 
 def _k_means(vectors: Floats, count: int) -> tuple[Ints, Floats]:
     """The nearest of `count` centres of each vector, and the centres."""
-    centres = _far_apart(vectors, count)
+    centres = _initial_centres(vectors, count)
     nearest = np.full(len(vectors), -1)
     for _ in range(_ROUNDS):
-        before, nearest = nearest, _squares(vectors, centres).argmin(axis=1)
+        before, nearest = nearest, _squared_distances(vectors, centres).argmin(axis=1)
         if np.array_equal(before, nearest):
             break
         members = np.bincount(nearest, minlength=count)
@@ -63,18 +63,18 @@ def _k_means(vectors: Floats, count: int) -> tuple[Ints, Floats]:
     return nearest, centres
 
 
-def _far_apart(vectors: Floats, count: int) -> Floats:
+def _initial_centres(vectors: Floats, count: int) -> Floats:
     """Vectors chosen one by one, each the farthest from all chosen ones, beginning near the
     mean."""
-    first = int(_squares(vectors, vectors.mean(axis=0)[None])[:, 0].argmin())
+    first = int(_squared_distances(vectors, vectors.mean(axis=0)[None])[:, 0].argmin())
     chosen, distance = [first], np.full(len(vectors), np.inf)
     while len(chosen) < count:
-        distance = np.minimum(distance, _squares(vectors, vectors[chosen[-1:]])[:, 0])
+        distance = np.minimum(distance, _squared_distances(vectors, vectors[chosen[-1:]])[:, 0])
         chosen.append(int(distance.argmax()))
     return vectors[chosen].copy()
 
 
-def _partners(vectors: Floats, own: Ints, centres: Floats) -> Ints:
+def _second_centres(vectors: Floats, own: Ints, centres: Floats) -> Ints:
     """The other centre whose mixture with a vector's own centre comes nearest to it; its own if
     there is only one."""
     count = len(centres)
@@ -82,18 +82,18 @@ def _partners(vectors: Floats, own: Ints, centres: Floats) -> Ints:
         return own
     grid = centres @ centres.T
     square = np.diag(grid)
-    between = np.maximum(square[own][:, None] - 2.0 * grid[own] + square, _SMALLEST)
+    squared_gaps = np.maximum(square[own][:, None] - 2.0 * grid[own] + square, _MIN_LENGTH)
     to_centres = vectors @ centres.T
     from_own = to_centres[np.arange(len(own)), own]
     # (v - a) (b - a) for all b, a being its own centre
     toward = to_centres - from_own[:, None] - grid[own] + square[own][:, None]
-    fraction = np.clip(toward / between, 0.0, 0.5)
-    gain = 2.0 * fraction * toward - fraction * fraction * between
+    fraction = np.clip(toward / squared_gaps, 0.0, 0.5)
+    gain = 2.0 * fraction * toward - fraction * fraction * squared_gaps
     gain[np.arange(len(own)), own] = -1.0
     return gain.argmax(axis=1)
 
 
-def _squares(vectors: Floats, centres: Floats) -> Floats:
+def _squared_distances(vectors: Floats, centres: Floats) -> Floats:
     """Squared distances, (n, k)."""
     product = vectors @ centres.T
     lengths = (vectors * vectors).sum(axis=1)[:, None] + (centres * centres).sum(axis=1)
@@ -108,20 +108,20 @@ def rest_joints(lines: Floats, chains: Chains, joints: int) -> Floats:
     Args:
         lines: (n, row_count, 3) places along each card, root to tip [m].
     """
-    places = middle_lines(lines, chains, joints)
+    places = chain_lines(lines, chains, joints)
     rest = np.tile(np.eye(4), (chains.count, joints, 1, 1))
     rest[..., :3, 3] = places
-    rest[..., :3, :3] = turned_to(np.gradient(places, axis=1))
+    rest[..., :3, :3] = rotations_from_y(np.gradient(places, axis=1))
     return rest
 
 
-def middle_lines(lines: Floats, chains: Chains, joints: int) -> Floats:
+def chain_lines(lines: Floats, chains: Chains, joints: int) -> Floats:
     """Places evenly along the middle of each chain's cards, (chains, joints, ...).
 
     Args:
         lines: (n, row_count, ...) of each card, root to tip.
     """
-    is_member = (chains.own == np.arange(chains.count)[:, None]).astype(np.float64)
+    is_member = (chains.first == np.arange(chains.count)[:, None]).astype(np.float64)
     middle = np.tensordot(is_member / is_member.sum(axis=1, keepdims=True), lines, 1)
     at = np.linspace(0.0, middle.shape[1] - 1.0, joints)
     before = np.minimum(at.astype(int), middle.shape[1] - 2)
@@ -130,7 +130,7 @@ def middle_lines(lines: Floats, chains: Chains, joints: int) -> Floats:
     return places
 
 
-def turned_to(direction: Floats) -> Floats:
+def rotations_from_y(direction: Floats) -> Floats:
     """The smallest rotations (..., 3, 3) that take y to these directions; Rodrigues' formula."""
     y = np.array([0.0, 1.0, 0.0])
     unit = unit_or(direction, y, 1.0e-9)
@@ -151,7 +151,7 @@ def cross_matrices(axis: Floats) -> Floats:
     return cross
 
 
-def reach_of(points: Floats, skin: Skin, rest: Floats) -> Floats:
+def joint_reach(points: Floats, skin: Skin, rest: Floats) -> Floats:
     """Root mean square distance from each joint of the points that it moves, (chains, joints)
     [m]."""
     places = rest.reshape(-1, 4, 4)[:, :3, 3]

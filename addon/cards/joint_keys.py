@@ -16,37 +16,38 @@ from ..arrays import Floats, Ints
 from .joints import JointRig
 
 #: Quaternions nearer to each other than this (their dot product) are interpolated linearly.
-_NEAR = 1.0 - 1.0e-9
+_MAX_SLERP_COSINE = 1.0 - 1.0e-9
 
 
 @dataclass(frozen=True, eq=False)
 class ChainKeys:
     """Keys of a chain.
 
-    frame: (key_count,) counted from 0.
+    frames: (key_count,) counted from 0.
     rotation: (joints, key_count, 4) unit quaternions x, y, z, w; translation: (joints, key_count,
         3) [m]; each joint in the space of the one before, the first in that of the rig.
     """
 
-    frame: Ints
+    frames: Ints
     rotation: Floats
     translation: Floats
 
 
-def chain_keys(rig: JointRig, near: float) -> Generator[float, None, tuple[ChainKeys, ...]]:
+def chain_keys(rig: JointRig, tolerance: float) -> Generator[float, None, tuple[ChainKeys, ...]]:
     """The keys of all chains; yields the fraction of them that is done.
 
     Args:
-        near: maximum distance of a joint, and of what it moves, from its path between two keys [m].
+        tolerance: maximum distance of a joint, and of what it moves, from its path between two keys
+            [m].
     """
     keys = []
     for chain in range(rig.chains):
-        keys.append(keys_of(rig.turn[chain], rig.place[chain], rig.reach[chain], near))
+        keys.append(reduce_keys(rig.turn[chain], rig.place[chain], rig.reach[chain], tolerance))
         yield (chain + 1) / rig.chains
     return tuple(keys)
 
 
-def keys_of(turn: Floats, place: Floats, reach: Floats, near: float) -> ChainKeys:
+def reduce_keys(turn: Floats, place: Floats, reach: Floats, tolerance: float) -> ChainKeys:
     """The keys of one chain.
 
     Args:
@@ -54,37 +55,39 @@ def keys_of(turn: Floats, place: Floats, reach: Floats, near: float) -> ChainKey
         reach: (joints,) [m]: distance from a joint at which its rotation matters.
     """
     frame_count = turn.shape[1]
-    rotation, translation = _beside_parents(turn, place)
-    kept = np.unique([0, frame_count - 1])
-    while len(kept) < frame_count:
-        keys = ChainKeys(kept, rotation[:, kept], translation[:, kept])
-        turned, placed = between_keys(keys, frame_count)
+    rotation, translation = _relative_to_parents(turn, place)
+    key_frames = np.unique([0, frame_count - 1])
+    while len(key_frames) < frame_count:
+        keys = ChainKeys(key_frames, rotation[:, key_frames], translation[:, key_frames])
+        turned, placed = interpolate_keys(keys, frame_count)
         miss = np.linalg.norm(placed - place, axis=-1)
         angle = np.linalg.norm(turned - turn, axis=(-2, -1)) / np.sqrt(2.0)
-        off = (miss + angle * reach[:, None]).max(axis=0)
-        if off.max() <= near:
+        errors = (miss + angle * reach[:, None]).max(axis=0)
+        if errors.max() <= tolerance:
             break
         # the worst frame of each stretch between two keys
-        stretch = np.searchsorted(kept, np.arange(frame_count), side="right")
-        order = np.lexsort((-off, stretch))
+        stretch = np.searchsorted(key_frames, np.arange(frame_count), side="right")
+        order = np.lexsort((-errors, stretch))
         first = np.unique(stretch[order], return_index=True)[1]
-        worst = order[first]
-        kept = np.union1d(kept, worst[off[worst] > near])
-    return _shortest(ChainKeys(kept, rotation[:, kept], translation[:, kept]))
+        worst_frames = order[first]
+        key_frames = np.union1d(key_frames, worst_frames[errors[worst_frames] > tolerance])
+    return _without_still_keys(
+        ChainKeys(key_frames, rotation[:, key_frames], translation[:, key_frames])
+    )
 
 
-def between_keys(keys: ChainKeys, frame_count: int) -> tuple[Floats, Floats]:
+def interpolate_keys(keys: ChainKeys, frame_count: int) -> tuple[Floats, Floats]:
     """Where the keys put the joints in every frame: turns (joints, frame_count, 3, 3) and places
-    (joints, frame_count, 3), as `keys_of` takes them.
+    (joints, frame_count, 3), as `reduce_keys` takes them.
     """
-    frames = np.clip(np.arange(frame_count), keys.frame[0], keys.frame[-1])
-    after = np.searchsorted(keys.frame, frames).clip(1 if len(keys.frame) > 1 else 0)
+    frames = np.clip(np.arange(frame_count), keys.frames[0], keys.frames[-1])
+    after = np.searchsorted(keys.frames, frames).clip(1 if len(keys.frames) > 1 else 0)
     before = np.maximum(after - 1, 0)
-    length = np.maximum(keys.frame[after] - keys.frame[before], 1)
-    fraction = ((frames - keys.frame[before]) / length)[:, None]
+    length = np.maximum(keys.frames[after] - keys.frames[before], 1)
+    fraction = ((frames - keys.frames[before]) / length)[:, None]
     one, other = keys.translation[:, before], keys.translation[:, after]
     place = one + (other - one) * fraction
-    turn = matrices(slerp(keys.rotation[:, before], keys.rotation[:, after], fraction))
+    turn = rotation_matrices(slerp(keys.rotation[:, before], keys.rotation[:, after], fraction))
     for joint in range(1, len(turn)):
         place[joint] = np.einsum("fab,fb->fa", turn[joint - 1], place[joint]) + place[joint - 1]
         turn[joint] = turn[joint - 1] @ turn[joint]
@@ -111,7 +114,7 @@ def quaternions(turn: Floats) -> Floats:
     return unit
 
 
-def matrices(quaternion: Floats) -> Floats:
+def rotation_matrices(quaternion: Floats) -> Floats:
     """Unit quaternions x, y, z, w (..., 4) as turns (..., 3, 3)."""
     x, y, z, w = np.moveaxis(quaternion, -1, 0)
     rows = [
@@ -128,8 +131,8 @@ def slerp(one: Floats, other: Floats, fraction: Floats) -> Floats:
     cosine = (one * other).sum(axis=-1, keepdims=True)
     other = np.where(cosine < 0.0, -other, other)
     cosine = np.minimum(np.abs(cosine), 1.0)
-    angle = np.arccos(np.minimum(cosine, _NEAR))
-    is_near = cosine > _NEAR
+    angle = np.arccos(np.minimum(cosine, _MAX_SLERP_COSINE))
+    is_near = cosine > _MAX_SLERP_COSINE
     sine = np.sin(angle)
     first = np.where(is_near, 1.0 - fraction, np.sin((1.0 - fraction) * angle) / sine)
     second = np.where(is_near, fraction, np.sin(fraction * angle) / sine)
@@ -138,13 +141,13 @@ def slerp(one: Floats, other: Floats, fraction: Floats) -> Floats:
     return unit
 
 
-def beside_parent(parent: Floats, own: Floats) -> Floats:
+def relative_to_parent(parent: Floats, own: Floats) -> Floats:
     """Rigid matrices (..., 4, 4) relative to those of parents."""
     result: Floats = np.linalg.inv(parent) @ own
     return result
 
 
-def _beside_parents(turn: Floats, place: Floats) -> tuple[Floats, Floats]:
+def _relative_to_parents(turn: Floats, place: Floats) -> tuple[Floats, Floats]:
     """Quaternions that go the shorter way from frame to frame, and translations, in parents'
     spaces."""
     turned, moved = turn.copy(), place.copy()
@@ -158,10 +161,10 @@ def _beside_parents(turn: Floats, place: Floats) -> tuple[Floats, Floats]:
     return rotation, moved
 
 
-def _shortest(keys: ChainKeys) -> ChainKeys:
+def _without_still_keys(keys: ChainKeys) -> ChainKeys:
     """A single key for joints that do not move."""
-    if len(keys.frame) == 2 and all(
+    if len(keys.frames) == 2 and all(
         np.array_equal(each[:, 0], each[:, 1]) for each in (keys.rotation, keys.translation)
     ):
-        return ChainKeys(keys.frame[:1], keys.rotation[:, :1], keys.translation[:, :1])
+        return ChainKeys(keys.frames[:1], keys.rotation[:, :1], keys.translation[:, :1])
     return keys

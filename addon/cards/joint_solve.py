@@ -18,11 +18,11 @@ from ..arrays import Floats, Ints
 INFLUENCES = 4
 #: Weight of the previous rotation in a fit, as a fraction of that of the points: points in a line
 #: do not determine the rotation about it.
-_KEEP = 1.0e-4
+_ROTATION_PRIOR = 1.0e-4
 #: The same for weights.
-_KEEP_WEIGHTS = 1.0e-4
+_WEIGHT_PRIOR = 1.0e-4
 #: Lengths [m] and weights below this count as 0.
-_SMALLEST = 1.0e-9
+_MIN_SIZE = 1.0e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +41,7 @@ class Skin:
         return cls(np.take_along_axis(joint, order, 1), np.take_along_axis(weight, order, 1))
 
 
-def rigid_fits(
+def fit_rigid_motions(
     points: Floats, targets: Floats, weight: Floats, before: Floats
 ) -> tuple[Floats, Floats]:
     """The rigid motion that brings weighted points nearest to targets, in each frame.
@@ -55,18 +55,18 @@ def rigid_fits(
     Returns:
         Turns (frame_count, 3, 3) and shifts (frame_count, 3): target = turn point + shift.
     """
-    total = max(float(weight.sum()), _SMALLEST)
-    middle, goal = weight @ points / total, np.tensordot(weight, targets, 1) / total
-    arms = points - middle
+    total = max(float(weight.sum()), _MIN_SIZE)
+    center, goal = weight @ points / total, np.tensordot(weight, targets, 1) / total
+    arms = points - center
     spread = np.tensordot(arms * weight[:, None], targets, (0, 0)).transpose(1, 2, 0)
     size = float((weight * (arms * arms).sum(axis=1)).sum())
-    left, _, right = np.linalg.svd(spread + (size * _KEEP + _SMALLEST**2) * before)
+    left, _, right = np.linalg.svd(spread + (size * _ROTATION_PRIOR + _MIN_SIZE**2) * before)
     left[:, :, 2] *= np.sign(np.linalg.det(left @ right))[:, None]
     turn = left @ right
-    return turn, goal - turn @ middle
+    return turn, goal - turn @ center
 
 
-def placed(points: Floats, turn: Floats, shift: Floats) -> Floats:
+def moved_rigidly(points: Floats, turn: Floats, shift: Floats) -> Floats:
     """Points (n, 3) in each frame of a rigid motion, (n, frame_count, 3)."""
     flat = points @ turn.reshape(-1, 3).T + shift.reshape(-1)
     return flat.reshape(len(points), -1, 3)
@@ -84,11 +84,13 @@ def skinned(points: Floats, skin: Skin, turn: Floats, shift: Floats) -> Floats:
             own = np.flatnonzero((skin.joint[:, column] == joint) & (skin.weight[:, column] > 0.0))
             if len(own):
                 fraction = skin.weight[own, column, None, None]
-                result[own] += fraction * placed(points[own], turn[joint], shift[joint])
+                result[own] += fraction * moved_rigidly(points[own], turn[joint], shift[joint])
     return result
 
 
-def first_joints(points: Floats, targets: Floats, skin: Skin, count: int) -> tuple[Floats, Floats]:
+def initial_joint_motions(
+    points: Floats, targets: Floats, skin: Skin, count: int
+) -> tuple[Floats, Floats]:
     """`turn` and `shift` of each joint, as if it alone moved all points that it has a weight in."""
     still = np.tile(np.eye(3), (targets.shape[1], 1, 1))
     turn, shift = np.tile(still, (count, 1, 1, 1)), np.zeros((count, *targets.shape[1:]))
@@ -96,11 +98,13 @@ def first_joints(points: Floats, targets: Floats, skin: Skin, count: int) -> tup
         fraction = np.where(skin.joint == joint, skin.weight, 0.0).sum(axis=1)
         own = np.flatnonzero(fraction > 0.0)
         if len(own):
-            turn[joint], shift[joint] = rigid_fits(points[own], targets[own], fraction[own], still)
+            turn[joint], shift[joint] = fit_rigid_motions(
+                points[own], targets[own], fraction[own], still
+            )
     return turn, shift
 
 
-def move_joints(
+def refine_joint_motions(
     points: Floats, targets: Floats, skin: Skin, turn: Floats, shift: Floats, rounds: int
 ) -> None:
     """Improve `turn` and `shift` in place, joint by joint, against the residual of the others
@@ -110,7 +114,7 @@ def move_joints(
         targets: (n, frame_count, 3).
         turn, shift: as of `skinned`.
     """
-    left = targets - skinned(points, skin, turn, shift)
+    residual = targets - skinned(points, skin, turn, shift)
     count = len(turn)
     members = [np.flatnonzero((skin.joint == joint).any(axis=1)) for joint in range(count)]
     for _ in range(rounds):
@@ -119,15 +123,17 @@ def move_joints(
             own, fraction = own[fraction > 0.0], fraction[fraction > 0.0]
             if not len(own):
                 continue
-            before = placed(points[own], turn[joint], shift[joint])
-            goal = before + left[own] / np.maximum(fraction, 1.0e-3)[:, None, None]
-            fit = rigid_fits(points[own], goal, fraction * fraction, turn[joint])
-            after = placed(points[own], *fit)
-            left[own] += fraction[:, None, None] * (before - after)
+            before = moved_rigidly(points[own], turn[joint], shift[joint])
+            goal = before + residual[own] / np.maximum(fraction, 1.0e-3)[:, None, None]
+            fit = fit_rigid_motions(points[own], goal, fraction * fraction, turn[joint])
+            after = moved_rigidly(points[own], *fit)
+            residual[own] += fraction[:, None, None] * (before - after)
             turn[joint], shift[joint] = fit
 
 
-def best_weights(points: Floats, targets: Floats, first: Skin, turn: Floats, shift: Floats) -> Skin:
+def fit_weights(
+    points: Floats, targets: Floats, initial: Skin, turn: Floats, shift: Floats
+) -> Skin:
     """The weights of the same joints that bring points nearest to targets (eq. 5).
 
     Every subset of the joints is tried, which finds the best weights that are not negative, not
@@ -135,32 +141,34 @@ def best_weights(points: Floats, targets: Floats, first: Skin, turn: Floats, shi
 
     Args:
         targets: (n, frame_count, 3).
-        first: the weights to keep where the motion does not determine them.
+        initial: the weights to keep where the motion does not determine them.
     """
-    shown = np.stack(
+    residuals = np.stack(
         [
-            _of_joints(points, first.joint[:, column], turn, shift) - targets
+            _moved_by_joints(points, initial.joint[:, column], turn, shift) - targets
             for column in range(INFLUENCES)
         ],
         axis=1,
     ).reshape(len(points), INFLUENCES, -1)
-    gram = shown @ shown.transpose(0, 2, 1)  # of the residuals: weights of sum 1 blend these too
-    scale = np.trace(gram, axis1=1, axis2=2) * _KEEP_WEIGHTS + _SMALLEST**2
+    gram = residuals @ residuals.transpose(
+        0, 2, 1
+    )  # of the residuals: weights of sum 1 blend these too
+    scale = np.trace(gram, axis1=1, axis2=2) * _WEIGHT_PRIOR + _MIN_SIZE**2
     gram = gram + scale[:, None, None] * np.eye(INFLUENCES)
-    pull = scale[:, None] * first.weight
-    best, weight = np.full(len(points), np.inf), first.weight.astype(np.float64)
+    pull = scale[:, None] * initial.weight
+    best, weight = np.full(len(points), np.inf), initial.weight.astype(np.float64)
     for size in range(1, INFLUENCES + 1):
         for chosen in combinations(range(INFLUENCES), size):
-            found = _of_sum_one(gram[:, chosen][:, :, chosen], pull[:, chosen])
+            found = _weights_of_sum_one(gram[:, chosen][:, :, chosen], pull[:, chosen])
             trial = np.zeros((len(points), INFLUENCES))
             trial[:, chosen] = found
             cost = np.einsum("ni,nij,nj->n", trial, gram, trial) - 2.0 * (trial * pull).sum(axis=1)
             is_better = (found >= 0.0).all(axis=1) & (cost < best)
             best[is_better], weight[is_better] = cost[is_better], trial[is_better]
-    return Skin(first.joint, weight)
+    return Skin(initial.joint, weight)
 
 
-def _of_joints(points: Floats, joint: Ints, turn: Floats, shift: Floats) -> Floats:
+def _moved_by_joints(points: Floats, joint: Ints, turn: Floats, shift: Floats) -> Floats:
     """Each point moved by a joint of its own, (n, frame_count, 3)."""
     result = np.empty((len(points), *shift.shape[1:]))
     order = np.argsort(joint, kind="stable")
@@ -168,11 +176,11 @@ def _of_joints(points: Floats, joint: Ints, turn: Floats, shift: Floats) -> Floa
     for number, (begin, end) in enumerate(pairwise(ends)):
         own = order[begin:end]
         if len(own):
-            result[own] = placed(points[own], turn[number], shift[number])
+            result[own] = moved_rigidly(points[own], turn[number], shift[number])
     return result
 
 
-def _of_sum_one(gram: Floats, pull: Floats) -> Floats:
+def _weights_of_sum_one(gram: Floats, pull: Floats) -> Floats:
     """w that minimises w G w / 2 - p w under sum 1, (n, k), by a Lagrange multiplier."""
     count, size = pull.shape
     both = np.stack([np.ones((count, size)), pull], axis=2)

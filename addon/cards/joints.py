@@ -17,23 +17,30 @@ from ..arrays import Floats, Ints
 from .card_mesh import CardMesh
 from .export_settings import CardExportSettings
 from .follow import card_lines
-from .joint_chains import Chains, card_chains, reach_of, rest_joints
-from .joint_solve import INFLUENCES, Skin, best_weights, first_joints, move_joints, skinned
+from .joint_chains import Chains, card_chains, joint_reach, rest_joints
+from .joint_solve import (
+    INFLUENCES,
+    Skin,
+    fit_weights,
+    initial_joint_motions,
+    refine_joint_motions,
+    skinned,
+)
 from .sort import card_of_vertex
 
 #: Numbers of joints that are tried, the fewest first.
-_COUNTS = (2, 3, 4, 6, 8, 12, 16)
+_JOINT_COUNTS = (2, 3, 4, 6, 8, 12, 16)
 #: Joints are added while each step reduces the error by at least this fraction.
-_WORTH = 0.03
+_MIN_GAIN = 0.03
 #: Fraction of the allowed error for the joints; the rest is for the keys that are left out.
 FIT_FRACTION = 0.9
 #: Numbers of frames that weights, and of vertices that joints are learnt from.
-_LEARNT_FRAMES = 24
-_LEARNT_VERTICES = 12_000
-_TURNS = 3
+_MAX_SAMPLE_FRAMES = 24
+_MAX_SAMPLE_VERTICES = 12_000
+_ALTERNATIONS = 3
 #: Frames solved at once, and vertices placed at once.
-_FRAMES_AT_ONCE = 64
-VERTICES_AT_ONCE = 4096
+_FRAME_BATCH = 64
+VERTEX_BATCH = 4096
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,34 +48,36 @@ class CardTracks:
     """Cards in motion, in their space at rest, which moves with the head.
 
     levels: at rest [m], the finest first.
-    moved: (vertex_count, frame_count, 3) float32 [m] of each level.
+    moved_positions: (vertex_count, frame_count, 3) float32 [m] of each level.
     carrier: (frame_count, 4, 4) rigid motion, from that space to the world.
     hair_length: median length of the guides [m], of which errors are fractions.
     root: (3,) middle of the roots at rest [m].
-    first: number of the first frame. frame_rate: [1/s].
+    first_frame: number of the first frame. frame_rate: [1/s].
     """
 
     levels: tuple[CardMesh, ...]
-    moved: tuple[Floats, ...]
+    moved_positions: tuple[Floats, ...]
     carrier: Floats
     hair_length: float
     root: Floats
-    first: int
+    first_frame: int
     frame_rate: float
 
     @property
     def frame_count(self) -> int:
         return len(self.carrier)
 
-    def some_frames(self) -> Ints:
+    def sample_frames(self) -> Ints:
         """The frames from which weights are learnt, evenly chosen, ascending."""
-        few = min(self.frame_count, _LEARNT_FRAMES)
-        return np.linspace(0, self.frame_count - 1, few).round().astype(int)
+        sample_count = min(self.frame_count, _MAX_SAMPLE_FRAMES)
+        return np.linspace(0, self.frame_count - 1, sample_count).round().astype(int)
 
-    def some_vertices(self, count: int) -> Ints:
+    def sample_vertices(self, count: int) -> Ints:
         """This many vertices of the finest level, or all, chosen at random, ascending."""
-        there = len(self.levels[0].positions)
-        return np.sort(np.random.default_rng(0).permutation(there)[: min(there, count)])
+        vertex_count = len(self.levels[0].positions)
+        return np.sort(
+            np.random.default_rng(0).permutation(vertex_count)[: min(vertex_count, count)]
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,9 +106,9 @@ class FitError:
     square, 99th percentile, and maximum.
     """
 
-    mean_square_root: float
-    most: float
-    worst: float
+    root_mean_square: float
+    percentile_99: float
+    maximum: float
 
     @classmethod
     def of(cls, distances: Sequence[Floats]) -> Self:
@@ -109,18 +118,18 @@ class FitError:
         return cls(rms, float(np.quantile(every, 0.99)), float(every.max(initial=0.0)))
 
     @classmethod
-    def played(
+    def of_motion(
         cls, tracks: CardTracks, skins: Sequence[Skin], moves: tuple[Floats, Floats]
     ) -> Self:
         """The error of all levels.
 
         Args:
-            moves: of the joints, see `joint_moves`.
+            moves: of the joints, see `joint_transforms`.
         """
         distances = []
-        for mesh, moved, skin in zip(tracks.levels, tracks.moved, skins, strict=True):
-            for begin in range(0, len(moved), VERTICES_AT_ONCE):
-                part = slice(begin, begin + VERTICES_AT_ONCE)
+        for mesh, moved, skin in zip(tracks.levels, tracks.moved_positions, skins, strict=True):
+            for begin in range(0, len(moved), VERTEX_BATCH):
+                part = slice(begin, begin + VERTEX_BATCH)
                 points = mesh.positions[part].astype(np.float64)
                 own = Skin(skin.joint[part], skin.weight[part])
                 miss = skinned(points, own, *moves) - moved[part]
@@ -135,21 +144,21 @@ def joint_steps(
 
     Yields the fraction that is done.
     """
-    learnt = _Learnt.of(tracks, settings.chains)
+    samples = _Samples.of(tracks, settings.chains)
     yield 0.1
     allowed = FIT_FRACTION * settings.joint_error / 100.0 * tracks.hair_length
-    best, least = None, np.inf
-    for count in (each for each in _COUNTS if each <= settings.joints):
-        fit, error = learnt.fitted(count)
-        if error > least * (1.0 - _WORTH):
+    best, smallest = None, np.inf
+    for count in (each for each in _JOINT_COUNTS if each <= settings.joints):
+        fit, error = samples.fitted(count)
+        if error > smallest * (1.0 - _MIN_GAIN):
             break
-        best, least = (count, *fit), error
+        best, smallest = (count, *fit), error
         if error <= allowed:
             break
-        yield 0.1 + 0.4 * count / _COUNTS[-1]
+        yield 0.1 + 0.4 * count / _JOINT_COUNTS[-1]
     assert best is not None, "two joints are always tried"
     yield 0.5
-    return (yield from _on_all(tracks, learnt, *best))
+    return (yield from _fit_all(tracks, samples, *best))
 
 
 def keyed_error(tracks: CardTracks, rig: JointRig, turn: Floats, place: Floats) -> FitError:
@@ -158,10 +167,10 @@ def keyed_error(tracks: CardTracks, rig: JointRig, turn: Floats, place: Floats) 
     Args:
         turn, place: as in the rig, but possibly with keys left out.
     """
-    return FitError.played(tracks, rig.skins, joint_moves(rig.rest, turn, place))
+    return FitError.of_motion(tracks, rig.skins, joint_transforms(rig.rest, turn, place))
 
 
-def joint_moves(rest: Floats, turn: Floats, place: Floats) -> tuple[Floats, Floats]:
+def joint_transforms(rest: Floats, turn: Floats, place: Floats) -> tuple[Floats, Floats]:
     """Transforms of points at rest by joints: turns (n, frame_count, 3, 3) and shifts
     (n, frame_count, 3); a point moves to turn point + shift.
     """
@@ -174,82 +183,82 @@ def joint_moves(rest: Floats, turn: Floats, place: Floats) -> tuple[Floats, Floa
 
 
 @dataclass(frozen=True, eq=False)
-class _Learnt:
+class _Samples:
     """The data that joints are learnt from: some vertices of the finest level in some frames."""
 
     lines: Floats
     chains: Chains
     points: Floats
-    moved: Floats
+    moved_positions: Floats
     card: Ints
     along: Floats
-    picked: Ints
+    vertices: Ints
     frames: Ints
 
     @classmethod
-    def of(cls, tracks: CardTracks, most: int) -> _Learnt:
-        mesh, moved = tracks.levels[0], tracks.moved[0]
-        frames = tracks.some_frames()
+    def of(cls, tracks: CardTracks, max_chains: int) -> _Samples:
+        mesh, moved = tracks.levels[0], tracks.moved_positions[0]
+        frames = tracks.sample_frames()
         _, lines = card_lines(mesh)
         shifts = [card_lines(replace(mesh, positions=moved[:, frame]))[1] for frame in frames]
         lines = lines.astype(np.float64)
-        chains = card_chains(lines, np.stack(shifts, axis=2).astype(np.float64), most)
-        picked = tracks.some_vertices(_LEARNT_VERTICES)
+        chains = card_chains(lines, np.stack(shifts, axis=2).astype(np.float64), max_chains)
+        vertices = tracks.sample_vertices(_MAX_SAMPLE_VERTICES)
         return cls(
             lines,
             chains,
-            mesh.positions[picked].astype(np.float64),
-            moved[picked][:, frames].astype(np.float64),
-            _card_places(mesh, mesh)[picked],
-            mesh.along[picked],
-            picked,
+            mesh.positions[vertices].astype(np.float64),
+            moved[vertices][:, frames].astype(np.float64),
+            _card_places(mesh, mesh)[vertices],
+            mesh.along[vertices],
+            vertices,
             frames,
         )
 
-    def first_skin(self, card: Ints, along: Floats, joints: int) -> Skin:
+    def initial_skin(self, card: Ints, along: Floats, joints: int) -> Skin:
         """Each vertex between two joints of its own chain, with weights of 0 for the other
         chain's."""
-        at = np.clip(along.astype(np.float64), 0.0, 1.0) * (joints - 1)
-        before = np.minimum(at.astype(np.int64), joints - 2)
-        own = self.chains.own[card] * joints + before
-        other = self.chains.other[card] * joints + before
-        fraction = at - before
+        place = np.clip(along.astype(np.float64), 0.0, 1.0) * (joints - 1)
+        before = np.minimum(place.astype(np.int64), joints - 2)
+        own = self.chains.first[card] * joints + before
+        other = self.chains.second[card] * joints + before
+        fraction = place - before
         weight = np.zeros((len(card), INFLUENCES))
         weight[:, 0], weight[:, 1] = 1.0 - fraction, fraction
         return Skin(np.stack([own, own + 1, other, other + 1], axis=1), weight)
 
     def fitted(self, joints: int) -> tuple[tuple[Skin, Floats, Floats], float]:
         """The skin of the learnt vertices, the joints' motion, and the error [m]."""
-        skin = self.first_skin(self.card, self.along, joints)
+        skin = self.initial_skin(self.card, self.along, joints)
         count = self.chains.count * joints
-        turn, shift = first_joints(self.points, self.moved, skin, count)
-        for _ in range(_TURNS):
-            move_joints(self.points, self.moved, skin, turn, shift, 2)
-            skin = best_weights(self.points, self.moved, skin, turn, shift)
-        move_joints(self.points, self.moved, skin, turn, shift, 1)
-        miss = skinned(self.points, skin, turn, shift) - self.moved
+        turn, shift = initial_joint_motions(self.points, self.moved_positions, skin, count)
+        for _ in range(_ALTERNATIONS):
+            refine_joint_motions(self.points, self.moved_positions, skin, turn, shift, 2)
+            skin = fit_weights(self.points, self.moved_positions, skin, turn, shift)
+        refine_joint_motions(self.points, self.moved_positions, skin, turn, shift, 1)
+        miss = skinned(self.points, skin, turn, shift) - self.moved_positions
         return (skin, turn, shift), float(np.sqrt((miss * miss).sum(axis=-1).mean()))
 
 
-def _on_all(
-    tracks: CardTracks, learnt: _Learnt, joints: int, skin: Skin, turn: Floats, shift: Floats
+def _fit_all(
+    tracks: CardTracks, samples: _Samples, joints: int, skin: Skin, turn: Floats, shift: Floats
 ) -> Generator[float, None, JointRig]:
     """The learnt joints in all frames and for all vertices."""
-    chains, frame_count = learnt.chains.count, tracks.frame_count
+    chains, frame_count = samples.chains.count, tracks.frame_count
     turns = np.empty((chains * joints, frame_count, 3, 3))
     shifts = np.empty((chains * joints, frame_count, 3))
-    for begin in range(0, frame_count, _FRAMES_AT_ONCE):
-        part = slice(begin, begin + _FRAMES_AT_ONCE)
-        moved = tracks.moved[0][learnt.picked, part].astype(np.float64)
-        block = first_joints(learnt.points, moved, skin, chains * joints)
-        move_joints(learnt.points, moved, skin, *block, rounds=3)
+    for begin in range(0, frame_count, _FRAME_BATCH):
+        part = slice(begin, begin + _FRAME_BATCH)
+        moved = tracks.moved_positions[0][samples.vertices, part].astype(np.float64)
+        block = initial_joint_motions(samples.points, moved, skin, chains * joints)
+        refine_joint_motions(samples.points, moved, skin, *block, rounds=3)
         turns[:, part], shifts[:, part] = block
-        yield 0.5 + 0.3 * min(begin + _FRAMES_AT_ONCE, frame_count) / frame_count
+        yield 0.5 + 0.3 * min(begin + _FRAME_BATCH, frame_count) / frame_count
     skins = []
-    for mesh, now in zip(tracks.levels, tracks.moved, strict=True):
-        skins.append(_skin_of(mesh, now, tracks.levels[0], learnt, joints, turn, shift))
+    for mesh, now in zip(tracks.levels, tracks.moved_positions, strict=True):
+        skins.append(_level_skin(mesh, now, tracks.levels[0], samples, joints, turn, shift))
         yield 0.8 + 0.1 * len(skins) / len(tracks.levels)
-    rest = rest_joints(learnt.lines, learnt.chains, joints)
+    rest = rest_joints(samples.lines, samples.chains, joints)
     flat: Floats = rest.reshape(-1, 4, 4)
     place = np.einsum("jfab,jb->jfa", turns, flat[:, :3, 3])
     shape = (chains, joints, frame_count)
@@ -259,16 +268,16 @@ def _on_all(
         rest,
         (turns @ flat[:, None, :3, :3]).reshape(*shape, 3, 3),
         (place + shifts).reshape(*shape, 3),
-        reach_of(tracks.levels[0].positions, skins[0], rest),
+        joint_reach(tracks.levels[0].positions, skins[0], rest),
         tuple(skins),
     )
 
 
-def _skin_of(
+def _level_skin(
     mesh: CardMesh,
     moved: Floats,
     finest: CardMesh,
-    learnt: _Learnt,
+    samples: _Samples,
     joints: int,
     turn: Floats,
     shift: Floats,
@@ -276,12 +285,12 @@ def _skin_of(
     """The weights of all vertices of a level, heaviest first."""
     card = _card_places(mesh, finest)
     parts = []
-    for begin in range(0, len(moved), VERTICES_AT_ONCE):
-        part = slice(begin, begin + VERTICES_AT_ONCE)
-        first = learnt.first_skin(card[part], mesh.along[part], joints)
+    for begin in range(0, len(moved), VERTEX_BATCH):
+        part = slice(begin, begin + VERTEX_BATCH)
+        first = samples.initial_skin(card[part], mesh.along[part], joints)
         points = mesh.positions[part].astype(np.float64)
-        shifts = moved[part][:, learnt.frames].astype(np.float64)
-        parts.append(best_weights(points, shifts, first, turn, shift))
+        shifts = moved[part][:, samples.frames].astype(np.float64)
+        parts.append(fit_weights(points, shifts, first, turn, shift))
     return Skin.joined(parts)
 
 

@@ -25,7 +25,7 @@ from ..arrays import Floats, Ints, means_by
 from ..strands import StrandSet, Surface
 from ..strands.closest_point import search_of
 from ..strands.vectors import unit, unit_or
-from .atlas import check_width, medoids
+from .atlas import check_width, k_medoids
 from .atlas_grid import AtlasGrid
 from .atlas_settings import AtlasSettings
 from .bake_strands import FlatStrands, strand_ids
@@ -202,7 +202,7 @@ def plan_shells(
     step = _thin_steps(patches, patch_of_root, density)
     whole = np.flatnonzero(step == 0)
     whole = whole if len(whole) else np.arange(len(step))
-    _, chosen = medoids(patches.features[whole], min(_PATTERNS, len(whole)), random)
+    _, chosen = k_medoids(patches.features[whole], min(_PATTERNS, len(whole)), random)
     features = patches.features[whole[chosen]]
     source = list(whole[chosen])
     thinned = None
@@ -450,7 +450,7 @@ def shell_strands(
     gain = max(float(shade.max(initial=0.0)), 1.0)
     parts = {
         "place": on_atlas,
-        "half": edge - on_atlas,
+        "half_width": edge - on_atlas,
         "along": along,
         "depth": np.clip(0.5 + away[..., 2] / side, 0.0, 1.0),
         "tangent": np.repeat(_directions(step, mean, own, layer, axes)[:, None], 2, axis=1),

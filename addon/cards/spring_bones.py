@@ -18,19 +18,19 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from .joint_chains import cross_matrices
-from .joint_keys import matrices, quaternions, slerp
+from .joint_keys import quaternions, rotation_matrices, slerp
 
 #: Steps [1/s] that the values are for: engines step once a frame.
 STEP_RATE = 60.0
 DOWN = np.array([0.0, 0.0, -1.0])
 #: Minimum of 1 + cos between two directions, which is 0 for opposite ones.
-_REVERSED = 1.0e-9
+_MIN_COSINE_SUM = 1.0e-9
 #: Lengths [m] below this count as 0.
-_SHORTEST = 1.0e-9
+_MIN_LENGTH = 1.0e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Balls:
+class SpringColliders:
     """Balls and capsules that move with the head, in the space of the chains at rest.
 
     center, tail: (n, 3) [m] the ends of a capsule's axis; equal for a ball. radius: (n,) [m].
@@ -41,7 +41,7 @@ class Balls:
     radius: Floats
 
     @classmethod
-    def of(cls, center: Floats, radius: Floats) -> Balls:
+    def spheres(cls, center: Floats, radius: Floats) -> SpringColliders:
         """Balls without axes."""
         center = np.asarray(center, np.float64).reshape(-1, 3)
         return cls(center, center, np.asarray(radius, np.float64).reshape(-1))
@@ -51,7 +51,7 @@ class Balls:
         from the ball around it (..., n) [m].
         """
         axis = self.tail - self.center
-        square = np.maximum((axis * axis).sum(axis=1), _SHORTEST**2)
+        square = np.maximum((axis * axis).sum(axis=1), _MIN_LENGTH**2)
         away = points[..., None, :] - self.center
         fraction = np.clip((away * axis).sum(axis=-1) / square, 0.0, 1.0)
         place = self.center + fraction[..., None] * axis
@@ -79,12 +79,12 @@ class SpringChains:
     """Chains at rest, and the balls that they keep out of.
 
     rest: (chains, joints, 4, 4) rigid [m]; y points to the next joint, the last one ends the chain.
-    balls: for all chains. hits: (chains, n) which balls a chain keeps out of.
+    colliders: for all chains. collides: (chains, n) which balls a chain keeps out of.
     """
 
     rest: Floats
-    balls: Balls
-    hits: Bools
+    colliders: SpringColliders
+    collides: Bools
 
     @property
     def lengths(self) -> Floats:
@@ -92,39 +92,39 @@ class SpringChains:
         lengths: Floats = np.linalg.norm(np.diff(self.rest[..., :3, 3], axis=1), axis=-1)
         return lengths
 
-    def take(self, chains: Ints) -> SpringChains:
+    def select(self, chains: Ints) -> SpringChains:
         """Some of the chains, possibly several times."""
-        return SpringChains(self.rest[chains], self.balls, self.hits[chains])
+        return SpringChains(self.rest[chains], self.colliders, self.collides[chains])
 
 
-def stepped(carrier: Floats, frame_rate: float, step_rate: float = STEP_RATE) -> Floats:
+def resampled_to_steps(carrier: Floats, frame_rate: float, step_rate: float = STEP_RATE) -> Floats:
     """A rigid motion by frames, (frame_count, 4, 4), resampled to steps, (step_count, 4, 4).
 
     Between frames rotations are interpolated by slerp and translations linearly.
     """
     last = len(carrier) - 1
-    at = np.arange(round(last * step_rate / frame_rate) + 1) * frame_rate / step_rate
-    before = np.minimum(at.astype(np.int64), max(last - 1, 0))
-    after, fraction = np.minimum(before + 1, last), np.minimum(at - before, 1.0)[:, None]
+    frame = np.arange(round(last * step_rate / frame_rate) + 1) * frame_rate / step_rate
+    before = np.minimum(frame.astype(np.int64), max(last - 1, 0))
+    after, fraction = np.minimum(before + 1, last), np.minimum(frame - before, 1.0)[:, None]
     turns = quaternions(carrier[:, :3, :3])
-    steps: Floats = np.tile(np.eye(4), (len(at), 1, 1))
-    steps[:, :3, :3] = matrices(slerp(turns[before], turns[after], fraction))
+    steps: Floats = np.tile(np.eye(4), (len(frame), 1, 1))
+    steps[:, :3, :3] = rotation_matrices(slerp(turns[before], turns[after], fraction))
     places = carrier[:, :3, 3]
     steps[:, :3, 3] = places[before] * (1.0 - fraction) + places[after] * fraction
     return steps
 
 
-def at_frames(values: Floats, frame_count: int, frame_rate: float) -> Floats:
+def resampled_to_frames(values: Floats, frame_count: int, frame_rate: float) -> Floats:
     """Values of steps (step_count, ...) at the frames, interpolated linearly."""
-    at = np.minimum(np.arange(frame_count) * STEP_RATE / frame_rate, len(values) - 1)
-    before = np.minimum(at.astype(np.int64), max(len(values) - 2, 0))
-    fraction = (at - before).reshape(-1, *[1] * (values.ndim - 1))
+    step = np.minimum(np.arange(frame_count) * STEP_RATE / frame_rate, len(values) - 1)
+    before = np.minimum(step.astype(np.int64), max(len(values) - 2, 0))
+    fraction = (step - before).reshape(-1, *[1] * (values.ndim - 1))
     mixed: Floats = values[before] * (1.0 - fraction)
     mixed += values[np.minimum(before + 1, len(values) - 1)] * fraction
     return mixed
 
 
-def sprung(chains: SpringChains, values: SpringValues, carrier: Floats) -> Floats:
+def simulate_springs(chains: SpringChains, values: SpringValues, carrier: Floats) -> Floats:
     """Places of the joints in each step as springs move them, in the space of the head.
 
     Args:
@@ -134,7 +134,7 @@ def sprung(chains: SpringChains, values: SpringValues, carrier: Floats) -> Float
         Places (step_count, chains, joints, 3) [m]; the chains begin at rest.
     """
     count, joints = chains.rest.shape[:2]
-    lengths, beside = chains.lengths, _beside_parents(chains.rest)
+    lengths, relative = chains.lengths, _relative_rotations(chains.rest)
     step = 1.0 / STEP_RATE
     places = np.empty((len(carrier), count, joints, 3))
     first = chains.rest[..., :3, 3] @ carrier[0, :3, :3].T + carrier[0, :3, 3]
@@ -144,23 +144,23 @@ def sprung(chains: SpringChains, values: SpringValues, carrier: Floats) -> Float
         place = chains.rest[:, 0, :3, 3] @ head[:3, :3].T + head[:3, 3]
         moved = [place]
         for bone in range(joints - 1):
-            at_rest = turn @ beside[:, bone]
+            at_rest = turn @ relative[:, bone]
             goal = at_rest[..., 1]
             now = tail[:, bone]
             onward = (now - before[:, bone]) * (1.0 - values.drag[:, bone, None])
             pull = goal * values.stiffness[:, bone, None] + DOWN * values.gravity[:, bone, None]
             length = lengths[:, bone, None]
-            after = _held(now + onward + pull * step, place, length)
+            after = _at_length(now + onward + pull * step, place, length)
             _push_out(after, place, length, chains, values.hit_radius[:, bone], head)
             before[:, bone], tail[:, bone] = now, after
-            turn = turned_by(goal, (after - place) / length) @ at_rest
+            turn = rotations_between(goal, (after - place) / length) @ at_rest
             place = after
             moved.append(place)
         places[number] = (np.stack(moved, axis=1) - head[:3, 3]) @ head[:3, :3]
     return places
 
 
-def turns_to(rest: Floats, places: Floats) -> Floats:
+def rotations_towards(rest: Floats, places: Floats) -> Floats:
     """Rotations of joints that point at these places, each by the smallest rotation after its
     parent's.
 
@@ -170,33 +170,33 @@ def turns_to(rest: Floats, places: Floats) -> Floats:
     Returns:
         (frame_count, chains, joints, 3, 3); the last joint turns with the one before.
     """
-    beside = _beside_parents(rest)
+    relative = _relative_rotations(rest)
     directions = _unit(np.diff(places, axis=2))
     turn = np.broadcast_to(np.eye(3), (*places.shape[:2], 3, 3))
     turns = []
     for bone in range(rest.shape[1] - 1):
-        at_rest = turn @ beside[:, bone]
-        turn = turned_by(at_rest[..., 1], directions[:, :, bone]) @ at_rest
+        at_rest = turn @ relative[:, bone]
+        turn = rotations_between(at_rest[..., 1], directions[:, :, bone]) @ at_rest
         turns.append(turn)
     return np.stack([*turns, turn], axis=2)
 
 
-def chained(rest: Floats, targets: Floats) -> Floats:
+def with_bone_lengths(rest: Floats, targets: Floats) -> Floats:
     """The places nearest to targets (..., chains, joints, 3), joint by joint, that bones of the
     rest lengths reach.
     """
     lengths = np.linalg.norm(np.diff(rest[..., :3, 3], axis=1), axis=-1)
     places = [np.broadcast_to(rest[:, 0, :3, 3], targets.shape[:-2] + (3,))]
     for bone in range(rest.shape[1] - 1):
-        places.append(_held(targets[..., bone + 1, :], places[-1], lengths[:, bone, None]))
+        places.append(_at_length(targets[..., bone + 1, :], places[-1], lengths[:, bone, None]))
     return np.stack(places, axis=-2)
 
 
-def turned_by(one: Floats, other: Floats) -> Floats:
+def rotations_between(one: Floats, other: Floats) -> Floats:
     """The smallest rotations (..., 3, 3) that take unit vectors to others; Rodrigues' formula."""
     axis, cosine = np.cross(one, other), (one * other).sum(axis=-1)
     cross = cross_matrices(axis)
-    fraction = 1.0 / np.maximum(1.0 + cosine, _REVERSED)
+    fraction = 1.0 / np.maximum(1.0 + cosine, _MIN_COSINE_SUM)
     turn: Floats = np.eye(3) + cross + cross @ cross * fraction[..., None, None]
     return turn
 
@@ -205,39 +205,41 @@ def _push_out(
     tail: Floats, place: Floats, length: Floats, chains: SpringChains, reach: Floats, head: Floats
 ) -> None:
     """Push tails (chains, 3) out of the balls that they hit, one after the other, in place."""
-    balls = chains.balls
-    if not len(balls.radius):
+    colliders = chains.colliders
+    if not len(colliders.radius):
         return
     local = (tail - head[:3, 3]) @ head[:3, :3]
-    near = (balls.nearest(local)[1] < reach[:, None]) & chains.hits
+    near = (colliders.nearest(local)[1] < reach[:, None]) & chains.collides
     rows = np.flatnonzero(near.any(axis=1))
     if not len(rows):
         return
-    own, root = local[rows], (place[rows] - head[:3, 3]) @ head[:3, :3]
-    for number in range(len(balls.radius)):
-        one = Balls(*(each[number][None] for each in (balls.center, balls.tail, balls.radius)))
-        axis, distance = one.nearest(own)
+    local_tails, root = local[rows], (place[rows] - head[:3, 3]) @ head[:3, :3]
+    for number in range(len(colliders.radius)):
+        one = SpringColliders(
+            *(each[number][None] for each in (colliders.center, colliders.tail, colliders.radius))
+        )
+        axis, distance = one.nearest(local_tails)
         miss = distance[:, 0] - reach[rows]
-        hit = np.flatnonzero((miss < 0.0) & chains.hits[rows, number])
-        pushed = own[hit] - _unit(own[hit] - axis[hit, 0]) * miss[hit, None]
-        own[hit] = _held(pushed, root[hit], length[rows][hit])
-    tail[rows] = own @ head[:3, :3].T + head[:3, 3]
+        hit = np.flatnonzero((miss < 0.0) & chains.collides[rows, number])
+        pushed = local_tails[hit] - _unit(local_tails[hit] - axis[hit, 0]) * miss[hit, None]
+        local_tails[hit] = _at_length(pushed, root[hit], length[rows][hit])
+    tail[rows] = local_tails @ head[:3, :3].T + head[:3, 3]
 
 
-def _beside_parents(rest: Floats) -> Floats:
+def _relative_rotations(rest: Floats) -> Floats:
     """Rotations of joints at rest relative to the joint before, (chains, joints, 3, 3)."""
     turn = rest[..., :3, :3]
-    beside: Floats = turn.copy()
-    beside[:, 1:] = turn[:, :-1].swapaxes(-1, -2) @ turn[:, 1:]
-    return beside
+    relative: Floats = turn.copy()
+    relative[:, 1:] = turn[:, :-1].swapaxes(-1, -2) @ turn[:, 1:]
+    return relative
 
 
-def _held(tail: Floats, place: Floats, length: Floats) -> Floats:
+def _at_length(tail: Floats, place: Floats, length: Floats) -> Floats:
     """Tails moved along their direction from the place to this length (..., 1) from it."""
     return place + _unit(tail - place) * length
 
 
 def _unit(vectors: Floats) -> Floats:
     length = np.sqrt((vectors * vectors).sum(axis=-1, keepdims=True))
-    unit: Floats = vectors / np.maximum(length, _SHORTEST)
+    unit: Floats = vectors / np.maximum(length, _MIN_LENGTH)
     return unit

@@ -18,7 +18,7 @@ from ..strands.triangles import areas_of
 #: The direction from root to tip in all UVs: "auto" finds it, the others are known.
 type UvDirection = Literal["auto", "up", "down", "right", "left"]
 #: (axis, whether the root is where the coordinate is largest)
-_KNOWN: dict[str, tuple[int, bool]] = {
+_DIRECTIONS: dict[str, tuple[int, bool]] = {
     "up": (1, False),
     "down": (1, True),
     "right": (0, False),
@@ -26,11 +26,11 @@ _KNOWN: dict[str, tuple[int, bool]] = {
 }
 
 #: An island that is this many times longer along one axis decides for itself.
-_CLEAR_LENGTH = 2.0
+_CLEAR_LENGTH_RATIO = 2.0
 #: So does one whose ends differ by this, as a fraction of its length.
-_CLEAR_END = 0.3
+_CLEAR_END_DIFFERENCE = 0.3
 #: Differences of ends below this are no evidence.
-_NO_END = 0.05
+_MIN_END_DIFFERENCE = 0.05
 #: Weight of being higher, relative to being nearer to the head.
 _HEIGHT_WEIGHT = 0.2
 #: Fraction of an island's length that counts as one of its ends.
@@ -42,15 +42,15 @@ class UvAxes:
     """The direction of each island.
 
     axis: (island_count,) 0 where hair runs along u, 1 along v.
-    is_down: (island_count,) whether the root is where that coordinate is largest.
-    is_against: (island_count,) whether it runs in another direction than the others.
-    is_unsaid: (island_count,) whether the root end is unknown even from the others.
+    is_reversed: (island_count,) whether the root is where that coordinate is largest.
+    is_deviating: (island_count,) whether it runs in another direction than the others.
+    is_undecided: (island_count,) whether the root end is unknown even from the others.
     """
 
     axis: Ints
-    is_down: Bools
-    is_against: Bools
-    is_unsaid: Bools
+    is_reversed: Bools
+    is_deviating: Bools
+    is_undecided: Bools
 
 
 def uv_axes(
@@ -67,41 +67,41 @@ def uv_axes(
     """
     if direction != "auto":
         count = int(island.max()) + 1
-        known_axis, known_end = _KNOWN[direction]
-        nobody = np.zeros(count, bool)
-        return UvAxes(np.full(count, known_axis), np.full(count, known_end), nobody, nobody)
-    area = _sums(island, areas_of(corners))
+        known_axis, known_end = _DIRECTIONS[direction]
+        none = np.zeros(count, bool)
+        return UvAxes(np.full(count, known_axis), np.full(count, known_end), none, none)
+    area = _sums_by_island(island, areas_of(corners))
     lengths = _lengths(corners, uv, island)
     ratio = np.log(np.maximum(lengths[:, 1], 1e-12) / np.maximum(lengths[:, 0], 1e-12))
-    usual = int((area * ratio).sum() >= 0.0)
-    is_clear = np.abs(ratio) > np.log(_CLEAR_LENGTH)
-    axis = np.where(is_clear, (ratio > 0.0).astype(np.int64), usual)
+    most_common = int((area * ratio).sum() >= 0.0)
+    is_clear = np.abs(ratio) > np.log(_CLEAR_LENGTH_RATIO)
+    axis = np.where(is_clear, (ratio > 0.0).astype(np.int64), most_common)
 
     length = np.take_along_axis(lengths, axis[:, None], axis=1)[:, 0]
     end = _end_evidence(corners, uv, distance, island, axis) / np.maximum(length, 1e-12)
-    is_down = np.zeros(len(axis), bool)
-    is_against, is_unsaid = axis != usual, np.zeros(len(axis), bool)
+    is_reversed = np.zeros(len(axis), bool)
+    is_deviating, is_undecided = axis != most_common, np.zeros(len(axis), bool)
     for each in (0, 1):
         own = axis == each
         vote = float((area * np.clip(end, -1.0, 1.0))[own].sum())
-        is_strong = np.abs(end) > _CLEAR_END
-        is_down[own] = np.where(is_strong, end > 0.0, vote > 0.0)[own]
-        is_against |= own & is_strong & ((end > 0.0) != (vote > 0.0))
-        if abs(vote) <= _NO_END * float(area[own].sum()):
-            is_unsaid |= own & ~is_strong
-    return UvAxes(axis, is_down, is_against, is_unsaid & ~is_against)
+        is_strong = np.abs(end) > _CLEAR_END_DIFFERENCE
+        is_reversed[own] = np.where(is_strong, end > 0.0, vote > 0.0)[own]
+        is_deviating |= own & is_strong & ((end > 0.0) != (vote > 0.0))
+        if abs(vote) <= _MIN_END_DIFFERENCE * float(area[own].sum()):
+            is_undecided |= own & ~is_strong
+    return UvAxes(axis, is_reversed, is_deviating, is_undecided & ~is_deviating)
 
 
 def coordinate_gradients(corners: Floats, uv: Floats) -> Floats:
     """Derivatives of the position by u and by v, (triangle_count, 2, 3) [m]; 0 where UVs have no
     area."""
-    one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    first, second = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
-    area = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
-    by = np.divide(1.0, area, out=np.zeros_like(area), where=np.abs(area) > 1e-14)
-    along_u = one * second[:, 1:] - two * first[:, 1:]
-    along_v = two * first[:, :1] - one * second[:, :1]
-    gradients: Floats = np.stack([along_u, along_v], axis=1) * by[:, None, None]
+    edge_1, edge_2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    uv_edge_1, uv_edge_2 = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
+    area = uv_edge_1[:, 0] * uv_edge_2[:, 1] - uv_edge_1[:, 1] * uv_edge_2[:, 0]
+    inverse = np.divide(1.0, area, out=np.zeros_like(area), where=np.abs(area) > 1e-14)
+    along_u = edge_1 * uv_edge_2[:, 1:] - edge_2 * uv_edge_1[:, 1:]
+    along_v = edge_2 * uv_edge_1[:, :1] - edge_1 * uv_edge_2[:, :1]
+    gradients: Floats = np.stack([along_u, along_v], axis=1) * inverse[:, None, None]
     return gradients
 
 
@@ -118,8 +118,10 @@ def _lengths(corners: Floats, uv: Floats, island: Ints) -> Floats:
     """Lengths of each island along u and along v, (island_count, 2) [m]."""
     speed = np.linalg.norm(coordinate_gradients(corners, uv), axis=2)
     weight = areas_of(corners) * (speed > 0.0).all(axis=1)
-    total = np.maximum(_sums(island, weight), 1e-30)
-    mean = np.stack([_sums(island, weight * speed[:, axis]) / total for axis in (0, 1)], axis=1)
+    total = np.maximum(_sums_by_island(island, weight), 1e-30)
+    mean = np.stack(
+        [_sums_by_island(island, weight * speed[:, axis]) / total for axis in (0, 1)], axis=1
+    )
     low, high = island_bounds(uv, island)
     lengths: Floats = mean * (high - low)
     return lengths
@@ -130,20 +132,24 @@ def _end_evidence(
 ) -> Floats:
     """How much nearer to the head, and higher, the end of large coordinates is, (island_count,)
     [m]."""
-    own = axis[island]
-    coordinate = np.take_along_axis(uv, own[:, None, None], axis=2)[:, :, 0]
+    corner_axis = axis[island]
+    coordinate = np.take_along_axis(uv, corner_axis[:, None, None], axis=2)[:, :, 0]
     low, high = island_bounds(coordinate, island)
     size = np.maximum(high - low, 1e-12)[island, None]
     fraction = ((coordinate - low[island, None]) / size).ravel()
-    whose = np.repeat(island, 3)
+    corner_island = np.repeat(island, 3)
     nearness = (_HEIGHT_WEIGHT * corners[:, :, 2] - distance).ravel()
     ends = []
     for is_end in (fraction <= _END_FRACTION, fraction >= 1.0 - _END_FRACTION):
-        count = np.maximum(_sums(whose, is_end.astype(np.float64), len(axis)), 1.0)
-        ends.append(_sums(whose, np.where(is_end, nearness, 0.0), len(axis)) / count)
+        count = np.maximum(
+            _sums_by_island(corner_island, is_end.astype(np.float64), len(axis)), 1.0
+        )
+        ends.append(
+            _sums_by_island(corner_island, np.where(is_end, nearness, 0.0), len(axis)) / count
+        )
     difference: Floats = ends[1] - ends[0]
     return difference
 
 
-def _sums(island: Ints, values: Floats, count: int = 0) -> Floats:
+def _sums_by_island(island: Ints, values: Floats, count: int = 0) -> Floats:
     return np.bincount(island, values, minlength=count)

@@ -23,7 +23,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..cards.atlas_maps import AtlasMaps
-from ..cards.bake import SAMPLES, Block, blocks_of, min_one_sample
+from ..cards.bake import SAMPLES, Block, atlas_blocks, with_min_width
 from ..cards.bake_strands import FlatStrands
 from ..cards.steps import result_of
 from . import gpu_objects
@@ -79,7 +79,7 @@ def baked_maps(flat: FlatStrands, size: int) -> AtlasMaps:
 
 
 def baking(flat: FlatStrands, size: int) -> Generator[None, None, AtlasMaps]:
-    """Bake the maps of an atlas, one block per step; zero where no strand is, as in sampled_maps.
+    """Bake the maps of an atlas, one block per step; zero where no strand is, as in sample_maps.
 
     Args:
         size: of the atlas [pixels].
@@ -90,7 +90,7 @@ def baking(flat: FlatStrands, size: int) -> Generator[None, None, AtlasMaps]:
     texels = np.zeros((4, size, size, 4), np.float32)
     if len(flat):
         for block, made in _blocks(_Bake.of(flat, size)):
-            rows = slice(block.low, block.low + block.height)
+            rows = slice(block.bottom, block.bottom + block.height)
             texels[:, rows, block.left : block.left + block.width] = made
             yield
     place, base, tangent, normal = texels
@@ -123,7 +123,7 @@ class _Bake:
 
     @classmethod
     def of(cls, flat: FlatStrands, size: int) -> _Bake:
-        half, fraction = min_one_sample(flat, size)
+        half, fraction = with_min_width(flat, size)
         number = np.broadcast_to(flat.strand_id[:, None], fraction.shape)
         values = (
             np.concatenate([flat.place, half], axis=-1),
@@ -140,7 +140,7 @@ class _Bake:
 
 def _blocks(bake: _Bake) -> Iterator[tuple[Block, Floats]]:
     """The blocks that have hair, each with its texels (4, height, width, 4)."""
-    blocks = blocks_of(bake.size)
+    blocks = atlas_blocks(bake.size)
     width, height = blocks[0].width, blocks[0].height
     shape = blocks[0].samples_across, height * SAMPLES
     samples = {name: _texture(*shape, "RGBA16F") for name in _SAMPLES_OF}
@@ -149,7 +149,7 @@ def _blocks(bake: _Bake) -> Iterator[tuple[Block, Floats]]:
     texels = {name: _texture(width, height, "RGBA32F") for name in _TEXELS_OF}
     ribbon = _ribbon(bake.flat.place.shape[1])
     for block in blocks:
-        reached = block.reached(bake.flat, bake.half, bake.size)
+        reached = block.overlapping(bake.flat, bake.half, bake.size)
         if len(reached):
             first, last = int(reached[0]), int(reached[-1])
             with drawing_into(target), drawing_state(depth_test="LESS_EQUAL"):
@@ -170,9 +170,9 @@ def _bound(bake: _Bake, block: Block, shape: tuple[int, int], first_strand: int)
     integers = {"cv_count": bake.flat.place.shape[1], "first_strand": first_strand}
     if bake.is_sparse:
         integers["first_column"] = block.left * SAMPLES
-        integers["first_row"] = block.low * SAMPLES
+        integers["first_row"] = block.bottom * SAMPLES
     numbers = {
-        "block_start": (block.left, block.low),
+        "block_start": (block.left, block.bottom),
         "atlas_size": float(bake.size),
         "block_samples": shape,
     }

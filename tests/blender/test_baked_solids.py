@@ -163,7 +163,7 @@ def test_exported_cards_are_led_out_too(swinging, get_depsgraph):
     list(Bake.of([hair], bpy.context.scene).steps())
     motion = BakedGuides.of(hair)
     moved = result_of(moved_cards(motion, [mesh], space="world", with_directions=False))
-    places = moved.tracks.moved[0]
+    places = moved.tracks.moved_positions[0]
     middles = np.array([motion.at(frame)[0].matrix[:3, 3] for frame in motion.frames])
     depth = RADIUS - np.linalg.norm(places - middles, axis=2).min()
     assert depth < flat + 0.0005

@@ -57,7 +57,7 @@ def test_no_card_enters_a_head_deeper_than_at_rest() -> None:
     solids = (PosedCollider(field, np.eye(4), np.eye(4)),)
     carried = carried_cards(cards, guides, turns)
     contacts = CardContacts(
-        solids, CardClearance.at(*carried, cards.row, cards.offsets, solids, KEPT)
+        solids, CardClearance.measure(*carried, cards.row_of_vertex, cards.offsets, solids, KEPT)
     )
     # all strands fall to the left, many through the head
     fall = guides[:, :1] + along * np.array([-0.8, 0.1, -0.6], np.float32)

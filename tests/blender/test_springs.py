@@ -21,10 +21,10 @@ from hairloom.addon.blender.bakes.guide_motion import GuideMotion  # noqa: E402
 from hairloom.addon.blender.cards.files import WrittenCards  # noqa: E402
 from hairloom.addon.blender.scene.bone_weights import head_bone_of  # noqa: E402
 from hairloom.addon.cards.spring_bones import (  # noqa: E402
-    Balls,
     SpringChains,
+    SpringColliders,
     SpringValues,
-    sprung,
+    simulate_springs,
 )
 from hairloom.addon.errors import HairloomError  # noqa: E402
 from hairloom.addon.exchange.cards.glb_file import GlbFile  # noqa: E402
@@ -88,13 +88,13 @@ def sprung_as_told(springs_entry: dict[str, Any], path: Path, carrier: np.ndarra
     shapes = [each["sphere"] for each in springs_entry["colliders"]]
     root = to_blender(np.array(springs_entry["root_place"]))
     centers = to_blender(np.array([each["offset"] for each in shapes])) + root
-    balls = Balls.of(centers, np.array([each["radius"] for each in shapes]))
+    balls = SpringColliders.spheres(centers, np.array([each["radius"] for each in shapes]))
     hits = np.zeros((len(rest), len(shapes)), bool)
     for number, spring in enumerate(springs_entry["springs"]):
         hits[number, spring["colliders"]] = True
     names = ("stiffness", "drag", "gravity", "hit_radius")
     values = [np.array([each[name] for each in springs_entry["springs"]]) for name in names]
-    return sprung(SpringChains(rest, balls, hits), SpringValues(*values), carrier)
+    return simulate_springs(SpringChains(rest, balls, hits), SpringValues(*values), carrier)
 
 
 def test_motion_by_three_vrm_is_close_to_the_bake(

@@ -20,7 +20,7 @@ from test_springs import sprung_as_told
 from three_springs import MODULE, head_matrices, to_z_up
 
 from hairloom.addon.blender.bakes.guide_motion import GuideMotion
-from hairloom.addon.cards.spring_bones import STEP_RATE, stepped
+from hairloom.addon.cards.spring_bones import STEP_RATE, resampled_to_steps
 from hairloom.addon.exchange.cards.glb_file import GlbFile
 from hairloom.addon.exchange.cards.glb_skin import add_head_bone
 
@@ -41,7 +41,7 @@ def springs(motion: GuideMotion) -> dict[str, Any]:  # noqa: F811
     glb = OUTPUT / "asset" / "hair.glb"
     glb.parent.mkdir(parents=True)
     told = dict(write(glb, motion, kind="springs", spring_joints=40).motion)
-    carrier = stepped(np.stack([head_matrix(motion, n) for n in range(FRAMES)]), RATE)
+    carrier = resampled_to_steps(np.stack([head_matrix(motion, n) for n in range(FRAMES)]), RATE)
     (OUTPUT / "poses.json").write_text(json.dumps({"matrices": head_matrices(carrier)}))
     ours = sprung_as_told(told, glb, carrier)
     ours = ours.reshape(len(ours), -1, 3)

@@ -10,8 +10,8 @@ import pytest
 from gpu_rounding import SUBPIXEL, tolerance
 
 from hairloom.addon.cards import bake
-from hairloom.addon.cards.atlas_maps import MAPS
-from hairloom.addon.cards.bake import Block, fibre_normal, is_counted, sampled_maps
+from hairloom.addon.cards.atlas_maps import MAP_NAMES
+from hairloom.addon.cards.bake import Block, fibre_normal, is_counted, sample_maps
 from hairloom.addon.cards.bake_strands import FlatStrands
 
 pytestmark = pytest.mark.usefixtures("gpu_context")
@@ -59,13 +59,13 @@ def wavy(count: int, half: float, seed: int = 0) -> FlatStrands:
 def test_the_pass_agrees_with_the_reference(baked_maps: Any, size: int, half: float) -> None:
     """Except for samples on an edge, and for half-float rounding."""
     flat = wavy(12, half)
-    ours, reference = baked_maps(flat, size), sampled_maps(flat, size)
+    ours, reference = baked_maps(flat, size), sample_maps(flat, size)
     assert ours.base_gain == reference.base_gain == 1.5
     differs = np.abs(ours.alpha - reference.alpha) > 1e-6
     assert differs.mean() < 0.01
     assert np.abs(ours.alpha - reference.alpha).max() <= 2 / 16
     assert reference.alpha.mean() > 0.01
-    for name in MAPS:
+    for name in MAP_NAMES:
         apart = np.abs(getattr(ours, name) - getattr(reference, name))
         assert np.quantile(apart[~differs], 0.999) < tolerance(2e-3, SUBPIXEL), name
 
@@ -74,13 +74,13 @@ def test_blocks_join_without_a_seam(baked_maps: Any, monkeypatch: pytest.MonkeyP
     """Many small blocks, with lower ones at the top, give the same as one."""
     flat, size = wavy(12, 0.02), 80
     whole = baked_maps(flat, size)
-    monkeypatch.setattr(bake, "_MAX_ACROSS", 40)
+    monkeypatch.setattr(bake, "_MAX_BLOCK_WIDTH", 40)
     monkeypatch.setattr(bake, "_MAX_SAMPLES", 40 * 16 * 24)
-    assert len(bake.blocks_of(size)) == 8
+    assert len(bake.atlas_blocks(size)) == 8
     parted = baked_maps(flat, size)
     differs = np.abs(parted.alpha - whole.alpha) > 1e-6
     assert differs.mean() < 0.002
-    for name in MAPS:
+    for name in MAP_NAMES:
         apart = np.abs(getattr(parted, name) - getattr(whole, name))
         assert np.quantile(apart[~differs], 0.999) < 2e-3, name
 
@@ -93,7 +93,7 @@ def test_thin_strands_cover_as_much_as_they_are_wide(baked_maps: Any) -> None:
     half = np.zeros_like(place)
     half[..., 0] = 0.01 / 128
     flat = wavy(40, 0.01)
-    thin = replace(flat, place=place, half=half)
+    thin = replace(flat, place=place, half_width=half)
     assert baked_maps(thin, 128).alpha.mean() == pytest.approx(40 * 0.02 / 128, rel=0.05)
 
 
@@ -120,5 +120,5 @@ def test_functions_agree_with_their_twins(compute: Any) -> None:
     column, row, strand = np.moveaxis(numbers[..., :3].astype(np.int64), -1, 0)
     counted = is_counted(column, row, strand, numbers[..., 3])
     np.testing.assert_array_equal(found[..., 0] > 0.5, counted)
-    places = Block(64, 32, 128, 128).leaning(numbers[..., :2] / 16384.0, 512)
+    places = Block(64, 32, 128, 128).sheared(numbers[..., :2] / 16384.0, 512)
     np.testing.assert_allclose(found[..., 1:3], places, rtol=1e-5, atol=1e-3)

@@ -132,8 +132,10 @@ def sort_steps(
         shading = occlusion_steps(mesh, occluders, bodies, options.occlusion)
         openness = yield from map_progress(shading, lambda fraction: (1.0 + fraction) / 2.0)
         corner = np.zeros(len(obj.data.loops), np.int32)
-        corner[source.corner] = source.cards.corner
-        problems += _write_occlusion(obj.data, source.cards.vertex, corner, openness, mesh.along)
+        corner[source.corner] = source.cards.corner_vertex
+        problems += _write_occlusion(
+            obj.data, source.cards.source_vertex, corner, openness, mesh.along
+        )
     notes += problems
     moved = reorder_faces(obj.data, _face_order(source.polygon[order]))
     return SortedCards(mesh.card_count, len(obj.data.polygons), moved, tuple(notes))

@@ -18,10 +18,10 @@ import numpy as np
 from ...arrays import Floats
 from ...card_flow import bound_cards, card_build_steps, card_groom, cards_at
 from ...cards.atlas import AtlasPlan
-from ...cards.atlas_depth import places_in_depth
+from ...cards.atlas_depth import relative_depths
 from ...cards.atlas_maps import AtlasMaps, dilated
 from ...cards.atlas_settings import AtlasSettings
-from ...cards.bake import sampled_maps
+from ...cards.bake import sample_maps
 from ...cards.bake_strands import FlatStrands, flat_strands
 from ...cards.build import CardBuild
 from ...cards.drawing_settings import CardDrawingSettings
@@ -277,7 +277,7 @@ def card_maps(inputs: CardInputs, build: CardBuild, draw: AtlasDraw) -> CardMaps
     gain = 1.0 if "base" in pictures else maps.base_gain
     names = ("alpha", "shift", "noise", "tangent", "normal")
     shown = {name: by_name[name] for name in names}
-    textures = HairTextures(base=by_name["base"] * gain, **shown, place=maps.place)
+    textures = HairTextures(base=by_name["base"] * gain, **shown, place=maps.relative_depth)
     return CardMaps(
         by_name,
         textures,
@@ -300,13 +300,13 @@ def _card_color(rig: Rig) -> Floats | None:
 
 def drawn_maps(flat: FlatStrands, size: int) -> AtlasMaps:
     """The maps of flat strands, drawn on the GPU if there is one; for the main thread."""
-    return baked_maps(flat, size) if has_gpu() else sampled_maps(flat, size)
+    return baked_maps(flat, size) if has_gpu() else sample_maps(flat, size)
 
 
 def drawing_maps(flat: FlatStrands, size: int) -> Generator[None, None, AtlasMaps]:
     """As `drawn_maps`, in steps."""
     if not has_gpu():
-        return sampled_maps(flat, size)
+        return sample_maps(flat, size)
     return (yield from baking(flat, size))
 
 
@@ -333,7 +333,7 @@ def baked_atlas(
         return dilated(draw(flat, plan.size), plan.grid)
     flat = flat_strands(plan, grid, groom.radius, colors)
     maps = dilated(draw(flat, plan.size), plan.grid)
-    return replace(maps, place=places_in_depth(maps, flat, plan))
+    return replace(maps, relative_depth=relative_depths(maps, flat, plan))
 
 
 def has_gpu() -> bool:

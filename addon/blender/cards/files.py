@@ -306,7 +306,7 @@ class _Writer:
                 self._fitting(moved.tracks, motion.rig.head),
                 lambda fraction: (f"Fitting {kind}", fraction),
             )
-        self.motion = skeleton.facts
+        self.motion = skeleton.sidecar_section
         yield "Writing", None
         return (*skeleton.notes, *self._write(levels, backs, skeleton=skeleton))
 
@@ -332,7 +332,7 @@ class _Writer:
         yield "Writing", None
         texture = TextureMotion.of(moved, settings, self.file_format, str(self.path))
         with self.stage("write motion texture"):
-            self.motion = texture.facts(texture.write(self.path))
+            self.motion = texture.sidecar_section(texture.write(self.path))
         return self._write(levels, backs, texture.texels)
 
     @property

@@ -13,10 +13,10 @@ from ...arrays import Floats
 from ...card_flow import CardMeasure, bound_cards, cards_at
 from ...cards.card_mesh import CardMesh
 from ...cards.export_settings import CardExportSettings
-from ...cards.joint_keys import between_keys, chain_keys, keys_of
-from ...cards.joint_solve import rigid_fits
+from ...cards.joint_keys import chain_keys, interpolate_keys, reduce_keys
+from ...cards.joint_solve import fit_rigid_motions
 from ...cards.joints import CardTracks, FitError, joint_steps, keyed_error
-from ...cards.spring_bones import Balls
+from ...cards.spring_bones import SpringColliders
 from ...cards.spring_chains import spring_steps
 from ...cards.steps import result_of
 from ...cards.vertex_animation import (
@@ -43,15 +43,15 @@ from ..base.images import write_texture
 _KEY_FRACTION = 0.5
 #: Number of balls that approximate the head; error of springs that is reported, as a fraction of
 #: the hair's length.
-HEAD_BALLS = 12
+HEAD_SPHERE_COUNT = 12
 SPRING_ERROR = 0.1
 #: Minimum number of frames: a single one holds no motion.
-_FEWEST_FRAMES = 2
+_MIN_FRAMES = 2
 
 
 @dataclass(frozen=True, eq=False)
 class MovedCards:
-    """Cards in all frames. normals, tangents: as `CardTracks.moved`, if requested.
+    """Cards in all frames. normals, tangents: as `CardTracks.moved_positions`, if requested.
 
     figures: of the finest level.
     """
@@ -70,7 +70,7 @@ def check_motion(
     Raises:
         HairloomError: a single frame, or a format that cannot store such motion.
     """
-    if len(motion.frames) < _FEWEST_FRAMES:
+    if len(motion.frames) < _MIN_FRAMES:
         raise HairloomError(
             "motion needs more than one frame",
             place="frame range",
@@ -112,7 +112,7 @@ def moved_cards(
     for number, frame in enumerate(motion.frames):
         pose, guides = motion.at(frame)
         now = guides[:, :1].astype(np.float64)
-        turn, translation = rigid_fits(roots, now, np.ones(len(roots)), turn)
+        turn, translation = fit_rigid_motions(roots, now, np.ones(len(roots)), turn)
         carrier[number, :3, :3], carrier[number, :3, 3] = turn[0], translation[0]
         back = np.eye(4) if space == "world" else carrier[number]
         for level, binding in enumerate(bound):
@@ -158,7 +158,7 @@ class JointMotion:
     @property
     def relative_error(self) -> float:
         """The error as a fraction of the hair's length."""
-        return self.error.mean_square_root / self.tracks.hair_length
+        return self.error.root_mean_square / self.tracks.hair_length
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -168,12 +168,12 @@ class JointMotion:
             return ()
         return (
             f"Joints are off by {self.relative_error:.1%} of the hair's length (root mean square; "
-            f"the worst by {self.error.worst / self.tracks.hair_length:.1%}), more than the "
+            f"the worst by {self.error.maximum / self.tracks.hair_length:.1%}), more than the "
             f"{wanted:.1%} allowed. Allow more chains, or more joints in each.",
         )
 
     @property
-    def facts(self) -> dict[str, Any]:
+    def sidecar_section(self) -> dict[str, Any]:
         return joint_motion(self.tracks, self.skeleton, self.error, self.settings.motion_space)
 
     def complete(self, path: Path, nodes: Sequence[str]) -> None:
@@ -191,7 +191,7 @@ def joint_motion_steps(
     rig = yield from joint_steps(tracks, settings)
     keys = result_of(chain_keys(rig, allowed))
     yield 0.95
-    turn, place = zip(*(between_keys(each, tracks.frame_count) for each in keys), strict=True)
+    turn, place = zip(*(interpolate_keys(each, tracks.frame_count) for each in keys), strict=True)
     error = keyed_error(tracks, rig, np.stack(turn), np.stack(place))
     root_keys = None
     if settings.motion_space == "world":
@@ -199,7 +199,7 @@ def joint_motion_steps(
         size = np.ptp(tracks.levels[0].positions, axis=0).max()
         reach = np.array([float(size)])
         # relative to the root joint's rest, which is a translation only
-        root_keys = keys_of(tracks.carrier[None, :, :3, :3], carried[None], reach, allowed)
+        root_keys = reduce_keys(tracks.carrier[None, :, :3, :3], carried[None], reach, allowed)
     skeleton = Skeleton(rig, keys, tracks.root, root_keys, tracks.frame_rate)
     yield 1.0
     return JointMotion(tracks, skeleton, error, settings)
@@ -214,7 +214,7 @@ class SpringMotion:
     notes: tuple[str, ...]
 
     @property
-    def facts(self) -> dict[str, Any]:
+    def sidecar_section(self) -> dict[str, Any]:
         return spring_motion(self.tracks, self.skeleton, self.skeleton.rig.error)
 
     def complete(self, path: Path, nodes: Sequence[str]) -> None:
@@ -236,29 +236,29 @@ def spring_motion_steps(
     Args:
         bone: the one that carries the head; None where there is none.
     """
-    balls, notes = _head_balls(head, place)
-    rig = yield from spring_steps(tracks, settings.spring_joints, balls)
+    colliders, notes = _head_colliders(head, place)
+    rig = yield from spring_steps(tracks, settings.spring_joints, colliders)
     skeleton = SpringSkeleton(rig, tracks.root, bone)
-    most = rig.error.most / tracks.hair_length
-    if most > SPRING_ERROR:
+    error = rig.error.percentile_99 / tracks.hair_length
+    if error > SPRING_ERROR:
         notes += (
-            f"Springs are off by up to {most:.0%} of the hair's length (99% of all vertices): "
+            f"Springs are off by up to {error:.0%} of the hair's length (99% of all vertices): "
             "engines will move this hair differently from the bake. Allow more spring joints, or "
             "choose joints.",
         )
     return SpringMotion(tracks, skeleton, notes)
 
 
-def _head_balls(head: Surface | None, place: str) -> tuple[Balls, tuple[str, ...]]:
+def _head_colliders(head: Surface | None, place: str) -> tuple[SpringColliders, tuple[str, ...]]:
     """The balls that springs stay out of, and a note if there are none."""
-    nothing = Balls.of(np.empty((0, 3)), np.empty(0))
+    nothing = SpringColliders.spheres(np.empty((0, 3)), np.empty(0))
     if head is None:
         return nothing, ("This hair has no head, so its springs collide with nothing.",)
     try:
-        fit = fit_spheres(head, SphereFitSettings(sphere_count=HEAD_BALLS), place=place)
+        fit = fit_spheres(head, SphereFitSettings(sphere_count=HEAD_SPHERE_COUNT), place=place)
     except HairloomError as error:
         return nothing, (f"{error} Until then springs collide with nothing.",)
-    return Balls.of(fit.centers, fit.radii), ()
+    return SpringColliders.spheres(fit.centers, fit.radii), ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -307,7 +307,7 @@ class TextureMotion:
         """The offsets of each level's vertices from rest, (vertex_count, frame_count, 3) [m]."""
         tracks = self.moved.tracks
         rests = [mesh.positions[:, None] for mesh in tracks.levels]
-        return [now - rest for now, rest in zip(tracks.moved, rests, strict=True)]
+        return [now - rest for now, rest in zip(tracks.moved_positions, rests, strict=True)]
 
     @property
     def error(self) -> FitError:
@@ -316,10 +316,14 @@ class TextureMotion:
         misses = [rounding(each * scale, depth) / scale for each in self._offsets]
         return FitError.of([np.linalg.norm(miss, axis=-1).ravel() for miss in misses])
 
-    def facts(self, files: dict[str, str]) -> dict[str, Any]:
+    def sidecar_section(self, files: dict[str, str]) -> dict[str, Any]:
         tracks = self.moved.tracks
-        low: Floats = np.stack([each.min(axis=(0, 1)) for each in tracks.moved]).min(axis=0)
-        high: Floats = np.stack([each.max(axis=(0, 1)) for each in tracks.moved]).max(axis=0)
+        low: Floats = np.stack([each.min(axis=(0, 1)) for each in tracks.moved_positions]).min(
+            axis=0
+        )
+        high: Floats = np.stack([each.max(axis=(0, 1)) for each in tracks.moved_positions]).max(
+            axis=0
+        )
         return texture_motion(
             tracks,
             self.file_format,

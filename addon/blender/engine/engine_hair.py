@@ -17,7 +17,7 @@ import numpy as np
 
 from ...arrays import Floats, are_same
 from ...cards.edits import CardEdits
-from ...cards.follow import moved_mesh
+from ...cards.follow import transformed_mesh
 from ...cards.occlusion_settings import CardOcclusionSettings
 from ...errors import HairloomError
 from ...groom.painted_color import PaintedColor
@@ -247,7 +247,7 @@ def placed(snapshot: Snapshot, motion: Floats) -> Snapshot:
         back, depth = cards.back_triangles, cards.depth
         cards = replace(
             cards,
-            mesh=moved_mesh(cards.mesh, motion),
+            mesh=transformed_mesh(cards.mesh, motion),
             back_triangles=back[:, ::-1] if is_mirrored and back is not None else back,
             openness=_placed_light(cards.openness, is_mirrored),
             skin_seen=_placed_light(cards.skin_seen, is_mirrored),

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...arrays import Floats, Ints
 from ...cards.card_mesh import CardMesh
-from ...cards.joint_keys import ChainKeys, beside_parent, quaternions
+from ...cards.joint_keys import ChainKeys, quaternions, relative_to_parent
 from ...cards.joint_solve import Skin
 from ...cards.joints import JointRig, joint_names
 from ...errors import HairloomError
@@ -182,7 +182,7 @@ def _add_joints(file: GlbFile, rest: Floats, root: Floats) -> list[int]:
         parents = [at_root, *chain[:-1]]
         parent_node: dict[str, Any] = first
         for parent, own in zip(parents, chain, strict=True):
-            local = beside_parent(parent, own)
+            local = relative_to_parent(parent, own)
             node = {
                 "name": next(names),
                 "translation": _vector(local[:3, 3]),
@@ -249,8 +249,8 @@ def _add_animation(file: GlbFile, skeleton: Skeleton, joints: list[int]) -> None
         for joint, node in enumerate(nodes):
             rotations, translations = keys.rotation[joint], keys.translation[joint]
             translations = translations if joint else translations - parent
-            add(node, "rotation", keys.frame, _rotations(rotations), "VEC4")
-            add(node, "translation", keys.frame, GLB.to_file_space(translations), "VEC3")
+            add(node, "rotation", keys.frames, _rotations(rotations), "VEC4")
+            add(node, "translation", keys.frames, GLB.to_file_space(translations), "VEC3")
     animation = {"name": ANIMATION, "samplers": samplers, "channels": channels}
     file.append("animations", animation)
 

@@ -13,7 +13,7 @@ from typing import Any
 from ...arrays import Floats
 from ...cards.card_mesh import CardMesh
 from ...cards.joints import joint_names
-from ...cards.spring_bones import DOWN, Balls
+from ...cards.spring_bones import DOWN, SpringColliders
 from ...cards.spring_chains import SpringRig
 from .card_formats import GLB
 from .glb_file import GlbFile
@@ -85,13 +85,13 @@ def spring_list(rig: SpringRig) -> list[dict[str, Any]]:
             "drag": _rounded(values.drag[chain]),
             "gravity": _rounded(values.gravity[chain]),
             "hit_radius": _rounded(values.hit_radius[chain]),
-            "colliders": [int(number) for number in chains.hits[chain].nonzero()[0]],
+            "colliders": [int(number) for number in chains.collides[chain].nonzero()[0]],
         }
         for chain in range(count)
     ]
 
 
-def collider_list(balls: Balls, root: Floats) -> list[dict[str, Any]]:
+def collider_list(balls: SpringColliders, root: Floats) -> list[dict[str, Any]]:
     """Balls and capsules, in the space of the root joint."""
     shapes: list[dict[str, Any]] = []
     for center, tail, radius in zip(balls.center, balls.tail, balls.radius, strict=True):
@@ -108,7 +108,7 @@ def collider_list(balls: Balls, root: Floats) -> list[dict[str, Any]]:
 def _extension(skeleton: SpringSkeleton, joints: list[int]) -> dict[str, Any]:
     """joints: nodes, the root first."""
     rig, root = skeleton.rig, joints[0]
-    shapes = collider_list(rig.chains.balls, skeleton.root)
+    shapes = collider_list(rig.chains.colliders, skeleton.root)
     node = dict(zip(joint_names(*rig.chains.rest.shape[:2]), joints[1:], strict=True))
     springs = [
         {

@@ -134,9 +134,9 @@ def texture_motion(
 def _error(error: FitError, tracks: CardTracks, scale: float) -> dict[str, float]:
     """The errors in a file with `scale` units in a metre."""
     return {
-        "root_mean_square": error.mean_square_root * scale,
-        "percentile_99": error.most * scale,
-        "worst": error.worst * scale,
+        "root_mean_square": error.root_mean_square * scale,
+        "percentile_99": error.percentile_99 * scale,
+        "worst": error.maximum * scale,
         "hair_length": tracks.hair_length * scale,
     }
 
@@ -144,7 +144,7 @@ def _error(error: FitError, tracks: CardTracks, scale: float) -> dict[str, float
 def _common(tracks: CardTracks, space: str) -> dict[str, Any]:
     return {
         "frames": {
-            "first": tracks.first,
+            "first": tracks.first_frame,
             "count": tracks.frame_count,
             "rate": tracks.frame_rate,
         },

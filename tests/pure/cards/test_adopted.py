@@ -49,7 +49,7 @@ def as_source(mesh: CardMesh, uv: np.ndarray | None = None) -> Surface:
 def source_corners(adopted: AdoptedCards) -> tuple[np.ndarray, np.ndarray]:
     """Positions and UVs that adoption gave to the corners of the source's triangles."""
     mesh = adopted.mesh
-    return mesh.positions[adopted.corner], mesh.uv[adopted.corner]
+    return mesh.positions[adopted.corner_vertex], mesh.uv[adopted.corner_vertex]
 
 
 #: direction of hair on the texture -> conversion of our UVs into it; "up": roots are below
@@ -69,12 +69,12 @@ def test_our_own_cards_are_understood_whichever_way_they_lie(laid: str, stands: 
     adopted = adopt_cards(source, ball(), place="test")
     found = adopted.mesh
     assert adopted.notes == ()
-    np.testing.assert_allclose(found.along, mesh.along[adopted.vertex], atol=1e-5)
-    ahead = np.einsum("ij,ij->i", found.tangent, mesh.tangent[adopted.vertex])
+    np.testing.assert_allclose(found.along, mesh.along[adopted.source_vertex], atol=1e-5)
+    ahead = np.einsum("ij,ij->i", found.tangent, mesh.tangent[adopted.source_vertex])
     assert ahead.min() > 0.9 and np.median(ahead) > 0.99
     assert found.card_count == 24
     if not stands:
-        facing = np.einsum("ij,ij->i", found.normal, mesh.normal[adopted.vertex])
+        facing = np.einsum("ij,ij->i", found.normal, mesh.normal[adopted.source_vertex])
         assert facing.min() > 0.9
     known = adopt_cards(source, None, direction=laid, place="test")  # type: ignore[arg-type]
     np.testing.assert_allclose(known.mesh.along, found.along, atol=1e-6)
@@ -103,7 +103,7 @@ def test_cards_whose_root_nothing_tells_are_said_to_be_such() -> None:
 def test_without_a_head_the_higher_end_is_the_root() -> None:
     mesh = hanging()
     adopted = adopt_cards(as_source(mesh), None, place="test")
-    np.testing.assert_allclose(adopted.mesh.along, mesh.along[adopted.vertex], atol=1e-5)
+    np.testing.assert_allclose(adopted.mesh.along, mesh.along[adopted.source_vertex], atol=1e-5)
     assert len(adopted.notes) == 1 and "no head" in adopted.notes[0]
 
 
@@ -121,7 +121,7 @@ def test_a_card_that_leads_back_to_the_head_is_told_by_the_others() -> None:
         np.concatenate([mesh.uv[mesh.triangles], other.uv[other.triangles]]),
     )
     adopted = adopt_cards(source, ball(), place="test")
-    expected = np.concatenate([mesh.along, other.along])[adopted.vertex]
+    expected = np.concatenate([mesh.along, other.along])[adopted.source_vertex]
     np.testing.assert_allclose(adopted.mesh.along, expected, atol=1e-5)
 
 
@@ -141,7 +141,7 @@ def test_cards_that_face_the_head_are_turned_and_those_at_odds_are_noted() -> No
     adopted = adopt_cards(replaced(mesh, at_odds), ball(), place="test")
     assert adopted.notes == ("The faces of 1 card do not all point to the same side",)
     np.testing.assert_array_equal(
-        np.sort(adopted.mesh.triangles, axis=1), np.sort(adopted.corner, axis=1)
+        np.sort(adopted.mesh.triangles, axis=1), np.sort(adopted.corner_vertex, axis=1)
     )
 
 
@@ -156,8 +156,8 @@ def test_a_seam_of_the_uvs_does_not_divide_a_card() -> None:
     corner_uv[right, :, 0] += 0.3
     adopted = adopt_cards(replace(as_source(mesh), corner_uv=corner_uv), ball(), place="test")
     assert adopted.mesh.card_count == 1
-    assert len(adopted.vertex) > len(mesh.positions)
-    np.testing.assert_allclose(adopted.mesh.along, mesh.along[adopted.vertex], atol=1e-5)
+    assert len(adopted.source_vertex) > len(mesh.positions)
+    np.testing.assert_allclose(adopted.mesh.along, mesh.along[adopted.source_vertex], atol=1e-5)
     places, uv = source_corners(adopted)
     np.testing.assert_array_equal(places, mesh.positions[mesh.triangles])
     np.testing.assert_array_equal(uv, corner_uv)

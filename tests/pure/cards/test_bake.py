@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from hairloom.addon.cards.atlas import AtlasPlan
-from hairloom.addon.cards.atlas_depth import places_in_depth
+from hairloom.addon.cards.atlas_depth import relative_depths
 from hairloom.addon.cards.atlas_grid import AtlasGrid
 from hairloom.addon.cards.atlas_maps import AtlasMaps, dilated, tile_edges
-from hairloom.addon.cards.bake import sampled_maps
+from hairloom.addon.cards.bake import sample_maps
 from hairloom.addon.cards.bake_strands import FlatStrands, flat_strands
 from hairloom.addon.cards.strip import CardFrames, Strips
 
@@ -61,7 +61,7 @@ def baked(
     """Bake strands; `width` is a strand's width as a fraction of the card's."""
     radius = np.full(grid.shape[:2], 0.5 * width * WIDTH, np.float32)
     flat = flat_strands(plan, grid, radius, base)
-    return flat, sampled_maps(flat, size)
+    return flat, sample_maps(flat, size)
 
 
 @pytest.mark.parametrize("width", [0.05, 0.03, 0.0051, 0.0007])
@@ -168,7 +168,7 @@ def test_strands_beyond_the_strip_are_squeezed_into_it() -> None:
     grid = lines(across)
     grid[2, :, 2] = np.linspace(-0.3 * LENGTH, 1.4 * LENGTH, ROWS)
     flat, maps = baked(plan_of([5]), grid, 0.04, 64)
-    edges = np.stack([flat.place - flat.half, flat.place + flat.half])
+    edges = np.stack([flat.place - flat.half_width, flat.place + flat.half_width])
     assert edges.min() >= 0.0
     assert edges.max() <= 1.0
     np.testing.assert_allclose(flat.place[1:4, 0, 0], 0.5 + across[1:4], atol=1e-6)
@@ -192,7 +192,7 @@ def test_strips_without_size_do_no_harm() -> None:
     frames = replace(plan.strips.frames, center=np.zeros_like(plan.strips.frames.center))
     flat_plan = replace(plan, strips=Strips(frames, np.zeros_like(plan.strips.width)))
     flat, maps = baked(flat_plan, np.zeros((2, ROWS, 3), np.float32), 0.1, 16)
-    for values in (flat.place, flat.half, flat.depth, flat.tangent, *maps.by_name.values()):
+    for values in (flat.place, flat.half_width, flat.depth, flat.tangent, *maps.by_name.values()):
         assert np.isfinite(values).all()
 
 
@@ -271,7 +271,7 @@ def test_a_texel_stores_how_deep_its_strand_lies_among_others(bend: float, colum
     beside = slice(None, None, 1 - 2 * column)
     plan = plan_of([count, 1][beside], AtlasGrid(2, 1))
     flat, maps = baked(plan, np.concatenate([grid, single][beside]), width, 64)
-    tiles = np.split(places_in_depth(maps, flat, plan), 2, axis=1)
+    tiles = np.split(relative_depths(maps, flat, plan), 2, axis=1)
     sample = (np.arange(32 * 16) + 0.5) / (32 * 16) - 0.5
     is_met = np.abs(sample[:, None] - across) < 0.5 * width
     foremost = np.where(is_met, grid[:, 0, 1], np.inf).argmin(axis=1)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from hairloom.addon.cards.clusters import (
-    at_rim,
     cluster_of_guides,
     cluster_strands,
+    is_at_rim,
     proportional_parts,
 )
 from hairloom.addon.strands.face import BROWS, LASHES
@@ -144,15 +144,15 @@ def parted(count: int = 4000, lift: float = 0.2) -> tuple[np.ndarray, np.ndarray
 
 def test_the_rim_lies_along_the_parting_and_nowhere_else() -> None:
     grid, normal = parted()
-    is_rim, away = at_rim(grid, normal, 40.0), np.abs(grid[:, 0, 0])
+    is_rim, away = is_at_rim(grid, normal, 40.0), np.abs(grid[:, 0, 0])
     # an average card is a square of 1 cm
     assert is_rim[away < 0.001].all()
     assert 0.001 < np.median(away[is_rim]) < 0.004 and away[is_rim].max() < 0.01
     # upright hair covers no roots
-    assert not at_rim(parted(lift=9.0)[0], normal, 40.0).any()
+    assert not is_at_rim(parted(lift=9.0)[0], normal, 40.0).any()
     # a hairline: no roots on one side
     half = grid[:, 0, 0] > 0.0
-    is_rim = at_rim(grid[half], normal[half], 40.0)
+    is_rim = is_at_rim(grid[half], normal[half], 40.0)
     assert is_rim[away[half] < 0.0005].all() and away[half][is_rim].max() < 0.01
 
 
@@ -161,7 +161,7 @@ def test_cards_along_a_parting_hold_fewer_strands() -> None:
     same = np.zeros(len(grid), np.int32)
     found = cluster_strands(grid, same, 100, 0, normal)
     assert found.max() == 99
-    is_rim = at_rim(grid, normal, 40.0)
+    is_rim = is_at_rim(grid, normal, 40.0)
     assert 3.0 < 40.0 / (is_rim.sum() / len(np.unique(found[is_rim]))) < 5.0
     # and no strands from elsewhere
     assert not set(found[is_rim].tolist()) & set(found[~is_rim].tolist())

@@ -48,7 +48,7 @@ def bound(mesh: CardMesh, guides: np.ndarray) -> tuple[CardBinding, np.ndarray, 
     own, turns = np.arange(count)[:, None], np.tile(np.eye(3), (count, 1, 1))
     cards = bind_cards(mesh, guides, own, np.ones((count, 1), np.float32))
     carried = carried_cards(cards, guides, turns)
-    clearance = CardClearance.at(*carried, cards.row, cards.offsets, BALL, KEPT)
+    clearance = CardClearance.measure(*carried, cards.row_of_vertex, cards.offsets, BALL, KEPT)
     return cards, turns, CardContacts(BALL, clearance)
 
 
@@ -76,11 +76,11 @@ def test_lengths_and_widths_are_kept(by: float) -> None:
     middle = ~cards.arms.any(axis=0)
     lines = (mesh.positions[middle], led.positions[middle])
     before, after = (np.linalg.norm(np.diff(line, axis=0), axis=1) for line in lines)
-    within = np.diff(cards.row_card[cards.row[middle]]) == 0
+    within = np.diff(cards.card_of_row[cards.row_of_vertex[middle]]) == 0
     np.testing.assert_allclose(after[within], before[within], rtol=1e-4)
     middles = np.zeros_like(cards.spine)
-    middles[cards.row[middle]] = led.positions[middle]
-    arms = np.linalg.norm(led.positions - middles[cards.row], axis=1)
+    middles[cards.row_of_vertex[middle]] = led.positions[middle]
+    arms = np.linalg.norm(led.positions - middles[cards.row_of_vertex], axis=1)
     np.testing.assert_allclose(arms, np.linalg.norm(cards.arms, axis=0), rtol=1e-4, atol=1e-8)
 
 
@@ -90,7 +90,7 @@ def test_rows_bend_by_a_right_angle_at_most() -> None:
     mesh, guides = cards_on_a_ball()
     cards, turns, contacts = bound(mesh, guides)
     led = follow_guides(cards, fallen(guides, 1.9), turns, contacts)
-    order = np.lexsort((mesh.uv[:, 0], cards.row))
+    order = np.lexsort((mesh.uv[:, 0], cards.row_of_vertex))
     bends = []
     for points in (mesh.positions, led.positions):
         rows = points[order].reshape(-1, CardSettings().column_count + 1, 3)
@@ -107,7 +107,7 @@ def test_normals_and_tangents_turn_with_what_is_led() -> None:
     led = follow_guides(cards, fallen(guides, 1.9), turns, contacts)
     for vectors in (led.normal, led.tangent):
         np.testing.assert_allclose(np.linalg.norm(vectors, axis=1), 1.0, atol=1e-5)
-    order = np.lexsort((mesh.uv[:, 0], cards.row))
+    order = np.lexsort((mesh.uv[:, 0], cards.row_of_vertex))
     rows = led.positions[order].reshape(-1, CardSettings().column_count + 1, 3)
     at_rest = mesh.positions[order].reshape(rows.shape)
     # the angle between a normal and the direction across the card stays as at rest

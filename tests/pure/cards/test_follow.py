@@ -208,7 +208,7 @@ def test_cards_of_a_rig_ride_as_its_strands_do() -> None:
     assert step[mesh.group[owner] == 3].max() < 1e-6
     # straight guides turn about their roots, by this angle about x, and so do spines
     angle, middle = np.arctan2(0.05, 0.2), ~binding.arms.any(axis=0)
-    roots = binding.spine[binding.offsets[:-1]][binding.row_card[binding.row]]
+    roots = binding.spine[binding.offsets[:-1]][binding.card_of_row[binding.row_of_vertex]]
     turned = 2.0 * np.sin(0.5 * angle) * np.linalg.norm((mesh.positions - roots)[:, 1:], axis=1)
     moving = middle & (mesh.group[owner] == 7)
     assert step[moving] == pytest.approx(turned[moving], abs=1e-5)

@@ -13,14 +13,14 @@ from hairloom.addon.cards.card_mesh import CardMesh
 from hairloom.addon.cards.export_settings import CardExportSettings
 from hairloom.addon.cards.joint_chains import card_chains
 from hairloom.addon.cards.joint_keys import (
-    between_keys,
     chain_keys,
-    keys_of,
-    matrices,
+    interpolate_keys,
     quaternions,
+    reduce_keys,
+    rotation_matrices,
     slerp,
 )
-from hairloom.addon.cards.joint_solve import Skin, best_weights, rigid_fits, skinned
+from hairloom.addon.cards.joint_solve import Skin, fit_rigid_motions, fit_weights, skinned
 from hairloom.addon.cards.joints import (
     CardTracks,
     JointRig,
@@ -55,9 +55,9 @@ def test_a_rigid_motion_is_found() -> None:
     points, turn, way = random.normal(size=(9, 3)), random_turns(5), random.normal(size=(5, 3))
     targets = np.einsum("fab,nb->nfa", turn, points) + way
     still = np.tile(np.eye(3), (5, 1, 1))
-    found = rigid_fits(points, targets, random.uniform(0.1, 1.0, 9), still)
+    found = fit_rigid_motions(points, targets, random.uniform(0.1, 1.0, 9), still)
     np.testing.assert_allclose(found[0], turn, atol=2e-3)  # a weak pull towards the earlier turn
-    again = rigid_fits(points, targets, np.ones(9), found[0])
+    again = fit_rigid_motions(points, targets, np.ones(9), found[0])
     np.testing.assert_allclose(again[0], turn, atol=1e-6)
     np.testing.assert_allclose(again[1], way, atol=1e-6)
 
@@ -66,7 +66,7 @@ def test_points_in_a_line_do_not_spin() -> None:
     """The turn about the line, which the points leave open, stays as before; no turn mirrors."""
     points = np.linspace(0.0, 1.0, 5)[:, None] * [1.0, 0.0, 0.0]
     before = turn_about(0, np.array([0.4]))
-    turn, _ = rigid_fits(points, points[:, None], np.ones(5), before)
+    turn, _ = fit_rigid_motions(points, points[:, None], np.ones(5), before)
     np.testing.assert_allclose(turn, before, atol=1e-3)
     np.testing.assert_allclose(np.linalg.det(turn), 1.0)
 
@@ -95,7 +95,7 @@ def test_weights_are_the_best_on_a_fine_grid() -> None:
     points, targets = random.normal(size=(20, 3)), random.normal(size=(20, 6, 3))
     joint = np.tile(np.arange(4), (20, 1))
     even = Skin(joint, np.full((20, 4), 0.25))
-    found = best_weights(points, targets, even, turn, way)
+    found = fit_weights(points, targets, even, turn, way)
     np.testing.assert_allclose(found.weight.sum(axis=1), 1.0)
     assert found.weight.min() >= 0.0
     assert (found.weight == 0.0).any()
@@ -119,8 +119,8 @@ def test_cards_that_move_alike_share_a_chain() -> None:
     moved = places[:, :, None] + 0.1 * sway
     chains = card_chains(places, moved, 3)
     assert chains.count == 3
-    assert len(set(zip(kind.tolist(), chains.own.tolist(), strict=True))) == 3
-    assert (chains.other != chains.own).all()
+    assert len(set(zip(kind.tolist(), chains.first.tolist(), strict=True))) == 3
+    assert (chains.second != chains.first).all()
     assert card_chains(places[:2], moved[:2], 64).count <= 2
 
 
@@ -172,7 +172,7 @@ def test_what_bends_more_has_more_joints_and_stays_under_the_error() -> None:
         tracks = tracks_of(mesh, bent(mesh, curl))
         rig = fitted(tracks, chains=2, joint_error=0.3)
         counts.append(rig.joints)
-        assert keyed_error(tracks, rig, rig.turn, rig.place).mean_square_root < 0.003 * 0.1
+        assert keyed_error(tracks, rig, rig.turn, rig.place).root_mean_square < 0.003 * 0.1
     assert counts == sorted(counts)
     assert counts[0] == 2 < counts[-1] <= 16
 
@@ -194,10 +194,10 @@ def test_the_error_is_what_skinning_by_hand_gives() -> None:
     misses = []
     for number, point in enumerate(points):
         mixed = np.einsum("k,kfab->fab", skin.weight[number], moves[skin.joint[number]])
-        misses.append((mixed @ point)[:, :3] - tracks.moved[0][number])
+        misses.append((mixed @ point)[:, :3] - tracks.moved_positions[0][number])
     error = keyed_error(tracks, rig, rig.turn, rig.place)
     distance = np.linalg.norm(misses, axis=-1)
-    assert error.mean_square_root == pytest.approx(np.sqrt((distance**2).mean()), rel=1e-4)
+    assert error.root_mean_square == pytest.approx(np.sqrt((distance**2).mean()), rel=1e-4)
     assert error.worst == pytest.approx(distance.max(), rel=1e-4)
 
 
@@ -224,7 +224,7 @@ def test_quaternions_and_matrices_agree() -> None:
     turns = np.concatenate([random_turns(200), turn_about(1, np.array([np.pi, 0.0, -np.pi]))])
     quaternion = quaternions(turns)
     np.testing.assert_allclose(np.linalg.norm(quaternion, axis=-1), 1.0)
-    np.testing.assert_allclose(matrices(quaternion), turns, atol=1e-12)
+    np.testing.assert_allclose(rotation_matrices(quaternion), turns, atol=1e-12)
     about_z = quaternions(turn_about(2, np.array(0.6)))
     np.testing.assert_allclose(about_z * np.sign(about_z[3]), [0, 0, np.sin(0.3), np.cos(0.3)])
 
@@ -234,22 +234,26 @@ def test_slerp_turns_evenly_the_shorter_way() -> None:
     ends = quaternions(turn_about(2, np.array([0.2, 1.4])))
     for sign in (1.0, -1.0):
         between = slerp(ends[:1], sign * ends[1:], share[:, None])
-        np.testing.assert_allclose(matrices(between), turn_about(2, 0.2 + 1.2 * share), atol=1e-9)
+        np.testing.assert_allclose(
+            rotation_matrices(between), turn_about(2, 0.2 + 1.2 * share), atol=1e-9
+        )
 
 
 def test_an_even_motion_needs_two_keys_and_a_still_one_needs_one() -> None:
     frames = np.arange(FRAMES)
     turn = np.stack([turn_about(2, 0.05 * frames), turn_about(2, 0.05 * frames)])
     place = np.stack([0.01 * frames[:, None] * [1.0, 0.0, 0.0]] * 2)
-    keys = keys_of(turn, place, np.ones(2), 1e-6)
-    assert keys.frame.tolist() == [0, FRAMES - 1]
-    still = keys_of(np.tile(np.eye(3), (2, FRAMES, 1, 1)), np.zeros((2, FRAMES, 3)), np.ones(2), 0)
-    assert still.frame.tolist() == [0]
+    keys = reduce_keys(turn, place, np.ones(2), 1e-6)
+    assert keys.frames.tolist() == [0, FRAMES - 1]
+    still = reduce_keys(
+        np.tile(np.eye(3), (2, FRAMES, 1, 1)), np.zeros((2, FRAMES, 3)), np.ones(2), 0
+    )
+    assert still.frames.tolist() == [0]
     for each, (turned, placed) in (
         (keys, (turn, place)),
         (still, (turn * 0 + np.eye(3), place * 0)),
     ):
-        found = between_keys(each, FRAMES)
+        found = interpolate_keys(each, FRAMES)
         np.testing.assert_allclose(found[0], turned, atol=1e-9)
         np.testing.assert_allclose(found[1], placed, atol=1e-9)
 
@@ -261,12 +265,12 @@ def test_left_out_keys_stay_near(near: float) -> None:
     turn = np.stack([turn_about(0, np.sin(time + 0.3 * joint)) for joint in range(4)])
     place = 0.02 * np.cumsum(turn[..., 1], axis=0)
     reach = np.full(4, 0.03)
-    keys = keys_of(turn, place, reach, near)
-    turned, placed = between_keys(keys, 60)
+    keys = reduce_keys(turn, place, reach, near)
+    turned, placed = interpolate_keys(keys, 60)
     tip = np.array([0.0, 0.03, 0.0])
     miss = np.linalg.norm(turned @ tip + placed - turn @ tip - place, axis=-1)
     assert miss.max() <= near + 1e-12
-    assert (len(keys.frame) == 60) == (near == 0.0)
+    assert (len(keys.frames) == 60) == (near == 0.0)
     steps = (keys.rotation[:, 1:] * keys.rotation[:, :-1]).sum(axis=-1)
     assert steps.min() > 0.0  # engines that ignore the signs of quaternions do not spin
 
@@ -277,7 +281,7 @@ def test_all_chains_have_keys() -> None:
     rig = fitted(tracks, chains=3, joints=4)
     keys = result_of(chain_keys(rig, 1e-4))
     assert len(keys) == rig.chains
-    turn, place = zip(*(between_keys(each, FRAMES) for each in keys), strict=True)
+    turn, place = zip(*(interpolate_keys(each, FRAMES) for each in keys), strict=True)
     kept = keyed_error(tracks, rig, np.stack(turn), np.stack(place))
     whole = keyed_error(tracks, rig, rig.turn, rig.place)
-    assert abs(kept.mean_square_root - whole.mean_square_root) < 1e-4
+    assert abs(kept.root_mean_square - whole.root_mean_square) < 1e-4

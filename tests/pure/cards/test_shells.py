@@ -10,7 +10,7 @@ import pytest
 from tiers import few_in_commits
 
 from hairloom.addon.cards.atlas_settings import AtlasSettings
-from hairloom.addon.cards.bake import sampled_maps
+from hairloom.addon.cards.bake import sample_maps
 from hairloom.addon.cards.card_mesh import CardMesh
 from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.cards.shell_plan import Patches, shell_strands
@@ -143,7 +143,7 @@ def test_from_above_layers_cover_what_strands_cover(spread: float) -> None:
     flat = shell_strands(
         replace(plan, thickness=np.ones_like(plan.thickness)), strands.grid, radius, 0.0
     )
-    alpha = sampled_maps(flat, plan.size).alpha
+    alpha = sample_maps(flat, plan.size).alpha
     low, high = (plan.grid.uv(np.arange(plan.layers * 4), each, each) for each in (0.0, 1.0))
     corners = np.round(np.concatenate([low, high], axis=1) * plan.size).astype(int)
     shown = np.array([alpha[b:d, a:c].mean() for a, b, c, d in corners]).reshape(4, -1).mean(axis=0)
@@ -164,7 +164,7 @@ def test_sparse_hair_covers_as_much_however_few_strands_a_pattern_has(
     made = built(strands, square())
     plan, mesh = made.plan, made.levels[0].mesh
     radius = strands.radius.reshape(count, -1)
-    alpha = sampled_maps(shell_strands(plan, strands.grid, radius, 0.0), plan.size).alpha
+    alpha = sample_maps(shell_strands(plan, strands.grid, radius, 0.0), plan.size).alpha
     shares = np.random.default_rng(8).dirichlet((1.0, 1.0, 1.0), 12)
     where = np.einsum("pc,tca->tpa", shares, mesh.uv[mesh.triangles]) * plan.size
     column, row = np.moveaxis(np.clip(where.astype(int), 0, plan.size - 1), -1, 0)

@@ -14,21 +14,21 @@ from hairloom.addon.cards.joints import CardTracks
 from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.cards.spring_bones import (
     STEP_RATE,
-    Balls,
     SpringChains,
+    SpringColliders,
     SpringValues,
-    at_frames,
-    chained,
-    sprung,
-    stepped,
-    turns_to,
+    resampled_to_frames,
+    resampled_to_steps,
+    rotations_towards,
+    simulate_springs,
+    with_bone_lengths,
 )
-from hairloom.addon.cards.spring_chains import Tried, fewest_joints, spring_steps
+from hairloom.addon.cards.spring_chains import Candidate, fewest_joints, spring_steps
 from hairloom.addon.cards.spring_fit import spring_fit
 from hairloom.addon.cards.steps import result_of
 
 STEPS = 60
-NO_BALLS = Balls.of(np.empty((0, 3)), np.empty(0))
+NO_BALLS = SpringColliders.spheres(np.empty((0, 3)), np.empty(0))
 
 
 def shaken(steps: int = STEPS) -> np.ndarray:
@@ -41,7 +41,7 @@ def shaken(steps: int = STEPS) -> np.ndarray:
     return head
 
 
-def made_chains(count: int = 3, joints: int = 4, balls: Balls = NO_BALLS) -> SpringChains:
+def made_chains(count: int = 3, joints: int = 4, balls: SpringColliders = NO_BALLS) -> SpringChains:
     """Chains that hang outwards, each a little bent."""
     random = np.random.default_rng(4)
     ways = random.normal(size=(count, joints, 3)) * 0.3 + [0.5, 0.0, -1.0]
@@ -97,7 +97,7 @@ def by_the_book(chain: SpringChains, values: SpringValues, head: np.ndarray) -> 
             tail = tail + parent @ local @ axis * values.stiffness[0, bone] / STEP_RATE
             tail = tail + np.array([0, 0, -1]) * values.gravity[0, bone] / STEP_RATE
             tail = origin + (tail - origin) / np.linalg.norm(tail - origin) * length
-            for center, radius in zip(chain.balls.center, chain.balls.radius, strict=True):
+            for center, radius in zip(chain.colliders.center, chain.colliders.radius, strict=True):
                 way = tail - (matrix[:3, :3] @ center + matrix[:3, 3])
                 miss = np.linalg.norm(way) - radius - values.hit_radius[0, bone]
                 if miss < 0:
@@ -114,13 +114,14 @@ def by_the_book(chain: SpringChains, values: SpringValues, head: np.ndarray) -> 
 
 @pytest.mark.parametrize("ball_count", [0, 2])
 def test_steps_are_those_of_the_specification(ball_count: int) -> None:
-    balls = Balls.of(np.array([[0.1, 0.02, -0.03], [0.13, -0.03, -0.07]])[:ball_count],
+    balls = SpringColliders.spheres(np.array([[0.1, 0.02, -0.03], [0.13, -0.03,
+    -0.07]])[:ball_count],
                      np.array([0.03, 0.025])[:ball_count])  # fmt: skip
     chains, head = made_chains(balls=balls), shaken()
     values = made_values(chains)
-    found = sprung(chains, values, head)
+    found = simulate_springs(chains, values, head)
     for number in range(len(chains.rest)):
-        own = chains.take(np.array([number]))
+        own = chains.select(np.array([number]))
         names = ("stiffness", "drag", "gravity", "hit_radius")
         own_values = SpringValues(*(getattr(values, name)[number][None] for name in names))
         np.testing.assert_allclose(found[:, number], by_the_book(own, own_values, head), atol=1e-9)
@@ -128,8 +129,8 @@ def test_steps_are_those_of_the_specification(ball_count: int) -> None:
 
 def test_a_capsule_is_the_balls_along_it() -> None:
     ends = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]])
-    capsule = Balls(ends[:1], ends[1:], np.array([0.02]))
-    many = Balls.of(np.linspace(ends[0], ends[1], 2001), np.full(2001, 0.02))
+    capsule = SpringColliders(ends[:1], ends[1:], np.array([0.02]))
+    many = SpringColliders.spheres(np.linspace(ends[0], ends[1], 2001), np.full(2001, 0.02))
     points = np.random.default_rng(0).uniform(-0.1, 0.2, (50, 3))
     nearest = many.nearest(points)[1].min(axis=-1)
     np.testing.assert_allclose(capsule.nearest(points)[1][:, 0], nearest, atol=1e-6)
@@ -138,29 +139,29 @@ def test_a_capsule_is_the_balls_along_it() -> None:
 def test_a_head_at_rest_leaves_chains_at_rest_and_gravity_draws_them_down() -> None:
     chains, still = made_chains(), np.tile(np.eye(4), (STEPS, 1, 1))
     values = made_values(chains)
-    places = sprung(chains, replace(values, gravity=np.zeros_like(values.gravity)), still)
+    places = simulate_springs(chains, replace(values, gravity=np.zeros_like(values.gravity)), still)
     np.testing.assert_allclose(places[-1], chains.rest[..., :3, 3], atol=1e-12)
-    drawn = sprung(chains, values, still)[-1]
+    drawn = simulate_springs(chains, values, still)[-1]
     assert (drawn[:, -1, 2] < chains.rest[:, -1, 2, 3]).all()
 
 
 def test_bones_keep_their_lengths_and_point_at_the_next_joint() -> None:
     chains = made_chains()
-    places = sprung(chains, made_values(chains), shaken())
+    places = simulate_springs(chains, made_values(chains), shaken())
     ways = np.diff(places, axis=2)
     lengths = np.linalg.norm(ways, axis=-1)
     np.testing.assert_allclose(lengths, np.broadcast_to(chains.lengths, lengths.shape))
-    turns = turns_to(chains.rest, places)
+    turns = rotations_towards(chains.rest, places)
     np.testing.assert_allclose(turns[:, :, :-1, :, 1], ways / lengths[..., None], atol=1e-9)
-    np.testing.assert_allclose(chained(chains.rest, places), places, atol=1e-12)
+    np.testing.assert_allclose(with_bone_lengths(chains.rest, places), places, atol=1e-12)
 
 
 def test_frames_and_steps_are_the_same_times() -> None:
     head = shaken(31)
-    steps = stepped(head, 30.0)
+    steps = resampled_to_steps(head, 30.0)
     assert len(steps) == 61
     np.testing.assert_allclose(steps[::2], head, atol=1e-9)
-    np.testing.assert_allclose(at_frames(steps, 31, 30.0), head, atol=1e-9)
+    np.testing.assert_allclose(resampled_to_frames(steps, 31, 30.0), head, atol=1e-9)
 
 
 def test_values_that_are_known_are_found_again() -> None:
@@ -171,7 +172,7 @@ def test_values_that_are_known_are_found_again() -> None:
     known = SpringValues(
         np.full(shape, 0.3), np.full(shape, 0.1), np.full(shape, 0.05), np.zeros(shape)
     )
-    targets = sprung(chains, known, head)
+    targets = simulate_springs(chains, known, head)
     fit = result_of(spring_fit(chains, targets, head, STEP_RATE, known.hit_radius))
     moved = np.linalg.norm(targets - targets[0], axis=-1).max()
     assert moved > 0.02
@@ -207,7 +208,7 @@ def moving_cards(swing: float) -> CardTracks:
     ],
 )
 def test_the_fewest_joints_that_do_are_chosen(errors: dict[int, float], best: int) -> None:
-    tried = [Tried(joints, error, joints) for joints, error in errors.items()]
+    tried = [Candidate(joints, error, joints) for joints, error in errors.items()]
     assert fewest_joints(tried, 1e-6) == best
 
 
@@ -221,8 +222,8 @@ def test_nothing_is_tried_that_has_more_joints_than_the_maximum(
 ) -> None:
     """The root joint that carries all chains counts as well."""
 
-    def most(tried: list[Tried[Any]], unseen: float) -> Any:
-        return max(tried, key=lambda each: each.joints).choice
+    def most(tried: list[Candidate[Any]], unseen: float) -> Any:
+        return max(tried, key=lambda each: each.joints).skeleton
 
     monkeypatch.setattr(spring_chains, "fewest_joints", most)
     rest = result_of(spring_steps(moving_cards(0.4), 5, NO_BALLS)).chains.rest
@@ -236,10 +237,12 @@ def test_cards_at_rest_stay_where_they_are() -> None:
 
 def test_a_chain_is_not_pushed_by_what_it_touches_at_rest() -> None:
     tracks = moving_cards(0.2)
-    within = Balls.of(np.array([[0.1, 0.0, -0.15], [0.1, -0.5, 0.0]]), np.array([0.08, 0.1]))
+    within = SpringColliders.spheres(
+        np.array([[0.1, 0.0, -0.15], [0.1, -0.5, 0.0]]), np.array([0.08, 0.1])
+    )
     rig = result_of(spring_steps(tracks, 30, within))
     tails = rig.chains.rest[:, 1:, :3, 3]
     distance = within.nearest(tails)[1]
     near = 1e-3 * rig.chains.lengths[..., None]
-    assert (rig.chains.hits == (distance > -near).all(axis=1)).all()
-    assert rig.chains.hits[:, 1].all() and not rig.chains.hits[:, 0].all()
+    assert (rig.chains.collides == (distance > -near).all(axis=1)).all()
+    assert rig.chains.collides[:, 1].all() and not rig.chains.collides[:, 0].all()

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hairloom.addon.cards.atlas_maps import MAPS
+from hairloom.addon.cards.atlas_maps import MAP_NAMES
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.textures.texture_packing import (
     MAP_MEANINGS,
@@ -147,7 +147,7 @@ def test_every_preset_has_what_a_card_needs(preset: str) -> None:
 
 
 def test_all_maps_of_an_atlas_can_be_packed() -> None:
-    assert set(MAPS) <= set(MAP_MEANINGS)
+    assert set(MAP_NAMES) <= set(MAP_MEANINGS)
     held = set().union(*(layout.sources for layout in PRESETS["hairloom"]))
     assert held == set(MAP_MEANINGS) - {"roughness"}
 
