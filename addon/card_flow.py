@@ -9,7 +9,7 @@ import numpy as np
 
 from .arrays import Bools, Floats
 from .cards.atlas_settings import AtlasSettings
-from .cards.build import AlphaOf, CardBuild, CardGroom, card_steps, strand_occluder
+from .cards.build import CardBuild, CardGroom, MakeAlpha, card_steps, strand_occluder
 from .cards.card_mesh import CardMesh
 from .cards.card_strands import card_strands
 from .cards.contacts import CardClearance, CardContacts
@@ -43,7 +43,7 @@ _DEFAULT_STRANDS = StrandSettings()
 def card_build_steps(
     rig: Rig,
     settings: SettingsMap,
-    alpha_of: AlphaOf = lambda _build: None,
+    alpha_of: MakeAlpha = lambda _build: None,
     occluders: Sequence[CardOccluder] = (),
     edits: CardEdits | None = None,
 ) -> Generator[str, None, CardBuild]:

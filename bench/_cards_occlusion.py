@@ -16,7 +16,7 @@ from mathutils.bvhtree import BVHTree
 from hairloom.addon.card_flow import card_build_steps
 from hairloom.addon.cards.atlas_settings import AtlasSettings
 from hairloom.addon.cards.card_mesh import CardMesh
-from hairloom.addon.cards.occlusion import CardOccluder, extent_of, vertex_occlusion
+from hairloom.addon.cards.occlusion import CardOccluder, diagonal_of, vertex_occlusion
 from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
 from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.cards.steps import result_of
@@ -106,7 +106,7 @@ class _Scene:
     ) -> None:
         self._tree, self._mesh, self._alpha = tree, mesh, alpha
         self._corners, self._settings = corners, settings
-        self._extent = extent_of(mesh)  # the mesh holds all cards
+        self._extent = diagonal_of(mesh)  # the mesh holds all cards
 
     def light(self, start: np.ndarray, direction: np.ndarray, own: int) -> float:
         """The fraction of light that arrives along one ray."""

@@ -21,15 +21,15 @@ from hairloom.addon.card_flow import card_build_steps
 from hairloom.addon.cards.atlas_settings import AtlasSettings
 from hairloom.addon.cards.build import CardBuild
 from hairloom.addon.cards.card_mesh import CardMesh
-from hairloom.addon.cards.order_check import seen_cards, views_of, wrong_pixels
-from hairloom.addon.cards.order_views import BallView
+from hairloom.addon.cards.order_check import check_views, visible_fragments, wrong_pixels
+from hairloom.addon.cards.order_views import SphereView
 from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.cards.sort import (
     CardOrders,
     card_orders,
     connected_components,
-    order_from,
-    reordered,
+    order_from_eye,
+    sorted_by_key,
 )
 from hairloom.addon.cards.steps import result_of
 from hairloom.addon.params import SettingsMap
@@ -45,7 +45,7 @@ FEWER_VIEWS = 40
 SORTED_TRIANGLES, ROUNDS = 100_000, 9
 
 #: The order of triangles in a view, for front faces and for back faces.
-type OrderOf = Callable[[BallView], tuple[np.ndarray, np.ndarray]]
+type OrderOf = Callable[[SphereView], tuple[np.ndarray, np.ndarray]]
 
 
 def order_figures() -> dict[str, float]:
@@ -54,7 +54,7 @@ def order_figures() -> dict[str, float]:
     order_wrong_unsorted: cards in the order in which they were built.
     order_wrong_sorted: the mesh's order for front faces, and that for back faces.
     order_wrong_perview: whole cards by the distance of their middle from the eye, for each view.
-    order_wrong_perview_triangles: triangles by their own distance, as `order_from` sorts them.
+    order_wrong_perview_triangles: triangles by their own distance, as `order_from_eye` sorts them.
     order_wrong_distance: whole cards by their distance from the head, for all views.
     order_wrong_cards: whole cards in the learnt order, which has another for back faces.
     order_wrong_one_buffer: the mesh's order for front faces, also for back faces.
@@ -122,15 +122,15 @@ def both(orders: CardOrders) -> OrderOf:
 def others(
     mesh: CardMesh, head: Surface, learnt: CardOrders, alpha: np.ndarray
 ) -> dict[str, OrderOf]:
-    def per_view(view: BallView) -> tuple[np.ndarray, np.ndarray]:
+    def per_view(view: SphereView) -> tuple[np.ndarray, np.ndarray]:
         away = mesh.positions[mesh.triangles].mean(axis=1) - eye_of(view)
         far = np.linalg.norm(away, axis=1)
         middle = np.bincount(mesh.card, far) / np.maximum(np.bincount(mesh.card), 1)
         order = np.argsort(-middle[mesh.card], kind="stable")
         return order, order
 
-    def per_view_triangles(view: BallView) -> tuple[np.ndarray, np.ndarray]:
-        order = order_from(mesh, np.append(eye_of(view), 1.0))
+    def per_view_triangles(view: SphereView) -> tuple[np.ndarray, np.ndarray]:
+        order = order_from_eye(mesh, np.append(eye_of(view), 1.0))
         return order, order
 
     return {
@@ -142,7 +142,7 @@ def others(
     }
 
 
-def eye_of(view: BallView) -> np.ndarray:
+def eye_of(view: SphereView) -> np.ndarray:
     return view.middle + view.direction * view.distance
 
 
@@ -155,8 +155,8 @@ def wrong_shares(
 ) -> dict[str, float]:
     """The fraction of wrong pixels for each order, over the same views."""
     wrong, covered = dict.fromkeys(orders, 0), 0
-    for view in views_of(mesh, view_count, SIZE):
-        seen = seen_cards(mesh, head, view, alpha)
+    for view in check_views(mesh, view_count, SIZE):
+        seen = visible_fragments(mesh, head, view, alpha)
         for name, order_of in orders.items():
             is_wrong = wrong_pixels(mesh, seen, *order_of(view))
             wrong[name] += int(is_wrong.sum())
@@ -196,7 +196,7 @@ def sort_milliseconds() -> float:
     def once() -> float:
         begin = time.process_time()
         connected_components(mesh.triangles)
-        reordered(mesh, distance)
+        sorted_by_key(mesh, distance)
         return time.process_time() - begin
 
     return 1e3 * float(np.median([once() for _ in range(ROUNDS)]))
@@ -205,7 +205,7 @@ def sort_milliseconds() -> float:
 def eye_milliseconds(mesh: CardMesh) -> float:
     def once(eye: np.ndarray) -> float:
         begin = time.process_time()
-        order_from(mesh, eye)
+        order_from_eye(mesh, eye)
         return time.process_time() - begin
 
     eyes = np.random.default_rng(0).standard_normal((ROUNDS, 4))

@@ -54,11 +54,11 @@ def motion_figures(seconds: float) -> dict[str, float]:
     ridden = time.perf_counter()
     joints = result_of(joint_motion_steps(moved.tracks, CardExportSettings(motion="joints")))
     fitted = time.perf_counter()
-    length, facts = moved.tracks.hair_length, joints.facts
+    length, facts = moved.tracks.hair_length, joints.sidecar_section
     figures = {
         "joint_error_percent": 100.0 * joints.relative_error,
-        "joint_error_percent_99": 100.0 * joints.error.most / length,
-        "joint_error_percent_worst": 100.0 * joints.error.worst / length,
+        "joint_error_percent_99": 100.0 * joints.error.percentile_99 / length,
+        "joint_error_percent_worst": 100.0 * joints.error.maximum / length,
         "chains": facts["chains"],
         "joints": facts["joints_in_chain"],
         "keys": facts["keys"],

@@ -388,8 +388,8 @@ def _timed(
 
 def _middle_lines(mesh: CardMesh, cards: CardBinding) -> Ints:
     """The middle vertex of each row; Sintel's cards have three in a row."""
-    order = np.lexsort((mesh.uv[:, 0], cards.row))
-    count = np.bincount(cards.row)
+    order = np.lexsort((mesh.uv[:, 0], cards.row_of_vertex))
+    count = np.bincount(cards.row_of_vertex)
     assert (count % 2 == 1).all()
     middles: Ints = order[piece_starts(count) + count // 2]
     return middles
@@ -398,7 +398,7 @@ def _middle_lines(mesh: CardMesh, cards: CardBinding) -> Ints:
 def _row_edges(mesh: CardMesh, cards: CardBinding) -> Ints:
     """Edges of triangles within rows, (n, 2)."""
     pairs = np.concatenate([mesh.triangles[:, sides] for sides in ((0, 1), (1, 2), (2, 0))])
-    within = pairs[cards.row[pairs[:, 0]] == cards.row[pairs[:, 1]]]
+    within = pairs[cards.row_of_vertex[pairs[:, 0]] == cards.row_of_vertex[pairs[:, 1]]]
     return np.unique(np.sort(within, axis=1), axis=0)
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from hairloom.addon.cards.card_mesh import CardMesh
-from hairloom.addon.cards.order_views import BallView
+from hairloom.addon.cards.order_views import SphereView
 
-VIEW = BallView(np.array([0.01, 0.0, 0.004]), 1.0, np.array([0.0, -1.0, 0.0]), 32)
+VIEW = SphereView(np.array([0.01, 0.0, 0.004]), 1.0, np.array([0.0, -1.0, 0.0]), 32)
 
 
 def sheets(depths: tuple[float, ...], turned: tuple[bool, ...] = ()) -> CardMesh:

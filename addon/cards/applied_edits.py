@@ -35,7 +35,7 @@ from .edits import (
     median_gap,
 )
 from .settings import CardSettings
-from .sort import reordered
+from .sort import sorted_by_key
 from .strip import CardFrames, Strips, UncutCards
 
 #: Motion of the skin below this fraction of a card's length is ignored.
@@ -79,7 +79,7 @@ class AppliedEdits:
             if len(rest.triangles)
             else self._only_kept(mesh)
         )
-        return reordered(both, np.arange(len(self.cards)))
+        return sorted_by_key(both, np.arange(len(self.cards)))
 
     def _only_kept(self, mesh: CardMesh) -> CardMesh:
         own: dict[str, Any] = {name: getattr(self.kept_mesh, name) for name in VERTEX_FIELDS}
@@ -160,20 +160,20 @@ def _assembled(
     mesh, strips = _adopted(edits, cards, settings, head, placed)
     model = np.resize(np.arange(count, dtype=np.int32), total)
     if is_new.any():
-        near = card_gaps(card_places(strips.of(np.flatnonzero(is_new))), record.places).argmin(
+        near = card_gaps(card_places(strips.select(np.flatnonzero(is_new))), record.places).argmin(
             axis=1
         )
         model[placed.number[is_new]] = near
     all_strips = _with_replaced(cards.strips, placed.number, strips, total)
     is_replaced = record.represented_by != np.arange(count)
-    absent = np.zeros(total, bool)
-    absent[:count] = placed.is_free | is_replaced
+    is_absent = np.zeros(total, bool)
+    is_absent[:count] = placed.is_free | is_replaced
     strand_count = cards.strand_count[model]
     covered = np.bincount(record.represented_by, cards.strand_count, count)
     strand_count[:count] = np.where(is_replaced, strand_count[:count], covered)
     tile = cards.tile[model]
     tile[placed.number] = placed.tile
-    record.prints[absent[:count]] = NO_PRINT
+    record.prints[is_absent[:count]] = NO_PRINT
     record.prints[placed.number[~is_new]] = NO_PRINT
     both = replace(
         cards,
@@ -182,11 +182,11 @@ def _assembled(
         group=cards.group[model],
         layer=cards.layer[model],
         tile=tile,
-        absent=absent,
+        is_absent=is_absent,
     )
     mesh = replace(mesh, group=both.group, layer=both.layer, tile=both.tile, atlas=both.atlas)
     notes = _notes(edits, counts, strips, head, piece_count)
-    if absent.all() and not piece_count:
+    if is_absent.all() and not piece_count:
         notes = (*notes, "all its cards were deleted; Discard Edits makes them again")
     return AppliedEdits(both, mesh, model, record, counts, notes)
 
@@ -352,7 +352,7 @@ def _adopted(
             card=none,
             along=np.zeros(0, np.float32),
         )
-        return mesh, cards.strips.of(none)
+        return mesh, cards.strips.select(none)
     uv = _uvs_on_tiles(edits, cards.atlas, placed.tile)
     triangles: Ints = edits.surface.triangles
     if np.linalg.det(edits.matrix[:3, :3]) < 0.0:  # a mirrored object turns its faces around

@@ -133,7 +133,7 @@ def _half_width(across: Floats, along: Floats, thickness: Floats, aspect: Floats
 
 
 def _subdivided(values: Floats) -> Floats:
-    """PIECES stations per segment, (n, stations, channels), by Catmull and Rom 1974."""
+    """PIECES_PER_SEGMENT stations per segment, (n, stations, channels), by Catmull and Rom 1974."""
     ends = 2.0 * values[:, [0, -1]] - values[:, [1, -2]]
     wide = np.concatenate([ends[:, :1], values, ends[:, 1:]], axis=1)
     p0, p1, p2, p3 = (wide[:, i : wide.shape[1] - 3 + i, None] for i in range(4))

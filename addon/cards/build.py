@@ -23,23 +23,23 @@ from .layers import card_layers
 from .levels import card_levels
 from .occlusion import CardOccluder, occlusion_steps
 from .occlusion_settings import CardOcclusionSettings
-from .on_skin import above_skin, on_skin
 from .order_check import wrong_fraction
 from .settings import CardSettings
 from .shell_plan import ShellPlan
-from .shells import are_wanted, build_shells
+from .shells import build_shells, wants_shells
 from .short_hair import fitted_to_length
-from .sort import VIEW_COUNT, CardOrders, SortBy, card_of_vertex, in_order, order_steps
+from .skin_clearance import lift_roots, raise_between_rows
+from .sort import VIEW_COUNT, CardOrders, SortBy, card_of_vertex, order_steps, with_triangle_order
 from .steps import map_progress
 from .strand_shading import shading_from_strands
-from .strip import Strips, UncutCards, guide_strips, scattered_tiles, strip_mesh
+from .strip import Strips, UncutCards, guide_strips, random_tiles, strip_mesh
 
 #: Number of views from which coarser levels are sorted.
 _COARSER_VIEWS = 16
 #: Number of views in which the order is checked.
 _CHECKED_VIEWS = 8
 #: Fraction of wrong pixels above which there is a note: fewer are hard to see.
-_WRONG_ENOUGH = 0.1
+_MIN_NOTED_WRONG = 0.1
 #: Each card represents about this many strands; there are at most this many cards.
 _STRANDS_PER_CARD, _MAX_CARDS = 12, 600
 
@@ -49,8 +49,8 @@ class CardGroom:
     """The hair that cards are made from.
 
     strands: uniform, at least one.
-    number: (strand_count,) of each strand in the groom, on which its colour depends.
-    guides: (guide_count,) which strands are guides.
+    strand_numbers: (strand_count,) of each strand in the groom, on which its colour depends.
+    guide_indices: (guide_count,) which strands are guides.
     radius: (strand_count, cv_count) [m], as strands are drawn.
     root_normal: (strand_count, 3) unit normals of the head under the roots.
     head: in the space of the strands, or None.
@@ -61,8 +61,8 @@ class CardGroom:
     """
 
     strands: StrandSet
-    number: Ints
-    guides: Ints
+    strand_numbers: Ints
+    guide_indices: Ints
     radius: Floats
     root_normal: Floats
     head: Surface | None
@@ -119,7 +119,7 @@ class CardBuild:
 
 #: Returns the alpha of the atlas, (height, width), or None for opaque cards; may bake it from the
 #: plan of this build, whose cards have no occlusion and order yet.
-type AlphaOf = Callable[[CardBuild], Floats | None]
+type MakeAlpha = Callable[[CardBuild], Floats | None]
 
 
 def card_steps(
@@ -127,21 +127,23 @@ def card_steps(
     settings: CardSettings,
     atlas: AtlasSettings,
     occlusion: CardOcclusionSettings,
-    alpha_of: AlphaOf,
-    others: Sequence[CardOccluder] = (),
+    make_alpha: MakeAlpha,
+    other_occluders: Sequence[CardOccluder] = (),
     edits: CardEdits | None = None,
 ) -> Generator[str, None, CardBuild]:
     """Build the cards; each step names what comes next, and the result is returned.
 
     Args:
-        others: cards of other grooms, which occlude these, world space.
+        other_occluders: cards of other grooms, which occlude these, world space.
         edits: the artist's changes of earlier cards, which are kept.
 
     Raises:
         HairloomError: the atlas is too small for its tiles, or there is nothing to bake into it.
     """
-    if are_wanted(settings, groom.strands, groom.head, bool(edits)):
-        return (yield from _shell_steps(groom, settings, atlas, occlusion, alpha_of, others))
+    if wants_shells(settings, groom.strands, groom.head, bool(edits)):
+        return (
+            yield from _shell_steps(groom, settings, atlas, occlusion, make_alpha, other_occluders)
+        )
     yield "Cards from strands"
     settings, atlas, shape_notes = fitted_to_length(settings, atlas, groom.strands)
     card = card_of_strand(groom, settings)
@@ -156,10 +158,10 @@ def card_steps(
     if settings.source == "clusters":
         error = settings.error * float(np.median(groom.strands.lengths()))
     levels = card_levels(cards, settings, error, None if applied is None else applied.kept_numbers)
-    record = record.with_joined_cards(levels[0].owner)
+    record = record.with_joined_cards(levels[0].represented_by)
     meshes, errors = zip(*((level.mesh, level.error) for level in levels), strict=True)
-    meshes = tuple(on_skin(mesh, groom.head, median_width) for mesh in meshes)
-    meshes = tuple(above_skin(mesh, groom.head, median_width) for mesh in meshes)
+    meshes = tuple(lift_roots(mesh, groom.head, median_width) for mesh in meshes)
+    meshes = tuple(raise_between_rows(mesh, groom.head, median_width) for mesh in meshes)
     if applied is not None:
         meshes = (applied.with_kept_mesh(meshes[0]), *meshes[1:])
     unsorted = tuple(mesh.triangles for mesh in meshes)
@@ -167,11 +169,11 @@ def card_steps(
     if applied is not None:
         build = replace(build, edits=applied.counts, edit_notes=applied.notes)
     yield "Atlas"
-    alpha = alpha_of(build)
-    shading = _occlusion_steps(groom, card, build, alpha, others, occlusion, applied)
-    build = yield from _reported("Ambient occlusion", shading)
+    alpha = make_alpha(build)
+    shading = _occlusion_steps(groom, card, build, alpha, other_occluders, occlusion, applied)
+    build = yield from _with_progress("Ambient occlusion", shading)
     finest = build.finest
-    shaded = (finest, *(with_occlusion_of(finest, level) for level in build.levels[1:]))
+    shaded = (finest, *(with_nearest_occlusion(finest, level) for level in build.levels[1:]))
     orders = yield from _orders(shaded, groom.head, settings, alpha)
     yield "Check of the order"
     first = orders[0]
@@ -186,7 +188,7 @@ def card_steps(
     pairs = list(zip(shaded, orders, strict=True))
     return replace(
         build,
-        levels=tuple(in_order(mesh, each.front) for mesh, each in pairs),
+        levels=tuple(with_triangle_order(mesh, each.front) for mesh, each in pairs),
         back_triangles=tuple(mesh.triangles[each.back] for mesh, each in pairs),
         wrong_fraction=wrong,
         order_notes=_order_notes(wrong, settings),
@@ -198,8 +200,8 @@ def _shell_steps(
     settings: CardSettings,
     atlas: AtlasSettings,
     occlusion: CardOcclusionSettings,
-    alpha_of: AlphaOf,
-    others: Sequence[CardOccluder],
+    make_alpha: MakeAlpha,
+    other_occluders: Sequence[CardOccluder],
 ) -> Generator[str, None, CardBuild]:
     """The same for shells, whose order is known."""
     yield "Shells from strands"
@@ -220,11 +222,11 @@ def _shell_steps(
     errors = tuple(level.error for level in made.levels)
     build = CardBuild(tuple(meshes), made.back_triangles, errors, made.plan, settings.shell_layers)
     yield "Atlas"
-    alpha = alpha_of(build)
-    if others:
+    alpha = make_alpha(build)
+    if other_occluders:
         for number, mesh in enumerate(meshes):
-            rays = occlusion_steps(mesh, others, [], occlusion)
-            shade = yield from _reported("Ambient occlusion", rays)
+            rays = occlusion_steps(mesh, other_occluders, [], occlusion)
+            shade = yield from _with_progress("Ambient occlusion", rays)
             meshes[number] = mesh.with_occlusion(mesh.occlusion * shade)
     yield "Check of the order"
     finest = meshes[0]
@@ -240,7 +242,7 @@ def _shell_steps(
 
 
 def _order_notes(wrong: float, settings: CardSettings) -> tuple[str, ...]:
-    if wrong <= _WRONG_ENOUGH:
+    if wrong <= _MIN_NOTED_WRONG:
         return ()
     remedy = (
         "Give hair that hangs away from the head a group of its own, or let your engine sort cards "
@@ -256,7 +258,7 @@ def _occlusion_steps(
     card: Ints,
     build: CardBuild,
     alpha: Floats | None,
-    others: Sequence[CardOccluder],
+    other_occluders: Sequence[CardOccluder],
     occlusion: CardOcclusionSettings,
     applied: AppliedEdits | None,
 ) -> Generator[float, None, CardBuild]:
@@ -271,7 +273,7 @@ def _occlusion_steps(
         return build
     if groom.occlusion is None:
         bodies = [] if groom.head is None else [groom.head]
-        own = [CardOccluder(mesh, alpha), *others]
+        own = [CardOccluder(mesh, alpha), *other_occluders]
         found = yield from occlusion_steps(mesh, own, bodies, occlusion)
         return _with_finest(build, mesh.with_occlusion(found))
     # the artist's own cards use the strands of the nearest made card
@@ -280,8 +282,8 @@ def _occlusion_steps(
         on_strands, groom.strands.grid, groom.occlusion, groom.light, card
     )
     shown: Floats = (1.0 - occlusion.strength * (1.0 - of_strands.occlusion)).astype(np.float32)
-    if others:
-        shown = shown * (yield from occlusion_steps(mesh, others, [], occlusion))
+    if other_occluders:
+        shown = shown * (yield from occlusion_steps(mesh, other_occluders, [], occlusion))
     build = replace(build, light=of_strands.light, depth=of_strands.depth)
     return _with_finest(build, mesh.with_occlusion(shown))
 
@@ -295,7 +297,7 @@ def card_of_strand(groom: CardGroom, settings: CardSettings) -> Ints:
     after all others, in the same order."""
     grid, group = groom.strands.grid, groom.strands.group
     if settings.source == "guides":
-        return cluster_of_guides(grid, group, groom.guides)
+        return cluster_of_guides(grid, group, groom.guide_indices)
     return cluster_of_strands(grid, group, settings, groom.root_normal)
 
 
@@ -303,17 +305,17 @@ def _orders(
     levels: Sequence[CardMesh], head: Surface | None, settings: CardSettings, alpha: Floats | None
 ) -> Generator[str, None, list[CardOrders]]:
     """The orders of each level; coarser ones are sorted from fewer views."""
-    by = cast("SortBy", settings.order_by)
+    sort_by = cast("SortBy", settings.order_by)
     orders = []
     for number, mesh in enumerate(levels):
         view_count = _COARSER_VIEWS if number else VIEW_COUNT
-        steps = order_steps(mesh, head, by, view_count=view_count, alpha=alpha)
+        steps = order_steps(mesh, head, sort_by, view_count=view_count, alpha=alpha)
         name = f"Order of level {number}" if len(levels) > 1 else "Order"
-        orders.append((yield from _reported(name, steps)))
+        orders.append((yield from _with_progress(name, steps)))
     return orders
 
 
-def _reported[Result](
+def _with_progress[Result](
     name: str, steps: Generator[float, None, Result]
 ) -> Generator[str, None, Result]:
     """Progress messages: the step's name, then its percentage."""
@@ -330,7 +332,7 @@ def uncut_cards(
     Args:
         cluster: see `card_of_strand`.
     """
-    strands, guides, is_baked = groom.strands, groom.guides, atlas.source == "baked"
+    strands, guides, is_baked = groom.strands, groom.guide_indices, atlas.source == "baked"
     grid, radius = strands.grid, strands.radius.reshape(strands.grid.shape[:2])
     _, found, count = np.unique(cluster, return_index=True, return_counts=True)
     first: Ints = found
@@ -344,24 +346,24 @@ def uncut_cards(
         strips = fit_strips(grid, radius, cluster, groom.root_normal, settings)
     # second cards of crossed pairs follow after all others, and represent the same strands
     owner = np.resize(np.arange(len(first)), len(strips))
-    cards = _by_chance(strips, count[owner], strands.group[first][owner], settings)
-    cards = _looking_out(cards, groom)
+    cards = _with_random_tiles(strips, count[owner], strands.group[first][owner], settings)
+    cards = _with_outward_normals(cards, groom)
     if not is_baked:
         return cards, None
-    uncrossed = strips.of(np.arange(len(first)))
+    uncrossed = strips.select(np.arange(len(first)))
     plan = plan_atlas(
         uncrossed, grid, groom.radius, cluster, strands.group, atlas, strands.color_grid
     )
-    strips = _wider(cards.strips, plan.width_factor[owner])
+    strips = _with_width_factor(cards.strips, plan.width_factor[owner])
     return replace(cards, strips=strips, tile=plan.tile[owner], atlas=plan.grid), plan
 
 
-def _looking_out(cards: UncutCards, groom: CardGroom) -> UncutCards:
+def _with_outward_normals(cards: UncutCards, groom: CardGroom) -> UncutCards:
     """The cards with normals away from the middle of all roots, as strands have."""
     return replace(cards, center=groom.strands.roots.mean(axis=0, dtype=np.float64))
 
 
-def _by_chance(
+def _with_random_tiles(
     strips: Strips, strand_count: Ints, group: Ints, settings: CardSettings
 ) -> UncutCards:
     """Cards with random tiles."""
@@ -372,8 +374,8 @@ def _by_chance(
     is_outermost = is_loose | is_face_hair(group)
     layer = np.where(is_outermost, settings.layers - 1, layer).astype(np.int32)
     atlas = AtlasGrid(columns=settings.atlas_columns)
-    tile = scattered_tiles(len(strips), atlas, settings.seed)
-    strips = _wider(strips, _base_widths(layer, settings))
+    tile = random_tiles(len(strips), atlas, settings.seed)
+    strips = _with_width_factor(strips, _base_widths(layer, settings))
     return UncutCards(strips, strand_count.astype(np.int32), group, layer, tile, atlas)
 
 
@@ -383,25 +385,29 @@ def _base_widths(layer: Ints, settings: CardSettings) -> Floats:
     return 1.0 + (settings.base_width - 1.0) * depth * (settings.layers > 1)
 
 
-def _wider(strips: Strips, factor: Floats) -> Strips:
+def _with_width_factor(strips: Strips, factor: Floats) -> Strips:
     return replace(strips, width=(strips.width * factor[:, None]).astype(np.float32))
 
 
-def with_occlusion_of(finest: CardMesh, level: CardMesh) -> CardMesh:
+def with_nearest_occlusion(finest: CardMesh, level: CardMesh) -> CardMesh:
     """A coarser level, with each vertex's occlusion from the vertex of its card that is nearest in
     the atlas."""
     owner = card_of_vertex(finest)
     vertices = np.argsort(owner, kind="stable")
     count = np.bincount(owner, minlength=len(finest.group))
     start = piece_starts(count)
-    mine = card_of_vertex(level)
+    owner_in_level = card_of_vertex(level)
     step = np.arange(int(count.max(initial=0)))
-    candidate = vertices[start[mine, None] + np.minimum(step, count[mine, None] - 1)]
+    candidate = vertices[
+        start[owner_in_level, None] + np.minimum(step, count[owner_in_level, None] - 1)
+    ]
     # along and across count equally, whatever the shape of a tile
     tiles = np.array([finest.atlas.columns, finest.atlas.rows])
     gap = (finest.uv[candidate] - level.uv[:, None]) * tiles
     nearest = np.einsum("vci,vci->vc", gap, gap).argmin(axis=1)
-    return level.with_occlusion(finest.occlusion[candidate[np.arange(len(mine)), nearest]])
+    return level.with_occlusion(
+        finest.occlusion[candidate[np.arange(len(owner_in_level)), nearest]]
+    )
 
 
 def strand_occluder(groom: CardGroom) -> CardOccluder:

@@ -17,12 +17,12 @@ _STATIONS = 5
 #: Maximum number of places of other cards.
 _MAX_OTHERS = 4096
 #: Number of such places within reach of a probe where cards lie in one sheet.
-_SEEN = 6.0
+_NEIGHBOURS_IN_REACH = 6.0
 #: Minimum cosine between the normals of cards on the same side of the head.
-_ALIKE = 0.3
+_MIN_NORMAL_COSINE = 0.3
 #: Places nearer than this to a card's own plane, in terms of the reach, are neither below nor above
 #: it.
-_LEVEL = 1.0e-3
+_PLANE_TOLERANCE = 1.0e-3
 _CHUNK = 1024
 
 
@@ -44,11 +44,11 @@ def card_depths(strips: Strips) -> Floats:
     normal = strips.frames.normal[:, rows].reshape(-1, 3)
     card = np.repeat(np.arange(len(strips)), len(rows))
     others = np.linspace(0, len(place) - 1, min(len(place), _MAX_OTHERS)).round().astype(int)
-    reach = _SEEN * _area(strips) / (np.pi * len(others))
+    reach = _NEIGHBOURS_IN_REACH * _area(strips) / (np.pi * len(others))
     fraction = np.empty(len(place))
     for start in range(0, len(place), _CHUNK):
         chosen = slice(start, start + _CHUNK)
-        below, above = _counted(
+        below, above = _count_below_and_above(
             (place[chosen], normal[chosen], card[chosen]),
             (place[others], normal[others], card[others]),
             reach,
@@ -57,7 +57,7 @@ def card_depths(strips: Strips) -> Floats:
     return fraction.reshape(len(strips), -1).mean(axis=1)
 
 
-def _counted(
+def _count_below_and_above(
     probes: tuple[Floats, Floats, Ints], others: tuple[Floats, Floats, Ints], reach: float
 ) -> tuple[Ints, Ints]:
     """How many others lie below and above each probe along its normal, two of (probe_count,).
@@ -75,10 +75,10 @@ def _counted(
     )
     is_seen = (
         (squared - height**2 < reach)
-        & (normal @ other_normal.T > _ALIKE)
+        & (normal @ other_normal.T > _MIN_NORMAL_COSINE)
         & (card[:, None] != other_card)
     )
-    level = _LEVEL * reach**0.5
+    level = _PLANE_TOLERANCE * reach**0.5
     below, above = height < -level, height > level
     return (is_seen & below).sum(axis=1), (is_seen & above).sum(axis=1)
 

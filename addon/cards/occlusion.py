@@ -37,9 +37,9 @@ from .sort import card_of_vertex
 from .steps import result_of
 
 #: Minimum distance of what a ray meets, for cards that cross at a vertex. In extents of the cards.
-_NEAREST = 2.0e-4
+_MIN_DISTANCE = 2.0e-4
 #: Optical depth of opaque texels: exp of its negative is 0 in float32.
-_OPAQUE = 100.0
+_OPAQUE_DEPTH = 100.0
 #: Directions at work at the same time; numpy lets other threads run most of the time.
 _THREADS = min(4, os.cpu_count() or 1)
 _DIRECTIONS_PER_STEP = 8
@@ -100,13 +100,13 @@ def occlusion_steps(
     if not count:
         return np.ones(0, np.float32)
     scene = _Scene(mesh, occluders, bodies, settings)
-    axes = even_axes(settings.rays)
+    axes = evenly_spread_axes(settings.rays)
     light, whole = np.zeros(count), np.zeros(count)
     with ThreadPoolExecutor(_THREADS) as threads:
         for first in range(0, len(axes), _DIRECTIONS_PER_STEP):
             part = axes[first : first + _DIRECTIONS_PER_STEP]
             # in order, so that the sums are the same every time
-            for fraction, transmittance in threads.map(scene.seen_along, part):
+            for fraction, transmittance in threads.map(scene.transmittance_along, part):
                 light += fraction * transmittance
                 whole += fraction
             yield (first + len(part)) / len(axes)
@@ -115,13 +115,13 @@ def occlusion_steps(
     return shown
 
 
-def extent_of(*meshes: CardMesh) -> float:
+def diagonal_of(*meshes: CardMesh) -> float:
     """The diagonal of cards' bounds [m], the unit of distances in the settings."""
     positions = np.concatenate([mesh.positions for mesh in meshes])
     return float(np.linalg.norm(np.ptp(positions, axis=0)))
 
 
-def even_axes(count: int) -> Floats:
+def evenly_spread_axes(count: int) -> Floats:
     """Unit vectors, one of each axis, (count, 3): with their opposites evenly over the sphere.
 
     A Fibonacci lattice of the upper half (Swinbank and Purser 2006).
@@ -148,7 +148,7 @@ class _Triangles:
         )
 
 
-class _Layer:
+class _OccluderCards:
     """The cards of one occluder.
 
     texel: (triangle_count, 6) float32 place in the texture of each triangle's first corner, and
@@ -162,7 +162,7 @@ class _Layer:
         alpha = np.ones((1, 1), np.float32) if occluder.alpha is None else occluder.alpha
         self.triangles = _Triangles(mesh.positions, mesh.triangles, middle)
         self.card = mesh.card if is_own else np.full_like(mesh.card, -1)
-        self.depth = -np.log(np.maximum(1.0 - alpha, np.exp(-_OPAQUE))).astype(np.float32)
+        self.depth = -np.log(np.maximum(1.0 - alpha, np.exp(-_OPAQUE_DEPTH))).astype(np.float32)
         texel = mesh.uv[mesh.triangles] * np.array(alpha.shape[::-1], np.float32)
         texel[:, 1:] -= texel[:, :1]
         self._texel = texel.reshape(-1, 6)
@@ -186,7 +186,7 @@ class _Distances:
 
     nearest: float
     reach: float
-    own: float
+    own_card: float
 
     @classmethod
     def of(cls, settings: CardOcclusionSettings, extent: float, whole: float) -> Self:
@@ -195,7 +195,7 @@ class _Distances:
             whole: of these and all occluders.
         """
         own = settings.self_occlusion_distance * extent
-        return cls(_NEAREST * extent, settings.reach * whole, own)
+        return cls(_MIN_DISTANCE * extent, settings.reach * whole, own)
 
 
 class _Scene:
@@ -214,19 +214,19 @@ class _Scene:
         self._card = card_of_vertex(mesh)
         self._extinction = settings.extinction
         self._distances = _Distances.of(
-            settings, extent_of(mesh), extent_of(mesh, *(each.mesh for each in occluders))
+            settings, diagonal_of(mesh), diagonal_of(mesh, *(each.mesh for each in occluders))
         )
         self._bodies = [_Triangles(body.positions, body.triangles, middle) for body in bodies]
-        self._layers = [_Layer(each, middle, each.mesh is mesh) for each in occluders]
+        self._layers = [_OccluderCards(each, middle, each.mesh is mesh) for each in occluders]
 
-    def seen_along(self, axis: Floats) -> tuple[Floats, Floats]:
+    def transmittance_along(self, axis: Floats) -> tuple[Floats, Floats]:
         """(cosine, transmittance) of each vertex' ray along the axis, each (vertex_count,)."""
         frame = _frame(axis)
         leaning = self._normals @ frame[2]
         side = np.where(leaning < 0.0, -1.0, 1.0).astype(np.float32)
         rays = _Rays(np.arange(len(leaning)), frame @ self._points, side, self._card)
         for body in self._bodies:
-            rays = rays.taken(~rays.enters(frame @ body.corners, body.height, self._distances))
+            rays = rays.select(~rays.enters(frame @ body.corners, body.height, self._distances))
         depth = np.zeros(len(rays.vertex))
         for layer in self._layers:
             depth += rays.depth(frame @ layer.triangles.corners, layer, self._distances)
@@ -236,7 +236,7 @@ class _Scene:
 
 
 @dataclass(frozen=True)
-class _Met:
+class _RayHits:
     """Rays and the triangles that they meet, each (m,); distance [m] along the ray."""
 
     ray: Ints
@@ -259,7 +259,7 @@ class _Rays:
     side: Floats
     card: Ints
 
-    def taken(self, chosen: Bools) -> _Rays:
+    def select(self, chosen: Bools) -> _Rays:
         index = np.flatnonzero(chosen)
         return _Rays(
             self.vertex[index], self.places.take(index, axis=1), self.side[index], self.card[index]
@@ -270,23 +270,23 @@ class _Rays:
         one, two = corners[1] - corners[0], corners[2] - corners[0]
         facing = one[0] * two[1] - one[1] * two[0]
         found = np.zeros(len(self.vertex), bool)
-        for met in self._met(corners, height, distances):
+        for met in self._hits(corners, height, distances):
             enters = facing.take(met.triangle) * self.side.take(met.ray) < 0.0
             found[met.ray[enters]] = True
         return found
 
-    def depth(self, corners: Floats, layer: _Layer, distances: _Distances) -> Floats:
+    def depth(self, corners: Floats, layer: _OccluderCards, distances: _Distances) -> Floats:
         """Optical depth of all cards of a layer that each ray meets, (n,)."""
         total = np.zeros(len(self.vertex))
-        for met in self._met(corners, layer.triangles.height, distances):
+        for met in self._hits(corners, layer.triangles.height, distances):
             is_own = layer.card.take(met.triangle) == self.card.take(met.ray)
-            kept = np.flatnonzero(~is_own | (met.distance > distances.own))
+            kept = np.flatnonzero(~is_own | (met.distance > distances.own_card))
             places = met.triangle.take(kept), met.second.take(kept), met.third.take(kept)
             depth = layer.depth_at(*places)
             total += np.bincount(met.ray.take(kept), depth, minlength=len(total))
         return total
 
-    def _met(self, corners: Floats, height: float, distances: _Distances) -> Iterator[_Met]:
+    def _hits(self, corners: Floats, height: float, distances: _Distances) -> Iterator[_RayHits]:
         """All triangles that rays meet ahead within the reach, in portions."""
         if not len(self.vertex):
             return
@@ -297,7 +297,7 @@ class _Rays:
             met = plane[:, 0] + plane[:, 1] * pair.second + plane[:, 2] * pair.third
             distance = (met - self.places[2].take(pair.point)) * self.side.take(pair.point)
             kept = np.flatnonzero((distance > distances.nearest) & (distance < distances.reach))
-            yield _Met(
+            yield _RayHits(
                 pair.point.take(kept),
                 pair.triangle.take(kept),
                 pair.second.take(kept),

@@ -24,30 +24,30 @@ from .card_mesh import CardMesh
 from .order_views import (
     MIN_ALPHA,
     OPAQUE_ALPHA,
-    BallView,
     Fragments,
-    alpha_at,
-    fragments,
-    nearest,
-    sphere_of,
+    SphereView,
+    bounding_sphere,
+    fragment_alpha,
+    rasterized,
+    surface_nearness,
     view_directions,
 )
 
 #: Colours that differ by more can be distinguished in 8 bits.
-VISIBLE = 1.0 / 255.0
+MIN_VISIBLE_DIFFERENCE = 1.0 / 255.0
 #: Alpha of cards without a texture.
-_PLAIN_ALPHA = 0.5
+_DEFAULT_ALPHA = 0.5
 #: Distance of the eye from the middle of the hair, in radii of the hair.
-_DISTANCE = 5.0
+_EYE_DISTANCE = 5.0
 
 
 @dataclass(frozen=True)
-class SeenCards:
+class VisibleFragments:
     """Visible fragments of the cards in a view, pixel by pixel, the farthest first, without those
     that opaque ones or the head hide. alpha: (fragment_count,), 1 for opaque ones.
     """
 
-    met: Fragments
+    fragments: Fragments
     alpha: Floats
 
 
@@ -72,67 +72,75 @@ def wrong_fraction(
     front = np.arange(len(mesh.triangles)) if front is None else front
     back = front if back is None else back
     wrong = covered = 0
-    for view in views_of(mesh, view_count, size):
-        is_wrong = wrong_pixels(mesh, seen_cards(mesh, head, view, alpha), front, back)
+    for view in check_views(mesh, view_count, size):
+        is_wrong = wrong_pixels(mesh, visible_fragments(mesh, head, view, alpha), front, back)
         wrong += int(is_wrong.sum())
         covered += len(is_wrong)
     return wrong / max(covered, 1)
 
 
-def views_of(mesh: CardMesh, count: int, size: int) -> list[BallView]:
+def check_views(mesh: CardMesh, count: int, size: int) -> list[SphereView]:
     """Views around the head, different from those that the order is learnt from."""
-    middle, radius = sphere_of(mesh)
+    middle, radius = bounding_sphere(mesh)
     turned = view_directions(count, turn=0.5)
-    return [BallView(middle, radius, each, size, _DISTANCE * radius) for each in turned]
+    return [SphereView(middle, radius, each, size, _EYE_DISTANCE * radius) for each in turned]
 
 
-def seen_cards(
-    mesh: CardMesh, head: Surface | None, view: BallView, alpha: Floats | None = None
-) -> SeenCards:
+def visible_fragments(
+    mesh: CardMesh, head: Surface | None, view: SphereView, alpha: Floats | None = None
+) -> VisibleFragments:
     """The visible fragments of a view; alpha is that of the nearest texel."""
-    met = fragments(view, mesh.positions, mesh.triangles)
-    met = met[met.near > nearest(view, head)[met.pixel]]
+    fragments = rasterized(view, mesh.positions, mesh.triangles)
+    fragments = fragments[fragments.nearness > surface_nearness(view, head)[fragments.pixel]]
     if alpha is None:
-        covers = np.full(len(met.pixel), _PLAIN_ALPHA, np.float32)
+        coverage = np.full(len(fragments.pixel), _DEFAULT_ALPHA, np.float32)
     else:
-        covers = alpha_at(mesh, met, alpha)
+        coverage = fragment_alpha(mesh, fragments, alpha)
     hidden = np.full(view.size * view.size, -np.inf, np.float32)
-    is_opaque = covers >= OPAQUE_ALPHA
-    np.maximum.at(hidden, met.pixel[is_opaque], met.near[is_opaque])
+    is_opaque = coverage >= OPAQUE_ALPHA
+    np.maximum.at(hidden, fragments.pixel[is_opaque], fragments.nearness[is_opaque])
     # of opaque fragments at one depth the first is drawn
-    is_seen = (covers >= MIN_ALPHA) & (met.near >= hidden[met.pixel])
-    met, covers = met[is_seen], np.where(is_opaque, 1.0, covers)[is_seen]
-    order = np.lexsort((met.near, met.pixel))
-    return SeenCards(met[order], covers[order])
+    is_seen = (coverage >= MIN_ALPHA) & (fragments.nearness >= hidden[fragments.pixel])
+    fragments, coverage = fragments[is_seen], np.where(is_opaque, 1.0, coverage)[is_seen]
+    order = np.lexsort((fragments.nearness, fragments.pixel))
+    return VisibleFragments(fragments[order], coverage[order])
 
 
-def wrong_pixels(mesh: CardMesh, seen: SeenCards, front: Ints, back: Ints) -> Bools:
+def wrong_pixels(mesh: CardMesh, visible: VisibleFragments, front: Ints, back: Ints) -> Bools:
     """Which of the pixels that hair covers are wrong, (covered_count,), by pixel."""
-    color = np.random.default_rng(0).random((len(mesh.group), 3))[mesh.card[seen.met.triangle]]
-    right = _blended(seen, color, np.arange(len(color)), is_written=np.zeros(len(color), bool))
-    is_opaque, is_front = seen.alpha >= 1.0, seen.met.is_front
-    place = np.where(is_front, _places(front)[seen.met.triangle], _places(back)[seen.met.triangle])
+    color = np.random.default_rng(0).random((len(mesh.group), 3))[
+        mesh.card[visible.fragments.triangle]
+    ]
+    expected = _blended(
+        visible, color, np.arange(len(color)), is_written=np.zeros(len(color), bool)
+    )
+    is_opaque, is_front = visible.alpha >= 1.0, visible.fragments.is_front
+    place = np.where(
+        is_front,
+        _ranks(front)[visible.fragments.triangle],
+        _ranks(back)[visible.fragments.triangle],
+    )
     drawn_in = np.where(is_opaque, 0, np.where(is_front, 2, 1))
     place[is_opaque] = -np.arange(is_opaque.sum())
-    order = np.lexsort((place, drawn_in, seen.met.pixel))
-    drawn = _blended(seen, color, order, is_written=is_front & ~is_opaque)
-    return (np.abs(drawn - right) > VISIBLE).any(axis=1)
+    order = np.lexsort((place, drawn_in, visible.fragments.pixel))
+    drawn = _blended(visible, color, order, is_written=is_front & ~is_opaque)
+    return (np.abs(drawn - expected) > MIN_VISIBLE_DIFFERENCE).any(axis=1)
 
 
-def _places(order: Ints) -> Ints:
+def _ranks(order: Ints) -> Ints:
     place = np.empty(len(order), np.int64)
     place[order] = np.arange(len(order))
     return place
 
 
-def _blended(seen: SeenCards, color: Floats, order: Ints, is_written: Bools) -> Floats:
+def _blended(visible: VisibleFragments, color: Floats, order: Ints, is_written: Bools) -> Floats:
     """The colour of each pixel, (covered_count, 3), fragments blended in this order.
 
     Args:
         order: (fragment_count,), pixel by pixel.
         is_written: (fragment_count,) whether a fragment's depth hides farther ones that come later.
     """
-    pixel = seen.met.pixel[order]
+    pixel = visible.fragments.pixel[order]
     starts = np.flatnonzero(np.diff(pixel, prepend=-1))
     count = np.diff(np.append(starts, len(pixel)))
     blended = np.zeros((len(starts), 3))
@@ -140,9 +148,9 @@ def _blended(seen: SeenCards, color: Floats, order: Ints, is_written: Bools) -> 
     for step in range(int(count.max(initial=0))):
         pixels = np.flatnonzero(count > step)
         one = order[starts[pixels] + step]
-        is_drawn = seen.met.near[one] > depth[pixels]
+        is_drawn = visible.fragments.nearness[one] > depth[pixels]
         pixels, one = pixels[is_drawn], one[is_drawn]
-        blended[pixels] += seen.alpha[one, None] * (color[one] - blended[pixels])
+        blended[pixels] += visible.alpha[one, None] * (color[one] - blended[pixels])
         hides = is_written[one]
-        depth[pixels[hides]] = seen.met.near[one[hides]]
+        depth[pixels[hides]] = visible.fragments.nearness[one[hides]]
     return blended

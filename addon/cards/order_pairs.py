@@ -14,84 +14,86 @@ from ..arrays import Bools, Floats, Ints
 from ..strands import Surface
 from .card_mesh import CardMesh
 from .order_views import (
-    LOWEST,
     MIN_ALPHA,
+    MIN_ELEVATION,
     OPAQUE_ALPHA,
-    BallView,
     Fragments,
-    alpha_at,
-    far_to_near,
-    fragments,
-    seen_from_afar,
-    sphere_of,
+    SphereView,
+    bounding_sphere,
+    downsampled_alpha,
+    fragment_alpha,
+    rasterized,
+    sorted_far_to_near,
     view_directions,
 )
 
 #: Alpha of cards without a texture. More would show too few layers, less would show layers that
 #: hardly count.
-OPACITY = 0.4
+DEFAULT_ALPHA = 0.4
 #: A pair that changes its pixel's colour by less than this fraction is left out.
 MIN_WEIGHT = 0.004
 #: Weights are whole numbers, so that their sums do not depend on the order of adding.
-_UNIT = 1000
+_WEIGHT_UNIT = 1000
 #: Views at work at the same time; numpy lets other threads run most of the time.
 _THREADS = min(4, os.cpu_count() or 1)
 
 
 @dataclass(frozen=True)
-class Pairs:
+class FragmentPairs:
     """Pairs of fragments in one pixel.
 
-    behind, before: (pair_count,) triangles, the farther one and the nearer one.
+    farther, nearer: (pair_count,) triangles, the farther one and the nearer one.
     weight: (pair_count,) int32, how much their order changes the colour of the pixel.
     facing: (pair_count,) int8, 0 two back faces, 1 two front faces, 2 one of each.
     """
 
-    behind: Ints
-    before: Ints
+    farther: Ints
+    nearer: Ints
     weight: Ints
     facing: Ints
 
-    def __getitem__(self, chosen: Bools) -> Pairs:
-        return Pairs(*(getattr(self, name)[chosen] for name in _NAMES))
+    def __getitem__(self, chosen: Bools) -> FragmentPairs:
+        return FragmentPairs(*(getattr(self, name)[chosen] for name in _FIELDS))
 
 
-_NAMES = ("behind", "before", "weight", "facing")
+_FIELDS = ("farther", "nearer", "weight", "facing")
 
 
 def pairs_by_view(
     mesh: CardMesh, head: Surface | None, view_count: int, size: int, alpha: Floats | None = None
-) -> Iterator[Pairs]:
+) -> Iterator[FragmentPairs]:
     """The pairs in each of many parallel views around the head, `size` pixels across.
 
     Args:
-        alpha: (height, width) of the cards' texture; None: OPACITY everywhere.
+        alpha: (height, width) of the cards' texture; None: DEFAULT_ALPHA everywhere.
     """
     if alpha is not None:
-        _, radius = sphere_of(mesh)
-        alpha = seen_from_afar(alpha, mesh, 2.0 * radius / size)
+        _, radius = bounding_sphere(mesh)
+        alpha = downsampled_alpha(alpha, mesh, 2.0 * radius / size)
 
-    def seen(direction: Floats) -> Pairs:
-        both_directions = _both_directions(mesh, head, direction, size, alpha)
-        return all_pairs([pairs_of(met, covers) for met, covers in both_directions])
+    def seen(direction: Floats) -> FragmentPairs:
+        both_directions = _from_both_sides(mesh, head, direction, size, alpha)
+        return concatenated_pairs([fragment_pairs(met, covers) for met, covers in both_directions])
 
     # few at a time: ending the work, or Blender, waits for the views that have begun
     with ThreadPoolExecutor(_THREADS) as threads:
-        begun: deque[Future[Pairs]] = deque()
+        running: deque[Future[FragmentPairs]] = deque()
         for direction in view_directions(view_count):
-            begun.append(threads.submit(seen, direction))
-            if len(begun) > _THREADS:
-                yield begun.popleft().result()
-        while begun:
-            yield begun.popleft().result()
+            running.append(threads.submit(seen, direction))
+            if len(running) > _THREADS:
+                yield running.popleft().result()
+        while running:
+            yield running.popleft().result()
 
 
-def all_pairs(found: Sequence[Pairs]) -> Pairs:
+def concatenated_pairs(found: Sequence[FragmentPairs]) -> FragmentPairs:
     """The pairs of some views in one, of at least one."""
-    return Pairs(*(np.concatenate([getattr(one, name) for one in found]) for name in _NAMES))
+    return FragmentPairs(
+        *(np.concatenate([getattr(one, name) for one in found]) for name in _FIELDS)
+    )
 
 
-def _both_directions(
+def _from_both_sides(
     mesh: CardMesh, head: Surface | None, direction: Floats, size: int, alpha: Floats | None
 ) -> Iterator[tuple[Fragments, Floats]]:
     """The fragments seen from this direction and, unless too far below, from the opposite one; and
@@ -99,64 +101,66 @@ def _both_directions(
 
     Parallel views from opposite sides have the same fragments in opposite order.
     """
-    view = BallView(*sphere_of(mesh), direction, size)
-    met = far_to_near(fragments(view, mesh.positions, mesh.triangles))
+    view = SphereView(*bounding_sphere(mesh), direction, size)
+    fragments = sorted_far_to_near(rasterized(view, mesh.positions, mesh.triangles))
     if alpha is None:
-        covers = np.full(len(met.pixel), OPACITY)
+        coverage = np.full(len(fragments.pixel), DEFAULT_ALPHA)
     else:
-        covers = alpha_at(mesh, met, alpha)
-    is_opaque = covers >= OPAQUE_ALPHA
-    body = None if head is None else fragments(view, head.positions, head.triangles)
+        coverage = fragment_alpha(mesh, fragments, alpha)
+    is_opaque = coverage >= OPAQUE_ALPHA
+    body = None if head is None else rasterized(view, head.positions, head.triangles)
     for sign in (1.0, -1.0):
-        if sign * direction[2] < np.sin(np.radians(LOWEST)):
+        if sign * direction[2] < np.sin(np.radians(MIN_ELEVATION)):
             continue
         # opaque pixels have their own pass, which hides what lies behind them
         limit = np.full(size * size, -np.inf, np.float32)
-        near = np.float32(sign) * met.near
-        np.maximum.at(limit, met.pixel[is_opaque], near[is_opaque])
+        near = np.float32(sign) * fragments.nearness
+        np.maximum.at(limit, fragments.pixel[is_opaque], near[is_opaque])
         if body is not None:
-            np.maximum.at(limit, body.pixel, np.float32(sign) * body.near)
-        is_seen = (near > limit[met.pixel]) & (covers >= MIN_ALPHA) & ~is_opaque
-        seen, fraction = met[is_seen], covers[is_seen]
+            np.maximum.at(limit, body.pixel, np.float32(sign) * body.nearness)
+        is_seen = (near > limit[fragments.pixel]) & (coverage >= MIN_ALPHA) & ~is_opaque
+        seen, fraction = fragments[is_seen], coverage[is_seen]
         if sign > 0.0:
             yield seen, fraction
         else:
             back = seen[np.arange(len(seen.pixel))[::-1]]
-            turned = replace(back, near=-back.near, is_front=~back.is_front)
+            turned = replace(back, nearness=-back.nearness, is_front=~back.is_front)
             yield turned, fraction[::-1]
 
 
-def pairs_of(met: Fragments, covers: Floats) -> Pairs:
+def fragment_pairs(fragments: Fragments, alpha: Floats) -> FragmentPairs:
     """All pairs of fragments that share a pixel, down to MIN_WEIGHT.
 
     Exchanging two fragments changes the pixel by the difference of their colours times both alphas
     and the transmittance of all other fragments before the farther one.
 
     Args:
-        met: pixel by pixel, the farthest first.
-        covers: (fragment_count,) below 1.
+        fragments: pixel by pixel, the farthest first.
+        alpha: (fragment_count,) below 1.
     """
-    count = len(met.pixel)
+    count = len(fragments.pixel)
     is_last = np.ones(count, bool)
-    is_last[:-1] = met.pixel[1:] != met.pixel[:-1]
+    is_last[:-1] = fragments.pixel[1:] != fragments.pixel[:-1]
     ends = np.flatnonzero(is_last)
     in_front = np.repeat(ends, np.diff(ends, prepend=-1)) - np.arange(count)
     # logarithm of the transmittance of all fragments before each
-    through = np.log1p(-covers.astype(np.float64)).cumsum()
+    through = np.log1p(-alpha.astype(np.float64)).cumsum()
     through = np.repeat(through[ends], np.diff(ends, prepend=-1)) - through
     found = [(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0))]
-    for apart in range(1, int(in_front.max(initial=0)) + 1):
-        behind = np.flatnonzero(in_front >= apart)
-        before = behind + apart
-        others = np.exp(through[behind]) / (1.0 - covers[before])
-        weight = covers[behind] * covers[before] * others
+    for steps in range(1, int(in_front.max(initial=0)) + 1):
+        farther = np.flatnonzero(in_front >= steps)
+        nearer = farther + steps
+        others = np.exp(through[farther]) / (1.0 - alpha[nearer])
+        weight = alpha[farther] * alpha[nearer] * others
         matters = weight >= MIN_WEIGHT
-        found.append((behind[matters], before[matters], weight[matters]))
-    behind, before, weight = (np.concatenate(each) for each in zip(*found, strict=True))
-    facing = np.where(met.is_front[behind] == met.is_front[before], met.is_front[behind], 2)
-    return Pairs(
-        met.triangle[behind].astype(np.int32),
-        met.triangle[before].astype(np.int32),
-        np.rint(_UNIT * weight).astype(np.int32),
+        found.append((farther[matters], nearer[matters], weight[matters]))
+    farther, nearer, weight = (np.concatenate(each) for each in zip(*found, strict=True))
+    facing = np.where(
+        fragments.is_front[farther] == fragments.is_front[nearer], fragments.is_front[farther], 2
+    )
+    return FragmentPairs(
+        fragments.triangle[farther].astype(np.int32),
+        fragments.triangle[nearer].astype(np.int32),
+        np.rint(_WEIGHT_UNIT * weight).astype(np.int32),
         facing.astype(np.int8),
     )

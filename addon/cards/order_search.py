@@ -29,18 +29,18 @@ class Preferences:
     higher: Ints
     weight: Ints
 
-    def broken(self, rank: Ints) -> int:
+    def violated_weight(self, rank: Ints) -> int:
         """Weight of the preferences that an order violates. rank: (count,) of each thing."""
         is_lower_first = rank[self.lower] < rank[self.higher]
         return int(np.abs(self.weight[is_lower_first != (self.weight > 0)]).sum())
 
-    def of_whole(self, whole: Ints, count: int) -> Preferences:
-        """The same preferences for `count` larger things; `whole`, (self.count,), maps each thing
-        to its own."""
+    def for_groups(self, group_of: Ints, count: int) -> Preferences:
+        """The same preferences for `count` larger things; `group_of`, (self.count,), maps each
+        thing to its own."""
         is_lower_first = self.weight > 0
         before = np.where(is_lower_first, self.lower, self.higher)
         after = np.where(is_lower_first, self.higher, self.lower)
-        return net_preferences(count, whole[before], whole[after], np.abs(self.weight))
+        return net_preferences(count, group_of[before], group_of[after], np.abs(self.weight))
 
 
 def net_preferences(count: int, before: Ints, after: Ints, weight: Ints) -> Preferences:
@@ -61,7 +61,7 @@ def net_preferences(count: int, before: Ints, after: Ints, weight: Ints) -> Pref
     return Preferences(count, lower, higher, total[total != 0])
 
 
-def min_broken(preferences: Preferences, start: Ints, max_moves: int = 20) -> Ints:
+def minimize_violations(preferences: Preferences, start: Ints, max_moves: int = 20) -> Ints:
     """The rank of each thing, (count,), in an order that no single move improves.
 
     A thing is tested again when one that it is compared with has moved. Things without preferences
@@ -73,17 +73,17 @@ def min_broken(preferences: Preferences, start: Ints, max_moves: int = 20) -> In
     """
     place = np.empty(preferences.count)
     place[start] = np.arange(preferences.count)
-    firsts, others, weights = _by_thing(preferences)
+    firsts, others, weights = _by_item(preferences)
     random = np.random.default_rng(0)
     waiting, looks = np.ones(preferences.count, bool), max_moves * preferences.count
     while looks > 0 and waiting.any():
         todo = random.permutation(np.flatnonzero(waiting))
         waiting[:] = False
-        for thing in todo[:looks].tolist():
-            mine = slice(firsts[thing], firsts[thing + 1])
-            better = _better_place(place[thing], place[others[mine]], weights[mine])
+        for item in todo[:looks].tolist():
+            mine = slice(firsts[item], firsts[item + 1])
+            better = _better_place(place[item], place[others[mine]], weights[mine])
             if better is not None:
-                place[thing] = better
+                place[item] = better
                 waiting[others[mine]] = True
         looks -= len(todo)
         place[np.argsort(place, kind="stable")] = np.arange(preferences.count)
@@ -98,17 +98,17 @@ def _better_place(own: float, places: Floats, weights: Ints) -> float | None:
     """
     order = places.argsort()
     places = places[order]
-    broken = np.zeros(len(places) + 1, np.int64)
-    weights[order].cumsum(out=broken[1:])
-    best = int(broken.argmin())
-    if broken[best] >= broken[places.searchsorted(own)]:
+    violated = np.zeros(len(places) + 1, np.int64)
+    weights[order].cumsum(out=violated[1:])
+    best = int(violated.argmin())
+    if violated[best] >= violated[places.searchsorted(own)]:
         return None
     low = places[best - 1] if best > 0 else places[0] - 1.0
     high = places[best] if best < len(places) else places[-1] + 1.0
     return float(low + high) / 2.0
 
 
-def _by_thing(preferences: Preferences) -> tuple[list[int], Ints, Ints]:
+def _by_item(preferences: Preferences) -> tuple[list[int], Ints, Ints]:
     """Preferences by thing: where each one's begin, the other things, and the weights."""
     one = np.concatenate([preferences.lower, preferences.higher])
     other = np.concatenate([preferences.higher, preferences.lower])

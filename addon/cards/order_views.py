@@ -14,16 +14,16 @@ from ..strands import Surface
 from .card_mesh import CardMesh
 
 #: Range of elevations of views around a head [degrees]; few look at hair from below.
-LOWEST, HIGHEST = -20.0, 65.0
+MIN_ELEVATION, MAX_ELEVATION = -20.0, 65.0
 #: Points beyond this fraction of the way from the middle to the eye count as behind it.
-_BEFORE_EYE = 0.99
+_MAX_NEARNESS = 0.99
 #: Alpha from which on a pixel is opaque, and below which it is transparent, as in the passes.
 OPAQUE_ALPHA, MIN_ALPHA = 0.99, 0.004
 _GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
 
 
 @dataclass(frozen=True)
-class BallView:
+class SphereView:
     """A square picture that contains a sphere.
 
     middle: (3,) and radius: of the sphere [m].
@@ -53,7 +53,7 @@ class BallView:
         if np.isinf(reach):
             rows = [x * half + half, y * half + half, near, np.ones_like(near)]
         else:
-            is_ahead = near < _BEFORE_EYE * reach
+            is_ahead = near < _MAX_NEARNESS * reach
             scale = np.where(is_ahead, reach / (reach - near * is_ahead), 0.0)
             stretch = scale * half * np.sqrt(1.0 - reach**-2)
             rows = [x * stretch + half, y * stretch + half, scale, scale]
@@ -64,38 +64,38 @@ class BallView:
 class Fragments:
     """Samples of triangles, one array each, (fragment_count,).
 
-    pixel: row * size + column. near: see BallView.project. is_front: counter-clockwise.
+    pixel: row * size + column. nearness: see SphereView.project. is_front: counter-clockwise.
     second, third: barycentric coordinates on the triangle.
     """
 
     pixel: Ints
     triangle: Ints
-    near: Floats
+    nearness: Floats
     is_front: Bools
     second: Floats
     third: Floats
 
     def __getitem__(self, chosen: Ints | Bools) -> Fragments:
-        names = ("pixel", "triangle", "near", "is_front", "second", "third")
+        names = ("pixel", "triangle", "nearness", "is_front", "second", "third")
         return Fragments(*(getattr(self, name)[chosen] for name in names))
 
 
 def view_directions(count: int, turn: float = 0.0) -> Floats:
     """Unit vectors all around, evenly spread over the range of elevations, (count, 3)."""
     number = np.arange(count) + 0.5
-    low, high = np.sin(np.radians([LOWEST, HIGHEST]))
+    low, high = np.sin(np.radians([MIN_ELEVATION, MAX_ELEVATION]))
     up = low + (high - low) * ((number * _GOLDEN + turn) % 1.0)
     around, out = 2.0 * np.pi * (number / max(count, 1) + turn), np.sqrt(1.0 - up * up)
     return np.stack([out * np.cos(around), out * np.sin(around), up], axis=1)
 
 
-def sphere_of(mesh: CardMesh) -> tuple[Floats, float]:
+def bounding_sphere(mesh: CardMesh) -> tuple[Floats, float]:
     """Middle (3,) and radius [m] of a sphere that contains the cards."""
     low, high = (corner.astype(np.float64) for corner in mesh.bounds())
     return (low + high) / 2.0, max(float(np.linalg.norm(high - low)) / 2.0, 1e-9)
 
 
-def fragments(view: BallView, positions: Floats, triangles: Ints) -> Fragments:
+def rasterized(view: SphereView, positions: Floats, triangles: Ints) -> Fragments:
     """Samples of all triangles in this view, in the order of the triangles."""
     corners = view.project(positions)[:, triangles.T]
     column, row, triangle = _candidates(corners, view.size)
@@ -108,15 +108,15 @@ def fragments(view: BallView, positions: Floats, triangles: Ints) -> Fragments:
     second = (right * ys[1, triangle] - up * xs[1, triangle]) * inverse[triangle]
     third = (up * xs[0, triangle] - right * ys[0, triangle]) * inverse[triangle]
     is_in = (second >= 0.0) & (third >= 0.0) & (second + third <= 1.0) & (area[triangle] != 0.0)
-    met = np.flatnonzero(is_in)
-    triangle, second, third = triangle[met], second[met], third[met]
+    inside = np.flatnonzero(is_in)
+    triangle, second, third = triangle[inside], second[inside], third[inside]
     first = 1.0 - second - third
     near, scale = (
         first * each[0, triangle] + second * each[1, triangle] + third * each[2, triangle]
         for each in (near, scale)
     )
     return Fragments(
-        row[met] * view.size + column[met],
+        row[inside] * view.size + column[inside],
         triangle,
         near,
         area[triangle] > 0.0,
@@ -137,33 +137,33 @@ def _candidates(corners: Floats, size: int) -> tuple[Ints, Ints, Ints]:
     return low[0, triangle] + column, low[1, triangle] + row, triangle
 
 
-def nearest(view: BallView, surface: Surface | None) -> Floats:
+def surface_nearness(view: SphereView, surface: Surface | None) -> Floats:
     """Nearness of the surface in each pixel, (size * size,); -inf where there is none."""
     near = np.full(view.size * view.size, -np.inf, np.float32)
     if surface is not None:
-        met = fragments(view, surface.positions, surface.triangles)
-        np.maximum.at(near, met.pixel, met.near)
+        fragments = rasterized(view, surface.positions, surface.triangles)
+        np.maximum.at(near, fragments.pixel, fragments.nearness)
     return near
 
 
-def far_to_near(met: Fragments) -> Fragments:
+def sorted_far_to_near(fragments: Fragments) -> Fragments:
     """Fragments sorted by pixel, and in a pixel the farthest first; equally near ones keep their
     order."""
-    return met[np.lexsort((met.near, met.pixel))]
+    return fragments[np.lexsort((fragments.nearness, fragments.pixel))]
 
 
-def alpha_at(mesh: CardMesh, met: Fragments, alpha: Floats) -> Floats:
+def fragment_alpha(mesh: CardMesh, fragments: Fragments, alpha: Floats) -> Floats:
     """Alpha of the nearest texel of each fragment, (fragment_count,); alpha: (height, width)."""
-    first = 1.0 - met.second - met.third
-    fractions = np.stack([first, met.second, met.third], axis=1)
-    uv = np.einsum("nc,nci->ni", fractions, mesh.uv[mesh.triangles[met.triangle]])
+    first = 1.0 - fragments.second - fragments.third
+    fractions = np.stack([first, fragments.second, fragments.third], axis=1)
+    uv = np.einsum("nc,nci->ni", fractions, mesh.uv[mesh.triangles[fragments.triangle]])
     height, width = alpha.shape
     row = np.clip((uv[:, 1] * height).astype(int), 0, height - 1)
     column = np.clip((uv[:, 0] * width).astype(int), 0, width - 1)
     return alpha[row, column]
 
 
-def seen_from_afar(alpha: Floats, mesh: CardMesh, pixel: float) -> Floats:
+def downsampled_alpha(alpha: Floats, mesh: CardMesh, pixel: float) -> Floats:
     """The alpha with texels about as large on the cards as a pixel of this many metres.
 
     It is halved like mip maps, to the last level whose texels are not larger than the pixel,

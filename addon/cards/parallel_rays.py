@@ -26,7 +26,7 @@ _ROWS_PER_TRIANGLE = 3.0
 #: Pairs of points and triangles tested at once: they stay in the processor's cache.
 _CHUNK = 1 << 15
 #: Edges that rise by less than this count as level, in rows.
-_LEVEL = 1.0e-6
+_MIN_RISE = 1.0e-6
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ def crossings(grid: PointGrid, corners: Floats) -> Iterator[Crossings]:
         done = total[first - 1] if first else 0
         last = max(int(np.searchsorted(total, done + _CHUNK, side="right")), first + 1)
         part = slice(first, last)
-        yield _covered(grid, forms, triangle[part], start[part], count[part])
+        yield _points_in_triangles(grid, forms, triangle[part], start[part], count[part])
         first = last
 
 
@@ -106,10 +106,10 @@ def _spans(grid: PointGrid, corners: Floats) -> tuple[Ints, Ints, Ints]:
     """(triangle, first sorted point, number of points) for each row of cells that a triangle
     crosses."""
     x, y = np.moveaxis((corners - grid.low[:, None]) / grid.cell[:, None], 1, 0)
-    lowest, highest = _least(y), _greatest(y)
+    lowest, highest = _corner_minimum(y), _corner_maximum(y)
     first = np.clip(lowest, 0, grid.row_count).astype(np.int64)
     beyond = np.clip(np.floor(highest) + 1, 0, grid.row_count).astype(np.int64)
-    is_beside = (_greatest(x) < 0) | (_least(x) >= grid.column_count)
+    is_beside = (_corner_maximum(x) < 0) | (_corner_minimum(x) >= grid.column_count)
     rows = np.where(is_beside, 0, np.maximum(beyond - first, 0))
     triangle = np.repeat(np.arange(len(rows)), rows)
     row = np.arange(len(triangle)) - np.repeat(piece_starts(rows) - first, rows)
@@ -119,15 +119,15 @@ def _spans(grid: PointGrid, corners: Floats) -> tuple[Ints, Ints, Ints]:
     first_cell = row * grid.column_count
     start = grid.starts.take(first_cell + begin)
     count = grid.starts.take(first_cell + end) - start
-    held = np.flatnonzero(count > 0)
-    return triangle.take(held), start.take(held), count.take(held)
+    with_points = np.flatnonzero(count > 0)
+    return triangle.take(with_points), start.take(with_points), count.take(with_points)
 
 
-def _least(corners: Floats) -> Floats:
+def _corner_minimum(corners: Floats) -> Floats:
     return np.minimum(np.minimum(corners[0], corners[1]), corners[2])
 
 
-def _greatest(corners: Floats) -> Floats:
+def _corner_maximum(corners: Floats) -> Floats:
     return np.maximum(np.maximum(corners[0], corners[1]), corners[2])
 
 
@@ -141,7 +141,7 @@ def _ends_in_row(x: Floats, y: Floats, triangle: Ints, row: Floats) -> tuple[Flo
     for one, two in ((0, 1), (1, 2), (2, 0)):
         low, high = np.minimum(y[one], y[two]), np.maximum(y[one], y[two])
         rise = y[two] - y[one]
-        slope = np.divide(x[two] - x[one], rise, np.zeros_like(rise), where=high - low > _LEVEL)
+        slope = np.divide(x[two] - x[one], rise, np.zeros_like(rise), where=high - low > _MIN_RISE)
         edge = np.stack([x[one] - slope * y[one], slope, low, high], axis=1).take(triangle, axis=0)
         enter, leave = np.maximum(edge[:, 2], row), np.minimum(edge[:, 3], row + 1)
         at_enter = edge[:, 0] + edge[:, 1] * enter
@@ -157,14 +157,16 @@ def _barycentric_forms(corners: Floats) -> Floats:
     first, one, two = corners[0], corners[1] - corners[0], corners[2] - corners[0]
     area = one[0] * two[1] - two[0] * one[1]
     is_flat = area == 0.0
-    by = 1.0 / np.where(is_flat, 1.0, area)
-    second, third = (two[1] * by, -two[0] * by), (-one[1] * by, one[0] * by)
+    inverse = 1.0 / np.where(is_flat, 1.0, area)
+    second, third = (two[1] * inverse, -two[0] * inverse), (-one[1] * inverse, one[0] * inverse)
     of_second, of_third = (-(bx * first[0] + by_ * first[1]) for bx, by_ in (second, third))
     of_second[is_flat] = -np.inf
     return np.stack([of_second, *second, of_third, *third], axis=1)
 
 
-def _covered(grid: PointGrid, forms: Floats, triangle: Ints, start: Ints, count: Ints) -> Crossings:
+def _points_in_triangles(
+    grid: PointGrid, forms: Floats, triangle: Ints, start: Ints, count: Ints
+) -> Crossings:
     """The points of spans that lie in their triangles."""
     begin = piece_starts(count)
     is_next = np.zeros(int(begin[-1] + count[-1]), np.int8)

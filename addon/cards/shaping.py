@@ -89,13 +89,13 @@ class CardVertices:
         return middle[row], axis[row]
 
 
-def tile_shift(grid: AtlasGrid, tile: Ints, wanted: Ints) -> Floats:
+def tile_offset(grid: AtlasGrid, tile: Ints, wanted: Ints) -> Floats:
     """Offset of UVs from tiles to wanted ones, (n, 2)."""
     nothing = np.zeros(1)
     return grid.uv(wanted, nothing, nothing) - grid.uv(tile, nothing, nothing)
 
 
-def card_along(
+def card_along_line(
     line: Floats,
     outwards: Floats,
     settings: CardSettings,
@@ -107,7 +107,7 @@ def card_along(
     """A card along a line from root to tip.
 
     Args:
-        line, outwards: see `from_root`.
+        line, outwards: see `line_from_root`.
         width: at the root [m].
     """
     frames = card_frames(line[None].astype(np.float32), outwards[None], settings.segment_count)
@@ -118,7 +118,7 @@ def card_along(
     return strip_mesh([(one, strips)], cards, settings.column_count, settings)
 
 
-def from_root(line: Floats, head: Surface | None) -> tuple[Floats, Floats]:
+def line_from_root(line: Floats, head: Surface | None) -> tuple[Floats, Floats]:
     """A line that starts at its root, and the normal of the skin there.
 
     The end nearer to the skin is the root. If it is near enough, it is moved onto the skin, and the
@@ -135,8 +135,8 @@ def from_root(line: Floats, head: Surface | None) -> tuple[Floats, Floats]:
     end = int(found.distance[1] < found.distance[0])
     line = line[::-1] if end else line
     lengths = np.linalg.norm(np.diff(line, axis=0), axis=1)
-    reached = np.concatenate([[0.0], np.cumsum(lengths)])
-    if found.distance[end] <= _NEAR_SKIN * reached[-1]:
-        left = 1.0 - reached / reached[-1]
-        line = line + (found.point[end] - line[0]) * (left**2)[:, None]
+    arc_length = np.concatenate([[0.0], np.cumsum(lengths)])
+    if found.distance[end] <= _NEAR_SKIN * arc_length[-1]:
+        remaining = 1.0 - arc_length / arc_length[-1]
+        line = line + (found.point[end] - line[0]) * (remaining**2)[:, None]
     return line, head.triangle_normals()[found.triangle[end]]

@@ -15,10 +15,10 @@ _NO_COLOR = 4.0
 #: Maximum number of strands that the hair is learnt from; numbers of neighbours that give the
 #: length of hair at a place, and its other properties; quantile of the neighbours' lengths that
 #: shells reach.
-_MAX_LEARNT, _NEIGHBOURS, _LIKE, _LONGEST = 20_000, 24, 12, 0.97
+_MAX_SAMPLES, _NEIGHBOURS, _AVERAGED_NEIGHBOURS, _LONGEST = 20_000, 24, 12, 0.97
 
 
-def between(values: Floats, along: Floats) -> Floats:
+def interpolated_along(values: Floats, along: Floats) -> Floats:
     """Values (n, cv_count, c) of CVs interpolated at parts (n, m) of the strands, (n, m, c);
     extrapolated beyond 1."""
     place = along * (values.shape[1] - 1)
@@ -47,7 +47,7 @@ class ShortHair:
     @classmethod
     def of(cls, strands: StrandSet, occlusion: Floats | None, layers: int) -> ShortHair:
         chosen = np.linspace(
-            0, strands.strand_count - 1, min(strands.strand_count, _MAX_LEARNT)
+            0, strands.strand_count - 1, min(strands.strand_count, _MAX_SAMPLES)
         ).astype(np.int64)
         grid = strands.grid[chosen].astype(np.float64)
         length = np.maximum(strands.lengths()[chosen], 1e-12)
@@ -56,20 +56,22 @@ class ShortHair:
         station = np.linspace(0.0, 1.0, 2 * layers + 1)
         # shorter strands are extrapolated
         along = np.minimum((reach / length)[:, None] * station, 2.0)
-        shift = between(grid, along) - grid[:, :1]
+        shift = interpolated_along(grid, along) - grid[:, :1]
         light: Floats = np.ones((len(chosen), layers))
         if occlusion is not None:
             within = along[:, 1::2]
-            light = between(occlusion[chosen][..., None], np.minimum(within, 1.0))[..., 0]
+            light = interpolated_along(occlusion[chosen][..., None], np.minimum(within, 1.0))[
+                ..., 0
+            ]
             light[within > 1.0] = np.nan
         hue = np.full((len(chosen), 3), _NO_COLOR)
         if strands.color_grid is not None:
             hue = np.nan_to_num(strands.color_grid[chosen].mean(axis=1), nan=_NO_COLOR)
         return cls(grid[:, 0], shift, light, reach, np.sqrt(np.maximum(hue, 0.0)))
 
-    def around(self, places: Floats) -> ShortHair:
+    def average_around(self, places: Floats) -> ShortHair:
         """The mean hair around places (m, 3)."""
-        near = nearest_points(places, self.roots, _LIKE)[0]
+        near = nearest_points(places, self.roots, _AVERAGED_NEIGHBOURS)[0]
         shift, reach, hue = (part[near].mean(axis=1) for part in (self.shift, self.reach, self.hue))
         there = self.occlusion[near]
         reaches = np.isfinite(there)

@@ -29,33 +29,33 @@ from .atlas import check_width, k_medoids
 from .atlas_grid import AtlasGrid
 from .atlas_settings import AtlasSettings
 from .bake_strands import FlatStrands, strand_ids
-from .shell_hair import ShortHair, between
+from .shell_hair import ShortHair, interpolated_along
 from .shell_skin import ShellSkin
 
 #: Number of patterns of full hair; fractions of the usual density of strands below which a patch
 #: shows one of the thinner patterns, which are as dense as such patches.
-_PATTERNS, _BORDERS = 4, (0.8, 0.45)
+_PATTERNS, _THIN_DENSITIES = 4, (0.8, 0.45)
 #: A patch counts as thin if it lacks more strands than this many standard deviations of the
 #: expected number.
-_BY_CHANCE = 2.0
+_CHANCE_DEVIATIONS = 2.0
 #: Margin around a patch from which strands are taken, as a fraction of its tile; maximum strands of
 #: a tile.
-_AROUND, _MAX_STRANDS = 0.15, 2500
+_MARGIN, _MAX_STRANDS = 0.15, 2500
 #: Cells along each side of a tile for counting how much of it patches show; and sample points along
 #: each side of a triangle.
 _SEEN_CELLS, _SEEN_POINTS = 8, 4
 #: Maximum number of cells along each side of a tile, of which empty ones are filled from others;
 #: and strands that a cell should hold, so that none is empty by chance.
-_MAX_CELLS, _PER_CELL = 5, 16.0
+_MAX_CELLS, _STRANDS_PER_CELL = 5, 16.0
 #: Texels across a strand's width.
 _STRAND_TEXELS = 1.5
 #: Factor on the strand width of cards.
-_WIDER = 0.9
+_WIDTH_FACTOR = 0.9
 #: Hair lies flat where the sine of its angle to the skin is below this.
-_FLAT = 0.6
+_MAX_FLAT_SINE = 0.6
 #: Difference of perceived colour that counts as much as hair twice as long: of square roots of
 #: linear colours.
-_HUE = 0.15
+_COLOR_SCALE = 0.15
 _TINY = 1e-12
 
 
@@ -107,14 +107,14 @@ class Patches:
         reach = np.maximum(mean(hair.reach[:, None])[:, 0], _TINY)
         leaning = upright / np.maximum(np.linalg.norm(lean, axis=1), _TINY)
         shape = np.stack([np.log2(reach), 2.0 * leaning], axis=1)
-        features = np.concatenate([shape, mean(hair.hue) / _HUE], axis=1)
+        features = np.concatenate([shape, mean(hair.hue) / _COLOR_SCALE], axis=1)
         area = np.bincount(of_triangle, skin.areas, count)
         extent = (high - low).max(axis=1) / 2.0
         surface = Surface(skin.positions, skin.triangles)
         made = cls(center, axes, extent, area, features, surface, of_triangle)
         return made, away - middle[patch]
 
-    def at(self, points: Floats) -> Ints:
+    def nearest_patch(self, points: Floats) -> Ints:
         """The patch nearest to each point, (len(points),)."""
         return np.asarray(self.of_triangle[search_of(self.surface).closest(points).triangle])
 
@@ -124,9 +124,9 @@ class ShellPlan:
     """What the bake needs beside the strands' points and radii.
 
     grid: how the atlas is divided; a pattern's layers are tiles one after another. size: of the
-    atlas [pixels]. half: half of the side of the square that a tile shows [m].
-    features: (pattern_count, k) of whole patterns, see `Patches`; thinned: the pattern that the
-        thinner patterns derive from, or None.
+    atlas [pixels]. half_side: half of the side of the square that a tile shows [m].
+    features: (pattern_count, k) of whole patterns, see `Patches`; thinned_pattern: the pattern that
+        the thinner patterns derive from, or None.
     center: (pattern_count, 3), axes: (pattern_count, 3, 3), reach: (pattern_count,) [m] length of
         the hair there.
     strands, pattern: (n,) strands and the patterns that show them. shift: (n, 2) within the tile
@@ -141,9 +141,9 @@ class ShellPlan:
     grid: AtlasGrid
     size: int
     layers: int
-    half: float
+    half_side: float
     features: Floats
-    thinned: int | None
+    thinned_pattern: int | None
     center: Floats
     axes: Floats
     reach: Floats
@@ -159,8 +159,8 @@ class ShellPlan:
     def pattern_of(self, patches: Patches) -> Ints:
         """The pattern that each patch shows, (patch_count,) int32."""
         step = np.zeros(len(patches.area), int)
-        if self.thinned is not None:
-            step = _thin_steps(patches, patches.at(self.roots), self.density)
+        if self.thinned_pattern is not None:
+            step = _thin_steps(patches, patches.nearest_patch(self.roots), self.density)
         return _pattern_of(patches, self.features, step)
 
 
@@ -173,8 +173,10 @@ def _thin_steps(patches: Patches, patch_of_root: Ints, density: float) -> Ints:
     """Number of _BORDERS that each patch's density is below, (patch_count,)."""
     count = np.bincount(patch_of_root, minlength=len(patches.area))
     expected = density * patches.area
-    is_thin = count < expected - _BY_CHANCE * expected**0.5
-    steps = np.digitize(-count / np.maximum(expected, _TINY), -np.array(_BORDERS), right=True)
+    is_thin = count < expected - _CHANCE_DEVIATIONS * expected**0.5
+    steps = np.digitize(
+        -count / np.maximum(expected, _TINY), -np.array(_THIN_DENSITIES), right=True
+    )
     return np.where(is_thin, steps, 0)
 
 
@@ -197,66 +199,71 @@ def plan_shells(
     check_width(radius)
     roots = strands.roots.astype(np.float64)
     random = np.random.default_rng(settings.seed)
-    patch_of_root = patches.at(roots)
-    density = _usual_density(patches, patch_of_root)
+    patch_of_root = patches.nearest_patch(roots)
+    density = _median_density(patches, patch_of_root)
     step = _thin_steps(patches, patch_of_root, density)
     whole = np.flatnonzero(step == 0)
     whole = whole if len(whole) else np.arange(len(step))
     _, chosen = k_medoids(patches.features[whole], min(_PATTERNS, len(whole)), random)
     features = patches.features[whole[chosen]]
     source = list(whole[chosen])
-    thinned = None
+    thinned_pattern = None
     if (step > 0).any():
         gap = ((patches.features[step > 0][:, None] - features) ** 2).sum(axis=2)
-        thinned = int(np.bincount(gap.argmin(axis=1)).argmax())
-        source += [source[thinned]] * len(_BORDERS)
-    half = 1.02 * float(np.quantile(patches.extent, 0.95))
+        thinned_pattern = int(np.bincount(gap.argmin(axis=1)).argmax())
+        source += [source[thinned_pattern]] * len(_THIN_DENSITIES)
+    half_side = 1.02 * float(np.quantile(patches.extent, 0.95))
     length = strands.lengths()
     covers = 2.0 * radius.mean(axis=1) * length
-    shows = _pattern_of(patches, features, step)
-    grown = _Grown.of(patches, shows, patch_of_root, covers, len(source))
-    shown = [
-        _shown(patches, patch, half, density, grown.density[p], roots, root_normal, random)
+    pattern_of_patch = _pattern_of(patches, features, step)
+    pattern_hair = _PatternHair.of(patches, pattern_of_patch, patch_of_root, covers, len(source))
+    tile_strands = [
+        _tile_strands(
+            patches, patch, half_side, density, pattern_hair.density[p], roots, root_normal, random
+        )
         for p, patch in enumerate(source)
     ]
-    used = np.concatenate([each.strand for each in shown])
-    pattern = np.repeat(np.arange(len(shown)), [len(each.strand) for each in shown])
-    wider = [
-        grown.cover[p] / _seen_cover(patches, np.flatnonzero(shows == p), half, each, covers)
-        for p, each in enumerate(shown)
+    used = np.concatenate([each.strand for each in tile_strands])
+    pattern = np.repeat(np.arange(len(tile_strands)), [len(each.strand) for each in tile_strands])
+    width_factors = [
+        pattern_hair.cover[p]
+        / _visible_cover(patches, np.flatnonzero(pattern_of_patch == p), half_side, each, covers)
+        for p, each in enumerate(tile_strands)
     ]
-    thickness = _WIDER * settings.strand_width * np.array(wider)
+    thickness = _WIDTH_FACTOR * settings.strand_width * np.array(width_factors)
     texel = 2.0 * float(np.median(radius[used].mean(axis=1))) * thickness[0] / _STRAND_TEXELS
-    fitted = _fitted(settings, layers * len(shown), 2.0 * half / texel)
-    texels = _STRAND_TEXELS * fitted.inner_tile[0] * texel / (2.0 * half)
+    fitted = _fitted_settings(settings, layers * len(tile_strands), 2.0 * half_side / texel)
+    texels = _STRAND_TEXELS * fitted.inner_tile[0] * texel / (2.0 * half_side)
     return ShellPlan(
         grid=fitted.grid,
         size=fitted.side,
         layers=layers,
-        half=half,
+        half_side=half_side,
         features=features,
-        thinned=thinned,
+        thinned_pattern=thinned_pattern,
         center=patches.center[source],
         axes=patches.axes[source],
-        reach=np.array([np.quantile(length[used][pattern == p], 0.9) for p in range(len(shown))]),
+        reach=np.array(
+            [np.quantile(length[used][pattern == p], 0.9) for p in range(len(tile_strands))]
+        ),
         strands=used,
         pattern=pattern,
-        shift=np.concatenate([each.shift for each in shown]),
+        shift=np.concatenate([each.shift for each in tile_strands]),
         thickness=thickness,
         density=density,
         roots=roots,
-        is_flat=float(np.median(patches.features[:, 1])) < 2.0 * _FLAT,
+        is_flat=float(np.median(patches.features[:, 1])) < 2.0 * _MAX_FLAT_SINE,
         notes=_notes(texels),
     )
 
 
-def _usual_density(patches: Patches, patch_of_root: Ints) -> float:
+def _median_density(patches: Patches, patch_of_root: Ints) -> float:
     count = np.bincount(patch_of_root, minlength=len(patches.area))
     return float(np.median((count / np.maximum(patches.area, _TINY))[count > 0]))
 
 
 @dataclass(frozen=True, eq=False)
-class _Grown:
+class _PatternHair:
     """Hair on all patches that show a pattern, (pattern_count,) each.
 
     density: of roots [1/m^2]. cover: area of strands, laid flat, over that of skin.
@@ -267,14 +274,19 @@ class _Grown:
 
     @classmethod
     def of(
-        cls, patches: Patches, shows: Ints, patch_of_root: Ints, covers: Floats, count: int
-    ) -> _Grown:
-        skin = np.bincount(shows, patches.area, count)
-        pattern = shows[patch_of_root]
+        cls,
+        patches: Patches,
+        pattern_of_patch: Ints,
+        patch_of_root: Ints,
+        covers: Floats,
+        count: int,
+    ) -> _PatternHair:
+        skin = np.bincount(pattern_of_patch, patches.area, count)
+        pattern = pattern_of_patch[patch_of_root]
         roots, area = np.bincount(pattern, minlength=count), np.bincount(pattern, covers, count)
         # a pattern that no patch of this level shows, or without a root, gets the density of the
         # last border
-        thin = len(covers) / patches.area.sum() * _BORDERS[-1]
+        thin = len(covers) / patches.area.sum() * _THIN_DENSITIES[-1]
         has_any = (skin > 0.0) & (roots > 0)
         skin = np.where(has_any, skin, 1.0)
         return cls(
@@ -284,7 +296,7 @@ class _Grown:
 
 
 @dataclass(frozen=True, eq=False)
-class _Shown:
+class _TileStrands:
     """The strands of a tile, (n,): their number, root and shift (n, 2) [m] in its plane."""
 
     strand: Ints
@@ -292,38 +304,40 @@ class _Shown:
     shift: Floats
 
 
-def _shown(
+def _tile_strands(
     patches: Patches,
     patch: int,
     half: float,
-    usual: float,
+    full_density: float,
     density: float,
     roots: Floats,
     root_normal: Floats,
     random: np.random.Generator,
-) -> _Shown:
-    """Strands around a patch, as many as the density gives; usual: density of full hair."""
+) -> _TileStrands:
+    """Strands around a patch, as many as the density gives; full_density: density of full hair."""
     axes, away = patches.axes[patch], roots - patches.center[patch]
-    place, reach = away @ axes[:2].T, (1.0 + _AROUND) * half
+    place, reach = away @ axes[:2].T, (1.0 + _MARGIN) * half
     is_near = (np.abs(place) <= reach).all(axis=1)
     is_near &= (np.abs(away @ axes[2]) <= half) & (root_normal @ axes[2] > 0.3)
     own = np.flatnonzero(is_near)
     own = own if len(own) else np.linalg.norm(away, axis=1).argmin(keepdims=True)
-    every, shift = _filled(own, place[own], half, usual * (2.0 * reach) ** 2, random)
+    every, shift = _with_filled_cells(
+        own, place[own], half, full_density * (2.0 * reach) ** 2, random
+    )
     wanted = int(np.clip(round(density * (2.0 * reach) ** 2), 1, _MAX_STRANDS))
     kept = np.sort(random.permutation(len(every))[:wanted])
     again = random.choice(every, wanted - len(kept))
     moved = random.uniform(-reach, reach, (len(again), 2)) - place[again]
     strand = np.concatenate([every[kept], again])
     shift = np.concatenate([shift[kept], moved])
-    return _Shown(strand, place[strand] + shift, shift)
+    return _TileStrands(strand, place[strand] + shift, shift)
 
 
-def _seen_cover(
-    patches: Patches, chosen: Ints, half: float, shown: _Shown, covers: Floats
+def _visible_cover(
+    patches: Patches, chosen: Ints, half: float, shown: _TileStrands, covers: Floats
 ) -> float:
     """Area of a tile's strands over that of the skin, where these patches show the tile."""
-    reach = (1.0 + _AROUND) * half
+    reach = (1.0 + _MARGIN) * half
     if not len(chosen):
         return float(covers[shown.strand].sum() / (2.0 * reach) ** 2)
     is_seen = np.isin(patches.of_triangle, chosen)
@@ -337,14 +351,14 @@ def _seen_cover(
     place = np.einsum("tpi,tai->tpa", points - patches.center[patch, None], patches.axes[patch, :2])
     place /= np.maximum(half, patches.extent[patch])[:, None, None]
     area = np.repeat(np.linalg.norm(np.cross(edge_a, edge_b), axis=1), len(a))
-    seen = _in_cells(place.reshape(-1, 2), area)
-    cover = _in_cells(shown.root / half, covers[shown.strand])
+    seen = _sums_in_cells(place.reshape(-1, 2), area)
+    cover = _sums_in_cells(shown.root / half, covers[shown.strand])
     cell = (2.0 * half / _SEEN_CELLS) ** 2
     found = float((seen * cover).sum() / (seen.sum() * cell))
     return found if found > 0.0 else float(covers[shown.strand].sum() / (2.0 * reach) ** 2)
 
 
-def _in_cells(place: Floats, values: Floats) -> Floats:
+def _sums_in_cells(place: Floats, values: Floats) -> Floats:
     """Sums of values in the cells of a tile; places from -1 to 1 along both sides."""
     cell = np.floor((place + 1.0) * (0.5 * _SEEN_CELLS)).astype(int)
     is_inside = ((cell >= 0) & (cell < _SEEN_CELLS)).all(axis=1)
@@ -352,8 +366,8 @@ def _in_cells(place: Floats, values: Floats) -> Floats:
     return np.bincount(number, values[is_inside], _SEEN_CELLS**2)
 
 
-def _filled(
-    own: Ints,
+def _with_filled_cells(
+    strands: Ints,
     place: Floats,
     half: float,
     expected: float,
@@ -361,27 +375,27 @@ def _filled(
 ) -> tuple[Ints, Floats]:
     """The strands, with copies in cells of the tile without hair, as at a rim, since patches
     elsewhere show the tile too."""
-    reach = (1.0 + _AROUND) * half
-    cells = int(np.clip((expected / _PER_CELL) ** 0.5, 1.0, _MAX_CELLS))
+    reach = (1.0 + _MARGIN) * half
+    cells = int(np.clip((expected / _STRANDS_PER_CELL) ** 0.5, 1.0, _MAX_CELLS))
     cell = np.clip(((place / reach + 1.0) * 0.5 * cells).astype(int), 0, cells - 1)
     number = cell[:, 0] * cells + cell[:, 1]
     count = np.bincount(number, minlength=cells**2)
     usual = expected / cells**2
-    is_full = count >= min(usual - _BY_CHANCE * usual**0.5, float(count.max()))
+    is_full = count >= min(usual - _CHANCE_DEVIATIONS * usual**0.5, float(count.max()))
     full = np.flatnonzero(is_full)
-    all_own = [own[is_full[number]]]
+    all_own = [strands[is_full[number]]]
     all_shift = [np.zeros((len(all_own[0]), 2))]
     for empty in np.flatnonzero(~is_full):
-        of = random.choice(full)
-        copied = number == of
-        step = np.array(divmod(int(empty), cells)) - divmod(int(of), cells)
-        all_own.append(own[copied])
+        donor = random.choice(full)
+        copied = number == donor
+        step = np.array(divmod(int(empty), cells)) - divmod(int(donor), cells)
+        all_own.append(strands[copied])
         moved = step * 2.0 * reach / cells
         all_shift.append(np.tile(moved, (int(copied.sum()), 1)))
     return np.concatenate(all_own), np.concatenate(all_shift)
 
 
-def _fitted(settings: AtlasSettings, tile_count: int, texels: float) -> AtlasSettings:
+def _fitted_settings(settings: AtlasSettings, tile_count: int, texels: float) -> AtlasSettings:
     """The settings with square tiles, as many as are needed."""
     columns = 1 << round(np.log2(tile_count) / 2.0)
     square = replace(settings, columns=columns, rows=-(-tile_count // columns))
@@ -423,7 +437,7 @@ def shell_strands(
     strand, layer = strand[order], layer[order]
     own = pattern[strand]
     along = np.stack([start[strand, layer], end[strand, layer]], axis=1)
-    ends = between(points[strand], along)
+    ends = interpolated_along(points[strand], along)
     axes = plan.axes[own]
     away = ends - (plan.center[own] + mean[own, layer])[:, None]
     away = np.einsum("nei,nai->nea", away, axes)
@@ -433,9 +447,11 @@ def shell_strands(
     shown = np.sqrt(flat**2 + visible_upright * np.maximum(whole**2 - flat**2, 0.0))
     heading = unit_or(np.pad(step[:, :2], ((0, 0), (0, 1))), (0.0, 1.0, 0.0), 1e-9)[:, :2]
     middle = away[..., :2].mean(axis=1)
-    thick = between(radius[plan.strands][..., None].astype(np.float64)[strand], along)[..., 0]
+    thick = interpolated_along(radius[plan.strands][..., None].astype(np.float64)[strand], along)[
+        ..., 0
+    ]
     thick = thick * plan.thickness[own, None]
-    side = 2.0 * plan.half
+    side = 2.0 * plan.half_side
     place = middle[:, None] + np.array([[-0.5], [0.5]]) * (shown[:, None] * heading)[:, None]
     place = 0.5 + place / side
     aside = np.stack([heading[:, 1], -heading[:, 0]], axis=1)[:, None] * thick[..., None] / side
@@ -454,8 +470,8 @@ def shell_strands(
         "along": along,
         "depth": np.clip(0.5 + away[..., 2] / side, 0.0, 1.0),
         "tangent": np.repeat(_directions(step, mean, own, layer, axes)[:, None], 2, axis=1),
-        "base": between(shade[strand], along) / gain,
-        "occlusion": np.repeat(_beneath(area, side**2, layers)[tile], 2, axis=1),
+        "base": interpolated_along(shade[strand], along) / gain,
+        "occlusion": np.repeat(_light_below_layers(area, side**2, layers)[tile], 2, axis=1),
         "strand_id": strand_ids(len(points))[strand],
     }
     single = {name: part[inside].astype(np.float32) for name, part in parts.items()}
@@ -465,7 +481,7 @@ def shell_strands(
 def _mean_shifts(plan: ShellPlan, points: Floats, slab: Floats) -> Floats:
     """Mean vectors from roots to the middle of each slab, (pattern_count, layers, 3) [m]."""
     middle = (slab[:, :-1] + slab[:, 1:]) / 2.0
-    shift = between(points, np.minimum(middle, 2.0)) - points[:, :1]
+    shift = interpolated_along(points, np.minimum(middle, 2.0)) - points[:, :1]
     means = [shift[plan.pattern == pattern].mean(axis=0) for pattern in range(len(plan.reach))]
     return np.stack(means)
 
@@ -480,7 +496,7 @@ def _directions(step: Floats, mean: Floats, own: Ints, layer: Ints, axes: Floats
     return unit_or(np.einsum("ni,nai->na", step, frame), (0.0, 1.0, 0.0), 1e-12)
 
 
-def _beneath(area: Floats, side: float, layers: int) -> Floats:
+def _light_below_layers(area: Floats, side: float, layers: int) -> Floats:
     """Light from the front that the layers above each tile let through: exp(-tau)."""
     tau = (area / side).reshape(-1, layers)
     above = tau[:, ::-1].cumsum(axis=1)[:, ::-1] - tau

@@ -24,9 +24,9 @@ from ..strands.weld import unique_position_indices
 #: Distance from a root up to which skin has hair, in distances between roots.
 _REACH = 2.5
 #: Factor by which the skin is cut finer than the coarse triangles, and maximum number of pieces.
-_FINER, _MAX_PIECES = 4.0, 400_000
+_REFINEMENT, _MAX_PIECES = 4.0, 400_000
 #: Offset along the normal that separates cells on both sides of a sheet, as a fraction of an edge.
-_SIDES_APART = 0.4
+_SIDE_OFFSET = 0.4
 _ROUNDS, _ATTEMPTS = 10, 5
 #: Approximate number of places of the skin that are tested for bulges.
 _MAX_BULGES = 20_000
@@ -34,10 +34,10 @@ _MAX_BULGES = 20_000
 _MAX_RAISED = 2.5
 #: If a triangle's normal and its patch's have a cosine below this, the patch's triangles become
 #: patches of their own.
-_APART = 0.6
+_MIN_PATCH_COSINE = 0.6
 #: Triangles below this fraction of the median area are dropped: they have no direction and show
 #: nothing.
-_SLIVER = 0.02
+_MIN_AREA_RATIO = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,14 +47,14 @@ class ShellSkin:
     positions, normals: (vertex_count, 3) [m], on the skin, and unit normals of the triangles there.
     triangles: (triangle_count, 3), counter-clockwise seen from outside.
     error: nine tenths of the skin under hair are nearer to this one than this [m].
-    raised: the positions moved outwards, so that no skin bulges out of the triangles.
+    raised_positions: the positions moved outwards, so that no skin bulges out of the triangles.
     """
 
     positions: Floats
     normals: Floats
     triangles: Ints
     error: float
-    raised: Floats
+    raised_positions: Floats
 
     @property
     def middles(self) -> Floats:
@@ -86,15 +86,17 @@ class ShellSkin:
             layers: (layer_count, vertex_count, 3) [m], positions of the vertices in the layers of
                 shells.
         """
-        label = gathered(self.middles, self.facings, self.areas, count)
-        is_lonely = np.zeros(len(label), bool)
+        label = voronoi_cells(self.middles, self.facings, self.areas, count)
+        faces_apart = np.zeros(len(label), bool)
         for positions in (self.positions, *layers):
             vectors = area_vectors(positions[self.triangles])
             across = np.zeros((len(self.triangles), 3))
             np.add.at(across, label, vectors)
-            is_lonely |= np.einsum("ti,ti->t", unit(across[label]), unit(vectors)) < _APART
-        alone = np.bincount(label, is_lonely)[label] > 0
-        label = np.where(alone, len(label) + np.arange(len(label)), label)
+            faces_apart |= (
+                np.einsum("ti,ti->t", unit(across[label]), unit(vectors)) < _MIN_PATCH_COSINE
+            )
+        is_split = np.bincount(label, faces_apart)[label] > 0
+        label = np.where(is_split, len(label) + np.arange(len(label)), label)
         return np.asarray(np.unique(label, return_inverse=True)[1]).reshape(-1)
 
 
@@ -121,10 +123,12 @@ def fine_skin(head: Surface, roots: Floats, spacing: float, triangle_count: int)
     chosen = np.flatnonzero(away <= reach + size)
     corners: Floats = head.corners[chosen].astype(np.float64)
     normals: Floats = head.vertex_normals()[head.triangles[chosen]].astype(np.float64)
-    edge = _edge(min(float(areas_of(corners).sum()), len(roots) * spacing**2), triangle_count)
+    edge = _even_edge_length(
+        min(float(areas_of(corners).sum()), len(roots) * spacing**2), triangle_count
+    )
     while len(corners) and 4 * len(corners) <= _MAX_PIECES:
         longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-        if np.quantile(longest, 0.9) <= edge / _FINER:
+        if np.quantile(longest, 0.9) <= edge / _REFINEMENT:
             break
         corners, normals = quartered(corners), quartered(normals)
     number = unique_position_indices(corners.reshape(-1, 3).astype(np.float32))
@@ -144,7 +148,7 @@ def coarse_skin(fine: FineSkin, head: Surface, triangle_count: int) -> ShellSkin
     any."""
     cells, best = max(triangle_count // 2, 3), None
     for _ in range(_ATTEMPTS):
-        found = _of_cells(fine, head, min(cells, len(fine.positions)))
+        found = _skin_from_cells(fine, head, min(cells, len(fine.positions)))
         count = len(found.triangles)
         if count <= triangle_count and count > (0 if best is None else len(best.triangles)):
             best = found
@@ -152,17 +156,17 @@ def coarse_skin(fine: FineSkin, head: Surface, triangle_count: int) -> ShellSkin
             break
         wanted = 0.97 * triangle_count / max(count, 1)
         cells = max(int(cells * np.clip(wanted, 0.4, 2.5)), 3)
-    return None if best is None else _raised(best, fine)
+    return None if best is None else _with_raised_vertices(best, fine)
 
 
-def gathered(places: Floats, normals: Floats, area: Floats, count: int) -> Ints:
+def voronoi_cells(places: Floats, normals: Floats, area: Floats, count: int) -> Ints:
     """The cell of each place, (n,), of at most `count` cells of about one size.
 
     Args:
         places, normals: (n, 3); places of opposite normals are kept apart. area: (n,) weights.
     """
-    edge = _edge(float(area.sum()), 2 * count)
-    points = places + _SIDES_APART * edge * normals
+    edge = _even_edge_length(float(area.sum()), 2 * count)
+    points = places + _SIDE_OFFSET * edge * normals
     order = np.argsort(morton_code(points), kind="stable")
     middle = points[order[np.linspace(0, len(order) - 1, count).round().astype(int)]]
     for _ in range(_ROUNDS):
@@ -174,8 +178,8 @@ def gathered(places: Floats, normals: Floats, area: Floats, count: int) -> Ints:
     return nearest_points(points, middle, 1)[0][:, 0]
 
 
-def _of_cells(fine: FineSkin, head: Surface, count: int) -> ShellSkin:
-    label = gathered(fine.positions, fine.normals, fine.area, count)
+def _skin_from_cells(fine: FineSkin, head: Surface, count: int) -> ShellSkin:
+    label = voronoi_cells(fine.positions, fine.normals, fine.area, count)
     # a cell at the border lies on the border, or hair would recede by half a cell
     weight = np.where(_is_border(fine), 1.0, 1e-6) * fine.area
     has_border = np.bincount(label, _is_border(fine)) > 0
@@ -186,16 +190,18 @@ def _of_cells(fine: FineSkin, head: Surface, count: int) -> ShellSkin:
     normals = head.vertex_normals()[head.triangles[on_skin.triangle]]
     normals = unit(np.einsum("nk,nki->ni", on_skin.barycentric, normals))
 
-    met = label[fine.triangles]
-    is_corner = (met[:, 0] != met[:, 1]) & (met[:, 1] != met[:, 2]) & (met[:, 2] != met[:, 0])
-    met = met[is_corner]
-    _, first = np.unique(np.sort(met, axis=1), axis=0, return_index=True)
-    triangles = met[np.sort(first)]
+    cells = label[fine.triangles]
+    is_corner = (
+        (cells[:, 0] != cells[:, 1]) & (cells[:, 1] != cells[:, 2]) & (cells[:, 2] != cells[:, 0])
+    )
+    cells = cells[is_corner]
+    _, first = np.unique(np.sort(cells, axis=1), axis=0, return_index=True)
+    triangles = cells[np.sort(first)]
     face = area_vectors(on_skin.point[triangles])
-    is_turned = np.einsum("ni,ni->n", face, normals[triangles].sum(axis=1)) < 0.0
-    triangles[is_turned] = triangles[is_turned, ::-1]
+    is_flipped = np.einsum("ni,ni->n", face, normals[triangles].sum(axis=1)) < 0.0
+    triangles[is_flipped] = triangles[is_flipped, ::-1]
     area = areas_of(on_skin.point[triangles])
-    triangles = triangles[area > _SLIVER * np.median(area)] if len(area) else triangles
+    triangles = triangles[area > _MIN_AREA_RATIO * np.median(area)] if len(area) else triangles
     used, compact = np.unique(triangles, return_inverse=True)
     triangles = np.asarray(compact).reshape(-1, 3)
     positions = on_skin.point[used]
@@ -206,22 +212,22 @@ def _of_cells(fine: FineSkin, head: Surface, count: int) -> ShellSkin:
     return ShellSkin(positions, unit(across), triangles, error, positions)
 
 
-def _raised(skin: ShellSkin, fine: FineSkin) -> ShellSkin:
+def _with_raised_vertices(skin: ShellSkin, fine: FineSkin) -> ShellSkin:
     """The skin with vertices raised so far that hardly any skin under hair bulges out of the
     triangles: each bulge moves the corners of the triangle below it by the smallest sufficient
     heights."""
     places = np.arange(0, len(fine.positions), max(len(fine.positions) // _MAX_BULGES, 1))
-    on = search_of(Surface(skin.positions, skin.triangles)).closest(fine.positions[places])
-    out = skin.facings[on.triangle]
-    height = np.einsum("ni,ni->n", fine.positions[places] - on.point, out)
+    closest = search_of(Surface(skin.positions, skin.triangles)).closest(fine.positions[places])
+    out = skin.facings[closest.triangle]
+    height = np.einsum("ni,ni->n", fine.positions[places] - closest.point, out)
     # places beyond the border have no triangle below
-    is_over = (height > 0.5 * on.distance) & (on.distance > 0.0)
-    corner, weight = skin.triangles[on.triangle], on.barycentric
-    need = height[:, None] * weight / np.sum(weight**2, axis=1, keepdims=True)
-    most = np.zeros(len(skin.positions))
-    np.maximum.at(most, corner[is_over], need[is_over])
-    raised = np.minimum(most, _MAX_RAISED * skin.error)[:, None] * skin.normals
-    return replace(skin, raised=skin.positions + raised)
+    is_over = (height > 0.5 * closest.distance) & (closest.distance > 0.0)
+    corner, weight = skin.triangles[closest.triangle], closest.barycentric
+    rise = height[:, None] * weight / np.sum(weight**2, axis=1, keepdims=True)
+    max_rise = np.zeros(len(skin.positions))
+    np.maximum.at(max_rise, corner[is_over], rise[is_over])
+    raised = np.minimum(max_rise, _MAX_RAISED * skin.error)[:, None] * skin.normals
+    return replace(skin, raised_positions=skin.positions + raised)
 
 
 def _is_border(fine: FineSkin) -> Bools:
@@ -241,6 +247,6 @@ def _error(fine: FineSkin, positions: Floats, triangles: Ints) -> float:
     return float(np.percentile(found.distance, 90.0))
 
 
-def _edge(area: float, triangle_count: int) -> float:
+def _even_edge_length(area: float, triangle_count: int) -> float:
     """Edge of this many even triangles with this area together [m]."""
     return float((4.0 / 3.0**0.5 * max(area, 1e-30) / max(triangle_count, 1)) ** 0.5)

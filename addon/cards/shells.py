@@ -38,13 +38,13 @@ from .strip import mean_spacing
 #: shells cannot show hair longer than the second fraction.
 SHORT, _TOO_LONG = 0.12, 0.4
 #: Minimum number of strands for shells.
-_FEWEST = 100
+_MIN_STRANDS = 100
 #: Triangles of the finest level if no number is set.
-_TRIANGLES = 12_000
+_DEFAULT_TRIANGLES = 12_000
 #: Approximate number of triangles of a patch, and minimum strands on it: fewer make no pattern.
-_PATCH, _PATCH_STRANDS = 2, 8
+_TRIANGLES_PER_PATCH, _MIN_STRANDS_PER_PATCH = 2, 8
 #: Minimum cosine between a normal of the hair's volume and that of the layer.
-_FRONT = 0.3
+_MIN_FRONT_COSINE = 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +58,7 @@ class Shells:
     plan: ShellPlan
 
 
-def are_wanted(
+def wants_shells(
     settings: CardSettings, strands: StrandSet, head: Surface | None, has_edits: bool
 ) -> bool:
     """Whether shells are made of this hair.
@@ -83,7 +83,11 @@ def are_wanted(
             )
         return True
     is_plain = settings.source == "clusters" and not has_edits
-    return is_plain and problem is None and _usual_length(strands) < SHORT * _side(strands)
+    return (
+        is_plain
+        and problem is None
+        and _median_length(strands) < SHORT * _root_square_side(strands)
+    )
 
 
 def _problem(strands: StrandSet, head: Surface | None) -> str | None:
@@ -92,10 +96,10 @@ def _problem(strands: StrandSet, head: Surface | None) -> str | None:
         return "shells are layers of the skin, and this hair has no surface"
     if is_face_hair(strands.group).any():
         return "brows and lashes cannot be shells, which show hair as layers over skin"
-    if strands.strand_count < _FEWEST:
+    if strands.strand_count < _MIN_STRANDS:
         count = "1 strand" if strands.strand_count == 1 else f"{strands.strand_count} strands"
-        return f"{count} cannot fill shells, which need {_FEWEST} or more"
-    length, side = _usual_length(strands), _side(strands)
+        return f"{count} cannot fill shells, which need {_MIN_STRANDS} or more"
+    length, side = _median_length(strands), _root_square_side(strands)
     if length > _TOO_LONG * side:
         return (
             f"its hair is {100.0 * length:.3g} cm long and grows on {100.0 * side:.3g} cm of skin; "
@@ -104,11 +108,11 @@ def _problem(strands: StrandSet, head: Surface | None) -> str | None:
     return None
 
 
-def _usual_length(strands: StrandSet) -> float:
+def _median_length(strands: StrandSet) -> float:
     return float(np.median(strands.lengths()))
 
 
-def _side(strands: StrandSet) -> float:
+def _root_square_side(strands: StrandSet) -> float:
     """Side of the square that the roots fill [m]."""
     return _spacing(strands) * strands.strand_count**0.5
 
@@ -139,14 +143,14 @@ def build_shells(
     """
     layers = settings.shell_layers
     hair = ShortHair.of(strands, occlusion, layers)
-    budget = settings.max_triangles or _TRIANGLES
+    budget = settings.max_triangles or _DEFAULT_TRIANGLES
     fine = fine_skin(head, strands.roots, _spacing(strands), budget // layers)
     skins = _skins(fine, head, budget, settings)
-    first = _Layered.of(skins[0], hair, strands.strand_count)
+    first = _ShellLevel.of(skins[0], hair, strands.strand_count)
     plan = plan_shells(first.patches, strands, radius, root_normal, layers, atlas)
     center = strands.roots.mean(axis=0, dtype=np.float64)
-    made = [first, *(_Layered.of(skin, hair, strands.strand_count) for skin in skins[1:])]
-    meshes = [each.mesh(plan, strands, center) for each in made]
+    levels = [first, *(_ShellLevel.of(skin, hair, strands.strand_count) for skin in skins[1:])]
+    meshes = [each.mesh(plan, strands, center) for each in levels]
     return Shells(
         tuple(CardLevel(mesh, skin.error) for mesh, skin in zip(meshes, skins, strict=True)),
         tuple(_outside_in(mesh, layers) for mesh in meshes),
@@ -179,7 +183,7 @@ def _outside_in(mesh: CardMesh, layers: int) -> Ints:
 
 
 @dataclass(frozen=True, eq=False)
-class _Layered:
+class _ShellLevel:
     """A level's skin in patches, and the hair at its vertices.
 
     vertex, patch: (n,) of each vertex of a layer, in which patches share no vertices.
@@ -195,31 +199,33 @@ class _Layered:
     place: Floats
 
     @classmethod
-    def of(cls, skin: ShellSkin, hair: ShortHair, strand_count: int) -> _Layered:
-        there = hair.around(skin.positions)
-        count = min(len(skin.triangles) // _PATCH, strand_count // _PATCH_STRANDS)
+    def of(cls, skin: ShellSkin, hair: ShortHair, strand_count: int) -> _ShellLevel:
+        hair_at_vertices = hair.average_around(skin.positions)
+        count = min(
+            len(skin.triangles) // _TRIANGLES_PER_PATCH, strand_count // _MIN_STRANDS_PER_PATCH
+        )
         of_triangle = skin.patches(
-            max(count, 1), skin.positions + there.shift[:, 1::2].swapaxes(0, 1)
+            max(count, 1), skin.positions + hair_at_vertices.shift[:, 1::2].swapaxes(0, 1)
         )
         key = of_triangle[:, None] * len(skin.positions) + skin.triangles
         keys, index = np.unique(key, return_inverse=True)
         patch, vertex = np.divmod(keys, len(skin.positions))
-        patches, place = Patches.of(skin, of_triangle, there, vertex, patch)
+        patches, place = Patches.of(skin, of_triangle, hair_at_vertices, vertex, patch)
         triangles = np.asarray(index).reshape(-1, 3)
-        return cls(skin, there, patches, vertex, patch, triangles, place)
+        return cls(skin, hair_at_vertices, patches, vertex, patch, triangles, place)
 
     def mesh(self, plan: ShellPlan, strands: StrandSet, center: Floats) -> CardMesh:
         """All layers, from the innermost to the outermost."""
         layers, count = plan.layers, len(self.vertex)
-        skin, hair, vertex = self.skin.raised, self.hair, self.vertex
+        skin, hair, vertex = self.skin.raised_positions, self.hair, self.vertex
         positions = skin[vertex] + hair.shift[vertex][:, 1::2].swapaxes(0, 1)
         outwards = self._outwards(positions)
         step = np.diff(hair.shift[vertex][:, ::2], axis=1).swapaxes(0, 1)
         tangent = unit(step)
         normal = volume_normals(positions, tangent, center)
-        is_front = np.einsum("lvi,lvi->lv", normal, outwards) > _FRONT
+        is_front = np.einsum("lvi,lvi->lv", normal, outwards) > _MIN_FRONT_COSINE
         normal = np.where(is_front[..., None], normal, outwards)
-        half = np.maximum(plan.half, self.patches.extent)[self.patch, None]
+        half = np.maximum(plan.half_side, self.patches.extent)[self.patch, None]
         across = 0.5 + self.place / (2.0 * half)
         pattern = plan.pattern_of(self.patches)
         tile = pattern * layers

@@ -18,12 +18,12 @@ from .strip import mean_spacing
 #: Hair is short if it is shorter than this fraction of the side of the square that its roots fill.
 _SHORT = 0.12
 #: Maximum side of the square of a card's roots, as a fraction of the hair's length.
-_NARROW = 0.25
+_MAX_CARD_WIDTH = 0.25
 #: Maximum factor on the number of cards, and segments and columns of each: 8 triangles.
-_MORE, _SEGMENTS, _COLUMNS = 3.0, 4, 1
+_MAX_COUNT_FACTOR, _SEGMENTS, _COLUMNS = 3.0, 4, 1
 #: Factor on the strands' width in the atlas: cards that lie on a body are mostly seen from the
 #: front, where strands need no widening.
-_FACE_ON = 0.7
+_STRAND_WIDTH_FACTOR = 0.7
 
 
 def fitted_to_length(
@@ -37,8 +37,8 @@ def fitted_to_length(
     side = 2.0 * mean_spacing(strands.roots) * strands.strand_count**0.5
     if length > _SHORT * side:
         return settings, atlas, ()
-    enough = (side / max(_NARROW * length, 1e-12)) ** 2
-    more = float(np.clip(enough / wanted, 1.0, _MORE))
+    enough = (side / max(_MAX_CARD_WIDTH * length, 1e-12)) ** 2
+    more = float(np.clip(enough / wanted, 1.0, _MAX_COUNT_FACTOR))
     fitted = replace(
         settings,
         card_count=min(round(wanted * more), strands.strand_count, 20_000),
@@ -49,4 +49,4 @@ def fitted_to_length(
         f"the hair is too short for {wanted:,} cards, so there are {fitted.card_count:,} of "
         f"{2 * fitted.segment_count * fitted.column_count} triangles or fewer"
     )
-    return fitted, replace(atlas, strand_width=_FACE_ON * atlas.strand_width), (note,)
+    return fitted, replace(atlas, strand_width=_STRAND_WIDTH_FACTOR * atlas.strand_width), (note,)

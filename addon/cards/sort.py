@@ -10,8 +10,8 @@ faces from the inside to the outside, back faces, which are on the far side of t
 way round.
 
 Limitations: one order cannot suit views that contradict each other; `wrong_fraction` measures how
-often. Hair that swings far from its rest shape has to be sorted at run time, see `order_from`, or
-be a mesh of its own, such as a ponytail, see `card_orders`.
+often. Hair that swings far from its rest shape has to be sorted at run time, see `order_from_eye`,
+or be a mesh of its own, such as a ponytail, see `card_orders`.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from ..arrays import Floats, Ints, piece_starts
 from ..strands import Surface
 from ..strands.closest_point import closest_point
 from .card_mesh import CARD_FIELDS, VERTEX_FIELDS, CardMesh
-from .order_pairs import Pairs, all_pairs, pairs_by_view
-from .order_search import Preferences, min_broken, net_preferences
+from .order_pairs import FragmentPairs, concatenated_pairs, pairs_by_view
+from .order_search import Preferences, minimize_violations, net_preferences
 from .steps import result_of
 
 #: Number of a card's vertices whose distance from the head is measured; more hardly change the
@@ -44,9 +44,9 @@ _VIEWS_PER_STEP, _FRACTION_OF_VIEWS = 8, 0.6
 
 #: A group dangles if its median card is this many times as far from the head as nearly all cards of
 #: the nearer groups that do not dangle.
-_FARTHER = 1.25
+_DANGLING_RATIO = 1.25
 #: Percentage that counts as nearly all.
-_NEARLY_ALL = 90.0
+_NEAR_PERCENTILE = 90.0
 
 #: What is sorted: pieces of cards or whole cards, by views; or whole cards, by distance alone.
 type SortBy = Literal["pieces", "cards", "distance"]
@@ -63,7 +63,7 @@ class CardOrders:
     back: Ints
 
 
-def in_order(mesh: CardMesh, order: Ints) -> CardMesh:
+def with_triangle_order(mesh: CardMesh, order: Ints) -> CardMesh:
     """The same cards with their triangles in this order, (triangle_count,)."""
     return replace(mesh, triangles=mesh.triangles[order], card=mesh.card[order])
 
@@ -71,8 +71,8 @@ def in_order(mesh: CardMesh, order: Ints) -> CardMesh:
 def card_orders(
     mesh: CardMesh,
     head: Surface | None,
-    by: SortBy = "pieces",
-    apart: Collection[int] | None = None,
+    sort_by: SortBy = "pieces",
+    separate_groups: Collection[int] | None = None,
     view_count: int = VIEW_COUNT,
     alpha: Floats | None = None,
 ) -> CardOrders:
@@ -81,82 +81,86 @@ def card_orders(
 
     Args:
         head: in the space of the mesh; without one distances are from the middle of the hair.
-        by: "cards" and "distance" keep the triangles of a card together, from root to tip;
+        sort_by: "cards" and "distance" keep the triangles of a card together, from root to tip;
             "pieces" sorts pieces of cards that cross each other separately, which halves the
             errors. Cards that are nowhere seen together keep their order by distance, and those at
             equal distance the order of their roots' places.
-        apart: groups that are drawn separately after all others, so that they can be left out or
-            moved; None: those that dangle.
+        separate_groups: groups that are drawn separately after all others, so that they can be left
+            out or moved; None: those that dangle.
         view_count: number of views. A third is enough for coarser levels of detail.
         alpha: (height, width) of the texture, which determines what is visible of a card and behind
             it; None: cards that cover evenly.
     """
-    return result_of(order_steps(mesh, head, by, apart, view_count, alpha))
+    return result_of(order_steps(mesh, head, sort_by, separate_groups, view_count, alpha))
 
 
 def order_steps(
     mesh: CardMesh,
     head: Surface | None,
-    by: SortBy = "pieces",
-    apart: Collection[int] | None = None,
+    sort_by: SortBy = "pieces",
+    separate_groups: Collection[int] | None = None,
     view_count: int = VIEW_COUNT,
     alpha: Floats | None = None,
 ) -> Generator[float, None, CardOrders]:
     """As card_orders, some views per step; yields the fraction that is done."""
-    numbered = canonical(mesh)
-    orders = yield from _canonical_orders(numbered.mesh, head, by, apart, view_count, alpha)
-    return CardOrders(numbered.triangle[orders.front], numbered.triangle[orders.back])
+    numbered = to_canonical(mesh)
+    orders = yield from _canonical_orders(
+        numbered.mesh, head, sort_by, separate_groups, view_count, alpha
+    )
+    return CardOrders(numbered.source_triangle[orders.front], numbered.source_triangle[orders.back])
 
 
 def _canonical_orders(
     mesh: CardMesh,
     head: Surface | None,
-    by: SortBy,
-    apart: Collection[int] | None,
+    sort_by: SortBy,
+    separate_groups: Collection[int] | None,
     view_count: int,
     alpha: Floats | None,
 ) -> Generator[float, None, CardOrders]:
-    """As order_steps, for a mesh that is numbered by `canonical`."""
+    """As order_steps, for a mesh that is numbered by `to_canonical`."""
     distance = card_distances(mesh, head)
-    section = _section_of_cards(mesh, distance, apart)
+    section = _section_of_cards(mesh, distance, separate_groups)
     inside_out = np.lexsort((distance, section))
     outside_in = np.lexsort((-distance, section))
-    if by == "distance" or len(mesh.triangles) > MAX_TRIANGLES:
+    if sort_by == "distance" or len(mesh.triangles) > MAX_TRIANGLES:
         return CardOrders(_triangles_of(mesh, inside_out), _triangles_of(mesh, outside_in))
     found = []
     for seen in pairs_by_view(mesh, head, view_count, VIEW_SIZE, alpha):
         found.append(seen)
         if len(found) % _VIEWS_PER_STEP == 0:
             yield _FRACTION_OF_VIEWS * len(found) / view_count
-    pairs = all_pairs(found)
-    own = section[mesh.card]
-    pairs = pairs[own[pairs.behind] == own[pairs.before]]
-    piece = pieces(mesh) if by == "pieces" else None
+    pairs = concatenated_pairs(found)
+    section_of_triangle = section[mesh.card]
+    pairs = pairs[section_of_triangle[pairs.farther] == section_of_triangle[pairs.nearer]]
+    piece = piece_of_triangle(mesh) if sort_by == "pieces" else None
     yield _FRACTION_OF_VIEWS
-    front = _learnt(mesh, pairs[pairs.facing == 1], inside_out, piece)
+    front = _learned_order(mesh, pairs[pairs.facing == 1], inside_out, piece)
     yield (1.0 + _FRACTION_OF_VIEWS) / 2.0
-    back = _learnt(mesh, pairs[pairs.facing == 0], outside_in, piece)
+    back = _learned_order(mesh, pairs[pairs.facing == 0], outside_in, piece)
     # triangles moved to an end of their own section may have passed other sections
-    front, back = (order[np.argsort(own[order], kind="stable")] for order in (front, back))
+    front, back = (
+        order[np.argsort(section_of_triangle[order], kind="stable")] for order in (front, back)
+    )
     return CardOrders(front, back)
 
 
-def _learnt(mesh: CardMesh, pairs: Pairs, cards: Ints, piece: Ints | None) -> Ints:
+def _learned_order(mesh: CardMesh, pairs: FragmentPairs, cards: Ints, piece: Ints | None) -> Ints:
     """All triangles in the order that violates the least of the pairs, starting from whole
     cards."""
-    preferences = net_preferences(len(mesh.triangles), pairs.behind, pairs.before, pairs.weight)
-    triangles = _improved(preferences, mesh.card, cards)
+    preferences = net_preferences(len(mesh.triangles), pairs.farther, pairs.nearer, pairs.weight)
+    triangles = _improved_order(preferences, mesh.card, cards)
     if piece is None:
         return triangles
     _, first = np.unique(piece[triangles], return_index=True)
-    return _improved(preferences, piece, np.argsort(first))
+    return _improved_order(preferences, piece, np.argsort(first))
 
 
-def _improved(preferences: Preferences, thing: Ints, start: Ints) -> Ints:
+def _improved_order(preferences: Preferences, owner: Ints, start: Ints) -> Ints:
     """All triangles in an order of the things that they belong to, (triangle_count,), better than
     `start`."""
-    rank = min_broken(preferences.of_whole(thing, len(start)), start)
-    return np.argsort(rank[thing], kind="stable")
+    rank = minimize_violations(preferences.for_groups(owner, len(start)), start)
+    return np.argsort(rank[owner], kind="stable")
 
 
 def _triangles_of(mesh: CardMesh, cards: Ints) -> Ints:
@@ -166,13 +170,15 @@ def _triangles_of(mesh: CardMesh, cards: Ints) -> Ints:
     return np.argsort(place[mesh.card], kind="stable")
 
 
-def _section_of_cards(mesh: CardMesh, distance: Floats, apart: Collection[int] | None) -> Ints:
-    """The section of each card number that has a distance, see `sections`."""
+def _section_of_cards(
+    mesh: CardMesh, distance: Floats, separate_groups: Collection[int] | None
+) -> Ints:
+    """The section of each card number that has a distance, see `section_of_groups`."""
     group = mesh.group[: len(distance)]
-    if apart is None:
+    if separate_groups is None:
         used = np.unique(mesh.card)
-        apart = dangling_groups(group[used], distance[used])
-    return sections(group, apart)
+        separate_groups = dangling_groups(group[used], distance[used])
+    return section_of_groups(group, separate_groups)
 
 
 def dangling_groups(group: Ints, distance: Floats) -> list[int]:
@@ -186,17 +192,17 @@ def dangling_groups(group: Ints, distance: Floats) -> list[int]:
     ordered = sorted(names, key=lambda name: middle[name])
     near, dangling = ordered[:1], ordered[:0]
     for name in ordered[1:]:
-        usual = float(np.percentile(distance[np.isin(group, near)], _NEARLY_ALL))
-        (dangling if middle[name] > _FARTHER * usual else near).append(name)
+        usual = float(np.percentile(distance[np.isin(group, near)], _NEAR_PERCENTILE))
+        (dangling if middle[name] > _DANGLING_RATIO * usual else near).append(name)
     return dangling
 
 
-def sections(group: Ints, apart: Collection[int]) -> Ints:
-    """Sections that are drawn separately, (len(group),): 0 for all groups but those of `apart`,
-    which follow as 1, 2 ...
+def section_of_groups(group: Ints, separate_groups: Collection[int]) -> Ints:
+    """Sections that are drawn separately, (len(group),): 0 for all groups but those of
+    `separate_groups`, which follow as 1, 2 ...
     """
     section = np.zeros(len(group), np.int64)
-    for number, name in enumerate(apart, 1):
+    for number, name in enumerate(separate_groups, 1):
         section[group == name] = number
     return section
 
@@ -204,14 +210,14 @@ def sections(group: Ints, apart: Collection[int]) -> Ints:
 @dataclass(frozen=True)
 class Canonical:
     """mesh: the same cards; the triangles of a card follow each other from root to tip.
-    triangle: (triangle_count,) the source's triangle of each of its triangles.
+    source_triangle: (triangle_count,) the source's triangle of each of its triangles.
     """
 
     mesh: CardMesh
-    triangle: Ints
+    source_triangle: Ints
 
 
-def canonical(mesh: CardMesh) -> Canonical:
+def to_canonical(mesh: CardMesh) -> Canonical:
     """The mesh numbered by the position from root to tip, then by place, then by UV.
 
     The result of the search depends on the order in which it starts. So cards are first numbered by
@@ -224,12 +230,12 @@ def canonical(mesh: CardMesh) -> Canonical:
     number[vertices] = np.arange(len(vertices), dtype=np.int32)
     corners = _lowest_first(number[mesh.triangles])
     first, second, third = rank[corners].T
-    inside = np.lexsort((corners[:, 0], third, second, first))  # the last counts most
-    names, place = np.unique(mesh.card[inside], return_index=True)
+    root_to_tip = np.lexsort((corners[:, 0], third, second, first))  # the last counts most
+    names, place = np.unique(mesh.card[root_to_tip], return_index=True)
     cards = names[np.argsort(place)]
     card = np.zeros(int(names.max(initial=-1)) + 1, np.int32)
     card[cards] = np.arange(len(cards), dtype=np.int32)
-    order = inside[np.argsort(card[mesh.card[inside]], kind="stable")]
+    order = root_to_tip[np.argsort(card[mesh.card[root_to_tip]], kind="stable")]
     numbered = replace(
         mesh,
         triangles=corners[order],
@@ -257,7 +263,7 @@ def _lowest_first(triangles: Ints) -> Ints:
     return np.take_along_axis(triangles, turned, axis=1)
 
 
-def order_from(mesh: CardMesh, eye: Floats) -> Ints:
+def order_from_eye(mesh: CardMesh, eye: Floats) -> Ints:
     """All triangles from the farthest to the nearest, (triangle_count,): an order at run time.
 
     Triangles are sorted by their centres; by the centres of whole cards more pixels are wrong. At
@@ -273,10 +279,10 @@ def order_from(mesh: CardMesh, eye: Floats) -> Ints:
         near = -np.einsum("ti,ti->t", away, away)
     else:
         near = (first + second + third) @ place
-    return np.argsort(_steps(near), kind="stable")
+    return np.argsort(_quantized(near), kind="stable")
 
 
-def _steps(values: Floats) -> Ints:
+def _quantized(values: Floats) -> Ints:
     """Values in 65,536 equal steps, which sort in a tenth of the time."""
     if not len(values):
         return np.zeros(0, np.uint16)
@@ -284,23 +290,23 @@ def _steps(values: Floats) -> Ints:
     return ((values - low) * (65_535.0 / max(high - low, 1e-30))).astype(np.uint16)
 
 
-def pieces(mesh: CardMesh) -> Ints:
+def piece_of_triangle(mesh: CardMesh) -> Ints:
     """The separately sorted piece of each triangle, (triangle_count,) from 0 without gaps.
 
     A piece is one triangle, or as many consecutive triangles of a card as keep the number of pieces
     below MAX_PIECES.
     """
     count = len(mesh.triangles)
-    together = -(-count // MAX_PIECES) if count else 1
+    triangles_per_piece = -(-count // MAX_PIECES) if count else 1
     order = np.argsort(mesh.card, kind="stable")
     starts = np.flatnonzero(np.diff(mesh.card[order], prepend=-1))
     place = np.arange(count) - np.repeat(starts, np.diff(np.append(starts, count)))
     number = np.empty(count, np.int64)
-    number[order] = np.cumsum(place % together == 0) - 1
+    number[order] = np.cumsum(place % triangles_per_piece == 0) - 1
     return number
 
 
-def reordered(mesh: CardMesh, key: Floats | Ints) -> CardMesh:
+def sorted_by_key(mesh: CardMesh, key: Floats | Ints) -> CardMesh:
     """The same cards by ascending key, one key per card number; equal keys keep their order."""
     triangles = np.argsort(key[mesh.card], kind="stable")
     owner = card_of_vertex(mesh)
@@ -362,7 +368,7 @@ def connected_components(triangles: Ints) -> Ints:
     one, two = np.concatenate([first, second]), np.concatenate([second, third])
     while len(one):
         root[np.maximum(one, two)] = np.minimum(one, two)
-        _lead_to_roots(root)
+        _point_to_roots(root)
         one, two = root[one], root[two]
         is_open = one != two
         one, two = one[is_open], two[is_open]
@@ -372,7 +378,7 @@ def connected_components(triangles: Ints) -> Ints:
     return number[root[first]]
 
 
-def _lead_to_roots(root: Ints) -> None:
+def _point_to_roots(root: Ints) -> None:
     """Pointer jumping in place: afterwards each vertex points to a vertex that points to itself."""
     while True:
         further = root[root]

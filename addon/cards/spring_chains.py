@@ -74,12 +74,12 @@ class _Skeleton:
 
 
 @dataclass(frozen=True)
-class Candidate[Choice]:
+class Candidate[Skeleton]:
     """A choice, its number of joints, and its error against the simulation [m]."""
 
     joints: int
     error: float
-    skeleton: Choice
+    skeleton: Skeleton
 
 
 def spring_steps(
@@ -99,8 +99,8 @@ def spring_steps(
     for number, joints in enumerate(each for each in _JOINT_COUNTS if each < max_joints):
         counts = {min(count, (max_joints - 1) // joints) for count in _CHAIN_COUNTS}
         for count in sorted(counts):
-            choice = samples.skeleton(count, joints)
-            candidates.append(Candidate(count * joints, samples.error(choice), choice))
+            skeleton = samples.skeleton(count, joints)
+            candidates.append(Candidate(count * joints, samples.error(skeleton), skeleton))
             yield 0.1 + 0.3 * (number + count / max(counts)) / len(_JOINT_COUNTS)
     best = fewest_joints(candidates, _INVISIBLE_ERROR * tracks.hair_length)
     chains, hit_radius = _with_colliders(best.rest, colliders)
@@ -116,7 +116,9 @@ def spring_steps(
     return SpringRig(chains, found.values, skins, found.error, miss)
 
 
-def fewest_joints[Choice](candidates: Sequence[Candidate[Choice]], tolerance: float) -> Choice:
+def fewest_joints[Skeleton](
+    candidates: Sequence[Candidate[Skeleton]], tolerance: float
+) -> Skeleton:
     """Of all choices the one with the fewest joints whose error is nearly the smallest, even if
     more joints did not help at some steps in between.
 
@@ -176,60 +178,62 @@ class _Samples:
         return list(zip(self.tracks.levels, self.tracks.moved_positions, strict=True))
 
     def skeleton(self, count: int, joints: int) -> _Skeleton:
-        groups = card_chains(self.lines, self.moved_lines[:, :, self.frames], count)
-        places = chain_lines(self.lines, groups, joints)
+        chains = card_chains(self.lines, self.moved_lines[:, :, self.frames], count)
+        places = chain_lines(self.lines, chains, joints)
         rest = np.tile(np.eye(4), (*places.shape[:2], 1, 1))
         rest[..., :3, 3] = places
         directions = np.diff(places, axis=1)
         rest[..., :3, :3] = rotations_from_y(
             np.concatenate([directions, directions[:, -1:]], axis=1)
         )
-        moved = chain_lines(self.moved_lines, groups, joints).transpose(2, 0, 1, 3)
-        return _Skeleton(groups, rest, moved, joints)
+        moved = chain_lines(self.moved_lines, chains, joints).transpose(2, 0, 1, 3)
+        return _Skeleton(chains, rest, moved, joints)
 
-    def error(self, choice: _Skeleton) -> float:
+    def error(self, skeleton: _Skeleton) -> float:
         """Root mean square error of the learnt vertices with joints at their simulated places
         [m]."""
         mesh, moved = self.levels[0]
         points = mesh.positions[self.vertices].astype(np.float64)
         targets = moved[self.vertices][:, self.frames].astype(np.float64)
         moves = _joint_transforms(
-            choice.rest, with_bone_lengths(choice.rest, choice.places[self.frames])
+            skeleton.rest, with_bone_lengths(skeleton.rest, skeleton.places[self.frames])
         )
-        skin = fit_weights(points, targets, self._initial_skin(mesh, self.vertices, choice), *moves)
+        skin = fit_weights(
+            points, targets, self._initial_skin(mesh, self.vertices, skeleton), *moves
+        )
         miss = skinned(points, skin, *moves) - targets
         return float(np.sqrt((miss * miss).sum(axis=-1).mean()))
 
-    def skin(self, mesh: CardMesh, moved: Floats, choice: _Skeleton, places: Floats) -> Skin:
+    def skin(self, mesh: CardMesh, moved: Floats, skeleton: _Skeleton, places: Floats) -> Skin:
         """The weights of all vertices of a level with joints in these places, heaviest first."""
-        moves = _joint_transforms(choice.rest, places[self.frames])
+        moves = _joint_transforms(skeleton.rest, places[self.frames])
         parts = []
         for begin in range(0, len(moved), VERTEX_BATCH):
             part = np.arange(begin, min(begin + VERTEX_BATCH, len(moved)))
             points = mesh.positions[part].astype(np.float64)
             targets = moved[part][:, self.frames].astype(np.float64)
             parts.append(
-                fit_weights(points, targets, self._initial_skin(mesh, part, choice), *moves)
+                fit_weights(points, targets, self._initial_skin(mesh, part, skeleton), *moves)
             )
         return Skin.joined(parts)
 
-    def _initial_skin(self, mesh: CardMesh, vertices: Ints, choice: _Skeleton) -> Skin:
+    def _initial_skin(self, mesh: CardMesh, vertices: Ints, skeleton: _Skeleton) -> Skin:
         """Each vertex weighted to its bone and a little to the nearer neighbour."""
         used = np.unique(self.tracks.levels[0].card)
         card = np.searchsorted(used, card_of_vertex(mesh)[vertices])
-        bones = choice.joints - 1
+        bones = skeleton.joints - 1
         at = np.clip(mesh.along[vertices].astype(np.float64), 0.0, 1.0) * bones
         bone = np.minimum(at.astype(np.int64), bones - 1)
         fraction = at - bone
         beside = np.where(fraction < 0.5, bone - 1, bone + 1)
         is_end = (beside < 0) | (beside >= bones)
         beside = np.clip(np.where(is_end, 2 * bone - beside, beside), 0, bones - 1)
-        own, other = choice.chains.own[card], choice.chains.other[card]
+        own, other = skeleton.chains.first[card], skeleton.chains.second[card]
         weight = np.zeros((len(card), INFLUENCES))
         weight[:, 1] = np.where(is_end, 0.0, np.abs(fraction - 0.5))
         weight[:, 0] = 1.0 - weight[:, 1]
-        root = np.full(len(card), choice.chains.count * choice.joints)
-        own, other = own * choice.joints, other * choice.joints
+        root = np.full(len(card), skeleton.chains.count * skeleton.joints)
+        own, other = own * skeleton.joints, other * skeleton.joints
         return Skin(np.stack([own + bone, own + beside, other + bone, root], axis=1), weight)
 
 

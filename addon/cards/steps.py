@@ -17,12 +17,12 @@ def result_of[Result](steps: Generator[Any, None, Result]) -> Result:
 
 
 def map_progress[Step, Progress, Result](
-    steps: Generator[Step, None, Result], tell: Callable[[Step], Progress]
+    steps: Generator[Step, None, Result], convert: Callable[[Step], Progress]
 ) -> Generator[Progress, None, Result]:
-    """The same work, with each step's progress converted by `tell`."""
+    """The same work, with each step's progress converted by `convert`."""
     try:
         while True:
-            yield tell(next(steps))
+            yield convert(next(steps))
     except StopIteration as end:
         result: Result = end.value
         return result

@@ -20,12 +20,12 @@ from ..strands.resample import resample
 from .atlas_grid import AtlasGrid
 from .card_mesh import CardMesh, join_meshes
 from .settings import CardSettings
-from .sort import reordered
+from .sort import sorted_by_key
 
 #: Roots whose distance to their neighbours is measured.
 _SPACING_SAMPLES = 512
 #: Spacing of a single guide, which has no neighbour, as a fraction of its length.
-_LONELY_SPACING = 0.04
+_SINGLE_GUIDE_SPACING = 0.04
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Strips:
     def __len__(self) -> int:
         return len(self.width)
 
-    def of(self, cards: Ints) -> Strips:
+    def select(self, cards: Ints) -> Strips:
         """The strips of the chosen cards."""
         frames = self.frames
         parts = (frames.center, frames.tangent, frames.normal, frames.side)
@@ -68,7 +68,7 @@ class UncutCards:
     atlas: how the texture is divided into tiles.
     center: (3,) [m], from which normals point away, as those of strands do; None: each card has the
         normals of its own surface.
-    absent: (card_count,) cards that are not made; None: all are made.
+    is_absent: (card_count,) cards that are not made; None: all are made.
     """
 
     strips: Strips
@@ -78,7 +78,7 @@ class UncutCards:
     tile: Ints
     atlas: AtlasGrid
     center: Floats | None = None
-    absent: Bools | None = None
+    is_absent: Bools | None = None
 
     def __len__(self) -> int:
         return len(self.strips)
@@ -96,7 +96,7 @@ def guide_strips(guides: Floats, root_normal: Floats, settings: CardSettings) ->
     """
     frames = card_frames(guides, root_normal, settings.segment_count)
     along = np.linspace(0.0, 1.0, settings.segment_count + 1, dtype=np.float32)
-    spacing = mean_spacing(guides[:, 0]) or _LONELY_SPACING * _length(guides)
+    spacing = mean_spacing(guides[:, 0]) or _SINGLE_GUIDE_SPACING * _length(guides)
     width = settings.width_factor * spacing * taper(along, settings.tip_width)
     return Strips(frames, np.broadcast_to(width, (len(guides), len(along))))
 
@@ -115,17 +115,17 @@ def strip_mesh(
         column_count: number of columns across a card.
     """
     meshes = [
-        _part_mesh(strips, numbers, cards, column_count, settings) for numbers, strips in parts
+        _mesh_of_part(strips, numbers, cards, column_count, settings) for numbers, strips in parts
     ]
-    return reordered(join_meshes(meshes), np.arange(len(cards)))
+    return sorted_by_key(join_meshes(meshes), np.arange(len(cards)))
 
 
-def scattered_tiles(card_count: int, atlas: AtlasGrid, seed: int) -> Ints:
+def random_tiles(card_count: int, atlas: AtlasGrid, seed: int) -> Ints:
     """A tile for each card, at random, (card_count,)."""
     return np.random.default_rng(seed).integers(atlas.tile_count, size=card_count)
 
 
-def _part_mesh(
+def _mesh_of_part(
     strips: Strips,
     numbers: Ints,
     cards: UncutCards,

@@ -73,14 +73,14 @@ def uv_axes(
     area = _sums_by_island(island, areas_of(corners))
     lengths = _lengths(corners, uv, island)
     ratio = np.log(np.maximum(lengths[:, 1], 1e-12) / np.maximum(lengths[:, 0], 1e-12))
-    most_common = int((area * ratio).sum() >= 0.0)
+    usual_axis = int((area * ratio).sum() >= 0.0)
     is_clear = np.abs(ratio) > np.log(_CLEAR_LENGTH_RATIO)
-    axis = np.where(is_clear, (ratio > 0.0).astype(np.int64), most_common)
+    axis = np.where(is_clear, (ratio > 0.0).astype(np.int64), usual_axis)
 
     length = np.take_along_axis(lengths, axis[:, None], axis=1)[:, 0]
     end = _end_evidence(corners, uv, distance, island, axis) / np.maximum(length, 1e-12)
     is_reversed = np.zeros(len(axis), bool)
-    is_deviating, is_undecided = axis != most_common, np.zeros(len(axis), bool)
+    is_deviating, is_undecided = axis != usual_axis, np.zeros(len(axis), bool)
     for each in (0, 1):
         own = axis == each
         vote = float((area * np.clip(end, -1.0, 1.0))[own].sum())

@@ -16,7 +16,7 @@ from .card_mesh import VERTEX_FIELDS, CardMesh
 from .sort import connected_components
 
 
-def with_fans_apart(mesh: CardMesh, back: Ints) -> tuple[CardMesh, Ints]:
+def split_fans(mesh: CardMesh, back: Ints) -> tuple[CardMesh, Ints]:
     """The same mesh, whose triangles share a vertex only if they are connected around it by edges
     and their UVs have the same orientation, as MikkTSpace groups them (Mikkelsen 2008, "Simulation
     of Wrinkled Surfaces Revisited"). Vertices without a triangle are left out.
@@ -28,10 +28,10 @@ def with_fans_apart(mesh: CardMesh, back: Ints) -> tuple[CardMesh, Ints]:
     triangles = mesh.triangles
     uv = mesh.uv[triangles].astype(np.float64)
     one, two = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
-    is_turned = one[:, 0] * two[:, 1] > one[:, 1] * two[:, 0]
+    is_mirrored = one[:, 0] * two[:, 1] > one[:, 1] * two[:, 0]
     # each corner has two edges; corners at one vertex with a common edge belong to one fan
     own = triangles.astype(np.int64)
-    edges = [_edges(own, np.roll(own, step, axis=1), is_turned) for step in (1, 2)]
+    edges = [_edges(own, np.roll(own, step, axis=1), is_mirrored) for step in (1, 2)]
     _, number = np.unique(np.stack(edges, axis=2), return_inverse=True)
     fan = connected_components(number.reshape(-1, 2)[:, [0, 1, 1]]).astype(np.int64)
     vertex, corner = np.unique(own.ravel() * max(len(fan), 1) + fan, return_inverse=True)

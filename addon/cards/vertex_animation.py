@@ -45,9 +45,9 @@ def motion_layout(vertex_count: int, frame_count: int, place: str) -> MotionLayo
     Raises:
         HairloomError: the motion does not fit into a texture that engines can hold.
     """
-    for most in _WIDTHS:
-        rows = -(-vertex_count // most)
-        if rows * frame_count <= most:
+    for max_width in _WIDTHS:
+        rows = -(-vertex_count // max_width)
+        if rows * frame_count <= max_width:
             return MotionLayout(vertex_count, frame_count, -(-vertex_count // rows), rows)
     raise HairloomError(
         f"{vertex_count:,} vertices in {frame_count:,} frames do not fit into a texture of "
@@ -66,7 +66,7 @@ def vertex_texels(layout: MotionLayout) -> Floats:
     return np.stack([(column + 0.5) / layout.width, (row + 0.5) / layout.height], axis=1)
 
 
-def rounding(values: Floats, depth: str) -> Floats:
+def rounding_errors(values: Floats, depth: str) -> Floats:
     """Rounding errors of stored values, of any shape.
 
     Args:

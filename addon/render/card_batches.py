@@ -9,7 +9,7 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..cards.card_mesh import CardMesh
-from ..cards.sort import order_from
+from ..cards.sort import order_from_eye
 from ..shading.environment import openness_from_occlusion
 from . import gpu_objects
 from .card_snapshot import CardSnapshot
@@ -75,7 +75,7 @@ class CardBatches:
         is_same = self._mesh is mesh and self._eye is not None and (self._eye == eye).all()
         self._upload(cards)
         if not is_same or "view" not in self._orders:
-            triangles, known = mesh.triangles[order_from(mesh, eye)], self._orders.get("view")
+            triangles, known = mesh.triangles[order_from_eye(mesh, eye)], self._orders.get("view")
             if known is not None and np.array_equal(known.triangles, triangles):
                 triangles = known.triangles
             self._eye = np.array(eye)

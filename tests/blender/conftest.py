@@ -60,7 +60,7 @@ def cached_functions() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         for name in ("sky_field", "openness_field", "skin_field"):
             cache_function(patch, light_flow, name, extra_key=cells)
-        for name in ("above_skin", "wrong_fraction"):
+        for name in ("raise_between_rows", "wrong_fraction"):
             cache_function(patch, card_build, name)
         for name in ("grow", "grow_with_face"):
             cache_function(patch, inputs, name)

@@ -12,7 +12,7 @@ from guide_cards import build_cards
 
 from hairloom.addon.cards.card_mesh import CardMesh
 from hairloom.addon.cards.settings import CardSettings
-from hairloom.addon.cards.sort import card_orders, in_order
+from hairloom.addon.cards.sort import card_orders, with_triangle_order
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.cards.card_formats import GLB
 from hairloom.addon.shading.texture_settings import TextureSettings
@@ -42,7 +42,7 @@ def hair(count: int = 120, seed: int = 2) -> CardMesh:
 @pytest.fixture(scope="module")
 def sorted_hair() -> CardMesh:
     mesh = hair()
-    return in_order(mesh, card_orders(mesh, None).front)
+    return with_triangle_order(mesh, card_orders(mesh, None).front)
 
 
 @pytest.fixture(scope="module")

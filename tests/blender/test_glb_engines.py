@@ -15,7 +15,7 @@ from guide_cards import build_cards
 
 from hairloom.addon.cards.card_mesh import CardMesh
 from hairloom.addon.cards.settings import CardSettings
-from hairloom.addon.cards.sort import card_orders, in_order
+from hairloom.addon.cards.sort import card_orders, with_triangle_order
 from hairloom.addon.shading.texture_settings import TextureSettings
 from hairloom.addon.shading.textures import hair_textures
 
@@ -35,7 +35,7 @@ def curtain() -> tuple[CardMesh, np.ndarray]:
     settings = CardSettings(width_factor=1.5)
     mesh = build_cards(guides.astype(np.float32), out.astype(np.float32), settings)
     texture = hair_textures(TextureSettings(variant_width=16, height=64), mesh.atlas.columns).card
-    return in_order(mesh, card_orders(mesh, None).front), texture
+    return with_triangle_order(mesh, card_orders(mesh, None).front), texture
 
 
 @pytest.mark.parametrize("portable", [True, False])

@@ -153,8 +153,10 @@ def test_baby_hair_is_fine_where_widths_are_found() -> None:
 def test_cards_are_made_from_all_hair_but_baby_hair() -> None:
     rig = wig()
     groom = card_groom(rig)
-    np.testing.assert_array_equal(groom.number, np.flatnonzero(~short_strands(rig)))
-    expected = card_strands(rig.strands.take(groom.number))
+    np.testing.assert_array_equal(groom.strand_numbers, np.flatnonzero(~short_strands(rig)))
+    expected = card_strands(rig.strands.take(groom.strand_numbers))
     np.testing.assert_array_equal(groom.strands.points, expected.points)
-    np.testing.assert_array_equal(groom.root_normal, rig_flow.root_normals(rig)[groom.number])
+    np.testing.assert_array_equal(
+        groom.root_normal, rig_flow.root_normals(rig)[groom.strand_numbers]
+    )
     np.testing.assert_array_equal(groom.strands.roots[groom.guides], rig.guide_grid[:, 0])

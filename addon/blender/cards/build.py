@@ -326,7 +326,7 @@ def baked_atlas(
     groom = card_groom(rig, drawn)
     strands, grid = groom.strands, groom.strands.grid
     colors = strand_variation(
-        groom.number, grid.shape[1], shading, strands.color_grid, strands.group
+        groom.strand_numbers, grid.shape[1], shading, strands.color_grid, strands.group
     )
     if isinstance(plan, ShellPlan):
         flat = shell_strands(plan, grid, groom.radius, VISIBLE_UPRIGHT, colors)

@@ -20,7 +20,7 @@ from ...cards.export_settings import CardExportSettings
 from ...cards.joints import CardTracks
 from ...cards.settings import CardSettings
 from ...cards.steps import map_progress, result_of
-from ...cards.uv_fans import with_fans_apart
+from ...cards.uv_fans import split_fans
 from ...cards.vertex_animation import motion_layout
 from ...dynamics.figures import CardFigures
 from ...errors import HairloomError
@@ -284,7 +284,7 @@ class _Writer:
     def steps(self, motion: GuideMotion | None) -> FileSteps[tuple[str, ...]]:
         """Write everything; returns notes for the artist."""
         build = self.made.build
-        parts = map(with_fans_apart, build.levels, build.back_triangles)
+        parts = map(split_fans, build.levels, build.back_triangles)
         levels, backs = zip(*parts, strict=True)
         if motion is None or self.output.settings.motion == "none":
             yield "Writing", None

@@ -13,7 +13,7 @@ from ...arrays import Floats, Ints
 from ...cards.card_mesh import CardMesh
 from ...cards.edits import CardRecord
 from ...cards.settings import CardSettings
-from ...cards.shaping import CardVertices, card_along, from_root, tile_shift
+from ...cards.shaping import CardVertices, card_along_line, line_from_root, tile_offset
 from ...errors import HairloomError
 from ...strands.affine import transform_points
 from ..base.objects import check_shape_editable, head_of, matrix_of
@@ -75,7 +75,7 @@ def put_on_tiles(obj: bpy.types.Object, tile_of: Callable[[Ints, int], Ints]) ->
     middles = np.array([np.mean([loop[layer].uv[:] for loop in own], axis=0) for own in loops])
     tile = grid.tile_at(middles)
     wanted = tile_of(tile, grid.tile_count)
-    for own, shift in zip(loops, tile_shift(grid, tile, wanted).tolist(), strict=True):
+    for own, shift in zip(loops, tile_offset(grid, tile, wanted).tolist(), strict=True):
         for loop in own:
             u, v = loop[layer].uv
             loop[layer].uv = u + shift[0], v + shift[1]
@@ -121,9 +121,9 @@ def add_along_curves(
     try:
         edited.from_mesh(obj.data)
         for line in lines:
-            rooted, outwards = from_root(line, surface)
+            rooted, outwards = line_from_root(line, surface)
             near = np.linalg.norm(record.places[:, 0] - rooted[0], axis=1).argmin()
-            card = card_along(
+            card = card_along_line(
                 rooted,
                 outwards,
                 settings,

@@ -23,7 +23,7 @@ from ...cards.vertex_animation import (
     MotionLayout,
     motion_layout,
     motion_texture,
-    rounding,
+    rounding_errors,
     vertex_texels,
 )
 from ...dynamics.figures import CardFigures
@@ -313,7 +313,7 @@ class TextureMotion:
     def error(self) -> FitError:
         """The error of vertices by the rounding of stored values."""
         scale, depth = np.float32(self.file_format.units_per_metre), self.settings.motion_depth
-        misses = [rounding(each * scale, depth) / scale for each in self._offsets]
+        misses = [rounding_errors(each * scale, depth) / scale for each in self._offsets]
         return FitError.of([np.linalg.norm(miss, axis=-1).ravel() for miss in misses])
 
     def sidecar_section(self, files: dict[str, str]) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from hairloom.addon.cards.build import (
     card_of_strand,
     card_steps,
     uncut_cards,
-    with_occlusion_of,
+    with_nearest_occlusion,
 )
 from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
 from hairloom.addon.cards.order_check import wrong_fraction
@@ -210,7 +210,7 @@ def test_a_vertex_that_is_in_both_levels_has_the_same_occlusion() -> None:
     finest, coarser = built(falling(900), levels=2).levels
     shade = np.random.default_rng(0).random(len(finest.positions)).astype(np.float32)
     finest = finest.with_occlusion(shade)
-    level = with_occlusion_of(finest, coarser)
+    level = with_nearest_occlusion(finest, coarser)
     known = {tuple(key): value for key, value in zip(_keys(finest), shade, strict=True)}
     shared = [
         (value, known[tuple(key)])

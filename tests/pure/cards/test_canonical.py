@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hairloom.addon.cards.card_mesh import CARD_FIELDS, VERTEX_FIELDS, CardMesh
-from hairloom.addon.cards.sort import canonical
+from hairloom.addon.cards.sort import to_canonical
 
 #: a strip of two segments and one column
 STRIP = np.array([[0, 1, 3], [0, 3, 2], [2, 3, 5], [2, 5, 4]], np.int32)
@@ -69,35 +69,35 @@ def check_same(one: CardMesh, other: CardMesh) -> None:
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_the_numbering_hangs_on_the_cards_alone(seed: int) -> None:
     mesh = scattered()
-    check_same(canonical(shuffled(mesh, seed)).mesh, canonical(mesh).mesh)
+    check_same(to_canonical(shuffled(mesh, seed)).mesh, to_canonical(mesh).mesh)
 
 
 def test_what_is_numbered_stays_as_it_is() -> None:
-    once = canonical(scattered()).mesh
-    twice = canonical(once)
+    once = to_canonical(scattered()).mesh
+    twice = to_canonical(once)
     check_same(twice.mesh, once)
-    np.testing.assert_array_equal(twice.triangle, np.arange(len(once.triangles)))
+    np.testing.assert_array_equal(twice.source_triangle, np.arange(len(once.triangles)))
 
 
 def test_nothing_of_a_triangle_changes_but_its_numbers() -> None:
     mesh = shuffled(scattered(), 4)
-    found = canonical(mesh)
-    assert sorted(found.triangle) == list(range(len(mesh.triangles)))
+    found = to_canonical(mesh)
+    assert sorted(found.source_triangle) == list(range(len(mesh.triangles)))
     for name in VERTEX_FIELDS:
         one = getattr(found.mesh, name)[found.mesh.triangles]
-        other = getattr(mesh, name)[mesh.triangles[found.triangle]]
+        other = getattr(mesh, name)[mesh.triangles[found.source_triangle]]
         for corners, known in zip(one, other, strict=True):
             starts = [np.array_equal(corners, np.roll(known, turn, axis=0)) for turn in range(3)]
             assert any(starts), name
     for name in CARD_FIELDS:
         np.testing.assert_array_equal(
             getattr(found.mesh, name)[found.mesh.card],
-            getattr(mesh, name)[mesh.card][found.triangle],
+            getattr(mesh, name)[mesh.card][found.source_triangle],
         )
 
 
 def test_cards_have_no_gaps_and_their_triangles_go_from_root_to_tip() -> None:
-    mesh = canonical(shuffled(scattered(), 5)).mesh
+    mesh = to_canonical(shuffled(scattered(), 5)).mesh
     np.testing.assert_array_equal(mesh.card, np.repeat(np.arange(30), 4))
     along = mesh.along[mesh.triangles].mean(axis=1).reshape(30, 4)
     assert (np.diff(along, axis=1) > 0.0).all()
@@ -112,7 +112,7 @@ def test_the_way_from_the_root_counts_before_the_place() -> None:
     along = mesh.along.copy()
     along[6:] = 1.0 - along[6:]
     for each in (replace(mesh, along=along), shuffled(replace(mesh, along=along), 6)):
-        found = canonical(each).mesh
+        found = to_canonical(each).mesh
         assert (np.diff(found.along) >= 0.0).all()
         np.testing.assert_allclose(found.positions[:4, 2], [0.0, 1.0, 0.0, 1.0])
 
@@ -121,8 +121,8 @@ def test_the_way_from_the_root_counts_before_the_place() -> None:
 def test_cards_in_one_place_are_told_apart_by_their_uv(seed: int) -> None:
     mesh = strips(np.zeros((5, 3)))
     mesh = replace(mesh, uv=mesh.uv + np.repeat([0.4, 0.1, 0.3, 0.0, 0.2], 6)[:, None])
-    found = canonical(shuffled(mesh, seed)).mesh
-    check_same(found, canonical(mesh).mesh)
+    found = to_canonical(shuffled(mesh, seed)).mesh
+    check_same(found, to_canonical(mesh).mesh)
     np.testing.assert_array_equal(found.tile, np.array([3, 1, 4, 2, 0]) + 5)
 
 
@@ -132,7 +132,7 @@ def test_cards_that_are_alike_in_all_keep_their_order() -> None:
     order = np.random.default_rng(8).permutation(len(mesh.triangles))
     mixed = replace(mesh, triangles=mesh.triangles[order], card=mesh.card[order])
     for each in (mesh, mixed):
-        found = canonical(each).mesh
+        found = to_canonical(each).mesh
         np.testing.assert_array_equal(found.tile, np.arange(4) + 5)
         np.testing.assert_array_equal(found.card, np.repeat(np.arange(4), 4))
 
@@ -159,7 +159,7 @@ def test_triangles_of_one_card_go_by_the_places_of_their_corners() -> None:
         places = [keys[corner] for corner in corners]
         lowest = places.index(min(places))
         expected.append((*places[lowest:], *places[:lowest]))
-    found = canonical(mesh).mesh
+    found = to_canonical(mesh).mesh
     order = [tuple(map(float, key)) for key in zip(found.along, *found.positions.T, strict=True)]
     assert order == sorted(keys)
     assert [tuple(order[c] for c in corners) for corners in found.triangles] == sorted(expected)
@@ -174,13 +174,13 @@ def test_vertices_in_one_place_count_alike() -> None:
         triangles=np.array([[6, 1, 3], [0, 7, 2], [2, 3, 5], [2, 5, 4]]),
         **{name: getattr(whole, name)[[*range(6), 0, 3]] for name in VERTEX_FIELDS},
     )
-    one, other = canonical(whole), canonical(split)
-    np.testing.assert_array_equal(one.triangle, other.triangle)
+    one, other = to_canonical(whole), to_canonical(split)
+    np.testing.assert_array_equal(one.source_triangle, other.source_triangle)
     np.testing.assert_array_equal(
         one.mesh.positions[one.mesh.triangles], other.mesh.positions[other.mesh.triangles]
     )
 
 
 def test_no_cards() -> None:
-    found = canonical(strips(np.zeros((0, 3))))
-    assert not len(found.triangle) and not found.mesh.card_count
+    found = to_canonical(strips(np.zeros((0, 3))))
+    assert not len(found.source_triangle) and not found.mesh.card_count

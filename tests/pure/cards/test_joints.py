@@ -162,7 +162,7 @@ def test_rigid_cards_are_exact_with_the_fewest_joints() -> None:
     tracks = tracks_of(mesh, np.einsum("fab,nb->nfa", turn, mesh.positions))
     rig = fitted(tracks, chains=3)
     assert rig.joints == 2
-    assert keyed_error(tracks, rig, rig.turn, rig.place).worst < 1e-5
+    assert keyed_error(tracks, rig, rig.turn, rig.place).maximum < 1e-5
 
 
 def test_what_bends_more_has_more_joints_and_stays_under_the_error() -> None:
@@ -198,7 +198,7 @@ def test_the_error_is_what_skinning_by_hand_gives() -> None:
     error = keyed_error(tracks, rig, rig.turn, rig.place)
     distance = np.linalg.norm(misses, axis=-1)
     assert error.root_mean_square == pytest.approx(np.sqrt((distance**2).mean()), rel=1e-4)
-    assert error.worst == pytest.approx(distance.max(), rel=1e-4)
+    assert error.maximum == pytest.approx(distance.max(), rel=1e-4)
 
 
 def test_joints_lie_along_their_chain_at_rest() -> None:

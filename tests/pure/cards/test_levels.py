@@ -11,8 +11,8 @@ import pytest
 
 from hairloom.addon.cards.atlas_grid import AtlasGrid
 from hairloom.addon.cards.card_mesh import CardMesh
+from hairloom.addon.cards.joining import join_pairs, pairs_to_join
 from hairloom.addon.cards.levels import card_levels
-from hairloom.addon.cards.merging import pairs_to_join, with_joined
 from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.cards.strip import CardFrames, Strips, UncutCards
 from hairloom.addon.strands import Surface
@@ -156,7 +156,7 @@ def test_two_cards_side_by_side_become_one_of_both_widths() -> None:
     cards = side_by_side((0.01, 0.0, 0.0))
     pairs = pairs_to_join(cards.strips, cards.strand_count, cards.group, np.arange(2))
     np.testing.assert_array_equal(pairs, [[0, 1]])
-    strips, count = with_joined(cards.strips, cards.strand_count, pairs)
+    strips, count = join_pairs(cards.strips, cards.strand_count, pairs)
     np.testing.assert_allclose(strips.width[0], 0.02, rtol=1e-4)
     np.testing.assert_allclose(strips.frames.center[0, :, 0], 0.005, atol=1e-6)
     assert count[0] == 2
@@ -164,7 +164,7 @@ def test_two_cards_side_by_side_become_one_of_both_widths() -> None:
 
 def test_two_cards_on_each_other_become_one_between_the_same_and_twice_the_width() -> None:
     cards = side_by_side((0.0, 0.004, 0.0))
-    strips, _ = with_joined(cards.strips, cards.strand_count, np.array([[0, 1]]))
+    strips, _ = join_pairs(cards.strips, cards.strand_count, np.array([[0, 1]]))
     np.testing.assert_allclose(strips.width[0], 0.01 * np.sqrt(2.0), rtol=1e-4)
     np.testing.assert_allclose(strips.frames.center[0, :, 1], 0.002, atol=1e-6)
 
@@ -174,7 +174,7 @@ def test_the_one_of_more_strands_stays_and_hardly_moves() -> None:
     count = np.array([1, 99], np.int32)
     pairs = pairs_to_join(cards.strips, count, cards.group, np.arange(2))
     np.testing.assert_array_equal(pairs, [[1, 0]])
-    strips, _ = with_joined(cards.strips, count, pairs)
+    strips, _ = join_pairs(cards.strips, count, pairs)
     np.testing.assert_allclose(strips.frames.center[1, :, 0], 0.0099, atol=1e-6)
     assert 0.01 < strips.width[1, 0] < 0.015
 

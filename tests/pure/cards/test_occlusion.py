@@ -10,7 +10,12 @@ from guide_cards import build_cards
 from spheres import globe
 
 from hairloom.addon.cards.card_mesh import VERTEX_FIELDS, CardMesh
-from hairloom.addon.cards.occlusion import CardOccluder, even_axes, extent_of, vertex_occlusion
+from hairloom.addon.cards.occlusion import (
+    CardOccluder,
+    diagonal_of,
+    evenly_spread_axes,
+    vertex_occlusion,
+)
 from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
 from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.strands import Surface
@@ -107,7 +112,7 @@ def test_the_mean_error_against_brute_force_is_below_two_hundredths() -> None:
     found = vertex_occlusion(mesh, [CardOccluder(mesh, alpha)], [head], settings)
     chosen = np.random.default_rng(2).choice(len(found), 50, replace=False)
     through = (1.0 - alpha) ** settings.extinction
-    own = settings.self_occlusion_distance * extent_of(mesh)
+    own = settings.self_occlusion_distance * diagonal_of(mesh)
     expected = brute_force(mesh, 1.0 - through, head, chosen, 512, own)
     assert expected.min() < 0.3 and expected.max() > 0.95  # it is not all alike
     error = found[chosen] - expected
@@ -219,7 +224,7 @@ def test_other_grooms_and_bodies_shade_as_well_and_only_within_the_reach() -> No
     below = Surface(body.positions, body.triangles[:, ::-1])
     far = plain()
     for shades, bodies in (([CardOccluder(other)], []), ([], [below])):
-        near = plain(reach=0.1 / extent_of(mesh, *(each.mesh for each in shades)))
+        near = plain(reach=0.1 / diagonal_of(mesh, *(each.mesh for each in shades)))
         np.testing.assert_array_equal(vertex_occlusion(mesh, shades, bodies, near), 1.0)
         assert vertex_occlusion(mesh, shades, bodies, far).max() < 0.02
 
@@ -279,7 +284,7 @@ def test_nothing_and_triangles_without_area() -> None:
 
 
 def test_axes_are_even_over_the_sphere() -> None:
-    axes = even_axes(500)
+    axes = evenly_spread_axes(500)
     np.testing.assert_allclose(np.linalg.norm(axes, axis=1), 1.0, atol=1e-12)
     assert (axes[:, 2] > 0.0).all()
     np.testing.assert_allclose(axes.T @ axes / 500, np.eye(3) / 3.0, atol=0.005)

@@ -9,8 +9,13 @@ import pytest
 from sheets import VIEW, sheets
 
 from hairloom.addon.cards.card_mesh import CardMesh
-from hairloom.addon.cards.order_pairs import all_pairs, pairs_by_view
-from hairloom.addon.cards.order_views import alpha_at, fragments, seen_from_afar, texels_per_metre
+from hairloom.addon.cards.order_pairs import concatenated_pairs, pairs_by_view
+from hairloom.addon.cards.order_views import (
+    downsampled_alpha,
+    fragment_alpha,
+    rasterized,
+    texels_per_metre,
+)
 from hairloom.addon.cards.sort import SortBy, card_orders
 
 
@@ -34,14 +39,14 @@ def crossing_sheets() -> CardMesh:
 def test_alpha_is_that_of_the_texel_under_the_pixel() -> None:
     mesh = sheets((0.0,))
     random = np.random.default_rng(0).random((16, 16))
-    met = fragments(VIEW, mesh.positions, mesh.triangles)
+    met = rasterized(VIEW, mesh.positions, mesh.triangles)
     # the sheet covers half the picture, from column 7.84 and row 7.936
     row, column = (
         at - offset for at, offset in zip(divmod(met.pixel, 32), (7.936, 7.84), strict=True)
     )
     texel = [np.floor(at + 0.5).astype(int) for at in (row, column)]
     assert len(met.pixel) == 256
-    np.testing.assert_array_equal(alpha_at(mesh, met, random), random[texel[0], texel[1]])
+    np.testing.assert_array_equal(fragment_alpha(mesh, met, random), random[texel[0], texel[1]])
 
 
 def test_texels_on_a_square_metre() -> None:
@@ -53,20 +58,20 @@ def test_texels_on_a_square_metre() -> None:
 
 def test_from_afar_a_texel_is_as_large_as_a_pixel() -> None:
     mesh, alpha = sheets((0.0,)), np.random.default_rng(1).random((64, 48))
-    assert seen_from_afar(alpha, mesh, 1.0e-3) is alpha
-    coarse = seen_from_afar(alpha, mesh, 0.15)
+    assert downsampled_alpha(alpha, mesh, 1.0e-3) is alpha
+    coarse = downsampled_alpha(alpha, mesh, 0.15)
     assert coarse.shape == (8, 6)
     np.testing.assert_allclose(coarse[2, 3], alpha[16:24, 24:32].mean())
-    assert seen_from_afar(np.ones((1, 9)), mesh, 1.0).shape == (1, 9)
-    assert seen_from_afar(alpha, mesh, 1.0e9).shape == (2, 1)
+    assert downsampled_alpha(np.ones((1, 9)), mesh, 1.0).shape == (1, 9)
+    assert downsampled_alpha(alpha, mesh, 1.0e9).shape == (2, 1)
 
 
 def test_what_is_clear_or_behind_something_opaque_has_no_order() -> None:
     mesh = sheets((0.0, 0.1, 0.2))
 
     def pairs(alpha: np.ndarray) -> set[tuple[int, ...]]:
-        found = all_pairs(list(pairs_by_view(mesh, None, 8, 32, alpha)))
-        both = np.stack([found.behind, found.before], axis=1)
+        found = concatenated_pairs(list(pairs_by_view(mesh, None, 8, 32, alpha)))
+        both = np.stack([found.farther, found.nearer], axis=1)
         return set(map(tuple, mesh.card[both].tolist()))
 
     assert len(pairs(half_clear(slice(0, 0)))) == 6  # three pairs from either side
@@ -80,10 +85,11 @@ def test_fine_strands_of_a_texture_count_by_what_they_cover_together() -> None:
     strands[:, ::8] = 0.8
     even = np.full((8, 8), 0.1, np.float32)
     of_strands, of_even = (
-        all_pairs(list(pairs_by_view(mesh, None, 4, 32, alpha))) for alpha in (strands, even)
+        concatenated_pairs(list(pairs_by_view(mesh, None, 4, 32, alpha)))
+        for alpha in (strands, even)
     )
     assert len(of_even.weight) > 1000
-    np.testing.assert_array_equal(of_strands.behind, of_even.behind)
+    np.testing.assert_array_equal(of_strands.farther, of_even.farther)
     np.testing.assert_array_equal(of_strands.weight, of_even.weight)
 
 

@@ -10,12 +10,12 @@ from sheets import VIEW, sheets
 
 from hairloom.addon.cards.card_mesh import CardMesh
 from hairloom.addon.cards.order_check import (
-    seen_cards,
-    views_of,
+    check_views,
+    visible_fragments,
     wrong_fraction,
     wrong_pixels,
 )
-from hairloom.addon.cards.order_views import BallView
+from hairloom.addon.cards.order_views import SphereView
 from hairloom.addon.strands import Surface
 
 
@@ -25,7 +25,7 @@ def share(
     """The fraction of wrong pixels if cards are drawn in this order; None if none is seen."""
     order = np.concatenate([np.flatnonzero(mesh.card == card) for card in cards])
     picture = np.full((4, 4), alpha)
-    is_wrong = wrong_pixels(mesh, seen_cards(mesh, head, VIEW, picture), order, order)
+    is_wrong = wrong_pixels(mesh, visible_fragments(mesh, head, VIEW, picture), order, order)
     assert len(is_wrong) in (0, 256)
     return float(is_wrong.mean()) if len(is_wrong) else None
 
@@ -67,7 +67,7 @@ def test_depth_that_front_faces_write_loses_what_comes_too_late() -> None:
         mesh = sheets((0.1, 0.2), (is_turned, is_turned))
         u = np.repeat([u_of_far, 0.75], 4)
         mesh = replace(mesh, card=np.zeros(4), uv=np.stack([u, u], axis=1))
-        seen = seen_cards(mesh, None, VIEW, picture)
+        seen = visible_fragments(mesh, None, VIEW, picture)
         return wrong_pixels(mesh, seen, near_first, near_first)
 
     assert is_wrong(False, 0.75).all()
@@ -80,9 +80,9 @@ def test_alpha_is_read_where_the_texture_says() -> None:
     picture = np.array([[0.0, 1.0], [0.0, 0.5]])
     mesh = sheets((0.1,))
     for distance in (np.inf, 3.0):
-        view = BallView(VIEW.middle, VIEW.radius, VIEW.direction, VIEW.size, distance)
-        seen = seen_cards(mesh, None, view, picture)
-        row, column = np.divmod(seen.met.pixel, VIEW.size)
+        view = SphereView(VIEW.middle, VIEW.radius, VIEW.direction, VIEW.size, distance)
+        seen = visible_fragments(mesh, None, view, picture)
+        row, column = np.divmod(seen.fragments.pixel, VIEW.size)
         assert column.min() >= VIEW.size // 2
         np.testing.assert_array_equal(seen.alpha, np.where(row < VIEW.size // 2, 1.0, 0.5))
 
@@ -101,7 +101,7 @@ def no_cards() -> CardMesh:
 
 def test_views_are_from_outside_and_hold_all_cards() -> None:
     mesh = sheets((0.1, 0.9))
-    for view in views_of(mesh, 9, 64):
+    for view in check_views(mesh, 9, 64):
         assert view.distance > view.radius
         x, y, _, scale = view.project(mesh.positions)
         assert (scale > 0.0).all()

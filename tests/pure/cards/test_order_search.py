@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
-from hairloom.addon.cards.order_search import Preferences, min_broken, net_preferences
+from hairloom.addon.cards.order_search import Preferences, minimize_violations, net_preferences
 
 
 def random_preferences(random: np.random.Generator, count: int) -> np.ndarray:
@@ -49,7 +49,7 @@ def test_preferences_are_added_up_as_a_double_loop_does(seed: int) -> None:
     assert preferences.weight.all()
     assert (preferences.lower < preferences.higher).all()
     rank = random.permutation(9)
-    assert preferences.broken(rank) == broken(table, np.argsort(rank))
+    assert preferences.violated_weight(rank) == broken(table, np.argsort(rank))
 
 
 def test_preferences_of_parts_are_those_of_the_whole() -> None:
@@ -57,7 +57,7 @@ def test_preferences_of_parts_are_those_of_the_whole() -> None:
     before, after = random.integers(0, 30, (2, 400))
     weight, whole = random.integers(0, 5, 400), random.integers(0, 6, 30)
     direct = net_preferences(6, whole[before], whole[after], weight)
-    found = net_preferences(30, before, after, weight).of_whole(whole, 6)
+    found = net_preferences(30, before, after, weight).for_groups(whole, 6)
     for name in ("count", "lower", "higher", "weight"):
         np.testing.assert_array_equal(getattr(found, name), getattr(direct, name))
 
@@ -70,7 +70,7 @@ def test_what_is_found_is_nearly_the_best_of_all_orders(count: int) -> None:
     trials, best_of_all, found_of_all = (40 if count < 7 else 8), 0, 0
     for _ in range(trials):
         table = random_preferences(random, count)
-        order = order_of(min_broken(as_preferences(table), random.permutation(count)))
+        order = order_of(minimize_violations(as_preferences(table), random.permutation(count)))
         best = min(broken(table, each) for each in itertools.permutations(range(count)))
         found = broken(table, order)
         best_of_all, found_of_all = best_of_all + best, found_of_all + found
@@ -87,29 +87,33 @@ def test_preferences_without_contradiction_are_fulfilled() -> None:
     is_first = truth[one] < truth[two]
     before, after = np.where(is_first, one, two), np.where(is_first, two, one)
     preferences = net_preferences(300, before, after, np.ones(4000, np.int64))
-    assert preferences.broken(np.argsort(random.permutation(300))) > 1000
-    assert preferences.broken(min_broken(preferences, random.permutation(300))) < 40
+    assert preferences.violated_weight(np.argsort(random.permutation(300))) > 1000
+    assert (
+        preferences.violated_weight(minimize_violations(preferences, random.permutation(300))) < 40
+    )
     near = np.argsort(truth + random.normal(0.0, 10.0, 300))
-    assert preferences.broken(np.argsort(near)) > 50
-    assert preferences.broken(min_broken(preferences, near)) < 10
+    assert preferences.violated_weight(np.argsort(near)) > 50
+    assert preferences.violated_weight(minimize_violations(preferences, near)) < 10
 
 
 def test_things_without_preferences_stay_where_they_were() -> None:
     start = np.random.default_rng(2).permutation(12)
     none = np.zeros(0, np.int64)
     np.testing.assert_array_equal(
-        order_of(min_broken(net_preferences(12, none, none, none), start)), start
+        order_of(minimize_violations(net_preferences(12, none, none, none), start)), start
     )
     one = net_preferences(12, start[9:10], start[8:9], np.array([3]))
     expected = start.copy()
     expected[[8, 9]] = start[[9, 8]]
-    np.testing.assert_array_equal(order_of(min_broken(one, start)), expected)
-    assert len(min_broken(net_preferences(0, none, none, none), none)) == 0
+    np.testing.assert_array_equal(order_of(minimize_violations(one, start)), expected)
+    assert len(minimize_violations(net_preferences(0, none, none, none), none)) == 0
 
 
 def test_a_search_without_end_is_cut_short() -> None:
     table = random_preferences(np.random.default_rng(3), 30)
     start = np.arange(30)
-    np.testing.assert_array_equal(order_of(min_broken(as_preferences(table), start, 0)), start)
-    once = min_broken(as_preferences(table), start, 1)
+    np.testing.assert_array_equal(
+        order_of(minimize_violations(as_preferences(table), start, 0)), start
+    )
+    once = minimize_violations(as_preferences(table), start, 1)
     assert broken(table, order_of(once)) < broken(table, start)

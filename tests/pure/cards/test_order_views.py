@@ -8,23 +8,23 @@ import numpy as np
 import pytest
 
 from hairloom.addon.cards.card_mesh import CardMesh
-from hairloom.addon.cards.order_check import seen_cards
+from hairloom.addon.cards.order_check import visible_fragments
 from hairloom.addon.cards.order_pairs import (
     MIN_WEIGHT,
-    all_pairs,
+    concatenated_pairs,
+    fragment_pairs,
     pairs_by_view,
-    pairs_of,
 )
 from hairloom.addon.cards.order_views import (
-    BallView,
     Fragments,
-    far_to_near,
-    fragments,
-    nearest,
-    sphere_of,
+    SphereView,
+    bounding_sphere,
+    rasterized,
+    sorted_far_to_near,
+    surface_nearness,
     view_directions,
 )
-from hairloom.addon.cards.sort import dangling_groups, sections
+from hairloom.addon.cards.sort import dangling_groups, section_of_groups
 from hairloom.addon.strands import Surface
 
 
@@ -49,7 +49,7 @@ def as_cards(points: np.ndarray, triangles: np.ndarray) -> CardMesh:
 
 
 def hits(
-    view: BallView, corners: np.ndarray
+    view: SphereView, corners: np.ndarray
 ) -> dict[tuple[int, int], tuple[float, bool, np.ndarray]]:
     """(pixel, triangle) -> depth towards the eye, whether it is a front face, and barycentric
     coordinates, from a ray through each pixel's centre and each triangle's plane.
@@ -83,8 +83,8 @@ def hits(
 def test_fragments_are_where_rays_meet_triangles(distance: float) -> None:
     points, triangles = loose_triangles()
     direction = np.array([0.48, -0.6, 0.64])
-    view = BallView(np.array([0.1, 0.0, -0.1]), 1.6, direction, 28, distance)
-    met = fragments(view, points, triangles)
+    view = SphereView(np.array([0.1, 0.0, -0.1]), 1.6, direction, 28, distance)
+    met = rasterized(view, points, triangles)
     truth = hits(view, points[triangles])
     assert len(truth) > 150
     found = {}
@@ -92,12 +92,12 @@ def test_fragments_are_where_rays_meet_triangles(distance: float) -> None:
         shares = np.array([0.0, met.second[index], met.third[index]])
         shares[0] = 1.0 - shares.sum()
         key = int(met.pixel[index]), int(met.triangle[index])
-        found[key] = met.near[index], met.is_front[index], shares
+        found[key] = met.nearness[index], met.is_front[index], shares
     assert len(set(truth) ^ set(found)) <= 2  # rounding at edges
     for key in set(truth) & set(found):
         assert found[key][1] == truth[key][1]
         np.testing.assert_allclose(found[key][2], truth[key][2], atol=2e-4)
-    sorted_met = far_to_near(met)
+    sorted_met = sorted_far_to_near(met)
     for pixel in range(view.size**2):
         own = sorted_met.triangle[sorted_met.pixel == pixel].tolist()
         depths = [truth[pixel, number][0] for number in own if (pixel, number) in truth]
@@ -106,14 +106,14 @@ def test_fragments_are_where_rays_meet_triangles(distance: float) -> None:
 
 def test_what_is_behind_the_eye_is_not_seen() -> None:
     points, triangles = loose_triangles(4)
-    view = BallView(np.zeros(3), 1.0, np.array([0.0, -1.0, 0.0]), 16, 2.0)
-    assert len(fragments(view, points, triangles).pixel)
+    view = SphereView(np.zeros(3), 1.0, np.array([0.0, -1.0, 0.0]), 16, 2.0)
+    assert len(rasterized(view, points, triangles).pixel)
     for shift in (-4.0, -9.0):
-        assert not len(fragments(view, points + [0.0, shift, 0.0], triangles).pixel)
+        assert not len(rasterized(view, points + [0.0, shift, 0.0], triangles).pixel)
     reaching_past = np.array([[-0.5, 0.0, -0.5], [0.5, 0.0, -0.5], [0.4, -3.0, 0.5]])
-    assert not len(fragments(view, reaching_past, np.array([[0, 1, 2]])).pixel)
-    assert not len(fragments(view, points[:0], triangles[:0]).pixel)
-    assert (nearest(view, None) == -np.inf).all()
+    assert not len(rasterized(view, reaching_past, np.array([[0, 1, 2]])).pixel)
+    assert not len(rasterized(view, points[:0], triangles[:0]).pixel)
+    assert (surface_nearness(view, None) == -np.inf).all()
 
 
 def test_directions_are_spread_over_the_elevations_of_views() -> None:
@@ -149,8 +149,8 @@ def test_pairs_are_those_of_a_double_loop() -> None:
                 facing = int(met.is_front[one]) if met.is_front[one] == met.is_front[two] else 2
                 if weight >= MIN_WEIGHT:
                     expected.append((met.triangle[one], met.triangle[two], weight, facing))
-    pairs = pairs_of(met, covers)
-    found = list(zip(pairs.behind, pairs.before, pairs.weight / 1000, pairs.facing, strict=True))
+    pairs = fragment_pairs(met, covers)
+    found = list(zip(pairs.farther, pairs.nearer, pairs.weight / 1000, pairs.facing, strict=True))
     assert len(found) == len(expected) > 300
     np.testing.assert_allclose(sorted(found), sorted(expected), atol=6e-4)
 
@@ -170,13 +170,13 @@ def test_a_view_from_behind_is_the_view_from_the_front_turned_over() -> None:
         for sign in (1.0, -1.0):
             if sign * direction[2] < np.sin(np.radians(-20.0)):
                 continue
-            view = BallView(*sphere_of(mesh), sign * direction, 32)
-            seen = seen_cards(mesh, head, view, alpha)
+            view = SphereView(*bounding_sphere(mesh), sign * direction, 32)
+            seen = visible_fragments(mesh, head, view, alpha)
             is_blended = seen.alpha < 1.0
-            pairs = pairs_of(seen.met[is_blended], seen.alpha[is_blended])
-            expected += zip(pairs.behind, pairs.before, pairs.weight, pairs.facing, strict=True)
-    pairs = all_pairs(list(pairs_by_view(mesh, head, 5, 32, alpha)))
-    found = list(zip(pairs.behind, pairs.before, pairs.weight, pairs.facing, strict=True))
+            pairs = fragment_pairs(seen.fragments[is_blended], seen.alpha[is_blended])
+            expected += zip(pairs.farther, pairs.nearer, pairs.weight, pairs.facing, strict=True)
+    pairs = concatenated_pairs(list(pairs_by_view(mesh, head, 5, 32, alpha)))
+    found = list(zip(pairs.farther, pairs.nearer, pairs.weight, pairs.facing, strict=True))
     missed = sum(abs(found.count(pair) - expected.count(pair)) for pair in set(found + expected))
     assert len(expected) > 400
     assert missed <= 0.01 * len(expected)  # pixels at an edge
@@ -191,4 +191,4 @@ def test_only_a_group_far_beyond_all_others_dangles() -> None:
     assert dangling_groups(group[:0], near[:0]) == []
     tails = near + 0.1 * (group == 9) + 0.2 * (group == 2)
     assert dangling_groups(group, tails) == [9, 2]
-    np.testing.assert_array_equal(sections(group, [9, 2]), np.repeat([0, 2, 1, 0], 50))
+    np.testing.assert_array_equal(section_of_groups(group, [9, 2]), np.repeat([0, 2, 1, 0], 50))

@@ -14,7 +14,7 @@ from hairloom.addon.cards.bake import sample_maps
 from hairloom.addon.cards.card_mesh import CardMesh
 from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.cards.shell_plan import Patches, shell_strands
-from hairloom.addon.cards.shells import Shells, are_wanted, build_shells
+from hairloom.addon.cards.shells import Shells, build_shells, wants_shells
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.strands import StrandSet, Surface
 from hairloom.addon.strands.face import BROWS
@@ -215,12 +215,12 @@ def test_without_thinner_patterns_thin_skin_of_a_coarser_level_shows_whole_ones(
 
 def test_automatic_makes_shells_of_short_hair_alone() -> None:
     head, automatic = square(), CardSettings(kind="auto")
-    assert are_wanted(automatic, fur_on_square(), head, False)
-    assert not are_wanted(automatic, fur_on_square(), head, True)
-    assert not are_wanted(automatic, fur_on_square(), None, False)
-    assert not are_wanted(replace(automatic, kind="cards"), fur_on_square(), head, False)
+    assert wants_shells(automatic, fur_on_square(), head, False)
+    assert not wants_shells(automatic, fur_on_square(), head, True)
+    assert not wants_shells(automatic, fur_on_square(), None, False)
+    assert not wants_shells(replace(automatic, kind="cards"), fur_on_square(), head, False)
     long_hair = replace(fur_on_square(), points=fur_on_square().points * [1.0, 1.0, 20.0])
-    assert not are_wanted(automatic, long_hair, head, False)
+    assert not wants_shells(automatic, long_hair, head, False)
 
 
 def test_what_cannot_be_shells_is_refused_in_plain_words() -> None:
@@ -236,7 +236,7 @@ def test_what_cannot_be_shells_is_refused_in_plain_words() -> None:
     ]
     for strands, skin, has_edits, problem in cases:
         with pytest.raises(HairloomError, match=problem):
-            are_wanted(SHELLS, strands, skin, has_edits)
+            wants_shells(SHELLS, strands, skin, has_edits)
 
 
 def test_too_few_triangles_are_refused() -> None:

@@ -13,7 +13,7 @@ from tiers import few_in_commits
 
 from hairloom.addon.cards.card_mesh import CARD_FIELDS, VERTEX_FIELDS, CardMesh, join_meshes
 from hairloom.addon.cards.order_check import wrong_fraction
-from hairloom.addon.cards.order_pairs import all_pairs, pairs_by_view
+from hairloom.addon.cards.order_pairs import concatenated_pairs, pairs_by_view
 from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.cards.sort import (
     MAX_PIECES,
@@ -23,10 +23,10 @@ from hairloom.addon.cards.sort import (
     card_of_vertex,
     card_orders,
     connected_components,
-    in_order,
-    order_from,
-    pieces,
-    reordered,
+    order_from_eye,
+    piece_of_triangle,
+    sorted_by_key,
+    with_triangle_order,
 )
 from hairloom.addon.strands import Surface
 
@@ -84,7 +84,7 @@ WAYS: tuple[SortBy, ...] = ("pieces", "cards", "distance")
 @pytest.mark.parametrize("head", [None, globe(24)])
 def test_shells_are_drawn_from_the_inside_to_the_outside(head: Surface | None, by: SortBy) -> None:
     mesh, distance = shells()
-    ordered = in_order(mesh, card_orders(mesh, head, by).front)
+    ordered = with_triangle_order(mesh, card_orders(mesh, head, by).front)
     drawn = ordered.card[np.flatnonzero(np.diff(ordered.card, prepend=-1))]
     assert sorted(drawn) == list(range(mesh.card_count))
     np.testing.assert_array_equal(distance[drawn], np.sort(distance))
@@ -131,10 +131,10 @@ def as_drawn(mesh: CardMesh, order: np.ndarray) -> np.ndarray:
 def test_the_order_hangs_on_where_cards_are_alone(head: Surface | None, by: SortBy) -> None:
     group = np.arange(40) % 3
     mesh = replace(crossing_cards(), group=group)
-    expected = card_orders(mesh, head, by, apart=(2,), view_count=8)
+    expected = card_orders(mesh, head, by, separate_groups=(2,), view_count=8)
     for seed in range(2):
         other = shuffled(mesh, seed)
-        found = card_orders(other, head, by, apart=(2,), view_count=8)
+        found = card_orders(other, head, by, separate_groups=(2,), view_count=8)
         for one, two in ((expected.front, found.front), (expected.back, found.back)):
             np.testing.assert_array_equal(as_drawn(mesh, one), as_drawn(other, two))
 
@@ -145,7 +145,7 @@ def test_cards_that_are_sorted_stay_as_they_are(by: SortBy) -> None:
     twice = join_meshes(
         [mesh, replace(mesh, card=mesh.card + 40)]
     )  # each card coincides with another
-    once = in_order(twice, card_orders(twice, globe(24), by, view_count=8).front)
+    once = with_triangle_order(twice, card_orders(twice, globe(24), by, view_count=8).front)
     again = card_orders(once, globe(24), by, view_count=8)
     np.testing.assert_array_equal(again.front, np.arange(len(once.triangles)))
 
@@ -161,11 +161,11 @@ def test_everything_of_a_triangle_and_a_vertex_travels_with_it() -> None:
         return np.unique(np.column_stack([one.card, corners]), axis=0)
 
     orders = card_orders(mesh, None)
-    ordered, back = in_order(mesh, orders.front), mesh.triangles[orders.back]
+    ordered, back = with_triangle_order(mesh, orders.front), mesh.triangles[orders.back]
     assert not np.array_equal(ordered.triangles, mesh.triangles)
     np.testing.assert_array_equal(table(ordered), table(mesh))
     np.testing.assert_array_equal(np.unique(back, axis=0), np.unique(mesh.triangles, axis=0))
-    again = reordered(mesh, np.arange(mesh.card_count)[::-1])
+    again = sorted_by_key(mesh, np.arange(mesh.card_count)[::-1])
     np.testing.assert_array_equal(table(again), table(mesh))
     assert (np.diff(again.triangles.min(axis=1)) >= 0).all()  # vertices follow their cards
     assert again.atlas == mesh.atlas
@@ -253,7 +253,7 @@ def test_cards_side_by_side_go_by_their_place() -> None:
     mesh = build_cards(guides, up, CardSettings(width_factor=0.2, bend=0.0))
     wall = np.float32([[-9, -1, -9], [9, -1, -9], [0, -1, 9]])
     for by in WAYS:
-        orders = card_orders(mesh, Surface(wall, np.array([[0, 1, 2]])), by, apart=())
+        orders = card_orders(mesh, Surface(wall, np.array([[0, 1, 2]])), by, separate_groups=())
         for order in (orders.front, orders.back):
             np.testing.assert_array_equal(np.sort(order), np.arange(len(mesh.triangles)))
             if by != "pieces":
@@ -273,10 +273,10 @@ def test_a_ponytail_is_drawn_on_its_own_after_the_rest(by: SortBy) -> None:
         drawn = group[mesh.card[order]]
         assert (drawn[-5 * 16 :] == 7).all()
         assert set(drawn[: -5 * 16]) == {0, 3}
-    named = card_orders(mesh, globe(24), by, apart=(3, 7))
+    named = card_orders(mesh, globe(24), by, separate_groups=(3, 7))
     runs = group[mesh.card[named.front]]
     np.testing.assert_array_equal(runs, np.repeat([0, 3, 7], 16 * np.array([32, 3, 5])))
-    together = group[mesh.card[card_orders(mesh, globe(24), by, apart=()).back]]
+    together = group[mesh.card[card_orders(mesh, globe(24), by, separate_groups=()).back]]
     assert (together[-5 * 16 :] != 7).any()
 
 
@@ -284,7 +284,9 @@ def test_a_ponytail_is_drawn_on_its_own_after_the_rest(by: SortBy) -> None:
 def test_groups_that_lie_among_each_other_are_drawn_apart(by: SortBy) -> None:
     mesh = crossing_cards()
     group = np.random.default_rng(1).integers(0, 4, mesh.card_count)
-    orders = card_orders(replace(mesh, group=group), None, by, apart=(1, 2, 3), view_count=8)
+    orders = card_orders(
+        replace(mesh, group=group), None, by, separate_groups=(1, 2, 3), view_count=8
+    )
     for order in (orders.front, orders.back):
         drawn = group[mesh.card[order]]
         np.testing.assert_array_equal(drawn, np.sort(drawn))
@@ -310,7 +312,11 @@ def test_none_and_one_card(by: SortBy, count: int) -> None:
     mesh = crossing_cards(count) if count else empty_mesh()
     for head in (None, globe(24)):
         orders = card_orders(mesh, head, by)
-        for order in (orders.front, orders.back, order_from(mesh, np.array([1.0, 0.0, 0.0, 1.0]))):
+        for order in (
+            orders.front,
+            orders.back,
+            order_from_eye(mesh, np.array([1.0, 0.0, 0.0, 1.0])),
+        ):
             np.testing.assert_array_equal(np.sort(order), np.arange(len(mesh.triangles)))
         assert wrong_fraction(mesh, head, view_count=2) <= 1.0
 
@@ -340,11 +346,11 @@ def test_cards_that_share_all_their_vertices() -> None:
 
 def test_pieces_are_triangles_unless_there_are_too_many() -> None:
     mesh = crossing_cards(5)
-    np.testing.assert_array_equal(pieces(mesh), np.arange(len(mesh.triangles)))
+    np.testing.assert_array_equal(piece_of_triangle(mesh), np.arange(len(mesh.triangles)))
     random = np.random.default_rng(0)
     card = random.integers(0, 9_000, 2 * MAX_PIECES + 5)
     known = {name: np.zeros(9_000) for name in ("group", "layer", "tile")}
-    piece = pieces(replace(mesh, triangles=np.zeros((len(card), 3)), card=card, **known))
+    piece = piece_of_triangle(replace(mesh, triangles=np.zeros((len(card), 3)), card=card, **known))
     assert piece.max() + 1 == len(np.unique(piece)) < MAX_PIECES
     for number in random.integers(0, piece.max(), 50).tolist():
         own = np.flatnonzero(piece == number)
@@ -362,14 +368,14 @@ def test_order_from_an_eye_is_that_of_the_middles(eye: tuple[float, ...]) -> Non
         near = -np.linalg.norm(middle - np.array(eye[:3]) / eye[3], axis=1)
     else:
         near = middle @ np.array(eye[:3])
-    drawn = near[order_from(mesh, np.array(eye))]
+    drawn = near[order_from_eye(mesh, np.array(eye))]
     assert (np.diff(drawn) > -2e-5 * np.ptp(near) * 2).all()
     assert np.ptp(near) > 0.1
 
 
 def test_cards_at_equal_distance_keep_their_order() -> None:
     mesh, _ = shells()
-    ordered = reordered(mesh, np.zeros(mesh.card_count))
+    ordered = sorted_by_key(mesh, np.zeros(mesh.card_count))
     np.testing.assert_array_equal(ordered.triangles, mesh.triangles)
     np.testing.assert_array_equal(ordered.positions, mesh.positions)
 
@@ -390,18 +396,18 @@ def test_five_thousand_cards_are_sorted() -> None:
     mesh, _ = shells(5000)
     key = np.random.default_rng(0).random(mesh.card_count)
     assert connected_components(mesh.triangles).max() == 4999
-    assert (np.diff(key[reordered(mesh, key).card]) >= 0.0).all()
+    assert (np.diff(key[sorted_by_key(mesh, key).card]) >= 0.0).all()
 
 
 def test_the_order_of_few_cards_is_the_best_of_all_orders() -> None:
     """Brute force over all orders of six crossing cards, judged by the pairs that are seen."""
     mesh = crossing_cards(6)
     orders = card_orders(mesh, None, "cards", view_count=24)
-    pairs = all_pairs(list(pairs_by_view(mesh, None, 24, VIEW_SIZE)))
+    pairs = concatenated_pairs(list(pairs_by_view(mesh, None, 24, VIEW_SIZE)))
     for facing, order in ((1, orders.front), (0, orders.back)):
         own = pairs[pairs.facing == facing]
         table = np.zeros((6, 6), np.int64)
-        np.add.at(table, (mesh.card[own.behind], mesh.card[own.before]), own.weight)
+        np.add.at(table, (mesh.card[own.farther], mesh.card[own.nearer]), own.weight)
         table -= table.T
 
         def broken(cards: tuple[int, ...], table: np.ndarray = table) -> int:

@@ -8,8 +8,8 @@ import numpy as np
 from hair_ball import ball_mesh
 
 from hairloom.addon.cards.atlas_grid import AtlasGrid
-from hairloom.addon.cards.on_skin import above_skin, on_skin
 from hairloom.addon.cards.settings import CardSettings
+from hairloom.addon.cards.skin_clearance import lift_roots, raise_between_rows
 from hairloom.addon.cards.strip import CardFrames, Strips, UncutCards, strip_mesh
 from hairloom.addon.strands import Surface
 
@@ -37,7 +37,7 @@ def heights(mesh) -> np.ndarray:
 
 def test_what_begins_under_the_skin_is_put_onto_it() -> None:
     head, mesh = Surface(*ball_mesh(96)), card(0.95, 1.1)
-    found = on_skin(mesh, head, WIDTH)
+    found = lift_roots(mesh, head, WIDTH)
     first = mesh.along < 0.1
     assert heights(mesh)[first].max() < -0.03
     # a ball of triangles is a little smaller than the ball
@@ -53,17 +53,17 @@ def test_what_begins_under_the_skin_is_put_onto_it() -> None:
 def test_what_lies_on_the_skin_or_far_within_stays() -> None:
     head = Surface(*ball_mesh(48))
     for mesh in (card(1.05, 1.2), card(0.4, 0.5)):
-        np.testing.assert_array_equal(on_skin(mesh, head, WIDTH).positions, mesh.positions)
+        np.testing.assert_array_equal(lift_roots(mesh, head, WIDTH).positions, mesh.positions)
     mesh = card(0.95, 1.1)
-    assert on_skin(mesh, None, WIDTH) is mesh
-    assert on_skin(mesh, replace(head, triangles=head.triangles[:0]), WIDTH) is mesh
+    assert lift_roots(mesh, None, WIDTH) is mesh
+    assert lift_roots(mesh, replace(head, triangles=head.triangles[:0]), WIDTH) is mesh
 
 
 def test_a_card_of_few_rows_does_not_run_through_the_skin() -> None:
     """A card with one row at each end of a chord through the ball is raised in between as well."""
     head = Surface(*ball_mesh(96))
     mesh = card(1.0, 0.8, row_count=2, column_count=1)
-    found = above_skin(mesh, head, WIDTH)
+    found = raise_between_rows(mesh, head, WIDTH)
     assert lowest_inside(mesh) < -0.04
     assert lowest_inside(found) > -0.01
     # raised no farther than it lay too low
@@ -73,9 +73,11 @@ def test_a_card_of_few_rows_does_not_run_through_the_skin() -> None:
 def test_what_lies_above_the_skin_or_far_within_is_not_raised() -> None:
     head = Surface(*ball_mesh(48))
     for mesh in (card(1.1, 1.0), card(0.4, 0.3)):
-        np.testing.assert_array_equal(above_skin(mesh, head, WIDTH).positions, mesh.positions)
+        np.testing.assert_array_equal(
+            raise_between_rows(mesh, head, WIDTH).positions, mesh.positions
+        )
     mesh = card(1.0, 0.8)
-    assert above_skin(mesh, None, WIDTH) is mesh
+    assert raise_between_rows(mesh, None, WIDTH) is mesh
 
 
 def lowest_inside(mesh) -> float:

@@ -40,7 +40,7 @@ def pairs_to_join(strips: Strips, strand_count: Ints, group: Ints, numbers: Ints
     return np.array(pairs, np.int32).reshape(-1, 2)
 
 
-def with_joined(strips: Strips, strand_count: Ints, pairs: Ints) -> tuple[Strips, Ints]:
+def join_pairs(strips: Strips, strand_count: Ints, pairs: Ints) -> tuple[Strips, Ints]:
     """All strips, where the first of each pair covers both, and how many strands they represent.
 
     The joined card runs along the mean of both, with the orientation of the first. Its width is the
@@ -48,29 +48,29 @@ def with_joined(strips: Strips, strand_count: Ints, pairs: Ints) -> tuple[Strips
     widths, without which more skin would show through. So two cards side by side become one as wide
     as both together, and two on top of each other one 1.4 times as wide.
     """
-    kept, joined = pairs.T
+    first, second = pairs.T
     frames, width = strips.frames, strips.width
-    fraction = (strand_count[joined] / (strand_count[kept] + strand_count[joined]))[:, None, None]
-    center = frames.center[kept] * (1.0 - fraction) + frames.center[joined] * fraction
+    fraction = (strand_count[second] / (strand_count[first] + strand_count[second]))[:, None, None]
+    center = frames.center[first] * (1.0 - fraction) + frames.center[second] * fraction
     tangent = tangents(center)
-    normal = frames.normal[kept]
+    normal = frames.normal[first]
     normal = unit(normal - tangent * np.einsum("cri,cri->cr", normal, tangent)[..., None])
     side = np.cross(tangent, normal)
     squared = sum(
         part * _squared_width(strips, each, center, side)
-        for part, each in ((1.0 - fraction[..., 0], kept), (fraction[..., 0], joined))
+        for part, each in ((1.0 - fraction[..., 0], first), (fraction[..., 0], second))
     )
-    spread, both = np.sqrt(squared), width[kept] + width[joined]
+    spread, both = np.sqrt(squared), width[first] + width[second]
     covering = np.sqrt(spread * np.maximum(both, spread))
     all_frames = CardFrames(
-        _with(frames.center, kept, center),
-        _with(frames.tangent, kept, tangent),
-        _with(frames.normal, kept, normal),
-        _with(frames.side, kept, side),
+        _with_changed(frames.center, first, center),
+        _with_changed(frames.tangent, first, tangent),
+        _with_changed(frames.normal, first, normal),
+        _with_changed(frames.side, first, side),
     )
     count = strand_count.copy()
-    count[kept] += strand_count[joined]
-    return replace(strips, frames=all_frames, width=_with(width, kept, covering)), count
+    count[first] += strand_count[second]
+    return replace(strips, frames=all_frames, width=_with_changed(width, first, covering)), count
 
 
 def _neighbours(
@@ -120,7 +120,7 @@ def _squared_width(strips: Strips, chosen: Ints, center: Floats, side: Floats) -
     return squared
 
 
-def _with(values: Floats, chosen: Ints, changed: Floats) -> Floats:
+def _with_changed(values: Floats, chosen: Ints, changed: Floats) -> Floats:
     copy = np.array(values, np.float32)
     copy[chosen] = changed
     return copy
