@@ -43,14 +43,14 @@ _DEFAULT_STRANDS = StrandSettings()
 def card_build_steps(
     rig: Rig,
     settings: SettingsMap,
-    alpha_of: MakeAlpha = lambda _build: None,
+    make_alpha: MakeAlpha = lambda _build: None,
     occluders: Sequence[CardOccluder] = (),
     edits: CardEdits | None = None,
 ) -> Generator[str, None, CardBuild]:
     """Cards at rest in all levels of detail, with occlusion, sorted from inside to outside.
 
     Args:
-        alpha_of: bakes the atlas and returns its alpha; see `cards.build`.
+        make_alpha: bakes the atlas and returns its alpha; see `cards.build`.
         occluders: cards of other grooms, which shade these, world space.
         edits: the artist's changes to cards made before, which are kept.
 
@@ -74,7 +74,7 @@ def card_build_steps(
         light=light.reshape(*strands.grid.shape[:2], -1),
     )
     sections = settings[CardSettings], settings[AtlasSettings], settings[CardOcclusionSettings]
-    build = yield from card_steps(groom, *sections, alpha_of, occluders, edits)
+    build = yield from card_steps(groom, *sections, make_alpha, occluders, edits)
     if build.shell_layers:
         build = replace(build, light=directional_light(fields, build.finest.positions))
     return build

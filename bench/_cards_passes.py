@@ -114,7 +114,7 @@ def sintel_cards() -> tuple[CardSnapshot, MeshSnapshot]:
         rig = sintel_rig()
         assert rig.head is not None
         settings = SettingsMap(CARDS, AtlasSettings(source="made"))
-        built = BuiltCards.now(CardInputs(rig, settings))
+        built = BuiltCards.build(CardInputs(rig, settings))
         cards = built.drawn(built.rest, settings)
         _kept.append((cards, MeshSnapshot.of(rig.head)))
     return _kept[0]

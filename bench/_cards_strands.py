@@ -20,7 +20,7 @@ from hairloom.addon.blender.cards.build import (
     MappedCards,
     build_steps,
     card_maps,
-    drawn_maps,
+    draw_maps,
 )
 from hairloom.addon.blender.cards.show import without_strands
 from hairloom.addon.blender.properties.presets import named_preset
@@ -89,7 +89,7 @@ def _made(rig: Rig, width: float) -> MappedCards:
 def _cards(rig: Rig, made: MappedCards, look: str, width: float) -> CardSnapshot:
     """The cards in a look, on which only their maps depend."""
     settings = _settings(look, width)
-    maps = card_maps(CardInputs(rig, settings), made.build, drawn_maps)
+    maps = card_maps(CardInputs(rig, settings), made.build, draw_maps)
     built = BuiltCards.of(rig, replace(made, maps=maps))
     return built.drawn(built.rest, settings)
 

@@ -22,7 +22,7 @@ def shell_figures() -> dict[str, Any]:
     inputs = _added("short_coat")
     kind = replace(inputs.settings[CardSettings], kind="shells", levels=1)
     inputs = replace(inputs, settings=inputs.settings.with_settings(kind))
-    made = BuiltCards.now(inputs)
+    made = BuiltCards.build(inputs)
     coverage, color = beside_strands(inputs, made, SIDES, OUTPUT / "shells_short_coat.png")
     return {
         "shells_triangles": len(made.rest.mesh.triangles),

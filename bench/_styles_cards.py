@@ -22,6 +22,6 @@ def card_figures(style: str) -> dict[str, float]:
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     bpy.ops.hairloom.add_hairstyle(style=style, plays=False)
     inputs, _, _ = read_inputs(bpy.context.object, bpy.context.evaluated_depsgraph_get())
-    built, path = BuiltCards.now(inputs), OUTPUT / f"cards_{style}.png"
+    built, path = BuiltCards.build(inputs), OUTPUT / f"cards_{style}.png"
     coverage, color = beside_strands(inputs, built, SIDES, path)
     return {"cards_coverage_percent": 100.0 * coverage, "cards_color_percent": 100.0 * color}

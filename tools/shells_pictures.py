@@ -43,7 +43,7 @@ def pictures_of(style: str) -> list[Any]:
     )
     size = WIDTH, HEIGHT, SAMPLES
     strands = studio.picture(rig.rest_pose, rig.strands.points, *size)
-    made = builds.BuiltCards.now(inputs)
+    made = builds.BuiltCards.build(inputs)
     return [strands, studio.card_picture(made.drawn(made.rest, inputs.settings), *size)]
 
 

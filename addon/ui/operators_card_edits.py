@@ -13,7 +13,7 @@ from ..blender.base.outcome import report
 from ..blender.cards.hand_tools import (
     add_along_curves,
     edited_cards,
-    put_on_tiles,
+    move_to_tiles,
     shape_selected,
 )
 from ..blender.cards.made_objects import card_objects
@@ -152,7 +152,7 @@ class HAIRLOOM_OT_card_tile(bpy.types.Operator):
                 return np.full(len(tile), min(self.number, count) - 1, np.int32)
             return (tile + _STEPS[self.to]) % count
 
-        tiles = [tile for obj in edited_cards(context) for tile in put_on_tiles(obj, tile_of)]
+        tiles = [tile for obj in edited_cards(context) for tile in move_to_tiles(obj, tile_of)]
         numbers = sorted(set(tiles))
         one = f"on tile {numbers[0] + 1}" if len(numbers) == 1 else f"on {len(numbers)} tiles"
         return _done(self, len(tiles), one)

@@ -476,7 +476,7 @@ def test_edited_cards_ride_on_the_guides(hair, get_depsgraph):
     """A card that was moved follows its guides as the other cards do."""
     obj = make(hair)
     move(obj, 3, by=(0.0, 0.0, 0.02))
-    built = BuiltCards.now(read_inputs(hair, get_depsgraph())[0])
+    built = BuiltCards.build(read_inputs(hair, get_depsgraph())[0])
     rig = built.rig
     away = np.array([0.1, 0.2, 0.3], np.float32)
     still, moved = (

@@ -71,7 +71,7 @@ def fur_and_shells() -> tuple[Snapshot, Snapshot]:
     strands, head = fur_on_ball()
     rig = rig_flow.prepare(strands, head, GuideSettings(guide_count=40), place="fur")
     settings = SettingsMap(CardSettings(kind="shells", levels=1, max_triangles=6000))
-    made = BuiltCards.now(CardInputs(rig, settings))
+    made = BuiltCards.build(CardInputs(rig, settings))
     hole = replace(MeshSnapshot.of(head), is_holdout=True)
     hair = replace(
         snapshot_of(PreparedGroom(rig, AmbientSettings())),

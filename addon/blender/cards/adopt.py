@@ -35,7 +35,7 @@ from ..scene.surfaces import (
     read_corner_uv,
     read_surface,
 )
-from .material import alpha_of
+from .material import read_alpha
 from .mesh import OCCLUSION_IS_OURS, reorder_faces, set_uv_map
 from .occluders import read_occluders
 
@@ -120,7 +120,7 @@ def sort_steps(
     apart = [_DANGLING] if options.dangling else None
     part_count = 1.0 if options.occlusion is None else 2.0
     needs_alpha = options.by != "distance" or options.occlusion is not None
-    alpha, problems = alpha_of(obj, options.alpha) if needs_alpha else (None, [])
+    alpha, problems = read_alpha(obj, options.alpha) if needs_alpha else (None, [])
     ordering = order_steps(mesh, source.head, options.by, apart, alpha=alpha)
     orders = yield from map_progress(ordering, lambda fraction: fraction / part_count)
     order = orders.front
@@ -162,9 +162,11 @@ def read_cards(
     if head is not None:
         surface = read_surface(head, depsgraph, need_uv=False, place=head.name)
     source, polygon, corner, notes = _read_faces(obj, depsgraph)
-    group = _dangling(obj, options.dangling)
+    group = _dangling_groups(obj, options.dangling)
     cards = adopt_cards(source, surface, group=group, direction=options.direction, place=obj.name)
-    return CardSource(cards, surface, polygon, corner, (*notes, *_shared(obj.data), *cards.notes))
+    return CardSource(
+        cards, surface, polygon, corner, (*notes, *_shared_mesh_notes(obj.data), *cards.notes)
+    )
 
 
 def _check(obj: bpy.types.Object) -> None:
@@ -234,7 +236,7 @@ def _triangles(mesh: bpy.types.Mesh, matrix: Floats) -> tuple[Surface, Ints, Int
     return surface, polygon, corner
 
 
-def _dangling(obj: bpy.types.Object, name: str) -> Ints | None:
+def _dangling_groups(obj: bpy.types.Object, name: str) -> Ints | None:
     """(vertex_count,) _DANGLING for members of a vertex group, 0 for all others."""
     if not name:
         return None
@@ -249,7 +251,7 @@ def _dangling(obj: bpy.types.Object, name: str) -> Ints | None:
     return np.where(is_member, _DANGLING, 0)
 
 
-def _shared(mesh: bpy.types.Mesh) -> list[str]:
+def _shared_mesh_notes(mesh: bpy.types.Mesh) -> list[str]:
     if mesh.users < 2:
         return []
     return [f"{mesh.users} objects share the mesh '{mesh.name}' and have been sorted together"]
@@ -271,7 +273,7 @@ def _write_occlusion(
     """
     mesh[OCCLUSION_IS_OURS] = True
     for name, values in zip(CARD_ATTRIBUTES, (openness, along), strict=True):
-        set_attribute(mesh, name, "POINT", _at_source(values, vertex, len(mesh.vertices)))
+        set_attribute(mesh, name, "POINT", _at_source_vertices(values, vertex, len(mesh.vertices)))
     if not set_uv_map(mesh, OCCLUSION_LAYER, np.stack([openness, along], axis=1)[corner]):
         return [
             "It already has the maximum number of UV maps, so occlusion is stored as an attribute "
@@ -281,7 +283,7 @@ def _write_occlusion(
     return []
 
 
-def _at_source(values: Floats, vertex: Ints, count: int) -> Floats:
+def _at_source_vertices(values: Floats, vertex: Ints, count: int) -> Floats:
     """Means over the copies of each of `count` vertices; 1 for a vertex without faces."""
     means = means_by(vertex, values, count)
     means[np.bincount(vertex, minlength=count) == 0] = 1.0

@@ -97,14 +97,14 @@ def read_inputs(
     depsgraph: bpy.types.Depsgraph,
     rig: Rig | None = None,
     keep_edits: bool = True,
-    known: tuple[MadeRig, ...] = (),
+    known_rigs: tuple[MadeRig, ...] = (),
 ) -> tuple[CardInputs, tuple[str, ...], dict[str, int]]:
     """A groom with its own settings; notes for the artist; counts of dropped strands by reason.
 
     Args:
         rig: that of the groom's bake; None: made from its curves.
         keep_edits: whether to keep the artist's changes to cards in the scene.
-        known: see `MadeRig.of`.
+        known_rigs: see `MadeRig.of`.
 
     Raises:
         HairloomError: no hair that can be used, or edited cards that cannot be read.
@@ -115,7 +115,7 @@ def read_inputs(
     if rig is None:
         read = read_source(hair, depsgraph)
         source = read.at_rest
-        rig, colors = MadeRig.of(hair, source, known).rig, source.colors
+        rig, colors = MadeRig.of(hair, source, known_rigs).rig, source.colors
         notes, dropped = source.warnings, source.dropped
         if read.rest is not None:
             frame, head = depsgraph.scene.frame_current, head_of(hair)
@@ -211,18 +211,20 @@ def build_steps(
     """
     made: list[CardMaps] = []
 
-    def alpha_of(build: CardBuild) -> Floats:
+    def make_alpha(build: CardBuild) -> Floats:
         with stage("card texture"):
-            made.append(card_maps(inputs, build, draw or drawn_maps))
+            made.append(card_maps(inputs, build, draw or draw_maps))
         return made[-1].textures.alpha
 
     yield "Other hair"
-    others, notes = inputs.occluders.cards()
-    build = yield from card_build_steps(inputs.rig, inputs.settings, alpha_of, others, inputs.edits)
+    other_occluders, notes = inputs.occluders.cards()
+    build = yield from card_build_steps(
+        inputs.rig, inputs.settings, make_alpha, other_occluders, inputs.edits
+    )
     return MappedCards(build, made[-1], (*build.notes, *notes))
 
 
-def built_in_thread(work: ThreadWork[Any], inputs: CardInputs) -> MappedCards:
+def build_in_thread(work: ThreadWork[Any], inputs: CardInputs) -> MappedCards:
     """The cards, built in the thread of this work; the main thread draws the atlas.
 
     Raises:
@@ -231,7 +233,7 @@ def built_in_thread(work: ThreadWork[Any], inputs: CardInputs) -> MappedCards:
     """
 
     def draw(flat: FlatStrands, size: int) -> AtlasMaps:
-        return work.on_main_thread(drawing_maps(flat, size))
+        return work.on_main_thread(draw_maps_steps(flat, size))
 
     return result_of(map_progress(build_steps(inputs, draw), work.report))
 
@@ -283,12 +285,12 @@ def card_maps(inputs: CardInputs, build: CardBuild, draw: AtlasDraw) -> CardMaps
         textures,
         "tangent",
         gain,
-        is_view_compensated="alpha" not in pictures and _lies_in_its_plane(build.plan),
+        is_view_compensated="alpha" not in pictures and _is_in_card_plane(build.plan),
         base_color=brightest_look(_card_color(inputs.rig), look).base_color if colored else None,
     )
 
 
-def _lies_in_its_plane(plan: AtlasPlan | ShellPlan) -> bool:
+def _is_in_card_plane(plan: AtlasPlan | ShellPlan) -> bool:
     """Whether the strands in the tiles lie in the plane of the geometry that shows them."""
     return not isinstance(plan, ShellPlan) or plan.is_flat
 
@@ -298,13 +300,13 @@ def _card_color(rig: Rig) -> Floats | None:
     return card_groom(rig).strands.color
 
 
-def drawn_maps(flat: FlatStrands, size: int) -> AtlasMaps:
+def draw_maps(flat: FlatStrands, size: int) -> AtlasMaps:
     """The maps of flat strands, drawn on the GPU if there is one; for the main thread."""
     return baked_maps(flat, size) if has_gpu() else sample_maps(flat, size)
 
 
-def drawing_maps(flat: FlatStrands, size: int) -> Generator[None, None, AtlasMaps]:
-    """As `drawn_maps`, in steps."""
+def draw_maps_steps(flat: FlatStrands, size: int) -> Generator[None, None, AtlasMaps]:
+    """As `draw_maps`, in steps."""
     if not has_gpu():
         return sample_maps(flat, size)
     return (yield from baking(flat, size))
@@ -315,7 +317,7 @@ def baked_atlas(
     plan: AtlasPlan | ShellPlan,
     shading: ShadingSettings,
     drawn: StrandSettings,
-    draw: AtlasDraw = drawn_maps,
+    draw: AtlasDraw = draw_maps,
 ) -> AtlasMaps:
     """The maps of all tiles: strands are laid flat and drawn, and colours are dilated to where
     there is no hair.
@@ -396,7 +398,7 @@ class BuiltCards:
         )
 
     @classmethod
-    def now(cls, inputs: CardInputs) -> BuiltCards:
+    def build(cls, inputs: CardInputs) -> BuiltCards:
         """Build the cards in this thread.
 
         Raises:
@@ -405,30 +407,30 @@ class BuiltCards:
         return cls.of(inputs.rig, result_of(build_steps(inputs)))
 
     @classmethod
-    def in_thread(cls, work: ThreadWork[BuiltCards], inputs: CardInputs) -> BuiltCards:
+    def build_in_thread(cls, work: ThreadWork[BuiltCards], inputs: CardInputs) -> BuiltCards:
         """Build the cards in the thread of this work, with their textures on the GPU.
 
         Raises:
             HairloomError: no cards can be made.
             GivenUpError: the work was given up.
         """
-        built = cls.of(inputs.rig, built_in_thread(work, inputs))
+        built = cls.of(inputs.rig, build_in_thread(work, inputs))
         work.report("Textures")
-        return replace(built, rest=replace(built.rest, device=_uploaded(work, built.rest)))
+        return replace(built, rest=replace(built.rest, device=_upload_textures(work, built.rest)))
 
     def at(self, pose: Pose, guides: Floats, settings: SettingsMap) -> CardSnapshot:
         """The cards riding on guides (guide_count, cv_count, 3) [m, world]."""
         mesh = cards_at(self.rig, self.binding, pose, guides)
-        return self.drawn(replace(self.rest, mesh=mesh), settings)
+        return self.with_drawing_settings(replace(self.rest, mesh=mesh), settings)
 
-    def drawn(self, cards: CardSnapshot, settings: SettingsMap) -> CardSnapshot:
+    def with_drawing_settings(self, cards: CardSnapshot, settings: SettingsMap) -> CardSnapshot:
         """The same cards with the drawing settings and the shadow density of these settings."""
         shadow = self.strand_area.shadow_area(settings[StrandSettings])
         thickness = shadow / max(self.card_shadow_area, 1.0e-12)
         return replace(cards, drawing=settings[CardDrawingSettings], thickness=thickness)
 
 
-def _uploaded(work: ThreadWork[Any], cards: CardSnapshot) -> CardTextures | None:
+def _upload_textures(work: ThreadWork[Any], cards: CardSnapshot) -> CardTextures | None:
     """In the thread: upload textures, so that no draw has to; None without a GPU.
 
     Raises:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from ...arrays import same_content
 from ..base.objects import Handle
 from ..base.thread_work import ThreadWork
-from .build import CardInputs, MappedCards, built_in_thread, has_gpu
+from .build import CardInputs, MappedCards, build_in_thread, has_gpu
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +41,7 @@ class CardBuildCache:
             made = self._last.made
             return ThreadWork(lambda _: made, name)
         self.forget()  # frees memory before the new build
-        return ThreadWork(lambda work: built_in_thread(work, inputs), name)
+        return ThreadWork(lambda work: build_in_thread(work, inputs), name)
 
     def keep(self, hair: Handle, inputs: CardInputs, made: MappedCards) -> None:
         """Keep these cards instead of the last ones."""

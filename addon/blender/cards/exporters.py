@@ -33,7 +33,7 @@ from .mesh import fill_mesh
 
 _NAMED = ("objects", "meshes", "materials", "images", "scenes")
 #: the attribute that holds occlusion and along in OBJ
-_COLORS = "Occlusion color"
+_COLOR_ATTRIBUTE = "Occlusion color"
 
 
 @dataclass(frozen=True)
@@ -84,21 +84,21 @@ def write_card_mesh(
     check_cards(levels, str(path))
     check_exporter(file_format, str(path))
     scene_of_cards = card_scene(levels, name, look, file_format, portable=portable, texels=texels)
-    with scene_of_cards as scene, shown(scene):
-        said = StringIO()
+    with scene_of_cards as scene, scene_in_window(scene):
+        messages = StringIO()
         try:
-            with redirect_stdout(StringIO()), redirect_stderr(said):  # no running commentary
+            with redirect_stdout(StringIO()), redirect_stderr(messages):  # no running commentary
                 _EXPORTERS[file_format.name](path, portable)
         except RuntimeError as error:
             if write_failure_reason(path, _reason(error)) == DISK_FULL:
                 raise write_error(path, DISK_FULL) from error
-            print(said.getvalue(), end="", file=sys.stderr)
+            print(messages.getvalue(), end="", file=sys.stderr)
             raise HairloomError(
                 f"Blender's exporter of {file_format.title} failed ({_reason(error)})",
                 place=path.name,
                 remedy="Try another file name or folder",
             ) from error
-        print(said.getvalue(), end="", file=sys.stderr)
+        print(messages.getvalue(), end="", file=sys.stderr)
 
 
 def check_cards(levels: Sequence[CardMesh], place: str) -> None:
@@ -241,7 +241,7 @@ def card_scene(
         texels: for each level, (vertex_count, 2): a third UV map, with v from the top.
     """
     names = level_names(name, len(levels))
-    with _free_names({identifier_name(name), *names}), new_blocks_removed():
+    with _names_freed({identifier_name(name), *names}), new_blocks_removed():
         scene = bpy.data.scenes.new(identifier_name(name))
         material = _new_material(look, identifier_name(name), file_format)
         parent = _new_parent(scene, identifier_name(name)) if len(levels) > 1 else None
@@ -251,7 +251,7 @@ def card_scene(
             points = _attributes(level, file_format, portable=portable)
             fill_mesh(mesh, level, uv_maps=uv_maps, points=points)
             if file_format == OBJ:
-                mesh.color_attributes.active_color = mesh.color_attributes[_COLORS]
+                mesh.color_attributes.active_color = mesh.color_attributes[_COLOR_ATTRIBUTE]
             mesh.materials.append(material)
             obj = bpy.data.objects.new(level_name, mesh)
             obj.parent = parent
@@ -260,7 +260,7 @@ def card_scene(
 
 
 @contextmanager
-def shown(scene: bpy.types.Scene) -> Iterator[None]:
+def scene_in_window(scene: bpy.types.Scene) -> Iterator[None]:
     """Show a scene in the window inside the block, as exporters need it.
 
     Blender runs the frame change handlers at both changes of the scene.
@@ -277,7 +277,7 @@ def shown(scene: bpy.types.Scene) -> Iterator[None]:
 
 
 @contextmanager
-def _free_names(names: Iterable[str]) -> Iterator[None]:
+def _names_freed(names: Iterable[str]) -> Iterator[None]:
     """Rename data-blocks with these names inside the block, else Blender would number ours."""
     taken = [
         (block, block.name)
@@ -324,7 +324,7 @@ def _attributes(cards: CardMesh, file_format: CardFormat, *, portable: bool) -> 
         # OBJ has a single UV map, so colours hold the rest; its exporter encodes them as sRGB.
         rest = np.stack([cards.occlusion, cards.along, np.zeros_like(cards.along)], axis=1)
         opaque = np.ones((len(rest), 1))
-        values[_COLORS] = np.concatenate([srgb_decoded(rest), opaque], axis=1)
+        values[_COLOR_ATTRIBUTE] = np.concatenate([srgb_decoded(rest), opaque], axis=1)
     if file_format == USD:
         values["tangents"] = unit(np.cross(cards.tangent, cards.normal))
     return values

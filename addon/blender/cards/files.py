@@ -105,16 +105,16 @@ _UNITS = {
     "none": "1",
 }
 #: Maps that glTF's standard material can use beside the colour.
-_DIRECTIONS: tuple[str, ...] = ("normal", "tangent")
+_DIRECTION_MAPS: tuple[str, ...] = ("normal", "tangent")
 #: Texels of the ramp from 0 to 1, through which glTF reads occlusion from a UV map.
 _RAMP_SIZE = 256
 #: settings of Marschner's model only, although both models share their panel
-_PIGMENT = {"pigment", "melanin", "redness", "absorption"}
+_PIGMENT_SETTINGS = {"pigment", "melanin", "redness", "absorption"}
 #: settings of strands only: on cards, textures contain their effect
-_OF_STRANDS = {"model", "color_source", "color_map", "brow_source", "brow_color"}
+_STRAND_SETTINGS = {"model", "color_source", "color_map", "brow_source", "brow_color"}
 #: a suffix at least as long as those of all files beside the mesh
-_LONGEST = "_motion_position.exr"
-_OF_KIND = {"color": "scene-linear Rec. 709", "choice": "name", "toggle": "true or false"}
+_LONGEST_SUFFIX = "_motion_position.exr"
+_UNITS_OF_KINDS = {"color": "scene-linear Rec. 709", "choice": "name", "toggle": "true or false"}
 
 #: Yields the current stage, and the fraction of it that is done; None where that is unknown.
 type FileSteps[Result] = Generator[tuple[str, float | None], None, Result]
@@ -196,7 +196,7 @@ def check_output(path: Path, output: CardOutput, motion: GuideMotion | None) -> 
     """
     path, file_format = format_of(path, output.format)
     check_writable(path)
-    check_writable(path.with_name(path.stem + _LONGEST))
+    check_writable(path.with_name(path.stem + _LONGEST_SUFFIX))
     _check_neighbours(path)
     check_exporter(file_format, str(path))
     check_page(output.settings, file_format, str(path))
@@ -257,13 +257,13 @@ def file_steps(
     check_cards(made.build.levels, str(path))
     with atomic_file_set(path) as folder:
         writer = _Writer(folder / path.name, made, settings, output, file_format, stage, head)
-        said = yield from writer.steps(motion)
-        said += back_up_foreign_files(folder, path, files_of_earlier_export(path))
+        writer_notes = yield from writer.steps(motion)
+        writer_notes += back_up_foreign_files(folder, path, files_of_earlier_export(path))
         names = {file.name for file in folder.iterdir() if file.is_file()}
     beside = sorted(names - {path.name, path.stem + SUFFIX})
     files = (path.name, *beside, path.stem + SUFFIX)
     paths = tuple(path.with_name(name) for name in files)
-    notes = (*made.notes, *said)
+    notes = (*made.notes, *writer_notes)
     return WrittenCards(made.build, made.maps, paths, notes, writer.motion, writer.figures)
 
 
@@ -446,7 +446,7 @@ class _Writer:
 
 def _direction_pictures(path: Path, maps: CardMaps) -> dict[str, bytes]:
     """PNG files of the direction maps that glTF's standard material can use."""
-    directions = {name: maps.by_name[name] for name in _DIRECTIONS if name in maps.by_name}
+    directions = {name: maps.by_name[name] for name in _DIRECTION_MAPS if name in maps.by_name}
     if not directions:
         return {}
     made = pack_textures(resized_to_largest(directions), "gltf")
@@ -475,13 +475,15 @@ def material_of(shading: ShadingSettings, tables: Mapping[str, str]) -> dict[str
         tables: name -> file of the tables beside it, see `write_tables`.
     """
     own: type[Settings] = KajiyaKaySettings if shading.model == "kajiya_kay" else MarschnerSettings
-    left_out = _OF_STRANDS | (_PIGMENT if own is KajiyaKaySettings else set())
+    left_out = _STRAND_SETTINGS | (_PIGMENT_SETTINGS if own is KajiyaKaySettings else set())
     every = (*SharedSettings.parameters(), *own.parameters())
     parameters = [each for each in every if each.name not in left_out]
     content: dict[str, Any] = {
         "model": shading.model,
         "values": {each.name: getattr(shading, each.name) for each in parameters},
-        "units": {each.name: _OF_KIND.get(each.kind, _UNITS[each.unit]) for each in parameters},
+        "units": {
+            each.name: _UNITS_OF_KINDS.get(each.kind, _UNITS[each.unit]) for each in parameters
+        },
         "meanings": {each.name: each.description for each in parameters},
         "fibre": {},
         "tables": {name: {"file": file} for name, file in tables.items()},
@@ -534,7 +536,7 @@ class CardExport:
         check_output(path, output, motion)
         check_no_input(path, picture_files(hair.data.hairloom.card_images))
         rig, stale = (None, ()) if motion is None else (motion.rig, motion.notes)
-        inputs, notes, dropped = read_inputs(hair, depsgraph, rig, known=known)
+        inputs, notes, dropped = read_inputs(hair, depsgraph, rig, known_rigs=known)
         bone = head_bone_of(hair, depsgraph, inputs.rig.strands)
         output = replace(output, head_bone=bone, head_look=look_of_head(hair, inputs.rig.head))
         if levels is not None:

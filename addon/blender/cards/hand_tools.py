@@ -57,7 +57,7 @@ def shape_selected(obj: bpy.types.Object, shape: Callable[[CardVertices], Floats
     return len(pieces)
 
 
-def put_on_tiles(obj: bpy.types.Object, tile_of: Callable[[Ints, int], Ints]) -> list[int]:
+def move_to_tiles(obj: bpy.types.Object, tile_of: Callable[[Ints, int], Ints]) -> list[int]:
     """Move the UVs of all cards that have a selected vertex to other tiles; returns these tiles.
 
     Args:
@@ -131,7 +131,7 @@ def add_along_curves(
                 tile=tile if tile >= 0 else int(record.tile[near]),
                 grid=record.grid,
             )
-            _append(edited, card, matrix)
+            _append_card(edited, card, matrix)
         edited.to_mesh(obj.data)
     finally:
         edited.free()
@@ -187,7 +187,7 @@ def _selected_pieces(edited: bmesh.types.BMesh) -> list[list[bmesh.types.BMVert]
     return pieces
 
 
-def _append(edited: bmesh.types.BMesh, card: CardMesh, matrix: Floats) -> None:
+def _append_card(edited: bmesh.types.BMesh, card: CardMesh, matrix: Floats) -> None:
     """Add a card, world space, to a mesh in the space of an object, as one of the artist's own."""
     places = transform_points(card.positions, np.linalg.inv(matrix))
     normal = card.normal @ matrix[:3, :3]

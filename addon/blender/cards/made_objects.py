@@ -13,18 +13,18 @@ def card_objects(hair: bpy.types.Object) -> list[bpy.types.Object]:
     return [made[level] for level in sorted(made)]
 
 
-def remember_names() -> None:
+def store_object_names() -> None:
     """Store the names of made objects before a file is saved: session numbers are not saved."""
     cards = _all_cards()
-    made = {_place(obj) for obj in cards if _has_made_uid(obj)}
+    made = {_groom_and_level(obj) for obj in cards if _has_made_uid(obj)}
     for obj in cards:
         if _has_made_uid(obj):
             obj.hairloom.card_object.made_name = obj.name
-        elif _place(obj) in made:  # a copy may have the name that the made object had before
+        elif _groom_and_level(obj) in made:  # a copy may have the made object's earlier name
             obj.hairloom.card_object.made_name = ""
 
 
-def remember_numbers() -> None:
+def store_session_uids() -> None:
     """Store session numbers of made objects after a file was opened, before any is renamed."""
     for obj in _all_cards():
         is_made = _has_made_name(obj) and obj.library is None
@@ -36,7 +36,7 @@ def _all_cards() -> list[bpy.types.Object]:
     return [obj for obj in meshes if obj.hairloom.card_object.groom is not None]
 
 
-def _place(obj: bpy.types.Object) -> tuple[bpy.types.Object, int]:
+def _groom_and_level(obj: bpy.types.Object) -> tuple[bpy.types.Object, int]:
     """The groom and the level of the cards in an object."""
     return obj.hairloom.card_object.groom, obj.hairloom.card_object.level
 

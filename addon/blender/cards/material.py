@@ -104,7 +104,7 @@ def fill_image(image: bpy.types.Image, texture: Floats) -> None:
     image.pixels.foreach_set(coded.ravel())
 
 
-def alpha_of(
+def read_alpha(
     obj: bpy.types.Object, chosen: bpy.types.Image | None = None
 ) -> tuple[Floats | None, list[str]]:
     """The alpha of cards, (height, width), and notes; None: they count as opaque."""

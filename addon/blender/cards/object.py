@@ -58,7 +58,7 @@ class CardObjectJob:
         for obj in card_objects(hair):
             _check_replaceable(obj)
         self._inputs, self.notes, self.dropped = read_inputs(
-            hair, depsgraph, keep_edits=keep_edits, known=known
+            hair, depsgraph, keep_edits=keep_edits, known_rigs=known
         )
         self._kept = CardBuildCache() if kept is None else kept
         self._hair, self._matrix = Handle.of(hair), matrix_of(hair, depsgraph)

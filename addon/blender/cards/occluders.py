@@ -29,14 +29,14 @@ from ..colliders.rigs import rig_from
 from ..properties.groom_settings import GroomSettings
 from ..scene.source import Source, read_source
 from ..scene.surfaces import CARD_ATTRIBUTES, read_surface
-from .material import alpha_of
+from .material import read_alpha
 
 #: Hair counts as unmoved within this tolerance, relative to its largest coordinate.
 _STILL = 1.0e-5
 _NO_MOTION = np.eye(4)
 
 
-class _Read(Protocol):
+class _ReadOccluder(Protocol):
     """An object that was read."""
 
     def occluder(self) -> CardOccluder:
@@ -46,7 +46,7 @@ class _Read(Protocol):
         ...
 
     @property
-    def state(self) -> tuple[object, ...]:
+    def occlusion_inputs(self) -> tuple[object, ...]:
         """All values that its occlusion depends on."""
         ...
 
@@ -61,25 +61,25 @@ class Occluders:
 
     uids: frozenset[int] = frozenset()
     notes: tuple[str, ...] = ()
-    _read: tuple[_Read, ...] = ()
+    _occluders: tuple[_ReadOccluder, ...] = ()
 
     def cards(self) -> tuple[tuple[CardOccluder, ...], tuple[str, ...]]:
         """The hair as cards, and notes for the artist."""
         found: list[CardOccluder] = []
         notes = list(self.notes)
-        for each in self._read:
+        for each in self._occluders:
             try:
                 found.append(each.occluder())
             except HairloomError as error:
-                notes.append(_shades_nothing(error))
+                notes.append(_occludes_nothing_note(error))
         return tuple(found), tuple(notes)
 
-    def is_like(self, other: Occluders) -> bool:
+    def gives_same_occlusion(self, other: Occluders) -> bool:
         """Whether both give the same occlusion."""
         if (self.uids, self.notes) != (other.uids, other.notes):
             return False
-        pairs = zip(self._read, other._read, strict=True)
-        return all(_alike(one.state, two.state) for one, two in pairs)
+        pairs = zip(self._occluders, other._occluders, strict=True)
+        return all(_are_alike(one.occlusion_inputs, two.occlusion_inputs) for one, two in pairs)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +91,7 @@ class _ReadMesh:
         return CardOccluder.of_surface(self.surface, self.alpha)
 
     @property
-    def state(self) -> tuple[object, ...]:
+    def occlusion_inputs(self) -> tuple[object, ...]:
         surface = self.surface
         return surface.positions, surface.triangles, surface.corner_uv, self.alpha
 
@@ -107,7 +107,7 @@ class _ReadStrands:
         return card_flow.occluder_of(rig, self.settings[StrandSettings])
 
     @property
-    def state(self) -> tuple[object, ...]:
+    def occlusion_inputs(self) -> tuple[object, ...]:
         source, strands = self.source, self.source.strands
         head = None if source.head is None else source.head.positions
         hair = strands.points, strands.offsets, strands.radius, strands.group
@@ -133,7 +133,7 @@ def read_occluders(
         return Occluders()
     back = _NO_MOTION if np.array_equal(motion, _NO_MOTION) else np.linalg.pinv(motion)
     depsgraph = depsgraph or bpy.context.evaluated_depsgraph_get()
-    read: list[_Read] = []
+    read: list[_ReadOccluder] = []
     notes: list[str] = []
     objects = occluder_objects(own, depsgraph.view_layer)
     for obj in objects:
@@ -145,7 +145,7 @@ def read_occluders(
                 read.append(mesh)
                 notes += [f"{obj.name}: {problem}" for problem in problems]
         except HairloomError as error:
-            notes.append(_shades_nothing(error))
+            notes.append(_occludes_nothing_note(error))
     return Occluders(frozenset(obj.session_uid for obj in objects), tuple(notes), tuple(read))
 
 
@@ -153,7 +153,7 @@ def _read_mesh(
     obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, back: Floats
 ) -> tuple[_ReadMesh, list[str]]:
     surface = read_surface(obj, depsgraph, need_uv=False, place=obj.name)
-    alpha, problems = alpha_of(obj)
+    alpha, problems = read_alpha(obj)
     return _ReadMesh(surface.transformed(back), alpha), problems
 
 
@@ -171,11 +171,11 @@ def _read_strands(
     return _ReadStrands(source, of_shade, hair.name)
 
 
-def _shades_nothing(error: HairloomError) -> str:
+def _occludes_nothing_note(error: HairloomError) -> str:
     return f"It occludes nothing: {error}"
 
 
-def _alike(one: tuple[object, ...], other: tuple[object, ...]) -> bool:
+def _are_alike(one: tuple[object, ...], other: tuple[object, ...]) -> bool:
     return all(_is_still(a, b) for a, b in zip(one, other, strict=True))
 
 

@@ -60,14 +60,14 @@ class PageHead:
             files["head.uv"] = rounded("TEXCOORD_0", uv).tobytes()
         pictures: dict[int, str] = {}
         parts = []
-        for its, material in chosen:
+        for triangles_of_part, material in chosen:
             color = _color_of(material) if has_uv else None
             if color is not None and id(color) not in pictures:
                 pictures[id(color)] = f"head.{len(pictures)}.webp"
                 files[pictures[id(color)]] = webp_of(path, _coded(color), _SIDE, _QUALITY)
             parts.append(
                 {
-                    "triangles": len(its),
+                    "triangles": len(triangles_of_part),
                     "color": list(material.color),
                     "emission": list(material.emission),
                     "roughness": material.roughness,

@@ -144,7 +144,7 @@ class ShownCards:
         if self._wanted is None:
             return
         occluders, edits = self._read_occluders(self._wanted[1]), self._read_edits()
-        if not (occluders.is_like(self._occluders) and same_edits(edits, self._edits)):
+        if not (occluders.gives_same_occlusion(self._occluders) and same_edits(edits, self._edits)):
             self._job.cancel()
             self._build(occluders)
 
@@ -168,7 +168,7 @@ class ShownCards:
         if built.rig is rig:
             self._shown = built.at(pose, guides(), settings)
         elif self._shown is not None:
-            self._shown = built.drawn(self._shown, settings)
+            self._shown = built.with_drawing_settings(self._shown, settings)
         return self._shown
 
     def figures(self, solids: Solids | None) -> CardFigures | None:
@@ -198,14 +198,14 @@ class ShownCards:
         assert self._wanted is not None
         rig, settings = self._wanted
         if latest_job.is_blocking():
-            self._take(lambda: BuiltCards.now(self._read(rig, settings, occluders)))
+            self._take(lambda: BuiltCards.build(self._read(rig, settings, occluders)))
         else:
             self._job.want(self._wanted, lambda: self._begun(rig, settings, occluders))
 
     def _begun(
         self, rig: Rig, settings: GroomSettings, occluders: Occluders | None
     ) -> Work[BuiltCards]:
-        return partial(BuiltCards.in_thread, inputs=self._read(rig, settings, occluders))
+        return partial(BuiltCards.build_in_thread, inputs=self._read(rig, settings, occluders))
 
     def _read(self, rig: Rig, settings: GroomSettings, occluders: Occluders | None) -> CardInputs:
         """The inputs, with pictures, the artist's edits and other hair as they are now."""

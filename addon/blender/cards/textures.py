@@ -90,7 +90,7 @@ def write_textures(
     """
     return [
         texture
-        for those in _together(maps, settings)
+        for those in _groups_of_one_size(maps, settings)
         for texture in write_card_textures(
             folder / stem,
             resized_to_largest(those),
@@ -135,7 +135,7 @@ def texture_channels(written: Iterable[WrittenTexture]) -> dict[str, dict[str, A
     }
 
 
-def _together(
+def _groups_of_one_size(
     maps: Mapping[str, Floats], settings: CardExportSettings
 ) -> list[Mapping[str, Floats]]:
     """Groups of maps that must have one size: all, as they share files, or as alpha weighs their

@@ -90,12 +90,14 @@ class _Made:
         """
         key = cards_key(settings), settings[ShadingSettings]
         for known, built, before, edits_before in self._cards:
-            is_lit_alike = others.uids == before.uids if self.is_baked else others.is_like(before)
+            is_lit_alike = (
+                others.uids == before.uids if self.is_baked else others.gives_same_occlusion(before)
+            )
             is_cut_alike = same_edits(edits, edits_before)
             if known == key and built.rig is rig and is_lit_alike and is_cut_alike:
                 return built
         pictures, _ = chosen_pictures(owner.data.hairloom.card_images)
-        built = BuiltCards.now(CardInputs(rig, settings.sections, pictures, others, edits))
+        built = BuiltCards.build(CardInputs(rig, settings.sections, pictures, others, edits))
         self._cards[:] = [(key, built, others, edits)]
         return built
 

@@ -189,7 +189,7 @@ class Studio:
         key, sections = cards_key(self.settings), self.settings.sections
         if self._cards is None or self._cards[0] != key:
             inputs = CardInputs(self._rig, sections, self._card_pictures, edits=self._edits)
-            self._cards = key, BuiltCards.now(inputs)
+            self._cards = key, BuiltCards.build(inputs)
         if guides is None:
             guides = style_of_guides(self._rig, pose)
         return self._cards[1].at(pose, guides, sections)

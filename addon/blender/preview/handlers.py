@@ -12,7 +12,7 @@ from ..bakes import baked_copy, playback
 from ..base import event_handlers, suspension
 from ..base.latest_job import unwatch_all
 from ..base.redraw import show_status
-from ..cards.made_objects import remember_names, remember_numbers
+from ..cards.made_objects import store_object_names, store_session_uids
 from ..properties import changed, library_overrides
 from ..scene import mesh_materials
 from ..viewport import views
@@ -32,7 +32,7 @@ def on_load_pre(*_: Any) -> None:
 @persistent
 def on_load_post(*_: Any) -> None:
     registry.forget_all()
-    remember_numbers()
+    store_session_uids()
     _heal()
 
 
@@ -45,7 +45,7 @@ def on_load_fail(*_: Any) -> None:
 @persistent
 def on_save_pre(*_: Any) -> None:
     library_overrides.make_last()
-    remember_names()
+    store_object_names()
     _heal()
 
 
