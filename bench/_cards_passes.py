@@ -115,7 +115,7 @@ def sintel_cards() -> tuple[CardSnapshot, MeshSnapshot]:
         assert rig.head is not None
         settings = SettingsMap(CARDS, AtlasSettings(source="made"))
         built = BuiltCards.build(CardInputs(rig, settings))
-        cards = built.drawn(built.rest, settings)
+        cards = built.with_drawing_settings(built.rest, settings)
         _kept.append((cards, MeshSnapshot.of(rig.head)))
     return _kept[0]
 

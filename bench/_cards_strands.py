@@ -91,7 +91,7 @@ def _cards(rig: Rig, made: MappedCards, look: str, width: float) -> CardSnapshot
     settings = _settings(look, width)
     maps = card_maps(CardInputs(rig, settings), made.build, draw_maps)
     built = BuiltCards.of(rig, replace(made, maps=maps))
-    return built.drawn(built.rest, settings)
+    return built.with_drawing_settings(built.rest, settings)
 
 
 def _look(name: str) -> ShadingSettings:

@@ -140,7 +140,9 @@ def beside_strands(
     """Differences of cards from their strands in coverage and colour, see `_differences`; writes a
     picture, strands above and cards below."""
     strands = _lit(inputs)
-    drawn = replace(without_strands(strands), cards=cards.drawn(cards.rest, inputs.settings))
+    drawn = replace(
+        without_strands(strands), cards=cards.with_drawing_settings(cards.rest, inputs.settings)
+    )
     pictures = [_from_all_sides(inputs.rig, hair, sides) for hair in (strands, drawn)]
     path.parent.mkdir(parents=True, exist_ok=True)
     shown = [_shown(each) for row in pictures for each in row]

@@ -62,7 +62,7 @@ class Shots:
         steps = builds.build_steps(builds.CardInputs(self.rig, chosen, edits=edits))
         made = addon_module("cards.steps").result_of(steps)
         tied = builds.BuiltCards.of(self.rig, made)
-        return made.build, tied.drawn(tied.rest, chosen)
+        return made.build, tied.with_drawing_settings(tied.rest, chosen)
 
     def cards(self, mesh: Any, drawn: Any, back: Any = None) -> Any:
         """A picture of these cards alone of all drawn ones, with the order of their back faces."""

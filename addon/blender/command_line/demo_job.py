@@ -67,7 +67,7 @@ def _write_card_still(
     """Write a picture of the still and the cards side by side."""
     options = job.options
     built = BuiltCards.of(rig, MappedCards(written.build, written.maps))
-    shown = built.drawn(built.rest, job.settings)
+    shown = built.with_drawing_settings(built.rest, job.settings)
     with job.report.stage("draw cards"):
         picture = studio.card_picture(shown, options.width, options.height, options.samples)
     studio.write(path, contact_sheet([still, picture], 2))

@@ -63,7 +63,7 @@ LAID = {
 
 @pytest.mark.parametrize("stands", [False, True])
 @pytest.mark.parametrize("laid", LAID)
-def test_our_own_cards_are_understood_whichever_way_they_lie(laid: str, stands: bool) -> None:
+def test_our_own_cards_are_read_in_any_uv_direction(laid: str, stands: bool) -> None:
     mesh = hanging(stands=stands)
     source = as_source(mesh, LAID[laid](mesh.uv))
     adopted = adopt_cards(source, ball(), place="test")
@@ -81,7 +81,7 @@ def test_our_own_cards_are_understood_whichever_way_they_lie(laid: str, stands: 
     assert known.notes == ()
 
 
-def test_cards_that_run_another_way_are_counted_and_of_how_many() -> None:
+def test_cards_that_run_in_another_direction_are_counted() -> None:
     mesh = hanging()
     turned = np.unique(mesh.triangles[mesh.card < 4])
     uv = mesh.uv.copy()
@@ -91,7 +91,7 @@ def test_cards_that_run_another_way_are_counted_and_of_how_many() -> None:
     assert adopted.notes == (said,)
 
 
-def test_cards_whose_root_nothing_tells_are_said_to_be_such() -> None:
+def test_cards_with_an_undecided_root_end_are_reported() -> None:
     """The cards lie flat, and there is no head."""
     mesh = hanging()
     flat = Surface(mesh.positions * [1.0, 1.0, 0.0], mesh.triangles, mesh.uv[mesh.triangles])
@@ -107,7 +107,7 @@ def test_without_a_head_the_higher_end_is_the_root() -> None:
     assert len(adopted.notes) == 1 and "no head" in adopted.notes[0]
 
 
-def test_a_card_that_leads_back_to_the_head_is_told_by_the_others() -> None:
+def test_a_card_that_returns_to_the_head_follows_the_direction_of_the_others() -> None:
     """A loop whose tip is as near to the head and as high as its root: the other cards decide."""
     mesh = hanging(10)
     turn = np.linspace(0.0, np.pi, 9)
@@ -125,7 +125,7 @@ def test_a_card_that_leads_back_to_the_head_is_told_by_the_others() -> None:
     np.testing.assert_allclose(adopted.mesh.along, expected, atol=1e-5)
 
 
-def test_cards_that_face_the_head_are_turned_and_those_at_odds_are_noted() -> None:
+def test_cards_that_face_the_head_are_flipped_and_mixed_ones_are_noted() -> None:
     mesh = hanging()
     turned = np.where((mesh.card % 2 == 0)[:, None], mesh.triangles[:, ::-1], mesh.triangles)
     adopted = adopt_cards(replaced(mesh, turned), ball(), place="test")
@@ -163,7 +163,7 @@ def test_a_seam_of_the_uvs_does_not_divide_a_card() -> None:
     np.testing.assert_array_equal(uv, corner_uv)
 
 
-def test_a_card_belongs_to_the_group_of_most_of_it() -> None:
+def test_a_card_belongs_to_the_group_of_most_of_its_corners() -> None:
     mesh = hanging(4)
     group = np.where(mesh.along > 0.3, 7, 2)
     group[: len(group) // 4] = 2
@@ -171,7 +171,7 @@ def test_a_card_belongs_to_the_group_of_most_of_it() -> None:
     assert sorted(adopted.mesh.group.tolist()) == [2, 7, 7, 7]
 
 
-def test_what_cannot_be_used_is_told() -> None:
+def test_unusable_meshes_are_refused_with_a_remedy() -> None:
     mesh = hanging(2)
     with pytest.raises(HairloomError, match="no UVs"):
         adopt_cards(Surface(mesh.positions, mesh.triangles), None, place="test")
@@ -234,7 +234,7 @@ def body(shared_data: Path) -> Surface:
     return read_obj(shared_data / "makehuman" / "mh_base.obj", "body")
 
 
-def test_long_hair_of_an_artist(shared_data: Path, body: Surface) -> None:
+def test_long_hair_made_by_an_artist_is_read_as_cards(shared_data: Path, body: Surface) -> None:
     source = read_obj(shared_data / "makehuman" / "long01.obj")
     adopted = adopt_cards(source, body, place="long01")
     mesh = adopted.mesh
@@ -252,7 +252,7 @@ def test_long_hair_of_an_artist(shared_data: Path, body: Surface) -> None:
     assert (mesh.normal[behind, 1] > 0.0).mean() > 0.7  # the back of the hair looks backwards
 
 
-def test_a_ponytail_of_an_artist(shared_data: Path, body: Surface) -> None:
+def test_a_ponytail_made_by_an_artist_is_read_as_cards(shared_data: Path, body: Surface) -> None:
     source = read_obj(shared_data / "makehuman" / "ponytail01.obj")
     adopted = adopt_cards(source, body, place="ponytail01")
     mesh = adopted.mesh

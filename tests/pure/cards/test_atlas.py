@@ -88,7 +88,7 @@ def test_the_same_seed_gives_the_same_plan() -> None:
     np.testing.assert_array_equal(many().strands, many().strands)
 
 
-def test_brows_have_tiles_enough_and_strands_as_wide_as_they_are() -> None:
+def test_brows_have_enough_tiles_and_unwidened_strands() -> None:
     """Brows get six of 16 tiles, where their proportion is one. Strands of all other hair are drawn
     wider, since cards are mostly seen at an angle."""
     parts = tufts(np.full(200, 0.02), np.full(200, 0.2), np.full(200, 6), 1e-4)
@@ -211,7 +211,7 @@ def test_an_automatic_atlas_is_as_large_as_its_strands_need(
     assert texels(plan.size) >= 1.5 > texels(plan.size // 2)
 
 
-def test_an_automatic_atlas_has_an_end() -> None:
+def test_an_automatic_atlas_has_a_maximum_size() -> None:
     """At the maximum size a note reports strands that are too thin."""
     parts = tufts(np.full(64, 0.02), np.full(64, 0.2), np.full(64, 5), 1e-6)
     plan = plan_atlas(*parts, np.zeros(len(parts[1]), int), AtlasSettings())

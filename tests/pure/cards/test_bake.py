@@ -65,7 +65,7 @@ def baked(
 
 
 @pytest.mark.parametrize("width", [0.05, 0.03, 0.0051, 0.0007])
-def test_parallel_strands_cover_what_they_are_wide(width: float) -> None:
+def test_parallel_strands_cover_the_sum_of_their_widths(width: float) -> None:
     """Alpha is the sum of all widths. In 64 pixels, 0.05 is three pixels and 0.0007 a twentieth of
     one, which samples can miss."""
     across = np.linspace(-0.34, 0.33, 8)
@@ -89,7 +89,7 @@ def test_slanting_strands_cover_their_projected_area() -> None:
     assert maps.alpha.mean() == pytest.approx(3 * 0.03 * length, rel=0.04)
 
 
-def test_a_diagonal_strand_knows_its_way() -> None:
+def test_a_diagonal_strand_has_its_direction_in_the_tangent_map() -> None:
     """A strand 30 degrees aside and 20 out of the card has this direction as its unit tangent."""
     grid = lines(np.array([-0.3]), end=np.array([-0.3 + np.tan(np.radians(30.0))]))
     grid[0, :, 1] = -np.linspace(0.0, LENGTH * np.tan(np.radians(20.0)), ROWS)
@@ -105,7 +105,7 @@ def test_a_diagonal_strand_knows_its_way() -> None:
     assert flat.depth[0, -1] == pytest.approx(0.5 + np.tan(np.radians(20.0)) * LENGTH / WIDTH)
 
 
-def test_a_strand_is_round() -> None:
+def test_normals_are_those_of_a_round_strand() -> None:
     """Across a strand the normal's x goes linearly from -1 to 1, with z = sqrt(1 - x^2)."""
     _, maps = baked(plan_of([1]), lines(np.array([0.0])), 0.5, 64)
     x, y, z = np.moveaxis(2.0 * maps.normal[32, 17:47] - 1.0, -1, 0)
@@ -115,7 +115,7 @@ def test_a_strand_is_round() -> None:
     np.testing.assert_allclose(z, np.sqrt(1.0 - place**2), atol=0.04)
 
 
-def test_a_curl_goes_evenly_from_root_to_tip() -> None:
+def test_along_rises_evenly_from_root_to_tip_of_a_curl() -> None:
     """A helix along the strip: at height z of the card `along` is z, and place and depth are the
     helix's."""
     rows = 64
@@ -142,7 +142,7 @@ def test_the_outermost_strand_shows() -> None:
         assert maps.depth[16, 16] == pytest.approx(0.7)
 
 
-def test_what_lies_behind_gets_less_light() -> None:
+def test_strands_behind_others_are_occluded() -> None:
     """exp(-tau) behind a strand of 0.1 of the card's width, which counts over a quarter of that
     width: tau is 0.4. Nothing lies before the front strand."""
     grid = np.concatenate([lines(np.array([0.05]), depth=0.004), lines(np.array([0.0]))])
@@ -153,7 +153,7 @@ def test_what_lies_behind_gets_less_light() -> None:
     np.testing.assert_allclose(baked(plan_of([2]), apart, 0.1, 32)[0].occlusion, 1.0)
 
 
-def test_colours_are_kept_below_one_and_the_gain_gives_them_back() -> None:
+def test_colours_are_at_most_one_and_the_gain_restores_them() -> None:
     base = np.ones((2, ROWS, 3), np.float32)
     base[0] *= (1.6, 0.8, 0.4)
     flat, maps = baked(plan_of([2]), lines(np.array([-0.2, 0.2])), 0.2, 32, base)
@@ -162,7 +162,7 @@ def test_colours_are_kept_below_one_and_the_gain_gives_them_back() -> None:
     np.testing.assert_allclose(maps.base[16, 22] * flat.base_gain, 1.0, rtol=1e-5)
 
 
-def test_strands_beyond_the_strip_are_squeezed_into_it() -> None:
+def test_strands_beyond_the_strip_are_compressed_into_it() -> None:
     """Nothing is cut off: not at the sides, nor before the root, nor beyond the tip."""
     across = np.array([-0.9, -0.2, 0.0, 0.2, 0.9])
     grid = lines(across)
@@ -175,7 +175,7 @@ def test_strands_beyond_the_strip_are_squeezed_into_it() -> None:
     assert maps.alpha.mean() == pytest.approx(5 * 0.04, rel=0.08)
 
 
-def test_strands_that_begin_a_little_late_begin_sooner_and_end_where_they_do() -> None:
+def test_strands_that_begin_behind_their_card_are_extended_at_the_root_only() -> None:
     """Seven tenths of their delay are removed, at most 4.2 % of the card: roots of brows lie
     anywhere."""
     grid, late = lines(np.zeros(3)), np.array([0.0, 0.05, 0.5])
@@ -187,7 +187,7 @@ def test_strands_that_begin_a_little_late_begin_sooner_and_end_where_they_do() -
     assert (np.diff(flat.place[..., 1], axis=1) > 0.0).all()
 
 
-def test_strips_without_size_do_no_harm() -> None:
+def test_strips_without_size_give_finite_maps() -> None:
     plan = plan_of([2])
     frames = replace(plan.strips.frames, center=np.zeros_like(plan.strips.frames.center))
     flat_plan = replace(plan, strips=Strips(frames, np.zeros_like(plan.strips.width)))
@@ -243,7 +243,7 @@ def test_tiles_without_hair_are_plain() -> None:
     np.testing.assert_array_equal(maps.occlusion[:, 16:], 1.0)
 
 
-def test_values_go_over_from_hair_to_hair() -> None:
+def test_values_are_interpolated_between_hairs() -> None:
     """Between two strands, depth is interpolated, while the strand's number is one of the two."""
     grid = np.concatenate([lines(np.array([-0.3]), depth=0.008), lines(np.array([0.3]))])
     flat, maps = baked(plan_of([2]), grid, 0.1, 64)
@@ -254,13 +254,13 @@ def test_values_go_over_from_hair_to_hair() -> None:
     np.testing.assert_array_equal(whole.alpha, maps.alpha)
 
 
-def test_tiles_begin_where_the_middle_of_a_texel_does() -> None:
+def test_a_texel_belongs_to_the_tile_that_holds_its_middle() -> None:
     assert tile_edges(128, 5).tolist() == [0, 26, 51, 77, 102, 128]
     assert tile_edges(64, 4).tolist() == [0, 16, 32, 48, 64]
 
 
 @pytest.mark.parametrize(("bend", "column"), [(0.0, 0), (0.4, 1)])
-def test_a_texel_stores_how_deep_its_strand_lies_among_others(bend: float, column: int) -> None:
+def test_relative_depth_places_a_strand_among_its_neighbours(bend: float, column: int) -> None:
     """Straight strands at random in a slab, flat or bent about the head, against the foremost one
     at 16 places of each texel: how much deeper it lies in the slab than these do on average."""
     random, count, deep, width = np.random.default_rng(2), 300, 0.3 * WIDTH, 0.03

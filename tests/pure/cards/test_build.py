@@ -84,7 +84,7 @@ def built(
 
 @pytest.mark.parametrize("way", few_in_commits(["clusters", "guides"]))
 @pytest.mark.parametrize("source", few_in_commits(["baked", "made"]))
-def test_levels_share_one_atlas_and_all_that_is_known_of_cards(way: str, source: str) -> None:
+def test_levels_share_one_atlas_and_all_card_attributes(way: str, source: str) -> None:
     build = built(falling(800), AtlasSettings(source=source, columns=8, rows=2), source=way)
     assert len(build.levels) == len(build.errors) == len(build.back_triangles) == 3
     assert (build.plan is None) == (source == "made")
@@ -258,7 +258,7 @@ def test_an_atlas_that_is_too_small_says_by_how_much() -> None:
         built(falling(100), small)
 
 
-def test_alpha_is_asked_for_once_and_darkens_less_than_opaque_cards() -> None:
+def test_alpha_is_made_once_and_darkens_less_than_opaque_cards() -> None:
     rig = rig_flow.prepare(falling(900), None, GuideSettings(), place="hair")
     settings = CardSettings(source="clusters", card_count=30, levels=1)
     asked: list[CardBuild] = []
@@ -275,7 +275,7 @@ def test_alpha_is_asked_for_once_and_darkens_less_than_opaque_cards() -> None:
     assert opaque.finest.occlusion.mean() < 0.9
 
 
-def test_every_step_says_how_far_it_is() -> None:
+def test_every_step_reports_its_progress() -> None:
     rig = rig_flow.prepare(falling(600), None, GuideSettings(), place="hair")
     settings = CardSettings(source="clusters", card_count=30, levels=2)
     groom = card_flow.card_groom(rig)  # so that rays find the occlusion
@@ -288,7 +288,7 @@ def test_every_step_says_how_far_it_is() -> None:
 
 
 @pytest.mark.parametrize("by", ["pieces", "cards", "distance"])
-def test_the_order_is_the_one_that_was_chosen_and_its_faults_are_told(by: str) -> None:
+def test_the_chosen_order_is_used_and_its_errors_are_measured(by: str) -> None:
     strands = falling(900)
     build = built(strands, order_by=by, levels=1)
     mesh = build.finest
@@ -311,7 +311,7 @@ def test_cards_that_are_clear_stay_in_the_order_of_their_distance() -> None:
     assert unseen == by_distance != seen
 
 
-def test_notes_go_by_how_wide_strands_are_drawn() -> None:
+def test_notes_depend_on_the_drawn_width_of_strands() -> None:
     rig = rig_flow.prepare(falling(900), None, GuideSettings(), place="hair")
     settings = CardSettings(source="clusters", card_count=30)
     atlas = AtlasSettings(size="512", columns=8, rows=2)
@@ -336,7 +336,9 @@ def test_half_a_million_strands_become_cards() -> None:
     assert len(cards) >= 800
 
 
-def test_much_that_blends_wrongly_comes_with_a_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_many_wrongly_blended_pixels_give_a_note_with_a_remedy(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     for wrong, order_by, remedy in (
         (0.05, "distance", None),
         (0.2, "distance", "Set Order By to Pieces"),

@@ -67,19 +67,19 @@ def check_same(one: CardMesh, other: CardMesh) -> None:
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_the_numbering_hangs_on_the_cards_alone(seed: int) -> None:
+def test_the_numbering_depends_on_the_cards_alone(seed: int) -> None:
     mesh = scattered()
     check_same(to_canonical(shuffled(mesh, seed)).mesh, to_canonical(mesh).mesh)
 
 
-def test_what_is_numbered_stays_as_it_is() -> None:
+def test_numbering_twice_changes_nothing() -> None:
     once = to_canonical(scattered()).mesh
     twice = to_canonical(once)
     check_same(twice.mesh, once)
     np.testing.assert_array_equal(twice.source_triangle, np.arange(len(once.triangles)))
 
 
-def test_nothing_of_a_triangle_changes_but_its_numbers() -> None:
+def test_triangles_keep_all_their_attributes() -> None:
     mesh = shuffled(scattered(), 4)
     found = to_canonical(mesh)
     assert sorted(found.source_triangle) == list(range(len(mesh.triangles)))
@@ -96,7 +96,7 @@ def test_nothing_of_a_triangle_changes_but_its_numbers() -> None:
         )
 
 
-def test_cards_have_no_gaps_and_their_triangles_go_from_root_to_tip() -> None:
+def test_card_numbers_have_no_gaps_and_triangles_run_from_root_to_tip() -> None:
     mesh = to_canonical(shuffled(scattered(), 5)).mesh
     np.testing.assert_array_equal(mesh.card, np.repeat(np.arange(30), 4))
     along = mesh.along[mesh.triangles].mean(axis=1).reshape(30, 4)
@@ -106,7 +106,7 @@ def test_cards_have_no_gaps_and_their_triangles_go_from_root_to_tip() -> None:
     assert (np.diff(first[:, 0]) > 0.0).all(), "cards by place, where all begin at the root"
 
 
-def test_the_way_from_the_root_counts_before_the_place() -> None:
+def test_the_position_along_the_card_counts_before_the_place() -> None:
     """Two cards in one place: the root of one is at the tip of the other."""
     mesh = strips(np.zeros((2, 3)))
     along = mesh.along.copy()
@@ -118,7 +118,7 @@ def test_the_way_from_the_root_counts_before_the_place() -> None:
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_cards_in_one_place_are_told_apart_by_their_uv(seed: int) -> None:
+def test_cards_in_one_place_are_distinguished_by_their_uvs(seed: int) -> None:
     mesh = strips(np.zeros((5, 3)))
     mesh = replace(mesh, uv=mesh.uv + np.repeat([0.4, 0.1, 0.3, 0.0, 0.2], 6)[:, None])
     found = to_canonical(shuffled(mesh, seed)).mesh
@@ -126,7 +126,7 @@ def test_cards_in_one_place_are_told_apart_by_their_uv(seed: int) -> None:
     np.testing.assert_array_equal(found.tile, np.array([3, 1, 4, 2, 0]) + 5)
 
 
-def test_cards_that_are_alike_in_all_keep_their_order() -> None:
+def test_identical_cards_keep_their_order() -> None:
     """The order of their vertices counts, whatever the order of their triangles."""
     mesh = strips(np.zeros((4, 3)))
     order = np.random.default_rng(8).permutation(len(mesh.triangles))
@@ -137,7 +137,7 @@ def test_cards_that_are_alike_in_all_keep_their_order() -> None:
         np.testing.assert_array_equal(found.card, np.repeat(np.arange(4), 4))
 
 
-def test_triangles_of_one_card_go_by_the_places_of_their_corners() -> None:
+def test_triangles_of_one_card_are_sorted_by_their_corners() -> None:
     """Against tuples sorted by Python; triangles between few places, all of one card."""
     random = np.random.default_rng(9)
     names = [tuple(random.permutation(12)[:3]) for _ in range(60)]
@@ -181,6 +181,6 @@ def test_vertices_in_one_place_count_alike() -> None:
     )
 
 
-def test_no_cards() -> None:
+def test_a_mesh_without_cards_is_numbered() -> None:
     found = to_canonical(strips(np.zeros((0, 3))))
     assert not len(found.source_triangle) and not found.mesh.card_count

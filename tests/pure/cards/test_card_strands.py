@@ -42,7 +42,7 @@ def waving(count: int = 200, cv_count: int = 64) -> StrandSet:
     return StrandSet(points.reshape(-1, 3), offsets, np.full(count * cv_count, 1e-3), [0] * count)
 
 
-def test_cards_of_points_by_need_are_those_of_many_points() -> None:
+def test_cards_of_sparse_strands_equal_those_of_dense_ones() -> None:
     dense = waving()
     rig = rig_flow.prepare(dense, None, GuideSettings(cv_count=64), place="test")
     uneven = with_needed_points(rig.strands, 16)
@@ -57,7 +57,7 @@ def test_cards_of_points_by_need_are_those_of_many_points() -> None:
     assert abs(found.occlusion.mean() - expected.occlusion.mean()) < 0.03
 
 
-def test_rows_are_what_most_strands_need() -> None:
+def test_cards_have_as_many_rows_as_most_strands_need() -> None:
     assert row_count(np.full(100, 3)) == 16
     assert row_count(np.r_[np.full(95, 40), np.full(5, 256)]) == 40
     assert row_count(np.full(100_000, 200)) == 40, "not more than memory holds"

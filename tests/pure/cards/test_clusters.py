@@ -52,13 +52,13 @@ def test_strands_lie_along_the_nearest_guide_of_their_group() -> None:
     np.testing.assert_array_equal(cluster_of_guides(grid, alone, guides), owner)
 
 
-def test_guides_that_lie_in_one_place_stay_their_own() -> None:
+def test_coinciding_guides_keep_their_own_clusters() -> None:
     grid = np.tile(bundles(1, 1)[0], (3, 1, 1))
     same = np.zeros(3, np.int32)
     np.testing.assert_array_equal(cluster_of_guides(grid, same, np.array([0, 2]))[[0, 2]], [0, 1])
 
 
-def test_strands_that_part_are_kept_apart_though_their_roots_touch() -> None:
+def test_strands_that_diverge_from_touching_roots_are_separated() -> None:
     random = np.random.default_rng(2)
     side = np.repeat([-1.0, 1.0], 50)
     along = np.linspace(0.0, 0.2, 8)
@@ -70,7 +70,7 @@ def test_strands_that_part_are_kept_apart_though_their_roots_touch() -> None:
     np.testing.assert_array_equal(label, np.where(np.arange(100) < 50, label[0], 1 - label[0]))
 
 
-def test_no_cluster_holds_two_groups_and_each_group_has_its_share() -> None:
+def test_no_cluster_holds_two_groups_and_each_gets_clusters_in_proportion() -> None:
     grid, _ = bundles(8, 50, spread=0.03)
     group = np.where(np.arange(len(grid)) < 300, 7, -2).astype(np.int32)
     label = cluster_strands(grid, group, 40)
@@ -90,7 +90,7 @@ def test_no_single_strand_could_move_to_a_much_better_cluster() -> None:
     assert max(found) < 0.95 * spread_within(grid, random)
 
 
-def test_a_seed_gives_the_same_clusters_again_and_another_one_others() -> None:
+def test_clusters_depend_on_the_seed_alone() -> None:
     grid = np.random.default_rng(3).normal(size=(300, 6, 3)).astype(np.float32)
     group = np.zeros(300, np.int32)
     first = cluster_strands(grid, group, 20, seed=4)
@@ -110,14 +110,14 @@ def test_strands_that_coincide_are_one_cluster() -> None:
     np.testing.assert_array_equal(cluster_strands(grid, np.zeros(9, np.int32), 3), np.zeros(9))
 
 
-def test_more_strands_than_are_learnt_from_all_find_their_bundle() -> None:
+def test_strands_beyond_the_sampled_ones_find_their_bundle() -> None:
     grid, owner = bundles(10, 2_500)
     label = cluster_strands(grid, np.zeros(len(grid), np.int32), 10)
     pairs = {(int(a), int(b)) for a, b in zip(label, owner, strict=True)}
     assert len(pairs) == 10
 
 
-def test_cards_are_shared_out_by_size() -> None:
+def test_parts_are_proportional_to_sizes() -> None:
     np.testing.assert_array_equal(proportional_parts(10, np.array([50, 30, 20])), [5, 3, 2])
     np.testing.assert_array_equal(proportional_parts(2, np.array([1000, 1, 1])), [2, 1, 1])
     np.testing.assert_array_equal(proportional_parts(100, np.array([3, 5])), [3, 5])
@@ -142,7 +142,7 @@ def parted(count: int = 4000, lift: float = 0.2) -> tuple[np.ndarray, np.ndarray
     return grid.astype(np.float32), np.tile(np.float32([0.0, 0.0, 1.0]), (count, 1))
 
 
-def test_the_rim_lies_along_the_parting_and_nowhere_else() -> None:
+def test_the_rim_lies_along_the_parting_only() -> None:
     grid, normal = parted()
     is_rim, away = is_at_rim(grid, normal, 40.0), np.abs(grid[:, 0, 0])
     # an average card is a square of 1 cm

@@ -58,7 +58,7 @@ def depths(points: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("by", [-2.6, -1.7, 1.9, 3.0])
-def test_no_vertex_is_in_a_ball(by: float) -> None:
+def test_no_vertex_is_in_a_sphere_collider(by: float) -> None:
     mesh, guides = cards_on_a_ball()
     cards, turns, contacts = bound(mesh, guides)
     now = fallen(guides, by)
@@ -101,7 +101,7 @@ def test_rows_bend_by_a_right_angle_at_most() -> None:
     assert np.quantile(bends[1] - bends[0], 0.5) < 0.1
 
 
-def test_normals_and_tangents_turn_with_what_is_led() -> None:
+def test_normals_and_tangents_turn_with_their_rows() -> None:
     mesh, guides = cards_on_a_ball()
     cards, turns, contacts = bound(mesh, guides)
     led = follow_guides(cards, fallen(guides, 1.9), turns, contacts)
@@ -120,7 +120,7 @@ def test_normals_and_tangents_turn_with_what_is_led() -> None:
         np.testing.assert_allclose(found[0], found[1], atol=2e-3)
 
 
-def test_what_was_inside_gets_no_deeper() -> None:
+def test_vertices_that_began_inside_get_no_deeper() -> None:
     mesh, guides = cards_on_a_ball(sink=0.01)
     before = depths(mesh.positions)
     assert (before > 0.005).sum() == len(guides)
@@ -130,7 +130,7 @@ def test_what_was_inside_gets_no_deeper() -> None:
         assert (depths(led.positions) <= np.maximum(before, 0.0) + SLACK * KEPT).all()
 
 
-def test_what_is_far_from_colliders_is_where_it_rides() -> None:
+def test_cards_far_from_colliders_are_not_moved() -> None:
     mesh, guides = cards_on_a_ball()
     cards, turns, contacts = bound(mesh, guides)
     now = fallen(guides, 0.05)
@@ -140,7 +140,7 @@ def test_what_is_far_from_colliders_is_where_it_rides() -> None:
     assert follow_guides(cards, guides, turns, contacts) is mesh
 
 
-def test_a_vertex_is_led_as_often_as_it_is_asked_to() -> None:
+def test_cards_are_led_out_alike_in_any_order_of_frames() -> None:
     """Frames give the same in any order, as a bake needs: none depends on the one before."""
     mesh, guides = cards_on_a_ball()
     cards, turns, contacts = bound(mesh, guides)
@@ -153,7 +153,7 @@ def test_a_vertex_is_led_as_often_as_it_is_asked_to() -> None:
         np.testing.assert_array_equal(here, there)
 
 
-def test_a_card_of_one_row_goes_with_its_root() -> None:
+def test_a_card_of_one_row_moves_with_its_root() -> None:
     """A mesh whose `along` is all 0 has one row per card: nothing is led out, and all is finite."""
     mesh, guides = cards_on_a_ball(3)
     flat = CardMesh(**{**vars(mesh), "along": np.zeros_like(mesh.along)})
@@ -163,7 +163,7 @@ def test_a_card_of_one_row_goes_with_its_root() -> None:
     assert len(cards.offsets) == 4 and (np.diff(cards.offsets) == 2).all()
 
 
-def test_shells_are_led_as_cards_are() -> None:
+def test_shells_are_led_out_like_cards() -> None:
     """A patch of skin on top of the ball with its layers, whose guide falls over."""
     side, layers = np.linspace(-0.01, 0.01, 3), 5
     x, y = (each.ravel() for each in np.meshgrid(side, side))

@@ -39,7 +39,7 @@ def test_a_flat_bundle_gets_the_strip_that_holds_it() -> None:
     np.testing.assert_allclose(strips.width, 1.8 / np.sqrt(3.0) * BREADTH, rtol=0.02)
 
 
-def test_the_spread_turns_a_strip_and_the_head_decides_which_side_is_out() -> None:
+def test_a_strip_lies_along_the_spread_and_faces_away_from_the_head() -> None:
     slanted = (np.cos(0.6), np.sin(0.6), 0.0)
     for outwards in ((0.0, -1.0, 0.0), (0.0, 1.0, 0.0)):
         strips = fitted(flat_bundle(slanted), outwards)
@@ -69,7 +69,7 @@ def segments_within(strips: Strips, error: float, most: int) -> list[int]:
     return fewest_segments(segment_errors(strips, most), error, most).tolist()
 
 
-def test_edges_stay_within_the_error_and_one_segment_less_would_not_do() -> None:
+def test_segments_are_the_fewest_within_the_error() -> None:
     turn = np.linspace(0.0, np.pi, 33)
     arc = np.stack([0.1 * np.sin(turn), 0.0 * turn, 0.1 * np.cos(turn)], axis=-1)
     grid = arc + np.linspace(-0.005, 0.005, 20)[:, None, None] * [0.0, 1.0, 0.0]

@@ -138,7 +138,7 @@ def test_a_turned_root_twists_the_whole_card_alike() -> None:
     np.testing.assert_allclose(now.positions, mesh.positions @ turn.T, atol=1e-6)
 
 
-def test_a_helix_does_not_wring_its_card() -> None:
+def test_a_helix_does_not_twist_its_card() -> None:
     """From row to row a card turns no more than its bone: nothing twists about it."""
     binding = bound(flat_card(), straight())
     t = np.linspace(0.0, 1.0, CVS)
@@ -154,7 +154,7 @@ def test_a_helix_does_not_wring_its_card() -> None:
 
 
 @pytest.mark.parametrize("kind", ["a point", "folded back", "reversed"])
-def test_whatever_guides_do_cards_stay_finite(kind: str) -> None:
+def test_cards_stay_finite_for_any_motion_of_guides(kind: str) -> None:
     mesh, binding = flat_card(), bound(flat_card(), straight())
     now = straight()
     if kind == "a point":
@@ -172,7 +172,7 @@ def test_whatever_guides_do_cards_stay_finite(kind: str) -> None:
     assert mesh.card_count == 1
 
 
-def test_guides_count_by_their_weights() -> None:
+def test_cards_follow_guides_by_their_weights() -> None:
     mesh, guides = flat_card(), straight(2)
     binding = bind_cards(mesh, guides, np.array([[0, 1]]), np.float32([[0.75, 0.25]]))
     now = guides.copy()
@@ -215,7 +215,7 @@ def test_cards_of_a_rig_ride_as_its_strands_do() -> None:
     assert step[moving].max() > 0.045
 
 
-def test_a_card_between_guides_that_go_apart_keeps_its_length() -> None:
+def test_a_card_between_diverging_guides_keeps_its_length() -> None:
     """Two guides swing by 60 degrees to either side: their mean would be half as long."""
     mesh, guides = flat_card(), straight(2)
     binding = bind_cards(mesh, guides, np.array([[0, 1]]), np.float32([[0.5, 0.5]]))
@@ -256,7 +256,7 @@ def test_vertices_without_triangles_change_no_card() -> None:
     np.testing.assert_array_equal(found, expected)
 
 
-def test_no_cards_are_nothing() -> None:
+def test_a_mesh_without_cards_follows() -> None:
     mesh = flat_card()
     empty = CardMesh(**{**vars(mesh), "triangles": mesh.triangles[:0], "card": mesh.card[:0]})
     binding = bind_cards(empty, straight(), np.zeros((0, 1), int), np.zeros((0, 1), np.float32))

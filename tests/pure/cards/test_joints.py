@@ -165,7 +165,7 @@ def test_rigid_cards_are_exact_with_the_fewest_joints() -> None:
     assert keyed_error(tracks, rig, rig.turn, rig.place).maximum < 1e-5
 
 
-def test_what_bends_more_has_more_joints_and_stays_under_the_error() -> None:
+def test_stronger_bends_get_more_joints_and_stay_under_the_error() -> None:
     counts = []
     for curl in (0.1, 1.5, 3.0):
         mesh = curtain()
@@ -177,7 +177,7 @@ def test_what_bends_more_has_more_joints_and_stays_under_the_error() -> None:
     assert counts[0] == 2 < counts[-1] <= 16
 
 
-def test_the_error_is_what_skinning_by_hand_gives() -> None:
+def test_the_error_agrees_with_skinning_by_hand() -> None:
     """From the rest matrices and the joints, as an engine does it."""
     mesh = curtain(6)
     tracks = tracks_of(mesh, bent(mesh, 2.0))
@@ -229,7 +229,7 @@ def test_quaternions_and_matrices_agree() -> None:
     np.testing.assert_allclose(about_z * np.sign(about_z[3]), [0, 0, np.sin(0.3), np.cos(0.3)])
 
 
-def test_slerp_turns_evenly_the_shorter_way() -> None:
+def test_slerp_turns_evenly_along_the_shorter_arc() -> None:
     share = np.linspace(0.0, 1.0, 7)
     ends = quaternions(turn_about(2, np.array([0.2, 1.4])))
     for sign in (1.0, -1.0):
@@ -259,7 +259,7 @@ def test_an_even_motion_needs_two_keys_and_a_still_one_needs_one() -> None:
 
 
 @pytest.mark.parametrize("near", [3e-3, 1e-3, 0.0])
-def test_left_out_keys_stay_near(near: float) -> None:
+def test_reduced_keys_stay_within_the_tolerance(near: float) -> None:
     """Between the remaining keys the error stays below `near`, along a whole chain of joints."""
     time = np.linspace(0.0, 6.0, 60)
     turn = np.stack([turn_about(0, np.sin(time + 0.3 * joint)) for joint in range(4)])

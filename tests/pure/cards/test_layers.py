@@ -70,14 +70,14 @@ def test_both_sides_of_a_head_do_not_count_as_each_other_s_layers() -> None:
     np.testing.assert_array_equal(depth, 0.0)
 
 
-def test_one_card_and_one_layer() -> None:
+def test_one_card_and_one_layer_are_layer_0() -> None:
     center, outwards = shell(0.1, 1, 0)
     np.testing.assert_array_equal(card_layers(strips_of(center, outwards), 3), [0])
     center, outwards = shell(0.1, 50, 0)
     np.testing.assert_array_equal(card_layers(strips_of(center, outwards), 1), np.zeros(50))
 
 
-def test_a_part_of_many_cards_says_the_same_as_all() -> None:
+def test_sampled_neighbours_give_the_same_layers_as_all() -> None:
     """Of this many cards only a sample is evaluated; the layers are those of the shells all the
     same."""
     parts = [shell(0.10 + 0.01 * k, 700, k) for k in range(2)]

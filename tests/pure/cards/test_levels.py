@@ -86,7 +86,7 @@ def test_rows_go_first_then_columns_then_cards() -> None:
     assert errors == sorted(errors) and errors[0] <= 0.002
 
 
-def test_the_error_that_is_stated_holds_for_the_edges() -> None:
+def test_the_stated_error_holds_for_the_edges() -> None:
     """Nine tenths of the finest edges lie within the stated error of the level's surface, by their
     distance in space."""
     cards = fall(120)
@@ -126,7 +126,7 @@ def test_the_hair_covers_as_much_in_every_level() -> None:
             assert both > 0.85
 
 
-def test_what_cannot_be_halved_has_fewer_levels() -> None:
+def test_cards_that_cannot_be_halved_have_fewer_levels() -> None:
     one = fall(1, groups=1)
     settings = CardSettings(levels=5, column_count=1, segment_count=4)
     counts = [len(level.mesh.triangles) for level in card_levels(one, settings, None)]
@@ -169,7 +169,7 @@ def test_two_cards_on_each_other_become_one_between_the_same_and_twice_the_width
     np.testing.assert_allclose(strips.frames.center[0, :, 1], 0.002, atol=1e-6)
 
 
-def test_the_one_of_more_strands_stays_and_hardly_moves() -> None:
+def test_the_card_of_more_strands_keeps_its_number_and_hardly_moves() -> None:
     cards = side_by_side((0.01, 0.0, 0.0))
     count = np.array([1, 99], np.int32)
     pairs = pairs_to_join(cards.strips, count, cards.group, np.arange(2))
@@ -179,7 +179,7 @@ def test_the_one_of_more_strands_stays_and_hardly_moves() -> None:
     assert 0.01 < strips.width[1, 0] < 0.015
 
 
-def test_groups_are_never_joined_and_nobody_joins_twice() -> None:
+def test_cards_of_two_groups_are_never_joined_and_no_card_joins_twice() -> None:
     cards = fall(200, groups=5)
     pairs = pairs_to_join(cards.strips, cards.strand_count, cards.group, np.arange(200))
     assert len(pairs) > 50

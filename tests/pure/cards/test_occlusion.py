@@ -268,7 +268,7 @@ def test_strength_mixes_in_and_the_same_input_gives_the_same_bits() -> None:
     assert full.dtype == np.float32
 
 
-def test_nothing_and_triangles_without_area() -> None:
+def test_empty_meshes_and_triangles_without_area_occlude_nothing() -> None:
     one = stacked([0.0])
     empty = replace(
         one,

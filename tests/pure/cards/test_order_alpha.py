@@ -56,7 +56,7 @@ def test_texels_on_a_square_metre() -> None:
     assert texels_per_metre(np.zeros((64, 32)), half) == pytest.approx(32.0)
 
 
-def test_from_afar_a_texel_is_as_large_as_a_pixel() -> None:
+def test_downsampled_texels_are_as_large_as_a_pixel() -> None:
     mesh, alpha = sheets((0.0,)), np.random.default_rng(1).random((64, 48))
     assert downsampled_alpha(alpha, mesh, 1.0e-3) is alpha
     coarse = downsampled_alpha(alpha, mesh, 0.15)
@@ -66,7 +66,7 @@ def test_from_afar_a_texel_is_as_large_as_a_pixel() -> None:
     assert downsampled_alpha(alpha, mesh, 1.0e9).shape == (2, 1)
 
 
-def test_what_is_clear_or_behind_something_opaque_has_no_order() -> None:
+def test_clear_and_hidden_fragments_have_no_order() -> None:
     mesh = sheets((0.0, 0.1, 0.2))
 
     def pairs(alpha: np.ndarray) -> set[tuple[int, ...]]:
@@ -94,7 +94,7 @@ def test_fine_strands_of_a_texture_count_by_what_they_cover_together() -> None:
 
 
 @pytest.mark.parametrize("by", ["pieces", "cards"])
-def test_crossing_cards_go_by_what_is_seen_of_them(by: SortBy) -> None:
+def test_crossing_cards_are_ordered_by_their_visible_texels(by: SortBy) -> None:
     mesh = crossing_sheets()
     for alpha, first in ((RIGHT, 1), (LEFT, 0)):
         orders = card_orders(mesh, None, by, view_count=8, alpha=alpha)

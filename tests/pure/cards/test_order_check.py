@@ -19,7 +19,7 @@ from hairloom.addon.cards.order_views import SphereView
 from hairloom.addon.strands import Surface
 
 
-def share(
+def wrong_fraction_of(
     mesh: CardMesh, cards: tuple[int, ...], alpha: float = 0.5, head: Surface | None = None
 ) -> float | None:
     """The fraction of wrong pixels if cards are drawn in this order; None if none is seen."""
@@ -30,32 +30,32 @@ def share(
     return float(is_wrong.mean()) if len(is_wrong) else None
 
 
-def test_two_sheets() -> None:
+def test_two_sheets_are_wrong_in_reversed_order_only() -> None:
     mesh = sheets((0.1, 0.2))
-    assert share(mesh, (0, 1)) == 0.0
-    assert share(mesh, (1, 0)) == 1.0
+    assert wrong_fraction_of(mesh, (0, 1)) == 0.0
+    assert wrong_fraction_of(mesh, (1, 0)) == 1.0
 
 
 def test_back_faces_are_drawn_before_front_faces() -> None:
     behind, before = sheets((0.1, 0.2), (True, False)), sheets((0.1, 0.2), (False, True))
     for cards in ((0, 1), (1, 0)):
-        assert share(behind, cards) == 0.0
-        assert share(before, cards) == 1.0
+        assert wrong_fraction_of(behind, cards) == 0.0
+        assert wrong_fraction_of(before, cards) == 1.0
 
 
-def test_what_cannot_be_seen_cannot_be_wrong() -> None:
+def test_invisible_fragments_are_never_wrong() -> None:
     mesh = sheets((0.1, 0.2, 0.3))
-    assert share(mesh, (2, 1, 0), alpha=1.0) == 0.0  # the nearest hides the others
-    assert share(mesh, (2, 1, 0), alpha=0.003) is None
-    assert share(mesh, (2, 1, 0), alpha=0.2) == 1.0
+    assert wrong_fraction_of(mesh, (2, 1, 0), alpha=1.0) == 0.0  # the nearest hides the others
+    assert wrong_fraction_of(mesh, (2, 1, 0), alpha=0.003) is None
+    assert wrong_fraction_of(mesh, (2, 1, 0), alpha=0.2) == 1.0
     wall = Surface(np.array([[-9, 0, -9], [9, 0, -9], [0, 0, 9]]) - [0, 0.15, 0], [[0, 1, 2]])
-    assert share(mesh, (2, 1, 0), head=wall) == 1.0
-    assert share(mesh, (1, 0, 2), head=wall) == 0.0  # the wrong one is behind the wall
+    assert wrong_fraction_of(mesh, (2, 1, 0), head=wall) == 1.0
+    assert wrong_fraction_of(mesh, (1, 0, 2), head=wall) == 0.0  # the wrong one is behind the wall
     over = Surface(wall.positions - [0, 1.0, 0], wall.triangles)
-    assert share(mesh, (2, 1, 0), head=over) is None
+    assert wrong_fraction_of(mesh, (2, 1, 0), head=over) is None
 
 
-def test_depth_that_front_faces_write_loses_what_comes_too_late() -> None:
+def test_front_faces_hide_farther_ones_that_are_drawn_later() -> None:
     """Two halves of one card have one colour, so any order of blending is right; but the depth test
     rejects the farther half after the nearer one, unless both are back faces or the farther one is
     opaque.

@@ -52,7 +52,7 @@ def test_preferences_are_added_up_as_a_double_loop_does(seed: int) -> None:
     assert preferences.violated_weight(rank) == broken(table, np.argsort(rank))
 
 
-def test_preferences_of_parts_are_those_of_the_whole() -> None:
+def test_preferences_of_groups_are_sums_of_their_members() -> None:
     random = np.random.default_rng(1)
     before, after = random.integers(0, 30, (2, 400))
     weight, whole = random.integers(0, 5, 400), random.integers(0, 6, 30)
@@ -63,7 +63,7 @@ def test_preferences_of_parts_are_those_of_the_whole() -> None:
 
 
 @pytest.mark.parametrize("count", [2, 5, 7])
-def test_what_is_found_is_nearly_the_best_of_all_orders(count: int) -> None:
+def test_the_order_found_is_nearly_optimal(count: int) -> None:
     """Against all orders. A search by single moves may stop a little above the optimum, where no
     single move helps."""
     random = np.random.default_rng(count)
@@ -109,7 +109,7 @@ def test_things_without_preferences_stay_where_they_were() -> None:
     assert len(minimize_violations(net_preferences(0, none, none, none), none)) == 0
 
 
-def test_a_search_without_end_is_cut_short() -> None:
+def test_the_search_stops_after_its_maximum_of_moves() -> None:
     table = random_preferences(np.random.default_rng(3), 30)
     start = np.arange(30)
     np.testing.assert_array_equal(

@@ -104,7 +104,7 @@ def test_fragments_are_where_rays_meet_triangles(distance: float) -> None:
         assert depths == sorted(depths)
 
 
-def test_what_is_behind_the_eye_is_not_seen() -> None:
+def test_triangles_behind_the_eye_give_no_fragments() -> None:
     points, triangles = loose_triangles(4)
     view = SphereView(np.zeros(3), 1.0, np.array([0.0, -1.0, 0.0]), 16, 2.0)
     assert len(rasterized(view, points, triangles).pixel)

@@ -175,7 +175,7 @@ def test_sparse_hair_covers_as_much_however_few_strands_a_pattern_has(
     assert 1.0 - left == pytest.approx(1.0 - np.exp(-tau), rel=0.1)
 
 
-def test_colours_and_places_along_the_strands_are_the_grooms() -> None:
+def test_shells_show_the_colours_and_places_of_the_strands() -> None:
     strands = fur_on_square()
     plan = fur_on_the_square().plan
     shade = np.broadcast_to(np.linspace(0.2, 0.8, 8)[None, :, None], (*strands.grid.shape[:2], 3))
@@ -213,7 +213,7 @@ def test_without_thinner_patterns_thin_skin_of_a_coarser_level_shows_whole_ones(
     np.testing.assert_array_equal(replace(plan, thinned=0).pattern_of(patches), [5, 5])
 
 
-def test_automatic_makes_shells_of_short_hair_alone() -> None:
+def test_automatic_makes_shells_of_short_hair_only() -> None:
     head, automatic = square(), CardSettings(kind="auto")
     assert wants_shells(automatic, fur_on_square(), head, False)
     assert not wants_shells(automatic, fur_on_square(), head, True)
@@ -223,7 +223,7 @@ def test_automatic_makes_shells_of_short_hair_alone() -> None:
     assert not wants_shells(automatic, long_hair, head, False)
 
 
-def test_what_cannot_be_shells_is_refused_in_plain_words() -> None:
+def test_hair_that_cannot_be_shells_is_refused_with_a_remedy() -> None:
     head, fur = square(), fur_on_square()
     long_hair = replace(fur, points=fur.points * [1.0, 1.0, 20.0])
     brow = replace(fur, group=np.full(fur.strand_count, BROWS, np.int32))

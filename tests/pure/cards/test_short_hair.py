@@ -56,11 +56,11 @@ def test_fur_gets_more_cards_of_eight_triangles_at_most() -> None:
 
 
 @pytest.mark.parametrize("length", [0.05, 0.3])
-def test_longer_hair_has_the_cards_that_are_asked_for(length: float) -> None:
+def test_longer_hair_has_the_wanted_number_of_cards(length: float) -> None:
     assert fitted_to_length(FUR, ATLAS, fur(length)) == (FUR, ATLAS, ())
 
 
-def test_there_are_no_more_cards_than_it_takes() -> None:
+def test_there_are_no_more_cards_than_needed() -> None:
     """The roots of a card fill a square with a side of a quarter of the hair's length."""
     strands = fur(0.03)
     fitted, _, _ = fitted_to_length(replace(FUR, card_count=1000), ATLAS, strands)

@@ -35,7 +35,7 @@ def heights(mesh) -> np.ndarray:
     return np.linalg.norm(mesh.positions, axis=1) - 1.0
 
 
-def test_what_begins_under_the_skin_is_put_onto_it() -> None:
+def test_roots_under_the_skin_are_lifted_onto_it() -> None:
     head, mesh = Surface(*ball_mesh(96)), card(0.95, 1.1)
     found = lift_roots(mesh, head, WIDTH)
     first = mesh.along < 0.1
@@ -50,7 +50,7 @@ def test_what_begins_under_the_skin_is_put_onto_it() -> None:
     )
 
 
-def test_what_lies_on_the_skin_or_far_within_stays() -> None:
+def test_roots_on_the_skin_or_far_inside_are_not_moved() -> None:
     head = Surface(*ball_mesh(48))
     for mesh in (card(1.05, 1.2), card(0.4, 0.5)):
         np.testing.assert_array_equal(lift_roots(mesh, head, WIDTH).positions, mesh.positions)
@@ -70,7 +70,7 @@ def test_a_card_of_few_rows_does_not_run_through_the_skin() -> None:
     assert np.linalg.norm(found.positions - mesh.positions, axis=1).max() < 0.07
 
 
-def test_what_lies_above_the_skin_or_far_within_is_not_raised() -> None:
+def test_rows_above_the_skin_or_far_inside_are_not_raised() -> None:
     head = Surface(*ball_mesh(48))
     for mesh in (card(1.1, 1.0), card(0.4, 0.3)):
         np.testing.assert_array_equal(

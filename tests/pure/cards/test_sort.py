@@ -128,7 +128,7 @@ def as_drawn(mesh: CardMesh, order: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("by", WAYS)
 @pytest.mark.parametrize("head", [None, globe(24)])
-def test_the_order_hangs_on_where_cards_are_alone(head: Surface | None, by: SortBy) -> None:
+def test_the_order_depends_on_the_places_of_cards_alone(head: Surface | None, by: SortBy) -> None:
     group = np.arange(40) % 3
     mesh = replace(crossing_cards(), group=group)
     expected = card_orders(mesh, head, by, separate_groups=(2,), view_count=8)
@@ -150,7 +150,7 @@ def test_cards_that_are_sorted_stay_as_they_are(by: SortBy) -> None:
     np.testing.assert_array_equal(again.front, np.arange(len(once.triangles)))
 
 
-def test_everything_of_a_triangle_and_a_vertex_travels_with_it() -> None:
+def test_triangles_and_vertices_keep_all_their_attributes() -> None:
     mesh = crossing_cards()
     mesh = mesh.with_occlusion(np.random.default_rng(0).random(len(mesh.positions)))
 

@@ -127,7 +127,7 @@ def test_steps_are_those_of_the_specification(ball_count: int) -> None:
         np.testing.assert_allclose(found[:, number], by_the_book(own, own_values, head), atol=1e-9)
 
 
-def test_a_capsule_is_the_balls_along_it() -> None:
+def test_a_capsule_equals_the_spheres_along_it() -> None:
     ends = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]])
     capsule = SpringColliders(ends[:1], ends[1:], np.array([0.02]))
     many = SpringColliders.spheres(np.linspace(ends[0], ends[1], 2001), np.full(2001, 0.02))
@@ -164,7 +164,7 @@ def test_frames_and_steps_are_the_same_times() -> None:
     np.testing.assert_allclose(resampled_to_frames(steps, 31, 30.0), head, atol=1e-9)
 
 
-def test_values_that_are_known_are_found_again() -> None:
+def test_known_spring_values_are_recovered() -> None:
     """The motion is the same. The values themselves are not compared, since others give the same
     motion."""
     chains, head = made_chains(count=2, joints=3), shaken()
@@ -212,12 +212,12 @@ def test_the_fewest_joints_that_do_are_chosen(errors: dict[int, float], best: in
     assert fewest_joints(tried, 1e-6) == best
 
 
-def test_what_swings_as_one_needs_one_chain() -> None:
+def test_hair_that_swings_as_one_needs_one_chain() -> None:
     rig = result_of(spring_steps(moving_cards(0.4), 120, NO_BALLS))
     assert rig.chains.rest.shape[0] == 1
 
 
-def test_nothing_is_tried_that_has_more_joints_than_the_maximum(
+def test_no_candidate_has_more_joints_than_the_maximum(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The root joint that carries all chains counts as well."""
@@ -235,7 +235,7 @@ def test_cards_at_rest_stay_where_they_are() -> None:
     assert rig.error.maximum < 1e-3
 
 
-def test_a_chain_is_not_pushed_by_what_it_touches_at_rest() -> None:
+def test_chains_ignore_colliders_that_they_touch_at_rest() -> None:
     tracks = moving_cards(0.2)
     within = SpringColliders.spheres(
         np.array([[0.1, 0.0, -0.15], [0.1, -0.5, 0.0]]), np.array([0.08, 0.1])

@@ -39,7 +39,7 @@ def taken(occluder: CardOccluder) -> float:
     return 0.5 * float((area * -np.log1p(-occluder.alpha[row, column])).sum())
 
 
-def test_they_take_what_the_strands_take() -> None:
+def test_occluding_cards_block_as_much_light_as_the_strands() -> None:
     for count, radius in ((3000, 1.0e-4), (300, 3.0e-4)):
         rig = curtain(count, radius)
         strands = rig.strands

@@ -89,7 +89,7 @@ def test_a_card_whose_strands_are_all_elsewhere_has_their_mean() -> None:
     np.testing.assert_allclose(found, 0.5, rtol=1e-5)
 
 
-def test_light_is_that_of_strands_as_they_are_seen() -> None:
+def test_light_is_the_mean_weighted_by_visibility() -> None:
     """The mean is weighted by openness: a strand that sees three times as much of the sky is seen
     three times as often."""
     grid = np.stack([upright(-0.5), upright(0.7)])
@@ -100,7 +100,7 @@ def test_light_is_that_of_strands_as_they_are_seen() -> None:
     np.testing.assert_allclose(hidden, np.tile([0.0, 3.0, 0.0], (6, 1)), atol=1e-5)
 
 
-def test_depth_is_that_of_even_strands() -> None:
+def test_depth_is_the_extent_of_evenly_spread_strands() -> None:
     """Strands uniformly distributed over 0.04 m along the normal -y have this depth."""
     heights = np.random.default_rng(3).uniform(-0.03, 0.01, 4000)
     grid = np.stack([upright(0.0, y) for y in heights])
@@ -142,7 +142,7 @@ def test_each_card_is_as_open_as_its_own_strands(settings: CardSettings) -> None
     assert np.corrcoef(found, expected)[0, 1] > 0.97
 
 
-def test_guide_cards_have_that_of_the_strands_along_their_guides() -> None:
+def test_guide_cards_have_the_occlusion_of_the_strands_along_their_guides() -> None:
     rig = rig_of(300)
     groom = card_flow.card_groom(rig)
     settings = replace(CLUSTERS, source="guides")
@@ -154,7 +154,7 @@ def test_guide_cards_have_that_of_the_strands_along_their_guides() -> None:
     np.testing.assert_allclose(mesh.occlusion, shade[card_of_vertex(mesh)], rtol=1e-5)
 
 
-def test_other_grooms_shade_beside_that() -> None:
+def test_other_grooms_occlude_too() -> None:
     rig = rig_of(300)
     groom = card_flow.card_groom(rig)
     even = np.full(rig.strands.grid.shape[:2], 0.6, np.float32)

@@ -14,7 +14,7 @@ from hairloom.addon.errors import HairloomError
 
 
 @pytest.mark.parametrize(("vertices", "frames"), [(1, 2), (700, 5), (1025, 40), (5000, 900)])
-def test_a_shader_finds_what_was_put_in(vertices: int, frames: int) -> None:
+def test_a_shader_reads_back_the_stored_values(vertices: int, frames: int) -> None:
     """From a vertex's texel and the step to the next frame alone, rows counted from the top."""
     values = np.random.default_rng(vertices).normal(size=(vertices, frames, 3)).astype(np.float32)
     layout = motion_layout(vertices, frames, "x")
@@ -36,11 +36,11 @@ def test_texels_are_exact_enough_as_float32() -> None:
     assert np.abs(v % 1.0 - 0.5).max() < 0.01
 
 
-def test_little_is_wasted() -> None:
+def test_the_layout_wastes_few_texels() -> None:
     layout = motion_layout(4097, 60, "x")
     assert layout.width * layout.rows < 4097 * 1.01
 
 
-def test_too_much_is_told() -> None:
+def test_motion_that_fits_no_texture_is_refused() -> None:
     with pytest.raises(HairloomError, match="do not fit"):
         motion_layout(100_000, 1000, "hair.glb")
