@@ -1,13 +1,14 @@
 """Exported cards in programs without Hairloom: plain viewers, the page, the springs, shells, the
-levels of detail, and the exported atlases.
+levels of detail, their light, and the exported atlases.
 
-See `_engines_plain`, `_engines_page`, `_engines_springs`, `_engines_shells`, `_engines_levels` and
-`_engines_atlas` for what is compared with what.
+See `_engines_plain`, `_engines_page`, `_engines_light`, `_engines_springs`, `_engines_shells`,
+`_engines_levels` and `_engines_atlas` for what is compared with what.
 
 Exit code 1: a limit is missed.
 
 make bench NAME=engines                     all parts
-tools/bench.py engines page                 one part: plain, page, springs, shells, levels or atlas
+tools/bench.py engines page                 one part: plain, page, light, springs, shells, levels,
+                                            or atlas
 tools/bench.py engines atlas sintel few     some grooms, of atlas or levels
 """
 
@@ -18,6 +19,7 @@ from typing import Any
 
 from _engines_atlas import GROOMS_OF_ATLAS, atlas_figures
 from _engines_levels import GROOMS_OF_LEVELS, level_figures
+from _engines_light import light_figures
 from _engines_page import page_figures
 from _engines_plain import plain_figures
 from _engines_shells import shell_figures
@@ -28,6 +30,7 @@ REFERENCE = "our own picture of the strands, drawn as they come, under the same 
 PARTS = {
     "plain": plain_figures,
     "page": page_figures,
+    "light": light_figures,
     "springs": spring_figures,
     "shells": shell_figures,
 }
@@ -37,6 +40,7 @@ MAX_LIMITS = {
     "*plain_color_percent": 10.0,
     "*page_bytes": 6e6,
     "*page_errors": 0,
+    "light_*_percent": 30.0,
     "*fur_triangles": 8.0,
     "*fur_coverage_percent": 10.0,
     "*fur_color_percent": 10.0,

@@ -97,7 +97,7 @@ void main()
                                     card_axis,
                                     card_depth,
                                     deeper);
-    irradiance *= path.x < 0.0 ? card_occlusion : path.z;
+    irradiance *= path.x < 0.0 ? hair_lit_fraction(card_occlusion) : path.z;
     float level = 0.0;
 #  if MARSCHNER
     level = pixel_level(

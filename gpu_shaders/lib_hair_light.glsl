@@ -69,6 +69,17 @@ vec3 hair_light(vec3 tangent,
 #endif
 }
 
+// The fraction of a light without a shadow map that arrives. Scheuermann multiplies Kajiya-Kay's model by
+// the occlusion itself.
+float hair_lit_fraction(float occlusion)
+{
+#if MARSCHNER
+  return lit_fraction(occlusion);
+#else
+  return occlusion;
+#endif
+}
+
 #if WORLD
 // Light from the world that hair scatters to the eye. Marschner's model takes it as eight lights;
 // Kajiya-Kay's shades a matt surface, shadowed by ambient occlusion alone.

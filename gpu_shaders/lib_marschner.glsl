@@ -102,6 +102,19 @@ vec3 strand_color(Fibre fibre, vec3 absorption)
   return exp(-sqrt(max(absorption, 0.0)) * fibre.root.w);
 }
 
+// The fraction of light that strands scatter between them back to the side it comes from.
+vec3 scattered_color(Fibre fibre, vec3 absorption)
+{
+  vec3 color = strand_color(fibre, absorption);
+  return color / (1.0 + color);
+}
+
+// The fraction of a light without a shadow map that arrives where this fraction of ambient light does.
+float lit_fraction(float occlusion)
+{
+  return min(1.5 * occlusion, 1.0);
+}
+
 // The angles at a strand whose tangent is shifted by a noise in 0..1.
 vec3 strand_angles(vec3 tangent,
                    vec3 normal,
@@ -154,8 +167,8 @@ vec3 single_scattering(sampler3D longitudinal,
   return look_up(longitudinal, azimuthal, paths, angles, absorption, strengths, level);
 }
 
-// Light from one light to the eye: times irradiance, and times occlusion where tau is unknown, it is
-// radiance. Both noises are in 0..1; for the level see look_up.
+// Light from one light to the eye: times irradiance, and times lit_fraction where tau is
+// unknown, it is radiance. Both noises are in 0..1; for the level see look_up.
 vec3 marschner_light(sampler3D longitudinal,
                      sampler2D azimuthal,
                      sampler2D paths,
@@ -176,5 +189,5 @@ vec3 marschner_light(sampler3D longitudinal,
       longitudinal, azimuthal, paths, angles, sparkle_noise, absorption, fibre, shading, level);
   float bias = diffuse_bias(normal, to_light) * (tau < 0.0 ? 1.0 : exp(-tau));
   return scattered * cos(angles.x) * unscattered_fraction(normal, to_light, tau, shading) +
-         strand_color(fibre, absorption) * (shading.fake_scattering * bias / PI);
+         scattered_color(fibre, absorption) * (shading.fake_scattering * bias / PI);
 }

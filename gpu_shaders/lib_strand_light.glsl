@@ -102,7 +102,7 @@ vec3 strand_radiance(vec3 point,
 #ifdef OTHER_TAU
     path.x += path.x >= 0.0 && index < {{other_tau_lights}} ? other_tau[index] : 0.0;
 #endif
-    irradiance *= path.x < 0.0 ? occlusion : path.z;
+    irradiance *= path.x < 0.0 ? hair_lit_fraction(occlusion) : path.z;
     float level = 0.0;
 #if MARSCHNER
     level = strand_level(tangent, bend, normal, to_light, to_eye, shift_noise);

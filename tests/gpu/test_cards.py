@@ -128,6 +128,7 @@ def test_marschner_shades_cards_as_strands(
     )
     from hairloom.addon.shading.marschner.look import (
         fibre_of,
+        lit_fraction,
         marschner_light,
         strand_absorption,
         strand_color,
@@ -185,7 +186,9 @@ def test_marschner_shades_cards_as_strands(
         )
         for lamp in LIGHTS:
             irradiance = light_irradiance(lamp, point)
-            expected += occlusion * irradiance * lit(to_light=light_at(lamp, point)[0])
+            expected += (
+                lit_fraction(occlusion) * irradiance * lit(to_light=light_at(lamp, point)[0])
+            )
         assert picture[row, column, :3] == pytest.approx(expected, rel=0.01)
 
 

@@ -22,6 +22,7 @@ from hairloom.addon.shading.lights import Light, light_at
 from hairloom.addon.shading.marschner import tables as tables_module
 from hairloom.addon.shading.marschner.look import (
     fibre_of,
+    lit_fraction,
     marschner_light,
     root_absorption,
     strand_absorption,
@@ -100,7 +101,7 @@ def test_a_pixel_has_the_colour_of_the_reference(
         expected += irradiance * marschner_light(
             tables, tangent, normal, to_light, to_eye, shift, sparkle, absorption, shading
         )
-    expected *= occlusion[..., None]
+    expected *= lit_fraction(occlusion)[..., None]
     away = (point - CENTER) / np.linalg.norm(point - CENTER, axis=-1, keepdims=True)
     expected += hair_ambient(
         Environment(ambient),

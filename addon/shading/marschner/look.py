@@ -97,6 +97,23 @@ def strand_color(absorption: Floats) -> Floats:
     return absorption_color(absorption)
 
 
+def scattered_color(absorption: Floats) -> Floats:
+    """The fraction of light that strands scatter between them back to the side it comes from,
+    (..., 3); a fit to dual scattering, see docs/dev/shading.md."""
+    color = strand_color(absorption)
+    return color / (1.0 + color)
+
+
+def lit_fraction(occlusion: Floats) -> Floats:
+    """The fraction of a light without a shadow map that arrives where this fraction of ambient
+    light does, (...).
+
+    Hair that two thirds of the surroundings reach is on the outside, and fully lit; a fit to shadow
+    maps, see docs/dev/shading.md.
+    """
+    return np.minimum(1.5 * occlusion, 1.0)
+
+
 def unscattered_fraction(
     normal: Floats, to_light: Floats, tau: Floats | float, shading: ShadingSettings
 ) -> Floats:
@@ -154,7 +171,7 @@ def marschner_light(
     tau: Floats | float = -1.0,
 ) -> Floats:
     """Light of one lamp that hair sends to the eye, (..., 3): times irradiance it is radiance, and
-    also times occlusion where tau is unknown.
+    also times `lit_fraction` where tau is unknown.
 
     Args:
         tangent, normal, to_light, to_eye: unit vectors, (..., 3), in one space; the normal is that
@@ -169,4 +186,5 @@ def marschner_light(
     bias = diffuse_bias(normal, to_light) * np.exp(-np.maximum(tau, 0.0))
     shade = unscattered_fraction(normal, to_light, tau, shading)
     direct = scattered * (np.cos(angles[0]) * shade)[..., None]
-    return direct + strand_color(absorption) * (shading.fake_scattering * bias / np.pi)[..., None]
+    fake = scattered_color(absorption) * (shading.fake_scattering * bias / np.pi)[..., None]
+    return direct + fake

@@ -191,7 +191,7 @@ class MarschnerSettings(Settings):
         shown_when=when("shading.model", "marschner"),
     )
     fake_scattering: float = number(
-        0.6,
+        0.8,
         label="Fake Scattering",
         description="Amount of approximate scattering between strands, used while Shadows or "
         "Scattering are off",

@@ -215,11 +215,32 @@ vec3 hair_marschner(HairMaterial hair,
   vec3 absorption = hair_absorption(hair, place.along, place.base);
   vec3 single = hair_scattering(longitudinal, azimuthal, paths, angles, absorption, strengths);
   float facing = hair_diffuse(place.normal, to_light);
+  vec3 color = hair_color(hair, place.along, place.base);
   return single * cos(angles.x) * mix(1.0, facing, hair.volume_shadow) +
-         hair_color(hair, place.along, place.base) * (hair.fake_scattering * facing / HAIR_PI);
+         color / (1.0 + color) * (hair.fake_scattering * facing / HAIR_PI);
 }
 
-// Light from one lamp to the eye: multiplied by irradiance and vertex occlusion, it is radiance.
+// Fraction of a lamp's light that reaches hair with this vertex occlusion. Hair that two thirds of the
+// surroundings reach is on the outside and fully lit; fitted to Hairloom's shadow maps. Scheuermann
+// multiplies Kajiya-Kay's model by the occlusion itself.
+float hair_lit_fraction(HairMaterial hair, float occlusion)
+{
+  return hair.model == 1 ? min(1.5 * occlusion, 1.0) : occlusion;
+}
+
+// Radiance of hair in ambient light of radiance 1: multiplied by that and vertex occlusion. For Marschner's
+// model a fit to Hairloom's light from all directions, with its scattering between strands.
+vec3 hair_ambient(HairMaterial hair, float along, vec3 base)
+{
+  vec3 color = hair_color(hair, along, base);
+  if (hair.model == 1) {
+    vec3 scattered = pow(color, vec3(0.8));
+    color = 0.04 * hair.fibre_strengths.x + 3.0 * scattered / (1.0 + 1.3 * scattered);
+  }
+  return hair.ambient * color;
+}
+
+// Light from one lamp to the eye: multiplied by irradiance and hair_lit_fraction, it is radiance.
 vec3 hair_light(HairMaterial hair,
                 sampler2D longitudinal,
                 sampler2D azimuthal,

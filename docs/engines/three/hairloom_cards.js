@@ -539,7 +539,7 @@ void main() {
 #else
   HairMaterial hair = material();
   HairPlace here = place();
-  vec3 radiance = hair_color(hair, here.along, here.base) * ambient * ambientLightColor / HAIR_PI;
+  vec3 radiance = vec3(0.0);
 #if NUM_DIR_LIGHTS > 0
   for (int i = 0; i < NUM_DIR_LIGHTS; i++) {
     radiance += directionalLights[i].color *
@@ -554,7 +554,9 @@ void main() {
                 hair_light(hair, longitudinal, azimuthal, paths, here, normalize(away));
   }
 #endif
-  radiance *= occlusion_and_along.x;
+  float occlusion = occlusion_and_along.x;
+  radiance *= hair_lit_fraction(hair, occlusion);
+  radiance += occlusion * hair_ambient(hair, here.along, here.base) * ambientLightColor / HAIR_PI;
   float covered = IS_OPAQUE == 1 ? 1.0 : alpha;
   color = linearToOutputTexel(vec4(radiance, 1.0));
 #include <fog_fragment>

@@ -14,6 +14,7 @@ from hairloom.addon.shading.marschner.look import (
     fibre_of,
     marschner_light,
     pack_fibre,
+    scattered_color,
     strand_absorption,
     strand_color,
 )
@@ -149,7 +150,7 @@ def test_the_side_away_from_the_light_is_in_the_dark(tables: MarschnerTables) ->
         fake_scattering=1.0,
         **dict.fromkeys(("strength_r", "strength_tt", "strength_trt", "strength_higher"), 0.0),
     )
-    assert seen(x, only_scattered) == pytest.approx(strand_color(absorption) / np.pi)
+    assert seen(x, only_scattered) == pytest.approx(scattered_color(absorption) / np.pi)
 
 
 def test_the_packed_fibre_is_what_the_struct_says() -> None:

@@ -226,11 +226,32 @@ float3 hair_marschner(HairMaterial hair,
   float3 absorption = hair_absorption(hair, place.along, place.base);
   float3 single = hair_scattering(longitudinal, azimuthal, paths, angles, absorption, strengths);
   float facing = hair_diffuse(place.normal, to_light);
+  float3 color = hair_color(hair, place.along, place.base);
   return single * cos(angles.x) * lerp(1.0, facing, hair.volume_shadow) +
-         hair_color(hair, place.along, place.base) * (hair.fake_scattering * facing / HAIR_PI);
+         color / (1.0 + color) * (hair.fake_scattering * facing / HAIR_PI);
 }
 
-// Light from one lamp to the eye: multiplied by irradiance and vertex occlusion, it is radiance.
+// Fraction of a lamp's light that reaches hair with this vertex occlusion. Hair that two thirds of the
+// surroundings reach is on the outside and fully lit; fitted to Hairloom's shadow maps. Scheuermann
+// multiplies Kajiya-Kay's model by the occlusion itself.
+float hair_lit_fraction(HairMaterial hair, float occlusion)
+{
+  return hair.model == 1 ? min(1.5 * occlusion, 1.0) : occlusion;
+}
+
+// Radiance of hair in ambient light of radiance 1: multiplied by that and vertex occlusion. For Marschner's
+// model a fit to Hairloom's light from all directions, with its scattering between strands.
+float3 hair_ambient(HairMaterial hair, float along, float3 base)
+{
+  float3 color = hair_color(hair, along, base);
+  if (hair.model == 1) {
+    float3 scattered = pow(color, ((float3)(0.8)));
+    color = 0.04 * hair.fibre_strengths.x + 3.0 * scattered / (1.0 + 1.3 * scattered);
+  }
+  return hair.ambient * color;
+}
+
+// Light from one lamp to the eye: multiplied by irradiance and hair_lit_fraction, it is radiance.
 float3 hair_light(HairMaterial hair,
                 Texture2D longitudinal,
                 Texture2D azimuthal,

@@ -173,8 +173,7 @@ float4 fragment(CardPoint card) : SV_Target
     float alpha = coverage_of(card);
     HairMaterial hair = material_of_hair();
     HairPlace here = place_of_hair(card, to_eye_of(card));
-    float3 radiance = hair_color(hair, here.along, here.base) * _ambient * SampleSH(card.normal);
-    radiance += radiance_of(hair, here, GetMainLight(TransformWorldToShadowCoord(card.place)));
+    float3 radiance = radiance_of(hair, here, GetMainLight(TransformWorldToShadowCoord(card.place)));
 #if defined(_ADDITIONAL_LIGHTS)
     InputData inputData = (InputData)0;
     inputData.positionWS = card.place;
@@ -190,7 +189,10 @@ float4 fragment(CardPoint card) : SV_Target
         radiance += radiance_of(hair, here, GetAdditionalLight(lightIndex, card.place, half4(1, 1, 1, 1)));
     LIGHT_LOOP_END
 #endif
-    radiance = MixFog(radiance * card.occlusion_and_along.x, card.fog);
+    float occlusion = card.occlusion_and_along.x;
+    radiance *= hair_lit_fraction(hair, occlusion);
+    radiance += occlusion * hair_ambient(hair, here.along, here.base) * SampleSH(card.normal);
+    radiance = MixFog(radiance, card.fog);
     return float4(radiance, _MaxAlpha > 1.0 ? 1.0 : alpha);
 }
 
