@@ -417,7 +417,7 @@ def _no_gpu(_at: int, _path: Path, _verb: Any, _random: Any) -> Iterator[None]:
     nothing = {"backend": "", "renderer": "", "driver": ""}
     with (
         mock.patch.object(gpu_context, "gpu_in_use", lambda: nothing),
-        mock.patch.object(gpu_context, "_can_draw", lambda: False),
+        mock.patch.object(gpu_context, "can_draw", lambda: False),
     ):
         yield
 

@@ -47,7 +47,7 @@ def parameter_tables() -> str:
     parameters = importlib.import_module(f"{PACKAGE}.addon.parameters")
     docs = importlib.import_module(f"{PACKAGE}.addon.params.docs")
     return HEADING + "\n".join(
-        docs.table(settings) for settings in parameters.ALL_SETTINGS.values()
+        docs.parameter_table(settings) for settings in parameters.ALL_SETTINGS.values()
     )
 
 

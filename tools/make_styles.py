@@ -72,7 +72,9 @@ def rig_of(name: str, max_strands: int = 1_000_000) -> tuple[Any, bpy.types.Obje
     source = addon_module("blender.scene.source").read_source(hair, depsgraph)
     if setup.is_bust(head) and not setup.is_face_hairstyle(style):
         face = run_parts(setup.face_hair(head, source.head, depsgraph))
-        source = replace(source, strands=addon_module("strands.join").joined(source.strands, face))
+        source = replace(
+            source, strands=addon_module("strands.join").join_strands(source.strands, face)
+        )
     rig = addon_module("blender.colliders.rigs").MadeRig.of(hair, source).rig
     return rig, hair
 

@@ -249,8 +249,10 @@ def test_rebuilt_hair_arrives_with_its_old_light_and_keeps_newer_strokes(
     hair, session, get_depsgraph, monkeypatch
 ):
     """Combed hair first has the old light. Its own arrives later, and keeps newer strokes."""
-    opened, lit = threading.Event(), session_module.lit
-    monkeypatch.setattr(session_module, "lit", lambda *given: opened.wait(60.0) and lit(*given))
+    opened, lit = threading.Event(), session_module.with_full_light
+    monkeypatch.setattr(
+        session_module, "with_full_light", lambda *given: opened.wait(60.0) and lit(*given)
+    )
     monkeypatch.setattr(latest_job, "is_blocking", lambda: False)
     fields = session.groom.light.fields
     stroke(hair, range(5))

@@ -145,13 +145,13 @@ def test_gpu_buffers_of_strands_are_laid_out_in_the_thread(
 @pytest.fixture
 def light_gate(in_window, monkeypatch):
     """Computing light is held back until this event is set."""
-    opened, lit = threading.Event(), session_module.lit
+    opened, lit = threading.Event(), session_module.with_full_light
 
     def wait_and_light(groom, report):
         assert opened.wait(60.0)
         return lit(groom, report)
 
-    monkeypatch.setattr(session_module, "lit", wait_and_light)
+    monkeypatch.setattr(session_module, "with_full_light", wait_and_light)
     yield opened
     opened.set()
 

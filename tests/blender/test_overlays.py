@@ -185,7 +185,7 @@ def test_density_shows_the_cells_that_two_slices_cut(preview, get_depsgraph):
     assert (flat.min(axis=1) < 1e-5).all(), "each lies in a plane"
     np.testing.assert_allclose(np.sort(flat, axis=1)[:, 1:], 0.88 * cell, rtol=1e-3)
     middle = guides[:, 0].mean(axis=0)
-    points = guides.reshape(-1, 3) - middle + motion_lines.BEGIN * cell
+    points = guides.reshape(-1, 3) - middle + motion_lines.GRID_OFFSET * cell
     cells = np.unique(np.floor(points / cell), axis=0)
     cut = sum((cells[:, axis] == 0.0).sum() for axis in (0, 1))
     assert len(squares) == cut > 10

@@ -231,12 +231,12 @@ float3 hair_marschner(HairMaterial hair,
          color / (1.0 + color) * (hair.fake_scattering * facing / HAIR_PI);
 }
 
-// Fraction of a lamp's light that reaches hair with this vertex occlusion. Hair that two thirds of the
+// Fraction of a lamp's light that reaches hair with this vertex occlusion. Hair that 60 % of the
 // surroundings reach is on the outside and fully lit; fitted to Hairloom's shadow maps. Scheuermann
 // multiplies Kajiya-Kay's model by the occlusion itself.
 float hair_lit_fraction(HairMaterial hair, float occlusion)
 {
-  return hair.model == 1 ? min(1.5 * occlusion, 1.0) : occlusion;
+  return hair.model == 1 ? min(1.7 * occlusion, 1.0) : occlusion;
 }
 
 // Radiance of hair in ambient light of radiance 1: multiplied by that and vertex occlusion. For Marschner's
@@ -246,7 +246,7 @@ float3 hair_ambient(HairMaterial hair, float along, float3 base)
   float3 color = hair_color(hair, along, base);
   if (hair.model == 1) {
     float3 scattered = pow(color, ((float3)(0.8)));
-    color = 0.04 * hair.fibre_strengths.x + 3.0 * scattered / (1.0 + 1.3 * scattered);
+    color = 0.045 * hair.fibre_strengths.x + 3.5 * scattered / (1.0 + 1.6 * scattered);
   }
   return hair.ambient * color;
 }
