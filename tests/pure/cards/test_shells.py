@@ -195,7 +195,7 @@ def test_fewer_strands_show_where_hair_is_thin() -> None:
     is_kept = (strands.roots[:, 0] < 0.6 * SIDE) | (np.arange(strands.strand_count) % 4 == 0)
     made = built(strands.take(np.flatnonzero(is_kept)), square())
     plan, mesh = made.plan, made.levels[0].mesh
-    assert plan.thinned is not None
+    assert plan.thinned_pattern is not None
     count = np.bincount(plan.pattern)
     shown = count[mesh.tile[mesh.card] // plan.layers] / count[: len(plan.features)].mean()
     middle = mesh.positions[mesh.triangles].mean(axis=1)[:, 0]
@@ -204,13 +204,13 @@ def test_fewer_strands_show_where_hair_is_thin() -> None:
 
 
 def test_without_thinner_patterns_thin_skin_of_a_coarser_level_shows_whole_ones() -> None:
-    plan = replace(fur_on_the_square().plan, features=np.zeros((4, 2)), thinned=None)
+    plan = replace(fur_on_the_square().plan, features=np.zeros((4, 2)), thinned_pattern=None)
     one = np.tile(np.eye(3), (2, 1, 1))
     patches = Patches(
         np.zeros((2, 3)), one, np.ones(2), np.ones(2), np.zeros((2, 2)), square(1), np.arange(2)
     )
     np.testing.assert_array_equal(plan.pattern_of(patches), [0, 0])
-    np.testing.assert_array_equal(replace(plan, thinned=0).pattern_of(patches), [5, 5])
+    np.testing.assert_array_equal(replace(plan, thinned_pattern=0).pattern_of(patches), [5, 5])
 
 
 def test_automatic_makes_shells_of_short_hair_only() -> None:
