@@ -82,7 +82,7 @@ def fur_and_shells() -> tuple[Snapshot, Snapshot]:
     hair = replace(hair, occlusion=np.ones(len(hair.points), np.float32))
     mesh = made.rest.mesh.with_occlusion(np.ones_like(made.rest.mesh.occlusion))
     shells = replace(made.rest, mesh=mesh)
-    return hair, replace(without_strands(hair), cards=made.drawn(shells, settings))
+    return hair, replace(without_strands(hair), cards=made.with_drawing_settings(shells, settings))
 
 
 @pytest.mark.slow(
