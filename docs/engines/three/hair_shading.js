@@ -228,16 +228,18 @@ float hair_lit_fraction(HairMaterial hair, float occlusion)
   return hair.model == 1 ? min(1.7 * occlusion, 1.0) : occlusion;
 }
 
-// Radiance of hair in ambient light of radiance 1: multiplied by that and vertex occlusion. For Marschner's
-// model a fit to Hairloom's light from all directions, with its scattering between strands.
-vec3 hair_ambient(HairMaterial hair, float along, vec3 base)
+// Radiance of hair with this vertex occlusion, in ambient light of radiance 1. For Marschner's model a fit to
+// Hairloom's light from all directions, with scattering between strands: the brighter they are, the less it
+// matters how deep they lie.
+vec3 hair_ambient(HairMaterial hair, float along, vec3 base, float occlusion)
 {
   vec3 color = hair_color(hair, along, base);
   if (hair.model == 1) {
-    vec3 scattered = pow(color, vec3(0.8));
-    color = 0.045 * hair.fibre_strengths.x + 3.5 * scattered / (1.0 + 1.6 * scattered);
+    vec3 scattered = 3.1 * pow(occlusion, 0.6) * pow(color, vec3(0.9));
+    vec3 reflected = vec3(0.045 * hair.fibre_strengths.x * occlusion);
+    return hair.ambient * (reflected + scattered / (1.0 + 1.1 * scattered));
   }
-  return hair.ambient * color;
+  return hair.ambient * occlusion * color;
 }
 
 // Light from one lamp to the eye: multiplied by irradiance and hair_lit_fraction, it is radiance.

@@ -556,7 +556,7 @@ void main() {
 #endif
   float occlusion = occlusion_and_along.x;
   radiance *= hair_lit_fraction(hair, occlusion);
-  radiance += occlusion * hair_ambient(hair, here.along, here.base) * ambientLightColor / HAIR_PI;
+  radiance += hair_ambient(hair, here.along, here.base, occlusion) * ambientLightColor / HAIR_PI;
   float covered = IS_OPAQUE == 1 ? 1.0 : alpha;
   color = linearToOutputTexel(vec4(radiance, 1.0));
 #include <fog_fragment>

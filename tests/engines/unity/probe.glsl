@@ -52,7 +52,9 @@ vec4 probe(sampler2D longitudinal, sampler2D azimuthal, sampler2D paths, float a
   here.sparkle = probe_wave(at, 57.0);
   here.base = probe_vector(at, 58.0);
   vec3 sent = hair_light(hair, longitudinal, azimuthal, paths, here, probe_direction(at, 61.0));
-  sent = hair_lit_fraction(hair, probe_wave(at, 68.0)) * sent + hair_ambient(hair, here.along, here.base);
+  float occlusion = probe_wave(at, 68.0);
+  sent *= hair_lit_fraction(hair, occlusion);
+  sent += hair_ambient(hair, here.along, here.base, occlusion);
   float alpha = hair_view_compensated_alpha(probe_wave(at, 64.0), probe_direction(at, 65.0), tangent,
                                             here.to_eye, vec2(0.8, 0.1));
   return vec4(sent, alpha);

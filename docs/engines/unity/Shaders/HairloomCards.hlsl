@@ -191,7 +191,7 @@ float4 fragment(CardPoint card) : SV_Target
 #endif
     float occlusion = card.occlusion_and_along.x;
     radiance *= hair_lit_fraction(hair, occlusion);
-    radiance += occlusion * hair_ambient(hair, here.along, here.base) * SampleSH(card.normal);
+    radiance += hair_ambient(hair, here.along, here.base, occlusion) * SampleSH(card.normal);
     radiance = MixFog(radiance, card.fog);
     return float4(radiance, _MaxAlpha > 1.0 ? 1.0 : alpha);
 }
