@@ -40,7 +40,7 @@ MAX_LIMITS = {
     "*plain_color_percent": 10.0,
     "*page_bytes": 6e6,
     "*page_errors": 0,
-    "light_*_percent": 30.0,
+    "light_*_percent": 35.0,
     "*fur_triangles": 8.0,
     "*fur_coverage_percent": 10.0,
     "*fur_color_percent": 10.0,

@@ -112,7 +112,7 @@ vec3 scattered_color(Fibre fibre, vec3 absorption)
 // The fraction of a light without a shadow map that arrives where this fraction of ambient light does.
 float lit_fraction(float occlusion)
 {
-  return min(1.7 * occlusion, 1.0);
+  return min(2.0 * occlusion, 1.0);
 }
 
 // The angles at a strand whose tangent is shifted by a noise in 0..1.

@@ -34,8 +34,8 @@ SIZE, FIELD_OF_VIEW = 480, 30.0
 EYE, TARGET = (0.25, -0.45, 0.1), (0.0, 0.0, -0.01)
 TO_SUN = tuple(np.array([0.5, -0.7, 0.5]) / np.linalg.norm([0.5, -0.7, 0.5]))
 IRRADIANCE = 4.0
-#: Ambient radiance. None for Marschner, since the two differ by design: Hairloom lights all lobes
-#: with it, engines only the hair's colour.
+#: Ambient radiance. None for Marschner: engines have a fit to Hairloom's, see
+#: gpu/test_engine_light.py.
 AMBIENT = {"kajiya_kay": 0.3, "marschner": 0.0}
 NEAR, FAR = 0.05, 5.0
 

@@ -29,11 +29,6 @@ class Preferences:
     higher: Ints
     weight: Ints
 
-    def violated_weight(self, rank: Ints) -> int:
-        """Weight of the preferences that an order violates. rank: (count,) of each thing."""
-        is_lower_first = rank[self.lower] < rank[self.higher]
-        return int(np.abs(self.weight[is_lower_first != (self.weight > 0)]).sum())
-
     def for_groups(self, group_of: Ints, count: int) -> Preferences:
         """The same preferences for `count` larger things; `group_of`, (self.count,), maps each
         thing to its own."""

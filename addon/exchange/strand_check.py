@@ -48,7 +48,7 @@ def check_lines(facts: dict[str, Any]) -> list[str]:
     hand = ", left-handed" if facts["is_mirrored"] else ""
     return [
         f"{facts['strands']:,} strands, {facts['guides']:,} guides, {facts['points']:,} points",
-        f"Points a strand: {_range(facts['points_per_curve'], 'd')}",
+        f"Points per strand: {_range(facts['points_per_curve'], 'd')}",
         f"Groups: {_groups(facts)}",
         f"Width: {_range(facts['width'], '.3g')} {unit}",
         f"Length: {_range(facts['length'], '.3g')} {unit}",

@@ -41,5 +41,5 @@ class RevertsShape:
                     "lost, too"
                 )
                 report(self, "WARNING", f"{hair.name}: {text}. Undo brings it back")
-            report(self, "INFO", f"{hair.name} is as it was before it {self.read_if_unchanged}")
+            report(self, "INFO", f"{hair.name} is as it was before it {self.before}")
         return {"FINISHED"}

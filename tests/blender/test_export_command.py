@@ -203,7 +203,7 @@ def test_options_of_the_formats_reach_them(
     new_hair: Any, sphere: Any, tmp_path: Path, run: Callable[..., Any]
 ) -> None:
     new_hair(sphere)
-    options = ["--by-group", "--vertex-count", "16", "--fills-groups"]
+    options = ["--by-group", "--vertex-count", "16", "--pad-to-64"]
     options += ["--up", "Z", "--scale", "0.01"]
     report = run("--object", "Hair", *options, output="hair.tfx")
     assert report["outputs"] == ["hair_group0.tfx", "hair_group1.tfx"]

@@ -77,7 +77,7 @@ def test_a_view_keeps_no_picture_where_memory_is_short(
     picture = SimpleNamespace(
         begin=lambda: calls.append("begin"), release=lambda: calls.append("release"), marks=()
     )
-    view = SimpleNamespace(picture=picture, moves_to=lambda _: False, address=0)
+    view = SimpleNamespace(picture=picture, has_new_marks=lambda _: False, address=0)
     monkeypatch.setattr(gpu_memory, "exceeds_budget", lambda: is_short)
     overlay._draw_hair(view, None, [], ("drawn",))  # type: ignore[arg-type]
     assert calls == (["release"] if is_short else ["begin"])

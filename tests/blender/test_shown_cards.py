@@ -146,9 +146,9 @@ def test_in_a_window_textures_are_on_the_gpu_before_cards_are_shown(in_window, g
     assert drawn(session).cards.device is None, "in the background each draw has its own"
     hair.data.hairloom.cards.segment_count = 5
     cards = served(session)
-    before = cards.device.of("alpha")
+    before = cards.device.texture("alpha")
     cards.device.upload(cards)
-    assert cards.device.of("alpha") is before, "the draw uploads them again"
+    assert cards.device.texture("alpha") is before, "the draw uploads them again"
     assert (before.height, before.width) > cards.textures.alpha.shape, "it holds the mip maps too"
 
 

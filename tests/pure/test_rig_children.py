@@ -159,4 +159,4 @@ def test_cards_are_made_from_all_hair_but_baby_hair() -> None:
     np.testing.assert_array_equal(
         groom.root_normal, rig_flow.root_normals(rig)[groom.strand_numbers]
     )
-    np.testing.assert_array_equal(groom.strands.roots[groom.guides], rig.guide_grid[:, 0])
+    np.testing.assert_array_equal(groom.strands.roots[groom.guide_indices], rig.guide_grid[:, 0])

@@ -31,9 +31,9 @@ SHADING = {
 MATERIAL = {
     "fibre_are": "marschner only. root: absorption per radius, factor of a root of absorption; "
     "tip: the same for the tips, fraction of absorption in a grey strand; strengths of R, TT, TRT "
-    "and the rest. colour = exp(-root(absorption) factor). Light of lamps: times min(1, 1.7 "
+    "and the rest. colour = exp(-root(absorption) factor). Light of lamps: times min(1, 2 "
     "occlusion), and besides the lobes fake_scattering colour / (1 + colour) / pi times diffuse. "
-    "Ambient light: times 0.045 R occlusion + s / (1 + 1.1 s), s = 3.1 occlusion^0.6 colour^0.9",
+    "Ambient light: times 0.056 R occlusion + s / (1 + 1.1 s), s = 3.9 occlusion^0.6 colour^0.9",
     "tables_are": "marschner only; as stored, clamped, the lowest row first. longitudinal: column "
     "theta_i, row theta_r, each from -pi/2 to pi/2; M_R, M_TT, M_TRT, cos theta_d. azimuthal, "
     "paths: column cos theta_d from 0 to 1, row phi from 0 to pi; N_R, N_TT, N_TRT, N_rest and "

@@ -108,10 +108,10 @@ def lit_fraction(occlusion: Floats) -> Floats:
     """The fraction of a light without a shadow map that arrives where this fraction of ambient
     light does, (...).
 
-    Hair that 60 % of the surroundings reach is on the outside, and fully lit; a fit to shadow
+    Hair that half of the surroundings reach is on the outside, and fully lit; a fit to shadow
     maps, see docs/dev/shading.md.
     """
-    return np.minimum(1.7 * occlusion, 1.0)
+    return np.minimum(2.0 * occlusion, 1.0)
 
 
 def unscattered_fraction(

@@ -220,12 +220,12 @@ vec3 hair_marschner(HairMaterial hair,
          color / (1.0 + color) * (hair.fake_scattering * facing / HAIR_PI);
 }
 
-// Fraction of a lamp's light that reaches hair with this vertex occlusion. Hair that 60 % of the
+// Fraction of a lamp's light that reaches hair with this vertex occlusion. Hair that half of the
 // surroundings reach is on the outside and fully lit; fitted to Hairloom's shadow maps. Scheuermann
 // multiplies Kajiya-Kay's model by the occlusion itself.
 float hair_lit_fraction(HairMaterial hair, float occlusion)
 {
-  return hair.model == 1 ? min(1.7 * occlusion, 1.0) : occlusion;
+  return hair.model == 1 ? min(2.0 * occlusion, 1.0) : occlusion;
 }
 
 // Radiance of hair with this vertex occlusion, in ambient light of radiance 1. For Marschner's model a fit to
@@ -235,8 +235,8 @@ vec3 hair_ambient(HairMaterial hair, float along, vec3 base, float occlusion)
 {
   vec3 color = hair_color(hair, along, base);
   if (hair.model == 1) {
-    vec3 scattered = 3.1 * pow(occlusion, 0.6) * pow(color, vec3(0.9));
-    vec3 reflected = vec3(0.045 * hair.fibre_strengths.x * occlusion);
+    vec3 scattered = 3.9 * pow(occlusion, 0.6) * pow(color, vec3(0.9));
+    vec3 reflected = vec3(0.056 * hair.fibre_strengths.x * occlusion);
     return hair.ambient * (reflected + scattered / (1.0 + 1.1 * scattered));
   }
   return hair.ambient * occlusion * color;

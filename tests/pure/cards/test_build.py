@@ -151,7 +151,7 @@ def test_guides_show_the_strands_that_lie_along_them() -> None:
     """Each tile shows the strands of its guides. Where there are only guides, tufts are made
     instead."""
     groom, settings = _groom(falling(1500)), CardSettings(source="guides")
-    grid, guides = groom.strands.grid, groom.guides
+    grid, guides = groom.strands.grid, groom.guide_indices
     assert len(guides) < len(grid)
     baked, plan = uncut(groom, settings, BAKED)
     made, none = uncut(groom, settings, MADE)
@@ -167,7 +167,7 @@ def test_guides_show_the_strands_that_lie_along_them() -> None:
         own = plan.strands[plan.tile_of_strand == tile]
         shown = np.abs(grid[guides][:, 0] - strip[0]).sum(axis=1).argmin()
         assert set(card[own].tolist()) == {shown}
-    alone = replace(groom, strands=groom.strands.take(guides), guides=np.arange(len(guides)))
+    alone = replace(groom, strands=groom.strands.take(guides), guide_indices=np.arange(len(guides)))
     parts = {name: getattr(groom, name)[guides] for name in ("radius", "root_normal")}
     cards, plan = uncut(replace(alone, **parts), settings, BAKED)
     assert plan is None

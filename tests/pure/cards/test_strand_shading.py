@@ -148,7 +148,7 @@ def test_guide_cards_have_the_occlusion_of_the_strands_along_their_guides() -> N
     settings = replace(CLUSTERS, source="guides")
     cards = card_of_strand(groom, settings)
     assert np.bincount(cards).max() > 1
-    shade = np.random.default_rng(1).random(len(groom.guides))
+    shade = np.random.default_rng(1).random(len(groom.guide_indices))
     own = np.tile(shade[cards, None], groom.strands.grid.shape[1])
     mesh = built(replace(groom, occlusion=own.astype(np.float32)), settings).finest
     np.testing.assert_allclose(mesh.occlusion, shade[card_of_vertex(mesh)], rtol=1e-5)

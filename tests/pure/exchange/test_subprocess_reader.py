@@ -55,7 +55,7 @@ def test_a_script_has_the_file_the_result_and_all_packages(path: Path) -> None:
         path,
         "import os, sys, numpy\n"
         "open(sys.argv[-1], 'w').write(open(sys.argv[-2]).read() + os.environ['MORE'])\n",
-        settings={"MORE": " and more"},
+        environment={"MORE": " and more"},
     )
     assert path.with_name("result").read_text() == "content and more"
 

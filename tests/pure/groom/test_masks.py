@@ -262,7 +262,7 @@ def test_what_is_painted_on_curves_is_mixed_as_their_points_are() -> None:
     numbers = StrandMask(np.arange(own.strand_count, dtype=np.float32)[:, None])
     between = Places(None, None, np.array([[2, 6]]), np.array([[0.25, 0.75]]))
     assert numbers.at(between) == pytest.approx(5.0)
-    assert numbers.of(np.array([4, 9])).at(Places.of_strands(own, np.array([1]))) == 9.0
+    assert numbers.for_strands(np.array([4, 9])).at(Places.of_strands(own, np.array([1]))) == 9.0
 
 
 def test_children_take_what_is_painted_on_their_guides() -> None:
