@@ -25,6 +25,7 @@ from _cards_strands import _shown
 from _engines_atlas import _lit
 from _engines_page import OUTPUT, REPOSITORY, SANDBOX
 
+import hairloom
 from hairloom.addon.blender.base.images import contact_sheet, write_png
 from hairloom.addon.blender.cards.build import CardInputs, read_inputs
 from hairloom.addon.blender.cards.files import CardOutput, write_cards
@@ -79,6 +80,8 @@ STAGE = """(() => {
 
 def light_figures() -> dict[str, Any]:
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    if not hasattr(bpy.types.Scene, "hairloom"):
+        hairloom.register()
     bpy.ops.hairloom.add_hairstyle(style=STYLE, plays=False)
     inputs = read_inputs(bpy.context.object, bpy.context.evaluated_depsgraph_get())[0]
     found: dict[str, Any] = {}

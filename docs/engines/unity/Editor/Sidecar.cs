@@ -192,7 +192,7 @@ namespace Hairloom
         public float secondary_strength = 1.0f;
         public float secondary_exponent = 60.0f;
         public float secondary_shift = -0.2f;
-        public float fake_scattering = 0.5f;
+        public float fake_scattering = 0.8f;
         public float volume_shadow = 1.0f;
     }
 

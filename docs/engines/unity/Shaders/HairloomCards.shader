@@ -32,7 +32,7 @@ Shader "Hairloom/Cards"
         _fibre_root ("Fibre Root", Vector) = (0, 0, 0, 1)
         _fibre_tip ("Fibre Tip", Vector) = (0, 0, 0, 0)
         _fibre_strengths ("Fibre Strengths", Vector) = (1, 1, 1, 1)
-        _fake_scattering ("Fake Scattering", Float) = 0.5
+        _fake_scattering ("Fake Scattering", Float) = 0.8
         _volume_shadow ("Volume Shadow", Float) = 1
         _base_gain ("Base Gain", Float) = 1
         _facing_range ("Mean and Minimum Facing", Vector) = (0, 0, 0, 0)
