@@ -1,6 +1,6 @@
 // Hair among hair: deposit of other hair's CVs into the cells around the groom, vertex stage.
 //
-// Twin of others_in in addon/dynamics/hair_grid.py.
+// Twin of neighbour_sums in addon/dynamics/hair_grid.py.
 #include "lib_strand_texel.glsl"
 #include "lib_hair_grid.glsl"
 

@@ -5,7 +5,7 @@
 #include "lib_strand_texel.glsl"
 #include "lib_hair_grid.glsl"
 
-// Twin of own_part: the CV's own part of the density (x), and its gradient (yzw).
+// Twin of own_contribution: the CV's own part of the density (x), and its gradient (yzw).
 vec4 own_part(vec3 part)
 {
   vec3 far = min(part, 1.0 - part);

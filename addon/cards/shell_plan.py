@@ -170,7 +170,7 @@ def _pattern_of(patches: Patches, features: Floats, step: Ints) -> Ints:
 
 
 def _thin_steps(patches: Patches, patch_of_root: Ints, density: float) -> Ints:
-    """Number of _BORDERS that each patch's density is below, (patch_count,)."""
+    """Number of _THIN_DENSITIES that each patch's density is below, (patch_count,)."""
     count = np.bincount(patch_of_root, minlength=len(patches.area))
     expected = density * patches.area
     is_thin = count < expected - _CHANCE_DEVIATIONS * expected**0.5

@@ -250,7 +250,7 @@ def _grow_segments(
 def _stretched_over_hollows(grid: Floats, plan: _Plan) -> Floats:
     """The strands stretched over hollows of the skin, which hair bridges, as around an ear.
 
-    Points only move away from the skin; `_laid` restores the lengths.
+    Points only move away from the skin; `_with_restored_lengths` restores the lengths.
     """
     grid = grid.copy()
     normal = plan.skin.nearest_normal(grid[:, 1:].reshape(-1, 3)).reshape(grid[:, 1:].shape)

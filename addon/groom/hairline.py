@@ -31,8 +31,8 @@ def nearness_to_border(
 def nearness_from_neighbours(
     places: Floats, among: Floats, index: Ints, distance: Floats
 ) -> Floats:
-    """`nearness_to_border` from the nearest roots of each place, at least AROUND of them, as given
-    by `nearest_points`; 0 with fewer."""
+    """`nearness_to_border` from the nearest roots of each place, at least NEIGHBOURS of them, as
+    given by `nearest_points`; 0 with fewer."""
     if index.shape[1] < NEIGHBOURS:
         return np.zeros(len(places))
     aside = np.linalg.norm(among[index[:, :NEIGHBOURS]].mean(axis=1) - places, axis=1)

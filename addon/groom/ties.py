@@ -35,7 +35,8 @@ class Tie:
 class TipSurface:
     """A surface that holds the tips near to it; world space at rest.
 
-    weight: (vertex_count,), it holds tips only where this is HOLDING or more; None: everywhere.
+    weight: (vertex_count,), it holds tips only where this is MIN_HOLDING_WEIGHT or more; None:
+        everywhere.
     """
 
     name: str

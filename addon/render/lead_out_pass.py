@@ -8,7 +8,7 @@ in the layouts of `strand_layout`.
     clearances    R32F: distance that each point keeps where its root carries it [m]
     states        RGBA32F: state of each strand, x whether it is led out, see lead_out.comp.glsl
     near_strands, near_counts RGBA32F: strands that are too near, see lead_out.comp.glsl
-    segment_bends RGBA32F: xyz bend of the segment that ends at a point, see lead_out.Leans
+    segment_bends RGBA32F: xyz bend of the segment that ends at a point, see lead_out.Deflections
     led_points    RGBA32F: xyz position of points that are led out [m, world]
     led_texels    RG32F: texels of points that were led out earlier
     cv_points     RGBA32F: xyz position now [m, world], changed in place

@@ -154,7 +154,7 @@ def _have_knots(counts: Ints, shapes: CurveShapes) -> Bools:
 
 def _pieces(points: Floats, offsets: Ints) -> Ints:
     """The number of pieces that each segment of a polygon is cut into, (curve_count,), so that a
-    smooth curve through their ends rounds corners by no more than _ROUNDED of its length."""
+    smooth curve through their ends rounds corners by no more than _MAX_ROUNDING of its length."""
     counts, found = np.diff(offsets), np.ones(len(offsets) - 1, np.int64)
     for count in np.unique(counts[counts > 2]).tolist():
         chosen = np.flatnonzero(counts == count)

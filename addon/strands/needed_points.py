@@ -12,7 +12,7 @@ from .resample import positions_at, resample
 from .result_cache import NO_CACHE, ResultCache
 from .strand_set import StrandSet
 
-#: Maximum number of points of a strand: with 410, 20 turns of a coil lose LOST.
+#: Maximum number of points of a strand: with 410, 20 turns of a coil lose MAX_LENGTH_LOSS.
 MAX_POINTS = 512
 #: Fraction of its length that a strand may lose.
 MAX_LENGTH_LOSS = 0.005
@@ -39,9 +39,10 @@ def with_needed_points(
 ) -> StrandSet:
     """The same strands with no more points than their shapes need, and at least `min_points` each.
 
-    A strand is resampled evenly to as few points as it takes to lose at most LOST of its length and
-    to stray by at most STRAY of the median length of all. If that is no fewer than it has, it keeps
-    its own points; with fewer than `min_points` of them it gets more in between.
+    A strand is resampled evenly to as few points as it takes to lose at most MAX_LENGTH_LOSS of its
+    length and to stray by at most MAX_DEVIATION of the median length of all. If that is no fewer
+    than it has, it keeps its own points; with fewer than `min_points` of them it gets more in
+    between.
 
     Args:
         cache: results of the last call, used if all strands have the same point count.

@@ -45,12 +45,12 @@ facts["difference"] = float(np.abs(fast.position - slow.position).max())
 """,
     "A look parameter": """
 from hairloom.addon.parameters import ALL_SETTINGS
-from hairloom.addon.params.docs import table
+from hairloom.addon.params.docs import parameter_table
 from hairloom.addon.params.glsl import struct_source
 
 shading = ALL_SETTINGS["shading"]
 facts["glsl"] = struct_source(shading, "ShadingSettings")
-facts["page"] = table(shading)
+facts["page"] = parameter_table(shading)
 facts["halo"] = shading.from_dict({"halo": 0.5}, "test").halo
 facts["is_property"] = "halo" in bpy.data.hair_curves.new("Hair").hairloom.shading.bl_rna.properties
 (row,) = (each for each in shading.parameters() if each.name == "halo")
@@ -68,7 +68,7 @@ data.hairloom.glitter.amount = 0.25
 settings = GroomSettings.of(hair, bpy.context.evaluated_depsgraph_get())
 facts["amount"] = settings[GlitterSettings].amount
 facts["glsl"] = struct_source(GlitterSettings, "GlitterSettings")
-facts["page"] = table(GlitterSettings)
+facts["page"] = parameter_table(GlitterSettings)
 facts["panels"] = [name for name in dir(bpy.types) if "glitter" in name.lower()]
 try:
     GlitterSettings.from_dict({"amount": 2.0}, "a preset")
