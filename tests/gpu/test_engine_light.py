@@ -30,7 +30,7 @@ MELANINS = (0.0, 0.25, 0.5, 0.75, 1.0)
 PROBE = """
 vec4 result_of_probe;
 
-// at.x: 0.05 times 64 places, each a red absorption of 0 to 3 and one of four occlusions
+// at.x: 0.05 times the number of a place, with an absorption of 0 to 3 and one of four occlusions
 vec4 probe(vec2 at)
 {
   float number = at.x / 0.05;
@@ -101,8 +101,9 @@ def light_of_hair(melanin: float, occlusion: float) -> np.ndarray:
 def test_ambient_light_of_engines_is_that_of_dual_scattering(
     in_engines: np.ndarray, occlusion: float
 ) -> None:
-    """Within a third for all natural colours, where the colour of a mass of hair alone would have a
-    tenth of the light. Real hair, which the formula is fitted to, is not a flat surface."""
+    """Within a factor of 1.5 for all natural colours. The colour of a mass of brown hair alone
+    would have less than a quarter of the light. Real hair, which the formula is fitted to, is no
+    flat surface."""
     here = in_engines[np.abs(in_engines[:, 1] - occlusion) < 0.01]
     order = np.argsort(here[:, 0])
     for melanin in MELANINS:

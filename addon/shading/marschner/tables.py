@@ -154,12 +154,12 @@ def lobe_transmittance(paths: Floats, absorption: Floats) -> Floats:
     Where the fitted parabola would rise again, it stays at its minimum.
     """
     l_tt, l_trt, v_trt, l_rest = np.moveaxis(paths[..., None], -2, 0)
-    path_length = np.minimum(absorption, l_trt / np.maximum(v_trt, _MIN_VARIANCE))
+    limited_absorption = np.minimum(absorption, l_trt / np.maximum(v_trt, _MIN_VARIANCE))
     return np.stack(
         [
             np.ones(np.broadcast_shapes(l_tt.shape, absorption.shape)),
             np.exp(-absorption * l_tt),
-            np.exp(-path_length * (l_trt - 0.5 * path_length * v_trt)),
+            np.exp(-limited_absorption * (l_trt - 0.5 * limited_absorption * v_trt)),
             np.exp(-absorption * l_rest),
         ],
         axis=-2,
