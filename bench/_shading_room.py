@@ -97,9 +97,9 @@ class CyclesRoom:
         self._body = self._new("Body", mesh)
         self._body.visible_shadow = casts_shadow
 
-    def leave_out_body(self, is_left_out: bool) -> None:
+    def leave_out_body(self, is_holdout: bool) -> None:
         """Whether the body is a holdout, so that alpha is the coverage of strands."""
-        self._body.is_holdout = is_left_out
+        self._body.is_holdout = is_holdout
 
     def look(self, camera: Camera) -> None:
         """See through a perspective camera of ours, in square pictures."""

@@ -140,7 +140,7 @@ def main() -> int:
     arrive("preview")
     ticks, begin = 0, time.perf_counter()
     while previews.previews[session.uid].phase is Phase.WAITING:
-        stops.timed("waiting" if not fields.are_made() else "play begins", tick)
+        stops.timed("waiting" if not fields.are_ready() else "play begins", tick)
         time.sleep(1.0 / RATE)
         ticks += 1
     waited = time.perf_counter() - begin

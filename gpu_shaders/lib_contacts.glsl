@@ -41,7 +41,7 @@ struct Posed {
   vec4 own;         // of a field xyz nodes, w row; of round solids x the first, y how many, w -1
   vec4 inverse_before[3];  // rows of world to object at the substep's begin
   vec4 sweep;  // x [m^2] squared length up to which paths need not be followed; y above 0: segments
-              // collide; z the smallest scale; w [m] its swelling
+              // collide; z the smallest scale; w [m] its deformation
 };
 
 vec4 moment_texel(int substep, int collider, int texel)

@@ -75,7 +75,7 @@ def rig_of(name: str, max_strands: int = 1_000_000) -> tuple[Any, bpy.types.Obje
         source = replace(
             source, strands=addon_module("strands.join").join_strands(source.strands, face)
         )
-    rig = addon_module("blender.colliders.rigs").MadeRig.of(hair, source).rig
+    rig = addon_module("blender.colliders.rigs").CachedRig.of(hair, source).rig
     return rig, hair
 
 

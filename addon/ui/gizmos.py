@@ -15,7 +15,7 @@ from mathutils import Euler, Matrix, Vector
 
 from ..blender.base.objects import objects_in
 from ..blender.colliders.obstacle_reader import sized_axis
-from ..blender.colliders.obstacles import sources_of
+from ..blender.colliders.obstacles import collider_objects
 from ..blender.colliders.ties import ties_of
 from ..blender.preview import previews
 from ..blender.scene.fin_modifier import has_fins
@@ -93,7 +93,7 @@ class HAIRLOOM_GGT_empty_size(_OfActive, bpy.types.GizmoGroup):
     @staticmethod
     def has_handles(obj: bpy.types.Object, context: bpy.types.Context) -> bool:
         return obj.type == "EMPTY" and any(
-            obj in ties_of(owner) or obj in sources_of(owner, None)
+            obj in ties_of(owner) or obj in collider_objects(owner, None)
             for owner in _simulated_in(context.view_layer)
         )
 

@@ -17,7 +17,7 @@ from ..blender.base.file_names import file_stem, files_of, in_own_folder
 from ..blender.base.objects import without_hidden
 from ..blender.base.outcome import Outcome, report
 from ..blender.cards.files import CardExport, CardOutput, FileSteps
-from ..blender.preview.previews import made_rigs, previews
+from ..blender.preview.previews import previewed_rigs, previews
 from ..blender.properties.groups import operator_properties
 from ..blender.properties.properties import settings_of
 from ..cards.export_settings import OF_MOTION, CardExportSettings
@@ -121,7 +121,7 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
             self._output(path, hair.name),
             levels=self.levels if self.own_levels else None,
             frames=self._frames(hair),
-            known=tuple(made_rigs().values()),
+            cached_rigs=tuple(previewed_rigs().values()),
             kept=previews.built_cards,
         )
 

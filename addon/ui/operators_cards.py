@@ -12,7 +12,7 @@ from ..blender.cards.build import counts_line, order_line
 from ..blender.cards.edits import read_edits
 from ..blender.cards.made_objects import card_objects
 from ..blender.cards.object import CardObjectJob
-from ..blender.preview.previews import made_rigs, previews
+from ..blender.preview.previews import previewed_rigs, previews
 from ..cards.settings import CardSettings
 from ..errors import HairloomError
 from .drawing import draw_button
@@ -94,9 +94,9 @@ def _built(
 ) -> Steps[None]:
     """Make the cards of the active hair, and report it."""
     hair = chosen_hair(context)[0]
-    depsgraph, known = context.evaluated_depsgraph_get(), tuple(made_rigs().values())
+    depsgraph, cached_rigs = context.evaluated_depsgraph_get(), tuple(previewed_rigs().values())
     job = CardObjectJob(
-        hair, depsgraph, keep_edits=keep_edits, known=known, kept=previews.built_cards
+        hair, depsgraph, keep_edits=keep_edits, cached_rigs=cached_rigs, kept=previews.built_cards
     )
     yield Progress("Reading the hair")
     job.write((yield from threaded(job.building())))

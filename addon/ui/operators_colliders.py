@@ -46,7 +46,7 @@ class HAIRLOOM_OT_fit_spheres(LongWork, bpy.types.Operator):
         assert mesh is not None
         fitting = spheres.fit_spheres_to(mesh, context, settings_of(self, SphereFitSettings))
         fitted = yield from steps_of_parts(fitting)
-        for hair in spheres.grown_on(mesh, context.view_layer):
+        for hair in spheres.hair_on(mesh, context.view_layer):
             spheres.use_spheres(hair, fitted.collection, context.scene)
         if self.replace_mesh:
             spheres.replace_mesh(mesh, fitted.collection)

@@ -8,9 +8,9 @@ import bpy
 from bpy.props import EnumProperty
 
 from ..blender.base.outcome import Outcome
-from ..blender.colliders.rigs import MadeRig
+from ..blender.colliders.rigs import CachedRig
 from ..blender.preview.bake import is_bakeable
-from ..blender.preview.previews import made_rigs
+from ..blender.preview.previews import previewed_rigs
 from ..blender.strands.export_check import ExportCheck
 from ..exchange.strand_export_settings import StrandExportSettings
 from ..exchange.strand_formats import STRAND_FORMATS, StrandFormat
@@ -36,9 +36,9 @@ def end(of: ExportCheck | None = None) -> None:
         _check = None
 
 
-def made() -> tuple[MadeRig, ...]:
+def cached_rigs() -> tuple[CachedRig, ...]:
     """Rigs that were made by the open dialog and by previews."""
-    return (*(() if _check is None else _check.made_rigs), *made_rigs().values())
+    return (*(() if _check is None else _check.cached_rigs), *previewed_rigs().values())
 
 
 def count() -> int:
@@ -128,7 +128,7 @@ class HAIRLOOM_OT_check_export(LongWork, bpy.types.Operator):
         return cls.is_free() and needs_hair(cls, context)
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
-        own = ExportCheck.of(writable(chosen_hair(context)), made_rigs())
+        own = ExportCheck.of(writable(chosen_hair(context)), previewed_rigs())
         reading = own.read_steps(context.evaluated_depsgraph_get(), *_choice(self.engine))
         yield from steps_of_parts(reading)
         begin(own)

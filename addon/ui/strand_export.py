@@ -15,8 +15,8 @@ from ..blender.bakes.bake_settings import frame_range
 from ..blender.base.file_names import file_stem, files_of
 from ..blender.base.objects import without_hidden
 from ..blender.base.outcome import Outcome, report
-from ..blender.colliders.rigs import MadeRig
-from ..blender.preview.previews import made_rigs
+from ..blender.colliders.rigs import CachedRig
+from ..blender.preview.previews import previewed_rigs
 from ..blender.properties.properties import property_annotations, settings_of
 from ..blender.strands.export_check import ExportCheck
 from ..blender.strands.strand_export import StrandExport
@@ -102,7 +102,7 @@ class StrandExportOperator(LongWork, ExportHelper):
         if hair and not self.filepath:
             folder = Path(bpy.data.filepath).parent if bpy.data.filepath else Path()
             self.properties.filepath = str(folder / (file_stem(hair[0].name) + self.filename_ext))
-        export_check.begin(ExportCheck.of(hair, made_rigs()))
+        export_check.begin(ExportCheck.of(hair, previewed_rigs()))
         self._refresh(context)
         return super().invoke(context, event)
 
@@ -115,9 +115,9 @@ class StrandExportOperator(LongWork, ExportHelper):
         return export_check.refresh(context, self.kind, settings_of(self, StrandExportSettings))
 
     def steps(self: Any, context: bpy.types.Context) -> Steps[None]:
-        made = export_check.made()
+        cached_rigs = export_check.cached_rigs()
         export_check.end()
-        plans = self._plans(context, made)
+        plans = self._plans(context, cached_rigs)
         for done, (path, plan) in enumerate(plans):
             if done:
                 self.unharmed = f"{done:,} of {len(plans):,} files are written"
@@ -131,7 +131,7 @@ class StrandExportOperator(LongWork, ExportHelper):
         super().cancel(context)
 
     def _plans(
-        self, context: bpy.types.Context, known: tuple[MadeRig, ...]
+        self, context: bpy.types.Context, cached_rigs: tuple[CachedRig, ...]
     ) -> list[tuple[Path, StrandExport]]:
         """The files to write, with their contents: one for all hair, or one for each."""
         hair, path = self._hair(context), Path(bpy.path.abspath(self.filepath))
@@ -147,7 +147,7 @@ class StrandExportOperator(LongWork, ExportHelper):
                     self.kind,
                     settings_of(self, StrandExportSettings),
                     frames=self._frames(context.scene),
-                    known=known,
+                    cached_rigs=cached_rigs,
                 ),
             )
             for file, part in zip(files, parts, strict=True)

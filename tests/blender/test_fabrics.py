@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from waiting import wait_until
 
-from hairloom.addon.blender.colliders.fields import NotMadeYetError
+from hairloom.addon.blender.colliders.fields import NotReadyError
 from hairloom.addon.blender.preview import fins, previews
 from hairloom.addon.blender.preview import preview as preview_module
 from hairloom.addon.blender.preview.phases import Phase
@@ -60,7 +60,7 @@ def test_what_is_stopped_meanwhile_does_not_play(sheet, get_depsgraph, monkeypat
 
 def test_a_mesh_that_moves_is_waited_for_once(sheet, get_depsgraph):
     session = fins.start(sheet, get_depsgraph())
-    with pytest.raises(NotMadeYetError):
+    with pytest.raises(NotReadyError):
         session.play(get_depsgraph(), blocking=False)
     sheet.location.x = 0.3
     bpy.context.view_layer.update()
@@ -73,7 +73,7 @@ def test_a_mesh_that_moves_is_waited_for_once(sheet, get_depsgraph):
 
 def test_a_changed_mesh_is_rebuilt_and_an_unchanged_one_is_kept(sheet, get_depsgraph):
     session = fins.start(sheet, get_depsgraph())
-    with pytest.raises(NotMadeYetError):
+    with pytest.raises(NotReadyError):
         session.play(get_depsgraph(), blocking=False)
     wait_until(lambda: session.is_made)
     session.play(get_depsgraph(), blocking=False)
@@ -82,7 +82,7 @@ def test_a_changed_mesh_is_rebuilt_and_an_unchanged_one_is_kept(sheet, get_depsg
     assert session.state.fabric is first
     sheet.vertex_groups["Pins"].add([60], 1.0, "REPLACE")
     bpy.context.view_layer.update()
-    with pytest.raises(NotMadeYetError):
+    with pytest.raises(NotReadyError):
         session.play(get_depsgraph(), blocking=False)
     wait_until(lambda: session.is_made)
     session.play(get_depsgraph(), blocking=False)

@@ -46,7 +46,7 @@ def gate(monkeypatch):
 
 
 def until_made():
-    wait_until(fields.are_made)
+    wait_until(fields.are_ready)
 
 
 def surface_of(obj, get_depsgraph):
@@ -55,7 +55,7 @@ def surface_of(obj, get_depsgraph):
 
 def test_a_field_is_the_same_whoever_makes_it_and_is_made_once(sphere, get_depsgraph, extension):
     surface = surface_of(sphere, get_depsgraph)
-    with pytest.raises(fields.NotMadeYetError):
+    with pytest.raises(fields.NotReadyError):
         fields.field_of(surface, COARSE, place="Head", blocking=False)
     beside = fields.field_of(surface, COARSE, place="Head")
     alone = DistanceField.from_surface(surface, COARSE)
@@ -86,13 +86,15 @@ def test_only_the_latest_fields_are_cached(sphere, get_depsgraph, extension):
 
 def fields_wanted():
     """Settings for one more field than the cache keeps."""
-    return [DynamicsSettings(collider_resolution=16 + number) for number in range(fields.KEPT + 1)]
+    return [
+        DynamicsSettings(collider_resolution=16 + number) for number in range(fields.MAX_CACHED + 1)
+    ]
 
 
 def made_beside(surface):
     """Build more fields than are kept, as previews do; returns a weak reference to the oldest."""
     for settings in fields_wanted():
-        with pytest.raises(fields.NotMadeYetError):
+        with pytest.raises(fields.NotReadyError):
             fields.field_of(surface, settings, place="Head", blocking=False)
     until_made()
     made = [
@@ -178,14 +180,14 @@ def test_more_meshes_than_are_kept_are_all_waited_for(new_hair, sphere, get_deps
     hair.hairloom.dynamics.collider_resolution = 16
     colliders = bpy.data.collections.new("Colliders")
     bpy.context.scene.collection.children.link(colliders)
-    for number in range(fields.KEPT + 2):
+    for number in range(fields.MAX_CACHED + 2):
         bpy.ops.mesh.primitive_cube_add(size=0.02, location=(1.0 + number, 0.0, 0.0))
         colliders.objects.link(bpy.context.object)
     hair.hairloom.collider_collection = colliders
     session = previews.start(hair, get_depsgraph())
     previews.play(get_depsgraph(), blocking=False)
     wait_until_playing(session, get_depsgraph, FRAME)
-    assert len(session.obstacles.parts) == fields.KEPT + 3
+    assert len(session.obstacles.parts) == fields.MAX_CACHED + 3
 
 
 def test_blenders_playback_waits_and_takes_over(new_hair, sphere, get_depsgraph, extension):

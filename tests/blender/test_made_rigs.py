@@ -194,7 +194,7 @@ def test_strands_of_a_bake_are_those_that_were_baked(
     assert session.rig.child_count and session.rig.grown_children is None, (
         "it has those of the bake"
     )
-    assert not previews.made_rigs()
+    assert not previews.previewed_rigs()
     made.clear()
     written(tmp_path / "own.tfx")
     assert made == ["Hair"]
@@ -220,7 +220,7 @@ def test_the_dialog_makes_strands_once_and_the_file_has_them(
     operators_export_check.begin(check)
     found = written(tmp_path / "found.tfx")
     assert made == ["Hair"]
-    assert not operators_export_check.made(), "they are kept no longer than the dialog"
+    assert not operators_export_check.cached_rigs(), "they are kept no longer than the dialog"
     assert found == written(tmp_path / "own.tfx") and made == ["Hair", "Hair"]
     operators_export_check.begin(check)
     comb(hair)
@@ -239,7 +239,7 @@ def test_the_dialog_takes_strands_of_the_preview(
 ) -> None:
     previews.start(hair, get_depsgraph())
     made.clear()
-    check = ExportCheck.of([hair], previews.made_rigs())
+    check = ExportCheck.of([hair], previews.previewed_rigs())
     list(check.read_steps(get_depsgraph(), TRESSFX, StrandExportSettings()))
     check.refresh(get_depsgraph(), TRESSFX, StrandExportSettings())
     assert check.lines and not made

@@ -15,7 +15,7 @@ from hedgehogs import hedgehog
 
 from hairloom.addon.blender.bakes.baked_rig import RestMatrices, baked_rig_of, rig_arrays
 from hairloom.addon.blender.base.attributes import set_attribute
-from hairloom.addon.blender.colliders.rigs import MadeRig
+from hairloom.addon.blender.colliders.rigs import CachedRig
 from hairloom.addon.blender.scene.curves import curve_points
 from hairloom.addon.blender.scene.masks import MaskReader
 from hairloom.addon.blender.scene.source import read_source
@@ -47,7 +47,7 @@ def made_real() -> Any:
 
 def test_every_strand_is_kept_at_its_place(hair: Any) -> None:
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    rig = MadeRig.of(hair, read_source(hair, depsgraph)).rig
+    rig = CachedRig.of(hair, read_source(hair, depsgraph)).rig
     assert rig.child_count > 100
     real = made_real()
     assert real != hair and len(real.data.curves) == rig.strands.strand_count
@@ -60,12 +60,12 @@ def test_every_strand_is_kept_at_its_place(hair: Any) -> None:
 def test_every_strand_keeps_its_noise(hair: Any) -> None:
     """Seeds are kept when curves are added later, and in a bake."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    seeds = strand_seeds(MadeRig.of(hair, read_source(hair, depsgraph)).rig)
+    seeds = strand_seeds(CachedRig.of(hair, read_source(hair, depsgraph)).rig)
     assert (np.diff(seeds) != 1).any(), "children have others than their numbers"
     real = made_real()
     real.data.add_curves([2])
     real.data.position_data[len(real.data.points) - 1].vector = (0.0, 0.0, 0.3)
-    rig = MadeRig.of(real, read_source(real, bpy.context.evaluated_depsgraph_get())).rig
+    rig = CachedRig.of(real, read_source(real, bpy.context.evaluated_depsgraph_get())).rig
     assert strand_seeds(rig).tolist() == [*seeds, len(seeds)]
     baked = baked_rig_of(rig_arrays(rig, RestMatrices(np.eye(4), np.eye(4))), "bake").rig
     np.testing.assert_array_equal(strand_seeds(baked), strand_seeds(rig))

@@ -228,10 +228,10 @@ def test_nothing_is_left_of_light_that_is_found_for_hair_that_goes(hair, get_dep
 def test_play_waits_for_the_hair(hair, get_depsgraph, gate):
     session = previews.start(hair, get_depsgraph())
     assert previews.play(get_depsgraph(), blocking=False) == []
-    wait_until(fields.are_made)
+    wait_until(fields.are_ready)
     previews.advance(get_depsgraph(), FRAME)
     assert previews.previews[session.uid].phase is Phase.WAITING and not session.is_playing
-    with pytest.raises(fields.NotMadeYetError):
+    with pytest.raises(fields.NotReadyError):
         session.play(get_depsgraph(), blocking=False)
     gate.set()
     arrive(session)
@@ -371,7 +371,7 @@ def test_a_frame_of_blenders_playback_is_not_put_off_for_contacts(hair, get_deps
     session = previews.start(hair, get_depsgraph())
     arrive(session)
     session.make_fields(get_depsgraph())
-    wait_until(fields.are_made)
+    wait_until(fields.are_ready)
     session.play(get_depsgraph(), blocking=False, is_frame=True)
     assert session.is_playing and session.solver.motion.clearance is not None
 
@@ -612,7 +612,7 @@ def test_playback_goes_on_before_a_collider_is_made(hair, moving, get_depsgraph,
     rounds(session, 1, 2, 3)
     assert session.is_made and not session.is_playing and previews.previews[session.uid].is_deferred
     opened.set()
-    wait_until(fields.are_made)
+    wait_until(fields.are_ready)
     rounds(session, 4)
     assert session.is_playing and not previews.previews[session.uid].is_deferred
 

@@ -293,7 +293,7 @@ def test_a_look_at_colliders_between_two_frames_changes_no_motion(scene):
     deformations = []
     for angle in (0.2, 0.4, 0.4):
         pose(Matrix.Rotation(angle, 4, "X"))
-        found[0].standing(depsgraph())
+        found[0].static_colliders(depsgraph())
         (looked,), (alone,) = map(move_obstacles, found)
         np.testing.assert_array_equal(looked.matrix_now, alone.matrix_now)
         assert looked.deformation == alone.deformation

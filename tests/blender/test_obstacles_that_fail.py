@@ -8,7 +8,7 @@ import pytest
 from collider_scene import COARSE_SETTINGS, ColliderScene, depsgraph, distance_now, move_obstacles
 
 from hairloom.addon.blender.base.objects import Body
-from hairloom.addon.blender.colliders.obstacles import Obstacles, sources_of
+from hairloom.addon.blender.colliders.obstacles import Obstacles, collider_objects
 from hairloom.addon.blender.scene.surfaces import read_surface
 from hairloom.addon.errors import HairloomError
 
@@ -214,7 +214,7 @@ def test_two_grooms_have_their_own_colliders(scene):
     scene.ball(0.1, name="Own")
     scene.cube(name="Both")
     group.objects.link(bpy.data.objects["Both"])
-    names = [{obj.name for obj in sources_of(owner, None)} for owner in (scene.owner, other)]
+    names = [{obj.name for obj in collider_objects(owner, None)} for owner in (scene.owner, other)]
     assert names == [{"Own", "Both"}, {"Both"}]
     assert len(scene.obstacles().parts) == 2
     assert len(Obstacles.of(other, None, None, COARSE_SETTINGS, depsgraph(), None).parts) == 1

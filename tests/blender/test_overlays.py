@@ -58,7 +58,7 @@ def test_lines_of_a_collider_that_is_being_made_come_when_it_is_there(preview, m
     hair.hairloom.shown_overlays = {"colliders"}
     assert overlays(session) == () and latest_job.take_steps() == latest_job.ARRIVAL_TIME
     is_made.set()
-    wait_until(fields.are_made)
+    wait_until(fields.are_ready)
     assert latest_job.take_steps() is None
     assert len(overlays(session)) == 1
 

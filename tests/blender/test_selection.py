@@ -8,7 +8,7 @@ from panel_layout import Layout
 
 from hairloom.addon.blender.base.objects import objects_in
 from hairloom.addon.blender.cards.occluders import read_occluders
-from hairloom.addon.blender.colliders.spheres import grown_on
+from hairloom.addon.blender.colliders.spheres import hair_on
 from hairloom.addon.blender.command_line import bake_job, object_settings
 from hairloom.addon.blender.preview.diagnostics import nearest_surface
 from hairloom.addon.blender.sessions.fins import fins_in
@@ -38,7 +38,7 @@ def test_an_object_that_was_just_removed_is_no_obstacle(hair, sphere):
     assert objects_in(layer) == [sphere, hair]
     assert chosen_hair(bpy.context) == [hair]
     assert fins_in(layer) == []
-    assert grown_on(sphere, layer) == [hair]
+    assert hair_on(sphere, layer) == [hair]
 
 
 def test_a_removed_object_is_no_obstacle_for_cards(hair):

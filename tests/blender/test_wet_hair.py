@@ -11,7 +11,7 @@ import pytest
 from hairloom.addon.blender.bakes import playback
 from hairloom.addon.blender.bakes.groom_hashes import settings_hash
 from hairloom.addon.blender.bakes.stale_bakes import changed_inputs
-from hairloom.addon.blender.colliders.rigs import MadeRig
+from hairloom.addon.blender.colliders.rigs import CachedRig
 from hairloom.addon.blender.preview.bake import Bake
 from hairloom.addon.blender.preview.preview import baked_rig_for
 from hairloom.addon.blender.properties.groom_settings import GroomSettings
@@ -31,7 +31,7 @@ def hair(new_hair: Any, sphere: Any) -> Any:
 
 
 def rig(hair: Any) -> Any:
-    return MadeRig.of(hair, read_source(hair, bpy.context.evaluated_depsgraph_get())).rig
+    return CachedRig.of(hair, read_source(hair, bpy.context.evaluated_depsgraph_get())).rig
 
 
 def test_water_acts_on_look_children_and_motion_and_leaves_what_is_stored(hair: Any) -> None:

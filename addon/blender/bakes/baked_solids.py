@@ -33,7 +33,7 @@ from ...dynamics.settings import DynamicsSettings
 from ...errors import HairloomError
 from ...rig_flow import MotionStart, Pose, Solids
 from ...strands import Surface
-from ..colliders.fields import NotMadeYetError, field_of
+from ..colliders.fields import NotReadyError, field_of
 from .simulation import Arrays
 
 _BALL, _CAPSULE, _BALLS, _MESH = range(4)
@@ -166,7 +166,7 @@ class BakedSolids:
 
         Raises:
             HairloomError: as `motion_start`.
-            NotMadeYetError: a field is being made, and the call is not blocking.
+            NotReadyError: a field is being made, and the call is not blocking.
         """
         try:
             solids, matrices = frame["solids"].tolist(), frame["solid_matrices"]
@@ -223,7 +223,7 @@ class _FrameSolids:
     def colliders(self) -> tuple[PosedCollider, ...]:
         try:
             return self.bake.colliders(self.frame, blocking=self.is_blocking)
-        except NotMadeYetError:
+        except NotReadyError:
             return ()
 
 

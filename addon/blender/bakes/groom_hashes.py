@@ -24,8 +24,8 @@ from ..base.attributes import read_attribute
 from ..base.mesh_arrays import corner_vertices, vertex_places
 from ..base.objects import head_of, matrix_of
 from ..base.vertex_weights import painted_attribute, weight_names, weights_on
-from ..colliders.carriers import is_deforming, is_left_out
-from ..colliders.obstacles import shape_of, sources_of
+from ..colliders.carriers import is_deforming, is_disabled
+from ..colliders.obstacles import collider_objects, shape_of
 from ..colliders.ties import holders_of
 from ..properties.groom_settings import GroomSettings
 from ..properties.properties import settings_of
@@ -177,7 +177,7 @@ def collider_places(
 ) -> tuple[Floats | str, ...]:
     """Where the colliders of a groom or fin are now, and which of them collide; without the head,
     which is in the pose."""
-    return _places([obj for obj in sources_of(owner, head) if obj != head], depsgraph)
+    return _places([obj for obj in collider_objects(owner, head) if obj != head], depsgraph)
 
 
 def _places(
@@ -186,7 +186,7 @@ def _places(
     """Where objects are now, in which shape, and which are left out."""
     places: list[Floats | str] = []
     for obj in objects:
-        places += [f"{is_left_out(obj, depsgraph)}", matrix_of(obj, depsgraph)]
+        places += [f"{is_disabled(obj, depsgraph)}", matrix_of(obj, depsgraph)]
         if obj.type == "MESH" and (len(obj.modifiers) or is_deforming(obj)):
             places.append(read_positions(obj, depsgraph, place=obj.name))
     return tuple(places)
@@ -197,7 +197,7 @@ def collider_shapes(
 ) -> tuple[Floats | Ints | str, ...]:
     """The shapes of the colliders of a groom or fin, wherever they are."""
     parts: list[Floats | Ints | str] = []
-    for obj in sources_of(owner, head):
+    for obj in collider_objects(owner, head):
         shape = shape_of(obj)
         parts.append(f"{shape} {obj.empty_display_size if obj.type == 'EMPTY' else ''}")
         if obj.type == "MESH" and shape != "none":

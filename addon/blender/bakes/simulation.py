@@ -70,7 +70,7 @@ class Simulation(Protocol):
                 of a second are waited for even if not blocking.
 
         Raises:
-            NotMadeYetError: something is being built, and the call does not wait; it stays at rest
+            NotReadyError: something is being built, and the call does not wait; it stays at rest
                 until then.
         """
 

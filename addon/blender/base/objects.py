@@ -213,10 +213,10 @@ def is_hidden(obj: bpy.types.Object, layer: bpy.types.ViewLayer) -> bool:
     """Whether neither the views nor the renders of a view layer show an object; hair counts as
     shown in renders if the copy that plays its bake is."""
     bake = obj.hairloom.bake
-    is_left_out = bake.was_hidden if bake.hides else obj.hide_render
-    is_left_out |= all(collection.hide_render for collection in obj.users_collection)
+    is_hidden_in_renders = bake.was_hidden if bake.hides else obj.hide_render
+    is_hidden_in_renders |= all(collection.hide_render for collection in obj.users_collection)
     with _without_area():
-        return bool(is_left_out and not obj.visible_get(view_layer=layer))
+        return bool(is_hidden_in_renders and not obj.visible_get(view_layer=layer))
 
 
 def without_hidden(

@@ -58,7 +58,7 @@ from ..base.gpu_context import ensure_gpu
 from ..base.objects import head_of
 from ..base.outcome import notes_of
 from ..base.thread_work import ThreadWork
-from ..colliders.rigs import MadeRig
+from ..colliders.rigs import CachedRig
 from ..properties.groom_settings import GroomSettings
 from ..scene.painted_colors import read_colors
 from ..scene.source import read_source
@@ -97,14 +97,14 @@ def read_inputs(
     depsgraph: bpy.types.Depsgraph,
     rig: Rig | None = None,
     keep_edits: bool = True,
-    known_rigs: tuple[MadeRig, ...] = (),
+    cached_rigs: tuple[CachedRig, ...] = (),
 ) -> tuple[CardInputs, tuple[str, ...], dict[str, int]]:
     """A groom with its own settings; notes for the artist; counts of dropped strands by reason.
 
     Args:
         rig: that of the groom's bake; None: made from its curves.
         keep_edits: whether to keep the artist's changes to cards in the scene.
-        known_rigs: see `MadeRig.of`.
+        cached_rigs: see `CachedRig.of`.
 
     Raises:
         HairloomError: no hair that can be used, or edited cards that cannot be read.
@@ -115,7 +115,7 @@ def read_inputs(
     if rig is None:
         read = read_source(hair, depsgraph)
         source = read.at_rest
-        rig, colors = MadeRig.of(hair, source, known_rigs).rig, source.colors
+        rig, colors = CachedRig.of(hair, source, cached_rigs).rig, source.colors
         notes, dropped = source.warnings, source.dropped
         if read.rest is not None:
             frame, head = depsgraph.scene.frame_current, head_of(hair)

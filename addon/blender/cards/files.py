@@ -57,7 +57,7 @@ from ..base.objects import Handle
 from ..base.outcome import Outcome
 from ..base.report import hairloom_version
 from ..base.thread_work import ThreadWork
-from ..colliders.rigs import MadeRig
+from ..colliders.rigs import CachedRig
 from ..scene.bone_weights import head_bone_of
 from ..scene.built_in_head import HeadLook
 from ..scene.head_look import look_of_head
@@ -518,7 +518,7 @@ class CardExport:
         *,
         levels: int | None = None,
         frames: range | None = None,
-        known: tuple[MadeRig, ...] = (),
+        cached_rigs: tuple[CachedRig, ...] = (),
         kept: CardBuildCache | None = None,
     ) -> CardExport:
         """Read the hair; if motion is to be written, from its bake.
@@ -526,7 +526,7 @@ class CardExport:
         Args:
             levels: number of levels of detail; None: by the groom's own settings.
             frames: of the bake; None: all of them.
-            known: see `MadeRig.of`.
+            cached_rigs: see `CachedRig.of`.
             kept: cards that were built before; the new ones are kept in it.
 
         Raises:
@@ -536,7 +536,7 @@ class CardExport:
         check_output(path, output, motion)
         check_no_input(path, picture_files(hair.data.hairloom.card_images))
         rig, stale = (None, ()) if motion is None else (motion.rig, motion.notes)
-        inputs, notes, dropped = read_inputs(hair, depsgraph, rig, known_rigs=known)
+        inputs, notes, dropped = read_inputs(hair, depsgraph, rig, cached_rigs=cached_rigs)
         bone = head_bone_of(hair, depsgraph, inputs.rig.strands)
         output = replace(output, head_bone=bone, head_look=look_of_head(hair, inputs.rig.head))
         if levels is not None:

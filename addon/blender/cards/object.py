@@ -21,7 +21,7 @@ from ...shading.settings import ShadingSettings
 from ..base.attributes import set_attribute
 from ..base.objects import Handle, check_shape_editable, head_of, link_into, matrix_of
 from ..base.thread_work import ThreadWork
-from ..colliders.rigs import MadeRig
+from ..colliders.rigs import CachedRig
 from ..scene.surfaces import OCCLUSION_LAYER
 from .build import MappedCards, order_line, read_inputs
 from .build_cache import CardBuildCache
@@ -39,7 +39,7 @@ class CardObjectJob:
 
     Args:
         keep_edits: whether to keep the artist's changes to existing cards.
-        known: see `MadeRig.of`.
+        cached_rigs: see `CachedRig.of`.
         kept: cards that were built before; the new ones are kept in it.
 
     Raises:
@@ -52,13 +52,13 @@ class CardObjectJob:
         depsgraph: bpy.types.Depsgraph,
         *,
         keep_edits: bool = True,
-        known: tuple[MadeRig, ...] = (),
+        cached_rigs: tuple[CachedRig, ...] = (),
         kept: CardBuildCache | None = None,
     ) -> None:
         for obj in card_objects(hair):
             _check_replaceable(obj)
         self._inputs, self.notes, self.dropped = read_inputs(
-            hair, depsgraph, keep_edits=keep_edits, known_rigs=known
+            hair, depsgraph, keep_edits=keep_edits, cached_rigs=cached_rigs
         )
         self._kept = CardBuildCache() if kept is None else kept
         self._hair, self._matrix = Handle.of(hair), matrix_of(hair, depsgraph)

@@ -21,12 +21,12 @@ from ...strands.affine import transform_points
 from ..base.objects import Body
 from ..scene.surfaces import read_positions
 
-#: Approximate number of vertices that a mesh is tracked by; more would not change the result.
-_ENOUGH = 2000
+#: Approximate number of vertices by which a mesh is tracked; more would not change the result.
+_TRACKED_VERTICES = 2000
 #: Rings of triangles around the roots that count as near them.
-_RINGS = 2
+_TRIANGLE_RINGS = 2
 #: Modifiers that do not move a mesh.
-_STILL = frozenset(
+_STATIC_MODIFIERS = frozenset(
     ("SUBSURF", "MULTIRES", "TRIANGULATE", "MIRROR", "EDGE_SPLIT", "WEIGHTED_NORMAL", "BEVEL")
     + ("NORMAL_EDIT", "UV_PROJECT", "UV_WARP", "WELD", "DECIMATE", "REMESH", "SOLIDIFY", "MASK")
 )
@@ -59,10 +59,10 @@ class Carrier:
         """
         used = np.unique(surface.triangles)
         if roots is not None and len(roots):
-            around = _around(surface.triangles, roots, len(surface.positions))
-            if fit_similarity(surface.positions[around], surface.positions[around]) is not None:
-                used = around
-        used = used[:: max(len(used) // _ENOUGH, 1)]
+            near = _vertices_near_roots(surface.triangles, roots, len(surface.positions))
+            if fit_similarity(surface.positions[near], surface.positions[near]) is not None:
+                used = near
+        used = used[:: max(len(used) // _TRACKED_VERTICES, 1)]
         return cls(body, used, surface.positions[used], len(surface.positions))
 
     def motion_from_rest(self, depsgraph: bpy.types.Depsgraph) -> Floats:
@@ -101,13 +101,13 @@ class Carrier:
 def is_deforming(obj: bpy.types.Object) -> bool:
     """Whether the shape of the mesh may change from frame to frame."""
     return (
-        any(each.show_viewport and each.type not in _STILL for each in obj.modifiers)
+        any(each.show_viewport and each.type not in _STATIC_MODIFIERS for each in obj.modifiers)
         or getattr(obj.data, "shape_keys", None) is not None
         or (obj.parent is not None and obj.parent_type in {"ARMATURE", "LATTICE", "CURVE"})
     )
 
 
-def is_left_out(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
+def is_disabled(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
     """Whether the artist has disabled it in viewports or excluded it from the view layer.
 
     Blender evaluates it anyway, because the hair refers to it. Hiding it with the eye icon does not
@@ -128,10 +128,10 @@ def scales_of(matrix: Floats) -> Floats:
     return lengths
 
 
-def _around(triangles: Ints, roots: Ints, vertex_count: int) -> Ints:
-    """The vertices of `_RINGS` rings of triangles around the roots."""
+def _vertices_near_roots(triangles: Ints, roots: Ints, vertex_count: int) -> Ints:
+    """The vertices of `_TRIANGLE_RINGS` rings of triangles around the roots."""
     chosen = np.zeros(vertex_count, bool)
     chosen[np.asarray(roots)] = True
-    for _ in range(_RINGS):
+    for _ in range(_TRIANGLE_RINGS):
         chosen[triangles[chosen[triangles].any(axis=1)]] = True
     return np.flatnonzero(chosen)

@@ -1,5 +1,5 @@
-"""Copies of the objects that act on a groom, for hair in another scene whose head is at the origin:
-each object as it is now, as a child of that head."""
+"""Copies of the objects that act on a groom, as they are now, for hair in another scene. They are
+children of that hair's head, which is at the origin."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from dataclasses import dataclass, field
 
 import bpy
 
-from .carriers import is_left_out
-from .obstacles import sources_of
+from .carriers import is_disabled
+from .obstacles import collider_objects
 from .ties import ties_of
 
 
 @dataclass
-class StillCopies:
+class StaticCopies:
     """Static copies of objects, each copied once.
 
     head: their parent. scene: the one whose collection they are in.
@@ -22,13 +22,13 @@ class StillCopies:
     head: bpy.types.Object
     scene: bpy.types.Scene
     depsgraph: bpy.types.Depsgraph
-    made: dict[bpy.types.Object, bpy.types.Object] = field(default_factory=dict)
+    _copies: dict[bpy.types.Object, bpy.types.Object] = field(default_factory=dict)
 
     def of(self, obj: bpy.types.Object) -> bpy.types.Object:
         """The copy of an object, without animation, constraints and modifiers."""
-        if obj not in self.made:
-            self.made[obj] = self._copied(obj)
-        return self.made[obj]
+        if obj not in self._copies:
+            self._copies[obj] = self._copy(obj)
+        return self._copies[obj]
 
     def collection(self, name: str, objects: list[bpy.types.Object]) -> bpy.types.Collection | None:
         """A collection of copies of these objects; None if there are no objects."""
@@ -39,10 +39,10 @@ class StillCopies:
             collection.objects.link(self.of(obj))
         return collection
 
-    def _copied(self, obj: bpy.types.Object) -> bpy.types.Object:
+    def _copy(self, obj: bpy.types.Object) -> bpy.types.Object:
         evaluated = obj.evaluated_get(self.depsgraph)
         copy, matrix = obj.copy(), evaluated.matrix_world.copy()
-        copy.hide_viewport = is_left_out(obj, self.depsgraph)
+        copy.hide_viewport = is_disabled(obj, self.depsgraph)
         for attached in (copy.constraints, copy.modifiers):
             attached.clear()
         copy.animation_data_clear()
@@ -54,7 +54,7 @@ class StillCopies:
         return copy
 
 
-def copy_holders(source: bpy.types.Object, hair: bpy.types.Object, copies: StillCopies) -> None:
+def copy_holders(source: bpy.types.Object, hair: bpy.types.Object, copies: StaticCopies) -> None:
     """Hold hair by copies of another groom's ties and tip surface."""
     hair.hairloom.tie_collection = copies.collection("Ties", list(ties_of(source)))
     surface = source.hairloom.tip_surface
@@ -66,7 +66,7 @@ def copy_colliders(
     source: bpy.types.Object,
     head: bpy.types.Object | None,
     hair: bpy.types.Object,
-    copies: StillCopies,
+    copies: StaticCopies,
 ) -> None:
     """Give hair copies of another groom's colliders.
 
@@ -77,5 +77,5 @@ def copy_colliders(
         copies.head.hairloom.collider_shape = head.hairloom.collider_shape
     chosen = source.hairloom.collider
     hair.hairloom.collider = None if chosen in (None, head) else copies.of(chosen)
-    others = [obj for obj in sources_of(source, head) if obj not in (head, chosen)]
+    others = [obj for obj in collider_objects(source, head) if obj not in (head, chosen)]
     hair.hairloom.collider_collection = copies.collection("Colliders", others)

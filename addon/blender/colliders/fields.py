@@ -1,6 +1,6 @@
-"""Distance fields of meshes, each made once, in a thread if the caller cannot wait.
+"""Distance fields of meshes, each built once, in a thread if the caller cannot wait.
 
-A field depends only on the mesh and its resolution, so it is found again by their hash: by the next
+A field depends only on the mesh and its resolution, so it is cached by their hash: for the next
 preview, the next groom on the same head, or a bake. It is bitwise the same, whichever thread builds
 it. The field of the built-in head is shipped.
 """
@@ -17,22 +17,22 @@ from ..base.digests import digest
 from ..base.thread_work import ThreadWork
 from .bust_field import shipped_field
 
-#: Number of fields that are kept, used or not; 6 MB each by default.
-KEPT = 8
+#: Number of cached fields, in use or not; 6 MB each by default.
+MAX_CACHED = 8
 
 _works: dict[str, ThreadWork[DistanceField]] = {}
-#: threads that make hair get fields too
+#: threads that build hair need fields too
 _lock = Lock()
 
 
-class NotMadeYetError(Exception):
-    """The field is being made; try again once `are_made` is true."""
+class NotReadyError(Exception):
+    """It is being built; try again later. For fields, `are_ready` says when."""
 
 
 def field_of(
     surface: Surface, settings: DynamicsSettings, *, place: str, blocking: bool = True
 ) -> DistanceField:
-    """The field of a closed mesh, which takes a second to make for the first time.
+    """The field of a closed mesh, which takes a second to build the first time.
 
     Args:
         place: the mesh's name in messages.
@@ -40,30 +40,30 @@ def field_of(
 
     Raises:
         HairloomError: see `DistanceField.from_surface`.
-        NotMadeYetError: it is being made, and the call is not blocking.
+        NotReadyError: it is being built, and the call is not blocking.
     """
     key = field_key(surface, settings)
     with _lock:
         work = _works.pop(key, None)
         if work is None:
-            work = ThreadWork(lambda _: _made(surface, settings, key), "distance field")
+            work = ThreadWork(lambda _: _build(surface, settings, key), "distance field")
         _works[key] = work  # last in the order of use
     if blocking:
         work.wait()
         trim()
     elif not work.is_done:
-        raise NotMadeYetError
+        raise NotReadyError
     try:
         return work.result()
-    except HairloomError as error:  # kept, since the same surface would fail again
+    except HairloomError as error:  # stays cached, since the same surface would fail again
         raise HairloomError(error.problem, place=place, remedy=error.remedy) from error
     except Exception:
         with _lock:
-            _works.pop(key, None)  # another try may succeed, such as after a lack of memory
+            _works.pop(key, None)  # another try may succeed, such as after memory ran out
         raise
 
 
-def solid_of(head: Surface | None) -> DistanceField | None:
+def head_field_of(head: Surface | None) -> DistanceField | None:
     """The field of the mesh that hair grows on, with default settings; None if it has no inside."""
     if head is None:
         return None
@@ -73,21 +73,21 @@ def solid_of(head: Surface | None) -> DistanceField | None:
         return None
 
 
-def are_made() -> bool:
-    """Whether no field is being made."""
+def are_ready() -> bool:
+    """Whether no field is being built."""
     with _lock:
         return all(work.is_done for work in _works.values())
 
 
 def trim() -> None:
-    """Drop all but the `KEPT` fields used last.
+    """Drop all but the `MAX_CACHED` fields that were used last.
 
     Not to be called while a caller that does not block gathers more fields than that: it would
     never get them all.
     """
     with _lock:
-        made = [key for key, work in _works.items() if work.is_done]
-        for key in made[:-KEPT]:
+        ready = [key for key, work in _works.items() if work.is_done]
+        for key in ready[:-MAX_CACHED]:
             del _works[key]
 
 
@@ -97,7 +97,7 @@ def forget() -> None:
         _works.clear()
 
 
-def _made(surface: Surface, settings: DynamicsSettings, key: str) -> DistanceField:
+def _build(surface: Surface, settings: DynamicsSettings, key: str) -> DistanceField:
     return shipped_field(surface, key) or DistanceField.from_surface(surface, settings)
 
 

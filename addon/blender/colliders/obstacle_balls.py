@@ -13,12 +13,12 @@ from ...dynamics.fitting.similarity import fit_similarity
 from ...errors import HairloomError
 from ...strands.affine import mean_scale, transform_points
 from ..base.objects import Body, matrix_of
-from .carriers import is_left_out
-from .obstacle_parts import Track, is_solid_scale
+from .carriers import is_disabled
+from .obstacle_parts import Track, is_invertible
 
 #: A set is unchanged if its balls moved relative to each other by less than this fraction of the
 #: largest radius.
-_SAME_SET = 1.0e-3
+_SET_TOLERANCE = 1.0e-3
 
 
 @dataclass(frozen=True)
@@ -59,8 +59,8 @@ class BallsPart:
     def uid(self) -> int | None:
         return None
 
-    def now(self, depsgraph: bpy.types.Depsgraph) -> tuple[Collider, Floats]:
-        chosen, matrices = self._found(depsgraph)
+    def evaluate(self, depsgraph: bpy.types.Depsgraph) -> tuple[Collider, Floats]:
+        chosen, matrices = self._usable(depsgraph)
         if not chosen:
             raise HairloomError(
                 "this ball and those beside it are gone or hidden",
@@ -78,38 +78,38 @@ class BallsPart:
         radii = radius * size / mean_scale(matrix)
         return self._set_of(centers, radii, tuple(chosen)), matrix
 
-    def swollen(self) -> float:
+    def deformation(self) -> float:
         return 0.0
 
-    def _found(self, depsgraph: bpy.types.Depsgraph) -> tuple[list[int], list[Floats]]:
-        """The balls that exist, by index, and their matrices."""
+    def _usable(self, depsgraph: bpy.types.Depsgraph) -> tuple[list[int], list[Floats]]:
+        """The indices of the balls that can be used, and their matrices."""
         self.warnings.clear()
         chosen, matrices = [], []
         for number, ball in enumerate(self.balls):
             obj, name = ball.body.handle.find(), ball.body.handle.name
-            if obj is None or is_left_out(obj, depsgraph):
+            if obj is None or is_disabled(obj, depsgraph):
                 self.warnings[name] = f"{name}: it is gone or hidden, so nothing collides with it."
             else:
                 chosen.append(number)
                 matrices.append(matrix_of(obj, depsgraph))
-        solid = is_solid_scale(np.array(matrices).reshape(-1, 4, 4))
-        for number in np.array(chosen, int)[~solid]:
+        are_usable = is_invertible(np.array(matrices).reshape(-1, 4, 4))
+        for number in np.array(chosen, int)[~are_usable]:
             name = self.balls[number].body.handle.name
             self.warnings[name] = f"{name}: its scale is zero. Correct its scale."
-        kept = np.flatnonzero(solid)
-        return [chosen[i] for i in kept], [matrices[i] for i in kept]
+        rows = np.flatnonzero(are_usable)
+        return [chosen[i] for i in rows], [matrices[i] for i in rows]
 
     def _set_of(
         self, centers: Floats, radii: Floats, members: tuple[int, ...]
     ) -> SphereSetCollider:
-        """A set of balls; the previous one if it differs by rounding only, as a new one has to
+        """A set of balls; the previous one if it differs by rounding only, since a new one has to
         build its grid."""
-        known = self._set
-        if known is not None and members == self._members:
-            tolerance = _SAME_SET * float(radii.max())
-            same = np.allclose(known.centers, centers, rtol=0.0, atol=tolerance)
-            if same and np.allclose(known.radii, radii, rtol=1.0e-3, atol=0.0):
-                return known
+        previous = self._set
+        if previous is not None and members == self._members:
+            tolerance = _SET_TOLERANCE * float(radii.max())
+            same = np.allclose(previous.centers, centers, rtol=0.0, atol=tolerance)
+            if same and np.allclose(previous.radii, radii, rtol=1.0e-3, atol=0.0):
+                return previous
         self._set, self._members = SphereSetCollider(centers, radii), members
         return self._set
 

@@ -26,11 +26,11 @@ from .carriers import Carrier, scales_of
 from .fields import field_of
 
 #: A mesh counts as the same if it differs from its rest by less than this fraction of its extent.
-_SAME_SHAPE = 1.0e-5
+_SHAPE_TOLERANCE = 1.0e-5
 #: Distance that counts as near the tracked vertices, in radii of a ball around them.
-NEAR = 3.0
-#: Axes whose lengths differ by less than this fraction count as equal.
-_EVEN = 0.01
+_NEAR_RADII = 3.0
+#: A scale is even if its axes' lengths differ by less than this fraction.
+_EVEN_TOLERANCE = 0.01
 
 
 class Part(Protocol):
@@ -38,8 +38,8 @@ class Part(Protocol):
 
     name: of its object, or of the first one.
     uid: the object's session number, or None if it consists of several objects.
-    track: where it was in the last two frames.
-    warnings: object -> a warning for the artist, from the last call of `now`.
+    track: its matrices in the last two frames.
+    warnings: object -> a warning for the artist, from the last call of `evaluate`.
     """
 
     track: Track
@@ -51,15 +51,16 @@ class Part(Protocol):
     @property
     def uid(self) -> int | None: ...
 
-    def now(self, depsgraph: bpy.types.Depsgraph) -> tuple[Collider, Floats]:
-        """The collider, and its matrix (4, 4) to world space; does not touch `track`.
+    def evaluate(self, depsgraph: bpy.types.Depsgraph) -> tuple[Collider, Floats]:
+        """The collider in its present shape, and its matrix (4, 4) to world space; does not change
+        `track`.
 
         Raises:
             HairloomError: it is gone, or it is another mesh.
         """
 
-    def swollen(self) -> float:
-        """How far the shape has changed between the last two calls of this, see `PosedCollider`."""
+    def deformation(self) -> float:
+        """`PosedCollider.deformation` since the last call of this."""
 
 
 @dataclass
@@ -73,29 +74,30 @@ class Track:
     earlier: Floats | None = None
     duration: float = 0.0
 
-    def rest(self, matrix: Floats) -> None:
+    def reset(self, matrix: Floats) -> None:
         self.before, self.earlier, self.duration = matrix, None, 0.0
 
-    def go(
-        self, collider: Collider, matrix: Floats, duration: float, swelling: float = 0.0
+    def advance(
+        self, collider: Collider, matrix: Floats, duration: float, deformation: float = 0.0
     ) -> PosedCollider:
         """The trajectory since the previous frame, with the same formula as for roots."""
         if self.before is None:
-            self.rest(matrix)
+            self.reset(matrix)
         assert self.before is not None
         earlier, ratio = None, 1.0
         if self.earlier is not None and duration:
             earlier, ratio = self.earlier, self.duration / duration
-        posed = PosedCollider(collider, self.before, matrix, earlier, ratio, swelling)
+        posed = PosedCollider(collider, self.before, matrix, earlier, ratio, deformation)
         self.earlier, self.before, self.duration = self.before, matrix, duration
         return posed
 
 
 @dataclass(frozen=True, eq=False)
-class _Seen:
-    """A mesh as last seen. shape: (vertex_count, 3) [m] in its own space. scale: of that space."""
+class _LastShape:
+    """A mesh when last evaluated. positions: (vertex_count, 3) [m] in its own space. scale: of that
+    space."""
 
-    shape: Floats
+    positions: Floats
     scale: float
 
 
@@ -113,10 +115,10 @@ class FieldPart:
     resolution: int
     track: Track = field(default_factory=Track)
     warnings: dict[str, str] = field(default_factory=dict)
-    _seen: _Seen | None = None
-    _before: Floats | None = None
-    _bent: DeformedField | None = None
-    _at: tuple[Floats, DistanceField] | None = None
+    _last_shape: _LastShape | None = None
+    _previous_positions: Floats | None = None
+    _deformed_field: DeformedField | None = None
+    _last_field: tuple[Floats, DistanceField] | None = None
 
     @classmethod
     def new(
@@ -134,47 +136,48 @@ class FieldPart:
     def uid(self) -> int | None:
         return self.carrier.body.handle.uid
 
-    def now(self, depsgraph: bpy.types.Depsgraph) -> tuple[Collider, Floats]:
+    def evaluate(self, depsgraph: bpy.types.Depsgraph) -> tuple[Collider, Floats]:
         matrix, shape = (
-            _solid(self.carrier.motion_from_rest(depsgraph), self.name),
+            _checked_matrix(self.carrier.motion_from_rest(depsgraph), self.name),
             self.carrier.shape,
         )
         if shape is None:
-            self._seen = None
+            self._last_shape = None
             return self.distance, matrix
         local = transform_points(shape, np.linalg.inv(matrix)).astype(np.float32)
-        self._seen = _Seen(local, mean_scale(matrix))
-        if self._bent is None:
-            self._bent = DeformedField(self.distance, self.surface)
-        if self._at is None or not np.array_equal(self._at[0], local):
-            self._at = local, self._bent.at(local)
-        return self._at[1], matrix
+        self._last_shape = _LastShape(local, mean_scale(matrix))
+        if self._deformed_field is None:
+            self._deformed_field = DeformedField(self.distance, self.surface)
+        if self._last_field is None or not np.array_equal(self._last_field[0], local):
+            self._last_field = local, self._deformed_field.at(local)
+        return self._last_field[1], matrix
 
-    def swollen(self) -> float:
-        before, seen = self._before, self._seen
-        self._before = None if seen is None else seen.shape
-        if seen is None:
+    def deformation(self) -> float:
+        before, now = self._previous_positions, self._last_shape
+        self._previous_positions = None if now is None else now.positions
+        if now is None:
             return 0.0
-        path = (seen.shape - (self.surface.positions if before is None else before))[self._near]
-        return float(np.sqrt(np.einsum("ij,ij->i", path, path).max(initial=0.0))) * seen.scale
+        path = now.positions - (self.surface.positions if before is None else before)
+        path = path[self._is_near_tracked]
+        return float(np.sqrt(np.einsum("ij,ij->i", path, path).max(initial=0.0))) * now.scale
 
-    def take_bent(self, other: FieldPart) -> None:
-        """Take over the last shape of a part that was made from the same mesh."""
-        self._bent, self._at = other._bent, other._at
+    def take_deformed_field(self, other: FieldPart) -> None:
+        """Take over the field of a part that was made from the same mesh, in its last shape."""
+        self._deformed_field, self._last_field = other._deformed_field, other._last_field
 
     @cached_property
-    def _near(self) -> Bools:
+    def _is_near_tracked(self) -> Bools:
         """(vertex_count,) whether vertices are near the tracked ones, since the motion of hands,
         for example, does not matter to hair on a head."""
         tracked = self.carrier.rest
         if not len(tracked):
             return np.ones(len(self.surface.positions), bool)
         middle = tracked.mean(axis=0)
-        reach = NEAR * float(np.linalg.norm(tracked - middle, axis=1).max())
+        reach = _NEAR_RADII * float(np.linalg.norm(tracked - middle, axis=1).max())
         result: Bools = np.linalg.norm(self.surface.positions - middle, axis=1) <= reach
         return result
 
-    def is_of(self, surface: Surface, matrix: Floats, settings: DynamicsSettings) -> bool:
+    def was_made_from(self, surface: Surface, matrix: Floats, settings: DynamicsSettings) -> bool:
         """Whether this part was made from this mesh at rest, which `matrix` (4, 4) has moved."""
         if (
             self.resolution != settings.collider_resolution
@@ -184,7 +187,7 @@ class FieldPart:
             return False
         here = transform_points(self.surface.positions, matrix)
         extent = float(np.linalg.norm(np.ptp(here, axis=0)))
-        tolerance = _SAME_SHAPE * extent + 1.0e-6 * float(np.abs(here).max(initial=0.0))
+        tolerance = _SHAPE_TOLERANCE * extent + 1.0e-6 * float(np.abs(here).max(initial=0.0))
         return np.allclose(here, surface.positions, rtol=0.0, atol=tolerance)
 
 
@@ -206,25 +209,27 @@ class ShapePart:
     def uid(self) -> int | None:
         return self.carrier.body.handle.uid
 
-    def now(self, depsgraph: bpy.types.Depsgraph) -> tuple[Collider, Floats]:
-        return self.shape, _solid(self.carrier.motion_from_rest(depsgraph), self.name) @ self.base
+    def evaluate(self, depsgraph: bpy.types.Depsgraph) -> tuple[Collider, Floats]:
+        return self.shape, _checked_matrix(
+            self.carrier.motion_from_rest(depsgraph), self.name
+        ) @ self.base
 
-    def swollen(self) -> float:
+    def deformation(self) -> float:
         return 0.0
 
 
-def _solid(matrix: Floats, name: str) -> Floats:
+def _checked_matrix(matrix: Floats, name: str) -> Floats:
     """The matrix, if it has a volume.
 
     Raises:
         HairloomError: it scales an axis to zero.
     """
-    if not is_solid_scale(matrix):
+    if not is_invertible(matrix):
         raise HairloomError("its scale is zero", place=name, remedy="Correct its scale")
     return matrix
 
 
-def is_solid_scale(matrix: Floats) -> Bools:
+def is_invertible(matrix: Floats) -> Bools:
     """Whether each matrix (..., 4, 4) is finite and its volume is not zero."""
     linear = matrix[..., :3, :3]
     is_finite = np.isfinite(matrix).all(axis=(-2, -1))
@@ -234,10 +239,10 @@ def is_solid_scale(matrix: Floats) -> Bools:
     return result
 
 
-def is_round(matrix: Floats) -> bool:
+def is_evenly_scaled(matrix: Floats) -> bool:
     """Whether a matrix (4, 4) scales evenly, so that a ball stays a ball."""
     size = np.linalg.svd(matrix[:3, :3], compute_uv=False)
-    return bool(size[0] - size[2] <= _EVEN * size[0])
+    return bool(size[0] - size[2] <= _EVEN_TOLERANCE * size[0])
 
 
 def capsule_of(low: Floats, high: Floats, matrix: Floats) -> tuple[CapsuleCollider, Floats]:
@@ -257,7 +262,7 @@ def capsule_of(low: Floats, high: Floats, matrix: Floats) -> tuple[CapsuleCollid
     return CapsuleCollider(middle - to_end, middle + to_end, radius), base
 
 
-def used_box(surface: Surface) -> tuple[Floats, Floats]:
+def face_bounds(surface: Surface) -> tuple[Floats, Floats]:
     """Lowest and highest corner, (3,) each, of the vertices that belong to faces."""
     used: Ints = np.unique(surface.triangles)
     return surface.positions[used].min(axis=0), surface.positions[used].max(axis=0)

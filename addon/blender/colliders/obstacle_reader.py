@@ -15,33 +15,33 @@ from ...strands import Surface
 from ...strands.affine import transform_points
 from ..base.objects import Body
 from ..scene.surfaces import read_surface
-from .carriers import Carrier, is_deforming, is_left_out
+from .carriers import Carrier, is_deforming, is_disabled
 from .obstacle_balls import Ball
 from .obstacle_parts import (
     FieldPart,
     Part,
     ShapePart,
     capsule_of,
-    is_round,
-    is_solid_scale,
-    used_box,
+    face_bounds,
+    is_evenly_scaled,
+    is_invertible,
 )
 
 #: Types of objects that look solid but are not meshes.
-_SOLID = frozenset(("CURVE", "SURFACE", "META", "FONT", "VOLUME", "POINTCLOUD"))
+_SOLID_TYPES = frozenset(("CURVE", "SURFACE", "META", "FONT", "VOLUME", "POINTCLOUD"))
 
 
 @dataclass
-class Reader:
-    """Builds the part of one object.
+class ColliderReader:
+    """Makes the part of one object.
 
-    known: its previous part, if that has a field. blocking: for a new field; see `fields.field_of`.
+    previous: its last part, if that has a field. blocking: for a new field; see `fields.field_of`.
     """
 
     obj: bpy.types.Object
     depsgraph: bpy.types.Depsgraph
     settings: DynamicsSettings
-    known: FieldPart | None
+    previous: FieldPart | None
     blocking: bool
 
     def part_of_head(self, head: Body, at_rest: Surface, roots: Ints | None) -> Part | Ball | None:
@@ -55,51 +55,53 @@ class Reader:
     def part(self) -> Part | Ball | None:
         """Raises:
         HairloomError: it cannot collide as it should.
-        NotMadeYetError: its field is being made, and the call is not blocking.
+        NotReadyError: its field is being built, and the call is not blocking.
         """
         shape, obj = shape_of(self.obj), self.obj
         if shape == "none":
             return None
-        if is_left_out(obj, self.depsgraph):
-            raise left_out(obj.name)
+        if is_disabled(obj, self.depsgraph):
+            raise disabled_error(obj.name)
         body = Body.at_rest(obj, self.depsgraph)
-        if not is_solid_scale(body.rest):
+        if not is_invertible(body.rest):
             raise HairloomError("its scale is zero", place=obj.name, remedy="Correct its scale")
         if obj.type == "EMPTY" and shape != "mesh":
-            return self._empty(body, shape)
+            return self._empty_shape(body, shape)
         surface = read_surface(obj, self.depsgraph, need_uv=False, place=obj.name)
         carrier = Carrier.of_mesh(body, surface)
         if shape != "mesh":
-            return self._boxed(carrier, surface, shape)
-        if self.known is not None and self.known.carrier.vertex_count == carrier.vertex_count:
-            matrix = self.known.carrier.motion_from_rest(self.depsgraph)
-            if self.known.is_of(surface, matrix, self.settings):
-                return self._again(self.known.carrier)
+            return self._bounding_shape(carrier, surface, shape)
+        if self.previous is not None and self.previous.carrier.vertex_count == carrier.vertex_count:
+            matrix = self.previous.carrier.motion_from_rest(self.depsgraph)
+            if self.previous.was_made_from(surface, matrix, self.settings):
+                return self._reused(self.previous.carrier)
         return FieldPart.new(carrier, surface, self.settings, blocking=self.blocking)
 
     def _field_part(self, carrier: Carrier, surface: Surface, matrix: Floats) -> FieldPart:
-        if self.known is not None and self.known.is_of(surface, matrix, self.settings):
-            return self._again(carrier)
+        if self.previous is not None and self.previous.was_made_from(
+            surface, matrix, self.settings
+        ):
+            return self._reused(carrier)
         return FieldPart.new(carrier, surface, self.settings, blocking=self.blocking)
 
-    def _again(self, carrier: Carrier) -> FieldPart:
-        assert self.known is not None
-        known = self.known
-        made = FieldPart(carrier, known.surface, known.distance, known.resolution)
-        made.take_bent(known)
-        return made
+    def _reused(self, carrier: Carrier) -> FieldPart:
+        assert self.previous is not None
+        previous = self.previous
+        part = FieldPart(carrier, previous.surface, previous.distance, previous.resolution)
+        part.take_deformed_field(previous)
+        return part
 
-    def _empty(self, body: Body, shape: str) -> Part | Ball:
+    def _empty_shape(self, body: Body, shape: str) -> Part | Ball:
         size, middle = self.obj.empty_display_size, np.zeros(3)
         if shape == "sphere":
             return _ball_or_part(Carrier.of_object(body), Ball(body, middle, size))
         corner = np.array([size / 2.0, size / 2.0, size])
         return ShapePart(Carrier.of_object(body), *capsule_of(-corner, corner, body.rest))
 
-    def _boxed(self, carrier: Carrier, surface: Surface, shape: str) -> Part | Ball:
+    def _bounding_shape(self, carrier: Carrier, surface: Surface, shape: str) -> Part | Ball:
         rest = carrier.body.rest
         inverse = np.linalg.inv(rest)
-        low, high = used_box(
+        low, high = face_bounds(
             Surface(transform_points(surface.positions, inverse), surface.triangles)
         )
         if shape == "capsule":
@@ -115,7 +117,7 @@ def shape_of(obj: bpy.types.Object) -> str:
     chosen: str = obj.hairloom.collider_shape
     if chosen != "automatic":
         return chosen
-    if obj.type == "MESH" or obj.type in _SOLID:
+    if obj.type == "MESH" or obj.type in _SOLID_TYPES:
         return "mesh"  # for other types, reading it reports that it is no mesh
     return "sphere" if obj.type == "EMPTY" and obj.empty_display_type == "SPHERE" else "none"
 
@@ -127,12 +129,12 @@ def sized_axis(empty: bpy.types.Object) -> int:
 
 def _ball_or_part(carrier: Carrier, ball: Ball) -> Part | Ball:
     """A round ball, which becomes part of a set; or an ellipsoid, by its scale, as its own part."""
-    if is_round(carrier.body.rest):
+    if is_evenly_scaled(carrier.body.rest):
         return ball
     return ShapePart(carrier, SphereCollider(ball.center, ball.radius), carrier.body.rest)
 
 
-def left_out(name: str) -> HairloomError:
+def disabled_error(name: str) -> HairloomError:
     return HairloomError(
         "it is disabled in viewports or excluded from the view layer, so hair does not collide "
         "with it",

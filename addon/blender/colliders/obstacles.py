@@ -21,11 +21,11 @@ from ...errors import HairloomError
 from ...strands import Surface
 from ...strands.mesh_faults import edges_of
 from ..base.objects import Body
-from .carriers import is_left_out
-from .fields import NotMadeYetError
+from .carriers import is_disabled
+from .fields import NotReadyError
 from .obstacle_balls import Ball, BallsPart
 from .obstacle_parts import FieldPart, Part, ShapePart
-from .obstacle_reader import Reader, left_out, shape_of
+from .obstacle_reader import ColliderReader, disabled_error, shape_of
 
 
 @dataclass
@@ -34,9 +34,9 @@ class Obstacles:
 
     parts: list[Part]
     head_uid: int | None
-    _unusable: dict[str, str] = field(default_factory=dict)
-    _failed: dict[str, str] = field(default_factory=dict)
-    _doubtful: list[str] = field(default_factory=list)
+    _unusable_warnings: dict[str, str] = field(default_factory=dict)
+    _failure_warnings: dict[str, str] = field(default_factory=dict)
+    _mesh_warnings: list[str] = field(default_factory=list)
 
     @classmethod
     def of(
@@ -46,7 +46,7 @@ class Obstacles:
         head_at_rest: Surface | None,
         settings: DynamicsSettings,
         depsgraph: bpy.types.Depsgraph,
-        known: Obstacles | None,
+        previous: Obstacles | None,
         roots: Ints | None = None,
         *,
         blocking: bool = True,
@@ -56,51 +56,51 @@ class Obstacles:
         Args:
             owner: the hair curves, or a fin.
             head, head_at_rest: the surface, and its mesh in world space at rest; or None.
-            known: the previous colliders, whose distance fields are reused if nothing has changed.
+            previous: the last colliders, whose distance fields are reused if nothing has changed.
             roots: vertices of the head that hair grows on; the head is tracked by them.
             blocking: False: do not wait for distance fields to be built.
 
         Raises:
             HairloomError: as `move`.
-            NotMadeYetError: a field is being made, and the call is not blocking.
+            NotReadyError: a field is being built, and the call is not blocking.
         """
-        found = cls([], None if head is None else head.handle.uid)
-        fields = {} if known is None else known._fields()
+        obstacles = cls([], None if head is None else head.handle.uid)
+        fields = {} if previous is None else previous._fields()
         balls: dict[object, list[Ball]] = {}
-        is_whole = True
-        for obj in sources_of(owner, None if head is None else head.handle.find()):
+        is_complete = True
+        for obj in collider_objects(owner, None if head is None else head.handle.find()):
             is_head = head is not None and head.handle.uid == obj.session_uid
-            reader = Reader(obj, depsgraph, settings, fields.get(obj.session_uid), blocking)
+            reader = ColliderReader(obj, depsgraph, settings, fields.get(obj.session_uid), blocking)
             try:
                 if is_head and head is not None and head_at_rest is not None:
-                    made = reader.part_of_head(head, head_at_rest, roots)
+                    part = reader.part_of_head(head, head_at_rest, roots)
                 else:
-                    made = reader.part()
+                    part = reader.part()
             except HairloomError as error:
-                found._unusable[obj.name] = str(_named(obj.name, error))
+                obstacles._unusable_warnings[obj.name] = str(_with_place(obj.name, error))
                 continue
-            except NotMadeYetError:  # go on, so that the other fields are begun too
-                is_whole = False
+            except NotReadyError:  # go on, so that the other fields are begun too
+                is_complete = False
                 continue
-            if isinstance(made, Ball):
-                balls.setdefault(_carried_by(obj), []).append(made)
-            elif made is not None:
-                found.parts.append(made)
-                if isinstance(made, FieldPart) and not is_head:
-                    found._doubtful += _mesh_notes(made.surface, obj.name)
-        if not is_whole:
-            raise NotMadeYetError
-        found._doubtful += _unused_collection(owner)
-        found.parts += [BallsPart.new(group, depsgraph) for group in balls.values()]
-        found.rest(depsgraph)
-        return found
+            if isinstance(part, Ball):
+                balls.setdefault(_parent_key(obj), []).append(part)
+            elif part is not None:
+                obstacles.parts.append(part)
+                if isinstance(part, FieldPart) and not is_head:
+                    obstacles._mesh_warnings += _mesh_notes(part.surface, obj.name)
+        if not is_complete:
+            raise NotReadyError
+        obstacles._mesh_warnings += _unused_collection(owner)
+        obstacles.parts += [BallsPart.new(group, depsgraph) for group in balls.values()]
+        obstacles.rest(depsgraph)
+        return obstacles
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Objects that are left out and why, and doubts about those that are used."""
-        seen = [text for part in self.parts for text in part.warnings.values()]
-        lost = (*self._unusable.values(), *self._failed.values())
-        return tuple(dict.fromkeys([*lost, *self._doubtful, *seen]))
+        """Objects that are left out and why, and defects of those that are used."""
+        of_parts = [text for part in self.parts for text in part.warnings.values()]
+        unused = (*self._unusable_warnings.values(), *self._failure_warnings.values())
+        return tuple(dict.fromkeys([*unused, *self._mesh_warnings, *of_parts]))
 
     @property
     def meshes(self) -> tuple[Surface, ...]:
@@ -114,12 +114,12 @@ class Obstacles:
             HairloomError: the head is gone, or it has another mesh.
         """
         posed = []
-        for part in self._there(depsgraph):
+        for part in self._enabled_parts(depsgraph):
             try:
-                collider, matrix = part.now(depsgraph)
-                posed.append(part.track.go(collider, matrix, duration, part.swollen()))
+                collider, matrix = part.evaluate(depsgraph)
+                posed.append(part.track.advance(collider, matrix, duration, part.deformation()))
             except HairloomError as error:
-                self._fail(part, error)
+                self._drop(part, error)
         return tuple(posed)
 
     def rest(self, depsgraph: bpy.types.Depsgraph) -> tuple[PosedCollider, ...]:
@@ -129,60 +129,60 @@ class Obstacles:
             HairloomError: as `move`.
         """
         posed = []
-        for part in self._there(depsgraph):
+        for part in self._enabled_parts(depsgraph):
             try:
-                collider, matrix = part.now(depsgraph)
+                collider, matrix = part.evaluate(depsgraph)
                 posed.append(PosedCollider(collider, matrix, matrix))
-                part.track.rest(matrix)
-                part.swollen()
+                part.track.reset(matrix)
+                part.deformation()
             except HairloomError as error:
-                self._fail(part, error)
+                self._drop(part, error)
         return tuple(posed)
 
-    def standing(self, depsgraph: bpy.types.Depsgraph) -> tuple[PosedCollider, ...]:
-        """The colliders where they are now; those that cannot be used are left out, as Play reports
-        them."""
-        found = []
+    def static_colliders(self, depsgraph: bpy.types.Depsgraph) -> tuple[PosedCollider, ...]:
+        """The colliders in the present pose, at rest. Those that cannot be used are left out; Play
+        reports them."""
+        posed = []
         for part in self.parts:
             with suppress(HairloomError):
-                collider, matrix = part.now(depsgraph)
-                found.append(PosedCollider(collider, matrix, matrix))
-        return tuple(found)
+                collider, matrix = part.evaluate(depsgraph)
+                posed.append(PosedCollider(collider, matrix, matrix))
+        return tuple(posed)
 
-    def _there(self, depsgraph: bpy.types.Depsgraph) -> Iterator[Part]:
+    def _enabled_parts(self, depsgraph: bpy.types.Depsgraph) -> Iterator[Part]:
         """The parts that are enabled in the scene; others start from rest when enabled again."""
-        self._failed.clear()
+        self._failure_warnings.clear()
         for part in self.parts:
-            if self._is_left_out(part, depsgraph):
+            if self._is_disabled(part, depsgraph):
                 part.track.before = None
                 name = part.name
-                self._failed[name] = str(left_out(name))
+                self._failure_warnings[name] = str(disabled_error(name))
             else:
                 yield part
 
-    def _is_left_out(self, part: Part, depsgraph: bpy.types.Depsgraph) -> bool:
+    def _is_disabled(self, part: Part, depsgraph: bpy.types.Depsgraph) -> bool:
         """Sets of balls check this themselves; a hidden head still collides with its hair."""
         if isinstance(part, BallsPart) or self._is_head(part):
             return False
         assert isinstance(part, FieldPart | ShapePart)
         obj = part.carrier.body.handle.find()
-        return obj is not None and is_left_out(obj, depsgraph)
+        return obj is not None and is_disabled(obj, depsgraph)
 
     def _is_head(self, part: Part) -> bool:
         return part.uid is not None and part.uid == self.head_uid
 
-    def _fail(self, part: Part, error: HairloomError) -> None:
+    def _drop(self, part: Part, error: HairloomError) -> None:
         if self._is_head(part):
-            raise _named(part.name, error) from error
+            raise _with_place(part.name, error) from error
         part.track.before = None
-        self._failed[part.name] = str(_named(part.name, error))
+        self._failure_warnings[part.name] = str(_with_place(part.name, error))
 
     def _fields(self) -> dict[int, FieldPart]:
-        made = [part for part in self.parts if isinstance(part, FieldPart)]
-        return {part.carrier.body.handle.uid: part for part in made}
+        parts = [part for part in self.parts if isinstance(part, FieldPart)]
+        return {part.carrier.body.handle.uid: part for part in parts}
 
 
-def sources_of(
+def collider_objects(
     owner: bpy.types.Object, head: bpy.types.Object | None
 ) -> tuple[bpy.types.Object, ...]:
     """The objects that may collide with `owner`, each once: the chosen collider, or else the head,
@@ -212,35 +212,35 @@ def _mesh_notes(surface: Surface, name: str) -> Iterator[str]:
     edges = edges_of(surface)
     if edges.open_count:
         yield (
-            f"{name}: {_edges(edges.open_count)} with only one face. Hair collides with it as if "
-            "its holes were closed (Mesh > Clean Up > Fill Holes closes them)."
+            f"{name}: {_edge_count(edges.open_count)} with only one face. Hair collides with it as "
+            "if its holes were closed (Mesh > Clean Up > Fill Holes closes them)."
         )
     if edges.crowded_count:
         yield (
-            f"{name}: {_edges(edges.crowded_count)} with more than two faces, so hair may get into "
-            "it there. Delete its inner faces (Select > Select All by Trait > Interior Faces)."
+            f"{name}: {_edge_count(edges.crowded_count)} with more than two faces, so hair may get "
+            "into it there. Delete its inner faces (Select > Select All by Trait > Interior Faces)."
         )
     if edges.opposed_count:
         yield (
-            f"{name}: at {_edges(edges.opposed_count)} the faces point to opposite sides, so hair "
-            "may get into it there. Turn them outwards (Mesh > Normals > Recalculate Outside)."
+            f"{name}: at {_edge_count(edges.opposed_count)} the faces point to opposite sides, so "
+            "hair may get into it there. Turn them outwards (Mesh > Normals > Recalculate Outside)."
         )
 
 
-def _edges(count: int) -> str:
+def _edge_count(count: int) -> str:
     return "1 edge" if count == 1 else f"{count:,} edges"
 
 
-def _carried_by(obj: bpy.types.Object) -> object:
+def _parent_key(obj: bpy.types.Object) -> object:
     """The parent mesh or bone of a ball; balls with the same one move together."""
     if obj.parent is None:
         return None
     return obj.parent.session_uid, obj.parent_bone if obj.parent_type == "BONE" else ""
 
 
-def _named(name: str, error: HairloomError) -> HairloomError:
+def _with_place(name: str, error: HairloomError) -> HairloomError:
     """The error, with the object's name as its place."""
     return HairloomError(error.problem, place=name, remedy=error.remedy)
 
 
-__all__ = ["Obstacles", "shape_of", "sources_of"]
+__all__ = ["Obstacles", "collider_objects", "shape_of"]

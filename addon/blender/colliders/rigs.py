@@ -17,10 +17,10 @@ from ...rig_flow import ChildPlacement, Rig
 from ...strands.result_cache import NO_CACHE, ResultCache
 from ..properties.groom_settings import GroomSettings
 from ..scene.source import Source
-from .fields import solid_of
+from .fields import head_field_of
 
 #: The fields of `Source` that a rig is made from.
-_OF_RIG = ("strands", "head", "density", "masks", "partings", "holders")
+_RIG_INPUTS = ("strands", "head", "density", "masks", "partings", "holders")
 
 
 def rig_from(
@@ -42,7 +42,7 @@ def rig_from(
         place=place,
         children=settings[ChildrenSettings],
         placement=ChildPlacement(
-            source.density, source.masks, source.partings, lambda: solid_of(source.head)
+            source.density, source.masks, source.partings, lambda: head_field_of(source.head)
         ),
         widths=settings[WidthSettings].method,
         holders=source.holders,
@@ -52,32 +52,34 @@ def rig_from(
 
 
 @dataclass(frozen=True, eq=False)
-class MadeRig:
-    """A rig with its inputs, kept so that the same rig is not made twice."""
+class CachedRig:
+    """A rig with the inputs that it was made from, so that the same rig is not made twice."""
 
     source: Source
     settings: GroomSettings
     rig: Rig
 
     @classmethod
-    def of(cls, hair: bpy.types.Object, source: Source, known: tuple[MadeRig, ...] = ()) -> MadeRig:
+    def of(
+        cls, hair: bpy.types.Object, source: Source, cached: tuple[CachedRig, ...] = ()
+    ) -> CachedRig:
         """The rig of hair with its own settings, at rest as it was read.
 
         Args:
-            known: rigs that were made before, maybe of this hair; one with the same inputs is
+            cached: rigs that were made before, maybe of this hair; one with the same inputs is
                 returned.
 
         Raises:
             HairloomError: no hair that can be used.
         """
         settings = GroomSettings.of(hair)
-        for made in known:
-            if made.is_of(source, settings):
-                return made
+        for each in cached:
+            if each.was_made_from(source, settings):
+                return each
         return cls(source, settings, rig_from(source, settings.sections, place=hair.name))
 
-    def is_of(self, source: Source, settings: GroomSettings) -> bool:
+    def was_made_from(self, source: Source, settings: GroomSettings) -> bool:
         """Whether the rig made from these inputs is the same, to the last bit."""
         return self.settings.rig_settings == settings.rig_settings and all(
-            same_content(getattr(self.source, name), getattr(source, name)) for name in _OF_RIG
+            same_content(getattr(self.source, name), getattr(source, name)) for name in _RIG_INPUTS
         )

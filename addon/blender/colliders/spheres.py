@@ -26,7 +26,7 @@ __all__ = [
     "SphereFitSettings",
     "fit_spheres_to",
     "fitted_collections",
-    "grown_on",
+    "hair_on",
     "remove_spheres",
     "replace_mesh",
     "use_spheres",
@@ -35,11 +35,13 @@ __all__ = [
 #: Custom property of data-blocks made here: on the collection the mesh, on each Empty True.
 MARK = "hairloom_fitted"
 #: Custom property of the collection: the mesh's collider shape before its spheres replaced it.
-_BEFORE = "hairloom_collided_as"
+_REPLACED_SHAPE = "hairloom_collided_as"
 #: Vertices that a sphere may be parented to: maximum distance in radii, and minimum number.
-_REACH, _LEAST = 1.3, 12
+_PARENT_REACH, _MIN_PARENT_VERTICES = 1.3, 12
 #: Modifiers that make several vertices from one; Blender uses their centre as the parent.
-_COPYING = frozenset(("MIRROR", "ARRAY", "SCREW", "SKIN", "REMESH", "BOOLEAN", "BUILD", "NODES"))
+_COPYING_MODIFIERS = frozenset(
+    ("MIRROR", "ARRAY", "SCREW", "SKIN", "REMESH", "BOOLEAN", "BUILD", "NODES")
+)
 
 
 @dataclass(frozen=True)
@@ -64,8 +66,8 @@ def fit_spheres_to(
     depsgraph = context.evaluated_depsgraph_get()
     surface = read_surface(mesh, depsgraph, need_uv=False, place=mesh.name)
     fit = yield Part("Fitting spheres", partial(fit_spheres, surface, settings, place=mesh.name))
-    carrying = _vertices_now(mesh, depsgraph)
-    collection = _emptied_collection(mesh, context.scene)
+    vertices = _deformed_vertices(mesh, depsgraph)
+    collection = _empty_collection(mesh, context.scene)
     empties = []
     for radius in fit.radii:
         empty = bpy.data.objects.new(f"{mesh.name} Sphere", None)
@@ -74,7 +76,7 @@ def fit_spheres_to(
         empty[MARK] = True
         collection.objects.link(empty)
         empties.append(empty)
-    unskinned = _parent_to(empties, fit, mesh, carrying, context)
+    unskinned = _parent_to(empties, fit, mesh, vertices, context)
     return FittedSpheres(collection, fit, unskinned)
 
 
@@ -103,7 +105,7 @@ def use_spheres(
 def replace_mesh(mesh: bpy.types.Object, collection: bpy.types.Collection) -> None:
     """Let the spheres in this collection collide instead of their mesh."""
     if mesh.hairloom.collider_shape != "none":
-        collection[_BEFORE] = mesh.hairloom.collider_shape
+        collection[_REPLACED_SHAPE] = mesh.hairloom.collider_shape
         mesh.hairloom.collider_shape = "none"
 
 
@@ -111,43 +113,43 @@ def remove_spheres(mesh: bpy.types.Object) -> int:
     """Remove all spheres fitted to a mesh, which then collides as before; returns their number."""
     count = 0
     for collection in fitted_collections(mesh):
-        count += _empty_out(collection)
-        before = collection.pop(_BEFORE, None)
-        if before is not None and mesh.hairloom.collider_shape == "none":
-            mesh.hairloom.collider_shape = before
+        count += _remove_empties(collection)
+        shape = collection.pop(_REPLACED_SHAPE, None)
+        if shape is not None and mesh.hairloom.collider_shape == "none":
+            mesh.hairloom.collider_shape = shape
         if not collection.all_objects and not collection.children:
             bpy.data.collections.remove(collection)
     return count
 
 
-def grown_on(mesh: bpy.types.Object, view_layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
+def hair_on(mesh: bpy.types.Object, view_layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
     """The hair that grows on a mesh."""
     return [obj for obj in objects_in(view_layer) if obj.type == "CURVES" and head_of(obj) == mesh]
 
 
-def _emptied_collection(mesh: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Collection:
-    """The collection of this mesh's spheres, emptied of old ones; other objects in it are kept."""
-    found = fitted_collections(mesh)
-    collection = found[0] if found else bpy.data.collections.new(f"{mesh.name} Spheres")
-    _empty_out(collection)
+def _empty_collection(mesh: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Collection:
+    """The collection of this mesh's spheres, emptied of old ones; other objects stay in it."""
+    fitted = fitted_collections(mesh)
+    collection = fitted[0] if fitted else bpy.data.collections.new(f"{mesh.name} Spheres")
+    _remove_empties(collection)
     collection[MARK] = mesh
     if collection not in scene.collection.children_recursive:
         scene.collection.children.link(collection)
     return collection
 
 
-def _empty_out(collection: bpy.types.Collection) -> int:
+def _remove_empties(collection: bpy.types.Collection) -> int:
     old = [obj for obj in collection.objects if obj.get(MARK) and obj.type == "EMPTY"]
     bpy.data.batch_remove(old)
     return len(old)
 
 
-def _vertices_now(mesh: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats | None:
+def _deformed_vertices(mesh: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats | None:
     """(vertex_count, 3) [m] world, the mesh's own vertices as deformed; None if they cannot be
     identified among those that modifiers add."""
     positions = read_positions(mesh, depsgraph, place=mesh.name)
     count = len(mesh.data.vertices)
-    copied = any(each.show_viewport and each.type in _COPYING for each in mesh.modifiers)
+    copied = any(each.show_viewport and each.type in _COPYING_MODIFIERS for each in mesh.modifiers)
     if len(positions) < count or (len(positions) > count and copied):
         return None
     return positions[:count]  # subdivision keeps them first
@@ -163,12 +165,12 @@ def _parent_to(
     """Parent the spheres and place them; returns how many are parented to the object only."""
     unskinned = 0
     for empty, center, radius in zip(empties, fit.centers, fit.radii, strict=True):
-        carriers = None if vertices is None else _carriers(vertices, center, radius)
+        parents = None if vertices is None else _parent_vertices(vertices, center, radius)
         empty.parent = mesh
-        if carriers is None:
+        if parents is None:
             unskinned += 1
         else:
-            empty.parent_type, empty.parent_vertices = "VERTEX_3", carriers.tolist()
+            empty.parent_type, empty.parent_vertices = "VERTEX_3", parents.tolist()
     context.view_layer.update()  # Blender computes the frame of each sphere's parent
     for empty, center in zip(empties, fit.centers, strict=True):
         empty.matrix_parent_inverse = empty.matrix_world.inverted_safe()
@@ -177,13 +179,13 @@ def _parent_to(
     return unskinned
 
 
-def _carriers(vertices: Floats, center: Floats, radius: float) -> Ints | None:
+def _parent_vertices(vertices: Floats, center: Floats, radius: float) -> Ints | None:
     """Three vertices near a sphere (3,), far apart so that they define its rotation well; None if
     there is no triangle."""
     distance = np.linalg.norm(vertices - center, axis=1)
-    near = np.flatnonzero(distance <= _REACH * radius)
-    if len(near) < _LEAST:
-        near = np.argsort(distance, kind="stable")[:_LEAST]
+    near = np.flatnonzero(distance <= _PARENT_REACH * radius)
+    if len(near) < _MIN_PARENT_VERTICES:
+        near = np.argsort(distance, kind="stable")[:_MIN_PARENT_VERTICES]
     first = near[distance[near].argmin()]
     offset = vertices[near] - vertices[first]
     second = near[np.linalg.norm(offset, axis=1).argmax()]

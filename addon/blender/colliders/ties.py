@@ -33,20 +33,20 @@ from ..base.vertex_weights import read_weights
 from ..scene.hair_collections import add_to_collection, objects_in, remove_from_collection
 from ..scene.source import shown_curves
 from ..scene.surfaces import read_positions, read_surface
-from .carriers import is_deforming, is_left_out
-from .obstacle_parts import is_solid_scale
+from .carriers import is_deforming, is_disabled
+from .obstacle_parts import is_invertible
 
 #: Types of objects whose points form a ring.
-_DRAWN = frozenset(("MESH", "CURVE", "SURFACE", "FONT"))
-TIE_TYPES = frozenset(("EMPTY",)) | _DRAWN
+_RING_TYPES = frozenset(("MESH", "CURVE", "SURFACE", "FONT"))
+TIE_TYPES = frozenset(("EMPTY",)) | _RING_TYPES
 #: From this thickness on, relative to its width, a mesh is a ball instead of a ring.
-_THICK = 0.5
+_BALL_THICKNESS = 0.5
 #: Below this width, relative to its length, a ring is a line, which holds nothing.
-_LINE = 0.01
+_LINE_WIDTH = 0.01
 #: Radius of a new ring, relative to the hair's length.
-_NEW_RADIUS = 0.1
+_NEW_RING_RADIUS = 0.1
 #: Ties are unchanged if their shape differs by less than this, relative to their size.
-_SAME = 1.0e-4
+_SHAPE_TOLERANCE = 1.0e-4
 
 
 @dataclass
@@ -67,9 +67,9 @@ class _TrackedTie:
             HairloomError: it is gone, disabled or scaled to zero.
         """
         obj = self.body.resolve()
-        if is_left_out(obj, depsgraph):
+        if is_disabled(obj, depsgraph):
             raise _disabled_error(obj.name)
-        if not is_solid_scale(matrix_of(obj, depsgraph)):
+        if not is_invertible(matrix_of(obj, depsgraph)):
             raise HairloomError(
                 "its scale is zero, so it holds no hair", place=obj.name, remedy="Correct its scale"
             )
@@ -95,40 +95,40 @@ class TrackedHolders:
     _tips: Handle | None = None
     _unusable_warnings: tuple[str, ...] = ()
     _display_keys: dict[int, str] = field(default_factory=dict)
-    _idle_warnings: tuple[str, ...] = ()
+    _pose_warnings: tuple[str, ...] = ()
 
     @classmethod
     def of(
         cls,
         hair: bpy.types.Object,
         depsgraph: bpy.types.Depsgraph,
-        known: TrackedHolders | None = None,
-        back: Floats | None = None,
+        previous: TrackedHolders | None = None,
+        to_rest: Floats | None = None,
     ) -> TrackedHolders:
         """The ties and the tip surface of hair, at rest in its present pose.
 
         Args:
-            known: as read before; objects that are unchanged keep their rest.
-            back: (4, 4), from the present pose to that in which the hair is at rest.
+            previous: as read before; objects that are unchanged keep their rest.
+            to_rest: (4, 4), from the present pose to the rest pose of the hair.
         """
-        back = np.eye(4) if back is None else back
-        found, unusable = [], []
+        to_rest = np.eye(4) if to_rest is None else to_rest
+        ties, unusable = [], []
         for obj in ties_of(hair):
             try:
-                found.append(_reused_tie(_read_tie(obj, depsgraph, back), known))
+                ties.append(_reused_tie(_read_tie(obj, depsgraph, to_rest), previous))
             except HairloomError as error:
                 unusable.append(str(error))
         tips = None
         try:
-            tips = _read_tips(hair, depsgraph, back)
+            tips = _read_tips(hair, depsgraph, to_rest)
         except HairloomError as error:
             unusable.append(str(error))
         surface = hair.hairloom.tip_surface
-        if tips is not None and known is not None and known._has_tip_surface(surface):
-            tips = _same_surface(tips, known.holders.tip_surface)
+        if tips is not None and previous is not None and previous._has_tip_surface(surface):
+            tips = _reused_surface(tips, previous.holders.tip_surface)
         return cls(
-            Holders(tuple(one.tie for one in found), tips),
-            tuple(found),
+            Holders(tuple(one.tie for one in ties), tips),
+            tuple(ties),
             None if tips is None else Handle.of(surface),
             tuple(unusable),
             {obj.session_uid: _display_key(obj) for obj in holders_of(hair)},
@@ -139,7 +139,7 @@ class TrackedHolders:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        return (*self._unusable_warnings, *self._idle_warnings)
+        return (*self._unusable_warnings, *self._pose_warnings)
 
     @property
     def uids(self) -> frozenset[int]:
@@ -158,10 +158,10 @@ class TrackedHolders:
             return self
         ties = []
         for one, rest in zip(self._ties, rests, strict=True):
-            back = rest @ np.linalg.pinv(one.body.rest)
-            tie = Tie(one.tie.name, back @ one.tie.shape, one.tie.is_ball)
+            to_rest = rest @ np.linalg.pinv(one.body.rest)
+            tie = Tie(one.tie.name, to_rest @ one.tie.shape, one.tie.is_ball)
             ties.append(
-                _TrackedTie(Body(one.body.handle, rest), tie, transform_points(one.points, back))
+                _TrackedTie(Body(one.body.handle, rest), tie, transform_points(one.points, to_rest))
             )
         holders = Holders(tuple(one.tie for one in ties), self.holders.tip_surface)
         return TrackedHolders(
@@ -172,7 +172,7 @@ class TrackedHolders:
         self, hair: bpy.types.Object, holds: Holds, depsgraph: bpy.types.Depsgraph
     ) -> Floats:
         """The matrices of all anchors now, see `groom.holds.anchors_of`."""
-        idle = []
+        warnings = []
         matrices = np.full((holds.tie_count, 4, 4), np.nan)
         current = {obj.session_uid for obj in ties_of(hair)}
         for number, one in enumerate(self._ties[: holds.tie_count]):
@@ -181,13 +181,13 @@ class TrackedHolders:
                 if one.body.handle.uid in current and np.isfinite(matrix).all():
                     matrices[number] = matrix
             except HairloomError as error:
-                idle.append(str(_gone_tie_error(one.body.handle.name, error)))
+                warnings.append(str(_tie_error(one.body.handle.name, error)))
         positions = None
         try:
             positions = self._tip_positions(hair, holds, depsgraph)
         except HairloomError as error:
-            idle.append(str(error))
-        self._idle_warnings = tuple(idle)
+            warnings.append(str(error))
+        self._pose_warnings = tuple(warnings)
         return anchors_of(holds, matrices, positions)
 
     def _tip_positions(
@@ -196,7 +196,7 @@ class TrackedHolders:
         obj = hair.hairloom.tip_surface
         if holds.surface is None or obj is None:
             return None
-        if is_left_out(obj, depsgraph):
+        if is_disabled(obj, depsgraph):
             raise _disabled_error(obj.name)
         positions = read_positions(obj, depsgraph, place=obj.name)
         if positions.shape != holds.surface.positions.shape:
@@ -242,7 +242,7 @@ def new_ring(hair: bpy.types.Object, context: bpy.types.Context) -> bpy.types.Ob
     ring = bpy.data.objects.new("Hair Tie", None)
     ring.empty_display_type = "CIRCLE"
     strands = shown_curves(hair, context.evaluated_depsgraph_get()).strands
-    ring.empty_display_size = _NEW_RADIUS * float(np.median(strands.lengths()))
+    ring.empty_display_size = _NEW_RING_RADIUS * float(np.median(strands.lengths()))
     link_into(ring, hair.users_collection, context.scene)
     head = head_of(hair)
     if head is not None:
@@ -282,11 +282,13 @@ def count_held_curves(
 
 
 def _display_key(obj: bpy.types.Object) -> str:
-    """A key of an object's shape as far as a change of it edits no data: an Empty's display."""
+    """A key of what may change an object's shape without editing its data: an Empty's display."""
     return f"{obj.empty_display_type} {obj.empty_display_size}" if obj.type == "EMPTY" else obj.type
 
 
-def _read_tie(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, back: Floats) -> _TrackedTie:
+def _read_tie(
+    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, to_rest: Floats
+) -> _TrackedTie:
     """Raises:
     HairloomError: it cannot be a tie.
     """
@@ -296,14 +298,14 @@ def _read_tie(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, back: Float
             place=obj.name,
             remedy="Use an Empty, a curve or a mesh as a tie",
         )
-    if is_left_out(obj, depsgraph):
+    if is_disabled(obj, depsgraph):
         raise _disabled_error(obj.name)
     matrix = matrix_of(obj, depsgraph)
-    if not np.isfinite(matrix).all() or not is_solid_scale(matrix):
+    if not np.isfinite(matrix).all() or not is_invertible(matrix):
         raise HairloomError(
             "its scale is zero, so it holds no hair", place=obj.name, remedy="Correct its scale"
         )
-    rest = back @ matrix
+    rest = to_rest @ matrix
     body = Body(Handle.of(obj), rest)
     if obj.type == "EMPTY":
         shape, is_ball = _empty_tie_shape(obj)
@@ -339,8 +341,8 @@ def _fit_tie_shape(points: Floats, name: str) -> tuple[Floats, bool]:
         middle = points.mean(axis=0)
         _, size, axes = np.linalg.svd(points - middle, full_matrices=False)
         size /= np.sqrt(len(points))
-        if size[1] > _LINE * size[0] > 0.0:
-            is_ball = bool(size[2] > _THICK * size[0])
+        if size[1] > _LINE_WIDTH * size[0] > 0.0:
+            is_ball = bool(size[2] > _BALL_THICKNESS * size[0])
             half = size * np.sqrt(3.0 if is_ball else 2.0)
             half[2] = half[2] if is_ball else half[0]  # across the ring, where it has no extent
             shape = np.eye(4)
@@ -354,22 +356,22 @@ def _fit_tie_shape(points: Floats, name: str) -> tuple[Floats, bool]:
 
 
 def _read_tips(
-    hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, back: Floats
+    hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, to_rest: Floats
 ) -> TipSurface | None:
     obj = hair.hairloom.tip_surface
     if obj is None:
         return None
-    if is_left_out(obj, depsgraph):
+    if is_disabled(obj, depsgraph):
         raise _disabled_error(obj.name)
     surface = read_surface(obj, depsgraph, need_uv=False, place=obj.name)
     group = hair.hairloom.tip_group
     weight = read_weights(obj, depsgraph, group) if group else None
-    return TipSurface(obj.name, surface.transformed(back), weight)
+    return TipSurface(obj.name, surface.transformed(to_rest), weight)
 
 
-def _reused_tie(read: _TrackedTie, known: TrackedHolders | None) -> _TrackedTie:
+def _reused_tie(read: _TrackedTie, previous: TrackedHolders | None) -> _TrackedTie:
     """The tie as read before, unless its shape has changed; a new pose is no change of shape."""
-    for one in () if known is None else known._ties:
+    for one in () if previous is None else previous._ties:
         if one.body.handle.uid != read.body.handle.uid:
             continue
         here, there = (np.linalg.pinv(each.body.rest) @ each.tie.shape for each in (read, one))
@@ -379,8 +381,8 @@ def _reused_tie(read: _TrackedTie, known: TrackedHolders | None) -> _TrackedTie:
         size = float(np.trace(squares[1]))
         if (
             is_alike
-            and np.abs(squares[0] - squares[1]).max() <= _SAME * size
-            and np.abs(here[:3, 3] - there[:3, 3]).max() <= _SAME * np.sqrt(size)
+            and np.abs(squares[0] - squares[1]).max() <= _SHAPE_TOLERANCE * size
+            and np.abs(here[:3, 3] - there[:3, 3]).max() <= _SHAPE_TOLERANCE * np.sqrt(size)
         ):
             return one
         to_rest = one.body.rest @ np.linalg.pinv(read.body.rest)
@@ -389,16 +391,16 @@ def _reused_tie(read: _TrackedTie, known: TrackedHolders | None) -> _TrackedTie:
     return read
 
 
-def _same_surface(read: TipSurface, known: TipSurface | None) -> TipSurface:
+def _reused_surface(read: TipSurface, previous: TipSurface | None) -> TipSurface:
     """The surface as read before if it has the same triangles, since only its pose may differ."""
-    if known is None:
+    if previous is None:
         return read
-    one, other = read.surface.triangles, known.surface.triangles
+    one, other = read.surface.triangles, previous.surface.triangles
     is_same = one.shape == other.shape and bool((one == other).all())
     if not is_same:
         return read
-    is_as_weighted = are_same(read.weight, known.weight)
-    return known if is_as_weighted else replace(known, weight=read.weight)
+    has_same_weight = are_same(read.weight, previous.weight)
+    return previous if has_same_weight else replace(previous, weight=read.weight)
 
 
 def _disabled_error(name: str) -> HairloomError:
@@ -409,7 +411,7 @@ def _disabled_error(name: str) -> HairloomError:
     )
 
 
-def _gone_tie_error(name: str, error: HairloomError) -> HairloomError:
+def _tie_error(name: str, error: HairloomError) -> HairloomError:
     if not isinstance(error, ObjectGoneError):
         return error
     return HairloomError(

@@ -21,7 +21,7 @@ from ...strands import StrandSet, Surface
 from ...strands.affine import rotation_about
 from ..bakes.guide_motion import BakedGuides
 from ..base.attributes import set_attribute
-from ..colliders.copies import StillCopies, copy_colliders, copy_holders
+from ..colliders.copies import StaticCopies, copy_colliders, copy_holders
 from ..preview.bake import Bake
 from ..scene.curves import write_curves
 from ..scene.partings import copy_partings
@@ -99,7 +99,7 @@ def _hair_to_simulate(job: Job, inputs: Inputs) -> Iterator[bpy.types.Object]:
         head = mesh_object("Head", inputs.head, scene)
         hair = write_curves("Hair", inputs.strands, head, scene.collection)
         if scene_hair is not None:
-            copies = StillCopies(head, scene, depsgraph)
+            copies = StaticCopies(head, scene, depsgraph)
             copy_holders(scene_hair, hair, copies)
             copy_colliders(
                 scene_hair, bpy.data.objects.get(inputs.head_object_name or ""), hair, copies

@@ -27,7 +27,7 @@ from ..bakes.simulation import Simulation, differences
 from ..base import latest_job
 from ..base.objects import Handle, head_of
 from ..colliders import fields
-from ..colliders.fields import NotMadeYetError
+from ..colliders.fields import NotReadyError
 from ..properties.groom_settings import GroomSettings
 from ..sessions.session import Session
 from .phases import SIMULATED, Action, Event, Phase, frame_event, next_phase
@@ -88,7 +88,7 @@ class Preview:
     @property
     def can_begin(self) -> bool:
         """Whether everything that it needs to be simulated is made."""
-        return self.session.is_made and fields.are_made()
+        return self.session.is_made and fields.are_ready()
 
     @property
     def is_playing(self) -> bool:
@@ -105,7 +105,7 @@ class Preview:
         """Why it is not simulated, or its bake not shown; empty while all is well."""
         return " ".join(filter(None, (self.problem, self.bake_problem)))
 
-    def is_left_out(self, depsgraph: bpy.types.Depsgraph) -> bool:
+    def is_disabled(self, depsgraph: bpy.types.Depsgraph) -> bool:
         """Whether this depsgraph leaves out an object that it is made of.
 
         Such an object is in another scene, in an excluded collection, or disabled in viewports;
@@ -122,8 +122,8 @@ class Preview:
         self.handle_or_raise(Event.STOP, depsgraph)
         self.show_frame(depsgraph)
 
-    def stop_left_out(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """`stop` for a preview that is left out: cloth rests now, hair once it is read again."""
+    def stop_disabled(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """`stop` for a preview that is disabled: cloth rests now, hair once it is read again."""
         self.phase, self.session.is_playing = Phase.REST, False
         self.session.is_stale = self.must_rest = True
         if self.groom is None:
@@ -174,7 +174,7 @@ class Preview:
                     # saves reading the scene in each frame of playback just to find it unmade
                     is_frame = self.phase is Phase.TIMELINE
                     if is_frame and not blocking and not self.can_begin:
-                        raise NotMadeYetError
+                        raise NotReadyError
                     session.play(depsgraph, blocking=blocking, is_frame=is_frame)
                 case Action.ADVANCE:
                     session.advance(depsgraph, duration)
@@ -182,7 +182,7 @@ class Preview:
                     session.rest(depsgraph)
                 case Action.STOP:
                     session.stop(depsgraph)
-        except NotMadeYetError:
+        except NotReadyError:
             self.handle_or_raise(Event.UNMADE, depsgraph)
         except HairloomError:
             self.phase, session.is_playing = Phase.REST, False

@@ -29,7 +29,7 @@ from ..base.originals import (
 from ..base.redraw import redraw_panels, redraw_views, refresh_panels
 from ..cards.build_cache import CardBuildCache
 from ..colliders import fields
-from ..colliders.rigs import MadeRig
+from ..colliders.rigs import CachedRig
 from ..scene.fin_modifier import clear, is_shown
 from ..sessions.coupled_frame import CoupledFrame
 from ..sessions.session import Session
@@ -184,12 +184,12 @@ def simulations() -> tuple[Simulation, ...]:
 
 def simulations_in(depsgraph: bpy.types.Depsgraph) -> tuple[Simulation, ...]:
     """The previewed grooms and fins that this depsgraph does not leave out."""
-    return tuple(each.session for each in previews.values() if not each.is_left_out(depsgraph))
+    return tuple(each.session for each in previews.values() if not each.is_disabled(depsgraph))
 
 
-def made_rigs() -> dict[int, MadeRig]:
+def previewed_rigs() -> dict[int, CachedRig]:
     """The rigs of the previewed grooms that are made, by session number, as they were last read."""
-    made = {session.uid: session.made_rig for session in sessions()}
+    made = {session.uid: session.cached_rig for session in sessions()}
     return {uid: each for uid, each in made.items() if each is not None}
 
 
@@ -226,7 +226,7 @@ def playing_windows() -> dict[int, bpy.types.Window]:
     found: dict[int, bpy.types.Window] = {}
     for window in bpy.context.window_manager.windows:
         depsgraph = window.view_layer.depsgraph
-        if depsgraph is not None and not all(each.is_left_out(depsgraph) for each in playing):
+        if depsgraph is not None and not all(each.is_disabled(depsgraph) for each in playing):
             found.setdefault(window.scene.session_uid, window)
     return found
 
@@ -309,8 +309,8 @@ def _begin(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
 def rest(depsgraph: bpy.types.Depsgraph, *, keep_playing: bool) -> None:
     """Put all hair back into its style; or, unless it keeps playing, into its baked frame."""
     for preview in tuple(previews.values()):
-        if preview.is_playing and not keep_playing and preview.is_left_out(depsgraph):
-            preview.stop_left_out(depsgraph)
+        if preview.is_playing and not keep_playing and preview.is_disabled(depsgraph):
+            preview.stop_disabled(depsgraph)
             for each in shown_depsgraphs():
                 each.scene.update_tag()  # has it read again in another window that shows it
             continue
@@ -371,8 +371,8 @@ def attempt(
         needs_gpu: whether to only mark it to be read again later while there is no GPU.
     """
     session = preview.session
-    if preview.is_left_out(depsgraph):
-        if all(map(preview.is_left_out, shown_depsgraphs())):
+    if preview.is_disabled(depsgraph):
+        if all(map(preview.is_disabled, shown_depsgraphs())):
             session.is_stale = True  # until it is evaluated again
             overlay.hide(session.uid)
         return  # if another window shows it, it must not be changed from here
@@ -410,7 +410,7 @@ def publish(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
         note = f"{hair.name}: {note}"
     overlay.show(session.uid, overlay.read_drawing(session, hair, depsgraph, note))
     is_missing_lines = session.obstacles is None and "colliders" in hair.hairloom.shown_overlays
-    if is_missing_lines and not fields.are_made():
+    if is_missing_lines and not fields.are_ready():
         watch((session.uid, "lines"), partial(_show_lines, preview))
     refresh_panels()
     # our strands replace Blender's once they are made, in object mode and under a combing brush;
@@ -424,7 +424,7 @@ def publish(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
 
 def _show_lines(preview: Preview) -> float | None:
     """A step of `latest_job`: show the lines of colliders once they are made."""
-    if not fields.are_made():
+    if not fields.are_ready():
         return ARRIVAL_TIME
     attempt(preview, bpy.context.evaluated_depsgraph_get(), lambda: None)
     redraw_panels()
@@ -451,7 +451,7 @@ def _shown_depsgraph(preview: Preview) -> bpy.types.Depsgraph | None:
     """The evaluated depsgraph of a window that shows it; None: no window does."""
     for window in bpy.context.window_manager.windows:
         depsgraph = window.view_layer.depsgraph
-        if depsgraph is not None and not preview.is_left_out(depsgraph):
+        if depsgraph is not None and not preview.is_disabled(depsgraph):
             with bpy.context.temp_override(window=window):
                 return bpy.context.evaluated_depsgraph_get()
     return None
@@ -464,7 +464,7 @@ def finish(session: Session, depsgraph: bpy.types.Depsgraph) -> None:
         HairloomError: it is left out here, and will only be made when it is shown again.
     """
     preview = previews[session.uid]
-    if preview.is_left_out(depsgraph):
+    if preview.is_disabled(depsgraph):
         raise HairloomError(
             "it is in another scene, or its collection is hidden",
             place=session.name,

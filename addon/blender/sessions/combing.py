@@ -15,7 +15,7 @@ from ...refine.lead_out_at_rest import lead_out_at_rest
 from ...strands import StrandSet, Surface
 from ..base.objects import check_curves_editable, head_of
 from ..base.parts import Part, Parts
-from ..colliders.fields import solid_of
+from ..colliders.fields import head_field_of
 from ..scene.curves import read_original_curves, write_original_curves
 from ..scene.shape_backup import ShapeBackup
 from ..scene.surfaces import read_surface
@@ -75,7 +75,7 @@ def comb(
         is_changed = np.zeros(count, bool)
         other = np.flatnonzero((points != bound.points).any(axis=1))
         is_changed[np.searchsorted(bound.offsets, other, side="right") - 1] = True
-        changed, solid = np.flatnonzero(is_changed), solid_of(surface)
+        changed, solid = np.flatnonzero(is_changed), head_field_of(surface)
         if solid is not None and len(changed):
             some = replace(bound, points=points.copy()).take(changed)
             led, _ = lead_out_at_rest(some, solid, float(np.median(bound.lengths())))

@@ -14,7 +14,7 @@ from ...arrays import Floats, Ints
 from ...dynamics.cloth.state import Fabric, start_cloth
 from ..base.redraw import redraw_panels
 from ..base.thread_work import ThreadWork
-from ..colliders.fields import NotMadeYetError
+from ..colliders.fields import NotReadyError
 
 #: Meshes with at most this many triangles take a hundredth of a second, and are waited for.
 MAX_BLOCKING_TRIANGLES = 500
@@ -72,7 +72,7 @@ class FabricJob:
 
         Raises:
             HairloomError: see `start_cloth`.
-            NotMadeYetError: it is being made, and the call does not block.
+            NotReadyError: it is being made, and the call does not block.
         """
         if blocking or len(mesh.triangles) <= MAX_BLOCKING_TRIANGLES:
             self.cancel()
@@ -83,7 +83,7 @@ class FabricJob:
         if work is not None and self._mesh is not None and self._mesh.has_same_fabric(mesh):
             if not work.is_done:
                 self._work = work
-                raise NotMadeYetError
+                raise NotReadyError
             redraw_panels()
             self._fabric = work.result()
             return self._fabric
@@ -91,7 +91,7 @@ class FabricJob:
             self._mesh, self._fabric = mesh, None
             self._work = ThreadWork(lambda _: mesh.fabric(), "fabric")
             redraw_panels()
-            raise NotMadeYetError
+            raise NotReadyError
         return self._fabric
 
     def cancel(self) -> None:

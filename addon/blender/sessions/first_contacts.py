@@ -14,7 +14,7 @@ from ...dynamics.settings import DynamicsSettings
 from ...motion_flow import Motion
 from ...rig_flow import Pose, Rig
 from ..base.thread_work import ThreadWork
-from ..colliders.fields import NotMadeYetError
+from ..colliders.fields import NotReadyError
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,12 +69,12 @@ class FirstContacts:
         earlier start is done, that will do, so that a moving body is waited for only once.
 
         Raises:
-            NotMadeYetError: it is being found.
+            NotReadyError: it is being found.
         """
         if isinstance(self._motion, ThreadWork):
             if not self._motion.is_done:
-                raise NotMadeYetError
+                raise NotReadyError
         elif self._start is None or not self._start.is_same_as(start):
             self._start = start
             self._motion = ThreadWork(lambda _: start.motion(), "first contacts")
-            raise NotMadeYetError
+            raise NotReadyError

@@ -19,7 +19,7 @@ from ..base.attributes import copy_elements, read_attribute, set_attribute
 from ..base.objects import head_of, matrix_of
 from ..base.outcome import Outcome
 from ..base.parts import Part, Parts
-from ..colliders.fields import solid_of
+from ..colliders.fields import head_field_of
 from ..scene.curves import curve_offsets, curve_points, put_points, read_original_curves
 from ..scene.groom_attributes import CLOSEST_GUIDES, GUIDE, STRAND_ID
 from ..scene.shape_backup import SHAPE_BACKUPS
@@ -84,7 +84,7 @@ def mirror_hair(
 def _led_out(made: Mirrored, surface: Surface) -> Mirrored:
     """Lead out curves that an asymmetric surface has swallowed."""
     shifted = np.flatnonzero(made.is_shifted)
-    solid = solid_of(surface) if len(shifted) else None
+    solid = head_field_of(surface) if len(shifted) else None
     if solid is None:
         return made
     strands = made.strands

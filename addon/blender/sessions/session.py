@@ -34,9 +34,9 @@ from ..bakes.simulation import Arrays
 from ..base.latest_job import LatestJob
 from ..base.objects import Body
 from ..base.thread_work import ThreadWork
-from ..colliders.fields import NotMadeYetError
+from ..colliders.fields import NotReadyError
 from ..colliders.obstacles import Obstacles
-from ..colliders.rigs import MadeRig
+from ..colliders.rigs import CachedRig
 from ..properties.groom_settings import GroomSettings
 from ..scene.forces import force_fields_of, gravity_of
 from ..scene.source import Source, check_no_hair_dynamics, dynamics_warnings
@@ -148,13 +148,13 @@ class Session:
         return self._styled_rig or self.groom.rig
 
     @property
-    def made_rig(self) -> MadeRig | None:
+    def cached_rig(self) -> CachedRig | None:
         """The rig, and what it was made from; None if it has not grown children itself, as before
         it is made and when it comes from a bake."""
         request, groom = self._made
         if groom.rig.grown_children is None:
             return None
-        return MadeRig(request.source, request.settings, groom.rig)
+        return CachedRig(request.source, request.settings, groom.rig)
 
     @property
     def posed_colliders(self) -> tuple[PosedCollider, ...]:
@@ -550,7 +550,7 @@ class Session:
 
         Raises:
             HairloomError: as `rest`, or Blender's own hair dynamics is on.
-            NotMadeYetError: a distance field, the hair, or its first contacts are being made, and
+            NotReadyError: a distance field, the hair, or its first contacts are being made, and
                 the call does not block.
         """
         self.is_playing = False
@@ -560,7 +560,7 @@ class Session:
             self.finish(depsgraph)
         self._read_obstacles(depsgraph, blocking=blocking)
         if not self.is_made:
-            raise NotMadeYetError
+            raise NotReadyError
         if not blocking and not is_frame:
             start = self._play_start(self._pose(depsgraph), self.solids(depsgraph))
             self._contacts.find(start)
@@ -575,7 +575,7 @@ class Session:
 
         Errors of colliders are reported by Play, not here.
         """
-        with suppress(HairloomError, NotMadeYetError):
+        with suppress(HairloomError, NotReadyError):
             self._read_obstacles(depsgraph, blocking=False)
 
     def _read_obstacles(self, depsgraph: bpy.types.Depsgraph, *, blocking: bool) -> None:
@@ -717,7 +717,7 @@ class Session:
         """The colliders of the hair at this moment; none until they are made."""
         if self.obstacles is None:
             self.make_fields(depsgraph)
-        return () if self.obstacles is None else self.obstacles.standing(depsgraph)
+        return () if self.obstacles is None else self.obstacles.static_colliders(depsgraph)
 
     def bake_arrays(self) -> Arrays:
         """See `baked_rig.frame_arrays` and `baked_solids.solid_arrays`."""

@@ -26,7 +26,7 @@ from ...strands import StrandSet
 from ...strands.clean import Cleaned
 from ..base.objects import check_curves_editable, head_of
 from ..base.outcome import Outcome
-from ..colliders.fields import solid_of
+from ..colliders.fields import head_field_of
 from ..colliders.obstacles import Obstacles
 from ..scene.curves import read_original_curves, write_original_curves
 from ..scene.forces import gravity_of
@@ -78,7 +78,7 @@ def settle_hair(
     gravity = gravity_of(depsgraph.scene)
     painted = painted_guides(rig, masks) if masks else None
     fallen = yield from settle_flow.settle(rig, pose, posed, dynamics, settings, gravity, painted)
-    head = solid_of(rig.head)
+    head = head_field_of(rig.head)
     settled, is_out = settle_flow.settled_curves(strands, rig, fallen, head)
     if read.rest is not None and read.head is not None:
         settled = carry_with_surface(settled, read.head, read.rest.surface)

@@ -29,7 +29,7 @@ from ...strands.rooted_shapes import RootedShapes
 from ..base.objects import check_curves_editable, check_shape_editable, head_of
 from ..base.parts import Part, Parts, new_blocks_removed_on_error
 from ..base.vertex_weights import read_weights, set_group, weight_names
-from ..colliders.fields import solid_of
+from ..colliders.fields import head_field_of
 from ..properties import previews
 from ..properties.presets import apply, named_preset
 from ..properties.properties import settings_of
@@ -318,7 +318,9 @@ def _fur(
         GrowSettings.from_dict(style.settings[GROW_SECTION], style.title), factor
     )
     surface = read_surface(head, depsgraph, need_uv=False, place=head.name)
-    return lambda: _Growth(_led_out(grow(surface, settings), solid_of(surface)), factor, factor)
+    return lambda: _Growth(
+        _led_out(grow(surface, settings), head_field_of(surface)), factor, factor
+    )
 
 
 def _on_bust(
@@ -360,7 +362,7 @@ def _on_foreign(
             strands = _with_weighted_roots(strands, weights, foreign.surface, name, mask)
         if positions is not None:
             groups[mask] = foreign.weights(mask, positions)
-        solid = solid_of(foreign.surface)
+        solid = head_field_of(foreign.surface)
         strands = _led_out(strands, solid)
         lost = len(guides.group) - strands.strand_count
         if lost > _NOTED_LOST_FRACTION * len(guides.group):

@@ -19,7 +19,7 @@ from ..bakes import playback
 from ..bakes.stale_bakes import changed_inputs
 from ..base.objects import Handle
 from ..base.parts import Part, Parts
-from ..colliders.rigs import MadeRig, rig_from
+from ..colliders.rigs import CachedRig, rig_from
 from ..properties.groom_settings import GroomSettings
 from ..scene.source import read_source
 from .read_hair import ExportRequest, needs_rig, read_still_hair
@@ -37,28 +37,28 @@ class ExportCheck:
     lines: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     _read: dict[ExportRequest, tuple[Groom, tuple[str, ...]]] = field(default_factory=dict)
-    _made_rigs: dict[int, MadeRig] = field(default_factory=dict)
+    _cached_rigs: dict[int, CachedRig] = field(default_factory=dict)
     _stale: dict[int, tuple[str, ...]] = field(default_factory=dict)
     _checked: tuple[StrandFormat, StrandExportSettings] | None = None
 
     @classmethod
     def of(
-        cls, hair: list[bpy.types.Object], known: Mapping[int, MadeRig] | None = None
+        cls, hair: list[bpy.types.Object], cached: Mapping[int, CachedRig] | None = None
     ) -> ExportCheck:
         """Begin a check.
 
         Args:
-            known: rigs of hair that are made already, by session number.
+            cached: rigs of hair that are made already, by session number.
         """
         check = cls([Handle.of(each) for each in hair])
         uids = {each.uid for each in check.hair}
-        check._made_rigs = {uid: made for uid, made in (known or {}).items() if uid in uids}
+        check._cached_rigs = {uid: made for uid, made in (cached or {}).items() if uid in uids}
         return check
 
     @property
-    def made_rigs(self) -> tuple[MadeRig, ...]:
+    def cached_rigs(self) -> tuple[CachedRig, ...]:
         """The rigs that were made, so that writing the file need not make them again."""
-        return tuple(self._made_rigs.values())
+        return tuple(self._cached_rigs.values())
 
     def read_steps(
         self,
@@ -75,11 +75,11 @@ class ExportCheck:
             groom = GroomSettings.of(hair)
             with suppress(HairloomError):  # `refresh` gets it too, and reports it
                 source = read_source(hair, depsgraph)
-                known = self._made_rigs.get(uid)
-                if known is None or not known.is_of(source, groom):
+                cached = self._cached_rigs.get(uid)
+                if cached is None or not cached.was_made_from(source, groom):
                     make = partial(rig_from, source, groom.sections, place=name)
                     rig = yield Part("Making strands", make)
-                    self._made_rigs[uid] = MadeRig(source, groom, rig)
+                    self._cached_rigs[uid] = CachedRig(source, groom, rig)
 
     def refresh(
         self,
@@ -114,10 +114,10 @@ class ExportCheck:
             found = [hair for hair in (each.find() for each in self.hair) if hair is not None]
             if not found:
                 raise HairloomError("it is gone", place="hair", remedy="Export again")
-            outs = [read_still_hair(each, depsgraph, request, self.made_rigs) for each in found]
+            outs = [read_still_hair(each, depsgraph, request, self.cached_rigs) for each in found]
             for each, out in zip(found, outs, strict=True):
                 if out.made is not None:
-                    self._made_rigs[each.session_uid] = out.made
+                    self._cached_rigs[each.session_uid] = out.made
             groom, lost = join_grooms([out.groom for out in outs], found[0].name)
             notes = dict.fromkeys([note for out in outs for note in out.notes])
             self._read[request] = groom, (*notes, *lost)

@@ -22,7 +22,7 @@ from ..bakes.playback import check_frames
 from ..bakes.stale_bakes import stale_notes
 from ..base.objects import Body, Handle, head_of
 from ..base.suspension import suspended
-from ..colliders.rigs import MadeRig
+from ..colliders.rigs import CachedRig
 from ..scene.source import shown_curves
 from ..scene.surfaces import read_positions
 from .read_hair import ExportRequest, ExportStrands, read_baked_hair, read_still_hair
@@ -116,7 +116,7 @@ def moving_hair(
     depsgraph: bpy.types.Depsgraph,
     frames: range,
     request: ExportRequest,
-    known_rigs: tuple[MadeRig, ...] = (),
+    cached_rigs: tuple[CachedRig, ...] = (),
     *,
     use_bake: bool,
 ) -> tuple[MovingHair, tuple[str, ...]]:
@@ -124,7 +124,7 @@ def moving_hair(
 
     Args:
         frames: scene frames.
-        known_rigs: see `read_still_hair`.
+        cached_rigs: see `read_still_hair`.
         use_bake: whether its bake moves it, if it has one.
 
     Raises:
@@ -138,7 +138,7 @@ def moving_hair(
     rate = frame_rate(depsgraph.scene)
     with _scene_frame_restored() as go_to:
         depsgraph = go_to(frames[0])
-        out = read_still_hair(hair, depsgraph, request, known_rigs)
+        out = read_still_hair(hair, depsgraph, request, cached_rigs)
         moving: MovingHair = ShownMotion(out, Handle.of(hair), rate)
         if out.has_children and out.made is not None:
             moving = _children_motion(hair, depsgraph, out, out.made, rate)
@@ -209,7 +209,7 @@ def _children_motion(
     hair: bpy.types.Object,
     depsgraph: bpy.types.Depsgraph,
     out: ExportStrands,
-    made: MadeRig,
+    made: CachedRig,
     rate: float,
 ) -> ChildrenMotion:
     rig, head = made.rig, head_of(hair)

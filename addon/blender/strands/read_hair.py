@@ -25,7 +25,7 @@ from ...strands.resample import resample
 from ..bakes import playback
 from ..bakes.cache import Cache
 from ..base.outcome import notes_of
-from ..colliders.rigs import MadeRig
+from ..colliders.rigs import CachedRig
 from ..properties.groom_settings import GroomSettings
 from ..scene.groom_attributes import group_names, stored_groom
 from ..scene.painted_colors import read_colors
@@ -66,7 +66,7 @@ class ExportStrands:
     copied: Ints
     dropped: Mapping[str, int] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
-    made: MadeRig | None = None
+    made: CachedRig | None = None
     has_children: bool = False
 
     def points(self, seen: Floats) -> Floats:
@@ -83,7 +83,7 @@ def read_still_hair(
     hair: bpy.types.Object,
     depsgraph: bpy.types.Depsgraph,
     request: ExportRequest,
-    known_rigs: tuple[MadeRig, ...] = (),
+    cached_rigs: tuple[CachedRig, ...] = (),
 ) -> ExportStrands:
     """All strands after the modifiers, with their own points; or guides and children, if any.
 
@@ -91,14 +91,14 @@ def read_still_hair(
     added.
 
     Args:
-        known_rigs: rigs that were made before, maybe of the same hair.
+        cached_rigs: rigs that were made before, maybe of the same hair.
 
     Raises:
         HairloomError: no usable hair, or it is of another scale than its head.
     """
     source = read_source(hair, depsgraph)
     has_children = hair.data.hairloom.children.method != "none"
-    made = MadeRig.of(hair, source, known_rigs) if has_children else None
+    made = CachedRig.of(hair, source, cached_rigs) if has_children else None
     if made is not None and made.rig.own_count is not None:
         rig = made.rig
         strands = with_colors(rig.strands, source.colors, _look(hair))
@@ -109,7 +109,7 @@ def read_still_hair(
         return _with_notes(hair, source, out, rig)
     attributes = _without_empty_marks(stored_groom(hair, depsgraph, source.curve_indices))
     if request.guides and "is_guide" not in attributes:
-        made = made or MadeRig.of(hair, source, known_rigs)
+        made = made or CachedRig.of(hair, source, cached_rigs)
         rig, strands = made.rig, _as_wide_as_drawn(hair, source.strands)
         strands = with_colors(_with_roots_of(strands, rig.strands), source.colors, _look(hair))
         groom = Groom(strands, hair.name, **attributes)

@@ -23,7 +23,7 @@ from ...exchange.strand_writing import WrittenStrands, write_strands
 from ...exchange.tfxbone import BoneWeights
 from ..base.outcome import Outcome
 from ..base.thread_work import ThreadWork
-from ..colliders.rigs import MadeRig
+from ..colliders.rigs import CachedRig
 from ..scene.bone_weights import bones_of, has_bones, unmoved_head_notes
 from .groom_motion import MovingHair, common_rate, frame_positions, moving_hair
 from .read_hair import ExportRequest, ExportStrands, read_still_hair
@@ -63,13 +63,13 @@ class StrandExport:
         settings: StrandExportSettings,
         *,
         frames: range | None = None,
-        known: tuple[MadeRig, ...] = (),
+        cached_rigs: tuple[CachedRig, ...] = (),
     ) -> StrandExport:
         """Read hair of the scene; several objects become one groom, each with its own groups.
 
         Args:
             frames: scene frames; None: a still of the present frame.
-            known: see `read_still_hair`.
+            cached_rigs: see `read_still_hair`.
 
         Raises:
             HairloomError: no usable hair, frames that were not baked, or an engine or option that
@@ -79,10 +79,10 @@ class StrandExport:
         has_roots = with_bones and any(has_bones(each) for each in hair)
         request = replace(request_of(kind, settings), roots=has_roots)
         if frames is None:
-            outs, moving, notes = _read_still(hair, depsgraph, request, known)
+            outs, moving, notes = _read_still(hair, depsgraph, request, cached_rigs)
         else:
             outs, moving, notes = _read_moving(
-                hair, depsgraph, request, frames, known, use_bake=settings.use_bake
+                hair, depsgraph, request, frames, cached_rigs, use_bake=settings.use_bake
             )
         groom, lost = join_grooms([out.groom for out in outs], hair[0].name)
         bones, missing = None, tuple[str, ...]()
@@ -187,9 +187,9 @@ def _read_still(
     hair: list[bpy.types.Object],
     depsgraph: bpy.types.Depsgraph,
     request: ExportRequest,
-    known_rigs: tuple[MadeRig, ...],
+    cached_rigs: tuple[CachedRig, ...],
 ) -> tuple[list[ExportStrands], tuple[MovingHair, ...], tuple[str, ...]]:
-    return [read_still_hair(each, depsgraph, request, known_rigs) for each in hair], (), ()
+    return [read_still_hair(each, depsgraph, request, cached_rigs) for each in hair], (), ()
 
 
 def _read_moving(
@@ -197,7 +197,7 @@ def _read_moving(
     depsgraph: bpy.types.Depsgraph,
     request: ExportRequest,
     frames: range,
-    known_rigs: tuple[MadeRig, ...],
+    cached_rigs: tuple[CachedRig, ...],
     *,
     use_bake: bool,
 ) -> tuple[list[ExportStrands], tuple[MovingHair, ...], tuple[str, ...]]:
@@ -205,7 +205,7 @@ def _read_moving(
     notes: list[str] = []
     for each in hair:
         part, more_notes = moving_hair(
-            each, depsgraph, frames, request, known_rigs, use_bake=use_bake
+            each, depsgraph, frames, request, cached_rigs, use_bake=use_bake
         )
         moving.append(part)
         notes += more_notes
