@@ -149,7 +149,7 @@ def _ours(rig: Rig, camera: Any, absorption: tuple[float, float, float], world: 
     studio = _studio(rig, GroomSettings().with_settings(look))
     light = read_environment(SimpleNamespace(world=world))
     snapshot = replace(
-        studio._at_rest,
+        studio._rest_snapshot,
         points=rig.strands.points,
         meshes=studio._meshes(rig.rest_pose),
         lights=light.suns,

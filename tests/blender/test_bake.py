@@ -746,11 +746,11 @@ def test_a_render_has_the_rig_of_the_newest_bake(swinging, get_depsgraph):
     hair, _ = swinging
     bake(hair)
     engine_hair.read_groom(hair, get_depsgraph())
-    before = engine_hair._kept[hair.session_uid].made.rig
+    before = engine_hair._cache[hair.session_uid].built.rig
     hair.data.hairloom.guides.guide_count = 10
     bake(hair)
     engine_hair.read_groom(hair, get_depsgraph())
-    after = engine_hair._kept[hair.session_uid].made.rig
+    after = engine_hair._cache[hair.session_uid].built.rig
     np.testing.assert_array_equal(before.strands.points, after.strands.points)
     assert len(after.guides) == 10 < len(before.guides)
     engine_hair.forget()

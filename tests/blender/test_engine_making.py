@@ -217,7 +217,7 @@ def test_an_error_reported_repeatedly_does_not_grow(
     def read() -> None:
         try:
             engine_hair.read_groom(hair, bpy.context.evaluated_depsgraph_get(), blocking=False)
-        except (HairloomError, engine_hair.HairNotMadeYetError) as error:
+        except (HairloomError, engine_hair.HairNotReadyError) as error:
             causes = error, error.__cause__
             lengths.append(sum(len(list(traceback.walk_tb(e.__traceback__))) for e in causes if e))
 
@@ -245,7 +245,7 @@ def test_the_picture_keeps_its_hair_until_the_preview_has_its_own(
         return view.read(
             {hair.session_uid},
             is_previewed=drawn.__contains__,
-            is_expected=expected.__contains__,
+            has_pending_preview=expected.__contains__,
         )
 
     assert read() == (before,)

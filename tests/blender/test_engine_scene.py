@@ -155,8 +155,8 @@ def test_hair_of_instances_is_as_thick_and_lit_as_it_looks(
     settings.card_drawing.shown_as, settings.card_occlusion.rays = shown_as, 4
     settings.cards.order_by, settings.atlas.source = "distance", "made"
     own = engine_hair.read_groom(hair, bpy.context.evaluated_depsgraph_get())
-    large = engine_hair.placed(own, np.diag((2.0, 2.0, 2.0, 1.0)))
-    mirrored = engine_hair.placed(own, np.diag((-1.0, 1.0, 1.0, 1.0)))
+    large = engine_hair.transformed(own, np.diag((2.0, 2.0, 2.0, 1.0)))
+    mirrored = engine_hair.transformed(own, np.diag((-1.0, 1.0, 1.0, 1.0)))
     if own.cards is None:
         np.testing.assert_allclose(large.radius, 2.0 * own.radius)
     else:

@@ -320,7 +320,7 @@ def test_files_that_were_saved_amid_a_render_are_healed(
     cycles.hairloom.use_hair_scene = True
     hair_scene.hide_hair(cycles)
     path = str(tmp_path / "amid.blend")
-    handler = hair_scene.heal
+    handler = hair_scene.repair
     bpy.app.handlers.save_pre.remove(handler)  # autosaves do not call this handler
     try:
         bpy.ops.wm.save_as_mainfile(filepath=path, copy=True)
@@ -586,6 +586,6 @@ def test_a_file_format_comes_back_after_the_picture_was_read(
         ]
 
     before = state()
-    with engine_picture._as_floats(settings):
+    with engine_picture._float_format(settings):
         assert settings.file_format == "OPEN_EXR" and settings.color_depth == "32"
     assert state() == before

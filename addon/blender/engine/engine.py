@@ -16,7 +16,7 @@ from ..base import event_handlers
 from ..base.gpu_context import can_draw
 from ..viewport.overlay import ENGINE
 from . import engine_hair
-from .engine_passes import COMBINED, wanted_passes
+from .engine_passes import COMBINED, enabled_passes
 from .engine_still import Still
 from .engine_view import EngineView
 
@@ -39,7 +39,7 @@ class HAIRLOOM_RE_engine(bpy.types.RenderEngine):
 
     def update_render_passes(self, scene: Any, renderlayer: Any) -> None:
         """Register the passes for Blender's compositor and file outputs."""
-        for each in (COMBINED, *wanted_passes(scene, renderlayer)):
+        for each in (COMBINED, *enabled_passes(scene, renderlayer)):
             channels = len(each.channels), each.channels
             self.register_pass(scene, renderlayer, each.name, *channels, each.kind)
 
@@ -52,12 +52,12 @@ class HAIRLOOM_RE_engine(bpy.types.RenderEngine):
 
     def _render(self, depsgraph: Any) -> None:
         layer = depsgraph.view_layer
-        for each in wanted_passes(depsgraph.scene, layer):
+        for each in enabled_passes(depsgraph.scene, layer):
             self.add_pass(each.name, len(each.channels), each.channels, layer=layer.name)
         try:
             still = Still(self, depsgraph)
-            for name in _views(depsgraph.scene.render):
-                still.view(name)
+            for name in _view_names(depsgraph.scene.render):
+                still.render_view(name)
         except Exception as error:
             if not isinstance(error, (HairloomError, ShaderError)):
                 traceback.print_exc()
@@ -77,11 +77,11 @@ class HAIRLOOM_RE_engine(bpy.types.RenderEngine):
         counts = self._attempt(self.view.draw, context, depsgraph)
         if counts is None:
             return
-        count, wanted = counts
+        count, total = counts
         warning = next(iter(self.view.warnings), "")
-        lacking = "Hair is being made. " if self.view.is_waiting else ""
-        self.update_stats(f"{lacking}Sample {count} of {wanted}", warning)
-        if count < wanted:
+        notice = "Hair is being made. " if self.view.is_waiting else ""
+        self.update_stats(f"{notice}Sample {count} of {total}", warning)
+        if count < total:
             self.tag_redraw()
 
     def _attempt(self, action: Any, context: Any, depsgraph: Any) -> Any:
@@ -99,7 +99,7 @@ class HAIRLOOM_RE_engine(bpy.types.RenderEngine):
             return None
 
 
-def _views(render: Any) -> list[str]:
+def _view_names(render: Any) -> list[str]:
     """The names of the views of a picture; a single empty one without stereoscopy."""
     if not render.use_multiview:
         return [""]

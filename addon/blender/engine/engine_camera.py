@@ -14,9 +14,9 @@ from ...render.camera_window import Window, cropped
 from ...render.lens import Lens
 
 #: Blender's own minimum of a picture's side [pixels]
-_SMALLEST = 1
+_MIN_SIZE = 1
 #: minimum f-stop, as in Cycles
-_SMALLEST_STOP = 1.0e-5
+_MIN_F_STOP = 1.0e-5
 
 
 def read_camera(
@@ -31,7 +31,7 @@ def read_camera(
     Raises:
         HairloomError: there is no camera.
     """
-    camera = _chosen(engine, depsgraph)
+    camera = _active_camera(engine, depsgraph)
     if camera is None:
         raise HairloomError(
             "there is no camera", place=depsgraph.scene.name, remedy="Add one (Add > Camera)"
@@ -56,22 +56,22 @@ def read_camera(
     return cropped(Camera(_view_matrix(matrix), projection), window)
 
 
-def _chosen(engine: Any, depsgraph: bpy.types.Depsgraph) -> bpy.types.Object | None:
-    """The active camera; None where the scene has none, or an object of another type."""
+def _active_camera(engine: Any, depsgraph: bpy.types.Depsgraph) -> bpy.types.Object | None:
+    """The active camera; None if the scene has none, or an object of another type."""
     camera = engine.camera_override or depsgraph.scene.camera
     return camera if camera is not None and camera.type == "CAMERA" else None
 
 
 def read_lens(engine: Any, depsgraph: bpy.types.Depsgraph) -> Lens | None:
     """The lens of the active camera; None without depth of field."""
-    camera = _chosen(engine, depsgraph)
+    camera = _active_camera(engine, depsgraph)
     if camera is None or not camera.data.dof.use_dof:
         return None
     evaluated = camera.evaluated_get(depsgraph)
     data = evaluated.data
-    # the radius as in Cycles; the focal length is in millimetres
-    wide = 1.0 if data.type == "ORTHO" else 1.0e-3 * data.lens
-    radius = wide / (2.0 * max(data.dof.aperture_fstop, _SMALLEST_STOP))
+    # the radius as in Cycles; Blender's focal length is in millimetres
+    focal_length = 1.0 if data.type == "ORTHO" else 1.0e-3 * data.lens
+    radius = focal_length / (2.0 * max(data.dof.aperture_fstop, _MIN_F_STOP))
     focus = _focus_distance(evaluated, depsgraph)
     if not (radius > 0.0 and focus > 0.0 and np.isfinite(focus)):
         return None
@@ -86,16 +86,16 @@ def _focus_distance(camera: bpy.types.Object, depsgraph: bpy.types.Depsgraph) ->
     if dof.focus_object is None:
         return float(dof.focus_distance)
     target = dof.focus_object.evaluated_get(depsgraph)
-    place = target.matrix_world
+    matrix = target.matrix_world
     if target.type == "ARMATURE" and dof.focus_subtarget in target.pose.bones:
-        place = place @ target.pose.bones[dof.focus_subtarget].matrix
-    seen = camera.matrix_world.normalized().inverted() @ place.translation
-    return float(abs(seen.z))
+        matrix = matrix @ target.pose.bones[dof.focus_subtarget].matrix
+    in_view = camera.matrix_world.normalized().inverted() @ matrix.translation
+    return float(abs(in_view.z))
 
 
 def camera_warnings(engine: Any, depsgraph: bpy.types.Depsgraph) -> tuple[str, ...]:
     """Warnings about the camera, each with its remedy; mostly none."""
-    camera = _chosen(engine, depsgraph)
+    camera = _active_camera(engine, depsgraph)
     if camera is None or camera.data.type != "PANO":
         return ()
     return (
@@ -119,7 +119,7 @@ def border_window(
         left, right = (int(x * np.float32(b)) for b in (render.border_min_x, render.border_max_x))
         bottom, top = (int(y * np.float32(b)) for b in (render.border_min_y, render.border_max_y))
     size = right - left, top - bottom
-    if min(size) < _SMALLEST:
+    if min(size) < _MIN_SIZE:
         raise HairloomError(
             f"the picture has {max(size[0], 0)} x {max(size[1], 0)} pixels",
             place="render",
@@ -151,8 +151,8 @@ def view_rectangle(
             frame = _camera_frame(camera.evaluated_get(depsgraph), scene, region)
             corners = frame[0] + _border(scene.render, "border") * (frame[1] - frame[0])
     low, high = np.clip(corners * (width, height), 0, (width, height)).round().astype(int)
-    across, up = np.maximum(high - low, 0)
-    return int(low[0]), int(low[1]), int(across), int(up)
+    size = np.maximum(high - low, 0)
+    return int(low[0]), int(low[1]), int(size[0]), int(size[1])
 
 
 def _border(owner: Any, name: str) -> Floats:
@@ -166,8 +166,8 @@ def _camera_frame(camera: bpy.types.Object, scene: bpy.types.Scene, region: Any)
     """The lower left and upper right corner of a camera's frame, as fractions of its 3D view."""
     frame = np.array([(*corner, 1.0) for corner in camera.data.view_frame(scene=scene)])
     clip = frame @ np.array(region.window_matrix).T
-    places = 0.5 + 0.5 * clip[:, :2] / clip[:, 3:]
-    return np.array([places.min(axis=0), places.max(axis=0)])
+    corners = 0.5 + 0.5 * clip[:, :2] / clip[:, 3:]
+    return np.array([corners.min(axis=0), corners.max(axis=0)])
 
 
 def _view_matrix(matrix: Floats) -> Floats:
@@ -181,9 +181,7 @@ def _view_matrix(matrix: Floats) -> Floats:
 def _fit_fraction(
     camera: bpy.types.Camera, render: bpy.types.RenderSettings, width: int, height: int
 ) -> float:
-    """The side of the picture that shifts refer to, relative to the picture's width."""
+    """The side of the picture that camera shifts are measured in, relative to its width."""
     wide, high = width * render.pixel_aspect_x, height * render.pixel_aspect_y
-    is_by_width = camera.sensor_fit == "HORIZONTAL" or (
-        camera.sensor_fit == "AUTO" and wide >= high
-    )
-    return 1.0 if is_by_width else high / wide
+    fits_width = camera.sensor_fit == "HORIZONTAL" or (camera.sensor_fit == "AUTO" and wide >= high)
+    return 1.0 if fits_width else high / wide

@@ -27,10 +27,10 @@ class Mattes:
 
     @classmethod
     def of(
-        cls, wanted: Mapping[str, Any], layer: bpy.types.ViewLayer, width: int, height: int
+        cls, passes: Mapping[str, Any], layer: bpy.types.ViewLayer, width: int, height: int
     ) -> Mattes | None:
         """The mattes of a picture; None if no pass needs them."""
-        is_wanted = any(name == HAIR_ALPHA.name or name.startswith(CRYPTOMATTE) for name in wanted)
+        is_wanted = any(name == HAIR_ALPHA.name or name.startswith(CRYPTOMATTE) for name in passes)
         return cls(height, width, layer) if is_wanted else None
 
     def add(self, objects: Mapping[str, Floats], hair: Floats) -> None:
@@ -43,15 +43,15 @@ class Mattes:
             self._names[name] = None
             self._objects.add(name, coverage)
 
-    def write(self, wanted: Mapping[str, Any]) -> None:
+    def write(self, passes: Mapping[str, Any]) -> None:
         """Write the mattes into Blender's passes."""
-        if HAIR_ALPHA.name in wanted:
-            write(wanted[HAIR_ALPHA.name], self._hair / max(self._count, 1))
+        if HAIR_ALPHA.name in passes:
+            write(passes[HAIR_ALPHA.name], self._hair / max(self._count, 1))
         if self._objects is None:
             return
         pictures = self._objects.pictures(self._count)
         for each, picture in zip(cryptomatte_passes(self._layer), pictures, strict=True):
-            write(wanted[each.name], picture)
+            write(passes[each.name], picture)
 
     @property
     def metadata(self) -> dict[str, str]:

@@ -35,13 +35,13 @@ def read_meshes(
     if mesh is None:
         return ()
     try:
-        return _split(mesh, obj, matrix, is_head) if len(mesh.polygons) else ()
+        return _split_by_material(mesh, obj, matrix, is_head) if len(mesh.polygons) else ()
     finally:
         if not is_plain:
             obj.to_mesh_clear()
 
 
-def _split(
+def _split_by_material(
     mesh: bpy.types.Mesh, obj: bpy.types.Object, matrix: Floats, is_head: bool
 ) -> tuple[MeshSnapshot, ...]:
     triangles, positions, normals = _corners(mesh)
@@ -54,19 +54,19 @@ def _split(
     slots: Ints = np.zeros(len(triangles), np.int32)
     if len(obj.material_slots) > 1:
         slots = of_triangles(mesh, "material_index")
-    found = []
+    meshes = []
     corner_uv = read_corner_uv(mesh, triangle_corners(mesh, "loops"))
     is_skin = is_head and corner_uv is not None
     head = Surface(positions, triangles, corner_uv) if is_skin else None
     for slot in np.unique(slots):
-        here = np.flatnonzero(slots == slot)
-        own, vertices = np.unique(triangles[here], return_inverse=True)
+        rows = np.flatnonzero(slots == slot)
+        used, vertices = np.unique(triangles[rows], return_inverse=True)
         material = _material(obj, int(slot))
-        uv = None if corner_uv is None or material.pictures is None else corner_uv[here]
-        surface = Surface(positions[own], vertices.reshape(-1, 3).astype(np.int32), uv)
-        skin = None if head is None else Skin(head, here)
-        found.append(_with_material(MeshSnapshot(surface, normals[own], skin=skin), material))
-    return tuple(found)
+        uv = None if corner_uv is None or material.pictures is None else corner_uv[rows]
+        surface = Surface(positions[used], vertices.reshape(-1, 3).astype(np.int32), uv)
+        skin = None if head is None else Skin(head, rows)
+        meshes.append(_with_material(MeshSnapshot(surface, normals[used], skin=skin), material))
+    return tuple(meshes)
 
 
 def _corners(mesh: bpy.types.Mesh) -> tuple[Ints, Floats, Floats]:
@@ -99,27 +99,26 @@ def _with_material(mesh: MeshSnapshot, material: MeshMaterial) -> MeshSnapshot:
     )
 
 
-def as_before(old: MeshSnapshot, new: MeshSnapshot) -> MeshSnapshot:
-    """The old mesh if both draw the same, so that it can stay on the GPU; for a head that has only
-    moved, the new mesh with the old triangles and UVs.
-    """
+def reused_or_new(old: MeshSnapshot, new: MeshSnapshot) -> MeshSnapshot:
+    """The old mesh if both look the same, so that it can stay on the GPU; for a head that has only
+    moved, the new mesh with the old triangles and UVs."""
     is_same = (
-        _looks(old) == _looks(new)
+        _look_key(old) == _look_key(new)
         and np.array_equal(old.surface.triangles, new.surface.triangles)
         and _same_uv(old.surface, new.surface)
         and np.array_equal(old.surface.positions, new.surface.positions)
         and np.array_equal(old.vertex_normals, new.vertex_normals)
     )
     was, now = old.skin, new.skin
-    if was is None or now is None or not _same_chart(was.surface, now.surface):
+    if was is None or now is None or not _same_uv_layout(was.surface, now.surface):
         return old if is_same else new
     if is_same:
         return old
-    kept = replace(now.surface, triangles=was.surface.triangles, corner_uv=was.surface.corner_uv)
-    return replace(new, skin=replace(now, surface=kept))
+    surface = replace(now.surface, triangles=was.surface.triangles, corner_uv=was.surface.corner_uv)
+    return replace(new, skin=replace(now, surface=surface))
 
 
-def _looks(mesh: MeshSnapshot) -> tuple[object, ...]:
+def _look_key(mesh: MeshSnapshot) -> tuple[object, ...]:
     """A key of everything that drawing depends on, except the surface."""
     pictures = mesh.pictures or MeshPictures()
     return (
@@ -130,7 +129,7 @@ def _looks(mesh: MeshSnapshot) -> tuple[object, ...]:
     )
 
 
-def _same_chart(one: Surface, other: Surface) -> bool:
+def _same_uv_layout(one: Surface, other: Surface) -> bool:
     return np.array_equal(one.triangles, other.triangles) and _same_uv(one, other)
 
 

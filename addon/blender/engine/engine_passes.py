@@ -17,7 +17,7 @@ from . import hair_scene
 
 @dataclass(frozen=True)
 class RenderPass:
-    """A pass. channels: their names. kind: of its socket. empty: the value where nothing is."""
+    """A pass. channels: their names. kind: of its socket. empty: the value of nothing."""
 
     name: str
     channels: str
@@ -44,14 +44,14 @@ SHAFTS = RenderPass("Hair Shafts", "RGB", "COLOR")
 CRYPTOMATTE = "CryptoObject"
 #: names of the passes that hold data of the nearest surface or strand at each pixel's centre
 DATA = frozenset(each.name for each in (DEPTH, NORMAL, VECTOR, OBJECT_INDEX, STRAND_INDEX, TANGENT))
-#: settings of view layers -> the passes that they enable; Blender's own, and ours
-_ASKED = {
+#: settings of view layers -> the passes that they enable: Blender's own, then those of hair
+_BLENDER_PASSES = {
     "use_pass_z": DEPTH,
     "use_pass_normal": NORMAL,
     "use_pass_vector": VECTOR,
     "use_pass_object_index": OBJECT_INDEX,
 }
-_ASKED_OF_US = {
+_HAIR_PASSES = {
     "use_strand_index": STRAND_INDEX,
     "use_tangent": TANGENT,
     "use_alpha": HAIR_ALPHA,
@@ -59,13 +59,13 @@ _ASKED_OF_US = {
 }
 
 
-def wanted_passes(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> Iterator[RenderPass]:
+def enabled_passes(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> Iterator[RenderPass]:
     """The enabled passes beside the picture."""
-    is_hair_scene = hair_scene.drawn_by(scene) is not None
-    for owner, asked in ((layer, _ASKED), (layer.hairloom, _ASKED_OF_US)):
-        for name, found in asked.items():
-            if getattr(owner, name) or (is_hair_scene and found is SHADOW):
-                yield found
+    is_hair_scene = hair_scene.drawn_scene(scene) is not None
+    for owner, passes in ((layer, _BLENDER_PASSES), (layer.hairloom, _HAIR_PASSES)):
+        for name, each in passes.items():
+            if getattr(owner, name) or (is_hair_scene and each is SHADOW):
+                yield each
     if layer.use_pass_cryptomatte_object:
         yield from cryptomatte_passes(layer)
     if is_hair_scene:
@@ -73,20 +73,20 @@ def wanted_passes(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> Iterato
 
 
 def cryptomatte_passes(layer: bpy.types.ViewLayer) -> list[RenderPass]:
-    """As many passes as the view layer's number of levels needs."""
+    """The passes for the view layer's number of levels."""
     count = -(-layer.pass_cryptomatte_depth // PAIRS)
     return [RenderPass(f"{CRYPTOMATTE}{number:02}", "RGBA", "COLOR") for number in range(count)]
 
 
-def empty_of(name: str) -> float:
+def empty_value(name: str) -> float:
     """The value of a pass of this name where nothing is seen."""
-    known = (DEPTH, SHADOW)
-    return next((each.empty for each in known if each.name == name), 0.0)
+    others = (DEPTH, SHADOW)
+    return next((each.empty for each in others if each.name == name), 0.0)
 
 
-def write(into: Any, values: Floats) -> None:
+def write(render_pass: Any, values: Floats) -> None:
     """Fill a pass of Blender's with (height, width, channels) values, row 0 at the bottom."""
-    into.rect.foreach_set(np.ascontiguousarray(values, np.float32).ravel())
+    render_pass.rect.foreach_set(np.ascontiguousarray(values, np.float32).ravel())
 
 
 def passes_in(result: Any) -> dict[str, Any]:

@@ -31,13 +31,16 @@ _FORMAT = {
 
 
 def engine_picture(
-    scene: bpy.types.Scene, whole: tuple[int, int], corner: tuple[int, int], size: tuple[int, int]
+    scene: bpy.types.Scene,
+    full_size: tuple[int, int],
+    corner: tuple[int, int],
+    size: tuple[int, int],
 ) -> Floats | None:
     """The picture of a scene before compositing, (height, width, 4) scene-linear, premultiplied,
     row 0 at the bottom; None where there is none.
 
     Args:
-        whole: width and height of the full picture [pixels].
+        full_size: width and height of the full picture [pixels].
         corner, size: of the part to return [pixels].
     """
     result = next((each for each in bpy.data.images if each.type == "RENDER_RESULT"), None)
@@ -46,27 +49,27 @@ def engine_picture(
     with tempfile.TemporaryDirectory(prefix="hairloom") as folder:
         path = Path(folder) / "picture.exr"
         try:
-            with _as_floats(scene.render.image_settings):
+            with _float_format(scene.render.image_settings):
                 result.save_render(str(path), scene=scene)
         except RuntimeError:  # nothing was rendered
             return None
-        found = _read(path) if path.is_file() else None
-    if found is None or found.shape[:2] == size[::-1]:
-        return found
-    if found.shape[:2] != whole[::-1]:
+        picture = _read(path) if path.is_file() else None
+    if picture is None or picture.shape[:2] == size[::-1]:
+        return picture
+    if picture.shape[:2] != full_size[::-1]:
         return None
     left, bottom = corner
-    return found[bottom : bottom + size[1], left : left + size[0]]
+    return picture[bottom : bottom + size[1], left : left + size[0]]
 
 
 @contextmanager
-def _as_floats(settings: Any) -> Iterator[None]:
-    kept = {name: getattr(settings, name) for name in _FORMAT}
+def _float_format(settings: Any) -> Iterator[None]:
+    original = {name: getattr(settings, name) for name in _FORMAT}
     try:
         _set(settings, _FORMAT)
         yield
     finally:
-        _set(settings, kept)
+        _set(settings, original)
 
 
 def _set(settings: Any, values: dict[str, str]) -> None:
@@ -77,10 +80,10 @@ def _set(settings: Any, values: dict[str, str]) -> None:
 
 def _read(path: Path) -> Floats | None:
     try:
-        found = read_texture(path, is_color=True)
+        picture = read_texture(path, is_color=True)
     except HairloomError:
         return None
-    if found.shape[2] != 4:
+    if picture.shape[2] != 4:
         return None
-    found[..., :3] *= found[..., 3:]
-    return found
+    picture[..., :3] *= picture[..., 3:]
+    return picture

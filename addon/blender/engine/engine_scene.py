@@ -24,8 +24,8 @@ from ..scene.lights import light_warnings, read_lights
 from ..scene.mesh_materials import material_notes
 from ..scene.world import read_environment, world_notes
 from . import engine_hair, hair_scene
-from .engine_hair import HairNotMadeYetError
-from .engine_meshes import SOLID_TYPES, as_before, read_meshes
+from .engine_hair import HairNotReadyError
+from .engine_meshes import SOLID_TYPES, read_meshes, reused_or_new
 
 type Key = tuple[int, ...]
 type IsShown = Callable[[bpy.types.Object], bool]
@@ -33,11 +33,11 @@ type IsShown = Callable[[bpy.types.Object], bool]
 
 @dataclass(frozen=True)
 class Visibility:
-    """How one instance takes part in the picture."""
+    """How one instance appears in the picture."""
 
     is_seen: bool
     is_holdout: bool
-    casts: bool
+    casts_shadow: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +54,7 @@ class _ReadMesh:
 
 @dataclass(frozen=True, eq=False)
 class _ReadGroom:
-    """A groom that was read. state: see `engine_hair.state_of`, with matrix and holdout."""
+    """A groom that was read. state: see `engine_hair.state_key`, with matrix and holdout."""
 
     state: tuple[Any, ...]
     groom: DrawnGroom
@@ -84,7 +84,7 @@ class SceneReader:
         changed: set[int] | None = None,
         is_shown: IsShown = lambda _: True,
         is_previewed: Callable[[int], bool] = lambda _: False,
-        is_expected: Callable[[int], bool] = lambda _: False,
+        has_pending_preview: Callable[[int], bool] = lambda _: False,
         blocking: bool = True,
     ) -> SceneSnapshot:
         """The scene in this evaluation.
@@ -94,38 +94,38 @@ class SceneReader:
                 the last reading; None: all.
             is_shown: whether an object is visible.
             is_previewed: whether a groom, by session number, is left out; its instances are not.
-            is_expected: whether a groom, by session number, stays as it was, since its preview is
-                about to be shown.
+            has_pending_preview: whether a groom, by session number, stays as it was, since its
+                preview is about to be shown.
             blocking: False: hair is built in a thread, and stays as it was until then.
         """
         warnings: list[str] = []
         drawn: list[MeshSnapshot] = []
         casters: list[MeshSnapshot] = []
         grooms: dict[Key, _ReadGroom] = {}
-        read: dict[Key, _ReadMesh] = {}
+        meshes: dict[Key, _ReadMesh] = {}
         self.previewed, self.pending = {}, set()
         self._heads = _heads(depsgraph)
-        behind = hair_scene.drawn_by(depsgraph.scene)
-        layer = depsgraph.view_layer if behind is None else hair_scene.drawn_layer(behind)
+        drawn_scene = hair_scene.drawn_scene(depsgraph.scene)
+        layer = depsgraph.view_layer if drawn_scene is None else hair_scene.drawn_layer(drawn_scene)
         for instance in depsgraph.object_instances:
             obj = instance.object
-            if not instance.show_self or not is_shown(_holder(instance)):
+            if not instance.show_self or not is_shown(_scene_object(instance)):
                 continue
-            key, matrix = _key(instance), np.array(instance.matrix_world)
+            key, matrix = _instance_key(instance), np.array(instance.matrix_world)
             visibility = _visibility(instance, layer)
             # a preview draws a groom once; its instances are read like any other hair
-            is_own = obj.type == "CURVES" and not instance.is_instance
-            if behind is not None and obj.type in SOLID_TYPES:
+            is_original = obj.type == "CURVES" and not instance.is_instance
+            if drawn_scene is not None and obj.type in SOLID_TYPES:
                 visibility = replace(visibility, is_holdout=True)
             if obj.type in SOLID_TYPES:
-                read[key] = self._read_mesh(key, obj, matrix, visibility, changed)
+                meshes[key] = self._read_mesh(key, obj, matrix, visibility, changed)
                 if visibility.is_seen:
-                    drawn += read[key].meshes
-                if visibility.casts:
-                    casters += read[key].meshes
-            elif is_own and is_previewed(obj.original.session_uid):
+                    drawn += meshes[key].meshes
+                if visibility.casts_shadow:
+                    casters += meshes[key].meshes
+            elif is_original and is_previewed(obj.original.session_uid):
                 self.previewed[obj.original.session_uid] = visibility
-            elif obj.type == "CURVES" and is_expected(obj.original.session_uid):
+            elif obj.type == "CURVES" and has_pending_preview(obj.original.session_uid):
                 grooms |= {key: self._grooms[key]} if key in self._grooms else {}
             elif obj.type == "CURVES" and visibility.is_seen:
                 hair = obj.original
@@ -133,22 +133,22 @@ class SceneReader:
                     key, hair, matrix, depsgraph, changed, warnings, visibility.is_holdout, blocking
                 )
                 grooms |= {} if groom is None else {key: groom}
-        self._meshes, self._grooms = read, grooms
+        self._meshes, self._grooms = meshes, grooms
         if not blocking:  # a render's thread must not read bpy.data.objects, as the window may edit
-            engine_hair.forget_gone()
-        found = tuple(each.groom for each in grooms.values())
-        center = _center(found, drawn)
-        of_meshes = [note for each in read.values() for note in each.notes]
+            engine_hair.forget_deleted()
+        drawn_grooms = tuple(each.groom for each in grooms.values())
+        center = _center(drawn_grooms, drawn)
+        mesh_notes = [note for each in meshes.values() for note in each.notes]
         if any(_has_soft_shadow(each.groom.snapshot) for each in grooms.values()):
-            of_meshes += [note for each in read.values() for note in each.skin_notes]
+            mesh_notes += [note for each in meshes.values() for note in each.skin_notes]
         environment = read_environment(depsgraph.scene_eval, blocking=blocking)
-        of_light = light_warnings(depsgraph, environment.suns)
+        light_notes = light_warnings(depsgraph, environment.suns)
         of_world = world_notes(depsgraph.scene_eval)
-        self.warnings = (*warnings, *dict.fromkeys(of_meshes), *of_light, *of_world)
+        self.warnings = (*warnings, *dict.fromkeys(mesh_notes), *light_notes, *of_world)
         return SceneSnapshot(
             meshes=tuple(drawn),
             casters=tuple(casters),
-            grooms=found,
+            grooms=drawn_grooms,
             lights=read_lights(depsgraph, center, environment.suns),
             ambient=environment.ambient,
             harmonics=environment.harmonics,
@@ -163,18 +163,18 @@ class SceneReader:
         visibility: Visibility,
         changed: set[int] | None,
     ) -> _ReadMesh:
-        known = self._meshes.get(key)
+        previous = self._meshes.get(key)
         if (
-            known is not None
+            previous is not None
             and changed is not None
-            and known.is_holdout == visibility.is_holdout
-            and np.array_equal(known.matrix, matrix)
+            and previous.is_holdout == visibility.is_holdout
+            and np.array_equal(previous.matrix, matrix)
             and not changed & _uids(obj)
         ):
-            return known
+            return previous
         number = obj.pass_index
         is_head = obj.original.session_uid in self._heads
-        fresh = tuple(
+        meshes = tuple(
             replace(
                 mesh,
                 key=(*key, part),
@@ -184,12 +184,12 @@ class SceneReader:
             )
             for part, mesh in enumerate(read_meshes(obj, matrix, is_head=is_head))
         )
-        if known is not None and len(known.meshes) == len(fresh):
-            pairs = zip(known.meshes, fresh, strict=True)
-            fresh = tuple(as_before(old, new) for old, new in pairs)
+        if previous is not None and len(previous.meshes) == len(meshes):
+            pairs = zip(previous.meshes, meshes, strict=True)
+            meshes = tuple(reused_or_new(old, new) for old, new in pairs)
         notes = material_notes(obj)
-        of_uv = _skin_notes(obj.name, fresh, known) if is_head else ()
-        return _ReadMesh(matrix, visibility.is_holdout, fresh, notes, of_uv)
+        skin_notes = _skin_notes(obj.name, meshes, previous) if is_head else ()
+        return _ReadMesh(matrix, visibility.is_holdout, meshes, notes, skin_notes)
 
     def _read_groom(
         self,
@@ -209,23 +209,29 @@ class SceneReader:
                 "Use hair curves."
             )
             return None
-        known, uid = self._grooms.get(key), engine_hair.owner_of(hair).session_uid
+        previous, uid = self._grooms.get(key), engine_hair.owner_of(hair).session_uid
         try:
             state: tuple[Any, ...]
-            state = (*engine_hair.state_of(hair, depsgraph), matrix.tobytes(), is_holdout)
-            is_same = known is not None and changed is not None and known.state == state
-            if known is not None and is_same and not (changed or set()) & engine_hair.uids_of(hair):
-                return known
+            state = (*engine_hair.state_key(hair, depsgraph), matrix.tobytes(), is_holdout)
+            is_same = previous is not None and changed is not None and previous.state == state
+            if (
+                previous is not None
+                and is_same
+                and not (changed or set()) & engine_hair.uids_of(hair)
+            ):
+                return previous
             snapshot = engine_hair.read_groom(hair, depsgraph, blocking=blocking)
-        except HairNotMadeYetError:
+        except HairNotReadyError:
             self.pending.add(uid)
-            return None if known is None else _ReadGroom((), known.groom)  # no state: read again
+            return (
+                None if previous is None else _ReadGroom((), previous.groom)
+            )  # no state, so read again
         except HairloomError as error:
             warnings.append(str(error))
             return None
         if len(key) > 1:
-            own = np.array(hair.evaluated_get(depsgraph).matrix_world)
-            snapshot = engine_hair.placed(snapshot, matrix @ np.linalg.pinv(own))
+            own_matrix = np.array(hair.evaluated_get(depsgraph).matrix_world)
+            snapshot = engine_hair.transformed(snapshot, matrix @ np.linalg.pinv(own_matrix))
         owner = engine_hair.owner_of(hair)
         if not blocking and engine_hair.is_pending(uid):
             self.pending.add(uid)
@@ -240,16 +246,16 @@ def _has_soft_shadow(snapshot: Snapshot) -> bool:
 
 
 def _skin_notes(
-    name: str, meshes: tuple[MeshSnapshot, ...], known: _ReadMesh | None
+    name: str, meshes: tuple[MeshSnapshot, ...], previous: _ReadMesh | None
 ) -> tuple[str, ...]:
     """Problems of a head's UVs; checked again only if the UVs have changed."""
     if not meshes:
         return ()
     skin = meshes[0].skin
-    if known is not None and known.meshes and skin is not None:
-        before = known.meshes[0].skin
+    if previous is not None and previous.meshes and skin is not None:
+        before = previous.meshes[0].skin
         if before is not None and before.surface.corner_uv is skin.surface.corner_uv:
-            return known.skin_notes
+            return previous.skin_notes
     head = meshes[0].surface if skin is None else skin.surface
     return tuple(f"{name}: {note}" for note in uv_notes(head))
 
@@ -261,12 +267,12 @@ def _heads(depsgraph: bpy.types.Depsgraph) -> frozenset[int]:
     return frozenset(head.session_uid for head in heads if head is not None)
 
 
-def _holder(instance: bpy.types.DepsgraphObjectInstance) -> bpy.types.Object:
+def _scene_object(instance: bpy.types.DepsgraphObjectInstance) -> bpy.types.Object:
     """The scene's object behind an instance: its instancer, or itself if it is no instance."""
     return (instance.parent if instance.is_instance else instance.object).original
 
 
-def _key(instance: bpy.types.DepsgraphObjectInstance) -> Key:
+def _instance_key(instance: bpy.types.DepsgraphObjectInstance) -> Key:
     uid = instance.object.original.session_uid
     if not instance.is_instance:
         return (uid,)
@@ -275,24 +281,24 @@ def _key(instance: bpy.types.DepsgraphObjectInstance) -> Key:
 
 def _uids(obj: bpy.types.Object) -> set[int]:
     """Session numbers of an object, its data and its materials."""
-    found = {obj.original.session_uid}
+    uids = {obj.original.session_uid}
     if obj.original.data is not None:
-        found.add(obj.original.data.session_uid)
+        uids.add(obj.original.data.session_uid)
     slots = (slot.material for slot in obj.material_slots)
-    return found | {material.original.session_uid for material in slots if material is not None}
+    return uids | {material.original.session_uid for material in slots if material is not None}
 
 
 def _visibility(
     instance: bpy.types.DepsgraphObjectInstance, layer: bpy.types.ViewLayer
 ) -> Visibility:
     """The artist's settings of visibility, without a preview's changes to the evaluated copy."""
-    obj, holder = instance.object.original, _holder(instance)
-    is_indirect = holder.indirect_only_get(view_layer=layer)
+    obj, scene_object = instance.object.original, _scene_object(instance)
+    is_indirect = scene_object.indirect_only_get(view_layer=layer)
     # a copy for renders has the visibility of its groom
     owner = engine_hair.owner_of(obj) if obj.type == "CURVES" else obj
-    marked = (each.is_holdout for each in (obj, owner, holder))
-    is_holdout = any(marked) or holder.holdout_get(view_layer=layer)
-    is_seen = hair_scene.was_seen(owner) if obj.type == "CURVES" else obj.visible_camera
+    flags = (each.is_holdout for each in (obj, owner, scene_object))
+    is_holdout = any(flags) or scene_object.holdout_get(view_layer=layer)
+    is_seen = hair_scene.is_visible_to_camera(owner) if obj.type == "CURVES" else obj.visible_camera
     return Visibility(is_seen and not is_indirect, is_holdout, obj.visible_shadow)
 
 

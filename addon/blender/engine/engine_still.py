@@ -40,7 +40,7 @@ from .engine_passes import (
     STRAND_INDEX,
     TANGENT,
     VECTOR,
-    empty_of,
+    empty_value,
     passes_in,
     write,
 )
@@ -48,10 +48,10 @@ from .engine_picture import engine_picture
 from .engine_scene import SceneReader
 
 #: interval at which the picture so far is shown [s]
-_SHOWN_EVERY = 1.0
+_UPDATE_INTERVAL = 1.0
 
 
-_UNSEEN = (
+_UNREADABLE_PICTURE = (
     "Light Shafts: bright things cast none, since the engine's picture could not be read. Turn "
     "Stereoscopy off, and render the scene that the hair belongs to."
 )
@@ -62,24 +62,26 @@ class SampleTime:
     """Samples that are taken at one time.
 
     time: [frames], relative to the rendered frame.
-    places: (n, 2) the samples' offsets [pixels].
+    offsets: (n, 2) the samples' offsets [pixels].
     """
 
     time: float
-    places: Floats
+    offsets: Floats
 
 
 def sample_times(
     settings: PictureSettings, render: bpy.types.RenderSettings
 ) -> tuple[SampleTime, ...]:
     """The samples distributed over the shutter time; all at one time without motion blur."""
-    places = jitters(settings.samples, render.filter_size)
+    offsets = jitters(settings.samples, render.filter_size)
     steps = min(settings.motion_steps, settings.samples) if render.use_motion_blur else 1
     if steps == 1:
-        return (SampleTime(0.0, places),)
-    opens = {"START": 0.0, "CENTER": -0.5, "END": -1.0}[render.motion_blur_position]
+        return (SampleTime(0.0, offsets),)
+    start = {"START": 0.0, "CENTER": -0.5, "END": -1.0}[render.motion_blur_position]
     return tuple(
-        SampleTime(render.motion_blur_shutter * (opens + (step + 0.5) / steps), places[step::steps])
+        SampleTime(
+            render.motion_blur_shutter * (start + (step + 0.5) / steps), offsets[step::steps]
+        )
         for step in range(steps)
     )
 
@@ -98,23 +100,23 @@ class Still:
         ensure_gpu()
         self._engine, self._depsgraph = engine, depsgraph
         self._render = depsgraph.scene.render
-        self._settings = _calm(settings_of(depsgraph.scene.hairloom.picture, PictureSettings))
-        self._whole = engine.resolution_x, engine.resolution_y
+        self._settings = _noise_free(settings_of(depsgraph.scene.hairloom.picture, PictureSettings))
+        self._full_size = engine.resolution_x, engine.resolution_y
         self._window: Window
-        self._window, self._size = border_window(self._render, *self._whole)
+        self._window, self._size = border_window(self._render, *self._full_size)
         self._reader, self._pass = SceneReader(), ScenePass()
         self._target, self._picture = Target(), Accumulation()
-        behind = hair_scene.drawn_by(depsgraph.scene)
-        self._behind = behind
+        drawn_scene = hair_scene.drawn_scene(depsgraph.scene)
+        self._drawn_scene = drawn_scene
         self._shadow: tuple[Target, Accumulation] | None = None
         self._shafts = Accumulation()
-        self._apart: SeparateShafts | None = None
-        self._is_needed = behind is None or hair_scene.is_needed(behind)
+        self._separate_shafts: SeparateShafts | None = None
+        self._is_needed = drawn_scene is None or hair_scene.is_needed(drawn_scene)
         self._layer = depsgraph.view_layer
         self._mattes: Mattes | None = None
         self.warnings: tuple[str, ...] = ()
 
-    def view(self, name: str) -> None:
+    def render_view(self, name: str) -> None:
         """Render the view of this name, which is empty without stereoscopy.
 
         Raises:
@@ -128,56 +130,62 @@ class Still:
             if self._is_needed:
                 self._fill(result)
             else:
-                _leave_empty(result)
+                _fill_empty(result)
         finally:
             engine.end_result(result)
         for key, value in () if self._mattes is None else self._mattes.metadata.items():
             engine.get_result().stamp_data_add_field(key, value)
 
     def _fill(self, result: Any) -> None:
-        timed = self._depsgraph.scene
+        blender_scene = self._depsgraph.scene
         # without time stretching, which frame_set applies itself
-        frame = timed.frame_current + timed.frame_subframe
+        frame = blender_scene.frame_current + blender_scene.frame_subframe
         moments = sample_times(self._settings, self._render)
         lens = read_lens(self._engine, self._depsgraph)
         through_lens = None if lens is None else lens.places(self._settings.samples)
         self._picture.begin(*self._size)
-        wanted = passes_in(result)
-        if SHADOW.name in wanted:
+        passes = passes_in(result)
+        if SHADOW.name in passes:
             self._shadow = Target(), Accumulation()
             self._shadow[1].begin(*self._size)
-        shown = time.monotonic()
-        scene, camera = self._moment()
-        self._apart = None if self._behind is None else self._beside(self._behind, scene)
-        if self._apart is not None:
+        last_update = time.monotonic()
+        scene, camera = self._read_scene()
+        self._separate_shafts = (
+            None if self._drawn_scene is None else self._shafts_target(self._drawn_scene, scene)
+        )
+        if self._separate_shafts is not None:
             self._shafts.begin(*self._size)
-        self._mattes = Mattes.of(wanted, self._layer, *self._size)
-        if DATA & wanted.keys():
-            self._add_data(wanted, frame, scene, camera)
+        self._mattes = Mattes.of(passes, self._layer, *self._size)
+        if DATA & passes.keys():
+            self._add_data(passes, frame, scene, camera)
         for moment in moments:
             if self._engine.test_break():
                 break
             if len(moments) > 1:
-                self._go_to(frame + moment.time)
-                scene, camera = self._moment()
-            for place in moment.places:
+                self._set_frame(frame + moment.time)
+                scene, camera = self._read_scene()
+            for offset in moment.offsets:
                 if self._engine.test_break():
                     break
-                seen = camera
+                sample_camera = camera
                 if lens is not None and through_lens is not None:
-                    seen = camera_through_lens(camera, lens, through_lens[self._picture.count])
-                self._add_sample(scene, seen, place)
-                if time.monotonic() - shown > _SHOWN_EVERY:
+                    sample_camera = camera_through_lens(
+                        camera, lens, through_lens[self._picture.count]
+                    )
+                self._add_sample(scene, sample_camera, offset)
+                if time.monotonic() - last_update > _UPDATE_INTERVAL:
                     self._show(result)
                     self._engine.update_result(result)
-                    shown = time.monotonic()
+                    last_update = time.monotonic()
         if len(moments) > 1:
-            self._go_to(frame)
+            self._set_frame(frame)
         self._show(result)
         if self._mattes is not None:
-            self._mattes.write(wanted)
+            self._mattes.write(passes)
 
-    def _beside(self, behind: bpy.types.Scene, scene: SceneSnapshot) -> SeparateShafts | None:
+    def _shafts_target(
+        self, drawn_scene: bpy.types.Scene, scene: SceneSnapshot
+    ) -> SeparateShafts | None:
         """The target for shafts of light; None without any. Shafts from bright things also need the
         picture of Blender's own engine."""
         settings = shafts_of(scene)
@@ -187,55 +195,62 @@ class Still:
         if not wants_bright(settings):
             return SeparateShafts(light)
         left, bottom = (
-            round(start * side) for start, side in zip(self._window[:2], self._whole, strict=True)
+            round(start * side)
+            for start, side in zip(self._window[:2], self._full_size, strict=True)
         )
-        seen = engine_picture(behind.original, self._whole, (left, bottom), self._size)
-        if seen is None:
-            self.warnings = (*self.warnings, _UNSEEN)
+        picture = engine_picture(drawn_scene.original, self._full_size, (left, bottom), self._size)
+        if picture is None:
+            self.warnings = (*self.warnings, _UNREADABLE_PICTURE)
             return SeparateShafts(light)
-        shows_world = not behind.render.film_transparent
-        return SeparateShafts(light, texture_from(seen, "RGBA32F"), shows_world)
+        shows_world = not drawn_scene.render.film_transparent
+        return SeparateShafts(light, texture_from(picture, "RGBA32F"), shows_world)
 
-    def _moment(self) -> tuple[SceneSnapshot, Camera]:
+    def _read_scene(self) -> tuple[SceneSnapshot, Camera]:
         """Scene and camera as evaluated now."""
-        seen = read_camera(self._engine, self._depsgraph, *self._whole, self._window)
+        camera = read_camera(self._engine, self._depsgraph, *self._full_size, self._window)
         scene = self._reader.read(self._depsgraph)
-        found = (*self._reader.warnings, *camera_warnings(self._engine, self._depsgraph))
-        self.warnings = tuple(dict.fromkeys((*self.warnings, *found, *_dark(scene))))
-        return scene, seen
+        warnings = (*self._reader.warnings, *camera_warnings(self._engine, self._depsgraph))
+        self.warnings = tuple(
+            dict.fromkeys((*self.warnings, *warnings, *_darkness_warnings(scene)))
+        )
+        return scene, camera
 
-    def _go_to(self, time_: float) -> None:
+    def _set_frame(self, time_: float) -> None:
         frame = int(np.floor(time_))
         self._engine.frame_set(frame, time_ - frame)
 
-    def _add_sample(self, scene: SceneSnapshot, camera: Camera, place: Floats) -> None:
-        moved = jittered(camera, place, *self._size, sample=self._picture.count)
+    def _add_sample(self, scene: SceneSnapshot, camera: Camera, offset: Floats) -> None:
+        jittered_camera = jittered(camera, offset, *self._size, sample=self._picture.count)
         scene = scene.at_sample(self._picture.count)
         sky = sky_of(scene, self._render)
-        self._pass.draw(scene, moved, self._target, self._size, sky, self._apart)
+        self._pass.draw(
+            scene, jittered_camera, self._target, self._size, sky, self._separate_shafts
+        )
         self.warnings = tuple(dict.fromkeys((*self.warnings, *self._pass.notes)))
         self._picture.add(self._target.color)
         if self._shadow is not None:
             target, shadow = self._shadow
-            self._pass.draw_hair_shadow(scene, moved, target, self._size)
+            self._pass.draw_hair_shadow(scene, jittered_camera, target, self._size)
             shadow.add(target.color)
-        if self._apart is not None:
-            self._shafts.add(self._apart.light)
+        if self._separate_shafts is not None:
+            self._shafts.add(self._separate_shafts.light)
         if self._mattes is not None:
-            self._mattes.add(*self._pass.coverages(scene, moved, self._target, self._size))
+            self._mattes.add(
+                *self._pass.coverages(scene, jittered_camera, self._target, self._size)
+            )
         self._engine.update_progress(self._picture.count / self._settings.samples)
         self._engine.update_stats("", f"Sample {self._picture.count} of {self._settings.samples}")
 
     def _add_data(
-        self, wanted: dict[str, Any], frame: float, scene: SceneSnapshot, camera: Camera
+        self, passes: dict[str, Any], frame: float, scene: SceneSnapshot, camera: Camera
     ) -> None:
         """Write the passes in DATA, of the nearest surface or strand at each pixel's centre, at the
         exact frame."""
         drawing = self._target, self._size
         nearest = self._pass.nearest(scene, camera, *drawing)
-        if self._behind is not None:
+        if self._drawn_scene is not None:
             nearest = nearest.of_hair()
-        found = {
+        make = {
             DEPTH.name: lambda: nearest.distances(camera),
             OBJECT_INDEX.name: lambda: nearest.object_numbers(scene),
             STRAND_INDEX.name: nearest.strand_numbers,
@@ -249,8 +264,8 @@ class Still:
             ),
             VECTOR.name: lambda: self._motion(nearest, frame, scene, camera),
         }
-        for name in DATA & wanted.keys():
-            write(wanted[name], found[name]())
+        for name in DATA & passes.keys():
+            write(passes[name], make[name]())
 
     def _motion(
         self, nearest: Nearest, frame: float, scene: SceneSnapshot, camera: Camera
@@ -259,37 +274,37 @@ class Still:
         next frame."""
         moments = {}
         for step in (-1, 1):
-            self._go_to(frame + step)
-            moments[step] = SceneAtTime.of(scene, *self._moment())
-        self._go_to(frame)
+            self._set_frame(frame + step)
+            moments[step] = SceneAtTime.of(scene, *self._read_scene())
+        self._set_frame(frame)
         moments[0] = SceneAtTime.of(scene, scene, camera)
         # cards and the background only have the motion of the camera
         is_there, is_mesh = (nearest.depth < 1.0)[..., None], (nearest.mesh >= 0)[..., None]
         seen, behind = unprojected(camera, nearest.depth), background(camera, nearest.depth)
-        still, places = np.where(is_there, seen, behind), {}
+        static, pixels = np.where(is_there, seen, behind), {}
         for step, each in moments.items():
             drawing = camera, self._target, self._size
-            meshes = np.where(is_mesh, self._pass.on_meshes(scene, each.meshes, *drawing), still)
+            meshes = np.where(is_mesh, self._pass.on_meshes(scene, each.meshes, *drawing), static)
             points = nearest.on_strands(each.grooms, meshes)
-            places[step] = projected(each.camera, points, self._size)
-        return motion(places[-1], places[0], places[1])
+            pixels[step] = projected(each.camera, points, self._size)
+        return motion(pixels[-1], pixels[0], pixels[1])
 
     def _show(self, result: Any) -> None:
-        wanted = passes_in(result)
-        write(wanted[COMBINED.name], self._picture.mean())
+        passes = passes_in(result)
+        write(passes[COMBINED.name], self._picture.mean())
         if self._shadow is not None:
-            write(wanted[SHADOW.name], self._shadow[1].mean()[..., :3])
-        if self._apart is not None:
-            write(wanted[SHAFTS.name], self._shafts.mean()[..., :3])
+            write(passes[SHADOW.name], self._shadow[1].mean()[..., :3])
+        if self._separate_shafts is not None:
+            write(passes[SHAFTS.name], self._shafts.mean()[..., :3])
 
 
-def _leave_empty(result: Any) -> None:
+def _fill_empty(result: Any) -> None:
     """Fill all passes with their empty values, so that compositing them changes nothing."""
     for name, each in passes_in(result).items():
-        write(each, np.full(len(each.rect) * each.channels, empty_of(name)))
+        write(each, np.full(len(each.rect) * each.channels, empty_value(name)))
 
 
-def _calm(settings: PictureSettings) -> PictureSettings:
+def _noise_free(settings: PictureSettings) -> PictureSettings:
     """The settings, with enough samples for hashed strands where the GPU cannot draw layers."""
     if capabilities().image_atomics:
         return settings
@@ -301,7 +316,7 @@ def sky_of(scene: SceneSnapshot, render: bpy.types.RenderSettings) -> Rgba:
     return (0.0, 0.0, 0.0, 0.0) if render.film_transparent else (*scene.ambient, 1.0)
 
 
-def _dark(scene: SceneSnapshot) -> tuple[str, ...]:
+def _darkness_warnings(scene: SceneSnapshot) -> tuple[str, ...]:
     if scene.lights or any(scene.ambient):
         return ()
     return (

@@ -33,22 +33,22 @@ from .engine_still import sky_of
 
 
 @dataclass(frozen=True, eq=False)
-class _Shown:
+class _SampleInputs:
     """All inputs of a sample; samples with equal inputs accumulate.
 
     scene: with the previewed hair in it.
-    marks: values and objects, some of which change whenever the picture does.
+    keys: values and objects; whenever the picture changes, so does one of them.
     """
 
     scene: SceneSnapshot
     camera: Camera
-    marks: tuple[Any, ...]
+    keys: tuple[Any, ...]
 
-    def continues(self, other: _Shown | None) -> bool:
+    def is_same_as(self, other: _SampleInputs | None) -> bool:
         return (
             other is not None
-            and len(self.marks) == len(other.marks)
-            and all(a is b or a == b for a, b in zip(self.marks, other.marks, strict=True))
+            and len(self.keys) == len(other.keys)
+            and all(a is b or a == b for a, b in zip(self.keys, other.keys, strict=True))
         )
 
 
@@ -61,9 +61,9 @@ class EngineView:
         self._reader, self._pass = SceneReader(), ScenePass()
         self._target, self._picture = Target(), Accumulation()
         self._scene: SceneSnapshot | None = None
-        self._shown: _Shown | None = None
+        self._inputs: _SampleInputs | None = None
         self._previewed: tuple[frozenset[int], ...] = ()
-        self._local: int = 0
+        self._local_view: int = 0
 
     def read(self, context: Any, depsgraph: bpy.types.Depsgraph) -> None:
         """Read what Blender has evaluated again."""
@@ -77,33 +77,33 @@ class EngineView:
             the number of samples so far, and the final number.
         """
         space, render = context.space_data, depsgraph.scene.render
-        local = space.local_view.as_pointer() if space.local_view else 0
-        is_other = self._previewed != _previewed() or self._local != local
-        if self._scene is None or is_other or self._has_arrived:
+        local_view = space.local_view.as_pointer() if space.local_view else 0
+        has_other_content = self._previewed != _previewed() or self._local_view != local_view
+        if self._scene is None or has_other_content or self._has_new_hair:
             self._read(context, depsgraph, None if self._scene is None else set())
         settings = settings_of(depsgraph.scene.hairloom.picture, PictureSettings)
-        left, bottom, wide, high = gpu.state.viewport_get()
-        x, y, *size = view_rectangle(context, depsgraph, wide, high)
+        left, bottom, width, height = gpu.state.viewport_get()
+        x, y, *size = view_rectangle(context, depsgraph, width, height)
         if not all(size):
             return settings.viewport_samples, settings.viewport_samples
-        window = x / wide, y / high, (x + size[0]) / wide, (y + size[1]) / high
-        shown = self._now(context, render, size, window)
-        if not shown.continues(self._shown) or self._picture.size != tuple(size):
+        window = x / width, y / height, (x + size[0]) / width, (y + size[1]) / height
+        inputs = self._sample_inputs(context, render, size, window)
+        if not inputs.is_same_as(self._inputs) or self._picture.size != tuple(size):
             self._picture.begin(*size)
-        self._shown = shown
+        self._inputs = inputs
         if self._picture.count < settings.viewport_samples:
-            self._add_sample(shown, render)
+            self._add_sample(inputs, render)
         # outside the render region Blender's background stays
         gpu.state.viewport_set(left + x, bottom + y, *size)
         self._picture.show(left + x, bottom + y)
-        gpu.state.viewport_set(left, bottom, wide, high)
+        gpu.state.viewport_set(left, bottom, width, height)
         return self._picture.count, settings.viewport_samples
 
-    def _add_sample(self, shown: _Shown, render: bpy.types.RenderSettings) -> None:
+    def _add_sample(self, inputs: _SampleInputs, render: bpy.types.RenderSettings) -> None:
         size, number = self._picture.size, self._picture.count
-        place = jitters(number + 1, render.filter_size)[-1]
-        camera = jittered(shown.camera, place, *size, number)
-        scene = shown.scene.at_sample(number)
+        offset = jitters(number + 1, render.filter_size)[-1]
+        camera = jittered(inputs.camera, offset, *size, number)
+        scene = inputs.scene.at_sample(number)
         self._pass.draw(scene, camera, self._target, size, sky_of(scene, render))
         self._picture.add(self._target.color)
 
@@ -113,7 +113,7 @@ class EngineView:
         return bool(self._reader.pending or overlay.pending_uids())
 
     @property
-    def _has_arrived(self) -> bool:
+    def _has_new_hair(self) -> bool:
         return not all(engine_hair.is_pending(uid) for uid in self._reader.pending)
 
     @property
@@ -127,27 +127,27 @@ class EngineView:
 
     def _read(self, context: Any, depsgraph: bpy.types.Depsgraph, changed: set[int] | None) -> None:
         space = context.space_data
-        self._local = space.local_view.as_pointer() if space.local_view else 0
-        self._previewed = drawn, expected = _previewed()
+        self._local_view = space.local_view.as_pointer() if space.local_view else 0
+        self._previewed = drawn, pending = _previewed()
         self._scene = self._reader.read(
             depsgraph,
             changed=changed,
             is_shown=lambda obj: obj.visible_in_viewport_get(space),
             is_previewed=drawn.__contains__,
-            is_expected=expected.__contains__,
+            has_pending_preview=pending.__contains__,
             blocking=latest_job.is_blocking(),
         )
 
-    def _now(
+    def _sample_inputs(
         self, context: Any, render: bpy.types.RenderSettings, size: list[int], window: Window
-    ) -> _Shown:
+    ) -> _SampleInputs:
         assert self._scene is not None
         space, view = context.space_data, context.region_data
         whole = Camera(np.array(view.view_matrix), np.array(view.window_matrix))
         camera = cropped(whole, window)
-        unknown = Visibility(is_seen=True, is_holdout=False, casts=True)
+        visible = Visibility(is_seen=True, is_holdout=False, casts_shadow=True)
         found = (
-            (*each, self._reader.previewed.get(each[0], unknown))
+            (*each, self._reader.previewed.get(each[0], visible))
             for each in overlay.shown_in(context)
             if each[1].is_made
         )
@@ -159,21 +159,21 @@ class EngineView:
         shadows = settings_of(context.scene.hairloom.mesh_shadows, MeshShadowSettings)
         grooms = (*self._scene.grooms, *previewed)
         scene = replace(self._scene, grooms=grooms, mesh_shadows=shadows)
-        used = uses_scene_light(space.shading)
-        if not all(used):
+        uses_scene = uses_scene_light(space.shading)
+        if not all(uses_scene):
             scene = overlay.with_view_lights(scene, space.shading, three_point_lights(camera.view))
-        marks = (
+        keys = (
             *(self._scene, shadows),
             *(drawing.snapshot for _, drawing in overlay.shown_in(context)),
-            *(_serial(groom.snapshot) for groom in previewed),
+            *(_points_version(groom.snapshot) for groom in previewed),
             *((groom.key, groom.is_holdout) for groom in previewed),
             camera.view.tobytes(),
             camera.projection.tobytes(),
-            (*used, render.film_transparent, render.filter_size, *size),
+            (*uses_scene, render.film_transparent, render.filter_size, *size),
             (scene.lights, scene.ambient),
             b"" if scene.harmonics is None else scene.harmonics.tobytes(),
         )
-        return _Shown(scene, camera, marks)
+        return _SampleInputs(scene, camera, keys)
 
 
 def _previewed() -> tuple[frozenset[int], ...]:
@@ -181,6 +181,6 @@ def _previewed() -> tuple[frozenset[int], ...]:
     return overlay.drawn_uids(), overlay.pending_uids()
 
 
-def _serial(snapshot: Snapshot) -> int:
+def _points_version(snapshot: Snapshot) -> int:
     """A number that grows whenever the GPU computes new points into the same texture."""
     return 0 if snapshot.device_points is None else snapshot.device_points.serial

@@ -13,29 +13,29 @@ STRENGTH = "Shadow Strength"
 #: custom property of node trees that are ours: the group, and a compositor made for it
 _KIND = "hairloom"
 _LAYERS = "CompositorNodeRLayers"
-#: distances of nodes below and beside the node of the picture [pixels]
-_BELOW, _BESIDE = 320.0, 340.0
+#: distances of nodes beside and below the node of the picture [pixels]
+_X_DISTANCE, _Y_DISTANCE = 340.0, 320.0
 
 
 def link(scene: bpy.types.Scene, hair: bpy.types.Scene, layer: str) -> None:
     """Lay the hair over each Render Layers node of this view layer; makes a compositor if there is
     none."""
     tree = scene.compositing_node_group or _new_compositor(scene)
-    for node in [each for each in _pictures(tree, scene) if each.layer == layer]:
-        beside = tree.nodes.new(_LAYERS)
-        beside.scene = hair
-        beside.location = node.location.x, node.location.y - _BELOW
+    for node in [each for each in _render_layers(tree, scene) if each.layer == layer]:
+        hair_layers = tree.nodes.new(_LAYERS)
+        hair_layers.scene = hair
+        hair_layers.location = node.location.x, node.location.y - _Y_DISTANCE
         group = tree.nodes.new("CompositorNodeGroup")
-        group.node_tree = _group()
-        group.location = node.location.x + _BESIDE, node.location.y
+        group.node_tree = _hair_group()
+        group.location = node.location.x + _X_DISTANCE, node.location.y
         picture = node.outputs[IMAGE]
         for old in list(picture.links):
             tree.links.new(group.outputs[IMAGE], old.to_socket)
         tree.links.new(picture, group.inputs[IMAGE])
-        tree.links.new(beside.outputs[IMAGE], group.inputs[HAIR])
+        tree.links.new(hair_layers.outputs[IMAGE], group.inputs[HAIR])
         for name in (SHADOW, SHAFTS):
             if name in group.inputs:  # a group of an older file has no input for shafts
-                tree.links.new(beside.outputs[name], group.inputs[name])
+                tree.links.new(hair_layers.outputs[name], group.inputs[name])
 
 
 def unlink(scene: bpy.types.Scene, hair: bpy.types.Scene | None) -> None:
@@ -44,7 +44,7 @@ def unlink(scene: bpy.types.Scene, hair: bpy.types.Scene | None) -> None:
     tree = scene.compositing_node_group
     if tree is None:
         return
-    for group in [each for each in _groups(tree) if _lays(each, hair)]:
+    for group in [each for each in _hair_groups(tree) if _composites(each, hair)]:
         sources = [each.from_socket for each in group.inputs[IMAGE].links]
         for old in list(group.outputs[IMAGE].links):
             if sources:
@@ -55,7 +55,7 @@ def unlink(scene: bpy.types.Scene, hair: bpy.types.Scene | None) -> None:
     if tree.get(_KIND) == "compositor" and tree.users <= 1 and len(tree.nodes) == 2:
         scene.compositing_node_group = None
         bpy.data.node_groups.remove(tree)
-    group_tree = _known_group()
+    group_tree = _existing_group()
     if group_tree is not None and not group_tree.users:
         bpy.data.node_groups.remove(group_tree)
 
@@ -65,21 +65,21 @@ def is_linked(scene: bpy.types.Scene, hair: bpy.types.Scene) -> bool:
     tree = scene.compositing_node_group
     if tree is None or not any(_hair_layers(tree, hair)):
         return False
-    groups = (group for group in _groups(tree) if not group.mute)
-    return any(group.inputs[HAIR].is_linked and _lays(group, hair) for group in groups)
+    groups = (group for group in _hair_groups(tree) if not group.mute)
+    return any(group.inputs[HAIR].is_linked and _composites(group, hair) for group in groups)
 
 
-def _pictures(tree: Any, scene: bpy.types.Scene) -> Iterator[Any]:
+def _render_layers(tree: Any, scene: bpy.types.Scene) -> Iterator[Any]:
     return (each for each in tree.nodes if each.bl_idname == _LAYERS and each.scene == scene)
 
 
 def _hair_layers(tree: Any, hair: bpy.types.Scene | None) -> Iterator[Any]:
     """The Render Layers nodes of a hair scene; None: nodes without a scene, as it was removed."""
-    return _pictures(tree, hair)
+    return _render_layers(tree, hair)
 
 
-def _groups(tree: Any) -> Iterator[Any]:
-    group = _known_group()
+def _hair_groups(tree: Any) -> Iterator[Any]:
+    group = _existing_group()
     return (
         each
         for each in tree.nodes
@@ -87,17 +87,17 @@ def _groups(tree: Any) -> Iterator[Any]:
     )
 
 
-def _lays(group: Any, hair: bpy.types.Scene | None) -> bool:
-    """Whether a group lays the hair of this scene over a picture, or that of no scene."""
-    scenes, seen = set(), set()
-    asked = [link.from_node for link in group.inputs[HAIR].links]
-    while asked:
-        node = asked.pop()
+def _composites(group: Any, hair: bpy.types.Scene | None) -> bool:
+    """Whether a group lays the hair of this scene, or of no scene, over a picture."""
+    scenes, visited = set(), set()
+    nodes = [link.from_node for link in group.inputs[HAIR].links]
+    while nodes:
+        node = nodes.pop()
         if node.bl_idname == _LAYERS:
             scenes.add(node.scene)
-        elif node.name not in seen:  # a node of the artist's, such as a blur
-            seen.add(node.name)
-            asked += [link.from_node for each in node.inputs for link in each.links]
+        elif node.name not in visited:  # a node of the artist's, such as a blur
+            visited.add(node.name)
+            nodes += [link.from_node for each in node.inputs for link in each.links]
     return not scenes or hair in scenes
 
 
@@ -108,19 +108,19 @@ def _new_compositor(scene: bpy.types.Scene) -> Any:
     tree.interface.new_socket(IMAGE, in_out="OUTPUT", socket_type="NodeSocketColor")
     picture, output = tree.nodes.new(_LAYERS), tree.nodes.new("NodeGroupOutput")
     picture.scene = scene
-    output.location.x = 2.0 * _BESIDE
+    output.location.x = 2.0 * _X_DISTANCE
     tree.links.new(picture.outputs[IMAGE], output.inputs[0])
     scene.compositing_node_group = tree
     return tree
 
 
-def _known_group() -> Any:
+def _existing_group() -> Any:
     return next((each for each in bpy.data.node_groups if each.get(_KIND) == "hair"), None)
 
 
-def _group() -> Any:
+def _hair_group() -> Any:
     """The node group: picture times shadow, then hair over it, plus shafts of light."""
-    tree = _known_group()
+    tree = _existing_group()
     if tree is not None:
         return tree
     tree = bpy.data.node_groups.new(NAME, "CompositorNodeTree")
@@ -136,29 +136,29 @@ def _group() -> Any:
     strength = sockets.new_socket(STRENGTH, in_out="INPUT", socket_type="NodeSocketFloat")
     strength.subtype, strength.default_value = "FACTOR", 1.0
     strength.min_value, strength.max_value = 0.0, 1.0
-    given, output = tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
+    inputs, output = tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
     shaded, over = tree.nodes.new("ShaderNodeMix"), tree.nodes.new("CompositorNodeAlphaOver")
     added = tree.nodes.new("ShaderNodeMix")
     for node, blend in ((shaded, "MULTIPLY"), (added, "ADD")):
         node.data_type, node.blend_type, node.clamp_factor = "RGBA", blend, False
     added.inputs[0].default_value = 1.0
-    for number, node in enumerate((given, shaded, over, added, output)):
+    for number, node in enumerate((inputs, shaded, over, added, output)):
         node.location.x = 220.0 * number
     pairs = (
-        (given.outputs[STRENGTH], shaded.inputs[0]),
-        (given.outputs[IMAGE], _of_type(shaded.inputs, "RGBA", 0)),
-        (given.outputs[SHADOW], _of_type(shaded.inputs, "RGBA", 1)),
-        (_of_type(shaded.outputs, "RGBA", 0), over.inputs["Background"]),
-        (given.outputs[HAIR], over.inputs["Foreground"]),
-        (over.outputs[0], _of_type(added.inputs, "RGBA", 0)),
-        (given.outputs[SHAFTS], _of_type(added.inputs, "RGBA", 1)),
-        (_of_type(added.outputs, "RGBA", 0), output.inputs[0]),
+        (inputs.outputs[STRENGTH], shaded.inputs[0]),
+        (inputs.outputs[IMAGE], _socket_of_type(shaded.inputs, "RGBA", 0)),
+        (inputs.outputs[SHADOW], _socket_of_type(shaded.inputs, "RGBA", 1)),
+        (_socket_of_type(shaded.outputs, "RGBA", 0), over.inputs["Background"]),
+        (inputs.outputs[HAIR], over.inputs["Foreground"]),
+        (over.outputs[0], _socket_of_type(added.inputs, "RGBA", 0)),
+        (inputs.outputs[SHAFTS], _socket_of_type(added.inputs, "RGBA", 1)),
+        (_socket_of_type(added.outputs, "RGBA", 0), output.inputs[0]),
     )
-    for one, other in pairs:
-        tree.links.new(one, other)
+    for source, target in pairs:
+        tree.links.new(source, target)
     return tree
 
 
-def _of_type(sockets: Any, kind: str, number: int) -> Any:
+def _socket_of_type(sockets: Any, kind: str, number: int) -> Any:
     """A socket by type and number: those of a Mix node have the same names for all data types."""
     return [each for each in sockets if each.type == kind][number]

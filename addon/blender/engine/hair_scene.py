@@ -45,12 +45,12 @@ _LAYER = (
 
 def hair_scene_of(scene: bpy.types.Scene) -> bpy.types.Scene | None:
     """The scene that draws the hair of this one; None where there is none."""
-    found = scene.hairloom.hair_scene
+    hair_scene = scene.hairloom.hair_scene
     # a copy of a scene still points to the hair scene of its original
-    return found if found is not None and found.background_set == scene else None
+    return hair_scene if hair_scene is not None and hair_scene.background_set == scene else None
 
 
-def drawn_by(scene: bpy.types.Scene) -> bpy.types.Scene | None:
+def drawn_scene(scene: bpy.types.Scene) -> bpy.types.Scene | None:
     """The scene whose hair this one draws; None for a scene that is no hair scene."""
     shown = scene.background_set
     is_hair_scene = shown is not None and shown.hairloom.hair_scene == scene.original
@@ -67,7 +67,7 @@ def is_needed(scene: bpy.types.Scene) -> bool:
     return scene.render.engine != ENGINE
 
 
-def was_seen(hair: bpy.types.Object) -> bool:
+def is_visible_to_camera(hair: bpy.types.Object) -> bool:
     """Whether curves are visible to the camera by the artist's setting, also while hidden."""
     hidden = hair.hairloom.hidden_rays
     return bool(hidden & _CAMERA) if hidden else hair.visible_camera
@@ -90,11 +90,11 @@ def problem_of(scene: bpy.types.Scene) -> str:
     return ""
 
 
-def switched(scene: bpy.types.Scene) -> None:
+def on_switched(scene: bpy.types.Scene) -> None:
     """Add or remove the hair scene after the artist has switched *Hairloom Hair*."""
     hair = hair_scene_of(scene)
     if scene.hairloom.use_hair_scene and hair is None:
-        _add(scene)
+        _add_hair_scene(scene)
     elif not scene.hairloom.use_hair_scene:
         scene.hairloom.hair_scene = None
         hair_compositor.unlink(scene, hair)
@@ -102,7 +102,7 @@ def switched(scene: bpy.types.Scene) -> None:
             bpy.data.scenes.remove(hair)
 
 
-def _add(scene: bpy.types.Scene) -> None:
+def _add_hair_scene(scene: bpy.types.Scene) -> None:
     hair = bpy.data.scenes.new(f"{scene.name} Hair")
     hair.render.engine = ENGINE
     hair.render.film_transparent = True
@@ -110,57 +110,58 @@ def _add(scene: bpy.types.Scene) -> None:
     scene.hairloom.hair_scene = hair
     # the window must not draw while a render's thread hides hair
     scene.render.use_lock_interface = True
-    follow(scene, hair)
+    copy_settings(scene, hair)
     hair_compositor.link(scene, hair, drawn_layer(scene).name)
 
 
-def follow(scene: bpy.types.Scene, hair: bpy.types.Scene) -> None:
+def copy_settings(scene: bpy.types.Scene, hair: bpy.types.Scene) -> None:
     """Copy camera, world, picture settings and passes of the artist's scene to the hair scene."""
     pairs = [(scene.render, hair.render, name) for name in _RENDER]
     pairs += [(scene, hair, name) for name in ("camera", "world", "frame_start", "frame_end")]
     for section in ("picture", "mesh_shadows"):
-        ours = getattr(scene.hairloom, section)
-        pairs += [(ours, getattr(hair.hairloom, section), name) for name in ours.__annotations__]
-    _copy(pairs)
-    _follow_passes(scene, hair)
-    used = {view.name: view.use for view in scene.render.views}
+        source, target = getattr(scene.hairloom, section), getattr(hair.hairloom, section)
+        pairs += [(source, target, name) for name in source.__annotations__]
+    _copy_properties(pairs)
+    _copy_passes(scene, hair)
+    is_used = {view.name: view.use for view in scene.render.views}
     for view in hair.render.views:
-        view.use = used.get(view.name, False)
+        view.use = is_used.get(view.name, False)
 
 
-def _follow_passes(scene: bpy.types.Scene, hair: bpy.types.Scene) -> None:
+def _copy_passes(scene: bpy.types.Scene, hair: bpy.types.Scene) -> None:
     """Copy the passes of the view layer whose hair is drawn to the hair scene."""
-    ours, theirs = drawn_layer(scene), hair.view_layers[0]
-    of_hair = ((ours.hairloom, theirs.hairloom, name) for name in ours.hairloom.__annotations__)
-    _copy([*((ours, theirs, name) for name in _LAYER), *of_hair])
+    source, target = drawn_layer(scene), hair.view_layers[0]
+    names = source.hairloom.__annotations__
+    of_hair = ((source.hairloom, target.hairloom, name) for name in names)
+    _copy_properties([*((source, target, name) for name in _LAYER), *of_hair])
 
 
-def _copy(pairs: Iterable[tuple[Any, Any, str]]) -> None:
-    """Copy properties by name from one owner to the other, where they differ."""
-    for ours, theirs, name in pairs:
-        value = getattr(ours, name)
-        if getattr(theirs, name) != value:
-            setattr(theirs, name, value)
+def _copy_properties(pairs: Iterable[tuple[Any, Any, str]]) -> None:
+    """Copy properties by name from source to target, where they differ."""
+    for source, target, name in pairs:
+        value = getattr(source, name)
+        if getattr(target, name) != value:
+            setattr(target, name, value)
 
 
-def passes_changed(scene: bpy.types.Scene) -> None:
+def on_passes_changed(scene: bpy.types.Scene) -> None:
     """Update the passes after the artist has switched one."""
     for layer in scene.view_layers:
         layer.update_render_passes()
     hair = hair_scene_of(scene)
     if hair is not None:
-        _follow_passes(scene, hair)
+        _copy_passes(scene, hair)
 
 
-def _hair_in(collection: bpy.types.Collection, seen: set[str]) -> Iterator[bpy.types.Object]:
+def _hair_in(collection: bpy.types.Collection, visited: set[str]) -> Iterator[bpy.types.Object]:
     """All hair curves of a collection, also in collections that it instances."""
     for obj in collection.all_objects:
         if obj.type == "CURVES":
             yield obj
         inner = obj.instance_collection if obj.instance_type == "COLLECTION" else None
-        if inner is not None and inner.name_full not in seen:
-            seen.add(inner.name_full)
-            yield from _hair_in(inner, seen)
+        if inner is not None and inner.name_full not in visited:
+            visited.add(inner.name_full)
+            yield from _hair_in(inner, visited)
 
 
 def hide_hair(scene: bpy.types.Scene) -> None:
@@ -190,7 +191,7 @@ def on_render_begin(scene: bpy.types.Scene, *_: object) -> None:
     hair = hair_scene_of(scene)
     if hair is None:
         return
-    follow(scene, hair)
+    copy_settings(scene, hair)
     if not is_needed(scene):
         return
     problem = problem_of(scene)
@@ -201,12 +202,12 @@ def on_render_begin(scene: bpy.types.Scene, *_: object) -> None:
 @persistent
 def on_frame_begin(scene: bpy.types.Scene, *_: object) -> None:
     """Update the camera, which may change at any frame, and hide hair, which a save shows again."""
-    _follow_camera(scene)
+    _copy_camera(scene)
     if hair_scene_of(scene) is not None and is_needed(scene) and not problem_of(scene):
         hide_hair(scene)
 
 
-def _follow_camera(scene: bpy.types.Scene) -> None:
+def _copy_camera(scene: bpy.types.Scene) -> None:
     hair = hair_scene_of(scene)
     if hair is not None and hair.camera != scene.camera:
         hair.camera = scene.camera
@@ -221,19 +222,19 @@ def on_render_end(*_: object) -> None:
 def on_update(scene: bpy.types.Scene, *_: object) -> None:
     """Keep the hair scene up to date: before a render, Blender needs a camera in all scenes of a
     compositor, and nodes of the compositor show the passes of their scene."""
-    _follow_camera(scene)
+    _copy_camera(scene)
     hair = hair_scene_of(scene)
     if hair is not None:
-        _follow_passes(scene, hair)
+        _copy_passes(scene, hair)
 
 
 @persistent
-def heal(*_: object) -> None:
+def repair(*_: object) -> None:
     """Restore hair in files saved during a render, and remove hair scenes whose scene is gone."""
     show_hair()
-    named = {scene.hairloom.hair_scene for scene in bpy.data.scenes}
+    in_use = {scene.hairloom.hair_scene for scene in bpy.data.scenes}
     for scene in list(bpy.data.scenes):
-        if scene.hairloom.is_hair_scene and scene not in named and len(bpy.data.scenes) > 1:
+        if scene.hairloom.is_hair_scene and scene not in in_use and len(bpy.data.scenes) > 1:
             bpy.data.scenes.remove(scene)
 
 
@@ -243,13 +244,13 @@ HANDLERS = (
     (bpy.app.handlers.render_complete, on_render_end),
     (bpy.app.handlers.render_cancel, on_render_end),
     (bpy.app.handlers.depsgraph_update_post, on_update),
-    (bpy.app.handlers.load_post, heal),
-    (bpy.app.handlers.save_pre, heal),
+    (bpy.app.handlers.load_post, repair),
+    (bpy.app.handlers.save_pre, repair),
 )
 
 
-#: properties that the artist changes -> functions called then
-LISTENERS = (("hair_scene", switched), ("passes", passes_changed))
+#: properties -> functions that are called when the artist has changed them
+LISTENERS = (("hair_scene", on_switched), ("passes", on_passes_changed))
 
 
 def register() -> None:
