@@ -66,7 +66,7 @@ def main() -> None:
         return plain.with_settings(chosen["cards"], atlas, shown), at_rest
 
     for section in ("dynamics", "volume", "cards"):
-        for entry in presets.shipped(section):
+        for entry in presets.shipped_presets(section):
             studio.settings, (pose, points) = look_and_motion(presets.named_preset(entry.name))
             size = THUMBNAIL, THUMBNAIL, SAMPLES
             picture = studio.picture(pose, points, *size, is_transparent=True)

@@ -8,12 +8,12 @@ import bpy
 from bpy.props import StringProperty
 
 from ..blender.properties.groups import operator_properties
-from ..blender.properties.properties import maps_meant
+from ..blender.properties.properties import matching_maps
 from .selection import ground_mesh
 
 
 def names_of_weights(_operator: Any, context: bpy.types.Context, typed: str) -> list[str]:
-    return maps_meant(ground_mesh(context), typed)
+    return matching_maps(ground_mesh(context), typed)
 
 
 #: part of the `__annotations__` of such an operator

@@ -9,7 +9,7 @@ import bpy
 import rna_keymap_ui
 
 from ..blender.preview import previews
-from ..blender.properties.presets import shipped
+from ..blender.properties.presets import shipped_presets
 from .drawing import draw_overlays
 from .operators_card_edits import draw_menu
 from .operators_strand_export import draw_strand_exports
@@ -47,7 +47,7 @@ class HAIRLOOM_MT_looks(bpy.types.Menu):
     bl_label = "Look"
 
     def draw(self, _context: bpy.types.Context) -> None:
-        for entry in shipped("shading"):
+        for entry in shipped_presets("shading"):
             operator = self.layout.operator(
                 "hairloom.apply_preset", text=entry.title, icon_value=entry.icon
             )

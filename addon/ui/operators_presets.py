@@ -12,14 +12,14 @@ from bpy_extras.io_utils import ImportHelper, poll_file_object_drop
 
 from ..blender.base.outcome import report
 from ..blender.properties.presets import (
-    OWN,
+    OWN_PREFIX,
     apply,
     delete_own,
     free_title,
-    kept_settings,
+    is_title_taken,
     named_preset,
-    replaced_preset,
     save_own,
+    settings_to_store,
 )
 from ..blender.properties.properties import settings_of
 from ..blender.scene.hair_material import has_look_material
@@ -128,13 +128,13 @@ class HAIRLOOM_OT_save_preset(bpy.types.Operator):
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        path = save_own(self.title, *kept_settings(chosen_hair(context)[0], self.section))
-        report(self, "INFO", f"Saved as {OWN}{path.stem}, in {path}")
+        path = save_own(self.title, *settings_to_store(chosen_hair(context)[0], self.section))
+        report(self, "INFO", f"Saved as {OWN_PREFIX}{path.stem}, in {path}")
         return {"FINISHED"}
 
     def draw(self, _context: bpy.types.Context) -> None:
         self.layout.prop(self, "title")
-        if replaced_preset(self.title, self.section):
+        if is_title_taken(self.title, self.section):
             self.layout.label(text="Replaces your preset of this name", icon="ERROR")
 
 

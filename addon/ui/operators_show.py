@@ -12,7 +12,13 @@ from ..blender.bakes.groom_hashes import frame_rate
 from ..blender.base.outcome import report
 from ..blender.pictures.sheet import Sheet
 from ..blender.pictures.showing import ShownGroom, file_name, shown_groom
-from ..blender.pictures.turntable import FRAMES, LIGHTS, SIDES, Turntable, TurntableSettings
+from ..blender.pictures.turntable import (
+    FRAME_LIMITS,
+    LIGHTS,
+    SIDE_LIMITS,
+    Turntable,
+    TurntableSettings,
+)
 from ..errors import HairloomError
 from .long_work import LongWork, Steps, counted, draw_progress
 from .reports import reporting, wait_cursor
@@ -46,16 +52,16 @@ class HAIRLOOM_OT_turntable(LongWork, bpy.types.Operator):
         name="Frames",
         description="Number of pictures in a full turn",
         default=48,
-        min=FRAMES[0],
-        max=FRAMES[1],
+        min=FRAME_LIMITS[0],
+        max=FRAME_LIMITS[1],
         soft_max=360,
     )
     size: IntProperty(
         name="Size",
         description="Width and height of the pictures in pixels",
         default=720,
-        min=SIDES[0],
-        max=SIDES[1],
+        min=SIDE_LIMITS[0],
+        max=SIDE_LIMITS[1],
         soft_max=2048,
         subtype="PIXEL",
     )
@@ -135,8 +141,8 @@ class HAIRLOOM_OT_contact_sheet(bpy.types.Operator, ExportHelper):
         name="Size",
         description="Width and height of each picture on the sheet in pixels",
         default=480,
-        min=SIDES[0],
-        max=SIDES[1] // 4,
+        min=SIDE_LIMITS[0],
+        max=SIDE_LIMITS[1] // 4,
         subtype="PIXEL",
     )
     samples: _SAMPLES

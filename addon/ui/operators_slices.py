@@ -7,7 +7,7 @@ import bpy
 from ..blender.base.outcome import report
 from ..blender.pictures import skin_picture, slices
 from ..blender.pictures.skin_picture import skin_shadow_of_view
-from ..blender.pictures.slices import shown_image, slices_of_view
+from ..blender.pictures.slices import filled_image, slices_of_view
 from ..blender.preview import previews
 from ..blender.sessions.session import Session
 from .reports import reporting
@@ -27,7 +27,7 @@ class HAIRLOOM_OT_show_slices(bpy.types.Operator):
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
         picture = slices_of_view(_previewed(context).snapshot, context)
-        _show(context, shown_image(slices.IMAGE, picture))
+        _show(context, filled_image(slices.IMAGE, picture))
         report(
             self, "INFO", "White: no light is blocked. Layers away from the light, from top left"
         )
@@ -50,7 +50,7 @@ class HAIRLOOM_OT_show_skin_shadow(bpy.types.Operator):
         session = _previewed(context)
         hair = session.snapshot, session.rig, session.solver.pose
         picture = skin_shadow_of_view(*hair, context, place=self.bl_label)
-        _show(context, shown_image(skin_picture.IMAGE, picture))
+        _show(context, filled_image(skin_picture.IMAGE, picture))
         report(self, "INFO", "White: all light reaches the skin. One map for each light")
         return {"FINISHED"}
 

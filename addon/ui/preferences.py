@@ -12,7 +12,7 @@ from ..blender.base import gpu_choices
 from ..blender.base.gpu_context import gpu_in_use
 from ..blender.base.redraw import redraw_views
 from ..blender.properties.groups import operator_properties
-from ..blender.properties.presets import titles
+from ..blender.properties.presets import names_by_title
 from ..blender.sessions.solvers import compute_problem
 from ..blender.setup.self_test import last_report
 from .menus import draw_shortcuts
@@ -25,11 +25,11 @@ LOOK, DYNAMICS = "Brown", "Breeze"
 
 
 def _looks(_owner: Any, _context: bpy.types.Context, typed: str) -> list[str]:
-    return [name for name in titles("shading") if typed.lower() in name.lower()]
+    return [name for name in names_by_title("shading") if typed.lower() in name.lower()]
 
 
 def _motions(_owner: Any, _context: bpy.types.Context, typed: str) -> list[str]:
-    return [name for name in titles("dynamics") if typed.lower() in name.lower()]
+    return [name for name in names_by_title("dynamics") if typed.lower() in name.lower()]
 
 
 #: choices for a new groom; in the `__annotations__` of the page, and of operators that make one
@@ -169,7 +169,7 @@ def chosen_presets(chosen: Any) -> tuple[str, ...]:
         chosen: preferences, or an operator with NEW_GROOM; presets are given by title or name.
     """
     typed = {"shading": chosen.look, "dynamics": chosen.motion}
-    return tuple(titles(section).get(text, text) for section, text in typed.items() if text)
+    return tuple(names_by_title(section).get(text, text) for section, text in typed.items() if text)
 
 
 def register() -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 from bpy.props import EnumProperty, PointerProperty
 
-from ..blender.properties.presets import Entry, own, preset_of, shipped
+from ..blender.properties.presets import Entry, matching_preset, own_presets, shipped_presets
 from ..blender.scene.curves import COLOR_ATTRIBUTE
 from ..blender.scene.principled import has_principled_hair
 from .messages import draw_message
@@ -72,8 +72,8 @@ def draw_preset_row(
 
 def _entries(section: str) -> tuple[tuple[Entry, ...], tuple[str, ...]]:
     """All presets of a section, and warnings about files among the artist's own."""
-    entries, warnings = own(section)
-    return (*shipped(section), *entries), warnings
+    entries, warnings = own_presets(section)
+    return (*shipped_presets(section), *entries), warnings
 
 
 def _number(hair: bpy.types.Object, entries: tuple[Entry, ...]) -> int:
@@ -82,7 +82,7 @@ def _number(hair: bpy.types.Object, entries: tuple[Entry, ...]) -> int:
     `color_source` is ignored on hair without colours of its own, where it has no effect.
     """
     ignored = () if COLOR_ATTRIBUTE in hair.data.attributes else ("color_source",)
-    found = preset_of(hair, entries, ignored)
+    found = matching_preset(hair, entries, ignored)
     return 0 if found is None else 1 + entries.index(found)
 
 

@@ -314,10 +314,10 @@ def test_a_preset_keeps_painted_maps_unless_it_names_its_own(hair: Any) -> None:
     shipped = presets.named_preset("dynamics/big")
     presets.apply(shipped.settings, hair)
     assert (dynamics.style_root, dynamics.gravity_mask) == (5.0, "Top")
-    entries = presets.shipped("dynamics")
-    found = presets.preset_of(hair, entries)
+    entries = presets.shipped_presets("dynamics")
+    found = presets.matching_preset(hair, entries)
     assert found is not None and found.name == "dynamics/big", "painted hair has it, too"
-    (kept,) = presets.kept_settings(hair, "dynamics")
+    (kept,) = presets.settings_to_store(hair, "dynamics")
     dynamics.gravity_mask, dynamics.bend_mask = "Other", "Bent"
     presets.apply(kept, hair)
     assert (dynamics.gravity_mask, dynamics.bend_mask) == ("Top", "Bent")

@@ -30,13 +30,13 @@ def hair(new_hair: Callable[..., bpy.types.Object]) -> bpy.types.Object:
     return new_hair()
 
 
-@pytest.mark.parametrize("name", [entry.name for entry in presets.shipped("volume")])
+@pytest.mark.parametrize("name", [entry.name for entry in presets.shipped_presets("volume")])
 def test_shadows_keep_key_fill_and_rim_light(name: str) -> None:
     """Lights without a map use occlusion instead of shadows, which is 30 % darker on blond hair."""
     assert presets.named_preset(name).settings.max_lights >= 3
 
 
-@pytest.mark.parametrize("name", [entry.name for entry in presets.shipped("shading")])
+@pytest.mark.parametrize("name", [entry.name for entry in presets.shipped_presets("shading")])
 def test_a_look_goes_onto_the_selected_hair(hair: bpy.types.Object, name: str) -> None:
     assert bpy.ops.hairloom.apply_preset(name=name) == {"FINISHED"}
     applied = settings_of(hair.data.hairloom.shading, ShadingSettings).as_dict()
@@ -49,9 +49,9 @@ def test_a_look_goes_onto_the_selected_hair(hair: bpy.types.Object, name: str) -
 def test_the_panel_knows_which_preset_the_hair_has(hair: bpy.types.Object, section: str) -> None:
     """Values are stored with seven digits; each preset is still recognised by them."""
     choices = bpy.context.window_manager.hairloom_presets
-    for entry in presets.shipped(section):
+    for entry in presets.shipped_presets(section):
         setattr(choices, section, entry.name)
-        assert presets.preset_of(hair, presets.shipped(section)) == entry
+        assert presets.matching_preset(hair, presets.shipped_presets(section)) == entry
         assert getattr(choices, section) == entry.name
 
 
@@ -61,7 +61,7 @@ def test_hair_with_a_setting_of_its_own_has_no_preset(hair: bpy.types.Object) ->
     hair.data.hairloom.shading.width_r *= 1.1
     assert choices.shading == "CUSTOM"
     choices.shading = "CUSTOM"  # changes nothing
-    assert presets.preset_of(hair, presets.shipped("shading")) is None
+    assert presets.matching_preset(hair, presets.shipped_presets("shading")) is None
     choices.shading = "looks/blond"
     assert choices.shading == "looks/blond"
 
@@ -77,10 +77,10 @@ def test_a_new_groom_has_the_look_that_it_was_given(hair: bpy.types.Object) -> N
 
 
 def test_a_preset_of_two_sections_needs_both(hair: bpy.types.Object) -> None:
-    (crowd,) = (each for each in presets.shipped("cards") if each.name == "cards/crowd")
+    (crowd,) = (each for each in presets.shipped_presets("cards") if each.name == "cards/crowd")
     bpy.ops.hairloom.apply_preset(name=crowd.name)
     hair.data.hairloom.atlas.columns += 1
-    assert presets.preset_of(hair, (crowd,)) is None
+    assert presets.matching_preset(hair, (crowd,)) is None
 
 
 def test_choosing_goes_to_all_selected_hair(
@@ -91,7 +91,7 @@ def test_choosing_goes_to_all_selected_hair(
         each.select_set(True)
     bpy.context.window_manager.hairloom_presets.shading = "looks/red"
     for each in (hair, other):
-        found = presets.preset_of(each, presets.shipped("shading"))
+        found = presets.matching_preset(each, presets.shipped_presets("shading"))
         assert found is not None and found.name == "looks/red"
 
 
@@ -139,9 +139,9 @@ def test_a_preset_file_is_applied_and_kept(
     file.write_text(json.dumps(data | {"title": "Theirs"}))
     for titles in (["Theirs"], ["Theirs", "Theirs 2"]):
         assert bpy.ops.hairloom.add_preset(filepath=str(file)) == {"FINISHED"}
-        entries, warnings = presets.own("shading")
+        entries, warnings = presets.own_presets("shading")
         assert [entry.title for entry in entries] == titles and not warnings
-    assert presets.preset_of(hair, entries) == entries[0]
+    assert presets.matching_preset(hair, entries) == entries[0]
 
 
 @pytest.mark.parametrize(
@@ -170,21 +170,21 @@ def own_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
 
 
 def titles() -> list[str]:
-    return [entry.title for entry in presets.own("shading")[0]]
+    return [entry.title for entry in presets.own_presets("shading")[0]]
 
 
 def test_a_look_is_saved_listed_applied_and_deleted(
     hair: bpy.types.Object, own_folder: Path
 ) -> None:
     shading = hair.data.hairloom.shading
-    assert presets.own("shading") == ((), ())
+    assert presets.own_presets("shading") == ((), ())
     shading.model, shading.width_r = "marschner", 0.123
     assert bpy.ops.hairloom.save_preset(title="  My Red, no. 2 ") == {"FINISHED"}
     assert [path.name for path in own_folder.iterdir()] == ["my_red_no_2.json"]
-    ((entry,), warnings) = presets.own("shading")
+    ((entry,), warnings) = presets.own_presets("shading")
     assert (entry.name, entry.title, warnings) == ("own/my_red_no_2", "My Red, no. 2", ())
     assert entry.is_own and entry.icon == 0
-    assert presets.own("dynamics") == ((), ())
+    assert presets.own_presets("dynamics") == ((), ())
     shading.model, shading.width_r = "kajiya_kay", 0.2
     assert bpy.ops.hairloom.apply_preset(name=entry.name) == {"FINISHED"}
     assert shading.model == "marschner" and shading.width_r == pytest.approx(0.123)
@@ -222,12 +222,12 @@ def test_presets_of_all_kinds_are_saved_and_cards_bring_their_atlas(
     groom.cards.card_count, groom.atlas.size, hair.hairloom.dynamics.drag = 77, "512", 0.5
     for section in ("cards", "dynamics", "volume"):
         assert bpy.ops.hairloom.save_preset(title="Mine", section=section) == {"FINISHED"}
-        ((entry,), _) = presets.own(section)
+        ((entry,), _) = presets.own_presets(section)
         assert entry.title == "Mine"
-    assert presets.own("shading") == ((), ())
+    assert presets.own_presets("shading") == ((), ())
     groom.cards.card_count, groom.atlas.size, hair.hairloom.dynamics.drag = 100, "1024", 0.0
     for section in ("cards", "dynamics"):
-        bpy.ops.hairloom.apply_preset(name=presets.own(section)[0][0].name)
+        bpy.ops.hairloom.apply_preset(name=presets.own_presets(section)[0][0].name)
     assert (groom.cards.card_count, groom.atlas.size) == (77, "512")
     assert hair.hairloom.dynamics.drag == 0.5
 
@@ -236,7 +236,7 @@ def test_presets_of_all_kinds_are_saved_and_cards_bring_their_atlas(
 def test_every_preset_that_ships_goes_onto_a_groom_and_has_a_picture(
     hair: bpy.types.Object, section: str
 ) -> None:
-    entries = presets.shipped(section)
+    entries = presets.shipped_presets(section)
     assert len(entries) >= 3
     for entry in entries:
         assert bpy.ops.hairloom.apply_preset(name=entry.name) == {"FINISHED"}
@@ -290,7 +290,7 @@ def test_garbage_in_the_preset_folder_is_reported_and_harmless(
     (own_folder / "bad.json").write_bytes(content)
     (own_folder / "folder.json").mkdir()
     (own_folder / "note.txt").write_text("not looked at")
-    entries, warnings = presets.own("shading")
+    entries, warnings = presets.own_presets("shading")
     assert [entry.title for entry in entries] == ["Good"]
     assert [warning.split(" ")[0] for warning in warnings] == ["bad.json", "folder.json"]
     with pytest.raises(HairloomError):
@@ -327,7 +327,7 @@ def test_a_picture_beside_a_preset_goes_with_it(extension: Any, own_folder: Path
     data = {"hairloom": PRESET_VERSION, "section": "shading", "title": "Seen", "values": {}}
     (own_folder / "seen.json").write_text(json.dumps(data))
     (own_folder / "seen.png").write_bytes(b"no picture")
-    (entry,), _ = presets.own("shading")
+    (entry,), _ = presets.own_presets("shading")
     assert entry.icon == entry.icon
     presets.delete_own(entry.name)
     assert list(own_folder.iterdir()) == []
@@ -348,10 +348,10 @@ def test_the_look_under_water_brings_its_shafts_of_light_with_it(hair: bpy.types
 
 def test_a_title_stands_for_one_preset(hair: bpy.types.Object, own_folder: Path) -> None:
     """An artist may give an own look the title of a shipped one."""
-    assert presets.titles("dynamics")["Soft and long"] == "dynamics/soft"
+    assert presets.names_by_title("dynamics")["Soft and long"] == "dynamics/soft"
     for title in ("Brown", "Mine"):
         bpy.ops.hairloom.save_preset(title=title)
-    found = presets.titles("shading")
+    found = presets.names_by_title("shading")
     assert found["Brown"] == "looks/brown" and found["own/brown"] == "own/brown"
     assert found["Mine"] == "own/mine"
 

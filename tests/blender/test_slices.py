@@ -15,7 +15,7 @@ from engine_stage import view_shadings
 
 from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.pictures.skin_picture import IMAGE as SKIN_IMAGE
-from hairloom.addon.blender.pictures.slices import IMAGE, shown_image, shown_slices
+from hairloom.addon.blender.pictures.slices import IMAGE, filled_image, slices_picture
 from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.sessions.session import Session
 from hairloom.addon.errors import HairloomError
@@ -76,12 +76,12 @@ def test_an_image_shows_them_and_is_the_same_each_time(new_hair: Any, sphere: An
     session = Session(new_hair(sphere), bpy.context.evaluated_depsgraph_get())
     with pytest.raises(HairloomError, match="Set Shadows to"):
         none = replace(session.snapshot, volume=VolumeSettings(shadows="none"))
-        shown_slices(none, StrandPass())
+        slices_picture(none, StrandPass())
     for layers, across in ((3, 2), (8, 3)):
         volume = VolumeSettings(shadows="deep", resolution=32, layers=layers)
         snapshot = replace(session.snapshot, volume=volume)
-        picture = shown_slices(snapshot, StrandPass())
-        image = shown_image(IMAGE, picture)
+        picture = slices_picture(snapshot, StrandPass())
+        image = filled_image(IMAGE, picture)
         assert image.name == IMAGE and tuple(image.size) == (across * 34, across * 34)
         assert np.allclose(np.array(image.pixels[:]).reshape(picture.shape), picture)
     assert sum(each.name.startswith(IMAGE) for each in bpy.data.images) == 1

@@ -16,7 +16,7 @@ from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.pictures.film import write_picture
 from hairloom.addon.blender.pictures.studio import Studio
 from hairloom.addon.blender.properties.groom_settings import GroomSettings
-from hairloom.addon.blender.properties.presets import named_preset, shipped
+from hairloom.addon.blender.properties.presets import named_preset, shipped_presets
 from hairloom.addon.blender.scene.built_in_head import built_in_head
 from hairloom.addon.blender.scene.surfaces import read_surface
 from hairloom.addon.blender.sessions.prepared_groom import prepare_groom
@@ -109,7 +109,9 @@ def test_children_do_not_turn_the_camera(head: Surface) -> None:
 
 
 def test_the_stages_that_ship_are_four_and_the_studio_is_the_default() -> None:
-    found = {entry.path.stem: named_preset(entry.name).settings for entry in shipped("stage")}
+    found = {
+        entry.path.stem: named_preset(entry.name).settings for entry in shipped_presets("stage")
+    }
     assert set(found) == STAGES
     assert found["studio"] == StageSettings()
     assert len(set(found.values())) == len(STAGES)

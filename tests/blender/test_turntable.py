@@ -27,7 +27,7 @@ from hairloom.addon.blender.pictures.sheet import COLUMNS, VIEWS, Sheet, labelle
 from hairloom.addon.blender.pictures.showing import file_name, shown_groom
 from hairloom.addon.blender.pictures.studio import FIELD_OF_VIEW, MARGIN
 from hairloom.addon.blender.pictures.turntable import Turntable, TurntableSettings
-from hairloom.addon.blender.properties.presets import shipped
+from hairloom.addon.blender.properties.presets import shipped_presets
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.files import file_moves, stale_temp_files
 from hairloom.addon.render.camera import frame_points
@@ -136,7 +136,7 @@ def test_feet_are_not_cut_off_however_wide_they_stand(top: float, foot: float) -
     height, angle = np.array([0.0, 1.8])[random.integers(0, 2, 4000)], random.uniform(0, 6.3, 4000)
     reach = np.where(height > 0.0, top, foot)
     places = np.stack([reach * np.cos(angle), reach * np.sin(angle), height], axis=1)
-    outline = turntable_module.turned_around(places, np.array([0.0, 0.0, 0.9]))
+    outline = turntable_module.enclosing_rings(places, np.array([0.0, 0.0, 0.9]))
     camera = frame_points(outline, (0.0, -1.0, 0.14), FIELD_OF_VIEW, 1.0, margin=MARGIN)
     seen = np.column_stack([places, np.ones(4000)]) @ (camera.projection @ camera.view).T
     farthest = np.abs(seen[:, :2] / seen[:, 3:]).max()
@@ -226,14 +226,14 @@ def test_a_video_on_a_full_disk_is_none(tmp_path: Path, part: float) -> None:
         write_png(frame, picture)
     whole, cut = tmp_path / "whole.mp4", tmp_path / "cut.mp4"
     video.write_video(whole, frames, (64, 64), 24.0)
-    assert video.is_whole(whole)
+    assert video.is_complete(whole)
     limit = int(part * whole.stat().st_size)
     with full_disk(limit), pytest.raises(HairloomError, match="no video was written"):
         video.write_video(cut, frames, (64, 64), 24.0)
     assert not cut.exists()
     for length in (0, 7, 100, limit, whole.stat().st_size - 1):
         cut.write_bytes(whole.read_bytes()[:length])
-        assert not video.is_whole(cut)
+        assert not video.is_complete(cut)
 
 
 @pytest.mark.slow(instead="test_a_failed_turntable_leaves_no_files")
@@ -346,9 +346,9 @@ def test_a_contact_sheet_shows_all_sides(hair: bpy.types.Object, tmp_path: Path)
 def test_a_contact_sheet_of_all_looks_leaves_the_groom_its_own(table: Turntable) -> None:
     studio, worn = table.studio, table.studio.settings
     sheet = Sheet(studio, table.pose, table.points, (48, 48), 1, by_looks=True)
-    assert list(sheet.steps()) == list(range(1, len(shipped("shading")) + 1))
+    assert list(sheet.steps()) == list(range(1, len(shipped_presets("shading")) + 1))
     assert studio.settings is worn
-    rows = -(-len(shipped("shading")) // COLUMNS)
+    rows = -(-len(shipped_presets("shading")) // COLUMNS)
     assert sheet.picture.shape == (48 * rows, 48 * COLUMNS, 4)
     top = sheet.picture[-48:]
     assert np.abs(top[:, :48] - top[:, 48:96]).max() > 0.1
@@ -428,8 +428,14 @@ def test_a_folder_that_cannot_be_written_gets_a_message(
 
 def test_limits_of_the_button_are_those_of_the_settings(extension: None) -> None:
     properties = bpy.ops.hairloom.turntable.get_rna_type().properties
-    assert (properties["frames"].hard_min, properties["frames"].hard_max) == turntable_module.FRAMES
-    assert (properties["size"].hard_min, properties["size"].hard_max) == turntable_module.SIDES
+    assert (
+        properties["frames"].hard_min,
+        properties["frames"].hard_max,
+    ) == turntable_module.FRAME_LIMITS
+    assert (
+        properties["size"].hard_min,
+        properties["size"].hard_max,
+    ) == turntable_module.SIDE_LIMITS
     defaults = TurntableSettings()
     assert properties["frames"].default == defaults.frames
     assert properties["size"].default == defaults.width == defaults.height

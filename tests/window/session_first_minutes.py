@@ -143,7 +143,7 @@ def presets_have_pictures():
     presets = hairloom_module("presets")
     bpy.context.window.cursor_warp(viewport().x + 300, viewport().y + viewport().height // 2)
     for section in ("shading", "dynamics", "volume", "cards"):
-        entries = presets.shipped(section)
+        entries = presets.shipped_presets(section)
         assert entries and all(entry.icon for entry in entries), section
     before = yield from redrawn_pixels("brown")
     bpy.context.window_manager.hairloom_presets.shading = "looks/blond"

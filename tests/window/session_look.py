@@ -261,14 +261,14 @@ def own_presets():
     """Saved in the extension's user folder, shown with a picture, deleted."""
     presets = hairloom_module("presets")
     folder = presets.own_folder()
-    assert "extensions" in folder.parts and presets.own("shading") == ((), ())
+    assert "extensions" in folder.parts and presets.own_presets("shading") == ((), ())
     assert bpy.ops.hairloom.save_preset(title="Mine") == {"FINISHED"}
     (folder / "broken.json").write_text("{")
     image = bpy.data.images.new("Picture", 128, 128, float_buffer=True)
     image.pixels.foreach_set(np.tile(np.float32([0.6, 0.3, 0.1, 1.0]), 128 * 128))
     image.file_format = "PNG"
     image.save(filepath=str(folder / "mine.png"))
-    (entry,), (warning,) = presets.own("shading")
+    (entry,), (warning,) = presets.own_presets("shading")
     assert entry.icon > 0 and warning.startswith("broken.json")
     chosen = bpy.context.window_manager.hairloom_presets
     assert chosen.shading == entry.name
@@ -330,7 +330,7 @@ def a_picture_is_a_button(hair):
     yield from wait_until(lambda: chosen.shading != "looks/dyed", "no picture was clicked")
     name = chosen.shading
     assert name.startswith("looks/"), name
-    entry = presets.preset_of(hair, presets.shipped("shading"))
+    entry = presets.matching_preset(hair, presets.shipped_presets("shading"))
     assert entry is not None and entry.name == name
     bpy.ops.ed.undo()
     yield

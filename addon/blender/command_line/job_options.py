@@ -15,7 +15,7 @@ from ...params import Settings, SettingsMap
 from ...params.preset import Preset
 from ..bakes.bake_settings import frame_range
 from ..base.report import STYLES
-from ..properties.presets import named_preset, shipped
+from ..properties.presets import named_preset, shipped_presets
 from ..scene.bust_skin import TONES
 from ..scene.principled import look_from_named
 from ..setup.hairstyles import shipped_hairstyles as hairstyles
@@ -198,7 +198,7 @@ def add_picture_options(parser: argparse.ArgumentParser, width: int, height: int
 
 def _stages() -> list[str]:
     """The short names of the shipped stages."""
-    return [entry.path.stem for entry in shipped("stage")]
+    return [entry.path.stem for entry in shipped_presets("stage")]
 
 
 def add_motion_options(parser: argparse.ArgumentParser) -> None:

@@ -32,11 +32,11 @@ def write_picture(path: Path, linear: Floats, stage: StageSettings) -> None:
         HairloomError: it cannot be written, or this Blender has no such view transform.
     """
     straight = straight_alpha(linear)
-    coded = _developed(straight[..., :3], stage)
-    save_coded_png(path, _dithered(np.concatenate([coded, straight[..., 3:]], axis=-1)))
+    encoded = _display_encoded(straight[..., :3], stage)
+    save_coded_png(path, _dithered(np.concatenate([encoded, straight[..., 3:]], axis=-1)))
 
 
-def _developed(colors: Floats, stage: StageSettings) -> Floats:
+def _display_encoded(colors: Floats, stage: StageSettings) -> Floats:
     """Display-encoded values in [0, 1] of scene-linear colours."""
     transform, look = _TRANSFORMS[stage.view]
     view = ColorView(transform=transform, look=look, exposure=stage.exposure)
@@ -56,10 +56,10 @@ def _developed(colors: Floats, stage: StageSettings) -> Floats:
         ) from error
 
 
-def _dithered(coded: Floats) -> Floats:
+def _dithered(encoded: Floats) -> Floats:
     """Colours with noise of up to half an 8-bit step, the same in every picture, so that a soft
     backdrop has no bands. Pure black and white stay as they are."""
-    noise = np.random.default_rng(0).random((*coded.shape[:2], 3), np.float32) - 0.5
-    moved = coded.copy()
-    moved[..., :3] = np.clip(coded[..., :3] + noise / 255.0, 0.0, 1.0)
-    return moved
+    noise = np.random.default_rng(0).random((*encoded.shape[:2], 3), np.float32) - 0.5
+    dithered = encoded.copy()
+    dithered[..., :3] = np.clip(encoded[..., :3] + noise / 255.0, 0.0, 1.0)
+    return dithered

@@ -8,17 +8,17 @@ from ...render.snapshot import MeshSnapshot, Skin
 from ..scene.built_in_head import HeadLook
 
 
-def head_parts(whole: MeshSnapshot, look: HeadLook) -> tuple[MeshSnapshot, ...]:
+def head_parts(head: MeshSnapshot, look: HeadLook) -> tuple[MeshSnapshot, ...]:
     """A head's parts, which share its vertices and skin, so that soft shadows continue across them.
 
     Args:
-        whole: the head with its normals and occlusion.
+        head: the head with its normals and occlusion.
     """
-    surface = whole.surface
-    has_skin = whole.skin is not None and surface.corner_uv is not None
+    surface = head.surface
+    has_skin = head.skin is not None and surface.corner_uv is not None
     return tuple(
         replace(
-            whole,
+            head,
             surface=replace(
                 surface,
                 triangles=surface.triangles[triangles],

@@ -16,7 +16,7 @@ from ...shading.settings import ShadingSettings
 from ...shading.shafts_settings import ShaftSettings
 from ...wet_flow import effective_settings
 from ..base.images import contact_sheet
-from ..properties.presets import named_preset, shipped
+from ..properties.presets import named_preset, shipped_presets
 from .studio import Studio
 
 #: name of a view, and its angle from the front [degrees] and height, see GoodSide.turned; None:
@@ -58,12 +58,12 @@ class Sheet:
         self._studio, self._pose, self._points = studio, pose, points
         self._guides = guides
         self._size, self._samples, self._by_looks = size, samples, by_looks
-        self._held = studio.held(pose, points)
+        self._framed_points = studio.framed_points(pose, points)
         self._pictures: list[Floats] = []
 
     @property
     def count(self) -> int:
-        return len(shipped("shading")) if self._by_looks else len(VIEWS) + 1
+        return len(shipped_presets("shading")) if self._by_looks else len(VIEWS) + 1
 
     def steps(self) -> Iterator[int]:
         """Draw everything; yields the number of finished pictures."""
@@ -80,35 +80,35 @@ class Sheet:
         side = self._studio.side
         for name, turn in VIEWS:
             direction = side.three_quarter if turn is None else side.turned(*turn)
-            yield name, self._seen(self._camera(direction, self._held))
-        yield CLOSE_UP, self._seen(self._camera(side.three_quarter, self._near_the_eye()))
+            yield name, self._draw(self._camera(direction, self._framed_points))
+        yield CLOSE_UP, self._draw(self._camera(side.three_quarter, self._close_up_points()))
 
     def _looks(self) -> Iterator[tuple[str, Floats]]:
-        worn = self._studio.settings
-        camera = self._camera(self._studio.side.three_quarter, self._held)
+        settings = self._studio.settings
+        camera = self._camera(self._studio.side.three_quarter, self._framed_points)
         try:
-            for entry in shipped("shading"):
+            for entry in shipped_presets("shading"):
                 look = effective_settings(SettingsMap(*named_preset(entry.name).all))
                 parts = look[ShadingSettings], look[ShaftSettings]
-                self._studio.settings = worn.with_settings(*parts)
-                yield entry.title, self._seen(camera)
+                self._studio.settings = settings.with_settings(*parts)
+                yield entry.title, self._draw(camera)
         finally:
-            self._studio.settings = worn
+            self._studio.settings = settings
 
-    def _seen(self, camera: Camera) -> Floats:
+    def _draw(self, camera: Camera) -> Floats:
         hair = self._pose, self._points
         return self._studio.picture(*hair, *self._size, self._samples, camera, guides=self._guides)
 
-    def _camera(self, direction: Floats, held: Floats) -> Camera:
-        return self._studio.framed(held, direction, self._size[0] / self._size[1])
+    def _camera(self, direction: Floats, points: Floats) -> Camera:
+        return self._studio.framing_camera(points, direction, self._size[0] / self._size[1])
 
-    def _near_the_eye(self) -> Floats:
-        """Points around the nearest hair in the three-quarter view."""
-        middles = self._studio.middles(self._points)
-        towards = middles @ self._studio.side.three_quarter
+    def _close_up_points(self) -> Floats:
+        """Points around the hair nearest to the eye in the three-quarter view."""
+        middles = self._studio.strand_middles(self._points)
+        depth = middles @ self._studio.side.three_quarter
         count = max(round(_NEAREST_FRACTION * len(middles)), 1)
-        middle = middles[np.argsort(towards)[-count:]].mean(axis=0)
-        reach = 0.5 * _CLOSE_FRACTION * float(np.ptp(self._held, axis=0).max())
+        middle = middles[np.argsort(depth)[-count:]].mean(axis=0)
+        reach = 0.5 * _CLOSE_FRACTION * float(np.ptp(self._framed_points, axis=0).max())
         return middle + reach * np.concatenate([np.eye(3), -np.eye(3)])
 
 
@@ -125,11 +125,11 @@ def labelled(picture: Floats, text: str) -> Floats:
     Args:
         picture: (height, width, 4) scene-linear, premultiplied, row 0 at the bottom.
     """
-    coverage = _letters(picture.shape[1], picture.shape[0], text)[..., None]
+    coverage = _text_coverage(picture.shape[1], picture.shape[0], text)[..., None]
     return (picture * (1.0 - coverage) + coverage * (*[_BRIGHTNESS] * 3, 1.0)).astype(np.float32)
 
 
-def _letters(width: int, height: int, text: str) -> Floats:
+def _text_coverage(width: int, height: int, text: str) -> Floats:
     """The coverage of each pixel by letters, (height, width)."""
     shorter = min(width, height)
     buffer = imbuf.new((width, height))

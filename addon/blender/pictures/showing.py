@@ -1,4 +1,4 @@
-"""A groom of the open scene in the studio, to be shown to others."""
+"""A groom of the open scene in the studio, for pictures."""
 
 from __future__ import annotations
 

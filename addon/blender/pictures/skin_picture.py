@@ -17,13 +17,13 @@ from ...rig_flow import Pose, Rig
 from ...shading.lights import packed_lights
 from ...shading.skin.diffusion import SKIN_LIGHTS
 from ...strands import Surface
-from .slices import lit_as_in
+from .slices import lit_as_in_view
 
 #: name of the image that shows it, reused each time
 IMAGE = "Skin Shadow"
 
 
-def shown_skin_shadow(snapshot: Snapshot, strand_pass: StrandPass, *, place: str) -> Floats:
+def skin_shadow_picture(snapshot: Snapshot, strand_pass: StrandPass, *, place: str) -> Floats:
     """The transmittance of light to the skin, (rows, columns, 4) scene-linear, row 0 at v = 0.
 
     White is full light, and transparent texels are no skin. The maps of up to four lights are side
@@ -34,7 +34,7 @@ def shown_skin_shadow(snapshot: Snapshot, strand_pass: StrandPass, *, place: str
         place: for errors.
 
     Raises:
-        HairloomError: there is no such shadow, and why.
+        HairloomError: there is no such shadow.
     """
     maps = strand_pass.opacity(snapshot)
     if maps is None or not snapshot.skin.soft_shadow or not snapshot.skin.softness:
@@ -64,16 +64,16 @@ def shown_skin_shadow(snapshot: Snapshot, strand_pass: StrandPass, *, place: str
 def skin_shadow_of_view(
     snapshot: Snapshot, rig: Rig, pose: Pose, context: bpy.types.Context, *, place: str
 ) -> Floats:
-    """As `shown_skin_shadow`, for previewed hair on its head, in the light of the 3D view.
+    """As `skin_shadow_picture`, for previewed hair on its head, in the light of the 3D view.
 
     Raises:
-        HairloomError: as `shown_skin_shadow`.
+        HairloomError: as `skin_shadow_picture`.
     """
-    shown = lit_as_in(context, _on_its_head(snapshot, rig, pose))
-    return shown_skin_shadow(shown, StrandPass(), place=place)
+    shown = lit_as_in_view(context, _with_head(snapshot, rig, pose))
+    return skin_shadow_picture(shown, StrandPass(), place=place)
 
 
-def _on_its_head(snapshot: Snapshot, rig: Rig, pose: Pose) -> Snapshot:
+def _with_head(snapshot: Snapshot, rig: Rig, pose: Pose) -> Snapshot:
     """The hair with its head as a mesh."""
     head = rig.head
     if head is None or pose.head_positions is None:

@@ -18,7 +18,7 @@ from ..viewport.overlay import with_view_lights
 IMAGE = "Hair Slices"
 
 
-def shown_slices(snapshot: Snapshot, strand_pass: StrandPass) -> Floats:
+def slices_picture(snapshot: Snapshot, strand_pass: StrandPass) -> Floats:
     """The layers of all lights' maps side by side, see opacity_tiles.
 
     Raises:
@@ -35,15 +35,15 @@ def shown_slices(snapshot: Snapshot, strand_pass: StrandPass) -> Floats:
 
 
 def slices_of_view(snapshot: Snapshot, context: bpy.types.Context) -> Floats:
-    """As `shown_slices`, in the light of the 3D view; without one, in the snapshot's own light.
+    """As `slices_picture`, in the light of the 3D view; without one, in the snapshot's own light.
 
     Raises:
-        HairloomError: as `shown_slices`.
+        HairloomError: as `slices_picture`.
     """
-    return shown_slices(lit_as_in(context, snapshot), StrandPass())
+    return slices_picture(lit_as_in_view(context, snapshot), StrandPass())
 
 
-def lit_as_in(context: bpy.types.Context, snapshot: Snapshot) -> Snapshot:
+def lit_as_in_view(context: bpy.types.Context, snapshot: Snapshot) -> Snapshot:
     """The snapshot in the light of the 3D view; without one, in its own light."""
     space = context.space_data
     if not isinstance(space, bpy.types.SpaceView3D):
@@ -52,7 +52,7 @@ def lit_as_in(context: bpy.types.Context, snapshot: Snapshot) -> Snapshot:
     return with_view_lights(snapshot, space.shading, studio)
 
 
-def shown_image(name: str, picture: Floats) -> bpy.types.Image:
+def filled_image(name: str, picture: Floats) -> bpy.types.Image:
     """The image of this name, filled with a scene-linear picture.
 
     Args:

@@ -38,16 +38,16 @@ from ..sessions.prepared_groom import PreparedGroom
 from ..sessions.snapshots import snapshot_of, with_settings
 from .film import write_picture
 from .head_parts import head_parts
-from .skin_picture import shown_skin_shadow
-from .slices import shown_slices
+from .skin_picture import skin_shadow_picture
+from .slices import slices_picture
 
 FIELD_OF_VIEW = np.radians(30.0)
-#: distance around the groom within which the head is shown, as a fraction of the groom's size
-HEAD_ROOM = 0.25
+#: distance from the groom up to which the head is framed too, as a fraction of the groom's size
+HEAD_MARGIN = 0.25
 #: for a close-up: its direction (degrees from the front, and z), and the radius that it shows, as a
 #: fraction of the groom's size
 CLOSE_UP, CLOSE_REACH = (50.0, 0.3), 0.2
-#: margin around the points that the camera holds, as a factor
+#: margin around the framed points, as a factor
 MARGIN = 1.16
 
 
@@ -78,7 +78,7 @@ class Studio:
         self.settings = settings
 
     @property
-    def _at_rest(self) -> Snapshot:
+    def _rest_snapshot(self) -> Snapshot:
         return with_settings(self._snapshot, self.settings)
 
     def picture(
@@ -108,7 +108,7 @@ class Studio:
         """
         camera, occluders = camera or self._camera(width / height), self._groom.occluders
         snapshot = replace(
-            self._at_rest,
+            self._rest_snapshot,
             points=points,
             meshes=self._meshes(pose),
             lights=self.lights(camera) if lights is None else lights,
@@ -116,14 +116,14 @@ class Studio:
             occluder_spheres=None if occluders is None else occluders.at(pose),
             cards=self._cards_at(pose, guides),
         )
-        picture = self._drawn(as_shown(snapshot), camera, width, height, samples, is_soft)
+        picture = self._draw(as_shown(snapshot), camera, width, height, samples, is_soft)
         return (
             picture
             if is_transparent
             else over_backdrop(picture, backdrop(self.stage, width, height))
         )
 
-    def _drawn(
+    def _draw(
         self,
         snapshot: Snapshot,
         camera: Camera,
@@ -176,14 +176,13 @@ class Studio:
 
     @cached_property
     def side(self) -> GoodSide:
-        """The directions from which the groom at rest is best seen, by its own strands: children,
-        which are random, would change the view.
-        """
-        own = np.arange(self._rig.strands.strand_count - self._rig.child_count)
-        return good_side(self._rig.strands.take(own), self._rig.head)
+        """The directions from which the groom at rest is best seen. Children do not count, since
+        they are random and would change the view."""
+        parents = np.arange(self._rig.strands.strand_count - self._rig.child_count)
+        return good_side(self._rig.strands.take(parents), self._rig.head)
 
     def _cards_at(self, pose: Pose, guides: Floats | None) -> CardSnapshot | None:
-        """The cards on these guides; None where strands are shown."""
+        """The cards on these guides; None if strands are shown."""
         if not self.settings.shows_cards:
             return None
         key, sections = cards_key(self.settings), self.settings.sections
@@ -200,20 +199,20 @@ class Studio:
         Raises:
             HairloomError: there are none.
         """
-        return shown_slices(self._in_its_light(pose, points), self._passes[1])
+        return slices_picture(self._lit_snapshot(pose, points), self._passes[1])
 
     def skin_shadow(self, pose: Pose, points: Floats) -> Floats:
-        """The soft shadow on the head in the studio's light, see shown_skin_shadow.
+        """The soft shadow on the head in the studio's light, see skin_shadow_picture.
 
         Raises:
             HairloomError: there is none.
         """
-        snapshot = self._in_its_light(pose, points)
-        return shown_skin_shadow(snapshot, self._passes[1], place="--skin-shadow")
+        snapshot = self._lit_snapshot(pose, points)
+        return skin_shadow_picture(snapshot, self._passes[1], place="--skin-shadow")
 
-    def _in_its_light(self, pose: Pose, points: Floats) -> Snapshot:
+    def _lit_snapshot(self, pose: Pose, points: Floats) -> Snapshot:
         return replace(
-            self._at_rest,
+            self._rest_snapshot,
             points=points,
             meshes=self._meshes(pose),
             lights=self.lights(self._camera(1.0)),
@@ -235,19 +234,19 @@ class Studio:
             meshes=self._meshes(self._rig.rest_pose),
             lights=self.lights(camera),
             ambient=self.stage.ambient,
-            shading=self._at_rest.shading,
-            volume=self._at_rest.volume,
-            skin=self._at_rest.skin,
+            shading=self._rest_snapshot.shading,
+            volume=self._rest_snapshot.volume,
+            skin=self._rest_snapshot.skin,
             cards=cards,
         )
-        picture = self._drawn(snapshot, camera, width, height, samples)
+        picture = self._draw(snapshot, camera, width, height, samples)
         return over_backdrop(picture, backdrop(self.stage, width, height))
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """Warnings about shadows in the studio's light, and about materials of the head."""
         lights = self.lights(self._camera(1.0))
-        snapshot = self._at_rest
+        snapshot = self._rest_snapshot
         return (
             *shadow_warnings(lights, HairBall().ball(snapshot), snapshot.volume),
             *skin_notes(self._rig.head, snapshot.skin, snapshot.volume),
@@ -256,45 +255,48 @@ class Studio:
 
     @property
     def statistics(self) -> Statistics:
-        """The counts of what was drawn of the hair in the last picture."""
+        """The counts of the hair that was drawn in the last picture."""
         return self._passes[1].statistics
 
-    def held(self, pose: Pose, points: Floats) -> Floats:
+    def framed_points(self, pose: Pose, points: Floats) -> Floats:
         """Points that pictures show, (n, 3) [m]: the hair, and vertices of the head near it."""
-        places = points.reshape(-1, 3)
+        hair = points.reshape(-1, 3)
         if pose.head_positions is None:
-            return places
-        low, high = places.min(axis=0), places.max(axis=0)
-        room = HEAD_ROOM * float(np.max(high - low))
+            return hair
+        low, high = hair.min(axis=0), hair.max(axis=0)
+        margin = HEAD_MARGIN * float(np.max(high - low))
         head = pose.head_positions
-        is_near = ((head > low - room) & (head < high + room)).all(axis=1)
-        return np.concatenate([places, head[is_near]])
+        is_near = ((head > low - margin) & (head < high + margin)).all(axis=1)
+        return np.concatenate([hair, head[is_near]])
 
     def bounds(self, pose: Pose, points: Floats) -> tuple[Floats, Floats]:
         """Lowest and highest corner [m] of the points that pictures show."""
-        held = self.held(pose, points)
-        return held.min(axis=0), held.max(axis=0)
+        framed = self.framed_points(pose, points)
+        return framed.min(axis=0), framed.max(axis=0)
 
-    def framed(self, held: Floats, direction: Floats, aspect: float) -> Camera:
+    def framing_camera(self, points: Floats, direction: Floats, aspect: float) -> Camera:
         """A camera in this direction from points (n, 3) [m] that frames them with a margin."""
-        return frame_points(held, direction, FIELD_OF_VIEW, aspect, margin=MARGIN)
+        return frame_points(points, direction, FIELD_OF_VIEW, aspect, margin=MARGIN)
 
     def _camera(self, aspect: float) -> Camera:
         """The camera that frames the groom at rest and the head near it, with room for motion."""
-        if aspect not in self._cameras:  # kept, as there may be a million points, in each frame
-            held = self.held(self._rig.rest_pose, self._rig.strands.points)
-            self._cameras[aspect] = self.framed(held, self.side.three_quarter, aspect)
+        if (
+            aspect not in self._cameras
+        ):  # cached, as there may be a million points, and this is called in each frame
+            points = self.framed_points(self._rig.rest_pose, self._rig.strands.points)
+            self._cameras[aspect] = self.framing_camera(points, self.side.three_quarter, aspect)
         return self._cameras[aspect]
 
     def close_up(self, aspect: float) -> Camera:
         """The camera that frames the part of the groom at rest around the root nearest the eye."""
         direction, roots = self.side.turned(*CLOSE_UP), self._rig.strands.roots
-        held = self.held(self._rig.rest_pose, self._rig.strands.points)
+        points = self.framed_points(self._rig.rest_pose, self._rig.strands.points)
         nearest = roots[(roots @ direction).argmax()]
-        reach = CLOSE_REACH * float(np.ptp(held, axis=0).max())
-        return self.framed(held[np.linalg.norm(held - nearest, axis=1) < reach], direction, aspect)
+        reach = CLOSE_REACH * float(np.ptp(points, axis=0).max())
+        is_near = np.linalg.norm(points - nearest, axis=1) < reach
+        return self.framing_camera(points[is_near], direction, aspect)
 
-    def middles(self, points: Floats) -> Floats:
+    def strand_middles(self, points: Floats) -> Floats:
         """The middle point of each strand, (strand_count, 3) [m]; points as for `picture`."""
         offsets = self._rig.strands.offsets
         return points.reshape(-1, 3)[(offsets[:-1] + offsets[1:]) // 2]
@@ -304,5 +306,5 @@ class Studio:
             return ()
         head = self._rig.head
         surface = Surface(pose.head_positions, head.triangles, head.corner_uv)
-        whole = MeshSnapshot.of(surface, occlusion=self._groom.head_occlusion, is_skin=True)
-        return (whole,) if self._look is None else head_parts(whole, self._look)
+        head_mesh = MeshSnapshot.of(surface, occlusion=self._groom.head_occlusion, is_skin=True)
+        return (head_mesh,) if self._look is None else head_parts(head_mesh, self._look)

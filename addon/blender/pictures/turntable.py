@@ -1,7 +1,7 @@
 """A turntable: the camera circles a groom once, with a picture for each frame, and a video.
 
 Pictures are written into a temporary folder and moved together when all are done, so that a
-cancelled or failed turntable leaves no partial files, and an earlier one as it was.
+cancelled or failed turntable leaves no partial files and does not change an earlier one.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ LIGHTS = (
     ("groom", "Stay on Groom", "Look as if the camera circled a fixed groom with fixed lights"),
 )
 #: frame count and sides of pictures [pixels], min and max
-FRAMES, SIDES = (1, 10_000), (16, 4096)
+FRAME_LIMITS, SIDE_LIMITS = (1, 10_000), (16, 4096)
 #: height of the camera: z of a direction whose horizontal length is 1
-_HEIGHT = 0.14
+_CAMERA_Z = 0.14
 #: number of layers of the turning points, and number of corners of the circle around each
 _LAYERS, _CORNERS = 48, 64
 
@@ -69,13 +69,14 @@ class TurntableSettings:
     frame_rate: float = 24.0
 
     def __post_init__(self) -> None:
-        limits = {"frames": FRAMES, "width": SIDES, "height": SIDES, "samples": (1, 4)}
-        for name, (least, most) in limits.items():
-            if not least <= getattr(self, name) <= most:
+        sides = {"width": SIDE_LIMITS, "height": SIDE_LIMITS}
+        limits = {"frames": FRAME_LIMITS, **sides, "samples": (1, 4)}
+        for name, (low, high) in limits.items():
+            if not low <= getattr(self, name) <= high:
                 raise HairloomError(
                     f"{name} cannot be {getattr(self, name)}",
                     place="turntable",
-                    remedy=f"Use a number from {least} to {most}",
+                    remedy=f"Use a number from {low} to {high}",
                 )
         if not 0.0 < self.frame_rate < np.inf:
             raise HairloomError(
@@ -118,33 +119,34 @@ class Turntable:
 
     def picture(self, frame: int) -> Floats:
         """The picture of a frame, from 0; the same after a full turn."""
-        chosen = self.settings
+        settings = self.settings
         return self.studio.picture(
             self.pose,
             self.points,
-            chosen.width,
-            chosen.height,
-            chosen.samples,
+            settings.width,
+            settings.height,
+            settings.samples,
             self.camera(frame),
             lights=self._lights(frame),
             guides=self.guides,
-            is_transparent=chosen.transparent,
+            is_transparent=settings.transparent,
         )
 
     def camera(self, frame: int) -> Camera:
         """The camera of a frame, on a circle around the groom, from its front to its right."""
-        first, middle = self._first
+        first, middle = self._first_camera
         turns = frame / self.settings.frames % 1.0  # exactly 0 after full turns
         return replace(first, view=first.view @ rotation_about(middle, 2.0 * np.pi * turns))
 
     @cached_property
-    def _first(self) -> tuple[Camera, Floats]:
-        """The camera of frame 0, which frames the groom in all its rotations; and the centre."""
-        held = self.studio.held(self.pose, self.points).astype(np.float64)
-        middle = (held.min(axis=0) + held.max(axis=0)) / 2.0
+    def _first_camera(self) -> tuple[Camera, Floats]:
+        """The camera of frame 0, which frames the groom in all its rotations; and their centre."""
+        points = self.studio.framed_points(self.pose, self.points).astype(np.float64)
+        middle = (points.min(axis=0) + points.max(axis=0)) / 2.0
         aspect = self.settings.width / self.settings.height
-        direction = self.studio.side.turned(0.0, _HEIGHT)
-        return self.studio.framed(turned_around(held, middle), direction, aspect), middle
+        direction = self.studio.side.turned(0.0, _CAMERA_Z)
+        rings = enclosing_rings(points, middle)
+        return self.studio.framing_camera(rings, direction, aspect), middle
 
     def steps(self) -> Generator[int]:
         """Write everything; yields the number of finished pictures.
@@ -152,18 +154,18 @@ class Turntable:
         Raises:
             HairloomError: the folder cannot be written.
         """
-        chosen = self.settings
-        with _written_when_done(self.files[0]) as beside:
-            frames = [beside / path.name for path in self.files[: chosen.frames]]
+        settings = self.settings
+        with _atomic_folder(self.files[0]) as temporary:
+            frames = [temporary / path.name for path in self.files[: settings.frames]]
             for index, path in enumerate(frames):
                 self.studio.write(path, self.picture(index))
                 yield index + 1
-            if chosen.video:
-                self._write_video(beside, frames)
-        self._remove_earlier()
+            if settings.video:
+                self._write_video(temporary, frames)
+        self._remove_leftovers()
 
-    def _remove_earlier(self) -> None:
-        """Remove further pictures and the video of an earlier turn, which would pass for ours."""
+    def _remove_leftovers(self) -> None:
+        """Remove further pictures and the video of an earlier turntable, which look like ours."""
         numbers = count(self.settings.frames + 1)
         more = map(self._picture_path, numbers)
         videos = [] if self.has_video else [self.folder / f"{self.name}.mp4"]
@@ -173,29 +175,29 @@ class Turntable:
             except OSError as error:
                 raise write_error(path, error.strerror or str(error)) from error
 
-    def _write_video(self, beside: Path, frames: list[Path]) -> None:
+    def _write_video(self, temporary: Path, frames: list[Path]) -> None:
         """Write a video, or note why there is none; the pictures are written in any case."""
-        chosen = self.settings
+        settings = self.settings
         try:
-            size = chosen.width, chosen.height
-            write_video(beside / f"{self.name}.mp4", frames, size, chosen.frame_rate)
+            size = settings.width, settings.height
+            write_video(temporary / f"{self.name}.mp4", frames, size, settings.frame_rate)
         except HairloomError as error:
             self.notes.append(f"{error.problem}. {error.remedy}")
 
     def _lights(self, frame: int) -> tuple[Light, ...]:
-        follows = self.settings.lights == "camera"
-        return self.studio.lights(self.camera(frame if follows else 0))
+        turns_with_camera = self.settings.lights == "camera"
+        return self.studio.lights(self.camera(frame if turns_with_camera else 0))
 
 
-def turned_around(points: Floats, middle: Floats) -> Floats:
+def enclosing_rings(points: Floats, middle: Floats) -> Floats:
     """Points (n, 3) that enclose points (m, 3) in all rotations about the vertical through the
     middle (3,): in each of _LAYERS layers, circles at the lowest and the highest point."""
-    reach = np.hypot(*(points - middle)[:, :2].T)
+    distance = np.hypot(*(points - middle)[:, :2].T)
     low, high = points[:, 2].min(), points[:, 2].max()
-    thick = max(float(high - low), 1.0e-30) / _LAYERS
-    layer = np.minimum((points[:, 2] - low) // thick, _LAYERS - 1).astype(int)
+    layer_height = max(float(high - low), 1.0e-30) / _LAYERS
+    layer = np.minimum((points[:, 2] - low) // layer_height, _LAYERS - 1).astype(int)
     radius = np.zeros(_LAYERS)
-    np.maximum.at(radius, layer, reach)
+    np.maximum.at(radius, layer, distance)
     used = np.flatnonzero(np.bincount(layer, minlength=_LAYERS))
     angle = 2.0 * np.pi * np.arange(_CORNERS) / _CORNERS
     circle = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1) / np.cos(
@@ -210,7 +212,7 @@ def turned_around(points: Floats, middle: Floats) -> Floats:
 
 
 @contextmanager
-def _written_when_done(first: Path) -> Iterator[Path]:
+def _atomic_folder(first: Path) -> Iterator[Path]:
     """An empty folder whose files, one of which is named as `first`, move into its folder when the
     block succeeds. If it fails, that folder is removed again if it was new."""
     folder = first.parent
@@ -220,8 +222,8 @@ def _written_when_done(first: Path) -> Iterator[Path]:
     except OSError as error:
         raise folder_write_error(folder, error.strerror or str(error)) from error
     try:
-        with atomic_file_set(first) as beside:
-            yield beside
+        with atomic_file_set(first) as temporary:
+            yield temporary
     except BaseException:
         if is_new and folder.is_dir() and not any(folder.iterdir()):
             folder.rmdir()

@@ -16,7 +16,7 @@ from ...exchange.files.atomic import atomic_write, write_failure_reason
 
 #: codecs that Blender may have been built with, the most widely supported first
 _CODECS = ("H264", "MPEG4")
-_OTHER_BUILD = "make a video of them with an official build of Blender"
+_USE_OFFICIAL_BUILD = "make a video of them with an official build of Blender"
 _FREE_SPACE = "free some space there and try again, or make a video of them elsewhere"
 
 
@@ -39,8 +39,8 @@ def write_video(
         HairloomError: this Blender cannot write videos, or the file cannot be written.
     """
     if not can_write_video():
-        raise _failed(path, "this Blender was built without FFmpeg")
-    why = "it has neither of the codecs " + " and ".join(_CODECS)
+        raise _video_error(path, "this Blender was built without FFmpeg")
+    reason = "it has neither of the codecs " + " and ".join(_CODECS)
     with atomic_write(path) as temporary, _sequence_of(frames, size, frame_rate) as scene:
         scene.render.filepath = str(temporary)
         for codec in _CODECS:
@@ -48,35 +48,37 @@ def write_video(
             try:
                 bpy.ops.render.render(animation=True, scene=scene.name)
             except RuntimeError as error:
-                why = str(error).strip()
+                reason = str(error).strip()
             if temporary.is_file() and temporary.stat().st_size:
-                if not is_whole(temporary):
-                    raise _failed(path, write_failure_reason(path, "it was cut short"), _FREE_SPACE)
+                if not is_complete(temporary):
+                    raise _video_error(
+                        path, write_failure_reason(path, "it was cut short"), _FREE_SPACE
+                    )
                 return
-        raise _failed(path, why)
+        raise _video_error(path, reason)
 
 
-def is_whole(path: Path) -> bool:
+def is_complete(path: Path) -> bool:
     """Whether an .mp4 has been written to its end; Blender reports no error if the disk is full.
 
     The file is a sequence of boxes, each with its size and type, one of which (moov) is the index
     of all frames (ISO base media file format).
     """
-    end, at, kinds = path.stat().st_size, 0, set[bytes]()
+    end, position, box_types = path.stat().st_size, 0, set[bytes]()
     with path.open("rb") as file:
-        while at < end:
-            file.seek(at)
+        while position < end:
+            file.seek(position)
             head = file.read(16)
             if len(head) < 8:
                 return False
-            size, kind = int.from_bytes(head[:4]), head[4:8]
+            size, box_type = int.from_bytes(head[:4]), head[4:8]
             if size == 1:
                 size = int.from_bytes(head[8:])
             if size < 8:
                 return False
-            kinds.add(kind)
-            at += size
-    return at == end and b"moov" in kinds
+            box_types.add(box_type)
+            position += size
+    return position == end and b"moov" in box_types
 
 
 @contextmanager
@@ -110,9 +112,9 @@ def _sequence_of(
         bpy.data.scenes.remove(scene)
 
 
-def _failed(path: Path, why: str, remedy: str = _OTHER_BUILD) -> HairloomError:
+def _video_error(path: Path, reason: str, remedy: str = _USE_OFFICIAL_BUILD) -> HairloomError:
     return HairloomError(
-        f"no video was written ({why})",
+        f"no video was written ({reason})",
         place=str(path),
         remedy=f"The pictures are complete: {remedy}",
     )

@@ -44,7 +44,7 @@ def on_load_fail(*_: Any) -> None:
 
 @persistent
 def on_save_pre(*_: Any) -> None:
-    library_overrides.make_last()
+    library_overrides.access_all_groups()
     store_object_names()
     _heal()
 

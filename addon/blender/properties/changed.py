@@ -19,8 +19,10 @@ _listeners: dict[str, list[Listener]] = {
     "hair_scene": [],
     "passes": [],
 }
-#: changes (kind, data-block) that wait for the end of `together`; None outside of it
-_HELD: ContextVar[list[tuple[str, bpy.types.ID]] | None] = ContextVar("held changes", default=None)
+#: changes (kind, data-block) that wait for the end of `as_one_change`; None outside of it
+_PENDING: ContextVar[list[tuple[str, bpy.types.ID]] | None] = ContextVar(
+    "pending changes", default=None
+)
 
 
 def subscribe(kind: str, listener: Listener) -> None:
@@ -65,24 +67,24 @@ def passes(owner: bpy.types.ID) -> None:
 @contextmanager
 def as_one_change() -> Iterator[None]:
     """All properties of a data-block that are set inside count as one change, at the end."""
-    if _HELD.get() is not None:
+    if _PENDING.get() is not None:
         yield
         return
-    held: list[tuple[str, bpy.types.ID]] = []
-    token = _HELD.set(held)
+    pending: list[tuple[str, bpy.types.ID]] = []
+    token = _PENDING.set(pending)
     try:
         yield
     finally:
-        _HELD.reset(token)
-        for kind, owner in held:
+        _PENDING.reset(token)
+        for kind, owner in pending:
             _call(kind, owner)
 
 
 def _call(kind: str, owner: bpy.types.ID) -> None:
-    held = _HELD.get()
-    if held is not None:
-        if (kind, owner) not in held:
-            held.append((kind, owner))
+    pending = _PENDING.get()
+    if pending is not None:
+        if (kind, owner) not in pending:
+            pending.append((kind, owner))
         return
     for listener in _listeners[kind]:
         listener(owner)

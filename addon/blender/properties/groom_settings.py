@@ -45,11 +45,10 @@ class GroomSettings:
     def of(
         cls, hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph | None = None
     ) -> GroomSettings:
-        """The settings at the moment.
+        """The present settings.
 
-        Blender writes animated and driven settings into the original data only where a window
-        shows them. A render has them in its evaluated copies alone, which lag behind edits in a
-        window.
+        Blender writes animated and driven settings into the original data only if a window shows
+        them. A render has them only in its evaluated copies, which lag behind edits in a window.
 
         Args:
             hair: not the evaluated copy.
@@ -60,7 +59,7 @@ class GroomSettings:
             groom = hair.data.evaluated_get(depsgraph).hairloom
             character = hair.evaluated_get(depsgraph).hairloom
         owners: dict[Owner, bpy.types.PropertyGroup] = {"groom": groom, "character": character}
-        chosen = SettingsMap(
+        stored = SettingsMap(
             *(
                 settings_of(getattr(group, section), ALL_SETTINGS[section])
                 for owner, group in owners.items()
@@ -68,7 +67,7 @@ class GroomSettings:
             )
         )
         return cls(
-            effective_settings(chosen),
+            effective_settings(stored),
             picture_names(groom.card_images),
             character.children_density,
             character.debug_view,
@@ -93,17 +92,17 @@ class GroomSettings:
         return self.sections.only(*kinds), self.children_density, is_animated
 
     def needs_no_rebuild(self, before: GroomSettings) -> bool:
-        """Whether the settings that differ need nothing to be read or made again."""
+        """Whether no setting that differs needs anything to be read or built again."""
         return self._read_settings == before._read_settings
 
     @property
     def _read_settings(self) -> tuple[Any, ...]:
-        """The settings that determine what is read and made."""
+        """The settings that determine what is read and built."""
         names = mask_names(self[DynamicsSettings]), self[ShadingSettings].color_map
         return self.rig_settings, self[AmbientSettings], names
 
     def with_built_values_of(self, before: GroomSettings) -> GroomSettings:
         """These settings, but with earlier values of those that need the hair to be read again."""
         kinds = (GuideSettings, WidthSettings, ChildrenSettings, AmbientSettings)
-        waiting = (before[kind] for kind in kinds)
-        return replace(self.with_settings(*waiting), children_density=before.children_density)
+        earlier = (before[kind] for kind in kinds)
+        return replace(self.with_settings(*earlier), children_density=before.children_density)

@@ -16,9 +16,9 @@ from .card_group import HAIRLOOM_PG_card_images, HAIRLOOM_PG_card_object
 from .properties import (
     OVERRIDABLE,
     masks_of_groom,
+    matching_weights,
     property_annotations,
     property_group,
-    weights_meant,
     weights_of_surface,
 )
 
@@ -121,9 +121,9 @@ def _is_mesh(_group: Any, obj: bpy.types.Object) -> bool:
     return obj.type == "MESH"
 
 
-def _tip_groups(group: Any, _context: bpy.types.Context, typed: str) -> list[str]:
+def _tip_groups(group: Any, _context: bpy.types.Context, text: str) -> list[str]:
     """The weights of the mesh that holds tips, for the search of Tip Group."""
-    return weights_meant(group.tip_surface, typed)
+    return matching_weights(group.tip_surface, text)
 
 
 def _grow_changed(group: Any, _context: bpy.types.Context) -> None:

@@ -15,17 +15,17 @@ from typing import Any
 import bpy
 
 
-def make_last() -> None:
-    """Access all groups of settings; call it before a file is saved."""
+def access_all_groups() -> None:
+    """Access all groups of settings, so that they exist; call it before a file is saved."""
     for owner in (*bpy.data.objects, *bpy.data.hair_curves):
         override = owner.override_library
         if override is not None and override.reference is not None:
-            _look_at(owner.hairloom)
-            _look_at(override.reference.hairloom)
+            _access_groups(owner.hairloom)
+            _access_groups(override.reference.hairloom)
 
 
-def _look_at(group: Any) -> None:
+def _access_groups(group: Any) -> None:
     for name in type(group).__annotations__:
         value = getattr(group, name)
         if isinstance(value, bpy.types.PropertyGroup):
-            _look_at(value)
+            _access_groups(value)

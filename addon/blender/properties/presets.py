@@ -28,13 +28,13 @@ from . import changed, previews
 from .properties import settings_of
 
 PRESET_FOLDER = Path(__file__).resolve().parents[3] / "presets"
-#: what the names of the artist's own presets begin with
-OWN = "own/"
-#: longer files [bytes] are not read; presets are far shorter
-_LONGEST = 1_000_000
-_LONGEST_TITLE = 40
-#: section of a preset -> further sections that it stores, as cards need their atlas
-_TOGETHER = {"cards": ("atlas", "card_texture")}
+#: prefix of the names of the artist's own presets
+OWN_PREFIX = "own/"
+#: larger files [bytes] are not read; presets are far smaller
+_MAX_SIZE = 1_000_000
+_MAX_TITLE_LENGTH = 40
+#: section of a preset -> further sections that it stores, such as the atlas for cards
+_LINKED_SECTIONS = {"cards": ("atlas", "card_texture")}
 #: the name of the package as Blender knows it: what precedes `.addon`
 _EXTENSION = __package__.rpartition(".addon")[0]
 
@@ -53,7 +53,7 @@ class Entry:
 
     @property
     def is_own(self) -> bool:
-        return self.name.startswith(OWN)
+        return self.name.startswith(OWN_PREFIX)
 
     @property
     def icon(self) -> int:
@@ -62,19 +62,19 @@ class Entry:
 
 
 @cache
-def shipped(section: str) -> tuple[Entry, ...]:
-    """The presets of one section that come with Hairloom; a name is a path below their folder."""
-    found = []
+def shipped_presets(section: str) -> tuple[Entry, ...]:
+    """The presets of one section that come with Hairloom; a name is a path in their folder."""
+    entries = []
     for path in sorted(PRESET_FOLDER.rglob("*.json")):
         preset = read_any_preset(path, ALL_SETTINGS)
         if preset.settings.section == section:
             name = path.relative_to(PRESET_FOLDER).with_suffix("").as_posix()
-            found.append(Entry(name, preset.title, path, preset))
-    return tuple(found)
+            entries.append(Entry(name, preset.title, path, preset))
+    return tuple(entries)
 
 
-def own(section: str) -> tuple[tuple[Entry, ...], tuple[str, ...]]:
-    """The artist's own presets of one section, and what is wrong with other files there."""
+def own_presets(section: str) -> tuple[tuple[Entry, ...], tuple[str, ...]]:
+    """The artist's own presets of one section, and warnings about other files in their folder."""
     entries, warnings = [], []
     for path in _own_files():
         try:
@@ -85,20 +85,20 @@ def own(section: str) -> tuple[tuple[Entry, ...], tuple[str, ...]]:
             warnings.append(f"{path.name} is not a preset: {why}")
             continue
         if preset.settings.section == section:
-            title = _as_title(preset.title) or path.stem
-            entries.append(Entry(OWN + path.stem, title, path, preset))
+            title = _clean_title(preset.title) or path.stem
+            entries.append(Entry(OWN_PREFIX + path.stem, title, path, preset))
     return tuple(sorted(entries, key=lambda entry: entry.title.lower())), tuple(warnings)
 
 
-def titles(section: str) -> dict[str, str]:
-    """Title of each preset of one section -> its name; those that ship come first.
+def names_by_title(section: str) -> dict[str, str]:
+    """Title of each preset of one section -> its name; shipped ones come first.
 
     If an earlier preset has the same title, a preset is listed under its name.
     """
-    found: dict[str, str] = {}
-    for entry in (*shipped(section), *own(section)[0]):
-        found[entry.name if entry.title in found else entry.title] = entry.name
-    return found
+    names: dict[str, str] = {}
+    for entry in (*shipped_presets(section), *own_presets(section)[0]):
+        names[entry.name if entry.title in names else entry.title] = entry.name
+    return names
 
 
 def own_folder() -> Path:
@@ -109,19 +109,21 @@ def own_folder() -> Path:
         return Path(bpy.utils.user_resource("CONFIG", path="hairloom")) / "presets"
 
 
-def kept_settings(hair: bpy.types.Object, section: str) -> tuple[Settings, ...]:
+def settings_to_store(hair: bpy.types.Object, section: str) -> tuple[Settings, ...]:
     """The settings that a preset of this section stores: its own, then those that go with it."""
-    return tuple(_kept(hair, name) for name in (section, *_TOGETHER.get(section, ())))
+    return tuple(
+        _current_settings(hair, name) for name in (section, *_LINKED_SECTIONS.get(section, ()))
+    )
 
 
-def _kept(hair: bpy.types.Object, section: str) -> Settings:
+def _current_settings(hair: bpy.types.Object, section: str) -> Settings:
     """The settings of one section, from the groom or its object."""
     owners = hair.data.hairloom, hair.hairloom
     owner = next(each for each in owners if hasattr(each, section))
     return settings_of(getattr(owner, section), ALL_SETTINGS[section])
 
 
-def preset_of(
+def matching_preset(
     hair: bpy.types.Object, entries: Iterable[Entry], ignored: Container[str] = ()
 ) -> Entry | None:
     """The first of these presets whose values all equal those of this groom.
@@ -129,13 +131,13 @@ def preset_of(
     Args:
         ignored: names of parameters that have no effect on this hair.
     """
-    kept: dict[str, Settings] = {}
+    current: dict[str, Settings] = {}
     for entry in entries:
-        wanted = entry.preset.all
-        for each in wanted:
-            if each.section not in kept:
-                kept[each.section] = _kept(hair, each.section)
-        if all(_is_same(kept[each.section], each, ignored) for each in wanted):
+        stored = entry.preset.all
+        for each in stored:
+            if each.section not in current:
+                current[each.section] = _current_settings(hair, each.section)
+        if all(_is_same(current[each.section], each, ignored) for each in stored):
             return entry
     return None
 
@@ -155,7 +157,7 @@ def save_own(title: str, settings: Settings, *also: Settings) -> Path:
     Raises:
         HairloomError: the title is empty, or the file cannot be written.
     """
-    title = _as_title(title)
+    title = _clean_title(title)
     stem = re.sub(r"[\W_]+", "_", title.lower()).strip("_")
     if not title:
         raise HairloomError("a preset needs a name", place="Save Preset", remedy="Type one")
@@ -165,21 +167,21 @@ def save_own(title: str, settings: Settings, *also: Settings) -> Path:
     return path
 
 
-def _as_title(text: str) -> str:
-    """The text as titles are stored: in one line, and not too long."""
-    return " ".join(text.split())[:_LONGEST_TITLE].rstrip()
+def _clean_title(text: str) -> str:
+    """The text as a title: in one line, and not too long."""
+    return " ".join(text.split())[:_MAX_TITLE_LENGTH].rstrip()
 
 
-def replaced_preset(title: str, section: str) -> bool:
-    """Whether the artist has a preset of this title, which saving another one would replace."""
-    return _of_title(_as_title(title), section) is not None
+def is_title_taken(title: str, section: str) -> bool:
+    """Whether the artist has a preset of this title; saving another one would replace it."""
+    return _own_preset_titled(_clean_title(title), section) is not None
 
 
 def free_title(title: str, section: str) -> str:
     """This title, with a number if one of the artist's presets has it already."""
-    title, number, free = _as_title(title), 2, _as_title(title)
-    while replaced_preset(free, section):
-        free = f"{title[: _LONGEST_TITLE - 1 - len(str(number))].rstrip()} {number}"
+    title, number, free = _clean_title(title), 2, _clean_title(title)
+    while is_title_taken(free, section):
+        free = f"{title[: _MAX_TITLE_LENGTH - 1 - len(str(number))].rstrip()} {number}"
         number += 1
     return free
 
@@ -192,7 +194,7 @@ def delete_own(name: str) -> None:
     """
     path = _own_path(name)
     if path is None:
-        raise HairloomError("you have no preset of this name", place=name, remedy=_KNOWN_OWN)
+        raise HairloomError("you have no preset of this name", place=name, remedy=_OWN_REMEDY)
     previews.forget(path)
     try:
         path.unlink()
@@ -214,32 +216,36 @@ def named_preset(name: str, sections: Iterable[str] = tuple(ALL_SETTINGS)) -> Pr
     Raises:
         HairloomError: there is no such preset, or it is damaged.
     """
-    below = PRESET_FOLDER / f"{name}.json"
-    is_shipped = os.path.isfile(below) and below.resolve().is_relative_to(PRESET_FOLDER)
-    path = (below if is_shipped else None) or _own_path(name) or Path(name)
+    shipped_path = PRESET_FOLDER / f"{name}.json"
+    is_shipped = os.path.isfile(shipped_path) and shipped_path.resolve().is_relative_to(
+        PRESET_FOLDER
+    )
+    path = (shipped_path if is_shipped else None) or _own_path(name) or Path(name)
     if not os.path.isfile(path):
         raise _no_preset(
-            name, [one.name for each in sections for one in shipped(each) + own(each)[0]]
+            name,
+            [one.name for each in sections for one in shipped_presets(each) + own_presets(each)[0]],
         )
     return read_any_preset(path, ALL_SETTINGS)
 
 
-def _no_preset(name: str, known: list[str]) -> HairloomError:
-    """The error for a missing preset, with the likely names and all known ones."""
-    said = PurePath(name).stem
-    stems = {each: PurePath(each).name for each in known}
-    meant = [said] if said in stems.values() else get_close_matches(said, stems.values())
-    near = " or ".join(each for each, stem in stems.items() if stem in meant)
+def _no_preset(name: str, names: list[str]) -> HairloomError:
+    """The error for a missing preset, with similar names and all existing ones."""
+    stem = PurePath(name).stem
+    stems = {each: PurePath(each).name for each in names}
+    matches = [stem] if stem in stems.values() else get_close_matches(stem, stems.values())
+    suggestions = " or ".join(each for each, stem in stems.items() if stem in matches)
     return HairloomError(
         "there is no such preset" if name else "no preset is named",
         place=name or "preset",
-        remedy=(f"Did you mean {near}? " if near else "") + f"Use a file or {', '.join(known)}",
+        remedy=(f"Did you mean {suggestions}? " if suggestions else "")
+        + f"Use a file or {', '.join(names)}",
     )
 
 
 def apply(settings: Settings, hair: bpy.types.Object) -> None:
-    """Apply all values of one section to a groom or its object; its own masks stay where these
-    settings name none.
+    """Apply all values of one section to a groom or its object. Its masks stay if these settings
+    name none.
 
     Raises:
         HairloomError: a groom does not store these settings.
@@ -253,15 +259,15 @@ def apply(settings: Settings, hair: bpy.types.Object) -> None:
                 for name, value in settings.as_dict().items():
                     setattr(group, name, value)
             return
-    kept = [name for name in ALL_SETTINGS if any(hasattr(owner, name) for owner in owners)]
+    sections = [name for name in ALL_SETTINGS if any(hasattr(owner, name) for owner in owners)]
     raise HairloomError(
         f"a groom has no '{settings.section}' settings",
         place="preset",
-        remedy=f"Choose a preset of {', '.join(kept)}",
+        remedy=f"Choose a preset of {', '.join(sections)}",
     )
 
 
-_KNOWN_OWN = "Choose one from the menu of presets"
+_OWN_REMEDY = "Choose one from the menu of presets"
 
 
 def _own_files() -> list[Path]:
@@ -273,28 +279,32 @@ def _own_files() -> list[Path]:
 
 def _own_path(name: str) -> Path | None:
     """The file of a name such as own/mine, if it exists; never one outside the folder."""
-    found = {OWN + path.stem: path for path in _own_files()} if name.startswith(OWN) else {}
+    found = (
+        {OWN_PREFIX + path.stem: path for path in _own_files()}
+        if name.startswith(OWN_PREFIX)
+        else {}
+    )
     return found.get(name)
 
 
 @lru_cache(maxsize=256)
 def _read(path: Path, _changed: int, size: int) -> Preset[Any]:
     """The preset in a file; cached until the file changes."""
-    if size > _LONGEST:
+    if size > _MAX_SIZE:
         raise HairloomError("it is too long", place=path.name, remedy="Delete it")
     return read_any_preset(path, ALL_SETTINGS)
 
 
 def _file_for(stem: str, title: str, section: str) -> Path:
     """The file of the preset with this title, or a new path that no other file has."""
-    known = _of_title(title, section)
-    if known is not None:
-        return known.path
+    existing = _own_preset_titled(title, section)
+    if existing is not None:
+        return existing.path
     taken = {name_key(path.stem) for path in _own_files()}
     return own_folder() / f"{safe_folder_name(stem, taken, 'preset')}.json"
 
 
-def _of_title(title: str, section: str) -> Entry | None:
+def _own_preset_titled(title: str, section: str) -> Entry | None:
     """The artist's own preset with a title, ignoring case."""
-    entries, _ = own(section)
+    entries, _ = own_presets(section)
     return next((each for each in entries if name_key(each.title) == name_key(title)), None)

@@ -28,15 +28,15 @@ def icon_of(preset: Path) -> int:
     picture = preset.with_suffix(".png")
     if not picture.is_file():
         return 0
-    name, known = str(picture), pictures()
-    if name not in known:
-        known.load(name, name, "IMAGE")
-    icon: int = known[name].icon_id
+    name, loaded = str(picture), pictures()
+    if name not in loaded:
+        loaded.load(name, name, "IMAGE")
+    icon: int = loaded[name].icon_id
     return icon
 
 
 def forget(preset: Path) -> None:
     """Drop the picture of a preset, as it has changed or is gone."""
-    name, known = str(preset.with_suffix(".png")), pictures()
-    if name in known:
-        del known[name]
+    name, loaded = str(preset.with_suffix(".png")), pictures()
+    if name in loaded:
+        del loaded[name]

@@ -24,7 +24,7 @@ from ..base.vertex_weights import color_choices, mask_choices, weight_names
 type Changed = Callable[[bpy.types.ID], None]
 
 #: unit of a parameter -> how Blender shows it
-_SHOWN_AS = {
+_DISPLAY_OPTIONS = {
     "none": {},
     "length": {"subtype": "DISTANCE"},
     "angle": {"subtype": "ANGLE"},
@@ -40,7 +40,7 @@ _SHOWN_AS = {
 _PRECISION = {"length": 5, "rate": 2, "pixels": 2}
 #: Blender stores float32, which holds this many decimal digits
 _STORED_DIGITS = 7
-_LARGEST_INTEGER = 2**31 - 1
+_MAX_INTEGER = 2**31 - 1
 #: Lets library overrides of linked grooms have their own settings.
 OVERRIDABLE = {"LIBRARY_OVERRIDABLE"}
 
@@ -77,17 +77,17 @@ def settings_of[S: Settings](group: Any, settings: type[S]) -> S:
     )
 
 
-def weights_of_surface(group: Any, _context: bpy.types.Context, typed: str) -> list[str]:
+def weights_of_surface(group: Any, _context: bpy.types.Context, text: str) -> list[str]:
     """The weights and images on the surface of this hair, for the search of a growth mask."""
     owner, head = group.id_data, None
     if isinstance(owner, bpy.types.Curves):
         head = owner.surface
     elif owner.type == "CURVES":
         head = head_of(owner)
-    return maps_meant(head, typed)
+    return matching_maps(head, text)
 
 
-def masks_of_groom(group: Any, _context: bpy.types.Context, typed: str) -> list[str]:
+def masks_of_groom(group: Any, _context: bpy.types.Context, text: str) -> list[str]:
     """All weights, attributes and images that may be a mask of this hair, for the search."""
     owner = group.id_data
     if isinstance(owner, bpy.types.Curves):
@@ -97,30 +97,30 @@ def masks_of_groom(group: Any, _context: bpy.types.Context, typed: str) -> list[
         hair, surface = owner, head_of(owner) if owner.type == "CURVES" else None
     is_hair = hair is not None and hair.type == "CURVES"
     names = mask_choices(hair if is_hair else None, surface)
-    return [name for name in names if typed.lower() in name.lower()]
+    return [name for name in names if text.lower() in name.lower()]
 
 
-def colors_of_groom(group: Any, _context: bpy.types.Context, typed: str) -> list[str]:
+def colors_of_groom(group: Any, _context: bpy.types.Context, text: str) -> list[str]:
     """All colours of the surface, and images, that may colour this hair, for the search."""
     owner = group.id_data
     hair = next((each for each in bpy.data.objects if each.data == owner), None)
     surface = None if hair is None else head_of(hair)
-    return [name for name in color_choices(surface) if typed.lower() in name.lower()]
+    return [name for name in color_choices(surface) if text.lower() in name.lower()]
 
 
-#: kind of a parameter that names painted data -> its search
-_SEARCHED = {"mask": masks_of_groom, "map": colors_of_groom}
+#: kind of a parameter that names painted data -> its search function
+_SEARCHES = {"mask": masks_of_groom, "map": colors_of_groom}
 
 
-def maps_meant(obj: bpy.types.Object | None, typed: str) -> list[str]:
-    """The weights of a mesh, and the images, whose names contain the typed text."""
-    return [name for name in mask_choices(None, obj) if typed.lower() in name.lower()]
+def matching_maps(obj: bpy.types.Object | None, text: str) -> list[str]:
+    """The weights of a mesh, and the images, whose names contain the text."""
+    return [name for name in mask_choices(None, obj) if text.lower() in name.lower()]
 
 
-def weights_meant(obj: bpy.types.Object | None, typed: str) -> list[str]:
-    """The weights of a mesh whose names contain the typed text."""
+def matching_weights(obj: bpy.types.Object | None, text: str) -> list[str]:
+    """The weights of a mesh whose names contain the text."""
     names = [] if obj is None or obj.type != "MESH" else weight_names(obj)
-    return [name for name in names if typed.lower() in name.lower()]
+    return [name for name in names if text.lower() in name.lower()]
 
 
 def _property(parameter: Parameter, changed: Changed | None) -> Any:
@@ -136,8 +136,8 @@ def _property(parameter: Parameter, changed: Changed | None) -> Any:
         return BoolProperty(**common)
     if parameter.kind == "choice":
         return EnumProperty(items=parameter.choices, **common)
-    if parameter.kind in _SEARCHED:
-        search = _SEARCHED[parameter.kind]
+    if parameter.kind in _SEARCHES:
+        search = _SEARCHES[parameter.kind]
         return StringProperty(search=search, **common | {"options": set()})
     common |= _ranges(parameter)
     if parameter.kind == "integer":
@@ -146,18 +146,20 @@ def _property(parameter: Parameter, changed: Changed | None) -> Any:
         return FloatVectorProperty(size=3, subtype="COLOR", **common)
     if parameter.kind == "curve":
         return FloatVectorProperty(size=len(KNOT_POSITIONS), precision=2, **common)
-    return FloatProperty(precision=_digits(parameter), **_SHOWN_AS[parameter.unit], **common)
+    return FloatProperty(
+        precision=_precision(parameter), **_DISPLAY_OPTIONS[parameter.unit], **common
+    )
 
 
-def _digits(parameter: Parameter) -> int:
-    """Decimals that a field shows; as many as its default has, if that has at most five."""
+def _precision(parameter: Parameter) -> int:
+    """Decimals that a field shows; enough for its default, if that has at most five."""
     shown = _PRECISION.get(parameter.unit, 3)
     if parameter.unit == "angle":  # shown in degrees, stored in radians
         return shown
-    enough = (
+    precise = (
         each for each in range(shown, 6) if round(parameter.default, each) == parameter.default
     )
-    return next(enough, shown)
+    return next(precise, shown)
 
 
 def _ranges(parameter: Parameter) -> dict[str, float]:
@@ -167,7 +169,7 @@ def _ranges(parameter: Parameter) -> dict[str, float]:
             continue
         low, high = span
         if parameter.kind == "integer":
-            low, high = (int(max(-_LARGEST_INTEGER, min(x, _LARGEST_INTEGER))) for x in span)
+            low, high = (int(max(-_MAX_INTEGER, min(x, _MAX_INTEGER))) for x in span)
         limits |= {f"{prefix}min": low, f"{prefix}max": high}
     return limits
 
@@ -182,14 +184,16 @@ def _update(changed: Changed) -> Callable[[Any, bpy.types.Context], None]:
 def _value(group: Any, parameter: Parameter) -> Any:
     value = getattr(group, parameter.name)
     if parameter.kind in {"color", "curve"}:
-        return tuple(_as_typed(channel) for channel in value)
+        return tuple(_without_rounding_error(channel) for channel in value)
     if parameter.kind == "number":
         # 30 degrees in radians have more digits than are stored, so declared values come first
         declared = (parameter.default, *(parameter.hard_range or ()))
-        return next((one for one in declared if np.float32(one) == value), _as_typed(value))
+        return next(
+            (one for one in declared if np.float32(one) == value), _without_rounding_error(value)
+        )
     return value
 
 
-def _as_typed(value: float) -> float:
-    """0.01 is stored as 0.00999999978, which lies outside a range that starts at 0.01."""
+def _without_rounding_error(value: float) -> float:
+    """The decimal that was stored: 0.01 becomes 0.00999999978, which is below a minimum of 0.01."""
     return float(f"{value:.{_STORED_DIGITS}g}")
