@@ -143,7 +143,7 @@ def unregister() -> None:
 def end_all() -> None:
     """End previews and long work, and drop all that is deferred."""
     operators_preview.stop_ticking()
-    long_work.stop()
+    long_work.cancel_running()
     scene_events.clear()
 
 

@@ -15,7 +15,7 @@ import bpy
 import numpy as np
 
 from hairloom.addon.blender.base import latest_job
-from hairloom.addon.blender.base.latest_job import ARRIVAL_TIME
+from hairloom.addon.blender.base.latest_job import POLL_INTERVAL
 from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.scene.curves import curve_offsets, curve_points, put_points
 from hairloom.addon.blender.sessions.session import Session
@@ -101,9 +101,9 @@ def _catch_up(session: Session) -> tuple[float, float]:
         scene_events.catch_up(depsgraph)
     while session.is_pending and not session.is_lighting:
         session.take_made(depsgraph)
-    hair = time.perf_counter() - began + scene_events.SETTLING_TIME + ARRIVAL_TIME
+    hair = time.perf_counter() - began + scene_events.SETTLING_TIME + POLL_INTERVAL
     session.finish(depsgraph)
-    light = time.perf_counter() - began + scene_events.SETTLING_TIME + 2.0 * ARRIVAL_TIME
+    light = time.perf_counter() - began + scene_events.SETTLING_TIME + 2.0 * POLL_INTERVAL
     return 1000.0 * hair, 1000.0 * light
 
 

@@ -32,7 +32,7 @@ def silent() -> dict[str, float]:
         job()
         found[f"silent_{name}_seconds"] = max(longest)
         while any(not session.is_made for session in previews.sessions()):
-            latest_job.take_steps()
+            latest_job.run_steps()
             time.sleep(_LOOK)
     return {"silent_seconds_max": max(found.values()), **found}
 

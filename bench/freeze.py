@@ -123,7 +123,7 @@ def main() -> int:
         begin = time.perf_counter()
         while session.is_pending:
             due = time.perf_counter() + 1.0 / RATE
-            is_there = session.has_arrived
+            is_there = session.has_result
             stops.timed(f"{kind}: arrives" if is_there else f"{kind}: is made", take)
             stops.timed(f"{kind}: frame meanwhile", tick)
             stops.beat(f"{kind}: heartbeat")
@@ -133,7 +133,7 @@ def main() -> int:
 
     def take() -> None:
         attempt = partial(session.take_made, depsgraph)
-        if session.has_arrived:
+        if session.has_result:
             previews.attempt(previews.previews[session.uid], depsgraph, attempt)
 
     seconds: dict[str, float] = {}

@@ -48,12 +48,12 @@ type Steps[Result] = Generator[Progress, None, Result]
 class LongWork:
     """Base of an operator, before bpy.types.Operator.
 
-    `steps` does the work and reports it. An operator's poll starts with `is_free`.
+    `steps` does the work and reports it. An operator's poll starts with `can_start`.
 
-    unharmed: the state after Esc, for the report.
+    state_after_cancel: for the report after Esc.
     """
 
-    unharmed = "nothing has changed"
+    state_after_cancel = "nothing has changed"
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         """The whole work, including its reports.
@@ -66,34 +66,34 @@ class LongWork:
         """
         raise NotImplementedError
 
-    def follow(self, context: bpy.types.Context) -> None:
+    def on_finished(self, context: bpy.types.Context) -> None:
         """Called in a window once the work has ended, for example to open a popup."""
 
-    def is_pressed(self: Any) -> bool:
-        """Whether a button or a menu has started it, in a window. Adjust Last Operation does not
+    def is_interactive(self: Any) -> bool:
+        """Whether a button or a menu of a window has started it. Adjust Last Operation does not
         count: Blender does not keep a repeated operator, so it cannot run modally."""
-        how = self.options
-        is_repeated = how.is_repeat or how.is_repeat_last
-        return not bpy.app.background and how.is_invoke and not is_repeated
+        options = self.options
+        is_repeated = options.is_repeat or options.is_repeat_last
+        return not bpy.app.background and options.is_invoke and not is_repeated
 
     @classmethod
-    def is_free(cls: Any) -> bool:
+    def can_start(cls: Any) -> bool:
         """For `poll`: whether no other long operator runs; the greyed-out button names it."""
-        return is_free(cls)
+        return can_start(cls)
 
     @reporting
     def execute(self: Any, context: bpy.types.Context) -> set[str]:
         global _running
         steps = self.steps(context)
-        if not self.is_pressed():
+        if not self.is_interactive():
             with wait_cursor(context):
-                _run_at_once(steps)
+                _run_blocking(steps)
             return {"FINISHED"}
         with wait_cursor(context):
             try:
                 first = next(steps)
             except StopIteration:
-                self.follow(context)
+                self.on_finished(context)
                 return {"FINISHED"}
         _running = _Running(self, steps, context.window)
         _running.show_progress(first)
@@ -104,23 +104,23 @@ class LongWork:
         if _running is None:
             return {"CANCELLED"}
         if event.type == "ESC" and event.value == "PRESS" and _is_cancellable():
-            stop()
-            report(self, "INFO", f"{self.bl_label} was cancelled; {self.unharmed}")
+            cancel_running()
+            report(self, "INFO", f"{self.bl_label} was cancelled; {self.state_after_cancel}")
             return {"CANCELLED"}
         if event.type != "TIMER":
             return {"RUNNING_MODAL"}
         result = {"CANCELLED"}
         try:
-            result = self._spell(context)
+            result = self._run_slice(context)
         finally:
             if result != {"RUNNING_MODAL"}:
-                stop()
+                cancel_running()
         if result == {"FINISHED"}:
-            self.follow(context)
+            self.on_finished(context)
         return result
 
     @reporting
-    def _spell(self, _context: bpy.types.Context) -> set[str]:
+    def _run_slice(self, _context: bpy.types.Context) -> set[str]:
         running, end = _running, time.perf_counter() + _SLICE_SECONDS
         assert running is not None
         try:
@@ -134,7 +134,7 @@ class LongWork:
 
     def cancel(self, _context: bpy.types.Context) -> None:
         """Called when Blender ends the operator: a file is loaded or its window closed."""
-        stop()
+        cancel_running()
 
 
 class _Running:
@@ -186,7 +186,7 @@ def status(label: str, progress: Progress) -> str:
 @persistent  # removed when the work ends, which may be after a file is loaded
 def _on_undo(*_: Any) -> None:
     """Keys cannot undo during the work, but scripts can; its references would then be invalid."""
-    stop()
+    cancel_running()
 
 
 _HANDLERS = (
@@ -198,13 +198,13 @@ _HANDLERS = (
 _running: _Running | None = None
 
 
-def running() -> str:
+def running_label() -> str:
     """The label of the operator that runs in the window; "" if there is none."""
     return "" if _running is None else _running.label
 
 
-def is_free(operator: Any) -> bool:
-    """For the `poll` of any operator, see `LongWork.is_free`."""
+def can_start(operator: Any) -> bool:
+    """For the `poll` of any operator, see `LongWork.can_start`."""
     if _running is None:
         return True
     esc = "; Esc cancels it" if _is_cancellable() else ""
@@ -235,11 +235,11 @@ def draw_progress(layout: bpy.types.UILayout, operator: type[LongWork]) -> bool:
     return True
 
 
-def counted(steps: Generator[int], total: int, things: str) -> Steps[None]:
-    """Work that yields how many things are done. things: their name, such as "frames"."""
+def counted(steps: Generator[int], total: int, unit: str) -> Steps[None]:
+    """Work that yields how many units are done. unit: such as "frames"."""
     with closing(steps):
         for done in steps:
-            yield Progress(f"{done:,} of {total:,} {things}", done / total)
+            yield Progress(f"{done:,} of {total:,} {unit}", done / total)
 
 
 def as_progress[Result](steps: Generator[float, None, Result]) -> Steps[Result]:
@@ -255,18 +255,18 @@ def as_progress[Result](steps: Generator[float, None, Result]) -> Steps[Result]:
 
 
 def threaded[Result](work: ThreadWork[Result]) -> Steps[Result]:
-    """Work in a thread, which reports its progress; closing the generator abandons the work."""
+    """Work in a thread, which reports its progress; closing the generator cancels the work."""
     try:
         while not work.run_main_thread_steps():
             is_idle = not work.wants_main_thread
             yield Progress(work.stage, is_idle=is_idle, is_committed=work.is_committed)
         return work.result()
     finally:
-        work.give_up()
+        work.cancel()
 
 
 def steps_of_parts[Result](parts: Parts[Result]) -> Steps[Result]:
-    """Work whose parts run in threads; closing the generator closes the work and abandons the
+    """Work whose parts run in threads; closing the generator closes the work and cancels the
     running part."""
     with closing(parts):
         step = partial(next, parts)
@@ -278,11 +278,11 @@ def steps_of_parts[Result](parts: Parts[Result]) -> Steps[Result]:
                 return result
             yield Progress(part.title)  # at least once, even for a short part
             try:
-                made = yield from threaded(_thread_work_of(part))
+                part_result = yield from threaded(_thread_work_of(part))
             except Exception as error:  # raised where the work waits for the part
                 step = partial(parts.throw, error)
             else:
-                step = partial(parts.send, made)
+                step = partial(parts.send, part_result)
 
 
 def _thread_work_of(part: Part) -> ThreadWork[Any]:
@@ -291,19 +291,19 @@ def _thread_work_of(part: Part) -> ThreadWork[Any]:
     return work
 
 
-def stop() -> None:
+def cancel_running() -> None:
     """Cancel the running work, if any: no timer, no text and no half-written file remains."""
     global _running
     if _running is None:
         return
-    ended, _running = _running, None
+    cancelled, _running = _running, None
     try:
-        ended.steps.close()
+        cancelled.steps.close()
     finally:
-        ended.end()
+        cancelled.end()
 
 
-def _run_at_once(steps: Steps[None]) -> None:
+def _run_blocking(steps: Steps[None]) -> None:
     for step in steps:
         if step.is_idle:
             time.sleep(_PAUSE_SECONDS)

@@ -70,7 +70,7 @@ class HAIRLOOM_OT_sort_cards(LongWork, bpy.types.Operator):
 
     @classmethod
     def poll(cls: Any, context: bpy.types.Context) -> bool:
-        return cls.is_free() and _can_sort(cls, context)
+        return cls.can_start() and _can_sort(cls, context)
 
     def invoke(self: Any, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         obj = active_mesh(context)

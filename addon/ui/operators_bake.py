@@ -15,7 +15,7 @@ from ..blender.sessions.measures import table_of
 from ..errors import HairloomError
 from .drawing import draw_idle
 from .help import WithHelp
-from .long_work import LongWork, Steps, counted, draw_progress, is_free
+from .long_work import LongWork, Steps, can_start, counted, draw_progress
 from .operators_measure import draw_figures
 from .reports import reporting
 from .selection import chosen_hair
@@ -27,11 +27,11 @@ class HAIRLOOM_OT_bake(LongWork, bpy.types.Operator):
     bl_idname = "hairloom.bake"
     bl_label = "Bake"
     bl_options = {"REGISTER", "UNDO"}
-    unharmed = "the previous bake is kept"
+    state_after_cancel = "the previous bake is kept"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not cls.is_free():
+        if not cls.can_start():
             return False
         if chosen(context):
             return True
@@ -65,7 +65,7 @@ class HAIRLOOM_OT_bake_free(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not is_free(cls):
+        if not can_start(cls):
             return False
         if any(has_bake(obj) for obj in chosen(context)):
             return True

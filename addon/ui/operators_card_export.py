@@ -38,7 +38,7 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
     bl_idname = "hairloom.export_cards"
     bl_label = "Export Hair Cards"
     bl_options = {"PRESET"}
-    unharmed = "nothing was written"
+    state_after_cancel = "nothing was written"
     #: notes on stale bakes, for the file browser
     stale: tuple[str, ...] = ()
 
@@ -88,7 +88,7 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         # a collection's exporter has its own hair, so it needs no selection
-        return cls.is_free() and (bool(bpy.data.hair_curves) or needs_hair(cls, context))
+        return cls.can_start() and (bool(bpy.data.hair_curves) or needs_hair(cls, context))
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         hair = chosen_hair(context)

@@ -85,8 +85,8 @@ class HAIRLOOM_OT_discard_card_edits(LongWork, bpy.types.Operator):
 
 
 def _can_make(operator: Any, context: bpy.types.Context) -> bool:
-    is_free: bool = operator.is_free()
-    return is_free and in_object_mode(operator, context) and needs_hair(operator, context)
+    can_start: bool = operator.can_start()
+    return can_start and in_object_mode(operator, context) and needs_hair(operator, context)
 
 
 def _built(

@@ -39,7 +39,7 @@ class HAIRLOOM_OT_fit_spheres(LongWork, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return cls.is_free() and _has_mesh(cls, context)
+        return cls.can_start() and _has_mesh(cls, context)
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         mesh = _mesh(context)

@@ -125,7 +125,7 @@ class HAIRLOOM_OT_check_export(LongWork, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return cls.is_free() and needs_hair(cls, context)
+        return cls.can_start() and needs_hair(cls, context)
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         own = ExportCheck.of(writable(chosen_hair(context)), previewed_rigs())
@@ -138,7 +138,7 @@ class HAIRLOOM_OT_check_export(LongWork, bpy.types.Operator):
         report_outcome(self, Outcome("; ".join(own.lines), {}, tuple(own.warnings)))
         end(own)
 
-    def follow(self, _context: bpy.types.Context) -> None:
+    def on_finished(self, _context: bpy.types.Context) -> None:
         bpy.ops.hairloom.show_export_check("INVOKE_DEFAULT", engine=self.engine)
 
 

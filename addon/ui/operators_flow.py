@@ -87,7 +87,7 @@ class HAIRLOOM_OT_comb_flow(LongWork, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not (cls.is_free() and in_object_mode(cls, context) and needs_hair(cls, context)):
+        if not (cls.can_start() and in_object_mode(cls, context) and needs_hair(cls, context)):
             return False
         if any(map(strokes_of, chosen_hair(context))):
             return True

@@ -33,7 +33,7 @@ class HAIRLOOM_OT_grow(LongWork, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not (cls.is_free() and in_object_mode(cls, context)):
+        if not (cls.can_start() and in_object_mode(cls, context)):
             return False
         if ground_mesh(context) is not None:
             return True
@@ -66,7 +66,7 @@ class HAIRLOOM_OT_grow_again(LongWork, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return cls.is_free() and in_object_mode(cls, context) and needs_hair(cls, context)
+        return cls.can_start() and in_object_mode(cls, context) and needs_hair(cls, context)
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         grooms = without_linked_duplicates(chosen_hair(context))

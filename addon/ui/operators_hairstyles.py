@@ -73,7 +73,7 @@ class HAIRLOOM_OT_add_hairstyle(LongWork, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return cls.is_free() and in_object_mode(cls, context)
+        return cls.can_start() and in_object_mode(cls, context)
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         if not self.properties.is_property_set("plays"):
@@ -104,7 +104,7 @@ class HAIRLOOM_OT_add_hairstyle(LongWork, bpy.types.Operator):
                 report(self, kind, line)
         if is_new:
             report(self, "INFO", f"Added a head, {head.name}, for the hair to grow on")
-        if is_new and is_alone and self.is_pressed():
+        if is_new and is_alone and self.is_interactive():
             _look_at([*grooms, head], context)
         yield from beginning(self, context, grooms, plays=self.plays)
 
@@ -148,7 +148,7 @@ class HAIRLOOM_OT_place_landmarks(LongWork, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not (cls.is_free() and in_object_mode(cls, context)):
+        if not (cls.can_start() and in_object_mode(cls, context)):
             return False
         if ground_mesh(context) is not None:
             return True
@@ -186,7 +186,7 @@ class HAIRLOOM_OT_fit_again(LongWork, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not (cls.is_free() and in_object_mode(cls, context)):
+        if not (cls.can_start() and in_object_mode(cls, context)):
             return False
         if any(hair.hairloom.hairstyle for hair in chosen_hair(context)):
             return True

@@ -21,7 +21,7 @@ class HAIRLOOM_OT_make_real(LongWork, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return cls.is_free() and in_object_mode(cls, context) and needs_hair(cls, context)
+        return cls.can_start() and in_object_mode(cls, context) and needs_hair(cls, context)
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         parts = make_real(chosen_hair(context), context.evaluated_depsgraph_get())

@@ -15,20 +15,20 @@ import bpy
 
 from ..blender.bakes.groom_hashes import frame_rate
 from ..blender.base.frame_clock import FrameClock
-from ..blender.base.latest_job import is_watched, unwatch, watch
+from ..blender.base.latest_job import is_scheduled, schedule, unschedule
 from ..blender.base.outcome import Outcome, report
 from ..blender.base.redraw import show_status
 from ..blender.base.suspension import is_suspended
 from ..blender.preview import fins, previews
 from ..blender.scene.source import hair_dynamics_modifiers, mute_hair_dynamics
 from ..blender.sessions.fins import any_enabled
-from .long_work import running
+from .long_work import running_label
 from .reports import report_outcome, reporting, wait_cursor
 from .selection import chosen_hair, needs_hair
 
 #: Rate of ticks [1/s]; high, so that a frame is delayed only by a fraction of its length.
 TICKS_PER_SECOND = 120.0
-#: The key of the ticks in `latest_job.watch`.
+#: The key of the ticks in `latest_job.schedule`.
 TICKS = "play"
 STATUS = "Hairloom plays. Move the head or the sliders. Esc: stop, and return the hair to its style"
 PAUSED = "Hairloom is paused: press Resume in its panel. Esc: stop"
@@ -214,13 +214,13 @@ class HAIRLOOM_OT_reset(bpy.types.Operator):
 def start_ticking() -> None:
     ticks = _Ticks()
     ticks.tell()
-    watch(TICKS, ticks.tick)
+    schedule(TICKS, ticks.tick)
 
 
 def stop_ticking() -> None:
     """Stop the clock, and remove the text in the status bar."""
-    if is_watched(TICKS):
-        unwatch(TICKS)
+    if is_scheduled(TICKS):
+        unschedule(TICKS)
         show_status(None)
 
 
@@ -252,7 +252,7 @@ class _Ticks:
         return 1.0 / TICKS_PER_SECOND
 
     def tell(self) -> None:
-        if running():  # a long operator uses the status bar, and empties it at its end
+        if running_label():  # a long operator uses the status bar, and empties it at its end
             self._said = ""
             return
         text = PAUSED if previews.is_paused() else STATUS

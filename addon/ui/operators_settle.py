@@ -28,7 +28,7 @@ class HAIRLOOM_OT_settle(LongWork, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return cls.is_free() and in_object_mode(cls, context) and needs_hair(cls, context)
+        return cls.can_start() and in_object_mode(cls, context) and needs_hair(cls, context)
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         settings, depsgraph = settings_of(self, SettleSettings), context.evaluated_depsgraph_get()

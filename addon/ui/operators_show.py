@@ -35,7 +35,7 @@ class HAIRLOOM_OT_turntable(LongWork, bpy.types.Operator):
     bl_idname = "hairloom.turntable"
     bl_label = "Turntable"
     bl_options = {"REGISTER", "PRESET"}
-    unharmed = "nothing was written"
+    state_after_cancel = "nothing was written"
 
     directory: StringProperty(
         name="Folder",
@@ -82,7 +82,7 @@ class HAIRLOOM_OT_turntable(LongWork, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return cls.is_free() and needs_hair(cls, context)
+        return cls.can_start() and needs_hair(cls, context)
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         if self.directory:

@@ -55,7 +55,7 @@ class HAIRLOOM_OT_add_groom(LongWork, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return cls.is_free() and in_object_mode(cls, context) and _has_ground(cls, context)
+        return cls.can_start() and in_object_mode(cls, context) and _has_ground(cls, context)
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         _take_preferences(self, context)
@@ -102,7 +102,7 @@ class HAIRLOOM_OT_sample_scene(LongWork, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return cls.is_free() and in_object_mode(cls, context)
+        return cls.can_start() and in_object_mode(cls, context)
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         _take_preferences(self, context)
@@ -132,7 +132,7 @@ class HAIRLOOM_OT_use_groom(LongWork, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not (cls.is_free() and in_object_mode(cls, context)):
+        if not (cls.can_start() and in_object_mode(cls, context)):
             return False
         if any(previews.session_of(hair) is None for hair in chosen_hair(context)):
             return True
@@ -167,7 +167,7 @@ class HAIRLOOM_OT_convert_particles(LongWork, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not (cls.is_free() and in_object_mode(cls, context)):
+        if not (cls.can_start() and in_object_mode(cls, context)):
             return False
         mesh = active_mesh(context)
         if mesh is not None and hair_systems(mesh):

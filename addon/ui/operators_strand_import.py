@@ -105,7 +105,7 @@ class HAIRLOOM_OT_import_strands(LongWork, ImportHelper, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return cls.is_free() and in_object_mode(cls, context)
+        return cls.can_start() and in_object_mode(cls, context)
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         """Import the files; if one cannot be used, the others are still imported."""

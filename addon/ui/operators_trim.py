@@ -32,11 +32,11 @@ class HAIRLOOM_OT_trim_to_shape(LongWork, bpy.types.Operator):
     bl_idname = "hairloom.trim_to_shape"
     bl_label = "Trim to Shape"
     bl_options = {"REGISTER", "UNDO"}
-    unharmed = "the hair is as long as before"
+    state_after_cancel = "the hair is as long as before"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not (cls.is_free() and in_object_mode(cls, context) and needs_hair(cls, context)):
+        if not (cls.can_start() and in_object_mode(cls, context) and needs_hair(cls, context)):
             return False
         if any(trim_shapes_of(hair) or _chosen(hair, context) for hair in chosen_hair(context)):
             return True

@@ -17,7 +17,7 @@ from ..blender.sessions.measures import PARTS, array_bytes
 from ..blender.sessions.session import Session
 from ..blender.viewport import view_transform
 from ..blender.viewport.overlay import notes_of, statistics_of
-from .long_work import draw_esc, running
+from .long_work import draw_esc, running_label
 from .messages import draw_lines, draw_message
 
 _MEGABYTE = 1 << 20
@@ -44,8 +44,8 @@ def draw_state(layout: bpy.types.UILayout, session: Session | None) -> None:
         parts = lines.split(factor=NAMES)
         parts.label(text=name)
         row = parts.row(align=True)
-        if name == "State" and running():
-            row.label(text=running())
+        if name == "State" and running_label():
+            row.label(text=running_label())
             draw_esc(row)
             continue
         row.label(text=text)

@@ -69,7 +69,7 @@ class StrandExportOperator(LongWork, ExportHelper):
     """Base of the export operators of all formats. Motion is written in steps; Esc cancels."""
 
     bl_options: ClassVar[set[str]] = {"PRESET"}
-    unharmed = "the file is as it was before"
+    state_after_cancel = "the file is as it was before"
     kind: ClassVar[StrandFormat]
 
     collection: StringProperty(
@@ -92,7 +92,7 @@ class StrandExportOperator(LongWork, ExportHelper):
 
     @classmethod
     def poll(cls: Any, context: bpy.types.Context) -> bool:
-        if not cls.is_free():
+        if not cls.can_start():
             return False
         # a collection's exporter has its own hair, so it needs no selection
         return bool(bpy.data.hair_curves) or needs_hair(cls, context)
@@ -120,7 +120,7 @@ class StrandExportOperator(LongWork, ExportHelper):
         plans = self._plans(context, cached_rigs)
         for done, (path, plan) in enumerate(plans):
             if done:
-                self.unharmed = f"{done:,} of {len(plans):,} files are written"
+                self.state_after_cancel = f"{done:,} of {len(plans):,} files are written"
             if plan.frames is None:
                 report_outcome(self, plan.write(path))
             else:
@@ -236,7 +236,7 @@ def _in_motion(path: Path, plan: StrandExport) -> Steps[Outcome]:
                 )
             return work.result()
         finally:
-            work.give_up()
+            work.cancel()
 
 
 def _refuse(place: str, remedy: str) -> Any:

@@ -5,7 +5,7 @@ import threading
 import bpy
 import numpy as np
 import pytest
-from waiting import take_steps_until
+from waiting import run_steps_until
 
 from hairloom.addon.blender.base import latest_job
 from hairloom.addon.blender.preview import previews, scene_events
@@ -50,7 +50,7 @@ def drawn(session):
 
 def arrive(session, get_depsgraph):
     scene_events.catch_up(get_depsgraph())
-    take_steps_until(lambda: not session.is_pending)
+    run_steps_until(lambda: not session.is_pending)
 
 
 def rebuilt(hair, get_depsgraph):
@@ -121,7 +121,7 @@ def test_a_stroke_amid_a_build_is_not_lost_when_that_arrives(hair, session, get_
     scene_events.catch_up(get_depsgraph())
     stroke(hair, range(10, 15))
     shown = drawn(session)
-    take_steps_until(lambda: not session.is_pending)
+    run_steps_until(lambda: not session.is_pending)
     own = session.rig.strands.offsets[session.rig.own_count]
     np.testing.assert_allclose(drawn(session)[:own], shown[:own], atol=1e-6)
     arrive(session, get_depsgraph)
@@ -190,7 +190,7 @@ def test_painting_amid_a_build_is_not_lost_when_that_arrives(hair, group, sessio
     scene_events.catch_up(get_depsgraph())
     paint(group, 0.1)
     painted = roots(session)
-    take_steps_until(lambda: not session.is_pending)
+    run_steps_until(lambda: not session.is_pending)
     assert roots(session) == painted
     arrive(session, get_depsgraph)
     np.testing.assert_array_equal(session.rig.strands.points, rebuilt(hair, get_depsgraph)[0])
@@ -257,7 +257,7 @@ def test_rebuilt_hair_arrives_with_its_old_light_and_keeps_newer_strokes(
     fields = session.groom.light.fields
     stroke(hair, range(5))
     scene_events.catch_up(get_depsgraph())
-    take_steps_until(lambda: session.is_lighting)
+    run_steps_until(lambda: session.is_lighting)
     assert session.groom.light.is_quick and session.groom.light.fields is fields
     wanted = rebuilt(hair, get_depsgraph)[1]
     assert not np.array_equal(session.snapshot.occlusion, wanted)
@@ -265,7 +265,7 @@ def test_rebuilt_hair_arrives_with_its_old_light_and_keeps_newer_strokes(
     stroke(hair, range(10, 15))
     shown, combed = drawn(session), session.rig.strands.points
     opened.set()
-    take_steps_until(lambda: not session.is_lighting)
+    run_steps_until(lambda: not session.is_lighting)
     np.testing.assert_array_equal(drawn(session), shown)
     np.testing.assert_array_equal(session.rig.strands.points, combed)
     np.testing.assert_array_equal(session.snapshot.occlusion, wanted)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from waiting import take_steps_until, wait_until
+from waiting import run_steps_until, wait_until
 
 bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
 
@@ -73,7 +73,7 @@ class View:
             nonlocal found
             if not self.reader.pending:
                 return True
-            latest_job.take_steps()
+            latest_job.run_steps()
             if not all(engine_hair.is_pending(uid) for uid in self.reader.pending):
                 found = self.read()
             return False
@@ -86,7 +86,7 @@ def test_the_first_picture_is_without_hair_until_it_is_made(hair: Any, gate: Gat
     view = View()
     assert view.read() == () and view.reader.pending == {hair.session_uid}
     assert view.read() == (), "nor does the next picture wait"
-    assert bpy.app.timers.is_registered(latest_job.take_steps)
+    assert bpy.app.timers.is_registered(latest_job.run_steps)
     gate.opened.set()
     (shown,) = view.arrive()
     assert shown.strand_count == COUNT and gate.makers == ["hair in Rendered mode"]
@@ -148,9 +148,9 @@ def test_hair_that_became_invisible_is_not_waited_for(hair: Any, gate: Gate) -> 
     bpy.context.view_layer.update()
     assert view.read() == () and not view.reader.pending
     assert not engine_hair.is_pending(uid)
-    assert latest_job.take_steps() is None
-    latest_job.unwatch_all()
-    assert not bpy.app.timers.is_registered(latest_job.take_steps)
+    assert latest_job.run_steps() is None
+    latest_job.unschedule_all()
+    assert not bpy.app.timers.is_registered(latest_job.run_steps)
 
 
 def test_two_views_of_other_hair_leave_each_other_theirs(
@@ -162,7 +162,7 @@ def test_two_views_of_other_hair_leave_each_other_theirs(
     for _ in range(2):
         for name, view in views.items():
             view.read(is_shown=lambda obj, name=name: obj.name in (name, "Head"))
-    wait_until(lambda: latest_job.take_steps() is None)
+    wait_until(lambda: latest_job.run_steps() is None)
     for name, view in views.items():
         shown = view.read(is_shown=lambda obj, name=name: obj.name in (name, "Head"))
         assert len(shown) == 1 and not view.reader.pending
@@ -222,7 +222,7 @@ def test_an_error_reported_repeatedly_does_not_grow(
             lengths.append(sum(len(list(traceback.walk_tb(e.__traceback__))) for e in causes if e))
 
     read()
-    wait_until(lambda: latest_job.take_steps() is None)
+    wait_until(lambda: latest_job.run_steps() is None)
     for _ in range(4):
         read()
     assert len(set(lengths[1:])) == 1
@@ -250,7 +250,7 @@ def test_the_picture_keeps_its_hair_until_the_preview_has_its_own(
 
     assert read() == (before,)
     gate.opened.set()
-    take_steps_until(lambda: not session.is_pending)
+    run_steps_until(lambda: not session.is_pending)
     assert overlay.drawn_uids() == {hair.session_uid} and not overlay.pending_uids()
     assert read() == (), "the preview draws it from now on"
     scene_events.clear()

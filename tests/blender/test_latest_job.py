@@ -7,7 +7,7 @@ from collections.abc import Generator, Iterator
 from typing import Any
 
 import pytest
-from waiting import TIMEOUT_S, take_steps_until
+from waiting import TIMEOUT_S, run_steps_until
 
 bpy = pytest.importorskip("bpy", reason="its timer is Blender's")
 
@@ -31,11 +31,11 @@ class Workshop:
         self.errors: list[HairloomError] = []
         self.job = LatestJob[str, str]("test", self._take)
 
-    def want(self, key: str, *, fails: bool = False, error: Exception | None = None) -> None:
+    def request(self, key: str, *, fails: bool = False, error: Exception | None = None) -> None:
         if fails:
             error = HairloomError("it cannot be", place=key, remedy="Undo")
         self.gates.setdefault(key, threading.Event())
-        self.job.want(key, lambda: self._begin(key, error))
+        self.job.request(key, lambda: self._begin(key, error))
 
     def _begin(self, key: str, error: Exception | None) -> Work[str]:
         assert threading.current_thread() is threading.main_thread()
@@ -70,103 +70,103 @@ def shop() -> Iterator[Workshop]:
     yield shop
     shop.job.cancel()
     shop.open(*shop.gates)
-    latest_job.unwatch_all()
+    latest_job.unschedule_all()
 
 
 def test_a_result_arrives_by_blenders_timer_and_is_not_computed_twice(shop: Workshop) -> None:
-    shop.want("a")
-    assert bpy.app.timers.is_registered(latest_job.take_steps)
-    assert shop.job.is_pending and not shop.job.has_arrived
-    assert latest_job.take_steps() == latest_job.ARRIVAL_TIME and shop.taken == []
-    shop.want("a")
+    shop.request("a")
+    assert bpy.app.timers.is_registered(latest_job.run_steps)
+    assert shop.job.is_pending and not shop.job.has_result
+    assert latest_job.run_steps() == latest_job.POLL_INTERVAL and shop.taken == []
+    shop.request("a")
     shop.open("a")
-    take_steps_until(lambda: shop.taken == ["A"])
-    shop.want("a")
+    run_steps_until(lambda: shop.taken == ["A"])
+    shop.request("a")
     assert shop.begun == ["a"] and not shop.job.is_pending
-    assert latest_job.take_steps() is None, "the timer ends with the last work"
+    assert latest_job.run_steps() is None, "the timer ends with the last work"
 
 
 def test_a_running_job_finishes_and_the_latest_request_follows(shop: Workshop) -> None:
     for key in "abcd":
-        shop.want(key)
+        shop.request(key)
     assert shop.begun == ["a"]
     shop.open("a", "d")
-    take_steps_until(lambda: shop.taken == ["A", "D"])
+    run_steps_until(lambda: shop.taken == ["A", "D"])
     assert shop.begun == ["a", "d"], "what is in between is left out"
 
 
 def test_requesting_the_running_job_again_drops_later_requests(shop: Workshop) -> None:
     for key in "aba":
-        shop.want(key)
+        shop.request(key)
     shop.open("a", "b")
-    take_steps_until(lambda: shop.taken == ["A"])
+    run_steps_until(lambda: shop.taken == ["A"])
     assert shop.begun == ["a"] and not shop.job.is_pending
 
 
 def test_a_failure_is_reported_only_if_still_requested(shop: Workshop) -> None:
-    shop.want("a", fails=True)
-    shop.want("b", fails=True)
+    shop.request("a", fails=True)
+    shop.request("b", fails=True)
     shop.open("a", "b")
-    take_steps_until(lambda: bool(shop.errors))
+    run_steps_until(lambda: bool(shop.errors))
     assert shop.taken == [None] and [error.place for error in shop.errors] == ["b"]
-    shop.want("b")
+    shop.request("b")
     assert not shop.job.is_pending, "it fails once"
-    shop.want("c")
+    shop.request("c")
     shop.open("c")
-    take_steps_until(lambda: shop.taken == [None, "C"])
+    run_steps_until(lambda: shop.taken == [None, "C"])
 
 
 def test_any_exception_is_reported_only_if_still_requested(
     shop: Workshop, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    shop.want("a", error=MemoryError("far too much"))
-    shop.want("b")
+    shop.request("a", error=MemoryError("far too much"))
+    shop.request("b")
     shop.open("a", "b")
-    take_steps_until(lambda: shop.taken == [None, "B"])
+    run_steps_until(lambda: shop.taken == [None, "B"])
     assert "MemoryError: far too much" in capsys.readouterr().err
 
 
 def test_a_job_whose_step_is_dropped_can_be_wanted_again(shop: Workshop) -> None:
-    shop.want("a")
-    latest_job.unwatch_all()
+    shop.request("a")
+    latest_job.unschedule_all()
     assert not shop.job.is_pending
-    shop.want("a")
+    shop.request("a")
     shop.open("a")
-    take_steps_until(lambda: shop.taken == ["A"])
+    run_steps_until(lambda: shop.taken == ["A"])
     assert shop.begun == ["a", "a"]
 
 
 def test_cancelled_work_ends_by_itself_and_is_not_wanted_any_more(shop: Workshop) -> None:
-    shop.want("a")
-    shop.want("b")
+    shop.request("a")
+    shop.request("b")
     shop.job.cancel()
-    assert not shop.job.is_pending and latest_job.take_steps() is None
+    assert not shop.job.is_pending and latest_job.run_steps() is None
     shop.open("a", "b")
-    take_steps_until(lambda: shop.ended == ["a"])
+    run_steps_until(lambda: shop.ended == ["a"])
     assert shop.taken == [] and shop.begun == ["a"]
-    shop.want("a")
-    take_steps_until(lambda: shop.taken == ["A"])
+    shop.request("a")
+    run_steps_until(lambda: shop.taken == ["A"])
 
 
 def test_taking_a_result_early_waits_for_it(shop: Workshop) -> None:
-    shop.want("a")
+    shop.request("a")
     threading.Timer(0.05, lambda: shop.open("a")).start()
     assert shop.job.take() == "A"
 
 
 def test_a_result_stays_available_until_it_is_taken(shop: Workshop) -> None:
     offers: list[bool] = []
-    job = LatestJob[str, str]("test", lambda: offers.append(job.has_arrived))
-    job.want("a", lambda: lambda _: "A")
-    take_steps_until(lambda: len(offers) >= 3)
+    job = LatestJob[str, str]("test", lambda: offers.append(job.has_result))
+    job.request("a", lambda: lambda _: "A")
+    run_steps_until(lambda: len(offers) >= 3)
     assert all(offers) and job.take() == "A"
-    assert latest_job.take_steps() is None
+    assert latest_job.run_steps() is None
 
 
 def test_keys_can_be_compared_by_a_custom_function(shop: Workshop) -> None:
     job = LatestJob[str, str]("test", lambda: None, lambda one, other: one[0] == other[0])
-    job.want("apple", lambda: lambda _: "A")
-    assert job.wants("almond") and not job.wants("birch")
+    job.request("apple", lambda: lambda _: "A")
+    assert job.is_latest("almond") and not job.is_latest("birch")
     job.cancel()
 
 
@@ -180,8 +180,8 @@ def test_main_thread_steps_are_run_by_the_timer(shop: Workshop) -> None:
         return "A"
 
     job = LatestJob[str, str]("test", lambda: shop.taken.append(job.take()))
-    job.want("a", lambda: lambda work: work.on_main_thread(steps()))
-    take_steps_until(lambda: shop.taken == ["A"])
+    job.request("a", lambda: lambda work: work.on_main_thread(steps()))
+    run_steps_until(lambda: shop.taken == ["A"])
     assert seen == 3 * [threading.main_thread()]
 
 
@@ -197,12 +197,12 @@ def test_a_step_that_fails_is_reported_and_the_others_go_on(
         taken.append("step")
         return 0.5
 
-    latest_job.watch("bad", fail)
-    latest_job.watch("good", count)
-    assert latest_job.take_steps() == 0.5 and latest_job.take_steps() == 0.5
+    latest_job.schedule("bad", fail)
+    latest_job.schedule("good", count)
+    assert latest_job.run_steps() == 0.5 and latest_job.run_steps() == 0.5
     assert len(taken) == 2 and capsys.readouterr().err.count("ValueError: a defect") == 1
-    latest_job.unwatch("good")
-    assert latest_job.take_steps() is None
+    latest_job.unschedule("good")
+    assert latest_job.run_steps() is None
 
 
 def test_a_step_may_end_others_and_begin_new_ones(shop: Workshop) -> None:
@@ -214,14 +214,14 @@ def test_a_step_may_end_others_and_begin_new_ones(shop: Workshop) -> None:
 
     def first() -> float | None:
         taken.append("first")
-        latest_job.unwatch("second")
-        latest_job.watch("third", last)
+        latest_job.unschedule("second")
+        latest_job.schedule("third", last)
         return None
 
-    latest_job.watch("first", first)
-    latest_job.watch("second", lambda: taken.append("second"))
-    assert latest_job.take_steps() == latest_job.ARRIVAL_TIME, "the third is still to come"
-    assert latest_job.take_steps() is None and taken == ["first", "last"]
+    latest_job.schedule("first", first)
+    latest_job.schedule("second", lambda: taken.append("second"))
+    assert latest_job.run_steps() == latest_job.POLL_INTERVAL, "the third is still to come"
+    assert latest_job.run_steps() is None and taken == ["first", "last"]
 
 
 def test_a_job_that_failed_to_start_can_be_requested_again(shop: Workshop) -> None:
@@ -229,7 +229,7 @@ def test_a_job_that_failed_to_start_can_be_requested_again(shop: Workshop) -> No
         raise HairloomError("it cannot be read", place="a", remedy="Undo")
 
     with pytest.raises(HairloomError):
-        shop.job.want("a", begin)
-    shop.want("a")
+        shop.job.request("a", begin)
+    shop.request("a")
     shop.open("a")
-    take_steps_until(lambda: shop.taken == ["A"])
+    run_steps_until(lambda: shop.taken == ["A"])

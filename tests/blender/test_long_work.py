@@ -11,7 +11,7 @@ import bpy
 import pytest
 from waiting import wait_until
 
-from hairloom.addon.blender.base.thread_work import GivenUpError, ThreadWork
+from hairloom.addon.blender.base.thread_work import ThreadWork, WorkCancelledError
 from hairloom.addon.cards.steps import result_of
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.ui import long_work, operators_preview
@@ -37,7 +37,7 @@ class HAIRLOOM_OT_test_work(LongWork, bpy.types.Operator):
 
     @classmethod
     def poll(cls, _context: Any) -> bool:
-        return cls.is_free()
+        return cls.can_start()
 
     def steps(self: Any, _context: Any) -> Steps[None]:
         if self.count > 5:
@@ -128,7 +128,7 @@ def test_closing_cancels_the_thread() -> None:
     steps.close()
     may_go_on.set()
     wait_until(thread.run_main_thread_steps)
-    with pytest.raises(GivenUpError):
+    with pytest.raises(WorkCancelledError):
         thread.result()
 
 
@@ -168,6 +168,6 @@ def test_play_restores_its_status_text_after_other_work(monkeypatch: pytest.Monk
     monkeypatch.setattr(operators_preview, "show_status", shown.append)
     ticks = operators_preview._Ticks()
     for label in ("", "", "Settle", "Settle", ""):
-        monkeypatch.setattr(operators_preview, "running", lambda label=label: label)
+        monkeypatch.setattr(operators_preview, "running_label", lambda label=label: label)
         ticks.tell()
     assert shown == [operators_preview.STATUS] * 2

@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 from grids import strand_grid
-from waiting import take_steps_until, wait_until, wait_until_playing
+from waiting import run_steps_until, wait_until, wait_until_playing
 
 from hairloom.addon import light_flow, motion_flow, rig_flow
 from hairloom.addon.arrays import same_content
@@ -65,7 +65,7 @@ def hair(new_hair, sphere):
 
 def arrive(session):
     """Run timer steps until nothing is pending."""
-    take_steps_until(lambda: not (session.is_pending and previews.sessions()))
+    run_steps_until(lambda: not (session.is_pending and previews.sessions()))
 
 
 def shown(session):
@@ -81,7 +81,7 @@ def test_a_preview_shows_blenders_strands_until_its_own_are_made(hair, get_depsg
     assert not session.is_made and session.is_pending
     assert shown(session).snapshot.strand_count == 0 and "is being made" in shown(session).note
     assert not is_box(hair, get_depsgraph)
-    assert bpy.app.timers.is_registered(latest_job.take_steps)
+    assert bpy.app.timers.is_registered(latest_job.run_steps)
     gate.set()
     arrive(session)
     assert session.is_made and shown(session).note == ""
@@ -108,7 +108,7 @@ def test_cancel_ends_the_preview_of_hair_that_is_being_made(hair, get_depsgraph,
     assert not session.is_made and bpy.ops.hairloom.cancel_build() == {"FINISHED"}
     assert previews.session_of(hair) is None and not session.is_pending
     gate.set()
-    take_steps_until(lambda: not latest_job.is_watched(session))
+    run_steps_until(lambda: not latest_job.is_scheduled(session))
     assert previews.session_of(hair) is None
 
 
@@ -170,7 +170,7 @@ def has_light(snapshot, light):
 
 def test_hair_is_shown_before_its_light_is_found(hair, get_depsgraph, light_gate):
     session, whole = previews.start(hair, get_depsgraph()), light_of(hair, get_depsgraph)
-    take_steps_until(lambda: session.is_made)
+    run_steps_until(lambda: session.is_made)
     quick = shown(session).snapshot
     assert session.is_lighting and session.is_pending and is_box(hair, get_depsgraph)
     assert quick.occlusion.shape == whole.occlusion.shape and not has_light(quick, whole)
@@ -186,7 +186,7 @@ def test_hair_is_shown_before_its_light_is_found(hair, get_depsgraph, light_gate
 
 def test_a_picture_waits_for_the_light(hair, get_depsgraph, in_window):
     session, whole = previews.start(hair, get_depsgraph()), light_of(hair, get_depsgraph)
-    take_steps_until(lambda: session.is_made)
+    run_steps_until(lambda: session.is_made)
     assert session.is_lighting
     picture = shown_groom(hair, get_depsgraph())
     assert not session.is_pending and has_light(session.snapshot, whole)
@@ -195,14 +195,14 @@ def test_a_picture_waits_for_the_light(hair, get_depsgraph, in_window):
 
 def test_a_new_build_starts_while_light_of_the_old_one_is_computed(hair, get_depsgraph, light_gate):
     session = previews.start(hair, get_depsgraph())
-    take_steps_until(lambda: session.is_made)
+    run_steps_until(lambda: session.is_made)
     first = session.groom
     assert session.is_lighting
     hair.data.hairloom.children.method = "multi"
     hair.data.hairloom.children.strand_count = 300
     scene_events.catch_up(get_depsgraph())
     assert not session.is_lighting
-    take_steps_until(lambda: session.groom is not first)
+    run_steps_until(lambda: session.groom is not first)
     quick = session.groom.light
     assert session.is_lighting and quick.fields is first.light.fields, "in the light before"
     light_gate.set()
@@ -212,13 +212,13 @@ def test_a_new_build_starts_while_light_of_the_old_one_is_computed(hair, get_dep
 
 def test_nothing_is_left_of_light_that_is_found_for_hair_that_goes(hair, get_depsgraph, light_gate):
     session = previews.start(hair, get_depsgraph())
-    take_steps_until(lambda: session.is_made)
+    run_steps_until(lambda: session.is_made)
     previews.stop(session)
     assert not session.is_pending and previews.session_of(hair) is None
     light_gate.set()
-    take_steps_until(lambda: not latest_job.is_watched(session))
+    run_steps_until(lambda: not latest_job.is_scheduled(session))
     session = previews.start(hair, get_depsgraph())
-    take_steps_until(lambda: session.is_made)
+    run_steps_until(lambda: session.is_made)
     assert session.is_lighting
     scene_events.clear()
     bpy.data.objects.remove(hair)
@@ -496,7 +496,7 @@ def test_an_end_in_the_middle_leaves_nothing(end, hair, get_depsgraph, gate):
         bpy.context.view_layer.update()
     else:
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    assert previews.sessions() == () and latest_job.take_steps() is None
+    assert previews.sessions() == () and latest_job.run_steps() is None
     assert not session.is_pending, "nobody waits for it any more"
 
 
@@ -693,11 +693,11 @@ def test_hair_that_is_made_while_another_scene_is_shown_arrives_with_its_own(
     monkeypatch.setattr(previews, "refresh_views", lambda: refreshed.append(True))
     window.scene = bpy.data.scenes.new("Elsewhere")
     get_depsgraph()
-    wait_until(lambda: session.has_arrived)
+    wait_until(lambda: session.has_result)
     for _ in range(3):
-        latest_job.take_steps()
+        latest_job.run_steps()
     assert not refreshed and not session.is_made, "the other scene is left alone"
     window.scene = scene
     get_depsgraph()
-    take_steps_until(lambda: session.is_made)
+    run_steps_until(lambda: session.is_made)
     assert refreshed and overlay.drawing_of(session.uid).is_made

@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 from tiers import few_in_commits
-from waiting import take_steps_until
+from waiting import run_steps_until
 
 from hairloom.addon import card_flow
 from hairloom.addon.blender.base import latest_job
@@ -235,7 +235,7 @@ def test_other_hair_is_made_into_cards_in_the_thread(shaded, get_depsgraph, monk
     strands.rotation_euler.z += 0.3
     follow(get_depsgraph)
     assert threads_of("hairloom cards") - first, "it moves while a build is pending"
-    take_steps_until(lambda: not session.cards.is_pending)
+    run_steps_until(lambda: not session.cards.is_pending)
     assert shown(session) is not near
     assert threads and threading.main_thread() not in threads
 

@@ -56,10 +56,10 @@ def test_lines_of_a_collider_that_is_being_made_come_when_it_is_there(preview, m
     fields.forget()
     monkeypatch.setattr(DistanceField, "from_surface", late)
     hair.hairloom.shown_overlays = {"colliders"}
-    assert overlays(session) == () and latest_job.take_steps() == latest_job.ARRIVAL_TIME
+    assert overlays(session) == () and latest_job.run_steps() == latest_job.POLL_INTERVAL
     is_made.set()
     wait_until(fields.are_ready)
-    assert latest_job.take_steps() is None
+    assert latest_job.run_steps() is None
     assert len(overlays(session)) == 1
 
 

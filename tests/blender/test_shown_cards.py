@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from waiting import take_steps_until
+from waiting import run_steps_until
 
 bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
 
@@ -43,7 +43,7 @@ def drawn(session):
 
 def served(session):
     """The displayed cards once all pending builds have arrived."""
-    take_steps_until(lambda: not session.cards.is_pending)
+    run_steps_until(lambda: not session.cards.is_pending)
     return drawn(session).cards
 
 
@@ -158,7 +158,7 @@ def test_strands_again_give_up_what_is_being_built(in_window):
     assert session.cards.is_pending
     hair.data.hairloom.card_drawing.shown_as = "strands"
     assert not session.cards.is_pending and drawn(session).cards is None
-    assert latest_job.take_steps() is None, "it is waited for"
+    assert latest_job.run_steps() is None, "it is waited for"
 
 
 def test_cards_throw_the_shadow_of_their_strands(preview):
@@ -192,7 +192,7 @@ def test_lines_say_what_is_built_and_what_is_shown(in_window):
     hair.data.hairloom.card_drawing.shown_as = "cards"
     assert session.cards.lines == () and session.cards.is_pending
     stages = []
-    take_steps_until(lambda: stages.append(session.cards.stage) or not session.cards.is_pending)
+    run_steps_until(lambda: stages.append(session.cards.stage) or not session.cards.is_pending)
     assert {"Cards from strands", "Check of the order"} <= set(stages), stages
     assert session.cards.stage == "" and len(session.cards.lines) == 2
 
@@ -220,7 +220,7 @@ def test_cards_of_the_rig_before_stay_until_those_of_other_hair_are_built(in_win
     bpy.context.view_layer.update()
     scene_events.updated(get_depsgraph())
     scene_events.catch_up(get_depsgraph())
-    take_steps_until(lambda: not session.is_pending)
+    run_steps_until(lambda: not session.is_pending)
     assert session.cards.is_pending
     assert np.array_equal(drawn(session).cards.mesh.positions, before.mesh.positions)
     before = drawn(session).cards

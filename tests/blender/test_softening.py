@@ -193,7 +193,7 @@ def test_slow_motion_is_not_at_rest_between_its_frames(
     two_views: tuple[views.View, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pauses: list[float] = []
-    monkeypatch.setattr(softening, "soon", lambda _, pause: pauses.append(pause))
+    monkeypatch.setattr(softening, "debounce", lambda _, pause: pauses.append(pause))
     for now in (100.0, 100.05, 100.1, 100.6, 101.1, 130.0):
         monkeypatch.setattr(softening.time, "monotonic", lambda now=now: now)
         softening.schedule_samples(two_views[0])

@@ -226,7 +226,7 @@ def test_changing_curve_counts_are_reported_and_leave_no_file(
 
 @needs_usd
 def test_a_cancelled_export_leaves_the_old_file(swinging: Any, tmp_path: Path) -> None:
-    """Esc in the window gives up work halfway in the same way."""
+    """Esc in the window cancels work halfway in the same way."""
     hair, _ = swinging
     bake(hair)
     for suffix, kind in ((".abc", ALEMBIC), (".usdc", USD)):
@@ -239,7 +239,7 @@ def test_a_cancelled_export_leaves_the_old_file(swinging: Any, tmp_path: Path) -
         positions = plan.positions()
         work = plan.write_in_thread(path, positions)
         wait_until(lambda w=work, p=plan: w.run_main_thread_steps() or p.frames_read >= 3)
-        work.give_up()
+        work.cancel()
         positions.close()
         wait_until(work.run_main_thread_steps)
         assert plan.frames_read >= 3

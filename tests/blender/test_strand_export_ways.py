@@ -296,4 +296,4 @@ def test_esc_says_how_many_of_several_files_are_written() -> None:
     steps = StrandExportOperator.steps(operator, bpy.context)
     assert next(steps).text == "0 of 2 frames"
     steps.close()
-    assert operator.unharmed == "1 of 2 files are written"
+    assert operator.state_after_cancel == "1 of 2 files are written"

@@ -372,4 +372,4 @@ def test_signals_are_as_before_afterwards() -> None:
     assert caught.value.exit_code == 130
     assert signal.getsignal(signal.SIGINT) is before
     with interruption.interruptible():
-        interruption.stop_if_asked()  # the earlier signal is forgotten
+        interruption.raise_if_interrupted()  # the earlier signal is forgotten

@@ -11,7 +11,7 @@ from waiting import TIMEOUT_S, wait_until
 
 pytest.importorskip("bpy", reason="what serves it runs inside Blender")
 
-from hairloom.addon.blender.base.thread_work import GivenUpError, ThreadWork
+from hairloom.addon.blender.base.thread_work import ThreadWork, WorkCancelledError
 
 
 def counting(seen: list[Any], last: int) -> Generator[None, None, int]:
@@ -61,66 +61,66 @@ def test_what_fails_is_raised_in_the_thread_and_told_by_the_result() -> None:
         work.result()
 
 
-def test_who_gives_up_closes_what_was_begun_and_ends_the_thread() -> None:
+def test_cancelling_closes_the_steps_and_ends_the_thread() -> None:
     seen: list[Any] = []
     work = ThreadWork(lambda work: work.on_main_thread(counting(seen, 1000)), "test")
     wait_until(lambda: work.wants_main_thread)
     work.run_main_thread_steps(duration=0.0)
-    work.give_up()
+    work.cancel()
     assert seen[-1] == "closed", "what it holds is freed by the thread"
     wait_until(work.run_main_thread_steps)
-    with pytest.raises(GivenUpError):
+    with pytest.raises(WorkCancelledError):
         work.result()
 
 
-def test_work_that_was_given_up_asks_and_goes_on_no_more() -> None:
-    given_up, ended = threading.Event(), []
+def test_cancelled_work_cannot_report_nor_use_the_main_thread() -> None:
+    cancelled, ended = threading.Event(), []
 
     def go_on(work: ThreadWork[None]) -> None:
-        given_up.wait(TIMEOUT_S)
+        cancelled.wait(TIMEOUT_S)
         for goes_on in (lambda: work.report("next"), lambda: work.on_main_thread(counting([], 1))):
             try:
                 goes_on()
-            except GivenUpError:
+            except WorkCancelledError:
                 ended.append(True)
 
     work = ThreadWork(go_on, "test")
-    work.give_up()
-    given_up.set()
+    work.cancel()
+    cancelled.set()
     wait_until(work.run_main_thread_steps)
     assert ended == [True, True]
 
 
-def test_who_gives_up_ends_the_child_that_is_waited_for() -> None:
+def test_cancelling_kills_the_child_process_that_is_waited_for() -> None:
     waiting, ended = threading.Event(), threading.Event()
 
     def wait_for_a_child(work: ThreadWork[None]) -> None:
-        with work.ending(ended.set):
+        with work.kill_context(ended.set):
             waiting.set()
             assert ended.wait(TIMEOUT_S)
 
     work = ThreadWork(wait_for_a_child, "test")
     assert waiting.wait(TIMEOUT_S) and not ended.is_set()
-    work.give_up()
+    work.cancel()
     assert ended.is_set(), "it waits for the thread"
     wait_until(lambda: work.is_done)
-    with pytest.raises(GivenUpError):
+    with pytest.raises(WorkCancelledError):
         work.result()
 
 
-def test_work_that_was_given_up_begins_no_child_and_one_that_has_ended_is_left_alone() -> None:
-    given_up, begun, ended = threading.Event(), [], []
+def test_cancelled_work_starts_no_child_process_and_one_that_has_ended_is_left_alone() -> None:
+    cancelled, started, killed = threading.Event(), [], []
 
     def work_with_children(work: ThreadWork[None]) -> None:
-        with work.ending(lambda: ended.append("the first")):
-            begun.append("the first")
-        assert given_up.wait(TIMEOUT_S)
-        with work.ending(lambda: ended.append("the second")):
-            begun.append("the second")
+        with work.kill_context(lambda: killed.append("the first")):
+            started.append("the first")
+        assert cancelled.wait(TIMEOUT_S)
+        with work.kill_context(lambda: killed.append("the second")):
+            started.append("the second")
 
     work = ThreadWork(work_with_children, "test")
-    wait_until(lambda: begun)
-    work.give_up()
-    given_up.set()
+    wait_until(lambda: started)
+    work.cancel()
+    cancelled.set()
     wait_until(lambda: work.is_done)
-    assert begun == ["the first"] and ended == []
+    assert started == ["the first"] and killed == []

@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 from engine_stage import background_node, set_panorama
-from waiting import take_steps_until
+from waiting import run_steps_until
 
 from hairloom.addon.blender.scene import world as world_module
 from hairloom.addon.blender.scene.world import read_environment, world_notes
@@ -175,7 +175,7 @@ def test_in_the_window_it_is_rendered_beside(scene: Any, monkeypatch: pytest.Mon
     tree.links.new(gradient.outputs["Color"], background_node(scene).inputs["Color"])
 
     def arrived() -> Environment:
-        take_steps_until(lambda: not world_module._job.is_pending)
+        run_steps_until(lambda: not world_module._job.is_pending)
         return read_environment(scene, blocking=False)
 
     plain = read_environment(scene, blocking=False)

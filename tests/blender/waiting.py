@@ -26,13 +26,13 @@ def wait_until_playing(session: Any, get_depsgraph: Callable[[], Any], duration:
     wait_until(lambda: previews.advance(get_depsgraph(), duration) or session.is_playing)
 
 
-def take_steps_until(condition: Callable[[], Any]) -> None:
+def run_steps_until(condition: Callable[[], Any]) -> None:
     """Run steps as Blender's timer does, until a condition holds."""
 
     def holds_after_a_step() -> bool:
         if condition():
             return True
-        latest_job.take_steps()
+        latest_job.run_steps()
         return False
 
     wait_until(holds_after_a_step)

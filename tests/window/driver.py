@@ -99,7 +99,7 @@ class Timers:
         jobs, is_played = hairloom_module("latest_job"), _is_animation_playing()
         if timer is hairloom_module("views")._catch_up:
             return is_played or "play" in jobs._steps
-        return timer is jobs.take_steps and set(jobs._steps) == {"play"}
+        return timer is jobs.run_steps and set(jobs._steps) == {"play"}
 
 
 def _is_animation_playing() -> bool:

@@ -39,7 +39,7 @@ REVERTS = ("revert_settle", "revert_flow", "revert_trim")
 def wait_for_long_work():
     """Wait for the end of long work, whose data a script could remove and a mouse cannot."""
     yield from wait_until(
-        lambda: not hairloom_module("long_work").running(), "the work does not end"
+        lambda: not hairloom_module("long_work").running_label(), "the work does not end"
     )
 
 

@@ -45,7 +45,7 @@ def steps():
         lambda: not hairloom_module("previews").is_playing(), "Esc does not stop it"
     )
     yield from wait_until(
-        lambda: not hairloom_module("latest_job").is_watched("play"), "it ticks on"
+        lambda: not hairloom_module("latest_job").is_scheduled("play"), "it ticks on"
     )
 
 

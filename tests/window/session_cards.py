@@ -251,7 +251,7 @@ def card_objects():
 
 
 def is_making():
-    return hairloom_module("long_work").running() == "Make Cards"
+    return hairloom_module("long_work").running_label() == "Make Cards"
 
 
 def stage():

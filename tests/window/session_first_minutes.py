@@ -77,7 +77,7 @@ def the_sample_scene_plays():
     own = bpy.context.window.scene
     invoke("sample_scene")
     yield from wait_until(
-        lambda: not hairloom_module("long_work").running(), "the scene does not come"
+        lambda: not hairloom_module("long_work").running_label(), "the scene does not come"
     )
     scene = bpy.context.window.scene
     assert scene != own and len(live().sessions()) == 1

@@ -92,7 +92,7 @@ def the_sample_scene():
     with bpy.context.temp_override(area=viewport(), region=region("WINDOW")):
         bpy.ops.hairloom.sample_scene("EXEC_DEFAULT", plays=False)
     yield from wait_until(
-        lambda: not hairloom_module("long_work").running(), "the scene does not come"
+        lambda: not hairloom_module("long_work").running_label(), "the scene does not come"
     )
     yield from wait_until(lambda: is_drawn(bpy.context.object), "the hair is not drawn")
     yield from panels_beside_it()
@@ -273,7 +273,7 @@ def popup(name, operator, **settings):
     with bpy.context.temp_override(area=viewport(), region=view):
         getattr(bpy.ops.hairloom, operator)("INVOKE_DEFAULT", **settings)
     yield from wait_until(
-        lambda: not hairloom_module("long_work").running(), f"{operator} does not end"
+        lambda: not hairloom_module("long_work").running_label(), f"{operator} does not end"
     )
     yield
     screen = yield from whole_screen(f"part_{name}")

@@ -103,11 +103,11 @@ def esc_ends_the_process_that_reads():
     yield from press("RET")
     yield from wait_until(lambda: number.is_file() and number.read_text(), "no process reads")
     work = hairloom_module("long_work")
-    assert work.running() == "Import Hair Strands"
+    assert work.running_label() == "Import Hair Strands"
     assert not bpy.ops.hairloom.import_strands.poll(), "another import may begin"
     driver.screenshot("reading")
     yield from press("ESC")
-    yield from wait_until(lambda: not work.running(), "Esc does not cancel")
+    yield from wait_until(lambda: not work.running_label(), "Esc does not cancel")
     child = Path("/proc", number.read_text().strip())
     yield from wait_until(lambda: not child.exists(), "the process goes on")
     assert grooms() == {}

@@ -49,8 +49,8 @@ def steps():
     assert "Traceback" not in log.new_output(), "something has raised"
 
 
-def running():
-    return hairloom_module("long_work").running()
+def running_label():
+    return hairloom_module("long_work").running_label()
 
 
 def stage():
@@ -76,11 +76,11 @@ def cancelled(at, label):
     if stage() == at:
         driver.screenshot(label)
     yield from press("ESC")
-    yield from wait_until(lambda: not running(), "Esc does not cancel")
+    yield from wait_until(lambda: not running_label(), "Esc does not cancel")
 
 
 def done():
-    yield from wait_until(lambda: not running(), "it does not end")
+    yield from wait_until(lambda: not running_label(), "it does not end")
     yield from wait_for_hair()
 
 
@@ -109,7 +109,7 @@ def a_hairstyle():
     look_from_front(FAR)
     with bpy.context.temp_override(area=viewport(), region=region("WINDOW")):
         bpy.ops.ed.undo_redo("EXEC_DEFAULT", True)
-    assert not running() and len(objects()) == 3, "Adjust Last Operation gives something else"
+    assert not running_label() and len(objects()) == 3, "Adjust Last Operation gives something else"
     yield from done()
     assert height_in_view(head()) < 0.1, "Adjust Last Operation moves the view"
     yield from undone_and_done_again({})

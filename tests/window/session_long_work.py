@@ -32,8 +32,8 @@ MOVED = 60
 failures: list[str] = []
 
 
-def running():
-    return hairloom_module("long_work").running()
+def running_label():
+    return hairloom_module("long_work").running_label()
 
 
 def progress_text():
@@ -111,7 +111,7 @@ def sort_by_dialog(rays):
     assert asked == {"RUNNING_MODAL"}
     yield
     yield from press("RET")
-    yield from wait_until(lambda: running() == "Sort Hair Cards", "the dialog starts nothing")
+    yield from wait_until(lambda: running_label() == "Sort Hair Cards", "the dialog starts nothing")
 
 
 def from_a_dialog():
@@ -122,10 +122,10 @@ def from_a_dialog():
     for operator in (bpy.ops.hairloom.sort_cards, bpy.ops.hairloom.turntable):
         assert not operator.poll(), "another long work may begin"
     yield from press("ESC")
-    yield from wait_until(lambda: not running(), "Esc does not cancel")
+    yield from wait_until(lambda: not running_label(), "Esc does not cancel")
     assert np.array_equal(order(), before)
     yield from sort_by_dialog(FEW)
-    yield from wait_until(lambda: not running(), "sorting does not end")
+    yield from wait_until(lambda: not running_label(), "sorting does not end")
     after = order()
     assert not np.array_equal(after, before)
     repeated_at_once(bpy.ops.ed.undo_redo)
@@ -141,7 +141,7 @@ def repeated_at_once(repeat):
     """A repeated operator must not run on in the window, since Blender can free it at any time."""
     with bpy.context.temp_override(area=viewport(), region=region("WINDOW")):
         repeat("EXEC_DEFAULT", True)  # with an undo step, as for a click
-    assert not running()
+    assert not running_label()
 
 
 def undone_in_mid_work():
@@ -149,7 +149,7 @@ def undone_in_mid_work():
     after = order()
     yield from sort_by_dialog(MANY)
     bpy.ops.ed.undo()
-    assert not running(), "the work goes on with data that is gone"
+    assert not running_label(), "the work goes on with data that is gone"
     yield
     assert bpy.ops.hairloom.sort_cards.poll()
     bpy.ops.ed.redo()
@@ -161,7 +161,7 @@ def check():
     choose(bpy.data.objects["Hair"])
     with bpy.context.temp_override(area=viewport(), region=region("WINDOW")):
         asked = bpy.ops.hairloom.check_export("INVOKE_DEFAULT", engine="alembic unreal")
-    assert asked == {"RUNNING_MODAL"} and running() == "Check for Export"
+    assert asked == {"RUNNING_MODAL"} and running_label() == "Check for Export"
     assert progress_text() == "Making strands"
 
 
@@ -170,10 +170,10 @@ def into_a_popup():
     seen = hairloom_module("export_check").count
     check()
     yield from press("ESC")
-    yield from wait_until(lambda: not running(), "Esc does not cancel the check")
+    yield from wait_until(lambda: not running_label(), "Esc does not cancel the check")
     assert seen() == 0, "a check that was cancelled goes on"
     check()
-    yield from wait_until(lambda: not running(), "the check does not end")
+    yield from wait_until(lambda: not running_label(), "the check does not end")
     assert seen() == 1, "no popup shows what was read"
     yield
     driver.screenshot("checked")
@@ -187,7 +187,7 @@ def turntable(frames):
     with bpy.context.temp_override(area=viewport(), region=region("WINDOW")):
         bpy.ops.hairloom.turntable("INVOKE_DEFAULT", frames=frames, **SMALL)
     yield from confirm_file_browser(FOLDER)
-    yield from wait_until(lambda: running() == "Turntable", "the file browser starts nothing")
+    yield from wait_until(lambda: running_label() == "Turntable", "the file browser starts nothing")
 
 
 def from_the_file_browser():
@@ -195,10 +195,10 @@ def from_the_file_browser():
     yield 1
     driver.screenshot("turning")
     yield from press("ESC")
-    yield from wait_until(lambda: not running(), "Esc does not cancel the turntable")
+    yield from wait_until(lambda: not running_label(), "Esc does not cancel the turntable")
     assert list(FOLDER.iterdir()) == []
     yield from turntable(3)
-    yield from wait_until(lambda: not running(), "the turntable does not end")
+    yield from wait_until(lambda: not running_label(), "the turntable does not end")
     assert len(list(FOLDER.glob("Hair_000*.png"))) == 3
     yield
 
@@ -223,11 +223,13 @@ def cards_in_motion():
     with bpy.context.temp_override(area=viewport(), region=region("WINDOW")):
         bpy.ops.hairloom.export_cards("INVOKE_DEFAULT", motion="joints")
     yield from confirm_file_browser(FOLDER)
-    yield from wait_until(lambda: running() == "Export Hair Cards", "the browser starts no export")
+    yield from wait_until(
+        lambda: running_label() == "Export Hair Cards", "the browser starts no export"
+    )
     yield from wait_until(lambda: progress_text() == "Fitting joints", "no joints are fitted")
     driver.screenshot("fitting")
     yield from press("ESC")
-    yield from wait_until(lambda: not running(), "Esc does not cancel the export of cards")
+    yield from wait_until(lambda: not running_label(), "Esc does not cancel the export of cards")
     assert [file.name for file in cards.iterdir()] == ["Hair.glb"]
     assert (cards / "Hair.glb").read_bytes() == b"the cards of before"
     head.animation_data_clear()
@@ -240,7 +242,7 @@ def another_file_in_mid_work():
     yield from turntable(2000)
     bpy.ops.wm.open_mainfile(filepath=path)
     yield
-    assert not running() and list(FOLDER.glob(".turntable*")) == []
+    assert not running_label() and list(FOLDER.glob(".turntable*")) == []
     assert bpy.ops.hairloom.turntable.poll()
 
 

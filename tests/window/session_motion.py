@@ -130,7 +130,7 @@ def run_bake():
 
 
 def is_baking():
-    return hairloom_module("long_work").running() == "Bake"
+    return hairloom_module("long_work").running_label() == "Bake"
 
 
 def bake_in_the_window():

@@ -15,8 +15,8 @@ FOLDER = Path(bpy.app.tempdir) / "shown"
 SMALL = {"size": 64, "samples": 1}
 
 
-def running():
-    return hairloom_module("long_work").running()
+def running_label():
+    return hairloom_module("long_work").running_label()
 
 
 def steps():
@@ -43,7 +43,7 @@ def turntable(**options):
 def a_whole_turn():
     """Pictures and a video, while the window stays responsive."""
     turntable(frames=FRAMES)
-    yield from wait_until(lambda: not running(), "the turntable does not end")
+    yield from wait_until(lambda: not running_label(), "the turntable does not end")
     names = sorted(path.name for path in FOLDER.iterdir())
     assert names == ["Hair.mp4", *(f"Hair_000{n}.png" for n in range(1, FRAMES + 1))], names
     clip = bpy.data.movieclips.load(str(FOLDER / "Hair.mp4"))
@@ -58,10 +58,10 @@ def a_cancelled_one():
     turntable(frames=2000)
     third = ".Hair_0001.hl-*/*_0003.png"  # the folder until the last one is there
     yield from wait_until(lambda: any(FOLDER.glob(third)), "no picture is drawn")
-    assert running() == "Turntable"
+    assert running_label() == "Turntable"
     driver.screenshot("turning")
     yield from press("ESC")
-    yield from wait_until(lambda: not running(), "Esc does not cancel the turntable")
+    yield from wait_until(lambda: not running_label(), "Esc does not cancel the turntable")
     assert {path.name: path.stat().st_mtime_ns for path in FOLDER.iterdir()} == before
     assert bpy.ops.hairloom.turntable.poll()
 

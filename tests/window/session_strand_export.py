@@ -26,8 +26,8 @@ FOLDER = Path(bpy.app.tempdir) / "strands"
 failures: list[str] = []
 
 
-def running():
-    return hairloom_module("long_work").running()
+def running_label():
+    return hairloom_module("long_work").running_label()
 
 
 def steps():
@@ -76,17 +76,17 @@ def the_check_stands_beside_the_options():
     driver.screenshot("options")
     yield from confirm_file_browser()
     yield from wait_until((FOLDER / "hair.abc").exists, "nothing is written")
-    assert check.count() == 0 and not running()
+    assert check.count() == 0 and not running_label()
 
 
 def motion_comes_in_steps():
     (FOLDER / "hair.abc").unlink()
     yield from export(frames="own", first=1, last=20)
     yield from confirm_file_browser()
-    yield from wait_until(lambda: bool(running()), "the export does not begin")
+    yield from wait_until(lambda: bool(running_label()), "the export does not begin")
     yield
     driver.screenshot("writing")
-    yield from wait_until(lambda: not running(), "the export does not end")
+    yield from wait_until(lambda: not running_label(), "the export does not end")
     assert (FOLDER / "hair.abc").exists()
     assert bpy.context.scene.frame_current == 1
 
@@ -95,10 +95,10 @@ def escape_leaves_the_old_file():
     (FOLDER / "hair.abc").write_bytes(b"old")
     yield from export(frames="own", first=1, last=4000)
     yield from confirm_file_browser()
-    yield from wait_until(lambda: bool(running()), "the export does not begin")
+    yield from wait_until(lambda: bool(running_label()), "the export does not begin")
     yield
     yield from press("ESC")
-    yield from wait_until(lambda: not running(), "Esc does not cancel the export")
+    yield from wait_until(lambda: not running_label(), "Esc does not cancel the export")
     yield from wait_until(
         lambda: [p.name for p in FOLDER.iterdir()] == ["hair.abc"], "a half-written file is left"
     )
@@ -111,7 +111,9 @@ def the_check_alone():
     check, sidebar = hairloom_module("export_check"), region("UI")
     for y in range(sidebar.y + 6, sidebar.y + sidebar.height, 12):
         yield from click(sidebar.x + sidebar.width // 2, y)
-        yield from wait_until(lambda: running() != "Check for Export", "the check does not end")
+        yield from wait_until(
+            lambda: running_label() != "Check for Export", "the check does not end"
+        )
         if check.count():
             break
         yield from press("ESC")

@@ -94,6 +94,6 @@ def preview_traces() -> dict[str, Any]:
         "previews": [each.name for each in hairloom_module("previews").simulations()],
         "draw handlers": hairloom_module("overlay")._overlay.handles,
         "drawn": sorted(hairloom_module("overlay").drawn_uids()),
-        "ticks": hairloom_module("latest_job").is_watched("play"),
-        "work": hairloom_module("long_work").running(),
+        "ticks": hairloom_module("latest_job").is_scheduled("play"),
+        "work": hairloom_module("long_work").running_label(),
     }

@@ -206,7 +206,7 @@ def drag(start: tuple[int, int], end: tuple[int, int], count: int = 8) -> Iterat
 def wait_until_idle() -> Iterator[int]:
     """Wait until no long work runs and the hair is made."""
     yield from wait_until(
-        lambda: not hairloom_module("long_work").running(), "the work does not end"
+        lambda: not hairloom_module("long_work").running_label(), "the work does not end"
     )
     yield from wait_for_hair()
     yield

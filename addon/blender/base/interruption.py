@@ -9,9 +9,9 @@ from contextlib import contextmanager
 from types import FrameType
 
 #: SIGBREAK is what a farm sends on Windows.
-_NAMES = ("SIGINT", "SIGTERM", "SIGBREAK")
+_SIGNAL_NAMES = ("SIGINT", "SIGTERM", "SIGBREAK")
 
-_asked: list[int] = []
+_received: list[int] = []
 
 
 class Interrupted(KeyboardInterrupt):
@@ -40,13 +40,13 @@ def interruptible() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    _asked.clear()
-    numbers = [getattr(signal, name) for name in _NAMES if hasattr(signal, name)]
-    before = {number: signal.signal(number, _stop) for number in numbers}
+    _received.clear()
+    numbers = [getattr(signal, name) for name in _SIGNAL_NAMES if hasattr(signal, name)]
+    before = {number: signal.signal(number, _on_signal) for number in numbers}
     try:
         yield
     except Exception:
-        stop_if_asked()  # Blender raises another error for an interrupted operator
+        raise_if_interrupted()  # Blender raises another error for an interrupted operator
         raise
     finally:
         for number, handler in before.items():
@@ -54,16 +54,16 @@ def interruptible() -> Iterator[None]:
             signal.signal(number, signal.SIG_DFL if handler is None else handler)
 
 
-def stop_if_asked() -> None:
+def raise_if_interrupted() -> None:
     """Call between the steps of long work: Blender swallows exceptions inside its own handlers.
 
     Raises:
         Interrupted: a signal has come.
     """
-    if _asked:
-        raise Interrupted(_asked[0])
+    if _received:
+        raise Interrupted(_received[0])
 
 
-def _stop(number: int, _frame: FrameType | None) -> None:
-    _asked.append(number)
+def _on_signal(number: int, _frame: FrameType | None) -> None:
+    _received.append(number)
     raise Interrupted(number)

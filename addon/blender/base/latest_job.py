@@ -7,7 +7,7 @@
     cancelled                    the result is dropped; the thread ends by itself
     a file is opened             all are cancelled, as Blender drops the timer
 
-All jobs share one timer of Blender's: `watch` has a step taken in the main thread.
+All jobs share one timer of Blender's, which runs the steps added by `schedule` in the main thread.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from .redraw import redraw_panels
 from .thread_work import ThreadWork
 
 #: [s] between checks of a running job, and of one that waits for the main thread.
-ARRIVAL_TIME, SERVING_PAUSE = 0.05, 0.01
+POLL_INTERVAL, STEP_INTERVAL = 0.05, 0.01
 
 type Step = Callable[[], float | None]
 type Work[Result] = Callable[[ThreadWork[Result]], Result]
@@ -37,38 +37,38 @@ def is_blocking() -> bool:
     return bool(bpy.app.background)
 
 
-def watch(key: Hashable, step: Step) -> None:
-    """Have this step taken again and again, instead of the one that has this key.
+def schedule(key: Hashable, step: Step) -> None:
+    """Run this step repeatedly, instead of the one that has this key.
 
     Args:
-        step: returns the seconds until it is to be taken again; None: it was the last time.
+        step: returns the seconds until its next run; None: this was the last one.
     """
     _steps[key] = step
-    if not bpy.app.timers.is_registered(take_steps):
-        bpy.app.timers.register(take_steps, first_interval=ARRIVAL_TIME)
+    if not bpy.app.timers.is_registered(run_steps):
+        bpy.app.timers.register(run_steps, first_interval=POLL_INTERVAL)
 
 
-def is_watched(key: Hashable) -> bool:
-    """Whether a step with this key is still taken."""
+def is_scheduled(key: Hashable) -> bool:
+    """Whether a step with this key is still run."""
     return key in _steps
 
 
-def unwatch(key: Hashable) -> None:
+def unschedule(key: Hashable) -> None:
     _steps.pop(key, None)
 
 
-def unwatch_all() -> None:
+def unschedule_all() -> None:
     """Remove all steps and the timer, and cancel the jobs that rely on a step: without it, they
     could never begin again."""
     for key in tuple(_steps):
         if isinstance(key, LatestJob):
             key.cancel()
     _steps.clear()
-    if bpy.app.timers.is_registered(take_steps):
-        bpy.app.timers.unregister(take_steps)
+    if bpy.app.timers.is_registered(run_steps):
+        bpy.app.timers.unregister(run_steps)
 
 
-def take_steps() -> float | None:
+def run_steps() -> float | None:
     """The function of the timer. A step that fails is reported and removed; the others go on."""
     pauses = []
     for key, step in tuple(_steps.items()):
@@ -83,8 +83,8 @@ def take_steps() -> float | None:
             pauses.append(pause)
         elif _steps.get(key) is step:
             del _steps[key]
-    # steps that were added meanwhile rely on this timer, which was registered
-    return min(pauses, default=ARRIVAL_TIME) if _steps else None
+    # steps that were scheduled meanwhile rely on this timer, which was registered
+    return min(pauses, default=POLL_INTERVAL) if _steps else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,36 +98,36 @@ class LatestJob[Key, Result]:
 
     Args:
         name: of its threads.
-        arrived: called in the main thread when the work is done, repeatedly until it is taken.
+        on_result: called in the main thread when the work is done, repeatedly until it is taken.
         is_same: whether two keys give the same result.
     """
 
     def __init__(
         self,
         name: str,
-        arrived: Callable[[], None],
+        on_result: Callable[[], None],
         is_same: Callable[[Key, Key], bool] = operator.eq,
     ) -> None:
-        self._name, self._arrived, self._is_same = name, arrived, is_same
-        self._wanted: tuple[Key, Callable[[], Work[Result]]] | None = None
+        self._name, self._on_result, self._is_same = name, on_result, is_same
+        self._latest: tuple[Key, Callable[[], Work[Result]]] | None = None
         self._running: _Running[Key, Result] | None = None
         self._shown_stage = ""
 
-    def want(self, key: Key, begin: Callable[[], Work[Result]]) -> None:
+    def request(self, key: Key, prepare: Callable[[], Work[Result]]) -> None:
         """Request the result of this key.
 
         Args:
-            begin: called in the main thread when this request's turn has come, so that it can read
-                its inputs then; returns the work.
+            prepare: called in the main thread when this request's turn has come, to read its
+                inputs; returns the work.
         """
-        if not self.wants(key):
-            self._wanted = key, begin
+        if not self.is_latest(key):
+            self._latest = key, prepare
             if self._running is None:
                 self._begin()
 
-    def wants(self, key: Key) -> bool:
+    def is_latest(self, key: Key) -> bool:
         """Whether this was requested last."""
-        return self._wanted is not None and self._is_same(self._wanted[0], key)
+        return self._latest is not None and self._is_same(self._latest[0], key)
 
     @property
     def is_pending(self) -> bool:
@@ -140,7 +140,7 @@ class LatestJob[Key, Result]:
         return "" if self._running is None else self._running.work.stage
 
     @property
-    def has_arrived(self) -> bool:
+    def has_result(self) -> bool:
         """Whether `take` need not wait."""
         return self._running is not None and self._running.work.is_done
 
@@ -155,7 +155,7 @@ class LatestJob[Key, Result]:
         """
         running, self._running = self._running, None
         assert running is not None, "nothing is being made"
-        is_latest = self.wants(running.key)
+        is_latest = self.is_latest(running.key)
         try:
             running.work.wait()
             return running.work.result()
@@ -172,26 +172,26 @@ class LatestJob[Key, Result]:
     def cancel(self) -> None:
         """Drop the request and the running work."""
         if self._running is not None:
-            self._running.work.give_up()
-        self._running = self._wanted = None
-        unwatch(self)
+            self._running.work.cancel()
+        self._running = self._latest = None
+        unschedule(self)
 
     def _begin(self) -> None:
-        assert self._wanted is not None
-        key, begin = self._wanted
+        assert self._latest is not None
+        key, prepare = self._latest
         try:
-            self._running = _Running(key, ThreadWork(begin(), self._name))
+            self._running = _Running(key, ThreadWork(prepare(), self._name))
         except BaseException:
-            self._wanted = None  # so that the same can be wanted again
+            self._latest = None  # so that the same can be requested again
             raise
-        watch(self, self._step)
+        schedule(self, self._step)
 
     def _step(self) -> float | None:
         if self._running is not None and self._running.work.run_main_thread_steps():
-            self._arrived()
+            self._on_result()
         if self.stage != self._shown_stage:
             self._shown_stage = self.stage
             redraw_panels()
         if self._running is None:
             return None
-        return SERVING_PAUSE if self._running.work.wants_main_thread else ARRIVAL_TIME
+        return STEP_INTERVAL if self._running.work.wants_main_thread else POLL_INTERVAL

@@ -64,11 +64,11 @@ def show_status(text: str | None) -> None:
                 workspace.status_text_set(text)
 
 
-def soon(timer: Callable[[], None], pause: float) -> None:
-    """Call a timer once, this long [s] after the last call of `soon`."""
-    if bpy.app.timers.is_registered(timer):
-        bpy.app.timers.unregister(timer)
-    bpy.app.timers.register(timer, first_interval=pause)
+def debounce(callback: Callable[[], None], pause: float) -> None:
+    """Call a function once, this long [s] after the last call of `debounce` with it."""
+    if bpy.app.timers.is_registered(callback):
+        bpy.app.timers.unregister(callback)
+    bpy.app.timers.register(callback, first_interval=pause)
 
 
 def _redraw(places: set[tuple[str, str]]) -> None:

@@ -20,7 +20,7 @@ from ...errors import HairloomError
 from ...exchange.files.atomic import write_text_atomic
 from .gpu_choices import peak_memory
 from .gpu_context import gpu_in_use
-from .interruption import stop_if_asked
+from .interruption import raise_if_interrupted
 
 _MANIFEST = Path(__file__).parents[3] / "blender_manifest.toml"
 #: Styles of progress lines: for a reader, or for a runner of Open Job Description.
@@ -47,7 +47,7 @@ class Report:
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
         """Time the block as a stage of this name."""
-        stop_if_asked()
+        raise_if_interrupted()
         if self._style == "openjd" and name != self._stage:
             print(f"openjd_status: {name}", flush=True)
         self._stage = name
@@ -120,7 +120,7 @@ class Progress:
         self._name, self._total, self._style, self._shown = name, total, style, -1
 
     def show(self, done: int) -> None:
-        stop_if_asked()
+        raise_if_interrupted()
         parts = 100 if self._style == "openjd" else 10
         part = done * parts // max(self._total, 1)
         if self._style == "openjd":

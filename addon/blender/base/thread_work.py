@@ -1,4 +1,4 @@
-"""Background work in a thread; the main thread takes the steps that only it may take."""
+"""Background work in a thread; the main thread runs the steps that only it may run."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
-#: Time [s] that the main thread spends on a thread's steps at once; at least one step is taken.
-SERVING_TIME = 0.05
+#: Time [s] that the main thread spends on a thread's steps at once; it runs at least one.
+MAIN_THREAD_TIME = 0.05
 
 
-class GivenUpError(Exception):
-    """The work was given up: its result is not needed."""
+class WorkCancelledError(Exception):
+    """The work was cancelled: its result is not needed."""
 
 
 @dataclass
@@ -23,7 +23,7 @@ class _Request:
     """Steps for the main thread, and the future for their result."""
 
     steps: Generator[None, None, Any]
-    answer: Future[Any] = field(default_factory=Future)
+    future: Future[Any] = field(default_factory=Future)
 
 
 class ThreadWork[T]:
@@ -40,8 +40,8 @@ class ThreadWork[T]:
         self._work = work
         self._lock = threading.Lock()
         self._request: _Request | None = None
-        self._is_given_up = self._is_committed = False
-        self._end: Callable[[], None] | None = None
+        self._is_cancelled = self._is_committed = False
+        self._kill: Callable[[], None] | None = None
         self._result: list[T] = []
         self._error: BaseException | None = None
         # a daemon, so that Blender can quit at any time
@@ -52,59 +52,59 @@ class ThreadWork[T]:
         """In the thread: report the stage that begins.
 
         Raises:
-            GivenUpError: the work was given up.
+            WorkCancelledError: the work was cancelled.
         """
-        if self._is_given_up:
-            raise GivenUpError
+        if self._is_cancelled:
+            raise WorkCancelledError
         self.stage = stage
 
     def on_main_thread[R](self, steps: Generator[None, None, R]) -> R:
-        """In the thread: have the main thread take these steps, and return their result.
+        """In the thread: have the main thread run these steps, and return their result.
 
         Raises:
-            GivenUpError: the work was given up. And whatever a step raises.
+            WorkCancelledError: the work was cancelled. And whatever a step raises.
         """
         request = _Request(steps)
         with self._lock:
-            if self._is_given_up:
-                raise GivenUpError
+            if self._is_cancelled:
+                raise WorkCancelledError
             self._request = request
-        result: R = request.answer.result()
+        result: R = request.future.result()
         return result
 
     @contextmanager
-    def committing(self) -> Iterator[None]:
+    def commit_context(self) -> Iterator[None]:
         """In the thread, for `exchange.files.file_moves.commit_context`: files are moved to their
-        places, and `give_up` waits until all are.
+        places, and `cancel` waits until all are.
 
         Raises:
-            GivenUpError: the work was given up before.
+            WorkCancelledError: the work was cancelled before.
         """
         with self._lock:
-            if self._is_given_up:
-                raise GivenUpError
+            if self._is_cancelled:
+                raise WorkCancelledError
             self._is_committed = True
             yield
 
     @contextmanager
-    def ending(self, end: Callable[[], None]) -> Iterator[None]:
-        """In the thread, for `exchange.files.child_process.kill_context`: `give_up` also ends the
+    def kill_context(self, kill: Callable[[], None]) -> Iterator[None]:
+        """In the thread, for `exchange.files.child_process.kill_context`: `cancel` also kills the
         child process.
 
         Raises:
-            GivenUpError: the work was given up.
+            WorkCancelledError: the work was cancelled.
         """
         with self._lock:
-            if self._is_given_up:
-                raise GivenUpError
-            self._end = end
+            if self._is_cancelled:
+                raise WorkCancelledError
+            self._kill = kill
         try:
             yield
         finally:
             with self._lock:
-                self._end = None
-        if self._is_given_up:
-            raise GivenUpError
+                self._kill = None
+        if self._is_cancelled:
+            raise WorkCancelledError
 
     @property
     def is_committed(self) -> bool:
@@ -116,24 +116,24 @@ class ThreadWork[T]:
         """Whether the thread waits for `run_main_thread_steps`."""
         return self._request is not None
 
-    def run_main_thread_steps(self, duration: float = SERVING_TIME) -> bool:
-        """In the main thread: take the thread's steps for about this long [s].
+    def run_main_thread_steps(self, duration: float = MAIN_THREAD_TIME) -> bool:
+        """In the main thread: run the thread's steps for about this long [s].
 
         Returns:
             whether the work is done.
         """
-        request, end = self._request, time.perf_counter() + duration
+        request, deadline = self._request, time.perf_counter() + duration
         if request is not None:
             try:
                 next(request.steps)
-                while time.perf_counter() < end:
+                while time.perf_counter() < deadline:
                     next(request.steps)
             except StopIteration as last:
                 self._request = None
-                request.answer.set_result(last.value)
+                request.future.set_result(last.value)
             except Exception as error:  # raised again in the thread, which reports it
                 self._request = None
-                request.answer.set_exception(error)
+                request.future.set_exception(error)
         return not self._thread.is_alive()
 
     @property
@@ -149,23 +149,23 @@ class ThreadWork[T]:
         """The result of the work, once it is done.
 
         Raises:
-            GivenUpError: it was given up. And whatever the work has raised.
+            WorkCancelledError: it was cancelled. And whatever the work has raised.
         """
         if self._error is not None:
             raise self._error
         assert self._result, "not done yet"
         return self._result[0]
 
-    def give_up(self) -> None:
+    def cancel(self) -> None:
         """In the main thread: end the work as soon as possible and drop its result."""
         with self._lock:
-            self._is_given_up = True
+            self._is_cancelled = True
             request, self._request = self._request, None
-            if self._end is not None:
-                self._end()
+            if self._kill is not None:
+                self._kill()
         if request is not None:
             request.steps.close()  # here, as its locals may hold objects only this thread may free
-            request.answer.set_exception(GivenUpError())
+            request.future.set_exception(WorkCancelledError())
 
     def _run(self) -> None:
         try:

@@ -229,7 +229,7 @@ def build_in_thread(work: ThreadWork[Any], inputs: CardInputs) -> MappedCards:
 
     Raises:
         HairloomError: no cards can be made.
-        GivenUpError: the work was given up.
+        WorkCancelledError: the work was cancelled.
     """
 
     def draw(flat: FlatStrands, size: int) -> AtlasMaps:
@@ -412,7 +412,7 @@ class BuiltCards:
 
         Raises:
             HairloomError: no cards can be made.
-            GivenUpError: the work was given up.
+            WorkCancelledError: the work was cancelled.
         """
         built = cls.of(inputs.rig, build_in_thread(work, inputs))
         work.report("Textures")
@@ -434,7 +434,7 @@ def _upload_textures(work: ThreadWork[Any], cards: CardSnapshot) -> CardTextures
     """In the thread: upload textures, so that no draw has to; None without a GPU.
 
     Raises:
-        GivenUpError: the work was given up.
+        WorkCancelledError: the work was cancelled.
     """
     packed = list(packed_textures(cards.textures, cards.mesh.atlas))
 

@@ -71,15 +71,15 @@ class ShownCards:
     warnings: about the cards, or why there are none.
 
     Args:
-        hair: finds the object. arrived: called when `collect` has cards to take over.
+        hair: finds the object. on_result: called when `collect` has cards to take over.
     """
 
     def __init__(
-        self, hair: Callable[[], bpy.types.Object], arrived: Callable[[], None] = lambda: None
+        self, hair: Callable[[], bpy.types.Object], on_result: Callable[[], None] = lambda: None
     ) -> None:
         self._hair = hair
         self._job = LatestJob[tuple[Rig, GroomSettings], BuiltCards](
-            "hairloom cards", arrived, _same
+            "hairloom cards", on_result, _same
         )
         self._built: BuiltCards | None = None
         self._wanted: tuple[Rig, GroomSettings] | None = None
@@ -101,9 +101,9 @@ class ShownCards:
         return self._job.stage
 
     @property
-    def has_arrived(self) -> bool:
+    def has_result(self) -> bool:
         """Whether `collect` has cards to take over."""
-        return self._job.has_arrived
+        return self._job.has_result
 
     @property
     def counts(self) -> tuple[int, int, int]:
@@ -122,7 +122,7 @@ class ShownCards:
         line = counts_line(cards, triangles, self._built.shell_layers)
         return line, order_line(self._built.wrong_fraction)
 
-    def want(self, rig: Rig, settings: GroomSettings) -> None:
+    def request(self, rig: Rig, settings: GroomSettings) -> None:
         """Show cards of this rig with these settings from now on; the same are not built twice."""
         if self._wanted is None or not _same(self._wanted, (rig, settings)):
             self._wanted = rig, settings
@@ -200,7 +200,7 @@ class ShownCards:
         if latest_job.is_blocking():
             self._take(lambda: BuiltCards.build(self._read(rig, settings, occluders)))
         else:
-            self._job.want(self._wanted, lambda: self._begun(rig, settings, occluders))
+            self._job.request(self._wanted, lambda: self._begun(rig, settings, occluders))
 
     def _begun(
         self, rig: Rig, settings: GroomSettings, occluders: Occluders | None

@@ -138,9 +138,9 @@ class _CachedGroom:
         elif self.was_built_from(inputs):
             self.cancel()
         else:
-            if not self._job.wants(inputs):
+            if not self._job.is_latest(inputs):
                 self._error = None
-                self._job.want(inputs, lambda: lambda _: make())
+                self._job.request(inputs, lambda: lambda _: make())
             if self._error is not None:
                 raise _copied_error(self._error) from self._error
         return built

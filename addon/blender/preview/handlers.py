@@ -10,7 +10,7 @@ from bpy.app.handlers import persistent
 
 from ..bakes import baked_copy, playback
 from ..base import event_handlers, suspension
-from ..base.latest_job import unwatch_all
+from ..base.latest_job import unschedule_all
 from ..base.redraw import show_status
 from ..cards.made_objects import store_object_names, store_session_uids
 from ..properties import changed, library_overrides
@@ -25,8 +25,8 @@ from .previews import previews
 def on_load_pre(*_: Any) -> None:
     registry.forget_all()
     mesh_materials.clear_cache()
-    unwatch_all()  # Blender drops the timer itself
-    show_status(None)  # Play's ticks, which would have removed it, are unwatched too
+    unschedule_all()  # Blender drops the timer itself
+    show_status(None)  # Play's ticks, which would have removed it, are unscheduled too
 
 
 @persistent

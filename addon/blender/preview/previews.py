@@ -19,7 +19,7 @@ from ..bakes.bake_settings import folder_of
 from ..bakes.simulation import Simulation
 from ..base import latest_job
 from ..base.gpu_context import free_soon, is_interrupted
-from ..base.latest_job import ARRIVAL_TIME, unwatch, watch
+from ..base.latest_job import POLL_INTERVAL, schedule, unschedule
 from ..base.originals import (
     all_depsgraphs,
     refresh_views,
@@ -72,7 +72,11 @@ def start(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Session:
     """
     baked = baked_rig_for(hair, depsgraph.scene)
     session = Session(
-        hair, depsgraph, baked=baked, blocking=latest_job.is_blocking(), arrived=_take_finished_work
+        hair,
+        depsgraph,
+        baked=baked,
+        blocking=latest_job.is_blocking(),
+        on_result=_take_finished_work,
     )
     overlay.retry()
     add(session, depsgraph)
@@ -165,7 +169,7 @@ def _forget(uid: int) -> None:
     """`stop` for an object that is about to be freed: does not touch it."""
     preview = previews.pop(uid, None)
     previews.built_cards.forget()
-    unwatch((uid, "lines"))
+    unschedule((uid, "lines"))
     if preview is not None:
         preview.session.forget()
     overlay.stop_drawing(uid)
@@ -411,7 +415,7 @@ def publish(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
     overlay.show(session.uid, overlay.read_drawing(session, hair, depsgraph, note))
     is_missing_lines = session.obstacles is None and "colliders" in hair.hairloom.shown_overlays
     if is_missing_lines and not fields.are_ready():
-        watch((session.uid, "lines"), partial(_show_lines, preview))
+        schedule((session.uid, "lines"), partial(_show_lines, preview))
     refresh_panels()
     # our strands replace Blender's once they are made, in object mode and under a combing brush;
     # an overlay that has failed shows nothing
@@ -425,7 +429,7 @@ def publish(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
 def _show_lines(preview: Preview) -> float | None:
     """A step of `latest_job`: show the lines of colliders once they are made."""
     if not fields.are_ready():
-        return ARRIVAL_TIME
+        return POLL_INTERVAL
     attempt(preview, bpy.context.evaluated_depsgraph_get(), lambda: None)
     redraw_panels()
     return None
@@ -439,10 +443,10 @@ def _take_finished_work(session: Session) -> None:
     depsgraph = _shown_depsgraph(preview)
     if depsgraph is None:
         return  # called again until some window shows it
-    if session.has_arrived:
+    if session.has_result:
         attempt(preview, depsgraph, partial(_take_built, preview, session, depsgraph))
         refresh_views()  # to hide Blender's own strands, shown until now
-    elif session.cards.has_arrived:
+    elif session.cards.has_result:
         attempt(preview, depsgraph, session.take_cards)
     redraw_panels()
 

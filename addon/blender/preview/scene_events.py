@@ -21,7 +21,7 @@ from ...shading.settings import ShadingSettings
 from ..bakes import playback
 from ..base import latest_job
 from ..base.originals import refresh_views
-from ..base.redraw import redraw_panels, soon
+from ..base.redraw import debounce, redraw_panels
 from ..cards.made_objects import card_objects
 from ..cards.occluders import occluder_objects
 from ..sessions.session import Session
@@ -156,7 +156,7 @@ def _follow_frame(preview: Preview, depsgraph: bpy.types.Depsgraph, light_change
 def _refine_soon(session: Session) -> None:
     """Refine the shading once the slider rests; every move delays that."""
     if session.is_coarse:
-        soon(_refine, REFINING_TIME)
+        debounce(_refine, REFINING_TIME)
 
 
 def _refine() -> None:
@@ -237,7 +237,7 @@ def clear() -> None:
     """Leave nothing behind: no preview, no timer, no notice."""
     registry.end()
     view_transform.clear_tables()
-    latest_job.unwatch_all()
+    latest_job.unschedule_all()
     for timer in (_read_again, _refine, follow_undo):
         if bpy.app.timers.is_registered(timer):
             bpy.app.timers.unregister(timer)

@@ -150,9 +150,9 @@ def _request_render(uid: int, key: Hashable, plain: tuple[float, float, float]) 
         work = partial(_render_in_thread, folder, world.name, plain, _key(world))
         return lambda _: work()
 
-    if _job.wants(key) and not _job.is_pending:
+    if _job.is_latest(key) and not _job.is_pending:
         _job.cancel()  # its result has dropped out of the cache
-    _job.want(key, begin)
+    _job.request(key, begin)
 
 
 def _cached(key: Hashable, make: Callable[[], _WorldLight]) -> _WorldLight:

@@ -95,7 +95,7 @@ class FabricJob:
         return self._fabric
 
     def cancel(self) -> None:
-        """Give up the fabric that is being made."""
+        """Cancel the fabric that is being made."""
         if self._work is not None:
-            self._work.give_up()
+            self._work.cancel()
             self._mesh = self._work = None

@@ -72,7 +72,7 @@ class Session:
         baked: the rig of a bake of this groom, to be the same to the bit.
         is_drawn: False leaves out what only drawing needs.
         blocking: False: the hair is made in a thread, with a few strands as its placeholder.
-        arrived: called with this session when hair or cards that were made in a thread can be
+        on_result: called with this session when hair or cards that were made in a thread can be
             taken over.
 
     Raises:
@@ -90,16 +90,16 @@ class Session:
         baked: BakedRig | None = None,
         is_drawn: bool = True,
         blocking: bool = True,
-        arrived: Callable[[Session], None] = lambda session: None,
+        on_result: Callable[[Session], None] = lambda session: None,
     ) -> None:
         self._source = GroomSource(hair, depsgraph)
         self._source.use_bake(baked)
         self.hair, self.head = self._source.hair, self._source.head
         self.uid = self.hair.handle.uid
         self._is_drawn = is_drawn
-        self._job = LatestJob[BuildRequest, _Built]("hair", partial(arrived, self))
+        self._job = LatestJob[BuildRequest, _Built]("hair", partial(on_result, self))
         # full light of the hair that was made last; does not run while other hair is made
-        self._light_job = LatestJob[PreparedGroom, PreparedGroom]("light", partial(arrived, self))
+        self._light_job = LatestJob[PreparedGroom, PreparedGroom]("light", partial(on_result, self))
         self.times = FrameTimes()
         self.obstacles: Obstacles | None = None
         self.is_playing = False
@@ -118,7 +118,7 @@ class Session:
         self.card_figures: CardFigures | None = None
         self.are_figures_current = False
         self.picture = GroomPicture(
-            self.hair.resolve, is_drawn=is_drawn, arrived=partial(arrived, self)
+            self.hair.resolve, is_drawn=is_drawn, on_result=partial(on_result, self)
         )
         self.cards = self.picture.cards
         request = self._source.request
@@ -182,9 +182,9 @@ class Session:
         return self._job.stage or self._light_job.stage
 
     @property
-    def has_arrived(self) -> bool:
+    def has_result(self) -> bool:
         """Whether finished hair or light can be taken over."""
-        return self._job.has_arrived or self._light_job.has_arrived
+        return self._job.has_result or self._light_job.has_result
 
     def has_changed_head(self) -> bool:
         """Whether the artist has set another surface since the session began."""
@@ -249,7 +249,7 @@ class Session:
             is_on_gpu = self.solver.device == "compute"
             return partial(_build_in_thread, request, self._made, self._play_state(), is_on_gpu)
 
-        self._job.want(request, begin)
+        self._job.request(request, begin)
 
     def _play_state(self) -> _PlayState | None:
         """The state from which hair that is being made will go on; None: it will start at rest."""
@@ -325,7 +325,7 @@ class Session:
         else:
             self.rest(depsgraph)
         if groom.light is not None and groom.light.is_quick and not self._job.is_pending:
-            self._light_job.want(groom, lambda: partial(_light_in_thread, groom=groom))
+            self._light_job.request(groom, lambda: partial(_light_in_thread, groom=groom))
 
     def take_made(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Show the hair or the light that is being made; waits for it.

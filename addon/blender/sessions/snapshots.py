@@ -95,7 +95,7 @@ class GroomPicture:
     Args:
         hair: returns the object.
         is_drawn: False leaves out what only drawing needs.
-        arrived: see `ShownCards`.
+        on_result: see `ShownCards`.
     """
 
     snapshot: Snapshot
@@ -107,7 +107,7 @@ class GroomPicture:
         hair: Callable[[], bpy.types.Object],
         *,
         is_drawn: bool,
-        arrived: Callable[[], None],
+        on_result: Callable[[], None],
     ) -> None:
         self._is_drawn = is_drawn
         self._ball = HairBall()
@@ -115,7 +115,7 @@ class GroomPicture:
         self._colors: PaintedColor | None = None
         self._card_rigs: tuple[Rig, Rig] | None = None
         self._light_warnings: tuple[str, ...] = ()
-        self.cards = ShownCards(hair, arrived)
+        self.cards = ShownCards(hair, on_result)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -181,7 +181,7 @@ class GroomPicture:
             self.cards.forget()
             return self.snapshot.cards is not None
         self._card_rigs = rig, _with_color(rig, self.snapshot.color)
-        self.cards.want(self._card_rigs[1], settings)
+        self.cards.request(self._card_rigs[1], settings)
         return True
 
     @property

@@ -148,7 +148,9 @@ def read_in_thread(
             return error
 
     def work(thread: ThreadWork[list[FileStrands | HairloomError]]) -> Any:
-        child_process.kill_context.set(thread.ending)  # a context variable of this thread alone
+        child_process.kill_context.set(
+            thread.kill_context
+        )  # a context variable of this thread alone
         found = []
         for number, path in enumerate(paths, 1):
             which = f", {number} of {len(paths)}" if len(paths) > 1 else ""

@@ -153,7 +153,7 @@ class StrandExport:
         """`write` in a thread, which has the main thread produce each frame of `positions`."""
 
         def work(thread: ThreadWork[Outcome]) -> Outcome:
-            commit_context.set(thread.committing)  # a context variable of this thread alone
+            commit_context.set(thread.commit_context)  # a context variable of this thread alone
             return self.write(path, _positions_from_main_thread(thread, positions))
 
         return ThreadWork(work, "Hairloom strands")

@@ -21,7 +21,7 @@ from ...render.soft_picture import SoftPicture
 from ...render.strand_layers import is_software
 from ...render.strand_pass import StrandPass
 from ...shading.lights import Light
-from ..base.redraw import redraw_view, soon
+from ..base.redraw import debounce, redraw_view
 from .views import View, known_views
 
 #: time [s] without a change before a view gets samples; and the longest time between draws of a
@@ -58,7 +58,7 @@ def schedule_samples(view: View) -> None:
     now = time.monotonic()
     pause, view.changed_at = now - view.changed_at, now
     view.wants_samples = True
-    soon(
+    debounce(
         _request_sample, max(_REST_SECONDS, 2.0 * pause) if pause < _SLOW_SECONDS else _REST_SECONDS
     )
 
@@ -74,7 +74,7 @@ def discard_samples(view: View) -> None:
 def resume_timer(view: View) -> None:
     """After a view has shown its kept picture, start the timer if it waits for samples."""
     if view.wants_samples and not bpy.app.timers.is_registered(_request_sample):
-        soon(_request_sample, 0.0)
+        debounce(_request_sample, 0.0)
 
 
 def stop() -> None:
@@ -92,7 +92,7 @@ def takes_sample(view: View) -> bool:
     if gpu_memory.exceeds_budget(_softening.picture.missing_bytes()):
         view.wants_samples = False
         _stop()
-        soon(_request_sample, 0.0)
+        debounce(_request_sample, 0.0)
     return view.wants_samples
 
 
@@ -141,7 +141,7 @@ def was_sampled(
     if is_as_shown or count >= samples:
         view.wants_samples, view.has_all_samples = view.may_be_outdated, True
         _stop()
-    soon(_request_sample, 0.0)
+    debounce(_request_sample, 0.0)
 
 
 def _stop() -> None:
@@ -166,7 +166,7 @@ def _request_sample() -> None:
     _softening.view, _softening.is_due = view, True
     if not redraw_view(view.address):
         _give_up(view)  # no window shows it
-        soon(_request_sample, 0.0)
+        debounce(_request_sample, 0.0)
 
 
 def _give_up(view: View) -> None:

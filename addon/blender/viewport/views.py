@@ -19,7 +19,7 @@ import gpu
 from ...render.cached_picture import CachedPicture, are_same_marks
 from ...render.camera import Camera
 from ...render.strand_pass import Statistics, StrandPass
-from ..base.redraw import redraw_views, soon
+from ..base.redraw import debounce, redraw_views
 
 #: types of views whose picture changes only with the scene, the view and its settings
 STEADY_VIEW_TYPES = ("SOLID", "WIREFRAME")
@@ -162,14 +162,14 @@ def record_reshown(view: View, shading: Any) -> None:
     )
     if shading.type not in STEADY_VIEW_TYPES and is_row:
         view.needs_redraw = True
-        soon(_redraw_strands, _REDRAW_PAUSE)
+        debounce(_redraw_strands, _REDRAW_PAUSE)
 
 
 def record_drawn(view: View) -> None:
     """Record that the strands of a view were drawn."""
     view.needs_redraw, view.reshown_count, view.drawn_at = False, 0, time.monotonic()
     if view.is_outdated:
-        soon(_catch_up, _CATCH_UP_PAUSE)
+        debounce(_catch_up, _CATCH_UP_PAUSE)
 
 
 def _redraw_strands() -> None:
