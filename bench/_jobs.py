@@ -28,7 +28,7 @@ def silent() -> dict[str, float]:
         longest: list[float] = []
         # as in a window, where nothing blocks on a thread
         latest_job.is_blocking = lambda: False
-        long_work._run_at_once = lambda steps, to=longest: to.append(_longest(steps))
+        long_work._run_blocking = lambda steps, to=longest: to.append(_longest(steps))
         job()
         found[f"silent_{name}_seconds"] = max(longest)
         while any(not session.is_made for session in previews.sessions()):

@@ -416,7 +416,7 @@ def _another(
 def _no_gpu(_at: int, _path: Path, _verb: Any, _random: Any) -> Iterator[None]:
     nothing = {"backend": "", "renderer": "", "driver": ""}
     with (
-        mock.patch.object(gpu_context, "gpu_in_use", lambda: nothing),
+        mock.patch.object(gpu_context, "gpu_info", lambda: nothing),
         mock.patch.object(gpu_context, "can_draw", lambda: False),
     ):
         yield

@@ -17,7 +17,7 @@ ENDING_WAITS = {
     "blender/preview/previews.py:finish": "each turn takes one result; another scene is refused",
     "blender/sessions/session.py:finish": "each turn takes one result, of which none is begun here",
     "ui/long_work.py:threaded": "gives back at every turn, and Esc closes it",
-    "ui/strand_export.py:_in_motion": "gives back at every turn, and Esc closes it",
+    "ui/strand_export.py:_write_motion": "gives back at every turn, and Esc closes it",
 }
 
 

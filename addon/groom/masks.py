@@ -31,7 +31,9 @@ _ALONG = 17
 
 def mask_parameters(settings: type[Settings]) -> dict[str, str]:
     """Parameter that may be painted -> parameter that names its mask."""
-    return {each.of: each.name for each in settings.parameters() if each.kind == "mask"}
+    return {
+        each.masked_parameter: each.name for each in settings.parameters() if each.kind == "mask"
+    }
 
 
 def mask_names(settings: Settings) -> dict[str, str]:

@@ -36,9 +36,9 @@ def parameter_table(settings: type[Settings]) -> str:
 def _row(parameter: Parameter) -> str:
     cells = [
         f"**{parameter.label}** `{parameter.name}`",
-        _shown(parameter, parameter.default),
-        _span(parameter, parameter.soft_range),
-        _allowed(parameter),
+        _value_text(parameter, parameter.default),
+        _range_text(parameter, parameter.soft_range),
+        _allowed_values(parameter),
         _unit(parameter),
         parameter.description,
         parameter.source,
@@ -54,22 +54,22 @@ def _unit(parameter: Parameter) -> str:
     return _UNIT_SYMBOLS[parameter.unit]
 
 
-def _allowed(parameter: Parameter) -> str:
+def _allowed_values(parameter: Parameter) -> str:
     """Allowed values, as presets and the command line take them (`code`); choices with labels."""
     if parameter.kind == "choice":
         return "; ".join(f"`{identifier}` {label}" for identifier, label, _ in parameter.choices)
     if parameter.kind == "toggle":
         return "`true`; `false`"
-    return _span(parameter, parameter.hard_range)
+    return _range_text(parameter, parameter.hard_range)
 
 
-def _span(parameter: Parameter, span: tuple[float, float] | None) -> str:
-    if span is None:
+def _range_text(parameter: Parameter, limits: tuple[float, float] | None) -> str:
+    if limits is None:
         return ""
-    return f"{_shown(parameter, span[0])} to {_shown(parameter, span[1])}"
+    return f"{_value_text(parameter, limits[0])} to {_value_text(parameter, limits[1])}"
 
 
-def _shown(parameter: Parameter, value: object) -> str:
+def _value_text(parameter: Parameter, value: object) -> str:
     if isinstance(value, tuple):
         return ", ".join(f"{channel:g}" for channel in value)
     if isinstance(value, bool):

@@ -71,7 +71,7 @@ class Parameter:
     not hold.
     `is_painted`: a mask may multiply it; `Settings` declares the mask's parameter after it.
     `is_animatable`: keyframes and drivers may change it.
-    `of`, for a mask: the parameter that it multiplies and is drawn beside.
+    `masked_parameter`, for a mask: the parameter that it multiplies and is drawn beside.
     """
 
     name: str
@@ -89,7 +89,7 @@ class Parameter:
     active_when: Condition | None = None
     is_painted: bool = False
     is_animatable: bool = True
-    of: str = ""
+    masked_parameter: str = ""
 
     def checked(self, value: Any, place: str) -> Any:
         """The value in its canonical type.
@@ -118,18 +118,18 @@ class Parameter:
                 raise TypeError("it must be a name")
             return value
         if self.kind == "color":
-            return self._several(value, 3, "red, green and blue")
+            return self._numbers(value, 3, "red, green and blue")
         if self.kind == "curve":
-            return self._several(value, len(KNOT_POSITIONS), "from root to tip")
+            return self._numbers(value, len(KNOT_POSITIONS), "from root to tip")
         if self.kind == "integer":
             if isinstance(value, bool) or int(_finite(value)) != value:
                 raise TypeError("it must be a whole number")
             return int(self._in_range(_finite(value)))
         return self._in_range(_finite(value))
 
-    def _several(self, value: Any, count: int, which: str) -> tuple[float, ...]:
+    def _numbers(self, value: Any, count: int, meaning: str) -> tuple[float, ...]:
         if isinstance(value, str) or not hasattr(value, "__len__") or len(value) != count:
-            raise TypeError(f"it must be {count} numbers, {which}, with commas between them")
+            raise TypeError(f"it must be {count} numbers, {meaning}, with commas between them")
         return tuple(self._in_range(_finite(each)) for each in value)
 
     def _in_range(self, value: float) -> float:
@@ -150,10 +150,10 @@ class Parameter:
         if self.hard_range:
             low, high = self.hard_range
             if self.unit == "angle":
-                ends = f"{math.degrees(low):g} to {math.degrees(high):g} degrees"
-                return f"Use {ends}, which is {low:g} to {high:g} here"
-            some = "values" if self.kind in ("color", "curve") else "a value"
-            return f"Use {some} from {low:g} to {high:g} (default {self.default})"
+                span = f"{math.degrees(low):g} to {math.degrees(high):g} degrees"
+                return f"Use {span}, which is {low:g} to {high:g} here"
+            quantity = "values" if self.kind in ("color", "curve") else "a value"
+            return f"Use {quantity} from {low:g} to {high:g} (default {self.default})"
         return f"Use a {self.kind} (default {self.default})"
 
 
@@ -212,9 +212,9 @@ class Settings:
     @cache
     def parameters(cls) -> tuple[Parameter, ...]:
         """The declarations, in the order of the class."""
-        keyed = {} if cls.is_animatable else {"is_animatable": False}
+        overrides = {} if cls.is_animatable else {"is_animatable": False}
         return tuple(
-            dataclasses.replace(field.metadata[_METADATA_KEY], name=field.name, **keyed)
+            dataclasses.replace(field.metadata[_METADATA_KEY], name=field.name, **overrides)
             for field in dataclasses.fields(cls)
         )
 
@@ -264,12 +264,12 @@ class Settings:
         declared = {parameter.name: parameter for parameter in cls.parameters()}
         unknown = sorted(set(values) - set(declared))
         if unknown:
-            near = get_close_matches(unknown[0], declared, 3, _MIN_NAME_SIMILARITY)
-            meant = f"Did you mean {' or '.join(near)}? " if near else ""
+            matches = get_close_matches(unknown[0], declared, 3, _MIN_NAME_SIMILARITY)
+            suggestion = f"Did you mean {' or '.join(matches)}? " if matches else ""
             raise HairloomError(
                 f"unknown {cls.section} parameter '{unknown[0]}'",
                 place=place,
-                remedy=f"{meant}docs/parameters.md lists all of them",
+                remedy=f"{suggestion}docs/parameters.md lists all of them",
             )
         return cls(**{name: declared[name].checked(v, place) for name, v in values.items()})
 
@@ -318,12 +318,12 @@ def number(
     hard: Range,
     unit: Unit = "none",
     source: str = "Hairloom",
-    **drawn: Unpack[_DrawOptions],
+    **options: Unpack[_DrawOptions],
 ) -> Any:
     """Declare a real number."""
     return _declare(
         Parameter(
-            "", "number", float(default), label, description, source, unit, soft, hard, **drawn
+            "", "number", float(default), label, description, source, unit, soft, hard, **options
         )
     )
 
@@ -336,12 +336,12 @@ def integer(
     soft: Range,
     hard: Range,
     source: str = "Hairloom",
-    **drawn: Unpack[_DrawOptions],
+    **options: Unpack[_DrawOptions],
 ) -> Any:
     """Declare a whole number."""
     return _declare(
         Parameter(
-            "", "integer", int(default), label, description, source, "none", soft, hard, **drawn
+            "", "integer", int(default), label, description, source, "none", soft, hard, **options
         )
     )
 
@@ -353,13 +353,13 @@ def color(
     description: str,
     source: str = "Hairloom",
     maximum: float = 1.0,
-    **drawn: Unpack[_DrawOptions],
+    **options: Unpack[_DrawOptions],
 ) -> Any:
     """Declare a scene-linear Rec.709 colour."""
     span = (0.0, maximum)
     return _declare(
         Parameter(
-            "", "color", tuple(default), label, description, source, "none", span, span, **drawn
+            "", "color", tuple(default), label, description, source, "none", span, span, **options
         )
     )
 
@@ -370,10 +370,10 @@ def toggle(
     label: str,
     description: str,
     source: str = "Hairloom",
-    **drawn: Unpack[_DrawOptions],
+    **options: Unpack[_DrawOptions],
 ) -> Any:
     """Declare an on/off switch."""
-    return _declare(Parameter("", "toggle", default, label, description, source, **drawn))
+    return _declare(Parameter("", "toggle", default, label, description, source, **options))
 
 
 def choice(
@@ -383,7 +383,7 @@ def choice(
     label: str,
     description: str,
     source: str = "Hairloom",
-    **drawn: Unpack[_DrawOptions],
+    **options: Unpack[_DrawOptions],
 ) -> Any:
     """Declare one of several named options, each (identifier, label, description)."""
     return _declare(
@@ -395,7 +395,7 @@ def choice(
             description,
             source,
             choices=choices,
-            **drawn,
+            **options,
         )
     )
 
@@ -407,21 +407,21 @@ def curve(
     description: str,
     hard: Range,
     source: str = "Hairloom",
-    **drawn: Unpack[_DrawOptions],
+    **options: Unpack[_DrawOptions],
 ) -> Any:
     """Declare values along the strand, see `curve.sample_curve`."""
     return _declare(
         Parameter(
-            "", "curve", tuple(default), label, description, source, "none", hard, hard, **drawn
+            "", "curve", tuple(default), label, description, source, "none", hard, hard, **options
         )
     )
 
 
 def color_map(
-    *, label: str, description: str, source: str = "Hairloom", **drawn: Unpack[_DrawOptions]
+    *, label: str, description: str, source: str = "Hairloom", **options: Unpack[_DrawOptions]
 ) -> Any:
     """Declare the name of painted colours, which replace a colour as a mask multiplies a number."""
-    return _declare(Parameter("", "map", "", label, description, source, **drawn))
+    return _declare(Parameter("", "map", "", label, description, source, **options))
 
 
 def mask_parameter(name: str) -> str:
@@ -429,14 +429,16 @@ def mask_parameter(name: str) -> str:
     return f"{name}_mask"
 
 
-def _mask(of: str, parameter: Parameter) -> Any:
+def _mask(masked_parameter: str, parameter: Parameter) -> Any:
     description = (
         f"Mask that {parameter.label} is multiplied by: a vertex group or attribute of the "
         "surface, an attribute of the curves, or an image on the surface's UVs. If empty, the "
         "value is the same everywhere"
     )
     label = f"{parameter.label} Mask"
-    return _declare(Parameter("", "mask", "", label, description, "Hairloom", of=of))
+    return _declare(
+        Parameter("", "mask", "", label, description, "Hairloom", masked_parameter=masked_parameter)
+    )
 
 
 def _declare(parameter: Parameter) -> Any:

@@ -49,8 +49,8 @@ def _members(settings: type[Settings]) -> list[Parameter]:
 
 def _check_kinds(settings: type[Settings]) -> None:
     """Assert that no parameter is a curve, which shaders read from a texture, or a mask's name."""
-    others = [p.name for p in settings.parameters() if p.kind in ("curve", "mask")]
-    assert not others, f"{settings.section}: {', '.join(others)}"
+    unsupported = [p.name for p in settings.parameters() if p.kind in ("curve", "mask")]
+    assert not unsupported, f"{settings.section}: {', '.join(unsupported)}"
 
 
 def _scalar(parameter: Parameter, value: float | bool | str) -> float | np.int32:

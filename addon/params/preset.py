@@ -17,9 +17,9 @@ from ..errors import HairloomError
 from .field import Settings
 
 PRESET_VERSION = 1
-#: Largest preset file [bytes]: a preset has some thousand, and JSON may take twenty times its size
-#: in memory.
-LARGEST_PRESET = 1 << 16
+#: Largest size of a preset file: most have a few thousand bytes, and JSON may take twenty times its
+#: size in memory.
+MAX_PRESET_BYTES = 1 << 16
 
 #: version n -> the step that converts it to version n + 1; an entry for each version ever released
 MIGRATIONS: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {}
@@ -51,7 +51,7 @@ def read_any_preset(path: Path, kinds: Mapping[str, type[Settings]]) -> Preset[A
         HairloomError: too large, not JSON, of a newer version, of none of these sections, or with a
             bad value.
     """
-    data = _content(path)
+    data = _read_json(path)
     section = data.get("section") if isinstance(data, dict) else None
     kind = kinds.get(section) if isinstance(section, str) else None
     if kind is None:
@@ -76,10 +76,10 @@ def _also(data: Any, kinds: Mapping[str, type[Settings]], place: str) -> tuple[S
     return tuple(kinds[section].from_dict(values, place) for section, values in data.items())
 
 
-def _content(path: Path) -> Any:
+def _read_json(path: Path) -> Any:
     try:
-        if path.stat().st_size > LARGEST_PRESET:
-            raise ValueError(f"it has more than {LARGEST_PRESET:,} bytes")
+        if path.stat().st_size > MAX_PRESET_BYTES:
+            raise ValueError(f"it has more than {MAX_PRESET_BYTES:,} bytes")
         return json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
         raise HairloomError(

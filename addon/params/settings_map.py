@@ -19,16 +19,16 @@ class SettingsMap:
 
     def __init__(self, *settings: Settings) -> None:
         # defaults are left out, so that equal maps store the same values
-        self._values = {type(one): one for one in settings if one != _default(type(one))}  # type: ignore[arg-type]
+        self._values = {type(each): each for each in settings if each != _default(type(each))}  # type: ignore[arg-type]
 
     def __getitem__[S: Settings](self, kind: type[S]) -> S:
-        found = self._values.get(kind)
-        return cast(S, _default(kind) if found is None else found)  # type: ignore[arg-type]
+        settings = self._values.get(kind)
+        return cast(S, _default(kind) if settings is None else settings)  # type: ignore[arg-type]
 
     def with_settings(self, *settings: Settings) -> SettingsMap:
         """The same map with these settings replaced."""
-        kept = (one for kind, one in self._values.items() if kind not in map(type, settings))
-        return SettingsMap(*kept, *settings)
+        others = (one for kind, one in self._values.items() if kind not in map(type, settings))
+        return SettingsMap(*others, *settings)
 
     def only(self, *kinds: type[Settings]) -> SettingsMap:
         """The map with the settings of these classes only."""

@@ -15,9 +15,9 @@ type Draw = Callable[[bpy.types.UILayout, bpy.types.Object], None]
 
 #: Fraction of a row for its label, as in Blender's own panels, which leave room for a dot at the
 #: end; and fraction of the rest for a slider with a mask beside it.
-_LABEL, _BESIDE_MASK = 0.37, 0.5
+_LABEL_FRACTION, _SLIDER_FRACTION = 0.37, 0.5
 #: positions of a curve's five values
-_PLACES = ("Root", "Quarter", "Middle", "Three Quarters", "Tip")
+_CURVE_LABELS = ("Root", "Quarter", "Middle", "Three Quarters", "Tip")
 
 
 def draw_section(
@@ -26,100 +26,104 @@ def draw_section(
     section: str,
     panel: str = "",
     *,
-    leave_out: Collection[str] = (),
+    exclude: Collection[str] = (),
 ) -> None:
     """Draw the parameters of a section that belong to a panel; those without effect are greyed out.
 
     Args:
         sections: the properties that hold the section, such as `hair.data.hairloom`.
-        leave_out: parameters that are drawn elsewhere, such as in the header.
+        exclude: parameters that are drawn elsewhere, such as in the header.
     """
     group, column = getattr(sections, section), layout.column()
-    masks = {each.of: each for each in group.settings.parameters() if each.kind == "mask"}
+    masks = {
+        each.masked_parameter: each for each in group.settings.parameters() if each.kind == "mask"
+    }
     for parameter in group.settings.parameters():
         is_shown = parameter.shown_when is None or parameter.shown_when(sections)
-        is_elsewhere = parameter.name in leave_out or parameter.kind == "mask"
-        if parameter.panel != panel or is_elsewhere or not is_shown:
+        is_excluded = parameter.name in exclude or parameter.kind == "mask"
+        if parameter.panel != panel or is_excluded or not is_shown:
             continue
-        own, condition = column.column(), parameter.active_when
-        lack = "" if condition is None or condition(sections) else condition.unmet_reason(sections)
-        own.active = not lack
+        cell, condition, reason = column.column(), parameter.active_when, ""
+        if condition is not None and not condition(sections):
+            reason = condition.unmet_reason(sections)
+        cell.active = not reason
         if parameter.kind == "curve":
-            _draw_curve(own, group, parameter, lack)
+            _draw_curve(cell, group, parameter, reason)
             continue
         if parameter.name in masks:
-            _draw_painted(own, group, parameter, masks[parameter.name])
+            _draw_masked(cell, group, parameter, masks[parameter.name])
             continue
         icon = "GROUP_VCOL" if parameter.kind == "map" else "NONE"
         is_number = parameter.kind in {"number", "integer"}
-        if lack:
-            draw_idle(own, group, parameter.name, lack)
+        if reason:
+            draw_inactive(cell, group, parameter.name, reason)
             continue
-        own.prop(group, parameter.name, slider=is_number, icon=icon)
+        cell.prop(group, parameter.name, slider=is_number, icon=icon)
 
 
-def _draw_painted(
+def _draw_masked(
     layout: bpy.types.UILayout, group: Any, parameter: Parameter, mask: Parameter
 ) -> None:
     """A slider and its mask side by side, with the label aligned to all labels."""
-    row = layout.split(factor=_LABEL)
+    row = layout.split(factor=_LABEL_FRACTION)
     row.use_property_split = False
     label = row.row()
     label.alignment = "RIGHT"
     label.label(text=parameter.label)
-    fields = row.split(factor=_BESIDE_MASK, align=True)
+    fields = row.split(factor=_SLIDER_FRACTION, align=True)
     fields.prop(group, parameter.name, text="", slider=True)
     fields.prop(group, mask.name, text="", icon="GROUP_VERTEX")
 
 
-def draw_idle(
-    layout: bpy.types.UILayout, group: Any, name: str, lack: str, *, is_own: bool = True
+def draw_inactive(
+    layout: bpy.types.UILayout, group: Any, name: str, reason: str, *, is_editable: bool = True
 ) -> None:
     """A field without effect at the moment, as high as usual: it shows why, and can still be set.
 
     Args:
-        lack: the reason.
-        is_own: False: the field shows the value that applies instead, and cannot be set.
+        reason: why it has no effect.
+        is_editable: False: the field shows the value that applies instead, and cannot be set.
     """
     layout.active = False
-    layout.enabled = is_own
-    known = group.bl_rna.properties[name]
-    row = layout.split(factor=_LABEL)
+    layout.enabled = is_editable
+    property_rna = group.bl_rna.properties[name]
+    row = layout.split(factor=_LABEL_FRACTION)
     row.use_property_split = False
     label = row.row()
     label.alignment = "RIGHT"
-    label.label(text=known.name)
-    has_place = known.type in {"INT", "FLOAT", "BOOLEAN"} and not known.array_length
+    label.label(text=property_rna.name)
+    is_number = property_rna.type in {"INT", "FLOAT"}
+    has_text = (is_number or property_rna.type == "BOOLEAN") and not property_rna.array_length
     field = row.row(align=True)
-    field.prop(group, name, text=lack if has_place else "", slider=known.type in {"INT", "FLOAT"})
-    if not has_place:
-        field.label(text=lack)
+    field.prop(group, name, text=reason if has_text else "", slider=is_number)
+    if not has_text:
+        field.label(text=reason)
 
 
 def draw_button(
     layout: bpy.types.UILayout,
     operator: str,
-    idle: str = "",
+    disabled_text: str = "",
     text: str | None = None,
     *,
-    anywhere: bool = False,
-    **how: Any,
+    in_all_modes: bool = False,
+    **arguments: Any,
 ) -> Any:
     """A button that shows in its label, not only in its tooltip, why it is greyed out.
 
     Args:
         operator: such as "hairloom.settle".
-        idle: label if its poll fails; outside Object Mode the label is "Object Mode Only".
-        anywhere: whether it works in all modes, so that the mode is not the reason.
-        how: arguments for `UILayout.operator`.
+        disabled_text: label if its poll fails; outside Object Mode the label is "Object Mode Only".
+        in_all_modes: whether it works in all modes, so that the mode is not the reason.
+        arguments: for `UILayout.operator`.
     """
     if not getattr(bpy.ops.hairloom, operator.partition(".")[2]).poll():
-        is_mode = bpy.context.mode != "OBJECT" and not anywhere
-        text = "Object Mode Only" if is_mode else idle or text
+        is_wrong_mode = bpy.context.mode != "OBJECT" and not in_all_modes
+        text = "Object Mode Only" if is_wrong_mode else disabled_text or text
     return (
-        layout.operator(operator, **how)
+        layout.operator(operator, **arguments)
         if text is None
-        else layout.operator(operator, text=text, **how)
+        else layout.operator(operator, text=text, **arguments)
     )
 
 
@@ -133,9 +137,9 @@ def draw_overlays(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     row.prop(hair.hairloom, "shown_map", text="", icon="GROUP_VERTEX")
 
 
-def _draw_curve(layout: bpy.types.UILayout, group: Any, parameter: Parameter, lack: str) -> None:
+def _draw_curve(layout: bpy.types.UILayout, group: Any, parameter: Parameter, reason: str) -> None:
     """Five sliders, from root to tip."""
-    layout.label(text=f"{parameter.label}: {lack}" if lack else parameter.label)
+    layout.label(text=f"{parameter.label}: {reason}" if reason else parameter.label)
     sliders = layout.column(align=True)
-    for index, place in enumerate(_PLACES):
-        sliders.prop(group, parameter.name, index=index, text=place, slider=True)
+    for index, label in enumerate(_CURVE_LABELS):
+        sliders.prop(group, parameter.name, index=index, text=label, slider=True)

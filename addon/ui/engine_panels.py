@@ -8,14 +8,14 @@ import bpy
 
 from ..blender.engine import hair_scene
 from ..blender.viewport.overlay import ENGINE
-from .drawing import draw_idle
+from .drawing import draw_inactive
 from .help import WithHelp
 from .messages import draw_message
 
 #: panels of Blender for all engines whose settings have no effect here
-_UNFIT = frozenset({"VIEWLAYER_PT_filter", "RENDER_PT_freestyle"})
+_INCOMPATIBLE = frozenset({"VIEWLAYER_PT_filter", "RENDER_PT_freestyle"})
 #: EEVEE's panels whose settings have the same effect here
-_FIT = frozenset(
+_COMPATIBLE = frozenset(
     {
         "EEVEE_MATERIAL_PT_context_material",
         "EEVEE_MATERIAL_PT_surface",
@@ -29,7 +29,7 @@ class _RenderPanel(WithHelp, bpy.types.Panel):
     bl_space_type = "PROPERTIES"
     bl_region_type = "WINDOW"
     bl_context = "render"
-    helped = "picture"
+    help_section = "picture"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -54,7 +54,7 @@ class HAIRLOOM_PT_engine_mesh_shadows(_RenderPanel):
     """Shadows cast by meshes"""
 
     bl_label = "Mesh Shadows"
-    helped = "mesh_shadows"
+    help_section = "mesh_shadows"
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw_header(self, context: bpy.types.Context) -> None:
@@ -104,7 +104,7 @@ class HAIRLOOM_PT_hair_scene(WithHelp, bpy.types.Panel):
     """Hair drawn by Hairloom over the pictures of this engine"""
 
     bl_label = "Hairloom Hair"
-    helped = "hair_scene"
+    help_section = "hair_scene"
     bl_space_type = "PROPERTIES"
     bl_region_type = "WINDOW"
     bl_context = "render"
@@ -130,7 +130,7 @@ class HAIRLOOM_PT_hair_scene(WithHelp, bpy.types.Panel):
         if context.scene.render.use_motion_blur:
             column.prop(settings.picture, "motion_steps", text="Motion Steps")
         else:
-            draw_idle(column.row(), settings.picture, "motion_steps", "no Motion Blur")
+            draw_inactive(column.row(), settings.picture, "motion_steps", "no Motion Blur")
         passes = column.column(heading="Passes")
         for name in ("use_alpha", "use_tangent", "use_strand_index"):
             passes.prop(hair_scene.drawn_layer(context.scene).hairloom, name)
@@ -142,7 +142,7 @@ class HAIRLOOM_PT_hair_scene(WithHelp, bpy.types.Panel):
 class _PassesPanel(WithHelp):
     """What both panels of passes share."""
 
-    helped = "passes"
+    help_section = "passes"
     bl_space_type = "PROPERTIES"
     bl_region_type = "WINDOW"
     bl_context = "view_layer"
@@ -201,26 +201,26 @@ CLASSES = (
 
 def register() -> None:
     """Show Blender's panels with our engine, as its documentation suggests."""
-    for panel in _panels_of_blender():
+    for panel in _panels_limited_to_engines():
         name, engines = panel.__name__, panel.COMPAT_ENGINES
-        if name in _FIT or ("BLENDER_RENDER" in engines and name not in _UNFIT):
+        if name in _COMPATIBLE or ("BLENDER_RENDER" in engines and name not in _INCOMPATIBLE):
             engines.add(ENGINE)
 
 
 def unregister() -> None:
-    for panel in _panels_of_blender():
+    for panel in _panels_limited_to_engines():
         panel.COMPAT_ENGINES.discard(ENGINE)
 
 
-def _panels_of_blender() -> list[type[Any]]:
+def _panels_limited_to_engines() -> list[type[Any]]:
     """Blender's panels that are limited to certain engines."""
-    all_panels = (each for each in _panels(bpy.types.Panel) if each not in CLASSES)
+    all_panels = (each for each in _derived_panels(bpy.types.Panel) if each not in CLASSES)
     return [each for each in all_panels if hasattr(each, "COMPAT_ENGINES")]
 
 
-def _panels(parent: type[Any]) -> list[type[Any]]:
+def _derived_panels(parent: type[Any]) -> list[type[Any]]:
     """All registered panels, also those derived from others."""
-    found = []
+    panels = []
     for each in parent.__subclasses__():
-        found += [each, *_panels(each)]
-    return list(dict.fromkeys(found))
+        panels += [each, *_derived_panels(each)]
+    return list(dict.fromkeys(panels))

@@ -23,12 +23,12 @@ from ..blender.sessions.fins import fins_in
 from ..blender.viewport.debug_lines import COLORS, wind_length
 
 #: radius of a ring, relative to Blender's size of gizmos
-RING = 1.3
+RING_SCALE = 1.3
 #: size of an arrow's head or a box, likewise; width of lines [pixels]
-_HANDLE, _LINE = 1.2, 2.0
+_HANDLE_SCALE, _LINE_WIDTH = 1.2, 2.0
 
 
-class _OfActive:
+class _ActiveObjectGizmos:
     """Base of gizmos of the active object, before bpy.types.GizmoGroup: shown when Blender shows
     its own."""
 
@@ -45,7 +45,7 @@ class _OfActive:
         return bool(is_shown and cls.has_handles(obj, context))
 
 
-class HAIRLOOM_GGT_wind(_OfActive, bpy.types.GizmoGroup):
+class HAIRLOOM_GGT_wind(_ActiveObjectGizmos, bpy.types.GizmoGroup):
     """Speed, direction and elevation of the wind of previewed hair, while its overlay is shown"""
 
     bl_label = "Wind"
@@ -57,16 +57,16 @@ class HAIRLOOM_GGT_wind(_OfActive, bpy.types.GizmoGroup):
 
     def setup(self, _context: bpy.types.Context) -> None:
         self.speed = _arrow(self, "NORMAL", COLORS["wind"])
-        self.turns = {}
+        self.dials = {}
         for name in ("wind_direction", "wind_elevation"):
-            dial = self.turns[name] = self.gizmos.new("GIZMO_GT_dial_3d")
-            dial.scale_basis, dial.use_draw_value = RING, True
+            dial = self.dials[name] = self.gizmos.new("GIZMO_GT_dial_3d")
+            dial.scale_basis, dial.use_draw_value = RING_SCALE, True
             _prepare(dial, COLORS["wind"])
 
     def refresh(self, context: bpy.types.Context) -> None:
         """Bind the gizmos to the active hair."""
         hair = context.active_object
-        for name, dial in self.turns.items():
+        for name, dial in self.dials.items():
             dial.target_set_prop("offset", hair.hairloom.dynamics, name)
         self.speed.target_set_handler("offset", get=_arrow_length, set=_set_arrow_length)
 
@@ -75,17 +75,19 @@ class HAIRLOOM_GGT_wind(_OfActive, bpy.types.GizmoGroup):
         session = previews.session_of(context.active_object)
         assert session is not None, "poll has looked"
         wind = context.active_object.hairloom.dynamics
-        place = Matrix.Translation(session.snapshot.root_center.tolist())
-        turned = Euler((0.0, 0.0, wind.wind_direction)).to_matrix().to_4x4()
+        translation = Matrix.Translation(session.snapshot.root_center.tolist())
+        azimuth = Euler((0.0, 0.0, wind.wind_direction)).to_matrix().to_4x4()
         # Blender counts a dial's angle clockwise around its z, so these point down and to the side
-        down, aside = (Euler((x, 0.0, 0.0)).to_matrix().to_4x4() for x in (np.pi, -np.pi / 2.0))
-        along = turned @ Euler((0.0, np.pi / 2.0 - wind.wind_elevation, 0.0)).to_matrix().to_4x4()
-        self.speed.matrix_basis = place @ along
-        self.turns["wind_direction"].matrix_basis = place @ down
-        self.turns["wind_elevation"].matrix_basis = place @ turned @ aside
+        down, sideways = (Euler((x, 0.0, 0.0)).to_matrix().to_4x4() for x in (np.pi, -np.pi / 2.0))
+        downwind = (
+            azimuth @ Euler((0.0, np.pi / 2.0 - wind.wind_elevation, 0.0)).to_matrix().to_4x4()
+        )
+        self.speed.matrix_basis = translation @ downwind
+        self.dials["wind_direction"].matrix_basis = translation @ down
+        self.dials["wind_elevation"].matrix_basis = translation @ azimuth @ sideways
 
 
-class HAIRLOOM_GGT_empty_size(_OfActive, bpy.types.GizmoGroup):
+class HAIRLOOM_GGT_empty_size(_ActiveObjectGizmos, bpy.types.GizmoGroup):
     """Size of an Empty that is a hair tie or a collider"""
 
     bl_label = "Size of Tie or Collider"
@@ -108,8 +110,8 @@ class HAIRLOOM_GGT_empty_size(_OfActive, bpy.types.GizmoGroup):
         """Move the gizmo to the Empty."""
         empty = context.active_object
         axis = _size_axis(empty).normalized()
-        turned = Vector((0.0, 0.0, 1.0)).rotation_difference(axis).to_matrix().to_4x4()
-        self.size.matrix_basis = Matrix.Translation(empty.matrix_world.translation) @ turned
+        rotation = Vector((0.0, 0.0, 1.0)).rotation_difference(axis).to_matrix().to_4x4()
+        self.size.matrix_basis = Matrix.Translation(empty.matrix_world.translation) @ rotation
 
 
 def _simulated_in(layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
@@ -122,7 +124,7 @@ def _arrow(group: bpy.types.GizmoGroup, style: str, color: tuple[float, ...]) ->
     """A handle without a stem that is dragged along its z axis."""
     arrow = group.gizmos.new("GIZMO_GT_arrow_3d")
     arrow.draw_style, arrow.length, arrow.use_draw_value = style, 0.0, True
-    arrow.scale_basis = _HANDLE
+    arrow.scale_basis = _HANDLE_SCALE
     _prepare(arrow, color)
     return arrow
 
@@ -130,7 +132,7 @@ def _arrow(group: bpy.types.GizmoGroup, style: str, color: tuple[float, ...]) ->
 def _prepare(gizmo: bpy.types.Gizmo, color: tuple[float, ...]) -> None:
     gizmo.color, gizmo.alpha = color[:3], 0.7
     gizmo.color_highlight, gizmo.alpha_highlight = (1.0, 1.0, 1.0), 1.0
-    gizmo.line_width, gizmo.use_undo = _LINE, True
+    gizmo.line_width, gizmo.use_undo = _LINE_WIDTH, True
 
 
 def _arrow_length() -> float:

@@ -9,11 +9,11 @@ from bpy.props import StringProperty
 
 from ..blender.properties.groups import operator_properties
 from ..blender.properties.properties import matching_maps
-from .selection import ground_mesh
+from .selection import growth_mesh
 
 
-def names_of_weights(_operator: Any, context: bpy.types.Context, typed: str) -> list[str]:
-    return matching_maps(ground_mesh(context), typed)
+def search_weight_names(_operator: Any, context: bpy.types.Context, edit_text: str) -> list[str]:
+    return matching_maps(growth_mesh(context), edit_text)
 
 
 #: part of the `__annotations__` of such an operator
@@ -23,17 +23,17 @@ GROW_PROPERTIES: dict[str, Any] = {
         name="Density",
         description="Vertex group, attribute of the surface, or image on its UVs with the density "
         "of the hair. If empty, combed hair grows on the scalp, other hair everywhere",
-        search=names_of_weights,
+        search=search_weight_names,
     ),
     "length_group": StringProperty(
         name="Length Factor",
         description="Vertex group, attribute of the surface, or image on its UVs that the "
         "length is multiplied by. If empty, all hair has the same length",
-        search=names_of_weights,
+        search=search_weight_names,
     ),
 }
 
 
-def draw_where_settings_are(layout: bpy.types.UILayout) -> None:
+def draw_settings_hint(layout: bpy.types.UILayout) -> None:
     """A hint instead of settings in Adjust Last Operation, which closes at the next click."""
     layout.label(text="Length, count and more: Hairloom > Grow", icon="INFO")

@@ -44,7 +44,7 @@ PAGES = {section: settings.help_page for section, settings in ALL_SETTINGS.items
     "passes": "engine#passes",
 }
 #: part of an operator's name -> page; the first that matches counts
-_OPERATORS = (
+_OPERATOR_PAGES = (
     ("export_cards", "cards_export"),
     ("export_", "strands_export"),
     ("import_", "strands_import"),
@@ -74,13 +74,13 @@ _OPERATORS = (
 _FALLBACK = "user_guide"
 
 
-def address(page: str) -> str:
+def page_url(page: str) -> str:
     """The URL of a page such as "cards#limits"; in a clone, that of its source."""
     name, _, heading = page.partition("#")
     if not HELP.is_dir():
         return (_SOURCES / f"{name}.md").as_uri()
-    place = (HELP / "docs" / f"{name}.html").as_uri()
-    return f"{place}#{heading}" if heading else place
+    url = (HELP / "docs" / f"{name}.html").as_uri()
+    return f"{url}#{heading}" if heading else url
 
 
 def page_of(section: str) -> str:
@@ -91,12 +91,12 @@ def page_of(section: str) -> str:
 def manual_map() -> tuple[str, tuple[tuple[str, str], ...]]:
     """The result for `bpy.utils.register_manual_map`."""
     groups = (
-        (f"bpy.types.hairloom_pg_{section}.*", address(page))
+        (f"bpy.types.hairloom_pg_{section}.*", page_url(page))
         for section, page in PAGES.items()
         if section
     )
-    operators = ((f"bpy.ops.hairloom.*{part}*", address(page)) for part, page in _OPERATORS)
-    return "", (*groups, *operators, ("bpy.types.hairloom_*", address(_FALLBACK)))
+    operators = ((f"bpy.ops.hairloom.*{part}*", page_url(page)) for part, page in _OPERATOR_PAGES)
+    return "", (*groups, *operators, ("bpy.types.hairloom_*", page_url(_FALLBACK)))
 
 
 class HAIRLOOM_OT_help(bpy.types.Operator):
@@ -115,12 +115,12 @@ class HAIRLOOM_OT_help(bpy.types.Operator):
 
     @reporting
     def execute(self, _context: bpy.types.Context) -> set[str]:
-        known = {*PAGES.values(), *(page for _, page in _OPERATORS), _FALLBACK}
-        if self.page not in known:
+        pages = {*PAGES.values(), *(page for _, page in _OPERATOR_PAGES), _FALLBACK}
+        if self.page not in pages:
             raise HairloomError(
                 "there is no such page", place=self.page, remedy=f"Use {_FALLBACK}, for example"
             )
-        bpy.ops.wm.url_open(url=address(self.page))
+        bpy.ops.wm.url_open(url=page_url(self.page))
         return {"FINISHED"}
 
 
@@ -133,13 +133,13 @@ def draw_help(layout: bpy.types.UILayout, section: str) -> None:
 class WithHelp:
     """Base of a panel with a question mark in its header, before bpy.types.Panel.
 
-    helped: the section whose page it opens.
+    help_section: the section whose page it opens.
     """
 
-    helped = ""
+    help_section = ""
 
     def draw_header_preset(self: Any, _context: bpy.types.Context) -> None:
-        draw_help(self.layout, self.helped)
+        draw_help(self.layout, self.help_section)
 
 
 CLASSES = (HAIRLOOM_OT_help,)

@@ -10,7 +10,7 @@ import bpy
 #: width of a letter in pixels at UI scale 1, for breaking lines
 _LETTER_WIDTH = 7.0
 #: width of a panel's margins, in letters
-_EDGES = 6
+_MARGIN_LETTERS = 6
 
 
 def draw_message(
@@ -26,19 +26,19 @@ def draw_lines(
     text: str,
     icon: str = "NONE",
     *,
-    room: int = 0,
+    reserved_letters: int = 0,
     width: float = 0.0,
 ) -> None:
     """Draw a text as lines.
 
     Args:
-        room: number of letters to reserve lines for, even if the text is shorter, so that the
-            layout below keeps its place.
+        reserved_letters: number of letters to reserve lines for, even if the text is shorter, so
+            that the layout below keeps its place.
         width: of a popup, in pixels at UI scale 1; 0: the width of the region.
     """
     region = context.region.width / context.preferences.system.ui_scale
-    letters = max(int((width or region) / _LETTER_WIDTH) - _EDGES, 16)
+    letters = max(int((width or region) / _LETTER_WIDTH) - _MARGIN_LETTERS, 16)
     lines = textwrap.wrap(text, letters)
-    lines += [""] * (math.ceil(room / letters) - len(lines))
+    lines += [""] * (math.ceil(reserved_letters / letters) - len(lines))
     for index, line in enumerate(lines):
         column.label(text=line, icon="BLANK1" if index and icon != "NONE" else icon)

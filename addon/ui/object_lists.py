@@ -20,7 +20,7 @@ class _Kind(NamedTuple):
 
     icon: str
     remove: str
-    named: str
+    object_property: str
 
 
 #: setting of the hair that names the collection -> its kind of list
@@ -48,7 +48,7 @@ class HAIRLOOM_UL_objects(bpy.types.UIList):
         kind = KINDS[self.list_id]
         layout.prop(obj, "name", text="", emboss=False, icon=kind.icon)
         button = layout.operator(kind.remove, text="", icon="X", emboss=False)
-        setattr(button, kind.named, obj.name)
+        setattr(button, kind.object_property, obj.name)
 
 
 class HAIRLOOM_PG_list_rows(bpy.types.PropertyGroup):
@@ -68,9 +68,9 @@ def draw_objects(layout: bpy.types.UILayout, hair: bpy.types.Object, setting: st
     if collection is None:
         return
     rows = bpy.context.window_manager.hairloom_list_rows
-    how = {"rows": ROWS, "maxrows": ROWS}
+    size = {"rows": ROWS, "maxrows": ROWS}
     column.template_list(
-        HAIRLOOM_UL_objects.__name__, setting, collection, "all_objects", rows, setting, **how
+        HAIRLOOM_UL_objects.__name__, setting, collection, "all_objects", rows, setting, **size
     )
 
 

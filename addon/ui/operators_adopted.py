@@ -112,13 +112,13 @@ class HAIRLOOM_OT_sort_cards(LongWork, bpy.types.Operator):
             alpha=_named_image(self.alpha),
         )
         steps = sort_steps(obj, context.evaluated_depsgraph_get(), options)
-        self._tell(obj, (yield from as_progress(steps)))
+        self._report(obj, (yield from as_progress(steps)))
 
-    def _tell(self, obj: bpy.types.Object, done: SortedCards) -> None:
-        for note in done.notes:
+    def _report(self, obj: bpy.types.Object, result: SortedCards) -> None:
+        for note in result.notes:
             report(self, "WARNING", f"{obj.name}: {note}")
-        moved = f"{done.moved} of {done.face_count} faces moved"
-        count = "1 card" if done.card_count == 1 else f"{done.card_count} cards"
+        moved = f"{result.moved} of {result.face_count} faces moved"
+        count = "1 card" if result.card_count == 1 else f"{result.card_count} cards"
         report(self, "INFO", f"Sorted {count}; {moved}")
 
 
@@ -135,11 +135,11 @@ def _can_sort(operator: type[Any], context: bpy.types.Context) -> bool:
     return False
 
 
-def _likely_head(obj: bpy.types.Object, context: bpy.types.Context) -> bpy.types.Object | None:
+def _likely_head(cards: bpy.types.Object, context: bpy.types.Context) -> bpy.types.Object | None:
     """The parent mesh, else the only other selected mesh; None: there is neither."""
-    if obj.parent is not None and obj.parent.type == "MESH":
-        return obj.parent
-    others = [one for one in context.selected_objects if one.type == "MESH" and one != obj]
+    if cards.parent is not None and cards.parent.type == "MESH":
+        return cards.parent
+    others = [obj for obj in context.selected_objects if obj.type == "MESH" and obj != cards]
     return others[0] if len(others) == 1 else None
 
 

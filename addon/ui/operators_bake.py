@@ -13,7 +13,7 @@ from ..blender.preview.bake import Bake, free, is_bakeable, show_in_renders
 from ..blender.scene.fin_modifier import fin_modifier
 from ..blender.sessions.measures import table_of
 from ..errors import HairloomError
-from .drawing import draw_idle
+from .drawing import draw_inactive
 from .help import WithHelp
 from .long_work import LongWork, Steps, can_start, counted, draw_progress
 from .operators_measure import draw_figures
@@ -33,7 +33,7 @@ class HAIRLOOM_OT_bake(LongWork, bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         if not cls.can_start():
             return False
-        if chosen(context):
+        if chosen_objects(context):
             return True
         cls.poll_message_set("Select hair curves, or a mesh that is cloth, first")
         return False
@@ -41,11 +41,11 @@ class HAIRLOOM_OT_bake(LongWork, bpy.types.Operator):
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         if previews.is_playing():
             previews.rest(context.evaluated_depsgraph_get(), keep_playing=False)
-        bake = Bake.of(chosen(context), context.scene)
+        bake = Bake.of(chosen_objects(context), context.scene)
         yield from counted(bake.steps(), bake.frame_count, "frames")
         locked = show_in_renders(bake.objects(), context.evaluated_depsgraph_get())
         names = ", ".join(obj.name for obj in bake.objects())
-        also = (
+        lock_note = (
             "; Render > Lock Interface was turned on, as renders of baked hair need it"
             if locked
             else ""
@@ -53,7 +53,7 @@ class HAIRLOOM_OT_bake(LongWork, bpy.types.Operator):
         count = "1 frame" if bake.frame_count == 1 else f"{bake.frame_count:,} frames"
         if bake.unfelt_notes:
             report(self, "WARNING", " ".join(bake.unfelt_notes))
-        report(self, "INFO", f"Baked {count} of {names}{also}")
+        report(self, "INFO", f"Baked {count} of {names}{lock_note}")
 
 
 class HAIRLOOM_OT_bake_free(bpy.types.Operator):
@@ -67,7 +67,7 @@ class HAIRLOOM_OT_bake_free(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         if not can_start(cls):
             return False
-        if any(has_bake(obj) for obj in chosen(context)):
+        if any(has_bake(obj) for obj in chosen_objects(context)):
             return True
         cls.poll_message_set("Nothing selected has a bake")
         return False
@@ -77,12 +77,12 @@ class HAIRLOOM_OT_bake_free(bpy.types.Operator):
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        for obj in chosen(context):
+        for obj in chosen_objects(context):
             free(obj, context.evaluated_depsgraph_get())
         return {"FINISHED"}
 
 
-def chosen(context: bpy.types.Context) -> list[bpy.types.Object]:
+def chosen_objects(context: bpy.types.Context) -> list[bpy.types.Object]:
     """The objects that the buttons apply to: hair, as for other buttons, and selected fins."""
     return list(
         dict.fromkeys(filter(is_bakeable, (*chosen_hair(context), *context.selected_objects)))
@@ -104,11 +104,13 @@ def draw_bake(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     layout.prop(bake, "folder")
     layout.prop(bake, "use_own_range")
     column = layout.column(align=True)
-    for name, of_scene in (("first", "frame_start"), ("last", "frame_end")):
+    for name, scene_property in (("first", "frame_start"), ("last", "frame_end")):
         if bake.use_own_range:
             column.prop(bake, name)
         else:
-            draw_idle(column, bpy.context.scene, of_scene, "as the scene", is_own=False)
+            draw_inactive(
+                column, bpy.context.scene, scene_property, "as the scene", is_editable=False
+            )
     if obj.type == "CURVES":
         layout.prop(bake, "in_renders")
     if not draw_progress(layout, HAIRLOOM_OT_bake):
@@ -123,31 +125,31 @@ def _draw_state(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
         cache, problem = playback.cache_of(obj), ""
     except HairloomError as error:
         cache, problem = None, error.problem
-    shown = layout.column()
+    column = layout.column()
     if cache is None:
-        draw_idle(shown, obj.hairloom.bake, "is_shown", "not baked")
+        draw_inactive(column, obj.hairloom.bake, "is_shown", "not baked")
     else:
-        shown.prop(obj.hairloom.bake, "is_shown")
+        column.prop(obj.hairloom.bake, "is_shown")
     facts = None if cache is None else cache.facts
     if facts is None:
         layout.label(text=problem or "Not baked", icon="ERROR" if problem else "BLANK1")
     else:
-        computed = {"numpy": "CPU", "compute": "GPU"}.get(facts.form, facts.form)
+        device = {"numpy": "CPU", "compute": "GPU"}.get(facts.form, facts.form)
         layout.label(
-            text=f"Frames {facts.first} to {facts.last} at {facts.frame_rate:g} fps, {computed}",
+            text=f"Frames {facts.first} to {facts.last} at {facts.frame_rate:g} fps, {device}",
             icon="CHECKMARK",
         )
     if obj.type == "CURVES":  # cloth is not measured
         figures = None if facts is None else facts.figures
         draw_figures(layout.column(align=True), table_of(figures))
-    known = previews.bake_of(obj)
-    changed = () if facts is None or known is None else known.changed_inputs
+    preview_bake = previews.bake_of(obj)
+    changed = () if facts is None or preview_bake is None else preview_bake.changed_inputs
     text = "Out of date: " + ", ".join(changed) if changed else ""
     layout.label(text=text, icon="ERROR" if changed else "BLANK1")
 
 
 class _FinBake(WithHelp):
-    helped = "bake"
+    help_section = "bake"
     bl_label = "Bake"
     bl_options: ClassVar[set[str]] = {"DEFAULT_CLOSED"}
 

@@ -31,11 +31,11 @@ def _in_edit_mode(operator: Any, context: bpy.types.Context) -> bool:
     return False
 
 
-def _done(operator: bpy.types.Operator, count: int, what: str) -> set[str]:
+def _report_count(operator: bpy.types.Operator, count: int, change: str) -> set[str]:
     if not count:
         report(operator, "WARNING", "No card is selected: a vertex of each is enough")
         return {"CANCELLED"}
-    report(operator, "INFO", f"{count:,} {'card' if count == 1 else 'cards'} {what}")
+    report(operator, "INFO", f"{count:,} {'card' if count == 1 else 'cards'} {change}")
     return {"FINISHED"}
 
 
@@ -65,7 +65,9 @@ class HAIRLOOM_OT_card_width(bpy.types.Operator):
         root, tip = self.root, self.tip
         objects = edited_cards(context)
         count = sum(shape_selected(obj, lambda each: each.widened(root, tip)) for obj in objects)
-        return _done(self, count, f"{root:.2g} times as wide at the root, {tip:.2g} at the tip")
+        return _report_count(
+            self, count, f"{root:.2g} times as wide at the root, {tip:.2g} at the tip"
+        )
 
 
 class HAIRLOOM_OT_card_twist(bpy.types.Operator):
@@ -96,7 +98,7 @@ class HAIRLOOM_OT_card_twist(bpy.types.Operator):
         angle = self.angle
         objects = edited_cards(context)
         count = sum(shape_selected(obj, lambda each: each.twisted(angle)) for obj in objects)
-        return _done(self, count, f"twisted by {np.degrees(angle):.0f} degrees")
+        return _report_count(self, count, f"twisted by {np.degrees(angle):.0f} degrees")
 
 
 class HAIRLOOM_OT_card_tile(bpy.types.Operator):
@@ -147,15 +149,15 @@ class HAIRLOOM_OT_card_tile(bpy.types.Operator):
 
     @reporting
     def execute(self: Any, context: bpy.types.Context) -> set[str]:
-        def tile_of(tile: Ints, count: int) -> Ints:
+        def new_tiles(tile: Ints, count: int) -> Ints:
             if self.to == "number":
                 return np.full(len(tile), min(self.number, count) - 1, np.int32)
             return (tile + _STEPS[self.to]) % count
 
-        tiles = [tile for obj in edited_cards(context) for tile in move_to_tiles(obj, tile_of)]
+        tiles = [tile for obj in edited_cards(context) for tile in move_to_tiles(obj, new_tiles)]
         numbers = sorted(set(tiles))
-        one = f"on tile {numbers[0] + 1}" if len(numbers) == 1 else f"on {len(numbers)} tiles"
-        return _done(self, len(tiles), one)
+        change = f"on tile {numbers[0] + 1}" if len(numbers) == 1 else f"on {len(numbers)} tiles"
+        return _report_count(self, len(tiles), change)
 
 
 class HAIRLOOM_OT_add_card_along_curve(bpy.types.Operator):

@@ -13,7 +13,7 @@ from bpy_extras.io_utils import ExportHelper
 from ..blender.bakes import playback
 from ..blender.bakes.bake_settings import frame_range
 from ..blender.bakes.stale_bakes import stale_notes
-from ..blender.base.file_names import file_stem, files_of, in_own_folder
+from ..blender.base.file_names import file_paths, file_stem, in_asset_folder
 from ..blender.base.objects import without_hidden
 from ..blender.base.outcome import Outcome, report
 from ..blender.cards.files import CardExport, CardOutput, FileSteps
@@ -23,7 +23,7 @@ from ..blender.properties.properties import settings_of
 from ..cards.export_settings import OF_MOTION, CardExportSettings
 from ..errors import HairloomError
 from ..exchange.cards.card_formats import FORMATS, GLB, SUFFIXES
-from .drawing import draw_idle
+from .drawing import draw_inactive
 from .long_work import LongWork, Progress, Steps, threaded
 from .messages import draw_lines
 from .reports import report_outcome
@@ -81,9 +81,9 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
     @property
     def filename_ext(self) -> str:
         """The suffix that Blender appends to a name; one that fits the format is kept."""
-        (chosen,) = (each for each in FORMATS if each.name == self.format)
+        (file_format,) = (each for each in FORMATS if each.name == self.format)
         suffix = Path(self.filepath).suffix.lower()
-        return suffix if suffix in chosen.suffixes else chosen.suffixes[0]
+        return suffix if suffix in file_format.suffixes else file_format.suffixes[0]
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -97,19 +97,19 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
             self.properties.filepath = str(folder / (file_stem(hair[0].name) + self.filename_ext))
         if not self.properties.is_property_set("own_folder"):
             self.own_folder = True
-        self.stale = _stale(hair[:1], context.evaluated_depsgraph_get())
+        self.stale = _stale_bake_notes(hair[:1], context.evaluated_depsgraph_get())
         return super().invoke(context, event)
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         hair = self._hair(context)
-        files = files_of(Path(bpy.path.abspath(self.filepath)), [each.name for each in hair])
+        files = file_paths(Path(bpy.path.abspath(self.filepath)), [each.name for each in hair])
         if self.own_folder:
-            files = [in_own_folder(path) for path in files]
+            files = [in_asset_folder(path) for path in files]
         plans = [self._plan(context, *each) for each in zip(hair, files, strict=True)]
         outcomes = []
         for plan in plans:
-            made = yield from threaded(plan.building())
-            outcomes.append((yield from _shown(plan.writing(made))))
+            built = yield from threaded(plan.building())
+            outcomes.append((yield from _as_steps(plan.writing(built))))
         for outcome in outcomes:
             report_outcome(self, outcome)
 
@@ -138,21 +138,23 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
 
     def _hair(self, context: bpy.types.Context) -> list[bpy.types.Object]:
         if not self.collection:
-            return chosen_hair(context)[:1] or _refuse("Nothing selected", "Select hair curves")
+            return chosen_hair(context)[:1] or _raise_no_hair(
+                "Nothing selected", "Select hair curves"
+            )
         collection = bpy.data.collections.get(self.collection)
         objects = () if collection is None else collection.all_objects
         grooms = [obj for obj in objects if obj.type == "CURVES"]
         hair, left_out = without_hidden(grooms, context.evaluated_depsgraph_get())
         for each in left_out:
             report(self, "WARNING", f"{each}, and is left out.")
-        return hair or _refuse(
+        return hair or _raise_no_hair(
             f"Collection '{self.collection}'", "Link hair curves to it, or choose another one"
         )
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split = True
-        self._draw_place(layout)
+        self._draw_folder(layout)
         layout.prop(self, "format")
         levels = layout.row(heading="Levels")
         levels.prop(self, "own_levels", text="")
@@ -166,19 +168,19 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
         if self.motion != "none":
             self._draw_motion(layout, context)
 
-    def _draw_place(self, layout: bpy.types.UILayout) -> None:
+    def _draw_folder(self, layout: bpy.types.UILayout) -> None:
         """The option for a folder of its own, and whether that would replace a file: the file
         browser only warns about a file of the name that it shows, not about one in that folder."""
         layout.prop(self, "own_folder")
         if self.own_folder:
-            path = in_own_folder(Path(bpy.path.abspath(self.filepath)))
-            icon, does = ("ERROR", "Replaces") if path.exists() else ("FILE_FOLDER", "Makes")
-            layout.label(text=f"{does} {path.parent.name}/{path.name}", icon=icon)
+            path = in_asset_folder(Path(bpy.path.abspath(self.filepath)))
+            icon, verb = ("ERROR", "Replaces") if path.exists() else ("FILE_FOLDER", "Makes")
+            layout.label(text=f"{verb} {path.parent.name}/{path.name}", icon=icon)
 
     def _draw_page(self, layout: bpy.types.UILayout) -> None:
         page = layout.column()
         if self.format != GLB.name:
-            draw_idle(page, self, "page", "only with .glb")
+            draw_inactive(page, self, "page", "only with .glb")
             return
         page.prop(self, "page")
         for name in ("page_texture", "page_head") if self.page else ():
@@ -197,17 +199,19 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
             draw_lines(layout.column(align=True), context, note, "ERROR")
 
 
-def _stale(hair: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> tuple[str, ...]:
+def _stale_bake_notes(
+    hair: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph
+) -> tuple[str, ...]:
     """Notes on stale bakes; a bake that cannot be read is reported when the file is written."""
     try:
-        found = [(each, playback.cache_of(each)) for each in hair]
-        stale = [stale_notes(each, cache, depsgraph) for each, cache in found if cache is not None]
+        caches = [(each, playback.cache_of(each)) for each in hair]
+        stale = [stale_notes(each, cache, depsgraph) for each, cache in caches if cache is not None]
     except HairloomError:
         return ()
     return tuple(note for notes in stale for note in notes)
 
 
-def _shown(writing: FileSteps[Outcome]) -> Steps[Outcome]:
+def _as_steps(writing: FileSteps[Outcome]) -> Steps[Outcome]:
     with closing(writing):
         while True:
             try:
@@ -231,7 +235,7 @@ class HAIRLOOM_FH_cards(bpy.types.FileHandler):
         return False  # it only exports
 
 
-def _refuse(place: str, remedy: str) -> Any:
+def _raise_no_hair(place: str, remedy: str) -> Any:
     raise HairloomError("there is no hair to write", place=place, remedy=remedy)
 
 

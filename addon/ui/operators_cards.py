@@ -37,10 +37,10 @@ class HAIRLOOM_OT_make_cards(LongWork, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return _can_make(cls, context)
+        return _can_make_cards(cls, context)
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
-        yield from _built(self, context)
+        yield from _build_steps(self, context)
 
 
 class HAIRLOOM_OT_discard_card_edits(LongWork, bpy.types.Operator):
@@ -53,7 +53,7 @@ class HAIRLOOM_OT_discard_card_edits(LongWork, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not _can_make(cls, context):
+        if not _can_make_cards(cls, context):
             return False
         if not card_objects(chosen_hair(context)[0]):
             cls.poll_message_set("There are no cards yet")
@@ -65,31 +65,31 @@ class HAIRLOOM_OT_discard_card_edits(LongWork, bpy.types.Operator):
         try:
             edits, _ = read_edits(hair, context.evaluated_depsgraph_get())
         except HairloomError:  # cards that cannot be read can still be discarded
-            lost = "All edits"
+            edits_text = "All edits"
         else:
             if edits is None:
                 report(self, "INFO", f"{hair.name}: its cards have no edits")
                 return {"CANCELLED"}
-            lost = edits.counts.summary
+            edits_text = edits.counts.summary
         return context.window_manager.invoke_confirm(
             self,
             event,
             title="Discard Edits",
-            message=f"{lost} of {hair.name} will be lost",
+            message=f"{edits_text} of {hair.name} will be lost",
             confirm_text="Discard",
             icon="WARNING",
         )
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
-        yield from _built(self, context, keep_edits=False)
+        yield from _build_steps(self, context, keep_edits=False)
 
 
-def _can_make(operator: Any, context: bpy.types.Context) -> bool:
+def _can_make_cards(operator: Any, context: bpy.types.Context) -> bool:
     can_start: bool = operator.can_start()
     return can_start and in_object_mode(operator, context) and needs_hair(operator, context)
 
 
-def _built(
+def _build_steps(
     operator: bpy.types.Operator, context: bpy.types.Context, *, keep_edits: bool = True
 ) -> Steps[None]:
     """Make the cards of the active hair, and report it."""
@@ -113,12 +113,14 @@ def draw_made_cards(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
         text = "Make Cards Again" if objects else "Make Cards"
         draw_button(layout, "hairloom.make_cards", text=text, icon="MESH_GRID")
     finest = objects[0] if objects else None
-    made = finest and finest.hairloom.card_object
+    card_object = finest and finest.hairloom.card_object
     column = layout.column(align=True)
     column.label(text=_counts(finest) if finest else "No cards yet", icon="OUTLINER_OB_MESH")
     _draw_levels(column, objects)
-    column.label(text=order_line(made.wrong_fraction) if made else "", icon="SORTSIZE")
-    image = made and made.image
+    column.label(
+        text=order_line(card_object.wrong_fraction) if card_object else "", icon="SORTSIZE"
+    )
+    image = card_object and card_object.image
     size = f"{image.size[0]} x {image.size[1]}" if image else "-"
     column.label(text=f"Texture {size}", icon="TEXTURE")
 
@@ -129,20 +131,20 @@ def _draw_levels(column: bpy.types.UILayout, objects: Sequence[bpy.types.Object]
     row = column.row(align=True)
     for number in range(_MAX_LEVELS):
         if number < len(objects):
-            text = _short(len(objects[number].data.polygons))
+            text = _short_count(len(objects[number].data.polygons))
             row.prop(objects[number], "hide_viewport", text=text, toggle=1, invert_checkbox=True)
         else:
             row.label(text="-")
 
 
-def _short(count: int) -> str:
+def _short_count(count: int) -> str:
     """A number in at most four characters, such as "37k"."""
     return f"{count:,}" if count < 1000 else f"{count / 1000.0:.0f}k"
 
 
 def _counts(obj: bpy.types.Object) -> str:
-    made = obj.hairloom.card_object
-    return counts_line(made.card_count, len(obj.data.polygons), made.shell_layers)
+    card_object = obj.hairloom.card_object
+    return counts_line(card_object.card_count, len(obj.data.polygons), card_object.shell_layers)
 
 
 CLASSES = (HAIRLOOM_OT_make_cards, HAIRLOOM_OT_discard_card_edits)

@@ -50,9 +50,9 @@ class HAIRLOOM_OT_fit_spheres(LongWork, bpy.types.Operator):
             spheres.use_spheres(hair, fitted.collection, context.scene)
         if self.replace_mesh:
             spheres.replace_mesh(mesh, fitted.collection)
-        self._tell(mesh, fitted)
+        self._report(mesh, fitted)
 
-    def _tell(self, mesh: bpy.types.Object, fitted: FittedSpheres) -> None:
+    def _report(self, mesh: bpy.types.Object, fitted: FittedSpheres) -> None:
         error, count = fitted.fit.error, len(fitted.fit.radii)
         if fitted.unskinned and mesh.modifiers:
             report(
@@ -119,7 +119,7 @@ class HAIRLOOM_PT_collider(WithHelp, bpy.types.Panel):
     """How this object collides with hair that uses it as a collider"""
 
     bl_label = "Hairloom Collider"
-    helped = "collisions"
+    help_section = "collisions"
     bl_space_type = "PROPERTIES"
     bl_region_type = "WINDOW"
     bl_context = "physics"

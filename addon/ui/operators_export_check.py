@@ -23,16 +23,16 @@ from .selection import chosen_hair, needs_hair
 _check: ExportCheck | None = None
 
 
-def begin(of: ExportCheck) -> None:
+def open_check(check: ExportCheck) -> None:
     """Set the check, when a file browser or popup opens."""
     global _check
-    _check = of
+    _check = check
 
 
-def end(of: ExportCheck | None = None) -> None:
+def close_check(check: ExportCheck | None = None) -> None:
     """Drop the check when its dialog closes, unless another one has opened since."""
     global _check
-    if of is None or of is _check:
+    if check is None or check is _check:
         _check = None
 
 
@@ -41,7 +41,7 @@ def cached_rigs() -> tuple[CachedRig, ...]:
     return (*(() if _check is None else _check.cached_rigs), *previewed_rigs().values())
 
 
-def count() -> int:
+def hair_count() -> int:
     """The number of hair objects in the open dialog; 0 without one."""
     return 0 if _check is None else len(_check.hair)
 
@@ -62,7 +62,7 @@ def draw_motion(layout: bpy.types.UILayout, context: bpy.types.Context, *, use_b
             draw_lines(column, context, line)
 
 
-def writable(objects: Any) -> list[bpy.types.Object]:
+def exportable_hair(objects: Any) -> list[bpy.types.Object]:
     """The hair among these objects, except copies that show a bake in renders."""
     return [obj for obj in objects if obj.type == "CURVES" and is_bakeable(obj)]
 
@@ -84,16 +84,16 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context, panel: str) -> 
         draw_lines(column, context, warning, severity)
 
 
-def _choice(engine: str) -> tuple[StrandFormat, StrandExportSettings]:
+def _format_and_settings(engine: str) -> tuple[StrandFormat, StrandExportSettings]:
     """The format and settings for an item of `_engines`."""
     name, _, layout = engine.partition(" ")
     (kind,) = (each for each in STRAND_FORMATS if each.name == name)
     return kind, StrandExportSettings(engine=layout) if layout else StrandExportSettings()
 
 
-def _look(operator: Any, context: bpy.types.Context) -> None:
+def _refresh_engine(operator: Any, context: bpy.types.Context) -> None:
     """Check the hair for the chosen engine."""
-    refresh(context, *_choice(operator.engine))
+    refresh(context, *_format_and_settings(operator.engine))
 
 
 def _engines() -> list[tuple[str, str, str]]:
@@ -128,15 +128,17 @@ class HAIRLOOM_OT_check_export(LongWork, bpy.types.Operator):
         return cls.can_start() and needs_hair(cls, context)
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
-        own = ExportCheck.of(writable(chosen_hair(context)), previewed_rigs())
-        reading = own.read_steps(context.evaluated_depsgraph_get(), *_choice(self.engine))
+        check = ExportCheck.of(exportable_hair(chosen_hair(context)), previewed_rigs())
+        reading = check.read_steps(
+            context.evaluated_depsgraph_get(), *_format_and_settings(self.engine)
+        )
         yield from steps_of_parts(reading)
-        begin(own)
+        open_check(check)
         if not bpy.app.background and self.options.is_invoke:
             return
-        _look(self, context)
-        report_outcome(self, Outcome("; ".join(own.lines), {}, tuple(own.warnings)))
-        end(own)
+        _refresh_engine(self, context)
+        report_outcome(self, Outcome("; ".join(check.lines), {}, tuple(check.warnings)))
+        close_check(check)
 
     def on_finished(self, _context: bpy.types.Context) -> None:
         bpy.ops.hairloom.show_export_check("INVOKE_DEFAULT", engine=self.engine)
@@ -149,12 +151,12 @@ class HAIRLOOM_OT_show_export_check(bpy.types.Operator):
     bl_label = "Check for Export"
     bl_options = {"INTERNAL"}
 
-    __annotations__ = {"engine": EnumProperty(**_ENGINE, update=_look)}
+    __annotations__ = {"engine": EnumProperty(**_ENGINE, update=_refresh_engine)}
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         """Open a popup that shows the check, with a button for the export itself."""
-        self.own = _check
-        _look(self, context)
+        self.export_check = _check
+        _refresh_engine(self, context)
         return context.window_manager.invoke_popup(self, width=440)
 
     def draw(self, context: bpy.types.Context) -> None:
@@ -173,7 +175,7 @@ class HAIRLOOM_OT_show_export_check(bpy.types.Operator):
         return {"FINISHED"}
 
     def cancel(self, _context: bpy.types.Context) -> None:
-        end(self.own)
+        close_check(self.export_check)
 
 
 CLASSES = (HAIRLOOM_OT_check_export, HAIRLOOM_OT_show_export_check)

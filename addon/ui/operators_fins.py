@@ -32,7 +32,7 @@ class HAIRLOOM_OT_fin_add(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return _can_change(cls, context)
+        return _can_change_modifiers(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         obj = active_mesh(context)
@@ -58,7 +58,7 @@ class HAIRLOOM_OT_fin_remove(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return _can_change(cls, context) and _needs_fin(cls, context)
+        return _can_change_modifiers(cls, context) and _needs_fin(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         obj = active_mesh(context)
@@ -154,7 +154,9 @@ def _draw_buttons(row: bpy.types.UILayout, session: Simulation | None) -> None:
         return
     text, icon = ("Stop Preview", "HIDE_OFF") if session else ("Preview", "HIDE_ON")
     row.operator("hairloom.fin_preview", text=text, icon=icon, depress=session is not None)
-    draw_button(row, "hairloom.fin_reset", "At Rest", "Reset", anywhere=True, icon="FILE_REFRESH")
+    draw_button(
+        row, "hairloom.fin_reset", "At Rest", "Reset", in_all_modes=True, icon="FILE_REFRESH"
+    )
     row.operator("hairloom.fin_remove", text="", icon="TRASH")
 
 
@@ -168,7 +170,7 @@ class HAIRLOOM_PT_fin(WithHelp, bpy.types.Panel):
     """A mesh that moves as cloth"""
 
     bl_label = "Hairloom Cloth"
-    helped = "fin"
+    help_section = "fin"
     bl_space_type = "PROPERTIES"
     bl_region_type = "WINDOW"
     bl_context = "physics"
@@ -191,7 +193,7 @@ class HAIRLOOM_PT_sidebar_fin(WithHelp, bpy.types.Panel):
     """A mesh that moves as cloth"""
 
     bl_label = "Cloth"
-    helped = "fin"
+    help_section = "fin"
     bl_parent_id = "HAIRLOOM_PT_sidebar"
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
@@ -211,7 +213,7 @@ class HAIRLOOM_PT_sidebar_fin(WithHelp, bpy.types.Panel):
         draw_fin(self.layout, context.object)
 
 
-def _can_change(operator: type[Any], context: bpy.types.Context) -> bool:
+def _can_change_modifiers(operator: type[Any], context: bpy.types.Context) -> bool:
     """For `poll`: whether modifiers of the active mesh can be added or removed; the greyed-out
     button says why not."""
     obj = active_mesh(context)

@@ -62,7 +62,7 @@ class HAIRLOOM_OT_snap_roots(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         hair = chosen_hair(context)[0]
         set_surface(hair, _surface_of(context))
-        with wait_cursor(context), _alone(context, hair):
+        with wait_cursor(context), _only_selected(context, hair):
             bpy.ops.curves.snap_curves_to_surface(attach_mode="NEAREST")
         return {"FINISHED"}
 
@@ -90,7 +90,7 @@ class HAIRLOOM_OT_unwrap_surface(bpy.types.Operator):
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
         hair, head = chosen_hair(context)[0], _surface_of(context)
-        with wait_cursor(context), _alone(context, head):
+        with wait_cursor(context), _only_selected(context, head):
             bpy.ops.object.mode_set(mode="EDIT")
             try:
                 bpy.ops.mesh.select_all(action="SELECT")
@@ -154,13 +154,13 @@ class HAIRLOOM_OT_apply_scale(bpy.types.Operator):
                 remedy="Apply the scale of the parent (Ctrl A) first; until then widths are "
                 "averaged",
             )
-        with _alone(context, hair):
+        with _only_selected(context, hair):
             bpy.ops.object.transform_apply(location=False, rotation=False, scale=True)
         return {"FINISHED"}
 
 
 @contextmanager
-def _alone(context: bpy.types.Context, obj: bpy.types.Object) -> Iterator[None]:
+def _only_selected(context: bpy.types.Context, obj: bpy.types.Object) -> Iterator[None]:
     """Select this object alone, for Blender's operators; then restore the selection."""
     selected, active = context.selected_objects, context.view_layer.objects.active
     for other in selected:

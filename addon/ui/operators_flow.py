@@ -19,7 +19,7 @@ from .drawing import draw_button
 from .long_work import LongWork, Steps, draw_progress, steps_of_parts
 from .object_lists import draw_objects
 from .reports import report_outcome, reporting
-from .revert_shape import RevertsShape
+from .revert_shape import RevertShapeOperator
 from .selection import chosen_hair, in_object_mode, needs_hair, without_linked_duplicates
 
 
@@ -97,21 +97,21 @@ class HAIRLOOM_OT_comb_flow(LongWork, bpy.types.Operator):
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         settings, depsgraph = settings_of(self, FlowSettings), context.evaluated_depsgraph_get()
         grooms = without_linked_duplicates(filter(strokes_of, chosen_hair(context)))
-        works = (comb_flow(hair, depsgraph, settings) for hair in grooms)
-        for outcome in (yield from steps_of_parts(batched(works))):
+        jobs = (comb_flow(hair, depsgraph, settings) for hair in grooms)
+        for outcome in (yield from steps_of_parts(batched(jobs))):
             report_outcome(self, outcome)
 
 
-class HAIRLOOM_OT_revert_flow(RevertsShape, bpy.types.Operator):
+class HAIRLOOM_OT_revert_flow(RevertShapeOperator, bpy.types.Operator):
     """Restore the shape of the selected hair from before it was combed along strokes. Later
     combing, settling and trimming is lost"""
 
     bl_idname = "hairloom.revert_flow"
     bl_label = "Revert Flow"
     bl_options = {"REGISTER", "UNDO"}
-    shape = BEFORE_FLOW
-    idle = "The selected hair was not combed along strokes: press Comb Along Flow"
-    before = "followed strokes"
+    backup = BEFORE_FLOW
+    disabled_text = "The selected hair was not combed along strokes: press Comb Along Flow"
+    change = "followed strokes"
 
 
 def draw_flow(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:

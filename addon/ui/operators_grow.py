@@ -6,20 +6,20 @@ import bpy
 
 from ..blender.strands.growing import grow_again, grow_on, has_grown, is_outdated, lost_by_growing
 from .drawing import draw_button, draw_section
-from .grow_options import GROW_PROPERTIES, draw_where_settings_are
+from .grow_options import GROW_PROPERTIES, draw_settings_hint
 from .long_work import LongWork, Steps, draw_progress, steps_of_parts
 from .messages import draw_message
 from .selection import (
     chosen_hair,
-    ground_mesh,
+    growth_mesh,
     in_object_mode,
     make_active,
     needs_hair,
     without_linked_duplicates,
 )
 
-#: Most names that are listed; more are only counted.
-_NAMED = 2
+#: Further names are only counted.
+_MAX_LISTED = 2
 
 
 class HAIRLOOM_OT_grow(LongWork, bpy.types.Operator):
@@ -35,13 +35,13 @@ class HAIRLOOM_OT_grow(LongWork, bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         if not (cls.can_start() and in_object_mode(cls, context)):
             return False
-        if ground_mesh(context) is not None:
+        if growth_mesh(context) is not None:
             return True
         cls.poll_message_set("Select the mesh to grow hair on")
         return False
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
-        head, depsgraph = ground_mesh(context), context.evaluated_depsgraph_get()
+        head, depsgraph = growth_mesh(context), context.evaluated_depsgraph_get()
         growing = grow_on(
             head,
             depsgraph,
@@ -53,7 +53,7 @@ class HAIRLOOM_OT_grow(LongWork, bpy.types.Operator):
         make_active(context, [(yield from steps_of_parts(growing))])
 
     def draw(self, _context: bpy.types.Context) -> None:
-        draw_where_settings_are(self.layout)
+        draw_settings_hint(self.layout)
 
 
 class HAIRLOOM_OT_grow_again(LongWork, bpy.types.Operator):
@@ -102,7 +102,7 @@ def _state(curves: bpy.types.Curves, lost: tuple[str, ...]) -> str:
 
 def _listed(lost: tuple[str, ...]) -> str:
     """The names, or the number of them if they would not fit in a line."""
-    if len(lost) > _NAMED:
+    if len(lost) > _MAX_LISTED:
         return f"{lost[0]}, {len(lost) - 1} attributes"
     return ", ".join(lost) or "nothing"
 

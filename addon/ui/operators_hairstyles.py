@@ -23,22 +23,22 @@ from ..blender.setup.hairstyles import (
     named_hairstyle,
     shipped_hairstyles,
 )
-from .grow_options import names_of_weights
+from .grow_options import search_weight_names
 from .long_work import LongWork, Progress, Steps, steps_of_parts
-from .operators_start import beginning
+from .operators_start import start_preview_steps
 from .preferences import preferences
 from .selection import (
     chosen_hair,
-    ground_mesh,
+    growth_mesh,
     in_object_mode,
     make_active,
     without_linked_duplicates,
 )
 
 #: pictures per row, their scale, and the width of the page at UI scale 1
-_ACROSS, _PICTURE_SCALE, _WIDTH = 4, 5.0, 440
+_COLUMNS, _PICTURE_SCALE, _WIDTH = 4, 5.0, 440
 #: types of objects without visible geometry, which do not count as contents of a scene
-_UNSEEN = frozenset(("CAMERA", "EMPTY", "LIGHT", "LIGHT_PROBE", "SPEAKER"))
+_INVISIBLE_TYPES = frozenset(("CAMERA", "EMPTY", "LIGHT", "LIGHT_PROBE", "SPEAKER"))
 
 
 class HAIRLOOM_OT_add_hairstyle(LongWork, bpy.types.Operator):
@@ -65,7 +65,7 @@ class HAIRLOOM_OT_add_hairstyle(LongWork, bpy.types.Operator):
         name="Hairline",
         description="Vertex group or point attribute (float) of the head that limits where this "
         "hair grows. If empty, the one that the hairstyle names, such as scalp",
-        search=names_of_weights,
+        search=search_weight_names,
     )
     plays: BoolProperty(
         name="Play", description="Simulate the hair as soon as it is added", default=True
@@ -82,36 +82,36 @@ class HAIRLOOM_OT_add_hairstyle(LongWork, bpy.types.Operator):
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         style, collection = named_hairstyle(self.style), context.collection
-        head = ground_mesh(context) if grows_anywhere(style) else self._head(context)
+        head = growth_mesh(context) if grows_anywhere(style) else self._head(context)
         is_new, is_alone = head is None, _is_empty(context)
-        with new_blocks_removed_on_error() as note:
+        with new_blocks_removed_on_error() as record_added:
             if head is None:
                 head = yield from steps_of_parts(add_head(collection, self.skin))
-                note()
+                record_added()
                 yield Progress(f"Placing {style.title}")
             depsgraph = context.evaluated_depsgraph_get()
             added = yield from steps_of_parts(
                 add_hairstyle(style, head, depsgraph, collection, hairline=self.hairline)
             )
-            note()
+            record_added()
             grooms = [added.hair]
             if is_new and not is_face_hairstyle(style):
                 depsgraph = context.evaluated_depsgraph_get()
-                of_face = add_face_hair(head, depsgraph, collection, added.hair)
-                grooms.insert(0, (yield from steps_of_parts(of_face)))
+                adding = add_face_hair(head, depsgraph, collection, added.hair)
+                grooms.insert(0, (yield from steps_of_parts(adding)))
         for kind, lines in (("WARNING", added.warnings), ("INFO", added.done)):
             for line in lines:
                 report(self, kind, line)
         if is_new:
             report(self, "INFO", f"Added a head, {head.name}, for the hair to grow on")
         if is_new and is_alone and self.is_interactive():
-            _look_at([*grooms, head], context)
-        yield from beginning(self, context, grooms, plays=self.plays)
+            _frame_in_view([*grooms, head], context)
+        yield from start_preview_steps(self, context, grooms, plays=self.plays)
 
     def _head(self, context: bpy.types.Context) -> bpy.types.Object | None:
         """The head to use: the active one, or that of the active hair, else the first built-in one
         in the view layer; None: there is none."""
-        active = ground_mesh(context)
+        active = growth_mesh(context)
         if active is not None:
             if is_bust(active) or may_be_head(active):
                 return active
@@ -121,10 +121,10 @@ class HAIRLOOM_OT_add_hairstyle(LongWork, bpy.types.Operator):
 
 def _is_empty(context: bpy.types.Context) -> bool:
     """Whether the view layer has no object with visible geometry."""
-    return all(obj.type in _UNSEEN for obj in objects_in(context.view_layer))
+    return all(obj.type in _INVISIBLE_TYPES for obj in objects_in(context.view_layer))
 
 
-def _look_at(objects: list[bpy.types.Object], context: bpy.types.Context) -> None:
+def _frame_in_view(objects: list[bpy.types.Object], context: bpy.types.Context) -> None:
     """Select these objects and frame them in the current 3D view, as a head is a dot in the view of
     a new file. A view through a camera stays."""
     area = context.area
@@ -150,18 +150,18 @@ class HAIRLOOM_OT_place_landmarks(LongWork, bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         if not (cls.can_start() and in_object_mode(cls, context)):
             return False
-        if ground_mesh(context) is not None:
+        if growth_mesh(context) is not None:
             return True
         cls.poll_message_set("Select a head")
         return False
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
-        head = ground_mesh(context)
+        head = growth_mesh(context)
         assert head is not None, "poll has looked"
         adding = add_landmarks(head, context.evaluated_depsgraph_get(), context.collection)
-        made, is_sure = yield from steps_of_parts(adding)
+        landmarks, is_sure = yield from steps_of_parts(adding)
         if is_sure:
-            report(self, "INFO", f"{head.name}: {_placed(len(made))}")
+            report(self, "INFO", f"{head.name}: {_placed_text(len(landmarks))}")
         else:
             report(
                 self,
@@ -170,7 +170,7 @@ class HAIRLOOM_OT_place_landmarks(LongWork, bpy.types.Operator):
             )
 
 
-def _placed(count: int) -> str:
+def _placed_text(count: int) -> str:
     if not count:
         return "it has all landmarks already"
     return "placed 1 missing landmark" if count == 1 else f"placed {count} missing landmarks"
@@ -221,13 +221,13 @@ class HAIRLOOM_OT_choose_hairstyle(bpy.types.Operator):
 
     def draw(self, _context: bpy.types.Context) -> None:
         self.layout.label(text="Hairstyles")
-        grid = self.layout.grid_flow(row_major=True, columns=_ACROSS, even_columns=True)
+        grid = self.layout.grid_flow(row_major=True, columns=_COLUMNS, even_columns=True)
         for entry in shipped_hairstyles():
             cell = grid.column(align=True)
             if entry.icon:
                 cell.template_icon(icon_value=entry.icon, scale=_PICTURE_SCALE)
             cell.operator("hairloom.add_hairstyle", text=entry.title).style = entry.name
-        for _ in range(-len(shipped_hairstyles()) % _ACROSS):
+        for _ in range(-len(shipped_hairstyles()) % _COLUMNS):
             grid.label(text="")
 
 

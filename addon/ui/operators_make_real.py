@@ -25,10 +25,10 @@ class HAIRLOOM_OT_make_real(LongWork, bpy.types.Operator):
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         parts = make_real(chosen_hair(context), context.evaluated_depsgraph_get())
-        made = yield from steps_of_parts(parts)
-        for each in made:
+        results = yield from steps_of_parts(parts)
+        for each in results:
             report_outcome(self, each.outcome)
-        make_active(context, [each.hair for each in made])
+        make_active(context, [each.hair for each in results])
 
 
 CLASSES = (HAIRLOOM_OT_make_real,)

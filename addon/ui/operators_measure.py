@@ -15,7 +15,7 @@ from .reports import reporting
 from .selection import chosen_hair, needs_hair
 
 #: Fraction of a table's width for the names.
-_NAMES = 0.34
+_NAME_FRACTION = 0.34
 
 
 class HAIRLOOM_OT_measure(bpy.types.Operator):
@@ -50,12 +50,12 @@ def _simulated(hair: Iterable[bpy.types.Object]) -> Iterable[Session]:
 def draw_measure(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     """Draw the button and the last measurement, greyed out once the hair has moved on."""
     session = previews.session_of(hair)
-    is_old = session is not None and session.figures and not session.are_figures_current
-    text = "Measure Again: Hair Has Moved" if is_old else None
-    idle, icon = "Measure: Press Play First", "DRIVER_DISTANCE"
-    draw_button(layout, "hairloom.measure", idle, text, anywhere=True, icon=icon)
+    is_outdated = session is not None and session.figures and not session.are_figures_current
+    text = "Measure Again: Hair Has Moved" if is_outdated else None
+    disabled_text, icon = "Measure: Press Play First", "DRIVER_DISTANCE"
+    draw_button(layout, "hairloom.measure", disabled_text, text, in_all_modes=True, icon=icon)
     lines = layout.column(align=True)
-    lines.active = not is_old
+    lines.active = not is_outdated
     draw_figures(lines, table_of(None if session is None else session.figures))
     draw_figures(lines, card_table_of(None if session is None else session.card_figures))
 
@@ -63,7 +63,7 @@ def draw_measure(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
 def draw_figures(column: bpy.types.UILayout, table: Iterable[Sequence[str]]) -> None:
     """Draw a measurement as a table, see `table_of`."""
     for name, *values in table:
-        row = column.split(factor=_NAMES)
+        row = column.split(factor=_NAME_FRACTION)
         row.label(text=name)
         columns = row.row()
         for value in values:

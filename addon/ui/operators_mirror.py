@@ -31,11 +31,11 @@ class HAIRLOOM_OT_mirror_hair(LongWork, bpy.types.Operator):
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         settings, depsgraph = settings_of(self, MirrorSettings), context.evaluated_depsgraph_get()
-        works = (
+        jobs = (
             mirror_hair(hair, depsgraph, settings)
             for hair in without_linked_duplicates(chosen_hair(context))
         )
-        for outcome in (yield from steps_of_parts(batched(works))):
+        for outcome in (yield from steps_of_parts(batched(jobs))):
             report_outcome(self, outcome)
 
 

@@ -84,8 +84,8 @@ class HAIRLOOM_OT_comb_parting(LongWork, bpy.types.Operator):
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         settings, depsgraph = settings_of(self, PartingSettings), context.evaluated_depsgraph_get()
         grooms = without_linked_duplicates(filter(partings.partings_of, chosen_hair(context)))
-        works = (comb_parting(hair, depsgraph, settings) for hair in grooms)
-        for outcome in (yield from steps_of_parts(batched(works))):
+        jobs = (comb_parting(hair, depsgraph, settings) for hair in grooms)
+        for outcome in (yield from steps_of_parts(batched(jobs))):
             report_outcome(self, outcome)
 
 

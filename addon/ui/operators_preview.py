@@ -69,14 +69,14 @@ class HAIRLOOM_OT_cancel_build(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         if not needs_hair(cls, context):
             return False
-        if any(map(_is_being_made, chosen_hair(context))):
+        if any(map(_is_building, chosen_hair(context))):
             return True
         cls.poll_message_set("Nothing is being made for the selected hair")
         return False
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        for hair in filter(_is_being_made, chosen_hair(context)):
+        for hair in filter(_is_building, chosen_hair(context)):
             session = previews.session_of(hair)
             if session is None or not session.is_made:
                 stop_preview([hair])
@@ -87,7 +87,7 @@ class HAIRLOOM_OT_cancel_build(bpy.types.Operator):
         return {"FINISHED"}
 
 
-def _is_being_made(hair: bpy.types.Object) -> bool:
+def _is_building(hair: bpy.types.Object) -> bool:
     """Whether hair or cards are being made that can be cancelled."""
     session = previews.session_of(hair)
     return session is not None and (not session.is_made or session.cards.is_pending)
@@ -213,7 +213,7 @@ class HAIRLOOM_OT_reset(bpy.types.Operator):
 
 def start_ticking() -> None:
     ticks = _Ticks()
-    ticks.tell()
+    ticks.update_status()
     schedule(TICKS, ticks.tick)
 
 
@@ -229,14 +229,14 @@ class _Ticks:
 
     def __init__(self) -> None:
         self._clocks: dict[int, FrameClock] = {}
-        self._said = ""
+        self._status = ""
 
     def tick(self) -> float | None:
         """Simulate the due frames of each scene in one step, as its head has moved only once."""
         if not previews.is_playing():
             show_status(None)
             return None
-        self.tell()
+        self.update_status()
         now, windows = time.perf_counter(), previews.playing_windows()
         # the clock of a scene that was hidden for a while starts at this moment
         self._clocks = {uid: self._clocks.get(uid) or FrameClock(now) for uid in windows}
@@ -245,21 +245,21 @@ class _Ticks:
                 self._clocks[uid].skip(now)
                 continue
             rate = frame_rate(window.scene)
-            frames = self._clocks[uid].due(now, rate)
+            frames = self._clocks[uid].due_frames(now, rate)
             if frames:
                 with bpy.context.temp_override(window=window):
                     previews.advance(bpy.context.evaluated_depsgraph_get(), frames / rate)
         return 1.0 / TICKS_PER_SECOND
 
-    def tell(self) -> None:
+    def update_status(self) -> None:
         if running_label():  # a long operator uses the status bar, and empties it at its end
-            self._said = ""
+            self._status = ""
             return
         text = PAUSED if previews.is_paused() else STATUS
         if names := previews.waiting_names():
             text = WAITING.format(names=", ".join(names))
-        if text != self._said:
-            self._said = text
+        if text != self._status:
+            self._status = text
             show_status(text)
 
 

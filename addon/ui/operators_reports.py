@@ -61,7 +61,7 @@ class HAIRLOOM_OT_copy_reports(bpy.types.Operator):
         return _has_reports(cls)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        lines = (f"{one.time} {one.source}, {one.kind}: {one.text}" for one in past_reports)
+        lines = (f"{each.time} {each.source}, {each.kind}: {each.text}" for each in past_reports)
         context.window_manager.clipboard = "\n".join(lines)
         report(self, "INFO", "The reports were copied")
         return {"FINISHED"}

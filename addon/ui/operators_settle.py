@@ -12,7 +12,7 @@ from ..dynamics.settle_settings import SettleSettings
 from .drawing import draw_button
 from .long_work import LongWork, Progress, Steps, as_progress, draw_progress
 from .reports import report_outcome
-from .revert_shape import RevertsShape
+from .revert_shape import RevertShapeOperator
 from .selection import chosen_hair, in_object_mode, needs_hair, without_linked_duplicates
 
 
@@ -40,16 +40,16 @@ class HAIRLOOM_OT_settle(LongWork, bpy.types.Operator):
             report_outcome(self, write())
 
 
-class HAIRLOOM_OT_revert_settle(RevertsShape, bpy.types.Operator):
+class HAIRLOOM_OT_revert_settle(RevertShapeOperator, bpy.types.Operator):
     """Restore the shape of the selected hair from before it settled. Later combing and trimming is
     lost"""
 
     bl_idname = "hairloom.revert_settle"
     bl_label = "Revert Settle"
     bl_options = {"REGISTER", "UNDO"}
-    shape = BEFORE_SETTLE
-    idle = "The selected hair has not settled: press Settle first"
-    before = "settled"
+    backup = BEFORE_SETTLE
+    disabled_text = "The selected hair has not settled: press Settle first"
+    change = "settled"
 
 
 def draw_settle(layout: bpy.types.UILayout) -> None:

@@ -95,17 +95,17 @@ class HAIRLOOM_OT_turntable(LongWork, bpy.types.Operator):
             raise HairloomError(
                 "there is no folder for the pictures", place="Turntable", remedy="Choose one"
             )
-        table = self._table(context)
-        count = table.settings.frames
-        yield from counted(table.steps(), count, "pictures")
-        for note in (*table.notes, *table.studio.notes):
+        turntable = self._turntable(context)
+        count = turntable.settings.frames
+        yield from counted(turntable.steps(), count, "pictures")
+        for note in (*turntable.notes, *turntable.studio.notes):
             report(self, "WARNING", note)
-        video = " and a video" if table.has_video else ""
-        report(self, "INFO", f"Wrote {count:,} pictures{video} to {table.folder}")
+        video = " and a video" if turntable.has_video else ""
+        report(self, "INFO", f"Wrote {count:,} pictures{video} to {turntable.folder}")
 
-    def _table(self, context: bpy.types.Context) -> Turntable:
+    def _turntable(self, context: bpy.types.Context) -> Turntable:
         shown = _shown(self, context)
-        chosen = TurntableSettings(
+        settings = TurntableSettings(
             frames=self.frames,
             width=self.size,
             height=self.size,
@@ -117,7 +117,9 @@ class HAIRLOOM_OT_turntable(LongWork, bpy.types.Operator):
         )
         name = file_name(chosen_hair(context)[0].name)
         folder = Path(bpy.path.abspath(self.directory))
-        return Turntable(shown.studio, shown.pose, shown.points, chosen, folder, name, shown.guides)
+        return Turntable(
+            shown.studio, shown.pose, shown.points, settings, folder, name, shown.guides
+        )
 
 
 class HAIRLOOM_OT_contact_sheet(bpy.types.Operator, ExportHelper):

@@ -18,7 +18,7 @@ from ..blender.scene.particle_hair import convert_particle_hair, hair_systems
 from ..blender.setup.sample_scene import add_sample_scene
 from ..blender.setup.starting import new_groom, prepare_existing_hair
 from ..errors import HairloomError
-from .grow_options import GROW_PROPERTIES, draw_where_settings_are
+from .grow_options import GROW_PROPERTIES, draw_settings_hint
 from .long_work import LongWork, Progress, Steps, steps_of_parts
 from .operators_preview import start_preview
 from .preferences import NEW_GROOM, chosen_presets, preferences
@@ -26,7 +26,7 @@ from .reports import report_outcome, reporting
 from .selection import (
     active_mesh,
     chosen_hair,
-    ground_mesh,
+    growth_mesh,
     in_object_mode,
     make_active,
     needs_hair,
@@ -55,15 +55,15 @@ class HAIRLOOM_OT_add_groom(LongWork, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return cls.can_start() and in_object_mode(cls, context) and _has_ground(cls, context)
+        return cls.can_start() and in_object_mode(cls, context) and _has_growth_mesh(cls, context)
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
-        _take_preferences(self, context)
+        _apply_preferences(self, context)
         return self.execute(context)
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         growing = new_groom(
-            ground_mesh(context),
+            growth_mesh(context),
             context.evaluated_depsgraph_get(),
             context.collection,
             self,
@@ -73,13 +73,13 @@ class HAIRLOOM_OT_add_groom(LongWork, bpy.types.Operator):
             length_group=self.length_group,
         )
         hair = yield from steps_of_parts(growing)
-        yield from beginning(self, context, [hair], plays=self.plays)
+        yield from start_preview_steps(self, context, [hair], plays=self.plays)
 
     def draw(self, _context: bpy.types.Context) -> None:
         self.layout.use_property_split = True
         for name in (*NEW_GROOM, "fits"):
             self.layout.prop(self, name)
-        draw_where_settings_are(self.layout)
+        draw_settings_hint(self.layout)
 
 
 class HAIRLOOM_OT_sample_scene(LongWork, bpy.types.Operator):
@@ -105,7 +105,7 @@ class HAIRLOOM_OT_sample_scene(LongWork, bpy.types.Operator):
         return cls.can_start() and in_object_mode(cls, context)
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
-        _take_preferences(self, context)
+        _apply_preferences(self, context)
         return self.execute(context)
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
@@ -114,7 +114,7 @@ class HAIRLOOM_OT_sample_scene(LongWork, bpy.types.Operator):
         if context.window is not None:
             context.window.scene = scene
         with context.temp_override(scene=scene, view_layer=scene.view_layers[0]):
-            begin(self, context, [hair], plays=False)
+            start_previews(self, context, [hair], plays=False)
             hair.select_set(False)  # active, but without an outline
         if not bpy.app.background:
             _look_through_the_camera(context)
@@ -141,20 +141,20 @@ class HAIRLOOM_OT_use_groom(LongWork, bpy.types.Operator):
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         chosen = preferences(context)
-        taken, problems = list[bpy.types.Object](), list[HairloomError]()
+        prepared, problems = list[bpy.types.Object](), list[HairloomError]()
         grooms, depsgraph = chosen_hair(context), context.evaluated_depsgraph_get()
-        works = (prepare_existing_hair(hair, depsgraph, chosen_presets(chosen)) for hair in grooms)
-        for hair, done in (yield from steps_of_parts(batched(works, problems.append))):
-            for one in done:
-                report(self, "INFO", f"{hair.name}: {one}")
-            taken.append(hair)
-        for problem in problems[not taken :]:
+        jobs = (prepare_existing_hair(hair, depsgraph, chosen_presets(chosen)) for hair in grooms)
+        for hair, notes in (yield from steps_of_parts(batched(jobs, problems.append))):
+            for note in notes:
+                report(self, "INFO", f"{hair.name}: {note}")
+            prepared.append(hair)
+        for problem in problems[not prepared :]:
             report(self, "ERROR", problem)
-        if not taken:
+        if not prepared:
             raise problems[0]
-        yield from beginning(self, context, taken, plays=chosen.plays)
+        yield from start_preview_steps(self, context, prepared, plays=chosen.plays)
         if len(grooms) > 1:
-            report(self, "INFO", f"Hairloom now previews {len(taken)} of {len(grooms)} grooms")
+            report(self, "INFO", f"Hairloom now previews {len(prepared)} of {len(grooms)} grooms")
 
 
 class HAIRLOOM_OT_convert_particles(LongWork, bpy.types.Operator):
@@ -179,15 +179,15 @@ class HAIRLOOM_OT_convert_particles(LongWork, bpy.types.Operator):
         chosen, mesh = preferences(context), active_mesh(context)
         assert mesh is not None, "poll has looked"
         yield Progress("Reading the particles")
-        made, dropped = yield from steps_of_parts(convert_particle_hair(context, mesh))
-        for hair in made:
+        grooms, dropped = yield from steps_of_parts(convert_particle_hair(context, mesh))
+        for hair in grooms:
             depsgraph = context.evaluated_depsgraph_get()
-            _, done = run_parts(prepare_existing_hair(hair, depsgraph, chosen_presets(chosen)))
-            for one in done:
-                report(self, "INFO", f"{hair.name}: {one}")
+            _, notes = run_parts(prepare_existing_hair(hair, depsgraph, chosen_presets(chosen)))
+            for note in notes:
+                report(self, "INFO", f"{hair.name}: {note}")
         result = f"{mesh.name}: its particle hair was hidden and replaced by curves"
         report_outcome(self, Outcome(result, dropped))
-        yield from beginning(self, context, made, plays=chosen.plays)
+        yield from start_preview_steps(self, context, grooms, plays=chosen.plays)
 
 
 class HAIRLOOM_OT_show_settings(bpy.types.Operator):
@@ -219,19 +219,19 @@ def _show_data(editor: bpy.types.SpaceProperties) -> None:
             return
 
 
-def begin(
+def start_previews(
     operator: bpy.types.Operator,
     context: bpy.types.Context,
     grooms: list[bpy.types.Object],
     *,
     plays: bool,
 ) -> None:
-    """`beginning` in one go."""
-    for _ in beginning(operator, context, grooms, plays=plays):
+    """`start_preview_steps` in one go."""
+    for _ in start_preview_steps(operator, context, grooms, plays=plays):
         pass
 
 
-def beginning(
+def start_preview_steps(
     operator: bpy.types.Operator,
     context: bpy.types.Context,
     grooms: list[bpy.types.Object],
@@ -273,15 +273,15 @@ def _look_through_the_camera(context: bpy.types.Context) -> None:
             area.spaces.active.region_3d.view_perspective = "CAMERA"
 
 
-def _take_preferences(operator: Any, context: bpy.types.Context) -> None:
+def _apply_preferences(operator: Any, context: bpy.types.Context) -> None:
     chosen = preferences(context)
     for name in NEW_GROOM:
         if not operator.properties.is_property_set(name):
             setattr(operator, name, getattr(chosen, name))
 
 
-def _has_ground(operator: type[Any], context: bpy.types.Context) -> bool:
-    if ground_mesh(context) is not None:
+def _has_growth_mesh(operator: type[Any], context: bpy.types.Context) -> bool:
+    if growth_mesh(context) is not None:
         return True
     operator.poll_message_set(_NO_MESH)
     return False

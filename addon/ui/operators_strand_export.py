@@ -8,7 +8,7 @@ import bpy
 from bpy.props import StringProperty
 
 from ..exchange.strand_formats import STRAND_FORMATS, StrandFormat
-from .strand_export import MovingExport, StrandExportOperator, option_properties
+from .strand_export import MotionOptions, StrandExportOperator, option_properties
 
 
 def _operator(kind: StrandFormat) -> type[Any]:
@@ -26,7 +26,7 @@ def _operator(kind: StrandFormat) -> type[Any]:
         "bl_label": f"Export {kind.title}",
         "kind": kind,
     }
-    return type(name, (MovingExport, *bases) if kind.has_motion else bases, namespace)
+    return type(name, (MotionOptions, *bases) if kind.has_motion else bases, namespace)
 
 
 def _handler(operator: type[Any]) -> type[bpy.types.FileHandler]:

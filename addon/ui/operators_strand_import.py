@@ -29,10 +29,10 @@ from ..blender.strands.import_groom import (
     read_import_surface,
     read_in_thread,
 )
-from .drawing import draw_idle
+from .drawing import draw_inactive
 from .long_work import LongWork, Steps, threaded
 from .reports import report_outcome
-from .selection import active_mesh, ground_mesh, in_object_mode, make_active
+from .selection import active_mesh, growth_mesh, in_object_mode, make_active
 
 SUFFIXES = tuple(suffix for _, suffixes in FILE_KINDS for suffix in suffixes)
 UP_AXES = (
@@ -110,26 +110,26 @@ class HAIRLOOM_OT_import_strands(LongWork, ImportHelper, bpy.types.Operator):
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         """Import the files; if one cannot be used, the others are still imported."""
         head = active_mesh(context) if self.onto_mesh else None
-        ground = head and read_import_surface(
+        surface = head and read_import_surface(
             head, context.evaluated_depsgraph_get(), self.head_scale
         )
-        choices = StrandImport(
+        options = StrandImport(
             up=None if self.up == "FILE" else self.up,
             scale=self.scale,
             guides=self.guides.lower(),
         )
-        found = yield from threaded(read_in_thread(self._paths(), ground, choices))
-        if ground is not None and any(isinstance(each, FileStrands) for each in found):
-            apply_head_scale(ground)
-            for note in ground.notes:
+        results = yield from threaded(read_in_thread(self._paths(), surface, options))
+        if surface is not None and any(isinstance(each, FileStrands) for each in results):
+            apply_head_scale(surface)
+            for note in surface.notes:
                 report(self, "WARNING", note)
         imported: list[bpy.types.Object] = []
-        for each in found:
+        for each in results:
             if isinstance(each, FileStrands):
-                hair, outcome = add_to_scene(each, ground, context.collection)
+                hair, outcome = add_to_scene(each, surface, context.collection)
                 imported += hair
                 report_outcome(self, outcome)
-            elif each is found[-1] and not imported:
+            elif each is results[-1] and not imported:
                 raise each  # nothing was imported, so there is nothing to undo
             else:
                 report(self, "ERROR", each)
@@ -145,21 +145,21 @@ class HAIRLOOM_OT_import_strands(LongWork, ImportHelper, bpy.types.Operator):
         layout.prop(self, "up")
         layout.prop(self, "scale")
         layout.prop(self, "guides")
-        mesh = ground_mesh(context)  # in Adjust Last Operation, the imported hair is active
+        mesh = growth_mesh(context)  # in Adjust Last Operation, the imported hair is active
         if mesh is None:
-            draw_idle(layout.row(), self, "onto_mesh", "no mesh is active")
+            draw_inactive(layout.row(), self, "onto_mesh", "no mesh is active")
         else:
             layout.row(heading=mesh.name).prop(self, "onto_mesh")
         row = layout.row()
         if mesh is None or not self.onto_mesh:
-            draw_idle(row, self, "head_scale", "not onto a mesh")
+            draw_inactive(row, self, "head_scale", "not onto a mesh")
         else:
             row.prop(self, "head_scale")
 
     def _paths(self) -> list[Path]:
         """The files that were chosen or dropped, else the one in `filepath`."""
-        named = [Path(self.directory) / file.name for file in self.files if file.name]
-        return named or [Path(self.filepath)]
+        chosen = [Path(self.directory) / file.name for file in self.files if file.name]
+        return chosen or [Path(self.filepath)]
 
 
 class HAIRLOOM_FH_strands(bpy.types.FileHandler):

@@ -29,7 +29,7 @@ class HAIRLOOM_OT_add_hair_tie(bpy.types.Operator):
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
         hair = chosen_hair(context)[0]
-        rings = [obj for obj in context.selected_objects if _may_tie(obj, hair)]
+        rings = [obj for obj in context.selected_objects if _can_be_tie(obj, hair)]
         if not rings:
             rings = [ties.new_ring(hair, context)]
         depsgraph = context.evaluated_depsgraph_get()
@@ -75,7 +75,7 @@ def draw_ties(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
         draw_section(layout, hair.data.hairloom, "guides", "Ties")
 
 
-def _may_tie(obj: bpy.types.Object, hair: bpy.types.Object) -> bool:
+def _can_be_tie(obj: bpy.types.Object, hair: bpy.types.Object) -> bool:
     return obj.type in ties.TIE_TYPES and obj not in (hair, head_of(hair))
 
 

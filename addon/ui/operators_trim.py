@@ -20,7 +20,7 @@ from .drawing import draw_button
 from .long_work import LongWork, Steps, draw_progress, steps_of_parts
 from .object_lists import draw_objects
 from .reports import report_outcome, reporting
-from .revert_shape import RevertsShape
+from .revert_shape import RevertShapeOperator
 from .selection import chosen_hair, in_object_mode, needs_hair, without_linked_duplicates
 
 
@@ -38,7 +38,10 @@ class HAIRLOOM_OT_trim_to_shape(LongWork, bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         if not (cls.can_start() and in_object_mode(cls, context) and needs_hair(cls, context)):
             return False
-        if any(trim_shapes_of(hair) or _chosen(hair, context) for hair in chosen_hair(context)):
+        if any(
+            trim_shapes_of(hair) or _selected_trim_shapes(hair, context)
+            for hair in chosen_hair(context)
+        ):
             return True
         cls.poll_message_set("Select a closed mesh, a flat mesh or an Empty together with the hair")
         return False
@@ -46,17 +49,17 @@ class HAIRLOOM_OT_trim_to_shape(LongWork, bpy.types.Operator):
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         depsgraph, grooms = context.evaluated_depsgraph_get(), []
         for hair in chosen_hair(context):
-            chosen = _chosen(hair, context)
-            for obj in chosen:
+            shapes = _selected_trim_shapes(hair, context)
+            for obj in shapes:
                 read_shape(obj, depsgraph)
-            if chosen:
+            if shapes:
                 add_to_collection(
-                    hair, COLLECTION_PROPERTY, COLLECTION_LABEL, chosen, context.scene
+                    hair, COLLECTION_PROPERTY, COLLECTION_LABEL, shapes, context.scene
                 )
             if trim_shapes_of(hair):
                 grooms.append(hair)
-        works = (trim_to_shapes(hair, depsgraph) for hair in without_linked_duplicates(grooms))
-        for outcome in (yield from steps_of_parts(batched(works))):
+        jobs = (trim_to_shapes(hair, depsgraph) for hair in without_linked_duplicates(grooms))
+        for outcome in (yield from steps_of_parts(batched(jobs))):
             report_outcome(self, outcome)
 
 
@@ -90,22 +93,24 @@ class HAIRLOOM_OT_remove_trim_shape(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class HAIRLOOM_OT_revert_trim(RevertsShape, bpy.types.Operator):
+class HAIRLOOM_OT_revert_trim(RevertShapeOperator, bpy.types.Operator):
     """Restore the shape of the selected hair from before it was trimmed. Later combing and settling
     is lost"""
 
     bl_idname = "hairloom.revert_trim"
     bl_label = "Revert Trim"
     bl_options = {"REGISTER", "UNDO"}
-    shape = BEFORE_TRIM
-    idle = "The selected hair is not trimmed: press Trim to Shape"
-    before = "was trimmed"
+    backup = BEFORE_TRIM
+    disabled_text = "The selected hair is not trimmed: press Trim to Shape"
+    change = "was trimmed"
 
 
-def _chosen(hair: bpy.types.Object, context: bpy.types.Context) -> list[bpy.types.Object]:
+def _selected_trim_shapes(
+    hair: bpy.types.Object, context: bpy.types.Context
+) -> list[bpy.types.Object]:
     """Selected objects that are meant to trim this hair; none unless the hair is selected too."""
-    chosen = context.selected_objects
-    return [obj for obj in chosen if may_trim(obj, hair)] if hair in chosen else []
+    selected = context.selected_objects
+    return [obj for obj in selected if may_trim(obj, hair)] if hair in selected else []
 
 
 def draw_trim(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:

@@ -26,7 +26,7 @@ from .operators_start import (
 )
 from .sections import SECTIONS, SESSION_SECTIONS, SUB_SECTIONS, SWITCHES
 from .selection import active_mesh, chosen_hair, pinned_hair
-from .state import NAMES, draw_notice, draw_problems_row, draw_state
+from .state import NAME_FRACTION, draw_notice, draw_problems_row, draw_state
 
 
 def _hair(context: bpy.types.Context) -> bpy.types.Object | None:
@@ -42,9 +42,11 @@ def draw_preview(layout: bpy.types.UILayout, context: bpy.types.Context) -> None
     column = layout.column(align=True)
     column.scale_y = 1.3
     text, icon = ("Stop Preview", "HIDE_OFF") if session else ("Preview", "HIDE_ON")
-    idle = "Preview: Select Hair First"
+    disabled_text = "Preview: Select Hair First"
     is_on = session is not None
-    draw_button(column, "hairloom.preview", idle, text, anywhere=True, icon=icon, depress=is_on)
+    draw_button(
+        column, "hairloom.preview", disabled_text, text, in_all_modes=True, icon=icon, depress=is_on
+    )
     playing, paused = previews.is_playing(), previews.is_paused()
     row = column.row(align=True)
     text, icon = ("Stop", "SNAP_FACE") if playing else ("Play", "PLAY")
@@ -60,9 +62,9 @@ def draw_preview(layout: bpy.types.UILayout, context: bpy.types.Context) -> None
         return
     draw_state(layout, session)
     draw_problems_row(layout, hair, session)
-    idle = "Uses Hairloom" if session is not None else ""
+    disabled_text = "Uses Hairloom" if session is not None else ""
     if not draw_progress(layout, HAIRLOOM_OT_use_groom):
-        draw_button(layout, "hairloom.use_groom", idle, icon="OUTLINER_OB_CURVES")
+        draw_button(layout, "hairloom.use_groom", disabled_text, icon="OUTLINER_OB_CURVES")
     draw_more(layout)
     if hair.hairloom.hairstyle:
         row = layout.row(align=True)
@@ -70,7 +72,7 @@ def draw_preview(layout: bpy.types.UILayout, context: bpy.types.Context) -> None
             draw_button(row, "hairloom.place_landmarks", text="Landmarks", icon="EMPTY_AXIS")
         if not draw_progress(row, HAIRLOOM_OT_fit_again):
             draw_button(row, "hairloom.fit_again", icon="FILE_REFRESH")
-    parts = layout.split(factor=NAMES)
+    parts = layout.split(factor=NAME_FRACTION)
     parts.label(text="Colour By")
     row = parts.row(align=True)
     row.prop(hair.hairloom, "debug_view", text="")
@@ -153,9 +155,9 @@ def _sub_panels(
             continue
         section = _sub_panel(parent, name, label, draw_section)
         yield section
-        for below in SUB_SECTIONS.get(name, ()):
-            if only is None or below[0] in only:
-                yield _sub_panel(section, *below)
+        for sub_section in SUB_SECTIONS.get(name, ()):
+            if only is None or sub_section[0] in only:
+                yield _sub_panel(section, *sub_section)
 
 
 def _sub_panel(
@@ -193,9 +195,9 @@ def _sub_panel(
     }
     if name in SWITCHES:
         namespace["draw_header"] = draw_header
-    for place in ("bl_category", "bl_context"):
-        if hasattr(parent, place):
-            namespace[place] = getattr(parent, place)
+    for attribute in ("bl_category", "bl_context"):
+        if hasattr(parent, attribute):
+            namespace[attribute] = getattr(parent, attribute)
     return type(f"{parent.__name__}_{name}", (bpy.types.Panel,), namespace)
 
 

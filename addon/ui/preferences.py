@@ -8,8 +8,8 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 
-from ..blender.base import gpu_choices
-from ..blender.base.gpu_context import gpu_in_use
+from ..blender.base import gpu_preferences
+from ..blender.base.gpu_context import gpu_info
 from ..blender.base.redraw import redraw_views
 from ..blender.properties.groups import operator_properties
 from ..blender.properties.presets import names_by_title
@@ -24,12 +24,12 @@ ROOT_PACKAGE = __package__.rpartition(".addon")[0]
 LOOK, DYNAMICS = "Brown", "Breeze"
 
 
-def _looks(_owner: Any, _context: bpy.types.Context, typed: str) -> list[str]:
-    return [name for name in names_by_title("shading") if typed.lower() in name.lower()]
+def _search_looks(_owner: Any, _context: bpy.types.Context, edit_text: str) -> list[str]:
+    return [name for name in names_by_title("shading") if edit_text.lower() in name.lower()]
 
 
-def _motions(_owner: Any, _context: bpy.types.Context, typed: str) -> list[str]:
-    return [name for name in names_by_title("dynamics") if typed.lower() in name.lower()]
+def _search_motions(_owner: Any, _context: bpy.types.Context, edit_text: str) -> list[str]:
+    return [name for name in names_by_title("dynamics") if edit_text.lower() in name.lower()]
 
 
 #: choices for a new groom; in the `__annotations__` of the page, and of operators that make one
@@ -38,14 +38,14 @@ NEW_GROOM: dict[str, Any] = {
         name="Look",
         description="Look preset of new grooms. If empty, the plain defaults are used",
         default=LOOK,
-        search=_looks,
+        search=_search_looks,
         search_options={"SUGGESTION"},
     ),
     "motion": StringProperty(
         name="Dynamics",
         description="Motion preset of new grooms. If empty, the plain defaults are used",
         default=DYNAMICS,
-        search=_motions,
+        search=_search_motions,
         search_options={"SUGGESTION"},
     ),
     "plays": BoolProperty(
@@ -57,8 +57,8 @@ NEW_GROOM: dict[str, Any] = {
 _DEVICE = operator_properties("dynamics")["device"]
 
 
-def _choose_gpu(page: Any, _context: Any) -> None:
-    gpu_choices.choose(image_atomics=page.image_atomics, memory=page.gpu_memory)
+def _apply_gpu_preferences(page: Any, _context: Any) -> None:
+    gpu_preferences.apply(image_atomics=page.image_atomics, memory=page.gpu_memory)
     redraw_views()
 
 
@@ -68,19 +68,19 @@ _MACHINE: dict[str, Any] = {
         name="Image Atomics",
         description="Whether the GPU sorts the strands of each pixel in lists. If hair is missing "
         "or broken, choose Never and send us the text of Copy Report",
-        items=gpu_choices.ATOMICS,
-        update=_choose_gpu,
+        items=gpu_preferences.ATOMICS,
+        update=_apply_gpu_preferences,
     ),
     "gpu_memory": IntProperty(
         name="GPU Memory (MB)",
         description="Amount of GPU memory that hair may use. With less, strands are drawn in more "
         "parts and shadow maps have fewer texels. Blender does not report how much memory the GPU "
         "has",
-        default=gpu_choices.DEFAULT_MEMORY,
-        min=gpu_choices.MIN_MEMORY,
+        default=gpu_preferences.DEFAULT_MEMORY,
+        min=gpu_preferences.MIN_MEMORY,
         max=1 << 17,
         soft_max=1 << 14,
-        update=_choose_gpu,
+        update=_apply_gpu_preferences,
     ),
 }
 
@@ -130,8 +130,8 @@ class HAIRLOOM_AP_preferences(bpy.types.AddonPreferences):
 
 def draw_machine(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw the GPU, and the results of the last self-test."""
-    used = gpu_in_use()
-    for name, value in used.items():
+    info = gpu_info()
+    for name, value in info.items():
         layout.label(text=f"{name.capitalize()}: {value or 'none'}")
     problem = compute_problem()
     text = f"Simulates on the CPU: {problem}" if problem else "Simulates on the GPU"
@@ -162,26 +162,28 @@ def preferences(context: bpy.types.Context) -> Any:
     )
 
 
-def chosen_presets(chosen: Any) -> tuple[str, ...]:
+def chosen_presets(options: Any) -> tuple[str, ...]:
     """The presets of a new groom, by name.
 
     Args:
-        chosen: preferences, or an operator with NEW_GROOM; presets are given by title or name.
+        options: preferences, or an operator with NEW_GROOM; presets are given by title or name.
     """
-    typed = {"shading": chosen.look, "dynamics": chosen.motion}
-    return tuple(names_by_title(section).get(text, text) for section, text in typed.items() if text)
+    presets = {"shading": options.look, "dynamics": options.motion}
+    return tuple(
+        names_by_title(section).get(text, text) for section, text in presets.items() if text
+    )
 
 
 def register() -> None:
     """Apply the saved settings of this machine."""
     entry = bpy.context.preferences.addons.get(ROOT_PACKAGE)
     if entry is not None and entry.preferences is not None:
-        _choose_gpu(entry.preferences, None)
+        _apply_gpu_preferences(entry.preferences, None)
 
 
 def unregister() -> None:
     """Restore the defaults, as the page to change the settings is gone."""
-    gpu_choices.choose()
+    gpu_preferences.apply()
 
 
 CLASSES: tuple[type[Any], ...] = (HAIRLOOM_AP_preferences,)

@@ -40,7 +40,7 @@ def draw_preset_row(
     """Draw the picture of the hair's preset and the buttons; for looks also those that convert from
     and to a material."""
     entries, warnings = _entries(section)
-    now = _number(hair, entries)
+    current = _preset_number(hair, entries)
     row = layout.row(align=True)
     row.template_icon_view(
         bpy.context.window_manager.hairloom_presets,
@@ -52,14 +52,16 @@ def draw_preset_row(
     buttons = row.column(align=True)
     steps = buttons.row(align=True)
     for icon, step in (("TRIA_LEFT", -1), ("TRIA_RIGHT", 1)):
-        beside = entries[(max(now - 1, 0) + step) % len(entries)] if now else entries[0]
-        steps.operator("hairloom.apply_preset", text="", icon=icon).name = beside.name
-    buttons.label(text=entries[now - 1].title if now else _CUSTOM[1])
-    kept = buttons.row(align=True)
-    kept.operator("hairloom.save_preset", text="Save", icon="ADD").section = section
-    kept.operator("hairloom.add_preset", text="", icon="FILE_FOLDER")
-    if now and entries[now - 1].is_own:
-        kept.operator("hairloom.delete_preset", text="", icon="X").name = entries[now - 1].name
+        neighbor = entries[(max(current - 1, 0) + step) % len(entries)] if current else entries[0]
+        steps.operator("hairloom.apply_preset", text="", icon=icon).name = neighbor.name
+    buttons.label(text=entries[current - 1].title if current else _CUSTOM[1])
+    file_buttons = buttons.row(align=True)
+    file_buttons.operator("hairloom.save_preset", text="Save", icon="ADD").section = section
+    file_buttons.operator("hairloom.add_preset", text="", icon="FILE_FOLDER")
+    if current and entries[current - 1].is_own:
+        file_buttons.operator("hairloom.delete_preset", text="", icon="X").name = entries[
+            current - 1
+        ].name
     for warning in warnings:
         draw_message(layout, bpy.context, warning, "ERROR")
     if section != "shading":
@@ -76,50 +78,50 @@ def _entries(section: str) -> tuple[tuple[Entry, ...], tuple[str, ...]]:
     return (*shipped_presets(section), *entries), warnings
 
 
-def _number(hair: bpy.types.Object, entries: tuple[Entry, ...]) -> int:
+def _preset_number(hair: bpy.types.Object, entries: tuple[Entry, ...]) -> int:
     """The number of the preset that the hair's settings match, counted from 1; 0: none.
 
     `color_source` is ignored on hair without colours of its own, where it has no effect.
     """
     ignored = () if COLOR_ATTRIBUTE in hair.data.attributes else ("color_source",)
-    found = matching_preset(hair, entries, ignored)
-    return 0 if found is None else 1 + entries.index(found)
+    preset = matching_preset(hair, entries, ignored)
+    return 0 if preset is None else 1 + entries.index(preset)
 
 
-def _choice(section: str) -> Any:
+def _preset_property(section: str) -> Any:
     """A property that is the preset of the hair in the panels; setting it applies another one."""
     # Blender does not copy the texts of items, so that they must be kept here
-    shown: list[tuple[str, str, str, str | int, int]] = []
+    enum_items: list[tuple[str, str, str, str | int, int]] = []
 
-    def items(_choices: Any, _context: bpy.types.Context | None) -> Any:
+    def items(_presets: Any, _context: bpy.types.Context | None) -> Any:
         entries, _ = _entries(section)
-        shown[:] = [
+        enum_items[:] = [
             (each.name, each.title, "", each.icon or "PRESET", number)
             for number, each in enumerate(entries, start=1)
         ]
-        if get(_choices) == 0:
-            shown.insert(0, _CUSTOM)
-        return shown
+        if get(_presets) == 0:
+            enum_items.insert(0, _CUSTOM)
+        return enum_items
 
-    def get(_choices: Any) -> int:
+    def get(_presets: Any) -> int:
         hair = chosen_hair(bpy.context)
-        return _number(hair[0], _entries(section)[0]) if hair else 0
+        return _preset_number(hair[0], _entries(section)[0]) if hair else 0
 
-    def choose(_choices: Any, number: int) -> None:
+    def apply(_presets: Any, number: int) -> None:
         if number > 0:
             name = _entries(section)[0][number - 1].name
             bpy.ops.hairloom.apply_preset("EXEC_DEFAULT", True, name=name)
 
     title, about = KINDS[section]
     return EnumProperty(
-        name=title, description=f"{about}. Click to choose", items=items, get=get, set=choose
+        name=title, description=f"{about}. Click to choose", items=items, get=get, set=apply
     )
 
 
 class HAIRLOOM_PG_presets(bpy.types.PropertyGroup):
     """The presets of the selected hair; the scene itself stores only settings, not which preset."""
 
-    __annotations__ = {section: _choice(section) for section in KINDS}
+    __annotations__ = {section: _preset_property(section) for section in KINDS}
 
 
 CLASSES: tuple[type[Any], ...] = (HAIRLOOM_PG_presets,)

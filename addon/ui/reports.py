@@ -9,7 +9,7 @@ from typing import Any
 
 import bpy
 
-from ..blender.base.gpu_context import gpu_refusals
+from ..blender.base.gpu_context import converted_gpu_errors
 from ..blender.base.outcome import Outcome, dropped_phrase, report
 from ..errors import HairloomError
 
@@ -18,15 +18,15 @@ def reporting(execute: Callable[..., set[str]]) -> Callable[..., set[str]]:
     """Decorator of an operator's `execute`: bad input becomes an error report, not a traceback."""
 
     @functools.wraps(execute)
-    def reported(self: Any, context: bpy.types.Context) -> set[str]:
+    def wrapper(self: Any, context: bpy.types.Context) -> set[str]:
         try:
-            with gpu_refusals():
+            with converted_gpu_errors():
                 return execute(self, context)
         except HairloomError as error:
             report(self, "ERROR", error)
             return {"CANCELLED"}
 
-    return reported
+    return wrapper
 
 
 def report_outcome(operator: bpy.types.Operator, outcome: Outcome) -> None:

@@ -31,7 +31,7 @@ from .operators_trim import draw_trim
 from .preset_chooser import draw_preset_row
 
 #: letters reserved for a line of the preview about strands, guides or children
-_LINE = 140
+_RESERVED_LETTERS = 140
 #: name, label, function that draws it
 type Section = tuple[str, str, Draw]
 
@@ -58,19 +58,19 @@ def _panel(section: str, panel: str = "") -> Draw:
     def draw(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
         if settings.panel_note and not panel:
             draw_lines(layout.column(align=True), bpy.context, settings.panel_note)
-        draw_section(layout, owner(hair), section, panel, leave_out=switch)
+        draw_section(layout, owner(hair), section, panel, exclude=switch)
 
     return draw
 
 
-def _with_declared(sections: Iterable[Section]) -> tuple[Section, ...]:
+def _insert_declared(sections: Iterable[Section]) -> tuple[Section, ...]:
     """These sections, with those inserted that only draw declared parameters."""
-    found = list(sections)
+    result = list(sections)
     for name, settings in ALL_SETTINGS.items():
         if settings.panel_after:
-            before = next(i for i, each in enumerate(found) if each[0] == settings.panel_after)
-            found.insert(before + 1, (name, settings.title, _panel(name)))
-    return tuple(found)
+            index = next(i for i, each in enumerate(result) if each[0] == settings.panel_after)
+            result.insert(index + 1, (name, settings.title, _panel(name)))
+    return tuple(result)
 
 
 def _look_panel(panel: str) -> Draw:
@@ -87,10 +87,10 @@ def draw_look(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     draw_section(layout, hair.data.hairloom, "shading")
 
 
-def _said(hair: bpy.types.Object, what: Callable[[Any], str]) -> str:
+def _preview_line(hair: bpy.types.Object, line_of: Callable[[Any], str]) -> str:
     """A line of the preview about its strands; empty before they are made."""
     session = previews.session_of(hair)
-    text = "" if session is None or not session.is_made else what(session.rig)
+    text = "" if session is None or not session.is_made else line_of(session.rig)
     return f"{text}." if text else ""
 
 
@@ -98,10 +98,10 @@ def draw_strands(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     """Lines about widths and guides, their settings, and the menu of Blender's hair nodes."""
     column = layout.column(align=True)
     for text in (
-        _said(hair, lambda rig: rig.widths.line),
-        _said(hair, lambda rig: rig.guides_line),
+        _preview_line(hair, lambda rig: rig.widths.line),
+        _preview_line(hair, lambda rig: rig.guides_line),
     ):
-        draw_lines(column, bpy.context, text, room=_LINE)
+        draw_lines(column, bpy.context, text, reserved_letters=_RESERVED_LETTERS)
     draw_section(layout, hair.data.hairloom, "widths")
     draw_section(layout, hair.data.hairloom, "strands")
     layout.label(text=ALL_SETTINGS["ambient"].title)
@@ -114,7 +114,7 @@ def draw_volume(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     draw_preset_row(layout, hair, "volume")
     draw_section(layout, hair.data.hairloom, "volume")
     if hair.data.hairloom.volume.shadows != "none":
-        draw_button(layout, "hairloom.show_slices", "Opacity Map: Preview First", anywhere=True)
+        draw_button(layout, "hairloom.show_slices", "Opacity Map: Preview First", in_all_modes=True)
 
 
 def draw_skin(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
@@ -122,8 +122,11 @@ def draw_skin(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     _panel("skin")(layout, hair)
     column = layout.column()
     column.active = groom.skin.soft_shadow and groom.volume.shadows != "none"
-    idle, text = "Skin Shadow: Preview First", None if column.active else "Hair Has No Skin Shadow"
-    draw_button(column, "hairloom.show_skin_shadow", text or idle, text, anywhere=True)
+    disabled_text, text = (
+        "Skin Shadow: Preview First",
+        None if column.active else "Hair Has No Skin Shadow",
+    )
+    draw_button(column, "hairloom.show_skin_shadow", text or disabled_text, text, in_all_modes=True)
 
 
 def draw_medium(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
@@ -137,12 +140,12 @@ def draw_children(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     """A line about the preview's children and their settings; without children, only the method."""
     groom = hair.data.hairloom
     if groom.children.method == "auto":
-        text = _said(hair, lambda rig: rig.children_line)
-        draw_lines(layout.column(align=True), bpy.context, text, room=_LINE)
+        text = _preview_line(hair, lambda rig: rig.children_line)
+        draw_lines(layout.column(align=True), bpy.context, text, reserved_letters=_RESERVED_LETTERS)
     layout.prop(groom.children, "method")
     if groom.children.method != "none":
         layout.prop(hair.hairloom, "children_density")
-        draw_section(layout, groom, "children", leave_out={"method"})
+        draw_section(layout, groom, "children", exclude={"method"})
 
 
 def draw_trim_and_mirror(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
@@ -170,13 +173,13 @@ def draw_export(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
         layout.operator("hairloom.check_export", icon="CHECKMARK")
     if not draw_progress(layout, HAIRLOOM_OT_make_real):
         draw_button(layout, "hairloom.make_real", icon="OUTLINER_OB_CURVES")
-    idle = "No Reports Yet"
-    draw_button(layout, "hairloom.show_reports", idle, anywhere=True, icon="TEXT")
+    disabled_text = "No Reports Yet"
+    draw_button(layout, "hairloom.show_reports", disabled_text, in_all_modes=True, icon="TEXT")
 
 
 #: panels below Look whose settings only act in the model Marschner
 _MARSCHNER_PANELS = ("Rim Light", "Fibre")
-SECTIONS = _with_declared(
+SECTIONS = _insert_declared(
     (
         ("look", "Look", draw_look),
         ("shadows", "Shadows", draw_volume),

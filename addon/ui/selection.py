@@ -75,7 +75,7 @@ def active_mesh(context: bpy.types.Context) -> bpy.types.Object | None:
     return active if is_mesh else None
 
 
-def ground_mesh(context: bpy.types.Context) -> bpy.types.Object | None:
+def growth_mesh(context: bpy.types.Context) -> bpy.types.Object | None:
     """The mesh to grow hair on: the active one, or the active hair's.
 
     The latter because newly grown hair is active, and Blender offers Adjust Last Operation only if

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import bpy
 
-from ..blender.base.gpu_choices import memory_in_use, memory_problem
+from ..blender.base.gpu_preferences import memory_in_use, memory_problem
 from ..blender.base.outcome import dropped_phrase
 from ..blender.preview import previews as registry
 from ..blender.preview.diagnostics import instances_note, issues_of, unfelt_note
@@ -22,7 +22,7 @@ from .messages import draw_lines, draw_message
 
 _MEGABYTE = 1 << 20
 #: fraction of a line for the name of its value
-NAMES = 0.36
+NAME_FRACTION = 0.36
 #: text for a missing value
 _NONE = "-"
 
@@ -40,8 +40,8 @@ def draw_state(layout: bpy.types.UILayout, session: Session | None) -> None:
     """Draw what moves the hair, counts, memory and times, with the same number of short lines in
     any state, so that buttons below do not move away from under the mouse."""
     lines = layout.column(align=True)
-    for name, text in (("State", _state(session)), *_figures(session)):
-        parts = lines.split(factor=NAMES)
+    for name, text in (("State", _state(session)), *_statistics(session)):
+        parts = lines.split(factor=NAME_FRACTION)
         parts.label(text=name)
         row = parts.row(align=True)
         if name == "State" and running_label():
@@ -85,23 +85,23 @@ def draw_card_progress(layout: bpy.types.UILayout, session: Session | None) -> b
     return True
 
 
-def _figures(session: Session | None) -> Iterator[tuple[str, str]]:
+def _statistics(session: Session | None) -> Iterator[tuple[str, str]]:
     """Name and value of each figure, also for hair that is not made."""
     rig = None if session is None or not session.is_made else session.rig
-    shown: tuple[str, ...] = (_NONE, _NONE)
+    drawn: tuple[str, ...] = (_NONE, _NONE)
     if session is not None and rig is not None:
-        shown = _shown(session)
+        drawn = _drawn_counts(session)
     yield "Strands", _NONE if rig is None else f"{rig.strands.strand_count:,}"
     yield "Guides", _NONE if rig is None else f"{len(rig.guides):,}"
-    yield from zip(("Drawn", ""), shown, strict=True)
+    yield from zip(("Drawn", ""), drawn, strict=True)
     size = 0 if session is None or rig is None else array_bytes(rig, session.snapshot)
     yield "Memory", f"{size / _MEGABYTE:,.0f} MB, GPU {memory_in_use():,.0f} MB" if size else _NONE
     for part in PARTS:
-        spent = None if session is None else session.times.milliseconds(part)
-        yield part.capitalize(), _milliseconds(spent)
+        milliseconds = None if session is None else session.times.milliseconds(part)
+        yield part.capitalize(), _milliseconds(milliseconds)
 
 
-def _shown(session: Session) -> tuple[str, str]:
+def _drawn_counts(session: Session) -> tuple[str, str]:
     """The number of drawn strands or cards, and of their vertices or triangles."""
     if session.snapshot.cards is not None:
         cards, triangles, _ = session.cards.counts
@@ -110,30 +110,34 @@ def _shown(session: Session) -> tuple[str, str]:
     return f"{drawn.strands:,} strands", f"{drawn.vertices:,} vertices"
 
 
-def _milliseconds(spent: float | None) -> str:
-    if spent is None:
+def _milliseconds(milliseconds: float | None) -> str:
+    if milliseconds is None:
         return _NONE
-    return f"{spent:,.0f} ms" if spent >= 100.0 else f"{spent:.1f} ms"
+    return f"{milliseconds:,.0f} ms" if milliseconds >= 100.0 else f"{milliseconds:.1f} ms"
 
 
 def problems_of(hair: bpy.types.Object, session: Session | None) -> tuple[Problem, ...]:
     """The problems, worst first, then other notes for the artist."""
-    ended = [Problem(registry.notice())] if registry.notice() else []
+    notices = [Problem(registry.notice())] if registry.notice() else []
     issues = issues_of(hair, session)
-    found = [*ended, *(Problem(one.text, one.operator, one.button) for one in issues)]
+    problems = [*notices, *(Problem(each.text, each.operator, each.button) for each in issues)]
     if session is None:
-        return tuple(found)
+        return tuple(problems)
     if session.source.dropped:
-        found.append(Problem(dropped_phrase(session.source.dropped).capitalize()))
+        problems.append(Problem(dropped_phrase(session.source.dropped).capitalize()))
     reported = {issue.instead_of for issue in issues}
-    problems = previews[session.uid].problems
-    machine = memory_problem(), view_transform.problem()
-    left_out = instances_note(hair), unfelt_note(session)
-    others = filter(None, (problems, *machine, *left_out, *notes_of(session.uid)))
-    for warning in dict.fromkeys((*session.warnings, *others)):
+    others = (
+        previews[session.uid].problems,
+        memory_problem(),
+        view_transform.problem(),
+        instances_note(hair),
+        unfelt_note(session),
+        *notes_of(session.uid),
+    )
+    for warning in dict.fromkeys((*session.warnings, *filter(None, others))):
         if warning not in reported:
-            found.append(Problem(warning.removeprefix(f"{hair.name}: ")))
-    return tuple(found)
+            problems.append(Problem(warning.removeprefix(f"{hair.name}: ")))
+    return tuple(problems)
 
 
 def draw_problems_row(
@@ -147,9 +151,9 @@ def draw_problems_row(
         return
     text = "1 problem" if len(problems) == 1 else f"{len(problems)} problems"
     row.operator("hairloom.show_problems", text=text, icon="ERROR")
-    fixed = next((one for one in problems if one.operator), None)
-    if fixed is not None:
-        row.operator(fixed.operator, text=fixed.button, icon="MODIFIER")
+    fixable = next((problem for problem in problems if problem.operator), None)
+    if fixable is not None:
+        row.operator(fixable.operator, text=fixable.button, icon="MODIFIER")
 
 
 def draw_problems(
@@ -160,11 +164,11 @@ def draw_problems(
     width: float,
 ) -> None:
     """Draw all problems in full, each with its button. width: of the popup, see `draw_lines`."""
-    for one in problems_of(hair, session):
+    for problem in problems_of(hair, session):
         box = layout.box().column(align=True)
-        draw_lines(box, context, one.text, "ERROR", width=width)
-        if one.operator:
-            box.operator(one.operator, text=one.button, icon="MODIFIER")
+        draw_lines(box, context, problem.text, "ERROR", width=width)
+        if problem.operator:
+            box.operator(problem.operator, text=problem.button, icon="MODIFIER")
 
 
 def draw_notice(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:

@@ -12,7 +12,7 @@ from bpy.props import EnumProperty, IntProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
 from ..blender.bakes.bake_settings import frame_range
-from ..blender.base.file_names import file_stem, files_of
+from ..blender.base.file_names import file_paths, file_stem
 from ..blender.base.objects import without_hidden
 from ..blender.base.outcome import Outcome, report
 from ..blender.colliders.rigs import CachedRig
@@ -26,11 +26,11 @@ from ..exchange.strand_formats import StrandFormat
 from ..params import Parameter
 from . import operators_export_check as export_check
 from .long_work import LongWork, Progress, Steps
-from .operators_export_check import writable
+from .operators_export_check import exportable_hair
 from .reports import report_outcome
 from .selection import chosen_hair, needs_hair
 
-_SEVERAL = (
+_MULTIPLE_OBJECTS = (
     ("one", "One File", "All hair in one file, with separate groups for each object"),
     ("each", "A File Each", "One file for each hair object, named after it"),
 )
@@ -40,24 +40,24 @@ _FRAMES = (
     ("own", "Frames", "A range of frames"),
 )
 #: panel -> options of the dialog itself, drawn before those of the settings
-_OF_DIALOG = {"Include": ("several",), "Animation": ("frames", "first", "last")}
+_DIALOG_OPTIONS = {"Include": ("several",), "Animation": ("frames", "first", "last")}
 
 
 def option_properties(kind: StrandFormat) -> dict[str, Any]:
     """The options in the `__annotations__` of the operator that writes a format."""
-    return property_annotations(_as_in(kind, each) for each in _options(kind))
+    return property_annotations(_for_format(kind, each) for each in _options(kind))
 
 
-def _as_in(kind: StrandFormat, option: Parameter) -> Parameter:
+def _for_format(kind: StrandFormat, option: Parameter) -> Parameter:
     """An option with a format's defaults and choices: its engines, or else its axis and unit."""
     if option.name == "engine":
         engines = tuple((each.name, each.title, each.about) for each in kind.layouts)
         return replace(option, default=engines[0][0], choices=engines)
     if "engine" not in kind.options and option.name in ("up", "scale"):
         space = kind.layouts[0].space
-        usual = {"up": space.up, "scale": 1.0 / space.units_per_metre}
+        defaults = {"up": space.up, "scale": 1.0 / space.units_per_metre}
         choices = tuple(each for each in option.choices if each[0] != FORMAT_DEFAULT)
-        return replace(option, default=usual[option.name], choices=choices)
+        return replace(option, default=defaults[option.name], choices=choices)
     return option
 
 
@@ -81,14 +81,14 @@ class StrandExportOperator(LongWork, ExportHelper):
     several: EnumProperty(
         name="Multiple Objects",
         description="How to write more than one hair object",
-        items=_SEVERAL,
+        items=_MULTIPLE_OBJECTS,
     )
 
     @property
     def filename_ext(self) -> str:
         """The suffix that Blender appends to a name; one that fits the format is kept."""
-        suffix, known = Path(self.filepath).suffix.lower(), self.kind.suffixes
-        return suffix if suffix in known else known[0]
+        suffix, suffixes = Path(self.filepath).suffix.lower(), self.kind.suffixes
+        return suffix if suffix in suffixes else suffixes[0]
 
     @classmethod
     def poll(cls: Any, context: bpy.types.Context) -> bool:
@@ -98,11 +98,11 @@ class StrandExportOperator(LongWork, ExportHelper):
         return bool(bpy.data.hair_curves) or needs_hair(cls, context)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        hair = writable(chosen_hair(context))
+        hair = exportable_hair(chosen_hair(context))
         if hair and not self.filepath:
             folder = Path(bpy.data.filepath).parent if bpy.data.filepath else Path()
             self.properties.filepath = str(folder / (file_stem(hair[0].name) + self.filename_ext))
-        export_check.begin(ExportCheck.of(hair, previewed_rigs()))
+        export_check.open_check(ExportCheck.of(hair, previewed_rigs()))
         self._refresh(context)
         return super().invoke(context, event)
 
@@ -116,7 +116,7 @@ class StrandExportOperator(LongWork, ExportHelper):
 
     def steps(self: Any, context: bpy.types.Context) -> Steps[None]:
         cached_rigs = export_check.cached_rigs()
-        export_check.end()
+        export_check.close_check()
         plans = self._plans(context, cached_rigs)
         for done, (path, plan) in enumerate(plans):
             if done:
@@ -124,10 +124,10 @@ class StrandExportOperator(LongWork, ExportHelper):
             if plan.frames is None:
                 report_outcome(self, plan.write(path))
             else:
-                report_outcome(self, (yield from _in_motion(path, plan)))
+                report_outcome(self, (yield from _write_motion(path, plan)))
 
     def cancel(self, context: bpy.types.Context) -> None:
-        export_check.end()
+        export_check.close_check()
         super().cancel(context)
 
     def _plans(
@@ -137,7 +137,7 @@ class StrandExportOperator(LongWork, ExportHelper):
         hair, path = self._hair(context), Path(bpy.path.abspath(self.filepath))
         parts = [hair] if self.several == "one" else [[each] for each in hair]
         depsgraph = context.evaluated_depsgraph_get()
-        files = files_of(path, [part[0].name for part in parts])
+        files = file_paths(path, [part[0].name for part in parts])
         return [
             (
                 file,
@@ -157,24 +157,26 @@ class StrandExportOperator(LongWork, ExportHelper):
         frames = getattr(self, "frames", "still")
         if frames == "still":
             return None
-        own = frames == "own"
-        first, last = (self.first, self.last) if own else (scene.frame_start, scene.frame_end)
+        uses_own_range = frames == "own"
+        first, last = (
+            (self.first, self.last) if uses_own_range else (scene.frame_start, scene.frame_end)
+        )
         return frame_range(first, last, "Frames")
 
     def _hair(self, context: bpy.types.Context) -> list[bpy.types.Object]:
         if not self.collection:
-            return writable(chosen_hair(context)) or _refuse(
+            return exportable_hair(chosen_hair(context)) or _raise_no_hair(
                 "Nothing selected", "Select hair curves"
             )
-        own = context.scene.collection
+        scene_collection = context.scene.collection
         collection = bpy.data.collections.get(
-            self.collection, own if self.collection == own.name else None
+            self.collection, scene_collection if self.collection == scene_collection.name else None
         )
         objects = () if collection is None else collection.all_objects
-        hair, left_out = without_hidden(writable(objects), context.evaluated_depsgraph_get())
+        hair, left_out = without_hidden(exportable_hair(objects), context.evaluated_depsgraph_get())
         for each in left_out:
             report(self, "WARNING", f"{each}, and is left out.")
-        return hair or _refuse(
+        return hair or _raise_no_hair(
             f"Collection '{self.collection}'", "Link hair curves to it, or choose another one"
         )
 
@@ -198,8 +200,8 @@ class StrandExportOperator(LongWork, ExportHelper):
 
     def _names(self, panel: str) -> list[str]:
         """The options in a panel."""
-        own = [name for name in _OF_DIALOG.get(panel, ()) if hasattr(self, name)]
-        return own + [each.name for each in _options(self.kind) if each.panel == panel]
+        dialog_options = [name for name in _DIALOG_OPTIONS.get(panel, ()) if hasattr(self, name)]
+        return dialog_options + [each.name for each in _options(self.kind) if each.panel == panel]
 
     def _draw_option(self: Any, layout: bpy.types.UILayout, name: str) -> None:
         """Draw an option, unless it has no effect with the present choices."""
@@ -207,12 +209,12 @@ class StrandExportOperator(LongWork, ExportHelper):
             return
         if name == "use_bake" and self.frames == "still":
             return
-        if name == "several" and export_check.count() == 1:
+        if name == "several" and export_check.hair_count() == 1:
             return
         layout.prop(self, name)
 
 
-class MovingExport:
+class MotionOptions:
     """Options of formats that hold motion."""
 
     frames: EnumProperty(name="Frames", description="Frames to write", items=_FRAMES)
@@ -220,7 +222,7 @@ class MovingExport:
     last: IntProperty(name="Last", description="Last frame", default=250)
 
 
-def _in_motion(path: Path, plan: StrandExport) -> Steps[Outcome]:
+def _write_motion(path: Path, plan: StrandExport) -> Steps[Outcome]:
     """Read frames here, in the main thread, while another thread writes them."""
     total = plan.frame_count
     yield Progress(f"0 of {total:,} frames", 0.0)
@@ -239,5 +241,5 @@ def _in_motion(path: Path, plan: StrandExport) -> Steps[Outcome]:
             work.cancel()
 
 
-def _refuse(place: str, remedy: str) -> Any:
+def _raise_no_hair(place: str, remedy: str) -> Any:
     raise HairloomError("there is no hair to write", place=place, remedy=remedy)

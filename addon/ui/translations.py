@@ -24,20 +24,24 @@ TEMPLATE = "template"
 
 #: function that draws a text -> the context in which Blender looks it up, and the index of the
 #: first argument that is a text; for all others the context is "*"
-_DRAWN = {"operator": ("Operator", 1), "draw_button": ("Operator", 2), "draw_idle": ("*", 3)}
+_DRAW_FUNCTIONS = {
+    "operator": ("Operator", 1),
+    "draw_button": ("Operator", 2),
+    "draw_inactive": ("*", 3),
+}
 #: keywords that are texts
-_TEXTS = ("text", "heading", "idle")
+_TEXT_KEYWORDS = ("text", "heading", "disabled_text")
 
 type Table = dict[tuple[str, str], str]
 
 
 def tables() -> dict[str, Table]:
     """language -> (context, text) -> translation, from all files."""
-    found = {}
+    result = {}
     for path in sorted(FOLDER.glob("*.json")):
         if path.stem != TEMPLATE:
-            found[path.stem] = table_of(json.loads(path.read_text(encoding="utf-8")))
-    return found
+            result[path.stem] = table_of(json.loads(path.read_text(encoding="utf-8")))
+    return result
 
 
 def table_of(content: dict[str, dict[str, str]]) -> Table:
@@ -52,12 +56,12 @@ def table_of(content: dict[str, dict[str, str]]) -> Table:
 
 def texts(classes: Iterable[type[Any]]) -> dict[str, dict[str, str]]:
     """All texts that the template holds: context -> text -> "", in order."""
-    found = _drawn()
+    found = _drawn_texts()
     for each in classes:
-        found |= _of_class(each)
+        found |= _class_texts(each)
     for name in dir(bpy.ops.hairloom):
         rna = getattr(bpy.ops.hairloom, name).get_rna_type()
-        found |= {("Operator", rna.name), ("*", rna.description)} | _of_properties(rna)
+        found |= {("Operator", rna.name), ("*", rna.description)} | _property_texts(rna)
     ordered: dict[str, dict[str, str]] = {}
     for context, text in sorted(found):
         if text:
@@ -65,18 +69,18 @@ def texts(classes: Iterable[type[Any]]) -> dict[str, dict[str, str]]:
     return ordered
 
 
-def _drawn() -> set[tuple[str, str]]:
+def _drawn_texts() -> set[tuple[str, str]]:
     """The literal texts that code in this room draws."""
-    found: set[tuple[str, str]] = set()
+    texts: set[tuple[str, str]] = set()
     for file in Path(__file__).parent.rglob("*.py"):
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Call):
-                called = getattr(node.func, "attr", getattr(node.func, "id", ""))
-                context, first = _DRAWN.get(called, ("*", len(node.args)))
-                given = [each.value for each in node.keywords if each.arg in _TEXTS]
-                for text in (*node.args[first:], *given):
-                    found |= {(context, each) for each in _constants(text)}
-    return found
+                name = getattr(node.func, "attr", getattr(node.func, "id", ""))
+                context, first = _DRAW_FUNCTIONS.get(name, ("*", len(node.args)))
+                keyword_texts = [each.value for each in node.keywords if each.arg in _TEXT_KEYWORDS]
+                for text in (*node.args[first:], *keyword_texts):
+                    texts |= {(context, each) for each in _constants(text)}
+    return texts
 
 
 def _constants(text: ast.expr) -> set[str]:
@@ -87,21 +91,21 @@ def _constants(text: ast.expr) -> set[str]:
     return {value} if isinstance(value, str) and re.search("[a-z]", value) else set()
 
 
-def _of_class(each: Any) -> set[tuple[str, str]]:
+def _class_texts(each: Any) -> set[tuple[str, str]]:
     label = ("*", getattr(each, "bl_label", ""))
-    return {label, ("*", each.bl_rna.description)} | _of_properties(each.bl_rna)
+    return {label, ("*", each.bl_rna.description)} | _property_texts(each.bl_rna)
 
 
-def _of_properties(rna: Any) -> set[tuple[str, str]]:
-    own = {prop.identifier for base in _bases(rna) for prop in base.properties}
-    found = set()
+def _property_texts(rna: Any) -> set[tuple[str, str]]:
+    inherited = {prop.identifier for base in _bases(rna) for prop in base.properties}
+    texts = set()
     for prop in rna.properties:
-        if prop.identifier in own:
+        if prop.identifier in inherited:
             continue
-        found |= {("*", prop.name), ("*", prop.description)}
+        texts |= {("*", prop.name), ("*", prop.description)}
         for item in getattr(prop, "enum_items_static", ()):
-            found |= {("*", item.name), ("*", item.description)}
-    return found
+            texts |= {("*", item.name), ("*", item.description)}
+    return texts
 
 
 def _bases(rna: Any) -> list[Any]:

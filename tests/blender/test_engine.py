@@ -352,7 +352,7 @@ def test_gpu_memory_of_a_view_is_freed_when_it_leaves_rendered_mode(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     asked: list[bool] = []
-    monkeypatch.setattr(engine_view, "free_soon", lambda: asked.append(True))
+    monkeypatch.setattr(engine_view, "schedule_free_unused", lambda: asked.append(True))
     view = engine_view.EngineView()
     assert not asked
     del view

@@ -93,14 +93,14 @@ def test_the_winds_arrow_ends_where_the_overlays_does(hair: Any) -> None:
 
 def test_rings_turn_the_wind_as_the_mouse_turns_them(hair: Any) -> None:
     """Blender turns rings clockwise around z: turned back by its angle, x points along the wind."""
-    turns, wind = handles(gizmos.HAIRLOOM_GGT_wind).turns, hair.hairloom.dynamics
+    dials, wind = handles(gizmos.HAIRLOOM_GGT_wind).dials, hair.hairloom.dynamics
     level = Vector((math.cos(wind.wind_direction), math.sin(wind.wind_direction), 0.0))
     along = math.cos(wind.wind_elevation) * level
     along.z = math.sin(wind.wind_elevation)
     for name, expected in (("wind_direction", level), ("wind_elevation", along)):
-        assert turns[name].target == (wind, name)
+        assert dials[name].target == (wind, name)
         back = Matrix.Rotation(-getattr(wind, name), 3, "Z")
-        found = turns[name].matrix_basis.to_3x3() @ back @ Vector((1.0, 0.0, 0.0))
+        found = dials[name].matrix_basis.to_3x3() @ back @ Vector((1.0, 0.0, 0.0))
         np.testing.assert_allclose(found, expected, atol=1e-6)
 
 

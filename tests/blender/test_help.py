@@ -84,7 +84,7 @@ def test_every_page_and_heading_is_in_the_zip(pages: Path, monkeypatch: pytest.M
     _, entries = ours.manual_map()
     missing = [pattern for pattern, address in entries if not is_there(address)]
     assert missing == [] and len(entries) > 50
-    assert not is_there(ours.address("dynamics#nowhere")), "the check finds everything"
+    assert not is_there(ours.page_url("dynamics#nowhere")), "the check finds everything"
 
 
 @pytest.mark.slow(instead="test_f1_finds_a_page_for_each_operator_and_property")
@@ -142,7 +142,7 @@ def test_each_panel_of_hair_has_a_question_mark_for_its_own_page(
 
     ours_all = [each for each in registration.CLASSES if issubclass(each, bpy.types.Panel)]
     for panel in ours_all:
-        drawn = SimpleNamespace(layout=Layout(), helped=getattr(panel, "helped", ""))
+        drawn = SimpleNamespace(layout=Layout(), help_section=getattr(panel, "help_section", ""))
         panel.draw_header_preset(drawn, bpy.context)
         section = panel.__name__.partition("_PT_")[2].partition("_")[2]
         assert asked[-1].page in ours.PAGES.values(), section

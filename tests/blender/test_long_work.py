@@ -169,5 +169,5 @@ def test_play_restores_its_status_text_after_other_work(monkeypatch: pytest.Monk
     ticks = operators_preview._Ticks()
     for label in ("", "", "Settle", "Settle", ""):
         monkeypatch.setattr(operators_preview, "running_label", lambda label=label: label)
-        ticks.tell()
+        ticks.update_status()
     assert shown == [operators_preview.STATUS] * 2

@@ -55,7 +55,7 @@ def hair(new_hair: Callable[..., Any], sphere: Any) -> Iterator[Any]:
     select(made)
     bpy.context.view_layer.update()
     yield made
-    operators_export_check.end()
+    operators_export_check.close_check()
 
 
 def written(path: Path) -> bytes:
@@ -217,12 +217,12 @@ def test_the_dialog_makes_strands_once_and_the_file_has_them(
     assert made == ["Hair"]
     check.refresh(depsgraph, ALEMBIC, StrandExportSettings())
     assert made == ["Hair"], "another format has the same strands"
-    operators_export_check.begin(check)
+    operators_export_check.open_check(check)
     found = written(tmp_path / "found.tfx")
     assert made == ["Hair"]
     assert not operators_export_check.cached_rigs(), "they are kept no longer than the dialog"
     assert found == written(tmp_path / "own.tfx") and made == ["Hair", "Hair"]
-    operators_export_check.begin(check)
+    operators_export_check.open_check(check)
     comb(hair)
     bpy.context.view_layer.update()
     edited = written(tmp_path / "edited.tfx")

@@ -88,7 +88,7 @@ def test_stills_take_more_samples_without_atomics() -> None:
 def test_the_preferences_forbid_them_and_the_self_test_says_so(monkeypatch: Any) -> None:
     monkeypatch.setattr(self_test, "_last_results", ())
     page = SimpleNamespace(image_atomics="never", gpu_memory=1024)
-    preferences._choose_gpu(page, bpy.context)
+    preferences._apply_gpu_preferences(page, bpy.context)
     self_test.run()
     found = {check.name: check for check in self_test.last_report()}
     atomics, limits = found["Image atomics"], found["GPU"]
@@ -98,7 +98,7 @@ def test_the_preferences_forbid_them_and_the_self_test_says_so(monkeypatch: Any)
     assert f"textures of {most:,} texels" in limits.text and "ms" in limits.text
     assert not any(check.outcome == "failed" for check in found.values())
     page.image_atomics = "automatic"
-    preferences._choose_gpu(page, bpy.context)
+    preferences._apply_gpu_preferences(page, bpy.context)
     self_test.run()
     assert {check.name: check.outcome for check in self_test.last_report()}[
         "Image atomics"

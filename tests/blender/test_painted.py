@@ -10,7 +10,7 @@ import pytest
 
 from hairloom.addon.blender.bakes.groom_hashes import groom_rig_hash
 from hairloom.addon.blender.bakes.simulation import differences
-from hairloom.addon.blender.base.vertex_weights import Memberships, read_weights
+from hairloom.addon.blender.base.vertex_weights import VertexGroupWeights, read_weights
 from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.preview.bake import Bake
 from hairloom.addon.blender.preview.preview import baked_rig_for
@@ -335,8 +335,8 @@ def test_a_dab_reads_the_vertex_groups_once_for_children_and_overlay(
     session = started(hair, get_depsgraph)
     hair.hairloom.shown_overlays, hair.hairloom.shown_map = {"paint"}, "Long"
     catch_up(get_depsgraph)
-    read, of = [], Memberships.of
-    monkeypatch.setattr(Memberships, "of", lambda mesh: read.append(mesh) or of(mesh))
+    read, of = [], VertexGroupWeights.of
+    monkeypatch.setattr(VertexGroupWeights, "of", lambda mesh: read.append(mesh) or of(mesh))
     for name, weight in (("Long", 0.5), ("Top", 0.2), ("Long", 0.3)):
         length = session.rig.strands.lengths()
         sphere.vertex_groups[name].add(every[: len(every) // 2], weight, "REPLACE")

@@ -195,10 +195,10 @@ def test_a_temporarily_missing_gpu_is_waited_for(preview, get_depsgraph, monkeyp
     """Blender has no GPU context between a window's closing and the next redraw."""
     _, _, session = preview
     done = []
-    monkeypatch.setattr(previews, "is_interrupted", lambda: True)
+    monkeypatch.setattr(previews, "is_context_missing", lambda: True)
     previews.attempt(previews.previews[session.uid], get_depsgraph(), lambda: done.append(session))
     assert done == [] and previews.sessions() == (session,) and session.is_stale
-    monkeypatch.setattr(previews, "is_interrupted", lambda: False)
+    monkeypatch.setattr(previews, "is_context_missing", lambda: False)
     assert not bpy.app.timers.is_registered(scene_events._read_again)
     update()
     assert bpy.app.timers.is_registered(scene_events._read_again), "nobody looks again"

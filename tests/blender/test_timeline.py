@@ -11,7 +11,7 @@ from swinging import shake_head
 from tiers import few_in_commits
 
 from hairloom.addon.blender.bakes import playback
-from hairloom.addon.blender.base.frame_clock import MAX_AT_ONCE, FrameClock
+from hairloom.addon.blender.base.frame_clock import MAX_FRAMES_PER_TICK, FrameClock
 from hairloom.addon.blender.preview import previews
 
 LAST = 10
@@ -234,11 +234,11 @@ def test_a_driver_without_a_number_is_ignored(swinging):
 def test_play_keeps_the_scenes_rate_and_drops_what_it_cannot_make_up_for():
     clock = FrameClock(10.0)
     ticks = 10.0 + np.arange(1, 121) / 120.0
-    assert sum(clock.due(now, 24.0) for now in ticks) == 24
-    assert max(FrameClock(0.0).due(now, 24.0) for now in (5.0, 0.05)) == MAX_AT_ONCE
+    assert sum(clock.due_frames(now, 24.0) for now in ticks) == 24
+    assert max(FrameClock(0.0).due_frames(now, 24.0) for now in (5.0, 0.05)) == MAX_FRAMES_PER_TICK
     slow = FrameClock(0.0)
-    assert slow.due(5.0, 24.0) == MAX_AT_ONCE
-    assert slow.due(5.0 + 1.5 / 24.0, 24.0) == 1, "what was late is forgotten"
+    assert slow.due_frames(5.0, 24.0) == MAX_FRAMES_PER_TICK
+    assert slow.due_frames(5.0 + 1.5 / 24.0, 24.0) == 1, "what was late is forgotten"
     slow.skip(9.0)
-    assert slow.due(9.0 + 1.0 / 24.0, 24.0) == 1
-    assert FrameClock(0.0).due(0.5, 0.01) == 0
+    assert slow.due_frames(9.0 + 1.0 / 24.0, 24.0) == 1
+    assert FrameClock(0.0).due_frames(0.5, 0.01) == 0

@@ -128,7 +128,7 @@ def the_winds_speed():
 def the_winds_direction():
     """Dragged by the ring around the hair, whose front follows the mouse."""
     center, _ = ball()
-    pixels = bpy.context.preferences.view.gizmo_size * hairloom_module("gizmos").RING
+    pixels = bpy.context.preferences.view.gizmo_size * hairloom_module("gizmos").RING_SCALE
     aside = on_screen(center + Vector((0.01, 0.0, 0.0)))[0] - on_screen(center)[0]
     radius = 0.01 * pixels / aside
     angle = math.radians(-60.0)

@@ -259,7 +259,7 @@ def popups():
     yield from popup("sort", "sort_cards")
     choose(bpy.data.objects["Hair"])
     yield from popup("check", "check_export")
-    assert hairloom_module("export_check").count() == 0, "the check goes on unseen"
+    assert hairloom_module("export_check").hair_count() == 0, "the check goes on unseen"
     bpy.ops.hairloom.preview()
     yield from wait_until(lambda: is_drawn(bpy.data.objects["Hair"]), "the hair is not drawn")
 

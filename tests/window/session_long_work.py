@@ -167,7 +167,7 @@ def check():
 
 def into_a_popup():
     """Data that was read is freed by Esc while it is read, and by Esc in the popup."""
-    seen = hairloom_module("export_check").count
+    seen = hairloom_module("export_check").hair_count
     check()
     yield from press("ESC")
     yield from wait_until(lambda: not running_label(), "Esc does not cancel the check")

@@ -72,11 +72,11 @@ def export(**options):
 def the_check_stands_beside_the_options():
     yield from export()
     check = hairloom_module("export_check")
-    assert check.count() == 1 and "guides" in check._check.lines[0], check._check
+    assert check.hair_count() == 1 and "guides" in check._check.lines[0], check._check
     driver.screenshot("options")
     yield from confirm_file_browser()
     yield from wait_until((FOLDER / "hair.abc").exists, "nothing is written")
-    assert check.count() == 0 and not running_label()
+    assert check.hair_count() == 0 and not running_label()
 
 
 def motion_comes_in_steps():
@@ -114,7 +114,7 @@ def the_check_alone():
         yield from wait_until(
             lambda: running_label() != "Check for Export", "the check does not end"
         )
-        if check.count():
+        if check.hair_count():
             break
         yield from press("ESC")
     else:
@@ -123,7 +123,7 @@ def the_check_alone():
     driver.screenshot("check")
     yield from press("ESC")
     yield
-    assert hairloom_module("export_check").count() == 0
+    assert hairloom_module("export_check").hair_count() == 0
 
 
 driver.play_session(steps())

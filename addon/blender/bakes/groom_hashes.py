@@ -21,7 +21,7 @@ from ...groom.width_settings import WidthSettings
 from ...rig_flow import Pose
 from ...wet_flow import wet_dynamics
 from ..base.attributes import read_attribute
-from ..base.mesh_arrays import corner_vertices, vertex_places
+from ..base.mesh_arrays import corner_vertices, vertex_positions
 from ..base.objects import head_of, matrix_of
 from ..base.vertex_weights import painted_attribute, weight_names, weights_on
 from ..colliders.carriers import is_deforming, is_disabled
@@ -277,4 +277,4 @@ def _curves_parts(hair: bpy.types.Object) -> tuple[Floats | Ints | str, ...]:
 
 def mesh_parts(obj: bpy.types.Object) -> tuple[Floats | Ints, ...]:
     """Vertices (vertex_count, 3) in object space, and the vertex of each polygon corner."""
-    return vertex_places(obj.data), corner_vertices(obj.data)
+    return vertex_positions(obj.data), corner_vertices(obj.data)

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...arrays import Bools, Floats, Ints
 
-#: data type of an attribute -> (name of the value, width, dtype)
+#: data type of an attribute -> (property that holds a value, width, dtype)
 _LAYOUTS: dict[str, tuple[str, int, Any]] = {
     "BOOLEAN": ("value", 1, np.bool_),
     "FLOAT": ("value", 1, np.float32),
@@ -43,12 +43,12 @@ def read_attribute(
     attribute = data.attributes.get(name)
     if attribute is None or attribute.domain != domain or attribute.data_type not in _LAYOUTS:
         return None
-    value, own_width, dtype = _LAYOUTS[attribute.data_type]
-    if width not in (None, own_width):
+    member, stored_width, dtype = _LAYOUTS[attribute.data_type]
+    if width not in (None, stored_width):
         return None
-    values = np.empty(len(attribute.data) * own_width, dtype)
-    attribute.data.foreach_get(value, values)
-    return values if own_width == 1 else values.reshape(-1, own_width)
+    values = np.empty(len(attribute.data) * stored_width, dtype)
+    attribute.data.foreach_get(member, values)
+    return values if stored_width == 1 else values.reshape(-1, stored_width)
 
 
 def set_attribute(
@@ -61,30 +61,30 @@ def set_attribute(
 
     An attribute of this name with another domain or type is replaced.
     """
-    kind = _data_type(values)
+    data_type = _data_type(values)
     attribute = data.attributes.get(name)
-    if attribute is not None and (attribute.domain, attribute.data_type) != (domain, kind):
+    if attribute is not None and (attribute.domain, attribute.data_type) != (domain, data_type):
         data.attributes.remove(attribute)
         attribute = None
     if attribute is None:
-        attribute = data.attributes.new(name, kind, domain)
-    part, _, dtype = _LAYOUTS[kind]
+        attribute = data.attributes.new(name, data_type, domain)
+    member, _, dtype = _LAYOUTS[data_type]
     if len(values):
-        attribute.data.foreach_set(part, np.ascontiguousarray(values, dtype).ravel())
+        attribute.data.foreach_set(member, np.ascontiguousarray(values, dtype).ravel())
 
 
 def copy_elements(attribute: bpy.types.Attribute, source: Ints, target: Ints) -> None:
     """Copy an attribute's values from source elements to as many target elements."""
-    if attribute.data_type not in _LAYOUTS:  # texts, one by one
-        texts = [attribute.data[number].value for number in source.tolist()]
-        for number, text in zip(target.tolist(), texts, strict=True):
-            attribute.data[number].value = text
+    if attribute.data_type not in _LAYOUTS:  # strings, one by one
+        strings = [attribute.data[number].value for number in source.tolist()]
+        for number, string in zip(target.tolist(), strings, strict=True):
+            attribute.data[number].value = string
         return
-    part, width, dtype = _LAYOUTS[attribute.data_type]
+    member, width, dtype = _LAYOUTS[attribute.data_type]
     values = np.empty((len(attribute.data), width), dtype)
-    attribute.data.foreach_get(part, values.ravel())
+    attribute.data.foreach_get(member, values.ravel())
     values[target] = values[source]
-    attribute.data.foreach_set(part, values.ravel())
+    attribute.data.foreach_set(member, values.ravel())
 
 
 def _data_type(values: Floats | Ints | Bools) -> str:

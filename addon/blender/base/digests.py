@@ -1,4 +1,4 @@
-"""Digests: short texts that are the same for the same content, on every machine."""
+"""Digests: short texts that are equal for equal content, on every machine."""
 
 from __future__ import annotations
 

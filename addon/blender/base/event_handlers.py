@@ -6,16 +6,16 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 #: one of the lists in bpy.app.handlers, and a handler for it
-type Listed = tuple[list[Any], Callable[..., None]]
+type HandlerEntry = tuple[list[Any], Callable[..., None]]
 
 
-def append(listed: Iterable[Listed]) -> None:
-    for handlers, handler in listed:
+def append(entries: Iterable[HandlerEntry]) -> None:
+    for handlers, handler in entries:
         handlers.append(handler)
 
 
-def remove(listed: Iterable[Listed]) -> None:
+def remove(entries: Iterable[HandlerEntry]) -> None:
     """Remove handlers that are still there: any script may have emptied a list."""
-    for handlers, handler in listed:
+    for handlers, handler in entries:
         if handler in handlers:
             handlers.remove(handler)

@@ -13,13 +13,12 @@ def file_stem(hair_name: str) -> str:
     return avoid_device_name(identifier_name(hair_name))
 
 
-def in_own_folder(path: Path) -> Path:
-    """The path with a folder of the asset's own, named after it, put in between; a path that is in
-    such a folder stays as it is."""
+def in_asset_folder(path: Path) -> Path:
+    """The path inside a folder named after the asset; unchanged if it is in such a folder."""
     return path if path.parent.name == path.stem else path.parent / path.stem / path.name
 
 
-def files_of(path: Path, hair_names: Sequence[str]) -> list[Path]:
+def file_paths(path: Path, hair_names: Sequence[str]) -> list[Path]:
     """The file of each hair; where there are several, with the hair's name appended.
 
     Names that differ for Blender but not as file names, such as "Hair.001" and "hair_001", get a

@@ -1,7 +1,7 @@
 """The GPU context of this process, created if there is none, and the GPU's name.
 
-In background mode Blender creates a context only on request. Where there is no driver that draws,
-the request crashes Blender; so another process tries first.
+In background mode Blender creates a context only on request. Without a driver that draws, the
+request crashes Blender, so another process tests the drivers first.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from ...exchange.files.child_process import run_child
 from ...render import gpu_objects
 
 #: Exits with 0 if OpenGL or Vulkan finds a device without a window, in the way that Blender does.
-_TRIAL = """
+_DRIVER_TEST = """
 import ctypes, sys
 
 def opengl():
@@ -45,9 +45,9 @@ def vulkan():
     vulkan.vkEnumeratePhysicalDevices(instance, ctypes.byref(count), None)
     return count.value > 0
 
-def works(trial):
+def works(test):
     try:
-        return trial()
+        return test()
     except (OSError, AttributeError):
         return False
 
@@ -55,12 +55,12 @@ sys.exit(0 if works(opengl) or works(vulkan) else 1)
 """
 
 
-#: How errors of Blender's module begin where no texture or target can be made.
-_REFUSAL = "gpu."
+#: Errors of Blender's module start with this if a texture or target cannot be created.
+_GPU_ERROR_PREFIX = "gpu."
 #: Seconds for a driver to answer, on a busy machine too.
-_PATIENCE = 60.0
+_DRIVER_TIMEOUT = 60.0
 #: Seconds between checks for a window context.
-_PAUSE = 0.05
+_POLL_INTERVAL = 0.05
 
 
 def ensure_gpu() -> None:
@@ -71,7 +71,7 @@ def ensure_gpu() -> None:
     """
     if not bpy.app.background:
         return
-    if not gpu_in_use()["backend"] and not can_draw():
+    if not gpu_info()["backend"] and not can_draw():
         raise HairloomError(
             "there is neither a GPU nor a software driver here",
             place="render",
@@ -85,25 +85,26 @@ def can_draw() -> bool:
     """Whether there is a driver that draws; always, except on Linux."""
     if not sys.platform.startswith("linux"):
         return True
+    command = [sys.executable, "-I", "-c", _DRIVER_TEST]
     try:
-        return run_child([sys.executable, "-I", "-c", _TRIAL], seconds=_PATIENCE).returncode == 0
+        return run_child(command, seconds=_DRIVER_TIMEOUT).returncode == 0
     except TimeoutExpired:  # Blender would wait for the same driver
         return False
-    except OSError:  # this Blender has no Python executable to try it with
+    except OSError:  # this Blender has no Python executable for the test
         return True
 
 
 @contextmanager
-def gpu_refusals() -> Iterator[None]:
+def converted_gpu_errors() -> Iterator[None]:
     """Turn errors of the GPU inside the block, such as a lack of memory, into a HairloomError.
 
     Raises:
-        HairloomError: the GPU has refused something.
+        HairloomError: the GPU cannot provide something.
     """
     try:
         yield
     except RuntimeError as error:
-        if not str(error).startswith(_REFUSAL):
+        if not str(error).startswith(_GPU_ERROR_PREFIX):
             raise
         raise HairloomError(
             f"the GPU cannot provide what drawing needs ({error})",
@@ -112,8 +113,9 @@ def gpu_refusals() -> Iterator[None]:
         ) from error
 
 
-def is_interrupted() -> bool:
-    """Whether there is no window context, as after a window was closed, until the next redraw."""
+def is_context_missing() -> bool:
+    """Whether there is no window context, as between the closing of a window and the next
+    redraw."""
     if bpy.app.background:
         return False
     try:
@@ -123,8 +125,8 @@ def is_interrupted() -> bool:
     return False
 
 
-def free_soon() -> None:
-    """Free unused GPU objects from a timer, once the caller's own references are gone too."""
+def schedule_free_unused() -> None:
+    """Free unused GPU objects from a timer, when the caller's own references are gone too."""
     is_main = threading.current_thread() is threading.main_thread()
     if bpy.app.background or not is_main or bpy.app.timers.is_registered(_free_unused):
         return
@@ -132,13 +134,13 @@ def free_soon() -> None:
 
 
 def _free_unused() -> float | None:
-    if is_interrupted():
-        return _PAUSE
+    if is_context_missing():
+        return _POLL_INTERVAL
     gpu_objects.free_unused()
     return None
 
 
-def gpu_in_use() -> dict[str, str]:
+def gpu_info() -> dict[str, str]:
     """Backend, renderer and driver; empty strings where this process has no GPU context."""
     try:
         return {

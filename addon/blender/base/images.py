@@ -28,7 +28,7 @@ def write_png(path: Path, linear: Floats) -> None:
     Raises:
         HairloomError: the folder or file cannot be written.
     """
-    save_coded_png(path, display_encoded(linear))
+    write_encoded_png(path, display_encoded(linear))
 
 
 def write_texture(
@@ -54,10 +54,10 @@ def write_texture(
             remedy="Choose PNG, or use an official build of Blender",
         )
     values = np.clip(np.atleast_3d(pixels).astype(np.float32), 0.0, 1.0)
-    coded = np.ones((*values.shape[:2], 4), np.float32)
-    coded[..., :3] = srgb_encoded(values[..., :3]) if is_color else values[..., :3]
-    coded[..., 3:] = values[..., 3:] if values.shape[2] == 4 else 1.0
-    save_coded_png(path, coded, has_alpha=values.shape[2] == 4)
+    encoded = np.ones((*values.shape[:2], 4), np.float32)
+    encoded[..., :3] = srgb_encoded(values[..., :3]) if is_color else values[..., :3]
+    encoded[..., 3:] = values[..., 3:] if values.shape[2] == 4 else 1.0
+    write_encoded_png(path, encoded, has_alpha=values.shape[2] == 4)
 
 
 def read_texture(path: Path, *, is_color: bool) -> Floats:
@@ -93,7 +93,7 @@ def read_image(image: bpy.types.Image, *, is_color: bool, place: str) -> Floats:
     Raises:
         HairloomError: its file is missing or broken, or it is too large.
     """
-    width, height = image.size  # loads the image, if that has not happened
+    width, height = image.size  # loads the image, if necessary
     if not (width and height and image.has_data):
         raise HairloomError(
             "this picture has no pixels: its file is missing or broken",
@@ -104,16 +104,16 @@ def read_image(image: bpy.types.Image, *, is_color: bool, place: str) -> Floats:
     pixels = np.empty(width * height * 4, np.float32)
     image.pixels.foreach_get(pixels)
     pixels = pixels.reshape(height, width, 4)
-    is_coded = image.colorspace_settings.name == "sRGB"
+    is_srgb = image.colorspace_settings.name == "sRGB"
     if not image.is_float:  # pixels are the stored values
-        if is_color and is_coded:
+        if is_color and is_srgb:
             pixels[..., :3] = srgb_decoded(pixels[..., :3])
         return pixels
     # float images are scene-linear already, and premultiplied
     if image.alpha_mode != "CHANNEL_PACKED":
         alpha = pixels[..., 3:]
         np.divide(pixels[..., :3], alpha, out=pixels[..., :3], where=alpha > 0.0)
-    if is_coded and not is_color:
+    if is_srgb and not is_color:
         pixels[..., :3] = srgb_encoded(pixels[..., :3])
     return pixels
 
@@ -121,8 +121,8 @@ def read_image(image: bpy.types.Image, *, is_color: bool, place: str) -> Floats:
 def display_encoded(linear: Floats) -> Floats:
     """Scene-linear premultiplied to sRGB-encoded straight alpha, (..., 4) (IEC 61966-2-1)."""
     straight = straight_alpha(linear)
-    coded = srgb_encoded(np.clip(straight[..., :3], 0.0, 1.0))
-    return np.concatenate([coded, straight[..., 3:]], axis=-1).astype(np.float32)
+    encoded = srgb_encoded(np.clip(straight[..., :3], 0.0, 1.0))
+    return np.concatenate([encoded, straight[..., 3:]], axis=-1).astype(np.float32)
 
 
 def straight_alpha(premultiplied: Floats) -> Floats:
@@ -144,13 +144,13 @@ def contact_sheet(pictures: list[Floats], columns: int) -> Floats:
     return sheet
 
 
-def save_coded_png(path: Path, coded: Floats, *, has_alpha: bool = True) -> None:
+def write_encoded_png(path: Path, encoded: Floats, *, has_alpha: bool = True) -> None:
     """Write values that are sRGB-encoded already, (height, width, 4), in 8 bits.
 
     Raises:
         HairloomError: the folder or file cannot be written.
     """
-    with _image_of(coded, has_alpha=has_alpha) as image:
+    with _temporary_image(encoded, has_alpha=has_alpha) as image:
         image.file_format = "PNG"
         with atomic_write(path) as temporary:
             image.save(filepath=str(temporary))
@@ -158,22 +158,22 @@ def save_coded_png(path: Path, coded: Floats, *, has_alpha: bool = True) -> None
                 raise write_error(path, DISK_FULL)
 
 
-def webp_of(path: Path, coded: Floats, side: int, quality: int) -> bytes:
+def webp_bytes(path: Path, encoded: Floats, max_side: int, quality: int) -> bytes:
     """The bytes of a small WebP file of a picture.
 
     Args:
         path: a temporary file is written beside it.
-        coded: (height, width, 4), sRGB-encoded already, row 0 at the bottom.
-        side: a larger picture is scaled down to this [pixels].
+        encoded: (height, width, 4), sRGB-encoded already, row 0 at the bottom.
+        max_side: a larger picture is scaled down to this [pixels].
         quality: up to 100.
 
     Raises:
         HairloomError: the folder cannot be written.
     """
-    height, width = coded.shape[:2]
-    scale = min(side / max(height, width), 1.0)
+    height, width = encoded.shape[:2]
+    scale = min(max_side / max(height, width), 1.0)
     file = path.with_name(".picture.webp")
-    with _image_of(coded, has_alpha=bool((coded[..., 3] < 1.0).any())) as image:
+    with _temporary_image(encoded, has_alpha=bool((encoded[..., 3] < 1.0).any())) as image:
         if scale < 1.0:
             image.scale(max(round(width * scale), 1), max(round(height * scale), 1))
         image.file_format = "WEBP"
@@ -187,11 +187,11 @@ def webp_of(path: Path, coded: Floats, side: int, quality: int) -> bytes:
 
 
 @contextmanager
-def _image_of(coded: Floats, *, has_alpha: bool) -> Iterator[bpy.types.Image]:
-    height, width = coded.shape[:2]
+def _temporary_image(encoded: Floats, *, has_alpha: bool) -> Iterator[bpy.types.Image]:
+    height, width = encoded.shape[:2]
     image = bpy.data.images.new("Hairloom", width, height, alpha=has_alpha)
     try:
-        image.pixels.foreach_set(np.ascontiguousarray(coded, np.float32).ravel())
+        image.pixels.foreach_set(np.ascontiguousarray(encoded, np.float32).ravel())
         yield image
     finally:
         bpy.data.images.remove(image)

@@ -1,4 +1,4 @@
-"""Ending a job cleanly at Ctrl-C or at a farm's signal: nothing is left half-written."""
+"""Ending a job cleanly on Ctrl-C or a farm's signal: nothing is left half-written."""
 
 from __future__ import annotations
 
@@ -41,15 +41,15 @@ def interruptible() -> Iterator[None]:
         yield
         return
     _received.clear()
-    numbers = [getattr(signal, name) for name in _SIGNAL_NAMES if hasattr(signal, name)]
-    before = {number: signal.signal(number, _on_signal) for number in numbers}
+    signals = [getattr(signal, name) for name in _SIGNAL_NAMES if hasattr(signal, name)]
+    previous_handlers = {number: signal.signal(number, _on_signal) for number in signals}
     try:
         yield
     except Exception:
         raise_if_interrupted()  # Blender raises another error for an interrupted operator
         raise
     finally:
-        for number, handler in before.items():
+        for number, handler in previous_handlers.items():
             # None: set by C code, which Python cannot set again
             signal.signal(number, signal.SIG_DFL if handler is None else handler)
 
@@ -58,7 +58,7 @@ def raise_if_interrupted() -> None:
     """Call between the steps of long work: Blender swallows exceptions inside its own handlers.
 
     Raises:
-        Interrupted: a signal has come.
+        Interrupted: a signal was received.
     """
     if _received:
         raise Interrupted(_received[0])

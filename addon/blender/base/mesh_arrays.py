@@ -8,11 +8,11 @@ import numpy as np
 from ...arrays import Floats, Ints
 
 
-def vertex_places(mesh: bpy.types.Mesh) -> Floats:
+def vertex_positions(mesh: bpy.types.Mesh) -> Floats:
     """Vertex positions, (vertex_count, 3) float32, in the mesh's own space."""
-    places = np.empty((len(mesh.vertices), 3), np.float32)
-    mesh.vertices.foreach_get("co", places.ravel())
-    return places
+    positions = np.empty((len(mesh.vertices), 3), np.float32)
+    mesh.vertices.foreach_get("co", positions.ravel())
+    return positions
 
 
 def edge_vertices(mesh: bpy.types.Mesh) -> Ints:
@@ -29,25 +29,25 @@ def corner_vertices(mesh: bpy.types.Mesh) -> Ints:
     return vertices
 
 
-def triangle_corners(mesh: bpy.types.Mesh, of: str = "vertices") -> Ints:
+def triangle_corners(mesh: bpy.types.Mesh, property_name: str = "vertices") -> Ints:
     """The mesh's triangles, (triangle_count, 3) int32.
 
     Args:
-        of: "vertices", or "loops": the corners of faces.
+        property_name: "vertices", or "loops": the corners of faces.
     """
     mesh.calc_loop_triangles()
     numbers = np.empty((len(mesh.loop_triangles), 3), np.int32)
-    mesh.loop_triangles.foreach_get(of, numbers.ravel())
+    mesh.loop_triangles.foreach_get(property_name, numbers.ravel())
     return numbers
 
 
-def of_triangles(mesh: bpy.types.Mesh, what: str) -> Ints:
-    """An index of each triangle, (triangle_count,) int32.
+def triangle_indices(mesh: bpy.types.Mesh, property_name: str) -> Ints:
+    """An index that each triangle has, (triangle_count,) int32.
 
     Args:
-        what: "polygon_index" or "material_index".
+        property_name: "polygon_index" or "material_index".
     """
     mesh.calc_loop_triangles()
     numbers = np.empty(len(mesh.loop_triangles), np.int32)
-    mesh.loop_triangles.foreach_get(what, numbers)
+    mesh.loop_triangles.foreach_get(property_name, numbers)
     return numbers

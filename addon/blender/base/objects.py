@@ -19,8 +19,8 @@ from ...errors import HairloomError
 
 type LayerKey = tuple[int, str]
 
-#: from this ratio of scales along two axes on, an object counts as flat
-_FLAT = 1e6
+#: above this ratio of scales along two axes, an object counts as flat
+_MAX_CONDITION_NUMBER = 1e6
 
 
 class ObjectGoneError(HairloomError):
@@ -155,7 +155,7 @@ def check_curves_editable(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph
         HairloomError: see there; or the object's matrix cannot be inverted.
     """
     check_shape_editable(hair)
-    if not np.linalg.cond(matrix_of(hair, depsgraph)[:3, :3]) < _FLAT:
+    if not np.linalg.cond(matrix_of(hair, depsgraph)[:3, :3]) < _MAX_CONDITION_NUMBER:
         raise HairloomError(
             "it or one of its parents is scaled to 0 along an axis",
             place=hair.name,
@@ -163,7 +163,7 @@ def check_curves_editable(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph
         )
 
 
-def takes_objects(collection: bpy.types.Collection) -> bool:
+def accepts_objects(collection: bpy.types.Collection) -> bool:
     """Whether objects can be added to a collection: it is neither linked nor overridden."""
     return bool(collection.is_editable and collection.override_library is None)
 
@@ -172,7 +172,7 @@ def link_into(
     obj: bpy.types.Object, collections: Iterable[bpy.types.Collection], scene: bpy.types.Scene
 ) -> None:
     """Put an object into these collections, or into the scene's if none of them takes objects."""
-    for collection in list(filter(takes_objects, collections)) or [scene.collection]:
+    for collection in list(filter(accepts_objects, collections)) or [scene.collection]:
         if obj.name not in collection.objects:
             collection.objects.link(obj)
 
@@ -223,16 +223,16 @@ def without_hidden(
     objects: Iterable[bpy.types.Object], depsgraph: bpy.types.Depsgraph
 ) -> tuple[list[bpy.types.Object], tuple[str, ...]]:
     """The objects that are neither hidden in views and renders nor hair without curves; and why
-    the others are left out. For jobs where the user has named no object."""
-    taken, left_out = [], []
+    the others are left out. For jobs without objects chosen by the user."""
+    visible, left_out = [], []
     for obj in objects:
         if is_hidden(obj, depsgraph.view_layer):
             left_out.append(f"{obj.name}: it is hidden in viewport and renders")
         elif obj.type == "CURVES" and not len(obj.evaluated_get(depsgraph).data.curves):
             left_out.append(f"{obj.name}: it has no curves")
         else:
-            taken.append(obj)
-    return taken, tuple(left_out)
+            visible.append(obj)
+    return visible, tuple(left_out)
 
 
 def layers_showing(obj: bpy.types.Object) -> frozenset[LayerKey]:

@@ -10,28 +10,28 @@ def show_originals(
     depsgraph: bpy.types.Depsgraph,
     *,
     show: bool,
-    has_own_shadow: bool = False,
+    has_hairloom_shadow: bool = False,
 ) -> None:
     """Show or hide Blender's drawing of hair.
 
-    To hide it: solid view does not draw hair displayed as wire, only the outline of its strands
-    while selected (as bounds it would draw a box always), and EEVEE does not draw what is invisible
-    to cameras. Only the evaluated copy is changed.
+    Hidden hair is displayed as wire, of which solid view draws only the outline of selected strands
+    (of bounds, always a box), and is invisible to cameras, so that EEVEE does not draw it. Only the
+    evaluated copy is changed.
 
     Args:
-        has_own_shadow: our shadow is on the head, so that Blender's strands must not cast one.
+        has_hairloom_shadow: our shadow is on the head, so Blender's strands must not cast one.
     """
     evaluated = hair.evaluated_get(depsgraph)
     if not evaluated.is_evaluated:
         return
-    display, is_seen = (hair.display_type, hair.visible_camera) if show else ("WIRE", False)
+    display, is_visible = (hair.display_type, hair.visible_camera) if show else ("WIRE", False)
     if evaluated.display_type != display:
         evaluated.display_type = display
-    if evaluated.visible_camera != is_seen:
-        evaluated.visible_camera = is_seen
-    throws = hair.visible_shadow and (show or not has_own_shadow)
-    if evaluated.visible_shadow != throws:
-        evaluated.visible_shadow = throws
+    if evaluated.visible_camera != is_visible:
+        evaluated.visible_camera = is_visible
+    casts_shadow = hair.visible_shadow and (show or not has_hairloom_shadow)
+    if evaluated.visible_shadow != casts_shadow:
+        evaluated.visible_shadow = casts_shadow
 
 
 def all_depsgraphs() -> tuple[bpy.types.Depsgraph, ...]:
@@ -43,8 +43,8 @@ def all_depsgraphs() -> tuple[bpy.types.Depsgraph, ...]:
 
 def shown_depsgraphs() -> tuple[bpy.types.Depsgraph, ...]:
     """The depsgraphs of the view layers that windows show."""
-    found = (window.view_layer.depsgraph for window in bpy.context.window_manager.windows)
-    return tuple(depsgraph for depsgraph in found if depsgraph is not None)
+    depsgraphs = (window.view_layer.depsgraph for window in bpy.context.window_manager.windows)
+    return tuple(depsgraph for depsgraph in depsgraphs if depsgraph is not None)
 
 
 def refresh_views() -> None:

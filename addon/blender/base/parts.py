@@ -1,7 +1,7 @@
-"""Long work with parts that touch no data of Blender's, so that a thread can do them.
+"""Long jobs with parts that use no data of Blender's, so that a thread can run them.
 
-Such a function is a generator. It reads from the scene, yields a part, is sent the part's result,
-and writes it into the scene. The caller decides where the parts run:
+Such a job is a generator. It reads from the scene, yields a part, is sent the part's result, and
+writes it into the scene. The caller decides where the parts run:
 
     run_parts                      in the calling thread: scripts, and jobs without a window
     ui.long_work.steps_of_parts    in a thread, while the window shows progress and may cancel
@@ -45,26 +45,26 @@ def run_parts[Result](parts: Parts[Result]) -> Result:
 
 
 def batched[Result](
-    works: Iterable[Parts[Result]], failed: Callable[[HairloomError], None] | None = None
+    jobs: Iterable[Parts[Result]], on_error: Callable[[HairloomError], None] | None = None
 ) -> Parts[list[Result]]:
-    """Several works of one part each, such as one per hair: all parts, which may fail or be
-    cancelled, run before any work writes.
+    """Several jobs of one part each, such as one per hair: all parts, which may fail or be
+    cancelled, run before any job writes.
 
     Args:
-        failed: called with the error of each work that fails, while the others go on; without it,
+        on_error: called with the error of each job that fails, while the others go on; without it,
             the first error is raised.
     """
-    begun, results = [], list[Result]()
-    for work in works:
+    started, results = [], list[Result]()
+    for job in jobs:
         try:
-            begun.append((work, (yield next(work))))
+            started.append((job, (yield next(job))))
         except HairloomError as error:
-            if failed is None:
+            if on_error is None:
                 raise
-            failed(error)
-    for work, made in begun:
+            on_error(error)
+    for job, part_result in started:
         try:
-            work.send(made)
+            job.send(part_result)
         except StopIteration as end:
             results.append(end.value)
         else:
@@ -80,9 +80,9 @@ def new_blocks_removed_on_error() -> Iterator[Callable[[], None]]:
     until then are removed. They are kept by session number, since another file may be loaded
     meanwhile.
     """
-    before, added = _session_uids(), set[int]()
+    existing, added = _session_uids(), set[int]()
     try:
-        yield lambda: added.update(_session_uids() - before)
+        yield lambda: added.update(_session_uids() - existing)
     except BaseException:  # to be cancelled raises GeneratorExit, which is no Exception
         bpy.data.batch_remove([each for each in _data_blocks() if each.session_uid in added])
         raise
@@ -91,11 +91,11 @@ def new_blocks_removed_on_error() -> Iterator[Callable[[], None]]:
 @contextmanager
 def new_blocks_removed() -> Iterator[None]:
     """Remove data-blocks that were added inside at the end, however the block ends."""
-    before = _session_uids()
+    existing = _session_uids()
     try:
         yield
     finally:
-        bpy.data.batch_remove([each for each in _data_blocks() if each.session_uid not in before])
+        bpy.data.batch_remove([each for each in _data_blocks() if each.session_uid not in existing])
 
 
 def _session_uids() -> set[int]:

@@ -8,9 +8,9 @@ from collections.abc import Callable
 import bpy
 
 #: Panels with times and counts are redrawn at this interval [s] while hair moves.
-_PAUSE = 0.5
+_REFRESH_INTERVAL = 0.5
 
-_last = 0.0
+_last_refresh = 0.0
 
 
 def redraw_views() -> None:
@@ -43,10 +43,10 @@ def redraw_panels() -> None:
 
 def refresh_panels() -> None:
     """As `redraw_panels`, but at most every half second."""
-    global _last
+    global _last_refresh
     now = time.monotonic()
-    if now - _last >= _PAUSE:
-        _last = now
+    if now - _last_refresh >= _REFRESH_INTERVAL:
+        _last_refresh = now
         redraw_panels()
 
 

@@ -18,8 +18,8 @@ import numpy as np
 
 from ...errors import HairloomError
 from ...exchange.files.atomic import write_text_atomic
-from .gpu_choices import peak_memory
-from .gpu_context import gpu_in_use
+from .gpu_context import gpu_info
+from .gpu_preferences import peak_memory
 from .interruption import raise_if_interrupted
 
 _MANIFEST = Path(__file__).parents[3] / "blender_manifest.toml"
@@ -51,9 +51,9 @@ class Report:
         if self._style == "openjd" and name != self._stage:
             print(f"openjd_status: {name}", flush=True)
         self._stage = name
-        begin = time.perf_counter()
+        start = time.perf_counter()
         yield
-        self._times.setdefault(name, []).append((time.perf_counter() - begin) * 1000.0)
+        self._times.setdefault(name, []).append((time.perf_counter() - start) * 1000.0)
 
     def stages_ms(self) -> dict[str, float]:
         return {name: round(statistics.median(times), 3) for name, times in self._times.items()}
@@ -71,21 +71,21 @@ class Report:
         """The progress of a long step."""
         return Progress(name, total, self._style)
 
-    def end(self, status: str) -> None:
+    def finish(self, status: str) -> None:
         """Record that the job is "done", or "skipped" because its result exists."""
         self.facts["status"] = status
 
     def fail(self, error: HairloomError) -> None:
         """Record why the job failed."""
-        self._break_off("failed", error.problem, error.place, error.remedy)
+        self._record_failure("failed", error.problem, error.place, error.remedy)
         if self._style == "openjd":
             print(f"openjd_fail: {error}", flush=True)
 
-    def stop(self, signal_name: str) -> None:
+    def interrupt(self, signal_name: str) -> None:
         """Record that the job was interrupted."""
-        self._break_off("interrupted", "the job was interrupted", signal_name, "Run it again")
+        self._record_failure("interrupted", "the job was interrupted", signal_name, "Run it again")
 
-    def _break_off(self, status: str, problem: str, place: str, remedy: str) -> None:
+    def _record_failure(self, status: str, problem: str, place: str, remedy: str) -> None:
         error = {"problem": problem, "place": place, "remedy": remedy}
         self.facts.update(status=status, error=error)
 
@@ -103,7 +103,7 @@ def environment() -> dict[str, str]:
         "blender": bpy.app.version_string,
         "python": platform.python_version(),
         "numpy": np.__version__,
-        **gpu_in_use(),
+        **gpu_info(),
     }
 
 
@@ -117,19 +117,19 @@ class Progress:
     each hundredth for a farm."""
 
     def __init__(self, name: str, total: int, style: str = "lines") -> None:
-        self._name, self._total, self._style, self._shown = name, total, style, -1
+        self._name, self._total, self._style, self._last_part = name, total, style, -1
 
     def show(self, done: int) -> None:
         raise_if_interrupted()
         parts = 100 if self._style == "openjd" else 10
         part = done * parts // max(self._total, 1)
         if self._style == "openjd":
-            if part != self._shown:
+            if part != self._last_part:
                 print(f"openjd_progress: {min(part, 100)}", flush=True)
         elif sys.stdout.isatty():
             print(f"\r{self._name}: {done}/{self._total}", end="", flush=True)
             if done >= self._total:
                 print()
-        elif part != self._shown:
+        elif part != self._last_part:
             print(f"{self._name}: {done}/{self._total}", flush=True)
-        self._shown = part
+        self._last_part = part

@@ -12,14 +12,14 @@ from ...arrays import Floats, Ints, means_by
 from ...errors import HairloomError
 from ...shading.luminance import LUMINANCE
 from .attributes import read_attribute
-from .mesh_arrays import of_triangles, triangle_corners
+from .mesh_arrays import triangle_corners, triangle_indices
 from .objects import as_mesh
 
 #: Attributes that may be painted; colours count by their luminance.
 _NUMBERS, _COLORS = ("FLOAT", "BOOLEAN"), ("FLOAT_COLOR", "BYTE_COLOR")
 _DOMAINS = ("POINT", "CORNER", "FACE", "CURVE")
-#: Prefixes of Blender's own attributes, which are no paint; and types of images without a picture.
-_NOT_PAINT, _NO_IMAGES = ("sharp_", "radius"), ("RENDER_RESULT", "COMPOSITING")
+#: Prefixes of Blender's own attributes, which nobody paints; and types of images without pixels.
+_BUILT_IN_PREFIXES, _NO_IMAGES = ("sharp_", "radius"), ("RENDER_RESULT", "COMPOSITING")
 
 
 def weight_names(obj: bpy.types.Object) -> list[str]:
@@ -31,9 +31,9 @@ def weight_names(obj: bpy.types.Object) -> list[str]:
 def attribute_names(data: bpy.types.Mesh | bpy.types.Curves) -> list[str]:
     """The attributes of a mesh or of curves that are numbers or colours."""
     return [
-        one.name
-        for one in data.attributes
-        if _is_weight(one) and not one.name.startswith((".", *_NOT_PAINT))
+        attribute.name
+        for attribute in data.attributes
+        if _is_weight(attribute) and not attribute.name.startswith((".", *_BUILT_IN_PREFIXES))
     ]
 
 
@@ -109,7 +109,7 @@ def weights_on(obj: bpy.types.Object, mesh: bpy.types.Mesh, name: str) -> tuple[
     """
     group = obj.vertex_groups.get(name)
     if group is not None:
-        return Memberships.of(mesh).weights(group.index), "POINT"
+        return VertexGroupWeights.of(mesh).weights(group.index), "POINT"
     found = painted_attribute(mesh, name)
     if found is None:
         raise missing_weights(obj, name, mesh.attributes.get(name))
@@ -136,10 +136,10 @@ def at_corners(mesh: bpy.types.Mesh, values: Floats, domain: str) -> Floats:
         return values[triangle_corners(mesh)]
     if domain == "CORNER":
         return values[triangle_corners(mesh, "loops")]
-    return np.repeat(values[of_triangles(mesh, "polygon_index")][:, None], 3, axis=1)
+    return np.repeat(values[triangle_indices(mesh, "polygon_index")][:, None], 3, axis=1)
 
 
-def set_group(obj: bpy.types.Object, name: str, weights: Floats) -> None:
+def set_vertex_group(obj: bpy.types.Object, name: str, weights: Floats) -> None:
     """Assign weights, (vertex_count,), to a vertex group in 255 steps; weights of 0 are skipped."""
     group = obj.vertex_groups.get(name) or obj.vertex_groups.new(name=name)
     steps = np.round(255.0 * weights).astype(np.int64)  # few calls for many vertices
@@ -148,7 +148,7 @@ def set_group(obj: bpy.types.Object, name: str, weights: Floats) -> None:
 
 
 @dataclass(frozen=True)
-class Memberships:
+class VertexGroupWeights:
     """The weights of all vertices in all vertex groups, which take as long to read as one group.
 
     vertex, group: (n,). weight: (n,) float32. vertex_count: of the mesh.
@@ -175,10 +175,10 @@ class Memberships:
 
     def weights(self, index: int) -> Floats:
         """The weights in one group, (vertex_count,) float32; 0 for vertices outside it."""
-        found = np.zeros(self.vertex_count, np.float32)
+        weights = np.zeros(self.vertex_count, np.float32)
         is_in = self.group == index
-        found[self.vertex[is_in]] = self.weight[is_in]
-        return found
+        weights[self.vertex[is_in]] = self.weight[is_in]
+        return weights
 
 
 def _is_weight(attribute: bpy.types.Attribute) -> bool:
@@ -200,7 +200,7 @@ def missing_weights(
             f"its attribute '{name}' is {attribute.data_type} on {attribute.domain}, not a number "
             "or colour on points, corners or faces"
         )
-    there = ", ".join(weight_names(obj)[:8])
-    paint = "Paint one (Weight Paint), or leave the field empty"
-    remedy = f"Use one of: {there}" if there else paint
+    names = ", ".join(weight_names(obj)[:8])
+    alternative = "Paint one (Weight Paint), or leave the field empty"
+    remedy = f"Use one of: {names}" if names else alternative
     return HairloomError(problem, place=obj.name, remedy=remedy)

@@ -25,7 +25,7 @@ from ...cards.uv_directions import UvDirection
 from ...errors import HairloomError
 from ...strands import Surface
 from ..base.attributes import set_attribute
-from ..base.mesh_arrays import corner_vertices, of_triangles, triangle_corners, vertex_places
+from ..base.mesh_arrays import corner_vertices, triangle_corners, triangle_indices, vertex_positions
 from ..base.objects import matrix_of
 from ..base.vertex_weights import weights_on
 from ..scene.surfaces import (
@@ -224,7 +224,7 @@ def loop_triangles(mesh: bpy.types.Mesh) -> tuple[Floats, Ints, Ints, Ints]:
         (m, 3) and polygon (m,) of each triangle, int32.
     """
     triangles, loops = triangle_corners(mesh), triangle_corners(mesh, "loops")
-    return vertex_places(mesh), triangles, loops, of_triangles(mesh, "polygon_index")
+    return vertex_positions(mesh), triangles, loops, triangle_indices(mesh, "polygon_index")
 
 
 def _triangles(mesh: bpy.types.Mesh, matrix: Floats) -> tuple[Surface, Ints, Ints]:

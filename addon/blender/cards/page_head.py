@@ -14,7 +14,7 @@ from ...exchange.cards.page_asset import rounded
 from ...exchange.files.axes import from_z_up
 from ...exchange.textures.srgb import srgb_encoded
 from ...strands import Surface
-from ..base.images import webp_of
+from ..base.images import webp_bytes
 from ..scene.built_in_head import HeadLook
 from ..scene.head_look import PLAIN_SKIN
 from ..scene.mesh_materials import MeshMaterial
@@ -64,7 +64,7 @@ class PageHead:
             color = _color_of(material) if has_uv else None
             if color is not None and id(color) not in pictures:
                 pictures[id(color)] = f"head.{len(pictures)}.webp"
-                files[pictures[id(color)]] = webp_of(path, _coded(color), _SIDE, _QUALITY)
+                files[pictures[id(color)]] = webp_bytes(path, _coded(color), _SIDE, _QUALITY)
             parts.append(
                 {
                     "triangles": len(triangles_of_part),

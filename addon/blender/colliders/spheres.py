@@ -17,7 +17,7 @@ from mathutils import Matrix
 from ...arrays import Floats, Ints
 from ...dynamics.fitting.settings import SphereFitSettings
 from ...dynamics.fitting.sphere_fit import SphereFit, fit_spheres
-from ..base.objects import head_of, objects_in, takes_objects
+from ..base.objects import accepts_objects, head_of, objects_in
 from ..base.parts import Part, Parts
 from ..scene.surfaces import read_positions, read_surface
 
@@ -94,7 +94,7 @@ def use_spheres(
     if used is None:
         hair.hairloom.collider_collection = collection
     elif collection not in (used, *used.children_recursive):
-        if used.get(MARK) is not None or not takes_objects(used):
+        if used.get(MARK) is not None or not accepts_objects(used):
             both = bpy.data.collections.new(f"{hair.name} Colliders")
             scene.collection.children.link(both)
             both.children.link(used)

@@ -19,7 +19,7 @@ from ...errors import HairloomError
 from ...groom.holds import Holds, anchors_of
 from ...groom.ties import Holders, Tie, TipSurface, find_holds
 from ...strands.affine import transform_points
-from ..base.mesh_arrays import vertex_places
+from ..base.mesh_arrays import vertex_positions
 from ..base.objects import (
     Body,
     Handle,
@@ -328,7 +328,7 @@ def _empty_tie_shape(obj: bpy.types.Object) -> tuple[Floats, bool]:
 def _points_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
     """The points of a mesh or curve as it is drawn, (n, 3) object space."""
     with as_mesh(obj, depsgraph) as mesh:
-        return np.empty((0, 3), np.float32) if mesh is None else vertex_places(mesh)
+        return np.empty((0, 3), np.float32) if mesh is None else vertex_positions(mesh)
 
 
 def _fit_tie_shape(points: Floats, name: str) -> tuple[Floats, bool]:

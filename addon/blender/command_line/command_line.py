@@ -15,7 +15,7 @@ import bpy
 
 from ...errors import HairloomError
 from ...params import SettingsMap
-from ..base.gpu_context import gpu_refusals
+from ..base.gpu_context import converted_gpu_errors
 from ..base.interruption import Interrupted, interruptible
 from ..base.parts import run_parts
 from ..base.report import Report
@@ -100,7 +100,7 @@ def parser() -> argparse.ArgumentParser:
 def _run_and_report(verb: Verb, options: argparse.Namespace, report: Report) -> int:
     """Run a verb, and report errors; returns the exit code."""
     try:
-        with interruptible(), gpu_refusals():
+        with interruptible(), converted_gpu_errors():
             _run_unless_done(verb, options, report)
     except HairloomError as error:
         print(f"hairloom: {error}", file=sys.stderr)
@@ -108,7 +108,7 @@ def _run_and_report(verb: Verb, options: argparse.Namespace, report: Report) -> 
         return 1
     except Interrupted as stop:
         print(f"hairloom: interrupted ({stop.name})", file=sys.stderr)
-        report.stop(stop.name)
+        report.interrupt(stop.name)
         return stop.exit_code
     return 0
 
@@ -143,7 +143,7 @@ def _run_unless_done(verb: Verb, options: argparse.Namespace, report: Report) ->
         reason = stamp.reason_to_run()
         if not reason:
             report.facts |= stamp.reported
-            report.end("skipped")
+            report.finish("skipped")
             print(f"Nothing to do: {options.output} exists, made from the same inputs and options")
             return
         print(f"to be done: {reason}", flush=True)
@@ -155,7 +155,7 @@ def _run_unless_done(verb: Verb, options: argparse.Namespace, report: Report) ->
         print(f"Wrote {saved}")
     if stamp is not None:
         stamp.write(report)
-    report.end("done")
+    report.finish("done")
 
 
 def _job(verb: Verb, options: argparse.Namespace, report: Report) -> Job:

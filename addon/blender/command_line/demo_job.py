@@ -40,7 +40,7 @@ def demo(job: Job) -> None:
     with report.stage("write strands"):
         write_tfx(folder / "strands.tfx", rig.strands)
     report.add_output(folder / "strands.tfx")
-    report.end("done")
+    report.finish("done")
     report.write(folder / "report.json")
     print(f"Wrote {', '.join(report.facts['outputs'])} and report.json into {folder}")
 

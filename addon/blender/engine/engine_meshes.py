@@ -12,7 +12,7 @@ from ...render.snapshot import MeshPictures, MeshSnapshot, Skin
 from ...strands import Surface
 from ...strands.affine import transform_points
 from ...strands.vectors import unit
-from ..base.mesh_arrays import corner_vertices, of_triangles, triangle_corners, vertex_places
+from ..base.mesh_arrays import corner_vertices, triangle_corners, triangle_indices, vertex_positions
 from ..scene.mesh_materials import MeshMaterial, material_of
 from ..scene.surfaces import read_corner_uv
 
@@ -53,7 +53,7 @@ def _split_by_material(
     normals = unit(normals @ from_world.astype(np.float32))
     slots: Ints = np.zeros(len(triangles), np.int32)
     if len(obj.material_slots) > 1:
-        slots = of_triangles(mesh, "material_index")
+        slots = triangle_indices(mesh, "material_index")
     meshes = []
     corner_uv = read_corner_uv(mesh, triangle_corners(mesh, "loops"))
     is_skin = is_head and corner_uv is not None
@@ -71,7 +71,7 @@ def _split_by_material(
 
 def _corners(mesh: bpy.types.Mesh) -> tuple[Ints, Floats, Floats]:
     """Triangles, positions and normals; split normals split vertices."""
-    positions = vertex_places(mesh)
+    positions = vertex_positions(mesh)
     if mesh.normals_domain == "POINT":
         normals = np.empty_like(positions)
         mesh.vertex_normals.foreach_get("vector", normals.ravel())

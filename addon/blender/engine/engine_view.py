@@ -21,7 +21,7 @@ from ...shading.lights import three_point_lights
 from ...shading.mesh_shadow_settings import MeshShadowSettings
 from ...shading.picture_settings import PictureSettings
 from ..base import latest_job
-from ..base.gpu_context import free_soon
+from ..base.gpu_context import schedule_free_unused
 from ..properties.properties import settings_of
 from ..scene.lights import uses_scene_light
 from ..sessions.snapshots import with_all_strands
@@ -57,7 +57,7 @@ class EngineView:
 
     def __init__(self) -> None:
         # Blender drops this when the view leaves Rendered mode, and may never draw with it again
-        weakref.finalize(self, free_soon).atexit = False
+        weakref.finalize(self, schedule_free_unused).atexit = False
         self._reader, self._pass = SceneReader(), ScenePass()
         self._target, self._picture = Target(), Accumulation()
         self._scene: SceneSnapshot | None = None

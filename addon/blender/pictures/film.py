@@ -10,7 +10,7 @@ import numpy as np
 from ...arrays import Floats
 from ...errors import HairloomError
 from ...shading.stage_settings import StageSettings
-from ..base.images import save_coded_png, straight_alpha
+from ..base.images import straight_alpha, write_encoded_png
 from ..viewport.view_transform import ColorView, apply_view_transform
 
 #: choice of `StageSettings.view` -> Blender's names of view transform and look
@@ -33,7 +33,7 @@ def write_picture(path: Path, linear: Floats, stage: StageSettings) -> None:
     """
     straight = straight_alpha(linear)
     encoded = _display_encoded(straight[..., :3], stage)
-    save_coded_png(path, _dithered(np.concatenate([encoded, straight[..., 3:]], axis=-1)))
+    write_encoded_png(path, _dithered(np.concatenate([encoded, straight[..., 3:]], axis=-1)))
 
 
 def _display_encoded(colors: Floats, stage: StageSettings) -> Floats:

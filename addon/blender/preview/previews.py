@@ -18,7 +18,7 @@ from ..bakes import playback
 from ..bakes.bake_settings import folder_of
 from ..bakes.simulation import Simulation
 from ..base import latest_job
-from ..base.gpu_context import free_soon, is_interrupted
+from ..base.gpu_context import is_context_missing, schedule_free_unused
 from ..base.latest_job import POLL_INTERVAL, schedule, unschedule
 from ..base.originals import (
     all_depsgraphs,
@@ -173,7 +173,7 @@ def _forget(uid: int) -> None:
     if preview is not None:
         preview.session.forget()
     overlay.stop_drawing(uid)
-    free_soon()
+    schedule_free_unused()
 
 
 def sessions() -> tuple[Session, ...]:
@@ -298,7 +298,7 @@ def advance(depsgraph: bpy.types.Depsgraph, duration: float) -> None:
 def coupled_frame(depsgraph: bpy.types.Depsgraph) -> Iterator[None]:
     """A frame of all previewed grooms of the scene; those that feel each other move at its end."""
     here = [each for each in simulations_in(depsgraph) if isinstance(each, Session)]
-    with CoupledFrame([] if is_interrupted() else here) as frame:
+    with CoupledFrame([] if is_context_missing() else here) as frame:
         yield
         for session in frame.simulate_coupled():
             preview = previews.get(session.uid)
@@ -380,7 +380,7 @@ def attempt(
             session.is_stale = True  # until it is evaluated again
             overlay.hide(session.uid)
         return  # if another window shows it, it must not be changed from here
-    if needs_gpu and is_interrupted():
+    if needs_gpu and is_context_missing():
         session.is_stale = True
         redraw_views()
         refresh_views()  # triggers the update in which it is read again
@@ -422,8 +422,10 @@ def publish(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
     is_replaced = (hair.mode == "OBJECT" or is_in_sculpt_mode(hair)) and not overlay.failure()
     hides = is_replaced and hair.hairloom.hide_original and session.is_made
     # without a head our shadow has nothing to fall on; there are casters only if shadows are on
-    has_own_shadow = session.settings[VolumeSettings].on_body and bool(session.snapshot.casters)
-    show_originals(hair, depsgraph, show=not hides, has_own_shadow=has_own_shadow)
+    has_hairloom_shadow = session.settings[VolumeSettings].on_body and bool(
+        session.snapshot.casters
+    )
+    show_originals(hair, depsgraph, show=not hides, has_hairloom_shadow=has_hairloom_shadow)
 
 
 def _show_lines(preview: Preview) -> float | None:

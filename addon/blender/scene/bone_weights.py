@@ -11,7 +11,7 @@ from ...exchange.cards.glb_springs import HeadBone
 from ...exchange.tfxbone import BoneWeights, bones_at_roots
 from ...strands import StrandSet
 from ..base.objects import head_of
-from ..base.vertex_weights import Memberships
+from ..base.vertex_weights import VertexGroupWeights
 from .surfaces import evaluated_mesh, read_surface
 
 
@@ -88,6 +88,6 @@ def _vertex_weights(
 ) -> Floats:
     """(vertex_count, bone_count) float32 of the mesh after its modifiers."""
     with evaluated_mesh(skin, depsgraph, skin.name) as mesh:
-        members = Memberships.of(mesh)
+        members = VertexGroupWeights.of(mesh)
     weights = [members.weights(skin.vertex_groups[name].index) for name in names]
     return np.stack(weights, axis=1)

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...arrays import Floats
 from ...exchange.textures.srgb import srgb_encoded
-from ..base.vertex_weights import set_group
+from ..base.vertex_weights import set_vertex_group
 from .bust_data import HAIR_GROUPS, Bust, load_bust
 from .bust_skin import (
     EYE_IOR,
@@ -35,7 +35,7 @@ def bust_object(name: str, tone: str | None) -> bpy.types.Object:
     mesh = _mesh(name, bust)
     obj = bpy.data.objects.new(name, mesh)
     for group in HAIR_GROUPS:
-        set_group(obj, group, bust.weights[group])
+        set_vertex_group(obj, group, bust.weights[group])
     modifier = obj.modifiers.new("Smooth", "SUBSURF")
     modifier.levels = modifier.render_levels = 1
     # the picture is painted for the UV map without smoothing

@@ -9,7 +9,7 @@ from ...arrays import Floats, Ints
 from ...errors import HairloomError
 from ...strands.affine import transform_points
 from ...strands.closest_point import search_of
-from ..base.mesh_arrays import edge_vertices, vertex_places
+from ..base.mesh_arrays import edge_vertices, vertex_positions
 from ..base.objects import as_mesh, head_of, link_into, matrix_of
 from .surfaces import read_surface
 
@@ -52,7 +52,7 @@ def pieces_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
         points: Floats = np.empty((0, 3), np.float32)
         ends: Ints = np.empty(0, np.int32)
         if mesh is not None and len(mesh.edges):
-            points, ends = vertex_places(mesh), edge_vertices(mesh).ravel()
+            points, ends = vertex_positions(mesh), edge_vertices(mesh).ravel()
     pieces = transform_points(points, matrix)[ends].reshape(-1, 2, 3)
     if not np.isfinite(pieces).all():
         raise HairloomError(

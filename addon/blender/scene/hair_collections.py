@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ...errors import HairloomError
-from ..base.objects import takes_objects
+from ..base.objects import accepts_objects
 
 
 def objects_in(hair: bpy.types.Object, setting: str) -> tuple[bpy.types.Object, ...]:
@@ -32,7 +32,7 @@ def add_to_collection(
         kind: what it holds, such as "Ties".
     """
     collection = getattr(hair.hairloom, setting)
-    if collection is None or not takes_objects(collection):
+    if collection is None or not accepts_objects(collection):
         inner, collection = collection, bpy.data.collections.new(f"{hair.name} {kind}")
         scene.collection.children.link(collection)
         if inner is not None:
@@ -53,7 +53,7 @@ def remove_from_collection(
     """
     collection = getattr(hair.hairloom, setting)
     obj = None if collection is None else collection.objects.get(name)
-    if obj is None or not takes_objects(collection):
+    if obj is None or not accepts_objects(collection):
         raise HairloomError(
             f"it is not in a local collection of {kind.lower()}",
             place=name or hair.name,

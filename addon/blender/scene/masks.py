@@ -28,7 +28,7 @@ from ...shading.luminance import LUMINANCE
 from ...strands import StrandSet, Surface
 from ..base.mesh_arrays import triangle_corners
 from ..base.vertex_weights import (
-    Memberships,
+    VertexGroupWeights,
     at_corners,
     has_weights,
     image_names,
@@ -46,13 +46,13 @@ from .surfaces import evaluated_mesh, read_surface
 class _VertexGroups:
     """The vertex groups of a surface. corners: (triangle_count, 3) vertices of its triangles."""
 
-    members: Memberships
+    members: VertexGroupWeights
     corners: Ints
 
     @classmethod
     def of(cls, surface: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Self:
         with evaluated_mesh(surface, depsgraph, surface.name) as mesh:
-            return cls(Memberships.of(mesh), triangle_corners(mesh))
+            return cls(VertexGroupWeights.of(mesh), triangle_corners(mesh))
 
     def at_corners(self, index: int) -> Floats:
         """The weights in one group, (triangle_count, 3)."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...arrays import Floats
 from ...errors import HairloomError
-from ..base.mesh_arrays import edge_vertices, vertex_places
+from ..base.mesh_arrays import edge_vertices, vertex_positions
 from ..base.objects import head_of
 from .drawn_lines import pieces_of
 from .hair_collections import add_to_collection, objects_in, remove_from_collection
@@ -62,7 +62,7 @@ def _line_points(obj: bpy.types.Object) -> Floats:
     """The control points of a curve and how they are joined, or the vertices and edges of a mesh,
     before modifiers."""
     if obj.type == "MESH":
-        places, edges = vertex_places(obj.data), edge_vertices(obj.data)
+        places, edges = vertex_positions(obj.data), edge_vertices(obj.data)
         return np.concatenate([places.ravel(), edges.ravel()]).astype(np.float64)
     found: list[float] = []
     for spline in obj.data.splines if obj.type == "CURVE" else ():

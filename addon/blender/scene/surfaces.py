@@ -19,7 +19,7 @@ from ...errors import HairloomError
 from ...strands import Surface
 from ...strands.affine import transform_points
 from ..base.attributes import read_attribute
-from ..base.mesh_arrays import of_triangles, triangle_corners
+from ..base.mesh_arrays import triangle_corners, triangle_indices
 from ..base.objects import as_mesh
 
 #: the UV map of cards that holds occlusion and along
@@ -166,7 +166,7 @@ def read_material_slots(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -
         HairloomError: not a mesh.
     """
     with evaluated_mesh(obj, depsgraph, obj.name) as mesh:
-        return of_triangles(mesh, "material_index")
+        return triangle_indices(mesh, "material_index")
 
 
 @contextmanager

@@ -26,7 +26,7 @@ from ...render.ride_pass import RideTexels
 from ...render.snapshot import Snapshot
 from ...rig_flow import Pose, Rig
 from ...strands import StrandSet
-from ..base.gpu_context import gpu_in_use
+from ..base.gpu_context import gpu_info
 from .compute_solver import ComputeSolver
 from .numpy_solver import NumpySolver
 
@@ -143,7 +143,7 @@ def device_name(device: str) -> str:
     """The name of a device: "CPU (numpy)", or such as "GPU (OpenGL, llvmpipe)"."""
     if device == "numpy":
         return "CPU (numpy)"
-    used = gpu_in_use()
+    used = gpu_info()
     backend = _BACKENDS.get(used["backend"], used["backend"])
     return f"GPU ({backend}, {used['renderer'].partition(' (')[0]})"
 

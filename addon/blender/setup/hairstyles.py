@@ -28,7 +28,7 @@ from ...strands.face import is_face_hair
 from ...strands.rooted_shapes import RootedShapes
 from ..base.objects import check_curves_editable, check_shape_editable, head_of
 from ..base.parts import Part, Parts, new_blocks_removed_on_error
-from ..base.vertex_weights import read_weights, set_group, weight_names
+from ..base.vertex_weights import read_weights, set_vertex_group, weight_names
 from ..colliders.fields import head_field_of
 from ..properties import previews
 from ..properties.presets import apply, named_preset
@@ -213,7 +213,7 @@ def _add_groups_and_landmarks(
     """Give a head the vertex groups and landmarks that it lacks; returns what was done."""
     done = []
     for name, weights in growth.groups.items():
-        set_group(head, name, weights)
+        set_vertex_group(head, name, weights)
         done.append(f"{head.name} has a vertex group '{name}' now: paint it to move the hairline")
     move_landmarks(head, growth.landmarks)
     if growth.landmarks and put_landmarks(head, growth.landmarks, collection):

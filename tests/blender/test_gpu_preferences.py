@@ -9,7 +9,7 @@ from typing import Any
 import bpy
 import pytest
 
-from hairloom.addon.blender.base import gpu_choices
+from hairloom.addon.blender.base import gpu_preferences
 from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.viewport import overlay
 from hairloom.addon.render import gpu_memory, gpu_objects
@@ -24,21 +24,24 @@ MEGABYTE = 1 << 20
 def automatic(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     monkeypatch.delenv(gpu_memory.MEMORY_VARIABLE, raising=False)
     yield
-    gpu_choices.choose()
+    gpu_preferences.apply()
 
 
 def chosen(megabytes: int) -> None:
     page = SimpleNamespace(image_atomics="automatic", gpu_memory=megabytes)
-    preferences._choose_gpu(page, bpy.context)
+    preferences._apply_gpu_preferences(page, bpy.context)
 
 
 def test_the_preference_is_the_budget_and_is_never_too_little_to_draw() -> None:
-    assert gpu_memory.budget() == gpu_choices.DEFAULT_MEMORY * MEGABYTE
+    assert gpu_memory.budget() == gpu_preferences.DEFAULT_MEMORY * MEGABYTE
     chosen(4096)
     assert gpu_memory.budget() == 4096 * MEGABYTE
     page = bpy.types.AddonPreferences.bl_rna_get_subclass_py("HAIRLOOM_AP_preferences").bl_rna
-    asked = page.properties["gpu_memory"]
-    assert (asked.hard_min, asked.default) == (gpu_choices.MIN_MEMORY, gpu_choices.DEFAULT_MEMORY)
+    setting = page.properties["gpu_memory"]
+    assert (setting.hard_min, setting.default) == (
+        gpu_preferences.MIN_MEMORY,
+        gpu_preferences.DEFAULT_MEMORY,
+    )
 
 
 def test_the_panel_says_what_to_do_when_the_budget_is_exceeded(

@@ -18,7 +18,7 @@ ATOMICS = (
 MIN_MEMORY, DEFAULT_MEMORY = 128, gpu_memory.DEFAULT_MEGABYTES
 
 
-def choose(*, image_atomics: str = "automatic", memory: int = DEFAULT_MEMORY) -> None:
+def apply(*, image_atomics: str = "automatic", memory: int = DEFAULT_MEMORY) -> None:
     """Apply settings from the next draw on.
 
     Args:
