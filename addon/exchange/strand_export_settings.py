@@ -13,7 +13,7 @@ from .strand_formats import STRAND_FORMATS, StrandFormat
 from .tressfx_layout import VERTEX_COUNTS
 
 #: the default of the format or the engine
-FORMAT_DEFAULT = "usual"
+FORMAT_DEFAULT = "default"
 
 
 def _engines() -> tuple[tuple[str, str, str], ...]:

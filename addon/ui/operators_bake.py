@@ -134,7 +134,7 @@ def _draw_state(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     if facts is None:
         layout.label(text=problem or "Not baked", icon="ERROR" if problem else "BLANK1")
     else:
-        device = {"numpy": "CPU", "compute": "GPU"}.get(facts.form, facts.form)
+        device = {"numpy": "CPU", "compute": "GPU"}.get(facts.device, facts.device)
         layout.label(
             text=f"Frames {facts.first} to {facts.last} at {facts.frame_rate:g} fps, {device}",
             icon="CHECKMARK",

@@ -52,7 +52,7 @@ def test_a_scene_is_baked_and_saved(file, tmp_path):
         "first": 1,
         "last": LAST,
         "frame_rate": 24.0,
-        "form": "numpy",
+        "device": "numpy",
     }
     bpy.ops.wm.open_mainfile(filepath=str(file))
     hair = bpy.data.objects["Hair"]
@@ -133,8 +133,8 @@ def test_bad_input_is_one_line_and_exit_code_1(arguments, message, file, tmp_pat
     arguments = [str(tmp_path / a) if a.endswith(".blend") else a for a in arguments]
     scene = [] if "--scene" in arguments else ["--scene", str(file)]
     assert command_line.run(["bake", *scene, *arguments]) == 1
-    told = [line for line in capfd.readouterr().err.splitlines() if line.startswith("hairloom:")]
-    assert len(told) == 1 and message in told[0]
+    errors = [line for line in capfd.readouterr().err.splitlines() if line.startswith("hairloom:")]
+    assert len(errors) == 1 and message in errors[0]
     assert not (tmp_path / "hairloom_cache").exists()
 
 
@@ -151,12 +151,12 @@ def test_hair_without_a_surface_is_baked_and_noted(file, tmp_path):
 
 def test_the_failed_task_of_the_farm_page_fails_as_it_says(file, tmp_path):
     page = (Path(__file__).parents[2] / "docs" / "farm" / "README.md").read_text(encoding="utf-8")
-    (said,) = re.findall(r"^```json\n(.+?)^```", page, flags=re.M | re.S)
+    (documented,) = re.findall(r"^```json\n(.+?)^```", page, flags=re.M | re.S)
     report = tmp_path / "report.json"
     arguments = ["bake", "--scene", str(file), "--frames", "250", "1", "--report", str(report)]
     assert command_line.run(arguments) == 1
     failed = json.loads(report.read_text())
-    for key, value in json.loads(said).items():
+    for key, value in json.loads(documented).items():
         assert failed[key] == value
 
 

@@ -37,7 +37,7 @@ def show_in_renders(
     bake = hair.hairloom.bake
     copy = bake.copy
     # a duplicate of hair still points to the copy of its original
-    if copy is None or copy.hairloom.bake.stands_for not in (None, hair):
+    if copy is None or copy.hairloom.bake.shown_hair not in (None, hair):
         curves = bpy.data.hair_curves.new(f"{hair.name} Baked")
         copy = bpy.data.objects.new(curves.name, curves)
     link_into(copy, hair.users_collection, depsgraph.scene)
@@ -48,7 +48,7 @@ def show_in_renders(
     copy.data.hairloom.baked_in = bake.folder
     copy.data.hairloom.baked_rig = cache.facts.rig_hash
     # renders hide the hair but evaluate it, and its settings, since the copy points to it
-    copy.hairloom.bake.stands_for = hair
+    copy.hairloom.bake.shown_hair = hair
     copy.hide_viewport = copy.hide_select = True
     copy.hide_render = bake.was_hidden
     hair.hide_render = True
@@ -69,8 +69,8 @@ def remove_copy(hair: bpy.types.Object) -> None:
     bake.copy = None
     other = next((obj for obj in bpy.data.objects if obj.hairloom.bake.copy == copy), None)
     if other is not None:  # a duplicate of the hair, with the same copy
-        if copy.hairloom.bake.stands_for == hair:
-            copy.hairloom.bake.stands_for = other
+        if copy.hairloom.bake.shown_hair == hair:
+            copy.hairloom.bake.shown_hair = other
         return
     remove_hair(copy)
 

@@ -7,7 +7,7 @@
     solid_balls     (n, 4) float32: centre and radius of balls; a capsule has two
     solid_shapes    (m, 3) float32: vertices of deformed meshes, in the space of the mesh
 
-The same arrays with the prefix `begun_` hold the colliders where the motion began.
+The same arrays with the prefix `start_` hold the colliders where the motion began.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from ..colliders.fields import NotReadyError, field_of
 from .simulation import Arrays
 
 _BALL, _CAPSULE, _BALLS, _MESH = range(4)
-_START_PREFIX = "begun_"
+_START_PREFIX = "start_"
 #: arrays whose length may differ between frames
 VARIABLE_LENGTH = frozenset({"solids", "solid_matrices", "solid_balls", "solid_shapes"})
 
@@ -51,7 +51,7 @@ def solid_constants(
         meshes: those of all mesh colliders, at rest.
     """
     arrays: Arrays = {
-        "kept": np.array(start.max_clearance),
+        "max_clearance": np.array(start.max_clearance),
         "collider_resolution": np.array(settings.collider_resolution),
         f"{_START_PREFIX}matrix": np.asarray(start.pose.matrix, np.float64),
     }
@@ -156,7 +156,7 @@ class BakedSolids:
             own = {name: known[_START_PREFIX + name] for name in VARIABLE_LENGTH}
             head, anchors = (known.get(_START_PREFIX + name) for name in ("head", "anchors"))
             pose = Pose(head, known[f"{_START_PREFIX}matrix"], anchors)
-            max_clearance = float(known["kept"])
+            max_clearance = float(known["max_clearance"])
         except (KeyError, ValueError, TypeError) as error:
             raise _damaged(error) from error
         return MotionStart(pose, self.colliders(own, blocking=True), max_clearance)

@@ -39,8 +39,9 @@ from .baked_solids import VARIABLE_LENGTH
 from .simulation import Arrays
 
 #: Version of the format, beyond what `layout` describes. 2: strands may have points of their own.
-#: 3: frames hold the strands that were led out of colliders.
-VERSION = 3
+#: 3: frames hold the strands that were led out of colliders. 4: facts name the device, and
+#: constants the start of the motion.
+VERSION = 4
 #: Arrays whose length may differ between frames.
 _VARIABLE_LENGTH = frozenset({"led_strands", "led_points"}) | VARIABLE_LENGTH
 FACTS, CONSTANTS = "cache.json", "constants.npz"
@@ -58,7 +59,7 @@ class Facts:
 
     owner, file: the object, and the name of its Blender file; empty where that was not saved.
     first, last: scene frames. frame_rate: [1/s].
-    form: the solver that computed it. rig_hash, frame_hashes (one per frame): see
+    device: the one that simulated it. rig_hash, frame_hashes (one per frame): see
     `simulation.hashes`.
     hairloom: the version that wrote it.
     figures: measurements of the motion of hair; None for cloth, and from versions that took none.
@@ -68,7 +69,7 @@ class Facts:
     first: int
     last: int
     frame_rate: float
-    form: str
+    device: str
     rig_hash: str
     hairloom: str
     file: str = ""
@@ -422,7 +423,7 @@ def _check_facts(facts: Facts) -> None:
     texts = (
         facts.owner,
         facts.file,
-        facts.form,
+        facts.device,
         facts.rig_hash,
         facts.hairloom,
         *facts.frame_hashes,

@@ -28,14 +28,14 @@ MADE_ATTRIBUTE = "made_card"
 RECORD_PROPERTY = "hairloom_made"
 #: the UV map on the atlas
 TILE_LAYER = "UVMap"
-#: arrays of the record: key -> (field of CardRecord, dtype, shape for each card)
-_ARRAYS: dict[str, tuple[str, Any, tuple[int, ...]]] = {
-    "places": ("places", np.float32, (5, 3)),
-    "tile": ("tile", np.int32, ()),
-    "marks": ("prints", np.int32, ()),
-    "stands": ("represented_by", np.int32, ()),
-    "triangle": ("triangle", np.int32, ()),
-    "corners": ("corners", np.float32, (3, 3)),
+#: arrays of the record: field of CardRecord -> (dtype, shape for each card)
+_ARRAYS: dict[str, tuple[Any, tuple[int, ...]]] = {
+    "places": (np.float32, (5, 3)),
+    "tile": (np.int32, ()),
+    "prints": (np.int32, ()),
+    "represented_by": (np.int32, ()),
+    "triangle": (np.int32, ()),
+    "corners": (np.float32, (3, 3)),
 }
 
 
@@ -104,10 +104,10 @@ def write_record(mesh: bpy.types.Mesh, record: CardRecord, prints: Ints, matrix:
     """
     local = record.moved(np.linalg.inv(matrix))
     content: dict[str, Any] = {
-        key: np.ascontiguousarray(getattr(local, field), dtype).ravel()
-        for key, (field, dtype, _) in _ARRAYS.items()
+        field: np.ascontiguousarray(getattr(local, field), dtype).ravel()
+        for field, (dtype, _) in _ARRAYS.items()
     }
-    content["marks"] = np.ascontiguousarray(prints, np.int32)
+    content["prints"] = np.ascontiguousarray(prints, np.int32)
     grid = record.grid
     content["grid"] = [grid.columns, grid.rows]
     content["padding"] = list(grid.padding)
@@ -126,8 +126,8 @@ def read_record(mesh: bpy.types.Mesh) -> CardRecord | None:
     content = mesh.get(RECORD_PROPERTY)
     try:
         arrays = {
-            field: np.array(content[key], dtype).reshape(-1, *shape)
-            for key, (field, dtype, shape) in _ARRAYS.items()
+            field: np.array(content[field], dtype).reshape(-1, *shape)
+            for field, (dtype, shape) in _ARRAYS.items()
         }
         columns, rows = (int(each) for each in content["grid"])
         across, along = (float(each) for each in content["padding"])

@@ -121,7 +121,7 @@ def _report_bakes(objects: list[bpy.types.Object], report: Report) -> None:
                 "first": facts.first,
                 "last": facts.last,
                 "frame_rate": facts.frame_rate,
-                "form": facts.form,
+                "device": facts.device,
                 "figures": None if facts.figures is None else facts.figures.as_dict(),
             }
         )

@@ -75,7 +75,7 @@ class Stamp:
         """Why the job has to run; empty where it need not."""
         try:
             known = json.loads(self.path.read_text(encoding="utf-8"))
-            values, inputs, outputs = known["asked"], known["inputs"], known["outputs"]
+            values, inputs, outputs = known["options"], known["inputs"], known["outputs"]
             self.reported = dict(known["reported"])
             pairs = _all_items(inputs, outputs)
             changed = [
@@ -105,7 +105,7 @@ class Stamp:
         found = [os.path.abspath(path) for path in read] + _files_of_scene()
         inputs = {path: self._digest_as_read(Path(path)) for path in found} | self._inputs
         content = {
-            "asked": self._option_values,
+            "options": self._option_values,
             "reported": {name: report.facts[name] for name in _REPORTED if name in report.facts},
             "inputs": {
                 _relative_path(self._folder, path): digest_before

@@ -178,7 +178,7 @@ def owner_of(hair: bpy.types.Object) -> bpy.types.Object:
     """
     if not hair.data.hairloom.baked_in:
         return hair
-    original = hair.hairloom.bake.stands_for  # not set in copies of older bakes
+    original = hair.hairloom.bake.shown_hair  # not set in copies of older bakes
     return original or next(
         (obj for obj in bpy.data.objects if obj.hairloom.bake.copy == hair), hair
     )

@@ -106,7 +106,7 @@ class _BakedObject:
                 first=self.frames.start,
                 last=self.frames.stop - 1,
                 frame_rate=rate,
-                form=device_of_session(self.session),
+                device=device_of_session(self.session),
                 rig_hash=self.rig_hash,
                 hairloom=environment()["hairloom"],
                 file=file_name(self.resolve()),

@@ -81,9 +81,9 @@ class HAIRLOOM_PG_bake(bpy.types.PropertyGroup):
         options={"HIDDEN"},
         override=OVERRIDABLE,
     )
-    stands_for: PointerProperty(
+    shown_hair: PointerProperty(
         type=bpy.types.Object,
-        name="Stands For",
+        name="Shown Hair",
         description="Hair whose bake this copy shows, and whose animated settings renders use",
         options={"HIDDEN"},
         override=OVERRIDABLE,

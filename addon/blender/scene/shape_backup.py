@@ -16,7 +16,7 @@ from .curves import curve_offsets, curve_points, move_curves
 from .sag_correction import restore_sag_correction
 
 #: custom property of the curves: the attributes of their kept shapes, in the order of time
-_ORDER = "hairloom_kept"
+_ORDER = "hairloom_shape_backups"
 
 
 @dataclass(frozen=True)

@@ -114,8 +114,8 @@ def test_usd_has_the_parts_that_the_engine_wants_in_motion_too(tmp_path: Path) -
     hair = guided()
     frames = [hair.strands.points + np.float32(step) for step in (0.0, 0.5)]
     for engine, parts, count in (
-        ("unreal", "usual", 12),
-        ("houdini", "usual", 10),
+        ("unreal", "default", 12),
+        ("houdini", "default", 10),
         ("houdini", "guides", 2),
         ("houdini", "both", 12),
     ):
@@ -193,9 +193,9 @@ def test_an_export_again_replaces_its_own_files_and_keeps_those_of_others(tmp_pa
         hair = replace(
             groom(seed=turn), bones=bones if turn % 2 else bones.take(np.arange(COUNT)[::-1])
         )
-        said = write_strands(tmp_path / "hair.tfx", hair, split).notes
-        said += write_strands(tmp_path / "one.tfx", hair).notes
-        kept = [note for note in said if "is kept as" in note]
+        notes = write_strands(tmp_path / "hair.tfx", hair, split).notes
+        notes += write_strands(tmp_path / "one.tfx", hair).notes
+        kept = [note for note in notes if "is kept as" in note]
         assert kept == ["hair_crown.tfx already existed, and is kept as hair_crown old.tfx."][turn:]
     assert [file.name for file in tmp_path.iterdir() if "old" in file.name] == [
         "hair_crown old.tfx"
