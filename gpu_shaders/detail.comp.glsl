@@ -57,7 +57,7 @@ void main()
   float width_sum = 0.0, strand_pixels = 0.0, fragments = 0.0, thick_fragments = 0.0;
 #endif
 #if CULLING == {{culling_hidden}}
-  uint hiding = shades_over(from, (1u << uint(detail_view.center.w)) - 1u, detail_view);
+  uint hiding = regions_around(from, (1u << uint(detail_view.center.w)) - 1u, detail_view);
 #endif
 
   int texels = factor_texels(span.count);
@@ -73,9 +73,9 @@ void main()
         after = texelFetch(cv_points, span_texel(span, segment + 2), 0).xyz;
       }
 #if CULLING == {{culling_hidden}}
-      hiding = shades_over(from + (to - before) / 6.0, hiding, detail_view);
-      hiding = shades_over(to - (after - from) / 6.0, hiding, detail_view);
-      hiding = shades_over(to, hiding, detail_view);
+      hiding = regions_around(from + (to - before) / 6.0, hiding, detail_view);
+      hiding = regions_around(to - (after - from) / 6.0, hiding, detail_view);
+      hiding = regions_around(to, hiding, detail_view);
       before = from;
 #endif
       vec4 clip_after = detail_view.view_projection * vec4(after, 1.0);

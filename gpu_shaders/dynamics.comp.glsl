@@ -3,7 +3,7 @@
 // Twin of advance in addon/dynamics/step.py. Defines: CV_COUNT; RELAXATION; IS_PAINTED, where guides have
 // numbers of their own; HAS_HELD; HAS_SPRINGS; HAS_PUSHES, where hair feels other hair; HAS_AIR;
 // HAS_FORCE_FIELDS; CONTACT_SLOTS, 0 where there are no colliders; HAS_ROUNDS and HAS_FIELDS, the kinds of
-// colliders; INHERITS, where hair inherits some of its head's motion; HAS_SHARP, HAS_FOLLOWED and
+// colliders; INHERITS_MOTION, where hair inherits some of its head's motion; HAS_SHARP, HAS_TRACING and
 // HAS_CLEARANCE, see lib_contacts.glsl.
 //
 // Loops without a constant count test their condition at the end: drivers on CPUs run the body of a loop
@@ -37,59 +37,59 @@ vec3 twist_curvature;
 #ifdef HAS_SPRINGS
 bool is_curled = false;
 #endif
-float own_kept;           // of the block, or painted for this guide; so is own_air
-float own_air;
-float own_carried = 1.0;  // factor on the motion that the moving style gives
-float own_gravity = 1.0;
-vec3 fall[FREE_SIZE];  // [m] displacement of each free CV by gravity and other hair in a substep
+float velocity_factor;    // of the block, or painted for this guide; so is air_factor
+float air_factor;
+float style_factor = 1.0;  // on the motion that the moving style gives
+float gravity_factor = 1.0;
+vec3 force_displacement[FREE_SIZE];  // [m] of each free CV by gravity and other hair in a substep
 
-// A rigid motion, see Carry in addon/dynamics/rigid_path.py.
-struct Carry {
+// A rigid motion, see RigidTransform in addon/dynamics/rigid_path.py.
+struct RigidTransform {
   vec4 row[3];  // xyz of the rotation, w a coordinate of the moved origin
   vec4 origin;  // xyz; w another number, see dynamics_pass
 };
 
-// A motion in `carriers`, see dynamics_pass. The last row has those that are the same for all substeps.
-Carry carry_at(int number, int texel)
+// A motion in `transforms`, see dynamics_pass. The last row has those that are the same for all substeps.
+RigidTransform transform_at(int number, int texel)
 {
-  Carry carry;
+  RigidTransform transform;
   for (int i = 0; i < 3; i++) {
-    carry.row[i] = texelFetch(carriers, ivec2(texel + i, number), 0);
+    transform.row[i] = texelFetch(transforms, ivec2(texel + i, number), 0);
   }
-  carry.origin = texelFetch(carriers, ivec2(texel + 3, number), 0);
-  return carry;
+  transform.origin = texelFetch(transforms, ivec2(texel + 3, number), 0);
+  return transform;
 }
 
-vec3 carried(Carry carry, vec3 point)
+vec3 transformed(RigidTransform transform, vec3 point)
 {
-  vec3 beside = point - carry.origin.xyz;
-  return vec3(dot(carry.row[0].xyz, beside), dot(carry.row[1].xyz, beside), dot(carry.row[2].xyz, beside)) +
-         vec3(carry.row[0].w, carry.row[1].w, carry.row[2].w);
+  vec3 beside = point - transform.origin.xyz;
+  return vec3(dot(transform.row[0].xyz, beside), dot(transform.row[1].xyz, beside), dot(transform.row[2].xyz, beside)) +
+         vec3(transform.row[0].w, transform.row[1].w, transform.row[2].w);
 }
 
 // [m] motion of the style at each free CV in the substep, beyond the inherited motion, where the style moves
 // along an arc; else zero
-vec3 style_moved[FREE_SIZE];
-float arc_carried;  // fraction of its motion that the style gives, 0 where there is no arc
-#ifdef INHERITS
-Carry inherited;         // in this substep
-Carry inherited_before;  // in the one before
+vec3 arc_displacement[FREE_SIZE];
+float arc_factor;  // fraction of its motion that the style gives, 0 where there is no arc
+#ifdef INHERITS_MOTION
+RigidTransform inherited_motion;           // in this substep
+RigidTransform previous_inherited_motion;  // in the one before
 #endif
 
 // Position and previous position of a CV after it has inherited its head's motion, before anything else acts
 // on it.
-vec3 inheriting(vec3 here)
+vec3 with_inherited_motion(vec3 here)
 {
-#ifdef INHERITS
-  here = carried(inherited, here);
+#ifdef INHERITS_MOTION
+  here = transformed(inherited_motion, here);
 #endif
   return here;
 }
 
-vec3 inheriting_before(vec3 before)
+vec3 previous_with_inherited_motion(vec3 before)
 {
-#ifdef INHERITS
-  before = carried(inherited, carried(inherited_before, before));
+#ifdef INHERITS_MOTION
+  before = transformed(inherited_motion, transformed(previous_inherited_motion, before));
 #endif
   return before;
 }
@@ -97,23 +97,23 @@ vec3 inheriting_before(vec3 before)
 // Curvature of a point's path, times r (r + 1); twin of curvature in addon/dynamics/trajectory.py.
 vec3 curvature_of(vec3 earlier, vec3 before, vec3 displacement)
 {
-  return earlier - before + displacement * frame.fall.w;
+  return earlier - before + displacement * frame.gravity.w;
 }
 
 void load_guide(int guide)
 {
-  own_kept = frame.kept;
-  own_air = frame.air_fraction;
+  velocity_factor = frame.velocity_factor;
+  air_factor = frame.air_factor;
 #ifdef IS_PAINTED
   vec4 own = texelFetch(painted_numbers, strand_texel(guide, 0, CV_COUNT), 0);
-  own_kept = own.x;
-  own_air = own.y;
-  own_carried = own.z;
-  own_gravity = own.w;
+  velocity_factor = own.x;
+  air_factor = own.y;
+  style_factor = own.z;
+  gravity_factor = own.w;
 #endif
-  Carry seen_now = carry_at(frame.substep_count, 8);
-  arc_carried = seen_now.origin.w;
-  Carry seen_earlier = carry_at(frame.substep_count, 12);
+  RigidTransform back_from_now = transform_at(frame.substep_count, 8);
+  arc_factor = back_from_now.origin.w;
+  RigidTransform back_from_earlier = transform_at(frame.substep_count, 12);
   for (int cv = 0; cv < CV_COUNT; cv++) {
     ivec2 texel = strand_texel(guide, cv, CV_COUNT);
     vec4 here = imageLoad(positions, texel);
@@ -125,29 +125,29 @@ void load_guide(int guide)
     style_before[cv] = texelFetch(styles_before, texel, 0).xyz;
     vec3 now = texelFetch(styles_now, texel, 0).xyz;
     vec3 earlier = texelFetch(styles_earlier, texel, 0).xyz;
-    now = carried(seen_now, now);
-    earlier = carried(seen_earlier, earlier);
+    now = transformed(back_from_now, now);
+    earlier = transformed(back_from_earlier, earlier);
     style_displacement[cv] = now - style_before[cv];
     style_curvature[cv] = curvature_of(earlier, style_before[cv], style_displacement[cv]);
   }
-  for (int i = 0; i < FREE; i++) {
+  for (int i = 0; i < FREE_COUNT; i++) {
     ivec2 texel = strand_texel(guide, i + 1, CV_COUNT);
     shape[i] = texelFetch(rest_shapes, texel, 0);
     segment_length[i] = texelFetch(rest_lengths, texel, 0).x;
 #ifdef HAS_SPRINGS
     rest_length[i] = segment_length[i];
-    most[i] = texelFetch(curl_rooms, texel, 0).x * rest_length[i] * frame.springs.x;
+    max_extension[i] = texelFetch(curl_slacks, texel, 0).x * rest_length[i] * frame.springs.x;
     compliance[i] = 0.0;
-    is_curled = is_curled || most[i] > 0.0;
+    is_curled = is_curled || max_extension[i] > 0.0;
 #endif
 #ifdef IS_PAINTED
     band[i] = texelFetch(painted_bands, strand_texel(guide, i + 2, CV_COUNT), 0);
-    bend[i] = texelFetch(painted_numbers, texel, 0).x;
+    local_stiffness[i] = texelFetch(painted_numbers, texel, 0).x;
 #else
     band[i] = frame.band[i + 2];
-    bend[i] = frame.own[i + 1].x;
+    local_stiffness[i] = frame.stiffness_and_radius[i + 1].x;
 #endif
-    radius[i] = frame.own[i + 2].y;
+    radius[i] = frame.stiffness_and_radius[i + 2].y;
 #ifdef HAS_CLEARANCE
     radius[i] = min(radius[i], texelFetch(clearances, strand_texel(guide, i + 2, CV_COUNT), 0).x);
 #endif
@@ -161,14 +161,14 @@ void load_guide(int guide)
   twist_before = texelFetch(styles_before, texel, 0).xyz;
   vec3 now = texelFetch(styles_now, texel, 0).xyz;
   vec3 earlier = texelFetch(styles_earlier, texel, 0).xyz;
-  now = carried(seen_now, now);
-  earlier = carried(seen_earlier, earlier);
+  now = transformed(back_from_now, now);
+  earlier = transformed(back_from_earlier, earlier);
   twist_displacement = now - twist_before;
   twist_curvature = curvature_of(earlier, twist_before, twist_displacement);
-  Carry begin = carry_at(frame.substep_count, 0);
-  float at_curvature = carry_at(frame.substep_count, 4).origin.w;
+  RigidTransform begin = transform_at(frame.substep_count, 0);
+  float at_curvature = transform_at(frame.substep_count, 4).origin.w;
   for (int cv = 0; cv < CV_COUNT; cv++) {
-    style[cv] = carried(begin, style_before[cv] + style_displacement[cv] * begin.origin.w + style_curvature[cv] * at_curvature);
+    style[cv] = transformed(begin, style_before[cv] + style_displacement[cv] * begin.origin.w + style_curvature[cv] * at_curvature);
   }
 }
 
@@ -176,23 +176,23 @@ void load_guide(int guide)
 vec3 middle_of_style(int cv)
 {
   vec3 middle = style_before[cv] + 0.5 * style_displacement[cv];
-  Carry halfway = carry_at(frame.substep_count, 16);
-  middle = carried(halfway, middle + style_curvature[cv] * halfway.origin.w);
+  RigidTransform halfway = transform_at(frame.substep_count, 16);
+  middle = transformed(halfway, middle + style_curvature[cv] * halfway.origin.w);
   return middle;
 }
 
-void find_fall(int guide)
+void find_force_displacement(int guide)
 {
   vec3 middle[FREE_SIZE];
-  for (int i = 0; i < FREE; i++) {
+  for (int i = 0; i < FREE_COUNT; i++) {
     middle[i] = middle_of_style(i + 2);
   }
   vec3 root = middle_of_style(1);
-  weight_on_style(frame.combed.xyz * own_gravity, root, middle, fall);
-  for (int i = 0; i < FREE; i++) {
-    fall[i] = frame.fall.xyz * own_gravity - fall[i];
+  weight_across_style(frame.compensated_gravity.xyz * gravity_factor, root, middle, force_displacement);
+  for (int i = 0; i < FREE_COUNT; i++) {
+    force_displacement[i] = frame.gravity.xyz * gravity_factor - force_displacement[i];
 #ifdef HAS_PUSHES
-    fall[i] += texelFetch(pushes, strand_texel(guide, i + 2, CV_COUNT), 0).xyz;
+    force_displacement[i] += texelFetch(pushes, strand_texel(guide, i + 2, CV_COUNT), 0).xyz;
 #endif
 #ifdef HAS_SPRINGS
     load[i] *= frame.springs.y;
@@ -201,45 +201,45 @@ void find_fall(int guide)
 }
 
 // Previous position of a CV that gives it the speed after drag.
-vec3 slowed(vec3 here, vec3 before, vec3 air_displacement)
+vec3 after_drag(vec3 here, vec3 before, vec3 air_displacement)
 {
-  return frame.drag > 0.0 ? braked(here, before, frame.drag, air_displacement) : before;
+  return frame.drag > 0.0 ? apply_drag(here, before, frame.drag, air_displacement) : before;
 }
 
 #ifdef HAS_FORCE_FIELDS
-vec3 blown[FREE_SIZE];  // [m] displacement of each free CV by force fields in a substep
+vec3 field_displacement[FREE_SIZE];  // [m] of each free CV by force fields in a substep
 
-void feel_fields(vec3 air_displacement)
+void find_field_displacement(vec3 air_displacement)
 {
   int i = 0;
   do {
-    vec3 here = inheriting(picked(position, i + 2));
-    vec3 before = slowed(here, inheriting_before(picked(previous, i + 2)), air_displacement);
-    vec3 along = inheriting(picked(position, min(i + 3, CV_COUNT - 1))) - inheriting(picked(position, i + 1));
-    vec3 felt = blown_by_fields(here, before, field_direction(along));
-    for (int k = 0; k < FREE; k++) {
-      blown[k] = k == i ? felt : blown[k];
+    vec3 here = with_inherited_motion(element_at(position, i + 2));
+    vec3 before = after_drag(here, previous_with_inherited_motion(element_at(previous, i + 2)), air_displacement);
+    vec3 along = with_inherited_motion(element_at(position, min(i + 3, CV_COUNT - 1))) - with_inherited_motion(element_at(position, i + 1));
+    vec3 displacement = displacement_by_fields(here, before, field_direction(along));
+    for (int k = 0; k < FREE_COUNT; k++) {
+      field_displacement[k] = k == i ? displacement : field_displacement[k];
     }
     i++;
-  } while (i < FREE);
+  } while (i < FREE_COUNT);
 }
 #endif
 
-void predict(vec4 moment, vec3 air_displacement)
+void predict(vec4 path_weights, vec3 air_displacement)
 {
 #ifdef HAS_FORCE_FIELDS
-  feel_fields(air_displacement);
+  find_field_displacement(air_displacement);
 #endif
-  for (int i = 0; i < FREE; i++) {
-    vec3 here = inheriting(position[i + 2]);
-    vec3 before = slowed(here, inheriting_before(previous[i + 2]), air_displacement);
+  for (int i = 0; i < FREE_COUNT; i++) {
+    vec3 here = with_inherited_motion(position[i + 2]);
+    vec3 before = after_drag(here, previous_with_inherited_motion(previous[i + 2]), air_displacement);
 #ifdef HAS_FORCE_FIELDS
-    before -= blown[i];
+    before -= field_displacement[i];
 #endif
-    vec3 impulse = style_displacement[i + 2] * moment.z + style_curvature[i + 2] * moment.w + style_moved[i];
-    impulse = impulse * own_carried + fall[i] + air_displacement * own_air;
+    vec3 impulse = style_displacement[i + 2] * path_weights.z + style_curvature[i + 2] * path_weights.w + arc_displacement[i];
+    impulse = impulse * style_factor + force_displacement[i] + air_displacement * air_factor;
     previous[i + 2] = position[i + 2];
-    position[i + 2] = (here - before) * own_kept + here + impulse;
+    position[i + 2] = (here - before) * velocity_factor + here + impulse;
   }
 }
 
@@ -250,7 +250,7 @@ void pin_held()
 #ifdef HAS_HELD
   vec3 start = style[1];
   float reach = 0.0;
-  for (int i = 0; i < FREE; i++) {
+  for (int i = 0; i < FREE_COUNT; i++) {
     reach += LENGTH_AT_REST[i];
     vec3 displacement = style[i + 2] - start;
     float ratio = reach / max(length(displacement), TINY);
@@ -284,12 +284,12 @@ void keep_lengths(bool has_normals)
 }
 
 // Alternate contacts and lengths, then solve lengths alone until they are within the tolerance.
-void keep_outside()
+void solve_contacts()
 {
 #if CONTACT_SLOTS > 0
   int passes = frame.contact_passes;  // at least one
 #ifdef HAS_SHARP
-  passes *= part_fraction < 1.0 ? {{part_passes}} : 1;
+  passes *= part_fraction < 1.0 ? {{part_pass_factor}} : 1;
 #endif
   bool is_off = true;
 #elif defined(RELAXATION)
@@ -306,7 +306,7 @@ void keep_outside()
 #endif
 #if CONTACT_SLOTS > 0
   int round_number = 0;
-  bool is_again = true;
+  bool needs_round = true;
   do {  // another round where the length solve has pulled the guide into a collider
 #endif
   int number = 0;
@@ -328,21 +328,21 @@ void keep_outside()
   }
 #ifndef RELAXATION
   if (is_off) {
-    lay_out();
+    rebuild();
   }
 #endif
 #if CONTACT_SLOTS > 0
-    is_again = round_number < {{more_rounds}} && is_deep();
+    needs_round = round_number < {{max_extra_rounds}} && is_too_deep();
     round_number++;
     steps += 1 - passes;
     passes = 1;
     is_off = true;
-  } while (is_again);
+  } while (needs_round);
 #endif
 }
 
 #ifdef HAS_SHARP
-vec3 went[CV_COUNT];  // [m] sum of each CV's displacements in parts, without what contacts absorbed
+vec3 part_displacement[CV_COUNT];  // [m] sum of each CV's displacements in parts, without what contacts absorbed
 
 // Go back to the begin of the substep. From here on position - previous is a CV's path in the next part.
 void begin_parts()
@@ -351,7 +351,7 @@ void begin_parts()
     vec3 path = (position[cv] - previous[cv]) * part_fraction;
     position[cv] = previous[cv];
     previous[cv] -= path;
-    went[cv] = vec3(0.0);
+    part_displacement[cv] = vec3(0.0);
   }
 }
 
@@ -372,14 +372,14 @@ void begin_part(bool is_last)
 void end_part(bool is_last)
 {
   for (int cv = 0; cv < CV_COUNT; cv++) {
-    went[cv] += position[cv] - previous[cv];
-    previous[cv] = is_last ? position[cv] - went[cv] : previous[cv];
+    part_displacement[cv] += position[cv] - previous[cv];
+    previous[cv] = is_last ? position[cv] - part_displacement[cv] : previous[cv];
   }
 }
 #endif
 
 // Lengths and contacts of a substep; repeated in parts, from its begin, if the guide meets a fast collider.
-void go_outside(int number)
+void solve_lengths_and_contacts(int number)
 {
 #ifdef HAS_SHARP
   int part = 0;
@@ -395,12 +395,12 @@ void go_outside(int number)
     }
     keep_lengths(false);
     find_contacts(number);
-    if (count == 1 && is_hurried) {
-      count = {{parts}};
-      part_fraction = 1.0 / float({{parts}});
+    if (count == 1 && needs_parts) {
+      count = {{part_count}};
+      part_fraction = 1.0 / float({{part_count}});
       begin_parts();
     } else {
-      keep_outside();
+      solve_contacts();
       absorb();
       part++;
       if (count > 1) {
@@ -413,7 +413,7 @@ void go_outside(int number)
 #if CONTACT_SLOTS > 0
   find_contacts(number);
 #endif
-  keep_outside();
+  solve_contacts();
 #if CONTACT_SLOTS > 0
   absorb();
 #endif
@@ -422,43 +422,43 @@ void go_outside(int number)
 
 void do_substep(int number)
 {
-  vec4 moment = texelFetch(moments, ivec2(0, number), 0);
+  vec4 path_weights = texelFetch(substep_table, ivec2(0, number), 0);
 #ifdef HAS_AIR
-  vec4 turns[{{wind_modes}} / 4];
+  vec4 phases[{{wind_modes}} / 4];
   for (int i = 0; i < {{wind_modes}} / 4; i++) {
-    turns[i] = texelFetch(moments, ivec2(1 + i, number), 0);
+    phases[i] = texelFetch(substep_table, ivec2(1 + i, number), 0);
   }
-  vec3 air_displacement = air_at(position[0], turns) * frame.dt;
+  vec3 air_displacement = air_at(position[0], phases) * frame.dt;
 #else
   vec3 air_displacement = vec3(0.0);
 #endif
-#ifdef INHERITS
-  inherited = carry_at(number, 4);
-  inherited_before = carry_at(number > 0 ? number - 1 : frame.substep_count, 4);
+#ifdef INHERITS_MOTION
+  inherited_motion = transform_at(number, 4);
+  previous_inherited_motion = transform_at(number > 0 ? number - 1 : frame.substep_count, 4);
 #endif
-  Carry place = carry_at(number, 0);
-  for (int i = 0; i < FREE; i++) {
-    style_moved[i] = -inheriting(style[i + 2]);
+  RigidTransform root_motion = transform_at(number, 0);
+  for (int i = 0; i < FREE_COUNT; i++) {
+    arc_displacement[i] = -with_inherited_motion(style[i + 2]);
   }
   for (int cv = 0; cv < CV_COUNT; cv++) {
-    style[cv] = style_before[cv] + style_displacement[cv] * moment.x + style_curvature[cv] * moment.y;
-    style[cv] = carried(place, style[cv]);
+    style[cv] = style_before[cv] + style_displacement[cv] * path_weights.x + style_curvature[cv] * path_weights.y;
+    style[cv] = transformed(root_motion, style[cv]);
   }
-  style_twist = twist_before + twist_displacement * moment.x + twist_curvature * moment.y;
-  style_twist = carried(place, style_twist);
-  for (int i = 0; i < FREE; i++) {
-    style_moved[i] = (style_moved[i] + style[i + 2]) * arc_carried;
+  style_twist = twist_before + twist_displacement * path_weights.x + twist_curvature * path_weights.y;
+  style_twist = transformed(root_motion, style_twist);
+  for (int i = 0; i < FREE_COUNT; i++) {
+    arc_displacement[i] = (arc_displacement[i] + style[i + 2]) * arc_factor;
   }
-  predict(moment, air_displacement);
+  predict(path_weights, air_displacement);
   pin();
 #ifdef HAS_SPRINGS
   if (is_curled) {
-    give(frame.springs.y);
+    spring_step(frame.springs.y);
   }
 #endif
   restore_style();
   pin_held();
-  go_outside(number);
+  solve_lengths_and_contacts(number);
 }
 
 void main()
@@ -468,7 +468,7 @@ void main()
     return;
   }
   load_guide(guide);
-  find_fall(guide);
+  find_force_displacement(guide);
   int number = 0;
   do {
     do_substep(number);

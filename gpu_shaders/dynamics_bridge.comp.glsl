@@ -18,7 +18,7 @@ vec3 simulated_at(int guide, int cv, vec3 displacement)
 {
   ivec2 texel = strand_texel(guide, cv, cv_count);
 #ifdef HAS_HELD
-  displacement += texelFetch(beside_root, texel, 0).xyz;
+  displacement += texelFetch(held_displacements, texel, 0).xyz;
 #endif
   vec3 place = texelFetch(positions, texel, 0).xyz;
 #ifdef IS_TURNED

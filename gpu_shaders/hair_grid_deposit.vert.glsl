@@ -13,7 +13,7 @@ void main()
   vec3 before = vec3(texelFetch(previous_positions, texel, 0).xy, here.w);
   HairGridCv cv = hair_grid_cv(grid, here.xyz, before);
   mass_motion = mass_and_motion(grid, cv.motion, texelFetch(hair_at_rest, texel, 0).z);
-  ivec3 cell = cv.low + ivec3(greaterThanEqual(cv.part, vec3(0.5)));
+  ivec3 cell = cv.low + ivec3(greaterThanEqual(cv.fraction, vec3(0.5)));
   gl_PointSize = 1.0;
   gl_Position = cell_clip_position(grid, wrapped_cell(cell, grid.counts.xyz));
 }

@@ -3,7 +3,7 @@
 #include "lib_strand_texel.glsl"
 
 #define SWEEPS {{hold_sweeps}}
-#define NEAR {{hold_near}}
+#define MIN_ERROR {{min_hold_error}}
 #define TINY 1.0e-12
 
 vec3 point_at(StrandSpan span, int cv)
@@ -25,7 +25,7 @@ float length_from(StrandSpan span, int cv)
   return distance(here, next);
 }
 
-void put_beside(StrandSpan span, int cv, int other, float away)
+void set_distance(StrandSpan span, int cv, int other, float away)
 {
   vec3 place = point_at(span, other);
   vec3 offset = point_at(span, cv) - place;
@@ -44,7 +44,7 @@ vec3 carried(StrandSpan span, int cv, int anchor)
 }
 
 // Bring a strand to one hold. before: the last CV that is held so far; returns the next such CV.
-int bring(StrandSpan span, int number, int before, float whole_length)
+int move_to_hold(StrandSpan span, int number, int before, float whole_length)
 {
   vec2 hold = texelFetch(holds, counted_texel(number), 0).xy;  // place, anchor
   int first = int(hold.x);
@@ -53,7 +53,7 @@ int bring(StrandSpan span, int number, int before, float whole_length)
   vec3 beyond = carried(span, after, int(hold.y));
   vec3 here = point_at(span, first);
   vec3 there = point_at(span, after);
-  if (max(distance(target, here), distance(beyond, there)) <= NEAR * whole_length) {
+  if (max(distance(target, here), distance(beyond, there)) <= MIN_ERROR * whole_length) {
     return after;
   }
   float reach = 0.0;
@@ -75,10 +75,10 @@ int bring(StrandSpan span, int number, int before, float whole_length)
   }
   for (int sweep = 0; sweep < SWEEPS; sweep++) {
     for (int cv = first - 1; cv > before; cv--) {
-      put_beside(span, cv, cv + 1, length_from(span, cv));
+      set_distance(span, cv, cv + 1, length_from(span, cv));
     }
     for (int cv = before + 1; cv < first; cv++) {
-      put_beside(span, cv, cv - 1, length_from(span, cv - 1));
+      set_distance(span, cv, cv - 1, length_from(span, cv - 1));
     }
   }
   return after;
@@ -97,8 +97,8 @@ void main()
   for (int cv = 0; cv < span.count - 1; cv++) {
     whole_length += length_from(span, cv);
   }
-  int before = {{pinned}} - 1;
+  int before = {{pinned_count}} - 1;
   for (int number = 0; number < own.z; number++) {
-    before = bring(span, own.y + number, before, whole_length);
+    before = move_to_hold(span, own.y + number, before, whole_length);
   }
 }

@@ -31,8 +31,8 @@
 #endif
 
 #define SWEEPS {{lead_sweeps}}
-#define TRIES {{lead_tries}}
-#define HALVINGS {{lead_halvings}}
+#define DIRECTIONS {{lead_directions}}
+#define BISECTIONS {{lead_bisections}}
 #define TINY 1.0e-30
 
 #define BLOCK {{lead_block}}
@@ -58,7 +58,7 @@ vec3 ridden_point(StrandSpan span, int point)
 // Motion of a strand's root.
 RootMotion motion_of(int strand)
 {
-  return root_motion_at(root_motions, min(strand, mover_count - 1));
+  return root_motion_at(root_motions, min(strand, root_motion_count - 1));
 }
 
 vec3 carried_point(StrandSpan span, int point, RootMotion motion)
@@ -94,7 +94,7 @@ void process_strand(int strand, StrandSpan span, int end)
     imageStore(cv_points, texel, vec4(place, riding.w));
   }
   // a strand that was bent in the frame before is led out from its root on
-  bool was_bent = imageLoad(states, counted_texel(strand)).z > turn_back_angle;
+  bool was_bent = imageLoad(states, counted_texel(strand)).z > return_angle;
   float is_moved = was_bent ? 2.0 : last > 0 ? 1.0 : 0.0;
   vec4 state = vec4(is_moved, was_bent ? 1.0 : 0.0, 0.0, 0.0);
   imageStore(states, counted_texel(strand), state);
@@ -111,7 +111,7 @@ void process_strand(int strand, StrandSpan span, int end)
     vec3 here = ridden_point(span, point);
     float away = distance(here, carried_point(span, point, motion));
     float shortfall = wanted_clearance(span, point, away) - signed_distance(solid, here, max_clearance).w;
-    state.y = shortfall > {{lead_slack}} * max_clearance ? float(point) : state.y;
+    state.y = shortfall > {{lead_tolerance}} * max_clearance ? float(point) : state.y;
   }
   state.x = state.y > 0.5 ? max(state.x, 1.0) : state.x;
   imageStore(states, counted_texel(strand), state);
@@ -130,7 +130,7 @@ void keep_bends(int strand, StrandSpan span)
     vec3 segment = riding.xyz - riding_start;
     vec3 along = direction_of(segment);
     vec3 bend = imageLoad(segment_bends, texel).xyz;
-    bend *= max(1.0 - turn_back_angle / max(length(bend), TINY), 0.0);
+    bend *= max(1.0 - return_angle / max(length(bend), TINY), 0.0);
     vec3 bent = at_length(vec3(0.0), along + bend, length(segment));
     bool has_bend = bend != vec3(0.0);  // segments without a bend stay bit-identical
     shift += has_bend ? bent - segment : vec3(0.0);
@@ -145,7 +145,7 @@ void keep_bends(int strand, StrandSpan span)
 // Directions spread evenly over the sphere, on a spiral by the golden angle.
 vec3 spiral_direction(int number)
 {
-  float height = 1.0 - (2.0 * float(number) + 1.0) / float(TRIES);
+  float height = 1.0 - (2.0 * float(number) + 1.0) / float(DIRECTIONS);
   float angle = {{golden_angle}} * float(number);
   float radius = sqrt(1.0 - height * height);
   return vec3(radius * cos(angle), radius * sin(angle), height);
@@ -160,10 +160,10 @@ vec4 turn_out(Solid solid, vec3 start, vec3 arm, float size, vec3 toward, float 
   vec3 best_direction = vec3(0.0);
   float best_score = -1.0e30;
   float remaining = 0.0;
-  for (int number = -1; number < TRIES; number++) {
+  for (int number = -1; number < DIRECTIONS; number++) {
     vec3 candidate = number < 0 ? toward : spiral_direction(number);
     float shortfall = goal - signed_distance(solid, start + size * candidate, goal).w;
-    // the nearest direction that leads out; if none does, the one that lacks least
+    // the nearest direction that leads out; if none does, the one with the smallest shortfall
     float score = shortfall > 0.0 ? -2.0 - shortfall : dot(candidate, arm);
     best_direction = score > best_score ? candidate : best_direction;
     remaining = score > best_score ? max(shortfall, 0.0) : remaining;
@@ -171,7 +171,7 @@ vec4 turn_out(Solid solid, vec3 start, vec3 arm, float size, vec3 toward, float 
   }
   float low = 0.0;
   float high = 1.0;
-  for (int halving = 0; halving < HALVINGS; halving++) {
+  for (int bisection = 0; bisection < BISECTIONS; bisection++) {
     float middle = (low + high) / 2.0;
     vec3 end = at_length(start, arm + middle * (best_direction - arm), size);
     if (signed_distance(solid, end, goal).w < goal) {
@@ -189,7 +189,7 @@ vec4 turn_out(Solid solid, vec3 start, vec3 arm, float size, vec3 toward, float 
 float outward_shift(vec3 arm, vec3 outward, float size, float shortfall)
 {
   float along = dot(arm, outward) / max(size, TINY);
-  return shortfall / max(1.0 - along * along, {{lead_steepest}});
+  return shortfall / max(1.0 - along * along, {{lead_min_squared_sine}});
 }
 
 // One attempt to lead some points of a strand out, from the first that is too near on. extra_clearance:
@@ -225,9 +225,9 @@ void lead(StrandSpan span, int begin, int end, RootMotion motion, float extra_cl
       vec3 here = sweep > 0 ? at_length(start, arm, size) : start + segment;
       vec4 found = signed_distance(solid, here, max_clearance + extra_clearance);
       float shortfall = goal - found.w;
-      bool is_out = shortfall <= {{lead_slack}} * max_clearance;
+      bool is_out = shortfall <= {{lead_tolerance}} * max_clearance;
       // deep inside a collider the normal may point to its other side
-      is_stuck = !is_out && (sweep == SWEEPS || shortfall > {{lead_deepest}} * size);
+      is_stuck = !is_out && (sweep == SWEEPS || shortfall > {{lead_max_straight_move}} * size);
       arm = here - start;
       arm += is_stuck ? vec3(0.0) : found.xyz * outward_shift(arm, found.xyz, size, shortfall);
       if (is_out) {
@@ -261,11 +261,11 @@ void lead_strand(int strand, StrandSpan span, int end)
       for (int point = 1; point < span.count; point++) {
         extra_clearance += distance(ridden_point(span, point - 1), ridden_point(span, point));
       }
-      extra_clearance *= {{lead_margin}} * float(attempt) / float(span.count - 1);
+      extra_clearance *= {{lead_extra_distance}} * float(attempt) / float(span.count - 1);
       state.y = 1.0;
     }
     lead(span, max(first_point, int(state.y)), end, motion, extra_clearance, state);
-    state.w = end == span.count && state.z <= {{lead_slack}} * max_clearance ? 1.0 : 0.0;
+    state.w = end == span.count && state.z <= {{lead_tolerance}} * max_clearance ? 1.0 : 0.0;
   }
   imageStore(states, counted_texel(strand), state);
 }
@@ -295,7 +295,7 @@ void store_points(int strand, StrandSpan span)
     start = place;
   }
   state.x = 1.0;
-  state.z = max_bend > {{lead_upright}} && !is_stuck ? max_bend : 0.0;
+  state.z = max_bend > {{lead_min_deflection}} && !is_stuck ? max_bend : 0.0;
   imageStore(states, counted_texel(strand), state);
 }
 #endif

@@ -12,6 +12,6 @@ vec3 blended_segment(vec3 simulated, vec3 style, float fraction)
   vec3 ahead = style / max(style_length, 1.0e-12);
   vec3 direction = ahead + (toward - ahead) * fraction;
   float size = length(direction);
-  direction = size > {{blend_opposite}} ? direction / max(size, {{blend_opposite}}) : toward;
+  direction = size > {{min_blend_direction}} ? direction / max(size, {{min_blend_direction}}) : toward;
   return direction * (style_length + (simulated_length - style_length) * fraction);
 }

@@ -4,7 +4,7 @@
 // HAS_ROUNDS, HAS_FIELDS. Needs the textures `rounds` and `fields`, see
 // addon/render/collider_textures.py.
 
-struct Found {
+struct SignedDistance {
   float distance;  // [m], negative inside
   vec3 gradient;
 };
@@ -33,12 +33,12 @@ vec3 outward_of(Round solid, vec3 point)
   return outward - solid.axis * fraction;
 }
 
-Found distance_from(vec3 outward, float radius)
+SignedDistance round_distance(vec3 outward, float radius)
 {
   float reach = length(outward);
   vec3 gradient = outward / max(reach, 1.0e-9);
   gradient.z = reach < 1.0e-9 ? 1.0 : gradient.z;  // on the axis itself any direction leads out
-  return Found(reach - radius, gradient);
+  return SignedDistance(reach - radius, gradient);
 }
 #endif
 
@@ -57,15 +57,15 @@ vec4 nodes_at(Field field, int index)
                     ivec2(index % {{field_row}}, field.row + index / {{field_row}}), 0);
 }
 
-Found distance_in(Field field, vec3 point)
+SignedDistance field_distance(Field field, vec3 point)
 {
   vec3 top = vec3(field.nodes - 1);
   vec3 place = (point - field.low) * (1.0 / field.cell);
-  vec3 held = clamp(place, vec3(0.0), top);
-  float outside = length(place - held) * field.cell;
-  held = min(held, top - 1.0e-3);
-  ivec3 node = ivec3(held);
-  vec3 f = held - vec3(node);
+  vec3 clamped = clamp(place, vec3(0.0), top);
+  float outside = length(place - clamped) * field.cell;
+  clamped = min(clamped, top - 1.0e-3);
+  ivec3 node = ivec3(clamped);
+  vec3 f = clamped - vec3(node);
   int index = (node.z * field.nodes.y + node.y) * field.nodes.x + node.x;
   vec4 near = nodes_at(field, index);
   vec4 far = nodes_at(field, index + 1);
@@ -76,34 +76,34 @@ Found distance_in(Field field, vec3 point)
   vec2 y = z.xz + f.y * dy;
   vec2 slope_z = dz.xz + f.y * (dz.yw - dz.xz);
   vec3 gradient = vec3(y.y - y.x, mix(dy.x, dy.y, f.x), mix(slope_z.x, slope_z.y, f.x));
-  return Found(y.x + f.x * gradient.x + outside, gradient * (1.0 / field.cell));
+  return SignedDistance(y.x + f.x * gradient.x + outside, gradient * (1.0 / field.cell));
 }
 #endif
 
 // Distance and gradient at a point of the collider's object space.
 //
-// For a field, own: nodes along x, y and z, then its row; low_cell: xyz place of its first node, w its cell
-// size. For round solids, own: the first one, their count, 0, -1.
-Found distance_to(vec4 own, vec4 low_cell, vec3 local)
+// For a field, collider_shape: nodes along x, y and z, then its row; grid_origin: xyz place of its first node, w its cell
+// size. For round solids, collider_shape: the first one, their count, 0, -1.
+SignedDistance collider_distance(vec4 collider_shape, vec4 grid_origin, vec3 local)
 {
-  Found found = Found(1.0e30, vec3(0.0));
+  SignedDistance found = SignedDistance(1.0e30, vec3(0.0));
 #ifdef HAS_FIELDS
-  if (own.w >= 0.0) {
-    found = distance_in(Field(low_cell.xyz, low_cell.w, ivec3(own.xyz), int(own.w)), local);
+  if (collider_shape.w >= 0.0) {
+    found = field_distance(Field(grid_origin.xyz, grid_origin.w, ivec3(collider_shape.xyz), int(collider_shape.w)), local);
   }
 #endif
 #ifdef HAS_ROUNDS
-  if (own.w < 0.0) {
+  if (collider_shape.w < 0.0) {
     vec4 nearest = vec4(0.0);  // xyz from the axis, w radius
-    int end = int(own.x + own.y);
-    for (int k = int(own.x); k < end; k++) {
+    int end = int(collider_shape.x + collider_shape.y);
+    for (int k = int(collider_shape.x); k < end; k++) {
       Round solid = round_at(k);
       vec3 outward = outward_of(solid, local);
       float away = length(outward) - solid.radius;
       nearest = away < found.distance ? vec4(outward, solid.radius) : nearest;
       found.distance = min(away, found.distance);
     }
-    found = distance_from(nearest.xyz, nearest.w);
+    found = round_distance(nearest.xyz, nearest.w);
   }
 #endif
   return found;

@@ -5,11 +5,11 @@
 
 // Whether a point lies in the region behind a ball: with s = (point - origin) . axis,
 // s >= nearest and |point - origin - s axis|^2 <= width + slope s^2.
-bool is_shaded(vec3 point, int index, DetailView detail_view)
+bool is_in_region(vec3 point, int index, DetailView detail_view)
 {
-  vec4 origin_nearest = detail_view.shades[3 * index];
-  vec4 axis_width = detail_view.shades[3 * index + 1];
-  float slope = detail_view.shades[3 * index + 2].x;
+  vec4 origin_nearest = detail_view.hidden_regions[3 * index];
+  vec4 axis_width = detail_view.hidden_regions[3 * index + 1];
+  float slope = detail_view.hidden_regions[3 * index + 2].x;
   vec3 away = point - origin_nearest.xyz;
   float along = dot(away, axis_width.xyz);
   vec3 across = away - along * axis_width.xyz;
@@ -17,11 +17,11 @@ bool is_shaded(vec3 point, int index, DetailView detail_view)
 }
 
 // The subset of `regions`, one bit each, that contain a point.
-uint shades_over(vec3 point, uint regions, DetailView detail_view)
+uint regions_around(vec3 point, uint regions, DetailView detail_view)
 {
   for (int index = 0; index < int(detail_view.center.w) && regions != 0u; index++) {
     uint region = 1u << uint(index);
-    regions &= is_shaded(point, index, detail_view) ? ~0u : ~region;
+    regions &= is_in_region(point, index, detail_view) ? ~0u : ~region;
   }
   return regions;
 }

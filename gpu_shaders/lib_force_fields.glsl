@@ -10,7 +10,7 @@
 #include "lib_angle.glsl"
 
 #define FIELD_TINY 1.0e-12
-#define FIELD_STRONGEST 1.0e9
+#define MAX_FIELD_ACCELERATION 1.0e9
 
 vec3 field_push;         // [m/s^2]
 float field_slowing;     // [1/s]
@@ -29,7 +29,7 @@ vec3 field_direction(vec3 vector)
   return size > FIELD_TINY ? vector / size : vec3(0.0);
 }
 
-float fallen(vec4 falloff, float away)
+float power_falloff(vec4 falloff, float away)
 {
   float beyond = max(away + (1.0 - falloff.y), 1.0);
   return away <= falloff.z ? pow(beyond, -falloff.x) : 0.0;
@@ -41,7 +41,7 @@ float field_falloff(int field, int kind, float away, vec3 from_center, vec3 norm
   float along = dot(normal, from_center);
   float part;
   if (kind == 0) {
-    part = fallen(by_distance, away);
+    part = power_falloff(by_distance, away);
   }
   else {
     float wide = length(from_center - normal * along);
@@ -49,7 +49,7 @@ float field_falloff(int field, int kind, float away, vec3 from_center, vec3 norm
       float size = max(length(from_center), FIELD_TINY);
       wide = angle_of(wide / size, along / size) * 57.29577951308232;
     }
-    part = fallen(by_distance, abs(along)) * fallen(field_texel(field, 6), wide);
+    part = power_falloff(by_distance, abs(along)) * power_falloff(field_texel(field, 6), wide);
   }
   return along * by_distance.w < 0.0 ? 0.0 : part * frame.wind.w;
 }
@@ -60,11 +60,11 @@ int permuted(int index)
   return int(texelFetch(force_fields, ivec2(index / 4, 0), 0)[index % 4]);
 }
 
-float noise_gradient(int corner, vec3 seen)
+float noise_gradient(int corner, vec3 offset)
 {
   corner &= 15;
-  float one = corner < 8 ? seen.x : seen.y;
-  float other = corner < 4 ? seen.y : (corner == 12 || corner == 14 ? seen.x : seen.z);
+  float one = corner < 8 ? offset.x : offset.y;
+  float other = corner < 4 ? offset.y : (corner == 12 || corner == 14 ? offset.x : offset.z);
   return ((corner & 1) != 0 ? -one : one) + ((corner & 2) != 0 ? -other : other);
 }
 
@@ -79,9 +79,9 @@ float perlin(vec3 point)
     int x = i / 2;
     int y = i % 2;
     int row = permuted(permuted(cell.x + x) + cell.y + y) + cell.z;
-    vec3 seen = inside - vec3(x, y, 0);
-    float low = noise_gradient(permuted(row), seen);
-    float high = noise_gradient(permuted(row + 1), seen - vec3(0, 0, 1));
+    vec3 offset = inside - vec3(x, y, 0);
+    float low = noise_gradient(permuted(row), offset);
+    float high = noise_gradient(permuted(row + 1), offset - vec3(0, 0, 1));
     edges[i] = mix(low, high, fade.z);
   }
   return mix(mix(edges.x, edges.y, fade.y), mix(edges.z, edges.w, fade.y), fade.x);
@@ -98,7 +98,7 @@ vec3 turbulence(vec3 point, float size)
   return vec3(octaves_of(point), octaves_of(point.yzx), octaves_of(point.zxy));
 }
 
-void feel_field(int field, vec3 point, vec3 velocity)
+void add_field(int field, vec3 point, vec3 velocity)
 {
   vec4 first = field_texel(field, 0);
   vec4 second = field_texel(field, 1);
@@ -120,39 +120,39 @@ void feel_field(int field, vec3 point, vec3 velocity)
   if (part <= 0.0) {
     return;
   }
-  float strong = part * third.w;
+  float strength = part * third.w;
   vec3 push = vec3(0.0);
   float slowing = 0.0;
   if (kind == {{field_wind}}) {
-    push = normal * strong;
+    push = normal * strength;
   }
   else if (kind == {{field_force}}) {
     if ((options & 1) != 0) {
-      strong = far > FIELD_TINY ? strong / (far * far + FIELD_TINY) : 0.0;
+      strength = far > FIELD_TINY ? strength / (far * far + FIELD_TINY) : 0.0;
     }
-    push = field_direction(away) * strong;
+    push = field_direction(away) * strength;
   }
   else if (kind == {{field_vortex}} && shape == {{shape_point}}) {
-    push = field_direction(cross(normal, away)) * (strong * far);
+    push = field_direction(cross(normal, away)) * (strength * far);
   }
   else if (kind == {{field_vortex}}) {
-    vec3 around = cross(fourth.xyz, from_center) * strong;
-    push = cross(fourth.xyz, around) * strong + around;
+    vec3 around = cross(fourth.xyz, from_center) * strength;
+    push = cross(fourth.xyz, around) * strength + around;
     slowing = 1.0;
   }
   else if (kind == {{field_magnet}}) {
     bool is_around = shape == {{shape_point}} || shape == {{shape_line}};
-    field_spin += field_direction(is_around ? cross(normal, away) : normal) * strong;
+    field_spin += field_direction(is_around ? cross(normal, away) : normal) * strength;
   }
   else if (kind == {{field_harmonic}}) {
     if (fifth.x > 0.0) {
       away *= (far - fifth.x) / max(far, FIELD_TINY);
     }
-    push = away * -strong;
+    push = away * -strength;
     slowing = fourth.w * 2.0 * sqrt(abs(third.w));
   }
   else if (kind == {{field_turbulence}}) {
-    push = turbulence((options & 2) != 0 ? point : from_center + fourth.xyz, fifth.x) * strong;
+    push = turbulence((options & 2) != 0 ? point : from_center + fourth.xyz, fifth.x) * strength;
   }
   else {
     slowing = part * (length(velocity) * min(third.w, 2.0) + min(fourth.w, 2.0));
@@ -166,13 +166,13 @@ void feel_field(int field, vec3 point, vec3 velocity)
   field_across_slowing += slowing * fifth.z;
 }
 
-float speed_left(float slowing)
+float slowing_factor(float slowing)
 {
   return slowing > 0.0 ? 1.0 / (1.0 + slowing) : 1.0 - slowing;
 }
 
 // Displacement of a CV by all fields in a substep [m]; `along` is the strand's direction there.
-vec3 blown_by_fields(vec3 here, vec3 before, vec3 along)
+vec3 displacement_by_fields(vec3 here, vec3 before, vec3 along)
 {
   vec3 velocity = (here - before) / frame.dt;
   field_push = field_across_push = field_spin = vec3(0.0);
@@ -180,18 +180,18 @@ vec3 blown_by_fields(vec3 here, vec3 before, vec3 along)
   int count = textureSize(force_fields, 0).y - 1;  // one at least
   int field = 0;
   do {
-    feel_field(field, here, velocity);
+    add_field(field, here, velocity);
     field++;
   } while (field < count);
-  field_push = clamp(field_push, -FIELD_STRONGEST, FIELD_STRONGEST);
-  field_across_push = clamp(field_across_push, -FIELD_STRONGEST, FIELD_STRONGEST);
-  vec3 blown = velocity + field_push * frame.dt;
-  float straight = dot(blown, along);
-  blown = (blown - along * straight) * speed_left(field_slowing * frame.dt);
+  field_push = clamp(field_push, -MAX_FIELD_ACCELERATION, MAX_FIELD_ACCELERATION);
+  field_across_push = clamp(field_across_push, -MAX_FIELD_ACCELERATION, MAX_FIELD_ACCELERATION);
+  vec3 new_velocity = velocity + field_push * frame.dt;
+  float straight = dot(new_velocity, along);
+  new_velocity = (new_velocity - along * straight) * slowing_factor(field_slowing * frame.dt);
   straight -= dot(field_across_push, along) * frame.dt;
-  blown += along * (straight * speed_left((field_slowing - field_across_slowing) * frame.dt));
+  new_velocity += along * (straight * slowing_factor((field_slowing - field_across_slowing) * frame.dt));
   vec3 turn = clamp(field_spin * frame.dt, -1.0e6, 1.0e6);
-  blown = (blown + cross(blown, turn) + turn * dot(blown, turn)) / (dot(turn, turn) + 1.0);
-  vec3 displacement = (blown - velocity) * frame.dt;
+  new_velocity = (new_velocity + cross(new_velocity, turn) + turn * dot(new_velocity, turn)) / (dot(turn, turn) + 1.0);
+  vec3 displacement = (new_velocity - velocity) * frame.dt;
   return displacement * (frame.springs.w / max(length(displacement), frame.springs.w + FIELD_TINY));
 }

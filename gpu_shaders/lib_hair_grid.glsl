@@ -4,9 +4,9 @@
 
 // A CV in the grid.
 struct HairGridCv {
-  vec3 motion;  // world [m] in a substep
-  ivec3 low;    // lowest of the eight cells whose centres surround it
-  vec3 part;    // position between that cell's centre (0) and the next one's (1)
+  vec3 motion;    // world [m] in a substep
+  ivec3 low;      // lowest of the eight cells whose centres surround it
+  vec3 fraction;  // position between that cell's centre (0) and the next one's (1)
 };
 
 // Dot product with the same order of additions as in numpy.

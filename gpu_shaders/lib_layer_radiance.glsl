@@ -3,7 +3,7 @@
 //
 // Reads the textures of strands by name, see addon/render/strand_pass.py, and the block `strands`.
 // TANGENTS: the unit tangent, from root to tip in world space, instead of the radiance.
-#define SHADED_LATER
+#define DEFERRED_SHADING
 #include "lib_strand_geometry.glsl"
 #ifndef TANGENTS
 #  include "lib_strand_light.glsl"

@@ -6,7 +6,7 @@
 #include "lib_guide.glsl"
 
 #define CONTACT_WEIGHT {{contact_weight}}
-#define HELD {{held_weight}}
+#define HELD_WEIGHT {{held_weight}}
 #define HELD_SWEEPS {{held_sweeps}}
 
 vec3 touched_normal[FREE_SIZE];  // at each free CV that touches a collider, else zero
@@ -21,16 +21,16 @@ void newton_step(bool has_normals)
   vec3 normal_before = vec3(0.0);
   float inverse_pivot = 0.0;
   float tension_before = 0.0;
-  for (int i = 0; i < FREE; i++) {
+  for (int i = 0; i < FREE_COUNT; i++) {
     segment[i] = position[i + 2] - position[i + 1];
     float square = dot(segment[i], segment[i]) + TINY * TINY;
     float diagonal = i == 0 ? square : 2.0 * square;  // the last pinned CV does not move
-    float beside = -dot(segment[i], segment_before);
+    float off_diagonal = -dot(segment[i], segment_before);
 #ifdef HAS_HELD
-    float light_before = i > 0 && held[i - 1] ? 1.0 - HELD : 1.0;
-    diagonal -= i > 0 ? square * (1.0 - light_before) : 0.0;
-    diagonal -= held[i] ? square * HELD : 0.0;
-    beside *= light_before;
+    float weight_before = i > 0 && held[i - 1] ? 1.0 - HELD_WEIGHT : 1.0;
+    diagonal -= i > 0 ? square * (1.0 - weight_before) : 0.0;
+    diagonal -= held[i] ? square * HELD_WEIGHT : 0.0;
+    off_diagonal *= weight_before;
 #endif
 #ifdef HAS_SPRINGS
     diagonal += compliance[i] * square;
@@ -38,20 +38,20 @@ void newton_step(bool has_normals)
     if (has_normals) {
       float lower = dot(normal_before, segment[i]);
       float upper = dot(touched_normal[i], segment[i]);
-      beside += CONTACT_WEIGHT * (dot(normal_before, segment_before) * lower);
+      off_diagonal += CONTACT_WEIGHT * (dot(normal_before, segment_before) * lower);
       diagonal -= CONTACT_WEIGHT * (upper * upper);
       diagonal -= CONTACT_WEIGHT * (lower * lower);
       normal_before = touched_normal[i];
     }
-    ratio[i] = beside * inverse_pivot;
-    inverse_pivot = 1.0 / (diagonal - ratio[i] * beside);
+    ratio[i] = off_diagonal * inverse_pivot;
+    inverse_pivot = 1.0 / (diagonal - ratio[i] * off_diagonal);
     tension_before = square - sqrt(square) * segment_length[i] - ratio[i] * tension_before;
     tension[i] = tension_before * inverse_pivot;
     segment_before = segment[i];
   }
   vec3 above = vec3(0.0);  // the segment above times its tension
   float taken = 0.0;       // part of the tension, by back substitution from the segment above
-  for (int i = FREE - 1; i >= 0; i--) {
+  for (int i = FREE_COUNT - 1; i >= 0; i--) {
     float own = tension[i] - taken;
     taken = ratio[i] * own;
     vec3 pull = segment[i] * own;
@@ -72,7 +72,7 @@ void newton_step(bool has_normals)
 bool is_off_length(float tolerance, float rounding)
 {
   bool is_off = false;
-  for (int i = 0; i < FREE; i++) {
+  for (int i = 0; i < FREE_COUNT; i++) {
     vec3 segment = position[i + 2] - position[i + 1];
     float square = dot(segment, segment) + TINY * TINY;
     float allowed = segment_length[i] * tolerance + rounding;
@@ -85,12 +85,12 @@ bool is_off_length(float tolerance, float rounding)
 
 // Set all segments to their lengths, from the root on, keeping their directions. With held CVs, first from
 // these towards the root.
-void lay_out()
+void rebuild()
 {
 #ifdef HAS_HELD
   vec3 after = position[CV_COUNT - 1];
   bool is_beyond = false;
-  for (int i = FREE - 1; i > 0; i--) {  // CV i + 1 from the one beyond it
+  for (int i = FREE_COUNT - 1; i > 0; i--) {  // CV i + 1 from the one beyond it
     is_beyond = is_beyond || held[i];
     vec3 place = position[i + 1];
     vec3 moved_place = position[i + 2] - unit_of(after - place) * segment_length[i];
@@ -100,7 +100,7 @@ void lay_out()
 #endif
   vec3 before = position[1];
   vec3 from_root = before;
-  for (int i = 0; i < FREE; i++) {
+  for (int i = 0; i < FREE_COUNT; i++) {
     vec3 place = position[i + 2];
     from_root += unit_of(place - before) * segment_length[i];
     before = place;
@@ -111,7 +111,7 @@ void lay_out()
 void relax_lengths(int sweeps)
 {
   for (int sweep = 0; sweep < sweeps; sweep++) {
-    for (int i = 0; i < FREE; i++) {
+    for (int i = 0; i < FREE_COUNT; i++) {
       vec3 segment = position[i + 2] - position[i + 1];
       float now = length(segment);
       segment *= (now - segment_length[i]) / max(now, TINY);
@@ -131,16 +131,16 @@ void relax_lengths(int sweeps)
 }
 
 // A point, moved towards another one if it is farther from it than `farthest`.
-vec3 brought_near(vec3 point, vec3 other, float farthest)
+vec3 within_distance(vec3 point, vec3 other, float farthest)
 {
   vec3 offset = point - other;
   return other + offset * min(farthest / max(length(offset), TINY), 1.0);
 }
 
-void shorten_from_root()
+void shorten_segments()
 {
-  for (int i = 0; i < FREE; i++) {
-    position[i + 2] = brought_near(position[i + 2], position[i + 1], segment_length[i]);
+  for (int i = 0; i < FREE_COUNT; i++) {
+    position[i + 2] = within_distance(position[i + 2], position[i + 1], segment_length[i]);
   }
 }
 
@@ -149,29 +149,29 @@ void shorten_from_root()
 void hold_within_reach()
 {
   float reach = 0.0;
-  for (int i = 0; i < FREE; i++) {
+  for (int i = 0; i < FREE_COUNT; i++) {
     reach += segment_length[i];
     vec3 offset = position[i + 2] - position[1];
     position[i + 2] = position[1] + offset * min(reach / max(length(offset), TINY), 1.0);
   }
 #ifdef HAS_HELD
   vec3 place[FREE_SIZE];
-  for (int i = 0; i < FREE; i++) {
+  for (int i = 0; i < FREE_COUNT; i++) {
     place[i] = position[i + 2];
   }
   for (int sweep = 0; sweep < HELD_SWEEPS; sweep++) {
     bool is_beyond = false;
-    for (int i = FREE - 1; i >= 0; i--) {
+    for (int i = FREE_COUNT - 1; i >= 0; i--) {
       position[i + 2] = held[i] ? place[i] : position[i + 2];
     }
-    for (int i = FREE - 2; i >= 0; i--) {
+    for (int i = FREE_COUNT - 2; i >= 0; i--) {
       is_beyond = is_beyond || held[i + 1];
-      vec3 near = brought_near(position[i + 2], position[i + 3], segment_length[i + 1]);
+      vec3 near = within_distance(position[i + 2], position[i + 3], segment_length[i + 1]);
       position[i + 2] = is_beyond && !held[i] ? near : position[i + 2];
     }
-    shorten_from_root();
+    shorten_segments();
   }
 #else
-  shorten_from_root();
+  shorten_segments();
 #endif
 }

@@ -126,17 +126,17 @@ vec3 panel_vector_irradiance(Lights lights, int index, vec3 away)
   if (offset.z <= MIN_HEIGHT) {
     return vec3(0.0);
   }
-  float form = lights.vector_and_kind[index].w;
+  float shape = lights.vector_and_kind[index].w;
   vec2 half_sides = vec2(lights.across[index].w, lights.upward[index].w);
-  bool is_round = form == ROUND_GRID_LIGHT;
-  if (form == DISK_LIGHT) {
+  bool is_round = shape == ROUND_GRID_LIGHT;
+  if (shape == DISK_LIGHT) {
     return axes * panel_disk(half_sides.x, offset);
   }
   float narrow = min(lights.along[index].w, 1.0);
   if (dot(half_sides, half_sides) < FAR_PANEL * narrow * narrow * dot(offset, offset)) {
     return axes * panel_four_points(lights, index, is_round, half_sides, offset);
   }
-  if (form == RECTANGLE_LIGHT) {
+  if (shape == RECTANGLE_LIGHT) {
     return axes * panel_rectangle(half_sides, offset);
   }
   return axes * panel_grid(lights, index, is_round, offset);
@@ -183,10 +183,10 @@ void light_at(Lights lights, int index, vec3 point, out vec3 to_light, out vec3 
 #  endif
   float added = lights.power[index].w, least = lights.across[index].w;
   float squared = max(dot(away, away) + added, least);
-  float let_through = 1.0;
+  float cone = 1.0;
   if (light.w == SPOT_LIGHT) {
-    let_through = cone_fraction(lights, index, away, min((added + least) / squared, 1.0));
+    cone = cone_fraction(lights, index, away, min((added + least) / squared, 1.0));
   }
-  irradiance *= let_through / (4.0 * PI * squared);
+  irradiance *= cone / (4.0 * PI * squared);
 #endif
 }

@@ -33,12 +33,12 @@ vec3 mesh_slope(int map, vec3 place, vec3 normal)
   vec3 ray = cross(across, upward), deeper = mesh_shadows.map_depth[map].xyz;
   float size = length(ray);
   float cosine = dot(normal, ray) / size;
-  cosine = (cosine < 0.0 ? -1.0 : 1.0) * max(abs(cosine), {{edge_on}});
+  cosine = (cosine < 0.0 ? -1.0 : 1.0) * max(abs(cosine), {{min_mesh_cosine}});
   float texel = 2.0 / mesh_shadows.resolution;
   vec2 slope = vec2(dot(cross(upward, normal), deeper), dot(cross(normal, across), deeper));
   slope *= texel / (size * cosine);
   float unit = texel * length(deeper) * inversesqrt(size);
-  return vec3(slope / max(length(slope) / ({{steepest}} * unit), 1.0), unit);
+  return vec3(slope / max(length(slope) / ({{max_mesh_slope}} * unit), 1.0), unit);
 }
 
 // The fraction of a light that reaches a point. normal: of its triangle, of any sign and length.

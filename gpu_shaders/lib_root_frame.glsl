@@ -61,13 +61,13 @@ RootMotion root_motion(RootFrame rest, RootFrame now)
 
 // The motion in four texels of a texture, as ride_roots.comp.glsl writes them: three with a column of the
 // turn in xyz and a coordinate of the shift in w, then xyz the rest origin.
-RootMotion root_motion_at(sampler2D motions, int mover)
+RootMotion root_motion_at(sampler2D motions, int number)
 {
-  vec4 x = texelFetch(motions, strand_texel(mover, 0, 4), 0);
-  vec4 y = texelFetch(motions, strand_texel(mover, 1, 4), 0);
-  vec4 z = texelFetch(motions, strand_texel(mover, 2, 4), 0);
+  vec4 x = texelFetch(motions, strand_texel(number, 0, 4), 0);
+  vec4 y = texelFetch(motions, strand_texel(number, 1, 4), 0);
+  vec4 z = texelFetch(motions, strand_texel(number, 2, 4), 0);
   RootMotion motion;
-  motion.rest_origin = texelFetch(motions, strand_texel(mover, 3, 4), 0).xyz;
+  motion.rest_origin = texelFetch(motions, strand_texel(number, 3, 4), 0).xyz;
   motion.turn = mat3(x.xyz, y.xyz, z.xyz);
   motion.shift = vec3(x.w, y.w, z.w);
   return motion;

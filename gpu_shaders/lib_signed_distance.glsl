@@ -13,20 +13,20 @@ vec4 solid_texel(int solid, int texel)
 
 // A collider in its current pose.
 struct Solid {
-  vec4 to_own[3];  // rows of the matrix to its own space
-  vec4 sphere;     // around it
-  vec4 own;        // see distance_to
-  vec4 low_cell;
+  vec4 to_local[3];  // rows of the matrix to its own space
+  vec4 sphere;       // around it
+  vec4 shape;        // see collider_distance
+  vec4 grid_origin;
 };
 
 Solid solid_at(int number)
 {
   Solid solid;
   for (int row = 0; row < 3; row++) {
-    solid.to_own[row] = solid_texel(number, row);
+    solid.to_local[row] = solid_texel(number, row);
   }
-  solid.own = solid_texel(number, 6);
-  solid.low_cell = solid_texel(number, 7);
+  solid.shape = solid_texel(number, 6);
+  solid.grid_origin = solid_texel(number, 7);
   solid.sphere = solid_texel(number, 8);
   return solid;
 }
@@ -38,14 +38,14 @@ vec4 nearer_of(vec4 result, Solid solid, vec3 point)
     return result;
   }
   vec4 here = vec4(point, 1.0);
-  vec4 rows[3] = solid.to_own;
+  vec4 rows[3] = solid.to_local;
   vec3 local = vec3(dot(rows[0], here), dot(rows[1], here), dot(rows[2], here));
-  Found found = distance_to(solid.own, solid.low_cell, local);
+  SignedDistance found = collider_distance(solid.shape, solid.grid_origin, local);
   vec3 normal = rows[0].xyz * found.gradient.x + rows[1].xyz * found.gradient.y +
                 rows[2].xyz * found.gradient.z;
   float size = max(length(normal), 1.0e-12);
   // where two sides of the collider are equally near, a sampled gradient is short
-  float stretch = max({{flattest}} / max(length(found.gradient), 1.0e-12), 1.0);
+  float stretch = max({{min_gradient}} / max(length(found.gradient), 1.0e-12), 1.0);
   float away = found.distance / (size * stretch);
   return away < result.w ? vec4(normal / size, away) : result;
 }

@@ -12,12 +12,12 @@
 
 #if MARSCHNER
 // Level at which a highlight does not flicker. Where a strand is shaded as it is drawn, screen-space
-// derivatives give the change of theta_h. With SHADED_LATER neighbouring pixels may show other strands, so
+// derivatives give the change of theta_h. With DEFERRED_SHADING neighbouring pixels may show other strands, so
 // the change is computed from `bend`, the change of the tangent in a pixel.
 float strand_level(
     vec3 tangent, vec3 bend, vec3 normal, vec3 to_light, vec3 to_eye, float shift_noise)
 {
-#  ifndef SHADED_LATER
+#  ifndef DEFERRED_SHADING
   return pixel_level(longitudinal, tangent, normal, to_light, to_eye, shift_noise, shading);
 #  else
   // the derivative of theta = asin(t . w), which is unbounded where w runs along the strand

@@ -13,25 +13,25 @@ void restore_style()
   vec3 tangent = unit_of(segment);
   vec3 beside = style_twist - style[0];
   vec3 normal = unit_of(beside - tangent * dot(beside, tangent));
-  for (int i = 0; i < FREE; i++) {  // residual of the curvature at CV i + 1
+  for (int i = 0; i < FREE_COUNT; i++) {  // residual of the curvature at CV i + 1
     vec3 next_segment = position[i + 2] - position[i + 1];
     vec3 next_tangent = unit_of(next_segment);
     vec3 carried = cross(tangent, normal) * shape[i].z + normal * shape[i].y + tangent * shape[i].x;
     vec3 second = (style[i + 2] - style[i + 1]) - (style[i + 1] - style[i]);
     vec3 residual = carried * shape[i].w + second * (1.0 - shape[i].w);
-    right[i] = (residual - next_segment + segment) * bend[i];
+    right[i] = (residual - next_segment + segment) * local_stiffness[i];
     vec3 middle = next_tangent + tangent;
     float scale = dot(next_tangent, middle) + 1.0e-6;
     normal -= middle / scale * dot(normal, next_tangent);
     tangent = next_tangent;
     segment = next_segment;
   }
-  for (int i = 0; i < FREE; i++) {
+  for (int i = 0; i < FREE_COUNT; i++) {
     vec3 sum = (style[i + 2] - position[i + 2]) * band[i].w + right[i];
-    if (i + 1 < FREE) {
+    if (i + 1 < FREE_COUNT) {
       sum -= 2.0 * right[i + 1];
     }
-    if (i + 2 < FREE) {
+    if (i + 2 < FREE_COUNT) {
       sum += right[i + 2];
     }
     if (i >= 1) {
@@ -42,12 +42,12 @@ void restore_style()
     }
     right[i] = sum;
   }
-  for (int i = FREE - 1; i >= 0; i--) {
+  for (int i = FREE_COUNT - 1; i >= 0; i--) {
     right[i] *= band[i].z;
-    if (i < FREE - 1) {
+    if (i < FREE_COUNT - 1) {
       right[i] -= right[i + 1] * band[i + 1].x;
     }
-    if (i < FREE - 2) {
+    if (i < FREE_COUNT - 2) {
       right[i] -= right[i + 2] * band[i + 2].y;
     }
     position[i + 2] += right[i];

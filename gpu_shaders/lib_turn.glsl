@@ -21,7 +21,7 @@ vec4 turn_product(vec4 left, vec4 right)
 vec3 direction_of(vec3 edge)
 {
   float size = length(edge);
-  return size < {{shortest_segment}} ? vec3(0.0) : edge / size;
+  return size < {{min_segment_length}} ? vec3(0.0) : edge / size;
 }
 
 // The smallest rotation from one unit vector to another; the identity where either is zero. Computed from
@@ -33,7 +33,7 @@ vec4 minimal_rotation(vec3 one, vec3 other)
   }
   vec3 change = other - one;
   vec4 turn = vec4(cross(one, change), 2.0 - 0.5 * dot(change, change));
-  if (turn.w < {{reversed_turn}}) {
+  if (turn.w < {{reversal_limit}}) {
     turn = vec4(cross(one, axis_across(one)), 0.0);
   }
   return turn / sqrt(dot(turn, turn));

@@ -21,26 +21,26 @@ struct GuideSegment {
 };
 
 // The guide segments at a place along a guide [segments].
-GuideSegment seat_at(int guide, float place)
+GuideSegment guide_segment_at(int guide, float place)
 {
   float from_middle = clamp(place - 0.5, 0.0, float(segment_count - 1));
   int before = int(from_middle);
   return GuideSegment(strand_texel(guide, before, segment_count + 1), from_middle - float(before));
 }
 
-vec4 turn_at(GuideSegment seat)
+vec4 turn_at(GuideSegment segment)
 {
-  vec4 near = imageLoad(guide_turns, seat.before);
-  vec4 far = imageLoad(guide_turns, seat.before + ivec2(1, 0));
-  return near + seat.fraction * (far - near);
+  vec4 near = imageLoad(guide_turns, segment.before);
+  vec4 far = imageLoad(guide_turns, segment.before + ivec2(1, 0));
+  return near + segment.fraction * (far - near);
 }
 
 #ifdef HAS_CURLS
-vec4 axis_at(GuideSegment seat)
+vec4 axis_at(GuideSegment segment)
 {
-  vec4 near = imageLoad(guide_axes, seat.before);
-  vec4 far = imageLoad(guide_axes, seat.before + ivec2(1, 0));
-  return near + seat.fraction * (far - near);
+  vec4 near = imageLoad(guide_axes, segment.before);
+  vec4 far = imageLoad(guide_axes, segment.before + ivec2(1, 0));
+  return near + segment.fraction * (far - near);
 }
 #endif
 
@@ -50,7 +50,7 @@ void main()
   if (strand >= strand_count) {
     return;
   }
-  RootMotion motion = root_motion_at(root_motions, min(strand, mover_count - 1));
+  RootMotion motion = root_motion_at(root_motions, min(strand, root_motion_count - 1));
   // xyz of three texels: the guides, their weights, their segments per metre
   ivec3 guide = ivec3(texelFetch(guide_weights, strand_texel(strand, 0, 3), 0).xyz);
   vec3 weight = texelFetch(guide_weights, strand_texel(strand, 1, 3), 0).xyz;
@@ -67,7 +67,7 @@ void main()
   int last_held = span.factors;  // the last point that moves rigidly with the root
   displacement = last_held > 0 ? vec3(0.0) : displacement;
   // a strand that was bent in the frame before is led out from its root on
-  bool was_bent = imageLoad(states, counted_texel(strand)).z > turn_back_angle;
+  bool was_bent = imageLoad(states, counted_texel(strand)).z > return_angle;
   int first_near = was_bent ? 1 : 0;
   Solid solid = solid_at(0);
 #endif
@@ -81,21 +81,21 @@ void main()
     vec3 edge = next.xyz - rest.xyz;
     float size = length(edge);
     vec3 place = (arc_length + 0.5 * size) * per_meter;
-    vec4 blend = weight.x * turn_at(seat_at(guide.x, place.x));
+    vec4 blend = weight.x * turn_at(guide_segment_at(guide.x, place.x));
     for (int k = 1; k < 3; k++) {
-      vec4 turn = turn_at(seat_at(guide[k], place[k]));
+      vec4 turn = turn_at(guide_segment_at(guide[k], place[k]));
       // q and -q are the same rotation: take the nearer one
       blend += (dot(turn, blend) < 0.0 ? -weight[k] : weight[k]) * turn;
     }
-    blend.w += dot(blend, blend) < {{reversed_turn}} ? 1.0 : 0.0;
+    blend.w += dot(blend, blend) < {{reversal_limit}} ? 1.0 : 0.0;
     vec3 carried = edge + motion.turn * edge;
     vec3 change = vec3(0.0);
 #ifdef HAS_CURLS
     vec4 axis = vec4(0.0);
     for (int k = 0; k < 3; k++) {
-      axis += weight[k] * axis_at(seat_at(guide[k], place[k]));
+      axis += weight[k] * axis_at(guide_segment_at(guide[k], place[k]));
     }
-    change = drawn_out(carried, axis);
+    change = change_by_extension(carried, axis);
     carried += change;
 #endif
     change += turn_change(blend, carried);
@@ -109,9 +109,9 @@ void main()
     imageStore(cv_points, span_texel(span, point), vec4(here, rest.w));
 #ifdef HAS_CLEARANCE
     float clearance = imageLoad(clearances, span_texel(span, point)).x;
-    float wanted = min(clearance + length(displacement), max_clearance);
-    float shortfall = wanted - signed_distance(solid, here, max_clearance).w;
-    first_near = first_near == 0 && shortfall > {{lead_slack}} * max_clearance ? point : first_near;
+    float goal = min(clearance + length(displacement), max_clearance);
+    float shortfall = goal - signed_distance(solid, here, max_clearance).w;
+    first_near = first_near == 0 && shortfall > {{lead_tolerance}} * max_clearance ? point : first_near;
 #endif
   } while (point + 1 < span.count);
 #ifdef HAS_CLEARANCE

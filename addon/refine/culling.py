@@ -85,19 +85,19 @@ def hidden_regions(
         axis = away / distance[:, None]
         squared = distance * distance - size * size
         origin = np.tile(eye[:3, 3], (len(balls), 1))
-        shades = HiddenRegions(origin, axis, squared / distance, 0.0 * size, size * size / squared)
+        regions = HiddenRegions(origin, axis, squared / distance, 0.0 * size, size * size / squared)
     else:
         size = balls[:, 3] - radius - half_width / scale.min()
         balls, size = balls[size > 0.0], size[size > 0.0]
         axis = np.tile(-eye[:3, 2], (len(balls), 1))
-        shades = HiddenRegions(balls[:, :3], axis, 0.0 * size, size * size, 0.0 * size)
-    front = balls[:, :3] - shades.axis * balls[:, 3:]
+        regions = HiddenRegions(balls[:, :3], axis, 0.0 * size, size * size, 0.0 * size)
+    front = balls[:, :3] - regions.axis * balls[:, 3:]
     clip = np.column_stack([front, np.ones(len(front))]) @ view.view_projection.T
     is_drawn = clip[:, 2] >= -clip[:, 3]
-    return HiddenRegions(*(part[is_drawn] for part in _parts(shades)))
+    return HiddenRegions(*(part[is_drawn] for part in _parts(regions)))
 
 
-def are_hidden(points: Floats, shades: HiddenRegions) -> Bools:
+def are_hidden(points: Floats, regions: HiddenRegions) -> Bools:
     """Which strands lie entirely within one of the regions, (strand_count,).
 
     Args:
@@ -107,7 +107,7 @@ def are_hidden(points: Floats, shades: HiddenRegions) -> Bools:
     for start in range(0, len(points), _CHUNK):
         control = bezier(np.asarray(points[start : start + _CHUNK], np.float64))
         control = control.reshape(len(control), -1, 3)
-        for origin, axis, nearest, width, slope in zip(*_parts(shades), strict=True):
+        for origin, axis, nearest, width, slope in zip(*_parts(regions), strict=True):
             away = control - origin
             along = away @ axis
             across = away - along[..., None] * axis
@@ -266,5 +266,5 @@ def _select_distinct(balls: Floats, count: int) -> Floats:
     return balls[chosen]
 
 
-def _parts(shades: HiddenRegions) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-    return shades.origin, shades.axis, shades.nearest, shades.width, shades.slope
+def _parts(regions: HiddenRegions) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+    return regions.origin, regions.axis, regions.nearest, regions.width, regions.slope

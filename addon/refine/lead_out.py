@@ -41,32 +41,32 @@ from ..strands.vectors import even_directions, unit
 #: Maximum number of times that a point moves straight out and back to its segment's length.
 SWEEPS = 2
 #: Lower limit of the squared sine of the angle between a segment and the way out in that move.
-STEEPEST = 0.5
+MIN_SQUARED_SINE = 0.5
 #: How much nearer than it should be a point may come before its strand is led out, as a fraction
 #: of `Clearance.max_distance`.
-SLACK = 0.05
+TOLERANCE = 0.05
 #: A point that has to move by more than this fraction of its segment is not moved straight out:
 #: deep inside of a collider the way out may switch to another side.
-DEEPEST = 0.5
+MAX_STRAIGHT_MOVE = 0.5
 #: Number of directions tried for a segment that moving straight out does not lead out, and how
 #: often the turn towards the chosen one is bisected.
-TRIES, HALVINGS = 64, 5
+DIRECTION_COUNT, BISECTIONS = 64, 5
 #: A point deeper than this in a distance field, as a fraction of `Clearance.max_distance`, is
 #: tested with the mesh itself.
 DEEP = 0.5
 #: A strand that is still stuck, as in a fold, is led again from its root, farther out by this
 #: fraction of its mean segment; maximum number of attempts.
-MARGIN, ATTEMPTS = 0.5, 3
+EXTRA_DISTANCE, ATTEMPTS = 0.5, 3
 #: How quickly segments turn back to where they ride once nothing leads them out [rad/s].
-TURNING_BACK = 20.0
+RETURN_RATE = 20.0
 #: A strand whose segments all lean by no more than this counts as where it rides.
-UPRIGHT = 1.0e-3
+MIN_DEFLECTION = 1.0e-3
 #: How many points of a strand are tested at once for the first one that is too near.
 _AHEAD = np.arange(5)
 _TINY = 1.0e-30
 
 #: Where roots carry points: indices (n,) of points and of their strands (n,) to (n, 3) world [m].
-type Carry = Callable[[Ints, Ints], Floats]
+type CarryPoints = Callable[[Ints, Ints], Floats]
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +131,7 @@ class Clearance:
     def reach(self) -> Floats:
         """The distance below which each point may be too near, (point_count,) float32 [m]; -inf
         where it moves with its root."""
-        most = np.float32((1.0 - SLACK) * self.max_distance)
+        most = np.float32((1.0 - TOLERANCE) * self.max_distance)
         return np.where(self.points == -np.inf, np.float32(-np.inf), most)
 
 
@@ -156,11 +156,11 @@ class Deflections:
         begins = piece_starts(counts)
         values = _steps(led - ridden, begins)  # over lengths, which are the same in both
         values /= np.maximum(_size(_steps(ridden, begins)), np.float32(_TINY))[:, None]
-        return cls(strands, values)._where(_size(values) > UPRIGHT, counts)
+        return cls(strands, values)._where(_size(values) > MIN_DEFLECTION, counts)
 
     def decayed(self, duration: float, offsets: Ints) -> Deflections:
         """The deflections that are left after some time [s]."""
-        size, turned = _size(self.values), np.float32(TURNING_BACK * duration)
+        size, turned = _size(self.values), np.float32(RETURN_RATE * duration)
         left = self._where(size > turned, np.diff(offsets)[self.strands])
         size = np.maximum(_size(left.values), np.float32(_TINY))
         scale = np.maximum(np.float32(1.0) - turned / size, np.float32(0.0))
@@ -266,7 +266,7 @@ def points_outside_meshes(
 
 def lead_out(
     points: Floats,
-    carry: Carry,
+    carry: CarryPoints,
     offsets: Ints,
     colliders: Sequence[PosedCollider],
     clearance: Clearance,
@@ -292,7 +292,7 @@ def lead_out(
     owner = _owners(index, offsets)
     away = _size(points.take(index, axis=0) - carry(index, owner))
     wanted = np.minimum(clearance.points.take(index) + away, np.float32(max_distance))
-    is_near = distance < wanted - np.float32(SLACK * max_distance)
+    is_near = distance < wanted - np.float32(TOLERANCE * max_distance)
     strands, first = np.unique(owner[is_near], return_index=True)
     bent = np.union1d(deflections.strands, strands)
     every = point_indices(bent, offsets)
@@ -315,7 +315,7 @@ def _owners(index: Ints, offsets: Ints) -> Ints:
     return np.searchsorted(offsets, index, side="right") - 1
 
 
-def _hold(points: Floats, carry: Carry, offsets: Ints, clearance: Clearance) -> Ints:
+def _hold(points: Floats, carry: CarryPoints, offsets: Ints, clearance: Clearance) -> Ints:
     """Move the held parts of strands with their roots, in place, and translate the rest of these
     strands along; returns the strands (n,)."""
     held = clearance.held_parts(offsets)
@@ -341,8 +341,8 @@ def point_indices(strands: Ints, offsets: Ints) -> Ints:
 
 @cache
 def tried_directions() -> Floats:
-    """The directions that are tried, unit vectors (TRIES, 3)."""
-    return even_directions(TRIES)
+    """The directions that are tried, unit vectors (DIRECTION_COUNT, 3)."""
+    return even_directions(DIRECTION_COUNT)
 
 
 @dataclass(frozen=True, eq=False)
@@ -372,7 +372,7 @@ class _Near:
         strands: Ints,
         found: tuple[Ints, Floats, Floats],
         points: Floats,
-        carry: Carry,
+        carry: CarryPoints,
         offsets: Ints,
         clearance: Clearance,
     ) -> _Near:
@@ -424,51 +424,51 @@ def _led(near: _Near, max_distance: float, poses: Sequence[Pose]) -> tuple[Float
     """Where the points are led to, (m, 3), and which belong to strands that nothing leads out,
     (m,)."""
     count = len(near.begins)
-    led, lack = _led_by(
-        near, np.zeros(count), np.full(count, SLACK * max_distance), max_distance, poses
+    led, shortfall = _led_by(
+        near, np.zeros(count), np.full(count, TOLERANCE * max_distance), max_distance, poses
     )
-    stuck = np.flatnonzero(lack > SLACK * max_distance)
+    stuck = np.flatnonzero(shortfall > TOLERANCE * max_distance)
     if len(stuck):
         # all further attempts at once: use the first that succeeds, or the last
         tries = np.tile(stuck, ATTEMPTS - 1)
         number = np.repeat(np.arange(1, ATTEMPTS), len(stuck))
         again = near.part(tries)
-        farther = MARGIN * number * again.mean_segments
-        max_lack = np.where(number == ATTEMPTS - 1, max_distance, SLACK * max_distance)
-        found, left_over = _led_by(again, farther, max_lack, max_distance, poses)
-        is_out = (left_over <= SLACK * max_distance).reshape(ATTEMPTS - 1, -1)
+        farther = EXTRA_DISTANCE * number * again.mean_segments
+        max_shortfall = np.where(number == ATTEMPTS - 1, max_distance, TOLERANCE * max_distance)
+        found, left_over = _led_by(again, farther, max_shortfall, max_distance, poses)
+        is_out = (left_over <= TOLERANCE * max_distance).reshape(ATTEMPTS - 1, -1)
         is_out[-1] = True
         chosen = is_out.argmax(axis=0) * len(stuck) + np.arange(len(stuck))
-        lack[stuck] = left_over[chosen]
+        shortfall[stuck] = left_over[chosen]
         from_ = point_indices(chosen, np.append(again.begins, again.ends[-1:]))
         led[point_indices(stuck, np.append(near.begins, near.ends[-1:]))] = found[from_]
-    is_lost = np.repeat(lack > max_distance, near.ends - near.begins)
+    is_lost = np.repeat(shortfall > max_distance, near.ends - near.begins)
     return np.where(is_lost[:, None], near.carried, led), is_lost
 
 
 def _led_by(
-    near: _Near, farther: Floats, max_lack: Floats, max_distance: float, poses: Sequence[Pose]
+    near: _Near, farther: Floats, max_shortfall: Floats, max_distance: float, poses: Sequence[Pose]
 ) -> tuple[Floats, Floats]:
-    """One attempt: where the points are led to, (m, 3), and the largest remaining lack of distance
+    """One attempt: where the points are led to, (m, 3), and the largest remaining shortfall
     of each strand, (n,) [m].
 
     Args:
         farther: (n,) [m] beyond the wanted distance that strands are led out.
-        max_lack: (n,) [m], a strand that lacks more than this is led no further.
+        max_shortfall: (n,) [m], a strand with a larger one is led no further.
     """
-    walk = _Walk.of(near, farther, SLACK * max_distance, poses)
+    walk = _Walk.of(near, farther, TOLERANCE * max_distance, poses)
     every = np.arange(len(farther))
     waiting: Ints = every[:0]
     if near.found is not None:
         waiting = walk.push(every, walk.goal[near.firsts] - near.found[0], near.found[1])
-    going = walk.underway(every, max_lack)
+    going = walk.underway(every, max_shortfall)
     while len(going) + len(waiting):
         if len(waiting) > len(going):  # turns are expensive: many strands at once
             walk.turn(waiting)
-            going, waiting = np.append(going, walk.underway(waiting, max_lack)), waiting[:0]
+            going, waiting = np.append(going, walk.underway(waiting, max_shortfall)), waiting[:0]
         else:
             stuck = walk.step(going)
-            going, waiting = walk.underway(going, max_lack), np.append(waiting, stuck)
+            going, waiting = walk.underway(going, max_shortfall), np.append(waiting, stuck)
     return walk.led(), walk.worst
 
 
@@ -476,7 +476,8 @@ def _led_by(
 class _Walk:
     """Strands being led out from root to tip, each at its own point and sweep; changed in place.
 
-    goal: (m,) [m], the distance that each point of `near` should have; `slack` [m] less will do.
+    goal: (m,) [m], the distance that each point of `near` should have; `tolerance` [m] less will
+        do.
     lengths: (m,) [m], of the segments that end at the points.
     at: (n,) each strand's current point, among the m.
     sweep: (n,) how often it has moved straight out; 0: perhaps it need not.
@@ -484,13 +485,13 @@ class _Walk:
     shift: (n, 3) displacement of the last point that was led, and of the points after it until the
         next one that is. own_shift: (n, 3) displacement of the current point.
     shifts, is_led: (m, 3) and (m,), displacement of the points that were led, and which these are.
-    farther: see `_led_by`. worst: (n,) [m], the largest lack so far.
+    farther: see `_led_by`. worst: (n,) [m], the largest shortfall so far.
     """
 
     near: _Near
     goal: Floats
     lengths: Floats
-    slack: float
+    tolerance: float
     poses: Sequence[Pose]
     at: Ints
     sweep: Ints
@@ -503,7 +504,7 @@ class _Walk:
     worst: Floats
 
     @classmethod
-    def of(cls, near: _Near, farther: Floats, slack: float, poses: Sequence[Pose]) -> _Walk:
+    def of(cls, near: _Near, farther: Floats, tolerance: float, poses: Sequence[Pose]) -> _Walk:
         count, points = len(farther), near.points
         is_led = np.zeros(len(points), bool)
         is_led[near.begins] = True
@@ -511,7 +512,7 @@ class _Walk:
             near,
             near.wanted + np.repeat(farther, near.ends - near.begins),
             _size(_steps(points, near.begins)),
-            slack,
+            tolerance,
             poses,
             near.firsts.copy(),
             np.zeros(count, np.int64),
@@ -524,10 +525,10 @@ class _Walk:
             np.zeros(count),
         )
 
-    def underway(self, some: Ints, max_lack: Floats) -> Ints:
+    def underway(self, some: Ints, max_shortfall: Floats) -> Ints:
         """Those of some strands that are neither finished, nor given up, nor waiting."""
         is_going = self.at[some] < self.near.ends[some]
-        is_going &= (self.worst[some] <= max_lack[some]) & ~self.is_waiting[some]
+        is_going &= (self.worst[some] <= max_shortfall[some]) & ~self.is_waiting[some]
         return some[is_going]
 
     def step(self, going: Ints) -> Ints:
@@ -541,28 +542,32 @@ class _Walk:
         places = self.near.points.take(index, axis=0)
         places += self.own_shift.take(going, axis=0)[:, None]
         distance, outward = distance_of_few(places.reshape(-1, 3), self.poses)
-        lack = self.goal.take(index).ravel()
-        lack -= distance
-        is_in = (lack > self.slack).reshape(index.shape)
+        shortfall = self.goal.take(index).ravel()
+        shortfall -= distance
+        is_in = (shortfall > self.tolerance).reshape(index.shape)
         first = is_in.argmax(axis=1)  # 0 where none is
         found = np.arange(0, index.size, len(_AHEAD)) + first
         is_found = is_in.take(found)
         first[~is_found] = len(_AHEAD)
         self._go_on(going, first)
         found = found.compress(is_found)
-        return self.push(going.compress(is_found), lack.take(found), outward.take(found, axis=0))
+        return self.push(
+            going.compress(is_found), shortfall.take(found), outward.take(found, axis=0)
+        )
 
-    def push(self, some: Ints, lack: Floats, outward: Floats) -> Ints:
-        """Move the current points of some strands straight out, by what they lack (k,) [m] along
+    def push(self, some: Ints, shortfall: Floats, outward: Floats) -> Ints:
+        """Move the current points of some strands straight out, by their shortfalls (k,) [m] along
         their ways out (k, 3).
 
         Returns the strands that this would not lead out; these wait for a turn.
         """
         is_tried = self.sweep.take(some) == SWEEPS
-        is_tried |= lack > DEEPEST * self.lengths.take(self.at.take(some))
+        is_tried |= shortfall > MAX_STRAIGHT_MOVE * self.lengths.take(self.at.take(some))
         is_going = ~is_tried
         self._go_out(
-            some.compress(is_going), lack.compress(is_going), outward.compress(is_going, axis=0)
+            some.compress(is_going),
+            shortfall.compress(is_going),
+            outward.compress(is_going, axis=0),
         )
         stuck: Ints = some.compress(is_tried)
         self.is_waiting[stuck] = True
@@ -572,7 +577,7 @@ class _Walk:
         """Turn the current segments of some strands until their ends are out, and go on."""
         point = self.at[some]
         start, arm, length = self._arms(some, point)
-        end, lack = _turned_out(
+        end, shortfall = _turned_out(
             start,
             arm,
             length,
@@ -582,7 +587,7 @@ class _Walk:
         )
         self.own_shift[some] = end - self.near.points[point]
         self.sweep[some] = SWEEPS
-        self.worst[some] = np.maximum(self.worst[some], lack - self.farther[some])
+        self.worst[some] = np.maximum(self.worst[some], shortfall - self.farther[some])
         self.is_waiting[some] = False
         self._go_on(some, np.ones_like(some))
 
@@ -601,11 +606,12 @@ class _Walk:
         arm -= start
         return start, arm, self.lengths.take(point)
 
-    def _go_out(self, some: Ints, lack: Floats, outward: Floats) -> None:
-        """Move straight out by what some strands lack (k,) [m], and back to the segment length."""
+    def _go_out(self, some: Ints, shortfall: Floats, outward: Floats) -> None:
+        """Move some strands straight out by their shortfalls (k,) [m], and back to the segment
+        length."""
         point = self.at.take(some)
         start, arm, length = self._arms(some, point)
-        arm += outward * _going_out(arm, outward, length, lack)[:, None]
+        arm += outward * _going_out(arm, outward, length, shortfall)[:, None]
         here = _at_length(start, arm, length)
         here -= self.near.points.take(point, axis=0)
         self.own_shift[some] = here
@@ -624,11 +630,11 @@ class _Walk:
         self.sweep[some.compress(is_out)] = 0
 
 
-def _going_out(arm: Floats, outward: Floats, length: Floats, lack: Floats) -> Floats:
-    """How far [m] the ends of segments (n, 3) move straight out, so that `lack` [m] remains of it
-    once the segments are back at their lengths, which removes the component along them."""
+def _going_out(arm: Floats, outward: Floats, length: Floats, shortfall: Floats) -> Floats:
+    """How far [m] the ends of segments (n, 3) move straight out, so that `shortfall` [m] remains of
+    it once the segments are back at their lengths, which removes the component along them."""
     along = np.einsum("ij,ij->i", arm, outward) / np.maximum(length, _TINY)
-    return lack / np.maximum(1.0 - along * along, STEEPEST)
+    return shortfall / np.maximum(1.0 - along * along, MIN_SQUARED_SINE)
 
 
 def _turned_out(
@@ -639,8 +645,8 @@ def _turned_out(
     wanted: Floats,
     poses: Sequence[Pose],
 ) -> tuple[Floats, Floats]:
-    """The ends (n, 3) of segments turned until they are out, and what each still lacks of `wanted`,
-    (n,) [m].
+    """The ends (n, 3) of segments turned until they are out, and the remaining shortfall of each
+    from `wanted`, (n,) [m].
 
     Args:
         toward: (n, 3) unit directions in which roots carry the segments, tried as well since they
@@ -649,22 +655,24 @@ def _turned_out(
     rows = np.arange(len(arm))
     tried = np.concatenate([toward[None], np.repeat(tried_directions()[:, None], len(arm), axis=1)])
     distance, _ = distance_of_few((start + length[:, None] * tried).reshape(-1, 3), poses)
-    lack = np.maximum(wanted - distance.reshape(len(tried), -1), 0.0)
+    shortfall = np.maximum(wanted - distance.reshape(len(tried), -1), 0.0)
     arm = arm / np.maximum(length, _TINY)[:, None]
-    # the nearest direction that leads out; if none does, the one with the smallest lack
-    found = np.where(lack > 0.0, -2.0 - lack, np.einsum("tni,ni->tn", tried, arm)).argmax(axis=0)
+    # the nearest direction that leads out; if none does, the one with the smallest shortfall
+    found = np.where(shortfall > 0.0, -2.0 - shortfall, np.einsum("tni,ni->tn", tried, arm)).argmax(
+        axis=0
+    )
     # query all turns that the bisection might reach at once, then find the smallest that leads out
-    parts = np.arange(1, (1 << HALVINGS) + 1)[:, None, None] / (1 << HALVINGS)
+    parts = np.arange(1, (1 << BISECTIONS) + 1)[:, None, None] / (1 << BISECTIONS)
     arms = arm + parts * (tried[found, rows] - arm)
     ends = start + arms * (length / np.maximum(_size(arms), _TINY))[..., None]
     is_near = distance_of_few(ends[:-1].reshape(-1, 3), poses)[0].reshape(-1, len(arm)) < wanted
-    low, high = np.zeros(len(arm), np.int64), np.full(len(arm), 1 << HALVINGS)
-    for _ in range(HALVINGS):
+    low, high = np.zeros(len(arm), np.int64), np.full(len(arm), 1 << BISECTIONS)
+    for _ in range(BISECTIONS):
         middle = (low + high) // 2
         is_in = is_near[middle - 1, rows]
         low, high = np.where(is_in, middle, low), np.where(is_in, high, middle)
-    lack = np.where(high < 1 << HALVINGS, 0.0, lack[found, rows])
-    return ends[high - 1, rows], lack
+    shortfall = np.where(high < 1 << BISECTIONS, 0.0, shortfall[found, rows])
+    return ends[high - 1, rows], shortfall
 
 
 def _at_length(start: Floats | float, arm: Floats, length: Floats) -> Floats:

@@ -77,7 +77,7 @@ def are_inside(
 
 
 def _as_they_are(points: Floats, index: Ints, _: Ints) -> Floats:
-    """`Carry` at rest: roots carry points to where they are."""
+    """`CarryPoints` at rest: roots carry points to where they are."""
     return points[index]
 
 

@@ -28,13 +28,13 @@ from ..strands.blocks import Block, blocks_of
 from ..strands.center_lines import center_lines
 from ..strands.root_motions import RootMotions
 from ..strands.vectors import cross_rows, dot_rows
-from .curls import drawn_out, guide_axes
+from .curls import change_by_extension, guide_axes
 
 #: Segments shorter than this [m] have no direction, so they turn like the one before them.
-SHORTEST = 1.0e-12
+MIN_SEGMENT_LENGTH = 1.0e-12
 #: A rotation between two directions is a full reversal if w of its quaternion, before it is
 #: normalized, is smaller than this.
-REVERSED = 1.0e-6
+REVERSAL_LIMIT = 1.0e-6
 #: Quaternions with a larger real part turn by less than a right angle, so that any two of them, and
 #: their blends, lie in the same hemisphere.
 SMALL = 0.7072
@@ -89,10 +89,10 @@ class Riders:
             room: (guide_count, cv_count - 1), see `center_lines.curl_slack`; None: no curls.
         """
         lengths = np.linalg.norm(np.diff(guides, axis=1), axis=2).sum(axis=1, dtype=np.float64)
-        per_meter = (guides.shape[1] - 1) / np.maximum(lengths, SHORTEST)
+        per_meter = (guides.shape[1] - 1) / np.maximum(lengths, MIN_SEGMENT_LENGTH)
         # a curl advances along its guide as fast as its own centre line does
         reach = center_lines(strands, guides.shape[1]).lengths()
-        reach /= np.maximum(strands.lengths(), np.float32(SHORTEST))
+        reach /= np.maximum(strands.lengths(), np.float32(MIN_SEGMENT_LENGTH))
         stations = _middles(strands.points, strands.offsets)
         stations *= np.repeat(reach, strands.point_counts)
         can_extend = None if room is None else room > 0.0
@@ -233,7 +233,7 @@ def minimal_rotation(one: Floats, other: Floats, has_none: Bools) -> Floats:
     turn = np.empty((4, one.shape[1]), np.float32)
     turn[:3] = cross_rows(one, change)
     turn[3] = np.float32(2.0) - np.float32(0.5) * dot_rows(change, change)
-    is_reversed = turn[3] < REVERSED
+    is_reversed = turn[3] < REVERSAL_LIMIT
     if is_reversed.any():
         back = one[:, is_reversed]
         axis = np.zeros_like(back)
@@ -261,7 +261,7 @@ def _directions(grid: Floats) -> Floats:
     """Unit vectors along segments, (3, cv_count - 1, guide_count) float32; 0 for no length."""
     edge = np.ascontiguousarray(np.diff(grid, axis=1).transpose(2, 1, 0), np.float32)
     length = np.sqrt(dot_rows(edge, edge))
-    is_short = length < SHORTEST
+    is_short = length < MIN_SEGMENT_LENGTH
     edge /= np.where(is_short, np.float32(1.0), length)
     edge[:, is_short] = 0.0
     return edge
@@ -322,10 +322,10 @@ def _turned(
     assert blend is not None
     if len(wide):  # opposite turns that cancel out become the identity
         some = blend[..., wide]
-        blend[3][:, wide] += _dot(some, some) < REVERSED
+        blend[3][:, wide] += _dot(some, some) < REVERSAL_LIMIT
     if axis is None or not axis[3].any():
         return turn_change(blend, edge)
-    drawn = edge * axis[3] if are_center_lines else drawn_out(edge, axis)
+    drawn = edge * axis[3] if are_center_lines else change_by_extension(edge, axis)
     edge += drawn
     drawn += turn_change(blend, edge)
     return drawn

@@ -69,7 +69,7 @@ class ColliderTextures:
     """The solids of some colliders in textures.
 
     colliders: those in the textures, in order.
-    shape_texels: (collider_count, 2, 4) two texels of each in the table of moments. For a field:
+    shape_texels: (collider_count, 2, 4) two texels of each in the table of substeps. For a field:
         nodes along x, y and z, and its first row; low and cell. For others: first round solid,
         number of solids, 0, -1; zeros.
     bounds: center and radius [m] of a sphere around each.
@@ -127,15 +127,15 @@ class ColliderTextures:
     def solids(self, posed: tuple[PosedCollider, ...]) -> Any:
         """The texture `solids` of lib_signed_distance.glsl: all colliders at the frame's end.
 
-        RGBA32F, with COLLIDER_TEXELS texels for each collider in one row, as in `moments`; those
-        for the motion are 0.
+        RGBA32F, with COLLIDER_TEXELS texels for each collider in one row, as in `pose_texels`;
+        those for the motion are 0.
         """
         table = np.zeros((1, len(posed), COLLIDER_TEXELS, 4), np.float32)
         for place, one in enumerate(posed):
             self._write_pose(table, place, one.matrix_now[None])
         return texture_from(table.reshape(1, -1, 4), "RGBA32F")
 
-    def moments(
+    def pose_texels(
         self,
         posed: tuple[PosedCollider, ...],
         spans: Floats,
@@ -143,7 +143,7 @@ class ColliderTextures:
         size: float,
         cv_count: int,
     ) -> Floats:
-        """Rows of the table of moments, (substep_count, collider_count * COLLIDER_TEXELS, 4).
+        """Rows of the table of substeps, (substep_count, collider_count * COLLIDER_TEXELS, 4).
 
         A collider's texels: three rows of its inverse matrix at the substep's end; three rows of
         the change of its matrix in the substep; those of `shape_texels`; a sphere around all points
@@ -158,9 +158,9 @@ class ColliderTextures:
             size: [m] of the hair. cv_count: of a guide.
         """
         table = np.zeros((len(spans), len(posed), COLLIDER_TEXELS, 4), np.float32)
-        moments: Any = spans.T[..., None, None]  # in matrix_at an array does for a number
+        times: Any = spans.T[..., None, None]  # in matrix_at an array does for a number
         for place, one in enumerate(posed):
-            before, now = one.matrix_at(moments)
+            before, now = one.matrix_at(times)
             self._write_pose(table, place, now)
             table[:, place, 3:6] = (now - before)[:, :3]
             travel = travels(now - before, *self.bounds[place])
@@ -181,7 +181,7 @@ class ColliderTextures:
 
     def _write_pose(self, table: Floats, place: int, now: Floats) -> None:
         """Write the pose of a collider, (n, 4, 4) object to world, its shape and its bounding
-        sphere into rows of a table of moments."""
+        sphere into rows of a table of substeps."""
         table[:, place, 0:3] = np.linalg.inv(now)[:, :3]
         table[:, place, 6:8] = self.shape_texels[place]
         turned, (center, radius) = now[:, :3, :3], self.bounds[place]

@@ -37,7 +37,7 @@ from .detail_classes import DetailClass, detail_classes
 from .detail_slots import DetailSlots
 from .rest_counts import RestCounts, best_slot_pieces
 from .shader_program import ShaderRecipe, program
-from .shader_source import DETAIL_CHOICES, SHADE_CAPACITY
+from .shader_source import DETAIL_CHOICES, HIDDEN_REGION_CAPACITY
 from .snapshot import Snapshot
 from .strand_layout import StrandLayout, from_strand_rows, strand_rows, strand_rows_size
 from .textures import UniformBlock, texture_from, texture_to_array
@@ -137,9 +137,9 @@ class DetailPass:
         """
         view = PictureView(camera.view, camera.projection, *size)
         thinned = self._thinned(snapshot, view)
-        shades = _hidden_regions(snapshot, view, thinned.widening)
+        regions = _hidden_regions(snapshot, view, thinned.widening)
         culling = "none" if snapshot.detail.culling == "hidden" else snapshot.detail.culling
-        culling = "hidden" if len(shades) else culling
+        culling = "hidden" if len(regions) else culling
         is_uniform = snapshot.detail.mode == "fixed" and bool(snapshot.layout.cv_count)
         if is_uniform and culling == "none" and thinned == Thinning() and not counted:
             return _uniform_order(snapshot)
@@ -151,7 +151,7 @@ class DetailPass:
                 rest_counts.slots_at(scale),
                 reserve_fragments(rest_counts.fragments_at(scale)),
             )
-        detail_view = _view_values(view, camera, snapshot, shades)
+        detail_view = _view_values(view, camera, snapshot, regions)
         inputs = (
             serial,
             detail_view.tobytes(),
@@ -353,20 +353,22 @@ def _hidden_regions(snapshot: Snapshot, view: PictureView, widening: float) -> F
     settings = snapshot.strand_settings
     radius = float(snapshot.radius.max()) * settings.fullness * widening
     half_width = max(settings.minimum_width / 2.0, EDGE) * widening
-    shades = hidden_regions(snapshot.occluder_spheres[:SHADE_CAPACITY], view, half_width, radius)
-    packed = np.zeros((len(shades.nearest), 12), np.float32)
-    packed[:, 0:3], packed[:, 3] = shades.origin, shades.nearest
-    packed[:, 4:7], packed[:, 7] = shades.axis, shades.width
-    packed[:, 8] = shades.slope
+    spheres = snapshot.occluder_spheres[:HIDDEN_REGION_CAPACITY]
+    regions = hidden_regions(spheres, view, half_width, radius)
+    packed = np.zeros((len(regions.nearest), 12), np.float32)
+    packed[:, 0:3], packed[:, 3] = regions.origin, regions.nearest
+    packed[:, 4:7], packed[:, 7] = regions.axis, regions.width
+    packed[:, 8] = regions.slope
     return packed
 
 
-def _view_values(view: PictureView, camera: Camera, snapshot: Snapshot, shades: Floats) -> Floats:
-    """`DetailView` in std140, (28 + 12 SHADE_CAPACITY,); GLSL's matrices are stored by columns."""
-    space = np.zeros(12 * SHADE_CAPACITY)
-    space[: shades.size] = shades.ravel()
+def _view_values(view: PictureView, camera: Camera, snapshot: Snapshot, regions: Floats) -> Floats:
+    """`DetailView` in std140, (28 + 12 HIDDEN_REGION_CAPACITY,); GLSL's matrices are stored
+    by columns."""
+    space = np.zeros(12 * HIDDEN_REGION_CAPACITY)
+    space[: regions.size] = regions.ravel()
     fullness = snapshot.strand_settings.fullness * _focal_length(view)
-    picture, middle = [*view.half_size, 0.0, fullness], [*snapshot.root_center, len(shades)]
+    picture, middle = [*view.half_size, 0.0, fullness], [*snapshot.root_center, len(regions)]
     values: list[Any] = [view.view_projection.T.ravel(), camera.eye, picture, middle, space]
     return np.concatenate(values).astype(np.float32)
 

@@ -1,5 +1,5 @@
 """The inputs of a frame of dynamics for its shader: a uniform block (struct_dynamics) and a table
-of moments, one row per substep.
+with one row per substep.
 
 A row of the table, texels of RGBA32F:
     0     x the substep's end s as a fraction of the frame, y s (s - 1); z and w fractions of the
@@ -28,7 +28,7 @@ from ..dynamics.springs import max_extension_fraction, stiffness
 from ..dynamics.style import StyleSystem, style_system
 from ..dynamics.trajectory import clamped_ratio
 from ..dynamics.wind import MODES
-from .shader_source import MOMENT_TEXELS
+from .shader_source import SUBSTEP_TEXELS
 
 #: The uniform block: numbers before the vectors, and vectors before those of the CVs.
 _NUMBERS, _VECTORS = 16, 4 + 2 * MODES
@@ -39,9 +39,9 @@ def spans_of(frame: Frame, first: int, count: int) -> Floats:
     return np.array([frame.span(number) for number in range(first, first + count)]).reshape(-1, 2)
 
 
-def moments_of(frame: Frame, first: int, spans: Floats) -> Floats:
-    """The table without colliders' texels, (substep_count, MOMENT_TEXELS, 4) float32."""
-    table = np.zeros((len(spans), MOMENT_TEXELS, 4), np.float32)
+def substep_table_of(frame: Frame, first: int, spans: Floats) -> Floats:
+    """The table without colliders' texels, (substep_count, SUBSTEP_TEXELS, 4) float32."""
+    table = np.zeros((len(spans), SUBSTEP_TEXELS, 4), np.float32)
     begin, end = spans.T
     table[:, 0, 0] = end
     table[:, 0, 2] = part = frame.damping_factors.style * (end - begin)
@@ -53,13 +53,13 @@ def moments_of(frame: Frame, first: int, spans: Floats) -> Floats:
         table[:, 0, 2:] = 0.0
     if frame.air is not None and len(frame.air.phase):
         time = frame.time + np.arange(first, first + len(spans)) * frame.dt
-        turns = np.mod(frame.air.phase - frame.air.angular_frequency * time[:, None], 2.0 * np.pi)
-        table[:, 1:] = turns.reshape(len(spans), MOMENT_TEXELS - 1, 4)
+        phases = np.mod(frame.air.phase - frame.air.angular_frequency * time[:, None], 2.0 * np.pi)
+        table[:, 1:] = phases.reshape(len(spans), SUBSTEP_TEXELS - 1, 4)
     return table
 
 
-def carriers_of(frame: Frame, first: int, count: int) -> Floats:
-    """`carriers` of dynamics_pass for some substeps, (count + 1, 20, 4) float32."""
+def transforms_of(frame: Frame, first: int, count: int) -> Floats:
+    """`transforms` of dynamics_pass for some substeps, (count + 1, 20, 4) float32."""
     table = np.zeros((count + 1, 5, 4, 4), np.float32)
     table[:, :, :3, :3] = np.eye(3)
     begin, bend = frame.span(first)[0], 0.0
@@ -135,8 +135,8 @@ def _fill_forces(vectors: Floats, frame: Frame) -> None:
     square = np.float32(frame.dt * frame.dt)
     vectors[0, :3] = pull * np.float32(1.0 - settings.buoyancy) * square
     vectors[0, 3] = clamped_ratio(frame.drive.earlier_ratio)
-    combed = (frame.rotation @ pull.astype(np.float64)).astype(np.float32)
-    vectors[1, :3] = combed * (np.float32(settings.sag_compensation) * square)
+    compensated = (frame.rotation @ pull.astype(np.float64)).astype(np.float32)
+    vectors[1, :3] = compensated * (np.float32(settings.sag_compensation) * square)
     if frame.force_fields is not None:
         vectors[2, 3] = frame.force_fields.factor
     if air is not None:
@@ -147,12 +147,13 @@ def _fill_forces(vectors: Floats, frame: Frame) -> None:
 
 @lru_cache(maxsize=8)
 def _cv_values(settings: DynamicsSettings, cv_count: int, dt: float, size: float) -> Floats:
-    """`band` and `own` of the block, flat."""
-    band, own = values = np.zeros((2, cv_count, 4), np.float32)
+    """`band` and `stiffness_and_radius` of the block, flat."""
+    band, stiffness_and_radius = values = np.zeros((2, cv_count, 4), np.float32)
     if cv_count > PINNED_COUNT:
         matrix = style_system(settings, cv_count, dt)
-        band[:], own[:, 0] = bands_of(matrix, cv_count, 1)[0], bends_of(matrix, cv_count, 1)[0]
-        own[PINNED_COUNT:, 1] = cv_radius(settings, cv_count, size)
+        band[:] = bands_of(matrix, cv_count, 1)[0]
+        stiffness_and_radius[:, 0] = local_stiffness_of(matrix, cv_count, 1)[0]
+        stiffness_and_radius[PINNED_COUNT:, 1] = cv_radius(settings, cv_count, size)
     return values.ravel()
 
 
@@ -167,18 +168,18 @@ def bands_of(matrix: StyleSystem, cv_count: int, guide_count: int) -> Floats:
     return bands
 
 
-def bends_of(matrix: StyleSystem, cv_count: int, guide_count: int) -> Floats:
-    """`own.x` of guides, (guide_count, cv_count) float32."""
-    bends = np.zeros((guide_count, cv_count), np.float32)
-    bends[:, 1:-1] = matrix.local_stiffness.T
-    return bends
+def local_stiffness_of(matrix: StyleSystem, cv_count: int, guide_count: int) -> Floats:
+    """The local stiffness of guides, (guide_count, cv_count) float32."""
+    stiffness = np.zeros((guide_count, cv_count), np.float32)
+    stiffness[:, 1:-1] = matrix.local_stiffness.T
+    return stiffness
 
 
 def painted_texels(frame: Frame, painted: PaintedFrame, cv_count: int) -> Floats:
     """`painted_numbers` of dynamics_pass, (guide_count, cv_count, 4) float32."""
     guide_count = len(painted.gravity)
     own = np.zeros((guide_count, cv_count, 4), np.float32)
-    own[..., 0] = bends_of(painted.style_system, cv_count, guide_count)
+    own[..., 0] = local_stiffness_of(painted.style_system, cv_count, guide_count)
     damped, carried = painted.damping_factors, float(frame.damping_factors.style)
     own[:, 0] = np.stack(
         [

@@ -9,27 +9,29 @@ strand_layout.strand_rows:
     pushes         RGBA32F: xyz [m] displacement by other hair in a substep, see state.DynamicsState
     bridged        RGBA32F: xyz world [m], at the exact end of the frame (step.grid_at_frame_end)
     styles_earlier, styles_before, styles_now   RGBA32F: xyz world [m], see frame.Drive
-    rest_shapes    RGBA32F: for CV i xyz curvature [m] and w hold (style.LocalShape); for CV 0 x its
-                   twist CV
+    rest_shapes    RGBA32F: for CV i xyz curvature [m] and w turning fraction (style.LocalShape);
+                   for CV 0 x its twist CV
     rest_lengths   R32F: [m] to the next CV
-    curl_rooms     R32F: of the segment to the next CV, see Rest.curl_slack; only where curls give
+    curl_slacks    R32F: of the segment to the next CV, see Rest.curl_slack; only where curls
+                   stretch
     held_cvs       R32F: 1 where a CV is held (held.HeldCvs), else 0
     force_fields   RGBA32F: see force_fields.ForceFields.table; only where any act
     clearances     RGBA32F: for each CV, see clearance.GuideClearance; only with colliders
-    beside_root    RGBA32F: xyz [m], see step.remaining_displacement; this and held_cvs only where
-                   CVs are held
-    painted_bands  RGBA32F: for each CV near and far factor, inverse pivot, pull (style.StyleSystem)
+    held_displacements   RGBA32F: xyz [m], see step.remaining_displacement; this and held_cvs only
+                   where CVs are held
+    painted_bands  RGBA32F: for each CV near and far factor, inverse pivot, global stiffness
+                   (style.StyleSystem)
     painted_numbers   RGBA32F: for a guide's first CV x fraction of the speed that damping leaves, y
                    fraction of the air's speed, z and w factors on the style's motion and gravity;
-                   for all others x bend; this and painted_bands only where something is painted
-    carriers       RGBA32F: four texels for each rigid motion, see rigid_path.RigidTransform.texels.
-        Row n:
-                   the motion of all roots to the end of substep n; the motion that hair inherits in
-                   it. In the last row: the same to the begin of the first substep, with s of that
-                   moment in w of the origin; the same in the substep before, with s (s - 1) in w as
-                   in the table of moments; back from the frame's end, with w the fraction of its
-                   motion that a style on an arc gives; back from one frame earlier; to the middle
-                   of the frame, with w as s (s - 1)
+                   for all others x local stiffness; this and painted_bands only where something is
+                   painted
+    transforms     RGBA32F: four texels for each rigid motion, see
+                   rigid_path.RigidTransform.texels. Row n: the motion of all roots to the end of
+                   substep n; the motion that hair inherits in it. In the last row: the same to the
+                   begin of the first substep, with s of that moment in w of the origin; the same in
+                   the substep before, with s (s - 1) in w as in the table of substeps; back from
+                   the frame's end, with w the fraction of its motion that a style on an arc gives;
+                   back from one frame earlier; to the middle of the frame, with w as s (s - 1)
     fractions      R32F: for a guide's first CV the simulated fraction, see blend.blended; only
                    where some guides are not fully simulated
 
@@ -61,7 +63,14 @@ from ..dynamics.state import DynamicsState, Rest, as_rows
 from ..dynamics.step import remaining_displacement, remaining_rotation
 from .capabilities import pair_format
 from .collider_textures import UNLIMITED_PATH, UploadedColliders
-from .dynamics_block import bands_of, block_of, carriers_of, moments_of, painted_texels, spans_of
+from .dynamics_block import (
+    bands_of,
+    block_of,
+    painted_texels,
+    spans_of,
+    substep_table_of,
+    transforms_of,
+)
 from .hair_grid_pass import HairGridPass
 from .shader_program import ShaderRecipe, program, released_with_shaders
 from .strand_layout import from_strand_rows, strand_rows
@@ -79,7 +88,7 @@ TURN_ROWS = ("turn_x", "turn_y", "turn_z")
 @lru_cache(maxsize=4)
 def bridge_recipe(*, held: bool, blended: bool, turned: bool = False) -> ShaderRecipe:
     """The program that moves guides from the last substep to the exact end of the frame."""
-    names = ["positions", "styles_now", *["beside_root"] * held, *["fractions"] * blended]
+    names = ["positions", "styles_now", *["held_displacements"] * held, *["fractions"] * blended]
     return ShaderRecipe(
         name="dynamics_bridge",
         compute="dynamics_bridge.comp.glsl",
@@ -109,11 +118,11 @@ def dynamics_recipe(
     collider_count: int = 0,
     rounds: bool = False,
     fields: bool = False,
-    followed: bool = False,
+    traced: bool = False,
     sharp: bool = False,
     clearance: bool = False,
     painted: bool = False,
-    inherits: bool = False,
+    inherits_motion: bool = False,
     pairs: str = "RG32F",
 ) -> ShaderRecipe:
     """The program for guides with this many CVs, with only the parts that the scene needs.
@@ -130,14 +139,14 @@ def dynamics_recipe(
         "HAS_FORCE_FIELDS": force_fields and cv_count > PINNED_COUNT,
         "HAS_ROUNDS": rounds,
         "HAS_FIELDS": fields,
-        "HAS_FOLLOWED": followed and cv_count > PINNED_COUNT,
+        "HAS_TRACING": traced and cv_count > PINNED_COUNT,
         "HAS_SHARP": sharp and cv_count > PINNED_COUNT,
         "HAS_CLEARANCE": clearance,
         "IS_PAINTED": painted,
-        "INHERITS": inherits,
+        "INHERITS_MOTION": inherits_motion,
     }
     textures = ["styles_earlier", "styles_before", "styles_now", "rest_shapes", "rest_lengths"]
-    textures += ["moments", "carriers"] + ["held_cvs"] * held + ["curl_rooms"] * springs
+    textures += ["substep_table", "transforms"] + ["held_cvs"] * held + ["curl_slacks"] * springs
     textures += ["pushes"] * pushed + ["force_fields"] * (force_fields and cv_count > PINNED_COUNT)
     textures += ["painted_bands", "painted_numbers"] * painted
     textures += ["rounds"] * rounds + ["fields"] * fields + ["clearances"] * clearance
@@ -283,7 +292,7 @@ class DynamicsPass:
         lengths = segments_at_cvs(rest.length)
         textures["rest_lengths"] = texture_from(strand_rows(lengths), "R32F")
         if rest.curl_slack is not None:
-            textures["curl_rooms"] = texture_from(
+            textures["curl_slacks"] = texture_from(
                 strand_rows(segments_at_cvs(rest.curl_slack)), "R32F"
             )
 
@@ -324,19 +333,19 @@ class DynamicsPass:
     def _dispatch(self, frame: Frame, first: int, count: int, speed_ratio: float) -> None:
         settings, state, posed = frame.settings, self._state, frame.drive.colliders
         colliders = self._colliders.textures_of(posed)
-        spans, is_followed, is_sharp = spans_of(frame, first, count), False, False
-        table = moments_of(frame, first, spans)
+        spans, is_traced, is_sharp = spans_of(frame, first, count), False, False
+        table = substep_table_of(frame, first, spans)
         if posed:
             reach = CONTACT_MARGIN * frame.size + max_clearance(settings, frame.size)
-            poses = colliders.moments(posed, spans, reach, frame.size, state.cv_count)
+            poses = colliders.pose_texels(posed, spans, reach, frame.size, state.cv_count)
             limit, sharp = poses.reshape(len(spans), len(posed), -1, 4)[:, :, 12, :2].T
-            is_followed, is_sharp = bool((limit < UNLIMITED_PATH).any()), bool(sharp.any())
+            is_traced, is_sharp = bool((limit < UNLIMITED_PATH).any()), bool(sharp.any())
             table = np.concatenate([table, poses], axis=1)
-        textures = {**self._textures, "moments": texture_from(table, "RGBA32F")}
+        textures = {**self._textures, "substep_table": texture_from(table, "RGBA32F")}
         textures |= {"rounds": colliders.rounds, "fields": colliders.fields}
         if frame.force_fields is not None:
             textures["force_fields"] = texture_from(frame.force_fields.table, "RGBA32F")
-        textures["carriers"] = texture_from(carriers_of(frame, first, count), "RGBA32F")
+        textures["transforms"] = texture_from(transforms_of(frame, first, count), "RGBA32F")
         recipe = dynamics_recipe(
             state.cv_count,
             relaxation=settings.length_solver == "relaxation",
@@ -348,11 +357,11 @@ class DynamicsPass:
             collider_count=len(posed),
             rounds=colliders.rounds is not None,
             fields=colliders.fields is not None,
-            followed=is_followed,
+            traced=is_traced,
             sharp=is_sharp,
             clearance=bool(posed) and frame.drive.clearance is not None,
             painted=frame.painted is not None,
-            inherits=frame.inherits_motion,
+            inherits_motion=frame.inherits_motion,
             pairs=pair_format(),
         )
         block = block_of(frame, state.guide_count, state.cv_count, count, speed_ratio)
@@ -365,16 +374,18 @@ class DynamicsPass:
         shader.dispatch(state.guide_count)
 
     def _bridge(
-        self, beside_root: Floats | None, simulated: Floats | None, turn: Floats | None
+        self, held_displacements: Floats | None, simulated: Floats | None, turn: Floats | None
     ) -> None:
         """Fill `bridged`."""
         state, textures = self._state, dict(self._textures)
         recipe = bridge_recipe(
-            held=beside_root is not None, blended=simulated is not None, turned=turn is not None
+            held=held_displacements is not None,
+            blended=simulated is not None,
+            turned=turn is not None,
         )
         rows = {} if turn is None else dict(zip(TURN_ROWS, turn.tolist(), strict=True))
-        if beside_root is not None:
-            textures["beside_root"] = points_texture(beside_root)
+        if held_displacements is not None:
+            textures["held_displacements"] = points_texture(held_displacements)
         if simulated is not None:
             fractions = np.zeros((state.guide_count, state.cv_count, 1), np.float32)
             fractions[:, 0, 0] = simulated

@@ -27,10 +27,10 @@ from ..arrays import Ints, number_in_piece
 from ..dynamics.colliders import PosedCollider
 from ..refine.lead_out import (
     ATTEMPTS,
-    HALVINGS,
+    BISECTIONS,
+    DIRECTION_COUNT,
+    RETURN_RATE,
     SWEEPS,
-    TRIES,
-    TURNING_BACK,
     Clearance,
     LedOut,
 )
@@ -46,7 +46,7 @@ _GROUP = (64, 1)
 #: replaces infinity on the GPU [m]
 _INFINITE = np.float32(1.0e30)
 #: larger than any bend of a segment
-_MAX_TURN_BACK = 4.0
+_MAX_RETURN_ANGLE = 4.0
 #: Most iterations of all loops of a shader; software drivers end one after a few more.
 _MAX_ITERATIONS = 60_000
 #: step -> its images
@@ -82,7 +82,7 @@ _TEXTURES = {
     "LEAD_OUT": (*_CARRY_TEXTURES, "near_strands", "clearances"),
     "STORE_POINTS": (*_CARRY_TEXTURES, "near_strands"),
 }
-_POINT_RANGE = ("mover_count", "first_point", "point_end")
+_POINT_RANGE = ("root_motion_count", "first_point", "point_end")
 _INTEGERS = {
     "CARRY_ROOTS": _POINT_RANGE,
     "FIND_NEAR": _POINT_RANGE,
@@ -90,7 +90,7 @@ _INTEGERS = {
     "LIST_NEAR": (),
     "KEEP_BENDS": ("lane_count",),
     "LEAD_OUT": (*_POINT_RANGE, "lane_count", "first_attempt", "attempt_end"),
-    "STORE_POINTS": ("mover_count", "lane_count"),
+    "STORE_POINTS": ("root_motion_count", "lane_count"),
 }
 #: step -> most strands per invocation
 _STRANDS_PER_INVOCATION = {
@@ -102,9 +102,9 @@ _STRANDS_PER_INVOCATION = {
 }
 #: step -> its numbers
 _NUMBERS = {
-    "CARRY_ROOTS": ("turn_back_angle",),
+    "CARRY_ROOTS": ("return_angle",),
     "FIND_NEAR": ("max_clearance",),
-    "KEEP_BENDS": ("turn_back_angle",),
+    "KEEP_BENDS": ("return_angle",),
     "LEAD_OUT": ("max_clearance",),
     "STORE_POINTS": ("max_clearance",),
 }
@@ -206,7 +206,7 @@ class LeadOutPass:
             kinds,
             {name: len(posed) for name in kinds.integers},
             self._clearance.max_distance,
-            min(TURNING_BACK * elapsed, _MAX_TURN_BACK),
+            min(RETURN_RATE * elapsed, _MAX_RETURN_ANGLE),
             iterations <= _MAX_ITERATIONS,
         )
 
@@ -215,7 +215,7 @@ class LeadOutPass:
         cv_points: Any,
         inputs: LeadOutInputs,
         carry_textures: dict[str, Any],
-        mover_count: int,
+        root_motion_count: int,
     ) -> None:
         """Lead strands out, see `refine.lead_out.lead_out`.
 
@@ -223,14 +223,14 @@ class LeadOutPass:
             inputs: of this frame; if `finds_near_while_riding`, the pass before has found the
                 strands that are too near.
             carry_textures: the textures rest_points and root_motions.
-            mover_count: number of root motions.
+            root_motion_count: number of root motions.
 
         Raises:
             ShaderError: the shader does not compile here.
         """
         textures = self._textures | carry_textures | inputs.textures | {"cv_points": cv_points}
-        integers = {"mover_count": mover_count, **inputs.integers}
-        numbers = {"max_clearance": inputs.max_clearance, "turn_back_angle": inputs.turn_back_angle}
+        integers = {"root_motion_count": root_motion_count, **inputs.integers}
+        numbers = {"max_clearance": inputs.max_clearance, "return_angle": inputs.return_angle}
         steps = () if inputs.finds_near_while_riding else ("CARRY_ROOTS", "FIND_NEAR")
         for step in (*steps, "COUNT_NEAR", "LIST_NEAR"):
             self._run((step,), textures, integers, numbers)
@@ -331,7 +331,9 @@ class LeadOutPass:
         """How many points of a strand one dispatch can lead, including the steps KEEP_BENDS and
         STORE_POINTS."""
         assert self._solids is not None
-        per_point = 4 + (SWEEPS + TRIES + HALVINGS + 4) * (1 + self._solids.distance_iterations)
+        per_point = 4 + (SWEEPS + DIRECTION_COUNT + BISECTIONS + 4) * (
+            1 + self._solids.distance_iterations
+        )
         return max(_MAX_ITERATIONS // (per_point * _STRANDS_PER_INVOCATION["LEAD_OUT"]), 1)
 
 
@@ -340,7 +342,7 @@ class LeadOutInputs:
     """The inputs for leading strands out of colliders in one frame.
 
     textures: strand_spans, clearances and the colliders. states: an image. kinds, integers: of the
-    colliders. max_clearance: largest distance that points keep [m]. turn_back_angle: angle by which
+    colliders. max_clearance: largest distance that points keep [m]. return_angle: angle by which
     segments turn back since the frame before [rad]. finds_near_while_riding: whether the pass that
     moves strands can do the steps CARRY_ROOTS and FIND_NEAR.
     """
@@ -350,7 +352,7 @@ class LeadOutInputs:
     kinds: SolidKinds
     integers: dict[str, int]
     max_clearance: float
-    turn_back_angle: float
+    return_angle: float
     finds_near_while_riding: bool
 
 

@@ -73,7 +73,7 @@ def _guides_recipe(*, curls: bool) -> ShaderRecipe:
             ("FLOAT_2D", "guide_points"),
         ),
         images=(("RGBA32F", "guide_turns"), *[("RGBA32F", "guide_axes")] * curls),
-        integers=("segment_count", "guide_count", "mover_count"),
+        integers=("segment_count", "guide_count", "root_motion_count"),
         group_size=(64, 1),
         defines=(("HAS_CURLS", 1),) if curls else (),
     )
@@ -91,7 +91,7 @@ def _ride_recipe(*, curls: bool, solids: SolidKinds | None = None) -> ShaderReci
         *[("RGBA32F", "guide_axes", "READ")] * curls,
     )
     defines: tuple[tuple[str, int], ...] = (("HAS_CURLS", 1),) if curls else ()
-    integers = ["segment_count", "strand_count", "mover_count"]
+    integers = ["segment_count", "strand_count", "root_motion_count"]
     if solids is not None:
         names += solids.textures
         images += ("RGBA32F", "states", "READ_WRITE"), ("R32F", "clearances", "READ")
@@ -103,9 +103,7 @@ def _ride_recipe(*, curls: bool, solids: SolidKinds | None = None) -> ShaderReci
         textures=tuple(("FLOAT_2D", name) for name in names),
         images=images,
         integers=tuple(integers),
-        numbers=()
-        if solids is None
-        else (("FLOAT", "max_clearance"), ("FLOAT", "turn_back_angle")),
+        numbers=() if solids is None else (("FLOAT", "max_clearance"), ("FLOAT", "return_angle")),
         group_size=(64, 1),
         defines=defines,
     )
@@ -281,7 +279,7 @@ class RidePass:
         return int(self._guide_grid.shape[1]) - 1
 
     @property
-    def _mover_count(self) -> int:
+    def _root_motion_count(self) -> int:
         """Number of root motions: one for each strand, or one for all."""
         return 1 if self._root_holds is None else self._strands.strand_count
 
@@ -363,7 +361,7 @@ class RidePass:
             integers={
                 "segment_count": self._segment_count,
                 "guide_count": count,
-                "mover_count": self._mover_count,
+                "root_motion_count": self._root_motion_count,
             },
         )
         shader.dispatch(count)
@@ -387,7 +385,7 @@ class RidePass:
         integers = {
             "segment_count": self._segment_count,
             "strand_count": count,
-            "mover_count": self._mover_count,
+            "root_motion_count": self._root_motion_count,
         }
         numbers = {}
         if inputs is not None and inputs.finds_near_while_riding:
@@ -397,14 +395,14 @@ class RidePass:
             integers = integers | inputs.integers
             numbers = {
                 "max_clearance": inputs.max_clearance,
-                "turn_back_angle": inputs.turn_back_angle,
+                "return_angle": inputs.return_angle,
             }
         shader = program(_ride_recipe(curls=is_curled, solids=solids))
         shader.bind(textures=ride_textures, images=images, integers=integers, numbers=numbers)
         shader.dispatch(count)
         if inputs is not None:
             carry_textures = _named(textures, "rest_points", "root_motions")
-            self.lead_out.lead(self.points.texture, inputs, carry_textures, self._mover_count)
+            self.lead_out.lead(self.points.texture, inputs, carry_textures, self._root_motion_count)
         if self._hold_pass is not None:
             self._hold_pass.hold(self.points.texture, textures["rest_points"], anchors)
         self.lead_out.put(self.points.texture, led)

@@ -60,11 +60,11 @@ from ..shading.volume.dual import DEFAULT_TAU_BEYOND, MIDPOINT
 from ..shading.volume.map_size import START_TEXELS
 from ..shading.volume.mesh_frames import MESH_FRAME_CAPACITY
 from ..shading.volume.mesh_light import (
-    EDGE_ON,
+    MAX_SLOPE,
     MESH_BIAS,
     MESH_BLUR,
     MESH_TAPS,
-    STEEPEST,
+    MIN_COSINE,
 )
 from ..shading.volume.opacity import MAP_BORDER, MIN_MESH_BIAS, MIN_THICKNESS
 from ..shading.volume.transparency import UNSEEN_FRACTION
@@ -75,14 +75,14 @@ SHADER_FOLDER = Path(__file__).resolve().parents[2] / "gpu_shaders"
 
 #: Largest texture side that every GPU supported by Blender has [texels].
 STRAND_ROWS = 16384
-#: Texels of the dynamics' table of moments: for the substep itself, and for each collider.
-MOMENT_TEXELS, COLLIDER_TEXELS = 1 + -(-MODES // 4), 13
+#: Texels of a row of the dynamics' `substep_table`: for the substep itself, and for each collider.
+SUBSTEP_TEXELS, COLLIDER_TEXELS = 1 + -(-MODES // 4), 13
 #: Strands per block in which those to be led out of colliders are counted.
 LEAD_BLOCK = 128
 #: Round solids, and nodes of distance fields, in one row of their textures.
 ROUNDS_ACROSS, FIELD_ROW = 512, 4096
 #: Most regions behind the head for culling; a strand's regions are bits of one integer.
-SHADE_CAPACITY = 16
+HIDDEN_REGION_CAPACITY = 16
 #: Most texels, of four layers each, of an opacity map: three passes of six slots, for 64 slices.
 LAYER_TEXEL_CAPACITY = 18
 #: Scale of depths as integers in `starts` of opacity maps.
@@ -122,53 +122,53 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
         "harmonic_count": str(HARMONIC_COUNT),
         "min_roughness": repr(MIN_ROUGHNESS),
         "strand_rows": str(STRAND_ROWS),
-        "pinned": str(PINNED_COUNT),
+        "pinned_count": str(PINNED_COUNT),
         "contact_weight": repr(float(CONTACT_WEIGHT)),
         "held_weight": repr(float(HELD_WEIGHT)),
-        "steepest_spring": repr(float(springs.MAX_LINEARISED)),
+        "max_linearised": repr(float(springs.MAX_LINEARISED)),
         "hair_grid_max_motion": repr(float(hair_grid.MAX_MOTION * hair_grid.MOTION_UNITS)),
         "hair_grid_density_tolerance": repr(hair_grid.DENSITY_TOLERANCE),
         "hair_grid_max_shift": repr(hair_grid.MAX_SHIFT),
         "hair_grid_pressed_friction": repr(hair_grid.PRESSED_FRICTION),
         "hair_grid_min_density": repr(hair_grid.MIN_DENSITY),
-        "blend_opposite": repr(float(blend.MIN_DIRECTION)),
+        "min_blend_direction": repr(float(blend.MIN_DIRECTION)),
         "held_sweeps": str(HELD_SWEEPS),
         "hold_sweeps": str(SWEEPS),
-        "hold_near": repr(MIN_HOLD_ERROR),
-        "flattest": repr(MIN_GRADIENT),
+        "min_hold_error": repr(MIN_HOLD_ERROR),
+        "min_gradient": repr(MIN_GRADIENT),
         "lead_sweeps": str(lead_out.SWEEPS),
-        "lead_slack": repr(lead_out.SLACK),
-        "lead_upright": repr(lead_out.UPRIGHT),
-        "lead_tries": str(lead_out.TRIES),
-        "lead_halvings": str(lead_out.HALVINGS),
-        "lead_margin": repr(lead_out.MARGIN),
+        "lead_tolerance": repr(lead_out.TOLERANCE),
+        "lead_min_deflection": repr(lead_out.MIN_DEFLECTION),
+        "lead_directions": str(lead_out.DIRECTION_COUNT),
+        "lead_bisections": str(lead_out.BISECTIONS),
+        "lead_extra_distance": repr(lead_out.EXTRA_DISTANCE),
         "lead_block": str(LEAD_BLOCK),
-        "lead_deepest": repr(lead_out.DEEPEST),
-        "lead_steepest": repr(lead_out.STEEPEST),
-        "skin_of_reach": repr(TOUCH_DISTANCE / CONTACT_MARGIN),
-        "shortest_segment": repr(ride.SHORTEST),
-        "curl_slack": repr(curls.SLACK),
-        "curl_catching_up": repr(curls.CATCHING_UP),
-        "curl_widest": repr(curls.WIDEST),
-        "curl_shortest": repr(curls.SHORTEST),
-        "reversed_turn": repr(ride.REVERSED),
-        "between_count": str(len(SEGMENT_POINTS)),
-        "between_radius": repr(float(SEGMENT_RADIUS)),
-        "trace_steps": str(MAX_TRACE_STEPS),
-        "may_miss": repr(float(ALLOWED_DEPTH)),
-        "more_rounds": str(MAX_EXTRA_ROUNDS),
-        "fast_of_reach": repr(FAST_SEGMENTS / CONTACT_MARGIN),
-        "parts": str(PART_COUNT),
-        "part_passes": str(PART_PASS_FACTOR),
-        "max_weight": repr(float(MAX_SEGMENT_WEIGHT)),
+        "lead_max_straight_move": repr(lead_out.MAX_STRAIGHT_MOVE),
+        "lead_min_squared_sine": repr(lead_out.MIN_SQUARED_SINE),
+        "touch_distance_over_margin": repr(TOUCH_DISTANCE / CONTACT_MARGIN),
+        "min_segment_length": repr(ride.MIN_SEGMENT_LENGTH),
+        "extension_tolerance": repr(curls.EXTENSION_TOLERANCE),
+        "extension_gain": repr(curls.EXTENSION_GAIN),
+        "max_widening": repr(curls.MAX_WIDENING),
+        "min_axis_length": repr(curls.MIN_AXIS_LENGTH),
+        "reversal_limit": repr(ride.REVERSAL_LIMIT),
+        "segment_point_count": str(len(SEGMENT_POINTS)),
+        "segment_radius": repr(float(SEGMENT_RADIUS)),
+        "max_trace_steps": str(MAX_TRACE_STEPS),
+        "allowed_depth": repr(float(ALLOWED_DEPTH)),
+        "max_extra_rounds": str(MAX_EXTRA_ROUNDS),
+        "fast_segments_over_margin": repr(FAST_SEGMENTS / CONTACT_MARGIN),
+        "part_count": str(PART_COUNT),
+        "part_pass_factor": str(PART_PASS_FACTOR),
+        "max_segment_weight": repr(float(MAX_SEGMENT_WEIGHT)),
         "wind_modes": str(MODES),
         **{f"field_{name}": str(number) for number, name in enumerate(KINDS)},
         **{f"shape_{name}": str(number) for number, name in enumerate(SHAPES)},
-        "moment_texels": str(MOMENT_TEXELS),
+        "substep_texels": str(SUBSTEP_TEXELS),
         "collider_texels": str(COLLIDER_TEXELS),
         "rounds_across": str(ROUNDS_ACROSS),
         "field_row": str(FIELD_ROW),
-        "shade_capacity": str(SHADE_CAPACITY),
+        "hidden_region_capacity": str(HIDDEN_REGION_CAPACITY),
         "layer_texel_capacity": str(LAYER_TEXEL_CAPACITY),
         "map_border": repr(MAP_BORDER),
         "min_mesh_bias": repr(MIN_MESH_BIAS),
@@ -180,8 +180,8 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
         "mesh_blur": repr(MESH_BLUR),
         "mesh_taps": str(MESH_TAPS),
         "golden_angle": repr(GOLDEN_ANGLE),
-        "steepest": repr(STEEPEST),
-        "edge_on": repr(EDGE_ON),
+        "max_mesh_slope": repr(MAX_SLOPE),
+        "min_mesh_cosine": repr(MIN_COSINE),
         "start_texels": str(START_TEXELS),
         "tile_gap": str(TILE_GAP),
         "midpoint_absorption": repr(MIDPOINT),

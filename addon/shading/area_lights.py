@@ -86,7 +86,7 @@ class Panel:
         return 0.5 if self.is_round else float(np.sqrt(1.0 / 3.0))
 
     @property
-    def form(self) -> str:
+    def shape(self) -> str:
         """How it is computed: "rectangle" or "disk" in closed form, else "grid"."""
         width, height = self.half_sides
         if not self.has_full_spread or (self.is_round and abs(width - height) > 1e-6 * width):
@@ -104,12 +104,13 @@ def vector_irradiance(panel: Panel, offsets: Floats) -> Floats:
     x, y, height = np.moveaxis(np.asarray(offsets, np.float64) @ axes.T, -1, 0)
     is_before = height > MIN_HEIGHT
     height = np.where(is_before, height, 1.0)
-    found = {"rectangle": _rectangle, "disk": _disk, "grid": _grid}[panel.form](panel, x, y, height)
+    compute = {"rectangle": _rectangle, "disk": _disk, "grid": _grid}[panel.shape]
+    found = compute(panel, x, y, height)
     squared = x * x + y * y + height * height
     width, depth = panel.half_sides
     far = FAR_RATIO * min(1.0, panel.tangent * panel.tangent)
     is_far = width * width + depth * depth < far * squared
-    if panel.form != "disk":
+    if panel.shape != "disk":
         found = np.where(is_far[..., None], _four_points(panel, x, y, height), found)
     return np.where(is_before[..., None], found, 0.0) @ axes
 

@@ -35,7 +35,7 @@ HARMONIC_COUNT = 8
 NEAREST_DISTANCE = 1.0e-6
 
 #: forms, in the order of their numbers in lib_lights.glsl
-_FORMS = ("sun", "point", "spot", "rectangle", "disk", "grid", "round grid")
+_SHAPES = ("sun", "point", "spot", "rectangle", "disk", "grid", "round grid")
 
 
 @dataclass(frozen=True)
@@ -288,10 +288,10 @@ def _light_vectors(light: Light) -> Floats:
     """One light's five vec4, see struct_lights.glsl."""
     lanes = np.zeros((5, 4))
     lanes[0, :3], lanes[1, :3] = light.vector, light.power
-    form: str = light.kind
+    shape: str = light.kind
     if light.panel is not None:
         panel = light.panel
-        form = "round grid" if panel.form == "grid" and panel.is_round else panel.form
+        shape = "round grid" if panel.shape == "grid" and panel.is_round else panel.shape
         lanes[2:, :3] = panel.right, panel.up, panel.shines_along
         lanes[1:, 3] = panel.normalizer, *panel.half_sides, panel.tangent
     elif light.kind != "sun":
@@ -299,5 +299,5 @@ def _light_vectors(light: Light) -> Floats:
     if light.cone is not None:
         lanes[2:, :3] = light.cone.axes
         lanes[3:, 3] = light.cone.fade
-    lanes[0, 3] = _FORMS.index(form)
+    lanes[0, 3] = _SHAPES.index(shape)
     return lanes

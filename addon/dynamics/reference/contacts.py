@@ -111,7 +111,7 @@ def push_out(planes: list[list[Plane]], x: Floats, friction: float) -> dict[int,
     return of_segments | of_cvs
 
 
-def is_deep(planes: list[list[Plane]], x: Floats) -> bool:
+def are_too_deep(planes: list[list[Plane]], x: Floats) -> bool:
     """Whether any point is farther below its plane than allowed."""
     return any(plane.gap(x) > plane.allowed_depth for group in planes for plane in group)
 
@@ -121,7 +121,7 @@ class SubstepCollider:
     """A collider in one substep."""
 
     posed: PosedCollider
-    change: Floats  # of its matrix
+    displacement: Floats  # of its matrix
     now: Floats
     inverse: Floats
     inverse_before: Floats
@@ -132,18 +132,18 @@ class SubstepCollider:
     is_part: bool = False
 
     @classmethod
-    def of(cls, posed: PosedCollider, moment: Substep, size: float) -> SubstepCollider | None:
+    def of(cls, posed: PosedCollider, substep: Substep, size: float) -> SubstepCollider | None:
         """The collider in a substep; None if it is flat."""
-        before, now = posed.matrix_at(moment.begin), posed.matrix_at(moment.end)
+        before, now = posed.matrix_at(substep.begin), posed.matrix_at(substep.end)
         if np.linalg.cond(now[:3, :3]) >= 1.0 / MIN_SCALE_RATIO:
             return None
         scale = float(np.linalg.svd(now[:3, :3], compute_uv=False)[-1])
-        seen = max_untraced_squared(posed.collider.curve_radius * scale, size)
-        change, (center, reach) = now - before, posed.collider.bounds
-        travel = float(np.linalg.norm(change[:3, :3] @ center + change[:3, 3]))
-        travel += reach * float(np.linalg.norm(change[:3, :3]))
+        limit = max_untraced_squared(posed.collider.curve_radius * scale, size)
+        displacement, (center, reach) = now - before, posed.collider.bounds
+        travel = float(np.linalg.norm(displacement[:3, :3] @ center + displacement[:3, 3]))
+        travel += reach * float(np.linalg.norm(displacement[:3, :3]))
         inverses = np.linalg.inv(now), inverse_or_fallback(before, now)
-        return cls(posed, change, now, *inverses, scale, seen, travel, posed.deformation)
+        return cls(posed, displacement, now, *inverses, scale, limit, travel, posed.deformation)
 
     def part(self, number: int, count: int) -> SubstepCollider:
         """The collider in one of `count` parts of the substep."""
@@ -153,7 +153,7 @@ class SubstepCollider:
         )
         return replace(
             self,
-            change=self.change / count,
+            displacement=self.displacement / count,
             now=np.linalg.inv(end),
             inverse=end,
             inverse_before=begin,
@@ -171,7 +171,7 @@ class SubstepCollider:
 
     def origin(self, x: Floats, previous: Floats) -> Floats:
         """Where a point would be had it moved with the collider."""
-        result: Floats = previous + (self.change @ np.append(self.local(x), 1.0))[:3]
+        result: Floats = previous + (self.displacement @ np.append(self.local(x), 1.0))[:3]
         return result
 
     def distance_and_normal(self, local: Floats) -> tuple[float, Floats]:
@@ -202,27 +202,29 @@ class SubstepCollider:
     ) -> float:
         """The fraction of the path at which the distance falls to `target`; 1 if it does not."""
         length = float(np.linalg.norm(path)) * self.scale
-        gone, distance = 0.0, first
+        travelled, distance = 0.0, first
         for _ in range(MAX_TRACE_STEPS):
             step = max(distance - target, length / MAX_TRACE_STEPS)
-            if gone + step >= length:
+            if travelled + step >= length:
                 return 1.0
-            local = begin + path * ((gone + step) / length)
+            local = begin + path * ((travelled + step) / length)
             found = float(self.posed.collider.distance(local[:, None])[0][0]) * self.scale
             if found < target:
-                return (gone + step * (distance - target) / (distance - found)) / length
-            gone, distance = gone + step, found
+                return (travelled + step * (distance - target) / (distance - found)) / length
+            travelled, distance = travelled + step, found
         return 1.0
 
 
-def is_fast(
+def needs_parts(
     solid: SubstepCollider, planes: list[Plane], x: Floats, previous: Floats, spacing: float
 ) -> bool:
     """Whether a guide with these planes is advanced in parts of the substep; see
     `contacts.fast_guides`."""
     root, farthest = PINNED_COUNT - 1, FAST_SEGMENTS * spacing
-    is_far = float(np.linalg.norm(x[root] - solid.origin(x[root], previous[root]))) > farthest
-    return solid.is_sharp(spacing) and is_far and any(plane.path > farthest for plane in planes)
+    is_root_fast = float(np.linalg.norm(x[root] - solid.origin(x[root], previous[root]))) > farthest
+    return (
+        solid.is_sharp(spacing) and is_root_fast and any(plane.path > farthest for plane in planes)
+    )
 
 
 def planes_of(
@@ -253,9 +255,11 @@ def planes_of(
         if plane is not None:
             of_cvs.append(plane)
         if is_sharp:
-            is_loose = cv > PINNED_COUNT and not held[cv - 1]
+            is_previous_free = cv > PINNED_COUNT and not held[cv - 1]
             wanted = np.minimum(radius * float(SEGMENT_RADIUS), clearance[cv, 1:]).tolist()
-            plane = _plane_between(solid, cv, x, previous, own, wanted, max_exit, size, is_loose)
+            plane = _plane_between(
+                solid, cv, x, previous, own, wanted, max_exit, size, is_previous_free
+            )
             if plane is not None:
                 of_segments.append(plane)
     return of_cvs, of_segments
@@ -274,22 +278,26 @@ def _plane_of_cv(
     distance, normal = solid.distance_and_normal(solid.local(x[cv]))
     origin = solid.origin(x[cv], previous[cv])
     path = x[cv] - origin
-    beyond = float(np.linalg.norm(path)) if is_sharp else 0.0
-    if distance >= radius + CONTACT_MARGIN * size + beyond:
+    travel = float(np.linalg.norm(path)) if is_sharp else 0.0
+    if distance >= radius + CONTACT_MARGIN * size + travel:
         return None
-    surface, was = float(normal @ x[cv]) - distance, distance - float(normal @ path)
+    surface, start_distance = float(normal @ x[cv]) - distance, distance - float(normal @ path)
     if (
         is_sharp or solid.travel**2 > solid.max_untraced_squared
     ) and path @ path > solid.max_untraced_squared:
-        normal, surface, was = solid.traced(x[cv], previous[cv], radius)
-    reached = was + max_exit
-    offset = surface + min(radius, reached)
+        normal, surface, start_distance = solid.traced(x[cv], previous[cv], radius)
+    allowed = start_distance + max_exit
+    offset = surface + min(radius, allowed)
     if is_sharp and offset - normal @ x[cv] <= -CONTACT_MARGIN * size:
         return None
-    is_out = reached >= (0.0 if solid.is_part else radius)
-    slack = max(radius * float(ALLOWED_DEPTH), 2.0 * TOUCH_DISTANCE * size) if is_out else np.inf
-    gone = float(np.linalg.norm(path))
-    return Plane(cv, normal, offset, origin, is_out, TOUCH_DISTANCE * size, slack, gone)
+    leads_out = allowed >= (0.0 if solid.is_part else radius)
+    allowed_depth = (
+        max(radius * float(ALLOWED_DEPTH), 2.0 * TOUCH_DISTANCE * size) if leads_out else np.inf
+    )
+    travelled = float(np.linalg.norm(path))
+    return Plane(
+        cv, normal, offset, origin, leads_out, TOUCH_DISTANCE * size, allowed_depth, travelled
+    )
 
 
 def _plane_between(
@@ -301,30 +309,39 @@ def _plane_between(
     distances: list[float],
     max_exit: float,
     size: float,
-    is_loose: bool,
+    is_previous_free: bool,
 ) -> Plane | None:
     """The plane of the deepest of the points of the segment that ends at a CV.
 
     Args:
         radius: of that CV [m]. distances: distances that the points keep [m].
-        is_loose: whether the previous CV is free too.
+        is_previous_free: whether the previous CV is free too.
     """
     deepest: Plane | None = None
     for along, wanted in zip(SEGMENT_POINTS, distances, strict=True):
         here, before = (rows[cv - 1] + (rows[cv] - rows[cv - 1]) * along for rows in (x, previous))
-        normal, surface, was = solid.traced(here, before, radius)
-        offset = surface + min(wanted, was + max_exit)
-        lower = (1.0 - along) * is_loose
+        normal, surface, start_distance = solid.traced(here, before, radius)
+        offset = surface + min(wanted, start_distance + max_exit)
+        lower = (1.0 - along) * is_previous_free
         scale = lower * lower + along * along
         weights = lower / scale, min(along / scale, float(MAX_SEGMENT_WEIGHT))
-        is_out = was + max_exit >= (0.0 if solid.is_part else wanted)
-        slack = (
-            max(wanted * float(ALLOWED_DEPTH), 2.0 * TOUCH_DISTANCE * size) if is_out else np.inf
+        leads_out = start_distance + max_exit >= (0.0 if solid.is_part else wanted)
+        allowed_depth = (
+            max(wanted * float(ALLOWED_DEPTH), 2.0 * TOUCH_DISTANCE * size) if leads_out else np.inf
         )
         origin = solid.origin(here, before)
-        gone = float(np.linalg.norm(here - origin))
+        travelled = float(np.linalg.norm(here - origin))
         plane = Plane(
-            cv, normal, offset, origin, is_out, TOUCH_DISTANCE * size, slack, gone, along, weights
+            cv,
+            normal,
+            offset,
+            origin,
+            leads_out,
+            TOUCH_DISTANCE * size,
+            allowed_depth,
+            travelled,
+            along,
+            weights,
         )
         if deepest is None or plane.gap(x) > deepest.gap(x):
             deepest = plane

@@ -30,8 +30,8 @@ from .contacts import (
     Plane,
     Substep,
     SubstepCollider,
-    is_deep,
-    is_fast,
+    are_too_deep,
+    needs_parts,
     planes_of,
     push_out,
 )
@@ -60,31 +60,33 @@ def advance_reference(
     for number in range(count):
         push.before(number, guides)
         assert frame is not None
-        carries = (
+        inherited_motions = (
             [frame.inherited_motion(k) for k in (number - 1, number)]
             if frame.inherits_motion
             else []
         )
-        placed = frame.root_place(number - 1) if frame.inherits_motion else None
+        root_place = frame.root_place(number - 1) if frame.inherits_motion else None
         begin = (number * dt - state.time_left) / duration
-        moment = Substep(begin, begin + dt / duration, state.time + number * dt, dt)
+        substep = Substep(begin, begin + dt / duration, state.time + number * dt, dt)
         for guide in guides:
-            guide.substep(drive, moment, carries, placed)
+            guide.substep(drive, substep, inherited_motions, root_place)
     if not guides:
         return state
     rows = [np.stack([g.x for g in guides]), np.stack([g.previous for g in guides])]
     position, previous = (grid.transpose(2, 1, 0).astype(np.float32) for grid in rows)
     left = max(time - count * dt, 0.0)
-    substep = dt if count else state.substep
+    last_substep = dt if count else state.substep
     time = state.time + count * dt
-    carried = root_places_after(state, frame, drive, settings, count)
+    root_places = root_places_after(state, frame, drive, settings, count)
     return DynamicsState(
-        position, previous, state.rest, substep, left, time, (), push.rows, carried
+        position, previous, state.rest, last_substep, left, time, (), push.rows, root_places
     )
 
 
-def _carried(carry: RigidTransform, points: Floats) -> Floats:
-    result: Floats = (points - carry.origin) @ carry.rotation.T + carry.moved_origin
+def _transformed(inherited_motion: RigidTransform, points: Floats) -> Floats:
+    result: Floats = (
+        points - inherited_motion.origin
+    ) @ inherited_motion.rotation.T + inherited_motion.moved_origin
     return result
 
 
@@ -95,23 +97,23 @@ class _Push:
         self, state: DynamicsState, drive: Drive, settings: DynamicsSettings, dt: float
     ) -> None:
         self.state, self.settings, self.dt = state, settings, dt
-        self.is_felt = settings.volume > 0.0 and state.cv_count > PINNED_COUNT
+        self.is_active = settings.volume > 0.0 and state.cv_count > PINNED_COUNT
         self.substeps = max(round(1.0 / (UPDATES_PER_SECOND * dt)), 1)
         self.first = round(state.time / dt)
-        self.rows = state.push if self.is_felt else None
+        self.rows = state.push if self.is_active else None
         self.middles = (drive.target_before + drive.target_now).transpose(2, 1, 0) / 2.0
 
     def before(self, number: int, guides: list[_Guide]) -> None:
         """Update the push of guides before a substep of the frame."""
-        if not self.is_felt or not guides:
+        if not self.is_active or not guides:
             return
         if self.rows is None or (self.first + number) % self.substeps == 0:
-            self._feel(guides)
+            self._update(guides)
         assert self.rows is not None
         for guide, push in zip(guides, self.rows.transpose(2, 1, 0), strict=True):
             guide.push = push.astype(np.float64)
 
-    def _feel(self, guides: list[_Guide]) -> None:
+    def _update(self, guides: list[_Guide]) -> None:
         rest = self.state.rest
         here = np.concatenate([guide.x for guide in guides])
         before = np.concatenate([guide.previous for guide in guides])
@@ -121,10 +123,10 @@ class _Push:
         hair = GroomPoints(here, here - before, turn, middle)
         cv_count = len(here) // len(guides)
         volume = np.repeat([guide.settings.volume for guide in guides], cv_count)
-        taken, push = friction_and_push_reference(
+        friction, push = friction_and_push_reference(
             rest.hair_grid, at_rest, hair, volume, self.dt, self.substeps
         )
-        for guide, own in zip(guides, np.split(taken, len(guides)), strict=True):
+        for guide, own in zip(guides, np.split(friction, len(guides)), strict=True):
             guide.previous = guide.previous + own
         self.rows = push.reshape(len(guides), -1, 3).transpose(2, 1, 0).astype(np.float32)
 
@@ -153,8 +155,10 @@ class _Guide:
         self.rest_length = [float(np.linalg.norm(b - a)) for a, b in pairwise(self.rest)]
         self.push = np.zeros_like(self.x)  # by other guides, in each substep
         self.length = self.rest_length  # the lengths to keep in this substep
-        room = state.rest.curl_slack
-        self.room = np.zeros(len(self.length)) if room is None else room[:, guide].astype(float)
+        curl_slack = state.rest.curl_slack
+        self.curl_slack = (
+            np.zeros(len(self.length)) if curl_slack is None else curl_slack[:, guide].astype(float)
+        )
         self.size = state.rest.size
         self.held = [False] * len(self.x)
         if drive.held is not None:
@@ -167,11 +171,11 @@ class _Guide:
         now, earlier = drive.target_now[guide].astype(np.float64), drive.target_earlier
         self.curvature = np.zeros_like(now)
         if self.carrier is not None:
-            now = self._as_carrier_sees(now, self.carrier.path.now)
+            now = self._before_carrier(now, self.carrier.path.now)
         if earlier is not None:
             since = earlier[guide].astype(np.float64)
             if self.carrier is not None and self.carrier.path.earlier is not None:
-                since = self._as_carrier_sees(since, self.carrier.path.earlier)
+                since = self._before_carrier(since, self.carrier.path.earlier)
             self.curvature = curvature(since, self.before, now, drive.earlier_ratio)
         self.displacement = now - self.before
         self.middle = (self.before + drive.target_now[guide]) / 2.0
@@ -179,7 +183,7 @@ class _Guide:
             self.middle = self._style_at(0.5)
         middle = (drive.target_before + drive.target_now).transpose(2, 1, 0) / 2.0
         turn = best_rotation(state.rest.position, middle)
-        self.gravity = self._felt_gravity(drive, settings, turn)
+        self.gravity = self._effective_gravity(drive, settings, turn)
         self.load = settings.sag_compensation * self._tension_on_style(
             turn @ (np.asarray(drive.gravity, np.float64) * settings.gravity)
         )
@@ -187,43 +191,45 @@ class _Guide:
     def substep(
         self,
         drive: Drive,
-        moment: Substep,
-        carries: list[RigidTransform],
-        placed: RigidMotion | None,
+        substep: Substep,
+        inherited_motions: list[RigidTransform],
+        root_place: RigidMotion | None,
     ) -> None:
         """Args:
-        carries: the motion that hair takes over from the roots without inertia, in the previous
-            substep and in this one; empty if it takes over none.
-        placed: where the roots as a whole are at the begin; None: according to their path.
+        inherited_motions: the motion that hair inherits from the roots, in the previous substep and
+            in this one; empty if it inherits none.
+        root_place: where the roots as a whole are at the begin; None: according to their path.
         """
-        settings, begun = self.settings, self.x.copy()
-        air = self._air(settings, moment)
-        style_begun = self._style_at(moment.begin, placed)
-        for carry in carries:
-            self.previous = _carried(carry, self.previous)
-        if carries:
-            self.x, style_begun = (_carried(carries[1], each) for each in (self.x, style_begun))
-        self._brake(settings.drag, air, moment.dt)
+        settings, position_before = self.settings, self.x.copy()
+        air = self._air(settings, substep)
+        style_before = self._style_at(substep.begin, root_place)
+        for inherited_motion in inherited_motions:
+            self.previous = _transformed(inherited_motion, self.previous)
+        if inherited_motions:
+            self.x, style_before = (
+                _transformed(inherited_motions[1], each) for each in (self.x, style_before)
+            )
+        self._apply_drag(settings.drag, air, substep.dt)
         fields = drive.force_fields.scaled(settings.force_fields)
         if fields is not None:
             self.previous = previous_after_fields(
-                self.x, self.previous, fields, moment.dt, self.size
+                self.x, self.previous, fields, substep.dt, self.size
             )
-        self._predict(settings, air, moment, style_begun)
-        self.previous = begun
-        style = self._style_at(moment.end)
+        self._predict(settings, air, substep, style_before)
+        self.previous = position_before
+        style = self._style_at(substep.end)
         self._pin(style)
-        self._give(settings, moment.dt)
-        self._restore_style(style, settings, moment.dt)
+        self._spring_step(settings, substep.dt)
+        self._restore_style(style, settings, substep.dt)
         self._pin(style)
         self._keep_lengths({}, settings)
-        found = [SubstepCollider.of(posed, moment, self.size) for posed in drive.colliders]
+        found = [SubstepCollider.of(posed, substep, self.size) for posed in drive.colliders]
         solids = [solid for solid in found if solid is not None]
         passes = settings.contact_passes if drive.colliders else 0
-        if not self._keep_outside(solids, settings, moment.dt, passes):
-            self._keep_outside_in_parts(solids, settings, moment.dt, passes)
+        if not self._solve_contacts(solids, settings, substep.dt, passes):
+            self._solve_contacts_in_parts(solids, settings, substep.dt, passes)
 
-    def _keep_outside(
+    def _solve_contacts(
         self, solids: list[SubstepCollider], settings: DynamicsSettings, dt: float, passes: int
     ) -> bool:
         """Solve contacts and lengths; False, without doing so, if the guide needs to be advanced in
@@ -237,12 +243,12 @@ class _Guide:
         spacing = self.size / (len(self.x) - 1)
         for solid, (of_cvs, of_segments) in zip(solids, found, strict=True):
             own = of_cvs + of_segments
-            if not solid.is_part and is_fast(solid, own, self.x, self.previous, spacing):
+            if not solid.is_part and needs_parts(solid, own, self.x, self.previous, spacing):
                 return False
         planes = [of_cvs for of_cvs, _ in found] + [of_segments for _, of_segments in found]
         self._solve_in_turn(planes, settings, passes)
         for _ in range(MAX_EXTRA_ROUNDS):
-            if not is_deep(planes, self.x):
+            if not are_too_deep(planes, self.x):
                 break
             self._solve_in_turn(planes, settings, 1)
         for group in planes:
@@ -250,7 +256,7 @@ class _Guide:
                 plane.absorb(self.x, self.previous)
         return True
 
-    def _keep_outside_in_parts(
+    def _solve_contacts_in_parts(
         self,
         solids: list[SubstepCollider],
         settings: DynamicsSettings,
@@ -258,20 +264,20 @@ class _Guide:
         passes: int,
     ) -> None:
         end, path = self.x.copy(), (self.x - self.previous) / PART_COUNT
-        went = np.zeros_like(path)
+        part_displacement = np.zeros_like(path)
         self.x = self.previous.copy()
         for number in range(PART_COUNT):
             self.previous = self.x.copy()
             self.x = self.x + path
             if number == PART_COUNT - 1:
-                carried = [*range(PINNED_COUNT), *self._held_cvs()]
-                self.x[carried] = end[carried]
+                fixed = [*range(PINNED_COUNT), *self._held_cvs()]
+                self.x[fixed] = end[fixed]
             self._keep_lengths({}, settings)
             solids_now = [solid.part(number, PART_COUNT) for solid in solids]
-            self._keep_outside(solids_now, settings, dt / PART_COUNT, passes * PART_PASS_FACTOR)
+            self._solve_contacts(solids_now, settings, dt / PART_COUNT, passes * PART_PASS_FACTOR)
             path = self.x - self.previous
-            went += path
-        self.previous = self.x - went
+            part_displacement += path
+        self.previous = self.x - part_displacement
 
     def _solve_in_turn(
         self, planes: list[list[Plane]], settings: DynamicsSettings, passes: int
@@ -284,47 +290,51 @@ class _Guide:
             self._finish_lengths(normals, settings)
 
     def _style_at(self, fraction: float, place: RigidMotion | None = None) -> Floats:
-        seen = (
+        style = (
             self.before
             + self.displacement * fraction
             + self.curvature * fraction * (fraction - 1.0)
         )
         if self.carrier is None:
-            return seen
+            return style
         place, pivot = place or self.carrier.path.at(fraction), self.carrier.pivot
-        return (seen - pivot) @ place.rotation.T + pivot + place.shift
+        return (style - pivot) @ place.rotation.T + pivot + place.shift
 
-    def _as_carrier_sees(self, points: Floats, place: RigidMotion) -> Floats:
+    def _before_carrier(self, points: Floats, place: RigidMotion) -> Floats:
         assert self.carrier is not None
         pivot = self.carrier.pivot
         return (points - pivot - place.shift) @ place.rotation + pivot
 
-    def _air(self, settings: DynamicsSettings, moment: Substep) -> Floats:
+    def _air(self, settings: DynamicsSettings, substep: Substep) -> Floats:
         """Velocity of the air at the root, (3,)."""
         air = air_from_settings(settings)
         if air is None:
             return np.zeros(3)
-        return air.at(self.x[0][:, None].astype(np.float32), moment.time)[:, 0].astype(np.float64)
+        return air.at(self.x[0][:, None].astype(np.float32), substep.time)[:, 0].astype(np.float64)
 
-    def _brake(self, drag: float, air: Floats, dt: float) -> None:
+    def _apply_drag(self, drag: float, air: Floats, dt: float) -> None:
         for cv in range(len(self.x)):
-            through = (self.x[cv] - self.previous[cv]) / dt - air
-            through = through / (1.0 + drag * float(np.linalg.norm(through)) * dt)
-            self.previous[cv] = self.x[cv] - (through + air) * dt
+            relative_velocity = (self.x[cv] - self.previous[cv]) / dt - air
+            relative_velocity = relative_velocity / (
+                1.0 + drag * float(np.linalg.norm(relative_velocity)) * dt
+            )
+            self.previous[cv] = self.x[cv] - (relative_velocity + air) * dt
 
     def _predict(
-        self, settings: DynamicsSettings, air: Floats, moment: Substep, style_begun: Floats
+        self, settings: DynamicsSettings, air: Floats, substep: Substep, style_before: Floats
     ) -> None:
-        both = settings.damping + settings.style_damping
-        kept = math.exp(-both * moment.dt)
-        lost = (1.0 - kept) / both if both else 0.0
-        style_displacement = self._style_at(moment.end) - style_begun
+        damping_rate = settings.damping + settings.style_damping
+        velocity_factor = math.exp(-damping_rate * substep.dt)
+        mean_factor = (1.0 - velocity_factor) / damping_rate if damping_rate else 0.0
+        style_displacement = self._style_at(substep.end) - style_before
         for cv in range(len(self.x)):
-            moved = (self.x[cv] - self.previous[cv]) * kept
-            moved = moved + style_displacement[cv] * lost * settings.style_damping
-            moved = moved + air * moment.dt * lost * settings.damping
-            moved = moved + self.gravity[cv] * moment.dt**2 + self.push[cv]
-            self.x[cv] = self.x[cv] + moved
+            displacement = (self.x[cv] - self.previous[cv]) * velocity_factor
+            displacement = (
+                displacement + style_displacement[cv] * mean_factor * settings.style_damping
+            )
+            displacement = displacement + air * substep.dt * mean_factor * settings.damping
+            displacement = displacement + self.gravity[cv] * substep.dt**2 + self.push[cv]
+            self.x[cv] = self.x[cv] + displacement
 
     def _pin(self, style: Floats) -> None:
         self.x[:PINNED_COUNT] = style[:PINNED_COUNT]
@@ -344,55 +354,59 @@ class _Guide:
         last = max(self._held_cvs(), default=0)
         return [cv for cv in range(last - 1, PINNED_COUNT - 1, -1) if not self.held[cv]]
 
-    def _felt_gravity(self, drive: Drive, settings: DynamicsSettings, turn: Floats) -> Floats:
+    def _effective_gravity(self, drive: Drive, settings: DynamicsSettings, turn: Floats) -> Floats:
         pull = np.asarray(drive.gravity, np.float64) * settings.gravity
-        felt = np.tile(pull * (1.0 - settings.buoyancy), (len(self.x), 1))
+        gravity = np.tile(pull * (1.0 - settings.buoyancy), (len(self.x), 1))
         free = len(self.x) - PINNED_COUNT
         if free < 1:
-            return felt
-        # the part of the combed weight orthogonal to all length constraints, by projection
-        combed = np.tile(turn @ pull, free)
+            return gravity
+        # the part of the compensated weight orthogonal to all length constraints, by projection
+        compensated = np.tile(turn @ pull, free)
         jacobian = jacobian_of(self.middle)
         tension = self._tension_on_style(turn @ pull)
-        felt[PINNED_COUNT:] -= settings.sag_compensation * (combed - jacobian.T @ tension).reshape(
-            free, 3
-        )
-        return felt
+        gravity[PINNED_COUNT:] -= settings.sag_compensation * (
+            compensated - jacobian.T @ tension
+        ).reshape(free, 3)
+        return gravity
 
-    def _tension_on_style(self, combed: Floats) -> Floats:
+    def _tension_on_style(self, compensated: Floats) -> Floats:
         """The tension of each segment beyond the pinned ones that holds the style's gravity
         [m/s^2]."""
         free = len(self.x) - PINNED_COUNT
         if free < 1:
             return np.zeros(0)
         jacobian = jacobian_of(self.middle)
-        tension: Floats = np.linalg.solve(jacobian @ jacobian.T, jacobian @ np.tile(combed, free))
+        tension: Floats = np.linalg.solve(
+            jacobian @ jacobian.T, jacobian @ np.tile(compensated, free)
+        )
         return tension
 
-    def _give(self, settings: DynamicsSettings, dt: float) -> None:
+    def _spring_step(self, settings: DynamicsSettings, dt: float) -> None:
         """One step of the springs along a curl, by their tension; sets `length` to the result."""
-        room = self.room[PINNED_COUNT - 1 :] * max_extension_fraction(settings)
-        if not room.any():
+        curl_slack = self.curl_slack[PINNED_COUNT - 1 :] * max_extension_fraction(settings)
+        if not curl_slack.any():
             return
         free, kappa = len(self.x) - PINNED_COUNT, stiffness(settings, len(self.x))
         rest = np.array(self.rest_length[PINNED_COUNT - 1 :])
         previous = np.linalg.norm(np.diff(self.previous[PINNED_COUNT - 1 :], axis=0), axis=1)
         right = self._lengths() - rest
         compliance = np.zeros(free)
-        for one in np.flatnonzero(room):
-            most = room[one] * rest[one]
-            ratio = np.clip((previous[one] - rest[one]) / most, -MAX_LINEARISED, MAX_LINEARISED)
+        for one in np.flatnonzero(curl_slack):
+            max_extension = curl_slack[one] * rest[one]
+            ratio = np.clip(
+                (previous[one] - rest[one]) / max_extension, -MAX_LINEARISED, MAX_LINEARISED
+            )
             slope = kappa * (1.0 + ratio**2) / (1.0 - ratio**2) ** 2
-            tension = kappa * most * ratio / (1.0 - ratio**2) + self.load[one]
+            tension = kappa * max_extension * ratio / (1.0 - ratio**2) + self.load[one]
             compliance[one] = 1.0 / (slope * dt * dt)
-            right[one] += tension / slope - most * ratio
+            right[one] += tension / slope - max_extension * ratio
         jacobian, mobility = jacobian_of(self.x), self._mobility({})
         before = self.x.copy()
         tension = np.linalg.solve(jacobian @ mobility @ jacobian.T + np.diag(compliance), right)
         self.x[PINNED_COUNT:] -= (mobility @ jacobian.T @ tension).reshape(free, 3)
         held = self._held_cvs()
         self.x[held] = before[held]
-        longest = rest * (1.0 + room)
+        longest = rest * (1.0 + curl_slack)
         left = np.clip(self._lengths(), rest**2 / longest, longest)
         self.length = [*self.rest_length[: PINNED_COUNT - 1], *left]
 
@@ -465,11 +479,11 @@ class _Guide:
         for _ in range(HELD_SWEEPS if held else 1):
             self.x[held] = before
             for cv in self._towards_root():
-                self._bring_near(cv, cv + 1, self.length[cv])
+                self._limit_distance(cv, cv + 1, self.length[cv])
             for cv in range(PINNED_COUNT, len(self.x)):
-                self._bring_near(cv, cv - 1, self.length[cv - 1])
+                self._limit_distance(cv, cv - 1, self.length[cv - 1])
 
-    def _bring_near(self, cv: int, other: int, farthest: float) -> None:
+    def _limit_distance(self, cv: int, other: int, farthest: float) -> None:
         offset = self.x[cv] - self.x[other]
         away = float(np.linalg.norm(offset))
         if away > farthest:
@@ -503,14 +517,14 @@ class _Guide:
                 return
             self._newton_step(normals)
         if self._is_off(settings.length_tolerance):
-            self._lay_out()
+            self._rebuild()
 
     def _is_off(self, tolerance: float) -> bool:
         wanted = np.array(self.length[PINNED_COUNT - 1 :])
         allowed = wanted * tolerance + ROUNDING * self.size
         return bool((np.abs(self._lengths() - wanted) > allowed).any())
 
-    def _lay_out(self) -> None:
+    def _rebuild(self) -> None:
         segment = self._segments()
         for cv in self._towards_root():
             self.x[cv] = self.x[cv + 1] - segment[cv]

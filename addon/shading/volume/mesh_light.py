@@ -23,9 +23,9 @@ MESH_TAPS, MESH_BLUR = 16, 0.003
 #: how far in front of a place a mesh must be, as a fraction of the disk's radius and a texel
 MESH_BIAS = 0.5
 #: the steepest slope that is followed, as a tangent
-STEEPEST = 20.0
+MAX_SLOPE = 20.0
 #: minimum cosine of a slope that is seen from its edge
-EDGE_ON = 1.0e-3
+MIN_COSINE = 1.0e-3
 
 
 def mesh_light(
@@ -86,12 +86,12 @@ def _slope(frame: LightFrame, points: Floats, normals: Floats, size: int) -> tup
     ray = np.cross(across, upward)
     length = np.linalg.norm(ray, axis=1)
     cosine = (normals * ray).sum(axis=1) / length
-    cosine = np.where(cosine < 0.0, -1.0, 1.0) * np.maximum(np.abs(cosine), EDGE_ON)
+    cosine = np.where(cosine < 0.0, -1.0, 1.0) * np.maximum(np.abs(cosine), MIN_COSINE)
     deeper = frame.to_depth[:3]
     slope = np.stack(
         [np.cross(upward, normals) @ deeper, np.cross(normals, across) @ deeper], axis=1
     )
     slope *= 2.0 / size / (length * cosine)[:, None]
     unit = 2.0 / size * np.linalg.norm(deeper) / np.sqrt(length)
-    steep = np.linalg.norm(slope, axis=1) / (STEEPEST * unit)
-    return slope / np.maximum(steep, 1.0)[:, None], unit
+    excess = np.linalg.norm(slope, axis=1) / (MAX_SLOPE * unit)
+    return slope / np.maximum(excess, 1.0)[:, None], unit

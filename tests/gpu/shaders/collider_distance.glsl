@@ -9,12 +9,12 @@ void main()
     return;
   }
   vec4 point = texelFetch(points, at, 0);
-  vec4 low_cell = texelFetch(own, ivec2(0, 0), 0);
+  vec4 grid_origin = texelFetch(own, ivec2(0, 0), 0);
   ivec3 nodes = ivec3(texelFetch(own, ivec2(1, 0), 0).xyz);
   Round solid = round_at(0);
-  Found found = distance_from(outward_of(solid, point.xyz), solid.radius);
+  SignedDistance found = round_distance(outward_of(solid, point.xyz), solid.radius);
   if (point.w == 1.0) {
-    found = distance_in(Field(low_cell.xyz, low_cell.w, nodes, 0), point.xyz);
+    found = field_distance(Field(grid_origin.xyz, grid_origin.w, nodes, 0), point.xyz);
   }
   imageStore(result, at, vec4(found.gradient, found.distance));
 }

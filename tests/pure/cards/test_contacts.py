@@ -11,7 +11,7 @@ from hairloom.addon.cards.contacts import CardClearance, CardContacts
 from hairloom.addon.cards.follow import CardBinding, bind_cards, carried_cards, follow_guides
 from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.dynamics.colliders import PosedCollider, SphereCollider
-from hairloom.addon.refine.lead_out import SLACK
+from hairloom.addon.refine.lead_out import TOLERANCE
 
 RADIUS, LENGTH, CVS, KEPT = 0.1, 0.15, 16, 0.001
 BALL = (PosedCollider(SphereCollider(np.zeros(3), RADIUS), np.eye(4), np.eye(4)),)
@@ -127,7 +127,7 @@ def test_vertices_that_began_inside_get_no_deeper() -> None:
     cards, turns, contacts = bound(mesh, guides)
     for by in (-1.8, 0.6, 2.2):
         led = follow_guides(cards, fallen(guides, by), turns, contacts)
-        assert (depths(led.positions) <= np.maximum(before, 0.0) + SLACK * KEPT).all()
+        assert (depths(led.positions) <= np.maximum(before, 0.0) + TOLERANCE * KEPT).all()
 
 
 def test_cards_far_from_colliders_are_not_moved() -> None:

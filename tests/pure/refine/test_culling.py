@@ -59,8 +59,8 @@ def test_nothing_of_a_hidden_strand_is_seen(
     start = behind * random.uniform(-1.0, 2.0, (4000, 1)) + random.normal(0.0, 0.4, (4000, 3))
     step = random.normal(size=(4000, 4, 3)) * random.uniform(0.01, 0.2, (4000, 1, 1))
     points = (start[:, None] + np.cumsum(step, axis=1)).astype(np.float32)
-    shades = hidden_regions(BALLS, picture, HALF_WIDTH, RADIUS)
-    is_hidden = are_hidden(points, shades)
+    regions = hidden_regions(BALLS, picture, HALF_WIDTH, RADIUS)
+    is_hidden = are_hidden(points, regions)
     assert 40 < is_hidden.sum() < 3500
     # those that slightly smaller balls would not hide
     is_close = is_hidden & ~are_hidden(
@@ -87,14 +87,14 @@ def test_what_is_behind_a_ball_is_found(name: str) -> None:
     """Short strands just inside the hidden region are hidden, those just outside or before it are
     not."""
     picture = PictureView(look_at((0, -3, 0), (0, 0, 0)), PROJECTIONS[name], WIDTH, HEIGHT)
-    shades = hidden_regions(BALLS[:1], picture, 0.5, 0.0)
+    regions = hidden_regions(BALLS[:1], picture, 0.5, 0.0)
     places = np.array([[0, 0.6, 0], [0.4, 0.5, 0], [0, -0.6, 0], [0.9, 0.6, 0], [0, -4.0, 0]])
     points = places[:, None] + np.linspace(0.0, 0.02, 4)[:, None] * [0.0, 1.0, 0.0]
-    assert are_hidden(points, shades).tolist() == [True, True, False, False, False]
+    assert are_hidden(points, regions).tolist() == [True, True, False, False, False]
     # one visible CV is enough for a strand to be drawn
     out = points[:1].copy()
     out[0, 3] = [1.5, 0.7, 0.0]
-    assert not are_hidden(out, shades).any()
+    assert not are_hidden(out, regions).any()
 
 
 def test_no_ball_hides_that_is_too_small_too_near_or_clipped() -> None:
@@ -103,9 +103,9 @@ def test_no_ball_hides_that_is_too_small_too_near_or_clipped() -> None:
 
     def count(eye: tuple[float, float, float], half_width: float = 1.0) -> int:
         picture = PictureView(look_at(eye, (0, 9, 0)), lens, WIDTH, HEIGHT)
-        shades = hidden_regions(BALLS[:1], picture, half_width, 1e-4)
-        assert are_hidden(points, shades).any() == (len(shades.axis) > 0)
-        return len(shades.axis)
+        regions = hidden_regions(BALLS[:1], picture, half_width, 1e-4)
+        assert are_hidden(points, regions).any() == (len(regions.axis) > 0)
+        return len(regions.axis)
 
     assert count((0, -3, 0)) == 1
     assert count((0, -3, 0), half_width=1000.0) == 0

@@ -5,7 +5,12 @@ import pytest
 
 from hairloom.addon import motion_flow, rig_flow
 from hairloom.addon.groom.settings import GuideSettings
-from hairloom.addon.refine.curls import CATCHING_UP, SLACK, drawn_out, seen
+from hairloom.addon.refine.curls import (
+    EXTENSION_GAIN,
+    EXTENSION_TOLERANCE,
+    change_by_extension,
+    visible_extension,
+)
 from hairloom.addon.rig_flow import Pose, Rig
 from hairloom.addon.strands import StrandSet
 
@@ -96,10 +101,12 @@ def test_guides_that_are_off_by_what_their_solver_may_be_change_no_bit() -> None
     np.testing.assert_array_equal(rest, rig.strands.points)
     straight = on_its_axis(rig)
     assert straight.curl_slack is not None
-    off = motion_flow.strands_at(straight, STILL, drawn(straight, 1.0 + 0.9 * SLACK))
+    off = motion_flow.strands_at(straight, STILL, drawn(straight, 1.0 + 0.9 * EXTENSION_TOLERANCE))
     np.testing.assert_array_equal(off, rig.strands.points)
-    beyond = motion_flow.strands_at(straight, STILL, drawn(straight, 1.0 + 4.0 * SLACK))
-    assert np.abs(beyond - rig.strands.points).max() > 3.0 * SLACK * LENGTH
+    beyond = motion_flow.strands_at(
+        straight, STILL, drawn(straight, 1.0 + 4.0 * EXTENSION_TOLERANCE)
+    )
+    assert np.abs(beyond - rig.strands.points).max() > 3.0 * EXTENSION_TOLERANCE * LENGTH
 
 
 def test_straight_hair_beside_curls_never_stretches() -> None:
@@ -119,12 +126,12 @@ def test_straight_hair_alone_has_no_room() -> None:
 
 def test_what_is_seen_is_continuous_and_then_all() -> None:
     extension = np.linspace(-0.3, 0.3, 10_001)
-    found = seen(extension)
-    assert (found[np.abs(extension) <= SLACK] == 0.0).all()
-    is_all = np.abs(extension) > 3.1 * SLACK
+    found = visible_extension(extension)
+    assert (found[np.abs(extension) <= EXTENSION_TOLERANCE] == 0.0).all()
+    is_all = np.abs(extension) > 3.1 * EXTENSION_TOLERANCE
     np.testing.assert_array_equal(found[is_all], extension[is_all])
     assert (np.diff(found) >= 0.0).all()
-    assert np.diff(found).max() <= CATCHING_UP * np.diff(extension).max() * 1.001
+    assert np.diff(found).max() <= EXTENSION_GAIN * np.diff(extension).max() * 1.001
 
 
 def test_straight_hair_among_curls_stays_straight_however_short_these_get() -> None:
@@ -132,7 +139,7 @@ def test_straight_hair_among_curls_stays_straight_however_short_these_get() -> N
     lean = np.float32([[0.01, -0.01], [0.0, 0.0], [1.0, 1.0]])
     for extension in (-0.3, 0.4):
         axis = np.float32([[0.0, 0.0], [0.0, 0.0], [1.0, 1.0], [extension, extension]])
-        assert np.abs(drawn_out(lean, axis)).max() < 0.011
+        assert np.abs(change_by_extension(lean, axis)).max() < 0.011
 
 
 def test_any_segment_keeps_its_length_and_nothing_is_not_finite() -> None:
@@ -142,7 +149,7 @@ def test_any_segment_keeps_its_length_and_nothing_is_not_finite() -> None:
     segment[:, :50], axis[:, 25:75] = 0.0, 0.0
     axis[:3, 75:90] = 0.0  # a guide without a direction
     axis[:3, 90:120] = segment[:, 90:120]  # along the guide
-    change = drawn_out(segment, axis)
+    change = change_by_extension(segment, axis)
     assert np.isfinite(change).all()
     before, after = (np.linalg.norm(one, axis=0) for one in (segment, segment + change))
     np.testing.assert_allclose(after, before, rtol=1e-5, atol=1e-7)

@@ -19,9 +19,9 @@ from hairloom.addon.groom.weights import GuideWeights
 from hairloom.addon.motion_flow import FrameInput
 from hairloom.addon.refine.lead_out import (
     NO_DEFLECTIONS,
-    SLACK,
-    TURNING_BACK,
-    Carry,
+    RETURN_RATE,
+    TOLERANCE,
+    CarryPoints,
     LedOut,
     clearance_at,
     lead_out,
@@ -40,8 +40,8 @@ def still(collider: Collider, *shift: float) -> tuple[PosedCollider, ...]:
     return (PosedCollider(collider, matrix, matrix),)
 
 
-def at(places: np.ndarray) -> Carry:
-    """A `Carry` that returns these places for all points."""
+def at(places: np.ndarray) -> CarryPoints:
+    """A `CarryPoints` that returns these places for all points."""
     return lambda index, strands: places[index]
 
 
@@ -74,10 +74,10 @@ def test_strands_go_around_a_ball_and_keep_their_segments(across) -> None:
     now = points.copy()
     led, _ = lead_out(now, at(points), offsets, colliders, clearance)
     depth = np.linalg.norm(points, axis=1) - 0.1
-    were_near = np.minimum.reduceat(depth, offsets[:-1]) < KEPT * (1.0 - SLACK)
+    were_near = np.minimum.reduceat(depth, offsets[:-1]) < KEPT * (1.0 - TOLERANCE)
     np.testing.assert_array_equal(led, np.flatnonzero(were_near))
     assert 100 < len(led) < 350
-    assert np.linalg.norm(now, axis=1).min() > 0.1 + KEPT * (1.0 - SLACK) - 1.0e-7
+    assert np.linalg.norm(now, axis=1).min() > 0.1 + KEPT * (1.0 - TOLERANCE) - 1.0e-7
     np.testing.assert_allclose(
         segment_lengths(now, offsets), segment_lengths(points, offsets), atol=1e-7
     )
@@ -96,7 +96,7 @@ def test_what_comes_after_goes_along_in_its_shape() -> None:
     led, _ = lead_out(now, at(points), offsets, still(BALL), clearance)
     assert led.tolist() == [0]
     np.testing.assert_allclose(np.diff(now[1:], axis=0), np.diff(points[1:], axis=0), atol=1e-7)
-    assert np.linalg.norm(now[1]) >= 0.1 + KEPT * (1.0 - SLACK)
+    assert np.linalg.norm(now[1]) >= 0.1 + KEPT * (1.0 - TOLERANCE)
 
 
 def test_what_was_inside_may_stay_as_deep_and_no_deeper(across) -> None:
@@ -109,8 +109,8 @@ def test_what_was_inside_may_stay_as_deep_and_no_deeper(across) -> None:
     moved = still(BALL, 0.02, 0.0, 0.0)
     led, _ = lead_out(now, at(points), offsets, moved, clearance)
     assert len(led)
-    lack = clearance.points - signed_distance(now, moved, KEPT)[0]
-    assert lack.max() <= SLACK * KEPT + 1e-7
+    shortfall = clearance.points - signed_distance(now, moved, KEPT)[0]
+    assert shortfall.max() <= TOLERANCE * KEPT + 1e-7
 
 
 def test_what_was_inside_comes_out_as_it_moves_away() -> None:
@@ -126,7 +126,7 @@ def test_what_was_inside_comes_out_as_it_moves_away() -> None:
         away = np.linalg.norm(now - points, axis=1)[1:]
         distance = np.linalg.norm(now, axis=1)[1:] - 0.1
         wanted = np.minimum(clearance.points[1:] + aside, KEPT)
-        assert (distance > wanted - 2.0 * SLACK * KEPT).all(), (away, distance)
+        assert (distance > wanted - 2.0 * TOLERANCE * KEPT).all(), (away, distance)
 
 
 def test_a_fold_from_which_no_segment_leads_out() -> None:
@@ -148,7 +148,7 @@ def test_a_fold_from_which_no_segment_leads_out() -> None:
     led, _ = lead_out(now, at(points), offsets, colliders, clearance)
     assert len(led) > 40
     distance = signed_distance(now, colliders, KEPT)[0]
-    assert distance.min() > KEPT * (1.0 - 2.0 * SLACK)
+    assert distance.min() > KEPT * (1.0 - 2.0 * TOLERANCE)
     np.testing.assert_allclose(
         segment_lengths(now, offsets), segment_lengths(points, offsets), atol=1e-7
     )
@@ -252,7 +252,7 @@ def test_hair_beside_a_sheet_that_its_grid_makes_thicker_stays_on_its_side() -> 
     expected = segment_lengths(ridden, offsets)
     for strand, last in enumerate(clearance.held):
         held = slice(offsets[strand], offsets[strand] + last + 1)
-        np.testing.assert_allclose(now[held], carried[held], atol=KEPT * SLACK)
+        np.testing.assert_allclose(now[held], carried[held], atol=KEPT * TOLERANCE)
         expected[held] = segment_lengths(carried, offsets)[held]
     np.testing.assert_allclose(segment_lengths(now, offsets), expected, atol=1e-7)
 
@@ -288,7 +288,7 @@ def test_a_strand_that_could_go_either_way_goes_where_it_went_before() -> None:
             now = dives(tilt)
             left = deflections.decayed(1.0 / 60.0, offsets) if remembers else NO_DEFLECTIONS
             _, deflections = lead_out(now, at(rest), offsets, colliders, clearance, left)
-            assert np.linalg.norm(now, axis=1).min() > 0.1 + KEPT * (1.0 - 2.0 * SLACK)
+            assert np.linalg.norm(now, axis=1).min() > 0.1 + KEPT * (1.0 - 2.0 * TOLERANCE)
             np.testing.assert_allclose(
                 segment_lengths(now, offsets), segment_lengths(dives(tilt), offsets), atol=1e-7
             )
@@ -321,12 +321,12 @@ def test_what_nothing_leads_out_any_more_turns_back_steadily() -> None:
             np.linalg.norm(np.diff(now - before, axis=0), axis=1)
             / segment_lengths(rest, offsets)[1:]
         )
-        assert turned.max() < 1.3 * TURNING_BACK * frame
+        assert turned.max() < 1.3 * RETURN_RATE * frame
         np.testing.assert_allclose(
             segment_lengths(now, offsets), segment_lengths(rest, offsets), atol=1e-7
         )
         before, frames = now, frames + 1
-    assert 2 <= frames <= np.ceil(2.0 / (TURNING_BACK * frame)) + 1
+    assert 2 <= frames <= np.ceil(2.0 / (RETURN_RATE * frame)) + 1
     np.testing.assert_allclose(now, rest, atol=1e-6)
     now = rest.copy()
     lead_out(now, at(rest), offsets, gone, clearance)
