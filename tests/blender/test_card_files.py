@@ -258,8 +258,8 @@ def test_a_failure_in_the_middle_leaves_the_old_files(
         export_cards(tmp_path / f"hair{suffix}", "--set", "grow.length=0.2", "--levels", "2") == 1
     )
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
-    told = capfd.readouterr().err
-    assert f"{tmp_path / f'hair{suffix}'}: " in told and "No space left on device" in told
+    output = capfd.readouterr().err
+    assert f"{tmp_path / f'hair{suffix}'}: " in output and "No space left on device" in output
 
 
 @pytest.mark.slow(instead="test_a_failure_in_the_middle_leaves_the_old_files")
@@ -314,9 +314,9 @@ def test_a_disk_that_becomes_full_at_the_mesh_keeps_its_files(
         capfd.readouterr()
         assert export_cards(disk / name, *options) == 1
         assert {path.name: path.read_bytes() for path in disk.iterdir()} == {name: kept}
-    said = capfd.readouterr().err
-    assert "Traceback" not in said and said.count("cannot be written") == 1
-    assert f"{name}: this file cannot be written (No space left on device)" in said
+    output = capfd.readouterr().err
+    assert "Traceback" not in output and output.count("cannot be written") == 1
+    assert f"{name}: this file cannot be written (No space left on device)" in output
 
 
 @contextmanager

@@ -243,7 +243,7 @@ def test_cards_that_are_being_edited_are_refused(hair, capfd):
 def test_the_panel_shows_the_counts_of_existing_cards(hair):
     from hairloom.addon.ui.operators_cards import draw_made_cards
 
-    said: list[str] = []
+    labels: list[str] = []
 
     class Layout(SimpleNamespace):
         def column(self, **_):
@@ -252,25 +252,25 @@ def test_the_panel_shows_the_counts_of_existing_cards(hair):
         row = column
 
         def label(self, text="", icon="NONE"):
-            said.append(text)
+            labels.append(text)
 
         def operator(self, _name, text="", icon="NONE"):
-            said.append(text)
+            labels.append(text)
 
         def prop(self, *_arguments, text="", **_named):
-            said.append(text)
+            labels.append(text)
 
     draw_made_cards(Layout(), hair)
-    assert said == ["Make Cards", "No cards yet", *5 * ["-"], "", "Texture -"]
-    before = len(said)
+    assert labels == ["Make Cards", "No cards yet", *5 * ["-"], "", "Texture -"]
+    before = len(labels)
     press()
-    said.clear()
+    labels.clear()
     draw_made_cards(Layout(), hair)
-    assert len(said) == before, "what is below moves"
-    assert said[0] == "Make Cards Again"
-    assert said[1:3] == ["12 cards, 384 triangles", "384"] and said[5:7] == ["-", "-"]
-    assert said[-2].endswith(" % of pixels blend in the wrong order")
-    assert said[-1] == "Texture 128 x 32"
+    assert len(labels) == before, "what is below moves"
+    assert labels[0] == "Make Cards Again"
+    assert labels[1:3] == ["12 cards, 384 triangles", "384"] and labels[5:7] == ["-", "-"]
+    assert labels[-2].endswith(" % of pixels blend in the wrong order")
+    assert labels[-1] == "Texture 128 x 32"
 
 
 def test_the_panel_shows_only_what_acts_on_these_cards(hair):

@@ -187,7 +187,7 @@ def test_curves_that_cannot_be_cards_are_refused(hair, case):
     select(obj)
     line.select_set(True)
     count = len(obj.data.polygons)
-    said = {"tile": "its atlas has 4 tiles", "point": "no length", "faces": "has faces"}[case]
-    with pytest.raises(RuntimeError, match=said):
+    message = {"tile": "its atlas has 4 tiles", "point": "no length", "faces": "has faces"}[case]
+    with pytest.raises(RuntimeError, match=message):
         bpy.ops.hairloom.add_card_along_curve(tile=9 if case == "tile" else 0)
     assert len(obj.data.polygons) == count

@@ -245,7 +245,7 @@ def test_unusable_masks_are_reported_and_have_no_effect(hair, sphere, get_depsgr
     broken.data[0].value = float("nan")
     sphere.data.attributes.new("Numbers", "INT", "POINT")
     sphere.vertex_groups.new(name="Nowhere")
-    for name, said in (
+    for name, message in (
         ("Gone", "neither a vertex group nor an attribute"),
         ("Broken", "not finite"),
         ("Numbers", "INT on POINT"),
@@ -253,7 +253,7 @@ def test_unusable_masks_are_reported_and_have_no_effect(hair, sphere, get_depsgr
         children.frizz_mask = name
         catch_up(get_depsgraph)
         (warning,) = session.warnings
-        assert warning.startswith("Head: ") and f"'{name}'" in warning and said in warning
+        assert warning.startswith("Head: ") and f"'{name}'" in warning and message in warning
         np.testing.assert_array_equal(session.rig.strands.points, before)
     children.frizz_mask = "Nowhere"
     catch_up(get_depsgraph)

@@ -52,12 +52,12 @@ def test_impossible_facts_are_reported(bake, change):
 
 
 @pytest.mark.parametrize(
-    ("change", "said"), [(1, "a newer Hairloom.*Update"), (-1, "an older Hairloom.*Bake again")]
+    ("change", "message"), [(1, "a newer Hairloom.*Update"), (-1, "an older Hairloom.*Bake again")]
 )
-def test_a_bake_of_another_version_is_not_called_damaged(bake, change, said):
+def test_a_bake_of_another_version_is_not_called_damaged(bake, change, message):
     facts = json.loads((bake / "cache.json").read_text())
     (bake / "cache.json").write_text(json.dumps(facts | {"version": facts["version"] + change}))
-    with pytest.raises(HairloomError, match=said) as raised:
+    with pytest.raises(HairloomError, match=message) as raised:
         Cache(bake)
     assert "damaged" not in str(raised.value)
 
@@ -77,7 +77,7 @@ def test_facts_of_any_size_are_refused_before_they_are_read(bake, monkeypatch):
 def test_random_bytes_in_a_bake_are_reported_or_read(bake):
     random = np.random.default_rng(2)
     whole = {path: path.read_bytes() for path in bake.rglob("*") if path.is_file()}
-    told = 0
+    error_count = 0
     for _ in range(300):
         path = list(whole)[int(random.integers(len(whole)))]
         content = bytearray(whole[path])
@@ -90,7 +90,7 @@ def test_random_bytes_in_a_bake_are_reported_or_read(bake):
             for frame in (1, 2):
                 assert read.frame(frame)["points"].shape == (2, 3)
         except HairloomError as error:
-            told += 1
+            error_count += 1
             assert error.remedy and str(bake) in error.place
         path.write_bytes(whole[path])
-    assert 150 < told < 300
+    assert 150 < error_count < 300

@@ -127,8 +127,8 @@ def test_the_template_and_its_page_offer_all_that_moves_cards() -> None:
     there_is = {identifier for identifier, *_ in choices}
     assert set(declared["CardMotion"]["allowedValues"]) == there_is
     page = TEMPLATE.with_name("README.md").read_text()
-    (said,) = re.findall(r"`CardMotion` \(([^)]+)\)", page)
-    assert set(re.findall("`([^`]+)`", said)) == there_is
+    (documented,) = re.findall(r"`CardMotion` \(([^)]+)\)", page)
+    assert set(re.findall("`([^`]+)`", documented)) == there_is
 
 
 @pytest.mark.slow

@@ -126,8 +126,8 @@ def test_objects_that_are_no_strokes_on_the_head_are_refused(hair, wrong):
     elif wrong == "empty":
         stroke.data.splines.clear()
     stroke.select_set(True)
-    said = {"faces": "has faces", "away": "away from Head", "empty": "no length"}[wrong]
-    with pytest.raises(RuntimeError, match=said):
+    message = {"faces": "has faces", "away": "away from Head", "empty": "no length"}[wrong]
+    with pytest.raises(RuntimeError, match=message):
         bpy.ops.hairloom.add_stroke()
     assert not strokes_of(hair)
 

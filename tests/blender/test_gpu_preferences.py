@@ -50,17 +50,17 @@ def test_the_panel_says_what_to_do_when_the_budget_is_exceeded(
     hair = new_hair(sphere)
     session = previews.start(hair, get_depsgraph())
 
-    def told() -> list[str]:
+    def warnings() -> list[str]:
         return [one.text for one in problems_of(hair, session) if "GPU" in one.text]
 
     gpu_objects.free_unused()
     before = gpu_objects.bytes_in_use()  # other tests of this process hold some memory
     budget = 128 + round(before / MEGABYTE)
     chosen(budget)
-    assert not told()
+    assert not warnings()
     side = 4096  # 256 MB
     large = gpu_objects.texture((side, side), format="RGBA32F")
-    (text,) = told()
+    (text,) = warnings()
     taken = before / MEGABYTE + 256
     assert (
         f"takes {taken:,.0f} MB" in text
@@ -69,7 +69,7 @@ def test_the_panel_says_what_to_do_when_the_budget_is_exceeded(
     )
     del large
     gpu_objects.free_unused()
-    assert not told()
+    assert not warnings()
 
 
 @pytest.mark.parametrize("is_short", [False, True])

@@ -240,10 +240,10 @@ def test_from_nothing_there_is_a_head_with_brows_and_lashes() -> None:
 
 def test_landmarks_are_placed_once_and_the_report_counts_them(head: bpy.types.Object) -> None:
     bpy.context.view_layer.objects.active = head
-    for said in (r"placed \d+ missing landmarks$", "it has all landmarks already$"):
+    for pattern in (r"placed \d+ missing landmarks$", "it has all landmarks already$"):
         head.select_set(True)
         assert bpy.ops.hairloom.place_landmarks() == {"FINISHED"}
-        assert re.search(said, past_reports[-1].text)
+        assert re.search(pattern, past_reports[-1].text)
 
 
 @pytest.mark.slow(

@@ -195,31 +195,31 @@ def test_shortcuts_are_offered_without_keys(extension):
 
 def test_the_status_text_is_cleared_in_all_workspaces(preview, get_depsgraph, monkeypatch):
     """Blender writes the text into the context's workspace, whatever workspace is addressed."""
-    said = {}
+    statuses = {}
 
     def status_text_set(_workspace, text):
-        said[bpy.context.workspace.name] = text
+        statuses[bpy.context.workspace.name] = text
 
     monkeypatch.setattr(bpy.types.WorkSpace, "status_text_set", status_text_set)
     everywhere = [workspace.name for workspace in bpy.data.workspaces]
     assert len(everywhere) > 1
     previews.play(get_depsgraph())
     operators_preview.start_ticking()
-    assert said == dict.fromkeys(everywhere, operators_preview.STATUS)
+    assert statuses == dict.fromkeys(everywhere, operators_preview.STATUS)
     operators_preview.stop_ticking()
-    assert said == dict.fromkeys(everywhere, None)
+    assert statuses == dict.fromkeys(everywhere, None)
     operators_preview.start_ticking()
     with pytest.raises(RuntimeError):
         bpy.ops.wm.open_mainfile(filepath=__file__)
-    assert said == dict.fromkeys(everywhere, None), "nothing plays any more"
+    assert statuses == dict.fromkeys(everywhere, None), "nothing plays any more"
 
 
 def test_a_failure_to_draw_is_forgotten_with_the_last_preview(preview, monkeypatch):
-    said = []
-    monkeypatch.setattr(overlay, "show_status", said.append)
+    statuses = []
+    monkeypatch.setattr(overlay, "show_status", statuses.append)
     overlay._fail(ValueError("a defect"))
     bpy.app.timers.unregister(overlay._report_failure)
     overlay._report_failure()
-    assert "a defect" in previews.notice() and "a defect" in said[-1]
+    assert "a defect" in previews.notice() and "a defect" in statuses[-1]
     previews.stop_all()
-    assert previews.notice() == "" and said[-1] is None
+    assert previews.notice() == "" and statuses[-1] is None

@@ -77,8 +77,8 @@ def test_bad_input_is_an_error_of_the_operator() -> None:
 
 
 def test_progress_counts_done_of_total() -> None:
-    told = list(counted(counting(2), 2000, "frames"))
-    assert told == [Progress("1 of 2,000 frames", 0.0005), Progress("2 of 2,000 frames", 0.001)]
+    progress = list(counted(counting(2), 2000, "frames"))
+    assert progress == [Progress("1 of 2,000 frames", 0.0005), Progress("2 of 2,000 frames", 0.001)]
 
 
 def test_closing_the_progress_closes_the_work() -> None:

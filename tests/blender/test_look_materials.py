@@ -84,19 +84,19 @@ def test_a_preset_writes_the_material_once(hair, monkeypatch):
 
 
 def test_settings_set_together_are_one_change(hair):
-    told = []
-    listener = ("settings", told.append)
+    notified = []
+    listener = ("settings", notified.append)
     changed.subscribe(*listener)
     try:
         with changed.as_one_change():
             hair.data.hairloom.shading.melanin = 0.31
             hair.data.hairloom.shading.tip_tint = 0.2
-            assert told == []
-        assert told == [hair.data]
+            assert notified == []
+        assert notified == [hair.data]
         hair.data.hairloom.shading.melanin = 0.32
     finally:
         changed.unsubscribe(*listener)
-    assert told == [hair.data, hair.data]
+    assert notified == [hair.data, hair.data]
 
 
 def test_a_duplicate_follows_its_own_look(hair):

@@ -180,8 +180,8 @@ def test_curves_in_the_middle_stay_and_the_report_counts(new_hair, egg, tmp_path
     bpy.ops.wm.save_as_mainfile(filepath=scene)
     run = ["run", "mirror_hair", "--scene", scene, "--object", name, "--set", "side=negative"]
     assert command_line.run([*run, "--output", output]) == 0
-    said = f"{name}: {less} curves mirrored, {more} replaced, 5 in the middle left unchanged"
-    assert said in capsys.readouterr().out
+    message = f"{name}: {less} curves mirrored, {more} replaced, 5 in the middle left unchanged"
+    assert message in capsys.readouterr().out
     bpy.ops.wm.open_mainfile(filepath=output)
     assert len(bpy.data.objects[name].data.curves) == 2 * less + 5
 

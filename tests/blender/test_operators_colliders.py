@@ -148,8 +148,8 @@ def test_spheres_that_vertices_cannot_carry_follow_the_object_with_a_warning(mon
 
 def test_the_report_has_count_and_error_of_the_spheres(monkey, capfd):
     fit(10)
-    told = capfd.readouterr().out
-    assert "10 spheres in Suzanne Spheres" in told and told.count("mm") == 4
+    output = capfd.readouterr().out
+    assert "10 spheres in Suzanne Spheres" in output and output.count("mm") == 4
 
 
 def test_the_hair_of_the_mesh_uses_them(new_hair, sphere):

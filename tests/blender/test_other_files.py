@@ -223,8 +223,8 @@ def test_hair_of_an_instance_is_reported_as_left_out(library, new_hair, tmp_path
     scene = ["--scene", str(tmp_path / "shot.blend")]
     for verb in (["export", "--output", str(tmp_path / "a.tfx")], ["bake", "--frames", "1", "1"]):
         assert command_line.run([*verb, *scene]) == (1 if is_alone else 0)
-        told = capfd.readouterr()
-        (line,) = [one for one in (told.err + told.out).splitlines() if "an instance" in one]
+        output = capfd.readouterr()
+        (line,) = [one for one in (output.err + output.out).splitlines() if "an instance" in one]
         assert line.startswith("hairloom: Anna: its hair") and "library override" in line
 
 

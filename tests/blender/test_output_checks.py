@@ -72,10 +72,10 @@ def contents(folder: Path) -> dict[Path, bytes]:
     return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
-@pytest.mark.parametrize(("arguments", "said"), REFUSED, ids=lambda each: " ".join(each)[-40:])
+@pytest.mark.parametrize(("arguments", "message"), REFUSED, ids=lambda each: " ".join(each)[-40:])
 def test_outputs_that_would_overwrite_inputs_are_refused_before_any_work(
     arguments: list[str],
-    said: str,
+    message: str,
     folder: Path,
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
@@ -83,7 +83,7 @@ def test_outputs_that_would_overwrite_inputs_are_refused_before_any_work(
     monkeypatch.setattr(job_steps, "read_inputs", lambda *_: pytest.fail("it has begun"))
     before = contents(folder)
     assert command_line.run(arguments) == 1
-    assert said in capsys.readouterr().err
+    assert message in capsys.readouterr().err
     assert contents(folder) == before
 
 
@@ -121,14 +121,14 @@ def test_a_scene_that_is_saved_over_itself_is_kept_as_the_version_before(folder:
 
 
 @pytest.mark.parametrize(
-    ("content", "said"),
+    ("content", "message"),
     [(b"hair", "this is not a Blender file"), (None, "Blender cannot open this")],
 )
 def test_files_that_are_no_scenes_are_named_briefly(
-    content: bytes | None, said: str, folder: Path, capsys: pytest.CaptureFixture[str]
+    content: bytes | None, message: str, folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     cut = content or (folder / "wig.blend").read_bytes()[:-5000]
     (folder / "cut.blend").write_bytes(cut)
     assert command_line.run(["export", "--scene", "cut.blend", "--output", "a.tfx"]) == 1
     line = capsys.readouterr().err.splitlines()[-1]
-    assert line.startswith(f"hairloom: cut.blend: {said}") and line.count("cut.blend") == 1
+    assert line.startswith(f"hairloom: cut.blend: {message}") and line.count("cut.blend") == 1

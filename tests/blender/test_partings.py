@@ -227,8 +227,8 @@ def test_objects_that_are_no_lines_on_the_head_are_refused(hair, wrong):
     elif wrong == "empty":
         line.data.splines.clear()
     line.select_set(True)
-    said = {"faces": "has faces", "away": "away from Head", "empty": "no length"}[wrong]
-    with pytest.raises(RuntimeError, match=said):
+    message = {"faces": "has faces", "away": "away from Head", "empty": "no length"}[wrong]
+    with pytest.raises(RuntimeError, match=message):
         bpy.ops.hairloom.add_parting()
     assert not partings_of(hair)
 

@@ -155,8 +155,8 @@ def test_blenders_cryptomatte_node_selects_what_hair_covers(
     found = render_passes(tmp_path)
     alpha = pass_of(found, "Hair Alpha")
     assert 0.02 < (alpha > 0.0).mean() < 0.6 and alpha.max() < 0.999
-    said = noted(tmp_path / "picture.exr")
-    (manifest,) = (value for key, value in said.items() if key.endswith("manifest"))
+    metadata = noted(tmp_path / "picture.exr")
+    (manifest,) = (value for key, value in metadata.items() if key.endswith("manifest"))
     assert set(json.loads(manifest)) == {"Hair", "Head"}
     matte = matte_of(engine_scene, engine_scene, "Hair", tmp_path)
     np.testing.assert_allclose(matte, alpha, atol=1e-6)
@@ -187,9 +187,9 @@ def test_names_and_coverages_are_those_of_cycles(
     for engine, found in mattes.items():
         engine_scene.render.engine, engine_scene.compositing_node_group = engine, None
         render_passes(tmp_path)
-        said = noted(tmp_path / "picture.exr")
-        (place,) = {key.split("/")[1] for key in said}
-        manifests[engine] = (place, json.loads(said[f"cryptomatte/{place}/manifest"]))
+        metadata = noted(tmp_path / "picture.exr")
+        (place,) = {key.split("/")[1] for key in metadata}
+        manifests[engine] = (place, json.loads(metadata[f"cryptomatte/{place}/manifest"]))
         for name in ("Hair", "Head"):
             found[name] = matte_of(engine_scene, engine_scene, name, tmp_path)
     assert manifests["HAIRLOOM"][0] == manifests["CYCLES"][0]

@@ -252,13 +252,13 @@ def test_files_hold_the_hair_as_it_is_shown(hair):
 
 def test_cards_are_made_in_the_rest_pose_with_a_note(hair):
     inputs, notes, _ = read_inputs(hair, go_to(REST))
-    posed, said, _ = read_inputs(hair, go_to(POSED))
+    posed, posed_notes, _ = read_inputs(hair, go_to(POSED))
     for name in ("strands", "head"):
         one, other = (getattr(each.rig, name) for each in (inputs, posed))
         points = ("points" if name == "strands" else "positions",)
         assert getattr(one, *points) == pytest.approx(getattr(other, *points), abs=1e-6)
     assert not any("posed" in note for note in notes)
-    assert any("Head is posed in frame 4" in note for note in said)
+    assert any("Head is posed in frame 4" in note for note in posed_notes)
 
 
 def test_made_real_it_is_stored_as_it_was(hair):

@@ -103,10 +103,10 @@ def test_dynamics_go_onto_the_object(hair: bpy.types.Object) -> None:
 
 def test_settings_that_a_groom_does_not_keep_are_refused(hair: bpy.types.Object) -> None:
     """The message names all settings that it does keep."""
-    with pytest.raises(HairloomError, match="no 'settle' settings") as told:
+    with pytest.raises(HairloomError, match="no 'settle' settings") as error:
         presets.apply(ALL_SETTINGS["settle"](), hair)
-    assert "shading, " in str(told.value) and "volume" in str(told.value)
-    assert "dynamics" in str(told.value) and " settle," not in str(told.value)
+    assert "shading, " in str(error.value) and "volume" in str(error.value)
+    assert "dynamics" in str(error.value) and " settle," not in str(error.value)
 
 
 def test_an_unknown_name_is_reported_with_those_that_are_known(hair: bpy.types.Object) -> None:

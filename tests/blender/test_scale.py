@@ -63,7 +63,7 @@ def frames_and_messages(
     for kind in STRAND_FORMATS:
         check.refresh(get_depsgraph(), kind, StrandExportSettings())
         warnings[kind.name] = check.warnings
-    said = {
+    messages = {
         "warnings": warnings,
         "issues": [issue.text.replace(head.name, "head") for issue in issues_of(hair, session)],
         "notes": session.rig.notes,
@@ -73,7 +73,7 @@ def frames_and_messages(
         "loose": session.groom.loose_roots,
     }
     previews.end()
-    return np.array(frames), said
+    return np.array(frames), messages
 
 
 # powers of two: on a sphere with equal triangles, rounding would decide where the first children
@@ -85,10 +85,10 @@ def frames_and_messages(
 def test_a_scene_of_another_size_moves_and_warns_the_same(
     sphere: Any, new_hair: Callable[..., Any], get_depsgraph: Callable[[], Any], scale: float
 ) -> None:
-    one, said = frames_and_messages(sphere, new_hair, get_depsgraph, 1.0)
-    other, said_again = frames_and_messages(sphere, new_hair, get_depsgraph, scale)
-    assert said_again == said
-    assert said["children"] == 100
+    one, messages = frames_and_messages(sphere, new_hair, get_depsgraph, 1.0)
+    other, messages_again = frames_and_messages(sphere, new_hair, get_depsgraph, scale)
+    assert messages_again == messages
+    assert messages["children"] == 100
     assert np.abs(one[-1] - one[0] - [0.02 * (FRAMES - 1), 0.0, 0.0]).max() > 0.005
     assert np.abs(other - one).max() < 1e-4  # a thousandth of the hair's length
 
@@ -99,8 +99,8 @@ def test_the_unit_scale_only_changes_how_numbers_are_shown(
     sphere: Any, new_hair: Callable[..., Any], get_depsgraph: Callable[[], Any], unit: float
 ) -> None:
     """As in Blender's own physics, which takes gravity in scene units."""
-    one, said = frames_and_messages(sphere, new_hair, get_depsgraph, 1.0)
+    one, messages = frames_and_messages(sphere, new_hair, get_depsgraph, 1.0)
     bpy.context.scene.unit_settings.scale_length = unit
-    other, said_again = frames_and_messages(sphere, new_hair, get_depsgraph, 1.0)
+    other, messages_again = frames_and_messages(sphere, new_hair, get_depsgraph, 1.0)
     np.testing.assert_array_equal(other, one)
-    assert said_again == said
+    assert messages_again == messages

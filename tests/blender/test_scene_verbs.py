@@ -186,8 +186,8 @@ def test_a_scene_without_an_action_is_an_error(
 ) -> None:
     for wanted in (["--output", str(scene.with_name("out.blend"))], ["--save"]):
         assert command_line.run(["run", "--scene", str(scene), "--object", "Hair", *wanted]) == 1
-        told = capsys.readouterr()
-        assert "there is nothing to do" in told.err and "sphere_count" not in told.out
+        output = capsys.readouterr()
+        assert "there is nothing to do" in output.err and "sphere_count" not in output.out
 
 
 def test_a_mesh_becomes_a_fin_and_a_mesh_again(scene: Path) -> None:
@@ -232,9 +232,9 @@ def test_cards_are_made_as_objects_and_sorted(scene: Path, gpu_context: object) 
     bpy.ops.wm.save_as_mainfile(filepath=str(shuffled))
     sort = ["--set", "head=Head", "--set", "use_occlusion=false"]
     facts = run(shuffled, "run", "sort_cards", "--object", name, *sort)
-    (told,) = facts["messages"]
-    moved = int(told.partition("; ")[2].split()[0])
-    assert told.startswith("Sorted ") and moved > count / 2
+    (output,) = facts["messages"]
+    moved = int(output.partition("; ")[2].split()[0])
+    assert output.startswith("Sorted ") and moved > count / 2
     order = vertices_of(name)
     bpy.ops.wm.open_mainfile(filepath=str(shuffled))
     assert vertices_of(name) != order
@@ -290,8 +290,8 @@ def test_bad_input_saves_nothing(
     there = sorted(tmp_path.iterdir())
     placed = [str(tmp_path / word) if word.startswith("x.") else word for word in arguments]
     assert command_line.run([placed[0], "--scene", str(scene), *placed[1:]]) == 1
-    told = [line for line in capfd.readouterr().err.splitlines() if line.startswith("hairloom:")]
-    assert len(told) == 1 and message in told[0]
+    output = [line for line in capfd.readouterr().err.splitlines() if line.startswith("hairloom:")]
+    assert len(output) == 1 and message in output[0]
     assert sorted(tmp_path.iterdir()) == there
 
 
@@ -399,9 +399,9 @@ def test_settings_that_no_object_has_are_refused(
     for setting in ("cards.card_count=50", "dynamics.damping=2"):
         whole = ["run", "make_cards", "--scene", str(scene), "--object", "Head", "--set", setting]
         assert command_line.run([*whole, "--output", str(scene.with_name("out.blend"))]) == 1
-        said = capsys.readouterr().err
-        assert f"Head: it has no settings of '{setting.partition('.')[0]}'" in said
-        assert "Name the hair curves with --object" in said
+        message = capsys.readouterr().err
+        assert f"Head: it has no settings of '{setting.partition('.')[0]}'" in message
+        assert "Name the hair curves with --object" in message
     for name, preset in (("Head", "looks/blond"), ("Hair", "stage/daylight")):
         whole = ["run", "--scene", str(scene), "--object", name, "--preset", preset]
         assert command_line.run([*whole, "--output", str(scene.with_name("out.blend"))]) == 1
@@ -418,8 +418,8 @@ def test_a_render_of_a_scene_draws_its_hair(
     small = ["--set", "dynamics.device=numpy", "--set", "dynamics.collider_resolution=8"]
     output = ["--output", str(scene.with_name("baked"))]
     assert command_line.run([*simulated, *small, *output]) == 0
-    told = json.loads(report.read_text())
-    assert told["outputs"] == ["baked"] and "strands_inside_percent" in told
+    facts = json.loads(report.read_text())
+    assert facts["outputs"] == ["baked"] and "strands_inside_percent" in facts
     assert "reading Hair" in capsys.readouterr().out
     bpy.ops.wm.open_mainfile(filepath=str(scene))
     other = bpy.data.objects["Hair"].copy()
@@ -427,8 +427,8 @@ def test_a_render_of_a_scene_draws_its_hair(
     bpy.context.collection.objects.link(other)
     bpy.ops.wm.save_mainfile()
     assert command_line.run([*simulated, *small, *output]) == 1
-    said = capsys.readouterr().err
-    assert "several objects: Fringe, Hair" in said and "--groom" in said
+    message = capsys.readouterr().err
+    assert "several objects: Fringe, Hair" in message and "--groom" in message
 
 
 @pytest.mark.alike
@@ -488,14 +488,14 @@ def empty_curves(_hair: bpy.types.Object) -> bpy.types.Object:
 
 
 @pytest.mark.parametrize(
-    ("make", "said"),
+    ("make", "message"),
     [
         (hidden_copy, "Combed: it is hidden in viewport and renders, and is left out"),
         (empty_curves, "Nothing: it has no curves, and is left out"),
     ],
 )
 def test_jobs_on_all_hair_of_a_scene_leave_out_what_is_hidden_or_empty(
-    scene: Path, make: Callable[[Any], Any], said: str
+    scene: Path, make: Callable[[Any], Any], message: str
 ) -> None:
     """Make Real, for example, hides the hair that it has converted."""
     plain = ["--set", "children.method=none"]
@@ -503,18 +503,18 @@ def test_jobs_on_all_hair_of_a_scene_leave_out_what_is_hidden_or_empty(
     beside(scene, make)
     facts = exported(scene, *plain)
     assert facts["preflight"]["strands"] == alone
-    assert [note for note in facts["notes"] if said in note], facts["notes"]
+    assert [note for note in facts["notes"] if message in note], facts["notes"]
     small = ["--set", "dynamics.device=numpy", "--set", "dynamics.collider_resolution=8"]
     report, folder = scene.with_name("report.json"), scene.with_name("bake")
     bake = ["bake", "--scene", str(scene), "--frames", "1", "1", *small, "--report", str(report)]
     assert command_line.run([*bake, "--output", str(folder)]) == 0
     facts = json.loads(report.read_text())
     assert [each["object"] for each in facts["baked"]] == ["Hair"]
-    assert [note for note in facts["notes"] if said in note]
+    assert [note for note in facts["notes"] if message in note]
     moved = ["simulate", "--scene", str(scene), "--seconds", "0.02", *small]
     output = ["--output", str(scene.with_name("moved")), "--report", str(report)]
     assert command_line.run([*moved, *output]) == 0
-    assert [note for note in json.loads(report.read_text())["notes"] if said in note]
+    assert [note for note in json.loads(report.read_text())["notes"] if message in note]
 
 
 def test_hidden_hair_is_used_if_it_is_named(scene: Path) -> None:
@@ -591,8 +591,8 @@ def test_options_without_effect_are_refused(
     where = [] if "--delete" in more else ["--output", str(scene.with_name(made))]
     few = FEW if "--skin" in more else []
     assert command_line.run([verb, "--scene", str(scene), *more, *few, *where]) == 1
-    said = capsys.readouterr().err
-    assert f"hairloom: {option}: " in said and why in said, said
+    message = capsys.readouterr().err
+    assert f"hairloom: {option}: " in message and why in message, message
     assert [path.name for path in scene.parent.iterdir()] == [scene.name]
 
 

@@ -42,7 +42,7 @@ def test_failures_are_reported_and_other_tests_continue(monkeypatch, capfd):
 
 
 @pytest.mark.parametrize(
-    ("change", "told"),
+    ("change", "message"),
     [
         (lambda picture: np.zeros_like(picture), "covers 0%"),
         (lambda picture: np.full_like(picture, np.nan), "not numbers"),
@@ -51,9 +51,9 @@ def test_failures_are_reported_and_other_tests_continue(monkeypatch, capfd):
     ],
     ids=["nothing", "nan", "everywhere", "black"],
 )
-def test_pictures_that_show_no_hair_fail(change, told):
+def test_pictures_that_show_no_hair_fail(change, message):
     good = np.zeros((8, 8, 4), np.float32)
     good[2:6, 2:6] = 1.0
     assert "25%" in self_test._check_picture(good)
-    with pytest.raises(RuntimeError, match=told):
+    with pytest.raises(RuntimeError, match=message):
         self_test._check_picture(change(good))

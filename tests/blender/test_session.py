@@ -298,8 +298,8 @@ def test_the_preview_button_toggles_and_reports_counts(new_hair, sphere, capfd):
     hair = new_hair(sphere)
     hair.data.add_curves([1, 1])
     assert bpy.ops.hairloom.preview() == {"FINISHED"}
-    told = capfd.readouterr().out
-    assert "60 strands, 60 guides; dropped 2 (fewer than two points)" in told
+    output = capfd.readouterr().out
+    assert "60 strands, 60 guides; dropped 2 (fewer than two points)" in output
     assert previews.session_of(hair) is not None
     assert bpy.ops.hairloom.preview() == {"FINISHED"}
     assert previews.session_of(hair) is None

@@ -76,13 +76,13 @@ def test_three_vrm_moves_hair_as_our_own_springs_do(
         <= JOINTS
     )
     assert moved.spring_count == springs_entry["chains"] * (springs_entry["joints_in_chain"] - 1)
-    ours = sprung_as_told(springs_entry, springs[0], moved.carrier)
+    ours = simulated_springs(springs_entry, springs[0], moved.carrier)
     length = springs_entry["error"]["hair_length"]
     assert np.abs(moved.places - ours).max() < 1e-3 * length
     assert np.linalg.norm(ours - ours[0], axis=-1).max() > 0.1 * length
 
 
-def sprung_as_told(springs_entry: dict[str, Any], path: Path, carrier: np.ndarray) -> np.ndarray:
+def simulated_springs(springs_entry: dict[str, Any], path: Path, carrier: np.ndarray) -> np.ndarray:
     """Our own springs, moved with the values in the sidecar."""
     rest = rest_matrices(path).reshape(springs_entry["chains"], -1, 4, 4)
     shapes = [each["sphere"] for each in springs_entry["colliders"]]

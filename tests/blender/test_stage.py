@@ -141,8 +141,8 @@ def test_a_stage_is_chosen_by_its_name_and_changed_by_set(tmp_path: Path) -> Non
 def test_an_unknown_stage_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["render", "--stage", "moon", "--output", str(tmp_path / "still.png")]
     assert command_line.run(arguments) == 1
-    told = capsys.readouterr().err
-    assert "moon" in told and "stage/studio" in told
+    output = capsys.readouterr().err
+    assert "moon" in output and "stage/studio" in output
 
 
 def shown(linear: np.ndarray, path: Path, **stage: object) -> np.ndarray:

@@ -150,24 +150,24 @@ def test_attributes_of_the_groom_are_in_the_file(new_hair: Any, tmp_path: Path) 
     strands = replace(hedgehog(), color=np.random.default_rng(3).random((480, 3)))
     hair = new_hair(strands=strands)
     is_guide = np.arange(60) % 20 < 2  # two in each group
-    said = Groom(
+    stored = Groom(
         strands,
         strand_id=np.arange(60) * 3 + 7,
         is_guide=is_guide,
         group_names={0: "crown", 1: "nape"},
     )
-    store_groom(hair.data, said)
+    store_groom(hair.data, stored)
     path = tmp_path / "hair.abc"
     bpy.ops.hairloom.export_alembic(filepath=str(path), by_group=True)
     found = read_alembic_curves(path)
     assert set(found) == {"crown", "nape"}
     for group, name in ((0, "crown"), (1, "nape")):
         own = strands.group == group
-        np.testing.assert_array_equal(found[name]["groom_id"], said.strand_id[own])
+        np.testing.assert_array_equal(found[name]["groom_id"], stored.strand_id[own])
         np.testing.assert_array_equal(found[name]["groom_guide"], is_guide[own])
-        color = said.color.reshape(60, 8, 3)[own].reshape(-1, 3)
+        color = stored.color.reshape(60, 8, 3)[own].reshape(-1, 3)
         np.testing.assert_allclose(found[name]["groom_color"], color, atol=1e-6)
-        guides = said.strand_id[is_guide & own]
+        guides = stored.strand_id[is_guide & own]
         assert np.isin(found[name]["groom_closest_guides"], guides).all()
 
 

@@ -100,9 +100,9 @@ def test_a_bake_keeps_attributes_of_its_curves(swinging: Any, tmp_path: Path) ->
     hair, _ = swinging
     hair.data.hairloom.guides.cv_count = 15
     color = np.random.default_rng(6).random((480, 3)).astype(np.float32)
-    said = Groom(hedgehog(), strand_id=np.arange(60) + 9, group_names={1: "nape"})
-    store_groom(hair.data, said)
-    set_colors(hair.data, replace(said.strands, color=color))
+    stored = Groom(hedgehog(), strand_id=np.arange(60) + 9, group_names={1: "nape"})
+    store_groom(hair.data, stored)
+    set_colors(hair.data, replace(stored.strands, color=color))
     bake(hair, frames=range(1, 3))
     path = tmp_path / "a.abc"
     bpy.ops.hairloom.export_alembic(

@@ -271,9 +271,9 @@ def test_a_failed_task_reports_why(
     assert facts["status"] == "failed" and facts["verb"] == "bake"
     assert facts["error"]["place"] == "Nobody"
     assert set(facts["error"]) == {"problem", "place", "remedy"} and all(facts["error"].values())
-    told = capfd.readouterr()
-    assert f"openjd_fail: Nobody: {facts['error']['problem']}" in told.out
-    assert facts["error"]["problem"] in told.err
+    output = capfd.readouterr()
+    assert f"openjd_fail: Nobody: {facts['error']['problem']}" in output.out
+    assert facts["error"]["problem"] in output.err
     assert not (tmp_path / "bake").exists() and not (tmp_path / "bake.done.json").exists()
 
 

@@ -182,8 +182,8 @@ def test_unusable_ties_are_reported_and_hold_nothing(swinging, get_depsgraph, ho
     assert np.isfinite(shown).all()
     pose = session.solver.pose
     assert len(session.rig.holds.where(pose.anchors).strand) == 0
-    said = [text for text in session.warnings if "Ring" in text]
-    assert bool(said) == (how != "taken out")
+    warnings = [text for text in session.warnings if "Ring" in text]
+    assert bool(warnings) == (how != "taken out")
 
 
 def test_a_ring_beside_the_hair_is_said(swinging, get_depsgraph):

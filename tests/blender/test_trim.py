@@ -152,8 +152,9 @@ def test_the_report_counts_what_is_trimmed_left_and_outside(hair, tmp_path, caps
     run = ["run", "trim_to_shape", "--scene", scene, "--object", shape.name, "--object", name]
     assert command_line.run([*run, "--output", output]) == 0
     count, out = int((inside[:, 0] & ~inside[:, 1]).sum()), int((~inside[:, 0]).sum())
-    said = f"{name}: {count} curves trimmed, {60 - count} left unchanged, {out} of them with roots"
-    assert said in capsys.readouterr().out
+    message = f"{name}: {count} curves trimmed, {60 - count} left unchanged, "
+    message += f"{out} of them with roots"
+    assert message in capsys.readouterr().out
     assert 0 < count < 60 - out
 
 
@@ -185,11 +186,11 @@ def test_objects_that_cannot_cut_are_refused(hair, wrong):
         shape = bpy.data.objects.new("Nothing", bpy.data.meshes.new("Nothing"))
         bpy.context.collection.objects.link(shape)
     bpy.context.view_layer.update()
-    said = {"open": "neither closed nor flat", "no size": "no size", "no faces": "no faces"}
+    message = {"open": "neither closed nor flat", "no size": "no size", "no faces": "no faces"}
     shape.select_set(True)
     hair.select_set(True)
     bpy.context.view_layer.objects.active = hair
-    with pytest.raises(RuntimeError, match=said[wrong]):
+    with pytest.raises(RuntimeError, match=message[wrong]):
         bpy.ops.hairloom.trim_to_shape()
     assert np.array_equal(curve_points(hair.data), before)
     assert not trim_shapes_of(hair)

@@ -123,8 +123,8 @@ def test_a_name_that_no_file_can_have_is_named(
     """pathlib raises an error for file names longer than 255 bytes."""
     name, picture = "a" * 300 + suffix, tmp_path / "still.png"
     assert run(["render", option, name, "--output", str(picture)]) == 1
-    (said,) = [line for line in capfd.readouterr().err.splitlines() if "hairloom:" in line]
-    assert name in said
+    (message,) = [line for line in capfd.readouterr().err.splitlines() if "hairloom:" in line]
+    assert name in message
     assert not picture.exists()
 
 

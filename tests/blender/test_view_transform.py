@@ -209,9 +209,9 @@ def test_a_full_disk_is_an_error_and_not_wrong_colours(most_bytes: int, tmp_path
         frame = frame.tb_next
     gc.collect()
     stage = StageSettings(view="agx")
-    with full_disk(most_bytes), pytest.raises(HairloomError, match="temporary files") as told:
+    with full_disk(most_bytes), pytest.raises(HairloomError, match="temporary files") as error:
         write_picture(tmp_path / "a.png", np.ones((8, 512, 4), np.float32), stage)
-    assert "Free some space" in told.value.remedy and list(tmp_path.iterdir()) == []
+    assert "Free some space" in error.value.remedy and list(tmp_path.iterdir()) == []
 
 
 def test_a_look_that_this_blender_lacks_is_named(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from extension_loader import REPOSITORY
 pytest.importorskip("bpy", reason="writing cards needs Blender or the bpy module")
 
 from test_card_motion import FRAMES, RATE, head_matrix, motion, write  # noqa: F401
-from test_springs import sprung_as_told
+from test_springs import simulated_springs
 from three_springs import MODULE, head_matrices, to_z_up
 
 from hairloom.addon.blender.bakes.guide_motion import GuideMotion
@@ -40,13 +40,13 @@ def springs(motion: GuideMotion) -> dict[str, Any]:  # noqa: F811
     shutil.rmtree(OUTPUT, ignore_errors=True)
     glb = OUTPUT / "asset" / "hair.glb"
     glb.parent.mkdir(parents=True)
-    told = dict(write(glb, motion, kind="springs", spring_joints=40).motion)
+    entry = dict(write(glb, motion, kind="springs", spring_joints=40).motion)
     carrier = resampled_to_steps(np.stack([head_matrix(motion, n) for n in range(FRAMES)]), RATE)
     (OUTPUT / "poses.json").write_text(json.dumps({"matrices": head_matrices(carrier)}))
-    ours = sprung_as_told(told, glb, carrier)
+    ours = simulated_springs(entry, glb, carrier)
     ours = ours.reshape(len(ours), -1, 3)
     world = np.einsum("fab,fjb->fja", carrier[:, :3, :3], ours) + carrier[:, None, :3, 3]
-    return told | {"world": world}
+    return entry | {"world": world}
 
 
 def copied(kind: str, folder: Path) -> None:
@@ -90,8 +90,8 @@ def test_godot_moves_springs_as_we_do(
 def run_godot(sandbox: str, *options: str) -> None:
     command = [sandbox, "run", "godot", "--headless", *options]
     result = subprocess.run(command, capture_output=True, text=True, timeout=300)
-    said = result.stdout + result.stderr
-    assert result.returncode == 0 and "ERROR" not in said and "WARNING" not in said, said
+    output = result.stdout + result.stderr
+    assert result.returncode == 0 and "ERROR" not in output and "WARNING" not in output, output
 
 
 def rigged(glb: Path) -> None:
@@ -122,7 +122,7 @@ def test_our_module_passes_springs_to_three_vrm(
     result = subprocess.run(command, capture_output=True, text=True, timeout=300)
     assert result.returncode == 0, result.stderr
     found = json.loads((site / "joints.json").read_text(encoding="utf-8"))
-    assert found["said"] == []
+    assert found["warnings"] == []
     assert found["isWhole"]  # a copy is bound to its own joints
     assert not found["hasSprings"]  # which the original's springs do not move
     check(springs, found["frames"])

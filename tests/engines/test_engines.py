@@ -74,10 +74,10 @@ def run_godot(sandbox: str, *options: str, window: bool = True) -> str:
     else:
         command += ["godot", "--headless"]
     result = subprocess.run([*command, *options], capture_output=True, text=True, timeout=300)
-    said = result.stdout + result.stderr
-    assert result.returncode == 0, said
-    assert "SCRIPT ERROR" not in said and "SHADER ERROR" not in said, said
-    return said
+    output = result.stdout + result.stderr
+    assert result.returncode == 0, output
+    assert "SCRIPT ERROR" not in output and "SHADER ERROR" not in output, output
+    return output
 
 
 #: display values of fog that hides everything
@@ -142,13 +142,13 @@ def test_a_game_that_godot_exported_draws_cards_as_we_do(asset: Asset, sandbox: 
     """Imported by the add-on, packed without the source files, run from another folder."""
     project, game = godot_project(asset, "godot_editor"), asset.folder / "game"
     game.mkdir()
-    said = run_godot(sandbox, "--path", str(project), "--import", window=False)
-    assert "WARNING" not in said and "ERROR" not in said, said
+    output = run_godot(sandbox, "--path", str(project), "--import", window=False)
+    assert "WARNING" not in output and "ERROR" not in output, output
     pack = game / "game.pck"
     run_godot(sandbox, "--path", str(project), "--export-pack", "Pack", str(pack), window=False)
     shutil.rmtree(project)
-    said = run_godot(sandbox, "--main-pack", str(pack), "--", str(game))
-    assert "WARNING" not in said and "ERROR" not in said, said
+    output = run_godot(sandbox, "--main-pack", str(pack), "--", str(game))
+    assert "WARNING" not in output and "ERROR" not in output, output
     check_picture(asset, game / "godot.png")
     check_order(asset, game / "order.json")
     shown = json.loads((game / "shown.json").read_text(encoding="utf-8"))
@@ -296,7 +296,7 @@ def test_three_js_shows_damaged_files_as_far_as_possible_and_reports_them(
     assert result.returncode == 0, result.stderr
     seen = json.loads((site / "seen.json").read_text(encoding="utf-8"))
     whole = seen.pop("whole")
-    assert whole["said"] == [] and whole["levels"] == 3 and whole["filled"] > 0.1
+    assert whole["warnings"] == [] and whole["levels"] == 3 and whole["filled"] > 0.1
     for found in (whole, *seen.values()):
         assert found["bare"] == []
         # three.js keeps its own table for plain materials
@@ -304,12 +304,12 @@ def test_three_js_shows_damaged_files_as_far_as_possible_and_reports_them(
         assert found["left"]["geometries"] == found["left"]["programs"] == 0
     assert whole["left"]["textures"] == 0
     exr, dds = seen.pop("exr"), seen.pop("dds")
-    assert exr["said"] == [] and exr["off"] < 0.001
-    assert dds["levels"] == 3 and all("textures as PNG" in each for each in dds["said"])
+    assert exr["warnings"] == [] and exr["off"] < 0.001
+    assert dds["levels"] == 3 and all("textures as PNG" in each for each in dds["warnings"])
     for damage, sentence in DAMAGES.items():
         found = seen.pop(damage.__name__)
-        assert bool(found["said"]) == bool(sentence), damage.__name__
-        assert all(sentence in each for each in found["said"]), damage.__name__
+        assert bool(found["warnings"]) == bool(sentence), damage.__name__
+        assert all(sentence in each for each in found["warnings"]), damage.__name__
         is_plain = damage in (without_sidecar, with_garbage_sidecar, with_other_levels)
         assert found["levels"] == (0 if is_plain else 3)
         # at the same place, of the same size and similar brightness
@@ -331,8 +331,8 @@ def test_godot_shows_damaged_files_as_far_as_possible_and_reports_them(
         (glb,) = damaged_copy(baked.folder, project / name, damage).glob("*.glb")
         files[name] = glb.name
     (project / "cases.json").write_text(json.dumps(files), encoding="utf-8")
-    said = run_godot(sandbox, "--path", str(project), "--", str(project))
-    parts = dict(part.split("\n", 1) for part in said.split("CASE ")[1:])
+    output = run_godot(sandbox, "--path", str(project), "--", str(project))
+    parts = dict(part.split("\n", 1) for part in output.split("CASE ")[1:])
     sentences = {
         name: re.findall(r"^(?:WARNING|ERROR): (.+)$", part, flags=re.M)
         for name, part in parts.items()

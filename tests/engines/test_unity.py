@@ -429,8 +429,8 @@ def test_in_the_high_definition_pipeline_alpha_comes_with_the_colour_or_with_a_w
     imported: Callable[..., dict[str, Any]], asset: Asset
 ) -> None:
     folder = damaged_copy(asset.folder, OUTPUT / "unity_damaged", lambda folder: None)
-    (said,) = imported(glb_of(folder), "hdrp")["warnings"]
-    assert "packing Unity HDRP" in said
+    (warning,) = imported(glb_of(folder), "hdrp")["warnings"]
+    assert "packing Unity HDRP" in warning
     sidecar = next(folder.glob("*.hairloom.json"))
     content = sidecar_of(folder)
     content["textures"]["alpha"] |= {"file": content["textures"]["color"]["file"], "channels": "a"}

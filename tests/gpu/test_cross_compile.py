@@ -171,13 +171,13 @@ def test_programs_are_valid_spirv_and_metal(programs: list[dict[str, Any]], fold
     found = cross_compile.compile_all(folder)
     of_metal = {file for each in programs if is_on_metal(each) for file in each["files"]}
     hlsl = {
-        file: said
-        for file, said in found["hlsl"].items()
-        if not any(known in said for known in NOT_IN_HLSL)
+        file: message
+        for file, message in found["hlsl"].items()
+        if not any(known in message for known in NOT_IN_HLSL)
     }
     assert len(of_metal) > (200 if chosen == "all" else 20)
     assert found["spirv"] == {}
-    assert {file: said for file, said in found["metal"].items() if file in of_metal} == {}
+    assert {file: message for file, message in found["metal"].items() if file in of_metal} == {}
     assert hlsl == {}
 
 

@@ -88,8 +88,8 @@ def act(dice, number):
         is_refused = True
     if dice.happens(REDRAWN):
         yield BRIEFLY
-    said = log.new_output()
-    assert not any(sign in said for sign in RAISED), f"{action.__name__} raised"
+    output = log.new_output()
+    assert not any(sign in output for sign in RAISED), f"{action.__name__} raised"
     return is_refused
 
 

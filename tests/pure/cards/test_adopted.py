@@ -87,8 +87,8 @@ def test_cards_that_run_in_another_direction_are_counted() -> None:
     uv = mesh.uv.copy()
     uv[turned] = LAID["down"](uv[turned])
     adopted = adopt_cards(as_source(mesh, uv), ball(), place="test")
-    said = "The UVs of 4 of 24 cards run in another direction than those of the others"
-    assert adopted.notes == (said,)
+    note = "The UVs of 4 of 24 cards run in another direction than those of the others"
+    assert adopted.notes == (note,)
 
 
 def test_cards_with_an_undecided_root_end_are_reported() -> None:

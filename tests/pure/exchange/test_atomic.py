@@ -93,10 +93,10 @@ def test_a_place_is_refused_before_any_work(tmp_path: Path) -> None:
 
 def test_a_folder_is_refused_before_any_work(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    for target, said in ((tmp_path / "file", "a file has this name"), (Path("/proc/a"), "into")):
+    for target, message in ((tmp_path / "file", "a file has this name"), (Path("/proc/a"), "into")):
         with (
             pytest.MonkeyPatch.context() as patched,
-            pytest.raises(HairloomError, match=said) as caught,
+            pytest.raises(HairloomError, match=message) as caught,
         ):
             patched.setattr(os, "access", lambda *_: False)  # root may write anywhere
             check_folder_writable(target)
@@ -116,11 +116,11 @@ def test_a_remedy_fits_the_reason() -> None:
 def test_a_library_that_does_not_say_that_the_disk_is_full(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path, said = tmp_path / "a.usdc", "Couldn't map file: bad arguments to mmap()"
-    assert write_failure_reason(path, said) == said
+    path, message = tmp_path / "a.usdc", "Couldn't map file: bad arguments to mmap()"
+    assert write_failure_reason(path, message) == message
     full = shutil.disk_usage(tmp_path)._replace(free=0)
     monkeypatch.setattr(shutil, "disk_usage", lambda _: full)
-    assert write_failure_reason(path, said) == os.strerror(errno.ENOSPC)
+    assert write_failure_reason(path, message) == os.strerror(errno.ENOSPC)
 
 
 @pytest.mark.skipif(os.name != "posix", reason="file modes are POSIX")

@@ -393,9 +393,9 @@ def test_an_unnamed_unit_is_a_centimetre_and_can_be_overruled(tmp_path: Path) ->
     read = read_usd(tmp_path / "a.usda")
     assert read.strands.points[1].tolist() == [0, 0, 1]  # Y up, as USD has it without a word
     assert "centimetres" in " ".join(read.notes)
-    told = read_usd(tmp_path / "a.usda", up="Z", scale=0.001)
-    assert np.allclose(told.strands.points[1], [0, 0.1, 0])
-    assert "centimetres" not in " ".join(told.notes)
+    message = read_usd(tmp_path / "a.usda", up="Z", scale=0.001)
+    assert np.allclose(message.strands.points[1], [0, 0.1, 0])
+    assert "centimetres" not in " ".join(message.notes)
 
 
 def test_other_prims_are_left_out_with_a_note(tmp_path: Path) -> None:
@@ -419,13 +419,13 @@ def test_other_prims_are_left_out_with_a_note(tmp_path: Path) -> None:
     assert read.dropped == {"a point that is not finite": 1}
     assert dict(read.groom.group_names) == {0: "good", 1: "broken"}
     notes = "\n".join(read.notes)
-    for told in (
+    for message in (
         "/short was left out: its 1 counts of points add up to 3, but it has 2 points",
         "/closed was left out: its curves are closed",
         "/empty was left out: it has no curves",
         "1 HermiteCurves, 1 Mesh, 1 NurbsCurves, 1 PointInstancer",
     ):
-        assert told in notes
+        assert message in notes
 
 
 def test_primvars_that_do_not_fit_are_left_out(tmp_path: Path) -> None:
@@ -482,7 +482,7 @@ def test_what_cannot_be_written_is_an_error(tmp_path: Path) -> None:
     none = Groom(StrandSet(np.zeros((0, 3)), [0], [], []))
     (tmp_path / "taken.usdc").mkdir()
     short = GroomMotion([groom.strands.points[1:]], 24.0)
-    for name, wanted, options, told in (
+    for name, wanted, options, message in (
         ("a.abc", groom, {}, "not a suffix"),
         ("a.usdz", groom, {}, "not a suffix"),
         ("a.usdc", none, {}, "no strands"),
@@ -491,7 +491,7 @@ def test_what_cannot_be_written_is_an_error(tmp_path: Path) -> None:
         ("a.usdc", groom, {"motion": short}, "frame 1 has points that do not fit"),
         ("taken.usdc", groom, {}, "cannot be written"),
     ):
-        with pytest.raises(HairloomError, match=told):
+        with pytest.raises(HairloomError, match=message):
             write_usd(tmp_path / name, wanted, **options)
     assert [each.name for each in tmp_path.iterdir()] == ["taken.usdc"]
 
@@ -548,9 +548,9 @@ def test_damaged_files_are_refused_or_read(tmp_path: Path, suffix: str, count: i
         timeout=600,
         check=False,
     )
-    told = ended.stdout.split("\n")[:-1]
-    assert ended.returncode == 0 and len(told) == count, (ended.stderr[-2000:], told[-1:])
-    refused = sum(line.endswith("refused") for line in told)
+    message = ended.stdout.split("\n")[:-1]
+    assert ended.returncode == 0 and len(message) == count, (ended.stderr[-2000:], message[-1:])
+    refused = sum(line.endswith("refused") for line in message)
     assert count / 4 < refused < count
 
 

@@ -512,7 +512,7 @@ def first_guides(count: int) -> Callable[[Surface], StrandSet]:
 @pytest.mark.alike
 @pytest.mark.parametrize("way", ["multi", "single"])
 @pytest.mark.parametrize(
-    ("guides", "told"),
+    ("guides", "has_note"),
     [
         (first_guides(1), True),
         (first_guides(2), True),
@@ -524,7 +524,7 @@ def first_guides(count: int) -> Callable[[Surface], StrandSet]:
     ids=["one", "two", "three", "one place", "no length", "pairs"],
 )
 def test_odd_guides_still_get_children(
-    guides: Callable[[Surface], StrandSet], told: bool, way: str
+    guides: Callable[[Surface], StrandSet], has_note: bool, way: str
 ) -> None:
     surface = sheet()
     chosen = ChildrenSettings(method=way, strand_count=300)
@@ -533,7 +533,7 @@ def test_odd_guides_still_get_children(
     assert np.isfinite(children.strands.points).all()
     assert children.weights.weight.sum(axis=1) == pytest.approx(np.ones(300))
     if way == "multi":
-        assert bool(children.notes) == told
+        assert bool(children.notes) == has_note
 
 
 def test_a_tuft_stays_close_to_its_guides() -> None:

@@ -90,20 +90,20 @@ def test_the_strengths_and_widths_of_the_looks_are_those_of_their_page() -> None
     """docs/shading.md lists all strengths other than 1, for single looks or for all natural
     ones."""
     page = (FOLDER.parent / "docs" / "shading.md").read_text(encoding="utf-8")
-    said: dict[str, dict[str, float]] = {}
+    documented: dict[str, dict[str, float]] = {}
     rows = re.findall(r"^\| ([a-z ]+) \| ((?:R|TRT) [^|]+)\|", page, flags=re.M)
     for look, values in rows:
         for part in values.split(", "):
             found = re.match(r"(?:([a-z]+) |(R|TRT) )([\d.]+)", part)
             if found:
                 lobe = found.group(2) or "TRT"
-                said.setdefault(found.group(1) or look, {})[lobe] = float(found.group(3))
-    everywhere = said.pop("all natural looks")
+                documented.setdefault(found.group(1) or look, {})[lobe] = float(found.group(3))
+    everywhere = documented.pop("all natural looks")
     for path in PRESETS:
         settings = read_any_preset(path, ALL_SETTINGS).settings
         if not isinstance(settings, ShadingSettings) or settings.model != "marschner":
             continue
-        of_look = said.get(path.stem, {})
+        of_look = documented.get(path.stem, {})
         is_water = path.stem == "under_water"
         strengths = {"R": 1.0, "TRT": 1.0, **({} if is_water else everywhere), **of_look}
         assert {"R": settings.strength_r, "TRT": settings.strength_trt} == strengths, path

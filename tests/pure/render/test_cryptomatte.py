@@ -75,10 +75,10 @@ def test_a_pixel_has_room_for_as_many_objects_as_levels() -> None:
 
 
 def test_metadata_lists_all_names() -> None:
-    said = metadata("ViewLayer.CryptoObject", ["Hair", "Head", 'a "quoted", name', "Hair"])
+    fields = metadata("ViewLayer.CryptoObject", ["Hair", "Head", 'a "quoted", name', "Hair"])
     place = "cryptomatte/542cafa"
-    assert set(said) == {f"{place}/{key}" for key in ("name", "hash", "conversion", "manifest")}
-    assert said[f"{place}/name"] == "ViewLayer.CryptoObject"
-    names = json.loads(said[f"{place}/manifest"])
+    assert set(fields) == {f"{place}/{key}" for key in ("name", "hash", "conversion", "manifest")}
+    assert fields[f"{place}/name"] == "ViewLayer.CryptoObject"
+    names = json.loads(fields[f"{place}/manifest"])
     assert list(names) == ["Hair", "Head", 'a "quoted", name']
     assert all(f"{matte_bits(name):08x}" == found for name, found in names.items())

@@ -61,12 +61,12 @@ def test_an_unhandled_error_is_raised(run: Any) -> None:
 
 def test_in_the_window_parts_run_in_threads_and_report_what_they_do() -> None:
     may_go_on.clear()
-    told = steps_of_parts(quadrupled(2))
-    while next(told).text != "Doubling":
+    steps = steps_of_parts(quadrupled(2))
+    while next(steps).text != "Doubling":
         pass
-    assert next(told).is_idle and threads != [threading.main_thread().name]
+    assert next(steps).is_idle and threads != [threading.main_thread().name]
     may_go_on.set()
-    assert result_of(told) == 8 and len(threads) == 2
+    assert result_of(steps) == 8 and len(threads) == 2
     run_parts(quadrupled(2))
     assert threads[2:] == 2 * [threading.main_thread().name]
 

@@ -132,9 +132,9 @@ def test_a_button_that_is_greyed_out_says_why(new_hair, scene):
         if operator.poll():
             continue
         greyed += 1
-        with pytest.raises(RuntimeError) as told:
+        with pytest.raises(RuntimeError) as error:
             operator()
-        if "context is incorrect" in str(told.value):
+        if "context is incorrect" in str(error.value):
             mute.append(name)
     assert mute == []
     assert greyed

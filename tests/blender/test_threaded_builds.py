@@ -668,12 +668,12 @@ def test_hair_of_another_scale_is_reported_on_dense_heads_too(new_hair, get_deps
     order = GroomSource(new_hair(bpy.context.object), get_depsgraph()).request
     large = order.source.strands.transformed(np.diag([1000.0, 1000.0, 1000.0, 1.0]))
     order = replace(order, source=replace(order.source, strands=large))
-    told = []
+    messages = []
     for make_it in (prepared_groom.placeholder_groom, prepared_groom.requested_rig):
         with pytest.raises(HairloomError) as error:
             make_it(order)
-        told.append(str(error.value))
-    assert told[0] == told[1] and "a different scale" in told[0]
+        messages.append(str(error.value))
+    assert messages[0] == messages[1] and "a different scale" in messages[0]
 
 
 def test_hair_of_another_scene_is_not_waited_for(hair, get_depsgraph, in_window):

@@ -49,11 +49,12 @@ PROMISES = {
     "::test_outputs_that_would_overwrite_inputs_are_refused_before_any_work",
     "named before the work begins": "blender/test_output_checks.py"
     "::test_outputs_that_would_overwrite_inputs_are_refused_before_any_work",
-    "Hair whose baked copy was deleted": "blender/test_bake_kept.py"
+    "Hair whose baked copy was deleted": "blender/test_baked_copy.py"
     "::test_a_file_is_never_left_without_hair_in_renders",
     "run no code of the current folder": "pure/exchange/test_subprocess_reader.py"
     "::test_no_code_of_the_current_folder_or_the_environment_is_run",
-    "Foreign USD files are never opened": "pure/test_promises.py::test_one_module_opens_usd_files",
+    "Foreign USD files are never opened": "pure/test_safety_promises.py"
+    "::test_one_module_opens_usd_files",
     "on a full disk stays as it was": "blender/test_scene_files.py"
     "::test_a_full_disk_leaves_the_previous_scene",
     "Turntables are replaced as a whole": "blender/test_turntable.py"
