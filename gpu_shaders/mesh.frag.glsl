@@ -1,6 +1,6 @@
 // Meshes, fragment stage: a Lambertian base under a microfacet boundary, and the world's light. Hair and
 // meshes cast SHADOWS on them; for a light without a map of hair, the occlusion is used. OTHER_TAU: optical
-// depth of hair that is not in the maps. SKIN: the shadow of hair is looked up in the blurred shadow map of
+// depth of hair that is not in the maps. SKIN_SHADOW: the shadow of hair is looked up in the blurred shadow map of
 // the skin. PICTURES: textures replace the material's colour and bend its normals. HASHED, BLENDED: how a
 // partly transparent mesh is drawn. EMISSION: it emits light.
 #include "lib_lights.glsl"
@@ -9,7 +9,7 @@
 #include "lib_microfacet.glsl"
 #include "lib_shadows.glsl"
 #include "lib_output.glsl"
-#ifdef SKIN
+#ifdef SKIN_SHADOW
 #  include "lib_skin.glsl"
 #endif
 #ifdef HASHED
@@ -63,7 +63,7 @@ void main()
 #endif
   normal = facing_normal(own_normal, normal, facet, to_eye);
 
-#ifdef SKIN
+#ifdef SKIN_SHADOW
   float known;
   vec4 soft = skin_soft_shadow(skin_shadow,
                                skin_texels,
@@ -91,7 +91,7 @@ void main()
     vec3 path = shadow_path(index, mesh_point);
     vec3 blurred = vec3(0.0);
     float blur_weight = 0.0;
-#ifdef SKIN
+#ifdef SKIN_SHADOW
     // where the blurred shadow is unknown, because the head's UVs overlap, the plain shadow is used
     int map = int(opacity.light[index].x);
     if (map >= 0 && map < {{skin_lights}}) {

@@ -6,9 +6,9 @@ void main()
   mesh_normal = normal;
   mesh_occlusion = occlusion;
 #ifdef PICTURES
-  mesh_uv = picture_place;
+  mesh_uv = picture_uv;
 #endif
-#ifdef SKIN
+#ifdef SKIN_SHADOW
   mesh_skin = skin_place;
 #endif
   gl_Position = view.view_projection * vec4(position, 1.0);

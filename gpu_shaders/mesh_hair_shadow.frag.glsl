@@ -1,11 +1,11 @@
 // Shadow of hair on meshes, fragment stage: the fraction of light, by colour, that a matt surface still
 // receives, 1 without a shadow. Light that other meshes block is left out of both sides of the fraction.
-// OTHER_TAU, SKIN, HASHED and BLENDED as in mesh.frag.glsl; of PICTURES only alpha is used.
+// OTHER_TAU, SKIN_SHADOW, HASHED and BLENDED as in mesh.frag.glsl; of PICTURES only alpha is used.
 #include "lib_lights.glsl"
 #include "lib_environment.glsl"
 #include "lib_facing.glsl"
 #include "lib_shadows.glsl"
-#ifdef SKIN
+#ifdef SKIN_SHADOW
 #  include "lib_skin.glsl"
 #endif
 #ifdef HASHED
@@ -33,7 +33,7 @@ void main()
   vec3 facet = cross(dFdx(mesh_point), dFdy(mesh_point));
   vec3 normal = normalize(mesh_normal);
   normal = facing_normal(normal, normal, facet, to_eye);
-#ifdef SKIN
+#ifdef SKIN_SHADOW
   float known;
   vec4 soft = skin_soft_shadow(skin_shadow,
                                skin_texels,
@@ -62,7 +62,7 @@ void main()
 #if SHADOWS
     hair_transmittance = transmitted_light(vec3(path.xy, 1.0), hair_forward);
 #endif
-#ifdef SKIN
+#ifdef SKIN_SHADOW
     int map = int(opacity.light[index].x);
     if (map >= 0 && map < {{skin_lights}}) {
       vec3 blurred = skin_colored(soft[map], path.x, hair_forward);

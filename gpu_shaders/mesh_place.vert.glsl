@@ -8,7 +8,7 @@ void main()
   mesh_point = position;
 #endif
 #ifdef PICTURES
-  mesh_uv = picture_place;
+  mesh_uv = picture_uv;
 #endif
   gl_Position = view.view_projection * vec4(position, 1.0);
 }

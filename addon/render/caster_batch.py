@@ -32,5 +32,5 @@ def caster_batch(caster: Caster, vertex_values: Floats | None = None) -> Any:
     if has_corners and surface.corner_uv is not None:
         corners = surface.triangles.ravel()
         values = {name: array[corners] for name, array in values.items()}
-        values["picture_place"] = surface.corner_uv.reshape(-1, 2)
+        values["picture_uv"] = surface.corner_uv.reshape(-1, 2)
     return triangle_batch(values, None if has_corners else surface.triangles)

@@ -35,7 +35,7 @@ def mesh_batch(mesh: MeshSnapshot, skin: SkinLayout | None = None) -> Any:
     if skin is not None:
         values["skin_place"] = _skin_places(mesh, skin)
     if pictures_of(mesh) is not None and surface.corner_uv is not None:
-        values["picture_place"] = surface.corner_uv.reshape(-1, 2)
+        values["picture_uv"] = surface.corner_uv.reshape(-1, 2)
     return triangle_batch(values, None if has_corners else surface.triangles)
 
 

@@ -33,7 +33,7 @@ def depth_recipe(*, has_alpha: bool, has_pictures: bool) -> ShaderRecipe:
             *(("VEC4", row) for row in _ROWS),
             *((("FLOAT", "mesh_alpha"), ("VEC2", "mesh_hash_shift")) if has_alpha else ()),
         ),
-        inputs=(("VEC3", "position"), *((("VEC2", "picture_place"),) if has_pictures else ())),
+        inputs=(("VEC3", "position"), *((("VEC2", "picture_uv"),) if has_pictures else ())),
         varyings=(
             ("smooth", "FLOAT", "mesh_depth"),
             *((("smooth", "VEC2", "mesh_uv"),) if has_pictures else ()),

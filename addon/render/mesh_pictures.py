@@ -42,7 +42,7 @@ class PictureTextures:
             name="pictures",
             textures={name: ("FLOAT_2D", texture) for name, texture in texels.items()},
             numbers={"mesh_bump": ("FLOAT", pictures.bump)},
-            inputs=(("VEC2", "picture_place"),),
+            inputs=(("VEC2", "picture_uv"),),
             varyings=(("smooth", "VEC2", "mesh_uv"),),
             defines={"PICTURES": 1},
         )
@@ -52,7 +52,7 @@ class PictureTextures:
         return ShaderFeature(
             name="alpha",
             textures={"mesh_color_map": ("FLOAT_2D", self._texture(picture))},
-            inputs=(("VEC2", "picture_place"),),
+            inputs=(("VEC2", "picture_uv"),),
             varyings=(("smooth", "VEC2", "mesh_uv"),),
             defines={"PICTURES": 1},
         )

@@ -49,7 +49,7 @@ def place_recipe(*, has_alpha: bool, has_pictures: bool, has_vertex_values: bool
         ),
         inputs=(
             ("VEC3", "position"),
-            *((("VEC2", "picture_place"),) if has_pictures else ()),
+            *((("VEC2", "picture_uv"),) if has_pictures else ()),
             *((("VEC3", "vertex_values"),) if has_vertex_values else ()),
         ),
         varyings=(

@@ -85,7 +85,7 @@ class SkinShadow:
             textures={name: (kind, self.textures[name]) for kind, name in SKIN_TEXTURES},
             inputs=(("VEC3", "skin_place"),),
             varyings=(("smooth", "VEC3", "mesh_skin"),),
-            defines={"SKIN": 1},
+            defines={"SKIN_SHADOW": 1},
         )
 
     def picture(self) -> Floats:

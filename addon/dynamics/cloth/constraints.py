@@ -43,7 +43,7 @@ def keep_distances(position: Floats, color: Color, fraction: Floats) -> None:
         position[:, vertices] = here
 
 
-def hold_in_reach(position: Floats, fabric: Fabric) -> None:
+def apply_long_range_attachments(position: Floats, fabric: Fabric) -> None:
     """Limit the distance of each vertex from its anchor to that along the edges, in place.
 
     Kim, Chentanez and Mueller 2012, "Long Range Attachments".

@@ -78,10 +78,10 @@ class _Cloth:
     def substep(self, begin: float, end: float, time: float) -> None:
         settings = self.settings
         if settings.damping or settings.drag:
-            self._feel_air(time)
+            self._apply_air_resistance(time)
         fields = self.drive.force_fields.scaled(settings.force_fields)
         if fields is not None:
-            self._feel_force_fields(fields)
+            self._apply_force_fields(fields)
         if settings.bend:
             self._hold_folds()
         before = [x.copy() for x in self.x]
@@ -93,10 +93,10 @@ class _Cloth:
             fraction = (number + 1) / steps
             self._small_step(begin + (end - begin) * fraction)
             for plane in planes:
-                self._press(plane, fraction)
+                self._push_out(plane, fraction)
         self._push_out_at_end(before, begin, end)
 
-    def _feel_air(self, time: float) -> None:
+    def _apply_air_resistance(self, time: float) -> None:
         settings, ratio = self.settings, self.dt / self.small
         for v, normal in enumerate(self._normals()):
             wind: Floats = np.zeros(3)
@@ -120,7 +120,7 @@ class _Cloth:
                 total[v] = total[v] + np.cross(b - a, c - a)
         return [n / np.linalg.norm(n) if n.any() else n for n in total]
 
-    def _feel_force_fields(self, fields: ForceFields) -> None:
+    def _apply_force_fields(self, fields: ForceFields) -> None:
         ratio, x = self.dt / self.small, np.array(self.x)
         before = x - (x - np.array(self.previous)) * ratio
         blown = previous_after_fields(x, before, fields, self.dt, self.fabric.size, is_strand=False)
@@ -199,7 +199,7 @@ class _Cloth:
                 planes.append(_Plane(v, normal, displacement, first, offset))
         return planes
 
-    def _press(self, plane: _Plane, fraction: float) -> None:
+    def _push_out(self, plane: _Plane, fraction: float) -> None:
         """Push out in one small step, with friction and without bouncing."""
         v, normal = plane.vertex, plane.normal
         offset = plane.first + (plane.last - plane.first) * fraction

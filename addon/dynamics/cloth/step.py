@@ -43,9 +43,9 @@ from ..wind import Air, air_from_settings
 from .carried import pinned_path
 from .constraints import (
     animation_springs,
+    apply_long_range_attachments,
     edge_fractions,
     fold_fractions,
-    hold_in_reach,
     keep_distances,
 )
 from .contacts import MovingPlanes, find_moving_planes, push_out_at_end, relative_to_origin
@@ -106,8 +106,10 @@ def advance_cloth(
     for number in range(count):
         begin = (number * dt - state.time_left) / duration
         span = (begin, begin + dt / duration)
-        _feel_air(position, previous, state.fabric, frame, settings, state.time + number * dt)
-        _feel_force_fields(position, previous, frame, state.fabric.size)
+        _apply_air_resistance(
+            position, previous, state.fabric, frame, settings, state.time + number * dt
+        )
+        _apply_force_fields(position, previous, frame, state.fabric.size)
         _hold_folds(position, previous, state.fabric, frame, settings)
         position, previous = _substep(position, previous, state.fabric, frame, settings, span)
     return ClothState(
@@ -135,7 +137,7 @@ def cloth_at_frame_end(state: ClothState, drive: Drive) -> Floats:
     return np.ascontiguousarray((position + displacement).T)
 
 
-def _feel_air(
+def _apply_air_resistance(
     position: Floats,
     previous: Floats,
     fabric: Fabric,
@@ -174,7 +176,7 @@ def _feel_air(
     np.subtract(position, displacement, out=previous)
 
 
-def _feel_force_fields(position: Floats, previous: Floats, frame: _Frame, size: float) -> None:
+def _apply_force_fields(position: Floats, previous: Floats, frame: _Frame, size: float) -> None:
     """Apply the scene's force fields in a substep; changes `previous`."""
     if frame.force_fields is None:
         return
@@ -252,7 +254,7 @@ def _keep_edges(position: Floats, fabric: Fabric, frame: _Frame, settings: FinSe
     for edge, fraction in zip(fabric.edges, frame.edge_fractions, strict=True):
         keep_distances(position, edge, fraction)
     if settings.long_range:
-        hold_in_reach(position, fabric)
+        apply_long_range_attachments(position, fabric)
 
 
 def _prepare(state: ClothState, drive: Drive, settings: FinSettings, dt: float) -> _Frame:

@@ -41,7 +41,7 @@ def acceleration(place: Floats, velocity: Floats, fields: ForceFields) -> Floats
     """The acceleration of a point of mass 1, (3,) [m/s^2]."""
     total = np.zeros(3)
     for field in fields.fields:
-        push, slowing, spin = _felt(field, place, velocity, fields)
+        push, slowing, spin = _effect_of_field(field, place, velocity, fields)
         total = total + push - velocity * slowing + np.cross(velocity, spin)
     return total
 
@@ -54,25 +54,26 @@ def _change(
     push, spin = np.zeros(3), np.zeros(3)
     slows, slows_along = 0.0, 0.0
     for field in fields.fields:
-        one, slowing, turns = _felt(field, place, velocity, fields)
+        one, slowing, turns = _effect_of_field(field, place, velocity, fields)
         push = push + one * (1.0 - field.across_fraction) + beside @ one * field.across_fraction
         slows += slowing
         slows_along += slowing * (1.0 - field.across_fraction)
         spin = spin + turns
-    moved = velocity + push * dt
-    straight = along * float(along @ moved)
-    moved = (moved - straight) * _left(slows * dt) + straight * _left(slows_along * dt)
+    new_velocity = velocity + push * dt
+    straight = along * float(along @ new_velocity)
+    across = (new_velocity - straight) * _slowing_factor(slows * dt)
+    new_velocity = across + straight * _slowing_factor(slows_along * dt)
     # v' - dt v' x spin = v, as a linear system
     x, y, z = spin * dt
     system = np.eye(3) + np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.linalg.solve(system, moved) - velocity
+    return np.linalg.solve(system, new_velocity) - velocity
 
 
-def _left(slowing: float) -> float:
+def _slowing_factor(slowing: float) -> float:
     return 1.0 / (1.0 + slowing) if slowing > 0.0 else 1.0 - slowing
 
 
-def _felt(
+def _effect_of_field(
     field: ForceField, place: Floats, velocity: Floats, fields: ForceFields
 ) -> tuple[Floats, float, Floats]:
     """Push, slowing and spin of one field, see `force_fields.FieldEffect`."""
@@ -90,26 +91,26 @@ def _felt(
     nothing = np.zeros(3)
     if not part > 0.0:
         return nothing, 0.0, nothing
-    strong, flow = field.strength * part, field.flow * part
+    strength, flow = field.strength * part, field.flow * part
     match field.kind:
         case "wind":
-            return normal * strong, flow, nothing
+            return normal * strength, flow, nothing
         case "force":
             square = d * d if field.is_inverse_square else 1.0
-            return (_unit(away) * strong / square if square else nothing), flow, nothing
+            return (_unit(away) * strength / square if square else nothing), flow, nothing
         case "vortex" if field.shape == "point":
-            return _unit(np.cross(normal, away)) * strong * d, flow, nothing
+            return _unit(np.cross(normal, away)) * strength * d, flow, nothing
         case "vortex":
-            around = np.cross(axis, r) * strong
-            return np.cross(axis, around) * strong + around, 1.0 + flow, nothing
+            around = np.cross(axis, r) * strength
+            return np.cross(axis, around) * strength + around, 1.0 + flow, nothing
         case "magnet":
             is_around = field.shape in ("point", "line")
             lines = np.cross(normal, away) if is_around else normal
-            return nothing, flow, _unit(lines) * strong
+            return nothing, flow, _unit(lines) * strength
         case "harmonic":
             stretched = away * (1.0 - field.size / d) if field.size and d else away
             return (
-                -stretched * strong,
+                -stretched * strength,
                 2.0 * field.damping * math.sqrt(abs(field.strength)),
                 nothing,
             )
@@ -117,7 +118,7 @@ def _felt(
             assert fields.permutation is not None, "it comes with turbulence"
             seen = (place if field.is_global else r + axis) / (field.size or 1.0)
             noise = [_octaves(fields.permutation, np.roll(seen, -k)) for k in range(3)]
-            return np.array(noise) * strong, flow, nothing
+            return np.array(noise) * strength, flow, nothing
         case _:
             speed = float(np.linalg.norm(velocity))
             quadratic, linear = min(field.strength, 2.0), min(field.damping, 2.0)
@@ -128,14 +129,14 @@ def _falloff(field: ForceField, d: float, r: Floats, height: float, normal: Floa
     if height * field.side < 0.0:
         return 0.0
     if field.falloff == "sphere":
-        return _fallen(field.distance, d)
+        return _power_falloff(field.distance, d)
     wide = float(np.linalg.norm(r - height * normal))
     if field.falloff == "cone":
         wide = math.degrees(math.atan2(wide, height))
-    return _fallen(field.distance, abs(height)) * _fallen(field.radial, wide)
+    return _power_falloff(field.distance, abs(height)) * _power_falloff(field.radial, wide)
 
 
-def _fallen(falloff: Falloff, d: float) -> float:
+def _power_falloff(falloff: Falloff, d: float) -> float:
     if d > falloff.far:
         return 0.0
     return 1.0 if d < falloff.near else (1.0 + d - falloff.near) ** -falloff.power
