@@ -47,7 +47,7 @@ vec3 unit_of(vec3 vector)
 }
 
 // Element of an array at an index unknown at compile time, which as a plain access would force the array
-// into memory. With next_of, code that is long or branches is compiled once instead of once per CV, which
+// into memory. With next_set, code that is long or branches is compiled once instead of once per CV, which
 // would take drivers a minute.
 vec3 element_at(vec3 list[CV_COUNT], int index)
 {

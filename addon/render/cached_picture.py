@@ -5,7 +5,7 @@
 
 That is 12 bytes per pixel. Strands are drawn into the view, depth-tested against it, and their
 contribution is drawn into this picture as well. So the picture is valid as long as the depths of
-the rest of the view stay the same. Its owner sets marks for the data from which it was drawn.
+the rest of the view stay the same. Its owner sets a key of the data from which it was drawn.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _SHOWN_RECIPE = ShaderRecipe(
 class CachedPicture:
     """A picture of strands with depth. Creating one does not touch the GPU.
 
-    marks: the data from which it was drawn, see `matches`; empty: it must not be shown again.
+    key: the data from which it was drawn, see `matches`; empty: it must not be shown again.
     color, depth: the textures above, after `begin`.
 
     Args:
@@ -48,19 +48,19 @@ class CachedPicture:
 
     def release(self) -> None:
         """Release everything on the GPU; the picture is lost."""
-        self.marks: tuple[Any, ...] = ()
+        self.key: tuple[Any, ...] = ()
         self.color: Any = None
         self.depth: Any = None
         self._target: Any = None
         self._triangle: Any = None
 
     def forget(self) -> None:
-        """Clear the marks, so that it is not shown again; its textures stay."""
-        self.marks = ()
+        """Clear the key, so that it is not shown again; its textures stay."""
+        self.key = ()
 
-    def matches(self, marks: tuple[Any, ...]) -> bool:
+    def matches(self, key: tuple[Any, ...]) -> bool:
         """Whether it was drawn from the same objects and equal numbers."""
-        return are_same_marks(self.marks, marks)
+        return are_same_keys(self.key, key)
 
     def begin(self) -> None:
         """Clear the picture, resized to cover the viewport."""
@@ -101,10 +101,10 @@ class CachedPicture:
         self._triangle.draw(shader.shader)
 
 
-def are_same_marks(marks: tuple[Any, ...], other_marks: tuple[Any, ...]) -> bool:
-    """Whether both hold the same objects and equal numbers; False if there are no marks."""
+def are_same_keys(key: tuple[Any, ...], other: tuple[Any, ...]) -> bool:
+    """Whether both hold the same objects and equal numbers; False if the key is empty."""
     return (
-        bool(marks)
-        and len(marks) == len(other_marks)
-        and all(a is b or a == b for a, b in zip(marks, other_marks, strict=True))
+        bool(key)
+        and len(key) == len(other)
+        and all(a is b or a == b for a, b in zip(key, other, strict=True))
     )

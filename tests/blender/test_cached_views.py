@@ -19,7 +19,7 @@ SOLID, MATERIAL = SimpleNamespace(type="SOLID"), SimpleNamespace(type="MATERIAL"
 @pytest.fixture
 def view() -> Iterator[views.View]:
     known = views.view_of(SimpleNamespace(as_pointer=lambda: 7))
-    known.picture.marks = ("kept",)
+    known.picture.key = ("kept",)
     yield known
     views.forget_views()
 
@@ -38,7 +38,7 @@ def test_a_row_of_samples_is_followed_by_a_fresh_draw(view: views.View) -> None:
         views.record_reshown(view, MATERIAL)
         assert is_waiting(views._redraw_strands) == (count >= 3)
     views._redraw_strands()
-    assert view.picture.marks == ()
+    assert view.picture.key == ()
 
 
 def test_a_redraw_long_after_is_a_row_by_itself(view: views.View) -> None:
@@ -65,7 +65,7 @@ def test_a_view_turns_from_its_second_draw_on(view: views.View) -> None:
     ]
 
 
-def test_each_switch_and_each_evaluation_is_a_mark() -> None:
+def test_each_switch_and_each_evaluation_changes_the_key() -> None:
     space = next(
         area.spaces.active
         for screen in bpy.data.screens
@@ -92,6 +92,6 @@ def test_each_switch_and_each_evaluation_is_a_mark() -> None:
 
 def test_a_view_moves_until_it_is_drawn_of_the_same_again(view: views.View) -> None:
     one, other = (object(), 1, b"a"), (object(), 1, b"a")
-    assert [view.has_new_marks(marks) for marks in (one, one, other, other, one)] == [
+    assert [view.has_new_key(key) for key in (one, one, other, other, one)] == [
         *(True, False, True, False, True)
     ]

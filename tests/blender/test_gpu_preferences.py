@@ -78,10 +78,10 @@ def test_a_view_keeps_no_picture_where_memory_is_short(
 ) -> None:
     calls: list[str] = []
     picture = SimpleNamespace(
-        begin=lambda: calls.append("begin"), release=lambda: calls.append("release"), marks=()
+        begin=lambda: calls.append("begin"), release=lambda: calls.append("release"), key=()
     )
-    view = SimpleNamespace(picture=picture, has_new_marks=lambda _: False, address=0)
+    view = SimpleNamespace(picture=picture, has_new_key=lambda _: False, address=0)
     monkeypatch.setattr(gpu_memory, "exceeds_budget", lambda: is_short)
     overlay._draw_hair(view, None, [], ("drawn",))  # type: ignore[arg-type]
     assert calls == (["release"] if is_short else ["begin"])
-    assert picture.marks == (() if is_short else ("drawn",))
+    assert picture.key == (() if is_short else ("drawn",))

@@ -127,9 +127,9 @@ def test_a_sample_tells_whether_a_soft_view_is_still_right(
     for _ in range(10):
         softening._request_sample()
         sampled(view, 10)
-    view.picture.marks, view.needs_redraw = ("kept",), True
+    view.picture.key, view.needs_redraw = ("kept",), True
     views._redraw_strands()
-    assert view.picture.marks == ("kept",) and view.wants_samples and not view.needs_redraw
+    assert view.picture.key == ("kept",) and view.wants_samples and not view.needs_redraw
     softening.resume_timer(view)
     softening._request_sample()
     sampled(view, 10, fragments)
@@ -146,7 +146,7 @@ def test_a_view_shown_between_samples_is_checked_after_them(
 ) -> None:
     """Slow series of samples do not start again with each redraw."""
     view, _ = two_views
-    view.picture.marks = ("kept",)
+    view.picture.key = ("kept",)
     softening.schedule_samples(view)
     for count in range(10):
         softening._request_sample()
@@ -154,7 +154,7 @@ def test_a_view_shown_between_samples_is_checked_after_them(
         if count == 5:
             view.needs_redraw = True
             views._redraw_strands()
-    assert view.picture.marks and view.has_all_samples and view.wants_samples
+    assert view.picture.key and view.has_all_samples and view.wants_samples
     softening._request_sample()
     sampled(view, 10)
     assert not view.wants_samples
@@ -162,10 +162,10 @@ def test_a_view_shown_between_samples_is_checked_after_them(
 
 def test_a_view_that_no_window_shows_waits_for_nothing(two_views: tuple[views.View, ...]) -> None:
     view = views.view_of(SimpleNamespace(as_pointer=lambda: 9))
-    view.picture.marks = ("kept",)
+    view.picture.key = ("kept",)
     softening.schedule_samples(view)
     softening._request_sample()
-    assert not view.wants_samples and not softening.takes_sample(view) and not view.picture.marks
+    assert not view.wants_samples and not softening.takes_sample(view) and not view.picture.key
 
 
 def test_without_memory_a_view_stays_hard(

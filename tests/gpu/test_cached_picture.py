@@ -103,7 +103,7 @@ def test_a_picture_matches_only_its_own_marks() -> None:
 
     cached, thing = CachedPicture(), object()
     assert not cached.matches(()), "nothing is kept yet"
-    cached.marks = (thing, 1, (2.0, "a"))
+    cached.key = (thing, 1, (2.0, "a"))
     assert cached.matches((thing, 1, (2.0, "a")))
     for other in ((object(), 1, (2.0, "a")), (thing, 2, (2.0, "a")), (thing, 1)):
         assert not cached.matches(other)

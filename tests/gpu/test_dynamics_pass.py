@@ -615,7 +615,7 @@ def test_a_frame_without_a_substep_moves_only_what_is_shown(make_pass: Any) -> N
 
 
 def test_frames_shorter_than_a_substep(make_pass: Any) -> None:
-    """With all effects of the table of moments, which has no rows then."""
+    """With all effects of the table of substeps, which has no rows then."""
     scene = Scene({"wind_speed": 6.0, "gusts": 1.0}, on_head=(BALL,), fps=1000.0)
     assert_equal(scene, make_pass, TOUCHING, seconds=0.05)
 

@@ -51,7 +51,7 @@ from .views import (
     forget_views,
     record_drawn,
     record_reshown,
-    view_marks,
+    view_key,
     view_of,
 )
 
@@ -234,20 +234,20 @@ def _draw_strands(context: Any) -> None:
         softening.discard_samples(view)
         return
     samples = context.scene.hairloom.picture.viewport_samples
-    marks = (
-        *view_marks(context, camera),
+    key = (
+        *view_key(context, camera),
         samples,
-        *(mark for each in shown for mark in each.marks),
+        *(part for each in shown for part in each.key),
     )
     with DRAW_LOCK, gpu_memory.shared_by(len(shown)):
         if has_no_scene_depth(context):
             _draw_depth(context.space_data.as_pointer(), camera, shown)
-        if not view.picture.matches(marks):
+        if not view.picture.matches(key):
             softening.discard_samples(view)
             _draw_body_shadows(camera, shown)
-            _draw_hair(view, camera, shown, marks)
+            _draw_hair(view, camera, shown, key)
             record_drawn(view)
-            if view.picture.marks and softening.can_soften(shown[0].snapshot.lights, samples):
+            if view.picture.key and softening.can_soften(shown[0].snapshot.lights, samples):
                 softening.schedule_samples(view)
             return
         is_sampled = softening.takes_sample(view)
@@ -309,9 +309,7 @@ def _draw_depth(address: int, camera: Camera, shown: Sequence[_ShownGroom]) -> N
     _overlay.depth.draw(heads, camera, width, height)
 
 
-def _draw_hair(
-    view: View, camera: Camera, shown: list[_ShownGroom], marks: tuple[Any, ...]
-) -> None:
+def _draw_hair(view: View, camera: Camera, shown: list[_ShownGroom], key: tuple[Any, ...]) -> None:
     """Draw all grooms into the current view, and into its picture if that can be kept."""
     forget_closed_views(each.hair.strands for each in _overlay.drawn.values())
     can_be_kept = all(each.can_be_kept for each in shown) and not gpu_memory.exceeds_budget()
@@ -320,7 +318,7 @@ def _draw_hair(
         view.picture.release()
     else:
         picture.begin()
-    is_moving = view.has_new_marks(marks)
+    is_moving = view.has_new_key(key)
     maps: dict[Hashable, OpacityMaps | None] = {}
     if len(shown) > 1:  # a single groom makes its maps when it is drawn
         for each in shown:
@@ -332,7 +330,7 @@ def _draw_hair(
     view.is_outdated = any(each.drawn.hair.strands.needs_redraw(view.address) for each in shown)
     view.statistics_by_uid = {each.uid: each.drawn.hair.strands.statistics for each in shown}
     if picture is not None and not view.is_outdated:
-        picture.marks = marks
+        picture.key = key
 
 
 @dataclass(frozen=True, eq=False)
@@ -356,7 +354,7 @@ class _ShownGroom:
     shows_all_strands: bool
 
     @property
-    def marks(self) -> tuple[Any, ...]:
+    def key(self) -> tuple[Any, ...]:
         """Everything that its picture depends on, beside the view."""
         snapshot = self.snapshot
         points, harmonics, display = snapshot.device_points, snapshot.harmonics, self.display

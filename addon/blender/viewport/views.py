@@ -16,7 +16,7 @@ from typing import Any
 import bpy
 import gpu
 
-from ...render.cached_picture import CachedPicture, are_same_marks
+from ...render.cached_picture import CachedPicture, are_same_keys
 from ...render.camera import Camera
 from ...render.strand_pass import Statistics, StrandPass
 from ..base.redraw import debounce, redraw_views
@@ -33,7 +33,7 @@ _SERIES_LENGTH, _SERIES_SECONDS = 3, 5.0
 class View:
     """What is kept for a 3D view.
 
-    address: of its region's data. marks: of what was last drawn into it, see CachedPicture.
+    address: of its region's data. key: of what was last drawn into it, see CachedPicture.
     statistics_by_uid: counts of what its picture shows, by session number of the hair.
     is_outdated: whether its shadows lag behind its lights, or it was drawn without waiting for the
         GPU.
@@ -48,7 +48,7 @@ class View:
 
     address: int
     picture: CachedPicture = field(default_factory=CachedPicture)
-    marks: tuple[Any, ...] = ()
+    key: tuple[Any, ...] = ()
     statistics_by_uid: dict[int, Statistics] = field(default_factory=dict)
     is_outdated: bool = False
     drawn_at: float = 0.0
@@ -67,10 +67,10 @@ class View:
         before, self.seen_from = self.seen_from, camera.view.tobytes()
         return before not in (b"", self.seen_from)
 
-    def has_new_marks(self, marks: tuple[Any, ...]) -> bool:
-        """Whether something else was last drawn; stores these marks."""
-        before, self.marks = self.marks, marks
-        return not are_same_marks(before, marks)
+    def has_new_key(self, key: tuple[Any, ...]) -> bool:
+        """Whether something else was last drawn; stores this key."""
+        before, self.key = self.key, key
+        return not are_same_keys(before, key)
 
 
 class _KnownViews:
@@ -102,7 +102,7 @@ def invalidate_pictures() -> None:
     _known.changes += 1
 
 
-def view_marks(context: Any, camera: Camera) -> tuple[Any, ...]:
+def view_key(context: Any, camera: Camera) -> tuple[Any, ...]:
     """Everything that may change what is drawn of the scene into a view, and where."""
     space, region_data = context.space_data, context.region_data
     clipped = tuple(map(tuple, region_data.clip_planes)) if region_data.use_clip_planes else ()

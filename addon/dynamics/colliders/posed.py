@@ -93,8 +93,8 @@ class PosedCollider:
         matrix = value_at(before, displacement, bent, moment)
         if self._arc is None:
             return matrix
-        moments = np.ravel(moment).tolist()
-        places = [_matrix_of(self._arc.at(each)) for each in moments]
+        times = np.ravel(moment).tolist()
+        places = [_matrix_of(self._arc.at(each)) for each in times]
         return np.reshape(places, (*np.shape(moment)[:-2], 4, 4)) @ matrix
 
     @cached_property
@@ -130,8 +130,8 @@ class PosedCollider:
         Args:
             spans: begin and end of the substeps as fractions of the frame.
         """
-        moments: Any = np.array(spans).T[..., None, None]  # matrix_at also broadcasts over arrays
-        before, now = self.matrix_at(moments)
+        times: Any = np.array(spans).T[..., None, None]  # matrix_at also broadcasts over arrays
+        before, now = self.matrix_at(times)
         center, radius = self.collider.bounds
         centers = (now[:, :3, :3] @ center + now[:, :3, 3]).astype(np.float32)
         scales = np.linalg.svd(now[:, :3, :3], compute_uv=False)
