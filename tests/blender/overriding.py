@@ -16,8 +16,8 @@ def library_overrides(folder: Path) -> list[bpy.types.Object]:
         bpy.context.scene.collection.objects.unlink(obj)
     bpy.ops.wm.save_as_mainfile(filepath=file)
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    with bpy.data.libraries.load(file, link=True) as (_, wanted):
-        wanted.collections = ["Character"]
+    with bpy.data.libraries.load(file, link=True) as (_, data_to):
+        data_to.collections = ["Character"]
     scene, layer = bpy.context.scene, bpy.context.view_layer
     bpy.data.collections["Character"].override_hierarchy_create(scene, layer)
     objects = [scene.objects[name] for name in names]

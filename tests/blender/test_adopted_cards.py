@@ -226,7 +226,7 @@ def test_deforming_modifiers_are_applied_and_generating_ones_are_reported(
 def test_a_mirrored_object_is_sorted_and_shaded_as_the_plain_one(shells, sphere, get_depsgraph):
     plain = read_cards(shells, get_depsgraph(), SortOptions(head=sphere)).cards.mesh
     sort_mesh(shells, get_depsgraph(), SortOptions(head=sphere, occlusion=QUICK))
-    wanted = values(shells.data, "occlusion"), layer(shells.data, "Occlusion")
+    expected = values(shells.data, "occlusion"), layer(shells.data, "Occlusion")
     for vertex in shells.data.vertices:
         vertex.co.x *= -1.0
     shells.scale = (-1.0, 1.0, 1.0)
@@ -236,8 +236,8 @@ def test_a_mirrored_object_is_sorted_and_shaded_as_the_plain_one(shells, sphere,
     assert outward.shape == plain.along.shape
     assert (mirrored.normal[:, :2] * mirrored.positions[:, :2]).sum(axis=1).min() > 0.0
     sort_mesh(shells, get_depsgraph(), SortOptions(head=sphere, occlusion=QUICK))
-    np.testing.assert_allclose(values(shells.data, "occlusion"), wanted[0], atol=1e-4)
-    np.testing.assert_allclose(layer(shells.data, "Occlusion"), wanted[1], atol=1e-4)
+    np.testing.assert_allclose(values(shells.data, "occlusion"), expected[0], atol=1e-4)
+    np.testing.assert_allclose(layer(shells.data, "Occlusion"), expected[1], atol=1e-4)
 
 
 def test_a_vertex_group_is_drawn_after_all_others(shells, sphere, get_depsgraph):

@@ -110,10 +110,10 @@ def test_blenders_undo_and_redo_are_followed(hair, session, get_depsgraph):
     stroke(hair, range(5))
     bpy.ops.ed.undo_push(message="combed")
     combed = drawn(session)
-    for back, wanted in ((bpy.ops.ed.undo, before), (bpy.ops.ed.redo, combed)):
+    for back, expected in ((bpy.ops.ed.undo, before), (bpy.ops.ed.redo, combed)):
         back()
         scene_events.follow_undo()
-        np.testing.assert_allclose(drawn(session), wanted, atol=1e-6)
+        np.testing.assert_allclose(drawn(session), expected, atol=1e-6)
 
 
 def test_a_stroke_amid_a_build_is_not_lost_when_that_arrives(hair, session, get_depsgraph):
@@ -259,16 +259,16 @@ def test_rebuilt_hair_arrives_with_its_old_light_and_keeps_newer_strokes(
     scene_events.catch_up(get_depsgraph())
     run_steps_until(lambda: session.is_lighting)
     assert session.groom.light.is_quick and session.groom.light.fields is fields
-    wanted = rebuilt(hair, get_depsgraph)[1]
-    assert not np.array_equal(session.snapshot.occlusion, wanted)
-    assert np.abs(session.snapshot.occlusion - wanted).mean() < 0.05
+    expected = rebuilt(hair, get_depsgraph)[1]
+    assert not np.array_equal(session.snapshot.occlusion, expected)
+    assert np.abs(session.snapshot.occlusion - expected).mean() < 0.05
     stroke(hair, range(10, 15))
     shown, combed = drawn(session), session.rig.strands.points
     opened.set()
     run_steps_until(lambda: not session.is_lighting)
     np.testing.assert_array_equal(drawn(session), shown)
     np.testing.assert_array_equal(session.rig.strands.points, combed)
-    np.testing.assert_array_equal(session.snapshot.occlusion, wanted)
+    np.testing.assert_array_equal(session.snapshot.occlusion, expected)
     arrive(session, get_depsgraph)
     points, occlusion = rebuilt(hair, get_depsgraph)
     np.testing.assert_array_equal(session.rig.strands.points, points)

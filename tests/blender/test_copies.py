@@ -109,11 +109,11 @@ def test_undoing_a_duplicate_keeps_the_original(playing, get_depsgraph):
 def test_hair_of_the_same_name_from_a_file(link, playing, get_depsgraph, tmp_path):
     file = str(tmp_path / "groom.blend")
     bpy.ops.wm.save_as_mainfile(filepath=file, copy=True)
-    with bpy.data.libraries.load(file, link=link) as (_, wanted):
-        wanted.objects = ["Hair", "Head"]
-    for obj in wanted.objects:
+    with bpy.data.libraries.load(file, link=link) as (_, data_to):
+        data_to.objects = ["Hair", "Head"]
+    for obj in data_to.objects:
         bpy.context.scene.collection.objects.link(obj)
-    theirs = wanted.objects[0]
+    theirs = data_to.objects[0]
     bpy.context.view_layer.update()
     goes_on(playing)
     playing.hair.name = "Wig"  # "Hair" may now be another object

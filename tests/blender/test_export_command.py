@@ -163,9 +163,9 @@ def test_a_simulation_moves_in_usd(
         np.testing.assert_allclose(moving, still.points, atol=1e-6)
     first, last = (np.array(curves.GetPointsAttr().Get(frame)) for frame in (2, 5))
     assert np.abs(last - first).max() > 1e-3
-    for wanted in ("0 9", "5 3"):
+    for frames in ("0 9", "5 3"):
         report = run(
-            *source, "--bake", str(bake), "--frames", *wanted.split(), output="no.usdc", code=1
+            *source, "--bake", str(bake), "--frames", *frames.split(), output="no.usdc", code=1
         )
         assert report["status"] != "done"
     run(*source, "--frames", "0", "3", output="no.usdc", code=1)

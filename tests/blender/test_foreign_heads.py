@@ -188,9 +188,9 @@ def test_a_posed_mesh_of_makehumans_has_roots_at_the_same_places_of_its_faces(co
     places = np.full((len(load_bust().positions), 3), np.nan)
     known = load_bust().makehuman >= 0
     places[known] = (posed @ matrix[:3, :3].T + matrix[:3, 3])[load_bust().makehuman[known]]
-    wanted = by_barycentric(style, places)
+    expected = by_barycentric(style, places)
     # Blender may split a quad that is not flat along the other diagonal
-    gap = np.linalg.norm(roots_of(hair) - wanted, axis=1) / 2.0
+    gap = np.linalg.norm(roots_of(hair) - expected, axis=1) / 2.0
     assert np.median(gap) < 1e-5 and gap.max() < 5e-4
     assert away(roots_of(hair)[::40], human) < 1e-5
     assert human.vertex_groups.get("scalp") is not None
@@ -297,14 +297,14 @@ def test_hair_follows_a_head_whose_shape_has_changed_and_landmarks_that_were_dra
     assert not run_parts(fit_again([hair], depsgraph()))
     fresh = bpy.data.objects.new("Fresh", head.data.copy())
     bpy.context.collection.objects.link(fresh)
-    wanted = added("buzz_cut", fresh).hair
-    assert len(hair.data.curves) == len(wanted.data.curves)
+    expected = added("buzz_cut", fresh).hair
+    assert len(hair.data.curves) == len(expected.data.curves)
     there, wanted_there = (placed_landmarks(one, depsgraph()) for one in (head, fresh))
     for name in LANDMARKS:
         assert there[name] == pytest.approx(wanted_there[name], abs=1e-4)
-    lengths = [read_curves(one, depsgraph()).strands.lengths() for one in (hair, wanted)]
+    lengths = [read_curves(one, depsgraph()).strands.lengths() for one in (hair, expected)]
     assert np.median(lengths[0]) == pytest.approx(np.median(lengths[1]), rel=0.01)
-    assert roots_of(hair) == pytest.approx(roots_of(wanted), abs=1e-3)
+    assert roots_of(hair) == pytest.approx(roots_of(expected), abs=1e-3)
     # after a rotation the head has the same shape, so its landmarks are not guessed again
     head.matrix_world = Matrix.Rotation(1.3, 4, "X") @ Matrix.Translation((0.3, 0.0, 0.0))
     before = roots_of(hair)
@@ -500,11 +500,11 @@ def test_the_command_line_takes_a_head_of_the_scene(tmp_path: Path) -> None:
 def test_a_warp_moves_landmarks_to_their_targets_and_leaves_far_points() -> None:
     random = np.random.default_rng(2)
     source = random.uniform(-0.1, 0.1, (12, 3))
-    wanted = source + random.normal(0.0, 0.004, source.shape)
-    warp = Warp(np.eye(4)).with_bend(source, wanted, 0.3, 0.0)
-    assert np.abs(warp(source) - wanted).max() < 1e-9
+    expected = source + random.normal(0.0, 0.004, source.shape)
+    warp = Warp(np.eye(4)).with_bend(source, expected, 0.3, 0.0)
+    assert np.abs(warp(source) - expected).max() < 1e-9
     assert np.abs(warp(source + 5.0) - source - 5.0).max() == 0.0
-    bent = warp.with_bend(wanted, source, 0.3, 0.0)  # the inverse warp
+    bent = warp.with_bend(expected, source, 0.3, 0.0)  # the inverse warp
     assert np.abs(bent(source) - source).max() < 1e-9
 
 

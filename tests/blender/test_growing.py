@@ -53,8 +53,8 @@ def test_an_edit_makes_the_hair_that_its_settings_say(grown, sphere):
         np.array([triangle.vertices for triangle in mesh.loop_triangles]),
     )
     settings = GrowSettings(**{**FEW, "length": 0.05, "droop": 0.2})
-    wanted = grow(surface, settings, scalp_density(surface)).points
-    assert curve_points(grown.data) == pytest.approx(wanted, abs=1e-5)
+    expected = grow(surface, settings, scalp_density(surface)).points
+    assert curve_points(grown.data) == pytest.approx(expected, abs=1e-5)
 
 
 def test_more_strands_and_more_points_are_made_too(grown):

@@ -103,9 +103,9 @@ def test_cycles_finds_the_curves_own_colours(hair: Any, tmp_path: Path) -> None:
     radial = node.inputs["Radial Roughness"].default_value
     assert radial > 0.5, "a colour at another roughness is another colour"
     found = evaluated_input(hair, "Color", tmp_path)[32]
-    wanted = np.where(np.isnan(own[:, 0]), look.base_color, own[:, 0])
-    wanted = absorption_color(color_absorption(wanted), radial)
-    np.testing.assert_allclose(found, wanted, rtol=0.01, atol=2e-3)
+    expected = np.where(np.isnan(own[:, 0]), look.base_color, own[:, 0])
+    expected = absorption_color(color_absorption(expected), radial)
+    np.testing.assert_allclose(found, expected, rtol=0.01, atol=2e-3)
 
 
 def test_the_button_writes_what_the_other_button_reads(hair: Any) -> None:

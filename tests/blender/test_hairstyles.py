@@ -96,9 +96,9 @@ def test_each_style_that_ships_is_curves_on_the_scalp_with_its_settings(
         owner = hair.data.hairloom if hasattr(hair.data.hairloom, section) else hair.hairloom
         for key, value in values.items():
             found = getattr(getattr(owner, section), key)
-            wanted = tuple(value) if isinstance(value, (tuple, list)) else value
-            found = found[:] if isinstance(wanted, tuple) else found
-            assert found == pytest.approx(wanted), key
+            expected = tuple(value) if isinstance(value, (tuple, list)) else value
+            found = found[:] if isinstance(expected, tuple) else found
+            assert found == pytest.approx(expected), key
     look = named_preset(style.presets[0]).settings
     assert hair.data.hairloom.shading.base_color[:] == pytest.approx(look.base_color)
     assert hair.hairloom.children_density in head.vertex_groups
@@ -319,9 +319,9 @@ def test_nodes_that_are_replaced_renamed_or_not_there(
 
 @pytest.mark.portable
 def test_this_blender_brings_all_node_groups_that_styles_use(head: bpy.types.Object) -> None:
-    wanted = {one.nodes: one.inputs for n in NAMES for one in named_hairstyle(n).modifiers}
+    expected = {one.nodes: one.inputs for n in NAMES for one in named_hairstyle(n).modifiers}
     hair = added(named_hairstyle("buzz_cut"), head)
-    for nodes, inputs in wanted.items():
+    for nodes, inputs in expected.items():
         assert hair_nodes.add_hair_nodes(hair, nodes, inputs).node_group.name == nodes
 
 

@@ -67,14 +67,14 @@ def test_numbers_have_soft_limits_within_hard_ones():
 
 def test_units_are_those_that_were_declared():
     """Lengths have the scene's units, angles degrees, times seconds, as the parameters declare."""
-    wanted = {"length": "LENGTH", "angle": "ROTATION", "time": "TIME_ABSOLUTE"}
-    wanted |= {"speed": "VELOCITY", "acceleration": "ACCELERATION"}
+    expected = {"length": "LENGTH", "angle": "ROTATION", "time": "TIME_ABSOLUTE"}
+    expected |= {"speed": "VELOCITY", "acceleration": "ACCELERATION"}
     checked = 0
     for group in registration.groups.SECTION_GROUPS.values():
         for parameter in group.settings.parameters():
             shown = group.bl_rna.properties[parameter.name]
-            if parameter.unit in wanted:
-                assert shown.unit == wanted[parameter.unit], parameter.name
+            if parameter.unit in expected:
+                assert shown.unit == expected[parameter.unit], parameter.name
                 checked += 1
             if parameter.unit == "factor" and parameter.kind == "number":
                 assert shown.subtype == "FACTOR", parameter.name

@@ -52,11 +52,11 @@ def test_a_render_without_atomics_has_little_noise(
         picture_settings.samples = samples
         capabilities.choose_image_atomics(choice)
         pictures[samples, choice] = render_picture(tmp_path)
-    wanted = pictures[16, "automatic"]
+    expected = pictures[16, "automatic"]
     np.testing.assert_array_equal(pictures[1, "never"], pictures[16, "never"])
-    off = np.abs(pictures[1, "never"] - wanted)[..., :3]
-    assert 0.0 < off.mean() < 0.01 * wanted[..., :3].max()
-    assert pictures[1, "never"].mean() == pytest.approx(wanted.mean(), rel=0.01)
+    off = np.abs(pictures[1, "never"] - expected)[..., :3]
+    assert 0.0 < off.mean() < 0.01 * expected[..., :3].max()
+    assert pictures[1, "never"].mean() == pytest.approx(expected.mean(), rel=0.01)
 
 
 @pytest.mark.slow(instead="test_the_preview_is_drawn_without_atomics")

@@ -44,8 +44,8 @@ def library(new_hair, sphere, tmp_path):
 
 
 def brought(file, *, link):
-    with bpy.data.libraries.load(file, link=link) as (_, wanted):
-        wanted.collections = ["Groom"]
+    with bpy.data.libraries.load(file, link=link) as (_, data_to):
+        data_to.collections = ["Groom"]
     return bpy.data.collections["Groom"]
 
 

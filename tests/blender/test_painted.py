@@ -351,14 +351,14 @@ def test_a_dab_reads_the_vertex_groups_once_for_children_and_overlay(
 
 def test_weights_are_read_at_each_vertex(sphere: Any, get_depsgraph: Any) -> None:
     random, count = np.random.default_rng(2), len(sphere.data.vertices)
-    wanted = {}
+    expected = {}
     for name in ("One", "Two", "Three"):
         group, weights = sphere.vertex_groups.new(name=name), np.zeros(count)
         for vertex in random.permutation(count)[: count // 2].tolist():
             weights[vertex] = random.uniform()
             group.add([vertex], float(weights[vertex]), "REPLACE")
-        wanted[name] = weights
-    for name, weights in wanted.items():
+        expected[name] = weights
+    for name, weights in expected.items():
         np.testing.assert_allclose(read_weights(sphere, get_depsgraph(), name), weights, atol=1e-7)
 
 

@@ -168,9 +168,9 @@ def test_nothing_below_moves_whatever_happens_to_the_hair(hair, monkeypatch, tmp
                 *(height(draw, hair) for draw in OTHERS),
             )
     for width in WIDTHS:
-        wanted = heights["not previewed", width]
-        found = {key: each for key, each in heights.items() if key[1] == width and each != wanted}
-        assert found == {}, f"not {wanted}"
+        expected = heights["not previewed", width]
+        found = {key: each for key, each in heights.items() if key[1] == width and each != expected}
+        assert found == {}, f"not {expected}"
     assert len(heights) == (11 + len(JOBS)) * len(WIDTHS)
 
 

@@ -46,11 +46,11 @@ def quadrupled(value: int) -> Parts[int]:
     return four
 
 
-@pytest.mark.parametrize(("value", "wanted"), [(3, 12), (9, -1)])
-def test_blocking_and_threaded_parts_have_the_same_result(value: int, wanted: int) -> None:
+@pytest.mark.parametrize(("value", "expected"), [(3, 12), (9, -1)])
+def test_blocking_and_threaded_parts_have_the_same_result(value: int, expected: int) -> None:
     """An error of a part is raised at its `yield`, where the work may catch it."""
-    assert run_parts(quadrupled(value)) == wanted
-    assert result_of(steps_of_parts(quadrupled(value))) == wanted
+    assert run_parts(quadrupled(value)) == expected
+    assert result_of(steps_of_parts(quadrupled(value))) == expected
 
 
 @pytest.mark.parametrize("run", [run_parts, lambda parts: result_of(steps_of_parts(parts))])

@@ -40,9 +40,9 @@ def test_shadows_keep_key_fill_and_rim_light(name: str) -> None:
 def test_a_look_goes_onto_the_selected_hair(hair: bpy.types.Object, name: str) -> None:
     assert bpy.ops.hairloom.apply_preset(name=name) == {"FINISHED"}
     applied = settings_of(hair.data.hairloom.shading, ShadingSettings).as_dict()
-    for parameter, wanted in presets.named_preset(name).settings.as_dict().items():
-        is_word = isinstance(wanted, str)
-        assert applied[parameter] == (wanted if is_word else pytest.approx(wanted, rel=1e-6))
+    for parameter, expected in presets.named_preset(name).settings.as_dict().items():
+        is_word = isinstance(expected, str)
+        assert applied[parameter] == (expected if is_word else pytest.approx(expected, rel=1e-6))
 
 
 @pytest.mark.parametrize("section", list(preset_chooser.KINDS))
@@ -97,8 +97,8 @@ def test_choosing_goes_to_all_selected_hair(
 
 def test_dynamics_go_onto_the_object(hair: bpy.types.Object) -> None:
     bpy.ops.hairloom.apply_preset(name="dynamics/soft")
-    wanted = presets.named_preset("dynamics/soft").settings.as_dict()["style_tip"]
-    assert hair.hairloom.dynamics.style_tip == pytest.approx(wanted)
+    expected = presets.named_preset("dynamics/soft").settings.as_dict()["style_tip"]
+    assert hair.hairloom.dynamics.style_tip == pytest.approx(expected)
 
 
 def test_settings_that_a_groom_does_not_keep_are_refused(hair: bpy.types.Object) -> None:
@@ -338,12 +338,12 @@ def test_the_look_under_water_brings_its_shafts_of_light_with_it(hair: bpy.types
     assert not shafts.use_shafts
     assert bpy.ops.hairloom.apply_preset(name="looks/under_water") == {"FINISHED"}
     assert shafts.use_shafts
-    wanted = presets.named_preset("looks/under_water").also
-    assert (settings_of(shafts, ShaftSettings),) == wanted
+    expected = presets.named_preset("looks/under_water").also
+    assert (settings_of(shafts, ShaftSettings),) == expected
     options = command_line.parser().parse_args(
         ["render", "--output", "x.png", "--preset", "looks/under_water"]
     )
-    assert job_options.settings_from_options(options)[ShaftSettings] == wanted[0]
+    assert job_options.settings_from_options(options)[ShaftSettings] == expected[0]
 
 
 def test_a_title_stands_for_one_preset(hair: bpy.types.Object, own_folder: Path) -> None:

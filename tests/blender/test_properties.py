@@ -90,12 +90,12 @@ def test_every_value_that_blender_takes_is_one_that_settings_take(section, group
             return
         is_whole = parameter.kind == "integer"
         values = {"color": 3, "curve": len(KNOT_POSITIONS)}.get(parameter.kind)
-        for wanted in (-math.inf, *parameter.hard_range, math.inf):
-            limited = max(-(2**31), min(wanted, 2**31 - 1)) if is_whole else wanted
+        for requested in (-math.inf, *parameter.hard_range, math.inf):
+            limited = max(-(2**31), min(requested, 2**31 - 1)) if is_whole else requested
             setattr(group, parameter.name, (limited,) * values if values else limited)
             value = getattr(settings_of(group, settings), parameter.name)
-            if math.isfinite(wanted):
-                assert value == pytest.approx((wanted,) * values if values else wanted)
+            if math.isfinite(requested):
+                assert value == pytest.approx((requested,) * values if values else requested)
         group.property_unset(parameter.name)
 
     assert differing(section, check) == {}

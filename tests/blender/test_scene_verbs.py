@@ -184,8 +184,8 @@ def test_operators_are_listed_with_their_properties(
 def test_a_scene_without_an_action_is_an_error(
     scene: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for wanted in (["--output", str(scene.with_name("out.blend"))], ["--save"]):
-        assert command_line.run(["run", "--scene", str(scene), "--object", "Hair", *wanted]) == 1
+    for target in (["--output", str(scene.with_name("out.blend"))], ["--save"]):
+        assert command_line.run(["run", "--scene", str(scene), "--object", "Hair", *target]) == 1
         output = capsys.readouterr()
         assert "there is nothing to do" in output.err and "sphere_count" not in output.out
 

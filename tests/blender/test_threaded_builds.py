@@ -451,8 +451,8 @@ def test_edits_while_hair_is_made_arrive_too(playing, hair, get_depsgraph, monke
         scene_events.catch_up(get_depsgraph())
     opened.set()
     arrive(playing)
-    wanted = build_groom(GroomSource(hair, get_depsgraph()).request, is_drawn=False).rig.strands
-    length = np.linalg.norm(np.diff(wanted.grid, axis=1), axis=2).sum()
+    expected = build_groom(GroomSource(hair, get_depsgraph()).request, is_drawn=False).rig.strands
+    length = np.linalg.norm(np.diff(expected.grid, axis=1), axis=2).sum()
     now = np.linalg.norm(np.diff(playing.rig.strands.grid, axis=1), axis=2).sum()
     assert now == pytest.approx(length, rel=1e-3)
 
@@ -657,8 +657,8 @@ def test_the_placeholder_on_a_dense_head_searches_a_part_of_it(
     made = prepared_groom.placeholder_groom(order)
     assert len(searched) == 1 and searched[0] < len(head.triangles) / 10
     assert made.rig.head is head and made.is_placeholder
-    wanted = bind(made.rig.strands, head, place="Hair").strands
-    assert np.array_equal(made.rig.strands.root_triangle, wanted.root_triangle)
+    expected = bind(made.rig.strands, head, place="Hair").strands
+    assert np.array_equal(made.rig.strands.root_triangle, expected.root_triangle)
     carried = motion_flow.carried_strands(made.rig, made.rig.rest_pose)
     assert np.array_equal(carried, made.rig.strands.points)
 

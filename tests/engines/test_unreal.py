@@ -238,8 +238,8 @@ def test_a_groom_gets_strands_cards_and_its_head(
     textures = cards.values["textures"].values.get("textures", [])
     is_packed = "_Depth" in "".join(sidecar_of(asset.folder)["texture_files"])
     slots = ["Depth", "Coverage", "Tangent", "Attributes", "Material", "Auxiliary"]
-    wanted = [f"/Game/Hair/T_cards_{slot}" for slot in slots]
-    assert [each.path for each in textures] == (wanted if is_packed else [])
+    expected = [f"/Game/Hair/T_cards_{slot}" for slot in slots]
+    assert [each.path for each in textures] == (expected if is_packed else [])
     warnings = [text for kind, text in unreal.log_lines if kind == "warning"]
     assert len(warnings) == (0 if is_packed else 1)
     solver = made.values["hair_groups_physics"][1].get_editor_property("solver_settings")

@@ -128,10 +128,10 @@ def test_equals_numpy(
     np.testing.assert_array_equal(found()[:, 3], np.float32(1e-4), "radii stay")
 
     away = np.linalg.norm(points - carried, axis=1)
-    wanted = np.minimum(clearance.points + away, np.float32(CLEARANCE))
+    required = np.minimum(clearance.points + away, np.float32(CLEARANCE))
 
     def stuck(places: np.ndarray) -> float:
-        shortfall = wanted - signed_distance(places, posed(moved=0.0), CLEARANCE)[0]
+        shortfall = required - signed_distance(places, posed(moved=0.0), CLEARANCE)[0]
         return float((np.maximum.reduceat(shortfall, offsets[:-1]) > 0.1 * CLEARANCE).mean())
 
     assert abs(stuck(found()[:, :3]) - stuck(expected)) < 0.01

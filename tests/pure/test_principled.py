@@ -34,8 +34,8 @@ def test_a_colour_absorbs_as_in_cycles_whatever_the_radial_roughness(
 ) -> None:
     settings, notes = settings_from(PrincipledHair(color=color, radial_roughness=radial))
     assert (settings.model, settings.pigment, notes) == ("marschner", "color", ())
-    wanted = color_absorption(np.array(color), radial)
-    assert root_absorption(settings) == pytest.approx(wanted, rel=1e-3)
+    expected = color_absorption(np.array(color), radial)
+    assert root_absorption(settings) == pytest.approx(expected, rel=1e-3)
 
 
 def test_melanin_is_taken_over_as_it_is_with_its_variation() -> None:
@@ -52,9 +52,9 @@ def test_a_tint_adds_to_the_melanin() -> None:
     tint = (0.8, 0.2, 0.3)
     hair = PrincipledHair(parametrization="MELANIN", melanin=0.4, melanin_redness=0.7, tint=tint)
     settings, (note,) = settings_from(hair)
-    wanted = melanin_absorption(0.4, 0.7) + color_absorption(np.array(tint))
+    expected = melanin_absorption(0.4, 0.7) + color_absorption(np.array(tint))
     assert settings.pigment == "absorption" and "Tint" in note
-    assert root_absorption(settings) == pytest.approx(wanted)
+    assert root_absorption(settings) == pytest.approx(expected)
 
 
 def test_an_absorption_is_taken_over_as_it_is() -> None:
@@ -168,13 +168,13 @@ def test_a_node_that_became_a_look_becomes_the_same_node(hair: PrincipledHair) -
         "ABSORPTION": {"absorption_coefficient"},
     }[hair.parametrization]
     for name in names:
-        wanted = getattr(hair, name)
+        expected = getattr(hair, name)
         if name == "aspect_ratio" and hair.model == "CHIANG":
             continue
         value = getattr(found, name)
-        assert value == (wanted if isinstance(wanted, str) else pytest.approx(wanted, rel=2e-3)), (
-            name
-        )
+        assert value == (
+            expected if isinstance(expected, str) else pytest.approx(expected, rel=2e-3)
+        ), name
 
 
 def test_the_highlights_of_kajiya_kay_are_as_wide_as_those_of_the_node() -> None:

@@ -103,8 +103,8 @@ def test_hair_comes_to_rest_in_another_style_as_if_it_had_begun_there() -> None:
         )
     assert np.abs(other.guides - there.guides).max() < 1e-4
     lengths = np.linalg.norm(np.diff(other.guides, axis=1), axis=2)
-    wanted = np.linalg.norm(np.diff(now.guide_grid, axis=1), axis=2)
-    np.testing.assert_allclose(lengths, wanted, rtol=0.002)
+    expected = np.linalg.norm(np.diff(now.guide_grid, axis=1), axis=2)
+    np.testing.assert_allclose(lengths, expected, rtol=0.002)
 
 
 def test_nothing_of_it_is_simulated_at_0_and_all_of_it_at_1() -> None:

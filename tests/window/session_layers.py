@@ -84,10 +84,10 @@ def ours_alone(label, mine):
     _, shown = yield from view_pictures(label)
     second.view_layer = mine
     yield
-    _, wanted = yield from view_pictures(f"{label}-wanted")
+    _, expected = yield from view_pictures(f"{label}-wanted")
     second.view_layer = other
     yield
-    share = changed_fraction(shown, wanted)
+    share = changed_fraction(shown, expected)
     print(f"{label}: {share:.4f} of the second window is otherwise", flush=True)
     assert share < MAX_REDRAW_FRACTION, f"{label}: Blender's own strands are seen"
 

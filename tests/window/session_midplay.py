@@ -131,10 +131,10 @@ def undo_and_redo_each_step():
 
 
 def by_keys(states, shift):
-    for number, wanted in enumerate(states):
+    for number, expected in enumerate(states):
         yield from press_in_view("Z", ctrl=True, shift=shift)
-        what = f"{'redo' if shift else 'undo'} {number} to {wanted}"
-        yield from wait_until(lambda wanted=wanted: state() == wanted, what)
+        what = f"{'redo' if shift else 'undo'} {number} to {expected}"
+        yield from wait_until(lambda expected=expected: state() == expected, what)
         yield
         nothing_raised(what)
 

@@ -35,11 +35,11 @@ def test_arrays_are_those_that_numpy_reads(tmp_path: Path) -> None:
     path = tmp_path / "a.npz"
     path.write_bytes(content_of(ARRAYS))
     found = read_arrays(path)
-    with np.load(path) as wanted:
-        assert list(found) == wanted.files
-        for name in wanted.files:
-            np.testing.assert_array_equal(found[name], wanted[name])
-            assert found[name].dtype == wanted[name].dtype and found[name].flags.writeable
+    with np.load(path) as expected:
+        assert list(found) == expected.files
+        for name in expected.files:
+            np.testing.assert_array_equal(found[name], expected[name])
+            assert found[name].dtype == expected[name].dtype and found[name].flags.writeable
 
 
 def described(text: bytes) -> bytes:

@@ -55,11 +55,11 @@ def test_texture_files_hold_the_packed_channels(
     written = write_card_textures(
         tmp_path / "Ünder.lock v1.2", maps, preset, file_format=file_format, grid=AtlasGrid(2, 1)
     )
-    wanted = pack_textures(maps, preset)
-    names = [f"Ünder.lock v1.2{each.suffix}{FORMATS[file_format]}" for each in wanted]
+    expected = pack_textures(maps, preset)
+    names = [f"Ünder.lock v1.2{each.suffix}{FORMATS[file_format]}" for each in expected]
     assert [each.path.name for each in written] == names
     assert sorted(os.listdir(tmp_path)) == sorted(names)
-    for file, texture in zip(written, wanted, strict=True):
+    for file, texture in zip(written, expected, strict=True):
         named = len(file.layout.channels)
         assert file.layout == replace(texture.layout, channels=texture.layout.channels[:named])
         is_coded = texture.layout.is_color and file_format != "exr"

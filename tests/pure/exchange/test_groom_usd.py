@@ -482,7 +482,7 @@ def test_what_cannot_be_written_is_an_error(tmp_path: Path) -> None:
     none = Groom(StrandSet(np.zeros((0, 3)), [0], [], []))
     (tmp_path / "taken.usdc").mkdir()
     short = GroomMotion([groom.strands.points[1:]], 24.0)
-    for name, wanted, options, message in (
+    for name, content, options, message in (
         ("a.abc", groom, {}, "not a suffix"),
         ("a.usdz", groom, {}, "not a suffix"),
         ("a.usdc", none, {}, "no strands"),
@@ -492,7 +492,7 @@ def test_what_cannot_be_written_is_an_error(tmp_path: Path) -> None:
         ("taken.usdc", groom, {}, "cannot be written"),
     ):
         with pytest.raises(HairloomError, match=message):
-            write_usd(tmp_path / name, wanted, **options)
+            write_usd(tmp_path / name, content, **options)
     assert [each.name for each in tmp_path.iterdir()] == ["taken.usdc"]
 
 

@@ -87,10 +87,10 @@ def test_coverage_is_kept_within_a_hundredth() -> None:
             break
         for tile in range(grid.tile_count):
             texels = tile_texels(level.shape, grid, tile)
-            wanted = coverage(alpha[tile_texels(alpha.shape, grid, tile)])
+            expected = coverage(alpha[tile_texels(alpha.shape, grid, tile)])
             most = max(0.01, 1.01 / tile_size)
-            assert abs(coverage(level[texels]) - wanted) <= most, (level.shape, tile)
-            assert abs(coverage(in_bytes[texels]) - wanted) <= most, (level.shape, tile)
+            assert abs(coverage(level[texels]) - expected) <= most, (level.shape, tile)
+            assert abs(coverage(in_bytes[texels]) - expected) <= most, (level.shape, tile)
         lost = max(lost, abs(coverage(averaged) - coverage(alpha)))
     assert lost > 0.02, "without care it would be lost"
 

@@ -77,12 +77,12 @@ def test_the_names_and_channels_that_unreal_asks_for() -> None:
         "_CoverageDepthSeed": "alpha depth strand_id",
         "_ColorRoughness": "color color color roughness",
     }
-    for preset, wanted in (("unreal", slots), ("unreal_compact", compact)):
+    for preset, expected in (("unreal", slots), ("unreal_compact", compact)):
         found = {
             layout.suffix: " ".join(role.split(":")[0].split()[0] for role in layout.roles.values())
             for layout in PRESETS[preset]
         }
-        assert found == wanted | {"_base": "base base base"}  # for our own shaders
+        assert found == expected | {"_base": "base base base"}  # for our own shaders
 
 
 @pytest.mark.parametrize(

@@ -28,17 +28,17 @@ def standing(cv_count: int = 9) -> StrandSet:
     return guides_at(SURFACE, root, np.tile([0.0, 0.0, LENGTH], (len(root), 1)), cv_count=cv_count)
 
 
-def grown(wanted: ChildrenSettings, cv_count: int = 9) -> Floats:
+def grown(settings: ChildrenSettings, cv_count: int = 9) -> Floats:
     """Points of each child from its root, (child_count, cv_count, 3)."""
-    grid = make_children(standing(cv_count), SURFACE, wanted, place="test").strands.grid
+    grid = make_children(standing(cv_count), SURFACE, settings, place="test").strands.grid
     return (grid - grid[:, :1]).astype(np.float64)
 
 
-def helix_length(wanted: ChildrenSettings) -> float:
+def helix_length(settings: ChildrenSettings) -> float:
     """The length of the helix around a straight guide, by 100,000 chords."""
     part, size = np.linspace(0.0, 1.0, 100_001), typical_length(standing().lengths())
-    radius = wanted.curl * size * sample_curve(wanted.curl_along, part)
-    angle = 2.0 * np.pi * part * LENGTH / (wanted.curl_length * size)
+    radius = settings.curl * size * sample_curve(settings.curl_along, part)
+    angle = 2.0 * np.pi * part * LENGTH / (settings.curl_length * size)
     places = np.stack([radius * np.cos(angle), radius * np.sin(angle), LENGTH * part])
     return float(np.linalg.norm(np.diff(places), axis=0).sum())
 
@@ -59,20 +59,20 @@ def test_curls_are_helices_around_the_path(curl: float, turn: float) -> None:
 
 @pytest.mark.parametrize(("curl", "turn"), [(0.02, 0.5), (0.03, 0.12), (0.02, 0.06), (0.05, 0.05)])
 def test_no_curl_loses_more_length_than_points_by_need_may(curl: float, turn: float) -> None:
-    wanted = children_settings(curl=curl, curl_length=turn, strand_count=100)
+    settings = children_settings(curl=curl, curl_length=turn, strand_count=100)
     rig = rig_flow.prepare(
-        standing(16), SURFACE, GuideSettings(cv_count=16), place="test", children=wanted
+        standing(16), SURFACE, GuideSettings(cv_count=16), place="test", children=settings
     )
     children = rig.strands.take(np.arange(64, rig.strands.strand_count))
-    kept = children.lengths() / helix_length(wanted)
+    kept = children.lengths() / helix_length(settings)
     assert kept.min() >= 0.995
     assert kept.max() < 1.001
     assert not any("Curls need" in note for note in rig.notes)
 
 
 def test_a_clump_winds_as_one_and_clumps_each_their_own_way() -> None:
-    wanted = children_settings(curl=0.04, curl_along=EVEN, clump=0.05, clump_size=200)
-    made = make_children(standing(), SURFACE, wanted, place="test")
+    settings = children_settings(curl=0.04, curl_along=EVEN, clump=0.05, clump_size=200)
+    made = make_children(standing(), SURFACE, settings, place="test")
     plain = make_children(
         standing(), SURFACE, children_settings(clump=0.05, clump_size=200), place="test"
     )
@@ -91,8 +91,8 @@ def test_a_clump_winds_as_one_and_clumps_each_their_own_way() -> None:
 
 
 def test_curls_that_have_no_room_say_so_and_are_finite(monkeypatch: pytest.MonkeyPatch) -> None:
-    wanted = children_settings(curl=0.02, curl_length=0.005, strand_count=100)
-    made = make_children(standing(), SURFACE, wanted, place="test")
+    settings = children_settings(curl=0.02, curl_length=0.005, strand_count=100)
+    made = make_children(standing(), SURFACE, settings, place="test")
     assert made.strands.grid.shape[1] == 512
     assert any("Curls need 4,801 points per child and have 512" in each for each in made.notes)
     monkeypatch.setattr(children, "CHILD_POINTS", 10_000)
@@ -109,11 +109,11 @@ def test_without_curls_and_fly_aways_nothing_changes() -> None:
 
 def test_combed_children_curl_and_stray_as_they_grew() -> None:
     """Shapes computed again from the stored growth are the same, bit for bit."""
-    wanted = children_settings(
+    settings = children_settings(
         curl=0.03, fly_aways=0.3, clump=0.5, frizz=0.01, length_variation=0.3
     )
     guides = standing()
-    made = make_children(guides, SURFACE, wanted, place="test")
+    made = make_children(guides, SURFACE, settings, place="test")
     chosen = np.arange(3, 400, 7)
     shapes = made.growth.shapes(guides.grid, chosen)
     assert np.array_equal(shapes, made.strands.grid[chosen])

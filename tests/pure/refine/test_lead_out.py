@@ -125,8 +125,8 @@ def test_what_was_inside_comes_out_as_it_moves_away() -> None:
         lead_out(now, at(points), offsets, colliders, clearance)
         away = np.linalg.norm(now - points, axis=1)[1:]
         distance = np.linalg.norm(now, axis=1)[1:] - 0.1
-        wanted = np.minimum(clearance.points[1:] + aside, KEPT)
-        assert (distance > wanted - 2.0 * TOLERANCE * KEPT).all(), (away, distance)
+        required = np.minimum(clearance.points[1:] + aside, KEPT)
+        assert (distance > required - 2.0 * TOLERANCE * KEPT).all(), (away, distance)
 
 
 def test_a_fold_from_which_no_segment_leads_out() -> None:

@@ -36,10 +36,10 @@ def test_each_strand_lies_whole_in_a_row(counts: object) -> None:
     pixels = numbered(layout)
     assert pixels.shape == layout.size[::-1]
     number = 1
-    for (x, y, count, _), wanted in zip(
+    for (x, y, count, _), expected in zip(
         layout.spans.astype(int).tolist(), layout.counts.tolist(), strict=True
     ):
-        assert count == wanted
+        assert count == expected
         assert (pixels[y, x : x + count] == np.arange(number, number + count)).all()
         number += count
     assert np.count_nonzero(pixels) == layout.point_count, "all other texels are empty"

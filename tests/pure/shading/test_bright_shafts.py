@@ -176,8 +176,8 @@ def test_strength_tint_threshold_and_source_change_shafts() -> None:
     assert tinted[..., 1] == pytest.approx(0.5 * full[..., 1]) and not tinted[..., 2].any()
     assert not added(window(), replace(ON, bright_threshold=6.0)).any()
     assert not full[..., 3].any()
-    wanted = [wants_bright(replace(ON, source=source)) for source in ("lights", "bright", "both")]
-    assert wanted == [False, True, True]
+    wants = [wants_bright(replace(ON, source=source)) for source in ("lights", "bright", "both")]
+    assert wants == [False, True, True]
     assert not wants_bright(replace(ON, use_shafts=False))
     assert not wants_bright(replace(ON, bright_strength=0.0))
 

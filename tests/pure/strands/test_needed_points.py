@@ -67,8 +67,8 @@ def test_points_are_hardly_more_than_a_circle_needs() -> None:
     turned = min(
         2.0 * np.arccos(1.0 - MAX_DEVIATION * length / radius), np.sqrt(24.0 * MAX_LENGTH_LOSS)
     )
-    wanted = length / radius / turned
-    assert wanted < count < 1.3 * wanted + 1
+    min_count = length / radius / turned
+    assert min_count < count < 1.3 * min_count + 1
 
 
 def test_few_points_stay_and_get_more_between_them() -> None:

@@ -20,8 +20,8 @@ def walked(curve: Floats, values: Floats, cv_count: int) -> Floats:
     """Values at equal arc lengths, by numpy's own one-dimensional interpolation."""
     steps = np.linalg.norm(np.diff(curve.astype(np.float64), axis=0), axis=1)
     along = np.concatenate([[0.0], np.cumsum(steps)])
-    wanted = np.linspace(0.0, along[-1], cv_count)
-    return np.stack([np.interp(wanted, along, column) for column in values.T], axis=1)
+    places = np.linspace(0.0, along[-1], cv_count)
+    return np.stack([np.interp(places, along, column) for column in values.T], axis=1)
 
 
 @pytest.mark.parametrize("cv_count", [4, 16, 64])

@@ -43,8 +43,8 @@ def test_nearest_points_are_those_that_are_found_from_nothing(
     places, among, kept = cloud(300, 1, rounded), cloud(200, 2, rounded), ResultCache()
     for step in range(4):
         found = kept.nearest("here", places, among, 5)
-        wanted = nearest_points(places, among, 5)
-        for one, other in zip(found, wanted, strict=True):
+        expected = nearest_points(places, among, 5)
+        for one, other in zip(found, expected, strict=True):
             np.testing.assert_array_equal(one, other)
         places, among = (
             change(places, of_places, 10 * step),
