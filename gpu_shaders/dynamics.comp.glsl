@@ -105,11 +105,11 @@ void load_guide(int guide)
   velocity_factor = frame.velocity_factor;
   air_factor = frame.air_factor;
 #ifdef IS_PAINTED
-  vec4 own = texelFetch(painted_numbers, strand_texel(guide, 0, CV_COUNT), 0);
-  velocity_factor = own.x;
-  air_factor = own.y;
-  style_factor = own.z;
-  gravity_factor = own.w;
+  vec4 painted = texelFetch(painted_numbers, strand_texel(guide, 0, CV_COUNT), 0);
+  velocity_factor = painted.x;
+  air_factor = painted.y;
+  style_factor = painted.z;
+  gravity_factor = painted.w;
 #endif
   RigidTransform back_from_now = transform_at(frame.substep_count, 8);
   arc_factor = back_from_now.origin.w;

@@ -91,14 +91,14 @@ void main()
     return;
   }
   // x the strand, y its first hold, z how many it has
-  ivec3 own = ivec3(texelFetch(held_strands, counted_texel(held), 0).xyz);
-  StrandSpan span = strand_span(strand_spans, own.x);
+  ivec3 held_strand = ivec3(texelFetch(held_strands, counted_texel(held), 0).xyz);
+  StrandSpan span = strand_span(strand_spans, held_strand.x);
   float whole_length = 0.0;
   for (int cv = 0; cv < span.count - 1; cv++) {
     whole_length += length_from(span, cv);
   }
   int before = {{pinned_count}} - 1;
-  for (int number = 0; number < own.z; number++) {
-    before = move_to_hold(span, own.y + number, before, whole_length);
+  for (int number = 0; number < held_strand.z; number++) {
+    before = move_to_hold(span, held_strand.y + number, before, whole_length);
   }
 }

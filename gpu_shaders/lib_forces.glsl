@@ -37,14 +37,14 @@ void weight_across_style(vec3 gravity, vec3 root, vec3 carried[FREE_SIZE], out v
     segment_before = segment[i];
   }
   vec3 above = vec3(0.0);
-  float taken = 0.0;  // part of the tension, by back substitution from the segment above
+  float substituted = 0.0;  // part of the tension, by back substitution from the segment above
   for (int i = FREE_COUNT - 1; i >= 0; i--) {
-    float own = tension[i] - taken;
-    taken = ratio[i] * own;
+    float solved_tension = tension[i] - substituted;
+    substituted = ratio[i] * solved_tension;
 #ifdef HAS_SPRINGS
-    load[i] = own * length_of(segment[i]);
+    load[i] = solved_tension * length_of(segment[i]);
 #endif
-    vec3 pull = segment[i] * own;
+    vec3 pull = segment[i] * solved_tension;
     weight[i] = gravity - (pull - above);
     above = pull;
   }

@@ -49,12 +49,12 @@ void newton_step(bool has_normals)
     tension[i] = tension_before * inverse_pivot;
     segment_before = segment[i];
   }
-  vec3 above = vec3(0.0);  // the segment above times its tension
-  float taken = 0.0;       // part of the tension, by back substitution from the segment above
+  vec3 above = vec3(0.0);   // the segment above times its tension
+  float substituted = 0.0;  // part of the tension, by back substitution from the segment above
   for (int i = FREE_COUNT - 1; i >= 0; i--) {
-    float own = tension[i] - taken;
-    taken = ratio[i] * own;
-    vec3 pull = segment[i] * own;
+    float solved_tension = tension[i] - substituted;
+    substituted = ratio[i] * solved_tension;
+    vec3 pull = segment[i] * solved_tension;
     vec3 move = pull - above;
     above = pull;
     if (has_normals) {

@@ -257,18 +257,19 @@ def test_collider_distance(
     points = random.uniform(-0.7, 0.7, (40, 32, 4)).astype(np.float32)
     points[0, 0, :3] = solid.start if isinstance(solid, CapsuleCollider) else solid.bounds[0]
     rounds, fields = np.zeros((1, 2, 4), np.float32), np.zeros((1, 1, 4), np.float32)
-    own = np.zeros((1, 2, 4), np.float32)
+    field_grid = np.zeros((1, 2, 4), np.float32)
     points[..., 3] = is_field = float(isinstance(solid, DistanceField))
     if isinstance(solid, DistanceField):
         points[1, :3, :3] = solid.low, solid.low + 0.1, solid.low + 0.1 * np.array([6, 4, 8])
         fields = field_texels(solid.values)[None]
-        own[0, 0], own[0, 1, :3] = (*solid.low, solid.cell), solid.values.shape
+        field_grid[0, 0] = *solid.low, solid.cell
+        field_grid[0, 1, :3] = solid.values.shape
     else:
         rounds = round_texels(solid)
     found = compute(
         "collider_distance.glsl",
         (32, 40),
-        textures={"points": points, "own": own, "rounds": rounds, "fields": fields},
+        textures={"points": points, "field_grid": field_grid, "rounds": rounds, "fields": fields},
         defines=(("HAS_ROUNDS", 1), ("HAS_FIELDS", 1)),
     )
     distance, gradient = solid.distance(np.ascontiguousarray(points[..., :3].reshape(-1, 3).T))

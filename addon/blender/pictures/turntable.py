@@ -162,9 +162,9 @@ class Turntable:
                 yield index + 1
             if settings.video:
                 self._write_video(temporary, frames)
-        self._remove_leftovers()
+        self._remove_superseded_files()
 
-    def _remove_leftovers(self) -> None:
+    def _remove_superseded_files(self) -> None:
         """Remove further pictures and the video of an earlier turntable, which look like ours."""
         numbers = count(self.settings.frames + 1)
         more = map(self._picture_path, numbers)

@@ -9,8 +9,8 @@ void main()
     return;
   }
   vec4 point = texelFetch(points, at, 0);
-  vec4 grid_origin = texelFetch(own, ivec2(0, 0), 0);
-  ivec3 nodes = ivec3(texelFetch(own, ivec2(1, 0), 0).xyz);
+  vec4 grid_origin = texelFetch(field_grid, ivec2(0, 0), 0);
+  ivec3 nodes = ivec3(texelFetch(field_grid, ivec2(1, 0), 0).xyz);
   Round solid = round_at(0);
   SignedDistance found = round_distance(outward_of(solid, point.xyz), solid.radius);
   if (point.w == 1.0) {
