@@ -156,7 +156,7 @@ def _ours(rig: Rig, camera: Any, absorption: tuple[float, float, float], world: 
         ambient=light.ambient,
         harmonics=light.harmonics,
     )
-    return studio._drawn(snapshot, camera, SIZE, SIZE, SAMPLES)
+    return studio._draw(snapshot, camera, SIZE, SIZE, SAMPLES)
 
 
 def _shown(picture: np.ndarray, exposure: float) -> np.ndarray:
