@@ -42,19 +42,19 @@ def make(names: list[str]) -> None:
     hairstyles = addon_module("exchange.hairstyles")
     STYLES.mkdir(parents=True, exist_ok=True)
     for name in names:
-        begun = time.perf_counter()
+        start = time.perf_counter()
         style = RECIPES[name](head)
         path = STYLES / f"{name}.json"
         hairstyles.write_hairstyle(path, style)
         count = 0 if style.guides is None else len(style.guides.group)
-        print(f"{name}: {count:,} guides, {time.perf_counter() - begun:.1f} s", flush=True)
+        print(f"{name}: {count:,} guides, {time.perf_counter() - start:.1f} s", flush=True)
 
 
 def rig_of(name: str, max_strands: int = 1_000_000) -> tuple[Any, bpy.types.Object]:
     """The rig and the hair object of a style, added to a new scene as by an artist.
 
     Args:
-        most: limit of the number of children.
+        max_strands: limit of the number of children.
     """
     bpy.ops.wm.read_factory_settings(use_empty=True)
     setup = addon_module("blender.setup.hairstyles")
@@ -89,16 +89,18 @@ def animal() -> bpy.types.Object:
 
 def studio_of(rig: Any, hair: bpy.types.Object) -> Any:
     """A studio that draws this hair in its own look."""
-    parameters, of = addon_module("parameters").ALL_SETTINGS, addon_module
-    is_bust = of("blender.setup.hairstyles").is_bust(hair.parent)
-    own = of("blender.command_line.object_settings").settings_of_object(hair)
-    settings = {section: kind() for section, kind in parameters.items()} | own
-    return of("blender.pictures.studio").Studio(
-        of("blender.sessions.prepared_groom").prepare_groom(rig, settings["ambient"]),
-        of("blender.properties.groom_settings").GroomSettings(
-            of("params").SettingsMap(*settings.values())
+    parameters = addon_module("parameters").ALL_SETTINGS
+    is_bust = addon_module("blender.setup.hairstyles").is_bust(hair.parent)
+    object_settings = addon_module("blender.command_line.object_settings").settings_of_object(hair)
+    settings = {section: kind() for section, kind in parameters.items()} | object_settings
+    return addon_module("blender.pictures.studio").Studio(
+        addon_module("blender.sessions.prepared_groom").prepare_groom(rig, settings["ambient"]),
+        addon_module("blender.properties.groom_settings").GroomSettings(
+            addon_module("params").SettingsMap(*settings.values())
         ),
-        look=of("blender.scene.built_in_head").built_in_head().look("light") if is_bust else None,
+        look=addon_module("blender.scene.built_in_head").built_in_head().look("light")
+        if is_bust
+        else None,
     )
 
 
@@ -150,26 +152,26 @@ def draw(name: str, folder: Path) -> None:
 
 
 def main() -> int:
-    options = argparse.ArgumentParser(
+    parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    options.add_argument("names", nargs="*", metavar="NAME", default=[])
-    options.add_argument("--pictures", type=Path, metavar="FOLDER")
-    options.add_argument("--draw-only", action="store_true", help="what there is")
-    options.add_argument("--thumbnails", action="store_true", help="draw these alone")
-    chosen = options.parse_args()
-    names = chosen.names or list(RECIPES)
+    parser.add_argument("names", nargs="*", metavar="NAME", default=[])
+    parser.add_argument("--pictures", type=Path, metavar="FOLDER")
+    parser.add_argument("--draw-only", action="store_true", help="what there is")
+    parser.add_argument("--thumbnails", action="store_true", help="draw these alone")
+    arguments = parser.parse_args()
+    names = arguments.names or list(RECIPES)
     unknown = sorted(set(names) - set(RECIPES))
     if unknown:
         sys.exit(f"There is no recipe {', '.join(unknown)}; there are {', '.join(RECIPES)}")
     gpu.init()
     load_package().register()
-    if not chosen.draw_only:
+    if not arguments.draw_only:
         make(names)
-    for name in names if chosen.pictures else ():
+    for name in names if arguments.pictures else ():
         draw_thumbnail(name)
-    for name in names if chosen.pictures and not chosen.thumbnails else ():
-        draw(name, chosen.pictures.resolve())
+    for name in names if arguments.pictures and not arguments.thumbnails else ():
+        draw(name, arguments.pictures.resolve())
     return 0
 
 
