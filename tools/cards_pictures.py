@@ -55,14 +55,14 @@ class Shots:
     ) -> tuple[Any, Any]:
         """Cards built by this method, and how they are drawn."""
         settings, builds = self.settings, addon_module("blender.cards.build")
-        chosen = addon_module("params").SettingsMap(
+        options = addon_module("params").SettingsMap(
             settings["cards"](source=method, card_count=count, levels=levels),
             settings["card_occlusion"](rays=64),
         )
-        steps = builds.build_steps(builds.CardInputs(self.rig, chosen, edits=edits))
-        made = addon_module("cards.steps").result_of(steps)
-        tied = builds.BuiltCards.of(self.rig, made)
-        return made.build, tied.with_drawing_settings(tied.rest, chosen)
+        steps = builds.build_steps(builds.CardInputs(self.rig, options, edits=edits))
+        cards = addon_module("cards.steps").result_of(steps)
+        bound = builds.BuiltCards.of(self.rig, cards)
+        return cards.build, bound.with_drawing_settings(bound.rest, options)
 
     def cards(self, mesh: Any, drawn: Any, back: Any = None) -> Any:
         """A picture of these cards alone of all drawn ones, with the order of their back faces."""
@@ -73,11 +73,11 @@ class Shots:
 
 def cards_of_layer(mesh: Any, layer: int) -> Any:
     """The cards of one layer alone."""
-    kept = mesh.layer[mesh.card] == layer
-    return replace(mesh, triangles=mesh.triangles[kept], card=mesh.card[kept])
+    is_in_layer = mesh.layer[mesh.card] == layer
+    return replace(mesh, triangles=mesh.triangles[is_in_layer], card=mesh.card[is_in_layer])
 
 
-def edited(build: Any) -> Any:
+def edits_by_hand(build: Any) -> Any:
     """Edits like an artist's: on one side the tips of long cards are flicked out and wider, on the
     other side outer ones are deleted."""
     edits, mesh = addon_module("cards.edits"), build.finest
@@ -90,22 +90,22 @@ def edited(build: Any) -> Any:
     is_right = root[:, 0] > np.median(root[:, 0])
     is_flicked, is_deleted = is_long & is_right, is_long & ~is_right & (mesh.layer > 0)
     card = addon_module("cards.sort").card_of_vertex(mesh)
-    part = np.clip((mesh.along - 0.6) / 0.4, 0.0, 1.0) * is_flicked[card]
+    flick = np.clip((mesh.along - 0.6) / 0.4, 0.0, 1.0) * is_flicked[card]
     outwards = mesh.positions - root.mean(axis=0)
     outwards[:, 2] = 0.0
     outwards /= np.maximum(np.linalg.norm(outwards, axis=1, keepdims=True), 1e-6)
-    bend = 0.05 * part**1.5, 0.05 * part**2
-    moved = mesh.positions + bend[0][:, None] * outwards + bend[1][:, None] * UP
+    offsets = 0.05 * flick**1.5, 0.05 * flick**2
+    moved = mesh.positions + offsets[0][:, None] * outwards + offsets[1][:, None] * UP
     wider = addon_module("cards.shaping").CardVertices(moved, mesh.uv, card).widened(1.0, 1.3)
     moved[is_flicked[card]] = wider[is_flicked[card]]
-    left = ~is_deleted[mesh.card]
+    is_kept = ~is_deleted[mesh.card]
     surface = replace(
         surface,
         positions=moved,
-        triangles=mesh.triangles[left],
-        corner_uv=mesh.uv[mesh.triangles[left]],
+        triangles=mesh.triangles[is_kept],
+        corner_uv=mesh.uv[mesh.triangles[is_kept]],
     )
-    return edits.find_edits(surface, mesh.card[left], record, np.eye(4))
+    return edits.find_edits(surface, mesh.card[is_kept], record, np.eye(4))
 
 
 def main(folder: Path) -> None:
@@ -132,14 +132,14 @@ def main(folder: Path) -> None:
         "card_levels.png",
         [shots.cards(build.levels[n], baked, build.back_triangles[n]) for n in (0, 2, 4)],
     )
-    by_hand = edited(build)
+    by_hand = edits_by_hand(build)
     print(by_hand.counts.report_line)
-    again = [shots.built("clusters", count=count, edits=by_hand) for count in (CARDS, 400)]
+    edited = [shots.built("clusters", count=count, edits=by_hand) for count in (CARDS, 400)]
     sheet(
         "card_edits.png",
         [
-            shots.cards(one.finest, drawn, one.back_triangles[0])
-            for one, drawn in [(build, baked), *again]
+            shots.cards(build_.finest, drawn, build_.back_triangles[0])
+            for build_, drawn in [(build, baked), *edited]
         ],
     )
     for mesh, error in zip(build.levels, build.errors, strict=True):

@@ -25,8 +25,8 @@ from hairloom.addon.exchange.usd.groom_usd import write_usd
 from hairloom.addon.strands import StrandSet
 
 #: extreme counts and offsets
-EXTREMES = (0, 1, 2, 3, 63, 65, 255, 0xFFFF, 0x10000, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF)
-NUMBERS = (np.nan, np.inf, -np.inf, 3.0e38, -3.0e38, 1.0e-45, -0.0, 1.0e9)
+EXTREME_COUNTS = (0, 1, 2, 3, 63, 65, 255, 0xFFFF, 0x10000, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF)
+EXTREME_NUMBERS = (np.nan, np.inf, -np.inf, 3.0e38, -3.0e38, 1.0e-45, -0.0, 1.0e9)
 TOKENS = (
     *("NaN", "Infinity", "-Infinity", "1e999", "-1", "null", "true", "[]", "{}", '"x"', '""'),
     *(
@@ -46,8 +46,8 @@ def damaged_content(kind: str, seed: int, number: int) -> bytes:
     """The damaged file of this number."""
     random = np.random.default_rng([seed, number])
     small, large = originals(kind)
-    originals_here = large if number % 20 == 0 and large else small
-    content = bytearray(originals_here[int(random.integers(len(originals_here)))])
+    files = large if number % 20 == 0 and large else small
+    content = bytearray(files[int(random.integers(len(files)))])
     mutations = TEXT_MUTATIONS if kind == "preset" else MUTATIONS
     for _ in range(int(random.integers(1, 4))):
         content = mutations[int(random.integers(len(mutations)))](content, random)
@@ -61,9 +61,9 @@ def originals(kind: str) -> tuple[tuple[bytes, ...], tuple[bytes, ...]]:
         return tuple(file.read_bytes() for file in sorted(REPOSITORY.glob("presets/*/*.json"))), ()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"sound.{kind}"
-        makers = MAKERS[kind]
-        large = () if kind in LIBRARY_FORMATS else tuple(makers(path, 6000))
-        return tuple(makers(path, 5)), large
+        write_files = WRITERS[kind]
+        large = () if kind in LIBRARY_FORMATS else tuple(write_files(path, 6000))
+        return tuple(write_files(path, 5)), large
 
 
 def sample(strand_count: int, seed: int = 0, *, point_count: int = 0) -> Groom:
@@ -145,7 +145,7 @@ def _motion(groom: Groom) -> GroomMotion:
     return GroomMotion([groom.strands.points, groom.strands.points + np.float32(0.01)], 24.0)
 
 
-MAKERS: dict[str, Callable[[Path, int], Iterator[bytes]]] = {
+WRITERS: dict[str, Callable[[Path, int], Iterator[bytes]]] = {
     "tfx": _tfx_files,
     "hair": _hair_files,
     "abc": _alembic_files,
@@ -172,14 +172,14 @@ def _damage_header(content: bytearray, random: np.random.Generator) -> bytearray
 
 
 def _extreme_count(content: bytearray, random: np.random.Generator) -> bytearray:
-    near = len(content) + int(random.integers(-20, 20))
-    value = int(random.choice([*EXTREMES, near & 0xFFFFFFFF, len(content) // 16]))
+    near_length = len(content) + int(random.integers(-20, 20))
+    value = int(random.choice([*EXTREME_COUNTS, near_length & 0xFFFFFFFF, len(content) // 16]))
     return _put(content, random, 64, value.to_bytes(4, "little"))
 
 
 def _extreme_number(content: bytearray, random: np.random.Generator) -> bytearray:
     for _ in range(int(random.integers(1, 9))):
-        value = np.array([random.choice(NUMBERS)]).astype("<f4").tobytes()
+        value = np.array([random.choice(EXTREME_NUMBERS)]).astype("<f4").tobytes()
         content = _put(content, random, len(content), value)
     return content
 
@@ -192,7 +192,7 @@ def _swap_words(content: bytearray, random: np.random.Generator) -> bytearray:
     return content
 
 
-def _cut(content: bytearray, random: np.random.Generator) -> bytearray:
+def _truncate(content: bytearray, random: np.random.Generator) -> bytearray:
     return content[: int(random.integers(len(content) + 1))]
 
 
@@ -200,43 +200,43 @@ def _extend(content: bytearray, random: np.random.Generator) -> bytearray:
     return content + random.bytes(int(random.integers(1, 200)))
 
 
-def _remove_some(content: bytearray, random: np.random.Generator) -> bytearray:
+def _remove_bytes(content: bytearray, random: np.random.Generator) -> bytearray:
     begin = int(random.integers(len(content) + 1))
     del content[begin : begin + int(random.integers(1, 64))]
     return content
 
 
-def _repeat_some(content: bytearray, random: np.random.Generator) -> bytearray:
+def _repeat_bytes(content: bytearray, random: np.random.Generator) -> bytearray:
     begin = int(random.integers(len(content) + 1))
     part = content[begin : begin + int(random.integers(1, 200))]
     return content[:begin] + part + content[begin:]
 
 
-def _clear_some(content: bytearray, random: np.random.Generator) -> bytearray:
+def _clear_bytes(content: bytearray, random: np.random.Generator) -> bytearray:
     begin = int(random.integers(len(content) + 1))
     part = content[begin : begin + int(random.integers(1, 200))]
     content[begin : begin + len(part)] = bytes([int(random.choice([0, 0xFF]))]) * len(part)
     return content
 
 
-def _other_token(content: bytearray, random: np.random.Generator) -> bytearray:
+def _replace_token(content: bytearray, random: np.random.Generator) -> bytearray:
     """A number or a text of a JSON file becomes something else."""
     tokens = list(re.finditer(rb'-?\d[\d.eE+-]*|"[^"]*"|true|false', content))
     if not tokens:
         return content
     token = tokens[int(random.integers(len(tokens)))]
-    other = TOKENS[int(random.integers(len(TOKENS)))].encode()
-    return content[: token.start()] + other + content[token.end() :]
+    replacement = TOKENS[int(random.integers(len(TOKENS)))].encode()
+    return content[: token.start()] + replacement + content[token.end() :]
 
 
-def _near_number(content: bytearray, random: np.random.Generator) -> bytearray:
+def _change_number(content: bytearray, random: np.random.Generator) -> bytearray:
     """A number of a JSON file changes by up to a tenth, which may stay in its range."""
     numbers = list(re.finditer(rb"-?\d+\.\d+", content))
     if not numbers:
         return content
     number = numbers[int(random.integers(len(numbers)))]
-    near = repr(float(number[0]) * float(random.uniform(0.9, 1.1))).encode()
-    return content[: number.start()] + near + content[number.end() :]
+    changed = repr(float(number[0]) * float(random.uniform(0.9, 1.1))).encode()
+    return content[: number.start()] + changed + content[number.end() :]
 
 
 def _put(content: bytearray, random: np.random.Generator, end: int, value: bytes) -> bytearray:
@@ -253,14 +253,14 @@ MUTATIONS = (
     _extreme_count,
     _extreme_number,
     _swap_words,
-    _cut,
+    _truncate,
     _extend,
-    _remove_some,
-    _repeat_some,
-    _clear_some,
+    _remove_bytes,
+    _repeat_bytes,
+    _clear_bytes,
 )
 TEXT_MUTATIONS = (
-    *(_flip_bits, _cut, _extend, _remove_some, _repeat_some, _clear_some),
-    *[_other_token] * 4,
-    *[_near_number] * 4,
+    *(_flip_bits, _truncate, _extend, _remove_bytes, _repeat_bytes, _clear_bytes),
+    *[_replace_token] * 4,
+    *[_change_number] * 4,
 )

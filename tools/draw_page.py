@@ -25,14 +25,14 @@ class Handler(http.server.SimpleHTTPRequestHandler):
     """Serves files, and stores what index.html posts."""
 
     problem: str | None = "the browser never answered"
-    answered = threading.Event()
+    finished = threading.Event()
 
     def do_POST(self) -> None:
         body = self.rfile.read(int(self.headers["Content-Length"]))
         name = self.path.strip("/")
         if name in ("done", "failed"):
             Handler.problem = None if name == "done" else body.decode()
-            Handler.answered.set()
+            Handler.finished.set()
         else:
             (FOLDER / Path(name).name).write_bytes(body)
         self.send_response(204)
@@ -51,7 +51,7 @@ def main(seconds: float = TIMEOUT_SECONDS) -> int:
         command = [*BROWSER, f"--user-data-dir={profile}", "--remote-debugging-port=0", address]
         browser = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         try:
-            Handler.answered.wait(seconds)
+            Handler.finished.wait(seconds)
         finally:
             browser.kill()
             browser.wait()

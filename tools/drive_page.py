@@ -33,15 +33,15 @@ NO_WEBGL = """HTMLCanvasElement.prototype.getContext = new Proxy(
 
 
 class Browser:
-    """One page in Chromium. complaints: errors and warnings of its console; requests: the addresses
-    that it requested."""
+    """One page in Chromium. console_messages: errors and warnings; requests: the addresses that it
+    requested."""
 
     def __init__(self, profile: str) -> None:
         to_browser, self._out = os.pipe()
         self._in, from_browser = os.pipe()
         command = [*BROWSER, f"--user-data-dir={profile}", "--remote-debugging-pipe"]
 
-        def plugged() -> None:
+        def connect_pipes() -> None:
             """Chromium reads from 3 and writes to 4."""
             ends = [os.dup(to_browser), os.dup(from_browser)]
             for end, number in zip(ends, (3, 4), strict=True):
@@ -49,108 +49,110 @@ class Browser:
 
         self.process = subprocess.Popen(
             [*command, "about:blank"],
-            preexec_fn=plugged,
+            preexec_fn=connect_pipes,
             close_fds=False,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )
         os.close(to_browser)
         os.close(from_browser)
-        self.complaints: list[str] = []
+        self.console_messages: list[str] = []
         self.requests: list[str] = []
-        self._numbers, self._left = itertools.count(1), b""
-        targets = self.ask("Target.getTargets")["targetInfos"]
+        self._message_ids, self._buffer = itertools.count(1), b""
+        targets = self.request("Target.getTargets")["targetInfos"]
         (page,) = (each["targetId"] for each in targets if each["type"] == "page")
-        self._session = self.ask("Target.attachToTarget", targetId=page, flatten=True)["sessionId"]
+        self._session = self.request("Target.attachToTarget", targetId=page, flatten=True)[
+            "sessionId"
+        ]
         for domain in ("Page", "Runtime", "Log", "Network"):
-            self.ask(f"{domain}.enable")
-        self.ask("Network.emulateNetworkConditions", offline=True, latency=0,
+            self.request(f"{domain}.enable")
+        self.request("Network.emulateNetworkConditions", offline=True, latency=0,
                  downloadThroughput=0, uploadThroughput=0)  # fmt: skip
 
     _session: str | None = None
 
-    def ask(self, method: str, **parameters: Any) -> dict[str, Any]:
-        number = next(self._numbers)
+    def request(self, method: str, **parameters: Any) -> dict[str, Any]:
+        number = next(self._message_ids)
         message = {"id": number, "method": method, "params": parameters}
         if self._session:
             message["sessionId"] = self._session
         os.write(self._out, json.dumps(message).encode() + b"\0")
         while True:
-            answer = self._message()
-            if answer.get("id") == number:
-                if "error" in answer:
-                    raise RuntimeError(f"{method}: {answer['error']['message']}")
-                return answer["result"]
-            self._note(answer)
+            reply = self._read_message()
+            if reply.get("id") == number:
+                if "error" in reply:
+                    raise RuntimeError(f"{method}: {reply['error']['message']}")
+                return reply["result"]
+            self._record_event(reply)
 
     def value(self, script: str) -> Any:
-        answer = self.ask("Runtime.evaluate", expression=script, returnByValue=True,
+        result = self.request("Runtime.evaluate", expression=script, returnByValue=True,
                           awaitPromise=True)  # fmt: skip
-        if "exceptionDetails" in answer:
-            raise RuntimeError(f"{script}: {answer['exceptionDetails']}")
-        return answer["result"].get("value")
+        if "exceptionDetails" in result:
+            raise RuntimeError(f"{script}: {result['exceptionDetails']}")
+        return result["result"].get("value")
 
     def wait(self, script: str) -> None:
         end = time.monotonic() + TIMEOUT_SECONDS
         while not self.value(script):
             if time.monotonic() > end:
-                raise RuntimeError(f"never came: {script}; {self.complaints}")
+                raise RuntimeError(f"never came: {script}; {self.console_messages}")
             time.sleep(0.1)
 
     def picture(self, path: Path) -> None:
-        path.write_bytes(base64.b64decode(self.ask("Page.captureScreenshot")["data"]))
+        path.write_bytes(base64.b64decode(self.request("Page.captureScreenshot")["data"]))
 
-    def _message(self) -> dict[str, Any]:
-        while b"\0" not in self._left:
+    def _read_message(self) -> dict[str, Any]:
+        while b"\0" not in self._buffer:
             part = os.read(self._in, 1 << 16)
             if not part:
                 raise RuntimeError("the browser has ended")
-            self._left += part
-        message, _, self._left = self._left.partition(b"\0")
+            self._buffer += part
+        message, _, self._buffer = self._buffer.partition(b"\0")
         return json.loads(message)
 
-    def _note(self, event: dict[str, Any]) -> None:
-        method, what = event.get("method"), event.get("params", {})
+    def _record_event(self, event: dict[str, Any]) -> None:
+        method, parameters = event.get("method"), event.get("params", {})
         if method == "Runtime.exceptionThrown":
-            self.complaints.append(str(what["exceptionDetails"]))
+            self.console_messages.append(str(parameters["exceptionDetails"]))
         elif method == "Log.entryAdded":
-            self.complaints.append(what["entry"]["text"])
-        elif method == "Runtime.consoleAPICalled" and what["type"] in (
+            self.console_messages.append(parameters["entry"]["text"])
+        elif method == "Runtime.consoleAPICalled" and parameters["type"] in (
             "error",
             "warning",
             "assert",
         ):
-            self.complaints.append(str([each.get("value") for each in what["args"]]))
+            self.console_messages.append(str([each.get("value") for each in parameters["args"]]))
         elif method == "Network.requestWillBeSent":
-            self.requests.append(what["request"]["url"][:200])
+            self.requests.append(parameters["request"]["url"][:200])
 
 
 def perform(browser: Browser, step: dict[str, Any], page: Path, output: Path) -> Any:
-    ((name, what),) = step.items()
+    ((name, argument),) = step.items()
     if name == "open":
-        browser.ask("Page.navigate", url=page.resolve().as_uri())
+        browser.request("Page.navigate", url=page.resolve().as_uri())
         browser.wait("['ready', 'failed'].includes(document.documentElement?.dataset.state)")
     elif name == "evaluate":
-        return browser.value(what)
+        return browser.value(argument)
     elif name == "wait":
-        browser.wait(what)
+        browser.wait(argument)
     elif name == "picture":
         browser.value(
             "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
         )
-        browser.picture(output / what)
+        browser.picture(output / argument)
     elif name == "key":
         for kind in ("keyDown", "keyUp"):
-            browser.ask("Input.dispatchKeyEvent", type=kind, key=what)
+            browser.request("Input.dispatchKeyEvent", type=kind, key=argument)
     elif name == "screen":
-        width, height, scale = what
-        browser.ask("Emulation.setDeviceMetricsOverride", width=width, height=height,
+        width, height, scale = argument
+        browser.request("Emulation.setDeviceMetricsOverride", width=width, height=height,
                     deviceScaleFactor=scale, mobile=width < 600)  # fmt: skip
     elif name == "media":
-        features = [{"name": each, "value": value} for each, value in what.items()]
-        browser.ask("Emulation.setEmulatedMedia", features=features)
+        features = [{"name": each, "value": value} for each, value in argument.items()]
+        browser.request("Emulation.setEmulatedMedia", features=features)
     elif name == "block_webgl":
-        browser.ask("Page.addScriptToEvaluateOnNewDocument", source=NO_WEBGL)
+        browser.request("Page.addScriptToEvaluateOnNewDocument", source=NO_WEBGL)
     else:
         raise ValueError(f"no such step: {name}")
     return None
@@ -160,14 +162,14 @@ def main(page: Path, steps: Path, output: Path) -> int:
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
         browser = Browser(profile)
         try:
-            asked = json.loads(steps.read_text(encoding="utf-8"))
-            values = [perform(browser, step, page, output) for step in asked]
+            step_list = json.loads(steps.read_text(encoding="utf-8"))
+            values = [perform(browser, step, page, output) for step in step_list]
         finally:
             browser.process.kill()
             browser.process.wait()
     report = {
         "values": values,
-        "complaints": browser.complaints,
+        "complaints": browser.console_messages,
         "requests": browser.requests,
     }
     (output / "report.json").write_text(json.dumps(report), encoding="utf-8")

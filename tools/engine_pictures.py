@@ -44,11 +44,11 @@ def addon_module(module: str) -> Any:
 
 
 def material(name: str, color: tuple[float, float, float], roughness: float) -> Any:
-    found = bpy.data.materials.new(name)
-    principled = found.node_tree.nodes["Principled BSDF"]
+    material = bpy.data.materials.new(name)
+    principled = material.node_tree.nodes["Principled BSDF"]
     principled.inputs["Base Color"].default_value = (*color, 1.0)
     principled.inputs["Roughness"].default_value = roughness
-    return found
+    return material
 
 
 def head() -> Any:
@@ -59,10 +59,10 @@ def head() -> Any:
     mesh.uv_layers.new().data.foreach_set("uv", surface.corner_uv.ravel())
     mesh.shade_smooth()
     mesh.materials.append(material("Skin", (0.8, 0.55, 0.42), 0.5))
-    found = bpy.data.objects.new("Head", mesh)
-    bpy.context.collection.objects.link(found)
-    found.pass_index = 1
-    return found
+    obj = bpy.data.objects.new("Head", mesh)
+    bpy.context.collection.objects.link(obj)
+    obj.pass_index = 1
+    return obj
 
 
 def scene_of_head() -> Any:
@@ -105,13 +105,13 @@ def passes_of(scene: Any, path: Path) -> dict[str, Any]:
     settings.media_type, settings.file_format = "MULTI_LAYER_IMAGE", "OPEN_EXR_MULTILAYER"
     render.filepath = str(path)
     bpy.ops.render.render(write_still=True)
-    file, found = OpenImageIO.ImageInput.open(str(path)), {}
-    while file.seek_subimage(len(found), 0):
+    file, passes = OpenImageIO.ImageInput.open(str(path)), {}
+    while file.seek_subimage(len(passes), 0):
         spec = file.spec()
-        pixels = file.read_image(len(found), 0, 0, spec.nchannels, "float")
-        found[spec.channelnames[0].split(".")[1]] = np.asarray(pixels)[::-1]
+        pixels = file.read_image(len(passes), 0, 0, spec.nchannels, "float")
+        passes[spec.channelnames[0].split(".")[1]] = np.asarray(pixels)[::-1]
     file.close()
-    return found
+    return passes
 
 
 def render_with_each_engine(work: Path) -> list[Path]:
@@ -132,9 +132,9 @@ def render_with_each_engine(work: Path) -> list[Path]:
     return pictures
 
 
-def add_pane_behind(toward: Any, size: tuple[float, float], material: Any) -> Any:
+def add_pane_behind(offset: Any, size: tuple[float, float], material: Any) -> Any:
     """A pane that faces the camera, at this offset from the target."""
-    bpy.ops.mesh.primitive_plane_add(size=1.0, location=TARGET + toward)
+    bpy.ops.mesh.primitive_plane_add(size=1.0, location=TARGET + offset)
     pane = bpy.context.object
     pane.rotation_euler = (CAMERA - TARGET).to_track_quat("Z", "Y").to_euler()
     pane.scale = (*size, 1.0)
@@ -150,15 +150,15 @@ def render_shafts(work: Path) -> list[Path]:
     world = scene.world.node_tree.nodes["Background"].inputs["Color"]
     world.default_value = ROOM
     hair = next(each for each in scene.objects if each.type == "CURVES")
-    behind, shining = (TARGET - CAMERA).normalized(), material("Pane", (0.0, 0.0, 0.0), 0.9)
-    principled = shining.node_tree.nodes["Principled BSDF"]
+    behind, glowing = (TARGET - CAMERA).normalized(), material("Pane", (0.0, 0.0, 0.0), 0.9)
+    principled = glowing.node_tree.nodes["Principled BSDF"]
     principled.inputs["Emission Color"].default_value = (1.0, 0.85, 0.6, 1.0)
     principled.inputs["Emission Strength"].default_value = 6.0
     dark = material("Bar", (0.05, 0.04, 0.03), 0.9)
-    panes = [add_pane_behind(behind * 0.3, (0.3, 0.3), shining)]
-    for place, size in BARS:
+    panes = [add_pane_behind(behind * 0.3, (0.3, 0.3), glowing)]
+    for offset, size in BARS:
         bar = add_pane_behind(behind * 0.29, size, dark)
-        bar.location += bar.rotation_euler.to_matrix() @ Vector((*place, 0.0))
+        bar.location += bar.rotation_euler.to_matrix() @ Vector((*offset, 0.0))
         panes.append(bar)
     scene.render.resolution_x = scene.render.resolution_y = SIZE
     scene.render.engine, scene.hairloom.picture.samples = "HAIRLOOM", SHAFT_SAMPLES
@@ -186,7 +186,7 @@ def render_shafts(work: Path) -> list[Path]:
     return pictures
 
 
-def side_by_side(pictures: list[Path], kept: Path) -> None:
+def side_by_side(pictures: list[Path], target: Path) -> None:
     import OpenImageIO as oiio
 
     side = oiio.ImageBuf(str(pictures[0])).spec().width
@@ -194,10 +194,10 @@ def side_by_side(pictures: list[Path], kept: Path) -> None:
     for number, path in enumerate(pictures):
         picture = oiio.ImageBufAlgo.channels(oiio.ImageBuf(str(path)), (0, 1, 2))
         oiio.ImageBufAlgo.paste(sheet, number * side, 0, 0, 0, picture)
-    drawn = kept.with_suffix(".png")
-    sheet.write(str(drawn))
-    write_small(drawn, kept)
-    drawn.unlink()
+    temporary = target.with_suffix(".png")
+    sheet.write(str(temporary))
+    write_small(temporary, target)
+    temporary.unlink()
 
 
 def opaque(colors: Any) -> Any:
@@ -206,10 +206,10 @@ def opaque(colors: Any) -> Any:
 
 def distances(depth: Any) -> Any:
     """A picture of depth: white near, grey far, black where nothing is."""
-    is_there = depth < 1.0e9
-    near, far = depth[is_there].min(), np.percentile(depth[is_there], 98.0)
+    is_surface = depth < 1.0e9
+    near, far = depth[is_surface].min(), np.percentile(depth[is_surface], 98.0)
     fraction = np.clip((depth - near) / (far - near), 0.0, 1.0)
-    return opaque(np.where(is_there, 0.9 - 0.85 * fraction, 0.0) * np.ones(3))
+    return opaque(np.where(is_surface, 0.9 - 0.85 * fraction, 0.0) * np.ones(3))
 
 
 def main() -> int:
@@ -218,15 +218,15 @@ def main() -> int:
     extension.register()
     try:
         with tempfile.TemporaryDirectory() as work:
-            found = passes_of(scene_of_head(), Path(work) / "picture.exr")
+            passes = passes_of(scene_of_head(), Path(work) / "picture.exr")
             side_by_side(render_with_each_engine(Path(work)), folder / "over_engines.jpg")
             side_by_side(render_shafts(Path(work)), folder / "light_shafts.jpg")
     finally:
         extension.unregister()
     mask = np.zeros((SIZE, SIZE, 3), np.float32)
     for number, color in MASK.items():
-        mask[found["Object Index"][..., 0] == number] = color
-    pictures = [opaque(found["Combined"][..., :3]), distances(found["Depth"]), opaque(mask)]
+        mask[passes["Object Index"][..., 0] == number] = color
+    pictures = [opaque(passes["Combined"][..., :3]), distances(passes["Depth"]), opaque(mask)]
     images = addon_module("blender.base.images")
     images.write_png(folder / "engine.png", images.contact_sheet(pictures, len(pictures)))
     return 0

@@ -87,10 +87,10 @@ def measure(names: list[str]) -> int:
     begin, is_all = time.monotonic(), len(names) == len(BENCHES)
     for number, name in enumerate(names, 1):
         print(f"[{number}/{len(names)}] {name} {BENCHES[name].arguments}", flush=True)
-        found = results["benches"][name] = run(name)
-        missed = ", ".join(found.get("missed", [])) or "none"
-        verdict = f"missed: {missed}" if found["ended"] else "did not end"
-        print(f"    {found['seconds']:.0f} s, {verdict}", flush=True)
+        result = results["benches"][name] = run(name)
+        missed = ", ".join(result.get("missed", [])) or "none"
+        verdict = f"missed: {missed}" if result["ended"] else "did not end"
+        print(f"    {result['seconds']:.0f} s, {verdict}", flush=True)
         measured = results["benches"]
         results["benches"] = {each: measured[each] for each in BENCHES if each in measured}
         write(results)
@@ -130,15 +130,15 @@ def run(name: str) -> dict[str, Any]:
             timeout=TIMEOUT_SECONDS,
             check=False,
         )
-        found = json.loads(done.stdout.splitlines()[-1])
+        figures = json.loads(done.stdout.splitlines()[-1])
     except (subprocess.TimeoutExpired, json.JSONDecodeError, IndexError) as error:
         print(
             f"    {type(error).__name__}: {getattr(error, 'stderr', None) or done.stderr[-2000:]}"
         )
         return {**conditions, "ended": False, "seconds": round(time.monotonic() - begin, 1)}
-    metadata = {key: found.pop(key) for key in METADATA_KEYS if key in found}
+    metadata = {key: figures.pop(key) for key in METADATA_KEYS if key in figures}
     seconds = round(time.monotonic() - begin, 1)
-    return {**conditions, "ended": True, "seconds": seconds, **metadata, "figures": found}
+    return {**conditions, "ended": True, "seconds": seconds, **metadata, "figures": figures}
 
 
 def busy_processors() -> float:
@@ -169,16 +169,16 @@ def stored_results() -> dict[str, Any]:
     """What has been measured so far."""
     if not FIGURES.is_file():
         return {"benches": {}}
-    found: dict[str, Any] = json.loads(FIGURES.read_text(encoding="utf-8"))
-    return found
+    results: dict[str, Any] = json.loads(FIGURES.read_text(encoding="utf-8"))
+    return results
 
 
 def page(results: Mapping[str, Any]) -> str:
     """The text of docs/figures.md."""
     benches: dict[str, Any] = results["benches"]
-    ended = {name: found for name, found in benches.items() if found["ended"]}
-    limits = sum(len(found["limits"]) for found in ended.values())
-    missed = [f"`{name}.{key}`" for name, found in ended.items() for key in found["missed"]]
+    ended = {name: result for name, result in benches.items() if result["ended"]}
+    limits = sum(len(result["limits"]) for result in ended.values())
+    missed = [f"`{name}.{key}`" for name, result in ended.items() for key in result["missed"]]
     if not ended:
         return "# Figures\n\nNothing has been measured yet: `make bench` does.\n"
     lines = [
@@ -198,42 +198,43 @@ def page(results: Mapping[str, Any]) -> str:
     ):
         if names:
             lines += ["", f"{word}: {', '.join(names)}."]
-    for name, found in ended.items():
-        lines += ["", *section(name, found)]
+    for name, result in ended.items():
+        lines += ["", *section(name, result)]
     return "\n".join(lines) + "\n"
 
 
-def section(name: str, found: Mapping[str, Any]) -> list[str]:
-    command = f"tools/bench.py {name} {found['arguments']}".strip()
-    left_out = f" Left out: {found['left_out']}." if found["left_out"] else ""
-    if found["other_work"] > MAX_BUSY:
+def section(name: str, result: Mapping[str, Any]) -> list[str]:
+    command = f"tools/bench.py {name} {result['arguments']}".strip()
+    left_out = f" Left out: {result['left_out']}." if result["left_out"] else ""
+    if result["other_work"] > MAX_BUSY:
         left_out += " **Measured beside other work: its times count for little.**"
     lines = [
         f"## {name}",
         "",
         summary(name),
         "",
-        f"`{command}`, {found['seconds']:.0f} s. Beside: {found['reference']}.{left_out}",
+        f"`{command}`, {result['seconds']:.0f} s. Beside: {result['reference']}.{left_out}",
         "",
-        measured_on(found),
+        measured_on(result),
         "",
         "| figure | found | limit |",
         "| --- | ---: | --- |",
     ]
-    for key, value in found["figures"].items():
-        limit = found["limits"].get(key, "")
-        mark = f"**{limit}, missed**" if key in found["missed"] else limit
+    for key, value in result["figures"].items():
+        limit = result["limits"].get(key, "")
+        mark = f"**{limit}, missed**" if key in result["missed"] else limit
         lines.append(f"| `{key}` | {number(value)} | {mark} |")
     return lines
 
 
-def measured_on(found: Mapping[str, Any]) -> str:
+def measured_on(result: Mapping[str, Any]) -> str:
     """When a benchmark ran, and what computed and drew."""
-    drawn = "**A software driver, no GPU**" if found["is_software"] else "A GPU"
+    drawn = "**A software driver, no GPU**" if result["is_software"] else "A GPU"
     return (
-        f"Measured on {found['date']} with {found['machine']['cores']} cores of "
-        f"{found['machine']['processor']}, Blender {found['blender']}, Python {found['python']}, "
-        f"numpy {found['numpy']}. {drawn} drew: {found['renderer']} ({found['backend']})."
+        f"Measured on {result['date']} with {result['machine']['cores']} cores of "
+        f"{result['machine']['processor']}, Blender {result['blender']}, "
+        f"Python {result['python']}, numpy {result['numpy']}. "
+        f"{drawn} drew: {result['renderer']} ({result['backend']})."
     )
 
 
@@ -268,8 +269,8 @@ def with_current_values(text: str, results: Mapping[str, Any]) -> str:
     def shown(match: re.Match[str]) -> str:
         bench, key = match["name"].split(".")
         value = results["benches"][bench]["figures"][key]
-        number_there = re.match(r"[\d.,e+-]*\d", match["shown"])
-        unit = match["shown"][number_there.end() :] if number_there else ""
+        quoted_number = re.match(r"[\d.,e+-]*\d", match["shown"])
+        unit = match["shown"][quoted_number.end() :] if quoted_number else ""
         if unit.strip() == "%" and "percent" not in key:
             value = 100.0 * value
         return f'[{number(value)}{unit}]({match["page"]} "{match["name"]}")'

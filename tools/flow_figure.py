@@ -74,8 +74,8 @@ blender/preview/handlers.py register
 """,
 }
 #: colours of floors: the window, Blender, the GPU, pure Python
-_COLORS = {"ui": "#d6e6fa", "blender": "#fae8c8", "render": "#d8f0d4"}
-_PURE = "#e6e2f2"
+_FLOOR_COLORS = {"ui": "#d6e6fa", "blender": "#fae8c8", "render": "#d8f0d4"}
+_PURE_COLOR = "#e6e2f2"
 _BOX, _GAP, _ROW, _LEFT, _TITLE = (150, 36), 10, 56, 118, 40
 
 
@@ -100,25 +100,25 @@ class Step:
 
 def steps_of(flow: str) -> list[Step]:
     """The steps at the top of a flow's tree; raises ValueError where an indentation is skipped."""
-    tops: list[Step] = []
+    roots: list[Step] = []
     path: list[Step] = []
     for line in flow.strip("\n").splitlines():
         depth, step = (len(line) - len(line.lstrip())) // 2, Step(*line.split())
         if depth > len(path):
             raise ValueError(f"{line}: indented by more than one step")
         del path[depth:]
-        (path[-1].calls if path else tops).append(step)
+        (path[-1].calls if path else roots).append(step)
         path.append(step)
-    return tops
+    return roots
 
 
 def arrows(steps: list[Step]) -> list[tuple[Step, Step]]:
     """(caller, called) of a tree, in the order of the calls."""
-    found = []
+    pairs = []
     for step in steps:
         for called in step.calls:
-            found += [(step, called), *arrows([called])]
-    return found
+            pairs += [(step, called), *arrows([called])]
+    return pairs
 
 
 def figure() -> str:
@@ -152,8 +152,8 @@ def _place_columns(steps: list[Step], column: int) -> int:
     for step in steps:
         for called in step.calls:
             called.row = step.row + 1 if called.floor == step.floor else 0
-        after = _place_columns(step.calls, column) if step.calls else column + 1
-        step.column, column = column, after
+        next_column = _place_columns(step.calls, column) if step.calls else column + 1
+        step.column, column = column, next_column
     return column
 
 
@@ -167,7 +167,7 @@ def _panel(title: str, tops: list[Step], top: int, right: int) -> tuple[str, int
         if not rows:
             continue
         starts[floor], height = y, max(rows) * _ROW
-        color = _COLORS.get(floor.partition("/")[0], _PURE)
+        color = _FLOOR_COLORS.get(floor.partition("/")[0], _PURE_COLOR)
         name = f"{floor}.py" if floor.endswith("_flow") else f"{floor}/"
         parts.append(
             f'<rect x="0" y="{y}" width="{right}" height="{height - 4}" fill="{color}"/>'

@@ -39,7 +39,7 @@ MAX_SECONDS_IN_SUBPROCESS = 20.0
 MAX_MEMORY_FACTOR, MAX_EXTRA_MEMORY = 10, 1_000_000
 MAX_MESSAGE_LENGTH = 2000
 #: address space of the child beyond what it has at the start [bytes]
-ADDRESSES = 1 << 29
+MAX_ADDRESS_SPACE = 1 << 29
 
 
 def read_preset_file(path: Path) -> Preset[Any]:
@@ -60,10 +60,10 @@ def main(arguments: list[str]) -> int:
     kind, count, seed = arguments[0], int(arguments[1]), int((arguments[2:] or ["0"])[0])
     if kind not in LIBRARY_FORMATS:
         pages = int(Path("/proc/self/statm").read_text().split()[0])
-        limit = pages * resource.getpagesize() + ADDRESSES
+        limit = pages * resource.getpagesize() + MAX_ADDRESS_SPACE
         resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
-    found = fuzz(kind, count, seed)
-    print(json.dumps(found))
+    result = fuzz(kind, count, seed)
+    print(json.dumps(result))
     return 0
 
 
@@ -71,7 +71,7 @@ def fuzz(kind: str, count: int, seed: int = 0) -> dict[str, Any]:
     """Read `count` damaged files of a format; failures are named with their numbers."""
     outcomes = {"read": 0, "refused": 0}
     failures: list[str] = []
-    slowest, hungriest = 0.0, 0.0
+    slowest, max_memory_factor = 0.0, 0.0
     max_seconds = MAX_SECONDS_IN_SUBPROCESS if kind in LIBRARY_FORMATS else MAX_SECONDS
     max_factor = np.inf if kind in LIBRARY_FORMATS else MAX_MEMORY_FACTOR
     tracemalloc.start()
@@ -82,7 +82,9 @@ def fuzz(kind: str, count: int, seed: int = 0) -> dict[str, Any]:
             path.write_bytes(content)
             outcome, seconds, peak = read_and_judge(READERS[kind], path, max_seconds)
             slowest = max(slowest, seconds)
-            hungriest = max(hungriest, (peak - MAX_EXTRA_MEMORY) / max(len(content), 1))
+            max_memory_factor = max(
+                max_memory_factor, (peak - MAX_EXTRA_MEMORY) / max(len(content), 1)
+            )
             if peak > max_factor * len(content) + MAX_EXTRA_MEMORY:
                 outcome = f"{peak:,} bytes of memory for a file of {len(content):,}"
             if seconds > max_seconds:
@@ -97,7 +99,7 @@ def fuzz(kind: str, count: int, seed: int = 0) -> dict[str, Any]:
         "failures": failures,
         **outcomes,
         "slowest": slowest,
-        "memory_times": hungriest,
+        "memory_times": max_memory_factor,
     }
 
 
@@ -112,8 +114,8 @@ def read_and_judge(
         with _interrupted_after(3.0 * max_seconds):
             outcome = fault_of(read(path)) or "read"
     except HairloomError as error:
-        is_told = bool(error.problem and error.remedy and path.name in error.place)
-        is_clear = is_told and len(str(error)) < MAX_MESSAGE_LENGTH
+        is_complete = bool(error.problem and error.remedy and path.name in error.place)
+        is_clear = is_complete and len(str(error)) < MAX_MESSAGE_LENGTH
         outcome = "refused" if is_clear else f"an unclear message: {error}"
     except (Exception, _Hang) as error:
         outcome = f"{type(error).__name__}: {error}"
@@ -124,24 +126,26 @@ def read_and_judge(
 def _are_valid(color: Any, offsets: Any) -> bool:
     """Whether each strand has colours all along or none at all."""
     is_none = np.isnan(color).all(axis=1)
-    of_strand = np.repeat(is_none[offsets[:-1]], np.diff(offsets))
-    known = color[~is_none]
-    return bool((is_none == of_strand).all() and (known >= 0.0).all() and np.isfinite(known).all())
+    is_none_in_strand = np.repeat(is_none[offsets[:-1]], np.diff(offsets))
+    colors = color[~is_none]
+    return bool(
+        (is_none == is_none_in_strand).all() and (colors >= 0.0).all() and np.isfinite(colors).all()
+    )
 
 
-def fault_of(found: Any) -> str:
+def fault_of(result: Any) -> str:
     """What is wrong with a reader's result; empty if nothing is."""
-    if isinstance(found, ReadGroom):
-        strands, color = found.strands, found.groom.color
-        sound = [
+    if isinstance(result, ReadGroom):
+        strands, color = result.strands, result.groom.color
+        checks = [
             strands.strand_count > 0,
             np.isfinite(strands.points).all(),
             np.isfinite(strands.radius).all() and (strands.radius > 0.0).all(),
             strands.root_uv is None or np.isfinite(strands.root_uv).all(),
             color is None or _are_valid(color, strands.offsets),
         ]
-        return "" if all(sound) else f"a groom that is not sound: {sound}"
-    return "" if isinstance(found, Preset) else f"a {type(found).__name__}"
+        return "" if all(checks) else f"a groom that is not sound: {checks}"
+    return "" if isinstance(result, Preset) else f"a {type(result).__name__}"
 
 
 class _Hang(BaseException):
@@ -153,10 +157,10 @@ def _interrupted_after(seconds: float) -> Iterator[None]:
     def interrupt(*_: object) -> None:
         raise _Hang(f"still reading after {seconds:g} s")
 
-    old = signal.signal(signal.SIGALRM, interrupt)
+    previous_handler = signal.signal(signal.SIGALRM, interrupt)
     signal.setitimer(signal.ITIMER_REAL, seconds)
     try:
         yield
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, old)
+        signal.signal(signal.SIGALRM, previous_handler)

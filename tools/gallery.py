@@ -27,7 +27,7 @@ PICTURES = REPOSITORY / "docs" / "images" / "gallery"
 PRESETS, STYLES = REPOSITORY / "presets", REPOSITORY / "hairstyles"
 HEADLESS, BEAR = "tools/headless.py", "tools/gallery.py --bear"
 SIZE = "--width 360 --height 360 --samples 2"
-COLUMNS, COATED = 3, "--style long_wavy"
+COLUMNS, STYLED = 3, "--style long_wavy"
 HEADING = """# Gallery
 
 Made by `make gallery` from the commands shown here. Do not edit this page. Each command can be
@@ -63,7 +63,7 @@ class Section:
     title: str
     text: str
     pictures: tuple[Picture, ...]
-    first: tuple[str, ...] = ()
+    setup_commands: tuple[str, ...] = ()
 
 
 def preset_pictures(folder: str, options: str) -> tuple[Picture, ...]:
@@ -128,13 +128,13 @@ SECTIONS = (
         "Water and dust",
         "A hairstyle [wet and dusty](shading.md#water-and-dust).",
         (
-            Picture("water_half", "Half wet", f"{COATED} --set shading.wetness=0.5"),
-            Picture("water_soaked", "Soaked", f"{COATED} --set shading.wetness=1"),
-            Picture("dust_dry", "Dusty", f"{COATED} --set shading.dust=0.6"),
+            Picture("water_half", "Half wet", f"{STYLED} --set shading.wetness=0.5"),
+            Picture("water_soaked", "Soaked", f"{STYLED} --set shading.wetness=1"),
+            Picture("dust_dry", "Dusty", f"{STYLED} --set shading.dust=0.6"),
             Picture(
                 "dust_wet",
                 "Wet dust",
-                f"{COATED} --set shading.dust=0.6 --set shading.wetness=0.8",
+                f"{STYLED} --set shading.dust=0.6 --set shading.wetness=0.8",
             ),
         ),
     ),
@@ -174,7 +174,7 @@ SECTIONS = (
                 " --set grow.volume=0.008",
             ),
         ),
-        first=(f"{HEADLESS} run sample_scene --output sample.blend",),
+        setup_commands=(f"{HEADLESS} run sample_scene --output sample.blend",),
     ),
     Section(
         "Fur",
@@ -183,7 +183,7 @@ SECTIONS = (
             fur("fur_short", "Short fur", "brown", length=0.012, strand_count=60000),
             fur("fur_long", "Long fur", "blond", length=0.02, strand_count=60000),
         ),
-        first=(f"{BEAR} bear.obj",),
+        setup_commands=(f"{BEAR} bear.obj",),
     ),
     Section(
         "Strands and cards",
@@ -202,27 +202,27 @@ SECTIONS = (
 
 def page() -> str:
     """The text of docs/gallery.md."""
-    return "\n".join([HEADING, *(_shown(section) for section in SECTIONS)])
+    return "\n".join([HEADING, *(_section_text(section) for section in SECTIONS)])
 
 
-def _shown(section: Section) -> str:
+def _section_text(section: Section) -> str:
     lines = [f"## {section.title}", "", section.text, ""]
-    if section.first:
-        lines += ["```sh", *(_for_reader(command) for command in section.first), "```", ""]
+    if section.setup_commands:
+        lines += ["```sh", *(_as_shown(command) for command in section.setup_commands), "```", ""]
     for start in range(0, len(section.pictures), COLUMNS):
         row = section.pictures[start : start + COLUMNS]
         pictures = (f"![{each.title}](images/gallery/{each.name}.jpg)" for each in row)
-        lines += [_cells(each.title for each in row), _cells("---" for _ in row)]
-        lines += [_cells(pictures), "", "```sh"]
-        lines += [*(_for_reader(each.command) for each in row), "```", ""]
+        lines += [_table_row(each.title for each in row), _table_row("---" for _ in row)]
+        lines += [_table_row(pictures), "", "```sh"]
+        lines += [*(_as_shown(each.command) for each in row), "```", ""]
     return "\n".join(lines)
 
 
-def _cells(texts: Any) -> str:
+def _table_row(texts: Any) -> str:
     return f"| {' | '.join(texts)} |"
 
 
-def _for_reader(command: str) -> str:
+def _as_shown(command: str) -> str:
     return f".venv/bin/python {command}"
 
 
@@ -237,7 +237,10 @@ def draw(names: list[str]) -> None:
         os.chdir(folder)
         for section in SECTIONS:
             chosen = [each for each in section.pictures if not names or each.name in names]
-            for command in (*(section.first if chosen else ()), *(each.command for each in chosen)):
+            for command in (
+                *(section.setup_commands if chosen else ()),
+                *(each.command for each in chosen),
+            ):
                 print(command, flush=True)
                 run(command)
             for each in chosen:
@@ -269,12 +272,12 @@ def command_line() -> Callable[[str], None]:
 
 def grow_once(inputs: Any) -> None:
     """Keep the hair of the built-in head: growing it takes longer than drawing it."""
-    grow, kept = inputs.grow_with_face, {}
+    grow, cache = inputs.grow_with_face, {}
 
     def cached_grow(surface: Any, settings: Any, weights: Any, length: Any = None) -> Any:
-        if settings not in kept:
-            kept[settings] = grow(surface, settings, weights, length)
-        return kept[settings]
+        if settings not in cache:
+            cache[settings] = grow(surface, settings, weights, length)
+        return cache[settings]
 
     inputs.grow_with_face = cached_grow
 
@@ -324,18 +327,18 @@ def write_bear(path: Path) -> None:
 
 
 def main() -> int:
-    options = argparse.ArgumentParser(
+    parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    options.add_argument("names", nargs="*", metavar="NAME")
-    options.add_argument("--page", action="store_true")
-    options.add_argument("--bear", type=Path, metavar="FILE.obj")
-    chosen = options.parse_args()
-    if chosen.bear:
-        write_bear(chosen.bear)
+    parser.add_argument("names", nargs="*", metavar="NAME")
+    parser.add_argument("--page", action="store_true")
+    parser.add_argument("--bear", type=Path, metavar="FILE.obj")
+    arguments = parser.parse_args()
+    if arguments.bear:
+        write_bear(arguments.bear)
         return 0
-    if not chosen.page:
-        draw(chosen.names)
+    if not arguments.page:
+        draw(arguments.names)
     PAGE.write_text(page(), encoding="utf-8")
     return 0
 

@@ -20,12 +20,12 @@ SUBTEXEL = 1.0 / 512.0
 _ROUNDING = 2.0e-6
 
 
-def is_same(one: Floats, other: Floats) -> bool:
+def is_same(first: Floats, second: Floats) -> bool:
     """Whether two pictures, or other results of a GPU, are the same but for rounding."""
     if _is_software():
-        return bool(np.array_equal(one, other))
-    largest = np.maximum(np.abs(one), np.abs(other)).astype(np.float64)
-    return bool((np.abs(one - other) <= _ROUNDING * np.maximum(largest, 1.0)).all())
+        return bool(np.array_equal(first, second))
+    largest = np.maximum(np.abs(first), np.abs(second)).astype(np.float64)
+    return bool((np.abs(first - second) <= _ROUNDING * np.maximum(largest, 1.0)).all())
 
 
 def tolerance(processor: float, gpu: float) -> float:

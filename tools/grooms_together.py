@@ -59,15 +59,15 @@ class Groom:
         if self._pass is not None:
             self._pass.read()
 
-    def mover(
-        self, number: int, target: np.ndarray, duration: float, near: frozenset[int]
+    def advancing_groom(
+        self, number: int, target: np.ndarray, duration: float, neighbours: frozenset[int]
     ) -> AdvancingGroom:
         style = NeighbourStyle(partial(getattr, self, "style"), self.hair, self.grid)
-        straight = LinearMotion(self.style, partial(np.asarray, target))
+        motion = LinearMotion(self.style, partial(np.asarray, target))
         frame_steps = (
             None if self.settings is None else self._steps(self.settings, target, duration)
         )
-        return AdvancingGroom(number, style, straight, frame_steps, near, self.known)
+        return AdvancingGroom(number, style, motion, frame_steps, neighbours, self.known)
 
     def _steps(
         self, settings: DynamicsSettings, target: np.ndarray, duration: float
@@ -83,21 +83,21 @@ def play_frame(
     grooms: Sequence[Groom],
     targets: Sequence[np.ndarray],
     duration: float,
-    near: Sequence[frozenset[int]] | None = None,
+    neighbours: Sequence[frozenset[int]] | None = None,
 ) -> None:
     """Simulate a frame, in which the grooms' styles move to these targets.
 
     Args:
-        near: for each groom, the numbers of the grooms that it feels; None: all others.
+        neighbours: for each groom, the numbers of the grooms that it feels; None: all others.
     """
     numbers = frozenset(range(len(grooms)))
-    near = near or [numbers - {number} for number in numbers]
-    movers = [
-        groom.mover(number, target, duration, near[number])
+    neighbours = neighbours or [numbers - {number} for number in numbers]
+    advancing = [
+        groom.advancing_groom(number, target, duration, neighbours[number])
         for number, (groom, target) in enumerate(zip(grooms, targets, strict=True))
     ]
-    advance_together(movers)
-    for groom, mover, target in zip(grooms, movers, targets, strict=True):
-        if mover.error is not None:
-            raise mover.error
-        groom.known, groom.style = mover.known, target
+    advance_together(advancing)
+    for groom, groom_step, target in zip(grooms, advancing, targets, strict=True):
+        if groom_step.error is not None:
+            raise groom_step.error
+        groom.known, groom.style = groom_step.known, target

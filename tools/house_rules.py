@@ -16,7 +16,7 @@ from pathlib import Path
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 ADDON = REPOSITORY / "addon"
-BLENDER = {
+BLENDER_MODULES = {
     "bpy",
     "bmesh",
     "bpy_extras",
@@ -28,7 +28,7 @@ BLENDER = {
 }
 
 #: modules that every room may import; the pure rooms; and the modules over them
-GROUND = {"errors", "arrays"}
+COMMON_MODULES = {"errors", "arrays"}
 PURE = {"params", "strands", "groom", "dynamics", "refine", "shading", "cards", "exchange"}
 FLOWS = {
     "rig_flow",
@@ -64,7 +64,7 @@ BLENDER_ROOMS = (
     "command_line",
 )
 
-#: room -> what it may import, beside itself, GROUND, the standard library and numpy
+#: room -> what it may import, beside itself, COMMON_MODULES, the standard library and numpy
 MAY_IMPORT: dict[str, set[str]] = {
     "errors": set(),
     "arrays": set(),
@@ -96,9 +96,13 @@ MAY_IMPORT: dict[str, set[str]] = {
     "wet_flow": PURE,
     "parameters": PURE,
     "render": PURE | {"gpu"},
-    **{f"blender.{room}": PURE | FLOWS | {"render", "gpu"} | BLENDER for room in BLENDER_ROOMS},
-    "ui": {"params", "parameters", "strands", "blender"} | BLENDER,  # and declarations, see below
-    "registration": {"blender", "ui"} | BLENDER,
+    **{
+        f"blender.{room}": PURE | FLOWS | {"render", "gpu"} | BLENDER_MODULES
+        for room in BLENDER_ROOMS
+    },
+    "ui": {"params", "parameters", "strands", "blender"}
+    | BLENDER_MODULES,  # and declarations, see below
+    "registration": {"blender", "ui"} | BLENDER_MODULES,
     "__init__": {"registration"},
 }
 
@@ -115,12 +119,12 @@ def room_of(name: str) -> str:
 
 def reversed_import(room: str, target: str) -> str:
     """Why a room of blender/ may not import another; empty if it may, or if one is no such room."""
-    one, other = (name.removeprefix("blender.") for name in (room, target))
+    importer, imported = (name.removeprefix("blender.") for name in (room, target))
     if not (room.startswith("blender.") and target.startswith("blender.")):
         return ""
-    if BLENDER_ROOMS.index(other) <= BLENDER_ROOMS.index(one):
+    if BLENDER_ROOMS.index(imported) <= BLENDER_ROOMS.index(importer):
         return ""
-    return f"{other} stands after {one} in the order of the rooms: move what both need down"
+    return f"{imported} stands after {importer} in the order of the rooms: move what both need down"
 
 
 def imports_of(file: Path, addon: Path = ADDON) -> Iterator[tuple[int, str]]:
@@ -150,7 +154,7 @@ def violations(addon: Path) -> list[str]:
         room = room_of(module_name(file, addon))
         if room == "blender.__init__":
             continue  # empty
-        allowed = MAY_IMPORT[room] | GROUND | {room}
+        allowed = MAY_IMPORT[room] | COMMON_MODULES | {room}
         for line, name in imports_of(file, addon):
             target = room_of(name)
             if why := reversed_import(room, target):
@@ -251,34 +255,34 @@ def mutable_names(addon: Path = ADDON) -> list[str]:
 
 def _module_names(file: Path) -> set[str]:
     """Names that the module itself binds and that no function binds locally."""
-    bound: set[str] = set()
-    own: set[str] = set()
+    module_names: set[str] = set()
+    bound_locally: set[str] = set()
     module = _nodes(file)[0]
     assert isinstance(module, ast.Module)
     for node in module.body:
         targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
-        bound.update(each.id for each in targets if isinstance(each, ast.Name))
+        module_names.update(each.id for each in targets if isinstance(each, ast.Name))
     for node in _nodes(file):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
             shared = {
                 n for each in ast.walk(node) if isinstance(each, ast.Global) for n in each.names
             }
             arguments = node.args
-            own.update(
+            bound_locally.update(
                 a.arg for a in (*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs)
             )
-            own.update(
+            bound_locally.update(
                 each.id
                 for each in ast.walk(node)
                 if isinstance(each, ast.Name)
                 and isinstance(each.ctx, ast.Store)
                 and each.id not in shared
             )
-    return bound - own
+    return module_names - bound_locally
 
 
 #: what Blender itself calls, by name
-_OF_BLENDER = {
+_CALLED_BY_BLENDER = {
     "bake",
     "check",
     "description",
@@ -287,7 +291,7 @@ _OF_BLENDER = {
     "draw_header_preset",
     "execute",
 }
-_OF_BLENDER |= {
+_CALLED_BY_BLENDER |= {
     "invoke",
     "modal",
     "cancel",
@@ -297,8 +301,8 @@ _OF_BLENDER |= {
     "unregister",
     "render",
 }
-_OF_BLENDER |= {"update", "update_render_passes", "view_draw", "view_update", "filter_items"}
-_OF_BLENDER |= {"update_script_node", "draw_item", "setup", "draw_prepare"}
+_CALLED_BY_BLENDER |= {"update", "update_render_passes", "view_draw", "view_update", "filter_items"}
+_CALLED_BY_BLENDER |= {"update_script_node", "draw_item", "setup", "draw_prepare"}
 
 
 def unused_names(repository: Path = REPOSITORY) -> list[str]:
@@ -326,7 +330,7 @@ def unused_names(repository: Path = REPOSITORY) -> list[str]:
                 used.update(re.findall(r"\w+", node.value) if len(node.value) < 200 else ())
     shaders = " ".join(file.read_text() for file in (repository / "gpu_shaders").rglob("*.glsl"))
     defined = [(name, place) for name, place in defined if "reference" not in place]
-    of_shaders = set(re.findall(r"\w+", shaders)) | _OF_BLENDER | set(WANTED)
+    of_shaders = set(re.findall(r"\w+", shaders)) | _CALLED_BY_BLENDER | set(KEPT_NAMES)
     return [
         f"{place} {name}"
         for name, place in defined
@@ -335,7 +339,7 @@ def unused_names(repository: Path = REPOSITORY) -> list[str]:
 
 
 #: unused names that stay, each for its reason
-WANTED = {
+KEPT_NAMES = {
     "are_facing_away": "what culling by shaders is tested against",
     "are_hidden": "what culling by shaders is tested against",
     "detail_factors": "what the pieces drawn by shaders are tested against",
@@ -355,15 +359,15 @@ def files_that_list_sections(sections: dict[str, str], addon: Path = ADDON) -> l
     """
     found = []
     for file in sorted(addon.rglob("*.py")):
-        named: set[object] = set()
+        names: set[object] = set()
         for node in _nodes(file):
             if isinstance(node, ast.Constant):
-                named.add(node.value)
+                names.add(node.value)
             elif isinstance(node, ast.Attribute):
-                named.add(node.attr)
+                names.add(node.attr)
             elif isinstance(node, ast.Name):
-                named.add(node.id)
-        count = max(len(named.intersection(each)) for each in (sections, sections.values()))
+                names.add(node.id)
+        count = max(len(names.intersection(each)) for each in (sections, sections.values()))
         if count >= 0.4 * len(sections):
             found.append(str(file.relative_to(addon)))
     return found
@@ -375,10 +379,10 @@ def renamed_arguments(addon: Path = ADDON) -> list[str]:
     for file in sorted(addon.rglob("*.py")):
         functions = (node for node in _nodes(file) if isinstance(node, ast.FunctionDef))
         for function in functions:
-            own = {node.arg for node in ast.walk(function.args) if isinstance(node, ast.arg)}
+            arguments = {node.arg for node in ast.walk(function.args) if isinstance(node, ast.arg)}
             text = (ast.get_docstring(function) or "").partition("\nArgs:\n")[2]
             for names in re.findall(r"^ {4}(\w+(?:, \w+)*): ", text.partition("\n\n")[0], re.M):
-                unknown = sorted(set(names.split(", ")) - own)
+                unknown = sorted(set(names.split(", ")) - arguments)
                 found += [f"{file.relative_to(addon)}: {function.name}: {name}" for name in unknown]
     return found
 

@@ -30,9 +30,9 @@ from hairloom.addon.exchange.usd.groom_usd import write_usd
 
 STRANDS = 3000
 #: the child is killed within the time that this many writes take
-WRITES = 4.0
+MAX_DELAY_IN_WRITES = 4.0
 #: files that are exported as a set with the target
-OTHERS = ("hair_base.png", "hair_normal.png", "hair.json")
+OTHER_FILES = ("hair_base.png", "hair_normal.png", "hair.json")
 
 
 def _write_bones(path: Path, version: int) -> None:
@@ -46,11 +46,11 @@ def _write_text(path: Path, version: int) -> None:
 
 def _write_set(path: Path, version: int) -> None:
     with atomic_file_set(path) as folder:
-        for name in (path.name, *OTHERS):
+        for name in (path.name, *OTHER_FILES):
             (folder / name).write_bytes(bytes([version]) * 500_000)
 
 
-def _write_plainly(path: Path, version: int) -> None:
+def _write_without_atomicity(path: Path, version: int) -> None:
     """A writer that is not atomic; that it is caught shows that the trials can fail."""
     path.write_bytes(bytes([version]) * 3_000_000)
 
@@ -64,7 +64,7 @@ WRITERS: dict[str, Callable[[Path, int], object]] = {
     "abc": lambda path, version: write_groom_alembic(path, GROOMS[version]),
     "usdc": lambda path, version: write_usd(path, GROOMS[version]),
     "glb": _write_set,
-    "plain": _write_plainly,
+    "plain": _write_without_atomicity,
 }
 #: imported once, not in every child
 LIBRARIES = {"abc": ("imath", "alembic3d"), "usdc": ("pxr.Usd", "pxr.UsdGeom", "pxr.Vt")}
@@ -95,30 +95,30 @@ def kill_and_check(
     random = np.random.default_rng(seed)
     folder, versions, seconds = target.parent, [], 0.0
     for version in (0, 1):
-        begun = time.perf_counter()
+        start = time.perf_counter()
         _write_in_child(write, target, version)
-        seconds = max(seconds, time.perf_counter() - begun)
-        versions.append(_content(folder))
-    found = {"trials": trials, "failures": 0, "amid": 0, "mixed": 0, "leftovers": 0}
+        seconds = max(seconds, time.perf_counter() - start)
+        versions.append(_folder_content(folder))
+    counts = {"trials": trials, "failures": 0, "amid": 0, "mixed": 0, "leftovers": 0}
     stale_names: set[str] = set()
     for _ in range(trials):
-        _kill_one(write, target, float(random.uniform(0.0, WRITES * seconds)))
+        _kill_one(write, target, float(random.uniform(0.0, MAX_DELAY_IN_WRITES * seconds)))
         temporary_names = {name for name in os.listdir(folder) if name.startswith(".")}
-        found["amid"] += bool(temporary_names - stale_names)
+        counts["amid"] += bool(temporary_names - stale_names)
         remove_stale_files(folder)  # as the next writer does
         stale_names = {name for name in os.listdir(folder) if name.startswith(".")}
-        content = _content(folder)
+        content = _folder_content(folder)
         is_whole = all(content.get(n) in [v[n] for v in versions] for n in versions[0])
-        found["failures"] += not is_whole
-        found["mixed"] += is_whole and content not in versions
+        counts["failures"] += not is_whole
+        counts["mixed"] += is_whole and content not in versions
         if not is_whole:
             _write_in_child(write, target, 0)
     _write_in_child(write, target, 0)
-    found["leftovers"] = len(set(os.listdir(folder)) - set(versions[0]))
-    return found
+    counts["leftovers"] = len(set(os.listdir(folder)) - set(versions[0]))
+    return counts
 
 
-def _content(folder: Path) -> dict[str, bytes]:
+def _folder_content(folder: Path) -> dict[str, bytes]:
     """The visible files of a folder; of Alembic files, which hold a date, size and completeness."""
     files = [path for path in folder.iterdir() if not path.name.startswith(".")]
     return {

@@ -24,11 +24,11 @@ MIDDLE = np.array([0.0, -0.06, 0.735])
 
 # From here on places are in metres around that origin: x to the left of the bust, -y ahead, z up.
 #: how far shoulders are lowered, and each lip is moved to the other; height of the mouth [m]
-SHOULDERS_DOWN, LIPS_CLOSED, MOUTH = 0.034, 0.0013, -0.0755
+SHOULDER_DROP, LIP_SHIFT, MOUTH = 0.034, 0.0013, -0.0755
 #: the cut, seen from the front: a superellipse with this middle, these half axes and this power
 CUT_HEIGHT, CUT_HALF, CUT_POWER = -0.10, (0.158, 0.158), 2.4
 #: corners this near to the cut are moved onto it, so that no slivers are left [m]
-SNAP = 0.004
+SNAP_DISTANCE = 0.004
 #: island -> y behind which the mouth and the eye sockets are left out [m]
 MAX_DEPTH = {1: -0.07, 2: -0.062, 3: -0.062}
 
@@ -118,7 +118,9 @@ class Mesh:
         return Mesh(self.positions[vertices], self.uv[uvs], self.sizes, corner_vertex, corner_uv)
 
 
-def of_polygons(positions: np.ndarray, uv: np.ndarray, faces: list[list[tuple[int, int]]]) -> Mesh:
+def mesh_of_polygons(
+    positions: np.ndarray, uv: np.ndarray, faces: list[list[tuple[int, int]]]
+) -> Mesh:
     """A mesh of polygons whose corners are (vertex, uv)."""
     corners = np.array([corner for face in faces for corner in face])
     sizes = np.array([len(face) for face in faces])
@@ -139,22 +141,22 @@ def read_skin(path: Path) -> Mesh:
         elif kind == "f" and group == "body":
             faces.append([tuple(int(one) - 1 for one in corner.split("/")[:2]) for corner in rest])
     x, y, z = np.array(vertices).T * DECIMETRE
-    return of_polygons(np.stack([x, -z, y], axis=1) - MIDDLE, np.array(uv), faces)
+    return mesh_of_polygons(np.stack([x, -z, y], axis=1) - MIDDLE, np.array(uv), faces)
 
 
 def relaxed(mesh: Mesh) -> Mesh:
     """The mesh with shoulders lowered from the pose of MakeHuman's model, and closed lips."""
     x, y, z = mesh.positions.T
-    let_down = (
-        SHOULDERS_DOWN * smooth_step((np.abs(x) - 0.04) / 0.14) * smooth_step((-0.10 - z) / 0.05)
+    lowering = (
+        SHOULDER_DROP * smoothstep((np.abs(x) - 0.04) / 0.14) * smoothstep((-0.10 - z) / 0.05)
     )
-    near = np.exp(-(((z - MOUTH) / 0.007) ** 2)) * smooth_step((0.030 - np.abs(x)) / 0.010)
-    closed = LIPS_CLOSED * near * smooth_step((-0.075 - y) / 0.01) * np.sign(z - MOUTH)
-    moved = np.stack([x, y, z - let_down - closed], axis=1)
-    return Mesh(moved, mesh.uv, mesh.sizes, mesh.corner_vertex, mesh.corner_uv)
+    lip_weight = np.exp(-(((z - MOUTH) / 0.007) ** 2)) * smoothstep((0.030 - np.abs(x)) / 0.010)
+    lip_offset = LIP_SHIFT * lip_weight * smoothstep((-0.075 - y) / 0.01) * np.sign(z - MOUTH)
+    positions = np.stack([x, y, z - lowering - lip_offset], axis=1)
+    return Mesh(positions, mesh.uv, mesh.sizes, mesh.corner_vertex, mesh.corner_uv)
 
 
-def above_cut(positions: np.ndarray) -> np.ndarray:
+def distance_inside_cut(positions: np.ndarray) -> np.ndarray:
     """How far inside the cut points are, approximately [m]; negative outside."""
     across = np.abs(positions[:, 0]) / CUT_HALF[0]
     down = np.maximum(CUT_HEIGHT - positions[:, 2], 0.0) / CUT_HALF[1]
@@ -165,23 +167,26 @@ def above_cut(positions: np.ndarray) -> np.ndarray:
 def cut(mesh: Mesh) -> Mesh:
     """The part of a mesh inside the cut, with its border exactly on it."""
     positions = snapped(mesh.positions)
-    inside = above_cut(positions)
+    inside = distance_inside_cut(positions)
     inside[np.abs(inside) < 1e-7] = 0.0
     points, uvs = list(positions), list(mesh.uv)
-    made: dict[tuple[int, ...], int] = {}
+    new_indices: dict[tuple[int, ...], int] = {}
 
-    def between(one: tuple[int, int], other: tuple[int, int]) -> tuple[int, int]:
+    def cut_corner(start_corner: tuple[int, int], end_corner: tuple[int, int]) -> tuple[int, int]:
         """The corner where an edge meets the cut."""
-        one, other = min(one, other), max(one, other)
-        start, end = positions[one[0]], positions[other[0]]
-        at = crossing(start, end)
-        vertex = made.setdefault((one[0], other[0]), len(points))
+        start_corner, end_corner = min(start_corner, end_corner), max(start_corner, end_corner)
+        start, end = positions[start_corner[0]], positions[end_corner[0]]
+        fraction = cut_fraction(start, end)
+        vertex = new_indices.setdefault((start_corner[0], end_corner[0]), len(points))
         if vertex == len(points):
-            points.append(start + at * (end - start))
-        key = (*one, *other)
-        place = made.setdefault(key, len(uvs))
+            points.append(start + fraction * (end - start))
+        key = (*start_corner, *end_corner)
+        place = new_indices.setdefault(key, len(uvs))
         if place == len(uvs):
-            uvs.append(mesh.uv[one[1]] + at * (mesh.uv[other[1]] - mesh.uv[one[1]]))
+            uvs.append(
+                mesh.uv[start_corner[1]]
+                + fraction * (mesh.uv[end_corner[1]] - mesh.uv[start_corner[1]])
+            )
         return vertex, place
 
     faces = []
@@ -190,54 +195,57 @@ def cut(mesh: Mesh) -> Mesh:
         if not (inside[corners[:, 0]] > 0.0).any():
             continue
         face = []
-        ring = [tuple(int(one) for one in corner) for corner in corners]
-        for one, other in zip(ring, ring[1:] + ring[:1], strict=True):
-            if inside[one[0]] >= 0.0:
-                face.append(one)
-            if inside[one[0]] * inside[other[0]] < 0.0:
-                face.append(between(one, other))
+        ring = [tuple(int(start_corner) for start_corner in corner) for corner in corners]
+        for start_corner, end_corner in zip(ring, ring[1:] + ring[:1], strict=True):
+            if inside[start_corner[0]] >= 0.0:
+                face.append(start_corner)
+            if inside[start_corner[0]] * inside[end_corner[0]] < 0.0:
+                face.append(cut_corner(start_corner, end_corner))
         if len(face) > 2:
             faces.append(face)
-    return of_polygons(np.array(points), np.array(uvs), faces).compact()
+    return mesh_of_polygons(np.array(points), np.array(uvs), faces).compact()
 
 
 def snapped(positions: np.ndarray) -> np.ndarray:
     """Points near the cut moved onto it, along its gradient."""
     moved = positions.copy()
-    near = np.abs(above_cut(moved)) < SNAP
+    near = np.abs(distance_inside_cut(moved)) < SNAP_DISTANCE
     for _ in range(8):
-        here = above_cut(moved[near])
+        here = distance_inside_cut(moved[near])
         steps = np.eye(3) * 1e-5
-        slope = np.stack([above_cut(moved[near] + step) - here for step in steps], axis=1) / 1e-5
+        slope = (
+            np.stack([distance_inside_cut(moved[near] + step) - here for step in steps], axis=1)
+            / 1e-5
+        )
         moved[near] -= here[:, None] * slope / (slope**2).sum(axis=1, keepdims=True)
     return moved
 
 
-def crossing(start: np.ndarray, end: np.ndarray) -> float:
+def cut_fraction(start: np.ndarray, end: np.ndarray) -> float:
     """The fraction of an edge at which it meets the cut, by bisection."""
     low, high = 0.0, 1.0
-    start_is_in = above_cut(start[None])[0] > 0.0
+    start_is_in = distance_inside_cut(start[None])[0] > 0.0
     for _ in range(50):
         middle = 0.5 * (low + high)
-        is_in = above_cut((start + middle * (end - start))[None])[0] > 0.0
+        is_in = distance_inside_cut((start + middle * (end - start))[None])[0] > 0.0
         low, high = (middle, high) if is_in == start_is_in else (low, middle)
     return 0.5 * (low + high)
 
 
-def chosen(mesh: Mesh, wanted: np.ndarray) -> Mesh:
+def select_polygons(mesh: Mesh, is_selected: np.ndarray) -> Mesh:
     """Some polygons of a mesh."""
-    at = np.repeat(wanted, mesh.sizes)
-    kept = mesh.corner_vertex[at], mesh.corner_uv[at]
-    return Mesh(mesh.positions, mesh.uv, mesh.sizes[wanted], *kept).compact()
+    corners = np.repeat(is_selected, mesh.sizes)
+    selected = mesh.corner_vertex[corners], mesh.corner_uv[corners]
+    return Mesh(mesh.positions, mesh.uv, mesh.sizes[is_selected], *selected).compact()
 
 
-def shallow(mesh: Mesh) -> Mesh:
+def without_depths(mesh: Mesh) -> Mesh:
     """The mesh without the depths of the mouth and the eye sockets, which are separate islands."""
     first = np.concatenate([[0], np.cumsum(mesh.sizes)[:-1]])
     depth = np.minimum.reduceat(mesh.positions[mesh.corner_vertex, 1], first)
     island = island_of(mesh.uv)[mesh.corner_uv[first]]
     limit = np.array([MAX_DEPTH.get(number, np.inf) for number in range(len(ISLANDS))])
-    return chosen(mesh, depth <= limit[island])
+    return select_polygons(mesh, depth <= limit[island])
 
 
 def island_of(uv: np.ndarray) -> np.ndarray:
@@ -265,15 +273,15 @@ def cap(mesh: Mesh) -> Mesh:
     turn = np.arctan2(across, down)
     first, last = int(turn.argmin()), int(turn.argmax())
     count = len(ring)
-    one = (first + np.arange((last - first) % count + 1)) % count
-    other = (first - np.arange((first - last) % count + 1)) % count
+    left = (first + np.arange((last - first) % count + 1)) % count
+    right = (first - np.arange((first - last) % count + 1)) % count
     faces, i, j = [], 0, 0
-    while i + 1 < len(one) or j + 1 < len(other):
-        goes_on = j + 1 == len(other) or (
-            i + 1 < len(one) and turn[one[i + 1]] <= turn[other[j + 1]]
+    while i + 1 < len(left) or j + 1 < len(right):
+        advances_left = j + 1 == len(right) or (
+            i + 1 < len(left) and turn[left[i + 1]] <= turn[right[j + 1]]
         )
-        face = [one[i], other[j], one[i + 1] if goes_on else other[j + 1]]
-        i, j = (i + 1, j) if goes_on else (i, j + 1)
+        face = [left[i], right[j], left[i + 1] if advances_left else right[j + 1]]
+        i, j = (i + 1, j) if advances_left else (i, j + 1)
         if len(set(face)) == 3:
             faces.append(face)
     order = np.argsort(turn)
@@ -288,7 +296,7 @@ def cap(mesh: Mesh) -> Mesh:
     outward = 0.5 * (a + b) - (0.0, 0.5 * (a + b)[:, 1].mean(), CUT_HEIGHT)
     if (np.cross(b - a, c - a) * outward).sum() < 0.0:
         faces = [face[::-1] for face in faces]
-    return of_polygons(ring, uv, [[(corner, corner) for corner in face] for face in faces])
+    return mesh_of_polygons(ring, uv, [[(corner, corner) for corner in face] for face in faces])
 
 
 def border(mesh: Mesh) -> np.ndarray:
@@ -298,11 +306,11 @@ def border(mesh: Mesh) -> np.ndarray:
         for face in mesh.polygons(mesh.corner_vertex)
         for start, end in zip(face, np.roll(face, -1), strict=True)
     }
-    after = {start: end for start, end in edges if (end, start) not in edges}
-    on_cut = np.abs(above_cut(mesh.positions)) < 1e-5
-    ring = [next(vertex for vertex in after if on_cut[vertex])]
-    while after[ring[-1]] != ring[0]:
-        ring.append(after[ring[-1]])
+    next_vertex = {start: end for start, end in edges if (end, start) not in edges}
+    on_cut = np.abs(distance_inside_cut(mesh.positions)) < 1e-5
+    ring = [next(vertex for vertex in next_vertex if on_cut[vertex])]
+    while next_vertex[ring[-1]] != ring[0]:
+        ring.append(next_vertex[ring[-1]])
     assert on_cut[ring].all()
     return np.array(ring)
 
@@ -332,20 +340,20 @@ def eyes() -> Mesh:
     maps = [np.array(flat) * EYE_MAP_RADIUS + middle for middle in EYE_MAPS]
     count = len(ball)
     both = [[(one + shift, one + shift) for one in face] for shift in (0, count) for face in faces]
-    return of_polygons(np.concatenate([left, right]), np.concatenate(maps), both)
+    return mesh_of_polygons(np.concatenate([left, right]), np.concatenate(maps), both)
 
 
-def joined(one: Mesh, other: Mesh) -> Mesh:
+def joined(first: Mesh, second: Mesh) -> Mesh:
     return Mesh(
-        np.concatenate([one.positions, other.positions]),
-        np.concatenate([one.uv, other.uv]),
-        np.concatenate([one.sizes, other.sizes]),
-        np.concatenate([one.corner_vertex, other.corner_vertex + len(one.positions)]),
-        np.concatenate([one.corner_uv, other.corner_uv + len(one.uv)]),
+        np.concatenate([first.positions, second.positions]),
+        np.concatenate([first.uv, second.uv]),
+        np.concatenate([first.sizes, second.sizes]),
+        np.concatenate([first.corner_vertex, second.corner_vertex + len(first.positions)]),
+        np.concatenate([first.corner_uv, second.corner_uv + len(first.uv)]),
     )
 
 
-def smooth_step(value: np.ndarray) -> np.ndarray:
+def smoothstep(value: np.ndarray) -> np.ndarray:
     x = np.clip(value, 0.0, 1.0)
     return x * x * (3.0 - 2.0 * x)
 
@@ -355,33 +363,33 @@ def inside_line(positions: np.ndarray, line: tuple[tuple[float, ...], ...]) -> n
     x, y, z = positions.T
     # angles as lengths on the head, whose radius is about 8.5 cm
     to_metres = np.radians(1.0) * 0.085
-    place = np.stack([np.degrees(np.arctan2(np.abs(x), AXIS - y)) * to_metres, z], axis=1)
+    position = np.stack([np.degrees(np.arctan2(np.abs(x), AXIS - y)) * to_metres, z], axis=1)
     corners = np.array(line)
     corners[:, 0] *= to_metres
-    nearest, width = np.full(len(place), np.inf), np.ones(len(place))
-    crossings = np.zeros(len(place), int)
+    nearest, width = np.full(len(position), np.inf), np.ones(len(position))
+    crossings = np.zeros(len(position), int)
     for start, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):
         along = end[:2] - start[:2]
-        at = np.clip((place - start[:2]) @ along / (along @ along), 0.0, 1.0)
-        away = np.linalg.norm(place - start[:2] - at[:, None] * along, axis=1)
-        width = np.where(away < nearest, start[2] + at * (end[2] - start[2]), width)
-        nearest = np.minimum(nearest, away)
-        spans = (start[1] > place[:, 1]) != (end[1] > place[:, 1])
+        fraction = np.clip((position - start[:2]) @ along / (along @ along), 0.0, 1.0)
+        distance = np.linalg.norm(position - start[:2] - fraction[:, None] * along, axis=1)
+        width = np.where(distance < nearest, start[2] + fraction * (end[2] - start[2]), width)
+        nearest = np.minimum(nearest, distance)
+        spans = (start[1] > position[:, 1]) != (end[1] > position[:, 1])
         with np.errstate(divide="ignore", invalid="ignore"):
-            meets = start[0] + (place[:, 1] - start[1]) / along[1] * along[0]
-        crossings += spans & (place[:, 0] < meets)
-    return np.where(crossings % 2 == 1, smooth_step(nearest / width), 0.0)
+            crossing_x = start[0] + (position[:, 1] - start[1]) / along[1] * along[0]
+        crossings += spans & (position[:, 0] < crossing_x)
+    return np.where(crossings % 2 == 1, smoothstep(nearest / width), 0.0)
 
 
 def brows(positions: np.ndarray) -> np.ndarray:
-    place = np.stack([np.abs(positions[:, 0]), positions[:, 2]], axis=1)
-    line, weight = np.array(BROW), np.zeros(len(place))
+    position = np.stack([np.abs(positions[:, 0]), positions[:, 2]], axis=1)
+    line, weight = np.array(BROW), np.zeros(len(position))
     for start, end in pairwise(line):
         along = end[:2] - start[:2]
-        at = np.clip((place - start[:2]) @ along / (along @ along), 0.0, 1.0)
-        away = np.linalg.norm(place - start[:2] - at[:, None] * along, axis=1)
-        half = start[2] + at * (end[2] - start[2])
-        weight = np.maximum(weight, smooth_step(0.8 * (1.9 - away / half)))
+        fraction = np.clip((position - start[:2]) @ along / (along @ along), 0.0, 1.0)
+        distance = np.linalg.norm(position - start[:2] - fraction[:, None] * along, axis=1)
+        half = start[2] + fraction * (end[2] - start[2])
+        weight = np.maximum(weight, smoothstep(0.8 * (1.9 - distance / half)))
     return weight * (positions[:, 1] < -0.04)
 
 
@@ -397,7 +405,7 @@ def lips(mesh: Mesh, mouth: np.ndarray) -> np.ndarray:
     top = -0.0755 + 0.0098 * np.clip(1.0 - across**1.8, 0.0, 1.0) ** 0.8 - bow
     bottom = -0.0760 - 0.0108 * np.clip(1.0 - across**2.4, 0.0, 1.0) ** 0.7
     edge = np.minimum(top - z, z - bottom) / 0.0016
-    red = smooth_step(edge + 0.7) * (y < -0.07) * (across < 1.0)
+    red = smoothstep(edge + 0.7) * (y < -0.07) * (across < 1.0)
     red[mesh.corner_vertex[mouth]] = 1.0
     return red
 
@@ -417,15 +425,15 @@ def lid_rims(mesh: Mesh, sockets: np.ndarray) -> np.ndarray:
         for face in mesh.polygons(mesh.corner_vertex)
         for start, end in zip(face, np.roll(face, -1), strict=True)
     }
-    one, other = np.array([edge for edge in edges if of_face[list(edge)].all()]).T
+    starts, ends = np.array([edge for edge in edges if of_face[list(edge)].all()]).T
     ring = np.where(of_socket & of_face, 0, RIM_RING + 1)
     for step in range(RIM_RING):
-        for start, end in ((one, other), (other, one)):
-            beside = end[ring[start] == step]
-            ring[beside] = np.minimum(ring[beside], step + 1)
+        for start, end in ((starts, ends), (ends, starts)):
+            neighbors = end[ring[start] == step]
+            ring[neighbors] = np.minimum(ring[neighbors], step + 1)
     # no lashes in the inner corner, at the caruncle
-    away = np.abs(mesh.positions[:, 0]) - EYE[0]
-    return (ring == RIM_RING) * smooth_step((away + 0.0115) / 0.003)
+    distance = np.abs(mesh.positions[:, 0]) - EYE[0]
+    return (ring == RIM_RING) * smoothstep((distance + 0.0115) / 0.003)
 
 
 def cavities(mesh: Mesh) -> np.ndarray:
@@ -438,15 +446,15 @@ def cavities(mesh: Mesh) -> np.ndarray:
     ring = np.sqrt(1.0 - height**2)
     sphere = np.stack([ring * np.cos(turn), ring * np.sin(turn), height], axis=1)
     # rays are cosine-weighted about the normal
-    free = np.empty(len(mesh.positions))
+    openness = np.empty(len(mesh.positions))
     for vertex, (point, normal) in enumerate(zip(mesh.positions, normals, strict=True)):
         rays = sphere + normal
         start = Vector(point + 1e-4 * normal)
         hits = [tree.ray_cast(start, Vector(ray), CAVITY_REACH)[3] for ray in rays]
         # farther hits occlude less
-        hidden = sum(1.0 - hit / CAVITY_REACH for hit in hits if hit is not None)
-        free[vertex] = 1.0 - hidden / CAVITY_RAYS
-    return free
+        occlusion = sum(1.0 - hit / CAVITY_REACH for hit in hits if hit is not None)
+        openness[vertex] = 1.0 - occlusion / CAVITY_RAYS
+    return openness
 
 
 def vertex_normals(mesh: Mesh) -> np.ndarray:
@@ -465,7 +473,7 @@ def indices_in(whole: Mesh, part: np.ndarray) -> np.ndarray:
 
 def main(path: Path) -> None:
     whole = relaxed(read_skin(path))
-    skin = shallow(cut(whole))
+    skin = without_depths(cut(whole))
     makehuman = indices_in(whole, skin.positions)
     island = island_of(skin.uv)[skin.corner_uv]
     lashes, red = lid_rims(skin, np.isin(island, (2, 3))), lips(skin, island == 1)

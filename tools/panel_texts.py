@@ -29,17 +29,17 @@ class Recorder:
     """Replaces Blender's UILayout: records the contents, and changes nothing."""
 
     def __init__(self) -> None:
-        self.noted: list[str] = []
+        self.texts: list[str] = []
 
     def __setattr__(self, name: str, value: Any) -> None:
-        if name == "noted":
+        if name == "texts":
             object.__setattr__(self, name, value)
 
     def __getattr__(self, name: str) -> Callable[..., Any]:
         """Any other call of a layout: its text is recorded, and its result records too."""
 
         def call(*_: Any, text: str = "", heading: str = "", **__: Any) -> Any:
-            self.noted += [each for each in (text, heading) if each]
+            self.texts += [each for each in (text, heading) if each]
             return self
 
         return call
@@ -49,11 +49,11 @@ class Recorder:
 
     def operator(self, name: str, text: str | None = None, **_: Any) -> Any:
         operator = getattr(bpy.ops.hairloom, name.partition(".")[2])
-        self.noted.append(operator.get_rna_type().name if text is None else text)
+        self.texts.append(operator.get_rna_type().name if text is None else text)
         return SimpleNamespace()
 
     def prop(self, data: Any, name: str, text: str | None = None, **_: Any) -> None:
-        self.noted.append(_field(data.bl_rna.properties[name], text))
+        self.texts.append(_field(data.bl_rna.properties[name], text))
 
     def prop_search(
         self, data: Any, name: str, *_: Any, text: str | None = None, **__: Any
@@ -61,14 +61,14 @@ class Recorder:
         self.prop(data, name, text)
 
 
-def _field(known: Any, text: str | None) -> str:
-    default = getattr(known, "default", "")
-    if getattr(known, "is_array", False):
-        default = [round(each, 4) for each in known.default_array]
+def _field(property_rna: Any, text: str | None) -> str:
+    default = getattr(property_rna, "default", "")
+    if getattr(property_rna, "is_array", False):
+        default = [round(each, 4) for each in property_rna.default_array]
     elif isinstance(default, float):
         default = round(default, 4)
-    dot = "" if known.is_animatable else ", no keyframes"
-    return f"{known.name if text is None else text}: {default}{dot}"
+    dot = "" if property_rna.is_animatable else ", no keyframes"
+    return f"{property_rna.name if text is None else text}: {default}{dot}"
 
 
 @contextmanager
@@ -97,10 +97,10 @@ def texts() -> dict[str, list[str]]:
     bpy.ops.hairloom.grow(strand_count=60, length=0.1, cv_count=8)
     hair = bpy.context.object
     with _without_line_breaks():
-        found = {name: list(_texts_of_picture(name, hair, mesh)) for name in PICTURES}
+        by_picture = {name: list(_texts_of_picture(name, hair, mesh)) for name in PICTURES}
     preferences = importlib.import_module(f"{PACKAGE}.addon.ui.preferences").HAIRLOOM_AP_preferences
     declared = [each.keywords for each in preferences.__annotations__.values()]
-    return found | {
+    return by_picture | {
         "preferences": [f"{each['name']}: {each.get('default', '')}" for each in declared]
     }
 
@@ -111,12 +111,12 @@ def _texts_of_picture(name: str, hair: bpy.types.Object, mesh: bpy.types.Object)
         recorder, kind = Recorder(), getattr(bpy.types, f"HAIRLOOM_PT_{panel}")
         with bpy.context.temp_override(active_object=active, object=active):
             kind.draw(SimpleNamespace(layout=recorder), bpy.context)
-        yield from (f"# {kind.bl_label}", *recorder.noted)
+        yield from (f"# {kind.bl_label}", *recorder.texts)
 
 
 def stored_texts() -> dict[str, list[str]]:
-    found: dict[str, list[str]] = json.loads(STORED_TEXTS.read_text(encoding="utf-8"))
-    return found
+    texts_by_picture: dict[str, list[str]] = json.loads(STORED_TEXTS.read_text(encoding="utf-8"))
+    return texts_by_picture
 
 
 def store_texts() -> None:

@@ -17,8 +17,8 @@ def random_parts(seeds: list[str], actions: int, backend: str) -> list[dict[str,
     """
     parts = []
     for seed in seeds:
-        for number, begun in enumerate(range(0, actions, MAX_ACTIONS[backend])):
-            count = min(MAX_ACTIONS[backend], actions - begun)
+        for number, start in enumerate(range(0, actions, MAX_ACTIONS[backend])):
+            count = min(MAX_ACTIONS[backend], actions - start)
             name = str(int(seed) + number * SEED_STEP)
             parts.append({"HAIRLOOM_SEEDS": name, "HAIRLOOM_ACTIONS": str(count)})
     return parts

@@ -29,32 +29,32 @@ SLICES, LAYERS = (4, 8, 16, 64, 255), (4, 8, 16)
 
 def slice_spans(resolution: int) -> LayerSpans:
     """The spans of slices: the whole depth, in each texel."""
-    all_of_it = np.tile([1.0, 0.0, 0.0], (resolution, resolution, 1))
-    return LayerSpans(0.0 * all_of_it, all_of_it, 1)
+    whole = np.tile([1.0, 0.0, 0.0], (resolution, resolution, 1))
+    return LayerSpans(0.0 * whole, whole, 1)
 
 
 @dataclass(frozen=True)
-class Places:
+class SamplePoints:
     """Random points of strands, T as counted there, and the coverage that maps are made from."""
 
     exact: Coverage
     texel: np.ndarray
-    place: np.ndarray
+    position: np.ndarray
     depth: np.ndarray
-    counted: np.ndarray
+    counted_transmittance: np.ndarray
 
     def error(self, settings: VolumeSettings, ends: np.ndarray) -> float:
         """The error with layers of these ends, and spans as coarse as the shader's."""
         spans = slice_spans(RESOLUTION)
         if settings.shadows == "deep":
             spans = self.exact.spans(START_TEXELS)
-        behind = spans.fraction(*np.divmod(self.texel, RESOLUTION), self.place, self.depth)
+        behind = spans.fraction(*np.divmod(self.texel, RESOLUTION), self.position, self.depth)
         layers = self.exact.layers(ends, spans)[self.texel]
         return self.error_of((layers * layer_weights(behind, ends)).sum(axis=1))
 
     def error_of(self, tau: np.ndarray) -> float:
-        wrong = np.abs(transmittance(tau, 1.0) - self.counted)
-        return float(wrong.mean() / self.counted.mean())
+        error = np.abs(transmittance(tau, 1.0) - self.counted_transmittance)
+        return float(error.mean() / self.counted_transmittance.mean())
 
 
 def errors(
@@ -69,25 +69,27 @@ def errors(
     Args:
         strands: (strand_count, cv_count, 3) [m] float64. radius: of all of them [m].
     """
-    at = _places(strands, radius, sun)
-    found = {"none": at.error_of(np.zeros(POINTS))}
+    points = _sample_points(strands, radius, sun)
+    result = {"none": points.error_of(np.zeros(POINTS))}
     for count in slices:
-        even = np.arange(1, count + 1) / count
-        found[f"slices{count}"] = at.error(VolumeSettings(shadows="slices"), even)
+        ends = np.arange(1, count + 1) / count
+        result[f"slices{count}"] = points.error(VolumeSettings(shadows="slices"), ends)
     for count in layers:
         settings = VolumeSettings(shadows="deep", layers=count)
-        found[f"deep{count}"] = at.error(settings, layer_ends(settings))
-    return found
+        result[f"deep{count}"] = points.error(settings, layer_ends(settings))
+    return result
 
 
-def _places(strands: np.ndarray, radius: float, sun: Light) -> Places:
+def _sample_points(strands: np.ndarray, radius: float, sun: Light) -> SamplePoints:
     frame = light_frame(sun, ball_around(strands))
     assert frame is not None
     exact = coverage(strands, np.full(strands.shape[:2], radius), frame, RESOLUTION)
     points = strands.reshape(-1, 3)
-    chosen = np.random.default_rng(1).integers(len(points), size=POINTS)
-    place, depth = frame.places(points[chosen])
-    place *= RESOLUTION
-    column, row = np.floor(place).astype(np.int64).T
+    index = np.random.default_rng(1).integers(len(points), size=POINTS)
+    position, depth = frame.places(points[index])
+    position *= RESOLUTION
+    column, row = np.floor(position).astype(np.int64).T
     texel, depth = row * RESOLUTION + column, depth - VolumeSettings().bias
-    return Places(exact, texel, place, depth, transmittance(exact.optical_depth(texel, depth), 1.0))
+    return SamplePoints(
+        exact, texel, position, depth, transmittance(exact.optical_depth(texel, depth), 1.0)
+    )

@@ -78,11 +78,11 @@ NOT_IN_COMMITS = (
 #: a commit have a small screen if that is enough. Some need a large one: to picture long panels
 #: uncut, or to make Blender's own texts and gizmos a small part of compared pictures.
 _LARGE, _SMALL = "1600x1000x24", "1024x700x24"
-_ON_SMALL = (
+_SMALL_SCREEN_SESSIONS = (
     *("cards", "combing", "first_minutes", "hair_scene", "import", "layers", "soft_shadows"),
     *("long_work", "look", "motion", "selection", "shadows", "views"),
 )
-SCREENS = {f"session_{name}": _SMALL for name in _ON_SMALL} | {
+SCREENS = {f"session_{name}": _SMALL for name in _SMALL_SCREEN_SESSIONS} | {
     **{f"session_{name}": "1024x900x24" for name in TUTORIALS},
     "session_engine": _LARGE,
     "session_everyday": _LARGE,
@@ -102,7 +102,7 @@ PROBLEM_LINES = 30
 #: beginning of the first line of Python's traceback when Blender crashes
 CRASH_LINE = "Fatal Python error"
 #: limit of the mean FLIP of the same picture on both backends
-MAX_DIFFERENT = 0.02
+MAX_FLIP = 0.02
 
 _running: set[subprocess.Popen[bytes]] = set()
 _interrupted = threading.Event()
@@ -126,12 +126,12 @@ Job = Callable[[Tally], None]
 
 
 def run_blender(
-    how: str, arguments: list[str], log: Path, limit_s: float, environment: dict[str, str]
+    mode: str, arguments: list[str], log: Path, limit_s: float, environment: dict[str, str]
 ) -> int:
     """The exit code of `tools/window_blender HOW ARGUMENTS`; 124 when it ran past its limit."""
     with log.open("wb") as stream:
         process = subprocess.Popen(
-            [REPOSITORY / "tools" / "window_blender", how, *arguments],
+            [REPOSITORY / "tools" / "window_blender", mode, *arguments],
             cwd=REPOSITORY,
             env=os.environ | {"HAIRLOOM_CACHE": str(CACHE)} | environment,
             stdout=stream,
@@ -189,8 +189,10 @@ def install_extension(tally: Tally) -> bool:
             SESSION_LIMIT_S,
             {"BLENDER_USER_RESOURCES": str(INSTALLED)},
         )
-        found = (INSTALLED / "extensions/user_default/hairloom/blender_manifest.toml").is_file()
-        passed = code == 0 and found
+        is_installed = (
+            INSTALLED / "extensions/user_default/hairloom/blender_manifest.toml"
+        ).is_file()
+        passed = code == 0 and is_installed
         if passed:
             break
     announce(f"installing {path.name}", "either", passed, f"exit code {code}", log)
@@ -200,35 +202,35 @@ def install_extension(tally: Tally) -> bool:
 
 def run_command_line(tally: Tally) -> None:
     """Run the installed extension as a farm does: one job that succeeds, one that is refused."""
-    made = OUTPUT / "cards.glb"
+    output = OUTPUT / "cards.glb"
     small = ["--set", "grow.strand_count=200", "--set", "guides.guide_count=50"]
     jobs = {
-        "a job": (["--output", str(made), *small], 0),
-        "a missing groom": (["--groom", "missing.tfx", "--output", str(made)], 1),
+        "a job": (["--output", str(output), *small], 0),
+        "a missing groom": (["--groom", "missing.tfx", "--output", str(output)], 1),
     }
     for name, (arguments, expected) in jobs.items():
         log = OUTPUT / "command-line.log"
         command = ["--command", "hairloom", "cards", *arguments]
         environment = {"BLENDER_USER_RESOURCES": str(INSTALLED)}
         code = run_blender("background", command, log, SESSION_LIMIT_S, environment)
-        passed = code == expected and made.is_file() == (expected == 0)
+        passed = code == expected and output.is_file() == (expected == 0)
         announce(f"command line, {name}", "either", passed, f"exit code {code}", log)
         tally.add(passed, not passed)
-        made.unlink(missing_ok=True)
+        output.unlink(missing_ok=True)
 
 
-def run_tests(backend: str, chosen: tuple[str, ...], tally: Tally) -> None:
+def run_tests(backend: str, selection: tuple[str, ...], tally: Tally) -> None:
     """Run tests in Blender's own Python, in the background."""
     log, report = OUTPUT / f"tests-{backend}.log", OUTPUT / f"tests-{backend}.xml"
     arguments = ["--factory-startup", "--gpu-backend", backend, "--python-exit-code", "1"]
     arguments += ["--python", "tests/run_in_blender.py", "--", f"--junitxml={report}"]
     # as in the Makefile: rewriting all tests takes longer than most of them
     arguments += ["--assert=plain", "--showlocals"]
-    arguments += chosen
-    kept = {"HAIRLOOM_PICTURES": str(OUTPUT)}
+    arguments += selection
+    environment = {"HAIRLOOM_PICTURES": str(OUTPUT)}
     for packages in INSTALLED.glob("extensions/.local/lib/python*/site-packages"):
-        kept["HAIRLOOM_PACKAGES"] = str(packages)
-    code = run_blender("background", arguments, log, TESTS_LIMIT_S, kept)
+        environment["HAIRLOOM_PACKAGES"] = str(packages)
+    code = run_blender("background", arguments, log, TESTS_LIMIT_S, environment)
     if not report.is_file():
         announce("tests", backend, False, f"exit code {code} and no report", log)
         tally.add(0, 1)
@@ -254,11 +256,13 @@ def compare_backends(tally: Tally) -> None:
         announce("comparing", "both", False, "pictures are missing", log)
         tally.add(0, 1)
         return
-    one, other = (np.load(file) for file in files)
-    found = {name: flip_evaluator.evaluate(one[name], other[name], "LDR")[1] for name in one}
-    log.write_text("".join(f"{name} {flip:.5f}\n" for name, flip in found.items()))
-    passed = max(found.values()) <= MAX_DIFFERENT
-    detail = f"FLIP of {len(found)} pictures at most {max(found.values()):.4f}"
+    opengl, vulkan = (np.load(file) for file in files)
+    differences = {
+        name: flip_evaluator.evaluate(opengl[name], vulkan[name], "LDR")[1] for name in opengl
+    }
+    log.write_text("".join(f"{name} {flip:.5f}\n" for name, flip in differences.items()))
+    passed = max(differences.values()) <= MAX_FLIP
+    detail = f"FLIP of {len(differences)} pictures at most {max(differences.values()):.4f}"
     announce("comparing", "both", passed, detail, log)
     tally.add(passed, not passed)
 
@@ -317,10 +321,10 @@ def jobs_of(sessions: list[Path], *, is_commit: bool, with_tests: bool) -> list[
         jobs += [partial(run_tests, backend, tests[backend]) for backend in reversed(BACKENDS)]
     for script in sessions:
         name = script.stem.removeprefix("session_")
-        chosen = (TUTORIALS[name],) if name in TUTORIALS else BACKENDS
+        backends = (TUTORIALS[name],) if name in TUTORIALS else BACKENDS
         if is_commit:
-            chosen = () if name in NOT_IN_COMMITS else BACKENDS[name in ON_VULKAN :][:1]
-        for backend in chosen:
+            backends = () if name in NOT_IN_COMMITS else BACKENDS[name in ON_VULKAN :][:1]
+        for backend in backends:
             for part in parts_of(script, backend, is_commit):
                 jobs.append(partial(run_session, script, part, backend, is_commit))
     return jobs
@@ -334,10 +338,10 @@ def run(job: Job) -> Tally:
 
 
 def main(arguments: list[str]) -> int:
-    wanted = [each for each in arguments if each != "--all"]
+    names = [each for each in arguments if each != "--all"]
     is_commit = not arguments
     sessions = sorted((REPOSITORY / "tests" / "window").glob("session_*.py"))
-    if unknown := set(wanted) - {script.stem for script in sessions}:
+    if unknown := set(names) - {script.stem for script in sessions}:
         print(f"no such session: {', '.join(sorted(unknown))}")
         return 2
     shutil.rmtree(OUTPUT, ignore_errors=True)
@@ -345,10 +349,10 @@ def main(arguments: list[str]) -> int:
     CACHE.mkdir(exist_ok=True)
     tally = Tally()
     installed = install_extension(tally)
-    if installed and not wanted:
+    if installed and not names:
         run_command_line(tally)
-    chosen = [s for s in sessions if installed and (not wanted or s.stem in wanted)]
-    jobs = jobs_of(chosen, is_commit=is_commit, with_tests=not wanted)
+    selected = [s for s in sessions if installed and (not names or s.stem in names)]
+    jobs = jobs_of(selected, is_commit=is_commit, with_tests=not names)
     # Side by side: a Blender that waits or computes leaves most of the machine to the other.
     with ThreadPoolExecutor(PARALLEL_JOBS) as pool:
         try:
@@ -359,7 +363,7 @@ def main(arguments: list[str]) -> int:
             for process in tuple(_running):
                 stop(process)  # Ctrl-C must not leave a Blender behind
             raise
-    if not wanted:
+    if not names:
         compare_backends(tally)
     print(f"{tally.passed} passed, {tally.failed} failed")
     return int(tally.failed > 0 or tally.passed == 0)

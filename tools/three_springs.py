@@ -36,13 +36,13 @@ _AXES[:3, :3] = GLB.to_file_space(np.eye(3)).T
 
 @dataclass(frozen=True, eq=False)
 class ThreePlayback:
-    """carrier: (step_count, 4, 4) of the head. places: (step_count, chains, joints, 3) in the space
-    of the head, Z up. rest: (chains, joints, 4, 4). spring_count: bones that springs turn.
+    """carrier: (step_count, 4, 4) of the head. positions: (step_count, chains, joints, 3), relative
+    to the head, Z up. rest: (chains, joints, 4, 4). spring_count: bones that springs turn.
     """
 
     path: Path
     carrier: np.ndarray
-    places: np.ndarray
+    positions: np.ndarray
     rest: np.ndarray
     spring_count: int
 
@@ -50,20 +50,24 @@ class ThreePlayback:
         """The corners of all triangles of each level, (triangle_count, 3, frame_count, 3), in the
         space of the head, by the weights of the file.
         """
-        places = resampled_to_frames(self.places, frame_count, rate)
-        turns = rotations_towards(self.rest, places).transpose(1, 2, 0, 3, 4)
-        turn, shift = joint_transforms(self.rest, turns, places.transpose(1, 2, 0, 3))
-        still = np.tile(np.eye(3), (1, frame_count, 1, 1))
-        turn = np.concatenate([still, turn])
-        shift = np.concatenate([np.zeros_like(shift[:1]), shift])
+        positions = resampled_to_frames(self.positions, frame_count, rate)
+        rotations = rotations_towards(self.rest, positions).transpose(1, 2, 0, 3, 4)
+        rotation, translation = joint_transforms(
+            self.rest, rotations, positions.transpose(1, 2, 0, 3)
+        )
+        identity = np.tile(np.eye(3), (1, frame_count, 1, 1))
+        rotation = np.concatenate([identity, rotation])
+        translation = np.concatenate([np.zeros_like(translation[:1]), translation])
         file, levels = GlbFile.of(self.path.read_bytes(), str(self.path)), []
         for node in (each for each in file.content["nodes"] if "mesh" in each):
             (primitive,) = file.content["meshes"][node["mesh"]]["primitives"]
-            read = {name: file.values(n) for name, n in primitive["attributes"].items()}
-            skin = Skin(read["JOINTS_0"].astype(int), read["WEIGHTS_0"].astype(np.float64))
-            points = to_z_up(np.asarray(read["POSITION"], np.float64))
+            attributes = {name: file.values(n) for name, n in primitive["attributes"].items()}
+            skin = Skin(
+                attributes["JOINTS_0"].astype(int), attributes["WEIGHTS_0"].astype(np.float64)
+            )
+            points = to_z_up(np.asarray(attributes["POSITION"], np.float64))
             index = np.asarray(file.values(primitive["indices"])).reshape(-1, 3)
-            levels.append(skinned(points, skin, turn, shift)[index])
+            levels.append(skinned(points, skin, rotation, translation)[index])
         return levels
 
 
@@ -86,11 +90,13 @@ def play_in_three(path: Path, head: np.ndarray, rate: float, chains: int) -> Thr
     world = to_z_up(np.array(playback["frames"]))
     local = np.einsum("fab,fja->fjb", carrier[:, :3, :3], world - carrier[:, None, :3, 3])
     rest = rest_matrices(path)
-    of_chains = [
+    chain_joints = [
         number for number, name in enumerate(playback["names"]) if name.startswith("chain")
     ]
-    places = local[:, of_chains].reshape(len(local), chains, -1, 3)
-    return ThreePlayback(path, carrier, places, rest.reshape(chains, -1, 4, 4), playback["springs"])
+    positions = local[:, chain_joints].reshape(len(local), chains, -1, 3)
+    return ThreePlayback(
+        path, carrier, positions, rest.reshape(chains, -1, 4, 4), playback["springs"]
+    )
 
 
 def head_matrices(carrier: np.ndarray) -> list[list[float]]:
@@ -106,8 +112,8 @@ def rest_matrices(path: Path) -> np.ndarray:
     columns = np.asarray(file.values(skin["inverseBindMatrices"]), np.float64)
     matrices = np.linalg.inv(columns.reshape(-1, 4, 4).swapaxes(1, 2))
     names = [file.content["nodes"][number]["name"] for number in skin["joints"]]
-    of_chains = [name.startswith("chain") for name in names]
-    return (_AXES.T @ matrices @ _AXES)[of_chains]
+    is_in_chain = [name.startswith("chain") for name in names]
+    return (_AXES.T @ matrices @ _AXES)[is_in_chain]
 
 
 def to_z_up(vectors: np.ndarray) -> np.ndarray:

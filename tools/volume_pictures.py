@@ -50,51 +50,51 @@ class Chart:
             along @ along, 1e-9
         )
         fraction = np.clip(fraction, 0.0, 1.0)
-        away = np.hypot(x - start[0] - fraction * along[0], y - start[1] - fraction * along[1])
-        cover = np.clip(0.5 * width + 0.5 - away, 0.0, 1.0)[..., None]
+        distance = np.hypot(x - start[0] - fraction * along[0], y - start[1] - fraction * along[1])
+        cover = np.clip(0.5 * width + 0.5 - distance, 0.0, 1.0)[..., None]
         self.pixels[..., :3] += cover * (np.array(color) - self.pixels[..., :3])
 
-    def word(self, place: tuple[float, float], text: str, color: Any, size: int = 15) -> None:
+    def word(self, position: tuple[float, float], text: str, color: Any, size: int = 15) -> None:
         """A text centred on a place [pixels]."""
         # like gpu, they live inside bpy
         blf, imbuf = importlib.import_module("blf"), importlib.import_module("imbuf")
         blf.size(0, size)
         blf.color(0, 1.0, 1.0, 1.0, 1.0)
         wide, high = blf.dimensions(0, text)
-        blf.position(0, round(place[0] - 0.5 * wide), round(place[1] - 0.5 * high), 0)
+        blf.position(0, round(position[0] - 0.5 * wide), round(position[1] - 0.5 * high), 0)
         page = imbuf.new((WIDE, HIGH))
         with blf.bind_imbuf(0, page):
             blf.draw_buffer(0, text)
-        with page.with_buffer() as held:
-            cover = np.array(held, np.float32).reshape(HIGH, WIDE, 4)[..., 3:] / 255.0
+        with page.with_buffer() as pixels:
+            cover = np.array(pixels, np.float32).reshape(HIGH, WIDE, 4)[..., 3:] / 255.0
         self.pixels[..., :3] += cover * (np.array(color) - self.pixels[..., :3])
 
 
 def error_chart(errors: dict[str, float]) -> Any:
     """A chart of error over the number of slices or layers, both axes logarithmic."""
     chart = Chart()
-    most, least = 5.0, 0.1
+    max_error, min_error = 5.0, 0.1
 
-    def place(count: float, error: float) -> tuple[float, float]:
+    def position(count: float, error: float) -> tuple[float, float]:
         right = np.log2(count / 4.0) / np.log2(64.0)
-        up = np.log2(error / least) / np.log2(most / least)
+        up = np.log2(error / min_error) / np.log2(max_error / min_error)
         return LEFT + right * (WIDE - LEFT - RIGHT), LOW + up * (HIGH - LOW - TOP)
 
     for error in (0.1, 0.2, 0.5, 1.0, 2.0, 5.0):
-        chart.line(place(4, error), place(256, error), PALE, 1.0)
-        chart.word((LEFT - 30, place(4, error)[1]), f"{100.0 * error:g} %", INK)
+        chart.line(position(4, error), position(256, error), PALE, 1.0)
+        chart.word((LEFT - 30, position(4, error)[1]), f"{100.0 * error:g} %", INK)
     for count in (4, 8, 16, 64, 255):
-        chart.word((place(count, least)[0], LOW - 18), str(count), INK)
-    chart.line(place(4, errors["none"]), place(256, errors["none"]), INK, 2.0)
-    chart.word((WIDE - 52, place(4, errors["none"])[1]), "no shadows", INK)
+        chart.word((position(count, min_error)[0], LOW - 18), str(count), INK)
+    chart.line(position(4, errors["none"]), position(256, errors["none"]), INK, 2.0)
+    chart.word((WIDE - 52, position(4, errors["none"])[1]), "no shadows", INK)
     for method, color in LINES.items():
         counts = sorted(int(key[len(method) :]) for key in errors if key.startswith(method))
-        places = [place(count, errors[f"{method}{count}"]) for count in counts]
-        for start, end in pairwise(places):
+        positions = [position(count, errors[f"{method}{count}"]) for count in counts]
+        for start, end in pairwise(positions):
             chart.line(start, end, color, 2.5)
-        for spot in places:
-            chart.line(spot, spot, color, 9.0)
-        chart.word((places[-1][0] + 60, places[-1][1]), NAMES[method], color)
+        for point in positions:
+            chart.line(point, point, color, 9.0)
+        chart.word((positions[-1][0] + 60, positions[-1][1]), NAMES[method], color)
     return chart.pixels
 
 
@@ -144,11 +144,11 @@ def main(folder: Path) -> None:
     load_package().register()
     images, light = addon_module("blender.base.images"), addon_module("shading.lights").Light
     strands = combed_strands(STRANDS)
-    shown = shadow_pictures(strands)
-    images.write_png(folder / "opacity_slices.png", images.contact_sheet(shown, len(shown)))
+    pictures = shadow_pictures(strands)
+    images.write_png(folder / "opacity_slices.png", images.contact_sheet(pictures, len(pictures)))
     errors = importlib.import_module("shadow_errors").errors
-    found = errors(strands.astype(np.float64), RADIUS, light.sun(SUN, (1.0, 1.0, 1.0), 1.0))
-    images.write_png(folder / "opacity_error.png", error_chart(found))
+    measured = errors(strands.astype(np.float64), RADIUS, light.sun(SUN, (1.0, 1.0, 1.0), 1.0))
+    images.write_png(folder / "opacity_error.png", error_chart(measured))
     print("Wrote opacity_slices.png and opacity_error.png", flush=True)
 
 

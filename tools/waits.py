@@ -9,9 +9,17 @@ from extension_loader import REPOSITORY
 
 ADDON = REPOSITORY / "addon"
 #: A call of one of these in a `while` loop makes it wait.
-WAITING = {"wait", "sleep", "join", "result", "take_made", "attempt", "run_main_thread_steps"}
+BLOCKING_CALLS = {
+    "wait",
+    "sleep",
+    "join",
+    "result",
+    "take_made",
+    "attempt",
+    "run_main_thread_steps",
+}
 #: function -> why it ends
-ENDING_WAITS = {
+KNOWN_WAITS = {
     "cards/order_pairs.py:pairs_by_view": "each turn takes one view",
     "exchange/files/file_moves.py:move_file": "after MAX_WAIT seconds",
     "blender/preview/previews.py:finish": "each turn takes one result; another scene is refused",
@@ -23,20 +31,20 @@ ENDING_WAITS = {
 
 def waits(folder: Path = ADDON) -> list[str]:
     """Functions with a `while` loop that waits, as FILE:FUNCTION."""
-    found = []
+    functions = []
     for path in sorted(folder.rglob("*.py")):
         text = path.read_text(encoding="utf-8")
         if "while" not in text:
             continue
         for function in ast.walk(ast.parse(text)):
             if isinstance(function, ast.FunctionDef) and any(map(_waits, _own_loops(function))):
-                found.append(f"{path.relative_to(folder).as_posix()}:{function.name}")
-    return found
+                functions.append(f"{path.relative_to(folder).as_posix()}:{function.name}")
+    return functions
 
 
 def endless_waits() -> list[str]:
     """Waits without a reason in ENDS."""
-    return [each for each in waits() if each not in ENDING_WAITS]
+    return [each for each in waits() if each not in KNOWN_WAITS]
 
 
 def _own_loops(function: ast.FunctionDef) -> list[ast.While]:
@@ -48,4 +56,4 @@ def _waits(loop: ast.While) -> bool:
     names = {
         call.attr if isinstance(call, ast.Attribute) else getattr(call, "id", "") for call in calls
     }
-    return bool(names & WAITING)
+    return bool(names & BLOCKING_CALLS)

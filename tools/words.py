@@ -44,15 +44,15 @@ class Text:
 class Retired:
     scope: str
     term: str
-    instead: str
+    replacement: str
 
     def lines_in(self, text: Text) -> list[int]:
         """The line of each use."""
         if self.scope == "code":
             end = "" if self.term.endswith("_") else " "
             return [text.line] * (f" {_parts(self.term)} " in f" {_parts(text.text)}{end}")
-        found = self._pattern.finditer(text.text)
-        return [text.line + text.text.count("\n", 0, match.start()) for match in found]
+        matches = self._pattern.finditer(text.text)
+        return [text.line + text.text.count("\n", 0, match.start()) for match in matches]
 
     @cached_property
     def _pattern(self) -> re.Pattern[str]:
@@ -68,15 +68,15 @@ def _parts(name: str) -> str:
 
 def retired_terms(glossary: Path = GLOSSARY) -> list[Retired]:
     """Rows of the tables under the two headings: `term`, `its other forms` | what to say."""
-    found: list[Retired] = []
+    terms: list[Retired] = []
     scope = ""
     for line in glossary.read_text(encoding="utf-8").splitlines():
         if line.startswith("## "):
             scope = SCOPES.get(line.strip(), "")
         cells = [cell.strip() for cell in line.strip("|").split("|")]
         if scope and line.startswith("|") and len(cells) == 2:
-            found += [Retired(scope, term, cells[1]) for term in re.findall("`([^`]+)`", cells[0])]
-    return found
+            terms += [Retired(scope, term, cells[1]) for term in re.findall("`([^`]+)`", cells[0])]
+    return terms
 
 
 @dataclass(frozen=True)
@@ -91,32 +91,32 @@ class Use:
         return f"{self.place}:{self.line} {self.name}".rstrip()
 
 
-def count_uses(found: list[Use]) -> int:
+def count_uses(uses_of_term: list[Use]) -> int:
     """Uses in prose; different names in code, so that code can be moved without changing it."""
-    names = {use.name for use in found if use.name}
-    return len(names) + sum(not use.name for use in found)
+    names = {use.name for use in uses_of_term if use.name}
+    return len(names) + sum(not use.name for use in uses_of_term)
 
 
 def uses(repository: Path = REPOSITORY) -> dict[Retired, list[Use]]:
     """Each retired term -> the places where it is used, at best none."""
     terms = retired_terms(repository / "docs" / "glossary.md")
-    found: dict[Retired, list[Use]] = {term: [] for term in terms}
+    by_term: dict[Retired, list[Use]] = {term: [] for term in terms}
     by_scope = {scope: [t for t in terms if t.scope == scope] for scope in ("prose", "code")}
-    may_be = {scope: _first_words(of_scope) for scope, of_scope in by_scope.items()}
-    nowhere: set[tuple[str, str]] = set()
+    candidates = {scope: _first_words(of_scope) for scope, of_scope in by_scope.items()}
+    unused: set[tuple[str, str]] = set()
     for text in texts_of(repository):
         key = (text.scope, text.text)
-        if key in nowhere or not may_be[text.scope].search(text.text):
+        if key in unused or not candidates[text.scope].search(text.text):
             continue
         is_used = False
         for term in by_scope[text.scope]:
             for line in term.lines_in(text):
                 is_used = True
                 name = text.text if text.scope == "code" else ""
-                found[term].append(Use(text.place, line, name))
+                by_term[term].append(Use(text.place, line, name))
         if not is_used:
-            nowhere.add(key)
-    return found
+            unused.add(key)
+    return by_term
 
 
 def _first_words(terms: list[Retired]) -> re.Pattern[str]:
@@ -145,10 +145,10 @@ def texts_of(repository: Path) -> Iterator[Text]:
                 yield Text("code", path.name.partition(".")[0], place, 1)
 
 
-Found = Iterator[tuple[str, str, int]]
+Entries = Iterator[tuple[str, str, int]]
 
 
-def _page(text: str) -> Found:
+def _page(text: str) -> Entries:
     """Its paragraphs, without code and without the glossary's own tables of retired words."""
     for heading in SCOPES:
         text = re.sub(rf"^{heading}$.*?(?=^## |\Z)", _empty, text, flags=re.M | re.S)
@@ -164,7 +164,7 @@ def _empty(match: re.Match[str]) -> str:
     return "\n" * match[0].count("\n")
 
 
-def _said(text: str, line: int) -> Found:
+def _classified(text: str, line: int) -> Entries:
     """A text in code: one word is a name, as it may be a key; more are prose."""
     yield "code" if re.fullmatch(r"[\w./]+", text) else "prose", text, line
 
@@ -173,20 +173,20 @@ def _said(text: str, line: int) -> Found:
 _TOKENS_BETWEEN_STRINGS = (tokenize.NL, tokenize.FSTRING_START, tokenize.FSTRING_END)
 
 
-def _python(text: str) -> Found:
+def _python(text: str) -> Entries:
     """By its tokens, as walking the syntax tree takes twice as long."""
-    said: list[tuple[str, int]] = []
+    strings: list[tuple[str, int]] = []
     comment: list[str] = []
     for token in tokenize.generate_tokens(io.StringIO(text).readline):
         line = token.start[0]
         if token.type == tokenize.STRING:
             value = ast.literal_eval(token.string)
-            said += [(value, line)] * isinstance(value, str)
+            strings += [(value, line)] * isinstance(value, str)
         elif token.type == tokenize.FSTRING_MIDDLE:
-            said.append((token.string, line))
-        elif said and token.type not in (*_TOKENS_BETWEEN_STRINGS, tokenize.COMMENT):
-            yield from _said("".join(part for part, _ in said), said[0][1])
-            said = []
+            strings.append((token.string, line))
+        elif strings and token.type not in (*_TOKENS_BETWEEN_STRINGS, tokenize.COMMENT):
+            yield from _classified("".join(part for part, _ in strings), strings[0][1])
+            strings = []
         if token.type == tokenize.NAME:
             yield "code", token.string, line
         if token.type == tokenize.COMMENT:
@@ -196,7 +196,7 @@ def _python(text: str) -> Found:
             comment = []
 
 
-def _shader(text: str) -> Found:
+def _shader(text: str) -> Entries:
     comments = r"(?:^[ \t]*//[^\n]*\n?)+|//[^\n]*|/\*.*?\*/"
     for match in re.finditer(comments, text, re.M | re.S):
         prose = re.sub(r"^[ \t]*//", " ", match[0], flags=re.M)
@@ -206,10 +206,10 @@ def _shader(text: str) -> Found:
         yield from (("code", name, line) for name in _NAME.findall(row))
 
 
-def _preset(text: str) -> Found:
-    def walk(value: object) -> Found:
+def _preset(text: str) -> Entries:
+    def walk(value: object) -> Entries:
         if isinstance(value, str):
-            yield from _said(value, 1)
+            yield from _classified(value, 1)
         elif isinstance(value, dict):
             for key, inner in value.items():
                 yield "code", key, 1
@@ -224,5 +224,5 @@ def _preset(text: str) -> Found:
 if __name__ == "__main__":
     for retired, found in uses().items():
         if found:
-            print(f"{retired.scope}: {retired.term} (say: {retired.instead})")
+            print(f"{retired.scope}: {retired.term} (say: {retired.replacement})")
             print("".join(f"    {use}\n" for use in found), end="")

@@ -78,7 +78,7 @@ def test_three_vrm_moves_hair_as_our_own_springs_do(
     assert moved.spring_count == springs_entry["chains"] * (springs_entry["joints_in_chain"] - 1)
     ours = simulated_springs(springs_entry, springs[0], moved.carrier)
     length = springs_entry["error"]["hair_length"]
-    assert np.abs(moved.places - ours).max() < 1e-3 * length
+    assert np.abs(moved.positions - ours).max() < 1e-3 * length
     assert np.linalg.norm(ours - ours[0], axis=-1).max() > 0.1 * length
 
 
@@ -143,7 +143,7 @@ def test_below_a_bone_springs_move_as_before(
 ) -> None:
     head = np.stack([head_matrix(motion, frame) for frame in range(FRAMES)])
     found = play_in_three(carried[0], head, RATE, len(moved.rest))
-    np.testing.assert_allclose(found.places, moved.places, atol=1e-6)
+    np.testing.assert_allclose(found.positions, moved.positions, atol=1e-6)
     report = validator_report(carried[0])
     assert report["issues"]["numErrors"] == 0, report
 

@@ -128,7 +128,7 @@ _STARTERS = {"subprocess", "multiprocessing", "pty"}
 def test_nothing_is_there_for_tests_alone() -> None:
     """A function that only tests call belongs in the tests, unless it is the twin that a shader is
     tested against."""
-    assert unused_names() == [], "delete them, or name them in WANTED with the reason"
+    assert unused_names() == [], "delete them, or name them in KEPT_NAMES with the reason"
 
 
 def test_few_modules_hold_what_changes() -> None:

@@ -21,12 +21,12 @@ GLOSSARY = """\
 
 
 def test_no_retired_word_is_used() -> None:
-    found = [
-        f"{retired.scope}: `{retired.term}`; say {retired.instead}: {', '.join(map(str, places))}"
-        for retired, places in words.uses().items()
-        if places
+    used = [
+        f"{term.scope}: `{term.term}`; say {term.replacement}: {', '.join(map(str, uses))}"
+        for term, uses in words.uses().items()
+        if uses
     ]
-    assert found == []
+    assert used == []
 
 
 def test_each_kind_of_use_is_seen(tmp_path: Path) -> None:
