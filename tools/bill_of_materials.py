@@ -78,21 +78,23 @@ def _wheel(name: str, digest: str, licenses: LicenseFactory) -> Component:
     with zipfile.ZipFile(FOLDER / name) as wheel:
         (path,) = (each for each in wheel.namelist() if each.endswith(".dist-info/METADATA"))
         metadata = HeaderParser().parsestr(wheel.read(path).decode("utf-8"))
-    found = metadata["License-Expression"] or metadata["License"] or _classified(metadata)
-    found = found.strip().splitlines()[0]
+    license_name = (
+        metadata["License-Expression"] or metadata["License"] or _license_from_classifiers(metadata)
+    )
+    license_name = license_name.strip().splitlines()[0]
     return Component(
         name=package,
         version=version,
         type=ComponentType.LIBRARY,
         description=metadata["Summary"],
-        licenses=[licenses.make_from_string(_IDENTIFIERS.get(found, found))],
+        licenses=[licenses.make_from_string(_IDENTIFIERS.get(license_name, license_name))],
         purl=PackageURL("pypi", None, package, version, {"file_name": name}),
         hashes=[HashType(alg=HashAlgorithm.SHA_256, content=digest)],
         bom_ref=name,
     )
 
 
-def _classified(metadata: Message) -> str:
+def _license_from_classifiers(metadata: Message) -> str:
     """The license that PyPI's classifiers name."""
     lines = metadata.get_all("Classifier", [])
     names = [line.rpartition(" :: ")[2] for line in lines if line.startswith("License")]

@@ -62,12 +62,12 @@ _READ_WRITE = {"R32F", "R32UI", "R32I", "RGBA32F", "RGBA32UI", "RGBA32I", "RGBA1
 _SCRIPT = """
 for file in *.vert *.frag *.comp; do
     [ -e "$file" ] || continue
-    kept() { "$@" >"$file.said" 2>&1 && rm "$file.said"; }
-    { kept glslangValidator -V --quiet "$file" -o "$file.spv" &&
-        kept spirv-val --target-env vulkan1.0 "$file.spv"; } ||
-        { mv "$file.said" "$file.spirv_failed"; continue; }
-    kept spirv-cross "$file.spv" --msl --msl-version 20200 || mv "$file.said" "$file.metal_failed"
-    kept spirv-cross "$file.spv" --hlsl --shader-model 50 || mv "$file.said" "$file.hlsl_failed"
+    logged() { "$@" >"$file.log" 2>&1 && rm "$file.log"; }
+    { logged glslangValidator -V --quiet "$file" -o "$file.spv" &&
+        logged spirv-val --target-env vulkan1.0 "$file.spv"; } ||
+        { mv "$file.log" "$file.spirv_failed"; continue; }
+    logged spirv-cross "$file.spv" --msl --msl-version 20200 || mv "$file.log" "$file.metal_failed"
+    logged spirv-cross "$file.spv" --hlsl --shader-model 50 || mv "$file.log" "$file.hlsl_failed"
 done
 """
 _WINDOW_BLENDER = Path(__file__).resolve().parent / "window_blender"
@@ -97,8 +97,8 @@ def compile_all(folder: Path) -> dict[str, dict[str, str]]:
     subprocess.run(script, check=True, timeout=600)
     return {
         kind: {
-            said.stem: said.read_text(encoding="utf-8").strip()[:400]
-            for said in folder.glob(f"*.{kind}_failed")
+            log.stem: log.read_text(encoding="utf-8").strip()[:400]
+            for log in folder.glob(f"*.{kind}_failed")
         }
         for kind in ("spirv", "metal", "hlsl")
     }
@@ -132,10 +132,10 @@ def _declarations(recipe: Any, structs: str, stage: str) -> list[str]:
             f"{_QUALIFIERS[access[0] if access else 'WRITE']}{kind} {name};"
         )
         binding += 1
-    pushed = [("int", name) for name in recipe.integers]
-    pushed += [(_TYPES[kind], name) for kind, name in recipe.numbers]
-    if pushed:
-        members = " ".join(f"{kind} {name};" for kind, name in pushed)
+    constants = [("int", name) for name in recipe.integers]
+    constants += [(_TYPES[kind], name) for kind, name in recipe.numbers]
+    if constants:
+        members = " ".join(f"{kind} {name};" for kind, name in constants)
         lines.append(f"layout(push_constant) uniform pushed_constants {{ {members} }};")
     if stage == "compute":
         x, y = (*recipe.group_size, 1)[:2]
@@ -145,23 +145,25 @@ def _declarations(recipe: Any, structs: str, stage: str) -> list[str]:
     else:
         lines += _with_locations("out", ((kind, name) for kind, name in recipe.outputs))
     qualifier = "out" if stage == "vertex" else "in"
-    for place, (interpolation, kind, name) in enumerate(recipe.varyings):
-        lines.append(f"layout(location={place}) {interpolation} {qualifier} {_TYPES[kind]} {name};")
+    for location, (interpolation, kind, name) in enumerate(recipe.varyings):
+        lines.append(
+            f"layout(location={location}) {interpolation} {qualifier} {_TYPES[kind]} {name};"
+        )
     return lines
 
 
 def _with_locations(qualifier: str, members: Any) -> list[str]:
     return [
-        f"layout(location={place}) {qualifier} {_TYPES[kind]} {name};"
-        for place, (kind, name) in enumerate(members)
+        f"layout(location={location}) {qualifier} {_TYPES[kind]} {name};"
+        for location, (kind, name) in enumerate(members)
     ]
 
 
 def resource_counts(recipe: Any) -> dict[str, int]:
     """What a program needs, by the names of METAL_LIMITS."""
     source = "\n".join(text.source for text in recipe.texts.values())
-    pushed = ["int"] * len(recipe.integers) + [_TYPES[kind] for kind, _ in recipe.numbers]
-    both = [image[0] for image in recipe.images if image[2:] == ("READ_WRITE",)]
+    constants = ["int"] * len(recipe.integers) + [_TYPES[kind] for kind, _ in recipe.numbers]
+    read_write = [image[0] for image in recipe.images if image[2:] == ("READ_WRITE",)]
     group = 1
     for side in recipe.group_size if recipe.compute else ():
         group *= side
@@ -171,7 +173,7 @@ def resource_counts(recipe: Any) -> dict[str, int]:
         "buffers": len(recipe.blocks) + len(recipe.inputs),
         # a vec3 takes as much as a vec4
         "push_bytes": sum(
-            16 if _components(kind) == 3 else 4 * _components(kind) for kind in pushed
+            16 if _components(kind) == 3 else 4 * _components(kind) for kind in constants
         ),
         "inputs": len(recipe.inputs),
         "varying_floats": sum(_components(_TYPES[kind]) for _, kind, _ in recipe.varyings),
@@ -180,7 +182,7 @@ def resource_counts(recipe: Any) -> dict[str, int]:
         "image_atomics": len(re.findall(r"imageAtomic\w+", source)),
         "early_tests": source.count("early_fragment_tests"),
         "shared_memory": len(re.findall(r"^\s*shared\s", source, re.MULTILINE)),
-        "unreadable_images": sum(image_format not in _READ_WRITE for image_format in both),
+        "unreadable_images": sum(image_format not in _READ_WRITE for image_format in read_write),
     }
 
 
@@ -188,8 +190,8 @@ def _components(kind: str) -> int:
     return _COMPONENTS.get(kind) or int(kind[-1])
 
 
-def exceeded_metal_limits(found: Mapping[str, int]) -> list[str]:
+def exceeded_metal_limits(counts: Mapping[str, int]) -> list[str]:
     """The demands that exceed Metal's limits."""
     return [
-        f"{name} {found[name]}" for name, maximum in METAL_LIMITS.items() if found[name] > maximum
+        f"{name} {counts[name]}" for name, maximum in METAL_LIMITS.items() if counts[name] > maximum
     ]

@@ -59,20 +59,20 @@ def fetch(name: str, digest: str, folder: Path = FOLDER) -> None:
         pinned = Path(temporary) / "requirements.txt"
         pinned.write_text(f"{package}=={version} --hash=sha256:{digest}\n", encoding="utf-8")
         pip = [sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check"]
-        exact = ["--no-deps", "--only-binary", ":all:", "--require-hashes", *pip_options(name)]
-        done = subprocess.run(
-            [*pip, *exact, "--dest", temporary, "--requirement", str(pinned)],
+        options = ["--no-deps", "--only-binary", ":all:", "--require-hashes", *pip_options(name)]
+        result = subprocess.run(
+            [*pip, *options, "--dest", temporary, "--requirement", str(pinned)],
             capture_output=True,
             text=True,
         )
-        fetched = Path(temporary) / name
-        if done.returncode or not is_downloaded(fetched, digest):
-            reasons = (done.stderr or done.stdout).strip().splitlines() or ["no reason given"]
+        downloaded = Path(temporary) / name
+        if result.returncode or not is_downloaded(downloaded, digest):
+            reasons = (result.stderr or result.stdout).strip().splitlines() or ["no reason given"]
             raise FetchError(
                 f"{name} cannot be fetched ({reasons[-1]}): check the network, or name your "
                 f"package index in PIP_INDEX_URL, or put the file into {folder} yourself"
             )
-        os.replace(fetched, folder / name)
+        os.replace(downloaded, folder / name)
 
 
 def main() -> int:

@@ -49,22 +49,22 @@ def traced_lobes(
     light = np.array([-np.cos(theta), 0.0, -np.sin(theta)])
     point = np.stack([np.sqrt(1.0 - h * h), h, np.zeros_like(h)], axis=1)
     cosine = -(point @ light)
-    mirrored, cos_in = _glass(cosine, 1.0 / index)
+    reflectance, cos_in = _fresnel(cosine, 1.0 / index)
     directions = light + 2.0 * cosine[:, None] * point
     inside = light / index + (cosine / index - cos_in)[:, None] * point
-    energy = np.repeat((1.0 - mirrored)[:, None], 3, axis=1)
-    lobes = [(directions, np.repeat(mirrored[:, None], 3, axis=1))]
+    energy = np.repeat((1.0 - reflectance)[:, None], 3, axis=1)
+    lobes = [(directions, np.repeat(reflectance[:, None], 3, axis=1))]
     for _ in range(1, order_count):
         flat = inside * [1.0, 1.0, 0.0]
         length = -2.0 * _dot(point, flat) / _dot(flat, flat)
         point = point + length[:, None] * flat
         energy = energy * np.exp(-length[:, None] * np.array(fibre.absorption))
         cosine = np.maximum(_dot(inside, point), 0.0)
-        mirrored, cos_out = _glass(cosine, index)
+        reflectance, cos_out = _fresnel(cosine, index)
         directions = inside * index + (cos_out - index * cosine)[:, None] * point
-        lobes.append((directions, energy * (1.0 - mirrored)[:, None]))
+        lobes.append((directions, energy * (1.0 - reflectance)[:, None]))
         inside = inside - 2.0 * cosine[:, None] * point
-        energy = energy * mirrored[:, None]
+        energy = energy * reflectance[:, None]
     histograms = np.stack([_histogram(directions, weight) for directions, weight in lobes])
     return histograms, np.array([weight.mean(axis=0) for _, weight in lobes])
 
@@ -83,9 +83,9 @@ def lobe_errors(traced: Floats, theta: float, fibre: Fibre) -> tuple[float, floa
     errors = []
     for order, function in enumerate((azimuthal_r, azimuthal_tt, azimuthal_trt)):
         expected = _bin_means(np.array(np.cos(theta)), function, fibre)
-        kept = ~is_near if order == 2 else np.full(BIN_COUNT, True)
-        difference = np.abs(expected - traced[order])[kept].max(axis=0)
-        errors.append(float((difference / traced[order][kept].max(axis=0)).max()))
+        is_compared = ~is_near if order == 2 else np.full(BIN_COUNT, True)
+        difference = np.abs(expected - traced[order])[is_compared].max(axis=0)
+        errors.append(float((difference / traced[order][is_compared].max(axis=0)).max()))
     return (errors[0], errors[1], errors[2])
 
 
@@ -98,16 +98,16 @@ def scattered_energy(fibre: Fibre, theta_i: Floats) -> Floats:
     theta_r = ((np.arange(720) + 0.5) / 720 - 0.5) * np.pi
     phi = (np.arange(180) + 0.5) / 180 * np.pi
     theta_d = np.linspace(0.0, 0.5 * np.pi, 129)
-    around = 2.0 * np.pi * azimuthal_lobes(np.cos(theta_d)[:, None], phi, fibre).mean(axis=1)
-    turned = 0.5 * (theta_r - theta_i[:, None])
-    measure = np.cos(theta_r) ** 2 / np.cos(turned) ** 2 * (np.pi / len(theta_r))
+    azimuthal = 2.0 * np.pi * azimuthal_lobes(np.cos(theta_d)[:, None], phi, fibre).mean(axis=1)
+    theta_d_of_pair = 0.5 * (theta_r - theta_i[:, None])
+    measure = np.cos(theta_r) ** 2 / np.cos(theta_d_of_pair) ** 2 * (np.pi / len(theta_r))
     lobes = longitudinal_lobes(fibre)
     total = np.zeros((len(theta_i), 3))
     for order, lobe in enumerate((*lobes, lobes[2])):
-        along = fibre.strengths[order] * lobe(theta_i[:, None], theta_r) * measure
+        longitudinal = fibre.strengths[order] * lobe(theta_i[:, None], theta_r) * measure
         for channel in range(3):
-            energy = np.interp(np.abs(turned), theta_d, around[:, order, channel])
-            total[:, channel] += (along * energy).sum(axis=1)
+            energy = np.interp(np.abs(theta_d_of_pair), theta_d, azimuthal[:, order, channel])
+            total[:, channel] += (longitudinal * energy).sum(axis=1)
     return total
 
 
@@ -122,12 +122,12 @@ def _bin_means(
 
 def _histogram(directions: Floats, weight: Floats) -> Floats:
     azimuth = (np.arctan2(directions[:, 1], directions[:, 0]) + np.pi) * (BIN_COUNT / (2.0 * np.pi))
-    place = np.minimum(azimuth.astype(np.int64), BIN_COUNT - 1)
-    counts = [np.bincount(place, channel, BIN_COUNT) for channel in weight.T]
+    bin_index = np.minimum(azimuth.astype(np.int64), BIN_COUNT - 1)
+    counts = [np.bincount(bin_index, channel, BIN_COUNT) for channel in weight.T]
     return np.stack(counts, axis=1) * (BIN_COUNT / (2.0 * np.pi) / len(directions))
 
 
-def _glass(cos_in: Floats, ratio: float) -> tuple[Floats, Floats]:
+def _fresnel(cos_in: Floats, ratio: float) -> tuple[Floats, Floats]:
     """Fresnel's reflectance and the cosine of refraction, in space; ratio: n before over n
     behind."""
     cos_out = np.sqrt(np.maximum(1.0 - ratio**2 * (1.0 - cos_in**2), 0.0))
@@ -136,5 +136,5 @@ def _glass(cos_in: Floats, ratio: float) -> tuple[Floats, Floats]:
     return 0.5 * (across**2 + along**2), cos_out
 
 
-def _dot(one: Floats, other: Floats) -> Floats:
-    return np.einsum("ij,ij->i", one, other)
+def _dot(first: Floats, second: Floats) -> Floats:
+    return np.einsum("ij,ij->i", first, second)

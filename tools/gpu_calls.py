@@ -23,18 +23,18 @@ def gpu_calls(work: Callable[[], Any]) -> Counter[str]:
     """Number of calls by `work` in this thread, by kind. Types of the gpu module cannot be patched,
     so the interpreter's profiler reports calls of built-in functions.
     """
-    found: Counter[str] = Counter()
+    counts: Counter[str] = Counter()
 
-    def note(_frame: Any, event: str, function: Any) -> None:
+    def count_call(_frame: Any, event: str, function: Any) -> None:
         if event == "c_call":
             kind = _CALLS.get(function.__qualname__)
             if kind is not None:
-                found[kind] += 1
+                counts[kind] += 1
 
-    before = sys.getprofile()
-    sys.setprofile(note)
+    previous = sys.getprofile()
+    sys.setprofile(count_call)
     try:
         work()
     finally:
-        sys.setprofile(before)
-    return found
+        sys.setprofile(previous)
+    return counts

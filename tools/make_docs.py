@@ -97,12 +97,12 @@ def make_pictures() -> None:
 
 
 def main() -> int:
-    options = argparse.ArgumentParser(description=__doc__)
-    options.add_argument("--check", action="store_true")
-    options.add_argument("--pictures", action="store_true")
-    chosen = options.parse_args()
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--check", action="store_true")
+    parser.add_argument("--pictures", action="store_true")
+    arguments = parser.parse_args()
     text = parameter_tables()
-    if chosen.check:
+    if arguments.check:
         current = PARAMETERS.is_file() and PARAMETERS.read_text(encoding="utf-8") == text
         if not current:
             print("docs/parameters.md is out of date: run make docs", file=sys.stderr)
@@ -118,7 +118,7 @@ def main() -> int:
     hairstyles = hairstyle_table.PAGE.read_text(encoding="utf-8")
     hairstyle_table.PAGE.write_text(hairstyle_table.with_table(hairstyles), encoding="utf-8")
     figures.write_quotes()
-    if chosen.pictures:
+    if arguments.pictures:
         make_pictures()
     return 0
 

@@ -19,16 +19,23 @@ from make_site import PAGES, REPOSITORY, write_site
 
 HELP = REPOSITORY / "help"
 #: checksum of the sources of the pages
-MADE_OF = REPOSITORY / "out" / "help.sum"
+CHECKSUM_FILE = REPOSITORY / "out" / "help.sum"
 #: files of the site that reading does not need
-_LEFT_OUT = shutil.ignore_patterns("_images", "_sources", "_downloads", "images", "*.inv", "*.map")
+_EXCLUDED_FILES = shutil.ignore_patterns(
+    "_images", "_sources", "_downloads", "images", "*.inv", "*.map"
+)
 _PICTURE = re.compile(r"<a [^>]*image-reference[^>]*>\s*<img [^>]*>\s*</a>|<img [^>]*>")
 
 
-def made_of(repository: Path = REPOSITORY) -> str:
+def sources_checksum(repository: Path = REPOSITORY) -> str:
     """A checksum of all sources of the pages, and of the tools that make them."""
-    own = ("tools/make_help.py", "tools/make_site.py", "requirements.lock", "blender_manifest.toml")
-    files = [repository / name for name in (*PAGES, *own)]
+    tools = (
+        "tools/make_help.py",
+        "tools/make_site.py",
+        "requirements.lock",
+        "blender_manifest.toml",
+    )
+    files = [repository / name for name in (*PAGES, *tools)]
     for folder in ("docs", "tools/site"):
         files += [f for f in (repository / folder).rglob("*") if f.is_file() and f.suffix != ".pyc"]
     checksum = hashlib.sha256()
@@ -40,13 +47,13 @@ def made_of(repository: Path = REPOSITORY) -> str:
 
 def fresh_help() -> None:
     """Write the pages, unless they are those of this state of the repository."""
-    now = made_of()
-    if HELP.is_dir() and MADE_OF.is_file() and MADE_OF.read_text() == now:
+    checksum = sources_checksum()
+    if HELP.is_dir() and CHECKSUM_FILE.is_file() and CHECKSUM_FILE.read_text() == checksum:
         return
-    MADE_OF.unlink(missing_ok=True)  # in case writing is interrupted
+    CHECKSUM_FILE.unlink(missing_ok=True)  # in case writing is interrupted
     write_help()
-    MADE_OF.parent.mkdir(exist_ok=True)
-    MADE_OF.write_text(now)
+    CHECKSUM_FILE.parent.mkdir(exist_ok=True)
+    CHECKSUM_FILE.write_text(checksum)
 
 
 def write_help(folder: Path = HELP) -> Path:
@@ -54,7 +61,7 @@ def write_help(folder: Path = HELP) -> Path:
     with tempfile.TemporaryDirectory() as site:
         version = write_site(Path(site))
         shutil.rmtree(folder, ignore_errors=True)
-        shutil.copytree(version, folder, ignore=_LEFT_OUT)
+        shutil.copytree(version, folder, ignore=_EXCLUDED_FILES)
     for page in folder.rglob("*.html"):
         page.write_text(_PICTURE.sub("", page.read_text("utf-8")), "utf-8")
     return folder

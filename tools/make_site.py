@@ -108,10 +108,10 @@ def _gather(repository: Path, pages: Path) -> None:
     for file in (*map(Path, PAGES), *pictures):
         (pages / file).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(repository / file, pages / file)
-    with (pages / PAGES[0]).open("a", encoding="utf-8") as first:
+    with (pages / PAGES[0]).open("a", encoding="utf-8") as index:
         for title, names in MENU.items():
             lines = ("```{toctree}", ":hidden:", f":caption: {title}", "", *names, "```")
-            first.write("\n" + "\n".join(lines) + "\n")
+            index.write("\n" + "\n".join(lines) + "\n")
 
 
 if __name__ == "__main__":

@@ -73,8 +73,8 @@ def wheels_for(wheels: list[str], system: str, python: tuple[int, int]) -> list[
 def manifest_for(manifest: str, system: str, wheels: list[str]) -> str:
     """The manifest of a zip for one system, with these wheels."""
     lines = "".join(f'  "./wheels/{name}",\n' for name in wheels)
-    ours = f'platforms = ["{system}"]\nwheels = [\n{lines}]\n'
-    changed, count = re.subn(r"^wheels = \[\n.*?^\]\n", ours, manifest, flags=re.M | re.S)
+    replacement = f'platforms = ["{system}"]\nwheels = [\n{lines}]\n'
+    changed, count = re.subn(r"^wheels = \[\n.*?^\]\n", replacement, manifest, flags=re.M | re.S)
     assert count == 1, "the manifest has one list of wheels"
     return changed
 
@@ -85,32 +85,32 @@ def recompressed(wheel: bytes) -> bytes:
     alembic3d's largest library for Linux holds the table of its symbols three times, too far apart
     for Deflate: its wheel shrinks from 13.0 MB to 8.0.
     """
-    kept = PACKED / f"{hashlib.sha256(wheel).hexdigest()}.whl"
-    if not kept.is_file():
+    cached = PACKED / f"{hashlib.sha256(wheel).hexdigest()}.whl"
+    if not cached.is_file():
         packed = io.BytesIO()
         with zipfile.ZipFile(io.BytesIO(wheel)) as old, zipfile.ZipFile(packed, "w") as new:
             for entry in old.infolist():
                 new.writestr(entry, old.read(entry), zipfile.ZIP_LZMA)
-        kept.parent.mkdir(parents=True, exist_ok=True)
-        partial = kept.with_suffix(f".{os.getpid()}")
+        cached.parent.mkdir(parents=True, exist_ok=True)
+        partial = cached.with_suffix(f".{os.getpid()}")
         partial.write_bytes(packed.getvalue())
-        os.replace(partial, kept)
-    return kept.read_bytes()
+        os.replace(partial, cached)
+    return cached.read_bytes()
 
 
 def write_zip(
     whole: Path, folder: Path, system: str, python: tuple[int, int], is_quick: bool = False
 ) -> Path:
     """Write the zip for one build of Blender, a part of the whole zip."""
-    other = "" if python == OFFICIAL else f"_python{python[0]}{python[1]}"
-    path = folder / f"{whole.stem}-{system.replace('-', '_')}{other}.zip"
+    suffix = "" if python == OFFICIAL else f"_python{python[0]}{python[1]}"
+    path = folder / f"{whole.stem}-{system.replace('-', '_')}{suffix}.zip"
     partial = path.with_suffix(".part")
     with zipfile.ZipFile(whole) as old, zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED) as new:
         names = [n.removeprefix("wheels/") for n in old.namelist() if n.endswith(".whl")]
-        kept = wheels_for(names, system, python)
+        fitting = wheels_for(names, system, python)
         for entry in old.infolist():
             is_wheel = entry.filename.endswith(".whl")
-            if is_wheel and entry.filename.rpartition("/")[2] not in kept:
+            if is_wheel and entry.filename.rpartition("/")[2] not in fitting:
                 continue
             content = old.read(entry)
             if is_quick and is_wheel:
@@ -119,7 +119,7 @@ def write_zip(
             if is_wheel and system == LZMA_SYSTEM and len(content) > LZMA_BYTES:
                 content = recompressed(content)
             if entry.filename == MANIFEST:
-                content = manifest_for(content.decode(), system, kept).encode()
+                content = manifest_for(content.decode(), system, fitting).encode()
             # wheels, which Blender's packager only stores, still shrink by a fiftieth
             new.writestr(entry, content, zipfile.ZIP_DEFLATED, compresslevel=9)
     os.replace(partial, path)
@@ -131,9 +131,9 @@ def main(folder: Path, is_quick: bool = False) -> int:
     fresh_help()  # it is packed
     with tempfile.TemporaryDirectory() as temporary:
         command = [sys.executable, extension_tool(), "build", "--source-dir", REPOSITORY]
-        done = subprocess.run([*map(str, command), "--output-dir", temporary])
-        if done.returncode:
-            return done.returncode
+        result = subprocess.run([*map(str, command), "--output-dir", temporary])
+        if result.returncode:
+            return result.returncode
         (whole,) = Path(temporary).glob("*.zip")
         with ThreadPoolExecutor() as pool:
             for path in pool.map(

@@ -43,21 +43,21 @@ def main(folder: Path) -> None:
         # after a first loop, hair begins each loop where it ends
         bake.folder, bake.use_own_range, bake.first, bake.last = scratch, True, 1, 2 * LOOP
         bpy.ops.hairloom.bake()
-        write_loop(folder / "turning.webp", drawn(scene, Path(scratch)))
+        write_loop(folder / "turning.webp", render_loop(scene, Path(scratch)))
 
 
 def turn(head: Any) -> None:
     """Keyframes that loop smoothly."""
     head.animation_data_clear()
-    for part, angle, nod in (*TURNS, (1.0, *TURNS[0][1:])):
+    for fraction, angle, nod in (*TURNS, (1.0, *TURNS[0][1:])):
         head.rotation_euler = np.radians((nod, 0.0, angle))
-        head.keyframe_insert("rotation_euler", frame=1.0 + part * LOOP)
+        head.keyframe_insert("rotation_euler", frame=1.0 + fraction * LOOP)
     (bag,) = head.animation_data.action.layers[0].strips[0].channelbags
     for curve in bag.fcurves:
         curve.modifiers.new("CYCLES")
 
 
-def drawn(scene: Any, scratch: Path) -> list[Image.Image]:
+def render_loop(scene: Any, scratch: Path) -> list[Image.Image]:
     """Pictures of the second loop."""
     scene.render.resolution_x = scene.render.resolution_y = SIDE
     scene.render.image_settings.file_format = "PNG"

@@ -2,7 +2,7 @@
 
 python tools/preset_pictures.py FOLDER
 
-FOLDER gets looks.png, where each look is shown twice: in a studio's light, and against the light.
+FOLDER gets looks.png, where each look is shown twice: in a studio's light, and backlight the light.
 """
 
 import importlib
@@ -34,9 +34,9 @@ def addon_module(module: str) -> Any:
 def wig(strand_count: int = STRANDS) -> Any:
     """The rig of shoulder-long hair on the built-in head, with its brows and lashes."""
     settings = addon_module("parameters").ALL_SETTINGS
-    grown = settings["grow"](strand_count=strand_count)
+    growth = settings["grow"](strand_count=strand_count)
     bust = addon_module("blender.scene.built_in_head").built_in_head()
-    strands = addon_module("groom.face_hair").grow_with_face(bust.surface, grown, bust.weights)
+    strands = addon_module("groom.face_hair").grow_with_face(bust.surface, growth, bust.weights)
     return addon_module("rig_flow").prepare(
         strands, bust.surface, settings["guides"](), place="the built-in groom", widths="auto"
     )
@@ -56,7 +56,7 @@ def studio_of(rig: Any, *settings: Any) -> Any:
     )
 
 
-def against(view: np.ndarray) -> tuple[Any, ...]:
+def backlight(view: np.ndarray) -> tuple[Any, ...]:
     """A sun behind the hair and a weak one in front of it, fixed to the camera."""
     sun = addon_module("shading.lights").Light.sun
     to_world = np.linalg.inv(view)[:3, :3]
@@ -64,21 +64,21 @@ def against(view: np.ndarray) -> tuple[Any, ...]:
     return tuple(sun(-to_world @ np.array(towards), *light) for towards, *light in suns)
 
 
-def coarse(picture: Any) -> Any:
+def posterized(picture: Any) -> Any:
     """The picture with SHADES levels per displayed channel."""
-    shown = addon_module("blender.base.images").display_encoded(picture)
-    shown = np.round(shown * (SHADES - 1)) / (SHADES - 1)
-    alpha = shown[..., 3:]
-    colors = addon_module("exchange.textures.srgb").srgb_decoded(shown[..., :3])
+    encoded = addon_module("blender.base.images").display_encoded(picture)
+    encoded = np.round(encoded * (SHADES - 1)) / (SHADES - 1)
+    alpha = encoded[..., 3:]
+    colors = addon_module("exchange.textures.srgb").srgb_decoded(encoded[..., :3])
     return np.concatenate([colors * alpha, alpha], axis=-1).astype(np.float32)
 
 
 def write_thumbnail(path: Path, picture: Any) -> None:
     """Write a picture as a small file, since all go into the zip."""
-    addon_module("blender.base.images").write_png(path, coarse(picture))
-    with Image.open(path) as written:
-        written.load()
-        written.save(path, optimize=True)
+    addon_module("blender.base.images").write_png(path, posterized(picture))
+    with Image.open(path) as image:
+        image.load()
+        image.save(path, optimize=True)
 
 
 def main(folder: Path) -> None:
@@ -102,7 +102,7 @@ def main(folder: Path) -> None:
     studio_stage, dark = (
         presets.named_preset(f"stage/{n}").settings for n in ("studio", "dramatic")
     )
-    sheet, stages = [], ((studio_stage, None), (dark, against))
+    sheet, stages = [], ((studio_stage, None), (dark, backlight))
     for path in sorted(LOOKS.glob("*.json")):
         look = addon_module("shading.wet_and_dusty").wet_and_dusty_look(
             presets.named_preset(f"looks/{path.stem}").settings
@@ -111,10 +111,10 @@ def main(folder: Path) -> None:
             studio.settings = studio.settings.with_settings(look, stage)
             if lights is None:
                 write_thumbnail(path.with_suffix(".png"), picture(THUMBNAIL, THUMBNAIL))
-            shown = picture(WIDTH, HEIGHT, lights)
-            shown[..., :3] += BACKDROP * (1.0 - shown[..., 3:])
-            shown[..., 3] = 1.0
-            sheet.append(shown)
+            rendered = picture(WIDTH, HEIGHT, lights)
+            rendered[..., :3] += BACKDROP * (1.0 - rendered[..., 3:])
+            rendered[..., 3] = 1.0
+            sheet.append(rendered)
         print(f"Drew {path.stem}", flush=True)
     images.write_png(folder / "looks.png", images.contact_sheet(sheet, 6))
 

@@ -18,7 +18,7 @@ PRESETS, SAMPLES = REPOSITORY / "presets", 2
 #: all hair is blond here: it shows shadows best
 LOOK, STRANDS = "looks/blond", 5000
 #: the head turns by this much [rad] and stops; the picture is taken this many frames after it began
-TURN, TURNING, FRAMES, DURATION = np.radians(70.0), 8, 13, 1.0 / 24.0
+TURN, TURN_FRAMES, FRAMES, DURATION = np.radians(70.0), 8, 13, 1.0 / 24.0
 #: enough for a picture of this size
 ATLAS = "1024"
 GRAVITY = np.array([0.0, 0.0, -9.81])
@@ -36,7 +36,7 @@ def turned(rig: Any, angle: float) -> Any:
 def moved(rig: Any, dynamics: Any) -> tuple[Any, Any]:
     """Pose and strands a moment after the head has turned to the front."""
     motion_flow = addon_module("motion_flow")
-    angles = [-TURN * (1.0 - min(frame / TURNING, 1.0)) for frame in range(FRAMES)]
+    angles = [-TURN * (1.0 - min(frame / TURN_FRAMES, 1.0)) for frame in range(FRAMES)]
     motion = motion_flow.begin(rig, turned(rig, angles[0]))
     for angle in angles[1:]:
         pose = turned(rig, angle)
@@ -56,14 +56,14 @@ def main() -> None:
 
     def look_and_motion(preset: Any) -> tuple[Any, tuple[Any, Any]]:
         at_rest = rig.rest_pose, rig.strands.points
-        chosen = {one.section: one for one in preset.all}
-        if "dynamics" in chosen:
-            return plain, moved(rig, chosen["dynamics"])
-        if "volume" in chosen:
-            return plain.with_settings(chosen["volume"]), at_rest
-        atlas = replace(chosen["atlas"], size=ATLAS)
-        shown = settings["card_drawing"](shown_as="cards")
-        return plain.with_settings(chosen["cards"], atlas, shown), at_rest
+        sections = {each.section: each for each in preset.all}
+        if "dynamics" in sections:
+            return plain, moved(rig, sections["dynamics"])
+        if "volume" in sections:
+            return plain.with_settings(sections["volume"]), at_rest
+        atlas = replace(sections["atlas"], size=ATLAS)
+        drawing = settings["card_drawing"](shown_as="cards")
+        return plain.with_settings(sections["cards"], atlas, drawing), at_rest
 
     for section in ("dynamics", "volume", "cards"):
         for entry in presets.shipped_presets(section):

@@ -17,7 +17,7 @@ from extension_loader import PACKAGE, load_package
 #: guides and strands of the Nalu demo, few and wide enough to tell their pieces apart
 GUIDES, CHILDREN = 762, 4095
 #: as many children as a head of hair has
-WHOLE = 20_000
+FULL_COUNT = 20_000
 WIDTH, HEIGHT, SAMPLES = 640, 720, 3
 #: where the built-in head's hair falls over its temple [m]
 TEMPLE = np.array([-0.12, -0.01, 0.075])
@@ -30,11 +30,11 @@ def addon_module(module: str) -> Any:
 def wig(children: str, count: int = CHILDREN, widths: str = "auto") -> Any:
     """A rig of wavy guides on the built-in head, with or without children; each side is a group."""
     settings = addon_module("parameters").ALL_SETTINGS
-    grown = settings["grow"](strand_count=GUIDES, wave=0.018, wave_length=0.06, clump=0.3)
+    growth = settings["grow"](strand_count=GUIDES, wave=0.018, wave_length=0.06, clump=0.3)
     bust = addon_module("blender.scene.built_in_head").built_in_head()
     head = bust.surface
     grow = addon_module("groom.grow")
-    strands = grow.grow(head, grown, bust.weights["scalp"])
+    strands = grow.grow(head, growth, bust.weights["scalp"])
     return addon_module("rig_flow").prepare(
         replace(strands, group=strands.roots[:, 0] > 0.0),
         head,
@@ -59,22 +59,22 @@ def picture(rig: Any, look: dict[str, Any], camera: Any = None, samples: int = S
     view = look.pop("debug_view", "none")
     sections = addon_module("params").SettingsMap(settings["detail"](**look))
     groom_settings = addon_module("blender.properties.groom_settings")
-    chosen = groom_settings.GroomSettings(sections, debug_view=view)
-    made = studio.Studio(
+    groom = groom_settings.GroomSettings(sections, debug_view=view)
+    studio_ = studio.Studio(
         addon_module("blender.sessions.prepared_groom").prepare_groom(rig, ambient),
-        chosen,
+        groom,
         look=addon_module("blender.scene.built_in_head").built_in_head().look("light"),
     )
-    return made.picture(rig.rest_pose, rig.strands.points, WIDTH, HEIGHT, samples, camera)
+    return studio_.picture(rig.rest_pose, rig.strands.points, WIDTH, HEIGHT, samples, camera)
 
 
-def close_camera(rig: Any, reach: float) -> Any:
-    """A camera in front of the hair over the temple, showing `reach` [m] from bottom to top."""
+def close_camera(rig: Any, height: float) -> Any:
+    """A camera in front of the hair over the temple, showing `height` [m] from bottom to top."""
     camera = addon_module("render.camera")
     points = rig.strands.points.astype(np.float64)
     target = points[np.linalg.norm(points - TEMPLE, axis=1).argmin()]
     eye = target + np.array([-0.3, -0.3, 0.05])
-    fov = 2.0 * np.arctan(reach / 2.0 / np.linalg.norm(eye - target))
+    fov = 2.0 * np.arctan(height / 2.0 / np.linalg.norm(eye - target))
     projection = camera.perspective(fov, WIDTH / HEIGHT, 0.01, 2.0)
     return camera.Camera(camera.look_at(eye, target), projection)
 
@@ -89,13 +89,15 @@ def main(folder: Path) -> None:
         print(f"Wrote {name}.png", flush=True)
 
     full = wig("multi")
-    close, closer = close_camera(full, reach=0.16), close_camera(full, reach=0.06)
+    close, closer = close_camera(full, height=0.16), close_camera(full, height=0.06)
     undivided = {"mode": "fixed", "subdivisions": 1}
-    write("children", [picture(wig("none", widths="own"), {}), picture(wig("multi", WHOLE), {})])
+    write(
+        "children", [picture(wig("none", widths="own"), {}), picture(wig("multi", FULL_COUNT), {})]
+    )
     write("curl", [picture(full, dict(undivided), closer), picture(full, {}, closer)])
     views = [dict(undivided), {"mode": "fixed", "subdivisions": 64}, {}]
-    shown = [picture(full, view | {"debug_view": "detail"}, close) for view in views]
-    write("detail_view", shown)
+    pictures = [picture(full, view | {"debug_view": "detail"}, close) for view in views]
+    write("detail_view", pictures)
     write("guide_view", [picture(full, {"debug_view": view}) for view in ("guide", "group")])
 
 

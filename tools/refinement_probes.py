@@ -41,8 +41,8 @@ def read_factors(order: DetailOrder, strand_count: int, cv_count: int) -> Ints:
     from hairloom.addon.render.textures import texture_to_array
 
     texels = (cv_count - 2) // FACTORS_IN_TEXEL + 1
-    found = texture_to_array(order.factors).reshape(-1, 4)[: strand_count * texels]
-    factors = np.ascontiguousarray(found).view(np.uint8).reshape(strand_count, -1)
+    texels_read = texture_to_array(order.factors).reshape(-1, 4)[: strand_count * texels]
+    factors = np.ascontiguousarray(texels_read).view(np.uint8).reshape(strand_count, -1)
     return factors[:, : cv_count - 1].astype(np.int32)
 
 

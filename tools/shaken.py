@@ -20,8 +20,8 @@ def shaken_poses(rig: Rig, frame_count: int, rate: float) -> list[Pose]:
     poses = []
     for frame in range(frame_count):
         matrix = shake_matrix((low + high) / 2.0, frame / rate)
-        moved = rig.head.positions @ matrix[:3, :3].T + matrix[:3, 3]
-        poses.append(Pose(moved.astype(np.float32), matrix))
+        positions = rig.head.positions @ matrix[:3, :3].T + matrix[:3, 3]
+        poses.append(Pose(positions.astype(np.float32), matrix))
     return poses
 
 

@@ -43,10 +43,10 @@ def pictures_of(style: str) -> list[Any]:
     )
     size = WIDTH, HEIGHT, SAMPLES
     strands = studio.picture(rig.rest_pose, rig.strands.points, *size)
-    made = builds.BuiltCards.build(inputs)
+    built = builds.BuiltCards.build(inputs)
     return [
         strands,
-        studio.card_picture(made.with_drawing_settings(made.rest, inputs.settings), *size),
+        studio.card_picture(built.with_drawing_settings(built.rest, inputs.settings), *size),
     ]
 
 

@@ -19,7 +19,7 @@ from small_pictures import write_small
 WIDTH, HEIGHT, SAMPLES = 560, 600, 8
 CURVES, CHILDREN = 1200, 24_000
 #: the frame of a shake that is pictured
-SHAKEN = 8
+SHAKE_FRAME = 8
 
 
 def addon_module(module: str) -> Any:
@@ -58,19 +58,21 @@ def picture(hair: Any) -> np.ndarray:
 def sheet(folder: Path, name: str, pictures: list[np.ndarray]) -> None:
     """Write pictures side by side, as a small file."""
     images = addon_module("blender.base.images")
-    with tempfile.TemporaryDirectory() as drawn:
-        images.write_png(Path(drawn) / "sheet.png", images.contact_sheet(pictures, len(pictures)))
-        write_small(Path(drawn) / "sheet.png", folder / name)
+    with tempfile.TemporaryDirectory() as temporary:
+        images.write_png(
+            Path(temporary) / "sheet.png", images.contact_sheet(pictures, len(pictures))
+        )
+        write_small(Path(temporary) / "sheet.png", folder / name)
 
 
 def grow(folder: Path) -> None:
     """Draw one groom while it is edited."""
     hair = grown(length=0.24)
-    own = hair.data.hairloom.grow
+    settings = hair.data.hairloom.grow
     pictures = [picture(hair)]
-    own.length, own.volume = 0.1, 0.02
+    settings.length, settings.volume = 0.1, 0.02
     pictures.append(picture(hair))
-    own.length, own.comb_back, own.wave, own.clump = 0.3, 0.2, 0.014, 0.6
+    settings.length, settings.comb_back, settings.wave, settings.clump = 0.3, 0.2, 0.014, 0.6
     sheet(folder, "grow.jpg", [*pictures, picture(hair)])
 
 
@@ -104,15 +106,15 @@ STROKES = {
 }
 
 
-def stroke_on(head: Any, name: str, places: Any) -> Any:
+def stroke_on(head: Any, name: str, points: Any) -> Any:
     """A curve on the head near these places, as the Draw tool leaves it."""
     data = bpy.data.curves.new(name, "CURVE")
     data.dimensions = "3D"
     spline = data.splines.new("BEZIER")
-    spline.bezier_points.add(len(places) - 1)
-    for point, place in zip(spline.bezier_points, places, strict=True):
-        _, point.co, _, _ = head.closest_point_on_mesh(place)
-        point.handle_left_type = point.handle_right_type = "AUTO"
+    spline.bezier_points.add(len(points) - 1)
+    for bezier_point, point in zip(spline.bezier_points, points, strict=True):
+        _, bezier_point.co, _, _ = head.closest_point_on_mesh(point)
+        bezier_point.handle_left_type = bezier_point.handle_right_type = "AUTO"
     stroke = bpy.data.objects.new(name, data)
     bpy.context.collection.objects.link(stroke)
     stroke.parent = head
@@ -122,7 +124,7 @@ def stroke_on(head: Any, name: str, places: Any) -> Any:
 def flow(folder: Path) -> None:
     hair = grown(method="normals", length=0.1)
     pictures = [picture(hair)]
-    strokes = [stroke_on(hair.parent, name, places) for name, places in STROKES.items()]
+    strokes = [stroke_on(hair.parent, name, points) for name, points in STROKES.items()]
     for stroke in strokes:
         stroke.select_set(True)
     bpy.ops.hairloom.add_stroke()
@@ -133,15 +135,15 @@ def flow(folder: Path) -> None:
 def shaken(hair: Any) -> np.ndarray:
     """The hair in the middle of a shake of the head."""
     scene, head = bpy.context.scene, hair.parent
-    scene.frame_start, scene.frame_end = 1, SHAKEN
-    for frame, (turn, aside) in {1: (0, 0), 5: (0.9, 0.03), 10: (-0.9, -0.03)}.items():
-        head.rotation_euler.z, head.location.x = turn, aside
+    scene.frame_start, scene.frame_end = 1, SHAKE_FRAME
+    for frame, (turn, shift) in {1: (0, 0), 5: (0.9, 0.03), 10: (-0.9, -0.03)}.items():
+        head.rotation_euler.z, head.location.x = turn, shift
         head.keyframe_insert("rotation_euler", frame=frame)
         head.keyframe_insert("location", frame=frame)
     depsgraph = bpy.context.evaluated_depsgraph_get()
     session = addon_module("blender.preview.previews").start(hair, depsgraph)
     hair.hairloom.bake.follows = True
-    for frame in range(1, SHAKEN + 1):
+    for frame in range(1, SHAKE_FRAME + 1):
         scene.frame_set(frame)
     shown = addon_module("blender.pictures.showing").shown_groom(hair, depsgraph)
     image = shown.studio.picture(shown.pose, session.strands, WIDTH, HEIGHT, SAMPLES)
@@ -192,19 +194,19 @@ def paint_highlights(mesh: Any, size: int = 512, samples: int = 4_000_000) -> No
     mesh.calc_loop_triangles()
     corners = np.array([each.loops[:] for each in mesh.loop_triangles])
     uv = np.array([each.vector for each in mesh.uv_layers.active.uv])[corners]
-    place = np.array([each.co for each in mesh.vertices])[
+    positions = np.array([each.co for each in mesh.vertices])[
         np.array([each.vertices[:] for each in mesh.loop_triangles])
     ]
-    across = np.abs(np.linalg.det(uv[:, 1:] - uv[:, :1]))
-    triangle = random.choice(len(uv), samples, p=across / across.sum())
+    area = np.abs(np.linalg.det(uv[:, 1:] - uv[:, :1]))
+    triangle = random.choice(len(uv), samples, p=area / area.sum())
     weight = random.dirichlet((1.0, 1.0, 1.0), samples)
-    at = np.einsum("nk,nkj->nj", weight, uv[triangle])
-    x, y, z = np.einsum("nk,nkj->nj", weight, place[triangle]).T
-    locks = np.sin(620.0 * y + 2.0 * np.sin(90.0 * z) + np.sign(x)) + np.sin(230.0 * (y + z))
+    sample_uv = np.einsum("nk,nkj->nj", weight, uv[triangle])
+    x, y, z = np.einsum("nk,nkj->nj", weight, positions[triangle]).T
+    streaks = np.sin(620.0 * y + 2.0 * np.sin(90.0 * z) + np.sign(x)) + np.sin(230.0 * (y + z))
     pixels = np.zeros((size, size, 4), np.float32)
     pixels[..., :3] = 0.78, 0.57, 0.36  # sRGB
-    column, row = np.clip((at * size).astype(int), 0, size - 1).T
-    pixels[row, column, 3] = np.clip(locks - 0.2, 0.0, 0.9)
+    column, row = np.clip((sample_uv * size).astype(int), 0, size - 1).T
+    pixels[row, column, 3] = np.clip(streaks - 0.2, 0.0, 0.9)
     image = bpy.data.images.new("Highlights", size, size, alpha=True)
     image.pixels.foreach_set(pixels.ravel())
     image.update()

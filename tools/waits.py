@@ -43,7 +43,7 @@ def waits(folder: Path = ADDON) -> list[str]:
 
 
 def endless_waits() -> list[str]:
-    """Waits without a reason in ENDS."""
+    """Waits without a reason in KNOWN_WAITS."""
     return [each for each in waits() if each not in KNOWN_WAITS]
 
 

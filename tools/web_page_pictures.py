@@ -43,11 +43,11 @@ def main(folder: Path) -> None:
     command = [str(sandbox), "run", "python3", str(driver), str(page), str(steps), str(SCRATCH)]
     subprocess.run(command, check=True)
     desktop, phone = (oiio.ImageBuf(str(SCRATCH / f"{each}.png")) for each in ("desktop", "phone"))
-    both = oiio.ImageBuf(oiio.ImageSpec(1200 + 16 + 390, 760, 3, "uint8"))
-    oiio.ImageBufAlgo.fill(both, (1.0, 1.0, 1.0))
-    oiio.ImageBufAlgo.paste(both, 0, 0, 0, 0, oiio.ImageBufAlgo.channels(desktop, (0, 1, 2)))
-    oiio.ImageBufAlgo.paste(both, 1216, 0, 0, 0, oiio.ImageBufAlgo.channels(phone, (0, 1, 2)))
-    both.write(str(SCRATCH / "both.png"))
+    combined = oiio.ImageBuf(oiio.ImageSpec(1200 + 16 + 390, 760, 3, "uint8"))
+    oiio.ImageBufAlgo.fill(combined, (1.0, 1.0, 1.0))
+    oiio.ImageBufAlgo.paste(combined, 0, 0, 0, 0, oiio.ImageBufAlgo.channels(desktop, (0, 1, 2)))
+    oiio.ImageBufAlgo.paste(combined, 1216, 0, 0, 0, oiio.ImageBufAlgo.channels(phone, (0, 1, 2)))
+    combined.write(str(SCRATCH / "both.png"))
     write_small(SCRATCH / "both.png", folder / "web_page.jpg")
 
 

@@ -34,8 +34,8 @@ def test_pages_are_made_again_when_what_they_are_made_of_changes(
     made: list[str] = []
     state = {"sum": "one"}
     monkeypatch.setattr(make_help, "HELP", tmp_path / "help")
-    monkeypatch.setattr(make_help, "MADE_OF", tmp_path / "out" / "help.sum")
-    monkeypatch.setattr(make_help, "made_of", lambda: state["sum"])
+    monkeypatch.setattr(make_help, "CHECKSUM_FILE", tmp_path / "out" / "help.sum")
+    monkeypatch.setattr(make_help, "sources_checksum", lambda: state["sum"])
 
     def write() -> None:
         made.append(state["sum"])
@@ -57,11 +57,11 @@ def test_every_page_and_the_tools_count_for_the_checksum(tmp_path: Path) -> None
     for name in names:
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text("as it was")
-    before = make_help.made_of(tmp_path)
-    assert make_help.made_of(tmp_path) == before
+    before = make_help.sources_checksum(tmp_path)
+    assert make_help.sources_checksum(tmp_path) == before
     for name in names:
         (tmp_path / name).write_text("changed")
-        assert make_help.made_of(tmp_path) != before, name
+        assert make_help.sources_checksum(tmp_path) != before, name
         (tmp_path / name).write_text("as it was")
 
 
