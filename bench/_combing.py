@@ -17,7 +17,7 @@ import numpy as np
 from hairloom.addon.blender.base import latest_job
 from hairloom.addon.blender.base.latest_job import POLL_INTERVAL
 from hairloom.addon.blender.preview import previews, scene_events
-from hairloom.addon.blender.scene.curves import curve_offsets, curve_points, put_points
+from hairloom.addon.blender.scene.curves import curve_offsets, curve_points, set_points
 from hairloom.addon.blender.sessions.session import Session
 
 STRANDS, STROKES = 20_000, 7
@@ -43,11 +43,11 @@ def combed(hair: Any) -> dict[str, float]:
     assert session is not None
     for stroke in range(STROKES):
         before, strands = curve_points(hair.data), session.rig.strands.points
-        put_points(hair.data, _turned(hair, stroke * count // STROKES))
+        set_points(hair.data, _turned(hair, stroke * count // STROKES))
         first.append(_update())
         assert session.rig.strands.points is not strands, "the strands do not follow"
         if stroke % 2:
-            put_points(hair.data, before)
+            set_points(hair.data, before)
             undo.append(_update())
         hair_ms, light_ms = _catch_up(session)
         rest.append(hair_ms)

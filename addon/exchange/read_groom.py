@@ -77,7 +77,7 @@ def values_of_kept_points(values: Floats, offsets: Ints, cleaned: Cleaned) -> Fl
     if not cleaned.dropped:
         return values
     is_kept = np.zeros(len(offsets) - 1, bool)
-    is_kept[cleaned.kept] = True
+    is_kept[cleaned.curve_indices] = True
     return values[np.repeat(is_kept, np.diff(offsets))]
 
 

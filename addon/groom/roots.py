@@ -183,7 +183,7 @@ def carry_with_roots(points: Floats, offsets: Ints, motions: RootMotions) -> Flo
     moved = np.array(points)
     for block in blocks_of(offsets):
         rest = block.planes(moved)
-        block.put(moved, rest + motions.change(rest, block.strands))
+        block.write(moved, rest + motions.displacement(rest, block.strands))
     return moved
 
 

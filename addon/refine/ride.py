@@ -186,7 +186,7 @@ def ride(
     for block, seats in riders.blocks:
         rest = block.planes(points)
         if motions is not None:  # the same, bit for bit, as `groom.roots.carry_with_roots`
-            rest += motions.change(rest, block.strands)
+            rest += motions.displacement(rest, block.strands)
         change, edge = np.empty_like(rest), rest[:, 1:] - rest[:, :-1]
         change[:, 0] = 0.0
         if have_left:
@@ -196,7 +196,7 @@ def ride(
         change[:, 1:] = _turned(edge, riders.are_center_lines, seats, table, wide, axes)
         _sum(change)
         change += rest
-        block.put(moved, change)
+        block.write(moved, change)
     return moved
 
 

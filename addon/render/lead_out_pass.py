@@ -111,8 +111,8 @@ _NUMBERS = {
 #: steps that read colliders
 _STEPS_WITH_COLLIDERS = ("FIND_NEAR", "LEAD_OUT")
 STORED_POINTS_RECIPE = ShaderRecipe(
-    name="put_points",
-    compute="put_points.comp.glsl",
+    name="set_points",
+    compute="set_points.comp.glsl",
     textures=(("FLOAT_2D", "led_points"), ("FLOAT_2D", "led_texels")),
     images=(("RGBA32F", "cv_points", "READ_WRITE"),),
     integers=("point_count",),

@@ -100,20 +100,20 @@ def even_fractions(offsets: Ints) -> Floats:
     return number / np.repeat(np.maximum(counts - 1, 1), counts)
 
 
-def first_point_at_arc_length(along: Floats, offsets: Ints, wanted: Floats) -> Ints:
-    """The first point of each strand at or past each wanted arc length, (strand_count, n).
+def first_point_at_arc_length(along: Floats, offsets: Ints, target: Floats) -> Ints:
+    """The first point of each strand at or past each target arc length, (strand_count, n).
 
     Args:
-        along: see `arc_lengths`. wanted: (strand_count, n) [m], no farther than the tip.
+        along: see `arc_lengths`. target: (strand_count, n) [m], no farther than the tip.
     """
-    number = np.arange(len(wanted))
+    number = np.arange(len(target))
     length = np.maximum(along[offsets[1:] - 1], np.finfo(np.float64).tiny)
     # keys ascend over all strands, so that one search does for all; a large strand number costs
     # digits of the fraction, so the search may be off by one point, which the end corrects
-    every = along / np.repeat(length, np.diff(offsets)) + 2.0 * np.repeat(number, np.diff(offsets))
-    asked = wanted / length[:, None] + 2.0 * number[:, None]
-    right = np.searchsorted(every, asked.ravel(), side="left").reshape(wanted.shape)
+    keys = along / np.repeat(length, np.diff(offsets)) + 2.0 * np.repeat(number, np.diff(offsets))
+    target_keys = target / length[:, None] + 2.0 * number[:, None]
+    right = np.searchsorted(keys, target_keys.ravel(), side="left").reshape(target.shape)
     low, high = offsets[:-1, None], offsets[1:, None] - 1
     right = np.clip(right, low, high)
-    right = np.where(along[np.maximum(right - 1, low)] >= wanted, np.maximum(right - 1, low), right)
-    return np.where(along[right] < wanted, np.minimum(right + 1, high), right)
+    right = np.where(along[np.maximum(right - 1, low)] >= target, np.maximum(right - 1, low), right)
+    return np.where(along[right] < target, np.minimum(right + 1, high), right)

@@ -45,7 +45,7 @@ class Block:
         taken = values[self.points]
         return np.ascontiguousarray(taken.reshape(-1, self.count, *values.shape[1:]).T)
 
-    def put(self, values: Floats, planes: Floats) -> None:
+    def write(self, values: Floats, planes: Floats) -> None:
         """Write planes (..., count, n) into values (point_count, ...), in place."""
         if isinstance(self.points, slice):
             rows = values[self.points].reshape(-1, self.count, len(planes))

@@ -32,8 +32,8 @@ def catmull_rom(points: Sequence[Floats], t: Floats) -> Floats:
     p0, p1, p2, p3 = points
     m1, m2 = 0.5 * (p2 - p0), 0.5 * (p3 - p1)  # the tangents
     chord = p2 - p1
-    found: Floats = p1 + t * (m1 + t * (3.0 * chord - 2.0 * m1 - m2 + t * (m1 + m2 - 2.0 * chord)))
-    return found
+    point: Floats = p1 + t * (m1 + t * (3.0 * chord - 2.0 * m1 - m2 + t * (m1 + m2 - 2.0 * chord)))
+    return point
 
 
 def catmull_rom_derivative(points: Sequence[Floats], t: Floats) -> Floats:
@@ -41,10 +41,10 @@ def catmull_rom_derivative(points: Sequence[Floats], t: Floats) -> Floats:
     p0, p1, p2, p3 = points
     m1, m2 = 0.5 * (p2 - p0), 0.5 * (p3 - p1)
     chord = p2 - p1
-    found: Floats = m1 + t * (
+    derivative: Floats = m1 + t * (
         2.0 * (3.0 * chord - 2.0 * m1 - m2) + t * 3.0 * (m1 + m2 - 2.0 * chord)
     )
-    return found
+    return derivative
 
 
 def even_points_on_curve(grid: Floats, count: int) -> Floats:

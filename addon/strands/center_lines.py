@@ -19,10 +19,10 @@ from .arc_length import first_point_at_arc_length
 from .resample import evenly_spaced
 from .strand_set import StrandSet
 
-#: A strand that resampling shortens by less than this fraction has no curls that its CVs miss.
-_FAITHFUL = 0.02
-#: Largest `curl_slack` of a segment: where curls cancel out, it would have no limit.
-_WIDEST = 20.0
+#: If resampling shortens a strand by less than this fraction, its CVs represent all of its curls.
+_MAX_LENGTH_LOSS = 0.02
+#: Maximum `curl_slack` of a segment: where curls cancel out, it would have no limit.
+_MAX_SLACK = 20.0
 #: Points averaged at once, so that they stay in the cache.
 _CHUNK = 32_768
 
@@ -37,12 +37,12 @@ def center_lines(strands: StrandSet, cv_count: int) -> StrandSet:
     if cv_count < 3:
         return lines
     length = strands.lengths()
-    lost = np.flatnonzero(length - lines.lengths() > _FAITHFUL * length)
-    if not len(lost):
+    shortened = np.flatnonzero(length - lines.lengths() > _MAX_LENGTH_LOSS * length)
+    if not len(shortened):
         return lines
-    points, counts = lines.grid.copy(), strands.point_counts[lost]
+    points, counts = lines.grid.copy(), strands.point_counts[shortened]
     for count in np.unique(counts).tolist():
-        own = lost[counts == count]
+        own = shortened[counts == count]
         for some in np.array_split(own, -(-len(own) * count // _CHUNK)):
             rows = strands.offsets[some, None] + np.arange(count)
             points[some, 1:-1] = _means(strands.points.take(rows, axis=0), cv_count)
@@ -50,7 +50,7 @@ def center_lines(strands: StrandSet, cv_count: int) -> StrandSet:
 
 
 def curl_slack(length: Floats, lines: Floats) -> Floats | None:
-    """How far each segment of centre lines can be drawn out until its curls are straight, as a
+    """How far each segment of centre lines can be stretched until its curls are straight, as a
     fraction of its length, (n, cv_count - 1) float32; None if no strand is curled.
 
     Args:
@@ -58,11 +58,11 @@ def curl_slack(length: Floats, lines: Floats) -> Floats | None:
         lines: (n, cv_count, 3) [m].
     """
     segment = np.linalg.norm(np.diff(lines, axis=1), axis=2)
-    room = length[:, None] / segment.shape[1] / np.maximum(segment, 1.0e-12) - 1.0
-    is_curled = length - segment.sum(axis=1) > _FAITHFUL * length
+    slack = length[:, None] / segment.shape[1] / np.maximum(segment, 1.0e-12) - 1.0
+    is_curled = length - segment.sum(axis=1) > _MAX_LENGTH_LOSS * length
     if not is_curled.any():
         return None
-    return np.where(is_curled[:, None], np.clip(room, 0.0, _WIDEST), 0.0).astype(np.float32)
+    return np.where(is_curled[:, None], np.clip(slack, 0.0, _MAX_SLACK), 0.0).astype(np.float32)
 
 
 def _means(grid: Floats, cv_count: int) -> Floats:
@@ -73,29 +73,31 @@ def _means(grid: Floats, cv_count: int) -> Floats:
     place -= root
     step = np.diff(place, axis=2)
     length = np.sqrt(step[0] ** 2 + step[1] ** 2 + step[2] ** 2)
-    reached = _summed(length)
-    wanted = reached[:, -1:] * np.linspace(0.0, 1.0, cv_count)
+    along = _running_sums(length)
+    target = along[:, -1:] * np.linspace(0.0, 1.0, cv_count)
     offsets = np.arange(len(grid) + 1) * grid.shape[1]
-    left = first_point_at_arc_length(reached.ravel(), offsets, wanted) - 1
+    left = first_point_at_arc_length(along.ravel(), offsets, target) - 1
     left = np.maximum(left, offsets[:-1, None])
-    inside = wanted - reached.take(left)
+    inside = target - along.take(left)
     # the segment in which each CV lies
     segment = left - np.arange(len(grid))[:, None]
     slope = 1.0 / np.maximum(length.take(segment), np.finfo(np.float64).tiny)
     means = np.empty((len(grid), cv_count - 2, 3))
     for axis in range(3):
         near, far = place[axis, :, :-1], place[axis, :, 1:]
-        once = _summed(0.5 * length * (near + far))
-        twice = _summed(length * (once[:, :-1] + length * (2.0 * near + far) / 6.0))
-        found = place[axis].take(left) / 2.0 + inside * step[axis].take(segment) * slope / 6.0
-        found = twice.take(left) + inside * (once.take(left) + inside * found)
-        means[..., axis] = np.diff(found, 2, axis=1)
-    spacing = reached[:, -1:, None] / (cv_count - 1)
+        first_integral = _running_sums(0.5 * length * (near + far))
+        mean = first_integral[:, :-1] + length * (2.0 * near + far) / 6.0
+        second_integral = _running_sums(length * mean)
+        integral = place[axis].take(left) / 2.0 + inside * step[axis].take(segment) * slope / 6.0
+        integral = first_integral.take(left) + inside * integral
+        integral = second_integral.take(left) + inside * integral
+        means[..., axis] = np.diff(integral, 2, axis=1)
+    spacing = along[:, -1:, None] / (cv_count - 1)
     means /= spacing * spacing
     return means + root.transpose(1, 2, 0)
 
 
-def _summed(parts: Floats) -> Floats:
+def _running_sums(parts: Floats) -> Floats:
     """Running sums of parts (n, k), from 0 to the total, (n, k + 1)."""
     total = np.zeros((len(parts), parts.shape[1] + 1))
     np.cumsum(parts, axis=1, out=total[:, 1:])

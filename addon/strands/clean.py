@@ -25,11 +25,11 @@ MAX_COORDINATE = 1.0e6
 
 @dataclass(frozen=True)
 class Cleaned:
-    """The usable strands, how many were dropped for which reason, and which ones were kept."""
+    """The usable strands, their curves, and how many others were dropped for which reason."""
 
     strands: StrandSet
     dropped: dict[str, int]
-    kept: Ints  # (strand_count,) indices into the input
+    curve_indices: Ints  # (strand_count,) among the input
 
 
 def clean(
@@ -41,7 +41,7 @@ def clean(
     root_uv: Floats | None = None,
     color: Floats | None = None,
     seed: Ints | None = None,
-    unfit: Mapping[str, Bools] = MappingProxyType({}),
+    unusable: Mapping[str, Bools] = MappingProxyType({}),
 ) -> Cleaned:
     """Make a `StrandSet` from curves of any origin.
 
@@ -55,20 +55,20 @@ def clean(
         root_uv: (curve_count, 2); values that are not finite become 0.
         color: (point_count, 3) scene-linear; see `usable_colors`.
         seed: (curve_count,); see `StrandSet`.
-        unfit: reason -> (curve_count,) curves to drop for this reason, whatever their points.
+        unusable: reason -> (curve_count,) curves to drop for this reason, whatever their points.
     """
     points = np.asarray(points, np.float32).reshape(-1, 3)
     offsets = np.asarray(offsets, np.int64)
     counts = np.diff(offsets)
     curve_count = len(counts)
     color = None if color is None else usable_colors(color, offsets)
-    if not unfit and radius is not None and _are_clean(points, offsets, radius, root_uv):
+    if not unusable and radius is not None and _are_clean(points, offsets, radius, root_uv):
         group = np.zeros(curve_count, np.int32) if group is None else group
         strands = StrandSet(points, offsets, radius, group, root_uv, color=color, seed=seed)
         return Cleaned(strands, {}, np.arange(curve_count))
 
     faults = {
-        **unfit,
+        **unusable,
         "fewer than two points": counts < 2,
         "a point that is not finite": _any_per_curve(~np.isfinite(points).all(axis=1), offsets),
         "a point farther than 1,000 km away": _any_per_curve(
@@ -84,19 +84,23 @@ def clean(
             dropped[reason] = count
         usable &= ~is_faulty
 
-    kept = np.flatnonzero(usable)
-    point_kept = np.repeat(usable, counts)
+    curve_indices = np.flatnonzero(usable)
+    is_point_usable = np.repeat(usable, counts)
     strands = StrandSet(
-        points=points[point_kept],
-        offsets=np.concatenate([[0], np.cumsum(counts[kept])]).astype(np.int32),
-        radius=_usable_radius(radius, offsets)[point_kept],
-        group=np.zeros(len(kept), np.int32) if group is None else np.asarray(group)[kept],
-        root_uv=None if root_uv is None else np.nan_to_num(root_uv, posinf=0, neginf=0)[kept],
+        points=points[is_point_usable],
+        offsets=np.concatenate([[0], np.cumsum(counts[curve_indices])]).astype(np.int32),
+        radius=_usable_radius(radius, offsets)[is_point_usable],
+        group=np.zeros(len(curve_indices), np.int32)
+        if group is None
+        else np.asarray(group)[curve_indices],
+        root_uv=None
+        if root_uv is None
+        else np.nan_to_num(root_uv, posinf=0, neginf=0)[curve_indices],
         has_widths=radius is not None and bool(are_valid_widths(np.asarray(radius), offsets).any()),
-        color=None if color is None else color[point_kept],
-        seed=None if seed is None else np.asarray(seed)[kept],
+        color=None if color is None else color[is_point_usable],
+        seed=None if seed is None else np.asarray(seed)[curve_indices],
     )
-    return Cleaned(strands, dropped, kept)
+    return Cleaned(strands, dropped, curve_indices)
 
 
 def _are_clean(points: Floats, offsets: Ints, radius: Floats, root_uv: Floats | None) -> bool:
@@ -139,9 +143,11 @@ def _usable_radius(radius: Floats | None, offsets: Ints) -> Floats:
     radius = np.asarray(radius, np.float32)
     is_width = are_valid_widths(radius, offsets)
     is_positive = is_width & (radius > 0.0)
-    known = _upper_median(radius[is_positive]) if is_positive.any() else np.float32(DEFAULT_RADIUS)
+    typical = (
+        _upper_median(radius[is_positive]) if is_positive.any() else np.float32(DEFAULT_RADIUS)
+    )
     return np.where(
-        is_positive, radius, np.where(is_width, known * np.float32(_POINTED_RADIUS), known)
+        is_positive, radius, np.where(is_width, typical * np.float32(_POINTED_RADIUS), typical)
     )
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints, piece_starts
 from ..errors import HairloomError
 from .parallel import parallel_map
-from .point_clusters import PointClusters, clustered
+from .point_clusters import PointClusters, cluster_points
 from .surface import Surface
 from .triangle_distance import TriangleForms
 from .triangle_tree import TriangleTree, build_tree
@@ -107,7 +107,7 @@ class ClosestPointSearch:
                 point of it, also beyond reach. Much faster if few points are within reach.
         """
         local = np.asarray(points, np.float64).reshape(-1, 3) - self.center
-        return self._measured(local, self._nearest(local, reach))
+        return self._closest_on(local, self._nearest(local, reach))
 
     def nearest(self, points: Floats, reach: float) -> Ints:
         """The nearest triangle only, (point_count,), searched without clusters.
@@ -118,9 +118,9 @@ class ClosestPointSearch:
 
     def closest_on(self, points: Floats, triangle: Ints) -> ClosestPoints:
         """The closest point to each point (point_count, 3) on its given triangle (point_count,)."""
-        return self._measured(np.asarray(points, np.float64) - self.center, triangle)
+        return self._closest_on(np.asarray(points, np.float64) - self.center, triangle)
 
-    def _measured(self, local: Floats, triangle: Ints) -> ClosestPoints:
+    def _closest_on(self, local: Floats, triangle: Ints) -> ClosestPoints:
         barycentric = self._forms.closest(local, triangle)
         closest = np.einsum("ni,nij->nj", barycentric, self.corners[triangle])
         distance = np.linalg.norm(local - closest, axis=1)
@@ -132,18 +132,18 @@ class ClosestPointSearch:
         """The nearest triangle of each point, using clusters if that saves work."""
         if len(points) < _MIN_POINTS_PER_CLUSTER:
             return self._search_all(points, reach)
-        clusters = clustered(points, self._size)
+        clusters = cluster_points(points, self._size)
         if len(points) < _MIN_POINTS_PER_CLUSTER * len(clusters.middle):
             return self._search_all(points, reach)
         nearest = self._search_all(clusters.middle, reach + float(clusters.radius.max()))
         candidates = self._candidates(clusters, nearest, reach)
         is_crowded = (candidates.count > _MAX_CANDIDATES)[clusters.cluster]
         found = np.empty(len(points), np.int64)
-        alone, together = np.flatnonzero(is_crowded), np.flatnonzero(~is_crowded)
-        found[clusters.order[together]] = self._of_clusters(
-            points, clusters, together, nearest, candidates, reach
+        single, shared = np.flatnonzero(is_crowded), np.flatnonzero(~is_crowded)
+        found[clusters.order[shared]] = self._of_clusters(
+            points, clusters, shared, nearest, candidates, reach
         )
-        found[clusters.order[alone]] = self._search_all(points[clusters.order[alone]], reach)
+        found[clusters.order[single]] = self._search_all(points[clusters.order[single]], reach)
         return found
 
     def _search_all(self, points: Floats, reach: float) -> Ints:
@@ -230,8 +230,8 @@ class ClosestPointSearch:
             count, first = candidates.count[cluster], candidates.first[cluster]
             point = np.repeat(np.arange(len(here)), count)
             pair = np.arange(len(point)) + np.repeat(first - piece_starts(count), count)
-            so_far = np.minimum(np.sqrt(best.distance), reach) + clusters.away[part]
-            is_near = candidates.away[pair] <= (so_far * _ROUNDING_FACTOR)[point]
+            limit = np.minimum(np.sqrt(best.distance), reach) + clusters.away[part]
+            is_near = candidates.away[pair] <= (limit * _ROUNDING_FACTOR)[point]
             self._improve(best, here, point[is_near], candidates.triangle[pair[is_near]])
             found.append(best.triangle)
         return np.concatenate(found)
@@ -286,9 +286,9 @@ def _first_minimum_rows(point: Ints, value: Floats) -> Ints:
     first = np.flatnonzero(np.diff(point, prepend=-1))
     if not len(first):
         return first
-    least = np.repeat(np.minimum.reduceat(value, first), np.diff(first, append=len(point)))
-    is_least = np.flatnonzero(value == least)
-    return is_least[np.flatnonzero(np.diff(point[is_least], prepend=-1))]
+    minimum = np.repeat(np.minimum.reduceat(value, first), np.diff(first, append=len(point)))
+    is_minimum = np.flatnonzero(value == minimum)
+    return is_minimum[np.flatnonzero(np.diff(point[is_minimum], prepend=-1))]
 
 
 def _point_triangle_pairs(point: Ints, triangles: Ints) -> tuple[Ints, Ints]:

@@ -16,7 +16,7 @@ _CHUNK, _PAIR_LIMIT = 1 << 14, 100_000
 #: Factor of the squared reach that makes up for rounding, so that no triangle is missed.
 _ROUNDING_FACTOR = 1.0 + 1.0e-6
 #: A crossing within this fraction of a line's first segment means that it begins on the surface.
-_AT_START = 1.0e-4
+_START_TOLERANCE = 1.0e-4
 
 
 def first_crossings(lines: Floats, surface: Surface) -> Floats:
@@ -35,16 +35,16 @@ def first_crossings(lines: Floats, surface: Surface) -> Floats:
     first = np.full(len(start), np.inf)
     for begin in range(0, len(start), _CHUNK):
         some = np.arange(begin, min(begin + _CHUNK, len(start)))
-        for segment, triangle in _near(tree, start, end, some):
-            place = _places(start[segment], end[segment], corners[triangle])
-            place[(segment % segments == 0) & (place < _AT_START)] = np.inf
+        for segment, triangle in _candidate_pairs(tree, start, end, some):
+            place = _crossing_fractions(start[segment], end[segment], corners[triangle])
+            place[(segment % segments == 0) & (place < _START_TOLERANCE)] = np.inf
             np.minimum.at(first, segment, place)
     reached = np.arange(segments) + first.reshape(len(lines), segments)
     found: Floats = reached.min(axis=1, initial=np.inf)
     return found
 
 
-def _near(
+def _candidate_pairs(
     tree: TriangleTree, start: Floats, end: Floats, some: Ints
 ) -> Iterator[tuple[Ints, Ints]]:
     """Chunks of the pairs of segment and triangle that may meet."""
@@ -53,14 +53,14 @@ def _near(
     found = tree.leaves_within(middle, within, _PAIR_LIMIT)
     if found is None:
         for part in np.array_split(some, 2):
-            yield from _near(tree, start, end, part)
+            yield from _candidate_pairs(tree, start, end, part)
         return
     segment, leaf, _ = found
     triangles = tree.leaf_triangles[leaf]
     yield np.repeat(some[segment], triangles.shape[1]), triangles.ravel()
 
 
-def _places(start: Floats, end: Floats, corners: Floats) -> Floats:
+def _crossing_fractions(start: Floats, end: Floats, corners: Floats) -> Floats:
     """Where each segment passes through its triangle, (n,) from 0 to 1, pair by pair; infinite
     where it does not.
 

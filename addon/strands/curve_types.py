@@ -71,22 +71,22 @@ class _CurveBatch:
     """Curves that are evaluated by the same matrix.
 
     inner: (n, count) indices of control points. outer: (n, samples) indices of evaluated points.
-    mix: (samples, count) the weights of the control points' values at each sample.
+    basis: (samples, count) the weights of the control points' values at each sample.
     weight: (n, count) NURBS weights of the control points; None: all 1.
     """
 
     inner: Ints
     outer: Ints
-    mix: Floats
+    basis: Floats
     weight: Floats | None = None
 
     def of(self, values: Floats) -> Floats:
         """(n, samples, width) from values of control points (point_count, width)."""
         some = values[self.inner].astype(np.float64)
         if self.weight is None:
-            return np.asarray(self.mix @ some)
-        whole = self.mix @ self.weight[..., None]
-        return np.asarray((self.mix @ (some * self.weight[..., None])) / whole)
+            return np.asarray(self.basis @ some)
+        whole = self.basis @ self.weight[..., None]
+        return np.asarray((self.basis @ (some * self.weight[..., None])) / whole)
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,25 +121,25 @@ def evaluate_curves(points: Floats, offsets: Ints, shapes: CurveShapes) -> Evalu
     kind = np.where((shapes.kind == CurveType.NURBS) & ~is_nurbs, CurveType.POLY, shapes.kind)
     pieces = np.where(kind == CurveType.CATMULL_ROM, 1, np.maximum(shapes.resolution, 1))
     is_poly = kind == CurveType.POLY
-    pieces[is_poly] = _pieces(points, offsets)[is_poly]
+    pieces[is_poly] = _piece_counts(points, offsets)[is_poly]
     pieces[counts < 2] = 1
     order, knots = (np.where(is_nurbs, each, 0) for each in (shapes.order, shapes.knots))
     traits = np.stack([kind, counts, pieces, order, knots], axis=1)
     unique, which = np.unique(traits, axis=0, return_inverse=True)
-    mixes = [_mix(*row) for row in unique.tolist()]
-    sizes = np.array([len(mix) for mix in mixes], np.int64)[which.ravel()]
+    bases = [_basis(*row) for row in unique.tolist()]
+    sizes = np.array([len(basis) for basis in bases], np.int64)[which.ravel()]
     outer = np.concatenate([[0], np.cumsum(sizes)])
     found = np.empty((outer[-1], 3), np.float32)
     parts = []
-    for number, (row, mix) in enumerate(zip(unique.tolist(), mixes, strict=True)):
+    for number, (row, basis) in enumerate(zip(unique.tolist(), bases, strict=True)):
         chosen = np.flatnonzero(which.ravel() == number)
         inner_rows = offsets[chosen, None] + np.arange(row[1])
-        outer_rows = outer[chosen, None] + np.arange(len(mix))
+        outer_rows = outer[chosen, None] + np.arange(len(basis))
         weight = shapes.weight[inner_rows] if row[0] == CurveType.NURBS else None
-        part = _CurveBatch(inner_rows, outer_rows, mix, weight)
+        part = _CurveBatch(inner_rows, outer_rows, basis, weight)
         parts.append(part)
         if row[0] == CurveType.BEZIER and row[1] > 1:
-            found[outer_rows] = _bezier(points, shapes, inner_rows, row[2])
+            found[outer_rows] = _bezier_points(points, shapes, inner_rows, row[2])
         else:
             found[outer_rows] = part.of(points)
     return EvaluatedCurves(found, outer, tuple(parts))
@@ -152,7 +152,7 @@ def _have_knots(counts: Ints, shapes: CurveShapes) -> Bools:
     return (order >= 2) & (counts >= order + needs_more)
 
 
-def _pieces(points: Floats, offsets: Ints) -> Ints:
+def _piece_counts(points: Floats, offsets: Ints) -> Ints:
     """The number of pieces that each segment of a polygon is cut into, (curve_count,), so that a
     smooth curve through their ends rounds corners by no more than _MAX_ROUNDING of its length."""
     counts, found = np.diff(offsets), np.ones(len(offsets) - 1, np.int64)
@@ -169,21 +169,21 @@ def _pieces(points: Floats, offsets: Ints) -> Ints:
     return found
 
 
-def _mix(kind: int, count: int, pieces: int, order: int, knots: int) -> Floats:
+def _basis(kind: int, count: int, pieces: int, order: int, knots: int) -> Floats:
     """The weights of `count` control points at each sample of a curve, (samples, count)."""
     if kind == CurveType.NURBS:
-        return _nurbs(count, pieces, order, knots)
+        return _nurbs_basis(count, pieces, order, knots)
     if count < 2:
         return np.eye(count)
     place = np.linspace(0.0, count - 1.0, (count - 1) * pieces + 1)
     before = np.minimum(place.astype(np.int64), count - 2)
-    mix, row = np.zeros((len(place), count)), np.arange(len(place))
-    mix[row, before] = 1.0 - (place - before)
-    mix[row, before + 1] = place - before
-    return mix
+    basis, row = np.zeros((len(place), count)), np.arange(len(place))
+    basis[row, before] = 1.0 - (place - before)
+    basis[row, before + 1] = place - before
+    return basis
 
 
-def _bezier(points: Floats, shapes: CurveShapes, inner: Ints, pieces: int) -> Floats:
+def _bezier_points(points: Floats, shapes: CurveShapes, inner: Ints, pieces: int) -> Floats:
     """Points (n, samples, 3) on Bezier curves with these control points (n, count)."""
     u = np.linspace(0.0, 1.0, pieces + 1)[:-1, None]
     v = 1.0 - u
@@ -202,9 +202,9 @@ def _bezier(points: Floats, shapes: CurveShapes, inner: Ints, pieces: int) -> Fl
     return np.concatenate([grid, points[inner[:, -1:]]], axis=1)
 
 
-def _nurbs(count: int, pieces: int, order: int, mode: int) -> Floats:
+def _nurbs_basis(count: int, pieces: int, order: int, mode: int) -> Floats:
     """B-spline basis functions (samples, count), with `pieces` samples per non-empty knot span."""
-    knots = _knot_places(count, order, mode)
+    knots = _knot_vector(count, order, mode)
     ends = np.unique(knots[order - 1 : count + 1])
     inside = ends[:-1, None] + np.diff(ends)[:, None] * np.arange(pieces) / pieces
     place = np.append(inside.ravel(), ends[-1])
@@ -221,7 +221,7 @@ def _nurbs(count: int, pieces: int, order: int, mode: int) -> Floats:
     return basis
 
 
-def _knot_places(count: int, order: int, mode: int) -> Floats:
+def _knot_vector(count: int, order: int, mode: int) -> Floats:
     """The knots of an open curve, (count + order,), in one of Blender's modes."""
     is_bezier = mode in (KnotMode.BEZIER, KnotMode.ENDPOINT_BEZIER)
     reaches_ends = mode in (KnotMode.ENDPOINT, KnotMode.ENDPOINT_BEZIER)

@@ -8,7 +8,7 @@ from ..arrays import Floats, Ints
 from .vectors import dot_rows, unit_or
 
 #: Shortest usable normal before it is normalized, squared; shortest vector with a direction [m].
-_SMALLEST, _SHORTEST = 1.0e-6, np.float32(1.0e-6)
+_MIN_SQUARED_NORMAL, _MIN_LENGTH = 1.0e-6, np.float32(1.0e-6)
 
 
 def tangents(grid: Floats) -> Floats:
@@ -89,12 +89,12 @@ def volume_normal_rows(away: Floats, tangent: Floats) -> Floats:
     outward = _unit_or_up(away)
     across: Floats = outward - tangent * dot_rows(outward, tangent)
     squared = dot_rows(across, across)
-    unclear = squared <= _SMALLEST
-    if unclear.any():
-        own = tangent[:, unclear].T
+    is_parallel = squared <= _MIN_SQUARED_NORMAL
+    if is_parallel.any():
+        own = tangent[:, is_parallel].T
         axis = np.eye(3)[np.abs(own).argmin(axis=-1)]
-        across[:, unclear] = unit_or(np.cross(own, axis), axis).T
-        squared[unclear] = 1.0
+        across[:, is_parallel] = unit_or(np.cross(own, axis), axis).T
+        squared[is_parallel] = 1.0
     across /= np.sqrt(squared)
     return across
 
@@ -102,8 +102,8 @@ def volume_normal_rows(away: Floats, tangent: Floats) -> Floats:
 def _unit_or_up(rows: Floats) -> Floats:
     """Vectors in rows (3, n), scaled to length 1; (0, 0, 1) for those without length."""
     length = np.sqrt(dot_rows(rows, rows))
-    found: Floats = rows / np.maximum(length, _SHORTEST)
-    is_short = length <= _SHORTEST
+    found: Floats = rows / np.maximum(length, _MIN_LENGTH)
+    is_short = length <= _MIN_LENGTH
     if is_short.any():
         found[:, is_short] = np.array([[0.0], [0.0], [1.0]])
     return found
@@ -114,7 +114,7 @@ def _perpendicular(vector: Floats, tangent: Floats) -> Floats:
     parallel."""
     across = vector - tangent * np.sum(vector * tangent, axis=-1, keepdims=True)
     length = np.linalg.norm(across, axis=-1, keepdims=True)
-    least = np.abs(tangent).argmin(axis=-1)
-    substitute = np.cross(tangent, np.eye(3, dtype=np.float32)[least])
+    smallest_axis = np.abs(tangent).argmin(axis=-1)
+    substitute = np.cross(tangent, np.eye(3, dtype=np.float32)[smallest_axis])
     across = np.where(length > 1e-6, across, substitute)
     return (across / np.linalg.norm(across, axis=-1, keepdims=True)).astype(np.float32)

@@ -16,9 +16,9 @@ from .strand_set import StrandSet
 MAX_POINTS = 512
 #: Fraction of its length that a strand may lose.
 MAX_LENGTH_LOSS = 0.005
-#: Fraction of the hair's median length that a strand may stray by: 0.2 mm for 25 cm.
+#: Fraction of the hair's median length that a strand may deviate by: 0.2 mm for 25 cm.
 MAX_DEVIATION = 8.0e-4
-#: Approximate ratio between successive counts to try.
+#: Approximate ratio between successive counts that are tried.
 _STEP = 1.25
 #: Points tested at once, so that they stay in the cache.
 _CHUNK = 100_000
@@ -40,7 +40,7 @@ def with_needed_points(
     """The same strands with no more points than their shapes need, and at least `min_points` each.
 
     A strand is resampled evenly to as few points as it takes to lose at most MAX_LENGTH_LOSS of its
-    length and to stray by at most MAX_DEVIATION of the median length of all. If that is no fewer
+    length and to deviate by at most MAX_DEVIATION of the median length of all. If that is no fewer
     than it has, it keeps its own points; with fewer than `min_points` of them it gets more in
     between.
 
@@ -50,15 +50,15 @@ def with_needed_points(
     own = strands.point_counts
     if not strands.strand_count or (own == min_points).all():
         return strands
-    stray = MAX_DEVIATION * typical_length(strands.lengths())
+    max_deviation = MAX_DEVIATION * typical_length(strands.lengths())
 
     def of(some: Ints) -> tuple[Ints, Bools]:
-        return _needed(strands.take(some), min_points, stray)
+        return _point_counts(strands.take(some), min_points, max_deviation)
 
     if strands.is_uniform:
-        needed, is_even = cache.rows("points", (min_points, stray), (strands.grid,), of)
+        needed, is_even = cache.rows("points", (min_points, max_deviation), (strands.grid,), of)
     else:
-        needed, is_even = _needed(strands, min_points, stray)
+        needed, is_even = _point_counts(strands, min_points, max_deviation)
     return with_points(strands, needed, is_even)
 
 
@@ -84,7 +84,7 @@ def with_points(strands: StrandSet, counts: Ints, is_even: Bools) -> StrandSet:
     return replace(strands, points=points, offsets=offsets, radius=radius, color=color)
 
 
-def _needed(strands: StrandSet, min_points: int, stray: float) -> tuple[Ints, Bools]:
+def _point_counts(strands: StrandSet, min_points: int, max_deviation: float) -> tuple[Ints, Bools]:
     """How many points each strand gets, and whether evenly, (strand_count,) each.
 
     A strand tries the lowest count first, which is enough for most; then the next one below its
@@ -92,36 +92,40 @@ def _needed(strands: StrandSet, min_points: int, stray: float) -> tuple[Ints, Bo
     """
     own = strands.point_counts
     along = arc_lengths(strands.points, strands.offsets)
-    counts = np.array(_counts(min_points))
+    counts = np.array(_trial_counts(min_points))
     # range of the counts that each strand has left to try; `last` stands for its own points
     low = np.zeros(len(own), np.int64)
     last = np.where(own == min_points, 0, np.maximum(counts.searchsorted(own), 1))
     high = last.copy()
-    tried = np.zeros(len(own), np.int64)
+    trial = np.zeros(len(own), np.int64)
     while (left := np.flatnonzero(low < high)).size:
-        for number in np.unique(tried[left]).tolist():
-            some = left[tried[left] == number]
-            suffices = _suffice(strands, along, some, int(counts[number]), stray)
-            high[some[suffices]] = number
-            low[some[~suffices]] = number + 1
+        for number in np.unique(trial[left]).tolist():
+            some = left[trial[left] == number]
+            is_sufficient = _are_sufficient(
+                strands, along, some, int(counts[number]), max_deviation
+            )
+            high[some[is_sufficient]] = number
+            low[some[~is_sufficient]] = number + 1
         # curls need about as many as they have: if the count below is too few, no other is tried
-        is_first = (low == 1) & (high == last) & (tried == 0)
-        tried = np.where(is_first, high - 1, (low + high) // 2)
+        is_first = (low == 1) & (high == last) & (trial == 0)
+        trial = np.where(is_first, high - 1, (low + high) // 2)
     is_even = low < last
-    kept = np.clip(own, min_points, MAX_POINTS)
-    needed = np.where(is_even, counts[np.minimum(low, len(counts) - 1)], kept)
+    clipped = np.clip(own, min_points, MAX_POINTS)
+    needed = np.where(is_even, counts[np.minimum(low, len(counts) - 1)], clipped)
     return needed, is_even | (own > MAX_POINTS)
 
 
-def _suffice(strands: StrandSet, along: Floats, some: Ints, count: int, stray: float) -> Bools:
+def _are_sufficient(
+    strands: StrandSet, along: Floats, some: Ints, count: int, max_deviation: float
+) -> Bools:
     """Whether `count` even points keep the shape of each of some strands, (n,)."""
     size = max(_CHUNK // max(int(strands.point_counts[some].max()), count), 1)
     parts = [some[start : start + size] for start in range(0, len(some), size)]
-    found = [_Lines.of(strands, along, part).suffice(count, stray) for part in parts]
+    found = [_Lines.of(strands, along, part).are_sufficient(count, max_deviation) for part in parts]
     return np.concatenate(found)
 
 
-def _counts(min_points: int) -> list[int]:
+def _trial_counts(min_points: int) -> list[int]:
     counts, count = [], float(min_points)
     while count < MAX_POINTS:
         counts.append(round(count))
@@ -152,7 +156,7 @@ class _Lines:
         offsets, points = _rows(self.offsets, some)
         return _Lines(self.axes.take(points, axis=1), self.along.take(points), offsets)
 
-    def suffice(self, count: int, stray: float) -> Bools:
+    def are_sufficient(self, count: int, max_deviation: float) -> Bools:
         """Whether `count` even points keep the shape of each strand, (strand_count,)."""
         length = self.along[self.offsets[1:] - 1]
         left, weight = positions_at(self.along, self.offsets, count)
@@ -160,14 +164,15 @@ class _Lines:
         even = [axis.take(left) * before + axis.take(left + 1) * weight for axis in self.axes]
         steps = (np.diff(axis.astype(np.float64), axis=1) for axis in even)
         total = np.sqrt(sum(step * step for step in steps)).sum(axis=1)
-        suffices = np.asarray(total >= (1.0 - MAX_LENGTH_LOSS) * length)
-        long = np.flatnonzero(suffices)  # the others fail anyway
+        is_sufficient = np.asarray(total >= (1.0 - MAX_LENGTH_LOSS) * length)
+        long = np.flatnonzero(is_sufficient)  # the others fail anyway
         if len(long):
             lines = self if len(long) == len(length) else self.take(long)
-            suffices[long] = lines._farthest([axis[long] for axis in even]) <= stray * stray
-        return suffices
+            deviation = lines._max_squared_deviation([axis[long] for axis in even])
+            is_sufficient[long] = deviation <= max_deviation * max_deviation
+        return is_sufficient
 
-    def _farthest(self, even: list[Floats]) -> Floats:
+    def _max_squared_deviation(self, even: list[Floats]) -> Floats:
         """The largest squared distance of each strand's points from the line through the even ones,
         (strand_count,).
 
@@ -239,8 +244,8 @@ def _refined(strands: StrandSet, count: int) -> StrandSet:
 def _pieces(length: Floats, count: int) -> Ints:
     """How many of `count` pieces each segment gets, (n, segments): by length, at least one each."""
     segments = length.shape[1]
-    wanted = length / np.maximum(length.sum(axis=1, keepdims=True), 1.0e-30) * (count - segments)
-    pieces = wanted.astype(np.int64)
+    ideal = length / np.maximum(length.sum(axis=1, keepdims=True), 1.0e-30) * (count - segments)
+    pieces = ideal.astype(np.int64)
     spare = count - segments - pieces.sum(axis=1)
-    rank = np.argsort(np.argsort(pieces - wanted, axis=1, kind="stable"), axis=1, kind="stable")
+    rank = np.argsort(np.argsort(pieces - ideal, axis=1, kind="stable"), axis=1, kind="stable")
     return pieces + 1 + (rank < spare[:, None])

@@ -13,11 +13,11 @@ THREADS = min(4, os.cpu_count() or 1)
 def parallel_map[T, R](make: Callable[[T], R], parts: Iterable[T]) -> list[R]:
     """The results of `make` for each part, in order, computed in parallel; calls must be
     independent."""
-    waiting = list(parts)
-    if len(waiting) < 2 or THREADS < 2:
-        return [make(part) for part in waiting]
+    all_parts = list(parts)
+    if len(all_parts) < 2 or THREADS < 2:
+        return [make(part) for part in all_parts]
     with ThreadPoolExecutor(THREADS) as threads:
-        return list(threads.map(make, waiting))
+        return list(threads.map(make, all_parts))
 
 
 def even_slices(count: int, min_size: int) -> list[slice]:

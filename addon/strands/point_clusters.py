@@ -30,7 +30,7 @@ class PointClusters:
     radius: Floats
 
 
-def clustered(points: Floats, size: float) -> PointClusters:
+def cluster_points(points: Floats, size: float) -> PointClusters:
     """Group points (point_count, 3), at least one, by cells of this size, or of a larger one if the
     points would need more than _MAX_CELLS along an axis."""
     low, high = points.min(axis=0), points.max(axis=0)
@@ -38,8 +38,8 @@ def clustered(points: Floats, size: float) -> PointClusters:
     cell = ((points - low) / size if size > 0.0 else np.zeros_like(points)).astype(np.int64)
     key = (cell[:, 0] * (_MAX_CELLS + 1) + cell[:, 1]) * (_MAX_CELLS + 1) + cell[:, 2]
     order = np.argsort(key, kind="stable")
-    begins = np.diff(key[order], prepend=-1) != 0
-    cluster, first = np.cumsum(begins) - 1, np.flatnonzero(begins)
+    is_first = np.diff(key[order], prepend=-1) != 0
+    cluster, first = np.cumsum(is_first) - 1, np.flatnonzero(is_first)
     gathered = points[order]
     counts = np.diff(np.append(first, len(points)))
     middle = np.add.reduceat(gathered, first, axis=0) / counts[:, None]

@@ -55,12 +55,12 @@ def arc_length_positions(strands: StrandSet, cv_count: int) -> tuple[Ints, Float
 def positions_at(along: Floats, offsets: Ints, cv_count: int) -> tuple[Ints, Floats]:
     """`arc_length_positions` from the arc length `along` at each point, see `arc_lengths`."""
     first, last = offsets[:-1], offsets[1:] - 1
-    wanted = along[last, None] * np.linspace(0.0, 1.0, cv_count)
-    right = first_point_at_arc_length(along, offsets, wanted)
+    target = along[last, None] * np.linspace(0.0, 1.0, cv_count)
+    right = first_point_at_arc_length(along, offsets, target)
     right = np.clip(right, first[:, None] + 1, last[:, None])
     left = right - 1
     span = along[right] - along[left]
-    weight = np.divide(wanted - along[left], span, out=np.zeros_like(wanted), where=span > 0.0)
+    weight = np.divide(target - along[left], span, out=np.zeros_like(target), where=span > 0.0)
     weight = np.clip(weight, 0.0, 1.0)
     left[:, 0], weight[:, 0] = first, 0.0
     left[:, -1], weight[:, -1] = last - 1, 1.0

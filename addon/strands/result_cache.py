@@ -1,7 +1,7 @@
 """A cache of the last results, so that only what has changed is computed again.
 
-An artist combs or paints a part of the hair, and the rest stays as it was. Inputs are compared bit
-for bit, and a kept result is used only where it equals a new one to the last bit.
+An artist combs or paints a part of the hair, and the rest does not change. Inputs are compared bit
+for bit, and a cached result is used only if it equals a new one to the last bit.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class ResultCache:
     """The last result of each named computation.
 
     Args:
-        forgets: whether every result is computed from scratch and none is kept.
+        is_disabled: whether every result is computed from scratch and none is stored.
     """
 
     def __init__(self, *, is_disabled: bool = False) -> None:
@@ -58,22 +58,22 @@ class ResultCache:
         bits = np.concatenate([_bits(each) for each in rows], axis=1)
         last = self._rows.get(name)
         if last is None or last.fixed != fixed or last.bits.shape[1] != bits.shape[1]:
-            made = _compute(make, np.arange(len(bits)))
+            result = _compute(make, np.arange(len(bits)))
         else:
-            made = last.rows_for(bits, make)
-        self._rows[name] = _LastRows(fixed, bits, made)
-        return made
+            result = last.rows_for(bits, make)
+        self._rows[name] = _LastRows(fixed, bits, result)
+        return result
 
-    def nearest(self, name: str, places: Floats, among: Floats, count: int) -> tuple[Ints, Floats]:
+    def nearest(self, name: str, places: Floats, others: Floats, count: int) -> tuple[Ints, Floats]:
         """`nearest_points`, searched only for the places whose nearest points may have changed."""
         if self._is_disabled:
-            return nearest_points(places, among, count)
+            return nearest_points(places, others, count)
         last = self._nearest.get(name)
-        if last is not None and count == last.count <= min(len(among), len(last.among)):
-            index, distance = last.updated(places, among)
+        if last is not None and count == last.count <= min(len(others), len(last.others)):
+            index, distance = last.updated(places, others)
         else:
-            index, distance = nearest_points(places, among, count)
-        self._nearest[name] = _LastNearest(places, among, count, index, distance)
+            index, distance = nearest_points(places, others, count)
+        self._nearest[name] = _LastNearest(places, others, count, index, distance)
         return index.copy(), distance.copy()
 
 
@@ -84,20 +84,20 @@ NO_CACHE = ResultCache(is_disabled=True)
 class _LastRows:
     """The last call of `ResultCache.rows`.
 
-    fixed: see there. bits: (n, width) uint32, the input rows. made: the result, arrays (n, ...).
+    fixed: see there. bits: (n, width) uint32, the input rows. result: arrays (n, ...).
     """
 
     fixed: tuple[Any, ...]
     bits: Ints
-    made: Rows
+    result: Rows
 
     def rows_for(self, bits: Ints, make: Callable[[Ints], Rows]) -> Rows:
-        """The result for these rows: the kept one for known rows, computed for new ones."""
+        """The result for these rows: cached for those of the last call, computed for new ones."""
         found = _row_indices(bits, self.bits)
         missing = np.flatnonzero(found < 0)
         if not len(missing) and np.array_equal(found, np.arange(len(self.bits))):
-            return self.made
-        result = tuple(each[found] for each in self.made)
+            return self.result
+        result = tuple(each[found] for each in self.result)
         if len(missing):
             for whole, part in zip(result, _compute(make, missing), strict=True):
                 whole[missing] = part
@@ -109,32 +109,32 @@ class _LastNearest:
     """The last call of `ResultCache.nearest`, and its result."""
 
     places: Floats
-    among: Floats
+    others: Floats
     count: int
     index: Ints
     distance: Floats
 
-    def updated(self, places: Floats, among: Floats) -> tuple[Ints, Floats]:
-        """The result for these, searched again where the place is new, where one of its nearest
-        points is gone, and where a new point is at least as near as the last of them."""
+    def updated(self, places: Floats, others: Floats) -> tuple[Ints, Floats]:
+        """The result for these places and points. A place is searched again if it is new, if one of
+        its nearest points is gone, or if a new point is at least as near as the last of them."""
         place, point = (
             _row_indices(_bits(places), _bits(self.places)),
-            _indices_of_earlier(among, self.among),
+            _indices_of_earlier(others, self.others),
         )
         if point is None:
-            return nearest_points(places, among, self.count)
+            return nearest_points(places, others, self.count)
         index, distance = point[self.index[place]], self.distance[place]
         stale = (place < 0) | (index < 0).any(axis=1)
-        is_new = np.ones(len(among), bool)
+        is_new = np.ones(len(others), bool)
         is_new[point[point >= 0]] = False
         rest = np.flatnonzero(~stale)
         if is_new.any() and len(rest):
             reach, some = distance[rest, -1:], places[rest]
-            low, high = among[is_new].min(axis=0), among[is_new].max(axis=0)
+            low, high = others[is_new].min(axis=0), others[is_new].max(axis=0)
             rest = rest[((some >= low - reach) & (some <= high + reach)).all(axis=1)]
-            _, gap = nearest_points(places[rest], among[is_new], 1)
+            _, gap = nearest_points(places[rest], others[is_new], 1)
             stale[rest] = gap[:, 0] <= distance[rest, -1]
-        index[stale], distance[stale] = nearest_points(places[stale], among, self.count)
+        index[stale], distance[stale] = nearest_points(places[stale], others, self.count)
         return index, distance
 
 
@@ -148,41 +148,41 @@ def _compute(make: Callable[[Ints], Rows], rows: Ints) -> Rows:
     return tuple(np.concatenate(each) for each in zip(*parts, strict=True))
 
 
-def find_rows(rows: Any, among: Any) -> Ints:
+def find_rows(rows: Any, others: Any) -> Ints:
     """The index of each row (n, ...) among others (m, ...), compared bit by bit, (n,); -1: none."""
-    return _row_indices(_bits(rows), _bits(among))
+    return _row_indices(_bits(rows), _bits(others))
 
 
-def _indices_of_earlier(among: Floats, before: Floats) -> Ints | None:
+def _indices_of_earlier(others: Floats, before: Floats) -> Ints | None:
     """The index among the points (n, 3) of each earlier point (m, 3), (m,); -1: none.
 
     None if points coincide or have changed their order: then ties between equally near points may
     be resolved differently.
     """
-    found = _row_indices(_bits(among), _bits(before))
-    known = np.flatnonzero(found >= 0)
-    if (np.diff(found[known]) <= 0).any():
+    found = _row_indices(_bits(others), _bits(before))
+    existing = np.flatnonzero(found >= 0)
+    if (np.diff(found[existing]) <= 0).any():
         return None
-    back = np.full(len(before), -1)
-    back[found[known]] = known
-    return back
+    index = np.full(len(before), -1)
+    index[found[existing]] = existing
+    return index
 
 
-def _row_indices(bits: Ints, among: Ints) -> Ints:
+def _row_indices(bits: Ints, others: Ints) -> Ints:
     """The index of each row (n, width) among others (m, width), (n,); -1: none."""
     found = np.full(len(bits), -1)
-    if bits.shape == among.shape:
-        is_same = (bits == among).all(axis=1)
+    if bits.shape == others.shape:
+        is_same = (bits == others).all(axis=1)
         found[is_same] = np.flatnonzero(is_same)
     left = np.flatnonzero(found < 0)
-    if len(left) and len(among):
+    if len(left) and len(others):
         factors = _FACTORS[: bits.shape[1]]
-        codes = among @ factors
+        codes = others @ factors
         order = np.argsort(codes, kind="stable")
         place = np.searchsorted(codes[order], bits[left] @ factors)
-        maybe = order[np.minimum(place, len(order) - 1)]
-        is_same = (bits[left] == among[maybe]).all(axis=1)
-        found[left[is_same]] = maybe[is_same]
+        candidate = order[np.minimum(place, len(order) - 1)]
+        is_same = (bits[left] == others[candidate]).all(axis=1)
+        found[left[is_same]] = candidate[is_same]
     return found
 
 

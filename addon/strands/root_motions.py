@@ -31,7 +31,7 @@ class RootMotions:
         turn = (matrix[:3, :3] - np.eye(3))[..., None].astype(np.float32)
         return cls(turn, matrix[:3, 3:].astype(np.float32), np.zeros((3, 1), np.float32))
 
-    def change(self, rows: Floats, strands: Ints | slice) -> Floats:
+    def displacement(self, rows: Floats, strands: Ints | slice) -> Floats:
         """The displacement of points at rest when they move with their roots, shaped like `rows`.
 
         Args:
@@ -54,7 +54,7 @@ class RootMotions:
             strands: (n,), the strand that each belongs to.
         """
         rest = points.take(index, axis=0)
-        return rest + self.change(np.ascontiguousarray(rest.T), strands).T
+        return rest + self.displacement(np.ascontiguousarray(rest.T), strands).T
 
     def take(self, strands: Ints | slice, dimensions: int = 2) -> RootMotions:
         """The motions of some strands, shaped to broadcast over arrays of 2 or 3 dimensions."""

@@ -58,7 +58,7 @@ class RootedShapes:
         Raises:
             HairloomError: the surface has no UVs, or its UV map has no face at a root.
         """
-        triangle, barycentric = _at(self.root_uv, surface)
+        triangle, barycentric = _find_uv(self.root_uv, surface)
         origin, frame = _frames(surface, triangle, barycentric)
         counts = np.diff(self.offsets)
         turned = np.einsum("pj,pij->pi", scale * self.shape, np.repeat(frame, counts, axis=0))
@@ -74,7 +74,7 @@ class RootedShapes:
         )
 
 
-def _at(uv: Floats, surface: Surface) -> tuple[Ints, Floats]:
+def _find_uv(uv: Floats, surface: Surface) -> tuple[Ints, Floats]:
     """The triangle (n,) and barycentric coordinates (n, 3) at each UV coordinate (n, 2)."""
     if surface.corner_uv is None:
         raise HairloomError(
@@ -82,7 +82,7 @@ def _at(uv: Floats, surface: Surface) -> tuple[Ints, Floats]:
         )
     places = np.zeros((len(uv), 3), np.float32)
     places[:, :2] = uv
-    found = surface.compute_once(_search_of_map).closest(places)
+    found = surface.compute_once(_uv_search).closest(places)
     if len(uv) and found.distance.max() > _MAX_UV_DISTANCE:
         raise HairloomError(
             "its UV map has no face where hair is to grow",
@@ -92,7 +92,7 @@ def _at(uv: Floats, surface: Surface) -> tuple[Ints, Floats]:
     return found.triangle, found.barycentric
 
 
-def _search_of_map(surface: Surface) -> ClosestPointSearch:
+def _uv_search(surface: Surface) -> ClosestPointSearch:
     """A search through the surface's UV map, as a mesh in the plane z = 0."""
     assert surface.corner_uv is not None
     flat = np.zeros((3 * len(surface.triangles), 3), np.float32)
@@ -115,8 +115,8 @@ def _frames(surface: Surface, triangle: Ints, barycentric: Floats) -> tuple[Floa
     # dP/du up to its length: the mix of edges that leaves V constant, towards growing U even where
     # the map is mirrored
     area = span[:, 0, 0] * span[:, 1, 1] - span[:, 1, 0] * span[:, 0, 1]
-    growing = edges[:, 0] * span[:, 1, 1:] - edges[:, 1] * span[:, 0, 1:]
-    growing *= np.where(area < 0.0, -1.0, 1.0)[:, None]
-    growing -= normal * np.einsum("nj,nj->n", growing, normal)[:, None]
-    along = unit_or(unit(growing), unit(np.cross(normal, (0.3, 0.5, 0.8))))
+    along_u = edges[:, 0] * span[:, 1, 1:] - edges[:, 1] * span[:, 0, 1:]
+    along_u *= np.where(area < 0.0, -1.0, 1.0)[:, None]
+    along_u -= normal * np.einsum("nj,nj->n", along_u, normal)[:, None]
+    along = unit_or(unit(along_u), unit(np.cross(normal, (0.3, 0.5, 0.8))))
     return origin, np.stack([along, np.cross(normal, along), normal], axis=2)

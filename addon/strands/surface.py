@@ -17,7 +17,7 @@ from .weld import unique_position_indices
 
 #: Coincident vertices share a normal if their own is within 41 degrees of it (cosine). Normals of a
 #: box that is split at its edges are at least 45 degrees away, so its edges stay hard.
-_SMOOTH = 0.75
+_MIN_SMOOTH_COSINE = 0.75
 
 
 @dataclass(frozen=True)
@@ -84,11 +84,11 @@ class Surface:
 
         Many callers search the same head.
         """
-        kept: dict[Callable[[Surface], Any], Any] = vars(self).setdefault("_made_once", {})
-        if make not in kept:
-            kept[make] = make(self)
-        found: T = kept[make]
-        return found
+        cache: dict[Callable[[Surface], Any], Any] = vars(self).setdefault("_made_once", {})
+        if make not in cache:
+            cache[make] = make(self)
+        result: T = cache[make]
+        return result
 
     def compute_if_changed[**Rest, T](
         self,
@@ -100,13 +100,13 @@ class Surface:
 
         Arguments are numbers and arrays, compared by value: hair that is combed keeps its roots.
         """
-        kept: dict[Any, tuple[tuple[Any, ...], Any]] = vars(self).setdefault("_made_last", {})
-        given = (*arguments, *named.values())
-        known = kept.get(make)
-        if known is None or not _are_equal(known[0], given):
-            kept[make] = known = given, make(self, *arguments, **named)
-        found: T = known[1]
-        return found
+        cache: dict[Any, tuple[tuple[Any, ...], Any]] = vars(self).setdefault("_made_last", {})
+        inputs = (*arguments, *named.values())
+        last = cache.get(make)
+        if last is None or not _are_equal(last[0], inputs):
+            cache[make] = last = inputs, make(self, *arguments, **named)
+        result: T = last[1]
+        return result
 
     def transformed(self, matrix: Floats) -> Surface:
         """Moved by an affine (4, 4) matrix; a mirroring one reverses the triangles' winding."""
@@ -126,12 +126,12 @@ def _vertex_normals(surface: Surface) -> Floats:
         two = unit(corners[:, (corner + 2) % 3] - corners[:, corner])
         angle = np.arccos(np.clip(np.einsum("ij,ij->i", one, two), -1.0, 1.0))
         np.add.at(total, surface.triangles[:, corner], normals * angle[:, None])
-    shared = _shared(surface, total)
+    shared = _shared_normals(surface, total)
     shared.flags.writeable = False
     return shared
 
 
-def _shared(surface: Surface, total: Floats) -> Floats:
+def _shared_normals(surface: Surface, total: Floats) -> Floats:
     """Unit normals, (vertex_count, 3), from the sums of normals around each vertex, shared between
     coincident vertices where smooth."""
     own, place = unit(total), surface.compute_once(_places)
@@ -141,7 +141,7 @@ def _shared(surface: Surface, total: Floats) -> Floats:
     of_place = np.zeros((count, 3), np.float32)
     np.add.at(of_place, place, total)
     shared = unit(of_place)[place]
-    is_smooth = np.einsum("ij,ij->i", own, shared) > _SMOOTH
+    is_smooth = np.einsum("ij,ij->i", own, shared) > _MIN_SMOOTH_COSINE
     return np.where(is_smooth[:, None], shared, own)
 
 

@@ -13,9 +13,9 @@ import numpy as np
 from ..arrays import Floats, Ints
 
 #: Pairs measured at once, so that they stay in the processor's cache.
-_AT_ONCE = 1 << 14
+_CHUNK = 1 << 14
 #: A triangle whose 4 area^2 is below this fraction of |ab|^2 |ac|^2 is treated as its edges alone.
-_FLAT = 1.0e-12
+_DEGENERATE_RATIO = 1.0e-12
 
 
 class TriangleForms:
@@ -30,24 +30,24 @@ class TriangleForms:
         ab, ac = corners[:, 1] - a, corners[:, 2] - a
         bb, bc, cc = ((one * two).sum(axis=1) for one, two in ((ab, ab), (ab, ac), (ac, ac)))
         determinant = bb * cc - bc * bc
-        determinant[determinant <= _FLAT * bb * cc] = 0.0
+        determinant[determinant <= _DEGENERATE_RATIO * bb * cc] = 0.0
         #: as rows, read in one pass: a, ab, ac, ab.ab, ab.ac, ac.ac, determinant (0 where flat)
         self._rows = np.concatenate([a.T, ab.T, ac.T, [bb, bc, cc, determinant]])
 
     def squared_distance(self, points: Floats, triangle: Ints) -> Floats:
         """Squared distance from each of the points (n, 3) to its triangle (n,), (n,)."""
-        return self._measured(points, triangle)[0]
+        return self._distance_and_barycentric(points, triangle)[0]
 
     def closest(self, points: Floats, triangle: Ints) -> Floats:
         """Barycentric coordinates of each point's closest point on its triangle (n,), (n, 3)."""
-        _, v, w = self._measured(points, triangle)
+        _, v, w = self._distance_and_barycentric(points, triangle)
         return np.stack([1.0 - v - w, v, w], axis=1)
 
-    def _measured(self, points: Floats, triangle: Ints) -> Floats:
+    def _distance_and_barycentric(self, points: Floats, triangle: Ints) -> Floats:
         """Squared distance, and barycentric coordinates v and w of the closest point, (3, n)."""
         found = np.empty((3, len(triangle)))
-        for start in range(0, len(triangle), _AT_ONCE):
-            part = slice(start, start + _AT_ONCE)
+        for start in range(0, len(triangle), _CHUNK):
+            part = slice(start, start + _CHUNK)
             ax, ay, az, bx, by, bz, cx, cy, cz, *form = self._rows.take(triangle[part], axis=1)
             x, y, z = points[part].T
             x, y, z = x - ax, y - ay, z - az

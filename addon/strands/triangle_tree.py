@@ -43,8 +43,8 @@ class TriangleTree:
         for low, high in self.levels[1:]:
             middle = (low + high) / 2.0
             left, right = (
-                _BOX_WEIGHT * _squared_distance(place, *_chosen(child, low, high))
-                + _squared_distance(place, *_chosen(child, middle, middle))
+                _BOX_WEIGHT * _squared_distance(place, *_columns(child, low, high))
+                + _squared_distance(place, *_columns(child, middle, middle))
                 for child in (2 * node, 2 * node + 1)
             )
             node = 2 * node + (right < left)
@@ -64,7 +64,7 @@ class TriangleTree:
         for low, high in self.levels[1:]:
             point, node = np.repeat(point, 2), np.repeat(2 * node, 2)
             node[1::2] += 1
-            distance = _squared_distance(*_chosen(point, place), *_chosen(node, low, high))
+            distance = _squared_distance(*_columns(point, place), *_columns(node, low, high))
             near = np.flatnonzero(distance < squared_reach.take(point))
             point, node, distance = point.take(near), node.take(near), distance.take(near)
             if len(point) > limit:
@@ -101,7 +101,7 @@ def _median_order(centers: Floats, order: Ints, depth: int) -> Ints:
     return order
 
 
-def _chosen(columns: Ints, *tables: Floats) -> Iterator[Floats]:
+def _columns(columns: Ints, *tables: Floats) -> Iterator[Floats]:
     """These columns of each table (3, n)."""
     return (table.take(columns, axis=1) for table in tables)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..blender.strands.growing import grow_again, grow_on, has_grown, is_outdated, lost_by_growing
+from ..blender.strands.growing import grow_again, grow_on, has_grown, is_outdated, lost_by_regrowing
 from .drawing import draw_button, draw_section
 from .grow_options import GROW_PROPERTIES, draw_settings_hint
 from .long_work import LongWork, Steps, draw_progress, steps_of_parts
@@ -76,7 +76,7 @@ class HAIRLOOM_OT_grow_again(LongWork, bpy.types.Operator):
 def draw_grow(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     """Draw whether hair follows its settings, what growing again would lose, and the settings."""
     curves = hair.data
-    lost = lost_by_growing(curves)
+    lost = lost_by_regrowing(curves)
     lines = layout.column(align=True)
     lines.label(text=_state(curves, lost), icon="UNLOCKED" if not lost else "LOCKED")
     lines.label(text=f"Growing again loses: {_listed(lost)}", icon="BLANK1")

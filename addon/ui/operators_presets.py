@@ -23,7 +23,7 @@ from ..blender.properties.presets import (
 )
 from ..blender.properties.properties import settings_of
 from ..blender.scene.hair_material import has_look_material
-from ..blender.scene.look_materials import put_look
+from ..blender.scene.look_materials import apply_look
 from ..blender.scene.principled import has_principled_hair, look_from_material
 from .preset_chooser import KIND
 from .reports import reporting
@@ -60,7 +60,7 @@ def _apply(all_settings: Iterable[Any], context: bpy.types.Context) -> None:
         for settings in all_settings:
             apply(settings, hair)
         if has_look_material(hair.data):
-            put_look(hair)
+            apply_look(hair)
 
 
 class HAIRLOOM_OT_add_preset(bpy.types.Operator, ImportHelper):
@@ -199,7 +199,7 @@ class HAIRLOOM_OT_look_to_material(bpy.types.Operator):
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
         for hair in chosen_hair(context):
-            material, notes = put_look(hair)
+            material, notes = apply_look(hair)
             report(self, "INFO", f"{hair.name} has the material '{material.name}'")
             for note in notes:
                 report(self, "WARNING", f"{hair.name}: {note}")

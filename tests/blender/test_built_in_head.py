@@ -73,7 +73,7 @@ def test_skin_is_redder_where_blood_is_and_never_bright_as_paper(tone: str) -> N
     assert picture.shape == (RESOLUTION, RESOLUTION, 4) and (picture[..., 3] == 1.0).all()
     assert picture[..., :3].min() >= 0.0 and picture[..., :3].max() < 0.9
     head, bust = built_in_head(), load_bust()
-    corners, material = bust.fans
+    corners, material = bust.triangulated
     texel = (bust.uv[bust.corner_uv[corners]].mean(axis=1) * RESOLUTION).astype(int)
     color = picture[texel[:, 1], texel[:, 0], :3]
     lips = bust.weights["lips"][bust.corner_vertex[corners]].min(axis=1) > 0.99

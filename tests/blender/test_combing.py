@@ -9,7 +9,7 @@ from waiting import run_steps_until
 
 from hairloom.addon.blender.base import latest_job
 from hairloom.addon.blender.preview import previews, scene_events
-from hairloom.addon.blender.scene.curves import curve_offsets, curve_points, put_points
+from hairloom.addon.blender.scene.curves import curve_offsets, curve_points, set_points
 from hairloom.addon.blender.sessions import session as session_module
 from hairloom.addon.blender.sessions.session import Session
 from hairloom.addon.blender.viewport import overlay
@@ -40,7 +40,7 @@ def stroke(hair, curves, angle=0.3):
     for curve in curves:
         own = slice(offsets[curve], offsets[curve + 1])
         points[own] = points[own][0] + (points[own] - points[own][0]) @ turn.T
-    put_points(hair.data, points)
+    set_points(hair.data, points)
     bpy.context.view_layer.update()
 
 
@@ -89,7 +89,7 @@ def test_an_undo_brings_back_the_very_hair(hair, session, get_depsgraph):
     before, points, groom = drawn(session), curve_points(hair.data), session.groom
     own = session.rig.strands.offsets[session.rig.own_count]
     stroke(hair, range(5))
-    put_points(hair.data, points)
+    set_points(hair.data, points)
     bpy.context.view_layer.update()
     np.testing.assert_allclose(drawn(session), before, atol=1e-6)
     arrive(session, get_depsgraph)
@@ -97,7 +97,7 @@ def test_an_undo_brings_back_the_very_hair(hair, session, get_depsgraph):
     assert session.groom is groom, "made once, not again"
     stroke(hair, range(5))
     arrive(session, get_depsgraph)
-    put_points(hair.data, points)
+    set_points(hair.data, points)
     bpy.context.view_layer.update()
     np.testing.assert_allclose(drawn(session)[:own], before[:own], atol=1e-6)
     arrive(session, get_depsgraph)

@@ -131,7 +131,7 @@ def test_unusable_curves_are_dropped_and_counted(get_depsgraph):
         "a point that is not finite": 2,
         "no length": 1,
     }
-    assert read.kept.tolist() == [0, 5]
+    assert read.curve_indices.tolist() == [0, 5]
     assert read.strands.roots.tolist() == [[100, 0, 0], [105, 0, 0]]
 
 
@@ -146,7 +146,7 @@ def test_the_fast_path_for_valid_curves_equals_cleaning(get_depsgraph):
         root_uv=strands.root_uv,
     )
     assert same(read.strands, cleaned.strands)
-    assert read.kept.tolist() == cleaned.kept.tolist()
+    assert read.curve_indices.tolist() == cleaned.curve_indices.tolist()
 
 
 @pytest.mark.parametrize("bad", [0.0, -1.0, float("nan"), float("inf")])
@@ -308,7 +308,7 @@ def test_curves_that_are_no_hair_are_named(get_depsgraph):
     closed = typed("BEZIER", cyclic=np.array([True, False]), **HANDLES)
     assert read_curves(closed, get_depsgraph()).dropped == {"no end (Toggle Cyclic opens them)": 1}
     own = read_original_curves(closed, get_depsgraph())
-    assert own.kept.tolist() == [1] and own.strands.point_count == 6
+    assert own.curve_indices.tolist() == [1] and own.strands.point_count == 6
 
 
 def test_custom_knots_are_named(extension):

@@ -149,7 +149,7 @@ def by_barycentric(style: Hairstyle, positions: np.ndarray) -> np.ndarray:
     """Positions of the roots on the built-in head with other vertex positions; each root's triangle
     in UV space is found by testing all triangles."""
     bust = load_bust()
-    corners, _ = bust.fans
+    corners, _ = bust.triangulated
     uv = bust.uv[bust.corner_uv[corners]].astype(np.float64)
     edges = np.stack([uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]], axis=2)
     area = np.abs(np.linalg.det(edges))

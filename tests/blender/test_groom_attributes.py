@@ -51,7 +51,7 @@ def written(groom):
 def read_back(hair):
     depsgraph = bpy.context.evaluated_depsgraph_get()
     cleaned = read_curves(hair, depsgraph)
-    return Groom(cleaned.strands, **stored_groom(hair, depsgraph, cleaned.kept))
+    return Groom(cleaned.strands, **stored_groom(hair, depsgraph, cleaned.curve_indices))
 
 
 def assert_same(read, groom):

@@ -7,8 +7,8 @@ import pytest
 from hairloom.addon.blender.base.attributes import read_attribute, set_attribute
 from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.properties.properties import settings_of, weights_of_surface
-from hairloom.addon.blender.scene.curves import curve_points, put_points, read_curves
-from hairloom.addon.blender.strands.growing import has_grown, is_outdated, lost_by_growing
+from hairloom.addon.blender.scene.curves import curve_points, read_curves, set_points
+from hairloom.addon.blender.strands.growing import has_grown, is_outdated, lost_by_regrowing
 from hairloom.addon.groom.grow import grow, scalp_density
 from hairloom.addon.groom.settings import GrowSettings
 from hairloom.addon.strands import Surface
@@ -29,14 +29,16 @@ def lengths(hair):
 
 
 def comb(hair):
-    put_points(hair.data, curve_points(hair.data) * np.float32(1.05))
+    set_points(hair.data, curve_points(hair.data) * np.float32(1.05))
 
 
 def test_a_groom_keeps_what_it_has_grown_by(grown):
     own = grown.data.hairloom.grow
     assert settings_of(own, GrowSettings) == GrowSettings(**FEW)
     assert (
-        has_grown(grown.data) and lost_by_growing(grown.data) == () and not is_outdated(grown.data)
+        has_grown(grown.data)
+        and lost_by_regrowing(grown.data) == ()
+        and not is_outdated(grown.data)
     )
 
 
@@ -90,9 +92,9 @@ def test_hair_that_was_changed_is_not_lost_to_a_slider(grown, change):
     points = curve_points(grown.data)
     grown.data.hairloom.grow.length = 0.05
     assert np.array_equal(curve_points(grown.data), points), "what was done to it is gone"
-    assert lost_by_growing(grown.data) == lost and is_outdated(grown.data)
+    assert lost_by_regrowing(grown.data) == lost and is_outdated(grown.data)
     assert bpy.ops.hairloom.grow_again() == {"FINISHED"}
-    assert lost_by_growing(grown.data) == () and len(grown.data.curves) == FEW["strand_count"]
+    assert lost_by_regrowing(grown.data) == () and len(grown.data.curves) == FEW["strand_count"]
     assert lengths(grown).max() < 0.052
     grown.data.hairloom.grow.length = 0.1
     assert lengths(grown).max() > 0.09, "it does not follow again"
@@ -103,7 +105,7 @@ def test_hair_that_was_not_grown_stays_until_grow_again_is_pressed(new_hair, sph
     points = curve_points(hair.data)
     hair.data.hairloom.grow.strand_count = 40
     assert np.array_equal(curve_points(hair.data), points)
-    assert lost_by_growing(hair.data) == (f"{len(hair.data.curves):,} curves",)
+    assert lost_by_regrowing(hair.data) == (f"{len(hair.data.curves):,} curves",)
     hair.data.hairloom.grow.length = 0.1
     bpy.ops.hairloom.grow_again()
     assert len(hair.data.curves) == 40 and has_grown(hair.data)
@@ -168,7 +170,7 @@ def test_undo_takes_setting_and_hair_back_together(grown):
     hair = bpy.context.object
     assert hair.data.hairloom.grow.length == pytest.approx(0.1)
     assert np.array_equal(curve_points(hair.data), points)
-    assert lost_by_growing(hair.data) == () and not is_outdated(hair.data)
+    assert lost_by_regrowing(hair.data) == () and not is_outdated(hair.data)
     bpy.ops.ed.redo()
     hair = bpy.context.object
     assert np.array_equal(curve_points(hair.data), shorter)
@@ -193,7 +195,7 @@ def test_settings_and_what_was_made_of_them_are_saved(grown, tmp_path):
     bpy.ops.wm.open_mainfile(filepath=file)
     hair = next(obj for obj in bpy.data.objects if obj.type == "CURVES")
     assert hair.data.hairloom.grow.length == pytest.approx(0.08)
-    assert lost_by_growing(hair.data) == ()
+    assert lost_by_regrowing(hair.data) == ()
     hair.data.hairloom.grow.length = 0.04
     assert lengths(hair).max() < 0.042
 

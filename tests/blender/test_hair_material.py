@@ -14,7 +14,7 @@ from engine_stage import render_picture
 
 from hairloom.addon.blender.properties.presets import apply
 from hairloom.addon.blender.scene.curves import set_colors
-from hairloom.addon.blender.scene.hair_material import put_look_material
+from hairloom.addon.blender.scene.hair_material import set_look_material
 from hairloom.addon.blender.scene.principled import look_from_material
 from hairloom.addon.shading.marschner.look import (
     GREY_ABSORPTION,
@@ -70,7 +70,7 @@ def test_cycles_finds_the_tint_of_the_tips(hair: Any, tmp_path: Path) -> None:
     look = ShadingSettings(
         tip_tint=0.8, tint_start=0.2, tint_end=0.7, color_variation=0.0, base_color=(0.3, 0.2, 0.1)
     )
-    put_look_material(hair.data, look)
+    set_look_material(hair.data, look)
     found = evaluated_input(hair, "Absorption Coefficient", tmp_path)
     even = np.full_like(ALONG, 0.5)
     np.testing.assert_allclose(found, strand_absorption(look, ALONG, even, even), rtol=0.02)
@@ -80,7 +80,7 @@ def test_cycles_finds_as_many_grey_strands_and_as_much_variation(hair: Any, tmp_
     look = ShadingSettings(
         grey_fraction=0.3, color_variation=0.4, pigment="absorption", absorption=(0.2, 0.5, 0.9)
     )
-    put_look_material(hair.data, look)
+    set_look_material(hair.data, look)
     found = evaluated_input(hair, "Absorption Coefficient", tmp_path).mean(axis=0)
     root = root_absorption(look)
     is_grey = found[:, 2] < 0.5 * root[2] * 0.6
@@ -97,7 +97,7 @@ def test_cycles_finds_the_curves_own_colours(hair: Any, tmp_path: Path) -> None:
     own = np.tile(np.linspace(0.05, 0.9, ROW)[:, None, None], (1, TALL, 3)) * (1.0, 0.7, 0.4)
     own[ROW // 2 :] = np.nan
     set_colors(hair.data, replace(row(), color=own.reshape(-1, 3)))
-    put_look_material(hair.data, look)
+    set_look_material(hair.data, look)
     tree = hair.data.materials[0].node_tree
     node = next(each for each in tree.nodes if each.type == "BSDF_HAIR_PRINCIPLED")
     radial = node.inputs["Radial Roughness"].default_value

@@ -21,7 +21,7 @@ from hairloom.addon.blender.command_line.command_line import run
 from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.properties.presets import named_preset
 from hairloom.addon.blender.scene import hair_nodes
-from hairloom.addon.blender.scene.curves import curve_points, put_points, read_curves
+from hairloom.addon.blender.scene.curves import curve_points, read_curves, set_points
 from hairloom.addon.blender.scene.sag_correction import set_full_sag_correction
 from hairloom.addon.blender.scene.shape_backup import BEFORE_SETTLE
 from hairloom.addon.blender.scene.surfaces import read_surface
@@ -275,7 +275,7 @@ def test_hair_that_is_fitted_again_is_as_it_was_added(head: bpy.types.Object) ->
     head.matrix_world = Matrix.LocRotScale((0.3, 0.0, 0.1), Euler((0.0, 0.4, 0.0)), (2.0,) * 3)
     bpy.context.view_layer.update()
     BEFORE_SETTLE.save(hair)
-    put_points(hair.data, added_points * np.float32(1.05))
+    set_points(hair.data, added_points * np.float32(1.05))
     BEFORE_SETTLE.mark_result(hair)
     assert set_full_sag_correction(hair.data) and BEFORE_SETTLE.exists(hair)
     bpy.context.view_layer.objects.active = hair

@@ -77,8 +77,10 @@ def test_it_follows_in_a_file_that_was_saved(hair, tmp_path):
 def test_a_preset_writes_the_material_once(hair, monkeypatch):
     """A preset sets its settings one by one."""
     (settings, *_) = named_preset("looks/blond").all
-    written, put = [], look_materials.put_look
-    monkeypatch.setattr(look_materials, "put_look", lambda each: written.append(each) or put(each))
+    written, put = [], look_materials.apply_look
+    monkeypatch.setattr(
+        look_materials, "apply_look", lambda each: written.append(each) or put(each)
+    )
     apply(settings, hair)
     assert written == [hair]
 

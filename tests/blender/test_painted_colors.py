@@ -14,8 +14,8 @@ from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.engine.engine_hair import read_groom
 from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.properties.properties import colors_of_groom
-from hairloom.addon.blender.scene.curves import curve_points, put_points
-from hairloom.addon.blender.strands.growing import lost_by_growing
+from hairloom.addon.blender.scene.curves import curve_points, set_points
+from hairloom.addon.blender.strands.growing import lost_by_regrowing
 from hairloom.addon.blender.strands.read_hair import ExportRequest, read_still_hair
 from hairloom.addon.blender.viewport import overlay
 from hairloom.addon.exchange.hair_file import read_hair_file
@@ -342,7 +342,7 @@ def test_replaced_curves_get_the_colours_painted_under_their_roots(
     node = next(each for each in nodes if each.type == "BSDF_HAIR_PRINCIPLED")
     if is_changed:
         node.inputs["Random Roughness"].default_value = 0.7
-    assert lost_by_growing(hair.data) == ()
+    assert lost_by_regrowing(hair.data) == ()
 
     def assert_painted(count: int) -> None:
         values = np.empty((count, 4), np.float32)
@@ -353,7 +353,7 @@ def test_replaced_curves_get_the_colours_painted_under_their_roots(
 
     hair.data.hairloom.grow.strand_count = 200
     assert_painted(200)
-    put_points(hair.data, curve_points(hair.data) * np.float32(1.05))
+    set_points(hair.data, curve_points(hair.data) * np.float32(1.05))
     assert bpy.ops.hairloom.grow_again() == {"FINISHED"}
     assert_painted(200)
     if is_changed:

@@ -11,7 +11,7 @@ import pytest
 from tiers import few_in_commits
 
 from hairloom.addon.blender.base.parts import Part, Parts, new_blocks_removed_on_error, run_parts
-from hairloom.addon.blender.scene.curves import curve_points, put_points
+from hairloom.addon.blender.scene.curves import curve_points, set_points
 from hairloom.addon.cards.steps import result_of
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.ui.long_work import steps_of_parts
@@ -118,7 +118,7 @@ def test_hair_that_does_not_grow_again_after_all_is_as_it_was_combed(sphere: Any
         grooms.append(bpy.context.object)
     grooms[0].select_set(True)  # the active one grows first
     for hair in grooms:
-        put_points(hair.data, curve_points(hair.data) * np.float32(1.1))
+        set_points(hair.data, curve_points(hair.data) * np.float32(1.1))
         combed.append(curve_points(hair.data))
     cancelled(HAIRLOOM_OT_grow_again, "Growing 60 strands")
     for hair, points in zip(grooms, combed, strict=True):

@@ -12,7 +12,7 @@ from hairloom.addon.blender.cards.build import read_inputs
 from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.preview.bake import Bake
 from hairloom.addon.blender.scene.curves import curve_points, fill_curves, read_curves
-from hairloom.addon.blender.scene.source import hair_dynamics_modifiers, read_source, shown_curves
+from hairloom.addon.blender.scene.source import hair_dynamics_modifiers, posed_curves, read_source
 from hairloom.addon.blender.sessions.groom_source import GroomSource
 from hairloom.addon.blender.strands.groom_motion import moving_hair
 from hairloom.addon.blender.strands.make_real import make_real
@@ -168,14 +168,14 @@ def test_a_head_that_is_subdivided_but_not_posed_moves_no_hair(hair, sphere):
 def test_a_shape_key_is_a_pose_too(new_hair, sphere):
     hair = new_hair(sphere, hedgehog(80, seed=3))
     attach_roots(hair)
-    rest = shown_curves(hair, go_to(REST)).strands.points
+    rest = posed_curves(hair, go_to(REST)).strands.points
     sphere.shape_key_add(name="Basis")
     wide = sphere.shape_key_add(name="Wide")
     for point in wide.data:
         point.co.y += 0.3
     wide.value = 1.0
     bpy.context.view_layer.update()
-    shown = shown_curves(hair, bpy.context.evaluated_depsgraph_get()).strands.points
+    shown = posed_curves(hair, bpy.context.evaluated_depsgraph_get()).strands.points
     assert shown == pytest.approx(rest + [0.0, 0.3, 0.0], abs=SAME)
 
 
@@ -193,7 +193,7 @@ def test_hair_on_a_shape_key_is_distinguished_from_hair_on_the_basis(hair, spher
     bpy.context.view_layer.update()
     assert read_source(hair, go_to(REST)).rest is None
     there = expected(hair)
-    assert shown_curves(hair, go_to(POSED)).strands.points == pytest.approx(there, abs=SAME)
+    assert posed_curves(hair, go_to(POSED)).strands.points == pytest.approx(there, abs=SAME)
 
 
 def test_the_bakes_of_both_frames_are_one(hair, tmp_path):
@@ -245,9 +245,9 @@ def test_files_hold_the_hair_as_it_is_shown(hair):
     moving, _ = moving_hair(
         hair, go_to(POSED), range(REST, POSED + 1), ExportRequest(), use_bake=False
     )
-    assert moving.at(POSED, go_to(POSED)) == pytest.approx(there, abs=SAME)
+    assert moving.positions_at(POSED, go_to(POSED)) == pytest.approx(there, abs=SAME)
     stored = read_curves(hair, go_to(REST)).strands.points
-    assert np.array_equal(moving.at(REST, go_to(REST)), stored)
+    assert np.array_equal(moving.positions_at(REST, go_to(REST)), stored)
 
 
 def test_cards_are_made_in_the_rest_pose_with_a_note(hair):
@@ -287,7 +287,7 @@ def test_settled_in_a_pose_it_is_stored_at_rest(hair):
     assert bpy.ops.hairloom.settle() == {"FINISHED"}
     settled = read_curves(hair, go_to(REST)).strands
     assert settled.roots == pytest.approx(stored.roots, abs=SAME)
-    posed = shown_curves(hair, go_to(POSED)).strands
+    posed = posed_curves(hair, go_to(POSED)).strands
     fallen = (posed.points - there)[stored.offsets[1:] - 1]
     assert np.median(fallen[:, 2]) < -0.01, "straight down, in the pose"
     assert np.abs(np.median(fallen[:, :2], axis=0)).max() < 0.3 * -np.median(fallen[:, 2])

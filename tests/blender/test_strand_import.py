@@ -96,7 +96,7 @@ def imported(path, **options):
 def groom_of(hair):
     depsgraph = bpy.context.evaluated_depsgraph_get()
     cleaned = read_curves(hair, depsgraph)
-    return Groom(cleaned.strands, **stored_groom(hair, depsgraph, cleaned.kept))
+    return Groom(cleaned.strands, **stored_groom(hair, depsgraph, cleaned.curve_indices))
 
 
 @pytest.mark.parametrize("suffix", [".abc", ".usdc", ".usda"])

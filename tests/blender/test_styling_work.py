@@ -14,7 +14,7 @@ from overriding import library_overrides
 
 from hairloom.addon.blender.base.parts import Part, batched, run_parts
 from hairloom.addon.blender.colliders import ties
-from hairloom.addon.blender.scene.curves import curve_points, put_points
+from hairloom.addon.blender.scene.curves import curve_points, set_points
 from hairloom.addon.blender.scene.shape_backup import BEFORE_SETTLE
 from hairloom.addon.ui import (
     operators_colliders,
@@ -114,7 +114,7 @@ def trimmed(hair, tmp_path):
     with_plane(hair)
     bpy.ops.hairloom.trim_to_shape()
     BEFORE_SETTLE.save(hair)
-    put_points(hair.data, curve_points(hair.data) * np.float32(1.01))
+    set_points(hair.data, curve_points(hair.data) * np.float32(1.01))
     BEFORE_SETTLE.mark_result(hair)
     return overridden_hair(tmp_path)
 

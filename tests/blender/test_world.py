@@ -132,7 +132,7 @@ def test_the_views_picture_turns_as_blenders_nodes_do(scene: Any, tmp_path: Any)
     node, tree = set_panorama(scene, uneven()), scene.world.node_tree
     node.image.filepath_raw, node.image.file_format = str(tmp_path / "view.exr"), "OPEN_EXR"
     node.image.save()
-    ours = world_module._studio(str(tmp_path / "view.exr"), 0.8, 1.0)
+    ours = world_module._studio_light(str(tmp_path / "view.exr"), 0.8, 1.0)
     place, turn = tree.nodes.new("ShaderNodeTexCoord"), tree.nodes.new("ShaderNodeVectorRotate")
     turn.rotation_type = "Z_AXIS"
     turn.inputs["Angle"].default_value = 0.8

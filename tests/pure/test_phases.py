@@ -48,7 +48,7 @@ def test_play_begins_goes_on_and_is_stopped() -> None:
 
 
 def test_play_waits_at_rest_for_what_is_being_made() -> None:
-    assert after(Phase.REST, Event.PLAY, Event.UNMADE) == (Phase.WAITING, ["BEGIN", "NONE"])
+    assert after(Phase.REST, Event.PLAY, Event.NOT_READY) == (Phase.WAITING, ["BEGIN", "NONE"])
     assert after(Phase.WAITING, Event.TICK, Event.RESET) == (Phase.WAITING, ["NONE", "REST"])
     assert after(Phase.WAITING, Event.PLAY) == (Phase.FREE, ["BEGIN"])
     assert after(Phase.WAITING, Event.STOP)[0] is Phase.REST
@@ -69,7 +69,7 @@ def test_the_timeline_takes_hair_over_that_plays_without_a_break() -> None:
 
 
 def test_playback_goes_on_without_what_is_being_made() -> None:
-    events = (Event.NEXT, Event.UNMADE, Event.NEXT, Event.UNMADE)
+    events = (Event.NEXT, Event.NOT_READY, Event.NEXT, Event.NOT_READY)
     assert after(Phase.REST, *events) == (Phase.DEFERRED, ["BEGIN", "REST"] * 2)
     assert after(Phase.DEFERRED, Event.NEXT, Event.NEXT)[1] == ["BEGIN", "ADVANCE"]
 

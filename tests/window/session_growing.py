@@ -97,24 +97,24 @@ def undo():
     yield from wait_until(lambda: hair().data.hairloom.grow.length > 0.95 * LENGTH, "no undo")
     assert np.abs(points() - shape).max() > 0.01, "the hair is not undone"
     growing = hairloom_module("growing")
-    assert growing.lost_by_growing(hair().data) == () and not growing.is_outdated(hair().data)
+    assert growing.lost_by_regrowing(hair().data) == () and not growing.is_outdated(hair().data)
     yield
 
 
 def combed_hair_stays():
     growing = hairloom_module("growing")
     shape = points() * np.float32(1.02)
-    hairloom_module("curves").put_points(hair().data, shape)
+    hairloom_module("curves").set_points(hair().data, shape)
     bpy.ops.ed.undo_push(message="comb")
     hair().data.hairloom.grow.length = 0.5 * LENGTH
     yield
     driver.screenshot("combed")
     assert np.array_equal(points(), shape), "what was combed is lost"
-    assert growing.lost_by_growing(hair().data) == ("combed shape",)
+    assert growing.lost_by_regrowing(hair().data) == ("combed shape",)
     x, y = yield from find_field(viewport(), "UI", "grow.method")
     yield from click(x, y + ROW)  # Grow Again is above it
     yield from wait_until(
-        lambda: growing.lost_by_growing(hair().data) == (), "Grow Again does nothing"
+        lambda: growing.lost_by_regrowing(hair().data) == (), "Grow Again does nothing"
     )
     yield
     driver.screenshot("grown-again")

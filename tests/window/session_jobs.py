@@ -164,7 +164,7 @@ def grown_again():
     hair = bpy.context.object
     name = hair.name
     assert head == hair.parent
-    put, points = hairloom_module("curves").put_points, hairloom_module("curves").curve_points
+    put, points = hairloom_module("curves").set_points, hairloom_module("curves").curve_points
     put(hair.data, points(hair.data) * np.float32(1.05))
     hair.data.hairloom.grow.strand_count = STRANDS
     bpy.ops.ed.undo_push(message="combed")

@@ -14,7 +14,7 @@ from ..base.attributes import read_attribute, set_attribute
 from ..base.objects import link_into, remove_hair
 from ..properties.properties import settings_of
 from ..scene.curves import set_colors
-from ..scene.hair_material import put_look_material
+from ..scene.hair_material import set_look_material
 from ..scene.painted_colors import read_colors
 from . import playback
 from .baked_rig import BakedRig
@@ -123,7 +123,7 @@ def _write_strands(
     for material in hair.data.materials:
         curves.materials.append(material)
     if not len(curves.materials):
-        put_look_material(curves, look)
+        set_look_material(curves, look)
 
 
 def _are_poly(curves: bpy.types.Curves) -> bool:

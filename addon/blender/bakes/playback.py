@@ -18,7 +18,7 @@ import numpy as np
 from ...arrays import Floats
 from ...errors import HairloomError
 from ...rig_flow import Pose, Solids
-from ..scene.curves import put_points
+from ..scene.curves import set_points
 from ..scene.fin_modifier import clear, fin_modifier, has_fins, show
 from .bake_settings import folder_of, shown_folder_of
 from .baked_rig import BakedRig, baked_rig_of
@@ -259,7 +259,7 @@ def _write_copy(curves: bpy.types.Curves, folder: Path, scene: bpy.types.Scene) 
         raise HairloomError(
             "these curves do not match the bake", place=curves.name, remedy="Bake again"
         )
-    put_points(curves, points)
+    set_points(curves, points)
 
 
 def _report_errors(folder: Path, show: Callable[[], object]) -> None:

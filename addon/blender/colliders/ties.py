@@ -31,7 +31,7 @@ from ..base.objects import (
 )
 from ..base.vertex_weights import read_weights
 from ..scene.hair_collections import add_to_collection, objects_in, remove_from_collection
-from ..scene.source import shown_curves
+from ..scene.source import posed_curves
 from ..scene.surfaces import read_positions, read_surface
 from .carriers import is_deforming, is_disabled
 from .obstacle_parts import is_invertible
@@ -241,7 +241,7 @@ def new_ring(hair: bpy.types.Object, context: bpy.types.Context) -> bpy.types.Ob
     """A ring at the 3D cursor, parented to the surface."""
     ring = bpy.data.objects.new("Hair Tie", None)
     ring.empty_display_type = "CIRCLE"
-    strands = shown_curves(hair, context.evaluated_depsgraph_get()).strands
+    strands = posed_curves(hair, context.evaluated_depsgraph_get()).strands
     ring.empty_display_size = _NEW_RING_RADIUS * float(np.median(strands.lengths()))
     link_into(ring, hair.users_collection, context.scene)
     head = head_of(hair)
@@ -276,7 +276,7 @@ def count_held_curves(
     Raises:
         HairloomError: it cannot be a tie, or the hair has no curves.
     """
-    strands = shown_curves(hair, depsgraph).strands
+    strands = posed_curves(hair, depsgraph).strands
     holds = find_holds(strands, Holders((_read_tie(ring, depsgraph, np.eye(4)).tie,)))
     return (0 if holds is None else len(holds.strand)), strands.strand_count
 

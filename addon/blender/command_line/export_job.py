@@ -128,7 +128,7 @@ def _check_baked(plan: StrandExport) -> None:
         if not isinstance(part, BakedMotion):
             raise HairloomError(
                 "it has no bake",
-                place=part.out.groom.name,
+                place=part.export.groom.name,
                 remedy="Bake it, or omit --use-bake to write the motion of Blender's own animation",
             )
 
@@ -163,7 +163,7 @@ def _plan_of_rig(
         groom = replace(groom, strands=rig.strands.with_points(points.reshape(-1, 3)))
     colors = job_colors(job, rig)
     moving = BakedMotion(export_strands_of_rig(rig, groom, needs, look, colors), motion.cache)
-    plan = StrandExport(moving.out.groom, settings, kind, frames=frames)
+    plan = StrandExport(moving.export.groom, settings, kind, frames=frames)
     if frames is not None:
         plan.moving, plan.rate = (moving,), moving.rate
     return plan

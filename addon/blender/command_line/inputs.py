@@ -25,7 +25,7 @@ from ..base.parts import run_parts
 from ..base.vertex_weights import read_weights
 from ..scene.built_in_head import HeadLook, built_in_head
 from ..scene.curves import read_curves
-from ..scene.head_look import head_look, is_our_bust
+from ..scene.head_look import head_look, is_bust_surface
 from ..scene.masks import read_map
 from ..scene.mesh_files import read_mesh_file
 from ..scene.partings import read_partings
@@ -167,7 +167,7 @@ def _read_head(name: str | None, sources: Sources) -> tuple[Surface | None, tupl
         )
     if name is not None:
         head, head_notes = _read_mesh(name, sources)
-        if sources.skin != _SKIN and not is_our_bust(head):
+        if sources.skin != _SKIN and not is_bust_surface(head):
             raise HairloomError(
                 "only the built-in head has skin tones",
                 place="--skin",

@@ -148,7 +148,9 @@ def read_job_masks(
     if not names:
         return {}
     hair = job.hair
-    kept_strands = np.zeros(0, np.int32) if hair is None else read_curves(hair, depsgraph).kept
+    kept_strands = (
+        np.zeros(0, np.int32) if hair is None else read_curves(hair, depsgraph).curve_indices
+    )
     head = bpy.data.objects.get(inputs.head_object_name or "")
     mask_reader = MaskReader(hair, head, inputs.head, inputs.strands, kept_strands)
     found = {parameter: mask_reader.mask(name, depsgraph) for parameter, name in names.items()}

@@ -15,7 +15,7 @@ from ..base.objects import objects_in, without_hidden
 from ..properties.presets import named_preset
 from ..properties.properties import settings_of
 from ..scene.fin_modifier import fin_modifier
-from ..strands.growing import is_outdated, lost_by_growing
+from ..strands.growing import is_outdated, lost_by_regrowing
 from .overrides import overrides
 
 
@@ -169,7 +169,7 @@ def _check_growth(obj: bpy.types.Object) -> None:
     """
     problem = obj.data.hairloom.grow.problem
     if not problem and is_outdated(obj.data):
-        problem = f"growing again would lose: {', '.join(lost_by_growing(obj.data))}"
+        problem = f"growing again would lose: {', '.join(lost_by_regrowing(obj.data))}"
     if problem:
         raise HairloomError(
             f"the hair cannot be grown with these settings ({problem})",

@@ -25,7 +25,7 @@ from ..colliders.copies import StaticCopies, copy_colliders, copy_holders
 from ..preview.bake import Bake
 from ..scene.curves import write_curves
 from ..scene.partings import copy_partings
-from ..strands.import_groom import animate_by_file, cut_motion_notes
+from ..strands.import_groom import animate_from_file, cut_motion_notes
 from .bake_job import write_bake
 from .inputs import Inputs
 from .job_options import add_motion_options
@@ -151,7 +151,7 @@ def _hair_of_open_scene(job: Job, inputs: Inputs) -> bpy.types.Object:
     if hair is None:
         hair = write_curves("Hair", inputs.strands, head, scene.collection)
         if inputs.groom is not None and inputs.groom.motion is not None:
-            animate_by_file(hair, inputs.groom.motion)
+            animate_from_file(hair, inputs.groom.motion)
             cut = cut_motion_notes(inputs.groom.motion)
             report_notes([f"{inputs.groom_name}: {note}" for note in cut], job.report)
     hair.data.surface = head

@@ -1,7 +1,7 @@
 """Baking: simulate all frames in order, as playback does, and write them to disk.
 
 The steps are those of the timeline, so that a bake equals what the artist saw. A bake that is
-cancelled or fails leaves the earlier bake as it was.
+cancelled or fails does not change the earlier bake.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from ..sessions.coupled_frame import CoupledFrame
 from ..sessions.fins import FinSession
 from ..sessions.session import Session
 from . import previews
-from .bystanders import Bystanders
+from .passive_grooms import PassiveGrooms
 
 
 @dataclass
@@ -62,7 +62,7 @@ class _BakedObject:
     measure: FiguresCollector | None = None
 
     def groom_in(self, frame: int) -> Session | None:
-        """Its session, if it is a groom that has begun and this is one of its frames."""
+        """Its session, if it is a groom that is being simulated and this is one of its frames."""
         session = self.session
         return session if frame in self.frames and isinstance(session, Session) else None
 
@@ -75,8 +75,8 @@ class _BakedObject:
             session.play(depsgraph)
             self.rig_hash = session.rig_hash(depsgraph)
             if isinstance(session, Session):
-                of_rig = (f"{self.handle.name}: {note}" for note in session.rig.notes)
-                self.notes = (*session.source.warnings, *of_rig)
+                rig_notes = (f"{self.handle.name}: {note}" for note in session.rig.notes)
+                self.notes = (*session.source.warnings, *rig_notes)
                 self.measure = session.new_measure()
             self.writer = CacheWriter(self.folder)
             self.writer.add_constants(session.constants())
@@ -115,7 +115,7 @@ class _BakedObject:
         )
 
     def abandon(self) -> None:
-        """Delete what is half written."""
+        """Delete files that are incomplete."""
         if self.writer is not None:
             self.writer.abandon()
 
@@ -139,7 +139,7 @@ class Bake:
     """A bake of some grooms and fins of the open scene, each over its own frames."""
 
     baked_objects: list[_BakedObject] = field(default_factory=list)
-    _bystanders: Bystanders = field(default_factory=Bystanders)
+    _passive_grooms: PassiveGrooms = field(default_factory=PassiveGrooms)
 
     @classmethod
     def of(
@@ -167,22 +167,28 @@ class Bake:
                 "there is nothing to bake", place=scene.name, remedy="Select hair curves or cloth"
             )
         parts: list[_BakedObject] = []
-        with _folders_restored(objects):
+        with _preserving_folders(objects):
             for obj, name in zip(objects, folder_names(objects), strict=True):
                 if obj.type == "CURVES":
                     check_density(obj, bpy.context.evaluated_depsgraph_get())
-                own = frames_of(obj, scene) if frames is None else frames
+                frame_range = frames_of(obj, scene) if frames is None else frames
                 if folder is None:
-                    chosen = assign_folder(obj)
-                    check_owner(obj, chosen)
-                    named = obj.hairloom.bake.folder
+                    bake_folder = assign_folder(obj)
+                    check_owner(obj, bake_folder)
+                    folder_setting = obj.hairloom.bake.folder
                 else:
-                    chosen = folder / name if len(objects) > 1 else folder
-                    named = str(chosen)
-                check_bake_folder(chosen)
-                replaced = _replaced_note(obj, chosen, own)
+                    bake_folder = folder / name if len(objects) > 1 else folder
+                    folder_setting = str(bake_folder)
+                check_bake_folder(bake_folder)
+                replaced = _replaced_note(obj, bake_folder, frame_range)
                 parts.append(
-                    _BakedObject(Handle.of(obj), own, chosen, named, replaced_note=replaced)
+                    _BakedObject(
+                        Handle.of(obj),
+                        frame_range,
+                        bake_folder,
+                        folder_setting,
+                        replaced_note=replaced,
+                    )
                 )
         return cls(parts)
 
@@ -201,13 +207,13 @@ class Bake:
     @property
     def notes(self) -> list[str]:
         """Notes for the artist about what was baked so far."""
-        found = (note for part in self.baked_objects for note in (part.replaced_note, *part.notes))
-        return [*dict.fromkeys(filter(None, found)), *self.unfelt_notes]
+        notes = (note for part in self.baked_objects for note in (part.replaced_note, *part.notes))
+        return [*dict.fromkeys(filter(None, notes)), *self.unfelt_notes]
 
     @property
     def unfelt_notes(self) -> list[str]:
         """Notes on hair nearby that the baked hair did not feel, and why."""
-        return list(self._bystanders.notes.values())
+        return list(self._passive_grooms.notes.values())
 
     def objects(self) -> list[bpy.types.Object]:
         return [part.resolve() for part in self.baked_objects]
@@ -215,13 +221,13 @@ class Bake:
     def steps(self) -> Generator[int]:
         """Bake one frame at a time; yields how many are done. Closing the generator cancels.
 
-        Leaves the scene at the frame where it was.
+        The scene's frame is restored afterwards.
 
         Raises:
             HairloomError: a groom cannot be simulated, or a file cannot be written.
         """
         scene = bpy.context.scene
-        shown, subframe = scene.frame_current, scene.frame_subframe
+        frame, subframe = scene.frame_current, scene.frame_subframe
         try:
             with suspended(), playback.fins_not_shown(self.objects()):
                 yield from self._frames(scene)
@@ -232,28 +238,30 @@ class Bake:
             for part in self.baked_objects:
                 part.abandon()
             with suspended():
-                scene.frame_set(shown, subframe=subframe)
+                scene.frame_set(frame, subframe=subframe)
             self._show()
 
     def _frames(self, scene: bpy.types.Scene) -> Iterator[int]:
-        bystanders = self._bystanders
+        passive_grooms = self._passive_grooms
         for done, frame in enumerate(range(self._first, self._last + 1), start=1):
             scene.frame_set(frame)
             depsgraph = bpy.context.evaluated_depsgraph_get()
-            with _frame_named_in_errors(frame):
-                with CoupledFrame([*self._grooms_in(frame), *bystanders.values()]) as coupled_frame:
+            with _with_frame_in_errors(frame):
+                with CoupledFrame(
+                    [*self._grooms_in(frame), *passive_grooms.values()]
+                ) as coupled_frame:
                     for part in self.baked_objects:
                         part.simulate(frame, depsgraph)
-                    bystanders.move(depsgraph)
+                    passive_grooms.move(depsgraph)
                     coupled_frame.simulate_coupled()
                 for part in self.baked_objects:
                     part.write(frame, depsgraph)
-                bystanders.join(self._grooms_in(frame), depsgraph)
+                passive_grooms.join(self._grooms_in(frame), depsgraph)
             yield done
 
     def _grooms_in(self, frame: int) -> list[Session]:
-        found = (part.groom_in(frame) for part in self.baked_objects)
-        return [groom for groom in found if groom is not None]
+        grooms = (part.groom_in(frame) for part in self.baked_objects)
+        return [groom for groom in grooms if groom is not None]
 
     def _publish(self) -> None:
         """Replace all earlier bakes by the new ones, or none."""
@@ -273,7 +281,7 @@ class Bake:
             part.resolve().hairloom.bake.owner = part.handle.name
 
     def _show(self) -> None:
-        """Let previewed grooms show the new bake, or what they showed before."""
+        """Let previewed grooms show the new bake, or again what they showed before."""
         depsgraph = bpy.context.evaluated_depsgraph_get()
         for part in self.baked_objects:
             obj = part.handle.find()
@@ -282,7 +290,7 @@ class Bake:
 
 
 @contextmanager
-def _folders_restored(objects: list[bpy.types.Object]) -> Iterator[None]:
+def _preserving_folders(objects: list[bpy.types.Object]) -> Iterator[None]:
     """Restore the objects' folders afterwards, so that they show their old bakes for now."""
     before = [obj.hairloom.bake.folder for obj in objects]
     try:
@@ -293,7 +301,7 @@ def _folders_restored(objects: list[bpy.types.Object]) -> Iterator[None]:
 
 
 @contextmanager
-def _frame_named_in_errors(frame: int) -> Iterator[None]:
+def _with_frame_in_errors(frame: int) -> Iterator[None]:
     """Add the frame to errors raised inside."""
     try:
         yield
@@ -311,16 +319,16 @@ def simulation_for(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Sim
     Raises:
         HairloomError: it cannot be simulated.
     """
-    known = previews.simulation_of(obj)
-    if known is None and obj.type == "MESH":
+    previewed = previews.simulation_of(obj)
+    if previewed is None and obj.type == "MESH":
         return FinSession(obj, depsgraph)
-    if known is None or (isinstance(known, Session) and known.is_resized(depsgraph)):
+    if previewed is None or (isinstance(previewed, Session) and previewed.is_resized(depsgraph)):
         return Session(obj, depsgraph, is_drawn=False)
-    if isinstance(known, Session):
-        if known.is_stale:
-            known.read_again(depsgraph)
-        known.finish(depsgraph)
-    return known
+    if isinstance(previewed, Session):
+        if previewed.is_stale:
+            previewed.read_again(depsgraph)
+        previewed.finish(depsgraph)
+    return previewed
 
 
 def device_of_session(session: Simulation) -> str:

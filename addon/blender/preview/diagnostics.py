@@ -16,7 +16,7 @@ from ..scene.source import dynamics_warnings, hair_dynamics_modifiers
 from ..scene.surfaces import read_positions
 from ..sessions.session import Session
 from . import previews
-from .bystanders import grooms_near
+from .passive_grooms import nearby_grooms
 
 #: Scales whose ratio is smaller differ by rounding alone.
 _MAX_SCALE_RATIO = 1.01
@@ -47,7 +47,7 @@ def issues_of(hair: bpy.types.Object, session: Session | None) -> tuple[Issue, .
         session: its preview; without one, loose roots are not found.
     """
     head = head_of(hair)
-    known = "" if session is None else session.source.head_warning
+    warning = "" if session is None else session.source.head_warning
     found = []
     if hair_dynamics_modifiers(hair):
         found.append(
@@ -60,10 +60,10 @@ def issues_of(hair: bpy.types.Object, session: Session | None) -> tuple[Issue, .
         )
     if head is None:
         text = "No surface: it follows its own object only, and collides with nothing"
-        found.append(Issue(text, "hairloom.set_surface", "Set Surface", known))
+        found.append(Issue(text, "hairloom.set_surface", "Set Surface", warning))
     elif head.data.uv_layers.active is None:
         text = f"{head.name} has no UVs: exported strands will have no root UVs"
-        found.append(Issue(text, "hairloom.unwrap_surface", "Unwrap", known))
+        found.append(Issue(text, "hairloom.unwrap_surface", "Unwrap", warning))
     if (
         head is not None
         and session is not None
@@ -92,8 +92,8 @@ def instances_note(hair: bpy.types.Object) -> str:
     layer = bpy.context.view_layer
     if not any(_may_instance(obj) for obj in objects_in(layer) if obj != hair):
         return ""
-    looked_at = itertools.islice(layer.depsgraph.object_instances, _MAX_INSTANCES)
-    if any(each.is_instance and each.object.original == hair for each in looked_at):
+    searched = itertools.islice(layer.depsgraph.object_instances, _MAX_INSTANCES)
+    if any(each.is_instance and each.object.original == hair for each in searched):
         return "Instances of it have hair in renders, but not in the preview"
     return ""
 
@@ -101,7 +101,7 @@ def instances_note(hair: bpy.types.Object) -> str:
 def unfelt_note(session: Session) -> str:
     """A note on hair that is not previewed, but that a bake would feel; "" if there is none. Fast
     enough for every redraw."""
-    near = grooms_near([session], bpy.context.view_layer.depsgraph)
+    near = nearby_grooms([session], bpy.context.view_layer.depsgraph)
     names = [obj.name for obj in near if previews.session_of(obj) is None]
     if not names:
         return ""

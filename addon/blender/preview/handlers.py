@@ -33,7 +33,7 @@ def on_load_pre(*_: Any) -> None:
 def on_load_post(*_: Any) -> None:
     registry.forget_all()
     store_session_uids()
-    _heal()
+    _restore_hair()
 
 
 @persistent
@@ -46,10 +46,10 @@ def on_load_fail(*_: Any) -> None:
 def on_save_pre(*_: Any) -> None:
     library_overrides.access_all_groups()
     store_object_names()
-    _heal()
+    _restore_hair()
 
 
-def _heal() -> None:
+def _restore_hair() -> None:
     for name in baked_copy.restore_hair_without_copy():
         print(f"Hairloom: {name} is in renders again, since the copy that showed its bake is gone")
 

@@ -25,15 +25,15 @@ class Event(Enum):
     """What happens to a preview."""
 
     PLAY = "Play is pressed, or what it has waited for is made"
-    TICK = "Play's clock goes on"
+    TICK = "Play's clock ticks"
     STOP = "Play is stopped, or its bake has changed"
-    RESET = "it is put back into its style, or its body has moved within the frame"
+    RESET = "it returns to its style, or its body has moved within the frame"
     FIRST = "the scene is at its first frame"
-    NEXT = "the scene has gone on by a frame, or by some that were dropped"
-    SAME = "the scene is at the frame where it was"
+    NEXT = "the scene has advanced by a frame, or by several of which some were dropped"
+    SAME = "the scene is still at the same frame"
     JUMP = "the scene is anywhere else"
     IS_BAKED = "the scene's frame is in its bake"
-    UNMADE = "its hair or a collider is still being made, and nobody waits"
+    NOT_READY = "its hair or a collider is still being made, and nobody waits"
     FAILED = "it cannot be simulated"
 
 
@@ -46,7 +46,7 @@ _ANY = {
     Event.NEXT: (Phase.TIMELINE, Action.BEGIN),
     Event.JUMP: (Phase.REST, Action.REST),
     Event.IS_BAKED: (Phase.BAKED, Action.SHOW),
-    Event.UNMADE: (Phase.DEFERRED, Action.REST),
+    Event.NOT_READY: (Phase.DEFERRED, Action.REST),
     Event.FAILED: (Phase.REST, Action.REST),
 }
 #: exceptions to `_ANY` for single phases, and events that only matter in these
@@ -56,7 +56,7 @@ _SPECIAL = {
     (Phase.TIMELINE, Event.NEXT): (Phase.TIMELINE, Action.ADVANCE),
     (Phase.TIMELINE, Event.JUMP): (Phase.TIMELINE, Action.REST),
     # Play waits at rest: only the body moves, and the hair follows that anyway
-    (Phase.FREE, Event.UNMADE): (Phase.WAITING, Action.NONE),
+    (Phase.FREE, Event.NOT_READY): (Phase.WAITING, Action.NONE),
     # a bake leaves no velocities to continue from
     (Phase.BAKED, Event.SAME): (Phase.REST, Action.NONE),
     (Phase.BAKED, Event.RESET): (Phase.REST, Action.REST),
@@ -77,9 +77,9 @@ def frame_event(
     """The event that a scene frame causes in a preview, and the number of frames to advance.
 
     Args:
-        before: the frame at which the hair is; None: at none.
+        before: the frame of the hair; None: it has none.
         first: the frame at which playback begins.
-        max_dropped: the most frames ahead that count as dropped by playback.
+        max_dropped: maximum number of frames ahead that count as dropped by playback.
     """
     if now == first:
         return Event.FIRST, 0

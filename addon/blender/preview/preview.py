@@ -37,7 +37,7 @@ _MAX_DROPPED_TIME = 1.0
 
 
 @dataclass(frozen=True)
-class KnownBake:
+class BakeStatus:
     """The bake of a groom or fin, compared with the scene.
 
     changed_inputs: what has changed since it was made, in words; empty: it is up to date.
@@ -55,9 +55,9 @@ class Preview:
     frame: the scene frame up to which the timeline has moved it; None: the timeline does not.
     bake: None: it has none. rig_hash: the present one, to compare with that of the bake; "": not
         computed yet.
-    problem, bake_problem: why it is not simulated, or its bake not shown.
+    problem, bake_problem: why it is not simulated, or why its bake is not shown.
     cards_are_stale: whether its cards need to be shaded again once edits have settled.
-    must_rest: whether it was stopped while it was left out, and must rest once it is read again.
+    must_rest: whether it was stopped while it was disabled, and must rest once it is read again.
 
     Methods raise HairloomError when an object that it is made of is gone or broken.
     """
@@ -66,7 +66,7 @@ class Preview:
         self.session = session
         self.phase = Phase.REST
         self.frame: int | None = None
-        self.bake: KnownBake | None = None
+        self.bake: BakeStatus | None = None
         self.rig_hash = ""
         self.problem = self.bake_problem = ""
         self.cards_are_stale = self.must_rest = False
@@ -97,12 +97,12 @@ class Preview:
 
     @property
     def is_deferred(self) -> bool:
-        """Whether it is at rest while Blender plays, because something is still being made."""
+        """Whether it rests while Blender plays, because something is still being made."""
         return self.phase is Phase.DEFERRED and not _is_exact()
 
     @property
     def problems(self) -> str:
-        """Why it is not simulated, or its bake not shown; empty while all is well."""
+        """Why it is not simulated, or why its bake is not shown; empty while all is well."""
         return " ".join(filter(None, (self.problem, self.bake_problem)))
 
     def is_disabled(self, depsgraph: bpy.types.Depsgraph) -> bool:
@@ -183,7 +183,7 @@ class Preview:
                 case Action.STOP:
                     session.stop(depsgraph)
         except NotReadyError:
-            self.handle_or_raise(Event.UNMADE, depsgraph)
+            self.handle_or_raise(Event.NOT_READY, depsgraph)
         except HairloomError:
             self.phase, session.is_playing = Phase.REST, False
             raise
@@ -198,10 +198,10 @@ class Preview:
             self.problem = str(error)
 
     def detach_from_timeline(self) -> None:
-        """Detach it from the timeline, until `follow`."""
+        """Detach it from the timeline, until `follow_frame`."""
         self.frame = None
 
-    def follow(self, depsgraph: bpy.types.Depsgraph) -> None:
+    def follow_frame(self, depsgraph: bpy.types.Depsgraph) -> None:
         """React to a change of the scene's frame."""
         obj, scene = self.resolve(), depsgraph.scene
         now, before = scene.frame_current, self.frame
@@ -209,7 +209,7 @@ class Preview:
             before = now - 1  # it was played freely until now
         self.frame = now
         if not self.is_made and not _is_exact():
-            self.handle(Event.UNMADE, depsgraph)
+            self.handle(Event.NOT_READY, depsgraph)
             return
         rate, first = frame_rate(scene), _first_frame(scene)
         if now == first:
@@ -225,7 +225,7 @@ class Preview:
         )
         self.handle(event, depsgraph, frames / rate, blocking=_is_exact())
 
-    def keep_or_rest(self, depsgraph: bpy.types.Depsgraph) -> bool:
+    def rest_if_moved(self, depsgraph: bpy.types.Depsgraph) -> bool:
         """React to a new evaluation of the body within a frame: hair rests if its body has moved.
 
         Returns whether the hair is at rest.
@@ -235,7 +235,7 @@ class Preview:
             if self.session.frame_hash(depsgraph) == self.bake.frame_hash:
                 return False
             facts = self.bake.facts
-            self.bake = KnownBake(facts, self._changes_since_bake(facts, depsgraph))
+            self.bake = BakeStatus(facts, self._changes_since_bake(facts, depsgraph))
         elif not self.groom.has_moved(depsgraph):
             return self.phase is Phase.REST
         self.handle(Event.RESET, depsgraph)
@@ -260,12 +260,12 @@ class Preview:
         obj = self.resolve()
         self.rig_hash = self.session.rig_hash(depsgraph)
         cache = self._cache_of(obj)
-        self.bake = None if cache is None else self._known_bake(cache.facts, depsgraph)
+        self.bake = None if cache is None else self._bake_status(cache.facts, depsgraph)
 
     def compare_bake(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Compare the bake with the scene again after a setting was changed."""
         if self.bake is not None:
-            self.bake = self._known_bake(self.bake.facts, depsgraph)
+            self.bake = self._bake_status(self.bake.facts, depsgraph)
 
     def show_frame(self, depsgraph: bpy.types.Depsgraph) -> bool:
         """Show the scene's frame from the bake; returns whether the bake has it."""
@@ -292,12 +292,12 @@ class Preview:
             return False
         self.handle_or_raise(Event.IS_BAKED, depsgraph)
         self.rig_hash = self.rig_hash or self.session.rig_hash(depsgraph)
-        self.bake = self._known_bake(cache.facts, depsgraph)
+        self.bake = self._bake_status(cache.facts, depsgraph)
         return True
 
-    def _known_bake(self, facts: Facts, depsgraph: bpy.types.Depsgraph) -> KnownBake:
+    def _bake_status(self, facts: Facts, depsgraph: bpy.types.Depsgraph) -> BakeStatus:
         frame_hash = self.session.frame_hash(depsgraph)
-        return KnownBake(facts, self._changes_since_bake(facts, depsgraph, frame_hash), frame_hash)
+        return BakeStatus(facts, self._changes_since_bake(facts, depsgraph, frame_hash), frame_hash)
 
     def _changes_since_bake(
         self, facts: Facts, depsgraph: bpy.types.Depsgraph, frame_hash: str = ""

@@ -36,7 +36,7 @@ from ..sessions.session import Session
 from ..viewport import overlay
 from ..viewport.debug_lines import is_in_sculpt_mode
 from .phases import Event, Phase
-from .preview import KnownBake, Preview, baked_rig_for
+from .preview import BakeStatus, Preview, baked_rig_for
 
 #: Notes on hair that is about to play, and on hair that is not made yet.
 WAITING, BUILDING = "plays as soon as its collider is ready", "is being made"
@@ -208,7 +208,7 @@ def simulation_of(obj: bpy.types.Object | None) -> Simulation | None:
     return None if found is None else found.session
 
 
-def bake_of(obj: bpy.types.Object) -> KnownBake | None:
+def bake_of(obj: bpy.types.Object) -> BakeStatus | None:
     """What is known of the bake of a previewed object."""
     preview = previews.get(obj.session_uid)
     return None if preview is None else preview.bake

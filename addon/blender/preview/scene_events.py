@@ -120,7 +120,7 @@ def _update(
         session.take_lights(depsgraph)
     for brush in (*colors, *(brushes if preview.phase is Phase.REST else ())):
         brush(depsgraph)
-    if follows and preview.keep_or_rest(depsgraph) and preview.is_resized(depsgraph):
+    if follows and preview.rest_if_moved(depsgraph) and preview.is_resized(depsgraph):
         session.is_stale = True
         _read_again_soon()
 
@@ -148,7 +148,7 @@ def _follow_frame(preview: Preview, depsgraph: bpy.types.Depsgraph, light_change
     if preview.resolve().hairloom.bake.follows:
         # freely playing hair goes on swinging while the playhead is dragged; playback takes it over
         if not is_free or playback.is_animation_playing():
-            preview.follow(depsgraph)
+            preview.follow_frame(depsgraph)
     elif preview.phase is Phase.WAITING or not (is_free or preview.show_frame(depsgraph)):
         preview.handle_or_raise(Event.RESET, depsgraph)
 

@@ -47,13 +47,15 @@ def head_bone_of(
     else:
         weights = bones_of(hair, depsgraph, strands)
         if weights is not None:
-            heavy = np.bincount(weights.bone.ravel(), weights.weight.ravel(), len(weights.names))
-            name = weights.names[int(heavy.argmax())]
+            weight_sums = np.bincount(
+                weights.bone.ravel(), weights.weight.ravel(), len(weights.names)
+            )
+            name = weights.names[int(weight_sums.argmax())]
     bone = None if armature is None else armature.data.bones.get(name)
     if armature is None or bone is None:
         return None
-    place, turn, _ = (armature.matrix_world @ bone.matrix_local).decompose()
-    return HeadBone(name, np.array(Matrix.Translation(place) @ turn.to_matrix().to_4x4()))
+    location, rotation, _ = (armature.matrix_world @ bone.matrix_local).decompose()
+    return HeadBone(name, np.array(Matrix.Translation(location) @ rotation.to_matrix().to_4x4()))
 
 
 def has_bones(hair: bpy.types.Object) -> bool:

@@ -44,7 +44,7 @@ class Bust:
     makehuman: Ints
 
     @property
-    def fans(self) -> tuple[Ints, Ints]:
+    def triangulated(self) -> tuple[Ints, Ints]:
         """Triangles of the polygons: their corners (triangle_count, 3), and their materials."""
         first = piece_starts(self.sizes)
         count = self.sizes - 2

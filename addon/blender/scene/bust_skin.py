@@ -56,7 +56,7 @@ _FLUSH_SPOTS = (
     ((0.031, -0.085, 0.004), 0.012, 0.35),
 )
 #: middle of the shade below the left eye, (x, z) [m]; its reach across and down [m]
-_SHADE, _SHADE_REACH = (0.029, -0.0205), (0.013, 0.0055)
+_EYE_SHADE, _EYE_SHADE_REACH = (0.029, -0.0205), (0.013, 0.0055)
 #: middle of the left eye [m]; rims of pupil and iris, as angles from its axis [degrees]
 _EYE, _PUPIL_RIM, _IRIS_RIM = (0.0307767, -0.064535, -0.0065861), 9.2, 25.0
 #: size [m] and strength of blotches and pores
@@ -71,25 +71,25 @@ def skin_picture(tone: str) -> Floats:
         tone: one of TONES.
     """
     bust, colors = load_bust(), TONES[tone]
-    corners, material = bust.fans
+    corners, material = bust.triangulated
     place = bust.uv[bust.corner_uv[corners]].astype(np.float64) * RESOLUTION
     chart = Chart(place, np.ones(len(place), bool), (RESOLUTION, RESOLUTION))
     triangle, _ = covering(chart)
     row, column = np.nonzero(triangle >= 0)
-    shown = triangle[row, column]
-    fraction = barycentric(place[shown], np.stack([column + 0.5, row + 0.5], axis=1))
-    vertices = bust.corner_vertex[corners[shown]]
+    triangles = triangle[row, column]
+    fraction = barycentric(place[triangles], np.stack([column + 0.5, row + 0.5], axis=1))
+    vertices = bust.corner_vertex[corners[triangles]]
 
     def at_texels(values: Floats) -> Floats:
-        found: Floats = np.einsum("nk,nk...->n...", fraction, values[vertices])
-        return found
+        interpolated: Floats = np.einsum("nk,nk...->n...", fraction, values[vertices])
+        return interpolated
 
     points = at_texels(bust.positions)
     weights = {name: at_texels(values)[:, None] for name, values in bust.weights.items()}
-    is_eye = material[shown] == EYES
+    is_eye = material[triangles] == EYES
     color = np.empty((len(points), 3))
-    chosen = {name: values[~is_eye] for name, values in weights.items()}
-    color[~is_eye] = _skin(points[~is_eye], chosen, colors)
+    skin_weights = {name: values[~is_eye] for name, values in weights.items()}
+    color[~is_eye] = _skin(points[~is_eye], skin_weights, colors)
     color[is_eye] = _eyes(points[is_eye], colors)
     folds = 1.0 - np.clip(weights["cavity"], 0.0, 1.0)
     color *= _mix(np.ones(3), _FOLD, np.clip(1.4 * folds, 0.0, 1.0))
@@ -111,7 +111,7 @@ def _skin(points: Floats, weights: dict[str, Floats], colors: Tone) -> Floats:
         away = np.linalg.norm(across - middle, axis=1, keepdims=True) / reach
         flush += strength * np.exp(-(away**2))
     color *= _mix(np.ones(3), colors.flush, np.minimum(flush, 1.0))
-    below = (across[:, [0, 2]] - _SHADE) / _SHADE_REACH
+    below = (across[:, [0, 2]] - _EYE_SHADE) / _EYE_SHADE_REACH
     is_front = points[:, 1] < -0.05
     shade = np.exp(-(below**2).sum(axis=1)) * is_front
     color *= _mix(np.ones(3), _BELOW_EYES, shade[:, None])

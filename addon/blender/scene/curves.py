@@ -120,7 +120,7 @@ def _read(
         root_uv=read_attribute(curves, "surface_uv_coordinate", "CURVE", 2),
         color=color,
         seed=_seeds(curves),
-        unfit=unusable_curves(curves),
+        unusable=unusable_curves(curves),
     )
 
 
@@ -156,38 +156,40 @@ def curves_as_drawn(curves: bpy.types.Curves) -> EvaluatedCurves | None:
 
 def unusable_curves(curves: bpy.types.Curves) -> dict[str, Bools]:
     """Curves that are not hair, or cannot be read: reason -> mask (curve_count,)."""
-    found = {}
+    masks = {}
     cyclic = read_attribute(curves, "cyclic", "CURVE")
     if cyclic is not None and cyclic.any():
-        found["no end (Toggle Cyclic opens them)"] = cyclic
+        masks["no end (Toggle Cyclic opens them)"] = cyclic
     kind, knots = (read_attribute(curves, name, "CURVE") for name in ("curve_type", "knots_mode"))
     if kind is not None and knots is not None:
         is_custom = (kind == CurveType.NURBS) & (knots == KnotMode.CUSTOM)
         if is_custom.any():
-            found["knots of their own (set another Knot Mode)"] = is_custom
-    return found
+            masks["knots of their own (set another Knot Mode)"] = is_custom
+    return masks
 
 
 def write_original_curves(
-    obj: bpy.types.Object, own: Cleaned, points: Floats, depsgraph: bpy.types.Depsgraph
+    obj: bpy.types.Object, cleaned: Cleaned, points: Floats, depsgraph: bpy.types.Depsgraph
 ) -> None:
     """Move the curves that `read_original_curves` returned; those that it dropped stay.
 
     Args:
-        points: (point_count, 3) [m] world space, of the strands of `own`.
+        points: (point_count, 3) [m] world space, of the strands of `cleaned`.
     """
     curves = obj.data
     offsets, moved_points = curve_offsets(curves), curve_points(curves)
-    counts = np.diff(offsets)[own.kept]
+    counts = np.diff(offsets)[cleaned.curve_indices]
     number = number_in_piece(counts)
-    back = np.linalg.inv(np.array(obj.evaluated_get(depsgraph).matrix_world, np.float64))
-    moved_points[np.repeat(offsets[own.kept], counts) + number] = transform_points(points, back)
+    to_object = np.linalg.inv(np.array(obj.evaluated_get(depsgraph).matrix_world, np.float64))
+    moved_points[np.repeat(offsets[cleaned.curve_indices], counts) + number] = transform_points(
+        points, to_object
+    )
     move_curves(curves, moved_points)
 
 
 def move_curves(curves: bpy.types.Curves, points: Floats) -> None:
-    """`put_points` that moves the handles of Bezier curves too; each is scaled as the piece of the
-    curve on its side."""
+    """`set_points` that moves the handles of Bezier curves too; each is scaled as the piece of the
+    curve on its side is."""
     before = curve_points(curves)
     for name, side in (("handle_left", 1), ("handle_right", -1)):
         handles = read_attribute(curves, name, "POINT", 3)
@@ -195,12 +197,12 @@ def move_curves(curves: bpy.types.Curves, points: Floats) -> None:
             continue
         # the outer handles of a curve have no effect, so rolling past its ends does no harm
         was, now = (np.linalg.norm(p - np.roll(p, side, axis=0), axis=1) for p in (before, points))
-        longer = np.divide(now, was, out=np.ones_like(was), where=was > 0.0)
-        set_attribute(curves, name, "POINT", points + longer[:, None] * (handles - before))
-    put_points(curves, points)
+        scale = np.divide(now, was, out=np.ones_like(was), where=was > 0.0)
+        set_attribute(curves, name, "POINT", points + scale[:, None] * (handles - before))
+    set_points(curves, points)
 
 
-def put_points(curves: bpy.types.Curves, points: Floats) -> None:
+def set_points(curves: bpy.types.Curves, points: Floats) -> None:
     """Move all points, (point_count, 3) [m] object space, and nothing else of the curves.
 
     Written as an attribute: after writing to `position_data`, Blender keeps its cached curves, and

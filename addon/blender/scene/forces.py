@@ -39,9 +39,9 @@ _EXCLUDED = {
     "FLUID_FLOW": "a fluid cannot be evaluated at each point of the hair",
 }
 _SHAPES = {"POINT": "point", "LINE": "line", "PLANE": "plane", "POINTS": "points"}
-#: Most vertices of a mesh with the shape Every Point.
+#: Maximum number of vertices of a mesh with the shape Every Point.
 MAX_POINTS = 64
-#: Strengths are clamped to this, as numbers could overflow; hair cannot follow a thousandth of it.
+#: Strengths are clamped to this, since numbers could overflow; hair cannot follow a thousandth.
 _MAX_STRENGTH = 1.0e6
 
 
@@ -61,7 +61,7 @@ def force_fields_of(
     Args:
         owner: hair curves or cloth. If it names a collection, only the fields in there act.
     """
-    found: list[ForceField] = []
+    fields: list[ForceField] = []
     notes: list[str] = []
     chosen = owner.hairloom.field_collection
     names = None if chosen is None else {obj.name_full for obj in chosen.all_objects}
@@ -75,13 +75,13 @@ def force_fields_of(
         if reason:
             notes.append(f"{obj.name}: its force field does not act on hair: {reason}")
         elif field.apply_to_location:
-            found += _read(obj, field, depsgraph.scene.frame_current)
+            fields += _read(obj, field, depsgraph.scene.frame_current)
             if abs(field.strength) > _MAX_STRENGTH:
                 notes.append(f"{obj.name}: it is too strong for hair to follow. Lower Strength.")
-    if not found:
+    if not fields:
         return NO_FIELDS, tuple(notes)
-    is_turbulent = any(one.kind == "turbulence" for one in found)
-    return ForceFields(tuple(found), permutation() if is_turbulent else None), tuple(notes)
+    is_turbulent = any(one.kind == "turbulence" for one in fields)
+    return ForceFields(tuple(fields), permutation() if is_turbulent else None), tuple(notes)
 
 
 def _exclusion_reason(obj: bpy.types.Object, field: bpy.types.FieldSettings) -> str:
@@ -143,7 +143,7 @@ def _at_point(one: ForceField, matrix: Floats, vertex: bpy.types.MeshVertex) -> 
 
 
 def _noise_of(field: bpy.types.FieldSettings, frame: int) -> float:
-    """What noise adds to the strength in a frame, equal for all hair; distributed as Blender's."""
+    """What noise adds to the strength in a frame, for all hair alike; distributed as in Blender."""
     if not field.noise:
         return 0.0
     random = np.random.default_rng([field.seed, abs(frame)])
@@ -168,17 +168,19 @@ def permutation() -> Ints:
     Near a lattice corner (x, y, z) the noise rises along the gradient number p[p[p[x] + y] + z].
     So the gradients along z at x = 0 are a window of p that begins at p[p[0] + y]. How far the
     window of y is ahead of that of y = 0 gives p[p[0] + y] - p[p[0]], from which p follows once
-    p[0] is known. All values of p[0] are tried; only one explains the gradients that were seen.
+    p[0] is known. All values of p[0] are tried; only one explains the sampled gradients.
     """
-    seen = [_gradient(0, 0, z) for z in range(256)]
+    gradients = [_gradient(0, 0, z) for z in range(256)]
     window, edges = 24, [tuple(edge) for edge in GRADIENTS.astype(int).tolist()]
-    starts = {tuple((seen * 2)[at : at + window]): at for at in range(256)}
-    ahead = np.array([starts[tuple(_gradient(0, y, z) for z in range(window))] for y in range(256)])
+    starts = {tuple((gradients * 2)[start : start + window]): start for start in range(256)}
+    offsets = np.array(
+        [starts[tuple(_gradient(0, y, z) for z in range(window))] for y in range(256)]
+    )
     for begin in range(256):  # p[0]
-        first = (begin - ahead[-begin % 256]) % 256  # p[p[0]]
-        found = (np.roll(ahead, begin) + first) % 256
-        if [edges[found[(first + z) % 256] & 15] for z in range(256)] == seen:
-            return found
+        first = (begin - offsets[-begin % 256]) % 256  # p[p[0]]
+        result = (np.roll(offsets, begin) + first) % 256
+        if [edges[result[(first + z) % 256] & 15] for z in range(256)] == gradients:
+            return result
     raise AssertionError("Blender's noise is not Perlin's")
 
 

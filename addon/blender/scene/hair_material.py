@@ -33,11 +33,11 @@ _COLUMN_WIDTH, _ROW_HEIGHT = 190.0, 180.0
 
 
 def has_look_material(curves: bpy.types.Curves) -> bool:
-    """Whether hair curves have a material that `put_look_material` would overwrite."""
+    """Whether hair curves have a material that `set_look_material` would overwrite."""
     return look_material(curves) is not None
 
 
-def put_look_material(
+def set_look_material(
     curves: bpy.types.Curves,
     shading: ShadingSettings,
     *,
@@ -55,8 +55,8 @@ def put_look_material(
     Returns:
         the material, and notes on what it lacks of the look.
     """
-    has_colors = put_colors(curves, shading, painted)
-    slots, material = curves.materials, _own_material(curves)
+    has_colors = set_material_colors(curves, shading, painted)
+    slots, material = curves.materials, _single_user_material(curves)
     if material is None:
         material = bpy.data.materials.new(f"{curves.name} Look")
         material[_MARK] = True
@@ -71,8 +71,10 @@ def put_look_material(
     return material, notes
 
 
-def put_colors(curves: bpy.types.Curves, shading: ShadingSettings, painted: Floats | None) -> bool:
-    """Give hair curves the colours that their material reads, as `put_look_material` does; returns
+def set_material_colors(
+    curves: bpy.types.Curves, shading: ShadingSettings, painted: Floats | None
+) -> bool:
+    """Give hair curves the colours that their material reads, as `set_look_material` does; returns
     whether they have any."""
     if painted is not None:
         set_attribute(curves, MATERIAL_COLOR, "CURVE", painted)
@@ -93,22 +95,22 @@ def has_unchanged_nodes(material: bpy.types.Material) -> bool:
 def is_outdated(material: bpy.types.Material, look: ShadingSettings) -> bool:
     """Whether it was made from another look and its nodes have not been changed since; with changed
     nodes it is the artist's own."""
-    known = material.get(_LOOK_DIGEST)
-    return known not in (None, digest(look, size=8)) and has_unchanged_nodes(material)
+    stored = material.get(_LOOK_DIGEST)
+    return stored not in (None, digest(look, size=8)) and has_unchanged_nodes(material)
 
 
 def _nodes(material: bpy.types.Material) -> list[object]:
-    """Everything of the nodes that an artist can change, except their places."""
-    found: list[object] = []
+    """Everything about the nodes that an artist can change, except their places."""
+    state: list[object] = []
     for node in material.node_tree.nodes:
-        found.append((node.bl_idname, getattr(node, "parametrization", ""), node.mute))
+        state.append((node.bl_idname, getattr(node, "parametrization", ""), node.mute))
         for socket in node.inputs:
             value = getattr(socket, "default_value", None)
-            found.append(value if isinstance(value, float | int | str) else repr(_as_floats(value)))
+            state.append(value if isinstance(value, float | int | str) else repr(_as_floats(value)))
     for link in material.node_tree.links:
         ends = (link.from_node.name, link.from_socket.identifier)
-        found.append((*ends, link.to_node.name, link.to_socket.identifier))
-    return found
+        state.append((*ends, link.to_node.name, link.to_socket.identifier))
+    return state
 
 
 def _as_floats(value: Any) -> list[float]:
@@ -117,11 +119,11 @@ def _as_floats(value: Any) -> list[float]:
 
 def look_material(curves: bpy.types.Curves) -> bpy.types.Material | None:
     """The material of a look that the curves have, if it can be edited."""
-    marked = (each for each in curves.materials if each is not None and _MARK in each)
-    return next((each for each in marked if each.is_editable), None)
+    materials = (each for each in curves.materials if each is not None and _MARK in each)
+    return next((each for each in materials if each.is_editable), None)
 
 
-def _own_material(curves: bpy.types.Curves) -> bpy.types.Material | None:
+def _single_user_material(curves: bpy.types.Curves) -> bpy.types.Material | None:
     """As `look_material`, but a copy for these curves if others use it too, such as those of a
     duplicate, which may have another look. Copies that show their bake in renders share it."""
     material = look_material(curves)
@@ -135,12 +137,12 @@ def _own_material(curves: bpy.types.Curves) -> bpy.types.Material | None:
     }
     if users <= {curves, *baked}:
         return material
-    own = material.copy()
+    copy = material.copy()
     for each in (curves, *baked):
         for number, other in enumerate(each.materials):
             if other == material:
-                each.materials[number] = own
-    return own
+                each.materials[number] = copy
+    return copy
 
 
 def _copy_colors(curves: bpy.types.Curves) -> None:
@@ -166,20 +168,21 @@ def _write(
     if has_colors:
         node.parametrization = "COLOR"
         nodes.link(
-            nodes.own_color(hair, shading, has_final_colors=has_final_colors), node.inputs["Color"]
+            nodes.curve_color(hair, shading, has_final_colors=has_final_colors),
+            node.inputs["Color"],
         )
         is_changed = shading.tip_tint > 0.0 or shading.grey_fraction > 0.0
         if is_changed and not has_final_colors:
             notes += (
                 "Tip Tint and Grey Strands are left out for strands with colours of their own",
             )
-    elif _differs(shading, hair):
+    elif _needs_absorption_nodes(shading, hair):
         node.parametrization = "ABSORPTION"
         nodes.link(nodes.absorption(shading), node.inputs["Absorption Coefficient"])
     return notes
 
 
-def _differs(shading: ShadingSettings, hair: PrincipledHair) -> bool:
+def _needs_absorption_nodes(shading: ShadingSettings, hair: PrincipledHair) -> bool:
     """Whether colour varies between strands or along them in ways the node has no input for."""
     has_own_variation = shading.color_variation > 0.0 and hair.parametrization != "MELANIN"
     return has_own_variation or shading.tip_tint > 0.0 or shading.grey_fraction > 0.0
@@ -206,7 +209,7 @@ class _Nodes:
     def link(self, source: bpy.types.NodeSocket, target: bpy.types.NodeSocket) -> None:
         self.tree.links.new(source, target)
 
-    def put(self, socket: bpy.types.NodeSocket, value: Any) -> None:
+    def set_input(self, socket: bpy.types.NodeSocket, value: Any) -> None:
         """Set an input to a number or a colour, or link it to an output."""
         if isinstance(value, bpy.types.NodeSocket):
             self.link(value, socket)
@@ -227,7 +230,7 @@ class _Nodes:
         self.link(node.outputs[0], output.inputs["Surface"])
         return node
 
-    def own_color(
+    def curve_color(
         self, hair: PrincipledHair, shading: ShadingSettings, *, has_final_colors: bool
     ) -> bpy.types.NodeSocket:
         """The curves' colours for this node. Colour is exp(-c sqrt(absorption)), so that a factor
@@ -235,15 +238,15 @@ class _Nodes:
         color = self.add("ShaderNodeAttribute", attribute_name=MATERIAL_COLOR).outputs["Color"]
         exponent: Any = color_exponent(hair.azimuthal_roughness)
         if not has_final_colors:
-            color = self._whole(color, tuple(look_color(shading).tolist()))
+            color = self._with_look_color(color, tuple(look_color(shading).tolist()))
             if shading.color_variation > 0.0:
                 root = self._math("POWER", self._variation(shading), 0.5)
                 exponent = self._math("MULTIPLY", root, exponent)
         if exponent == 1.0:
             return color
         gamma = self.add("ShaderNodeGamma")
-        self.put(gamma.inputs["Color"], color)
-        self.put(gamma.inputs["Gamma"], exponent)
+        self.set_input(gamma.inputs["Color"], color)
+        self.set_input(gamma.inputs["Gamma"], exponent)
         return gamma.outputs["Color"]
 
     def absorption(self, shading: ShadingSettings) -> bpy.types.NodeSocket:
@@ -255,19 +258,21 @@ class _Nodes:
         if shading.grey_fraction > 0.0:
             third = (1.0 / 3.0,) * 3
             mean = self._vector("DOT_PRODUCT", value, third).outputs["Value"]
-            even = self._vector("SCALE", (GREY_ABSORPTION,) * 3, mean).outputs["Vector"]
-            value = self._mix(self._is_grey(shading), value, even)
+            grey = self._vector("SCALE", (GREY_ABSORPTION,) * 3, mean).outputs["Vector"]
+            value = self._mix(self._is_grey(shading), value, grey)
         amount = self._variation(shading)
         return self._vector("SCALE", value, amount).outputs["Vector"]
 
-    def _whole(self, color: bpy.types.NodeSocket, look: tuple[float, ...]) -> bpy.types.NodeSocket:
+    def _with_look_color(
+        self, color: bpy.types.NodeSocket, look: tuple[float, ...]
+    ) -> bpy.types.NodeSocket:
         """The colour, replaced by the look's for curves without one, which have -1."""
         red = self.add("ShaderNodeSeparateColor")
-        self.put(red.inputs["Color"], color)
+        self.set_input(red.inputs["Color"], color)
         is_own = self._math("GREATER_THAN", red.outputs["Red"], -0.5)
         mix = self.add("ShaderNodeMix", data_type="RGBA")
         for name, value in (("Factor", is_own), ("A", (*look, 1.0)), ("B", color)):
-            self.put(_socket(mix, name), value)
+            self.set_input(_socket(mix, name), value)
         return _output(mix)
 
     def _variation(self, shading: ShadingSettings) -> bpy.types.NodeSocket:
@@ -277,7 +282,7 @@ class _Nodes:
 
     def _is_grey(self, shading: ShadingSettings) -> bpy.types.NodeSocket:
         other = self.add("ShaderNodeTexWhiteNoise", noise_dimensions="1D")
-        self.put(other.inputs["W"], self._strand("Random"))
+        self.set_input(other.inputs["W"], self._strand("Random"))
         return self._math("LESS_THAN", other.outputs["Value"], shading.grey_fraction)
 
     def _tip_fraction(self, shading: ShadingSettings) -> bpy.types.NodeSocket:
@@ -305,25 +310,25 @@ class _Nodes:
             ("To Min", to_low),
             ("To Max", to_high),
         ):
-            self.put(node.inputs[name], number)
+            self.set_input(node.inputs[name], number)
         return node.outputs["Result"]
 
     def _math(self, operation: str, one: Any, other: Any) -> bpy.types.NodeSocket:
         node = self.add("ShaderNodeMath", operation=operation)
-        self.put(node.inputs[0], one)
-        self.put(node.inputs[1], other)
+        self.set_input(node.inputs[0], one)
+        self.set_input(node.inputs[1], other)
         return node.outputs["Value"]
 
     def _vector(self, operation: str, one: Any, other: Any) -> bpy.types.Node:
         node = self.add("ShaderNodeVectorMath", operation=operation)
-        self.put(node.inputs[0], one)
-        self.put(node.inputs["Scale"] if operation == "SCALE" else node.inputs[1], other)
+        self.set_input(node.inputs[0], one)
+        self.set_input(node.inputs["Scale"] if operation == "SCALE" else node.inputs[1], other)
         return node
 
     def _mix(self, factor: Any, one: Any, other: Any) -> bpy.types.NodeSocket:
         node = self.add("ShaderNodeMix", data_type="VECTOR")
         for name, value in (("Factor", factor), ("A", one), ("B", other)):
-            self.put(_socket(node, name), value)
+            self.set_input(_socket(node, name), value)
         return _output(node)
 
 

@@ -12,14 +12,14 @@ from ...errors import HairloomError
 
 _LIBRARY = "assets/nodes/procedural_hair_node_assets.blend"
 #: types of input sockets that can be set -> Python types of their values
-_KINDS: dict[str, tuple[type, ...]] = {
+_VALUE_TYPES: dict[str, tuple[type, ...]] = {
     "NodeSocketBool": (bool,),
     "NodeSocketInt": (int,),
     "NodeSocketFloat": (int, float),
     "NodeSocketMenu": (str,),
 }
 #: the input of curls and braids that is a number of turns per length
-_PER_LENGTH = "Frequency"
+_FREQUENCY_INPUT = "Frequency"
 
 
 def add_hair_nodes(
@@ -39,12 +39,12 @@ def add_hair_nodes(
         HairloomError: this Blender has no such group, or it has no such inputs.
     """
     group = bpy.data.node_groups.get(nodes)
-    if group is None or _unknown(group, values):
+    if group is None or _unsupported_inputs(group, values):
         group = _from_library(nodes)
-    unknown = _unknown(group, values)
-    if unknown:
+    unsupported = _unsupported_inputs(group, values)
+    if unsupported:
         raise HairloomError(
-            f"Blender's node group '{nodes}' has no input '{unknown[0]}' for this value",
+            f"Blender's node group '{nodes}' has no input '{unsupported[0]}' for this value",
             place=hair.name,
             remedy=f"Use Blender 5.2; this is {bpy.app.version_string}",
         )
@@ -54,7 +54,7 @@ def add_hair_nodes(
     for name, value in values.items():
         if getattr(inputs[name], "subtype", "") == "DISTANCE":
             value *= scale
-        elif name == _PER_LENGTH:
+        elif name == _FREQUENCY_INPUT:
             value /= scale
         getattr(modifier.properties.inputs, inputs[name].identifier).value = value
     return modifier
@@ -74,15 +74,15 @@ def _from_library(nodes: str) -> bpy.types.NodeTree:
             place=str(path),
             remedy="Install Blender from blender.org, which includes them",
         )
-    with bpy.data.libraries.load(str(path), link=False) as (there, wanted):
-        wanted.node_groups = [nodes] if nodes in there.node_groups else []
-    if not wanted.node_groups or wanted.node_groups[0] is None:
+    with bpy.data.libraries.load(str(path), link=False) as (available, loaded):
+        loaded.node_groups = [nodes] if nodes in available.node_groups else []
+    if not loaded.node_groups or loaded.node_groups[0] is None:
         raise HairloomError(
             f"this Blender has no hair nodes '{nodes}'",
             place=str(path),
             remedy=f"Use Blender 5.2; this is {bpy.app.version_string}",
         )
-    return wanted.node_groups[0]
+    return loaded.node_groups[0]
 
 
 def _inputs(group: bpy.types.NodeTree) -> dict[str, Any]:
@@ -94,11 +94,11 @@ def _inputs(group: bpy.types.NodeTree) -> dict[str, Any]:
     return found
 
 
-def _unknown(group: bpy.types.NodeTree, values: Mapping[str, Any]) -> list[str]:
+def _unsupported_inputs(group: bpy.types.NodeTree, values: Mapping[str, Any]) -> list[str]:
     """The names of inputs that the group lacks, or that cannot take the value."""
     inputs = _inputs(group) if group.bl_idname == "GeometryNodeTree" else {}
     return [
         name
         for name, value in values.items()
-        if name not in inputs or type(value) not in _KINDS.get(inputs[name].socket_type, ())
+        if name not in inputs or type(value) not in _VALUE_TYPES.get(inputs[name].socket_type, ())
     ]

@@ -33,31 +33,31 @@ def head_look(name: str | None, head: Surface | None, tone: str) -> HeadLook | N
     """
     if head is None:
         return None
-    own = _own_look(name)
-    if own is not None and sum(len(triangles) for triangles, _ in own) == len(head.triangles):
-        return own
-    return built_in_head().look(tone) if is_our_bust(head) else None
+    stored = _stored_look(name)
+    if stored is not None and sum(len(each) for each, _ in stored) == len(head.triangles):
+        return stored
+    return built_in_head().look(tone) if is_bust_surface(head) else None
 
 
-def is_our_bust(head: Surface) -> bool:
+def is_bust_surface(head: Surface) -> bool:
     """Whether it has the mesh of the built-in head, from wherever it was loaded."""
-    ours = built_in_head().surface.triangles
-    return head.corner_uv is not None and np.array_equal(head.triangles, ours)
+    bust_triangles = built_in_head().surface.triangles
+    return head.corner_uv is not None and np.array_equal(head.triangles, bust_triangles)
 
 
 def look_of_head(hair: bpy.types.Object, head: Surface | None) -> HeadLook | None:
     """`head_look` of the head that this hair grows on."""
-    found = head_of(hair)
-    return head_look(None if found is None else found.name, head, _TONE)
+    obj = head_of(hair)
+    return head_look(None if obj is None else obj.name, head, _TONE)
 
 
-def _own_look(name: str | None) -> HeadLook | None:
+def _stored_look(name: str | None) -> HeadLook | None:
     """The materials of an object in the scene or of a file; None: there are none."""
     if name is None:
         return None
-    found = bpy.data.objects.get(name)
-    if found is not None:
-        return _look_of([found])
+    obj = bpy.data.objects.get(name)
+    if obj is not None:
+        return _look_of([obj])
     path = Path(name)
     if not (path.suffix and path.is_file()):
         return None
@@ -76,7 +76,7 @@ def _look_of(meshes: list[bpy.types.Object]) -> HeadLook | None:
         slots = np.minimum(read_material_slots(mesh, depsgraph), len(materials) - 1)
         for slot in np.unique(slots).tolist():
             material = materials[slot]
-            known = PLAIN_SKIN if material is None else material_of(material)
-            parts.append((start + np.flatnonzero(slots == slot), known))
+            mesh_material = PLAIN_SKIN if material is None else material_of(material)
+            parts.append((start + np.flatnonzero(slots == slot), mesh_material))
         start += len(slots)
     return tuple(parts)

@@ -102,24 +102,24 @@ def _light(instance: bpy.types.Object) -> Light | None:
     color = _emission(data) * np.array(data.color) * data.energy * 2.0**data.exposure
     if data.use_temperature:
         color = color * np.array(data.temperature_color)
-    place = np.array(matrix.translation)
-    along = -np.array(matrix.col[2][:3])
-    if data.type in ("SUN", "AREA") and not along.any():
+    location = np.array(matrix.translation)
+    direction = -np.array(matrix.col[2][:3])
+    if data.type in ("SUN", "AREA") and not direction.any():
         return None
     if data.type == "SUN":
         strength = 1.0 if data.normalize else _sun_disk(data.angle)
-        return Light.sun(along, color, strength, data.angle)
+        return Light.sun(direction, color, strength, data.angle)
     if data.type == "AREA":
         if _is_portal(data):
             return None
         panel = _panel(data, matrix)
-        return Light.area(place, color, 1.0 if data.normalize else _panel_size(panel), panel)
+        return Light.area(location, color, 1.0 if data.normalize else _panel_size(panel), panel)
     radius, is_ball = data.shadow_soft_size, not data.use_soft_falloff
     power = 1.0 if data.normalize or radius == 0.0 else 4.0 * np.pi * radius * radius
     if data.type == "SPOT":
         cone = Cone(_inverse(matrix), data.spot_size, data.spot_blend)
-        return Light.spot(place, color, power, cone, radius, is_ball)
-    return Light.point(place, color, power, radius, is_ball)
+        return Light.spot(location, color, power, cone, radius, is_ball)
+    return Light.point(location, color, power, radius, is_ball)
 
 
 def _sun_disk(angle: float) -> float:
@@ -131,18 +131,18 @@ def _panel(data: bpy.types.AreaLight, matrix: Matrix) -> Panel:
     """Scaling the object enlarges an area light, but does not widen its spread."""
     right, up, back = (np.array(matrix.col[axis][:3]) for axis in range(3))
     height = data.size_y if data.shape in ("RECTANGLE", "ELLIPSE") else data.size
-    along = -back / np.linalg.norm(back)
+    direction = -back / np.linalg.norm(back)
     width_scale, height_scale = float(np.linalg.norm(right)), float(np.linalg.norm(up))
     # the axes of an area light are perpendicular, even if its matrix is sheared
-    up = np.cross(along, right)
+    up = np.cross(direction, right)
     if not up.any():
-        right = np.cross(along, np.eye(3)[np.abs(along).argmin()])
-        up = np.cross(along, right)
-    right = np.cross(up, along)
+        right = np.cross(direction, np.eye(3)[np.abs(direction).argmin()])
+        up = np.cross(direction, right)
+    right = np.cross(up, direction)
     return Panel(
         right=_triple(right / np.linalg.norm(right)),
         up=_triple(up / np.linalg.norm(up)),
-        shines_along=_triple(along),
+        shines_along=_triple(direction),
         half_width=0.5 * data.size * width_scale,
         half_height=0.5 * height * height_scale,
         is_round=data.shape in ("DISK", "ELLIPSE"),

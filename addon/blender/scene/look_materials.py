@@ -13,19 +13,19 @@ from .hair_material import (
     has_unchanged_nodes,
     is_outdated,
     look_material,
-    put_colors,
-    put_look_material,
+    set_look_material,
+    set_material_colors,
 )
 from .painted_colors import colors_of_curves
 
 #: time without edits before painted colours are looked up again [s]
-_PAUSE = 0.3
+_UPDATE_DELAY = 0.3
 
 #: session numbers of curves whose material is updated then
 _deferred: set[int] = set()
 
 
-def put_look(hair: bpy.types.Object) -> tuple[bpy.types.Material, tuple[str, ...]]:
+def apply_look(hair: bpy.types.Object) -> tuple[bpy.types.Material, tuple[str, ...]]:
     """Give hair the material of its look; returns the material and notes.
 
     Raises:
@@ -33,7 +33,7 @@ def put_look(hair: bpy.types.Object) -> tuple[bpy.types.Material, tuple[str, ...
     """
     look = _look_of(hair.data)
     painted, notes = colors_of_curves(hair, look, bpy.context.evaluated_depsgraph_get())
-    material, more = put_look_material(hair.data, look, painted=painted)
+    material, more = set_look_material(hair.data, look, painted=painted)
     return material, (*notes, *more)
 
 
@@ -42,10 +42,10 @@ def update_after_new_curves(hair: bpy.types.Object) -> None:
     look, material = _look_of(hair.data), look_material(hair.data)
     try:
         if material is not None and has_unchanged_nodes(material):
-            put_look(hair)
+            apply_look(hair)
         else:
             depsgraph = bpy.context.evaluated_depsgraph_get()
-            put_colors(hair.data, look, colors_of_curves(hair, look, depsgraph)[0])
+            set_material_colors(hair.data, look, colors_of_curves(hair, look, depsgraph)[0])
     except HairloomError:  # painted colours cannot be read; the preview reports it
         return
 
@@ -61,7 +61,7 @@ def update_after_edit(owner: bpy.types.ID) -> None:
     if look.color_map and not bpy.app.background:  # looking up a colour map is slow
         _deferred.add(owner.session_uid)
         if not bpy.app.timers.is_registered(_update_deferred):
-            bpy.app.timers.register(_update_deferred, first_interval=_PAUSE)
+            bpy.app.timers.register(_update_deferred, first_interval=_UPDATE_DELAY)
         return
     _update_material(owner)
 
@@ -77,7 +77,7 @@ def _update_material(owner: bpy.types.Curves) -> None:
     hair = next((obj for obj in bpy.data.objects if obj.data == owner), None)
     try:
         if hair is not None:
-            put_look(hair)
+            apply_look(hair)
     except HairloomError:  # painted colours cannot be read; the preview reports it
         return
 

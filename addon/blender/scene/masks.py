@@ -86,20 +86,20 @@ class MaskReader:
     ) -> tuple[Masks, tuple[str, ...]]:
         """The masks that settings name, and warnings.
 
-        A mask that cannot be used stays as it was last; one that never could has no effect. The
+        If a mask cannot be used, its last usable state is; without one it has no effect. The
         selection is read even while it has no effect, as keyframes may turn it on.
         """
-        acting, labels = mask_names(settings), {p.name: p.label for p in settings.parameters()}
-        named = dict(acting)
+        active, labels = mask_names(settings), {p.name: p.label for p in settings.parameters()}
+        names = dict(active)
         if hasattr(settings, "only_selected") and self._has_selection(depsgraph):
-            named["only_selected"] = SELECTION
-        found, warnings = {}, []
-        read = {name: self.read_or_last(name, depsgraph) for name in sorted(set(named.values()))}
-        for of, name in named.items():
+            names["only_selected"] = SELECTION
+        masks, warnings = {}, []
+        read = {name: self.read_or_last(name, depsgraph) for name in sorted(set(names.values()))}
+        for parameter, name in names.items():
             mask, warning = read[name]
             if mask is not None:
-                found[of] = mask
-            if of not in acting or warning in warnings:
+                masks[parameter] = mask
+            if parameter not in active or warning in warnings:
                 continue
             if warning:
                 warnings.append(warning)
@@ -110,20 +110,20 @@ class MaskReader:
                 )
             elif mask is not None and mask.is_zero:
                 warnings.append(
-                    f"{self._place}: the mask '{name}' is 0 everywhere, and so is {labels[of]}."
-                    " Paint it (Weight Paint), or clear its field"
+                    f"{self._place}: the mask '{name}' is 0 everywhere, and so is"
+                    f" {labels[parameter]}. Paint it (Weight Paint), or clear its field"
                 )
-        return Masks(found), tuple(warnings)
+        return Masks(masks), tuple(warnings)
 
     def read_or_last(self, name: str, depsgraph: bpy.types.Depsgraph) -> tuple[Mask | None, str]:
         """A mask, and a warning; if it cannot be used now, the one that was usable last."""
         try:
             mask = self.mask(name, depsgraph)
         except HairloomError as error:
-            known = self.last_usable.get(name)
-            if known is None or not self._fits(known):
+            last = self.last_usable.get(name)
+            if last is None or not self._fits(last):
                 return None, str(error)
-            return known, f"{error} Until then its last state is used"
+            return last, f"{error} Until then its last state is used"
         self.last_usable[name] = mask
         return mask, ""
 
@@ -146,8 +146,8 @@ class MaskReader:
 
     @property
     def _place(self) -> str:
-        named = self.surface or self.hair
-        return "hair" if named is None else str(named.name)
+        obj = self.surface or self.hair
+        return "hair" if obj is None else str(obj.name)
 
     def _fits(self, mask: Mask) -> bool:
         triangles = None if self.head is None else len(self.head.triangles)
@@ -226,8 +226,8 @@ class MaskReader:
         if drawn is not None and domain == "POINT":
             values = drawn.of(values)
         counts = np.diff(offsets)
-        is_known = self.curve_indices.max(initial=-1) < len(counts)
-        if not (is_known and np.array_equal(counts[self.curve_indices], strands.point_counts)):
+        exist = self.curve_indices.max(initial=-1) < len(counts)
+        if not (exist and np.array_equal(counts[self.curve_indices], strands.point_counts)):
             raise HairloomError(
                 f"the mask '{name}' belongs to other curves than those shown",
                 place=self.hair.name,
@@ -235,9 +235,9 @@ class MaskReader:
             )
         if domain == "CURVE":
             return values[self.curve_indices], domain
-        is_kept = np.zeros(len(counts), bool)
-        is_kept[self.curve_indices] = True
-        return values[np.repeat(is_kept, counts)], domain
+        is_used = np.zeros(len(counts), bool)
+        is_used[self.curve_indices] = True
+        return values[np.repeat(is_used, counts)], domain
 
     def _image_mask(self, name: str) -> ImageMask | None:
         return image_mask(name, self.head, self._place) if name in image_names() else None
@@ -246,13 +246,13 @@ class MaskReader:
         of_surface = None if self.surface is None else self.surface.data.attributes.get(name)
         if self.surface is not None and of_surface is not None:
             return missing_weights(self.surface, name, of_surface)
-        there = mask_choices(self.hair, self.surface)
+        choices = mask_choices(self.hair, self.surface)
         return HairloomError(
             f"it has neither a vertex group nor an attribute named '{name}', and there is no such"
             " image",
             place=self._place,
-            remedy=f"Use one of: {', '.join(there[:8])}"
-            if there
+            remedy=f"Use one of: {', '.join(choices[:8])}"
+            if choices
             else "Paint one (Weight Paint), or leave the field empty",
         )
 
@@ -331,8 +331,8 @@ def image_values(image: bpy.types.Image) -> Floats:
     pixels = pixels.reshape(height, width, channels)
     if channels < 3:
         return np.ascontiguousarray(pixels[..., 0])
-    found: Floats = pixels[..., :3] @ LUMINANCE
-    return found
+    luminance: Floats = pixels[..., :3] @ LUMINANCE
+    return luminance
 
 
 def checked_values(values: Floats, name: str, place: str) -> Floats:

@@ -55,7 +55,7 @@ def material_of(material: bpy.types.Material | None) -> MeshMaterial:
     node = _shader(material)
     if node is None:
         return MeshMaterial(_color(material.diffuse_color))
-    reader = _Reader(material)
+    reader = _MaterialReader(material)
     if node.type == "EMISSION":
         shining = reader.emission(node.inputs["Color"], node.inputs["Strength"])
         return MeshMaterial((0.0, 0.0, 0.0), 0.0, emission=shining, notes=tuple(reader.notes))
@@ -83,8 +83,8 @@ def material_of(material: bpy.types.Material | None) -> MeshMaterial:
 
 def material_notes(obj: bpy.types.Object) -> tuple[str, ...]:
     """Notes on what could not be read of an object's materials, each once."""
-    found = (material_of(slot.material).notes for slot in obj.material_slots)
-    return tuple(dict.fromkeys(note for notes in found for note in notes))
+    all_notes = (material_of(slot.material).notes for slot in obj.material_slots)
+    return tuple(dict.fromkeys(note for notes in all_notes for note in notes))
 
 
 def may_be_transparent(obj: bpy.types.Object) -> bool:
@@ -107,7 +107,7 @@ def _is_transparent(material: bpy.types.Material) -> bool:
     return alpha is not None and (_linked_node(alpha) is not None or alpha.default_value < 1.0)
 
 
-class _Reader:
+class _MaterialReader:
     """Reads one material and notes what it leaves out."""
 
     def __init__(self, material: bpy.types.Material) -> None:
@@ -117,31 +117,31 @@ class _Reader:
 
     def alpha(self, socket: bpy.types.NodeSocket, color: bpy.types.NodeSocket) -> float:
         """Its value; 1 if the alpha comes from the colour's own image."""
-        giver = _linked_node(socket)
-        if giver is None:
+        source = _linked_node(socket)
+        if source is None:
             return float(socket.default_value)
-        node, output = giver
+        node, output = source
         base = _linked_node(color)
         if node.type == "TEX_IMAGE" and output == "Alpha" and base is not None and base[0] == node:
             self.uses_alpha = True
         else:
-            self._leave_out("Alpha", "the alpha of the base colour's own picture")
+            self._note_unsupported("Alpha", "the alpha of the base colour's own picture")
         return 1.0
 
     def color(self, socket: bpy.types.NodeSocket) -> tuple[Floats | None, Color]:
         """The colour's image and its mean; without one, None and the value."""
-        giver = _linked_node(socket)
-        own = _color(socket.default_value)
-        if giver is None:
-            return None, own
-        node, output = giver
+        source = _linked_node(socket)
+        value = _color(socket.default_value)
+        if source is None:
+            return None, value
+        node, output = source
         if node.type == "RGB":
             return None, _color(node.outputs[0].default_value)
         if node.type != "TEX_IMAGE" or output != "Color":
-            self._leave_out(socket.name, "an Image Texture")
-            return None, own
+            self._note_unsupported(socket.name, "an Image Texture")
+            return None, value
         picture = self._picture(node.image, is_color=True)
-        return picture, own if picture is None else _mean(picture)
+        return picture, value if picture is None else _mean(picture)
 
     def emission(self, socket: bpy.types.NodeSocket, strength: bpy.types.NodeSocket) -> Color:
         """The emitted light, as one value; for an image, its mean."""
@@ -153,13 +153,13 @@ class _Reader:
 
     def normal(self, socket: bpy.types.NodeSocket) -> tuple[Floats | None, float]:
         """The normal map and its strength; None if the surface's own normals are used."""
-        giver = _linked_node(socket)
-        if giver is None:
+        source = _linked_node(socket)
+        if source is None:
             return None, 1.0
-        node, _ = giver
+        node, _ = source
         image = _linked_node(node.inputs["Color"]) if node.type == "NORMAL_MAP" else None
         if image is None or image[0].type != "TEX_IMAGE" or node.space != "TANGENT":
-            self._leave_out("Normal", "a Normal Map in tangent space with an Image Texture")
+            self._note_unsupported("Normal", "a Normal Map in tangent space with an Image Texture")
             return None, 1.0
         return self._picture(image[0].image, is_color=False), float(
             node.inputs["Strength"].default_value
@@ -170,10 +170,10 @@ class _Reader:
             return None
         kind = ("color" if self.uses_alpha else "opaque") if is_color else "normal"
         key, state = (image.session_uid, kind), _image_state(image)
-        known = _picture_cache.pop(key, None)
-        if known is not None and known[0] == state and not image.is_dirty:
-            _picture_cache[key] = known  # now the most recently used
-            return known[1]
+        cached = _picture_cache.pop(key, None)
+        if cached is not None and cached[0] == state and not image.is_dirty:
+            _picture_cache[key] = cached  # now the most recently used
+            return cached[1]
         try:
             picture = read_image(image, is_color=is_color, place=f"Image '{image.name}'")
         except HairloomError as error:
@@ -186,10 +186,10 @@ class _Reader:
             del _picture_cache[oldest]
         return picture
 
-    def _leave_out(self, what: str, known: str) -> None:
+    def _note_unsupported(self, what: str, supported: str) -> None:
         self.notes.append(
             f"{self._name}: {what} comes from unsupported nodes, so its own value was used. "
-            f"Supported are values, and {known}."
+            f"Supported are values, and {supported}."
         )
 
 
@@ -201,13 +201,13 @@ def clear_cache() -> None:
 def _image_state(image: bpy.types.Image) -> tuple[object, ...]:
     """A state that changes with the pixels; includes the file's modification time."""
     file = Path(bpy.path.abspath(image.filepath, library=image.library))
-    written = file.stat().st_mtime_ns if image.packed_file is None and file.is_file() else None
+    modified = file.stat().st_mtime_ns if image.packed_file is None and file.is_file() else None
     settings = image.colorspace_settings.name, image.alpha_mode
-    return (*image.size, image.filepath, written, *settings)
+    return (*image.size, image.filepath, modified, *settings)
 
 
 def _shader(material: bpy.types.Material) -> bpy.types.Node | None:
-    """The surface shader, if it is a known one."""
+    """The surface shader, if it is a supported one."""
     nodes = () if material.node_tree is None else material.node_tree.nodes
     for kind in ("BSDF_PRINCIPLED", "BSDF_DIFFUSE", "EMISSION"):
         for node in nodes:

@@ -44,10 +44,10 @@ def read_colors(
     if not name:
         return None, ()
     try:
-        found = painted_colors(head_of(hair), name, depsgraph, triangle_count, place=hair.name)
+        colors = painted_colors(head_of(hair), name, depsgraph, triangle_count, place=hair.name)
     except HairloomError as error:
         return None, (f"{error}. Until then the look's colour is used",)
-    return found, ()
+    return colors, ()
 
 
 def painted_colors(
@@ -75,20 +75,20 @@ def painted_colors(
         )
     with evaluated_mesh(surface, depsgraph, surface.name) as mesh:
         mesh.calc_loop_triangles()
-        found = _of_attribute(mesh, name, surface.name) or _of_image(mesh, name, surface.name)
-        there = len(mesh.loop_triangles)
-    if found is None:
+        colors = _of_attribute(mesh, name, surface.name) or _of_image(mesh, name, surface.name)
+        mesh_triangle_count = len(mesh.loop_triangles)
+    if colors is None:
         raise _missing(surface, name)
-    if there != triangle_count:
+    if mesh_triangle_count != triangle_count:
         raise HairloomError(
-            f"the colour map '{name}' covers {there:,} triangles, but the hair was made on "
-            f"{triangle_count:,}",
+            f"the colour map '{name}' covers {mesh_triangle_count:,} triangles, but the hair "
+            f"was made on {triangle_count:,}",
             place=surface.name,
             remedy="Turn on the modifiers that change the mesh, then show the hair",
         )
     if np.linalg.det(np.array(surface.evaluated_get(depsgraph).matrix_world)) < 0.0:
-        return found.mirrored()  # as triangles are, see `Surface.transformed`
-    return found
+        return colors.mirrored()  # as triangles are, see `Surface.transformed`
+    return colors
 
 
 def colors_of_curves(
@@ -109,13 +109,15 @@ def colors_of_curves(
     painted, notes = read_colors(hair, depsgraph, len(head.triangles))
     if painted is None:
         return None, notes
-    own = read_original_curves(hair, depsgraph)
-    strands = with_colors(bind_roots(own.strands, head, place=hair.name).strands, painted, look)
-    found = np.full((len(hair.data.curves), 4), -1.0, np.float32)
-    found[:, 3] = 1.0
+    cleaned = read_original_curves(hair, depsgraph)
+    strands = with_colors(bind_roots(cleaned.strands, head, place=hair.name).strands, painted, look)
+    colors = np.full((len(hair.data.curves), 4), -1.0, np.float32)
+    colors[:, 3] = 1.0
     if strands.color is not None:
-        found[own.kept, :3] = np.nan_to_num(strands.color[strands.offsets[:-1]], nan=-1.0)
-    return found, notes
+        colors[cleaned.curve_indices, :3] = np.nan_to_num(
+            strands.color[strands.offsets[:-1]], nan=-1.0
+        )
+    return colors, notes
 
 
 def _of_attribute(mesh: bpy.types.Mesh, name: str, place: str) -> SurfaceColor | None:
@@ -133,18 +135,18 @@ def _of_image(mesh: bpy.types.Mesh, name: str, place: str) -> ImageColor | None:
     image = checked_image(name, corner_uv, place, instead="a colour attribute")
     assert corner_uv is not None
     (width, height), channels = image.size, image.channels
-    meant = _decoder(image, place)
+    decode = _decoder(image, place)
     pixels = np.empty(width * height * channels, np.float32)
     image.pixels.foreach_get(pixels)
     if image.is_float:  # other images are stored as integers, which are always finite
         pixels = checked_values(pixels, name, place)
-    return ImageColor(pixels.reshape(height, width, channels), meant, corner_uv)
+    return ImageColor(pixels.reshape(height, width, channels), decode, corner_uv)
 
 
 def _decoder(image: bpy.types.Image, place: str) -> Callable[[Floats], Floats]:
     """The function from stored pixels to scene-linear premultiplied colours.
 
-    Pixels of float images are that already, whatever the colour space; others are as in the file.
+    Pixels of float images are so already, whatever the colour space; others are as in the file.
     """
     space, has_opacity = image.colorspace_settings.name, image.alpha_mode in ("STRAIGHT", "PREMUL")
     if image.is_float:
@@ -155,23 +157,23 @@ def _decoder(image: bpy.types.Image, place: str) -> Callable[[Floats], Floats]:
             place=place,
             remedy="Set its Color Space to sRGB (Image Editor > Sidebar > Image)",
         )
-    return partial(_decode, is_coded=space == "sRGB", has_opacity=has_opacity)
+    return partial(_decode, is_srgb=space == "sRGB", has_opacity=has_opacity)
 
 
-def _decode(stored: Floats, *, is_coded: bool, has_opacity: bool) -> Floats:
-    whole = _with_opacity(stored, has_opacity=has_opacity)
-    if is_coded:
-        whole[:, :3] = srgb_decoded(whole[:, :3])
-    return _premultiplied(whole)
+def _decode(stored: Floats, *, is_srgb: bool, has_opacity: bool) -> Floats:
+    rgba = _with_opacity(stored, has_opacity=has_opacity)
+    if is_srgb:
+        rgba[:, :3] = srgb_decoded(rgba[:, :3])
+    return _premultiplied(rgba)
 
 
 def _with_opacity(stored: Floats, *, has_opacity: bool) -> Floats:
     """Pixels (n, channels) as colours with an opacity, (n, 4)."""
-    whole = np.ones((len(stored), 4), np.float32)
-    whole[:, :3] = stored[:, :3] if stored.shape[1] >= 3 else stored[:, :1]
+    rgba = np.ones((len(stored), 4), np.float32)
+    rgba[:, :3] = stored[:, :3] if stored.shape[1] >= 3 else stored[:, :1]
     if has_opacity and stored.shape[1] == 4:
-        whole[:, 3] = np.minimum(stored[:, 3], 1.0)
-    return whole
+        rgba[:, 3] = np.minimum(stored[:, 3], 1.0)
+    return rgba
 
 
 def _premultiplied(values: Floats) -> Floats:
@@ -181,11 +183,11 @@ def _premultiplied(values: Floats) -> Floats:
 
 
 def _missing(surface: bpy.types.Object, name: str) -> HairloomError:
-    there = ", ".join(color_choices(surface)[:8])
+    choices = ", ".join(color_choices(surface)[:8])
     return HairloomError(
         f"it has no colour attribute named '{name}', and there is no such image",
         place=surface.name,
-        remedy=f"Use one of: {there}"
-        if there
+        remedy=f"Use one of: {choices}"
+        if choices
         else "Add one (Data > Color Attributes) and paint it (Vertex Paint), or clear Colour Map",
     )

@@ -51,23 +51,23 @@ def convert_particle_hair(
             bound = yield Part(f"Converting {strands.strand_count:,} strands", work)
             read.append((name, place, bound.strands, collection))
             dropped.update(cleaned.dropped)
-    made = []
+    hairs = []
     for name, place, strands, collection in read:
         system = mesh.particle_systems[name]
-        made.append(write_curves(place, strands, mesh, collection))
+        hairs.append(write_curves(place, strands, mesh, collection))
         slot = system.settings.material - 1  # counted from 1, even where the mesh has none
         if slot < len(mesh.material_slots):
-            made[-1].data.materials.append(mesh.material_slots[slot].material)
+            hairs[-1].data.materials.append(mesh.material_slots[slot].material)
         modifier = next(m for m in mesh.modifiers if getattr(m, "particle_system", None) == system)
         modifier.show_viewport = modifier.show_render = False
-    if not made:
+    if not hairs:
         raise HairloomError(
             "it has no particle hair that can be converted",
             place=mesh.name,
             remedy="Show it in the viewport (Particle System in Modifiers), or press Add Hair to "
             "grow some",
         )
-    return made, dict(dropped)
+    return hairs, dict(dropped)
 
 
 def _read(

@@ -14,7 +14,7 @@ from ..base.objects import head_of
 from .drawn_lines import pieces_of
 from .hair_collections import add_to_collection, objects_in, remove_from_collection
 
-_NONE = np.zeros((0, 2, 3), np.float32)
+_NO_LINES = np.zeros((0, 2, 3), np.float32)
 
 
 def partings_of(hair: bpy.types.Object) -> tuple[bpy.types.Object, ...]:
@@ -38,9 +38,9 @@ def _positioning_parents(
 ) -> Iterator[bpy.types.Object]:
     """The parents by which an artist moves a line over a head: not the head, and not what carries
     both."""
-    carriers = [] if head is None else [head, *_parents(head)]
+    head_parents = [] if head is None else [head, *_parents(head)]
     for each in _parents(line):
-        if each in carriers:
+        if each in head_parents:
             return
         if each.animation_data is None and not len(each.constraints):
             yield each
@@ -64,16 +64,16 @@ def _line_points(obj: bpy.types.Object) -> Floats:
     if obj.type == "MESH":
         places, edges = vertex_positions(obj.data), edge_vertices(obj.data)
         return np.concatenate([places.ravel(), edges.ravel()]).astype(np.float64)
-    found: list[float] = []
+    values: list[float] = []
     for spline in obj.data.splines if obj.type == "CURVE" else ():
         for point in spline.bezier_points:
             for place in (point.handle_left, point.co, point.handle_right):
-                found.extend(place)
+                values.extend(place)
         for point in spline.points:
-            found.extend(point.co)
-        found += (len(spline.points), len(spline.bezier_points), spline.type == "NURBS")
-        found += (spline.use_cyclic_u, spline.resolution_u, spline.order_u, spline.use_endpoint_u)
-    return np.array(found, np.float64)
+            values.extend(point.co)
+        values += (len(spline.points), len(spline.bezier_points), spline.type == "NURBS")
+        values += (spline.use_cyclic_u, spline.resolution_u, spline.order_u, spline.use_endpoint_u)
+    return np.array(values, np.float64)
 
 
 def read_partings(
@@ -84,13 +84,13 @@ def read_partings(
 
     The thickness of the lines, and whether they are hidden, do not matter.
     """
-    found, unusable = [_NONE], []
+    lines, unusable = [_NO_LINES], []
     for obj in partings_of(hair):
         try:
-            found.append(pieces_of(obj, depsgraph))
+            lines.append(pieces_of(obj, depsgraph))
         except HairloomError as error:
             unusable.append(str(error))
-    return np.concatenate(found), tuple(unusable)
+    return np.concatenate(lines), tuple(unusable)
 
 
 def add_partings(

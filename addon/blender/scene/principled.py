@@ -41,12 +41,12 @@ def has_principled_hair(hair: bpy.types.Object) -> bool:
 
 
 def look_from_material(
-    hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, before: ShadingSettings | None = None
+    hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, base: ShadingSettings | None = None
 ) -> tuple[ShadingSettings, tuple[str, ...]]:
     """Settings that look like its material, and notes on what could not be read.
 
     Args:
-        before: source of settings that have no equivalent in a material.
+        base: source of settings that have no equivalent in a material.
 
     Raises:
         HairloomError: there is no material with a Principled Hair.
@@ -60,7 +60,7 @@ def look_from_material(
             remedy="Give the hair a material with that node, or choose a preset",
         )
     values, notes = _values(node)
-    settings, more = settings_from(PrincipledHair(**values), before)
+    settings, more = settings_from(PrincipledHair(**values), base)
     if len({slot.material for slot in hair.material_slots} - {None}) > 1:
         more += (
             f"it has several materials; the look was taken from the active one, {material.name}",
@@ -68,7 +68,7 @@ def look_from_material(
     return settings, (*notes, *more)
 
 
-def look_from_named(name: str | None, before: Settings) -> tuple[ShadingSettings, tuple[str, ...]]:
+def look_from_named(name: str | None, base: Settings) -> tuple[ShadingSettings, tuple[str, ...]]:
     """`look_from_material` for a hair object of the open scene, by name.
 
     Raises:
@@ -81,8 +81,8 @@ def look_from_named(name: str | None, before: Settings) -> tuple[ShadingSettings
             place=f"--groom {name or ''}",
             remedy="Open a scene and name its hair curves with --groom",
         )
-    assert isinstance(before, ShadingSettings)
-    return look_from_material(hair, bpy.context.evaluated_depsgraph_get(), before)
+    assert isinstance(base, ShadingSettings)
+    return look_from_material(hair, bpy.context.evaluated_depsgraph_get(), base)
 
 
 def _node_of(material: bpy.types.Material) -> bpy.types.Node | None:
@@ -99,21 +99,21 @@ def _upstream_nodes(
     ends: list[bpy.types.Node], entered: set[bpy.types.NodeTree]
 ) -> Iterator[bpy.types.Node]:
     """These nodes and all nodes that feed them, nearest first, also those inside groups."""
-    waiting, seen = list(ends), set()
-    while waiting:
-        found = waiting.pop(0)
-        if found in seen or found.mute:
+    queue, visited = list(ends), set()
+    while queue:
+        node = queue.pop(0)
+        if node in visited or node.mute:
             continue
-        seen.add(found)
-        yield found
-        tree = found.node_tree if found.type == "GROUP" else None
+        visited.add(node)
+        yield node
+        tree = node.node_tree if node.type == "GROUP" else None
         if tree is not None and tree not in entered:
             entered.add(tree)
             outputs = (each for each in tree.nodes if each.type == "GROUP_OUTPUT")
             yield from _upstream_nodes(
-                [giver for each in outputs for giver in _linked_nodes(each)], entered
+                [source for each in outputs for source in _linked_nodes(each)], entered
             )
-        waiting += _linked_nodes(found)
+        queue += _linked_nodes(node)
 
 
 def _linked_nodes(node: bpy.types.Node) -> list[bpy.types.Node]:
@@ -140,5 +140,5 @@ def _constant(socket: bpy.types.NodeSocket) -> Any:
     """The input's own value, or that of a linked Value or RGB node; else None."""
     if not socket.links:
         return socket.default_value
-    giver = socket.links[0].from_node
-    return giver.outputs[0].default_value if giver.type in ("VALUE", "RGB") else None
+    source = socket.links[0].from_node
+    return source.outputs[0].default_value if source.type in ("VALUE", "RGB") else None

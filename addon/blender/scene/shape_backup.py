@@ -1,4 +1,4 @@
-"""Shapes of curves from before a tool, kept in attributes of their points to undo the tool."""
+"""Shapes of curves from before a tool, saved in attributes of their points to undo the tool."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ..base.objects import check_shape_editable
 from .curves import curve_offsets, curve_points, move_curves
 from .sag_correction import restore_sag_correction
 
-#: custom property of the curves: the attributes of their kept shapes, in the order of time
+#: custom property of the curves: the attributes of their saved shapes, the earliest first
 _ORDER = "hairloom_shape_backups"
 
 
@@ -41,8 +41,8 @@ class ShapeBackup:
         curves = hair.data
         if curves.get(self.result_digest) != digest(curve_points(curves).tobytes()):
             return None
-        kept: Floats | None = read_attribute(curves, self.attribute, "POINT", 3)
-        return kept
+        shape: Floats | None = read_attribute(curves, self.attribute, "POINT", 3)
+        return shape
 
     def save(self, hair: bpy.types.Object) -> None:
         """Store the shape, before the tool changes the curves.
@@ -60,8 +60,8 @@ class ShapeBackup:
         hair.data[self.result_digest] = digest(curve_points(hair.data).tobytes())
 
     def restore(self, hair: bpy.types.Object) -> bool:
-        """Restore the kept shape; curves that were drawn since stay as they are. Shapes that other
-        tools have kept since then are deleted, as they are later than the restored one.
+        """Restore the saved shape; curves that were drawn since do not change. Shapes that other
+        tools have saved since then are deleted, as they are later than the restored one.
 
         Returns whether other changes, made since the tool was used, were lost.
 
@@ -70,16 +70,16 @@ class ShapeBackup:
         """
         check_shape_editable(hair)
         curves, is_changed = hair.data, self.read_if_unchanged(hair) is None
-        kept = read_attribute(curves, self.attribute, "POINT", 3)
-        if kept is None:
+        shape = read_attribute(curves, self.attribute, "POINT", 3)
+        if shape is None:
             raise HairloomError(
                 "there is no earlier shape to restore",
                 place=hair.name,
                 remedy=f"Press {self.tool_label} first",
             )
         points, offsets = curve_points(curves), curve_offsets(curves)
-        is_known = np.repeat(_have_extent(kept, offsets), np.diff(offsets))
-        points[is_known] = kept[is_known]
+        has_backup = np.repeat(_have_extent(shape, offsets), np.diff(offsets))
+        points[has_backup] = shape[has_backup]
         move_curves(curves, points)
         order = _backup_order(curves)
         place = order.index(self.attribute) if self.attribute in order else len(order)
@@ -98,7 +98,7 @@ SHAPE_BACKUPS = (BEFORE_SETTLE, BEFORE_TRIM, BEFORE_FLOW)
 
 
 def _backup_order(curves: bpy.types.Curves) -> list[str]:
-    """The names of the attributes with kept shapes, the latest last."""
+    """The names of the attributes with saved shapes, the latest last."""
     return str(curves.get(_ORDER, "")).split()
 
 

@@ -47,7 +47,7 @@ class Source:
     holders: what holds the hair beside its roots, at rest.
     partings: the straight pieces of its partings, (n, 2, 3) [m] world space; None: there are none.
     parting_warnings: about objects that cannot be partings.
-    rest: the hair as it is stored, where it had to be put onto the posed head; else None.
+    rest: the hair as it is stored, if it had to be moved onto the posed head; else None.
     """
 
     strands: StrandSet
@@ -75,14 +75,14 @@ class Source:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        found = (
+        warnings = (
             self.head_warning,
             self.density_warning,
             *self.mask_warnings,
             *self.color_warnings,
             *self.parting_warnings,
         )
-        return tuple(filter(None, found))
+        return tuple(filter(None, warnings))
 
 
 def read_source(
@@ -100,13 +100,13 @@ def read_source(
     """
     read = usable_curves(hair, depsgraph)
     head, head_warning = _read_head(hair, depsgraph)
-    strands, rest = _on_head(hair, read.strands, head, depsgraph)
+    strands, rest = _posed_strands(hair, read.strands, head, depsgraph)
     mask_reader = MaskReader(
         hair,
         head_of(hair),
         head,
         strands,
-        read.kept,
+        read.curve_indices,
         {} if last_usable_masks is None else last_usable_masks,
     )
     density, density_warning = read_density(hair, mask_reader, depsgraph)
@@ -117,7 +117,7 @@ def read_source(
     return Source(
         strands,
         read.dropped,
-        read.kept,
+        read.curve_indices,
         head,
         density,
         masks,
@@ -132,13 +132,13 @@ def read_source(
     )
 
 
-def shown_curves(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Cleaned:
-    """Like `usable_curves`, on the head as it is posed."""
+def posed_curves(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Cleaned:
+    """Like `usable_curves`, on the posed head."""
     read, (head, _) = usable_curves(hair, depsgraph), _read_head(hair, depsgraph)
-    return replace(read, strands=_on_head(hair, read.strands, head, depsgraph)[0])
+    return replace(read, strands=_posed_strands(hair, read.strands, head, depsgraph)[0])
 
 
-def _on_head(
+def _posed_strands(
     hair: bpy.types.Object,
     strands: StrandSet,
     head: Surface | None,
@@ -151,8 +151,8 @@ def _on_head(
     rests, is_deformed_only = read_rest_surfaces(head_of(hair), depsgraph, head)
     # subdivision moves the surface too, but that is not a pose
     min_distance = DEFORMED if is_deformed_only else LOOSE_DISTANCE
-    found = RestHair.find(strands, rests, head, min_distance)
-    return (strands, None) if found is None else (found.on(head), found)
+    rest = RestHair.find(strands, rests, head, min_distance)
+    return (strands, None) if rest is None else (rest.on(head), rest)
 
 
 def read_source_colors(
@@ -162,8 +162,8 @@ def read_source_colors(
     depsgraph: bpy.types.Depsgraph,
 ) -> tuple[PaintedColor | None, tuple[str, ...]]:
     """The colours painted under hair, and all warnings about its colours."""
-    found, problems = read_colors(hair, depsgraph, None if head is None else len(head.triangles))
-    return found, (*problems, *color_notes(hair.name, strands))
+    colors, warnings = read_colors(hair, depsgraph, None if head is None else len(head.triangles))
+    return colors, (*warnings, *color_notes(hair.name, strands))
 
 
 def read_density(
@@ -192,7 +192,7 @@ def check_density(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Non
     if not name:
         return
     read, (head, _) = usable_curves(hair, depsgraph), _read_head(hair, depsgraph)
-    mask_reader = MaskReader(hair, head_of(hair), head, read.strands, read.kept)
+    mask_reader = MaskReader(hair, head_of(hair), head, read.strands, read.curve_indices)
     if head is not None and mask_reader.mask(name, depsgraph).is_zero:
         raise _no_density(name, mask_reader.surface)
 
@@ -224,11 +224,11 @@ def hair_dynamics_modifiers(hair: bpy.types.Object) -> list[bpy.types.Modifier]:
         and modifier.node_group is not None
         and modifier.node_group.name.startswith(_HAIR_DYNAMICS)
         and (modifier.show_viewport or modifier.show_render)
-        and ((mode := _mode(modifier)) is None or mode.value != _ATTACH_ONLY)
+        and ((mode := _mode_input(modifier)) is None or mode.value != _ATTACH_ONLY)
     ]
 
 
-def _mode(modifier: bpy.types.Modifier) -> Any:
+def _mode_input(modifier: bpy.types.Modifier) -> Any:
     """The input with the mode of Hair Dynamics; None in a group without one."""
     sockets = modifier.node_group.interface.items_tree
     found = [each for each in sockets if each.item_type == "SOCKET" and each.name == _MODE_INPUT]
@@ -265,7 +265,7 @@ def mute_hair_dynamics(hair: bpy.types.Object) -> int:
     mode are turned off. Returns how many were changed."""
     modifiers = hair_dynamics_modifiers(hair)
     for modifier in modifiers:
-        mode = _mode(modifier)
+        mode = _mode_input(modifier)
         if mode is None:
             modifier.show_viewport = modifier.show_render = False
         else:
@@ -276,7 +276,7 @@ def mute_hair_dynamics(hair: bpy.types.Object) -> int:
 
 
 def usable_curves(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Cleaned:
-    """Like `read_curves`, but no usable curve is an error.
+    """Like `read_curves`, but it is an error if no curve can be used.
 
     Raises:
         HairloomError: the object holds no hair curves, or none that can be used.

@@ -23,11 +23,11 @@ def read_strokes(
 ) -> tuple[tuple[Floats, ...], tuple[str, ...]]:
     """All strokes, each from its first point to its last, (m, 3) [m] world space; and notes on
     unusable ones."""
-    found: list[Floats] = []
+    strokes: list[Floats] = []
     unusable: list[str] = []
     for obj in strokes_of(hair):
         try:
-            found += joined_lines(obj, depsgraph)
+            strokes += joined_lines(obj, depsgraph)
         except HairloomError as error:
             unusable.append(str(error))
-    return tuple(found), tuple(unusable)
+    return tuple(strokes), tuple(unusable)

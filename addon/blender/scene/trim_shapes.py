@@ -49,14 +49,14 @@ def read_shapes(
     objects: tuple[bpy.types.Object, ...], depsgraph: bpy.types.Depsgraph
 ) -> tuple[tuple[Shape, ...], tuple[str, ...]]:
     """The shapes in world space, and notes on unusable objects."""
-    found: list[Shape] = []
+    shapes: list[Shape] = []
     unusable: list[str] = []
     for obj in objects:
         try:
-            found.append(read_shape(obj, depsgraph))
+            shapes.append(read_shape(obj, depsgraph))
         except HairloomError as error:
             unusable.append(str(error))
-    return tuple(found), tuple(unusable)
+    return tuple(shapes), tuple(unusable)
 
 
 def read_shape(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Shape:

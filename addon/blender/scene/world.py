@@ -79,17 +79,17 @@ def studio_environment(shading: bpy.types.View3DShading) -> Environment:
     light = shading.selected_studio_light if shading.type in ("MATERIAL", "RENDERED") else None
     if light is None or light.type != "WORLD":
         return Environment()
-    return _studio(light.path, shading.studiolight_rotate_z, shading.studiolight_intensity)
+    return _studio_light(light.path, shading.studiolight_rotate_z, shading.studiolight_intensity)
 
 
 @lru_cache(maxsize=8)
-def _studio(path: str, rotation: float, intensity: float) -> Environment:
+def _studio_light(path: str, rotation: float, intensity: float) -> Environment:
     panorama = _studio_panorama(path)
     if panorama is None:
         return Environment()
     # Blender turns the lookup direction, so the picture turns the other way
-    turn = np.array(Euler((0.0, 0.0, -rotation)).to_matrix())
-    return environment_of(intensity * panorama, turn)
+    matrix = np.array(Euler((0.0, 0.0, -rotation)).to_matrix())
+    return environment_of(intensity * panorama, matrix)
 
 
 @lru_cache(maxsize=4)
@@ -105,10 +105,10 @@ def _studio_panorama(path: str) -> Floats | None:
 def _read(world: bpy.types.World | None, *, blocking: bool) -> _WorldLight:
     if world is None:
         return _cached(None, lambda: _WorldLight(Environment()))
-    surface = _surface(world)
+    surface = _surface_node(world)
     if surface is None:
         return _plain_world(world)
-    picture = _picture(surface)
+    picture = _environment_texture(surface)
     if picture is not None:
         return picture
     if _is_plain(surface):
@@ -116,13 +116,13 @@ def _read(world: bpy.types.World | None, *, blocking: bool) -> _WorldLight:
     uid, key = world.original.session_uid, _key(world)
     if key not in _cache and not blocking:
         # while a sky is being edited, its last rendering is used until the new one is there
-        _request_render(uid, key, _colors(world))
+        _request_render(uid, key, _background_color(world))
         return _last_rendering(uid) or _plain_world(world)
 
     def render() -> _WorldLight:
         with tempfile.TemporaryDirectory(prefix="hairloom") as folder:
             _write(world, Path(folder))
-            return _render_panorama(Path(folder), world.name, _colors(world))
+            return _render_panorama(Path(folder), world.name, _background_color(world))
 
     return _cached(key, render)
 
@@ -141,8 +141,8 @@ def _request_render(uid: int, key: Hashable, plain: tuple[float, float, float]) 
     """Have the world with this session number rendered in the background."""
 
     def begin() -> Callable[[object], tuple[Hashable, _WorldLight]]:
-        found = (each for each in bpy.data.worlds if each.session_uid == uid)
-        world = next(found, None)
+        worlds = (each for each in bpy.data.worlds if each.session_uid == uid)
+        world = next(worlds, None)
         if world is None or world.node_tree is None:  # gone since, so the result is not used
             return lambda _: (key, _WorldLight(Environment(plain)))
         folder = tempfile.TemporaryDirectory(prefix="hairloom")
@@ -165,25 +165,25 @@ def _cached(key: Hashable, make: Callable[[], _WorldLight]) -> _WorldLight:
 
 def _plain_world(world: bpy.types.World) -> _WorldLight:
     """The colour of the Background, ignoring other nodes, or of a world without nodes."""
-    color = _colors(world)
+    color = _background_color(world)
     return _cached(("plain", color), lambda: _WorldLight(Environment(color)))
 
 
-def _colors(world: bpy.types.World) -> tuple[float, float, float]:
+def _background_color(world: bpy.types.World) -> tuple[float, float, float]:
     nodes = () if world.node_tree is None else world.node_tree.nodes
     node = next((each for each in nodes if each.type == "BACKGROUND" and not each.mute), None)
     if node is None:
         red, green, blue = world.color
         return (red, green, blue)
-    color, giver = node.inputs["Color"].default_value, _linked_node(node.inputs["Color"])
-    if giver is not None and giver.type == "RGB":
-        color = giver.outputs[0].default_value
+    color, source = node.inputs["Color"].default_value, _linked_node(node.inputs["Color"])
+    if source is not None and source.type == "RGB":
+        color = source.outputs[0].default_value
     strength = node.inputs["Strength"].default_value
     red, green, blue, *_ = (max(0.0, float(channel * strength)) for channel in color)
     return (red, green, blue)
 
 
-def _surface(world: bpy.types.World) -> bpy.types.Node | None:
+def _surface_node(world: bpy.types.World) -> bpy.types.Node | None:
     """The node linked to the world's output; None: there are no nodes, or none is linked."""
     if world.node_tree is None:
         return None
@@ -195,28 +195,28 @@ def _is_plain(surface: bpy.types.Node) -> bool:
     if surface.type != "BACKGROUND" or surface.mute or surface.inputs["Strength"].is_linked:
         return False
     color = surface.inputs["Color"]
-    giver = _linked_node(color)
-    return not color.is_linked or (giver is not None and giver.type == "RGB" and not giver.mute)
+    source = _linked_node(color)
+    return not color.is_linked or (source is not None and source.type == "RGB" and not source.mute)
 
 
-def _picture(surface: bpy.types.Node) -> _WorldLight | None:
+def _environment_texture(surface: bpy.types.Node) -> _WorldLight | None:
     """The world of an Environment Texture that is only turned and scaled in strength."""
     if surface.type != "BACKGROUND" or surface.mute or surface.inputs["Strength"].is_linked:
         return None
     node = _linked_node(surface.inputs["Color"])
     if node is None or node.type != "TEX_ENVIRONMENT" or node.mute or node.image is None:
         return None
-    turn = _rotation(node.inputs["Vector"])
+    rotation = _rotation(node.inputs["Vector"])
     is_file = node.image.source in ("FILE", "GENERATED")
-    if turn is None or node.projection != "EQUIRECTANGULAR" or not is_file:
+    if rotation is None or node.projection != "EQUIRECTANGULAR" or not is_file:
         return None
     image, strength = node.image, float(surface.inputs["Strength"].default_value)
     try:
         state = _image_state(image)
-        key = ("picture", state, strength, turn.tobytes())
+        key = ("picture", state, strength, rotation.tobytes())
         uid = image.original.session_uid
         return _cached(
-            key, lambda: _WorldLight(environment_of(strength * _panorama(uid, state), turn))
+            key, lambda: _WorldLight(environment_of(strength * _panorama(uid, state), rotation))
         )
     except HairloomError as error:
         note = f"World: {error} Until then it is black."
@@ -224,7 +224,7 @@ def _picture(surface: bpy.types.Node) -> _WorldLight | None:
 
 
 def _rotation(socket: bpy.types.NodeSocket) -> Floats | None:
-    """The rotation from a panorama's directions to the world's, (3, 3); None: it is not one."""
+    """The rotation from a panorama's directions to the world's, (3, 3); None: it is no rotation."""
     if not socket.is_linked:
         return np.eye(3)
     node, output = socket.links[0].from_node, socket.links[0].from_socket
@@ -238,8 +238,8 @@ def _rotation(socket: bpy.types.NodeSocket) -> Floats | None:
     before = _rotation(node.inputs["Vector"])
     if moves or is_scaled or before is None or node.vector_type == "NORMAL":
         return None
-    own = np.array(Euler(values["Rotation"], "XYZ").to_matrix())
-    return before @ (own if node.vector_type == "TEXTURE" else own.T)
+    rotation = np.array(Euler(values["Rotation"], "XYZ").to_matrix())
+    return before @ (rotation if node.vector_type == "TEXTURE" else rotation.T)
 
 
 def _linked_node(socket: bpy.types.NodeSocket) -> bpy.types.Node | None:
@@ -255,9 +255,9 @@ def _linked_node(socket: bpy.types.NodeSocket) -> bpy.types.Node | None:
 def _image_state(image: bpy.types.Image) -> Hashable:
     """A state that is equal while the pixels are."""
     path = bpy.path.abspath(image.filepath, library=image.library)
-    written = os.path.getmtime(path) if os.path.isfile(path) else 0.0
+    modified = os.path.getmtime(path) if os.path.isfile(path) else 0.0
     packed = 0 if image.packed_file is None else image.packed_file.size
-    file = image.original.session_uid, path, written, packed
+    file = image.original.session_uid, path, modified, packed
     state = (*file, *image.size, image.colorspace_settings.name)
     if not image.is_dirty:
         return state
@@ -298,12 +298,12 @@ def _state(tree: bpy.types.NodeTree, depth: int = 0) -> Hashable:
 
 
 def _node_state(node: bpy.types.Node, depth: int) -> tuple[Hashable, ...]:
-    own = (
+    names = (
         each.identifier
         for each in node.bl_rna.properties
         if each.identifier not in _IGNORED_PROPERTIES
     )
-    values = tuple((name, _value(getattr(node, name), depth)) for name in own)
+    values = tuple((name, _value(getattr(node, name), depth)) for name in names)
     inputs = tuple(_value(getattr(each, "default_value", None), depth) for each in node.inputs)
     outputs = tuple(_value(getattr(each, "default_value", None), depth) for each in node.outputs)
     return node.bl_idname, values, inputs, outputs
@@ -348,16 +348,16 @@ def _render_panorama(folder: Path, name: str, plain: tuple[float, float, float])
     files = str(folder / "world.blend"), str(panorama)
     try:
         command = [*program, str(_SCRIPT), "--", *files]
-        done = run_child(command, seconds=_TIMEOUT, environment=settings)
-        if done.returncode == 0:
+        process = run_child(command, seconds=_TIMEOUT, environment=settings)
+        if process.returncode == 0:
             return _WorldLight(environment_of(_rgb(read_texture(panorama, is_color=True))))
-        lines = done.stderr.decode(errors="replace").strip().splitlines()
-        why = lines[-1] if lines else f"it exited with code {done.returncode}"
+        lines = process.stderr.decode(errors="replace").strip().splitlines()
+        reason = lines[-1] if lines else f"it exited with code {process.returncode}"
     except (OSError, TimeoutExpired, HairloomError) as error:
-        why = str(error)
+        reason = str(error)
     note = (
-        f"World '{name}': another Blender could not render its nodes ({why}), so its plain colour "
-        "lights hair. Use only an Environment Texture, a Mapping and a Background."
+        f"World '{name}': another Blender could not render its nodes ({reason}), so its plain "
+        "colour lights hair. Use only an Environment Texture, a Mapping and a Background."
     )
     return _WorldLight(Environment(plain), note)
 
@@ -374,9 +374,9 @@ def _render_in_thread(
 
 def _take_result() -> None:
     """Take a world rendered in the background, and have worlds read again."""
-    found = _job.take()
-    if found is not None:
-        key, read = found
+    result = _job.take()
+    if result is not None:
+        key, read = result
         _cached(key, lambda: read)
     for scene in bpy.data.scenes:
         if scene.world is not None:

@@ -206,7 +206,9 @@ class GroomSource:
             strands = strands.with_points(before.strands.points)  # they differ in each frame
         if _is_same_hair(strands, before.strands, back):
             strands, rest = before.strands, before.rest
-        mask_reader = self._mask_reader(replace(before, strands=strands, curve_indices=read.kept))
+        mask_reader = self._mask_reader(
+            replace(before, strands=strands, curve_indices=read.curve_indices)
+        )
         self._read_motion_masks(mask_reader, settings, depsgraph)
         density, warning = read_density(hair, mask_reader, depsgraph)
         masks, mask_warnings = mask_reader.masks(settings[ChildrenSettings], depsgraph)
@@ -224,7 +226,7 @@ class GroomSource:
             strands=strands,
             rest=rest,
             dropped=read.dropped,
-            curve_indices=read.kept,
+            curve_indices=read.curve_indices,
             density=density,
             density_warning=warning,
             masks=masks,

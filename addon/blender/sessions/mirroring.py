@@ -20,7 +20,7 @@ from ..base.objects import head_of, matrix_of
 from ..base.outcome import Outcome
 from ..base.parts import Part, Parts
 from ..colliders.fields import head_field_of
-from ..scene.curves import curve_offsets, curve_points, put_points, read_original_curves
+from ..scene.curves import curve_offsets, curve_points, read_original_curves, set_points
 from ..scene.groom_attributes import CLOSEST_GUIDES, GUIDE, STRAND_ID
 from ..scene.shape_backup import SHAPE_BACKUPS
 from .combing import surface_to_comb_on
@@ -60,13 +60,13 @@ def mirror_hair(
         f"Mirroring {len(source):,} curves",
         lambda: _led_out(mirror_strands(own.strands.take(source), surface, across), surface),
     )
-    replaced = own.kept[side < 0]
+    replaced = own.curve_indices[side < 0]
     unchanged = [shape for shape in SHAPE_BACKUPS if shape.read_if_unchanged(hair) is not None]
     hair_frame = matrix_of(hair, depsgraph)
     to_own = np.linalg.inv(hair_frame)
     _replace(
         hair.data,
-        own.kept[source],
+        own.curve_indices[source],
         replaced,
         made,
         to_own,
@@ -137,7 +137,7 @@ def _replace(
         uv = np.zeros((len(curves.curves), 2), np.float32) if uv is None else uv
         uv[new_curves] = made.strands.root_uv
         set_attribute(curves, "surface_uv_coordinate", "CURVE", uv)
-    put_points(curves, points)
+    set_points(curves, points)
     _assign_ids(curves, source, new_curves, gone)
 
 

@@ -71,7 +71,7 @@ def settle_hair(
     dynamics, pose = source.settings[DynamicsSettings], source.pose(rig, depsgraph)
     posed, warnings = _colliders(hair, source, rig, dynamics, depsgraph)
     mask_reader = MaskReader(
-        hair, head_of(hair), read.head, strands, own.kept, is_before_modifiers=True
+        hair, head_of(hair), read.head, strands, own.curve_indices, is_before_modifiers=True
     )
     masks, notes = mask_reader.masks(dynamics, depsgraph)
     warnings += tuple(note for note in notes if note not in warnings)

@@ -221,7 +221,7 @@ def fit_model() -> FitModel:
 def _skin(positions: Floats) -> Surface:
     """The built-in head without its eyes, with other vertex positions."""
     bust = load_bust()
-    corners, material = bust.fans
+    corners, material = bust.triangulated
     corners = corners[material == SKIN]
     return Surface(positions, bust.corner_vertex[corners], bust.uv[bust.corner_uv[corners]])
 

@@ -36,7 +36,7 @@ from ..properties.properties import settings_of
 from ..scene.bust import bust_object, encoded_skin_picture
 from ..scene.bust_data import load_bust
 from ..scene.curves import read_curves, write_curves
-from ..scene.hair_material import put_look_material
+from ..scene.hair_material import set_look_material
 from ..scene.hair_nodes import add_hair_nodes
 from ..scene.surfaces import read_surface
 from ..strands.growing import replace_curves
@@ -200,7 +200,7 @@ def add_hairstyle(
         warnings = (*growth.warnings, *_remove_curves_inside(hair, growth))
     hair.hairloom.children_density = masks.get("children", "")
     hair.hairloom.hairstyle = style.name
-    put_look_material(
+    set_look_material(
         hair.data, wet_and_dusty_look(settings_of(hair.data.hairloom.shading, ShadingSettings))
     )
     done = _add_groups_and_landmarks(growth, head, collection)

@@ -17,7 +17,7 @@ from ..base.parts import Part, Parts
 from ..properties.presets import apply, named_preset
 from ..properties.properties import settings_of
 from ..scene.curves import read_curves
-from ..scene.hair_material import put_look_material
+from ..scene.hair_material import set_look_material
 from ..scene.principled import has_principled_hair, look_from_material
 from ..scene.source import mute_hair_dynamics
 from ..scene.surfaces import read_positions
@@ -108,7 +108,7 @@ def new_groom(
     )
     apply_presets(hair, presets)
     fit_motion(hair, factor)
-    put_look_material(
+    set_look_material(
         hair.data, wet_and_dusty_look(settings_of(hair.data.hairloom.shading, ShadingSettings))
     )
     return hair

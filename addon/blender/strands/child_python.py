@@ -45,15 +45,15 @@ def find_python() -> tuple[str, ...] | None:
             call its files are in memory.
     """
     loaded = [module for name, module in _PACKAGES.items() if importlib.util.find_spec(name)]
-    too_slow: TimeoutExpired | None = None
+    timeout: TimeoutExpired | None = None
     for program in _programs():
         try:
             if _can_import(python_program(program), loaded):
                 return python_program(program)
         except TimeoutExpired as error:
-            too_slow = error
-    if too_slow is not None:
-        raise too_slow
+            timeout = error
+    if timeout is not None:
+        raise timeout
     return None
 
 

@@ -36,10 +36,10 @@ class ExportCheck:
     hair: list[Handle]
     lines: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
-    _read: dict[ExportRequest, tuple[Groom, tuple[str, ...]]] = field(default_factory=dict)
+    _grooms: dict[ExportRequest, tuple[Groom, tuple[str, ...]]] = field(default_factory=dict)
     _cached_rigs: dict[int, CachedRig] = field(default_factory=dict)
-    _stale: dict[int, tuple[str, ...]] = field(default_factory=dict)
-    _checked: tuple[StrandFormat, StrandExportSettings] | None = None
+    _changed_inputs: dict[int, tuple[str, ...]] = field(default_factory=dict)
+    _last_options: tuple[StrandFormat, StrandExportSettings] | None = None
 
     @classmethod
     def of(
@@ -88,9 +88,9 @@ class ExportCheck:
         settings: StrandExportSettings,
     ) -> bool:
         """Check for a format and settings; returns whether the result may have changed."""
-        if self._checked == (kind, settings):
+        if self._last_options == (kind, settings):
             return False
-        if self._checked is None:
+        if self._last_options is None:
             self._find_stale_bakes(depsgraph)
         try:
             groom, notes = self._groom(depsgraph, request_of(kind, settings))
@@ -99,7 +99,7 @@ class ExportCheck:
             self.lines, self.warnings = [], [str(error)]
         else:
             self.lines, self.warnings = check_lines(facts), [*notes, *facts["warnings"]]
-        self._checked = kind, settings
+        self._last_options = kind, settings
         return True
 
     def motion_lines(self, *, use_bake: bool) -> list[str]:
@@ -110,18 +110,20 @@ class ExportCheck:
     def _groom(
         self, depsgraph: bpy.types.Depsgraph, request: ExportRequest
     ) -> tuple[Groom, tuple[str, ...]]:
-        if request not in self._read:
+        if request not in self._grooms:
             found = [hair for hair in (each.find() for each in self.hair) if hair is not None]
             if not found:
                 raise HairloomError("it is gone", place="hair", remedy="Export again")
-            outs = [read_still_hair(each, depsgraph, request, self.cached_rigs) for each in found]
-            for each, out in zip(found, outs, strict=True):
-                if out.made is not None:
-                    self._cached_rigs[each.session_uid] = out.made
-            groom, lost = join_grooms([out.groom for out in outs], found[0].name)
-            notes = dict.fromkeys([note for out in outs for note in out.notes])
-            self._read[request] = groom, (*notes, *lost)
-        return self._read[request]
+            exports = [
+                read_still_hair(each, depsgraph, request, self.cached_rigs) for each in found
+            ]
+            for each, export in zip(found, exports, strict=True):
+                if export.cached_rig is not None:
+                    self._cached_rigs[each.session_uid] = export.cached_rig
+            groom, lost = join_grooms([export.groom for export in exports], found[0].name)
+            notes = dict.fromkeys([note for export in exports for note in export.notes])
+            self._grooms[request] = groom, (*notes, *lost)
+        return self._grooms[request]
 
     def _motion_source(self, hair: bpy.types.Object, use_bake: bool) -> str:
         try:
@@ -132,7 +134,7 @@ class ExportCheck:
             return error.problem
         facts = cache.facts
         line = f"bake of frames {facts.first} to {facts.last} at {facts.frame_rate:g} fps"
-        changed = self._stale.get(hair.session_uid, ())
+        changed = self._changed_inputs.get(hair.session_uid, ())
         return f"{line}, out of date ({', '.join(changed)})" if changed else line
 
     def _find_stale_bakes(self, depsgraph: bpy.types.Depsgraph) -> None:
@@ -143,4 +145,4 @@ class ExportCheck:
                 changed = () if cache is None else changed_inputs(hair, cache, depsgraph)
             except HairloomError:  # reported by `motion_lines`, and when the file is written
                 changed = ()
-            self._stale[hair.session_uid] = changed
+            self._changed_inputs[hair.session_uid] = changed

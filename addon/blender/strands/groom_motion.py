@@ -23,7 +23,7 @@ from ..bakes.stale_bakes import stale_notes
 from ..base.objects import Body, Handle, head_of
 from ..base.suspension import suspended
 from ..colliders.rigs import CachedRig
-from ..scene.source import shown_curves
+from ..scene.source import posed_curves
 from ..scene.surfaces import read_positions
 from .read_hair import ExportRequest, ExportStrands, read_baked_hair, read_still_hair
 
@@ -32,11 +32,11 @@ class MovingHair(Protocol):
     """One hair in a file, at all frames.
 
     rate: frames per second.
-    needs_scene: whether the scene must be at a frame before `at` is called for it.
+    needs_scene: whether the scene must be at a frame before `positions_at` is called for it.
     """
 
     @property
-    def out(self) -> ExportStrands: ...
+    def export(self) -> ExportStrands: ...
 
     @property
     def rate(self) -> float: ...
@@ -44,15 +44,15 @@ class MovingHair(Protocol):
     @property
     def needs_scene(self) -> bool: ...
 
-    def at(self, frame: int, depsgraph: bpy.types.Depsgraph) -> Floats:
-        """The points of the strands in `out.seen`, (point_count, 3) [m]."""
+    def positions_at(self, frame: int, depsgraph: bpy.types.Depsgraph) -> Floats:
+        """The points of the strands in `export.strands`, (point_count, 3) [m]."""
 
 
 @dataclass(frozen=True)
 class BakedMotion:
     """Hair that is moved by its bake."""
 
-    out: ExportStrands
+    export: ExportStrands
     cache: Cache
     needs_scene: bool = False
 
@@ -60,22 +60,22 @@ class BakedMotion:
     def rate(self) -> float:
         return self.cache.facts.frame_rate
 
-    def at(self, frame: int, _depsgraph: bpy.types.Depsgraph) -> Floats:
+    def positions_at(self, frame: int, _depsgraph: bpy.types.Depsgraph) -> Floats:
         return playback.strands_in(self.cache, frame)
 
 
 @dataclass(frozen=True)
-class ShownMotion:
+class EvaluatedMotion:
     """Hair that modifiers and animation move, read again in each frame."""
 
-    out: ExportStrands
+    export: ExportStrands
     hair: Handle
     rate: float
     needs_scene: bool = True
 
-    def at(self, frame: int, depsgraph: bpy.types.Depsgraph) -> Floats:
-        read = shown_curves(self.hair.resolve("Export again"), depsgraph).strands
-        if not np.array_equal(read.offsets, self.out.seen.offsets):
+    def positions_at(self, frame: int, depsgraph: bpy.types.Depsgraph) -> Floats:
+        read = posed_curves(self.hair.resolve("Export again"), depsgraph).strands
+        if not np.array_equal(read.offsets, self.export.strands.offsets):
             raise _other_curves(self.hair, frame)
         return read.points
 
@@ -89,7 +89,7 @@ class ChildrenMotion:
     body: the object that carries the roots.
     """
 
-    out: ExportStrands
+    export: ExportStrands
     hair: Handle
     rate: float
     rig: Rig
@@ -98,8 +98,8 @@ class ChildrenMotion:
     body: Body
     needs_scene: bool = True
 
-    def at(self, frame: int, depsgraph: bpy.types.Depsgraph) -> Floats:
-        read = shown_curves(self.hair.resolve("Export again"), depsgraph).strands
+    def positions_at(self, frame: int, depsgraph: bpy.types.Depsgraph) -> Floats:
+        read = posed_curves(self.hair.resolve("Export again"), depsgraph).strands
         if read.strand_count != self.count:
             raise _other_curves(self.hair, frame)
         now = center_lines(read.take(self.guides), self.rig.guide_grid.shape[1]).grid
@@ -136,12 +136,12 @@ def moving_hair(
         motion = BakedMotion(read_baked_hair(hair, depsgraph, cache, request), cache)
         return motion, stale_notes(hair, cache, depsgraph)
     rate = frame_rate(depsgraph.scene)
-    with _scene_frame_restored() as go_to:
-        depsgraph = go_to(frames[0])
-        out = read_still_hair(hair, depsgraph, request, cached_rigs)
-        moving: MovingHair = ShownMotion(out, Handle.of(hair), rate)
-        if out.has_children and out.made is not None:
-            moving = _children_motion(hair, depsgraph, out, out.made, rate)
+    with _preserving_frame() as set_frame:
+        depsgraph = set_frame(frames[0])
+        export = read_still_hair(hair, depsgraph, request, cached_rigs)
+        moving: MovingHair = EvaluatedMotion(export, Handle.of(hair), rate)
+        if export.has_children and export.cached_rig is not None:
+            moving = _children_motion(hair, depsgraph, export, export.cached_rig, rate)
     notes: tuple[str, ...] = ()
     if use_bake:
         notes = (
@@ -160,7 +160,7 @@ def common_rate(parts: Sequence[MovingHair]) -> float:
     rates = {part.rate for part in parts}
     if len(rates) > 1:
         listed = " and ".join(f"{rate:g}" for rate in sorted(rates))
-        names = ", ".join(part.out.groom.name for part in parts)
+        names = ", ".join(part.export.groom.name for part in parts)
         raise HairloomError(
             f"this hair has different frame rates, {listed}",
             place=names,
@@ -172,55 +172,58 @@ def common_rate(parts: Sequence[MovingHair]) -> float:
 def frame_positions(parts: Sequence[MovingHair], frames: range) -> Generator[Floats]:
     """The points of all parts, one after the other, in each frame.
 
-    Leaves the scene at the frame where it was, also if the generator is closed before its end.
+    The scene's frame is restored afterwards, also if the generator is closed before its end.
 
     Raises:
         HairloomError: hair is gone, or has other curves than in the first frame.
     """
     needs_scene = any(part.needs_scene for part in parts)
-    with _scene_frame_restored() as go_to:
+    with _preserving_frame() as set_frame:
         for frame in frames:
-            depsgraph = go_to(frame) if needs_scene else bpy.context.evaluated_depsgraph_get()
-            yield np.concatenate([part.out.points(part.at(frame, depsgraph)) for part in parts])
+            depsgraph = set_frame(frame) if needs_scene else bpy.context.evaluated_depsgraph_get()
+            positions = (part.positions_at(frame, depsgraph) for part in parts)
+            yield np.concatenate(
+                [part.export.points(each) for part, each in zip(parts, positions, strict=True)]
+            )
 
 
 @contextmanager
-def _scene_frame_restored() -> Iterator[Callable[[int], bpy.types.Depsgraph]]:
+def _preserving_frame() -> Iterator[Callable[[int], bpy.types.Depsgraph]]:
     """A function that brings the scene to a frame; at the end, the scene returns to its frame."""
     scene = bpy.context.scene
-    shown, subframe, has_gone = scene.frame_current, scene.frame_subframe, False
+    original, subframe, has_moved = scene.frame_current, scene.frame_subframe, False
 
-    def go_to(frame: int) -> bpy.types.Depsgraph:
-        nonlocal has_gone
-        has_gone = True
+    def set_frame(frame: int) -> bpy.types.Depsgraph:
+        nonlocal has_moved
+        has_moved = True
         with suspended():
             scene.frame_set(frame)
         return bpy.context.evaluated_depsgraph_get()
 
     try:
-        yield go_to
+        yield set_frame
     finally:
-        if has_gone:
+        if has_moved:
             with suspended():
-                scene.frame_set(shown, subframe=subframe)
+                scene.frame_set(original, subframe=subframe)
 
 
 def _children_motion(
     hair: bpy.types.Object,
     depsgraph: bpy.types.Depsgraph,
-    out: ExportStrands,
-    made: CachedRig,
+    export: ExportStrands,
+    cached_rig: CachedRig,
     rate: float,
 ) -> ChildrenMotion:
-    rig, head = made.rig, head_of(hair)
+    rig, head = cached_rig.rig, head_of(hair)
     body = hair if head is None or rig.head is None else head
     return ChildrenMotion(
-        out,
+        export,
         Handle.of(hair),
         rate,
         rig,
         rig.guides,
-        made.source.strands.strand_count,
+        cached_rig.source.strands.strand_count,
         Body.at_rest(body, depsgraph),
     )
 

@@ -1,7 +1,7 @@
 """Grows hair on a mesh, and again when its settings are edited, unless the hair was combed.
 
 The settings are stored in the groom, with a digest of the curves that they made: curves follow an
-edit of the settings only if they are still as they grew.
+edit of the settings only if nothing has changed them since they grew.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from ..scene.sag_correction import restore_sag_correction
 from ..scene.surfaces import read_surface
 
 #: attributes of hair as it grows
-_OWN_ATTRIBUTES = ("position", "radius", "surface_uv_coordinate")
+_GROWN_ATTRIBUTES = ("position", "radius", "surface_uv_coordinate")
 
 
 def grow_on(
@@ -60,10 +60,10 @@ def grow_on(
     settings = settings_of(values, GrowSettings)
     strands = yield from _grow_steps(head, depsgraph, settings, density_group, length_group)
     hair = write_curves(f"{head.name} Hair", strands, head, collection, are_widths_estimated=True)
-    own = hair.data.hairloom.grow
+    growth = hair.data.hairloom.grow
     for name, value in settings.as_dict().items():
-        setattr(own, name, value)
-    own.density_group, own.length_group = density_group, length_group
+        setattr(growth, name, value)
+    growth.density_group, growth.length_group = density_group, length_group
     _store_digests(hair.data)
     return hair
 
@@ -75,10 +75,10 @@ def grow_again(grooms: Sequence[bpy.types.Object], depsgraph: bpy.types.Depsgrap
         HairloomError: some hair has no mesh to grow on, is linked from another file, or Blender
             does not evaluate it or its head; or as `grow_on`. Nothing is changed then.
     """
-    made = []
+    results = []
     for hair in grooms:
-        made.append((yield from _grow_again_steps(hair, depsgraph)))
-    for hair, strands in zip(grooms, made, strict=True):
+        results.append((yield from _grow_again_steps(hair, depsgraph)))
+    for hair, strands in zip(grooms, results, strict=True):
         replace_curves(hair, strands, depsgraph)
         hair.data.hairloom.grow.problem = ""
         _store_digests(hair.data)
@@ -86,7 +86,7 @@ def grow_again(grooms: Sequence[bpy.types.Object], depsgraph: bpy.types.Depsgrap
 
 def _grow_again_steps(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Parts[StrandSet]:
     check_curves_editable(hair, depsgraph)
-    head, own = head_of(hair), hair.data.hairloom.grow
+    head, growth = head_of(hair), hair.data.hairloom.grow
     if head is None:
         raise HairloomError(
             "it has no surface to grow on",
@@ -105,9 +105,9 @@ def _grow_again_steps(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) ->
         yield from _grow_steps(
             head,
             depsgraph,
-            settings_of(own, GrowSettings),
-            own.density_group,
-            own.length_group,
+            settings_of(growth, GrowSettings),
+            growth.density_group,
+            growth.length_group,
             replaced_hair=hair,
         )
     )
@@ -119,12 +119,12 @@ def replace_curves(
     """Give hair other curves, in world space. All attributes of the old curves are lost, except the
     colours that its material reads, which are made again."""
     curves = hair.data
-    back = np.linalg.inv(matrix_of(hair, depsgraph))
+    to_object = np.linalg.inv(matrix_of(hair, depsgraph))
     has_colors = MATERIAL_COLOR in curves.attributes
     curves.remove_curves()
-    for name in set(curves.attributes.keys()).difference(_OWN_ATTRIBUTES):
+    for name in set(curves.attributes.keys()).difference(_GROWN_ATTRIBUTES):
         curves.attributes.remove(curves.attributes[name])
-    fill_curves(curves, strands.transformed(back))
+    fill_curves(curves, strands.transformed(to_object))
     curves.update_tag()
     restore_sag_correction(curves)
     if has_colors:
@@ -134,8 +134,12 @@ def replace_curves(
 def grow_after_edit(curves: bpy.types.ID) -> None:
     """After a setting of growth was edited, grow hair again that is still as it grew."""
     assert isinstance(curves, bpy.types.Curves)
-    own = curves.hairloom.grow
-    if not curves.is_editable or own.made_by == _settings_digest(own) or lost_by_growing(curves):
+    growth = curves.hairloom.grow
+    if (
+        not curves.is_editable
+        or growth.made_by == _settings_digest(growth)
+        or lost_by_regrowing(curves)
+    ):
         return
     users = [obj for obj in objects_using(curves) if head_of(obj) is not None]
     depsgraph = bpy.context.evaluated_depsgraph_get()
@@ -144,15 +148,15 @@ def grow_after_edit(curves: bpy.types.ID) -> None:
         if users:
             run_parts(grow_again(users[:1], depsgraph))
     except HairloomError as error:  # shown in the panel; the artist may not have finished editing
-        own.problem = str(error)
+        growth.problem = str(error)
 
 
-def lost_by_growing(curves: bpy.types.Curves) -> tuple[str, ...]:
+def lost_by_regrowing(curves: bpy.types.Curves) -> tuple[str, ...]:
     """What growing again would lose, in a few words each; empty: curves follow their settings."""
-    own = curves.hairloom.grow
-    if not own.shape:
+    growth = curves.hairloom.grow
+    if not growth.shape:
         return (f"{len(curves.curves):,} curves",) if len(curves.curves) else ()
-    is_combed = own.shape != _shape_digest(curves)
+    is_combed = growth.shape != _shape_digest(curves)
     return (*(("combed shape",) if is_combed else ()), *_other_attributes(curves))
 
 
@@ -163,8 +167,8 @@ def has_grown(curves: bpy.types.Curves) -> bool:
 
 def is_outdated(curves: bpy.types.Curves) -> bool:
     """Whether the settings have changed since the curves grew."""
-    own = curves.hairloom.grow
-    return bool(own.made_by != _settings_digest(own))
+    growth = curves.hairloom.grow
+    return bool(growth.made_by != _settings_digest(growth))
 
 
 def _grow_steps(
@@ -192,9 +196,9 @@ def _grow_steps(
         )
 
     def work() -> StrandSet:
-        by_default = density is None and settings.method == "combed"
-        dense = surface.compute_once(scalp_density) if by_default else density
-        return _with_widths(grow(surface, settings, dense, length), radius, offsets)
+        uses_scalp = density is None and settings.method == "combed"
+        density_or_scalp = surface.compute_once(scalp_density) if uses_scalp else density
+        return _with_widths(grow(surface, settings, density_or_scalp, length), radius, offsets)
 
     return (yield Part(f"Growing {settings.strand_count:,} strands", work))
 
@@ -205,8 +209,8 @@ def _is_evaluated(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool
 
 def _radius_in_world(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats | None:
     """Radii of the points of its curves, (point_count,) [m]; None: they have no widths."""
-    own: Floats | None = read_attribute(hair.data, "radius", "POINT")
-    return None if own is None else own * np.float32(mean_scale(matrix_of(hair, depsgraph)))
+    radius: Floats | None = read_attribute(hair.data, "radius", "POINT")
+    return None if radius is None else radius * np.float32(mean_scale(matrix_of(hair, depsgraph)))
 
 
 def _with_widths(strands: StrandSet, radius: Floats | None, offsets: Ints) -> StrandSet:
@@ -224,14 +228,14 @@ def _other_attributes(curves: bpy.types.Curves) -> tuple[str, ...]:
     with a dot in Blender.
     """
     names = (attribute.name for attribute in curves.attributes)
-    own = (*_OWN_ATTRIBUTES, MATERIAL_COLOR)
-    return tuple(n for n in names if n not in own and not n.startswith("."))
+    ours = (*_GROWN_ATTRIBUTES, MATERIAL_COLOR)
+    return tuple(n for n in names if n not in ours and not n.startswith("."))
 
 
 def _store_digests(curves: bpy.types.Curves) -> None:
     """Store digests of the curves and of the settings that they have just grown by."""
-    own = curves.hairloom.grow
-    own.shape, own.made_by = _shape_digest(curves), _settings_digest(own)
+    growth = curves.hairloom.grow
+    growth.shape, growth.made_by = _shape_digest(curves), _settings_digest(growth)
 
 
 def _shape_digest(curves: bpy.types.Curves) -> str:
@@ -240,9 +244,9 @@ def _shape_digest(curves: bpy.types.Curves) -> str:
     return digest(*(part.tobytes() for part in parts if part is not None))
 
 
-def _settings_digest(own: Any) -> str:
-    settings = settings_of(own, GrowSettings).as_dict()
-    return digest((settings, own.density_group, own.length_group))
+def _settings_digest(growth: Any) -> str:
+    settings = settings_of(growth, GrowSettings).as_dict()
+    return digest((settings, growth.density_group, growth.length_group))
 
 
 LISTENER = ("grow", grow_after_edit)

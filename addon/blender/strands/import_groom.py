@@ -148,15 +148,14 @@ def read_in_thread(
             return error
 
     def work(thread: ThreadWork[list[FileStrands | HairloomError]]) -> Any:
-        child_process.kill_context.set(
-            thread.kill_context
-        )  # a context variable of this thread alone
-        found = []
+        # a context variable of this thread alone
+        child_process.kill_context.set(thread.kill_context)
+        results = []
         for number, path in enumerate(paths, 1):
-            which = f", {number} of {len(paths)}" if len(paths) > 1 else ""
-            thread.report(f"Reading {path.name}{which}")
-            found.append(read(path))
-        return found
+            counter = f", {number} of {len(paths)}" if len(paths) > 1 else ""
+            thread.report(f"Reading {path.name}{counter}")
+            results.append(read(path))
+        return results
 
     return ThreadWork(work, "Hairloom import")
 
@@ -172,10 +171,10 @@ def add_to_scene(
 ) -> tuple[list[bpy.types.Object], Outcome]:
     """Add hair to the scene; returns the new objects, separate guides last, and a report."""
     hair = [_add_groom(groom, name, surface, collection) for groom, name in read.hair]
-    cut = [
+    cut_notes = [
         f"{name}: {note}" for groom, name in read.hair for note in cut_motion_notes(groom.motion)
     ]
-    return hair, replace(read.outcome, warnings=(*read.outcome.warnings, *cut))
+    return hair, replace(read.outcome, warnings=(*read.outcome.warnings, *cut_notes))
 
 
 def _separate_grooms(groom: Groom, guides: str) -> list[tuple[Groom, str]]:
@@ -183,8 +182,8 @@ def _separate_grooms(groom: Groom, guides: str) -> list[tuple[Groom, str]]:
     is_guide = groom.is_guide
     if guides != "apart" or is_guide is None or is_guide.all() or not is_guide.any():
         return [(groom, "")]
-    untied = replace(groom, closest_guides=None, guide_weights=None)
-    return [(replace(untied.without_guides(), is_guide=None), ""), (untied.guides(), " Guides")]
+    unlinked = replace(groom, closest_guides=None, guide_weights=None)
+    return [(replace(unlinked.without_guides(), is_guide=None), ""), (unlinked.guides(), " Guides")]
 
 
 def _add_groom(
@@ -193,7 +192,7 @@ def _add_groom(
     hair = write_curves(name, groom.strands, surface and surface.head, collection)
     store_groom(hair.data, groom)
     if groom.motion is not None:
-        animate_by_file(hair, groom.motion)
+        animate_from_file(hair, groom.motion)
     return hair
 
 
@@ -203,7 +202,7 @@ def cut_motion_notes(motion: ReadMotion | None) -> tuple[str, ...]:
     return (note,) if note else ()
 
 
-def animate_by_file(hair: bpy.types.Object, motion: ReadMotion) -> None:
+def animate_from_file(hair: bpy.types.Object, motion: ReadMotion) -> None:
     """Let new curves, in world space, follow the motion of a file, as an animated style."""
     store_motion(hair, *motion.at_frames(frame_rate(bpy.context.scene)))
     hair.parent = None  # the file's motion is in world space: the surface must not carry them too

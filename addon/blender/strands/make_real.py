@@ -32,7 +32,7 @@ from ..properties.groom_settings import GroomSettings
 from ..properties.presets import apply
 from ..scene.curves import write_curves
 from ..scene.groom_attributes import group_names, store_group_names
-from ..scene.hair_material import put_look_material
+from ..scene.hair_material import set_look_material
 from ..scene.masks import MaskReader
 from ..scene.source import Source, read_source
 
@@ -56,7 +56,7 @@ class RealHair(NamedTuple):
     outcome: Outcome
 
 
-class _Drawn(NamedTuple):
+class _DrawnHair(NamedTuple):
     """The drawn strands of hair, as arrays alone. masks: of its motion."""
 
     source: Source
@@ -85,7 +85,7 @@ def make_real(
     return tuple(_add_real_hair(hair, each) for hair, each in zip(grooms, drawn, strict=True))
 
 
-def _drawn_hair(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Parts[_Drawn]:
+def _drawn_hair(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Parts[_DrawnHair]:
     name, settings = hair.name, GroomSettings.of(hair)
     source = read_source(hair, depsgraph)
     mask_reader = MaskReader(hair, head_of(hair), source.head, source.strands, source.curve_indices)
@@ -97,7 +97,7 @@ def _drawn_hair(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Parts
     strands = yield Part(
         "Colouring strands", lambda: _in_rest_pose(_with_drawn_look(rig, source, settings), source)
     )
-    return _Drawn(source, settings, rig, strands, masks)
+    return _DrawnHair(source, settings, rig, strands, masks)
 
 
 def _in_rest_pose(strands: StrandSet, source: Source) -> StrandSet:
@@ -128,13 +128,13 @@ def _with_drawn_look(rig: Rig, source: Source, settings: GroomSettings) -> Stran
     )
 
 
-def _add_real_hair(hair: bpy.types.Object, drawn: _Drawn) -> RealHair:
+def _add_real_hair(hair: bpy.types.Object, drawn: _DrawnHair) -> RealHair:
     source, settings, rig, strands, masks = drawn
     real = write_curves(f"{hair.name} Real", strands, head_of(hair), hair.users_collection[0])
     store_group_names(real.data, group_names(hair))
-    _keep_settings(real, hair, settings)
-    _keep_masks(real.data, rig, masks, settings[DynamicsSettings])
-    _, notes = put_look_material(
+    _copy_settings(real, hair, settings)
+    _copy_masks(real.data, rig, masks, settings[DynamicsSettings])
+    _, notes = set_look_material(
         real.data, real_look(settings[ShadingSettings]), has_final_colors=True
     )
     _hide(hair)
@@ -158,9 +158,9 @@ def real_look(shading: ShadingSettings) -> ShadingSettings:
     )
 
 
-def _keep_settings(real: bpy.types.Object, hair: bpy.types.Object, settings: GroomSettings) -> None:
+def _copy_settings(real: bpy.types.Object, hair: bpy.types.Object, settings: GroomSettings) -> None:
     """Copy all settings, except those whose effects are in the real strands themselves."""
-    own = settings.with_settings(
+    copied = settings.with_settings(
         real_look(settings[ShadingSettings]),
         replace(settings[StrandSettings], fullness=1.0, tip_width=1.0),
         replace(settings[ChildrenSettings], method="none"),
@@ -168,17 +168,17 @@ def _keep_settings(real: bpy.types.Object, hair: bpy.types.Object, settings: Gro
         WidthSettings(method="own"),
     )
     for name in (*sections_of("groom"), *sections_of("character")):
-        apply(own[ALL_SETTINGS[name]], real)
+        apply(copied[ALL_SETTINGS[name]], real)
     for name in _OBJECT_PROPERTIES:
         setattr(real.hairloom, name, getattr(hair.hairloom, name))
 
 
-def _keep_masks(
+def _copy_masks(
     curves: bpy.types.Curves, rig: Rig, masks: Masks, dynamics: DynamicsSettings
 ) -> None:
     """Copy masks that are painted on the original curves; those on the surface need no copy."""
-    for of, name in mask_names(dynamics).items():
-        mask = masks.masks.get(of)
+    for parameter, name in mask_names(dynamics).items():
+        mask = masks.masks.get(parameter)
         if isinstance(mask, StrandMask) and name not in curves.attributes:
             values = painted_strands(rig, mask)
             is_along = mask.grid.shape[1] > 1

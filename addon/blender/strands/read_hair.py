@@ -53,25 +53,29 @@ class ExportStrands:
     """Hair for a file.
 
     groom: the strands, followed by copies of guides if the file needs them.
-    seen: the strands alone.
-    copied: indices of the points of `seen` that the copies of guides repeat.
+    strands: the strands alone.
+    copied_points: indices of the points of `strands` that the copies of guides repeat.
     dropped: reason -> number of curves left out.
     notes: for the artist.
-    made: the rig, if one had to be made.
+    cached_rig: the rig, if one had to be made.
     has_children: whether some strands are not curves of the scene.
     """
 
     groom: Groom
-    seen: StrandSet
-    copied: Ints
+    strands: StrandSet
+    copied_points: Ints
     dropped: Mapping[str, int] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
-    made: CachedRig | None = None
+    cached_rig: CachedRig | None = None
     has_children: bool = False
 
-    def points(self, seen: Floats) -> Floats:
-        """The points of `groom` for these points of `seen`, (point_count, 3)."""
-        return np.concatenate([seen, seen[self.copied]]) if len(self.copied) else seen
+    def points(self, strands: Floats) -> Floats:
+        """The points of `groom` for these points of `strands`, (point_count, 3)."""
+        return (
+            np.concatenate([strands, strands[self.copied_points]])
+            if len(self.copied_points)
+            else strands
+        )
 
 
 def needs_rig(hair: bpy.types.Object, request: ExportRequest) -> bool:
@@ -98,23 +102,25 @@ def read_still_hair(
     """
     source = read_source(hair, depsgraph)
     has_children = hair.data.hairloom.children.method != "none"
-    made = CachedRig.of(hair, source, cached_rigs) if has_children else None
-    if made is not None and made.rig.own_count is not None:
-        rig = made.rig
+    cached_rig = CachedRig.of(hair, source, cached_rigs) if has_children else None
+    if cached_rig is not None and cached_rig.rig.own_count is not None:
+        rig = cached_rig.rig
         strands = with_colors(rig.strands, source.colors, _look(hair))
         groom = Groom(strands, hair.name, group_names=group_names(hair))
-        out = replace(
-            _export_strands(groom, rig, request, _look(hair)), made=made, has_children=True
+        export = replace(
+            _export_strands(groom, rig, request, _look(hair)),
+            cached_rig=cached_rig,
+            has_children=True,
         )
-        return _with_notes(hair, source, out, rig)
+        return _with_notes(hair, source, export, rig)
     attributes = _without_empty_marks(stored_groom(hair, depsgraph, source.curve_indices))
     if request.guides and "is_guide" not in attributes:
-        made = made or CachedRig.of(hair, source, cached_rigs)
-        rig, strands = made.rig, _as_wide_as_drawn(hair, source.strands)
+        cached_rig = cached_rig or CachedRig.of(hair, source, cached_rigs)
+        rig, strands = cached_rig.rig, _as_wide_as_drawn(hair, source.strands)
         strands = with_colors(_with_roots_of(strands, rig.strands), source.colors, _look(hair))
         groom = Groom(strands, hair.name, **attributes)
-        out = replace(_export_strands(groom, rig, request, _look(hair)), made=made)
-        return _with_notes(hair, source, out, rig)
+        export = replace(_export_strands(groom, rig, request, _look(hair)), cached_rig=cached_rig)
+        return _with_notes(hair, source, export, rig)
     strands = _as_wide_as_drawn(hair, source.strands)
     needs_roots = request.roots or strands.root_uv is None or source.colors is not None
     if source.head is not None and needs_roots:
@@ -138,7 +144,7 @@ def read_baked_hair(
     read, attributes = usable_curves(hair, depsgraph), dict[str, Any]()
     is_plain = hair.data.hairloom.children.method in ("none", "auto")
     if is_plain and rig.strands.strand_count == read.strands.strand_count:
-        attributes = _without_empty_marks(stored_groom(hair, depsgraph, read.kept))
+        attributes = _without_empty_marks(stored_groom(hair, depsgraph, read.curve_indices))
     notes: tuple[str, ...] = ()
     if rig.strands.root_uv is None and rig.head is not None:
         notes = (f"{hair.name}: its bake has no root UVs. Bake again to have them in the file.",)
@@ -148,8 +154,8 @@ def read_baked_hair(
     strands = with_colors(rig.strands, colors, _look(hair))
     groom = Groom(strands, hair.name, **({"group_names": group_names(hair)} | attributes))
     has_marks = groom.is_guide is not None
-    out = _export_strands(groom, None if has_marks else rig, request, _look(hair))
-    return replace(out, notes=notes)
+    export = _export_strands(groom, None if has_marks else rig, request, _look(hair))
+    return replace(export, notes=notes)
 
 
 def export_strands_of_rig(
@@ -194,10 +200,10 @@ def _export_strands(
 
 
 def _with_notes(
-    hair: bpy.types.Object, source: Source, out: ExportStrands, rig: Rig | None = None
+    hair: bpy.types.Object, source: Source, export: ExportStrands, rig: Rig | None = None
 ) -> ExportStrands:
     notes = () if rig is None else notes_of(hair, rig)
-    return replace(out, dropped=source.dropped, notes=(*source.warnings, *notes))
+    return replace(export, dropped=source.dropped, notes=(*source.warnings, *notes))
 
 
 def _as_wide_as_drawn(hair: bpy.types.Object, strands: StrandSet) -> StrandSet:

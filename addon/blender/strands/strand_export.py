@@ -79,19 +79,19 @@ class StrandExport:
         has_roots = with_bones and any(has_bones(each) for each in hair)
         request = replace(request_of(kind, settings), roots=has_roots)
         if frames is None:
-            outs, moving, notes = _read_still(hair, depsgraph, request, cached_rigs)
+            exports, moving, notes = _read_still(hair, depsgraph, request, cached_rigs)
         else:
-            outs, moving, notes = _read_moving(
+            exports, moving, notes = _read_moving(
                 hair, depsgraph, request, frames, cached_rigs, use_bake=settings.use_bake
             )
-        groom, lost = join_grooms([out.groom for out in outs], hair[0].name)
+        groom, lost = join_grooms([export.groom for export in exports], hair[0].name)
         bones, missing = None, tuple[str, ...]()
         if with_bones:
-            bones, missing = _bones(hair, depsgraph, outs)
+            bones, missing = _bones(hair, depsgraph, exports)
         dropped: Counter[str] = Counter()
-        for out in outs:
-            dropped.update(out.dropped)
-        read = dict.fromkeys([note for out in outs for note in out.notes])
+        for export in exports:
+            dropped.update(export.dropped)
+        read = dict.fromkeys([note for export in exports for note in export.notes])
         return cls(
             replace(groom, bones=bones),
             settings,
@@ -209,23 +209,23 @@ def _read_moving(
         )
         moving.append(part)
         notes += more_notes
-    return [part.out for part in moving], tuple(moving), tuple(notes)
+    return [part.export for part in moving], tuple(moving), tuple(notes)
 
 
 def _bones(
-    hair: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph, outs: list[ExportStrands]
+    hair: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph, exports: list[ExportStrands]
 ) -> tuple[BoneWeights | None, tuple[str, ...]]:
     """The bones of all strands, None if some hair has no skinned head; and warnings."""
     bones, without = [], []
     notes: list[str] = []
-    for each, out in zip(hair, outs, strict=True):
-        own = bones_of(each, depsgraph, out.groom.strands)
-        if own is None:
+    for each, export in zip(hair, exports, strict=True):
+        weights = bones_of(each, depsgraph, export.groom.strands)
+        if weights is None:
             without.append(each.name)
             notes += unmoved_head_notes(each)
         else:
-            bones.append(own)
-            notes += _loose_root_notes(each, own)
+            bones.append(weights)
+            notes += _loose_root_notes(each, weights)
     if without and bones:
         names = ", ".join(without)
         return None, (

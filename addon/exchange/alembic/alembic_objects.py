@@ -34,7 +34,7 @@ class JoinedCurves:
     identities: strand_id, closest_guides and guide_weights of each curve, as far as present.
     group_names: group -> name.
     motion: times [s] and the points at these, (n, point_count, 3), or None.
-    unfit: see `invalid_curves`.
+    unusable: see `invalid_curves`.
     notes: what could not be used.
     """
 
@@ -48,7 +48,7 @@ class JoinedCurves:
     identities: Arrays
     group_names: dict[int, str]
     motion: tuple[Floats, Floats] | None
-    unfit: dict[str, Bools]
+    unusable: dict[str, Bools]
     notes: tuple[str, ...]
 
 
@@ -135,7 +135,7 @@ def join_curves(found: Arrays, path: Path) -> JoinedCurves:
         identities=_identities(objects),
         group_names=names,
         motion=join_motions([_part_motion(each) for each in objects]),
-        unfit=_unfit(objects),
+        unusable=_unusable(objects),
         notes=(*_notes(objects), *left_out),  # after all others, which add notes to the objects
     )
 
@@ -146,7 +146,7 @@ def _notes(objects: list[_Object]) -> tuple[str, ...]:
     return (together, *notes) if len(objects) > 1 else notes
 
 
-def _unfit(objects: list[_Object]) -> dict[str, Bools]:
+def _unusable(objects: list[_Object]) -> dict[str, Bools]:
     """Why curves cannot be used -> which of all."""
     of_objects = [invalid_curves(each.sampling, str(each.arrays.get("basis"))) for each in objects]
     return {

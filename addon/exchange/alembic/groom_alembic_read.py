@@ -143,17 +143,17 @@ def _groom(curves: JoinedCurves, space: FileSpace, path: Path, notes: list[str])
             group=curves.group,
             root_uv=curves.root_uv,
             color=curves.color,
-            unfit=curves.unfit,
+            unusable=curves.unusable,
         )
     if not cleaned.strands.strand_count:
         reasons = ", ".join(f"{count} with {why}" for why, count in cleaned.dropped.items())
         problem = f"none of its strands can be used ({reasons})"
         raise _error(path, problem, "Export the groom again")
-    kept = cleaned.kept
-    identities = {name: values[kept] for name, values in curves.identities.items()}
+    curve_indices = cleaned.curve_indices
+    identities = {name: values[curve_indices] for name, values in curves.identities.items()}
     optional: dict[str, Any] = unique_identities(identities, notes)
     if curves.is_guide is not None:
-        optional["is_guide"] = curves.is_guide[kept]
+        optional["is_guide"] = curves.is_guide[curve_indices]
     if curves.motion is not None:
         times, positions = curves.motion
         with np.errstate(over="ignore", invalid="ignore"):

@@ -156,7 +156,7 @@ def _join_pieces(pieces: list[Curves], path: Path, name: str, notes: list[str]) 
             group=groups,
             root_uv=_all_or_none("root UVs", [piece.root_uv for piece in pieces], notes),
             color=_colors(pieces),
-            unfit=_unfit(pieces),
+            unusable=_unusable(pieces),
         )
     if not cleaned.strands.strand_count:
         reasons = ", ".join(f"{count:,} with {why}" for why, count in cleaned.dropped.items())
@@ -176,21 +176,23 @@ def _join_pieces(pieces: list[Curves], path: Path, name: str, notes: list[str]) 
     return Groom(
         cleaned.strands,
         name=name,
-        is_guide=_guides(pieces, cleaned.kept),
+        is_guide=_guides(pieces, cleaned.curve_indices),
         group_names=group_names,
         dropped=cleaned.dropped,
         source=path,
         motion=motion,
-        **_identities(pieces, cleaned.kept, notes),
+        **_identities(pieces, cleaned.curve_indices, notes),
     )
 
 
-def _unfit(pieces: list[Curves]) -> dict[str, Bools]:
+def _unusable(pieces: list[Curves]) -> dict[str, Bools]:
     """Why curves cannot be used -> which of all."""
     none = [np.zeros(piece.curve_count, bool) for piece in pieces]
     return {
-        reason: _concatenated([p.unfit.get(reason, no) for p, no in zip(pieces, none, strict=True)])
-        for reason in dict.fromkeys(reason for piece in pieces for reason in piece.unfit)
+        reason: _concatenated(
+            [p.unusable.get(reason, no) for p, no in zip(pieces, none, strict=True)]
+        )
+        for reason in dict.fromkeys(reason for piece in pieces for reason in piece.unusable)
     }
 
 

@@ -24,7 +24,7 @@ class Curves:
     """The content of a prim; None: not known. Arrays are as in `Groom`.
 
     offsets: (curve_count + 1,).
-    unfit: see `invalid_curves`.
+    unusable: see `invalid_curves`.
     notes: what had to be changed or left out.
     times, positions: of a prim that moves its times (n,) [s], and the points at these,
         (n, point_count, 3); of a still one None and (1, point_count, 3).
@@ -42,7 +42,7 @@ class Curves:
     is_guide: Bools | None
     closest_guides: Ints | None
     guide_weights: Floats | None
-    unfit: dict[str, Bools]
+    unusable: dict[str, Bools]
     notes: tuple[str, ...]
     times: Floats | None
     positions: Floats
@@ -110,7 +110,7 @@ def read_prim(prim: Arrays, space: Floats) -> Curves:
         is_guide=None if guide is None else guide > 0,
         closest_guides=values.strand_values("groom_closest_guides", np.int32, 3),
         guide_weights=values.strand_values("groom_guide_weights", np.float32, 3),
-        unfit=invalid_curves(values.sampling, basis),
+        unusable=invalid_curves(values.sampling, basis),
         notes=notes + tuple(values.notes),
         times=times,
         positions=placed[None] if times is None else positions,

@@ -34,7 +34,7 @@ def test_each_fault_is_counted_once_and_named() -> None:
         "a point farther than 1,000 km away": 1,
         "no length": 1,
     }
-    assert cleaned.kept.tolist() == [0, 6]
+    assert cleaned.curve_indices.tolist() == [0, 6]
     assert [points.tolist() for points in cleaned.strands.iter_strands()] == [CURVES[0], CURVES[6]]
 
 
@@ -45,7 +45,7 @@ def test_hair_of_any_size_is_kept(factor: float) -> None:
     curves = roots + np.linspace(0.0, 1e-3, 5)[:, None] * [0.0, -1.0, 0.0]
     curves[7] = curves[7, 0]
     cleaned = clean(factor * curves.reshape(-1, 3), np.arange(51) * 5)
-    assert cleaned.dropped == {"no length": 1} and 7 not in cleaned.kept
+    assert cleaned.dropped == {"no length": 1} and 7 not in cleaned.curve_indices
 
 
 def test_what_belongs_to_a_curve_stays_with_it() -> None:

@@ -34,7 +34,7 @@ def test_nearest_points_are_the_same_in_several_threads(
     """Against all distances; of coincident points the first counts."""
     monkeypatch.setattr(nearest, "THREADS", threads)
     random = np.random.default_rng(1)
-    places = random.random((nearest._MANY + 501, 3))
+    places = random.random((nearest._MAX_PLACES_PER_PART + 501, 3))
     among = np.round(random.random((300, 3)), 1)
     index, distance = nearest.nearest_points(places, among, 4)
     far = np.sqrt(((places[:, None] - among) ** 2).sum(axis=2))

@@ -1,4 +1,4 @@
-"""Grooms that the baked ones feel but that are not baked now: as in their own bakes, or at rest."""
+"""Passive grooms: baked ones feel them, but they move as in their own bakes, or are at rest."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from ..sessions.session import Session
 from .preview import baked_rig_for
 
 
-class Bystander:
-    """One such groom; implements `coupled_frame.FeltGroom`.
+class PassiveGroom:
+    """A passive groom; implements `coupled_frame.FeltGroom`.
 
     Raises:
         HairloomError: there are no hair curves, none can be used, or their scale is not the head's.
@@ -66,8 +66,8 @@ class Bystander:
         return motion_flow.neighbour_style(self.rig, self.pose, self._rest_rig)
 
 
-class Bystanders(dict[int, Bystander]):
-    """The bystanders of a bake, by session number of their objects; added once they may be near.
+class PassiveGrooms(dict[int, PassiveGroom]):
+    """The passive grooms of a bake, by session number of their objects; added once they are near.
 
     notes: why other grooms are not felt, by session number too.
     """
@@ -80,11 +80,11 @@ class Bystanders(dict[int, Bystander]):
         """Add grooms that these sessions may feel; those that cannot be used get a note instead."""
         for session in sessions:
             self.pop(session.uid, None)
-        for obj in grooms_near(sessions, depsgraph):
+        for obj in nearby_grooms(sessions, depsgraph):
             if obj.session_uid in self.keys() | self.notes.keys():
                 continue
             try:
-                self[obj.session_uid] = Bystander(obj, depsgraph)
+                self[obj.session_uid] = PassiveGroom(obj, depsgraph)
             except HairloomError as error:
                 self.notes[obj.session_uid] = f"not felt by hair that was baked beside it: {error}"
 
@@ -92,28 +92,30 @@ class Bystanders(dict[int, Bystander]):
         """Move all of them to the scene's frame.
 
         Raises:
-            HairloomError: as `Bystander.move`.
+            HairloomError: as `PassiveGroom.move`.
         """
         for each in self.values():
             each.move(depsgraph)
 
 
-def grooms_near(sessions: list[Session], depsgraph: bpy.types.Depsgraph) -> list[bpy.types.Object]:
+def nearby_grooms(
+    sessions: list[Session], depsgraph: bpy.types.Depsgraph
+) -> list[bpy.types.Object]:
     """Other grooms of the view layer that these may feel; fast enough for every redraw."""
-    feeling = [session.hair.resolve() for session in sessions if session.feels_hair]
-    balls = [_reach_ball(hair, depsgraph) for hair in feeling]
+    hairs = [session.hair.resolve() for session in sessions if session.feels_hair]
+    balls = [_bounding_ball(hair, depsgraph) for hair in hairs]
     found, uids = [], {session.uid for session in sessions}
     for obj in objects_in(depsgraph.view_layer) if balls else ():
         is_groom = obj.type == "CURVES" and not obj.data.hairloom.baked_in
         if is_groom and not obj.hide_render and obj.session_uid not in uids:
-            middle, radius = _reach_ball(obj, depsgraph)
+            middle, radius = _bounding_ball(obj, depsgraph)
             if any(np.linalg.norm(place - middle) <= radius + reach for place, reach in balls):
                 found.append(obj)
     return found
 
 
-def _reach_ball(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[Floats, float]:
-    """A ball that its hair cannot leave, however it swings: middle (3,) and radius [m]."""
+def _bounding_ball(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[Floats, float]:
+    """A ball that its hair cannot leave however it swings: centre (3,) and radius [m]."""
     corners = _corners(hair, depsgraph)
     reach = float(np.linalg.norm(np.ptp(corners, axis=0)))
     head = head_of(hair)
