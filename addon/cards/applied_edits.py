@@ -157,7 +157,7 @@ def _assembled(
     count, piece_count = len(record), len(placed.number)
     is_new = placed.number >= count
     total = count + int(np.count_nonzero(is_new))
-    mesh, strips = _adopted(edits, cards, settings, head, placed)
+    mesh, strips, slope_of_piece = _adopted(edits, cards, settings, head, placed)
     model = np.resize(np.arange(count, dtype=np.int32), total)
     if is_new.any():
         near = card_gaps(card_places(strips.select(np.flatnonzero(is_new))), record.places).argmin(
@@ -173,6 +173,9 @@ def _assembled(
     strand_count[:count] = np.where(is_replaced, strand_count[:count], covered)
     tile = cards.tile[model]
     tile[placed.number] = placed.tile
+    slope = np.zeros(len(cards), np.float32) if cards.root_slope is None else cards.root_slope
+    slope = slope[model]
+    slope[placed.number] = slope_of_piece
     record.prints[is_absent[:count]] = NO_PRINT
     record.prints[placed.number[~is_new]] = NO_PRINT
     both = replace(
@@ -183,6 +186,7 @@ def _assembled(
         layer=cards.layer[model],
         tile=tile,
         is_absent=is_absent,
+        root_slope=slope,
     )
     mesh = replace(mesh, group=both.group, layer=both.layer, tile=both.tile, atlas=both.atlas)
     notes = _notes(edits, counts, strips, head, piece_count)
@@ -335,8 +339,9 @@ def _adopted(
     settings: CardSettings,
     head: Surface | None,
     placed: _PlacedPieces,
-) -> tuple[CardMesh, Strips]:
-    """The kept cards as a mesh with their numbers, and as strips in the order of the pieces."""
+) -> tuple[CardMesh, Strips, Floats]:
+    """The kept cards as a mesh with their numbers, and as strips in the order of the pieces, with
+    the slopes of their root edges."""
     row_count = cards.strips.width.shape[1]
     if not len(edits.card_of_piece):
         none = np.zeros(0, np.int32)
@@ -352,7 +357,7 @@ def _adopted(
             card=none,
             along=np.zeros(0, np.float32),
         )
-        return mesh, cards.strips.select(none)
+        return mesh, cards.strips.select(none), np.zeros(0, np.float32)
     uv = _uvs_on_tiles(edits, cards.atlas, placed.tile)
     triangles: Ints = edits.surface.triangles
     if np.linalg.det(edits.matrix[:3, :3]) < 0.0:  # a mirrored object turns its faces around
@@ -371,8 +376,8 @@ def _adopted(
     mesh = replace(adopted, card=placed.number[piece], group=unknown, layer=unknown, tile=unknown)
     if cards.center is not None:
         mesh = _with_normals_of_volume(mesh, cards.center, across, settings)
-    strips = _strips(adopted, owner, across, (len(edits.card_of_piece), row_count), settings)
-    return mesh, strips
+    shape = len(edits.card_of_piece), row_count
+    return mesh, *_strips(adopted, owner, across, shape, settings)
 
 
 def _with_original_facing(mesh: CardMesh, triangles: Ints) -> CardMesh:
@@ -424,8 +429,9 @@ def _with_normals_of_volume(
 
 def _strips(
     mesh: CardMesh, owner: Ints, across: Floats, shape: tuple[int, int], settings: CardSettings
-) -> Strips:
-    """Each piece as a strip, for coarser levels: its edges cut at even steps along it.
+) -> tuple[Strips, Floats]:
+    """Each piece as a strip, for coarser levels: its edges cut at even steps along it; and the
+    slope of its root edge, (piece_count,).
 
     Args:
         owner: (vertex_count,) the piece of each vertex.
@@ -434,7 +440,6 @@ def _strips(
     count, row_count = shape
     left, right = _edges(mesh, owner, across, count, row_count)
     across_card = right - left
-    width = np.linalg.norm(across_card, axis=2)
     middle = (left + right) / 2.0
     tangent = tangents(middle)
     total = np.zeros((count, 3))
@@ -444,15 +449,19 @@ def _strips(
     side = unit_or(
         side, unit_or(np.cross(tangent, facing), (1.0, 0.0, 0.0), _MIN_LENGTH), _MIN_LENGTH
     )
+    width = np.einsum("cri,cri->cr", across_card, side)
+    ahead = np.einsum("ci,ci->c", across_card[:, 0], tangent[:, 0])
+    slope = ahead / np.maximum(width[:, 0], _MIN_LENGTH)
     normal = np.cross(side, tangent)
     # a flipped card has its left edge on the right
     is_inward = np.einsum("cri,cri->c", normal, facing) < 0.0
     side[is_inward] *= -1.0
     normal[is_inward] *= -1.0
+    slope[is_inward] *= -1.0
     behind = settings.bend * (1.0 if settings.column_count > 1 else 1.0 / 3.0)
     center = middle + normal * (behind * width)[..., None]
     parts = (each.astype(np.float32) for each in (center, tangent, normal, side))
-    return Strips(CardFrames(*parts), width.astype(np.float32))
+    return Strips(CardFrames(*parts), width.astype(np.float32)), slope.astype(np.float32)
 
 
 def _edges(

@@ -2,8 +2,8 @@
 
 Cards that look alike share a tile: k-medoids (Park and Jun 2009, here with the member nearest to
 the mean as the medoid) over features of cards in their own frames. The strands of the medoid are
-baked. Hair of two groups shares no tile, nor do single strands and bundles, as long as there are
-enough tiles.
+baked. Hair of two groups shares no tile, nor do single strands, cards along hairlines and partings,
+and all others, as long as there are enough tiles.
 """
 
 from __future__ import annotations
@@ -27,11 +27,10 @@ _FACE_TILES = 6
 _MAX_STRANDS_PER_PIXEL = 2
 #: Range of the factor by which a card is widened to cover as much as its own strands.
 _WIDTH_RANGE = (0.5, 2.0)
+#: The same at hairlines and partings, where wider strands would be seen one by one.
+_RIM_WIDTH_RANGE = (0.8, 1.25)
 #: Sine of the angle between strands and card that counts as much as a factor of two in width.
 _WAVE_SCALE = 0.2
-#: Slope of the line through a card's roots that counts as much; its sign differs between the two
-#: sides of a parting.
-_SLOPE_SCALE = 0.5
 #: Difference of perceived colour that counts as much: of square roots of linear colours.
 _COLOR_SCALE = 0.15
 #: Value beyond all colours, for strands without one of their own.
@@ -55,6 +54,8 @@ class AtlasPlan:
     strands: which strands are baked, tile after tile; offsets: (used tiles + 1,) where each begins.
     thickness: (used tiles,) factor of the radii, larger where a tile cannot hold all its strands.
     notes: for the artist.
+    root_slope: (used tiles,) slope of the root edge of each strip, see `strip.root_slants`; None:
+        all are square.
     """
 
     grid: AtlasGrid
@@ -66,6 +67,7 @@ class AtlasPlan:
     offsets: Ints
     thickness: Floats
     notes: tuple[str, ...] = ()
+    root_slope: Floats | None = None
 
     @property
     def tile_of_strand(self) -> Ints:
@@ -81,6 +83,8 @@ def plan_atlas(
     group: Ints,
     settings: AtlasSettings,
     color: Floats | None = None,
+    root_slope: Floats | None = None,
+    is_rim: Bools | None = None,
 ) -> AtlasPlan:
     """Choose what the tiles show.
 
@@ -92,6 +96,9 @@ def plan_atlas(
         cluster: (strand_count,) the card of each strand, from 0 without gaps.
         group: (strand_count,).
         color: (strand_count, cv_count, 3) that strands are drawn in; None: the look's.
+        root_slope: (card_count,) slopes of the cards' root edges; None: all are square.
+        is_rim: (card_count,) which cards lie along hairlines and partings, with bare skin before
+            them; None: none.
 
     Raises:
         HairloomError: the atlas is too small for its tiles, or no strand has a width.
@@ -100,7 +107,8 @@ def plan_atlas(
     settings = settings.fitted(len(strips), *_wanted_texels(strips, radius, cluster, settings))
     atlas = settings.grid
     shapes = _card_shapes(strips, grid, radius, cluster)
-    kind = _tile_kinds(cluster, group, shapes.strand_count, atlas.tile_count)
+    is_rim = np.zeros(len(strips), bool) if is_rim is None else is_rim
+    kind = _tile_kinds(cluster, group, shapes.strand_count, is_rim, atlas.tile_count)
     is_face = _is_face_card(cluster, group)
     random = np.random.default_rng(settings.seed)
     features = shapes.features
@@ -117,13 +125,14 @@ def plan_atlas(
         grid=atlas,
         size=settings.side,
         tile=tile,
-        width_factor=_width_factors(shapes, strips.width, tile, medoid),
+        width_factor=_width_factors(shapes, strips.width, tile, medoid, is_rim),
         strips=chosen,
         strands=strands,
         offsets=offsets,
-        # cards of brows and lashes face the viewer
-        thickness=crowding * np.where(is_face[medoid], 1.0, settings.strand_width),
+        # brows and lashes face the viewer, and before bare skin each strand is seen
+        thickness=crowding * np.where((is_face | is_rim)[medoid], 1.0, settings.strand_width),
         notes=notes,
+        root_slope=None if root_slope is None else root_slope[medoid],
     )
 
 
@@ -176,11 +185,12 @@ def _card_shapes(strips: Strips, grid: Floats, radius: Floats, cluster: Ints) ->
     covered = 1.0 - (1.0 - np.clip(fill / count[:, None], 0.0, 1.0)) ** count[:, None]
     spacing = np.gradient(strips.frames.center, axis=1)
     spacing = np.linalg.norm(spacing, axis=-1)
-    scales = (width.mean(axis=1), spacing.sum(axis=1), fill.mean(axis=1), count)
+    # roots are seen, on strands that are as much wider as the card
+    widths = width.mean(axis=1), width[:, 0]
+    scales = (*widths, spacing.sum(axis=1), fill.mean(axis=1), count)
     octaves = [np.log2(np.maximum(scale / np.median(scale), _TINY)) for scale in scales]
     wave = np.bincount(cluster, _sines_to_card(strips.frames, grid, cluster), card_count) / count
-    slope = _root_slopes(strips.frames, grid, cluster)
-    features = np.stack([*octaves, wave / _WAVE_SCALE, slope / _SLOPE_SCALE], axis=1)
+    features = np.stack([*octaves, wave / _WAVE_SCALE], axis=1)
     return _CardShapes(count, covered, spacing, features)
 
 
@@ -201,25 +211,15 @@ def _sines_to_card(frames: CardFrames, grid: Floats, cluster: Ints) -> Floats:
     return mean
 
 
-def _root_slopes(frames: CardFrames, grid: Floats, cluster: Ints) -> Floats:
-    """Slope of the line through each card's roots, along over across the card, (card_count,) in
-    [-1, 1].
-    """
-    away = grid[:, 0] - frames.center[cluster, 0]
-    aside = np.einsum("si,si->s", away, frames.side[cluster, 0])
-    ahead = np.einsum("si,si->s", away, frames.tangent[cluster, 0])
-    count = np.bincount(cluster)
-    ahead -= (np.bincount(cluster, ahead) / count)[cluster]
-    aside -= (np.bincount(cluster, aside) / count)[cluster]
-    slope = np.bincount(cluster, aside * ahead) / np.maximum(np.bincount(cluster, aside**2), _TINY)
-    return np.clip(slope, -1.0, 1.0)
-
-
-def _tile_kinds(cluster: Ints, group: Ints, strand_count: Ints, tile_count: int) -> Ints:
-    """Cards of different kinds share no tile, (card_count,): groups, and single strands in each."""
+def _tile_kinds(
+    cluster: Ints, group: Ints, strand_count: Ints, is_rim: Bools, tile_count: int
+) -> Ints:
+    """Cards of different kinds share no tile, (card_count,): groups, and in each of them single
+    strands, cards at the rim, and the rest."""
     _, first = np.unique(cluster, return_index=True)
     _, groups = np.unique(group[first], return_inverse=True)
-    pairs, kind = np.unique(2 * groups + (strand_count == 1), return_inverse=True)
+    within = np.where(strand_count == 1, 2, is_rim)
+    pairs, kind = np.unique(3 * groups + within, return_inverse=True)
     return kind if len(pairs) <= tile_count else np.zeros_like(kind)
 
 
@@ -312,14 +312,16 @@ def _choose_strands(
     return np.concatenate(tiles), offsets, np.array(crowding)
 
 
-def _width_factors(shapes: _CardShapes, width: Floats, tile: Ints, medoid: Ints) -> Floats:
+def _width_factors(
+    shapes: _CardShapes, width: Floats, tile: Ints, medoid: Ints, is_rim: Bools
+) -> Floats:
     """How much wider each card must be to cover as much as with its own strands, (card_count,)."""
     area = width * shapes.spacing
     own_area = (shapes.covered * area).sum(axis=1)
     shown_area = (shapes.covered[medoid[tile]] * area).sum(axis=1)
-    return np.clip(
-        np.where(shown_area > 0.0, own_area / np.maximum(shown_area, _TINY**2), 1.0), *_WIDTH_RANGE
-    )
+    factor = np.where(shown_area > 0.0, own_area / np.maximum(shown_area, _TINY**2), 1.0)
+    low, high = np.where(is_rim[:, None], _RIM_WIDTH_RANGE, _WIDTH_RANGE).T
+    return np.clip(factor, low, high)
 
 
 def _overflow_note(crowding: Floats) -> tuple[str, ...]:

@@ -1,8 +1,8 @@
 """The strands of an atlas laid flat into its tiles.
 
 A strip has one row per CV of the strands. CV r of a strand lies at row r, moved along the strip by
-its offset from that row; across the strip it lies at its offset along the row's side. Its height
-over the strip's plane is its depth.
+its offset from that row; across the strip it lies at its offset along the row's side. Rows near a
+slanted root edge are as slanted as their cards are. The height over the strip's plane is the depth.
 """
 
 from __future__ import annotations
@@ -14,15 +14,12 @@ import numpy as np
 from ..arrays import Floats
 from ..strands.vectors import unit_or
 from .atlas import AtlasPlan
+from .strip import root_slants
 
 #: Part of a card's width within which strands occlude those behind them.
 _OCCLUSION_WIDTH = 0.25
 #: Part of a card's width, from its middle, in which strands are never moved.
 _UNMOVED_WIDTH = 0.35
-#: Strands that begin behind their card's begin, by up to this fraction of its length, are extended
-#: to begin sooner, by this part of the gap: along a parting, where no other card covers the roots,
-#: skin would show.
-_MAX_ROOT_GAP, _CLOSED_GAP = 0.06, 0.7
 #: Stations that replace each segment, so that bends are smooth.
 PIECES_PER_SEGMENT = 4
 _TINY = 1e-12
@@ -81,15 +78,15 @@ def flat_strands(
     aside, ahead, outside = (np.einsum("sri,sri->sr", away, axis[tile]) for axis in axes)
     width: Floats = np.maximum(strips.width[tile], _TINY)
     row_count = points.shape[1]
+    if plan.root_slope is not None:
+        ahead = ahead - aside * plan.root_slope[tile, None] * root_slants(row_count)
     spacing = np.linalg.norm(np.gradient(frames.center, axis=1), axis=-1)[tile] * (row_count - 1)
     spacing = np.maximum(spacing, _TINY)
     radii = radius[plan.strands] * plan.thickness[tile, None] / width
     color, gain = _normalized_colors(plan, base, points.shape)
     cv_values = (
         aside / width,
-        _with_extended_roots(
-            _scaled_into_strip(np.linspace(0.0, 1.0, row_count) + ahead / spacing)
-        ),
+        _scaled_into_strip(np.linspace(0.0, 1.0, row_count) + ahead / spacing),
         np.clip(0.5 + outside / np.maximum(strips.width.mean(axis=1), _TINY)[tile, None], 0.0, 1.0),
         radii,
         width / spacing,
@@ -149,14 +146,6 @@ def _scaled_into_strip(along: Floats) -> Floats:
     low = np.minimum(along.min(axis=1, keepdims=True), 0.0)
     high = np.maximum(along.max(axis=1, keepdims=True), 1.0)
     return (along - low) / (high - low)
-
-
-def _with_extended_roots(along: Floats) -> Floats:
-    """Strands that begin a little behind their card's begin, extended towards it."""
-    root = along[:, :1]
-    start = root - _CLOSED_GAP * np.minimum(root, _MAX_ROOT_GAP)
-    stretched: Floats = start + (along - root) * (1.0 - start) / np.maximum(1.0 - root, _TINY)
-    return np.minimum(stretched, 1.0)
 
 
 def _compressed(across: Floats, half: Floats, plan: AtlasPlan) -> Floats:

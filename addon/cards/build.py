@@ -16,9 +16,9 @@ from .atlas import AtlasPlan, plan_atlas
 from .atlas_grid import AtlasGrid
 from .atlas_settings import AtlasSettings
 from .card_mesh import CardMesh
-from .clusters import cluster_of_guides
+from .clusters import cluster_of_guides, is_at_rim
 from .edits import CardEdits, CardRecord, EditCounts
-from .fit import cluster_of_strands, fit_strips
+from .fit import cluster_of_strands, fit_strips, root_slopes
 from .layers import card_layers
 from .levels import card_levels
 from .occlusion import CardOccluder, occlusion_steps
@@ -348,11 +348,23 @@ def uncut_cards(
     owner = np.resize(np.arange(len(first)), len(strips))
     cards = _with_random_tiles(strips, count[owner], strands.group[first][owner], settings)
     cards = _with_outward_normals(cards, groom)
+    slope = np.zeros(len(strips), np.float32)
+    slope[: len(first)] = root_slopes(strips.select(np.arange(len(first))).frames, grid, cluster)
+    cards = replace(cards, root_slope=slope)
     if not is_baked:
         return cards, None
     uncrossed = strips.select(np.arange(len(first)))
+    rim = is_at_rim(grid, groom.root_normal, len(grid) / len(first))
     plan = plan_atlas(
-        uncrossed, grid, groom.radius, cluster, strands.group, atlas, strands.color_grid
+        uncrossed,
+        grid,
+        groom.radius,
+        cluster,
+        strands.group,
+        atlas,
+        strands.color_grid,
+        slope[: len(first)],
+        np.bincount(cluster, rim) > 0.5 * np.bincount(cluster),
     )
     strips = _with_width_factor(cards.strips, plan.width_factor[owner])
     return replace(cards, strips=strips, tile=plan.tile[owner], atlas=plan.grid), plan

@@ -28,8 +28,11 @@ _MIN_WIDTH = 0.25
 _TIP_REACH = 1.3
 #: And before the mean root: sqrt(3) covers evenly spread roots, so that no parting is bald.
 _ROOT_REACH = 1.7
+#: Largest slope of a card's root edge, along over across the card.
+_MAX_ROOT_SLOPE = 2.0
 #: Cards of hair that leans away from the upright by more than this sine reach back in full.
 _MIN_LEANING = 1.0 / 3.0
+_TINY = 1e-12
 
 
 def cluster_of_strands(
@@ -90,17 +93,56 @@ def fit_strips(
     spread = means.of(np.stack([ahead * ahead, aside * aside, ahead * aside], axis=-1))
     turn = _best_turn(spread, normal, side, outwards)
     thickness = means.of(radius)
-    center[:, 0] -= _root_extensions(away[:, 0], tangent[:, 0], outwards, means, cluster)
+    frames = _turned(center, tangent, normal, side, turn)
+    beyond = away[:, 0] - frames.tangent[cluster, 0] * _ahead_of_slant(frames, grid, cluster)
+    center[:, 0] -= _root_extensions(beyond, tangent[:, 0], outwards, means, cluster)
     center[:, -1] += tangent[:, -1] * _tip_extensions(away[:, -1], tangent[:, -1], means, cluster)
     strips: list[tuple[CardFrames, Floats]] = []
     for further in (0.0, np.pi / 2.0)[: 1 + settings.crossed]:
         cosine, sine = np.cos(turn + further)[:, None], np.sin(turn + further)[:, None]
-        turned = normal * cosine[..., None] + side * sine[..., None]
         variance = _smoothed(np.maximum(_variance_along(spread, cosine, sine), 0.0))
         half = settings.cluster_width * _COVERED_DEVIATIONS * np.sqrt(variance) + thickness
-        frames = CardFrames(center, tangent, turned, np.cross(tangent, turned))
-        strips.append((frames, 2.0 * half))
+        strips.append((_turned(center, tangent, normal, side, turn + further), 2.0 * half))
     return _concatenated(strips)
+
+
+def _turned(
+    center: Floats, tangent: Floats, normal: Floats, side: Floats, turn: Floats
+) -> CardFrames:
+    """Frames turned about their tangents by (n,) [rad]."""
+    cosine, sine = np.cos(turn)[:, None, None], np.sin(turn)[:, None, None]
+    turned = normal * cosine + side * sine
+    return CardFrames(center, tangent, turned, np.cross(tangent, turned))
+
+
+def root_slopes(frames: CardFrames, grid: Floats, cluster: Ints) -> Floats:
+    """Slope of the line through the roots of each card's strands, along over across the card,
+    (card_count,): least squares.
+
+    Args:
+        frames: with a row for each CV.
+        grid: (strand_count, cv_count, 3) [m], root first.
+        cluster: (strand_count,) the card of each strand.
+    """
+    away = grid[:, 0] - frames.center[cluster, 0]
+    aside, ahead = (
+        np.einsum("si,si->s", away, axis[cluster, 0]) for axis in (frames.side, frames.tangent)
+    )
+    count = np.bincount(cluster)
+    ahead = ahead - (np.bincount(cluster, ahead) / count)[cluster]
+    aside = aside - (np.bincount(cluster, aside) / count)[cluster]
+    spread = np.maximum(np.bincount(cluster, aside**2), _TINY)
+    slope = np.bincount(cluster, aside * ahead) / spread
+    return np.clip(slope, -_MAX_ROOT_SLOPE, _MAX_ROOT_SLOPE).astype(np.float32)
+
+
+def _ahead_of_slant(frames: CardFrames, grid: Floats, cluster: Ints) -> Floats:
+    """How far the slanted root edge lies ahead of its middle at each root, (strand_count, 1)
+    [m]."""
+    away = grid[:, 0] - frames.center[cluster, 0]
+    aside = np.einsum("si,si->s", away, frames.side[cluster, 0])
+    ahead: Floats = aside * root_slopes(frames, grid, cluster)[cluster]
+    return ahead[:, None]
 
 
 def _tip_extensions(away: Floats, tangent: Floats, mean: _ClusterMeans, cluster: Ints) -> Floats:

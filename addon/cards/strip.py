@@ -24,6 +24,8 @@ from .sort import sorted_by_key
 
 #: Roots whose distance to their neighbours is measured.
 _SPACING_SAMPLES = 512
+#: Part of a card, from its root, within which a slanted root edge becomes square.
+_SLANTED_PART = 0.25
 #: Spacing of a single guide, which has no neighbour, as a fraction of its length.
 _SINGLE_GUIDE_SPACING = 0.04
 
@@ -68,6 +70,8 @@ class UncutCards:
     atlas: how the texture is divided into tiles.
     center: (3,) [m], from which normals point away, as those of strands do; None: each card has the
         normals of its own surface.
+    root_slope: (card_count,) slope of the root edge, along over across the card, see `root_slants`;
+        None: all are square.
     is_absent: (card_count,) cards that are not made; None: all are made.
     """
 
@@ -78,6 +82,7 @@ class UncutCards:
     tile: Ints
     atlas: AtlasGrid
     center: Floats | None = None
+    root_slope: Floats | None = None
     is_absent: Bools | None = None
 
     def __len__(self) -> int:
@@ -140,6 +145,8 @@ def _mesh_of_part(
     vertices_per_card = row_count * len(across)
     first = np.arange(card_count, dtype=np.int32) * vertices_per_card
     positions = _positions(frames, strips.width, across, settings)
+    if cards.root_slope is not None:
+        positions += _slanted(strips, cards.root_slope[numbers], across)
     normals = _normals(frames, across, settings)
     if cards.center is not None:
         volume = _normals_of_volume(positions, frames.tangent, cards.center, across, settings)
@@ -232,6 +239,25 @@ def _positions(frames: CardFrames, width: Floats, across: Floats, settings: Card
         + frames.side[:, :, None] * aside[..., None]
         + frames.normal[:, :, None] * behind[..., None]
     )
+
+
+def root_slants(row_count: int) -> Floats:
+    """How much of the slope of its root edge each row of a card has, (row_count,) float32.
+
+    Where hair leaves a hairline or a parting at an angle, the roots of a card lie on a slanted
+    line. Its first rows follow them: 1 at the root, 0 from a quarter of the card on.
+    """
+    along = np.linspace(0.0, 1.0, row_count, dtype=np.float32)
+    return np.maximum(np.float32(1.0) - along / np.float32(_SLANTED_PART), np.float32(0.0))
+
+
+def _slanted(strips: Strips, slope: Floats, across: Floats) -> Floats:
+    """How far vertices move along cards whose root edges have this slope, (cards, rows, columns,
+    3) [m]."""
+    aside = (across - 0.5) * strips.width[..., None]
+    ahead = aside * (slope[:, None] * root_slants(strips.width.shape[1]))[..., None]
+    moved: Floats = strips.frames.tangent[:, :, None] * ahead[..., None]
+    return moved
 
 
 def _normals(frames: CardFrames, across: Floats, settings: CardSettings) -> Floats:

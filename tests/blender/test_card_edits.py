@@ -387,9 +387,9 @@ def test_coarser_levels_follow_the_edited_shape(hair):
     own, coarse = corners(obj, 3), of_card(card_objects(hair)[1], 3)
     assert not len(of_card(card_objects(hair)[1], 5))
     assert len(coarse) < len(own)
-    # 0.012 m, because the coarser card is raised where it would sink into the head
+    # 0.013 m, because the coarser card is raised where it would sink into the head
     for reach in (np.min, np.max):
-        np.testing.assert_allclose(reach(coarse, axis=0), reach(own, axis=0), atol=0.012)
+        np.testing.assert_allclose(reach(coarse, axis=0), reach(own, axis=0), atol=0.013)
 
 
 def of_card(obj, card):

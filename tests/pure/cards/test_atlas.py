@@ -101,17 +101,28 @@ def test_brows_have_enough_tiles_and_unwidened_strands() -> None:
     np.testing.assert_allclose(np.delete(plan.thickness, of_brows), settings.strand_width)
 
 
-def test_cards_of_both_sides_of_a_parting_share_no_tile() -> None:
-    """The cards differ only in the side on which roots lie farther ahead."""
-    parts = tufts(np.full(40, 0.02), np.full(40, 0.2), np.full(40, 6), 1e-4)
-    side, cluster = np.where(np.arange(40) % 2 == 0, 1.0, -1.0), parts[3]
-    frames = parts[0].frames
-    away = parts[1][:, 0] - frames.center[cluster, 0]
-    aside = np.einsum("si,si->s", away, frames.side[cluster, 0])
-    parts[1][:, 0] += (side[cluster] * aside)[:, None] * frames.tangent[cluster, 0]
-    settings = AtlasSettings(size="512", columns=2, rows=1)
-    plan = plan_atlas(*parts, np.zeros(240, int), settings)
-    assert {len(np.unique(side[plan.tile == tile])) for tile in range(2)} == {1}
+def test_cards_at_a_hairline_have_tiles_of_their_own_and_unwidened_strands() -> None:
+    """Strands of all other cards are drawn wider, as the setting says."""
+    is_rim, count = np.arange(40) % 4 == 0, np.resize([6, 6, 9], 40)
+    parts = tufts(np.full(40, 0.02), np.full(40, 0.2), count, 1e-4)
+    settings = AtlasSettings(size="512", columns=4, rows=1, strand_width=1.5)
+    plan = plan_atlas(*parts, np.zeros(len(parts[1]), int), settings, is_rim=is_rim)
+    tiles = [np.unique(plan.tile[is_one]) for is_one in (is_rim, ~is_rim)]
+    assert not set(tiles[0]) & set(tiles[1])
+    for numbers, width in zip(tiles, (1.0, 1.5), strict=True):
+        np.testing.assert_array_equal(plan.thickness[numbers], width)
+
+
+def test_cards_at_a_hairline_are_hardly_widened() -> None:
+    """A card with six times as many strands as its tile shows becomes a quarter wider there, and
+    twice as wide elsewhere."""
+    parts = tufts(np.full(2, 0.02), np.full(2, 0.2), np.array([3, 18]), 1e-4)
+    settings = AtlasSettings(size="512", columns=1, rows=1)
+    for is_rim, width in ((True, 1.25), (False, 2.0)):
+        rim = np.full(2, is_rim)
+        plan = plan_atlas(*parts, np.zeros(21, int), settings, is_rim=rim)
+        wider = plan.width_factor.max() if plan.strands[0] == 0 else 1.0 / plan.width_factor.min()
+        assert wider == pytest.approx(width)
 
 
 def test_groups_and_single_strands_share_no_tile() -> None:

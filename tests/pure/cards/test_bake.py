@@ -175,16 +175,27 @@ def test_strands_beyond_the_strip_are_compressed_into_it() -> None:
     assert maps.alpha.mean() == pytest.approx(5 * 0.04, rel=0.08)
 
 
-def test_strands_that_begin_behind_their_card_are_extended_at_the_root_only() -> None:
-    """Seven tenths of their delay are removed, at most 4.2 % of the card: roots of brows lie
-    anywhere."""
+def test_strands_begin_where_their_roots_are() -> None:
+    """At a hairline, each at its own place, and not in a straight row."""
     grid, late = lines(np.zeros(3)), np.array([0.0, 0.05, 0.5])
     for strand, start in enumerate(late):
         grid[strand, :, 2] = np.linspace(start, 1.0, ROWS) * LENGTH
     flat, _ = baked(plan_of([3]), grid, 0.04, 64)
-    np.testing.assert_allclose(flat.place[:, 0, 1], [0.0, 0.015, 0.458], atol=1e-6)
+    np.testing.assert_allclose(flat.place[:, 0, 1], late, atol=1e-6)
     np.testing.assert_allclose(flat.place[:, -1, 1], 1.0, atol=1e-6)
     assert (np.diff(flat.place[..., 1], axis=1) > 0.0).all()
+
+
+def test_roots_on_a_slanted_edge_begin_at_the_edge_of_the_tile() -> None:
+    """The card itself is slanted there; from a quarter of it on it is square."""
+    across, slope = np.linspace(-0.3, 0.3, 5), 0.3
+    grid = lines(across, rows=9)
+    plan = replace(plan_of([5], rows=9), root_slope=np.array([slope], np.float32))
+    slanted = grid.copy()
+    slanted[..., 2] += slope * slanted[..., 0] * np.maximum(1.0 - np.linspace(0.0, 4.0, 9), 0.0)
+    square, _ = baked(plan_of([5], rows=9), grid, 0.04, 64)
+    flat, _ = baked(plan, slanted, 0.04, 64)
+    np.testing.assert_allclose(flat.place, square.place, atol=1e-6)
 
 
 def test_strips_without_size_give_finite_maps() -> None:

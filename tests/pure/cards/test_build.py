@@ -12,6 +12,7 @@ from tiers import few_in_commits
 from hairloom.addon import card_flow, rig_flow
 from hairloom.addon.cards import build as build_module
 from hairloom.addon.cards.atlas_settings import AtlasSettings
+from hairloom.addon.cards.bake_strands import flat_strands
 from hairloom.addon.cards.build import (
     CardBuild,
     CardGroom,
@@ -20,10 +21,12 @@ from hairloom.addon.cards.build import (
     uncut_cards,
     with_nearest_occlusion,
 )
+from hairloom.addon.cards.card_mesh import CardMesh
 from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
 from hairloom.addon.cards.order_check import wrong_fraction
 from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.cards.steps import result_of
+from hairloom.addon.cards.strip import strip_mesh
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.groom.settings import GuideSettings
 from hairloom.addon.params import SettingsMap
@@ -127,6 +130,42 @@ def test_cards_are_the_same_at_any_scale(method: str, source: str, factor: float
             np.testing.assert_allclose(found, expected, atol=1e-3, err_msg=name)
         for name in ("triangles", "card", "group", "layer", "tile"):
             np.testing.assert_array_equal(getattr(mesh, name), getattr(same, name), err_msg=name)
+
+
+def test_strands_on_cards_begin_where_they_grow() -> None:
+    """Two tufts whose roots lie on slanted lines, as at a hairline, and which show the same tile:
+    what is drawn on a card begins on its own line."""
+    aside, slopes = np.linspace(-0.01, 0.01, 12), (1.0, -1.5)
+    place = [[(y, slope * y, 0.0) for y in aside] for slope in slopes]
+    roots = np.array(place)[..., [1, 0, 2]] + [[[0.0, 0.0, 0.0]], [[0.0, 0.5, 0.0]]]
+    line = np.linspace(0.0, 0.2, 16)[:, None] * [1.0, 0.0, 0.0]
+    grid = (roots.reshape(-1, 1, 3) + line).astype(np.float32)
+    strands = StrandSet(
+        grid.reshape(-1, 3), np.arange(25) * 16, np.full(24 * 16, 1e-4), np.zeros(24, np.int32)
+    )
+    groom = replace(_groom(strands), root_normal=np.tile((0.0, 0.0, 1.0), (24, 1)))
+    settings = CardSettings(card_count=2, fly_aways=0.0, bend=0.0)
+    cards, plan = uncut(groom, settings, AtlasSettings(columns=1, rows=1))
+    assert plan is not None and len(cards) == 2 and len(plan.strips) == 1
+    mesh = strip_mesh([(np.arange(2), cards.strips)], cards, 1, settings)
+    drawn = flat_strands(plan, grid, groom.radius).place[:, 0]
+    for card, middle in enumerate(cards.strips.frames.center[:, 0, 1]):
+        slope = slopes[int(middle > 0.25)]
+        found = _on_mesh(mesh, card, drawn)
+        away = found[:, 0] - slope * (found[:, 1] - 0.5 * (middle > 0.25))
+        assert np.abs(away).max() < 1e-3, "or the edge of the card is square"
+
+
+def _on_mesh(mesh: CardMesh, card: int, uv: np.ndarray) -> np.ndarray:
+    """Points of a card at these places in the texture, (n, 3)."""
+    triangles = mesh.triangles[mesh.card == card]
+    corners = np.concatenate([mesh.uv[triangles], np.ones((len(triangles), 3, 1))], axis=2)
+    points = np.concatenate([uv, np.ones((len(uv), 1))], axis=1)
+    weights = np.einsum("pi,tij->ptj", points, np.linalg.inv(corners))
+    inside = weights.min(axis=2).argmax(axis=1)
+    weight = weights[np.arange(len(uv)), inside]
+    assert weight.min() > -1e-4
+    return np.einsum("pj,pji->pi", weight, mesh.positions[triangles[inside]])
 
 
 def test_crossed_cards_have_the_tile_and_group_of_their_pair() -> None:

@@ -3,8 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
-from hairloom.addon.cards.fit import cluster_of_strands, fit_strips, with_fly_aways
+from hairloom.addon.cards.fit import (
+    cluster_of_strands,
+    fit_strips,
+    root_slopes,
+    with_fly_aways,
+)
 from hairloom.addon.cards.segments import fewest_segments, segment_errors, with_segments
 from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.cards.strip import Strips
@@ -112,14 +118,27 @@ def test_a_card_reaches_to_where_most_of_its_strands_end() -> None:
 def test_a_card_reaches_back_to_its_rearmost_roots_along_the_head() -> None:
     """Roots spread along the head, with hair that rises at 45 or 63 degrees. The card of upright
     hair is not lengthened."""
-    spread = 0.02 / 3.0**0.5
+    spread, order = 0.02 / 3.0**0.5, np.random.default_rng(0).permutation(400)
     for lean, begins in ((1.0, -1.7 * spread), (0.5, -0.85 * spread), (0.0, 0.0)):
-        grid = flat_bundle((0.2, 0.0, 0.0), 400)
-        grid[..., 1] -= np.linspace(-0.02, 0.02, 400, dtype=np.float32)[:, None] * lean
+        grid = flat_bundle((8.0, 0.0, 0.0), 400)
+        grid[..., 1] -= np.linspace(-0.02, 0.02, 400, dtype=np.float32)[order, None] * lean
         grid[..., 1] += lean * grid[..., 2]
         strips = fitted(grid, (0.0, 0.0, -1.0))
-        np.testing.assert_allclose(strips.frames.center[0, 0, 1], -begins, atol=2e-4)
+        np.testing.assert_allclose(strips.frames.center[0, 0, 1], -begins, atol=4e-4)
         np.testing.assert_allclose(strips.frames.center[0, 0, [0, 2]], 0.0, atol=2e-4)
+
+
+@pytest.mark.parametrize("slope", [-1.5, 0.0, 0.6, 9.0])
+def test_a_slanted_line_of_roots_slants_the_card_and_does_not_lengthen_it(slope: float) -> None:
+    """Steeper lines than 2 are slanted by 2, and the card reaches back for the rest."""
+    grid = flat_bundle((1.0, 0.0, 0.0), 400)
+    grid[..., 2] -= slope * grid[:, :1, 0]
+    strips = fitted(grid, (0.0, -1.0, 0.0))
+    along = strips.frames.side[0, 0] @ np.array([1.0, 0.0, 0.0])
+    found = root_slopes(strips.frames, grid, one_cluster(grid))
+    np.testing.assert_allclose(found, np.clip(slope, -2.0, 2.0) * along, atol=1e-3)
+    beyond = 1.7 * max(abs(slope) - 2.0, 0.0) * BREADTH / 12.0**0.5
+    np.testing.assert_allclose(strips.frames.center[0, 0, 2], beyond, atol=2e-4)
 
 
 def test_nineteen_of_twenty_places_of_a_groom_lie_on_their_card() -> None:
