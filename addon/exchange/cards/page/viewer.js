@@ -41,7 +41,7 @@ async function show() {
   });
   renderer.toneMapping = THREE.LinearToneMapping; // as Hairloom's own pictures
   renderer.shadowMap.enabled = true;
-  renderer.shadowMap.type = THREE.PCFShadowMap;
+  renderer.shadowMap.type = THREE.VSMShadowMap; // soft edges without noise
   renderer.shadowMap.autoUpdate = false;
   const scene = new THREE.Scene();
   const hair = await loadHairloomCards(encodeURIComponent(asset.mesh), {
@@ -287,9 +287,10 @@ function surroundingsOf(scene, { center, radius }, redraw) {
   });
   suns.forEach(({ target, shadow }) => {
     target.position.copy(center);
-    shadow.mapSize.set(1024, 1024);
+    shadow.mapSize.set(512, 512);
     shadow.normalBias = 0.01 * radius;
-    shadow.radius = 3;
+    shadow.radius = 10;
+    shadow.blurSamples = 20;
     Object.assign(shadow.camera, { left: -1.5 * radius, right: 1.5 * radius, bottom: -1.5 * radius, top: 1.5 * radius, near: 0.5 * radius, far: 8 * radius });
     scene.add(target);
   });
