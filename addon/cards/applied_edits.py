@@ -36,7 +36,7 @@ from .edits import (
 )
 from .settings import CardSettings
 from .sort import sorted_by_key
-from .strip import CardFrames, Strips, UncutCards
+from .strip import MAX_ROOT_SLOPE, CardFrames, Strips, UncutCards
 
 #: Motion of the skin below this fraction of a card's length is ignored.
 _MIN_MOTION = 1.0e-3
@@ -451,7 +451,7 @@ def _strips(
     )
     width = np.einsum("cri,cri->cr", across_card, side)
     ahead = np.einsum("ci,ci->c", across_card[:, 0], tangent[:, 0])
-    slope = ahead / np.maximum(width[:, 0], _MIN_LENGTH)
+    slope = np.clip(ahead / np.maximum(width[:, 0], _MIN_LENGTH), -MAX_ROOT_SLOPE, MAX_ROOT_SLOPE)
     normal = np.cross(side, tangent)
     # a flipped card has its left edge on the right
     is_inward = np.einsum("cri,cri->c", normal, facing) < 0.0

@@ -15,7 +15,7 @@ from ..arrays import Floats, Ints, piece_starts
 from ..strands.frames import tangents, transported_normals
 from .clusters import cluster_strands
 from .settings import CardSettings
-from .strip import CardFrames, Strips
+from .strip import MAX_ROOT_SLOPE, CardFrames, Strips
 
 #: Half a card's width in standard deviations of its strands: sqrt(3) covers evenly spread strands.
 _COVERED_DEVIATIONS = 1.8
@@ -28,11 +28,9 @@ _MIN_WIDTH = 0.25
 _TIP_REACH = 1.3
 #: And before the mean root: sqrt(3) covers evenly spread roots, so that no parting is bald.
 _ROOT_REACH = 1.7
-#: Largest slope of a card's root edge, along over across the card.
-_MAX_ROOT_SLOPE = 2.0
 #: Cards of hair that leans away from the upright by more than this sine reach back in full.
 _MIN_LEANING = 1.0 / 3.0
-_TINY = 1e-12
+_TINY = 1e-30
 
 
 def cluster_of_strands(
@@ -133,7 +131,7 @@ def root_slopes(frames: CardFrames, grid: Floats, cluster: Ints) -> Floats:
     aside = aside - (np.bincount(cluster, aside) / count)[cluster]
     spread = np.maximum(np.bincount(cluster, aside**2), _TINY)
     slope = np.bincount(cluster, aside * ahead) / spread
-    return np.clip(slope, -_MAX_ROOT_SLOPE, _MAX_ROOT_SLOPE).astype(np.float32)
+    return np.clip(slope, -MAX_ROOT_SLOPE, MAX_ROOT_SLOPE).astype(np.float32)
 
 
 def _ahead_of_slant(frames: CardFrames, grid: Floats, cluster: Ints) -> Floats:

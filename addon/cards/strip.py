@@ -24,8 +24,9 @@ from .sort import sorted_by_key
 
 #: Roots whose distance to their neighbours is measured.
 _SPACING_SAMPLES = 512
-#: Part of a card, from its root, within which a slanted root edge becomes square.
-_SLANTED_PART = 0.25
+#: Largest slope of a root edge, along over across the card; and the part of a card, from its root,
+#: within which a slanted edge becomes square.
+MAX_ROOT_SLOPE, _SLANTED_PART = 2.0, 0.25
 #: Spacing of a single guide, which has no neighbour, as a fraction of its length.
 _SINGLE_GUIDE_SPACING = 0.04
 
