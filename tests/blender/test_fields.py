@@ -196,7 +196,7 @@ def test_blenders_playback_waits_and_takes_over(new_hair, sphere, get_depsgraph,
     session = previews.start(hair, get_depsgraph())
     previews.play(get_depsgraph(), blocking=False)
     bpy.context.scene.frame_set(bpy.context.scene.frame_start)
-    previews.previews[session.uid].follow(get_depsgraph())
+    previews.previews[session.uid].follow_frame(get_depsgraph())
     assert session.is_playing and previews.previews[session.uid].phase is not Phase.WAITING
     previews.advance(get_depsgraph(), FRAME)
     scene_events.clear()

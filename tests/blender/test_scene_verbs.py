@@ -409,6 +409,19 @@ def test_settings_that_no_object_has_are_refused(
     assert not scene.with_name("out.blend").exists()
 
 
+@pytest.mark.parametrize("verb", ["bake", "export"])
+def test_settings_that_a_verb_does_not_use_are_refused(
+    verb: str, scene: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Neither a bake nor an export has a stage."""
+    output = scene.with_name("out.usdc" if verb == "export" else "baked")
+    base = [verb, "--scene", str(scene), "--object", "Hair", "--output", str(output)]
+    for option in (("--preset", "stage/daylight"), ("--set", "stage.exposure=1")):
+        assert command_line.run([*base, *option]) == 1
+        assert "Hair: it has no settings of 'stage'" in capsys.readouterr().err
+    assert not output.exists()
+
+
 def test_a_render_of_a_scene_draws_its_hair(
     scene: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

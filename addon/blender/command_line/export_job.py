@@ -47,7 +47,7 @@ from .job_steps import (
     report_dropped_strands,
     report_notes,
 )
-from .object_settings import change_settings, grooms_to_export
+from .object_settings import change_settings, check_sections, grooms_to_export
 from .output_checks import check_not_an_input
 from .verb import Verb
 
@@ -99,6 +99,8 @@ def _plan_of_objects(
     options, depsgraph = job.options, bpy.context.evaluated_depsgraph_get()
     hair, notes = grooms_to_export(options.object)
     report_notes(list(notes), job.report)
+    section = StrandExportSettings.section
+    check_sections(hair, options.preset, options.set, job_section=section)
     for each in hair:
         change_settings(each, options.preset, options.set)
         if options.children_density:

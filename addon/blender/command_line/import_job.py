@@ -21,7 +21,7 @@ from ..strands.import_groom import (
 )
 from .job_options import add_head_scale_option
 from .job_steps import Job, report_notes
-from .object_settings import change_settings, named_objects
+from .object_settings import change_settings, check_sections, named_objects
 from .verb import Verb
 
 
@@ -45,6 +45,7 @@ def import_grooms(job: Job) -> None:
         print(
             "; ".join(filter(None, (outcome.result, dropped_phrase(outcome.dropped)))), flush=True
         )
+        check_sections(hair, options.preset, options.set)
         for each in hair:
             change_settings(each, options.preset, options.set)
             count = len(each.data.curves)

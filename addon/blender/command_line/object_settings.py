@@ -179,19 +179,27 @@ def _check_growth(obj: bpy.types.Object) -> None:
 
 
 def check_sections(
-    objects: list[bpy.types.Object], presets: list[str], assignments: list[str]
+    objects: list[bpy.types.Object],
+    presets: list[str],
+    assignments: list[str],
+    *,
+    job_section: str = "",
 ) -> None:
     """Refuse settings that act on none of these objects, and presets of such settings only.
+
+    Args:
+        job_section: settings of the job itself, which it uses beside those of the objects.
 
     Raises:
         HairloomError: naming the first of them.
     """
     hair = [obj for obj in objects if _is_simulated(obj)]
-    kept = {name for name in ALL_SETTINGS if any(_group(obj, name) is not None for obj in hair)}
-    wanted = [[section] for section in ALL_SETTINGS if overrides(assignments, section)]
-    wanted += [[each.section for each in named_preset(name).all] for name in presets]
-    for sections in wanted:
-        if kept.isdisjoint(sections):
+    used = {name for name in ALL_SETTINGS if any(_group(obj, name) is not None for obj in hair)}
+    used.add(job_section)
+    requested = [[section] for section in ALL_SETTINGS if overrides(assignments, section)]
+    requested += [[each.section for each in named_preset(name).all] for name in presets]
+    for sections in requested:
+        if used.isdisjoint(sections):
             raise _no_settings(objects, sections[0])
 
 
