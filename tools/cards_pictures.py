@@ -66,8 +66,9 @@ class Shots:
 
     def cards(self, mesh: Any, drawn: Any, back: Any = None) -> Any:
         """A picture of these cards alone of all drawn ones, with the order of their back faces."""
-        seen = drawn.skin_seen if mesh is drawn.mesh else None  # one value per vertex
-        shown = replace(drawn, mesh=mesh, back_triangles=back, skin_seen=seen)
+        shown = replace(drawn, mesh=mesh, back_triangles=back)
+        if len(mesh.positions) != len(drawn.mesh.positions):  # they have one value per vertex
+            shown = replace(shown, skin_seen=None, openness=None, depth=None)
         return self._studio.card_picture(shown, WIDTH, HEIGHT, SAMPLES)
 
 
