@@ -348,12 +348,12 @@ def uncut_cards(
     owner = np.resize(np.arange(len(first)), len(strips))
     cards = _with_random_tiles(strips, count[owner], strands.group[first][owner], settings)
     cards = _with_outward_normals(cards, groom)
-    slope = np.zeros(len(strips), np.float32)
-    slope[: len(first)] = root_slopes(strips.select(np.arange(len(first))).frames, grid, cluster)
-    cards = replace(cards, root_slope=slope)
+    uncrossed = strips.select(np.arange(len(first)))
+    slope = root_slopes(uncrossed.frames, grid, cluster)
+    # root edges of second cards are square
+    cards = replace(cards, root_slope=np.pad(slope, (0, len(strips) - len(first))))
     if not is_baked:
         return cards, None
-    uncrossed = strips.select(np.arange(len(first)))
     rim = is_at_rim(grid, groom.root_normal, len(grid) / len(first))
     plan = plan_atlas(
         uncrossed,
@@ -363,8 +363,8 @@ def uncut_cards(
         strands.group,
         atlas,
         strands.color_grid,
-        slope[: len(first)],
-        np.bincount(cluster, rim) > 0.5 * np.bincount(cluster),
+        root_slope=slope,
+        is_rim=np.bincount(cluster, rim) > 0.5 * np.bincount(cluster),
     )
     strips = _with_width_factor(cards.strips, plan.width_factor[owner])
     return replace(cards, strips=strips, tile=plan.tile[owner], atlas=plan.grid), plan

@@ -110,6 +110,18 @@ def test_files_of_all_formats_come_into_a_scene_on_a_head_from_a_file(
         np.testing.assert_allclose(points, expected, atol=1e-6)
 
 
+def test_settings_that_imported_hair_does_not_have_are_refused(
+    tmp_path: Path, head: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_groom_alembic(tmp_path / "hair.abc", hairdo())
+    scene = tmp_path / "scene.blend"
+    arguments = ["import", str(tmp_path / "hair.abc"), "--head", str(head)]
+    arguments += ["--output", str(scene), "--preset", "stage/daylight"]
+    assert command_line.run(arguments) == 1
+    assert "hair: it has no settings of 'stage'" in capsys.readouterr().err
+    assert not scene.exists()
+
+
 def test_guides_can_be_apart_on_a_head_of_the_scene(tmp_path: Path, sphere: Any) -> None:
     sphere.scale = (1.5, 1.5, 1.0)
     sphere.location.z = 0.1

@@ -15,12 +15,7 @@ from ..base.report import Report
 from ..preview.bake import Bake, free, is_bakeable, show_in_renders
 from .job_options import add_frames_option, add_object_option, frames_of_option
 from .job_steps import Job, report_notes
-from .object_settings import (
-    change_settings,
-    check_sections,
-    named_objects,
-    usable_objects,
-)
+from .object_settings import change_settings, check_sections, named_objects, usable_objects
 from .scene_files import save_scene
 from .verb import Verb
 
