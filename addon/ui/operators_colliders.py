@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 from bpy.props import BoolProperty
 
-from ..blender.base.objects import head_of
+from ..blender.base.objects import OVERRIDE, head_of
 from ..blender.base.outcome import report
 from ..blender.colliders import spheres
 from ..blender.colliders.spheres import FittedSpheres, SphereFitSettings
@@ -47,8 +47,21 @@ class HAIRLOOM_OT_fit_spheres(LongWork, bpy.types.Operator):
         fitting = spheres.fit_spheres_to(mesh, context, settings_of(self, SphereFitSettings))
         fitted = yield from steps_of_parts(fitting)
         for hair in spheres.hair_on(mesh, context.view_layer):
-            spheres.use_spheres(hair, fitted.collection, context.scene)
-        if self.replace_mesh:
+            if hair.is_editable:
+                spheres.use_spheres(hair, fitted.collection, context.scene)
+            else:
+                report(
+                    self,
+                    "WARNING",
+                    f"{hair.name} is linked from another file, so it does not use them. {OVERRIDE}",
+                )
+        if self.replace_mesh and not mesh.is_editable:
+            report(
+                self,
+                "WARNING",
+                f"{mesh.name} is linked from another file, so it still collides, too. {OVERRIDE}",
+            )
+        elif self.replace_mesh:
             spheres.replace_mesh(mesh, fitted.collection)
         self._report(mesh, fitted)
 

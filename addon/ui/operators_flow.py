@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 from bpy.props import StringProperty
 
+from ..blender.base.objects import check_settings_editable
 from ..blender.base.outcome import report
 from ..blender.base.parts import batched
 from ..blender.properties.groups import operator_properties
@@ -38,6 +39,7 @@ class HAIRLOOM_OT_add_stroke(bpy.types.Operator):
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
         hair = chosen_hair(context)[0]
+        check_settings_editable(hair)
         strokes = selected_or_new_lines(hair, "Stroke", context)
         add_to_collection(hair, COLLECTION_PROPERTY, COLLECTION_LABEL, strokes, context.scene)
         names = ", ".join(stroke.name for stroke in strokes)

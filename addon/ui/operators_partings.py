@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 from bpy.props import StringProperty
 
+from ..blender.base.objects import check_settings_editable
 from ..blender.base.outcome import report
 from ..blender.base.parts import batched
 from ..blender.properties.groups import operator_properties
@@ -35,6 +36,7 @@ class HAIRLOOM_OT_add_parting(bpy.types.Operator):
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
         hair = chosen_hair(context)[0]
+        check_settings_editable(hair)
         lines = selected_or_new_lines(hair, "Parting", context)
         partings.add_partings(hair, lines, context.scene)
         names = ", ".join(line.name for line in lines)

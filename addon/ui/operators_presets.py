@@ -10,6 +10,7 @@ import bpy
 from bpy.props import StringProperty
 from bpy_extras.io_utils import ImportHelper, poll_file_object_drop
 
+from ..blender.base.objects import check_editable
 from ..blender.base.outcome import report
 from ..blender.properties.presets import (
     OWN_PREFIX,
@@ -55,7 +56,13 @@ class HAIRLOOM_OT_apply_preset(bpy.types.Operator):
 
 
 def _apply(all_settings: Iterable[Any], context: bpy.types.Context) -> None:
-    """Apply a preset to the selected hair, and to its material if that is one of ours."""
+    """Apply a preset to the selected hair, and to its material if that is one of ours.
+
+    Raises:
+        HairloomError: some hair is linked from another file. Nothing is changed then.
+    """
+    for hair in chosen_hair(context):
+        check_editable(hair)
     for hair in chosen_hair(context):
         for settings in all_settings:
             apply(settings, hair)
@@ -174,7 +181,10 @@ class HAIRLOOM_OT_look_from_material(bpy.types.Operator):
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
         depsgraph = context.evaluated_depsgraph_get()
-        for hair in filter(has_principled_hair, chosen_hair(context)):
+        grooms = list(filter(has_principled_hair, chosen_hair(context)))
+        for hair in grooms:
+            check_editable(hair)
+        for hair in grooms:
             group = hair.data.hairloom.shading
             before = settings_of(group, group.settings)
             settings, notes = look_from_material(hair, depsgraph, before)
@@ -198,6 +208,8 @@ class HAIRLOOM_OT_look_to_material(bpy.types.Operator):
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
+        for hair in chosen_hair(context):
+            check_editable(hair)
         for hair in chosen_hair(context):
             material, notes = apply_look(hair)
             report(self, "INFO", f"{hair.name} has the material '{material.name}'")

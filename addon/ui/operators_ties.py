@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 from bpy.props import StringProperty
 
-from ..blender.base.objects import head_of
+from ..blender.base.objects import check_settings_editable, head_of
 from ..blender.base.outcome import report
 from ..blender.colliders import ties
 from .drawing import draw_section
@@ -29,6 +29,7 @@ class HAIRLOOM_OT_add_hair_tie(bpy.types.Operator):
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
         hair = chosen_hair(context)[0]
+        check_settings_editable(hair)
         rings = [obj for obj in context.selected_objects if _can_be_tie(obj, hair)]
         if not rings:
             rings = [ties.new_ring(hair, context)]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 from bpy.props import StringProperty
 
+from ..blender.base.objects import check_settings_editable
 from ..blender.base.parts import batched
 from ..blender.scene.hair_collections import add_to_collection, remove_from_collection
 from ..blender.scene.shape_backup import BEFORE_TRIM
@@ -47,17 +48,18 @@ class HAIRLOOM_OT_trim_to_shape(LongWork, bpy.types.Operator):
         return False
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
-        depsgraph, grooms = context.evaluated_depsgraph_get(), []
-        for hair in chosen_hair(context):
-            shapes = _selected_trim_shapes(hair, context)
+        depsgraph, chosen = context.evaluated_depsgraph_get(), chosen_hair(context)
+        selected = {hair: _selected_trim_shapes(hair, context) for hair in chosen}
+        for hair, shapes in selected.items():
             for obj in shapes:
+                check_settings_editable(hair)
                 read_shape(obj, depsgraph)
+        for hair, shapes in selected.items():
             if shapes:
                 add_to_collection(
                     hair, COLLECTION_PROPERTY, COLLECTION_LABEL, shapes, context.scene
                 )
-            if trim_shapes_of(hair):
-                grooms.append(hair)
+        grooms = [hair for hair in chosen if trim_shapes_of(hair)]
         jobs = (trim_to_shapes(hair, depsgraph) for hair in without_linked_duplicates(grooms))
         for outcome in (yield from steps_of_parts(batched(jobs))):
             report_outcome(self, outcome)

@@ -6,6 +6,7 @@ import bpy
 import numpy as np
 import pytest
 from grids import baked_grid, strand_grid
+from selecting import select
 from swinging import FRAME_S, tips_lag
 from tiers import few_in_commits
 
@@ -77,6 +78,56 @@ def test_a_linked_groom_is_shown_as_it_is_there(library):
     assert previews.play(bpy.context.evaluated_depsgraph_get()) == []
     previews.advance(bpy.context.evaluated_depsgraph_get(), FRAME_S)
     assert np.isfinite(strand_grid(session)).all() and previews.notice() == ""
+
+
+@pytest.fixture
+def linked(library):
+    """Hair of the library, linked and selected, beside a selected local Empty."""
+    bpy.context.scene.collection.children.link(brought(library, link=True))
+    hair, empty = bpy.data.objects["Hair"], bpy.data.objects.new("Cut", None)
+    bpy.context.scene.collection.objects.link(empty)
+    bpy.context.view_layer.update()
+    select(hair)
+    return hair
+
+
+@pytest.mark.parametrize(
+    ("operator", "options"),
+    [
+        ("add_hair_tie", {}),
+        ("add_parting", {}),
+        ("add_stroke", {}),
+        ("trim_to_shape", {}),
+        ("apply_preset", {"name": "looks/blond"}),
+        ("look_to_material", {}),
+    ],
+)
+def test_tools_refuse_linked_hair_which_would_forget_what_they_do(operator, options, linked):
+    """Undo crashes Blender where linked data refers to what the undo removes."""
+    if operator == "trim_to_shape":
+        bpy.data.objects["Cut"].select_set(True)
+    blocks, before = len(bpy.data.user_map()), GroomSettings.of(linked)
+    with pytest.raises(RuntimeError, match="Hair: it is linked from another file"):
+        getattr(bpy.ops.hairloom, operator)(**options)
+    assert len(bpy.data.user_map()) == blocks, "something was added"
+    assert GroomSettings.of(linked) == before and not linked.data.materials
+
+
+def test_linked_hair_stays_as_its_file_has_it_where_other_objects_are_made(linked, capfd):
+    """Undo does not bring changes of linked data back."""
+    before = GroomSettings.of(linked)
+    assert bpy.ops.hairloom.use_groom() == {"FINISHED"}
+    assert GroomSettings.of(linked) == before
+    select(linked)
+    assert bpy.ops.hairloom.make_real() == {"FINISHED"}
+    assert not linked.hide_render and not linked.hide_viewport
+    select(linked)
+    assert bpy.ops.hairloom.fit_spheres(sphere_count=4) == {"FINISHED"}
+    assert linked.hairloom.collider_collection is None
+    assert linked.parent.hairloom.collider_shape == "automatic"
+    said = capfd.readouterr().out
+    assert "still shown" in said and "does not use them" in said and "still collides" in said
+    assert bpy.data.objects["Hair Real"].hairloom.collider_collection is not None
 
 
 def test_an_override_has_settings_of_its_own_which_last(override, tmp_path):

@@ -10,13 +10,11 @@ import bpy
 
 from ...errors import HairloomError
 from ...exchange.files.file_names import name_key, safe_folder_name
+from ..base.objects import OVERRIDE
 from .cache import owner_and_file
 
 #: Folder beside Blender files; it holds one folder of bakes for each file.
 _CACHE_FOLDER = "//hairloom_cache"
-
-#: remedy for a linked object
-OVERRIDE = "Make a library override of it (Object > Library Override > Make)"
 
 
 def frames_of(obj: bpy.types.Object, scene: bpy.types.Scene) -> range:

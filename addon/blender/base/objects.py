@@ -22,6 +22,9 @@ type LayerKey = tuple[int, str]
 #: above this ratio of scales along two axes, an object counts as flat
 _MAX_CONDITION_NUMBER = 1e6
 
+#: remedy for a linked object whose settings must change
+OVERRIDE = "Make a library override of it (Object > Library Override > Make)"
+
 
 class ObjectGoneError(HairloomError):
     """An object no longer exists."""
@@ -122,6 +125,19 @@ def check_editable(obj: bpy.types.Object) -> None:
         raise HairloomError(
             "it is linked from another file", place=obj.name, remedy="Make it local in Blender"
         )
+
+
+def check_settings_editable(obj: bpy.types.Object) -> None:
+    """As `check_editable`, for the settings of the object itself, which an override can change.
+
+    Blender forgets changes of linked data with the file, and crashes on undo where linked data
+    refers to what the undo removes.
+
+    Raises:
+        HairloomError: it cannot be changed in this file.
+    """
+    if not obj.is_editable:
+        raise HairloomError("it is linked from another file", place=obj.name, remedy=OVERRIDE)
 
 
 def is_shape_editable(obj: bpy.types.Object) -> bool:

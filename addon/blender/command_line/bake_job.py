@@ -10,7 +10,8 @@ import bpy
 
 from ...errors import HairloomError
 from ..bakes import playback
-from ..bakes.bake_settings import OVERRIDE, folder_of
+from ..bakes.bake_settings import folder_of
+from ..base.objects import OVERRIDE
 from ..base.report import Report
 from ..preview.bake import Bake, free, is_bakeable, show_in_renders
 from .job_options import add_frames_option, add_object_option, frames_of_option

@@ -10,8 +10,7 @@ import bpy
 from ...errors import HairloomError
 from ...parameters import ALL_SETTINGS
 from ...params import Settings, SettingsMap
-from ..bakes.bake_settings import OVERRIDE
-from ..base.objects import objects_in, without_hidden
+from ..base.objects import OVERRIDE, objects_in, without_hidden
 from ..properties.presets import named_preset
 from ..properties.properties import settings_of
 from ..scene.fin_modifier import fin_modifier

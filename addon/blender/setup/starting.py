@@ -132,7 +132,8 @@ def prepare_existing_hair(
 ) -> Parts[tuple[bpy.types.Object, tuple[str, ...]]]:
     """Prepare Blender's hair curves for Hairloom; returns the groom, and what was done.
 
-    Blender's Hair Dynamics is muted. Empty hair is replaced by a new groom.
+    Blender's Hair Dynamics is muted. Empty hair is replaced by a new groom. Linked hair stays as
+    its file has it.
 
     Args:
         presets: for hair whose look has not been set.
@@ -141,6 +142,9 @@ def prepare_existing_hair(
         HairloomError: it has no curves, and no surface to grow some on.
     """
     done, factor = [], 1.0
+    if not (hair.is_editable and hair.data.is_editable):
+        yield Part("Reading the hair", lambda: None)
+        return hair, ()
     if not len(hair.data.curves) and not read_curves(hair, depsgraph).strands.strand_count:
         hair, factor = yield from _replace_empty_hair(hair, depsgraph)
         done.append("grew hair, since there was none")

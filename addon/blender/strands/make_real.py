@@ -73,7 +73,7 @@ def make_real(
     widths and colours, and a material equal to the look.
 
     Drawn by Hairloom they look the same: they keep the settings, except those whose effects are in
-    the curves themselves. The original hair is hidden.
+    the curves themselves. The original hair is hidden, unless it is linked from another file.
 
     Raises:
         HairloomError: there is no usable hair, or some is of another scale than its head. Nothing
@@ -137,10 +137,17 @@ def _add_real_hair(hair: bpy.types.Object, drawn: _DrawnHair) -> RealHair:
     _, notes = set_look_material(
         real.data, real_look(settings[ShadingSettings]), has_final_colors=True
     )
-    _hide(hair)
-    result = f"Made {strands.strand_count:,} strands real: {real.name}. {hair.name} is hidden"
-    warnings = (*source.warnings, *notes_of(hair, rig), *(f"{real.name}: {each}" for each in notes))
-    return RealHair(real, Outcome(result, dict(source.dropped), warnings))
+    result = f"Made {strands.strand_count:,} strands real: {real.name}"
+    warnings = [*source.warnings, *notes_of(hair, rig), *(f"{real.name}: {each}" for each in notes)]
+    if hair.is_editable:
+        _hide(hair)
+        result += f". {hair.name} is hidden"
+    else:
+        warnings.append(
+            f"{hair.name} is linked from another file, so it is still shown and rendered: exclude "
+            "its collection, or hide it in that file"
+        )
+    return RealHair(real, Outcome(result, dict(source.dropped), tuple(warnings)))
 
 
 def real_look(shading: ShadingSettings) -> ShadingSettings:
