@@ -444,6 +444,21 @@ def test_a_render_of_a_scene_draws_its_hair(
     assert "several objects: Fringe, Hair" in message and "--groom" in message
 
 
+def test_a_scene_that_is_already_open_gives_the_hair_or_has_none(
+    scene: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As in `blender -b wig.blend --command hairloom`: no other hair is grown in its place."""
+    bpy.ops.wm.open_mainfile(filepath=str(scene))
+    job = ["simulate", "--seconds", "0.05", "--output", str(scene.with_name("baked"))]
+    assert command_line.run(["export", "--output", str(scene.with_name("out.tfx"))]) == 0
+    assert "Wrote 60 strands to out.tfx" in capsys.readouterr().out
+    bpy.data.objects.remove(bpy.data.objects["Hair"])
+    bpy.ops.wm.save_mainfile()
+    for more in ([], ["--scene", str(scene)]):
+        assert command_line.run([*job, *more]) == 1
+        assert f"{scene}: there is no hair in this scene. " in capsys.readouterr().err
+
+
 @pytest.mark.alike
 @pytest.mark.parametrize("how", ["collection", "collider", "left out"])
 def test_a_shake_of_a_groom_stays_out_of_its_colliders(scene: Path, how: str) -> None:

@@ -128,6 +128,15 @@ def test_a_name_that_no_file_can_have_is_named(
     assert not picture.exists()
 
 
+def test_a_misspelt_option_gets_the_usage_of_its_verb_and_a_suggestion(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert run(["render", "--prest", "looks/blond", "--output", "still.png"]) == 2
+    message = capsys.readouterr().err
+    assert message.startswith("usage: hairloom render ")
+    assert message.endswith("--prest looks/blond. Did you mean --preset?\n")
+
+
 def test_a_look_is_no_stage(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     picture = tmp_path / "still.png"
     assert run(["render", "--stage", "looks/blond", "--output", str(picture)]) == 1

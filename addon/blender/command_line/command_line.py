@@ -20,12 +20,13 @@ from ..base.interruption import Interrupted, interruptible
 from ..base.parts import run_parts
 from ..base.report import Report
 from ..setup.hairstyles import add_hairstyle, add_head, named_hairstyle
+from .arguments import VerbParser, check_empty_values
 from .bake_job import BAKE
 from .cards_job import CARDS
 from .demo_job import DEMO
 from .export_job import EXPORT
 from .grow_job import GROW
-from .idle_options import check_idle_options
+from .idle_options import check_idle_options, has_scene
 from .import_job import IMPORT
 from .inputs import Sources
 from .job_options import check_numbers, settings_from_options
@@ -73,7 +74,7 @@ def run(arguments: list[str]) -> int:
     if not _write_report(report, options.report):
         return 1
     try:
-        code = _run_and_report(verb, options, report)
+        code = _run_and_report(verb, options, arguments, report)
     except Exception as fault:
         report.fail(_internal_error(fault))
         _write_report(report, options.report)
@@ -89,7 +90,7 @@ def parser() -> argparse.ArgumentParser:
         epilog="'VERB --help' lists the options of a verb. Exit codes: 0 done, 1 bad input, "
         "2 wrong usage, 130 interrupted.",
     )
-    verbs = top.add_subparsers(dest="verb", required=True, metavar="VERB")
+    verbs = top.add_subparsers(dest="verb", required=True, metavar="VERB", parser_class=VerbParser)
     for verb in VERBS:
         verb.add_all_options(
             verbs.add_parser(verb.name, help=verb.summary, description=verb.summary)
@@ -97,9 +98,12 @@ def parser() -> argparse.ArgumentParser:
     return top
 
 
-def _run_and_report(verb: Verb, options: argparse.Namespace, report: Report) -> int:
+def _run_and_report(
+    verb: Verb, options: argparse.Namespace, arguments: list[str], report: Report
+) -> int:
     """Run a verb, and report errors; returns the exit code."""
     try:
+        check_empty_values(arguments)
         with interruptible(), converted_gpu_errors():
             _run_unless_done(verb, options, report)
     except HairloomError as error:
@@ -227,12 +231,12 @@ def _add_hairstyle(options: argparse.Namespace, report: Report) -> str:
 
 
 def _only_groom(options: argparse.Namespace, report: Report) -> str | None:
-    """The only hair of --scene, if no option names another source of hair; else None.
+    """The only hair of the scene, if no option names another source of hair; else None.
 
     Raises:
-        HairloomError: there are several, or it is hidden or empty.
+        HairloomError: there are several, there is none, or it is hidden or empty.
     """
-    if not options.scene or options.head or getattr(options, "bake", None):
+    if not has_scene(options) or options.head or getattr(options, "bake", None):
         return None
     found, notes = usable_objects(is_groom, "--groom")
     report_notes(list(notes), report)
@@ -243,7 +247,14 @@ def _only_groom(options: argparse.Namespace, report: Report) -> str | None:
             place="--scene",
             remedy="Name one of them with --groom",
         )
-    return grooms[0] if grooms else None
+    if not grooms:
+        raise HairloomError(
+            "there is no hair in this scene",
+            place=options.scene or bpy.data.filepath,
+            remedy="Name a file with --groom, a hairstyle with --style, or with --head a mesh on"
+            " which hair is grown",
+        )
+    return grooms[0]
 
 
 def _children_density(groom: str | None) -> str:

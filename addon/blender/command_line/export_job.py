@@ -207,12 +207,12 @@ def _print_check(facts: dict[str, Any], form: str) -> None:
 
 def add_export_options(parser: argparse.ArgumentParser) -> None:
     """Add the artist's export settings, and options for frames."""
-    add_bake_frame_options(parser, "; for --object, or all hair of --scene, a frame of the scene")
+    add_bake_frame_options(parser, "; for --object, or all hair of the scene, a frame of the scene")
     hair = parser.add_argument_group("hair of the scene")
     add_object_option(
         hair,
         "hair curves to export; can be repeated to write several into one file (default: all hair "
-        "of --scene)",
+        "of the scene)",
     )
     add_frames_option(
         hair,

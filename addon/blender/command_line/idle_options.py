@@ -23,14 +23,19 @@ class _IdleOptions:
     remedy: str
 
 
+def has_scene(options: argparse.Namespace) -> bool:
+    """Whether a scene is named, by --scene or as the file that Blender was started with."""
+    return bool(options.scene or bpy.data.filepath)
+
+
 def exports_scene_hair(options: argparse.Namespace) -> bool:
     """Whether an export writes hair objects of the scene, with their own settings, head and bake:
-    those of --object, or all of --scene if no other source of strands is named.
+    those of --object, or all of the scene if no other source of strands is named.
     """
     if not hasattr(options, "object") or not hasattr(options, "groom"):
         return False
     has_other_source = options.groom or options.head or options.style or options.bake is not None
-    return bool(options.object or (options.scene and not has_other_source))
+    return bool(options.object or (has_scene(options) and not has_other_source))
 
 
 def _is_in_file(options: argparse.Namespace) -> bool:

@@ -140,7 +140,7 @@ def check_writable(path: Path) -> None:
         raise HairloomError(
             "this names a folder, not a file",
             place=str(path),
-            remedy="Give a file name; if it comes from a variable, that may be empty",
+            remedy="Give a file name",
         )
     try:
         why = reason_not_replaceable(path) or reason_not_creatable(path)
