@@ -91,6 +91,69 @@ def test_undo_and_redo_of_a_moved_head_and_edited_hair(new_hair, sphere, get_dep
     assert overlay.drawing_of(session.uid).snapshot.shading.ambient == 0.125
 
 
+def delete(name):
+    bpy.data.objects.remove(bpy.data.objects[name])
+    update()
+
+
+def add_vertices(name):
+    bpy.data.objects[name].modifiers.new("Smooth", "SUBSURF").levels = 1
+    update()
+
+
+def undo(step=bpy.ops.ed.undo):
+    """Undo or redo a step, and let the timers run that this starts."""
+    step()
+    for timer in (scene_events.follow_undo, scene_events._read_again):
+        if bpy.app.timers.is_registered(timer):
+            bpy.app.timers.unregister(timer)
+            timer()
+
+
+@pytest.mark.parametrize(
+    ("change", "name"), [(delete, "Hair"), (delete, "Head"), (add_vertices, "Head")]
+)
+def test_undoing_what_ended_a_preview_brings_it_back(change, name, new_hair, sphere, get_depsgraph):
+    hair = new_hair(sphere)
+    bpy.ops.ed.undo_push(message="begin")
+    before = strand_grid(previews.start(hair, get_depsgraph()))
+    change(name)
+    assert previews.sessions() == () and "ended" in previews.notice()
+    bpy.ops.ed.undo_push(message="changed")
+
+    undo()
+    (session,) = previews.sessions()
+    assert strand_grid(session) == pytest.approx(before, abs=1e-6)
+    assert overlay.drawing_of(session.uid).is_visible and previews.notice() == ""
+    undo(bpy.ops.ed.redo)
+    assert previews.sessions() == ()
+    undo()
+    assert len(previews.sessions()) == 1
+    previews.stop_all()
+    undo(bpy.ops.ed.redo)
+    undo()
+    assert previews.sessions() == (), "the artist has stopped it"
+
+
+def test_redo_of_a_new_groom_previews_it_again(extension, sphere):
+    bpy.ops.ed.undo_push(message="before")
+    bpy.ops.hairloom.add_groom("EXEC_DEFAULT", True, strand_count=60)
+    undo()
+    assert previews.sessions() == () and previews.notice() == ""
+    undo(bpy.ops.ed.redo)
+    assert [each.name for each in previews.sessions()] == [bpy.context.object.name]
+
+
+def test_cloth_that_an_undo_unmakes_is_no_fault(extension, sphere):
+    bpy.ops.ed.undo_push(message="before")
+    bpy.ops.hairloom.fin_add("EXEC_DEFAULT", True)
+    bpy.ops.hairloom.fin_preview()
+    undo()
+    assert previews.simulations() == () and previews.notice() == ""
+    undo(bpy.ops.ed.redo)
+    assert [each.name for each in previews.simulations()] == ["Head"]
+
+
 def test_loading_a_file_drops_all_previews_and_keeps_the_settings(preview, tmp_path):
     hair, _, session = preview
     hair.data.hairloom.shading.ambient = 0.125

@@ -46,6 +46,8 @@ class Previews(dict[int, Preview]):
     """The previews, by session number of their objects.
 
     notice: why one ended by itself; kept until the next one begins.
+    ended: session numbers of the objects whose previews ended by themselves; an undo may bring back
+        what they lacked. ended_before_undo: those that had ended before the last undo.
     is_paused: whether everything that plays freely is paused.
     last_edit: time of the last edit [s], by the monotonic clock.
     is_reacting: whether a reaction to one of Blender's events is running.
@@ -55,6 +57,8 @@ class Previews(dict[int, Preview]):
     def __init__(self) -> None:
         super().__init__()
         self.notice, self.is_paused = "", False
+        self.ended: set[int] = set()
+        self.ended_before_undo: set[int] = set()
         self.last_edit, self.is_reacting = 0.0, False
         self.built_cards = CardBuildCache()
 
@@ -112,6 +116,7 @@ def add(session: Simulation, depsgraph: bpy.types.Depsgraph) -> None:
     if before is not None:
         before.session.forget()
     previews[session.uid] = preview
+    previews.ended.discard(session.uid)
     publish(preview, depsgraph)
     redraw_panels()
 
@@ -122,6 +127,7 @@ def end() -> None:
     playback.forget()
     previews.built_cards.forget()
     fields.forget()
+    previews.ended.clear()
     previews.notice = ""
 
 
@@ -129,6 +135,7 @@ def forget_all() -> None:
     """`stop_all` for objects that are about to be freed: touches none of them."""
     for uid in tuple(previews):
         _forget(uid)
+    previews.ended.clear()
     previews.notice, previews.is_paused = "", False
     playback.forget()
     previews.built_cards.forget()
@@ -395,6 +402,8 @@ def attempt(
         previews.notice = f"Preview of {session.name} ended. {error}"
         print(f"Hairloom: {previews.notice}")
         stop(session)
+        if isinstance(error, HairloomError):
+            previews.ended.add(session.uid)
 
 
 def publish(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:

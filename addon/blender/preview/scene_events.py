@@ -10,22 +10,27 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from functools import partial
 
 import bpy
 
 from ...dynamics.settings import DynamicsSettings
+from ...errors import HairloomError
 from ...groom.children_settings import ChildrenSettings
 from ...groom.masks import mask_names
 from ...shading.settings import ShadingSettings
 from ..bakes import playback
+from ..bakes.simulation import Simulation
 from ..base import latest_job
 from ..base.originals import refresh_views
 from ..base.redraw import debounce, redraw_panels
 from ..cards.made_objects import card_objects
 from ..cards.occluders import occluder_objects
+from ..scene.fin_modifier import fin_modifier
 from ..sessions.session import Session
 from ..viewport import view_transform
+from . import fins
 from . import previews as registry
 from .phases import Event, Phase
 from .preview import Preview
@@ -170,27 +175,51 @@ def _refine() -> None:
 def undone() -> None:
     """After undo or redo, which may have changed anything, read everything again soon.
 
-    Hair whose creation was undone is gone; that needs no report.
+    What was made by an undone step is gone; that needs no report.
     """
-    for _, session in _grooms():
-        if session.hair.handle.find() is None:
+    previews.ended_before_undo = set(previews.ended)
+    for session in registry.simulations():
+        if not _is_there(session):
             registry.stop(session)
+            previews.ended.add(session.uid)
     for preview in previews.values():
         preview.session.is_stale = preview.cards_are_stale = True
     if previews:
         _read_again_soon()
-        if not bpy.app.timers.is_registered(follow_undo):
-            bpy.app.timers.register(follow_undo, first_interval=0.0)
+    if (previews or previews.ended) and not bpy.app.timers.is_registered(follow_undo):
+        bpy.app.timers.register(follow_undo, first_interval=0.0)
 
 
 def follow_undo() -> None:
-    """A timer for Blender: follow curves that undo put back, like curves under a brush."""
+    """A timer for Blender: preview again what undo or redo brought back, and follow curves that it
+    put back, like curves under a brush."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
+    _resume_ended(depsgraph)
     for preview, session in _grooms():
         if preview.phase is Phase.REST:
             attempt(preview, depsgraph, partial(session.follow_combing, depsgraph))
             attempt(preview, depsgraph, partial(session.follow_painted_masks, depsgraph))
         attempt(preview, depsgraph, partial(session.follow_painted_colors, depsgraph))
+
+
+def _resume_ended(depsgraph: bpy.types.Depsgraph) -> None:
+    """Preview objects again whose previews had ended before the undo, if they can be previewed.
+
+    Evaluating what an undo took away, such as a head, ends previews, too: those stay ended.
+    """
+    ended = previews.ended_before_undo & previews.ended
+    for obj in [each for each in bpy.data.objects if each.session_uid in ended]:
+        if not obj.evaluated_get(depsgraph).is_evaluated:
+            continue
+        start = registry.start if obj.type == "CURVES" else fins.start
+        with suppress(HairloomError):  # what ended it is still so
+            start(obj, depsgraph)
+
+
+def _is_there(session: Simulation) -> bool:
+    """Whether its object exists, and is cloth if it was."""
+    obj = session.bodies[0].handle.find()
+    return obj is not None and (isinstance(session, Session) or fin_modifier(obj) is not None)
 
 
 def _read_again_soon() -> None:
