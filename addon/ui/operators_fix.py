@@ -8,7 +8,7 @@ from typing import Any
 
 import bpy
 
-from ..blender.bakes.baked_copy import is_copy_gone, remove_copy
+from ..blender.bakes.baked_copy import remove_copy, render_problem
 from ..blender.base.objects import head_of, is_shape_editable, objects_in
 from ..blender.base.outcome import report
 from ..blender.preview.diagnostics import is_unevenly_scaled, nearest_surface, set_surface
@@ -102,7 +102,8 @@ class HAIRLOOM_OT_unwrap_surface(bpy.types.Operator):
 
 
 class HAIRLOOM_OT_show_in_renders(bpy.types.Operator):
-    """Show hair in renders again after its baked copy was deleted"""
+    """Show the hair itself in renders again, after its bake or the copy that showed it was
+    deleted"""
 
     bl_idname = "hairloom.show_in_renders"
     bl_label = "Show in Renders"
@@ -112,15 +113,14 @@ class HAIRLOOM_OT_show_in_renders(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         if not _can_fix(cls, context):
             return False
-        if any(is_copy_gone(hair) for hair in chosen_hair(context)):
+        if any(map(render_problem, chosen_hair(context))):
             return True
         cls.poll_message_set("Renders show it already, or a copy that shows its bake")
         return False
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        for hair in chosen_hair(context):
-            if is_copy_gone(hair):
-                remove_copy(hair)
+        for hair in filter(render_problem, chosen_hair(context)):
+            remove_copy(hair)
         return {"FINISHED"}
 
 

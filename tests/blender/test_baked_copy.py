@@ -38,6 +38,21 @@ def test_hair_is_rendered_again_after_its_render_copy_is_deleted(hair, get_depsg
     assert not bpy.ops.hairloom.show_in_renders.poll()
 
 
+def test_undoing_the_deletion_of_a_bake_offers_to_render_the_hair_itself(hair):
+    """The files stay deleted, but the copy that showed them is back, and stands still."""
+    bake(hair)
+    bpy.ops.ed.undo_push(message="baked")
+    assert not any(each.operator == "hairloom.show_in_renders" for each in issues_of(hair, None))
+    bpy.ops.hairloom.bake_free("EXEC_DEFAULT", True)
+    bpy.ops.ed.undo()
+    hair = bpy.data.objects["Hair"]
+    assert hair.hide_render and not hair.hairloom.bake.copy.hide_render
+    assert "without motion" in issues_of(hair, None)[-1].text
+    assert bpy.ops.hairloom.show_in_renders() == {"FINISHED"}
+    assert not hair.hide_render and hair.hairloom.bake.copy is None
+    assert not bpy.ops.hairloom.show_in_renders.poll()
+
+
 @pytest.mark.parametrize("handler", [handlers.on_save_pre, handlers.on_load_post])
 def test_a_file_is_never_left_without_hair_in_renders(hair, handler, capsys):
     bake(hair)

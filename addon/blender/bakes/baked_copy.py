@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import bpy
 
+from ...errors import HairloomError
 from ...paint_flow import with_colors
 from ...shading.settings import ShadingSettings
 from ...shading.wet_and_dusty import wet_and_dusty_look
@@ -17,6 +18,7 @@ from ..scene.curves import set_colors
 from ..scene.hair_material import set_look_material
 from ..scene.painted_colors import read_colors
 from . import playback
+from .bake_settings import shown_folder_of
 from .baked_rig import BakedRig
 from .cache import Cache
 
@@ -93,6 +95,24 @@ def is_copy_gone(hair: bpy.types.Object) -> bool:
     """Whether renders hide hair although its copy is in no scene."""
     bake = hair.hairloom.bake
     return bool(bake.hides and not (bake.copy and bake.copy.users_scene))
+
+
+def render_problem(hair: bpy.types.Object) -> str:
+    """Why renders show a baked groom wrongly: its copy is gone, or the bake of that; else "". Fast
+    enough for every redraw."""
+    if is_copy_gone(hair):
+        return "Renders hide it: the copy that showed its bake was deleted"
+    if hair.hairloom.bake.hides and _is_bake_gone(hair.hairloom.bake.copy):
+        return "Renders show it without motion: its bake was deleted"
+    return ""
+
+
+def _is_bake_gone(copy: bpy.types.Object) -> bool:
+    folder = shown_folder_of(copy.data)
+    try:
+        return folder is None or playback.cache_in(folder) is None
+    except HairloomError:  # it is damaged, which the panel reports
+        return False
 
 
 def _write_strands(

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 from ...errors import HairloomError
-from ..bakes.baked_copy import is_copy_gone
+from ..bakes.baked_copy import render_problem
 from ..base.objects import head_of, objects_in
 from ..scene.curves import attach_to_surface, read_curves
 from ..scene.source import dynamics_warnings, hair_dynamics_modifiers
@@ -76,8 +76,7 @@ def issues_of(hair: bpy.types.Object, session: Session | None) -> tuple[Issue, .
     if is_unevenly_scaled(hair):
         text = "Its object is scaled unevenly, so strand widths use the mean of the scales"
         found.append(Issue(text, "hairloom.apply_scale", "Apply Scale"))
-    if is_copy_gone(hair):
-        text = "Renders hide it: the copy that showed its bake was deleted"
+    if text := render_problem(hair):
         found.append(Issue(text, "hairloom.show_in_renders", "Show in Renders"))
     baked = previews.bake_of(hair)
     if baked is not None and baked.changed_inputs:
