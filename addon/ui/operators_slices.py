@@ -19,6 +19,7 @@ class HAIRLOOM_OT_show_slices(bpy.types.Operator):
 
     bl_idname = "hairloom.show_slices"
     bl_label = "Show Opacity Map"
+    bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -40,6 +41,7 @@ class HAIRLOOM_OT_show_skin_shadow(bpy.types.Operator):
 
     bl_idname = "hairloom.show_skin_shadow"
     bl_label = "Show Skin Shadow"
+    bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

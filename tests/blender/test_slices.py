@@ -134,6 +134,20 @@ def test_the_skin_shadow_of_previewed_hair(new_hair: Any, sphere: Any) -> None:
     assert previews.session_of(hair) is None
 
 
+def test_undo_of_a_later_step_keeps_the_picture(new_hair: Any, sphere: Any) -> None:
+    lamp = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
+    bpy.context.scene.collection.objects.link(lamp)
+    hair = new_hair(sphere)
+    hair.data.hairloom.volume.resolution = hair.data.hairloom.skin.skin_resolution = 64
+    bpy.ops.hairloom.preview()
+    bpy.ops.ed.undo_push(message="hair")
+    assert bpy.ops.hairloom.show_skin_shadow("EXEC_DEFAULT", True) == {"FINISHED"}
+    assert bpy.ops.hairloom.show_slices("EXEC_DEFAULT", True) == {"FINISHED"}
+    bpy.ops.ed.undo()
+    assert SKIN_IMAGE in bpy.data.images and IMAGE not in bpy.data.images
+    previews.stop_all()
+
+
 def test_a_lamp_inside_the_hair_is_reported_if_a_view_uses_scene_lights(
     new_hair: Any, sphere: Any
 ) -> None:
