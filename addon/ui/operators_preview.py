@@ -110,11 +110,8 @@ class HAIRLOOM_OT_play(bpy.types.Operator):
             return True
         return needs_hair(cls, context)
 
-    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
-        return self._start_or_stop(context)
-
     @reporting
-    def _start_or_stop(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, context: bpy.types.Context) -> set[str]:
         if previews.is_playing():
             previews.rest(context.evaluated_depsgraph_get(), keep_playing=False)
             stop_ticking()

@@ -1,7 +1,9 @@
 """Children between guides: in the panel, in a preview, in a bake and on the command line."""
 
 import json
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -16,6 +18,8 @@ from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.preview.bake import Bake
 from hairloom.addon.blender.properties.groom_settings import GroomSettings
+from hairloom.addon.blender.sessions.groom_source import GroomSource
+from hairloom.addon.blender.sessions.prepared_groom import requested_rig
 from hairloom.addon.blender.strands.strand_export import StrandExport
 from hairloom.addon.blender.viewport import overlay
 from hairloom.addon.errors import HairloomError
@@ -461,3 +465,16 @@ def test_the_command_line_reports_missing_groups(hair, sphere, tmp_path, capfd):
     facts = json.loads(report.read_text())
     assert facts["children"] == 0
     assert sum("Children need a surface" in note for note in facts["notes"]) == 1
+
+
+@pytest.mark.slow(instead="test_guides_come_first_and_children_after_them")
+def test_the_example_of_the_page_makes_its_hairs(extension, sphere, get_depsgraph):
+    """All but its last line, as Play needs a window."""
+    page = (Path(__file__).parents[2] / "docs" / "refinement.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"^```python\n(.*?)^```$", page, flags=re.M | re.S)
+    code, play = code.rstrip("\n").rsplit("\n", 1)
+    assert play == "bpy.ops.hairloom.play()"
+    known = {}
+    exec(compile(code, "block", "exec"), known)
+    rig = requested_rig(GroomSource(known["hair"], get_depsgraph()).request)
+    assert (len(rig.guides), rig.strands.strand_count) == (762, 762 + 4095)

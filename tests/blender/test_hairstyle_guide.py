@@ -23,7 +23,7 @@ class Walk:
     """Runs the steps of a hairstyle one after another; each returns roots and tips."""
 
     def __init__(self, name):
-        self.known, self.codes = {"bpy": bpy}, iter(STEPS[name])
+        self.known, self.codes = {}, iter(STEPS[name])
 
     def step(self):
         exec(compile(next(self.codes), "step", "exec"), self.known)

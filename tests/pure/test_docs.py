@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import builtins
 import re
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import decisions_index
 import hairstyle_table
 import make_docs
 import pytest
+from guide_steps import TUTORIALS
 
 REPOSITORY = Path(__file__).parents[2]
 PAGES = [
@@ -78,6 +80,44 @@ def test_the_list_of_the_readme_has_every_page() -> None:
     lists = Path("docs/tutorials/README.md")
     there_are = {page.as_posix() for page in docs if page.parent != lists.parent or page == lists}
     assert there_are == listed
+
+
+def python_blocks(page: Path) -> list[str]:
+    """The blocks of a page for artists; those of tutorials with the lines that their list puts
+    first."""
+    blocks = re.findall(r"^```python.*?\n(.*?)^```$", page.read_text("utf-8"), flags=re.M | re.S)
+    lists = REPOSITORY / "docs" / "tutorials" / "README.md"
+    if page.parent != lists.parent or page == lists:
+        return blocks
+    (first,) = python_blocks(lists)
+    return [first + block for block in blocks]
+
+
+def unknown_names(code: str) -> set[str]:
+    """Names that a script uses without having imported or set them."""
+    nodes = list(ast.walk(ast.parse(code)))
+    names = [node for node in nodes if isinstance(node, ast.Name)]
+    known = {node.id for node in names if isinstance(node.ctx, ast.Store)} | set(dir(builtins))
+    known |= {each.name for node in nodes if isinstance(node, ast.Import) for each in node.names}
+    return {node.id for node in names} - known
+
+
+def test_a_block_of_python_can_be_run_as_it_stands() -> None:
+    """What the blocks do is tested in tests/blender: test_tutorials.py, test_hairstyle_guide.py and
+    test_children.py."""
+    blocks = {
+        str(page.relative_to(REPOSITORY)): python_blocks(page)
+        for page in PAGES
+        if not is_for_programmers(page)
+    }
+    unknown = {page: set().union(*map(unknown_names, codes)) for page, codes in blocks.items()}
+    assert {page: names for page, names in unknown.items() if names} == {}
+    assert {page for page, codes in blocks.items() if codes} == {
+        "docs/hairstyles.md",
+        "docs/refinement.md",
+        "docs/tutorials/README.md",
+        *(f"docs/tutorials/{name}.md" for name in TUTORIALS),
+    }, "run the blocks of a new page in a test"
 
 
 def test_the_table_of_the_report_has_every_key_that_verbs_write() -> None:
