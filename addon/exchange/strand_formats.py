@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import HairloomError
+from .files.file_names import with_added_suffix
 from .files.file_space import FileSpace
 from .groom_presets import PRESETS, GroomPreset
 from .hair_file import MAX_SEGMENTS
@@ -150,7 +151,7 @@ def format_of(path: Path, name: str | None = None) -> tuple[Path, StrandFormat]:
         name: of the format; None: the suffix decides.
 
     Raises:
-        HairloomError: the suffix is of no format, or of another one.
+        HairloomError: the suffix is of no format, or of another one; or it names no file.
     """
     if name is None:
         return path, strand_format(path)
@@ -163,4 +164,4 @@ def format_of(path: Path, name: str | None = None) -> tuple[Path, StrandFormat]:
             place=str(path),
             remedy=f"Use {named.suffixes[0]}, or omit the format",
         )
-    return path.with_name(path.name + named.suffixes[0]), named
+    return with_added_suffix(path, named.suffixes[0]), named

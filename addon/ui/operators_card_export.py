@@ -13,7 +13,7 @@ from bpy_extras.io_utils import ExportHelper
 from ..blender.bakes import playback
 from ..blender.bakes.bake_settings import frame_range
 from ..blender.bakes.stale_bakes import stale_notes
-from ..blender.base.file_names import file_paths, file_stem, in_asset_folder
+from ..blender.base.file_names import file_paths, file_stem, given_path, in_asset_folder
 from ..blender.base.objects import without_hidden
 from ..blender.base.outcome import Outcome, report
 from ..blender.cards.files import CardExport, CardOutput, FileSteps
@@ -102,7 +102,8 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         hair = self._hair(context)
-        files = file_paths(Path(bpy.path.abspath(self.filepath)), [each.name for each in hair])
+        path = given_path(self.filepath, place=self.bl_label)
+        files = file_paths(path, [each.name for each in hair])
         if self.own_folder:
             files = [in_asset_folder(path) for path in files]
         plans = [self._plan(context, *each) for each in zip(hair, files, strict=True)]

@@ -81,6 +81,8 @@ class HAIRLOOM_OT_unwrap_surface(bpy.types.Operator):
         head = _surface_of(context)
         if head.data.uv_layers.active is not None:
             cls.poll_message_set("The surface has UVs already")
+        elif not head.data.polygons:
+            cls.poll_message_set("The surface has no faces")
         elif not is_shape_editable(head) or not head.visible_get():
             cls.poll_message_set("The surface is hidden, or linked from another file")
         else:

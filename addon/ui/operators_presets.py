@@ -51,7 +51,7 @@ class HAIRLOOM_OT_apply_preset(bpy.types.Operator):
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        _apply(named_preset(self.name).all, context)
+        _apply(named_preset(bpy.path.abspath(self.name)).all, context)
         return {"FINISHED"}
 
 
@@ -90,10 +90,9 @@ class HAIRLOOM_OT_add_preset(bpy.types.Operator, ImportHelper):
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        path = Path(bpy.path.abspath(self.filepath))
-        preset = named_preset(str(path))
+        preset = named_preset(bpy.path.abspath(self.filepath))
         _apply(preset.all, context)
-        title = free_title(preset.title or path.stem, preset.settings.section)
+        title = free_title(preset.title or Path(self.filepath).stem, preset.settings.section)
         save_own(title, *preset.all)
         report(self, "INFO", f"'{title}' was applied, and is now one of your own presets")
         return {"FINISHED"}

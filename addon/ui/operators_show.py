@@ -9,6 +9,7 @@ from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
 from ..blender.bakes.groom_hashes import frame_rate
+from ..blender.base.file_names import given_path
 from ..blender.base.outcome import report
 from ..blender.pictures.sheet import Sheet
 from ..blender.pictures.showing import ShownGroom, file_name, shown_groom
@@ -155,7 +156,7 @@ class HAIRLOOM_OT_contact_sheet(bpy.types.Operator, ExportHelper):
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        manager = context.window_manager
+        manager, path = context.window_manager, given_path(self.filepath, place=self.bl_label)
         with wait_cursor(context):
             shown = _shown(self, context)
             sheet = Sheet(
@@ -173,7 +174,7 @@ class HAIRLOOM_OT_contact_sheet(bpy.types.Operator, ExportHelper):
                     manager.progress_update(done)
             finally:
                 manager.progress_end()
-            shown.studio.write(Path(self.filepath), sheet.picture)
+            shown.studio.write(path, sheet.picture)
         for note in shown.studio.notes:
             report(self, "WARNING", note)
         report(self, "INFO", f"Wrote {sheet.count} pictures to {self.filepath}")

@@ -19,6 +19,7 @@ from bpy.props import (
 )
 from bpy_extras.io_utils import ImportHelper, poll_file_object_drop
 
+from ..blender.base.file_names import given_path
 from ..blender.base.outcome import report
 from ..blender.strands.import_groom import (
     FILE_KINDS,
@@ -157,9 +158,14 @@ class HAIRLOOM_OT_import_strands(LongWork, ImportHelper, bpy.types.Operator):
             row.prop(self, "head_scale")
 
     def _paths(self) -> list[Path]:
-        """The files that were chosen or dropped, else the one in `filepath`."""
-        chosen = [Path(self.directory) / file.name for file in self.files if file.name]
-        return chosen or [Path(self.filepath)]
+        """The files that were chosen or dropped, else the one in `filepath`.
+
+        Raises:
+            HairloomError: none is named.
+        """
+        folder = Path(bpy.path.abspath(self.directory))
+        chosen = [folder / file.name for file in self.files if file.name]
+        return chosen or [given_path(self.filepath, place=self.bl_label)]
 
 
 class HAIRLOOM_FH_strands(bpy.types.FileHandler):

@@ -12,7 +12,7 @@ from bpy.props import EnumProperty, IntProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
 from ..blender.bakes.bake_settings import frame_range
-from ..blender.base.file_names import file_paths, file_stem
+from ..blender.base.file_names import file_paths, file_stem, given_path
 from ..blender.base.objects import without_hidden
 from ..blender.base.outcome import Outcome, report
 from ..blender.colliders.rigs import CachedRig
@@ -134,7 +134,7 @@ class StrandExportOperator(LongWork, ExportHelper):
         self, context: bpy.types.Context, cached_rigs: tuple[CachedRig, ...]
     ) -> list[tuple[Path, StrandExport]]:
         """The files to write, with their contents: one for all hair, or one for each."""
-        hair, path = self._hair(context), Path(bpy.path.abspath(self.filepath))
+        hair, path = self._hair(context), given_path(self.filepath, place=self.bl_label)
         parts = [hair] if self.several == "one" else [[each] for each in hair]
         depsgraph = context.evaluated_depsgraph_get()
         files = file_paths(path, [part[0].name for part in parts])

@@ -104,6 +104,14 @@ def test_roots_in_the_air_are_counted_and_snapped(new_hair, sphere):
     assert issue_operators(hair) == []
 
 
+def test_a_surface_without_faces_is_not_unwrapped(new_hair):
+    bare = bpy.data.objects.new("Bare", bpy.data.meshes.new("Bare"))
+    bpy.context.collection.objects.link(bare)
+    bpy.context.view_layer.objects.active = new_hair(bare)
+    with pytest.raises(RuntimeError, match="The surface has no faces"):
+        bpy.ops.hairloom.unwrap_surface()
+
+
 def test_a_surface_without_uvs_is_unwrapped_without_overlap(new_hair, sphere):
     sphere.data.uv_layers.remove(sphere.data.uv_layers[0])
     hair = new_hair(sphere)

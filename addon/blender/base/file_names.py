@@ -1,11 +1,25 @@
-"""Names of files after the hair in them."""
+"""Names of files: those that operators are given, and those after the hair in them."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
 
+import bpy
+
+from ...errors import HairloomError
 from ...exchange.files.file_names import avoid_device_name, identifier_name, unique_names
+
+
+def given_path(filepath: str, *, place: str) -> Path:
+    """The path in an operator's property; // at its start is the folder of the blend file.
+
+    Raises:
+        HairloomError: it is empty, as if a script leaves it out.
+    """
+    if not filepath:
+        raise HairloomError("no file is named", place=place, remedy="Name one as filepath")
+    return Path(bpy.path.abspath(filepath))
 
 
 def file_stem(hair_name: str) -> str:

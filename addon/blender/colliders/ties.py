@@ -238,10 +238,14 @@ def holders_of(hair: bpy.types.Object) -> tuple[bpy.types.Object, ...]:
 
 
 def new_ring(hair: bpy.types.Object, context: bpy.types.Context) -> bpy.types.Object:
-    """A ring at the 3D cursor, parented to the surface."""
+    """A ring at the 3D cursor, parented to the surface.
+
+    Raises:
+        HairloomError: the hair has no curves.
+    """
+    strands = posed_curves(hair, context.evaluated_depsgraph_get()).strands
     ring = bpy.data.objects.new("Hair Tie", None)
     ring.empty_display_type = "CIRCLE"
-    strands = posed_curves(hair, context.evaluated_depsgraph_get()).strands
     ring.empty_display_size = _NEW_RING_RADIUS * float(np.median(strands.lengths()))
     link_into(ring, hair.users_collection, context.scene)
     head = head_of(hair)

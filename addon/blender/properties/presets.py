@@ -194,7 +194,9 @@ def delete_own(name: str) -> None:
     """
     path = _own_path(name)
     if path is None:
-        raise HairloomError("you have no preset of this name", place=name, remedy=_OWN_REMEDY)
+        raise HairloomError(
+            "you have no preset of this name", place=name or "preset", remedy=_OWN_REMEDY
+        )
     previews.forget(path)
     try:
         path.unlink()

@@ -187,6 +187,8 @@ def evaluated_mesh(
 
 def _positions(mesh: bpy.types.Mesh) -> Floats:
     """(vertex_count, 3) float32, object space."""
+    if not mesh.vertices:  # Blender then stores no attribute
+        return np.zeros((0, 3), np.float32)
     positions: Floats = read_attribute(mesh, "position", "POINT", 3)
     return positions
 

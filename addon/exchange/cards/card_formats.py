@@ -9,6 +9,7 @@ from pathlib import Path
 from ...arrays import Floats
 from ...errors import HairloomError
 from ..files.axes import from_z_up
+from ..files.file_names import with_added_suffix
 
 _OCCLUSION = "ambient occlusion of the vertex, from 0 enclosed to 1 open"
 _OPENNESS = (
@@ -146,7 +147,7 @@ def format_of(path: Path, name: str | None = None) -> tuple[Path, CardFormat]:
         name: of the format; None: the suffix decides.
 
     Raises:
-        HairloomError: another suffix, or one that is not of the format.
+        HairloomError: another suffix, or one that is not of the format; or it names no file.
     """
     suffix = path.suffix.lower()
     for known in FORMATS:
@@ -154,7 +155,7 @@ def format_of(path: Path, name: str | None = None) -> tuple[Path, CardFormat]:
             return path, known
     named = next((known for known in FORMATS if known.name == name), None)
     if named is not None and suffix not in SUFFIXES:
-        return path.with_name(path.name + named.suffixes[0]), named
+        return with_added_suffix(path, named.suffixes[0]), named
     suffixes = named.suffixes if named else SUFFIXES
     raise HairloomError(
         f"cards cannot be written as '{path.suffix}'" + (f" in the format {name}" if name else ""),

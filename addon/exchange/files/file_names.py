@@ -38,6 +38,19 @@ def check_utf8_name(path: Path) -> None:
         ) from error
 
 
+def with_added_suffix(path: Path, suffix: str) -> Path:
+    """The path with a suffix after its name, whatever dots that has.
+
+    Raises:
+        HairloomError: it ends without a name, as "" and ".." do.
+    """
+    if path.name in ("", ".."):
+        raise HairloomError(
+            "it names no file", place=f"'{path}'", remedy=f"Name one, such as hair{suffix}"
+        )
+    return path.with_name(path.name + suffix)
+
+
 def length_remark(path: Path, why: str) -> str:
     """A remark for where the system reports a path as missing that is too long for it; else ""."""
     length = len(os.path.abspath(path))

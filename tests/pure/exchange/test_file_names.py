@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from hairloom.addon.errors import HairloomError
+from hairloom.addon.exchange import strand_formats
+from hairloom.addon.exchange.cards import card_formats
 from hairloom.addon.exchange.files.file_names import identifier_name, name_in_other_case
 
 
@@ -35,3 +39,11 @@ def test_a_name_that_differs_in_case_alone_is_found(tmp_path: Path) -> None:
     assert name_in_other_case(tmp_path / "nowhere" / "hair.glb") == ""
     if not (tmp_path / "hair.glb").exists():  # a case-sensitive file system
         assert name_in_other_case(tmp_path / "hair.glb") == "Hair.glb"
+
+
+@pytest.mark.parametrize("path", ["", "/", ".."])
+@pytest.mark.parametrize(("formats", "name"), [(card_formats, "glb"), (strand_formats, "hair")])
+def test_a_path_without_a_name_gets_no_suffix(path: str, formats: Any, name: str) -> None:
+    with pytest.raises(HairloomError, match=f"it names no file. Name one, such as hair.{name}"):
+        formats.format_of(Path(path), name)
+    assert formats.format_of(Path(path) / "Hair.001", name)[0].name == f"Hair.001.{name}"

@@ -1,0 +1,114 @@
+"""Scripts call operators with whatever is at hand: each call works, or its error is a sentence of
+ours and the scene is as it was before."""
+
+import bpy
+import pytest
+from tiers import few_in_commits
+
+from hairloom.addon import registration
+
+pytestmark = pytest.mark.usefixtures("extension")
+
+#: operators that bring their own hair, or change presets, clipboard or folders
+ELSEWHERE = {"add_hairstyle", "sample_scene", "help", "self_test", "copy_report", "copy_reports"}
+ELSEWHERE |= {"save_preset"}
+
+
+def operators():
+    return [each for each in registration.CLASSES if issubclass(each, bpy.types.Operator)]
+
+
+def test_a_script_can_call_every_operator():
+    """Blender drops the call of an operator that has `invoke` alone, without an error."""
+    ours = [kind for each in operators() for kind in each.__mro__ if "hairloom" in kind.__module__]
+    without = [
+        each.bl_idname
+        for each in operators()
+        if not any("execute" in vars(kind) for kind in each.__mro__ if kind in ours)
+    ]
+    assert without == []
+
+
+def a_mesh_without_vertices(_):
+    bpy.context.collection.objects.link(bpy.data.objects.new("Nothing", bpy.data.meshes.new("No")))
+    select(bpy.data.objects["Nothing"])
+
+
+def hair_on_a_mesh_without_vertices(new_hair):
+    a_mesh_without_vertices(new_hair)
+    select(new_hair(bpy.data.objects["Nothing"]))
+
+
+def hair_without_curves(new_hair):
+    bpy.ops.mesh.primitive_ico_sphere_add(radius=0.1, subdivisions=1)
+    hair = bpy.data.objects.new("Hair", bpy.data.hair_curves.new("Hair"))
+    bpy.context.collection.objects.link(hair)
+    select(hair)
+
+
+def select(obj):
+    bpy.ops.object.select_all(action="DESELECT")
+    obj.select_set(True)
+    bpy.context.view_layer.objects.active = obj
+    bpy.context.view_layer.update()
+
+
+def snapshot():
+    if bpy.context.object is None:
+        return None
+    shown = [(obj.name, obj.select_get(), obj.hide_get()) for obj in bpy.context.view_layer.objects]
+    data = [bpy.data.meshes, bpy.data.hair_curves, bpy.data.collections, bpy.data.materials]
+    return shown, [len(each) for each in data], bpy.context.mode, bpy.context.object.name
+
+
+SCENES = [a_mesh_without_vertices, hair_without_curves, hair_on_a_mesh_without_vertices]
+
+
+@pytest.mark.parametrize("scene", few_in_commits(SCENES, 2), ids=lambda scene: scene.__name__)
+def test_what_cannot_be_used_is_said_and_stays_as_it_is(new_hair, scene):
+    """All operators whose button is not greyed out, without arguments."""
+    errors, before = {}, "not made yet"
+    for each in operators():
+        name = each.bl_idname.removeprefix("hairloom.")
+        if snapshot() != before:
+            bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+            scene(new_hair)
+            before = snapshot()
+        if name in ELSEWHERE or not getattr(bpy.ops.hairloom, name).poll():
+            continue
+        try:
+            getattr(bpy.ops.hairloom, name)()
+        except RuntimeError as error:
+            errors[name] = str(error)
+            assert snapshot() == before, name
+    assert len(errors) > 5
+    assert {name: text for name, text in errors.items() if "Traceback" in text} == {}
+
+
+def test_a_file_that_is_not_named_is_said(new_hair, sphere):
+    select(new_hair(sphere))
+    by_path = ("import_strands", "export_alembic", "export_hair", "export_cards", "contact_sheet")
+    for name in by_path:
+        with pytest.raises(RuntimeError, match=": no file is named"):
+            getattr(bpy.ops.hairloom, name)(filepath="")
+    with pytest.raises(RuntimeError, match="preset: no preset is named"):
+        bpy.ops.hairloom.add_preset()
+    with pytest.raises(RuntimeError, match="preset: you have no preset of this name"):
+        bpy.ops.hairloom.delete_preset()
+
+
+def test_paths_may_begin_at_the_folder_of_the_blend_file(new_hair, sphere, tmp_path):
+    hair = new_hair(sphere)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+    select(hair)
+    bpy.ops.hairloom.export_tressfx(filepath="//hair.tfx")
+    assert (tmp_path / "hair.tfx").is_file()
+    select(sphere)
+    bpy.ops.hairloom.import_strands(filepath="//hair.tfx")
+    bpy.ops.hairloom.import_strands(directory="//", files=[{"name": "hair.tfx"}])
+    assert len(bpy.data.hair_curves) == 3
+    (tmp_path / "look.json").write_text(
+        '{"hairloom": 1, "section": "shading", "title": "Look", "values": {}}', encoding="utf-8"
+    )
+    select(hair)
+    assert bpy.ops.hairloom.apply_preset(name="//look.json") == {"FINISHED"}
