@@ -175,7 +175,8 @@ class Head:
             length: of each [m].
             lift: how much they leave along the normal instead of the flow, 0 to 1.
             follow: how much they turn into the flow on each centimetre, 0 to 1.
-            hug: how much they turn back to the skin, at points (n, 3), for each centimetre of
+            hug: how much they follow the skin, at points (n, 3): from 1 on they do not leave it
+                where it turns away. Also how much they turn back to it, for each centimetre of
                 distance beyond `clearance`.
             clearance: minimum distance from the skin, by arc length [m].
             over_ears: whether they lie over the ears rather than around them.
@@ -197,8 +198,11 @@ class Head:
                 target = unit(flow(guides[:, cv - 1], roots, arc_length))
                 if hug is not None:
                     distance, outward = self.skin_distance(guides[:, cv - 1], over_ears)
+                    strength = hug(guides[:, cv - 1])
+                    # hair that lies on the head does not leave it where it turns away
+                    leaving = np.maximum((target * outward).sum(axis=1), 0.0)
                     excess = np.clip((distance - clearance(arc_length)) / 0.01, 0.0, 2.0)
-                    pull = hug(guides[:, cv - 1]) * excess
+                    pull = np.minimum(strength, 1.0) * leaving + strength * excess
                     target = unit(target - pull[:, None] * outward)
                 direction = unit((1.0 - blend) * direction + blend * target)
             point = guides[:, cv - 1] + step[:, None] * direction

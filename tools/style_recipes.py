@@ -298,7 +298,7 @@ def slicked_back(head: Head) -> Any:
         16,
         lift=0.25,
         follow=0.8,
-        hug=skull_attraction,
+        hug=lambda p: 1.2 * smoothstep(-0.12, -0.07, p[:, 2]),
         clearance=lambda s: 0.0015 + 0.09 * np.minimum(s, 0.07),
     )
     return style(
@@ -330,7 +330,7 @@ def parted(parting_x: float, back: float) -> Any:
             * smoothstep(0.115, 0.09, y)
         )
         behind = smoothstep(-0.01, -0.07, y) * smoothstep(-0.16, -0.02, z)
-        before_face = smoothstep(0.088, 0.066, np.abs(x)) * smoothstep(-0.03, -0.06, y)
+        before_face = smoothstep(0.073, 0.052, np.abs(x)) * smoothstep(-0.03, -0.06, y)
         rear = on_top * smoothstep(0.02, 0.07, roots.position[:, 1])
         return vectors(
             side * (1.1 * on_top + 1.3 * before_face),
@@ -407,11 +407,11 @@ def bob(head: Head) -> Any:
     falls = parted(-0.022, 0.25)
 
     def flow(points: np.ndarray, roots: Roots, arc_length: np.ndarray) -> np.ndarray:
-        inward = smoothstep(-0.05, -0.1, points[:, 2])[:, None] * unit(points * (1.0, 1.0, 0.0))
+        inward = smoothstep(-0.02, -0.08, points[:, 2])[:, None] * unit(points * (1.0, 1.0, 0.0))
         # hair at the forehead goes back first, so that it does not lie on the forehead
         first = smoothstep(-0.02, -0.08, roots.position[:, 1]) * smoothstep(0.06, 0.02, arc_length)
         back = first[:, None] * np.array([0.0, 0.9, 0.8])
-        return unit(falls(points, roots, arc_length)) - 0.5 * inward + back
+        return unit(falls(points, roots, arc_length)) - 0.7 * inward + back
 
     guides = head.combed(
         roots,
@@ -475,7 +475,7 @@ def long_guides(
     hem: Any,
     parting_x: float = 0.0,
     volume: float = 0.013,
-    over: float = 0.08,
+    over: float = 0.1,
 ) -> Any:
     """Long hair over the shoulders, cut where it comes to this height `hem` (n,) [m]."""
     guides = head.combed(
@@ -567,7 +567,7 @@ def layered_fringe(head: Head) -> Any:
     roots = head.roots(1700, "scalp")
     x, y, z = roots.position.T
     # a triangle, whose point is behind the forehead
-    is_fringe = (np.abs(x) < np.minimum(0.008 - 1.1 * (y + 0.022), 0.06)) & (z > 0.035)
+    is_fringe = (np.abs(x) < 0.008 - 1.1 * (y + 0.022)) & (z > 0.035)
     in_front = falls_in_front(roots)
     group = np.where(is_fringe, 5, parting_groups(roots, 0.0, in_front))
     # three layers: hair from the top ends further up, most of all around the face
@@ -582,7 +582,7 @@ def layered_fringe(head: Head) -> Any:
     fringe_roots = roots.take(fringe)
 
     def forward_flow(points: np.ndarray, _roots: Roots, _arc_length: np.ndarray) -> np.ndarray:
-        return vectors(5.0 * points[:, 0], -1.0 * smoothstep(-0.1, -0.08, points[:, 1]), -0.45)
+        return vectors(7.0 * points[:, 0], -1.0 * smoothstep(-0.1, -0.08, points[:, 1]), -0.45)
 
     front = head.combed(
         fringe_roots,
@@ -595,7 +595,7 @@ def layered_fringe(head: Head) -> Any:
         clearance=layered_clearance(fringe_roots, 0.008),
     )
     ends = np.repeat(0.020 + 0.014 * (fringe_roots.random[:, 0] - 0.5), front.shape[1])
-    guides[fringe] = cut(front, lambda p: p[:, 2] - ends + np.minimum(9.0 * p[:, 0] ** 2, 0.02))
+    guides[fringe] = cut(front, lambda p: p[:, 2] - ends + np.minimum(10.0 * p[:, 0] ** 2, 0.02))
     guides = in_bundles(guides, bundles(head, roots, group, 200), 0.45)
     return style(
         "Layered with Fringe",
