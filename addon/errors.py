@@ -6,6 +6,9 @@ operator report, or a line on stderr with a non-zero exit code.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from difflib import get_close_matches
+
 
 class HairloomError(Exception):
     """Bad input: what is wrong, where it was found, and what to do about it.
@@ -21,3 +24,14 @@ class HairloomError(Exception):
         self.problem = problem
         self.place = place
         self.remedy = remedy
+
+
+def did_you_mean(name: str, known: Iterable[str], count: int = 3, similarity: float = 0.6) -> str:
+    """The start of a remedy, such as "Did you mean a or b? ", for a wrong name; empty if no known
+    one is similar.
+
+    Args:
+        similarity: the least, from 0 to 1; see `difflib.get_close_matches`.
+    """
+    matches = get_close_matches(name, list(known), count, similarity)
+    return f"Did you mean {' or '.join(matches)}? " if matches else ""

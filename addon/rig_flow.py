@@ -31,6 +31,7 @@ from .groom.masks import Masks
 from .groom.partings import Partings
 from .groom.roots import RootFrames, RootHolds, bind_roots, root_frames
 from .groom.settings import GuideSettings
+from .groom.size_notes import length_text
 from .groom.ties import NO_HOLDERS, Holders, find_holds, unused_holder_notes
 from .groom.weights import GuideWeights, guide_weights
 from .groom.widths import Widths, with_widths
@@ -362,7 +363,7 @@ def _loose_root_notes(distance: float) -> tuple[str, ...]:
     if not distance:
         return ()
     return (
-        f"its roots lie {1e3 * distance:.3g} mm from the surface (median), so they float beside "
+        f"its roots lie {length_text(distance)} from the surface (median), so they float beside "
         "it. Check unit, up axis and place of both, or press Snap to Surface.",
     )
 

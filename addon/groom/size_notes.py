@@ -26,7 +26,7 @@ def size_note(hair: tuple[str, Floats] | None, head: tuple[str, Floats] | None) 
         for option, what in found.items()
         if what is not None and len(what[1])
     }
-    large = " and ".join(f"{name} is {_meters(size)} large" for name, size in sizes.values())
+    large = " and ".join(f"{name} is {length_text(size)} large" for name, size in sizes.values())
     largest = max((size for _, size in sizes.values()), default=0.0)
     if largest > MAX_EXTENT:
         least = max(_IN_METRES, largest / _TIMES_SMALLER)
@@ -42,6 +42,8 @@ def size_note(hair: tuple[str, Floats] | None, head: tuple[str, Floats] | None) 
     return ""
 
 
-def _meters(size: float) -> str:
+def length_text(length: float) -> str:
     """Such as "264 m" or "1.3 mm"."""
-    return f"{size:,.3g} m" if size >= 0.1 else f"{1e3 * size:.3g} mm"
+    if length < 0.9995:
+        return f"{1e3 * length:.3g} mm"
+    return f"{length:.3g} m" if length < 999.5 else f"{length:,.0f} m"

@@ -6,7 +6,6 @@ import dataclasses
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from difflib import get_close_matches
 from functools import cache
 from inspect import get_annotations
 from typing import Any, ClassVar, Literal, Self, TypedDict, Unpack
@@ -14,7 +13,7 @@ from typing import Any, ClassVar, Literal, Self, TypedDict, Unpack
 import numpy as np
 
 from ..arrays import Floats
-from ..errors import HairloomError
+from ..errors import HairloomError, did_you_mean
 from .curve import KNOT_POSITIONS, Curve
 
 Kind = Literal["number", "integer", "toggle", "color", "choice", "curve", "mask", "map"]
@@ -264,8 +263,7 @@ class Settings:
         declared = {parameter.name: parameter for parameter in cls.parameters()}
         unknown = sorted(set(values) - set(declared))
         if unknown:
-            matches = get_close_matches(unknown[0], declared, 3, _MIN_NAME_SIMILARITY)
-            suggestion = f"Did you mean {' or '.join(matches)}? " if matches else ""
+            suggestion = did_you_mean(unknown[0], declared, similarity=_MIN_NAME_SIMILARITY)
             raise HairloomError(
                 f"unknown {cls.section} parameter '{unknown[0]}'",
                 place=place,

@@ -208,7 +208,7 @@ def test_strict_refuses_what_would_be_dropped(
     output = tmp_path / "scene.blend"
     arguments = ["import", str(path), "--output", str(output)]
     assert command_line.run([*arguments, "--strict"]) == 1
-    assert "1 (a point that is not finite)" in capfd.readouterr().err
+    assert "would be dropped: 1 with a point that is not finite. " in capfd.readouterr().err
     assert not output.exists()
     assert command_line.run(arguments) == 0
     assert len(grooms_of(output)["hair"].data.curves) == 39

@@ -110,6 +110,14 @@ def test_hair_grows_where_a_group_says(scene: Path) -> None:
     assert roots[:, 2].min() > 0.02
 
 
+def test_growth_refuses_a_density_of_children_that_the_mesh_lacks(
+    scene: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    job = ["grow", "--scene", str(scene), "--head", "Head", "--children-density", "Nowhere", *FEW]
+    assert command_line.run([*job, "--output", str(scene.with_name("out.blend"))]) == 1
+    assert "neither a vertex group nor an attribute named 'Nowhere'" in capsys.readouterr().err
+
+
 def test_hair_that_has_grown_follows_its_settings(scene: Path) -> None:
     run(scene, "grow", "--head", "Head", "--name", "Tuft", *FEW)
     assert bpy.data.objects["Tuft"].data.hairloom.grow.length == pytest.approx(0.05)
@@ -179,6 +187,7 @@ def test_operators_are_listed_with_their_properties(
         about = getattr(bpy.ops.hairloom, name).get_rna_type().description
         assert f"{name}: {' '.join(about.split())}." in lines
     assert any(line.startswith("    sphere_count: ") for line in lines)
+    assert not any("filter_glob" in line for line in lines), "it only filters a file browser"
 
 
 def test_a_scene_without_an_action_is_an_error(

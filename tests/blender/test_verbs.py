@@ -137,6 +137,22 @@ def test_a_misspelt_option_gets_the_usage_of_its_verb_and_a_suggestion(
     assert message.endswith("--prest looks/blond. Did you mean --preset?\n")
 
 
+@pytest.mark.parametrize(
+    ("arguments", "remedy"),
+    [
+        (["grow", "--head", "cube", "--output", "a.blend"], "Did you mean Cube? "),
+        (["render", "--head", "Cubee", "--output", "a.png"], "Did you mean Cube? "),
+        (["render", "--set", "dynamic.damping=2", "--output", "a.png"], "Did you mean dynamics"),
+    ],
+)
+def test_a_misspelt_name_gets_a_suggestion(
+    arguments: list[str], remedy: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bpy.ops.mesh.primitive_cube_add()
+    assert run(arguments) == 1
+    assert remedy in capsys.readouterr().err
+
+
 def test_a_look_is_no_stage(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     picture = tmp_path / "still.png"
     assert run(["render", "--stage", "looks/blond", "--output", str(picture)]) == 1

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from difflib import get_close_matches
 from itertools import pairwise
 from typing import Any
 
-from ...errors import HairloomError
+from ...errors import HairloomError, did_you_mean
 
 
 class VerbParser(argparse.ArgumentParser):
@@ -21,9 +20,9 @@ class VerbParser(argparse.ArgumentParser):
         options, unknown = super().parse_known_args(args, namespace)
         if unknown:
             known = [name for action in self._actions for name in action.option_strings]
-            similar = get_close_matches(unknown[0].partition("=")[0], known, 1)
-            question = f". Did you mean {similar[0]}?" if similar else ""
-            self.error(f"unrecognized arguments: {' '.join(unknown)}{question}")
+            question = did_you_mean(unknown[0].partition("=")[0], known, count=1).strip()
+            ending = f". {question}" if question else ""
+            self.error(f"unrecognized arguments: {' '.join(unknown)}{ending}")
         return options, unknown
 
 

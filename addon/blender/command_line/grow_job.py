@@ -8,6 +8,7 @@ import bpy
 
 from ...groom.settings import GrowSettings
 from ..base.parts import run_parts
+from ..scene.masks import read_map
 from ..setup.starting import new_groom
 from .job_steps import Job
 from .object_settings import change_settings, named_objects
@@ -18,11 +19,14 @@ def grow(job: Job) -> None:
     """Grow hair curves on a mesh of a scene, with the given settings."""
     options, report = job.options, job.report
     (head,) = named_objects([options.head], lambda obj: bool(obj.type == "MESH"), "a mesh")
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    if options.children_density:
+        read_map(head, depsgraph, options.children_density)  # an unusable one is refused
     with report.stage("grow"):
         hair = run_parts(
             new_groom(
                 head,
-                bpy.context.evaluated_depsgraph_get(),
+                depsgraph,
                 bpy.context.collection,
                 job.settings[GrowSettings],
                 presets=(),

@@ -36,8 +36,9 @@ def import_grooms(job: Job) -> None:
         with report.stage("import"):
             hair, outcome = import_strands(path, surface, bpy.context.collection, import_options)
         if outcome.dropped and options.strict:
+            reasons = ", ".join(f"{n:,} with {reason}" for reason, n in outcome.dropped.items())
             raise HairloomError(
-                f"strands would be {dropped_phrase(outcome.dropped)}",
+                f"strands would be dropped: {reasons}",
                 place=str(path),
                 remedy="Fix the groom, or omit --strict",
             )

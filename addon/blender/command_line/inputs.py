@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 from ...arrays import Floats
-from ...errors import HairloomError
+from ...errors import HairloomError, did_you_mean
 from ...exchange.groom import Groom
 from ...exchange.strand_formats import SUFFIXES
 from ...exchange.strand_reading import read_strands
@@ -20,7 +20,7 @@ from ...groom.size_notes import size_note
 from ...strands import StrandSet, Surface
 from ...strands.colors import color_notes
 from ...strands.join import join_strands
-from ..base.objects import head_of
+from ..base.objects import head_of, objects_in
 from ..base.parts import run_parts
 from ..base.vertex_weights import read_weights
 from ..scene.built_in_head import HeadLook, built_in_head
@@ -243,7 +243,7 @@ def _read_groom(
         )
         notes = (*file.notes, *color_notes(path.name, file.strands))
         return file.strands, file.dropped, file.groom, notes
-    raise _unknown(source, "hair curves", "a groom's file such as hair.abc")
+    raise _unknown(source, "CURVES", "hair curves", "a groom's file such as hair.abc")
 
 
 def _read_mesh(source: str, sources: Sources) -> tuple[Surface, tuple[str, ...]]:
@@ -254,7 +254,7 @@ def _read_mesh(source: str, sources: Sources) -> tuple[Surface, tuple[str, ...]]
         surface = read_surface(mesh_object, depsgraph, need_uv=need_uv, place=source)
         return surface, tuple(filter(None, [uv_map_note(mesh_object)]))
     if not _is_mesh_file(source):
-        raise _unknown(source, "mesh", "a mesh file such as head.obj")
+        raise _unknown(source, "MESH", "mesh", "a mesh file such as head.obj")
     surface, notes = read_mesh_file(Path(source), need_uv=need_uv)
     if sources.head_scale != 1.0:
         surface = replace(surface, positions=surface.positions * np.float32(sources.head_scale))
@@ -278,9 +278,11 @@ def _size_notes(
     return tuple(filter(None, [size_note(hair, head_file)]))
 
 
-def _unknown(source: str, kind: str, example: str) -> HairloomError:
+def _unknown(source: str, object_type: str, kind: str, example: str) -> HairloomError:
+    own = objects_in(bpy.context.view_layer)
+    objects = [obj.name for obj in own if obj.type == object_type]
     return HairloomError(
         f"this is neither a {kind} object of the open scene nor {example}",
         place=source,
-        remedy="Check the name",
+        remedy=f"{did_you_mean(source, objects)}Check the name",
     )

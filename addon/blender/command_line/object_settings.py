@@ -7,7 +7,7 @@ from typing import Any
 
 import bpy
 
-from ...errors import HairloomError
+from ...errors import HairloomError, did_you_mean
 from ...parameters import ALL_SETTINGS
 from ...params import Settings, SettingsMap
 from ..base.objects import OVERRIDE, objects_in, without_hidden
@@ -34,10 +34,12 @@ def named_objects(
     for name in reversed(dict.fromkeys(reversed(names))):
         obj = bpy.context.view_layer.objects.get(name)
         if obj is None or not is_wanted(obj):
+            own = objects_in(bpy.context.view_layer)
+            wanted = [each.name for each in own if is_wanted(each)]
             raise HairloomError(
                 f"this is not {what} of the open scene",
                 place=name,
-                remedy="Check the name",
+                remedy=f"{did_you_mean(name, wanted)}Check the name",
             )
         found.append(obj)
     return found

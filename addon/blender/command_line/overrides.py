@@ -7,7 +7,7 @@ import math
 import re
 from typing import Any
 
-from ...errors import HairloomError
+from ...errors import HairloomError, did_you_mean
 from ...parameters import ALL_SETTINGS
 
 
@@ -22,7 +22,9 @@ def overrides(assignments: list[str], section: str) -> dict[str, Any]:
             raise HairloomError(
                 f"'{assignment}' does not name a parameter",
                 place="--set",
-                remedy="Write SECTION.NAME=VALUE with a section of " + ", ".join(ALL_SETTINGS),
+                remedy=(did_you_mean(owner, ALL_SETTINGS) if dot else "")
+                + "Write SECTION.NAME=VALUE with a section of "
+                + ", ".join(ALL_SETTINGS),
             )
         if owner == section:
             values[parameter] = text if parameter in choices else plain_value(text)

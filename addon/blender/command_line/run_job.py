@@ -139,7 +139,11 @@ class _Operator:
     @property
     def properties(self) -> dict[str, bpy.types.Property]:
         properties = self.rna.properties
-        return {each.identifier: each for each in properties if each.identifier != "rna_type"}
+        return {
+            each.identifier: each
+            for each in properties
+            if each.identifier != "rna_type" and not each.is_hidden
+        }
 
     def values(self, assignments: list[str]) -> dict[str, Any]:
         """The properties from NAME=VALUE arguments.

@@ -23,7 +23,7 @@ from ...exchange.strand_formats import STRAND_FORMATS, strand_format
 from ...exchange.strand_reading import read_strands
 from ...groom.root_fit import better_fit
 from ...groom.roots import bind_roots
-from ...groom.size_notes import size_note
+from ...groom.size_notes import length_text, size_note
 from ...strands import StrandSet, Surface
 from ...strands.closest_point import ClosestPointSearch
 from ..bakes.groom_hashes import frame_rate
@@ -232,7 +232,7 @@ def _bound_groom(
         remedy = _remedy(unbound, read.axes, surface, options)
         remedy = remedy or "Check the axes and the place of both"
         warnings.append(
-            f"{path.name}: its roots lie {distance * 1e3:.3g} mm from {ground.name} (median). "
+            f"{path.name}: its roots lie {length_text(distance)} from {ground.name} (median). "
             f"{remedy}."
         )
     if surface.corner_uv is None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hairloom.addon.groom.size_notes import size_note
+from hairloom.addon.groom.size_notes import length_text, size_note
 
 
 def thing(name: str, size: float) -> tuple[str, np.ndarray]:
@@ -40,3 +40,11 @@ def test_centimetres_are_named_with_what_scales_them(
 
 def test_hair_of_nothing_is_named() -> None:
     assert size_note(thing("a.tfx", 0.003), None).startswith("a.tfx is 3 mm large.")
+
+
+def test_a_length_is_written_in_the_unit_that_suits_it() -> None:
+    assert [length_text(each) for each in (0.15, 0.9994, 11016.0)] == [
+        "150 mm",
+        "999 mm",
+        "11,016 m",
+    ]
