@@ -15,6 +15,7 @@ from fin_motion import evaluated_vertices
 from gpu_rounding import is_same
 from grids import baked_grid, strand_grid
 from swinging import shake_head
+from undoing import redo, undo
 from windows_rules import windows_rules
 
 from hairloom.addon.blender.bakes import groom_hashes, playback
@@ -265,6 +266,53 @@ def test_a_head_that_is_posed_by_hand_takes_its_hair_along(swinging, get_depsgra
     assert drawn(hair)[:, 0, 1].mean() == pytest.approx(0.5, abs=0.02)
     assert previews.previews[session.uid].bake.changed_inputs == ("pose",)
     bpy.context.scene.frame_set(4)
+    np.testing.assert_array_equal(drawn(hair), baked)
+
+
+def set_damping(hair):
+    hair.hairloom.dynamics.damping = 3.0
+
+
+def hide_bake(hair):
+    hair.hairloom.bake.is_shown = False
+
+
+def move_head(_hair):
+    bpy.data.objects["Head"].location.y = 0.5
+
+
+def comb(hair):
+    hair.data.position_data[7].vector.x += 0.01
+
+
+@pytest.mark.parametrize("change", [set_damping, hide_bake, move_head, comb])
+def test_undo_shows_the_bake_again(change, swinging, get_depsgraph):
+    hair, _ = swinging
+    bake(hair)
+    bpy.context.scene.frame_set(4)
+    previews.start(hair, get_depsgraph())
+    baked = drawn(hair)
+    bpy.ops.ed.undo_push(message="baked")
+    change(hair)
+    bpy.context.view_layer.update()
+    scene_events.catch_up(get_depsgraph())
+    changed = drawn(hair)
+    bpy.ops.ed.undo_push(message="changed")
+    for step, shown in ((undo, baked), (redo, changed), (undo, baked)):
+        step()
+        np.testing.assert_allclose(drawn(bpy.data.objects["Hair"]), shown, atol=1e-6)
+
+
+def test_a_head_that_is_moved_back_has_its_baked_hair_again(swinging, get_depsgraph):
+    """As when a move is cancelled by Esc."""
+    hair, head = swinging
+    bake(hair)
+    bpy.context.scene.frame_set(4)
+    previews.start(hair, get_depsgraph())
+    baked = drawn(hair)
+    for y in (0.5, 0.0):
+        head.location.y = y
+        bpy.context.view_layer.update()
     np.testing.assert_array_equal(drawn(hair), baked)
 
 

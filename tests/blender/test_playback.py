@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from grids import baked_grid, strand_grid
 from tiers import few_in_commits
+from undoing import undo
 
 from hairloom.addon.blender.bakes import playback
 from hairloom.addon.blender.preview import previews
@@ -288,3 +289,15 @@ def test_a_baked_fin_equals_playback_and_plays_without_a_preview(fin, get_depsgr
     np.testing.assert_array_equal(shown(fin), played[0])
     bpy.ops.hairloom.bake_free()
     assert fin.data.attributes.get(POSITION) is None
+
+
+def test_undo_leaves_a_previewed_fin_in_its_baked_shape(fin, get_depsgraph):
+    list(Bake.of([fin], bpy.context.scene).steps())
+    previews.add(simulation_for(fin, get_depsgraph()), get_depsgraph())
+    bpy.context.scene.frame_set(4)
+    baked = shown(fin)
+    bpy.ops.ed.undo_push(message="baked")
+    fin.hide_select = True
+    bpy.ops.ed.undo_push(message="changed")
+    undo()
+    np.testing.assert_array_equal(shown(bpy.data.objects["Grid"]), baked)

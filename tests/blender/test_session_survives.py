@@ -4,6 +4,7 @@ import bpy
 import numpy as np
 import pytest
 from grids import strand_grid
+from undoing import redo, undo
 
 from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.viewport import overlay
@@ -101,15 +102,6 @@ def add_vertices(name):
     update()
 
 
-def undo(step=bpy.ops.ed.undo):
-    """Undo or redo a step, and let the timers run that this starts."""
-    step()
-    for timer in (scene_events.follow_undo, scene_events._read_again):
-        if bpy.app.timers.is_registered(timer):
-            bpy.app.timers.unregister(timer)
-            timer()
-
-
 @pytest.mark.parametrize(
     ("change", "name"), [(delete, "Hair"), (delete, "Head"), (add_vertices, "Head")]
 )
@@ -125,12 +117,12 @@ def test_undoing_what_ended_a_preview_brings_it_back(change, name, new_hair, sph
     (session,) = previews.sessions()
     assert strand_grid(session) == pytest.approx(before, abs=1e-6)
     assert overlay.drawing_of(session.uid).is_visible and previews.notice() == ""
-    undo(bpy.ops.ed.redo)
+    redo()
     assert previews.sessions() == ()
     undo()
     assert len(previews.sessions()) == 1
     previews.stop_all()
-    undo(bpy.ops.ed.redo)
+    redo()
     undo()
     assert previews.sessions() == (), "the artist has stopped it"
 
@@ -140,7 +132,7 @@ def test_redo_of_a_new_groom_previews_it_again(extension, sphere):
     bpy.ops.hairloom.add_groom("EXEC_DEFAULT", True, strand_count=60)
     undo()
     assert previews.sessions() == () and previews.notice() == ""
-    undo(bpy.ops.ed.redo)
+    redo()
     assert [each.name for each in previews.sessions()] == [bpy.context.object.name]
 
 
@@ -150,7 +142,7 @@ def test_cloth_that_an_undo_unmakes_is_no_fault(extension, sphere):
     bpy.ops.hairloom.fin_preview()
     undo()
     assert previews.simulations() == () and previews.notice() == ""
-    undo(bpy.ops.ed.redo)
+    redo()
     assert [each.name for each in previews.simulations()] == ["Head"]
 
 

@@ -70,6 +70,7 @@ class Preview:
         self.rig_hash = ""
         self.problem = self.bake_problem = ""
         self.cards_are_stale = self.must_rest = False
+        self._taken_bake: tuple[str, bool] | None = None
 
     @property
     def uid(self) -> int:
@@ -226,25 +227,45 @@ class Preview:
         self.handle(event, depsgraph, frames / rate, blocking=_is_exact())
 
     def rest_if_moved(self, depsgraph: bpy.types.Depsgraph) -> bool:
-        """React to a new evaluation of the body within a frame: hair rests if its body has moved.
+        """React to a new evaluation of the body within a frame: hair rests if its body has moved,
+        and shows its bake again if that is back where it was baked, such as after an undo.
 
         Returns whether the hair is at rest.
         """
         assert self.groom is not None
-        if self.phase is Phase.BAKED and self.bake is not None:
-            if self.session.frame_hash(depsgraph) == self.bake.frame_hash:
+        if self.bake is not None and self.phase in (Phase.BAKED, Phase.REST):
+            facts, now = self.bake.facts, self.session.frame_hash(depsgraph)
+            if self.phase is Phase.BAKED and not _has_moved(self.bake.frame_hash, now):
                 return False
-            facts = self.bake.facts
-            self.bake = BakeStatus(facts, self._changes_since_bake(facts, depsgraph))
-        elif not self.groom.has_moved(depsgraph):
+            if self.phase is Phase.REST and self._is_as_baked(now, depsgraph):
+                return not self.show_frame(depsgraph)
+            self.bake = BakeStatus(facts, self._changes_since_bake(facts, depsgraph, now))
+        if self.phase is not Phase.BAKED and not self.groom.has_moved(depsgraph):
             return self.phase is Phase.REST
         self.handle(Event.RESET, depsgraph)
         return True
 
+    def _is_as_baked(self, frame_hash: str, depsgraph: bpy.types.Depsgraph) -> bool:
+        """Whether everything is where it was in this frame of the bake."""
+        assert self.bake is not None
+        facts, frame = self.bake.facts, depsgraph.scene.frame_current
+        if not facts.first <= frame <= facts.last:
+            return False
+        return not _has_moved(facts.frame_hashes[frame - facts.first], frame_hash)
+
     def take_bake(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Find its bake, and show the scene's frame from it."""
+        self._taken_bake = self._bake_settings()
         self.check_bake(depsgraph)
         self.show_frame(depsgraph)
+
+    def has_other_bake(self) -> bool:
+        """Whether its object names another bake since `take_bake`, or shows or hides it now."""
+        return self._taken_bake not in (None, self._bake_settings())
+
+    def _bake_settings(self) -> tuple[str, bool]:
+        bake = self.resolve().hairloom.bake
+        return bake.folder, bake.is_shown
 
     def is_resized(self, depsgraph: bpy.types.Depsgraph) -> bool:
         """Whether its hair must be made again because its object or head has another size now.
@@ -261,6 +282,13 @@ class Preview:
         self.rig_hash = self.session.rig_hash(depsgraph)
         cache = self._cache_of(obj)
         self.bake = None if cache is None else self._bake_status(cache.facts, depsgraph)
+
+    def take_read_hair(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """After its hair was read again, which puts it to rest: compare the bake, and show the
+        scene's frame from it again if the bake is up to date."""
+        self.check_bake(depsgraph)
+        if self.phase is Phase.BAKED and self.bake is not None and not self.bake.changed_inputs:
+            self.show_frame(depsgraph)
 
     def compare_bake(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Compare the bake with the scene again after a setting was changed."""
@@ -328,6 +356,11 @@ def baked_rig_for(hair: bpy.types.Object, scene: bpy.types.Scene) -> BakedRig | 
         return None if set(changed) & set(RIG_PARTS) else playback.rig_in(cache)
     except HairloomError:  # `show_frame` reports it
         return None
+
+
+def _has_moved(known: str, now: str) -> bool:
+    """Whether two frame hashes differ by more than settings."""
+    return bool(set(differences(known, now)) - {"settings"})
 
 
 def _first_frame(scene: bpy.types.Scene) -> int:

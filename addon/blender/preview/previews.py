@@ -346,11 +346,16 @@ def bake_changed(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
     preview = previews.get(obj.session_uid)
     if preview is None:
         return
-    attempt(preview, depsgraph, partial(_take_changed_bake, preview, depsgraph))
+    attempt(preview, depsgraph, partial(take_changed_bake, preview, depsgraph))
     redraw_panels()
 
 
-def _take_changed_bake(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
+def take_changed_bake(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
+    """Show a groom or fin by the bake that it has now, or at rest.
+
+    Raises:
+        HairloomError: an object that it is made of is gone or broken.
+    """
     preview.forget_bake()
     preview.detach_from_timeline()
     preview.handle_or_raise(Event.STOP, depsgraph)
@@ -496,6 +501,6 @@ def _take_built(preview: Preview, session: Session, depsgraph: bpy.types.Depsgra
     if is_lit:
         return
     if was_made:
-        preview.check_bake(depsgraph)
+        preview.take_read_hair(depsgraph)
     else:
         preview.take_bake(depsgraph)

@@ -253,13 +253,17 @@ def _read_preview(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
     session = preview.groom
     if session is None:
         preview.handle_or_raise(Event.RESET, depsgraph)
+        preview.show_frame(depsgraph)
     elif session.has_changed_head() or preview.is_resized(depsgraph):
         registry.restart(preview, depsgraph)
     else:
         session.read_again(depsgraph, blocking=latest_job.is_blocking())
         if preview.must_rest:
             preview.stop(depsgraph)
-        preview.check_bake(depsgraph)
+        if preview.has_other_bake():
+            registry.take_changed_bake(preview, depsgraph)
+        else:
+            preview.take_read_hair(depsgraph)
 
 
 def clear() -> None:
