@@ -249,7 +249,11 @@ def test_hair_grows_where_and_as_long_as_the_groups_say(
 
 
 def test_simulate_render_and_export_agree_on_the_motion(
-    groom: Path, head: Path, tmp_path: Path, gpu_context: object
+    groom: Path,
+    head: Path,
+    tmp_path: Path,
+    gpu_context: object,
+    capfd: pytest.CaptureFixture[str],
 ) -> None:
     # a software driver takes long to compile the shader that moves hair
     numpy = ("--set", "dynamics.device=numpy")
@@ -263,6 +267,8 @@ def test_simulate_render_and_export_agree_on_the_motion(
     picture = tmp_path / "still.png"
     drawn = ["--bake", str(bake), "--frame", "12", "--width", "64", "--height", "48"]
     assert command_line.run(["render", *source, *drawn, "--output", str(picture)]) == 0
+    idle = "--set guides.guide_count, guides.cv_count, dynamics.device: the bake keeps the settings"
+    assert idle in capfd.readouterr().out
     image = bpy.data.images.load(str(picture))
     pixels = np.array(image.pixels[:]).reshape(48, 64, 4)
     bpy.data.images.remove(image)
@@ -270,6 +276,7 @@ def test_simulate_render_and_export_agree_on_the_motion(
     # a bake has its own head; the built-in one is not used
     alone = tmp_path / "alone.png"
     assert command_line.run(["render", *drawn, "--output", str(alone)]) == 0 and alone.exists()
+    assert "the bake keeps" not in capfd.readouterr().out
     wrong = ["--bake", str(bake), "--frame", "13", "--output", str(tmp_path / "none.png")]
     assert command_line.run(["render", *source, *wrong]) == 1
     assert not (tmp_path / "none.png").exists()

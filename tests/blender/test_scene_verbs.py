@@ -418,6 +418,18 @@ def test_settings_that_no_object_has_are_refused(
     assert not scene.with_name("out.blend").exists()
 
 
+def test_growth_refuses_settings_that_hair_does_not_have(
+    scene: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Hair keeps no stage, so a look of the stage would be lost."""
+    job = ["grow", "--scene", str(scene), "--head", "Head", "--name", "Tuft", *FEW]
+    for option in (("--preset", "stage/daylight"), ("--set", "stage.exposure=1")):
+        output = scene.with_name("out.blend")
+        assert command_line.run([*job, *option, "--output", str(output)]) == 1
+        assert "Tuft: it has no settings of 'stage'" in capsys.readouterr().err
+        assert not output.exists()
+
+
 @pytest.mark.parametrize("verb", ["bake", "export"])
 def test_settings_that_a_verb_does_not_use_are_refused(
     verb: str, scene: Path, capsys: pytest.CaptureFixture[str]

@@ -11,7 +11,7 @@ from ..base.parts import run_parts
 from ..scene.masks import read_map
 from ..setup.starting import new_groom
 from .job_steps import Job
-from .object_settings import change_settings, named_objects
+from .object_settings import change_settings, check_sections, named_objects
 from .verb import Verb
 
 
@@ -36,6 +36,7 @@ def grow(job: Job) -> None:
             )
         )
     hair.name = options.name or hair.name
+    check_sections([hair], options.preset, options.set)
     # settings of growth have been used already, to grow and fit the hair
     others = [each for each in options.set if not each.startswith("grow.")]
     change_settings(hair, options.preset, others)

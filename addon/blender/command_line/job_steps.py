@@ -14,11 +14,13 @@ import numpy as np
 
 from ...arrays import Floats
 from ...cards.edits import CardEdits
+from ...dynamics.settings import DynamicsSettings
 from ...errors import HairloomError
 from ...groom.children_settings import ChildrenSettings
 from ...groom.masks import Mask, Masks, mask_names
 from ...groom.painted_color import PaintedColor
-from ...groom.settings import GrowSettings
+from ...groom.settings import GrowSettings, GuideSettings
+from ...groom.width_settings import WidthSettings
 from ...paint_flow import with_painted_colors
 from ...params import Settings, SettingsMap
 from ...rig_flow import Pose, Rig
@@ -39,6 +41,9 @@ from ..scene.source import Source
 from ..sessions.prepared_groom import prepare_groom
 from .inputs import Inputs, Sources, find_head_name, read_head, read_head_look, read_inputs
 from .object_settings import find_hair
+
+#: settings that a bake is made with, and keeps
+_BAKED = (GrowSettings, GuideSettings, ChildrenSettings, WidthSettings, DynamicsSettings)
 
 
 @dataclass(frozen=True)
@@ -235,9 +240,23 @@ def read_baked_motion(job: Job, frames: range | None = None) -> BakedGuides:
         motion = BakedGuides.of(hair, frames)
     motion = replace(motion, rig=colored_rig(job, motion.rig))
     job.report.add_input(motion.cache.folder)
-    report_notes(list(motion.notes), job.report)
+    report_notes([*motion.notes, *_idle_settings_notes(job.options)], job.report)
     report_rig(job.report, motion.rig, motion.cache.facts.owner)
     return motion
+
+
+def _idle_settings_notes(options: argparse.Namespace) -> list[str]:
+    """A note on settings of --set that a bake has already used. They are no error, since scripts
+    give the same ones to `simulate` and to verbs that read its bake."""
+    baked = {kind.section for kind in _BAKED}
+    names = [each.partition("=")[0] for each in options.set]
+    idle = [name for name in names if name.partition(".")[0] in baked]
+    if not idle:
+        return []
+    return [
+        f"--set {', '.join(idle)}: the bake keeps the settings that it was made with. Bake again to"
+        " change them."
+    ]
 
 
 def posed_hair(job: Job) -> PosedHair:
