@@ -21,6 +21,8 @@ from ..blender.pictures.turntable import (
     TurntableSettings,
 )
 from ..errors import HairloomError
+from ..exchange.files.atomic import check_writable
+from ..exchange.files.file_names import with_added_suffix
 from .long_work import LongWork, Steps, counted, draw_progress
 from .reports import reporting, wait_cursor
 from .selection import chosen_hair, needs_hair
@@ -157,6 +159,9 @@ class HAIRLOOM_OT_contact_sheet(bpy.types.Operator, ExportHelper):
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
         manager, path = context.window_manager, given_path(self.filepath, place=self.bl_label)
+        if path.suffix.lower() != self.filename_ext:
+            path = with_added_suffix(path, self.filename_ext)
+        check_writable(path)
         with wait_cursor(context):
             shown = _shown(self, context)
             sheet = Sheet(
@@ -177,7 +182,7 @@ class HAIRLOOM_OT_contact_sheet(bpy.types.Operator, ExportHelper):
             shown.studio.write(path, sheet.picture)
         for note in shown.studio.notes:
             report(self, "WARNING", note)
-        report(self, "INFO", f"Wrote {sheet.count} pictures to {self.filepath}")
+        report(self, "INFO", f"Wrote {sheet.count} pictures to {path}")
         return {"FINISHED"}
 
 

@@ -342,6 +342,25 @@ def test_a_contact_sheet_shows_all_sides(hair: bpy.types.Object, tmp_path: Path)
             assert np.abs(tile - other).max() > 0.1
 
 
+@pytest.mark.parametrize(("name", "why"), [("folder", "a folder has this name"), ("sheet", "")])
+def test_a_contact_sheet_is_drawn_only_if_it_can_be_written(
+    hair: bpy.types.Object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, why: str
+) -> None:
+    """The suffix is added to a name without it."""
+    drawn: list[bool] = []
+
+    def refuse(_: Sheet) -> None:
+        drawn.append(True)
+        raise HairloomError("no drawing here", place="test", remedy="None")
+
+    monkeypatch.setattr(Sheet, "steps", refuse)
+    (tmp_path / "folder.png").mkdir()
+    (tmp_path / "sheet").mkdir()
+    with pytest.raises(RuntimeError, match=why or "no drawing here"):
+        bpy.ops.hairloom.contact_sheet(filepath=str(tmp_path / name), size=64)
+    assert drawn == ([] if why else [True])
+
+
 @pytest.mark.slow
 def test_a_contact_sheet_of_all_looks_leaves_the_groom_its_own(table: Turntable) -> None:
     studio, worn = table.studio, table.studio.settings
