@@ -16,7 +16,7 @@ from ..blender.preview import previews
 from ..blender.scene.bust_skin import TONES
 from ..blender.scene.particle_hair import convert_particle_hair, hair_systems
 from ..blender.setup.sample_scene import add_sample_scene
-from ..blender.setup.starting import new_groom, prepare_existing_hair
+from ..blender.setup.starting import check_presets, new_groom, prepare_existing_hair
 from ..errors import HairloomError
 from .grow_options import GROW_PROPERTIES, draw_settings_hint
 from .long_work import LongWork, Progress, Steps, steps_of_parts
@@ -178,6 +178,7 @@ class HAIRLOOM_OT_convert_particles(LongWork, bpy.types.Operator):
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         chosen, mesh = preferences(context), active_mesh(context)
         assert mesh is not None, "poll has looked"
+        check_presets(chosen_presets(chosen))
         yield Progress("Reading the particles")
         grooms, dropped = yield from steps_of_parts(convert_particle_hair(context, mesh))
         for hair in grooms:

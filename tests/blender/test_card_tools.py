@@ -67,6 +67,16 @@ def test_twist_turns_the_tip_by_the_angle_and_keeps_widths(hair):
     np.testing.assert_allclose(cosine, np.cos(turn) * (1.0 - ahead) + ahead, atol=1e-3)
 
 
+@pytest.mark.parametrize(("name", "value"), [("card_width", "root"), ("card_twist", "angle")])
+def test_what_is_not_finite_moves_no_card(hair, name, value):
+    obj = make(hair)
+    before = corners(obj, 3)
+    with pytest.raises(RuntimeError, match="Use finite numbers"):
+        apply(obj, (3,), getattr(bpy.ops.hairloom, name), **{value: float("nan")})
+    bpy.ops.object.mode_set(mode="OBJECT")
+    np.testing.assert_array_equal(corners(obj, 3), before)
+
+
 def test_tiles_go_round_and_to_a_number(hair):
     obj = make(hair)
     uv = corners(obj, 3, "UVMap")

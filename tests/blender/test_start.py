@@ -263,6 +263,20 @@ def fur(mesh, name, count):
     return modifier
 
 
+@pytest.mark.parametrize("name", ["add_groom", "sample_scene", "use_groom", "convert_particles"])
+def test_a_preset_that_is_gone_is_said_before_anything_is_made(sphere, monkeypatch, name):
+    modifier = fur(sphere, "Fur", 10)
+    bald = bpy.data.objects.new("Bald", bpy.data.hair_curves.new("Bald"))
+    bpy.context.collection.objects.link(bald)
+    bald.data.surface = sphere
+    make_active(bald if name == "use_groom" else sphere)
+    monkeypatch.setattr(operators_start, "chosen_presets", lambda _: ("looks/gone",))
+    with pytest.raises(RuntimeError, match="looks/gone: there is no such preset"):
+        getattr(bpy.ops.hairloom, name)()
+    assert set(bpy.data.objects) == {sphere, bald} and not len(bald.data.curves)
+    assert modifier.show_viewport and len(bpy.data.scenes) == 1
+
+
 def test_particles_without_hair_or_not_shown_add_none(sphere):
     fur(sphere, "None", 0)
     hidden = fur(sphere, "Hidden", 40)

@@ -37,7 +37,7 @@ def shape_selected(obj: bpy.types.Object, shape: Callable[[CardVertices], Floats
     """Move the vertices of all cards that have a selected vertex; returns the number of cards.
 
     Raises:
-        HairloomError: the mesh has no UV map.
+        HairloomError: the mesh has no UV map, or a vertex would go to a place that is not finite.
     """
     edited = bmesh.from_edit_mesh(obj.data)
     pieces = _selected_pieces(edited)
@@ -50,7 +50,14 @@ def shape_selected(obj: bpy.types.Object, shape: Callable[[CardVertices], Floats
         np.array([vertex.link_loops[0][layer].uv[:] for vertex in vertices]),
         np.repeat(np.arange(len(pieces)), [len(piece) for piece in pieces]),
     )
-    for vertex, place in zip(vertices, shape(cards).tolist(), strict=True):
+    places = shape(cards)
+    if not np.isfinite(places).all():
+        raise HairloomError(
+            "the cards would go to places that are not finite",
+            place=obj.name,
+            remedy="Use finite numbers",
+        )
+    for vertex, place in zip(vertices, places.tolist(), strict=True):
         vertex.co = place
     edited.normal_update()
     bmesh.update_edit_mesh(obj.data)

@@ -18,7 +18,7 @@ from ..scene.bust_data import HAIR_GROUPS
 from ..scene.curves import write_curves
 from ..scene.surfaces import read_surface
 from ..viewport.overlay import ENGINE
-from .starting import apply_presets
+from .starting import apply_presets, check_presets
 
 NAME = "Hairloom Sample"
 _FRAMES = 96
@@ -47,7 +47,11 @@ def add_sample_scene(
     Args:
         presets: of the groom, by name.
         skin: of the head, one of bust_skin.TONES.
+
+    Raises:
+        HairloomError: there is no such preset.
     """
+    check_presets(presets)
     yield Part("Painting the skin", partial(encoded_skin_picture, skin))  # fills its cache
     with new_blocks_removed_on_error() as note:
         scene, head = _scene_with_head(skin)

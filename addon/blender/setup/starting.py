@@ -95,6 +95,7 @@ def new_groom(
     Raises:
         HairloomError: see `growing.grow_on`; or there is no such preset.
     """
+    check_presets(presets)
     settings = settings_of(values, GrowSettings)
     factor = fitting_factor(head, depsgraph) if fits else 1.0
     settings = scaled_settings(settings, factor)
@@ -112,6 +113,16 @@ def new_groom(
         hair.data, wet_and_dusty_look(settings_of(hair.data.hairloom.shading, ShadingSettings))
     )
     return hair
+
+
+def check_presets(presets: tuple[str, ...]) -> None:
+    """Refuse names of no preset, before hair is made that they are for.
+
+    Raises:
+        HairloomError: there is no such preset.
+    """
+    for name in presets:
+        named_preset(name)
 
 
 def apply_presets(hair: bpy.types.Object, presets: tuple[str, ...]) -> None:
@@ -139,12 +150,14 @@ def prepare_existing_hair(
         presets: for hair whose look has not been set.
 
     Raises:
-        HairloomError: it has no curves, and no surface to grow some on.
+        HairloomError: it has no curves, and no surface to grow some on; or there is no such preset.
     """
     done, factor = [], 1.0
     if not (hair.is_editable and hair.data.is_editable):
         yield Part("Reading the hair", lambda: None)
         return hair, ()
+    if has_untouched_look(hair) or not len(hair.data.curves):
+        check_presets(presets)
     if not len(hair.data.curves) and not read_curves(hair, depsgraph).strands.strand_count:
         hair, factor = yield from _replace_empty_hair(hair, depsgraph)
         done.append("grew hair, since there was none")
