@@ -38,6 +38,20 @@ def test_hair_is_rendered_again_after_its_render_copy_is_deleted(hair, get_depsg
     assert not bpy.ops.hairloom.show_in_renders.poll()
 
 
+def test_a_copy_that_the_artist_converts_stays_and_the_next_bake_makes_another(hair):
+    bake(hair)
+    copy = hair.hairloom.bake.copy
+    copy.hide_viewport = copy.hide_select = False
+    bpy.ops.object.select_all(action="DESELECT")
+    copy.select_set(True)
+    bpy.context.view_layer.objects.active = copy
+    bpy.ops.object.convert(target="MESH")
+    assert copy.type == "MESH"
+    assert "the copy that showed its bake was deleted" in issues_of(hair, None)[-1].text
+    bake(hair)
+    assert hair.hairloom.bake.copy.type == "CURVES" and copy.name in bpy.data.objects
+
+
 def test_undoing_the_deletion_of_a_bake_offers_to_render_the_hair_itself(hair):
     """The files stay deleted, but the copy that showed them is back, and stands still."""
     bake(hair)

@@ -37,7 +37,7 @@ def show_in_renders(
     """
     rig = playback.rig_in(cache)
     bake = hair.hairloom.bake
-    copy = bake.copy
+    copy = copy_of(hair)
     # a duplicate of hair still points to the copy of its original
     if copy is None or copy.hairloom.bake.shown_hair not in (None, hair):
         curves = bpy.data.hair_curves.new(f"{hair.name} Baked")
@@ -60,15 +60,21 @@ def show_in_renders(
     return copy
 
 
+def copy_of(hair: bpy.types.Object) -> bpy.types.Object | None:
+    """The copy of this hair; None once the artist has converted it, such as to a mesh."""
+    copy = hair.hairloom.bake.copy
+    return copy if copy is not None and copy.type == "CURVES" else None
+
+
 def remove_copy(hair: bpy.types.Object) -> None:
     """Remove the copy, so that renders show the hair itself again."""
     bake = hair.hairloom.bake
-    copy = bake.copy
+    copy = copy_of(hair)
     if bake.hides:
         hair.hide_render, bake.hides = bake.was_hidden, False
+    bake.copy = None
     if copy is None:
         return
-    bake.copy = None
     other = next((obj for obj in bpy.data.objects if obj.hairloom.bake.copy == copy), None)
     if other is not None:  # a duplicate of the hair, with the same copy
         if copy.hairloom.bake.shown_hair == hair:
@@ -93,8 +99,8 @@ def restore_hair_without_copy() -> list[str]:
 
 def is_copy_gone(hair: bpy.types.Object) -> bool:
     """Whether renders hide hair although its copy is in no scene."""
-    bake = hair.hairloom.bake
-    return bool(bake.hides and not (bake.copy and bake.copy.users_scene))
+    copy = copy_of(hair)
+    return bool(hair.hairloom.bake.hides and not (copy and copy.users_scene))
 
 
 def render_problem(hair: bpy.types.Object) -> str:
