@@ -9,7 +9,7 @@ from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
 from ..blender.bakes.groom_hashes import frame_rate
-from ..blender.base.file_names import given_path
+from ..blender.base.file_names import path_to_write
 from ..blender.base.outcome import report
 from ..blender.pictures.sheet import Sheet
 from ..blender.pictures.showing import ShownGroom, file_name, shown_groom
@@ -21,8 +21,6 @@ from ..blender.pictures.turntable import (
     TurntableSettings,
 )
 from ..errors import HairloomError
-from ..exchange.files.atomic import check_writable
-from ..exchange.files.file_names import with_added_suffix
 from .long_work import LongWork, Steps, counted, draw_progress
 from .reports import reporting, wait_cursor
 from .selection import chosen_hair, needs_hair
@@ -158,10 +156,8 @@ class HAIRLOOM_OT_contact_sheet(bpy.types.Operator, ExportHelper):
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        manager, path = context.window_manager, given_path(self.filepath, place=self.bl_label)
-        if path.suffix.lower() != self.filename_ext:
-            path = with_added_suffix(path, self.filename_ext)
-        check_writable(path)
+        manager = context.window_manager
+        path = path_to_write(self.filepath, self.filename_ext, place=self.bl_label)
         with wait_cursor(context):
             shown = _shown(self, context)
             sheet = Sheet(

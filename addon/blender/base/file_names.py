@@ -8,7 +8,13 @@ from pathlib import Path
 import bpy
 
 from ...errors import HairloomError
-from ...exchange.files.file_names import avoid_device_name, identifier_name, unique_names
+from ...exchange.files.atomic import check_writable
+from ...exchange.files.file_names import (
+    avoid_device_name,
+    identifier_name,
+    unique_names,
+    with_added_suffix,
+)
 
 
 def given_path(filepath: str, *, place: str) -> Path:
@@ -20,6 +26,19 @@ def given_path(filepath: str, *, place: str) -> Path:
     if not filepath:
         raise HairloomError("no file is named", place=place, remedy="Name one as filepath")
     return Path(bpy.path.abspath(filepath))
+
+
+def path_to_write(filepath: str, suffix: str, *, place: str) -> Path:
+    """As `given_path`, for a file that is made by long work; it gets the suffix if it lacks it.
+
+    Raises:
+        HairloomError: it is empty, or cannot be written.
+    """
+    path = given_path(filepath, place=place)
+    if path.suffix.lower() != suffix:
+        path = with_added_suffix(path, suffix)
+    check_writable(path)
+    return path
 
 
 def file_stem(hair_name: str) -> str:
