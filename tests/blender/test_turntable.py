@@ -383,6 +383,14 @@ def test_a_label_stands_in_the_lower_left_corner_and_nowhere_else() -> None:
     assert not np.array_equal(labelled(grey, "Back"), named)
 
 
+@pytest.mark.parametrize("brightness", [0.02, 0.8])
+def test_a_label_is_legible_on_dark_and_on_bright_pictures(brightness: float) -> None:
+    """Each letter has bright pixels next to dark ones."""
+    named = labelled(np.full((100, 300, 4), brightness, np.float32), "Side")[..., 0]
+    contrast = np.abs(np.diff(named, axis=1))
+    assert (contrast > 0.5).sum() > 20
+
+
 def test_names_of_data_blocks_become_names_of_files() -> None:
     assert file_name("Hair.001") == "Hair.001"
     assert file_name("../a/b:c") == "_a_b_c"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import reduce
 
 import blf
 import imbuf
@@ -117,23 +118,40 @@ _FONT = 0
 _SIZE, _MARGIN = 0.045, 0.035
 _MIN_SIZE = 9
 _BRIGHTNESS = 0.8
+#: width of the dark outline that makes text legible on bright skin, as a fraction of its height
+_OUTLINE = 0.1
 
 
 def labelled(picture: Floats, text: str) -> Floats:
-    """A picture with a line of text in its lower left corner.
+    """A picture with a line of bright text with a dark outline in its lower left corner.
 
     Args:
         picture: (height, width, 4) scene-linear, premultiplied, row 0 at the bottom.
     """
-    coverage = _text_coverage(picture.shape[1], picture.shape[0], text)[..., None]
-    return (picture * (1.0 - coverage) + coverage * (*[_BRIGHTNESS] * 3, 1.0)).astype(np.float32)
+    height, width, _ = picture.shape
+    size = max(_SIZE * min(width, height), _MIN_SIZE)
+    letters = _text_coverage(width, height, text, size)
+    for coverage, brightness in ((_widened(letters, size), 0.0), (letters, _BRIGHTNESS)):
+        alpha = coverage[..., None]
+        color = np.array([*[brightness] * 3, 1.0], np.float32)
+        picture = picture * (1.0 - alpha) + alpha * color
+    return picture
 
 
-def _text_coverage(width: int, height: int, text: str) -> Floats:
-    """The coverage of each pixel by letters, (height, width)."""
+def _widened(coverage: Floats, size: float) -> Floats:
+    """The coverage of letters of this size [pixels] with their outline."""
+    reach = max(round(_OUTLINE * size), 1)
+    for axis in (0, 1):
+        shifted = (np.roll(coverage, shift, axis) for shift in range(-reach, reach + 1))
+        coverage = reduce(np.maximum, shifted)
+    return coverage
+
+
+def _text_coverage(width: int, height: int, text: str, size: float) -> Floats:
+    """The coverage of each pixel by letters of this size [pixels], (height, width)."""
     shorter = min(width, height)
     buffer = imbuf.new((width, height))
-    blf.size(_FONT, max(_SIZE * shorter, _MIN_SIZE))
+    blf.size(_FONT, size)
     blf.color(_FONT, 1.0, 1.0, 1.0, 1.0)
     with blf.bind_imbuf(_FONT, buffer):
         blf.position(_FONT, _MARGIN * shorter, _MARGIN * shorter, 0.0)
