@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from .field import Parameter, Settings
+from .field import Owner, Parameter, Settings
 
 _UNIT_SYMBOLS = {
     "length": "m",
@@ -19,12 +19,23 @@ _UNIT_SYMBOLS = {
     "none": "",
 }
 
+#: owner of a section -> what holds it in Python; options of a job are arguments of its operator
+_HOLDERS: dict[Owner, str] = {
+    "groom": "obj.data.hairloom",
+    "character": "obj.hairloom",
+    "scene": "scene.hairloom",
+}
+
 
 def parameter_table(settings: type[Settings]) -> str:
-    """A Markdown section: a heading, and a table with a row for each parameter."""
+    """A Markdown section: a heading, where Python finds the section, and a table with a row for
+    each parameter."""
+    holder = _HOLDERS.get(settings.owner)
+    place = [] if holder is None else [f"In Python: `{holder}.{settings.section}`", ""]
     rows = [
         f"## {settings.title} (`{settings.section}`)",
         "",
+        *place,
         "| Name | Default | Slider | Allowed | Unit | What it does | Source |",
         "| --- | --- | --- | --- | --- | --- | --- |",
         *(_row(parameter) for parameter in settings.parameters()),

@@ -1,6 +1,7 @@
 """Blender properties from parameter declarations, and their values."""
 
 import math
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -20,6 +21,7 @@ from hairloom.addon.blender.strands import growing
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.parameters import ALL_SETTINGS
 from hairloom.addon.params.curve import KNOT_POSITIONS
+from hairloom.addon.params.docs import parameter_table
 from hairloom.addon.params.field import NAME_KINDS
 
 pytestmark = pytest.mark.portable
@@ -39,6 +41,15 @@ def group_of(new_hair):
         return getattr(owners[ALL_SETTINGS[section].owner].hairloom, section)
 
     return get
+
+
+@pytest.mark.parametrize("section", SECTIONS)
+def test_the_page_of_parameters_says_where_a_script_finds_a_section(section, group_of):
+    table = parameter_table(ALL_SETTINGS[section])
+    (place,) = re.findall("^In Python: `(.+)`$", table, flags=re.M)
+    group = group_of(section)
+    here = {"obj": bpy.data.objects["Hair"], "scene": bpy.context.scene}
+    assert eval(place, here) == group
 
 
 def differing(section, check):
