@@ -329,8 +329,8 @@ def _overflow_note(crowding: Floats) -> tuple[str, ...]:
     if not full:
         return ()
     return (
-        f"{full} tiles cannot hold all their strands; they show only some of them, up to "
-        f"{crowding.max():.1f} times as wide",
+        f"the strands of {full} of {len(crowding)} tiles do not all fit; these show only some, up "
+        f"to {crowding.max():.1f} times as wide",
     )
 
 

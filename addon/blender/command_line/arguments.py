@@ -9,6 +9,9 @@ from typing import Any
 
 from ...errors import HairloomError, did_you_mean
 
+#: between an option and the one that is suggested, so that --object does not suggest --set
+_SIMILARITY = 0.7
+
 
 class VerbParser(argparse.ArgumentParser):
     """The options of a verb. Unknown ones are reported below the usage of this verb, with a
@@ -20,7 +23,7 @@ class VerbParser(argparse.ArgumentParser):
         options, unknown = super().parse_known_args(args, namespace)
         if unknown:
             known = [name for action in self._actions for name in action.option_strings]
-            question = did_you_mean(unknown[0].partition("=")[0], known, count=1).strip()
+            question = did_you_mean(unknown[0].partition("=")[0], known, 1, _SIMILARITY).strip()
             ending = f". {question}" if question else ""
             self.error(f"unrecognized arguments: {' '.join(unknown)}{ending}")
         return options, unknown

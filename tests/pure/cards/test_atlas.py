@@ -172,7 +172,7 @@ def test_a_full_tile_keeps_its_thickness() -> None:
     plan = plan_atlas(*parts, np.zeros(3000, int), settings)
     assert len(plan.strands) == 1024
     assert plan.thickness[0] * len(plan.strands) == pytest.approx(1.5 * 3000)
-    assert any("cannot hold all their strands" in note for note in plan.notes)
+    assert any("tiles do not all fit" in note for note in plan.notes)
 
 
 def test_notes_say_what_is_smaller_than_a_pixel() -> None:
