@@ -72,7 +72,14 @@ def spread_roots(pieces: Pieces, count: int, seed: int, whole: Pieces | None = N
 
 
 def require_area(mass: Floats) -> None:
-    """Raise if this mass, the area x density of each part, is 0 everywhere."""
+    """Refuse to scatter roots over nothing.
+
+    Args:
+        mass: area x density of each part [m^2], of any shape.
+
+    Raises:
+        HairloomError: it is 0 everywhere.
+    """
     if not mass.sum() > 0.0:
         raise HairloomError(
             "there is no area on which hair may grow",

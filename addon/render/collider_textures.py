@@ -212,7 +212,11 @@ class UploadedColliders:
 
 
 def round_texels(collider: Collider) -> Floats:
-    """Two texels for each round solid of a collider, (n, 2, 4)."""
+    """Two texels for each round solid of a collider, (n, 2, 4) float32.
+
+    Raises:
+        HairloomError: it is no ball, capsule or set of balls.
+    """
     if isinstance(collider, SphereSetCollider):
         solids = np.zeros((len(collider.radii), 2, 4), np.float32)
         solids[:, 0, :3], solids[:, 0, 3] = collider.centers, collider.radii

@@ -147,7 +147,11 @@ def _groups_of_one_size(
 
 
 def png_of(path: Path, pixels: Floats, *, is_color: bool = False) -> bytes:
-    """An 8-bit PNG of (height, width, channels); a temporary file is written beside `path`."""
+    """An 8-bit PNG of (height, width, channels); a temporary file is written beside `path`.
+
+    Raises:
+        HairloomError: it cannot be written there.
+    """
     picture = path.with_name(".picture.png")
     try:
         write_texture(picture, pixels, is_color=is_color, depth="uint8", is_packed=True)

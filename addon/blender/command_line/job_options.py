@@ -311,7 +311,11 @@ def add_farm_options(parser: argparse.ArgumentParser, *, can_skip: bool) -> None
 
 
 def check_numbers(options: argparse.Namespace) -> None:
-    """Refuse numbers out of range, such as sizes that cannot be drawn, before any work is done."""
+    """Refuse numbers out of range, such as sizes that cannot be drawn, before any work is done.
+
+    Raises:
+        HairloomError: naming the option and its limits.
+    """
     for name, minimum, maximum in _LIMITS:
         value = getattr(options, name, None)
         if value is not None and not minimum <= value <= maximum:

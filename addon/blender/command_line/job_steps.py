@@ -182,7 +182,11 @@ def report_rig(report: Report, rig: Rig, name: str) -> None:
 
 
 def report_dropped_strands(job: Job, dropped: Mapping[str, int], place: str) -> None:
-    """Print what was dropped of the hair of this name; with --strict that is an error."""
+    """Print what was dropped of the hair of this name.
+
+    Raises:
+        HairloomError: something was dropped, with --strict.
+    """
     if not dropped:
         return
     reasons = ", ".join(f"{count} with {reason}" for reason, count in dropped.items())

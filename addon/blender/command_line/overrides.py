@@ -12,7 +12,11 @@ from ...parameters import ALL_SETTINGS
 
 
 def overrides(assignments: list[str], section: str) -> dict[str, Any]:
-    """The values that --set gives to one section."""
+    """The values that --set gives to one section.
+
+    Raises:
+        HairloomError: an assignment names no section, or has no value.
+    """
     values: dict[str, Any] = {}
     choices = {each.name for each in ALL_SETTINGS[section].parameters() if each.choices}
     for assignment in assignments:

@@ -43,7 +43,11 @@ def read_pose(
 
 
 def check_finite(place: str, values: Floats) -> None:
-    """Refuse positions that a driver or modifier has made infinite or NaN."""
+    """Refuse positions of any shape that a driver or modifier has made infinite or NaN.
+
+    Raises:
+        HairloomError: one of them is.
+    """
     if not np.isfinite(values).all():
         raise HairloomError(
             "its position is not a finite number",

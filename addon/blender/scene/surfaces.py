@@ -173,7 +173,11 @@ def read_material_slots(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -
 def evaluated_mesh(
     obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, place: str
 ) -> Iterator[bpy.types.Mesh]:
-    """The evaluated mesh, even in Edit Mode; it is freed at the end of the block."""
+    """The evaluated mesh, even in Edit Mode; it is freed at the end of the block.
+
+    Raises:
+        HairloomError: not a mesh.
+    """
     if obj.type != "MESH":
         raise HairloomError(
             f"it is a {obj.type.lower()} object, not a mesh",
