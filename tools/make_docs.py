@@ -29,7 +29,7 @@ from small_pictures import write_small
 
 PARAMETERS = REPOSITORY / "docs" / "parameters.md"
 VERBS = REPOSITORY / "docs" / "verbs.md"
-TEXTS = REPOSITORY / "translations" / "template.json"
+TRANSLATIONS = REPOSITORY / "translations"
 IMAGES = REPOSITORY / "docs" / "images"
 HEADING = """# Parameters
 
@@ -64,12 +64,17 @@ def verb_tables() -> str:
     )
 
 
-def texts_to_translate() -> str:
-    """The text of translations/template.json; needs Blender."""
+def write_texts_to_translate() -> None:
+    """Write the template of translations, and bring each language up to date; needs Blender."""
     load_package().register()
     translations = importlib.import_module(f"{PACKAGE}.addon.ui.translations")
     classes = importlib.import_module(f"{PACKAGE}.addon.registration").CLASSES
-    return json.dumps(translations.texts(classes), indent=1, ensure_ascii=False) + "\n"
+    template = translations.texts(classes)
+    for path in TRANSLATIONS.glob("*.json"):
+        is_language = path.stem != translations.TEMPLATE
+        content = json.loads(path.read_text(encoding="utf-8")) if is_language else {}
+        texts = translations.updated(content, template)
+        path.write_text(json.dumps(texts, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
 def make_pictures() -> None:
@@ -113,7 +118,7 @@ def main() -> int:
     flow_figure.FIGURE.write_text(flow_figure.figure(), encoding="utf-8")
     hair_hlsl.write()
     VERBS.write_text(verb_tables(), encoding="utf-8")
-    TEXTS.write_text(texts_to_translate(), encoding="utf-8")
+    write_texts_to_translate()
     gallery.PAGE.write_text(gallery.page(), encoding="utf-8")
     decisions = decisions_index.PAGE.read_text(encoding="utf-8")
     decisions_index.PAGE.write_text(decisions_index.with_index(decisions), encoding="utf-8")

@@ -59,6 +59,7 @@ class HAIRLOOM_OT_add_hairstyle(LongWork, bpy.types.Operator):
         name="Skin",
         description="Skin tone of the head, if one is added",
         items=[(name, name.title(), "") for name in TONES],
+        translation_context="Skin",  # "Light" is also a panel
         default="light",
     )
     hairline: StringProperty(

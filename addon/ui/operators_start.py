@@ -96,6 +96,7 @@ class HAIRLOOM_OT_sample_scene(LongWork, bpy.types.Operator):
             name="Skin",
             description="Skin tone of the head",
             items=[(name, name.title(), "") for name in TONES],
+            translation_context="Skin",
             default="light",
         ),
     }

@@ -33,6 +33,8 @@ _DRAW_FUNCTIONS = {
 _TEXT_KEYWORDS = ("text", "heading", "disabled_text")
 
 type Table = dict[tuple[str, str], str]
+#: context -> text -> translation, "" if there is none
+type Texts = dict[str, dict[str, str]]
 
 
 def tables() -> dict[str, Table]:
@@ -44,7 +46,7 @@ def tables() -> dict[str, Table]:
     return result
 
 
-def table_of(content: dict[str, dict[str, str]]) -> Table:
+def table_of(content: Texts) -> Table:
     """A file's translations in Blender's form; texts without one stay English."""
     return {
         (context, text): translated
@@ -54,7 +56,15 @@ def table_of(content: dict[str, dict[str, str]]) -> Table:
     }
 
 
-def texts(classes: Iterable[type[Any]]) -> dict[str, dict[str, str]]:
+def updated(content: Texts, template: Texts) -> Texts:
+    """A file's translations of the template's texts; those of others are gone."""
+    return {
+        context: {text: content.get(context, {}).get(text, "") for text in texts}
+        for context, texts in template.items()
+    }
+
+
+def texts(classes: Iterable[type[Any]]) -> Texts:
     """All texts that the template holds: context -> text -> "", in order."""
     found = _drawn_texts()
     for each in classes:
@@ -62,7 +72,7 @@ def texts(classes: Iterable[type[Any]]) -> dict[str, dict[str, str]]:
     for name in dir(bpy.ops.hairloom):
         rna = getattr(bpy.ops.hairloom, name).get_rna_type()
         found |= {("Operator", rna.name), ("*", rna.description)} | _property_texts(rna)
-    ordered: dict[str, dict[str, str]] = {}
+    ordered: Texts = {}
     for context, text in sorted(found):
         if text:
             ordered.setdefault(context, {})[text] = ""
@@ -102,9 +112,10 @@ def _property_texts(rna: Any) -> set[tuple[str, str]]:
     for prop in rna.properties:
         if prop.identifier in inherited:
             continue
-        texts |= {("*", prop.name), ("*", prop.description)}
+        context = prop.translation_context
+        texts |= {(context, prop.name), ("*", prop.description)}
         for item in getattr(prop, "enum_items_static", ()):
-            texts |= {("*", item.name), ("*", item.description)}
+            texts |= {(context, item.name), ("*", item.description)}
     return texts
 
 

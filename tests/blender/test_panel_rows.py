@@ -31,6 +31,7 @@ from hairloom.addon.ui import (
     panels,
     sections,
     state,
+    translations,
 )
 from hairloom.addon.ui.selection import make_active
 
@@ -196,18 +197,21 @@ def test_a_head_that_has_brows_gets_hair_from_the_same_panel():
     assert "Select a Head" in [text for text, _ in layout.texts]
 
 
-def test_no_label_is_cut(extension):
+@pytest.mark.parametrize("language", ["English", *translations.tables()])
+def test_no_label_is_cut(extension, language):
     """Labels of all panels fit into their part of a row, measured with Blender's own font."""
     blf.size(0, FONT_SIZE)
+    table = translations.tables().get(language, {})
     cut, count = [], 0
     for section, settings in ALL_SETTINGS.items():
         for parameter in settings.parameters():
             if parameter.kind == "mask":
                 continue  # it is beside its slider, without a label
-            width = blf.dimensions(0, parameter.label)[0]
+            label = table.get(("*", parameter.label), parameter.label)
+            width = blf.dimensions(0, label)[0]
             count += 1
             if width > (TOGGLE_WIDTH if parameter.kind == "toggle" else LABEL_WIDTH):
-                cut.append(f"{section}, {parameter.label}: {width:.0f}")
+                cut.append(f"{section}, {label}: {width:.0f}")
     assert cut == [] and count > 200
 
 

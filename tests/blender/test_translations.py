@@ -1,6 +1,7 @@
 """Translatable texts are all in the template, and a language file reaches Blender."""
 
 import json
+import re
 
 import bpy
 import pytest
@@ -16,11 +17,14 @@ TEXTS_OF_ALL_KINDS = (
     "Colour and shine of the strands",
 )
 
+PLACEHOLDER = re.compile(r"%[a-z]|[{}]")
+
 #: context -> texts that panels draw besides names of operators and settings: a text, either of two,
 #: the reason on an idle button or field, a heading
 DRAWN = {
     "*": ("No problems", "Hairstyles", "as the scene", "Cryptomatte"),
     "Operator": ("Add Hair", "To Material", "Select a Head"),
+    "Skin": ("Light", "Dark"),
 }
 
 
@@ -28,6 +32,27 @@ def test_the_template_is_current(extension):
     path = translations.FOLDER / f"{translations.TEMPLATE}.json"
     found = json.loads(path.read_text(encoding="utf-8"))
     assert found == translations.texts(registration.CLASSES), "run make docs"
+
+
+@pytest.mark.parametrize("language", translations.tables())
+def test_a_language_has_the_texts_that_there_are(extension, language):
+    """No translation is of a text that has changed since; placeholders are as in the English."""
+    content = json.loads((translations.FOLDER / f"{language}.json").read_text(encoding="utf-8"))
+    template = translations.texts(registration.CLASSES)
+    assert content == translations.updated(content, template), "run make docs"
+    table = translations.tables()[language]
+    assert len(table) > 0.9 * sum(len(texts) for texts in template.values())
+    for (_, text), translated in table.items():
+        assert PLACEHOLDER.findall(text) == PLACEHOLDER.findall(translated), text
+
+
+def test_a_changed_text_loses_its_translation_and_the_others_keep_theirs():
+    content = {"*": {"Look": "Aussehen", "gone": "weg"}, "Gone": {"x": "y"}}
+    template = {"*": {"Look": "", "new": ""}, "Operator": {"Look": ""}}
+    assert translations.updated(content, template) == {
+        "*": {"Look": "Aussehen", "new": ""},
+        "Operator": {"Look": ""},
+    }
 
 
 def test_texts_of_every_kind_are_found(extension):
