@@ -332,6 +332,17 @@ def test_files_that_were_saved_amid_a_render_are_healed(
     assert hair_scene.problem_of(bpy.context.scene) == ""
 
 
+def test_undo_to_a_step_amid_a_render_hides_no_hair(cycles: Any, hairy: Any) -> None:
+    cycles.hairloom.use_hair_scene = True
+    hair_scene.hide_hair(cycles)
+    bpy.ops.ed.undo_push(message="amid")
+    hair_scene.show_hair()
+    bpy.ops.ed.undo_push(message="after")
+    bpy.ops.ed.undo()
+    hair = bpy.data.objects["Hair"]
+    assert hair.visible_camera and hair.visible_shadow and not hair.hairloom.hidden_rays
+
+
 def test_a_hair_scene_goes_with_the_scene_whose_hair_it_draws(cycles: Any, tmp_path: Path) -> None:
     cycles.hairloom.use_hair_scene = True
     hair = cycles.hairloom.hair_scene.name

@@ -219,6 +219,12 @@ def on_render_end(*_: object) -> None:
 
 
 @persistent
+def on_undo(*_: object) -> None:
+    """Restore hair after undo or redo to a step that was pushed during a render."""
+    show_hair()
+
+
+@persistent
 def on_update(scene: bpy.types.Scene, *_: object) -> None:
     """Keep the hair scene up to date: before a render, Blender needs a camera in all scenes of a
     compositor, and nodes of the compositor show the passes of their scene."""
@@ -243,6 +249,8 @@ HANDLERS = (
     (bpy.app.handlers.render_pre, on_frame_begin),
     (bpy.app.handlers.render_complete, on_render_end),
     (bpy.app.handlers.render_cancel, on_render_end),
+    (bpy.app.handlers.undo_post, on_undo),
+    (bpy.app.handlers.redo_post, on_undo),
     (bpy.app.handlers.depsgraph_update_post, on_update),
     (bpy.app.handlers.load_post, repair),
     (bpy.app.handlers.save_pre, repair),
