@@ -332,6 +332,25 @@ def test_files_that_were_saved_amid_a_render_are_healed(
     assert hair_scene.problem_of(bpy.context.scene) == ""
 
 
+@pytest.mark.parametrize("setting", few_in_commits(["holdout", "indirect_only", "camera"]))
+def test_holes_and_shadows_of_unseen_hair_are_those_of_cycles(
+    setting: str, cycles: Any, hairy: Any, tmp_path: Path
+) -> None:
+    cycles.render.film_transparent = True
+    if setting == "camera":
+        hairy.visible_camera = False
+    else:
+        collection = bpy.data.collections.new("Hair")
+        cycles.collection.children.link(collection)
+        collection.objects.link(hairy)
+        cycles.collection.objects.unlink(hairy)
+        setattr(cycles.view_layers[0].layer_collection.children["Hair"], setting, True)
+    expected = rendered(tmp_path)
+    cycles.hairloom.use_hair_scene = True
+    np.testing.assert_allclose(rendered(tmp_path), expected, atol=1e-4)
+    assert differs(bald(hairy, tmp_path), expected).mean() > 0.02, "nothing was to be seen"
+
+
 def test_undo_to_a_step_amid_a_render_hides_no_hair(cycles: Any, hairy: Any) -> None:
     cycles.hairloom.use_hair_scene = True
     hair_scene.hide_hair(cycles)

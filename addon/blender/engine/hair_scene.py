@@ -164,10 +164,19 @@ def _hair_in(collection: bpy.types.Collection, visited: set[str]) -> Iterator[bp
             yield from _hair_in(inner, visited)
 
 
+def _is_drawn(hair: bpy.types.Object, layer: bpy.types.ViewLayer) -> bool:
+    """Whether a picture shows the hair itself, not a hole in its place, or its shadows alone, which
+    are left to Blender's own engine."""
+    is_holdout = hair.is_holdout or hair.holdout_get(view_layer=layer)
+    is_seen = hair.visible_camera and not hair.indirect_only_get(view_layer=layer)
+    return bool(is_seen and not is_holdout)
+
+
 def hide_hair(scene: bpy.types.Scene) -> None:
-    """Hide all hair curves of a scene from Blender's own engine."""
+    """Hide the hair curves that the hair scene draws from Blender's own engine."""
+    layer = drawn_layer(scene)
     for hair in _hair_in(scene.collection, set()):
-        if hair.hairloom.hidden_rays:
+        if hair.hairloom.hidden_rays or not _is_drawn(hair, layer):
             continue
         bits = (getattr(hair, f"visible_{ray}") << number for number, ray in enumerate(RAYS))
         hair.hairloom.hidden_rays = HIDDEN | sum(bits)
