@@ -206,6 +206,29 @@ def test_a_baked_frame_is_drawn(file, tmp_path):
     assert "out of date (settings)" in json.loads(report.read_text())["notes"][0]
 
 
+def test_a_bake_in_a_folder_has_the_look_of_the_only_hair_of_the_scene(file, tmp_path, capsys):
+    bpy.ops.wm.open_mainfile(filepath=str(file))
+    hair = bpy.data.objects["Hair"]
+    hair.data.hairloom.shading.base_color = (0.9, 0.02, 0.02)
+    bpy.ops.wm.save_mainfile()
+    folder, picture = tmp_path / "bake", tmp_path / "hair.png"
+    assert command_line.run(["bake", "--scene", str(file), "--output", str(folder)]) == 0
+    arguments = ["render", "--scene", str(file), "--bake", str(folder), "--output", str(picture)]
+    arguments += ["--width", "32", "--height", "24", "--samples", "1"]
+    drawn = []
+    for more in ([], ["--groom", "Hair"]):
+        assert command_line.run([*arguments, *more]) == 0
+        drawn.append(read_texture(picture, is_color=False))
+    assert np.array_equal(*drawn)
+    bpy.ops.wm.open_mainfile(filepath=str(file))
+    other = bpy.data.objects["Hair"].copy()
+    bpy.context.collection.objects.link(other)
+    bpy.ops.wm.save_mainfile()
+    capsys.readouterr()
+    assert command_line.run(arguments) == 0
+    assert "several objects (Hair, Hair.001), so the bake has" in capsys.readouterr().out
+
+
 @pytest.mark.slow(instead="test_a_baked_frame_is_drawn")
 def test_a_picture_of_another_bake_is_not_skipped(file, tmp_path, capfd):
     assert command_line.run(["bake", "--scene", str(file), "--save"]) == 0

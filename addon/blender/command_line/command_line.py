@@ -17,6 +17,7 @@ from ...errors import HairloomError
 from ...params import SettingsMap
 from ..base.gpu_context import converted_gpu_errors
 from ..base.interruption import Interrupted, interruptible
+from ..base.objects import objects_in
 from ..base.parts import run_parts
 from ..base.report import Report
 from ..setup.hairstyles import add_hairstyle, add_head, named_hairstyle
@@ -168,8 +169,11 @@ def _job(verb: Verb, options: argparse.Namespace, report: Report) -> Job:
         with report.stage("open scene"):
             open_scene(Path(options.scene))
     check_idle_options(verb, options)
-    if verb.takes_hair and not (options.groom or options.style or hasattr(options, "object")):
-        options.groom = _only_groom(options, report)
+    if verb.takes_hair and not (options.groom or options.style):
+        if getattr(options, "bake", None):
+            options.groom = _groom_of_bake(options, report)
+        elif not hasattr(options, "object"):
+            options.groom = _only_groom(options, report)
     if verb.takes_hair and options.style:
         with report.stage("add hairstyle"):
             options.groom = _add_hairstyle(options, report)
@@ -236,7 +240,7 @@ def _only_groom(options: argparse.Namespace, report: Report) -> str | None:
     Raises:
         HairloomError: there are several, there is none, or it is hidden or empty.
     """
-    if not has_scene(options) or options.head or getattr(options, "bake", None):
+    if not has_scene(options) or options.head:
         return None
     found, notes = usable_objects(is_groom, "--groom")
     report_notes(list(notes), report)
@@ -255,6 +259,21 @@ def _only_groom(options: argparse.Namespace, report: Report) -> str | None:
             " which hair is grown",
         )
     return grooms[0]
+
+
+def _groom_of_bake(options: argparse.Namespace, report: Report) -> str | None:
+    """The only hair of the scene, which gives a bake from a folder its look, and the UVs and the
+    materials of its head; None if there is none or several, or if a head is named."""
+    if not has_scene(options) or options.head:
+        return None
+    grooms = sorted(obj.name for obj in objects_in(bpy.context.view_layer) if is_groom(obj))
+    if len(grooms) > 1:
+        note = (
+            f"this scene has hair in several objects ({', '.join(grooms)}), so the bake has the "
+            "default look. Name its hair with --groom."
+        )
+        report_notes([note], report)
+    return grooms[0] if len(grooms) == 1 else None
 
 
 def _children_density(groom: str | None) -> str:
