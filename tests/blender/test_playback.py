@@ -231,6 +231,19 @@ def test_hair_without_show_in_renders_is_rendered_as_it_stands(scene):
     assert hair.hairloom.bake.copy is None and not hair.hide_render
 
 
+def test_renders_show_the_copy_to_what_its_hair_is_shown_to(scene):
+    hair = bpy.data.objects["Hair"]
+    hair.visible_shadow = False
+    bpy.ops.hairloom.bake()
+    copy = hair.hairloom.bake.copy
+    assert copy.visible_camera and not copy.visible_shadow
+    hair.visible_camera, hair.is_holdout = False, True
+    scene.render.engine = "BLENDER_WORKBENCH"
+    scene.render.resolution_x = scene.render.resolution_y = 16
+    bpy.ops.render.render()
+    assert not copy.visible_camera and copy.is_holdout
+
+
 def test_a_copy_with_a_missing_bake_is_reported_once_and_stays(scene, tmp_path, capfd):
     bpy.ops.hairloom.bake()
     curves = bpy.data.objects["Hair"].hairloom.bake.copy.data

@@ -23,6 +23,11 @@ from .baked_rig import BakedRig
 from .cache import Cache
 
 _POLY = 1  # in Blender's attribute curve_type
+#: properties of objects by which renders show them, beside `hide_render`
+_VISIBILITY = (
+    *("visible_camera", "visible_diffuse", "visible_glossy", "visible_transmission"),
+    *("visible_volume_scatter", "visible_shadow", "is_holdout", "is_shadow_catcher"),
+)
 
 
 def show_in_renders(
@@ -54,6 +59,7 @@ def show_in_renders(
     copy.hide_viewport = copy.hide_select = True
     copy.hide_render = bake.was_hidden
     hair.hide_render = True
+    follow_visibility()
     scene = depsgraph.scene
     scene.render.use_lock_interface = True
     playback.show_in_copies(scene)
@@ -64,6 +70,17 @@ def copy_of(hair: bpy.types.Object) -> bpy.types.Object | None:
     """The copy of this hair; None once the artist has converted it, such as to a mesh."""
     copy = hair.hairloom.bake.copy
     return copy if copy is not None and copy.type == "CURVES" else None
+
+
+def follow_visibility() -> None:
+    """Give all copies the visibility of their hair to rays, and whether it is a holdout."""
+    for copy in bpy.data.objects:
+        hair = copy.hairloom.bake.shown_hair
+        # during a render, Hairloom Hair may have hidden it
+        for name in () if hair is None or hair.hairloom.hidden_rays else _VISIBILITY:
+            value = getattr(hair, name)
+            if getattr(copy, name) != value:
+                setattr(copy, name, value)
 
 
 def remove_copy(hair: bpy.types.Object) -> None:

@@ -85,6 +85,7 @@ def on_frame_change_begin(scene: bpy.types.Scene, *_: Any) -> None:
 @persistent
 def on_render_begin(*_: Any) -> None:
     playback.set_rendering(True)
+    baked_copy.follow_visibility()
 
 
 @persistent
