@@ -139,7 +139,10 @@ def test_without_strokes_or_surface_it_says_what_to_do(hair):
     stroke.data.splines.clear()
     before = curve_points(hair.data)
     bpy.context.view_layer.update()
-    with pytest.raises(RuntimeError, match=r"no strokes .*no length"):
+    with pytest.raises(
+        RuntimeError,
+        match=r"it has no strokes: .*no length.*[^.]\. Draw a curve on the surface and",
+    ):
         bpy.ops.hairloom.comb_flow()
     hair.data.surface = hair.parent = None
     with pytest.raises(RuntimeError, match="no surface"):

@@ -26,9 +26,9 @@ def comb_flow(
     surface = surface_to_comb_on(hair, depsgraph)
     lines, unusable = read_strokes(hair, depsgraph)
     if not lines:
-        reason = " ".join(unusable)
+        reason = " ".join(unusable).rstrip(".")
         raise HairloomError(
-            f"it has no strokes{f' ({reason})' if reason else ''}",
+            f"it has no strokes{f': {reason}' if reason else ''}",
             place=hair.name,
             remedy="Draw a curve on the surface and press Add Stroke",
         )

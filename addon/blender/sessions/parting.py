@@ -24,9 +24,9 @@ def comb_parting(
     surface = surface_to_comb_on(hair, depsgraph)
     lines, unusable = read_partings(hair, depsgraph)
     if not len(lines):
-        reason = " ".join(unusable)
+        reason = " ".join(unusable).rstrip(".")
         raise HairloomError(
-            f"it has no partings{f' ({reason})' if reason else ''}",
+            f"it has no partings{f': {reason}' if reason else ''}",
             place=hair.name,
             remedy="Draw a curve on the surface and press Add Parting",
         )

@@ -26,9 +26,9 @@ def trim_to_shapes(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Pa
     check_curves_editable(hair, depsgraph)
     shapes, unusable = read_shapes(trim_shapes_of(hair), depsgraph)
     if not shapes:
-        reason = " ".join(unusable)
+        reason = " ".join(unusable).rstrip(".")
         raise HairloomError(
-            f"it has no trim shape{f' ({reason})' if reason else ''}",
+            f"it has no trim shape{f': {reason}' if reason else ''}",
             place=hair.name,
             remedy="Select a closed mesh, a flat one or an Empty together with the hair",
         )
