@@ -220,6 +220,8 @@ def test_a_bake_in_a_folder_has_the_look_of_the_only_hair_of_the_scene(file, tmp
         assert command_line.run([*arguments, *more]) == 0
         drawn.append(read_texture(picture, is_color=False))
     assert np.array_equal(*drawn)
+    assert command_line.run([*arguments, "--groom", "Hairr"]) == 1
+    assert "Hairr: this is neither a hair curves object" in capsys.readouterr().err
     bpy.ops.wm.open_mainfile(filepath=str(file))
     other = bpy.data.objects["Hair"].copy()
     bpy.context.collection.objects.link(other)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -243,7 +244,19 @@ def _read_groom(
         )
         notes = (*file.notes, *color_notes(path.name, file.strands))
         return file.strands, file.dropped, file.groom, notes
-    raise _unknown(source, "CURVES", "hair curves", "a groom's file such as hair.abc")
+    raise _unknown_groom(source)
+
+
+def check_groom(source: str) -> None:
+    """Raises:
+    HairloomError: the name is that of no hair of the scene and of no file.
+    """
+    if find_hair(source) is None and not os.path.isfile(source):
+        raise _unknown_groom(source)
+
+
+def _unknown_groom(source: str) -> HairloomError:
+    return _unknown(source, "CURVES", "hair curves", "a groom's file such as hair.abc")
 
 
 def _read_mesh(source: str, sources: Sources) -> tuple[Surface, tuple[str, ...]]:

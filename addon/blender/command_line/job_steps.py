@@ -39,7 +39,15 @@ from ..scene.masks import MaskReader
 from ..scene.painted_colors import painted_colors
 from ..scene.source import Source
 from ..sessions.prepared_groom import prepare_groom
-from .inputs import Inputs, Sources, find_head_name, read_head, read_head_look, read_inputs
+from .inputs import (
+    Inputs,
+    Sources,
+    check_groom,
+    find_head_name,
+    read_head,
+    read_head_look,
+    read_inputs,
+)
 from .object_settings import find_hair
 
 #: settings that a bake is made with, and keeps
@@ -232,6 +240,8 @@ def read_baked_motion(job: Job, frames: range | None = None) -> BakedGuides:
         HairloomError: no bake, or frames that it does not hold.
     """
     if job.options.bake:
+        if job.sources.groom is not None:
+            check_groom(job.sources.groom)
         motion = BakedGuides.in_folder(Path(job.options.bake).resolve(), frames)
     else:
         hair = job.hair
