@@ -9,6 +9,7 @@ import pytest
 from panel_layout import Layout
 
 from hairloom.addon.blender.preview import previews, scene_events
+from hairloom.addon.blender.properties.properties import TRANSLATION_CONTEXT
 from hairloom.addon.parameters import ALL_SETTINGS
 from hairloom.addon.ui import (
     card_sections,
@@ -207,7 +208,7 @@ def test_no_label_is_cut(extension, language):
         for parameter in settings.parameters():
             if parameter.kind == "mask":
                 continue  # it is beside its slider, without a label
-            label = table.get(("*", parameter.label), parameter.label)
+            label = table.get((TRANSLATION_CONTEXT, parameter.label), parameter.label)
             width = blf.dimensions(0, label)[0]
             count += 1
             if width > (TOGGLE_WIDTH if parameter.kind == "toggle" else LABEL_WIDTH):

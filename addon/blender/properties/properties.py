@@ -41,6 +41,8 @@ _PRECISION = {"length": 5, "rate": 2, "pixels": 2}
 #: Blender stores float32, which holds this many decimal digits
 _STORED_DIGITS = 7
 _MAX_INTEGER = 2**31 - 1
+#: Labels are translated by our own tables alone: Blender's words for them may not fit the fields.
+TRANSLATION_CONTEXT = "Hairloom"
 #: Lets library overrides of linked grooms have their own settings.
 OVERRIDABLE = {"LIBRARY_OVERRIDABLE"}
 
@@ -127,6 +129,7 @@ def _property(parameter: Parameter, changed: Changed | None) -> Any:
     common: dict[str, Any] = {
         "name": parameter.label,
         "description": parameter.description,
+        "translation_context": TRANSLATION_CONTEXT,
         "default": parameter.default,
         "update": None if changed is None else _update(changed),
         "override": OVERRIDABLE,
