@@ -14,6 +14,7 @@ from .blender.command_line.command_line import run
 from .blender.engine import engine, hair_scene
 from .blender.preview import handlers, scene_events
 from .blender.properties import groups, previews
+from .blender.properties.properties import BUTTON_CONTEXT
 from .blender.scene import look_materials
 from .blender.strands import growing
 from .ui import (
@@ -171,6 +172,9 @@ def _steps() -> tuple[Step, ...]:
 
 
 def _class_step(each: type[Any]) -> Step:
+    if issubclass(each, bpy.types.Operator):
+        each.bl_translation_context = BUTTON_CONTEXT
+
     return (
         lambda: bpy.utils.register_class(each),
         lambda: bpy.utils.unregister_class(each),

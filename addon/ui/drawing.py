@@ -8,6 +8,7 @@ from typing import Any
 import bpy
 
 from ..blender.properties.groups import OVERLAYS
+from ..blender.properties.properties import TRANSLATION_CONTEXT
 from ..params import Parameter
 
 #: Draws one section of the panels of a groom.
@@ -69,7 +70,7 @@ def _draw_masked(
     row.use_property_split = False
     label = row.row()
     label.alignment = "RIGHT"
-    label.label(text=parameter.label)
+    label.label(text=parameter.label, text_ctxt=TRANSLATION_CONTEXT)
     fields = row.split(factor=_SLIDER_FRACTION, align=True)
     fields.prop(group, parameter.name, text="", slider=True)
     fields.prop(group, mask.name, text="", icon="GROUP_VERTEX")
@@ -91,7 +92,7 @@ def draw_inactive(
     row.use_property_split = False
     label = row.row()
     label.alignment = "RIGHT"
-    label.label(text=property_rna.name)
+    label.label(text=property_rna.name, text_ctxt=TRANSLATION_CONTEXT)
     is_number = property_rna.type in {"INT", "FLOAT"}
     has_text = (is_number or property_rna.type == "BOOLEAN") and not property_rna.array_length
     field = row.row(align=True)
@@ -139,7 +140,8 @@ def draw_overlays(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
 
 def _draw_curve(layout: bpy.types.UILayout, group: Any, parameter: Parameter, reason: str) -> None:
     """Five sliders, from root to tip."""
-    layout.label(text=f"{parameter.label}: {reason}" if reason else parameter.label)
+    text = f"{parameter.label}: {reason}" if reason else parameter.label
+    layout.label(text=text, text_ctxt=TRANSLATION_CONTEXT)
     sliders = layout.column(align=True)
     for index, label in enumerate(_CURVE_LABELS):
         sliders.prop(group, parameter.name, index=index, text=label, slider=True)

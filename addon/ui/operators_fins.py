@@ -152,8 +152,13 @@ def _draw_buttons(row: bpy.types.UILayout, session: Simulation | None) -> None:
         row.label(text="Making the cloth", icon="SORTTIME")
         row.operator("hairloom.fin_preview", text="", icon="X")
         return
-    text, icon = ("Stop Preview", "HIDE_OFF") if session else ("Preview", "HIDE_ON")
-    row.operator("hairloom.fin_preview", text=text, icon=icon, depress=session is not None)
+    is_on = session is not None
+    row.operator(
+        "hairloom.fin_preview",
+        text="Stop Preview" if is_on else "Preview",
+        icon="HIDE_OFF" if is_on else "HIDE_ON",
+        depress=is_on,
+    )
     draw_button(
         row, "hairloom.fin_reset", "At Rest", "Reset", in_all_modes=True, icon="FILE_REFRESH"
     )

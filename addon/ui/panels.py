@@ -41,18 +41,22 @@ def draw_preview(layout: bpy.types.UILayout, context: bpy.types.Context) -> None
     session = previews.session_of(hair)
     column = layout.column(align=True)
     column.scale_y = 1.3
-    text, icon = ("Stop Preview", "HIDE_OFF") if session else ("Preview", "HIDE_ON")
-    disabled_text = "Preview: Select Hair First"
     is_on = session is not None
     draw_button(
-        column, "hairloom.preview", disabled_text, text, in_all_modes=True, icon=icon, depress=is_on
+        column,
+        "hairloom.preview",
+        "Preview: Select Hair First",
+        "Stop Preview" if is_on else "Preview",
+        in_all_modes=True,
+        icon="HIDE_OFF" if is_on else "HIDE_ON",
+        depress=is_on,
     )
     playing, paused = previews.is_playing(), previews.is_paused()
     row = column.row(align=True)
-    text, icon = ("Stop", "SNAP_FACE") if playing else ("Play", "PLAY")
-    row.operator("hairloom.play", text=text, icon=icon, depress=playing)
-    text, icon = ("Resume", "PLAY") if paused else ("Pause", "PAUSE")
-    row.operator("hairloom.pause", text=text, icon=icon, depress=paused)
+    icon = "SNAP_FACE" if playing else "PLAY"
+    row.operator("hairloom.play", text="Stop" if playing else "Play", icon=icon, depress=playing)
+    icon = "PLAY" if paused else "PAUSE"
+    row.operator("hairloom.pause", text="Resume" if paused else "Pause", icon=icon, depress=paused)
     row.operator("hairloom.reset", text="Reset", icon="FILE_REFRESH")
     if hair is not None:
         layout.prop(hair.hairloom.bake, "follows")
@@ -62,9 +66,9 @@ def draw_preview(layout: bpy.types.UILayout, context: bpy.types.Context) -> None
         return
     draw_state(layout, session)
     draw_problems_row(layout, hair, session)
-    disabled_text = "Uses Hairloom" if session is not None else ""
     if not draw_progress(layout, HAIRLOOM_OT_use_groom):
-        draw_button(layout, "hairloom.use_groom", disabled_text, icon="OUTLINER_OB_CURVES")
+        icon, operator = "OUTLINER_OB_CURVES", "hairloom.use_groom"
+        draw_button(layout, operator, "Uses Hairloom" if session is not None else "", icon=icon)
     draw_more(layout)
     if hair.hairloom.hairstyle:
         row = layout.row(align=True)

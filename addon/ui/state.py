@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import bpy
 
@@ -13,6 +14,7 @@ from ..blender.preview import previews as registry
 from ..blender.preview.diagnostics import instances_note, issues_of, unfelt_note
 from ..blender.preview.phases import Phase
 from ..blender.preview.previews import previews
+from ..blender.properties.properties import TRANSLATION_CONTEXT
 from ..blender.sessions.measures import PARTS, array_bytes
 from ..blender.sessions.session import Session
 from ..blender.viewport import view_transform
@@ -36,13 +38,20 @@ class Problem:
     button: str = ""
 
 
+class Statistic(NamedTuple):
+    """A line about the hair."""
+
+    name: str
+    value: str
+
+
 def draw_state(layout: bpy.types.UILayout, session: Session | None) -> None:
     """Draw what moves the hair, counts, memory and times, with the same number of short lines in
     any state, so that buttons below do not move away from under the mouse."""
     lines = layout.column(align=True)
-    for name, text in (("State", _state(session)), *_statistics(session)):
+    for name, text in (Statistic("State", _state(session)), *_statistics(session)):
         parts = lines.split(factor=NAME_FRACTION)
-        parts.label(text=name)
+        parts.label(text=name, text_ctxt=TRANSLATION_CONTEXT)
         row = parts.row(align=True)
         if name == "State" and running_label():
             row.label(text=running_label())
@@ -85,20 +94,22 @@ def draw_card_progress(layout: bpy.types.UILayout, session: Session | None) -> b
     return True
 
 
-def _statistics(session: Session | None) -> Iterator[tuple[str, str]]:
-    """Name and value of each figure, also for hair that is not made."""
+def _statistics(session: Session | None) -> Iterator[Statistic]:
+    """All figures, also for hair that is not made."""
     rig = None if session is None or not session.is_made else session.rig
     drawn: tuple[str, ...] = (_NONE, _NONE)
     if session is not None and rig is not None:
         drawn = _drawn_counts(session)
-    yield "Strands", _NONE if rig is None else f"{rig.strands.strand_count:,}"
-    yield "Guides", _NONE if rig is None else f"{len(rig.guides):,}"
-    yield from zip(("Drawn", ""), drawn, strict=True)
+    yield Statistic("Strands", _NONE if rig is None else f"{rig.strands.strand_count:,}")
+    yield Statistic("Guides", _NONE if rig is None else f"{len(rig.guides):,}")
+    yield Statistic("Drawn", drawn[0])
+    yield Statistic("", drawn[1])
     size = 0 if session is None or rig is None else array_bytes(rig, session.snapshot)
-    yield "Memory", f"{size / _MEGABYTE:,.0f} MB, GPU {memory_in_use():,.0f} MB" if size else _NONE
+    memory = f"{size / _MEGABYTE:,.0f} MB, GPU {memory_in_use():,.0f} MB"
+    yield Statistic("Memory", memory if size else _NONE)
     for part in PARTS:
         milliseconds = None if session is None else session.times.milliseconds(part)
-        yield part.capitalize(), _milliseconds(milliseconds)
+        yield Statistic(part.capitalize(), _milliseconds(milliseconds))
 
 
 def _drawn_counts(session: Session) -> tuple[str, str]:

@@ -17,6 +17,7 @@ from typing import Any
 
 import bpy
 
+from ..blender.properties.properties import BUTTON_CONTEXT, TRANSLATION_CONTEXT
 from .preferences import ROOT_PACKAGE
 
 FOLDER = Path(__file__).resolve().parents[2] / "translations"
@@ -25,9 +26,10 @@ TEMPLATE = "template"
 #: function that draws a text -> the context in which Blender looks it up, and the index of the
 #: first argument that is a text; for all others the context is "*"
 _DRAW_FUNCTIONS = {
-    "operator": ("Operator", 1),
-    "draw_button": ("Operator", 2),
+    "operator": (BUTTON_CONTEXT, 1),
+    "draw_button": (BUTTON_CONTEXT, 2),
     "draw_inactive": ("*", 3),
+    "Statistic": (TRANSLATION_CONTEXT, 0),
 }
 #: keywords that are texts
 _TEXT_KEYWORDS = ("text", "heading", "disabled_text")
@@ -47,13 +49,20 @@ def tables() -> dict[str, Table]:
 
 
 def table_of(content: Texts) -> Table:
-    """A file's translations in Blender's form; texts without one stay English."""
-    return {
+    """A file's translations in Blender's form; texts without one stay English.
+
+    A text that a context lacks is that of another, such as of a setting whose name a label shows.
+    """
+    own = {
         (context, text): translated
         for context, texts in content.items()
         for text, translated in texts.items()
         if translated
     }
+    borrowed = {
+        (context, text): translated for (_, text), translated in own.items() for context in content
+    }
+    return borrowed | own
 
 
 def updated(content: Texts, template: Texts) -> Texts:
@@ -71,7 +80,8 @@ def texts(classes: Iterable[type[Any]]) -> Texts:
         found |= _class_texts(each)
     for name in dir(bpy.ops.hairloom):
         rna = getattr(bpy.ops.hairloom, name).get_rna_type()
-        found |= {("Operator", rna.name), ("*", rna.description)} | _property_texts(rna)
+        found |= {(rna.translation_context, rna.name), ("*", rna.description)}
+        found |= _property_texts(rna)
     ordered: Texts = {}
     for context, text in sorted(found):
         if text:

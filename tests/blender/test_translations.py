@@ -14,7 +14,7 @@ from hairloom.addon.ui import translations
 DECLARED = {
     "*": ("Play at Once", "Light Shafts", "Colour and shine of the strands"),
     "Hairloom": ("Levels of Detail", "Crossed Pairs"),
-    "Operator": ("Make Cards",),
+    "Hairloom Button": ("Make Cards",),
     "Skin": ("Light", "Dark"),
 }
 
@@ -24,7 +24,8 @@ PLACEHOLDER = re.compile(r"%[a-z]|[{}]")
 #: the reason on an idle button or field, a heading
 DRAWN = {
     "*": ("No problems", "Hairstyles", "as the scene", "Cryptomatte"),
-    "Operator": ("Add Hair", "To Material", "Select a Head"),
+    "Hairloom": ("Drawn",),
+    "Hairloom Button": ("Add Hair", "To Material", "Select a Head", "Stop Preview"),
 }
 
 
@@ -66,14 +67,17 @@ def test_texts_of_every_kind_are_found(extension):
 def test_a_language_reaches_blender_and_goes_again(no_extension, monkeypatch, tmp_path):
     template = {
         "*": {"Play at Once": "Gleich abspielen", "Look": ""},
-        "Operator": {"Make Cards": "x"},
+        "Hairloom": {"Width": "Breite"},
+        "Hairloom Button": {"Make Cards": "x", "Width": "Breiter"},
     }
     (tmp_path / "de_DE.json").write_text(json.dumps(template))
     (tmp_path / "template.json").write_text("{}")
     monkeypatch.setattr(translations, "FOLDER", tmp_path)
-    assert translations.tables() == {
-        "de_DE": {("*", "Play at Once"): "Gleich abspielen", ("Operator", "Make Cards"): "x"}
-    }
+    table = translations.tables()["de_DE"]
+    for context in template:
+        assert table[context, "Play at Once"] == "Gleich abspielen", "no context lacks a text"
+    assert table["Hairloom", "Width"] == "Breite" and table["Hairloom Button", "Width"] == "Breiter"
+    assert ("*", "Look") not in table
     view, language = bpy.context.preferences.view, bpy.context.preferences.view.language
     hairloom.register()
     try:

@@ -41,8 +41,8 @@ _PRECISION = {"length": 5, "rate": 2, "pixels": 2}
 #: Blender stores float32, which holds this many decimal digits
 _STORED_DIGITS = 7
 _MAX_INTEGER = 2**31 - 1
-#: Labels are translated by our own tables alone: Blender's words for them may not fit the fields.
-TRANSLATION_CONTEXT = "Hairloom"
+#: Labels and buttons are translated by our own tables alone: Blender's words for them may not fit.
+TRANSLATION_CONTEXT, BUTTON_CONTEXT = "Hairloom", "Hairloom Button"
 #: Lets library overrides of linked grooms have their own settings.
 OVERRIDABLE = {"LIBRARY_OVERRIDABLE"}
 
