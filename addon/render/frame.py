@@ -6,6 +6,7 @@ So shadows have penumbras, and errors of single shadow maps average out.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -14,6 +15,7 @@ import numpy as np
 from ..arrays import Floats
 from ..shading.lights import packed_lights
 from ..shading.mesh_shadow_settings import MeshShadowSettings
+from ..shading.settings import StrandSettings
 from . import gpu_objects
 from .camera import Camera, frame_camera, look_at, orthographic, perspective
 from .camera_window import jittered
@@ -36,6 +38,7 @@ __all__ = [
     "perspective",
     "render_image",
     "render_still",
+    "still_samples",
 ]
 
 #: the largest side that a target may have on every GPU that Blender supports
@@ -113,19 +116,22 @@ def render_still(
     center: Floats,
     passes: tuple[MeshPass, StrandPass],
     card_pass: CardPass,
+    on_sample: Callable[[int], object] = lambda done: None,
 ) -> Floats:
     """As `render_image`, with soft shadows: each sample of a pixel is a separate picture, lit by
     one point of each light.
 
     Args:
         center: (3,) [m], the point that the disks of lamps face.
+        on_sample: called with the number of samples that are done, of `still_samples`.
 
     Raises:
         ValueError, ShaderError: as `render_image`.
     """
     total = np.zeros((height, width, 4), np.float64)
-    count = max(samples**2, noise_free_samples(snapshot.strand_settings))
+    count = still_samples(snapshot.strand_settings, samples)
     for sample in range(count):
+        on_sample(sample)
         place = (np.array(divmod(sample % samples**2, samples)) + 0.5) / samples - 0.5
         total += render_image(
             replace(snapshot, lights=lights_at(snapshot.lights, sample, center)),
@@ -136,7 +142,13 @@ def render_still(
             passes=passes,
             card_pass=card_pass,
         )
+    on_sample(count)
     return (total / count).astype(np.float32)
+
+
+def still_samples(settings: StrandSettings, samples: int) -> int:
+    """The number of pictures that `render_still` draws, for samples along each side of a pixel."""
+    return max(samples**2, noise_free_samples(settings))
 
 
 def _averaged(color: Any, samples: int) -> Any:

@@ -268,7 +268,9 @@ def test_simulate_render_and_export_agree_on_the_motion(
     drawn = ["--bake", str(bake), "--frame", "12", "--width", "64", "--height", "48"]
     assert command_line.run(["render", *source, *drawn, "--output", str(picture)]) == 0
     idle = "--set guides.guide_count, guides.cv_count, dynamics.device: the bake keeps the settings"
-    assert idle in capfd.readouterr().out
+    output = capfd.readouterr().out
+    samples = re.findall(r"drawing the still: (\d+)/(\d+)", output)
+    assert idle in output and samples[0][0] == "0" and samples[-1] == (samples[0][1],) * 2
     image = bpy.data.images.load(str(picture))
     pixels = np.array(image.pixels[:]).reshape(48, 64, 4)
     bpy.data.images.remove(image)

@@ -50,8 +50,8 @@ def render(job: Job) -> None:
 
 def write_still(job: Job, path: Path, studio: Studio, hair: PosedHair) -> Floats:
     """Write a picture of the strands, and report how much was drawn; returns the picture."""
-    print("drawing the still", flush=True)
     options, report = job.options, job.report
+    progress = report.progress("drawing the still", studio.sample_count(options.samples))
     with report.stage("draw still"):
         picture = studio.picture(
             hair.pose,
@@ -60,6 +60,7 @@ def write_still(job: Job, path: Path, studio: Studio, hair: PosedHair) -> Floats
             options.height,
             options.samples,
             guides=hair.guides,
+            on_sample=progress.show,
         )
     drawn = studio.statistics
     report.facts["drawn"] = {

@@ -15,7 +15,7 @@ from ...motion_flow import style_of_guides
 from ...render.camera import Camera, frame_points
 from ...render.card_pass import CardPass
 from ...render.card_snapshot import CardSnapshot
-from ...render.frame import render_image, render_still
+from ...render.frame import render_image, render_still, still_samples
 from ...render.good_side import GoodSide, good_side
 from ...render.hair_ball import HairBall
 from ...render.mesh_pass import MeshPass
@@ -94,6 +94,7 @@ class Studio:
         guides: Floats | None = None,
         is_transparent: bool = False,
         is_soft: bool = True,
+        on_sample: Callable[[int], object] = lambda done: None,
     ) -> Floats:
         """Hair at these points on the head in this pose, (height, width, 4) scene-linear.
 
@@ -105,6 +106,8 @@ class Studio:
             guides: (guide_count, cv_count, 3) [m] that cards ride on; None: in their style.
             is_transparent: without the backdrop.
             is_soft: soft shadows; without them, a picture takes a third of the time.
+            on_sample: with soft shadows, called with the number of samples that are done, of
+                `sample_count`.
         """
         camera, occluders = camera or self._camera(width / height), self._groom.occluders
         snapshot = replace(
@@ -116,12 +119,16 @@ class Studio:
             occluder_spheres=None if occluders is None else occluders.at(pose),
             cards=self._cards_at(pose, guides),
         )
-        picture = self._draw(as_shown(snapshot), camera, width, height, samples, is_soft)
+        picture = self._draw(as_shown(snapshot), camera, width, height, samples, is_soft, on_sample)
         return (
             picture
             if is_transparent
             else over_backdrop(picture, backdrop(self.stage, width, height))
         )
+
+    def sample_count(self, samples: int) -> int:
+        """The number of samples of a picture with soft shadows."""
+        return still_samples(self._rest_snapshot.strand_settings, samples)
 
     def _draw(
         self,
@@ -131,8 +138,11 @@ class Studio:
         height: int,
         samples: int,
         is_soft: bool = True,
+        on_sample: Callable[[int], object] = lambda done: None,
     ) -> Floats:
-        draw: Callable[..., Floats] = partial(render_still, center=self._ball.center)
+        draw: Callable[..., Floats] = partial(
+            render_still, center=self._ball.center, on_sample=on_sample
+        )
         if not is_soft and noise_free_samples(snapshot.strand_settings) == 1:
             draw = render_image
         picture = draw(
