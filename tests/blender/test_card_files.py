@@ -72,11 +72,14 @@ def test_every_format_comes_with_a_sidecar_that_follows_the_schema(
         assert not written.name.startswith(".")
 
 
-def test_the_index_buffer_holds_the_indices_of_the_glb(tmp_path: Path) -> None:
+def test_the_index_buffer_holds_the_indices_of_the_glb(tmp_path: Path, capfd: Any) -> None:
     """For each level, the buffer has the GLB's indices, then its triangles in back-face order."""
     assert (
         export_cards(tmp_path / "hair.glb", *BAKED_OPTIONS, "--levels", "3", "--index-buffer") == 0
     )
+    steps = [line for line in capfd.readouterr().out.splitlines() if line.startswith("building")]
+    assert steps[1] == "building hair cards: cards from strands"
+    assert "building hair cards: ambient occlusion" in steps and len(set(steps)) == len(steps) > 5
     content, glb = read_sidecar(tmp_path / "hair.glb"), Glb(tmp_path / "hair.glb")
     indices = np.frombuffer((tmp_path / "hair.indices.bin").read_bytes(), "<u2")
     nodes = {node["name"]: node for node in glb.json["nodes"]}

@@ -8,7 +8,7 @@ import statistics
 import sys
 import time
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -70,6 +70,19 @@ class Report:
     def progress(self, name: str, total: int) -> Progress:
         """The progress of a long step."""
         return Progress(name, total, self._style)
+
+    def steps(self, name: str) -> Callable[[str], None]:
+        """A function that prints each step of long work once, without its percentage."""
+        shown = set[str]()
+
+        def show(text: str) -> None:
+            raise_if_interrupted()
+            step = text.partition(",")[0]
+            if step not in shown:
+                print(f"{name}: {step[:1].lower()}{step[1:]}", flush=True)
+            shown.add(step)
+
+        return show
 
     def finish(self, status: str) -> None:
         """Record that the job is "done", or "skipped" because its result exists."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Generator, Iterable, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -168,6 +168,7 @@ def write_cards(
     output: CardOutput | None = None,
     stage: Stage = untimed,
     motion: GuideMotion | None = None,
+    on_step: Callable[[str], object] = lambda text: None,
 ) -> WrittenCards:
     """Build the cards of a rig and write them.
 
@@ -175,6 +176,7 @@ def write_cards(
         path: of the mesh; the textures go beside it as NAME_base.png and so on.
         stage: makes a context manager that times a named stage.
         motion: that of this rig; None: the cards are at rest.
+        on_step: called with what is being made, such as "Ambient occlusion, 20 %".
 
     Raises:
         HairloomError: no cards, a format that cannot be written, or a folder that cannot be
@@ -183,9 +185,10 @@ def write_cards(
     output = output or CardOutput()
     check_output(path, output, motion)
     with stage("build cards"):
-        made = result_of(build_steps(inputs, stage=stage))
+        made = result_of(map_progress(build_steps(inputs, stage=stage), on_step))
     head = inputs.rig.head
-    return result_of(file_steps(path, made, inputs.settings, output, stage, motion, head))
+    writing = file_steps(path, made, inputs.settings, output, stage, motion, head)
+    return result_of(map_progress(writing, lambda step: on_step(step[0])))
 
 
 def check_output(path: Path, output: CardOutput, motion: GuideMotion | None) -> None:

@@ -70,7 +70,6 @@ def build_and_write_cards(
     motion: GuideMotion | None = None,
 ) -> WrittenCards:
     """Build and write the cards, and report them."""
-    print("building hair cards", flush=True)
     levels = getattr(job.options, "levels", None)
     settings, report = job.settings, job.report
     if levels is not None:
@@ -81,7 +80,8 @@ def build_and_write_cards(
         output = replace(output, head_bone=head_bone_of(hair, depsgraph, rig.strands))
     occluders = read_occluders(settings[CardOcclusionSettings], hair)
     inputs = CardInputs(rig, settings, pictures, occluders, card_edits(job))
-    written = write_cards(path, inputs, output, report.stage, motion)
+    on_step = report.steps("building hair cards")
+    written = write_cards(path, inputs, output, report.stage, motion, on_step)
     report.facts.update(
         cards=written.mesh.card_count,
         card_shell_layers=written.build.shell_layers,
