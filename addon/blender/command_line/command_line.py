@@ -36,7 +36,7 @@ from .object_settings import find_hair, is_groom, named_objects, usable_objects
 from .output_checks import check_outputs, check_report
 from .render_job import RENDER
 from .run_job import RUN
-from .scene_files import check_scene_output, open_scene, save_scene
+from .scene_files import check_scene_output, open_scene, remove_startup_cube, save_scene
 from .self_test_job import SELF_TEST
 from .show_jobs import SHEET, TURNTABLE
 from .simulate_job import SIMULATE
@@ -168,6 +168,9 @@ def _job(verb: Verb, options: argparse.Namespace, report: Report) -> Job:
     if verb.opens_scene and options.scene:
         with report.stage("open scene"):
             open_scene(Path(options.scene))
+    elif not bpy.data.filepath and (verb.saves_scene or verb is RUN):
+        named = getattr(options, "object", None) or ()
+        remove_startup_cube([*named, getattr(options, "head", None)])
     check_idle_options(verb, options)
     if verb.takes_hair and not (options.groom or options.style):
         if getattr(options, "bake", None):

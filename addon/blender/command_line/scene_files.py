@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import struct
+from collections.abc import Collection
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -50,6 +51,19 @@ def open_scene(path: Path) -> None:
             place=str(path),
             remedy="Give an undamaged .blend file of this or an older version of Blender",
         ) from error
+
+
+def remove_startup_cube(named: Collection[str | None]) -> None:
+    """Remove the cube of Blender's start-up scene, which would stand around the head; not a cube
+    that is named, or that someone has changed.
+    """
+    cube = bpy.data.objects.get("Cube")
+    if cube is None or cube.name in named or cube.type != "MESH":
+        return
+    corners = np.array([vertex.co for vertex in cube.data.vertices])
+    is_untouched = corners.shape == (8, 3) and bool((np.abs(corners) == 1.0).all())
+    if is_untouched and cube.matrix_world.is_identity and not (cube.modifiers or cube.children):
+        bpy.data.batch_remove([cube, cube.data])
 
 
 def check_scene_output(output: Path | None, *, overwrites: bool) -> None:
