@@ -87,7 +87,7 @@ SCREENS = {f"session_{name}": _SMALL for name in _SMALL_SCREEN_SESSIONS} | {
     "session_engine": _LARGE,
     "session_everyday": _LARGE,
     "session_guide_pictures": "1600x1500x24",
-    "session_midplay": _LARGE,
+    "session_midplay": "1600x1500x24",  # the open Dynamics panel is long
     "session_random": "800x600x24",
     "session_refinement": _LARGE,
     "session_still_views": "800x600x24",
