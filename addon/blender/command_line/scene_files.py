@@ -55,10 +55,11 @@ def open_scene(path: Path) -> None:
 
 def remove_startup_cube(named: Collection[str | None]) -> None:
     """Remove the cube of Blender's start-up scene, which would stand around the head; not a cube
-    that is named, or that someone has changed.
+    that is named, also if it is misspelt, or that someone has changed.
     """
     cube = bpy.data.objects.get("Cube")
-    if cube is None or cube.name in named or cube.type != "MESH":
+    is_named = any(name is not None and name.casefold() == "cube" for name in named)
+    if cube is None or is_named or cube.type != "MESH":
         return
     corners = np.array([vertex.co for vertex in cube.data.vertices])
     is_untouched = corners.shape == (8, 3) and bool((np.abs(corners) == 1.0).all())
