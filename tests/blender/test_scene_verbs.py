@@ -465,6 +465,7 @@ def test_a_render_of_a_scene_draws_its_hair(
     assert "several objects: Fringe, Hair" in message and "--groom" in message
 
 
+@pytest.mark.usefixtures("extension")
 @pytest.mark.parametrize("keeps", [(), ("Cube",)])
 def test_the_cube_of_the_start_up_scene_is_not_around_the_head(
     keeps: tuple[str, ...], tmp_path: Path
@@ -481,14 +482,21 @@ def test_the_cube_of_the_start_up_scene_is_not_around_the_head(
     assert {"Light", "Camera"} <= names and ("Cube" in names) == bool(keeps)
 
 
-def test_a_cube_that_someone_has_changed_is_kept(tmp_path: Path) -> None:
+@pytest.mark.usefixtures("extension")
+@pytest.mark.parametrize("change", ["shape", "linked duplicate"])
+def test_a_cube_that_someone_has_changed_is_kept(change: str, tmp_path: Path) -> None:
     output = tmp_path / "wig.blend"
     bpy.ops.wm.read_homefile(use_factory_startup=True)
-    bpy.data.objects["Cube"].data.vertices[0].co.z = 2.0
+    cube = bpy.data.objects["Cube"]
+    if change == "shape":
+        cube.data.vertices[0].co.z = 2.0
+    else:
+        bpy.context.collection.objects.link(bpy.data.objects.new("Box", cube.data))
     arguments = ["--set", "style=brows", "--set", "plays=false", "--output", str(output)]
     assert command_line.run(["run", "add_hairstyle", *arguments]) == 0
     bpy.ops.wm.open_mainfile(filepath=str(output))
-    assert "Cube" in bpy.data.objects
+    names = {each.name for each in bpy.data.objects}
+    assert "Cube" in names and ("Box" in names) == (change != "shape")
 
 
 def test_a_scene_that_is_already_open_gives_the_hair_or_has_none(

@@ -63,7 +63,8 @@ def remove_startup_cube(named: Collection[str | None]) -> None:
         return
     corners = np.array([vertex.co for vertex in cube.data.vertices])
     is_untouched = corners.shape == (8, 3) and bool((np.abs(corners) == 1.0).all())
-    if is_untouched and cube.matrix_world.is_identity and not (cube.modifiers or cube.children):
+    is_used = cube.modifiers or cube.children or cube.data.users > 1
+    if is_untouched and cube.matrix_world.is_identity and not is_used:
         bpy.data.batch_remove([cube, cube.data])
 
 
