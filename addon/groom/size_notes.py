@@ -42,6 +42,25 @@ def size_note(hair: tuple[str, Floats] | None, head: tuple[str, Floats] | None) 
     return ""
 
 
+def object_size_note(name: str, points: Floats) -> str:
+    """As `size_note`, for hair of a scene: its scale is that of its object, not an option.
+
+    Args:
+        points: (n, 3) [m], world space.
+    """
+    if not len(points):
+        return ""
+    size = float((points.max(axis=0) - points.min(axis=0)).max())
+    if size > MAX_EXTENT:
+        return (
+            f"{name} is {length_text(size)} large, as if in centimetres or decimetres. Scale the "
+            "hair and its head in the scene by 0.01 or by 0.1."
+        )
+    if size < MIN_EXTENT:
+        return f"{name} is {length_text(size)} large. Scale the hair and its head in the scene."
+    return ""
+
+
 def length_text(length: float) -> str:
     """Such as "264 m" or "1.3 mm"."""
     if length < 0.9995:

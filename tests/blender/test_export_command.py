@@ -18,7 +18,7 @@ from hairloom.addon.blender.bakes import playback
 from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.preview.bake import Bake
 from hairloom.addon.exchange.groom import Groom, GroomMotion
-from hairloom.addon.exchange.hair_file import read_hair_file
+from hairloom.addon.exchange.hair_file import read_hair_file, write_hair_file
 from hairloom.addon.exchange.strand_reading import read_strands
 from hairloom.addon.exchange.tressfx import read_tfx
 from hairloom.addon.exchange.usd.groom_usd import write_usd
@@ -140,6 +140,32 @@ def test_a_check_writes_nothing(
     facts = json.loads(shown[shown.index("{") : shown.rindex("}") + 1])
     assert facts["strands"] == 30 and facts == report["preflight"]
     assert [path.name for path in tmp_path.iterdir()] == ["report.json"]
+
+
+@pytest.mark.parametrize("scale", [1.0, 460.0])
+def test_a_check_warns_about_hair_in_another_unit(
+    extension: None,
+    sphere: Any,
+    new_hair: Callable[..., Any],
+    tmp_path: Path,
+    run: Callable[..., Any],
+    scale: float,
+) -> None:
+    """Hair of the scene and hair of a file, 40 cm and 180 m large."""
+    hair = new_hair(sphere)
+    sphere.scale = [scale] * 3
+    warnings = run("--object", hair.name, "--preflight", output="o.abc")["preflight"]["warnings"]
+    found = [each for each in warnings if "centimetres" in each]
+    assert len(found) == (scale > 1.0)
+    assert all(hair.name in each and "Scale the hair and its head" in each for each in found)
+    groom = on_sphere()
+    points = groom.strands.points * np.float32(scale)
+    path = tmp_path / "in.hair"
+    write_hair_file(path, replace(groom, strands=groom.strands.with_points(points)))
+    warnings = run("--groom", str(path), "--preflight", output="o.abc")["preflight"]["warnings"]
+    assert any("in.hair" in each and "--groom-scale 0.01" in each for each in warnings) == (
+        scale > 1.0
+    )
 
 
 @needs_usd

@@ -17,6 +17,7 @@ from ...exchange.groom import Groom
 from ...exchange.strand_check import check_lines
 from ...exchange.strand_export_settings import StrandExportSettings, layout_of
 from ...exchange.strand_formats import STRAND_FORMATS, StrandFormat, format_of
+from ...groom.size_notes import object_size_note, size_note
 from ...groom.widths import with_widths_of
 from ...rig_flow import Rig
 from ...shading.settings import ShadingSettings
@@ -66,6 +67,7 @@ def export(job: Job) -> None:
     else:
         plan = _plan_of_rig(job, kind, settings, frames)
     facts = plan.check()
+    facts["warnings"] += _size_warnings(job, plan)
     report.facts.update(preflight=facts, dropped=plan.dropped)
     if options.preflight:
         report_notes(list(plan.notes), report)
@@ -77,6 +79,18 @@ def export(job: Job) -> None:
     for file in plan.files:
         report.add_output(file)
     print(outcome.result)
+
+
+def _size_warnings(job: Job, plan: StrandExport) -> list[str]:
+    """Warnings about hair whose numbers cannot be metres."""
+    hair, head, points = job.sources.groom, job.sources.head, plan.groom.strands.points
+    if exports_scene_hair(job.options) or job.options.bake is not None or job.hair is not None:
+        note = object_size_note(plan.groom.name, points)
+    elif hair is not None:
+        note = size_note((Path(hair).name, points), None)
+    else:  # it was grown, in the unit of its head
+        note = size_note(None, (Path(head).name, points) if head else None)
+    return [note.rstrip(".")] if note else []
 
 
 def _check_layout(kind: StrandFormat, settings: StrandExportSettings) -> None:

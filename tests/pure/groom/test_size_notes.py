@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hairloom.addon.groom.size_notes import length_text, size_note
+from hairloom.addon.groom.size_notes import length_text, object_size_note, size_note
 
 
 def thing(name: str, size: float) -> tuple[str, np.ndarray]:
@@ -40,6 +40,14 @@ def test_centimetres_are_named_with_what_scales_them(
 
 def test_hair_of_nothing_is_named() -> None:
     assert size_note(thing("a.tfx", 0.003), None).startswith("a.tfx is 3 mm large.")
+
+
+@pytest.mark.parametrize(("size", "says"), [(92.0, "92 m large"), (0.003, "3 mm large"), (3.0, "")])
+def test_hair_of_a_scene_is_scaled_there(size: float, says: str) -> None:
+    note = object_size_note(*thing("Mane", size))
+    assert note == "" if not says else note.startswith(f"Mane is {says}")
+    assert "--" not in note
+    assert object_size_note("None", np.zeros((0, 3), np.float32)) == ""
 
 
 def test_a_length_is_written_in_the_unit_that_suits_it() -> None:
