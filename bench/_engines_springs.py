@@ -25,7 +25,7 @@ SECONDS = 2.0
 def spring_figures() -> dict[str, Any]:
     """spring_error_percent: 99th percentile of the errors of all corners of triangles, relative to
     the hair's mean length. spring_rigid_percent: the same of hair that is fixed to the head.
-    spring_told_percent: the error that the sidecar reports."""
+    spring_reported_percent: the error that the sidecar reports."""
     rig = sintel_rig()
     motion = shaken(rig, SECONDS)
     cards, atlas, occlusion = SETTINGS
@@ -54,7 +54,7 @@ def spring_figures() -> dict[str, Any]:
         "spring_error_percent": percent * float(np.quantile(every, 0.99)),
         "spring_error_percent_rms": percent * float(np.sqrt(np.mean(every * every))),
         "spring_error_percent_worst": percent * float(every.max()),
-        "spring_told_percent": percent * springs["error"]["percentile_99"],
+        "spring_reported_percent": percent * springs["error"]["percentile_99"],
         "spring_rigid_percent": percent * float(np.quantile(np.concatenate(rigid), 0.99)),
         "spring_joints": springs["joints"],
         "spring_chains": springs["chains"],

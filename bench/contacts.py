@@ -360,8 +360,8 @@ def main(arguments: list[str]) -> int:
     parts = chosen([each for each in arguments if each != "compute"], ("thin", *HEADS))
     found = figures(ComputeForm if use_compute else NumpyForm, parts)
     flat = {f"{name}_{key}": value for name, part in found.items() for key, value in part.items()}
-    form = {"form": "compute shaders" if use_compute else "numpy"}
-    return report(form | flat, REFERENCE, max_limits=MAX_LIMITS)
+    device = {"device": "compute shaders" if use_compute else "numpy"}
+    return report(device | flat, REFERENCE, max_limits=MAX_LIMITS)
 
 
 sys.exit(main(sys.argv[1:]))

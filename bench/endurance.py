@@ -49,7 +49,7 @@ def main() -> int:
     options.add_argument("--compute", action="store_true", help="on the GPU instead of in numpy")
     arguments = options.parse_args()
     start()
-    found: dict[str, object] = {"form": "compute" if arguments.compute else "numpy"}
+    found: dict[str, object] = {"device": "compute" if arguments.compute else "numpy"}
     tally, begin = Tally(), time.perf_counter()
     for seed in range(arguments.first, arguments.first + arguments.runs):
         note(tally, seed, random_run(seed, arguments.guides), compute=arguments.compute)

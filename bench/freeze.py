@@ -99,20 +99,20 @@ class Stops:
 
 def main() -> int:
     options = argparse.ArgumentParser()
-    options.add_argument("--form", default="automatic", help="automatic, compute or numpy")
+    options.add_argument("--device", default="automatic", help="automatic, compute or numpy")
     options.add_argument("--children", type=int, default=100_000)
     given = options.parse_args()
     start()
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     hairloom.register()
     latest_job.is_blocking = lambda: False  # as in a window
-    compile_programs(given.form)
+    compile_programs(given.device)
     scene, hair = run_parts(add_sample_scene(()))
-    hair.hairloom.dynamics.device = given.form
+    hair.hairloom.dynamics.device = given.device
     depsgraph = scene.view_layers[0].depsgraph
     stops = Stops()
     session = stops.timed("preview", lambda: previews.start(hair, depsgraph))
-    stops.timed("fields are begun", lambda: session.make_fields(depsgraph))
+    stops.timed("fields are started", lambda: session.make_fields(depsgraph))
     stops.timed("play", lambda: previews.play(depsgraph, blocking=False))
 
     def tick() -> None:
@@ -166,7 +166,7 @@ def main() -> int:
         read_again(kind)
     figures = stops.figures() | {
         "strands": session.rig.strands.strand_count,
-        "computed_on": session.device_name,
+        "device": session.device_name,
         "collider_ticks": ticks,
         "collider_seconds": waited,
         **{f"{_slug(kind)}_seconds": taken for kind, taken in seconds.items()},
@@ -176,10 +176,10 @@ def main() -> int:
     return report(figures, REFERENCE, max_limits=MAX_LIMITS)
 
 
-def compile_programs(form: str) -> None:
+def compile_programs(device: str) -> None:
     """Play the sample scene once, and drop it with all that is cached of its head."""
     scene, hair = run_parts(add_sample_scene(()))
-    hair.hairloom.dynamics.device = form
+    hair.hairloom.dynamics.device = device
     depsgraph = scene.view_layers[0].depsgraph
     session = Session(hair, depsgraph)
     session.play(depsgraph)

@@ -49,7 +49,7 @@ def main() -> int:
         "held_strands": len(tail.rig.holds.strand),
         "guides": len(tail.rig.guides),
         "held_guides": len(tail.rig.guide_holds.strand),
-        "form": "compute" if arguments.compute else "numpy",
+        "device": "compute" if arguments.compute else "numpy",
     }
     collider = field_of(tail.bust.surface, DynamicsSettings(), place="head")
     shakes = {"shake": lambda time: shake_matrix(np.zeros(3), time), "shake_5hz": fast_shake}

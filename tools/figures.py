@@ -57,7 +57,7 @@ BENCHES: dict[str, ShortRun] = {
     "strands": ShortRun("sintel", "other grooms"),
     "contacts": ShortRun("thin", "heads of hair"),
     "ties": ShortRun(),
-    "among": ShortRun("--skip-cost", "what a frame costs"),
+    "hair_grid": ShortRun("--skip-cost", "what a frame costs"),
     "endurance": ShortRun(
         "--runs 20 --minutes 0.2", "98 % of the runs, and most of the long shake"
     ),

@@ -24,7 +24,7 @@ style_frame_ms       time of such a frame, simulated; read_once: the same with a
 
 The exit status is 1 if a limit is missed.
 
-make bench NAME="among --pictures out"
+make bench NAME="hair_grid --pictures out"
 """
 
 from __future__ import annotations
@@ -246,41 +246,41 @@ def costs(name: str, count: int) -> dict[str, object]:
     drives = list(Shake(guides.grid, (field,)).drives(FPS, 0.5))
     fields = ForceFields(FIELDS, np.random.default_rng(1).permutation(256))
     blown = [replace(drive, force_fields=fields) for drive in drives]
-    forms: dict[str, Callable[[DynamicsState], Form]] = {"numpy": NumpyForm}
+    makers: dict[str, Callable[[DynamicsState], Form]] = {"numpy": NumpyForm}
     if has_compute():
-        forms["compute"] = ComputeForm
-    kinds = {"": (0.0, drives), "among": (0.5, drives), "fields": (0.0, blown)}
+        makers["compute"] = ComputeForm
+    kinds = {"": (0.0, drives), "volume": (0.5, drives), "fields": (0.0, blown)}
     times: dict[tuple[str, str], list[list[float]]] = {}
     for _ in range(ROUNDS[name]):
-        for form, make in forms.items():
+        for device, make in makers.items():
             for kind, (volume, driven) in kinds.items():
                 one = make(start(guides.grid))
                 took = play(one, driven, DynamicsSettings(volume=volume), FPS)
                 one.release()
-                times.setdefault((form, kind), []).append(took)
+                times.setdefault((device, kind), []).append(took)
     found: dict[str, object] = {}
-    for form in forms:
+    for device in makers:
         # the first frames compile, and size the grid
         without, with_it, with_fields = (
-            float(np.min(times[form, kind], axis=0)[2:].mean()) for kind in kinds
+            float(np.min(times[device, kind], axis=0)[2:].mean()) for kind in kinds
         )
-        found[f"{form}_{name}_ms"], found[f"{form}_{name}_without_ms"] = (
+        found[f"{device}_{name}_ms"], found[f"{device}_{name}_without_ms"] = (
             round(with_it, 2),
             round(without, 2),
         )
-        found[f"cost_ratio_{form}_{name}"] = round(with_it / without, 2)
-        found[f"field_cost_ratio_{form}_{name}"] = round(with_fields / without, 2)
-        found[f"cost_ratio_two_{form}_{name}"] = cost_of_two(form, guides.grid, ROUNDS[name])
+        found[f"cost_ratio_{device}_{name}"] = round(with_it / without, 2)
+        found[f"field_cost_ratio_{device}_{name}"] = round(with_fields / without, 2)
+        found[f"cost_ratio_two_{device}_{name}"] = cost_of_two(device, guides.grid, ROUNDS[name])
     return found
 
 
-def cost_of_two(form: str, grid: np.ndarray, rounds: int) -> float:
+def cost_of_two(device: str, grid: np.ndarray, rounds: int) -> float:
     """The time of two half grooms over that of the whole, without colliders, which each would
     have."""
     settings, frames, times = DynamicsSettings(volume=0.5), 8, []
     for _ in range(rounds):
         for parts in ((slice(0, None),), (slice(0, None, 2), slice(1, None, 2))):
-            make = DynamicsPass if form == "compute" else None
+            make = DynamicsPass if device == "compute" else None
             grooms = [Groom(grid[part], settings, make_pass=make) for part in parts]
             took = []
             for frame in range(frames):
@@ -328,7 +328,7 @@ def draw(folder: Path) -> None:
             soft = DynamicsSettings(volume=volume, **SOFT)
             run_alone(solver.steps(FrameInput(hair.pose(still), posed, soft, GRAVITY, 1.0 / FPS)))
         pictures.append(studio.picture(hair.pose(still), solver.strands(), 480, 600, 2, camera))
-    images.write_png(folder / "among.png", images.contact_sheet(pictures, 3))
+    images.write_png(folder / "hair_grid.png", images.contact_sheet(pictures, 3))
 
 
 if __name__ == "__main__":
