@@ -60,7 +60,7 @@ blender/preview/handlers.py register
     blender/preview/preview.py Preview
       blender/preview/phases.py next_phase
       blender/sessions/session.py advance
-        blender/colliders/obstacles.py Obstacles
+        blender/colliders/scene_colliders.py SceneColliders
         blender/sessions/solvers.py make_solver
           blender/sessions/compute_solver.py ComputeSolver
             render/dynamics_pass.py DynamicsPass

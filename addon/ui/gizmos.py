@@ -14,8 +14,8 @@ import numpy as np
 from mathutils import Euler, Matrix, Vector
 
 from ..blender.base.objects import objects_in
-from ..blender.colliders.obstacle_reader import sized_axis
-from ..blender.colliders.obstacles import collider_objects
+from ..blender.colliders.collider_reader import sized_axis
+from ..blender.colliders.scene_colliders import collider_objects
 from ..blender.colliders.ties import ties_of
 from ..blender.preview import previews
 from ..blender.scene.fin_modifier import has_fins

@@ -1,9 +1,9 @@
-"""A scene of colliders, as obstacles of an object."""
+"""A scene of colliders, and what an object reads of it."""
 
 import bpy
 import numpy as np
 
-from hairloom.addon.blender.colliders.obstacles import Obstacles
+from hairloom.addon.blender.colliders.scene_colliders import SceneColliders
 from hairloom.addon.dynamics.colliders import transform_points
 from hairloom.addon.dynamics.settings import DynamicsSettings
 
@@ -40,8 +40,8 @@ class ColliderScene:
         bpy.context.object.name = name
         return self.add(bpy.context.object, shape)
 
-    def obstacles(self, known=None):
-        return Obstacles.of(self.owner, None, None, COARSE_SETTINGS, depsgraph(), known)
+    def read_colliders(self, known=None):
+        return SceneColliders.of(self.owner, None, None, COARSE_SETTINGS, depsgraph(), known)
 
 
 def depsgraph():
@@ -58,5 +58,5 @@ def distance_now(posed, point):
     return float(distance[0] / np.linalg.norm(inverse[:3, :3].T @ gradient[:, 0]))
 
 
-def move_obstacles(obstacles, duration=FRAME_S):
-    return obstacles.move(depsgraph(), duration)
+def move_colliders(colliders, duration=FRAME_S):
+    return colliders.move(depsgraph(), duration)

@@ -181,7 +181,10 @@ def test_the_places_of_a_force_are_complete() -> None:
 
 
 def test_the_places_of_a_collider_shape_are_complete() -> None:
-    others = SPRINGS | {"gpu_shaders/lib_collider.glsl", "addon/blender/colliders/obstacles.py"}
+    others = SPRINGS | {
+        "gpu_shaders/lib_collider.glsl",
+        "addon/blender/colliders/scene_colliders.py",
+    }
     assert listed_files("A collider shape") - others == files_with("capsule") - others
 
 

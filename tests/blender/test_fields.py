@@ -187,7 +187,7 @@ def test_more_meshes_than_are_kept_are_all_waited_for(new_hair, sphere, get_deps
     session = previews.start(hair, get_depsgraph())
     previews.play(get_depsgraph(), blocking=False)
     wait_until_playing(session, get_depsgraph, FRAME)
-    assert len(session.obstacles.parts) == fields.MAX_CACHED + 3
+    assert len(session.scene_colliders.parts) == fields.MAX_CACHED + 3
 
 
 def test_blenders_playback_waits_and_takes_over(new_hair, sphere, get_depsgraph, extension):

@@ -39,7 +39,7 @@ def test_new_cloth_collides_with_nothing_as_the_page_says(flag_object, get_depsg
     assert (
         flag_object.hairloom.collider is None and flag_object.hairloom.collider_collection is None
     )
-    assert start_fin(flag_object, get_depsgraph).obstacles.parts == []
+    assert start_fin(flag_object, get_depsgraph).scene_colliders.parts == []
     page = (Path(__file__).parents[2] / "docs" / "dynamics.md").read_text(encoding="utf-8")
     cloth = " ".join(page.partition("\n## Cloth\n")[2].partition("\n## ")[0].split())
     assert "until you set one it collides with nothing" in cloth
@@ -183,7 +183,7 @@ def test_it_stays_out_of_a_collider(flag_object, get_depsgraph):
     flag_object.hairloom.collider = ball
     session = start_fin(flag_object, get_depsgraph)
     play_frames(session, get_depsgraph, 40)
-    assert session.obstacles.warnings == ()
+    assert session.scene_colliders.warnings == ()
     away = np.linalg.norm(
         evaluated_vertices(flag_object, get_depsgraph) - np.array(ball.location), axis=1
     )

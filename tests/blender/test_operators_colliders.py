@@ -9,7 +9,7 @@ from mathutils import Matrix
 from tiers import few_in_commits
 
 from hairloom.addon.blender.colliders import spheres
-from hairloom.addon.blender.colliders.obstacles import Obstacles
+from hairloom.addon.blender.colliders.scene_colliders import SceneColliders
 from hairloom.addon.dynamics.colliders import SphereSetCollider
 from hairloom.addon.dynamics.fitting.settings import SphereFitSettings
 from hairloom.addon.dynamics.measure import deepest_penetration
@@ -158,7 +158,7 @@ def test_the_hair_of_the_mesh_uses_them(new_hair, sphere):
     (collection,) = spheres.fitted_collections(sphere)
     assert hair.hairloom.collider_collection == collection
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    found = Obstacles.of(hair, None, None, DynamicsSettings(), depsgraph, None)
+    found = SceneColliders.of(hair, None, None, DynamicsSettings(), depsgraph, None)
     (posed,) = found.move(depsgraph, 1.0 / 60.0)
     assert isinstance(posed.collider, SphereSetCollider) and found.warnings == ()
     np.testing.assert_allclose(np.sort(posed.collider.radii), np.sort(balls(sphere)[1]), rtol=1e-5)
@@ -222,7 +222,7 @@ def test_removing_and_deleting(new_hair, sphere):
     bpy.data.objects.remove(sphere)
     bpy.context.view_layer.update()
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    Obstacles.of(hair, None, None, DynamicsSettings(), depsgraph, None).move(depsgraph, 0.1)
+    SceneColliders.of(hair, None, None, DynamicsSettings(), depsgraph, None).move(depsgraph, 0.1)
 
 
 @pytest.mark.parametrize("shape", few_in_commits(["automatic", "capsule", "none"]))
@@ -279,7 +279,7 @@ def test_hair_stays_out_of_fitted_spheres_that_an_armature_swings(monkey):
     owner.hairloom.collider_collection = spheres.fitted_collections(monkey)[0]
     depsgraph = bpy.context.evaluated_depsgraph_get()
     settings = DynamicsSettings(style_root=0.3, style_tip=0.1, bend=0.2, sag_compensation=0.0)
-    found = Obstacles.of(owner, None, None, settings, depsgraph, None)
+    found = SceneColliders.of(owner, None, None, settings, depsgraph, None)
     outward = np.random.default_rng(0).normal(size=(200, 1, 3))
     outward /= np.linalg.norm(outward, axis=2, keepdims=True)
     rest = (outward * (0.19 + np.linspace(0.0, 0.2, 12))[:, None]).astype(np.float32)

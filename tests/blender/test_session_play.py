@@ -69,14 +69,14 @@ def test_a_chosen_collider_is_used_in_place_of_the_head(preview, get_depsgraph):
     cube = bpy.context.object
     hair.hairloom.collider = cube
     assert previews.play(get_depsgraph()) == []
-    (part,) = session.obstacles.parts
+    (part,) = session.scene_colliders.parts
     assert part.carrier.body.handle.name == cube.name
     play_frames(get_depsgraph, 2, lambda frame: setattr(cube.location, "x", 0.1 * frame))
     assert part.track.before[:3, 3] == pytest.approx([0.1, 0.0, 0.0], abs=1e-6)
 
 
 def field_of(session):
-    (part,) = session.obstacles.parts
+    (part,) = session.scene_colliders.parts
     return part.distance
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import bpy
 
 from .carriers import is_disabled
-from .obstacles import collider_objects
+from .scene_colliders import collider_objects
 from .ties import ties_of
 
 

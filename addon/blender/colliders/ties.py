@@ -34,7 +34,7 @@ from ..scene.hair_collections import add_to_collection, objects_in, remove_from_
 from ..scene.source import posed_curves
 from ..scene.surfaces import read_positions, read_surface
 from .carriers import is_deforming, is_disabled
-from .obstacle_parts import is_invertible
+from .collider_parts import is_invertible
 
 #: Types of objects whose points form a ring.
 _RING_TYPES = frozenset(("MESH", "CURVE", "SURFACE", "FONT"))

@@ -427,7 +427,9 @@ def publish(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
     if note:
         note = f"{hair.name}: {note}"
     overlay.show(session.uid, overlay.read_drawing(session, hair, depsgraph, note))
-    is_missing_lines = session.obstacles is None and "colliders" in hair.hairloom.shown_overlays
+    is_missing_lines = (
+        session.scene_colliders is None and "colliders" in hair.hairloom.shown_overlays
+    )
     if is_missing_lines and not fields.are_ready():
         schedule((session.uid, "lines"), partial(_show_lines, preview))
     refresh_panels()

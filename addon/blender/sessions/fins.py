@@ -22,7 +22,7 @@ from ..bakes.simulation import CLOTH_VERSION, Arrays, hashes
 from ..base.mesh_arrays import triangle_corners
 from ..base.objects import Body, matrix_of, objects_in
 from ..base.vertex_weights import read_weights
-from ..colliders.obstacles import Obstacles
+from ..colliders.scene_colliders import SceneColliders
 from ..properties.properties import settings_of
 from ..scene.fin_mesh import check_usable, corners_of, loose_edges_of
 from ..scene.fin_modifier import clear, fin_modifier, has_fins, read_carried, show
@@ -41,7 +41,7 @@ class FinSession:
         self.body = Body.at_rest(obj, depsgraph)
         self.is_playing = False
         self.is_stale = False
-        self.obstacles: Obstacles | None = None
+        self.scene_colliders: SceneColliders | None = None
         self.state: ClothState | None = None
         self._fabric = FabricJob()
         self._earlier: Floats | None = None
@@ -83,8 +83,8 @@ class FinSession:
         if self.state is not None:
             position = np.ascontiguousarray(self._carried.T)
             self.state = ClothState(position, position, self.state.fabric)
-        if self.is_playing and self.obstacles is not None:
-            self.obstacles.rest(depsgraph)
+        if self.is_playing and self.scene_colliders is not None:
+            self.scene_colliders.rest(depsgraph)
 
     def play(
         self, depsgraph: bpy.types.Depsgraph, *, blocking: bool = True, is_frame: bool = False
@@ -104,8 +104,8 @@ class FinSession:
         position = vertex_rows(self._carried)
         self.state = ClothState(position, position, fabric)
         settings = self.settings.as_dynamics()
-        self.obstacles = Obstacles.of(
-            obj, None, None, settings, depsgraph, self.obstacles, blocking=blocking
+        self.scene_colliders = SceneColliders.of(
+            obj, None, None, settings, depsgraph, self.scene_colliders, blocking=blocking
         )
         self.is_playing = True
 
@@ -128,7 +128,7 @@ class FinSession:
             HairloomError: an object that it needs is gone or has changed.
         """
         obj, state = self._found(), self.state
-        assert state is not None and self.obstacles is not None, "play comes first"
+        assert state is not None and self.scene_colliders is not None, "play comes first"
         earlier, before = self._earlier, self._carried
         self._shown, self._matrix = self._read(obj, depsgraph)
         now = self._world()
@@ -136,7 +136,7 @@ class FinSession:
         drive = Drive(
             before,
             now,
-            self.obstacles.move(depsgraph, duration),
+            self.scene_colliders.move(depsgraph, duration),
             gravity_of(depsgraph.scene),
             earlier if duration else None,
             fields,
@@ -149,7 +149,7 @@ class FinSession:
     @property
     def warnings(self) -> tuple[str, ...]:
         """Warnings about its colliders, force fields and pins."""
-        known = () if self.obstacles is None else self.obstacles.warnings
+        known = () if self.scene_colliders is None else self.scene_colliders.warnings
         known += self._field_notes
         if self.state is None or self.state.fabric.pin.any():
             return known

@@ -35,8 +35,8 @@ from ..base.latest_job import LatestJob
 from ..base.objects import Body
 from ..base.thread_work import ThreadWork
 from ..colliders.fields import NotReadyError
-from ..colliders.obstacles import Obstacles
 from ..colliders.rigs import CachedRig
+from ..colliders.scene_colliders import SceneColliders
 from ..properties.groom_settings import GroomSettings
 from ..scene.forces import force_fields_of, gravity_of
 from ..scene.source import Source, check_no_hair_dynamics, dynamics_warnings
@@ -101,7 +101,7 @@ class Session:
         # full light of the hair that was made last; does not run while other hair is made
         self._light_job = LatestJob[PreparedGroom, PreparedGroom]("light", partial(on_result, self))
         self.times = FrameTimes()
-        self.obstacles: Obstacles | None = None
+        self.scene_colliders: SceneColliders | None = None
         self.is_playing = False
         self.is_stale = False
         self._motion_start: MotionStart | None = None
@@ -279,7 +279,7 @@ class Session:
         """Warnings about hair, head, children, colliders, cards and lights."""
         hair = self.hair.handle.find()
         doubled = () if hair is None else dynamics_warnings(hair)
-        found = () if self.obstacles is None else self.obstacles.warnings
+        found = () if self.scene_colliders is None else self.scene_colliders.warnings
         notes = (f"{self.name}: {note}" for note in self.rig.notes)
         cards = (f"{self.name}: {note}" for note in self.cards.warnings)
         found += self._field_notes
@@ -503,10 +503,10 @@ class Session:
         pose, self.figures, self.card_figures = self._pose(depsgraph), None, None
         self._motion_start, self._is_recorded, self.known_hair = None, False, KnownNeighbours()
         _, self._field_notes = force_fields_of(self.hair.resolve(), depsgraph)
-        if not self.is_playing or self.obstacles is None:
+        if not self.is_playing or self.scene_colliders is None:
             self.solver.rest(pose)
         else:
-            self._posed_colliders = self.obstacles.rest(depsgraph)
+            self._posed_colliders = self.scene_colliders.rest(depsgraph)
             start = self._play_start(pose, self._posed_colliders)
             self.solver.rest(pose, self._contacts.known_motion(start))
             kept = start.settings.radius_root * self.solver.size
@@ -558,7 +558,7 @@ class Session:
         self.take_settings()
         if blocking:
             self.finish(depsgraph)
-        self._read_obstacles(depsgraph, blocking=blocking)
+        self._read_scene_colliders(depsgraph, blocking=blocking)
         if not self.is_made:
             raise NotReadyError
         if not blocking and not is_frame:
@@ -576,16 +576,16 @@ class Session:
         Errors of colliders are reported by Play, not here.
         """
         with suppress(HairloomError, NotReadyError):
-            self._read_obstacles(depsgraph, blocking=False)
+            self._read_scene_colliders(depsgraph, blocking=False)
 
-    def _read_obstacles(self, depsgraph: bpy.types.Depsgraph, *, blocking: bool) -> None:
-        self.obstacles = Obstacles.of(
+    def _read_scene_colliders(self, depsgraph: bpy.types.Depsgraph, *, blocking: bool) -> None:
+        self.scene_colliders = SceneColliders.of(
             self.hair.resolve(),
             self.head,
             self.rig.head,
             self.settings[DynamicsSettings],
             depsgraph,
-            self.obstacles,
+            self.scene_colliders,
             self.groom.rig.root_vertices,
             blocking=blocking,
         )
@@ -656,10 +656,10 @@ class Session:
         """Simulate a frame of this duration [s]; the hair's time runs faster by this factor."""
         pose, settings = self._pose(depsgraph), self.settings[DynamicsSettings]
         goes_along = not time_scale or self.solver.has_jumped(pose, settings, duration)
-        if self.obstacles is not None and goes_along:
-            self._posed_colliders = self.obstacles.rest(depsgraph)
-        elif self.obstacles is not None:
-            self._posed_colliders = self.obstacles.move(depsgraph, duration)
+        if self.scene_colliders is not None and goes_along:
+            self._posed_colliders = self.scene_colliders.rest(depsgraph)
+        elif self.scene_colliders is not None:
+            self._posed_colliders = self.scene_colliders.move(depsgraph, duration)
         else:
             self._posed_colliders = ()
         fields, self._field_notes = force_fields_of(self.hair.resolve(), depsgraph)
@@ -715,9 +715,11 @@ class Session:
 
     def solids(self, depsgraph: bpy.types.Depsgraph) -> tuple[PosedCollider, ...]:
         """The colliders of the hair at this moment; none until they are made."""
-        if self.obstacles is None:
+        if self.scene_colliders is None:
             self.make_fields(depsgraph)
-        return () if self.obstacles is None else self.obstacles.static_colliders(depsgraph)
+        return (
+            () if self.scene_colliders is None else self.scene_colliders.static_colliders(depsgraph)
+        )
 
     def bake_arrays(self) -> Arrays:
         """See `baked_rig.frame_arrays` and `baked_solids.solid_arrays`."""
@@ -728,7 +730,7 @@ class Session:
 
     @property
     def _collider_meshes(self) -> tuple[Surface, ...]:
-        return () if self.obstacles is None else self.obstacles.meshes
+        return () if self.scene_colliders is None else self.scene_colliders.meshes
 
     def show_recorded(self, frame: Arrays, solids: Solids | None = None) -> None:
         """Show recorded hair on the recorded head.

@@ -27,7 +27,7 @@ from ...strands.clean import Cleaned
 from ..base.objects import check_curves_editable, head_of
 from ..base.outcome import Outcome
 from ..colliders.fields import head_field_of
-from ..colliders.obstacles import Obstacles
+from ..colliders.scene_colliders import SceneColliders
 from ..scene.curves import read_original_curves, write_original_curves
 from ..scene.forces import gravity_of
 from ..scene.masks import MaskReader
@@ -141,5 +141,5 @@ def _colliders(
 ) -> tuple[tuple[PosedCollider, ...], tuple[str, ...]]:
     """The colliders that the hair falls onto, and warnings."""
     roots, head = rig.root_vertices, source.head
-    obstacles = Obstacles.of(hair, head, rig.head, dynamics, depsgraph, None, roots)
-    return obstacles.rest(depsgraph), (*source.warnings, *obstacles.warnings)
+    colliders = SceneColliders.of(hair, head, rig.head, dynamics, depsgraph, None, roots)
+    return colliders.rest(depsgraph), (*source.warnings, *colliders.warnings)

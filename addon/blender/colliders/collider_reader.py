@@ -16,8 +16,8 @@ from ...strands.affine import transform_points
 from ..base.objects import Body
 from ..scene.surfaces import read_surface
 from .carriers import Carrier, is_deforming, is_disabled
-from .obstacle_balls import Ball
-from .obstacle_parts import (
+from .collider_balls import Ball
+from .collider_parts import (
     FieldPart,
     Part,
     ShapePart,

@@ -5,11 +5,11 @@ import math
 import bpy
 import numpy as np
 import pytest
-from collider_scene import COARSE_SETTINGS, ColliderScene, depsgraph, distance_now, move_obstacles
+from collider_scene import COARSE_SETTINGS, ColliderScene, depsgraph, distance_now, move_colliders
 from mathutils import Matrix, Vector
 
 from hairloom.addon.blender.base.objects import Body
-from hairloom.addon.blender.colliders.obstacles import Obstacles
+from hairloom.addon.blender.colliders.scene_colliders import SceneColliders
 from hairloom.addon.blender.scene.surfaces import read_surface
 from hairloom.addon.dynamics.colliders import (
     CapsuleCollider,
@@ -55,8 +55,8 @@ TURN = Matrix.Translation((0.1, -0.2, 0.3)) @ Matrix.Rotation(0.7, 4, (1, 2, 3))
 
 def test_nothing_to_collide_with(scene):
     scene.owner.hairloom.collider_collection = None
-    assert move_obstacles(scene.obstacles()) == ()
-    assert scene.obstacles().warnings == ()
+    assert move_colliders(scene.read_colliders()) == ()
+    assert scene.read_colliders().warnings == ()
 
 
 def test_each_object_collides_as_its_kind(scene):
@@ -65,11 +65,11 @@ def test_each_object_collides_as_its_kind(scene):
     scene.cube(shape="sphere", name="B", place=(1, 0, 0))
     scene.cube(shape="capsule", name="C")
     scene.cube(shape="none", name="D")
-    found = scene.obstacles()
-    kinds = sorted(type(posed.collider).__name__ for posed in move_obstacles(found))
+    found = scene.read_colliders()
+    kinds = sorted(type(posed.collider).__name__ for posed in move_colliders(found))
     assert kinds == ["CapsuleCollider", "DistanceField", "SphereSetCollider"]
     assert found.warnings == ()
-    (balls,) = [p for p in move_obstacles(found) if isinstance(p.collider, SphereSetCollider)]
+    (balls,) = [p for p in move_colliders(found) if isinstance(p.collider, SphereSetCollider)]
     assert len(balls.collider.radii) == 2
 
 
@@ -80,15 +80,15 @@ def test_an_empty_that_is_no_sphere_a_lamp_and_the_owner_are_left_alone(scene):
         bpy.context.collection.objects.link(obj)
         scene.add(obj)
     scene.add(scene.owner)
-    found = scene.obstacles()
-    assert move_obstacles(found) == () and len(found.warnings) == 1
+    found = scene.read_colliders()
+    assert move_colliders(found) == () and len(found.warnings) == 1
     assert "nothing in the collection" in found.warnings[0]
 
 
 def test_a_ball_is_as_large_as_blender_shows_it(scene):
     ball = scene.ball(0.1, (1, 0, 0))
     ball.scale = (2, 2, 2)
-    (posed,) = move_obstacles(scene.obstacles())
+    (posed,) = move_colliders(scene.read_colliders())
     assert distance_now(posed, (1.0, 0.0, 0.5)) == pytest.approx(0.3, abs=1e-6)
 
 
@@ -96,13 +96,13 @@ def test_a_mesh_as_sphere_holds_its_longest_side(scene):
     cube = scene.cube(0.2, "sphere", place=(0, 0, 1))
     for vertex in cube.data.vertices:
         vertex.co.x *= 2.0
-    (posed,) = move_obstacles(scene.obstacles())
+    (posed,) = move_colliders(scene.read_colliders())
     assert distance_now(posed, (0.0, 0.0, 1.5)) == pytest.approx(0.3, abs=1e-6)
 
 
 def test_a_stretched_ball_is_an_ellipsoid(scene):
     scene.ball(0.1).scale = (3, 1, 1)
-    (posed,) = move_obstacles(scene.obstacles())
+    (posed,) = move_colliders(scene.read_colliders())
     assert isinstance(posed.collider, SphereCollider)
     assert distance_now(posed, (0.4, 0, 0)) == pytest.approx(0.1, abs=1e-6)
     assert distance_now(posed, (0, 0.4, 0)) == pytest.approx(0.3, abs=1e-6)
@@ -113,7 +113,7 @@ def test_a_capsule_lies_along_the_longest_side_with_round_ends(scene):
     cube = scene.cube(0.2, "capsule")
     cube.scale = (1, 4, 1)
     cube.rotation_euler.z = math.pi / 2  # its y axis becomes the world's x axis
-    (posed,) = move_obstacles(scene.obstacles())
+    (posed,) = move_colliders(scene.read_colliders())
     assert isinstance(posed.collider, CapsuleCollider)
     assert distance_now(posed, (0.5, 0, 0)) == pytest.approx(0.1, abs=1e-6)
     assert distance_now(posed, (0.2, 0, 0.25)) == pytest.approx(0.15, abs=1e-6)
@@ -124,7 +124,7 @@ def test_a_capsule_lies_along_the_longest_side_with_round_ends(scene):
 def test_an_empty_as_capsule_stands_along_z(scene):
     empty = scene.ball(0.2)
     empty.hairloom.collider_shape = "capsule"
-    (posed,) = move_obstacles(scene.obstacles())
+    (posed,) = move_colliders(scene.read_colliders())
     assert distance_now(posed, (0, 0, 0.3)) == pytest.approx(0.1, abs=1e-6)
     assert distance_now(posed, (0.3, 0, 0)) == pytest.approx(0.2, abs=1e-6)
 
@@ -133,7 +133,7 @@ def test_an_empty_as_capsule_stands_along_z(scene):
 def test_a_mesh_that_is_mirrored_or_scaled(scene, scale):
     cube = scene.cube(0.2, place=(1, 0, 0))
     cube.scale, cube.rotation_euler.z = scale, 0.4
-    (posed,) = move_obstacles(scene.obstacles())
+    (posed,) = move_colliders(scene.read_colliders())
     assert isinstance(posed.collider, DistanceField)
     half = 0.1 * abs(scale[2])
     assert distance_now(posed, (1, 0, half + 0.02)) == pytest.approx(0.02, abs=2e-3)
@@ -145,12 +145,12 @@ def test_a_mesh_that_is_mirrored_or_scaled(scene, scale):
 
 def test_colliders_follow_a_curved_trajectory_between_frames(scene):
     ball, cube = scene.ball(), scene.cube()
-    found = scene.obstacles()
-    for posed in move_obstacles(found):
+    found = scene.read_colliders()
+    for posed in move_colliders(found):
         np.testing.assert_allclose(posed.matrix_before, posed.matrix_now)
     for place in (0.1, 0.3, 0.6):  # it accelerates
         ball.location.x = cube.location.x = place
-        last = move_obstacles(found)
+        last = move_colliders(found)
     assert len(last) == 2
     for posed in last:
         went = posed.matrix_now[0, 3] - posed.matrix_before[0, 3]
@@ -163,12 +163,12 @@ def test_colliders_follow_a_curved_trajectory_between_frames(scene):
 
 def test_after_rest_colliders_have_no_speed_and_no_curvature(scene):
     ball = scene.ball()
-    found = scene.obstacles()
+    found = scene.read_colliders()
     ball.location.x = 0.5
-    move_obstacles(found)
+    move_colliders(found)
     ball.location.x = 2.0
     found.rest(depsgraph())
-    (posed,) = move_obstacles(found)
+    (posed,) = move_colliders(found)
     assert posed.matrix_before[0, 3] == posed.matrix_now[0, 3] == pytest.approx(2.0, abs=1e-6)
     assert posed.matrix_earlier is None
 
@@ -177,13 +177,13 @@ def test_balls_that_move_apart_become_another_set(scene):
     parent = scene.ball(0.1, name="A")
     other = scene.ball(0.2, (0.5, 0, 0), name="B")
     other.parent = None
-    found = scene.obstacles()
-    (before,) = move_obstacles(found)
-    (still,) = move_obstacles(found)
+    found = scene.read_colliders()
+    (before,) = move_colliders(found)
+    (still,) = move_colliders(found)
     assert still.collider is before.collider, "its grid is made once"
     other.location.x = 0.9
     parent.scale = (2, 2, 2)
-    (posed,) = move_obstacles(found)
+    (posed,) = move_colliders(found)
     assert distance_now(posed, (1.2, 0, 0)) == pytest.approx(0.1, abs=1e-5)
     assert distance_now(posed, (-0.3, 0, 0)) == pytest.approx(0.1, abs=1e-5)
 
@@ -193,10 +193,10 @@ def test_balls_that_move_together_stay_one_set(scene):
     bpy.context.collection.objects.link(parent)
     for number in range(5):
         scene.ball(0.05, (0.1 * number, 0, 0), name=f"B{number}").parent = parent
-    found = scene.obstacles()
-    (before,) = move_obstacles(found)
+    found = scene.read_colliders()
+    (before,) = move_colliders(found)
     parent.matrix_world = TURN @ Matrix.Scale(2.0, 4)
-    (posed,) = move_obstacles(found)
+    (posed,) = move_colliders(found)
     assert posed.collider is before.collider
     place = TURN @ Vector((0.8, 0, 0))
     outward = TURN.to_3x3() @ Vector((1, 0, 0))
@@ -205,9 +205,9 @@ def test_balls_that_move_together_stay_one_set(scene):
 
 def test_one_ball_that_turns_turns_its_collider(scene):
     ball = scene.ball()
-    found = scene.obstacles()
+    found = scene.read_colliders()
     ball.rotation_euler.z = 0.5
-    (posed,) = move_obstacles(found)
+    (posed,) = move_colliders(found)
     np.testing.assert_allclose(posed.matrix_now[:2, 0], [math.cos(0.5), math.sin(0.5)], atol=1e-6)
 
 
@@ -219,9 +219,9 @@ def test_a_mesh_that_an_armature_turns_is_followed(scene, subdivided):
     pose = rig(head)
     if subdivided:
         head.modifiers.new("Subdivision", "SUBSURF").levels = 1
-    found = scene.obstacles()
+    found = scene.read_colliders()
     pose(TURN)
-    (posed,) = move_obstacles(found)
+    (posed,) = move_colliders(found)
     np.testing.assert_allclose(posed.matrix_now, TURN, atol=1e-4)
     (warning,) = found.warnings
     assert "only one face" in warning, "the monkey's eyes are loose parts without backs"
@@ -230,11 +230,11 @@ def test_a_mesh_that_an_armature_turns_is_followed(scene, subdivided):
 def test_a_mesh_that_an_armature_turns_and_its_object_carries(scene):
     cube = scene.cube()
     pose = rig(cube)
-    found = scene.obstacles()
+    found = scene.read_colliders()
     pose(Matrix.Rotation(0.5, 4, "Z"))
     bpy.data.objects["Rig"].matrix_world = TURN
     cube.parent = bpy.data.objects["Rig"]
-    (posed,) = move_obstacles(found)
+    (posed,) = move_colliders(found)
     np.testing.assert_allclose(posed.matrix_now, TURN @ Matrix.Rotation(0.5, 4, "Z"), atol=1e-5)
 
 
@@ -264,9 +264,9 @@ def test_the_head_is_followed_at_its_roots_where_the_body_bends(scene):
 
     def place(chosen):
         pose(Matrix.Identity(4))
-        found = Obstacles.of(scene.owner, head, at_rest, fine, depsgraph(), None, chosen)
+        found = SceneColliders.of(scene.owner, head, at_rest, fine, depsgraph(), None, chosen)
         pose(turn)
-        (posed,) = move_obstacles(found)
+        (posed,) = move_colliders(found)
         assert found.warnings == ()
         assert posed.collider is not found.parts[0].distance
         now = read_surface(body, depsgraph(), need_uv=False, place="Body").positions
@@ -289,12 +289,12 @@ def test_a_look_at_colliders_between_two_frames_changes_no_motion(scene):
     """Such as the look of an overlay, after the body has bent."""
     body, pose = long_body()
     scene.add(body)
-    found = [scene.obstacles(), scene.obstacles()]
+    found = [scene.read_colliders(), scene.read_colliders()]
     deformations = []
     for angle in (0.2, 0.4, 0.4):
         pose(Matrix.Rotation(angle, 4, "X"))
         found[0].static_colliders(depsgraph())
-        (looked,), (alone,) = map(move_obstacles, found)
+        (looked,), (alone,) = map(move_colliders, found)
         np.testing.assert_array_equal(looked.matrix_now, alone.matrix_now)
         assert looked.deformation == alone.deformation
         deformations.append(alone.deformation)
@@ -311,42 +311,42 @@ def test_a_head_bent_back_reuses_its_field(scene):
     scene.owner.hairloom.collider_collection = None
 
     def of(known):
-        return Obstacles.of(scene.owner, head, at_rest, COARSE_SETTINGS, depsgraph(), known)
+        return SceneColliders.of(scene.owner, head, at_rest, COARSE_SETTINGS, depsgraph(), known)
 
     straight = of(None)
     pose(Matrix.Rotation(0.3, 4, "X"))
-    (bent,) = move_obstacles(straight)
+    (bent,) = move_colliders(straight)
     again = of(straight)
-    assert move_obstacles(again)[0].collider is bent.collider
+    assert move_colliders(again)[0].collider is bent.collider
     assert bent.collider is not again.parts[0].distance
     pose(Matrix.Rotation(0.4, 4, "X"))
-    assert move_obstacles(of(again))[0].collider is not bent.collider
+    assert move_colliders(of(again))[0].collider is not bent.collider
 
 
 def test_fields_are_made_once_and_again_when_the_mesh_or_resolution_differs(scene):
     cube = scene.cube()
     pose = rig(cube)
-    found = scene.obstacles()
-    first = move_obstacles(found)[0].collider
+    found = scene.read_colliders()
+    first = move_colliders(found)[0].collider
     pose(TURN)
     cube.location.y = 2.0
-    again = scene.obstacles(found)
-    assert move_obstacles(again)[0].collider is first
+    again = scene.read_colliders(found)
+    assert move_colliders(again)[0].collider is first
     cube.data.vertices[0].co.x += 0.1
-    other = scene.obstacles(again)
-    assert move_obstacles(other)[0].collider is not first
-    finer = Obstacles.of(
+    other = scene.read_colliders(again)
+    assert move_colliders(other)[0].collider is not first
+    finer = SceneColliders.of(
         scene.owner, None, None, DynamicsSettings(collider_resolution=20), depsgraph(), other
     )
-    assert move_obstacles(finer)[0].collider is not move_obstacles(other)[0].collider
+    assert move_colliders(finer)[0].collider is not move_colliders(other)[0].collider
 
 
 def test_a_mesh_with_another_vertex_count_is_rebuilt_when_play_restarts(scene):
     cube = scene.cube()
-    found = scene.obstacles()
+    found = scene.read_colliders()
     cube.modifiers.new("Subdivision", "SUBSURF").levels = 2
-    again = scene.obstacles(found)
-    (posed,) = move_obstacles(again)
+    again = scene.read_colliders(found)
+    (posed,) = move_colliders(again)
     assert again.warnings == ()
     assert posed.collider is not found.parts[0].distance
 
@@ -357,9 +357,11 @@ def test_one_root_or_none_is_enough_to_follow_a_head(scene, sphere):
     head = Body.at_rest(sphere, depsgraph())
     alone = Surface(at_rest.positions, at_rest.triangles[:0])
     for surface, roots in ((at_rest, np.array([5])), (at_rest, np.zeros(0, int))):
-        found = Obstacles.of(scene.owner, head, surface, COARSE_SETTINGS, depsgraph(), None, roots)
+        found = SceneColliders.of(
+            scene.owner, head, surface, COARSE_SETTINGS, depsgraph(), None, roots
+        )
         pose(TURN)
-        np.testing.assert_allclose(move_obstacles(found)[0].matrix_now, TURN, atol=1e-5)
+        np.testing.assert_allclose(move_colliders(found)[0].matrix_now, TURN, atol=1e-5)
         pose(Matrix.Identity(4))
-    found = Obstacles.of(scene.owner, head, alone, COARSE_SETTINGS, depsgraph(), None)
-    assert move_obstacles(found) == () and "no faces" in found.warnings[0]
+    found = SceneColliders.of(scene.owner, head, alone, COARSE_SETTINGS, depsgraph(), None)
+    assert move_colliders(found) == () and "no faces" in found.warnings[0]

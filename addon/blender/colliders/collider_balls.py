@@ -14,7 +14,7 @@ from ...errors import HairloomError
 from ...strands.affine import mean_scale, transform_points
 from ..base.objects import Body, matrix_of
 from .carriers import is_disabled
-from .obstacle_parts import Track, is_invertible
+from .collider_parts import Track, is_invertible
 
 #: A set is unchanged if its balls moved relative to each other by less than this fraction of the
 #: largest radius.

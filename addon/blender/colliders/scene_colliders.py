@@ -22,14 +22,14 @@ from ...strands import Surface
 from ...strands.mesh_faults import edges_of
 from ..base.objects import Body
 from .carriers import is_disabled
+from .collider_balls import Ball, BallsPart
+from .collider_parts import FieldPart, Part, ShapePart
+from .collider_reader import ColliderReader, disabled_error, shape_of
 from .fields import NotReadyError
-from .obstacle_balls import Ball, BallsPart
-from .obstacle_parts import FieldPart, Part, ShapePart
-from .obstacle_reader import ColliderReader, disabled_error, shape_of
 
 
 @dataclass
-class Obstacles:
+class SceneColliders:
     """The colliders of one groom or fin, with warnings."""
 
     parts: list[Part]
@@ -46,11 +46,11 @@ class Obstacles:
         head_at_rest: Surface | None,
         settings: DynamicsSettings,
         depsgraph: bpy.types.Depsgraph,
-        previous: Obstacles | None,
+        previous: SceneColliders | None,
         roots: Ints | None = None,
         *,
         blocking: bool = True,
-    ) -> Obstacles:
+    ) -> SceneColliders:
         """Everything that collides with `owner`, at rest in its present pose.
 
         Args:
@@ -64,7 +64,7 @@ class Obstacles:
             HairloomError: as `move`.
             NotReadyError: a field is being built, and the call is not blocking.
         """
-        obstacles = cls([], None if head is None else head.handle.uid)
+        colliders = cls([], None if head is None else head.handle.uid)
         fields = {} if previous is None else previous._fields()
         balls: dict[object, list[Ball]] = {}
         is_complete = True
@@ -77,7 +77,7 @@ class Obstacles:
                 else:
                     part = reader.part()
             except HairloomError as error:
-                obstacles._unusable_warnings[obj.name] = str(_with_place(obj.name, error))
+                colliders._unusable_warnings[obj.name] = str(_with_place(obj.name, error))
                 continue
             except NotReadyError:  # go on, so that the other fields are begun too
                 is_complete = False
@@ -85,15 +85,15 @@ class Obstacles:
             if isinstance(part, Ball):
                 balls.setdefault(_parent_key(obj), []).append(part)
             elif part is not None:
-                obstacles.parts.append(part)
+                colliders.parts.append(part)
                 if isinstance(part, FieldPart) and not is_head:
-                    obstacles._mesh_warnings += _mesh_notes(part.surface, obj.name)
+                    colliders._mesh_warnings += _mesh_notes(part.surface, obj.name)
         if not is_complete:
             raise NotReadyError
-        obstacles._mesh_warnings += _unused_collection(owner)
-        obstacles.parts += [BallsPart.new(group, depsgraph) for group in balls.values()]
-        obstacles.rest(depsgraph)
-        return obstacles
+        colliders._mesh_warnings += _unused_collection(owner)
+        colliders.parts += [BallsPart.new(group, depsgraph) for group in balls.values()]
+        colliders.rest(depsgraph)
+        return colliders
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -243,4 +243,4 @@ def _with_place(name: str, error: HairloomError) -> HairloomError:
     return HairloomError(error.problem, place=name, remedy=error.remedy)
 
 
-__all__ = ["Obstacles", "collider_objects", "shape_of"]
+__all__ = ["SceneColliders", "collider_objects", "shape_of"]
