@@ -85,7 +85,7 @@ def write_children(
     """Write the shapes of some of a rig's children into `points`, with their old point counts.
 
     Args:
-        chosen: (n,) indices among the rig's children, for which `grown.kept` ascends.
+        chosen: (n,) indices among the rig's children, for which `grown.rig_children` ascends.
         own_count: the number of strands before the children.
     """
     children = _strands_of_grid(grown.growth.shapes(grown.shapes.grid, grown.rig_children[chosen]))

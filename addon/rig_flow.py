@@ -294,7 +294,7 @@ def prepare(
     placement: ChildPlacement = DEFAULT_PLACEMENT,
     widths: str = "own",
     holders: Holders = NO_HOLDERS,
-    kept: ResultCache = NO_CACHE,
+    cache: ResultCache = NO_CACHE,
     is_animated: bool = False,
 ) -> Rig:
     """Bind strands to the head, choose the guides, weigh them for every strand, find all widths,
@@ -308,7 +308,7 @@ def prepare(
         placement: its partings part the artist's own strands, too.
         widths: one of `groom.widths.METHODS`.
         holders: ties and a surface of tips, at rest.
-        kept: intermediate results of the last rig, reused where strands have not changed, as when
+        cache: intermediate results of the last rig, reused where strands have not changed, as when
             an artist combs or paints; it changes no result, only the time.
         is_animated: whether the strands will change shape, so that all keep their own points.
 
@@ -340,14 +340,14 @@ def prepare(
     weights = _weights(lines, guide_lines, kind, guide_kind, parted)
     notes = (*_loose_root_notes(root_distance), *_lost_length_notes(bound, own))
     rig = Rig(own, head, guides, guide_lines.grid, weights, _rest_frames(own, head), notes)
-    growing = _ChildContext(placement, parted, kept, is_animated)
+    growing = _ChildContext(placement, parted, cache, is_animated)
     if children is not None and children.method == "auto":
         rig = _with_automatic_children(rig, children, growing, widths, place)
     else:
         if children is not None and children.method != "none":
             rig = _with_children(rig, children, growing, place)
         strands, found = with_widths(
-            rig.strands, widths, number=_grown_numbers(rig), fineness=_fineness(rig), cache=kept
+            rig.strands, widths, number=_grown_numbers(rig), fineness=_fineness(rig), cache=cache
         )
         rig = replace(rig, strands=strands, widths=found)
     if holds is None:
@@ -374,7 +374,7 @@ class _ChildContext:
 
     ground: ChildPlacement
     partings: Partings | None
-    kept: ResultCache
+    cache: ResultCache
     is_animated: bool
 
 
@@ -435,7 +435,7 @@ def _with_automatic_children(
         )
     if parts > 1.0 and rig.head is None:
         parts, line = 1.0, "Children: none, since the hair has no surface to grow them on"
-    own, found = with_widths(rig.strands, widths, parts, cache=growing.kept)
+    own, found = with_widths(rig.strands, widths, parts, cache=growing.cache)
     rig = replace(rig, strands=own, widths=found)
     if parts > 1.0:
         with_children = _with_children(rig, settings, growing, place)
@@ -477,7 +477,7 @@ def _with_children(
     place: str,
 ) -> Rig:
     """The artist's own strands, and children grown between them."""
-    own, head, kept = rig.strands, rig.head, growing.kept
+    own, head, cache = rig.strands, rig.head, growing.cache
     ground = growing.ground
     if head is None:
         note = (
@@ -495,19 +495,19 @@ def _with_children(
         growing.partings,
         ground.masks.for_strands(parents),
         place=place,
-        cache=kept,
+        cache=cache,
     )
-    made, chosen = _led_out_of_head(made, ground.head_field(), _hair_length(shapes), kept)
+    made, chosen = _led_out_of_head(made, ground.head_field(), _hair_length(shapes), cache)
     if growing.is_animated:
         children = with_all_points(made.strands, cv_count)
     else:
-        children = with_needed_points(made.strands, cv_count, cache=kept)
+        children = with_needed_points(made.strands, cv_count, cache=cache)
     strands = join_strands(own, children)
     if len(rig.guides) < own.strand_count:
         # their shapes come from neighbours among all strands, their motion from guides alone
         lines = center_lines(own.take(rig.guides), cv_count)
         weights = _weights(
-            _child_center_lines(made.strands, cv_count, kept), lines, partings=growing.partings
+            _child_center_lines(made.strands, cv_count, cache), lines, partings=growing.partings
         )
     else:
         weights = replace(made.weights, guide=parents[made.weights.guide])
@@ -527,13 +527,13 @@ def _with_children(
     )
 
 
-def _child_center_lines(children: StrandSet, cv_count: int, kept: ResultCache) -> StrandSet:
+def _child_center_lines(children: StrandSet, cv_count: int, cache: ResultCache) -> StrandSet:
     """The centre lines of children, which have one point count; widths are dummies."""
 
     def of(some: Ints) -> tuple[Floats]:
         return (center_lines(children.take(some), cv_count).grid,)
 
-    (grid,) = kept.rows("lines", (cv_count,), (children.grid,), of)
+    (grid,) = cache.rows("lines", (cv_count,), (children.grid,), of)
     return StrandSet(
         grid.reshape(-1, 3),
         np.arange(len(grid) + 1) * cv_count,
@@ -543,7 +543,7 @@ def _child_center_lines(children: StrandSet, cv_count: int, kept: ResultCache) -
 
 
 def _led_out_of_head(
-    made: Children, head: DistanceField | None, length: float, kept: ResultCache
+    made: Children, head: DistanceField | None, length: float, cache: ResultCache
 ) -> tuple[Children, Ints]:
     """Children led out of the head, without those that cannot be, and their indices among all.
 
@@ -557,7 +557,7 @@ def _led_out_of_head(
         led, is_out = lead_out_at_rest(made.strands.take(some), head, length)
         return led.grid, is_out
 
-    grid, is_out = kept.rows("led out", (head, length), (made.strands.grid,), led_out)
+    grid, is_out = cache.rows("led out", (head, length), (made.strands.grid,), led_out)
     led = made.strands.with_points(grid.reshape(-1, 3))
     chosen, lost = np.flatnonzero(is_out), int((~is_out).sum())
     notes = made.notes

@@ -349,7 +349,7 @@ class _Measured:
 
     Args:
         chosen: indices of the sample; all others get the values of the nearest strand in it.
-        kept, name: see `ResultCache.nearest`.
+        cache, name: see `ResultCache.nearest`.
     """
 
     def __init__(self, places: Floats, chosen: Ints, cache: ResultCache, name: str) -> None:

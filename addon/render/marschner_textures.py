@@ -43,7 +43,7 @@ class MarschnerTextures:
     """Textures for fibre shapes, made on first use; keeps the last CAPACITY shapes."""
 
     def __init__(self) -> None:
-        self._kept: OrderedDict[Any, _Tables] = OrderedDict()
+        self._cache: OrderedDict[Any, _Tables] = OrderedDict()
         released_with_shaders(self)
 
     def textures(self, shading: ShadingSettings, size: int) -> dict[str, Any]:
@@ -63,18 +63,18 @@ class MarschnerTextures:
     def _tables(self, shading: ShadingSettings, size: int) -> _Tables:
         shape = shape_of(fibre_of(shading))
         key = (shape, size)
-        if key not in self._kept:
+        if key not in self._cache:
             tables = marschner_tables(shape, size)
             sides = fractions(tables)
-            self._kept[key] = _Tables(sides, _textures(tables, sides))
-            while len(self._kept) > CAPACITY:
-                self._kept.popitem(last=False)
-        self._kept.move_to_end(key)
-        return self._kept[key]
+            self._cache[key] = _Tables(sides, _textures(tables, sides))
+            while len(self._cache) > CAPACITY:
+                self._cache.popitem(last=False)
+        self._cache.move_to_end(key)
+        return self._cache[key]
 
     def release(self) -> None:
         """Release all textures; the next call makes them again."""
-        self._kept.clear()
+        self._cache.clear()
 
 
 #: shared by all passes

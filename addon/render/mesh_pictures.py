@@ -28,7 +28,7 @@ class PictureTextures:
     """Textures of pictures, each uploaded once as long as it is the same array."""
 
     def __init__(self) -> None:
-        self._kept: dict[int, tuple[Floats, Any]] = {}
+        self._cache: dict[int, tuple[Floats, Any]] = {}
         self._colors: dict[Color, Any] = {}
 
     def feature(self, mesh: MeshSnapshot, pictures: MeshPictures) -> ShaderFeature:
@@ -69,7 +69,7 @@ class PictureTextures:
                 used |= {id(mesh.pictures.color), id(mesh.pictures.normal)}
         colors = {mesh.color for mesh in meshes}
         self._colors = {color: kept for color, kept in self._colors.items() if color in colors}
-        self._kept = {key: kept for key, kept in self._kept.items() if key in used}
+        self._cache = {key: cached for key, cached in self._cache.items() if key in used}
 
     def _plain(self, color: Color) -> Any:
         if color not in self._colors:
@@ -78,8 +78,8 @@ class PictureTextures:
         return self._colors[color]
 
     def _texture(self, picture: Floats) -> Any:
-        if id(picture) not in self._kept:
+        if id(picture) not in self._cache:
             texture = texture_from(picture, "RGBA16F")
             texture.extend_mode("REPEAT")
-            self._kept[id(picture)] = picture, texture
-        return self._kept[id(picture)][1]
+            self._cache[id(picture)] = picture, texture
+        return self._cache[id(picture)][1]

@@ -123,7 +123,7 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
             levels=self.levels if self.own_levels else None,
             frames=self._frames(hair),
             cached_rigs=tuple(previewed_rigs().values()),
-            kept=previews.built_cards,
+            cache=previews.built_cards,
         )
 
     def _output(self, path: Path, hair_name: str) -> CardOutput:

@@ -96,7 +96,7 @@ def _build_steps(
     hair = chosen_hair(context)[0]
     depsgraph, cached_rigs = context.evaluated_depsgraph_get(), tuple(previewed_rigs().values())
     job = CardObjectJob(
-        hair, depsgraph, keep_edits=keep_edits, cached_rigs=cached_rigs, kept=previews.built_cards
+        hair, depsgraph, keep_edits=keep_edits, cached_rigs=cached_rigs, cache=previews.built_cards
     )
     yield Progress("Reading the hair")
     job.write((yield from threaded(job.building())))

@@ -82,10 +82,10 @@ PAINTED = ("frizz", "length", "clump", "width", "scatter", "fly_aways")
 def test_it_is_what_is_made_from_nothing(
     settings: ChildrenSettings, guides: int, does: Callable[..., Any]
 ) -> None:
-    kept, field = ResultCache(), block()
+    cache, field = ResultCache(), block()
     strands, density = wig_strands(), np.ones(len(HEAD.positions), np.float32)
 
-    def made(kept: dict[str, ResultCache]) -> rig_flow.Rig:
+    def rig_with(**options: ResultCache) -> rig_flow.Rig:
         return rig_flow.prepare(
             strands,
             HEAD,
@@ -98,12 +98,12 @@ def test_it_is_what_is_made_from_nothing(
                 head_field=lambda: field,
             ),
             widths="found",
-            **kept,
+            **options,
         )
 
     points = []
     for stroke in range(STROKES):
-        again, fresh = made({"kept": kept}), made({})
+        again, fresh = rig_with(cache=cache), rig_with()
         same(again, fresh)
         assert again.child_count > 100
         points.append(again.strands.points)

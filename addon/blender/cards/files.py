@@ -503,7 +503,7 @@ class CardExport:
     """The export of one hair's cards. notes: for the artist."""
 
     hair: Handle
-    kept: CardBuildCache
+    cache: CardBuildCache
     path: Path
     output: CardOutput
     inputs: CardInputs
@@ -522,7 +522,7 @@ class CardExport:
         levels: int | None = None,
         frames: range | None = None,
         cached_rigs: tuple[CachedRig, ...] = (),
-        kept: CardBuildCache | None = None,
+        cache: CardBuildCache | None = None,
     ) -> CardExport:
         """Read the hair; if motion is to be written, from its bake.
 
@@ -530,7 +530,7 @@ class CardExport:
             levels: number of levels of detail; None: by the groom's own settings.
             frames: of the bake; None: all of them.
             cached_rigs: see `CachedRig.of`.
-            kept: cards that were built before; the new ones are kept in it.
+            cache: cards that were built before; the new ones are kept in it.
 
         Raises:
             HairloomError: no hair that can be used, no bake, or a format that cannot be written.
@@ -546,17 +546,17 @@ class CardExport:
             cards = replace(inputs.settings[CardSettings], levels=levels)
             inputs = replace(inputs, settings=inputs.settings.with_settings(cards))
         notes += stale
-        kept = CardBuildCache() if kept is None else kept
-        return cls(Handle.of(hair), kept, path, output, inputs, motion, dropped, notes)
+        cache = CardBuildCache() if cache is None else cache
+        return cls(Handle.of(hair), cache, path, output, inputs, motion, dropped, notes)
 
     def building(self) -> ThreadWork[MappedCards]:
         """Build the cards in a thread."""
-        return self.kept.building(self.inputs, "hairloom card files")
+        return self.cache.building(self.inputs, "hairloom card files")
 
     def writing(self, made: MappedCards) -> FileSteps[Outcome]:
         """Write the built cards; closing the generator leaves old files as they were."""
         inputs = self.inputs
-        self.kept.keep(self.hair, inputs, made)
+        self.cache.keep(self.hair, inputs, made)
         steps = file_steps(
             self.path,
             made,

@@ -40,7 +40,7 @@ class CardObjectJob:
     Args:
         keep_edits: whether to keep the artist's changes to existing cards.
         cached_rigs: see `CachedRig.of`.
-        kept: cards that were built before; the new ones are kept in it.
+        cache: cards that were built before; the new ones are kept in it.
 
     Raises:
         HairloomError: no hair that can be used, or its existing cards cannot be changed.
@@ -53,14 +53,14 @@ class CardObjectJob:
         *,
         keep_edits: bool = True,
         cached_rigs: tuple[CachedRig, ...] = (),
-        kept: CardBuildCache | None = None,
+        cache: CardBuildCache | None = None,
     ) -> None:
         for obj in card_objects(hair):
             _check_replaceable(obj)
         self._inputs, self.notes, self.dropped = read_inputs(
             hair, depsgraph, keep_edits=keep_edits, cached_rigs=cached_rigs
         )
-        self._kept = CardBuildCache() if kept is None else kept
+        self._cache = CardBuildCache() if cache is None else cache
         self._hair, self._matrix = Handle.of(hair), matrix_of(hair, depsgraph)
         self.objects: list[bpy.types.Object] = []
         self.order = ""
@@ -68,7 +68,7 @@ class CardObjectJob:
 
     def building(self) -> ThreadWork[MappedCards]:
         """Build the cards in a thread, which touches none of Blender's data."""
-        return self._kept.building(self._inputs, "hairloom card objects")
+        return self._cache.building(self._inputs, "hairloom card objects")
 
     def write(self, made: MappedCards) -> None:
         """Put the cards into the scene.
@@ -77,7 +77,7 @@ class CardObjectJob:
             HairloomError: the hair is gone, or its cards cannot be changed any more.
         """
         hair, build = self._hair.resolve("Choose other hair"), made.build
-        self._kept.keep(self._hair, self._inputs, made)
+        self._cache.keep(self._hair, self._inputs, made)
         for obj in card_objects(hair):
             _check_replaceable(obj)
         self.notes += tuple(f"{hair.name}: {note}." for note in made.notes)

@@ -24,13 +24,13 @@ _RIG_INPUTS = ("strands", "head", "density", "masks", "partings", "holders")
 
 
 def rig_from(
-    source: Source, settings: SettingsMap, *, place: str, kept: ResultCache = NO_CACHE
+    source: Source, settings: SettingsMap, *, place: str, cache: ResultCache = NO_CACHE
 ) -> Rig:
     """The rig of hair, at rest as it was read; from arrays alone.
 
     Args:
         place: the hair's name in messages.
-        kept: see `rig_flow.prepare`.
+        cache: see `rig_flow.prepare`.
 
     Raises:
         HairloomError: no hair that can be used.
@@ -46,7 +46,7 @@ def rig_from(
         ),
         widths=settings[WidthSettings].method,
         holders=source.holders,
-        kept=kept,
+        cache=cache,
         is_animated=settings[DynamicsSettings].animated_style,
     )
 

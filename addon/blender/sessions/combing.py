@@ -54,14 +54,14 @@ def comb(
     points_of: Callable[[StrandSet], Floats],
     begin: Floats | None = None,
     *,
-    kept_as: ShapeBackup | None = None,
+    backup: ShapeBackup | None = None,
 ) -> Parts[Combed]:
     """Move the points of the hair's curves; curves that change are led out of the surface.
 
     Args:
         points_of: from strands in world space, bound to the surface, to their new points.
         begin: (point_count, 3) object space, the points to begin with; None: the present ones.
-        kept_as: keeps the shape from before.
+        backup: keeps the shape from before.
 
     Raises:
         HairloomError: no usable curves.
@@ -83,9 +83,9 @@ def comb(
         return points, len(changed)
 
     points, changed = yield Part(f"Combing {count:,} curves", work)
-    if kept_as is not None:
-        kept_as.save(hair)
+    if backup is not None:
+        backup.save(hair)
     write_original_curves(hair, own, points, depsgraph)
-    if kept_as is not None:
-        kept_as.mark_result(hair)
+    if backup is not None:
+        backup.mark_result(hair)
     return Combed(changed, count, own.dropped)

@@ -38,7 +38,7 @@ def comb_flow(
         depsgraph,
         lambda bound: comb_along_strokes(bound, lines, surface, settings),
         BEFORE_FLOW.read_if_unchanged(hair),
-        kept_as=BEFORE_FLOW,
+        backup=BEFORE_FLOW,
     )
     result = f"{hair.name}: {done.changed:,} of {done.all:,} curves follow its strokes"
     return Outcome(result, done.dropped, unusable)

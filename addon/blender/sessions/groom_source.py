@@ -81,12 +81,12 @@ class GroomSource:
         self._head_uid = head and head.session_uid
         self._parting_state = parting_state(hair)
         self.settings = GroomSettings.of(hair, depsgraph)
-        self._kept = ResultCache()
+        self._cache = ResultCache()
         self._read_motion_masks(self._mask_reader(self.source), self.settings, depsgraph)
         self._style_warning = ""
         self._styled_rig: _StyledRig | None = None
         self.request = BuildRequest(
-            self.name, self.source, self.settings, holders=self._holders, kept=self._kept
+            self.name, self.source, self.settings, holders=self._holders, cache=self._cache
         )
         check_finite(hair.name, self.hair.rest)
 
@@ -236,7 +236,7 @@ class GroomSource:
             partings=partings,
             parting_warnings=parting_warnings,
         )
-        request = BuildRequest(self.name, source, settings, holders=holding, kept=self._kept)
+        request = BuildRequest(self.name, source, settings, holders=holding, cache=self._cache)
         if (
             request.gives_same_rig_as(known)
             and request.settings[AmbientSettings] == known.settings[AmbientSettings]

@@ -47,7 +47,7 @@ class BuildRequest:
 
     name: of the groom, in messages. rig: that of its bake; None: it must be made.
     holding: what holds the hair beside its roots; follows those objects.
-    kept: results of the last build for the same session, which runs one build at a time.
+    cache: results of the last build for the same session, which runs one build at a time.
     """
 
     name: str
@@ -55,7 +55,7 @@ class BuildRequest:
     settings: GroomSettings
     rig: Rig | None = None
     holders: TrackedHolders = field(default_factory=TrackedHolders)
-    kept: ResultCache = NO_CACHE
+    cache: ResultCache = NO_CACHE
 
     def gives_same_rig_as(self, other: BuildRequest) -> bool:
         """Whether both surely give the same rig; does not build it."""
@@ -114,8 +114,8 @@ def requested_rig(request: BuildRequest) -> Rig:
     """
     if request.rig is not None:
         return request.rig
-    settings, kept = request.settings.sections, request.kept
-    return rig_from(request.source, settings, place=request.name, kept=kept)
+    settings, cache = request.settings.sections, request.cache
+    return rig_from(request.source, settings, place=request.name, cache=cache)
 
 
 def build_groom(

@@ -51,7 +51,7 @@ WITHOUT = {"clump": 0.0, "frizz": 0.0, "fly_aways": 0.0}
 def rig_of(
     settings: ChildrenSettings,
     masks: Masks = NO_MASKS,
-    kept: ResultCache = NO_CACHE,
+    cache: ResultCache = NO_CACHE,
     own: StrandSet | None = None,
 ) -> rig_flow.Rig:
     placement = rig_flow.ChildPlacement(masks=masks)
@@ -62,7 +62,7 @@ def rig_of(
         place="a wig",
         children=settings,
         placement=placement,
-        kept=kept,
+        cache=cache,
     )
 
 
@@ -186,9 +186,9 @@ def test_only_rows_that_are_painted_are_made_again() -> None:
 
             return super().rows(name, fixed, rows, counted)
 
-    kept = Counted()
-    rig_of(BOLD, NO_MASKS, kept)
-    again = rig_of(BOLD, on_head("frizz", HALF), kept)
+    cache = Counted()
+    rig_of(BOLD, NO_MASKS, cache)
+    again = rig_of(BOLD, on_head("frizz", HALF), cache)
     assert made[0] == 3000 and 1500 < made[1] < 2000
     np.testing.assert_array_equal(children(again), children(rig_of(BOLD, on_head("frizz", HALF))))
 

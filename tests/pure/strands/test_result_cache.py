@@ -40,9 +40,9 @@ CHANGES = ("nothing", "moved", "fewer", "more", "shuffled")
 def test_nearest_points_are_those_that_are_found_from_nothing(
     of_places: str, of_points: str, rounded: int | None
 ) -> None:
-    places, among, kept = cloud(300, 1, rounded), cloud(200, 2, rounded), ResultCache()
+    places, among, cache = cloud(300, 1, rounded), cloud(200, 2, rounded), ResultCache()
     for step in range(4):
-        found = kept.nearest("here", places, among, 5)
+        found = cache.nearest("here", places, among, 5)
         expected = nearest_points(places, among, 5)
         for one, other in zip(found, expected, strict=True):
             np.testing.assert_array_equal(one, other)
@@ -55,62 +55,66 @@ def test_nearest_points_are_those_that_are_found_from_nothing(
 def test_few_places_are_asked_again(monkeypatch: pytest.MonkeyPatch) -> None:
     from hairloom.addon.strands import result_cache as module
 
-    asked: list[int] = []
+    computed: list[int] = []
 
     def counted(places: np.ndarray, among: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
         if count > 1:
-            asked.append(len(places))
+            computed.append(len(places))
         return nearest_points(places, among, count)
 
     monkeypatch.setattr(module, "nearest_points", counted)
-    places, among, kept = cloud(2000, 1), cloud(2000, 2), ResultCache()
-    kept.nearest("here", places, among, 5)
+    places, among, cache = cloud(2000, 1), cloud(2000, 2), ResultCache()
+    cache.nearest("here", places, among, 5)
     among = among.copy()
     among[7] += np.float32(0.01)
-    kept.nearest("here", places, among, 5)
-    assert asked[0] == 2000 and 0 < asked[1] < 30
+    cache.nearest("here", places, among, 5)
+    assert computed[0] == 2000 and 0 < computed[1] < 30
 
 
 def test_only_new_rows_are_made() -> None:
     """Rows are found wherever they were before; values of any type are compared bit by bit."""
-    kept, asked = ResultCache(), []
+    cache, computed = ResultCache(), []
     rows = np.random.default_rng(3).normal(size=(50, 4, 3)).astype(np.float32)
     key = np.arange(50, dtype=np.uint64)
 
-    def made(rows: np.ndarray, key: np.ndarray, kept: ResultCache, factor: int = 2) -> np.ndarray:
+    def computed_rows(
+        rows: np.ndarray, key: np.ndarray, cache: ResultCache, factor: int = 2
+    ) -> np.ndarray:
         def make(some: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            asked.append(some)
+            computed.append(some)
             return rows[some].sum(axis=1) * factor, key[some] + 1
 
-        total, after = kept.rows("sums", (factor,), (rows, key), make)
+        total, after = cache.rows("sums", (factor,), (rows, key), make)
         np.testing.assert_array_equal(total, rows.sum(axis=1) * factor)
         np.testing.assert_array_equal(after, key + 1)
-        return asked[-1]
+        return computed[-1]
 
-    assert len(made(rows, key, kept)) == 50
+    assert len(computed_rows(rows, key, cache)) == 50
     other = rows.copy()
     other[7, 2, 1] = np.nextafter(other[7, 2, 1], np.float32(9))
-    np.testing.assert_array_equal(made(other, key, kept), [7])
+    np.testing.assert_array_equal(computed_rows(other, key, cache), [7])
     order = np.random.default_rng(4).permutation(50)[:30]
-    count = len(asked)
-    made(other[order], key[order], kept)
-    assert len(asked) == count, "all of them are known"
-    assert len(made(rows, key, kept)) == 21, "those that were not asked for last are forgotten"
+    count = len(computed)
+    computed_rows(other[order], key[order], cache)
+    assert len(computed) == count, "all of them are known"
+    assert len(computed_rows(rows, key, cache)) == 21, (
+        "those that were not asked for last are forgotten"
+    )
     key = key.copy()
     key[3] = 1 << 40
-    np.testing.assert_array_equal(made(rows, key, kept), [3])
-    assert len(made(rows, key, kept, factor=3)) == 50
-    assert len(made(rows[:0], key[:0], kept, factor=4)) == 0
-    assert len(made(rows, key, NO_CACHE, factor=3)) == 50
-    assert len(made(rows, key, NO_CACHE, factor=3)) == 50
+    np.testing.assert_array_equal(computed_rows(rows, key, cache), [3])
+    assert len(computed_rows(rows, key, cache, factor=3)) == 50
+    assert len(computed_rows(rows[:0], key[:0], cache, factor=4)) == 0
+    assert len(computed_rows(rows, key, NO_CACHE, factor=3)) == 50
+    assert len(computed_rows(rows, key, NO_CACHE, factor=3)) == 50
 
 
 def test_rows_that_swap_two_numbers_are_told_apart() -> None:
     rows = np.array([[1.0, 2.0], [2.0, 1.0], [1.0, 2.0]], np.float32)
-    kept = ResultCache()
+    cache = ResultCache()
 
     def first(rows: np.ndarray) -> list[float]:
-        return kept.rows("first", (), (rows,), lambda some: (rows[some, 0],))[0].tolist()
+        return cache.rows("first", (), (rows,), lambda some: (rows[some, 0],))[0].tolist()
 
     assert first(rows) == [1.0, 2.0, 1.0]
     assert first(rows[::-1]) == [1.0, 2.0, 1.0]
