@@ -1,4 +1,7 @@
-"""The side from which hair is best seen, found from where it grows.
+"""The side from which hair is best seen, found from where it grows, and from the mesh of its body.
+
+The front is where the body's mesh is finest, as that of a face is, however much hair covers it.
+Where the mesh is as fine on all sides, the front is found from the hair:
 
 A candidate direction of view is rated by the product of how much hair and how much of the face is
 visible from there. The face is the bare part of the body amidst the hair. The product is largest
@@ -7,7 +10,8 @@ head towards the eye. It is small from the edge of a sheet, and from behind a fa
 
 If no face is visible, as on an animal with fur all over, the lie of the coat decides: it runs from
 the nose to the tail. From behind one would also see the ends of its strands, which look dark under
-lights in front, since light leaves a strand in a cone around it.
+lights in front, since light leaves a strand in a cone around it. Where all of this says little, the
+front is Blender's, -Y.
 
 Pure numpy: importable without gpu.
 """
@@ -26,6 +30,8 @@ from ..strands.triangles import areas_of
 
 #: number of directions around the hair that are tried
 _AROUND = 16
+#: the convention for models in Blender
+_BLENDERS_FRONT = np.array([0.0, -1.0, 0.0])
 #: heights of the eye, as z of a direction whose horizontal part has unit length, and their ratings
 _HEIGHTS = ((0.16, 1.0), (0.4, 0.92), (0.7, 0.8), (1.7, 0.6))
 #: only this many of the lowest heights are tried for a head, if at least this fraction of the whole
@@ -39,9 +45,13 @@ _TURNS = ((_THREE_QUARTER, 1.0), (_ASIDE, 0.74))
 _WITHOUT_FACE = 0.35
 #: smallest visible area of a face, as a fraction of that of the hair
 _MIN_FACE = 0.02
-#: there is a front if the ratings of the directions lean to one side by this fraction
-_MIN_LENGTH = 0.06
-#: and if the directions from which the face is visible lean by this
+#: there is a front if the ratings of the directions lean to one side by this fraction; if the hair
+#: hides the face of its body, by this one, since hair on one side is no sign of a face
+_MIN_LENGTH, _MIN_HIDDEN_LENGTH = 0.06, 0.3
+#: the middle of the triangles of a mesh with a face lies this far from that of their areas, as a
+#: fraction of their extent; a mesh is flat, as a wall is, if its horizontal extents differ more
+_MIN_FINENESS, _MIN_THICKNESS = 0.25, 0.25
+#: there is a front if the directions from which the face is visible lean by this
 _MIN_FACE_LENGTH = 0.2
 #: smallest length of `_PointCloud.lie` for a coat to have a lie; and the smallest visible area
 #: against the lie, as a fraction of that from the opposite side
@@ -88,17 +98,22 @@ def good_side(strands: StrandSet, body: Surface | None) -> GoodSide:
     whole = areas.max(axis=0)
     is_face = whole[1] > _MIN_FACE * whole[0]
     ratings = _ratings(areas, whole) * (1.0 - 0.5 * _PREFERENCE * level[:, 1])
+    of_mesh = None if body is None else _front_of_mesh(body, strands.roots)
     front = None if is_face else cloud.against_lie()
     # from nearly beside a coat the ends of its strands are visible again
     turns = ((_THREE_QUARTER, 1.0),) if front is not None else _TURNS
     # short hair is visible from behind too, but a face only from the front
     if front is None:
-        front = _mean_direction(ratings, level, _MIN_LENGTH)
+        is_hidden = body is not None and not is_face
+        min_length = _MIN_HIDDEN_LENGTH if is_hidden else _MIN_LENGTH
+        front = _mean_direction(ratings, level, min_length)
     face = _mean_direction(areas[:, 1], level, _MIN_FACE_LENGTH) if is_face else None
     if face is not None and (front is None or front @ face < 0.0):
         front = face
-    if front is None:  # the best is the three-quarter view
-        front = _turned(level[ratings.argmax()], _THREE_QUARTER)
+    if of_mesh is not None:
+        front = of_mesh
+    if front is None:
+        front = _raised(_BLENDERS_FRONT, 0.0)
     # in this order, so that of equals the first wins
     candidates = [
         (_raised(_turned(front, turn), height), factor * preferred * aside)
@@ -113,6 +128,24 @@ def good_side(strands: StrandSet, body: Surface | None) -> GoodSide:
     factors = np.array([factor for _, factor in candidates])
     best = (_ratings(tried, np.maximum(whole, tried.max(axis=0))) * factors).argmax()
     return GoodSide(front, candidates[best][0])
+
+
+def _front_of_mesh(body: Surface, roots: Floats) -> Floats | None:
+    """The horizontal unit direction in which the mesh is finest, above the lowest roots; None if it
+    is as fine on all sides, or flat."""
+    corners = body.corners.astype(np.float64)
+    places, areas = corners.mean(axis=1), areas_of(corners)
+    is_used = (places[:, 2] > np.quantile(roots[:, 2], _LOWEST)) & (areas > 0.0)
+    if not is_used.any():
+        return None
+    places, areas = places[is_used, :2], areas[is_used] / areas[is_used].sum()
+    places -= areas @ places
+    spread = np.sqrt(np.linalg.eigvalsh(places.T @ (areas[:, None] * places)).clip(min=0.0))
+    finest: Floats = places.mean(axis=0)
+    length = float(np.linalg.norm(finest))
+    if length < _MIN_FINENESS * np.linalg.norm(spread) or spread[0] <= _MIN_THICKNESS * spread[1]:
+        return None
+    return _raised(finest / length, 0.0)
 
 
 def _mean_direction(ratings: Floats, level: Floats, min_length: float) -> Floats | None:
@@ -143,7 +176,7 @@ class _PointCloud:
     """Points that represent hair and body, for pictures of few cells.
 
     points: (n, 3) [m] from the middle. kind: (n,) 0 body, 1 hair, 2 face. cell: side of a cell [m].
-    lie: (3,) horizontal sum of the chords from root to tip, over the sum of their lengths.
+    lie: (3,) the horizontal part of the mean direction from root to tip.
     """
 
     points: Floats
@@ -201,8 +234,10 @@ def _evenly_spaced(strands: StrandSet) -> StrandSet:
 def _lie(grid: Floats) -> Floats:
     """`_PointCloud.lie` of strands (n, cv_count, 3)."""
     chord = grid[:, -1].astype(np.float64) - grid[:, 0]
-    whole = float(np.linalg.norm(chord, axis=1).sum())
-    return chord.sum(axis=0) * (1.0, 1.0, 0.0) / max(whole, 1e-30)
+    length = np.linalg.norm(chord, axis=1, keepdims=True)
+    # each strand counts the same: a tail at one side is no lie of the coat
+    mean: Floats = (chord / np.maximum(length, 1e-30)).mean(axis=0) * (1.0, 1.0, 0.0)
+    return mean
 
 
 def _subset[Array: (Floats, Ints)](points: Array, count: int) -> Array:

@@ -129,6 +129,57 @@ def test_the_front_is_found_wherever_it_is(shape, degrees: float) -> None:
     assert 15.0 < away(side.three_quarter, degrees) < 45.0
 
 
+def modelled(body: Surface) -> Surface:
+    """The body with a mesh that is finer towards -Y, as models of heads are."""
+    x, y, z = body.positions.T
+    around = np.arctan2(x, -y)
+    around = np.where(np.hypot(x, y) > 1e-6, around - 0.9 * np.sin(around), 0.0)
+    radius = np.hypot(x, y)
+    moved = np.stack([radius * np.sin(around), -radius * np.cos(around), z], axis=1)
+    return Surface(moved.astype(np.float32), body.triangles)
+
+
+def veiled() -> tuple[np.ndarray, Surface]:
+    """A head with hair all over, the face included, that is swept to one side."""
+    outward = np.random.default_rng(3).normal(size=(2500, 3))
+    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+    return spikes(0.1 * outward, outward + [0.87, 0.5, 0.0], 0.08), ball(0.1)
+
+
+@pytest.mark.alike
+@pytest.mark.parametrize("degrees", TURNS)
+def test_the_front_of_a_head_with_its_face_covered_is_that_of_its_mesh(degrees: float) -> None:
+    """From the hair alone, it would be 60 degrees beside it."""
+    strands, body = veiled()
+    assert away(side_of(strands, body).front, 0.0) > 50.0
+    side = side_of(*turned(strands, modelled(body), degrees))
+    assert away(side.front, degrees) < 3.0
+    assert 15.0 < away(side.three_quarter, degrees) < 45.0
+
+
+def test_hair_all_over_with_a_tail_at_one_side_is_seen_from_blenders_front() -> None:
+    """A tail is no sign of a face."""
+    outward = np.random.default_rng(3).normal(size=(2500, 3))
+    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+    at_side = outward @ np.array([0.87, 0.5, 0.0]) > 0.9
+    strands = spikes(0.1 * outward, outward, 0.01)
+    strands[at_side] = spikes(0.1 * outward[at_side], outward[at_side] - [0.0, 0.0, 1.0], 0.2)
+    assert away(side_of(strands, ball(0.1)).front, 0.0) < 1e-6
+
+
+def test_a_wall_with_a_finer_edge_is_not_seen_from_there() -> None:
+    strands, _ = sheet()
+    across = np.linspace(0.0, 1.0, 21) ** 2 - 0.5
+    x, z = np.meshgrid(across, [-0.5, 0.0, 0.5], indexing="ij")
+    row, column = np.indices((20, 2))
+    here = row * 3 + column
+    triangles = np.concatenate(
+        [np.stack([here, here + 3, here + 4], -1), np.stack([here, here + 4, here + 1], -1)]
+    )
+    wall = np.stack([x, np.zeros_like(x), z], axis=-1).reshape(-1, 3).astype(np.float32)
+    assert away(side_of(strands, Surface(wall, triangles.reshape(-1, 3))).front, 0.0) < 12.0
+
+
 @pytest.mark.parametrize("degrees", TURNS)
 def test_a_coat_is_seen_against_its_lie(degrees: float) -> None:
     """Light leaves a strand in a cone around it, so a coat seen along its lie shows dark tips."""
