@@ -15,13 +15,18 @@ FRAME_S = 1.0 / 24.0  # [s]
 STEP, FRAMES = 0.03, 4
 
 
+def key_x(obj: Any, x_by_frame: dict[int, float]) -> None:
+    """Key an object's x [m] in these frames."""
+    for frame, x in x_by_frame.items():
+        obj.location.x = x
+        obj.keyframe_insert("location", frame=frame)
+
+
 def shake_head(hair: Any, head: Any, last: int, bake: Path, peak: int = 4) -> tuple[Any, Any]:
     """Key the head from frame 1 to `last` and set the hair up to be solved fast on the CPU."""
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = 1, last
-    for frame, x in ((1, 0.0), (peak, 0.1), (last, -0.05)):
-        head.location.x = x
-        head.keyframe_insert("location", frame=frame)
+    key_x(head, {1: 0.0, peak: 0.1, last: -0.05})
     hair.hairloom.dynamics.collider_resolution = 8
     hair.hairloom.dynamics.device = "numpy"
     hair.hairloom.bake.folder = str(bake)

@@ -12,6 +12,7 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
+from swinging import key_x
 
 from hairloom.addon.blender.cards import build, build_cache
 from hairloom.addon.blender.cards.build_cache import CardBuildCache
@@ -43,10 +44,7 @@ def builds(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 def hair(new_hair: Callable[..., Any], sphere: Any, tmp_path: Path) -> Any:
     """A hedgehog of 60 strands on a keyframed sphere, set up for few cards with a small texture and
     an artist's picture."""
-    sphere.location.x = 0.0
-    sphere.keyframe_insert("location", frame=1)
-    sphere.location.x = 0.2
-    sphere.keyframe_insert("location", frame=5)
+    key_x(sphere, {1: 0.0, 5: 0.2})
     bpy.context.scene.frame_set(1)
     made = new_hair(sphere)
     cards, texture = made.data.hairloom.cards, made.data.hairloom.card_texture

@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 import pytest
 from selecting import select
+from swinging import key_x
 
 from hairloom.addon.blender.base import latest_job
 from hairloom.addon.blender.colliders import rigs
@@ -43,10 +44,7 @@ def hair(new_hair: Callable[..., Any], sphere: Any) -> Iterator[Any]:
     count = len(sphere.data.vertices)
     group.add(list(range(count)), 1.0, "REPLACE")
     group.add(list(range(count // 2)), 0.2, "REPLACE")
-    sphere.location.x = 0.0
-    sphere.keyframe_insert("location", frame=1)
-    sphere.location.x = 0.2
-    sphere.keyframe_insert("location", frame=5)
+    key_x(sphere, {1: 0.0, 5: 0.2})
     bpy.context.scene.frame_set(1)
     made = new_hair(sphere)
     made.data.hairloom.children.method, made.data.hairloom.children.strand_count = "multi", 200
