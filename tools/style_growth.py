@@ -164,8 +164,8 @@ class Head:
         cv_count: int = 16,
         *,
         lift: np.ndarray | float = 0.4,
-        follow: np.ndarray | float = 0.5,
-        hug: Callable[[np.ndarray], np.ndarray] | None = None,
+        flow_alignment: np.ndarray | float = 0.5,
+        skin_attraction: Callable[[np.ndarray], np.ndarray] | None = None,
         clearance: Callable[[np.ndarray], np.ndarray] = lambda arc_length: 0.002 + 0.1 * arc_length,
         over_ears: bool = False,
     ) -> np.ndarray:
@@ -174,17 +174,17 @@ class Head:
         Args:
             length: of each [m].
             lift: how much they leave along the normal instead of the flow, 0 to 1.
-            follow: how much they turn into the flow on each centimetre, 0 to 1.
-            hug: how much they follow the skin, at points (n, 3): from 1 on they do not leave it
-                where it turns away. Also how much they turn back to it, for each centimetre of
-                distance beyond `clearance`.
+            flow_alignment: how much they turn into the flow on each centimetre, 0 to 1.
+            skin_attraction: how much they follow the skin, at points (n, 3): from 1 on they do not
+                leave it where it turns away. Also how much they turn back to it, for each
+                centimetre of distance beyond `clearance`.
             clearance: minimum distance from the skin, by arc length [m].
             over_ears: whether they lie over the ears rather than around them.
         """
         count = len(roots.position)
         step = np.broadcast_to(np.asarray(length, float), (count,)) / (cv_count - 1)
         lift = np.broadcast_to(np.asarray(lift, float), (count,))[:, None]
-        blend = 1.0 - (1.0 - np.clip(follow, 0.0, 0.999)) ** (100.0 * step)
+        blend = 1.0 - (1.0 - np.clip(flow_alignment, 0.0, 0.999)) ** (100.0 * step)
         blend = np.broadcast_to(blend, (count,))[:, None]
         guides = np.empty((count, cv_count, 3))
         guides[:, 0], arc_length = roots.position, np.zeros(count)
@@ -196,9 +196,9 @@ class Head:
             arc_length = arc_length + step
             if cv > 1:
                 target = unit(flow(guides[:, cv - 1], roots, arc_length))
-                if hug is not None:
+                if skin_attraction is not None:
                     distance, outward = self.skin_distance(guides[:, cv - 1], over_ears)
-                    strength = hug(guides[:, cv - 1])
+                    strength = skin_attraction(guides[:, cv - 1])
                     # hair that lies on the head does not leave it where it turns away
                     leaving = np.maximum((target * outward).sum(axis=1), 0.0)
                     excess = np.clip((distance - clearance(arc_length)) / 0.01, 0.0, 2.0)

@@ -156,8 +156,8 @@ def crop_fade(head: Head) -> Any:
         length,
         9,
         lift=0.5 + 0.25 * top * bundle_random[:, 2],
-        follow=0.5,
-        hug=skull_attraction,
+        flow_alignment=0.5,
+        skin_attraction=skull_attraction,
         clearance=lambda s: (
             0.3 * np.minimum(s, 0.03) * (1.0 - top * (0.2 + 0.5 * bundle_random[:, 3]))
         ),
@@ -258,8 +258,8 @@ def side_part(head: Head) -> Any:
         length,
         14,
         lift=0.2 + 0.2 * top + 0.25 * rise,
-        follow=0.7,
-        hug=skull_attraction,
+        flow_alignment=0.7,
+        skin_attraction=skull_attraction,
         clearance=lambda s: 0.001 + (0.12 + 0.28 * top + 0.15 * rise) * np.minimum(s, 0.03),
     )
     guides = np.where((top > 0.2)[:, None, None], in_bundles(guides, bundle, 0.4), guides)
@@ -297,8 +297,8 @@ def slicked_back(head: Head) -> Any:
         length,
         16,
         lift=0.25,
-        follow=0.8,
-        hug=lambda p: 1.2 * smoothstep(-0.12, -0.07, p[:, 2]),
+        flow_alignment=0.8,
+        skin_attraction=lambda p: 1.2 * smoothstep(-0.12, -0.07, p[:, 2]),
         clearance=lambda s: 0.0015 + 0.09 * np.minimum(s, 0.07),
     )
     return style(
@@ -419,8 +419,8 @@ def bob(head: Head) -> Any:
         0.30,
         26,
         lift=0.25,
-        follow=0.55,
-        hug=skull_attraction,
+        flow_alignment=0.55,
+        skin_attraction=skull_attraction,
         clearance=layered_clearance(roots, 0.016, 0.11),
         over_ears=True,
     )
@@ -484,8 +484,8 @@ def long_guides(
         0.42,
         40,
         lift=0.25,
-        follow=0.6,
-        hug=skull_attraction,
+        flow_alignment=0.6,
+        skin_attraction=skull_attraction,
         clearance=layered_clearance(roots, volume, over),
         over_ears=True,
     )
@@ -590,8 +590,8 @@ def layered_fringe(head: Head) -> Any:
         0.16,
         30,
         lift=0.15,
-        follow=0.6,
-        hug=skull_attraction,
+        flow_alignment=0.6,
+        skin_attraction=skull_attraction,
         clearance=layered_clearance(fringe_roots, 0.008),
     )
     ends = np.repeat(0.020 + 0.014 * (fringe_roots.random[:, 0] - 0.5), front.shape[1])
@@ -656,7 +656,13 @@ def coils(head: Head) -> Any:
         1.0 - 0.5 * smoothstep(-0.02, -0.075, z) - 0.2 * smoothstep(-0.05, -0.085, y)
     )
     guides = head.combed(
-        roots, flow, length, 15, lift=0.7, follow=0.6, clearance=clearance_by_length(0.025, 0.5)
+        roots,
+        flow,
+        length,
+        15,
+        lift=0.7,
+        flow_alignment=0.6,
+        clearance=clearance_by_length(0.025, 0.5),
     )
     return style(
         "Coils",
@@ -695,7 +701,7 @@ def afro(head: Head) -> Any:
         0.12 - 0.095 * before_ear,
         16,
         lift=0.6,
-        follow=0.7,
+        flow_alignment=0.7,
         clearance=lambda s: 0.6 * s,
     )
     middle = np.array([0.0, 0.022, 0.035])
@@ -914,8 +920,8 @@ def braid_lines(head: Head, bases: Roots, cv_count: int) -> np.ndarray:
         length,
         32,
         lift=0.3,
-        follow=0.6,
-        hug=skull_attraction,
+        flow_alignment=0.6,
+        skin_attraction=skull_attraction,
         clearance=lambda s: 0.003 + np.minimum(0.25 * s, 0.016),
         over_ears=True,
     )
@@ -1012,8 +1018,8 @@ def undercut(head: Head) -> Any:
         length,
         16,
         lift=0.45,
-        follow=0.7,
-        hug=skull_attraction,
+        flow_alignment=0.7,
+        skin_attraction=skull_attraction,
         clearance=lambda s: 0.002 + 0.2 * np.minimum(s, 0.03),
     )
     guides = np.where(is_top[:, None, None], top, shaved)
@@ -1103,7 +1109,13 @@ def full_beard(head: Head) -> Any:
         0.8 + 0.3 * roots.random[:, 0]
     )
     guides = head.combed(
-        roots, beard_flow, length, 10, lift=0.4, follow=0.6, clearance=lambda s: 0.0005 + 0.25 * s
+        roots,
+        beard_flow,
+        length,
+        10,
+        lift=0.4,
+        flow_alignment=0.6,
+        clearance=lambda s: 0.0005 + 0.25 * s,
     )
     return style(
         "Full Beard",
@@ -1136,7 +1148,13 @@ def moustache(head: Head) -> Any:
         0.8 + 0.2 * roots.random[:, 0]
     )
     guides = head.combed(
-        roots, flow, length, 12, lift=0.35, follow=0.7, clearance=lambda s: 0.0005 + 0.18 * s
+        roots,
+        flow,
+        length,
+        12,
+        lift=0.35,
+        flow_alignment=0.7,
+        clearance=lambda s: 0.0005 + 0.18 * s,
     )
     return style(
         "Moustache",
