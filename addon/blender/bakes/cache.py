@@ -105,7 +105,7 @@ class CacheWriter:
                 _remove_stale(folder)
             self._frames.mkdir(parents=True)
         except OSError as error:
-            raise _unwritable(folder, error) from error
+            raise _write_error(folder, error) from error
 
     def add_constants(self, arrays: Arrays) -> None:
         self._save(CONSTANTS, arrays)
@@ -179,7 +179,7 @@ class CacheWriter:
                 np.savez(file, allow_pickle=False, **arrays)
             flush_file(self._frames / name)
         except OSError as error:
-            raise _unwritable(self.folder, error) from error
+            raise _write_error(self.folder, error) from error
 
 
 def check_bake_folder(folder: Path) -> None:
@@ -193,7 +193,7 @@ def check_bake_folder(folder: Path) -> None:
         if folder.exists():
             _check_no_foreign_files(folder)
     except OSError as error:
-        raise _unwritable(folder, error) from error
+        raise _write_error(folder, error) from error
 
 
 class Cache:
@@ -299,7 +299,7 @@ def delete(folder: Path) -> None:
             _remove_stale(folder)
             _remove_if_empty(folder)
     except OSError as error:
-        raise _unwritable(folder, error) from error
+        raise _write_error(folder, error) from error
 
 
 def _facts_text(content: dict[str, Any], frames: str) -> bytes:
@@ -454,7 +454,7 @@ def _damaged(path: Path, why: str) -> HairloomError:
     )
 
 
-def _unwritable(folder: Path, error: OSError) -> HairloomError:
+def _write_error(folder: Path, error: OSError) -> HairloomError:
     why = error.strerror or str(error)
     remark = length_remark(folder / f"frames-{writer_tag()}" / _frame_name(0), why)
     return HairloomError(
