@@ -65,11 +65,11 @@ def test_each_object_collides_as_its_kind(scene):
     scene.cube(shape="sphere", name="B", place=(1, 0, 0))
     scene.cube(shape="capsule", name="C")
     scene.cube(shape="none", name="D")
-    found = scene.read_colliders()
-    kinds = sorted(type(posed.collider).__name__ for posed in move_colliders(found))
+    colliders = scene.read_colliders()
+    kinds = sorted(type(posed.collider).__name__ for posed in move_colliders(colliders))
     assert kinds == ["CapsuleCollider", "DistanceField", "SphereSetCollider"]
-    assert found.warnings == ()
-    (balls,) = [p for p in move_colliders(found) if isinstance(p.collider, SphereSetCollider)]
+    assert colliders.warnings == ()
+    (balls,) = [p for p in move_colliders(colliders) if isinstance(p.collider, SphereSetCollider)]
     assert len(balls.collider.radii) == 2
 
 
@@ -80,9 +80,9 @@ def test_an_empty_that_is_no_sphere_a_lamp_and_the_owner_are_left_alone(scene):
         bpy.context.collection.objects.link(obj)
         scene.add(obj)
     scene.add(scene.owner)
-    found = scene.read_colliders()
-    assert move_colliders(found) == () and len(found.warnings) == 1
-    assert "nothing in the collection" in found.warnings[0]
+    colliders = scene.read_colliders()
+    assert move_colliders(colliders) == () and len(colliders.warnings) == 1
+    assert "nothing in the collection" in colliders.warnings[0]
 
 
 def test_a_ball_is_as_large_as_blender_shows_it(scene):
@@ -145,12 +145,12 @@ def test_a_mesh_that_is_mirrored_or_scaled(scene, scale):
 
 def test_colliders_follow_a_curved_trajectory_between_frames(scene):
     ball, cube = scene.ball(), scene.cube()
-    found = scene.read_colliders()
-    for posed in move_colliders(found):
+    colliders = scene.read_colliders()
+    for posed in move_colliders(colliders):
         np.testing.assert_allclose(posed.matrix_before, posed.matrix_now)
     for place in (0.1, 0.3, 0.6):  # it accelerates
         ball.location.x = cube.location.x = place
-        last = move_colliders(found)
+        last = move_colliders(colliders)
     assert len(last) == 2
     for posed in last:
         went = posed.matrix_now[0, 3] - posed.matrix_before[0, 3]
@@ -163,12 +163,12 @@ def test_colliders_follow_a_curved_trajectory_between_frames(scene):
 
 def test_after_rest_colliders_have_no_speed_and_no_curvature(scene):
     ball = scene.ball()
-    found = scene.read_colliders()
+    colliders = scene.read_colliders()
     ball.location.x = 0.5
-    move_colliders(found)
+    move_colliders(colliders)
     ball.location.x = 2.0
-    found.rest(depsgraph())
-    (posed,) = move_colliders(found)
+    colliders.rest(depsgraph())
+    (posed,) = move_colliders(colliders)
     assert posed.matrix_before[0, 3] == posed.matrix_now[0, 3] == pytest.approx(2.0, abs=1e-6)
     assert posed.matrix_earlier is None
 
@@ -177,13 +177,13 @@ def test_balls_that_move_apart_become_another_set(scene):
     parent = scene.ball(0.1, name="A")
     other = scene.ball(0.2, (0.5, 0, 0), name="B")
     other.parent = None
-    found = scene.read_colliders()
-    (before,) = move_colliders(found)
-    (still,) = move_colliders(found)
+    colliders = scene.read_colliders()
+    (before,) = move_colliders(colliders)
+    (still,) = move_colliders(colliders)
     assert still.collider is before.collider, "its grid is made once"
     other.location.x = 0.9
     parent.scale = (2, 2, 2)
-    (posed,) = move_colliders(found)
+    (posed,) = move_colliders(colliders)
     assert distance_now(posed, (1.2, 0, 0)) == pytest.approx(0.1, abs=1e-5)
     assert distance_now(posed, (-0.3, 0, 0)) == pytest.approx(0.1, abs=1e-5)
 
@@ -193,10 +193,10 @@ def test_balls_that_move_together_stay_one_set(scene):
     bpy.context.collection.objects.link(parent)
     for number in range(5):
         scene.ball(0.05, (0.1 * number, 0, 0), name=f"B{number}").parent = parent
-    found = scene.read_colliders()
-    (before,) = move_colliders(found)
+    colliders = scene.read_colliders()
+    (before,) = move_colliders(colliders)
     parent.matrix_world = TURN @ Matrix.Scale(2.0, 4)
-    (posed,) = move_colliders(found)
+    (posed,) = move_colliders(colliders)
     assert posed.collider is before.collider
     place = TURN @ Vector((0.8, 0, 0))
     outward = TURN.to_3x3() @ Vector((1, 0, 0))
@@ -205,9 +205,9 @@ def test_balls_that_move_together_stay_one_set(scene):
 
 def test_one_ball_that_turns_turns_its_collider(scene):
     ball = scene.ball()
-    found = scene.read_colliders()
+    colliders = scene.read_colliders()
     ball.rotation_euler.z = 0.5
-    (posed,) = move_colliders(found)
+    (posed,) = move_colliders(colliders)
     np.testing.assert_allclose(posed.matrix_now[:2, 0], [math.cos(0.5), math.sin(0.5)], atol=1e-6)
 
 
@@ -219,22 +219,22 @@ def test_a_mesh_that_an_armature_turns_is_followed(scene, subdivided):
     pose = rig(head)
     if subdivided:
         head.modifiers.new("Subdivision", "SUBSURF").levels = 1
-    found = scene.read_colliders()
+    colliders = scene.read_colliders()
     pose(TURN)
-    (posed,) = move_colliders(found)
+    (posed,) = move_colliders(colliders)
     np.testing.assert_allclose(posed.matrix_now, TURN, atol=1e-4)
-    (warning,) = found.warnings
+    (warning,) = colliders.warnings
     assert "only one face" in warning, "the monkey's eyes are loose parts without backs"
 
 
 def test_a_mesh_that_an_armature_turns_and_its_object_carries(scene):
     cube = scene.cube()
     pose = rig(cube)
-    found = scene.read_colliders()
+    colliders = scene.read_colliders()
     pose(Matrix.Rotation(0.5, 4, "Z"))
     bpy.data.objects["Rig"].matrix_world = TURN
     cube.parent = bpy.data.objects["Rig"]
-    (posed,) = move_colliders(found)
+    (posed,) = move_colliders(colliders)
     np.testing.assert_allclose(posed.matrix_now, TURN @ Matrix.Rotation(0.5, 4, "Z"), atol=1e-5)
 
 
@@ -264,11 +264,11 @@ def test_the_head_is_followed_at_its_roots_where_the_body_bends(scene):
 
     def place(chosen):
         pose(Matrix.Identity(4))
-        found = SceneColliders.of(scene.owner, head, at_rest, fine, depsgraph(), None, chosen)
+        colliders = SceneColliders.of(scene.owner, head, at_rest, fine, depsgraph(), None, chosen)
         pose(turn)
-        (posed,) = move_colliders(found)
-        assert found.warnings == ()
-        assert posed.collider is not found.parts[0].distance
+        (posed,) = move_colliders(colliders)
+        assert colliders.warnings == ()
+        assert posed.collider is not colliders.parts[0].distance
         now = read_surface(body, depsgraph(), need_uv=False, place="Body").positions
         now = now[np.abs(now[:, 2]) > 0.2]  # without the middle, which folds
         distance, _ = signed_distance(now, [posed])
@@ -289,12 +289,12 @@ def test_a_look_at_colliders_between_two_frames_changes_no_motion(scene):
     """Such as the look of an overlay, after the body has bent."""
     body, pose = long_body()
     scene.add(body)
-    found = [scene.read_colliders(), scene.read_colliders()]
+    both = [scene.read_colliders(), scene.read_colliders()]
     deformations = []
     for angle in (0.2, 0.4, 0.4):
         pose(Matrix.Rotation(angle, 4, "X"))
-        found[0].static_colliders(depsgraph())
-        (looked,), (alone,) = map(move_colliders, found)
+        both[0].static_colliders(depsgraph())
+        (looked,), (alone,) = map(move_colliders, both)
         np.testing.assert_array_equal(looked.matrix_now, alone.matrix_now)
         assert looked.deformation == alone.deformation
         deformations.append(alone.deformation)
@@ -326,11 +326,11 @@ def test_a_head_bent_back_reuses_its_field(scene):
 def test_fields_are_made_once_and_again_when_the_mesh_or_resolution_differs(scene):
     cube = scene.cube()
     pose = rig(cube)
-    found = scene.read_colliders()
-    first = move_colliders(found)[0].collider
+    colliders = scene.read_colliders()
+    first = move_colliders(colliders)[0].collider
     pose(TURN)
     cube.location.y = 2.0
-    again = scene.read_colliders(found)
+    again = scene.read_colliders(colliders)
     assert move_colliders(again)[0].collider is first
     cube.data.vertices[0].co.x += 0.1
     other = scene.read_colliders(again)
@@ -343,12 +343,12 @@ def test_fields_are_made_once_and_again_when_the_mesh_or_resolution_differs(scen
 
 def test_a_mesh_with_another_vertex_count_is_rebuilt_when_play_restarts(scene):
     cube = scene.cube()
-    found = scene.read_colliders()
+    colliders = scene.read_colliders()
     cube.modifiers.new("Subdivision", "SUBSURF").levels = 2
-    again = scene.read_colliders(found)
+    again = scene.read_colliders(colliders)
     (posed,) = move_colliders(again)
     assert again.warnings == ()
-    assert posed.collider is not found.parts[0].distance
+    assert posed.collider is not colliders.parts[0].distance
 
 
 def test_one_root_or_none_is_enough_to_follow_a_head(scene, sphere):
@@ -357,11 +357,11 @@ def test_one_root_or_none_is_enough_to_follow_a_head(scene, sphere):
     head = Body.at_rest(sphere, depsgraph())
     alone = Surface(at_rest.positions, at_rest.triangles[:0])
     for surface, roots in ((at_rest, np.array([5])), (at_rest, np.zeros(0, int))):
-        found = SceneColliders.of(
+        colliders = SceneColliders.of(
             scene.owner, head, surface, COARSE_SETTINGS, depsgraph(), None, roots
         )
         pose(TURN)
-        np.testing.assert_allclose(move_colliders(found)[0].matrix_now, TURN, atol=1e-5)
+        np.testing.assert_allclose(move_colliders(colliders)[0].matrix_now, TURN, atol=1e-5)
         pose(Matrix.Identity(4))
-    found = SceneColliders.of(scene.owner, head, alone, COARSE_SETTINGS, depsgraph(), None)
-    assert move_colliders(found) == () and "no faces" in found.warnings[0]
+    colliders = SceneColliders.of(scene.owner, head, alone, COARSE_SETTINGS, depsgraph(), None)
+    assert move_colliders(colliders) == () and "no faces" in colliders.warnings[0]

@@ -56,9 +56,9 @@ def not_finite(scene):
 def test_unusable_colliders_are_named_and_others_still_act(scene, make):
     bad = make(scene)
     scene.ball()
-    found = scene.read_colliders()
-    assert len(move_colliders(found)) == 1
-    (warning,) = found.warnings
+    colliders = scene.read_colliders()
+    assert len(move_colliders(colliders)) == 1
+    (warning,) = colliders.warnings
     assert warning.startswith(bad.name + ":") and warning.count(".") >= 2
 
 
@@ -79,9 +79,9 @@ def test_an_open_mesh_collides_and_is_reported(scene):
     for words, wrong in faults.items():
         cube.data = bpy.data.meshes.new("Wrong")
         cube.data.from_pydata(corners, [], wrong)
-        found = scene.read_colliders()
-        assert len(move_colliders(found)) == 1
-        (warning,) = [text for text in found.warnings if words in text]
+        colliders = scene.read_colliders()
+        assert len(move_colliders(colliders)) == 1
+        (warning,) = [text for text in colliders.warnings if words in text]
         assert warning.startswith("Cube: ")
 
 
@@ -91,75 +91,75 @@ def test_a_collider_excluded_from_the_view_layer_does_not_collide(scene):
     cube = scene.cube(name="Away")
     scene.colliders.objects.unlink(cube)
     away.objects.link(cube)
-    found = scene.read_colliders()
-    assert len(move_colliders(found)) == 1 and found.warnings == ()
+    colliders = scene.read_colliders()
+    assert len(move_colliders(colliders)) == 1 and colliders.warnings == ()
     layer = bpy.context.view_layer.layer_collection.children["Colliders"]
     layer.children["Away"].exclude = True
-    assert move_colliders(found) == ()
-    assert "Away" in found.warnings[0]
+    assert move_colliders(colliders) == ()
+    assert "Away" in colliders.warnings[0]
     layer.children["Away"].exclude = False
     cube.location.x = 3.0
-    (posed,) = move_colliders(found)
-    assert found.warnings == ()
+    (posed,) = move_colliders(colliders)
+    assert colliders.warnings == ()
     np.testing.assert_allclose(posed.matrix_before, posed.matrix_now)  # it returns without a jump
 
 
 def test_a_collider_hidden_in_the_viewport_still_collides(scene):
     ball = scene.ball()
     ball.hide_set(True)
-    found = scene.read_colliders()
-    assert len(move_colliders(found)) == 1 and found.warnings == ()
+    colliders = scene.read_colliders()
+    assert len(move_colliders(colliders)) == 1 and colliders.warnings == ()
     ball.location.x = 1.0
-    assert move_colliders(found)[0].matrix_now[0, 3] == pytest.approx(1.0, abs=1e-6)
+    assert move_colliders(colliders)[0].matrix_now[0, 3] == pytest.approx(1.0, abs=1e-6)
 
 
 def test_deleted_in_mid_play(scene):
     cube, ball, other = scene.cube(), scene.ball(name="A"), scene.ball(0.1, (1, 0, 0), "B")
-    found = scene.read_colliders()
-    assert len(move_colliders(found)) == 2
+    colliders = scene.read_colliders()
+    assert len(move_colliders(colliders)) == 2
     bpy.data.objects.remove(cube)
     bpy.data.objects.remove(ball)
-    (posed,) = move_colliders(found)
+    (posed,) = move_colliders(colliders)
     assert len(posed.collider.radii) == 1
     assert distance_now(posed, (1.3, 0, 0)) == pytest.approx(0.2, abs=1e-6)
-    assert ["Cube" in text or "A:" in text for text in found.warnings] == [True, True]
+    assert ["Cube" in text or "A:" in text for text in colliders.warnings] == [True, True]
     bpy.data.objects.remove(other)
-    assert move_colliders(found) == ()
+    assert move_colliders(colliders) == ()
 
 
 def test_scaled_to_nothing_and_back_in_mid_play(scene):
     cube, ball, stretched = scene.cube(), scene.ball(), scene.ball(name="Stretched")
     stretched.scale = (1, 1, 2)
-    found = scene.read_colliders()
-    assert len(move_colliders(found)) == 3
+    colliders = scene.read_colliders()
+    assert len(move_colliders(colliders)) == 3
     for obj in (cube, ball, stretched):
         obj.scale = (0, 0, 0)
-    assert move_colliders(found) == ()
-    assert len(found.warnings) >= 3
+    assert move_colliders(colliders) == ()
+    assert len(colliders.warnings) >= 3
     for obj in (cube, ball, stretched):
         obj.scale = (1, 1, 1)
-    assert len(move_colliders(found)) == 3 and found.warnings == ()
+    assert len(move_colliders(colliders)) == 3 and colliders.warnings == ()
 
 
 def test_another_mesh_in_mid_play(scene):
     cube = scene.cube()
-    found = scene.read_colliders()
+    colliders = scene.read_colliders()
     cube.modifiers.new("Subdivision", "SUBSURF").levels = 2
-    assert move_colliders(found) == ()
-    assert "vertices" in found.warnings[0]
+    assert move_colliders(colliders) == ()
+    assert "vertices" in colliders.warnings[0]
     cube.modifiers.clear()
-    assert len(move_colliders(found)) == 1 and found.warnings == ()
+    assert len(move_colliders(colliders)) == 1 and colliders.warnings == ()
 
 
 def test_a_deleted_head_is_an_error(scene, sphere):
     head = Body.at_rest(sphere, depsgraph())
     at_rest = read_surface(sphere, depsgraph(), need_uv=False, place="Head")
     scene.ball()
-    found = SceneColliders.of(scene.owner, head, at_rest, COARSE_SETTINGS, depsgraph(), None)
-    assert len(move_colliders(found)) == 2
+    colliders = SceneColliders.of(scene.owner, head, at_rest, COARSE_SETTINGS, depsgraph(), None)
+    assert len(move_colliders(colliders)) == 2
     bpy.data.objects.remove(sphere)
     with pytest.raises(HairloomError, match="gone"):
-        move_colliders(found)
+        move_colliders(colliders)
 
 
 def test_a_head_without_volume_is_reported_and_others_still_act(scene):
@@ -168,9 +168,9 @@ def test_a_head_without_volume_is_reported_and_others_still_act(scene):
     at_rest = read_surface(cap, depsgraph(), need_uv=False, place="Cap")
     scene.ball()
     head = Body.at_rest(cap, depsgraph())
-    found = SceneColliders.of(scene.owner, head, at_rest, COARSE_SETTINGS, depsgraph(), None)
-    assert len(move_colliders(found)) == 1
-    assert "Grid" in found.warnings[0]
+    colliders = SceneColliders.of(scene.owner, head, at_rest, COARSE_SETTINGS, depsgraph(), None)
+    assert len(move_colliders(colliders)) == 1
+    assert "Grid" in colliders.warnings[0]
 
 
 def test_a_chosen_collider_replaces_the_head(scene, sphere):
@@ -179,8 +179,8 @@ def test_a_chosen_collider_replaces_the_head(scene, sphere):
     scene.owner.hairloom.collider_collection = None
     bpy.ops.mesh.primitive_cube_add(size=0.1, location=(0, 0, 1))
     scene.owner.hairloom.collider = bpy.context.object
-    found = SceneColliders.of(scene.owner, head, at_rest, COARSE_SETTINGS, depsgraph(), None)
-    (posed,) = move_colliders(found)
+    colliders = SceneColliders.of(scene.owner, head, at_rest, COARSE_SETTINGS, depsgraph(), None)
+    (posed,) = move_colliders(colliders)
     assert distance_now(posed, (0, 0, 1.1)) == pytest.approx(0.05, abs=2e-3)
     sphere.hairloom.collider_shape = "none"
     scene.owner.hairloom.collider = None
@@ -202,9 +202,9 @@ def test_a_collection_in_which_nothing_collides_is_named(scene):
     ball.hairloom.collider_shape = "none"
     assert len(scene.read_colliders().warnings) == 1
     bpy.data.collections.remove(scene.colliders)
-    found = scene.read_colliders()
+    colliders = scene.read_colliders()
     assert scene.owner.hairloom.collider_collection is None
-    assert (found.parts, found.warnings) == ([], ())
+    assert (colliders.parts, colliders.warnings) == ([], ())
 
 
 def test_two_grooms_have_their_own_colliders(scene):
@@ -226,11 +226,11 @@ def test_a_mesh_that_bends_scaled_to_nothing_and_back(scene):
     cube, ball = scene.cube(), scene.ball()
     cube.shape_key_add(name="Basis")
     cube.shape_key_add(name="Wide").data[0].co *= 1.2
-    found = scene.read_colliders()
-    assert len(move_colliders(found)) == 2
+    colliders = scene.read_colliders()
+    assert len(move_colliders(colliders)) == 2
     cube.scale = (0, 0, 0)
-    assert len(move_colliders(found)) == 1
-    assert [text for text in found.warnings if "Cube: its scale is zero" in text]
+    assert len(move_colliders(colliders)) == 1
+    assert [text for text in colliders.warnings if "Cube: its scale is zero" in text]
     cube.scale = (1, 1, 1)
-    assert len(move_colliders(found)) == 2 and found.warnings == ()
+    assert len(move_colliders(colliders)) == 2 and colliders.warnings == ()
     assert ball.name == "Ball"

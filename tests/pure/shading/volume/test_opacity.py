@@ -52,8 +52,8 @@ def test_weights_give_back_what_grows_evenly() -> None:
     exactly."""
     ends = np.array([0.1, 0.3, 0.4, 1.0])
     depth = np.linspace(-0.2, 1.0, 50)
-    found = layer_weights(depth, ends) @ ends
-    assert np.allclose(found, np.maximum(depth, 0.0), atol=1e-12)
+    sums = layer_weights(depth, ends) @ ends
+    assert np.allclose(sums, np.maximum(depth, 0.0), atol=1e-12)
 
 
 def hair(count: int = 2000) -> tuple[np.ndarray, np.ndarray]:
@@ -84,9 +84,9 @@ def test_coverage_is_length_times_width() -> None:
     assert frame is not None
     area = (np.linalg.norm(np.diff(strands, axis=1), axis=2) * 2.0 * radius[:, 1:]).sum()
     for size in (16, 64):
-        found = coverage(strands, radius, frame, size)
+        cover = coverage(strands, radius, frame, size)
         texel = 1.0 / (frame.strand_area(np.zeros(3), np.array([1.0, 0.0, 0.0])) * size**2)
-        assert found.covered.sum() * texel == pytest.approx(area, rel=1e-6)
+        assert cover.covered.sum() * texel == pytest.approx(area, rel=1e-6)
 
 
 def test_strands_along_the_light_cover_nothing() -> None:
@@ -94,51 +94,51 @@ def test_strands_along_the_light_cover_nothing() -> None:
     strands[..., 2] = np.linspace(-0.1, 0.1, 4)
     frame = light_frame(SUN, ball_around(strands))
     assert frame is not None
-    found = coverage(strands, np.full((3, 4), 1e-4), frame, 32)
-    assert found.covered.sum() < 1e-9
+    cover = coverage(strands, np.full((3, 4), 1e-4), frame, 32)
+    assert cover.covered.sum() < 1e-9
 
 
 def test_counting_one_by_one_is_the_sum_over_what_is_in_front() -> None:
-    found, texel, _, depth = counted()
+    cover, texel, _, depth = counted()
     for which in range(0, 60, 3):
-        in_front = (found.texel == texel[which]) & (found.depth < depth[which])
-        expected = found.covered[in_front].sum()
+        in_front = (cover.texel == texel[which]) & (cover.depth < depth[which])
+        expected = cover.covered[in_front].sum()
         one = slice(which, which + 1)
-        assert found.optical_depth(texel[one], depth[one])[0] == pytest.approx(expected, abs=1e-9)
+        assert cover.optical_depth(texel[one], depth[one])[0] == pytest.approx(expected, abs=1e-9)
 
 
 @pytest.mark.parametrize("shadows", ["slices", "deep"])
 def test_at_the_ends_of_layers_sums_are_exact(shadows: str) -> None:
     settings = VolumeSettings(shadows=shadows)
-    found = counted()[0]
+    cover = counted()[0]
     ends = layer_ends(settings)
-    own = without_slopes(spans(found, settings, block=1))
-    layers = found.layers(ends, own)
+    layer_spans = without_slopes(spans(cover, settings, block=1))
+    layers = cover.layers(ends, layer_spans)
     filled = np.flatnonzero(layers[:, -1] > 0.0)
-    starts, thickness = in_texels(own)
+    starts, thickness = in_texels(layer_spans)
     for number, end in enumerate(ends[:-1]):
         depth = starts[filled] + end * thickness[filled]
         # a piece may lie exactly at the end
-        before, after = (found.optical_depth(filled, depth + step) for step in (-1e-9, 1e-9))
+        before, after = (cover.optical_depth(filled, depth + step) for step in (-1e-9, 1e-9))
         held = layers[filled, number]
         assert (before < held + 1e-6).all() and (held < after + 1e-6).all()
 
 
 def test_layers_hold_what_adds_to_them() -> None:
-    found = counted()[0]
+    cover = counted()[0]
     ends = np.array([0.2, 0.5, 1.0])
-    own = found.spans(4)
+    layer_spans = cover.spans(4)
     expected = np.zeros((SIZE * SIZE, len(ends)))
-    row, column = np.divmod(found.texel, SIZE)
-    behind = np.minimum(own.fraction(row, column, found.place, found.depth), 1.0)
-    np.add.at(expected, found.texel, layers_including(behind, ends) * found.covered[:, None])
-    assert np.allclose(found.layers(ends, own), expected)
+    row, column = np.divmod(cover.texel, SIZE)
+    behind = np.minimum(layer_spans.fraction(row, column, cover.place, cover.depth), 1.0)
+    np.add.at(expected, cover.texel, layers_including(behind, ends) * cover.covered[:, None])
+    assert np.allclose(cover.layers(ends, layer_spans), expected)
 
 
-def spans(found: Coverage, settings: VolumeSettings, block: int) -> LayerSpans:
+def spans(cover: Coverage, settings: VolumeSettings, block: int) -> LayerSpans:
     if settings.shadows == "deep":
-        return found.spans(block)
-    return slice_spans(found.resolution)
+        return cover.spans(block)
+    return slice_spans(cover.resolution)
 
 
 def without_slopes(spans: LayerSpans) -> LayerSpans:
@@ -152,14 +152,14 @@ def in_texels(spans: LayerSpans) -> tuple[np.ndarray, np.ndarray]:
 
 def test_deep_layers_lie_between_the_first_and_the_last_hair() -> None:
     """The first and last hair of a texel, or of all texels of a block."""
-    found = counted()[0]
+    cover = counted()[0]
     for block in (1, 4):
         side = SIZE // block
-        starts, thickness = in_texels(found.spans(block))
-        row, column = np.divmod(found.texel, SIZE)
+        starts, thickness = in_texels(cover.spans(block))
+        row, column = np.divmod(cover.texel, SIZE)
         of_block = row // block * side + column // block
         for which in np.unique(of_block)[::97]:
-            inside = found.depth[of_block == which]
+            inside = cover.depth[of_block == which]
             assert starts[which] == inside.min()
             assert thickness[which] == pytest.approx(max(np.ptp(inside), MIN_THICKNESS))
         bare = np.setdiff1d(np.arange(side * side), of_block)[0]
@@ -196,13 +196,13 @@ def test_hair_that_light_grazes_is_evenly_lit() -> None:
     sun = Light.sun((0.0, np.cos(angle), -np.sin(angle)), (1, 1, 1), 1.0)
     frame = light_frame(sun, ball_around(strands))
     assert frame is not None
-    found = coverage(strands, np.full((count, 2), 1e-3), frame, 128)
+    cover = coverage(strands, np.full((count, 2), 1e-3), frame, 128)
     points = np.zeros((300, 3))
     points[:, 1] = np.linspace(-0.6, 0.6, 300)
     place, depth = frame.places(points)
-    ends, planes, light = layer_ends(VolumeSettings(layers=8)), found.spans(4), []
+    ends, planes, light = layer_ends(VolumeSettings(layers=8)), cover.spans(4), []
     for spans in (without_slopes(planes), planes):
-        sums, meshes = found.layers(ends, spans).reshape(128, 128, -1), np.ones((128, 128))
+        sums, meshes = cover.layers(ends, spans).reshape(128, 128, -1), np.ones((128, 128))
         tau, _, _ = look_up(sums, spans, meshes, ends, place, depth, VolumeSettings().bias)
         light.append(transmittance(tau, 1.0))
     blocky, even = light
@@ -210,7 +210,7 @@ def test_hair_that_light_grazes_is_evenly_lit() -> None:
 
 
 def tau_in_texels(
-    found: Coverage,
+    cover: Coverage,
     spans: LayerSpans,
     ends: np.ndarray,
     texel: np.ndarray,
@@ -218,9 +218,9 @@ def tau_in_texels(
     depth: np.ndarray,
 ) -> np.ndarray:
     """Optical depth at places, each from its own texel alone."""
-    row, column = np.divmod(texel, found.resolution)
+    row, column = np.divmod(texel, cover.resolution)
     weights = layer_weights(spans.fraction(row, column, place, depth), ends)
-    tau: np.ndarray = (found.layers(ends, spans)[texel] * weights).sum(axis=1)
+    tau: np.ndarray = (cover.layers(ends, spans)[texel] * weights).sum(axis=1)
     return tau
 
 
@@ -230,10 +230,10 @@ def mean_error(
     extinction: float,
 ) -> float:
     """Mean error of the transmittance at random places."""
-    found, texel, place, depth = of
-    exact = transmittance(found.optical_depth(texel, depth), extinction)
+    cover, texel, place, depth = of
+    exact = transmittance(cover.optical_depth(texel, depth), extinction)
     ends = layer_ends(settings)
-    tau = tau_in_texels(found, spans(found, settings, block=4), ends, texel, place, depth)
+    tau = tau_in_texels(cover, spans(cover, settings, block=4), ends, texel, place, depth)
     return float(np.abs(transmittance(tau, extinction) - exact).mean())
 
 
@@ -252,11 +252,11 @@ def test_four_deep_layers_beat_sixteen_slices_on_a_head_of_hair() -> None:
     frame = light_frame(SUN, ball_around(strands))
     assert frame is not None
     size = 4 * SIZE
-    found = coverage(strands, np.full(strands.shape[:2], 3e-3), frame, size)
+    cover = coverage(strands, np.full(strands.shape[:2], 3e-3), frame, size)
     points = np.random.default_rng(5).permutation(strands.reshape(-1, 3))[:5000]
     place, depth = frame.places(points)
     column, row = np.floor(place * size).astype(np.int64).T
-    of = found, row * size + column, size * place, depth - VolumeSettings().bias
+    of = cover, row * size + column, size * place, depth - VolumeSettings().bias
     deep, even = (
         mean_error(of, VolumeSettings(shadows=shadows, layers=4, slices=16), 1.0)
         for shadows in ("deep", "slices")
@@ -275,14 +275,14 @@ def test_default_maps_leave_as_much_light_as_strands_counted_one_by_one(radius: 
     size = settings.resolution
     is_hidden = frame.places(strands.reshape(-1, 3))[1].reshape(strands.shape[:2]) > 0.5
     strands = strands[~is_hidden.any(axis=1)]
-    found = coverage(strands, np.full(strands.shape[:2], radius), frame, size)
+    cover = coverage(strands, np.full(strands.shape[:2], radius), frame, size)
     points = np.random.default_rng(5).permutation(strands.reshape(-1, 3))[:8000]
     place, depth = frame.places(points)
     column, row = np.floor(place * size).astype(np.int64).T
     texel, ends = row * size + column, layer_ends(settings)
-    tau = tau_in_texels(found, found.spans(4), ends, texel, size * place, depth - settings.bias)
+    tau = tau_in_texels(cover, cover.spans(4), ends, texel, size * place, depth - settings.bias)
     # without the strand itself
-    exact = transmittance(found.optical_depth(texel, depth - 1e-4), settings.extinction).mean()
+    exact = transmittance(cover.optical_depth(texel, depth - 1e-4), settings.extinction).mean()
     assert transmittance(tau, settings.extinction).mean() == pytest.approx(exact, rel=0.16)
 
 
@@ -316,7 +316,7 @@ def test_outside_of_a_map_nothing_shades() -> None:
 
 
 @pytest.mark.parametrize("extinction", [0.0, 1000.0])
-def test_transmittance_stays_a_share(extinction: float) -> None:
+def test_transmittance_stays_a_fraction(extinction: float) -> None:
     left = transmittance(np.array([0.0, 1e-6, 1.0, 1e6]), extinction)
     assert np.isfinite(left).all() and (left >= 0.0).all() and (left <= 1.0).all()
     assert left[0] == 1.0
@@ -351,7 +351,7 @@ def test_a_lamp_within_the_ball_counts_as_many_strands_as_its_rays_meet() -> Non
     ball = ball_around(strands)
     frame = light_frame(Light.point(tuple(lamp), (1, 1, 1), 3.0), ball)
     assert frame is not None
-    found = coverage(strands, np.full(strands.shape[:2], radius), frame, SIZE)
+    cover = coverage(strands, np.full(strands.shape[:2], radius), frame, SIZE)
     axis = (ball.center - lamp) / np.linalg.norm(ball.center - lamp)
     away = random.normal(size=(20000, 3))
     away /= np.linalg.norm(away, axis=1, keepdims=True)
@@ -361,7 +361,7 @@ def test_a_lamp_within_the_ball_counts_as_many_strands_as_its_rays_meet() -> Non
         points = points[np.linalg.norm(points, axis=1) < 0.1]
         place, depth = frame.places(points)
         column, row = np.clip(place * SIZE, 0, SIZE - 1).astype(np.int64).T
-        tau = found.optical_depth(row * SIZE + column, depth)
+        tau = cover.optical_depth(row * SIZE + column, depth)
         counts = [crossed(strands, radius, lamp, point) for point in points]
         assert np.mean(counts) > 1.0
         assert tau.mean() == pytest.approx(np.mean(counts), rel=0.08)
@@ -379,10 +379,10 @@ def light_through_slab(count: int, *, is_even: bool) -> float:
     frame = light_frame(SUN, ball)
     assert frame is not None
     # four strands overlap at any place
-    spacing, asked = 4.0 * 2.0 / count, requested_size(VolumeSettings(resolution=256), 1)
-    size = size_for_spacing(asked, spacing if is_even else 0.0, ball.radius)
-    found = coverage(strands.astype(np.float32), radius, frame, size.side)
-    sums = np.bincount(found.texel, found.covered, size.side**2).reshape(size.side, size.side, 1)
+    spacing, requested = 4.0 * 2.0 / count, requested_size(VolumeSettings(resolution=256), 1)
+    size = size_for_spacing(requested, spacing if is_even else 0.0, ball.radius)
+    cover = coverage(strands.astype(np.float32), radius, frame, size.side)
+    sums = np.bincount(cover.texel, cover.covered, size.side**2).reshape(size.side, size.side, 1)
     behind = random.uniform((-0.8, -0.8, -0.3), (0.8, 0.8, -0.3), (4000, 3))
     places, depth = frame.places(behind)
     spans, meshes = slice_spans(size.side), np.ones((size.mesh_side, size.mesh_side))
