@@ -33,8 +33,8 @@ def comb(hair):
 
 
 def test_a_groom_keeps_what_it_has_grown_by(grown):
-    own = grown.data.hairloom.grow
-    assert settings_of(own, GrowSettings) == GrowSettings(**FEW)
+    grow_settings = grown.data.hairloom.grow
+    assert settings_of(grow_settings, GrowSettings) == GrowSettings(**FEW)
     assert (
         has_grown(grown.data)
         and lost_by_regrowing(grown.data) == ()
@@ -45,8 +45,8 @@ def test_a_groom_keeps_what_it_has_grown_by(grown):
 def test_an_edit_makes_the_hair_that_its_settings_say(grown, sphere):
     """The result equals the pure function `grow` with these settings."""
     before = lengths(grown)
-    own = grown.data.hairloom.grow
-    own.length, own.droop = 0.05, 0.2
+    grow_settings = grown.data.hairloom.grow
+    grow_settings.length, grow_settings.droop = 0.05, 0.2
     assert lengths(grown).max() == pytest.approx(0.5 * before.max(), rel=0.03)
     mesh = sphere.data
     mesh.calc_loop_triangles()
@@ -60,11 +60,11 @@ def test_an_edit_makes_the_hair_that_its_settings_say(grown, sphere):
 
 
 def test_more_strands_and_more_points_are_made_too(grown):
-    own = grown.data.hairloom.grow
-    own.strand_count = 90
-    own.cv_count = 10
+    grow_settings = grown.data.hairloom.grow
+    grow_settings.strand_count = 90
+    grow_settings.cv_count = 10
     assert len(grown.data.curves) == 90 and len(grown.data.points) == 900
-    own.strand_count, own.cv_count = FEW["strand_count"], FEW["cv_count"]
+    grow_settings.strand_count, grow_settings.cv_count = FEW["strand_count"], FEW["cv_count"]
     again = curve_points(grown.data)
     bpy.ops.hairloom.grow_again()
     assert np.array_equal(curve_points(grown.data), again), "it depends on what was there before"
@@ -122,15 +122,15 @@ def test_weights_come_from_a_group_and_a_problem_is_reported_until_fixed(grown, 
     positions = np.array([vertex.co for vertex in sphere.data.vertices])
     group.add(np.flatnonzero(positions[:, 2] > 0.05).tolist(), 1.0, "REPLACE")
     sphere.vertex_groups.new(name="Empty")
-    own = grown.data.hairloom.grow
-    own.density_group = "Top"
+    grow_settings = grown.data.hairloom.grow
+    grow_settings.density_group = "Top"
     roots = curve_points(grown.data)[:: FEW["cv_count"]]
     assert roots[:, 2].min() > 0.03
-    own.density_group = "Empty"
-    assert "0 on every vertex" in own.problem
+    grow_settings.density_group = "Empty"
+    assert "0 on every vertex" in grow_settings.problem
     assert np.array_equal(curve_points(grown.data)[:: FEW["cv_count"]], roots), "it is half done"
-    own.density_group = ""
-    assert own.problem == "" and curve_points(grown.data)[:, 2].min() < 0.03
+    grow_settings.density_group = ""
+    assert grow_settings.problem == "" and curve_points(grown.data)[:, 2].min() < 0.03
 
 
 def test_images_control_where_and_how_long_hair_grows(grown, sphere):
@@ -142,20 +142,23 @@ def test_images_control_where_and_how_long_hair_grows(grown, sphere):
     pixels = np.zeros((64, 4, 4), np.float32)
     pixels[32:, :, :3] = 0.5
     image.pixels.foreach_set(pixels.ravel())
-    own = grown.data.hairloom.grow
-    assert "Top" in weights_of_surface(own, bpy.context, "to")
+    grow_settings = grown.data.hairloom.grow
+    assert "Top" in weights_of_surface(grow_settings, bpy.context, "to")
     whole = lengths(grown)
-    own.density_group = "Top"
-    assert own.problem == "" and curve_points(grown.data)[:: FEW["cv_count"], 2].min() > -0.03
-    own.density_group, own.length_group = "", "Top"
+    grow_settings.density_group = "Top"
+    assert (
+        grow_settings.problem == ""
+        and curve_points(grown.data)[:: FEW["cv_count"], 2].min() > -0.03
+    )
+    grow_settings.density_group, grow_settings.length_group = "", "Top"
     above = curve_points(grown.data)[:: FEW["cv_count"], 2] > 0.03
     assert lengths(grown)[above] == pytest.approx(0.5 * whole[above], rel=0.1)
     sphere.vertex_groups.new(name="Top").add(range(len(vertices)), 1.0, "REPLACE")
-    own.length_group = ""
-    own.length_group = "Top"
+    grow_settings.length_group = ""
+    grow_settings.length_group = "Top"
     assert lengths(grown) == pytest.approx(whole, rel=0.02)
-    own.length_group = "Gone"
-    assert "neither a vertex group nor an attribute" in own.problem
+    grow_settings.length_group = "Gone"
+    assert "neither a vertex group nor an attribute" in grow_settings.problem
 
 
 def test_undo_takes_setting_and_hair_back_together(grown):
@@ -239,13 +242,15 @@ def test_hair_that_blender_does_not_evaluate_says_so(grown, sphere):
     layer = bpy.context.view_layer.layer_collection.children["Kept"]
     layer.exclude = True
     points = curve_points(grown.data)
-    own = grown.data.hairloom.grow
-    own.length = 0.05
-    assert "Head: it is disabled in viewports or excluded from the view layer" in own.problem
+    grow_settings = grown.data.hairloom.grow
+    grow_settings.length = 0.05
+    assert (
+        "Head: it is disabled in viewports or excluded from the view layer" in grow_settings.problem
+    )
     assert np.array_equal(curve_points(grown.data), points)
     layer.exclude = False
-    own.length = 0.06
-    assert own.problem == "" and not np.array_equal(curve_points(grown.data), points)
+    grow_settings.length = 0.06
+    assert grow_settings.problem == "" and not np.array_equal(curve_points(grown.data), points)
 
 
 @pytest.mark.parametrize("operator", ["settle", "mirror_hair", "grow_again"])

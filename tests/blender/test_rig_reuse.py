@@ -24,7 +24,7 @@ from hairloom.addon.ui import operators_export_check
 
 
 @pytest.fixture
-def made(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+def prepared(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """The names of hair, one for each time that a rig is prepared."""
     names: list[str] = []
     prepare = rigs.rig_flow.prepare
@@ -46,13 +46,13 @@ def hair(new_hair: Callable[..., Any], sphere: Any) -> Iterator[Any]:
     group.add(list(range(count // 2)), 0.2, "REPLACE")
     key_x(sphere, {1: 0.0, 5: 0.2})
     bpy.context.scene.frame_set(1)
-    made = new_hair(sphere)
-    made.data.hairloom.children.method, made.data.hairloom.children.strand_count = "multi", 200
-    made.hairloom.children_density = "Thick"
+    groom = new_hair(sphere)
+    groom.data.hairloom.children.method, groom.data.hairloom.children.strand_count = "multi", 200
+    groom.hairloom.children_density = "Thick"
     assert bpy.ops.hairloom.add_parting() == {"FINISHED"}
-    select(made)
+    select(groom)
     bpy.context.view_layer.update()
-    yield made
+    yield groom
     operators_export_check.close_check()
 
 
@@ -139,48 +139,48 @@ CHANGES = (
 
 
 def test_a_file_of_previewed_hair_has_its_strands(
-    hair: Any, get_depsgraph: Any, tmp_path: Path, made: list[str]
+    hair: Any, get_depsgraph: Any, tmp_path: Path, prepared: list[str]
 ) -> None:
-    own = written(tmp_path / "own.tfx")
-    assert made == ["Hair"]
+    expected = written(tmp_path / "own.tfx")
+    assert prepared == ["Hair"]
     previews.start(hair, get_depsgraph())
-    made.clear()
-    assert written(tmp_path / "again.tfx") == own and not made, "the preview has them"
+    prepared.clear()
+    assert written(tmp_path / "again.tfx") == expected and not prepared, "the preview has them"
     previews.stop(previews.sessions()[0])
-    assert written(tmp_path / "last.tfx") == own and made == ["Hair"], "nothing is kept"
+    assert written(tmp_path / "last.tfx") == expected and prepared == ["Hair"], "nothing is kept"
 
 
 @pytest.mark.parametrize("change", CHANGES, ids=lambda change: change.__name__)
 def test_strands_of_a_preview_are_not_taken_for_other_hair(
-    hair: Any, get_depsgraph: Any, tmp_path: Path, made: list[str], change: Any
+    hair: Any, get_depsgraph: Any, tmp_path: Path, prepared: list[str], change: Any
 ) -> None:
     """Even if the preview has not read the change yet."""
     before = written(tmp_path / "before.tfx")
     previews.start(hair, get_depsgraph())
     change(hair)
     bpy.context.view_layer.update()
-    made.clear()
-    found = written(tmp_path / "found.tfx")
-    assert made == ["Hair"], "it is other hair"
+    prepared.clear()
+    exported = written(tmp_path / "found.tfx")
+    assert prepared == ["Hair"], "it is other hair"
     previews.stop_all()
-    assert found == written(tmp_path / "own.tfx") and found != before
+    assert exported == written(tmp_path / "own.tfx") and exported != before
 
 
 def test_strands_of_a_preview_are_taken_again_once_it_has_read_an_edit(
-    hair: Any, get_depsgraph: Any, tmp_path: Path, made: list[str]
+    hair: Any, get_depsgraph: Any, tmp_path: Path, prepared: list[str]
 ) -> None:
     session = previews.start(hair, get_depsgraph())
     comb(hair)
     session.read_again(get_depsgraph())
-    made.clear()
-    found = written(tmp_path / "found.tfx")
-    assert not made
+    prepared.clear()
+    exported = written(tmp_path / "found.tfx")
+    assert not prepared
     previews.stop_all()
-    assert found == written(tmp_path / "own.tfx")
+    assert exported == written(tmp_path / "own.tfx")
 
 
 def test_strands_of_a_bake_are_those_that_were_baked(
-    hair: Any, get_depsgraph: Any, tmp_path: Path, made: list[str]
+    hair: Any, get_depsgraph: Any, tmp_path: Path, prepared: list[str]
 ) -> None:
     """A bake previews the baked rig; a file gets the rig of the present curves."""
     bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, 2
@@ -193,39 +193,39 @@ def test_strands_of_a_bake_are_those_that_were_baked(
         "it has those of the bake"
     )
     assert not previews.previewed_rigs()
-    made.clear()
+    prepared.clear()
     written(tmp_path / "own.tfx")
-    assert made == ["Hair"]
+    assert prepared == ["Hair"]
 
 
 def test_hair_that_is_not_made_yet_is_made_for_the_file(
     hair: Any, get_depsgraph: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    own = written(tmp_path / "own.tfx")
+    expected = written(tmp_path / "own.tfx")
     monkeypatch.setattr(latest_job, "is_blocking", lambda: False)
     session = previews.start(hair, get_depsgraph())
-    assert not session.is_made and written(tmp_path / "found.tfx") == own
+    assert not session.is_made and written(tmp_path / "found.tfx") == expected
 
 
 def test_the_dialog_makes_strands_once_and_the_file_has_them(
-    hair: Any, tmp_path: Path, made: list[str]
+    hair: Any, tmp_path: Path, prepared: list[str]
 ) -> None:
     check, depsgraph = ExportCheck.of([hair]), bpy.context.evaluated_depsgraph_get()
     check.refresh(depsgraph, TRESSFX, StrandExportSettings())
-    assert made == ["Hair"]
+    assert prepared == ["Hair"]
     check.refresh(depsgraph, ALEMBIC, StrandExportSettings())
-    assert made == ["Hair"], "another format has the same strands"
+    assert prepared == ["Hair"], "another format has the same strands"
     operators_export_check.open_check(check)
-    found = written(tmp_path / "found.tfx")
-    assert made == ["Hair"]
+    exported = written(tmp_path / "found.tfx")
+    assert prepared == ["Hair"]
     assert not operators_export_check.cached_rigs(), "they are kept no longer than the dialog"
-    assert found == written(tmp_path / "own.tfx") and made == ["Hair", "Hair"]
+    assert exported == written(tmp_path / "own.tfx") and prepared == ["Hair", "Hair"]
     operators_export_check.open_check(check)
     comb(hair)
     bpy.context.view_layer.update()
     edited = written(tmp_path / "edited.tfx")
     assert edited == written(tmp_path / "as_it_is.tfx") != own_bytes(tmp_path)
-    assert len(made) == 4, "it was edited while the dialog was open"
+    assert len(prepared) == 4, "it was edited while the dialog was open"
 
 
 def own_bytes(folder: Path) -> bytes:
@@ -233,22 +233,22 @@ def own_bytes(folder: Path) -> bytes:
 
 
 def test_the_dialog_takes_strands_of_the_preview(
-    hair: Any, get_depsgraph: Any, made: list[str]
+    hair: Any, get_depsgraph: Any, prepared: list[str]
 ) -> None:
     previews.start(hair, get_depsgraph())
-    made.clear()
+    prepared.clear()
     check = ExportCheck.of([hair], previews.previewed_rigs())
     list(check.read_steps(get_depsgraph(), TRESSFX, StrandExportSettings()))
     check.refresh(get_depsgraph(), TRESSFX, StrandExportSettings())
-    assert check.lines and not made
+    assert check.lines and not prepared
 
 
 def test_frames_of_children_are_of_strands_that_were_made_once(
-    hair: Any, get_depsgraph: Any, made: list[str]
+    hair: Any, get_depsgraph: Any, prepared: list[str]
 ) -> None:
     plan = StrandExport.of(
         [hair], get_depsgraph(), ALEMBIC, StrandExportSettings(use_bake=False), frames=range(1, 3)
     )
-    assert made == ["Hair"]
+    assert prepared == ["Hair"]
     one, two = plan.positions()
     assert not np.array_equal(one, two)

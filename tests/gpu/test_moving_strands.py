@@ -52,7 +52,7 @@ def seen_from(frame: Any, degrees: float = 0.0, distance: float = 1.0) -> Any:
     return frame.Camera(frame.look_at(eye, (0, 0, 0)), frame.perspective(0.6, 1.0, 0.01, 5.0))
 
 
-def drawn(frame: Any, own: Any, groom: Any, camera: Any, **options: Any) -> Any:
+def drawn(frame: Any, hair_pass: Any, groom: Any, camera: Any, **options: Any) -> Any:
     """The picture over a mesh, (SIZE, SIZE, 4), and the number of GPU calls for the hair."""
     import gpu
 
@@ -65,7 +65,9 @@ def drawn(frame: Any, own: Any, groom: Any, camera: Any, **options: Any) -> Any:
     target = gpu.types.GPUFrameBuffer(depth_slot=depth, color_slots=(color,))
 
     def draw_hair() -> None:
-        own.draw(groom, camera, SIZE, SIZE, output="viewport", view=ViewState(VIEW, **options))
+        hair_pass.draw(
+            groom, camera, SIZE, SIZE, output="viewport", view=ViewState(VIEW, **options)
+        )
 
     with drawing_into(target):
         target.clear(color=(0.0, 0.0, 0.0, 0.0), depth=1.0)
@@ -82,47 +84,47 @@ def test_moving_hair_does_not_wait_for_the_gpu_and_looks_as_at_rest(frame: Any) 
     """While hair plays and the view turns, with or without its lights; then both rest."""
     lit = curls(frame, lights=three_point_lights(seen_from(frame).view), volume=VolumeSettings())
     for groom in (curls(frame), lit):
-        own = frame.StrandPass()
-        assert drawn(frame, own, groom, seen_from(frame), is_moving=True)[1]["reads"] > 0
-        assert not own.needs_redraw(VIEW), "nothing is known of a view before its first draw"
+        hair_pass = frame.StrandPass()
+        assert drawn(frame, hair_pass, groom, seen_from(frame), is_moving=True)[1]["reads"] > 0
+        assert not hair_pass.needs_redraw(VIEW), "nothing is known of a view before its first draw"
         for number in range(1, 4):
             now, camera = moved(groom, number), seen_from(frame, degrees=5.0 * number)
-            found, calls = drawn(frame, own, now, camera, is_moving=True)
-            assert calls["reads"] == 0 and calls["draws"] > 0 and own.needs_redraw(VIEW)
+            picture, calls = drawn(frame, hair_pass, now, camera, is_moving=True)
+            assert calls["reads"] == 0 and calls["draws"] > 0 and hair_pass.needs_redraw(VIEW)
             expected, _ = drawn(frame, frame.StrandPass(), now, camera)
-            assert np.abs(found - expected).max() < 1e-5 and expected[..., 3].mean() > 0.1
-        found, calls = drawn(frame, own, now, camera)
-        assert np.abs(found - expected).max() < 1e-5 and calls["reads"] > 0
-        assert not own.needs_redraw(VIEW)
+            assert np.abs(picture - expected).max() < 1e-5 and expected[..., 3].mean() > 0.1
+        picture, calls = drawn(frame, hair_pass, now, camera)
+        assert np.abs(picture - expected).max() < 1e-5 and calls["reads"] > 0
+        assert not hair_pass.needs_redraw(VIEW)
     away = frame.Camera(frame.look_at((0, -1, 0), (0, -2, 0)), seen_from(frame).projection)
-    assert not drawn(frame, own, groom, away, is_moving=True)[0].any(), "and behind the eye"
+    assert not drawn(frame, hair_pass, groom, away, is_moving=True)[0].any(), "and behind the eye"
 
 
 def test_a_view_that_turns_is_as_bright_and_covers_as_much(frame: Any) -> None:
     """With three layers instead of eight, at other places in each pixel."""
     from hairloom.addon.render.strand_layers import LAYERS_OF_PIXELS
 
-    own, groom = frame.StrandPass(), curls(frame)
-    drawn(frame, own, groom, seen_from(frame))
+    hair_pass, groom = frame.StrandPass(), curls(frame)
+    drawn(frame, hair_pass, groom, seen_from(frame))
     camera, seen = seen_from(frame, degrees=3.0), []
-    found, calls = drawn(frame, own, groom, camera, is_moving=True, is_turning=True)
+    picture, calls = drawn(frame, hair_pass, groom, camera, is_moving=True, is_turning=True)
     seen.append(int(np.asarray(LAYERS_OF_PIXELS._count.read()).ravel()[2]))
-    expected, _ = drawn(frame, own, groom, camera)
+    expected, _ = drawn(frame, hair_pass, groom, camera)
     seen.append(int(np.asarray(LAYERS_OF_PIXELS._count.read()).ravel()[2]))
     assert calls["reads"] == 0 and 0 < seen[0] < 0.8 * seen[1]
-    assert np.abs(found - expected)[..., 3].max() < 1e-5
-    assert found[..., 1].mean() == pytest.approx(expected[..., 1].mean(), rel=0.02)
-    assert np.abs(blurred(found - expected)).max() < 0.05
+    assert np.abs(picture - expected)[..., 3].max() < 1e-5
+    assert picture[..., 1].mean() == pytest.approx(expected[..., 1].mean(), rel=0.02)
+    assert np.abs(blurred(picture - expected)).max() < 0.05
 
 
 def test_other_strands_are_counted_first(frame: Any) -> None:
     """Other strands, or more pieces: counts from before do not apply."""
-    own, groom = frame.StrandPass(), curls(frame)
-    drawn(frame, own, groom, seen_from(frame))
+    hair_pass, groom = frame.StrandPass(), curls(frame)
+    drawn(frame, hair_pass, groom, seen_from(frame))
     fewer = frame.Snapshot(groom.points[:900].reshape(100, 9, 3), np.full((100, 9), 3e-4))
     finer = replace(groom, detail=replace(groom.detail, error=0.05))
     for other in (fewer, finer):
-        assert drawn(frame, own, other, seen_from(frame), is_moving=True)[1]["reads"] > 0
+        assert drawn(frame, hair_pass, other, seen_from(frame), is_moving=True)[1]["reads"] > 0
 
 
 def test_a_jump_coarsens_strands_and_loses_none(frame: Any, monkeypatch: Any) -> None:
@@ -132,23 +134,23 @@ def test_a_jump_coarsens_strands_and_loses_none(frame: Any, monkeypatch: Any) ->
     spheres = np.array([[0.0, 0.0, 0.0, 0.098]], np.float32)
     detail = DetailSettings(lod_size=0.0, culling="hidden")
     groom = curls(frame, outward=0.0, detail=detail, occluder_spheres=spheres)
-    own = frame.StrandPass()
-    drawn(frame, own, groom, seen_from(frame, distance=3.0))
-    before = own.statistics
+    hair_pass = frame.StrandPass()
+    drawn(frame, hair_pass, groom, seen_from(frame, distance=3.0))
+    before = hair_pass.statistics
     camera = seen_from(frame, degrees=180.0, distance=0.7)
     # the number of slots does not adapt to the distance either
     monkeypatch.setattr(RestCounts, "slots_at", lambda self, _: len(groom.roots))
-    found, calls = drawn(frame, own, groom, camera, is_moving=True)
+    picture, calls = drawn(frame, hair_pass, groom, camera, is_moving=True)
     still = frame.StrandPass()
     expected, _ = drawn(frame, still, groom, camera)
     assert calls["reads"] == 0
     assert still.statistics.strands > 1.3 * before.strands
     assert still.statistics.pieces > 2 * before.pieces
-    counts = own._views[VIEW].detail._rest_counts
+    counts = hair_pass._views[VIEW].detail._rest_counts
     assert still.statistics.pieces > len(groom.roots) * counts.slot_pieces
-    assert np.abs(found - expected).max() > 0.01, "it is coarser"
-    assert found[..., 3].sum() == pytest.approx(expected[..., 3].sum(), rel=0.05)
-    assert np.abs(blurred(found - expected)).max() < 0.1
+    assert np.abs(picture - expected).max() > 0.01, "it is coarser"
+    assert picture[..., 3].sum() == pytest.approx(expected[..., 3].sum(), rel=0.05)
+    assert np.abs(blurred(picture - expected)).max() < 0.1
 
 
 def blurred(picture: np.ndarray) -> np.ndarray:
@@ -169,17 +171,17 @@ def test_fragments_that_do_not_fit_are_compensated_by_width(
     groom = curls(frame)
     groom = replace(groom, radius=np.full_like(groom.radius, radius))
     far, near = seen_from(frame, distance=8.0), seen_from(frame, distance=0.7)
-    own = frame.StrandPass()
-    drawn(frame, own, groom, far)
-    found, calls = drawn(frame, own, groom, near, is_moving=True)
+    hair_pass = frame.StrandPass()
+    drawn(frame, hair_pass, groom, far)
+    picture, calls = drawn(frame, hair_pass, groom, near, is_moving=True)
     counted = int(np.asarray(layers._count.read()).ravel()[0])
     assert calls["reads"] == 0 and 0.5 * room < counted <= room
-    expected, _ = drawn(frame, own, groom, near)
-    assert own._views[VIEW].part_count > 1, "at rest it is drawn in parts"
-    assert found[..., 3].mean() == pytest.approx(expected[..., 3].mean(), rel=0.05)
-    found, expected = blurred(found)[..., 3], blurred(expected)[..., 3]
-    assert np.abs(found - expected).mean() < 0.1
-    assert found[expected > 0.5].min() > 0.15, "no place is bald"
+    expected, _ = drawn(frame, hair_pass, groom, near)
+    assert hair_pass._views[VIEW].part_count > 1, "at rest it is drawn in parts"
+    assert picture[..., 3].mean() == pytest.approx(expected[..., 3].mean(), rel=0.05)
+    picture, expected = blurred(picture)[..., 3], blurred(expected)[..., 3]
+    assert np.abs(picture - expected).mean() < 0.1
+    assert picture[expected > 0.5].min() > 0.15, "no place is bald"
 
 
 @pytest.mark.parametrize("fullness", [0.2, 1.0, 20.0])
@@ -190,9 +192,9 @@ def test_no_more_fragments_come_than_were_expected(frame: Any, fullness: float) 
     groom = replace(
         curls(frame), meshes=(), strand_settings=StrandSettings(fullness=fullness, tip_width=1.0)
     )
-    for distance, most in ((5.0, 1.6), (1.0, 1.6), (0.3, 4.0)):
-        own = frame.StrandPass()
-        drawn(frame, own, groom, seen_from(frame, distance=distance))
-        found = int(np.asarray(LAYERS_OF_PIXELS._count.read()).ravel()[0])
-        expected = own._views[VIEW].detail._rest_counts.fragments
-        assert found <= expected <= most * found, (distance, found, expected)
+    for distance, max_ratio in ((5.0, 1.6), (1.0, 1.6), (0.3, 4.0)):
+        hair_pass = frame.StrandPass()
+        drawn(frame, hair_pass, groom, seen_from(frame, distance=distance))
+        fragments = int(np.asarray(LAYERS_OF_PIXELS._count.read()).ravel()[0])
+        expected = hair_pass._views[VIEW].detail._rest_counts.fragments
+        assert fragments <= expected <= max_ratio * fragments, (distance, fragments, expected)

@@ -104,16 +104,18 @@ def test_grooms_and_a_mesh_in_parts_are_the_same_picture(
             target.clear(color=(0.2, 0.1, 0.0, 0.3), depth=1.0)
             gpu.state.viewport_set(13, 7, SIZE, SIZE)
             MeshPass().draw(grooms[0], front, SIZE, SIZE)
-            for own, groom in zip(passes, grooms, strict=True):
-                own.draw(groom, front, SIZE, SIZE)
+            for hair_pass, groom in zip(passes, grooms, strict=True):
+                hair_pass.draw(groom, front, SIZE, SIZE)
         pixels = np.asarray(color.read()).reshape(color.height, color.width, 4)
         depths = np.array(depth.read()).reshape(color.height, color.width, 1)
-        return np.dstack([pixels, depths]), [own.statistics.layers.parts for own in passes]
+        return np.dstack([pixels, depths]), [
+            hair_pass.statistics.layers.parts for hair_pass in passes
+        ]
 
     whole, at_once = picture(MANY)
-    found, parts = picture(FEW)
+    in_parts, parts = picture(FEW)
     assert at_once == [1, 1] and parts[0] > 5 and parts[1] > 1
-    assert is_same(found, whole)
+    assert is_same(in_parts, whole)
     assert (whole[7:-2, 13:-7, 3] > 0.5).mean() > 0.9, "where the viewport is"
     assert (whole[..., :4] == np.float32([0.2, 0.1, 0.0, 0.3])).all(axis=-1).any(), "and only there"
 
@@ -139,18 +141,18 @@ def test_each_draw_is_complete_and_starts_with_the_part_count_of_the_last_one(
     depth = gpu.types.GPUTexture((SIZE, SIZE), format="DEPTH_COMPONENT32F")
     target = gpu.types.GPUFrameBuffer(depth_slot=depth, color_slots=(color,))
 
-    def picture(own: Any, groom: Any) -> np.ndarray:
+    def picture(hair_pass: Any, groom: Any) -> np.ndarray:
         with drawing_into(target):
             target.clear(color=(0.0, 0.0, 0.0, 0.0), depth=1.0)
-            own.draw(groom, front, SIZE, SIZE, output=output)
+            hair_pass.draw(groom, front, SIZE, SIZE, output=output)
         return np.array(color.read())
 
-    own = with_rows(MANY)
-    expected = [picture(own, groom) for groom in (shown, few)]
-    own, parts = with_rows(FEW), []
+    hair_pass = with_rows(MANY)
+    expected = [picture(hair_pass, groom) for groom in (shown, few)]
+    hair_pass, parts = with_rows(FEW), []
     for number in (0, 0, 1, 1, 0):
-        assert is_same(picture(own, (shown, few)[number]), expected[number])
-        parts.append(own.statistics.layers.parts)
+        assert is_same(picture(hair_pass, (shown, few)[number]), expected[number])
+        parts.append(hair_pass.statistics.layers.parts)
     assert parts[0] > 5 and parts == [parts[0], parts[0], 1, 1, parts[0]]
 
 
@@ -176,11 +178,11 @@ def test_pixels_that_do_not_fit_are_drawn_by_depth(frame: Any, front: Any, with_
     """Against the theoretical composite of thousands of sheets, nearest first."""
     random = np.random.default_rng(5)
     depths, opacity = random.uniform(-40.0, 40.0, 5000), 4.0 / 4095.0
-    own = with_rows(1)
+    hair_pass = with_rows(1)
     picture = frame.render_image(
-        sheets(frame, depths, opacity), front, 2, 1, 1, passes=(frame.MeshPass(), own)
+        sheets(frame, depths, opacity), front, 2, 1, 1, passes=(frame.MeshPass(), hair_pass)
     )
-    assert own.statistics.layers.parts >= 2 * 2 and not own.statistics.notes
+    assert hair_pass.statistics.layers.parts >= 2 * 2 and not hair_pass.statistics.notes
     through = (1.0 - opacity) ** np.arange(len(depths) + 1)
     exact = (opacity * through[:-1] * brightness_of(np.sort(depths))).sum()
     assert picture[..., 3] == pytest.approx(np.full((1, 2), 1.0 - through[-1]), abs=1e-3)
@@ -207,12 +209,12 @@ def test_missing_fragments_are_reported(frame: Any, front: Any, with_rows: Any) 
 
     opacity = 4.0 / 4095.0
     for rows, room in ((1, 4096), (MANY, MAX_LIST_LENGTH_IN_SOFTWARE)):
-        own, shown = with_rows(rows), sheets(frame, np.zeros(room + 904), opacity)
-        picture = frame.render_image(shown, front, 1, 1, 1, passes=(frame.MeshPass(), own))
+        hair_pass, shown = with_rows(rows), sheets(frame, np.zeros(room + 904), opacity)
+        picture = frame.render_image(shown, front, 1, 1, 1, passes=(frame.MeshPass(), hair_pass))
         assert picture[0, 0, 3] == pytest.approx(1.0 - (1.0 - opacity) ** room, abs=1e-3)
         if rows == 1 or is_software():
-            assert own.statistics.layers.missing == 904
-            (note,) = own.statistics.notes
+            assert hair_pass.statistics.layers.missing == 904
+            (note,) = hair_pass.statistics.notes
             assert "904" in note
 
 
@@ -227,15 +229,15 @@ def test_little_memory_makes_more_parts_and_not_a_crash(
     expected = frame.render_image(shown, front, SIZE, SIZE, 1)
     make = gpu.types.GPUTexture
 
-    def made(size: Any, **more: Any) -> Any:
+    def failing_texture(size: Any, **more: Any) -> Any:
         if more["format"] == "RGBA32UI" and size[1] > 3:
             raise RuntimeError("no memory")
         return make(size, **more)
 
-    monkeypatch.setattr(strand_layers.gpu.types, "GPUTexture", made)
-    own = with_rows(MANY)
-    picture = frame.render_image(shown, front, SIZE, SIZE, 1, passes=(frame.MeshPass(), own))
-    assert own.statistics.layers.parts > 3
+    monkeypatch.setattr(strand_layers.gpu.types, "GPUTexture", failing_texture)
+    hair_pass = with_rows(MANY)
+    picture = frame.render_image(shown, front, SIZE, SIZE, 1, passes=(frame.MeshPass(), hair_pass))
+    assert hair_pass.statistics.layers.parts > 3
     assert is_same(picture, expected)
 
 
@@ -248,10 +250,10 @@ def test_thousands_of_layers_in_a_pixel_are_drawn_at_once(
     depths = np.linspace(-40.0, 40.0, count)
     alpha = round(opacity * 4095.0) / 4095.0  # as lists hold it
     fractions = layer_fractions(depths[None], np.full((1, count), alpha))[0]
-    own = with_rows(MANY)
+    hair_pass = with_rows(MANY)
     shown = sheets(frame, np.random.default_rng(9).permutation(depths), opacity)
-    picture = frame.render_image(shown, front, 2, 1, 1, passes=(frame.MeshPass(), own))
-    assert own.statistics.layers.parts == 1
+    picture = frame.render_image(shown, front, 2, 1, 1, passes=(frame.MeshPass(), hair_pass))
+    assert hair_pass.statistics.layers.parts == 1
     assert picture[..., 3] == pytest.approx(np.ones((1, 2)), abs=1e-3)
     assert picture[..., 0] == pytest.approx(
         np.full((1, 2), fractions @ brightness_of(depths)), abs=1e-3
