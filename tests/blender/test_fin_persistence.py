@@ -4,6 +4,7 @@ import bpy
 import numpy as np
 import pytest
 from fin_motion import evaluated_vertices, play_frames, rest_vertices, start_fin, update_view_layer
+from undoing import redo, undo
 
 from hairloom.addon.blender.preview import fins, previews, scene_events
 from hairloom.addon.blender.preview.bake import Bake
@@ -89,6 +90,27 @@ def test_however_its_preview_ends_it_is_at_rest(end, flag_object, get_depsgraph,
         with pytest.raises(RuntimeError):
             bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "bad.blend"))
     assert previews.simulations() == () and not is_shown(flag_object)
+
+
+@pytest.mark.parametrize("is_baked", [False, True])
+def test_undo_puts_no_cloth_back_into_motion_after_its_preview(
+    is_baked, flag_object, get_depsgraph, tmp_path
+):
+    bake = Bake.of([flag_object], bpy.context.scene, frames=range(1, 4), folder=tmp_path)
+    for _ in bake.steps() if is_baked else ():
+        pass
+    bpy.context.scene.frame_set(3)
+    before = evaluated_vertices(flag_object, get_depsgraph)
+    play_away_from(before, flag_object, get_depsgraph)
+    bpy.ops.ed.undo_push(message="in motion")
+    previews.stop_all()
+    bpy.ops.ed.undo_push(message="stopped")
+    for step in (undo, redo, undo):
+        step()
+        update_view_layer()
+        flag = bpy.data.objects["Flag"]
+        assert is_shown(flag) == is_baked
+        np.testing.assert_array_equal(evaluated_vertices(flag, get_depsgraph), before)
 
 
 def test_a_bake_is_shown_after_the_preview_too(flag_object, get_depsgraph, tmp_path):

@@ -48,6 +48,8 @@ class Previews(dict[int, Preview]):
     notice: why one ended by itself; kept until the next one begins.
     ended: session numbers of the objects whose previews ended by themselves; an undo may bring back
         what they lacked. ended_before_undo: those that had ended before the last undo.
+    cloth: session numbers of the cloth that has been previewed in this file; an undo may bring
+        back a frame of its motion after its preview.
     is_paused: whether everything that plays freely is paused.
     last_edit: time of the last edit [s], by the monotonic clock.
     is_reacting: whether a reaction to one of Blender's events is running.
@@ -59,6 +61,7 @@ class Previews(dict[int, Preview]):
         self.notice, self.is_paused = "", False
         self.ended: set[int] = set()
         self.ended_before_undo: set[int] = set()
+        self.cloth: set[int] = set()
         self.last_edit, self.is_reacting = 0.0, False
         self.built_cards = CardBuildCache()
 
@@ -117,6 +120,8 @@ def add(session: Simulation, depsgraph: bpy.types.Depsgraph) -> None:
         before.session.forget()
     previews[session.uid] = preview
     previews.ended.discard(session.uid)
+    if preview.groom is None:
+        previews.cloth.add(session.uid)
     publish(preview, depsgraph)
     redraw_panels()
 
@@ -128,6 +133,7 @@ def end() -> None:
     previews.built_cards.forget()
     fields.forget()
     previews.ended.clear()
+    previews.cloth.clear()
     previews.notice = ""
 
 
@@ -136,6 +142,7 @@ def forget_all() -> None:
     for uid in tuple(previews):
         _forget(uid)
     previews.ended.clear()
+    previews.cloth.clear()
     previews.notice, previews.is_paused = "", False
     playback.forget()
     previews.built_cards.forget()
@@ -156,6 +163,14 @@ def show_all_unpreviewed() -> None:
     for obj in bpy.data.objects:
         _show_unpreviewed(obj)
     refresh_views()
+
+
+def rest_ended_cloth() -> None:
+    """Show cloth whose preview has ended as without one, after an undo that may have put it back
+    into its motion."""
+    for obj in bpy.data.objects if previews.cloth else ():
+        if obj.session_uid in previews.cloth and obj.session_uid not in previews and is_shown(obj):
+            _show_unpreviewed(obj)
 
 
 def _show_unpreviewed(obj: bpy.types.Object) -> None:

@@ -186,15 +186,17 @@ def undone() -> None:
         preview.session.is_stale = preview.cards_are_stale = True
     if previews:
         _read_again_soon()
-    if (previews or previews.ended) and not bpy.app.timers.is_registered(follow_undo):
+    can_follow = previews or previews.ended or previews.cloth
+    if can_follow and not bpy.app.timers.is_registered(follow_undo):
         bpy.app.timers.register(follow_undo, first_interval=0.0)
 
 
 def follow_undo() -> None:
-    """A timer for Blender: preview again what undo or redo brought back, and follow curves that it
-    put back, like curves under a brush."""
+    """A timer for Blender: preview again what undo or redo brought back, put cloth without a preview
+    to rest, and follow curves that were put back, like curves under a brush."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     _resume_ended(depsgraph)
+    registry.rest_ended_cloth()
     for preview, session in _grooms():
         if preview.phase is Phase.REST:
             attempt(preview, depsgraph, partial(session.follow_combing, depsgraph))
