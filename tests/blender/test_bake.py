@@ -303,6 +303,21 @@ def test_undo_shows_the_bake_again(change, swinging, get_depsgraph):
         np.testing.assert_allclose(drawn(bpy.data.objects["Hair"]), shown, atol=1e-6)
 
 
+def test_undo_and_redo_show_the_bake_in_the_frame_that_they_bring_back(swinging, get_depsgraph):
+    hair, _ = swinging
+    bake(hair)
+    previews.start(hair, get_depsgraph())
+    shown = {}
+    for frame in (2, 4):
+        bpy.context.scene.frame_set(frame)
+        shown[frame] = drawn(hair)
+        bpy.ops.ed.undo_push(message=f"frame {frame}")
+    assert np.abs(shown[4] - shown[2]).max() > 0.02
+    for step, frame in ((undo, 2), (redo, 4), (undo, 2)):
+        step()
+        np.testing.assert_allclose(drawn(bpy.data.objects["Hair"]), shown[frame], atol=1e-6)
+
+
 def test_a_head_that_is_moved_back_has_its_baked_hair_again(swinging, get_depsgraph):
     """As when a move is cancelled by Esc."""
     hair, head = swinging

@@ -9,6 +9,7 @@ from grids import strand_grid
 from mathutils import Matrix
 from swinging import shake_head
 from tiers import few_in_commits
+from undoing import redo, undo
 
 from hairloom.addon.blender.bakes import playback
 from hairloom.addon.blender.base.frame_clock import MAX_FRAMES_PER_TICK, FrameClock
@@ -68,6 +69,47 @@ def test_hair_rests_at_the_first_frame_and_where_the_playhead_jumps(swinging):
     assert lag(session) > 1e-4, "and on from there"
     go(2)
     assert lag(session) < 1e-5, "backwards"
+
+
+def test_redo_brings_back_the_frame_and_the_hair_as_it_was(swinging, get_depsgraph):
+    _, _, session = swinging
+    go(1, 2)
+    bpy.ops.ed.undo_push(message="frame 2")
+    go(3, 4)
+    before = strand_grid(session)
+    assert lag(session) > 0.005
+    bpy.ops.ed.undo_push(message="frame 4")
+    go(5)
+    after = strand_grid(session)
+    go(1, 2, 3, 4)
+    for _ in range(2):
+        undo()
+        assert bpy.context.scene.frame_current == 2
+        assert lag(session) < 1e-5, "as where the playhead jumps"
+        redo()
+        assert bpy.context.scene.frame_current == 4
+        np.testing.assert_array_equal(strand_grid(session), before)
+    go(5)
+    # the head's own motion begins anew
+    np.testing.assert_allclose(strand_grid(session), after, atol=0.003)
+
+
+def test_hair_that_an_undo_has_left_does_not_come_back_on_a_body_that_stands_elsewhere(swinging):
+    _, head, session = swinging
+    go(1, 2)
+    bpy.ops.ed.undo_push(message="frame 2")
+    go(3, 4)
+    bpy.ops.ed.undo_push(message="frame 4")
+    undo()
+    head = bpy.data.objects["Head"]
+    go(3, 4)
+    head.location.y = 0.5
+    bpy.context.view_layer.update()
+    bpy.ops.ed.undo_push(message="moved")
+    bpy.data.objects["Hair"].hide_select = True
+    bpy.ops.ed.undo_push(message="locked")
+    undo()
+    assert bpy.context.scene.frame_current == 4 and lag(session) < 1e-5
 
 
 def test_the_same_frame_again_keeps_the_hair_as_it_is(swinging):

@@ -29,7 +29,7 @@ from ..base.objects import Handle, head_of
 from ..colliders import fields
 from ..colliders.fields import NotReadyError
 from ..properties.groom_settings import GroomSettings
-from ..sessions.session import Session
+from ..sessions.session import Moment, Session
 from .phases import SIMULATED, Action, Event, Phase, frame_event, next_phase
 
 #: A step ahead of more time [s] than this is a jump, not dropped frames.
@@ -58,6 +58,7 @@ class Preview:
     problem, bake_problem: why it is not simulated, or why its bake is not shown.
     cards_are_stale: whether its cards need to be shaded again once edits have settled.
     must_rest: whether it was stopped while it was disabled, and must rest once it is read again.
+    is_simulated: whether it is shown after simulated time, not at rest and not from a bake.
 
     Methods raise HairloomError when an object that it is made of is gone or broken.
     """
@@ -70,7 +71,9 @@ class Preview:
         self.rig_hash = ""
         self.problem = self.bake_problem = ""
         self.cards_are_stale = self.must_rest = False
+        self.is_simulated = False
         self._taken_bake: tuple[str, bool] | None = None
+        self._left: tuple[int, Moment] | None = None
 
     @property
     def uid(self) -> int:
@@ -169,6 +172,7 @@ class Preview:
             session.is_playing = False
         if action is not Action.NONE:
             self.problem, self.must_rest = "", False
+            self.is_simulated = action is Action.ADVANCE
         try:
             match action:
                 case Action.BEGIN:
@@ -225,6 +229,22 @@ class Preview:
             max_dropped=rate * _MAX_DROPPED_TIME,
         )
         self.handle(event, depsgraph, frames / rate, blocking=_is_exact())
+
+    def keep_moment(self) -> None:
+        """Keep hair that the timeline has simulated, before undo or redo takes its frame away."""
+        if self.phase is Phase.TIMELINE and self.is_simulated and self.groom is not None:
+            assert self.frame is not None, "the timeline has moved it"
+            self._left = self.frame, self.groom.moment()
+
+    def return_to_kept_moment(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """Show hair at rest as it was in this frame before an undo, if all else is as it was."""
+        if self.groom is None or self._left is None or self.is_simulated:
+            return
+        frame, moment = self._left
+        is_here = frame == self.frame == depsgraph.scene.frame_current
+        is_at_rest = self.phase in (Phase.REST, Phase.TIMELINE)
+        if is_here and is_at_rest and self.groom.return_to(moment, depsgraph):
+            self.phase, self.is_simulated = Phase.TIMELINE, True
 
     def rest_if_moved(self, depsgraph: bpy.types.Depsgraph) -> bool:
         """React to a new evaluation of the body within a frame: hair rests if its body has moved,

@@ -23,6 +23,7 @@ from ...shading.settings import ShadingSettings
 from ..bakes import playback
 from ..bakes.simulation import Simulation
 from ..base import latest_job
+from ..base.gpu_context import is_context_missing
 from ..base.originals import refresh_views
 from ..base.redraw import debounce, redraw_panels
 from ..cards.made_objects import card_objects
@@ -184,6 +185,8 @@ def undone() -> None:
             previews.ended.add(session.uid)
     for preview in previews.values():
         preview.session.is_stale = preview.cards_are_stale = True
+        if not is_context_missing():
+            preview.keep_moment()
     if previews:
         _read_again_soon()
     can_follow = previews or previews.ended or previews.cloth
@@ -192,7 +195,7 @@ def undone() -> None:
 
 
 def follow_undo() -> None:
-    """A timer for Blender: preview again what undo or redo brought back, put cloth without a preview
+    """A timer for Blender: preview again what undo or redo brought back, put cloth without preview
     to rest, and follow curves that were put back, like curves under a brush."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     _resume_ended(depsgraph)
@@ -258,6 +261,7 @@ def _read_preview(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
         preview.show_frame(depsgraph)
     elif session.has_changed_head() or preview.is_resized(depsgraph):
         registry.restart(preview, depsgraph)
+        return
     else:
         session.read_again(depsgraph, blocking=latest_job.is_blocking())
         if preview.must_rest:
@@ -266,6 +270,10 @@ def _read_preview(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
             registry.take_changed_bake(preview, depsgraph)
         else:
             preview.take_read_hair(depsgraph)
+    if preview.frame not in (None, depsgraph.scene.frame_current):
+        # Blender does not report frames that undo and redo change
+        _follow_frame(preview, depsgraph, light_changed=False)
+    preview.return_to_kept_moment(depsgraph)
 
 
 def clear() -> None:

@@ -590,6 +590,28 @@ class Session:
             blocking=blocking,
         )
 
+    def moment(self) -> Moment:
+        """The present moment of its motion; the hair must be simulated. Reads back from a GPU."""
+        return Moment(self.rig, self.solver.motion, self._motion_start, self._posed_colliders)
+
+    def return_to(self, moment: Moment, depsgraph: bpy.types.Depsgraph) -> bool:
+        """Show hair at rest in an earlier moment, and go on from there. Returns False, and changes
+        nothing, if its hair or its body is not as it was.
+
+        Raises:
+            HairloomError: as `rest`.
+        """
+        is_same = self.rig is moment.rig and self._pose(depsgraph).is_same_as(moment.motion.pose)
+        if not is_same or self.scene_colliders is None:
+            return False
+        self.scene_colliders.rest(depsgraph)
+        self._motion_start, self._posed_colliders = moment.start, moment.colliders
+        device = self.settings[DynamicsSettings].device
+        self.solver = make_solver(self.rig, device, moment.motion)
+        self.is_playing, self._is_recorded = True, False
+        self._show()
+        return True
+
     def stop(self, depsgraph: bpy.types.Depsgraph) -> None:
         """End the simulation; hair is in its style again."""
         self.is_playing = False
@@ -765,6 +787,19 @@ class Session:
             if self._motion_start is None
             else SimulatedSolids(self._motion_start, self._posed_colliders)
         )
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """A moment of simulated hair, to return to.
+
+    start: where the motion began. colliders: their motion in the last frame.
+    """
+
+    rig: Rig
+    motion: Motion
+    start: MotionStart | None
+    colliders: tuple[PosedCollider, ...]
 
 
 @dataclass(frozen=True, eq=False)
