@@ -7,6 +7,7 @@ from typing import ClassVar
 import bpy
 
 from ..blender.bakes import playback
+from ..blender.bakes.simulation import phrase_of
 from ..blender.base.outcome import report
 from ..blender.preview import previews
 from ..blender.preview.bake import Bake, free, is_bakeable, show_in_renders
@@ -144,7 +145,7 @@ def _draw_state(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
         draw_figures(layout.column(align=True), table_of(figures))
     preview_bake = previews.bake_of(obj)
     changed = () if facts is None or preview_bake is None else preview_bake.changed_inputs
-    text = "Out of date: " + ", ".join(changed) if changed else ""
+    text = f"Changed since: {phrase_of(changed)}" if changed else ""
     layout.label(text=text, icon="ERROR" if changed else "BLANK1")
 
 

@@ -69,7 +69,7 @@ def _state(session: Session | None) -> str:
     if not session.is_made:
         return _build_text(session.stage)
     preview = previews[session.uid]
-    if preview.phase is Phase.BAKED and preview.bake is not None:
+    if preview.phase is Phase.BAKED and preview.bake is not None and session.is_recorded:
         return "baked, out of date" if preview.bake.changed_inputs else "baked"
     if session.is_pending:
         return _build_text(session.stage)

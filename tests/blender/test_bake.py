@@ -28,6 +28,7 @@ from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.preview.bake import Bake, free
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.files import file_moves, stale_temp_files
+from hairloom.addon.ui import state
 
 LAST = 8
 
@@ -316,6 +317,26 @@ def test_undo_and_redo_show_the_bake_in_the_frame_that_they_bring_back(swinging,
     for step, frame in ((undo, 2), (redo, 4), (undo, 2)):
         step()
         np.testing.assert_allclose(drawn(bpy.data.objects["Hair"]), shown[frame], atol=1e-6)
+
+
+def test_hair_that_was_combed_since_its_bake_says_so_and_what_to_do(swinging, get_depsgraph):
+    hair, _ = swinging
+    bake(hair)
+    bpy.context.scene.frame_set(4)
+    session = previews.start(hair, get_depsgraph())
+    assert state._state(session) == "baked" and not state.problems_of(hair, session)
+    comb(hair)
+    bpy.context.view_layer.update()
+    scene_events.catch_up(get_depsgraph())
+    assert state._state(session) == "at rest, CPU", "it is shown as it was combed"
+    (problem,) = state.problems_of(hair, session)
+    assert problem.text == "Changed since its bake: combed or edited hair. Bake again"
+    assert problem.operator == "hairloom.bake"
+    hair.hairloom.dynamics.damping = 3.0
+    bpy.context.scene.frame_set(5)
+    assert state._state(session) == "baked, out of date", "its bake is shown"
+    (problem,) = state.problems_of(hair, session)
+    assert "combed or edited hair, settings. Bake again" in problem.text
 
 
 def test_a_head_that_is_moved_back_has_its_baked_hair_again(swinging, get_depsgraph):

@@ -116,6 +116,11 @@ def differences(known: str, now: str) -> tuple[str, ...]:
     return tuple(name.replace("_", " ") for name in names)
 
 
+def phrase_of(changed: tuple[str, ...]) -> str:
+    """What has changed, by names from `differences`, for a message to the artist."""
+    return ", ".join("combed or edited hair" if each == "hair" else each for each in changed)
+
+
 def _hashes_by_name(named: str) -> dict[str, str]:
     """Hashes by name; a plain hash counts as one part."""
     pairs = (part.rpartition("=") for part in named.split())

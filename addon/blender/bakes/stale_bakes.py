@@ -11,7 +11,7 @@ from ..scene.poses import read_pose
 from . import playback
 from .cache import Cache
 from .groom_hashes import groom_frame_hash, groom_rig_hash, settings_hash
-from .simulation import differences
+from .simulation import differences, phrase_of
 
 
 def changed_inputs(
@@ -47,7 +47,7 @@ def stale_notes(
     if not changed:
         return ()
     return (
-        f"{hair.name}: its bake is out of date ({', '.join(changed)}), and its motion is written "
+        f"{hair.name}: its bake is out of date ({phrase_of(changed)}), and its motion is written "
         "as it was baked. Bake again to write the current motion.",
     )
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from ...errors import HairloomError
 from ..bakes.baked_copy import render_problem
+from ..bakes.simulation import phrase_of
 from ..base.objects import head_of, objects_in
 from ..scene.curves import attach_to_surface, read_curves
 from ..scene.source import dynamics_warnings, hair_dynamics_modifiers
@@ -80,7 +81,7 @@ def issues_of(hair: bpy.types.Object, session: Session | None) -> tuple[Issue, .
         found.append(Issue(text, "hairloom.show_in_renders", "Show in Renders"))
     baked = previews.bake_of(hair)
     if baked is not None and baked.changed_inputs:
-        text = f"Its bake is out of date ({', '.join(baked.changed_inputs)})"
+        text = f"Changed since its bake: {phrase_of(baked.changed_inputs)}. Bake again"
         found.append(Issue(text, "hairloom.bake", "Bake"))
     return tuple(found)
 

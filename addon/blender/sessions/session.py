@@ -660,6 +660,11 @@ class Session:
         return self.is_made and hair is not None and not hair.hide_render
 
     @property
+    def is_recorded(self) -> bool:
+        """Whether the shown hair comes from a bake."""
+        return self._is_recorded
+
+    @property
     def pose(self) -> Pose:
         """The pose of the body as it is shown."""
         return self.solver.pose

@@ -16,6 +16,7 @@ from ...exchange.strand_check import check_lines
 from ...exchange.strand_export_settings import StrandExportSettings
 from ...exchange.strand_formats import StrandFormat
 from ..bakes import playback
+from ..bakes.simulation import phrase_of
 from ..bakes.stale_bakes import changed_inputs
 from ..base.objects import Handle
 from ..base.parts import Part, Parts
@@ -135,7 +136,7 @@ class ExportCheck:
         facts = cache.facts
         line = f"bake of frames {facts.first} to {facts.last} at {facts.frame_rate:g} fps"
         changed = self._changed_inputs.get(hair.session_uid, ())
-        return f"{line}, out of date ({', '.join(changed)})" if changed else line
+        return f"{line}, out of date ({phrase_of(changed)})" if changed else line
 
     def _find_stale_bakes(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Find stale bakes, once: hashing all inputs of a bake is too slow for drawing."""
