@@ -12,6 +12,8 @@ from bpy.props import IntProperty, PointerProperty
 
 #: rows of a list
 ROWS = 3
+#: description of the property of an operator that names the object to remove from a list
+REMOVED_OBJECT = "Name of the object; if empty, the selected one, or the only one"
 
 
 class _Kind(NamedTuple):

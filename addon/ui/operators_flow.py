@@ -18,7 +18,7 @@ from ..blender.sessions.flow import comb_flow
 from ..groom.flow_settings import FlowSettings
 from .drawing import draw_button
 from .long_work import LongWork, Steps, draw_progress, steps_of_parts
-from .object_lists import draw_objects
+from .object_lists import REMOVED_OBJECT, draw_objects
 from .reports import report_outcome, reporting
 from .revert_shape import RevertShapeOperator
 from .selection import chosen_hair, in_object_mode, needs_hair, without_linked_duplicates
@@ -56,9 +56,7 @@ class HAIRLOOM_OT_remove_stroke(bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     __annotations__ = {
-        "stroke": StringProperty(
-            name="Stroke", description="Name of the object", options={"SKIP_SAVE"}
-        )
+        "stroke": StringProperty(name="Stroke", description=REMOVED_OBJECT, options={"SKIP_SAVE"})
     }
 
     @classmethod
@@ -72,7 +70,7 @@ class HAIRLOOM_OT_remove_stroke(bpy.types.Operator):
             COLLECTION_PROPERTY,
             COLLECTION_LABEL,
             self.stroke,
-            context.scene,
+            context,
         )
         return {"FINISHED"}
 

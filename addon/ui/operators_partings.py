@@ -16,7 +16,7 @@ from ..blender.sessions.parting import comb_parting
 from ..groom.parting_settings import PartingSettings
 from .drawing import draw_button
 from .long_work import LongWork, Steps, draw_progress, steps_of_parts
-from .object_lists import draw_objects
+from .object_lists import REMOVED_OBJECT, draw_objects
 from .reports import report_outcome, reporting
 from .selection import chosen_hair, in_object_mode, needs_hair, without_linked_duplicates
 
@@ -52,7 +52,7 @@ class HAIRLOOM_OT_remove_parting(bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     __annotations__ = {
-        "line": StringProperty(name="Line", description="Name of the object", options={"SKIP_SAVE"})
+        "line": StringProperty(name="Line", description=REMOVED_OBJECT, options={"SKIP_SAVE"})
     }
 
     @classmethod
@@ -61,7 +61,7 @@ class HAIRLOOM_OT_remove_parting(bpy.types.Operator):
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        partings.remove_parting(chosen_hair(context)[0], self.line, context.scene)
+        partings.remove_parting(chosen_hair(context)[0], self.line, context)
         return {"FINISHED"}
 
 

@@ -9,7 +9,7 @@ from ..blender.base.objects import check_settings_editable, head_of
 from ..blender.base.outcome import report
 from ..blender.colliders import ties
 from .drawing import draw_section
-from .object_lists import draw_objects
+from .object_lists import REMOVED_OBJECT, draw_objects
 from .reports import reporting
 from .selection import chosen_hair, needs_hair
 
@@ -53,7 +53,7 @@ class HAIRLOOM_OT_remove_hair_tie(bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     __annotations__ = {
-        "tie": StringProperty(name="Tie", description="Name of the object", options={"SKIP_SAVE"})
+        "tie": StringProperty(name="Tie", description=REMOVED_OBJECT, options={"SKIP_SAVE"})
     }
 
     @classmethod
@@ -62,7 +62,7 @@ class HAIRLOOM_OT_remove_hair_tie(bpy.types.Operator):
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        ties.remove_tie(chosen_hair(context)[0], self.tie, context.scene)
+        ties.remove_tie(chosen_hair(context)[0], self.tie, context)
         return {"FINISHED"}
 
 

@@ -19,7 +19,7 @@ from ..blender.scene.trim_shapes import (
 from ..blender.sessions.trimming import trim_to_shapes
 from .drawing import draw_button
 from .long_work import LongWork, Steps, draw_progress, steps_of_parts
-from .object_lists import draw_objects
+from .object_lists import REMOVED_OBJECT, draw_objects
 from .reports import report_outcome, reporting
 from .revert_shape import RevertShapeOperator
 from .selection import chosen_hair, in_object_mode, needs_hair, without_linked_duplicates
@@ -74,9 +74,7 @@ class HAIRLOOM_OT_remove_trim_shape(bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     __annotations__ = {
-        "shape": StringProperty(
-            name="Shape", description="Name of the object", options={"SKIP_SAVE"}
-        )
+        "shape": StringProperty(name="Shape", description=REMOVED_OBJECT, options={"SKIP_SAVE"})
     }
 
     @classmethod
@@ -90,7 +88,7 @@ class HAIRLOOM_OT_remove_trim_shape(bpy.types.Operator):
             COLLECTION_PROPERTY,
             COLLECTION_LABEL,
             self.shape,
-            context.scene,
+            context,
         )
         return {"FINISHED"}
 

@@ -75,6 +75,25 @@ def test_the_cross_of_a_row_removes_its_object(setting, hair):
 
 
 @pytest.mark.parametrize("setting", PANELS)
+def test_without_a_name_the_selected_object_or_the_only_one_is_removed(setting, hair):
+    remove = getattr(bpy.ops.hairloom, object_lists.KINDS[setting].remove.partition(".")[2])
+    with pytest.raises(RuntimeError, match=f"{hair.name}: it has no .* of its own. Add one first"):
+        remove()
+    collection = filled(hair, setting, 4)
+    with pytest.raises(RuntimeError, match=r"several .*Thing 0, Thing 1, Thing 2, Thing 3"):
+        remove()
+    for number in (1, 2):
+        bpy.data.objects[f"Thing {number}"].select_set(True)
+    with pytest.raises(RuntimeError, match="one of Thing 1, Thing 2"):
+        remove()
+    bpy.context.view_layer.objects.active = bpy.data.objects["Thing 2"]
+    assert remove() == {"FINISHED"} and "Thing 2" not in collection.objects
+    assert remove() == {"FINISHED"} and "Thing 1" not in collection.objects
+    collection.objects.unlink(bpy.data.objects["Thing 0"])
+    assert remove() == {"FINISHED"} and not collection.objects
+
+
+@pytest.mark.parametrize("setting", PANELS)
 def test_hair_without_a_collection_has_no_list(setting, hair):
     layout = Layout([])
     object_lists.draw_objects(layout, hair, setting)

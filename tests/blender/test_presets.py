@@ -188,6 +188,8 @@ def test_a_look_is_saved_listed_applied_and_deleted(
     shading.model, shading.width_r = "kajiya_kay", 0.2
     assert bpy.ops.hairloom.apply_preset(name=entry.name) == {"FINISHED"}
     assert shading.model == "marschner" and shading.width_r == pytest.approx(0.123)
+    with pytest.raises(RuntimeError, match=r"no preset is named\. Name one of own/my_red_no_2"):
+        bpy.ops.hairloom.delete_preset()
     assert bpy.ops.hairloom.delete_preset(name=entry.name) == {"FINISHED"}
     assert list(own_folder.iterdir()) == [] and titles() == []
 

@@ -263,13 +263,10 @@ def add_ties(hair: bpy.types.Object, rings: list[bpy.types.Object], scene: bpy.t
     add_to_collection(hair, "tie_collection", "Ties", rings, scene)
 
 
-def remove_tie(hair: bpy.types.Object, name: str, scene: bpy.types.Scene) -> None:
-    """Take an object out of the hair's collection of ties, but not out of the scene.
-
-    Raises:
-        HairloomError: it is not directly in that collection.
-    """
-    remove_from_collection(hair, "tie_collection", "Ties", name, scene)
+def remove_tie(hair: bpy.types.Object, name: str, context: bpy.types.Context) -> None:
+    """Take an object out of the hair's collection of ties, but not out of the scene; see
+    `remove_from_collection`."""
+    remove_from_collection(hair, "tie_collection", "Ties", name, context)
 
 
 def count_held_curves(

@@ -195,7 +195,9 @@ def delete_own(name: str) -> None:
     path = _own_path(name)
     if path is None:
         raise HairloomError(
-            "you have no preset of this name", place=name or "preset", remedy=_OWN_REMEDY
+            "you have no preset of this name" if name else "no preset is named",
+            place=name or "preset",
+            remedy=_own_remedy(),
         )
     previews.forget(path)
     try:
@@ -269,7 +271,9 @@ def apply(settings: Settings, hair: bpy.types.Object) -> None:
     )
 
 
-_OWN_REMEDY = "Choose one from the menu of presets"
+def _own_remedy() -> str:
+    names = ", ".join(OWN_PREFIX + path.stem for path in _own_files())
+    return f"Name one of {names}" if names else "Save one first"
 
 
 def _own_files() -> list[Path]:

@@ -44,15 +44,20 @@ def add_to_collection(
 
 
 def remove_from_collection(
-    hair: bpy.types.Object, setting: str, kind: str, name: str, scene: bpy.types.Scene
+    hair: bpy.types.Object, setting: str, kind: str, name: str, context: bpy.types.Context
 ) -> None:
     """Take an object out of a collection of the hair, but not out of the scene.
 
+    Args:
+        name: of the object; "": the active or selected one, or the only one.
+
     Raises:
-        HairloomError: it is not in that collection itself.
+        HairloomError: it is not in that collection itself, or there are several and none is named.
     """
     collection = getattr(hair.hairloom, setting)
     obj = None if collection is None else collection.objects.get(name)
+    if not name:
+        obj = _unnamed_object(hair, collection, kind.lower(), context)
     if obj is None or not accepts_objects(collection):
         raise HairloomError(
             f"it is not in a local collection of {kind.lower()}",
@@ -61,6 +66,33 @@ def remove_from_collection(
             "is in",
         )
     if len(obj.users_collection) == 1:
-        scene.collection.objects.link(obj)
+        context.scene.collection.objects.link(obj)
     collection.objects.unlink(obj)
     setattr(hair.hairloom, setting, collection)
+
+
+def _unnamed_object(
+    hair: bpy.types.Object,
+    collection: bpy.types.Collection | None,
+    kind: str,
+    context: bpy.types.Context,
+) -> bpy.types.Object:
+    """The object of a collection that is meant where none is named.
+
+    Raises:
+        HairloomError: there is none, or there are several.
+    """
+    objects = [] if collection is None else list(collection.objects)
+    if not objects:
+        raise HairloomError(f"it has no {kind} of its own", place=hair.name, remedy="Add one first")
+    if context.active_object in objects:
+        return context.active_object
+    chosen = [obj for obj in objects if obj in context.selected_objects] or objects
+    if len(chosen) > 1:
+        names = ", ".join(sorted(obj.name for obj in chosen))
+        raise HairloomError(
+            f"it has several {kind}, and none is named",
+            place=hair.name,
+            remedy=f"Select or name one of {names}",
+        )
+    return chosen[0]

@@ -100,13 +100,10 @@ def add_partings(
     add_to_collection(hair, "parting_collection", "Partings", lines, scene)
 
 
-def remove_parting(hair: bpy.types.Object, name: str, scene: bpy.types.Scene) -> None:
-    """Take an object out of the hair's collection of partings, but not out of the scene.
-
-    Raises:
-        HairloomError: it is not in that collection itself.
-    """
-    remove_from_collection(hair, "parting_collection", "Partings", name, scene)
+def remove_parting(hair: bpy.types.Object, name: str, context: bpy.types.Context) -> None:
+    """Take an object out of the hair's collection of partings, but not out of the scene; see
+    `remove_from_collection`."""
+    remove_from_collection(hair, "parting_collection", "Partings", name, context)
 
 
 def copy_partings(
