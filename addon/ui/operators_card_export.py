@@ -24,6 +24,7 @@ from ..cards.export_settings import OF_MOTION, CardExportSettings
 from ..errors import HairloomError
 from ..exchange.cards.card_formats import FORMATS, GLB, SUFFIXES
 from .drawing import draw_inactive
+from .file_paths import FILE_TO_WRITE
 from .long_work import LongWork, Progress, Steps, threaded
 from .messages import draw_lines
 from .reports import report_outcome
@@ -42,6 +43,7 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
     #: notes on stale bakes, for the file browser
     stale: tuple[str, ...] = ()
 
+    filepath: FILE_TO_WRITE
     filter_glob: StringProperty(
         default=";".join(f"*{suffix}" for suffix in SUFFIXES), options={"HIDDEN"}
     )

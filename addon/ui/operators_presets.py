@@ -10,6 +10,7 @@ import bpy
 from bpy.props import StringProperty
 from bpy_extras.io_utils import ImportHelper, poll_file_object_drop
 
+from ..blender.base.file_names import absolute_path
 from ..blender.base.objects import check_editable
 from ..blender.base.outcome import report
 from ..blender.properties.presets import (
@@ -26,6 +27,7 @@ from ..blender.properties.properties import settings_of
 from ..blender.scene.hair_material import has_look_material
 from ..blender.scene.look_materials import apply_look
 from ..blender.scene.principled import has_principled_hair, look_from_material
+from .file_paths import FILE_TO_READ
 from .preset_chooser import KIND
 from .reports import reporting
 from .selection import chosen_hair, needs_hair
@@ -51,7 +53,7 @@ class HAIRLOOM_OT_apply_preset(bpy.types.Operator):
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        _apply(named_preset(bpy.path.abspath(self.name)).all, context)
+        _apply(named_preset(absolute_path(self.name)).all, context)
         return {"FINISHED"}
 
 
@@ -77,6 +79,7 @@ class HAIRLOOM_OT_add_preset(bpy.types.Operator, ImportHelper):
     bl_label = "Add Preset File"
     bl_options = {"REGISTER", "UNDO"}
 
+    filepath: FILE_TO_READ
     filter_glob: StringProperty(default=f"*{_SUFFIX}", options={"HIDDEN"})
 
     @classmethod
@@ -90,7 +93,7 @@ class HAIRLOOM_OT_add_preset(bpy.types.Operator, ImportHelper):
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        preset = named_preset(bpy.path.abspath(self.filepath))
+        preset = named_preset(absolute_path(self.filepath))
         _apply(preset.all, context)
         title = free_title(preset.title or Path(self.filepath).stem, preset.settings.section)
         save_own(title, *preset.all)

@@ -9,7 +9,7 @@ from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
 from ..blender.bakes.groom_hashes import frame_rate
-from ..blender.base.file_names import path_to_write
+from ..blender.base.file_names import absolute_path, path_to_write
 from ..blender.base.outcome import report
 from ..blender.pictures.sheet import Sheet
 from ..blender.pictures.showing import ShownGroom, file_name, shown_groom
@@ -21,6 +21,7 @@ from ..blender.pictures.turntable import (
     TurntableSettings,
 )
 from ..errors import HairloomError
+from .file_paths import FILE_TO_WRITE, FOLDER_OF_PICTURES
 from .long_work import LongWork, Steps, counted, draw_progress
 from .reports import reporting, wait_cursor
 from .selection import chosen_hair, needs_hair
@@ -38,12 +39,7 @@ class HAIRLOOM_OT_turntable(LongWork, bpy.types.Operator):
     bl_options = {"REGISTER", "PRESET"}
     state_after_cancel = "nothing was written"
 
-    directory: StringProperty(
-        name="Folder",
-        description="Folder for the pictures and the video",
-        subtype="DIR_PATH",
-        options={"SKIP_SAVE", "HIDDEN"},
-    )
+    directory: FOLDER_OF_PICTURES
     filter_folder: BoolProperty(
         description="Show folders in the file browser",
         default=True,
@@ -117,7 +113,7 @@ class HAIRLOOM_OT_turntable(LongWork, bpy.types.Operator):
             frame_rate=frame_rate(context.scene),
         )
         name = file_name(chosen_hair(context)[0].name)
-        folder = Path(bpy.path.abspath(self.directory))
+        folder = Path(absolute_path(self.directory))
         return Turntable(
             shown.studio, shown.pose, shown.points, settings, folder, name, shown.guides
         )
@@ -131,6 +127,7 @@ class HAIRLOOM_OT_contact_sheet(bpy.types.Operator, ExportHelper):
     bl_options = {"REGISTER", "PRESET"}
     filename_ext = ".png"
 
+    filepath: FILE_TO_WRITE
     filter_glob: StringProperty(default="*.png", options={"HIDDEN"})
     shows: EnumProperty(
         name="Shows",

@@ -19,7 +19,7 @@ from bpy.props import (
 )
 from bpy_extras.io_utils import ImportHelper, poll_file_object_drop
 
-from ..blender.base.file_names import given_path
+from ..blender.base.file_names import absolute_path, given_path
 from ..blender.base.outcome import report
 from ..blender.strands.import_groom import (
     FILE_KINDS,
@@ -31,6 +31,7 @@ from ..blender.strands.import_groom import (
     read_in_thread,
 )
 from .drawing import draw_inactive
+from .file_paths import FILE_TO_READ, FOLDER_TO_READ
 from .long_work import LongWork, Steps, threaded
 from .reports import report_outcome
 from .selection import active_mesh, growth_mesh, in_object_mode, make_active
@@ -67,11 +68,12 @@ class HAIRLOOM_OT_import_strands(LongWork, ImportHelper, bpy.types.Operator):
     bl_label = "Import Hair Strands"
     bl_options = {"REGISTER", "UNDO", "PRESET"}
 
+    filepath: FILE_TO_READ
     filter_glob: StringProperty(default=_filter(SUFFIXES), options={"HIDDEN", "SKIP_SAVE"})
     files: CollectionProperty(
         type=bpy.types.OperatorFileListElement, options={"HIDDEN", "SKIP_SAVE"}
     )
-    directory: StringProperty(subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"})
+    directory: FOLDER_TO_READ
     up: EnumProperty(name="Up", description="Axis that points up in the file", items=UP_AXES)
     scale: FloatProperty(
         name="Scale",
@@ -163,9 +165,9 @@ class HAIRLOOM_OT_import_strands(LongWork, ImportHelper, bpy.types.Operator):
         Raises:
             HairloomError: none is named.
         """
-        folder = Path(bpy.path.abspath(self.directory))
-        chosen = [folder / file.name for file in self.files if file.name]
-        return chosen or [given_path(self.filepath, place=self.bl_label)]
+        names = [file.name for file in self.files if file.name]
+        folder = Path(absolute_path(self.directory)) if names else Path()
+        return [folder / name for name in names] or [given_path(self.filepath, place=self.bl_label)]
 
 
 class HAIRLOOM_FH_strands(bpy.types.FileHandler):

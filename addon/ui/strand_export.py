@@ -25,6 +25,7 @@ from ..exchange.strand_export_settings import FORMAT_DEFAULT, StrandExportSettin
 from ..exchange.strand_formats import StrandFormat
 from ..params import Parameter
 from . import operators_export_check as export_check
+from .file_paths import FILE_TO_WRITE
 from .long_work import LongWork, Progress, Steps
 from .operators_export_check import exportable_hair
 from .reports import report_outcome
@@ -72,6 +73,7 @@ class StrandExportOperator(LongWork, ExportHelper):
     state_after_cancel = "the file is as it was before"
     kind: ClassVar[StrandFormat]
 
+    filepath: FILE_TO_WRITE
     collection: StringProperty(
         name="Source Collection",
         description="Export the hair of this collection instead of the selected hair",

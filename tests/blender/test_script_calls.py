@@ -97,7 +97,38 @@ def test_a_file_that_is_not_named_is_said(new_hair, sphere):
         bpy.ops.hairloom.delete_preset()
 
 
-def test_paths_may_begin_at_the_folder_of_the_blend_file(new_hair, sphere, tmp_path):
+def properties():
+    """The properties of all operators and settings."""
+    classes = [each for each in registration.CLASSES if hasattr(each, "bl_rna")]
+    operators = [getattr(bpy.ops.hairloom, name).get_rna_type() for name in dir(bpy.ops.hairloom)]
+    for rna in (*operators, *(each.bl_rna for each in classes)):
+        yield from ((rna.identifier, prop) for prop in rna.properties)
+
+
+def test_every_path_property_supports_the_folder_of_the_blend_file(extension):
+    paths = [
+        (owner, prop.identifier, prop.is_path_supports_blend_relative)
+        for owner, prop in properties()
+        if prop.type == "STRING" and prop.subtype in ("FILE_PATH", "DIR_PATH")
+    ]
+    assert len(paths) > 8
+    assert [each for each in paths if not each[-1]] == []
+
+
+def test_a_path_beside_a_file_that_has_not_been_saved_is_refused(new_hair, sphere, tmp_path):
+    select(new_hair(sphere))
+    for name in ("import_strands", "export_hair", "export_cards", "contact_sheet", "add_preset"):
+        with pytest.raises(RuntimeError, match=r"//x: // is .* not been saved\. Save it, or"):
+            getattr(bpy.ops.hairloom, name)(filepath="//x")
+    with pytest.raises(RuntimeError, match=r"//: // is .* not been saved"):
+        bpy.ops.hairloom.import_strands(directory="//", files=[{"name": "hair.tfx"}])
+    with pytest.raises(RuntimeError, match=r"//: // is .* not been saved"):
+        bpy.ops.hairloom.turntable(directory="//")
+    with pytest.raises(RuntimeError, match=r"//look.json: // is .* not been saved"):
+        bpy.ops.hairloom.apply_preset(name="//look.json")
+
+
+def test_paths_may_begin_at_the_folder_of_the_blend_file(new_hair, sphere, tmp_path, recwarn):
     hair = new_hair(sphere)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
     select(hair)
@@ -112,3 +143,4 @@ def test_paths_may_begin_at_the_folder_of_the_blend_file(new_hair, sphere, tmp_p
     )
     select(hair)
     assert bpy.ops.hairloom.apply_preset(name="//look.json") == {"FINISHED"}
+    assert not [each for each in recwarn if "blend relative" in str(each.message)]

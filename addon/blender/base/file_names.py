@@ -21,11 +21,28 @@ def given_path(filepath: str, *, place: str) -> Path:
     """The path in an operator's property; // at its start is the folder of the blend file.
 
     Raises:
-        HairloomError: it is empty, as if a script leaves it out.
+        HairloomError: it is empty, as if a script leaves it out, or begins with // in a file that
+            has not been saved.
     """
     if not filepath:
         raise HairloomError("no file is named", place=place, remedy="Name one as filepath")
-    return Path(bpy.path.abspath(filepath))
+    return Path(absolute_path(filepath))
+
+
+def absolute_path(path: str) -> str:
+    """A path; // at its start is the folder of the blend file.
+
+    Raises:
+        HairloomError: that file has not been saved. Blender would take the folder in which it was
+            started.
+    """
+    if path.startswith("//") and not bpy.data.filepath:
+        raise HairloomError(
+            "// is the folder of the blend file, which has not been saved",
+            place=path,
+            remedy="Save it, or give the whole path",
+        )
+    return str(bpy.path.abspath(path))
 
 
 def path_to_write(filepath: str, suffix: str, *, place: str) -> Path:
