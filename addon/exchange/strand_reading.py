@@ -6,8 +6,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from ..errors import HairloomError
 from .alembic.groom_alembic_read import read_groom_alembic
 from .groom import Groom
@@ -19,6 +17,8 @@ from .usd.groom_usd_read import read_usd
 
 #: which part of a file with strands and guides is read
 PARTS = ("strands", "guides", "both")
+#: limits of the factors on the lengths of a groom and of a head
+SCALE_LIMITS = (1.0e-6, 1.0e6)
 
 
 def read_strands(
@@ -45,20 +45,29 @@ def read_strands(
         kept if both strands and guides are.
 
     Raises:
-        HairloomError: another suffix, no guides where they are wanted, or a file that cannot be
-            read.
+        HairloomError: a scale outside its limits, another suffix, no guides where they are wanted,
+            or a file that cannot be read.
     """
     if parts not in PARTS:
         raise HairloomError(
             f"'{parts}' is not a part", place="parts", remedy="Use " + ", ".join(PARTS)
         )
-    if not (np.isfinite(scale) and scale > 0.0):
-        raise HairloomError(
-            f"{scale} cannot be used", place="scale", remedy="Use a number above zero"
-        )
+    check_scale(scale, "scale")
     read = _READERS[strand_format(path).name](path, up, scale, python)
     groom, note = _parts(read.groom, parts, path)
     return replace(read, groom=groom, notes=(*read.notes, *note))
+
+
+def check_scale(scale: float, place: str) -> None:
+    """Refuse a factor on lengths that is outside its limits, or not a number.
+
+    Raises:
+        HairloomError: it is. place: the setting, for the message.
+    """
+    low, high = SCALE_LIMITS
+    if not low <= scale <= high:
+        remedy = f"Use a number from {low:g} to {high:g}"
+        raise HairloomError(f"{scale:g} cannot be used", place=place, remedy=remedy)
 
 
 type Reader = Callable[[Path, str | None, float, Sequence[str] | None], ReadGroom]

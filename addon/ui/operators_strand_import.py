@@ -80,8 +80,6 @@ class HAIRLOOM_OT_import_strands(LongWork, ImportHelper, bpy.types.Operator):
         description="Factor on all lengths, in addition to the unit given in the file: 0.01 for a "
         "TressFX groom in centimetres",
         default=1.0,
-        min=1.0e-6,
-        max=1.0e6,
         soft_min=0.001,
         soft_max=100.0,
         precision=4,
@@ -91,8 +89,6 @@ class HAIRLOOM_OT_import_strands(LongWork, ImportHelper, bpy.types.Operator):
         description="Factor on the size of the active mesh, about the scene's origin: 0.01 for a "
         "head in centimetres",
         default=1.0,
-        min=1.0e-6,
-        max=1.0e6,
         soft_min=0.001,
         soft_max=100.0,
         precision=4,

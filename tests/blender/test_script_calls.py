@@ -97,6 +97,18 @@ def test_a_file_that_is_not_named_is_said(new_hair, sphere):
         bpy.ops.hairloom.delete_preset()
 
 
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), 0.0, -1.0])
+def test_an_import_blames_the_scale_that_cannot_be_used(value, new_hair, sphere, tmp_path):
+    select(new_hair(sphere))
+    bpy.ops.hairloom.export_hair(filepath=str(tmp_path / "hair.hair"))
+    select(sphere)
+    before = set(bpy.data.objects)
+    for name, place in (("scale", "scale"), ("head_scale", "scale of the head")):
+        with pytest.raises(RuntimeError, match=f"Error: {place}: .* cannot be used. Use a number"):
+            bpy.ops.hairloom.import_strands(filepath=str(tmp_path / "hair.hair"), **{name: value})
+    assert set(bpy.data.objects) == before and tuple(sphere.scale) == (1.0, 1.0, 1.0)
+
+
 def properties():
     """The properties of all operators and settings."""
     classes = [each for each in registration.CLASSES if hasattr(each, "bl_rna")]

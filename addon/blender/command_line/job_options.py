@@ -10,6 +10,7 @@ from typing import Any
 from ...cards.settings import CardSettings
 from ...errors import HairloomError
 from ...exchange.strand_formats import SUFFIXES
+from ...exchange.strand_reading import SCALE_LIMITS
 from ...parameters import ALL_SETTINGS
 from ...params import Settings, SettingsMap
 from ...params.preset import Preset
@@ -338,8 +339,8 @@ _LIMITS = (
     ("samples", 1, 16),
     ("seconds", 0.0, 3600.0),
     ("frame_rate", 1.0, 1000.0),
-    ("groom_scale", 1e-6, 1e6),
-    ("head_scale", 1e-6, 1e6),
+    ("groom_scale", *SCALE_LIMITS),
+    ("head_scale", *SCALE_LIMITS),
     ("levels", *_range_of(CardSettings, "levels")),
 )
 

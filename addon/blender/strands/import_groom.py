@@ -20,7 +20,7 @@ from ...exchange.files.file_space import FileSpace
 from ...exchange.groom import Groom, ReadMotion
 from ...exchange.read_groom import ReadGroom
 from ...exchange.strand_formats import STRAND_FORMATS, strand_format
-from ...exchange.strand_reading import read_strands
+from ...exchange.strand_reading import check_scale, read_strands
 from ...groom.root_fit import better_fit
 from ...groom.roots import bind_roots
 from ...groom.size_notes import length_text, size_note
@@ -87,8 +87,9 @@ def read_import_surface(
     """The mesh as Blender shows it, scaled about the world's origin.
 
     Raises:
-        HairloomError: it has no faces.
+        HairloomError: it has no faces, or the scale is outside its limits.
     """
+    check_scale(scale, "scale of the head")
     surface = read_surface(head, depsgraph, need_uv=False, place=head.name)
     if scale != 1.0:
         surface = replace(surface, positions=surface.positions * np.float32(scale))
