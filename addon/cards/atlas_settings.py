@@ -149,6 +149,6 @@ class AtlasSettings(Settings):
             f"{self.columns} x {self.rows} tiles of {across:g} x {along:g} pixels with "
             f"{self.padding} pixels of padding do not fit in {self.side} pixels; they need "
             f"{needed}, which is {needed - self.side} more",
-            place="atlas",
+            place=self.title,
             remedy="Use a larger atlas, fewer columns and rows, or less padding",
         )

@@ -73,13 +73,13 @@ def wants_shells(
     if has_edits and settings.kind == "shells":
         raise HairloomError(
             "its cards were edited, and shells would replace them",
-            place="shells",
+            place=settings.title,
             remedy="Set Kind to Cards or to Automatic, or press Discard Edits",
         )
     if settings.kind == "shells":
         if problem is not None:
             raise HairloomError(
-                problem, place="shells", remedy="Set Kind to Cards, or to Automatic"
+                problem, place=settings.title, remedy="Set Kind to Cards, or to Automatic"
             )
         return True
     is_plain = settings.source == "clusters" and not has_edits
@@ -171,7 +171,7 @@ def _skins(
     if not skins:
         raise HairloomError(
             f"{budget:,} triangles are too few for {settings.shell_layers} layers of this skin",
-            place="shells",
+            place=settings.title,
             remedy="Raise Max Triangles, or lower Shell Layers",
         )
     return tuple(skins)

@@ -113,14 +113,14 @@ def check_drive(state: DynamicsState, drive: Drive, checked: tuple[Floats, ...] 
             raise HairloomError(
                 f"the style has {guide_count} guides of {cv_count} CVs, but the simulation has "
                 f"{state.guide_count} of {state.cv_count}",
-                place="dynamics",
+                place=DynamicsSettings.title,
                 remedy="Start the simulation again",
             )
     if drive.held is not None and drive.held.is_held.shape != (state.guide_count, state.cv_count):
         raise HairloomError(
             f"ties hold {drive.held.is_held.shape} guides and CVs, but the simulation has "
             f"{(state.guide_count, state.cv_count)}",
-            place="dynamics",
+            place=DynamicsSettings.title,
             remedy="Start the simulation again",
         )
     clearance = drive.clearance
@@ -131,32 +131,32 @@ def check_drive(state: DynamicsState, drive: Drive, checked: tuple[Floats, ...] 
         raise HairloomError(
             f"there are distances from colliders for {clearance.distances.shape[:2]} guides and "
             f"CVs, but the simulation has {(state.guide_count, state.cv_count)}",
-            place="dynamics",
+            place=DynamicsSettings.title,
             remedy="Start the simulation again",
         )
     if drive.simulated is not None and drive.simulated.shape != (state.guide_count,):
         raise HairloomError(
             f"there are values of Influence for {drive.simulated.shape} guides, but the "
             f"simulation has {state.guide_count}",
-            place="dynamics",
+            place=DynamicsSettings.title,
             remedy="Start the simulation again",
         )
     if drive.painted is not None and not drive.painted.has_shape(state.cv_count, state.guide_count):
         raise HairloomError(
             f"painted values are not {state.guide_count} finite numbers, one for each guide",
-            place="dynamics",
+            place=DynamicsSettings.title,
             remedy="Start the simulation again",
         )
     if np.shape(drive.gravity) != (3,) or not np.isfinite(drive.gravity).all():
         raise HairloomError(
             "gravity is not three finite numbers",
-            place="dynamics",
+            place=DynamicsSettings.title,
             remedy="Check the scene's gravity",
         )
     if not np.isfinite(drive.force_fields.table).all():
         raise HairloomError(
             "a force field has numbers that are not finite",
-            place="dynamics",
+            place=DynamicsSettings.title,
             remedy="Check the scene's force fields",
         )
 

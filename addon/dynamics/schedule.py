@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from ..errors import HairloomError
+from .settings import DynamicsSettings
 
 #: A substep is due once all but this fraction of it has passed, so that 4 / 240 s makes one 60th.
 _DUE = 1.0e-6
@@ -26,7 +27,7 @@ def due_substeps(
     if not math.isfinite(duration) or duration < 0.0:
         raise HairloomError(
             f"a frame of {duration} seconds cannot be simulated",
-            place="dynamics",
+            place=DynamicsSettings.title,
             remedy="Check the scene's frame rate",
         )
     duration = min(duration, max_frame_time)

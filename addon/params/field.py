@@ -90,8 +90,11 @@ class Parameter:
     is_animatable: bool = True
     masked_parameter: str = ""
 
-    def checked(self, value: Any, place: str) -> Any:
+    def checked(self, value: Any, place: str, *, name: str = "") -> Any:
         """The value in its canonical type.
+
+        Args:
+            name: of the parameter in the message; "": its own.
 
         Raises:
             HairloomError: the value is not allowed; names it and its range.
@@ -99,9 +102,8 @@ class Parameter:
         try:
             return self._canonical(value)
         except (TypeError, ValueError, OverflowError) as error:
-            raise HairloomError(
-                f"'{self.name}' is {value!r}, but {error}", place=place, remedy=self._remedy()
-            ) from error
+            problem = f"'{name or self.name}' is {value!r}, but {error}"
+            raise HairloomError(problem, place=place, remedy=self._remedy()) from error
 
     def _canonical(self, value: Any) -> Any:
         if self.kind == "toggle":

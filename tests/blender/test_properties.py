@@ -12,11 +12,12 @@ import pytest
 import hairloom
 from hairloom import register, unregister
 from hairloom.addon.blender.engine import hair_scene
-from hairloom.addon.blender.preview import handlers
+from hairloom.addon.blender.preview import handlers, previews
 from hairloom.addon.blender.properties import changed, groups
 from hairloom.addon.blender.properties.groom_settings import GroomSettings
 from hairloom.addon.blender.properties.properties import property_group, settings_of
 from hairloom.addon.blender.scene import look_materials
+from hairloom.addon.blender.sessions import solvers
 from hairloom.addon.blender.strands import growing
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.parameters import ALL_SETTINGS
@@ -27,6 +28,12 @@ from hairloom.addon.params.field import NAME_KINDS
 pytestmark = pytest.mark.portable
 
 SECTIONS = list(groups.SECTION_GROUPS)
+#: section -> its first number
+NUMBERS = {
+    section: number
+    for section in SECTIONS
+    for number in [each for each in ALL_SETTINGS[section].parameters() if each.kind == "number"][:1]
+}
 
 
 @pytest.fixture
@@ -50,6 +57,27 @@ def test_the_page_of_parameters_says_where_a_script_finds_a_section(section, gro
     group = group_of(section)
     here = {"obj": bpy.data.objects["Hair"], "scene": bpy.context.scene}
     assert eval(place, here) == group
+
+
+@pytest.mark.parametrize("section", NUMBERS)
+def test_an_error_names_the_object_and_the_label_that_the_artist_sees(section, group_of):
+    settings, group, number = ALL_SETTINGS[section], group_of(section), NUMBERS[section]
+    setattr(group, number.name, math.nan)
+    owner = "Scene" if settings.owner == "scene" else "Hair"
+    with pytest.raises(HairloomError) as error:
+        settings_of(group, settings)
+    assert str(error.value).startswith(
+        f"{owner}, {settings.title}: '{number.label}' is nan, but it must be finite. Use "
+    )
+
+
+def test_a_device_that_does_not_work_is_said_of_the_hair(new_hair, monkeypatch):
+    monkeypatch.setattr(solvers, "compute_problem", lambda: "no driver")
+    hair = new_hair()
+    hair.hairloom.dynamics.device = "compute"
+    problem = re.escape("Hair, Dynamics: the GPU cannot compute here (no driver). Set Device to")
+    with pytest.raises(HairloomError, match=problem):
+        previews.start(hair, bpy.context.evaluated_depsgraph_get())
 
 
 def differing(section, check):

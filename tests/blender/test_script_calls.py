@@ -109,6 +109,12 @@ def test_an_import_blames_the_scale_that_cannot_be_used(value, new_hair, sphere,
     assert set(bpy.data.objects) == before and tuple(sphere.scale) == (1.0, 1.0, 1.0)
 
 
+def test_an_export_names_the_operator_and_the_label_of_a_value_that_cannot_be_used(new_hair):
+    select(new_hair())
+    with pytest.raises(RuntimeError, match=r"Error: Export Cem Yuksel's \.hair: 'Scale' is nan"):
+        bpy.ops.hairloom.export_hair(filepath="hair.hair", scale=float("nan"))
+
+
 def properties():
     """The properties of all operators and settings."""
     classes = [each for each in registration.CLASSES if hasattr(each, "bl_rna")]

@@ -16,6 +16,7 @@ from bpy.props import (
     StringProperty,
 )
 
+from ...errors import HairloomError
 from ...params import Parameter, Settings
 from ...params.curve import KNOT_POSITIONS
 from ..base.objects import head_of
@@ -73,10 +74,28 @@ def settings_of[S: Settings](group: Any, settings: type[S]) -> S:
     """The values in a property group (or operator) made from these settings, checked.
 
     An operator may have only some of them; the others are defaults.
+
+    Raises:
+        HairloomError: a value cannot be used, such as one that a driver has made; names the object
+            or the operator, and the labels that its panel shows.
     """
-    return settings(
-        **{p.name: _value(group, p) for p in settings.parameters() if hasattr(group, p.name)}
-    )
+    present = [each for each in settings.parameters() if hasattr(group, each.name)]
+    values = {each.name: _value(group, each) for each in present}
+    try:
+        return settings(**values)
+    except HairloomError:
+        for each in present:
+            each.checked(values[each.name], _place(group, settings), name=each.label)
+        raise
+
+
+def _place(group: Any, settings: type[Settings]) -> str:
+    """Where the artist finds these settings: object and section, or the operator."""
+    if isinstance(group, bpy.types.Operator):
+        return str(group.bl_label)
+    owner = group.id_data
+    users = (obj for obj in bpy.data.objects if obj.data == owner.original)
+    return f"{next(users, owner).name}, {settings.title}"
 
 
 def weights_of_surface(group: Any, _context: bpy.types.Context, text: str) -> list[str]:

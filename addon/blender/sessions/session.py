@@ -311,8 +311,7 @@ class Session:
         if not is_same:
             # the strands are new, but the guides go on
             motion = replace(self.solver.motion, clearance=made.clearance) if goes_on else None
-            device = self.settings[DynamicsSettings].device
-            self.solver = make_solver(groom.rig, device, motion, made.texels)
+            self.solver = self._new_solver(groom.rig, motion, made.texels)
             self._contacts = FirstContacts()
             if made.start is not None:
                 self._contacts.store(*made.start)
@@ -486,8 +485,18 @@ class Session:
     def _change_device(self, device: str) -> None:
         """Go on from the present motion with another solver."""
         if resolved_device(device) != self.solver.device:
-            self.solver = make_solver(self.rig, device, self.solver.motion)
+            self.solver = self._new_solver(self.rig, self.solver.motion)
             self._show()
+
+    def _new_solver(
+        self, rig: Rig, motion: Motion | None, texels: RideTexels | None = None
+    ) -> Solver:
+        """As `make_solver`, on the chosen device; errors name the hair."""
+        try:
+            return make_solver(rig, self.settings[DynamicsSettings].device, motion, texels)
+        except HairloomError as error:
+            place = f"{self.name}, {error.place}"
+            raise HairloomError(error.problem, place=place, remedy=error.remedy) from error
 
     def take_lights(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Take over the scene's lights and world."""
@@ -606,8 +615,7 @@ class Session:
             return False
         self.scene_colliders.rest(depsgraph)
         self._motion_start, self._posed_colliders = moment.start, moment.colliders
-        device = self.settings[DynamicsSettings].device
-        self.solver = make_solver(self.rig, device, moment.motion)
+        self.solver = self._new_solver(self.rig, moment.motion)
         self.is_playing, self._is_recorded = True, False
         self._show()
         return True

@@ -126,7 +126,7 @@ def make_solver(
     if not can_compute():
         raise HairloomError(
             f"the GPU cannot compute here ({compute_problem()})",
-            place="dynamics",
+            place=DynamicsSettings.title,
             remedy="Set Device to Automatic",
         )
     return ComputeSolver(rig, motion, texels)
