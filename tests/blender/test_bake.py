@@ -222,7 +222,7 @@ def test_changes_since_the_bake_are_reported_and_the_bake_still_plays(swinging, 
         return previews.previews[uid].bake.changed_inputs
 
     hair.hairloom.dynamics.damping = 3.0
-    assert previews.previews[uid].bake.changed_inputs == ("settings",), "told at once"
+    assert previews.previews[uid].bake.changed_inputs == ("settings",), "reported at once"
     assert changed_at(3) == ("settings",)
     np.testing.assert_array_equal(drawn(hair), shown[2])
     hair.hairloom.dynamics.damping = 0.5

@@ -271,12 +271,12 @@ def test_hair_beside_its_head_is_reported(tmp_path: Path, head: Path) -> None:
     moved = np.eye(4)
     moved[2, 3] = 0.02
     strands = hairdo().without_guides().strands
-    for matrix, is_told in ((np.eye(4), False), (moved, True)):
+    for matrix, is_reported in ((np.eye(4), False), (moved, True)):
         write_tfx(tmp_path / "hair.tfx", Groom(strands.transformed(matrix)))
         sources = Sources(str(tmp_path / "hair.tfx"), str(head))
         inputs = read_inputs(sources, GrowSettings())
         rig = rig_flow.prepare(inputs.strands, inputs.head, GuideSettings(), place="hair.tfx")
-        assert any("its roots lie 20 mm from" in note for note in rig.notes) == is_told
+        assert any("its roots lie 20 mm from" in note for note in rig.notes) == is_reported
 
 
 def test_a_name_that_is_neither_an_object_nor_a_file_is_reported(

@@ -38,7 +38,7 @@ def test_what_is_asked_is_done_by_who_serves_and_a_part_at_a_time() -> None:
     assert seen[-1] == "closed"
 
 
-def test_what_fails_is_raised_in_the_thread_and_told_by_the_result() -> None:
+def test_what_fails_is_raised_in_the_thread_and_reported_by_the_result() -> None:
     caught: list[Exception] = []
 
     def refusing() -> Generator[None]:

@@ -132,7 +132,7 @@ def test_what_the_node_does_not_speak_of_stays_and_tips_and_grey_strands_go() ->
         (PrincipledHair(model="HUANG", aspect_ratio=0.01), "Eccentricity"),
     ],
 )
-def test_what_lies_beyond_our_ranges_is_taken_into_them_and_told(
+def test_what_lies_beyond_our_ranges_is_taken_into_them_and_reported(
     hair: PrincipledHair, named: str
 ) -> None:
     _, notes = settings_from(hair)

@@ -45,7 +45,7 @@ def steps():
     yield from duplicates_by_keys()
     yield from blenders_own_animation()
     yield from hair_without_a_surface()
-    yield from a_failing_shader_is_told_once()
+    yield from a_failing_shader_is_reported_once()
     assert failures == [], failures
 
 
@@ -315,7 +315,7 @@ def hair_without_a_surface():
     driver.screenshot("without-surface")
 
 
-def a_failing_shader_is_told_once():
+def a_failing_shader_is_reported_once():
     overlay = hairloom_module("overlay")
     strand_pass = hairloom_module("strand_pass").StrandPass
     draw, calls = strand_pass.draw, []

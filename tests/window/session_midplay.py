@@ -240,7 +240,7 @@ def another_file(folder):
         yield from ended("another file")
         at_rest.append(traces.gpu_object_counts())
         assert hair().display_type == "TEXTURED"
-        assert live().notice() == "", "nobody needs to be told"
+        assert live().notice() == "", "nothing needs to be reported"
         with viewport_context():
             bpy.ops.hairloom.play("INVOKE_DEFAULT")
         yield from plays()

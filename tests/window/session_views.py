@@ -38,7 +38,7 @@ def steps():
     yield from another_view_layer_in_one_window()
     yield from another_scene_in_one_window()
     yield from hidden_in_every_way()
-    yield from instances_are_told()
+    yield from instances_are_reported()
     assert "Traceback" not in log.new_output()
 
 
@@ -150,7 +150,7 @@ def hair_pixels(found, shown, without):
     return float((is_hair & as_shown).mean())
 
 
-def instances_are_told():
+def instances_are_reported():
     """An instance of the groom's collection shows only the head, and the panel reports it."""
     scene, note = bpy.context.scene, hairloom_module("diagnostics").instances_note
     twin = bpy.data.objects.new("Twin", None)

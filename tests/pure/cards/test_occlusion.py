@@ -66,7 +66,12 @@ def plain(**changed: float) -> CardOcclusionSettings:
 
 
 def brute_force(
-    mesh: CardMesh, alpha: np.ndarray, head: Surface, chosen: np.ndarray, rays: int, own: float
+    mesh: CardMesh,
+    alpha: np.ndarray,
+    head: Surface,
+    chosen: np.ndarray,
+    rays: int,
+    own_distance: float,
 ) -> np.ndarray:
     """Occlusion by cosine-distributed random rays against every triangle, vertex by vertex (Moeller
     and Trumbore 1997)."""
@@ -78,7 +83,7 @@ def brute_force(
     uv = np.concatenate([mesh.uv[mesh.triangles], np.zeros((len(head.triangles), 3, 2))])
     card = np.concatenate([mesh.card, np.full(len(head.triangles), -1)])
     owner = {int(v): int(c) for t, c in zip(mesh.triangles, mesh.card, strict=True) for v in t}
-    found = []
+    open_fractions = []
     for vertex in chosen.tolist():
         direction = random.normal(size=(rays, 3))
         direction /= np.linalg.norm(direction, axis=1, keepdims=True)
@@ -93,15 +98,15 @@ def brute_force(
         v = direction @ q.T / det
         t = np.einsum("ti,ti->t", q, two) / det
         hit = (u >= 0) & (v >= 0) & (u + v <= 1) & (t > 1e-4)
-        hit &= ~((card == owner[vertex]) & (t < own))
+        hit &= ~((card == owner[vertex]) & (t < own_distance))
         hit &= ~(is_head & (direction @ outwards.T > 0))
         place = (
             uv[:, 0] + u[..., None] * (uv[:, 1] - uv[:, 0]) + v[..., None] * (uv[:, 2] - uv[:, 0])
         )
         pixel = (np.clip(place, 0, 0.99999) * alpha.shape[::-1]).astype(int)
         through = np.where(is_head, 0.0, 1.0 - alpha[pixel[..., 1], pixel[..., 0]])
-        found.append(np.where(hit, through, 1.0).prod(axis=1).mean())
-    return np.array(found)
+        open_fractions.append(np.where(hit, through, 1.0).prod(axis=1).mean())
+    return np.array(open_fractions)
 
 
 def test_the_mean_error_against_brute_force_is_below_two_hundredths() -> None:
@@ -109,21 +114,21 @@ def test_the_mean_error_against_brute_force_is_below_two_hundredths() -> None:
     alpha = np.random.default_rng(4).random((64, 64)).astype(np.float32)
     alpha[:, 20:40] = 1.0
     settings = CardOcclusionSettings()
-    found = vertex_occlusion(mesh, [CardOccluder(mesh, alpha)], [head], settings)
-    chosen = np.random.default_rng(2).choice(len(found), 50, replace=False)
+    occlusion = vertex_occlusion(mesh, [CardOccluder(mesh, alpha)], [head], settings)
+    chosen = np.random.default_rng(2).choice(len(occlusion), 50, replace=False)
     through = (1.0 - alpha) ** settings.extinction
-    own = settings.self_occlusion_distance * diagonal_of(mesh)
-    expected = brute_force(mesh, 1.0 - through, head, chosen, 512, own)
+    own_distance = settings.self_occlusion_distance * diagonal_of(mesh)
+    expected = brute_force(mesh, 1.0 - through, head, chosen, 512, own_distance)
     assert expected.min() < 0.3 and expected.max() > 0.95  # it is not all alike
-    error = found[chosen] - expected
+    error = occlusion[chosen] - expected
     assert np.abs(error).mean() < 0.02
     assert abs(error.mean()) < 0.01
 
 
 def test_a_card_alone_is_open() -> None:
     mesh = hanging(1)
-    found = vertex_occlusion(mesh, [CardOccluder(mesh)], [], plain())
-    np.testing.assert_array_equal(found, 1.0)
+    occlusion = vertex_occlusion(mesh, [CardOccluder(mesh)], [], plain())
+    np.testing.assert_array_equal(occlusion, 1.0)
     nothing = vertex_occlusion(hanging(20), [], [], plain())
     np.testing.assert_array_equal(nothing, 1.0)
 
@@ -132,19 +137,21 @@ def test_a_card_that_lies_open_on_the_head_has_nearly_all_light() -> None:
     along = np.linspace(-0.04, 0.04, 9)
     top = np.stack([along, 0.0 * along, np.sqrt(0.105**2 - along**2)], axis=1)[None]
     mesh = build_cards(top.astype(np.float32), np.array([[0, 0, 1]], np.float32), CardSettings())
-    found = vertex_occlusion(mesh, [CardOccluder(mesh)], [globe(16)], plain())
-    assert found.min() > 0.97
+    occlusion = vertex_occlusion(mesh, [CardOccluder(mesh)], [globe(16)], plain())
+    assert occlusion.min() > 0.97
 
 
 @pytest.mark.slow(instead="test_the_mean_error_against_brute_force_is_below_two_hundredths")
 def test_deep_inside_it_is_dark_and_outside_light() -> None:
     mesh, head = hanging(600, layers=0.04), globe(16)
-    found = vertex_occlusion(mesh, [CardOccluder(mesh)], [head], CardOcclusionSettings(rays=128))
+    occlusion = vertex_occlusion(
+        mesh, [CardOccluder(mesh)], [head], CardOcclusionSettings(rays=128)
+    )
     from_middle = np.linalg.norm(mesh.positions[:, :2], axis=1)
     ring = (np.abs(mesh.positions[:, 2]) < 0.02) & (mesh.along > 0.05)
     inner = from_middle[ring] < np.quantile(from_middle[ring], 0.2)
     outer = from_middle[ring] > np.quantile(from_middle[ring], 0.95)
-    assert np.median(found[ring][inner]) < 0.2 < 0.6 < np.median(found[ring][outer])
+    assert np.median(occlusion[ring][inner]) < 0.2 < 0.6 < np.median(occlusion[ring][outer])
 
 
 @pytest.mark.slow
@@ -152,11 +159,11 @@ def test_below_a_wide_square_only_the_light_past_its_edge_arrives() -> None:
     """Against the form factor of a square above its middle: Lambert's formula, four equal edges."""
     mesh = stacked([0.0, 1.0])
     middle = stacked([0.0], size=1e-3)
-    found = vertex_occlusion(middle, [CardOccluder(mesh)], [], plain(rays=4096))
+    occlusion = vertex_occlusion(middle, [CardOccluder(mesh)], [], plain(rays=4096))
     # the first square lies in the plane of the vertices and blocks nothing
     slant = 1.0 / np.sqrt(2.0)
     blocked = 4.0 / (np.pi) * slant * np.arctan(slant)
-    np.testing.assert_allclose(found, 1.0 - blocked, atol=0.005)
+    np.testing.assert_allclose(occlusion, 1.0 - blocked, atol=0.005)
 
 
 @pytest.mark.parametrize("extinction", [1.0, 2.5])
@@ -168,8 +175,8 @@ def test_cards_let_one_minus_alpha_through_and_several_multiply(
     below = stacked([0.0], size=0.01)
     picture = np.full((4, 4), alpha, np.float32)
     settings = plain(extinction=extinction)
-    found = vertex_occlusion(below, [CardOccluder(shades, picture)], [], settings)
-    np.testing.assert_allclose(found, (1.0 - alpha) ** (3.0 * extinction), atol=0.01)
+    occlusion = vertex_occlusion(below, [CardOccluder(shades, picture)], [], settings)
+    np.testing.assert_allclose(occlusion, (1.0 - alpha) ** (3.0 * extinction), atol=0.01)
 
 
 def test_alpha_is_read_at_the_place_that_is_hit() -> None:
@@ -179,8 +186,8 @@ def test_alpha_is_read_at_the_place_that_is_hit() -> None:
     half[:, 4:] = 1.0
     for shift, expected in ((-0.5, 1.0), (0.5, 0.0), (0.0, 0.5)):
         moved = replace(below, positions=below.positions + np.array([shift, 0.0, 0.0], np.float32))
-        found = vertex_occlusion(moved, [CardOccluder(shades, half)], [], plain())
-        np.testing.assert_allclose(found, expected, atol=0.06)
+        occlusion = vertex_occlusion(moved, [CardOccluder(shades, half)], [], plain())
+        np.testing.assert_allclose(occlusion, expected, atol=0.06)
 
 
 def test_both_sides_of_a_card_shade_and_what_is_behind_does_not() -> None:
@@ -189,8 +196,8 @@ def test_both_sides_of_a_card_shade_and_what_is_behind_does_not() -> None:
         shades = stacked([height], size=50.0)
         for turned in (shades.triangles, shades.triangles[:, ::-1]):
             card = replace(shades, triangles=turned)
-            found = vertex_occlusion(below, [CardOccluder(card)], [], plain())
-            np.testing.assert_allclose(found, expected, atol=0.01)
+            occlusion = vertex_occlusion(below, [CardOccluder(card)], [], plain())
+            np.testing.assert_allclose(occlusion, expected, atol=0.01)
 
 
 def test_roots_below_the_skin_are_not_dark() -> None:
@@ -200,8 +207,8 @@ def test_roots_below_the_skin_are_not_dark() -> None:
     mesh = build_cards(
         leaning[None].astype(np.float32), np.array([[1, 0, 0]], np.float32), CardSettings()
     )
-    found = vertex_occlusion(mesh, [CardOccluder(mesh)], [globe(16)], plain())
-    assert found[mesh.along == 0.0].min() > 0.4  # half its sky is below the horizon
+    occlusion = vertex_occlusion(mesh, [CardOccluder(mesh)], [globe(16)], plain())
+    assert occlusion[mesh.along == 0.0].min() > 0.4  # half its sky is below the horizon
 
 
 def test_a_card_that_curls_over_itself_shades_itself_beyond_its_own_reach() -> None:
@@ -231,15 +238,15 @@ def test_other_grooms_and_bodies_shade_as_well_and_only_within_the_reach() -> No
 
 @pytest.mark.parametrize("factor", [2.0**-10, 2.0**10])
 def test_occlusion_is_the_same_at_any_scale(factor: float) -> None:
-    def found(scale: float) -> np.ndarray:
+    def at_scale(scale: float) -> np.ndarray:
         mesh, head = hanging(40), globe(16)
         mesh = replace(mesh, positions=mesh.positions * np.float32(scale))
         head = replace(head, positions=head.positions * np.float32(scale))
         return vertex_occlusion(mesh, [CardOccluder(mesh)], [head], CardOcclusionSettings(rays=64))
 
-    one = found(1.0)
+    one = at_scale(1.0)
     assert one.min() < 0.5
-    np.testing.assert_allclose(found(factor), one, atol=1e-4)
+    np.testing.assert_allclose(at_scale(factor), one, atol=1e-4)
 
 
 def test_a_mesh_of_other_cards_shades_as_the_cards_themselves() -> None:
@@ -247,10 +254,13 @@ def test_a_mesh_of_other_cards_shades_as_the_cards_themselves() -> None:
     alpha = np.random.default_rng(2).random((16, 16)).astype(np.float32)
     mesh = Surface(other.positions, other.triangles, other.uv[other.triangles])
     shades = CardOccluder(other, alpha), CardOccluder.of_surface(mesh, alpha)
-    found = [vertex_occlusion(first, [CardOccluder(first), each], [], plain()) for each in shades]
-    np.testing.assert_allclose(found[0], found[1], atol=1e-5)
+    occlusion = [
+        vertex_occlusion(first, [CardOccluder(first), each], [], plain()) for each in shades
+    ]
+    np.testing.assert_allclose(occlusion[0], occlusion[1], atol=1e-5)
     assert (
-        found[0].mean() < vertex_occlusion(first, [CardOccluder(first)], [], plain()).mean() - 0.02
+        occlusion[0].mean()
+        < vertex_occlusion(first, [CardOccluder(first)], [], plain()).mean() - 0.02
     )
 
 

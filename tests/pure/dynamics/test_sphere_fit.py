@@ -255,5 +255,5 @@ def test_the_error_is_the_root_mean_square():
     ],
     ids=["none", "two", "one place", "line", "nan"],
 )
-def test_what_cannot_be_told(points):
+def test_points_that_fix_no_similarity_give_none(points):
     assert fit_similarity(points, points) is None

@@ -190,7 +190,7 @@ def test_no_roots_where_the_density_is_zero(egg: Surface) -> None:
 # --- bad input -----------------------------------------------------------------------------------
 
 
-def test_nowhere_to_grow_is_told(egg: Surface) -> None:
+def test_nowhere_to_grow_is_reported(egg: Surface) -> None:
     flat = Surface(np.zeros((3, 3)), [[0, 1, 2]])
     no_faces = Surface(np.zeros((3, 3)), np.zeros((0, 3)))
     for surface in (flat, no_faces):

@@ -193,7 +193,7 @@ def test_a_brush_moves_those_alone_that_it_touches() -> None:
     assert len(fewer) / len(inside) == pytest.approx(0.4 * len(more) / len(outside), rel=0.15)
 
 
-def test_a_painted_area_without_guides_stays_bare_and_is_told() -> None:
+def test_a_painted_area_without_guides_stays_bare_and_is_reported() -> None:
     surface = sheet(20, 10.0)
     guides = spread_guides(surface, 100)
     children = make_children(guides, surface, children_settings(), np.ones(441), place="test")
@@ -477,7 +477,7 @@ def test_children_are_the_same_at_any_scale(
 # --- bad input -----------------------------------------------------------------------------------
 
 
-def test_no_guides_and_nowhere_to_grow_are_told(egg: Surface, groomed: StrandSet) -> None:
+def test_no_guides_and_nowhere_to_grow_are_reported(egg: Surface, groomed: StrandSet) -> None:
     with pytest.raises(HairloomError, match="no guides"):
         make_children(groomed.take(np.zeros(0, np.int64)), egg, children_settings(), place="test")
     with pytest.raises(HairloomError, match="no area"):

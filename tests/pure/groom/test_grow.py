@@ -226,7 +226,7 @@ def test_all_extremes_of_the_sliders_give_finite_hair(egg: Surface, extreme: str
     assert (strands.lengths() > 0.0).all()
 
 
-def test_a_head_without_faces_is_told(egg: Surface) -> None:
+def test_a_head_without_faces_is_reported(egg: Surface) -> None:
     with pytest.raises(HairloomError):
         grow(Surface(egg.positions, np.zeros((0, 3))), SMALL)
 

@@ -52,11 +52,11 @@ def rig_of(
     settings: ChildrenSettings,
     masks: Masks = NO_MASKS,
     cache: ResultCache = NO_CACHE,
-    own: StrandSet | None = None,
+    strands: StrandSet | None = None,
 ) -> rig_flow.Rig:
     placement = rig_flow.ChildPlacement(masks=masks)
     return rig_flow.prepare(
-        own or wig_strands(),
+        strands or wig_strands(),
         HEAD,
         GUIDES,
         place="a wig",
@@ -80,13 +80,13 @@ def test_all_that_may_be_painted_is_declared() -> None:
     of_motion = {"gravity", "damping", "style_root", "style_tip", "style_damping", "bend", "volume"}
     assert mask_parameters(DynamicsSettings).keys() == of_motion | {"influence"}
     named = {"clump_mask": "Crown", "frizz_mask": "", "width_mask": "Front"}
-    for method, found in (
+    for method, expected in (
         ("multi", {"clump": "Crown", "width": "Front"}),
         ("auto", {"width": "Front"}),
         ("none", {}),
     ):
         settings = ChildrenSettings.from_dict({"method": method, **named}, "test")
-        assert mask_names(settings) == found
+        assert mask_names(settings) == expected
 
 
 @pytest.mark.parametrize("name", mask_parameters(ChildrenSettings))
@@ -111,9 +111,9 @@ def test_curls_are_multiplied() -> None:
     smooth = BOLD.from_dict(BOLD.as_dict() | plain, "test")
 
     def aside(weights: Floats) -> Floats:
-        made = make_children(guides, HEAD, smooth, masks=on_head("curl", weights), place="test")
-        grid = made.strands.grid
-        again = made.growth.shapes(guides.grid, np.arange(len(grid)))
+        grown = make_children(guides, HEAD, smooth, masks=on_head("curl", weights), place="test")
+        grid = grown.strands.grid
+        again = grown.growth.shapes(guides.grid, np.arange(len(grid)))
         np.testing.assert_allclose(again, grid, atol=1e-6, err_msg="as a brush shapes them")
         grid = grid.astype(np.float64) - grid[:, :1]
         chord = grid[:, -1:] / np.linalg.norm(grid[:, -1:], axis=2, keepdims=True)
@@ -175,13 +175,13 @@ def test_a_brush_gives_what_a_rebuild_makes_and_shapes_no_others(name: str) -> N
 
 
 def test_only_rows_that_are_painted_are_made_again() -> None:
-    made: list[int] = []
+    row_counts: list[int] = []
 
     class Counted(ResultCache):
         def rows(self, name, fixed, rows, make):  # type: ignore[no-untyped-def]
             def counted(some):  # type: ignore[no-untyped-def]
                 if name == "varied":
-                    made.append(len(some))
+                    row_counts.append(len(some))
                 return make(some)
 
             return super().rows(name, fixed, rows, counted)
@@ -189,7 +189,7 @@ def test_only_rows_that_are_painted_are_made_again() -> None:
     cache = Counted()
     rig_of(BOLD, NO_MASKS, cache)
     again = rig_of(BOLD, on_head("frizz", HALF), cache)
-    assert made[0] == 3000 and 1500 < made[1] < 2000
+    assert row_counts[0] == 3000 and 1500 < row_counts[1] < 2000
     np.testing.assert_array_equal(children(again), children(rig_of(BOLD, on_head("frizz", HALF))))
 
 
@@ -236,8 +236,8 @@ def test_an_image_is_seen_as_bilinear_sampling_says() -> None:
     pixels, uv = random.random((5, 7), np.float32), random.random((9, 3, 2), np.float32)
     triangle, barycentric = random.integers(0, 9, 50), random.dirichlet(np.ones(3), 50)
     places = Places(triangle, barycentric, np.zeros((50, 1), int), np.ones((50, 1)))
-    found = ImageMask(pixels, uv).at(places)
-    for number, value in enumerate(found):
+    values = ImageMask(pixels, uv).at(places)
+    for number, value in enumerate(values):
         x, y = barycentric[number] @ uv[triangle[number]] * (7, 5) - 0.5
         around = 0.0
         for column in (int(np.floor(x)), int(np.floor(x)) + 1):
@@ -251,28 +251,30 @@ def test_an_image_is_seen_as_bilinear_sampling_says() -> None:
 def test_what_is_painted_on_curves_is_mixed_as_their_points_are() -> None:
     """With `along` painted at each point, guides have it at their CVs, and 0.5 as a whole; between
     two curves, values are interpolated."""
-    own = wig_strands()
-    along = np.concatenate([np.linspace(0.0, 1.0, count) for count in own.point_counts])
-    mask = StrandMask.of_points(own, along.astype(np.float32))
-    np.testing.assert_allclose(mask.at_points(own), along, atol=1e-5)
-    guides = Places.of_strands(own, np.array([3, 5]))
+    strands = wig_strands()
+    along = np.concatenate([np.linspace(0.0, 1.0, count) for count in strands.point_counts])
+    mask = StrandMask.of_points(strands, along.astype(np.float32))
+    np.testing.assert_allclose(mask.at_points(strands), along, atol=1e-5)
+    guides = Places.of_strands(strands, np.array([3, 5]))
     even = np.linspace(0.0, 1.0, 9)[:, None].repeat(2, 1)
     np.testing.assert_allclose(mask.along(guides, 9), even, atol=1e-5)
     np.testing.assert_allclose(mask.at(guides), 0.5, atol=1e-6)
-    numbers = StrandMask(np.arange(own.strand_count, dtype=np.float32)[:, None])
+    numbers = StrandMask(np.arange(strands.strand_count, dtype=np.float32)[:, None])
     between = Places(None, None, np.array([[2, 6]]), np.array([[0.25, 0.75]]))
     assert numbers.at(between) == pytest.approx(5.0)
-    assert numbers.for_strands(np.array([4, 9])).at(Places.of_strands(own, np.array([1]))) == 9.0
+    assert (
+        numbers.for_strands(np.array([4, 9])).at(Places.of_strands(strands, np.array([1]))) == 9.0
+    )
 
 
 def test_children_take_what_is_painted_on_their_guides() -> None:
     """Where guides are painted 0, children are as with the setting at 0. Brows come first, so that
     guides of children have other indices than curves."""
-    own = replace(wig_strands(), group=np.where(np.arange(60) < 9, BROWS, 0))
-    is_right = own.roots[:, 0] > 0.0
+    strands = replace(wig_strands(), group=np.where(np.arange(60) < 9, BROWS, 0))
+    is_right = strands.roots[:, 0] > 0.0
     masks = Masks({"frizz": StrandMask(is_right.astype(np.float32)[:, None])})
-    masked, whole = rig_of(BOLD, masks, own=own), rig_of(BOLD, own=own)
-    none = rig_of(BOLD, on_head("frizz", 0.0 * ONES), own=own)
+    masked, whole = rig_of(BOLD, masks, strands=strands), rig_of(BOLD, strands=strands)
+    none = rig_of(BOLD, on_head("frizz", 0.0 * ONES), strands=strands)
     guide = masked.grown_children.growth.weights.guide
     are_right = is_right[masked.grown_children.parents][guide].all(axis=1)
     are_left = ~is_right[masked.grown_children.parents][guide].any(axis=1)
@@ -292,10 +294,10 @@ def test_guides_of_a_rig_have_their_own_factors() -> None:
             "bend": StrandMask(np.arange(rig.own_count, dtype=np.float32)[:, None]),
         }
     )
-    found = painted_guides(rig, masks)
+    painted = painted_guides(rig, masks)
     root = rig.strands.roots[rig.guides]
-    assert found.factors["gravity"].shape == (1, len(rig.guides))
-    np.testing.assert_array_equal(found.factors["gravity"][0, root[:, 0] > 0.04], 1.0)
-    np.testing.assert_array_equal(found.factors["gravity"][0, root[:, 0] < -0.04], 0.0)
-    np.testing.assert_array_equal(found.factors["bend"][0], rig.guides)
+    assert painted.factors["gravity"].shape == (1, len(rig.guides))
+    np.testing.assert_array_equal(painted.factors["gravity"][0, root[:, 0] > 0.04], 1.0)
+    np.testing.assert_array_equal(painted.factors["gravity"][0, root[:, 0] < -0.04], 0.0)
+    np.testing.assert_array_equal(painted.factors["bend"][0], rig.guides)
     assert painted_guides(rig, Masks({"bend": StrandMask(np.ones((7, 1)))})) is None

@@ -232,7 +232,7 @@ def test_weights_that_cannot_be_used_are_named(egg: Surface, settings: GrowSetti
         assert caught.value.place == "length"
 
 
-def test_nowhere_to_grow_is_told(egg: Surface) -> None:
+def test_nowhere_to_grow_is_reported(egg: Surface) -> None:
     top = (egg.positions[:, 2] > 0.05).astype(float)
     bottom = (egg.positions[:, 2] < -0.05).astype(float)
     flat = Surface(np.zeros((3, 3)), [[0, 1, 2]])

@@ -54,7 +54,7 @@ def test_a_turn_in_place_turns_the_hair(ball, hair):
     assert found.on(posed).points == pytest.approx(turned(hair.points), abs=1e-5)
 
 
-def test_far_away_it_is_told_without_uvs(ball, hair):
+def test_far_away_it_is_reported_without_uvs(ball, hair):
     shift = (5.0, 0.0, 1.0)
     posed = replace(ball, positions=turned(ball.positions, 0.7, shift))
     found = RestHair.find(replace(hair, root_uv=None), [ball], posed)

@@ -136,7 +136,9 @@ def test_frames_are_right_handed_rotations_even_on_broken_triangles() -> None:
 
 
 @pytest.mark.parametrize("unit", [100.0, 1000.0, 0.01, 1 / 0.0254, 1 / 0.3048])
-def test_a_groom_in_another_unit_is_told_with_the_factor_back(egg: Surface, unit: float) -> None:
+def test_a_groom_in_another_unit_is_reported_with_the_factor_back(
+    egg: Surface, unit: float
+) -> None:
     strands = hair_on(egg, 200).transformed(np.diag([unit, unit, unit, 1.0]))
     with pytest.raises(HairloomError) as caught:
         bind_roots(strands, egg, place="hair.tfx")
@@ -193,7 +195,7 @@ def test_few_stray_roots_and_loose_fits_are_no_scale_error(egg: Surface) -> None
     assert bind_roots(strands.with_points(points), egg, place="test").strands.is_bound
 
 
-def test_no_strands_bind_and_no_faces_are_told(egg: Surface) -> None:
+def test_no_strands_bind_and_no_faces_are_reported(egg: Surface) -> None:
     strands = hair_on(egg, 3)
     none = bind_roots(strands.take(np.zeros(0, np.int64)), egg, place="test").strands
     assert none.is_bound

@@ -62,7 +62,7 @@ def test_roots_keep_their_distance_better_than_chance(egg: Surface) -> None:
     assert np.median(nearest(roots)) > 1.1 * np.median(nearest(white))
 
 
-def test_no_area_to_grow_on_is_told(egg: Surface) -> None:
+def test_no_area_to_grow_on_is_reported(egg: Surface) -> None:
     flat = Surface(np.zeros((3, 3)), [[0, 1, 2]])
     no_faces = Surface(np.zeros((3, 3)), np.zeros((0, 3)))
     nowhere = np.zeros(len(egg.positions))

@@ -94,7 +94,7 @@ def test_plain_data_comes_back_and_missing_names_keep_their_default() -> None:
     assert Sample.from_dict({"kind": "flat"}, "here") == Sample(kind="flat")
 
 
-def test_an_unknown_name_is_refused_and_near_ones_are_told() -> None:
+def test_an_unknown_name_is_refused_and_near_ones_are_suggested() -> None:
     with pytest.raises(
         HairloomError, match=r"unknown sample parameter 'wdth'\. Did you mean width"
     ):

@@ -90,8 +90,8 @@ def one_by_one(rest: Floats, weights: GuideWeights, guides: Floats, now: Floats)
             was, way = (np.diff(each[guide], axis=0)[segment] for each in (guides, now))
             turn = turning(turn @ was, way) @ turn
             turns[guide, segment] = turn
-    found = rest.copy()
-    for strand, guide_of, weight_of in zip(found, weights.guide, weights.weight, strict=True):
+    ridden = rest.copy()
+    for strand, guide_of, weight_of in zip(ridden, weights.guide, weights.weight, strict=True):
         edges = np.diff(strand, axis=0)
         line = center_lines(set_of(strand, np.array([0, len(strand)])), guides.shape[1])
         reach = line.lengths()[0] / np.linalg.norm(edges, axis=1).sum()
@@ -109,7 +109,7 @@ def one_by_one(rest: Floats, weights: GuideWeights, guides: Floats, now: Floats)
                 blend += weight * (near + (place - before) * (far - near))
             strand[segment + 1] = strand[segment] + rotation(blend) @ edge
             reached += np.linalg.norm(edge)
-    return found
+    return ridden
 
 
 @pytest.mark.parametrize(("strand_count", "cv_count"), [(1, 2), (40, 9), (30, 40)])
@@ -117,9 +117,9 @@ def test_agrees_with_the_rotations_one_by_one(strand_count: int, cv_count: int) 
     guides = walks(8, 7, 2)
     now = walks(8, 7, 3)
     rest, weights = walks(strand_count, cv_count, 4), random_weights(strand_count, 8)
-    found = rode(rest, weights, guides, now)
-    assert found.dtype == np.float32
-    assert found == pytest.approx(one_by_one(rest, weights, guides, now), abs=2e-6)
+    ridden = rode(rest, weights, guides, now)
+    assert ridden.dtype == np.float32
+    assert ridden == pytest.approx(one_by_one(rest, weights, guides, now), abs=2e-6)
 
 
 def test_small_turns_need_no_look_at_their_signs(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -136,9 +136,9 @@ def test_small_turns_need_no_look_at_their_signs(monkeypatch: pytest.MonkeyPatch
 
 def test_guides_at_rest_leave_every_bit() -> None:
     guides, rest, weights = walks(20, 7, 2), walks(1000, 12, 3), random_weights(1000, 20)
-    found = rode(rest, weights, guides, guides)
-    assert (found == rest).all()
-    found += 1.0
+    ridden = rode(rest, weights, guides, guides)
+    assert (ridden == rest).all()
+    ridden += 1.0
     assert (rest == walks(1000, 12, 3)).all(), "the result is no view of the input"
 
 
@@ -166,17 +166,17 @@ def test_every_segment_keeps_its_length_however_wildly_guides_move() -> None:
     guides, rest, weights = walks(20, 16, 2), walks(500, 30, 3), random_weights(500, 20)
     now = guides + np.random.default_rng(5).normal(scale=0.05, size=guides.shape)
     now[:, 0] = guides[:, 0]
-    found = rode(rest, weights, guides, now)
-    assert np.abs(found - rest).max() > 0.1
-    assert lengths(found) == pytest.approx(lengths(rest), abs=2e-7)
-    assert (found[:, 0] == rest[:, 0]).all()
+    ridden = rode(rest, weights, guides, now)
+    assert np.abs(ridden - rest).max() > 0.1
+    assert lengths(ridden) == pytest.approx(lengths(rest), abs=2e-7)
+    assert (ridden[:, 0] == rest[:, 0]).all()
 
 
 def test_a_strand_that_is_a_guide_goes_where_the_guide_goes() -> None:
     guides, now = walks(20, 16, 2), walks(20, 16, 3)
     now += guides[:, :1] - now[:, :1]
-    found = rode(guides, on_one_guide(np.arange(20)), guides, now)
-    assert found == pytest.approx(now, abs=1e-6)
+    ridden = rode(guides, on_one_guide(np.arange(20)), guides, now)
+    assert ridden == pytest.approx(now, abs=1e-6)
 
 
 def coil(turns: int, cv_count: int, length: float = 0.2, radius: float = 0.008) -> Floats:
@@ -194,12 +194,14 @@ def test_a_coil_stays_this_coil_on_a_guide_that_bends_to_an_arc() -> None:
     line = center_lines(coils, 16).grid
     angle, away = -line[..., 2] / bend, bend - line[..., 0]
     places = [bend - away * np.cos(angle), line[..., 1], -away * np.sin(angle)]
-    found = ride(strand, Riders.of(coils, line, on_one_guide([0])), line, np.stack(places, axis=-1))
-    assert lengths(found[None]).sum() == pytest.approx(lengths(strand[None]).sum(), rel=1e-6)
+    ridden = ride(
+        strand, Riders.of(coils, line, on_one_guide([0])), line, np.stack(places, axis=-1)
+    )
+    assert lengths(ridden[None]).sum() == pytest.approx(lengths(strand[None]).sum(), rel=1e-6)
     # from the middle of the arc's circle, the windings reach as far in as out
-    radius = np.hypot(np.hypot(found[:, 0] - bend, found[:, 2]) - bend, found[:, 1])
+    radius = np.hypot(np.hypot(ridden[:, 0] - bend, ridden[:, 2]) - bend, ridden[:, 1])
     assert radius == pytest.approx(0.008, rel=0.06)
-    assert found[-1, 2] == pytest.approx(-bend, abs=0.01)
+    assert ridden[-1, 2] == pytest.approx(-bend, abs=0.01)
 
 
 def test_guides_that_fold_back_turn_nothing_further_than_themselves() -> None:
@@ -210,10 +212,10 @@ def test_guides_that_fold_back_turn_nothing_further_than_themselves() -> None:
         now = straight.copy()
         now[0, 8:, 2] = straight[0, 7, 2] + SPACING * np.arange(1, 9)
         now[0, 8:, 0] = slip
-        found = rode(rest, on_one_guide([0]), straight, now)
-        assert np.isfinite(found).all()
-        assert lengths(found) == pytest.approx(lengths(rest), abs=2e-7)
-        before, after = (np.diff(each[0], axis=0) / SPACING for each in (rest, found))
+        ridden = rode(rest, on_one_guide([0]), straight, now)
+        assert np.isfinite(ridden).all()
+        assert lengths(ridden) == pytest.approx(lengths(rest), abs=2e-7)
+        before, after = (np.diff(each[0], axis=0) / SPACING for each in (rest, ridden))
         cosine = (before * after).sum(axis=1) / (lengths(rest)[0] / SPACING) ** 2
         assert (cosine[:7] > 0.999).all(), "what hangs above the fold stays"
 
@@ -233,9 +235,9 @@ def test_points_that_coincide_stay_finite() -> None:
     rest[1] = rest[1, :1]
     now = walks(3, 8, 4)
     now[2, 2] = now[2, 1]
-    found = rode(rest, random_weights(9, 3), guides, now)
-    assert np.isfinite(found).all()
-    assert lengths(found) == pytest.approx(lengths(rest), abs=2e-7)
+    ridden = rode(rest, random_weights(9, 3), guides, now)
+    assert np.isfinite(ridden).all()
+    assert lengths(ridden) == pytest.approx(lengths(rest), abs=2e-7)
 
 
 def test_guides_that_turn_against_each_other_by_half_a_turn() -> None:
@@ -246,8 +248,8 @@ def test_guides_that_turn_against_each_other_by_half_a_turn() -> None:
         arms = (guides[guide] - guides[guide, 0]) @ rotation(np.array(axis)).T
         now[guide] = arms + guides[guide, 0]
     weights = GuideWeights(np.int32([[0, 1, 1]]), np.float32([[0.5, 0.5, 0.0]]))
-    found = rode(walks(1, 12, 3), weights, guides, now)
-    assert np.isfinite(found).all()
+    ridden = rode(walks(1, 12, 3), weights, guides, now)
+    assert np.isfinite(ridden).all()
 
 
 def test_guides_that_came_to_one_direction_from_two_sides_agree() -> None:
@@ -261,9 +263,9 @@ def test_guides_that_came_to_one_direction_from_two_sides_agree() -> None:
         now[guide, 1:] = now[guide, 0] + steps.cumsum(axis=0)
     guide, weight = [[2, 2, 2], [0, 1, 1]], [[1.0, 0.0, 0.0], [0.5, 0.5, 0.0]]
     weights = GuideWeights(np.int32(guide), np.float32(weight))
-    found = rode(straight[[2, 0]], weights, straight, now)
-    assert np.diff(found[1], axis=0)[-1] == pytest.approx(np.diff(now[0], axis=0)[-1], abs=1e-5)
-    assert np.array_equal(found[0], straight[2])
+    ridden = rode(straight[[2, 0]], weights, straight, now)
+    assert np.diff(ridden[1], axis=0)[-1] == pytest.approx(np.diff(now[0], axis=0)[-1], abs=1e-5)
+    assert np.array_equal(ridden[0], straight[2])
 
 
 @pytest.mark.parametrize("strand_count", [0, 1, 700, 2500])
@@ -275,12 +277,14 @@ def test_strands_of_any_number_of_points(strand_count: int) -> None:
     offsets = np.concatenate([[0], np.cumsum(counts)])
     strands = [walk[:count] for walk, count in zip(walks(strand_count, 30, 4), counts, strict=True)]
     points = np.concatenate([np.zeros((0, 3), np.float32), *strands])
-    found = ride(points, Riders.of(set_of(points, offsets), guides, weights), guides, now)
-    assert found.shape == points.shape
+    ridden = ride(points, Riders.of(set_of(points, offsets), guides, weights), guides, now)
+    assert ridden.shape == points.shape
     for strand in range(0, strand_count, 37):
-        own = GuideWeights(weights.guide[strand : strand + 1], weights.weight[strand : strand + 1])
-        alone = rode(strands[strand][None], own, guides, now)[0]
-        assert found[offsets[strand] : offsets[strand + 1]] == pytest.approx(alone, abs=1e-6)
+        own_weights = GuideWeights(
+            weights.guide[strand : strand + 1], weights.weight[strand : strand + 1]
+        )
+        alone = rode(strands[strand][None], own_weights, guides, now)[0]
+        assert ridden[offsets[strand] : offsets[strand + 1]] == pytest.approx(alone, abs=1e-6)
 
 
 def test_riding_takes_little_more_memory_than_its_result() -> None:

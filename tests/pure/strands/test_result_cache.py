@@ -109,7 +109,7 @@ def test_only_new_rows_are_made() -> None:
     assert len(computed_rows(rows, key, NO_CACHE, factor=3)) == 50
 
 
-def test_rows_that_swap_two_numbers_are_told_apart() -> None:
+def test_rows_that_swap_two_numbers_are_distinguished() -> None:
     rows = np.array([[1.0, 2.0], [2.0, 1.0], [1.0, 2.0]], np.float32)
     cache = ResultCache()
 

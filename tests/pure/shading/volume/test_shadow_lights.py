@@ -48,7 +48,7 @@ def test_lights_that_cast_all_their_shadow_give_no_warning() -> None:
     assert warnings_of(point(0.1, 0.0, 1.5), settings=VolumeSettings(shadows="none")) == ()
 
 
-def test_a_light_amidst_the_hair_is_told_by_its_name() -> None:
+def test_a_light_amidst_the_hair_is_reported_by_its_name() -> None:
     (warning,) = warnings_of(SUN, point(0.1, 0.02, 1.5))
     assert warning.startswith("Lamp: it stands inside the hair") and "0.21 m" in warning
     assert shadow_frames([SUN, point(0.1, 0.02, 1.5)], BALL, DEEP)[1] is None
@@ -62,7 +62,7 @@ def test_of_a_light_as_near_as_hair_reaches_a_part_has_no_shadow() -> None:
 
 
 @pytest.mark.parametrize("place", [(0.31, 0.0, 1.5), (1.0, 0.0, 1.5), (-1.0, 0.9, 1.5)])
-def test_a_spot_that_misses_the_hair_is_told(place: tuple[float, float, float]) -> None:
+def test_a_spot_that_misses_the_hair_is_reported(place: tuple[float, float, float]) -> None:
     (warning,) = warnings_of(spot(*place))
     assert warning.startswith("Spot: it shines past the hair")
 
@@ -76,14 +76,14 @@ def test_a_spot_of_a_scaled_object_lights_as_far_as_its_cone_is_squeezed() -> No
     assert light_irradiance(wide, place).all() and warnings_of(wide) == ()
 
 
-def test_a_panel_with_its_back_to_the_hair_is_told() -> None:
+def test_a_panel_with_its_back_to_the_hair_is_reported() -> None:
     panel = Panel((0, 1, 0), (0, 0, 1), (1.0, 0.0, 0.0), 0.1, 0.1, False, np.pi)
     lamp = replace(Light.area((1.0, 0.0, 1.5), (1, 1, 1), 9.0, panel), name="Area")
     assert warnings_of(lamp)[0].startswith("Area: it shines past the hair")
     assert warnings_of(replace(lamp, vector=(-1.0, 0.0, 1.5))) == ()
 
 
-def test_lights_beyond_those_that_throw_shadows_are_told_where_they_are_much() -> None:
+def test_lights_beyond_those_that_throw_shadows_are_reported_where_they_are_much() -> None:
     lights = [point(np.cos(turn), np.sin(turn), 1.5) for turn in range(20)]
     (warning,) = warnings_of(*lights)
     assert "the 2 strongest of 20" in warning and f"Raise {LABELS['max_lights']}," in warning
@@ -98,10 +98,10 @@ def test_lights_beyond_those_that_throw_shadows_are_told_where_they_are_much() -
         ("max_lights", 0, "is 0"),
     ],
 )
-def test_settings_that_leave_no_shadow_are_told(name: str, value: float, word: str) -> None:
+def test_settings_that_leave_no_shadow_are_reported(name: str, value: float, word: str) -> None:
     (warning,) = warnings_of(SUN, settings=replace(DEEP, **{name: value}))
     assert word in warning and LABELS[name] in warning
 
 
-def test_hair_without_extent_is_told() -> None:
+def test_hair_without_extent_is_reported() -> None:
     assert "no extent" in warnings_of(SUN, ball=Ball(np.zeros(3), 1.2e-9))[0]
